@@ -1,0 +1,1 @@
+"""Fault estimation, decision, metrics and reports on a replayed mission."""

@@ -1,0 +1,1 @@
+"""The HTML mission report, built from a saved result."""

@@ -1,0 +1,37 @@
+"""Errors that a user can act on; anything else is a bug.
+
+    MfhcaError
+    ├── ConfigError      exit 2   usage, options or the machine file
+    │   └── OutputError  exit 2   a result cannot be written
+    └── LogError         exit 3   a log cannot be read
+        └── NotJudged    exit 3   a readable log in which nothing can be judged
+
+A message is one sentence or two: the file and the place in it, what was found, what was expected,
+and what to do.
+"""
+
+
+class MfhcaError(Exception):
+    """Base of every error that the command line prints as one line."""
+
+    exit_code = 70
+
+
+class ConfigError(MfhcaError):
+    """The command's words or the machine file are off."""
+
+    exit_code = 2
+
+
+class OutputError(ConfigError):
+    """A result cannot be written where it was asked for."""
+
+
+class LogError(MfhcaError):
+    """A log, or one place in it, cannot be read."""
+
+    exit_code = 3
+
+
+class NotJudged(LogError):
+    """The log is readable, but it holds nothing from which a fault could be judged."""

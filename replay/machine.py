@@ -1,0 +1,389 @@
+"""The machine: geometry, control law, limits and where its signals are recorded.
+
+Defaults are the paper's Haulotte 16RTJ PRO with signals found automatically.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Literal
+
+from replay.errors import ConfigError
+from replay.units import quantity_of
+
+Law = Literal["auto", "signed", "opposed", "printed", "sign_abs", "none"]
+PsiMode = Literal["auto", "printed", "implied", "event_reset", "forced"]
+Coupling = Literal["auto", "free", "ground"]
+StampClock = Literal["header", "log", "publish"]
+PhiDot = Literal["command", "measured", "zero"]
+
+LAWS: tuple[str, ...] = ("auto", "signed", "opposed", "printed", "sign_abs", "none")
+PSI_MODES: tuple[str, ...] = ("auto", "printed", "implied", "event_reset", "forced")
+
+
+def check_range(key: str, value: float, low: float, high: float, unit: str) -> None:
+    """Raise a `ConfigError` that names the key, the value, the unit and the range."""
+    if not low <= value <= high:
+        raise ConfigError(f"{key} = {value:g} {unit} is out of range; expected {low:g} to {high:g} {unit}")
+
+
+@dataclass(frozen=True)
+class WheelGeometry:
+    """One drive wheel on its steering joint (frame REP-103 at the machine's centre).
+
+    Attributes
+    ----------
+    x, y : float
+        Steering joint [m]; x forward, y left.
+    offset : float
+        Distance from joint to wheel centre along the wheel's axle [m], positive to the left (d_i of L1 (1)).
+    axle : str
+        Steering axle: ``front``, ``rear``, the wheel's own name, or ``fixed``.
+    """
+
+    x: float
+    y: float
+    offset: float
+    axle: str
+
+
+@dataclass(frozen=True)
+class Geometry:
+    """Where the wheels are. `wheels` is keyed by wheel name."""
+
+    wheels: Mapping[str, WheelGeometry]
+    wheel_diameter: float
+
+    def __post_init__(self) -> None:
+        """Check lengths."""
+        check_range("geometry.wheel_diameter", self.wheel_diameter, 0.02, 5.0, "m")
+        for name, w in self.wheels.items():
+            for key, value in (("x", w.x), ("y", w.y)):
+                check_range(f"geometry.{name}.{key}", value, -20.0, 20.0, "m")
+            check_range(f"geometry.{name}.offset", w.offset, -2.0, 2.0, "m")
+
+    @property
+    def axles(self) -> tuple[str, ...]:
+        """Steered axles in order of first use."""
+        return tuple(dict.fromkeys(w.axle for w in self.wheels.values() if w.axle != "fixed"))
+
+    def axle_x(self, axle: str) -> float:
+        """Position of an axle along the machine [m]: mean x of its joints."""
+        xs = [w.x for w in self.wheels.values() if w.axle == axle]
+        return sum(xs) / len(xs)
+
+
+@dataclass(frozen=True)
+class Control:
+    """The MFHCA law and its readings (L15 (14), L16 (13), L17 (15)).
+
+    Attributes
+    ----------
+    law : str
+        ``signed`` u = −λ(v−v_c) + sgn(v_c)Ψ̂²; ``opposed`` u = −λ(v−v_c) − sgn(e)Ψ̂²; ``printed``
+        u = −λ|v| + λ|v_c| + Ψ̂²; ``sign_abs`` sgn(v_c)[λ(|v_c|−|v|) + Ψ̂²]; ``auto`` fits the law to the recorded
+        command; ``none`` means another controller.
+    psi : str
+        How Ψ̂ is replayed; see `replay.mfhca`.
+    lambda_ : float
+        λ [s/m].
+    xi, beta : float
+        ξ, β of L16 (13) [1/s].
+    zeta : float
+        Forcing of the ``forced`` mode [s/m²].
+    k_ps : float
+        Steering gain of L17 (15) [1/rad].
+    u_max : float
+        Saturation of the valve command [fraction].
+    psi0 : float or None
+        Ψ̂(0); None fits it where u is recorded, else 0.
+    phi_dot : str
+        Source of φ̇ in ω_j = ω_b + φ̇ (L1 (1)).
+    phi_dot_hz : float
+        Cut-off of the low-pass on φ̇ [Hz].
+    """
+
+    law: Law = "auto"
+    psi: PsiMode = "auto"
+    lambda_: float = 1.0
+    xi: float = 1.0
+    beta: float = 0.001
+    zeta: float = 1000.0
+    k_ps: float = 1.0
+    u_max: float = 1.0
+    psi0: float | None = None
+    phi_dot: PhiDot = "command"
+    phi_dot_hz: float = 5.0
+
+    def __post_init__(self) -> None:
+        """Check values."""
+        if self.law not in LAWS:
+            raise ConfigError(f"control.law = {self.law!r} is not known; expected one of {', '.join(LAWS)}")
+        if self.psi not in PSI_MODES:
+            raise ConfigError(f"control.psi = {self.psi!r} is not known; expected one of {', '.join(PSI_MODES)}")
+        if self.phi_dot not in ("command", "measured", "zero"):
+            raise ConfigError(f"control.phi_dot = {self.phi_dot!r} is not known; expected command, measured or zero")
+        check_range("control.lambda", self.lambda_, 1e-6, 1e4, "s/m")
+        check_range("control.xi", self.xi, 0.0, 1e3, "1/s")
+        check_range("control.beta", self.beta, 0.0, 1e3, "1/s")
+        check_range("control.zeta", self.zeta, 0.0, 1e9, "s/m^2")
+        check_range("control.k_ps", self.k_ps, 1e-6, 1e4, "1/rad")
+        check_range("control.u_max", self.u_max, 1e-6, 1e6, "of full opening")
+        check_range("control.phi_dot_hz", self.phi_dot_hz, 0.01, 1e3, "Hz")
+
+
+@dataclass(frozen=True)
+class WheelPlant:
+    """First-order wheel model τ v̇ = −v + K u + load of one wheel; NaN where not identified.
+
+    Attributes
+    ----------
+    K : float
+        Speed per full opening [m/s].
+    tau : float
+        Lag [s].
+    load : float
+        Constant load as a speed [m/s].
+    K_std, tau_std, load_std : float
+        Standard deviations, same units.
+    """
+
+    K: float
+    tau: float
+    load: float = 0.0
+    K_std: float = 0.0
+    tau_std: float = 0.0
+    load_std: float = 0.0
+
+    def __post_init__(self) -> None:
+        """Check values."""
+        check_range("plant.K", self.K, 1e-9, 1e9, "m/s per full opening")
+        check_range("plant.tau", self.tau, 1e-4, 60.0, "s")
+
+
+@dataclass(frozen=True)
+class Plant:
+    """What is known of the wheels before the mission."""
+
+    coupling: Coupling = "auto"
+    wheels: Mapping[str, WheelPlant] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        """Check values."""
+        if self.coupling not in ("auto", "free", "ground"):
+            raise ConfigError(f"plant.coupling = {self.coupling!r} is not known; expected auto, free or ground")
+
+
+@dataclass(frozen=True)
+class Noise:
+    """Known noise of one signal, SI units; None where it is to be estimated."""
+
+    std: float | None = None
+    lsb: float | None = None
+
+
+@dataclass(frozen=True)
+class Limits:
+    """What counts as a fault, and when a verdict may be given.
+
+    Attributes
+    ----------
+    brief : float
+        A stuck or silent sensor that lasts no longer is tolerable (Assumption 1) [s].
+    min_probability : float
+        Probability from which a fault is stated [1].
+    min_epsilon : float
+        Smallest ε that is reported [1].
+    min_sat : float
+        Smallest saturation term that counts as non-zero: m/s, rad or valve fraction.
+    min_assessed : float
+        Decided driving time per wheel and side that ``ready`` needs [s].
+    driving_speed : float
+        |v_c,i| above which a wheel drives [m/s].
+    """
+
+    brief: float = 1.0
+    min_probability: float = 0.9
+    min_epsilon: float = 0.1
+    min_sat: float = 0.02
+    min_assessed: float = 10.0
+    driving_speed: float = 0.05
+
+    def __post_init__(self) -> None:
+        """Check values."""
+        check_range("limits.brief", self.brief, 0.0, 3600.0, "s")
+        check_range("limits.min_probability", self.min_probability, 0.5, 0.9999, "")
+        check_range("limits.min_epsilon", self.min_epsilon, 0.0, 1.0, "")
+        check_range("limits.min_sat", self.min_sat, 0.0, 1e6, "m/s, rad or fraction")
+        check_range("limits.min_assessed", self.min_assessed, 0.0, 1e6, "s")
+        check_range("limits.driving_speed", self.driving_speed, 0.0, 1e6, "m/s")
+
+
+@dataclass(frozen=True)
+class SourceOptions:
+    """How to read one source that does not describe itself.
+
+    Attributes
+    ----------
+    time : str or None
+        Time column of a table.
+    time_unit : str
+        ``s``, ``ms``, ``us``, ``ns``, ``filetime`` (100 ns since 1601) or ``iso`` (date text).
+    epoch : str or None
+        ISO date and time of zero of the time column; None: 1970.
+    separator, decimal : str or None
+        Of a text table; None: found from the file.
+    scale : bool
+        Whether ScaleFactor and Offset of a TwinCAT export are to be applied.
+    stamp : str
+        Clock of a message log.
+    """
+
+    time: str | None = None
+    time_unit: str = "s"
+    epoch: str | None = None
+    separator: str | None = None
+    decimal: str | None = None
+    scale: bool = False
+    stamp: StampClock = "header"
+
+    def __post_init__(self) -> None:
+        """Check values."""
+        if self.time_unit not in ("s", "ms", "us", "ns", "filetime", "iso"):
+            raise ConfigError(
+                f"[sources] time_unit = {self.time_unit!r} is not known; expected s, ms, us, ns, filetime or iso"
+            )
+        if self.stamp not in ("header", "log", "publish"):
+            raise ConfigError(f"[sources] stamp = {self.stamp!r} is not known; expected header, log or publish")
+
+
+@dataclass(frozen=True)
+class SignalSource:
+    """Where a canonical signal is recorded, and how it becomes SI.
+
+    SI value = (recorded · gain + offset) · factor(unit). Either `topic` with `field`, or `symbol` (TwinCAT), or
+    `column` (table).
+    """
+
+    topic: str | None = None
+    field: str | None = None
+    symbol: str | None = None
+    column: str | None = None
+    unit: str = ""
+    gain: float = 1.0
+    offset: float = 0.0
+    derivative: bool = False
+    at: Literal["motor", "wheel"] = "wheel"
+    source: str | None = None
+
+    @property
+    def label(self) -> str:
+        """Name of the channel it points to."""
+        return f"{self.topic}.{self.field}" if self.topic is not None else str(self.symbol or self.column)
+
+
+@dataclass(frozen=True)
+class Machine:
+    """A whole machine file.
+
+    Attributes
+    ----------
+    name, id : str
+        Shown name, and identity for trends across missions.
+    wheels : tuple[str, ...]
+        Drive wheels in order (1…N).
+    geometry : Geometry or None
+        None: no kinematic evidence.
+    gear_ratio : float
+        Motor turns per wheel turn [1].
+    max_speed : float
+        Top speed at the rim [m/s].
+    max_steer : float
+        Largest steering angle [rad].
+    signals : Mapping[str, SignalSource]
+        Given signals; those absent are searched for.
+    sources : Mapping[str, SourceOptions]
+        Options per source, keyed by file name pattern.
+    """
+
+    name: str
+    id: str
+    wheels: tuple[str, ...]
+    geometry: Geometry | None
+    gear_ratio: float = 1.0
+    max_speed: float = 0.36
+    max_steer: float = 0.7853981633974483
+    control: Control = field(default_factory=Control)
+    plant: Plant = field(default_factory=Plant)
+    noise: Mapping[str, Noise] = field(default_factory=dict)
+    limits: Limits = field(default_factory=Limits)
+    sources: Mapping[str, SourceOptions] = field(default_factory=dict)
+    signals: Mapping[str, SignalSource] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        """Check values and that signals name this machine's wheels and axles."""
+        if not self.wheels or len(set(self.wheels)) != len(self.wheels):
+            raise ConfigError(f"machine.wheels = {list(self.wheels)} must name each wheel once, and at least one")
+        if self.geometry is not None and set(self.geometry.wheels) != set(self.wheels):
+            raise ConfigError(
+                f"geometry names the wheels {sorted(self.geometry.wheels)}, machine.wheels {sorted(self.wheels)}; "
+                "give every wheel its place, or leave geometry out"
+            )
+        check_range("geometry.gear_ratio", self.gear_ratio, 1e-3, 1e4, "")
+        check_range("geometry.max_speed", self.max_speed, 1e-6, 1e6, "m/s")
+        check_range("geometry.max_steer", self.max_steer, 0.0, 3.2, "rad")
+        for signal in self.signals:
+            quantity_of(signal)
+            group, _, rest = signal.partition(".")
+            part = rest.partition(".")[0]
+            if group == "wheel" and part not in self.wheels:
+                raise ConfigError(f"[signals] {signal!r}: no wheel {part!r}; machine.wheels has {list(self.wheels)}")
+            if group == "steer" and self.geometry is not None and part not in self.axles:
+                raise ConfigError(f"[signals] {signal!r}: no steering axle {part!r}; geometry has {list(self.axles)}")
+
+    @property
+    def axles(self) -> tuple[str, ...]:
+        """Steered axles; empty without geometry."""
+        return () if self.geometry is None else self.geometry.axles
+
+    @property
+    def wheel_radius(self) -> float | None:
+        """Rolling radius [m], where the geometry gives it."""
+        return None if self.geometry is None else self.geometry.wheel_diameter / 2
+
+    def canonical_signals(self) -> tuple[str, ...]:
+        """Every signal name that this machine can have, in reading order."""
+        wheel = ("v_ref", "v", "v_true", "u", "u_applied", "psi", "pressure_a", "pressure_b")
+        steer = ("phi_ref", "phi", "phi_true", "u", "u_applied")
+        names = ["cmd.v", "cmd.omega"]
+        names += [f"wheel.{w}.{s}" for w in self.wheels for s in wheel]
+        names += [f"steer.{a}.{s}" for a in self.axles for s in steer]
+        names += ["imu.yaw_rate", "gnss.lat", "gnss.lon", "gnss.speed", "odom.x", "odom.y", "odom.yaw"]
+        return tuple(names)
+
+
+def four_wheel_geometry(wheelbase: float, joint_spacing: float, wheel_diameter: float, wheel_offset: float) -> Geometry:
+    """Four steered wheels FR, FL, RR, RL on a front and a rear axle; all lengths in m."""
+    half, side = wheelbase / 2, joint_spacing / 2
+    return Geometry(
+        wheels={
+            "FR": WheelGeometry(half, -side, -wheel_offset, "front"),
+            "FL": WheelGeometry(half, side, wheel_offset, "front"),
+            "RR": WheelGeometry(-half, -side, -wheel_offset, "rear"),
+            "RL": WheelGeometry(-half, side, wheel_offset, "rear"),
+        },
+        wheel_diameter=wheel_diameter,
+    )
+
+
+def haulotte() -> Machine:
+    """The paper's machine: Haulotte 16RTJ PRO."""
+    return Machine(
+        name="Haulotte 16RTJ PRO",
+        id="",
+        wheels=("FR", "FL", "RR", "RL"),
+        geometry=four_wheel_geometry(2.1, 1.46, 0.854, 0.20),
+        gear_ratio=17.7,
+        max_speed=0.36,
+    )

@@ -1,0 +1,58 @@
+"""Recorded channels under their canonical names, in SI, still at their own stamps."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from replay.machine import SignalSource
+
+
+@dataclass(frozen=True)
+class Signal:
+    """One canonical signal at its recorded stamps.
+
+    Attributes
+    ----------
+    name : str
+        Canonical name (``wheel.FR.v``).
+    stamps : NDArray[np.int64], shape (n,)
+        Nanoseconds since 1970, strictly increasing.
+    values : NDArray[np.float64], shape (n,)
+        SI values; NaN where NaN was recorded.
+    origin : SignalSource
+        The channel and conversion it came from.
+    source : str
+        The file it came from.
+    guessed : bool
+        Whether the mapping was found automatically rather than given.
+    """
+
+    name: str
+    stamps: NDArray[np.int64]
+    values: NDArray[np.float64]
+    origin: SignalSource
+    source: str
+    guessed: bool
+
+
+@dataclass(frozen=True)
+class Signals:
+    """All mapped signals of one mission.
+
+    Attributes
+    ----------
+    items : Mapping[str, Signal]
+        By canonical name.
+    missing : Mapping[str, str]
+        Canonical names that were looked for and not found, with the reason.
+    notes : tuple[str, ...]
+        Guesses made and doubts about them, one sentence each.
+    """
+
+    items: Mapping[str, Signal]
+    missing: Mapping[str, str]
+    notes: tuple[str, ...] = ()
