@@ -378,7 +378,7 @@ def four_wheel_geometry(wheelbase: float, joint_spacing: float, wheel_diameter: 
 
 
 def haulotte() -> Machine:
-    """The paper's machine: Haulotte 16RTJ PRO."""
+    """Return the paper's machine: Haulotte 16RTJ PRO."""
     return Machine(
         name="Haulotte 16RTJ PRO",
         id="",
