@@ -1,0 +1,20 @@
+"""Fixtures shared by all tests."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parent.parent
+
+
+@pytest.fixture(scope="session")
+def reference_data() -> Path:
+    """Folder with recorded logs and fault data; tests that need it skip where it is absent."""
+    folder = Path(os.environ.get("MFHCA_REFERENCE_DATA", "../shared"))
+    folder = folder if folder.is_absolute() else ROOT / folder
+    if not (folder / "reference_logs").is_dir():
+        pytest.skip(f"no reference data at {folder}; set MFHCA_REFERENCE_DATA to run this test")
+    return folder
