@@ -1,0 +1,178 @@
+"""Inverse kinematics: wheel speeds and steering angles of a commanded body motion, L1 (1) and L2 (2).
+
+Readings of the printed text: the angle is taken along the direction in which the wheel rolls, so that reversing does
+not turn the wheels round (φ = atan2(s·v_ky, s·v_kx), s = sgn(v_kx)), and ω_j of L1 is the yaw rate of the wheel frame,
+ω_b + φ̇. Then v_c,i = s·|v_k| − (ω_b + φ̇)·d_i exactly.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from replay.machine import Geometry, PhiDot
+
+_STANDSTILL = 1e-3
+
+
+@dataclass(frozen=True)
+class WheelCommands:
+    """Commanded motion at the wheels.
+
+    Attributes
+    ----------
+    speed : NDArray[np.float64], shape (n, wheels)
+        v_c,i [m/s] in the order of the geometry's wheels.
+    angle : NDArray[np.float64], shape (n, wheels)
+        φ_c,i [rad].
+    axle_angle : NDArray[np.float64], shape (n, axles)
+        Direction of the velocity at the middle of each steered axle [rad].
+    """
+
+    speed: NDArray[np.float64]
+    angle: NDArray[np.float64]
+    axle_angle: NDArray[np.float64]
+
+
+def steering_angle(v_x: NDArray[np.float64], v_y: NDArray[np.float64], max_steer: float) -> NDArray[np.float64]:
+    """Steering angle of a point that moves with (v_x, v_y): L2 (2) along the rolling direction.
+
+    At standstill (|v| ≤ 1 mm/s, or NaN) the last angle is held; before any motion it is 0.
+
+    Parameters
+    ----------
+    v_x, v_y : NDArray[np.float64], shape (n,)
+        Velocity of the joint in the body frame [m/s].
+    max_steer : float
+        The angle is clipped to ±max_steer [rad].
+
+    Returns
+    -------
+    NDArray[np.float64], shape (n,)
+        φ_c [rad].
+    """
+    s = np.where(v_x < 0, -1.0, 1.0)
+    angle = np.clip(np.arctan2(s * v_y, s * v_x), -max_steer, max_steer)
+    moving = np.hypot(v_x, v_y) > _STANDSTILL
+    last = np.maximum.accumulate(np.where(moving, np.arange(angle.size), -1))
+    return np.where(last >= 0, angle[np.maximum(last, 0)], 0.0)
+
+
+def low_pass(x: NDArray[np.float64], dt: float, cutoff_hz: float) -> NDArray[np.float64]:
+    """First-order low-pass, started at the first sample; NaN is passed over."""
+    a = 1.0 - np.exp(-2 * np.pi * cutoff_hz * dt)
+    return np.asarray(_scan_low_pass(x, a, np.nan)[0])
+
+
+@njit(cache=True)
+def _scan_low_pass(x, a, state):  # type: ignore[no-untyped-def]
+    """Filter y += a (x − y), returning the output and the state to carry on with."""
+    out = np.empty(x.size)
+    for k in range(x.size):
+        if np.isnan(state):
+            state = x[k]
+        elif not np.isnan(x[k]):
+            state += a * (x[k] - state)
+        out[k] = state
+    return out, state
+
+
+def wheel_commands(
+    v: NDArray[np.float64],
+    omega: NDArray[np.float64],
+    geometry: Geometry,
+    *,
+    dt: float,
+    max_steer: float,
+    phi_dot: PhiDot = "command",
+    phi_dot_hz: float = 5.0,
+    measured_angle: NDArray[np.float64] | None = None,
+) -> WheelCommands:
+    """Map the commanded body motion to wheel speeds and steering angles: L1 (1), L2 (2).
+
+    Parameters
+    ----------
+    v, omega : NDArray[np.float64], shape (n,)
+        Commanded speed [m/s] and yaw rate [rad/s] of the body; NaN where unknown.
+    geometry : Geometry
+        Joint places, offsets and axles.
+    dt : float
+        Step [s].
+    max_steer : float
+        Limit of the steering angle [rad].
+    phi_dot : str
+        Source of φ̇: derivative of the commanded angle, of the measured one, or zero.
+    phi_dot_hz : float
+        Cut-off of the low-pass on φ̇ [Hz].
+    measured_angle : NDArray[np.float64], shape (n, wheels), or None
+        Measured φ_i [rad], for ``phi_dot="measured"``.
+    """
+    names = list(geometry.wheels)
+    n = v.size
+    speed = np.empty((n, len(names)))
+    angle = np.empty((n, len(names)))
+    for i, name in enumerate(names):
+        w = geometry.wheels[name]
+        v_x, v_y = v - omega * w.y, omega * w.x
+        s = np.where(v_x < 0, -1.0, 1.0)
+        if w.axle == "fixed":
+            angle[:, i] = 0.0
+            speed[:, i] = v_x - omega * w.offset
+            continue
+        angle[:, i] = steering_angle(v_x, v_y, max_steer)
+        if phi_dot == "zero" or (phi_dot == "measured" and measured_angle is None):
+            rate = np.zeros(n)
+        else:
+            source = angle[:, i] if measured_angle is None or phi_dot == "command" else measured_angle[:, i]
+            rate = low_pass(np.diff(source, prepend=source[:1]) / dt, dt, phi_dot_hz)
+        # L1 (1): v_c,i = s·|v_k| − (ω_b + φ̇)·d_i
+        speed[:, i] = s * np.hypot(v_x, v_y) - (omega + rate) * w.offset
+    axles = geometry.axles
+    axle_angle = np.empty((n, len(axles)))
+    for j, axle in enumerate(axles):
+        x = geometry.axle_x(axle)
+        y = geometry.wheels[axle].y if axle in geometry.wheels else 0.0
+        axle_angle[:, j] = steering_angle(v - omega * y, omega * x, max_steer)
+    return WheelCommands(speed, angle, axle_angle)
+
+
+def wheel_angles(axle_angle: NDArray[np.float64], geometry: Geometry) -> NDArray[np.float64]:
+    """Angle of each wheel from the measured axle angles.
+
+    An axle's angle is the direction of the velocity at (x_A, 0); two axle angles fix the centre of rotation, and with
+    it every wheel's angle. With one steered axle the unsteered wheels' axis takes the place of the second.
+
+    Parameters
+    ----------
+    axle_angle : NDArray[np.float64], shape (n, axles)
+        In the order of ``geometry.axles`` [rad].
+
+    Returns
+    -------
+    NDArray[np.float64], shape (n, wheels)
+        φ_i [rad].
+    """
+    names = list(geometry.wheels)
+    axles = geometry.axles
+    out = np.zeros((axle_angle.shape[0], len(names)))
+    shared = [a for a in axles if a not in geometry.wheels]
+    tan = {a: np.tan(axle_angle[:, axles.index(a)]) for a in shared}
+    places = [(geometry.axle_x(a), tan[a]) for a in shared]
+    fixed = [w.x for w in geometry.wheels.values() if w.axle == "fixed"]
+    if len(places) == 1:
+        places.append((float(np.mean(fixed)) if fixed else 0.0, np.zeros(axle_angle.shape[0])))
+    curvature = lateral = np.zeros(axle_angle.shape[0])
+    if len(places) >= 2 and places[0][0] != places[1][0]:
+        # at (x, 0): v_y/v_x = (v_by + ω x)/v_bx = tan φ  ⇒  curvature ω/v_bx and side slip v_by/v_bx
+        curvature = (places[0][1] - places[1][1]) / (places[0][0] - places[1][0])
+        lateral = places[0][1] - curvature * places[0][0]
+    for i, name in enumerate(names):
+        w = geometry.wheels[name]
+        if w.axle in geometry.wheels:
+            out[:, i] = axle_angle[:, axles.index(w.axle)]
+        elif w.axle != "fixed":
+            out[:, i] = np.arctan((lateral + curvature * w.x) / (1.0 - curvature * w.y))
+    return out
