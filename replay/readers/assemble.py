@@ -1,0 +1,298 @@
+"""From the payloads of a message log to named channels with stamps."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from replay.rawlog import Channel, Clock, LogSummary, RawLog
+from replay.readers import cdr, jsonmsg
+from replay.readers.definitions import DefinitionError, MessageType, resolve
+
+FAR_NS = 1_000_000_000
+_SLOW_SHARE = 0.2
+
+
+@dataclass(frozen=True)
+class Connection:
+    """One stream of messages of one type.
+
+    Attributes
+    ----------
+    topic, type_name : str
+        As recorded.
+    encoding : str
+        Serialisation of the payloads: ``cdr``, ``ros1`` or ``json``; others are not decoded.
+    schema_encoding, definition : str
+        Language and text of the message definition; empty where the log holds none.
+    """
+
+    topic: str
+    type_name: str
+    encoding: str
+    schema_encoding: str = ""
+    definition: str = ""
+
+    def why_not(self) -> str:
+        """Return why messages of this stream cannot be decoded, or an empty string."""
+        if self.encoding == "json":
+            return ""
+        if self.encoding not in ("cdr", "ros1"):
+            return f"{self.encoding or 'unnamed'} serialisation is not decoded"
+        try:
+            self.message_type()
+        except DefinitionError as error:
+            return str(error)
+        return ""
+
+    def message_type(self) -> MessageType:
+        """Return the resolved type; raises `DefinitionError`."""
+        return resolve(self.type_name, self.schema_encoding, self.definition, self.encoding == "ros1")
+
+
+@dataclass(frozen=True)
+class Block:
+    """Some messages of one connection.
+
+    Attributes
+    ----------
+    connection : Connection
+        Their stream.
+    data : NDArray[np.uint8], shape (b,)
+        Bytes that hold the payloads.
+    starts, lengths : NDArray[np.int64], shape (n,)
+        Place of each payload.
+    log_ns : NDArray[np.int64], shape (n,)
+        Log stamps [ns].
+    publish_ns : NDArray[np.int64], shape (n,) or None
+        Publish stamps [ns], where the container has them.
+    """
+
+    connection: Connection
+    data: NDArray[np.uint8]
+    starts: NDArray[np.int64]
+    lengths: NDArray[np.int64]
+    log_ns: NDArray[np.int64]
+    publish_ns: NDArray[np.int64] | None = None
+
+
+@dataclass
+class Report:
+    """Notes and damage gathered while reading; repeated sentences are kept once."""
+
+    notes: list[str] = field(default_factory=list)
+    damage: list[str] = field(default_factory=list)
+
+    def note(self, text: str) -> None:
+        """Add a harmless fact."""
+        if text not in self.notes:
+            self.notes.append(text)
+
+    def lost(self, text: str) -> None:
+        """Add a loss."""
+        if text not in self.damage:
+            self.damage.append(text)
+
+
+@dataclass
+class _Topic:
+    """Columns of one topic and type, gathered block by block."""
+
+    connection: Connection
+    stamp: str | None = None
+    count: int = 0
+    log: list[NDArray[np.int64]] = field(default_factory=list)
+    publish: list[NDArray[np.int64]] = field(default_factory=list)
+    order: list[NDArray[np.int64]] = field(default_factory=list)
+    columns: dict[str, list[tuple[NDArray[np.int64], NDArray[Any]]]] = field(default_factory=dict)
+    skipped: set[str] = field(default_factory=set)
+    outcome: cdr.Outcome = field(default_factory=cdr.Outcome)
+    mute: str = ""
+
+    def add(self, block: Block, serial: int) -> None:
+        if self.mute:
+            return
+        first, n = self.count, len(block.starts)
+        if block.connection.encoding == "json":
+            self.stamp, parts = jsonmsg.decode(block.data, block.starts, block.lengths, self.outcome)
+        else:
+            try:
+                kind = block.connection.message_type()
+            except DefinitionError as error:
+                self.mute = str(error)
+                return
+            self.stamp = kind.stamp
+            parts = list(cdr.decode(kind, block.data, block.starts, block.lengths, self.outcome))
+        for part in parts:
+            self.skipped.update(part.skipped)
+            rows = part.rows + first
+            for path, values in part.columns.items():
+                self.columns.setdefault(path, []).append((rows, values))
+        self.count += n
+        self.log.append(block.log_ns)
+        self.publish.append(block.log_ns if block.publish_ns is None else block.publish_ns)
+        self.order.append(block.starts + (serial << 40))
+
+
+class Assembler:
+    """Collects blocks and builds the `RawLog`."""
+
+    def __init__(self, clock: Clock, report: Report) -> None:
+        self.clock, self.report = clock, report
+        self.topics: dict[tuple[str, str], _Topic] = {}
+        self.serial = 0
+        self.no_header: list[str] = []
+        self.far: dict[str, list[str]] = {}
+
+    def add(self, blocks: Iterable[Block]) -> None:
+        """Decode blocks; `starts` order messages within one call of one buffer."""
+        for block in blocks:
+            key = (block.connection.topic, block.connection.type_name)
+            topic = self.topics.setdefault(key, _Topic(block.connection))
+            topic.add(_within_range(block, self.report), self.serial)
+        self.serial += 1
+
+    def finish(self, summary: LogSummary) -> RawLog:
+        """Build the channels and complete the summary's notes and damage."""
+        channels: dict[str, Channel] = {}
+        seen: set[str] = set()
+        for (name, type_name), topic in self.topics.items():
+            label = name
+            if name in seen:
+                label = f"{name} ({type_name})"
+                self.report.note(f"{name} carries several message types; those of {type_name} are under {label!r}")
+            seen.add(name)
+            for channel in self._channels(label, topic):
+                channels[channel.name] = channel
+        self._clock_notes()
+        summary = replace(
+            summary,
+            notes=tuple(dict.fromkeys((*summary.notes, *self.report.notes))),
+            damage=tuple(dict.fromkeys((*summary.damage, *self.report.damage))),
+        )
+        return RawLog(summary.source, summary.format, self.clock, channels, summary)
+
+    def _channels(self, label: str, topic: _Topic) -> Iterable[Channel]:
+        self._say(label, topic)
+        if topic.mute or not topic.count:
+            return
+        log, order = np.concatenate(topic.log), np.concatenate(topic.order)
+        rank = None if np.all(order[1:] > order[:-1]) else np.argsort(np.argsort(order, kind="stable"))
+        columns = {path: _join(parts, rank) for path, parts in topic.columns.items()}
+        if rank is not None:
+            log = log[np.argsort(rank)]
+        stamps = self._stamps(label, topic, columns, log, rank)
+        for path, (rows, values) in columns.items():
+            yield Channel(
+                f"{label}.{path}", label, path, stamps if len(rows) == len(stamps) else stamps[rows], values, None,
+                topic.connection.type_name,
+            )  # fmt: skip
+
+    def _say(self, label: str, topic: _Topic) -> None:
+        report, outcome = self.report, topic.outcome
+        if topic.mute:
+            report.note(f"{label} is not decoded: {topic.mute}")
+        if topic.skipped:
+            report.note(f"{label}: left out arrays of more than 64 elements: {', '.join(sorted(topic.skipped)[:5])}")
+        if outcome.bad:
+            report.lost(f"{label}: {outcome.bad} of {topic.count} messages cannot be decoded: {outcome.reason}")
+        if outcome.slow > _SLOW_SHARE * max(topic.count, 1):
+            report.note(f"{label}: {outcome.slow} of {topic.count} messages change their layout; decoded one by one")
+
+    def _stamps(
+        self,
+        label: str,
+        topic: _Topic,
+        columns: dict[str, tuple[NDArray[np.int64], NDArray[Any]]],
+        log: NDArray[np.int64],
+        rank: NDArray[np.int64] | None,
+    ) -> NDArray[np.int64]:
+        """Stamps on the chosen clock; takes the header stamp out of the columns."""
+        header, sec = None, None
+        if topic.stamp is not None:
+            sec = columns.pop(f"{topic.stamp}.sec", None)
+            nsec = columns.pop(f"{topic.stamp}.nanosec", None)
+            if sec is not None and nsec is not None and len(sec[0]) == len(nsec[0]):
+                header = np.zeros(len(log), np.int64)
+                header[sec[0]] = sec[1].astype(np.int64) * 1_000_000_000 + nsec[1].astype(np.int64)
+        if self.clock == "publish":
+            publish = np.concatenate(topic.publish)
+            if not publish.any():
+                self.report.note(f"{label} has no publish stamps; it stands on the log clock")
+                return log
+            return publish if rank is None else publish[np.argsort(rank)]
+        if header is None or sec is None:
+            self.no_header.append(label)
+            return log
+        given = header != 0
+        zero = np.zeros(len(log), np.bool_)
+        zero[sec[0]] = ~given[sec[0]]
+        if not given.any():
+            self.report.note(f"{label}: all header stamps are zero; it stands on the log clock")
+            return log
+        ahead = int(np.median(header[given] - log[given]))
+        if abs(ahead) > FAR_NS:
+            self.far.setdefault(_span(ahead), []).append(label)
+        if self.clock == "log":
+            return log
+        if zero.any():
+            shift = ahead if abs(ahead) > FAR_NS else 0
+            self.report.note(f"{label}: {zero.sum()} of {len(zero)} header stamps are zero; log stamps stand in")
+            header[zero] = log[zero] + shift
+        return header
+
+    def _clock_notes(self) -> None:
+        if self.clock == "header" and self.no_header:
+            self.report.note(f"no header stamps, so on the log clock: {_some(self.no_header)}")
+        for span, topics in self.far.items():
+            self.report.note(f"header stamps lie {span} the log's stamps (median): {_some(topics)}")
+
+
+def _within_range(block: Block, report: Report) -> Block:
+    """Drop messages whose unsigned log stamp does not fit 63 bits."""
+    late = block.log_ns < 0
+    if not late.any():
+        return block
+    report.lost(f"{block.connection.topic}: {late.sum()} messages with impossible log stamps were left out")
+    keep = ~late
+    publish = None if block.publish_ns is None else block.publish_ns[keep]
+    return replace(
+        block, starts=block.starts[keep], lengths=block.lengths[keep], log_ns=block.log_ns[keep], publish_ns=publish
+    )
+
+
+def _join(
+    parts: list[tuple[NDArray[np.int64], NDArray[Any]]], rank: NDArray[np.int64] | None
+) -> tuple[NDArray[np.int64], NDArray[Any]]:
+    """Rows in recorded order and their values."""
+    rows = np.concatenate([r for r, _ in parts]) if len(parts) > 1 else parts[0][0]
+    values = np.concatenate([v for _, v in parts]) if len(parts) > 1 else parts[0][1]
+    if rank is not None:
+        rows = rank[rows]
+    if np.all(rows[1:] > rows[:-1]):
+        return rows, values
+    order = np.argsort(rows, kind="stable")
+    return rows[order], values[order]
+
+
+def _span(ns: int) -> str:
+    seconds = abs(ns) / 1e9
+    size = f"{seconds / 86400:.1f} days" if seconds > 2 * 86400 else f"{seconds:.1f} s"
+    return f"{size} {'before' if ns < 0 else 'after'}"
+
+
+def _some(names: list[str]) -> str:
+    return ", ".join(names[:6]) + (f" and {len(names) - 6} more" if len(names) > 6 else "")
+
+
+def merged(metadata: Iterable[Mapping[str, str]]) -> dict[str, str]:
+    """Join metadata of several parts; the first value of a key stays."""
+    out: dict[str, str] = {}
+    for part in metadata:
+        for key, value in part.items():
+            out.setdefault(key, value)
+    return out

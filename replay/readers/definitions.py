@@ -1,0 +1,161 @@
+"""Message definitions: from the log's own text, or by name from the known ROS types."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any, TypeAlias
+
+from rosbags.interfaces import Nodetype
+from rosbags.typesys import Stores, get_types_from_idl, get_types_from_msg, get_typestore
+
+Fields: TypeAlias = tuple[tuple[str, Any], ...]
+
+MAX_DEFINITION = 1 << 20
+MAX_DEPTH = 32
+TIME = "builtin_interfaces/msg/Time"
+DURATION = "builtin_interfaces/msg/Duration"
+HEADER = "std_msgs/msg/Header"
+
+# Interfaces of robot controllers that the ROS distributions keep outside their common packages.
+_EXTRA = {
+    "ackermann_msgs/msg/AckermannDrive": (
+        "float32 steering_angle\nfloat32 steering_angle_velocity\nfloat32 speed\nfloat32 acceleration\nfloat32 jerk"
+    ),
+    "ackermann_msgs/msg/AckermannDriveStamped": "std_msgs/Header header\nAckermannDrive drive",
+    "control_msgs/msg/InterfaceValue": "string[] interface_names\nfloat64[] values",
+    "control_msgs/msg/DynamicJointState": (
+        "std_msgs/Header header\nstring[] joint_names\nInterfaceValue[] interface_values"
+    ),
+}
+_STORES = (
+    Stores.LATEST,
+    Stores.ROS2_LYRICAL,
+    Stores.ROS2_JAZZY,
+    Stores.ROS2_HUMBLE,
+    Stores.ROS2_IRON,
+    Stores.ROS2_FOXY,
+    Stores.ROS2_DASHING,
+)
+
+
+class DefinitionError(Exception):
+    """A message type has no usable definition; the text says why."""
+
+
+@dataclass(frozen=True)
+class MessageType:
+    """One message type with everything that its payload holds.
+
+    Attributes
+    ----------
+    name : str
+        Full name (``sensor_msgs/msg/JointState``).
+    fields : dict[str, tuple]
+        Field name and descriptor of every type reachable from `name`.
+    stamp : str or None
+        Path of the header stamp (``header.stamp``), where the message has one.
+    ros1 : bool
+        Whether payloads are in ROS 1 serialisation, else CDR.
+    note : str
+        Where the definition came from, if not from the log.
+    """
+
+    name: str
+    fields: dict[str, Fields]
+    stamp: str | None
+    ros1: bool
+    note: str = ""
+
+
+def full_name(name: str) -> str:
+    """Return ``package/msg/Type`` for ``package/Type``."""
+    parts = name.split("/")
+    return f"{parts[0]}/msg/{parts[1]}" if len(parts) == 2 else name
+
+
+@lru_cache(maxsize=64)
+def resolve(name: str, encoding: str, text: str, ros1: bool) -> MessageType:
+    """Build the message type from its definition, or by its name where the log holds none.
+
+    Parameters
+    ----------
+    name : str
+        Message type as recorded.
+    encoding : str
+        ``ros2msg``, ``ros1msg``, ``ros2idl`` or empty.
+    text : str
+        Definition as recorded; empty where the log holds none.
+    ros1 : bool
+        Whether payloads are in ROS 1 serialisation.
+
+    Raises
+    ------
+    DefinitionError
+        Where no definition is found or it cannot be understood.
+    """
+    root = full_name(name)
+    if text.strip() or encoding == "ros1msg":
+        fields, note = _parse(root, encoding, text), ""
+    else:
+        fields, note = _by_name(root, ros1), "definition not in the log, taken by name"
+    reached: dict[str, Fields] = {}
+    _reach(root, fields, reached, (), ros1)
+    return MessageType(root, reached, _stamp_path(root, reached), ros1, note)
+
+
+def _parse(root: str, encoding: str, text: str) -> dict[str, Fields]:
+    if len(text) > MAX_DEFINITION:
+        raise DefinitionError(f"its definition has {len(text)} characters; at most {MAX_DEFINITION} are read")
+    try:
+        parsed = get_types_from_idl(text) if encoding == "ros2idl" else get_types_from_msg(text, root)
+    except Exception as error:  # the parser raises many kinds on hostile text, RecursionError among them
+        raise DefinitionError(f"its definition cannot be parsed ({type(error).__name__})") from error
+    return {name: tuple(parts[1]) for name, parts in parsed.items()}
+
+
+@lru_cache(maxsize=1024)
+def _by_name(root: str, ros1: bool) -> dict[str, Fields]:
+    if not ros1 and root in _EXTRA:
+        return {name: fields for name in _EXTRA for fields in [_parse(name, "ros2msg", _EXTRA[name])[name]]}
+    for store in (Stores.ROS1_NOETIC,) if ros1 else _STORES:
+        known = get_typestore(store).fielddefs
+        if root in known:
+            return {name: tuple(parts[1]) for name, parts in known.items()}
+    raise DefinitionError("the log holds no definition of this type and it is not a known ROS type")
+
+
+def _reach(root: str, known: dict[str, Fields], out: dict[str, Fields], above: tuple[str, ...], ros1: bool) -> None:
+    """Collect the types reachable from `root`; refuse missing, recursive and too deep ones."""
+    if root in above or len(above) > MAX_DEPTH:
+        raise DefinitionError(f"its definition nests {root} without end")
+    if root in out:
+        return
+    if root not in known:
+        if root in (TIME, DURATION):
+            known = {**known, root: _by_name(root, False)[root]}
+        elif above:
+            try:
+                known = {**_by_name(root, ros1), **known}
+            except DefinitionError:
+                raise DefinitionError(f"its definition lacks the type {root}") from None
+        else:
+            raise DefinitionError(f"its definition does not define {root}")
+    for _, (kind, value) in known[root]:
+        sub = value[0] if kind in (Nodetype.ARRAY, Nodetype.SEQUENCE) else (kind, value)
+        if sub[0] == Nodetype.NAME:
+            _reach(sub[1], known, out, (*above, root), ros1)
+        elif sub[0] != Nodetype.BASE:
+            raise DefinitionError("its definition nests sequences directly")
+    out[root] = known[root]
+
+
+def _stamp_path(root: str, fields: dict[str, Fields]) -> str | None:
+    top = {name: value for name, (kind, value) in fields[root] if kind == Nodetype.NAME}
+    for name, type_name in top.items():
+        if type_name == HEADER:
+            return f"{name}.stamp"
+    for name in ("stamp", "timestamp"):
+        if top.get(name) == TIME:
+            return name
+    return None
