@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 
 from replay.rawlog import Channel, Clock, LogSummary, RawLog
 from replay.readers import cdr, jsonmsg
+from replay.readers.clocks import Clocks, Report
 from replay.readers.definitions import DefinitionError, MessageType, resolve
 
-FAR_NS = 1_000_000_000
 _SLOW_SHARE = 0.2
 
 
@@ -81,24 +81,6 @@ class Block:
 
 
 @dataclass
-class Report:
-    """Notes and damage gathered while reading; repeated sentences are kept once."""
-
-    notes: list[str] = field(default_factory=list)
-    damage: list[str] = field(default_factory=list)
-
-    def note(self, text: str) -> None:
-        """Add a harmless fact."""
-        if text not in self.notes:
-            self.notes.append(text)
-
-    def lost(self, text: str) -> None:
-        """Add a loss."""
-        if text not in self.damage:
-            self.damage.append(text)
-
-
-@dataclass
 class _Topic:
     """Columns of one topic and type, gathered block by block."""
 
@@ -145,8 +127,7 @@ class Assembler:
         self.clock, self.report = clock, report
         self.topics: dict[tuple[str, str], _Topic] = {}
         self.serial = 0
-        self.no_header: list[str] = []
-        self.far: dict[str, list[str]] = {}
+        self.clocks = Clocks(clock, report)
 
     def add(self, blocks: Iterable[Block]) -> None:
         """Decode blocks; `starts` order messages within one call of one buffer."""
@@ -168,7 +149,7 @@ class Assembler:
             seen.add(name)
             for channel in self._channels(label, topic):
                 channels[channel.name] = channel
-        self._clock_notes()
+        self.clocks.finish(channels)
         summary = replace(
             summary,
             notes=tuple(dict.fromkeys((*summary.notes, *self.report.notes))),
@@ -183,9 +164,11 @@ class Assembler:
         log, order = np.concatenate(topic.log), np.concatenate(topic.order)
         rank = None if np.all(order[1:] > order[:-1]) else np.argsort(np.argsort(order, kind="stable"))
         columns = {path: _join(parts, rank) for path, parts in topic.columns.items()}
+        publish = np.concatenate(topic.publish)
         if rank is not None:
-            log = log[np.argsort(rank)]
-        stamps = self._stamps(label, topic, columns, log, rank)
+            log, publish = (a[np.argsort(rank)] for a in (log, publish))
+        header = _take_header(topic.stamp, columns, len(log))
+        stamps = self.clocks.stamps(label, header, log, publish)
         for path, (rows, values) in columns.items():
             yield Channel(
                 f"{label}.{path}", label, path, stamps if len(rows) == len(stamps) else stamps[rows], values, None,
@@ -203,53 +186,17 @@ class Assembler:
         if outcome.slow > _SLOW_SHARE * max(topic.count, 1):
             report.note(f"{label}: {outcome.slow} of {topic.count} messages change their layout; decoded one by one")
 
-    def _stamps(
-        self,
-        label: str,
-        topic: _Topic,
-        columns: dict[str, tuple[NDArray[np.int64], NDArray[Any]]],
-        log: NDArray[np.int64],
-        rank: NDArray[np.int64] | None,
-    ) -> NDArray[np.int64]:
-        """Stamps on the chosen clock; takes the header stamp out of the columns."""
-        header, sec = None, None
-        if topic.stamp is not None:
-            sec = columns.pop(f"{topic.stamp}.sec", None)
-            nsec = columns.pop(f"{topic.stamp}.nanosec", None)
-            if sec is not None and nsec is not None and len(sec[0]) == len(nsec[0]):
-                header = np.zeros(len(log), np.int64)
-                header[sec[0]] = sec[1].astype(np.int64) * 1_000_000_000 + nsec[1].astype(np.int64)
-        if self.clock == "publish":
-            publish = np.concatenate(topic.publish)
-            if not publish.any():
-                self.report.note(f"{label} has no publish stamps; it stands on the log clock")
-                return log
-            return publish if rank is None else publish[np.argsort(rank)]
-        if header is None or sec is None:
-            self.no_header.append(label)
-            return log
-        given = header != 0
-        zero = np.zeros(len(log), np.bool_)
-        zero[sec[0]] = ~given[sec[0]]
-        if not given.any():
-            self.report.note(f"{label}: all header stamps are zero; it stands on the log clock")
-            return log
-        ahead = int(np.median(header[given] - log[given]))
-        if abs(ahead) > FAR_NS:
-            self.far.setdefault(_span(ahead), []).append(label)
-        if self.clock == "log":
-            return log
-        if zero.any():
-            shift = ahead if abs(ahead) > FAR_NS else 0
-            self.report.note(f"{label}: {zero.sum()} of {len(zero)} header stamps are zero; log stamps stand in")
-            header[zero] = log[zero] + shift
-        return header
 
-    def _clock_notes(self) -> None:
-        if self.clock == "header" and self.no_header:
-            self.report.note(f"no header stamps, so on the log clock: {_some(self.no_header)}")
-        for span, topics in self.far.items():
-            self.report.note(f"header stamps lie {span} the log's stamps (median): {_some(topics)}")
+def _take_header(
+    path: str | None, columns: dict[str, tuple[NDArray[np.int64], NDArray[Any]]], count: int
+) -> tuple[NDArray[np.int64], NDArray[np.int64]] | None:
+    """Take the header stamp out of the columns: rows that have one, and stamps of all rows [ns]."""
+    sec, nsec = (columns.pop(f"{path}.{part}", None) for part in ("sec", "nanosec"))
+    if sec is None or nsec is None or len(sec[0]) != len(nsec[0]):
+        return None
+    header = np.zeros(count, np.int64)
+    header[sec[0]] = sec[1].astype(np.int64) * 1_000_000_000 + nsec[1].astype(np.int64)
+    return sec[0], header
 
 
 def _within_range(block: Block, report: Report) -> Block:
@@ -277,22 +224,3 @@ def _join(
         return rows, values
     order = np.argsort(rows, kind="stable")
     return rows[order], values[order]
-
-
-def _span(ns: int) -> str:
-    seconds = abs(ns) / 1e9
-    size = f"{seconds / 86400:.1f} days" if seconds > 2 * 86400 else f"{seconds:.1f} s"
-    return f"{size} {'before' if ns < 0 else 'after'}"
-
-
-def _some(names: list[str]) -> str:
-    return ", ".join(names[:6]) + (f" and {len(names) - 6} more" if len(names) > 6 else "")
-
-
-def merged(metadata: Iterable[Mapping[str, str]]) -> dict[str, str]:
-    """Join metadata of several parts; the first value of a key stays."""
-    out: dict[str, str] = {}
-    for part in metadata:
-        for key, value in part.items():
-            out.setdefault(key, value)
-    return out

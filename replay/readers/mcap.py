@@ -15,7 +15,8 @@ from numpy.typing import NDArray
 from replay.errors import LogError
 from replay.machine import SourceOptions
 from replay.rawlog import Clock, LogSummary, RawLog, TopicInfo
-from replay.readers.assemble import Assembler, Block, Connection, Report
+from replay.readers.assemble import Assembler, Block, Connection
+from replay.readers.clocks import Report
 from replay.readers.inflate import InflateError, inflate
 from replay.readers.records import Records, scan_mcap
 
