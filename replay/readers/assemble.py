@@ -99,14 +99,13 @@ class _Topic:
         if self.mute:
             return
         first, n = self.count, len(block.starts)
+        self.mute = block.connection.why_not()
+        if self.mute:
+            return
         if block.connection.encoding == "json":
             self.stamp, parts = jsonmsg.decode(block.data, block.starts, block.lengths, self.outcome)
         else:
-            try:
-                kind = block.connection.message_type()
-            except DefinitionError as error:
-                self.mute = str(error)
-                return
+            kind = block.connection.message_type()
             self.stamp = kind.stamp
             parts = list(cdr.decode(kind, block.data, block.starts, block.lengths, self.outcome))
         for part in parts:
@@ -182,7 +181,9 @@ class Assembler:
         if topic.skipped:
             report.note(f"{label}: left out arrays of more than 64 elements: {', '.join(sorted(topic.skipped)[:5])}")
         if outcome.bad:
-            report.lost(f"{label}: {outcome.bad} of {topic.count} messages cannot be decoded: {outcome.reason}")
+            text = f"{label}: {outcome.bad} of {topic.count} messages cannot be decoded: {outcome.reason}"
+            guessed = not topic.connection.definition and outcome.bad == topic.count
+            (report.note if guessed else report.lost)(text)
         if outcome.slow > _SLOW_SHARE * max(topic.count, 1):
             report.note(f"{label}: {outcome.slow} of {topic.count} messages change their layout; decoded one by one")
 

@@ -95,7 +95,7 @@ class Clocks:
         rows, stamps = header
         given = stamps != 0
         if not given.any():
-            self.report.note(f"{label}: all header stamps are zero; it stands on the log clock")
+            self.no_header.append(label)
             return log
         ahead = int(np.median(stamps[given] - log[given]))
         if abs(ahead) > FAR_NS:
@@ -122,7 +122,7 @@ class Clocks:
         if self.clock != "header" or not self.no_header:
             return
         if self.lead is None or self.near:
-            self.report.note(f"no header stamps, so on the log clock: {_some(self.no_header)}")
+            self.report.note(f"no header stamps (or all zero), so on the log clock: {_some(self.no_header)}")
             return
         moved: dict[int, tuple[NDArray[np.int64], NDArray[np.int64]]] = {}
         for name, channel in channels.items():
@@ -132,7 +132,7 @@ class Clocks:
                     moved[id(old)] = (old, self.lead.to_header(old))
                 channels[name] = replace(channel, stamps=moved[id(old)][1])
         self.report.note(
-            "no header stamps, so their log stamps were moved by the distance of the other topics' header stamps: "
+            "no header stamps (or all zero), so their log stamps were moved by the distance of the other topics' header stamps: "
             + _some(self.no_header)
         )
 

@@ -11,9 +11,10 @@ from replay.rawlog import Clock, LogSummary, RawLog
 from replay.readers.base import Reader
 from replay.readers.mcap import McapReader
 from replay.readers.ros1_bag import Ros1BagReader
+from replay.readers.rosbag2 import Rosbag2Reader
 
 # In order of certainty: magic bytes first, text tables last.
-READERS: tuple[Reader, ...] = (McapReader(), Ros1BagReader())
+READERS: tuple[Reader, ...] = (McapReader(), Ros1BagReader(), Rosbag2Reader())
 FORMATS = "MCAP, ROS 1 bag, rosbag2 (folder, .db3), TwinCAT Scope export (CSV, TXT), CSV (also .gz) and Parquet"
 
 
