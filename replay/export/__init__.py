@@ -1,0 +1,1 @@
+"""Writers: one mission in every format that the readers know."""

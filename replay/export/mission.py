@@ -1,0 +1,44 @@
+"""Write a simulated mission in any format, always with the same values and stamps."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from pathlib import Path
+
+from replay.errors import ConfigError
+from replay.export.mcap_log import write_mcap
+from replay.export.topics import mission_topics
+from replay.simulation.options import SimulatedMission
+
+
+def _mcap(mission: SimulatedMission, path: Path) -> None:
+    write_mcap(path, mission_topics(mission, "cdr"))
+
+
+_WRITERS: Mapping[str, Callable[[SimulatedMission, Path], None]] = {"mcap": _mcap}
+
+FORMATS: tuple[str, ...] = tuple(_WRITERS)
+
+
+def write_mission(mission: SimulatedMission, path: Path, format: str) -> None:  # noqa: A002
+    """Write a mission's log; its truth is written by `replay.truth.write_truth`.
+
+    Parameters
+    ----------
+    mission : SimulatedMission
+        What to write.
+    path : Path
+        File, or folder for ``rosbag2``; an existing log is replaced.
+    format : str
+        One of `FORMATS`.
+
+    Raises
+    ------
+    ConfigError
+        Where the format is not known.
+    OutputError
+        Where the place cannot be written.
+    """
+    if format not in _WRITERS:
+        raise ConfigError(f"format = {format!r} is not known; expected one of {', '.join(FORMATS)}")
+    _WRITERS[format](mission, path)

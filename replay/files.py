@@ -1,0 +1,74 @@
+"""Results appear whole or not at all."""
+
+from __future__ import annotations
+
+import os
+import shutil
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from replay.errors import OutputError
+
+
+@contextmanager
+def atomic_path(path: Path, *, folder: bool = False) -> Iterator[Path]:
+    """Give a temporary name beside `path`; rename it to `path` when the block ends well, else remove it.
+
+    Parameters
+    ----------
+    path : Path
+        Where the result shall stand; an existing file is replaced.
+    folder : bool
+        Whether the result is a folder; the temporary folder is made here. An existing folder is replaced only
+        where it is empty or holds a rosbag2 recording (``metadata.yaml``).
+
+    Raises
+    ------
+    OutputError
+        Where the place cannot be written, or holds something that must not be replaced.
+    """
+    path = Path(path)
+    if not path.name:
+        raise OutputError(f"{str(path)!r} is no file name; give a name to write to")
+    temporary = path.with_name(f".{path.name}.{os.getpid()}.part")
+    _refuse_other_content(path, folder)
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        _remove(temporary)
+        if folder:
+            temporary.mkdir()
+        yield temporary
+        if folder:
+            _remove(path)
+        else:
+            _flush(temporary)
+        temporary.replace(path)
+    except OSError as error:
+        raise OutputError(f"{path}: cannot be written ({error.strerror or error}); give another place") from error
+    finally:
+        _remove(temporary)
+
+
+def _refuse_other_content(path: Path, folder: bool) -> None:
+    if folder and path.is_dir() and not (path / "metadata.yaml").is_file() and any(path.iterdir()):
+        raise OutputError(f"{path}: holds other files; give a new folder")
+    if folder and path.exists() and not path.is_dir():
+        raise OutputError(f"{path}: is a file, a folder is to be written; give another name")
+    if not folder and path.is_dir():
+        raise OutputError(f"{path}: is a folder, a file is to be written; give a file name")
+
+
+def _flush(path: Path) -> None:
+    descriptor = os.open(path, os.O_RDWR)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)
+
+
+def _remove(path: Path) -> None:
+    if path.is_dir() and not path.is_symlink():
+        shutil.rmtree(path, ignore_errors=True)
+    else:
+        path.unlink(missing_ok=True)
