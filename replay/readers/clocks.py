@@ -132,7 +132,7 @@ class Clocks:
                     moved[id(old)] = (old, self.lead.to_header(old))
                 channels[name] = replace(channel, stamps=moved[id(old)][1])
         self.report.note(
-            "no header stamps (or all zero), so their log stamps were moved by the distance of the other topics' header stamps: "
+            "no header stamps (or all zero), so moved from the log clock by the other topics' header offset: "
             + _some(self.no_header)
         )
 

@@ -12,9 +12,18 @@ from replay.readers.base import Reader
 from replay.readers.mcap import McapReader
 from replay.readers.ros1_bag import Ros1BagReader
 from replay.readers.rosbag2 import Rosbag2Reader
+from replay.readers.table import CsvReader, ParquetReader
+from replay.readers.twincat_csv import TwincatCsvReader
 
 # In order of certainty: magic bytes first, text tables last.
-READERS: tuple[Reader, ...] = (McapReader(), Ros1BagReader(), Rosbag2Reader())
+READERS: tuple[Reader, ...] = (
+    McapReader(),
+    Ros1BagReader(),
+    Rosbag2Reader(),
+    ParquetReader(),
+    TwincatCsvReader(),
+    CsvReader(),
+)
 FORMATS = "MCAP, ROS 1 bag, rosbag2 (folder, .db3), TwinCAT Scope export (CSV, TXT), CSV (also .gz) and Parquet"
 
 
