@@ -3,7 +3,7 @@
 Every row of the two tables is a model of a measured y against a reference x (v against v_true by L4, u_applied against
 u_a by L8):
 
-healthy      y = x + n
+healthy      y = x + n, or y = x + b + n with a small passing mismatch b of the two instruments
 stuck        y = c, a constant c
 no_signal    y = 0
 inefficient  y = δ·x + n, δ constant
@@ -27,14 +27,18 @@ Array = NDArray[np.float64]
 
 HEALTHY, STUCK, NO_SIGNAL, INEFFICIENT, NOISY = range(5)
 ROWS = ("healthy", "stuck", "no_signal", "inefficient", "noisy")
-WHITE_POWERS = (3.0, 8.0, 25.0, 80.0)
-ROW_OF_MODEL = np.array([HEALTHY, STUCK, NO_SIGNAL, INEFFICIENT, NOISY] + [NOISY] * len(WHITE_POWERS))
+# models of the last row: random walk of δ̄ [span/√s] and white noise [healthy noise]
+NOISY_MODELS = np.array([[0.3, 1.0], [0.06, 1.0], [0.012, 1.0], [0.06, 3.0], [0.06, 8.0], [0.06, 25.0], [0.06, 80.0]])
+ROW_OF_MODEL = np.array([HEALTHY, STUCK, NO_SIGNAL, INEFFICIENT, HEALTHY] + [NOISY] * len(NOISY_MODELS))
+_MISMATCH, _FIRST_NOISY = 4, 5
 MODELS = ROW_OF_MODEL.size
 
 SKIP, PAIR, SILENT = 0, 1, 2
 _STAY = 255
 _OUTLIER = -18.0
 _SILENT_COST = -6.0
+_MISMATCH_S = 0.05
+_LEARNING_COST = 10.0  # what a new entry loses until its filter has settled: a settled one is kept that long
 
 
 @dataclass(frozen=True)
@@ -47,10 +51,10 @@ class ModeModel:
         Standard deviation of y − x while healthy.
     constant_noise : float
         Standard deviation of y while stuck: the rounding step of a sensor, the noise of a spool sensor.
+    tolerance : float
+        Standard deviation of the slow mismatch between y and x while healthy.
     span : float
         Largest plausible magnitude of y.
-    drift : float
-        Random walk of δ̄ [unit/√s].
     switch_cost : float
         Minus the log-probability of entering a row at one sample.
     dt : float
@@ -59,14 +63,26 @@ class ModeModel:
 
     noise: float
     constant_noise: float
+    tolerance: float
     span: float
-    drift: float
     switch_cost: float
     dt: float
 
     def packed(self) -> Array:
-        """Parameters in the order of the compiled scan."""
-        return np.array([self.noise, self.constant_noise, self.span, self.drift**2 * self.dt, self.switch_cost])
+        """Parameters in the order of the compiled scan.
+
+        The last one is what a drifting row must gain per sample to be preferred: as much as the mismatch model of
+        healthy loses by its freedom, and a little more. Without it a fault row would follow any small mismatch.
+        """
+        f2 = np.exp(-2 * self.dt / _MISMATCH_S)
+        p, r, q = self.tolerance**2, self.noise**2, (1 - f2) * self.tolerance**2
+        for _ in range(200):  # Riccati recursion to its steady state
+            p = f2 * p + q
+            p = p * r / (p + r)
+        occam = 0.5 * np.log(1 + (f2 * p + q) / r) + 0.02
+        return np.array(
+            [self.noise, self.constant_noise, self.span, self.dt, self.switch_cost, self.tolerance, float(occam)]
+        )
 
 
 @dataclass(frozen=True)
@@ -96,30 +112,35 @@ def _enter(m, p, mean, cov):  # type: ignore[no-untyped-def]
     cov[m, 0], cov[m, 1], cov[m, 2] = 0.0, 0.0, 0.0
     if m == 0:
         mean[m, 0] = 1.0
+    elif m == _MISMATCH:
+        mean[m, 0], cov[m, 2] = 1.0, p[5] ** 2
     elif m == 1:
         cov[m, 0] = span * span
     elif m == 3:
         mean[m, 0], cov[m, 0] = 0.5, 0.09
-    elif m >= 4:
+    elif m >= _FIRST_NOISY:
         mean[m, 0], cov[m, 0] = 0.6, 0.09
         cov[m, 2] = (0.3 * span) ** 2
 
 
 @njit(cache=True)
-def _step(m, y, x, p, whites, mean, cov):  # type: ignore[no-untyped-def]
+def _step(m, y, x, p, noisy, mean, cov):  # type: ignore[no-untyped-def]
     """Kalman update of one model with y = H·[·,·] + n; returns the innovation's log-likelihood."""
     r = p[0] * p[0]
     h0, h1 = x, 0.0
-    if m == 1:
+    if m == _MISMATCH:
+        h1 = 1.0
+        f = np.exp(-p[3] / _MISMATCH_S)
+        mean[m, 1] *= f
+        cov[m, 2] = f * f * cov[m, 2] + (1 - f * f) * p[5] ** 2
+    elif m == 1:
         h0, r = 1.0, p[1] * p[1]
     elif m == 2:
         h0, r = 0.0, p[1] * p[1]
-    elif m >= 4:
+    elif m >= _FIRST_NOISY:
         h1 = 1.0
-        if m == 4:
-            cov[m, 2] += p[3]
-        else:
-            r *= whites[m - 5] ** 2
+        cov[m, 2] += (noisy[m - _FIRST_NOISY, 0] * p[2]) ** 2 * p[3]
+        r *= noisy[m - _FIRST_NOISY, 1] ** 2
     a, b, c = cov[m, 0], cov[m, 1], cov[m, 2]
     # S = H P Hᵀ + R
     g0, g1 = a * h0 + b * h1, b * h0 + c * h1
@@ -136,10 +157,29 @@ def _step(m, y, x, p, whites, mean, cov):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _scan_modes(y, x, status, p, whites, row, score, mean, cov, back, filtered):  # type: ignore[no-untyped-def]
+def _likelihoods(y, x, status, quiet, p, noisy, mean, cov, out):  # type: ignore[no-untyped-def]
+    """Log-likelihood of one sample under every model; where nothing moves, a zero reading speaks for no fault."""
+    floor = _OUTLIER - np.log(p[2])
+    for m in range(out.size):
+        if status == SILENT:
+            out[m] = 0.0 if m == 2 else _SILENT_COST
+        else:
+            out[m] = max(_step(m, y, x, p, noisy, mean, cov), floor)
+            if m >= _FIRST_NOISY:
+                out[m] -= p[6]
+            elif m == 3:
+                out[m] -= 0.02
+    if quiet and status == PAIR:
+        if abs(mean[1, 0]) < 3 * p[0]:
+            out[1] = min(out[1], out[0])
+        out[2] = min(out[2], out[0])
+
+
+@njit(cache=True)
+def _scan_modes(y, x, status, quiet, p, noisy, row, score, mean, cov, back, filtered):  # type: ignore[no-untyped-def]
     """Viterbi over the models; writes back-pointers (n, models) and softmax of scores by row (n, rows)."""
     models = score.size
-    floor = _OUTLIER - np.log(p[2])
+    gain = np.zeros(models)
     for k in range(y.size):
         best = 0
         for m in range(1, models):
@@ -151,16 +191,17 @@ def _scan_modes(y, x, status, p, whites, row, score, mean, cov, back, filtered):
                 cost = p[4]
                 if row[m] == row[best] and m != best:
                     cost = 3.0
-                if top - cost > score[m]:
+                if m == 0 or m == 2:
+                    learning = 0.0
+                else:
+                    learning = _LEARNING_COST
+                if top - cost - learning > score[m]:
                     score[m] = top - cost
                     back[k, m] = best
                     _enter(m, p, mean, cov)
+            _likelihoods(y[k], x[k], status[k], quiet[k], p, noisy, mean, cov, gain)
             for m in range(models):
-                if status[k] == SILENT:
-                    if m != 2:
-                        score[m] += _SILENT_COST
-                else:
-                    score[m] += max(_step(m, y[k], x[k], p, whites, mean, cov), floor)
+                score[m] += gain[m]
             top = score[0]
             for m in range(1, models):
                 top = max(top, score[m])
@@ -215,7 +256,7 @@ class ModePath:
 
 
 def forward(
-    y: Array, x: Array, status: NDArray[np.int8], model: ModeModel, state: ModeState
+    y: Array, x: Array, status: NDArray[np.int8], quiet: NDArray[np.bool_], model: ModeModel, state: ModeState
 ) -> tuple[NDArray[np.uint8], Array, ModeState]:
     """Run the recursion over one block.
 
@@ -225,6 +266,8 @@ def forward(
         Measured value and reference.
     status : NDArray[np.int8], shape (n,)
         `SKIP` (nothing new), `PAIR` (both valid) or `SILENT` (y silent while its source lives).
+    quiet : NDArray[np.bool_], shape (n,)
+        Where the machine stands, so that a reading of zero is what a healthy channel gives too.
     model : ModeModel
         Noise and prior.
     state : ModeState
@@ -242,18 +285,18 @@ def forward(
     back = np.full((y.size, MODELS), _STAY, dtype=np.uint8)
     filtered = np.zeros((y.size, len(ROWS)))
     score, mean, cov = state.score.copy(), state.mean.copy(), state.cov.copy()
-    _scan_modes(y, x, status, model.packed(), np.array(WHITE_POWERS), ROW_OF_MODEL, score, mean, cov, back, filtered)
+    _scan_modes(y, x, status, quiet, model.packed(), NOISY_MODELS, ROW_OF_MODEL, score, mean, cov, back, filtered)
     return back, filtered, ModeState(score, mean, cov)
 
 
-def most_probable(y: Array, x: Array, status: NDArray[np.int8], model: ModeModel) -> ModePath:
+def most_probable(y: Array, x: Array, status: NDArray[np.int8], quiet: NDArray[np.bool_], model: ModeModel) -> ModePath:
     """Most probable rows of a whole channel; see `forward` for the arguments."""
-    back, filtered, state = forward(y, x, status, model, initial_state(model))
+    back, filtered, state = forward(y, x, status, quiet, model, initial_state(model))
     path, entered = _trace(back, int(np.argmax(state.score)))
     return ModePath(path, entered, filtered)
 
 
-def segment_evidence(y: Array, x: Array, status: NDArray[np.int8], model: ModeModel) -> Array:
+def segment_evidence(y: Array, x: Array, status: NDArray[np.int8], quiet: NDArray[np.bool_], model: ModeModel) -> Array:
     """Log-evidence of each row over one segment, its filter started at the segment's first sample.
 
     Returns
@@ -261,21 +304,18 @@ def segment_evidence(y: Array, x: Array, status: NDArray[np.int8], model: ModeMo
     Array, shape (5,)
         Natural log; the best of its models for each row.
     """
-    by_model = _scan_evidence(y, x, status, model.packed(), np.array(WHITE_POWERS), MODELS)
-    return np.array([by_model[ROW_OF_MODEL == i].max() for i in range(len(ROWS))])
+    by_model = _scan_evidence(y, x, status, quiet, model.packed(), NOISY_MODELS, MODELS)
+    return np.array([by_model[i == ROW_OF_MODEL].max() for i in range(len(ROWS))])
 
 
 @njit(cache=True)
-def _scan_evidence(y, x, status, p, whites, models):  # type: ignore[no-untyped-def]
-    out = np.zeros(models)
+def _scan_evidence(y, x, status, quiet, p, noisy, models):  # type: ignore[no-untyped-def]
+    out, gain = np.zeros(models), np.zeros(models)
     mean, cov = np.zeros((models, 2)), np.zeros((models, 3))
-    floor = _OUTLIER - np.log(p[2])
     for m in range(models):
         _enter(m, p, mean, cov)
-        for k in range(y.size):
-            if status[k] == SILENT:
-                if m != 2:
-                    out[m] += _SILENT_COST
-            elif status[k] == PAIR:
-                out[m] += max(_step(m, y[k], x[k], p, whites, mean, cov), floor)
+    for k in range(y.size):
+        if status[k] != SKIP:
+            _likelihoods(y[k], x[k], status[k], quiet[k], p, noisy, mean, cov, gain)
+            out += gain
     return out

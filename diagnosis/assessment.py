@@ -1,0 +1,64 @@
+"""What an assessor hands on for one component and side: findings, states and evidence columns."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from diagnosis.result import Epsilon, Hypothesis, Sat
+from replay.faults import FaultMode, Side, State
+
+STATES: tuple[State, ...] = tuple(State)
+CODE = {state: np.int8(i) for i, state in enumerate(STATES)}
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One fault of one component on samples [start, stop); see `FaultInterval` for the other fields."""
+
+    start: int
+    stop: int
+    side: Side
+    mode: FaultMode
+    probability: float
+    hypotheses: tuple[Hypothesis, ...]
+    epsilon: Epsilon | None
+    sat: Sat | None
+    evidence: tuple[str, ...]
+    tier: str
+
+
+@dataclass(frozen=True)
+class Assessment:
+    """One component and side over the whole mission.
+
+    Attributes
+    ----------
+    states : NDArray[np.int8], shape (n,)
+        Index into `STATES` of each sample.
+    reasons : Mapping[State, str]
+        Why a state that is no judgement was given.
+    findings : tuple[Finding, ...]
+        Faults in order of time.
+    columns : Mapping[str, NDArray[np.float64]], each of shape (n,)
+        Evidence series by leaf name (``residual``, ``threshold``, ``delta``, …).
+    tier : str
+        ``direct``, ``model``, ``signal`` or ``none``.
+    notes : tuple[str, ...]
+        Figures that the judgement used, one sentence each.
+    """
+
+    states: NDArray[np.int8]
+    reasons: Mapping[State, str] = field(default_factory=dict)
+    findings: tuple[Finding, ...] = ()
+    columns: Mapping[str, NDArray[np.float64]] = field(default_factory=dict)
+    tier: str = "none"
+    notes: tuple[str, ...] = ()
+
+
+def unassessed(size: int, state: State, reason: str) -> Assessment:
+    """An assessment that says why nothing is judged."""
+    return Assessment(states=np.full(size, CODE[state], dtype=np.int8), reasons={state: reason})

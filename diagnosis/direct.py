@@ -1,0 +1,408 @@
+"""Direct evidence: a measurement beside an independent one of the same quantity.
+
+L4 with v against v_true for a sensor, L8 with u_applied against u_a for an actuator; the same for steering angles.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from diagnosis import modes
+from diagnosis.assessment import CODE, Assessment, Finding
+from diagnosis.kalman import GainBiasModel, track_gain_bias
+from diagnosis.noise import relative_lag, rounding_step, shifted, slow_mismatch, white_noise
+from diagnosis.result import Epsilon, Hypothesis, Sat
+from diagnosis.segments import Run, absorb_short, merge_equal, runs_of, trim
+from replay.faults import FaultMode, Side, State
+from replay.machine import Limits, Noise
+
+Array = NDArray[np.float64]
+
+_MODE = {
+    modes.STUCK: FaultMode.STUCK,
+    modes.NO_SIGNAL: FaultMode.NO_SIGNAL,
+    modes.INEFFICIENT: FaultMode.INEFFICIENT,
+    modes.NOISY: FaultMode.NOISY,
+}
+_TEMPER = 0.25
+_MEAN_HEALTHY_S = 60.0
+_MAX_LAG_S = 0.05
+_EDGE_S = 0.1
+
+
+@dataclass(frozen=True)
+class Pair:
+    """A channel and its reference.
+
+    Attributes
+    ----------
+    side : Side
+        `SENSOR` or `ACTUATOR`.
+    y, x : Array, shape (n,)
+        Measured value and reference, SI; NaN where not valid.
+    fresh : NDArray[np.bool_], shape (n,)
+        Steps with a new sample of y.
+    alive : NDArray[np.bool_], shape (n,)
+        Whether another channel of y's source delivers.
+    quiet : NDArray[np.bool_], shape (n,)
+        Where the component is neither commanded nor moving.
+    dt : float
+        Step [s].
+    unit : str
+        Unit of y.
+    span : float
+        Largest plausible magnitude [unit].
+    y_name, x_name : str
+        Canonical names, for the text.
+    known_noise : Noise
+        From the machine file.
+    """
+
+    side: Side
+    y: Array
+    x: Array
+    fresh: NDArray[np.bool_]
+    alive: NDArray[np.bool_]
+    quiet: NDArray[np.bool_]
+    dt: float
+    unit: str
+    span: float
+    y_name: str
+    x_name: str
+    known_noise: Noise
+
+
+def sample_status(
+    y: Array, x: Array, fresh: NDArray[np.bool_], alive: NDArray[np.bool_], dt: float
+) -> NDArray[np.int8]:
+    """Status of every step for `modes`: a pair, a silent y beside living siblings, or nothing new."""
+    status = np.full(y.size, modes.SKIP, dtype=np.int8)
+    known = np.isfinite(y)
+    status[fresh & known & np.isfinite(x)] = modes.PAIR
+    silent = ~known & alive
+    edge = round(_EDGE_S / dt)
+    for part in (slice(0, edge), slice(max(0, y.size - edge), y.size)):
+        if not silent[part].all() or edge * 2 < y.size:
+            silent[part] &= False
+    status[silent] = modes.SILENT
+    return status
+
+
+def assess_pair(pair: Pair, limits: Limits) -> Assessment:
+    """Judge a channel by its reference.
+
+    Parameters
+    ----------
+    pair : Pair
+        Channel, reference and circumstances.
+    limits : Limits
+        Smallest ε and saturation term that count.
+    """
+    usable = pair.fresh & np.isfinite(pair.y) & np.isfinite(pair.x)
+    max_lag = max(1, round(_MAX_LAG_S / pair.dt)) if pair.dt <= _MAX_LAG_S else 0
+    lag = relative_lag(pair.y, pair.x, usable & ~pair.quiet, max_lag)
+    x = shifted(pair.x, lag)
+    status = sample_status(pair.y, x, pair.fresh, pair.alive, pair.dt)
+    model, lsb = _mode_model(pair, x, status, 0.25 * limits.min_sat)
+    path = modes.most_probable(pair.y, x, status, pair.quiet, model)
+    findings = []
+    below = 0
+    for run in _tidy(path, pair, status, model, limits):
+        finding = _finding(run, pair, x, status, model, limits, lag)
+        if finding is None:
+            below += 1
+        else:
+            findings.append(finding)
+    states = _states(pair, x, status, model, findings)
+    notes = [
+        f"{pair.y_name} against {pair.x_name}: noise {model.noise:.2g} {pair.unit}, rounding step {lsb:.2g} {pair.unit}, "
+        f"delay {lag * pair.dt * 1e3:.3g} ms."
+    ]
+    if below:
+        notes.append(f"{below} deviations of {pair.y_name} lie below the limits of the machine file.")
+    return Assessment(
+        states=states,
+        reasons={State.NOT_EXCITED: "nothing is commanded and nothing moves", State.NO_DATA: "no samples"},
+        findings=tuple(findings),
+        columns=_columns(pair, x, status, model, path),
+        tier="direct",
+        notes=tuple(notes),
+    )
+
+
+def _mode_model(pair: Pair, x: Array, status: NDArray[np.int8], tolerance: float) -> tuple[modes.ModeModel, float]:
+    """Noise of the channel, found from the mission where the machine file does not give it."""
+    fresh_y = pair.y[status == modes.PAIR]
+    lsb = pair.known_noise.lsb if pair.known_noise.lsb is not None else rounding_step(fresh_y)
+    residual = np.where(status == modes.PAIR, pair.y - x, np.nan)
+    period = pair.dt * max(
+        1.0,
+        float(
+            np.median(
+                np.diff(np.flatnonzero(status == modes.PAIR)[:20_000]),
+            )
+        )
+        if fresh_y.size > 1
+        else 1.0,
+    )
+    white = white_noise(residual[status == modes.PAIR], period)
+    slow = slow_mismatch(residual, (status == modes.PAIR) & ~pair.quiet, pair.dt)
+    measured = max(np.nan_to_num(white), np.nan_to_num(slow))
+    noise = max(measured, pair.known_noise.std or 0.0, lsb / np.sqrt(12), 1e-5 * pair.span)
+    # a stuck sensor has no noise left, a stuck valve is still read by a noisy spool sensor
+    constant = max(lsb / np.sqrt(12), noise / 50) if pair.side is Side.SENSOR else noise
+    rate = 1.0 / period
+    model = modes.ModeModel(
+        noise=noise,
+        constant_noise=constant,
+        tolerance=tolerance,
+        span=pair.span,
+        switch_cost=float(np.log(_MEAN_HEALTHY_S * rate * 8)),
+        dt=period,
+    )
+    return model, lsb
+
+
+def _tidy(
+    path: modes.ModePath, pair: Pair, status: NDArray[np.int8], model: modes.ModeModel, limits: Limits
+) -> list[Run]:
+    """Faulty runs of a path, joined where they belong together, without the ends in which nothing moves."""
+    runs = absorb_short(runs_of(path), max(3, round(0.01 / pair.dt)))
+    runs = merge_equal(runs, max(2, round(0.02 / pair.dt)), (modes.NOISY, modes.INEFFICIENT, modes.NO_SIGNAL))
+    out = []
+    for run in runs:
+        if run.row == modes.HEALTHY:
+            continue
+        if run.row in (modes.INEFFICIENT, modes.NO_SIGNAL):
+            silent = status[run.start : run.stop] == modes.SILENT
+            still = pair.quiet.copy() if not silent.any() else pair.quiet & (status != modes.SILENT)
+            kept = trim(run, still)
+            if kept is None:
+                continue
+            run = kept
+        out.append(run)
+    return out
+
+
+def _finding(
+    run: Run, pair: Pair, x: Array, status: NDArray[np.int8], model: modes.ModeModel, limits: Limits, lag: int
+) -> Finding | None:
+    """Estimate ε and sat of a run; None where it lies below the limits or the evidence is thin."""
+    part = slice(run.start, run.stop)
+    y, ref, st, quiet = pair.y[part], x[part], status[part], pair.quiet[part]
+    use = st == modes.PAIR
+    evidence = modes.segment_evidence(y, ref, st, quiet, model)
+    gain = evidence[run.row] - evidence[modes.HEALTHY]
+    if gain < model.switch_cost:
+        return None
+    prior = np.log(np.array([0.8, 0.05, 0.05, 0.05, 0.05]))
+    tempered = prior + np.clip(_TEMPER * (evidence - evidence.max()), -700, 0)
+    p = np.exp(tempered - tempered.max())
+    p /= p.sum()
+    estimate = estimate_fault(run.row, y[use], ref[use], model, pair.unit, noisy_x=pair.side is Side.SENSOR)
+    if estimate is None:
+        return None
+    mode = _MODE[run.row]
+    epsilon, sat, delta = estimate
+    deviation = float(np.sqrt(np.mean((y[use] - ref[use]) ** 2))) if use.any() else float("inf")
+    if mode is FaultMode.INEFFICIENT:
+        if delta > 1.0 + limits.min_epsilon or delta < -limits.min_epsilon:
+            mode = FaultMode.OUTSIDE_TABLE
+        elif epsilon is not None and epsilon.value < limits.min_epsilon:
+            return None
+    if mode is FaultMode.NOISY and deviation < max(2.5 * model.noise, limits.min_sat / 2):
+        return None
+    shift = lag if pair.side is Side.ACTUATOR else 0
+    side = pair.side.value
+    hypotheses = sorted((Hypothesis(side, r, float(q)) for r, q in zip(modes.ROWS, p, strict=True)), key=lambda h: -h.p)
+    return Finding(
+        start=max(0, run.start - max(0, shift)),
+        stop=max(1, run.stop - max(0, shift)),
+        side=pair.side,
+        mode=mode,
+        probability=float(p[run.row]),
+        hypotheses=tuple(hypotheses),
+        epsilon=epsilon,
+        sat=sat,
+        evidence=_sentences(run.row, mode, pair, y, ref, use, st, model, epsilon, sat, gain, deviation),
+        tier="direct",
+    )
+
+
+def estimate_fault(
+    row: int, y: Array, x: Array, model: modes.ModeModel, unit: str, *, noisy_x: bool
+) -> tuple[Epsilon | None, Sat | None, float] | None:
+    """ε̂ and the saturation term of one row of the table with 95 % bounds, and δ̂.
+
+    Parameters
+    ----------
+    row : int
+        Row of the table.
+    y, x : Array, shape (n,)
+        Samples of the run.
+    model : ModeModel
+        Noise of the channel.
+    unit : str
+        Unit of the saturation term.
+    noisy_x : bool
+        Whether the reference is a measurement with noise of its own rather than an exact command.
+    """
+    if y.size < 3:
+        return (Epsilon(1.0, 0.0, 1.0), None, 0.0) if row == modes.NO_SIGNAL else None
+    if row in (modes.STUCK, modes.NO_SIGNAL):
+        level = float(np.mean(y))
+        spread = float(np.std(y))
+        slack = min(1.0, 1.96 * (model.constant_noise + spread) / max(1e-300, float(np.std(x)) * np.sqrt(y.size)))
+        se = 1.96 * max(model.constant_noise, spread) / np.sqrt(y.size)
+        sat = Sat(level, float(np.sqrt(np.mean(y**2))), level - se, level + se, unit)
+        return Epsilon(1.0, 1.0 - slack, 1.0), sat, 0.0
+    if row == modes.INEFFICIENT:
+        sxx = float(x @ x)
+        if sxx <= 0:
+            return None
+        delta = float(x @ y) / sxx
+        residual = y - delta * x
+        se = 1.96 * np.sqrt(_long_run_variance(residual) / sxx)
+        return _epsilon(delta, se), None, delta
+    # noisy: δ̄ drifts; generalised least squares on differences of blocks and levels through the Kalman filter
+    delta, delta_se = _gain_with_drift(y, x, model, 0.05 if noisy_x else 0.0)
+    bias = y - delta * x
+    epsilon = _epsilon(delta, 1.96 * delta_se)
+    eps = max(epsilon.value, 0.05)
+    mean, rms = float(np.mean(bias)), float(np.sqrt(np.mean(bias**2)))
+    half = 1.96 * np.sqrt(_long_run_variance(bias) / bias.size) + 1.96 * delta_se * abs(float(np.mean(x)))
+    return epsilon, Sat(mean / eps, rms / eps, (mean - half) / eps, (mean + half) / eps, unit), delta
+
+
+def _epsilon(delta: float, half: float) -> Epsilon:
+    value = 1.0 - delta
+    return Epsilon(float(value), float(value - half), float(value + half))
+
+
+def _long_run_variance(residual: Array) -> float:
+    """Variance of the mean times n: AR(1) inflation of the sample variance."""
+    centred = residual - residual.mean()
+    var = float(centred @ centred) / max(1, residual.size - 1)
+    if var <= 0 or residual.size < 8:
+        return var
+    rho = min(0.999, max(0.0, float(centred[1:] @ centred[:-1]) / float(centred @ centred)))
+    return var * (1 + rho) / (1 - rho)
+
+
+def _gain_with_drift(y: Array, x: Array, model: modes.ModeModel, smooth_s: float) -> tuple[float, float]:
+    """δ of y = δ·x + δ̄ + n with an AR(1) δ̄ around a constant: Cochrane–Orcutt steps from a ridge on [δ, mean]."""
+    spread = float(np.std(y - 0.7 * x)) + model.noise
+    ridge = np.diag([1 / 0.3**2, 1 / (0.1 * model.span) ** 2])
+    width = min(x.size, max(1, round(smooth_s / model.dt)))
+    if width > 1:  # the noise of x would pull δ towards 0
+        x = np.convolve(np.pad(x, (width // 2, width - 1 - width // 2), mode="edge"), np.ones(width) / width, "valid")
+    start = np.array([0.7, 0.0])
+    rho, sigma, theta = 0.0, spread, start
+    design = np.stack([x, np.ones_like(x)], axis=1)
+    covariance = np.linalg.inv(ridge)
+    for _ in range(6):
+        a = (design[1:] - rho * design[:-1]) / sigma
+        b = (y[1:] - rho * y[:-1]) / sigma
+        information = ridge + a.T @ a
+        covariance = np.linalg.inv(information)
+        theta = covariance @ (ridge @ start + a.T @ b)
+        residual = y - design @ theta
+        norm = float(residual[:-1] @ residual[:-1])
+        rho = min(0.9995, max(0.0, float(residual[1:] @ residual[:-1]) / norm)) if norm > 0 else 0.0
+        sigma = max(float(np.std(residual[1:] - rho * residual[:-1])), 1e-9 * model.span)
+    return float(theta[0]), float(np.sqrt(covariance[0, 0]))
+
+
+def _sentences(
+    row: int,
+    mode: FaultMode,
+    pair: Pair,
+    y: Array,
+    x: Array,
+    use: NDArray[np.bool_],
+    status: NDArray[np.int8],
+    model: modes.ModeModel,
+    epsilon: Epsilon | None,
+    sat: Sat | None,
+    gain: float,
+    deviation: float,
+) -> tuple[str, ...]:
+    """What decided, in figures."""
+    out = []
+    seconds = y.size * pair.dt
+    silent = int(np.count_nonzero(status == modes.SILENT))
+    if silent:
+        out.append(
+            f"{pair.y_name} delivered nothing for {silent * pair.dt:.3f} s while other channels of its source did."
+        )
+    if use.any() and row in (modes.STUCK, modes.NO_SIGNAL):
+        out.append(
+            f"{pair.y_name} stayed within {float(np.ptp(y[use])):.2g} {pair.unit} of {float(np.mean(y[use])):.4g} {pair.unit} "
+            f"for {seconds:.3f} s while {pair.x_name} moved over {float(np.ptp(x[use])):.2g} {pair.unit}."
+        )
+    elif use.any() and epsilon is not None:
+        out.append(
+            f"{pair.y_name} followed {1 - epsilon.value:.3f} × {pair.x_name} (95 %: {1 - epsilon.high:.3f} to "
+            f"{1 - epsilon.low:.3f}) over {seconds:.3f} s."
+        )
+        if sat is not None:
+            out.append(
+                f"The rest has a mean of {sat.mean * epsilon.value:.3g} and a root mean square of {sat.rms * epsilon.value:.3g} "
+                f"{pair.unit}; healthy noise is {model.noise:.2g} {pair.unit}."
+            )
+    if use.any():
+        out.append(
+            f"Residual {deviation:.3g} {pair.unit} root mean square; threshold {3 * model.noise:.2g} {pair.unit}."
+        )
+    if mode is FaultMode.OUTSIDE_TABLE:
+        out.append("The gain lies outside 0…1, which no row of the table describes.")
+    out.append(f"Log-evidence against healthy: {gain:.0f}; a fault is considered from {model.switch_cost:.0f}.")
+    return tuple(out)
+
+
+def _states(
+    pair: Pair, x: Array, status: NDArray[np.int8], model: modes.ModeModel, findings: list[Finding]
+) -> NDArray[np.int8]:
+    """State of every sample: faults, healthy where something moves, else not excited or no data."""
+    states = np.where(pair.quiet, CODE[State.NOT_EXCITED], CODE[State.HEALTHY]).astype(np.int8)
+    known = np.isfinite(pair.y) & np.isfinite(x)
+    nothing = ~known & (status != modes.SILENT)
+    states[nothing] = CODE[State.NO_DATA]
+    for f in findings:
+        states[f.start : f.stop] = CODE[State(f.mode.value)]
+    return states
+
+
+def _columns(
+    pair: Pair, x: Array, status: NDArray[np.int8], model: modes.ModeModel, path: modes.ModePath
+) -> dict[str, Array]:
+    """Series for the evidence plots."""
+    use = status == modes.PAIR
+    track = track_gain_bias(
+        pair.y,
+        x,
+        use,
+        GainBiasModel(
+            noise=model.noise,
+            gain_walk=0.3,
+            bias_walk=0.1 * pair.span,
+            gain_std=0.3,
+            bias_std=0.3 * pair.span,
+            relax_s=5.0,
+            dt=pair.dt,
+        ),
+    )
+    columns = {
+        "residual": np.where(use, pair.y - x, np.nan),
+        "threshold": np.full(pair.y.size, 3 * model.noise),
+        "expected": x,
+        "delta": track.delta,
+        "delta_std": track.delta_std,
+        "delta_bar": track.bias,
+        "delta_bar_std": track.bias_std,
+    }
+    columns.update({f"p_{name}": path.filtered[:, i] for i, name in enumerate(modes.ROWS)})
+    return columns
