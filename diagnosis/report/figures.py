@@ -45,6 +45,7 @@ class Row:
     threshold: str | None = None
     limits: tuple[float, float] | None = None
     right_unit: str = ""
+    component: str = ""
 
     def columns(self) -> tuple[str, ...]:
         """Columns that the row needs."""
@@ -201,14 +202,22 @@ def _side_rows(fault: Mapping[str, Any], side: str, residual_unit: tuple[str, fl
     return rows
 
 
-def _psi_row(c: str, columns: Columns) -> list[Row]:
+def _psi_row(c: str, columns: Columns, component: str = "") -> list[Row]:
     traces = [
         Trace(f"replay.{c}.psi_printed", "printed law", "replayed"),
         Trace(f"replay.{c}.psi_implied", "implied by the recorded command", "measured"),
         Trace(f"wheel.{c}.psi", "recorded", "reference"),
         Trace(f"replay.{c}.rho", "ρ (right axis)", "right", right=True),
     ]
-    return _row(columns, "psi", f"Ψ̂ {c}", "1", traces, right_unit="ρ (1/s)")
+    return _row(
+        columns,
+        "psi",
+        f"Ψ̂ {c}",
+        "1",
+        traces,
+        right_unit="ρ (1/s)" if f"replay.{c}.rho" in columns else "",
+        component=component,
+    )
 
 
 def loop_groups(wheels: Sequence[str], axles: Sequence[str], columns: Columns) -> tuple[Group, ...]:
@@ -220,16 +229,16 @@ def loop_groups(wheels: Sequence[str], axles: Sequence[str], columns: Columns) -
     for w in wheels:
         _, unit, scale, measured, commanded, _ = _motion(w, "wheel", columns)
         traces = [Trace(measured, "v measured", "measured", scale), Trace(commanded, "v_ref", "commanded", scale)]
-        speed += _row(columns, "v", f"Speed {w}", unit, traces)
+        speed += _row(columns, "v", f"Speed {w}", unit, traces, component=w)
         valve = [Trace(f"wheel.{w}.u", "recorded", "measured"), Trace(f"replay.{w}.u", "replayed", "replayed")]
-        drive += _row(columns, "u", f"u_a {w}", "fraction of full opening", valve)
-        psi += _psi_row(w, columns)
+        drive += _row(columns, "u", f"u_a {w}", "fraction of full opening", valve, component=w)
+        psi += _psi_row(w, columns, component=w)
     for a in axles:
         _, unit, scale, measured, commanded, _ = _motion(a, "steer", columns)
         traces = [Trace(measured, "φ measured", "measured", scale), Trace(commanded, "φ_c", "commanded", scale)]
-        steering += _row(columns, "phi", f"φ {a}", unit, traces)
+        steering += _row(columns, "phi", f"φ {a}", unit, traces, component=a)
         valve = [Trace(f"steer.{a}.u", "recorded", "measured"), Trace(f"replay.{a}.u", "replayed", "replayed")]
-        steering += _row(columns, "u", f"u_s {a}", "fraction of full opening", valve)
+        steering += _row(columns, "u", f"u_s {a}", "fraction of full opening", valve, component=a)
     groups = (
         Group("speed", "Wheel speeds", tuple(speed)),
         Group("drive", "Drive valves u_a", tuple(drive)),
@@ -257,6 +266,8 @@ def row_json(row: Row, index: Mapping[str, int]) -> dict[str, Any]:
         data["bandScale"] = row.band_scale
     if row.limits:
         data["limits"] = list(row.limits)
+    if row.component:
+        data["component"] = row.component
     if row.right_unit:
         data["rightUnit"] = row.right_unit
     return data

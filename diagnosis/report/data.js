@@ -1,0 +1,175 @@
+"use strict";
+// Time series of the report: decoded from the page's own text when first needed, thinned per pixel for drawing.
+const Data = (() => {
+  const view = JSON.parse(document.getElementById("view").textContent);
+  const BLOCK = 64;
+  const decoded = new Map();
+
+  function fromBase64(text) {
+    if (Uint8Array.fromBase64) return Uint8Array.fromBase64(text);
+    const raw = atob(text), bytes = new Uint8Array(raw.length);
+    for (let i = 0; i < raw.length; i++) bytes[i] = raw.charCodeAt(i);
+    return bytes;
+  }
+
+  async function inflated(id) {
+    const element = document.getElementById(id);
+    const stream = new Blob([fromBase64(element.textContent)]).stream().pipeThrough(new DecompressionStream("deflate"));
+    element.textContent = "";
+    return new Response(stream);
+  }
+
+  // Byte planes → zigzag → running sum; a level of 0 means no sample.
+  function levels(bytes, from, n, planes) {
+    const out = new Int32Array(n);
+    let sum = 0;
+    for (let i = 0; i < n; i++) {
+      let z = bytes[from + i];
+      if (planes > 1) z |= bytes[from + n + i] << 8;
+      if (planes > 2) z |= bytes[from + 2 * n + i] << 16;
+      if (planes > 3) z |= bytes[from + 3 * n + i] << 24;
+      sum = (sum + ((z >>> 1) ^ -(z & 1))) | 0;
+      out[i] = sum;
+    }
+    return out;
+  }
+
+  function extremes(q) {
+    const m = Math.ceil(q.length / BLOCK), low = new Int32Array(m), high = new Int32Array(m);
+    for (let b = 0; b < m; b++) {
+      let lo = 0x7fffffff, hi = 0;
+      for (let i = b * BLOCK, e = Math.min(q.length, i + BLOCK); i < e; i++) {
+        const v = q[i];
+        if (v) { if (v < lo) lo = v; if (v > hi) hi = v; }
+      }
+      low[b] = hi ? lo : 0;
+      high[b] = hi;
+    }
+    return { low, high };
+  }
+
+  function segment(c, j) {
+    const id = `c${c}-${j}`;
+    if (!decoded.has(id)) {
+      const [start, count, stride, planes] = view.channels[c].segments[j];
+      decoded.set(id, inflated(id).then((r) => r.arrayBuffer()).then((buffer) => {
+        const bytes = new Uint8Array(buffer), low = levels(bytes, 0, count, planes);
+        if (stride > 1) return { start, count, stride, low, high: levels(bytes, count * planes, count, planes) };
+        return { start, count, stride, q: low, ...extremes(low) };
+      }));
+    }
+    return decoded.get(id);
+  }
+
+  // The segment with every sample that covers [a, b), else the extremes of the whole mission.
+  function covering(c, a, b) {
+    const all = view.channels[c].segments;
+    const full = all.findIndex(([start, count, stride]) => stride === 1 && start <= a && start + count >= b);
+    return full >= 0 ? full : 0;
+  }
+
+  const range = (t0, t1) => [
+    Math.max(0, Math.floor((t0 - view.t0) / view.dt) - 1),
+    Math.min(view.n, Math.ceil((t1 - view.t0) / view.dt) + 2),
+  ];
+
+  // Smallest and largest level among samples [a, b) and their places, by whole blocks where possible.
+  function scan(s, a, b) {
+    let lo = 0x7fffffff, hi = 0, at = a, top = a, gap = false;
+    const samples = (i, e) => {
+      for (; i < e; i++) {
+        const v = s.q[i];
+        if (!v) gap = true;
+        else { if (v < lo) { lo = v; at = i; } if (v > hi) { hi = v; top = i; } }
+      }
+    };
+    const first = Math.ceil(a / BLOCK), last = Math.floor(b / BLOCK);
+    if (last - first < 2) samples(a, b);
+    else {
+      samples(a, first * BLOCK);
+      let lowest = -1, highest = -1;
+      for (let k = first; k < last; k++) {
+        if (!s.high[k]) { gap = true; continue; }
+        if (s.low[k] < lo) { lo = s.low[k]; lowest = k; }
+        if (s.high[k] > hi) { hi = s.high[k]; highest = k; }
+      }
+      if (lowest >= 0) at = s.q.indexOf(lo, lowest * BLOCK);
+      if (highest >= 0) top = s.q.indexOf(hi, highest * BLOCK);
+      samples(last * BLOCK, b);
+    }
+    return { lo, hi, at, top, gap };
+  }
+
+  // Curve over [t0, t1] for about `pixels` pixels: every sample where few enough, else the extremes per pixel.
+  async function curve(c, t0, t1, pixels) {
+    const { step, base } = view.channels[c], [a, b] = range(t0, t1);
+    const x = [], y = [], s = await segment(c, covering(c, a, b));
+    const time = (i) => view.t0 + i * view.dt, value = (v) => (v ? (base + v) * step : NaN);
+    const per = s.stride, i0 = Math.max(0, Math.floor((a - s.start) / per));
+    const i1 = Math.min(s.count, Math.ceil((b - s.start) / per)), n = i1 - i0;
+    const exact = per === 1 && n <= 2 * pixels;
+    if (exact) {
+      for (let i = i0; i < i1; i++) { x.push(time(s.start + i)); y.push(value(s.q[i])); }
+      return { x, y, exact, stride: 1 };
+    }
+    const buckets = Math.min(n, pixels), width = n / buckets;
+    for (let k = 0; k < buckets; k++) {
+      const p = i0 + Math.floor(k * width), e = i0 + Math.floor((k + 1) * width);
+      if (per === 1) {
+        const { lo, hi, at, top, gap } = scan(s, p, e);
+        if (!hi) { x.push(time(s.start + p)); y.push(NaN); continue; }
+        if (at <= top) { x.push(time(s.start + at), time(s.start + top)); y.push(value(lo), value(hi)); }
+        else { x.push(time(s.start + top), time(s.start + at)); y.push(value(hi), value(lo)); }
+        if (gap) { x.push(time(s.start + e - 1)); y.push(NaN); }
+      } else {
+        let lo = 0x7fffffff, hi = 0;
+        for (let i = p; i < e; i++) if (s.high[i]) { lo = Math.min(lo, s.low[i]); hi = Math.max(hi, s.high[i]); }
+        x.push(time(s.start + p * per), time(s.start + (p + e) / 2 * per));
+        if (hi) y.push(value(lo), value(hi)); else y.push(NaN, NaN);
+      }
+    }
+    return { x, y, exact, stride: Math.max(per, Math.round(width * per)), stored: per };
+  }
+
+  // Every stored value of some channels over [t0, t1] as CSV text; extremes where samples are not stored.
+  async function csv(columns, t0, t1) {
+    const [a, b] = range(t0, t1), parts = await Promise.all(columns.map(({ c }) => segment(c, covering(c, a, b))));
+    const stride = Math.max(...parts.map((s) => s.stride)), lines = [];
+    const guard = (s) => `"${(/^[=+\-@\t\r]/.test(s) ? "'" : "") + s.replaceAll('"', '""')}"`;
+    const heads = columns.map(({ c, unit }) => `${view.channels[c].name} [${unit}]`);
+    lines.push(["t [s]", ...(stride > 1 ? heads.flatMap((h) => [h + " min", h + " max"]) : heads)].map(guard).join(","));
+    const cell = (v, c, k) => (v ? ((view.channels[c].base + v) * view.channels[c].step * k).toPrecision(7) : "");
+    const digits = Math.max(3, Math.ceil(-Math.log10(view.dt)) + 1);
+    for (let i = Math.ceil(a / stride) * stride; i < b; i += stride) {
+      const t = view.t0 + i * view.dt;
+      if (t < t0 - view.dt / 2 || t > t1 + view.dt / 2) continue;
+      const row = [t.toFixed(digits)];
+      parts.forEach((s, j) => {
+        const { c, k } = columns[j];
+        if (stride === 1) { row.push(cell(s.q[i - s.start], c, k)); return; }
+        let lo = 0, hi = 0;
+        if (s.stride > 1) { const p = Math.floor((i - s.start) / s.stride); lo = s.low[p]; hi = s.high[p]; }
+        else { const r = scan(s, Math.max(0, i - s.start), Math.min(s.count, i - s.start + stride)); if (r.hi) { lo = r.lo; hi = r.hi; } }
+        const [p, q] = k < 0 ? [hi, lo] : [lo, hi];
+        row.push(cell(p, c, k), cell(q, c, k));
+      });
+      lines.push(row.join(","));
+    }
+    return lines.join("\n") + "\n";
+  }
+
+  // plotly.js: expanded from the page's own text; its hash stands in the page's policy.
+  let loading = null;
+  function plotly() {
+    loading ??= inflated("plotlyjs").then((r) => r.text()).then((source) => {
+      const script = document.createElement("script");
+      script.textContent = source;
+      document.head.append(script);
+      if (!window.Plotly) throw new Error("plotly.js did not start");
+      return window.Plotly;
+    });
+    return loading;
+  }
+
+  return { view, curve, csv, plotly };
+})();

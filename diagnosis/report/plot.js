@@ -1,0 +1,227 @@
+"use strict";
+// One figure: rows of panels over one time axis. Zooming thins the samples anew and restyles once.
+class Figure {
+  constructor(element, badge, onRange) {
+    Object.assign(this, { element, badge, onRange, rows: [], shades: [], range: [0, 1], drawn: false, busy: false, again: false, job: 0 });
+  }
+
+  static colour(name) { return getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim(); }
+
+  static text(s) { return s.replaceAll("&", "&amp;").replaceAll("<", "&lt;").replaceAll(">", "&gt;"); }
+
+  static styles = {
+    measured: { colour: "accent", width: 1.7, sign: "━━" },
+    commanded: { colour: "text", width: 1.3, dash: "dot", sign: "···" },
+    expected: { colour: "teal", width: 1.5, dash: "dash", sign: "╌╌" },
+    reference: { colour: "text", width: 1, sign: "──" },
+    replayed: { colour: "alt", width: 1.5, dash: "dash", sign: "╌╌" },
+    applied: { colour: "teal", width: 1.5, sign: "━━" },
+    right: { colour: "muted", width: 1, dash: "dot", sign: "···" },
+    peer: { colour: "peer", width: 1.1, sign: "──" },
+    band: { colour: "accent", width: 0 },
+    threshold: { colour: "stuck", width: 1.3, dash: "dash", sign: "╌╌" },
+  };
+
+  static style(role) {
+    if (role.startsWith("mode-")) {
+      const mode = role.slice(5), dash = { stuck: "solid", no_signal: "dash", inefficient: "solid", noisy: "dot" }[mode];
+      return { colour: mode === "inefficient" ? "ineff-line" : mode, width: 1.6, dash, sign: dash === "dash" ? "╌╌" : dash === "dot" ? "···" : "━━" };
+    }
+    return Figure.styles[role];
+  }
+
+  pixels() { return Math.max(200, this.element.clientWidth - 70); }
+
+  // Curves of all rows for the current range, in the order of `traces`.
+  async fetch(range) {
+    const pixels = this.pixels(), [t0, t1] = range;
+    const one = (c, k) => Data.curve(c, t0, t1, pixels).then((d) => (k === 1 ? d : { ...d, y: d.y.map((v) => v * k) }));
+    const curves = [];
+    for (const row of this.rows) {
+      if (row.band) {
+        const [low, high] = await Promise.all(row.band.map((c) => one(c, row.bandScale)));
+        curves.push(Figure.polygon(low, high));
+      }
+      if (row.threshold !== undefined) {
+        const d = await one(row.threshold, row.bandScale);
+        curves.push(d, { ...d, y: d.y.map((v) => -v) });
+      }
+      for (const t of row.traces) curves.push(await one(t.c, t.k));
+    }
+    return curves;
+  }
+
+  // Closed outlines between two curves, one for each stretch without a gap.
+  static polygon(low, high) {
+    const x = [], y = [];
+    const runs = (d) => {
+      const list = [];
+      let run = null;
+      d.y.forEach((v, i) => {
+        if (!Number.isFinite(v)) run = null;
+        else { if (!run) list.push(run = []); run.push([d.x[i], v]); }
+      });
+      return list;
+    };
+    const lows = runs(low), highs = runs(high);
+    for (let i = 0; i < Math.min(lows.length, highs.length); i++) {
+      for (const [a, b] of [...highs[i], ...lows[i].reverse()]) { x.push(a); y.push(b); }
+      x.push(NaN); y.push(NaN);
+    }
+    return { x, y, exact: low.exact, stride: low.stride, stored: low.stored };
+  }
+
+  traces(curves) {
+    const list = [], add = (i, role, name, unit, right, more) => {
+      const s = Figure.style(role), d = curves[list.length];
+      list.push({
+        type: "scatter", mode: "lines", x: d.x, y: d.y, name: Figure.text(name), connectgaps: false, xaxis: "x",
+        yaxis: right ? `y${100 + i}` : `y${i ? i + 1 : ""}`, line: { color: Figure.colour(s.colour), width: s.width, dash: s.dash || "solid" },
+        hovertemplate: `%{y:.4~g} ${Figure.text(unit)}<extra>${Figure.text(name)}</extra>`, ...more,
+      });
+    };
+    this.rows.forEach((row, i) => {
+      if (row.band) add(i, "band", "95 % band", row.unit, false, { fill: "toself", opacity: 0.22, fillcolor: Figure.colour("accent"), hoverinfo: "skip", hovertemplate: null });
+      if (row.threshold !== undefined) {
+        add(i, "threshold", "+ threshold", row.unit, false);
+        add(i, "threshold", "− threshold", row.unit, false);
+      }
+      for (const t of row.traces) add(i, t.role, t.name, t.right ? row.rightUnit : row.unit, t.right);
+    });
+    return list;
+  }
+
+  // Title and legend of a row, wrapped to the figure's width.
+  heading(row) {
+    const entries = row.traces.filter((t) => t.role !== "peer").map((t) => [Figure.style(t.role), t.name]);
+    const peers = row.traces.filter((t) => t.role === "peer").map((t) => t.name);
+    if (peers.length) entries.unshift([Figure.style("peer"), peers.join(", ")]);
+    if (row.threshold !== undefined) entries.push([Figure.style("threshold"), "± threshold"]);
+    const muted = Figure.colour("muted"), room = this.pixels() / 6.4, title = `${row.title} (${row.unit})`;
+    let text = `<b>${Figure.text(row.title)}</b> (${Figure.text(row.unit)})`, used = title.length, lines = 1;
+    for (const [s, n] of entries) {
+      if (used + n.length + 6 > room) { text += "<br>"; used = 0; lines += 1; } else text += "   ";
+      used += n.length + 6;
+      text += `<span style="color:${Figure.colour(s.colour)}">${s.sign}</span> <span style="color:${muted}">${Figure.text(n)}</span>`;
+    }
+    return { text, lines };
+  }
+
+  layout() {
+    const [text, muted, line, grid] = ["text", "muted", "line", "line2"].map(Figure.colour);
+    const panel = this.rows.length > 5 ? 104 : 128, foot = 44, headings = this.rows.map((r) => this.heading(r));
+    const heads = headings.map((h) => 15 + 16 * h.lines), plot = heads.reduce((sum, h) => sum + h + panel, 0), height = plot + foot;
+    const last = this.rows.length;
+    const layout = {
+      margin: { l: 56, r: this.rows.some((r) => r.rightUnit) ? 52 : 14, t: 0, b: foot }, height, autosize: true,
+      paper_bgcolor: "rgba(0,0,0,0)", plot_bgcolor: "rgba(0,0,0,0)", showlegend: false, dragmode: "zoom",
+      font: { color: text, size: 12, family: getComputedStyle(document.body).fontFamily },
+      hovermode: "x unified", hoversubplots: "axis", hoverlabel: { bgcolor: Figure.colour("surface"), bordercolor: line, font: { color: text } },
+      xaxis: {
+        range: [...this.range], anchor: last > 1 ? `y${last}` : "y", gridcolor: grid, zeroline: false, linecolor: line, tickcolor: line,
+        ticks: "outside", hoverformat: ".4f", showspikes: true, spikemode: "across", spikesnap: "cursor", spikethickness: 1, spikedash: "solid",
+        spikecolor: muted, title: { text: "mission time (s)", standoff: 4, font: { color: muted, size: 12 } },
+      },
+      shapes: [], annotations: [],
+    };
+    let down = 0;
+    this.rows.forEach((row, i) => {
+      down += heads[i] + panel;
+      const top = 1 - (down - panel) / plot, axis = `yaxis${i ? i + 1 : ""}`;
+      layout[axis] = {
+        domain: [Math.max(0, top - panel / plot), top], gridcolor: grid, zerolinecolor: line, fixedrange: true, nticks: 5, tickformat: ".4~g",
+        ...(row.limits ? { range: row.limits } : {}),
+      };
+      if (row.rightUnit) layout[`yaxis${100 + i}`] = { overlaying: `y${i ? i + 1 : ""}`, side: "right", anchor: "x", showgrid: false, zeroline: false, fixedrange: true, nticks: 4, tickfont: { color: muted }, tickformat: ".3~g", title: { text: Figure.text(row.rightUnit), font: { size: 11, color: muted }, standoff: 2 } };
+      layout.annotations.push({
+        xref: "paper", yref: "paper", x: 0, y: top, yshift: 3, xanchor: "left", yanchor: "bottom", showarrow: false, align: "left", font: { size: 12 },
+        text: headings[i].text,
+      });
+    });
+    this.shade(layout);
+    return layout;
+  }
+
+  // Intervals of faults behind the panels that show their component, named in the first.
+  shade(layout) {
+    for (const s of this.shades) {
+      const fill = Figure.colour(s.mode), x0 = s.start, x1 = Math.max(s.stop, s.start + Data.view.dt);
+      const rows = [...this.rows.keys()].filter((i) => !this.rows[i].component || this.rows[i].component === s.component);
+      for (const i of rows) {
+        const yref = `y${i ? i + 1 : ""} domain`, box = { xref: "x", yref, x0, y0: 0, y1: 1 };
+        layout.shapes.push({ ...box, type: "rect", x1, fillcolor: fill, opacity: s.main ? 0.15 : 0.09, line: { width: 0 }, layer: "below" });
+        if (s.main) for (const x of [x0, x1]) layout.shapes.push({ ...box, type: "line", x0: x, x1: x, line: { color: fill, width: 1.2 } });
+      }
+      if (s.main || !rows.length || this.shades.length > 30) continue;
+      layout.annotations.push({
+        xref: "x", yref: `y${rows[0] ? rows[0] + 1 : ""} domain`, x: (x0 + x1) / 2, y: 1, yanchor: "top", showarrow: false, text: Figure.text(s.id), bgcolor: Figure.colour("surface"), borderpad: 0, opacity: 0.85,
+        font: { size: 11, color: Figure.colour("muted") },
+      });
+    }
+  }
+
+  label(curves) {
+    if (!this.badge) return;
+    const every = curves.every((c) => c.exact), stride = Math.max(...curves.map((c) => c.stride));
+    const stored = Math.max(...curves.map((c) => c.stored || 1)), s = stride * Data.view.dt;
+    const time = s < 1 ? `${+(s * 1e3).toPrecision(2)} ms` : `${+s.toPrecision(2)} s`, rate = 1 / Data.view.dt;
+    this.badge.textContent = every
+      ? `every sample drawn · ${+rate.toPrecision(4)} Hz`
+      : `min–max envelope · ${time}` + (stored > 1 ? " · samples stored around faults only" : " per pixel");
+    this.badge.classList.toggle("full", every);
+  }
+
+  async draw(rows, shades, range) {
+    Object.assign(this, { rows, shades, range: this.clip(range) });
+    const job = ++this.job, Plotly = await Data.plotly(), curves = await this.fetch(this.range);
+    if (job !== this.job) return;
+    const config = {
+      responsive: true, displaylogo: false, showSendToCloud: false, plotlyServerURL: "", doubleClick: false,
+      modeBarButtonsToRemove: ["select2d", "lasso2d", "autoScale2d", "resetScale2d"],
+    };
+    await Plotly.react(this.element, this.traces(curves), this.layout(), config);
+    this.label(curves);
+    if (!this.drawn) {
+      this.drawn = true;
+      this.element.on("plotly_relayout", (e) => {
+        const r = e["xaxis.range"] || ("xaxis.range[0]" in e ? [e["xaxis.range[0]"], e["xaxis.range[1]"]] : null);
+        if (r && !this.busy) this.zoom(r.map(Number));
+      });
+      this.element.on("plotly_doubleclick", () => this.zoom([0, Data.view.duration]));
+    }
+    this.onRange?.(this.range);
+  }
+
+  redraw() { return this.drawn ? this.draw(this.rows, this.shades, this.range) : undefined; }
+
+  clip([a, b]) {
+    const least = 4 * Data.view.dt, end = Data.view.t0 + Data.view.n * Data.view.dt;
+    if (!(b - a >= least)) b = a + least;
+    return [Math.max(Math.min(0, Data.view.t0), a), Math.min(Math.max(end, Data.view.duration), b)];
+  }
+
+  async zoom(range) {
+    this.range = this.clip(range);
+    this.onRange?.(this.range);
+    if (this.busy) { this.again = true; return; }
+    this.busy = true;
+    try {
+      do {
+        this.again = false;
+        const target = [...this.range], curves = await this.fetch(target);
+        await Plotly.update(this.element, { x: curves.map((c) => c.x), y: curves.map((c) => c.y) }, { "xaxis.range": target });
+        this.label(curves);
+      } while (this.again);
+    } finally { this.busy = false; }
+  }
+
+  csv() {
+    const columns = new Map();
+    for (const row of this.rows) {
+      for (const t of row.traces) columns.set(t.c, { c: t.c, k: t.k, unit: t.right ? row.rightUnit.replace(/.*\(|\)/g, "") : row.unit });
+      for (const c of row.band || []) columns.set(c, { c, k: row.bandScale, unit: row.unit });
+      if (row.threshold !== undefined) columns.set(row.threshold, { c: row.threshold, k: row.bandScale, unit: row.unit });
+    }
+    return Data.csv([...columns.values()], ...this.range);
+  }
+}

@@ -1,0 +1,190 @@
+"""Rows of the report's tables and lists, with absent fields filled so that the template never asks."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from diagnosis.report.names import FAULT_MODES, UNDECIDED, VERDICTS, clock, grouped, known, number, part, sat_text, utc
+from diagnosis.report.picture import judged_sides
+from diagnosis.report.timeline import kind_of
+
+
+def machine_name(report: Mapping[str, Any]) -> str:
+    """Name and identity of the machine."""
+    machine = report.get("machine") or {}
+    both = [str(machine[k]) for k in ("id", "name") if machine.get(k)]
+    return " · ".join(both) or "Unnamed machine"
+
+
+def context(report: Mapping[str, Any], duration: float) -> dict[str, Any]:
+    """Everything that the template shows as text.
+
+    Parameters
+    ----------
+    report : Mapping[str, Any]
+        The parsed ``report.json`` with names made visible.
+    duration : float
+        Length of the mission [s].
+    """
+    verdict = report.get("verdict") or {}
+    status = verdict.get("status", "not_assessed")
+    state, words = VERDICTS.get(status, VERDICTS["not_assessed"])
+    faults = [_fault(f) for f in report.get("intervals") or ()]
+    modes = {f["id"]: f["mode"] for f in faults}
+    log = report.get("log") or {}
+    return {
+        "machine": machine_name(report),
+        "mission": " + ".join(f.get("path", "") for f in log.get("files") or ()) or "no log named",
+        "verdict": {
+            "state": state,
+            "words": words,
+            "title": verdict.get("title") or words,
+            "text": verdict.get("text") or "",
+            "caveats": verdict.get("caveats") or [],
+            "actions": [_action(a, modes) for a in verdict.get("actions") or ()],
+        },
+        "facts": _facts(report, log, duration),
+        "faults": faults,
+        "coverage": _coverage(report),
+        "metrics": _metrics(report.get("metrics") or {}),
+        "signals": [_signal(s) for s in report.get("signals") or ()],
+        "missing": report.get("missing") or [],
+        "quality": [{"ok": True, "effect": "", "result": "", "check": "", **q} for q in report.get("quality") or ()],
+        "files": [_file(f) for f in log.get("files") or ()],
+        "readings": [{"detail": "", "value": "", **r} for r in report.get("readings") or ()],
+        "limits": [(k.replace("_", " "), _plain(v)) for k, v in (report.get("limits") or {}).items()],
+        "tool": " ".join(str((report.get("tool") or {}).get(k, "")) for k in ("name", "version")).strip(),
+        "schema": report.get("schema", ""),
+        "undecided": UNDECIDED,
+        "judged": any(judged_sides(report).values()),
+    }
+
+
+def _plain(value: Any) -> str:
+    return number(value) if isinstance(value, int | float) and not isinstance(value, bool) else str(value)
+
+
+def _fault(fault: Mapping[str, Any]) -> dict[str, Any]:
+    epsilon, sat = fault.get("epsilon"), fault.get("sat")
+    figures = []
+    if epsilon:
+        figures.append(("ε̂", number(epsilon["value"]), f"{number(epsilon['low'])} to {number(epsilon['high'])}"))
+    if sat:
+        unit = sat.get("unit", "")
+        bounds = f"{sat_text(sat['low'], unit)} to {sat_text(sat['high'], unit)}"
+        figures.append(("sat", sat_text(sat["mean"], unit), bounds))
+        figures.append(("sat r.m.s.", sat_text(sat["rms"], unit), ""))
+    p = fault.get("probability")
+    return {
+        **fault,
+        "advice": fault.get("advice") or "",
+        "evidence": fault.get("evidence") or [],
+        "hypotheses": fault.get("hypotheses") or [],
+        "tier": {"direct": "a second measurement", "model": "the wheel model", "signal": "the channel alone"}.get(
+            fault.get("tier", ""), fault.get("tier", "")
+        ),
+        "figures": figures,
+        "percent": f"{100 * p:.1f} %" if p is not None else "–",
+    }
+
+
+def _action(action: Mapping[str, Any], modes: Mapping[str, str]) -> dict[str, Any]:
+    faults = [f for f in action.get("faults") or () if f in modes]
+    state = known(modes[faults[0]]) if faults else "warning"
+    return {"text": action.get("text", ""), "faults": faults, "state": state, "severity": action.get("severity", "")}
+
+
+def _facts(report: Mapping[str, Any], log: Mapping[str, Any], duration: float) -> list[tuple[str, str]]:
+    machine = report.get("machine") or {}
+    wheels, axles = machine.get("wheels") or (), machine.get("axles") or ()
+    facts = [
+        ("Machine", str(machine.get("id") or machine.get("name") or "unnamed")),
+        ("Start (UTC)", utc(log.get("start_ns"))),
+        ("Duration", clock(duration)),
+    ]
+    if log.get("driving_s") is not None:
+        facts.append(("Driving", clock(log["driving_s"])))
+    if log.get("distance_m") is not None:
+        facts.append(("Distance", f"{number(log['distance_m'])} m"))
+    if log.get("rate_hz"):
+        facts.append(("Sample rate", f"{number(log['rate_hz'])} Hz"))
+    facts.append(("Wheels", str(len(wheels)) + (f", {len(axles)} steering" if axles else "")))
+    return facts
+
+
+def _coverage(report: Mapping[str, Any]) -> list[dict[str, Any]]:
+    machine, rows = report.get("machine") or {}, []
+    for row in report.get("coverage") or ():
+        seconds = {k: float(v or 0.0) for k, v in (row.get("seconds") or {}).items()}
+        total = sum(seconds.values())
+        healthy = seconds.get("healthy", 0.0)
+        faulty = sum(v for k, v in seconds.items() if k in FAULT_MODES)
+        parts = [(known(k), v, 100 * v / total) for k, v in seconds.items() if total > 0 and v > 0]
+        kind = row.get("kind") or kind_of(row["component"], machine)
+        rows.append(
+            {
+                "component": row["component"],
+                "part": part(kind, row["side"]),
+                "parts": parts,
+                "healthy": healthy,
+                "faulty": faulty,
+                "open": total - healthy - faulty,
+                "driving": row.get("decided_driving_s"),
+            }
+        )
+    return rows
+
+
+def _cells(row: Mapping[str, Any]) -> list[str]:
+    return [
+        number((row.get(q) or {}).get(when))
+        for q in ("tracking_error", "control_effort")
+        for when in ("mission", "driving")
+    ]
+
+
+def _metrics(metrics: Mapping[str, Any]) -> dict[str, Any]:
+    rows = [(wheel, _cells(values)) for wheel, values in (metrics.get("wheels") or {}).items()]
+    if metrics.get("average"):
+        rows.append(("Average", _cells(metrics["average"])))
+    keys = ("tracking_error", "control_effort", "parameters")
+    paper = [(str(p.get("controller", "")), [number(p.get(k)) for k in keys]) for p in metrics.get("paper") or ()]
+    return {"rows": rows, "paper": paper}
+
+
+def _signal(signal: Mapping[str, Any]) -> dict[str, Any]:
+    unit, recorded = signal.get("unit") or "", signal.get("recorded_unit") or ""
+    missing = signal.get("missing_share")
+    return {
+        "name": signal["name"],
+        "channel": signal.get("channel") or "–",
+        "unit": unit if unit == recorded or not recorded else f"{unit} (recorded {recorded})",
+        "rate": f"{number(signal.get('rate_hz'), 4)} Hz",
+        "samples": grouped(signal["samples"]) if isinstance(signal.get("samples"), int) else "–",
+        "gaps": _gaps(signal),
+        "missing": f"{100 * missing:.2g} %" if isinstance(missing, int | float) else "–",
+        "lsb": f"{number(signal.get('lsb'))} {unit}" if signal.get("lsb") else "–",
+        "found": "guessed" if signal.get("guessed") else "given",
+        "poor": bool(missing and missing > 0.01),
+    }
+
+
+def _gaps(signal: Mapping[str, Any]) -> str:
+    gaps: Any = signal.get("gaps")
+    if not gaps:
+        return "none" if gaps == 0 else "–"
+    return f"{gaps}, longest {number(signal.get('longest_gap_s'))} s"
+
+
+def _file(file: Mapping[str, Any]) -> dict[str, Any]:
+    size = file.get("bytes")
+    notes: Sequence[str] = [*(file.get("damage") or ()), *(file.get("notes") or ())]
+    return {
+        "path": file.get("path", ""),
+        "format": file.get("format", ""),
+        "sha256": file.get("sha256") or "–",
+        "size": f"{grouped(size)} bytes" if isinstance(size, int) else "–",
+        "notes": notes,
+        "damaged": bool(file.get("damage")),
+    }
