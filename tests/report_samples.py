@@ -106,7 +106,7 @@ def _axle(
 
 
 def _evidence(f: Fault, t: NDArray[np.float64], columns: Columns, rng: np.random.Generator) -> Columns:
-    name, side, base = f[1], f[2], f"evidence.{f[1]}.{f[2]}."
+    name, base = f[1], f"evidence.{f[1]}.{f[2]}."
     steer = f"steer.{name}.phi" in columns
     on = ((t >= f[4]) & (t < f[5])).astype(float)
     soft = np.convolve(on, np.ones(50) / 50, "same")
@@ -166,8 +166,7 @@ def _states(parts: list[tuple[str, str]], faults: list[Fault], duration: float) 
     for component, side in parts:
         mine = sorted((f for f in faults if f[1] == component and f[2] == side), key=lambda f: f[4])
         marks = [(0.0, 0.04 * duration, "not_excited")]
-        for f in mine:
-            marks.append((f[4], f[5], f[3]))
+        marks += [(f[4], f[5], f[3]) for f in mine]
         marks.append((0.54 * duration, 0.6 * duration, "not_excited"))
         if any(f[1] == component and f[2] != side and f[3] == "stuck" for f in faults):
             marks.append((30.0, 36.0, "masked"))
@@ -262,7 +261,8 @@ def _report(
             "title": f"{len(worst)} faults to repair, {len(faults) - len(worst)} to watch"
             if faults
             else "No fault found",
-            "text": "The front-right speed sensor froze at 0.21 m/s for 6.0 s while the other three wheels followed the command, and the front steering angle was silent for 2.5 s. The rear-left drive lost a third of its effect on the slope."
+            "text": "The front-right speed sensor froze at 0.21 m/s for 6.0 s while the other wheels followed the command, "
+            "and the front steering angle was silent for 2.5 s. The rear-left drive lost a third of its effect."
             if faults
             else "Every speed sensor and drive valve that could be judged was healthy.",
             "caveats": [

@@ -199,7 +199,7 @@ def _script(name: str) -> str:
 def _plotly(path: Path | None) -> tuple[str, str, str]:
     """Source of plotly.js, the same deflated in base64, and its version."""
     if path is None:
-        from plotly.offline import get_plotlyjs  # noqa: PLC0415 - half a second that only pages need
+        from plotly.offline import get_plotlyjs
 
         source = str(get_plotlyjs())
     else:

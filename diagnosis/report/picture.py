@@ -73,9 +73,9 @@ def judged_sides(report: Mapping[str, Any]) -> dict[tuple[str, str], bool]:
     return decided
 
 
-def _rows(wheels: Sequence[str], geometry: Mapping[str, Any] | None) -> list[list[str]]:
+def _rows(wheels: Sequence[str], geometry: Mapping[str, Any]) -> list[list[str]]:
     """Wheels in rows from the front, each from left to right; a grid of two columns without geometry."""
-    if not geometry or not all(w in geometry for w in wheels):
+    if not all(w in geometry for w in wheels):
         columns = 1 if len(wheels) == 1 else 2 if len(wheels) <= 8 else 4
         return [list(wheels[i : i + columns]) for i in range(0, len(wheels), columns)]
     length = max((abs(geometry[w]["x"]) for w in wheels), default=0.0)
@@ -105,11 +105,11 @@ def machine_picture(report: Mapping[str, Any]) -> Markup:
     machine = report.get("machine") or {}
     wheels: Sequence[str] = machine.get("wheels") or ()
     axles: Sequence[str] = machine.get("axles") or ()
-    geometry = machine.get("geometry")
+    geometry: Mapping[str, Any] = machine.get("geometry") or {}
     faults = report.get("intervals") or ()
     judged = judged_sides(report)
     rows = _rows(wheels, geometry)
-    placed = bool(geometry) and all(w in geometry for w in wheels)
+    placed = bool(wheels) and all(w in geometry for w in wheels)
     top = 40.0 if placed else 26.0
     wide = max((len(r) for r in rows), default=1)
     parts: list[Markup] = []

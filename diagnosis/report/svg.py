@@ -114,7 +114,7 @@ def thumbnail(
     )
 
 
-def _path_d(x: NDArray[np.float64], y: NDArray[np.float64]) -> str:
+def _path_d(x: NDArray[np.floating], y: NDArray[np.floating]) -> str:
     out, pen = [], "M"
     for a, b in zip(x, y, strict=True):
         if math.isfinite(a) and math.isfinite(b):
@@ -171,29 +171,28 @@ def path_picture(
             ).format(m=known(fault["mode"]), id=fault["id"], x=cx, y=cy)
         )
     first = int(np.flatnonzero(good)[0])
+    parts.append(_start_and_scale(float(px[first]), float(py[first]), scale, width, height))
+    return Markup(
+        '<svg class="map" viewBox="0 0 {} {}" role="group" aria-label="Driven path with the places of faults">{}</svg>'
+    ).format(int(width), int(height), Markup("").join(parts))
+
+
+def _start_and_scale(x: float, y: float, scale: float, width: float, height: float) -> Markup:
+    """Start of the path and a bar of a round length in metres."""
     bar = 10.0 ** math.floor(math.log10(max(width / 3 / scale, 1e-6)))
     bar *= max(m for m in (1, 2, 5) if m * bar * scale <= width / 3)
-    parts.append(
-        Markup(
-            '<circle class="dot" cx="{x:.1f}" cy="{y:.1f}" r="4"/><text class="lbl" x="{tx:.1f}" y="{ty:.1f}">start</text>'
-            '<path class="bar" d="M{b0:.1f},{h}v4h{bw:.1f}v-4"/><text class="lbl mid" x="{bm:.1f}" y="{bt}">{n} m</text>'
-        ).format(
-            x=px[first],
-            y=py[first],
-            tx=px[first] + 8,
-            ty=py[first] + 14,
-            b0=width - 16 - bar * scale,
-            bw=bar * scale,
-            bm=width - 16 - bar * scale / 2,
-            h=height - 12,
-            bt=height - 14,
-            n=number(bar),
-        )
+    right, length = width - 16, bar * scale
+    return Markup(
+        '<circle class="dot" cx="{:.1f}" cy="{:.1f}" r="4"/>{}<path class="bar" d="M{:.1f},{:.0f}v4h{:.1f}v-4"/>{}'
+    ).format(
+        x,
+        y,
+        text(x + 8, y + 14, "start", "lbl"),
+        right - length,
+        height - 12,
+        length,
+        text(right - length / 2, height - 14, f"{number(bar)} m", "lbl mid"),
     )
-    shape = (
-        '<svg class="map" viewBox="0 0 {} {}" role="group" aria-label="Driven path with the places of faults">{}</svg>'
-    )
-    return Markup(shape).format(int(width), int(height), Markup("").join(parts))
 
 
 def _spread(points: list[list[float]], width: float, height: float) -> None:

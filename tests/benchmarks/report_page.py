@@ -1,6 +1,6 @@
-"""Size and time of a report page: 240 s at 1 kHz, and an hour; run as `python tests/benchmarks/report_page.py [FOLDER]`.
+"""Size and time of a report page, 240 s and an hour; run as `python tests/benchmarks/report_page.py [FOLDER]`.
 
-With a folder the pages are written there; where Chromium is installed, the time until the first plot stands is measured.
+With a folder the pages are written there; with Chromium installed, the time to the first plot is measured.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ def first_plot(path: Path) -> str:
         page.locator("#badge", has_not_text="drawing").wait_for()
         drawn = time.perf_counter() - begin
         begin = time.perf_counter()
-        page.get_by_role("button", name="Mission").click()
+        page.get_by_role("button", name="Mission", exact=True).click()
         page.locator("#badge", has_text="envelope").wait_for()
         zoomed = time.perf_counter() - begin
         browser.close()
