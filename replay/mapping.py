@@ -57,6 +57,7 @@ class _Draft:
     items: dict[str, Signal] = field(default_factory=dict)
     missing: dict[str, str] = field(default_factory=dict)
     notes: list[str] = field(default_factory=list)
+    named: list[str] = field(default_factory=list)
 
     def take(self, name: str, log: RawLog, converted: Converted, origin: SignalSource, guessed: bool) -> None:
         self.items[name] = Signal(name, converted.stamps, converted.values, origin, log.source, guessed)
@@ -96,6 +97,10 @@ def map_signals(logs: Sequence[RawLog], machine: Machine) -> Signals:
     for name in machine.canonical_signals():
         if name not in machine.signals:
             _take_guess(draft, name, by_signal.get(name, []))
+    if draft.named:
+        draft.notes.append(
+            f"{len(draft.named)} signals were recorded under their own names, in SI unless a unit is given"
+        )
     order = {name: i for i, name in enumerate((*machine.canonical_signals(), *machine.signals))}
     items = dict(sorted(draft.items.items(), key=lambda item: order[item[0]]))
     return Signals(items, draft.missing, tuple(dict.fromkeys(draft.notes)))
@@ -143,8 +148,11 @@ def _take_guess(draft: _Draft, name: str, found: list[tuple[Candidate, RawLog]])
             reason = str(error)
             continue
         draft.take(name, log, converted, origin, True)
+        if candidate.rank == 0:
+            draft.named.append(name)
+            return
         text = f"{name} is taken from {origin.label} ({candidate.why}"
-        text += f", in {origin.unit}" if origin.unit else ", unit not stated, SI assumed"
+        text += f", in {origin.unit.replace('1', 'fractions')}" if origin.unit else ", unit not stated, SI assumed"
         text += f" at the {origin.at})" if origin.unit in ("rpm", "rad/s") and name.startswith("wheel.") else ")"
         rivals = [c.origin.label for c, _ in ranked[i + 1 :] if c.rank == candidate.rank]
         text += f"; {rivals[0]} would fit as well" if rivals else ""

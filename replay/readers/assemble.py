@@ -93,6 +93,7 @@ class _Topic:
     columns: dict[str, list[tuple[NDArray[np.int64], NDArray[Any]]]] = field(default_factory=dict)
     skipped: set[str] = field(default_factory=set)
     outcome: cdr.Outcome = field(default_factory=cdr.Outcome)
+    decoders: dict[Connection, cdr.Decoder] = field(default_factory=dict)
     mute: str = ""
 
     def add(self, block: Block, serial: int) -> None:
@@ -105,9 +106,12 @@ class _Topic:
         if block.connection.encoding == "json":
             self.stamp, parts = jsonmsg.decode(block.data, block.starts, block.lengths, self.outcome)
         else:
-            kind = block.connection.message_type()
-            self.stamp = kind.stamp
-            parts = list(cdr.decode(kind, block.data, block.starts, block.lengths, self.outcome))
+            decoder = self.decoders.get(block.connection)
+            if decoder is None:
+                kind = block.connection.message_type()
+                self.stamp = kind.stamp
+                decoder = self.decoders[block.connection] = cdr.Decoder(kind, self.outcome)
+            parts = list(decoder.decode(block.data, block.starts, block.lengths))
         for part in parts:
             self.skipped.update(part.skipped)
             rows = part.rows + first

@@ -48,84 +48,116 @@ class Outcome:
     slow: int = 0
 
 
-def decode(
-    kind: MessageType, data: NDArray[np.uint8], starts: NDArray[np.int64], lengths: NDArray[np.int64], outcome: Outcome
-) -> Iterator[Part]:
-    """Decode payloads of one message type into columns.
+class Decoder:
+    """Decodes payloads of one message type; remembers the layouts it has met.
 
     Parameters
     ----------
     kind : MessageType
-        Their type.
-    data : NDArray[np.uint8], shape (b,)
-        Bytes that hold all payloads.
-    starts, lengths : NDArray[np.int64], shape (n,)
-        Place of each payload in `data`.
+        The type of all payloads.
     outcome : Outcome
         Counts of undecodable and slowly decoded messages, added to.
-
-    Yields
-    ------
-    Part
-        Every decodable row stands in exactly one part.
     """
-    for size in np.unique(lengths):
-        left = np.flatnonzero(lengths == size)
-        for _ in range(MAX_ROUNDS):
-            if not len(left):
-                break
-            layout = _walk(kind, data, int(starts[left[0]]), int(size), outcome)
-            if layout is None:
-                left = left[1:]
-                continue
-            fits, columns = _extract(layout, data, starts[left])
-            if columns:
-                yield Part(left[fits], columns, layout.skipped)
-            left = left[~fits]
-        for row in left:  # slow fallback: layouts that hardly repeat
-            layout = _walk(kind, data, int(starts[row]), int(size), outcome)
-            if layout is not None:
-                outcome.slow += 1
-                rows = np.array([row])
-                _, columns = _extract(layout, data, starts[rows])
-                yield Part(rows, columns, layout.skipped)
+
+    def __init__(self, kind: MessageType, outcome: Outcome) -> None:
+        self.kind, self.outcome = kind, outcome
+        self.met: dict[int, list[Layout]] = {}
+
+    def decode(self, data: NDArray[np.uint8], starts: NDArray[np.int64], lengths: NDArray[np.int64]) -> Iterator[Part]:
+        """Decode payloads into columns.
+
+        Parameters
+        ----------
+        data : NDArray[np.uint8], shape (b,)
+            Bytes that hold all payloads.
+        starts, lengths : NDArray[np.int64], shape (n,)
+            Place of each payload in `data`.
+
+        Yields
+        ------
+        Part
+            Every decodable row stands in exactly one part.
+        """
+        for size in np.unique(lengths):
+            left = np.flatnonzero(lengths == size)
+            met = self.met.setdefault(int(size), [])
+            for layout in met:
+                left, part = _take(layout, data, starts, left)
+                if part is not None:
+                    yield part
+            while len(left) and len(met) < MAX_ROUNDS:
+                new = self._walk(data, int(starts[left[0]]), int(size))
+                if new is None:
+                    left = left[1:]
+                    continue
+                met.append(new)
+                left, part = _take(new, data, starts, left)
+                if part is not None:
+                    yield part
+            for row in left:  # slow fallback: layouts that hardly repeat
+                single = self._walk(data, int(starts[row]), int(size))
+                if single is not None:
+                    self.outcome.slow += 1
+                    part = _take(single, data, starts, np.array([row]))[1]
+                    if part is not None:
+                        yield part
+
+    def _walk(self, data: NDArray[np.uint8], start: int, size: int) -> Layout | None:
+        try:
+            return layout_of(self.kind, data[start : start + size].tobytes())
+        except LayoutError as error:
+            self.outcome.bad += 1
+            self.outcome.reason = self.outcome.reason or str(error)
+            return None
 
 
-def _walk(kind: MessageType, data: NDArray[np.uint8], start: int, size: int, outcome: Outcome) -> Layout | None:
-    try:
-        return layout_of(kind, data[start : start + size].tobytes())
-    except LayoutError as error:
-        outcome.bad += 1
-        outcome.reason = outcome.reason or str(error)
-        return None
+def _take(
+    layout: Layout, data: NDArray[np.uint8], starts: NDArray[np.int64], rows: NDArray[np.int64]
+) -> tuple[NDArray[np.int64], Part | None]:
+    """Decode the rows that fit a layout; return the others."""
+    if not len(rows):
+        return rows, None
+    fits, columns = _extract(layout, data, starts[rows])
+    part = Part(rows[fits], columns, layout.skipped) if fits.any() and (columns or layout.skipped) else None
+    return rows[~fits], part
 
 
 def _extract(
     layout: Layout, data: NDArray[np.uint8], starts: NDArray[np.int64]
 ) -> tuple[NDArray[np.bool_], dict[str, NDArray[Any]]]:
     """Rows that fit the layout, and their columns."""
-    span = layout.span
-    whole = span <= _ROW_BYTES
-    rows = _gather(data, starts, 0, span).view(np.uint8).reshape(len(starts), span) if whole and span else None
+    span, fixed = layout.span, layout.fixed
+    if not span:
+        return np.ones(len(starts), np.bool_), {}
+    if span > _ROW_BYTES:
+        return _extract_far(layout, data, starts)
+    rows = _gather(data, starts, 0, span).view(np.uint8).reshape(len(starts), span)
+    fits: NDArray[np.bool_] = (rows[:, fixed[0]] == fixed[1]).all(axis=1)
+    if not fits.all():
+        rows = rows[fits]
+    return fits, {s.path: _native(rows[:, s.offset : s.offset + s.dtype.itemsize], s.dtype) for s in layout.slots}
 
-    def cells(offset: int, size: int) -> NDArray[np.uint8]:
-        if rows is not None:
-            return rows[:, offset : offset + size]
-        return _gather(data, starts, offset, size).view(np.uint8).reshape(len(starts), size)
 
+def _extract_far(
+    layout: Layout, data: NDArray[np.uint8], starts: NDArray[np.int64]
+) -> tuple[NDArray[np.bool_], dict[str, NDArray[Any]]]:
+    """Do the same cell by cell, for long payloads of which few bytes are wanted."""
     fits = np.ones(len(starts), np.bool_)
     for offset, content in layout.checks:
         if content:
-            fits &= (cells(offset, len(content)) == np.frombuffer(content, np.uint8)).all(axis=1)
-    every = bool(fits.all())
-    columns: dict[str, NDArray[Any]] = {}
-    for slot in layout.slots:
-        raw = cells(slot.offset, slot.dtype.itemsize)
-        if not every:
-            raw = raw[fits]
-        values = np.ascontiguousarray(raw).view(slot.dtype).reshape(-1)
-        columns[slot.path] = values.astype(slot.dtype.newbyteorder("="), copy=False)
-    return fits, columns
+            cells = _gather(data, starts, offset, len(content)).view(np.uint8).reshape(len(starts), -1)
+            fits &= (cells == np.frombuffer(content, np.uint8)).all(axis=1)
+    kept = starts[fits]
+    sizes = ((s, s.dtype.itemsize) for s in layout.slots)
+    return fits, {
+        s.path: _native(_gather(data, kept, s.offset, n).view(np.uint8).reshape(-1, n), s.dtype) for s, n in sizes
+    }
+
+
+def _native(cells: NDArray[np.uint8], dtype: np.dtype[Any]) -> NDArray[Any]:
+    """Bytes of shape (n, size) as n numbers in this machine's byte order."""
+    values = np.ascontiguousarray(cells).view(dtype).reshape(-1)
+    return values.astype(dtype.newbyteorder("="), copy=False)
 
 
 def _gather(data: NDArray[np.uint8], starts: NDArray[np.int64], offset: int, size: int) -> NDArray[Any]:

@@ -5,9 +5,11 @@ from __future__ import annotations
 import re
 import struct
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 from rosbags.interfaces import Nodetype
 
 from replay.readers.definitions import MAX_DEPTH, TIME, MessageType
@@ -69,11 +71,18 @@ class Layout:
     checks: tuple[tuple[int, bytes], ...]
     skipped: tuple[str, ...]
 
-    @property
+    @cached_property
     def span(self) -> int:
         """Bytes from the start that hold every slot and check."""
         ends = [s.offset + s.dtype.itemsize for s in self.slots] + [o + len(b) for o, b in self.checks]
         return max(ends, default=0)
+
+    @cached_property
+    def fixed(self) -> tuple[NDArray[np.int64], NDArray[np.uint8]]:
+        """Offset and value of every checked byte."""
+        at = [np.arange(o, o + len(b)) for o, b in self.checks]
+        value = b"".join(b for _, b in self.checks)
+        return np.concatenate(at) if at else np.empty(0, np.int64), np.frombuffer(value, np.uint8)
 
 
 @dataclass

@@ -7,7 +7,6 @@ import sqlite3
 from collections.abc import Collection, Iterator
 from contextlib import closing, contextmanager
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import zstandard
@@ -62,9 +61,12 @@ def _blocks(
     known = _connections(base, report)
     wanted = {i: c for i, c in known.items() if topics is None or c.topic in topics}
     marks = ",".join(str(i) for i in wanted)
+    where = f"from messages where topic_id in ({marks})"  # integers only
     rows = base.execute(
-        f"select topic_id, timestamp, data from messages where topic_id in ({marks}) order by id"  # integers only
+        f"select topic_id, timestamp, data {where} and typeof(data) = 'blob' and typeof(timestamp) = 'integer' "
+        "order by id"
     )
+    done = 0
     while True:
         try:
             batch = rows.fetchmany(_BATCH)
@@ -72,21 +74,22 @@ def _blocks(
             report.lost(f"{path.name}: its messages cannot be read to the end: {error}")
             return
         if not batch:
-            return
+            break
+        done += len(batch)
         yield _split(path, batch, wanted, report, packed)
+    total = base.execute(f"select count(*) {where}").fetchone()[0]
+    if done < total:
+        report.lost(f"{path.name}: {total - done} rows hold no message")
 
 
 def _split(
-    path: Path, batch: list[tuple[Any, Any, Any]], known: dict[int, Connection], report: Report, packed: bool
+    path: Path, rows: list[tuple[int, int, bytes]], known: dict[int, Connection], report: Report, packed: bool
 ) -> Iterator[Block]:
-    whole = [r for r in batch if isinstance(r[2], bytes) and isinstance(r[1], int)]
-    if len(whole) < len(batch):
-        report.lost(f"{path.name}: {len(batch) - len(whole)} rows hold no message")
     if packed:
-        whole = _unpack(path, whole, report)
-    if not whole:
+        rows = _unpack(path, rows, report)
+    if not rows:
         return
-    numbers, stamps, payloads = zip(*whole, strict=True)
+    numbers, stamps, payloads = zip(*rows, strict=True)
     data = np.frombuffer(b"".join(payloads), np.uint8)
     lengths = np.fromiter(map(len, payloads), np.int64, len(payloads))
     starts = np.cumsum(lengths) - lengths

@@ -188,10 +188,10 @@ def _widest(data: str, separator: str) -> int:
     """Most cells in one row, a trailing separator not counted."""
     raw = np.frombuffer(data.encode("utf-8", "replace"), np.uint8)
     mark = np.flatnonzero(raw == ord(separator))
-    ends = np.append(np.flatnonzero(raw == ord("\n")), len(raw))
+    ends = np.flatnonzero(raw == ord("\n"))
     counts = np.diff(np.searchsorted(mark, ends), prepend=0)
-    trailing = np.isin(ends - 1, mark)
-    return int((counts - trailing).max()) + 1
+    trailing = raw[ends - 1] == ord(separator)
+    return int((counts - trailing).max(initial=0)) + 1
 
 
 def _decimal(data: str, separator: str, path: Path) -> str:
