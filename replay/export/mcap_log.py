@@ -38,8 +38,17 @@ _MESSAGE_HEAD = np.dtype(
 )
 
 
-def write_mcap(path: Path, batches: Sequence[TopicBatch]) -> None:
+def write_mcap(path: Path, batches: Sequence[TopicBatch], level: int = 3) -> None:
     """Write topics in CDR as an MCAP file with profile ``ros2``.
+
+    Parameters
+    ----------
+    path : Path
+        File; an existing one is replaced.
+    batches : Sequence[TopicBatch]
+        Messages.
+    level : int
+        zstd level, 1…22.
 
     Raises
     ------
@@ -47,7 +56,7 @@ def write_mcap(path: Path, batches: Sequence[TopicBatch]) -> None:
         Where the file cannot be written.
     """
     with atomic_path(path) as temporary, temporary.open("wb") as file:
-        _write(file, batches)
+        _write(file, batches, level)
 
 
 def _record(record: McapRecord) -> bytes:
@@ -56,7 +65,7 @@ def _record(record: McapRecord) -> bytes:
     return bytes(builder.end())  # type: ignore[no-untyped-call]
 
 
-def _write(file: BinaryIO, batches: Sequence[TopicBatch]) -> None:
+def _write(file: BinaryIO, batches: Sequence[TopicBatch], level: int) -> None:
     topics = list(dict.fromkeys(b.topic for b in batches))
     types = list(dict.fromkeys(b.type_name for b in batches))
     channel_ids = [topics.index(b.topic) + 1 for b in batches]
@@ -80,7 +89,7 @@ def _write(file: BinaryIO, batches: Sequence[TopicBatch]) -> None:
         file.write(octets)
 
     put(head + definitions + channels)
-    compressor = zstandard.ZstdCompressor(level=3)
+    compressor = zstandard.ZstdCompressor(level=level)
     indexes = []
     sequence = np.zeros(len(topics) + 1, np.int64)
     for plan in plan_chunks(batches, _MESSAGE_HEAD.itemsize, _CHUNK_SIZE):

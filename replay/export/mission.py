@@ -7,15 +7,21 @@ from pathlib import Path
 
 from replay.errors import ConfigError
 from replay.export.mcap_log import write_mcap
+from replay.export.ros1_log import write_ros1_bag
+from replay.export.rosbag2_log import write_rosbag2
+from replay.export.table_log import write_csv, write_parquet
 from replay.export.topics import mission_topics
+from replay.export.twincat_log import write_twincat
 from replay.simulation.options import SimulatedMission
 
-
-def _mcap(mission: SimulatedMission, path: Path) -> None:
-    write_mcap(path, mission_topics(mission, "cdr"))
-
-
-_WRITERS: Mapping[str, Callable[[SimulatedMission, Path], None]] = {"mcap": _mcap}
+_WRITERS: Mapping[str, Callable[[SimulatedMission, Path], None]] = {
+    "mcap": lambda mission, path: write_mcap(path, mission_topics(mission, "cdr")),
+    "ros1": lambda mission, path: write_ros1_bag(path, mission_topics(mission, "ros1")),
+    "rosbag2": lambda mission, path: write_rosbag2(path, mission_topics(mission, "cdr")),
+    "twincat": lambda mission, path: write_twincat(path, mission),
+    "csv": lambda mission, path: write_csv(path, mission),
+    "parquet": lambda mission, path: write_parquet(path, mission),
+}
 
 FORMATS: tuple[str, ...] = tuple(_WRITERS)
 

@@ -70,8 +70,8 @@ def mission_topics(mission: SimulatedMission, dialect: Dialect) -> list[TopicBat
 
 
 def _log_stamps(stamps: NDArray[np.int64], after: int, rng: np.random.Generator) -> NDArray[np.int64]:
-    """Receive stamps: a little after the header stamp, with jitter [ns]."""
-    return stamps + after + rng.integers(0, 60_000, stamps.size)
+    """Receive stamps: a little after the header stamp, with jitter of whole microseconds [ns]."""
+    return stamps + after + rng.integers(0, 60, stamps.size) * 1000
 
 
 def _header(dialect: Dialect, frame: str, stamps: NDArray[np.int64]) -> tuple[Layout, dict[str, NDArray[np.generic]]]:

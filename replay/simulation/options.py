@@ -70,7 +70,7 @@ class PlantOptions:
     motor_displacement: float = 100e-6
     mass: float = 6650.0
     friction: float = 0.6
-    ice_friction: float = 0.08
+    ice_friction: float = 0.05
     slip_stiffness: float = 5e4
     rolling_resistance: float = 0.03
     steer_gain: float = 4.0
@@ -118,7 +118,7 @@ class SimulationOptions:
     psi0 : float
         Ψ̂(0).
     ice : float or None
-        Share of the ground under ice, 0…0.9; None: 0.15 in ``paper``, else 0.
+        Share of the ground under ice, 0…0.9; None: 0.25 in ``paper``, else 0.
     slopes : bool
         Whether the ground rises and falls.
     faults : tuple[FaultSpec, ...] or None
@@ -199,7 +199,7 @@ class SimulationOptions:
     @property
     def ice_share(self) -> float:
         """Share of the ground under ice."""
-        return (0.15 if self.scenario == "paper" else 0.0) if self.ice is None else self.ice
+        return (0.25 if self.scenario == "paper" else 0.0) if self.ice is None else self.ice
 
     @property
     def substeps(self) -> int:

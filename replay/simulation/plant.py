@@ -39,6 +39,12 @@ def _faulted(c: int, k: int, value: float, normal: float, faults: FaultTable, st
 
 
 @njit(cache=True)
+def _quantised(value: float, lsb: float) -> float:
+    """Nearest multiple of a sensor's resolution; divided by 1/lsb so that decimal steps give short decimals."""
+    return float(np.round(value / lsb) / (1.0 / lsb) + 0.0)
+
+
+@njit(cache=True)
 def _references(k: int, v: float, omega: float, p: PlantModel, state: PlantState, v_ref: F) -> None:
     """L1 (1), L2 (2): v_c,i = s·|v_k| − (ω_b + φ̇)·d_i and φ_c of wheels and axles, held at standstill."""
     for i in range(p.x.size):
@@ -186,7 +192,7 @@ def scan(
         for i in range(n):
             # y = Q[δ_s(v_a + n) + δ̄_s]
             clean = state.v[i] + p.v_std * normal[j, i]
-            v[i] = np.round(_faulted(i, k, clean, fault_normal[i], faults, state) / p.v_lsb) * p.v_lsb
+            v[i] = _quantised(_faulted(i, k, clean, fault_normal[i], faults, state), p.v_lsb)
             state.last[i] = v[i]
             # Ψ̂' = −(β+|v_c|+|v|+ξ)Ψ̂ + ½ζe²
             rho = p.beta + abs(v_ref[i]) + abs(v[i]) + p.xi
@@ -198,7 +204,7 @@ def scan(
         for a in range(2):
             clean = state.phi[a] + p.phi_std * normal[j, n + a]
             c = n + a
-            phi[a] = np.round(_faulted(c, k, clean, fault_normal[c], faults, state) / p.phi_lsb) * p.phi_lsb
+            phi[a] = _quantised(_faulted(c, k, clean, fault_normal[c], faults, state), p.phi_lsb)
             state.last[c] = phi[a]
             u_s[a] = min(max(p.k_ps * (state.axle_ref[a] - phi[a]), -p.u_max), p.u_max)
             c = 2 * n + 2 + a

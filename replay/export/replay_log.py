@@ -1,0 +1,146 @@
+"""Write the replayed loop as Parquet, CSV, or an MCAP file to open beside the original log."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.csv
+import pyarrow.parquet
+from numpy.typing import NDArray
+
+from replay.columns import replay_columns
+from replay.errors import ConfigError
+from replay.export.layout import Layout, TopicBatch
+from replay.export.mcap_log import write_mcap
+from replay.files import atomic_path
+from replay.loop import Replay
+from replay.machine import Machine
+from replay.timeline import Timeline
+
+REPLAY_FORMATS = ("parquet", "csv", "mcap")
+
+# Topic and field of `Replay`, by wheel and by steering axle.
+_WHEEL_TOPICS = (
+    ("v_ref", "v_ref"),
+    ("e", "e"),
+    ("rho", "rho"),
+    ("psi_hat", "psi"),
+    ("psi_hat_printed", "psi_printed"),
+    ("psi_hat_implied", "psi_implied"),
+    ("psi_hat_implied_squared", "implied_squared"),
+    ("psi_hat_forcing", "forcing"),
+    ("u_replayed", "u"),
+    ("u_difference", "u_difference"),
+    ("wheel_phi", "wheel_phi"),
+)
+_AXLE_TOPICS = (
+    ("steer_phi_ref", "phi_ref"),
+    ("steer_u_replayed", "steer_u"),
+    ("steer_u_difference", "steer_difference"),
+)
+
+
+def format_of(path: Path) -> str:
+    """Format that a file name asks for.
+
+    Raises
+    ------
+    ConfigError
+        Where its extension is none of `REPLAY_FORMATS`.
+    """
+    ending = path.suffix.lower().lstrip(".")
+    if ending not in REPLAY_FORMATS:
+        raise ConfigError(f"{path}: cannot tell the format from its name; expected .parquet, .csv or .mcap")
+    return ending
+
+
+def write_replay(path: Path, timeline: Timeline, replay: Replay, machine: Machine, format: str) -> tuple[str, ...]:  # noqa: A002
+    """Write the recorded signals and the replayed loop.
+
+    Tables hold ``stamp_ns`` and the columns of `replay.columns.replay_columns`. MCAP holds a JointState topic
+    ``/mfhca/<quantity>`` for each replayed quantity, named by wheel or axle, its value in ``position``; log time and
+    header stamp are the time of the step on the log's own clock. NaN stays NaN.
+
+    Parameters
+    ----------
+    path : Path
+        File to write; an existing one is replaced.
+    timeline : Timeline
+        Aligned signals.
+    replay : Replay
+        The loop replayed on it.
+    machine : Machine
+        Wheels and axles.
+    format : str
+        One of `REPLAY_FORMATS`.
+
+    Returns
+    -------
+    tuple[str, ...]
+        Columns or topics written.
+
+    Raises
+    ------
+    ConfigError
+        Where the format is not known.
+    OutputError
+        Where the file cannot be written.
+    """
+    if format not in REPLAY_FORMATS:
+        raise ConfigError(f"format = {format!r} is not known; expected one of {', '.join(REPLAY_FORMATS)}")
+    if format == "mcap":
+        batches = replay_topics(timeline, replay, machine)
+        write_mcap(path, batches)
+        return tuple(b.topic for b in batches)
+    columns = replay_columns(timeline, replay, machine, detail=True)
+    table = pa.table({"stamp_ns": pa.array(_stamps(timeline))} | {k: pa.array(v) for k, v in columns.items()})
+    with atomic_path(path) as temporary:
+        if format == "csv":
+            pa.csv.write_csv(table, temporary, pa.csv.WriteOptions(quoting_style="needed"))
+        else:
+            readings = json.dumps([[r.name, r.value, r.detail] for r in replay.readings], ensure_ascii=False)
+            table = table.replace_schema_metadata({"mfhca.machine": machine.name, "mfhca.readings": readings})
+            pa.parquet.write_table(table, temporary, compression="zstd")
+    return tuple(table.column_names)
+
+
+def _stamps(timeline: Timeline) -> NDArray[np.int64]:
+    return timeline.start_ns + timeline.step_ns * np.arange(timeline.size, dtype=np.int64)
+
+
+def replay_topics(timeline: Timeline, replay: Replay, machine: Machine) -> list[TopicBatch]:
+    """Every replayed quantity that is defined somewhere, as messages of one topic."""
+    stamps = _stamps(timeline)
+    batches = []
+    for parts, topics in ((machine.wheels, _WHEEL_TOPICS), (machine.axles, _AXLE_TOPICS)):
+        for name, field in topics:
+            values: NDArray[np.float64] = getattr(replay, field)
+            if values.size and np.isfinite(values).any():
+                batches.append(_joint_state(f"/mfhca/{name}", parts, values, stamps))
+    return batches
+
+
+def _joint_state(
+    topic: str, parts: Sequence[str], values: NDArray[np.float64], stamps: NDArray[np.int64]
+) -> TopicBatch:
+    """Messages with header stamp, the parts as joint names, and values (n, parts) as positions."""
+    layout = Layout("cdr")
+    layout.varying("sec", "u4")
+    layout.varying("nanosec", "u4")
+    layout.text("base_link")
+    layout.constant("I", len(parts))
+    for part in parts:
+        layout.text(part)
+    layout.doubles("position", len(parts))
+    layout.doubles(None)
+    layout.doubles(None)
+    fields: dict[str, NDArray[np.generic]] = {
+        "sec": (stamps // 1_000_000_000).astype(np.uint32),
+        "nanosec": (stamps % 1_000_000_000).astype(np.uint32),
+        "position": np.ascontiguousarray(values),
+    }
+    return TopicBatch(topic, "sensor_msgs/msg/JointState", layout, fields, stamps)
