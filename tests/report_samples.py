@@ -261,7 +261,7 @@ def _report(
             "title": f"{len(worst)} faults to repair, {len(faults) - len(worst)} to watch"
             if faults
             else "No fault found",
-            "text": "The front-right speed sensor froze at 0.21 m/s for 6.0 s while the other wheels followed the command, "
+            "text": "The front-right speed sensor froze at 0.21 m/s for 6.0 s while the other wheels followed, "
             "and the front steering angle was silent for 2.5 s. The rear-left drive lost a third of its effect."
             if faults
             else "Every speed sensor and drive valve that could be judged was healthy.",

@@ -67,7 +67,7 @@
   }
 
   async function copy(button) {
-    const article = one(`[data-ev="${CSS.escape(current)}"]`);
+    const article = one(`article[data-ev="${CSS.escape(current)}"]`);
     const text = `${view.name}\n${article.dataset.text}\n` + [...article.querySelectorAll("li, .advice")].map((e) => `- ${e.textContent.trim()}`).join("\n") + "\n";
     try { await navigator.clipboard.writeText(text); } catch {
       const area = document.createElement("textarea");

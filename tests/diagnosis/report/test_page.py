@@ -1,0 +1,177 @@
+from __future__ import annotations
+
+import base64
+import hashlib
+import json
+import re
+from collections.abc import Callable
+from html.parser import HTMLParser
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from diagnosis.report.page import build_page
+from replay.errors import ConfigError
+from tests import report_samples as samples
+
+SAMPLES: list[Callable[[], tuple[dict[str, Any], samples.Columns]]] = [
+    samples.five_faults,
+    samples.one_wheel,
+    samples.no_faults,
+    samples.six_wheels,
+    samples.not_assessed,
+    samples.hostile,
+]
+
+
+class Tree(HTMLParser):
+    """Tags with attributes, and the text of scripts and of everything else."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__()
+        self.tags: list[tuple[str, dict[str, str | None]]] = []
+        self.scripts: list[tuple[dict[str, str | None], str]] = []
+        self.words: list[str] = []
+        self._in = ""
+        self.feed(text)
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.tags.append((tag, dict(attrs)))
+        self._in = tag
+        if tag == "script":
+            self.scripts.append((dict(attrs), ""))
+
+    def handle_endtag(self, tag: str) -> None:
+        self._in = ""
+
+    def handle_data(self, data: str) -> None:
+        if self._in == "script":
+            attrs, text = self.scripts[-1]
+            self.scripts[-1] = (attrs, text + data)
+        elif self._in != "style":
+            self.words.append(data)
+
+    @property
+    def text(self) -> str:
+        return " ".join(self.words)
+
+
+@pytest.mark.parametrize("sample", SAMPLES, ids=lambda s: s.__name__)
+def test_scripts_match_the_policy_and_nothing_is_fetched(sample: Callable[[], Any]) -> None:
+    tree = Tree(build_page(*sample()))
+    policy = next(a["content"] for t, a in tree.tags if t == "meta" and a.get("http-equiv")) or ""
+    code = [text for attrs, text in tree.scripts if "type" not in attrs]
+    assert len(code) == 4
+    for text in code:
+        digest = base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()
+        assert f"'sha256-{digest}'" in policy
+    assert policy.startswith("default-src 'none'; script-src 'sha256-")
+    assert policy.endswith("img-src data: blob:; font-src data:; base-uri 'none'; form-action 'none'")
+    assert "eval" not in policy
+    for tag, attrs in tree.tags:
+        assert tag not in {"link", "iframe", "object", "embed", "base", "img", "form"}
+        assert "src" not in attrs
+        assert attrs.get("href", "#").startswith("#")  # type: ignore[union-attr]
+        assert not any(name.startswith("on") for name in attrs)
+
+
+@pytest.mark.parametrize("sample", SAMPLES, ids=lambda s: s.__name__)
+def test_same_input_gives_the_same_bytes(sample: Callable[[], Any]) -> None:
+    assert build_page(*sample()) == build_page(*sample())
+
+
+def test_page_tells_everything_without_javascript() -> None:
+    report, columns = samples.five_faults()
+    tree = Tree(build_page(report, columns))
+    for words in (
+        report["verdict"]["title"],
+        report["verdict"]["text"],
+        *report["verdict"]["caveats"],
+        *(a["text"] for a in report["verdict"]["actions"]),
+        *(e for f in report["intervals"] for e in f["evidence"]),
+        *(f["advice"] for f in report["intervals"]),
+        report["missing"][0]["cost"],
+        report["log"]["files"][0]["sha256"],
+        "opposed (fitted)",
+        "Yang",
+        "mfhca-replay 0.1.0",
+    ):
+        assert words in tree.text
+    kinds = [a.get("class") or "" for _, a in tree.tags]
+    assert kinds.count("spark") == 5
+    assert sum(k.startswith("fb ") for k in kinds) == 5
+    assert sum(k.startswith("mark ") for k in kinds) == 5
+    assert "The plots need JavaScript" in tree.text
+
+
+def test_hostile_names_are_shown_verbatim_and_inert() -> None:
+    report, columns = samples.hostile()
+    text = build_page(report, columns)
+    tree = Tree(text)
+    for name in samples.HOSTILE:
+        shown = name.replace("\u202e", "\\u202e").replace("\x1b", "\\x1b")
+        assert shown in tree.text
+    assert "\u202e" not in text
+    assert "\x1b" not in text
+    assert not any(t == "img" for t, _ in tree.tags)
+    assert "alert" not in "".join(s for a, s in tree.scripts if "type" not in a)
+    view = json.loads(next(s for a, s in tree.scripts if a.get("id") == "view"))
+    assert any("<script>alert(1)</script>" in c["name"] for c in view["channels"])
+
+
+def test_empty_report_is_still_a_page() -> None:
+    tree = Tree(build_page({}, {}))
+    assert "Not assessed" in tree.text
+    assert "Nothing could be judged" in tree.text
+
+
+@pytest.mark.parametrize("key", list(samples.five_faults()[0]))
+def test_every_part_of_the_report_may_be_absent(key: str) -> None:
+    report, columns = samples.five_faults(60.0, 20.0)
+    del report[key]
+    assert "</html>" in build_page(report, columns)
+
+
+@pytest.mark.parametrize("key", ["epsilon", "sat", "hypotheses", "evidence", "advice", "probability"])
+def test_parts_of_a_fault_may_be_null(key: str) -> None:
+    report, columns = samples.one_wheel()
+    report["intervals"][0][key] = None
+    assert "</html>" in build_page(report, columns)
+
+
+def test_caveats_stand_in_the_verdict() -> None:
+    report, columns = samples.five_faults()
+    text = build_page(report, columns)
+    verdict = text[text.index('id="verdict"') : text.index('id="timeline"')]
+    assert all(c in verdict for c in report["verdict"]["caveats"])
+
+
+@pytest.mark.parametrize(("status", "words"), [("ready", "Ready for the next mission"), ("unheard of", "Not assessed")])
+def test_verdict_words(status: str, words: str) -> None:
+    assert words in Tree(build_page({"verdict": {"status": status, "title": "x"}}, {})).text
+
+
+def test_large_mission_keeps_to_the_size() -> None:
+    report, columns = samples.five_faults(600.0, 200.0)
+    assert len(build_page(report, columns)) > 4.5e6
+    assert len(build_page(report, columns, max_size_mb=4.0)) < 4.2e6
+
+
+def test_columns_must_fit_the_time_axis() -> None:
+    with pytest.raises(ValueError, match="has shape"):
+        build_page({}, {"t": np.arange(5.0), "wheel.FR.v": np.zeros(4)})
+    with pytest.raises(ValueError, match="not uniform"):
+        build_page({}, {"t": np.array([0.0, 1.0, 3.0]), "wheel.FR.v": np.zeros(3)})
+
+
+def test_own_bundle_of_plotly(tmp_path: Path) -> None:
+    bundle = tmp_path / "plotly.min.js"
+    bundle.write_text("/*\n* plotly.js v9.8.7\n*/ window.Plotly = {};", encoding="utf-8")
+    report, columns = samples.one_wheel()
+    text = build_page(report, columns, plotlyjs=bundle)
+    assert len(text) < 4e5
+    assert re.search(r"<dt>plotly\.js</dt><dd>9\.8\.7</dd>", text)
+    with pytest.raises(ConfigError, match="cannot be read"):
+        build_page(report, columns, plotlyjs=tmp_path / "none.js")

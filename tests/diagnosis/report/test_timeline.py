@@ -1,0 +1,45 @@
+from __future__ import annotations
+
+from diagnosis.report.timeline import merged, ticks, timeline
+from tests import report_samples as samples
+
+
+def test_thousands_of_spans_merge_and_no_fault_is_lost() -> None:
+    spans = [
+        {"state": ("healthy", "not_excited")[i % 2], "start_s": i * 0.01, "stop_s": (i + 1) * 0.01}
+        for i in range(20_000)
+    ]
+    spans.append({"state": "stuck", "start_s": 77.0001, "stop_s": 77.0002})
+    runs = merged(spans, "state", 200.0)
+    assert len(runs) <= 2000
+    assert [r for r in runs if r[0] == "stuck"] == [("stuck", 770, 771)]
+
+
+def test_fault_at_the_very_end_is_drawn() -> None:
+    assert merged([{"state": "noisy", "start_s": 10.0, "stop_s": 10.0}], "state", 10.0) == [("noisy", 1999, 2000)]
+
+
+def test_lanes_with_and_without_faults() -> None:
+    report, _ = samples.five_faults()
+    t = timeline(report, 120.0)
+    assert [(x.component, x.part) for x in t.lanes] == [
+        ("FR", "speed sensor"),
+        ("FL", "speed sensor"),
+        ("RR", "drive valve"),
+        ("RL", "drive valve"),
+        ("front", "steering-angle sensor"),
+    ]
+    assert len(t.quiet) == 7
+    assert t.summary == "7 lanes without a fault: 6 healthy, 1 not assessed throughout"
+
+
+def test_fault_that_is_not_isolated_stands_on_both_lanes() -> None:
+    report, _ = samples.one_wheel()
+    report["intervals"][0]["side"] = "sensor_or_actuator"
+    assert [[b.fault for b in x.bars] for x in timeline(report, 120.0).lanes] == [["F1"], ["F1"]]
+
+
+def test_ticks() -> None:
+    assert [w for _, w in ticks(240.0)] == ["0:00", "0:30", "1:00", "1:30", "2:00", "2:30", "3:00", "3:30", "4:00"]
+    assert ticks(0.0) == ()
+    assert len(ticks(0.25)) == 3
