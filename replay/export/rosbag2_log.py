@@ -57,7 +57,7 @@ def write_rosbag2(path: Path, batches: Sequence[TopicBatch], *, compressed: bool
             raise OutputError(f"{path}: cannot be written ({error}); give another place") from error
         if compressed:
             with database.open("rb") as plain, database.with_name(database.name + ".zstd").open("wb") as packed:
-                zstandard.ZstdCompressor(level=10).copy_stream(plain, packed, size=database.stat().st_size)
+                zstandard.ZstdCompressor(level=19).copy_stream(plain, packed, size=database.stat().st_size)
             database.unlink()
         text = "\n".join(_yaml({"rosbag2_bagfile_information": metadata}, 0))
         (folder / "metadata.yaml").write_text(text + "\n", encoding="utf-8")
