@@ -92,8 +92,9 @@ def convert(
     stamps, recorded, notes = _ordered(*data)
     if origin.derivative and recorded.dtype.kind in "iu" and len(recorded):
         recorded = recorded.astype(np.int64) - np.int64(recorded[0])  # exact before they become floats
-    values = np.asarray(recorded, np.float64) * origin.gain + origin.offset
-    values = slope(stamps, values * factor) if origin.derivative else values * factor
+    with np.errstate(all="ignore"):  # damaged logs hold any bits
+        values = (np.asarray(recorded, np.float64) * origin.gain + origin.offset) * factor
+        values = slope(stamps, values) if origin.derivative else values
     return Converted(stamps, values, notes)
 
 

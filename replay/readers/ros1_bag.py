@@ -233,4 +233,13 @@ def _summary(bag: _Bag) -> LogSummary:
         totals[connection] = totals.get(connection, 0) + counts.get(number, 0)
     topics = tuple(TopicInfo(c.topic, c.type_name, n, c.encoding, (), c.why_not()) for c, n in totals.items())
     start, stop = (min(bounds), max(bounds)) if bounds else (0, 0)
-    return LogSummary(str(bag.path), "bag", start, stop, topics, tuple(bag.report.notes), tuple(bag.report.damage), {})
+    return LogSummary(
+        str(bag.path),
+        "bag",
+        start,
+        stop,
+        topics,
+        tuple(bag.report.notes),
+        tuple(bag.report.damage),
+        {"integrity": "unverifiable"},
+    )

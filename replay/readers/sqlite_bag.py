@@ -6,6 +6,7 @@ import shutil
 import sqlite3
 from collections.abc import Collection, Iterator
 from contextlib import closing, contextmanager
+from itertools import islice
 from pathlib import Path
 
 import numpy as np
@@ -33,9 +34,22 @@ def _database(path: Path, report: Report, scratch: Path) -> Iterator[sqlite3.Con
             shutil.copyfile(beside, scratch / beside.name)
             report.note(f"{path.name} was not closed by its recorder; it was read together with {beside.name}")
             path, mode = copy, "mode=rw"
+    _check_size(path, report)
     with closing(sqlite3.connect(f"{path.resolve().as_uri()}?{mode}", uri=True)) as base:
+        base.execute("pragma writable_schema = on")  # lets a file that was cut off be read as far as it goes
         base.text_factory = lambda raw: raw.decode("utf-8", "replace")
         yield base
+
+
+def _check_size(path: Path, report: Report) -> None:
+    """Compare the file's size with the page count in its header, where that is stated to be valid."""
+    with path.open("rb") as file:
+        head = file.read(100)
+    if len(head) == 100 and head[24:28] == head[92:96]:
+        page = int.from_bytes(head[16:18], "big")
+        stated = int.from_bytes(head[28:32], "big") * (65_536 if page == 1 else page)
+        if path.stat().st_size < stated:
+            report.lost(f"{path.name} was cut off: {path.stat().st_size} of {stated} bytes are there")
 
 
 def _connections(base: sqlite3.Connection, report: Report) -> dict[int, Connection]:
@@ -66,20 +80,17 @@ def _blocks(
         f"select topic_id, timestamp, data {where} and typeof(data) = 'blob' and typeof(timestamp) = 'integer' "
         "order by id"
     )
-    done = 0
     while True:
+        batch: list[tuple[int, int, bytes]] = []
         try:
-            batch = rows.fetchmany(_BATCH)
+            batch.extend(islice(rows, _BATCH))
         except (sqlite3.Error, MemoryError, OverflowError) as error:
             report.lost(f"{path.name}: its messages cannot be read to the end: {error}")
+            yield _split(path, batch, wanted, report, packed)
             return
         if not batch:
-            break
-        done += len(batch)
+            return
         yield _split(path, batch, wanted, report, packed)
-    total = base.execute(f"select count(*) {where}").fetchone()[0]
-    if done < total:
-        report.lost(f"{path.name}: {total - done} rows hold no message")
 
 
 def _split(
@@ -140,6 +151,37 @@ def read(
     return assembler.finish(summarise(files, source, report, scratch))
 
 
+def _counts(path: Path, base: sqlite3.Connection, report: Report) -> dict[int, tuple[int, int, int]]:
+    """Messages and first and last stamp per topic, as far as the table can be read."""
+    proper = "typeof(data) = 'blob' and typeof(timestamp) = 'integer' and timestamp >= 0"
+    try:
+        total = base.execute("select count(*) from messages").fetchone()[0]
+        rows = base.execute(
+            f"select topic_id, count(*), min(timestamp), max(timestamp) from messages where {proper} group by topic_id"
+        )
+        counts = {i: (n, first, last) for i, n, first, last in rows}
+    except sqlite3.Error:
+        return _readable_counts(path, base, report, proper)
+    lost = total - sum(n for n, _, _ in counts.values())
+    if lost:
+        report.lost(f"{path.name}: {lost} rows hold no message with a proper stamp")
+    return counts
+
+
+def _readable_counts(
+    path: Path, base: sqlite3.Connection, report: Report, proper: str
+) -> dict[int, tuple[int, int, int]]:
+    found: list[tuple[int, int]] = []
+    proper += " and typeof(topic_id) = 'integer'"
+    try:
+        found.extend(base.execute(f"select topic_id, timestamp from messages not indexed where {proper}"))
+    except (sqlite3.Error, OverflowError) as error:
+        report.lost(f"{path.name}: its messages cannot be read to the end: {error}")
+    table = np.array(found, np.int64).reshape(-1, 2)
+    split = {int(i): table[table[:, 0] == i, 1] for i in np.unique(table[:, 0])}
+    return {i: (len(s), int(s.min()), int(s.max())) for i, s in split.items()}
+
+
 def summarise(files: list[Path], source: Path, report: Report, scratch: Path) -> LogSummary:
     """Summarise the files of one recording.
 
@@ -158,14 +200,12 @@ def summarise(files: list[Path], source: Path, report: Report, scratch: Path) ->
                 readable += 1
                 for connection in known.values():
                     totals.setdefault(connection, 0)
-                for i, n, first, final in base.execute(
-                    "select topic_id, count(*), min(timestamp), max(timestamp) from messages group by topic_id"
-                ):
-                    if i not in known:
+                for i, (n, first, final) in _counts(path, base, report).items():
+                    if i in known:
+                        totals[known[i]] += n
+                        bounds += [first, final]
+                    else:
                         report.lost(f"{path.name}: {n} messages belong to topic {i}, which is not named")
-                        continue
-                    totals[known[i]] += n
-                    bounds += [s for s in (first, final) if isinstance(s, int) and s >= 0]
         except (sqlite3.Error, OSError) as error:
             last = f"{path.name} cannot be read: {error}"
             report.lost(last)
@@ -177,4 +217,13 @@ def summarise(files: list[Path], source: Path, report: Report, scratch: Path) ->
         more = f" and {len(named) - 5} more" if len(named) > 5 else ""
         report.note(f"definitions are not in the log and were taken by name: {', '.join(named[:5])}{more}")
     start, stop = (min(bounds), max(bounds)) if bounds else (0, 0)
-    return LogSummary(str(source), "rosbag2", start, stop, topics, tuple(report.notes), tuple(report.damage), {})
+    return LogSummary(
+        str(source),
+        "rosbag2",
+        start,
+        stop,
+        topics,
+        tuple(report.notes),
+        tuple(report.damage),
+        {"integrity": "unverifiable"},
+    )

@@ -126,7 +126,7 @@ class ParquetReader:
 
 def _open_parquet(path: Path) -> _Table:
     try:
-        with pq.ParquetFile(path) as file:
+        with pq.ParquetFile(path, page_checksum_verification=True) as file:
             size = sum(file.metadata.row_group(i).total_byte_size for i in range(file.metadata.num_row_groups))
             if size > _MAX_PARQUET:
                 raise LogError(f"{path} declares {size} bytes of columns; at most {_MAX_PARQUET} are read")
