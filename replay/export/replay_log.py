@@ -13,7 +13,7 @@ import pyarrow.parquet
 from numpy.typing import NDArray
 
 from replay.columns import replay_columns
-from replay.errors import ConfigError
+from replay.errors import ConfigError, OutputError
 from replay.export.layout import Layout, TopicBatch
 from replay.export.mcap_log import write_mcap
 from replay.files import atomic_path
@@ -22,6 +22,7 @@ from replay.machine import Machine
 from replay.timeline import Timeline
 
 REPLAY_FORMATS = ("parquet", "csv", "mcap")
+_LAST_ROS_NS = 2**32 * 1_000_000_000
 
 # Topic and field of `Replay`, by wheel and by steering axle.
 _WHEEL_TOPICS = (
@@ -93,6 +94,12 @@ def write_replay(path: Path, timeline: Timeline, replay: Replay, machine: Machin
     if format not in REPLAY_FORMATS:
         raise ConfigError(f"format = {format!r} is not known; expected one of {', '.join(REPLAY_FORMATS)}")
     if format == "mcap":
+        first, last = _stamps(timeline)[[0, -1]]
+        if first < 0 or last >= _LAST_ROS_NS:
+            raise OutputError(
+                f"{path}: MCAP with ROS stamps holds 1970 to 2106, the log starts at {np.datetime64(int(first), 'ns')}; "
+                "write Parquet or CSV instead"
+            )
         batches = replay_topics(timeline, replay, machine)
         write_mcap(path, batches)
         return tuple(b.topic for b in batches)

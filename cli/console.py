@@ -1,0 +1,124 @@
+"""What the user sees: results on stdout; progress, warnings and errors on stderr."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import IO, TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from rich.console import Console, RenderableType
+
+Progress = Callable[[str], None]
+
+# C0 and C1 controls, bidirectional overrides, zero-width marks, lone surrogates of undecodable file names.
+_HIDDEN = re.compile("[\x00-\x1f\x7f-\x9f\u061c\u200b-\u200f\u2028-\u202e\u2060-\u2069\ufeff\ud800-\udfff]+")
+_PADDING = re.compile("[ ]+$", re.MULTILINE)
+_PIPE_WIDTH = 120
+
+
+def clean(text: object) -> str:
+    """One line of text that cannot steer the terminal: runs of control and direction marks become one space."""
+    return _HIDDEN.sub(" ", str(text)).strip()
+
+
+@dataclass
+class Terminal:
+    """The two output streams of one run.
+
+    Attributes
+    ----------
+    quiet : bool
+        Errors and JSON only.
+    verbose : bool
+        Progress as lines where stderr is no terminal, tracebacks of internal errors.
+    json : bool
+        stdout is kept for one JSON document; what `show` prints goes to stderr.
+    """
+
+    quiet: bool = False
+    verbose: bool = False
+    json: bool = False
+
+    def show(self, *parts: RenderableType) -> None:
+        """Print results; a reader that closed the pipe early is no error."""
+        if not self.quiet:
+            stream = sys.stderr if self.json else sys.stdout
+            _write(stream, _rendered(_console(stream), parts))
+
+    def show_text(self, text: str) -> None:
+        """Print text of our own as it is."""
+        if not self.quiet:
+            _write(sys.stdout, text)
+
+    def show_json(self, document: Any) -> None:
+        """Print the one JSON document of a run, as UTF-8."""
+        # A lone surrogate of a file name becomes its JSON escape.
+        data = json.dumps(document, indent=2, ensure_ascii=False, allow_nan=False).encode("utf-8", "backslashreplace")
+        _write(sys.stdout, data + b"\n")
+
+    def note(self, text: object) -> None:
+        """One line on stderr."""
+        if not self.quiet:
+            self._line("note", "cyan", text)
+
+    def error(self, text: object) -> None:
+        """One line on stderr, also when quiet."""
+        self._line("error", "bold red", text)
+
+    def _line(self, label: str, style: str, text: object) -> None:
+        from rich.text import Text
+
+        line = Text.assemble((f"{label}:", style), " ", clean(text))
+        _write(sys.stderr, _rendered(_console(sys.stderr), (line,), wrap=False))
+
+    @contextmanager
+    def progress(self, first: str) -> Iterator[Progress]:
+        """Give a function that shows what is being done: a spinner on a terminal, lines with ``--verbose``."""
+        from rich.text import Text
+
+        if self.quiet or not sys.stderr.isatty():
+            yield (lambda text: _write(sys.stderr, clean(text) + "\n")) if self.verbose else (lambda text: None)
+            return
+        with _console(sys.stderr).status(Text(clean(first))) as status:
+            yield lambda text: status.update(Text(clean(text)))
+
+
+def _console(stream: IO[str]) -> Console:
+    from rich.console import Console
+
+    width = None if stream.isatty() or "COLUMNS" in os.environ else _PIPE_WIDTH
+    return Console(file=stream, width=width, highlight=False, markup=False, emoji=False)
+
+
+def _rendered(console: Console, parts: tuple[RenderableType, ...], *, wrap: bool = True) -> str:
+    with console.capture() as capture:
+        for part in parts:
+            console.print(part, soft_wrap=not wrap)
+    return _PADDING.sub("", capture.get())
+
+
+def _write(stream: IO[str], data: str | bytes) -> None:
+    try:
+        if isinstance(data, bytes):
+            stream.flush()
+            stream.buffer.write(data)  # type: ignore[attr-defined]
+        else:
+            stream.write(data)
+        stream.flush()
+    except BrokenPipeError:
+        discard(stream)
+
+
+def discard(stream: IO[str]) -> None:
+    """Send what is still written to a stream nowhere, so that the run ends with its own exit code."""
+    sink = os.open(os.devnull, os.O_WRONLY)
+    try:
+        os.dup2(sink, stream.fileno())
+    finally:
+        os.close(sink)

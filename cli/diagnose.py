@@ -1,0 +1,153 @@
+"""`mfhca diagnose` and `mfhca report`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from cli.app import command
+from cli.console import Terminal
+from cli.inputs import check_times, check_wheels, machine_of, mission_paths
+from cli.options import End, FailOn, Json, Logs, MachineFile, MaxSize, Start
+
+DIAGNOSE_EXAMPLES = """\b
+Examples:
+  mfhca diagnose mission.mcap
+  mfhca diagnose drive.bag plc-export.csv -m machine.toml -o reports/monday
+  mfhca diagnose mission.mcap --start 100 --end 160 --wheel FR --fail-on high
+  mfhca diagnose mission.mcap --json | jq .verdict"""
+REPORT_EXAMPLES = """\b
+Examples:
+  mfhca report mission-report
+  mfhca report mission-report/report.json --max-size 5"""
+
+_FAULTS = 1
+
+
+@command
+def diagnose(
+    terminal: Terminal,
+    logs: Logs,
+    output: Annotated[
+        Path | None,
+        typer.Option("--output", "-o", metavar="DIR", help="Folder of the report. Default: <log>-report."),
+    ] = None,
+    machine: MachineFile = None,
+    start: Start = None,
+    end: End = None,
+    wheel: Annotated[
+        list[str] | None,
+        typer.Option("--wheel", "-w", metavar="W", help="Only this wheel; may be given again.", show_default=False),
+    ] = None,
+    fail_on: Annotated[FailOn, typer.Option("--fail-on", help="Lowest severity that ends with code 1.")] = FailOn.LOW,
+    machine_id: Annotated[
+        str | None,
+        typer.Option("--machine-id", metavar="ID", help="Machine that the mission belongs to.", show_default=False),
+    ] = None,
+    json: Json = False,
+    dry_run: Annotated[bool, typer.Option("--dry-run", help="Say what would be read and written, and stop.")] = False,
+    open_page: Annotated[bool, typer.Option("--open", help="Open the report in the browser.")] = False,
+    max_size: MaxSize = 15.0,
+) -> None:
+    """Diagnose one mission: report.html, report.json, and a verdict as exit code."""
+    paths = mission_paths(logs)
+    check_times(start, end)
+    the_machine, source = machine_of(machine)
+    wheels = check_wheels(wheel, the_machine)
+    folder = output if output is not None else _default_folder(paths[0])
+    if dry_run:
+        _plan(terminal, paths, the_machine, source, folder, json)
+        return
+    with terminal.progress("starting") as progress:
+        from diagnosis.output import write_result
+        from diagnosis.pipeline import diagnose as diagnose_mission
+
+        result = diagnose_mission(
+            paths,
+            the_machine,
+            machine_source=source,
+            start_s=start,
+            stop_s=end,
+            wheels=wheels,
+            machine_id=machine_id,
+            progress=progress,
+        )
+        progress("writing the report")
+        written = write_result(result, folder, max_size_mb=max_size)
+    page = next((p for p in written if p.name == "report.html"), written[0])
+    if json:
+        terminal.show_json(dict(result.report))
+    else:
+        from cli.verdict import verdict_parts
+
+        terminal.show(*verdict_parts(result.report))
+    terminal.show(f"Report: {page}")
+    if open_page:
+        _open(page)
+    if _reaches(result.report, fail_on):
+        raise typer.Exit(_FAULTS)
+
+
+@command
+def report(
+    terminal: Terminal,
+    result: Annotated[
+        Path, typer.Argument(metavar="RESULT", help="Folder of a report, or its report.json.", show_default=False)
+    ],
+    max_size: MaxSize = 15.0,
+    open_page: Annotated[bool, typer.Option("--open", help="Open the report in the browser.")] = False,
+) -> None:
+    """Write report.html again from a saved result; the log is not needed."""
+    mission_paths([result])
+    with terminal.progress("writing the report"):
+        from diagnosis.output import rebuild
+
+        page = rebuild(result, max_size_mb=max_size)
+    terminal.show(f"Report: {page}")
+    if open_page:
+        _open(page)
+
+
+def _default_folder(log: Path) -> Path:
+    """``<stem>-report`` in the current folder; a compressed table loses both endings."""
+    stem = log.resolve().name if log.is_dir() else log.name.removesuffix(".gz").rsplit(".", 1)[0]
+    return Path(f"{stem or log.name}-report")
+
+
+def _reaches(report: Any, fail_on: FailOn) -> bool:
+    """Whether an interval is at least as severe as asked."""
+    order = list(FailOn)
+    return fail_on is not FailOn.NEVER and any(
+        order.index(FailOn(i["severity"])) >= order.index(fail_on) for i in report["intervals"]
+    )
+
+
+def _plan(terminal: Terminal, paths: list[Path], machine: Any, source: str, folder: Path, json: bool) -> None:
+    """Show what a run would read and write."""
+    from replay.mission import source_options
+    from replay.readers.registry import summarise_log
+
+    found = []
+    for path in paths:
+        summary = summarise_log(path, source_options(path, machine))
+        found.append(
+            {"path": str(path), "format": summary.format, "duration_s": (summary.stop_ns - summary.start_ns) * 1e-9}
+        )
+    outputs = [str(folder / name) for name in ("report.html", "report.json", "report.parquet")]
+    if json:
+        machine_part = {"name": machine.name, "source": source}
+        terminal.show_json({"would_read": found, "machine": machine_part, "would_write": outputs})
+        return
+    from cli.tables import key_values
+
+    rows = [("read", f"{f['path']}  ({f['format']}, {f['duration_s']:.1f} s)") for f in found]
+    rows += [("machine", f"{machine.name} ({source})"), *(("write", name) for name in outputs)]
+    terminal.show(key_values(rows))
+
+
+def _open(page: Path) -> None:
+    import webbrowser
+
+    webbrowser.open(page.resolve().as_uri())

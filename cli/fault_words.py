@@ -1,0 +1,89 @@
+"""Faults as typed on the command line: ``FR sensor stuck 30 37 eps=1 sat=0.2``."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+
+from replay.errors import ConfigError
+from replay.faults import FaultMode, FaultSpec, Side
+
+_SIDES = (Side.SENSOR, Side.ACTUATOR)
+_MODES = (FaultMode.STUCK, FaultMode.NO_SIGNAL, FaultMode.INEFFICIENT, FaultMode.NOISY)
+_KEYS: Mapping[str, Callable[[FaultSpec, float], FaultSpec]] = {
+    "eps": lambda fault, x: replace(fault, epsilon=x),
+    "sat": lambda fault, x: replace(fault, sat=x),
+    "std": lambda fault, x: replace(fault, sat_std=x),
+    "tau": lambda fault, x: replace(fault, sat_tau_s=x),
+}
+_FORM = "PART SIDE MODE START STOP [eps=…] [sat=…] [std=…] [tau=…], e.g. 'FR sensor stuck 30 37'"
+
+
+def parse_fault(words: str) -> FaultSpec:
+    """Read one fault; what is not given takes a typical value of its row of the table.
+
+    Raises
+    ------
+    ConfigError
+        Where the words do not follow the form.
+    """
+    fixed = [w for w in words.split() if "=" not in w]
+    if len(fixed) != 5:
+        raise ConfigError(f"--fault {words!r}: expected {_FORM}")
+    part, side_word, mode_word, start, stop = fixed
+    side = next((s for s in _SIDES if s.value == side_word.lower()), None)
+    if side is None:
+        raise ConfigError(f"--fault {words!r}: side {side_word!r} is not known; expected sensor or actuator")
+    mode = next((m for m in _MODES if m.value == mode_word.lower().replace("-", "_")), None)
+    if mode is None:
+        known = ", ".join(m.value for m in _MODES)
+        raise ConfigError(f"--fault {words!r}: mode {mode_word!r} is not known; expected one of {known}")
+    fault = _typical(part, side, mode, _number(words, "START", start), _number(words, "STOP", stop))
+    for word in (w for w in words.split() if "=" in w):
+        key, _, value = word.partition("=")
+        if key not in _KEYS:
+            raise ConfigError(f"--fault {words!r}: {key!r} is not known; expected eps, sat, std or tau")
+        fault = _KEYS[key](fault, _number(words, key, value))
+    _check_row(words, fault)
+    return fault
+
+
+def _typical(part: str, side: Side, mode: FaultMode, start: float, stop: float) -> FaultSpec:
+    """Fault of a row with middling severity; a stuck part holds its value at onset."""
+    fault = FaultSpec(part, side, mode, start, stop)
+    if mode is FaultMode.STUCK:
+        return replace(fault, sat=math.nan)
+    if mode is FaultMode.INEFFICIENT:
+        return replace(fault, epsilon=0.5)
+    if mode is FaultMode.NOISY and side is Side.SENSOR:
+        return replace(fault, epsilon=0.4, sat=0.05, sat_std=0.12, sat_tau_s=0.05)
+    if mode is FaultMode.NOISY:
+        return replace(fault, epsilon=0.4, sat=0.08, sat_std=0.08, sat_tau_s=0.8)
+    return fault
+
+
+def _number(words: str, key: str, value: str) -> float:
+    try:
+        number = float(value)
+    except ValueError:
+        number = math.nan
+    if not math.isfinite(number):
+        raise ConfigError(f"--fault {words!r}: {key} {value!r} is no number")
+    return number
+
+
+def _check_row(words: str, fault: FaultSpec) -> None:
+    """Raise where ε and sat belong to another row of the table than the mode says."""
+    full = fault.mode in (FaultMode.STUCK, FaultMode.NO_SIGNAL)
+    if full and fault.epsilon != 1.0:
+        raise ConfigError(f"--fault {words!r}: {fault.mode} means eps = 1, not {fault.epsilon:g}")
+    if not full and not 0.0 < fault.epsilon < 1.0:
+        raise ConfigError(f"--fault {words!r}: {fault.mode} needs eps between 0 and 1, not {fault.epsilon:g}")
+    silent = fault.mode in (FaultMode.NO_SIGNAL, FaultMode.INEFFICIENT)
+    if silent and (fault.sat or fault.sat_std):
+        raise ConfigError(f"--fault {words!r}: {fault.mode} means sat = 0; take stuck or noisy for another value")
+    if fault.mode is FaultMode.STUCK and (fault.sat == 0.0 or fault.sat_std):
+        raise ConfigError(f"--fault {words!r}: stuck means one value other than 0; take no_signal or noisy")
+    if fault.mode is FaultMode.NOISY and not (fault.sat or fault.sat_std):
+        raise ConfigError(f"--fault {words!r}: noisy needs sat or std other than 0; take inefficient")

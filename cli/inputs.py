@@ -1,0 +1,135 @@
+"""From what the user typed to checked paths, machines and times."""
+
+from __future__ import annotations
+
+import glob
+import math
+import sys
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from replay.errors import ConfigError, LogError
+
+if TYPE_CHECKING:
+    from replay.machine import Machine
+
+DEFAULT_MACHINE = "paper defaults"
+LOG_ENDINGS = (".mcap", ".bag", ".db3", ".csv", ".csv.gz", ".txt", ".parquet")
+
+
+def machine_of(path: Path | None) -> tuple[Machine, str]:
+    """Read the machine file, or take the paper's machine; with the name to show for it."""
+    from replay.machine import haulotte
+    from replay.machine_file import load_machine
+
+    return (haulotte(), DEFAULT_MACHINE) if path is None else (load_machine(path), path.name)
+
+
+def mission_paths(paths: Sequence[Path]) -> list[Path]:
+    """Check that the files of one mission are there, each once.
+
+    Raises
+    ------
+    LogError
+        Where one does not exist.
+    ConfigError
+        Where one is given twice.
+    """
+    for path in paths:
+        if not path.exists():
+            hint = "; give each file of the mission by its name" if glob.has_magic(str(path)) else ""
+            raise LogError(f"{path}: no such file{hint}")
+    real = [p.resolve() for p in paths]
+    for i, path in enumerate(real):
+        if path in real[:i]:
+            raise ConfigError(f"{paths[i]}: given twice; give each file of the mission once")
+    return list(paths)
+
+
+def check_times(start: float | None, end: float | None) -> None:
+    """Raise a `ConfigError` where the asked part of a mission cannot be one."""
+    for name, value in (("--start", start), ("--end", end)):
+        if value is not None and not (math.isfinite(value) and value >= 0):
+            raise ConfigError(f"{name} {value:g}: expected seconds from the mission's start, 0 or more")
+    if start is not None and end is not None and end <= start:
+        raise ConfigError(f"--end {end:g}: must be later than --start {start:g}")
+
+
+def check_wheels(wheels: Sequence[str] | None, machine: Machine) -> tuple[str, ...] | None:
+    """Give the asked wheels as the machine spells them, in its order; None where none are asked for."""
+    if not wheels:
+        return None
+    spelling = {w.casefold(): w for w in machine.wheels}
+    for wheel in wheels:
+        if wheel.casefold() not in spelling:
+            raise ConfigError(f"--wheel {wheel}: no such wheel; the machine has {', '.join(machine.wheels)}")
+    asked = {spelling[w.casefold()] for w in wheels}
+    return tuple(w for w in machine.wheels if w in asked)
+
+
+@dataclass
+class FoundLogs:
+    """Logs behind the words of a command line.
+
+    Attributes
+    ----------
+    paths : list[Path]
+        Files and rosbag2 folders, each once, in the given order; those in folders sorted.
+    missing : list[str]
+        Words behind which nothing was found, with the reason.
+    left_aside : int
+        Files in given folders that are no logs.
+    """
+
+    paths: list[Path]
+    missing: list[str]
+    left_aside: int = 0
+
+
+def find_logs(words: Iterable[str]) -> FoundLogs:
+    """Expand files, folders, globs and ``-`` (paths on stdin, one per line)."""
+    found = FoundLogs([], [])
+    seen: set[Path] = set()
+    for word in _words(words):
+        path = Path(word)
+        if path.exists():
+            hits = [path]
+        elif glob.has_magic(word):
+            hits = [Path(p) for p in sorted(glob.glob(word, recursive=True))]  # noqa: PTH207 - absolute patterns too
+        else:
+            hits = []
+        logs = [log for hit in hits for log in _logs_at(hit, found)]
+        if not hits:
+            found.missing.append(f"{word}: no such file" if not glob.has_magic(word) else f"{word}: matches no file")
+        elif not logs:
+            found.missing.append(f"{word}: holds no log ({', '.join(LOG_ENDINGS)} or a rosbag2 folder)")
+        for log in logs:
+            if (real := log.resolve()) not in seen:
+                seen.add(real)
+                found.paths.append(log)
+    return found
+
+
+def _words(words: Iterable[str]) -> Iterator[str]:
+    for word in words:
+        if word == "-":
+            yield from (line.rstrip("\r\n") for line in sys.stdin if line.strip())
+        else:
+            yield word
+
+
+def _logs_at(path: Path, found: FoundLogs) -> Iterator[Path]:
+    """Yield a file itself, a rosbag2 folder as one log, or the logs in a folder and below; links to folders are not followed."""
+    if not path.is_dir() or (path / "metadata.yaml").is_file():
+        yield path
+        return
+    for child in sorted(path.iterdir()):
+        if child.is_dir():
+            if not child.is_symlink() and not child.name.startswith("."):
+                yield from _logs_at(child, found)
+        elif child.name.lower().endswith(LOG_ENDINGS) and not child.name.startswith("."):
+            yield child
+        else:
+            found.left_aside += 1

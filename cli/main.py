@@ -1,0 +1,148 @@
+"""The `mfhca` command: its commands, and the exit code of every way a run can end.
+
+0 no fault, 1 faults found, 2 usage or configuration, 3 a log could not be read or judged, 70 internal error,
+130 interrupted.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+import traceback
+import warnings
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from cli import configure, diagnose, look, replaying, simulate
+from cli.app import App, Quiet, Verbose, terminal_of
+from cli.console import Terminal, discard
+from replay.errors import MfhcaError
+from replay.version import __version__
+
+# Click's base of usage errors; typer carries its own copy of click in newer versions.
+_UsageError = next(c for c in typer.BadParameter.__mro__ if c.__name__ == "ClickException")
+
+INTERNAL, INTERRUPTED = 70, 130
+
+app = typer.Typer(
+    name="mfhca",
+    cls=App,
+    no_args_is_help=True,
+    rich_markup_mode=None,
+    pretty_exceptions_enable=False,
+    context_settings={"help_option_names": ["-h", "--help"]},
+    epilog="\b\nExit codes: 0 no fault · 1 faults found · 2 usage or configuration ·\n"
+    "3 a log could not be read or judged · 70 internal error · 130 interrupted",
+)
+
+
+def _version(wanted: bool) -> None:
+    if wanted:
+        typer.echo(f"mfhca-replay {__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def root(
+    context: typer.Context,
+    version: Annotated[
+        bool, typer.Option("--version", "-V", callback=_version, is_eager=True, help="Show the version and exit.")
+    ] = False,
+    quiet: Quiet = False,
+    verbose: Verbose = False,
+) -> None:
+    """Replay the logs of a heavy-duty wheeled machine and find its sensor and actuator faults."""
+    terminal_of(context, quiet=quiet, verbose=verbose)
+
+
+_DIAGNOSE, _LOOK, _MAKE = "Diagnose", "Look into a log", "Set up and try"
+for _panel, _function, _name, _epilog in (
+    (_DIAGNOSE, diagnose.diagnose, "diagnose", diagnose.DIAGNOSE_EXAMPLES),
+    (_DIAGNOSE, diagnose.report, "report", diagnose.REPORT_EXAMPLES),
+    (_LOOK, look.inspect, "inspect", look.INSPECT_EXAMPLES),
+    (_LOOK, look.channels, "channels", look.CHANNELS_EXAMPLES),
+    (_LOOK, replaying.replay, "replay", replaying.EXAMPLES),
+    (_MAKE, simulate.simulate, "simulate", simulate.EXAMPLES),
+):
+    app.command(_name, rich_help_panel=_panel, epilog=_epilog)(_function)
+app.add_typer(configure.app, name="config", rich_help_panel=_MAKE)
+
+
+def run(arguments: Sequence[str] | None = None) -> int:
+    """Run one command line and give its exit code; every error becomes one line on stderr."""
+    terminal = Terminal()
+    try:
+        result = app(args=arguments, obj=terminal, standalone_mode=False, prog_name="mfhca")
+        code = result if isinstance(result, int) else 0
+        sys.stdout.flush()
+        return code if code != INTERRUPTED else _interrupted(terminal)
+    except (KeyboardInterrupt, typer.Abort):
+        return _interrupted(terminal)
+    except MfhcaError as error:
+        terminal.error(error)
+        return error.exit_code
+    except BrokenPipeError:
+        discard(sys.stdout)
+        return 0
+    except OSError as error:
+        return _system_error(terminal, error)
+    except Exception as error:
+        if isinstance(error, _UsageError):
+            return _usage_error(terminal, error)
+        return _internal_error(terminal, error)
+
+
+def _interrupted(terminal: Terminal) -> int:
+    terminal.error("interrupted")
+    return INTERRUPTED
+
+
+def _usage_error(terminal: Terminal, error: Exception) -> int:
+    """Print help where no command was given, else what is off and where to read on."""
+    context = getattr(error, "ctx", None)
+    message = str(error.format_message())  # type: ignore[attr-defined]
+    if type(error).__name__ == "NoArgsIsHelpError":
+        typer.echo(message, err=True)
+    else:
+        path = getattr(context, "command_path", "mfhca")
+        terminal.error(f"{message.rstrip('.')}; see `{path} --help`")
+    return 2
+
+
+def _system_error(terminal: Terminal, error: OSError) -> int:
+    reason = "no such file" if isinstance(error, FileNotFoundError) else (error.strerror or str(error))
+    if error.filename is None:
+        if terminal.verbose:
+            traceback.print_exc()
+        terminal.error(f"cannot write or read: {reason}")
+        discard(sys.stdout)
+        return 2
+    terminal.error(f"{error.filename}: {reason}")
+    return 3
+
+
+def _internal_error(terminal: Terminal, error: Exception) -> int:
+    if terminal.verbose:
+        traceback.print_exc()
+    hint = "" if terminal.verbose else "; run it again with -v and report what it prints"
+    terminal.error(f"internal error: {type(error).__name__}: {error}{hint}")
+    return INTERNAL
+
+
+def main() -> None:
+    """Entry of the installed command."""
+    for name, mode in (("stdin", "r"), ("stdout", "w"), ("stderr", "w")):
+        if getattr(sys, name) is None:  # closed by the caller
+            setattr(sys, name, Path(os.devnull).open(mode, encoding="utf-8"))  # noqa: SIM115 - for the whole run
+    for stream in (sys.stdout, sys.stderr):
+        stream.reconfigure(errors="replace")  # type: ignore[union-attr]
+    if not sys.warnoptions:
+        warnings.simplefilter("ignore")
+    sys.exit(run())
+
+
+if __name__ == "__main__":
+    main()

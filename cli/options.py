@@ -1,0 +1,43 @@
+"""Arguments and options that several commands share."""
+
+from __future__ import annotations
+
+from enum import StrEnum
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+Logs = Annotated[
+    list[Path],
+    typer.Argument(metavar="LOG...", help="The files of one mission, e.g. a bag and a PLC export.", show_default=False),
+]
+MachineFile = Annotated[
+    Path | None,
+    typer.Option(
+        "--machine",
+        "-m",
+        metavar="FILE",
+        help="Machine file (TOML). Default: the paper's Haulotte, signals found automatically.",
+        show_default=False,
+    ),
+]
+Start = Annotated[
+    float | None, typer.Option("--start", metavar="S", help="From this mission time [s].", show_default=False)
+]
+End = Annotated[float | None, typer.Option("--end", metavar="S", help="To this mission time [s].", show_default=False)]
+Json = Annotated[bool, typer.Option("--json", help="One JSON document on stdout, all else on stderr.")]
+MaxSize = Annotated[
+    float,
+    typer.Option("--max-size", metavar="MB", min=0.5, help="Size that the page's data may take; faults come first."),
+]
+
+
+class FailOn(StrEnum):
+    """Lowest severity that ends with exit code 1."""
+
+    INFO = "info"
+    LOW = "low"
+    MEDIUM = "medium"
+    HIGH = "high"
+    NEVER = "never"

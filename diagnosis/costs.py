@@ -1,0 +1,40 @@
+"""What a missing signal costs the diagnosis."""
+
+from __future__ import annotations
+
+_WHEEL = {
+    "v_ref": "v_c,i is computed from v_c and ω_c by the kinematics; without those and a geometry there is no e and no Ψ̂",
+    "v": "speed sensor and actuator are not assessed, and the actuators of the others lose a peer",
+    "v_true": "ε of the speed sensor rests on the wheel model instead of a second measurement",
+    "u": "the actuator is not assessed, no Ψ̂ is implied, and the speed sensor is judged by commands and peers alone",
+    "u_applied": "ε of the actuator rests on the wheel model, and sensor and actuator loss are harder to tell apart",
+    "psi": "Ψ̂ is replayed only and cannot be compared with the controller's own",
+    "pressure_a": "load and actuator disturbance are told apart by the wheel model alone",
+    "pressure_b": "load and actuator disturbance are told apart by the wheel model alone",
+}
+_STEER = {
+    "phi_ref": "φ_c is computed from v_c and ω_c by the kinematics; without those the steering loop is not replayed",
+    "phi": "steering is not assessed, and wheel speeds are compared as if the wheels pointed where commanded",
+    "phi_true": "ε of the steering sensor rests on the steering model instead of a second measurement",
+    "u": "the steering actuator is not assessed",
+    "u_applied": "ε of the steering actuator rests on the steering model",
+}
+_OTHER = {
+    "cmd.v": "without recorded v_c,i no wheel has a command: no e, no Ψ̂, no driving time",
+    "cmd.omega": "commands of the wheels are computed as if driving straight ahead, unless v_c,i is recorded",
+    "imu.yaw_rate": "a slipping wheel and a faulty speed sensor are told apart by the other wheels alone",
+    "gnss.lat": "no path is drawn from positions",
+    "gnss.lon": "no path is drawn from positions",
+    "gnss.speed": "wheel speeds have no reference that is independent of the ground",
+    "odom.x": "the path is computed from wheel speeds and steering",
+    "odom.y": "the path is computed from wheel speeds and steering",
+    "odom.yaw": "the path is computed from wheel speeds and steering",
+}
+
+
+def cost_of_missing(signal: str) -> str:
+    """Tell what the diagnosis loses without a canonical signal; empty for an unknown name."""
+    group, _, rest = signal.partition(".")
+    leaf = rest.rpartition(".")[2]
+    table = {"wheel": _WHEEL, "steer": _STEER}.get(group)
+    return _OTHER.get(signal, "") if table is None else table.get(leaf, "")

@@ -1,0 +1,187 @@
+"""From the files of one mission to its signals and its timeline."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from fnmatch import fnmatch
+from pathlib import Path
+
+from replay.errors import LogError
+from replay.machine import Machine, SourceOptions
+from replay.mapping import map_signals, plan_topics
+from replay.rawlog import LogSummary, RawLog
+from replay.readers.registry import read_log, summarise_log
+from replay.signals import Signals
+from replay.timeline import Timeline, align
+
+Progress = Callable[[str], None]
+
+_BLOCK = 1 << 22
+
+
+@dataclass(frozen=True)
+class MissionFile:
+    """One source of a mission.
+
+    Attributes
+    ----------
+    path : Path
+        As given.
+    sha256 : str
+        Of the content; of a folder, see `content_hash`.
+    bytes : int
+        Size; of a folder, of all its files.
+    format : str
+        As in `LogSummary`.
+    summary : LogSummary
+        Contents, notes and damage after decoding.
+    """
+
+    path: Path
+    sha256: str
+    bytes: int
+    format: str
+    summary: LogSummary
+
+
+@dataclass(frozen=True)
+class Mission:
+    """The files of one mission, their signals, and the signals on one time axis."""
+
+    files: tuple[MissionFile, ...]
+    signals: Signals
+    timeline: Timeline
+
+
+def source_options(path: Path, machine: Machine) -> SourceOptions:
+    """Options of the first entry of [sources] whose pattern matches the file's name, else the defaults."""
+    for pattern, options in machine.sources.items():
+        if fnmatch(path.name, pattern):
+            return options
+    return SourceOptions()
+
+
+def content_hash(path: Path) -> tuple[str, int]:
+    """SHA-256 and size of a file, or of a folder's relative file names, sizes and contents in order of name.
+
+    Raises
+    ------
+    LogError
+        Where it cannot be read.
+    """
+    digest = hashlib.sha256()
+    try:
+        if not path.is_dir():
+            size = _feed(digest, path)
+            return digest.hexdigest(), size
+        total = 0
+        for name, file in sorted(_files_below(path)):
+            digest.update(name.encode("utf-8", "surrogateescape") + b"\0" + file.stat().st_size.to_bytes(8, "big"))
+            total += _feed(digest, file)
+        return digest.hexdigest(), total
+    except OSError as error:
+        raise LogError(f"{path} cannot be read: {error.strerror or error}") from error
+
+
+def _files_below(folder: Path) -> Iterator[tuple[str, Path]]:
+    return ((p.relative_to(folder).as_posix(), p) for p in folder.rglob("*") if p.is_file())
+
+
+def _feed(digest: hashlib._Hash, path: Path) -> int:
+    size = 0
+    with path.open("rb") as file:
+        while block := file.read(_BLOCK):
+            digest.update(block)
+            size += len(block)
+    return size
+
+
+def read_signals(
+    paths: Sequence[Path], machine: Machine, *, progress: Progress | None = None
+) -> tuple[tuple[MissionFile, ...], Signals]:
+    """Read the files of one mission and find the machine's signals in them.
+
+    Parameters
+    ----------
+    paths : Sequence[Path]
+        Files and rosbag2 folders.
+    machine : Machine
+        Where its signals are recorded, and how its sources are to be read.
+    progress : callable or None
+        Called with one line about each step.
+
+    Returns
+    -------
+    tuple[tuple[MissionFile, ...], Signals]
+        The files in the given order, and the signals at their own stamps.
+
+    Raises
+    ------
+    LogError
+        Where a file cannot be read.
+    ConfigError
+        Where a given unit does not fit its signal.
+    """
+    tell = progress or (lambda text: None)
+    options = [source_options(path, machine) for path in paths]
+    summaries = []
+    for path, option in zip(paths, options, strict=True):
+        tell(f"opening {path.name}")
+        summaries.append(summarise_log(path, option))
+    plan = plan_topics(summaries, machine)
+    logs: list[RawLog] = []
+    files: list[MissionFile] = []
+    for path, option, summary in zip(paths, options, summaries, strict=True):
+        tell(f"reading {path.name}")
+        log = read_log(path, option, plan.get(summary.source))
+        tell(f"hashing {path.name}")
+        sha256, size = content_hash(path)
+        logs.append(log)
+        files.append(MissionFile(path, sha256, size, log.format, _complete(summary, log.summary)))
+    tell("mapping signals")
+    return tuple(files), map_signals(logs, machine)
+
+
+def _complete(index: LogSummary, decoded: LogSummary) -> LogSummary:
+    """Decoded summary with what only the index knew."""
+    return replace(
+        decoded,
+        notes=tuple(dict.fromkeys((*index.notes, *decoded.notes))),
+        damage=tuple(dict.fromkeys((*index.damage, *decoded.damage))),
+    )
+
+
+def load_mission(
+    paths: Sequence[Path],
+    machine: Machine,
+    *,
+    start_s: float | None = None,
+    stop_s: float | None = None,
+    progress: Progress | None = None,
+) -> Mission:
+    """Read the files of one mission onto one time axis.
+
+    Parameters
+    ----------
+    paths : Sequence[Path]
+        Files and rosbag2 folders.
+    machine : Machine
+        The machine.
+    start_s, stop_s : float or None
+        Part of the mission [s from its first wheel sample].
+    progress : callable or None
+        Called with one line about each step.
+
+    Raises
+    ------
+    LogError
+        Where a file cannot be read, no wheel signal is found, or the files do not overlap in time.
+    ConfigError
+        Where a given unit does not fit its signal.
+    """
+    files, signals = read_signals(paths, machine, progress=progress)
+    if progress is not None:
+        progress("aligning signals")
+    return Mission(files, signals, align(signals, start_s, stop_s))
