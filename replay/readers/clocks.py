@@ -63,7 +63,7 @@ class Clocks:
         self.clock, self.report = clock, report
         self.no_header: list[str] = []
         self.far: dict[str, list[str]] = {}
-        self.near = False
+        self.near = 0
         self.lead: _Lead | None = None
 
     def stamps(
@@ -104,7 +104,7 @@ class Clocks:
             if lead is not None and (self.lead is None or lead.count > self.lead.count):
                 self.lead = lead
         else:
-            self.near = True
+            self.near = max(self.near, len(rows))
         if self.clock == "log":
             return log
         zero = np.zeros(len(log), np.bool_)
@@ -121,7 +121,7 @@ class Clocks:
             self.report.note(f"header stamps lie {span} the log's stamps (median): {_some(topics)}")
         if self.clock != "header" or not self.no_header:
             return
-        if self.lead is None or self.near:
+        if self.lead is None or self.near >= self.lead.count:
             self.report.note(f"no header stamps (or all zero), so on the log clock: {_some(self.no_header)}")
             return
         moved: dict[int, tuple[NDArray[np.int64], NDArray[np.int64]]] = {}
