@@ -308,8 +308,8 @@ def _gain_with_drift(y: Array, x: Array, model: modes.ModeModel, smooth_s: float
         b = (y[1:] - rho * y[:-1]) / sigma
         information = ridge + a.T @ a
         covariance = np.linalg.inv(information)
-        theta = covariance @ (ridge @ start + a.T @ b)
-        residual = y - design @ theta
+        theta = np.asarray(covariance @ (ridge @ start + a.T @ b), dtype=np.float64)
+        residual = np.asarray(y - design @ theta, dtype=np.float64)
         norm = float(residual[:-1] @ residual[:-1])
         rho = min(0.9995, max(0.0, float(residual[1:] @ residual[:-1]) / norm)) if norm > 0 else 0.0
         sigma = max(float(np.std(residual[1:] - rho * residual[:-1])), 1e-9 * model.span)

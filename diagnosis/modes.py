@@ -191,10 +191,7 @@ def _scan_modes(y, x, status, quiet, p, noisy, row, score, mean, cov, back, filt
                 cost = p[4]
                 if row[m] == row[best] and m != best:
                     cost = 3.0
-                if m == 0 or m == 2:
-                    learning = 0.0
-                else:
-                    learning = _LEARNING_COST
+                learning = 0.0 if m == 0 or m == 2 else _LEARNING_COST
                 if top - cost - learning > score[m]:
                     score[m] = top - cost
                     back[k, m] = best

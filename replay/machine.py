@@ -164,15 +164,28 @@ class WheelPlant:
 
 @dataclass(frozen=True)
 class Plant:
-    """What is known of the wheels before the mission."""
+    """What is known of the wheels before the mission.
+
+    Attributes
+    ----------
+    coupling : str
+        ``free`` (wheels off the ground), ``ground``, or ``auto``.
+    flow : float or None
+        Sum of all wheels' speeds that the pump can feed [m/s]; None where every wheel has its own supply.
+    wheels : Mapping[str, WheelPlant]
+        Wheel models by name.
+    """
 
     coupling: Coupling = "auto"
+    flow: float | None = None
     wheels: Mapping[str, WheelPlant] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         """Check values."""
         if self.coupling not in ("auto", "free", "ground"):
             raise ConfigError(f"plant.coupling = {self.coupling!r} is not known; expected auto, free or ground")
+        if self.flow is not None:
+            check_range("plant.flow", self.flow, 1e-6, 1e6, "m/s, summed over the wheels")
 
 
 @dataclass(frozen=True)
@@ -386,4 +399,6 @@ def haulotte() -> Machine:
         geometry=four_wheel_geometry(2.1, 1.46, 0.854, 0.20),
         gear_ratio=17.7,
         max_speed=0.36,
+        # 63 l/min over motors of 100 cm³/rev, gear 17.7, wheel ⌀ 0.854 m
+        plant=Plant(flow=1.59),
     )

@@ -82,7 +82,7 @@ def _machine(data: Mapping[str, Any]) -> Machine:
         max_speed=speed,
         max_steer=top.get("max_steer", base.max_steer),
         control=_build(Control, "control", data.get("control", {}), {"lambda": "lambda_"}),
-        plant=_plant(data.get("plant", {}), tuple(wheels)),
+        plant=_plant(data.get("plant", {}), tuple(wheels), base.plant.flow if geometry == base.geometry else None),
         noise={k: _build(Noise, f"noise.{k}", v) for k, v in data.get("noise", {}).items()},
         limits=_build(Limits, "limits", limits),
         sources={k: _build(SourceOptions, f"sources.{k}", v) for k, v in data.get("sources", {}).items()},
@@ -145,10 +145,11 @@ def _place(wheel: str, value: Mapping[str, Any], wheels: tuple[str, ...]) -> Whe
     )
 
 
-def _plant(value: Mapping[str, Any], wheels: tuple[str, ...]) -> Plant:
-    _known("plant", value, {"coupling", *wheels})
+def _plant(value: Mapping[str, Any], wheels: tuple[str, ...], default_flow: float | None) -> Plant:
+    _known("plant", value, {"coupling", "flow", *wheels})
+    flow = _number("plant.flow", value["flow"]) if "flow" in value else default_flow
     models = {w: _build(WheelPlant, f"plant.{w}", value[w]) for w in wheels if w in value}
-    return Plant(coupling=value.get("coupling", "auto"), wheels=models)
+    return Plant(coupling=value.get("coupling", "auto"), flow=flow, wheels=models)
 
 
 def _signal(name: str, value: Any) -> SignalSource:
@@ -217,6 +218,8 @@ def dump_machine(machine: Machine) -> str:
             lines.append(f"{_key(w)} = {{ {place} }}")
     lines += ["", "[control]", *_table(machine.control, {"lambda_": "lambda"})]
     lines += ["", "[plant]", f"coupling = {_text(machine.plant.coupling)}"]
+    if machine.plant.flow is not None:
+        lines.append(f"flow = {machine.plant.flow!r}")
     lines += [f"{_key(w)} = {{ {', '.join(_table(p))} }}" for w, p in machine.plant.wheels.items()]
     lines += ["", "[limits]", *_table(machine.limits)]
     for section, items in (("noise", machine.noise), ("sources", machine.sources), ("signals", machine.signals)):

@@ -1,0 +1,285 @@
+"""From findings to faults, severity and verdict, by Assumptions 1 and 2 of the paper.
+
+Assumption 1: a sensor that is stuck or silent is tolerable when brief, else stop and repair. Assumption 2: a stuck
+actuator, or one without control signal, means stop at once. Everything else is watched.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from diagnosis.assessment import STATES, Assessment, Finding
+from diagnosis.result import FaultInterval, Severity, StateSpan, Verdict
+from replay.faults import FAULT_STATES, FaultMode, Side, State
+from replay.machine import Limits
+
+Key = tuple[str, str]
+
+_GONE = (FaultMode.STUCK, FaultMode.NO_SIGNAL)
+_RANK: dict[Severity, int] = {"high": 0, "medium": 1, "low": 2, "info": 3}
+_MARKED_EPSILON = 0.3
+
+MODE_WORDS = {
+    "sensor": {
+        "stuck": "stuck",
+        "no_signal": "without signal",
+        "inefficient": "inefficient",
+        "noisy": "noise-affected",
+        "outside_table": "outside the table",
+    },
+    "actuator": {
+        "stuck": "stuck",
+        "no_signal": "without control signal",
+        "inefficient": "inefficient",
+        "noisy": "disturbance-affected",
+        "outside_table": "outside the table",
+    },
+}
+
+
+def mode_words(side: str, mode: str) -> str:
+    """A fault mode in the paper's words for its side."""
+    return MODE_WORDS["actuator" if side == "actuator" else "sensor"][mode]
+
+
+def part_words(kind: str, component: str, side: str) -> str:
+    """A component and side in words: ``FR speed sensor``, ``front steering valve``."""
+    if kind == "steer":
+        return {
+            "sensor": f"{component} steering sensor",
+            "actuator": f"{component} steering valve",
+        }.get(side, f"{component} steering sensor or valve")
+    return {"sensor": f"{component} speed sensor", "actuator": f"{component} drive valve"}.get(
+        side, f"{component} speed sensor or drive valve"
+    )
+
+
+def severity_of(finding: Finding, seconds: float, limits: Limits) -> tuple[Severity, str]:
+    """Severity and advice of one fault; see the module's docstring."""
+    if finding.probability < limits.min_probability:
+        return "info", "Not certain enough to act on. Compare with the next mission."
+    if finding.mode in _GONE and finding.side is Side.ACTUATOR:
+        return "high", "Stop at once and repair: the valve does not answer its command (Assumption 2)."
+    if finding.mode in _GONE and finding.side is Side.SENSOR_OR_ACTUATOR:
+        return "high", "Stop and find out whether the drive or its sensor fails; treat it as the drive until then."
+    if finding.mode in _GONE:
+        if seconds <= limits.brief:
+            return "low", (
+                f"Tolerable: no longer than {limits.brief:g} s (Assumption 1). Check plug and cable at the next service."
+            )
+        return "high", (
+            f"Stop and repair the sensor: it gave nothing usable for more than {limits.brief:g} s (Assumption 1)."
+        )
+    marked = finding.epsilon is not None and finding.epsilon.value >= _MARKED_EPSILON
+    severity: Severity = "medium" if marked else "low"
+    if finding.mode is FaultMode.OUTSIDE_TABLE:
+        return (
+            "medium",
+            "Check scaling and sign of the channel: its gain lies outside what a fault of the table can give.",
+        )
+    if finding.side is Side.SENSOR:
+        what = "gap, magnet and scaling" if finding.mode is FaultMode.INEFFICIENT else "shield, ground and supply"
+        return severity, f"May go out; check the sensor's {what}."
+    if finding.side is Side.ACTUATOR:
+        what = (
+            "pressure, leakage and spool travel"
+            if finding.mode is FaultMode.INEFFICIENT
+            else "command wiring and pilot"
+        )
+        return severity, f"May go out; check the valve's {what}."
+    return severity, "May go out; measure speed and valve travel to tell sensor from valve."
+
+
+def intervals_of(
+    assessments: Mapping[Key, Assessment], axles: Sequence[str], start_ns: int, step_ns: int, limits: Limits
+) -> tuple[FaultInterval, ...]:
+    """Number the findings of all components: worst first, then by time; a shared finding counts once."""
+    found: dict[tuple[str, str, int, int], FaultInterval] = {}
+    for (component, _), assessment in assessments.items():
+        kind = "steer" if component in axles else "wheel"
+        for f in assessment.findings:
+            seconds = (f.stop - f.start) * step_ns * 1e-9
+            severity, advice = severity_of(f, seconds, limits)
+            found[component, f.side.value, f.start, f.stop] = FaultInterval(
+                id="",
+                component=component,
+                kind="steer" if kind == "steer" else "wheel",
+                side=f.side,
+                mode=f.mode,
+                start_s=f.start * step_ns * 1e-9,
+                stop_s=f.stop * step_ns * 1e-9,
+                start_ns=start_ns + f.start * step_ns,
+                stop_ns=start_ns + f.stop * step_ns,
+                epsilon=f.epsilon,
+                sat=f.sat,
+                probability=f.probability,
+                hypotheses=f.hypotheses,
+                severity=severity,
+                advice=advice,
+                evidence=f.evidence,
+                tier=f.tier,
+            )
+    ordered = sorted(found.values(), key=lambda x: (_RANK[x.severity], x.start_s, x.component, x.side.value))
+    return tuple(replace(f, id=f"F{i + 1}") for i, f in enumerate(ordered))
+
+
+def spans_of(assessments: Mapping[Key, Assessment], step_ns: int) -> tuple[StateSpan, ...]:
+    """States of every component and side as spans without gaps."""
+    out = []
+    for (component, side), assessment in assessments.items():
+        codes = assessment.states
+        cut = np.flatnonzero(np.r_[True, codes[1:] != codes[:-1]])
+        for a, b in zip(cut, np.r_[cut[1:], codes.size], strict=True):
+            state = STATES[int(codes[a])]
+            out.append(
+                StateSpan(
+                    component=component,
+                    side="sensor" if side == "sensor" else "actuator",
+                    state=state,
+                    start_s=float(a) * step_ns * 1e-9,
+                    stop_s=float(b) * step_ns * 1e-9,
+                    reason=assessment.reasons.get(state, ""),
+                )
+            )
+    return tuple(out)
+
+
+@dataclass(frozen=True)
+class Decision:
+    """The verdict and what to do."""
+
+    status: Verdict
+    title: str
+    text: str
+    caveats: tuple[str, ...]
+    actions: tuple[dict[str, object], ...]
+
+
+def decide(
+    intervals: Sequence[FaultInterval],
+    assessments: Mapping[Key, Assessment],
+    decided_s: Mapping[Key, float],
+    axles: Sequence[str],
+    limits: Limits,
+    damage: Sequence[str],
+) -> Decision:
+    """Give the verdict.
+
+    ``stop`` with a fault of high severity, ``watch`` with one of low or medium; without faults ``ready`` only where
+    every wheel and side was decided for `min_assessed` seconds of driving and the log lost nothing, else
+    ``not_assessed``.
+
+    Parameters
+    ----------
+    intervals : Sequence[FaultInterval]
+        Faults.
+    assessments : Mapping
+        By (component, side).
+    decided_s : Mapping
+        Seconds of driving in which the component and side was healthy or faulty rather than undecided.
+    axles : Sequence[str]
+        Steering axles.
+    limits : Limits
+        What ``ready`` needs.
+    damage : Sequence[str]
+        What the log lost.
+    """
+    short = [k for k in assessments if k[0] not in axles and decided_s.get(k, 0.0) < limits.min_assessed]
+    caveats = _caveats(short, assessments, decided_s, axles, limits, damage)
+    actions = _actions(intervals)
+    worst = intervals[0].severity if intervals else None
+    stop = [f for f in intervals if f.severity == "high"]
+    watch = [f for f in intervals if f.severity in ("medium", "low")]
+    if worst == "high":
+        title = f"{_count(len(stop), 'fault')} to repair" + (f", {len(watch)} to watch" if watch else "")
+        return Decision("stop", title, _sentence(stop), caveats, actions)
+    if watch:
+        return Decision("watch", f"{_count(len(watch), 'fault')} to watch", _sentence(watch), caveats, actions)
+    if short:
+        who = _join(sorted({part_words("wheel", c, s) for c, s in short}))
+        text = f"No fault was found, but {who} could not be judged long enough to say that they are healthy."
+        return Decision("not_assessed", "Not assessed", text, caveats, actions)
+    if damage:
+        return Decision(
+            "watch", "No fault found in a damaged log", "Parts of the log are lost: " + damage[0], caveats, actions
+        )
+    least = min((decided_s[k] for k in assessments if k[0] not in axles), default=0.0)
+    text = f"Every wheel's speed sensor and drive valve was judged healthy over at least {least:.0f} s of driving."
+    return Decision("ready", "No fault found", text, caveats, actions)
+
+
+def _caveats(
+    short: Sequence[Key],
+    assessments: Mapping[Key, Assessment],
+    decided_s: Mapping[Key, float],
+    axles: Sequence[str],
+    limits: Limits,
+    damage: Sequence[str],
+) -> tuple[str, ...]:
+    out = []
+    if damage:
+        out.append(f"The log is damaged: {damage[0]}" + (f" (and {len(damage) - 1} more)" if len(damage) > 1 else ""))
+    for key in short:
+        reason = _main_reason(assessments[key])
+        out.append(
+            f"{part_words('wheel', *key)}: judged for {decided_s.get(key, 0.0):.1f} s of driving, of "
+            f"{limits.min_assessed:g} s needed" + (f" ({reason})" if reason else "") + "."
+        )
+    unjudged = [k for k in assessments if k[0] in axles and assessments[k].tier == "none"]
+    if unjudged:
+        who = _join([part_words("steer", *k) for k in unjudged])
+        out.append(f"Not assessed: {who} ({_main_reason(assessments[unjudged[0]])}).")
+    return tuple(out)
+
+
+def _main_reason(assessment: Assessment) -> str:
+    """Reason of the commonest state that is no judgement."""
+    best, most = "", 0
+    for state, reason in assessment.reasons.items():
+        if state is State.HEALTHY or state in FAULT_STATES:
+            continue
+        count = int(np.count_nonzero(assessment.states == STATES.index(state)))
+        if count > most:
+            best, most = reason, count
+    return best
+
+
+def _actions(intervals: Sequence[FaultInterval]) -> tuple[dict[str, object], ...]:
+    """One action per component, side and mode, worst first."""
+    groups: dict[tuple[str, str, str, str], list[FaultInterval]] = {}
+    for f in intervals:
+        if f.severity != "info":
+            groups.setdefault((f.kind, f.component, f.side.value, f.mode.value), []).append(f)
+    out: list[dict[str, object]] = []
+    for (kind, component, side, mode), faults in groups.items():
+        total = sum(f.stop_s - f.start_s for f in faults)
+        times = "" if len(faults) == 1 else f" in {len(faults)} spells"
+        text = f"{part_words(kind, component, side)} {mode_words(side, mode)} for {_seconds(total)}{times}: {faults[0].advice}"
+        out.append({"n": len(out) + 1, "text": text, "faults": [f.id for f in faults], "severity": faults[0].severity})
+    return tuple(out)
+
+
+def _sentence(faults: Sequence[FaultInterval]) -> str:
+    shown = [
+        f"the {part_words(f.kind, f.component, f.side.value)} was {mode_words(f.side.value, f.mode.value)} for "
+        f"{_seconds(f.stop_s - f.start_s)}"
+        for f in faults[:3]
+    ]
+    text = _join(shown)
+    more = f"; {len(faults) - 3} more are listed below" if len(faults) > 3 else ""
+    return text[0].upper() + text[1:] + more + "."
+
+
+def _seconds(value: float) -> str:
+    return f"{value * 1e3:.0f} ms" if value < 1 else f"{value:.1f} s"
+
+
+def _count(n: int, word: str) -> str:
+    return f"{n} {word}" + ("" if n == 1 else "s")
+
+
+def _join(words: Sequence[str]) -> str:
+    return words[0] if len(words) == 1 else ", ".join(words[:-1]) + " and " + words[-1] if words else ""

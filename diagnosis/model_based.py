@@ -1,0 +1,325 @@
+"""Model evidence: a wheel judged by its valve command and speed alone, or with one of them measured twice."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from diagnosis import wheel_filter as wf
+from diagnosis.assessment import CODE, Assessment, Finding
+from diagnosis.noise import rounding_step, slow_mismatch, white_noise
+from diagnosis.result import Epsilon, Hypothesis, Sat
+from replay.faults import FaultMode, Side, State
+from replay.machine import Limits, Noise, WheelPlant
+
+Array = NDArray[np.float64]
+
+_TEMPER = 0.1
+_MEAN_HEALTHY_S = 60.0
+_RUN_IN_S = 2.0
+
+
+@dataclass(frozen=True)
+class WheelData:
+    """One wheel's channels; shapes (n,).
+
+    Attributes
+    ----------
+    y, u : Array
+        Measured speed [m/s] and valve opening [fraction] in force since the step before, the measured one where
+        logged.
+    common : Array
+        Load shared with the other wheels, as a speed [m/s].
+    slack : Array
+        Error of the wheel model beyond the load [m/s]; 0 where it holds.
+    status : NDArray[np.int8]
+        As in `diagnosis.modes`.
+    quiet : NDArray[np.bool_]
+        Where the wheel is neither commanded nor moving.
+    u_measured : bool
+        Whether `u` is the measured opening, so that the valve is judged elsewhere.
+    """
+
+    y: Array
+    u: Array
+    common: Array
+    slack: Array
+    status: NDArray[np.int8]
+    quiet: NDArray[np.bool_]
+    u_measured: bool
+    dt: float
+    span: float
+    noise: Noise
+    names: tuple[str, str]
+
+
+def filter_model(data: WheelData, plant: WheelPlant, residual: Array) -> wf.WheelFilterModel:
+    """Constants of the filter: noise and load are found from the mission."""
+    pair = data.status == 1
+    fresh = data.y[pair]
+    period = data.dt * (float(np.median(np.diff(np.flatnonzero(pair)[:20_000]))) if fresh.size > 1 else 1.0)
+    lsb = data.noise.lsb if data.noise.lsb is not None else rounding_step(fresh)
+    white = data.noise.std or float(np.nan_to_num(white_noise(fresh, period)))
+    noise = max(white, lsb / np.sqrt(12), 1e-4 * data.span)
+    load = slow_mismatch(residual - data.common, pair & ~data.quiet, data.dt)
+    return wf.WheelFilterModel(
+        K=plant.K,
+        tau=plant.tau,
+        noise=noise,
+        constant_noise=max(lsb / np.sqrt(12), noise / 50),
+        load=max(float(np.nan_to_num(load)), noise, 0.02 * data.span),
+        load_s=3.0,
+        span=data.span,
+        valve_span=0.15 if data.span < 1.5 * plant.K else 0.5 * data.span / plant.K,
+        switch_cost=float(np.log(_MEAN_HEALTHY_S / period * 8)),
+        dt=data.dt,
+    )
+
+
+def assess_wheel(
+    data: WheelData, plant: WheelPlant, residual: Array, limits: Limits, *, gains: bool
+) -> tuple[Assessment, Assessment]:
+    """Judge sensor and actuator of a wheel by its model.
+
+    Parameters
+    ----------
+    data : WheelData
+        Channels.
+    plant : WheelPlant
+        Wheel model.
+    residual : Array, shape (n,)
+        y − K·lowpass(u) [m/s].
+    limits : Limits
+        What counts.
+    gains : bool
+        Whether the model is good enough to judge gains and the valve by.
+
+    Returns
+    -------
+    tuple[Assessment, Assessment]
+        Sensor and actuator.
+    """
+    model = filter_model(data, plant, residual)
+    path = wf.most_probable(data.y, data.u, data.common, data.slack, data.status, data.quiet, model)
+    findings: list[Finding] = []
+    doubtful = np.zeros(data.y.size, dtype=np.bool_)
+    for start, stop, kind in _runs(path, data, model):
+        finding = _judge(start, stop, kind, data, model, limits, gains)
+        if finding is None:
+            continue
+        if _holds(finding, data, limits):
+            findings.append(finding)
+        else:
+            doubtful[start:stop] = True
+    sensor = [f for f in findings if f.side in (Side.SENSOR, Side.SENSOR_OR_ACTUATOR)]
+    actuator = [f for f in findings if f.side in (Side.ACTUATOR, Side.SENSOR_OR_ACTUATOR)]
+    base = np.where(data.quiet, CODE[State.NOT_EXCITED], CODE[State.HEALTHY]).astype(np.int8)
+    base[~np.isfinite(data.y) & (data.status != 2)] = CODE[State.NO_DATA]
+    states_s, states_a = base.copy(), base.copy()
+    states_a[~np.isfinite(data.u)] = CODE[State.NO_DATA]
+    states_s[(doubtful | (not gains)) & (states_s == CODE[State.HEALTHY])] = CODE[State.NOT_ASSESSED]
+    blind = doubtful | (not gains) | (data.slack > 0)
+    states_a[blind & (states_a == CODE[State.HEALTHY])] = CODE[State.NOT_ASSESSED]
+    for f in sensor:
+        states_s[f.start : f.stop] = CODE[State(f.mode.value)]
+        if f.side is Side.SENSOR and f.mode in (FaultMode.STUCK, FaultMode.NO_SIGNAL):
+            states_a[f.start : f.stop] = CODE[State.MASKED]
+    for f in actuator:
+        states_a[f.start : f.stop] = CODE[State(f.mode.value)]
+    reasons = {
+        State.NOT_EXCITED: "the wheel is neither commanded nor moving",
+        State.MASKED: "the speed sensor that would show it delivers nothing usable",
+        State.NOT_ASSESSED: "the wheel model does not hold here (too uncertain, or the pump at its limit), or no single fault explains it",
+        State.NO_DATA: "no samples",
+    }
+    v, var, g, g_var, b, b_var = path.track
+    series = {
+        "residual": np.where(data.status == 1, data.y - v, np.nan),
+        "threshold": 3 * np.sqrt(var + model.noise**2),
+        "expected": v,
+    }
+    on_sensor = (path.model >= wf.S_STUCK) & (path.model <= wf.S_WHITE_25)
+    on_actuator = path.model >= wf.A_GAIN
+    per_side = []
+    for mine in (on_sensor, on_actuator):
+        per_side.append(
+            {
+                **series,
+                "delta": np.where(mine, g, 1.0),
+                "delta_std": np.sqrt(np.where(mine, g_var, 0.0)),
+                "delta_bar": np.where(mine, b, 0.0),
+                "delta_bar_std": np.sqrt(np.where(mine, b_var, 0.0)),
+            }
+        )
+    per_side[1]["delta_bar"] = per_side[1]["delta_bar"] / model.K
+    per_side[1]["delta_bar_std"] = per_side[1]["delta_bar_std"] / model.K
+    note = (
+        f"{data.names[0]} by the wheel model with {data.names[1]}: noise {model.noise:.2g} m/s, load and model error "
+        f"{model.load:.2g} m/s, K {model.K:.3g} m/s per full opening, τ {model.tau:.2g} s."
+    )
+    return (
+        Assessment(states_s, reasons, tuple(sensor), per_side[0], "model", (note,)),
+        Assessment(states_a, reasons, tuple(actuator), per_side[1], "model", (note,)),
+    )
+
+
+def _holds(finding: Finding, data: WheelData, limits: Limits) -> bool:
+    """Whether a finding may be stated: probable enough, and a valve's not resting on a model in doubt."""
+    if finding.probability < limits.min_probability and finding.tier != "signal":
+        return False
+    if finding.side is Side.SENSOR:
+        return True
+    in_doubt = float(np.mean(data.slack[finding.start : finding.stop] > 0))
+    possible = finding.epsilon is None or (finding.epsilon.high > 0 and finding.epsilon.low < 1.2)
+    return in_doubt < 0.3 and possible
+
+
+def _runs(path: wf.WheelPath, data: WheelData, model: wf.WheelFilterModel) -> list[tuple[int, int, int]]:
+    """Faulty runs (start, stop, model); short ones join a longer faulty neighbour, quiet ends are cut."""
+    rows = wf.ROW[path.model]
+    anew = path.entered & np.isin(rows, (1, 3, 5, 6))
+    cut = np.flatnonzero(np.r_[True, (rows[1:] != rows[:-1]) | anew[1:]])
+    runs = [[int(a), int(b), int(path.model[b - 1])] for a, b in zip(cut, np.r_[cut[1:], rows.size], strict=True)]
+    short = max(3, round(0.05 / data.dt))
+    runs = _episodes(runs, round(0.1 / data.dt))
+    k = 0
+    while k < len(runs):
+        a, b, m = runs[k]
+        if m != wf.HEALTHY and b - a < short:
+            near = [j for j in (k + 1, k - 1) if 0 <= j < len(runs) and runs[j][2] != wf.HEALTHY]
+            near = [j for j in near if runs[j][1] - runs[j][0] >= short]
+            if near:
+                j = near[0]
+                runs[min(j, k) : max(j, k) + 1] = [[min(a, runs[j][0]), max(b, runs[j][1]), runs[j][2]]]
+                k = max(0, min(j, k) - 1)
+                continue
+        k += 1
+    out = []
+    for a, b, m in runs:
+        if m == wf.HEALTHY:
+            continue
+        keep = np.flatnonzero(~data.quiet[a:b] | (data.status[a:b] == 2))
+        if m in (wf.S_STUCK, wf.S_DRIFT, wf.S_WHITE_3, wf.S_WHITE_8, wf.S_WHITE_25, wf.A_STUCK):
+            out.append((a, b, m))
+        elif keep.size:
+            out.append((a + int(keep[0]), a + int(keep[-1]) + 1, m))
+    return out
+
+
+def _episodes(runs: list[list[int]], gap: int) -> list[list[int]]:
+    """Join valve faults that follow each other within `gap` samples; which row they are is judged as a whole."""
+    out: list[list[int]] = []
+    for a, b, m in runs:
+        if m >= wf.A_GAIN:
+            if out and out[-1][2] >= wf.A_GAIN:
+                longer = out[-1][2] if out[-1][1] - out[-1][0] >= b - a else m
+                out[-1] = [out[-1][0], b, longer]
+                continue
+            if len(out) > 1 and out[-1][2] == wf.HEALTHY and out[-1][1] - out[-1][0] < gap and out[-2][2] >= wf.A_GAIN:
+                out.pop()
+                longer = out[-1][2] if out[-1][1] - out[-1][0] >= b - a else m
+                out[-1] = [out[-1][0], b, longer]
+                continue
+        out.append([a, b, m])
+    return out
+
+
+def _judge(
+    start: int, stop: int, kind: int, data: WheelData, model: wf.WheelFilterModel, limits: Limits, gains: bool
+) -> Finding | None:
+    """Turn a run into a finding with the alternatives' probabilities; None where it does not hold."""
+    begin = max(0, start - round(_RUN_IN_S / data.dt))
+    part = slice(begin, stop)
+    evidence, z, P = wf.segment_evidence(
+        data.y[part],
+        data.u[part],
+        data.common[part],
+        data.slack[part],
+        data.status[part],
+        data.quiet[part],
+        start - begin,
+        model,
+    )
+    if evidence[kind] - evidence[wf.HEALTHY] < model.switch_cost:
+        return None
+    prior = np.log(np.where(np.arange(wf.MODELS) == wf.HEALTHY, 0.6, 0.05))
+    if data.u_measured:
+        prior[wf.A_GAIN :] = -50.0  # the valve is judged by its own measurement
+    tempered = prior + np.clip(_TEMPER * (evidence - evidence.max()), -700, 0)
+    p = np.exp(tempered - tempered.max())
+    p /= p.sum()
+    pooled: dict[tuple[str, str], float] = {}
+    for name, q in zip(wf.NAMES, p, strict=True):
+        pooled[name] = pooled.get(name, 0.0) + float(q)
+    ranked = sorted(pooled.items(), key=lambda item: -item[1])
+    (side_name, mode_name), probability = ranked[0]
+    if mode_name == "healthy":
+        return None
+    side = Side(side_name)
+    if probability < limits.min_probability:
+        other = Side.ACTUATOR if side is Side.SENSOR else Side.SENSOR
+        both = probability + pooled.get((other.value, mode_name), 0.0)
+        if both >= limits.min_probability and mode_name == "inefficient":
+            side, probability = Side.SENSOR_OR_ACTUATOR, both
+    m = int(np.argmax(np.where([n == (side_name, mode_name) for n in wf.NAMES], evidence, -np.inf)))
+    if not gains and m not in (wf.S_STUCK, wf.S_NONE, wf.S_WHITE_3, wf.S_WHITE_8, wf.S_WHITE_25):
+        return None
+    use = data.status[start:stop] == 1
+    y = data.y[start:stop][use]
+    epsilon, sat = _estimate(m, y, z[m], P[m], model)
+    if m == wf.A_STUCK and sat is not None and abs(sat.mean) < max(limits.min_sat, 2 * model.load / model.K):
+        m, mode_name = wf.A_NONE, "no_signal"
+    if epsilon is not None and m in (wf.S_GAIN, wf.A_GAIN) and epsilon.value < limits.min_epsilon:
+        return None
+    if data.u_measured and side is not Side.SENSOR:
+        return None
+    seconds = (stop - start) * data.dt
+    lines = [
+        f"Over {seconds:.3f} s the model “{side_name} {mode_name.replace('_', ' ')}” explains {data.names[0]} better than "
+        f"a healthy wheel by a log-evidence of {evidence[m] - evidence[wf.HEALTHY]:.0f}; a fault is considered from "
+        f"{model.switch_cost:.0f}."
+    ]
+    if m in (wf.S_STUCK, wf.S_NONE) and y.size:
+        lines.append(f"{data.names[0]} stayed within {float(np.ptp(y)):.2g} m/s of {float(np.mean(y)):.4g} m/s.")
+    second = next((item for item in ranked[1:] if item[0][1] != "healthy"), None)
+    if second is not None and second[1] >= 0.005:
+        lines.append(f"Next best: {second[0][0]} {second[0][1].replace('_', ' ')} with {100 * second[1]:.1f} %.")
+    if side is Side.SENSOR_OR_ACTUATOR:
+        lines.append("Without a second measurement a loss of gain of the sensor and of the valve look alike here.")
+    return Finding(
+        start=start,
+        stop=stop,
+        side=side,
+        mode=FaultMode(mode_name),
+        probability=min(1.0, probability),
+        hypotheses=tuple(Hypothesis(s, n, q) for (s, n), q in ranked if q >= 5e-4),
+        epsilon=epsilon,
+        sat=sat,
+        evidence=tuple(lines),
+        tier="signal" if m in (wf.S_STUCK, wf.S_NONE) else "model",
+    )
+
+
+def _estimate(m: int, y: Array, z: Array, P: Array, model: wf.WheelFilterModel) -> tuple[Epsilon | None, Sat | None]:
+    """ε̂ and the saturation term of a model from its state at the end of the run."""
+    g, g_std = float(z[1]), float(np.sqrt(max(P[1, 1], 0.0)))
+    if m in (wf.S_STUCK, wf.S_NONE):
+        if not y.size:
+            return Epsilon(1.0, 1.0, 1.0), None
+        level, rms = float(np.mean(y)), float(np.sqrt(np.mean(y**2)))
+        half = 1.96 * model.constant_noise
+        return Epsilon(1.0, 1.0, 1.0), Sat(level, rms, level - half, level + half, "m/s")
+    if m in (wf.S_GAIN, wf.A_GAIN):
+        return Epsilon(1 - g, 1 - g - 1.96 * g_std, 1 - g + 1.96 * g_std), None
+    if m in (wf.A_STUCK, wf.A_NONE):
+        level = float(z[2]) / model.K if m == wf.A_STUCK else 0.0
+        half = 1.96 * float(np.sqrt(max(P[2, 2], 0.0))) / model.K
+        return Epsilon(1.0, 0.0, 1.0), Sat(level, abs(level), level - half, level + half, "of full opening")
+    if m == wf.A_BIAS:
+        eps = max(1 - g, 0.05)
+        level, half = float(z[2]) / model.K, 1.96 * float(np.sqrt(max(P[2, 2], 0.0))) / model.K
+        bounds = Epsilon(1 - g, 1 - g - 1.96 * g_std, 1 - g + 1.96 * g_std)
+        return bounds, Sat(level / eps, abs(level) / eps, (level - half) / eps, (level + half) / eps, "of full opening")
+    return None, None

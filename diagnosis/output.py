@@ -1,0 +1,113 @@
+"""Write a result: `report.html`, `report.json` and `report.parquet`, from which the page can be made again."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import orjson
+import pyarrow as pa
+import pyarrow.parquet as pq
+from numpy.typing import NDArray
+
+from diagnosis.report.page import build_page
+from diagnosis.result import SCHEMA, MissionResult
+from replay.errors import LogError, OutputError
+from replay.files import atomic_path
+
+HTML, JSON, PARQUET = "report.html", "report.json", "report.parquet"
+
+
+def write_result(result: MissionResult, folder: Path, *, max_size_mb: float = 15.0) -> tuple[Path, ...]:
+    """Write the three files of a result, each under a temporary name first.
+
+    Parameters
+    ----------
+    result : MissionResult
+        From `diagnosis.pipeline.diagnose`.
+    folder : Path
+        Where to; made if absent.
+    max_size_mb : float
+        Size the page should keep to [MB].
+
+    Returns
+    -------
+    tuple[Path, ...]
+        ``report.html``, ``report.json``, ``report.parquet``.
+
+    Raises
+    ------
+    OutputError
+        Where the folder cannot be written.
+    """
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise OutputError(
+            f"{folder}: cannot make the folder ({error.strerror or error}); give another with -o"
+        ) from error
+    columns = {k: v if k == "t" else np.asarray(v, dtype=np.float32) for k, v in result.columns.items()}
+    with atomic_path(folder / PARQUET) as temporary:
+        pq.write_table(pa.table(columns), temporary, compression="zstd", use_dictionary=False)
+    with atomic_path(folder / JSON) as temporary:
+        temporary.write_bytes(orjson.dumps(result.report, option=orjson.OPT_INDENT_2))
+    _write_page(result.report, columns, folder / HTML, max_size_mb)
+    return folder / HTML, folder / JSON, folder / PARQUET
+
+
+def rebuild(path: Path, *, max_size_mb: float = 15.0) -> Path:
+    """Make ``report.html`` again from a saved result, without the log.
+
+    Parameters
+    ----------
+    path : Path
+        A result's folder or its ``report.json``.
+    max_size_mb : float
+        Size the page should keep to [MB].
+
+    Raises
+    ------
+    LogError
+        Where the saved result is missing or not one of this tool.
+    """
+    folder = path if path.is_dir() else path.parent
+    report = load_report(folder / JSON if path.is_dir() else path)
+    try:
+        table = pq.read_table(folder / PARQUET)
+    except (OSError, pa.ArrowException) as error:
+        raise LogError(
+            f"{folder / PARQUET}: cannot be read ({error}); run `mfhca diagnose` on the log again"
+        ) from error
+    columns = {name: table.column(name).to_numpy() for name in table.column_names}
+    _write_page(report, columns, folder / HTML, max_size_mb)
+    return folder / HTML
+
+
+def load_report(path: Path) -> dict[str, Any]:
+    """Read a ``report.json``.
+
+    Raises
+    ------
+    LogError
+        Where it is missing or not one of this tool.
+    """
+    try:
+        report = orjson.loads(path.read_bytes())
+    except OSError as error:
+        raise LogError(f"{path}: cannot be read ({error.strerror or error})") from error
+    except orjson.JSONDecodeError as error:
+        raise LogError(f"{path}: not JSON ({error}); expected a report.json of `mfhca diagnose`") from error
+    if not isinstance(report, dict) or report.get("schema") != SCHEMA:
+        found = report.get("schema") if isinstance(report, dict) else type(report).__name__
+        raise LogError(f"{path}: schema {found!r} found, {SCHEMA!r} expected; run `mfhca diagnose` on the log again")
+    return report
+
+
+def _write_page(
+    report: Mapping[str, Any], columns: Mapping[str, NDArray[np.floating]], path: Path, size: float
+) -> None:
+    page = build_page(report, columns, max_size_mb=size)
+    with atomic_path(path) as temporary:
+        temporary.write_text(page, encoding="utf-8")

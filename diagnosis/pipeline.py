@@ -1,0 +1,201 @@
+"""The whole flow: files → signals → timeline → replayed loop → evidence → faults → result."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from diagnosis import metrics, quality
+from diagnosis.assessment import Assessment
+from diagnosis.components import ComponentResult, assess_components
+from diagnosis.decide import Decision, decide, intervals_of, spans_of
+from diagnosis.result import SCHEMA, FaultInterval, MissionResult, to_json
+from replay.columns import replay_columns
+from replay.errors import ConfigError, NotJudged
+from replay.loop import Replay, replay_loop
+from replay.machine import Machine
+from replay.mission import Mission, load_mission
+from replay.version import __version__
+
+Array = NDArray[np.float64]
+
+
+def _silent(_: str) -> None:
+    return
+
+
+def diagnose(
+    paths: Sequence[Path],
+    machine: Machine,
+    *,
+    machine_source: str = "paper defaults",
+    start_s: float | None = None,
+    stop_s: float | None = None,
+    wheels: Sequence[str] | None = None,
+    machine_id: str | None = None,
+    progress: Callable[[str], None] = _silent,
+) -> MissionResult:
+    """Diagnose one mission.
+
+    Parameters
+    ----------
+    paths : Sequence[Path]
+        The mission's files; several are put on one clock by their stamps.
+    machine : Machine
+        The machine.
+    machine_source : str
+        Where the machine's settings come from, for the report.
+    start_s, stop_s : float or None
+        Part of the mission to judge [s].
+    wheels : Sequence[str] or None
+        Wheels to judge; None: all.
+    machine_id : str or None
+        Identity for trends; None: the machine file's.
+    progress : Callable[[str], None]
+        Told what is being done.
+
+    Raises
+    ------
+    LogError
+        Where a file cannot be read.
+    NotJudged
+        Where nothing in the log can be judged.
+    ConfigError
+        Where `wheels` names no wheel of the machine.
+    """
+    chosen = tuple(machine.wheels if wheels is None else wheels)
+    for wheel in chosen:
+        if wheel not in machine.wheels:
+            raise ConfigError(f"--wheel {wheel}: no such wheel; the machine has {', '.join(machine.wheels)}")
+    mission = load_mission(paths, machine, start_s=start_s, stop_s=stop_s, progress=progress)
+    progress("replaying the loop")
+    replay = replay_loop(mission.timeline, machine)
+    found = assess_components(mission.timeline, replay, machine, chosen, progress)
+    _require_something(found.assessments, mission, machine)
+    progress("deciding")
+    return _result(mission, machine, replay, found, machine_source, machine_id)
+
+
+def _require_something(assessments: Mapping[tuple[str, str], Assessment], mission: Mission, machine: Machine) -> None:
+    """Raise where no side of any component has any evidence."""
+    if any(a.tier != "none" for a in assessments.values()):
+        return
+    speeds = [w for w in machine.wheels if f"wheel.{w}.v" in mission.signals.items]
+    names = ", ".join(str(f.path) for f in mission.files)
+    if not speeds:
+        raise NotJudged(
+            f"{names}: no wheel speed was found among its channels; run `mfhca channels` to see them, and name the wheels' "
+            "signals in a machine file's [signals]"
+        )
+    raise NotJudged(
+        f"{names}: wheel speeds are logged, but no valve command, no second speed and no commanded wheel speed beside "
+        "them, so nothing can be judged; log wheel.<W>.u or wheel.<W>.v_true, or name them in the machine file's [signals]"
+    )
+
+
+def _result(
+    mission: Mission,
+    machine: Machine,
+    replay: Replay,
+    found: ComponentResult,
+    machine_source: str,
+    machine_id: str | None,
+) -> MissionResult:
+    timeline = mission.timeline
+    moving = metrics.driving(replay, timeline, machine)
+    rows, decided = metrics.coverage(found.assessments, moving, machine, timeline.dt)
+    intervals = intervals_of(found.assessments, machine.axles, timeline.start_ns, timeline.step_ns, machine.limits)
+    damage = [text for f in mission.files for text in f.summary.damage]
+    notes = [text for f in mission.files for text in f.summary.notes]
+    decision = decide(intervals, found.assessments, decided, machine.axles, machine.limits, damage)
+    report: dict[str, Any] = {
+        "schema": SCHEMA,
+        "tool": {"name": "mfhca-replay", "version": __version__},
+        "log": _log(mission, moving, machine),
+        "machine": _machine(machine, machine_source, machine_id),
+        "readings": list(replay.readings),
+        "verdict": decision,
+        "intervals": list(intervals),
+        "states": list(spans_of(found.assessments, timeline.step_ns)),
+        "phases": metrics.phases(timeline, replay, machine),
+        "coverage": rows,
+        "metrics": metrics.loop_metrics(timeline, replay, machine, moving),
+        "signals": quality.signal_rows(mission.signals, timeline),
+        "missing": quality.missing_rows(mission.signals, machine),
+        "quality": quality.checks(mission.signals, timeline, damage, notes, found.assessments, found.wheel_model),
+        "limits": machine.limits,
+    }
+    columns: dict[str, Array] = dict(replay_columns(timeline, replay, machine))
+    for (component, side), assessment in found.assessments.items():
+        columns.update({f"evidence.{component}.{side}.{leaf}": x for leaf, x in assessment.columns.items()})
+    columns.update(metrics.path_of(timeline))
+    return MissionResult(report=to_json(_named_status(report)), columns=columns)
+
+
+def _named_status(report: dict[str, Any]) -> dict[str, Any]:
+    """Give the verdict's fields plain names."""
+    verdict: Decision = report["verdict"]
+    report["verdict"] = {
+        "status": verdict.status,
+        "title": verdict.title,
+        "text": verdict.text,
+        "caveats": list(verdict.caveats),
+        "actions": list(verdict.actions),
+    }
+    return report
+
+
+def _log(mission: Mission, moving: NDArray[np.bool_], machine: Machine) -> dict[str, Any]:
+    timeline = mission.timeline
+    speeds = [timeline.signals[n] for w in machine.wheels if (n := f"wheel.{w}.v") in timeline.signals]
+    distance = float("nan")
+    if speeds:
+        counted = np.isfinite(speeds).sum(axis=0)
+        mean = np.nansum(np.abs(speeds), axis=0) / np.maximum(counted, 1)
+        distance = float(mean.sum()) * timeline.dt
+    return {
+        "files": [
+            {
+                "path": str(f.path),
+                "sha256": f.sha256,
+                "bytes": f.bytes,
+                "format": f.format,
+                "damage": list(f.summary.damage),
+                "notes": list(f.summary.notes),
+            }
+            for f in mission.files
+        ],
+        "start_ns": timeline.start_ns,
+        "duration_s": timeline.size * timeline.dt,
+        "rate_hz": 1e9 / timeline.step_ns,
+        "distance_m": distance,
+        "driving_s": float(np.count_nonzero(moving.any(axis=1))) * timeline.dt,
+    }
+
+
+def _machine(machine: Machine, source: str, machine_id: str | None) -> dict[str, Any]:
+    geometry = None
+    if machine.geometry is not None:
+        geometry = {
+            w: {"x": g.x, "y": g.y, "offset": g.offset, "axle": g.axle} for w, g in machine.geometry.wheels.items()
+        }
+    return {
+        "name": machine.name,
+        "id": machine_id or machine.id,
+        "wheels": list(machine.wheels),
+        "axles": list(machine.axles),
+        "geometry": geometry,
+        "source": source,
+    }
+
+
+def faults_of(result: MissionResult) -> list[Mapping[str, Any]]:
+    """The faults of a result as plain mappings, worst first."""
+    return list(result.report["intervals"])
+
+
+__all__ = ["FaultInterval", "diagnose", "faults_of"]

@@ -1,0 +1,143 @@
+"""What the log offers and how good it is: signals, what is missing, and the effect on the verdict."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from diagnosis.assessment import Assessment
+from diagnosis.costs import cost_of_missing
+from diagnosis.noise import rounding_step
+from diagnosis.wheel_model import WheelModelFit
+from replay.machine import Machine
+from replay.signals import Signal, Signals
+from replay.timeline import Timeline, median_period
+
+_GAP_PERIODS = 5
+_UNITS = {"v": "m/s", "v_ref": "m/s", "v_true": "m/s", "omega": "rad/s", "yaw_rate": "rad/s", "speed": "m/s"}
+
+
+def unit_of(signal: str) -> str:
+    """SI unit of a canonical signal as shown."""
+    leaf = signal.rpartition(".")[2]
+    if leaf in _UNITS:
+        return _UNITS[leaf]
+    if leaf.startswith("pressure"):
+        return "Pa"
+    if leaf.startswith("phi") or signal == "odom.yaw":
+        return "rad"
+    if leaf in ("lat", "lon"):
+        return "deg"
+    return "m" if signal.startswith("odom.") else "of full opening"
+
+
+def signal_rows(signals: Signals, timeline: Timeline) -> list[dict[str, Any]]:
+    """One row per mapped signal: origin, rate, gaps, missing share, rounding step."""
+    rows = []
+    for name, signal in signals.items.items():
+        period = median_period(signal.stamps)
+        gaps, longest = _gaps(signal, period)
+        values = timeline.signals.get(name)
+        missing = 1.0 if values is None else float(np.mean(~np.isfinite(values)))
+        rows.append(
+            {
+                "name": name,
+                "channel": signal.origin.label,
+                "unit": unit_of(name),
+                "recorded_unit": signal.origin.unit,
+                "rate_hz": 1e9 / period if period else None,
+                "samples": int(signal.stamps.size),
+                "gaps": gaps,
+                "longest_gap_s": longest,
+                "missing_share": missing,
+                "lsb": rounding_step(signal.values),
+                "guessed": signal.guessed,
+                "source": signal.source,
+            }
+        )
+    return rows
+
+
+def _gaps(signal: Signal, period: int) -> tuple[int, float]:
+    if signal.stamps.size < 2:
+        return 0, 0.0
+    steps = np.diff(signal.stamps)
+    return int(np.count_nonzero(steps > _GAP_PERIODS * period)), float(steps.max()) * 1e-9
+
+
+def missing_rows(signals: Signals, machine: Machine) -> list[dict[str, str]]:
+    """Signals that would sharpen the diagnosis and are not in the log, with what that costs."""
+    rows = []
+    for name in machine.canonical_signals():
+        if name in signals.items:
+            continue
+        cost = cost_of_missing(name)
+        if cost:
+            rows.append({"name": name, "cost": cost})
+    return rows
+
+
+def checks(
+    signals: Signals,
+    timeline: Timeline,
+    damage: Sequence[str],
+    notes: Sequence[str],
+    assessments: Mapping[tuple[str, str], Assessment],
+    model: WheelModelFit | None,
+) -> list[dict[str, Any]]:
+    """Checks of the data with their effect on the verdict."""
+    rows: list[dict[str, Any]] = []
+
+    def row(check: str, result: str, effect: str = "none", ok: bool = True) -> None:
+        rows.append({"check": check, "result": result, "effect": effect, "ok": ok})
+
+    jitter = _jitter_ms(signals, timeline)
+    row(
+        "Sample rate",
+        f"{1e9 / timeline.step_ns:.4g} Hz, jitter {jitter:.3g} ms (99 %)",
+        "none" if jitter < timeline.step_ns * 2.5e-6 else "onsets are only as sharp as the jitter",
+        jitter < timeline.step_ns * 2.5e-6,
+    )
+    for text in damage:
+        row("Damage", text, "what is lost is not assessed; no “ready” from a damaged log", False)
+    gaps = {n: _gaps(s, median_period(s.stamps)) for n, s in signals.items.items() if not n.startswith("cmd.")}
+    worst = [n for n, (count, _) in gaps.items() if count]
+    if worst:
+        longest = max(gaps[n][1] for n in worst)
+        shown = ", ".join(worst[:4]) + (f" and {len(worst) - 4} more" if len(worst) > 4 else "")
+        row(
+            "Gaps",
+            f"{shown}: longest {longest:.3g} s",
+            "no samples there: no data, or no signal where only one channel is silent",
+            False,
+        )
+    else:
+        row("Gaps", "none longer than five sample periods")
+    guessed = [n for n, s in signals.items.items() if s.guessed]
+    if guessed:
+        row(
+            "Mapping",
+            f"{len(guessed)} of {len(signals.items)} signals were found by name",
+            "a wrong guess would mislead the diagnosis: check with `mfhca channels`, fix in [signals]",
+        )
+    if model is not None:
+        row(
+            "Wheel model", model.note, "none" if model.reliable else "gains and valves are not assessed", model.reliable
+        )
+    for text in dict.fromkeys((*signals.notes, *timeline.notes, *notes)):
+        row("Note", text, "see text")
+    for text in dict.fromkeys(note for a in assessments.values() for note in a.notes):
+        row("Evidence", text)
+    return rows
+
+
+def _jitter_ms(signals: Signals, timeline: Timeline) -> float:
+    """99 % quantile of |stamp step − period| over the wheel signals [ms]."""
+    out = 0.0
+    for name, signal in signals.items.items():
+        period = median_period(signal.stamps)
+        if name.startswith("wheel.") and 0 < period < 2 * timeline.step_ns and signal.stamps.size > 2:
+            out = max(out, float(np.quantile(np.abs(np.diff(signal.stamps) - period), 0.99)) * 1e-6)
+    return out
