@@ -44,6 +44,7 @@ class Row:
     band_scale: float = 1.0
     threshold: str | None = None
     limits: tuple[float, float] | None = None
+    clip: tuple[float, float] | None = None
     right_unit: str = ""
     component: str = ""
 
@@ -139,12 +140,12 @@ def fault_rows(fault: Mapping[str, Any], peers: Sequence[str], columns: Columns)
         Trace(applied, "applied", "applied"),
         *([Trace(expected, "expected", "expected")] if by_valve else []),
     ]
-    valve_row = _row(columns, "u", "Valve command", "fraction of full opening", valve)
+    valve_row = _row(columns, "u", "Valve command", "of full opening", valve)
     rows = _row(columns, "v", title, unit, motion)
     if side == "actuator":
         rows += valve_row
     for s in _sides(side):
-        rows += _side_rows(fault, s, ("fraction", 1.0) if by_valve else (unit, scale), columns)
+        rows += _side_rows(fault, s, ("of full opening", 1.0) if by_valve else (unit, scale), columns)
     if kind == "wheel":
         rows += _psi_row(c, columns)
     if side != "actuator":
@@ -162,7 +163,7 @@ def _side_rows(fault: Mapping[str, Any], side: str, residual_unit: tuple[str, fl
     of = f" ({side})" if fault["side"] == "sensor_or_actuator" else ""
     unit, scale = residual_unit
     natural = "rad" if fault["kind"] == "steer" else "m/s"
-    sat_unit = (fault.get("sat") or {}).get("unit") or (natural if side == "sensor" else "fraction")
+    sat_unit = (fault.get("sat") or {}).get("unit") or (natural if side == "sensor" else "of full opening")
     sat_scale = _DEG if sat_unit == "rad" else 1.0
     rows = _row(
         columns,
@@ -180,6 +181,7 @@ def _side_rows(fault: Mapping[str, Any], side: str, residual_unit: tuple[str, fl
         "1",
         [Trace(base + "epsilon", "estimate, 95 % band", "measured")],
         band=(base + "epsilon_low", base + "epsilon_high"),
+        clip=(-1.0, 2.0),
     )
     rows += _row(
         columns,
@@ -231,14 +233,14 @@ def loop_groups(wheels: Sequence[str], axles: Sequence[str], columns: Columns) -
         traces = [Trace(measured, "v measured", "measured", scale), Trace(commanded, "v_ref", "commanded", scale)]
         speed += _row(columns, "v", f"Speed {w}", unit, traces, component=w)
         valve = [Trace(f"wheel.{w}.u", "recorded", "measured"), Trace(f"replay.{w}.u", "replayed", "replayed")]
-        drive += _row(columns, "u", f"u_a {w}", "fraction of full opening", valve, component=w)
+        drive += _row(columns, "u", f"u_a {w}", "of full opening", valve, component=w)
         psi += _psi_row(w, columns, component=w)
     for a in axles:
         _, unit, scale, measured, commanded, _ = _motion(a, "steer", columns)
         traces = [Trace(measured, "φ measured", "measured", scale), Trace(commanded, "φ_c", "commanded", scale)]
         steering += _row(columns, "phi", f"φ {a}", unit, traces, component=a)
         valve = [Trace(f"steer.{a}.u", "recorded", "measured"), Trace(f"replay.{a}.u", "replayed", "replayed")]
-        steering += _row(columns, "u", f"u_s {a}", "fraction of full opening", valve, component=a)
+        steering += _row(columns, "u", f"u_s {a}", "of full opening", valve, component=a)
     groups = (
         Group("speed", "Wheel speeds", tuple(speed)),
         Group("drive", "Drive valves u_a", tuple(drive)),
@@ -266,6 +268,8 @@ def row_json(row: Row, index: Mapping[str, int]) -> dict[str, Any]:
         data["bandScale"] = row.band_scale
     if row.limits:
         data["limits"] = list(row.limits)
+    if row.clip:
+        data["clip"] = list(row.clip)
     if row.component:
         data["component"] = row.component
     if row.right_unit:

@@ -137,11 +137,13 @@
   addEventListener("beforeprint", () => {
     before = root.dataset.theme;
     root.dataset.theme = "light";
-    for (const f of [evidence, loop]) if (f?.drawn) Plotly.relayout(f.element, { ...f.layout(), width: 680, autosize: false });
+    evidence?.print(680);
+    loop?.print(680);
   });
   addEventListener("afterprint", () => {
     root.dataset.theme = before;
-    for (const f of [evidence, loop]) if (f?.drawn) Plotly.relayout(f.element, { width: null, autosize: true }).then(() => f.redraw());
+    evidence?.redraw();
+    loop?.redraw();
   });
 
   root.addEventListener("theme", themed);
@@ -151,9 +153,10 @@
   one("#theme").setAttribute("aria-pressed", String(root.dataset.theme === "dark"));
   fromAddress(false);
   if (loop) {
-    const seen = new IntersectionObserver((entries) => {
-      if (entries.some((e) => e.isIntersecting)) { seen.disconnect(); drawLoop(loopKey); }
-    }, { rootMargin: "300px" });
+    // Drawn when it comes near, or a little later so that it is there to be printed.
+    const begin = () => { seen.disconnect(); clearTimeout(later); drawLoop(loopKey); };
+    const seen = new IntersectionObserver((entries) => entries.some((e) => e.isIntersecting) && begin(), { rootMargin: "300px" });
+    const later = setTimeout(begin, 4000);
     seen.observe(one("#loop-figure"));
   }
   root.dataset.ready = "1";

@@ -61,13 +61,13 @@ def build_page(
     ValueError
         Where the columns differ in length or ``t`` is not uniform.
     """
-    report = names.made_visible(report)
+    report = tables.repaired(names.made_visible(report))
     cols = {names.visible(k): np.asarray(v) for k, v in columns.items()}
     start, step, samples = _time_axis(cols)
     faults: Sequence[Mapping[str, Any]] = report.get("intervals") or ()
     machine = report.get("machine") or {}
     wheels, axles = machine.get("wheels") or (), machine.get("axles") or ()
-    shown = derived(cols, faults) if samples else {}
+    shown = derived({k: v for k, v in cols.items() if np.isfinite(v).any()}, faults) if samples else {}
     figures = {
         f["id"]: fault_rows(f, axles if f["kind"] == "steer" else wheels, shown) if samples else () for f in faults
     }
@@ -108,7 +108,7 @@ def _time_axis(columns: Mapping[str, NDArray[np.floating]]) -> tuple[float, floa
     if wrong := next((k for k, v in columns.items() if v.shape != t.shape), None):
         raise ValueError(f"column {wrong!r} has shape {columns[wrong].shape}, but t has {t.shape}")
     step = float(t[-1] - t[0]) / (len(t) - 1)
-    if not step > 0 or np.abs(np.diff(t) - step).max() > 0.01 * step:
+    if not step > 0 or np.abs(t - (t[0] + step * np.arange(len(t)))).max() > 0.5 * step:
         raise ValueError("column 't' is not uniform; resample the columns first")
     return float(t[0]), step, len(t)
 

@@ -107,13 +107,13 @@ class Figure {
     return { text, lines };
   }
 
-  layout() {
+  layout(width) {
     const [text, muted, line, grid] = ["text", "muted", "line", "line2"].map(Figure.colour);
-    const panel = this.rows.length > 5 ? 104 : 128, foot = 44, headings = this.rows.map((r) => this.heading(r));
+    const panel = width ? 78 : this.rows.length > 5 ? 104 : 128, foot = 44, headings = this.rows.map((r) => this.heading(r));
     const heads = headings.map((h) => 15 + 16 * h.lines), plot = heads.reduce((sum, h) => sum + h + panel, 0), height = plot + foot;
     const last = this.rows.length;
     const layout = {
-      margin: { l: 56, r: this.rows.some((r) => r.rightUnit) ? 52 : 14, t: 0, b: foot }, height, autosize: true,
+      margin: { l: 56, r: this.rows.some((r) => r.rightUnit) ? 52 : 14, t: 0, b: foot }, height, width, autosize: !width,
       paper_bgcolor: "rgba(0,0,0,0)", plot_bgcolor: "rgba(0,0,0,0)", showlegend: false, dragmode: "zoom",
       font: { color: text, size: 12, family: getComputedStyle(document.body).fontFamily },
       hovermode: "x unified", hoversubplots: "axis", hoverlabel: { bgcolor: Figure.colour("surface"), bordercolor: line, font: { color: text } },
@@ -130,7 +130,7 @@ class Figure {
       const top = 1 - (down - panel) / plot, axis = `yaxis${i ? i + 1 : ""}`;
       layout[axis] = {
         domain: [Math.max(0, top - panel / plot), top], gridcolor: grid, zerolinecolor: line, fixedrange: true, nticks: 5, tickformat: ".4~g",
-        ...(row.limits ? { range: row.limits } : {}),
+        ...(row.limits ? { range: row.limits } : {}), ...(row.clip ? { autorangeoptions: { clipmin: row.clip[0], clipmax: row.clip[1] } } : {}),
       };
       if (row.rightUnit) layout[`yaxis${100 + i}`] = { overlaying: `y${i ? i + 1 : ""}`, side: "right", anchor: "x", showgrid: false, zeroline: false, fixedrange: true, nticks: 4, tickfont: { color: muted }, tickformat: ".3~g", title: { text: Figure.text(row.rightUnit), font: { size: 11, color: muted }, standoff: 2 } };
       layout.annotations.push({
@@ -179,6 +179,7 @@ class Figure {
       responsive: true, displaylogo: false, showSendToCloud: false, plotlyServerURL: "", doubleClick: false,
       modeBarButtonsToRemove: ["select2d", "lasso2d", "autoScale2d", "resetScale2d"],
     };
+    this.curves = curves;
     await Plotly.react(this.element, this.traces(curves), this.layout(), config);
     this.label(curves);
     if (!this.drawn) {
@@ -191,6 +192,9 @@ class Figure {
     }
     this.onRange?.(this.range);
   }
+
+  // The same curves at once, for paper of `width` pixels.
+  print(width) { if (this.drawn) Plotly.react(this.element, this.traces(this.curves), this.layout(width)); }
 
   redraw() { return this.drawn ? this.draw(this.rows, this.shades, this.range) : undefined; }
 
@@ -210,6 +214,7 @@ class Figure {
         this.again = false;
         const target = [...this.range], curves = await this.fetch(target);
         await Plotly.update(this.element, { x: curves.map((c) => c.x), y: curves.map((c) => c.y) }, { "xaxis.range": target });
+        this.curves = curves;
         this.label(curves);
       } while (this.again);
     } finally { this.busy = false; }

@@ -23,6 +23,7 @@ _GLYPHS = {
     "healthy": f'<path d="M2.2 6.3l2.6 2.7 5-5.6" {_LINE}/>',
     "warning": f'<path d="M6 2v4.6M6 9.6v.2" {_LINE}/>',
 }
+_MARKS = 24
 _UNKNOWN = f'<path d="M3.6 4a2.4 2.2 0 1 1 3.4 2c-.8.4-1 .8-1 1.4M6 10v.1" {_LINE}/>'
 
 
@@ -130,6 +131,8 @@ def path_picture(
 ) -> Markup:
     """Driven path coloured by fault, equal axes, with a scale bar; empty where no position is known.
 
+    The first faults are named on it.
+
     Parameters
     ----------
     x, y : NDArray[np.floating], shape (n,)
@@ -159,6 +162,8 @@ def path_picture(
         if not d:
             continue
         parts.append(Markup('<path class="leg {}" d="{}"/>').format(known(fault["mode"]), d))
+        if len(marks) >= _MARKS:
+            continue
         here = np.flatnonzero(good[a:b]) + a
         middle = int(here[len(here) // 2])
         marks.append((fault, [float(px[middle]), float(py[middle])]))
@@ -196,9 +201,7 @@ def _start_and_scale(x: float, y: float, scale: float, width: float, height: flo
 
 
 def _spread(points: list[list[float]], width: float, height: float) -> None:
-    """Push labels apart until none overlaps (in place); few enough points for a plain double loop."""
-    if len(points) > 60:
-        return
+    """Push labels apart until none overlaps (in place)."""
     for _ in range(120):
         moved = False
         for i, p in enumerate(points):

@@ -17,6 +17,24 @@ def machine_name(report: Mapping[str, Any]) -> str:
     return " · ".join(both) or "Unnamed machine"
 
 
+def repaired(report: Mapping[str, Any]) -> dict[str, Any]:
+    """Report without estimates that have no value: a null in ε̂, the saturation term or a probability."""
+
+    def complete(estimate: Any) -> Any:
+        return estimate if estimate and all(v is not None for v in estimate.values()) else None
+
+    faults = [
+        {
+            **f,
+            "epsilon": complete(f.get("epsilon")),
+            "sat": complete(f.get("sat")),
+            "hypotheses": [h for h in f.get("hypotheses") or () if h.get("p") is not None],
+        }
+        for f in report.get("intervals") or ()
+    ]
+    return {**report, "intervals": faults}
+
+
 def context(report: Mapping[str, Any], duration: float) -> dict[str, Any]:
     """Everything that the template shows as text.
 
@@ -49,7 +67,7 @@ def context(report: Mapping[str, Any], duration: float) -> dict[str, Any]:
         "coverage": _coverage(report),
         "metrics": _metrics(report.get("metrics") or {}),
         "signals": [_signal(s) for s in report.get("signals") or ()],
-        "missing": report.get("missing") or [],
+        "missing": _missing(report.get("missing") or ()),
         "quality": [{"ok": True, "effect": "", "result": "", "check": "", **q} for q in report.get("quality") or ()],
         "files": [_file(f) for f in log.get("files") or ()],
         "readings": [{"detail": "", "value": "", **r} for r in report.get("readings") or ()],
@@ -80,7 +98,6 @@ def _fault(fault: Mapping[str, Any]) -> dict[str, Any]:
         **fault,
         "advice": fault.get("advice") or "",
         "evidence": fault.get("evidence") or [],
-        "hypotheses": fault.get("hypotheses") or [],
         "tier": {"direct": "a second measurement", "model": "the wheel model", "signal": "the channel alone"}.get(
             fault.get("tier", ""), fault.get("tier", "")
         ),
@@ -168,6 +185,14 @@ def _signal(signal: Mapping[str, Any]) -> dict[str, Any]:
         "found": "guessed" if signal.get("guessed") else "given",
         "poor": bool(missing and missing > 0.01),
     }
+
+
+def _missing(rows: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
+    """Missing signals that cost the same stand in one row."""
+    names: dict[str, list[str]] = {}
+    for row in rows:
+        names.setdefault(row.get("cost") or "", []).append(row["name"])
+    return [{"names": n, "cost": cost} for cost, n in names.items()]
 
 
 def _gaps(signal: Mapping[str, Any]) -> str:

@@ -105,7 +105,8 @@ def _bar(fault: Mapping[str, Any], duration: float) -> Bar:
     left = 100 * fault["start_s"] / duration
     width = 100 * (fault["stop_s"] - fault["start_s"]) / duration
     mode = state_label(fault["mode"], fault["side"])
-    label = f"{fault['id']} {mode.lower()}" if width > 10 else fault["id"] if width > 2.4 else ""
+    words = f"{fault['id']} {mode.lower()}"
+    label = words if width > 10 else fault["id"] if width > 0.9 + 0.8 * len(fault["id"]) else ""
     times = f"{clock(fault['start_s'], 2)} to {clock(fault['stop_s'], 2)}"
     return Bar(fault["id"], known(fault["mode"]), left, width, label, f"{fault['id']}: {fault_title(fault)}, {times}")
 

@@ -14,9 +14,9 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
 from diagnosis.report.page import build_page
-from tests.report_samples import five_faults
+from tests.report_samples import FAULTS, PLACES, mission
 
-CASES = {"240 s at 1 kHz": (240.0, 1000.0), "1 h at 1 kHz": (3600.0, 1000.0)}
+CASES = {"240 s, one fault": (240.0, 1), "240 s, five faults": (240.0, 5), "1 h, five faults": (3600.0, 5)}
 
 
 def first_plot(path: Path) -> str:
@@ -45,13 +45,14 @@ def first_plot(path: Path) -> str:
 
 def main() -> None:
     folder = Path(sys.argv[1] if len(sys.argv) > 1 else tempfile.mkdtemp())
-    for name, (duration, rate) in CASES.items():
-        report, columns = five_faults(duration, rate)
+    for name, (duration, faults) in CASES.items():
+        wheels, axles = ["FR", "FL", "RR", "RL"], ["front", "rear"]
+        report, columns = mission(wheels, axles, FAULTS[:faults], duration=duration, rate=1000.0, geometry=PLACES)
         build_page({}, {})
         begin = time.perf_counter()
         text = build_page(report, columns)
         seconds = time.perf_counter() - begin
-        path = folder / f"{name.replace(' ', '-')}.html"
+        path = folder / f"{name.replace(' ', '-').replace(',', '')}.html"
         path.write_text(text, encoding="utf-8", newline="\n")
         print(
             f"{name}, {len(columns)} columns: {len(text.encode()) / 1e6:.2f} MB in {seconds:.2f} s; {first_plot(path)}"

@@ -31,7 +31,7 @@ def test_directly_measured_valve_is_compared_with_its_command() -> None:
     rows = {r.key: r for r in fault_rows(fault, WHEELS, derived(columns, [fault]))}
     assert "expected" in [t.role for t in rows["u"].traces]
     assert "expected" not in [t.role for t in rows["v"].traces]
-    assert rows["residual"].unit == "fraction"
+    assert rows["residual"].unit == "of full opening"
 
 
 def test_loss_and_its_bounds() -> None:

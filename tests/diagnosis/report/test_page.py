@@ -141,6 +141,20 @@ def test_parts_of_a_fault_may_be_null(key: str) -> None:
     assert "</html>" in build_page(report, columns)
 
 
+def test_estimates_without_a_value_are_left_out() -> None:
+    report, columns = samples.one_wheel()
+    report["intervals"][0]["epsilon"]["low"] = None
+    report["intervals"][0]["sat"]["mean"] = None
+    report["intervals"][0]["hypotheses"][0]["p"] = None
+    assert "drive speed sensor stuck" in Tree(build_page(report, columns)).text
+
+
+def test_time_axis_in_single_precision() -> None:
+    report, columns = samples.one_wheel()
+    columns["t"] = np.arange(12_000, dtype=np.float32) / np.float32(100)
+    assert "</html>" in build_page(report, columns)
+
+
 def test_caveats_stand_in_the_verdict() -> None:
     report, columns = samples.five_faults()
     text = build_page(report, columns)
@@ -163,7 +177,7 @@ def test_columns_must_fit_the_time_axis() -> None:
     with pytest.raises(ValueError, match="has shape"):
         build_page({}, {"t": np.arange(5.0), "wheel.FR.v": np.zeros(4)})
     with pytest.raises(ValueError, match="not uniform"):
-        build_page({}, {"t": np.array([0.0, 1.0, 3.0]), "wheel.FR.v": np.zeros(3)})
+        build_page({}, {"t": np.array([0.0, 1.0, 9.0]), "wheel.FR.v": np.zeros(3)})
 
 
 def test_own_bundle_of_plotly(tmp_path: Path) -> None:
