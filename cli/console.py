@@ -24,7 +24,7 @@ _PIPE_WIDTH = 120
 
 def clean(text: object) -> str:
     """One line of text that cannot steer the terminal: runs of control and direction marks become one space."""
-    return _HIDDEN.sub(" ", str(text)).strip()
+    return _HIDDEN.sub(" ", str(text))
 
 
 @dataclass
@@ -74,7 +74,7 @@ class Terminal:
     def _line(self, label: str, style: str, text: object) -> None:
         from rich.text import Text
 
-        line = Text.assemble((f"{label}:", style), " ", clean(text))
+        line = Text.assemble((f"{label}:", style), " ", clean(text).strip())
         _write(sys.stderr, _rendered(_console(sys.stderr), (line,), wrap=False))
 
     @contextmanager

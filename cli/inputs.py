@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import glob
 import math
+import re
 import sys
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
@@ -16,6 +17,7 @@ if TYPE_CHECKING:
     from replay.machine import Machine
 
 DEFAULT_MACHINE = "paper defaults"
+_PART = re.compile(r"_\d+\.(db3|mcap)$", re.IGNORECASE)
 LOG_ENDINGS = (".mcap", ".bag", ".db3", ".csv", ".csv.gz", ".txt", ".parquet")
 
 
@@ -33,7 +35,7 @@ def mission_paths(paths: Sequence[Path]) -> list[Path]:
     Raises
     ------
     LogError
-        Where one does not exist.
+        Where one does not exist, or is a folder of separate logs.
     ConfigError
         Where one is given twice.
     """
@@ -41,11 +43,26 @@ def mission_paths(paths: Sequence[Path]) -> list[Path]:
         if not path.exists():
             hint = "; give each file of the mission by its name" if glob.has_magic(str(path)) else ""
             raise LogError(f"{path}: no such file{hint}")
+        if path.is_dir():
+            _check_one_recording(path)
     real = [p.resolve() for p in paths]
     for i, path in enumerate(real):
         if path in real[:i]:
             raise ConfigError(f"{paths[i]}: given twice; give each file of the mission once")
     return list(paths)
+
+
+def _check_one_recording(folder: Path) -> None:
+    """Raise a `LogError` where a folder without rosbag2's description holds files that are no numbered parts."""
+    if (folder / "metadata.yaml").is_file():
+        return
+    parts = [p.name for p in folder.iterdir() if p.name.lower().endswith((".db3", ".mcap"))]
+    stems = {_PART.sub("", name) if _PART.search(name) else name for name in parts}
+    if len(stems) > 1:
+        raise LogError(
+            f"{folder}: is a folder of {len(parts)} logs, not one rosbag2 recording; give the files of one mission "
+            "by their names"
+        )
 
 
 def check_times(start: float | None, end: float | None) -> None:
@@ -129,7 +146,12 @@ def _logs_at(path: Path, found: FoundLogs) -> Iterator[Path]:
         if child.is_dir():
             if not child.is_symlink() and not child.name.startswith("."):
                 yield from _logs_at(child, found)
-        elif child.name.lower().endswith(LOG_ENDINGS) and not child.name.startswith("."):
+        elif child.name.lower().endswith(LOG_ENDINGS) and not child.name.startswith(".") and not _is_result(child):
             yield child
         else:
             found.left_aside += 1
+
+
+def _is_result(path: Path) -> bool:
+    """Whether a table is the saved result of a diagnosis."""
+    return path.name == "report.parquet" and path.with_name("report.json").is_file()

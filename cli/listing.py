@@ -1,8 +1,8 @@
-"""One log's contents for `mfhca inspect`."""
+"""One log's contents and timing for `mfhca inspect`."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from rich.text import Text
@@ -12,18 +12,66 @@ from cli.tables import bullets, table, text
 if TYPE_CHECKING:
     from rich.console import RenderableType
 
-    from replay.rawlog import LogSummary
+    from replay.inspect import InspectReport, TopicTiming
 
 
-def summary_parts(summary: LogSummary) -> list[RenderableType]:
-    """File, time, topics, damage and notes."""
-    span = (summary.stop_ns - summary.start_ns) * 1e-9
-    start = f", {np.datetime64(summary.start_ns, 'ms')} UTC, {span:.3f} s" if summary.stop_ns else ""
-    parts: list[RenderableType] = [Text.assemble(text(summary.source, "bold"), text(f"  {summary.format}{start}"))]
-    rows = [(t.name, t.type_name, f"{t.count}", text(t.note, "dim")) for t in summary.topics]
-    parts.append(table(("topic", "type", "count", ""), rows, right=(2,)))
-    if summary.damage:
-        parts += [text("Damage", "bold red"), bullets(summary.damage)]
-    if summary.notes:
-        parts += [text("Notes", "bold"), bullets(summary.notes)]
+def inspect_document(report: InspectReport) -> dict[str, Any]:
+    """Everything as JSON values."""
+    from diagnosis.result import to_json
+
+    document: dict[str, Any] = to_json(report)
+    return document | {"duration_s": report.duration_s}
+
+
+def inspect_parts(report: InspectReport) -> list[RenderableType]:
+    """File and time; a line per topic; what is unusual; damage and notes."""
+    when = "no stamps"
+    if report.stop_ns:
+        start = np.datetime64(report.start_ns, "ns").astype("M8[ms]")
+        when = f"{str(start).replace('T', ' ')} UTC, {report.duration_s:.3f} s"
+    parts: list[RenderableType] = [
+        Text.assemble(text(report.source, "bold"), "  ", text(report.format), ", ", text(when))
+    ]
+    parts.append(
+        table(
+            ("topic", "type", "count", "Hz", "jitter ms", "gaps", "header−log ms"),
+            [_row(t) for t in report.topics],
+            right=(2, 3, 4, 5, 6),
+        )
+    )
+    unusual = [f"{t.name}: {words}" for t in report.topics if (words := _unusual(t))]
+    for title, lines, style in (
+        ("Timing", unusual, "bold"),
+        ("Damage", report.damage, "bold red"),
+        ("Notes", report.notes, "bold"),
+    ):
+        if lines:
+            parts += [text(title, style), bullets(lines)]
     return parts
+
+
+def _row(topic: TopicTiming) -> tuple[object, ...]:
+    return (
+        topic.name,
+        text(topic.type_name.rpartition("/")[2], "dim"),
+        topic.count,
+        "–" if topic.rate_hz is None else f"{topic.rate_hz:.5g}",
+        "–" if topic.jitter_p99_s is None else f"{topic.jitter_p99_s * 1e3:.2g}",
+        topic.gaps or "–",
+        "–" if topic.offset_s is None else f"{topic.offset_s * 1e3:.3g}",
+    )
+
+
+def _unusual(topic: TopicTiming) -> str:
+    """What a user should know about a topic's stamps, or why it was not decoded."""
+    words = []
+    if topic.note:
+        words.append(topic.note)
+    if topic.gaps and topic.longest_gap_s is not None:
+        plural = "" if topic.gaps == 1 else "s"
+        words.append(f"{topic.gaps} gap{plural}, longest {topic.longest_gap_s:.3g} s")
+    if topic.backwards:
+        words.append(f"{topic.backwards} stamps go backwards")
+    if topic.duplicates:
+        words.append(f"{topic.duplicates} stamps repeat the one before")
+    return "; ".join(words)

@@ -45,11 +45,10 @@ def inspect(
     json: Json = False,
 ) -> None:
     """Show what logs hold: topics, types, counts, rates, gaps, clocks, damage."""
-    from cli.listing import summary_parts
-    from diagnosis.result import to_json
+    from cli.listing import inspect_document, inspect_parts
     from replay.errors import LogError, MfhcaError
+    from replay.inspect import inspect_log
     from replay.mission import source_options
-    from replay.readers.registry import summarise_log
 
     the_machine, _ = machine_of(machine)
     found = find_logs(paths)
@@ -60,16 +59,16 @@ def inspect(
     for path in found.paths:
         try:
             with terminal.progress(f"reading {path}"):
-                seen = summarise_log(path, source_options(path, the_machine))
+                seen = inspect_log(path, source_options(path, the_machine))
         except (MfhcaError, OSError) as error:
             text = str(error) if isinstance(error, LogError) else f"{path}: {error}"
             failures.append(text)
             terminal.error(text)
             continue
         if json:
-            documents.append(to_json(seen))
+            documents.append(inspect_document(seen))
         else:
-            terminal.show(*summary_parts(seen), "")
+            terminal.show(*inspect_parts(seen), "")
     if found.left_aside:
         terminal.note(f"{found.left_aside} other files in the folders are no logs by their names")
     if json:
@@ -89,8 +88,13 @@ def channels(terminal: Terminal, logs: Logs, machine: MachineFile = None, json: 
         files, signals = read_signals(paths, the_machine, progress=progress)
     if json:
         terminal.show_json(signals_document(files, signals, the_machine, source))
-    else:
-        terminal.show(*signals_parts(signals, the_machine))
+        return
+    from cli.tables import bullets, section
+
+    terminal.show(*signals_parts(signals, the_machine))
+    damage = [line for file in files for line in file.summary.damage]
+    if damage:
+        terminal.show(section("Damage"), bullets(damage))
 
 
 def signals_document(files: Sequence[MissionFile], signals: Signals, machine: Machine, source: str) -> dict[str, Any]:
@@ -99,7 +103,17 @@ def signals_document(files: Sequence[MissionFile], signals: Signals, machine: Ma
 
     return {
         "machine": {"name": machine.name, "source": source, "wheels": list(machine.wheels)},
-        "files": [{"path": str(f.path), "sha256": f.sha256, "bytes": f.bytes, "format": f.format} for f in files],
+        "files": [
+            {
+                "path": str(f.path),
+                "sha256": f.sha256,
+                "bytes": f.bytes,
+                "format": f.format,
+                "notes": list(f.summary.notes),
+                "damage": list(f.summary.damage),
+            }
+            for f in files
+        ],
         "signals": [_signal(s) for s in signals.items.values()],
         "missing": [
             {"name": name, "reason": reason, "cost": cost_of_missing(name)} for name, reason in signals.missing.items()

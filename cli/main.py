@@ -103,7 +103,7 @@ def _interrupted(terminal: Terminal) -> int:
 def _usage_error(terminal: Terminal, error: Exception) -> int:
     """Print help where no command was given, else what is off and where to read on."""
     context = getattr(error, "ctx", None)
-    message = str(error.format_message())  # type: ignore[attr-defined]
+    message = str(error.format_message()).replace("Value error, ", "")  # type: ignore[attr-defined]
     if type(error).__name__ == "NoArgsIsHelpError":
         typer.echo(message, err=True)
     else:

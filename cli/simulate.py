@@ -5,7 +5,7 @@ from __future__ import annotations
 import shlex
 from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
@@ -13,9 +13,6 @@ from cli.app import command
 from cli.console import Terminal
 from cli.options import Json
 from replay.errors import ConfigError
-
-if TYPE_CHECKING:
-    from replay.simulation.options import SimulatedMission
 
 EXAMPLES = """\b
 Examples:
@@ -142,14 +139,12 @@ def simulate(
         stem = log.name.removesuffix(_ENDINGS[kind])
         truth = log.with_name(f"{stem}.truth.json")
         write_truth(mission.truth, truth)
-        machine_file = _write_machine(mission, log.with_name(f"{stem}.machine.toml"), kind)
-    words = ["mfhca", "diagnose", str(log), *(["-m", str(machine_file)] if machine_file else [])]
+    words = ["mfhca", "diagnose", str(log)]
     if json:
         terminal.show_json(
             {
                 "log": str(log),
                 "truth": str(truth),
-                "machine_file": str(machine_file) if machine_file else None,
                 "faults": len(mission.truth.intervals),
                 "duration_s": mission.truth.duration_s,
                 "diagnose": words,
@@ -158,12 +153,11 @@ def simulate(
         return
     from cli.tables import key_values
 
+    count = len(mission.truth.intervals)
     rows = [
         ("log", f"{log}  ({kind.value}, {mission.truth.duration_s:g} s at {rate:g} Hz)"),
-        ("truth", f"{truth}  ({len(mission.truth.intervals)} faults)"),
+        ("truth", f"{truth}  ({count} fault{'' if count == 1 else 's'})"),
     ]
-    if machine_file:
-        rows.append(("machine", str(machine_file)))
     terminal.show(key_values([*rows, ("next", shlex.join(words))]))
 
 
@@ -184,25 +178,3 @@ def _format_of(output: Path | None) -> LogFormat:
     raise ConfigError(
         f"{output}: cannot tell the format from its name; expected {known} or a folder name, or give --format"
     )
-
-
-def _write_machine(mission: SimulatedMission, path: Path, kind: LogFormat) -> Path | None:
-    """Write the machine file that a format needs to be read without guesses; None where it describes itself."""
-    from dataclasses import replace
-
-    from replay.export.twincat_log import plc_symbol
-    from replay.files import atomic_path
-    from replay.machine import SignalSource
-    from replay.machine_file import dump_machine
-
-    if kind is not LogFormat.TWINCAT:
-        return None
-    machine = mission.options.machine
-    names = [*mission.columns, *(name for group in mission.slow for name in group.columns)]
-    signals = {}
-    for name in names:
-        symbol, unit = plc_symbol(name, machine.wheels)
-        signals[name] = SignalSource(symbol=symbol, unit=unit, at="motor" if unit == "rpm" else "wheel")
-    with atomic_path(path) as temporary:
-        temporary.write_text(dump_machine(replace(machine, signals=signals)), encoding="utf-8")
-    return path

@@ -58,7 +58,7 @@ def _faults(intervals: list[Mapping[str, Any]]) -> Table:
             text(
                 f"{MODE_SIGNS.get(i['mode'], '·')} {str(i['mode']).replace('_', ' ')}", MODE_STYLES.get(i["mode"], "")
             ),
-            f"{i['start_s']:.2f}–{i['stop_s']:.2f}",
+            f"{i['start_s']:.3f}–{i['stop_s']:.3f}",
             _epsilon(i.get("epsilon")),
             _sat(i.get("sat")),
             f"{i['probability']:.3f}",

@@ -8,9 +8,9 @@ _WHEEL = {
     "v_true": "ε of the speed sensor rests on the wheel model instead of a second measurement",
     "u": "the actuator is not assessed, no Ψ̂ is implied, and the speed sensor is judged by commands and peers alone",
     "u_applied": "ε of the actuator rests on the wheel model, and sensor and actuator loss are harder to tell apart",
-    "psi": "Ψ̂ is replayed only and cannot be compared with the controller's own",
-    "pressure_a": "load and actuator disturbance are told apart by the wheel model alone",
-    "pressure_b": "load and actuator disturbance are told apart by the wheel model alone",
+    "psi": "nothing is judged by it; the replayed Ψ̂ has no recorded one beside it",
+    "pressure_a": "nothing: pressures are shown beside the evidence and not judged",
+    "pressure_b": "nothing: pressures are shown beside the evidence and not judged",
 }
 _STEER = {
     "phi_ref": "φ_c is computed from v_c and ω_c by the kinematics; without those the steering loop is not replayed",
@@ -22,13 +22,13 @@ _STEER = {
 _OTHER = {
     "cmd.v": "without recorded v_c,i no wheel has a command: no e, no Ψ̂, no driving time",
     "cmd.omega": "commands of the wheels are computed as if driving straight ahead, unless v_c,i is recorded",
-    "imu.yaw_rate": "a slipping wheel and a faulty speed sensor are told apart by the other wheels alone",
-    "gnss.lat": "no path is drawn from positions",
-    "gnss.lon": "no path is drawn from positions",
-    "gnss.speed": "wheel speeds have no reference that is independent of the ground",
-    "odom.x": "the path is computed from wheel speeds and steering",
-    "odom.y": "the path is computed from wheel speeds and steering",
-    "odom.yaw": "the path is computed from wheel speeds and steering",
+    "imu.yaw_rate": "nothing: the yaw rate is shown beside the evidence and not judged",
+    "gnss.lat": "the path is drawn from odometry; without either there is none",
+    "gnss.lon": "the path is drawn from odometry; without either there is none",
+    "gnss.speed": "nothing: it is shown beside the evidence and not judged",
+    "odom.x": "the path is drawn from GNSS; without either there is none",
+    "odom.y": "the path is drawn from GNSS; without either there is none",
+    "odom.yaw": "nothing: it is shown beside the evidence and not judged",
 }
 
 

@@ -184,4 +184,10 @@ def load_mission(
     files, signals = read_signals(paths, machine, progress=progress)
     if progress is not None:
         progress("aligning signals")
-    return Mission(files, signals, align(signals, start_s, stop_s))
+    try:
+        timeline = align(signals, start_s, stop_s)
+    except LogError as error:
+        damage = [text for file in files for text in file.summary.damage]
+        also = f"; the log is damaged: {damage[0]}" if damage else ""
+        raise LogError(f"{', '.join(str(p) for p in paths)}: {error}{also}") from error
+    return Mission(files, signals, timeline)
