@@ -251,9 +251,11 @@ def _by_symbol(channel: Channel, machine: Machine, first: Mapping[str, int]) -> 
         order = machine.axles if steering else machine.wheels
         at = numbered[1] - min(first.get(_family(channel, numbered[0]), first.get(numbered[0], numbered[1])), 1)
         part, rank = (order[at] if 0 <= at < len(order) else None), 9
+    if part is None and len(machine.wheels) == 1 and not steering and not re.search(r"gnss|gps|imu|odom", text):
+        part, rank = machine.wheels[0], 10
     if part is not None:
         signal = f"{'steer' if steering else 'wheel'}.{part}.{leaf[1]}"
-        how = "by its number" if rank == 9 else "by its name"
+        how = {9: "by its number", 10: "as the only wheel"}.get(rank, "by its name")
         yield Candidate(signal, _source(channel, channel.unit or ""), rank, f"{channel.name} {how}")
 
 

@@ -84,10 +84,8 @@ class Ros1BagReader:
         report = Report()
         bag = _open(path, report)
         assembler = Assembler(clock, report)
-        wanted = None if topics is None else {n for n, c in bag.connections.items() if c.topic in topics}
         for i, chunk in enumerate(bag.chunks):
-            counts = bag.indexed.get(i)
-            if wanted is not None and counts is not None and wanted.isdisjoint(counts):
+            if topics is not None and not _may_hold(bag, bag.indexed.get(i), topics):
                 continue
             opened = _open_chunk(bag, chunk)
             if opened is not None:
@@ -200,6 +198,13 @@ def _open_chunk(bag: _Bag, chunk: _Chunk) -> tuple[NDArray[np.uint8], BagRecords
     return data, records
 
 
+def _may_hold(bag: _Bag, counts: dict[int, int] | None, topics: Collection[str]) -> bool:
+    """Whether a chunk with this index may hold one of the topics; one without index may."""
+    if counts is None or any(n not in bag.connections for n in counts):
+        return True
+    return any(bag.connections[n].topic in topics for n in counts)
+
+
 def _split(bag: _Bag, data: NDArray[np.uint8], records: BagRecords, topics: Collection[str] | None) -> Iterator[Block]:
     """Blocks of one buffer, one per connection."""
     messages = records.op == _MESSAGE
@@ -217,7 +222,7 @@ def _summary(bag: _Bag) -> LogSummary:
     bounds = list(bag.bounds)
     for i, chunk in enumerate(bag.chunks):
         indexed = bag.indexed.get(i)
-        if indexed is None:
+        if indexed is None or any(n not in bag.connections for n in indexed):
             opened = _open_chunk(bag, chunk)
             if opened is None:
                 continue

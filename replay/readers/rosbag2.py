@@ -7,11 +7,8 @@ import tempfile
 from collections.abc import Collection
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import zstandard
-from ruamel.yaml import YAML
-from ruamel.yaml.error import YAMLError
 
 from replay.errors import LogError
 from replay.machine import SourceOptions
@@ -123,7 +120,10 @@ def _parts(path: Path, report: Report, scratch: Path) -> tuple[list[Path], dict[
 
 
 def _listed(path: Path, report: Report, modes: dict[str, str]) -> list[str] | None:
-    """Return the file names in ``metadata.yaml``, or None where there is none that can be used."""
+    """Return the file names in ``metadata.yaml``, or None where there is none that can be used.
+
+    Only the few lines that matter are looked at, so that no document can cost time or memory.
+    """
     meta = path / "metadata.yaml"
     if not meta.is_file():
         report.note(f"{path.name} has no metadata.yaml; its storage files were read in the order of their names")
@@ -133,21 +133,31 @@ def _listed(path: Path, report: Report, modes: dict[str, str]) -> list[str] | No
             f"{meta.name} has {meta.stat().st_size} bytes; at most {_MAX_METADATA} are read, so it was left out"
         )
         return None
-    try:
-        text = meta.read_text(encoding="utf-8", errors="replace")
-        if re.search(r"^\s*[-\w]+:\s*[&*]\w+|[\[,]\s*\*\w+", text, re.MULTILINE):
-            raise ValueError("anchors")
-        content = YAML(typ="safe", pure=True).load(text)
-        info: dict[str, Any] = content["rosbag2_bagfile_information"]
-        names = [str(n) for n in info["relative_file_paths"]]
-        for key in ("compression_mode", "compression_format", "ros_distro", "storage_identifier"):
-            modes[key] = str(info.get(key) or "").lower()
-    except (YAMLError, ValueError, TypeError, KeyError, AttributeError, RecursionError) as error:
-        report.lost(f"{meta.name} cannot be understood ({type(error).__name__}); the storage files were read by name")
+    text = meta.read_text(encoding="utf-8", errors="replace")
+    for key in ("compression_mode", "compression_format", "ros_distro", "storage_identifier"):
+        found = re.search(rf"^\s*{key}:[ \t]*(\S+)[ \t]*$", text, re.MULTILINE)
+        modes[key] = _scalar(found.group(1)).lower() if found else ""
+    listed = re.search(
+        r"^\s*relative_file_paths:[ \t]*(\[.*\])?[ \t]*\n((?:[ \t]*-[ \t]+\S.*\n?)*)", text + "\n", re.MULTILINE
+    )
+    if listed is None:
+        report.lost(f"{meta.name} names no files; the storage files were read in the order of their names")
         return None
     if modes["compression_mode"] not in _READABLE_MODES:
         report.lost(f"{meta.name}: compression mode {modes['compression_mode']!r} is not known")
-    return names
+    if listed.group(1):
+        return [_scalar(n) for n in listed.group(1)[1:-1].split(",") if n.strip()]
+    return [_scalar(line.partition("-")[2]) for line in listed.group(2).splitlines()]
+
+
+def _scalar(text: str) -> str:
+    """Text of a plain or quoted YAML scalar."""
+    text = text.strip()
+    if len(text) > 1 and text[0] == text[-1] == "'":
+        return text[1:-1].replace("''", "'")
+    if len(text) > 1 and text[0] == text[-1] == '"':
+        return re.sub(r"\\(.)", r"\1", text[1:-1])
+    return text.partition(" #")[0].strip()
 
 
 def _inside(folder: Path, name: str, report: Report) -> Path | None:
