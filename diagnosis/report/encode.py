@@ -11,7 +11,7 @@ import math
 import zlib
 from collections.abc import Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -111,11 +111,16 @@ def levels_of(values: NDArray[np.floating], step: float) -> tuple[NDArray[np.int
     low, high = float(y.min(where=good, initial=_HUGE)), float(y.max(where=good, initial=-_HUGE))
     step = max(step, (high - low) / _LEVELS, max(abs(low), abs(high)) * 1e-15)
     base = float(np.rint(low / step)) - 1.0
-    y[~good] = base * step
+    return _quantised(y, step, base), step, base
+
+
+def _quantised(values: NDArray[np.floating], step: float, base: float) -> NDArray[np.int32]:
+    y = values.astype(np.float64)
+    y[~(np.abs(y) < _HUGE)] = base * step
     y /= step
     np.rint(y, out=y)
     y -= base
-    return y.astype(np.int32), step, base
+    return y.astype(np.int32)
 
 
 def _zigzag(levels: NDArray[np.int32]) -> NDArray[np.uint32]:
@@ -164,15 +169,16 @@ def _merged(windows: Iterable[Window], column: str) -> list[tuple[int, int]]:
     return spans
 
 
-def _encode_one(
-    name: str, values: NDArray[np.floating], step: float, spans: Sequence[tuple[int, int]] | None, stride: int
-) -> Channel:
+def _encode_one(name: str, values: NDArray[np.floating], step: float, stride: int) -> Channel:
     levels, step, base = levels_of(values, step)
-    if spans is None:
-        return Channel(name, step, base, (_segment(0, 1, [levels]),))
-    segments = [_segment(0, stride, _extremes(levels, stride))]
-    segments += [_segment(a, 1, [levels[a:b]]) for a, b in spans if b > a]
-    return Channel(name, step, base, tuple(segments))
+    parts = [levels] if stride == 1 else _extremes(levels, stride)
+    return Channel(name, step, base, (_segment(0, stride, parts),))
+
+
+def _with_windows(channel: Channel, values: NDArray[np.floating], spans: Sequence[tuple[int, int]]) -> Channel:
+    """Channel of extremes with every sample of some stretches beside them."""
+    full = [_segment(a, 1, [_quantised(values[a:b], channel.step, channel.base)]) for a, b in spans if b > a]
+    return replace(channel, segments=(*channel.segments, *full))
 
 
 def windows_of(
@@ -216,29 +222,25 @@ def encode(
     samples = max(len(v) for v in columns.values())
     with ThreadPoolExecutor(_WORKERS) as pool:
 
-        def run(windows: list[Window] | None, stride: int) -> list[Channel]:
-            def one(name: str) -> Channel:
-                spans = None if windows is None else _merged(windows, name)
-                return _encode_one(name, columns[name], steps[name], spans, stride)
-
-            return list(pool.map(one, columns))
+        def run(stride: int) -> list[Channel]:
+            return list(pool.map(lambda c: _encode_one(c, columns[c], steps[c], stride), columns))
 
         rates = dict(zip(columns, pool.map(lambda c: _full_size(columns[c], steps[c]), columns), strict=True))
         if sum(rates.values()) * samples <= budget:
-            channels = run(None, 1)
+            channels = run(1)
             if sum(c.size for c in channels) <= budget:
                 return channels
         stride = 64
         while samples // stride > 32_768:
             stride *= 2
         while True:
-            channels = run([], stride)
+            channels = run(stride)
             left = budget - sum(c.size for c in channels)
             if left >= 0 or samples // stride <= 1024:
                 break
             stride *= 2
         chosen = _affordable(columns, rates, faults, step_s, samples, left)
-        return run(chosen, stride) if chosen else channels
+        return [_with_windows(c, columns[c.name], _merged(chosen, c.name)) for c in channels]
 
 
 def _affordable(

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -45,7 +45,7 @@ class Row:
     threshold: str | None = None
     limits: tuple[float, float] | None = None
     clip: tuple[float, float] | None = None
-    right_unit: str = ""
+    right: tuple[str, str] | None = None
     component: str = ""
 
     def columns(self) -> tuple[str, ...]:
@@ -60,7 +60,7 @@ class Group:
 
     key: str
     title: str
-    rows: tuple[Row, ...] = field(default_factory=tuple)
+    rows: tuple[Row, ...]
 
 
 def derived(columns: Columns, faults: Sequence[Mapping[str, Any]]) -> dict[str, NDArray[np.floating]]:
@@ -217,7 +217,7 @@ def _psi_row(c: str, columns: Columns, component: str = "") -> list[Row]:
         f"Ψ̂ {c}",
         "1",
         traces,
-        right_unit="ρ (1/s)" if f"replay.{c}.rho" in columns else "",
+        right=("ρ", "1/s") if f"replay.{c}.rho" in columns else None,
         component=component,
     )
 
@@ -272,6 +272,6 @@ def row_json(row: Row, index: Mapping[str, int]) -> dict[str, Any]:
         data["clip"] = list(row.clip)
     if row.component:
         data["component"] = row.component
-    if row.right_unit:
-        data["rightUnit"] = row.right_unit
+    if row.right:
+        data["rightUnit"] = {"title": row.right[0], "unit": row.right[1]}
     return data

@@ -58,6 +58,21 @@
     loop.draw(group.rows, view.faults.map((f) => ({ ...f, main: false })), loop.drawn ? loop.range : [0, view.duration]).catch(failed("#loop-figure"));
   }
 
+  // Unit and factor of a channel, from the first row that shows it.
+  function unitOf(c) {
+    for (const row of [...view.faults, ...view.loop].flatMap((g) => g.rows)) {
+      const t = row.traces.find((u) => u.c === c);
+      if (t) return { unit: t.right ? row.rightUnit.unit : row.unit, k: t.k };
+      if (row.threshold === c || row.band?.includes(c)) return { unit: row.unit, k: row.bandScale };
+    }
+    return { unit: "1", k: 1 };
+  }
+
+  function addSignal(c) {
+    const { unit, k } = unitOf(c), { name } = view.channels[c], row = { key: name, title: name, unit, traces: [{ c, name, role: "measured", k }] };
+    loop.draw([...loop.rows, row], loop.shades, loop.range).catch(failed("#loop-figure"));
+  }
+
   function save(name, type, text) {
     const url = URL.createObjectURL(new Blob([text], { type })), a = document.createElement("a");
     a.href = url;
@@ -146,6 +161,10 @@
     loop?.redraw();
   });
 
+  one("#explore")?.addEventListener("change", (e) => {
+    if (e.target.value !== "" && loop.drawn) addSignal(+e.target.value);
+    e.target.value = "";
+  });
   root.addEventListener("theme", themed);
   addEventListener("hashchange", () => fromAddress(true));
   let resizing = 0;

@@ -94,6 +94,7 @@ def build_page(
     budget = int(max_size_mb * 1e6) - len(packed) - 400_000 - 12_000 * len(faults)
     channels = _channels(report, shown, figures, groups, (start, step), max(budget, 200_000))
     context["blocks"] = [(f"c{i}-{j}", s.text) for i, c in enumerate(channels) for j, s in enumerate(c.segments)]
+    context["channels"] = [c.name for c in channels]
     context["view"] = htmlsafe_json_dumps(
         _view(report, channels, figures, groups, (start, step, samples, duration)), sort_keys=True
     )

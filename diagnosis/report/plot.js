@@ -7,7 +7,7 @@ class Figure {
 
   static colour(name) { return getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim(); }
 
-  static text(s) { return s.replaceAll("&", "&amp;").replaceAll("<", "&lt;").replaceAll(">", "&gt;"); }
+  static text(s) { return s.replaceAll("&", "&amp;").replaceAll("<", "&lt;").replaceAll(">", "&gt;").replaceAll("%{", "&#37;{"); }
 
   static styles = {
     measured: { colour: "accent", width: 1.7, sign: "━━" },
@@ -77,7 +77,7 @@ class Figure {
       list.push({
         type: "scatter", mode: "lines", x: d.x, y: d.y, name: Figure.text(name), connectgaps: false, xaxis: "x",
         yaxis: right ? `y${100 + i}` : `y${i ? i + 1 : ""}`, line: { color: Figure.colour(s.colour), width: s.width, dash: s.dash || "solid" },
-        hovertemplate: `%{y:.4~g} ${Figure.text(unit)}<extra>${Figure.text(name)}</extra>`, ...more,
+        hovertemplate: `%{y:.4~g} ${unit === "1" ? "" : Figure.text(unit)}<extra>${Figure.text(name)}</extra>`, ...more,
       });
     };
     this.rows.forEach((row, i) => {
@@ -86,7 +86,7 @@ class Figure {
         add(i, "threshold", "+ threshold", row.unit, false);
         add(i, "threshold", "− threshold", row.unit, false);
       }
-      for (const t of row.traces) add(i, t.role, t.name, t.right ? row.rightUnit : row.unit, t.right);
+      for (const t of row.traces) add(i, t.role, t.name, t.right ? row.rightUnit.unit : row.unit, t.right);
     });
     return list;
   }
@@ -115,11 +115,12 @@ class Figure {
     const layout = {
       margin: { l: 56, r: this.rows.some((r) => r.rightUnit) ? 52 : 14, t: 0, b: foot }, height, width, autosize: !width,
       paper_bgcolor: "rgba(0,0,0,0)", plot_bgcolor: "rgba(0,0,0,0)", showlegend: false, dragmode: "zoom",
+      modebar: { bgcolor: "rgba(0,0,0,0)", color: muted, activecolor: Figure.colour("accent") },
       font: { color: text, size: 12, family: getComputedStyle(document.body).fontFamily },
-      hovermode: "x unified", hoversubplots: "axis", hoverlabel: { bgcolor: Figure.colour("surface"), bordercolor: line, font: { color: text } },
+      hovermode: "x unified", hoverlabel: { bgcolor: Figure.colour("surface"), bordercolor: line, font: { color: text } },
       xaxis: {
         range: [...this.range], anchor: last > 1 ? `y${last}` : "y", gridcolor: grid, zeroline: false, linecolor: line, tickcolor: line,
-        ticks: "outside", hoverformat: ".4f", showspikes: true, spikemode: "across", spikesnap: "cursor", spikethickness: 1, spikedash: "solid",
+        ticks: "outside", unifiedhovertitle: { text: "%{x:.4f} s" }, showspikes: true, spikemode: "across", spikesnap: "cursor", spikethickness: 1, spikedash: "solid",
         spikecolor: muted, title: { text: "mission time (s)", standoff: 4, font: { color: muted, size: 12 } },
       },
       shapes: [], annotations: [],
@@ -132,7 +133,7 @@ class Figure {
         domain: [Math.max(0, top - panel / plot), top], gridcolor: grid, zerolinecolor: line, fixedrange: true, nticks: 5, tickformat: ".4~g",
         ...(row.limits ? { range: row.limits } : {}), ...(row.clip ? { autorangeoptions: { clipmin: row.clip[0], clipmax: row.clip[1] } } : {}),
       };
-      if (row.rightUnit) layout[`yaxis${100 + i}`] = { overlaying: `y${i ? i + 1 : ""}`, side: "right", anchor: "x", showgrid: false, zeroline: false, fixedrange: true, nticks: 4, tickfont: { color: muted }, tickformat: ".3~g", title: { text: Figure.text(row.rightUnit), font: { size: 11, color: muted }, standoff: 2 } };
+      if (row.rightUnit) layout[`yaxis${100 + i}`] = { overlaying: `y${i ? i + 1 : ""}`, side: "right", anchor: "x", showgrid: false, zeroline: false, fixedrange: true, nticks: 4, tickfont: { color: muted }, tickformat: ".3~g", title: { text: Figure.text(`${row.rightUnit.title} (${row.rightUnit.unit})`), font: { size: 11, color: muted }, standoff: 2 } };
       layout.annotations.push({
         xref: "paper", yref: "paper", x: 0, y: top, yshift: 3, xanchor: "left", yanchor: "bottom", showarrow: false, align: "left", font: { size: 12 },
         text: headings[i].text,
@@ -223,7 +224,7 @@ class Figure {
   csv() {
     const columns = new Map();
     for (const row of this.rows) {
-      for (const t of row.traces) columns.set(t.c, { c: t.c, k: t.k, unit: t.right ? row.rightUnit.replace(/.*\(|\)/g, "") : row.unit });
+      for (const t of row.traces) columns.set(t.c, { c: t.c, k: t.k, unit: t.right ? row.rightUnit.unit : row.unit });
       for (const c of row.band || []) columns.set(c, { c, k: row.bandScale, unit: row.unit });
       if (row.threshold !== undefined) columns.set(row.threshold, { c: row.threshold, k: row.bandScale, unit: row.unit });
     }

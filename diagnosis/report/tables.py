@@ -5,7 +5,19 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from diagnosis.report.names import FAULT_MODES, UNDECIDED, VERDICTS, clock, grouped, known, number, part, sat_text, utc
+from diagnosis.report.names import (
+    FAULT_MODES,
+    UNDECIDED,
+    VERDICTS,
+    clock,
+    grouped,
+    known,
+    number,
+    part,
+    sat_text,
+    state_label,
+    utc,
+)
 from diagnosis.report.picture import judged_sides
 from diagnosis.report.timeline import kind_of
 
@@ -131,7 +143,7 @@ def _facts(report: Mapping[str, Any], log: Mapping[str, Any], duration: float) -
 
 
 def _coverage(report: Mapping[str, Any]) -> list[dict[str, Any]]:
-    machine, rows = report.get("machine") or {}, []
+    machine, rows, why = report.get("machine") or {}, [], _why_undecided(report)
     for row in report.get("coverage") or ():
         seconds = {k: float(v or 0.0) for k, v in (row.get("seconds") or {}).items()}
         total = sum(seconds.values())
@@ -148,9 +160,24 @@ def _coverage(report: Mapping[str, Any]) -> list[dict[str, Any]]:
                 "faulty": faulty,
                 "open": total - healthy - faulty,
                 "driving": row.get("decided_driving_s"),
+                "why": why.get((row["component"], row["side"]), []),
             }
         )
     return rows
+
+
+def _why_undecided(report: Mapping[str, Any]) -> dict[tuple[str, str], list[str]]:
+    """For each component and side, the two reasons that cost most time without a decision."""
+    seconds: dict[tuple[str, str], dict[str, float]] = {}
+    for s in report.get("states") or ():
+        if s["state"] in UNDECIDED:
+            reason = s.get("reason") or state_label(s["state"]).lower()
+            mine = seconds.setdefault((s["component"], s["side"]), {})
+            mine[reason] = mine.get(reason, 0.0) + s["stop_s"] - s["start_s"]
+    return {
+        key: [f"{reason} ({length:.1f} s)" for reason, length in sorted(mine.items(), key=lambda r: -r[1])[:2]]
+        for key, mine in seconds.items()
+    }
 
 
 def _cells(row: Mapping[str, Any]) -> list[str]:

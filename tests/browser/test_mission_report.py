@@ -314,6 +314,9 @@ def test_loop_replay(open_page: OPEN) -> None:
         page.get_by_role("button", name=re.compile(name)).click()
         expect(page.locator("#loop-figure")).to_contain_text(words)
     assert x_range(page, "loop-figure") == [0.0, 120.0]
+    page.locator("#explore").select_option(label="wheel.FL.v")
+    expect(page.locator("#loop-figure")).to_contain_text("wheel.FL.v (m/s)")
+    expect(page.locator("#explore")).to_have_value("")
 
 
 def test_lanes_without_faults_unfold(show: SHOW) -> None:

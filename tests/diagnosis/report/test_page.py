@@ -155,6 +155,22 @@ def test_time_axis_in_single_precision() -> None:
     assert "</html>" in build_page(report, columns)
 
 
+def test_coverage_says_why_time_was_not_decided() -> None:
+    report, columns = samples.one_wheel()
+    report["states"] = [
+        {"component": "drive", "side": "sensor", "state": "not_excited", "start_s": 0.0, "stop_s": 3.0, "reason": ""},
+        {
+            "component": "drive",
+            "side": "sensor",
+            "state": "masked",
+            "start_s": 3.0,
+            "stop_s": 9.0,
+            "reason": "F1 hides it",
+        },
+    ]
+    assert "F1 hides it (6.0 s); not excited (3.0 s)" in Tree(build_page(report, columns)).text
+
+
 def test_caveats_stand_in_the_verdict() -> None:
     report, columns = samples.five_faults()
     text = build_page(report, columns)
