@@ -135,7 +135,7 @@ def stamps(
         )
         keep = moments.notna().to_numpy()
         ns = moments[keep].dt.tz_localize(None).to_numpy().astype("datetime64[ns]").astype(np.int64) + epoch
-    elif unit == "filetime" or column.dtype.kind in "iu":
+    elif unit in ("filetime", "ns") or column.dtype.kind in "iu":
         whole = column if column.dtype.kind in "iu" else _integers(column)
         keep = whole.notna().to_numpy()
         ticks = whole[keep].to_numpy().astype(np.int64)
@@ -153,7 +153,9 @@ def stamps(
 
 
 def _integers(column: pd.Series[Any]) -> pd.Series[Any]:
-    """Text cells as exact integers; others are missing."""
+    """Cells as integers, text ones exactly; others are missing."""
+    if column.dtype.kind == "f":
+        return column.where(column.abs() < 2.0**62).round().astype("Int64")
     cells = column.astype("string").str.strip()
     fits = cells.str.fullmatch(r"[+-]?\d{1,18}").fillna(False)
     return cells.where(fits).astype("Int64")

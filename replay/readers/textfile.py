@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import gzip
 import zlib
 from pathlib import Path
 
@@ -51,14 +50,25 @@ def read_text(path: Path, report: Report) -> str:
 
 
 def _unzip(path: Path, report: Report) -> bytes:
-    pieces, size = [], 0
-    try:
-        with gzip.open(path, "rb") as stream:
-            while (piece := stream.read(_PIECE)) and size <= MAX_TEXT:
-                pieces.append(piece)
-                size += len(piece)
-    except (EOFError, zlib.error, gzip.BadGzipFile) as error:
-        report.lost(f"{path.name}: its gzip data are damaged after {size} bytes of text ({type(error).__name__})")
+    """Expand as far as the file is whole, members one after the other."""
+    pieces: list[bytes] = []
+    size, member = 0, zlib.decompressobj(31)
+    trouble = ""
+    with path.open("rb") as file:
+        left = file.read(_PIECE)
+        while left and size <= MAX_TEXT and not trouble:
+            try:
+                piece = member.decompress(left, _PIECE)
+            except zlib.error:
+                trouble = "damaged"
+                break
+            pieces.append(piece)
+            size += len(piece)
+            left = (member.unused_data if member.eof else member.unconsumed_tail) or file.read(_PIECE)
+            if member.eof and left:
+                member = zlib.decompressobj(31)
+    if not member.eof or trouble:
+        report.lost(f"{path.name}: its gzip data are {trouble or 'cut off'} after {size} bytes of text")
     return b"".join(pieces)
 
 

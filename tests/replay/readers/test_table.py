@@ -1,0 +1,211 @@
+from __future__ import annotations
+
+import gzip
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from replay.errors import LogError
+from replay.machine import SourceOptions
+from replay.rawlog import RawLog
+from replay.readers.registry import open_log, read_log, summarise_log
+
+
+def read(path: Path, **options: object) -> RawLog:
+    return read_log(path, SourceOptions(**options))  # type: ignore[arg-type]
+
+
+@pytest.fixture
+def target(tmp_path: Path) -> Path:
+    return tmp_path / "table.csv"
+
+
+def test_plain_csv_with_units_in_the_header(target: Path) -> None:
+    target.write_text("t,speed [rpm],temp (K),n\n0,1.5,300,7\n0.01,2.5,301,8\n0.02,-3,302,9\n")
+    log = read(target)
+    assert open_log(target).format == "csv"
+    speed = log.channels["speed [rpm]"]
+    assert (speed.unit, speed.values.tolist(), speed.stamps.tolist()) == (
+        "rpm",
+        [1.5, 2.5, -3.0],
+        [0, 10**7, 2 * 10**7],
+    )
+    assert log.channels["n"].values.dtype == np.int64
+    assert any("time is column 't' in s, found by its name" in n for n in log.summary.notes)
+    assert summarise_log(target, SourceOptions()).topics[0].fields == ("speed [rpm]", "temp (K)", "n")
+
+
+@pytest.mark.parametrize(
+    ("separator", "decimal"), [(";", ","), ("\t", ","), (";", "."), ("\t", "."), ("|", "."), (",", ".")]
+)
+def test_separator_and_decimal_are_found(target: Path, separator: str, decimal: str) -> None:
+    rows = [["time", "a", "b"], ["0.5", "1.25", "-3"], ["1.5", "2e-3", ""], ["2.5", "4.5", "0"]]
+    target.write_text("\n".join(separator.join(c.replace(".", decimal) for c in row) for row in rows) + "\n")
+    log = read(target)
+    assert log.channels["a"].values.tolist() == [1.25, 0.002, 4.5]
+    np.testing.assert_array_equal(log.channels["b"].values, [-3, np.nan, 0])
+    assert log.channels["a"].stamps.tolist() == [500_000_000, 1_500_000_000, 2_500_000_000]
+
+
+def test_repeated_and_padded_names(target: Path) -> None:
+    target.write_text("Rel Time, v ,v,Mag. z\n0,1,2,3\n16,4,5,6\n31,7,8,9\n")
+    log = read(target, time="Rel Time", time_unit="ms")
+    assert [*log.channels] == ["v", "v (2)", "Mag. z"]
+    assert log.channels["v (2)"].values.tolist() == [2, 5, 8]
+    assert log.channels["v"].stamps.tolist() == [0, 16_000_000, 31_000_000]
+    assert any("names occur more than once" in n for n in log.summary.notes)
+
+
+@pytest.mark.parametrize(
+    ("cells", "options", "expected"),
+    [
+        (["1700000000000000001", "1700000000000000002"], {}, [1_700_000_000_000_000_001, 1_700_000_000_000_000_002]),
+        (["133000000000000001", "133000000000000002"], {"time_unit": "filetime"}, [1_655_526_400_000_000_100, 1_655_526_400_000_000_200]),
+        (["2024-05-01T10:00:00.000001Z", "2024-05-01 12:00:00+01:00"], {}, [1_714_557_600_000_001_000, 1_714_561_200_000_000_000]),
+        (["5", "6"], {"time_unit": "us", "epoch": "1970-01-01T00:00:01"}, [1_000_005_000, 1_000_006_000]),
+        (["-0.5", "0.25"], {"epoch": "2000-01-01T00:00:00+00:00"}, [946_684_799_500_000_000, 946_684_800_250_000_000]),
+    ],
+)  # fmt: skip
+def test_time_units_and_epochs_are_exact(
+    target: Path, cells: list[str], options: dict[str, str], expected: list[int]
+) -> None:
+    target.write_text("when,v\n" + "".join(f"{c},{i}.5\n" for i, c in enumerate(cells)))
+    assert read(target, time="when", **({"time_unit": "ns"} if len(cells[0]) == 19 else {"time_unit": "iso"} if "T" in cells[0] else {}) | options).channels["v"].stamps.tolist() == expected  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("header", "cells", "unit"),
+    [
+        ("t_ms", ["0", "10", "20"], "ms"),
+        ("time [us]", ["0", "10", "20"], "us"),
+        ("timestamp", ["1700000000000000000", "1700000000010000000"], "ns"),
+        ("timestamp", ["1700000000000", "1700000000010"], "ms"),
+        ("stamp", ["133000000000000000", "133000000000100000"], "filetime"),
+        ("Time", ["15936", "15950", "15964"], "ms"),
+        ("Time", ["0.0", "0.5", "1.0"], "s"),
+    ],
+)
+def test_the_unit_of_a_found_time_column_is_told(target: Path, header: str, cells: list[str], unit: str) -> None:
+    target.write_text(f"{header},v\n" + "".join(f"{c},{i % 2}\n" for i, c in enumerate(cells)))
+    assert any(f"time is column {header!r} in {unit}" in n for n in read(target).summary.notes)
+
+
+def test_a_time_column_without_a_name_is_found_because_it_rises(target: Path) -> None:
+    target.write_text("a,b\n5,0.1\n3,0.2\n4,0.3\n")
+    log = read(target)
+    assert [*log.channels] == ["a"]
+    assert any("because it only rises" in n for n in log.summary.notes)
+
+
+def test_rows_without_a_time_are_left_out_and_counted(target: Path) -> None:
+    target.write_text("t,v\n0,1\n,2\n2,3\n3,4\n")
+    log = read(target, time="t")
+    assert log.channels["v"].values.tolist() == [1, 3, 4]
+    assert any("1 of 4 rows have no readable time" in d for d in log.summary.damage)
+
+
+def test_booleans_text_and_odd_cells(target: Path) -> None:
+    target.write_text("t,ok,label,v\n0,True,a,1\n1,False,b,x\n2,True,c,3\n")
+    log = read(target)
+    assert log.channels["ok"].values.tolist() == [1, 0, 1]
+    np.testing.assert_array_equal(log.channels["v"].values, [1, np.nan, 3])
+    assert "label" not in log.channels
+    assert any("columns of text were left out: label" in n for n in log.summary.notes)
+    assert any("1 cells of 'v' are no numbers" in d for d in log.summary.damage)
+
+
+def test_without_a_header_and_with_comments(target: Path) -> None:
+    target.write_text("# made by x\n# t, a\n0,1\n1,2\n2,3\n")
+    assert read(target).channels["a"].values.tolist() == [1, 2, 3]
+    target.write_text("0,5\n1,6\n2,4\n")
+    assert read(target).channels["column 2"].values.tolist() == [5, 6, 4]
+
+
+def test_a_last_row_that_was_cut_off(target: Path) -> None:
+    target.write_text("t,a,b\n0,1,2\n1,2,3\n2,3")
+    log = read(target)
+    assert log.channels["a"].values.tolist() == [1, 2]
+    assert any("middle of a row" in d for d in log.summary.damage)
+
+
+def test_gzip_whole_and_cut_off(tmp_path: Path) -> None:
+    path = tmp_path / "t.csv.gz"
+    text = "t,a\n" + "".join(f"{i},{i * 7919 % 1000}\n" for i in range(5000))
+    path.write_bytes(gzip.compress(text.encode()))
+    assert len(read(path).channels["a"].values) == 5000
+    path.write_bytes(path.read_bytes()[:-2000])
+    log = read(path)
+    assert 0 < len(log.channels["a"].values) < 5000
+    assert any("gzip data are cut off" in d for d in log.summary.damage)
+
+
+def test_parquet_keeps_types(tmp_path: Path) -> None:
+    path = tmp_path / "t.parquet"
+    frame = pd.DataFrame({
+        "time": pd.to_datetime([10, 20, 30], unit="ns"),
+        "u": np.array([1, 2, 2**64 - 1], np.uint64),
+        "f": np.array([1.5, np.nan, 2.5], np.float32),
+        "s": ["a", "b", "c"],
+    })  # fmt: skip
+    frame.to_parquet(path)
+    log = read(path)
+    assert log.channels["u"].values.dtype == np.uint64
+    assert log.channels["u"].values[2] == 2**64 - 1
+    assert log.channels["f"].values.dtype == np.float32
+    assert log.channels["f"].stamps.tolist() == [10, 20, 30]
+    assert open_log(path).format == "parquet"
+
+
+@pytest.mark.parametrize(
+    ("text", "options", "reason"),
+    [
+        ("t,v\n0,1\n1,2\n", {"time": "zeit"}, "no column 'zeit' for time; its columns are t, v"),
+        ("a,b\n5,1\n3,2\n4,0\n", {}, "no time column"),
+        ("t,v\n0,1\n1,2\n", {"time": "t", "epoch": "yesterday"}, "no ISO date"),
+        ("t,v\nx,1\ny,2\n", {"time": "t"}, "holds no readable time"),
+    ],
+)
+def test_tables_that_cannot_be_read_say_why(target: Path, text: str, options: dict[str, str], reason: str) -> None:
+    target.write_text(text)
+    with pytest.raises(LogError, match=reason):
+        read(target, **options)
+
+
+def test_a_damaged_parquet_file(tmp_path: Path) -> None:
+    path = tmp_path / "t.parquet"
+    path.write_bytes(b"PAR1" + bytes(100))
+    with pytest.raises(LogError, match="damaged Parquet"):
+        read(path)
+
+
+@settings(max_examples=30, deadline=None)
+@given(values=st.lists(st.floats(allow_nan=False, allow_infinity=False), min_size=2, max_size=20), comma=st.booleans())
+def test_written_numbers_come_back_bit_for_bit(
+    tmp_path_factory: pytest.TempPathFactory, values: list[float], comma: bool
+) -> None:
+    path = tmp_path_factory.mktemp("t") / "t.csv"
+    text = "".join(f"{i};{v!r}\n" for i, v in enumerate(values))
+    path.write_text("t;v\n" + (text.replace(".", ",") if comma else text))
+    log = read(path, separator=";", decimal="," if comma else ".", time="t")
+    assert [float(v) for v in log.channels["v"].values] == values
+
+
+def test_real_motor_runs(reference_data: Path) -> None:
+    paths = sorted((reference_data / "fault_data" / "rosa").rglob("*.csv.gz"))[:6]
+    for path in paths:
+        log = read(path, time="Rel Time", time_unit="ms")
+        assert log.summary.damage == ()
+        assert {"Desired Speed", "Actual Speed", "Shaft Control Effort", "Force Sensor 1 (2)", "Mag. x"} <= {
+            *log.channels
+        } | {"Force Sensor 1 (2)"}
+        assert len(log.channels["Actual Speed"].values) > 500
+
+
+def test_real_robot_arm(reference_data: Path) -> None:
+    log = read(reference_data / "fault_data" / "dtr_robot_arm" / "Healthy_01.csv")
+    assert len(log.channels["resp_m1_rad"].values) == 1000
+    assert log.channels["cmd_m5_rad"].stamps[-1] == 9_990_000_000
