@@ -32,6 +32,7 @@ from replay.errors import ConfigError
 
 _HERE = Path(__file__).parent
 _SCRIPTS = ("data.js", "plot.js", "page.js")
+_THUMBNAILS = 300
 
 
 def build_page(
@@ -83,7 +84,7 @@ def build_page(
         "path": path_picture(cols["path.x"], cols["path.y"], start, step, faults)
         if samples and {"path.x", "path.y"} <= set(cols)
         else Markup(""),
-        "thumbs": {f["id"]: _thumbnail(f, figures[f["id"]], shown, start, step) for f in faults[:300]},
+        "thumbs": {f["id"]: _thumbnail(f, figures[f["id"]], shown, start, step) for f in faults[:_THUMBNAILS]},
         "groups": groups,
         "has_plots": plots,
         "plotly_version": version,
