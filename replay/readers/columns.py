@@ -157,7 +157,7 @@ def _integers(column: pd.Series[Any]) -> pd.Series[Any]:
     if column.dtype.kind == "f":
         return column.where(column.abs() < 2.0**62).round().astype("Int64")
     cells = column.astype("string").str.strip()
-    fits = cells.str.fullmatch(r"[+-]?\d{1,18}").fillna(False)
+    fits = cells.str.fullmatch(r"[+-]?(?:\d{1,18}|[1-8]\d{18})").fillna(False)
     return cells.where(fits).astype("Int64")
 
 
