@@ -1,0 +1,43 @@
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from replay.inspect import inspect_log
+from replay.machine import SourceOptions
+
+
+def test_rates_gaps_and_jitter_of_a_table(tmp_path: Path) -> None:
+    path = tmp_path / "t.csv"
+    t = np.concatenate([np.arange(100) * 0.01, 2.0 + np.arange(100) * 0.01])
+    t[50] += 0.002
+    path.write_text("t,v\n" + "".join(f"{x:.6f},{i}\n" for i, x in enumerate(t)))
+    report = inspect_log(path, SourceOptions())
+    (topic,) = report.topics
+    assert topic.count == 200
+    assert topic.rate_hz == pytest.approx(100.0)
+    assert (topic.gaps, topic.backwards, topic.duplicates) == (1, 0, 0)
+    assert topic.longest_gap_s == pytest.approx(1.01)
+    assert topic.jitter_p99_s is not None
+    assert 0 < topic.jitter_p99_s <= 0.002
+    assert topic.offset_s is None
+    assert report.duration_s == pytest.approx(2.99)
+    assert report.channels == ("v",)
+
+
+def test_backwards_and_equal_stamps_are_counted(tmp_path: Path) -> None:
+    path = tmp_path / "t.csv"
+    path.write_text("t,v\n0,1\n1,2\n1,3\n3,4\n2,5\n5,6\n")
+    (topic,) = inspect_log(path, SourceOptions(time="t")).topics
+    assert (topic.backwards, topic.duplicates) == (1, 1)
+
+
+def test_real_log_has_rate_and_clock_offset(reference_data: Path) -> None:
+    path = reference_data / "reference_logs" / "robot_localization" / "test1.bag"
+    topics = {t.name: t for t in inspect_log(path, SourceOptions()).topics}
+    assert topics["/imu/data"].rate_hz == pytest.approx(30.0, rel=0.01)
+    assert topics["/imu/data"].offset_s == pytest.approx(-0.025, abs=0.001)
+    on_log = {t.name: t for t in inspect_log(path, SourceOptions(stamp="log")).topics}
+    assert on_log["/imu/data"].offset_s == pytest.approx(-0.025, abs=0.001)
