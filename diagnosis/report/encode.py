@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 _LEVELS = 2**24
-_HUGE = 1e30
+_HUGE, _TINY = 1e30, 1e-30
 _RESOLUTION = 1024
 _PROBE = 8192
 _WORKERS = 4
@@ -82,12 +82,12 @@ def step_of(values: NDArray[np.floating], lsb: float | None) -> float:
     probe = probe[np.abs(probe) < _HUGE]
     if not len(probe):
         return 1.0
-    if lsb is not None and lsb > 0 and math.isfinite(lsb):
+    if lsb is not None and _TINY < lsb < _HUGE:
         turns = probe / lsb
         step = lsb if np.mean(np.abs(turns - np.rint(turns))) < 0.05 else lsb / 2
     else:
         low, high = np.quantile(probe, [0.001, 0.999])
-        extent = float(high - low) or float(np.abs(probe).max()) or 1.0
+        extent = max(float(high - low) or float(np.abs(probe).max()) or 1.0, _TINY)
         exponent = math.floor(math.log10(extent / _RESOLUTION))
         mantissa = extent / _RESOLUTION / 10.0**exponent
         step = max(m for m in (1.0, 2.0, 5.0) if m <= mantissa + 1e-9) * 10.0**exponent
