@@ -65,13 +65,12 @@ def check(
     json: Json = False,
 ) -> None:
     """Check a machine file; with --log also that every signal it names is there."""
-    from cli.look import signals_document, signals_parts
-
     machine, source = machine_of(file)
     lost: list[str] = []
     document: dict[str, object] = {"file": str(file), "ok": True, "given_signals": sorted(machine.signals)}
     if log:
         with terminal.progress("starting") as progress:
+            from cli.mapped import signals_document, signals_parts
             from replay.mission import read_signals
 
             files, signals = read_signals(mission_paths(log), machine, progress=progress)

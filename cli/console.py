@@ -71,6 +71,9 @@ class Terminal:
         """One line on stderr, also when quiet."""
         self._line("error", "bold red", text)
 
+    def _progress_line(self, text: str) -> None:
+        _write(sys.stderr, clean(text) + "\n")
+
     def _line(self, label: str, style: str, text: object) -> None:
         from rich.text import Text
 
@@ -83,7 +86,9 @@ class Terminal:
         from rich.text import Text
 
         if self.quiet or not sys.stderr.isatty():
-            yield (lambda text: _write(sys.stderr, clean(text) + "\n")) if self.verbose else (lambda text: None)
+            tell = self._progress_line if self.verbose and not self.quiet else lambda text: None
+            tell(first)
+            yield tell
             return
         with _console(sys.stderr).status(Text(clean(first))) as status:
             yield lambda text: status.update(Text(clean(text)))

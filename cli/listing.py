@@ -32,13 +32,9 @@ def inspect_parts(report: InspectReport) -> list[RenderableType]:
     parts: list[RenderableType] = [
         Text.assemble(text(report.source, "bold"), "  ", text(report.format), ", ", text(when))
     ]
-    parts.append(
-        table(
-            ("topic", "type", "count", "Hz", "jitter ms", "gaps", "header−log ms"),
-            [_row(t) for t in report.topics],
-            right=(2, 3, 4, 5, 6),
-        )
-    )
+    headings = ("topic", "type", "count", "Hz", "jitter ms", "gaps", "header−log ms")
+    rows = [_row(t) for t in report.topics]
+    parts.append(table(headings, rows, right=(2, 3, 4, 5, 6)) if rows else text("It holds no topics."))
     unusual = [f"{t.name}: {words}" for t in report.topics if (words := _unusual(t))]
     for title, lines, style in (
         ("Timing", unusual, "bold"),
@@ -68,10 +64,10 @@ def _unusual(topic: TopicTiming) -> str:
     if topic.note:
         words.append(topic.note)
     if topic.gaps and topic.longest_gap_s is not None:
-        plural = "" if topic.gaps == 1 else "s"
-        words.append(f"{topic.gaps} gap{plural}, longest {topic.longest_gap_s:.3g} s")
+        words.append(f"{topic.gaps} gap{'' if topic.gaps == 1 else 's'}, longest {topic.longest_gap_s:.3g} s")
     if topic.backwards:
-        words.append(f"{topic.backwards} stamps go backwards")
+        words.append("1 stamp goes back" if topic.backwards == 1 else f"{topic.backwards} stamps go back")
     if topic.duplicates:
-        words.append(f"{topic.duplicates} stamps repeat the one before")
+        some = "1 stamp repeats" if topic.duplicates == 1 else f"{topic.duplicates} stamps repeat"
+        words.append(f"{some} the one before")
     return "; ".join(words)

@@ -10,7 +10,7 @@ import typer
 
 Logs = Annotated[
     list[Path],
-    typer.Argument(metavar="LOG...", help="The files of one mission, e.g. a bag and a PLC export.", show_default=False),
+    typer.Argument(metavar="LOG", help="The files of one mission, e.g. a bag and a PLC export.", show_default=False),
 ]
 MachineFile = Annotated[
     Path | None,

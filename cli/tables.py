@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 
+from rich.console import Console, ConsoleOptions, RenderableType, RenderResult
 from rich.padding import Padding
 from rich.table import Table
 from rich.text import Text
@@ -47,6 +48,16 @@ def table(headings: Sequence[str], rows: Iterable[Sequence[object]], right: Sequ
     return out
 
 
+class ByWidth:
+    """The wide form where it fits on the terminal, else the narrow one."""
+
+    def __init__(self, wide: RenderableType, narrow: RenderableType, needs: int) -> None:
+        self._wide, self._narrow, self._needs = wide, narrow, needs
+
+    def __rich_console__(self, console: Console, options: ConsoleOptions) -> RenderResult:
+        yield self._wide if options.max_width >= self._needs else self._narrow
+
+
 def key_values(rows: Iterable[tuple[str, object]]) -> Table:
     """Two columns: what, and its value."""
     out = Table(box=None, show_header=False, pad_edge=False, padding=(0, 2, 0, 0))
@@ -68,18 +79,3 @@ def bullets(lines: Iterable[object], style: str = "") -> Table:
 def section(title: str) -> Padding:
     """Heading with a line of space before it."""
     return Padding(Text(title, style="bold"), (1, 0, 0, 0))
-
-
-def seconds(value: float) -> str:
-    """Mission time with milliseconds."""
-    return f"{value:.3f}"
-
-
-def size(octets: int) -> str:
-    """File size in the unit that gives three digits."""
-    amount = float(octets)
-    for unit in ("B", "kB", "MB", "GB"):
-        if amount < 1000:
-            return f"{amount:.0f} {unit}" if unit == "B" else f"{amount:.3g} {unit}"
-        amount /= 1000
-    return f"{amount:.3g} TB"

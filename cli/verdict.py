@@ -9,7 +9,7 @@ from rich.console import RenderableType
 from rich.table import Table
 from rich.text import Text
 
-from cli.tables import MODE_SIGNS, MODE_STYLES, SEVERITY_STYLES, bullets, section, table, text
+from cli.tables import MODE_SIGNS, MODE_STYLES, SEVERITY_STYLES, ByWidth, bullets, section, table, text
 
 _STATUS = {
     "ready": ("READY", "bold white on #1d7a63"),
@@ -50,31 +50,40 @@ def _actions(actions: list[Mapping[str, Any]]) -> Table:
     return out
 
 
-def _faults(intervals: list[Mapping[str, Any]]) -> Table:
-    rows = [
-        (
-            text(i["id"], "dim"),
-            f"{i['component']} {str(i['side']).replace('_', ' ')}",
-            text(
-                f"{MODE_SIGNS.get(i['mode'], '·')} {str(i['mode']).replace('_', ' ')}", MODE_STYLES.get(i["mode"], "")
-            ),
-            f"{i['start_s']:.3f}–{i['stop_s']:.3f}",
-            _epsilon(i.get("epsilon")),
-            _sat(i.get("sat")),
-            f"{i['probability']:.3f}",
-            text(i["severity"], SEVERITY_STYLES.get(i["severity"], "")),
+def _faults(intervals: list[Mapping[str, Any]]) -> ByWidth:
+    """Table of faults; on a narrow terminal without the bounds of ε."""
+    wide, narrow = (
+        table(
+            ("", "part", "fault", "time [s]", "ε", "saturation", "p", "severity"),
+            [_fault(i, bounds) for i in intervals[:_SHOWN]],
+            right=(3, 6),
         )
-        for i in intervals[:_SHOWN]
-    ]
-    return table(("", "part", "fault", "time [s]", "ε", "saturation", "p", "severity"), rows, right=(3, 6))
+        for bounds in (True, False)
+    )
+    return ByWidth(wide, narrow, 100)
 
 
-def _epsilon(value: Mapping[str, Any] | None) -> str:
+def _fault(fault: Mapping[str, Any], bounds: bool) -> tuple[object, ...]:
+    mode, severity = str(fault["mode"]), str(fault["severity"])
+    digits = 2 if fault["stop_s"] - fault["start_s"] >= 0.1 else 3
+    return (
+        text(fault["id"], "dim"),
+        f"{fault['component']} {str(fault['side']).replace('_', ' ')}",
+        text(f"{MODE_SIGNS.get(mode, '·')} {mode.replace('_', ' ')}", MODE_STYLES.get(mode, "")),
+        f"{fault['start_s']:.{digits}f}–{fault['stop_s']:.{digits}f}",
+        _epsilon(fault.get("epsilon"), bounds),
+        _sat(fault.get("sat")),
+        f"{fault['probability']:.3f}",
+        text(severity, SEVERITY_STYLES.get(severity, "")),
+    )
+
+
+def _epsilon(value: Mapping[str, Any] | None, bounds: bool) -> str:
     if not value or value.get("value") is None:
         return "–"
     low, high = value.get("low"), value.get("high")
-    bounds = f" ({low:.2f}–{high:.2f})" if low is not None and high is not None else ""
-    return f"{value['value']:.2f}{bounds}"
+    known = bounds and low is not None and high is not None
+    return f"{value['value']:.2f}" + (f" ({low:.2f}–{high:.2f})" if known else "")
 
 
 def _sat(value: Mapping[str, Any] | None) -> str:

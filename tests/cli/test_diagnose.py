@@ -1,0 +1,199 @@
+"""`mfhca diagnose` and `mfhca report`: what they call, print and end with."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from cli.main import run
+from diagnosis.result import MissionResult
+from replay.errors import NotJudged
+
+
+def interval(severity: str, number: int = 1) -> dict[str, Any]:
+    return {
+        "id": f"F{number}",
+        "component": "FR",
+        "kind": "wheel",
+        "side": "sensor",
+        "mode": "stuck",
+        "start_s": 5.0,
+        "stop_s": 9.0,
+        "epsilon": {"value": 1.0, "low": 0.99, "high": 1.0},
+        "sat": {"mean": 0.3, "rms": 0.3, "low": 0.29, "high": 0.31, "unit": "m/s"},
+        "probability": 0.999,
+        "severity": severity,
+    }
+
+
+def result(*severities: str) -> MissionResult:
+    verdict = {
+        "status": "stop" if severities else "ready",
+        "title": f"{len(severities)} faults [/]",
+        "text": "The FR speed sensor was stuck.",
+        "caveats": ["Steering is not assessed."],
+        "actions": [{"n": 1, "text": "Repair it.", "faults": ["F1"], "severity": "high"}] if severities else [],
+    }
+    intervals = [interval(s, i) for i, s in enumerate(severities, 1)]
+    return MissionResult({"verdict": verdict, "intervals": intervals}, {"t": np.arange(2.0)})
+
+
+@pytest.fixture
+def calls(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> dict[str, Any]:
+    """Replace the pipeline by one that returns `calls['result']` and notes what it was asked."""
+    seen: dict[str, Any] = {"result": result()}
+
+    def diagnose(paths: list[Path], machine: Any, **options: Any) -> MissionResult:
+        seen.update(paths=paths, machine=machine, **options)
+        options["progress"]("reading")
+        if isinstance(seen["result"], Exception):
+            raise seen["result"]
+        return seen["result"]  # type: ignore[no-any-return]
+
+    def write_result(result: MissionResult, folder: Path, *, max_size_mb: float) -> tuple[Path, ...]:
+        seen.update(folder=folder, max_size_mb=max_size_mb)
+        return folder / "report.html", folder / "report.json"
+
+    monkeypatch.setattr("diagnosis.pipeline.diagnose", diagnose)
+    monkeypatch.setattr("diagnosis.output.write_result", write_result)
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "drive.mcap").write_text("x")
+    return seen
+
+
+@pytest.mark.parametrize(
+    ("severities", "fail_on", "code"),
+    [
+        ((), "info", 0),
+        (("info",), "low", 0),
+        (("info",), "info", 1),
+        (("low",), "low", 1),
+        (("low", "medium"), "high", 0),
+        (("medium", "high"), "high", 1),
+        (("high",), "never", 0),
+    ],
+)
+def test_exit_code_by_severity(severities: tuple[str, ...], fail_on: str, code: int, calls: dict[str, Any]) -> None:
+    calls["result"] = result(*severities)
+    assert run(["diagnose", "drive.mcap", "--fail-on", fail_on]) == code
+
+
+def test_options_reach_the_pipeline(calls: dict[str, Any]) -> None:
+    Path("crane.toml").write_text('[machine]\nname = "Crane"\n')
+    words = "diagnose drive.mcap -m crane.toml --start 1 --end 9 -w rl -w FR --machine-id HX4 -o out --max-size 5"
+    assert run(words.split()) == 0
+    assert calls["paths"] == [Path("drive.mcap")]
+    assert (calls["machine"].name, calls["machine_source"], calls["machine_id"]) == ("Crane", "crane.toml", "HX4")
+    assert (calls["start_s"], calls["stop_s"], calls["wheels"]) == (1.0, 9.0, ("FR", "RL"))
+    assert (calls["folder"], calls["max_size_mb"]) == (Path("out"), 5.0)
+
+
+@pytest.mark.parametrize(
+    ("log", "folder"),
+    [
+        ("drive.mcap", "drive-report"),
+        ("a.b.csv.gz", "a.b-report"),
+        ("plain", "plain-report"),
+        ("rec.v1", "rec.v1-report"),
+    ],
+)
+def test_the_default_folder_stands_in_the_current_one(log: str, folder: str, calls: dict[str, Any]) -> None:
+    path = Path("deep") / log
+    if log.startswith("rec"):
+        path.mkdir(parents=True)
+    else:
+        path.parent.mkdir()
+        path.write_text("x")
+    assert run(["diagnose", str(path)]) == 0
+    assert calls["folder"] == Path(folder)
+
+
+def test_the_verdict_is_printed(calls: dict[str, Any], capsys: pytest.CaptureFixture[str]) -> None:
+    calls["result"] = result("high")
+    run(["diagnose", "drive.mcap"])
+    seen = capsys.readouterr()
+    assert seen.out.startswith(" STOP AND REPAIR   1 faults [/]\n")
+    for words in (
+        "Repair it.  F1",
+        "■ stuck",
+        "5.00–9.00",
+        "1.00 (0.99–1.00)",
+        "+0.300 m/s",
+        "0.999",
+        "Steering is not",
+    ):
+        assert words in seen.out
+    assert seen.out.endswith("Report: drive-report/report.html\n")
+    assert seen.err == ""
+
+
+def test_many_faults_are_cut_with_a_word_about_it(calls: dict[str, Any], capsys: pytest.CaptureFixture[str]) -> None:
+    calls["result"] = result(*["medium"] * 55)
+    run(["diagnose", "drive.mcap"])
+    assert "… and 15 more in the report" in capsys.readouterr().out
+
+
+def test_json_is_the_report_alone(calls: dict[str, Any], capsys: pytest.CaptureFixture[str]) -> None:
+    calls["result"] = result("low")
+    assert run(["diagnose", "drive.mcap", "--json", "-v"]) == 1
+    seen = capsys.readouterr()
+    assert json.loads(seen.out) == calls["result"].report
+    assert "Report: drive-report/report.html" in seen.err
+
+
+def test_quiet_prints_nothing(calls: dict[str, Any], capsys: pytest.CaptureFixture[str]) -> None:
+    calls["result"] = result("low")
+    assert run(["diagnose", "drive.mcap", "-q"]) == 1
+    assert capsys.readouterr() == ("", "")
+
+
+def test_nothing_to_judge_is_3_with_the_reason(calls: dict[str, Any], capsys: pytest.CaptureFixture[str]) -> None:
+    calls["result"] = NotJudged("drive.mcap: no wheel was assessed")
+    assert run(["diagnose", "drive.mcap"]) == 3
+    assert capsys.readouterr() == ("", "error: drive.mcap: no wheel was assessed\n")
+
+
+def test_a_dry_run_writes_nothing(mission_log: Path, calls: dict[str, Any], capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(["diagnose", str(mission_log), "--dry-run", "--json"]) == 0
+    document = json.loads(capsys.readouterr().out)
+    assert "paths" not in calls
+    assert document["would_read"][0]["format"] == "mcap"
+    assert document["would_write"][0] == str(Path("drive-report") / "report.html")
+    assert run(["diagnose", str(mission_log), "--dry-run"]) == 0
+    assert "drive-report/report.json" in capsys.readouterr().out
+    assert not Path("drive-report").exists()
+
+
+def test_open_shows_the_page(calls: dict[str, Any], monkeypatch: pytest.MonkeyPatch) -> None:
+    opened: list[str] = []
+    monkeypatch.setattr("webbrowser.open", opened.append)
+    run(["diagnose", "drive.mcap", "--open"])
+    assert opened == [(Path.cwd() / "drive-report" / "report.html").as_uri()]
+
+
+def test_a_real_mission_from_log_to_page_and_again(
+    mission_log: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert run(["diagnose", str(mission_log), "--json"]) == 1
+    report = json.loads(capsys.readouterr().out)
+    stuck = [i for i in report["intervals"] if (i["component"], i["side"], i["mode"]) == ("FR", "sensor", "stuck")]
+    assert len(stuck) == 1
+    assert (stuck[0]["start_s"], stuck[0]["stop_s"]) == pytest.approx((5.0, 9.0), abs=0.1)
+    folder = tmp_path / "drive-report"
+    assert json.loads((folder / "report.json").read_text()) == report
+    page = (folder / "report.html").read_bytes()
+    (folder / "report.html").unlink()
+    assert run(["report", "drive-report"]) == 0
+    assert (folder / "report.html").read_bytes() == page
+    assert run(["report", str(folder / "report.json")]) == 0
+
+
+def test_a_file_that_is_no_result(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "report.json").write_text('{"schema": "other"}')
+    assert run(["report", str(tmp_path)]) == 3
+    assert "schema 'other' found" in capsys.readouterr().err

@@ -1,0 +1,114 @@
+"""`mfhca inspect` and `mfhca channels`."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from cli.console import Terminal
+from cli.listing import inspect_parts
+from cli.main import run
+from replay.inspect import InspectReport, TopicTiming
+
+
+def test_inspect_lists_topics_with_rates(mission_log: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(["inspect", str(mission_log)]) == 0
+    seen = capsys.readouterr()
+    rows = {line.split()[0]: line.split() for line in seen.out.splitlines() if line.startswith("/")}
+    assert rows["/joint_states"][1:4] == ["JointState", "1200", "100"]
+    assert rows["/imu"][1] == "Imu"
+    assert "2025-10-09 08:53:20" in seen.out
+    assert seen.err == ""
+
+
+def test_one_bad_file_does_not_stop_the_others(
+    mission_log: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    bad = tmp_path / "bad.mcap"
+    bad.write_bytes(b"nothing of the kind")
+    assert run(["inspect", str(bad), str(mission_log), str(tmp_path / "absent.bag"), "--json"]) == 3
+    seen = capsys.readouterr()
+    document = json.loads(seen.out)
+    assert [log["source"] for log in document["logs"]] == [str(mission_log)]
+    assert len(document["errors"]) == 2
+    assert [line.startswith("error: ") for line in seen.err.splitlines()] == [True, True]
+    topics = {t["name"]: t for t in document["logs"][0]["topics"]}
+    assert topics["/joint_states"]["rate_hz"] == pytest.approx(100.0)
+    assert document["logs"][0]["duration_s"] == pytest.approx(12.0, abs=0.02)
+
+
+def test_gaps_repeats_and_backward_stamps_are_told(capsys: pytest.CaptureFixture[str]) -> None:
+    topics = (
+        TopicTiming("/odd", "x/msg/Odd", 10, 100.0, 1, 1.7, 0.001, backwards=1, duplicates=2),
+        TopicTiming("/image", "sensor_msgs/msg/Image", 3, note="holds no numbers"),
+    )
+    Terminal().show(*inspect_parts(InspectReport("a.mcap", "mcap", 0, 0, topics, ())))
+    out = capsys.readouterr().out
+    assert "a.mcap  mcap, no stamps" in out
+    assert "• /odd: 1 gap, longest 1.7 s; 1 stamp goes back; 2 stamps repeat the one before" in out
+    assert "• /image: holds no numbers" in out
+
+
+def test_damage_is_told(mission_log: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    torn = tmp_path / "torn.mcap"
+    torn.write_bytes(mission_log.read_bytes()[:-4000])
+    assert run(["inspect", str(torn)]) == 0
+    assert "Damage" in capsys.readouterr().out
+    assert run(["channels", str(torn)]) == 0
+    assert "Damage" in capsys.readouterr().out
+
+
+def test_channels_show_mapping_and_costs(mission_log: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(["channels", str(mission_log)]) == 0
+    out = capsys.readouterr().out
+    row = next(line for line in out.splitlines() if line.startswith("wheel.FR.v "))
+    assert row.split()[1:4] == ["/joint_states.velocity[front_right_wheel]", "rad/s", "100"]
+    missing = out.partition("Missing, and what it costs")[2]
+    assert "wheel.*.{pressure_a,pressure_b}" in missing
+
+
+def test_channels_as_json_are_one_document(mission_log: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(["channels", str(mission_log), "--json"]) == 0
+    seen = capsys.readouterr()
+    document = json.loads(seen.out)
+    assert seen.err == ""
+    signals = {s["name"]: s for s in document["signals"]}
+    fr = signals["wheel.FR.v"]
+    assert (fr["unit"], fr["recorded_unit"], fr["guessed"], fr["samples"]) == ("m/s", "rad/s", True, 1200)
+    assert fr["max"] == pytest.approx(0.3, abs=0.002)
+    assert all(m["cost"] for m in document["missing"])
+
+
+def test_given_signals_and_their_absence(mission_log: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    machine = tmp_path / "machine.toml"
+    machine.write_text(
+        "[signals]\n"
+        '"cmd.v" = { topic = "/cmd_vel", field = "twist.linear.x", unit = "mm/s" }\n'
+        '"wheel.FR.u" = { topic = "/valves", field = "data[0]" }\n'
+    )
+    assert run(["channels", str(mission_log), "-m", str(machine)]) == 0
+    out = capsys.readouterr().out
+    assert "/cmd_vel.twist.linear.x  (given)" in out
+    assert "names '/valves.data[0]', which no source holds" in out
+
+
+def test_several_files_are_named(mission_log: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    table = tmp_path / "plc.csv"
+    rows = "".join(f"{1_760_000_000_000_000_000 + i * 10_000_000},{i / 1000}\n" for i in range(1000))
+    table.write_text("time_ns,wheel.FR.pressure_a\n" + rows)
+    assert run(["channels", str(mission_log), str(table)]) == 0
+    out = capsys.readouterr().out
+    rows = {line.split()[0]: line for line in out.splitlines() if line.startswith("wheel.FR.")}
+    assert "wheel.FR.pressure_a  in plc.csv" in rows["wheel.FR.pressure_a"]
+    assert "in drive.mcap" in rows["wheel.FR.v"]
+
+
+@pytest.mark.parametrize("columns", ["80", "120"])
+def test_tables_keep_to_the_width(
+    columns: str, mission_log: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("COLUMNS", columns)
+    assert run(["channels", str(mission_log)]) == 0
+    assert max(len(line) for line in capsys.readouterr().out.splitlines()) <= int(columns)

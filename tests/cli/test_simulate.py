@@ -1,0 +1,73 @@
+"""`mfhca simulate`: a log, its truth, and the words to go on with."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from cli.main import run
+from replay.machine import haulotte
+from replay.mission import load_mission
+from replay.truth import read_truth
+
+SHORT = ["--duration", "4", "--rate", "100", "--scenario", "healthy"]
+
+
+@pytest.mark.parametrize(
+    ("name", "kind"),
+    [
+        ("m.mcap", "mcap"),
+        ("m.bag", "bag"),
+        ("m", "rosbag2"),
+        ("m.txt", "twincat"),
+        ("m.csv", "csv"),
+        ("m.parquet", "parquet"),
+    ],
+)
+def test_every_format_is_read_again_without_a_machine_file(
+    name: str, kind: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    log = tmp_path / name
+    assert run(["simulate", "-o", str(log), *SHORT]) == 0
+    assert f"({kind}, 4 s at 100 Hz)" in " ".join(capsys.readouterr().out.split())
+    assert read_truth(tmp_path / "m.truth.json").duration_s == 4.0
+    mission = load_mission([log], haulotte())
+    assert mission.timeline.size == 400
+    assert {f"wheel.{w}.{s}" for w in haulotte().wheels for s in ("v", "u", "v_true", "u_applied")} <= set(
+        mission.timeline.signals
+    )
+
+
+def test_faults_as_words_reach_the_truth(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    log = tmp_path / "m.mcap"
+    faults = ["--fault", "FR sensor stuck 1 2 sat=0.2", "--fault", "RL actuator inefficient 2 3 eps=0.4"]
+    assert run(["simulate", "-o", str(log), *SHORT, *faults, "--json"]) == 0
+    document = json.loads(capsys.readouterr().out)
+    assert (document["faults"], document["diagnose"]) == (2, ["mfhca", "diagnose", str(log)])
+    truth = read_truth(Path(document["truth"]))
+    assert [(i.component, i.mode, i.epsilon, i.sat_mean) for i in truth.intervals] == [
+        ("FR", "stuck", 1.0, 0.2),
+        ("RL", "inefficient", 0.4, 0.0),
+    ]
+
+
+def test_the_default_name_follows_the_format(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert run(["simulate", "-q", *SHORT]) == 0
+    assert run(["simulate", "-q", "--format", "bag", *SHORT]) == 0
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["mission.bag", "mission.mcap", "mission.truth.json"]
+
+
+def test_a_format_beats_the_ending(tmp_path: Path) -> None:
+    log = tmp_path / "m.log"
+    assert run(["simulate", "-q", "-o", str(log), "-f", "mcap", *SHORT]) == 0
+    assert log.read_bytes().startswith(b"\x89MCAP0")
+    assert (tmp_path / "m.log.truth.json").is_file()
+
+
+def test_the_same_seed_gives_the_same_bytes(tmp_path: Path) -> None:
+    for name in ("a.mcap", "b.mcap"):
+        assert run(["simulate", "-q", "-o", str(tmp_path / name), "--seed", "7", *SHORT]) == 0
+    assert (tmp_path / "a.mcap").read_bytes() == (tmp_path / "b.mcap").read_bytes()

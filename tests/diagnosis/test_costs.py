@@ -1,0 +1,19 @@
+"""Every signal that a machine can have has a cost when it is missing."""
+
+from __future__ import annotations
+
+from diagnosis.costs import cost_of_missing
+from replay.machine import haulotte
+
+
+def test_every_canonical_signal_has_a_cost() -> None:
+    assert [name for name in haulotte().canonical_signals() if not cost_of_missing(name)] == []
+
+
+def test_an_unknown_name_has_none() -> None:
+    assert cost_of_missing("wheel.FR.colour") == cost_of_missing("moon.phase") == ""
+
+
+def test_sensor_and_actuator_differ() -> None:
+    assert "actuator is not assessed" in cost_of_missing("wheel.RL.u")
+    assert "rests on the wheel model" in cost_of_missing("wheel.RL.v_true")

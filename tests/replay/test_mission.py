@@ -1,0 +1,98 @@
+"""From files to one timeline."""
+
+from __future__ import annotations
+
+import dataclasses
+import hashlib
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from replay.errors import LogError
+from replay.machine import SourceOptions, haulotte
+from replay.mission import content_hash, load_mission, read_signals, source_options
+
+START = 1_760_000_000_000_000_000
+
+
+def write_table(path: Path, name: str, values: np.ndarray, step_ns: int = 10_000_000, start: int = START) -> Path:
+    rows = "".join(f"{start + i * step_ns},{v!r}\n" for i, v in enumerate(values.tolist()))
+    path.write_text(f"time_ns,{name}\n{rows}")
+    return path
+
+
+def test_two_files_become_one_mission(tmp_path: Path) -> None:
+    speed, command = np.linspace(0.0, 0.3, 200), np.linspace(0.0, 0.2, 100)
+    a = write_table(tmp_path / "a.csv", "wheel.FR.v", speed)
+    b = write_table(tmp_path / "b.csv", "wheel.FR.u", command, step_ns=20_000_000)
+    told: list[str] = []
+    mission = load_mission([a, b], haulotte(), progress=told.append)
+    assert [(f.path, f.format, f.bytes) for f in mission.files] == [
+        (a, "csv", a.stat().st_size),
+        (b, "csv", b.stat().st_size),
+    ]
+    assert mission.files[0].sha256 == hashlib.sha256(a.read_bytes()).hexdigest()
+    assert (mission.timeline.start_ns, mission.timeline.step_ns, mission.timeline.size) == (START, 10_000_000, 200)
+    np.testing.assert_allclose(mission.timeline.signals["wheel.FR.v"], speed)
+    assert mission.timeline.sources == {"wheel.FR.v": str(a), "wheel.FR.u": str(b)}
+    assert "reading a.csv" in told
+    assert "reading b.csv" in told
+
+
+def test_a_part_of_a_mission(tmp_path: Path) -> None:
+    log = write_table(tmp_path / "a.csv", "wheel.FR.v", np.arange(200.0) / 1000)
+    timeline = load_mission([log], haulotte(), start_s=0.5, stop_s=1.0).timeline
+    assert timeline.start_ns == START + 500_000_000
+    np.testing.assert_allclose(timeline.signals["wheel.FR.v"], np.arange(50, 101) / 1000)
+
+
+def test_without_wheels_the_error_names_the_file(tmp_path: Path) -> None:
+    log = write_table(tmp_path / "a.csv", "oil_level", np.arange(200.0))
+    _, signals = read_signals([log], haulotte())
+    assert "wheel.FR.v" in signals.missing
+    with pytest.raises(LogError, match=r"a\.csv: no wheel signal"):
+        load_mission([log], haulotte())
+
+
+def test_files_of_different_days_are_refused(tmp_path: Path) -> None:
+    a = write_table(tmp_path / "a.csv", "wheel.FR.v", np.arange(200.0) / 1000)
+    b = write_table(tmp_path / "b.csv", "wheel.FR.u", np.arange(200.0) / 1000, start=START + 86_400 * 10**9)
+    with pytest.raises(LogError, match="do not overlap in time"):
+        load_mission([a, b], haulotte())
+
+
+def test_the_first_fitting_pattern_gives_the_options() -> None:
+    first, second = SourceOptions(separator=";"), SourceOptions(separator=",")
+    machine = dataclasses.replace(haulotte(), sources={"plc*.csv": first, "*.csv": second})
+    assert source_options(Path("deep/plc-1.csv"), machine) is first
+    assert source_options(Path("other.csv"), machine) is second
+    assert source_options(Path("drive.mcap"), machine) == SourceOptions()
+
+
+def test_options_of_a_source_are_used(tmp_path: Path) -> None:
+    log = tmp_path / "plc.csv"
+    log.write_text("tick,wheel.FR.v\n" + "".join(f"{i * 10},{i / 1000}\n" for i in range(100)))
+    options = SourceOptions(time="tick", time_unit="ms", epoch="2025-10-09T08:53:20")
+    machine = dataclasses.replace(haulotte(), sources={"plc.csv": options})
+    timeline = load_mission([log], machine).timeline
+    assert (timeline.start_ns, timeline.step_ns) == (START, 10_000_000)
+
+
+def test_the_hash_of_a_folder_knows_names_contents_and_their_borders(tmp_path: Path) -> None:
+    def folder(name: str, **files: str) -> Path:
+        (tmp_path / name / "sub").mkdir(parents=True)
+        for key, text in files.items():
+            (tmp_path / name / "sub" / key).write_text(text)
+        return tmp_path / name
+
+    one = content_hash(folder("one", a="12", b="3"))
+    assert one == content_hash(folder("same", b="3", a="12"))
+    assert one[1] == 3
+    others = [folder("two", a="1", b="23"), folder("three", a="12", c="3"), folder("four", a="12")]
+    assert len({one[0], *(content_hash(f)[0] for f in others)}) == 4
+
+
+def test_the_hash_of_a_missing_file(tmp_path: Path) -> None:
+    with pytest.raises(LogError, match="cannot be read"):
+        content_hash(tmp_path / "absent")
