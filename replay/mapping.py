@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import difflib
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from fnmatch import fnmatch
 from pathlib import PurePath
@@ -219,8 +219,3 @@ def _sparse(stamps: NDArray[np.int64], values: NDArray[Any]) -> tuple[NDArray[np
     usual = np.median(steps)
     regular = float((np.abs(steps - usual) <= max(1.0, 0.2 * usual)).mean())
     return (stamps[rows], values[rows]) if usual >= 2 and regular > 0.8 else (stamps, values)
-
-
-def sources_of(signals: Mapping[str, Signal]) -> Collection[str]:
-    """Sources that at least one signal came from."""
-    return tuple(dict.fromkeys(s.source for s in signals.values()))

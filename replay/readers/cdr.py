@@ -17,6 +17,7 @@ from replay.readers.definitions import MessageType
 from replay.readers.layout import Layout, LayoutError, layout_of
 
 MAX_ROUNDS = 24
+GIVE_UP = 500
 _ROW_BYTES = 8192
 
 
@@ -85,7 +86,7 @@ class Decoder:
                 left, part = _take(layout, data, starts, left)
                 if part is not None:
                     yield part
-            while len(left) and len(met) < MAX_ROUNDS:
+            while len(left) and len(met) < MAX_ROUNDS and not self._hopeless():
                 new = self._walk(data, int(starts[left[0]]), int(size))
                 if new is None:
                     left = left[1:]
@@ -94,6 +95,9 @@ class Decoder:
                 left, part = _take(new, data, starts, left)
                 if part is not None:
                     yield part
+            if self._hopeless():
+                self.outcome.bad += len(left)
+                continue
             for row in left:  # slow fallback: layouts that hardly repeat
                 single = self._walk(data, int(starts[row]), int(size))
                 if single is not None:
@@ -101,6 +105,10 @@ class Decoder:
                     part = _take(single, data, starts, np.array([row]))[1]
                     if part is not None:
                         yield part
+
+    def _hopeless(self) -> bool:
+        """Whether so many payloads failed and none fitted that the definition is not theirs."""
+        return self.outcome.bad >= GIVE_UP and not any(self.met.values())
 
     def _walk(self, data: NDArray[np.uint8], start: int, size: int) -> Layout | None:
         try:

@@ -141,9 +141,7 @@ class _Walk:
 
     def take(self, size: int, align: int) -> int:
         """Reserve `size` bytes, aligned in CDR, and return where they start."""
-        self.steps += 1
-        if self.steps > MAX_STEPS:
-            raise LayoutError(f"a message has more than {MAX_STEPS} parts")
+        self.step()
         at = self.pos
         if not self.kind.ros1:
             at = self.base + (at - self.base + align - 1) // align * align
@@ -151,6 +149,12 @@ class _Walk:
             raise LayoutError(f"a payload of {self.end} bytes ends inside a field at byte {at}")
         self.pos = at + size
         return at
+
+    def step(self) -> None:
+        """Count parts, so that no definition can make a payload endless."""
+        self.steps += 1
+        if self.steps > MAX_STEPS:
+            raise LayoutError(f"a message has more than {MAX_STEPS} parts")
 
     def word(self) -> int:
         at = self.take(4, 4)
@@ -163,6 +167,7 @@ class _Walk:
         return self.take(length, 1), length
 
     def message(self, path: _Path, name: str, parent: _Scope | None, emit: bool) -> None:
+        self.step()
         if len(path) > 2 * MAX_DEPTH:
             raise LayoutError("messages are nested too deep")
         scope = _Scope(parent)

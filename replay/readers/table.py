@@ -7,13 +7,10 @@ from collections import Counter
 from collections.abc import Collection
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
-import numpy as np
 import pandas as pd
 import pyarrow as pa
 import pyarrow.parquet as pq
-from numpy.typing import NDArray
 
 from replay.errors import LogError
 from replay.machine import SourceOptions
@@ -21,14 +18,9 @@ from replay.rawlog import Channel, Clock, LogSummary, RawLog, TopicInfo
 from replay.readers.clocks import Report
 from replay.readers.columns import epoch_ns, numbers, parse, stamps, unit_of
 from replay.readers.textfile import first_text, read_text
+from replay.readers.time_column import find_time
 
 _SEPARATORS = ("\t", ";", ",", "|")
-_TIME = re.compile(
-    r"^(t|time|times?tamp|stamp|rel(ative)?[ _]?time|elapsed([ _]?time)?|date[ _]?time|zeit|zeitstempel|seconds?|secs?|"
-    r"header\.stamp|log_time)([ _.]?(s|sec|ms|us|ns|nsec))?$"
-)
-_SUFFIX = re.compile(r"[ _.](s|sec|ms|us|ns|nsec)$")
-_UNITS = {"s": "s", "sec": "s", "seconds": "s", "ms": "ms", "us": "us", "µs": "us", "ns": "ns", "nsec": "ns"}
 _MAX_PARQUET = 16 << 30
 _MAX_COLUMNS = 20_000
 
@@ -239,7 +231,7 @@ def _build(table: _Table, options: SourceOptions, clock: Clock, report: Report) 
     path, frame = table.path, table.frame
     if not len(frame):
         raise LogError(f"{path} has a header and no row of data")
-    name, unit = _time_column(table, options, report)
+    name, unit = find_time(path, frame, options, report)
     epoch = epoch_ns(options, str(path))
     at, keep = stamps(frame[name], unit, epoch, table.decimal, f"{path.name}, column {name!r}", report)
     if not len(at):
@@ -263,68 +255,3 @@ def _build(table: _Table, options: SourceOptions, clock: Clock, report: Report) 
     said = tuple(report.notes), tuple(report.damage)
     summary = LogSummary(str(path), table.format, int(at.min()), int(at.max()), (topic,), *said, table.metadata)
     return RawLog(str(path), table.format, clock, channels, summary)
-
-
-def _time_column(table: _Table, options: SourceOptions, report: Report) -> tuple[str, str]:
-    """Name and unit of the time column: as given, by its name, or the first that only rises.
-
-    Raises
-    ------
-    LogError
-        Where the given column does not exist or none can be found.
-    """
-    path, frame = table.path, table.frame
-    names = [str(c) for c in frame.columns]
-    if options.time is not None:
-        wanted = options.time.strip()
-        if wanted not in names:
-            raise LogError(f"{path} has no column {wanted!r} for time; its columns are {', '.join(names[:12])}")
-        return wanted, "iso" if frame[wanted].dtype.kind == "M" else options.time_unit
-    called = [n for n in names if _TIME.match(_bare(n).lower())]
-    for name in [n for n in called if _rises(frame[n])] or [n for n in names if _rises(frame[n])]:
-        unit = _time_unit(name, frame[name], options)
-        how = "by its name" if name in called else "because it only rises"
-        report.note(f"{path.name}: time is column {name!r} in {unit}, found {how}; [sources] time and time_unit set it")
-        return name, unit
-    raise LogError(
-        f"{path} has no time column (none rises); give [sources] time; its columns are {', '.join(names[:12])}"
-    )
-
-
-def _bare(name: str) -> str:
-    """Name without a unit in brackets."""
-    return re.sub(r"\s*[\[(][^\[\]()]*[\])]\s*$", "", name).strip()
-
-
-def _rises(column: pd.Series[Any]) -> bool:
-    """Whether a column never falls, and rises in most steps; a rare step back is allowed."""
-    if column.dtype.kind == "M":
-        values: NDArray[Any] = column.dropna().to_numpy().astype(np.int64)
-    elif column.dtype.kind in "iuf":
-        values = column.dropna().to_numpy()
-    else:
-        moments = pd.to_datetime(column.dropna().head(2000), errors="coerce", utc=True, format="ISO8601").dropna()
-        values = moments.dt.tz_localize(None).to_numpy().astype(np.int64)
-    if len(values) < 2 or len(values) < 0.9 * min(len(column), 2000):
-        return len(column) == 1 and len(values) == 1
-    steps = np.diff(values.astype(np.float64))
-    return bool((steps >= 0).mean() > 0.99 and (steps > 0).mean() > 0.5)
-
-
-def _time_unit(name: str, column: pd.Series[Any], options: SourceOptions) -> str:
-    """Unit of a time column that was found: stated in the options or the name, else by size and step."""
-    if column.dtype.kind not in "iuf":
-        return "iso"
-    if options.time_unit != "s":
-        return options.time_unit
-    suffix = _SUFFIX.search(_bare(name).lower())
-    stated = unit_of(name) or (suffix.group(1) if suffix else "")
-    if stated.lower() in _UNITS:
-        return _UNITS[stated.lower()]
-    size = float(column.abs().max())
-    for unit, low, high in (("ns", 1e18, 4e18), ("filetime", 1.2e17, 1.6e17), ("us", 1e15, 4e15), ("ms", 1e12, 4e12)):
-        if low < size < high:
-            return unit
-    whole = column.dtype.kind in "iu"
-    step = float(np.median(np.diff(column.dropna().to_numpy().astype(np.float64)))) if len(column) > 1 else 1.0
-    return "ms" if whole and 2 <= step <= 5000 else "s"

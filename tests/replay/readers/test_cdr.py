@@ -208,6 +208,11 @@ def test_payloads_that_do_not_fit_are_counted_with_the_reason(text: str, payload
     assert reason in outcome.reason
 
 
+def test_a_definition_of_another_message_is_given_up_and_every_message_counted() -> None:
+    _, outcome = columns(resolve("p/msg/T", "ros2msg", "float64 v", False), [b"\0\1\0\0" + bytes(20)] * 3000)
+    assert outcome.bad == 3000
+
+
 @pytest.mark.parametrize(
     ("text", "reason"),
     [
