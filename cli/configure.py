@@ -95,5 +95,9 @@ def show(terminal: Terminal, machine: MachineFile = None) -> None:
     terminal.show_text(f"# {source}\n{dump_machine(the_machine)}")
 
 
-for _function in (init, check, show):
-    app.command()(_function)
+for _function, _example in (
+    (init, "mfhca config init -o machine.toml"),
+    (check, "mfhca config check machine.toml --log mission.mcap"),
+    (show, "mfhca config show -m machine.toml > full.toml"),
+):
+    app.command(epilog=f"\b\nExample:\n  {_example}")(_function)

@@ -9,7 +9,7 @@ import typer
 
 from cli.app import command
 from cli.console import Terminal
-from cli.inputs import check_times, check_wheels, machine_of, mission_paths
+from cli.inputs import check_output, check_times, check_wheels, machine_of, mission_paths
 from cli.options import End, FailOn, Json, Logs, MachineFile, MaxSize, Start
 
 DIAGNOSE_EXAMPLES = """\b
@@ -24,6 +24,7 @@ Examples:
   mfhca report mission-report/report.json --max-size 5"""
 
 _FAULTS = 1
+_OUTPUTS = ("report.html", "report.json", "report.parquet")
 
 
 @command
@@ -57,6 +58,7 @@ def diagnose(
     the_machine, source = machine_of(machine)
     wheels = check_wheels(wheel, the_machine)
     folder = output if output is not None else _default_folder(paths[0])
+    check_output([folder / name for name in _OUTPUTS], paths)
     if dry_run:
         _plan(terminal, paths, the_machine, source, folder, json)
         return
@@ -135,7 +137,7 @@ def _plan(terminal: Terminal, paths: list[Path], machine: Any, source: str, fold
         found.append(
             {"path": str(path), "format": summary.format, "duration_s": (summary.stop_ns - summary.start_ns) * 1e-9}
         )
-    outputs = [str(folder / name) for name in ("report.html", "report.json", "report.parquet")]
+    outputs = [str(folder / name) for name in _OUTPUTS]
     if json:
         machine_part = {"name": machine.name, "source": source}
         terminal.show_json({"would_read": found, "machine": machine_part, "would_write": outputs})

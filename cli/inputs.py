@@ -65,6 +65,17 @@ def _check_one_recording(folder: Path) -> None:
         )
 
 
+def check_output(outputs: Iterable[Path], inputs: Iterable[Path]) -> None:
+    """Raise a `ConfigError` where a result would replace a log, or stand inside a recording's folder."""
+    for output in (o.resolve() for o in outputs):
+        for path in inputs:
+            real = path.resolve()
+            if output == real or real in output.parents:
+                raise ConfigError(
+                    f"{path}: would be changed by writing {output.name} there; give another place with -o"
+                )
+
+
 def check_times(start: float | None, end: float | None) -> None:
     """Raise a `ConfigError` where the asked part of a mission cannot be one."""
     for name, value in (("--start", start), ("--end", end)):

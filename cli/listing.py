@@ -37,7 +37,7 @@ def inspect_parts(report: InspectReport) -> list[RenderableType]:
     parts.append(table(headings, rows, right=(2, 3, 4, 5, 6)) if rows else text("It holds no topics."))
     unusual = [f"{t.name}: {words}" for t in report.topics if (words := _unusual(t))]
     for title, lines, style in (
-        ("Timing", unusual, "bold"),
+        ("Unusual", unusual, "bold"),
         ("Damage", report.damage, "bold red"),
         ("Notes", report.notes, "bold"),
     ):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import traceback
 from typing import Annotated, Any
 
 import typer
@@ -21,7 +22,7 @@ Examples:
   mfhca channels mission.mcap
   mfhca channels drive.bag plc-export.csv -m machine.toml"""
 
-_UNREADABLE = 3
+_UNREADABLE, _INTERNAL = 3, 70
 
 
 @command
@@ -36,13 +37,14 @@ def inspect(
 ) -> None:
     """Show what logs hold: topics, types, counts, rates, gaps, clocks, damage."""
     from cli.listing import inspect_document, inspect_parts
-    from replay.errors import LogError, MfhcaError
+    from replay.errors import MfhcaError
     from replay.inspect import inspect_log
     from replay.mission import source_options
 
     the_machine, _ = machine_of(machine)
     found = find_logs(paths)
     failures = list(found.missing)
+    code = _UNREADABLE if failures else 0
     documents: list[dict[str, Any]] = []
     for line in found.missing:
         terminal.error(line)
@@ -50,21 +52,24 @@ def inspect(
         try:
             with terminal.progress(f"reading {path}"):
                 seen = inspect_log(path, source_options(path, the_machine))
-        except (MfhcaError, OSError) as error:
-            text = str(error) if isinstance(error, LogError) else f"{path}: {error}"
-            failures.append(text)
-            terminal.error(text)
+        except Exception as error:
+            known = isinstance(error, MfhcaError)
+            code = max(code, _UNREADABLE if known or isinstance(error, OSError) else _INTERNAL)
+            failures.append(str(error) if known else f"{path}: {type(error).__name__}: {error}")
+            if terminal.verbose and not known:
+                traceback.print_exc()
+            terminal.error(failures[-1])
             continue
         if json:
             documents.append(inspect_document(seen))
         else:
             terminal.show(*inspect_parts(seen), "")
     if found.left_aside:
-        terminal.note(f"{found.left_aside} other files in the folders are no logs by their names")
+        terminal.note(f"files in the folders that are no logs by their names: {found.left_aside}")
     if json:
         terminal.show_json({"logs": documents, "errors": failures})
-    if failures:
-        raise typer.Exit(_UNREADABLE)
+    if code:
+        raise typer.Exit(code)
 
 
 @command

@@ -9,7 +9,7 @@ import typer
 
 from cli.app import command
 from cli.console import Terminal
-from cli.inputs import check_times, machine_of, mission_paths
+from cli.inputs import check_output, check_times, machine_of, mission_paths
 from cli.options import End, Json, Logs, MachineFile, Start
 
 EXAMPLES = """\b
@@ -34,6 +34,7 @@ def replay(
     """Replay the control loop: v_c, e, ρ, Ψ̂ printed and implied, u_a and u_s, to Parquet, CSV or MCAP."""
     paths = mission_paths(logs)
     check_times(start, end)
+    check_output([output], paths)
     the_machine, source = machine_of(machine)
     with terminal.progress("starting") as progress:
         from replay.export.replay_log import format_of, write_replay

@@ -114,6 +114,9 @@ def simulate(
 
     kind = format or _format_of(output)
     log = output or Path(f"mission{_ENDINGS[kind]}")
+    truth = log.with_name(f"{log.name.removesuffix(_ENDINGS[kind])}.truth.json")
+    if log.exists() and not truth.exists():
+        raise ConfigError(f"{log}: exists and was not simulated, so it is left as it is; give another name with -o")
     faults = tuple(parse_fault(words) for words in fault) if fault else None
     with terminal.progress("simulating") as progress:
         from replay.export.mission import write_mission
@@ -136,8 +139,6 @@ def simulate(
         )
         progress(f"writing {log.name}")
         write_mission(mission, log, "ros1" if kind is LogFormat.BAG else kind.value)
-        stem = log.name.removesuffix(_ENDINGS[kind])
-        truth = log.with_name(f"{stem}.truth.json")
         write_truth(mission.truth, truth)
     words = ["mfhca", "diagnose", str(log)]
     if json:

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from cli.inputs import check_times, check_wheels, find_logs, machine_of, mission_paths
+from cli.inputs import check_output, check_times, check_wheels, find_logs, machine_of, mission_paths
 from replay.errors import ConfigError, LogError
 from replay.machine import haulotte
 
@@ -97,3 +97,13 @@ def test_machine_and_its_name(tmp_path: Path) -> None:
     machine, source = machine_of(file)
     assert (machine.name, source) == ("Crane", "crane.toml")
     assert machine_of(None)[1] == "paper defaults"
+
+
+def test_results_never_replace_a_log_or_stand_in_a_recording(tmp_path: Path) -> None:
+    make(tmp_path, "a.mcap", "rec/metadata.yaml")
+    check_output(
+        [tmp_path / "b.mcap", tmp_path / "rec-report" / "report.html"], [tmp_path / "a.mcap", tmp_path / "rec"]
+    )
+    for output in ("a.mcap", "x/../a.mcap", "rec/report/report.html"):
+        with pytest.raises(ConfigError, match="would be changed"):
+            check_output([tmp_path / output], [tmp_path / "a.mcap", tmp_path / "rec"])

@@ -112,3 +112,19 @@ def test_tables_keep_to_the_width(
     monkeypatch.setenv("COLUMNS", columns)
     assert run(["channels", str(mission_log)]) == 0
     assert max(len(line) for line in capsys.readouterr().out.splitlines()) <= int(columns)
+
+
+def test_a_crash_in_one_file_does_not_stop_the_others(
+    mission_log: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def inspect_log(path: Path, options: object) -> InspectReport:
+        if path.name == "poison.mcap":
+            raise ValueError("boom")
+        return InspectReport(str(path), "mcap", 0, 0, (), ())
+
+    (tmp_path / "poison.mcap").write_text("x")
+    monkeypatch.setattr("replay.inspect.inspect_log", inspect_log)
+    assert run(["inspect", str(tmp_path), str(mission_log)]) == 70
+    seen = capsys.readouterr()
+    assert "poison.mcap: ValueError: boom" in seen.err
+    assert str(mission_log) in seen.out

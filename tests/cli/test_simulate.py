@@ -71,3 +71,11 @@ def test_the_same_seed_gives_the_same_bytes(tmp_path: Path) -> None:
     for name in ("a.mcap", "b.mcap"):
         assert run(["simulate", "-q", "-o", str(tmp_path / name), "--seed", "7", *SHORT]) == 0
     assert (tmp_path / "a.mcap").read_bytes() == (tmp_path / "b.mcap").read_bytes()
+
+
+def test_a_recording_is_never_replaced(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    log = tmp_path / "real.bag"
+    log.write_text("recorded")
+    assert run(["simulate", "-o", str(log), *SHORT]) == 2
+    assert "exists and was not simulated" in capsys.readouterr().err
+    assert log.read_text() == "recorded"
