@@ -13,7 +13,7 @@ from diagnosis.direct import Pair, assess_pair, sample_status
 from diagnosis.model_based import WheelData, assess_wheel
 from diagnosis.noise import shifted
 from diagnosis.tracking import assess_tracking
-from diagnosis.wheel_model import WheelModelFit, common_load, fed_openings, identify, low_passed
+from diagnosis.wheel_model import WheelModelFit, aliasing_slack, common_load, fed_openings, identify, low_passed
 from replay.faults import Side, State
 from replay.loop import Replay, stack
 from replay.machine import Machine, Noise, WheelPlant
@@ -76,6 +76,7 @@ def assess_components(
         opening, slack = fed_openings(speed, opening, fit, machine.plant.flow, timeline.dt)
         for i, plant in enumerate(fit.plants):
             if plant is not None:
+                slack[:, i] = np.hypot(slack[:, i], aliasing_slack(opening[:, i], plant, timeline.dt))
                 residual[:, i] = speed[:, i] - plant.K * low_passed(opening[:, i], plant.tau, timeline.dt)
         common = common_load(residual, timeline.dt)
     out: dict[Key, Assessment] = {}

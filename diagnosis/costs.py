@@ -4,9 +4,9 @@ from __future__ import annotations
 
 _WHEEL = {
     "v_ref": "v_c,i is computed from v_c and ω_c by the kinematics; without those and a geometry there is no e and no Ψ̂",
-    "v": "speed sensor and actuator are not assessed, and the actuators of the others lose a peer",
+    "v": "the speed sensor is not assessed, and the actuator only where its valve opening is measured (u_applied)",
     "v_true": "ε of the speed sensor rests on the wheel model instead of a second measurement",
-    "u": "the actuator is not assessed, no Ψ̂ is implied, and the speed sensor is judged by commands and peers alone",
+    "u": "the actuator is not assessed, no Ψ̂ is implied, and without v_true the speed sensor only by whether it follows v_c,i",
     "u_applied": "ε of the actuator rests on the wheel model, and sensor and actuator loss are harder to tell apart",
     "psi": "nothing is judged by it; the replayed Ψ̂ has no recorded one beside it",
     "pressure_a": "nothing: pressures are shown beside the evidence and not judged",
@@ -14,10 +14,10 @@ _WHEEL = {
 }
 _STEER = {
     "phi_ref": "φ_c is computed from v_c and ω_c by the kinematics; without those the steering loop is not replayed",
-    "phi": "steering is not assessed, and wheel speeds are compared as if the wheels pointed where commanded",
-    "phi_true": "ε of the steering sensor rests on the steering model instead of a second measurement",
-    "u": "the steering actuator is not assessed",
-    "u_applied": "ε of the steering actuator rests on the steering model",
+    "phi": "the steering sensor is not assessed, and the wheels' own angles are unknown",
+    "phi_true": "the steering sensor is replayed and shown but not judged: that takes a second measurement",
+    "u": "the steering valve is not judged, and its replayed command has no recorded one beside it",
+    "u_applied": "the steering valve is replayed and shown but not judged: that takes its measured opening",
 }
 _OTHER = {
     "cmd.v": "without recorded v_c,i no wheel has a command: no e, no Ψ̂, no driving time",

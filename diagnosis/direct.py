@@ -12,8 +12,9 @@ from numpy.typing import NDArray
 
 from diagnosis import modes
 from diagnosis.assessment import CODE, Assessment, Finding
+from diagnosis.estimate import estimate_fault
 from diagnosis.kalman import GainBiasModel, track_gain_bias
-from diagnosis.noise import relative_lag, rounding_step, shifted, slow_mismatch, white_noise
+from diagnosis.noise import relative_lag, rounding_step, shifted, slow_mismatch, unresolved, white_noise, white_part
 from diagnosis.result import Epsilon, Hypothesis, Sat
 from diagnosis.segments import Run, absorb_short, merge_equal, runs_of, trim
 from replay.faults import FaultMode, Side, State
@@ -103,20 +104,28 @@ def assess_pair(pair: Pair, limits: Limits) -> Assessment:
     """
     usable = pair.fresh & np.isfinite(pair.y) & np.isfinite(pair.x)
     max_lag = max(1, round(_MAX_LAG_S / pair.dt)) if pair.dt <= _MAX_LAG_S else 0
-    lag = relative_lag(pair.y, pair.x, usable & ~pair.quiet, max_lag)
+    least_lag = 0 if pair.side is Side.ACTUATOR else -max_lag
+    lag = relative_lag(pair.y, pair.x, usable & ~pair.quiet, least_lag, max_lag)
     x = shifted(pair.x, lag)
     status = sample_status(pair.y, x, pair.fresh, pair.alive, pair.dt)
     model, lsb = _mode_model(pair, x, status, 0.25 * limits.min_sat)
+    blind, share = np.zeros(x.size, dtype=np.bool_), 0.0
+    if pair.side is Side.ACTUATOR:  # a command may jump from step to step, a speed may not
+        paired = status == modes.PAIR
+        blind, share = unresolved(np.where(paired, pair.y - x, np.nan), x, paired, model.noise, pair.dt)
+    status[blind & (status == modes.PAIR)] = modes.BLIND
     path = modes.most_probable(pair.y, x, status, pair.quiet, model)
     findings = []
     below = 0
-    for run in _tidy(path, pair, status, model, limits):
+    for run in _tidy(path, pair, status):
         finding = _finding(run, pair, x, status, model, limits, lag)
         if finding is None:
             below += 1
+        elif share and finding.mode is FaultMode.NOISY and _timing_explains(pair.y, pair.x, run):
+            blind[run.start : run.stop] = True
         else:
             findings.append(finding)
-    states = _states(pair, x, status, model, findings)
+    states = _states(pair, x, status, blind, findings)
     notes = [
         f"{pair.y_name} against {pair.x_name}: noise {model.noise:.2g} {pair.unit}, rounding step {lsb:.2g} {pair.unit}, "
         f"delay {lag * pair.dt * 1e3:.3g} ms."
@@ -125,12 +134,29 @@ def assess_pair(pair: Pair, limits: Limits) -> Assessment:
         notes.append(f"{below} deviations of {pair.y_name} lie below the limits of the machine file.")
     return Assessment(
         states=states,
-        reasons={State.NOT_EXCITED: "nothing is commanded and nothing moves", State.NO_DATA: "no samples"},
+        reasons={
+            State.NOT_EXCITED: "nothing is commanded and nothing moves",
+            State.NO_DATA: "no samples",
+            State.NOT_ASSESSED: "the command changes faster than the log's rate can resolve",
+        },
         findings=tuple(findings),
         columns=_columns(pair, x, status, model, path),
         tier="direct",
         notes=tuple(notes),
     )
+
+
+def _timing_explains(y: Array, x: Array, run: Run) -> bool:
+    """Whether a disturbance of y may be nothing but a delay.
+
+    Either what changes from sample to sample is as large, or y is x with its sign at other moments, as with a command
+    that switches to and fro between samples.
+    """
+    part = slice(run.start, run.stop)
+    deviation = np.sqrt(np.nanmean((y[part] - x[part]) ** 2))
+    sudden = max(float(np.sqrt(np.mean(white_part(z)[part] ** 2))) for z in (x, y))
+    size = np.sqrt(np.nanmean((np.abs(y[part]) - np.abs(x[part])) ** 2))
+    return bool(sudden > 0.3 * deviation or size < 0.3 * deviation)
 
 
 def _mode_model(pair: Pair, x: Array, status: NDArray[np.int8], tolerance: float) -> tuple[modes.ModeModel, float]:
@@ -166,9 +192,7 @@ def _mode_model(pair: Pair, x: Array, status: NDArray[np.int8], tolerance: float
     return model, lsb
 
 
-def _tidy(
-    path: modes.ModePath, pair: Pair, status: NDArray[np.int8], model: modes.ModeModel, limits: Limits
-) -> list[Run]:
+def _tidy(path: modes.ModePath, pair: Pair, status: NDArray[np.int8]) -> list[Run]:
     """Faulty runs of a path, joined where they belong together, without the ends in which nothing moves."""
     runs = absorb_short(runs_of(path), max(3, round(0.01 / pair.dt)))
     runs = merge_equal(runs, max(2, round(0.02 / pair.dt)), (modes.NOISY, modes.INEFFICIENT, modes.NO_SIGNAL))
@@ -188,12 +212,12 @@ def _tidy(
 
 
 def _finding(
-    run: Run, pair: Pair, x: Array, status: NDArray[np.int8], model: modes.ModeModel, limits: Limits, lag: int
+    run: Run, pair: Pair, x: Array, status: NDArray[np.int8], model: modes.ModeModel, limits: Limits, lag: float
 ) -> Finding | None:
     """Estimate ε and sat of a run; None where it lies below the limits or the evidence is thin."""
     part = slice(run.start, run.stop)
     y, ref, st, quiet = pair.y[part], x[part], status[part], pair.quiet[part]
-    use = st == modes.PAIR
+    use = (st == modes.PAIR) | (st == modes.BLIND)
     evidence = modes.segment_evidence(y, ref, st, quiet, model)
     gain = evidence[run.row] - evidence[modes.HEALTHY]
     if gain < model.switch_cost:
@@ -213,9 +237,11 @@ def _finding(
             mode = FaultMode.OUTSIDE_TABLE
         elif epsilon is not None and epsilon.value < limits.min_epsilon:
             return None
+    if pair.side is Side.ACTUATOR and mode in (FaultMode.STUCK, FaultMode.NO_SIGNAL) and deviation < 2.5 * model.noise:
+        return None  # the command hardly moved: a noisy reading of it looks constant too
     if mode is FaultMode.NOISY and deviation < max(2.5 * model.noise, limits.min_sat / 2):
         return None
-    shift = lag if pair.side is Side.ACTUATOR else 0
+    shift = round(lag) if pair.side is Side.ACTUATOR else 0
     side = pair.side.value
     hypotheses = sorted((Hypothesis(side, r, float(q)) for r, q in zip(modes.ROWS, p, strict=True)), key=lambda h: -h.p)
     return Finding(
@@ -230,90 +256,6 @@ def _finding(
         evidence=_sentences(run.row, mode, pair, y, ref, use, st, model, epsilon, sat, gain, deviation),
         tier="direct",
     )
-
-
-def estimate_fault(
-    row: int, y: Array, x: Array, model: modes.ModeModel, unit: str, *, noisy_x: bool
-) -> tuple[Epsilon | None, Sat | None, float] | None:
-    """ε̂ and the saturation term of one row of the table with 95 % bounds, and δ̂.
-
-    Parameters
-    ----------
-    row : int
-        Row of the table.
-    y, x : Array, shape (n,)
-        Samples of the run.
-    model : ModeModel
-        Noise of the channel.
-    unit : str
-        Unit of the saturation term.
-    noisy_x : bool
-        Whether the reference is a measurement with noise of its own rather than an exact command.
-    """
-    if y.size < 3:
-        return (Epsilon(1.0, 0.0, 1.0), None, 0.0) if row == modes.NO_SIGNAL else None
-    if row in (modes.STUCK, modes.NO_SIGNAL):
-        level = float(np.mean(y))
-        spread = float(np.std(y))
-        slack = min(1.0, 1.96 * (model.constant_noise + spread) / max(1e-300, float(np.std(x)) * np.sqrt(y.size)))
-        se = 1.96 * max(model.constant_noise, spread) / np.sqrt(y.size)
-        sat = Sat(level, float(np.sqrt(np.mean(y**2))), level - se, level + se, unit)
-        return Epsilon(1.0, 1.0 - slack, 1.0), sat, 0.0
-    if row == modes.INEFFICIENT:
-        sxx = float(x @ x)
-        if sxx <= 0:
-            return None
-        delta = float(x @ y) / sxx
-        residual = y - delta * x
-        se = 1.96 * np.sqrt(_long_run_variance(residual) / sxx)
-        return _epsilon(delta, se), None, delta
-    # noisy: δ̄ drifts; generalised least squares on differences of blocks and levels through the Kalman filter
-    delta, delta_se = _gain_with_drift(y, x, model, 0.05 if noisy_x else 0.0)
-    bias = y - delta * x
-    epsilon = _epsilon(delta, 1.96 * delta_se)
-    eps = max(epsilon.value, 0.05)
-    mean, rms = float(np.mean(bias)), float(np.sqrt(np.mean(bias**2)))
-    half = 1.96 * np.sqrt(_long_run_variance(bias) / bias.size) + 1.96 * delta_se * abs(float(np.mean(x)))
-    return epsilon, Sat(mean / eps, rms / eps, (mean - half) / eps, (mean + half) / eps, unit), delta
-
-
-def _epsilon(delta: float, half: float) -> Epsilon:
-    value = 1.0 - delta
-    return Epsilon(float(value), float(value - half), float(value + half))
-
-
-def _long_run_variance(residual: Array) -> float:
-    """Variance of the mean times n: AR(1) inflation of the sample variance."""
-    centred = residual - residual.mean()
-    var = float(centred @ centred) / max(1, residual.size - 1)
-    if var <= 0 or residual.size < 8:
-        return var
-    rho = min(0.999, max(0.0, float(centred[1:] @ centred[:-1]) / float(centred @ centred)))
-    return var * (1 + rho) / (1 - rho)
-
-
-def _gain_with_drift(y: Array, x: Array, model: modes.ModeModel, smooth_s: float) -> tuple[float, float]:
-    """δ of y = δ·x + δ̄ + n with an AR(1) δ̄ around a constant: Cochrane–Orcutt steps from a ridge on [δ, mean]."""
-    spread = float(np.std(y - 0.7 * x)) + model.noise
-    ridge = np.diag([1 / 0.3**2, 1 / (0.1 * model.span) ** 2])
-    width = min(x.size, max(1, round(smooth_s / model.dt)))
-    if width > 1:  # the noise of x would pull δ towards 0
-        x = np.convolve(np.pad(x, (width // 2, width - 1 - width // 2), mode="edge"), np.ones(width) / width, "valid")
-    start = np.array([0.7, 0.0])
-    rho, sigma, theta = 0.0, spread, start
-    design = np.stack([x, np.ones_like(x)], axis=1)
-    covariance = np.linalg.inv(ridge)
-    for _ in range(6):
-        a = (design[1:] - rho * design[:-1]) / sigma
-        b = (y[1:] - rho * y[:-1]) / sigma
-        information = ridge + a.T @ a
-        covariance = np.linalg.inv(information)
-        theta = np.asarray(covariance @ (ridge @ start + a.T @ b), dtype=np.float64)
-        residual = np.asarray(y - design @ theta, dtype=np.float64)
-        norm = float(residual[:-1] @ residual[:-1])
-        rho = min(0.9995, max(0.0, float(residual[1:] @ residual[:-1]) / norm)) if norm > 0 else 0.0
-        sigma = max(float(np.std(residual[1:] - rho * residual[:-1])), 1e-9 * model.span)
-    return float(theta[0]), float(np.sqrt(covariance[0, 0]))
 
 
 def _sentences(
@@ -364,13 +306,14 @@ def _sentences(
 
 
 def _states(
-    pair: Pair, x: Array, status: NDArray[np.int8], model: modes.ModeModel, findings: list[Finding]
+    pair: Pair, x: Array, status: NDArray[np.int8], blind: NDArray[np.bool_], findings: list[Finding]
 ) -> NDArray[np.int8]:
     """State of every sample: faults, healthy where something moves, else not excited or no data."""
     states = np.where(pair.quiet, CODE[State.NOT_EXCITED], CODE[State.HEALTHY]).astype(np.int8)
     known = np.isfinite(pair.y) & np.isfinite(x)
     nothing = ~known & (status != modes.SILENT)
     states[nothing] = CODE[State.NO_DATA]
+    states[blind & known] = CODE[State.NOT_ASSESSED]
     for f in findings:
         states[f.start : f.stop] = CODE[State(f.mode.value)]
     return states

@@ -275,6 +275,8 @@ def _judge(
         return None
     if data.u_measured and side is not Side.SENSOR:
         return None
+    if m == wf.S_DRIFT and float(np.mean(data.slack[start:stop] > 0)) > 0.3:
+        probability = 0.0  # a model in doubt looks like a drifting sensor
     seconds = (stop - start) * data.dt
     lines = [
         f"Over {seconds:.3f} s the model “{side_name} {mode_name.replace('_', ' ')}” explains {data.names[0]} better than "

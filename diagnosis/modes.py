@@ -33,7 +33,7 @@ ROW_OF_MODEL = np.array([HEALTHY, STUCK, NO_SIGNAL, INEFFICIENT, HEALTHY] + [NOI
 _MISMATCH, _FIRST_NOISY = 4, 5
 MODELS = ROW_OF_MODEL.size
 
-SKIP, PAIR, SILENT = 0, 1, 2
+SKIP, PAIR, SILENT, BLIND = 0, 1, 2, 3
 _STAY = 255
 _OUTLIER = -18.0
 _SILENT_COST = -6.0
@@ -163,6 +163,16 @@ def _likelihoods(y, x, status, quiet, p, noisy, mean, cov, out):  # type: ignore
     for m in range(out.size):
         if status == SILENT:
             out[m] = 0.0 if m == 2 else _SILENT_COST
+        elif status == BLIND:
+            # x jumps about between samples: only a y that does not join in says something, at most one bit a sample
+            out[m] = 0.0
+            if m in (1, 2):
+                level = mean[1, 0] if m == 1 and cov[1, 0] < p[2] ** 2 / 2 else (y if m == 1 else 0.0)
+                if abs(y - level) > 3.5 * p[1]:
+                    out[m] = -4.0
+                elif abs(x - level) > 5 * p[0]:
+                    out[m] = 0.69
+                _step(m, y, x, p, noisy, mean, cov)
         else:
             out[m] = max(_step(m, y, x, p, noisy, mean, cov), floor)
             if m >= _FIRST_NOISY:
@@ -262,7 +272,8 @@ def forward(
     y, x : Array, shape (n,)
         Measured value and reference.
     status : NDArray[np.int8], shape (n,)
-        `SKIP` (nothing new), `PAIR` (both valid) or `SILENT` (y silent while its source lives).
+        `SKIP` (nothing new), `PAIR` (both valid), `SILENT` (y silent while its source lives) or `BLIND` (both valid,
+        but x changes faster than the log resolves).
     quiet : NDArray[np.bool_], shape (n,)
         Where the machine stands, so that a reading of zero is what a healthy channel gives too.
     model : ModeModel

@@ -12,6 +12,8 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 _WINDOW_S = 0.25
+COARSE_STEP_S = 0.005  # slower logs do not fix the delay between a command and its measurement
+_COARSE_SHARE = 0.3
 
 
 def rounding_step(values: Array) -> float:
@@ -91,8 +93,15 @@ def slow_mismatch(residual: Array, use: NDArray[np.bool_], dt: float) -> float:
     return float(np.quantile(np.sqrt(squares[good] / counts[good]), 0.3)) if good.any() else float("nan")
 
 
-def shifted(x: Array, lag: int) -> Array:
-    """x delayed by `lag` steps (advanced where negative); NaN where nothing is known."""
+def shifted(x: Array, lag: float) -> Array:
+    """x delayed by `lag` steps (advanced where negative), interpolated between steps; NaN where nothing is known."""
+    whole = int(np.floor(lag))
+    part = lag - whole
+    out = _moved(x, whole)
+    return out if part < 1e-9 else (1 - part) * out + part * _moved(x, whole + 1)
+
+
+def _moved(x: Array, lag: int) -> Array:
     if lag == 0:
         return x
     out = np.full_like(x, np.nan)
@@ -103,22 +112,83 @@ def shifted(x: Array, lag: int) -> Array:
     return out
 
 
-def relative_lag(y: Array, x: Array, use: NDArray[np.bool_], max_lag: int) -> int:
-    """Delay of y against x in steps, by the smallest median |y(t) − x(t − lag)| where x changes.
+def relative_lag(y: Array, x: Array, use: NDArray[np.bool_], least_lag: int, max_lag: int) -> float:
+    """Delay of y against x in steps, to a tenth, by the smallest median |y(t) − x(t − lag)| where x changes.
 
-    A change of lag must lower the median by 2 % to be believed.
+    A change of lag must lower the median by 5 % to be believed; a valve cannot answer before its command, so there
+    `least_lag` is 0.
     """
     rate = np.abs(np.diff(x, prepend=x[:1]))
     smooth = np.convolve(np.nan_to_num(rate), np.ones(9) / 9, mode="same")
     moving = use & np.isfinite(y) & np.isfinite(x)
     if np.count_nonzero(moving) < 100:
-        return 0
+        return 0.0
     moving &= smooth >= np.quantile(smooth[moving], 0.7)
     places = np.flatnonzero(moving)
-    places = places[(places >= max_lag) & (places < y.size - max_lag)]
+    places = places[(places > max_lag) & (places < y.size - max_lag - 1)]
     places = places[:: max(1, places.size // 20_000)]
     if places.size < 50:
-        return 0
-    misfits = np.array([np.nanmedian(np.abs(y[places] - x[places - lag])) for lag in range(-max_lag, max_lag + 1)])
-    best = int(np.nanargmin(misfits)) - max_lag
-    return best if misfits[best + max_lag] < 0.98 * misfits[max_lag] else 0
+        return 0.0
+
+    def misfit(lag: float) -> float:
+        whole = int(np.floor(lag))
+        moved = (1 - (lag - whole)) * x[places - whole] + (lag - whole) * x[places - whole - 1]
+        return float(np.nanmedian(np.abs(y[places] - moved)))
+
+    best, least = 0.0, misfit(0.0)
+    for reach, step in ((max_lag, 1.0), (0.5, 0.1)):
+        candidates = np.clip(best + np.arange(-reach, reach + step / 2, step), least_lag, max_lag)
+        misfits = [misfit(c) for c in candidates]
+        k = int(np.argmin(misfits))
+        if misfits[k] < 0.95 * least:
+            best, least = float(candidates[k]), misfits[k]
+    return best
+
+
+def white_part(x: Array) -> Array:
+    """What changes from sample to sample in x, from its second differences; smooth motion leaves none. Shape (n,)."""
+    out = np.zeros(x.size)
+    out[1:-1] = (x[2:] - 2 * x[1:-1] + x[:-2]) / np.sqrt(6.0)
+    out[~np.isfinite(out)] = 0.0
+    return out
+
+
+def unresolved(
+    residual: Array, x: Array, use: NDArray[np.bool_], noise: float, dt: float
+) -> tuple[NDArray[np.bool_], float]:
+    """Where a reference changes faster than the log's rate can resolve, so that a delay below a step decides y − x.
+
+    The share of the reference's white part that shows up in the residual is read off the mission: where that part is
+    large, its median over windows of 0.3 s. It is near 0 where the delay is a whole number of steps.
+
+    Parameters
+    ----------
+    residual, x : Array, shape (n,)
+        y − x, and the reference.
+    use : NDArray[np.bool_], shape (n,)
+        Samples that count.
+    noise : float
+        Healthy noise of y − x.
+    dt : float
+        Step [s].
+
+    Returns
+    -------
+    blind : NDArray[np.bool_], shape (n,)
+        Samples that cannot be judged.
+    share : float
+        Share of the power of the white part that shows up; 0 where all is resolved.
+    """
+    kept = use & np.isfinite(residual) & np.isfinite(x)
+    white = np.where(kept, white_part(x), 0.0)
+    width = max(3, round(0.3 / dt))
+    kernel = np.ones(width) / width
+    power = np.convolve(white**2, kernel, mode="same")
+    lively = power > (3 * noise) ** 2
+    share = _COARSE_SHARE if dt >= COARSE_STEP_S else 0.0
+    if np.count_nonzero(lively) >= 10 * width:
+        seen = np.convolve(np.where(kept, residual, 0.0) ** 2, kernel, mode="same")
+        share = max(share, float(np.median(seen[lively] / power[lively])))
+    if share <= 0.05:
+        return np.zeros(x.size, dtype=np.bool_), 0.0
+    return np.asarray(share * power > (2 * noise) ** 2), share

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import lfilter
 
+from diagnosis.noise import COARSE_STEP_S, white_part
 from replay.machine import WheelPlant
 
 Array = NDArray[np.float64]
@@ -228,6 +229,16 @@ def _windowed(y: Array, p: Array, moving: NDArray[np.bool_], length: int) -> tup
     g = syp[good] / spp[good]
     misfit = (syy[good] - g * syp[good]) / np.maximum(syy[good], 1e-300)
     return g, misfit
+
+
+def aliasing_slack(u: Array, plant: WheelPlant, dt: float) -> Array:
+    """Error of the model [m/s], shape (n,), where u jumps about between samples of a slow log; else 0."""
+    if dt < COARSE_STEP_S:
+        return np.zeros(u.size)
+    width = max(3, round(0.5 / dt))
+    rms = np.sqrt(np.convolve(white_part(u) ** 2, np.ones(width) / width, mode="same"))
+    error = plant.K * rms * np.sqrt(dt / plant.tau)
+    return np.where(error > 0.02, error, 0.0)
 
 
 def common_load(residuals: Array, dt: float, smooth_s: float = 0.5) -> Array:

@@ -1,0 +1,96 @@
+"""ε̂ and the saturation term of one fault, with 95 % bounds, from the samples of its interval."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from diagnosis import modes
+from diagnosis.result import Epsilon, Sat
+
+Array = NDArray[np.float64]
+
+
+def estimate_fault(
+    row: int, y: Array, x: Array, model: modes.ModeModel, unit: str, *, noisy_x: bool
+) -> tuple[Epsilon | None, Sat | None, float] | None:
+    """ε̂ and the saturation term of one row of the table with 95 % bounds, and δ̂.
+
+    Parameters
+    ----------
+    row : int
+        Row of the table.
+    y, x : Array, shape (n,)
+        Samples of the run.
+    model : ModeModel
+        Noise of the channel.
+    unit : str
+        Unit of the saturation term.
+    noisy_x : bool
+        Whether the reference is a measurement with noise of its own rather than an exact command.
+    """
+    if y.size < 3:
+        return (Epsilon(1.0, 0.0, 1.0), None, 0.0) if row == modes.NO_SIGNAL else None
+    if row in (modes.STUCK, modes.NO_SIGNAL):
+        level = float(np.mean(y))
+        spread = float(np.std(y))
+        slack = min(1.0, 1.96 * (model.constant_noise + spread) / max(1e-300, float(np.std(x)) * np.sqrt(y.size)))
+        se = 1.96 * max(model.constant_noise, spread) / np.sqrt(y.size)
+        sat = Sat(level, float(np.sqrt(np.mean(y**2))), level - se, level + se, unit)
+        return Epsilon(1.0, 1.0 - slack, 1.0), sat, 0.0
+    if row == modes.INEFFICIENT:
+        sxx = float(x @ x)
+        if sxx <= 0:
+            return None
+        delta = float(x @ y) / sxx
+        residual = y - delta * x
+        se = 1.96 * np.sqrt(_long_run_variance(residual) / sxx)
+        return _epsilon(delta, se), None, delta
+    # noisy: δ̄ drifts; generalised least squares on differences of blocks and levels through the Kalman filter
+    delta, delta_se = _gain_with_drift(y, x, model, 0.05 if noisy_x else 0.0)
+    bias = y - delta * x
+    epsilon = _epsilon(delta, 1.96 * delta_se)
+    eps = max(epsilon.value, 0.05)
+    mean, rms = float(np.mean(bias)), float(np.sqrt(np.mean(bias**2)))
+    half = 1.96 * np.sqrt(_long_run_variance(bias) / bias.size) + 1.96 * delta_se * abs(float(np.mean(x)))
+    return epsilon, Sat(mean / eps, rms / eps, (mean - half) / eps, (mean + half) / eps, unit), delta
+
+
+def _epsilon(delta: float, half: float) -> Epsilon:
+    value = 1.0 - delta
+    return Epsilon(float(value), float(value - half), float(value + half))
+
+
+def _long_run_variance(residual: Array) -> float:
+    """Variance of the mean times n: AR(1) inflation of the sample variance."""
+    centred = residual - residual.mean()
+    var = float(centred @ centred) / max(1, residual.size - 1)
+    if var <= 0 or residual.size < 8:
+        return var
+    rho = min(0.999, max(0.0, float(centred[1:] @ centred[:-1]) / float(centred @ centred)))
+    return var * (1 + rho) / (1 - rho)
+
+
+def _gain_with_drift(y: Array, x: Array, model: modes.ModeModel, smooth_s: float) -> tuple[float, float]:
+    """δ of y = δ·x + δ̄ + n with an AR(1) δ̄ around a constant: Cochrane–Orcutt steps from a ridge on [δ, mean]."""
+    spread = float(np.std(y - 0.7 * x)) + model.noise
+    ridge = np.diag([1 / 0.3**2, 1 / (0.1 * model.span) ** 2])
+    width = min(x.size, max(1, round(smooth_s / model.dt)))
+    if width > 1:  # the noise of x would pull δ towards 0
+        x = np.convolve(np.pad(x, (width // 2, width - 1 - width // 2), mode="edge"), np.ones(width) / width, "valid")
+    start = np.array([0.7, 0.0])
+    rho, sigma = 0.0, spread
+    theta: Array = start
+    design = np.stack([x, np.ones_like(x)], axis=1)
+    covariance: Array = np.linalg.inv(ridge)
+    for _ in range(6):
+        a = (design[1:] - rho * design[:-1]) / sigma
+        b = (y[1:] - rho * y[:-1]) / sigma
+        information = ridge + a.T @ a
+        covariance = np.linalg.inv(information)
+        theta = covariance @ (ridge @ start + a.T @ b)
+        residual: Array = y - design @ theta
+        norm = float(residual[:-1] @ residual[:-1])
+        rho = min(0.9995, max(0.0, float(residual[1:] @ residual[:-1]) / norm)) if norm > 0 else 0.0
+        sigma = max(float(np.std(residual[1:] - rho * residual[:-1])), 1e-9 * model.span)
+    return float(theta[0]), float(np.sqrt(covariance[0, 0]))
