@@ -175,12 +175,13 @@ def test_full_output_is_said_and_no_internal_error() -> None:
 
 
 @pytest.mark.skipif(os.name == "nt", reason="POSIX signals")
-def test_an_interrupt_ends_with_130_and_leaves_nothing_behind(tmp_path: Path) -> None:
+@pytest.mark.parametrize("asked", [signal.SIGINT, signal.SIGTERM])
+def test_an_interrupt_ends_with_130_and_leaves_nothing_behind(asked: signal.Signals, tmp_path: Path) -> None:
     command = [*MFHCA, "simulate", "-v", "-o", str(tmp_path / "long.mcap"), "--duration", "100000"]
     with subprocess.Popen(command, cwd=ROOT, stderr=subprocess.PIPE, text=True) as process:
         assert process.stderr is not None
         assert process.stderr.readline() == "simulating\n"
-        process.send_signal(signal.SIGINT)
+        process.send_signal(asked)
         rest = process.stderr.read()
     assert process.returncode == 130
     assert only_line(rest) == "error: interrupted"

@@ -17,3 +17,4 @@ def test_an_unknown_name_has_none() -> None:
 def test_sensor_and_actuator_differ() -> None:
     assert "actuator is not assessed" in cost_of_missing("wheel.RL.u")
     assert "rests on the wheel model" in cost_of_missing("wheel.RL.v_true")
+    assert cost_of_missing("steer.front.u") != cost_of_missing("wheel.FR.u")
