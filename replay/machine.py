@@ -6,7 +6,7 @@ Defaults are the paper's Haulotte 16RTJ PRO with signals found automatically.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
 from replay.errors import ConfigError
@@ -343,17 +343,25 @@ class Machine:
                 f"geometry names the wheels {sorted(self.geometry.wheels)}, machine.wheels {sorted(self.wheels)}; "
                 "give every wheel its place, or leave geometry out"
             )
+        if self.geometry is not None:  # columns of the geometry stand in the order of the wheels
+            places = {w: self.geometry.wheels[w] for w in self.wheels}
+            object.__setattr__(self, "geometry", replace(self.geometry, wheels=places))
         check_range("geometry.gear_ratio", self.gear_ratio, 1e-3, 1e4, "")
         check_range("geometry.max_speed", self.max_speed, 1e-6, 1e6, "m/s")
         check_range("geometry.max_steer", self.max_steer, 0.0, 3.2, "rad")
-        for signal in self.signals:
-            quantity_of(signal)
-            group, _, rest = signal.partition(".")
-            part = rest.partition(".")[0]
-            if group == "wheel" and part not in self.wheels:
-                raise ConfigError(f"[signals] {signal!r}: no wheel {part!r}; machine.wheels has {list(self.wheels)}")
-            if group == "steer" and self.geometry is not None and part not in self.axles:
-                raise ConfigError(f"[signals] {signal!r}: no steering axle {part!r}; geometry has {list(self.axles)}")
+        for section, names in (("signals", self.signals), ("noise", self.noise)):
+            for name in names:
+                self._check_name(section, name)
+
+    def _check_name(self, section: str, name: str) -> None:
+        """Raise where a signal is not known or names no part of this machine."""
+        quantity_of(name)
+        group, _, rest = name.partition(".")
+        part = rest.partition(".")[0]
+        if group == "wheel" and part not in self.wheels:
+            raise ConfigError(f"[{section}] {name!r}: no wheel {part!r}; machine.wheels has {list(self.wheels)}")
+        if group == "steer" and self.geometry is not None and part not in self.axles:
+            raise ConfigError(f"[{section}] {name!r}: no steering axle {part!r}; geometry has {list(self.axles)}")
 
     @property
     def axles(self) -> tuple[str, ...]:

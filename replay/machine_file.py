@@ -209,17 +209,17 @@ def dump_machine(machine: Machine) -> str:
     """Write every setting of a machine as TOML that `load_machine` reads back."""
     lines = ["[machine]", f"name = {_text(machine.name)}", f"id = {_text(machine.id)}"]
     lines += [f"wheels = [{', '.join(_text(w) for w in machine.wheels)}]", "", "[geometry]"]
-    lines += [f"{key} = {getattr(machine, key)!r}" for key in _MACHINE_LEVEL]
+    lines += [f"{key} = {_real(getattr(machine, key))}" for key in _MACHINE_LEVEL]
     if machine.geometry is not None:
-        lines.append(f"wheel_diameter = {machine.geometry.wheel_diameter!r}")
+        lines.append(f"wheel_diameter = {_real(machine.geometry.wheel_diameter)}")
         for w, g in machine.geometry.wheels.items():
             steer = "own" if g.axle == w else g.axle
-            place = f"x = {g.x!r}, y = {g.y!r}, offset = {g.offset!r}, steer = {_text(steer)}"
+            place = f"x = {_real(g.x)}, y = {_real(g.y)}, offset = {_real(g.offset)}, steer = {_text(steer)}"
             lines.append(f"{_key(w)} = {{ {place} }}")
     lines += ["", "[control]", *_table(machine.control, {"lambda_": "lambda"})]
     lines += ["", "[plant]", f"coupling = {_text(machine.plant.coupling)}"]
     if machine.plant.flow is not None:
-        lines.append(f"flow = {machine.plant.flow!r}")
+        lines.append(f"flow = {_real(machine.plant.flow)}")
     lines += [f"{_key(w)} = {{ {', '.join(_table(p))} }}" for w, p in machine.plant.wheels.items()]
     lines += ["", "[limits]", *_table(machine.limits)]
     for section, items in (("noise", machine.noise), ("sources", machine.sources), ("signals", machine.signals)):
@@ -234,10 +234,14 @@ def _table(item: Any, rename: Mapping[str, str] | None = None) -> list[str]:
         if value is None or (isinstance(item, SignalSource) and value == default):
             continue
         text = (
-            _text(value) if isinstance(value, str) else str(value).lower() if isinstance(value, bool) else repr(value)
+            _text(value) if isinstance(value, str) else str(value).lower() if isinstance(value, bool) else _real(value)
         )
         out.append(f"{(rename or {}).get(f.name, f.name)} = {text}")
     return out
+
+
+def _real(value: float) -> str:
+    return repr(float(value))
 
 
 def _text(value: str) -> str:
