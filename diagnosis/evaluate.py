@@ -1,32 +1,31 @@
 """Compare a report with the truth: states over driving time, faults one to one.
 
-A fault is *right* where component, side and mode agree and the intervals overlap by at least `MIN_OVERLAP`
-(intersection over union). A fault of ``sensor_or_actuator`` is right for an inefficient sensor and for an inefficient
-actuator, the one pair that cannot be told apart. Time in which the truth says that an actuator was masked counts
-nowhere. Left-over faults are matched with left-over reports of the same component, then of any other: those have the
-wrong mode, side or part.
+A fault is right where component, side and mode agree and the intervals overlap enough (`diagnosis.matching`). Left-over
+faults are matched with left-over reports of the same component, then of any other: those have the wrong mode, side or
+part. Time in which the truth says that an actuator was masked counts nowhere.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import linear_sum_assignment
 
-from diagnosis.scores import COLUMNS, ROWS, SIDES, Counts, FaultOutcome, ReportOutcome
+from diagnosis.matching import UNION, assign, difference
+from diagnosis.outcomes import COLUMNS, ROWS, SIDES, Counts, FaultOutcome, ReportOutcome
+from diagnosis.spans import Span, codes_at, covered, length, merged, within, without
 from replay.errors import ConfigError, LogError
 from replay.truth import MissionTruth, TruthInterval
 
 Array = NDArray[np.float64]
-Span = tuple[float, float]
+Codes = NDArray[np.int64]
+States = Mapping[str, list[tuple[float, float, str]]]
 
-MIN_OVERLAP = 0.3
-_UNION = "sensor_or_actuator"
-_INEFFICIENT = ROWS.index("inefficient")
+_HEALTHY, _INEFFICIENT = ROWS.index("healthy"), ROWS.index("inefficient")
 _UNDECIDED = COLUMNS.index("undecided")
 
 
@@ -77,9 +76,7 @@ def evaluate_report(report: Mapping[str, Any], truth: MissionTruth, name: str = 
     try:
         return _evaluate(report, truth, name)
     except (KeyError, TypeError, ValueError, AttributeError) as error:
-        raise LogError(
-            f"{name}: is no complete report ({error!r}); run `mfhca diagnose` on the log again"
-        ) from error
+        raise LogError(f"{name}: is no complete report ({error!r}); run `mfhca diagnose` on the log again") from error
 
 
 def _evaluate(report: Mapping[str, Any], truth: MissionTruth, name: str) -> MissionScores:
@@ -118,115 +115,108 @@ class _Group:
         shift: float,
         window: Span,
         truth: MissionTruth,
-        states: Mapping[str, Mapping[str, list[tuple[float, float, str]]]],
+        states: Mapping[str, States],
     ) -> None:
         self.window, self.states, self.rate = window, states, truth.rate_hz
-        self.masked = {c: [(s.start_s, s.stop_s) for s in truth.masked if s.component == c] for c in states}
         driving: dict[str, list[Span]] = {}
         for s in truth.driving:
             driving.setdefault(s.component, []).append((s.start_s, s.stop_s))
-        anything = _merged([span for spans in driving.values() for span in spans])
-        self.driving = {c: _merged(driving.get(c, [])) if c in truth.wheels else anything for c in states}
+        anything = [span for spans in driving.values() for span in spans]
+        self.driving = {c: merged(driving.get(c, []) if c in truth.wheels else anything) for c in states}
+        self.masked = {
+            c: merged(self._clip(s.start_s, s.stop_s) for s in truth.masked if s.component == c) for c in states
+        }
         faults = [_Fault(f, *self._clip(f.start_s, f.stop_s)) for f in truth.intervals if f.component in states]
         self.faults = [f for f in faults if f.stop > f.start]
-        rows = [i for i in intervals if i["component"] in states]
-        self.rows = [r for r in rows if r["stop_s"] + shift > window[0] and r["start_s"] + shift < window[1]]
-        self.start = np.array([r["start_s"] for r in self.rows], dtype=np.float64) + shift
-        self.stop = np.array([r["stop_s"] for r in self.rows], dtype=np.float64) + shift
+        self.faulty = {c: merged((f.start, f.stop) for f in self.faults if f.truth.component == c) for c in states}
+        mine = [(i, i["start_s"] + shift, i["stop_s"] + shift) for i in intervals if i["component"] in states]
+        mine = [(i, a, b) for i, a, b in mine if b > window[0] and a < window[1]]
+        self.rows = [i for i, _, _ in mine]
+        self.start = np.array([a for _, a, _ in mine], dtype=np.float64)
+        self.stop = np.array([b for _, _, b in mine], dtype=np.float64)
 
     def _clip(self, start: float, stop: float) -> Span:
-        """First sample at or after each end, within the window."""
-        first, last = (np.ceil(t * self.rate - 1e-6) / self.rate for t in (start, stop))
-        return max(float(first), self.window[0]), min(float(last), self.window[1])
+        """First samples at or after the ends, within the window."""
+        return max(self._sample(start), self.window[0]), min(self._sample(stop), self.window[1])
+
+    def _sample(self, t: float) -> float:
+        return math.ceil(t * self.rate - 1e-6) / self.rate
+
+    def _hidden(self, component: str, side: str) -> list[Span]:
+        """Where the truth says that a side cannot be judged."""
+        return self.masked[component] if side == "actuator" else []
 
     def counts(self) -> Counts:
-        seconds = {side: np.zeros((len(ROWS), len(COLUMNS))) for side in SIDES}
-        healthy = []
-        for component in self.states:
-            for side, matrix in self._confusion(component).items():
-                seconds[side] += matrix
-            faulty = sum(b - a for a, b in self._faulty(component))
-            healthy.append(self.window[1] - self.window[0] - faulty)
+        """Count everything."""
+        each = [self._confusion(component) for component in self.states]
+        healthy = [self.window[1] - self.window[0] - length(self.faulty[c]) for c in self.states]
         faults, reports = self._events()
+        seconds = {side: np.sum([confusion[side] for confusion in each], axis=0) for side in SIDES}
         return Counts(seconds, faults, reports, float(np.mean(healthy)))
 
-    def _faulty(self, component: str) -> list[Span]:
-        return _merged([(f.start, f.stop) for f in self.faults if f.truth.component == component])
-
     def _confusion(self, component: str) -> dict[str, Array]:
-        """Driving time by true row and reported column, exact between all times at which anything changes."""
+        """Driving time by true row and reported column, exact between the times at which anything changes."""
+        driving = self.driving[component]
+        mine = [f for f in self.faults if f.truth.component == component]
         true = {
-            side: [(f.start, f.stop, f.truth.mode.value) for f in self.faults if _is(f.truth, component, side)]
-            for side in SIDES
+            s: [(f.start, f.stop, _index(f.truth.mode, ROWS, -1)) for f in mine if f.truth.side == s] for s in SIDES
         }
-        union = [
-            (a, b, str(r["mode"]))
-            for a, b, r in zip(self.start.tolist(), self.stop.tolist(), self.rows, strict=True)
-            if r["component"] == component and r["side"] == _UNION
+        told = {s: [(a, b, _index(m, COLUMNS, _UNDECIDED)) for a, b, m in self.states[component][s]] for s in SIDES}
+        either = [
+            (float(a), float(b), _index(r["mode"], COLUMNS, _UNDECIDED))
+            for a, b, r in zip(self.start, self.stop, self.rows, strict=True)
+            if r["component"] == component and r["side"] == UNION
         ]
-        masked, driving = self.masked[component], self.driving[component]
-        every = [*union, *masked, *driving, self.window]
-        for side in SIDES:
-            every += [*true[side], *self.states[component][side]]
-        cuts = np.unique(np.clip([t for span in every for t in span[:2]], *self.window))
+        coded = [*either, *(span for s in SIDES for span in (*true[s], *told[s]))]
+        spans = [*driving, *self.masked[component], *((a, b) for a, b, _ in coded), self.window]
+        cuts = np.unique(np.clip(np.array(spans).ravel(), *self.window))
         t, width = (cuts[1:] + cuts[:-1]) / 2, np.diff(cuts)
-        drives = _codes(t, [(a, b, 1) for a, b in driving], 0) == 1
-        hidden = _codes(t, [(a, b, 1) for a, b in _merged(masked)], 0) == 1
-        row = {s: _codes(t, [(a, b, _index(m, ROWS, -1)) for a, b, m in true[s]], 0) for s in SIDES}
-        either = _codes(t, [(a, b, _index(m, COLUMNS, _UNDECIDED)) for a, b, m in union], -1)
+        row = {s: codes_at(t, true[s], _HEALTHY) for s in SIDES}
+        claim = codes_at(t, either, -1)
+        drives = covered(cuts[1:], driving) > covered(cuts[:-1], driving)
         out = {}
         for side, other in (SIDES, SIDES[::-1]):
-            spans = [(a, b, _index(m, COLUMNS, _UNDECIDED)) for a, b, m in self.states[component][side]]
-            column = _codes(t, spans, _UNDECIDED)
-            column = np.where(either >= 0, _union_column(either, row[side], row[other]), column)
-            keep = drives & (row[side] >= 0) & ~(hidden & (side == "actuator"))
+            column = np.where(
+                claim < 0, codes_at(t, told[side], _UNDECIDED), _union_column(claim, row[side], row[other])
+            )
+            hidden = self._hidden(component, side)
+            keep = drives & (row[side] >= 0) & (covered(cuts[1:], hidden) == covered(cuts[:-1], hidden))
             out[side] = np.zeros((len(ROWS), len(COLUMNS)))
             np.add.at(out[side], (row[side][keep], column[keep]), width[keep])
         return out
 
-    def _unmasked(self, fault: _Fault, t: Array | float) -> Array:
-        """Time [s] on a clock that stands still while the fault's side is masked."""
-        spans = _merged(self.masked[fault.truth.component]) if fault.truth.side.value == "actuator" else []
-        return np.asarray(t, dtype=np.float64) - _inside(t, spans)
-
     def _events(self) -> tuple[tuple[FaultOutcome, ...], tuple[ReportOutcome, ...]]:
         """Match faults and reports one to one, and say what became of each."""
         overlap = np.zeros((len(self.faults), len(self.rows)))
-        grade = np.zeros(overlap.shape, dtype=np.int64)
-        for i, fault in enumerate(self.faults):
-            a, b, start, stop = (self._unmasked(fault, x) for x in (fault.start, fault.stop, self.start, self.stop))
+        for i, f in enumerate(self.faults):
+            hidden = self._hidden(f.truth.component, f.truth.side)
+            # a clock that stands still while the side is masked
+            a, b, start, stop = (t - covered(t, hidden) for t in (f.start, f.stop, self.start, self.stop))
             both = np.clip(np.minimum(b, stop) - np.maximum(a, start), 0.0, None)
             overlap[i] = both / np.maximum((b - a) + (stop - start) - both, 1e-12)
-            grade[i] = [_grade(fault.truth, row) for row in self.rows]
-        match = _assign(overlap, grade)
+        match = assign(overlap, [[difference(f.truth, row) for row in self.rows] for f in self.faults])
+        outcomes = ["surplus"] * len(self.rows)
         faults = []
-        report_outcomes = ["surplus"] * len(self.rows)
-        for i, fault in enumerate(self.faults):
+        for i, f in enumerate(self.faults):
             j = match.get(i)
-            outcome = self._fault_outcome(fault, j, 0.0 if j is None else float(overlap[i, j]))
-            faults.append(outcome)
+            fault = self._fault(f, j, 0.0 if j is None else float(overlap[i, j]))
+            faults.append(fault)
             if j is not None:
-                ignored = outcome.outcome in ("not_excited", "masked")
-                report_outcomes[j] = "ignored" if ignored else outcome.outcome
-        reports = [self._report_outcome(j, outcome) for j, outcome in enumerate(report_outcomes)]
-        return tuple(faults), tuple(reports)
+                outcomes[j] = "ignored" if fault.outcome in ("not_excited", "masked") else fault.outcome
+        return tuple(faults), tuple(self._report(j, outcome) for j, outcome in enumerate(outcomes))
 
-    def _fault_outcome(self, fault: _Fault, j: int | None, overlap: float) -> FaultOutcome:
-        truth = fault.truth
-        driving = _within(self.driving[truth.component], fault.start, fault.stop)
-        masked = _merged(self.masked[truth.component]) if truth.side.value == "actuator" else []
-        seen = [piece for a, b in driving for piece in _without((a, b), masked)]
-        first, first_seen = self._first_sample(driving), self._first_sample(seen)
-        outcome = "missed"
+    def _fault(self, fault: _Fault, j: int | None, overlap: float) -> FaultOutcome:
+        truth, row = fault.truth, None if j is None else self.rows[j]
+        driving = within(self.driving[truth.component], fault.start, fault.stop)
+        hidden = self._hidden(truth.component, truth.side)
+        first, first_seen = (self._first_sample(spans) for spans in (driving, without(driving, hidden)))
+        outcome = "missed" if row is None else difference(truth, row)
         if first_seen is None:
             outcome = "not_excited" if first is None else "masked"
-        elif j is not None:
-            row = self.rows[j]
-            right = (outcome := _difference(truth, row)) == "right"
         onset = end = error = None
-        if j is not None and first_seen is not None and right:
+        if row is not None and first_seen is not None and outcome == "right":
             onset = float(self.start[j]) - first_seen if first_seen == first else None
-            end = float(self.stop[j]) - fault.stop if not _hits(masked, fault.stop) else None
+            end = None if within(hidden, fault.stop - 1e-9, fault.stop) else float(self.stop[j]) - fault.stop
             estimate = (row.get("epsilon") or {}).get("value")
             error = None if estimate is None else abs(float(estimate) - truth.epsilon)
         return FaultOutcome(
@@ -236,9 +226,9 @@ class _Group:
             start_s=fault.start,
             stop_s=fault.stop,
             epsilon=truth.epsilon,
-            driving_share=sum(b - a for a, b in driving) / (fault.stop - fault.start),
+            driving_share=length(driving) / (fault.stop - fault.start),
             outcome=outcome,
-            report="" if j is None else str(self.rows[j]["id"]),
+            report="" if row is None else str(row["id"]),
             overlap=overlap,
             onset_error_s=onset,
             end_error_s=end,
@@ -247,23 +237,18 @@ class _Group:
 
     def _first_sample(self, spans: Sequence[Span]) -> float | None:
         """First recorded sample within spans [s]."""
-        for a, b in spans:
-            sample = float(np.ceil(a * self.rate - 1e-6) / self.rate)
-            if sample < b:
-                return sample
-        return None
+        return next((self._sample(a) for a, b in spans if self._sample(a) < b), None)
 
-    def _report_outcome(self, j: int, outcome: str) -> ReportOutcome:
+    def _report(self, j: int, outcome: str) -> ReportOutcome:
         row, start, stop = self.rows[j], float(self.start[j]), float(self.stop[j])
-        component = str(row["component"])
-        if outcome == "surplus" and row["side"] == "actuator":
-            hidden = sum(b - a for a, b in _within(_merged(self.masked[component]), start, stop))
-            outcome = "ignored" if hidden >= stop - start - 1e-9 else outcome
-        faulty = sum(b - a for a, b in _within(self._faulty(component), start, stop))
+        component, side = str(row["component"]), str(row["side"])
+        if outcome == "surplus" and not without([(start, stop)], self._hidden(component, side)):
+            outcome = "ignored"
+        faulty = length(within(self.faulty[component], start, stop))
         return ReportOutcome(
             id=str(row["id"]),
             component=component,
-            side=str(row["side"]),
+            side=side,
             mode=str(row["mode"]),
             severity=str(row["severity"]),
             start_s=start,
@@ -272,3 +257,19 @@ class _Group:
             outcome=outcome,
             false_alarm=outcome not in ("right", "ignored") and faulty < 0.5 * (stop - start),
         )
+
+
+def _index(name: str, names: Sequence[str], default: int) -> int:
+    return names.index(name) if name in names else default
+
+
+def _union_column(claim: Codes, mine: Codes, other: Codes) -> Codes:
+    """Column of one side where a fault of either side was reported.
+
+    Where one side is inefficient as claimed, the claim stands for that side and says nothing bad of a healthy other.
+    Where both sides are healthy it is wrong on both. Any other truth leaves the side undecided: the claim names none.
+    """
+    fulfilled = (claim == _INEFFICIENT) & ((mine == _INEFFICIENT) | (other == _INEFFICIENT))
+    false = (mine == _HEALTHY) & (other == _HEALTHY)
+    stands = np.where((mine == _INEFFICIENT) | (mine == _HEALTHY), mine, _UNDECIDED)
+    return np.where(fulfilled, stands, np.where(false, claim, _UNDECIDED))
