@@ -36,7 +36,8 @@ def proportional_part(law: str, v: Array, v_c: Array) -> Array:
     if law in ("signed", "opposed"):
         return np.asarray(v_c - v)
     part = np.abs(v_c) - np.abs(v)
-    return np.asarray(part if law == "printed" else np.sign(v_c) * part)
+    # sgn(0) = 1, as for Ψ̂²
+    return np.asarray(part if law == "printed" else np.where(v_c < 0, -part, part))
 
 
 def adaptive_sign(law: str, v: Array, v_c: Array) -> Array:
