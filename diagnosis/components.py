@@ -34,13 +34,19 @@ class ComponentResult:
 
 
 def alive_sources(timeline: Timeline) -> dict[str, NDArray[np.int16]]:
-    """Number of signals of each source that are valid at each step."""
+    """Number of signals of each source that deliver at each step: a new sample within two and a half periods."""
     out: dict[str, NDArray[np.int16]] = {}
-    for name, values in timeline.signals.items():
-        source = timeline.sources[name]
-        count = out.setdefault(source, np.zeros(timeline.size, dtype=np.int16))
-        count += np.isfinite(values)
+    for name in timeline.signals:
+        count = out.setdefault(timeline.sources[name], np.zeros(timeline.size, dtype=np.int16))
+        count += _delivers(timeline, name)
     return out
+
+
+def _delivers(timeline: Timeline, name: str) -> NDArray[np.bool_]:
+    steps = np.arange(timeline.size)
+    last = np.maximum.accumulate(np.where(timeline.fresh[name], steps, -(10**9)))
+    patience = max(1, round(2.5 * timeline.periods_ns[name] / timeline.step_ns))
+    return np.asarray(steps - last <= patience)
 
 
 def assess_components(
@@ -190,7 +196,7 @@ class _Wheel:
 
 def alive(timeline: Timeline, counts: dict[str, NDArray[np.int16]], name: str) -> NDArray[np.bool_]:
     """Whether another signal of the same source is valid at each step."""
-    return (counts[timeline.sources[name]] - np.isfinite(timeline.signals[name])) > 0
+    return (counts[timeline.sources[name]] - _delivers(timeline, name)) > 0
 
 
 def make_pair(

@@ -226,6 +226,12 @@ def _finding(
     tempered = prior + np.clip(_TEMPER * (evidence - evidence.max()), -700, 0)
     p = np.exp(tempered - tempered.max())
     p /= p.sum()
+    if run.row in (modes.STUCK, modes.NO_SIGNAL) and (
+        not use.any() or abs(float(np.mean(y[use]))) <= 3 * model.constant_noise / np.sqrt(min(use.sum(), 100))
+    ):  # stuck at zero and no signal are one row of the table
+        run = Run(run.start, run.stop, modes.NO_SIGNAL)
+        p[modes.NO_SIGNAL] += p[modes.STUCK]
+        p[modes.STUCK] = 0.0
     estimate = estimate_fault(run.row, y[use], ref[use], model, pair.unit, noisy_x=pair.side is Side.SENSOR)
     if estimate is None:
         return None

@@ -82,14 +82,14 @@ def _gain_with_drift(y: Array, x: Array, model: modes.ModeModel, smooth_s: float
     rho, sigma = 0.0, spread
     theta: Array = start
     design = np.stack([x, np.ones_like(x)], axis=1)
-    covariance: Array = np.linalg.inv(ridge)
+    covariance = np.asarray(np.linalg.inv(ridge), dtype=np.float64)
     for _ in range(6):
         a = (design[1:] - rho * design[:-1]) / sigma
         b = (y[1:] - rho * y[:-1]) / sigma
         information = ridge + a.T @ a
-        covariance = np.linalg.inv(information)
-        theta = covariance @ (ridge @ start + a.T @ b)
-        residual: Array = y - design @ theta
+        covariance = np.asarray(np.linalg.inv(information), dtype=np.float64)
+        theta = np.asarray(covariance @ (ridge @ start + a.T @ b), dtype=np.float64)
+        residual = np.asarray(y - design @ theta, dtype=np.float64)
         norm = float(residual[:-1] @ residual[:-1])
         rho = min(0.9995, max(0.0, float(residual[1:] @ residual[:-1]) / norm)) if norm > 0 else 0.0
         sigma = max(float(np.std(residual[1:] - rho * residual[:-1])), 1e-9 * model.span)

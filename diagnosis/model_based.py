@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from diagnosis import wheel_filter as wf
 from diagnosis.assessment import CODE, Assessment, Finding
-from diagnosis.noise import rounding_step, slow_mismatch, white_noise
+from diagnosis.noise import COARSE_STEP_S, quick_noise, rounding_step, slow_mismatch, white_noise
 from diagnosis.result import Epsilon, Hypothesis, Sat
 from replay.faults import FaultMode, Side, State
 from replay.machine import Limits, Noise, WheelPlant
@@ -19,6 +19,7 @@ Array = NDArray[np.float64]
 _TEMPER = 0.1
 _MEAN_HEALTHY_S = 60.0
 _RUN_IN_S = 2.0
+_MOST = 0.6
 
 
 @dataclass(frozen=True)
@@ -62,7 +63,10 @@ def filter_model(data: WheelData, plant: WheelPlant, residual: Array) -> wf.Whee
     period = data.dt * (float(np.median(np.diff(np.flatnonzero(pair)[:20_000]))) if fresh.size > 1 else 1.0)
     lsb = data.noise.lsb if data.noise.lsb is not None else rounding_step(fresh)
     white = data.noise.std or float(np.nan_to_num(white_noise(fresh, period)))
-    noise = max(white, lsb / np.sqrt(12), 1e-4 * data.span)
+    width = max(3, round(0.5 / data.dt))
+    changing = np.convolve(np.diff(data.y, prepend=data.y[:1]) != 0, np.ones(width), mode="same") > 0.1 * width
+    quick = quick_noise(np.where(pair & ~data.quiet & changing, residual, np.nan), data.dt)
+    noise = max(white, float(np.nan_to_num(quick)), lsb / np.sqrt(12), 1e-4 * data.span)
     load = slow_mismatch(residual - data.common, pair & ~data.quiet, data.dt)
     return wf.WheelFilterModel(
         K=plant.K,
@@ -142,17 +146,16 @@ def assess_wheel(
     }
     on_sensor = (path.model >= wf.S_STUCK) & (path.model <= wf.S_WHITE_25)
     on_actuator = path.model >= wf.A_GAIN
-    per_side = []
-    for mine in (on_sensor, on_actuator):
-        per_side.append(
-            {
-                **series,
-                "delta": np.where(mine, g, 1.0),
-                "delta_std": np.sqrt(np.where(mine, g_var, 0.0)),
-                "delta_bar": np.where(mine, b, 0.0),
-                "delta_bar_std": np.sqrt(np.where(mine, b_var, 0.0)),
-            }
-        )
+    per_side = [
+        {
+            **series,
+            "delta": np.where(mine, g, 1.0),
+            "delta_std": np.sqrt(np.where(mine, g_var, 0.0)),
+            "delta_bar": np.where(mine, b, 0.0),
+            "delta_bar_std": np.sqrt(np.where(mine, b_var, 0.0)),
+        }
+        for mine in (on_sensor, on_actuator)
+    ]
     per_side[1]["delta_bar"] = per_side[1]["delta_bar"] / model.K
     per_side[1]["delta_bar_std"] = per_side[1]["delta_bar_std"] / model.K
     note = (
@@ -167,12 +170,16 @@ def assess_wheel(
 
 def _holds(finding: Finding, data: WheelData, limits: Limits) -> bool:
     """Whether a finding may be stated: probable enough, and a valve's not resting on a model in doubt."""
-    if finding.probability < limits.min_probability and finding.tier != "signal":
+    if finding.tier == "signal":
+        return True
+    if finding.probability < limits.min_probability:
         return False
+    if finding.stop - finding.start > _MOST * np.count_nonzero(data.status == 1):
+        return False  # noise and model come from the same mission: what fills it cannot be told from their error
     if finding.side is Side.SENSOR:
         return True
     in_doubt = float(np.mean(data.slack[finding.start : finding.stop] > 0))
-    possible = finding.epsilon is None or (finding.epsilon.high > 0 and finding.epsilon.low < 1.2)
+    possible = finding.epsilon is None or 0 < finding.epsilon.value < 1.1
     return in_doubt < 0.3 and possible
 
 
@@ -250,9 +257,14 @@ def _judge(
     tempered = prior + np.clip(_TEMPER * (evidence - evidence.max()), -700, 0)
     p = np.exp(tempered - tempered.max())
     p /= p.sum()
+    use = data.status[start:stop] == 1
+    y = data.y[start:stop][use]
     pooled: dict[tuple[str, str], float] = {}
     for name, q in zip(wf.NAMES, p, strict=True):
         pooled[name] = pooled.get(name, 0.0) + float(q)
+    silent = y.size == 0 or abs(float(np.mean(y))) <= 3 * model.constant_noise
+    if silent and kind in (wf.S_STUCK, wf.S_NONE):  # stuck at zero and no signal are one row of the table
+        pooled["sensor", "no_signal"] += pooled.pop(("sensor", "stuck"))
     ranked = sorted(pooled.items(), key=lambda item: -item[1])
     (side_name, mode_name), probability = ranked[0]
     if mode_name == "healthy":
@@ -266,8 +278,6 @@ def _judge(
     m = int(np.argmax(np.where([n == (side_name, mode_name) for n in wf.NAMES], evidence, -np.inf)))
     if not gains and m not in (wf.S_STUCK, wf.S_NONE, wf.S_WHITE_3, wf.S_WHITE_8, wf.S_WHITE_25):
         return None
-    use = data.status[start:stop] == 1
-    y = data.y[start:stop][use]
     epsilon, sat = _estimate(m, y, z[m], P[m], model)
     if m == wf.A_STUCK and sat is not None and abs(sat.mean) < max(limits.min_sat, 2 * model.load / model.K):
         m, mode_name = wf.A_NONE, "no_signal"
@@ -275,8 +285,11 @@ def _judge(
         return None
     if data.u_measured and side is not Side.SENSOR:
         return None
-    if m == wf.S_DRIFT and float(np.mean(data.slack[start:stop] > 0)) > 0.3:
-        probability = 0.0  # a model in doubt looks like a drifting sensor
+    coarse = data.dt >= COARSE_STEP_S
+    if (m == wf.S_DRIFT or (coarse and m >= wf.S_GAIN and m not in (wf.S_WHITE_8, wf.S_WHITE_25))) and float(
+        np.mean(data.slack[start:stop] > 0)
+    ) > 0.3:
+        probability = 0.0  # a model in doubt looks like a drifting sensor, in a slow log like any fault of gain
     seconds = (stop - start) * data.dt
     lines = [
         f"Over {seconds:.3f} s the model “{side_name} {mode_name.replace('_', ' ')}” explains {data.names[0]} better than "

@@ -68,6 +68,17 @@ def white_noise(values: Array, dt: float) -> float:
     return float(np.quantile(rms, 0.4)) if rms.size >= 3 else float("nan")
 
 
+def quick_noise(residual: Array, dt: float) -> float:
+    """Root mean square of what changes within half a second in a residual, in its quieter windows; NaN where none."""
+    width = max(3, round(0.5 / dt))
+    known = np.isfinite(residual)
+    filled = np.where(known, residual, 0.0)
+    kernel = np.ones(width)
+    count = np.convolve(known, kernel, mode="same")
+    mean = np.convolve(filled, kernel, mode="same") / np.maximum(count, 1)
+    return slow_mismatch(residual - mean, known & (count > 0.8 * width), dt)
+
+
 def slow_mismatch(residual: Array, use: NDArray[np.bool_], dt: float) -> float:
     """Root mean square of a residual in its quieter windows: what healthy parts look like.
 

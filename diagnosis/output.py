@@ -110,4 +110,4 @@ def _write_page(
 ) -> None:
     page = build_page(report, columns, max_size_mb=size)
     with atomic_path(path) as temporary:
-        temporary.write_text(page, encoding="utf-8")
+        temporary.write_text(page, encoding="utf-8", newline="\n")

@@ -13,7 +13,7 @@ from diagnosis import metrics, quality
 from diagnosis.assessment import Assessment
 from diagnosis.components import ComponentResult, assess_components
 from diagnosis.decide import Decision, decide, intervals_of, spans_of
-from diagnosis.result import SCHEMA, FaultInterval, MissionResult, to_json
+from diagnosis.result import SCHEMA, MissionResult, to_json
 from replay.columns import replay_columns
 from replay.errors import ConfigError, NotJudged
 from replay.loop import Replay, replay_loop
@@ -72,6 +72,33 @@ def diagnose(
         if wheel not in machine.wheels:
             raise ConfigError(f"--wheel {wheel}: no such wheel; the machine has {', '.join(machine.wheels)}")
     mission = load_mission(paths, machine, start_s=start_s, stop_s=stop_s, progress=progress)
+    return diagnose_mission(
+        mission,
+        machine,
+        machine_source=machine_source,
+        wheels=chosen,
+        machine_id=machine_id,
+        progress=progress,
+    )
+
+
+def diagnose_mission(
+    mission: Mission,
+    machine: Machine,
+    *,
+    machine_source: str = "paper defaults",
+    wheels: Sequence[str] | None = None,
+    machine_id: str | None = None,
+    progress: Callable[[str], None] = _silent,
+) -> MissionResult:
+    """Diagnose a mission that is already aligned; see `diagnose`.
+
+    Raises
+    ------
+    NotJudged
+        Where nothing in the mission can be judged.
+    """
+    chosen = tuple(machine.wheels if wheels is None else wheels)
     progress("replaying the loop")
     replay = replay_loop(mission.timeline, machine)
     found = assess_components(mission.timeline, replay, machine, chosen, progress)
@@ -160,7 +187,7 @@ def _log(mission: Mission, moving: NDArray[np.bool_], machine: Machine) -> dict[
     return {
         "files": [
             {
-                "path": str(f.path),
+                "path": f.path.name,
                 "sha256": f.sha256,
                 "bytes": f.bytes,
                 "format": f.format,
@@ -192,10 +219,3 @@ def _machine(machine: Machine, source: str, machine_id: str | None) -> dict[str,
         "source": source,
     }
 
-
-def faults_of(result: MissionResult) -> list[Mapping[str, Any]]:
-    """The faults of a result as plain mappings, worst first."""
-    return list(result.report["intervals"])
-
-
-__all__ = ["FaultInterval", "diagnose", "faults_of"]

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import chi2
+from scipy.special import gammaincinv
 
 from diagnosis.outcomes import (
     COLUMNS,
@@ -204,7 +204,7 @@ def _false_alarms(judged: Sequence[ReportOutcome], hours: float) -> dict[str, An
     """Alarms per healthy hour with the upper 95 % bound of a Poisson count; those of severity info apart."""
     alarms = [r for r in judged if r.false_alarm]
     count = sum(r.severity != "info" for r in alarms)
-    bound = float(chi2.ppf(0.95, 2 * count + 2)) / 2
+    bound = float(gammaincinv(count + 1, 0.95))
     return {
         "count": count,
         "info": len(alarms) - count,

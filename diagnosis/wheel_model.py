@@ -19,7 +19,7 @@ from replay.machine import WheelPlant
 Array = NDArray[np.float64]
 
 _TAUS = (0.02, 0.05, 0.08, 0.12, 0.17, 0.25, 0.35, 0.5, 0.7, 1.0)
-_WINDOW_S = 4.0
+_WINDOW_S = 2.5
 _MAX_SPREAD = 0.25
 _OWN_RANGE = 0.15
 
@@ -238,7 +238,8 @@ def aliasing_slack(u: Array, plant: WheelPlant, dt: float) -> Array:
     width = max(3, round(0.5 / dt))
     rms = np.sqrt(np.convolve(white_part(u) ** 2, np.ones(width) / width, mode="same"))
     error = plant.K * rms * np.sqrt(dt / plant.tau)
-    return np.where(error > 0.02, error, 0.0)
+    usual = plant.K * float(np.sqrt(np.nanmean(u**2)))
+    return np.where(error > 0.1 * usual, error, 0.0)
 
 
 def common_load(residuals: Array, dt: float, smooth_s: float = 0.5) -> Array:

@@ -207,7 +207,7 @@ def _choose(
         fit_law(u, v, v_ref, dt, xi=control.xi, beta=control.beta, u_max=control.u_max, laws=laws) if recorded else ()
     )
     if not fits:
-        law = "signed" if control.law == "auto" else control.law
+        law: str = "signed" if control.law == "auto" else control.law
         why = "no recorded valve command to fit" if not recorded else "too few usable samples to fit"
         readings.append(Reading("control law", f"{law}: {mfhca.LAW_TEXT[law]}", f"{why}; λ = {control.lambda_:g} s/m"))
         readings.append(Reading("adaptive law Ψ̂", "printed only", why))
@@ -226,10 +226,10 @@ def _choose(
     readings.append(
         Reading("control law", f"{law}: {mfhca.LAW_TEXT[law]}", f"{detail}; replayed with λ = {lambda_:.4g} s/m")
     )
-    mode = control.psi
+    mode: str = control.psi
     zeta = control.zeta
     if mode == "auto":
-        mode = best.psi if fitted else "printed"  # type: ignore[assignment]
+        mode = best.psi if fitted else "printed"
         zeta = best.zeta if best.psi == "forced" and fitted else control.zeta
     text = {
         "printed": "L16 (13) as printed, exact exponential per step; Ψ̂(0) fitted"
