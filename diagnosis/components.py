@@ -12,6 +12,7 @@ from diagnosis.assessment import Assessment, unassessed
 from diagnosis.direct import Pair, assess_pair, sample_status
 from diagnosis.model_based import WheelData, assess_wheel
 from diagnosis.noise import shifted
+from diagnosis.parity import slipping
 from diagnosis.tracking import assess_tracking
 from diagnosis.wheel_model import WheelModelFit, aliasing_slack, common_load, fed_openings, identify, low_passed
 from replay.faults import Side, State
@@ -85,6 +86,7 @@ def assess_components(
                 slack[:, i] = np.hypot(slack[:, i], aliasing_slack(opening[:, i], plant, timeline.dt))
                 residual[:, i] = speed[:, i] - plant.K * low_passed(opening[:, i], plant.tau, timeline.dt)
         common = common_load(residual, timeline.dt)
+    slip = _slip(timeline, replay, machine, v)
     out: dict[Key, Assessment] = {}
     for i, wheel in enumerate(machine.wheels):
         if wheel not in wheels:
@@ -98,7 +100,7 @@ def assess_components(
             command = "u_applied" if has_applied[i] else "u"
             data = one.model_data(source, command, opening[:, i], common[:, i], slack[:, i], plant)
             assert fit is not None
-            model = assess_wheel(data, plant, residual[:, i], machine.limits, gains=fit.reliable)
+            model = assess_wheel(data, plant, residual[:, i], slip[:, i], machine.limits, gains=fit.reliable)
         elif fit is None and not has_true[i] and np.isfinite(v[:, i]).any() and np.isfinite(replay.v_ref[:, i]).any():
             model = assess_tracking(
                 v[:, i], replay.v_ref[:, i], timeline.dt, machine.limits, (f"wheel.{wheel}.v", "its command")
@@ -109,6 +111,21 @@ def assess_components(
         progress(f"judging steering {axle}")
         out[axle, "sensor"], out[axle, "actuator"] = _steering(timeline, replay, machine, j, axle, counts)
     return ComponentResult(out, fit)
+
+
+def _slip(timeline: Timeline, replay: Replay, machine: Machine, v: Array) -> NDArray[np.bool_]:
+    """Where a wheel breaks the parity of the body; nowhere without geometry, or without measured steering angles."""
+    geometry = machine.geometry
+    phi = stack(timeline, [f"steer.{a}.phi" for a in machine.axles])
+    if (
+        geometry is None
+        or v.shape[1] < 4
+        or not np.isfinite(v).any(axis=0).all()
+        or not np.isfinite(phi).any(axis=0).all()
+    ):
+        return np.zeros(v.shape, dtype=np.bool_)
+    least = 1.5 * machine.limits.min_sat
+    return slipping(v, phi, replay.phi_ref, replay.wheel_phi, geometry, timeline.dt, least)
 
 
 @dataclass(frozen=True)

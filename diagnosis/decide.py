@@ -248,18 +248,32 @@ def _main_reason(assessment: Assessment) -> str:
 
 
 def _actions(intervals: Sequence[FaultInterval]) -> tuple[dict[str, object], ...]:
-    """One action per component, side and mode, worst first."""
-    groups: dict[tuple[str, str, str, str], list[FaultInterval]] = {}
+    """One action per component and side, worst first."""
+    parts: dict[tuple[str, str, str], list[FaultInterval]] = {}
     for f in intervals:
         if f.severity != "info":
-            groups.setdefault((f.kind, f.component, f.side.value, f.mode.value), []).append(f)
+            parts.setdefault((f.kind, f.component, f.side.value), []).append(f)
     out: list[dict[str, object]] = []
-    for (kind, component, side, mode), faults in groups.items():
-        total = sum(f.stop_s - f.start_s for f in faults)
-        times = "" if len(faults) == 1 else f" in {len(faults)} spells"
-        text = f"{part_words(kind, component, side)} {mode_words(side, mode)} for {_seconds(total)}{times}: {faults[0].advice}"
+    for (kind, component, side), faults in parts.items():
+        modes: dict[str, list[FaultInterval]] = {}
+        for f in faults:
+            modes.setdefault(f.mode.value, []).append(f)
+        found = _join([_spells(side, mode, spells) for mode, spells in modes.items()])
+        text = f"{_order(faults[0])} the {part_words(kind, component, side)}: {found}."
         out.append({"n": len(out) + 1, "text": text, "faults": [f.id for f in faults], "severity": faults[0].severity})
     return tuple(out)
+
+
+def _order(worst: FaultInterval) -> str:
+    """What to do with a part, by its worst fault."""
+    if worst.severity == "high":
+        return "Stop at once and repair" if worst.side is Side.ACTUATOR else "Stop and repair"
+    return "Check at the next service" if worst.mode in _GONE else "May go out; check"
+
+
+def _spells(side: str, mode: str, faults: Sequence[FaultInterval]) -> str:
+    total = _seconds(sum(f.stop_s - f.start_s for f in faults))
+    return f"{mode_words(side, mode)} for {total}" + ("" if len(faults) == 1 else f" in {len(faults)} spells")
 
 
 def _sentence(faults: Sequence[FaultInterval]) -> str:

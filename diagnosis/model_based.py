@@ -83,7 +83,7 @@ def filter_model(data: WheelData, plant: WheelPlant, residual: Array) -> wf.Whee
 
 
 def assess_wheel(
-    data: WheelData, plant: WheelPlant, residual: Array, limits: Limits, *, gains: bool
+    data: WheelData, plant: WheelPlant, residual: Array, slip: NDArray[np.bool_], limits: Limits, *, gains: bool
 ) -> tuple[Assessment, Assessment]:
     """Judge sensor and actuator of a wheel by its model.
 
@@ -95,6 +95,8 @@ def assess_wheel(
         Wheel model.
     residual : Array, shape (n,)
         y − K·lowpass(u) [m/s].
+    slip : NDArray[np.bool_], shape (n,)
+        Where the wheel breaks the parity of the body.
     limits : Limits
         What counts.
     gains : bool
@@ -124,6 +126,7 @@ def assess_wheel(
     states_s, states_a = base.copy(), base.copy()
     states_a[~np.isfinite(data.u)] = CODE[State.NO_DATA]
     states_s[(doubtful | (not gains)) & (states_s == CODE[State.HEALTHY])] = CODE[State.NOT_ASSESSED]
+    states_s[slip & (states_s == CODE[State.HEALTHY])] = CODE[State.SLIP]
     blind = doubtful | (not gains) | (data.slack > 0)
     states_a[blind & (states_a == CODE[State.HEALTHY])] = CODE[State.NOT_ASSESSED]
     for f in sensor:
@@ -137,6 +140,7 @@ def assess_wheel(
         State.MASKED: "the speed sensor that would show it delivers nothing usable",
         State.NOT_ASSESSED: "the wheel model does not hold here (too uncertain, or the pump at its limit), or no single fault explains it",
         State.NO_DATA: "no samples",
+        State.SLIP: "the wheel breaks the parity of the body while it obeys its valve: it slips, or its sensor is off",
     }
     v, var, g, g_var, b, b_var = path.track
     series = {

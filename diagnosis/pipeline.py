@@ -218,4 +218,3 @@ def _machine(machine: Machine, source: str, machine_id: str | None) -> dict[str,
         "geometry": geometry,
         "source": source,
     }
-

@@ -139,11 +139,37 @@ def wheel_commands(
     return WheelCommands(speed, angle, axle_angle)
 
 
-def wheel_angles(axle_angle: NDArray[np.float64], geometry: Geometry) -> NDArray[np.float64]:
-    """Angle of each wheel from the measured axle angles.
+def rotation(axle_angle: NDArray[np.float64], geometry: Geometry) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Centre of rotation that the steering angles ask for: curvature ω/v_bx [1/m] and side slip v_by/v_bx [1].
 
-    An axle's angle is the direction of the velocity at (x_A, 0); two axle angles fix the centre of rotation, and with
-    it every wheel's angle. With one steered axle the unsteered wheels' axis takes the place of the second.
+    An axle's angle is the direction of the velocity at (x_A, 0); two axle angles fix the centre of rotation. With one
+    steered axle the unsteered wheels' axis takes the place of the second.
+
+    Parameters
+    ----------
+    axle_angle : NDArray[np.float64], shape (n, axles)
+        In the order of ``geometry.axles`` [rad].
+
+    Returns
+    -------
+    curvature, lateral : NDArray[np.float64], shape (n,)
+        Zero where the geometry has no shared axle.
+    """
+    axles = geometry.axles
+    n = axle_angle.shape[0]
+    places = [(geometry.axle_x(a), np.tan(axle_angle[:, axles.index(a)])) for a in axles if a not in geometry.wheels]
+    fixed = [w.x for w in geometry.wheels.values() if w.axle == "fixed"]
+    if len(places) == 1:
+        places.append((float(np.mean(fixed)) if fixed else 0.0, np.zeros(n)))
+    if len(places) < 2 or places[0][0] == places[1][0]:
+        return np.zeros(n), np.zeros(n)
+    # at (x, 0): v_y/v_x = (v_by + ω x)/v_bx = tan φ
+    curvature = np.asarray((places[0][1] - places[1][1]) / (places[0][0] - places[1][0]))
+    return curvature, np.asarray(places[0][1] - curvature * places[0][0])
+
+
+def wheel_angles(axle_angle: NDArray[np.float64], geometry: Geometry) -> NDArray[np.float64]:
+    """Angle of each wheel from the measured axle angles; see `rotation`.
 
     Parameters
     ----------
@@ -155,24 +181,33 @@ def wheel_angles(axle_angle: NDArray[np.float64], geometry: Geometry) -> NDArray
     NDArray[np.float64], shape (n, wheels)
         φ_i [rad].
     """
-    names = list(geometry.wheels)
-    axles = geometry.axles
-    out = np.zeros((axle_angle.shape[0], len(names)))
-    shared = [a for a in axles if a not in geometry.wheels]
-    tan = {a: np.tan(axle_angle[:, axles.index(a)]) for a in shared}
-    places = [(geometry.axle_x(a), tan[a]) for a in shared]
-    fixed = [w.x for w in geometry.wheels.values() if w.axle == "fixed"]
-    if len(places) == 1:
-        places.append((float(np.mean(fixed)) if fixed else 0.0, np.zeros(axle_angle.shape[0])))
-    curvature = lateral = np.zeros(axle_angle.shape[0])
-    if len(places) >= 2 and places[0][0] != places[1][0]:
-        # at (x, 0): v_y/v_x = (v_by + ω x)/v_bx = tan φ  ⇒  curvature ω/v_bx and side slip v_by/v_bx
-        curvature = (places[0][1] - places[1][1]) / (places[0][0] - places[1][0])
-        lateral = places[0][1] - curvature * places[0][0]
-    for i, name in enumerate(names):
-        w = geometry.wheels[name]
+    out = np.zeros((axle_angle.shape[0], len(geometry.wheels)))
+    curvature, lateral = rotation(axle_angle, geometry)
+    for i, w in enumerate(geometry.wheels.values()):
         if w.axle in geometry.wheels:
-            out[:, i] = axle_angle[:, axles.index(w.axle)]
+            out[:, i] = axle_angle[:, geometry.axles.index(w.axle)]
         elif w.axle != "fixed":
             out[:, i] = np.arctan((lateral + curvature * w.x) / (1.0 - curvature * w.y))
+    return out
+
+
+def speed_ratios(axle_angle: NDArray[np.float64], geometry: Geometry) -> NDArray[np.float64]:
+    """Wheel speed per forward speed of the body without slip, the angles held: s·|v_k|/v_bx − κ·d_i by L1 (1).
+
+    Parameters
+    ----------
+    axle_angle : NDArray[np.float64], shape (n, axles)
+        Measured axle angles [rad].
+
+    Returns
+    -------
+    NDArray[np.float64], shape (n, wheels)
+        Ratios [1]; all 1 straight ahead.
+    """
+    curvature, lateral = rotation(axle_angle, geometry)
+    out = np.empty((axle_angle.shape[0], len(geometry.wheels)))
+    for i, w in enumerate(geometry.wheels.values()):
+        k_x, k_y = 1.0 - curvature * w.y, lateral + curvature * w.x
+        rolling = k_x if w.axle == "fixed" else np.sign(k_x) * np.hypot(k_x, k_y)
+        out[:, i] = rolling - curvature * w.offset
     return out
