@@ -1,20 +1,26 @@
 """Make the sample missions: ``python sample_logs/make.py`` (the same files on every run).
 
-Each log has ``<stem>.truth.json`` beside it; the machine files name every signal of the logs.
+Each log has ``<stem>.truth.json`` beside it; the machine files name every signal of the logs. With ``--golden`` nothing
+is made but ``golden/<stem>.json``: what `mfhca diagnose` finds in each mission today, to be reviewed as text.
 """
 
 from __future__ import annotations
 
-import sys
+import argparse
+import json
 from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
+from diagnosis.pipeline import diagnose
 from replay.export.mcap_log import write_mcap
 from replay.export.ros1_log import write_ros1_bag
 from replay.export.rosbag2_log import write_rosbag2
 from replay.export.topics import axle_joint, mission_topics, wheel_joint
 from replay.export.twincat_log import plc_symbol, write_twincat
 from replay.files import atomic_path
+from replay.machine import haulotte
+from replay.machine_file import load_machine
 from replay.simulation.options import SimulatedMission, SimulationOptions
 from replay.simulation.run import simulate_mission
 from replay.truth import write_truth
@@ -140,5 +146,47 @@ def make(folder: Path) -> None:
         write_truth(mission.truth, folder / f"{path.stem}.truth.json")
 
 
+def golden_names() -> dict[str, str]:
+    """Log of each distinct mission by stem; a mission in several formats counts once."""
+    seen: list[SimulationOptions] = []
+    names = {}
+    for name, (_, options) in SAMPLES.items():
+        if options not in seen:
+            seen.append(options)
+            names[Path(name).stem] = name
+    return names
+
+
+def golden_of(log: Path, machine: Path | None = None) -> dict[str, Any]:
+    """Verdict and faults of a log, in order of time; without a machine file the signals are found by their names."""
+    report = diagnose([log], haulotte() if machine is None else load_machine(machine)).report
+    rows = []
+    for fault in report["intervals"]:
+        epsilon = (fault["epsilon"] or {}).get("value")
+        rows.append(
+            {key: fault[key] for key in ("component", "side", "mode")}
+            | {key: round(fault[key], 3) for key in ("start_s", "stop_s")}
+            | {"epsilon": None if epsilon is None else round(epsilon, 3), "severity": fault["severity"]}
+        )
+    rows.sort(key=lambda row: (row["start_s"], row["component"], row["side"], row["stop_s"]))
+    return {"log": log.name, "verdict": report["verdict"]["status"], "intervals": rows}
+
+
+def write_golden(folder: Path) -> None:
+    """Write the golden files, one fault per line."""
+    (folder / "golden").mkdir(exist_ok=True)
+    for stem, name in golden_names().items():
+        found = golden_of(folder / name)
+        rows = ",\n".join("    " + json.dumps(row) for row in found["intervals"])
+        head = "".join(f"  {json.dumps(key)}: {json.dumps(found[key])},\n" for key in ("log", "verdict"))
+        body = f"[\n{rows}\n  ]" if rows else "[]"
+        with atomic_path(folder / "golden" / f"{stem}.json") as temporary:
+            temporary.write_text(f'{{\n{head}  "intervals": {body}\n}}\n', encoding="utf-8")
+
+
 if __name__ == "__main__":
-    make(Path(sys.argv[1]) if len(sys.argv) > 1 else Path(__file__).parent)
+    parser = argparse.ArgumentParser(description="Make the sample missions.")
+    parser.add_argument("folder", type=Path, nargs="?", default=Path(__file__).parent)
+    parser.add_argument("--golden", action="store_true", help="write golden/<stem>.json of the samples that are there")
+    asked = parser.parse_args()
+    write_golden(asked.folder) if asked.golden else make(asked.folder)
