@@ -80,6 +80,8 @@ def evaluate_report(report: Mapping[str, Any], truth: MissionTruth, name: str = 
 
 
 def _evaluate(report: Mapping[str, Any], truth: MissionTruth, name: str) -> MissionScores:
+    if not truth.rate_hz > 0:
+        raise ConfigError(f"the truth file's rate_hz is {truth.rate_hz:g}; expected the recorded rate, above 0 Hz")
     shift = (int(report["log"]["start_ns"]) - truth.start_ns) * 1e-9
     window = (max(0.0, shift), min(truth.duration_s, shift + float(report["log"]["duration_s"])))
     if window[1] <= window[0]:

@@ -124,6 +124,40 @@ def test_confusion_is_weighted_with_driving_time() -> None:
     }
 
 
+@pytest.mark.parametrize("seed", range(5))
+def test_confusion_equals_counting_sample_by_sample(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    names = [*ROWS[1:], "healthy", "slip", "not_excited", "outside_table"]
+
+    def spans(count: int, words: list[str]) -> list[tuple[float, float, str]]:
+        """Spans that are apart, on the 100 Hz grid."""
+        edges = np.sort(rng.choice(2000, 2 * count, replace=False)) / 100
+        return [(edges[2 * i], edges[2 * i + 1], str(rng.choice(words))) for i in range(count)]
+
+    true = {(p, s): spans(4, list(ROWS[1:])) for p in "AB" for s in ("sensor", "actuator")}
+    told = {(p, s): spans(6, names) for p in "AB" for s in ("sensor", "actuator")}
+    driving, masked = {p: spans(3, ["x"]) for p in "AB"}, {p: spans(2, ["x"]) for p in "AB"}
+    truth = truth_of(
+        *(fault(p, Side(s), m, a, b) for (p, s), rows in true.items() for a, b, m in rows),
+        driving=tuple(TruthSpan(p, a, b) for p in "AB" for a, b, _ in driving[p]),
+        masked=tuple(TruthSpan(p, a, b) for p in "AB" for a, b, _ in masked[p]),
+    )
+
+    def at(t: float, rows: list[tuple[float, float, str]], default: str) -> str:
+        return next((m for a, b, m in rows if a <= t < b), default)
+
+    counted = {s: np.zeros((5, 7)) for s in ("sensor", "actuator")}
+    for (p, s), rows in true.items():
+        for t in np.arange(2000) / 100 + 0.005:
+            if at(t, driving[p], "") and not (s == "actuator" and at(t, masked[p], "")):
+                word = at(t, told[p, s], "healthy")
+                column = COLUMNS.index(word if word in COLUMNS else "undecided")
+                counted[s][ROWS.index(at(t, rows, "healthy")), column] += 0.01
+    scored = wheels(report_of(states=dict(told)), truth)
+    for s, matrix in counted.items():
+        assert_allclose(scored.seconds[s], matrix, atol=1e-9)
+
+
 def test_figures_of_a_confusion() -> None:
     matrix = np.zeros((5, 7))
     matrix[0, [0, 1, 6]] = 80.0, 5.0, 15.0  # healthy: 80 right, 5 called stuck, 15 undecided
@@ -351,6 +385,8 @@ def test_truth_of_another_mission_is_refused() -> None:
         evaluate_report(late, truth_of(), "mission.json")
     with pytest.raises(ConfigError, match="its components are X, the truth file's wheels A, B"):
         evaluate_report(report_of(parts=("X",)), truth_of())
+    with pytest.raises(ConfigError, match="rate_hz is 0; expected the recorded rate"):
+        evaluate_report(report_of(), truth_of(rate_hz=0.0))
 
 
 @pytest.mark.parametrize("part", ["log", "states", "intervals"])
