@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -115,7 +115,7 @@ def _saved(path: Path) -> Path | None:
 
 
 def _truth_of(path: Path) -> Path:
-    """Truth file of a result: beside its log, or beside the report.
+    """Truth file of a log: beside it; of a report: in the current folder, beside the report's folder, or in it.
 
     Raises
     ------
@@ -128,15 +128,14 @@ def _truth_of(path: Path) -> Path:
     else:
         from diagnosis.output import load_report
 
-        logs = [Path(str(f["path"])) for f in load_report(saved)["log"]["files"]]
-        folder = saved.resolve().parent
-        places = [_beside(log) for log in logs]
-        places += [near / p.name for p in list(places) for near in (folder.parent, folder)]
+        names = [_beside(Path(str(f["path"]))).name for f in load_report(saved)["log"]["files"]]
+        folder = saved.absolute().parent
+        places = [near / name for name in names for near in (Path(), folder.parent, folder)]
     for place in places:
         if place.is_file():
             return place
-    shown: Sequence[str] = [str(p) for p in dict.fromkeys(places)]
-    raise ConfigError(f"{path}: no truth file ({', '.join(shown)}); name it with --truth")
+    looked = ", ".join(str(p) for p in places)
+    raise ConfigError(f"{path}: no truth file; looked for {looked}; name it with --truth")
 
 
 def _beside(log: Path) -> Path:

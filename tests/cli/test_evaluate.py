@@ -18,13 +18,13 @@ from replay.truth import write_truth
 
 @pytest.fixture(scope="module")
 def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Folder with a log of 12 s, its truth (FR speed sensor stuck from 5 to 9 s), and its report in a folder below."""
+    """Folder with a log of 12 s, its truth (FR speed sensor stuck from 5 to 9 s), and its report in a folder beside it."""
     folder = tmp_path_factory.mktemp("missions")
     fault = FaultSpec("FR", Side.SENSOR, FaultMode.STUCK, 5.0, 9.0, 1.0, 0.3)
     mission = simulate_mission(SimulationOptions(scenario="healthy", duration_s=12.0, rate_hz=100.0, faults=(fault,)))
     write_mission(mission, folder / "drive.mcap", "mcap")
     write_truth(mission.truth, folder / "drive.truth.json")
-    assert run(["-q", "diagnose", str(folder / "drive.mcap"), "-o", str(folder / "reports" / "monday")]) == 1
+    assert run(["-q", "diagnose", str(folder / "drive.mcap"), "-o", str(folder / "monday")]) == 1
     return folder
 
 
@@ -49,7 +49,7 @@ def test_a_log_is_diagnosed_first_and_leaves_nothing_behind(
     assert found["all"]["wheel"]["events"]["faults"] == 1
 
 
-@pytest.mark.parametrize("name", ["reports/monday", "reports/monday/report.json"])
+@pytest.mark.parametrize("name", ["monday", "monday/report.json"])
 def test_a_report_gives_the_same_as_its_log(made: Path, name: str, capsys: pytest.CaptureFixture[str]) -> None:
     from_log = document([str(made / "drive.mcap")], capsys)
     from_report = document([str(made / name)], capsys)
@@ -57,7 +57,7 @@ def test_a_report_gives_the_same_as_its_log(made: Path, name: str, capsys: pytes
 
 
 def test_many_results_are_pooled(made: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    arguments = [str(made / "drive.mcap"), str(made / "reports" / "monday")]
+    arguments = [str(made / "drive.mcap"), str(made / "monday")]
     found = document(arguments, capsys)
     assert len(found["results"]) == 2
     assert found["all"]["wheel"]["events"]["faults"] == 2
@@ -68,7 +68,7 @@ def test_many_results_are_pooled(made: Path, capsys: pytest.CaptureFixture[str])
 
 
 def test_tables(made: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert run(["evaluate", str(made / "reports" / "monday")]) == 0
+    assert run(["evaluate", str(made / "monday")]) == 0
     shown = capsys.readouterr().out
     for words in (
         "Wheels: states over driving time",
@@ -88,7 +88,7 @@ def test_what_was_not_right_is_listed(made: Path, tmp_path: Path, capsys: pytest
     truth["intervals"][0] |= {"component": "RL", "start_s": 3.0, "stop_s": 4.0}
     other = tmp_path / "other.json"
     other.write_text(json.dumps(truth), encoding="utf-8")
-    assert run(["evaluate", str(made / "reports" / "monday"), "--truth", str(other)]) == 0
+    assert run(["evaluate", str(made / "monday"), "--truth", str(other)]) == 0
     shown = capsys.readouterr().out
     lines = shown[shown.index("Wheels: not right") :].splitlines()
     assert any(line.startswith("3.00–4.00  RL sensor") and "missed" in line for line in lines)
@@ -107,7 +107,7 @@ def test_parts_that_the_result_left_out_are_said(
 def test_what_cannot_be_evaluated_is_one_line(
     made: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    log, report = str(made / "drive.mcap"), str(made / "reports" / "monday")
+    log, report = str(made / "drive.mcap"), str(made / "monday")
     lonely = tmp_path / "lonely.mcap"
     lonely.write_bytes((made / "drive.mcap").read_bytes())
     late = json.loads((made / "drive.truth.json").read_text(encoding="utf-8"))
@@ -116,7 +116,11 @@ def test_what_cannot_be_evaluated_is_one_line(
     for arguments, code, words in (
         ([log, report, "--truth", "x.json"], 2, "--truth x.json: 2 results are given"),
         ([log, "--truth", str(tmp_path / "absent.json")], 2, "absent.json: cannot be read"),
-        ([str(lonely)], 2, f"{lonely}: no truth file ({tmp_path / 'lonely.truth.json'}); name it with --truth"),
+        (
+            [str(lonely)],
+            2,
+            f"{lonely}: no truth file; looked for {tmp_path / 'lonely.truth.json'}; name it with --truth",
+        ),
         ([report, "--truth", str(tmp_path / "late.json")], 2, "do not overlap; give the truth file of this log"),
         ([str(tmp_path / "no.json")], 3, "schema None found"),
         ([str(tmp_path / "absent.mcap")], 3, "absent.mcap: no such file"),
