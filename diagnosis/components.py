@@ -191,7 +191,7 @@ class _Wheel:
         self, speed: str, command: str, u: Array, common: Array, slack: Array, plant: WheelPlant
     ) -> WheelData:
         y = self.values(speed)
-        driven = plant.K * low_passed(u, plant.tau, self.timeline.dt)
+        driven = plant.K * u  # without command and opening a wheel may coast or brake: nothing to judge
         name = self.name(speed)
         status = sample_status(
             y, u, self.timeline.fresh[name], alive(self.timeline, self.counts, name), self.timeline.dt

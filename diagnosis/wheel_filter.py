@@ -309,6 +309,48 @@ def start_state(first: float, p: Array) -> tuple[Array, Array, Array]:
     return score, z, P
 
 
+@dataclass(frozen=True)
+class WheelFilterState:
+    """What the recursion carries from block to block: score, mean and covariance of every model."""
+
+    score: Array
+    mean: Array
+    cov: Array
+
+
+def initial_state(first: float, model: WheelFilterModel) -> WheelFilterState:
+    """State before the first sample of a mission that may begin with a fault; `first` is the first speed [m/s]."""
+    return WheelFilterState(*start_state(first, model.packed()))
+
+
+def forward(
+    y: Array,
+    u: Array,
+    common: Array,
+    slack: Array,
+    status: NDArray[np.int8],
+    quiet: NDArray[np.bool_],
+    model: WheelFilterModel,
+    state: WheelFilterState,
+) -> tuple[NDArray[np.uint8], Array, WheelFilterState]:
+    """Run the recursion over one block; see `most_probable` for the arguments.
+
+    Returns
+    -------
+    back : NDArray[np.uint8], shape (n, models)
+        Back-pointers.
+    track : Array, shape (6, n)
+        As in `WheelPath`.
+    state : WheelFilterState
+        For the next block.
+    """
+    back = np.full((y.size, MODELS), _STAY, dtype=np.uint8)
+    track = np.zeros((6, y.size))
+    score, z, P = state.score.copy(), state.mean.copy(), state.cov.copy()
+    _scan(y, u, common, slack, status, quiet, model.packed(), _WHITE, score, z, P, back, track)
+    return back, track, WheelFilterState(score, z, P)
+
+
 def most_probable(
     y: Array,
     u: Array,
@@ -323,7 +365,7 @@ def most_probable(
     Parameters
     ----------
     y, u : Array, shape (n,)
-        Measured speed [m/s] and valve opening [fraction].
+        Measured speed [m/s] and valve opening [fraction] in force since the step before.
     common : Array, shape (n,)
         Load shared with the other wheels, as a speed [m/s].
     slack : Array, shape (n,)
@@ -335,13 +377,10 @@ def most_probable(
     model : WheelFilterModel
         Constants.
     """
-    p = model.packed()
     known = np.flatnonzero(status == _PAIR)
-    score, z, P = start_state(float(y[known[0]]) if known.size else 0.0, p)
-    back = np.full((y.size, MODELS), _STAY, dtype=np.uint8)
-    track = np.zeros((6, y.size))
-    _scan(y, u, common, slack, status, quiet, p, _WHITE, score, z, P, back, track)
-    path, entered = _trace(back, int(np.argmax(score)))
+    state = initial_state(float(y[known[0]]) if known.size else 0.0, model)
+    back, track, state = forward(y, u, common, slack, status, quiet, model, state)
+    path, entered = _trace(back, int(np.argmax(state.score)))
     return WheelPath(path, entered, track)
 
 

@@ -1,0 +1,134 @@
+"""Real logs: what can be judged is judged, and the rest is said to be unjudged."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from diagnosis.pipeline import diagnose
+from diagnosis.result import MissionResult
+from replay.errors import LogError, NotJudged
+from replay.machine import Machine, haulotte
+from replay.machine_file import load_machine
+
+ROSA = """
+[machine]
+name = "motor rig"
+wheels = ["M"]
+[geometry]
+max_speed = 400
+[control]
+law = "none"
+u_max = 100
+[sources]
+"*.csv.gz" = { time = "Rel Time", time_unit = "ms" }
+[signals]
+"wheel.M.v_ref" = { column = "Desired Speed", unit = "m/s" }
+"wheel.M.v" = { column = "Actual Speed", unit = "m/s" }
+"wheel.M.u" = { column = "Shaft Control Effort", unit = "1" }
+"""
+
+ARM = """
+[machine]
+name = "robot arm"
+wheels = ["m1", "m2", "m3", "m4", "m5"]
+[geometry]
+max_speed = 1.5
+[control]
+law = "none"
+[limits]
+driving_speed = 0.02
+[sources]
+"*.csv" = { time = "t_s" }
+[signals]
+""" + "\n".join(
+    f'"wheel.m{i}.v_ref" = {{ column = "cmd_m{i}_rad", unit = "m", derivative = true }}\n'
+    f'"wheel.m{i}.v" = {{ column = "resp_m{i}_rad", unit = "m", derivative = true }}'
+    for i in range(1, 6)
+)
+
+
+def machine(text: str, folder: Path) -> Machine:
+    path = folder / "machine.toml"
+    path.write_text(text, encoding="utf-8")
+    return load_machine(path)
+
+
+def serious(result: MissionResult) -> list[tuple[str, str]]:
+    return [(f["component"], f["mode"]) for f in result.report["intervals"] if f["severity"] != "info"]
+
+
+@pytest.mark.parametrize(
+    ("log", "error", "reason"),
+    [
+        ("robot_localization/test1.bag", LogError, "no wheel signal"),
+        ("gps_nav_ws/bag", LogError, "no wheel signal"),
+        ("abitobot", NotJudged, "no valve command, no second speed and no commanded wheel speed"),
+    ],
+)
+def test_a_log_without_evidence_is_refused_with_the_reason(
+    reference_data: Path, log: str, error: type[LogError], reason: str
+) -> None:
+    with pytest.raises(error, match=reason):
+        diagnose([reference_data / "reference_logs" / log], haulotte())
+
+
+@pytest.mark.parametrize("run", ["Healthy_01", "Healthy_02", "Healthy_03", "Healthy_04"])
+def test_no_motor_of_a_healthy_arm_is_flagged(reference_data: Path, tmp_path: Path, run: str) -> None:
+    result = diagnose([reference_data / "fault_data/dtr_robot_arm" / f"{run}.csv"], machine(ARM, tmp_path))
+    assert serious(result) == []
+    assert result.report["verdict"]["status"] == "not_assessed"
+
+
+@pytest.mark.parametrize("motor", [1, 2, 3, 4])
+@pytest.mark.parametrize("run", [1, 2, 3, 4])
+def test_the_stuck_motor_of_the_arm_is_found(reference_data: Path, tmp_path: Path, motor: int, run: int) -> None:
+    log = reference_data / "fault_data/dtr_robot_arm" / f"Motor_{motor}_Stuck_{run:02d}.csv"
+    result = diagnose([log], machine(ARM, tmp_path))
+    assert serious(result) == [(f"m{motor}", "no_signal")]
+    assert result.report["intervals"][0]["side"] == "sensor_or_actuator"
+    assert result.report["intervals"][0]["start_s"] < 1.0
+
+
+def healthy_run(reference_data: Path, number: int) -> pd.DataFrame:
+    """A healthy run of the motor without the lone rows before and after it, at least 20 s long."""
+    name = reference_data / "fault_data/rosa/healthy_mode" / f"merged_data{number}.csv.gz"
+    frame = pd.read_csv(name, skipinitialspace=True)
+    t = frame["Rel Time"].to_numpy() / 1e3
+    inside = np.r_[False, np.ones(t.size - 2, dtype=bool), False]
+    return frame[inside].reset_index(drop=True)
+
+
+@pytest.mark.parametrize("number", [106, 130])
+@pytest.mark.parametrize("mode", ["none", "stuck", "no_signal", "inefficient", "noisy"])
+def test_faults_put_into_a_real_motors_sensor_are_found(
+    reference_data: Path, tmp_path: Path, number: int, mode: str
+) -> None:
+    frame = healthy_run(reference_data, number)
+    t = (frame["Rel Time"] - frame["Rel Time"].iloc[0]).to_numpy() / 1e3
+    v = frame["Actual Speed"].to_numpy().copy()
+    inside = (t >= 8) & (t < 16)
+    rng = np.random.default_rng(number)
+    sat = rng.normal(300, 100, int(inside.sum()))
+    # L4: v = (1 − ε) v_a + ε sat
+    put = {
+        "none": v[inside],
+        "stuck": np.full(sat.size, v[np.flatnonzero(inside)[0]]),
+        "no_signal": np.zeros(sat.size),
+        "inefficient": 0.7 * v[inside],
+        "noisy": 0.7 * v[inside] + 0.3 * sat,
+    }[mode]
+    v[inside] = put
+    frame["Actual Speed"] = v
+    log = tmp_path / "run.csv.gz"
+    frame.to_csv(log, index=False)
+    result = diagnose([log], machine(ROSA, tmp_path))
+    assert serious(result) == ([] if mode == "none" else [("M", mode)])
+    if mode != "none":
+        fault = result.report["intervals"][0]
+        assert fault["side"] == "sensor"
+        assert abs(fault["start_s"] - 8) < 0.5
+        assert abs(fault["stop_s"] - 16) < 0.5
