@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from diagnosis import wheel_filter as wf
+from diagnosis import wheel_scan as ws
 from diagnosis.assessment import CODE, Assessment, Finding
 from diagnosis.noise import COARSE_STEP_S, quick_noise, rounding_step, slow_mismatch, white_noise
 from diagnosis.result import Epsilon, Hypothesis, Sat
@@ -148,8 +149,8 @@ def assess_wheel(
         "threshold": 3 * np.sqrt(var + model.noise**2),
         "expected": v,
     }
-    on_sensor = (path.model >= wf.S_STUCK) & (path.model <= wf.S_WHITE_25)
-    on_actuator = path.model >= wf.A_GAIN
+    on_sensor = (path.model >= ws.S_STUCK) & (path.model <= ws.S_WHITE_25)
+    on_actuator = path.model >= ws.A_GAIN
     per_side = [
         {
             **series,
@@ -189,7 +190,7 @@ def _holds(finding: Finding, data: WheelData, limits: Limits) -> bool:
 
 def _runs(path: wf.WheelPath, data: WheelData, model: wf.WheelFilterModel) -> list[tuple[int, int, int]]:
     """Faulty runs (start, stop, model); short ones join a longer faulty neighbour, quiet ends are cut."""
-    rows = wf.ROW[path.model]
+    rows = ws.ROW[path.model]
     anew = path.entered & np.isin(rows, (1, 3, 5, 6))
     cut = np.flatnonzero(np.r_[True, (rows[1:] != rows[:-1]) | anew[1:]])
     runs = [[int(a), int(b), int(path.model[b - 1])] for a, b in zip(cut, np.r_[cut[1:], rows.size], strict=True)]
@@ -198,8 +199,8 @@ def _runs(path: wf.WheelPath, data: WheelData, model: wf.WheelFilterModel) -> li
     k = 0
     while k < len(runs):
         a, b, m = runs[k]
-        if m != wf.HEALTHY and b - a < short:
-            near = [j for j in (k + 1, k - 1) if 0 <= j < len(runs) and runs[j][2] != wf.HEALTHY]
+        if m != ws.HEALTHY and b - a < short:
+            near = [j for j in (k + 1, k - 1) if 0 <= j < len(runs) and runs[j][2] != ws.HEALTHY]
             near = [j for j in near if runs[j][1] - runs[j][0] >= short]
             if near:
                 j = near[0]
@@ -209,10 +210,10 @@ def _runs(path: wf.WheelPath, data: WheelData, model: wf.WheelFilterModel) -> li
         k += 1
     out = []
     for a, b, m in runs:
-        if m == wf.HEALTHY:
+        if m == ws.HEALTHY:
             continue
         keep = np.flatnonzero(~data.quiet[a:b] | (data.status[a:b] == 2))
-        if m in (wf.S_STUCK, wf.S_DRIFT, wf.S_WHITE_3, wf.S_WHITE_8, wf.S_WHITE_25, wf.A_STUCK):
+        if m in (ws.S_STUCK, ws.S_DRIFT, ws.S_WHITE_3, ws.S_WHITE_8, ws.S_WHITE_25, ws.A_STUCK):
             out.append((a, b, m))
         elif keep.size:
             out.append((a + int(keep[0]), a + int(keep[-1]) + 1, m))
@@ -223,12 +224,12 @@ def _episodes(runs: list[list[int]], gap: int) -> list[list[int]]:
     """Join valve faults that follow each other within `gap` samples; which row they are is judged as a whole."""
     out: list[list[int]] = []
     for a, b, m in runs:
-        if m >= wf.A_GAIN:
-            if out and out[-1][2] >= wf.A_GAIN:
+        if m >= ws.A_GAIN:
+            if out and out[-1][2] >= ws.A_GAIN:
                 longer = out[-1][2] if out[-1][1] - out[-1][0] >= b - a else m
                 out[-1] = [out[-1][0], b, longer]
                 continue
-            if len(out) > 1 and out[-1][2] == wf.HEALTHY and out[-1][1] - out[-1][0] < gap and out[-2][2] >= wf.A_GAIN:
+            if len(out) > 1 and out[-1][2] == ws.HEALTHY and out[-1][1] - out[-1][0] < gap and out[-2][2] >= ws.A_GAIN:
                 out.pop()
                 longer = out[-1][2] if out[-1][1] - out[-1][0] >= b - a else m
                 out[-1] = [out[-1][0], b, longer]
@@ -253,21 +254,21 @@ def _judge(
         start - begin,
         model,
     )
-    if evidence[kind] - evidence[wf.HEALTHY] < model.switch_cost:
+    if evidence[kind] - evidence[ws.HEALTHY] < model.switch_cost:
         return None
-    prior = np.log(np.where(np.arange(wf.MODELS) == wf.HEALTHY, 0.6, 0.05))
+    prior = np.log(np.where(np.arange(ws.MODELS) == ws.HEALTHY, 0.6, 0.05))
     if data.u_measured:
-        prior[wf.A_GAIN :] = -50.0  # the valve is judged by its own measurement
+        prior[ws.A_GAIN :] = -50.0  # the valve is judged by its own measurement
     tempered = prior + np.clip(_TEMPER * (evidence - evidence.max()), -700, 0)
     p = np.exp(tempered - tempered.max())
     p /= p.sum()
     use = data.status[start:stop] == 1
     y = data.y[start:stop][use]
     pooled: dict[tuple[str, str], float] = {}
-    for name, q in zip(wf.NAMES, p, strict=True):
+    for name, q in zip(ws.NAMES, p, strict=True):
         pooled[name] = pooled.get(name, 0.0) + float(q)
     silent = y.size == 0 or abs(float(np.mean(y))) <= 3 * model.constant_noise
-    if silent and kind in (wf.S_STUCK, wf.S_NONE):  # stuck at zero and no signal are one row of the table
+    if silent and kind in (ws.S_STUCK, ws.S_NONE):  # stuck at zero and no signal are one row of the table
         pooled["sensor", "no_signal"] += pooled.pop(("sensor", "stuck"))
     ranked = sorted(pooled.items(), key=lambda item: -item[1])
     (side_name, mode_name), probability = ranked[0]
@@ -279,28 +280,28 @@ def _judge(
         both = probability + pooled.get((other.value, mode_name), 0.0)
         if both >= limits.min_probability and mode_name == "inefficient":
             side, probability = Side.SENSOR_OR_ACTUATOR, both
-    m = int(np.argmax(np.where([n == (side_name, mode_name) for n in wf.NAMES], evidence, -np.inf)))
-    if not gains and m not in (wf.S_STUCK, wf.S_NONE, wf.S_WHITE_3, wf.S_WHITE_8, wf.S_WHITE_25):
+    m = int(np.argmax(np.where([n == (side_name, mode_name) for n in ws.NAMES], evidence, -np.inf)))
+    if not gains and m not in (ws.S_STUCK, ws.S_NONE, ws.S_WHITE_3, ws.S_WHITE_8, ws.S_WHITE_25):
         return None
     epsilon, sat = _estimate(m, y, z[m], P[m], model)
-    if m == wf.A_STUCK and sat is not None and abs(sat.mean) < max(limits.min_sat, 2 * model.load / model.K):
-        m, mode_name = wf.A_NONE, "no_signal"
-    if epsilon is not None and m in (wf.S_GAIN, wf.A_GAIN) and epsilon.value < limits.min_epsilon:
+    if m == ws.A_STUCK and sat is not None and abs(sat.mean) < max(limits.min_sat, 2 * model.load / model.K):
+        m, mode_name = ws.A_NONE, "no_signal"
+    if epsilon is not None and m in (ws.S_GAIN, ws.A_GAIN) and epsilon.value < limits.min_epsilon:
         return None
     if data.u_measured and side is not Side.SENSOR:
         return None
     coarse = data.dt >= COARSE_STEP_S
-    if (m == wf.S_DRIFT or (coarse and m >= wf.S_GAIN and m not in (wf.S_WHITE_8, wf.S_WHITE_25))) and float(
+    if (m == ws.S_DRIFT or (coarse and m >= ws.S_GAIN and m not in (ws.S_WHITE_8, ws.S_WHITE_25))) and float(
         np.mean(data.slack[start:stop] > 0)
     ) > 0.3:
         probability = 0.0  # a model in doubt looks like a drifting sensor, in a slow log like any fault of gain
     seconds = (stop - start) * data.dt
     lines = [
         f"Over {seconds:.3f} s the model “{side_name} {mode_name.replace('_', ' ')}” explains {data.names[0]} better than "
-        f"a healthy wheel by a log-evidence of {evidence[m] - evidence[wf.HEALTHY]:.0f}; a fault is considered from "
+        f"a healthy wheel by a log-evidence of {evidence[m] - evidence[ws.HEALTHY]:.0f}; a fault is considered from "
         f"{model.switch_cost:.0f}."
     ]
-    if m in (wf.S_STUCK, wf.S_NONE) and y.size:
+    if m in (ws.S_STUCK, ws.S_NONE) and y.size:
         lines.append(f"{data.names[0]} stayed within {float(np.ptp(y)):.2g} m/s of {float(np.mean(y)):.4g} m/s.")
     second = next((item for item in ranked[1:] if item[0][1] != "healthy"), None)
     if second is not None and second[1] >= 0.005:
@@ -317,26 +318,26 @@ def _judge(
         epsilon=epsilon,
         sat=sat,
         evidence=tuple(lines),
-        tier="signal" if m in (wf.S_STUCK, wf.S_NONE) else "model",
+        tier="signal" if m in (ws.S_STUCK, ws.S_NONE) else "model",
     )
 
 
 def _estimate(m: int, y: Array, z: Array, P: Array, model: wf.WheelFilterModel) -> tuple[Epsilon | None, Sat | None]:
     """ε̂ and the saturation term of a model from its state at the end of the run."""
     g, g_std = float(z[1]), float(np.sqrt(max(P[1, 1], 0.0)))
-    if m in (wf.S_STUCK, wf.S_NONE):
+    if m in (ws.S_STUCK, ws.S_NONE):
         if not y.size:
             return Epsilon(1.0, 1.0, 1.0), None
         level, rms = float(np.mean(y)), float(np.sqrt(np.mean(y**2)))
         half = 1.96 * model.constant_noise
         return Epsilon(1.0, 1.0, 1.0), Sat(level, rms, level - half, level + half, "m/s")
-    if m in (wf.S_GAIN, wf.A_GAIN):
+    if m in (ws.S_GAIN, ws.A_GAIN):
         return Epsilon(1 - g, 1 - g - 1.96 * g_std, 1 - g + 1.96 * g_std), None
-    if m in (wf.A_STUCK, wf.A_NONE):
-        level = float(z[2]) / model.K if m == wf.A_STUCK else 0.0
+    if m in (ws.A_STUCK, ws.A_NONE):
+        level = float(z[2]) / model.K if m == ws.A_STUCK else 0.0
         half = 1.96 * float(np.sqrt(max(P[2, 2], 0.0))) / model.K
         return Epsilon(1.0, 0.0, 1.0), Sat(level, abs(level), level - half, level + half, "of full opening")
-    if m == wf.A_BIAS:
+    if m == ws.A_BIAS:
         eps = max(1 - g, 0.05)
         level, half = float(z[2]) / model.K, 1.96 * float(np.sqrt(max(P[2, 2], 0.0))) / model.K
         bounds = Epsilon(1 - g, 1 - g - 1.96 * g_std, 1 - g + 1.96 * g_std)

@@ -34,7 +34,7 @@ _MISMATCH, _FIRST_NOISY = 4, 5
 MODELS = ROW_OF_MODEL.size
 
 SKIP, PAIR, SILENT, BLIND = 0, 1, 2, 3
-_STAY = 255
+STAY = 255
 _OUTLIER = -18.0
 _SILENT_COST = -6.0
 _MISMATCH_S = 0.05
@@ -224,7 +224,7 @@ def _scan_modes(y, x, status, quiet, p, noisy, row, score, mean, cov, back, filt
 
 
 @njit(cache=True)
-def _trace(back, last):  # type: ignore[no-untyped-def]
+def trace(back, last):  # type: ignore[no-untyped-def]
     """Follow back-pointers from the last model; also marks samples at which a model was entered."""
     n = back.shape[0]
     path = np.empty(n, dtype=np.uint8)
@@ -232,7 +232,7 @@ def _trace(back, last):  # type: ignore[no-untyped-def]
     m = last
     for k in range(n - 1, -1, -1):
         path[k] = m
-        if back[k, m] != _STAY:
+        if back[k, m] != STAY:
             entered[k] = True
             m = back[k, m]
     return path, entered
@@ -290,7 +290,7 @@ def forward(
     state : ModeState
         For the next block.
     """
-    back = np.full((y.size, MODELS), _STAY, dtype=np.uint8)
+    back = np.full((y.size, MODELS), STAY, dtype=np.uint8)
     filtered = np.zeros((y.size, len(ROWS)))
     score, mean, cov = state.score.copy(), state.mean.copy(), state.cov.copy()
     _scan_modes(y, x, status, quiet, model.packed(), NOISY_MODELS, ROW_OF_MODEL, score, mean, cov, back, filtered)
@@ -300,7 +300,7 @@ def forward(
 def most_probable(y: Array, x: Array, status: NDArray[np.int8], quiet: NDArray[np.bool_], model: ModeModel) -> ModePath:
     """Most probable rows of a whole channel; see `forward` for the arguments."""
     back, filtered, state = forward(y, x, status, quiet, model, initial_state(model))
-    path, entered = _trace(back, int(np.argmax(state.score)))
+    path, entered = trace(back, int(np.argmax(state.score)))
     return ModePath(path, entered, filtered)
 
 

@@ -7,7 +7,8 @@ import pytest
 from filterpy.kalman import KalmanFilter
 from numpy.testing import assert_allclose
 
-from diagnosis.wheel_filter import (
+from diagnosis.wheel_filter import WheelFilterModel, most_probable, segment_evidence, start_state
+from diagnosis.wheel_scan import (
     A_BIAS,
     A_GAIN,
     A_NONE,
@@ -21,10 +22,6 @@ from diagnosis.wheel_filter import (
     S_NONE,
     S_STUCK,
     S_WHITE_25,
-    WheelFilterModel,
-    most_probable,
-    segment_evidence,
-    start_state,
 )
 
 MODEL = WheelFilterModel(
