@@ -32,6 +32,7 @@ class Cost:
 def measure(arguments: list[str], caches: Path) -> Cost:
     """Run the command once in a process of its own."""
     environment = os.environ | {"NUMBA_CACHE_DIR": str(caches / "numba"), "PYTHONPYCACHEPREFIX": str(caches / "pyc")}
+    environment.pop("PYTHONDONTWRITEBYTECODE", None)  # else no run would be warm
     begin = time.perf_counter()
     process = subprocess.Popen(
         [sys.executable, "-m", "cli.main", *arguments],
