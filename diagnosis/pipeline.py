@@ -19,6 +19,8 @@ from replay.errors import ConfigError, NotJudged
 from replay.loop import Replay, replay_loop
 from replay.machine import Machine
 from replay.mission import Mission, load_mission
+from replay.signals import Signals
+from replay.timeline import align
 from replay.version import __version__
 
 Array = NDArray[np.float64]
@@ -82,6 +84,19 @@ def diagnose(
     )
 
 
+def diagnose_signals(signals: Signals, machine: Machine) -> MissionResult:
+    """Diagnose signals that are already in memory, without a log; see `diagnose`.
+
+    Raises
+    ------
+    LogError
+        Where no wheel signal has two samples.
+    NotJudged
+        Where nothing can be judged.
+    """
+    return diagnose_mission(Mission(files=(), signals=signals, timeline=align(signals)), machine)
+
+
 def diagnose_mission(
     mission: Mission,
     machine: Machine,
@@ -112,7 +127,7 @@ def _require_something(assessments: Mapping[tuple[str, str], Assessment], missio
     if any(a.tier != "none" for a in assessments.values()):
         return
     speeds = [w for w in machine.wheels if f"wheel.{w}.v" in mission.signals.items]
-    names = ", ".join(str(f.path) for f in mission.files)
+    names = ", ".join(str(f.path) for f in mission.files) or "the mission"
     if not speeds:
         raise NotJudged(
             f"{names}: no wheel speed was found among its channels; run `mfhca channels` to see them, and name the wheels' "

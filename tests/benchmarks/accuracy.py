@@ -1,4 +1,4 @@
-"""Scores of the diagnosis on simulated missions; run as `python tests/benchmarks/diagnosis.py [--quick] [--detail]`.
+"""Scores of the diagnosis on simulated missions; run as `python tests/benchmarks/accuracy.py [--quick] [--detail]`.
 
 Limits and models may be tuned on the missions of `TUNING` alone; figures that are published come from `REPORTING`
 (``--seeds reporting``), which no choice has seen. One line per evidence, coupling and ice (free wheels have no ground
