@@ -59,7 +59,8 @@ def part_words(kind: str, component: str, side: str) -> str:
 
 def severity_of(finding: Finding, seconds: float, limits: Limits) -> tuple[Severity, str]:
     """Severity and advice of one fault; see the module's docstring."""
-    if finding.probability < limits.min_probability:
+    faulty = 1.0 - sum(h.p for h in finding.hypotheses if h.mode == "healthy")
+    if faulty < limits.min_probability:
         return "info", "Not certain enough to act on. Compare with the next mission."
     if finding.mode in _GONE and finding.side is Side.ACTUATOR:
         return "high", "Stop at once and repair: the valve does not answer its command (Assumption 2)."

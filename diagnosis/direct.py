@@ -247,6 +247,11 @@ def _finding(
         return None  # the command hardly moved: a noisy reading of it looks constant too
     if mode is FaultMode.NOISY and deviation < max(2.5 * model.noise, limits.min_sat / 2):
         return None
+    lines = _sentences(run.row, mode, pair, y, ref, use, st, model, epsilon, sat, gain, deviation)
+    if run.row in (modes.STUCK, modes.INEFFICIENT) and use.any() and float(np.std(ref[use])) < 2 * model.noise:
+        # nothing moved: a constant value and a constant share of a constant are the same
+        p[modes.STUCK] = p[modes.INEFFICIENT] = (p[modes.STUCK] + p[modes.INEFFICIENT]) / 2
+        lines += (f"{pair.x_name} hardly moved in this time, so that stuck and inefficient look alike.",)
     shift = round(lag) if pair.side is Side.ACTUATOR else 0
     side = pair.side.value
     hypotheses = sorted((Hypothesis(side, r, float(q)) for r, q in zip(modes.ROWS, p, strict=True)), key=lambda h: -h.p)
@@ -259,7 +264,7 @@ def _finding(
         hypotheses=tuple(hypotheses),
         epsilon=epsilon,
         sat=sat,
-        evidence=_sentences(run.row, mode, pair, y, ref, use, st, model, epsilon, sat, gain, deviation),
+        evidence=lines,
         tier="direct",
     )
 
