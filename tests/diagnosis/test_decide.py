@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -241,7 +242,7 @@ def test_spans_leave_no_gap() -> None:
         mine = [s for s in spans if (s.component, s.side) == (component, side)]
         assert mine[0].start_s == 0.0
         assert mine[-1].stop_s == pytest.approx(30.0)
-        assert all(a.stop_s == b.start_s for a, b in zip(mine, mine[1:], strict=False))
+        assert all(a.stop_s == b.start_s for a, b in pairwise(mine))
     first, second = (s for s in spans if (s.component, s.side) == ("FR", "sensor"))
     assert (first.state, first.stop_s, second.state) == (State.STUCK, 0.1, State.HEALTHY)
     assert spans[-1].reason == "the valve is not in the log"

@@ -1,0 +1,96 @@
+"""Three files of one result, and the page made again from two of them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import orjson
+import pyarrow.parquet as pq
+import pytest
+
+from diagnosis.output import load_report, rebuild, write_result
+from diagnosis.pipeline import diagnose_mission
+from diagnosis.result import SCHEMA, MissionResult
+from replay.errors import LogError, OutputError
+from replay.machine import SignalSource, haulotte
+from replay.mission import Mission
+from replay.signals import Signal, Signals
+from replay.simulation.options import SimulationOptions
+from replay.simulation.run import simulate_mission
+from replay.timeline import align
+
+
+@pytest.fixture(scope="module")
+def result() -> MissionResult:
+    mission = simulate_mission(SimulationOptions(scenario="healthy", seed=3, duration_s=12.0, rate_hz=200.0))
+    items = {
+        name: Signal(name, mission.stamps, x, SignalSource(column=name), "a.mcap", guessed=False)
+        for name, x in mission.columns.items()
+    }
+    signals = Signals(items, {})
+    return diagnose_mission(Mission((), signals, align(signals)), haulotte())
+
+
+def test_three_files(result: MissionResult, tmp_path: Path) -> None:
+    folder = tmp_path / "new" / "mission-report"
+    paths = write_result(result, folder)
+    assert [p.name for p in paths] == ["report.html", "report.json", "report.parquet"]
+    assert sorted(p.name for p in folder.iterdir()) == sorted(p.name for p in paths)
+    assert load_report(folder / "report.json") == result.report
+    table = pq.read_table(folder / "report.parquet")
+    assert table.column_names == list(result.columns)
+    for name in ("t", "wheel.FR.v", "evidence.FR.sensor.residual", "replay.RL.psi_printed"):
+        stored, exact = table.column(name).to_numpy(), result.columns[name]
+        np.testing.assert_allclose(stored, exact, rtol=1e-3, atol=1e-9, equal_nan=True)
+    for name in table.column_names:
+        nan = np.isnan(table.column(name).to_numpy())
+        np.testing.assert_array_equal(nan, np.isnan(result.columns[name]), err_msg=name)
+
+
+def test_page_made_again_is_the_same_page(result: MissionResult, tmp_path: Path) -> None:
+    page, report, _ = write_result(result, tmp_path)
+    first = page.read_bytes()
+    page.unlink()
+    assert rebuild(tmp_path).read_bytes() == first
+    assert rebuild(report).read_bytes() == first
+
+
+def test_same_result_same_bytes(result: MissionResult, tmp_path: Path) -> None:
+    one = [p.read_bytes() for p in write_result(result, tmp_path / "a")]
+    two = [p.read_bytes() for p in write_result(result, tmp_path / "b")]
+    assert one == two
+
+
+def test_place_that_cannot_be_written(result: MissionResult, tmp_path: Path) -> None:
+    (tmp_path / "taken").write_text("a file")
+    with pytest.raises(OutputError, match=r"taken.*cannot make the folder.*-o"):
+        write_result(result, tmp_path / "taken" / "report")
+
+
+@pytest.mark.parametrize(
+    ("content", "words"),
+    [
+        (None, "cannot be read"),
+        (b"{", "not JSON"),
+        (b"[]", "'list' found"),
+        (b'{"schema": "other/1"}', f"schema 'other/1' found, '{SCHEMA}' expected"),
+    ],
+)
+def test_saved_report_that_is_none(tmp_path: Path, content: bytes | None, words: str) -> None:
+    path = tmp_path / "report.json"
+    if content is not None:
+        path.write_bytes(content)
+    with pytest.raises(LogError) as caught:
+        load_report(path)
+    assert words in str(caught.value)
+    assert str(path) in str(caught.value)
+
+
+def test_report_without_its_columns(tmp_path: Path) -> None:
+    (tmp_path / "report.json").write_bytes(orjson.dumps({"schema": SCHEMA}))
+    with pytest.raises(LogError, match=r"report\.parquet: cannot be read.*mfhca diagnose"):
+        rebuild(tmp_path)
+    (tmp_path / "report.parquet").write_bytes(b"PAR1 no table")
+    with pytest.raises(LogError, match=r"report\.parquet: cannot be read"):
+        rebuild(tmp_path)
