@@ -218,7 +218,9 @@ def _finding(
     part = slice(run.start, run.stop)
     y, ref, st, quiet = pair.y[part], x[part], status[part], pair.quiet[part]
     use = (st == modes.PAIR) | (st == modes.BLIND)
-    evidence = modes.segment_evidence(y, ref, st, quiet, model)
+    edge = min(5, (run.stop - run.start) // 20)  # a delay leaves a sample or two of the neighbours at the ends
+    inner = slice(edge, y.size - edge)
+    evidence = modes.segment_evidence(y[inner], ref[inner], st[inner], quiet[inner], model)
     gain = evidence[run.row] - evidence[modes.HEALTHY]
     if gain < model.switch_cost:
         return None
