@@ -9,8 +9,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from replay.geometry import Geometry
 from replay.kinematics import low_pass, speed_ratios
-from replay.machine import Geometry
 
 Array = NDArray[np.float64]
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from pathlib import PurePath
 from typing import Any
 
 import numpy as np
@@ -54,7 +55,7 @@ def signal_rows(signals: Signals, timeline: Timeline) -> list[dict[str, Any]]:
                 "missing_share": missing,
                 "lsb": rounding_step(signal.values),
                 "guessed": signal.guessed,
-                "source": signal.source,
+                "source": PurePath(signal.source).name,
             }
         )
     return rows

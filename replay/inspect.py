@@ -9,9 +9,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from replay.machine import SourceOptions
 from replay.rawlog import Channel, RawLog
 from replay.readers.registry import open_log
+from replay.sources import SourceOptions
 
 GAP_PERIODS = 5.0
 

@@ -13,7 +13,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from replay.machine import Geometry, PhiDot
+from replay.geometry import Geometry
+from replay.machine import PhiDot
 
 _STANDSTILL = 1e-3
 

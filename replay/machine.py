@@ -9,69 +9,19 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Literal
 
+from replay.checks import check_range
 from replay.errors import ConfigError
+from replay.geometry import Geometry, four_wheel_geometry
+from replay.sources import SignalSource, SourceOptions
 from replay.units import quantity_of
 
 Law = Literal["auto", "signed", "opposed", "printed", "sign_abs", "none"]
 PsiMode = Literal["auto", "printed", "implied", "event_reset", "forced"]
 Coupling = Literal["auto", "free", "ground"]
-StampClock = Literal["header", "log", "publish"]
 PhiDot = Literal["command", "measured", "zero"]
 
 LAWS: tuple[str, ...] = ("auto", "signed", "opposed", "printed", "sign_abs", "none")
 PSI_MODES: tuple[str, ...] = ("auto", "printed", "implied", "event_reset", "forced")
-
-
-def check_range(key: str, value: float, low: float, high: float, unit: str) -> None:
-    """Raise a `ConfigError` that names the key, the value, the unit and the range."""
-    if not low <= value <= high:
-        raise ConfigError(f"{key} = {value:g} {unit} is out of range; expected {low:g} to {high:g} {unit}")
-
-
-@dataclass(frozen=True)
-class WheelGeometry:
-    """One drive wheel on its steering joint (frame REP-103 at the machine's centre).
-
-    Attributes
-    ----------
-    x, y : float
-        Steering joint [m]; x forward, y left.
-    offset : float
-        Distance from joint to wheel centre along the wheel's axle [m], positive to the left (d_i of L1 (1)).
-    axle : str
-        Steering axle: ``front``, ``rear``, the wheel's own name, or ``fixed``.
-    """
-
-    x: float
-    y: float
-    offset: float
-    axle: str
-
-
-@dataclass(frozen=True)
-class Geometry:
-    """Where the wheels are. `wheels` is keyed by wheel name."""
-
-    wheels: Mapping[str, WheelGeometry]
-    wheel_diameter: float
-
-    def __post_init__(self) -> None:
-        """Check lengths."""
-        check_range("geometry.wheel_diameter", self.wheel_diameter, 0.02, 5.0, "m")
-        for name, w in self.wheels.items():
-            for key, value in (("x", w.x), ("y", w.y)):
-                check_range(f"geometry.{name}.{key}", value, -20.0, 20.0, "m")
-            check_range(f"geometry.{name}.offset", w.offset, -2.0, 2.0, "m")
-
-    @property
-    def axles(self) -> tuple[str, ...]:
-        """Steered axles in order of first use."""
-        return tuple(dict.fromkeys(w.axle for w in self.wheels.values() if w.axle != "fixed"))
-
-    def axle_x(self, axle: str) -> float:
-        """Position of an axle along the machine [m]: mean x of its joints."""
-        xs = [w.x for w in self.wheels.values() if w.axle == axle]
-        return sum(xs) / len(xs)
 
 
 @dataclass(frozen=True)
@@ -234,69 +184,6 @@ class Limits:
 
 
 @dataclass(frozen=True)
-class SourceOptions:
-    """How to read one source that does not describe itself.
-
-    Attributes
-    ----------
-    time : str or None
-        Time column of a table.
-    time_unit : str
-        ``s``, ``ms``, ``us``, ``ns``, ``filetime`` (100 ns since 1601) or ``iso`` (date text).
-    epoch : str or None
-        ISO date and time of zero of the time column; None: 1970.
-    separator, decimal : str or None
-        Of a text table; None: found from the file.
-    scale : bool
-        Whether ScaleFactor and Offset of a TwinCAT export are to be applied.
-    stamp : str
-        Clock of a message log.
-    """
-
-    time: str | None = None
-    time_unit: str = "s"
-    epoch: str | None = None
-    separator: str | None = None
-    decimal: str | None = None
-    scale: bool = False
-    stamp: StampClock = "header"
-
-    def __post_init__(self) -> None:
-        """Check values."""
-        if self.time_unit not in ("s", "ms", "us", "ns", "filetime", "iso"):
-            raise ConfigError(
-                f"[sources] time_unit = {self.time_unit!r} is not known; expected s, ms, us, ns, filetime or iso"
-            )
-        if self.stamp not in ("header", "log", "publish"):
-            raise ConfigError(f"[sources] stamp = {self.stamp!r} is not known; expected header, log or publish")
-
-
-@dataclass(frozen=True)
-class SignalSource:
-    """Where a canonical signal is recorded, and how it becomes SI.
-
-    SI value = (recorded · gain + offset) · factor(unit). Either `topic` with `field`, or `symbol` (TwinCAT), or
-    `column` (table).
-    """
-
-    topic: str | None = None
-    field: str | None = None
-    symbol: str | None = None
-    column: str | None = None
-    unit: str = ""
-    gain: float = 1.0
-    offset: float = 0.0
-    derivative: bool = False
-    at: Literal["motor", "wheel"] = "wheel"
-    source: str | None = None
-
-    @property
-    def label(self) -> str:
-        """Name of the channel it points to."""
-        return f"{self.topic}.{self.field}" if self.topic is not None else str(self.symbol or self.column)
-
-
-@dataclass(frozen=True)
 class Machine:
     """A whole machine file.
 
@@ -382,20 +269,6 @@ class Machine:
         names += [f"steer.{a}.{s}" for a in self.axles for s in steer]
         names += ["imu.yaw_rate", "gnss.lat", "gnss.lon", "gnss.speed", "odom.x", "odom.y", "odom.yaw"]
         return tuple(names)
-
-
-def four_wheel_geometry(wheelbase: float, joint_spacing: float, wheel_diameter: float, wheel_offset: float) -> Geometry:
-    """Four steered wheels FR, FL, RR, RL on a front and a rear axle; all lengths in m."""
-    half, side = wheelbase / 2, joint_spacing / 2
-    return Geometry(
-        wheels={
-            "FR": WheelGeometry(half, -side, -wheel_offset, "front"),
-            "FL": WheelGeometry(half, side, wheel_offset, "front"),
-            "RR": WheelGeometry(-half, -side, -wheel_offset, "rear"),
-            "RL": WheelGeometry(-half, side, wheel_offset, "rear"),
-        },
-        wheel_diameter=wheel_diameter,
-    )
 
 
 def haulotte() -> Machine:

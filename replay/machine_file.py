@@ -10,20 +10,9 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from replay.errors import ConfigError
-from replay.machine import (
-    Control,
-    Geometry,
-    Limits,
-    Machine,
-    Noise,
-    Plant,
-    SignalSource,
-    SourceOptions,
-    WheelGeometry,
-    WheelPlant,
-    four_wheel_geometry,
-    haulotte,
-)
+from replay.geometry import Geometry, WheelGeometry, four_wheel_geometry
+from replay.machine import Control, Limits, Machine, Noise, Plant, WheelPlant, haulotte
+from replay.sources import SignalSource, SourceOptions
 
 _T = TypeVar("_T")
 _SECTIONS = {"machine", "geometry", "control", "plant", "noise", "limits", "sources", "signals"}

@@ -13,11 +13,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from replay.errors import ConfigError
-from replay.machine import Machine, SignalSource
+from replay.machine import Machine
 from replay.mapping_convert import Converted, choose_motor_or_wheel, convert, doubt, usable_unit
 from replay.mapping_rules import Candidate, candidates, wanted_type
 from replay.rawlog import Channel, LogSummary, RawLog
 from replay.signals import Signal, Signals
+from replay.sources import SignalSource
 
 
 def plan_topics(summaries: Sequence[LogSummary], machine: Machine) -> dict[str, tuple[str, ...] | None]:

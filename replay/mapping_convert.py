@@ -9,8 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from replay.errors import ConfigError
-from replay.machine import Machine, SignalSource
+from replay.machine import Machine
 from replay.mapping_rules import SI_UNITS
+from replay.sources import SignalSource
 from replay.units import quantity_of, si_factor
 
 _TOO_FAST = 3.0

@@ -6,9 +6,10 @@ import re
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 
-from replay.machine import Machine, SignalSource
+from replay.machine import Machine
 from replay.mapping_parts import axle_of, first_indices, index_of, is_drive, is_steering, tokens, wheel_of
 from replay.rawlog import Channel
+from replay.sources import SignalSource
 from replay.units import quantity_of
 
 SI_UNITS = {

@@ -9,11 +9,12 @@ from fnmatch import fnmatch
 from pathlib import Path
 
 from replay.errors import LogError
-from replay.machine import Machine, SourceOptions
+from replay.machine import Machine
 from replay.mapping import map_signals, plan_topics
 from replay.rawlog import LogSummary, RawLog
 from replay.readers.registry import read_log, summarise_log
 from replay.signals import Signals
+from replay.sources import SourceOptions
 from replay.timeline import Timeline, align
 
 Progress = Callable[[str], None]

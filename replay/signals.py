@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from replay.machine import SignalSource
+from replay.sources import SignalSource
 
 
 @dataclass(frozen=True)

@@ -6,8 +6,8 @@ from collections.abc import Collection
 from pathlib import Path
 from typing import Protocol
 
-from replay.machine import SourceOptions
 from replay.rawlog import Clock, LogSummary, RawLog
+from replay.sources import SourceOptions
 
 
 class Reader(Protocol):

@@ -14,8 +14,8 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from replay.errors import LogError
-from replay.machine import SourceOptions
 from replay.readers.clocks import Report
+from replay.sources import SourceOptions
 
 FILETIME_EPOCH = 116_444_736_000_000_000
 _NANOSECONDS = {"s": 1_000_000_000, "ms": 1_000_000, "us": 1_000, "ns": 1}

@@ -10,12 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from replay.errors import LogError
-from replay.machine import SourceOptions
 from replay.rawlog import Clock, LogSummary, RawLog, TopicInfo
 from replay.readers.assemble import Assembler, Block, Connection
 from replay.readers.clocks import Report
 from replay.readers.mcap_file import MAGIC, MESSAGE, McapFile, chunk_records, open_file
 from replay.readers.records import Records, scan_mcap
+from replay.sources import SourceOptions
 
 _MESSAGE_HEAD = 22
 _HEAD = np.dtype([("channel", "<u2"), ("sequence", "<u4"), ("log", "<i8"), ("publish", "<i8")])

@@ -6,7 +6,6 @@ from collections.abc import Collection
 from pathlib import Path
 
 from replay.errors import LogError
-from replay.machine import SourceOptions
 from replay.rawlog import Clock, LogSummary, RawLog
 from replay.readers.base import Reader
 from replay.readers.mcap import McapReader
@@ -14,6 +13,7 @@ from replay.readers.ros1_bag import Ros1BagReader
 from replay.readers.rosbag2 import Rosbag2Reader
 from replay.readers.table import CsvReader, ParquetReader
 from replay.readers.twincat_csv import TwincatCsvReader
+from replay.sources import SourceOptions
 
 # In order of certainty: magic bytes first, text tables last.
 READERS: tuple[Reader, ...] = (

@@ -11,12 +11,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from replay.errors import LogError
-from replay.machine import SourceOptions
 from replay.rawlog import Clock, LogSummary, RawLog, TopicInfo
 from replay.readers.assemble import Assembler, Block, Connection
 from replay.readers.clocks import Report
 from replay.readers.inflate import InflateError, inflate
 from replay.readers.records import BagRecords, scan_bag
+from replay.sources import SourceOptions
 
 MAGIC = b"#ROSBAG V"
 _VERSION = b"#ROSBAG V2.0\n"

@@ -11,10 +11,10 @@ from pathlib import Path
 import zstandard
 
 from replay.errors import LogError
-from replay.machine import SourceOptions
 from replay.rawlog import Clock, LogSummary, RawLog
 from replay.readers import mcap, sqlite_bag
 from replay.readers.clocks import Report
+from replay.sources import SourceOptions
 
 _SQLITE = b"SQLite format 3\0"
 _STORES = (".db3", ".mcap", ".db3.zstd", ".mcap.zstd")

@@ -13,12 +13,12 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from replay.errors import LogError
-from replay.machine import SourceOptions
 from replay.rawlog import Channel, Clock, LogSummary, RawLog, TopicInfo
 from replay.readers.clocks import Report
 from replay.readers.columns import epoch_ns, numbers, parse, stamps, unit_of
 from replay.readers.textfile import first_text, read_text
 from replay.readers.time_column import find_time
+from replay.sources import SourceOptions
 
 _SEPARATORS = ("\t", ";", ",", "|")
 _MAX_PARQUET = 16 << 30

@@ -11,9 +11,9 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from replay.errors import LogError
-from replay.machine import SourceOptions
 from replay.readers.clocks import Report
 from replay.readers.columns import unit_of
+from replay.sources import SourceOptions
 
 _TIME = re.compile(
     r"^(t|time|times?tamp|stamp|rel(ative)?[ _]?time|elapsed([ _]?time)?|date[ _]?time|zeit|zeitstempel|seconds?|secs?|"

@@ -13,11 +13,11 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from replay.errors import LogError
-from replay.machine import SourceOptions
 from replay.rawlog import Channel, Clock, LogSummary, RawLog, TopicInfo
 from replay.readers.clocks import Report
 from replay.readers.columns import FILETIME_EPOCH, numbers, parse, stamps
 from replay.readers.textfile import first_text, read_text
+from replay.sources import SourceOptions
 
 _ROWS = frozenset(
     (

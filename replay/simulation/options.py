@@ -9,9 +9,10 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from replay.checks import check_range
 from replay.errors import ConfigError
 from replay.faults import FaultSpec, Side
-from replay.machine import Machine, check_range, haulotte
+from replay.machine import Machine, haulotte
 from replay.truth import MissionTruth
 
 Scenario = Literal["paper", "random", "healthy"]

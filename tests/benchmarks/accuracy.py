@@ -25,10 +25,11 @@ from diagnosis.outcomes import Counts, add
 from diagnosis.pipeline import diagnose_signals
 from diagnosis.scores import figures
 from replay.errors import MfhcaError
-from replay.machine import SignalSource, haulotte
+from replay.machine import haulotte
 from replay.signals import Signal, Signals
 from replay.simulation.options import SimulatedMission, SimulationOptions
 from replay.simulation.run import simulate_mission
+from replay.sources import SignalSource
 
 TUNING = range(20)
 REPORTING = range(1000, 1020)

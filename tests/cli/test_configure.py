@@ -12,8 +12,9 @@ import pytest
 
 from cli.configure import starter
 from cli.main import run
-from replay.machine import Control, Limits, Plant, SignalSource, SourceOptions, WheelPlant, haulotte
+from replay.machine import Control, Limits, Plant, WheelPlant, haulotte
 from replay.machine_file import dump_machine, load_machine
+from replay.sources import SignalSource, SourceOptions
 from replay.units import known_units
 
 

@@ -21,11 +21,12 @@ from diagnosis.result import MissionResult
 from replay.errors import ConfigError, LogError, NotJudged
 from replay.export.mission import write_mission
 from replay.faults import FaultMode, FaultSpec, Side, State
-from replay.machine import Machine, SignalSource, haulotte
+from replay.machine import Machine, haulotte
 from replay.mission import Mission
 from replay.signals import Signal, Signals
 from replay.simulation.options import EvidenceLevel, SimulatedMission, SimulationOptions
 from replay.simulation.run import simulate_mission
+from replay.sources import SignalSource
 from replay.timeline import align
 
 PAPER = haulotte()
@@ -149,7 +150,6 @@ def test_permuting_the_wheels_permutes_the_result_alone(evidence: EvidenceLevel)
         assert_allclose(shuffled.columns[name], x, rtol=1e-6, atol=1e-9, err_msg=name)
 
 
-@pytest.mark.xfail(reason="signals[].source names the file by its whole path")
 def test_same_files_give_the_same_bytes_wherever_they_lie(tmp_path: Path) -> None:
     logged = simulated()
     reports = []

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from replay.inspect import inspect_log
-from replay.machine import SourceOptions
+from replay.sources import SourceOptions
 
 
 def test_rates_gaps_and_jitter_of_a_table(tmp_path: Path) -> None:

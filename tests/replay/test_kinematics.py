@@ -13,8 +13,9 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 
+from replay.geometry import Geometry, WheelGeometry
 from replay.kinematics import WheelCommands, _scan_low_pass, low_pass, steering_angle, wheel_angles, wheel_commands
-from replay.machine import Geometry, PhiDot, WheelGeometry, haulotte
+from replay.machine import PhiDot, haulotte
 
 Array = np.ndarray
 MAX = 1.5

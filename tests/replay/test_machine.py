@@ -8,19 +8,9 @@ from typing import Any
 import pytest
 
 from replay.errors import ConfigError
-from replay.machine import (
-    Control,
-    Geometry,
-    Limits,
-    Machine,
-    Plant,
-    SignalSource,
-    SourceOptions,
-    WheelGeometry,
-    WheelPlant,
-    four_wheel_geometry,
-    haulotte,
-)
+from replay.geometry import Geometry, WheelGeometry, four_wheel_geometry
+from replay.machine import Control, Limits, Machine, Plant, WheelPlant, haulotte
+from replay.sources import SignalSource, SourceOptions
 
 
 def test_papers_machine() -> None:

@@ -10,20 +10,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from replay.errors import ConfigError
-from replay.machine import (
-    Control,
-    Geometry,
-    Limits,
-    Machine,
-    Noise,
-    Plant,
-    SignalSource,
-    SourceOptions,
-    WheelGeometry,
-    WheelPlant,
-    haulotte,
-)
+from replay.geometry import Geometry, WheelGeometry
+from replay.machine import Control, Limits, Machine, Noise, Plant, WheelPlant, haulotte
 from replay.machine_file import dump_machine, load_machine
+from replay.sources import SignalSource, SourceOptions
 
 SETTINGS = settings(max_examples=60, deadline=None)
 

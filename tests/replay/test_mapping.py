@@ -10,7 +10,7 @@ import pytest
 
 from replay.errors import ConfigError
 from replay.export.mission import FORMATS, write_mission
-from replay.machine import Machine, SignalSource, SourceOptions, haulotte
+from replay.machine import Machine, haulotte
 from replay.mapping import map_signals, plan_topics
 from replay.mapping_convert import slope
 from replay.mapping_parts import axle_of, wheel_of
@@ -19,6 +19,7 @@ from replay.readers.registry import read_log, summarise_log
 from replay.signals import Signals
 from replay.simulation.options import SimulationOptions
 from replay.simulation.run import simulate_mission
+from replay.sources import SignalSource, SourceOptions
 
 STEP = 10_000_000
 MACHINE = haulotte()

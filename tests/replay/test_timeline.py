@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 from numpy.testing import assert_array_equal
 
 from replay.errors import LogError
-from replay.machine import SignalSource
 from replay.signals import Signal, Signals
+from replay.sources import SignalSource
 from replay.timeline import align, median_period
 
 START = 1_760_000_000_000_000_000

@@ -10,12 +10,13 @@ import pytest
 
 from replay.errors import LogError
 from replay.export.mission import FORMATS, write_mission
-from replay.machine import SourceOptions, haulotte
+from replay.machine import haulotte
 from replay.mapping import map_signals
 from replay.rawlog import RawLog
 from replay.readers.registry import read_log, summarise_log
 from replay.simulation.options import SimulatedMission, SimulationOptions
 from replay.simulation.run import simulate_mission
+from replay.sources import SourceOptions
 
 ROUNDS = 40
 

@@ -12,9 +12,9 @@ from mcap.writer import CompressionType, IndexType, Writer
 from rosbags.typesys import Stores, get_typestore
 
 from replay.errors import LogError
-from replay.machine import SourceOptions
 from replay.readers.mcap import McapReader
 from replay.readers.registry import read_log, summarise_log
+from replay.sources import SourceOptions
 
 OPTIONS = SourceOptions()
 T0 = 1_760_000_000_000_000_000

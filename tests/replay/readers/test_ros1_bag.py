@@ -10,8 +10,8 @@ from rosbags.rosbag1 import Reader, Writer
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from replay.errors import LogError
-from replay.machine import SourceOptions
 from replay.readers.registry import read_log, summarise_log
+from replay.sources import SourceOptions
 
 OPTIONS = SourceOptions()
 STORE = get_typestore(Stores.ROS1_NOETIC)

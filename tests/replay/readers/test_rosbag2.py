@@ -14,8 +14,8 @@ from rosbags.rosbag2 import CompressionFormat, CompressionMode, Reader, StorageP
 from rosbags.typesys import Stores, get_typestore
 
 from replay.errors import LogError
-from replay.machine import SourceOptions
 from replay.readers.registry import read_log, summarise_log
+from replay.sources import SourceOptions
 
 OPTIONS = SourceOptions()
 STORE = get_typestore(Stores.LATEST)

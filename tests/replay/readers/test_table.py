@@ -10,9 +10,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from replay.errors import LogError
-from replay.machine import SourceOptions
 from replay.rawlog import RawLog
 from replay.readers.registry import open_log, read_log, summarise_log
+from replay.sources import SourceOptions
 
 
 def read(path: Path, **options: object) -> RawLog:

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from replay.errors import LogError
-from replay.machine import SourceOptions
 from replay.rawlog import RawLog
 from replay.readers.registry import open_log, read_log
+from replay.sources import SourceOptions
 
 START = 133_000_000_000_000_000  # FILETIME
 START_NS = (START - 116_444_736_000_000_000) * 100
