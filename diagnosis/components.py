@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -162,14 +162,20 @@ class _Wheel:
             self.timeline, self.counts, side, self.name(y), self.name(x), quiet, unit, self.span(y), self.machine
         )
 
+    def instruments(self) -> Array | None:
+        """The commanded speed and two lags of it: what moves the wheel and knows nothing of its sensor."""
+        command = self.replay.v_ref[:, self.index]
+        if not np.isfinite(command).any():
+            return None
+        return np.column_stack([command, *(low_passed(command, lag, self.timeline.dt) for lag in (0.1, 0.3))])
+
     def sensor(self, direct: bool, model: tuple[Assessment, Assessment] | None) -> Assessment:
         size = self.timeline.size
         if not np.isfinite(self.values("v")).any():
             return unassessed(size, State.NO_DATA, "the wheel's speed is not in the log")
         if direct:
-            return assess_pair(
-                self.pair(Side.SENSOR, "v", "v_true", self.quiet(self.values("v_true")), "m/s"), self.machine.limits
-            )
+            pair = self.pair(Side.SENSOR, "v", "v_true", self.quiet(self.values("v_true")), "m/s")
+            return assess_pair(replace(pair, instruments=self.instruments()), self.machine.limits)
         if model is not None:
             return model[0]
         return unassessed(

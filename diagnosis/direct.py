@@ -60,6 +60,8 @@ class Pair:
         Canonical names, for the text.
     known_noise : Noise
         From the machine file.
+    instruments : Array, shape (n, k), or None
+        Signals that drive x but know nothing of the fault; see `diagnosis.estimate`.
     """
 
     side: Side
@@ -74,6 +76,7 @@ class Pair:
     y_name: str
     x_name: str
     known_noise: Noise
+    instruments: Array | None = None
 
 
 def sample_status(
@@ -234,7 +237,8 @@ def _finding(
         run = Run(run.start, run.stop, modes.NO_SIGNAL)
         p[modes.NO_SIGNAL] += p[modes.STUCK]
         p[modes.STUCK] = 0.0
-    estimate = estimate_fault(run.row, y[use], ref[use], model, pair.unit, noisy_x=pair.side is Side.SENSOR)
+    instruments = None if pair.instruments is None else np.nan_to_num(pair.instruments[part][use])
+    estimate = estimate_fault(run.row, y[use], ref[use], model, pair.unit, instruments)
     if estimate is None:
         return None
     mode = _MODE[run.row]
@@ -323,7 +327,7 @@ def _states(
 ) -> NDArray[np.int8]:
     """State of every sample: faults, healthy where something moves, else not excited or no data."""
     states = np.where(pair.quiet, CODE[State.NOT_EXCITED], CODE[State.HEALTHY]).astype(np.int8)
-    known = np.isfinite(pair.y) & np.isfinite(x)
+    known = np.isfinite(pair.y) & np.isfinite(pair.x)
     nothing = ~known & (status != modes.SILENT)
     states[nothing] = CODE[State.NO_DATA]
     states[blind & known] = CODE[State.NOT_ASSESSED]

@@ -10,9 +10,11 @@ from diagnosis.result import Epsilon, Sat
 
 Array = NDArray[np.float64]
 
+_PRIOR = np.array([0.7, 0.0])  # of [δ, mean δ̄] of a noisy channel
+
 
 def estimate_fault(
-    row: int, y: Array, x: Array, model: modes.ModeModel, unit: str, *, noisy_x: bool
+    row: int, y: Array, x: Array, model: modes.ModeModel, unit: str, instruments: Array | None
 ) -> tuple[Epsilon | None, Sat | None, float] | None:
     """ε̂ and the saturation term of one row of the table with 95 % bounds, and δ̂.
 
@@ -26,8 +28,8 @@ def estimate_fault(
         Noise of the channel.
     unit : str
         Unit of the saturation term.
-    noisy_x : bool
-        Whether the reference is a measurement with noise of its own rather than an exact command.
+    instruments : Array, shape (n, k), or None
+        Signals that drive x but know nothing of the fault, such as the commanded speed and what a wheel makes of it.
     """
     if y.size < 3:
         return (Epsilon(1.0, 0.0, 1.0), None, 0.0) if row == modes.NO_SIGNAL else None
@@ -46,8 +48,11 @@ def estimate_fault(
         residual = y - delta * x
         se = 1.96 * np.sqrt(_long_run_variance(residual) / sxx)
         return _epsilon(delta, se), None, delta
-    # noisy: δ̄ drifts; generalised least squares on differences of blocks and levels through the Kalman filter
-    delta, delta_se = _gain_with_drift(y, x, model, 0.05 if noisy_x else 0.0)
+    # noisy: δ̄ drifts
+    if instruments is None:
+        delta, delta_se = _gain_with_drift(y, x, model)
+    else:
+        delta, delta_se = _gain_by_instruments(y, x, instruments, model)
     bias = y - delta * x
     epsilon = _epsilon(delta, 1.96 * delta_se)
     eps = max(epsilon.value, 0.05)
@@ -71,16 +76,36 @@ def _long_run_variance(residual: Array) -> float:
     return var * (1 + rho) / (1 - rho)
 
 
-def _gain_with_drift(y: Array, x: Array, model: modes.ModeModel, smooth_s: float) -> tuple[float, float]:
+def _gain_by_instruments(y: Array, x: Array, instruments: Array, model: modes.ModeModel) -> tuple[float, float]:
+    """δ of y = δ·x + δ̄ + n by two-stage least squares.
+
+    The loop answers to a sensor's noise, so that x and δ̄ are correlated and a plain regression takes δ too small; the
+    part of x that follows the command is free of that. The noise enters by its long-run variance over 0.25 s.
+    """
+    base = np.column_stack([instruments, np.ones_like(x)])
+    driven = base @ np.linalg.lstsq(base, x, rcond=None)[0]
+    design = np.column_stack([driven, np.ones_like(x)])
+    rest = y - _PRIOR[0] * x
+    rest = rest - rest.mean()
+    length = max(1, round(0.25 / model.dt))
+    count = rest.size // length
+    if count >= 2:
+        variance = float(np.var(rest[: count * length].reshape(count, length).mean(axis=1))) * length
+    else:
+        variance = float(np.var(rest)) * length / 5
+    variance = max(variance, model.noise**2)
+    ridge = np.diag([1 / 0.3**2, 1 / (0.06 * model.span) ** 2])
+    covariance = np.linalg.inv(ridge + design.T @ design / variance)
+    theta = covariance @ (ridge @ _PRIOR + design.T @ y / variance)
+    return float(theta[0]), float(np.sqrt(covariance[0, 0]))
+
+
+def _gain_with_drift(y: Array, x: Array, model: modes.ModeModel) -> tuple[float, float]:
     """δ of y = δ·x + δ̄ + n with an AR(1) δ̄ around a constant: Cochrane–Orcutt steps from a ridge on [δ, mean]."""
     spread = float(np.std(y - 0.7 * x)) + model.noise
     ridge = np.diag([1 / 0.3**2, 1 / (0.1 * model.span) ** 2])
-    width = min(x.size, max(1, round(smooth_s / model.dt)))
-    if width > 1:  # the noise of x would pull δ towards 0
-        x = np.convolve(np.pad(x, (width // 2, width - 1 - width // 2), mode="edge"), np.ones(width) / width, "valid")
-    start = np.array([0.7, 0.0])
     rho, sigma = 0.0, spread
-    theta: Array = start
+    theta: Array = _PRIOR
     design = np.stack([x, np.ones_like(x)], axis=1)
     covariance = np.asarray(np.linalg.inv(ridge), dtype=np.float64)
     for _ in range(6):
@@ -88,7 +113,7 @@ def _gain_with_drift(y: Array, x: Array, model: modes.ModeModel, smooth_s: float
         b = (y[1:] - rho * y[:-1]) / sigma
         information = ridge + a.T @ a
         covariance = np.asarray(np.linalg.inv(information), dtype=np.float64)
-        theta = np.asarray(covariance @ (ridge @ start + a.T @ b), dtype=np.float64)
+        theta = np.asarray(covariance @ (ridge @ _PRIOR + a.T @ b), dtype=np.float64)
         residual = np.asarray(y - design @ theta, dtype=np.float64)
         norm = float(residual[:-1] @ residual[:-1])
         rho = min(0.9995, max(0.0, float(residual[1:] @ residual[:-1]) / norm)) if norm > 0 else 0.0

@@ -53,7 +53,7 @@ def low_passed(u: Array, tau: float, dt: float) -> Array:
     """Response of a first-order lag to u held over each step; NaN counts as 0."""
     a = np.exp(-dt / tau)
     filled = np.nan_to_num(u)
-    return np.asarray(lfilter([0.0, 1 - a], [1.0, -a], filled, zi=[filled[0] * a])[0]) if u.size else u
+    return np.asarray(lfilter([0.0, 1 - a], [1.0, -a], filled, zi=[filled[0]])[0]) if u.size else u
 
 
 def identify(

@@ -91,7 +91,7 @@ def _initial_state(wheels: int, psi0: float, table: FaultTable) -> PlantState:
     return PlantState(
         v=np.zeros(wheels),
         spool=np.zeros(wheels),
-        psi=np.full(wheels, psi0),
+        psi=np.full(wheels, float(psi0)),
         phi=np.zeros(2),
         phi_rate=np.zeros(2),
         body=np.zeros(5),
