@@ -9,9 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from diagnosis.assessment import Assessment, unassessed
-from diagnosis.direct import Pair, assess_pair, sample_status
+from diagnosis.direct import assess_pair
 from diagnosis.model_based import WheelData, assess_wheel
 from diagnosis.noise import shifted
+from diagnosis.pairs import Pair, sample_status
 from diagnosis.parity import slipping
 from diagnosis.tracking import assess_tracking
 from diagnosis.wheel_model import WheelModelFit, aliasing_slack, common_load, fed_openings, identify, low_passed

@@ -5,8 +5,6 @@ L4 with v against v_true for a sensor, L8 with u_applied against u_a for an actu
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -14,11 +12,12 @@ from diagnosis import modes
 from diagnosis.assessment import CODE, Assessment, Finding
 from diagnosis.estimate import estimate_fault
 from diagnosis.kalman import GainBiasModel, track_gain_bias
-from diagnosis.noise import relative_lag, rounding_step, shifted, slow_mismatch, unresolved, white_noise, white_part
+from diagnosis.noise import relative_lag, shifted, unresolved
+from diagnosis.pairs import Pair, mode_model, sample_status, timing_explains
 from diagnosis.result import Epsilon, Hypothesis, Sat
-from diagnosis.segments import Run, absorb_short, merge_equal, runs_of, trim
+from diagnosis.segments import Run, absorb_short, join_noisy, merge_equal, runs_of, trim
 from replay.faults import FaultMode, Side, State
-from replay.machine import Limits, Noise
+from replay.machine import Limits
 
 Array = NDArray[np.float64]
 
@@ -29,70 +28,7 @@ _MODE = {
     modes.NOISY: FaultMode.NOISY,
 }
 _TEMPER = 0.25
-_MEAN_HEALTHY_S = 60.0
 _MAX_LAG_S = 0.05
-_EDGE_S = 0.1
-
-
-@dataclass(frozen=True)
-class Pair:
-    """A channel and its reference.
-
-    Attributes
-    ----------
-    side : Side
-        `SENSOR` or `ACTUATOR`.
-    y, x : Array, shape (n,)
-        Measured value and reference, SI; NaN where not valid.
-    fresh : NDArray[np.bool_], shape (n,)
-        Steps with a new sample of y.
-    alive : NDArray[np.bool_], shape (n,)
-        Whether another channel of y's source delivers.
-    quiet : NDArray[np.bool_], shape (n,)
-        Where the component is neither commanded nor moving.
-    dt : float
-        Step [s].
-    unit : str
-        Unit of y.
-    span : float
-        Largest plausible magnitude [unit].
-    y_name, x_name : str
-        Canonical names, for the text.
-    known_noise : Noise
-        From the machine file.
-    instruments : Array, shape (n, k), or None
-        Signals that drive x but know nothing of the fault; see `diagnosis.estimate`.
-    """
-
-    side: Side
-    y: Array
-    x: Array
-    fresh: NDArray[np.bool_]
-    alive: NDArray[np.bool_]
-    quiet: NDArray[np.bool_]
-    dt: float
-    unit: str
-    span: float
-    y_name: str
-    x_name: str
-    known_noise: Noise
-    instruments: Array | None = None
-
-
-def sample_status(
-    y: Array, x: Array, fresh: NDArray[np.bool_], alive: NDArray[np.bool_], dt: float
-) -> NDArray[np.int8]:
-    """Status of every step for `modes`: a pair, a silent y beside living siblings, or nothing new."""
-    status = np.full(y.size, modes.SKIP, dtype=np.int8)
-    known = np.isfinite(y)
-    status[fresh & known & np.isfinite(x)] = modes.PAIR
-    silent = ~known & alive
-    edge = round(_EDGE_S / dt)
-    for part in (slice(0, edge), slice(max(0, y.size - edge), y.size)):
-        if not silent[part].all() or edge * 2 < y.size:
-            silent[part] &= False
-    status[silent] = modes.SILENT
-    return status
 
 
 def assess_pair(pair: Pair, limits: Limits) -> Assessment:
@@ -111,7 +47,7 @@ def assess_pair(pair: Pair, limits: Limits) -> Assessment:
     lag = relative_lag(pair.y, pair.x, usable & ~pair.quiet, least_lag, max_lag)
     x = shifted(pair.x, lag)
     status = sample_status(pair.y, x, pair.fresh, pair.alive, pair.dt)
-    model, lsb = _mode_model(pair, x, status, 0.25 * limits.min_sat)
+    model, lsb = mode_model(pair, x, status, 0.25 * limits.min_sat)
     blind, share = np.zeros(x.size, dtype=np.bool_), 0.0
     if pair.side is Side.ACTUATOR:  # a command may jump from step to step, a speed may not
         paired = status == modes.PAIR
@@ -124,7 +60,7 @@ def assess_pair(pair: Pair, limits: Limits) -> Assessment:
         finding = _finding(run, pair, x, status, model, limits, lag)
         if finding is None:
             below += 1
-        elif share and finding.mode is FaultMode.NOISY and _timing_explains(pair.y, pair.x, run):
+        elif timing_explains(pair, x, run, finding.mode, share):
             blind[run.start : run.stop] = True
         else:
             findings.append(finding)
@@ -149,55 +85,10 @@ def assess_pair(pair: Pair, limits: Limits) -> Assessment:
     )
 
 
-def _timing_explains(y: Array, x: Array, run: Run) -> bool:
-    """Whether a disturbance of y may be nothing but a delay.
-
-    Either what changes from sample to sample is as large, or y is x with its sign at other moments, as with a command
-    that switches to and fro between samples.
-    """
-    part = slice(run.start, run.stop)
-    deviation = np.sqrt(np.nanmean((y[part] - x[part]) ** 2))
-    sudden = max(float(np.sqrt(np.mean(white_part(z)[part] ** 2))) for z in (x, y))
-    size = np.sqrt(np.nanmean((np.abs(y[part]) - np.abs(x[part])) ** 2))
-    return bool(sudden > 0.3 * deviation or size < 0.3 * deviation)
-
-
-def _mode_model(pair: Pair, x: Array, status: NDArray[np.int8], tolerance: float) -> tuple[modes.ModeModel, float]:
-    """Noise of the channel, found from the mission where the machine file does not give it."""
-    fresh_y = pair.y[status == modes.PAIR]
-    lsb = pair.known_noise.lsb if pair.known_noise.lsb is not None else rounding_step(fresh_y)
-    residual = np.where(status == modes.PAIR, pair.y - x, np.nan)
-    period = pair.dt * max(
-        1.0,
-        float(
-            np.median(
-                np.diff(np.flatnonzero(status == modes.PAIR)[:20_000]),
-            )
-        )
-        if fresh_y.size > 1
-        else 1.0,
-    )
-    white = white_noise(residual[status == modes.PAIR], period)
-    slow = slow_mismatch(residual, (status == modes.PAIR) & ~pair.quiet, pair.dt)
-    measured = max(np.nan_to_num(white), np.nan_to_num(slow))
-    noise = max(measured, pair.known_noise.std or 0.0, lsb / np.sqrt(12), 1e-5 * pair.span)
-    # a stuck sensor has no noise left, a stuck valve is still read by a noisy spool sensor
-    constant = max(lsb / np.sqrt(12), noise / 50) if pair.side is Side.SENSOR else noise
-    rate = 1.0 / period
-    model = modes.ModeModel(
-        noise=noise,
-        constant_noise=constant,
-        tolerance=tolerance,
-        span=pair.span,
-        switch_cost=float(np.log(_MEAN_HEALTHY_S * rate * 8)),
-        dt=period,
-    )
-    return model, lsb
-
-
 def _tidy(path: modes.ModePath, pair: Pair, status: NDArray[np.int8]) -> list[Run]:
     """Faulty runs of a path, joined where they belong together, without the ends in which nothing moves."""
     runs = absorb_short(runs_of(path), max(3, round(0.01 / pair.dt)))
+    runs = join_noisy(runs)
     runs = merge_equal(runs, max(2, round(0.02 / pair.dt)), (modes.NOISY, modes.INEFFICIENT, modes.NO_SIGNAL))
     out = []
     for run in runs:

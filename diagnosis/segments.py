@@ -54,6 +54,23 @@ def absorb_short(runs: Iterable[Run], shortest: int) -> list[Run]:
     return out
 
 
+def join_noisy(runs: Iterable[Run]) -> list[Run]:
+    """Give an inefficient run that lies between two noisy ones, without a gap and no longer than they, to them.
+
+    A drifting bias that rests for a while looks like a loss of gain.
+    """
+    out = list(runs)
+    k = 1
+    while k < len(out) - 1:
+        a, b, c = out[k - 1 : k + 2]
+        if b.row == INEFFICIENT and a.row == c.row == NOISY and b.size <= a.size + c.size:
+            out[k - 1 : k + 2] = [Run(a.start, c.stop, NOISY)]
+            k = max(1, k - 1)
+        else:
+            k += 1
+    return out
+
+
 def merge_equal(runs: Iterable[Run], gap: int, rows: tuple[int, ...] = (NOISY,)) -> list[Run]:
     """Join runs of one of `rows` that touch or are separated by less than `gap` healthy samples."""
     out: list[Run] = []

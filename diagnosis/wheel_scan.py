@@ -86,6 +86,9 @@ def predict(m, u, common, p, z, P):  # type: ignore[no-untyped-def]
         f_b = np.exp(-dt / 0.8)
         q_b = (1 - f_b * f_b) * (0.5 * p[7]) ** 2
     k_u = (1 - a) * p[0] * u
+    if m == S_GAIN:  # ν is in the sensor's scale, and so is the shared load
+        k_u += (1 - a) * common
+        common = 0.0
     # row of ν: [a, (1−a)K u, 1−a, 0]
     v = a * z[m, 0] + k_u * z[m, 1] + (1 - a) * (z[m, 2] + common)
     r0 = np.empty(4)

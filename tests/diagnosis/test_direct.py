@@ -11,7 +11,8 @@ from numpy.testing import assert_array_equal
 
 from diagnosis import modes
 from diagnosis.assessment import CODE, Assessment, Finding
-from diagnosis.direct import Pair, assess_pair, sample_status
+from diagnosis.direct import assess_pair
+from diagnosis.pairs import Pair, sample_status
 from replay.faults import FaultMode, Side, State, fault_affected
 from replay.machine import Limits, Noise
 

@@ -97,11 +97,12 @@ class Oracle:
             )
         f_b, q_b = load_walk(m)
         q_c = (0.06 * MODEL.span) ** 2 * MODEL.dt if S_DRIFT <= m <= S_WHITE_25 else 0.0
+        inside = common if m == S_GAIN else 0.0  # in the sensor's scale, as ν is
         F = np.array(
-            [[A, (1 - A) * MODEL.K * u, 1 - A, 0.0], [0, 1, 0, 0], [0, 0, f_b, 0], [0, 0, 0, 1]],
+            [[A, (1 - A) * (MODEL.K * u + inside), 1 - A, 0.0], [0, 1, 0, 0], [0, 0, f_b, 0], [0, 0, 0, 1]],
         )
         Q = np.diag([MODEL.noise**2 * MODEL.dt * 0.05, 0.0, q_b, q_c])
-        kf.predict(u=np.array([[common]]), B=np.array([[1 - A], [0], [0], [0]]), F=F, Q=Q)
+        kf.predict(u=np.array([[common - inside]]), B=np.array([[1 - A], [0], [0], [0]]), F=F, Q=Q)
         if status == SILENT:
             return 0.0 if m == S_NONE else -6.0
         if status == SKIP:

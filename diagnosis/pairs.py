@@ -1,0 +1,145 @@
+"""A channel beside its reference: what a sample of it says, its noise, and what a delay between the two explains."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from diagnosis import modes
+from diagnosis.noise import rounding_step, slow_mismatch, white_noise, white_part
+from diagnosis.segments import Run
+from replay.faults import FaultMode, Side
+from replay.machine import Noise
+
+Array = NDArray[np.float64]
+
+_MEAN_HEALTHY_S = 60.0
+_EDGE_S = 0.1
+_SPOOL_DELAY_S = 0.005
+_SENSOR_DELAY_S = 0.01
+_FLIPS = 25  # samples in a row on one side of a command that switches to and fro between samples
+
+
+@dataclass(frozen=True)
+class Pair:
+    """A channel and its reference.
+
+    Attributes
+    ----------
+    side : Side
+        `SENSOR` or `ACTUATOR`.
+    y, x : Array, shape (n,)
+        Measured value and reference, SI; NaN where not valid.
+    fresh : NDArray[np.bool_], shape (n,)
+        Steps with a new sample of y.
+    alive : NDArray[np.bool_], shape (n,)
+        Whether another channel of y's source delivers.
+    quiet : NDArray[np.bool_], shape (n,)
+        Where the component is neither commanded nor moving.
+    dt : float
+        Step [s].
+    unit : str
+        Unit of y.
+    span : float
+        Largest plausible magnitude [unit].
+    y_name, x_name : str
+        Canonical names, for the text.
+    known_noise : Noise
+        From the machine file.
+    instruments : Array, shape (n, k), or None
+        Signals that drive x but know nothing of the fault; see `diagnosis.estimate`.
+    """
+
+    side: Side
+    y: Array
+    x: Array
+    fresh: NDArray[np.bool_]
+    alive: NDArray[np.bool_]
+    quiet: NDArray[np.bool_]
+    dt: float
+    unit: str
+    span: float
+    y_name: str
+    x_name: str
+    known_noise: Noise
+    instruments: Array | None = None
+
+
+def sample_status(
+    y: Array, x: Array, fresh: NDArray[np.bool_], alive: NDArray[np.bool_], dt: float
+) -> NDArray[np.int8]:
+    """Status of every step for `modes`: a pair, a silent y beside living siblings, or nothing new."""
+    status = np.full(y.size, modes.SKIP, dtype=np.int8)
+    known = np.isfinite(y)
+    status[fresh & known & np.isfinite(x)] = modes.PAIR
+    silent = ~known & alive
+    edge = round(_EDGE_S / dt)
+    for part in (slice(0, edge), slice(max(0, y.size - edge), y.size)):
+        if not silent[part].all() or edge * 2 < y.size:
+            silent[part] &= False
+    status[silent] = modes.SILENT
+    return status
+
+
+def timing_explains(pair: Pair, x: Array, run: Run, mode: FaultMode, share: float) -> bool:
+    """Whether a deviation may be nothing but a delay between y and its reference.
+
+    Shorter than a spool sensor's delay; or, where a log is too slow for its commands: what changes from sample to
+    sample is as large, or y is x with its sign at other moments, or a constant y is met by most samples of x. For a
+    speed: shorter than half a second and no more than 10 ms of the reference's slope.
+    """
+    part = slice(run.start, run.stop)
+    y, ref = pair.y[part], x[part]
+    seconds = (run.stop - run.start) * pair.dt
+    off = np.abs(y - ref)
+    deviation = float(np.sqrt(np.nanmean(off**2))) if np.isfinite(off).any() else np.inf
+    if pair.side is Side.SENSOR:
+        slope = np.gradient(np.nan_to_num(x[max(0, run.start - 1) : run.stop + 1]), pair.dt)
+        moves = float(np.sqrt(np.mean(slope**2))) * _SENSOR_DELAY_S
+        return mode is FaultMode.NOISY and seconds < 0.5 and deviation < moves
+    if seconds <= _SPOOL_DELAY_S:
+        return True
+    if not share:
+        return False
+    if mode in (FaultMode.STUCK, FaultMode.NO_SIGNAL):
+        return run.size < _FLIPS or float(np.nanmedian(off)) < 0.5 * deviation
+    if mode is not FaultMode.NOISY:
+        return False
+    sudden = max(float(np.sqrt(np.mean(white_part(z)[part] ** 2))) for z in (pair.x, pair.y))
+    size = np.sqrt(np.nanmean((np.abs(y) - np.abs(pair.x[part])) ** 2))
+    return bool(sudden > 0.3 * deviation or size < 0.3 * deviation)
+
+
+def mode_model(pair: Pair, x: Array, status: NDArray[np.int8], tolerance: float) -> tuple[modes.ModeModel, float]:
+    """Noise of the channel, found from the mission where the machine file does not give it."""
+    fresh_y = pair.y[status == modes.PAIR]
+    lsb = pair.known_noise.lsb if pair.known_noise.lsb is not None else rounding_step(fresh_y)
+    residual = np.where(status == modes.PAIR, pair.y - x, np.nan)
+    period = pair.dt * max(
+        1.0,
+        float(
+            np.median(
+                np.diff(np.flatnonzero(status == modes.PAIR)[:20_000]),
+            )
+        )
+        if fresh_y.size > 1
+        else 1.0,
+    )
+    white = white_noise(residual[status == modes.PAIR], period)
+    slow = slow_mismatch(residual, (status == modes.PAIR) & ~pair.quiet, pair.dt)
+    measured = max(np.nan_to_num(white), np.nan_to_num(slow))
+    noise = max(measured, pair.known_noise.std or 0.0, lsb / np.sqrt(12), 1e-5 * pair.span)
+    # a stuck sensor has no noise left, a stuck valve is still read by a noisy spool sensor
+    constant = max(lsb / np.sqrt(12), noise / 50) if pair.side is Side.SENSOR else noise
+    rate = 1.0 / period
+    model = modes.ModeModel(
+        noise=noise,
+        constant_noise=constant,
+        tolerance=tolerance,
+        span=pair.span,
+        switch_cost=float(np.log(_MEAN_HEALTHY_S * rate * 8)),
+        dt=period,
+    )
+    return model, lsb
