@@ -10,11 +10,12 @@ from numpy.typing import NDArray
 
 from diagnosis.assessment import Assessment, unassessed
 from diagnosis.direct import assess_pair
-from diagnosis.model_based import WheelData, assess_wheel
+from diagnosis.model_based import assess_wheel
 from diagnosis.noise import shifted
 from diagnosis.pairs import Pair, sample_status
 from diagnosis.parity import slipping
 from diagnosis.tracking import assess_tracking
+from diagnosis.wheel_findings import WheelData
 from diagnosis.wheel_model import WheelModelFit, aliasing_slack, common_load, fed_openings, identify, low_passed
 from replay.faults import Side, State
 from replay.loop import Replay, stack
