@@ -69,17 +69,17 @@ def white_noise(values: Array, dt: float) -> float:
 
 
 def quick_noise(residual: Array, dt: float) -> float:
-    """Root mean square of what changes within half a second in a residual, in its quieter windows; NaN where none."""
+    """Root mean square of what changes within half a second in a residual, in its median window; NaN where none."""
     width = max(3, round(0.5 / dt))
     known = np.isfinite(residual)
     filled = np.where(known, residual, 0.0)
     kernel = np.ones(width)
     count = np.convolve(known, kernel, mode="same")
     mean = np.convolve(filled, kernel, mode="same") / np.maximum(count, 1)
-    return slow_mismatch(residual - mean, known & (count > 0.8 * width), dt)
+    return slow_mismatch(residual - mean, known & (count > 0.8 * width), dt, 0.5)
 
 
-def slow_mismatch(residual: Array, use: NDArray[np.bool_], dt: float) -> float:
+def slow_mismatch(residual: Array, use: NDArray[np.bool_], dt: float, quantile: float = 0.3) -> float:
     """Root mean square of a residual in its quieter windows: what healthy parts look like.
 
     Parameters
@@ -90,18 +90,20 @@ def slow_mismatch(residual: Array, use: NDArray[np.bool_], dt: float) -> float:
         Samples that count.
     dt : float
         Step [s].
+    quantile : float
+        Which window stands for healthy ones.
 
     Returns
     -------
     float
-        The 30 % quantile over windows of 0.5 s with at least half of their samples; NaN where there is none.
+        The quantile over windows of 0.5 s with at least a quarter of their samples; NaN where there is none.
     """
     length = max(10, round(0.5 / dt))
     kept = use & np.isfinite(residual)
     squares = _windows(np.where(kept, residual, 0.0) ** 2, length).sum(axis=1)
     counts = _windows(kept.astype(np.float64), length).sum(axis=1)
     good = counts >= length / 4
-    return float(np.quantile(np.sqrt(squares[good] / counts[good]), 0.3)) if good.any() else float("nan")
+    return float(np.quantile(np.sqrt(squares[good] / counts[good]), quantile)) if good.any() else float("nan")
 
 
 def shifted(x: Array, lag: float) -> Array:

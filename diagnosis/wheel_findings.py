@@ -150,7 +150,7 @@ def _model_error_explains(m: int, y: Array, slack: Array, dt: float) -> bool:
         return False
     if m not in (ws.S_WHITE_8, ws.S_WHITE_25):
         return True
-    return float(np.sqrt(np.mean(white_part(y) ** 2))) < 2 * float(np.mean(slack))
+    return float(np.sqrt(np.mean(white_part(y) ** 2))) < float(np.mean(slack))
 
 
 def _estimate(m: int, y: Array, z: Array, P: Array, model: wf.WheelFilterModel) -> tuple[Epsilon | None, Sat | None]:
