@@ -13,6 +13,7 @@ import numpy as np
 
 from diagnosis.assessment import STATES, Assessment, Finding
 from diagnosis.result import FaultInterval, Severity, StateSpan, Verdict
+from diagnosis.wheel_model import WheelModelFit
 from replay.faults import FAULT_STATES, FaultMode, Side, State
 from replay.machine import Limits
 
@@ -21,6 +22,9 @@ Key = tuple[str, str]
 _GONE = (FaultMode.STUCK, FaultMode.NO_SIGNAL)
 _RANK: dict[Severity, int] = {"high": 0, "medium": 1, "low": 2, "info": 3}
 _MARKED_EPSILON = 0.3
+_LEAST_SHARE = 0.8
+_MODEL_RESOLUTION = 0.25
+_COMPARED_WHEELS = 3
 
 MODE_WORDS = {
     "sensor": {
@@ -166,12 +170,16 @@ def decide(
     axles: Sequence[str],
     limits: Limits,
     damage: Sequence[str],
+    *,
+    driving_s: Mapping[Key, float] | None = None,
+    model: WheelModelFit | None = None,
 ) -> Decision:
     """Give the verdict.
 
     ``stop`` with a fault of high severity, ``watch`` with one of low or medium; without faults ``ready`` only where
-    every wheel and side was decided for `min_assessed` seconds of driving and the log lost nothing, else
-    ``not_assessed``.
+    every wheel and side was decided for `min_assessed` seconds and for four fifths of its driving, and the log lost
+    nothing, else ``not_assessed``. A wheel model found in the mission itself is compared across wheels; with fewer
+    than three of them a loss that lasts the whole mission would not show, so that it gives no ``ready`` either.
 
     Parameters
     ----------
@@ -187,9 +195,25 @@ def decide(
         What ``ready`` needs.
     damage : Sequence[str]
         What the log lost.
+    driving_s : Mapping or None
+        Seconds of driving of the component; None: only `min_assessed` counts.
+    model : WheelModelFit or None
+        Wheel models behind the judgement, where any.
     """
-    short = [k for k in assessments if k[0] not in axles and decided_s.get(k, 0.0) < limits.min_assessed]
-    caveats = _caveats(short, assessments, decided_s, axles, limits, damage)
+    driven = driving_s or {}
+    short = [
+        k
+        for k in assessments
+        if k[0] not in axles and decided_s.get(k, 0.0) < max(limits.min_assessed, _LEAST_SHARE * driven.get(k, 0.0))
+    ]
+    modelled = [k for k, a in assessments.items() if a.tier == "model"]
+    caveats = _caveats(short, assessments, decided_s, driven, axles, limits, damage)
+    if modelled and model is not None and model.identified:
+        caveats += (
+            "Speed sensors and valves that are not measured twice were judged by a wheel model found in this mission: a "
+            f"loss below about {100 * _MODEL_RESOLUTION:.0f} %, or one that lasts the whole mission on every wheel, does "
+            "not show. A machine file with [plant], or a second measurement, would.",
+        )
     actions = _actions(intervals)
     worst = intervals[0].severity if intervals else None
     stop = [f for f in intervals if f.severity == "high"]
@@ -203,6 +227,12 @@ def decide(
         who = _join(sorted({part_words("wheel", c, s) for c, s in short}))
         text = f"No fault was found, but {who} could not be judged long enough to say that they are healthy."
         return Decision("not_assessed", "Not assessed", text, caveats, actions)
+    if modelled and model is not None and model.identified and len(model.plants) < _COMPARED_WHEELS:
+        text = (
+            "No fault was found, but the wheel model comes from this mission alone: a loss that lasted all of it would "
+            "not show. Give the wheels' K and tau in a machine file's [plant]."
+        )
+        return Decision("not_assessed", "No fault found, not fully assessed", text, caveats, actions)
     if damage:
         return Decision(
             "watch", "No fault found in a damaged log", "Parts of the log are lost: " + damage[0], caveats, actions
@@ -216,6 +246,7 @@ def _caveats(
     short: Sequence[Key],
     assessments: Mapping[Key, Assessment],
     decided_s: Mapping[Key, float],
+    driven: Mapping[Key, float],
     axles: Sequence[str],
     limits: Limits,
     damage: Sequence[str],
@@ -227,7 +258,9 @@ def _caveats(
         reason = _main_reason(assessments[key])
         out.append(
             f"{part_words('wheel', *key)}: judged for {decided_s.get(key, 0.0):.1f} s of driving, of "
-            f"{limits.min_assessed:g} s needed" + (f" ({reason})" if reason else "") + "."
+            f"{max(limits.min_assessed, _LEAST_SHARE * driven.get(key, 0.0)):.3g} s needed"
+            + (f" ({reason})" if reason else "")
+            + "."
         )
     unjudged = [k for k in assessments if k[0] in axles and assessments[k].tier == "none"]
     if unjudged:

@@ -153,7 +153,16 @@ def _result(
     intervals = intervals_of(found.assessments, machine.axles, timeline.start_ns, timeline.step_ns, machine.limits)
     damage = [text for f in mission.files for text in f.summary.damage]
     notes = [text for f in mission.files for text in f.summary.notes]
-    decision = decide(intervals, found.assessments, decided, machine.axles, machine.limits, damage)
+    decision = decide(
+        intervals,
+        found.assessments,
+        decided,
+        machine.axles,
+        machine.limits,
+        damage,
+        driving_s={(row["component"], row["side"]): row["driving_s"] for row in rows},
+        model=found.wheel_model,
+    )
     report: dict[str, Any] = {
         "schema": SCHEMA,
         "tool": {"name": "mfhca-replay", "version": __version__},

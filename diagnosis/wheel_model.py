@@ -21,7 +21,7 @@ Array = NDArray[np.float64]
 _TAUS = (0.02, 0.05, 0.08, 0.12, 0.17, 0.25, 0.35, 0.5, 0.7, 1.0)
 _WINDOW_S = 2.5
 _MAX_SPREAD = 0.25
-_OWN_RANGE = 0.15
+_OWN_RANGE = 0.1
 
 
 @dataclass(frozen=True)
@@ -40,6 +40,8 @@ class WheelModelFit:
         Whether gains may be judged by it.
     note : str
         The figures in words.
+    identified : bool
+        Whether a wheel's model comes from this mission rather than from the machine file.
     """
 
     plants: tuple[WheelPlant | None, ...]
@@ -47,6 +49,7 @@ class WheelModelFit:
     windows: int
     reliable: bool
     note: str
+    identified: bool = True
 
 
 def low_passed(u: Array, tau: float, dt: float) -> Array:
@@ -195,7 +198,7 @@ def _identify(y: Array, u: Array, moving: NDArray[np.bool_], dt: float, given: d
     if best is None:
         known = all(p is not None for p in plants)
         why = "from the machine file" if known else "no window in which a wheel moves under a recorded valve command"
-        return WheelModelFit(tuple(plants), 0.0, 0, known, f"Wheel model: {why}.")
+        return WheelModelFit(tuple(plants), 0.0, 0, known, f"Wheel model: {why}.", not known)
     _, tau, gains = best
     pooled = np.concatenate(gains)
     centre = float(np.median(pooled))
@@ -214,7 +217,7 @@ def _identify(y: Array, u: Array, moving: NDArray[np.bool_], dt: float, given: d
         f"τ = {tau:g} s, spread of the windows {100 * spread:.0f} %"
         + ("." if reliable else f": too uncertain to judge gains by (limit {100 * _MAX_SPREAD:.0f} %).")
     )
-    return WheelModelFit(tuple(plants), spread, int(pooled.size), reliable, note)
+    return WheelModelFit(tuple(plants), spread, int(pooled.size), reliable, note, any(i not in given for i in wheels))
 
 
 def _windowed(y: Array, p: Array, moving: NDArray[np.bool_], length: int) -> tuple[Array, Array]:

@@ -31,6 +31,7 @@ ROW = np.array([0, 1, 2, 3, 4, 4, 4, 4, 5, 6, 7, 8])
 WHITE = np.array([1.0, 3.0, 8.0, 25.0])
 _OUTLIER = -18.0
 _LEARNING_COST = 10.0
+_OCCAM = 0.5  # what a row with an unknown gain or opening must gain on healthy per second
 _SILENT_COST = -6.0
 
 
@@ -153,7 +154,7 @@ def advance(y, u, common, slack, status, quiet, p, white, z, P, gain):  # type: 
             if m >= S_DRIFT and m <= S_WHITE_25:
                 gain[m] -= 0.05
             elif m >= S_GAIN:
-                gain[m] -= 0.02
+                gain[m] -= _OCCAM * p[9]
     if quiet and status == PAIR:
         if abs(z[S_STUCK, 3]) < 3 * p[2]:
             gain[S_STUCK] = min(gain[S_STUCK], gain[HEALTHY])

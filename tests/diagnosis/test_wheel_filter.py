@@ -109,7 +109,7 @@ class Oracle:
             return 0.0
         kf.update(y)
         gain = max(float(kf.log_likelihood), -18.0 - np.log(MODEL.span))
-        return gain - (0.05 if S_DRIFT <= m <= S_WHITE_25 else 0.02 if m >= S_GAIN else 0.0)
+        return gain - (0.05 if S_DRIFT <= m <= S_WHITE_25 else 0.5 * MODEL.dt if m >= S_GAIN else 0.0)
 
 
 READINGS = {
