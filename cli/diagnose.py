@@ -23,7 +23,7 @@ Examples:
   mfhca report mission-report
   mfhca report mission-report/report.json --max-size 5"""
 
-_FAULTS = 1
+_FAULTS, _NOT_JUDGED = 1, 3
 _OUTPUTS = ("report.html", "report.json", "report.parquet")
 
 
@@ -42,7 +42,13 @@ def diagnose(
         list[str] | None,
         typer.Option("--wheel", "-w", metavar="W", help="Only this wheel; may be given again.", show_default=False),
     ] = None,
-    fail_on: Annotated[FailOn, typer.Option("--fail-on", help="Lowest severity that ends with code 1.")] = FailOn.LOW,
+    fail_on: Annotated[
+        FailOn,
+        typer.Option(
+            "--fail-on",
+            help="Lowest severity that ends with code 1; with never, a log that could not be judged ends with 0 too.",
+        ),
+    ] = FailOn.LOW,
     machine_id: Annotated[
         str | None,
         typer.Option("--machine-id", metavar="ID", help="Machine that the mission belongs to.", show_default=False),
@@ -90,6 +96,8 @@ def diagnose(
         _open(page)
     if _reaches(result.report, fail_on):
         raise typer.Exit(_FAULTS)
+    if fail_on is not FailOn.NEVER and result.report["verdict"]["status"] == "not_assessed":
+        raise typer.Exit(_NOT_JUDGED)
 
 
 @command

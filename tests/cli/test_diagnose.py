@@ -12,6 +12,9 @@ import pytest
 from cli.main import run
 from diagnosis.result import MissionResult
 from replay.errors import NotJudged
+from replay.export.mission import write_mission
+from replay.simulation.options import SimulationOptions
+from replay.simulation.run import simulate_mission
 
 
 def interval(severity: str, number: int = 1) -> dict[str, Any]:
@@ -197,3 +200,12 @@ def test_a_file_that_is_no_result(tmp_path: Path, capsys: pytest.CaptureFixture[
     (tmp_path / "report.json").write_text('{"schema": "other"}')
     assert run(["report", str(tmp_path)]) == 3
     assert "schema 'other' found" in capsys.readouterr().err
+
+
+def test_a_log_that_cannot_be_judged_ends_with_3(tmp_path: Path) -> None:
+    log = tmp_path / "short.mcap"
+    options = SimulationOptions(scenario="healthy", seed=3, duration_s=6.0, rate_hz=200.0, evidence="direct")
+    write_mission(simulate_mission(options), log, "mcap")
+    assert run(["diagnose", str(log), "-o", str(tmp_path / "out")]) == 3
+    assert (tmp_path / "out" / "report.html").is_file()
+    assert run(["diagnose", str(log), "-o", str(tmp_path / "out"), "--fail-on", "never"]) == 0
