@@ -114,7 +114,8 @@ def simulate(
 
     kind = format or _format_of(output)
     log = output or Path(f"mission{_ENDINGS[kind]}")
-    truth = log.with_name(f"{log.name.removesuffix(_ENDINGS[kind])}.truth.json")
+    stem = log.name if kind is LogFormat.ROSBAG2 else log.name.rsplit(".", 1)[0]
+    truth = log.with_name(f"{stem or log.name}.truth.json")
     if log.exists() and not truth.exists():
         raise ConfigError(f"{log}: exists and was not simulated, so it is left as it is; give another name with -o")
     faults = tuple(parse_fault(words) for words in fault) if fault else None

@@ -49,6 +49,8 @@ class Assessment:
         ``direct``, ``model``, ``signal`` or ``none``.
     notes : tuple[str, ...]
         Figures that the judgement used, one sentence each.
+    unexplained_s : float
+        Time [s] in which something deviates that no single fault explains well enough to be stated.
     """
 
     states: NDArray[np.int8]
@@ -57,6 +59,7 @@ class Assessment:
     columns: Mapping[str, NDArray[np.float64]] = field(default_factory=dict)
     tier: str = "none"
     notes: tuple[str, ...] = ()
+    unexplained_s: float = 0.0
 
 
 def unassessed(size: int, state: State, reason: str) -> Assessment:

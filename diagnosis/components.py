@@ -37,19 +37,12 @@ class ComponentResult:
 
 
 def alive_sources(timeline: Timeline) -> dict[str, NDArray[np.int16]]:
-    """Number of signals of each source that deliver at each step: a new sample within two and a half periods."""
+    """Number of signals of each source that bring a new sample at each step."""
     out: dict[str, NDArray[np.int16]] = {}
-    for name in timeline.signals:
+    for name, fresh in timeline.fresh.items():
         count = out.setdefault(timeline.sources[name], np.zeros(timeline.size, dtype=np.int16))
-        count += _delivers(timeline, name)
+        count += fresh
     return out
-
-
-def _delivers(timeline: Timeline, name: str) -> NDArray[np.bool_]:
-    steps = np.arange(timeline.size)
-    last = np.maximum.accumulate(np.where(timeline.fresh[name], steps, -(10**9)))
-    patience = max(1, round(2.5 * timeline.periods_ns[name] / timeline.step_ns))
-    return np.asarray(steps - last <= patience)
 
 
 def assess_components(
@@ -220,8 +213,8 @@ class _Wheel:
 
 
 def alive(timeline: Timeline, counts: dict[str, NDArray[np.int16]], name: str) -> NDArray[np.bool_]:
-    """Whether another signal of the same source is valid at each step."""
-    return (counts[timeline.sources[name]] - _delivers(timeline, name)) > 0
+    """Whether another signal of the same source brings a new sample at each step."""
+    return (counts[timeline.sources[name]] - timeline.fresh[name]) > 0
 
 
 def make_pair(

@@ -25,6 +25,8 @@ _MARKED_EPSILON = 0.3
 _LEAST_SHARE = 0.8
 _MODEL_RESOLUTION = 0.25
 _COMPARED_WHEELS = 3
+_UNEXPLAINED_S = 0.5
+_SHORT_NOISE_S = 1.0
 
 MODE_WORDS = {
     "sensor": {
@@ -66,6 +68,8 @@ def severity_of(finding: Finding, seconds: float, limits: Limits) -> tuple[Sever
     faulty = 1.0 - sum(h.p for h in finding.hypotheses if h.mode == "healthy")
     if faulty < limits.min_probability:
         return "info", "Not certain enough to act on. Compare with the next mission."
+    if finding.mode is FaultMode.NOISY and finding.tier == "model" and seconds < _SHORT_NOISE_S:
+        return "info", "Too short to act on: the wheel model alone shows it. Compare with the next mission."
     if finding.mode in _GONE and finding.side is Side.ACTUATOR:
         return "high", "Stop at once and repair: the valve does not answer its command (Assumption 2)."
     if finding.mode in _GONE and finding.side is Side.SENSOR_OR_ACTUATOR:
@@ -227,6 +231,15 @@ def decide(
         who = _join(sorted({part_words("wheel", c, s) for c, s in short}))
         text = f"No fault was found, but {who} could not be judged long enough to say that they are healthy."
         return Decision("not_assessed", "Not assessed", text, caveats, actions)
+    odd = [k for k, a in assessments.items() if k[0] not in axles and a.unexplained_s >= _UNEXPLAINED_S]
+    if odd:
+        who = _join(sorted({part_words("wheel", c, "sensor_or_actuator") for c, _ in odd}))
+        most = max(assessments[k].unexplained_s for k in odd)
+        text = (
+            f"No fault can be stated, but something deviates at the {who} for up to {_seconds(most)} that no single fault "
+            "explains well enough. Measure speed or valve position a second time, or inspect."
+        )
+        return Decision("not_assessed", "Deviations that are not explained", text, caveats, actions)
     if modelled and model is not None and model.identified and len(model.plants) < _COMPARED_WHEELS:
         text = (
             "No fault was found, but the wheel model comes from this mission alone: a loss that lasted all of it would "
@@ -271,11 +284,13 @@ def _caveats(
 
 def _main_reason(assessment: Assessment) -> str:
     """Reason of the commonest state that is no judgement."""
-    best, most = "", 0
+    best, most = "", 0.0
     for state, reason in assessment.reasons.items():
         if state is State.HEALTHY or state in FAULT_STATES:
             continue
-        count = int(np.count_nonzero(assessment.states == STATES.index(state)))
+        count = float(np.count_nonzero(assessment.states == STATES.index(state)))
+        if state is State.NOT_ASSESSED:
+            count *= 1e3  # a judgement that failed says more than a machine at rest
         if count > most:
             best, most = reason, count
     return best

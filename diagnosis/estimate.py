@@ -55,7 +55,9 @@ def estimate_fault(
         delta, delta_se = _gain_by_instruments(y, x, instruments, model)
     bias = y - delta * x
     epsilon = _epsilon(delta, 1.96 * delta_se)
-    eps = max(epsilon.value, 0.05)
+    if epsilon.value < 0.1:
+        return epsilon, None, delta  # δ̄ is known, but not what share of the saturation term it is
+    eps = epsilon.value
     mean, rms = float(np.mean(bias)), float(np.sqrt(np.mean(bias**2)))
     half = 1.96 * np.sqrt(_long_run_variance(bias) / bias.size) + 1.96 * delta_se * abs(float(np.mean(x)))
     return epsilon, Sat(mean / eps, rms / eps, (mean - half) / eps, (mean + half) / eps, unit), delta

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from diagnosis import wheel_filter as wf
 from diagnosis import wheel_scan as ws
 from diagnosis.assessment import CODE, Assessment, Finding
-from diagnosis.noise import quick_noise, rounding_step, slow_mismatch, white_noise
+from diagnosis.noise import COARSE_STEP_S, moving_sum, quick_noise, rounding_step, slow_mismatch, white_noise
 from diagnosis.wheel_findings import WheelData, judge
 from replay.faults import FaultMode, Side, State
 from replay.machine import Limits, WheelPlant
@@ -17,6 +17,7 @@ Array = NDArray[np.float64]
 
 _MEAN_HEALTHY_S = 60.0
 _MOST = 0.6
+_LEAST_DISTURBANCE_S = 3.0
 
 
 def filter_model(data: WheelData, plant: WheelPlant, residual: Array) -> wf.WheelFilterModel:
@@ -27,7 +28,7 @@ def filter_model(data: WheelData, plant: WheelPlant, residual: Array) -> wf.Whee
     lsb = data.noise.lsb if data.noise.lsb is not None else rounding_step(fresh)
     white = data.noise.std or float(np.nan_to_num(white_noise(fresh, period)))
     width = max(3, round(0.5 / data.dt))
-    changing = np.convolve(np.diff(data.y, prepend=data.y[:1]) != 0, np.ones(width), mode="same") > 0.1 * width
+    changing = moving_sum(np.diff(data.y, prepend=data.y[:1]) != 0, width) > 0.1 * width
     quick = quick_noise(np.where(pair & ~data.quiet & changing, residual, np.nan), data.dt)
     noise = max(white, float(np.nan_to_num(quick)), lsb / np.sqrt(12), 1e-4 * data.span)
     load = slow_mismatch(residual - data.common, pair & ~data.quiet, data.dt)
@@ -105,6 +106,7 @@ def assess_wheel(
         State.NO_DATA: "no samples",
         State.SLIP: "the wheel breaks the parity of the body while it obeys its valve: it slips, or its sensor is off",
     }
+    unexplained = float(np.count_nonzero(doubtful & ~data.quiet)) * data.dt
     v, var, g, g_var, b, b_var = path.track
     series = {
         "residual": np.where(data.status == 1, data.y - v, np.nan),
@@ -130,8 +132,8 @@ def assess_wheel(
         f"{model.load:.2g} m/s, K {model.K:.3g} m/s per full opening, τ {model.tau:.2g} s."
     )
     return (
-        Assessment(states_s, reasons, tuple(sensor), per_side[0], "model", (note,)),
-        Assessment(states_a, reasons, tuple(actuator), per_side[1], "model", (note,)),
+        Assessment(states_s, reasons, tuple(sensor), per_side[0], "model", (note,), unexplained),
+        Assessment(states_a, reasons, tuple(actuator), per_side[1], "model", (note,), unexplained),
     )
 
 
@@ -145,6 +147,13 @@ def _holds(finding: Finding, data: WheelData, limits: Limits) -> bool:
         return False  # noise and model come from the same mission: what fills it cannot be told from their error
     if finding.side is Side.SENSOR:
         return True
+    if finding.mode is FaultMode.NOISY and finding.epsilon is not None and finding.epsilon.low < 0:
+        return False  # the data do not even say that something is lost
+    seconds = (finding.stop - finding.start) * data.dt
+    if finding.mode is FaultMode.NOISY and seconds < _LEAST_DISTURBANCE_S:
+        return False
+    if data.dt >= COARSE_STEP_S and finding.mode is not FaultMode.INEFFICIENT:
+        return False  # in a slow log a valve that does not answer and one whose sensor lost gain look alike
     in_doubt = float(np.mean(data.slack[finding.start : finding.stop] > 0))
     possible = finding.epsilon is None or 0 < finding.epsilon.value < 1.1
     return in_doubt < 0.3 and possible

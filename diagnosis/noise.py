@@ -16,6 +16,12 @@ COARSE_STEP_S = 0.005  # slower logs do not fix the delay between a command and 
 _COARSE_SHARE = 0.3
 
 
+def moving_sum(x: NDArray[np.float64] | NDArray[np.bool_], width: int) -> Array:
+    """Sum over a centred window of `width` samples, shape (n,); the window is cut at the ends, and to n."""
+    width = min(width, x.size)
+    return np.convolve(np.asarray(x, dtype=np.float64), np.ones(width), mode="same") if width else np.zeros(0)
+
+
 def rounding_step(values: Array) -> float:
     """Rounding step (LSB) of a channel; 0 where the values lie on no grid.
 
@@ -73,9 +79,8 @@ def quick_noise(residual: Array, dt: float) -> float:
     width = max(3, round(0.5 / dt))
     known = np.isfinite(residual)
     filled = np.where(known, residual, 0.0)
-    kernel = np.ones(width)
-    count = np.convolve(known, kernel, mode="same")
-    mean = np.convolve(filled, kernel, mode="same") / np.maximum(count, 1)
+    count = moving_sum(known, width)
+    mean = moving_sum(filled, width) / np.maximum(count, 1)
     return slow_mismatch(residual - mean, known & (count > 0.8 * width), dt, 0.5)
 
 
@@ -132,7 +137,7 @@ def relative_lag(y: Array, x: Array, use: NDArray[np.bool_], least_lag: int, max
     `least_lag` is 0.
     """
     rate = np.abs(np.diff(x, prepend=x[:1]))
-    smooth = np.convolve(np.nan_to_num(rate), np.ones(9) / 9, mode="same")
+    smooth = moving_sum(np.nan_to_num(rate), 9) / 9
     moving = use & np.isfinite(y) & np.isfinite(x)
     if np.count_nonzero(moving) < 100:
         return 0.0
@@ -161,6 +166,8 @@ def relative_lag(y: Array, x: Array, use: NDArray[np.bool_], least_lag: int, max
 def white_part(x: Array) -> Array:
     """What changes from sample to sample in x, from its second differences; smooth motion leaves none. Shape (n,)."""
     out = np.zeros(x.size)
+    if x.size < 3:
+        return out
     out[1:-1] = (x[2:] - 2 * x[1:-1] + x[:-2]) / np.sqrt(6.0)
     out[~np.isfinite(out)] = 0.0
     return out
@@ -195,12 +202,11 @@ def unresolved(
     kept = use & np.isfinite(residual) & np.isfinite(x)
     white = np.where(kept, white_part(x), 0.0)
     width = max(3, round(0.3 / dt))
-    kernel = np.ones(width) / width
-    power = np.convolve(white**2, kernel, mode="same")
+    power = moving_sum(white**2, width) / width
     lively = power > (3 * noise) ** 2
     share = _COARSE_SHARE if dt >= COARSE_STEP_S else 0.0
     if np.count_nonzero(lively) >= 10 * width:
-        seen = np.convolve(np.where(kept, residual, 0.0) ** 2, kernel, mode="same")
+        seen = moving_sum(np.where(kept, residual, 0.0) ** 2, width) / width
         share = max(share, float(np.median(seen[lively] / power[lively])))
     if share <= 0.05:
         return np.zeros(x.size, dtype=np.bool_), 0.0

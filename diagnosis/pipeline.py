@@ -170,6 +170,7 @@ def _result(
         "machine": _machine(machine, machine_source, machine_id),
         "readings": list(replay.readings),
         "verdict": decision,
+        "caveats": _more_caveats(mission, machine),
         "intervals": list(intervals),
         "states": list(spans_of(found.assessments, timeline.step_ns)),
         "phases": metrics.phases(timeline, replay, machine),
@@ -187,6 +188,24 @@ def _result(
     return MissionResult(report=to_json(_named_status(report)), columns=columns)
 
 
+def _more_caveats(mission: Mission, machine: Machine) -> list[str]:
+    """What the reader should know beside the verdict: parts of a mission, signals that were named and not found."""
+    out = []
+    absent = [name for name in machine.signals if name not in mission.signals.items]
+    if absent:
+        reason = mission.signals.missing.get(absent[0], "")
+        out.append(
+            f"Named in the machine file but not found in the log: {', '.join(absent)}"
+            + (f" ({reason})" if reason else "")
+            + "."
+        )
+    first = min((int(s.stamps[0]) for n, s in mission.signals.items.items() if n.startswith("wheel.")), default=0)
+    cut = (mission.timeline.start_ns - first) * 1e-9
+    if cut > mission.timeline.dt:
+        out.append(f"Only a part of the mission was judged; times count from its start, {cut:.3f} s into the log.")
+    return out
+
+
 def _named_status(report: dict[str, Any]) -> dict[str, Any]:
     """Give the verdict's fields plain names."""
     verdict: Decision = report["verdict"]
@@ -194,7 +213,7 @@ def _named_status(report: dict[str, Any]) -> dict[str, Any]:
         "status": verdict.status,
         "title": verdict.title,
         "text": verdict.text,
-        "caveats": list(verdict.caveats),
+        "caveats": [*verdict.caveats, *report.pop("caveats")],
         "actions": list(verdict.actions),
     }
     return report

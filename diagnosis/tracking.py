@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from diagnosis.assessment import CODE, Assessment, Finding
-from diagnosis.noise import shifted
+from diagnosis.noise import moving_sum, shifted
 from diagnosis.result import Epsilon, Hypothesis, Sat
 from replay.faults import FaultMode, Side, State
 from replay.machine import Limits
@@ -59,9 +59,8 @@ def assess_tracking(
     lag = estimate_lag(v, v_ref, dt)
     reference = shifted(v_ref, lag)
     width = max(1, round(0.1 / dt))
-    kernel = np.ones(width) / width
-    speed = np.convolve(np.nan_to_num(np.abs(v)), kernel, mode="same")
-    asked = np.convolve(np.nan_to_num(np.abs(reference)), kernel, mode="same")
+    speed = moving_sum(np.nan_to_num(np.abs(v)), width) / width
+    asked = moving_sum(np.nan_to_num(np.abs(reference)), width) / width
     driven = asked > limits.driving_speed
     scale = float(np.quantile(asked[driven], 0.5)) if driven.any() else 0.0
     still = speed < max(_MOVING * scale, 0.2 * limits.driving_speed)

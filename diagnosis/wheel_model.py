@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import lfilter
 
-from diagnosis.noise import COARSE_STEP_S, white_part
+from diagnosis.noise import COARSE_STEP_S, moving_sum, white_part
 from replay.machine import WheelPlant
 
 Array = NDArray[np.float64]
@@ -239,7 +239,7 @@ def aliasing_slack(u: Array, plant: WheelPlant, dt: float) -> Array:
     if dt < COARSE_STEP_S:
         return np.zeros(u.size)
     width = max(3, round(0.5 / dt))
-    rms = np.sqrt(np.convolve(white_part(u) ** 2, np.ones(width) / width, mode="same"))
+    rms = np.sqrt(moving_sum(white_part(u) ** 2, width) / width)
     error = plant.K * rms * np.sqrt(dt / plant.tau)
     usual = plant.K * float(np.sqrt(np.nanmean(u**2)))
     return np.where(error > 0.1 * usual, error, 0.0)

@@ -13,6 +13,7 @@ from replay.errors import ConfigError
 from replay.geometry import Geometry, WheelGeometry, four_wheel_geometry
 from replay.machine import Control, Limits, Machine, Noise, Plant, WheelPlant, haulotte
 from replay.sources import SignalSource, SourceOptions
+from replay.units import si_factor
 
 _T = TypeVar("_T")
 _SECTIONS = {"machine", "geometry", "control", "plant", "noise", "limits", "sources", "signals"}
@@ -62,7 +63,7 @@ def _machine(data: Mapping[str, Any]) -> Machine:
     limits = dict(data.get("limits", {}))
     limits.setdefault("driving_speed", round(base.limits.driving_speed * speed / base.max_speed, 9))
     limits.setdefault("min_sat", round(base.limits.min_sat * speed / base.max_speed, 9))
-    return Machine(
+    machine = Machine(
         name=str(head.get("name", base.name if wheels == list(base.wheels) else "unnamed machine")),
         id=str(head.get("id", "")),
         wheels=tuple(wheels),
@@ -77,6 +78,17 @@ def _machine(data: Mapping[str, Any]) -> Machine:
         sources={k: _build(SourceOptions, f"sources.{k}", v) for k, v in data.get("sources", {}).items()},
         signals={k: _signal(k, v) for k, v in data.get("signals", {}).items()},
     )
+    for name, source in machine.signals.items():
+        if source.unit:
+            si_factor(
+                name,
+                source.unit,
+                wheel_radius=machine.wheel_radius,
+                gear_ratio=machine.gear_ratio,
+                at=source.at,
+                derivative=source.derivative,
+            )
+    return machine
 
 
 def _geometry(geo: dict[str, Any], wheels: tuple[str, ...], base: Machine) -> Geometry | None:

@@ -185,6 +185,13 @@ def load_mission(
     files, signals = read_signals(paths, machine, progress=progress)
     if progress is not None:
         progress("aligning signals")
+    used = {signal.source for signal in signals.items.values()}
+    idle = [file.path for file in files if str(file.path) not in used]
+    if len(files) > 1 and idle and used:
+        raise LogError(
+            f"{idle[0]}: none of its channels is used, all signals were found in the other files; diagnose it by itself, "
+            "or name its signals with source = in the machine file's [signals]"
+        )
     try:
         timeline = align(signals, start_s, stop_s)
     except LogError as error:

@@ -17,6 +17,7 @@ from replay.errors import LogError
 from replay.signals import Signal, Signals
 
 MAX_STEPS = 200_000_000
+_LARGEST = 1e9
 _HOLD_PERIODS = 2.5
 _COMMAND_HOLD_NS = 500_000_000
 _STANDARD_NS = np.array([1, 2, 4, 5, 8, 10, 20, 25, 40, 50, 100, 200, 500, 1000], dtype=np.int64) * 1_000_000
@@ -112,6 +113,9 @@ def align(signals: Signals, start_s: float | None = None, stop_s: float | None =
     fresh: dict[str, NDArray[np.bool_]] = {}
     for name, signal in signals.items.items():
         if signal.stamps.size:
+            absurd = np.count_nonzero(np.isinf(signal.values) | (np.abs(signal.values) > _LARGEST))
+            if absurd:
+                notes.append(f"{name}: {absurd} values that are infinite or beyond {_LARGEST:g} count as no sample.")
             values[name], fresh[name] = _hold(signal, start, step, size)
     return Timeline(
         start_ns=start,
@@ -145,7 +149,8 @@ def _hold(signal: Signal, start: int, step: int, size: int) -> tuple[NDArray[np.
     known = index >= 0
     safe = np.maximum(index, 0)
     age = grid - signal.stamps[safe]
-    values = np.where(known & (age <= longest), signal.values[safe], np.nan)
+    usable = np.where(np.abs(signal.values) <= _LARGEST, signal.values, np.nan)
+    values = np.where(known & (age <= longest), usable[safe], np.nan)
     new = np.empty(size, dtype=np.bool_)
     new[0] = bool(known[0])
     new[1:] = index[1:] != index[:-1]

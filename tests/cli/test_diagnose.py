@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from cli.main import run
@@ -209,3 +210,47 @@ def test_a_log_that_cannot_be_judged_ends_with_3(tmp_path: Path) -> None:
     assert run(["diagnose", str(log), "-o", str(tmp_path / "out")]) == 3
     assert (tmp_path / "out" / "report.html").is_file()
     assert run(["diagnose", str(log), "-o", str(tmp_path / "out"), "--fail-on", "never"]) == 0
+
+
+def small_table(tmp_path: Path) -> pd.DataFrame:
+    log = tmp_path / "ok.csv"
+    options = SimulationOptions(scenario="healthy", seed=1, duration_s=30.0, rate_hz=100.0)
+    write_mission(simulate_mission(options), log, "csv")
+    return pd.read_csv(log)
+
+
+@pytest.mark.parametrize(
+    ("name", "code"), [("three rows", 3), ("infinite", 0), ("beyond any speed", 0), ("an hour's gap", 0)]
+)
+def test_odd_tables_are_judged_or_refused_without_a_crash(tmp_path: Path, name: str, code: int) -> None:
+    table = small_table(tmp_path)
+    half = len(table) // 2
+    if name == "three rows":
+        table = table.head(3)
+    elif name == "infinite":
+        table.loc[::7, "wheel.FR.v_ref"] = np.inf
+    elif name == "beyond any speed":
+        table.loc[half, "wheel.FR.v"] = 1e300
+    else:
+        table.loc[half:, "time_ns"] += 3600 * 10**9
+    log = tmp_path / "odd.csv"
+    table.to_csv(log, index=False)
+    assert run(["diagnose", str(log), "-o", str(tmp_path / "out")]) == code
+    report = json.loads((tmp_path / "out" / "report.json").read_text(encoding="utf-8"))
+    assert report["intervals"] == []
+
+
+def test_a_second_file_that_gives_nothing_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    table = small_table(tmp_path)
+    table["time_ns"] += 5 * 10**9
+    table.to_csv(tmp_path / "later.csv", index=False)
+    assert run(["diagnose", str(tmp_path / "ok.csv"), str(tmp_path / "later.csv"), "-o", str(tmp_path / "out")]) == 3
+    assert "none of its channels is used" in capsys.readouterr().err
+
+
+def test_a_part_of_a_mission_says_so(tmp_path: Path) -> None:
+    small_table(tmp_path)
+    out = tmp_path / "out"
+    run(["diagnose", str(tmp_path / "ok.csv"), "-o", str(out), "--start", "10", "--end", "25"])
+    report = json.loads((out / "report.json").read_text(encoding="utf-8"))
+    assert any("10.000 s into the log" in text for text in report["verdict"]["caveats"])

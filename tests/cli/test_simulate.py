@@ -64,7 +64,7 @@ def test_a_format_beats_the_ending(tmp_path: Path) -> None:
     log = tmp_path / "m.log"
     assert run(["simulate", "-q", "-o", str(log), "-f", "mcap", *SHORT]) == 0
     assert log.read_bytes().startswith(b"\x89MCAP0")
-    assert (tmp_path / "m.log.truth.json").is_file()
+    assert (tmp_path / "m.truth.json").is_file()
 
 
 def test_the_same_seed_gives_the_same_bytes(tmp_path: Path) -> None:

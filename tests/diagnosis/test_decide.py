@@ -257,3 +257,18 @@ def test_words_of_the_paper() -> None:
             assert mode_words(side.value, mode.value)
         assert part_words("wheel", "FR", side.value).startswith("FR ")
         assert "steering" in part_words("steer", "front", side.value)
+
+
+def test_deviations_that_nothing_explains_give_no_all_clear() -> None:
+    parts = machine()
+    parts["FR", "actuator"] = replace(parts["FR", "actuator"], unexplained_s=6.0)
+    got = decide((), parts, dict.fromkeys(parts, 20.0), AXLES, Limits(), ())
+    assert got.status == "not_assessed"
+    assert "FR speed sensor or drive valve" in got.text
+
+
+def test_a_fifth_of_the_driving_undecided_gives_no_all_clear() -> None:
+    parts = machine()
+    driven = dict.fromkeys(parts, 30.0)
+    assert decide((), parts, dict.fromkeys(parts, 23.0), AXLES, Limits(), (), driving_s=driven).status == "not_assessed"
+    assert decide((), parts, dict.fromkeys(parts, 25.0), AXLES, Limits(), (), driving_s=driven).status == "ready"

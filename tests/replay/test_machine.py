@@ -71,7 +71,7 @@ def test_axle_places() -> None:
         (lambda: SourceOptions(time_unit="h"), ["time_unit", "'h'", "ms"]),
         (lambda: SourceOptions(stamp="wall"), ["stamp", "wall", "header"]),  # type: ignore[arg-type]
         (lambda: four_wheel_geometry(2.1, 1.46, 0.0, 0.2), ["geometry.wheel_diameter", "0", "m", "0.02"]),
-        (lambda: four_wheel_geometry(99.0, 1.46, 0.8, 0.2), ["geometry.FR.x", "49.5", "m", "-20 to 20"]),
+        (lambda: four_wheel_geometry(99.0, 1.46, 0.8, 0.2), ["geometry.wheelbase", "99", "m", "0.05 to 40"]),
         (lambda: four_wheel_geometry(2.1, 1.46, 0.8, 3.0), ["geometry.FR.offset", "-3", "m"]),
         (lambda: replace(haulotte(), gear_ratio=0.0), ["geometry.gear_ratio", "0"]),
         (lambda: replace(haulotte(), max_speed=-1.0), ["geometry.max_speed", "-1", "m/s"]),

@@ -113,7 +113,7 @@ def machines(draw: st.DrawFn) -> Machine:
         plant=Plant(wheels=plants),
         limits=Limits(min_sat=draw(st.floats(0.0, 1e6)), brief=draw(st.floats(0.0, 3600.0))),
         sources={draw(NAMES): SourceOptions(time=draw(NAMES))},
-        signals={f"wheel.{wheels[0]}.v": SignalSource(column=draw(NAMES), unit=draw(NAMES))},
+        signals={f"wheel.{wheels[0]}.v": SignalSource(column=draw(NAMES), unit="m/s")},
     )
 
 
@@ -193,7 +193,7 @@ PLACES = "[geometry]\nwheel_diameter = 0.5\nA = { x = 1.0, y = 0 }\n"
         ('[signals]\n"cmd.v" = { column = "a", at = "hub" }\n', ["cmd.v", "'hub'", "motor or wheel"]),
         ('[signals]\n"cmd.w" = { column = "a" }\n', ["cmd.w", "not a known signal"]),
         ('[signals]\n"wheel.XX.v" = { column = "a" }\n', ["wheel.XX.v", "'XX'", "FR"]),
-        ("[geometry]\nwheelbase = 99\n", ["geometry.FR.x = 49.5 m", "-20 to 20 m"]),
+        ("[geometry]\nwheelbase = 99\n", ["geometry.wheelbase = 99 m", "0.05 to 40 m"]),
         ("[geometry]\nwheel_diameter = 0\n", ["geometry.wheel_diameter = 0 m", "0.02 to 5 m"]),
         ("[geometry]\ngear_ratio = -1\n", ["geometry.gear_ratio = -1", "0.001"]),
         ("[geometry]\nmax_steer = 45\n", ["geometry.max_steer = 45 rad", "0 to 3.2 rad"]),
