@@ -14,12 +14,12 @@ import numpy as np
 from diagnosis.assessment import STATES, Assessment, Finding
 from diagnosis.result import FaultInterval, Severity, StateSpan, Verdict
 from diagnosis.wheel_model import WheelModelFit
+from diagnosis.wording import GONE, actions_of, count_words, join_words, part_words, seconds_words, sentence_of
 from replay.faults import FAULT_STATES, FaultMode, Side, State
 from replay.machine import Limits
 
 Key = tuple[str, str]
 
-_GONE = (FaultMode.STUCK, FaultMode.NO_SIGNAL)
 _RANK: dict[Severity, int] = {"high": 0, "medium": 1, "low": 2, "info": 3}
 _MARKED_EPSILON = 0.3
 _LEAST_SHARE = 0.8
@@ -27,40 +27,6 @@ _MODEL_RESOLUTION = 0.25
 _COMPARED_WHEELS = 3
 _UNEXPLAINED_S = 0.5
 _SHORT_NOISE_S = 1.0
-
-MODE_WORDS = {
-    "sensor": {
-        "stuck": "stuck",
-        "no_signal": "without signal",
-        "inefficient": "inefficient",
-        "noisy": "noise-affected",
-        "outside_table": "outside the table",
-    },
-    "actuator": {
-        "stuck": "stuck",
-        "no_signal": "without control signal",
-        "inefficient": "inefficient",
-        "noisy": "disturbance-affected",
-        "outside_table": "outside the table",
-    },
-}
-
-
-def mode_words(side: str, mode: str) -> str:
-    """A fault mode in the paper's words for its side."""
-    return MODE_WORDS["actuator" if side == "actuator" else "sensor"][mode]
-
-
-def part_words(kind: str, component: str, side: str) -> str:
-    """A component and side in words: ``FR speed sensor``, ``front steering valve``."""
-    if kind == "steer":
-        return {
-            "sensor": f"{component} steering sensor",
-            "actuator": f"{component} steering valve",
-        }.get(side, f"{component} steering sensor or valve")
-    return {"sensor": f"{component} speed sensor", "actuator": f"{component} drive valve"}.get(
-        side, f"{component} speed sensor or drive valve"
-    )
 
 
 def severity_of(finding: Finding, seconds: float, limits: Limits) -> tuple[Severity, str]:
@@ -70,11 +36,11 @@ def severity_of(finding: Finding, seconds: float, limits: Limits) -> tuple[Sever
         return "info", "Not certain enough to act on. Compare with the next mission."
     if finding.mode is FaultMode.NOISY and finding.tier == "model" and seconds < _SHORT_NOISE_S:
         return "info", "Too short to act on: the wheel model alone shows it. Compare with the next mission."
-    if finding.mode in _GONE and finding.side is Side.ACTUATOR:
+    if finding.mode in GONE and finding.side is Side.ACTUATOR:
         return "high", "Stop at once and repair: the valve does not answer its command (Assumption 2)."
-    if finding.mode in _GONE and finding.side is Side.SENSOR_OR_ACTUATOR:
+    if finding.mode in GONE and finding.side is Side.SENSOR_OR_ACTUATOR:
         return "high", "Stop and find out whether the drive or its sensor fails; treat it as the drive until then."
-    if finding.mode in _GONE:
+    if finding.mode in GONE:
         if seconds <= limits.brief:
             return "low", (
                 f"Tolerable: no longer than {limits.brief:g} s (Assumption 1). Check plug and cable at the next service."
@@ -218,25 +184,25 @@ def decide(
             f"loss below about {100 * _MODEL_RESOLUTION:.0f} %, or one that lasts the whole mission on every wheel, does "
             "not show. A machine file with [plant], or a second measurement, would.",
         )
-    actions = _actions(intervals)
+    actions = actions_of(intervals)
     worst = intervals[0].severity if intervals else None
     stop = [f for f in intervals if f.severity == "high"]
     watch = [f for f in intervals if f.severity in ("medium", "low")]
     if worst == "high":
-        title = f"{_count(len(stop), 'fault')} to repair" + (f", {len(watch)} to watch" if watch else "")
-        return Decision("stop", title, _sentence(stop), caveats, actions)
+        title = f"{count_words(len(stop), 'fault')} to repair" + (f", {len(watch)} to watch" if watch else "")
+        return Decision("stop", title, sentence_of(stop), caveats, actions)
     if watch:
-        return Decision("watch", f"{_count(len(watch), 'fault')} to watch", _sentence(watch), caveats, actions)
+        return Decision("watch", f"{count_words(len(watch), 'fault')} to watch", sentence_of(watch), caveats, actions)
     if short:
-        who = _join(sorted({part_words("wheel", c, s) for c, s in short}))
+        who = join_words(sorted({part_words("wheel", c, s) for c, s in short}))
         text = f"No fault was found, but {who} could not be judged long enough to say that they are healthy."
         return Decision("not_assessed", "Not assessed", text, caveats, actions)
     odd = [k for k, a in assessments.items() if k[0] not in axles and a.unexplained_s >= _UNEXPLAINED_S]
     if odd:
-        who = _join(sorted({part_words("wheel", c, "sensor_or_actuator") for c, _ in odd}))
+        who = join_words(sorted({part_words("wheel", c, "sensor_or_actuator") for c, _ in odd}))
         most = max(assessments[k].unexplained_s for k in odd)
         text = (
-            f"No fault can be stated, but something deviates at the {who} for up to {_seconds(most)} that no single fault "
+            f"No fault can be stated, but something deviates at the {who} for up to {seconds_words(most)} that no single fault "
             "explains well enough. Measure speed or valve position a second time, or inspect."
         )
         return Decision("not_assessed", "Deviations that are not explained", text, caveats, actions)
@@ -277,7 +243,7 @@ def _caveats(
         )
     unjudged = [k for k in assessments if k[0] in axles and assessments[k].tier == "none"]
     if unjudged:
-        who = _join([part_words("steer", *k) for k in unjudged])
+        who = join_words([part_words("steer", *k) for k in unjudged])
         out.append(f"Not assessed: {who} ({_main_reason(assessments[unjudged[0]])}).")
     return tuple(out)
 
@@ -294,55 +260,3 @@ def _main_reason(assessment: Assessment) -> str:
         if count > most:
             best, most = reason, count
     return best
-
-
-def _actions(intervals: Sequence[FaultInterval]) -> tuple[dict[str, object], ...]:
-    """One action per component and side, worst first."""
-    parts: dict[tuple[str, str, str], list[FaultInterval]] = {}
-    for f in intervals:
-        if f.severity != "info":
-            parts.setdefault((f.kind, f.component, f.side.value), []).append(f)
-    out: list[dict[str, object]] = []
-    for (kind, component, side), faults in parts.items():
-        modes: dict[str, list[FaultInterval]] = {}
-        for f in faults:
-            modes.setdefault(f.mode.value, []).append(f)
-        found = _join([_spells(side, mode, spells) for mode, spells in modes.items()])
-        text = f"{_order(faults[0])} the {part_words(kind, component, side)}: {found}."
-        out.append({"n": len(out) + 1, "text": text, "faults": [f.id for f in faults], "severity": faults[0].severity})
-    return tuple(out)
-
-
-def _order(worst: FaultInterval) -> str:
-    """What to do with a part, by its worst fault."""
-    if worst.severity == "high":
-        return "Stop at once and repair" if worst.side is Side.ACTUATOR else "Stop and repair"
-    return "Check at the next service" if worst.mode in _GONE else "May go out; check"
-
-
-def _spells(side: str, mode: str, faults: Sequence[FaultInterval]) -> str:
-    total = _seconds(sum(f.stop_s - f.start_s for f in faults))
-    return f"{mode_words(side, mode)} for {total}" + ("" if len(faults) == 1 else f" in {len(faults)} spells")
-
-
-def _sentence(faults: Sequence[FaultInterval]) -> str:
-    shown = [
-        f"the {part_words(f.kind, f.component, f.side.value)} was {mode_words(f.side.value, f.mode.value)} for "
-        f"{_seconds(f.stop_s - f.start_s)}"
-        for f in faults[:3]
-    ]
-    text = _join(shown)
-    more = f"; {len(faults) - 3} more are listed below" if len(faults) > 3 else ""
-    return text[0].upper() + text[1:] + more + "."
-
-
-def _seconds(value: float) -> str:
-    return f"{value * 1e3:.0f} ms" if value < 1 else f"{value:.1f} s"
-
-
-def _count(n: int, word: str) -> str:
-    return f"{n} {word}" + ("" if n == 1 else "s")
-
-
-def _join(words: Sequence[str]) -> str:
-    return words[0] if len(words) == 1 else ", ".join(words[:-1]) + " and " + words[-1] if words else ""

@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 
 from diagnosis.assessment import CODE, Assessment, Finding, unassessed
-from diagnosis.decide import Decision, decide, intervals_of, mode_words, part_words, severity_of, spans_of
+from diagnosis.decide import Decision, decide, intervals_of, severity_of, spans_of
 from diagnosis.result import Epsilon, Hypothesis
+from diagnosis.wording import mode_words, part_words
 from replay.faults import FaultMode, Side, State
 from replay.machine import Limits
 
