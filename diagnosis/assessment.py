@@ -17,7 +17,11 @@ CODE = {state: np.int8(i) for i, state in enumerate(STATES)}
 
 @dataclass(frozen=True)
 class Finding:
-    """One fault of one component on samples [start, stop); see `FaultInterval` for the other fields."""
+    """One fault of one component on samples [start, stop); see `FaultInterval` for the other fields.
+
+    `detected` is the sample at which a causal reading of the same evidence, without anything later, would have raised
+    it; None where that is not known.
+    """
 
     start: int
     stop: int
@@ -29,6 +33,7 @@ class Finding:
     sat: Sat | None
     evidence: tuple[str, ...]
     tier: str
+    detected: int | None = None
 
 
 @dataclass(frozen=True)

@@ -96,6 +96,7 @@ def intervals_of(
                 advice=advice,
                 evidence=f.evidence,
                 tier=f.tier,
+                detected_s=None if f.detected is None else f.detected * step_ns * 1e-9,
             )
     ordered = sorted(found.values(), key=lambda x: (_RANK[x.severity], x.start_s, x.component, x.side.value))
     return tuple(replace(f, id=f"F{i + 1}") for i, f in enumerate(ordered))

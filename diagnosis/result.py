@@ -75,6 +75,9 @@ class FaultInterval:
         What decided, one sentence each with its figures.
     tier : str
         ``direct`` (a second measurement), ``model`` (wheel model), ``signal`` (the channel alone).
+    detected_s : float or None
+        Mission time [s] at which the same evidence, read without anything later, would have raised the fault; None
+        where that is not known.
     """
 
     id: str
@@ -94,6 +97,7 @@ class FaultInterval:
     advice: str
     evidence: tuple[str, ...]
     tier: str
+    detected_s: float | None = None
 
 
 @dataclass(frozen=True)

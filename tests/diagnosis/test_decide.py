@@ -209,6 +209,13 @@ def test_intervals_are_numbered_worst_first_then_by_time() -> None:
     assert (got[0].start_ns, got[0].stop_ns) == (8_000_000_000, 9_000_000_000)
 
 
+def test_time_of_detection_is_the_samples() -> None:
+    causal = replace(finding(Side.SENSOR, FaultMode.STUCK, 1000, 9000), detected=1004)
+    parts = machine(FR_sensor=assessed(causal), FL_sensor=assessed(finding(Side.SENSOR, FaultMode.STUCK)))
+    got = {f.component: f.detected_s for f in intervals_of(parts, AXLES, 5_000_000_000, STEP, LIMITS)}
+    assert got == {"FR": pytest.approx(1.004), "FL": None}
+
+
 def test_shared_finding_counts_once() -> None:
     shared = finding(Side.SENSOR_OR_ACTUATOR, FaultMode.INEFFICIENT, epsilon=0.5)
     got = intervals_of(machine(FR_sensor=assessed(shared), FR_actuator=assessed(shared)), AXLES, 0, STEP, LIMITS)

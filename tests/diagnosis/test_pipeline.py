@@ -252,6 +252,7 @@ FIELDS: dict[str, Any] = {
             "advice": str,
             "evidence": list,
             "tier": str,
+            "detected_s": (*NUMBER, type(None)),
         }
     ],
     "states": [{"component": str, "side": str, "state": str, **SPAN, "reason": str}],
