@@ -85,7 +85,7 @@ class Control:
 
 @dataclass(frozen=True)
 class WheelPlant:
-    """First-order wheel model τ v̇ = −v + K u + load of one wheel; NaN where not identified.
+    """Wheel model τ v̇ = −v + K·sgn(u)·max(|u| − dead, 0) + offset of one wheel.
 
     Attributes
     ----------
@@ -93,23 +93,42 @@ class WheelPlant:
         Speed per full opening [m/s].
     tau : float
         Lag [s].
-    load : float
+    load : float or None
+        Standard deviation of load and model error in healthy driving, as a speed [m/s]; None where not known.
+    K_std, tau_std, load_std : float or None
+        Standard deviations, same units; None where not known.
+    dead : float
+        Opening that static friction takes, which gives no speed [fraction].
+    dead_std : float or None
+        Its standard deviation [fraction].
+    offset : float
         Constant load as a speed [m/s].
-    K_std, tau_std, load_std : float
-        Standard deviations, same units.
+    offset_std : float or None
+        Its standard deviation [m/s].
     """
 
     K: float
     tau: float
-    load: float = 0.0
-    K_std: float = 0.0
-    tau_std: float = 0.0
-    load_std: float = 0.0
+    load: float | None = None
+    K_std: float | None = None
+    tau_std: float | None = None
+    load_std: float | None = None
+    dead: float = 0.0
+    dead_std: float | None = None
+    offset: float = 0.0
+    offset_std: float | None = None
 
     def __post_init__(self) -> None:
         """Check values."""
         check_range("plant.K", self.K, 1e-9, 1e9, "m/s per full opening")
         check_range("plant.tau", self.tau, 1e-4, 60.0, "s")
+        check_range("plant.dead", self.dead, 0.0, 1e6, "of full opening")
+        check_range("plant.offset", self.offset, -1e6, 1e6, "m/s")
+        spreads = (("load", "m/s"), ("K_std", "m/s"), ("tau_std", "s"), ("load_std", "m/s"), ("dead_std", ""))
+        for name, unit in (*spreads, ("offset_std", "m/s")):
+            value = getattr(self, name)
+            if value is not None:
+                check_range(f"plant.{name}", value, 0.0, 1e9, unit)
 
 
 @dataclass(frozen=True)
