@@ -5,6 +5,9 @@ L4 with v against v_true for a sensor, L8 with u_applied against u_a for an actu
 
 from __future__ import annotations
 
+import math
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -12,6 +15,7 @@ from diagnosis import modes
 from diagnosis.assessment import CODE, Assessment, Finding
 from diagnosis.estimate import estimate_fault
 from diagnosis.kalman import GainBiasModel, track_gain_bias
+from diagnosis.mode_path import ModePath, most_probable
 from diagnosis.noise import relative_lag, shifted, unresolved
 from diagnosis.pairs import Pair, mode_model, sample_status, timing_explains
 from diagnosis.result import Epsilon, Hypothesis, Sat
@@ -29,6 +33,7 @@ _MODE = {
 }
 _TEMPER = 0.25
 _MAX_LAG_S = 0.05
+_SHORTEST_S = 0.01
 
 
 def assess_pair(pair: Pair, limits: Limits) -> Assessment:
@@ -53,17 +58,18 @@ def assess_pair(pair: Pair, limits: Limits) -> Assessment:
         paired = status == modes.PAIR
         blind, share = unresolved(np.where(paired, pair.y - x, np.nan), x, paired, model.noise, pair.dt)
     status[blind & (status == modes.PAIR)] = modes.BLIND
-    path = modes.most_probable(pair.y, x, status, pair.quiet, model)
+    path = most_probable(pair.y, x, status, pair.quiet, model)
+    shortest = max(3, round(_SHORTEST_S / pair.dt))
     findings = []
     below = 0
-    for run in _tidy(path, pair, status):
+    for run in _tidy(path, pair, status, shortest):
         finding = _finding(run, pair, x, status, model, limits, lag)
         if finding is None:
             below += 1
         elif timing_explains(pair, x, run, finding.mode, share):
             blind[run.start : run.stop] = True
         else:
-            findings.append(finding)
+            findings.append(replace(finding, detected=_detected(path, run, shortest, lag)))
     states = _states(pair, x, status, blind, findings)
     notes = [
         f"{pair.y_name} against {pair.x_name}: noise {model.noise:.2g} {pair.unit}, rounding step {lsb:.2g} {pair.unit}, "
@@ -85,9 +91,15 @@ def assess_pair(pair: Pair, limits: Limits) -> Assessment:
     )
 
 
-def _tidy(path: modes.ModePath, pair: Pair, status: NDArray[np.int8]) -> list[Run]:
+def _detected(path: ModePath, run: Run, slack: int, lag: float) -> int | None:
+    """Sample at which the fault would have been raised causally: both y and the reference beside it have arrived."""
+    raised = path.crossing(run.start, run.stop, slack)
+    return None if raised is None else min(raised + max(0, math.ceil(-lag)), path.model.size - 1)
+
+
+def _tidy(path: ModePath, pair: Pair, status: NDArray[np.int8], shortest: int) -> list[Run]:
     """Faulty runs of a path, joined where they belong together, without the ends in which nothing moves."""
-    runs = absorb_short(runs_of(path), max(3, round(0.01 / pair.dt)))
+    runs = absorb_short(runs_of(path), shortest)
     runs = join_noisy(runs)
     runs = merge_equal(runs, max(2, round(0.02 / pair.dt)), (modes.NOISY, modes.INEFFICIENT, modes.NO_SIGNAL))
     out = []
@@ -228,7 +240,7 @@ def _states(
 
 
 def _columns(
-    pair: Pair, x: Array, status: NDArray[np.int8], model: modes.ModeModel, path: modes.ModePath
+    pair: Pair, x: Array, status: NDArray[np.int8], model: modes.ModeModel, path: ModePath
 ) -> dict[str, Array]:
     """Series for the evidence plots."""
     use = status == modes.PAIR

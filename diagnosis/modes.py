@@ -1,4 +1,4 @@
-"""Which row of the fault table holds, sample by sample: mode-conditioned Kalman filters and the most probable path.
+"""Rows of the fault table as Kalman models of one channel; `diagnosis.mode_path` finds which of them holds when.
 
 Every row of the two tables is a model of a measured y against a reference x (v against v_true by L4, u_applied against
 u_a by L8):
@@ -9,10 +9,8 @@ no_signal    y = 0
 inefficient  y = δ·x + n, δ constant
 noisy        y = δ·x + δ̄ + n, δ̄ drifting (random walk) or white with one of several powers
 
-A Kalman filter per row starts when the row is entered and carries the row's unknowns [δ or c, δ̄]. Viterbi's recursion
-over the rows keeps, for each row, the most probable entry (per-survivor processing), so that onsets come out at the
-sampling rate. Between two samples of y nothing is updated; a y that is silent while its source lives speaks for
-no_signal.
+A Kalman filter per row starts when the row is entered and carries the row's unknowns [δ or c, δ̄]. Between two samples
+of y nothing is updated; a y that is silent while its source lives speaks for no_signal.
 """
 
 from __future__ import annotations
@@ -38,7 +36,6 @@ STAY = 255
 _OUTLIER = -18.0
 _SILENT_COST = -6.0
 _MISMATCH_S = 0.05
-_LEARNING_COST = 10.0  # what a new entry loses until its filter has settled: a settled one is kept that long
 
 
 @dataclass(frozen=True)
@@ -85,27 +82,8 @@ class ModeModel:
         )
 
 
-@dataclass(frozen=True)
-class ModeState:
-    """What the recursion carries from block to block: score, mean and covariance per model."""
-
-    score: Array
-    mean: Array
-    cov: Array
-
-
-def initial_state(model: ModeModel) -> ModeState:
-    """State before the first sample: healthy is as probable as a fault that began long ago is not."""
-    score = np.full(MODELS, -model.switch_cost / 2)
-    score[HEALTHY] = 0.0
-    mean, cov = np.zeros((MODELS, 2)), np.zeros((MODELS, 3))
-    for m in range(MODELS):
-        _enter(m, model.packed(), mean, cov)
-    return ModeState(score, mean, cov)
-
-
 @njit(cache=True)
-def _enter(m, p, mean, cov):  # type: ignore[no-untyped-def]
+def enter(m, p, mean, cov):  # type: ignore[no-untyped-def]
     """Prior of a model's unknowns [δ or c, δ̄] at entry; cov = (P11, P12, P22)."""
     span = p[2]
     mean[m, 0], mean[m, 1] = 0.0, 0.0
@@ -157,7 +135,7 @@ def _step(m, y, x, p, noisy, mean, cov):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _likelihoods(y, x, status, quiet, p, noisy, mean, cov, out):  # type: ignore[no-untyped-def]
+def likelihoods(y, x, status, quiet, p, noisy, mean, cov, out):  # type: ignore[no-untyped-def]
     """Log-likelihood of one sample under every model; where nothing moves, a zero reading speaks for no fault."""
     floor = _OUTLIER - np.log(p[2])
     for m in range(out.size):
@@ -186,44 +164,6 @@ def _likelihoods(y, x, status, quiet, p, noisy, mean, cov, out):  # type: ignore
 
 
 @njit(cache=True)
-def _scan_modes(y, x, status, quiet, p, noisy, row, score, mean, cov, back, filtered):  # type: ignore[no-untyped-def]
-    """Viterbi over the models; writes back-pointers (n, models) and softmax of scores by row (n, rows)."""
-    models = score.size
-    gain = np.zeros(models)
-    for k in range(y.size):
-        best = 0
-        for m in range(1, models):
-            if score[m] > score[best]:
-                best = m
-        top = score[best]
-        if status[k] != SKIP:
-            for m in range(models):
-                cost = p[4]
-                if row[m] == row[best] and m != best:
-                    cost = 3.0
-                learning = 0.0 if m == 0 or m == 2 else _LEARNING_COST
-                if top - cost - learning > score[m]:
-                    score[m] = top - cost
-                    back[k, m] = best
-                    _enter(m, p, mean, cov)
-            _likelihoods(y[k], x[k], status[k], quiet[k], p, noisy, mean, cov, gain)
-            for m in range(models):
-                score[m] += gain[m]
-            top = score[0]
-            for m in range(1, models):
-                top = max(top, score[m])
-            for m in range(models):
-                score[m] -= top
-        total = 0.0
-        for m in range(models):
-            w = np.exp(score[m])
-            filtered[k, row[m]] += w
-            total += w
-        for i in range(filtered.shape[1]):
-            filtered[k, i] /= total
-
-
-@njit(cache=True)
 def trace(back, last):  # type: ignore[no-untyped-def]
     """Follow back-pointers from the last model; also marks samples at which a model was entered."""
     n = back.shape[0]
@@ -236,72 +176,6 @@ def trace(back, last):  # type: ignore[no-untyped-def]
             entered[k] = True
             m = back[k, m]
     return path, entered
-
-
-@dataclass(frozen=True)
-class ModePath:
-    """Most probable rows.
-
-    Attributes
-    ----------
-    model : NDArray[np.uint8], shape (n,)
-        Model per sample.
-    entered : NDArray[np.bool_], shape (n,)
-        Samples at which a model was entered.
-    filtered : NDArray[np.float64], shape (n, 5)
-        Causal probability of each row (softmax of the survivors' scores).
-    """
-
-    model: NDArray[np.uint8]
-    entered: NDArray[np.bool_]
-    filtered: Array
-
-    @property
-    def row(self) -> NDArray[np.int64]:
-        """Row of the table per sample."""
-        return np.asarray(ROW_OF_MODEL[self.model])
-
-
-def forward(
-    y: Array, x: Array, status: NDArray[np.int8], quiet: NDArray[np.bool_], model: ModeModel, state: ModeState
-) -> tuple[NDArray[np.uint8], Array, ModeState]:
-    """Run the recursion over one block.
-
-    Parameters
-    ----------
-    y, x : Array, shape (n,)
-        Measured value and reference.
-    status : NDArray[np.int8], shape (n,)
-        `SKIP` (nothing new), `PAIR` (both valid), `SILENT` (y silent while its source lives) or `BLIND` (both valid,
-        but x changes faster than the log resolves).
-    quiet : NDArray[np.bool_], shape (n,)
-        Where the machine stands, so that a reading of zero is what a healthy channel gives too.
-    model : ModeModel
-        Noise and prior.
-    state : ModeState
-        From `initial_state` or from the block before.
-
-    Returns
-    -------
-    back : NDArray[np.uint8], shape (n, models)
-        Back-pointers for `trace`.
-    filtered : Array, shape (n, 5)
-        Causal probability of each row.
-    state : ModeState
-        For the next block.
-    """
-    back = np.full((y.size, MODELS), STAY, dtype=np.uint8)
-    filtered = np.zeros((y.size, len(ROWS)))
-    score, mean, cov = state.score.copy(), state.mean.copy(), state.cov.copy()
-    _scan_modes(y, x, status, quiet, model.packed(), NOISY_MODELS, ROW_OF_MODEL, score, mean, cov, back, filtered)
-    return back, filtered, ModeState(score, mean, cov)
-
-
-def most_probable(y: Array, x: Array, status: NDArray[np.int8], quiet: NDArray[np.bool_], model: ModeModel) -> ModePath:
-    """Most probable rows of a whole channel; see `forward` for the arguments."""
-    back, filtered, state = forward(y, x, status, quiet, model, initial_state(model))
-    path, entered = trace(back, int(np.argmax(state.score)))
-    return ModePath(path, entered, filtered)
 
 
 def segment_evidence(y: Array, x: Array, status: NDArray[np.int8], quiet: NDArray[np.bool_], model: ModeModel) -> Array:
@@ -321,9 +195,9 @@ def _scan_evidence(y, x, status, quiet, p, noisy, models):  # type: ignore[no-un
     out, gain = np.zeros(models), np.zeros(models)
     mean, cov = np.zeros((models, 2)), np.zeros((models, 3))
     for m in range(models):
-        _enter(m, p, mean, cov)
+        enter(m, p, mean, cov)
     for k in range(y.size):
         if status[k] != SKIP:
-            _likelihoods(y[k], x[k], status[k], quiet[k], p, noisy, mean, cov, gain)
+            likelihoods(y[k], x[k], status[k], quiet[k], p, noisy, mean, cov, gain)
             out += gain
     return out

@@ -8,7 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from diagnosis.modes import HEALTHY, INEFFICIENT, NOISY, STUCK, ModePath
+from diagnosis.mode_path import ModePath
+from diagnosis.modes import HEALTHY, INEFFICIENT, NOISY, STUCK
 
 
 @dataclass(frozen=True)

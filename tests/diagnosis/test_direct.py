@@ -108,6 +108,8 @@ def test_every_row_of_the_tables(
     sharp = 8 if mode is FaultMode.INEFFICIENT else 5 if std else 2
     assert START - sharp <= found.start <= START + sharp + late
     assert STOP - sharp <= found.stop <= STOP + sharp + late
+    assert found.detected is not None
+    assert max(found.start, START - 1) <= found.detected <= START + 40  # a small loss needs that many samples to show
     assert found.epsilon is not None
     assert found.epsilon.value == pytest.approx(epsilon, abs=0.01 if std == 0 else 0.06)
     assert found.epsilon.low - 0.01 <= epsilon <= found.epsilon.high + 0.01

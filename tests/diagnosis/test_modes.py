@@ -8,6 +8,7 @@ from filterpy.kalman import KalmanFilter
 from numpy.testing import assert_allclose, assert_array_equal
 
 from diagnosis import modes
+from diagnosis.mode_path import ModeState, forward, initial_state, most_probable
 from diagnosis.modes import (
     HEALTHY,
     INEFFICIENT,
@@ -21,10 +22,6 @@ from diagnosis.modes import (
     SKIP,
     STUCK,
     ModeModel,
-    ModeState,
-    forward,
-    initial_state,
-    most_probable,
     segment_evidence,
 )
 

@@ -8,7 +8,8 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from diagnosis.modes import HEALTHY, INEFFICIENT, NO_SIGNAL, NOISY, STUCK, ModePath
+from diagnosis.mode_path import ModePath
+from diagnosis.modes import HEALTHY, INEFFICIENT, NO_SIGNAL, NOISY, STUCK
 from diagnosis.segments import Run, absorb_short, merge_equal, runs_of, trim
 
 # of the models, the first four stand for the first four rows

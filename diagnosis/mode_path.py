@@ -1,0 +1,179 @@
+"""Which row of the fault table holds, sample by sample: the most probable path through the models of `diagnosis.modes`.
+
+Viterbi's recursion over the rows keeps, for each row, the most probable entry (per-survivor processing), so that onsets
+come out at the sampling rate. The scores on the way forward know nothing of what follows: they say when a fault could
+have been raised at the earliest.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from diagnosis.modes import (
+    HEALTHY,
+    MODELS,
+    NOISY_MODELS,
+    ROW_OF_MODEL,
+    ROWS,
+    SKIP,
+    STAY,
+    ModeModel,
+    enter,
+    likelihoods,
+    trace,
+)
+
+Array = NDArray[np.float64]
+
+_LEARNING_COST = 10.0  # what a new entry loses until its filter has settled: a settled one is kept that long
+
+
+@dataclass(frozen=True)
+class ModeState:
+    """What the recursion carries from block to block: score, mean and covariance per model."""
+
+    score: Array
+    mean: Array
+    cov: Array
+
+
+def initial_state(model: ModeModel) -> ModeState:
+    """State before the first sample: healthy is as probable as a fault that began long ago is not."""
+    score = np.full(MODELS, -model.switch_cost / 2)
+    score[HEALTHY] = 0.0
+    mean, cov = np.zeros((MODELS, 2)), np.zeros((MODELS, 3))
+    for m in range(MODELS):
+        enter(m, model.packed(), mean, cov)
+    return ModeState(score, mean, cov)
+
+
+@njit(cache=True)
+def _scan_modes(y, x, status, quiet, p, noisy, row, score, mean, cov, back, filtered):  # type: ignore[no-untyped-def]
+    """Viterbi over the models; writes back-pointers (n, models) and softmax of scores by row (n, rows)."""
+    models = score.size
+    gain = np.zeros(models)
+    for k in range(y.size):
+        best = 0
+        for m in range(1, models):
+            if score[m] > score[best]:
+                best = m
+        top = score[best]
+        if status[k] != SKIP:
+            for m in range(models):
+                cost = p[4]
+                if row[m] == row[best] and m != best:
+                    cost = 3.0
+                learning = 0.0 if m == 0 or m == 2 else _LEARNING_COST
+                if top - cost - learning > score[m]:
+                    score[m] = top - cost
+                    back[k, m] = best
+                    enter(m, p, mean, cov)
+            likelihoods(y[k], x[k], status[k], quiet[k], p, noisy, mean, cov, gain)
+            for m in range(models):
+                score[m] += gain[m]
+            top = score[0]
+            for m in range(1, models):
+                top = max(top, score[m])
+            for m in range(models):
+                score[m] -= top
+        total = 0.0
+        for m in range(models):
+            w = np.exp(score[m])
+            filtered[k, row[m]] += w
+            total += w
+        for i in range(filtered.shape[1]):
+            filtered[k, i] /= total
+
+
+@dataclass(frozen=True)
+class ModePath:
+    """Most probable rows.
+
+    Attributes
+    ----------
+    model : NDArray[np.uint8], shape (n,)
+        Model per sample.
+    entered : NDArray[np.bool_], shape (n,)
+        Samples at which a model was entered.
+    filtered : NDArray[np.float64], shape (n, 5)
+        Causal probability of each row (softmax of the survivors' scores).
+    """
+
+    model: NDArray[np.uint8]
+    entered: NDArray[np.bool_]
+    filtered: Array
+
+    @property
+    def row(self) -> NDArray[np.int64]:
+        """Row of the table per sample."""
+        return np.asarray(ROW_OF_MODEL[self.model])
+
+    def crossing(self, start: int, stop: int, slack: int) -> int | None:
+        """First sample of [start, stop) from which on a fault is more probable than none without anything later.
+
+        The last rise of that decision within the interval counts, as in the detection time of DAMADICS; a rise up to
+        `slack` samples before `start` counts as `start`, and what happens in the last `slack` samples counts nothing,
+        since the interval's ends were found looking back.
+
+        Parameters
+        ----------
+        start, stop : int
+            Samples of the interval, half open.
+        slack : int
+            Samples by which its ends may be off; at most a quarter of the interval at its end.
+
+        Returns
+        -------
+        int or None
+            None where no fault is the more probable one at its end: a causal reading would have missed it.
+        """
+        first, last = max(0, start - slack), stop - min(slack, (stop - start) // 4)
+        calm = np.flatnonzero(self.filtered[first:last, HEALTHY] >= 0.5)
+        raised = first if not calm.size else first + int(calm[-1]) + 1
+        return None if raised >= last else max(raised, start)
+
+
+def forward(
+    y: Array, x: Array, status: NDArray[np.int8], quiet: NDArray[np.bool_], model: ModeModel, state: ModeState
+) -> tuple[NDArray[np.uint8], Array, ModeState]:
+    """Run the recursion over one block.
+
+    Parameters
+    ----------
+    y, x : Array, shape (n,)
+        Measured value and reference.
+    status : NDArray[np.int8], shape (n,)
+        `SKIP` (nothing new), `PAIR` (both valid), `SILENT` (y silent while its source lives) or `BLIND` (both valid,
+        but x changes faster than the log resolves).
+    quiet : NDArray[np.bool_], shape (n,)
+        Where the machine stands, so that a reading of zero is what a healthy channel gives too.
+    model : ModeModel
+        Noise and prior.
+    state : ModeState
+        From `initial_state` or from the block before.
+
+    Returns
+    -------
+    back : NDArray[np.uint8], shape (n, models)
+        Back-pointers for `trace`.
+    filtered : Array, shape (n, 5)
+        Causal probability of each row.
+    state : ModeState
+        For the next block.
+    """
+    back = np.full((y.size, MODELS), STAY, dtype=np.uint8)
+    filtered = np.zeros((y.size, len(ROWS)))
+    score, mean, cov = state.score.copy(), state.mean.copy(), state.cov.copy()
+    _scan_modes(y, x, status, quiet, model.packed(), NOISY_MODELS, ROW_OF_MODEL, score, mean, cov, back, filtered)
+    return back, filtered, ModeState(score, mean, cov)
+
+
+def most_probable(y: Array, x: Array, status: NDArray[np.int8], quiet: NDArray[np.bool_], model: ModeModel) -> ModePath:
+    """Most probable rows of a whole channel; see `forward` for the arguments."""
+    back, filtered, state = forward(y, x, status, quiet, model, initial_state(model))
+    path, entered = trace(back, int(np.argmax(state.score)))
+    return ModePath(path, entered, filtered)
