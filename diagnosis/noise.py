@@ -9,9 +9,12 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from replay.resolution import rounding_step as rounding_step
+from replay.resolution import white_noise as white_noise
+from replay.resolution import windows as _windows
+
 Array = NDArray[np.float64]
 
-_WINDOW_S = 0.25
 COARSE_STEP_S = 0.005  # slower logs do not fix the delay between a command and its measurement
 _COARSE_SHARE = 0.3
 
@@ -20,58 +23,6 @@ def moving_sum(x: NDArray[np.float64] | NDArray[np.bool_], width: int) -> Array:
     """Sum over a centred window of `width` samples, shape (n,); the window is cut at the ends, and to n."""
     width = min(width, x.size)
     return np.convolve(np.asarray(x, dtype=np.float64), np.ones(width), mode="same") if width else np.zeros(0)
-
-
-def rounding_step(values: Array) -> float:
-    """Rounding step (LSB) of a channel; 0 where the values lie on no grid.
-
-    Parameters
-    ----------
-    values : Array, shape (n,)
-        New samples only; NaN are left out.
-    """
-    known = values[np.isfinite(values)][:200_000]
-    steps = np.abs(np.diff(known))
-    steps = steps[steps > 1e-12 * max(1.0, float(np.max(np.abs(known), initial=0.0)))]
-    if steps.size < 20:
-        return 0.0
-    smallest = float(np.quantile(steps, 0.01))
-    step = float(np.median(steps[steps < 1.5 * smallest]))
-    multiple = steps / step
-    step *= float(np.sum(multiple * np.round(multiple)) / max(float(np.sum(np.round(multiple) ** 2)), 1e-300))
-    off = np.abs(steps / step - np.round(steps / step))
-    small = steps < 50 * step
-    return step if np.count_nonzero(small) >= 20 and float(np.mean(off[small] < 0.1)) > 0.97 else 0.0
-
-
-def _windows(values: Array, length: int) -> Array:
-    count = values.size // length
-    return values[: count * length].reshape(count, length)
-
-
-def white_noise(values: Array, dt: float) -> float:
-    """Standard deviation of the white part of a sampled signal, from its second differences.
-
-    Parameters
-    ----------
-    values : Array, shape (n,)
-        Consecutive samples; windows with NaN or without change are left out.
-    dt : float
-        Distance of samples [s].
-
-    Returns
-    -------
-    float
-        The 40 % quantile over windows of 0.25 s (at least 12 samples); NaN where no window is usable.
-    """
-    second = values[2:] - 2 * values[1:-1] + values[:-2]
-    blocks = _windows(second, max(12, round(_WINDOW_S / dt)))
-    if not blocks.size:
-        return float("nan")
-    moving = np.mean(np.abs(blocks) > 0, axis=1) > 0.3
-    rms = np.sqrt(np.mean(blocks**2, axis=1) / 6.0)
-    rms = rms[moving & np.isfinite(rms)]
-    return float(np.quantile(rms, 0.4)) if rms.size >= 3 else float("nan")
 
 
 def quick_noise(residual: Array, dt: float) -> float:

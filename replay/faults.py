@@ -69,6 +69,8 @@ class FaultSpec:
         Standard deviation of the varying part of the saturation term, same unit.
     sat_tau_s : float
         Correlation time of the varying part [s]; 0 for white.
+    ramp_s : float
+        Time over which ε grows from 0 to its value [s]; 0 for an abrupt onset. Injection into recordings alone.
     """
 
     component: str
@@ -80,6 +82,7 @@ class FaultSpec:
     sat: float = 0.0
     sat_std: float = 0.0
     sat_tau_s: float = 0.0
+    ramp_s: float = 0.0
 
 
 def fault_affected(

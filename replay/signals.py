@@ -51,8 +51,11 @@ class Signals:
         Canonical names that were looked for and not found, with the reason.
     notes : tuple[str, ...]
         Guesses made and doubts about them, one sentence each.
+    open_loop : bool
+        Whether faults were written into the recording, so that its controller never met them.
     """
 
     items: Mapping[str, Signal]
     missing: Mapping[str, str]
     notes: tuple[str, ...] = ()
+    open_loop: bool = False
