@@ -115,9 +115,9 @@ class ModePath:
     def crossing(self, start: int, stop: int, slack: int) -> int | None:
         """First sample of [start, stop) from which on a fault is more probable than none without anything later.
 
-        The last rise of that decision within the interval counts, as in the detection time of DAMADICS; a rise up to
-        `slack` samples before `start` counts as `start`, and what happens in the last `slack` samples counts nothing,
-        since the interval's ends were found looking back.
+        The last rise of that decision within the interval counts, as in the detection time of DAMADICS. The ends of
+        the interval were found looking back: a rise up to `slack` samples before `start` counts as `start`, and the
+        last `slack` samples count nothing; nor does the decision end where it is withdrawn for less than that.
 
         Parameters
         ----------
@@ -132,8 +132,10 @@ class ModePath:
             None where no fault is the more probable one at its end: a causal reading would have missed it.
         """
         first, last = max(0, start - slack), stop - min(slack, (stop - start) // 4)
-        calm = np.flatnonzero(self.filtered[first:last, HEALTHY] >= 0.5)
-        raised = first if not calm.size else first + int(calm[-1]) + 1
+        calm = np.r_[False, self.filtered[first:last, HEALTHY] >= 0.5, False]
+        falls, rises = np.flatnonzero(calm[1:] & ~calm[:-1]), np.flatnonzero(calm[:-1] & ~calm[1:])
+        taken_back = (rises - falls >= slack) | (falls == 0) | (rises == last - first)
+        raised = first + int(rises[taken_back].max(initial=0))
         return None if raised >= last else max(raised, start)
 
 

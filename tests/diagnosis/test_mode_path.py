@@ -24,6 +24,7 @@ def told(healthy: str) -> ModePath:
         ("hhhhffffffffhhhh", 4, 12, 0, 4),
         ("hhhhhhffffffhhhh", 4, 12, 0, 6),  # two samples of evidence were needed
         ("hhhhfhhfffffhhhh", 4, 12, 0, 7),  # the last rise counts: the first was taken back
+        ("hhhhffhffffhffff", 4, 16, 2, 4),  # withdrawn for a sample, less than the slack
         ("hhhfffffffffhhhh", 4, 12, 2, 4),  # raised a sample before the start found looking back
         ("ffffffffffffhhhh", 4, 12, 2, 4),  # raised long before
         ("hhhhffffffffhhhh", 4, 13, 2, 4),  # the end found looking back is a sample late
