@@ -38,11 +38,11 @@ def driving(replay: Replay, timeline: Timeline, machine: Machine) -> NDArray[np.
 def loop_metrics(timeline: Timeline, replay: Replay, machine: Machine, moving: NDArray[np.bool_]) -> dict[str, Any]:
     """Mean |e_i| [m/s] and mean |u_a,i| [fraction] per wheel and on average, for the mission and for driving.
 
-    e is taken with v_true where that is logged.
+    e is taken with v_true where that is logged, and not with a speed into which faults were injected.
     """
     u = stack(timeline, [f"wheel.{w}.u" for w in machine.wheels])
     true = stack(timeline, [f"wheel.{w}.v_true" for w in machine.wheels])
-    e = np.where(np.isfinite(true).any(axis=0), true - replay.v_ref, replay.e)
+    e = np.where(np.isfinite(true).any(axis=0), true - replay.v_ref, np.nan if timeline.open_loop else replay.e)
     per_wheel = {}
     for i, wheel in enumerate(machine.wheels):
         per_wheel[wheel] = {

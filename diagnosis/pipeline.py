@@ -191,6 +191,11 @@ def _result(
 def _more_caveats(mission: Mission, machine: Machine) -> list[str]:
     """What the reader should know beside the verdict: parts of a mission, signals that were named and not found."""
     out = []
+    if mission.open_loop:
+        out.append(
+            "Faults were injected into this recording; the controller did not react to them: evidence that rests on the "
+            "closed loop and on controller consistency is switched off."
+        )
     absent = [name for name in machine.signals if name not in mission.signals.items]
     if absent:
         reason = mission.signals.missing.get(absent[0], "")
@@ -240,6 +245,7 @@ def _log(mission: Mission, moving: NDArray[np.bool_], machine: Machine) -> dict[
             for f in mission.files
         ],
         "start_ns": timeline.start_ns,
+        "open_loop": mission.open_loop,
         "duration_s": timeline.size * timeline.dt,
         "rate_hz": 1e9 / timeline.step_ns,
         "distance_m": distance,

@@ -101,6 +101,13 @@ def checks(
         "none" if jitter < timeline.step_ns * 2.5e-6 else "onsets are only as sharp as the jitter",
         jitter < timeline.step_ns * 2.5e-6,
     )
+    if signals.open_loop:
+        row(
+            "Injected faults",
+            "faults were written into this recording; its controller never met them",
+            "the recorded commands are not compared with the law; no tracking error without a second speed",
+            False,
+        )
     for text in damage:
         row("Damage", text, "what is lost is not assessed; no “ready” from a damaged log", False)
     gaps = {n: _gaps(s, median_period(s.stamps)) for n, s in signals.items.items() if not n.startswith("cmd.")}

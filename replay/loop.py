@@ -108,8 +108,10 @@ def replay_loop(timeline: Timeline, machine: Machine) -> Replay:
     control = machine.control
     rho = mfhca.decay_rate(v, v_ref, control.xi, control.beta)
     e = v - v_ref
-    recorded = bool(np.isfinite(u).any())
-    law, psi_mode, lambda_, zeta, psi0, fits = _choose(machine, u, v, v_ref, timeline.dt, recorded, readings)
+    unfit = "" if np.isfinite(u).any() else "no recorded valve command to fit"
+    if timeline.open_loop:  # the recorded commands answer to other measurements than these
+        u, unfit = np.full_like(u, np.nan), "faults were injected into this recording, its controller never met them"
+    law, psi_mode, lambda_, zeta, psi0, fits = _choose(machine, u, v, v_ref, timeline.dt, unfit, readings)
     shape = v.shape
     nothing = np.full(shape, np.nan)
     psi_printed, implied, psi, u_replayed, forcing = (nothing.copy() for _ in range(5))
@@ -129,6 +131,8 @@ def replay_loop(timeline: Timeline, machine: Machine) -> Replay:
             u_replayed[:, i] = mfhca.drive_command(law, v[:, i], v_ref[:, i], psi[:, i] ** 2, lambda_, control.u_max)
     steer_u = mfhca.steering_command(phi_ref, phi, control.k_ps, control.u_max)
     steer_recorded = stack(timeline, [f"steer.{a}.u" for a in axles])
+    if timeline.open_loop:
+        steer_recorded = np.full_like(steer_recorded, np.nan)
     return Replay(
         v_ref=v_ref,
         phi_ref=phi_ref,
@@ -194,7 +198,7 @@ def _commands(timeline: Timeline, machine: Machine, phi: Array, readings: list[R
 
 
 def _choose(
-    machine: Machine, u: Array, v: Array, v_ref: Array, dt: float, recorded: bool, readings: list[Reading]
+    machine: Machine, u: Array, v: Array, v_ref: Array, dt: float, unfit: str, readings: list[Reading]
 ) -> tuple[str, str, float, float, tuple[float, ...], tuple[LawFit, ...]]:
     """Law, mode of Ψ̂ and constants to replay with."""
     control = machine.control
@@ -204,11 +208,11 @@ def _choose(
         return "none", "printed", 0.0, 0.0, zeros, ()
     laws = tuple(mfhca.LAW_TEXT) if control.law == "auto" else (control.law,)
     fits = (
-        fit_law(u, v, v_ref, dt, xi=control.xi, beta=control.beta, u_max=control.u_max, laws=laws) if recorded else ()
+        fit_law(u, v, v_ref, dt, xi=control.xi, beta=control.beta, u_max=control.u_max, laws=laws) if not unfit else ()
     )
     if not fits:
         law: str = "signed" if control.law == "auto" else control.law
-        why = "no recorded valve command to fit" if not recorded else "too few usable samples to fit"
+        why = unfit or "too few usable samples to fit"
         readings.append(Reading("control law", f"{law}: {mfhca.LAW_TEXT[law]}", f"{why}; λ = {control.lambda_:g} s/m"))
         readings.append(Reading("adaptive law Ψ̂", "printed only", why))
         return law, "printed", control.lambda_, control.zeta, zeros, ()

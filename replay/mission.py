@@ -11,6 +11,7 @@ from pathlib import Path
 from replay.errors import LogError
 from replay.machine import Machine
 from replay.mapping import map_signals, plan_topics
+from replay.open_loop import is_open_loop
 from replay.rawlog import LogSummary, RawLog
 from replay.readers.registry import read_log, summarise_log
 from replay.signals import Signals
@@ -54,6 +55,11 @@ class Mission:
     files: tuple[MissionFile, ...]
     signals: Signals
     timeline: Timeline
+
+    @property
+    def open_loop(self) -> bool:
+        """Whether faults were written into the recording, so that its controller never met them."""
+        return self.signals.open_loop
 
 
 def source_options(path: Path, machine: Machine) -> SourceOptions:
@@ -142,7 +148,8 @@ def read_signals(
         logs.append(log)
         files.append(MissionFile(path, sha256, size, log.format, _complete(summary, log.summary)))
     tell("mapping signals")
-    return tuple(files), map_signals(logs, machine)
+    open_loop = any(is_open_loop(file.summary) for file in files)
+    return tuple(files), replace(map_signals(logs, machine), open_loop=open_loop)
 
 
 def _complete(index: LogSummary, decoded: LogSummary) -> LogSummary:

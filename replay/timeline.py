@@ -43,6 +43,8 @@ class Timeline:
         Median sample period of each signal.
     notes : tuple[str, ...]
         What was unusual, one sentence each.
+    open_loop : bool
+        As in `Signals`.
     """
 
     start_ns: int
@@ -53,6 +55,7 @@ class Timeline:
     sources: Mapping[str, str]
     periods_ns: Mapping[str, int]
     notes: tuple[str, ...] = ()
+    open_loop: bool = False
 
     @property
     def dt(self) -> float:
@@ -126,6 +129,7 @@ def align(signals: Signals, start_s: float | None = None, stop_s: float | None =
         sources={k: s.source for k, s in signals.items.items()},
         periods_ns={k: median_period(s.stamps) for k, s in signals.items.items()},
         notes=tuple(notes),
+        open_loop=signals.open_loop,
     )
 
 
