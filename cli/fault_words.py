@@ -16,8 +16,9 @@ _KEYS: Mapping[str, Callable[[FaultSpec, float], FaultSpec]] = {
     "sat": lambda fault, x: replace(fault, sat=x),
     "std": lambda fault, x: replace(fault, sat_std=x),
     "tau": lambda fault, x: replace(fault, sat_tau_s=x),
+    "ramp": lambda fault, x: replace(fault, ramp_s=x),
 }
-_FORM = "PART SIDE MODE START STOP [eps=…] [sat=…] [std=…] [tau=…], e.g. 'FR sensor stuck 30 37'"
+_FORM = "PART SIDE MODE START STOP [eps=…] [sat=…] [std=…] [tau=…] [ramp=…], e.g. 'FR sensor stuck 30 37'"
 
 
 def parse_fault(words: str) -> FaultSpec:
@@ -43,7 +44,7 @@ def parse_fault(words: str) -> FaultSpec:
     for word in (w for w in words.split() if "=" in w):
         key, _, value = word.partition("=")
         if key not in _KEYS:
-            raise ConfigError(f"--fault {words!r}: {key!r} is not known; expected eps, sat, std or tau")
+            raise ConfigError(f"--fault {words!r}: {key!r} is not known; expected eps, sat, std, tau or ramp")
         fault = _KEYS[key](fault, _number(words, key, value))
     _check_row(words, fault)
     return fault

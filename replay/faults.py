@@ -70,7 +70,7 @@ class FaultSpec:
     sat_tau_s : float
         Correlation time of the varying part [s]; 0 for white.
     ramp_s : float
-        Time over which ε grows from 0 to its value [s]; 0 for an abrupt onset. Injection into recordings alone.
+        Time over which ε grows linearly from 0 to `epsilon` [s]; 0 for an abrupt onset.
     """
 
     component: str

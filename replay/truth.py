@@ -31,6 +31,8 @@ class TruthInterval:
         ε of L4 or L8.
     sat_mean, sat_std : float
         Saturation term: m/s, rad or valve fraction; for a stuck part the value it was stuck at.
+    ramp_s : float
+        Time from `start_s` on over which ε grew linearly from 0 to `epsilon` [s]; 0 for at once, then left out of files.
     """
 
     component: str
@@ -42,6 +44,7 @@ class TruthInterval:
     epsilon: float
     sat_mean: float
     sat_std: float
+    ramp_s: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -90,7 +93,8 @@ def _plain(value: Any) -> Any:
     if isinstance(value, tuple):
         return [_plain(v) for v in value]
     if isinstance(value, TruthInterval | TruthSpan):
-        return {f.name: _plain(getattr(value, f.name)) for f in fields(value)}
+        row = {f.name: _plain(getattr(value, f.name)) for f in fields(value)}
+        return {key: x for key, x in row.items() if key != "ramp_s" or x}
     return round(value, 9) if isinstance(value, float) else value
 
 
@@ -159,6 +163,7 @@ def _interval(row: Mapping[str, Any]) -> TruthInterval:
         epsilon=float(row["epsilon"]),
         sat_mean=float(row["sat_mean"]),
         sat_std=float(row["sat_std"]),
+        ramp_s=float(row.get("ramp_s", 0.0)),
     )
 
 

@@ -14,9 +14,10 @@ from replay.simulation.options import SimulatedMission
 
 
 def mission_table(mission: SimulatedMission) -> pa.Table:
-    """One row per recorded stamp; cells of slower signals are empty in between, as are those of silent sensors."""
+    """One row per recorded stamp; cells of slower signals are empty in between, as are those of silent sensors and lost rows."""
     columns = {"time_ns": pa.array(mission.stamps)}
-    columns |= {name: pa.array(values, from_pandas=True) for name, values in mission.columns.items()}
+    for name, values in mission.columns.items():
+        columns[name] = pa.array(np.where(mission.rows(name), values, np.nan), from_pandas=True)
     for group in mission.slow:
         rows = np.searchsorted(mission.stamps, group.stamps)
         for name, values in group.columns.items():

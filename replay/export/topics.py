@@ -91,12 +91,13 @@ def _header(dialect: Dialect, frame: str, stamps: NDArray[np.int64]) -> tuple[La
 
 
 def _twist(mission: SimulatedMission, dialect: Dialect, rng: np.random.Generator) -> TopicBatch:
-    layout, fields = _header(dialect, "base_link", mission.stamps)
+    rows = mission.rows("cmd.v")
+    layout, fields = _header(dialect, "base_link", mission.stamps[rows])
     layout.varying("v", "f8")
     layout.constant("d", 0.0, 0.0, 0.0, 0.0)
     layout.varying("omega", "f8")
-    fields |= {"v": mission.columns["cmd.v"], "omega": mission.columns["cmd.omega"]}
-    stamps = _log_stamps(mission.stamps, 100_000, rng)
+    fields |= {"v": mission.columns["cmd.v"][rows], "omega": mission.columns["cmd.omega"][rows]}
+    stamps = _log_stamps(mission.stamps, 100_000, rng)[rows]
     return TopicBatch("/cmd_vel", "geometry_msgs/msg/TwistStamped", layout, fields, stamps)
 
 
@@ -122,10 +123,13 @@ def _joint_states(
     present = np.ones(values.shape, np.bool_)
     if mission.options.silent == "drop":
         present = ~np.isnan(values)
+    recorded = mission.rows(columns[0][0])
     batches = []
     patterns, pattern = np.unique(present, axis=0, return_inverse=True)
     for i, joints in enumerate(patterns):
-        rows = np.flatnonzero(pattern.ravel() == i) if len(patterns) > 1 else slice(None)
+        rows = np.flatnonzero((pattern.ravel() == i) & recorded)
+        if rows.size == 0:
+            continue
         layout, fields = _header(dialect, "base_link", mission.stamps[rows])
         kept = np.flatnonzero(joints)
         layout.constant("I", kept.size)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
@@ -13,7 +14,7 @@ import pyarrow.csv
 from numpy.typing import NDArray
 
 from replay.files import atomic_path
-from replay.simulation.options import SIMULATED_AXLES, SimulatedMission
+from replay.simulation.options import SIMULATED_AXLES, SimulatedMission, channel_group
 
 _FILETIME_1970 = 116_444_736_000_000_000  # 100 ns from 1601 to 1970
 _WHEEL = {
@@ -71,7 +72,7 @@ def write_twincat(path: Path, mission: SimulatedMission) -> None:
     machine = mission.options.machine
     assert machine.geometry is not None  # checked by SimulationOptions
     motor_rpm = 60.0 * machine.gear_ratio / (np.pi * machine.geometry.wheel_diameter)
-    sources = [(mission.stamps, mission.columns), *((g.stamps, g.columns) for g in reversed(mission.slow))]
+    sources = [*_fast_groups(mission), *((g.stamps, g.columns) for g in reversed(mission.slow))]
     groups = []
     for stamps, columns in sorted(sources, key=lambda s: -s[0].size):
         pairs = [plc_symbol(name, machine.wheels) for name in columns]
@@ -85,6 +86,16 @@ def write_twincat(path: Path, mission: SimulatedMission) -> None:
         file.write(_head(start, stop, groups).replace("\n", "\r\n").encode())
         _write_rows(file, start, groups)
         file.write(b"EOF\r\n")
+
+
+def _fast_groups(mission: SimulatedMission) -> list[tuple[NDArray[np.int64], Mapping[str, NDArray[np.float64]]]]:
+    """Stamps and columns of the recorded rate; one group for all, or one per group of channels that lost rows."""
+    if not mission.kept:
+        return [(mission.stamps, mission.columns)]
+    return [
+        (mission.stamps[rows], {n: x[rows] for n, x in mission.columns.items() if channel_group(n) == group})
+        for group, rows in mission.kept.items()
+    ]
 
 
 def _head(start: int, stop: int, groups: list[_Group]) -> str:

@@ -108,7 +108,9 @@ def duty_of(options: SimulationOptions, rng: np.random.Generator) -> Duty:
     return Duty(
         speed=Profile(start, np.full(start.size, 1.2), speed),
         steer=_steering(start, speed, steer, options.duration_s),
-        slope=Profile(start_slope, np.full(start_slope.size, 3.0), slope * options.slopes),
+        slope=Profile(
+            start_slope, np.full(start_slope.size, 3.0), slope * (options.steepness if options.slopes else 0.0)
+        ),
         wobble_phase=float(rng.uniform(0.0, 2 * np.pi)),
         axle_x=geometry.axle_x("front"),
         half_track=max(abs(w.y) for w in geometry.wheels.values()),

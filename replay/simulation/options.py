@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Literal
 
@@ -13,86 +13,17 @@ from replay.checks import check_range
 from replay.errors import ConfigError
 from replay.faults import FaultSpec, Side
 from replay.machine import Machine, haulotte
+from replay.simulation.plant_options import PlantOptions
 from replay.truth import MissionTruth
 
 Scenario = Literal["paper", "random", "healthy"]
 EvidenceLevel = Literal["base", "spool", "direct"]
-SimulatedLaw = Literal["opposed", "signed", "printed", "sign_abs", "p"]
+SimulatedLaw = Literal["opposed", "signed", "printed", "sign_abs", "p", "event_reset"]
 
 SCENARIOS: tuple[str, ...] = ("paper", "random", "healthy")
 EVIDENCE_LEVELS: tuple[str, ...] = ("base", "spool", "direct")
-SIMULATED_LAWS: tuple[str, ...] = ("opposed", "signed", "printed", "sign_abs", "p")
+SIMULATED_LAWS: tuple[str, ...] = ("opposed", "signed", "printed", "sign_abs", "p", "event_reset")
 SIMULATED_AXLES: tuple[str, ...] = ("front", "rear")
-
-
-@dataclass(frozen=True)
-class PlantOptions:
-    """The machine's physics and its sensors.
-
-    Attributes
-    ----------
-    K : float
-        Wheel speed per full valve opening, before the pump's limit [m/s].
-    tau : float
-        Lag from valve to wheel speed [s].
-    wheel_spread : float
-        Relative standard deviation of K and tau from wheel to wheel [1].
-    dead_zone : float
-        Valve opening without flow [fraction].
-    valve_lag : float
-        Lag of the spool [s]; 0 for none.
-    droop : float
-        Speed lost to leakage per force at the rim [m/s/N].
-    pump_flow, motor_displacement : float
-        Flow shared by all motors [m³/s]; motor volume per turn [m³].
-    mass : float
-        Of the body [kg].
-    friction, ice_friction : float
-        Tyre friction on firm ground and on ice [1].
-    slip_stiffness : float
-        Tyre force per slip ratio of one wheel [N].
-    rolling_resistance : float
-        Share of the weight [1].
-    steer_gain, steer_rate, steer_lag : float
-        Steering speed per full valve opening [rad/s], its limit [rad/s], and lag [s].
-    v_std, v_lsb : float
-        Noise and resolution of the speed sensor [m/s]; None for 12 bit over 2500 rpm of the motor.
-    phi_std, phi_lsb : float
-        Noise and resolution of the steering encoder [rad].
-    """
-
-    K: float = 2.4
-    tau: float = 0.25
-    wheel_spread: float = 0.03
-    dead_zone: float = 0.0
-    valve_lag: float = 0.0
-    droop: float = 1e-5
-    pump_flow: float = 63e-3 / 60
-    motor_displacement: float = 100e-6
-    mass: float = 6650.0
-    friction: float = 0.6
-    ice_friction: float = 0.05
-    slip_stiffness: float = 5e4
-    rolling_resistance: float = 0.03
-    steer_gain: float = 4.0
-    steer_rate: float = 0.25
-    steer_lag: float = 0.05
-    v_std: float = 0.004
-    v_lsb: float | None = None
-    phi_std: float = 0.0005
-    phi_lsb: float = 0.0004
-
-    def __post_init__(self) -> None:
-        """Check values."""
-        check_range("plant.K", self.K, 0.1, 20.0, "m/s per full opening")
-        check_range("plant.tau", self.tau, 0.02, 5.0, "s")
-        check_range("plant.wheel_spread", self.wheel_spread, 0.0, 0.2, "")
-        check_range("plant.dead_zone", self.dead_zone, 0.0, 0.5, "of full opening")
-        check_range("plant.valve_lag", self.valve_lag, 0.0, 1.0, "s")
-        check_range("plant.droop", self.droop, 0.0, 1e-4, "m/s/N")
-        check_range("plant.mass", self.mass, 500.0, 1e5, "kg")
-        check_range("plant.friction", self.friction, 0.01, 2.0, "")
-        check_range("plant.ice_friction", self.ice_friction, 0.001, 2.0, "")
 
 
 @dataclass(frozen=True)
@@ -113,7 +44,8 @@ class SimulationOptions:
     coupling : str
         ``ground`` (wheels share the body through their tyres) or ``free`` (wheels off the ground).
     law : str
-        As in `replay.machine.Control`; ``p`` is the proportional part alone.
+        As in `replay.machine.Control`; ``p`` is the proportional part alone, ``event_reset`` is ``signed`` with Ψ̂ set
+        anew wherever |e| jumps.
     zeta : float or None
         Forcing of Ψ̂ [s/m²]; None: the machine's for ``opposed``, else 0 (L16 (13) as printed).
     psi0 : float
@@ -122,14 +54,24 @@ class SimulationOptions:
         Share of the ground under ice, 0…0.9; None: 0.25 in ``paper``, else 0.
     slopes : bool
         Whether the ground rises and falls.
+    steepness : float
+        Factor on the scenario's slopes, 0…3.
     faults : tuple[FaultSpec, ...] or None
         Faults to inject; None: those of the scenario.
     steering_faults : bool
         Whether the ``random`` scenario also faults the steering axles.
+    ramp_share, ramp_max_s : float
+        Share of the scenario's faults whose ε grows over 0.5 s to `ramp_max_s` [s] instead of at once.
+    early_share : float
+        Share of wheels that the scenario also gives a fault from the first sample on.
     silent : str
         What a silent sensor logs: ``zero``, ``nan``, or ``drop`` (no sample). The controller reads 0.
     gnss, imu : bool or None
         Whether positions and yaw rate are logged; None: unless `evidence` is ``base``.
+    jitter : float
+        Share of the recording step by which a stamp is late at most, 0…0.9.
+    drop_share, drop_burst_s : float
+        Mean share of rows that each group of channels loses, 0…0.5, and mean length of a loss [s]; 0 for single rows.
     start_ns : int
         First stamp, ns since 1970.
     machine : Machine
@@ -149,11 +91,18 @@ class SimulationOptions:
     psi0: float = 0.0
     ice: float | None = None
     slopes: bool = True
+    steepness: float = 1.0
     faults: tuple[FaultSpec, ...] | None = None
     steering_faults: bool = False
+    ramp_share: float = 0.0
+    ramp_max_s: float = 4.0
+    early_share: float = 0.0
     silent: Literal["zero", "nan", "drop"] = "zero"
     gnss: bool | None = None
     imu: bool | None = None
+    jitter: float = 0.0
+    drop_share: float = 0.0
+    drop_burst_s: float = 0.0
     start_ns: int = 1_760_000_000_000_000_000
     machine: Machine = field(default_factory=haulotte)
     plant: PlantOptions = field(default_factory=PlantOptions)
@@ -176,6 +125,13 @@ class SimulationOptions:
             check_range("ice", self.ice, 0.0, 0.9, "of the ground")
         if self.zeta is not None:
             check_range("zeta", self.zeta, 0.0, 1e9, "s/m^2")
+        check_range("steepness", self.steepness, 0.0, 3.0, "")
+        check_range("ramp_share", self.ramp_share, 0.0, 1.0, "of the faults")
+        check_range("ramp_max_s", self.ramp_max_s, 0.5, 60.0, "s")
+        check_range("early_share", self.early_share, 0.0, 1.0, "of the wheels")
+        check_range("jitter", self.jitter, 0.0, 0.9, "of the step")
+        check_range("drop_share", self.drop_share, 0.0, 0.5, "of the rows")
+        check_range("drop_burst_s", self.drop_burst_s, 0.0, 10.0, "s")
         if self.machine.geometry is None or set(self.machine.geometry.axles) != set(SIMULATED_AXLES):
             raise ConfigError("[geometry] the simulator needs wheels on a steered front and a steered rear axle")
         for fault in self.faults or ():
@@ -196,6 +152,7 @@ class SimulationOptions:
         check_range(f"fault of {fault.component}: epsilon", fault.epsilon, 0.0, 1.0, "")
         check_range(f"fault of {fault.component}: sat_std", fault.sat_std, 0.0, 1e3, "")
         check_range(f"fault of {fault.component}: sat_tau_s", fault.sat_tau_s, 0.0, 1e6, "s")
+        check_range(f"fault of {fault.component}: ramp_s", fault.ramp_s, 0.0, 1e6, "s")
 
     @property
     def ice_share(self) -> float:
@@ -211,6 +168,23 @@ class SimulationOptions:
     def samples(self) -> int:
         """Number of recorded samples."""
         return int(np.floor(self.duration_s * self.rate_hz + 1e-6))
+
+
+_GROUPS: Mapping[str, str] = {
+    "v": "sensors",
+    "phi": "sensors",
+    "v_ref": "references",
+    "phi_ref": "references",
+    "u": "valve_commands",
+    "u_applied": "valve_feedback",
+    "v_true": "second_sensors",
+    "phi_true": "second_sensors",
+}
+
+
+def channel_group(name: str) -> str:
+    """Group of channels that are recorded, and lost, together: ``commands``, ``sensors``, ``references`` and so on."""
+    return "commands" if name.startswith("cmd.") else _GROUPS[name.rpartition(".")[2]]
 
 
 @dataclass(frozen=True)
@@ -241,7 +215,7 @@ class SimulatedMission:
     options : SimulationOptions
         How it was made.
     stamps : NDArray[np.int64], shape (n,)
-        ns since 1970, on a uniform grid (whole microseconds).
+        ns since 1970, on a uniform grid (whole microseconds), late by `SimulationOptions.jitter`.
     columns : Mapping[str, NDArray[np.float64]], each of shape (n,)
         Logged signals by canonical name, SI; NaN where a silent sensor logs NaN or nothing.
     slow : tuple[SlowGroup, ...]
@@ -252,6 +226,8 @@ class SimulatedMission:
         True signals, never logged: ``wheel.<W>.v``, ``v_ref``, ``u_applied``, ``psi``, ``slip`` (rim over ground
         [m/s]), ``steer.<A>.phi``, ``steer.<A>.u_applied``, ``body.v``, ``body.x``, ``body.y``, ``body.yaw``,
         ``body.omega``.
+    kept : Mapping[str, NDArray[np.bool_]], each of shape (n,)
+        Rows of `columns` that were recorded, by group of channels (`channel_group`); empty where all were.
     """
 
     options: SimulationOptions
@@ -260,3 +236,17 @@ class SimulatedMission:
     slow: tuple[SlowGroup, ...]
     truth: MissionTruth
     actual: Mapping[str, NDArray[np.float64]]
+    kept: Mapping[str, NDArray[np.bool_]] = field(default_factory=dict)
+
+    def rows(self, name: str) -> NDArray[np.bool_]:
+        """Rows of a column that were recorded, shape (n,)."""
+        return self.kept.get(channel_group(name), np.ones(self.stamps.size, np.bool_))
+
+    def series(self) -> Iterator[tuple[str, NDArray[np.int64], NDArray[np.float64]]]:
+        """Name, stamps [ns] and values of every recorded signal, lost rows left out."""
+        for name, values in self.columns.items():
+            rows = self.rows(name)
+            yield name, self.stamps[rows], values[rows]
+        for group in self.slow:
+            for name, values in group.columns.items():
+                yield name, group.stamps, values

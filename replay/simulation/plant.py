@@ -17,6 +17,8 @@ from replay.simulation.state import (
     Recording,
 )
 
+_EVENT_RISE = 0.03  # rise of |e| that resets Ψ̂ [m/s]
+
 
 @njit(cache=True)
 def _faulted(c: int, k: int, value: float, normal: float, faults: FaultTable, state: PlantState) -> float:
@@ -35,7 +37,8 @@ def _faulted(c: int, k: int, value: float, normal: float, faults: FaultTable, st
         a = faults.decay[row]
         state.varying[c] = a * state.varying[c] + np.sqrt(1.0 - a * a) * normal
     sat = faults.held[row] + faults.std[row] * state.varying[c]
-    return float((1.0 - faults.epsilon[row]) * value + faults.epsilon[row] * sat)
+    epsilon = faults.epsilon[row] * min(1.0, (k - faults.start[row] + 1) * faults.growth[row])
+    return float((1.0 - epsilon) * value + epsilon * sat)
 
 
 @njit(cache=True)
@@ -67,12 +70,12 @@ def _references(k: int, v: float, omega: float, p: PlantModel, state: PlantState
 
 @njit(cache=True)
 def _law(v_ref: float, v: float, psi: float, p: PlantModel) -> float:
-    """u_a in its readings, L15 (14): 0 opposed, 1 signed, 2 printed, 3 sign_abs, 4 proportional alone."""
+    """u_a in its readings, L15 (14): 0 opposed, 1 signed, 2 printed, 3 sign_abs, 4 proportional alone, 5 event_reset."""
     e = v - v_ref
     s = 1.0 if v_ref >= 0.0 else -1.0
     if p.law == 0:
         u = -p.lam * e - np.sign(e) * psi * psi
-    elif p.law == 1:
+    elif p.law == 1 or p.law == 5:
         u = -p.lam * e + s * psi * psi
     elif p.law == 2:
         u = -p.lam * abs(v) + p.lam * abs(v_ref) + psi * psi
@@ -81,6 +84,19 @@ def _law(v_ref: float, v: float, psi: float, p: PlantModel) -> float:
     else:
         u = -p.lam * e
     return float(min(max(u, -p.u_max), p.u_max))
+
+
+@njit(cache=True)
+def _reset_at_jumps(i: int, e: float, p: PlantModel, state: PlantState) -> None:
+    """Ψ̂ ← √(λ|e|) where the short mean of |e| rises over the long one; again only once they have met."""
+    error = state.error[i]
+    error[0] += p.event_gains[0] * (abs(e) - error[0])
+    error[1] += p.event_gains[1] * (abs(e) - error[1])
+    rise = error[0] - error[1]
+    if error[2] == 0.0 and rise > _EVENT_RISE:
+        state.psi[i], error[2] = np.sqrt(p.lam * error[0]), 1.0
+    elif rise < 0.25 * _EVENT_RISE:
+        error[2] = 0.0
 
 
 @njit(cache=True)
@@ -97,7 +113,7 @@ def _friction(i: int, p: PlantModel, state: PlantState) -> float:
 
 @njit(cache=True)
 def _drive(slope: float, u: F, p: PlantModel, state: PlantState, slip: F) -> None:
-    """One step of τ v̇ = −v + K u − droop·F with the shared pump, and of the body and its path; fills `slip`."""
+    """One step of τ v̇ = −v + K u − leakage − droop·F with the shared pump, and of the body and its path; fills `slip`."""
     n = p.x.size
     # Centre of rotation from both axle angles: v_y = b·v_x, ω = κ·v_x.
     tan_f, tan_r = np.tan(state.phi[0]), np.tan(state.phi[1])
@@ -128,7 +144,10 @@ def _drive(slope: float, u: F, p: PlantModel, state: PlantState, slip: F) -> Non
         else:
             slip[i] = 0.0
             force = weight * slope / n
-        state.v[i] += p.dt / p.tau[i] * (share * p.K[i] * opening[i] - state.v[i] - p.droop * force)
+        flow = share * p.K[i] * opening[i]
+        if p.leakage > 0.0:
+            flow -= p.leakage * np.tanh(flow / p.leakage)
+        state.v[i] += p.dt / p.tau[i] * (flow - state.v[i] - p.droop * force)
     if p.ground:
         drag = weight * (p.rolling * np.tanh(state.body[0] / 0.02) + slope)
         state.body[0] += p.dt * (push - drag) / p.mass
@@ -197,6 +216,8 @@ def scan(
             # Ψ̂' = −(β+|v_c|+|v|+ξ)Ψ̂ + ½ζe²
             rho = p.beta + abs(v_ref[i]) + abs(v[i]) + p.xi
             state.psi[i] = state.psi[i] * np.exp(-rho * p.dt) + 0.5 * p.zeta * (v[i] - v_ref[i]) ** 2 * p.dt
+            if p.law == 5:
+                _reset_at_jumps(i, v[i] - v_ref[i], p, state)
             u[i] = _law(v_ref[i], v[i], state.psi[i], p)
             c = n + 2 + i
             u_v[i] = _faulted(c, k, u[i], fault_normal[c], faults, state)

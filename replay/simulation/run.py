@@ -13,11 +13,13 @@ from replay.simulation.duty import Duty, duty_of
 from replay.simulation.measure import logged_columns, slow_groups
 from replay.simulation.options import SIMULATED_AXLES, SIMULATED_LAWS, SimulatedMission, SimulationOptions
 from replay.simulation.plant import scan
-from replay.simulation.schedule import faults_of
+from replay.simulation.recorder import kept_rows, recorded_stamps, thinned
+from replay.simulation.schedule import faults_of, varied_onsets
 from replay.simulation.state import DELAY_LINE, FaultTable, PlantModel, PlantState, Recording
 from replay.simulation.truths import actual_signals, mission_truth
 
 _BLOCK = 60_000  # control steps
+_EVENT_LAGS = (0.05, 1.0)  # of the short and the long mean of |e| whose difference tells a jump [s]
 
 
 def simulate_mission(options: SimulationOptions, block: int = _BLOCK) -> SimulatedMission:
@@ -40,25 +42,27 @@ def simulate_mission(options: SimulationOptions, block: int = _BLOCK) -> Simulat
     ConfigError
         Where two faults of one part and side overlap.
     """
-    seeds = np.random.SeedSequence(options.seed).spawn(6)
-    duty_rng, fault_rng, plant_rng, loop_rng, measure_rng, slow_rng = (np.random.default_rng(s) for s in seeds)
+    seeds = np.random.SeedSequence(options.seed).spawn(8)
+    duty_rng, fault_rng, plant_rng, loop_rng, measure_rng, slow_rng, stamp_rng, onset_rng = (
+        np.random.default_rng(s) for s in seeds
+    )
     duty = duty_of(options, duty_rng)
-    faults = faults_of(options, duty, fault_rng)
+    faults = varied_onsets(options, faults_of(options, duty, fault_rng), onset_rng)
     model = _model(options, plant_rng)
     table, order = _fault_table(options, faults, model.dt)
     recording = _run(options, duty, model, table, loop_rng, block)
     realised = np.full(len(faults), np.nan)
     realised[order] = table.held
-    n = options.samples
-    # Whole microseconds: every format can hold them exactly.
-    stamps = options.start_ns + np.rint(np.arange(n) * (1e6 / options.rate_hz)).astype(np.int64) * 1000
+    stamps = recorded_stamps(options, stamp_rng)
+    columns = logged_columns(options, recording, duty, faults, measure_rng)
     return SimulatedMission(
         options=options,
         stamps=stamps,
-        columns=logged_columns(options, recording, duty, faults, measure_rng),
-        slow=slow_groups(options, stamps, recording.body, slow_rng),
+        columns=columns,
+        slow=thinned(options, slow_groups(options, stamps, recording.body, slow_rng), stamp_rng),
         truth=mission_truth(options, faults, realised, recording),
         actual=actual_signals(options, recording),
+        kept=kept_rows(options, columns, stamp_rng),
     )
 
 
@@ -92,6 +96,7 @@ def _initial_state(wheels: int, psi0: float, table: FaultTable) -> PlantState:
         v=np.zeros(wheels),
         spool=np.zeros(wheels),
         psi=np.full(wheels, float(psi0)),
+        error=np.zeros((wheels, 3)),
         phi=np.zeros(2),
         phi_rate=np.zeros(2),
         body=np.zeros(5),
@@ -117,7 +122,8 @@ def _model(options: SimulationOptions, rng: np.random.Generator) -> PlantModel:
     assert geometry is not None  # checked by SimulationOptions
     wheels = [geometry.wheels[w] for w in machine.wheels]
     dt = 1.0 / (options.rate_hz * options.substeps)
-    spread = 1.0 + plant.wheel_spread * rng.standard_normal((2, len(wheels)))
+    tau_spread = plant.wheel_spread if plant.tau_spread is None else plant.tau_spread
+    spread = 1.0 + np.array([[plant.wheel_spread], [tau_spread]]) * rng.standard_normal((2, len(wheels)))
     per_turn = np.pi * geometry.wheel_diameter / machine.gear_ratio  # rim travel per motor turn [m]
     waves, level = _ice_field(options.ice_share, rng)
     zeta = options.zeta if options.zeta is not None else (control.zeta if options.law == "opposed" else 0.0)
@@ -133,6 +139,7 @@ def _model(options: SimulationOptions, rng: np.random.Generator) -> PlantModel:
         dead_zone=plant.dead_zone,
         valve_gain=_gain(plant.valve_lag, dt),
         droop=plant.droop,
+        leakage=plant.leakage,
         mass=plant.mass,
         mu=plant.friction,
         mu_ice=plant.ice_friction,
@@ -144,6 +151,7 @@ def _model(options: SimulationOptions, rng: np.random.Generator) -> PlantModel:
         steer_lag_gain=_gain(plant.steer_lag, dt),
         max_steer=machine.max_steer,
         law=SIMULATED_LAWS.index(options.law),
+        event_gains=np.array([_gain(lag, dt) for lag in _EVENT_LAGS]),
         lam=control.lambda_,
         xi=control.xi,
         beta=control.beta,
@@ -198,6 +206,7 @@ def _fault_table(
         sat=np.array([f.sat for f in sorted_faults], np.float64),
         std=np.array([f.sat_std for f in sorted_faults], np.float64),
         decay=np.exp(-dt / np.maximum(tau, 1e-12)).astype(np.float64),
+        growth=dt / np.maximum(np.array([f.ramp_s for f in sorted_faults], np.float64), dt),
         held=np.full(len(faults), np.nan),
     )
     return table, order

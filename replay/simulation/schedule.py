@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -24,6 +26,29 @@ def faults_of(options: SimulationOptions, duty: Duty, rng: np.random.Generator) 
     else:
         faults = []
     return tuple(sorted(faults, key=lambda f: (f.start_s, f.component, f.side.value)))
+
+
+def varied_onsets(
+    options: SimulationOptions, faults: tuple[FaultSpec, ...], rng: np.random.Generator
+) -> tuple[FaultSpec, ...]:
+    """The scenario's faults, some of them growing, and more from the first sample on; given faults stay as they are."""
+    if options.faults is not None or options.scenario == "healthy":
+        return faults
+    out = []
+    for fault in faults:
+        longest = min(options.ramp_max_s, 0.6 * (fault.stop_s - fault.start_s))
+        ramp = round(float(rng.uniform(0.5, max(longest, 0.6))), 3)
+        out.append(replace(fault, ramp_s=ramp) if rng.random() < options.ramp_share else fault)
+    for wheel in options.machine.wheels:
+        first = min([f.start_s for f in faults if f.component == wheel], default=options.duration_s)
+        if rng.random() >= options.early_share or first < 6.0:
+            continue
+        side = Side.SENSOR if rng.random() < 0.5 else Side.ACTUATOR
+        mode, stop = _MODES[int(rng.integers(4))], float(rng.uniform(4.0, min(first - 2.0, 20.0)))
+        early = draw_fault(wheel, side, mode, 0.0, stop, rng, steer=False)
+        if not np.isnan(early.sat):  # a part that has not moved yet has no value to hold
+            out.append(early)
+    return tuple(sorted(out, key=lambda f: (f.start_s, f.component, f.side.value)))
 
 
 def draw_fault(

@@ -29,6 +29,7 @@ class PlantModel(NamedTuple):
     dead_zone: float
     valve_gain: float
     droop: float
+    leakage: float
     mass: float
     mu: float
     mu_ice: float
@@ -40,6 +41,7 @@ class PlantModel(NamedTuple):
     steer_lag_gain: float
     max_steer: float
     law: int
+    event_gains: F
     lam: float
     xi: float
     beta: float
@@ -65,6 +67,7 @@ class FaultTable(NamedTuple):
     sat: F
     std: F
     decay: F
+    growth: F  # share of ε gained per step
     held: F
 
 
@@ -74,6 +77,7 @@ class PlantState(NamedTuple):
     v: F
     spool: F
     psi: F
+    error: F  # per wheel: short and long mean of |e|, 1 after a jump until they meet again
     phi: F
     phi_rate: F
     body: F  # forward speed, x, y, yaw, yaw rate

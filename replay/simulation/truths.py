@@ -65,7 +65,16 @@ def _interval(fault: FaultSpec, sat: float, duration: float) -> TruthInterval:
     kind = "steer" if fault.component in SIMULATED_AXLES else "wheel"
     stop = min(fault.stop_s, duration)
     return TruthInterval(
-        fault.component, kind, fault.side, fault.mode, fault.start_s, stop, fault.epsilon, sat, fault.sat_std
+        fault.component,
+        kind,
+        fault.side,
+        fault.mode,
+        fault.start_s,
+        stop,
+        fault.epsilon,
+        sat,
+        fault.sat_std,
+        fault.ramp_s,
     )
 
 

@@ -10,7 +10,8 @@ from replay.errors import ConfigError
 from replay.faults import FaultMode, FaultSpec, Side
 from replay.kinematics import wheel_commands
 from replay.machine import haulotte
-from replay.simulation.options import PlantOptions, SimulatedMission, SimulationOptions
+from replay.simulation.options import SimulatedMission, SimulationOptions
+from replay.simulation.plant_options import PlantOptions
 from replay.simulation.run import simulate_mission
 
 WHEELS = ("FR", "FL", "RR", "RL")
@@ -121,6 +122,46 @@ def test_free_wheel_follows_its_difference_equation() -> None:
     assert_allclose(v[1:], predicted[:-1], atol=1e-5)
 
 
+def test_leakage_takes_speed_at_any_load_but_never_turns_a_wheel() -> None:
+    mission = open_valves((0.1, -0.1, 0.002, 0.0), plant=PlantOptions(wheel_spread=0.0, leakage=0.02))
+    # K·u − leakage where the flow is larger, hardly any speed where it is smaller
+    slow = 0.0048 - 0.02 * np.tanh(0.0048 / 0.02)
+    assert_allclose(stack(mission, "v")[-1], [0.22, -0.22, slow, 0.0], atol=1e-4)
+
+
+def test_wheels_may_differ_in_lag_alone() -> None:
+    mission = open_valves((0.1, 0.1, 0.1, 0.1), plant=PlantOptions(wheel_spread=0.0, tau_spread=0.2))
+    assert_allclose(stack(mission, "v")[-1], 0.24, atol=1e-3)
+    assert np.ptp(stack(mission, "v")[250]) > 0.01
+
+
+def test_steeper_ground_is_steeper() -> None:
+    made = [
+        simulate_mission(SimulationOptions(scenario="healthy", duration_s=40.0, rate_hz=100, seed=2, steepness=s))
+        for s in (0.0, 1.0, 3.0)
+    ]
+    effort = [np.abs(stack(m, "u_applied", actual=True)[2500:]).mean() for m in made]
+    flat = simulate_mission(SimulationOptions(scenario="healthy", duration_s=40.0, rate_hz=100, seed=2, slopes=False))
+    assert_array_equal(stack(made[0], "v"), stack(flat, "v"))
+    assert len(set(effort)) == 3
+
+
+def test_event_reset_sets_psi_anew_at_jumps_of_the_error_and_decays_between() -> None:
+    fault = FaultSpec("FR", Side.ACTUATOR, FaultMode.NO_SIGNAL, 12.0, 16.0)
+    options = SimulationOptions(
+        scenario="paper", duration_s=20.0, law="event_reset", faults=(fault,), coupling="free", slopes=False
+    )
+    mission = simulate_mission(options)
+    v, v_ref, psi = stack(mission, "v", actual=False), stack(mission, "v_ref"), stack(mission, "psi")
+    rho = 0.001 + np.abs(v_ref) + np.abs(v) + 1.0
+    decays = np.isclose(psi[1:], psi[:-1] * np.exp(-rho[1:] * 1e-3), rtol=1e-9)
+    jumps = np.flatnonzero(~decays[:, 0]) + 1
+    assert np.any((jumps > 12_000) & (jumps < 12_500))
+    assert jumps.size < 12
+    expected = v_ref - v + np.where(v_ref >= 0, 1.0, -1.0) * psi**2
+    assert_allclose(stack(mission, "u", actual=False), np.clip(expected, -1, 1), atol=1e-6)
+
+
 @pytest.mark.parametrize("law", ["opposed", "signed", "printed", "sign_abs", "p"])
 def test_recorded_command_obeys_the_law(law: str) -> None:
     mission = simulate_mission(SimulationOptions(scenario="random", duration_s=40.0, law=law, psi0=0.3))
@@ -227,6 +268,34 @@ def test_any_recorded_rate_has_a_uniform_grid(rate: float) -> None:
         assert np.isin(group.stamps, mission.stamps).all()
 
 
+def test_late_stamps_stay_within_their_step() -> None:
+    options = [SimulationOptions(duration_s=4.0, rate_hz=200, evidence="direct", jitter=j) for j in (0.0, 0.8)]
+    exact, late = (simulate_mission(o) for o in options)
+    delay = late.stamps - exact.stamps
+    assert delay[0] == 0
+    assert 0 <= delay.min() < 100_000 < 3_900_000 < delay.max() <= 4_000_000
+    assert np.diff(late.stamps).min() > 0
+    assert_array_equal(late.columns["wheel.FR.v"], exact.columns["wheel.FR.v"])
+    assert all(np.isin(group.stamps, late.stamps).all() for group in late.slow)
+
+
+@pytest.mark.parametrize("burst", [0.0, 0.2])
+def test_rows_are_lost_by_group_of_channels(burst: float) -> None:
+    mission = simulate_mission(SimulationOptions(duration_s=60.0, rate_hz=100, drop_share=0.1, drop_burst_s=burst))
+    series = {name: (stamps, values) for name, stamps, values in mission.series()}
+    assert series.keys() >= mission.columns.keys()
+    assert len(mission.kept) == 6
+    for rows in mission.kept.values():
+        assert 0.8 < rows.mean() < 0.97
+        lost = np.flatnonzero(np.diff(rows.astype(np.int8)) == -1).size
+        assert (~rows).sum() / lost == pytest.approx(max(1.0, burst * 100), rel=0.5)
+    assert np.any(mission.kept["sensors"] != mission.kept["commands"])
+    rows = mission.kept["sensors"]
+    for name in ("wheel.FR.v", "steer.rear.phi"):
+        assert_array_equal(series[name][0], mission.stamps[rows])
+        assert_array_equal(series[name][1], mission.columns[name][rows])
+
+
 def test_each_evidence_level_logs_what_it_says() -> None:
     leaves = {}
     for level in ("base", "spool", "direct"):
@@ -244,6 +313,10 @@ def test_each_evidence_level_logs_what_it_says() -> None:
         ({"scenario": "moon"}, "scenario"),
         ({"rate_hz": 20.0}, "rate_hz"),
         ({"ice": 2.0}, "ice"),
+        ({"jitter": 1.0}, "jitter"),
+        ({"drop_share": 0.6}, "drop_share"),
+        ({"steepness": -1.0}, "steepness"),
+        ({"early_share": 2.0}, "early_share"),
         ({"law": "auto"}, "law"),
         ({"faults": (FaultSpec("XX", Side.SENSOR, FaultMode.STUCK, 0, 1),)}, "XX"),
         ({"faults": (FaultSpec("FR", Side.SENSOR, FaultMode.STUCK, 2, 1),)}, "interval"),

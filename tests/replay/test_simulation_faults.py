@@ -96,6 +96,38 @@ def test_actuator_faults_apply_l8() -> None:
     assert mission.truth.masked == ()
 
 
+def test_epsilon_grows_linearly_over_its_ramp() -> None:
+    sensor = FaultSpec("FR", Side.SENSOR, FaultMode.INEFFICIENT, 8.0, 14.0, 0.6, ramp_s=4.0)
+    valve = FaultSpec("RL", Side.ACTUATOR, FaultMode.STUCK, 8.0, 14.0, 1.0, 0.1, ramp_s=2.0)
+    mission = mission_with(sensor, valve, duration=16.0)
+    y, v = mission.columns["wheel.FR.v"], mission.actual["wheel.FR.v"]
+    for at, epsilon in ((9.0, 0.15), (10.0, 0.3), (13.0, 0.6)):
+        rows_ = slice(round(at * 1000) - 50, round(at * 1000) + 50)
+        assert 1 - y[rows_].mean() / v[rows_].mean() == pytest.approx(epsilon, abs=0.01)
+    u, applied = mission.columns["wheel.RL.u"], mission.actual["wheel.RL.u_applied"]
+    share = np.minimum(1.0, np.arange(1, 6001) / 2000)
+    assert_allclose(applied[8000:14_000], (1 - share) * u[8000:14_000] + share * 0.1, atol=1e-6)
+    assert [(i.component, i.start_s, i.epsilon, i.ramp_s) for i in mission.truth.intervals] == [
+        ("FR", 8.0, 0.6, 4.0),
+        ("RL", 8.0, 1.0, 2.0),
+    ]
+
+
+def test_scenarios_may_have_growing_and_early_faults() -> None:
+    base = {"scenario": "random", "rate_hz": 50.0, "seed": 3, "duration_s": 120.0}
+    plain, varied = (
+        simulate_mission(SimulationOptions(**base, **more)).truth.intervals  # type: ignore[arg-type]
+        for more in ({}, {"ramp_share": 0.5, "ramp_max_s": 3.0, "early_share": 1.0})
+    )
+    early = [i for i in varied if i.start_s == 0.0]
+    assert len(early) >= 2
+    assert [(i.component, i.start_s) for i in varied if i.start_s > 0] == [(i.component, i.start_s) for i in plain]
+    ramps = np.array([i.ramp_s for i in varied if i.start_s > 0])
+    assert 0.2 < np.mean(ramps > 0) < 0.8
+    assert 0.5 <= ramps[ramps > 0].min() <= ramps.max() <= 3.0
+    assert all(i.ramp_s < i.stop_s - i.start_s for i in varied)
+
+
 def test_redundant_measurements_have_noise_delay_and_resolution_of_their_own() -> None:
     mission = mission_with(evidence="direct")
     for name, delay, std, lsb in (
@@ -166,7 +198,7 @@ def test_driving_spans_are_those_of_the_true_reference() -> None:
 
 
 def test_truth_file_round_trip(tmp_path: Path) -> None:
-    truth = simulate_mission(SimulationOptions(scenario="paper", rate_hz=50, seed=9)).truth
+    truth = simulate_mission(SimulationOptions(scenario="paper", rate_hz=50, seed=9, ramp_share=0.5)).truth
     write_truth(truth, tmp_path / "m.truth.json")
     again = read_truth(tmp_path / "m.truth.json")
     assert again.wheels == truth.wheels
@@ -175,6 +207,7 @@ def test_truth_file_round_trip(tmp_path: Path) -> None:
         (i.component, i.side, i.mode, i.start_s) for i in truth.intervals
     ]
     assert_allclose([i.sat_mean for i in again.intervals], [i.sat_mean for i in truth.intervals], atol=1e-9)
+    assert [i.ramp_s for i in again.intervals] == [i.ramp_s for i in truth.intervals]
     assert len(again.slip) == len(truth.slip)
     assert again.masked == truth.masked
     assert not again.open_loop
