@@ -213,10 +213,16 @@ def _sparse(stamps: NDArray[np.int64], values: NDArray[Any]) -> tuple[NDArray[np
     """Drop the empty cells of a slow column beside fast ones; cells of a silent channel stay empty."""
     if values.dtype.kind != "f":
         return stamps, values
+    rows = sparse_rows(values)
+    return stamps[rows], values[rows]
+
+
+def sparse_rows(values: NDArray[Any]) -> NDArray[np.int64]:
+    """Rows of a slow column beside fast ones that hold its samples; all rows where the column is not slow."""
     rows = np.flatnonzero(~np.isnan(values))
     steps = np.diff(rows)
     if len(rows) < 3 or len(rows) > 0.6 * len(values):
-        return stamps, values
+        return np.arange(len(values))
     usual = np.median(steps)
     regular = float((np.abs(steps - usual) <= max(1.0, 0.2 * usual)).mean())
-    return (stamps[rows], values[rows]) if usual >= 2 and regular > 0.8 else (stamps, values)
+    return rows if usual >= 2 and regular > 0.8 else np.arange(len(values))

@@ -11,7 +11,8 @@ from pathlib import Path
 from replay.errors import LogError
 from replay.machine import Machine
 from replay.mapping import map_signals, plan_topics
-from replay.open_loop import is_open_loop
+from replay.mapping_rules import candidates
+from replay.open_loop import is_open_loop, is_open_loop_table
 from replay.rawlog import LogSummary, RawLog
 from replay.readers.registry import read_log, summarise_log
 from replay.signals import Signals
@@ -132,7 +133,7 @@ def read_signals(
         Where a given unit does not fit its signal.
     """
     tell = progress or (lambda text: None)
-    options = [source_options(path, machine) for path in paths]
+    options = [SourceOptions() if is_open_loop_table(path) else source_options(path, machine) for path in paths]
     summaries = []
     for path, option in zip(paths, options, strict=True):
         tell(f"opening {path.name}")
@@ -148,8 +149,15 @@ def read_signals(
         logs.append(log)
         files.append(MissionFile(path, sha256, size, log.format, _complete(summary, log.summary)))
     tell("mapping signals")
-    open_loop = any(is_open_loop(file.summary) for file in files)
-    return tuple(files), replace(map_signals(logs, machine), open_loop=open_loop)
+    marked = [log for log in logs if is_open_loop(log.summary)]
+    signals = map_signals(logs, _without_given(machine, marked))
+    return tuple(files), replace(signals, open_loop=bool(marked))
+
+
+def _without_given(machine: Machine, marked: Sequence[RawLog]) -> Machine:
+    """Leave out given signals that logs with injected faults hold under their own names: they stood in the original."""
+    own = {c.signal for log in marked for c in candidates(log.channels, machine) if c.rank == 0}
+    return replace(machine, signals={n: s for n, s in machine.signals.items() if n not in own}) if own else machine
 
 
 def _complete(index: LogSummary, decoded: LogSummary) -> LogSummary:

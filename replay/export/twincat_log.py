@@ -51,8 +51,8 @@ def plc_symbol(name: str, wheels: tuple[str, ...]) -> tuple[str, str]:
 
 
 @dataclass(frozen=True)
-class _Group:
-    """Channels of one sample time: symbols, units, stamps (n,) and values (n,) in the recorded units."""
+class ScopeGroup:
+    """Channels that share their stamps: period, symbols, units, stamps (n,) [ns] and values (n,) in the recorded units."""
 
     period_ms: float
     symbols: list[str]
@@ -80,9 +80,28 @@ def write_twincat(path: Path, mission: SimulatedMission) -> None:
         # Ten decimals hold every recorded step exactly and take away the rounding of the conversion.
         values = [np.round(v * f, 10) + 0.0 for v, f in zip(columns.values(), factor, strict=True)]
         period = float(np.median(np.diff(stamps))) / 1e6 if stamps.size > 1 else 1000.0 / mission.options.rate_hz
-        groups.append(_Group(period, [s for s, _ in pairs], [u for _, u in pairs], stamps, values))
+        groups.append(ScopeGroup(period, [s for s, _ in pairs], [u for _, u in pairs], stamps, values))
+    write_scope(path, groups)
+
+
+def write_scope(path: Path, groups: list[ScopeGroup]) -> None:
+    """Write channels as a TwinCAT Scope export.
+
+    Parameters
+    ----------
+    path : Path
+        File; an existing one is replaced.
+    groups : list[ScopeGroup]
+        Channels by sample time, the most samples first.
+
+    Raises
+    ------
+    OutputError
+        Where the file cannot be written.
+    """
+    start = min(int(g.stamps[0]) for g in groups) // 100 * 100  # the head's clock counts 100 ns
+    stop = max(int(g.stamps[-1]) for g in groups)
     with atomic_path(path) as temporary, temporary.open("wb") as file:
-        start, stop = int(mission.stamps[0]), int(mission.stamps[-1])
         file.write(_head(start, stop, groups).replace("\n", "\r\n").encode())
         _write_rows(file, start, groups)
         file.write(b"EOF\r\n")
@@ -98,7 +117,7 @@ def _fast_groups(mission: SimulatedMission) -> list[tuple[NDArray[np.int64], Map
     ]
 
 
-def _head(start: int, stop: int, groups: list[_Group]) -> str:
+def _head(start: int, stop: int, groups: list[ScopeGroup]) -> str:
     """Everything above the data."""
 
     def moment(key: str, stamp: int) -> str:
@@ -134,7 +153,7 @@ def _head(start: int, stop: int, groups: list[_Group]) -> str:
     return "\n".join([*lines, "", ""])
 
 
-def _write_rows(file: BinaryIO, start: int, groups: list[_Group]) -> None:
+def _write_rows(file: BinaryIO, start: int, groups: list[ScopeGroup]) -> None:
     """Data rows: the k-th row holds each group's k-th sample; rows get shorter where a right-hand group ends."""
     done = 0
     for last in range(len(groups), 0, -1):
