@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from math import inf
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +16,12 @@ ROWS = ("healthy", "stuck", "no_signal", "inefficient", "noisy")
 COLUMNS = (*ROWS, "outside_table", "undecided")
 FAULT_OUTCOMES = ("right", "wrong_mode", "wrong_side", "wrong_part", "missed")
 REPORT_OUTCOMES = ("right", "wrong_mode", "wrong_side", "wrong_part", "surplus")
+
+# Bands: low ≤ value < high; the last one holds its upper end.
+EPSILON_BANDS = ((0.0, 0.2), (0.2, 0.4), (0.4, 0.7), (0.7, 1.0))
+SPEED_BANDS = ((0.0, 0.12), (0.12, 0.24), (0.24, inf))  # [m/s]: thirds of the paper's machine
+CONTACT = ("free", "slip", "masked")
+BANDS = {"epsilon": len(EPSILON_BANDS), "speed": len(SPEED_BANDS), "contact": len(CONTACT)}
 
 
 @dataclass(frozen=True)
@@ -39,6 +46,13 @@ class FaultOutcome:
         Reported start − first excited sample, reported − true end [s]; None where it is not right.
     epsilon_error : float or None
         |ε̂ − ε|; None where it is not right or no ε̂ was given.
+    detection_delay_s : float or None
+        Moment at which the evidence would have raised it causally − first excited sample [s]; None where nothing was
+        reported for its component, or the report does not know that moment.
+    speed : float or None
+        Mean |commanded speed| over its driving time [m/s]; None where the result does not hold it.
+    slip_share : float
+        Share of its driving time in which the tyre slipped [1].
     """
 
     component: str
@@ -54,6 +68,9 @@ class FaultOutcome:
     onset_error_s: float | None = None
     end_error_s: float | None = None
     epsilon_error: float | None = None
+    detection_delay_s: float | None = None
+    speed: float | None = None
+    slip_share: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -70,6 +87,12 @@ class ReportOutcome:
         One of `REPORT_OUTCOMES`, else ``ignored``: masked, or matched with a fault that was never excited.
     false_alarm : bool
         Not right, and for more than half of its time no side of the component was faulty.
+    tier : str
+        Evidence behind it, as reported.
+    epsilon : float or None
+        ε̂ [1], as reported.
+    speed, slip_share : float or None, float
+        As for `FaultOutcome`.
     """
 
     id: str
@@ -82,10 +105,23 @@ class ReportOutcome:
     probability: float
     outcome: str
     false_alarm: bool
+    tier: str = ""
+    epsilon: float | None = None
+    speed: float | None = None
+    slip_share: float = 0.0
 
 
-def _empty() -> dict[str, Array]:
-    return {side: np.zeros((len(ROWS), len(COLUMNS))) for side in SIDES}
+def _empty(bands: int = 0) -> dict[str, Array]:
+    shape = (len(ROWS), len(COLUMNS))
+    return {side: np.zeros((bands, *shape) if bands else shape) for side in SIDES}
+
+
+def _empty_parts() -> dict[str, dict[str, Array]]:
+    return {name: _empty(bands) for name, bands in BANDS.items()}
+
+
+def _empty_healthy() -> dict[str, Array]:
+    return {name: np.zeros(bands) for name, bands in BANDS.items()}
 
 
 @dataclass(frozen=True)
@@ -100,19 +136,38 @@ class Counts:
         Injected and reported faults.
     healthy_s : float
         Time without a fault of a component, averaged over the components [s].
+    parts : Mapping[str, Mapping[str, Array]], each of shape (bands, 5, 7)
+        `seconds` divided by ``epsilon`` of the true fault (faulty rows alone), by ``speed`` where the result holds
+        it, and by ``contact``; the last of `CONTACT` is masked time, which `seconds` does not hold.
+    healthy_parts : Mapping[str, Array], each of shape (bands,)
+        Driving part of `healthy_s` divided alike [s]; zeros for ``epsilon``.
     """
 
     seconds: Mapping[str, Array] = field(default_factory=_empty)
     faults: tuple[FaultOutcome, ...] = ()
     reports: tuple[ReportOutcome, ...] = ()
     healthy_s: float = 0.0
+    parts: Mapping[str, Mapping[str, Array]] = field(default_factory=_empty_parts)
+    healthy_parts: Mapping[str, Array] = field(default_factory=_empty_healthy)
 
 
 def add(parts: Sequence[Counts]) -> Counts:
     """Counts of many missions as those of one."""
     return Counts(
-        seconds={side: sum((p.seconds[side] for p in parts), np.zeros((len(ROWS), len(COLUMNS)))) for side in SIDES},
+        seconds={side: sum((p.seconds[side] for p in parts), zero) for side, zero in _empty().items()},
         faults=tuple(f for p in parts for f in p.faults),
         reports=tuple(r for p in parts for r in p.reports),
         healthy_s=float(sum(p.healthy_s for p in parts)),
+        parts={
+            name: {side: sum((p.parts[name][side] for p in parts), zero) for side, zero in empty.items()}
+            for name, empty in _empty_parts().items()
+        },
+        healthy_parts={
+            name: sum((p.healthy_parts[name] for p in parts), zero) for name, zero in _empty_healthy().items()
+        },
     )
+
+
+def band_of(value: float, bands: Sequence[tuple[float, float]]) -> int:
+    """Index of the band that holds a value; beyond the last one it is the last."""
+    return next((i for i, (_, high) in enumerate(bands) if value < high), len(bands) - 1)

@@ -9,10 +9,11 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
+from diagnosis.confusion import confusion_figures
 from diagnosis.evaluate import evaluate_report
 from diagnosis.matching import assign
 from diagnosis.outcomes import COLUMNS, ROWS, Counts, ReportOutcome, add
-from diagnosis.scores import confusion_figures, figures
+from diagnosis.scores import figures
 from diagnosis.spans import codes_at, covered, merged, without
 from replay.errors import ConfigError, LogError
 from replay.faults import FaultMode, Side
@@ -286,7 +287,9 @@ def test_every_way_to_be_wrong() -> None:
     assert [r.false_alarm for r in counts.reports] == [False, False, True, True, False, True]
     found = figures(counts)
     events = found["events"]
-    assert (events["isolation_rate"], events["wrong_wheel_rate"]) == (0.0, pytest.approx(1 / 3))
+    # Of the three that were reported, the first alone names the right part and side, and none the right row too.
+    assert (events["isolation_rate"], events["identification_rate"]) == (pytest.approx(1 / 3), 0.0)
+    assert events["wrong_wheel_rate"] == pytest.approx(1 / 3)
     assert (events["missed"], events["surplus"], events["recall"], events["precision"]) == (1, 3, 0.0, 0.0)
     alarms = found["false_alarms"]
     hours = ((20 - 6) + (20 - 1)) / 2 / 3600
