@@ -42,13 +42,8 @@ def simulate_mission(options: SimulationOptions, block: int = _BLOCK) -> Simulat
     ConfigError
         Where two faults of one part and side overlap.
     """
-    seeds = np.random.SeedSequence(options.seed).spawn(8)
-    duty_rng, fault_rng, plant_rng, loop_rng, measure_rng, slow_rng, stamp_rng, onset_rng = (
-        np.random.default_rng(s) for s in seeds
-    )
-    duty = duty_of(options, duty_rng)
-    faults = varied_onsets(options, faults_of(options, duty, fault_rng), onset_rng)
-    model = _model(options, plant_rng)
+    duty, faults, model = mission_parts(options)
+    loop_rng, measure_rng, slow_rng, stamp_rng = (_generator(options, i) for i in (3, 4, 5, 6))
     table, order = _fault_table(options, faults, model.dt)
     recording = _run(options, duty, model, table, loop_rng, block)
     realised = np.full(len(faults), np.nan)
@@ -64,6 +59,18 @@ def simulate_mission(options: SimulationOptions, block: int = _BLOCK) -> Simulat
         actual=actual_signals(options, recording),
         kept=kept_rows(options, columns, stamp_rng),
     )
+
+
+def mission_parts(options: SimulationOptions) -> tuple[Duty, tuple[FaultSpec, ...], PlantModel]:
+    """Duty cycle, faults by start, and constants of the loop with which a mission is simulated."""
+    duty = duty_of(options, _generator(options, 0))
+    faults = varied_onsets(options, faults_of(options, duty, _generator(options, 1)), _generator(options, 7))
+    return duty, faults, _model(options, _generator(options, 2))
+
+
+def _generator(options: SimulationOptions, purpose: int) -> np.random.Generator:
+    """Random numbers of one purpose; those of the others do not depend on how many are drawn."""
+    return np.random.default_rng(np.random.SeedSequence(options.seed).spawn(purpose + 1)[purpose])
 
 
 def _run(
