@@ -386,5 +386,14 @@ def _interval(fault: FaultSpec, machine: Machine, sat: float, length: float) -> 
     kind = "wheel" if fault.component in machine.wheels else "steer"
     stop = min(fault.stop_s, length)
     return TruthInterval(
-        fault.component, kind, fault.side, fault.mode, fault.start_s, stop, fault.epsilon, sat, fault.sat_std
+        fault.component,
+        kind,
+        fault.side,
+        fault.mode,
+        fault.start_s,
+        stop,
+        fault.epsilon,
+        sat,
+        fault.sat_std,
+        fault.ramp_s,
     )

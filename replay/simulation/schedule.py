@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -96,15 +97,22 @@ def _paper_faults(options: SimulationOptions, duty: Duty, rng: np.random.Generat
         for number, j in enumerate(rng.permutation(len(wanted))):
             side, mode = wanted[j]
             # One fault in four may overlap one of the wheel's other side.
-            place = _free_place(duty, busy, side, 50.0, end, number % 4 == 3, rng)
+            place = free_place(duty, busy, side, 50.0, end, number % 4 == 3, rng)
             if place is not None:
                 faults.append(draw_fault(wheel, side, mode, *place, rng, steer=False))
                 busy.append((*place, side))
     return faults
 
 
-def _free_place(
-    duty: Duty,
+class Drive(Protocol):
+    """How a machine is driven."""
+
+    def command(self, t: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Commands at times t [s], shape (n, k); the first is the speed [m/s]."""
+
+
+def free_place(
+    duty: Drive,
     busy: list[tuple[float, float, Side]],
     side: Side,
     begin: float,
@@ -126,7 +134,7 @@ def _free_place(
     return None
 
 
-def _drives(duty: Duty, start: float, stop: float) -> bool:
+def _drives(duty: Drive, start: float, stop: float) -> bool:
     """Whether the machine moves when the fault begins and for most of its time."""
     speed = np.abs(duty.command(np.linspace(start, stop, 40))[:, 0])
     return bool(speed[0] > _NEVER_STOPPED and np.mean(speed > 0.05) > 0.8)

@@ -42,8 +42,8 @@ def mission_truth(
     within = [(f, sat) for f, sat in zip(faults, realised.tolist(), strict=True) if f.start_s < duration]
     slip, motion = [], []
     for i, wheel in enumerate(options.machine.wheels):
-        slip += _spans(wheel, np.abs(recording.slip[:, i]) > _SLIP_SPEED, options.rate_hz)
-        motion += _spans(wheel, np.abs(recording.v_ref[:, i]) > driving, options.rate_hz)
+        slip += spans_where(wheel, np.abs(recording.slip[:, i]) > _SLIP_SPEED, options.rate_hz)
+        motion += spans_where(wheel, np.abs(recording.v_ref[:, i]) > driving, options.rate_hz)
     return MissionTruth(
         wheels=options.machine.wheels,
         rate_hz=options.rate_hz,
@@ -78,7 +78,7 @@ def _interval(fault: FaultSpec, sat: float, duration: float) -> TruthInterval:
     )
 
 
-def _spans(component: str, flag: NDArray[np.bool_], rate_hz: float) -> list[TruthSpan]:
+def spans_where(component: str, flag: NDArray[np.bool_], rate_hz: float) -> list[TruthSpan]:
     """Stretches in which a flag holds; gaps below 0.1 s are closed, stretches below 0.1 s left out."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], flag, [False]]).astype(np.int8)))
     start, stop = edges[::2] / rate_hz, edges[1::2] / rate_hz
