@@ -122,13 +122,16 @@ def _truth_of(path: Path) -> Path:
     ConfigError
         Where there is none.
     """
+    from replay.truth import truth_path
+
     saved = _saved(path)
     if saved is None:
-        places = [_beside(path)]
+        places = [truth_path(path, folder=path.is_dir())]
     else:
         from diagnosis.output import load_report
 
-        names = [_beside(Path(str(f["path"]))).name for f in load_report(saved)["log"]["files"]]
+        logs = [Path(str(f["path"])) for f in load_report(saved)["log"]["files"]]
+        names = [truth_path(log, folder=log.is_dir()).name for log in logs]
         folder = saved.absolute().parent
         places = [near / name for name in names for near in (Path(), folder.parent, folder)]
     for place in places:
@@ -136,9 +139,3 @@ def _truth_of(path: Path) -> Path:
             return place
     looked = ", ".join(str(p) for p in places)
     raise ConfigError(f"{path}: no truth file; looked for {looked}; name it with --truth")
-
-
-def _beside(log: Path) -> Path:
-    """``<stem>.truth.json`` beside a log; a compressed table loses both endings."""
-    stem = log.name if log.is_dir() else log.name.removesuffix(".gz").rsplit(".", 1)[0]
-    return log.with_name(f"{stem or log.name}.truth.json")

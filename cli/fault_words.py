@@ -9,6 +9,7 @@ from dataclasses import replace
 from replay.errors import ConfigError
 from replay.faults import FaultMode, FaultSpec, Side
 
+_PAPER_SPEED = 0.36
 _SIDES = (Side.SENSOR, Side.ACTUATOR)
 _MODES = (FaultMode.STUCK, FaultMode.NO_SIGNAL, FaultMode.INEFFICIENT, FaultMode.NOISY)
 _KEYS: Mapping[str, Callable[[FaultSpec, float], FaultSpec]] = {
@@ -21,8 +22,17 @@ _KEYS: Mapping[str, Callable[[FaultSpec, float], FaultSpec]] = {
 _FORM = "PART SIDE MODE START STOP [eps=…] [sat=…] [std=…] [tau=…] [ramp=…], e.g. 'FR sensor stuck 30 37'"
 
 
-def parse_fault(words: str) -> FaultSpec:
+def parse_fault(words: str, *, epsilon: float | None = None, speeds: Mapping[str, float] | None = None) -> FaultSpec:
     """Read one fault; what is not given takes a typical value of its row of the table.
+
+    Parameters
+    ----------
+    words : str
+        ``PART SIDE MODE START STOP`` and values.
+    epsilon : float or None
+        ε of inefficient and noisy faults that give none; None: the typical one.
+    speeds : Mapping[str, float] or None
+        Top speed [m/s] of parts on which typical values of a speed sensor's noise depend; None: the paper's.
 
     Raises
     ------
@@ -41,6 +51,11 @@ def parse_fault(words: str) -> FaultSpec:
         known = ", ".join(m.value for m in _MODES)
         raise ConfigError(f"--fault {words!r}: mode {mode_word!r} is not known; expected one of {known}")
     fault = _typical(part, side, mode, _number(words, "START", start), _number(words, "STOP", stop))
+    if epsilon is not None and mode in (FaultMode.INEFFICIENT, FaultMode.NOISY):
+        fault = replace(fault, epsilon=epsilon)
+    if speeds is not None and part in speeds and side is Side.SENSOR:
+        scale = speeds[part] / _PAPER_SPEED
+        fault = replace(fault, sat=fault.sat * scale, sat_std=fault.sat_std * scale)
     for word in (w for w in words.split() if "=" in w):
         key, _, value = word.partition("=")
         if key not in _KEYS:

@@ -71,7 +71,7 @@ class LogFormat(StrEnum):
     PARQUET = "parquet"
 
 
-_ENDINGS = {
+ENDINGS = {
     LogFormat.MCAP: ".mcap",
     LogFormat.BAG: ".bag",
     LogFormat.ROSBAG2: "",
@@ -111,11 +111,11 @@ def simulate(
 ) -> None:
     """Simulate a mission with known faults: a log, and its truth beside it."""
     from cli.fault_words import parse_fault
+    from replay.truth import truth_path
 
-    kind = format or _format_of(output)
-    log = output or Path(f"mission{_ENDINGS[kind]}")
-    stem = log.name if kind is LogFormat.ROSBAG2 else log.name.rsplit(".", 1)[0]
-    truth = log.with_name(f"{stem or log.name}.truth.json")
+    kind = format or (LogFormat.MCAP if output is None else format_of(output))
+    log = output or Path(f"mission{ENDINGS[kind]}")
+    truth = truth_path(log, folder=kind is LogFormat.ROSBAG2)
     if log.exists() and not truth.exists():
         raise ConfigError(f"{log}: exists and was not simulated, so it is left as it is; give another name with -o")
     faults = tuple(parse_fault(words) for words in fault) if fault else None
@@ -163,20 +163,18 @@ def simulate(
     terminal.show(key_values([*rows, ("next", shlex.join(words))]))
 
 
-def _format_of(output: Path | None) -> LogFormat:
-    """Format that a file name asks for; MCAP without a name.
+def format_of(output: Path) -> LogFormat:
+    """Format that a file name asks for.
 
     Raises
     ------
     ConfigError
         Where its ending is none of a known format.
     """
-    if output is None:
-        return LogFormat.MCAP
-    for kind, ending in _ENDINGS.items():
+    for kind, ending in ENDINGS.items():
         if output.suffix.lower() == ending:
             return kind
-    known = ", ".join(e for e in _ENDINGS.values() if e)
+    known = ", ".join(e for e in ENDINGS.values() if e)
     raise ConfigError(
         f"{output}: cannot tell the format from its name; expected {known} or a folder name, or give --format"
     )

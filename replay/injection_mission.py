@@ -121,6 +121,7 @@ def draw_faults(
     *,
     epsilon: float | None = None,
     options: InjectionOptions | None = None,
+    beside: Sequence[FaultSpec] = (),
 ) -> tuple[FaultSpec, ...]:
     """Draw faults of the wheels while they drive, row after row of the tables in random order.
 
@@ -138,6 +139,8 @@ def draw_faults(
         ε of inefficient and noisy faults; None: random.
     options : InjectionOptions or None
         Says whether valves' faults may act on the speed.
+    beside : Sequence[FaultSpec]
+        Faults that are there already and from which the drawn ones keep apart.
 
     Raises
     ------
@@ -164,7 +167,7 @@ def draw_faults(
                 break
             side, mode = rows[j]
             for part in rng.permutation(parts[side]).tolist():
-                busy = [(f.start_s, f.stop_s, f.side) for f in faults if f.component == part]
+                busy = [(f.start_s, f.stop_s, f.side) for f in (*beside, *faults) if f.component == part]
                 place = free_place(drives[part], busy, side, begin, end, False, rng)
                 if place is not None:
                     drawn = draw_fault(part, side, mode, *place, rng, steer=False)

@@ -98,6 +98,12 @@ def _plain(value: Any) -> Any:
     return round(value, 9) if isinstance(value, float) else value
 
 
+def truth_path(log: Path, *, folder: bool) -> Path:
+    """``<stem>.truth.json`` beside a log; a compressed table loses both endings, a folder none."""
+    stem = log.name if folder else log.name.removesuffix(".gz").rsplit(".", 1)[0]
+    return log.with_name(f"{stem or log.name}.truth.json")
+
+
 def write_truth(truth: MissionTruth, path: Path) -> None:
     """Write a truth file.
 
