@@ -11,17 +11,19 @@ import typer
 
 from cli.app import command
 from cli.console import Terminal
-from cli.inputs import machine_of, mission_paths
+from cli.inputs import check_output, machine_of
 from cli.options import Json, MachineFile
-from replay.errors import ConfigError
+from cli.scored import results_and_truths, saved_report
 
 if TYPE_CHECKING:
     from diagnosis.evaluate import MissionScores
+    from diagnosis.excitation import Speeds
 
 EXAMPLES = """\b
 Examples:
   mfhca evaluate mission.mcap
-  mfhca evaluate mission-report --truth mission.truth.json
+  mfhca evaluate mission-report mission.truth.json
+  mfhca evaluate missions/ -o scores.html     # all in a folder: its reports, else its logs with a truth
   mfhca evaluate missions/*.mcap --json | jq .all.wheel.sides.sensor.macro_f1"""
 
 SCHEMA = "mfhca-evaluation/1"
@@ -33,7 +35,10 @@ def evaluate(
     results: Annotated[
         list[Path],
         typer.Argument(
-            metavar="RESULT", help="Report folders, report.json files, or logs to diagnose first.", show_default=False
+            metavar="RESULT… [TRUTH]",
+            help="Report folders, report.json files, logs to diagnose first, or folders of them; a truth file may follow "
+            "a single one.",
+            show_default=False,
         ),
     ],
     truth: Annotated[
@@ -42,14 +47,17 @@ def evaluate(
             "--truth", metavar="FILE", help="Truth of the one RESULT. Default: <log>.truth.json.", show_default=False
         ),
     ] = None,
+    html: Annotated[
+        Path | None,
+        typer.Option("--html", "-o", metavar="FILE", help="Write all figures as one page.", show_default=False),
+    ] = None,
     machine: MachineFile = None,
     json: Json = False,
 ) -> None:
-    """Score results against the truth: confusion, faults found, onset and ε errors, false alarms."""
-    if truth is not None and len(results) > 1:
-        raise ConfigError(f"--truth {truth}: {len(results)} results are given; the option is for a single one")
-    mission_paths(results)
-    truths = [truth or _truth_of(path) for path in results]
+    """Score results against the truth: confusion, faults found, delays, ε errors, false alarms, reliability."""
+    pairs = results_and_truths(results, truth)
+    if html is not None:
+        check_output([html], [path for pair in pairs for path in pair if not path.is_dir()])
     with terminal.progress("starting") as progress:
         from diagnosis.evaluate import evaluate_report
         from diagnosis.outcomes import add
@@ -57,23 +65,30 @@ def evaluate(
         from replay.truth import read_truth
 
         scores = []
-        for path, file in zip(results, truths, strict=True):
+        for path, file in pairs:
             mission = read_truth(file)
-            scores.append(evaluate_report(_report_of(path, machine, progress), mission, str(path)))
+            report, speeds = _result_of(path, machine, mission.wheels, progress)
+            scores.append(evaluate_report(report, mission, str(path), speeds=speeds))
     groups = [g for g in ("wheel", "steer") if any(g in s.groups for s in scores)]
     pooled = {g: figures(add([s.groups[g] for s in scores if g in s.groups])) for g in groups}
-    for path, score in zip(results, scores, strict=True):
+    for (path, _), score in zip(pairs, scores, strict=True):
         if score.left_out:
             verb = "is" if len(score.left_out) == 1 else "are"
             terminal.note(f"{path}: {', '.join(score.left_out)} {verb} not in the result and not scored")
+    if json or html is not None:
+        rows = [_row(*pair, score) for pair, score in zip(pairs, scores, strict=True)]
+        document = {"schema": SCHEMA, "results": rows, "all": pooled}
+    if html is not None:
+        _write_page(document, html)
     if json:
-        rows = [_row(*each) for each in zip(results, truths, scores, strict=True)]
-        terminal.show_json({"schema": SCHEMA, "results": rows, "all": pooled})
+        terminal.show_json(document)
         return
     from cli.score_tables import score_parts
+    from cli.tables import text
 
-    names = [str(path) for path in results]
-    terminal.show(*score_parts(names, scores, pooled))
+    terminal.show(*score_parts([str(path) for path, _ in pairs], scores, pooled))
+    if html is not None:
+        terminal.show(text(f"Wrote {html}"))
 
 
 def _row(path: Path, truth: Path, score: MissionScores) -> dict[str, Any]:
@@ -92,50 +107,29 @@ def _row(path: Path, truth: Path, score: MissionScores) -> dict[str, Any]:
     return {"result": str(path), "truth": str(truth), "left_out": list(score.left_out)} | groups
 
 
-def _report_of(path: Path, machine: Path | None, progress: Callable[[str], None]) -> Mapping[str, Any]:
-    """A saved report, or the one of a log."""
-    saved = _saved(path)
-    if saved is not None:
-        from diagnosis.output import load_report
+def _write_page(document: Mapping[str, Any], path: Path) -> None:
+    from diagnosis.report.scores_page import build_scores_page
+    from replay.files import atomic_path
 
-        return load_report(saved)
+    page = build_scores_page(document)
+    with atomic_path(path) as temporary:
+        temporary.write_text(page, encoding="utf-8", newline="\n")
+
+
+def _result_of(
+    path: Path, machine: Path | None, wheels: tuple[str, ...], progress: Callable[[str], None]
+) -> tuple[Mapping[str, Any], Speeds | None]:
+    """A saved report, or the one of a log, and the commanded speeds beside it."""
+    from diagnosis.excitation import read_speeds, speeds_of
+    from diagnosis.output import PARQUET, load_report
+
+    saved = saved_report(path)
+    if saved is not None:
+        return load_report(saved), read_speeds(saved.with_name(PARQUET), wheels)
     from diagnosis.pipeline import diagnose
 
     the_machine, source = machine_of(machine)
-    return diagnose(
+    result = diagnose(
         [path], the_machine, machine_source=source, progress=lambda text: progress(f"{path.name}: {text}")
-    ).report
-
-
-def _saved(path: Path) -> Path | None:
-    """The report.json that a word names, None for a log."""
-    if path.is_dir():
-        return path / "report.json" if (path / "report.json").is_file() else None
-    return path if path.suffix.lower() == ".json" else None
-
-
-def _truth_of(path: Path) -> Path:
-    """Truth file of a log: beside it; of a report: in the current folder, beside the report's folder, or in it.
-
-    Raises
-    ------
-    ConfigError
-        Where there is none.
-    """
-    from replay.truth import truth_path
-
-    saved = _saved(path)
-    if saved is None:
-        places = [truth_path(path, folder=path.is_dir())]
-    else:
-        from diagnosis.output import load_report
-
-        logs = [Path(str(f["path"])) for f in load_report(saved)["log"]["files"]]
-        names = [truth_path(log, folder=log.is_dir()).name for log in logs]
-        folder = saved.absolute().parent
-        places = [near / name for name in names for near in (Path(), folder.parent, folder)]
-    for place in places:
-        if place.is_file():
-            return place
-    looked = ", ".join(str(p) for p in places)
-    raise ConfigError(f"{path}: no truth file; looked for {looked}; name it with --truth")
+    )
+    return result.report, speeds_of(result.columns, wheels)
