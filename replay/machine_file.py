@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import math
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -206,10 +206,23 @@ def _build(kind: type[_T], section: str, value: Any, rename: Mapping[str, str] |
     return kind(**out)
 
 
-def dump_machine(machine: Machine) -> str:
-    """Write every setting of a machine as TOML that `load_machine` reads back."""
-    lines = ["[machine]", f"name = {_text(machine.name)}", f"id = {_text(machine.id)}"]
-    lines += [f"wheels = [{', '.join(_text(w) for w in machine.wheels)}]", "", "[geometry]"]
+def dump_machine(machine: Machine, notes: Mapping[str, Sequence[str]] | None = None) -> str:
+    """Write every setting of a machine as TOML that `load_machine` reads back.
+
+    Parameters
+    ----------
+    machine : Machine
+        The settings.
+    notes : Mapping[str, Sequence[str]] or None
+        Comment lines by section; those of "" stand at the top.
+    """
+    said = {section: _comments(lines) for section, lines in (notes or {}).items()}
+
+    def head(section: str) -> list[str]:
+        return [f"[{section}]", *said.get(section, [])]
+
+    lines = [*said.get("", []), *head("machine"), f"name = {_text(machine.name)}", f"id = {_text(machine.id)}"]
+    lines += [f"wheels = [{', '.join(_text(w) for w in machine.wheels)}]", "", *head("geometry")]
     lines += [f"{key} = {_real(getattr(machine, key))}" for key in _MACHINE_LEVEL]
     if machine.geometry is not None:
         lines.append(f"wheel_diameter = {_real(machine.geometry.wheel_diameter)}")
@@ -217,15 +230,20 @@ def dump_machine(machine: Machine) -> str:
             steer = "own" if g.axle == w else g.axle
             place = f"x = {_real(g.x)}, y = {_real(g.y)}, offset = {_real(g.offset)}, steer = {_text(steer)}"
             lines.append(f"{_key(w)} = {{ {place} }}")
-    lines += ["", "[control]", *_table(machine.control, {"lambda_": "lambda"})]
-    lines += ["", "[plant]", f"coupling = {_text(machine.plant.coupling)}"]
+    lines += ["", *head("control"), *_table(machine.control, {"lambda_": "lambda"})]
+    lines += ["", *head("plant"), f"coupling = {_text(machine.plant.coupling)}"]
     if machine.plant.flow is not None:
         lines.append(f"flow = {_real(machine.plant.flow)}")
     lines += [f"{_key(w)} = {{ {', '.join(_table(p))} }}" for w, p in machine.plant.wheels.items()]
-    lines += ["", "[limits]", *_table(machine.limits)]
+    lines += ["", *head("limits"), *_table(machine.limits)]
     for section, items in (("noise", machine.noise), ("sources", machine.sources), ("signals", machine.signals)):
-        lines += ["", f"[{section}]", *(f"{_key(k)} = {{ {', '.join(_table(v))} }}" for k, v in items.items())]
+        lines += ["", *head(section), *(f"{_key(k)} = {{ {', '.join(_table(v))} }}" for k, v in items.items())]
     return "\n".join(lines) + "\n"
+
+
+def _comments(lines: Sequence[str]) -> list[str]:
+    """Comment lines; what TOML forbids in comments becomes a space."""
+    return ["# " + "".join(c if c >= " " and c != "\x7f" else " " for c in line) for line in lines]
 
 
 def _table(item: Any, rename: Mapping[str, str] | None = None) -> list[str]:

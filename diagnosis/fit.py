@@ -1,0 +1,351 @@
+"""Machine constants from healthy missions: noise, wheels, wheel offset, control law; unit errors by name."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from math import isfinite
+
+import numpy as np
+
+from diagnosis.fit_control import ControlFit, fit_control, lambda_doubt
+from diagnosis.fit_geometry import fit_offset, offset_pattern
+from diagnosis.fit_noise import NoiseFit, fit_noise
+from diagnosis.fit_plants import fit_plants
+from diagnosis.fit_units import UnitError, find_unit_errors, speed_mistakes
+from diagnosis.fit_wheels import Estimate, WheelFit, WheelRecord
+from replay.errors import NotJudged
+from replay.loop import Replay, replay_loop
+from replay.machine import Law, Machine, Noise, PsiMode, WheelPlant
+from replay.mission import Mission
+from replay.timeline import Timeline
+
+_LEAST_SECONDS = 10.0
+
+
+@dataclass(frozen=True)
+class Constant:
+    """One constant of the machine file.
+
+    Attributes
+    ----------
+    key : str
+        Its place in the machine file, ``plant.FR.K``.
+    value, std : float or None
+        What the missions say, and its standard deviation; None where they do not.
+    unit : str
+        Unit.
+    before : float or None
+        Value of the given machine.
+    windows, missions : int
+        What stands behind it; 0 windows where it does not come from windows.
+    written : bool
+        Whether it is in the new machine.
+    why : str
+        Why it is not written or how it is to be read.
+    """
+
+    key: str
+    value: float | None
+    std: float | None
+    unit: str
+    before: float | None
+    windows: int
+    missions: int
+    written: bool
+    why: str = ""
+
+
+@dataclass(frozen=True)
+class FitResult:
+    """What the missions say of the machine.
+
+    Attributes
+    ----------
+    machine : Machine
+        The given machine with the constants that were found.
+    constants : tuple[Constant, ...]
+        All constants that were looked for, in the order of the machine file.
+    unit_errors : tuple[UnitError, ...]
+        Wrong units and signs; constants that rest on these signals are not written.
+    left_out : tuple[str, ...]
+        Missions, wheels and windows that disagree with the others, one sentence each.
+    notes : tuple[str, ...]
+        What else is to be known.
+    missions : tuple[str, ...]
+        Names of the missions.
+    seconds, driving : float
+        Their length together, and the part in which a wheel is commanded to move [s].
+    """
+
+    machine: Machine
+    constants: tuple[Constant, ...]
+    unit_errors: tuple[UnitError, ...]
+    left_out: tuple[str, ...]
+    notes: tuple[str, ...]
+    missions: tuple[str, ...]
+    seconds: float
+    driving: float
+
+
+def fit_missions(
+    missions: Sequence[Mission], machine: Machine, *, progress: Callable[[str], None] | None = None
+) -> FitResult:
+    """Estimate a machine's constants from its healthy missions.
+
+    Parameters
+    ----------
+    missions : Sequence[Mission]
+        Missions of one machine, read with `machine`.
+    machine : Machine
+        Where its signals are, its geometry, limits and law; what is found replaces its constants.
+    progress : callable or None
+        Called with one line about each step.
+
+    Returns
+    -------
+    FitResult
+        The constants with their standard deviations; the machine with those that hold.
+
+    Raises
+    ------
+    NotJudged
+        Where no mission is given, or together they hold too little driving.
+    """
+    tell = progress or (lambda text: None)
+    names = tuple(m.files[0].path.name if m.files else f"mission {k}" for k, m in enumerate(missions, 1))
+    timelines = [m.timeline for m in missions]
+    replays = []
+    for name, timeline in zip(names, timelines, strict=True):
+        tell(f"replaying {name}")
+        replays.append(_slim(replay_loop(timeline, machine)))
+    seconds = sum(t.size * t.dt for t in timelines)
+    records = [_records(t, r, machine) for t, r in zip(timelines, replays, strict=True)]
+    driving = sum(_driving(wheels) for wheels in records)
+    tell("checking units")
+    errors = list(find_unit_errors(timelines, replays, machine))
+    bad = {s for e in errors for s in e.signals}
+    if driving < _LEAST_SECONDS and not errors:
+        raise NotJudged(
+            f"{', '.join(names) or 'no mission'}: {driving:.1f} s in which a wheel is commanded to move, {_LEAST_SECONDS:g} s "
+            "are needed; give missions that drive"
+        )
+    tell("fitting the control law")
+    control = fit_control(timelines, replays, machine, bad)
+    doubt = lambda_doubt(control, machine, speed_mistakes(machine))
+    if doubt:
+        leaves = ("u",) if "as if u" in doubt else ("v", "v_ref") if "as if" in doubt else ()
+        suspects = tuple(f"wheel.{w}.{leaf}" for leaf in leaves for w in machine.wheels)
+        errors.append(UnitError(suspects, control.lambda_.value / machine.control.lambda_, doubt))
+        bad |= set(suspects)
+    tell("fitting the wheels")
+    spoiled = [_spoiled(w, timelines, bad) for w in machine.wheels]
+    usable = [[None if s else r for r, s in zip(wheels, spoiled, strict=True)] for wheels in records]
+    plants = fit_plants(usable, machine.plant.flow) if usable else []
+    tell("fitting the geometry")
+    offset, blocks, turned = fit_offset(timelines, machine, bad)
+    noise = fit_noise(timelines, machine)
+    constants: list[Constant] = []
+    left_out: list[str] = []
+    out = _with_offset(machine, offset, blocks, len(turned), constants)
+    out = _with_control(out, machine, control, bool(doubt), constants)
+    out = _with_plants(out, machine, plants, spoiled, constants)
+    out = _with_noise(out, noise, bad, constants)
+    left_out += _left_plants(plants, machine, names)
+    left_out += [f"{names[m]}: the control law fits it badly or unlike the others" for m in control.left_missions]
+    notes = []
+    if control.law:
+        notes.append(
+            f"Control law {control.law}, Ψ̂ {control.psi}, explains at least {100 * control.explained:.1f} % of the command "
+            f"of {len(control.missions)} missions; λ̂ from increments {control.increments.value:.4g} ± "
+            f"{control.increments.std:.2g} s/m ({control.increments.why})."
+        )
+    return FitResult(
+        machine=out,
+        constants=tuple(constants),
+        unit_errors=tuple(errors),
+        left_out=tuple(left_out),
+        notes=tuple(notes),
+        missions=names,
+        seconds=seconds,
+        driving=driving,
+    )
+
+
+def _slim(replay: Replay) -> Replay:
+    """Keep commands, angles and fits; the rest of a replay is large."""
+    none = np.empty((0, replay.v_ref.shape[1]))
+    return replace(
+        replay,
+        rho=none,
+        psi_printed=none,
+        psi_implied=none,
+        implied_squared=none,
+        forcing=none,
+        psi=none,
+        u=none,
+        u_difference=none,
+        steer_u=none,
+        steer_difference=none,
+    )
+
+
+def _channels(wheel: str, timeline: Timeline) -> tuple[str | None, str | None]:
+    """Best measured speed and opening of a wheel that a mission logs."""
+    found = []
+    for leaves in (("v_true", "v"), ("u_applied", "u")):
+        logged = (f"wheel.{wheel}.{leaf}" for leaf in leaves)
+        found.append(next((n for n in logged if (x := timeline.get(n)) is not None and np.isfinite(x).any()), None))
+    return found[0], found[1]
+
+
+def _records(timeline: Timeline, replay: Replay, machine: Machine) -> list[WheelRecord | None]:
+    out: list[WheelRecord | None] = []
+    for i, w in enumerate(machine.wheels):
+        speed, opening = _channels(w, timeline)
+        if speed is None or opening is None:
+            out.append(None)
+            continue
+        y, command = timeline.signals[speed], replay.v_ref[:, i]
+        if not np.isfinite(command).any():
+            command = y  # a loop holds the speed: it is the better regressor
+        use = np.ones(y.size, dtype=np.bool_)
+        out.append(
+            WheelRecord(y, timeline.signals[opening][:, None], command, use, timeline.dt, machine.limits.driving_speed)
+        )
+    return out
+
+
+def _driving(wheels: list[WheelRecord | None]) -> float:
+    return max((np.count_nonzero(np.abs(r.command) > r.driving) * r.dt for r in wheels if r is not None), default=0.0)
+
+
+def _spoiled(wheel: str, timelines: Sequence[Timeline], bad: set[str]) -> str:
+    """Signal with a unit error that the wheel's constants would rest on; empty where there is none."""
+    used = {f"wheel.{wheel}.v_ref", "cmd.v"}
+    for t in timelines:
+        used |= {n for n in _channels(wheel, t) if n is not None}
+    return next(iter(sorted(used & bad)), "")
+
+
+def _constant(
+    key: str, e: Estimate, unit: str, before: float | None, windows: int, missions: int, *, written: bool, why: str = ""
+) -> Constant:
+    value = e.value if isfinite(e.value) else None
+    std = e.std if isfinite(e.std) else None
+    return Constant(key, value, std, unit, before, windows, missions, written and value is not None, why or e.why)
+
+
+def _with_offset(machine: Machine, d: Estimate, blocks: int, missions: int, constants: list[Constant]) -> Machine:
+    """Put the wheel offset into the geometry."""
+    geometry = machine.geometry
+    before = None if geometry is None else max(abs(w.offset) for w in geometry.wheels.values())
+    constants.append(_constant("geometry.offset", d, "m", before, blocks, missions, written=True))
+    if geometry is None or not isfinite(d.value):
+        return machine
+    places = {
+        n: replace(w, offset=float(s * d.value))
+        for (n, w), s in zip(geometry.wheels.items(), offset_pattern(machine), strict=True)
+    }
+    return replace(machine, geometry=replace(geometry, wheels=places))
+
+
+_LAWS: dict[str, Law] = {"signed": "signed", "opposed": "opposed", "printed": "printed", "sign_abs": "sign_abs"}
+_PSI: dict[str, PsiMode] = {"printed": "printed", "forced": "forced"}
+
+
+def _with_control(out: Machine, machine: Machine, fit: ControlFit, doubt: bool, constants: list[Constant]) -> Machine:
+    """Put law, λ, ζ into the control section."""
+    before, count = machine.control, len(fit.missions)
+    held = not doubt and bool(fit.law)
+    why = "far from the machine file's, see the unit errors" if doubt else ""
+    steady = isfinite(fit.psi0.value) and fit.psi0.std < 0.1 * fit.psi0.value
+    psi0_why = (
+        "" if steady or not isfinite(fit.psi0.value) else "differs between wheels and missions: left to be fitted"
+    )
+    constants += [
+        _constant("control.lambda", fit.lambda_, "s/m", before.lambda_, 0, count, written=held, why=why),
+        _constant("control.zeta", fit.zeta, "s/m²", before.zeta, 0, count, written=held),
+        _constant("control.psi0", fit.psi0, "", before.psi0, 0, count, written=held and steady, why=psi0_why),
+    ]
+    if not held:
+        return out
+    control = replace(before, law=_LAWS[fit.law], psi=_PSI[fit.psi], lambda_=fit.lambda_.value)
+    if isfinite(fit.zeta.value):
+        control = replace(control, zeta=fit.zeta.value)
+    if steady:
+        control = replace(control, psi0=fit.psi0.value)
+    return replace(out, control=control)
+
+
+_PLANT = (("K", "m/s per full opening"), ("tau", "s"), ("dead", "of full opening"), ("offset", "m/s"), ("load", "m/s"))
+
+
+def _with_plants(
+    out: Machine, machine: Machine, fits: list[WheelFit | None], spoiled: list[str], constants: list[Constant]
+) -> Machine:
+    """Put the wheels' constants into the plant section."""
+    wheels = dict(machine.plant.wheels)
+    for w, fit, error in zip(machine.wheels, fits, spoiled, strict=True):
+        before = wheels.get(w)
+        for name, unit in _PLANT:
+            e = Estimate(float("nan"), float("nan"), f"{error} has a wrong unit or sign" if error else "not logged")
+            if fit is not None:
+                e = Estimate(float("nan"), float("nan"), fit.refused) if fit.refused else getattr(fit, name)
+            old = None if before is None else getattr(before, name)
+            used, count = (0, 0) if fit is None else (fit.used, len(fit.missions))
+            constants.append(_constant(f"plant.{w}.{name}", e, unit, old, used, count, written=True))
+        if fit is not None and not fit.refused:
+            tau, tau_std = fit.tau.value, _known(fit.tau.std)
+            if tau_std is None and before is not None:
+                tau, tau_std = before.tau, before.tau_std
+            wheels[w] = WheelPlant(
+                K=fit.K.value,
+                tau=tau,
+                load=_known(fit.load.value),
+                K_std=_known(fit.K.std),
+                tau_std=tau_std,
+                load_std=_known(fit.load.std),
+                dead=fit.dead.value,
+                dead_std=_known(fit.dead.std),
+                offset=fit.offset.value,
+                offset_std=_known(fit.offset.std),
+            )
+    return replace(out, plant=replace(machine.plant, wheels=wheels))
+
+
+def _known(x: float) -> float | None:
+    return float(x) if isfinite(x) else None
+
+
+def _with_noise(out: Machine, fits: dict[str, NoiseFit], bad: set[str], constants: list[Constant]) -> Machine:
+    """Put the channels' noise into the noise section."""
+    noise = dict(out.noise)
+    for name, fit in fits.items():
+        before = noise.get(name, Noise())
+        why = "its unit or sign is wrong" if name in bad else ""
+        held = name not in bad
+        constants.append(
+            _constant(f"noise.{name}.std", fit.std, "SI", before.std, 0, fit.missions, written=held, why=why)
+        )
+        constants.append(
+            _constant(f"noise.{name}.lsb", fit.lsb, "SI", before.lsb, 0, fit.missions, written=held, why=why)
+        )
+        if held:
+            lsb = _known(fit.lsb.value)
+            noise[name] = Noise(std=_known(fit.std.value) or before.std, lsb=before.lsb if lsb is None else lsb)
+    return replace(out, noise=noise)
+
+
+def _left_plants(fits: list[WheelFit | None], machine: Machine, names: tuple[str, ...]) -> list[str]:
+    out = []
+    for w, fit in zip(machine.wheels, fits, strict=True):
+        if fit is None:
+            continue
+        if fit.refused:
+            out.append(f"wheel {w}: {fit.refused}")
+        out += [f"{names[m]}: wheel {w} disagrees with the other missions" for m in fit.left_missions]
+        gone = fit.considered - fit.used
+        if not fit.refused and gone > 0:
+            out.append(f"wheel {w}: {gone} of {fit.considered} windows disagree with the majority")
+    return out

@@ -1,0 +1,107 @@
+"""Robust regression over windows, and honest standard deviations by leaving out groups of windows."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+_SUBSETS = 400
+_ROUNDS = 20
+_TUKEY = 4.685
+_CUT = 4.0
+
+
+def weighted_median(x: Array, weight: Array) -> float:
+    """Value below which half of the weight lies; NaN where there is none."""
+    if not x.size:
+        return float("nan")
+    order = np.argsort(x)
+    total = np.cumsum(weight[order])
+    return float(x[order][min(int(np.searchsorted(total, 0.5 * total[-1])), x.size - 1)])
+
+
+def equal_weights(group: NDArray[np.int64], full: int) -> Array:
+    """Weights that count every group alike, one with fewer than `full` members in proportion; shape (n,)."""
+    _, index, count = np.unique(group, return_inverse=True, return_counts=True)
+    return np.asarray((np.minimum(count, full) / full / count)[index])
+
+
+def robust_solve(regressors: Array, instruments: Array, y: Array, weight: Array, floor: float) -> tuple[Array, Array]:
+    """Solve y = X·β by instruments, windows that disagree with the majority left out.
+
+    The start is the smallest median residual over small subsets, which holds while fewer than half of the weight
+    disagrees; Tukey's weights refine it.
+
+    Parameters
+    ----------
+    regressors, instruments : Array, shape (n, k)
+        X and Z of Z'X β = Z'y; the same where no instruments are known.
+    y, weight : Array, shape (n,)
+        Response, and how much each window counts.
+    floor : float
+        Smallest standard deviation that the residuals are taken to have.
+
+    Returns
+    -------
+    beta : Array, shape (k,)
+        NaN where the regressors do not fix it.
+    agree : Array, shape (n,)
+        Weight of each window with those that disagree at 0.
+    """
+    n, k = regressors.shape
+    nothing = np.full(k, np.nan), np.zeros(n)
+    if n < k + 2 or np.linalg.matrix_rank(regressors) < k:
+        return nothing
+    rng = np.random.default_rng(n)
+    rows = np.array([rng.choice(n, k, replace=False, p=weight / weight.sum()) for _ in range(_SUBSETS)])
+    starts = np.einsum("mij,mj->mi", np.linalg.pinv(regressors[rows], rcond=1e-6), y[rows])
+    misfits = [weighted_median(np.abs(y - regressors @ b), weight) for b in starts]
+    beta = starts[int(np.argmin(misfits))]
+    scale = max(1.4826 * min(misfits), floor)
+    for _ in range(_ROUNDS):
+        x = np.clip((y - regressors @ beta) / (_TUKEY * scale), -1, 1)
+        w = weight * (1 - x**2) ** 2
+        left = (instruments * w[:, None]).T @ regressors
+        if np.linalg.matrix_rank(left) < k:
+            return nothing
+        before, beta = beta, np.linalg.solve(left, (instruments * w[:, None]).T @ y)
+        residual = np.abs(y - regressors @ beta)
+        scale = max(1.4826 * weighted_median(residual, weight), floor)
+        if np.allclose(before, beta, rtol=1e-6, atol=1e-12):
+            break
+    return beta, np.where(np.abs(y - regressors @ beta) <= _CUT * scale, weight, 0.0)
+
+
+def solve(regressors: Array, instruments: Array, y: Array, weight: Array) -> Array:
+    """β of Z'WX β = Z'Wy; NaN where it is not fixed."""
+    left = (instruments * weight[:, None]).T @ regressors
+    if np.linalg.matrix_rank(left) < left.shape[0]:
+        return np.full(left.shape[0], np.nan)
+    return np.asarray(np.linalg.solve(left, (instruments * weight[:, None]).T @ y))
+
+
+def jackknife(groups: NDArray[np.int64], estimate: Callable[[NDArray[np.bool_]], Array]) -> Array:
+    """Standard deviation of an estimate from leaving out one group of windows at a time.
+
+    Parameters
+    ----------
+    groups : NDArray[np.int64], shape (n,)
+        Group of each window: its mission, or its part of the only mission.
+    estimate : callable
+        Estimate, shape (k,), from the windows that a mask keeps.
+
+    Returns
+    -------
+    Array, shape (k,)
+        NaN with fewer than three groups.
+    """
+    names = np.unique(groups)
+    if names.size < 3:
+        return np.full_like(estimate(np.ones(groups.size, dtype=np.bool_)), np.nan)
+    values = np.array([estimate(groups != g) for g in names])
+    count = names.size
+    return np.asarray(np.sqrt((count - 1) / count * ((values - values.mean(axis=0)) ** 2).sum(axis=0)))
