@@ -159,6 +159,8 @@ def inject(
 
 def _format_for(output: Path, paths: Sequence[Path], machine: Machine) -> LogFormat:
     """Format by the ending of the output, else that of the one input, else MCAP."""
+    if output.suffix.lower() == ".gz":
+        raise ConfigError(f"{output}: compressed tables are read, not written; leave out .gz")
     if output.suffix:
         try:
             return format_of(output)

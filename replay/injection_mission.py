@@ -21,7 +21,8 @@ from replay.truth import MissionTruth, TruthSpan
 
 Array = NDArray[np.float64]
 
-_PAPER_SPEED = 0.36  # what `draw_fault` and `free_place` are made for [m/s]
+_PAPER_SPEED = 0.36  # top speed for which `draw_fault` draws [m/s]
+_PAPER_DRIVING = 0.05  # speed from which a machine drives for `free_place` [m/s]
 _ROWS = tuple(
     (side, mode)
     for side in (Side.SENSOR, Side.ACTUATOR)
@@ -102,7 +103,7 @@ def _speeds(timeline: Timeline, machine: Machine) -> Array:
 
 @dataclass(frozen=True)
 class _WheelDrive:
-    """A wheel's speed over time, scaled to the paper's machine: what `free_place` asks about."""
+    """A wheel's speed over time, in shares of the driving speed: what `free_place` asks about."""
 
     speed: Array
     dt: float
@@ -151,7 +152,7 @@ def draw_faults(
     """
     rng = np.random.default_rng([seed, 1])
     timeline = align(signals)
-    speed = _speeds(timeline, machine) * (_PAPER_SPEED / machine.max_speed)
+    speed = _speeds(timeline, machine) * (_PAPER_DRIVING / max(machine.limits.driving_speed, 1e-9))
     drives = {w: _WheelDrive(speed[:, i], timeline.dt) for i, w in enumerate(machine.wheels)}
     parts = {
         side: _parts(signals, machine, side, options or InjectionOptions()) for side in (Side.SENSOR, Side.ACTUATOR)

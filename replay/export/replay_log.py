@@ -19,6 +19,7 @@ from replay.export.mcap_log import write_mcap
 from replay.files import atomic_path
 from replay.loop import Replay
 from replay.machine import Machine
+from replay.open_loop import COLUMN
 from replay.timeline import Timeline
 
 REPLAY_FORMATS = ("parquet", "csv", "mcap")
@@ -104,6 +105,8 @@ def write_replay(path: Path, timeline: Timeline, replay: Replay, machine: Machin
         write_mcap(path, batches)
         return tuple(b.topic for b in batches)
     columns = replay_columns(timeline, replay, machine, detail=True)
+    if timeline.open_loop:
+        columns[COLUMN] = np.ones(timeline.size)
     table = pa.table({"stamp_ns": pa.array(_stamps(timeline))} | {k: pa.array(v) for k, v in columns.items()})
     with atomic_path(path) as temporary:
         if format == "csv":
