@@ -17,7 +17,7 @@ from typing import Annotated
 
 import typer
 
-from cli import configure, diagnose, evaluating, injecting, look, replaying, simulate
+from cli import configure, diagnose, evaluating, fitting, injecting, look, replaying, simulate
 from cli.app import App, Quiet, Verbose, terminal_of
 from cli.console import Terminal, discard
 from replay.errors import MfhcaError
@@ -67,6 +67,7 @@ for _panel, _function, _name, _epilog in (
     (_LOOK, look.inspect, "inspect", look.INSPECT_EXAMPLES),
     (_LOOK, look.channels, "channels", look.CHANNELS_EXAMPLES),
     (_LOOK, replaying.replay, "replay", replaying.EXAMPLES),
+    (_MAKE, fitting.fit, "fit", fitting.EXAMPLES),
     (_MAKE, simulate.simulate, "simulate", simulate.EXAMPLES),
     (_MAKE, injecting.inject, "inject", injecting.EXAMPLES),
 ):

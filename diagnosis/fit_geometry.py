@@ -20,17 +20,19 @@ Array = NDArray[np.float64]
 
 _BLOCK_S = 0.25
 _EDGE_S = 0.02
+_SLIP = 0.04  # share of φ̇·d that slip and a lagging loop take or add
 _LEAST = 30
+_MOST, _MOST_STD = 1.5, 0.05  # m
 _LEAST_LEVER = 0.02
 _FULL = 20
 
 
 def offset_pattern(machine: Machine) -> Array:
-    """Sign with which the common offset enters each wheel: as in the geometry, else outwards (left positive)."""
+    """Share of the common offset that each wheel has: as in the geometry, else outwards (left positive)."""
     assert machine.geometry is not None
     places = list(machine.geometry.wheels.values())
-    given = np.array([np.sign(w.offset) for w in places])
-    return given if given.any() else np.array([np.sign(w.y) for w in places])
+    given = np.array([w.offset for w in places])
+    return given / np.abs(given).max() if given.any() else np.array([np.sign(w.y) for w in places])
 
 
 def fit_offset(timelines: Sequence[Timeline], machine: Machine, bad: set[str]) -> tuple[Estimate, int, tuple[int, ...]]:
@@ -99,7 +101,10 @@ def fit_offset(timelines: Sequence[Timeline], machine: Machine, bad: set[str]) -
     std = jackknife(groups, lambda k: solve(x[good][k], x[good][k], y[good][k], weight[good][k]))
     found = tuple(sorted(set(mission[good].tolist())))
     why = f"from steering movements; turning at held angles would give {d[0]:.3g} m, slip and tracking included"
-    return Estimate(float(d[1]), float(std[1]), why), int(np.count_nonzero(turning)), found
+    if abs(d[1]) > _MOST or not std[1] < _MOST_STD:
+        return _nothing(f"too uncertain: {d[1]:.2g} ± {std[1]:.2g} m")
+    spread = float(np.hypot(std[1], _SLIP * d[1]))
+    return Estimate(float(d[1]), spread, why), int(np.count_nonzero(turning)), found
 
 
 def _nothing(why: str) -> tuple[Estimate, int, tuple[int, ...]]:
