@@ -1,0 +1,253 @@
+"""Steering axles: sensor and valve of each by the best evidence there is, and the angles that the wheels may rely on."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from diagnosis.assessment import CODE, Assessment, Finding, unassessed
+from diagnosis.channels import alive, make_pair
+from diagnosis.direct import assess_pair
+from diagnosis.steering_blocks import SensorNoise, SteeringBlocks, blocks_of, sensor_noise
+from diagnosis.steering_filter import SteeringPath, allowed_models, follow_path, most_probable
+from diagnosis.steering_findings import SteeringData, judge_side, tidy
+from diagnosis.steering_model import model_of
+from diagnosis.steering_onset import refined
+from diagnosis.steering_plant import SteeringPlant, identify_plants
+from diagnosis.steering_states import BLIND_ROWS, REASONS, states_of
+from replay.faults import Side, State
+from replay.loop import Replay
+from replay.machine import Machine, Noise
+from replay.timeline import Timeline
+
+Array = NDArray[np.float64]
+Key = tuple[str, str]
+Counts = Mapping[str, NDArray[np.int16]]
+
+_STILL = 0.02
+
+
+@dataclass(frozen=True)
+class SteeringResult:
+    """What is known of the steering.
+
+    Attributes
+    ----------
+    assessments : dict[tuple[str, str], Assessment]
+        By (axle, ``sensor`` or ``actuator``).
+    angle : Array, shape (n, axles)
+        Best estimate of the true angle [rad]: the second measurement, else the sensor where it is healthy, else the
+        model's; NaN where nothing is known.
+    doubtful : NDArray[np.bool_], shape (n, axles)
+        Where that estimate rests on a model or on a sensor that was not judged healthy.
+    """
+
+    assessments: dict[Key, Assessment]
+    angle: Array
+    doubtful: NDArray[np.bool_]
+
+
+def assess_steering(
+    timeline: Timeline, replay: Replay, machine: Machine, counts: Counts, progress: Callable[[str], None]
+) -> SteeringResult:
+    """Judge sensor and valve of every steering axle.
+
+    Parameters
+    ----------
+    timeline, replay, machine
+        The aligned mission, the replayed loop and the machine.
+    counts : Mapping[str, NDArray[np.int16]]
+        From `diagnosis.channels.alive_sources`.
+    progress : Callable[[str], None]
+        Told what is being judged.
+    """
+    axles = [_Axle.of(timeline, replay, machine, j, counts) for j in range(len(machine.axles))]
+    modelled = [a for a in axles if a.blocks is not None]
+    plants: dict[str, SteeringPlant | None] = {}
+    if modelled:
+        progress("identifying the steering")
+        found = identify_plants([a.blocks for a in modelled], [a.noise for a in modelled], machine.max_steer)
+        plants = {a.name: plant for a, plant in zip(modelled, found, strict=True)}
+    assessments: dict[Key, Assessment] = {}
+    angle = np.full((timeline.size, len(axles)), np.nan)
+    doubtful = np.ones(angle.shape, dtype=np.bool_)
+    for j, axle in enumerate(axles):
+        progress(f"judging steering {axle.name}")
+        sensor, actuator, model_angle = _judge_axle(axle, plants.get(axle.name), machine)
+        assessments[axle.name, "sensor"], assessments[axle.name, "actuator"] = sensor, actuator
+        angle[:, j], doubtful[:, j] = _best_angle(axle, sensor, model_angle)
+    return SteeringResult(assessments, angle, doubtful)
+
+
+@dataclass(frozen=True)
+class _Axle:
+    """One axle's channels and, where a model must judge a side, their blocks."""
+
+    name: str
+    timeline: Timeline
+    counts: dict[str, NDArray[np.int16]]
+    have: frozenset[str]
+    command: Array
+    blocks: SteeringBlocks | None
+    noise: SensorNoise
+    measured: str
+    driven_by: str
+
+    @classmethod
+    def of(cls, timeline: Timeline, replay: Replay, machine: Machine, j: int, counts: Counts) -> _Axle:
+        name = machine.axles[j]
+        leaves = ("phi", "phi_true", "u", "u_applied")
+        have = frozenset(
+            leaf
+            for leaf in leaves
+            if (x := timeline.get(f"steer.{name}.{leaf}")) is not None and bool(np.isfinite(x).any())
+        )
+        measured = "phi_true" if "phi_true" in have else "phi"
+        driven_by = "u_applied" if "u_applied" in have else "u"
+        u = timeline.get(f"steer.{name}.{driven_by}") if driven_by in have else replay.steer_u[:, j]
+        blocks, noise = None, SensorNoise(1.0, 1.0, 0.0, 0.0)
+        both = {"phi", "phi_true", "u", "u_applied"} <= have
+        if measured in have and not both and u is not None and np.isfinite(u).any():
+            channel = f"steer.{name}.{measured}"
+            y, fresh = timeline.signals[channel], timeline.fresh[channel]
+            blocks = blocks_of(y, u, fresh, alive(timeline, dict(counts), channel), timeline.dt)
+            known = machine.noise.get(channel, Noise())
+            noise = sensor_noise(blocks, y[fresh & np.isfinite(y)], known, machine.max_steer)
+        command = np.full(timeline.size, np.nan) if u is None else u
+        return cls(name, timeline, dict(counts), have, command, blocks, noise, measured, driven_by)
+
+    def channel(self, leaf: str) -> str:
+        """Canonical name."""
+        return f"steer.{self.name}.{leaf}"
+
+    def values(self, leaf: str) -> Array:
+        """Values on the timeline; NaN where it is not logged."""
+        return self.timeline.signals[self.channel(leaf)] if leaf in self.have else np.full(self.timeline.size, np.nan)
+
+
+def _judge_axle(
+    axle: _Axle, plant: SteeringPlant | None, machine: Machine
+) -> tuple[Assessment, Assessment, Array | None]:
+    """Both sides of an axle, and the model's angle where a model was used."""
+    size = axle.timeline.size
+    by_model: dict[Side, Assessment] = {}
+    model_angle: Array | None = None
+    if axle.blocks is not None and plant is not None:
+        by_model, model_angle = _by_model(axle, axle.blocks, plant, machine)
+    why = "the axle was steered too little to identify what its valve does"
+    if axle.blocks is None:
+        why = "neither a steering command nor the valve's position is in the log"
+    fallback = unassessed(size, State.NOT_ASSESSED, why)
+    if "phi" not in axle.have:
+        sensor = unassessed(size, State.NO_DATA, "the steering angle is not in the log")
+    elif "phi_true" in axle.have:
+        quiet = np.abs(np.nan_to_num(axle.values("phi_true"))) < _STILL
+        sensor = _direct(axle, Side.SENSOR, "phi", "phi_true", quiet, "rad", 1.2 * machine.max_steer, machine)
+    else:
+        sensor = by_model.get(Side.SENSOR, fallback)
+    if "u" not in axle.have and "u_applied" not in axle.have and "phi" not in axle.have:
+        actuator = unassessed(size, State.NO_DATA, "the steering valve's command is not in the log")
+    elif {"u", "u_applied"} <= axle.have:
+        idle = np.abs(np.nan_to_num(axle.values("u"))) < _STILL * machine.control.u_max
+        u_max = machine.control.u_max
+        actuator = _direct(axle, Side.ACTUATOR, "u_applied", "u", idle, "of full opening", u_max, machine)
+    elif "u_applied" in axle.have:
+        actuator = unassessed(size, State.NOT_ASSESSED, "the valve's position is logged but not its command")
+    else:
+        actuator = by_model.get(Side.ACTUATOR, fallback)
+    return sensor, actuator, model_angle
+
+
+def _direct(
+    axle: _Axle, side: Side, y: str, x: str, quiet: NDArray[np.bool_], unit: str, span: float, machine: Machine
+) -> Assessment:
+    pair = make_pair(axle.timeline, axle.counts, side, axle.channel(y), axle.channel(x), quiet, unit, span, machine)
+    return assess_pair(pair, machine.limits)
+
+
+def _by_model(
+    axle: _Axle, blocks: SteeringBlocks, plant: SteeringPlant, machine: Machine
+) -> tuple[dict[Side, Assessment], Array]:
+    """Both sides by the filters, and the angle that they give [rad]."""
+    model = model_of(blocks, plant, axle.noise, machine.max_steer)
+    driven = blocks.driven(plant.gain, plant.rate)
+    allowed = allowed_models(sensor=axle.measured == "phi", actuator=axle.driven_by == "u" and plant.reliable)
+    names = (axle.channel(axle.measured), axle.channel(axle.driven_by))
+    data = SteeringData(blocks, driven, model, allowed, names)
+    first = most_probable(blocks, driven, model, allowed)
+    models = tidy(data, first.model)
+    path = SteeringPath(models, *follow_path(blocks, driven, model, models, slice(None))[:2])
+    judged = {side: judge_side(side, data, path, machine.limits) for side in (Side.SENSOR, Side.ACTUATOR)}
+    y = axle.values(axle.measured)
+    fresh = axle.timeline.fresh[names[0]]
+    findings: dict[Side, list[Finding]] = {
+        side: [refined(j.finding, y, fresh, axle.noise, blocks.length) for j in found if j.finding is not None]
+        for side, found in judged.items()
+    }
+    masked = [(f.start, f.stop) for f in findings[Side.SENSOR] if CODE[State(f.mode.value)] in BLIND_ROWS]
+    series = _series(path, blocks, model.plant.gain, y)
+    note = (
+        f"{names[0]} by the steering model with {names[1]}: {plant.gain:.3g} rad/s per full opening, at most "
+        f"{plant.rate:.3g} rad/s, lag {plant.lag:.2g} s, noise {axle.noise.std:.2g} rad, rounding step "
+        f"{axle.noise.lsb:.2g} rad, error of the rate {model.load:.2g} rad/s."
+    )
+    out = {}
+    for side in (Side.SENSOR, Side.ACTUATOR):
+        open_runs = [(j.start, j.stop) for j in judged[side] if j.finding is None]
+        states, doubt = states_of(side, data, path, findings[side], open_runs, masked, y, axle.command, plant.reliable)
+        out[side] = Assessment(
+            states=states,
+            reasons=REASONS[side],
+            findings=tuple(findings[side]),
+            columns=series[side],
+            tier="model",
+            notes=(note,),
+            unexplained_s=doubt * axle.timeline.dt,
+        )
+    angle = np.interp(
+        np.arange(y.size), np.arange(path.model.size) * blocks.length + (blocks.length - 1) / 2, path.mean[:, 0]
+    )
+    return out, np.asarray(angle)
+
+
+def _series(path: SteeringPath, blocks: SteeringBlocks, gain: float, y: Array) -> dict[Side, dict[str, Array]]:
+    """Evidence columns of both sides, each value held over its block."""
+
+    def held(x: Array) -> Array:
+        return np.repeat(x, blocks.length)[: y.size]
+
+    mean, std = path.mean, np.sqrt(np.maximum(path.variance, 0.0))
+    expected = held(mean[:, 0])
+    shared = {"residual": y - expected, "threshold": held(3 * std[:, 0]), "expected": expected}
+    return {
+        Side.SENSOR: shared
+        | {
+            "delta": held(mean[:, 4]),
+            "delta_std": held(std[:, 4]),
+            "delta_bar": held(mean[:, 5]),
+            "delta_bar_std": held(std[:, 5]),
+        },
+        Side.ACTUATOR: shared
+        | {
+            "delta": held(mean[:, 2]),
+            "delta_std": held(std[:, 2]),
+            "delta_bar": held(mean[:, 3]) / gain,
+            "delta_bar_std": held(std[:, 3]) / gain,
+        },
+    }
+
+
+def _best_angle(axle: _Axle, sensor: Assessment, model_angle: Array | None) -> tuple[Array, NDArray[np.bool_]]:
+    """Best estimate of an axle's true angle, and where it is in doubt."""
+    true = axle.values("phi_true")
+    fine = (sensor.states == CODE[State.HEALTHY]) | (sensor.states == CODE[State.NOT_EXCITED])
+    phi = axle.values("phi")
+    usable = fine if model_angle is not None else fine | (sensor.states == CODE[State.NOT_ASSESSED])
+    angle = np.where(usable, phi, np.nan if model_angle is None else model_angle)
+    doubtful = ~fine | ~np.isfinite(angle)
+    if model_angle is not None:
+        angle = np.where(np.isfinite(angle), angle, model_angle)
+    return np.where(np.isfinite(true), true, angle), doubtful & ~np.isfinite(true)

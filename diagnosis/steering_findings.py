@@ -1,0 +1,279 @@
+"""One stretch of a steering axle's path turned into a finding: alternatives with their probabilities, ε̂, saturation term."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from diagnosis import steering_scan as ss
+from diagnosis.assessment import Finding
+from diagnosis.modes import PAIR
+from diagnosis.result import Epsilon, Hypothesis, Sat
+from diagnosis.steering_blocks import SteeringBlocks
+from diagnosis.steering_filter import SteeringPath, follow_path
+from diagnosis.steering_model import SteeringModel
+from replay.faults import FaultMode, Side
+from replay.machine import Limits
+
+Array = NDArray[np.float64]
+Path = NDArray[np.uint8]
+
+MODES = {
+    ss.STUCK: FaultMode.STUCK,
+    ss.NONE: FaultMode.NO_SIGNAL,
+    ss.GAIN: FaultMode.INEFFICIENT,
+    ss.NOISY: FaultMode.NOISY,
+    ss.DRIFT: FaultMode.NOISY,
+}
+_TEMPER = 0.2
+_RUN_IN_S, _RUN_OUT_S = 2.0, 1.0
+_GAP_S = 0.1
+_MOST = 0.6
+
+
+@dataclass(frozen=True)
+class SteeringData:
+    """What judging an axle needs; `driven` as in `steering_filter`, `names` of angle and command."""
+
+    blocks: SteeringBlocks
+    driven: Array
+    model: SteeringModel
+    allowed: NDArray[np.bool_]
+    names: tuple[str, str]
+
+
+@dataclass(frozen=True)
+class Judged:
+    """A run of blocks in one row of one side, and the finding on it (None where nothing may be stated)."""
+
+    side: Side
+    start: int
+    stop: int
+    row: int
+    finding: Finding | None
+
+
+def model_number(sensor: int, actuator: int) -> int:
+    """Model that combines two rows; -1 where there is none."""
+    if sensor in (ss.STUCK, ss.NONE):
+        actuator = ss.OK
+    found = np.flatnonzero((sensor == ss.SENSOR) & (actuator == ss.ACTUATOR))
+    return int(found[0]) if found.size else -1
+
+
+def _runs(x: NDArray[np.int64]) -> Iterator[tuple[int, int, int]]:
+    cut = np.flatnonzero(np.r_[True, x[1:] != x[:-1]])
+    for a, b in zip(cut, np.r_[cut[1:], x.size], strict=True):
+        yield int(a), int(b), int(x[a])
+
+
+def evidence_of(data: SteeringData, path: Path, start: int, stop: int) -> float:
+    """Log-evidence of a path over [start, stop) with a run-in and a run-out, its switches paid for."""
+    dt = data.blocks.dt
+    a, b = max(0, start - round(_RUN_IN_S / dt)), min(path.size, stop + round(_RUN_OUT_S / dt))
+    part = path[a:b]
+    told = follow_path(data.blocks, data.driven, data.model, part, slice(a, b))[2]
+    cost = data.model.switch_cost
+    paid = sum(ss.switch_cost(part[k], part[k - 1], cost) for k in (np.flatnonzero(part[1:] != part[:-1]) + 1).tolist())
+    return float(told[max(0, start - a - round(0.1 / dt)) :].sum()) - float(paid)
+
+
+def tidy(data: SteeringData, path: Path) -> Path:
+    """Replace the models of an episode by a single one where that explains it better, and drop flickers.
+
+    Viterbi's recursion keeps one entry per model, so that it may stray for some blocks before it settles.
+    """
+    path = path.copy()
+    dt = data.blocks.dt
+    for a, b, faulty in list(_runs((path != 0).astype(np.int64))):
+        if faulty == 0 and a > 0 and b < path.size and (b - a) * dt < _GAP_S:
+            path[a:b] = path[a - 1]
+    for a, b, faulty in list(_runs((path != 0).astype(np.int64))):
+        if not faulty:
+            continue
+        best, most = path[a:b].copy(), evidence_of(data, path, a, b)
+        trial = path.copy()
+        for m in np.unique(path[a:b]):
+            trial[a:b] = m
+            told = evidence_of(data, trial, a, b)
+            if told > most:
+                best, most = trial[a:b].copy(), told
+        path[a:b] = best
+        _merge(data, path, a, b, most)
+    return path
+
+
+def _merge(data: SteeringData, path: Path, a: int, b: int, most: float) -> None:
+    """Give a stretch of an episode to one of its neighbours wherever that explains it better."""
+    k = 0
+    while True:
+        cuts = np.concatenate([[a], a + 1 + np.flatnonzero(np.diff(path[a:b].astype(np.int64))), [b]])
+        if k >= cuts.size - 1:
+            return
+        c, d = int(cuts[k]), int(cuts[k + 1])
+        before = path[c:d].copy()
+        best = before
+        for m in {int(path[j]) for j in (c - 1, d) if 0 <= j < path.size} - {int(before[0])}:
+            path[c:d] = m
+            told = evidence_of(data, path, a, b)
+            if told > most:
+                best, most = path[c:d].copy(), told
+        path[c:d] = best
+        k = max(0, k - 1) if best is not before else k + 1
+
+
+def judge_side(side: Side, data: SteeringData, path: SteeringPath, limits: Limits) -> list[Judged]:
+    """Judge every faulty run of one side."""
+    rows = path.sensor if side is Side.SENSOR else path.actuator
+    rows = np.where(rows == ss.DRIFT, ss.NOISY, rows)
+    out = []
+    for a, b, row in _runs(rows):
+        if row != ss.OK:
+            out.append(_judge(side, a, b, row, data, path, limits))
+    return out
+
+
+def _alternatives(side: Side, a: int, b: int, data: SteeringData, path: Path) -> dict[tuple[str, int], float]:
+    """Log-evidence of every row that [a, b) may be in: on this side, on the other one instead, and of none."""
+    sensor, actuator = ss.SENSOR[path[a:b]], ss.ACTUATOR[path[a:b]]
+    other_free = bool(np.mean((actuator if side is Side.SENSOR else sensor) == ss.OK) > 0.5)
+    out: dict[tuple[str, int], float] = {}
+    trial = path.copy()
+    for name, rows in ((Side.SENSOR, range(6)), (Side.ACTUATOR, range(1, 5))):
+        if name is not side and not other_free:
+            continue
+        for row in rows:
+            if row == ss.OK or name is side:
+                pairs = [(row, ac) if side is Side.SENSOR else (s, row) for s, ac in zip(sensor, actuator, strict=True)]
+            else:
+                pairs = [(row, ss.OK) if name is Side.SENSOR else (ss.OK, row)] * (b - a)
+            numbers = {pair: model_number(*pair) for pair in set(pairs)}
+            if any(m < 0 or not data.allowed[m] for m in numbers.values()):
+                continue
+            trial[a:b] = [numbers[pair] for pair in pairs]
+            key = ("none", ss.OK) if row == ss.OK else (name.value, row)
+            out[key] = evidence_of(data, trial, a, b)
+    if ("none", ss.OK) not in out:
+        trial[a:b] = 0
+        out["none", ss.OK] = evidence_of(data, trial, a, b)
+    return out
+
+
+def _judge(side: Side, a: int, b: int, row: int, data: SteeringData, path: SteeringPath, limits: Limits) -> Judged:
+    evidence = _alternatives(side, a, b, data, path.model)
+    top = max(evidence.values())
+    weight = {key: np.exp(max(-700.0, _TEMPER * (value - top))) for key, value in evidence.items()}
+    total = sum(weight.values())
+    silent = row in (ss.STUCK, ss.NONE) and side is Side.SENSOR and _level(a, b, data)[0] == 0.0
+    pooled: dict[tuple[str, str], float] = {}
+    for (name, r), w in weight.items():
+        mode = "healthy" if r == ss.OK else MODES[r].value
+        if silent and (name, r) == ("sensor", ss.STUCK):
+            mode = "no_signal"  # stuck at zero and no signal are one row of the table
+        pooled[name, mode] = pooled.get((name, mode), 0.0) + float(w / total)
+    ranked = sorted(pooled.items(), key=lambda item: -item[1])
+    (name, mode), probability = ranked[0]
+    gain = top - evidence["none", ss.OK]
+    if mode == "healthy" or gain <= 0:
+        return Judged(side, a, b, row, None)
+    mine = Side(name)
+    if probability < limits.min_probability:
+        both = sum(p for (_, m), p in ranked if m == mode)
+        if mode == "inefficient" and both >= limits.min_probability:
+            mine, probability = Side.SENSOR_OR_ACTUATOR, both
+    best = max((key for key in evidence if key[0] == name), key=lambda key: evidence[key])[1]
+    epsilon, sat = _estimate(Side(name), best, a, b, data, path)
+    if name == "actuator" and mode == "stuck" and sat is not None and abs(sat.mean) < limits.min_sat:
+        mode, sat = "no_signal", None
+    states_rest = mine is side or mine is Side.SENSOR_OR_ACTUATOR
+    too_much = b - a > _MOST * path.model.size and name == "actuator"
+    small = mode == "inefficient" and epsilon is not None and epsilon.value < limits.min_epsilon
+    if probability < limits.min_probability or too_much or small or not states_rest:
+        return Judged(side, a, b, row, None)
+    second = next((item for item in ranked[1:] if item[0][1] != "healthy"), None)
+    lines = [
+        f"Over {(b - a) * data.blocks.dt:.2f} s the model “{name} {mode.replace('_', ' ')}” explains {data.names[0]} better than "
+        f"a healthy axle by a log-evidence of {gain:.0f}; a fault is considered from {data.model.switch_cost:.0f}."
+    ]
+    if name == "sensor" and mode in ("stuck", "no_signal"):
+        level, spread, count = _level(a, b, data)
+        lines.append(
+            f"{data.names[0]} stayed within {spread:.2g} rad of {level:.4g} rad over {count} samples."
+            if count
+            else f"{data.names[0]} delivered nothing while other channels of its source did."
+        )
+    if second is not None and second[1] >= 0.005:
+        lines.append(f"Next best: {second[0][0]} {second[0][1].replace('_', ' ')} with {100 * second[1]:.1f} %.")
+    if mine is Side.SENSOR_OR_ACTUATOR:
+        lines.append("Without a second measurement a loss of gain of the sensor and of the valve look alike here.")
+    return Judged(
+        side,
+        a,
+        b,
+        best,
+        Finding(
+            start=a * data.blocks.length,
+            stop=b * data.blocks.length,
+            side=mine,
+            mode=FaultMode(mode),
+            probability=min(1.0, probability),
+            hypotheses=tuple(Hypothesis(s, m, q) for (s, m), q in ranked if q >= 5e-4),
+            epsilon=epsilon,
+            sat=sat,
+            evidence=tuple(lines),
+            tier="signal" if name == "sensor" and mode in ("stuck", "no_signal") else "model",
+        ),
+    )
+
+
+def _level(a: int, b: int, data: SteeringData) -> tuple[float, float, int]:
+    """Median of the blocks' means in a run, their spread without the ends [rad], and the number of samples."""
+    use = np.flatnonzero(data.blocks.status[a:b] == PAIR) + a
+    if not use.size:
+        return 0.0, 0.0, 0
+    values = data.blocks.mean[use[1:-1] if use.size > 2 else use]
+    return float(np.median(values)), float(np.ptp(values)), int(data.blocks.count[use].sum())
+
+
+def _bounds(value: float, std: float) -> Epsilon:
+    return Epsilon(1 - value, 1 - value - 1.96 * std, 1 - value + 1.96 * std)
+
+
+def _estimate(
+    side: Side, row: int, a: int, b: int, data: SteeringData, path: SteeringPath
+) -> tuple[Epsilon | None, Sat | None]:
+    """ε̂ and the saturation term of a row from the states along the path."""
+    gone = Epsilon(1.0, 1.0, 1.0)
+    last, var = path.mean[b - 1], path.variance[b - 1]
+    gain = data.model.plant.gain
+    if side is Side.SENSOR:
+        if row in (ss.STUCK, ss.NONE):
+            level, spread, count = _level(a, b, data)
+            half = 1.96 * float(np.sqrt(data.model.noise.step)) + spread
+            return gone, Sat(level, abs(level), level - half, level + half, "rad") if count else None
+        bounds = _bounds(float(last[4]), float(np.sqrt(var[4])))
+        if row == ss.GAIN:
+            return bounds, None
+        use = data.blocks.status[a:b] == PAIR
+        rest = (data.blocks.mean[a:b] - last[4] * path.mean[a:b, 0])[use] / max(bounds.value, 0.1)
+        return bounds, _sat(rest, "rad")
+    if row == ss.NONE:
+        return gone, None
+    if row == ss.STUCK:
+        level, half = float(last[3]) / gain, 1.96 * float(np.sqrt(var[3])) / gain
+        return gone, Sat(level, abs(level), level - half, level + half, "of full opening")
+    bounds = _bounds(float(last[2]), float(np.sqrt(var[2])))
+    if row == ss.GAIN:
+        return bounds, None
+    return bounds, _sat(path.mean[a:b, 3] / gain / max(bounds.value, 0.1), "of full opening")
+
+
+def _sat(values: Array, unit: str) -> Sat | None:
+    if not values.size:
+        return None
+    mean, rms = float(values.mean()), float(np.sqrt(np.mean(values**2)))
+    half = 1.96 * float(values.std()) / np.sqrt(max(1.0, values.size / 50))
+    return Sat(mean, rms, mean - half, mean + half, unit)

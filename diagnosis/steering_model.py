@@ -1,0 +1,100 @@
+"""Constants of the steering filters: plant, sensor noise and model error of one axle."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from diagnosis.steering_blocks import WHITE_DOF, SensorNoise, SteeringBlocks
+from diagnosis.steering_plant import SteeringPlant, windows_of
+
+Array = NDArray[np.float64]
+
+_MEAN_HEALTHY_S = 60.0
+_LOAD_S = 1.0
+
+
+@dataclass(frozen=True)
+class SteeringModel:
+    """Constants of the filters of one axle.
+
+    Attributes
+    ----------
+    plant : SteeringPlant
+        Valve and cylinder.
+    noise : SensorNoise
+        Of the angle.
+    stop : float
+        Angle of the end stops [rad].
+    load : float
+        Standard deviation of the rate's error [rad/s].
+    dt : float
+        Length of a block [s].
+    """
+
+    plant: SteeringPlant
+    noise: SensorNoise
+    stop: float
+    load: float
+    dt: float
+
+    @property
+    def switch_cost(self) -> float:
+        """Minus the log-probability that a row is entered in a block."""
+        return float(np.log(_MEAN_HEALTHY_S / self.dt * 8))
+
+    def packed(self) -> Array:
+        """Parameters in the order of the compiled scan."""
+        noise = self.noise
+        lag = max(self.plant.lag, 1e-4)
+        # what rounding leaves in a mean that noise does not even out: (q²/2π²)·exp(−4π²σ²/q²)
+        even = np.exp(-4 * np.pi**2 * (noise.std / noise.lsb) ** 2) if noise.lsb > 0 else 0.0
+        rounding = noise.lsb**2 / (2 * np.pi**2) * even + (1e-7 * self.stop) ** 2
+        return np.array(
+            [
+                self.dt,
+                np.exp(-self.dt / lag),
+                self.plant.gain,
+                self.plant.rate,
+                self.stop,
+                self.load,
+                _LOAD_S,
+                noise.white,
+                max(noise.step / 4, noise.white / 2500),
+                WHITE_DOF if noise.resolved else 0.02,
+                noise.spread,
+                lag,
+                (0.1 * self.load * self.dt) ** 2,
+                rounding + 0.01 * noise.white,
+                rounding,
+                self.switch_cost,
+                0.5 * self.dt,
+                max(0.02, self.plant.misfit) ** 2,
+                noise.step,
+            ]
+        )
+
+
+def model_of(blocks: SteeringBlocks, plant: SteeringPlant, noise: SensorNoise, stop: float) -> SteeringModel:
+    """Constants of an axle's filters; the rate's error comes from windows in which nothing is steered.
+
+    Parameters
+    ----------
+    blocks : SteeringBlocks
+        The axle.
+    plant : SteeringPlant
+        Valve and cylinder.
+    noise : SensorNoise
+        Of the angle.
+    stop : float
+        Angle of the end stops [rad].
+    """
+    windows = windows_of(blocks, noise, stop, 0.5)
+    predicted = windows.predicted(plant.gain, plant.rate, plant.lag)
+    off = np.abs(windows.rate - predicted)[windows.good & (np.abs(predicted) < 0.05 * plant.rate)]
+    load = 0.0
+    if off.size >= 8:
+        load = float(np.sqrt(max((np.quantile(off, 0.4) / 0.524) ** 2 - windows.noise**2, 0.0)))
+    return SteeringModel(plant, noise, stop, max(load, 5e-4 * plant.rate), blocks.dt)

@@ -1,0 +1,186 @@
+"""Valve gain, rate limit and lag of a steering axle, identified from the mission with faults in it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.signal import lfilter
+
+from diagnosis.steering_blocks import WHITE_DOF, SensorNoise, SteeringBlocks, window_means
+
+Array = NDArray[np.float64]
+
+_WINDOW_S = 0.25
+_SHORT_WINDOW_S = 0.1
+_LEAST_WINDOWS = 8
+
+
+@dataclass(frozen=True)
+class SteeringPlant:
+    """Valve and cylinder of an axle: ṙ = (sat(gain·u) − r)/lag, φ̇ = r.
+
+    Attributes
+    ----------
+    gain : float
+        Rate per full opening [rad/s].
+    rate : float
+        Rate limit [rad/s]; the largest rate seen where the mission never reached it.
+    lag : float
+        Lag [s].
+    misfit : float
+        Share of a rate that the model does not explain, in the windows that it explains better.
+    windows : int
+        Windows of steering behind it.
+    """
+
+    gain: float
+    rate: float
+    lag: float
+    misfit: float
+    windows: int
+
+    @property
+    def reliable(self) -> bool:
+        """Whether valves can be judged by it."""
+        return self.windows >= _LEAST_WINDOWS and self.misfit < 0.25
+
+
+def _lagged(driven: Array, lag: float, dt: float) -> Array:
+    """Rate behind a first-order lag."""
+    a = float(np.exp(-dt / max(lag, 1e-4)))
+    return np.asarray(lfilter([1 - a], [1, -a], driven))
+
+
+@dataclass(frozen=True)
+class Windows:
+    """Rates of one axle in windows, and what drives them."""
+
+    rate: Array  # mean rate between the middles of neighbouring windows [rad/s]
+    u: Array  # opening by block
+    good: NDArray[np.bool_]
+    length: int
+    dt: float
+    noise: float  # of the rates [rad/s]
+
+    def predicted(self, gain: float, limit: float, lag: float) -> Array:
+        """Rates that a plant gives at these openings."""
+        r = _lagged(np.clip(gain * self.u, -limit, limit), lag, self.dt)
+        means = window_means(r, self.length)
+        return (means[:-1] + means[1:]) / 2
+
+
+def windows_of(blocks: SteeringBlocks, noise: SensorNoise, stop: float, window_s: float) -> Windows:
+    """Rates between windows of `window_s`, marked where the sensor shows its usual noise and no end stop is near."""
+    length = max(2, round(window_s / blocks.dt))
+    known = blocks.count > 0
+    mean = blocks.mean
+    if not known.all() and known.any():
+        mean = np.interp(np.arange(mean.size), np.flatnonzero(known), mean[known])
+    power = window_means(blocks.power, length)
+    middle = window_means(mean, length)
+    # less or more noise than usual: not the healthy sensor; at its end stop an axle does not answer
+    counts = float(np.median(blocks.count[known])) * length if known.any() else 1.0
+    usual = 1 + max(0.3, 4 * float(np.sqrt(2 / (WHITE_DOF * counts))))
+    alive = (window_means(known.astype(np.float64), length) > 0.9) & (np.abs(middle) < 0.97 * stop)
+    alive &= power < usual * noise.white
+    if noise.resolved:
+        alive &= power > noise.white / usual
+    rate = np.diff(middle) / (length * blocks.dt)
+    spread = float(np.sqrt(2 * noise.white / max(counts, 1.0))) / (length * blocks.dt)
+    return Windows(rate, blocks.u, alive[1:] & alive[:-1], length, blocks.dt, spread)
+
+
+def _loss(parts: Sequence[Windows], gain: float, limit: float, lag: float, scale: float, tolerance: float) -> float:
+    """Mean of capped deviations over windows in which the axle is steered or turns."""
+    total, count = 0.0, 0
+    for w in parts:
+        predicted = w.predicted(gain, limit, lag)
+        use = w.good & (np.maximum(np.abs(predicted), np.abs(w.rate)) > 0.1 * scale)
+        off = np.abs(w.rate[use] - predicted[use]) / (tolerance * (scale + np.abs(w.rate[use])) + 2 * w.noise)
+        total += float(np.minimum(off, 3.0).sum())
+        count += int(np.count_nonzero(use))
+    return total / count if count else np.inf
+
+
+def _fit(parts: Sequence[Windows], short: Sequence[Windows]) -> SteeringPlant | None:
+    """Gain, rate limit and lag with the smallest loss: a coarse grid, then one after the other.
+
+    `parts` are long windows for the grid, `short` ones show the lag.
+    """
+    rates = np.concatenate([np.abs(w.rate[w.good]) for w in parts])
+    noise = max(w.noise for w in parts)
+    moving = rates[rates > max(5 * noise, 1e-4)]
+    if moving.size < _LEAST_WINDOWS:
+        return None
+    scale = float(np.quantile(moving, 0.8))
+    openings = np.concatenate(
+        [np.abs(w.predicted(1.0, np.inf, 0.05))[w.good & (np.abs(w.rate) > 0.3 * scale)] for w in parts]
+    )
+    openings = openings[openings > 0]
+    if not openings.size:
+        return None
+    typical = scale / float(np.median(openings))
+    top = float(np.quantile(moving, 0.98))
+    best = (np.inf, typical, top, 0.05)
+    for gain in typical * np.geomspace(0.3, 5.0, 12):
+        for limit in top * np.array([0.6, 0.8, 1.0, 1.25]):
+            best = min(best, (_loss(parts, gain, limit, 0.05, scale, 0.1), gain, limit, 0.05))
+    for step in (1.3, 1.12, 1.05, 1.02):
+        tolerance = 0.3 * (step - 1) + 0.004
+        best = (_loss(short, *best[1:], scale, tolerance), *best[1:])
+        for name in (2, 0, 1, 2, 0):
+            for factor in (1 / step, step):
+                trial = list(best[1:])
+                trial[name] = max(trial[name] * (factor if name < 2 else factor**2), 1e-3)
+                best = min(best, (_loss(short, *trial, scale, tolerance), *trial))
+    _, gain, limit, lag = best
+    off = []
+    for w in parts:
+        predicted = w.predicted(gain, limit, lag)
+        use = w.good & (np.abs(predicted) > 0.3 * scale)
+        off.append(np.abs(w.rate[use] - predicted[use]) / np.abs(predicted[use]))
+    shares = np.concatenate(off)
+    if not shares.size:
+        return None
+    return SteeringPlant(float(gain), float(limit), float(lag), float(np.quantile(shares, 0.3)), shares.size)
+
+
+def identify_plants(
+    axles: Sequence[SteeringBlocks | None], noises: Sequence[SensorNoise], stop: float
+) -> list[SteeringPlant | None]:
+    """Identify each axle's plant: its own where both axles agree, else that of both together.
+
+    A fault that lasts would make one axle look slow; a plant that the other axle does not confirm within a fifth is
+    not believed.
+
+    Parameters
+    ----------
+    axles : Sequence[SteeringBlocks or None]
+        None where an axle cannot be used.
+    noises : Sequence[SensorNoise]
+        Noise of each sensor.
+    stop : float
+        Angle of the end stops [rad].
+    """
+    windows = [
+        None if b is None else (windows_of(b, w, stop, _WINDOW_S), windows_of(b, w, stop, _SHORT_WINDOW_S))
+        for b, w in zip(axles, noises, strict=True)
+    ]
+    usable = [w for w in windows if w is not None]
+    pooled = _fit([w[0] for w in usable], [w[1] for w in usable]) if usable else None
+    if pooled is None:
+        return [None for _ in axles]
+    out: list[SteeringPlant | None] = []
+    for w in windows:
+        own = pooled if w is None or len(usable) == 1 else _fit([w[0]], [w[1]])
+        agrees = own is not None and own.reliable and abs(np.log(own.gain / pooled.gain)) < 0.2
+        limit = max(pooled.rate, own.rate) if own is not None and agrees else pooled.rate
+        out.append(
+            SteeringPlant(own.gain, limit, pooled.lag, own.misfit, own.windows)
+            if own is not None and agrees
+            else pooled
+        )
+    return out
