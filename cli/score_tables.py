@@ -39,10 +39,13 @@ def score_parts(
             parts += [section(f"{title}: faults"), _events(figures)]
         if figures["modes"]:
             parts += ["", _modes(figures["modes"])]
+        if figures["events"]["faults"] or figures["events"]["masked"]:
+            parts += [section(f"{title}: by severity and excitation"), _divided(figures)]
         if len(scores) == 1 and (wrong := _wrong(scores[0].groups[group])) is not None:
             parts += [section(f"{title}: not right"), wrong]
         if any(b["reported"] for b in figures["calibration"]):
             parts += [section(f"{title}: stated probability"), _calibration(figures["calibration"])]
+            parts += ["", _reliability(figures["reliability"])]
     return [*parts, ""]
 
 
@@ -108,11 +111,12 @@ def _states(sides: Mapping[str, Mapping[str, Any]]) -> Table:
             _share(s["balanced_accuracy"]),
             _share(s["balanced_accuracy_decided"]),
             _share(s["decided_share"]),
+            *(_share(s["damadics"][k]) for k in ("r_td", "r_fd", "r_ti", "r_fi")),
         )
         for side, s in sides.items()
     ]
     headings = ("", "driving [s]", "macro-F1", "balanced accuracy", "of decided time", "decided share")
-    return table(headings, rows, right=range(1, 6))
+    return table((*headings, "r_td", "r_fd", "r_ti", "r_fi"), rows, right=range(1, 10))
 
 
 def _confusion(side: Mapping[str, Any]) -> Table:
@@ -155,11 +159,16 @@ def _events(figures: Mapping[str, Any]) -> Table:
             "one to one",
             f"precision {_share(events['precision'])}, recall {_share(events['recall'])}, F1 {_share(events['f1'])}",
         ),
-        ("isolation", f"{_share(events['isolation_rate'])}, wrong part {_share(events['wrong_wheel_rate'])}"),
+        (
+            "isolation",
+            f"{_share(events['isolation_rate'])} of {events['detected']} detected, right row too "
+            f"{_share(events['identification_rate'])}, wrong part {_share(events['wrong_wheel_rate'])}",
+        ),
     ]
-    for name, key in (("onset error", "onset_error_s"), ("end error", "end_error_s")):
+    for name, key in (("onset error", "onset_error_s"), ("delay", "detection_delay_s"), ("end error", "end_error_s")):
         e = figures[key]
-        rows.append((name, f"median {_ms(e['median'])}, p95 {_ms(e['p95'])} over {e['n']} faults"))
+        more = f"; {e['without']} without a known moment" if e.get("without") else ""
+        rows.append((name, f"median {_ms(e['median'])}, p95 {_ms(e['p95'])} over {e['n']} faults{more}"))
     rows.append(
         (
             "ε error",
@@ -189,11 +198,38 @@ def _modes(modes: Sequence[Mapping[str, Any]]) -> Table:
             _share(m["epsilon_mae"]),
             _ms(m["onset_error_s"]["median"]),
             _ms(m["onset_error_s"]["p95"]),
+            _ms(m["detection_delay_s"]["median"]),
+            _ms(m["detection_delay_s"]["p95"]),
         )
         for m in modes
     ]
-    headings = ("side", "row", "faults", "right", "recall", "ε error", "onset median", "p95")
-    return table(headings, rows, right=range(2, 8))
+    headings = ("side", "row", "faults", "right", "recall", "ε error", "onset median", "p95", "delay median", "p95")
+    return table(headings, rows, right=range(2, 10))
+
+
+def _divided(figures: Mapping[str, Any]) -> Table:
+    """One line per band of ε, of commanded speed and of tyre contact."""
+    rows = []
+    for key, form in (("by_epsilon", "ε {}"), ("by_speed", "{} m/s"), ("by_contact", "{}")):
+        for b in figures[key]:
+            events, sides = b["events"], b["sides"]
+            if key == "by_epsilon" and not events["faults"]:
+                continue
+            band = "" if "low" not in b else f"≥ {b['low']:g}" if b["high"] is None else f"{b['low']:g}–{b['high']:g}"
+            name = form.format(b.get("contact", band))
+            rows.append(
+                (
+                    name,
+                    events["masked"] if name == "masked" else events["faults"],
+                    *(_share(events[k]) for k in ("recall", "precision", "isolation_rate", "wrong_wheel_rate")),
+                    _ms(b["detection_delay_s"]["p95"]),
+                    _share(b["epsilon"]["mae"]),
+                    b["false_alarms"]["count"],
+                    *(_share(sides[s][k]) for s in ("sensor", "actuator") for k in ("macro_f1", "undecided_share")),
+                )
+            )
+    headings = ("", "faults", "recall", "prec.", "isolated", "wrong", "delay p95", "ε error", "alarms")
+    return table((*headings, "sensor F1", "undec.", "act. F1", "undec."), rows, right=range(1, 13))
 
 
 def _wrong(counts: Counts) -> Table | None:
@@ -226,3 +262,10 @@ def _calibration(bins: Sequence[Mapping[str, Any]]) -> Table:
         if b["reported"]
     ]
     return table(("bin", "reported", "stated", "right"), rows, right=range(4))
+
+
+def _reliability(groups: Sequence[Mapping[str, Any]]) -> Table:
+    rows = [
+        (g["tier"], _words(g["side"]), g["reported"], g["right"], _share(g["brier"]), _share(g["ece"])) for g in groups
+    ]
+    return table(("tier", "side", "reported", "right", "Brier", "ECE"), rows, right=range(2, 6))

@@ -87,9 +87,9 @@ def damadics_rates(seconds: Array) -> dict[str, float | None]:
         ``r_td``, true detection rate: Σ time with a high detection decision during a fault / faulty time.
         ``r_fi``, false isolation rate: Σ time during a fault with the decision of another row / faulty time.
         ``r_ti``, true isolation rate: Σ time during a fault with the decision of its row / faulty time.
-        The detection time t_dt (from t_from to the last rise of the detection decision) is the detection delay of
-        `diagnosis.event_scores`. The isolation time t_it would need causal decisions per row, which a report does
-        not hold; recovery times have no counterpart, since what has healed is read looking back.
+        The detection time t_dt, from t_from to the rise of the detection decision, is the detection delay of
+        `diagnosis.event_scores`, counted from the first excited sample. The isolation time t_it would need causal
+        decisions per row, which a report does not hold.
     """
     faulty, healthy = seconds[1:].sum(), seconds[0].sum()
     told = seconds[:, 1:-1].sum(axis=1)

@@ -34,6 +34,7 @@ _MODE = {
 _TEMPER = 0.25
 _MAX_LAG_S = 0.05
 _SHORTEST_S = 0.01
+_HOLD_S = 0.1
 
 
 def assess_pair(pair: Pair, limits: Limits) -> Assessment:
@@ -69,7 +70,7 @@ def assess_pair(pair: Pair, limits: Limits) -> Assessment:
         elif timing_explains(pair, x, run, finding.mode, share):
             blind[run.start : run.stop] = True
         else:
-            findings.append(replace(finding, detected=_detected(path, run, shortest, lag)))
+            findings.append(replace(finding, detected=_detected(path, run, pair.dt, shortest, lag)))
     states = _states(pair, x, status, blind, findings)
     notes = [
         f"{pair.y_name} against {pair.x_name}: noise {model.noise:.2g} {pair.unit}, rounding step {lsb:.2g} {pair.unit}, "
@@ -91,9 +92,9 @@ def assess_pair(pair: Pair, limits: Limits) -> Assessment:
     )
 
 
-def _detected(path: ModePath, run: Run, slack: int, lag: float) -> int | None:
+def _detected(path: ModePath, run: Run, dt: float, slack: int, lag: float) -> int | None:
     """Sample at which the fault would have been raised causally: both y and the reference beside it have arrived."""
-    raised = path.crossing(run.start, run.stop, slack)
+    raised = path.crossing(run.start, run.stop, slack, max(slack, round(_HOLD_S / dt)))
     return None if raised is None else min(raised + max(0, math.ceil(-lag)), path.model.size - 1)
 
 

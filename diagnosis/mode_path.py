@@ -112,12 +112,12 @@ class ModePath:
         """Row of the table per sample."""
         return np.asarray(ROW_OF_MODEL[self.model])
 
-    def crossing(self, start: int, stop: int, slack: int) -> int | None:
+    def crossing(self, start: int, stop: int, slack: int, hold: int) -> int | None:
         """First sample of [start, stop) from which on a fault is more probable than none without anything later.
 
-        The last rise of that decision within the interval counts, as in the detection time of DAMADICS. The ends of
+        That decision must last `hold` samples, or to the interval's end, so that a blip is no detection. The ends of
         the interval were found looking back: a rise up to `slack` samples before `start` counts as `start`, and the
-        last `slack` samples count nothing; nor does the decision end where it is withdrawn for less than that.
+        last `slack` samples count nothing; nor does a decision end where it is withdrawn for less than that.
 
         Parameters
         ----------
@@ -125,18 +125,21 @@ class ModePath:
             Samples of the interval, half open.
         slack : int
             Samples by which its ends may be off; at most a quarter of the interval at its end.
+        hold : int
+            Samples that a decision must last.
 
         Returns
         -------
         int or None
-            None where no fault is the more probable one at its end: a causal reading would have missed it.
+            None where a causal reading would have missed the fault.
         """
         first, last = max(0, start - slack), stop - min(slack, (stop - start) // 4)
-        calm = np.r_[False, self.filtered[first:last, HEALTHY] >= 0.5, False]
-        falls, rises = np.flatnonzero(calm[1:] & ~calm[:-1]), np.flatnonzero(calm[:-1] & ~calm[1:])
-        taken_back = (rises - falls >= slack) | (falls == 0) | (rises == last - first)
-        raised = first + int(rises[taken_back].max(initial=0))
-        return None if raised >= last else max(raised, start)
+        calm = np.r_[True, self.filtered[first:last, HEALTHY] >= 0.5, True]
+        rises, falls = np.flatnonzero(calm[:-1] & ~calm[1:]), np.flatnonzero(~calm[:-1] & calm[1:])
+        apart = rises[1:] - falls[:-1] >= slack
+        begins, ends = rises[np.r_[True, apart][: rises.size]], falls[np.r_[apart, True][: falls.size]]
+        lasts = (ends - begins >= hold) | (ends == last - first)
+        return max(start, first + int(begins[lasts][0])) if lasts.any() else None
 
 
 def forward(

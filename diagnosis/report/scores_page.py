@@ -42,9 +42,9 @@ _DEFINITIONS = (
     "“Sensor or actuator” is right for inefficient ones alone, the pair that cannot be told apart in steady state.",
     "Onset error: reported start − first excited sample of the fault. End error: reported − true end. Both looking back, over "
     "right faults, by size.",
-    "Detection delay: moment at which the same evidence, read without anything later, would have raised the fault − first "
-    "excited sample; over faults reported on their own component. It is the detection time t_dt of DAMADICS. Noise and "
-    "delays of the channels are those of the whole mission.",
+    "Detection delay: moment at which the same evidence, read without anything later, would have raised the fault for "
+    "good or for 0.1 s at least − first excited sample; over faults reported on their own component. It is the detection time "
+    "t_dt of DAMADICS. Noise and delays of the channels are those of the whole mission.",
     "Isolated: share of the faults for which something was reported that named the right component and side.",
     "False alarms: reports that are not right and lie for more than half of their time where their component has no fault; "
     "without those of severity info; per hour without a fault, with the upper 95 % bound of a Poisson count.",
@@ -95,7 +95,7 @@ def _environment() -> jinja2.Environment:
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    environment.filters |= {"num": names.number, "share": _share, "time": _time, "state": names.state_label}
+    environment.filters |= {"num": names.number, "share": _share, "both": _both, "state": names.state_label}
     environment.globals |= {"icon": icon, "known": names.known}
     return environment
 
@@ -108,12 +108,21 @@ def _time(seconds: float | None) -> str:
     return "–" if seconds is None else names.span(abs(seconds)) if seconds >= -5e-4 else f"−{names.span(-seconds)}"
 
 
+def _both(e: Mapping[str, Any]) -> str:
+    """Median and 95 % quantile of a time in one unit."""
+    if not e["n"]:
+        return "–"
+    scale, unit = (1e3, "ms") if max(abs(e["median"]), abs(e["p95"])) < 1 else (1.0, "s")
+    return " / ".join(f"{names.number(round(scale * e[k], 2))}" for k in ("median", "p95")) + f" {unit}"
+
+
 def _group(key: str, figures: Mapping[str, Any], results: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
     """What the page shows of wheels or of steering."""
     title = _TITLES[key]
     return {
         "title": title,
         "figures": figures,
+        "told": bool(figures["events"]["faults"] or figures["events"]["masked"] or figures["events"]["reported"]),
         "kpis": list(_kpis(figures)),
         "confusions": [(side, _confusion(values, side)) for side, values in figures["sides"].items()],
         "by_epsilon": [(f"ε {_band(b)}", b) for b in figures["by_epsilon"]],
@@ -136,14 +145,16 @@ def _kpis(figures: Mapping[str, Any]) -> Iterator[tuple[str, str, str]]:
             f"false r_fd {_share(rates['r_fd'])}; isolation true r_ti {_share(rates['r_ti'])}, false r_fi {_share(rates['r_fi'])}",
         )
     events, alarms, epsilon = figures["events"], figures["false_alarms"], figures["epsilon"]
+    bound = f"at most {names.number(alarms['per_hour_high'])} (95 %); {alarms['count']} in {alarms['healthy_h']:.3f} h"
+    yield "false alarms per healthy hour", names.number(alarms["per_hour"]), bound
+    if not events["faults"]:
+        return
     more = f"precision {_share(events['precision'])}, recall {_share(events['recall'])}"
     yield "events, F1", _share(events["f1"]), f"{events['right']} of {events['faults']} right; {more}"
     more = (
         f"right row too {_share(events['identification_rate'])}, other component {_share(events['wrong_wheel_rate'])}"
     )
     yield "isolated, of detected", _share(events["isolation_rate"]), more
-    bound = f"at most {names.number(alarms['per_hour_high'])} (95 %); {alarms['count']} in {alarms['healthy_h']:.3f} h"
-    yield "false alarms per healthy hour", names.number(alarms["per_hour"]), bound
     for key, title in _TIMES.items():
         e = figures[key]
         yield f"{title.lower()}, median", _time(e["median"]), f"95 %: {_time(e['p95'])}, over {e['n']} faults"
@@ -165,7 +176,8 @@ def _confusion(side_figures: Mapping[str, Any], side: str) -> dict[str, Any]:
                 _cell(name, other, s, s / total) for other, s in zip(side_figures["reported"], seconds, strict=True)
             ]
             rows.append({"state": name, "words": names.state_label(name, side), "cells": cells})
-    columns = [names.state_label(c, side) if c != "undecided" else "Undecided" for c in side_figures["reported"]]
+    short = {"outside_table": "Outside", "undecided": "Undecided"}
+    columns = [short.get(c) or names.state_label(c, side) for c in side_figures["reported"]]
     return {"columns": columns, "rows": rows}
 
 

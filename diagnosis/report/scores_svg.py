@@ -75,7 +75,7 @@ def reliability_diagram(title: str, bins: Sequence[Mapping[str, Any]]) -> Markup
     bins : Sequence[Mapping[str, Any]]
         From `diagnosis.reliability`.
     """
-    size, left, top = 132.0, 30.0, 6.0
+    size, left, top = 132.0, 30.0, 11.0
 
     def at(p: float, share: float) -> tuple[float, float]:
         return left + size * p, top + size * (1 - share)
@@ -98,6 +98,6 @@ def reliability_diagram(title: str, bins: Sequence[Mapping[str, Any]]) -> Markup
                 "<title>{words}</title></circle>"
             ).format(x=x, y=y, d=at(0, b["probability"])[1], r=2.5 + 6 * math.sqrt(b["reported"] / most), words=words)
         )
-    return Markup('<svg class="plot rel" viewBox="0 0 176 160" role="img" aria-label="{}">{}</svg>').format(
+    return Markup('<svg class="plot rel" viewBox="0 0 176 164" role="img" aria-label="{}">{}</svg>').format(
         f"Reliability of {title}", Markup("").join(parts)
     )

@@ -2,7 +2,8 @@
 
 Limits and models may be tuned on the missions of `TUNING` alone; figures that are published come from `REPORTING`
 (``--seeds reporting``), which no choice has seen. One line per evidence, coupling and ice (free wheels have no ground
-to slip on): paper and random missions together, and the false alarms of healthy missions.
+to slip on): paper and random missions together, and the false alarms of healthy missions. With ``--steering`` the random
+missions fault the steering axles too, and a second line scores those.
 """
 
 from __future__ import annotations
@@ -21,6 +22,7 @@ from typing import Any
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
 from diagnosis.evaluate import evaluate_report
+from diagnosis.excitation import speeds_of
 from diagnosis.outcomes import Counts, add
 from diagnosis.pipeline import diagnose_signals
 from diagnosis.scores import figures
@@ -32,7 +34,7 @@ from replay.simulation.run import simulate_mission
 from replay.sources import SignalSource
 
 TUNING = range(20)
-REPORTING = range(1000, 1020)
+REPORTING = range(2000, 2040)
 SEEDS = {"tuning": TUNING, "reporting": REPORTING}
 
 EVIDENCE = ("direct", "spool", "base")
@@ -58,6 +60,7 @@ class Task:
     duration: float
     rate: float
     evidence: tuple[str, ...]
+    steering: bool = False
 
 
 def signals_of(mission: SimulatedMission, evidence: str) -> Signals:
@@ -82,13 +85,15 @@ def run_task(task: Task) -> dict[str, dict[str, Counts] | str]:
             rate_hz=task.rate,
             coupling=task.coupling,  # type: ignore[arg-type]
             ice=task.ice,
+            steering_faults=task.steering and task.scenario == "random",
         )
     )
     out: dict[str, dict[str, Counts] | str] = {}
     for evidence in task.evidence:
         try:
             result = diagnose_signals(signals_of(mission, evidence), haulotte())
-            out[evidence] = dict(evaluate_report(result.report, mission.truth, str(task)).groups)
+            speeds = speeds_of(result.columns, mission.truth.wheels)
+            out[evidence] = dict(evaluate_report(result.report, mission.truth, str(task), speeds=speeds).groups)
         except MfhcaError as error:
             out[evidence] = f"{task}: {error}"
     return out
@@ -105,12 +110,14 @@ def run_all(tasks: Sequence[Task], jobs: int) -> Iterator[tuple[Task, dict[str, 
     print(file=sys.stderr)
 
 
-def pooled(found: dict[tuple[Task, str], dict[str, Counts]], scenarios: Sequence[str], *key: object) -> dict[str, Any]:
-    """Figures of the wheels over missions of some scenarios with one coupling, ice share and evidence."""
+def pooled(
+    found: dict[tuple[Task, str], dict[str, Counts]], group: str, scenarios: Sequence[str], *key: object
+) -> dict[str, Any]:
+    """Figures of the wheels or the steering over missions of some scenarios with one coupling, ice share and evidence."""
     parts = [
-        counts["wheel"]
+        counts[group]
         for (task, evidence), counts in sorted(found.items(), key=str)
-        if task.scenario in scenarios and (task.coupling, task.ice, evidence) == key
+        if task.scenario in scenarios and (task.coupling, task.ice, evidence) == key and group in counts
     ]
     return {"missions": len(parts)} | figures(add(parts))
 
@@ -119,10 +126,10 @@ def number(value: float | None, digits: int = 3, scale: float = 1.0) -> str:
     return "–" if value is None else f"{value * scale:.{digits}f}"
 
 
-_WIDTHS = (26, 4, 6, 6, 6, 6, 1, 6, 6, 6, 6, 1, 6, 6, 6, 6, 6, 7, 7)
+_WIDTHS = (26, 4, 6, 6, 6, 6, 1, 6, 6, 6, 6, 1, 6, 6, 6, 6, 6, 6, 6, 6, 7, 7)
 _HEAD = (
-    "", "n", "F1", "bal", "dec", "share", "|", "F1", "bal", "dec", "share", "|", "ev.F1", "ε", "ε part", "on ms", "p95",
-    "fa/h", "≤",
+    "", "n", "F1", "bal", "dec", "share", "|", "F1", "bal", "dec", "share", "|", "ev.F1", "isol", "ε", "ε part", "on ms",
+    "p95", "det ms", "p95", "fa/h", "≤",
 )  # fmt: skip
 
 
@@ -141,10 +148,13 @@ def summary(name: str, faulty: dict[str, Any], healthy: dict[str, Any]) -> str:
         [
             *cells,
             number(faulty["events"]["f1"]),
+            number(faulty["events"]["isolation_rate"]),
             number(faulty["epsilon"]["mae"]),
             number(faulty["epsilon"]["mae_partial"]),
             number(faulty["onset_error_s"]["median"], 1, 1e3),
             number(faulty["onset_error_s"]["p95"], 0, 1e3),
+            number(faulty["detection_delay_s"]["median"], 1, 1e3),
+            number(faulty["detection_delay_s"]["p95"], 0, 1e3),
             number(alarms["per_hour"], 2),
             number(alarms["per_hour_high"], 2),
         ]
@@ -152,15 +162,31 @@ def summary(name: str, faulty: dict[str, Any], healthy: dict[str, Any]) -> str:
 
 
 def detail(figures_: dict[str, Any]) -> Iterator[str]:
-    """Recall of each row, by time and by event."""
+    """Recall of each row by time and by event, figures by severity and excitation, reliability."""
     for side, s in figures_["sides"].items():
         recall = "  ".join(f"{row} {number(v['recall'])}" for row, v in s["rows"].items())
-        yield f"    {side:9} recall by time: {recall}"
+        rates = "  ".join(f"{k} {number(v)}" for k, v in s["damadics"].items())
+        yield f"    {side:9} recall by time: {recall}; {rates}"
     for m in figures_["modes"]:
-        onset = m["onset_error_s"]
+        onset, delay = m["onset_error_s"], m["detection_delay_s"]
         yield (
             f"    {m['side']:9} {m['mode']:12} {m['right']:4} of {m['faults']:4} events, ε {number(m['epsilon_mae'])}, "
-            f"onset {number(onset['median'], 1, 1e3)} ms (p95 {number(onset['p95'], 0, 1e3)})"
+            f"onset {number(onset['median'], 1, 1e3)} ms (p95 {number(onset['p95'], 0, 1e3)}), "
+            f"delay {number(delay['median'], 1, 1e3)} ms (p95 {number(delay['p95'], 0, 1e3)}, {delay['without']} unknown)"
+        )
+    for key in ("by_epsilon", "by_speed", "by_contact"):
+        for b in figures_[key]:
+            name = b.get("contact") or f"{key[3:]} {b['low']:g}–{'' if b['high'] is None else format(b['high'], 'g')}"
+            events = b["events"]
+            f1 = ", ".join(f"{side} F1 {number(s['macro_f1'])}" for side, s in b["sides"].items())
+            yield (
+                f"    {name:18} {events['right']:4} of {events['faults']:4} events, precision {number(events['precision'])}, "
+                f"isolated {number(events['isolation_rate'])}, wrong part {number(events['wrong_wheel_rate'])}, {f1}"
+            )
+    for r in figures_["reliability"]:
+        yield (
+            f"    {r['tier']:9} {r['side']:18} {r['right']:4} of {r['reported']:4} reports right, Brier {number(r['brier'])}, "
+            f"ECE {number(r['ece'])}"
         )
 
 
@@ -176,6 +202,9 @@ def main() -> None:
     parser.add_argument("--coupling", choices=COUPLINGS, nargs="+", default=COUPLINGS)
     parser.add_argument("--ice", type=float, nargs="+", default=ICE, help="shares of icy ground")
     parser.add_argument("--scenario", choices=SCENARIOS, nargs="+", default=SCENARIOS)
+    parser.add_argument(
+        "--steering", action="store_true", help="fault the steering of random missions too, and score it"
+    )
     parser.add_argument("--jobs", type=int, default=2)
     parser.add_argument("--detail", action="store_true", help="every row of the tables")
     parser.add_argument("--json", type=Path, metavar="FILE", help="write all figures")
@@ -185,7 +214,7 @@ def main() -> None:
     evidence = tuple(asked.evidence)
     grounds = [(c, i) for c, i in product(asked.coupling, asked.ice) if c == "ground" or i == min(asked.ice)]
     tasks = [
-        Task(scenario, coupling, ice, seed, duration, asked.rate, evidence)
+        Task(scenario, coupling, ice, seed, duration, asked.rate, evidence, asked.steering)
         for seed, scenario, (coupling, ice) in product(seeds, asked.scenario, grounds)
     ]
     found: dict[tuple[Task, str], dict[str, Counts]] = {}
@@ -200,13 +229,17 @@ def main() -> None:
     print(f"{'':31}{'sensor':^29}{'actuator':^28}")
     print(line(_HEAD))
     document: dict[str, Any] = {"seeds": asked.seeds, "configurations": []}
-    for level, (coupling, ice) in product(evidence, grounds):
-        faulty = pooled(found, ("paper", "random"), coupling, ice, level)
-        healthy = pooled(found, ("healthy",), coupling, ice, level)
-        print(summary(f"{level}, {coupling}, ice {ice:g}", faulty, healthy))
+    for level, (coupling, ice), group in product(
+        evidence, grounds, ("wheel", "steer") if asked.steering else ("wheel",)
+    ):
+        scenarios = ("paper", "random") if group == "wheel" else ("random",)
+        faulty = pooled(found, group, scenarios, coupling, ice, level)
+        healthy = pooled(found, group, ("healthy",), coupling, ice, level)
+        name = f"{level}, {coupling}, ice {ice:g}"
+        print(summary(name if group == "wheel" else "  its steering", faulty, healthy))
         for text in detail(faulty) if asked.detail else ():
             print(text)
-        key = {"evidence": level, "coupling": coupling, "ice": ice}
+        key = {"evidence": level, "coupling": coupling, "ice": ice, "group": group}
         document["configurations"].append(key | {"faulty": faulty, "healthy": healthy})
     for text in sorted(failed):
         print(f"not judged: {text}")

@@ -23,19 +23,21 @@ def told(healthy: str) -> ModePath:
     [
         ("hhhhffffffffhhhh", 4, 12, 0, 4),
         ("hhhhhhffffffhhhh", 4, 12, 0, 6),  # two samples of evidence were needed
-        ("hhhhfhhfffffhhhh", 4, 12, 0, 7),  # the last rise counts: the first was taken back
-        ("hhhhffhffffhffff", 4, 16, 2, 4),  # withdrawn for a sample, less than the slack
+        ("hhhhfhhfffffhhhh", 4, 12, 1, 7),  # a blip that is withdrawn is no detection
+        ("hhhhfhffffffhhhh", 4, 12, 2, 4),  # unless it is withdrawn for less than the slack
+        ("hhhhffffhhhhhfff", 4, 16, 1, 4),  # one that lasts is, whatever follows
+        ("hhhhhhhhhhffhhhh", 4, 12, 0, 10),  # raised just before the end
         ("hhhfffffffffhhhh", 4, 12, 2, 4),  # raised a sample before the start found looking back
         ("ffffffffffffhhhh", 4, 12, 2, 4),  # raised long before
-        ("hhhhffffffffhhhh", 4, 13, 2, 4),  # the end found looking back is a sample late
-        ("hhhhffffffffhhhh", 4, 13, 0, None),  # and without slack the decision was taken back
+        ("hhhhhhhhffffhhhh", 4, 13, 2, 8),  # the end found looking back is a sample late
+        ("hhhhhhhhhhffhhhh", 4, 13, 0, None),  # without slack that decision neither lasts nor reaches the end
         ("hhhhhhhhhhhhhhhh", 4, 12, 2, None),
     ],
 )
-def test_last_rise_of_the_causal_decision(
+def test_first_rise_of_the_causal_decision_that_lasts(
     healthy: str, start: int, stop: int, slack: int, expected: int | None
 ) -> None:
-    assert told(healthy).crossing(start, stop, slack) == expected
+    assert told(healthy).crossing(start, stop, slack, hold=4) == expected
 
 
 def test_nothing_later_is_used() -> None:
@@ -50,6 +52,6 @@ def test_nothing_later_is_used() -> None:
     cut = most_probable(y[:210], x[:210], status[:210], busy[:210], model)
     np.testing.assert_array_equal(whole.filtered[:210], cut.filtered)
     assert (whole.row[200:] == NO_SIGNAL).all()
-    raised = whole.crossing(200, n, 3)
+    raised = whole.crossing(200, n, 3, 100)
     assert raised is not None
     assert 200 <= raised <= 201
