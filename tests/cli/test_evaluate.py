@@ -83,6 +83,49 @@ def test_tables(made: Path, capsys: pytest.CaptureFixture[str]) -> None:
         assert words in shown
 
 
+def test_figures_by_excitation_and_reliability_are_shown(made: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(["evaluate", str(made / "monday")]) == 0
+    shown = capsys.readouterr().out
+    for words in ("Wheels: by severity and excitation", "ε 0.7–1", " m/s ", "masked", "r_td", "delay  ", "Brier"):
+        assert words in shown
+    found = document([str(made / "monday")], capsys)["all"]["wheel"]
+    assert sum(b["faults"] for b in found["by_speed"]) == 1  # the commanded speed comes from report.parquet
+    assert found["detection_delay_s"]["n"] == 1
+    assert 0.0 <= found["detection_delay_s"]["median"] < 0.1
+
+
+def test_truth_as_the_second_word(made: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    elsewhere = tmp_path / "known.json"
+    elsewhere.write_bytes((made / "drive.truth.json").read_bytes())
+    found = document([str(made / "monday"), str(elsewhere)], capsys)
+    assert [r["truth"] for r in found["results"]] == [str(elsewhere)]
+    assert run(["evaluate", str(made / "monday"), str(elsewhere), "--truth", str(elsewhere)]) == 2
+
+
+def test_a_folder_stands_for_its_missions(made: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Its reports; where it has none, its logs with a truth beside them."""
+    found = document([str(made)], capsys)
+    assert [r["result"] for r in found["results"]] == [str(made / "monday")]
+    logs = tmp_path / "logs"
+    logs.mkdir()
+    for name in ("drive.mcap", "drive.truth.json"):
+        (logs / name).write_bytes((made / name).read_bytes())
+    (logs / "unknown.mcap").write_bytes((made / "drive.mcap").read_bytes())
+    found = document([str(logs)], capsys)
+    assert [r["result"] for r in found["results"]] == [str(logs / "drive.mcap")]
+
+
+def test_page(made: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    page = tmp_path / "scores.html"
+    assert run(["evaluate", str(made / "monday"), "-o", str(page)]) == 0
+    assert f"Wrote {page}" in capsys.readouterr().out.replace("\n", "")
+    assert "1 mission against the truth" in page.read_text(encoding="utf-8")
+    report = made / "monday" / "report.json"
+    assert run(["evaluate", str(report), "--html", str(report)]) == 2
+    assert "would be changed" in capsys.readouterr().err
+    assert document([str(made / "monday"), "--html", str(page)], capsys)["schema"] == "mfhca-evaluation/1"
+
+
 def test_what_was_not_right_is_listed(made: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     truth = json.loads((made / "drive.truth.json").read_text(encoding="utf-8"))
     truth["intervals"][0] |= {"component": "RL", "start_s": 3.0, "stop_s": 4.0}
