@@ -1,0 +1,264 @@
+"""A single drive with command, speed and effort, judged by what its controller answered to and what effort it took.
+
+Two kinds of evidence: the speed that the effort echoes (`diagnosis.drive_echo`) shows every fault of the speed's channel
+that the controller did not meet, and a channel that is constant; the effort beyond a map from healthy missions
+(`diagnosis.drive_load`) shows extra load or loss of effectiveness. A loss of gain that the controller met too leaves
+the first without a trace and looks like extra load in the second, so the sensor is called healthy only where both agree
+or where the log's faults were written into it afterwards.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from diagnosis.assessment import CODE, Assessment, Finding, unassessed
+from diagnosis.drive_echo import DriveRecord, echoed_speed, identify_echo
+from diagnosis.drive_load import LoadTrack, identify_effort, track_load
+from diagnosis.drive_rows import EchoPair, find_rows
+from diagnosis.modes import BLIND, PAIR
+from diagnosis.noise import rounding_step
+from diagnosis.pairs import sample_status
+from diagnosis.result import Epsilon, Hypothesis, Sat
+from replay.drive_model import DriveModel, EchoModel
+from replay.faults import FaultMode, Side, State
+from replay.machine import Limits
+
+Array = NDArray[np.float64]
+
+_WINDOW_S = 0.5
+_QUANTILE = 0.4
+_NOISE_RANGE = (0.7, 1.5)
+_STEP_RANGE = 0.1
+_QUIET = 0.4
+_LEAST_LOAD_S = 2.0
+_LEAST_LOAD = 2.0  # of a finding [standard deviations of a mission's offset]
+
+
+@dataclass(frozen=True)
+class DriveData:
+    """One drive's channels; shapes (n,), NaN where not valid.
+
+    Attributes
+    ----------
+    y : Array
+        Measured speed [m/s].
+    y_fresh : NDArray[np.bool_]
+        Steps with a new sample of it.
+    alive : NDArray[np.bool_]
+        Whether another channel of its source delivers.
+    command : Array
+        Commanded speed [m/s].
+    u : Array
+        Effort [unit of effort].
+    dt : float
+        Step [s].
+    model : DriveModel or None
+        From healthy missions; None: the echo is found in this mission, and there is no effort map.
+    span : float
+        Largest plausible speed [m/s].
+    u_max : float
+        Effort at which the controller saturates [unit of effort].
+    lsb : float or None
+        Rounding step of the speed [m/s]; None: found from the mission.
+    names : tuple[str, str, str]
+        Channels of speed, command and effort, for the text.
+    open_loop : bool
+        Whether faults were written into the log afterwards, so that the controller cannot have met them.
+    """
+
+    y: Array
+    y_fresh: NDArray[np.bool_]
+    alive: NDArray[np.bool_]
+    command: Array
+    u: Array
+    dt: float
+    model: DriveModel | None
+    span: float
+    u_max: float
+    lsb: float | None
+    names: tuple[str, str, str]
+    open_loop: bool = False
+
+    @property
+    def record(self) -> DriveRecord:
+        """The channels without their circumstances; an effort at its limit echoes nothing."""
+        free = np.abs(np.nan_to_num(self.u)) < 0.99 * self.u_max
+        return DriveRecord(self.y, self.command, np.where(free, self.u, np.nan), self.dt)
+
+
+def identify_drive(missions: Sequence[DriveData], least_speed: float) -> DriveModel:
+    """Find echo and effort map of a drive from several healthy missions.
+
+    Parameters
+    ----------
+    missions : Sequence[DriveData]
+        Healthy missions; their models are not used.
+    least_speed : float
+        Commanded speed from which the drive is driven [m/s].
+    """
+    records = [m.record for m in missions]
+    return DriveModel(echo=identify_echo(records), effort=identify_effort(records, least_speed))
+
+
+def assess_drive(data: DriveData, limits: Limits) -> tuple[Assessment, Assessment]:
+    """Judge sensor and actuator of a drive by its controller's echo and its effort.
+
+    Parameters
+    ----------
+    data : DriveData
+        Channels and model.
+    limits : Limits
+        What counts.
+
+    Returns
+    -------
+    tuple[Assessment, Assessment]
+        Sensor and actuator; not assessed where command and effort do not tell which speed the controller saw.
+    """
+    record = data.record
+    model = data.model or DriveModel()
+    echo = model.echo
+    if echo is None or abs(echo.step_s - data.dt) > _STEP_RANGE * data.dt:
+        echo = identify_echo([record])
+    if echo is None:
+        reason = "command and effort do not tell which speed the controller saw"
+        size = data.y.size
+        return unassessed(size, State.NOT_ASSESSED, reason), unassessed(size, State.NOT_ASSESSED, reason)
+    x = echoed_speed(echo, record)
+    pair = _pair(data, echo, x, limits)
+    findings, lead, below = find_rows(pair, limits)
+    quiet, known = pair.quiet, np.isfinite(data.y) & np.isfinite(x)
+    bad = np.zeros(data.y.size, dtype=np.bool_)
+    for f in findings:
+        bad[f.start : f.stop] = True
+    load: LoadTrack | None = None
+    if model.effort is not None:
+        clean = replace(record, y=np.where(bad, x, data.y))  # behind a faulty sensor the echo tells the speed
+        load = track_load(clean, model.effort, limits.driving_speed)
+    loaded = np.ones(data.y.size) if load is None else load.sampled(load.probability, data.y.size)
+    states = np.where(quiet, CODE[State.NOT_EXCITED], CODE[State.HEALTHY]).astype(np.int8)
+    states[~known & (pair.status != 2)] = CODE[State.NO_DATA]
+    actuator = states.copy()
+    if not data.open_loop:
+        states[(states == CODE[State.HEALTHY]) & ~(loaded < 0.5)] = CODE[State.NOT_ASSESSED]
+    for f in findings:
+        states[f.start : f.stop] = CODE[State(f.mode.value)]
+    actuator[(actuator == CODE[State.HEALTHY]) & ~(loaded < 0.5)] = CODE[State.NOT_ASSESSED]
+    more = [] if load is None or model.effort is None else _load_findings(load, model.effort.between, limits, data)
+    for f in more:
+        actuator[f.start : f.stop] = CODE[State(f.mode.value)]
+    reasons = {
+        State.NOT_EXCITED: "the drive is neither commanded nor moving",
+        State.NO_DATA: "no samples, or an effort at its limit",
+        State.NOT_ASSESSED: "no effort of healthy missions to compare with"
+        if load is None
+        else "the drive takes more effort than healthy missions did; a sensor that reads low would look the same",
+    }
+    columns = {
+        "residual": np.where(pair.status == PAIR, data.y - x, np.nan),
+        "threshold": np.full(x.size, 3 * pair.noise),
+        "expected": x,
+        "log_odds": lead,
+    }
+    notes = [
+        f"{data.names[0]} against the speed to which {data.names[2]} answered: noise {pair.noise:.3g} m/s "
+        f"({100 * pair.exact:.0f} % of the samples within {pair.core:.2g} m/s), integral time {echo.memory_s:.3g} s."
+    ]
+    if below:
+        notes.append(f"{below} deviations of {data.names[0]} lie below the limits of the machine file.")
+    drive_columns = {}
+    if load is not None:
+        size = data.y.size
+        drive_columns = {
+            "load_probability": load.sampled(load.probability, size),
+            "load": load.sampled(load.level, size),
+            "expected": load.sampled(load.expected, size),
+        }
+    return (
+        Assessment(states, reasons, tuple(findings), columns, "model", tuple(notes)),
+        Assessment(actuator, reasons, tuple(more), drive_columns, "model", tuple(notes)),
+    )
+
+
+def _pair(data: DriveData, echo: EchoModel, x: Array, limits: Limits) -> EchoPair:
+    status = sample_status(data.y, x, data.y_fresh, data.alive, data.dt)
+    commanded = np.isfinite(data.y) & np.isfinite(data.command) & np.isfinite(data.u)
+    status[data.y_fresh & commanded & ~np.isfinite(x)] = BLIND  # the effort is at its limit
+    still = _QUIET * limits.driving_speed
+    quiet = (np.abs(np.nan_to_num(data.command)) < still) & (np.abs(np.nan_to_num(x)) < still)
+    noise = _mission_noise(np.where(status == PAIR, data.y - x, np.nan), data.dt, echo.noise)
+    lsb = rounding_step(data.y[status == PAIR]) if data.lsb is None else data.lsb
+    return EchoPair(
+        y=data.y,
+        x=x,
+        status=status,
+        quiet=np.asarray(quiet),
+        lead=echo.first + len(echo.gains) - 1,
+        noise=noise,
+        core=echo.core,
+        exact=echo.exact,
+        lsb=lsb,
+        span=data.span,
+        dt=data.dt,
+        name=data.names[0],
+    )
+
+
+def _mission_noise(residual: Array, dt: float, known: float) -> float:
+    """Noise of this mission's quieter windows, no further from the known one than healthy missions differ."""
+    length = max(5, round(_WINDOW_S / dt))
+    count = residual.size // length
+    windows = residual[: count * length].reshape(count, length)
+    number = np.isfinite(windows).sum(axis=1)
+    power = np.nansum(windows**2, axis=1) / np.maximum(number, 1)
+    used = np.sqrt(power[number >= length / 2])
+    if not used.size:
+        return known
+    low, high = _NOISE_RANGE
+    return float(np.clip(np.quantile(used, _QUANTILE), low * known, high * known))
+
+
+def _load_findings(load: LoadTrack, between: float, limits: Limits, data: DriveData) -> list[Finding]:
+    """Stretches of probable extra load as loss of effectiveness: ε = load / (expected + load)."""
+    sure = np.nan_to_num(load.probability) >= limits.min_probability
+    edge = np.flatnonzero(np.diff(np.r_[False, sure, False].astype(np.int8)))
+    out = []
+    for a, b in zip(edge[::2], edge[1::2], strict=True):
+        level, expected = load.level[a:b], np.maximum(np.abs(load.expected[a:b]), 1e-9)
+        share = level / (expected + level)
+        epsilon, p = float(np.mean(share)), float(np.mean(load.probability[a:b]))
+        seconds = (b - a) * load.length * data.dt
+        if epsilon < limits.min_epsilon or seconds < _LEAST_LOAD_S or float(np.mean(level)) < _LEAST_LOAD * between:
+            continue
+        mode = FaultMode.NOISY if float(np.ptp(share)) > 0.5 * epsilon else FaultMode.INEFFICIENT
+        low, high = float(np.min(share)), float(np.max(share))
+        sat = None
+        if mode is FaultMode.NOISY:
+            mean, rms = -float(np.mean(level)), float(np.sqrt(np.mean(level**2)))
+            sat = Sat(mean, rms, -float(np.max(level)), -float(np.min(level)), "of full opening")
+        out.append(
+            Finding(
+                start=int(a) * load.length,
+                stop=int(b) * load.length,
+                side=Side.ACTUATOR,
+                mode=mode,
+                probability=p,
+                hypotheses=(
+                    Hypothesis("actuator", mode.value, p),
+                    Hypothesis("actuator", "healthy", 1 - p),
+                ),
+                epsilon=Epsilon(epsilon, low, high),
+                sat=sat,
+                evidence=(
+                    f"{data.names[2]} was {float(np.mean(level)):.3g} above the {float(np.mean(expected)):.3g} that healthy "
+                    f"missions needed for the same speed, over {seconds:.0f} s.",
+                    "An extra load and a loss of effectiveness look alike here.",
+                ),
+                tier="model",
+            )
+        )
+    return out

@@ -1,0 +1,203 @@
+"""Speed read back from a controller's effort: a second measurement of the speed that the controller saw.
+
+A proportional-integral controller answers to every change of speed, so that command and effort alone tell which speed
+it saw (`replay.drive_model.EchoModel`). A logged speed that differs from it is not what the controller acted on: its
+channel is at fault. A fault that the controller saw too leaves no difference; other evidence must show that one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.signal import lfilter
+
+from replay.drive_model import EchoModel
+
+Array = NDArray[np.float64]
+
+_MEMORIES = np.geomspace(0.1, 12.0, 19)  # integral times that are tried [s]
+_LEADS = range(-1, 9)
+_TAPS = 3
+_SETTLE_S = 0.6  # from this much of a stretch the controller's state before it is found
+_LEAST_S = 4.0
+_MOST_SAMPLES = 60_000
+_TUKEY = 4.0
+_LEAST_EXPLAINED = 0.5
+
+
+@dataclass(frozen=True)
+class DriveRecord:
+    """Speed, command and effort of one mission on a uniform axis, shapes (n,); NaN where not valid."""
+
+    y: Array
+    command: Array
+    u: Array
+    dt: float
+
+
+def stretches(valid: NDArray[np.bool_], least: int) -> list[slice]:
+    """Stretches of valid samples that are at least `least` long."""
+    edge = np.flatnonzero(np.diff(np.r_[False, valid, False].astype(np.int8)))
+    return [slice(int(a), int(b)) for a, b in zip(edge[::2], edge[1::2], strict=True) if b - a >= least]
+
+
+def high_passed(x: Array, memory_s: float, dt: float) -> Array:
+    """First-order high-pass of x with its first value as the level before it, shape (n,)."""
+    a = memory_s / (memory_s + dt)
+    return np.asarray(lfilter([a, -a], [1.0, -a], x - x[0]), dtype=np.float64)
+
+
+def _led(x: Array, lead: int) -> Array:
+    """x earlier by `lead` steps; the ends are held."""
+    return x[np.clip(np.arange(x.size) + lead, 0, x.size - 1)]
+
+
+def _fading(size: int, memory_s: float, dt: float) -> Array:
+    return np.asarray(np.exp(-np.arange(size) * dt / memory_s), dtype=np.float64)
+
+
+def echoed_speed(model: EchoModel, record: DriveRecord) -> Array:
+    """Speed that the controller saw, from command and effort; NaN where they are not logged. Shape (n,).
+
+    The state of the controller before a stretch is unknown: it is found from the measured speed of the stretch's first
+    0.6 s and fades with the integral time.
+
+    Parameters
+    ----------
+    model : EchoModel
+        Of this drive.
+    record : DriveRecord
+        The mission.
+    """
+    out = np.full(record.y.size, np.nan)
+    for part in stretches(np.isfinite(record.command) & np.isfinite(record.u), len(model.gains) + 2):
+        u = high_passed(record.u[part], model.memory_s, record.dt)
+        x = record.command[part] + model.setpoint * high_passed(record.command[part], model.memory_s, record.dt)
+        for i, gain in enumerate(model.gains):
+            x = x + gain * _led(u, model.first + i)
+        fade = _fading(x.size, model.memory_s, record.dt)
+        head = slice(0, max(3, round(_SETTLE_S / record.dt)))
+        off, w = (record.y[part] - x)[head], fade[head]
+        known = np.isfinite(off)
+        if known.any():
+            x = x + fade * float(off[known] @ w[known]) / float(w[known] @ w[known])
+        out[part] = x
+    return out
+
+
+def identify_echo(records: Sequence[DriveRecord]) -> EchoModel | None:
+    """Find the echo of a drive from missions that may hold faults in less than half of their time.
+
+    Parameters
+    ----------
+    records : Sequence[DriveRecord]
+        Missions with the same step, within a tenth; others are left out.
+
+    Returns
+    -------
+    EchoModel or None
+        None where effort and command do not explain at least half of the variance of the tracking error.
+    """
+    if not records:
+        return None
+    dt = float(np.median([r.dt for r in records]))
+    parts = [
+        (record.y[p], record.command[p], record.u[p])
+        for record in records
+        if abs(record.dt - dt) <= 0.1 * dt
+        for p in stretches(
+            np.isfinite(record.y) & np.isfinite(record.command) & np.isfinite(record.u), round(_LEAST_S / dt)
+        )
+    ]
+    if not parts or max(float(np.ptp(u)) for _, _, u in parts) <= 0:
+        return None
+    target = np.concatenate([y - r for y, r, _ in parts])
+    every = max(1, target.size // _MOST_SAMPLES)
+    best: tuple[float, float, int] | None = None
+    for memory in _MEMORIES:
+        design, error = _regression(parts, float(memory), dt, _LEADS)
+        theta = _robust(design[::every], error[::every])
+        first = _LEADS[int(np.argmax(np.abs(theta[: len(_LEADS)])))] - _TAPS // 2
+        design, error = _regression(parts, float(memory), dt, range(first, first + _TAPS))
+        rest = error - design @ _robust(design[::every], error[::every])
+        spread = _spread(rest)
+        if best is None or spread < best[0]:
+            best = spread, float(memory), first
+    assert best is not None
+    _, memory, first = best
+    design, error = _regression(parts, memory, dt, range(first, first + _TAPS))
+    theta = _robust(design[::every], error[::every])
+    rest = error - design @ theta
+    noise = _size(rest)
+    if noise <= 0 or noise**2 > (1 - _LEAST_EXPLAINED) * _size(target - np.median(target)) ** 2:
+        return None
+    exact, core = _exact_share(rest[:: max(1, rest.size // _MOST_SAMPLES)], noise)
+    return EchoModel(tuple(float(g) for g in theta[:_TAPS]), first, memory, float(theta[_TAPS]), noise, exact, core, dt)
+
+
+def _exact_share(rest: Array, noise: float) -> tuple[float, float]:
+    """Share and noise of the narrower of two normal distributions around 0, by expectation maximisation."""
+    share, core, late = 0.5, 0.2 * noise, 1.4 * noise
+    z = rest[np.abs(rest) < 5 * noise]
+    for _ in range(100):
+        a = share * np.exp(-0.5 * (z / core) ** 2) / core
+        b = (1 - share) * np.exp(-0.5 * (z / late) ** 2) / late
+        g = a / np.maximum(a + b, 1e-300)
+        share = float(np.clip(np.mean(g), 0.02, 0.98))
+        core = max(float(np.sqrt(g @ z**2 / max(float(np.sum(g)), 1e-9))), 0.01 * noise)
+        late = max(float(np.sqrt((1 - g) @ z**2 / max(float(np.sum(1 - g)), 1e-9))), core)
+    return share, core
+
+
+def _regression(
+    parts: Sequence[tuple[Array, Array, Array]], memory: float, dt: float, leads: range
+) -> tuple[Array, Array]:
+    """Design and target of e = v − r on the high-passed effort; the state before each stretch is projected out."""
+    designs, targets = [], []
+    for y, r, u in parts:
+        h = high_passed(u, memory, dt)
+        design = np.column_stack([*(_led(h, k) for k in leads), high_passed(r, memory, dt), y - r])
+        fade = _fading(y.size, memory, dt)
+        fade /= np.sqrt(float(fade @ fade))
+        design -= np.outer(fade, fade @ design)
+        designs.append(design[:, :-1])
+        targets.append(design[:, -1])
+    return np.vstack(designs), np.concatenate(targets)
+
+
+def _spread(x: Array) -> float:
+    """Standard deviation by the median absolute deviation."""
+    return 1.4826 * float(np.median(np.abs(x - np.median(x))))
+
+
+def _size(x: Array) -> float:
+    """Root mean square of all but the largest two percent: most samples of an echo are exact, the others are a step late."""
+    kept = np.abs(x) <= np.quantile(np.abs(x), 0.98)
+    return float(np.sqrt(np.mean(x[kept] ** 2)))
+
+
+def _robust(design: Array, target: Array) -> Array:
+    """Tukey's biweight regression from a few reweighted steps; columns without variance get 0."""
+    alive = np.ptp(design, axis=0) > 0
+    used = design[:, alive]
+    scale = np.sqrt(np.mean(used**2, axis=0))
+    used = used / scale
+    ridge = 1e-9 * target.size * np.eye(used.shape[1])
+    weight = np.ones(target.size)
+    solution = np.zeros(used.shape[1])
+    for step in range(8):
+        weighted = used * weight[:, None]
+        solution = np.linalg.solve(used.T @ weighted + ridge, weighted.T @ target)
+        rest = target - used @ solution
+        size = _spread(rest)
+        if size <= 0:
+            break
+        z = np.abs(rest) / size
+        # first steps by the absolute value, which needs no good start
+        weight = 1 / np.maximum(z, 0.3) if step < 4 else np.clip(1 - (z / _TUKEY) ** 2, 0.0, None) ** 2
+    out = np.zeros(design.shape[1])
+    out[alive] = solution / scale
+    return out
