@@ -12,12 +12,13 @@ from diagnosis.assessment import CODE, Assessment, Finding, unassessed
 from diagnosis.channels import alive, make_pair
 from diagnosis.direct import assess_pair
 from diagnosis.steering_blocks import SensorNoise, SteeringBlocks, blocks_of, sensor_noise
-from diagnosis.steering_filter import SteeringPath, allowed_models, follow_path, most_probable
-from diagnosis.steering_findings import SteeringData, judge_side, tidy
+from diagnosis.steering_filter import SteeringPath, allowed_models, most_probable
+from diagnosis.steering_findings import judge_side
 from diagnosis.steering_model import model_of
 from diagnosis.steering_onset import refined
 from diagnosis.steering_plant import SteeringPlant, identify_plants
 from diagnosis.steering_states import BLIND_ROWS, REASONS, states_of
+from diagnosis.steering_tidy import SteeringData, tidy
 from replay.faults import Side, State
 from replay.loop import Replay
 from replay.machine import Machine, Noise
@@ -177,9 +178,7 @@ def _by_model(
     allowed = allowed_models(sensor=axle.measured == "phi", actuator=axle.driven_by == "u" and plant.reliable)
     names = (axle.channel(axle.measured), axle.channel(axle.driven_by))
     data = SteeringData(blocks, driven, model, allowed, names)
-    first = most_probable(blocks, driven, model, allowed)
-    models = tidy(data, first.model)
-    path = SteeringPath(models, *follow_path(blocks, driven, model, models, slice(None))[:2])
+    path = tidy(data, most_probable(blocks, driven, model, allowed))
     judged = {side: judge_side(side, data, path, machine.limits) for side in (Side.SENSOR, Side.ACTUATOR)}
     y = axle.values(axle.measured)
     fresh = axle.timeline.fresh[names[0]]

@@ -23,13 +23,21 @@ class SteeringPath:
     ----------
     model : NDArray[np.uint8], shape (m,)
         Model of each block, an index into `steering_scan.SENSOR` and `ACTUATOR`.
-    mean, variance : Array, shape (m, 6)
+    mean, cov : Array, shape (m, 6) and (m, 6, 6)
         Of [φ, r, a, b, d, c] along that path.
+    noise : Array, shape (m, 2)
+        α and β of the sensor's noise where it is learned.
     """
 
     model: NDArray[np.uint8]
     mean: Array
-    variance: Array
+    cov: Array
+    noise: Array
+
+    @property
+    def variance(self) -> Array:
+        """Variances of [φ, r, a, b, d, c], shape (m, 6)."""
+        return np.asarray(np.diagonal(self.cov, axis1=1, axis2=2))
 
     @property
     def sensor(self) -> NDArray[np.int64]:
@@ -60,26 +68,10 @@ def start_state(first: float, p: Array) -> tuple[Array, Array, Array, Array]:
     return score, z, P, ig
 
 
-def _first(blocks: SteeringBlocks, part: slice) -> float:
-    known = np.flatnonzero(blocks.status[part] == PAIR)
-    return float(blocks.mean[part][known[0]]) if known.size else 0.0
-
-
-def _arrays(blocks: SteeringBlocks, driven: Array, part: slice) -> tuple[Array, ...]:
-    return (
-        blocks.mean[part],
-        blocks.power[part],
-        blocks.count[part],
-        driven[part],
-        blocks.u[part],
-        blocks.status[part],
-    )
-
-
 def most_probable(
     blocks: SteeringBlocks, driven: Array, model: SteeringModel, allowed: NDArray[np.bool_]
-) -> SteeringPath:
-    """Most probable models over a mission.
+) -> NDArray[np.uint8]:
+    """Most probable model of each block of a mission, as Viterbi's recursion leaves it.
 
     Parameters
     ----------
@@ -93,21 +85,25 @@ def most_probable(
         Models to consider; the first is always.
     """
     p = model.packed()
-    everything = slice(None)
-    score, z, P, ig = start_state(_first(blocks, everything), p)
+    score, z, P, ig = start_state(_first(blocks), p)
     score[~allowed] = -1e12
     back = np.full((blocks.mean.size, ss.MODELS), STAY, dtype=np.uint8)
-    ss.scan(*_arrays(blocks, driven, everything), allowed, p, score, z, P, ig, back)
+    b = blocks
+    ss.scan(b.mean, b.power, b.count, driven, b.u, b.status, allowed, p, score, z, P, ig, back)
     path, _ = trace(back, int(np.argmax(score)))
-    return SteeringPath(path, *follow_path(blocks, driven, model, path, everything)[:2])
+    return np.asarray(path)
 
 
-def follow_path(
-    blocks: SteeringBlocks, driven: Array, model: SteeringModel, path: NDArray[np.uint8], part: slice
-) -> tuple[Array, Array, Array]:
-    """States along a given path over a part of the mission: mean and variance (m, 6), log-evidence by block (m,)."""
-    p = model.packed()
-    _, z, P, ig = start_state(_first(blocks, part), p)
-    out = np.zeros((path.size, 2 * ss.STATES))
-    told = ss.follow(*_arrays(blocks, driven, part), path, p, z, P, ig, out)
-    return out[:, : ss.STATES], out[:, ss.STATES :], told
+def follow_path(blocks: SteeringBlocks, driven: Array, model: SteeringModel, path: NDArray[np.uint8]) -> SteeringPath:
+    """States along a given path."""
+    size = path.size
+    mean, cov = np.zeros((size, ss.STATES)), np.zeros((size, ss.STATES, ss.STATES))
+    noise = np.ones((size, 2))
+    b = blocks
+    ss.follow(b.mean, b.power, b.count, driven, b.u, b.status, path, _first(blocks), model.packed(), mean, cov, noise)
+    return SteeringPath(path.copy(), mean, cov, noise)
+
+
+def _first(blocks: SteeringBlocks) -> float:
+    known = np.flatnonzero(blocks.status == PAIR)
+    return float(blocks.mean[known[0]]) if known.size else 0.0

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,9 +11,8 @@ from diagnosis import steering_scan as ss
 from diagnosis.assessment import Finding
 from diagnosis.modes import PAIR
 from diagnosis.result import Epsilon, Hypothesis, Sat
-from diagnosis.steering_blocks import SteeringBlocks
-from diagnosis.steering_filter import SteeringPath, follow_path
-from diagnosis.steering_model import SteeringModel
+from diagnosis.steering_filter import SteeringPath
+from diagnosis.steering_tidy import SteeringData, end_state, evidence_of, runs_of
 from replay.faults import FaultMode, Side
 from replay.machine import Limits
 
@@ -28,21 +26,8 @@ MODES = {
     ss.NOISY: FaultMode.NOISY,
     ss.DRIFT: FaultMode.NOISY,
 }
-_TEMPER = 0.2
-_RUN_IN_S, _RUN_OUT_S = 2.0, 1.0
-_GAP_S = 0.1
+_TEMPER = 0.35
 _MOST = 0.6
-
-
-@dataclass(frozen=True)
-class SteeringData:
-    """What judging an axle needs; `driven` as in `steering_filter`, `names` of angle and command."""
-
-    blocks: SteeringBlocks
-    driven: Array
-    model: SteeringModel
-    allowed: NDArray[np.bool_]
-    names: tuple[str, str]
 
 
 @dataclass(frozen=True)
@@ -64,80 +49,25 @@ def model_number(sensor: int, actuator: int) -> int:
     return int(found[0]) if found.size else -1
 
 
-def _runs(x: NDArray[np.int64]) -> Iterator[tuple[int, int, int]]:
-    cut = np.flatnonzero(np.r_[True, x[1:] != x[:-1]])
-    for a, b in zip(cut, np.r_[cut[1:], x.size], strict=True):
-        yield int(a), int(b), int(x[a])
-
-
-def evidence_of(data: SteeringData, path: Path, start: int, stop: int) -> float:
-    """Log-evidence of a path over [start, stop) with a run-in and a run-out, its switches paid for."""
-    dt = data.blocks.dt
-    a, b = max(0, start - round(_RUN_IN_S / dt)), min(path.size, stop + round(_RUN_OUT_S / dt))
-    part = path[a:b]
-    told = follow_path(data.blocks, data.driven, data.model, part, slice(a, b))[2]
-    cost = data.model.switch_cost
-    paid = sum(ss.switch_cost(part[k], part[k - 1], cost) for k in (np.flatnonzero(part[1:] != part[:-1]) + 1).tolist())
-    return float(told[max(0, start - a - round(0.1 / dt)) :].sum()) - float(paid)
-
-
-def tidy(data: SteeringData, path: Path) -> Path:
-    """Replace the models of an episode by a single one where that explains it better, and drop flickers.
-
-    Viterbi's recursion keeps one entry per model, so that it may stray for some blocks before it settles.
-    """
-    path = path.copy()
-    dt = data.blocks.dt
-    for a, b, faulty in list(_runs((path != 0).astype(np.int64))):
-        if faulty == 0 and a > 0 and b < path.size and (b - a) * dt < _GAP_S:
-            path[a:b] = path[a - 1]
-    for a, b, faulty in list(_runs((path != 0).astype(np.int64))):
-        if not faulty:
-            continue
-        best, most = path[a:b].copy(), evidence_of(data, path, a, b)
-        trial = path.copy()
-        for m in np.unique(path[a:b]):
-            trial[a:b] = m
-            told = evidence_of(data, trial, a, b)
-            if told > most:
-                best, most = trial[a:b].copy(), told
-        path[a:b] = best
-        _merge(data, path, a, b, most)
-    return path
-
-
-def _merge(data: SteeringData, path: Path, a: int, b: int, most: float) -> None:
-    """Give a stretch of an episode to one of its neighbours wherever that explains it better."""
-    k = 0
-    while True:
-        cuts = np.concatenate([[a], a + 1 + np.flatnonzero(np.diff(path[a:b].astype(np.int64))), [b]])
-        if k >= cuts.size - 1:
-            return
-        c, d = int(cuts[k]), int(cuts[k + 1])
-        before = path[c:d].copy()
-        best = before
-        for m in {int(path[j]) for j in (c - 1, d) if 0 <= j < path.size} - {int(before[0])}:
-            path[c:d] = m
-            told = evidence_of(data, path, a, b)
-            if told > most:
-                best, most = path[c:d].copy(), told
-        path[c:d] = best
-        k = max(0, k - 1) if best is not before else k + 1
-
-
 def judge_side(side: Side, data: SteeringData, path: SteeringPath, limits: Limits) -> list[Judged]:
     """Judge every faulty run of one side."""
     rows = path.sensor if side is Side.SENSOR else path.actuator
     rows = np.where(rows == ss.DRIFT, ss.NOISY, rows)
     out = []
-    for a, b, row in _runs(rows):
+    for a, b, row in runs_of(rows):
         if row != ss.OK:
             out.append(_judge(side, a, b, row, data, path, limits))
     return out
 
 
-def _alternatives(side: Side, a: int, b: int, data: SteeringData, path: Path) -> dict[tuple[str, int], float]:
-    """Log-evidence of every row that [a, b) may be in: on this side, on the other one instead, and of none."""
+def _alternatives(
+    side: Side, a: int, b: int, data: SteeringData, known: SteeringPath, min_sat: float
+) -> dict[tuple[str, int], float]:
+    """Log-evidence of every row that [a, b) may be in: on this side, on the other one instead, and of none.
+
+    A valve stuck closed is one without control signal.
+    """
+    path = known.model
     sensor, actuator = ss.SENSOR[path[a:b]], ss.ACTUATOR[path[a:b]]
     other_free = bool(np.mean((actuator if side is Side.SENSOR else sensor) == ss.OK) > 0.5)
     out: dict[tuple[str, int], float] = {}
@@ -155,15 +85,23 @@ def _alternatives(side: Side, a: int, b: int, data: SteeringData, path: Path) ->
                 continue
             trial[a:b] = [numbers[pair] for pair in pairs]
             key = ("none", ss.OK) if row == ss.OK else (name.value, row)
-            out[key] = evidence_of(data, trial, a, b)
+            told = evidence_of(data, known, trial, a, b)
+            if key == ("actuator", ss.STUCK) and abs(_opening_at(data, known, trial, a, b)) < min_sat:
+                key = ("actuator", ss.NONE)
+            out[key] = max(told, out.get(key, -np.inf))
     if ("none", ss.OK) not in out:
         trial[a:b] = 0
-        out["none", ss.OK] = evidence_of(data, trial, a, b)
+        out["none", ss.OK] = evidence_of(data, known, trial, a, b)
     return out
 
 
+def _opening_at(data: SteeringData, known: SteeringPath, path: Path, a: int, b: int) -> float:
+    """Opening of a valve that is taken for stuck in [a, b) [fraction]."""
+    return float(end_state(data, known, path, a, b)[3]) / data.model.plant.gain
+
+
 def _judge(side: Side, a: int, b: int, row: int, data: SteeringData, path: SteeringPath, limits: Limits) -> Judged:
-    evidence = _alternatives(side, a, b, data, path.model)
+    evidence = _alternatives(side, a, b, data, path, limits.min_sat)
     top = max(evidence.values())
     weight = {key: np.exp(max(-700.0, _TEMPER * (value - top))) for key, value in evidence.items()}
     total = sum(weight.values())

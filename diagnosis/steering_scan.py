@@ -198,7 +198,7 @@ def update(m, y, power, count, p, z, P, ig, gain):  # type: ignore[no-untyped-de
     if s == GAIN:
         z[m, 4] = min(max(z[m, 4], _LEAST_GAIN), _MOST_GAIN)
     if ACTUATOR[m] == GAIN or ACTUATOR[m] == NOISY:
-        z[m, 2] = min(max(z[m, 2], 0.0), _MOST_GAIN)
+        z[m, 2] = min(max(z[m, 2], _LEAST_GAIN), _MOST_GAIN)
     return told
 
 
@@ -271,16 +271,48 @@ def scan(y, power, count, driven, u, status, allowed, p, score, z, P, ig, back):
 
 
 @njit(cache=True)
-def follow(y, power, count, driven, u, status, path, p, z, P, ig, out):  # type: ignore[no-untyped-def]
-    """Run only the model that `path` names in each block; writes means and variances (n, 12), returns evidence."""
+def follow(y, power, count, driven, u, status, path, first, p, Z, C, G):  # type: ignore[no-untyped-def]
+    """Run only the model that `path` names in each block; writes its mean, covariance and noise after each block."""
+    z, P, ig = _started(path[0], first, p)
     row = np.zeros((3, STATES))
-    told = np.zeros(y.size)
     for k in range(y.size):
         m = path[k]
         if k > 0 and m != path[k - 1]:
             enter(m, path[k - 1], p, z, P, ig)
-        told[k] = advance(m, y[k], power[k], count[k], driven[k], u[k], status[k], p, z, P, ig, row)
-        for i in range(STATES):
-            out[k, i] = z[m, i]
-            out[k, STATES + i] = P[m, i, i]
-    return told
+        advance(m, y[k], power[k], count[k], driven[k], u[k], status[k], p, z, P, ig, row)
+        Z[k], C[k], G[k] = z[m], P[m], ig[m]
+
+
+@njit(cache=True)
+def _started(m, first, p):  # type: ignore[no-untyped-def]
+    """States in which model m has just begun at the measured angle `first`."""
+    z, P, ig = np.zeros((MODELS, STATES)), np.zeros((MODELS, STATES, STATES)), np.ones((MODELS, 2))
+    z[m, 0] = min(max(first, -p[4]), p[4])
+    P[m, 0, 0], P[m, 1, 1] = p[4] ** 2, (0.2 * p[3]) ** 2
+    enter(m, m, p, z, P, ig)
+    return z, P, ig
+
+
+@njit(cache=True)
+def path_evidence(y, power, count, driven, u, status, path, a, b, known, p, Z, C, G):  # type: ignore[no-untyped-def]
+    """Log-evidence of blocks a…b of a path, less the price of its switches, and [φ, r, a, b, d, c] at the end.
+
+    The states before block a are those of `follow` on the path `known`.
+    """
+    if a > 0:
+        z, P, ig = np.zeros((MODELS, STATES)), np.zeros((MODELS, STATES, STATES)), np.ones((MODELS, 2))
+        before = known[a - 1]
+        z[before], P[before], ig[before] = Z[a - 1], C[a - 1], G[a - 1]
+    else:
+        before = path[0]
+        z, P, ig = _started(before, y[0], p)
+    row = np.zeros((3, STATES))
+    total = 0.0
+    for k in range(a, b):
+        m = path[k]
+        if m != before:
+            enter(m, before, p, z, P, ig)
+            total -= switch_cost(m, before, p[15])
+            before = m
+        total += advance(m, y[k], power[k], count[k], driven[k], u[k], status[k], p, z, P, ig, row)
+    return total, z[before].copy()

@@ -11,7 +11,7 @@ from diagnosis import steering_scan as ss
 from diagnosis.assessment import CODE, Finding
 from diagnosis.noise import moving_sum
 from diagnosis.steering_filter import SteeringPath
-from diagnosis.steering_findings import SteeringData
+from diagnosis.steering_tidy import SteeringData
 from replay.faults import Side, State
 
 Array = NDArray[np.float64]
