@@ -93,5 +93,7 @@ def _truth_of(path: Path) -> Path:
 
 def _beside(log: Path) -> Path:
     """``<stem>.truth.json`` beside a log; a compressed table loses both endings."""
+    if log.name in ("", ".."):
+        log = log.resolve()
     stem = log.name if log.is_dir() else log.name.removesuffix(".gz").rsplit(".", 1)[0]
-    return log.with_name(f"{stem or log.name}.truth.json")
+    return log.parent / f"{stem or log.name}.truth.json"

@@ -108,6 +108,10 @@ def _time(seconds: float | None) -> str:
     return "–" if seconds is None else names.span(abs(seconds)) if seconds >= -5e-4 else f"−{names.span(-seconds)}"
 
 
+def _faults(count: int) -> str:
+    return f"{count} fault{'s' if count != 1 else ''}"
+
+
 def _both(e: Mapping[str, Any]) -> str:
     """Median and 95 % quantile of a time in one unit."""
     if not e["n"]:
@@ -157,8 +161,8 @@ def _kpis(figures: Mapping[str, Any]) -> Iterator[tuple[str, str, str]]:
     yield "isolated, of detected", _share(events["isolation_rate"]), more
     for key, title in _TIMES.items():
         e = figures[key]
-        yield f"{title.lower()}, median", _time(e["median"]), f"95 %: {_time(e['p95'])}, over {e['n']} faults"
-    more = f"over {epsilon['n']} faults; inefficient and noisy {_share(epsilon['mae_partial'])}"
+        yield f"{title.lower()}, median", _time(e["median"]), f"95 %: {_time(e['p95'])}, over {_faults(e['n'])}"
+    more = f"over {_faults(epsilon['n'])}; inefficient and noisy {_share(epsilon['mae_partial'])}"
     yield "error of ε̂, mean", _share(epsilon["mae"]), more
 
 
@@ -211,7 +215,7 @@ def _plots(
         plot = distribution(f"{title}: {name.lower()}", values)
         if plot:
             e = figures[key]
-            words = f"Median {_time(e['median'])}, 95 % {_time(e['p95'])}, over {e['n']} faults"
+            words = f"Median {_time(e['median'])}, 95 % {_time(e['p95'])}, over {_faults(e['n'])}"
             missing = e.get("without", 0)
             yield name, plot, words + (f"; {missing} more without a known moment." if missing else ".")
 

@@ -102,7 +102,9 @@ def test_truth_as_the_second_word(made: Path, tmp_path: Path, capsys: pytest.Cap
     assert run(["evaluate", str(made / "monday"), str(elsewhere), "--truth", str(elsewhere)]) == 2
 
 
-def test_a_folder_stands_for_its_missions(made: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_folder_stands_for_its_missions(
+    made: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
     """Its reports; where it has none, its logs with a truth beside them."""
     found = document([str(made)], capsys)
     assert [r["result"] for r in found["results"]] == [str(made / "monday")]
@@ -113,6 +115,8 @@ def test_a_folder_stands_for_its_missions(made: Path, tmp_path: Path, capsys: py
     (logs / "unknown.mcap").write_bytes((made / "drive.mcap").read_bytes())
     found = document([str(logs)], capsys)
     assert [r["result"] for r in found["results"]] == [str(logs / "drive.mcap")]
+    monkeypatch.chdir(logs)
+    assert [r["result"] for r in document(["."], capsys)["results"]] == ["drive.mcap"]
 
 
 def test_page(made: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

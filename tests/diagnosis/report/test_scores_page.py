@@ -111,7 +111,7 @@ def test_confusion_has_shares_seconds_and_signs() -> None:
 def test_leading_figures() -> None:
     text = Tree(build_scores_page(document(("drive", counted())))).text
     assert "1 of 2 right; precision 0.500, recall 0.500" in text
-    assert "detection delay, median 20 ms 95 %: 20 ms, over 1 faults" in text
+    assert "detection delay, median 20 ms 95 %: 20 ms, over 1 fault" in text
     assert "onset error, median 4 ms" in text
     assert "true detection r_td, sensor 0.900" in text
     assert "false alarms per healthy hour 42.4" in text  # 1 in 85 s
