@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shlex
 from collections.abc import Sequence
+from contextlib import suppress
 from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -210,8 +211,9 @@ def _doubts(files: Sequence[MissionFile], paths: Sequence[Path], before: Signals
     out += [f"{file.path}: is damaged ({text})" for file in files for text in file.summary.damage[:1]]
     for path in paths:
         own = truth_path(path, folder=path.is_dir())
-        if own.is_file() and read_truth(own).intervals:
-            out.append(f"{path}: {own.name} names faults that it holds already; the new truth does not know them")
+        with suppress(ConfigError):  # a file of that name that is no truth
+            if read_truth(own).intervals:
+                out.append(f"{path}: {own.name} names faults that it holds already; the new truth does not know them")
     return out
 
 

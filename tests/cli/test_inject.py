@@ -166,3 +166,19 @@ def test_an_injected_log_takes_no_more_faults(
     words = ["inject", str(first), *drive[1:], "-o", str(tmp_path / "g.parquet"), "--fault", "B sensor stuck 20 30"]
     assert run(words) == 2
     assert "already injected" in capsys.readouterr().err
+
+
+def test_the_help_has_examples(capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(["inject", "--help"]) == 0
+    assert "mfhca inject drive.mcap -o faulty.mcap" in capsys.readouterr().out
+
+
+def test_faults_of_a_simulated_original_are_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    log = tmp_path / "drive.mcap"
+    words = ["--scenario", "healthy", "--duration", "8", "--rate", "100", "--fault", "FR sensor stuck 2 3"]
+    assert run(["simulate", "-q", "-o", str(log), *words]) == 0
+    assert run(["inject", str(log), "-o", str(tmp_path / "f.mcap"), "--fault", "RL sensor no_signal 4 6"]) == 0
+    assert "drive.truth.json names faults that it holds already" in capsys.readouterr().err
+    (tmp_path / "drive.truth.json").write_text("{}")
+    assert run(["inject", str(log), "-o", str(tmp_path / "g.mcap"), "--fault", "RL sensor no_signal 4 6"]) == 0
+    assert "names faults" not in capsys.readouterr().err
