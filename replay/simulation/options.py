@@ -125,6 +125,7 @@ class SimulationOptions:
             check_range("ice", self.ice, 0.0, 0.9, "of the ground")
         if self.zeta is not None:
             check_range("zeta", self.zeta, 0.0, 1e9, "s/m^2")
+        check_range("psi0", self.psi0, 0.0, 10.0, "")
         check_range("steepness", self.steepness, 0.0, 3.0, "")
         check_range("ramp_share", self.ramp_share, 0.0, 1.0, "of the faults")
         check_range("ramp_max_s", self.ramp_max_s, 0.5, 60.0, "s")

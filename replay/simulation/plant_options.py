@@ -85,5 +85,10 @@ class PlantOptions:
         if self.v_lsb is not None:
             check_range("plant.v_lsb", self.v_lsb, 1e-6, 0.1, "m/s")
         check_range("plant.mass", self.mass, 500.0, 1e5, "kg")
+        check_range("plant.pump_flow", self.pump_flow, 1e-5, 1.0, "m^3/s")
+        check_range("plant.slip_stiffness", self.slip_stiffness, 1e3, 1e6, "N")
+        check_range("plant.rolling_resistance", self.rolling_resistance, 0.0, 1.0, "of the weight")
+        check_range("plant.phi_std", self.phi_std, 0.0, 0.1, "rad")
+        check_range("plant.phi_lsb", self.phi_lsb, 1e-6, 0.1, "rad")
         check_range("plant.friction", self.friction, 0.01, 2.0, "")
         check_range("plant.ice_friction", self.ice_friction, 0.001, 2.0, "")

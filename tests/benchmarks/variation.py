@@ -28,9 +28,10 @@ from diagnosis.scores import figures
 from replay.errors import MfhcaError
 from replay.machine import haulotte
 from replay.signals import Signals
-from replay.simulation.options import SimulatedMission, SimulationOptions
+from replay.simulation.options import SimulatedMission, SimulationOptions, channel_group
 from replay.simulation.run import simulate_mission
 from replay.simulation.variation import POOLS, Kind, varied_options
+from replay.sources import SignalSource
 
 _RATES = ((0.0, 100.0), (100.0, 300.0), (300.0, 1000.0))
 _ONSETS = ("at once", "growing", "from the first sample")
@@ -59,14 +60,19 @@ class Outcome:
 
 
 def recorded_signals(mission: SimulatedMission, evidence: str) -> Signals:
-    """Signals with less evidence, without the rows that the recorder lost."""
+    """Signals with less evidence, without the rows that the recorder lost; each group of channels is a topic."""
     signals = signals_of(mission, evidence)
     items = {
-        name: replace(signals.items[name], stamps=stamps, values=values)
+        name: replace(signals.items[name], stamps=stamps, values=values, origin=_origin(name))
         for name, stamps, values in mission.series()
         if name in signals.items
     }
     return replace(signals, items=items)
+
+
+def _origin(name: str) -> SignalSource:
+    slow = name.startswith(("gnss.", "imu."))
+    return SignalSource(topic=f"/{name.partition('.')[0] if slow else channel_group(name)}", field=name)
 
 
 def judge(options: SimulationOptions, evidence: Sequence[str]) -> list[Outcome | str]:

@@ -79,3 +79,19 @@ def test_a_recording_is_never_replaced(tmp_path: Path, capsys: pytest.CaptureFix
     assert run(["simulate", "-o", str(log), *SHORT]) == 2
     assert "exists and was not simulated" in capsys.readouterr().err
     assert log.read_text() == "recorded"
+
+
+def test_constants_and_varied_machines(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    plain, slow, lossy, varied = (tmp_path / f"{name}.csv" for name in ("plain", "slow", "lossy", "varied"))
+    assert run(["simulate", "-q", "-o", str(plain), *SHORT]) == 0
+    assert run(["simulate", "-q", "-o", str(slow), *SHORT, "--set", "K=0.5", "--set", "lambda=0.5"]) == 0
+    assert run(["simulate", "-q", "-o", str(lossy), *SHORT, "--set", "drop_share=0.3", "--set", "jitter=0.5"]) == 0
+    assert run(["simulate", "-q", "-o", str(varied), "--vary", "--seed", "7", "--duration", "4"]) == 0
+    assert plain.read_bytes() != slow.read_bytes()
+    assert lossy.read_text().count(",,") > plain.read_text().count(",,") + 100
+    assert read_truth(tmp_path / "varied.truth.json").duration_s == 4.0
+    for setting, word in (("k=1", "'k' is not known"), ("K=big", "no number"), ("K=1e9", "plant.K")):
+        assert run(["simulate", "-o", str(tmp_path / "x.csv"), *SHORT, "--set", setting]) == 2
+        assert word in capsys.readouterr().err
+    assert run(["simulate", "-o", str(tmp_path / "x.csv"), "--vary", "--seed", "1500"]) == 2
+    assert "at least 2000" in capsys.readouterr().err
