@@ -122,8 +122,8 @@ def _check(fault: FaultSpec, machine: Machine, signals: Signals, length: float, 
         _need(who, f"wheel.{fault.component}.v", signals)
         if fault.component not in machine.plant.wheels:
             raise ConfigError(
-                f"{who}: --plant needs K and tau of wheel {fault.component}; give them in the machine file's "
-                f"[plant.{fault.component}]"
+                f"{who}: --plant needs K and tau of wheel {fault.component}; give them in the machine file's [plant], or "
+                "measure them with `mfhca fit`"
             )
 
 
