@@ -118,7 +118,6 @@ def _add_second_sensors(draft: Draft, rng: np.random.Generator) -> None:
             values = np.round(values / (std / 2)) * (std / 2)
         origin = SignalSource(column=second)
         draft.items[second] = Signal(second, signal.stamps, values, origin, signal.source, False)
-        draft.notes.append(f"{second} is the recorded {first} with the noise of a second sensor added")
 
 
 def _interval(fault: FaultSpec, machine: Machine, sat: float, length: float) -> TruthInterval:
