@@ -35,8 +35,8 @@ def evaluate(
     results: Annotated[
         list[Path],
         typer.Argument(
-            metavar="RESULT… [TRUTH]",
-            help="Report folders, report.json files, logs to diagnose first, or folders of them; a truth file may follow "
+            metavar="RESULT",
+            help="Report folders, report.json files, logs to diagnose first, or folders of them; the truth may follow "
             "a single one.",
             show_default=False,
         ),

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from cli.inputs import LOG_ENDINGS, mission_paths
 from replay.errors import ConfigError
-from replay.truth import SCHEMA
+from replay.truth import SCHEMA, truth_path
 
 
 def results_and_truths(words: Sequence[Path], truth: Path | None) -> list[tuple[Path, Path]]:
@@ -92,8 +92,5 @@ def _truth_of(path: Path) -> Path:
 
 
 def _beside(log: Path) -> Path:
-    """``<stem>.truth.json`` beside a log; a compressed table loses both endings."""
-    if log.name in ("", ".."):
-        log = log.resolve()
-    stem = log.name if log.is_dir() else log.name.removesuffix(".gz").rsplit(".", 1)[0]
-    return log.parent / f"{stem or log.name}.truth.json"
+    """The truth file that belongs beside a log."""
+    return truth_path(log.resolve() if log.name in ("", "..") else log, folder=log.is_dir())

@@ -113,33 +113,39 @@ class ModePath:
         return np.asarray(ROW_OF_MODEL[self.model])
 
     def crossing(self, start: int, stop: int, slack: int, hold: int) -> int | None:
-        """First sample of [start, stop) from which on a fault is more probable than none without anything later.
+        """First sample of [start, stop) from which on a fault is lastingly more probable than none; see `first_lasting`."""
+        return first_lasting(self.filtered[:, HEALTHY] < 0.5, start, stop, slack, hold)
 
-        That decision must last `hold` samples, or to the interval's end, so that a blip is no detection. The ends of
-        the interval were found looking back: a rise up to `slack` samples before `start` counts as `start`, and the
-        last `slack` samples count nothing; nor does a decision end where it is withdrawn for less than that.
 
-        Parameters
-        ----------
-        start, stop : int
-            Samples of the interval, half open.
-        slack : int
-            Samples by which its ends may be off; at most a quarter of the interval at its end.
-        hold : int
-            Samples that a decision must last.
+def first_lasting(raised: NDArray[np.bool_], start: int, stop: int, slack: int, hold: int) -> int | None:
+    """First sample of an interval from which on a causal decision lasts, so that a blip is no detection.
 
-        Returns
-        -------
-        int or None
-            None where a causal reading would have missed the fault.
-        """
-        first, last = max(0, start - slack), stop - min(slack, (stop - start) // 4)
-        calm = np.r_[True, self.filtered[first:last, HEALTHY] >= 0.5, True]
-        rises, falls = np.flatnonzero(calm[:-1] & ~calm[1:]), np.flatnonzero(~calm[:-1] & calm[1:])
-        apart = rises[1:] - falls[:-1] >= slack
-        begins, ends = rises[np.r_[True, apart][: rises.size]], falls[np.r_[apart, True][: falls.size]]
-        lasts = (ends - begins >= hold) | (ends == last - first)
-        return max(start, first + int(begins[lasts][0])) if lasts.any() else None
+    The ends of the interval were found looking back: a rise up to `slack` samples before `start` counts as `start`, and
+    the last `slack` samples count nothing; nor does a decision end where it is withdrawn for less than that.
+
+    Parameters
+    ----------
+    raised : NDArray[np.bool_], shape (n,)
+        Where the evidence up to a sample speaks for a fault.
+    start, stop : int
+        Samples of the interval, half open.
+    slack : int
+        Samples by which its ends may be off; at most a quarter of the interval at its end.
+    hold : int
+        Samples that a decision must last, or to the interval's end.
+
+    Returns
+    -------
+    int or None
+        None where a causal reading would have missed the fault.
+    """
+    first, last = max(0, start - slack), stop - min(slack, (stop - start) // 4)
+    held = np.r_[False, raised[first:last], False]
+    rises, falls = np.flatnonzero(held[1:] & ~held[:-1]), np.flatnonzero(held[:-1] & ~held[1:])
+    apart = rises[1:] - falls[:-1] >= slack
+    begins, ends = rises[np.r_[True, apart][: rises.size]], falls[np.r_[apart, True][: falls.size]]
+    lasts = (ends - begins >= hold) | (ends == last - first)
+    return max(start, first + int(begins[lasts][0])) if lasts.any() else None
 
 
 def forward(
