@@ -8,7 +8,6 @@ from pathlib import Path
 
 from cli.inputs import LOG_ENDINGS, mission_paths
 from replay.errors import ConfigError
-from replay.truth import SCHEMA, truth_path
 
 
 def results_and_truths(words: Sequence[Path], truth: Path | None) -> list[tuple[Path, Path]]:
@@ -41,6 +40,8 @@ def is_truth(path: Path) -> bool:
     """Whether a word of the command line is a truth file."""
     if path.suffix.lower() != ".json" or not path.is_file():
         return False
+    from replay.truth import SCHEMA
+
     try:
         document = json.loads(path.read_text(encoding="utf-8"))
     except (OSError, ValueError):
@@ -93,4 +94,6 @@ def _truth_of(path: Path) -> Path:
 
 def _beside(log: Path) -> Path:
     """The truth file that belongs beside a log."""
+    from replay.truth import truth_path
+
     return truth_path(log.resolve() if log.name in ("", "..") else log, folder=log.is_dir())
