@@ -4,56 +4,24 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from math import isfinite
 
 import numpy as np
 
-from diagnosis.fit_control import ControlFit, fit_control, lambda_doubt
-from diagnosis.fit_geometry import fit_offset, offset_pattern
-from diagnosis.fit_noise import NoiseFit, fit_noise
+from diagnosis.fit_control import fit_control, lambda_doubt
+from diagnosis.fit_geometry import fit_offset
+from diagnosis.fit_machine import Constant, with_control, with_noise, with_offset, with_plants
+from diagnosis.fit_noise import fit_noise
 from diagnosis.fit_plants import fit_plants
 from diagnosis.fit_units import UnitError, find_unit_errors, speed_mistakes
-from diagnosis.fit_wheels import Estimate, WheelFit, WheelRecord
+from diagnosis.fit_wheels import WheelFit
+from diagnosis.fit_windows import WheelRecord
 from replay.errors import NotJudged
 from replay.loop import Replay, replay_loop
-from replay.machine import Law, Machine, Noise, PsiMode, WheelPlant
+from replay.machine import Machine
 from replay.mission import Mission
 from replay.timeline import Timeline
 
 _LEAST_SECONDS = 10.0
-
-
-@dataclass(frozen=True)
-class Constant:
-    """One constant of the machine file.
-
-    Attributes
-    ----------
-    key : str
-        Its place in the machine file, ``plant.FR.K``.
-    value, std : float or None
-        What the missions say, and its standard deviation; None where they do not.
-    unit : str
-        Unit.
-    before : float or None
-        Value of the given machine.
-    windows, missions : int
-        What stands behind it; 0 windows where it does not come from windows.
-    written : bool
-        Whether it is in the new machine.
-    why : str
-        Why it is not written or how it is to be read.
-    """
-
-    key: str
-    value: float | None
-    std: float | None
-    unit: str
-    before: float | None
-    windows: int
-    missions: int
-    written: bool
-    why: str = ""
 
 
 @dataclass(frozen=True)
@@ -147,10 +115,10 @@ def fit_missions(
     noise = fit_noise(timelines, machine)
     constants: list[Constant] = []
     left_out: list[str] = []
-    out = _with_offset(machine, offset, blocks, len(turned), constants)
-    out = _with_control(out, machine, control, bool(doubt), constants)
-    out = _with_plants(out, machine, plants, spoiled, constants)
-    out = _with_noise(out, noise, bad, constants)
+    out = with_offset(machine, offset, blocks, len(turned), constants)
+    out = with_control(out, machine, control, bool(doubt), constants)
+    out = with_plants(out, machine, plants, spoiled, constants)
+    out = with_noise(out, noise, bad, constants)
     left_out += _left_plants(plants, machine, names)
     left_out += [f"{names[m]}: the control law fits it badly or unlike the others" for m in control.left_missions]
     notes = []
@@ -226,115 +194,6 @@ def _spoiled(wheel: str, timelines: Sequence[Timeline], bad: set[str]) -> str:
     for t in timelines:
         used |= {n for n in _channels(wheel, t) if n is not None}
     return next(iter(sorted(used & bad)), "")
-
-
-def _constant(
-    key: str, e: Estimate, unit: str, before: float | None, windows: int, missions: int, *, written: bool, why: str = ""
-) -> Constant:
-    value = e.value if isfinite(e.value) else None
-    std = e.std if isfinite(e.std) else None
-    return Constant(key, value, std, unit, before, windows, missions, written and value is not None, why or e.why)
-
-
-def _with_offset(machine: Machine, d: Estimate, blocks: int, missions: int, constants: list[Constant]) -> Machine:
-    """Put the wheel offset into the geometry."""
-    geometry = machine.geometry
-    before = None if geometry is None else max(abs(w.offset) for w in geometry.wheels.values())
-    constants.append(_constant("geometry.offset", d, "m", before, blocks, missions, written=True))
-    if geometry is None or not isfinite(d.value):
-        return machine
-    places = {
-        n: replace(w, offset=float(s * d.value))
-        for (n, w), s in zip(geometry.wheels.items(), offset_pattern(machine), strict=True)
-    }
-    return replace(machine, geometry=replace(geometry, wheels=places))
-
-
-_LAWS: dict[str, Law] = {"signed": "signed", "opposed": "opposed", "printed": "printed", "sign_abs": "sign_abs"}
-_PSI: dict[str, PsiMode] = {"printed": "printed", "forced": "forced"}
-
-
-def _with_control(out: Machine, machine: Machine, fit: ControlFit, doubt: bool, constants: list[Constant]) -> Machine:
-    """Put law, λ, ζ into the control section."""
-    before, count = machine.control, len(fit.missions)
-    held = not doubt and bool(fit.law)
-    why = "far from the machine file's, see the unit errors" if doubt else ""
-    steady = isfinite(fit.psi0.value) and fit.psi0.std < 0.1 * fit.psi0.value
-    psi0_why = (
-        "" if steady or not isfinite(fit.psi0.value) else "differs between wheels and missions: left to be fitted"
-    )
-    constants += [
-        _constant("control.lambda", fit.lambda_, "s/m", before.lambda_, 0, count, written=held, why=why),
-        _constant("control.zeta", fit.zeta, "s/m²", before.zeta, 0, count, written=held),
-        _constant("control.psi0", fit.psi0, "", before.psi0, 0, count, written=held and steady, why=psi0_why),
-    ]
-    if not held:
-        return out
-    control = replace(before, law=_LAWS[fit.law], psi=_PSI[fit.psi], lambda_=fit.lambda_.value)
-    if isfinite(fit.zeta.value):
-        control = replace(control, zeta=fit.zeta.value)
-    if steady:
-        control = replace(control, psi0=fit.psi0.value)
-    return replace(out, control=control)
-
-
-_PLANT = (("K", "m/s per full opening"), ("tau", "s"), ("dead", "of full opening"), ("offset", "m/s"), ("load", "m/s"))
-
-
-def _with_plants(
-    out: Machine, machine: Machine, fits: list[WheelFit | None], spoiled: list[str], constants: list[Constant]
-) -> Machine:
-    """Put the wheels' constants into the plant section."""
-    wheels = dict(machine.plant.wheels)
-    for w, fit, error in zip(machine.wheels, fits, spoiled, strict=True):
-        before = wheels.get(w)
-        for name, unit in _PLANT:
-            e = Estimate(float("nan"), float("nan"), f"{error} has a wrong unit or sign" if error else "not logged")
-            if fit is not None:
-                e = Estimate(float("nan"), float("nan"), fit.refused) if fit.refused else getattr(fit, name)
-            old = None if before is None else getattr(before, name)
-            used, count = (0, 0) if fit is None else (fit.used, len(fit.missions))
-            constants.append(_constant(f"plant.{w}.{name}", e, unit, old, used, count, written=True))
-        if fit is not None and not fit.refused:
-            tau, tau_std = fit.tau.value, _known(fit.tau.std)
-            if tau_std is None and before is not None:
-                tau, tau_std = before.tau, before.tau_std
-            wheels[w] = WheelPlant(
-                K=fit.K.value,
-                tau=tau,
-                load=_known(fit.load.value),
-                K_std=_known(fit.K.std),
-                tau_std=tau_std,
-                load_std=_known(fit.load.std),
-                dead=fit.dead.value,
-                dead_std=_known(fit.dead.std),
-                offset=fit.offset.value,
-                offset_std=_known(fit.offset.std),
-            )
-    return replace(out, plant=replace(machine.plant, wheels=wheels))
-
-
-def _known(x: float) -> float | None:
-    return float(x) if isfinite(x) else None
-
-
-def _with_noise(out: Machine, fits: dict[str, NoiseFit], bad: set[str], constants: list[Constant]) -> Machine:
-    """Put the channels' noise into the noise section."""
-    noise = dict(out.noise)
-    for name, fit in fits.items():
-        before = noise.get(name, Noise())
-        why = "its unit or sign is wrong" if name in bad else ""
-        held = name not in bad
-        constants.append(
-            _constant(f"noise.{name}.std", fit.std, "SI", before.std, 0, fit.missions, written=held, why=why)
-        )
-        constants.append(
-            _constant(f"noise.{name}.lsb", fit.lsb, "SI", before.lsb, 0, fit.missions, written=held, why=why)
-        )
-        if held:
-            lsb = _known(fit.lsb.value)
-            noise[name] = Noise(std=_known(fit.std.value) or before.std, lsb=before.lsb if lsb is None else lsb)
-    return replace(out, noise=noise)
 
 
 def _left_plants(fits: list[WheelFit | None], machine: Machine, names: tuple[str, ...]) -> list[str]:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from diagnosis.fit_wheels import Estimate
+from diagnosis.fit_robust import Estimate
 from replay.law_fit import MIN_EXPLAINED, LawFit
 from replay.loop import Replay, stack
 from replay.machine import Machine

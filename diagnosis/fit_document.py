@@ -5,7 +5,8 @@ from __future__ import annotations
 import dataclasses
 from typing import Any
 
-from diagnosis.fit import Constant, FitResult
+from diagnosis.fit import FitResult
+from diagnosis.fit_machine import Constant
 from replay.machine_file import dump_machine
 
 SCHEMA = "mfhca-fit/1"

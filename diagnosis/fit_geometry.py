@@ -7,8 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from diagnosis.fit_robust import equal_weights, jackknife, robust_solve, solve
-from diagnosis.fit_wheels import Estimate
+from diagnosis.fit_robust import Estimate, equal_weights, jackknife, robust_solve, solve
 from diagnosis.noise import moving_sum
 from replay.geometry import Geometry
 from replay.kinematics import rotation, wheel_angles

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from diagnosis.fit_wheels import Estimate
+from diagnosis.fit_robust import Estimate
 from diagnosis.noise import rounding_step, white_noise
 from replay.machine import Machine
 from replay.timeline import Timeline

@@ -7,8 +7,9 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from diagnosis.fit_robust import equal_weights, jackknife
-from diagnosis.fit_wheels import Estimate, WheelFit, WheelRecord, fed, fit_wheel
+from diagnosis.fit_robust import Estimate, equal_weights, jackknife
+from diagnosis.fit_wheels import WheelFit, fit_wheel
+from diagnosis.fit_windows import WheelRecord, fed, window_length
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -53,7 +54,8 @@ def _shared(missions: list[list[WheelRecord | None]], fits: list[WheelFit | None
     good = [i for i, f in enumerate(fits) if f is not None and not f.refused]
     if len(good) < _LEAST_WHEELS:
         return fits
-    means = [_mean_wheel([m[i] for i in good]) for m in missions]
+    odd = {place for i in good for place in _of(fits, i).odd}
+    means = [_mean_wheel([wheels[i] for i in good], [k for n, k in odd if n == m]) for m, wheels in enumerate(missions)]
     tau = float(np.median([_of(fits, i).tau.value for i in good]))
     shared = fit_wheel([m for m in means if m is not None], tau) if any(m is not None for m in means) else None
     if shared is None or shared.refused:
@@ -82,6 +84,7 @@ def _each(missions: list[list[WheelRecord | None]]) -> list[WheelFit | None]:
                 fit,
                 missions=tuple(logged[m] for m in fit.missions),
                 left_missions=tuple(logged[m] for m in fit.left_missions),
+                odd=tuple((logged[m], k) for m, k in fit.odd),
             )
         out.append(fit)
     return out
@@ -123,11 +126,15 @@ def _without_odd_wheels(fits: list[WheelFit | None]) -> list[WheelFit | None]:
     return out
 
 
-def _mean_wheel(wheels: list[WheelRecord | None]) -> WheelRecord | None:
-    """Mean of all wheels of a mission as one record; None where one is not logged."""
+def _mean_wheel(wheels: list[WheelRecord | None], odd: list[int]) -> WheelRecord | None:
+    """Mean of all wheels of a mission as one record, without windows in which one is odd; None where one is not logged."""
     known = [r for r in wheels if r is not None]
     if len(known) < len(wheels):
         return None
+    use = np.logical_and.reduce([r.use for r in known])
+    length = window_length(known[0].dt)
+    for k in odd:
+        use[k * length : (k + 1) * length] = False
     signs = np.abs(np.sum([np.sign(r.command) for r in known], axis=0))
     command = np.mean([r.command for r in known], axis=0)
     return replace(
@@ -135,7 +142,7 @@ def _mean_wheel(wheels: list[WheelRecord | None]) -> WheelRecord | None:
         y=np.mean([r.y for r in known], axis=0),
         u=np.column_stack([r.u for r in known]),
         command=np.where(signs == len(known), command, np.where(np.abs(command) < known[0].driving, command, np.nan)),
-        use=np.logical_and.reduce([r.use for r in known]),
+        use=use,
     )
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +14,18 @@ _SUBSETS = 400
 _ROUNDS = 20
 _TUKEY = 4.685
 _CUT = 4.0
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """A constant with its standard deviation; NaN where not known, `why` then says why."""
+
+    value: float
+    std: float
+    why: str = ""
+
+
+UNKNOWN = Estimate(float("nan"), float("nan"))
 
 
 def weighted_median(x: Array, weight: Array) -> float:

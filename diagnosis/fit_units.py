@@ -12,14 +12,11 @@ from dataclasses import dataclass
 from math import log, pi
 
 import numpy as np
-from numpy.typing import NDArray
 
-from replay.kinematics import wheel_commands
+from diagnosis.fit_ratios import Ratios, measure
 from replay.loop import Replay
 from replay.machine import Machine
 from replay.timeline import Timeline
-
-Array = NDArray[np.float64]
 
 _NEAR = (0.7, 1.35)
 _TRACKING = 0.93  # a healthy loop stays a little behind its command
@@ -89,71 +86,6 @@ def _named(factor: float, known: dict[str, tuple[float, str]], usual: float) -> 
     return best, f"{known[best][1]}{more}"
 
 
-def _ratio(x: Array | None, reference: Array | None) -> float:
-    """Median of x over its reference where that is large; NaN where there is too little."""
-    if x is None or reference is None:
-        return float("nan")
-    both = np.isfinite(x) & np.isfinite(reference)
-    if np.count_nonzero(both) < 100:
-        return float("nan")
-    large = both & (np.abs(reference) > 0.3 * np.quantile(np.abs(reference[both]), 0.95))
-    large &= reference != 0
-    return float(np.median(x[large] / reference[large])) if np.count_nonzero(large) >= 50 else float("nan")
-
-
-@dataclass(frozen=True)
-class _Ratios:
-    """Medians over the missions."""
-
-    speed: dict[str, float]  # wheel.<W>.v | v_true over the wheel's command
-    command: dict[str, float]  # logged v_ref, phi_ref over what L1, L2 give
-    angle: dict[str, float]  # steer.<A>.phi | phi_true over the axle's command
-    effort: dict[str, float]  # wheel.<W>.u over the wheel's command
-    top: dict[str, float]  # 99.5 % quantile of |x|
-
-
-def _measure(timelines: Sequence[Timeline], replays: Sequence[Replay], machine: Machine) -> _Ratios:
-    parts: list[dict[str, dict[str, float]]] = []
-    for t, r in zip(timelines, replays, strict=True):
-        one: dict[str, dict[str, float]] = {"speed": {}, "command": {}, "angle": {}, "effort": {}, "top": {}}
-        speed, omega = t.get("cmd.v"), t.get("cmd.omega")
-        mapped = None
-        if machine.geometry is not None and speed is not None:
-            mapped = wheel_commands(
-                speed,
-                np.zeros_like(speed) if omega is None else omega,
-                machine.geometry,
-                dt=t.dt,
-                max_steer=machine.max_steer,
-                phi_dot=machine.control.phi_dot,
-                phi_dot_hz=machine.control.phi_dot_hz,
-                measured_angle=r.wheel_phi,
-            )
-        for i, w in enumerate(machine.wheels):
-            for leaf in ("v", "v_true"):
-                one["speed"][f"wheel.{w}.{leaf}"] = _ratio(t.get(f"wheel.{w}.{leaf}"), r.v_ref[:, i])
-            for leaf in ("u", "u_applied"):
-                one["effort"][f"wheel.{w}.{leaf}"] = _ratio(t.get(f"wheel.{w}.{leaf}"), r.v_ref[:, i])
-            if mapped is not None:
-                one["command"][f"wheel.{w}.v_ref"] = _ratio(t.get(f"wheel.{w}.v_ref"), mapped.speed[:, i])
-        for j, a in enumerate(machine.axles):
-            for leaf in ("phi", "phi_true"):
-                one["angle"][f"steer.{a}.{leaf}"] = _ratio(t.get(f"steer.{a}.{leaf}"), r.phi_ref[:, j])
-            if mapped is not None:
-                one["command"][f"steer.{a}.phi_ref"] = _ratio(t.get(f"steer.{a}.phi_ref"), mapped.axle_angle[:, j])
-        for name, x in t.signals.items():
-            known = np.abs(x[np.isfinite(x)])
-            one["top"][name] = float(np.quantile(known, 0.995)) if known.size else float("nan")
-        parts.append(one)
-    return _Ratios(**{kind: _medians([p[kind] for p in parts]) for kind in parts[0]})
-
-
-def _medians(parts: list[dict[str, float]]) -> dict[str, float]:
-    names = dict.fromkeys(n for p in parts for n in p)
-    values = {n: np.array([p[n] for p in parts if np.isfinite(p.get(n, np.nan))]) for n in names}
-    return {n: float(np.median(v)) for n, v in values.items() if v.size}
-
-
 def find_unit_errors(
     timelines: Sequence[Timeline], replays: Sequence[Replay], machine: Machine
 ) -> tuple[UnitError, ...]:
@@ -166,7 +98,7 @@ def find_unit_errors(
     machine : Machine
         Geometry, gear, limits.
     """
-    x = _measure(timelines, replays, machine)
+    x = measure(timelines, replays, machine)
     commands = _command_errors(x, machine)
     bad = {s for e in commands for s in e.signals}
     out = list(commands)
@@ -182,18 +114,20 @@ def _off(ratio: float) -> bool:
 
 def _said(name: str, ratio: float, what: str, known: dict[str, tuple[float, str]], usual: float) -> UnitError:
     if ratio < 0 and not _off(-ratio):
-        text = f"{name} runs against {what}: its sign is flipped; set gain = -1 for it in [signals]"
+        text = f"{name}, against {what}: sign flipped; set gain = -1 in [signals]"
         return UnitError((name,), -1.0, text)
     sign = ", with flipped sign (gain = -1)" if ratio < 0 else ""
     guess = _named(ratio, known, usual) if ratio else None
     if guess is None:
-        text = f"{name} is {ratio:.3g} times {what}: no known unit explains it; check its unit, gain and place in [signals]"
+        text = (
+            f"{name}, {ratio:.3g} times {what}: no known unit explains it; check its unit, gain and place in [signals]"
+        )
     else:
-        text = f"{name} is {ratio:.3g} times {what}: {guess[0]}{sign}; set {guess[1]} for it in [signals]"
+        text = f"{name}, {ratio:.3g} times {what}: {guess[0]}{sign}; set {guess[1]} in [signals]"
     return UnitError((name,), ratio, text)
 
 
-def _command_errors(x: _Ratios, machine: Machine) -> list[UnitError]:
+def _command_errors(x: Ratios, machine: Machine) -> list[UnitError]:
     """Logged commands of wheels and axles against those that the body's command gives."""
     out = []
     speeds = speed_mistakes(machine)
@@ -209,7 +143,7 @@ def _command_errors(x: _Ratios, machine: Machine) -> list[UnitError]:
     return out
 
 
-def _speed_errors(x: _Ratios, machine: Machine, bad: set[str]) -> list[UnitError]:
+def _speed_errors(x: Ratios, machine: Machine, bad: set[str]) -> list[UnitError]:
     """Measured speeds against the wheel's command."""
     out = []
     known = speed_mistakes(machine)
@@ -227,16 +161,30 @@ def _speed_errors(x: _Ratios, machine: Machine, bad: set[str]) -> list[UnitError
                 out.append(_said(name, seen, "its command", known, _TRACKING))
         elif not checked and x.top.get(name, 0.0) > 1.5 * machine.max_speed:
             both = tuple(n for n in (name, reference) if n in x.top)
-            q = x.top[name] / machine.max_speed
-            text = (
-                f"{' and '.join(both)} reach {x.top[name]:.3g} m/s, {q:.3g} times the machine's top speed: check their "
-                f"unit and at in [signals], or geometry.max_speed = {machine.max_speed:g}"
-            )
-            out.append(UnitError(both, q, text))
+            out.append(_too_fast(both, x.top[name], x.gain, machine, known))
     return out
 
 
-def _angle_errors(x: _Ratios, machine: Machine, bad: set[str]) -> list[UnitError]:
+def _too_fast(
+    both: tuple[str, ...], top: float, gain: float, machine: Machine, known: dict[str, tuple[float, str]]
+) -> UnitError:
+    """Speed and command alike beyond what the machine can drive; λ̂, which falls as they grow, tells the unit."""
+    factor = machine.control.lambda_ / gain
+    guess = _named(factor, known, 1.0) if np.isfinite(factor) and _off(factor) else None
+    told = "λ̂ is off by the same"
+    if guess is None:
+        fits = [n for n, (f, _) in known.items() if 0.5 * machine.max_speed < top / f < 1.1 * machine.max_speed]
+        guess = (" or ".join(fits), " or ".join(known[n][1] for n in fits)) if fits else None
+        told = "by the top speed alone"
+    head = f"{' and '.join(both)}, up to {top:.3g} m/s or {top / machine.max_speed:.3g} times the machine's top speed"
+    if guess is None:
+        return UnitError(
+            both, top / machine.max_speed, f"{head}: check unit and at in [signals], or geometry.max_speed"
+        )
+    return UnitError(both, top / machine.max_speed, f"{head}: {guess[0]} ({told}); set {guess[1]} in [signals]")
+
+
+def _angle_errors(x: Ratios, machine: Machine, bad: set[str]) -> list[UnitError]:
     """Steering angles against their commands, and against what an axle can reach."""
     out = []
     for name, ratio in x.angle.items():
@@ -245,16 +193,16 @@ def _angle_errors(x: _Ratios, machine: Machine, bad: set[str]) -> list[UnitError
         if _off(seen):
             out.append(_said(name, seen, "its command", _ANGLES, 1.0))
         elif x.top.get(name, 0.0) > max(1.7, 1.5 * machine.max_steer):
-            text = f'{name} reaches {x.top[name]:.3g} rad: degrees read as rad; set unit = "deg" for it in [signals]'
+            text = f'{name}, up to {x.top[name]:.3g} rad: degrees read as rad; set unit = "deg" in [signals]'
             out.append(UnitError((name,), 180 / pi, text))
     for name in (n for n in x.top if n.startswith("steer.") and ".phi" in n and n not in x.angle):
         if not name.endswith("_ref") and x.top[name] > max(1.7, 1.5 * machine.max_steer):
-            text = f'{name} reaches {x.top[name]:.3g} rad: degrees read as rad; set unit = "deg" for it in [signals]'
+            text = f'{name}, up to {x.top[name]:.3g} rad: degrees read as rad; set unit = "deg" in [signals]'
             out.append(UnitError((name,), 180 / pi, text))
     return out
 
 
-def _effort_errors(x: _Ratios, machine: Machine, bad: set[str]) -> list[UnitError]:
+def _effort_errors(x: Ratios, machine: Machine, bad: set[str]) -> list[UnitError]:
     """Openings against their limit, their sign, and the speed that full opening would give."""
     out = []
     limit = machine.control.u_max
@@ -265,19 +213,18 @@ def _effort_errors(x: _Ratios, machine: Machine, bad: set[str]) -> list[UnitErro
         sensible = 1 / ratio if ratio else float("inf")  # m/s per opening
         if top > 1.5 * limit:
             percent = 'percent read as a fraction; set unit = "%"' if top <= 130 * limit else "raw counts; set a gain"
-            text = (
-                f"{name} reaches {top:.3g} of full opening (control.u_max = {limit:g}): {percent} for it in [signals]"
-            )
+            text = f"{name}, up to {top:.3g} of full opening with control.u_max = {limit:g}: {percent} in [signals]"
             out.append(UnitError((name,), 100.0 if top <= 130 * limit else top, text))
         elif spoiled:
             continue
         elif ratio < 0:
-            text = f"{name} is negative where its wheel drives forward: set gain = -1 for it in [signals]"
+            text = f"{name}, negative where its wheel drives forward: sign flipped; set gain = -1 in [signals]"
             out.append(UnitError((name,), -1.0, text))
         elif sensible * limit > _MOST_GAIN * machine.max_speed:
             text = (
-                f"{name}: full opening would give {sensible * limit:.3g} m/s, {sensible * limit / machine.max_speed:.3g} "
-                'times the machine\'s top speed: a fraction read as percent; set unit = "fraction" for it in [signals]'
+                f"{name}, of which full opening would give {sensible * limit:.3g} m/s or "
+                f"{sensible * limit / machine.max_speed:.3g} times the machine's top speed: a fraction read as percent; "
+                'set unit = "fraction" in [signals]'
             )
             out.append(UnitError((name,), 0.01, text))
     return out
@@ -287,7 +234,7 @@ def _joined(errors: list[UnitError]) -> list[UnitError]:
     """One sentence for the same mistake in several signals."""
     groups: dict[str, list[UnitError]] = {}
     for e in errors:
-        tail = e.text.partition(": ")[2] or e.text
+        tail = e.text.rpartition(": ")[2]
         leaf = e.signals[0].rpartition(".")[2]
         groups.setdefault(f"{leaf} {tail}", []).append(e)
     out = []
@@ -298,5 +245,5 @@ def _joined(errors: list[UnitError]) -> list[UnitError]:
             continue
         names = tuple(dict.fromkeys(s for e in same for s in e.signals))
         factor = float(np.median([e.factor for e in same]))
-        out.append(UnitError(names, factor, first.text.replace(first.signals[0], ", ".join(names), 1)))
+        out.append(UnitError(names, factor, ", ".join(names) + first.text[len(" and ".join(first.signals)) :]))
     return out

@@ -8,62 +8,24 @@ load makes effort and load go together. Windows in which the speed changes give 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from diagnosis.fit_robust import equal_weights, jackknife, robust_solve, solve
-from diagnosis.wheel_model import low_passed
+from diagnosis.fit_robust import UNKNOWN, Estimate, equal_weights, jackknife, robust_solve, solve
+from diagnosis.fit_windows import WINDOW_S, WheelRecord, Windows, cut_windows
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
-WINDOW_S = 2.0
 _TAUS = np.geomspace(0.01, 3.0, 13)
 _LEAST_WINDOWS = 8
-_FLOOR = 0.03
+_FLOOR = 0.05
 _MAX_LEFT_OUT = 1 / 3
 _FULL = 5
 _SPREAD_OF_SPEED = 0.12
-_CHANGE = 0.02
 _MISSION_LIMIT = 0.1
 _CUT_MISSION = 5.0
-
-
-@dataclass(frozen=True)
-class WheelRecord:
-    """One wheel in one mission.
-
-    Attributes
-    ----------
-    y, command : Array, shape (n,)
-        Speed and its command [m/s]; NaN where not valid.
-    u : Array, shape (n, k)
-        Opening [fraction]; several where a mean over wheels is fitted.
-    use : Mask, shape (n,)
-        Samples that the model holds for (the pump feeds all wheels).
-    dt : float
-        Step [s].
-    driving : float
-        Speed above which the wheel drives [m/s].
-    """
-
-    y: Array
-    u: Array
-    command: Array
-    use: Mask
-    dt: float
-    driving: float
-
-
-@dataclass(frozen=True)
-class Estimate:
-    """A constant with its standard deviation; NaN where not known, `why` then says why."""
-
-    value: float
-    std: float
-    why: str = ""
 
 
 @dataclass(frozen=True)
@@ -86,6 +48,8 @@ class WheelFit:
         Why nothing is given; empty where the figures hold.
     load : Estimate
         See `replay.machine.WheelPlant`.
+    odd : tuple[tuple[int, int], ...]
+        Steady windows that disagree: mission, and the window's number in it.
     """
 
     K: Estimate
@@ -98,80 +62,13 @@ class WheelFit:
     missions: tuple[int, ...]
     left_missions: tuple[int, ...]
     refused: str = ""
-    load: Estimate = Estimate(float("nan"), float("nan"))
+    load: Estimate = UNKNOWN
+    odd: tuple[tuple[int, int], ...] = ()
 
     @property
     def used(self) -> int:
         """Windows that agree."""
         return int(np.count_nonzero(self.weight))
-
-
-def opened(u: Array, dead: float) -> Array:
-    """Opening beyond the dead zone, sgn(u)·max(|u| − dead, 0) [fraction]."""
-    return np.asarray(np.sign(u) * np.maximum(np.abs(u) - dead, 0.0)) if dead > 0 else u
-
-
-def fed(record: WheelRecord, dead: float, tau: float) -> Array:
-    """Lagged opening beyond the dead zone, the mean of all in the record, shape (n,)."""
-    each = [low_passed(opened(u, dead), tau, record.dt) for u in record.u.T]
-    return np.asarray(np.mean(each, axis=0))
-
-
-@dataclass(frozen=True)
-class _Windows:
-    """Sums over the windows of all missions, each of shape (n,); see `_windows`."""
-
-    y: Array
-    p: Array
-    z: Array
-    mission: NDArray[np.int64]
-    group: NDArray[np.int64]
-    steady: Mask
-    frozen: Mask
-    yy: Array
-    yp: Array
-    pp: Array
-    changing: Mask
-
-
-def _cut(x: NDArray[Any], length: int) -> NDArray[Any]:
-    count = x.size // length
-    return x[: count * length].reshape(count, length)
-
-
-def _windows(records: list[WheelRecord], dead: float, tau: float) -> _Windows:
-    """Means, and scatter about them, of speed and fed opening in windows that drive."""
-    parts: list[tuple[NDArray[Any], ...]] = []
-    whole = [max(1, int(r.y.size * r.dt / WINDOW_S)) for r in records]
-    several = len(records) >= 4
-    per_block = max(1, round(sum(whole) / 10))
-    blocks = 0
-    speeds = np.concatenate([np.abs(r.command[np.abs(r.command) > r.driving]) for r in records])
-    typical = float(np.median(speeds)) if speeds.size else 1.0
-    for m, r in enumerate(records):
-        length = max(8, round(WINDOW_S / r.dt))
-        p = fed(r, dead, tau)
-        known = r.use & np.isfinite(r.y) & np.isfinite(r.u).all(axis=1) & np.isfinite(r.command)
-        y, p, z = (_cut(np.where(known, x, 0.0), length) for x in (r.y, p, r.command))
-        k = _cut(known, length)
-        count = k.sum(axis=1)
-        full = count > 0.9 * length
-        n = np.maximum(count, 1)
-        my, mp, mz = (x.sum(axis=1) / n for x in (y, p, z))
-        moving = (np.abs(z) > r.driving).sum(axis=1) > 0.5 * length
-        steady = (np.abs(z) > r.driving).sum(axis=1) > 0.98 * count
-        steady &= np.abs(np.sign(z).sum(axis=1)) > 0.98 * count
-        frozen = (np.ptp(y, axis=1) == 0) & steady
-        dy, dp = np.where(k, y - my[:, None], 0.0), np.where(k, p - mp[:, None], 0.0)
-        group = np.full(my.size, m) if several else blocks + np.arange(my.size) // per_block
-        blocks = int(group[-1]) + 1 if group.size and not several else blocks
-        keep = full & moving
-        cols = (my, mp, mz, np.full(my.size, m), group, steady, frozen)
-        dz = np.where(k, z - mz[:, None], 0.0)
-        changing = (dz * dz).sum(axis=1) / n > (_CHANGE * typical) ** 2
-        sums = ((dy * dy).sum(axis=1) / n, (dy * dp).sum(axis=1) / n, (dp * dp).sum(axis=1) / n, changing)
-        parts.append(tuple(c[keep] for c in (*cols, *sums)))
-    return _Windows(*(np.concatenate(c) for c in zip(*parts, strict=True)))
 
 
 @dataclass(frozen=True)
@@ -199,7 +96,7 @@ def _unpacked(shape: str, beta: Array) -> Array:
     return np.array([1.0 / beta[0] if beta[0] != 0 else np.nan, kink, shift])
 
 
-def _effort_map(w: _Windows, kept: Mask, dead: float) -> _Map | None:
+def _effort_map(w: Windows, kept: Mask, dead: float) -> _Map | None:
     """Fit the map to the steady windows of missions that are kept."""
     use = w.steady & ~w.frozen & kept
     if np.count_nonzero(use) < _LEAST_WINDOWS:
@@ -242,7 +139,7 @@ def _lag(records: list[WheelRecord], dead: float, start: float, allowed: list[in
     step = max(r.dt for r in records)
 
     def sums(tau: float) -> tuple[Array, NDArray[np.int64]]:
-        w = _windows(records, dead, tau)
+        w = cut_windows(records, dead, tau)
         mine = np.isin(w.mission, allowed) & ~w.frozen & w.changing
         return np.column_stack([w.yy[mine], w.yp[mine], w.pp[mine]]), w.group[mine]
 
@@ -289,7 +186,7 @@ def fit_wheel(records: list[WheelRecord], start_tau: float) -> WheelFit:
     left: list[int] = []
     for _ in range(3):
         for _ in range(4):
-            w = _windows(records, dead, tau.value)
+            w = cut_windows(records, dead, tau.value)
             found = _effort_map(w, np.isin(w.mission, allowed), dead)
             if found is None:
                 return _refused(f"fewer than {_LEAST_WINDOWS} steady windows of {WINDOW_S:g} s under command", w)
@@ -318,8 +215,9 @@ def fit_wheel(records: list[WheelRecord], start_tau: float) -> WheelFit:
     return _finished(w, found, dead, tau, left, steady)
 
 
-def _finished(w: _Windows, found: _Map, dead: float, tau: Estimate, left: list[int], steady: int) -> WheelFit:
+def _finished(w: Windows, found: _Map, dead: float, tau: Estimate, left: list[int], steady: int) -> WheelFit:
     K = found.K
+    out = w.steady & (found.weight == 0)
     K_std, kink_std, shift_std = (float(x) for x in found.std)
     one_way = "driven one way only: an offset cannot be told from the dead zone and is contained in it"
     offset, zone = Estimate(-found.shift * K, shift_std * K), Estimate(dead, kink_std)
@@ -344,10 +242,11 @@ def _finished(w: _Windows, found: _Map, dead: float, tau: Estimate, left: list[i
         steady,
         tuple(sorted(set(w.mission[found.weight > 0].tolist()))),
         tuple(sorted(left)),
+        odd=tuple(zip(w.mission[out].tolist(), w.place[out].tolist(), strict=True)),
     )
 
 
-def _odd_missions(w: _Windows, found: _Map, allowed: list[int]) -> list[int]:
+def _odd_missions(w: Windows, found: _Map, allowed: list[int]) -> list[int]:
     """Missions whose median window lies far from the others'."""
     expected = w.y / found.K + found.kink * np.sign(w.z) + found.shift
     relative = (w.p - expected) / np.maximum(np.abs(expected), 1e-12)
@@ -361,7 +260,7 @@ def _odd_missions(w: _Windows, found: _Map, allowed: list[int]) -> list[int]:
     return [m for m, c in zip(known, centres, strict=True) if abs(c - middle) > limit]
 
 
-def _refused(why: str, w: _Windows) -> WheelFit:
+def _refused(why: str, w: Windows) -> WheelFit:
     nothing = Estimate(float("nan"), float("nan"), why)
     none = np.zeros(w.y.size)
     steady = int(np.count_nonzero(w.steady))
