@@ -16,26 +16,23 @@ import numpy as np
 from numpy.typing import NDArray
 
 from diagnosis.assessment import CODE, Assessment, Finding, unassessed
-from diagnosis.drive_echo import DriveRecord, echoed_speed, identify_echo
+from diagnosis.drive_echo import DriveRecord, echoed_speed, identify_echo, window_size
+from diagnosis.drive_effort import load_findings
 from diagnosis.drive_load import LoadTrack, identify_effort, track_load
 from diagnosis.drive_rows import EchoPair, find_rows
 from diagnosis.modes import BLIND, PAIR
 from diagnosis.noise import rounding_step
 from diagnosis.pairs import sample_status
-from diagnosis.result import Epsilon, Hypothesis, Sat
 from replay.drive_model import DriveModel, EchoModel
 from replay.faults import FaultMode, Side, State
 from replay.machine import Limits
 
 Array = NDArray[np.float64]
 
-_WINDOW_S = 0.5
-_QUANTILE = 0.4
 _NOISE_RANGE = (0.7, 1.5)
 _STEP_RANGE = 0.1
 _QUIET = 0.4
-_LEAST_LOAD_S = 2.0
-_LEAST_LOAD = 2.0  # of a finding [standard deviations of a mission's offset]
+_LEAST_NOISE = 2e-3  # of the span: no echo is believed beyond that
 
 
 @dataclass(frozen=True)
@@ -137,7 +134,8 @@ def assess_drive(data: DriveData, limits: Limits) -> tuple[Assessment, Assessmen
         bad[f.start : f.stop] = True
     load: LoadTrack | None = None
     if model.effort is not None:
-        clean = replace(record, y=np.where(bad, x, data.y))  # behind a faulty sensor the echo tells the speed
+        # behind a faulty sensor the echo tells the speed, unless the controller met the fault too
+        clean = replace(record, y=np.where(bad, x if data.open_loop else np.nan, data.y))
         load = track_load(clean, model.effort, limits.driving_speed)
     loaded = np.ones(data.y.size) if load is None else load.sampled(load.probability, data.y.size)
     states = np.where(quiet, CODE[State.NOT_EXCITED], CODE[State.HEALTHY]).astype(np.int8)
@@ -145,14 +143,25 @@ def assess_drive(data: DriveData, limits: Limits) -> tuple[Assessment, Assessmen
     actuator = states.copy()
     if not data.open_loop:
         states[(states == CODE[State.HEALTHY]) & ~(loaded < 0.5)] = CODE[State.NOT_ASSESSED]
-    for f in findings:
-        states[f.start : f.stop] = CODE[State(f.mode.value)]
     actuator[(actuator == CODE[State.HEALTHY]) & ~(loaded < 0.5)] = CODE[State.NOT_ASSESSED]
-    more = [] if load is None or model.effort is None else _load_findings(load, model.effort.between, limits, data)
-    for f in more:
+    more: list[Finding] = []
+    if load is not None and model.effort is not None:
+        more = load_findings(
+            load, model.effort.between, data.y, data.dt, limits, data.names[2], open_loop=data.open_loop
+        )
+    on_sensor = sorted([*findings, *(f for f in more if f.side is not Side.ACTUATOR)], key=lambda f: f.start)
+    on_actuator = [f for f in more if f.side is not Side.SENSOR]
+    for f in (*(f for f in more if f.side is not Side.ACTUATOR), *findings):
+        states[f.start : f.stop] = CODE[State(f.mode.value)]
+    for f in on_actuator:
         actuator[f.start : f.stop] = CODE[State(f.mode.value)]
+    if not data.open_loop:
+        for f in findings:
+            if f.mode in (FaultMode.STUCK, FaultMode.NO_SIGNAL):
+                actuator[f.start : f.stop] = CODE[State.MASKED]
     reasons = {
         State.NOT_EXCITED: "the drive is neither commanded nor moving",
+        State.MASKED: "the speed sensor that would show it delivers nothing usable",
         State.NO_DATA: "no samples, or an effort at its limit",
         State.NOT_ASSESSED: "no effort of healthy missions to compare with"
         if load is None
@@ -179,8 +188,8 @@ def assess_drive(data: DriveData, limits: Limits) -> tuple[Assessment, Assessmen
             "expected": load.sampled(load.expected, size),
         }
     return (
-        Assessment(states, reasons, tuple(findings), columns, "model", tuple(notes)),
-        Assessment(actuator, reasons, tuple(more), drive_columns, "model", tuple(notes)),
+        Assessment(states, reasons, tuple(on_sensor), columns, "model", tuple(notes)),
+        Assessment(actuator, reasons, tuple(on_actuator), drive_columns, "model", tuple(notes)),
     )
 
 
@@ -190,8 +199,9 @@ def _pair(data: DriveData, echo: EchoModel, x: Array, limits: Limits) -> EchoPai
     status[data.y_fresh & commanded & ~np.isfinite(x)] = BLIND  # the effort is at its limit
     still = _QUIET * limits.driving_speed
     quiet = (np.abs(np.nan_to_num(data.command)) < still) & (np.abs(np.nan_to_num(x)) < still)
-    noise = _mission_noise(np.where(status == PAIR, data.y - x, np.nan), data.dt, echo.noise)
     lsb = rounding_step(data.y[status == PAIR]) if data.lsb is None else data.lsb
+    noise = _mission_noise(np.where(status == PAIR, data.y - x, np.nan), data.dt, echo.noise)
+    noise = max(noise, lsb, _LEAST_NOISE * data.span)
     return EchoPair(
         y=data.y,
         x=x,
@@ -210,55 +220,6 @@ def _pair(data: DriveData, echo: EchoModel, x: Array, limits: Limits) -> EchoPai
 
 def _mission_noise(residual: Array, dt: float, known: float) -> float:
     """Noise of this mission's quieter windows, no further from the known one than healthy missions differ."""
-    length = max(5, round(_WINDOW_S / dt))
-    count = residual.size // length
-    windows = residual[: count * length].reshape(count, length)
-    number = np.isfinite(windows).sum(axis=1)
-    power = np.nansum(windows**2, axis=1) / np.maximum(number, 1)
-    used = np.sqrt(power[number >= length / 2])
-    if not used.size:
-        return known
+    found = window_size(residual, dt)
     low, high = _NOISE_RANGE
-    return float(np.clip(np.quantile(used, _QUANTILE), low * known, high * known))
-
-
-def _load_findings(load: LoadTrack, between: float, limits: Limits, data: DriveData) -> list[Finding]:
-    """Stretches of probable extra load as loss of effectiveness: ε = load / (expected + load)."""
-    sure = np.nan_to_num(load.probability) >= limits.min_probability
-    edge = np.flatnonzero(np.diff(np.r_[False, sure, False].astype(np.int8)))
-    out = []
-    for a, b in zip(edge[::2], edge[1::2], strict=True):
-        level, expected = load.level[a:b], np.maximum(np.abs(load.expected[a:b]), 1e-9)
-        share = level / (expected + level)
-        epsilon, p = float(np.mean(share)), float(np.mean(load.probability[a:b]))
-        seconds = (b - a) * load.length * data.dt
-        if epsilon < limits.min_epsilon or seconds < _LEAST_LOAD_S or float(np.mean(level)) < _LEAST_LOAD * between:
-            continue
-        mode = FaultMode.NOISY if float(np.ptp(share)) > 0.5 * epsilon else FaultMode.INEFFICIENT
-        low, high = float(np.min(share)), float(np.max(share))
-        sat = None
-        if mode is FaultMode.NOISY:
-            mean, rms = -float(np.mean(level)), float(np.sqrt(np.mean(level**2)))
-            sat = Sat(mean, rms, -float(np.max(level)), -float(np.min(level)), "of full opening")
-        out.append(
-            Finding(
-                start=int(a) * load.length,
-                stop=int(b) * load.length,
-                side=Side.ACTUATOR,
-                mode=mode,
-                probability=p,
-                hypotheses=(
-                    Hypothesis("actuator", mode.value, p),
-                    Hypothesis("actuator", "healthy", 1 - p),
-                ),
-                epsilon=Epsilon(epsilon, low, high),
-                sat=sat,
-                evidence=(
-                    f"{data.names[2]} was {float(np.mean(level)):.3g} above the {float(np.mean(expected)):.3g} that healthy "
-                    f"missions needed for the same speed, over {seconds:.0f} s.",
-                    "An extra load and a loss of effectiveness look alike here.",
-                ),
-                tier="model",
-            )
-        )
-    return out
+    return known if np.isnan(found) else float(np.clip(found, low * known, high * known))

@@ -26,6 +26,8 @@ _LEAST_S = 4.0
 _MOST_SAMPLES = 60_000
 _TUKEY = 4.0
 _LEAST_EXPLAINED = 0.5
+_WINDOW_S = 0.5
+_QUANTILE = 0.4
 
 
 @dataclass(frozen=True)
@@ -131,8 +133,8 @@ def identify_echo(records: Sequence[DriveRecord]) -> EchoModel | None:
     design, error = _regression(parts, memory, dt, range(first, first + _TAPS))
     theta = _robust(design[::every], error[::every])
     rest = error - design @ theta
-    noise = _size(rest)
-    if noise <= 0 or noise**2 > (1 - _LEAST_EXPLAINED) * _size(target - np.median(target)) ** 2:
+    noise = window_size(rest, dt)
+    if not 0 < noise**2 < (1 - _LEAST_EXPLAINED) * window_size(target, dt) ** 2:
         return None
     exact, core = _exact_share(rest[:: max(1, rest.size // _MOST_SAMPLES)], noise)
     return EchoModel(tuple(float(g) for g in theta[:_TAPS]), first, memory, float(theta[_TAPS]), noise, exact, core, dt)
@@ -173,10 +175,17 @@ def _spread(x: Array) -> float:
     return 1.4826 * float(np.median(np.abs(x - np.median(x))))
 
 
-def _size(x: Array) -> float:
-    """Root mean square of all but the largest two percent: most samples of an echo are exact, the others are a step late."""
-    kept = np.abs(x) <= np.quantile(np.abs(x), 0.98)
-    return float(np.sqrt(np.mean(x[kept] ** 2)))
+def window_size(x: Array, dt: float) -> float:
+    """Root mean square of x in its quieter windows of half a second: healthy ones where less than half are faulty.
+
+    NaN are left out; the result is NaN where no window is half full.
+    """
+    length = max(5, round(_WINDOW_S / dt))
+    windows = x[: x.size // length * length].reshape(-1, length)
+    number = np.isfinite(windows).sum(axis=1)
+    power = np.nansum(windows**2, axis=1) / np.maximum(number, 1)
+    used = power[number >= length / 2]
+    return float(np.sqrt(np.quantile(used, _QUANTILE))) if used.size else float("nan")
 
 
 def _robust(design: Array, target: Array) -> Array:

@@ -48,11 +48,14 @@ class LoadTrack:
     length: int
 
     def sampled(self, values: Array, size: int) -> Array:
-        """Values of the steps for every sample, shape (size,); NaN after the last whole step."""
-        out = np.full(size, np.nan)
-        spread = np.repeat(values, self.length)
-        out[: spread.size] = spread
-        return out
+        """Values of the steps for every sample, shape (size,); a step without value, and the incomplete last one, take
+        the value of a neighbour.
+        """
+        if not values.size:
+            return np.full(size, np.nan)
+        earlier, later = np.r_[np.nan, values[:-1]], np.r_[values[1:], np.nan]
+        filled = np.where(np.isfinite(values), values, np.where(np.isfinite(earlier), earlier, later))
+        return filled[np.minimum(np.arange(size) // self.length, values.size - 1)]
 
 
 def step_means(record: DriveRecord, least_speed: float) -> tuple[Array, Array, int]:

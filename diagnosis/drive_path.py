@@ -28,7 +28,7 @@ Array = NDArray[np.float64]
 
 _EPSILONS = np.r_[np.arange(0.03, 0.1, 0.01), np.arange(0.1, 0.97, 0.02)]
 _HALF_STEPS = np.r_[np.full(7, 0.005), np.full(44, 0.01)]
-_POWERS = np.array([0.5, 1.0, 2.0, 4.0, 8.0, 16.0, 32.0])  # of the added noise [healthy noise]
+_POWERS = np.array([0.5, 1.0, 2.0, 4.0, 8.0, 16.0, 32.0, 64.0])  # of the added noise [healthy noise]
 _BIASES = np.arange(-3.0, 3.5)  # of the noisy row [its noise]
 _TAIL_SHARE, _TAIL_SIZE = 0.01, 3.0
 _WITHIN_NOISY = 4.0  # cost of another bias or power within the noisy row
