@@ -25,7 +25,7 @@ def event_figures(faults: Sequence[FaultOutcome], judged: Sequence[ReportOutcome
         Time in which every report would be a false alarm [s].
     """
     right = [f for f in faults if f.outcome == "right"]
-    found = [f for f in faults if f.outcome in ("right", "wrong_mode", "wrong_side")]
+    found = [f for f in faults if f.outcome in ("right", "wrong_mode", "wrong_side") and f.onset_seen]
     delay = spread((f.detection_delay_s for f in found), signed=True)
     return {
         "events": _events(faults, judged),

@@ -39,12 +39,13 @@ def _fault(group: Compared, fault: Fault, j: int | None, overlap: float) -> Faul
     outcome = "missed" if row is None else difference(truth, row)
     if first_seen is None:
         outcome = "not_excited" if first is None else "masked"
+    onset_seen = first_seen is not None and first_seen == first
     onset = end = error = delay = None
-    if row is not None and first_seen is not None and first_seen == first and outcome != "wrong_part":
+    if row is not None and first_seen is not None and onset_seen and outcome != "wrong_part":
         raised = row.get("detected_s")
         delay = None if raised is None else float(raised) + group.shift - first_seen
     if row is not None and first_seen is not None and outcome == "right":
-        onset = float(group.start[j]) - first_seen if first_seen == first else None
+        onset = float(group.start[j]) - first_seen if onset_seen else None
         end = None if within(hidden, fault.stop - 1e-9, fault.stop) else float(group.stop[j]) - fault.stop
         estimate = (row.get("epsilon") or {}).get("value")
         error = None if estimate is None else abs(float(estimate) - truth.epsilon)
@@ -66,6 +67,7 @@ def _fault(group: Compared, fault: Fault, j: int | None, overlap: float) -> Faul
         detection_delay_s=delay,
         speed=speed,
         slip_share=slip,
+        onset_seen=onset_seen,
     )
 
 

@@ -53,6 +53,8 @@ class FaultOutcome:
         Mean |commanded speed| over its driving time [m/s]; None where the result does not hold it.
     slip_share : float
         Share of its driving time in which the tyre slipped [1].
+    onset_seen : bool
+        Whether its first excited sample was not masked; else its onset and delay are not known.
     """
 
     component: str
@@ -71,6 +73,7 @@ class FaultOutcome:
     detection_delay_s: float | None = None
     speed: float | None = None
     slip_share: float = 0.0
+    onset_seen: bool = True
 
 
 @dataclass(frozen=True)

@@ -99,6 +99,14 @@ def test_detection_delay_is_the_causal_moment_after_the_first_excited_sample() -
     assert delay["p95"] == pytest.approx(0.03 + 0.9 * 0.02)  # of −0.01, 0.03, 0.05, linear between them
 
 
+def test_a_fault_that_began_masked_has_no_delay() -> None:
+    truth = truth_of((ACTUATOR, "stuck", 3.0, 9.0, 1.0), masked=(TruthSpan("A", 2.0, 5.0),))
+    counts = wheel(report_of(("actuator", "stuck", 5.0, 9.0, 1.0, 5.02)), truth)
+    assert [(f.outcome, f.onset_seen, f.detection_delay_s) for f in counts.faults] == [("right", False, None)]
+    delay = figures(counts)["detection_delay_s"]
+    assert (delay["n"], delay["without"]) == (0, 0)
+
+
 def test_reports_that_do_not_know_their_moment_of_detection() -> None:
     report = report_of(("sensor", "stuck", 2.0, 4.0, 1.0, None))
     del report["intervals"][0]["detected_s"], report["intervals"][0]["tier"]
