@@ -51,7 +51,9 @@ class SteeringModel:
         lag = max(self.plant.lag, 1e-4)
         # what rounding leaves in a mean that noise does not even out: (q²/2π²)·exp(−4π²σ²/q²)
         even = np.exp(-4 * np.pi**2 * (noise.std / noise.lsb) ** 2) if noise.lsb > 0 else 0.0
-        rounding = noise.lsb**2 / (2 * np.pi**2) * even + (1e-7 * self.stop) ** 2
+        rounding = noise.lsb**2 / (2 * np.pi**2) * even if noise.resolved else noise.step
+        rounding += (1e-7 * self.stop) ** 2
+        constant = max(noise.step / 4, noise.white / 2500)
         return np.array(
             [
                 self.dt,
@@ -62,7 +64,7 @@ class SteeringModel:
                 self.load,
                 _LOAD_S,
                 noise.white,
-                max(noise.step / 4, noise.white / 2500),
+                constant,
                 WHITE_DOF if noise.resolved else 0.02,
                 noise.spread,
                 lag,
@@ -70,7 +72,7 @@ class SteeringModel:
                 rounding + 0.01 * noise.white,
                 rounding,
                 self.switch_cost,
-                0.5 * self.dt,
+                0.5 * self.dt if noise.resolved else 0.03,
                 max(0.02, self.plant.misfit) ** 2,
                 noise.step,
             ]

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import minimize
 from scipy.signal import lfilter
 
 from diagnosis.steering_blocks import WHITE_DOF, SensorNoise, SteeringBlocks, window_means
@@ -124,19 +125,29 @@ def _fit(parts: Sequence[Windows], short: Sequence[Windows]) -> SteeringPlant | 
         return None
     typical = scale / float(np.median(openings))
     top = float(np.quantile(moving, 0.98))
-    best = (np.inf, typical, top, 0.05)
-    for gain in typical * np.geomspace(0.3, 5.0, 12):
-        for limit in top * np.array([0.6, 0.8, 1.0, 1.25]):
-            best = min(best, (_loss(parts, gain, limit, 0.05, scale, 0.1), gain, limit, 0.05))
-    for step in (1.3, 1.12, 1.05, 1.02):
-        tolerance = 0.3 * (step - 1) + 0.004
-        best = (_loss(short, *best[1:], scale, tolerance), *best[1:])
-        for name in (2, 0, 1, 2, 0):
-            for factor in (1 / step, step):
-                trial = list(best[1:])
-                trial[name] = max(trial[name] * (factor if name < 2 else factor**2), 1e-3)
-                best = min(best, (_loss(short, *trial, scale, tolerance), *trial))
-    _, gain, limit, lag = best
+    grid = [
+        (_loss(parts, gain, limit, lag, scale, 0.1), gain, limit, lag)
+        for gain in typical * np.geomspace(0.3, 5.0, 14)
+        for limit in top * np.array([0.6, 0.8, 1.0, 1.25])
+        for lag in (0.02, 0.06, 0.18)
+    ]
+    best = min(grid)[1:]
+    for tolerance in (0.05, 0.02, 0.006):
+        # gain and lag trade off against each other: a simplex in their logarithms follows the valley
+        found = minimize(
+            lambda x, tolerance=tolerance: _loss(short, *np.exp(x), scale, tolerance),
+            np.log(best),
+            method="Nelder-Mead",
+            options={
+                "initial_simplex": np.log(best)
+                + np.array([[0, 0, 0], [1, 0, 0.0], [0, 1, 0], [0, 0, 5]]) * 3 * tolerance,
+                "maxfev": 60,
+                "xatol": 1e-3,
+                "fatol": 1e-4,
+            },
+        )
+        best = tuple(np.exp(found.x))
+    gain, limit, lag = best
     off = []
     for w in parts:
         predicted = w.predicted(gain, limit, lag)
