@@ -6,10 +6,10 @@ simulated plant, the openings of the other valves, and the ground: the body's tr
 (``--knows body``: a hypothesis that turns the wheel differently then meets another tyre force), or the tyre force itself
 (``--knows force``: looser still, for the force gives the wheel's true speed away; free wheels have none).
 
-For each pair of rows (sensor, actuator) the likelihood of v is maximised over ε and sat within the simulator's own ranges;
-each parameter costs ½·log n, and each pair the logarithm of its prior. Behind a sensor without information (stuck, silent)
-no valve can be judged; the truth masks it there. The share of driving time in the right row is what no diagnosis of this
-evidence should be expected to pass.
+For each pair of rows (sensor, actuator) the likelihood of v is maximised over ε and sat within the simulator's own ranges.
+Each parameter costs half the logarithm of the independent samples that tell it, each pair the logarithm of its prior. Behind
+a sensor without information (stuck, silent) no valve can be judged; the truth masks it there. The share of driving time in
+the right row is what no diagnosis of this evidence should be expected to pass.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
-from oracle import ROWS, SIGNALS, A, Oracle, World, trajectories
+from oracle import ROWS, SIGNALS, A, Oracle, World, trajectory
 
 from replay.faults import Side
 from replay.simulation.options import SimulatedMission, SimulationOptions
@@ -122,7 +122,7 @@ def confusions(task: Task) -> tuple[A, float]:
             oracle = Oracle(measured[rows], float(speed[a]), model.v_std, model.v_lsb, part(world, rows))
             chosen = max(oracle.pairs(), key=lambda found: found[2])[:2]
             if truth[1, a] == 0:
-                replay = trajectories(oracle.v0, np.zeros(1), np.zeros(1), oracle.world)[0]
+                replay = trajectory(oracle.v0, 0.0, 0.0, oracle.world)
                 off = max(off, float(np.abs(replay - speed[rows]).max()))
             for side in (0, 1):
                 use = driving[rows] & ~(masked[rows] if side else np.False_)

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from itertools import product
 from typing import NamedTuple
 
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
+from scipy.optimize import minimize
 
 A = NDArray[np.float64]
 
@@ -19,6 +21,9 @@ NOISY_DELTA, NOISY_MEAN, NOISY_SPREAD, NOISY_TAU = (0.5, 0.75), (-0.05, 0.05), (
 DISTURBED_EPSILON, DISTURBED_SAT, DISTURBED_STD, DISTURBED_TAU = (0.3, 0.5), (0.05, 0.12), (0.05, 0.12), 0.8
 # Prior of a stretch: healthy, one row of one side, one of both.
 LOG_PRIOR = (np.log(0.5), np.log(0.5 * 6 / 7 / 8), np.log(0.5 / 7 / 16))
+HOPELESS = 5.0  # a search gains less than this per sample in log likelihood over its first guess
+
+Noise = tuple[float, float, float, float]
 
 
 class World(NamedTuple):
@@ -59,17 +64,41 @@ def _force(k, v, w):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def trajectories(v0, epsilon, sat, w):  # type: ignore[no-untyped-def]
-    """τ v̇ = −v + flow(u_v) − droop·F with u_v = (1−ε)u + ε·sat, shape (hypotheses, n)."""
-    out = np.empty((epsilon.size, w.u.size))
-    for g in range(epsilon.size):
-        v = v0
-        for k in range(w.u.size):
-            out[g, k] = v
-            flow, _ = _flow(k, (1.0 - epsilon[g]) * w.u[k] + epsilon[g] * sat[g], w)
-            force, _ = _force(k, v, w)
-            v += w.dt / w.tau * (flow - v - w.droop * force)
+def trajectory(v0, epsilon, sat, w):  # type: ignore[no-untyped-def]
+    """τ v̇ = −v + flow(u_v) − droop·F with u_v = (1−ε)u + ε·sat, shape (n,)."""
+    out, v = np.empty(w.u.size), v0
+    for k in range(w.u.size):
+        out[k] = v
+        flow, _ = _flow(k, (1.0 - epsilon) * w.u[k] + epsilon * sat, w)
+        force, _ = _force(k, v, w)
+        v += w.dt / w.tau * (flow - v - w.droop * force)
     return out
+
+
+def peak(function: Callable[[float], float], low: float, high: float, count: int = 9) -> tuple[float, float]:
+    """Place and height of a function's peak: the best point of a grid, then parabolas through three points."""
+    x = np.linspace(low, high, count)
+    found = {float(a): function(float(a)) for a in x}
+    step = float(x[1] - x[0])
+    for _ in range(3):
+        best = max(found, key=found.__getitem__)
+        before = max((y for y in found if y < best), default=None)
+        after = min((y for y in found if y > best), default=None)
+        if before is None or after is None:
+            place = best
+        else:
+            place = best + _vertex(before - best, after - best, found[before] - found[best], found[after] - found[best])
+        step /= 6.0
+        for a in np.clip([place - step, place, place + step], low, high):
+            found.setdefault(float(a), function(float(a)))
+    best = max(found, key=found.__getitem__)
+    return best, found[best]
+
+
+def _vertex(a: float, b: float, f_a: float, f_b: float) -> float:
+    """Where the parabola through (a, f_a), (0, 0), (b, f_b) is highest, a < 0 < b."""
+    bend = (f_a / a - f_b / b) / (a - b)
+    return float(np.clip(-(f_a / a - bend * a) / (2 * bend), a, b)) if bend < 0 else 0.0
 
 
 @njit(cache=True)
@@ -139,8 +168,9 @@ class Oracle:
         """Variance of what is white in y: noise before the fault, and quantisation."""
         return (delta * self.std) ** 2 + self.lsb**2 / 12
 
-    def cost(self, parameters: int) -> float:
-        return 0.5 * parameters * float(np.log(self.y.size))
+    def cost(self, parameters: int, tau: float = 0.0) -> float:
+        """Price of parameters that noise with a correlation time leaves uncertain: ½ log of its independent samples."""
+        return 0.5 * parameters * float(np.log(max(1.0, self.y.size * min(1.0, self.world.dt / max(tau, 1e-9)))))
 
     def pairs(self) -> Iterator[tuple[str, str, float]]:
         """Every pair of rows with the logarithm of its probability, up to a constant."""
@@ -149,32 +179,29 @@ class Oracle:
             silent = self.y[0] == 0.0
             yield ("no_signal" if silent else "stuck"), "healthy", LOG_PRIOR[1] + (0.0 if silent else cell)
             return  # noise above the resolution: no other row gives one value for long
-        for actuator in ROWS:
-            for sensor in ("healthy", "inefficient", "noisy"):
-                sides = (sensor != "healthy") + (actuator != "healthy")
-                fit = self.with_disturbance(sensor) if actuator == "noisy" else self.best(sensor, actuator)
-                yield sensor, actuator, fit + n * cell + LOG_PRIOR[sides]
+        found = {
+            (sensor, actuator): self.best(sensor, actuator)
+            for sensor, actuator in product(("healthy", "inefficient", "noisy"), ROWS)
+            if actuator != "noisy"
+        }
+        for sensor in ("healthy", "inefficient", "noisy"):
+            found[sensor, "noisy"] = self.with_disturbance(sensor, max(found.values()) - HOPELESS * n)
+        for (sensor, actuator), fit in found.items():
+            yield sensor, actuator, fit + n * cell + LOG_PRIOR[(sensor != "healthy") + (actuator != "healthy")]
 
     def best(self, sensor: str, actuator: str) -> float:
-        """Largest log likelihood over the actuator row's parameter, found by three ever finer grids."""
-        if actuator in ("healthy", "no_signal"):
-            return self.grid(sensor, np.array([float(actuator == "no_signal")]), np.zeros(1))[0]
-        ranges = [EPSILON] if actuator == "inefficient" else [STUCK_VALVE, (-STUCK_VALVE[1], -STUCK_VALVE[0])]
-        found = -np.inf
-        for low, high in ranges:
-            a, b = low, high
-            for _ in range(3):
-                x = np.linspace(a, b, 9)
-                weak = actuator == "inefficient"
-                fits = self.grid(sensor, x if weak else np.ones(9), np.zeros(9) if weak else x)
-                i = int(np.argmax(fits))
-                found = max(found, fits[i])
-                a, b = max(low, x[i] - (b - a) / 8), min(high, x[i] + (b - a) / 8)
-        return found - self.cost(1)
+        """Largest log likelihood over the actuator row's parameter."""
 
-    def grid(self, sensor: str, epsilon: A, sat: A) -> list[float]:
-        """Log likelihood of a sensor row for each hypothesis of the valve."""
-        return [getattr(self, sensor)(v) for v in trajectories(self.v0, epsilon, sat, self.world)]
+        def fit(epsilon: float, sat: float) -> float:
+            v = trajectory(self.v0, epsilon, sat, self.world)
+            return float(getattr(self, sensor)(v))
+
+        if actuator in ("healthy", "no_signal"):
+            return fit(float(actuator == "no_signal"), 0.0)
+        if actuator == "inefficient":
+            return peak(lambda x: fit(x, 0.0), *EPSILON)[1] - self.cost(1)
+        low, high = STUCK_VALVE
+        return max(peak(lambda x: fit(1.0, x), *r)[1] for r in ((low, high), (-high, -low))) - self.cost(1)
 
     def gauss(self, squares: float, variance: float) -> float:
         return float(-0.5 * (squares / variance + self.y.size * np.log(2 * np.pi * variance)))
@@ -183,56 +210,67 @@ class Oracle:
         return self.gauss(float(np.sum((self.y - v) ** 2)), self.white(1.0))
 
     def inefficient(self, v: A) -> float:
-        delta = float(np.clip((self.y @ v) / max(v @ v, 1e-12), *(1.0 - np.array(EPSILON[::-1]))))
+        delta = float(np.clip(float(self.y @ v) / max(float(v @ v), 1e-12), *(1.0 - np.array(EPSILON[::-1]))))
         return self.gauss(float(np.sum((self.y - delta * v) ** 2)), self.white(delta)) - self.cost(1)
 
     def noisy(self, v: A) -> float:
         """White or correlated noise about δv + m; the spread of its correlated part from a grid, then refined."""
-        return max(self.noise_of(v)[0], self.noise_of(v, 0.0)[0]) - self.cost(3)
+        return max(self.correlated(v)[0] - self.cost(3, NOISY_TAU), self.uncorrelated(v)[0] - self.cost(3))
 
-    def noise_of(self, v: A, tau: float = NOISY_TAU) -> tuple[float, float, float, float]:
-        """Log likelihood, δ, m and spread of the best noise with a correlation time."""
-        a = float(np.exp(-self.world.dt / tau)) if tau else 0.0
-        best: tuple[float, float, float, float] = (-np.inf, 0.62, 0.0, 0.05)
-        for factor in (0.0, 1.25, 1.12, 1.05):
-            around = (best[3] / max(factor, 1.0), best[3] * factor)
-            for spread in np.clip(around, *NOISY_SPREAD) if factor else np.geomspace(*NOISY_SPREAD, 5):
-                moments, log_s = _innovations(self.y, v, a, spread, self.white(best[1]))
-                delta, mean = _two(moments)
-                x = np.array([1.0, -delta, -mean])
-                fit = -0.5 * float(x @ moments @ x + log_s + self.y.size * np.log(2 * np.pi))
-                best = max(best, (fit, delta, mean, float(spread)))
-        return best
+    def uncorrelated(self, v: A) -> Noise:
+        """Log likelihood, δ, m and spread of the best white noise."""
+        one = np.ones_like(v)
+        delta, mean = _two(np.array([[a @ b for b in (self.y, v, one)] for a in (self.y, v, one)]))
+        rest = self.y - delta * v - mean
+        spread = float(np.sqrt(max(float(np.mean(rest**2)) - self.white(delta), 0.0)))
+        spread = float(np.clip(spread, *NOISY_SPREAD))
+        return self.gauss(float(rest @ rest), self.white(delta) + spread**2), delta, mean, spread
 
-    def with_disturbance(self, sensor: str) -> float:
-        """Largest log likelihood under a disturbed valve, by a search that narrows around the best point."""
-        rng = np.random.default_rng(self.y.size)
-        healthy = trajectories(self.v0, np.zeros(1), np.zeros(1), self.world)[0]
-        tau, spread = 0.0, 0.0
-        if sensor == "noisy":
-            (white_fit, *_), (slow_fit, _, _, slow) = self.noise_of(healthy, 0.0), self.noise_of(healthy)
-            tau, spread = (NOISY_TAU, slow) if slow_fit > white_fit else (0.0, self.noise_of(healthy, 0.0)[3])
-        ranges = np.array([DISTURBED_EPSILON, DISTURBED_SAT, DISTURBED_STD, (1.0, 1.0), (0.0, 0.0), (spread, spread)])
+    def correlated(self, v: A) -> Noise:
+        """The same of the best noise with the correlation time of the scenarios."""
+        a = float(np.exp(-self.world.dt / NOISY_TAU))
+        white = self.white(float(np.mean(NOISY_DELTA)))
+
+        def fit(log_spread: float) -> Noise:
+            spread = float(np.exp(log_spread))
+            moments, log_s = _innovations(self.y, v, a, spread, white)
+            delta, mean = _two(moments)
+            x = np.array([1.0, -delta, -mean])
+            total = -0.5 * float(x @ moments @ x + log_s + self.y.size * np.log(2 * np.pi))
+            return total, delta, mean, spread
+
+        return fit(peak(lambda x: fit(x)[0], float(np.log(NOISY_SPREAD[0])), float(np.log(NOISY_SPREAD[1])), 5)[0])
+
+    def with_disturbance(self, sensor: str, hopeless: float) -> float:
+        """Largest log likelihood under a disturbed valve; not searched where the first guess falls below `hopeless`."""
+        healthy = trajectory(self.v0, 0.0, 0.0, self.world)
+        middle = [float(np.mean(r)) for r in (DISTURBED_EPSILON, DISTURBED_SAT, DISTURBED_STD)]
+        ranges, start, tau = [DISTURBED_EPSILON, DISTURBED_SAT, DISTURBED_STD], middle, 0.0
         if sensor == "inefficient":
-            ranges[3] = 1.0 - np.array(EPSILON[::-1])
+            limits = (1.0 - EPSILON[1], 1.0 - EPSILON[0])
+            ranges, start = [*ranges, limits], [*start, float(np.clip(self.y @ healthy / (healthy @ healthy), *limits))]
         elif sensor == "noisy":
-            ranges[3:5] = NOISY_DELTA, NOISY_MEAN
-            ranges[5] = np.clip([0.7 * spread, 1.3 * spread], *NOISY_SPREAD)
-        found = -np.inf
-        for sign in (-1.0, 1.0):
-            middle, width, best = ranges.mean(axis=1), ranges[:, 1] - ranges[:, 0], -np.inf
-            for _ in range(3):
-                points = np.vstack([middle, middle + width * rng.uniform(-0.5, 0.5, (9, 6))])
-                for x in np.clip(points, ranges[:, 0], ranges[:, 1]):
-                    fit = self.filtered(x, sign, tau)
-                    if fit > best:
-                        best, middle = fit, x
-                width = 0.5 * width
-            found = max(found, best)
-        return found - self.cost(3 + {"healthy": 0, "inefficient": 1, "noisy": 3}[sensor])
+            white, slow = self.uncorrelated(healthy), self.correlated(healthy)
+            tau = NOISY_TAU if slow[0] > white[0] else 0.0
+            ranges, start = [*ranges, NOISY_DELTA, NOISY_MEAN, NOISY_SPREAD], [*start, *max(white, slow)[1:]]
+        low, high = np.array(ranges).T
+
+        def fit(x: A, sign: float) -> float:
+            inside = low + np.clip(x, 0.0, 1.0) * (high - low)
+            return self.filtered(inside, sign, tau)
+
+        first = (np.array(start) - low) / (high - low)
+        sign = max((-1.0, 1.0), key=lambda s: fit(first, s))
+        best = fit(first, sign)
+        if best > hopeless:
+            # Steps towards the middle of the range, so that every corner of the first simplex differs.
+            corners = np.vstack([first, first + np.diag(np.where(first > 0.5, -0.3, 0.3))])
+            options = {"maxfev": 35 * first.size, "initial_simplex": corners, "fatol": 0.3, "xatol": 1e-3}
+            best = -float(minimize(lambda x: -fit(x, sign), first, method="Nelder-Mead", options=options).fun)
+        return best - self.cost(3, DISTURBED_TAU) - self.cost(len(ranges) - 3, tau)
 
     def filtered(self, x: A, sign: float, tau: float) -> float:
-        epsilon, sat, std, delta, mean, spread = (float(value) for value in x)
+        epsilon, sat, std, delta, mean, spread = (*(float(value) for value in x), *(1.0, 0.0, 0.0)[x.size - 3 :])
         dt, white = self.world.dt, self.white(delta) + (0.0 if tau else spread**2)
         a, b = float(np.exp(-dt / DISTURBED_TAU)), float(np.exp(-dt / tau)) if tau else 0.0
         slow = spread if tau else 0.0
