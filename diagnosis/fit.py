@@ -93,19 +93,18 @@ def fit_missions(
     tell("checking units")
     errors = list(find_unit_errors(timelines, replays, machine))
     bad = {s for e in errors for s in e.signals}
+    tell("fitting the control law")
+    control = fit_control(timelines, replays, machine, bad)
+    doubt, leaves = lambda_doubt(control, machine, speed_mistakes(machine))
+    if doubt:
+        suspects = tuple(f"wheel.{w}.{leaf}" for leaf in leaves for w in machine.wheels)
+        errors.append(UnitError(suspects, control.lambda_.value / machine.control.lambda_, doubt))
+        bad |= set(suspects)
     if driving < _LEAST_SECONDS and not errors:
         raise NotJudged(
             f"{', '.join(names) or 'no mission'}: {driving:.1f} s in which a wheel is commanded to move, {_LEAST_SECONDS:g} s "
             "are needed; give missions that drive"
         )
-    tell("fitting the control law")
-    control = fit_control(timelines, replays, machine, bad)
-    doubt = lambda_doubt(control, machine, speed_mistakes(machine))
-    if doubt:
-        leaves = ("u",) if "as if u" in doubt else ("v", "v_ref") if "as if" in doubt else ()
-        suspects = tuple(f"wheel.{w}.{leaf}" for leaf in leaves for w in machine.wheels)
-        errors.append(UnitError(suspects, control.lambda_.value / machine.control.lambda_, doubt))
-        bad |= set(suspects)
     tell("fitting the wheels")
     spoiled = [_spoiled(w, timelines, bad) for w in machine.wheels]
     usable = [[None if s else r for r, s in zip(wheels, spoiled, strict=True)] for wheels in records]

@@ -19,6 +19,8 @@ Array = NDArray[np.float64]
 
 _FAR = 0.2
 _UNIT_NEAR = 0.08
+_VERY_FAR = 3.0
+_ROUGH = 0.7
 
 
 @dataclass(frozen=True)
@@ -141,32 +143,38 @@ def _increments(missions: Sequence[tuple[Timeline, Replay]], fit: LawFit, machin
     return Estimate(float(np.median(values)), float(np.std(values)), condition)
 
 
-def lambda_doubt(fit: ControlFit, machine: Machine, factors: dict[str, tuple[float, str]]) -> str:
-    """Sentence about a λ̂ far from the machine file's, with the unit that would explain it; empty where it is near."""
+def lambda_doubt(
+    fit: ControlFit, machine: Machine, factors: dict[str, tuple[float, str]]
+) -> tuple[str, tuple[str, ...]]:
+    """Sentence about a λ̂ far from the machine file's, and which signals of the wheels it puts in doubt.
+
+    Empty where λ̂ is near, or only unlike a λ that the file leaves open (law = auto) by less than a factor of three.
+    """
     if not fit.law:
-        return ""
+        return "", ()
     ratio = fit.lambda_.value / machine.control.lambda_
     if abs(ratio - 1) <= _FAR:
-        return ""
-    named = [n for n, (f, _) in factors.items() if abs(np.log(ratio * f)) < _UNIT_NEAR]
+        return "", ()
     condition = f"{LAW_TEXT[fit.law]}, Ψ̂ {fit.psi}, fitted jointly, {100 * fit.explained:.1f} % explained"
-    if named:
-        return (
-            f"λ̂ = {fit.lambda_.value:.4g} s/m is {ratio:.3g} times control.lambda = {machine.control.lambda_:g} "
-            f"({condition}): as if all wheels' v and v_ref had {named[0]}; check their unit and at in [signals]: "
-            f"{factors[named[0]][1]}"
-        )
-    if abs(ratio - 0.01) < 0.0008 or abs(ratio - 100) < 8:
+    head = f"λ̂ = {fit.lambda_.value:.4g} s/m is {ratio:.3g} times control.lambda = {machine.control.lambda_:g} ({condition})"
+    very_far = not 1 / _VERY_FAR < ratio < _VERY_FAR
+    # with a wrong unit ρ is wrong too, and λ̂ a little with it
+    reach = _ROUGH if very_far else _UNIT_NEAR
+    near = {n: abs(float(np.log(ratio * f))) for n, (f, _) in factors.items()}
+    named = sorted((n for n in near if near[n] < reach), key=near.__getitem__)
+    if abs(np.log(abs(ratio)) - np.log(100.0)) < _UNIT_NEAR or abs(np.log(ratio) + np.log(100.0)) < _UNIT_NEAR:
         which = (
             'percent read as a fraction: unit = "%"' if ratio > 1 else 'a fraction read as percent: unit = "fraction"'
         )
+        return f"{head}: as if u were {which} in [signals]", ("u",)
+    if named:
+        shown = ", or ".join(f"{n} ({factors[n][1]})" for n in named[:4])
         return (
-            f"λ̂ = {fit.lambda_.value:.4g} s/m is {ratio:.3g} times control.lambda = {machine.control.lambda_:g} "
-            f"({condition}): as if u were {which} for u in [signals]"
+            f"{head}: as if v and v_ref of all wheels had a wrong unit, {shown}; check them in [signals], or give the "
+            "right control.lambda",
+            ("v", "v_ref"),
         )
-    if machine.control.law != "auto":
-        return (
-            f"λ̂ = {fit.lambda_.value:.4g} s/m is {ratio:.3g} times control.lambda = {machine.control.lambda_:g} of the "
-            f"machine file ({condition}): check the units of u, v and v_ref in [signals], or control.lambda"
-        )
-    return ""
+    if very_far or machine.control.law != "auto":
+        text = f"{head}: check the units of u, v and v_ref in [signals], or give the right control.lambda"
+        return text, ("u", "v", "v_ref") if very_far else ()
+    return "", ()

@@ -1,0 +1,174 @@
+"""Constants of simulated healthy machines are found within what is stated; faults and wrong units are not learned."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+from diagnosis.fit import FitResult, fit_missions
+from diagnosis.fit_document import fit_document, fit_toml
+from replay.errors import NotJudged
+from replay.faults import FaultMode, FaultSpec, Side
+from replay.machine import haulotte
+from replay.machine_file import load_machine
+from replay.mission import Mission
+from replay.signals import Signal, Signals
+from replay.simulation.options import SimulationOptions
+from replay.simulation.plant_options import PlantOptions
+from replay.simulation.run import simulate_mission
+from replay.sources import SignalSource
+from replay.timeline import align
+
+WHEELS = ("FR", "FL", "RR", "RL")
+# one machine: K = 2.4 m/s, tau = 0.25 s, d = 0.2 m, lambda = 1 s/m in every mission
+SAME = PlantOptions(wheel_spread=0.0)
+DEAD = PlantOptions(wheel_spread=0.0, dead_zone=0.05)
+
+
+@cache
+def mission(
+    seed: int,
+    coupling: str = "free",
+    *,
+    seconds: float = 60.0,
+    rate: float = 100.0,
+    plant: PlantOptions = SAME,
+    faults: tuple[FaultSpec, ...] = (),
+) -> Mission:
+    options = SimulationOptions(
+        scenario="healthy",
+        seed=seed,
+        duration_s=seconds,
+        rate_hz=rate,
+        evidence="base",
+        coupling=coupling,  # type: ignore[arg-type]
+        plant=plant,
+        faults=faults,
+    )
+    simulated = simulate_mission(options)
+    items = {
+        name: Signal(name, simulated.stamps, x, SignalSource(column=name), "sim", False)
+        for name, x in simulated.columns.items()
+    }
+    signals = Signals(items, {})
+    return Mission((), signals, align(signals))
+
+
+def values(result: FitResult, leaf: str) -> list[float]:
+    return [c.value for c in result.constants if c.key.startswith("plant.") and c.key.endswith(f".{leaf}") and c.value]
+
+
+def written(result: FitResult) -> set[str]:
+    return {c.key for c in result.constants if c.written}
+
+
+@pytest.fixture(scope="module")
+def free() -> FitResult:
+    return fit_missions([mission(s, rate=200.0, plant=DEAD) for s in (3, 4, 5)], haulotte())
+
+
+@pytest.fixture(scope="module")
+def clean() -> FitResult:
+    return fit_missions([mission(s, "ground") for s in (3, 4, 5)], haulotte())
+
+
+@pytest.fixture(scope="module")
+def ground() -> FitResult:
+    return fit_missions([mission(s, "ground") for s in (3, 4)], haulotte())
+
+
+def test_constants_of_free_wheels(free: FitResult) -> None:
+    assert values(free, "K") == pytest.approx([2.4] * 4, rel=0.03)
+    assert values(free, "tau") == pytest.approx([0.25] * 4, rel=0.03)
+    assert values(free, "dead") == pytest.approx([0.05] * 4, abs=0.005)
+    assert free.machine.control.law == "opposed"
+    assert free.machine.control.lambda_ == pytest.approx(1.0, rel=0.1)
+    assert free.machine.control.zeta == pytest.approx(1000.0, rel=0.03)
+    assert not free.unit_errors
+
+
+def test_constants_on_the_ground(ground: FitResult) -> None:
+    assert values(ground, "K") == pytest.approx([2.4] * 4, rel=0.05)
+    assert values(ground, "tau") == pytest.approx([0.25] * 4, rel=0.2)
+    offsets = [w.offset for w in ground.machine.geometry.wheels.values()]  # type: ignore[union-attr]
+    assert offsets == pytest.approx([-0.2, 0.2, -0.2, 0.2], rel=0.1)
+    assert all(0.002 < load < 0.02 for load in values(ground, "load"))
+
+
+def test_truth_lies_within_three_standard_deviations(free: FitResult, ground: FitResult) -> None:
+    for result, truths in ((free, {"K": 2.4, "dead": 0.05}), (ground, {"K": 2.4})):
+        for c in result.constants:
+            truth = truths.get(c.key.rpartition(".")[2])
+            if c.key.startswith("plant.") and truth is not None and c.value is not None:
+                assert c.std is not None
+                assert abs(c.value - truth) < 3 * c.std, c.key
+
+
+def test_noise_of_every_measured_channel(free: FitResult) -> None:
+    for w in WHEELS:
+        noise = free.machine.noise[f"wheel.{w}.v"]
+        assert noise.std == pytest.approx(0.004, rel=0.05)
+        assert noise.lsb == pytest.approx(0.00154, rel=0.01)
+    assert set(free.machine.noise) == {f"wheel.{w}.v" for w in WHEELS} | {"steer.front.phi", "steer.rear.phi"}
+
+
+def test_no_steering_leaves_the_offset_as_it_is() -> None:
+    straight = mission(3)
+    names = {"steer.front.phi", "steer.rear.phi"}
+    items = {
+        n: replace(s, values=np.zeros_like(s.values)) if n in names else s for n, s in straight.signals.items.items()
+    }
+    signals = Signals(items, {})
+    result = fit_missions([Mission((), signals, align(signals))], haulotte())
+    offset = next(c for c in result.constants if c.key == "geometry.offset")
+    assert not offset.written
+    assert result.machine.geometry == haulotte().geometry
+
+
+@pytest.mark.parametrize(("side", "epsilon"), [(Side.ACTUATOR, 0.5), (Side.SENSOR, 0.4), (Side.ACTUATOR, 0.2)], ids=str)
+def test_a_mission_that_is_faulty_half_its_time_is_not_learned(clean: FitResult, side: Side, epsilon: float) -> None:
+    fault = FaultSpec("FR", side, FaultMode.INEFFICIENT, 30.0, 60.0, epsilon)
+    healthy = [mission(s, "ground") for s in (3, 4)]
+    result = fit_missions([*healthy, mission(5, "ground", faults=(fault,))], haulotte())
+    assert values(result, "K") == pytest.approx(values(clean, "K"), rel=0.03)
+    assert any("wheel FR" in text for text in result.left_out)
+
+
+def test_a_wheel_that_is_faulty_too_often_is_refused() -> None:
+    fault = FaultSpec("RL", Side.SENSOR, FaultMode.INEFFICIENT, 33.0, 60.0, 0.5)
+    result = fit_missions([mission(3, faults=(fault,))], haulotte())
+    assert "RL" not in result.machine.plant.wheels
+    assert {"FR", "FL", "RR"} <= set(result.machine.plant.wheels)
+    assert any(text.startswith("wheel RL: ") for text in result.left_out)
+
+
+def test_a_wheel_unlike_the_others_is_refused() -> None:
+    fault = FaultSpec("RL", Side.ACTUATOR, FaultMode.INEFFICIENT, 0.0, 60.0, 0.5)
+    result = fit_missions([mission(3, faults=(fault,))], haulotte())
+    assert any("wheel RL" in text and "disagrees with the other wheels" in text for text in result.left_out)
+    assert "RL" not in result.machine.plant.wheels
+
+
+def test_too_little_driving_is_no_fit() -> None:
+    with pytest.raises(NotJudged, match="are needed"):
+        fit_missions([mission(3, seconds=8.0)], haulotte())
+
+
+def test_same_missions_same_bytes(ground: FitResult) -> None:
+    again = fit_missions([mission(s, "ground") for s in (3, 4)], haulotte())
+    assert fit_toml(again) == fit_toml(ground)
+
+
+def test_document_and_machine_file(ground: FitResult, tmp_path_factory: pytest.TempPathFactory) -> None:
+    file = tmp_path_factory.mktemp("fit") / "machine.toml"
+    file.write_text(fit_toml(ground), encoding="utf-8")
+    assert load_machine(file) == ground.machine
+    text = file.read_text(encoding="utf-8")
+    assert "from 2 healthy missions" in text
+    assert "# control.psi0: not given; not identifiable" in text
+    document = fit_document(ground)
+    assert document["schema"] == "mfhca-fit/1"
+    assert len(document["constants"]) == len(ground.constants)
