@@ -21,7 +21,7 @@ from diagnosis.drive_effort import load_findings
 from diagnosis.drive_load import LoadTrack, identify_effort, track_load
 from diagnosis.drive_rows import EchoPair, find_rows
 from diagnosis.modes import BLIND, PAIR
-from diagnosis.noise import rounding_step
+from diagnosis.noise import moving_sum, rounding_step
 from diagnosis.pairs import sample_status
 from replay.drive_model import DriveModel, EchoModel
 from replay.faults import FaultMode, Side, State
@@ -32,6 +32,7 @@ Array = NDArray[np.float64]
 _NOISE_RANGE = (0.7, 1.5)
 _STEP_RANGE = 0.1
 _QUIET = 0.4
+_SLOW_S, _SLACK = 0.5, 0.06
 _LEAST_NOISE = 2e-3  # of the span: no echo is believed beyond that
 
 
@@ -205,6 +206,7 @@ def _pair(data: DriveData, echo: EchoModel, x: Array, limits: Limits) -> EchoPai
     return EchoPair(
         y=data.y,
         x=x,
+        slack=_slack(x - data.command, data.dt),
         status=status,
         quiet=np.asarray(quiet),
         lead=echo.first + len(echo.gains) - 1,
@@ -216,6 +218,12 @@ def _pair(data: DriveData, echo: EchoModel, x: Array, limits: Limits) -> EchoPai
         dt=data.dt,
         name=data.names[0],
     )
+
+
+def _slack(error: Array, dt: float) -> Array:
+    """What the echo may be off where the drive is long off its command: its share of the slow tracking error."""
+    width = max(1, round(_SLOW_S / dt))
+    return np.asarray(_SLACK * np.abs(moving_sum(np.nan_to_num(error), width)) / width, dtype=np.float64)
 
 
 def _mission_noise(residual: Array, dt: float, known: float) -> float:

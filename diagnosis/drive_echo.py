@@ -26,6 +26,8 @@ _LEAST_S = 4.0
 _MOST_SAMPLES = 60_000
 _TUKEY = 4.0
 _LEAST_EXPLAINED = 0.5
+_DRIFT_S = 2.0
+_LEAST_KNOWN = 10.0  # slope of the integral part [its standard errors]
 _WINDOW_S = 0.5
 _QUANTILE = 0.4
 
@@ -85,7 +87,7 @@ def echoed_speed(model: EchoModel, record: DriveRecord) -> Array:
         off, w = (record.y[part] - x)[head], fade[head]
         known = np.isfinite(off)
         if known.any():
-            x = x + fade * float(off[known] @ w[known]) / float(w[known] @ w[known])
+            x = x + fade * float(np.median(off[known] / w[known]))
         out[part] = x
     return out
 
@@ -118,26 +120,65 @@ def identify_echo(records: Sequence[DriveRecord]) -> EchoModel | None:
         return None
     target = np.concatenate([y - r for y, r, _ in parts])
     every = max(1, target.size // _MOST_SAMPLES)
+
+    def fitted(memory: float, leads: range) -> tuple[float, Array, Array]:
+        design, error = _regression(parts, memory, dt, leads)
+        theta = _robust(design[::every], error[::every])
+        rest = error - design @ theta
+        return _spread(rest), theta, rest
+
     best: tuple[float, float, int] | None = None
     for memory in _MEMORIES:
-        design, error = _regression(parts, float(memory), dt, _LEADS)
-        theta = _robust(design[::every], error[::every])
+        _, theta, _ = fitted(float(memory), _LEADS)
         first = _LEADS[int(np.argmax(np.abs(theta[: len(_LEADS)])))] - _TAPS // 2
-        design, error = _regression(parts, float(memory), dt, range(first, first + _TAPS))
-        rest = error - design @ _robust(design[::every], error[::every])
-        spread = _spread(rest)
+        spread, _, _ = fitted(float(memory), range(first, first + _TAPS))
         if best is None or spread < best[0]:
             best = spread, float(memory), first
     assert best is not None
     _, memory, first = best
-    design, error = _regression(parts, memory, dt, range(first, first + _TAPS))
-    theta = _robust(design[::every], error[::every])
-    rest = error - design @ theta
+    _, theta, _ = fitted(memory, range(first, first + _TAPS))
+    memory = _integral_time(parts, theta[:_TAPS], first, dt) or memory
+    _, theta, rest = fitted(memory, range(first, first + _TAPS))
     noise = window_size(rest, dt)
     if not 0 < noise**2 < (1 - _LEAST_EXPLAINED) * window_size(target, dt) ** 2:
         return None
     exact, core = _exact_share(rest[:: max(1, rest.size // _MOST_SAMPLES)], noise)
     return EchoModel(tuple(float(g) for g in theta[:_TAPS]), first, memory, float(theta[_TAPS]), noise, exact, core, dt)
+
+
+def _integral_time(parts: Sequence[tuple[Array, Array, Array]], gains: Array, first: int, dt: float) -> float | None:
+    """Ti from how the integral part u + Kp·e moves over seconds with ∫e; None where it hardly does.
+
+    The high-passed effort fixes Ti only loosely, while a drive that is long off its command needs it well.
+    """
+    total = float(np.sum(gains))
+    if total >= 0:
+        return None
+    lead = first + int(np.argmin(gains))
+    length = max(4, round(_DRIFT_S / dt))
+    moved, pushed = [], []
+    for y, r, u in parts:
+        e = y - r
+        integral = _led(u, lead) - e / total
+        count = e.size // length
+        if count < 2:
+            continue
+        sums = np.cumsum(e) * dt
+        middle = [np.median(x[: count * length].reshape(count, length), axis=1) for x in (integral, sums)]
+        moved.append(np.diff(middle[0]))
+        pushed.append(-np.diff(middle[1]))
+    if not moved:
+        return None
+    a, b = np.concatenate(pushed), np.concatenate(moved)
+    moving = np.abs(a) > 0
+    if not moving.any():
+        return None
+    # least absolute deviations: the median of b/a with weights |a|
+    ratio, weight = b[moving] / a[moving], np.abs(a[moving])
+    order = np.argsort(ratio)
+    slope = float(ratio[order][np.searchsorted(np.cumsum(weight[order]), 0.5 * float(weight.sum()))])
+    error = _spread(b - slope * a) / max(float(np.sqrt(a @ a)), 1e-300)
+    return -1 / (total * slope) if slope > _LEAST_KNOWN * error else None
 
 
 def _exact_share(rest: Array, noise: float) -> tuple[float, float]:

@@ -48,8 +48,9 @@ class LoadTrack:
     length: int
 
     def sampled(self, values: Array, size: int) -> Array:
-        """Values of the steps for every sample, shape (size,); a step without value, and the incomplete last one, take
-        the value of a neighbour.
+        """Values of the steps for every sample, shape (size,).
+
+        A step without value takes that of a neighbour, and so does the incomplete last one.
         """
         if not values.size:
             return np.full(size, np.nan)

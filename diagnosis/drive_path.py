@@ -89,8 +89,8 @@ STATES = ROW.size
 
 
 @njit(cache=True)
-def emission(m, y, x, last, status, quiet, row, eps, half, bias, added, p):  # type: ignore[no-untyped-def]
-    """Log-likelihood of one sample in state m; `last` is the sample of y before, NaN for none."""
+def emission(m, y, x, slack, last, status, quiet, row, eps, half, bias, added, p):  # type: ignore[no-untyped-def]
+    """Log-likelihood of one sample in state m; `last` is the sample of y before, NaN for none, `slack` what x may be off."""
     core, late, exact, constant, span = p[0], p[1], p[2], p[3], p[4]
     if status == SILENT:
         return 0.0 if row[m] == NO_SIGNAL else _SILENT_COST
@@ -105,7 +105,7 @@ def emission(m, y, x, last, status, quiet, row, eps, half, bias, added, p):  # t
     if status == BLIND:  # only whether y changes from sample to sample says something
         step = 0.0 if np.isnan(last) else min(abs(y - last) / late, 2.0)
         return -0.5 * step * step - np.log(late * np.sqrt(2 * np.pi))
-    width = (half[m] * x) ** 2 / 3 + (added[m] * added[m] * (1 + 1 / 12) if added[m] > 0 else 0.0)
+    width = slack * slack + (half[m] * x) ** 2 / 3 + (added[m] * added[m] * (1 + 1 / 12) if added[m] > 0 else 0.0)
     d = y - (1 - eps[m]) * x - bias[m]
     out = 1e-300
     s = np.sqrt(core * core + width)
@@ -118,7 +118,7 @@ def emission(m, y, x, last, status, quiet, row, eps, half, bias, added, p):  # t
 
 
 @njit(cache=True)
-def _scan_rows(y, x, last, status, quiet, row, eps, half, bias, added, p, score, back, lead):  # type: ignore[no-untyped-def]
+def _scan_rows(y, x, slack, last, status, quiet, row, eps, half, bias, added, p, score, back, lead):  # type: ignore[no-untyped-def]
     """Viterbi over the states; `back` holds where a state was entered from, −1 where it stayed; `lead` fault − healthy."""
     states = score.size
     for k in range(y.size):
@@ -140,7 +140,7 @@ def _scan_rows(y, x, last, status, quiet, row, eps, half, bias, added, p, score,
             if row[m] == NOISY and drift > score[m] and noisy != m:
                 score[m] = drift
                 back[k, m] = noisy
-            score[m] += emission(m, y[k], x[k], last[k], status[k], quiet[k], row, eps, half, bias, added, p)
+            score[m] += emission(m, y[k], x[k], slack[k], last[k], status[k], quiet[k], row, eps, half, bias, added, p)
         fault = score[1]
         for m in range(2, states):
             fault = max(fault, score[m])
@@ -161,11 +161,13 @@ def _trace(back, state):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _sum_states(y, x, last, status, quiet, row, eps, half, bias, added, p, out):  # type: ignore[no-untyped-def]
+def _sum_states(y, x, slack, last, status, quiet, row, eps, half, bias, added, p, out):  # type: ignore[no-untyped-def]
     for k in range(y.size):
         if status[k] != SKIP:
             for m in range(out.size):
-                out[m] += emission(m, y[k], x[k], last[k], status[k], quiet[k], row, eps, half, bias, added, p)
+                out[m] += emission(
+                    m, y[k], x[k], slack[k], last[k], status[k], quiet[k], row, eps, half, bias, added, p
+                )
 
 
 @dataclass(frozen=True)
@@ -191,7 +193,13 @@ def _before(y: Array, status: NDArray[np.int8], last: float) -> Array:
 
 
 def forward(
-    y: Array, x: Array, status: NDArray[np.int8], quiet: NDArray[np.bool_], model: RowModel, state: RowState
+    y: Array,
+    x: Array,
+    slack: Array,
+    status: NDArray[np.int8],
+    quiet: NDArray[np.bool_],
+    model: RowModel,
+    state: RowState,
 ) -> tuple[NDArray[np.int16], Array, RowState]:
     """Run the recursion over one block.
 
@@ -199,6 +207,8 @@ def forward(
     ----------
     y, x : Array, shape (n,)
         Measured speed and the independent reading of it [m/s].
+    slack : Array, shape (n,)
+        Standard deviation of what that reading may be off for long [m/s].
     status : NDArray[np.int8], shape (n,)
         As in `diagnosis.modes`; `BLIND` where y has no x beside it.
     quiet : NDArray[np.bool_], shape (n,)
@@ -222,28 +232,43 @@ def forward(
     score = state.score.copy()
     last = _before(y, status, state.last)
     _scan_rows(
-        y, x, last, status, quiet, ROW, EPSILON, HALF_STEP, model.bias, model.added, model.packed(), score, back, lead
+        y,
+        x,
+        slack,
+        last,
+        status,
+        quiet,
+        ROW,
+        EPSILON,
+        HALF_STEP,
+        model.bias,
+        model.added,
+        model.packed(),
+        score,
+        back,
+        lead,
     )
     known = y[(status == PAIR) | (status == BLIND)]
     return back, lead, RowState(score, float(known[-1]) if known.size else state.last)
 
 
 def most_probable(
-    y: Array, x: Array, status: NDArray[np.int8], quiet: NDArray[np.bool_], model: RowModel
+    y: Array, x: Array, slack: Array, status: NDArray[np.int8], quiet: NDArray[np.bool_], model: RowModel
 ) -> tuple[NDArray[np.int64], Array]:
     """Row of every sample of a whole channel, and the causal lead of a fault; see `forward`."""
-    back, lead, state = forward(y, x, status, quiet, model, initial_state(model))
+    back, lead, state = forward(y, x, slack, status, quiet, model, initial_state(model))
     return ROW[_trace(back, int(np.argmax(state.score)))], lead
 
 
 def state_evidence(
-    y: Array, x: Array, status: NDArray[np.int8], quiet: NDArray[np.bool_], model: RowModel, last: float
+    y: Array, x: Array, slack: Array, status: NDArray[np.int8], quiet: NDArray[np.bool_], model: RowModel, last: float
 ) -> Array:
     """Log-likelihood of a segment in every state that holds for all of it, shape (states,); `last` is y before it."""
     out = np.zeros(STATES)
     _sum_states(
         y,
         x,
+        slack,
         _before(y, status, last),
         status,
         quiet,

@@ -44,6 +44,8 @@ class EchoPair:
     ----------
     y, x : Array, shape (n,)
         Measured and echoed speed [m/s]; NaN where not valid.
+    slack : Array, shape (n,)
+        Standard deviation of what the echo may be off for long [m/s].
     status : NDArray[np.int8], shape (n,)
         As in `diagnosis.modes`.
     quiet : NDArray[np.bool_], shape (n,)
@@ -64,6 +66,7 @@ class EchoPair:
 
     y: Array
     x: Array
+    slack: Array
     status: NDArray[np.int8]
     quiet: NDArray[np.bool_]
     lead: int
@@ -100,7 +103,7 @@ def find_rows(pair: EchoPair, limits: Limits) -> tuple[list[Finding], Array, int
         How many deviations lie below the limits.
     """
     model = pair.model()
-    row, lead = most_probable(pair.y, pair.x, pair.status, pair.quiet, model)
+    row, lead = most_probable(pair.y, pair.x, pair.slack, pair.status, pair.quiet, model)
     cut = np.flatnonzero(np.r_[True, row[1:] != row[:-1]])
     runs = [Run(int(a), int(b), int(row[a])) for a, b in zip(cut, np.r_[cut[1:], row.size], strict=True)]
     out, below = [], 0
@@ -142,7 +145,7 @@ def _finding(run: Run, pair: EchoPair, model: RowModel, limits: Limits, lead: Ar
     seconds = run.size * pair.dt
     before = pair.y[: run.start][np.isin(pair.status[: run.start], (modes.PAIR, modes.BLIND))]
     last = float(before[-1]) if before.size else float("nan")
-    by_state = state_evidence(pair.y[part], pair.x[part], status, pair.quiet[part], model, last)
+    by_state = state_evidence(pair.y[part], pair.x[part], pair.slack[part], status, pair.quiet[part], model, last)
     evidence = np.array([by_state[i == ROW].max() for i in range(len(modes.ROWS))])
     row = run.row
     if row in _SOFT:

@@ -24,10 +24,12 @@ Array = NDArray[np.float64]
 
 MODEL = RowModel(noise=0.1, core=0.02, exact=0.6, constant_noise=0.002, span=10.0, switch_cost=8.0)
 
+NONE = np.zeros(300)
+
 
 def one(m: int, y: float, x: float, last: float, status: int = modes.PAIR, quiet: bool = False) -> float:
     return float(
-        emission(m, y, x, last, status, quiet, ROW, EPSILON, HALF_STEP, MODEL.bias, MODEL.added, MODEL.packed())
+        emission(m, y, x, 0.0, last, status, quiet, ROW, EPSILON, HALF_STEP, MODEL.bias, MODEL.added, MODEL.packed())
     )
 
 
@@ -43,7 +45,7 @@ def sample(seed: int, size: int = 300) -> tuple[Array, Array, NDArray[np.int8], 
 def test_the_scan_is_viterbis_recursion() -> None:
     y, x, status, quiet = sample(1, 80)
     y[40:] = 0.8 * y[40:]
-    back, lead, state = forward(y, x, status, quiet, MODEL, initial_state(MODEL))
+    back, lead, state = forward(y, x, NONE[: y.size], status, quiet, MODEL, initial_state(MODEL))
     score = initial_state(MODEL).score.copy()
     last = float("nan")
     for k in range(y.size):
@@ -63,9 +65,9 @@ def test_the_scan_is_viterbis_recursion() -> None:
 def test_blocks_change_nothing(cut: int) -> None:
     y, x, status, quiet = sample(2)
     y[120:180] = y[119]
-    whole = forward(y, x, status, quiet, MODEL, initial_state(MODEL))
-    head = forward(y[:cut], x[:cut], status[:cut], quiet[:cut], MODEL, initial_state(MODEL))
-    tail = forward(y[cut:], x[cut:], status[cut:], quiet[cut:], MODEL, head[2])
+    whole = forward(y, x, NONE[: y.size], status, quiet, MODEL, initial_state(MODEL))
+    head = forward(y[:cut], x[:cut], NONE[:cut], status[:cut], quiet[:cut], MODEL, initial_state(MODEL))
+    tail = forward(y[cut:], x[cut:], NONE[cut:300], status[cut:], quiet[cut:], MODEL, head[2])
     assert np.array_equal(whole[0], np.r_[head[0], tail[0]])
     assert whole[2].score == pytest.approx(tail[2].score)
 
@@ -90,7 +92,7 @@ def test_each_row_is_found_where_it_is(row: int, fault) -> None:  # type: ignore
     y, x, status, quiet = sample(3)
     status[:] = modes.PAIR
     y[100:200] = fault(y[100:200], np.random.default_rng(4))
-    path, lead = most_probable(y, x, status, quiet, MODEL)
+    path, lead = most_probable(y, x, NONE, status, quiet, MODEL)
     truth = np.where((np.arange(300) >= 100) & (np.arange(300) < 200), row, modes.HEALTHY)
     assert np.count_nonzero(path != truth) <= 3
     assert (lead[20:100] < 0).all()
@@ -100,7 +102,9 @@ def test_each_row_is_found_where_it_is(row: int, fault) -> None:  # type: ignore
 def test_standing_still_at_zero_is_no_fault() -> None:
     size = 200
     y, x = np.zeros(size), np.zeros(size)
-    path, _ = most_probable(y, x, np.full(size, modes.PAIR, dtype=np.int8), np.ones(size, dtype=np.bool_), MODEL)
+    path, _ = most_probable(
+        y, x, NONE[:size], np.full(size, modes.PAIR, dtype=np.int8), np.ones(size, dtype=np.bool_), MODEL
+    )
     assert (path == modes.HEALTHY).all()
 
 
@@ -108,9 +112,9 @@ def test_without_a_reference_only_a_constant_reading_is_a_fault() -> None:
     y, x, status, quiet = sample(5)
     status[:] = modes.BLIND
     x[:] = np.nan
-    assert (most_probable(y, x, status, quiet, MODEL)[0] == modes.HEALTHY).all()
+    assert (most_probable(y, x, NONE, status, quiet, MODEL)[0] == modes.HEALTHY).all()
     y[150:] = y[150]
-    path, _ = most_probable(y, x, status, quiet, MODEL)
+    path, _ = most_probable(y, x, NONE, status, quiet, MODEL)
     assert (path[:150] == modes.HEALTHY).all()
     assert (path[152:] == modes.STUCK).all()
 
@@ -118,12 +122,12 @@ def test_without_a_reference_only_a_constant_reading_is_a_fault() -> None:
 def test_a_silent_channel_beside_living_ones_is_no_signal() -> None:
     y, x, status, quiet = sample(6)
     y[100:], status[100:] = np.nan, modes.SILENT
-    assert (most_probable(y, x, status, quiet, MODEL)[0][110:] == modes.NO_SIGNAL).all()
+    assert (most_probable(y, x, NONE, status, quiet, MODEL)[0][110:] == modes.NO_SIGNAL).all()
 
 
 def test_evidence_of_a_segment_adds_up_its_samples() -> None:
     y, x, status, quiet = sample(7, 20)
-    got = state_evidence(y, x, status, quiet, MODEL, 3.0)
+    got = state_evidence(y, x, NONE[:20], status, quiet, MODEL, 3.0)
     last, total = 3.0, np.zeros(STATES)
     for k in np.flatnonzero(status == modes.PAIR):
         total += [one(m, y[k], x[k], last) for m in range(STATES)]
