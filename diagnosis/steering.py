@@ -9,14 +9,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from diagnosis.assessment import CODE, Assessment, Finding, unassessed
-from diagnosis.channels import alive, make_pair
-from diagnosis.direct import assess_pair
+from diagnosis.channels import alive
 from diagnosis.steering_blocks import SensorNoise, SteeringBlocks, blocks_of, sensor_noise
 from diagnosis.steering_filter import SteeringPath, allowed_models, most_probable
 from diagnosis.steering_findings import judge_side
 from diagnosis.steering_model import model_of
 from diagnosis.steering_onset import refined
 from diagnosis.steering_plant import SteeringPlant, identify_plants
+from diagnosis.steering_second import with_position, with_second_angle
 from diagnosis.steering_states import BLIND_ROWS, REASONS, states_of
 from diagnosis.steering_tidy import SteeringData, tidy
 from replay.faults import Side, State
@@ -27,8 +27,6 @@ from replay.timeline import Timeline
 Array = NDArray[np.float64]
 Key = tuple[str, str]
 Counts = Mapping[str, NDArray[np.int16]]
-
-_STILL = 0.02
 
 
 @dataclass(frozen=True)
@@ -95,7 +93,11 @@ class _Axle:
     blocks: SteeringBlocks | None
     noise: SensorNoise
     measured: str
-    driven_by: str
+
+    @property
+    def twice(self) -> bool:
+        """Whether something is measured twice."""
+        return {"phi", "phi_true"} <= self.have or {"u", "u_applied"} <= self.have
 
     @classmethod
     def of(cls, timeline: Timeline, replay: Replay, machine: Machine, j: int, counts: Counts) -> _Axle:
@@ -106,19 +108,24 @@ class _Axle:
             for leaf in leaves
             if (x := timeline.get(f"steer.{name}.{leaf}")) is not None and bool(np.isfinite(x).any())
         )
-        measured = "phi_true" if "phi_true" in have else "phi"
-        driven_by = "u_applied" if "u_applied" in have else "u"
-        u = timeline.get(f"steer.{name}.{driven_by}") if driven_by in have else replay.steer_u[:, j]
+        u = timeline.get(f"steer.{name}.u") if "u" in have else timeline.get(f"steer.{name}.u_applied")
+        if u is None or not np.isfinite(u).any():
+            u = replay.steer_u[:, j]
+        measured = "phi" if "phi" in have else "phi_true"
         blocks, noise = None, SensorNoise(1.0, 1.0, 0.0, 0.0)
-        both = {"phi", "phi_true", "u", "u_applied"} <= have
-        if measured in have and not both and u is not None and np.isfinite(u).any():
+        if measured in have and np.isfinite(u).any():
             channel = f"steer.{name}.{measured}"
             y, fresh = timeline.signals[channel], timeline.fresh[channel]
             blocks = blocks_of(y, u, fresh, alive(timeline, dict(counts), channel), timeline.dt)
             known = machine.noise.get(channel, Noise())
             noise = sensor_noise(blocks, y[fresh & np.isfinite(y)], known, machine.max_steer)
-        command = np.full(timeline.size, np.nan) if u is None else u
-        return cls(name, timeline, dict(counts), have, command, blocks, noise, measured, driven_by)
+            if {"phi", "phi_true"} <= have:
+                true = f"steer.{name}.phi_true"
+                blocks = with_second_angle(blocks, y, timeline.signals[true], timeline.fresh[true], timeline.dt)
+            if {"u", "u_applied"} <= have:
+                spool = f"steer.{name}.u_applied"
+                blocks = with_position(blocks, u, timeline.signals[spool], timeline.fresh[spool], timeline.dt)
+        return cls(name, timeline, dict(counts), have, u, blocks, noise, measured)
 
     def channel(self, leaf: str) -> str:
         """Canonical name."""
@@ -144,29 +151,15 @@ def _judge_axle(
     fallback = unassessed(size, State.NOT_ASSESSED, why)
     if "phi" not in axle.have:
         sensor = unassessed(size, State.NO_DATA, "the steering angle is not in the log")
-    elif "phi_true" in axle.have:
-        quiet = np.abs(np.nan_to_num(axle.values("phi_true"))) < _STILL
-        sensor = _direct(axle, Side.SENSOR, "phi", "phi_true", quiet, "rad", 1.2 * machine.max_steer, machine)
     else:
         sensor = by_model.get(Side.SENSOR, fallback)
     if "u" not in axle.have and "u_applied" not in axle.have and "phi" not in axle.have:
         actuator = unassessed(size, State.NO_DATA, "the steering valve's command is not in the log")
-    elif {"u", "u_applied"} <= axle.have:
-        idle = np.abs(np.nan_to_num(axle.values("u"))) < _STILL * machine.control.u_max
-        u_max = machine.control.u_max
-        actuator = _direct(axle, Side.ACTUATOR, "u_applied", "u", idle, "of full opening", u_max, machine)
-    elif "u_applied" in axle.have:
+    elif "u_applied" in axle.have and "u" not in axle.have:
         actuator = unassessed(size, State.NOT_ASSESSED, "the valve's position is logged but not its command")
     else:
         actuator = by_model.get(Side.ACTUATOR, fallback)
     return sensor, actuator, model_angle
-
-
-def _direct(
-    axle: _Axle, side: Side, y: str, x: str, quiet: NDArray[np.bool_], unit: str, span: float, machine: Machine
-) -> Assessment:
-    pair = make_pair(axle.timeline, axle.counts, side, axle.channel(y), axle.channel(x), quiet, unit, span, machine)
-    return assess_pair(pair, machine.limits)
 
 
 def _by_model(
@@ -175,8 +168,10 @@ def _by_model(
     """Both sides by the filters, and the angle that they give [rad]."""
     model = model_of(blocks, plant, axle.noise, machine.max_steer)
     driven = blocks.driven(plant.gain, plant.rate)
-    allowed = allowed_models(sensor=axle.measured == "phi", actuator=axle.driven_by == "u" and plant.reliable)
-    names = (axle.channel(axle.measured), axle.channel(axle.driven_by))
+    position = {"u", "u_applied"} <= axle.have
+    judged_valve = position or (plant.reliable and not ("u_applied" in axle.have and "u" not in axle.have))
+    allowed = allowed_models(sensor=axle.measured == "phi", actuator=judged_valve, twice=axle.twice)
+    names = (axle.channel(axle.measured), axle.channel("u" if "u" in axle.have else "u_applied"))
     data = SteeringData(blocks, driven, model, allowed, names)
     path = tidy(data, most_probable(blocks, driven, model, allowed))
     judged = {side: judge_side(side, data, path, machine.limits) for side in (Side.SENSOR, Side.ACTUATOR)}
@@ -186,7 +181,11 @@ def _by_model(
         side: [refined(j.finding, y, fresh, axle.noise, blocks.length) for j in found if j.finding is not None]
         for side, found in judged.items()
     }
-    masked = [(f.start, f.stop) for f in findings[Side.SENSOR] if CODE[State(f.mode.value)] in BLIND_ROWS]
+    masked = (
+        []
+        if axle.twice
+        else [(f.start, f.stop) for f in findings[Side.SENSOR] if CODE[State(f.mode.value)] in BLIND_ROWS]
+    )
     series = _series(path, blocks, model.plant.gain, y)
     note = (
         f"{names[0]} by the steering model with {names[1]}: {plant.gain:.3g} rad/s per full opening, at most "
@@ -196,7 +195,7 @@ def _by_model(
     out = {}
     for side in (Side.SENSOR, Side.ACTUATOR):
         open_runs = [(j.start, j.stop) for j in judged[side] if j.finding is None]
-        states, doubt = states_of(side, data, path, findings[side], open_runs, masked, y, axle.command, plant.reliable)
+        states, doubt = states_of(side, data, path, findings[side], open_runs, masked, y, axle.command, judged_valve)
         out[side] = Assessment(
             states=states,
             reasons=REASONS[side],

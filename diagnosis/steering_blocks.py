@@ -40,6 +40,9 @@ class SteeringBlocks:
         `PAIR`, `SILENT` or `SKIP` of `diagnosis.modes`.
     raw_u : Array, shape (n,)
         Valve opening of every sample, 0 where unknown.
+    second : Array, shape (m, 7)
+        What is measured twice, each with its variance: angle [rad], opening [fraction], share of the command's changes
+        in the opening [1]; then the command that belongs to the opening [fraction]. NaN where it is not.
     """
 
     length: int
@@ -50,6 +53,7 @@ class SteeringBlocks:
     u: Array
     status: NDArray[np.int8]
     raw_u: Array
+    second: Array
 
     def driven(self, gain: float, rate: float) -> Array:
         """Mean of sat(gain·u) between the middles of blocks [rad/s], shape (m,)."""
@@ -107,6 +111,7 @@ def blocks_of(y: Array, u: Array, fresh: NDArray[np.bool_], alive: NDArray[np.bo
         u=_between(opening, length, starts.size),
         status=status,
         raw_u=opening,
+        second=np.full((starts.size, 7), np.nan),
     )
 
 

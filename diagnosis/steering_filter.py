@@ -50,9 +50,10 @@ class SteeringPath:
         return np.asarray(ss.ACTUATOR[self.model])
 
 
-def allowed_models(*, sensor: bool, actuator: bool) -> NDArray[np.bool_]:
-    """Models that leave a side healthy which is not judged here."""
-    return np.asarray(((ss.SENSOR == ss.OK) | sensor) & ((ss.ACTUATOR == ss.OK) | actuator))
+def allowed_models(*, sensor: bool, actuator: bool, twice: bool) -> NDArray[np.bool_]:
+    """Models that leave a side healthy which is not judged here, and combine more where something is measured twice."""
+    rows = ((ss.SENSOR == ss.OK) | sensor) & ((ss.ACTUATOR == ss.OK) | actuator)
+    return np.asarray(rows & ((np.arange(ss.MODELS) < ss.SECOND) | twice))
 
 
 def start_state(first: float, p: Array) -> tuple[Array, Array, Array, Array]:
@@ -89,7 +90,7 @@ def most_probable(
     score[~allowed] = -1e12
     back = np.full((blocks.mean.size, ss.MODELS), STAY, dtype=np.uint8)
     b = blocks
-    ss.scan(b.mean, b.power, b.count, driven, b.u, b.status, allowed, p, score, z, P, ig, back)
+    ss.scan(b.mean, b.power, b.count, driven, b.u, b.status, b.second, allowed, p, score, z, P, ig, back)
     path, _ = trace(back, int(np.argmax(score)))
     return np.asarray(path)
 
@@ -100,7 +101,21 @@ def follow_path(blocks: SteeringBlocks, driven: Array, model: SteeringModel, pat
     mean, cov = np.zeros((size, ss.STATES)), np.zeros((size, ss.STATES, ss.STATES))
     noise = np.ones((size, 2))
     b = blocks
-    ss.follow(b.mean, b.power, b.count, driven, b.u, b.status, path, _first(blocks), model.packed(), mean, cov, noise)
+    ss.follow(
+        b.mean,
+        b.power,
+        b.count,
+        driven,
+        b.u,
+        b.status,
+        b.second,
+        path,
+        _first(blocks),
+        model.packed(),
+        mean,
+        cov,
+        noise,
+    )
     return SteeringPath(path.copy(), mean, cov, noise)
 
 

@@ -41,9 +41,9 @@ class Judged:
     finding: Finding | None
 
 
-def model_number(sensor: int, actuator: int) -> int:
-    """Model that combines two rows; -1 where there is none."""
-    if sensor in (ss.STUCK, ss.NONE):
+def model_number(sensor: int, actuator: int, *, twice: bool) -> int:
+    """Model that combines two rows; -1 where there is none. Behind a dead sensor a valve is seen only if measured."""
+    if sensor in (ss.STUCK, ss.NONE) and not twice:
         actuator = ss.OK
     found = np.flatnonzero((sensor == ss.SENSOR) & (actuator == ss.ACTUATOR))
     return int(found[0]) if found.size else -1
@@ -80,7 +80,7 @@ def _alternatives(
                 pairs = [(row, ac) if side is Side.SENSOR else (s, row) for s, ac in zip(sensor, actuator, strict=True)]
             else:
                 pairs = [(row, ss.OK) if name is Side.SENSOR else (ss.OK, row)] * (b - a)
-            numbers = {pair: model_number(*pair) for pair in set(pairs)}
+            numbers = {pair: model_number(*pair, twice=data.model.twice) for pair in set(pairs)}
             if any(m < 0 or not data.allowed[m] for m in numbers.values()):
                 continue
             trial[a:b] = [numbers[pair] for pair in pairs]

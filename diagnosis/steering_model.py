@@ -30,20 +30,40 @@ class SteeringModel:
         Angle of the end stops [rad].
     load : float
         Standard deviation of the rate's error [rad/s].
+    count : float
+        Samples in a usual block.
     dt : float
         Length of a block [s].
+    twice : bool
+        Whether something is measured twice.
     """
 
     plant: SteeringPlant
     noise: SensorNoise
     stop: float
     load: float
+    count: float
     dt: float
+    twice: bool
 
     @property
     def switch_cost(self) -> float:
         """Minus the log-probability that a row is entered in a block."""
         return float(np.log(_MEAN_HEALTHY_S / self.dt * 8))
+
+    def _freedom(self, r: float) -> float:
+        """What a healthy axle at rest loses per block, by its freedom, on a constant reading; and a little more.
+
+        A constant reading must gain as much to be taken for a stuck sensor where rounding hides the noise.
+        """
+        f = np.array([[1.0, self.dt], [0.0, np.exp(-self.dt / _LOAD_S)]])
+        q = np.diag([0.0, (1 - f[1, 1] ** 2) * self.load**2])
+        p = np.diag([r, self.load**2])
+        for _ in range(200):  # Riccati recursion to its steady state
+            p = f @ p @ f.T + q
+            p -= np.outer(p[:, 0], p[0]) / (p[0, 0] + r)
+        p = f @ p @ f.T + q
+        return float(0.5 * np.log(1 + p[0, 0] / r) + 0.03)
 
     def packed(self) -> Array:
         """Parameters in the order of the compiled scan."""
@@ -75,6 +95,8 @@ class SteeringModel:
                 0.5 * self.dt if noise.resolved else 0.03,
                 max(0.02, self.plant.misfit) ** 2,
                 noise.step,
+                self._freedom(noise.white / self.count + rounding),
+                float(self.twice),
             ]
         )
 
@@ -99,4 +121,7 @@ def model_of(blocks: SteeringBlocks, plant: SteeringPlant, noise: SensorNoise, s
     load = 0.0
     if off.size >= 8:
         load = float(np.sqrt(max((np.quantile(off, 0.4) / 0.524) ** 2 - windows.noise**2, 0.0)))
-    return SteeringModel(plant, noise, stop, max(load, 5e-4 * plant.rate), blocks.dt)
+    known = blocks.count[blocks.count > 0]
+    count = float(np.median(known)) if known.size else 1.0
+    twice = bool(np.isfinite(blocks.second).any())
+    return SteeringModel(plant, noise, stop, max(load, 5e-4 * plant.rate), count, blocks.dt, twice)

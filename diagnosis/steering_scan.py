@@ -19,15 +19,15 @@ from numba import njit
 from diagnosis.modes import PAIR, SILENT, SKIP
 
 OK, STUCK, NONE, GAIN, NOISY, DRIFT = range(6)
-# rows of sensor and actuator that a model combines; an actuator behind a dead sensor is masked
-SENSOR = np.array([0, 1, 2, 3, 4, 5, 0, 0, 0, 0, 3, 3, 3, 3, 4, 4, 4, 4])
-ACTUATOR = np.array([0, 0, 0, 0, 0, 0, 3, 1, 2, 4, 3, 1, 2, 4, 3, 1, 2, 4])
+# rows of sensor and actuator that a model combines; from `SECOND` on only where a second measurement tells them apart
+SENSOR = np.array([0, 1, 2, 3, 4, 5, 0, 0, 0, 0, 3, 3, 3, 3, 4, 4, 4, 4, 1, 1, 1, 1, 2, 2, 2, 2, 5, 5, 5, 5])
+ACTUATOR = np.array([0, 0, 0, 0, 0, 0, 3, 1, 2, 4, 3, 1, 2, 4, 3, 1, 2, 4, 3, 1, 2, 4, 3, 1, 2, 4, 3, 1, 2, 4])
+SECOND = 18
 MODELS = SENSOR.size
 STATES = 6
 _LEARNING_COST = 8.0
 _SILENT_COST = -6.0
 _OUTLIER = -18.0
-_OCCAM = 0.05  # what a constant reading must gain on healthy per block where it may be an axle at rest
 _DISTURBANCE_S = 0.8
 _SENSOR_DRIFT_S = 0.08
 _LEAST_GAIN, _MOST_GAIN = 0.1, 0.92  # of an inefficient part
@@ -117,7 +117,7 @@ def predict(m, driven, u, p, z, P, row):  # type: ignore[no-untyped-def]
     if a in (OK, GAIN, NONE):
         f_b = exp(-dt / load_s)
         # the valve's characteristic is known to a share only: the error grows with the rate
-        q_b = (1 - f_b * f_b) * (load * load + p[17] * driven * driven)
+        q_b = (1 - f_b * f_b) * (load * load + p[17] * driven * driven * (a != NONE))
     elif a == STUCK:
         f_b, q_b = 1.0, (0.02 * lift) ** 2 * dt
     else:
@@ -164,7 +164,7 @@ def update(m, y, power, count, p, z, P, ig, gain):  # type: ignore[no-untyped-de
         told = -0.5 * nu * (log(constant) + power / constant)
         r = constant
         if p[9] < 0.1:  # rounding hides the noise: an axle at rest reads as constant as a stuck sensor
-            told = -0.5 * nu * (log(white) + power / white) - _OCCAM
+            told = -0.5 * nu * (log(white) + power / white) - p[19]
             r = white / count + p[14]
     elif s == OK:
         told = -0.5 * nu * (log(white) + power / white)
@@ -222,33 +222,89 @@ def _learn_gain(m, seen, var, z, P, gain):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def advance(m, y, power, count, driven, u, status, p, z, P, ig, row):  # type: ignore[no-untyped-def]
+def measure(m, second, p, z, P, row):  # type: ignore[no-untyped-def]
+    """Update with what is measured twice.
+
+    `second` holds [angle, variance, opening, variance, share of the
+    command in it, variance, command].
+    """
+    told = 0.0
+    h = row[0]
+    g, a = p[2], ACTUATOR[m]
+    for which in range(3):
+        y, r = second[2 * which], second[2 * which + 1]
+        if np.isnan(y):
+            continue
+        expected = 0.0
+        h[:] = 0.0
+        if which == 0:
+            h[0], expected = 1.0, z[m, 0]
+        elif a == OK:
+            expected = second[6] if which == 1 else 1.0
+        elif a != NONE:
+            level = second[6] if which == 1 else 1.0
+            if a != STUCK:
+                h[2] = level
+                expected += z[m, 2] * level
+            if which == 1 and a != GAIN:
+                h[3] = 1 / g
+                expected += z[m, 3] / g
+        told += _linear(m, y - expected, r, h, z, P, row[1])
+    if a in (GAIN, NOISY):
+        z[m, 2] = min(max(z[m, 2], _LEAST_GAIN), _MOST_GAIN)
+    return told
+
+
+@njit(cache=True)
+def _linear(m, innovation, r, h, z, P, gain):  # type: ignore[no-untyped-def]
+    """Kalman update with one linear measurement H = h; an outlier teaches nothing. Returns the log-likelihood."""
+    total = r
+    for i in range(STATES):
+        gain[i] = 0.0
+        for j in range(STATES):
+            gain[i] += P[m, i, j] * h[j]
+    for i in range(STATES):
+        total += h[i] * gain[i]
+    # relative to what the measurement's own noise gives
+    told = -0.5 * (innovation * innovation / total + log(total / r))
+    if told < _OUTLIER:
+        return _OUTLIER
+    for i in range(STATES):
+        z[m, i] += gain[i] * innovation / total
+        for j in range(STATES):
+            P[m, i, j] -= gain[i] * gain[j] / total
+    return told
+
+
+@njit(cache=True)
+def advance(m, y, power, count, driven, u, status, second, p, z, P, ig, row):  # type: ignore[no-untyped-def]
     """One block of one model: prediction, update, log-likelihood."""
     predict(m, driven, u, p, z, P, row)
+    seen = measure(m, second, p, z, P, row) if p[20] > 0 else 0.0
     if status == SILENT:
-        return 0.0 if SENSOR[m] == NONE else _SILENT_COST
+        return seen if SENSOR[m] == NONE else seen + _SILENT_COST
     if status != PAIR:
-        return 0.0
-    out = update(m, y, power, count, p, z, P, ig, row[2])
+        return seen
+    out = seen + update(m, y, power, count, p, z, P, ig, row[2])
     if SENSOR[m] >= GAIN or ACTUATOR[m] == GAIN or ACTUATOR[m] == NOISY:
         out -= p[16]
     return out
 
 
 @njit(cache=True)
-def switch_cost(m, old, cost):  # type: ignore[no-untyped-def]
+def switch_cost(m, old, cost, second):  # type: ignore[no-untyped-def]
     """Minus the log-probability of going from model `old` to m within one block."""
     s, s0 = SENSOR[m], SENSOR[old]
     out = 0.0
     if s != s0:
         out += 3.0 if s >= NOISY and s0 >= NOISY else cost
     if ACTUATOR[m] != ACTUATOR[old]:
-        out += 0.0 if s in (STUCK, NONE) else cost
+        out += 0.0 if s in (STUCK, NONE) and second == 0 else cost
     return out
 
 
 @njit(cache=True)
-def scan(y, power, count, driven, u, status, allowed, p, score, z, P, ig, back):  # type: ignore[no-untyped-def]
+def scan(y, power, count, driven, u, status, second, allowed, p, score, z, P, ig, back):  # type: ignore[no-untyped-def]
     """Viterbi over the models; writes back-pointers (n, models)."""
     row = np.zeros((3, STATES))
     for k in range(y.size):
@@ -261,7 +317,7 @@ def scan(y, power, count, driven, u, status, allowed, p, score, z, P, ig, back):
             for m in range(MODELS):
                 if m == best or not allowed[m]:
                     continue
-                cost = switch_cost(m, best, p[15])
+                cost = switch_cost(m, best, p[15], p[20])
                 learning = 0.0 if m == 0 or m == 2 else _LEARNING_COST
                 if top - cost - learning > score[m]:
                     score[m] = top - cost
@@ -270,14 +326,16 @@ def scan(y, power, count, driven, u, status, allowed, p, score, z, P, ig, back):
         top = -1e300
         for m in range(MODELS):
             if allowed[m]:
-                score[m] += advance(m, y[k], power[k], count[k], driven[k], u[k], status[k], p, z, P, ig, row)
+                score[m] += advance(
+                    m, y[k], power[k], count[k], driven[k], u[k], status[k], second[k], p, z, P, ig, row
+                )
                 top = max(top, score[m])
         for m in range(MODELS):
             score[m] -= top
 
 
 @njit(cache=True)
-def follow(y, power, count, driven, u, status, path, first, p, Z, C, G):  # type: ignore[no-untyped-def]
+def follow(y, power, count, driven, u, status, second, path, first, p, Z, C, G):  # type: ignore[no-untyped-def]
     """Run only the model that `path` names in each block; writes its mean, covariance and noise after each block."""
     z, P, ig = _started(path[0], first, p)
     row = np.zeros((3, STATES))
@@ -285,7 +343,7 @@ def follow(y, power, count, driven, u, status, path, first, p, Z, C, G):  # type
         m = path[k]
         if k > 0 and m != path[k - 1]:
             enter(m, path[k - 1], p, z, P, ig)
-        advance(m, y[k], power[k], count[k], driven[k], u[k], status[k], p, z, P, ig, row)
+        advance(m, y[k], power[k], count[k], driven[k], u[k], status[k], second[k], p, z, P, ig, row)
         Z[k], C[k], G[k] = z[m], P[m], ig[m]
 
 
@@ -300,7 +358,7 @@ def _started(m, first, p):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def path_evidence(y, power, count, driven, u, status, path, a, b, known, p, Z, C, G):  # type: ignore[no-untyped-def]
+def path_evidence(y, power, count, driven, u, status, second, path, a, b, known, p, Z, C, G):  # type: ignore[no-untyped-def]
     """Log-evidence of blocks a…b of a path, less the price of its switches, and [φ, r, a, b, d, c] at the end.
 
     The states before block a are those of `follow` on the path `known`.
@@ -318,7 +376,7 @@ def path_evidence(y, power, count, driven, u, status, path, a, b, known, p, Z, C
         m = path[k]
         if m != before:
             enter(m, before, p, z, P, ig)
-            total -= switch_cost(m, before, p[15])
+            total -= switch_cost(m, before, p[15], p[20])
             before = m
-        total += advance(m, y[k], power[k], count[k], driven[k], u[k], status[k], p, z, P, ig, row)
+        total += advance(m, y[k], power[k], count[k], driven[k], u[k], status[k], second[k], p, z, P, ig, row)
     return total, z[before].copy()

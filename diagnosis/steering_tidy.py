@@ -77,6 +77,7 @@ def _evidence(data: SteeringData, known: SteeringPath, path: Path, start: int, s
         data.driven,
         b.u,
         b.status,
+        b.second,
         path,
         start,
         stop,
