@@ -21,6 +21,7 @@ _FAR = 0.2
 _UNIT_NEAR = 0.08
 _VERY_FAR = 3.0
 _ROUGH = 0.7
+_MISFIT_DOUBT = 4.0  # error of λ̂ per share left unexplained, as seen on simulated missions
 
 
 @dataclass(frozen=True)
@@ -102,7 +103,7 @@ def fit_control(
     return ControlFit(
         law,
         psi,
-        _mean([f.lambda_ for f in chosen], [f.lambda_std for f in chosen]),
+        _doubted(_mean([f.lambda_ for f in chosen], [f.lambda_std for f in chosen]), chosen),
         _mean([f.zeta for f in chosen], []) if psi == "forced" else none,
         _mean(psi0, []) if psi == "printed" and psi0 else none,
         min(f.explained for f in chosen),
@@ -118,6 +119,12 @@ def _mean(values: list[float], within: list[float]) -> Estimate:
     inner = float(np.median(within)) if within else float("nan")
     std = spread if not np.isfinite(inner) else inner if not np.isfinite(spread) else max(spread, inner)
     return Estimate(float(np.median(values)), std)
+
+
+def _doubted(e: Estimate, fits: Sequence[LawFit]) -> Estimate:
+    """Add what the reading leaves unexplained, as a share of the value: a step of delay more or less shows there."""
+    left = _MISFIT_DOUBT * float(np.sqrt(max(1.0 - f.explained for f in fits)))
+    return Estimate(e.value, float(np.hypot(np.nan_to_num(e.std), left * e.value)), e.why)
 
 
 def _increments(missions: Sequence[tuple[Timeline, Replay]], fit: LawFit, machine: Machine) -> Estimate:

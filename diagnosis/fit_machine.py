@@ -111,6 +111,8 @@ def with_plants(
             if fit is not None:
                 e = Estimate(float("nan"), float("nan"), fit.refused) if fit.refused else getattr(fit, name)
             old = None if before is None else getattr(before, name)
+            if name == "tau" and isfinite(e.value) and not isfinite(e.std):
+                e = Estimate(float("nan"), e.std, f"{e.why}; {e.value if old is None else old:g} s is assumed")
             used, count = (0, 0) if fit is None else (fit.used, len(fit.missions))
             constants.append(_constant(f"plant.{w}.{name}", e, unit, old, used, count, written=True))
         if fit is not None and not fit.refused:

@@ -26,6 +26,7 @@ _FULL = 5
 _SPREAD_OF_SPEED = 0.12
 _MISSION_LIMIT = 0.1
 _CUT_MISSION = 5.0
+_LAG_DOUBT = 0.01  # a wheel is no exact first-order lag
 
 
 @dataclass(frozen=True)
@@ -168,7 +169,7 @@ def _lag(records: list[WheelRecord], dead: float, start: float, allowed: list[in
     if best > 0.5 or float(misfit(table).max()) < 1.02 * best:
         why = f"the best lag explains {100 * (1 - best):.0f} % of the changes of speed only"
         return Estimate(start, float("nan"), why)
-    return Estimate(tau, std)
+    return Estimate(tau, float(np.hypot(std, _LAG_DOUBT * tau)))
 
 
 def fit_wheel(records: list[WheelRecord], start_tau: float) -> WheelFit:

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import cache
+from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from diagnosis.fit import FitResult, fit_missions
@@ -14,7 +16,7 @@ from replay.errors import NotJudged
 from replay.faults import FaultMode, FaultSpec, Side
 from replay.machine import haulotte
 from replay.machine_file import load_machine
-from replay.mission import Mission
+from replay.mission import Mission, load_mission
 from replay.signals import Signal, Signals
 from replay.simulation.options import SimulationOptions
 from replay.simulation.plant_options import PlantOptions
@@ -172,3 +174,41 @@ def test_document_and_machine_file(ground: FitResult, tmp_path_factory: pytest.T
     document = fit_document(ground)
     assert document["schema"] == "mfhca-fit/1"
     assert len(document["constants"]) == len(ground.constants)
+
+
+def test_a_real_motors_effort_map_comes_from_many_runs(reference_data: Path, tmp_path: Path) -> None:
+    rig = tmp_path / "rig.toml"
+    rig.write_text(
+        """
+[machine]
+wheels = ["M"]
+[geometry]
+max_speed = 400
+[control]
+law = "none"
+u_max = 100
+[sources]
+"*.csv" = { time = "Rel Time", time_unit = "ms" }
+[signals]
+"wheel.M.v_ref" = { column = "Desired Speed", unit = "m/s" }
+"wheel.M.v" = { column = "Actual Speed", unit = "m/s" }
+"wheel.M.u" = { column = "Shaft Control Effort", unit = "1" }
+""",
+        encoding="utf-8",
+    )
+    machine = load_machine(rig)
+    missions = []
+    for log in sorted((reference_data / "fault_data/rosa/healthy_mode").glob("*.csv.gz"))[::3]:
+        file = tmp_path / log.name.removesuffix(".gz")
+        pd.read_csv(log, skipinitialspace=True).iloc[1:-1].to_csv(file, index=False)  # lone rows at both ends
+        missions.append(load_mission([file], machine))
+    halves = [fit_missions(part, machine) for part in (missions[::2], missions[1::2])]
+    plants = [half.machine.plant.wheels["M"] for half in halves]
+    assert all(not half.unit_errors for half in halves)
+    for name in ("K", "dead"):
+        a, b = (getattr(p, name) for p in plants)
+        stds = [getattr(p, f"{name}_std") for p in plants]
+        assert abs(a - b) < 2 * np.hypot(*stds), (name, a, b, stds)
+    assert all(10 < p.K < 22 and 3 < p.dead < 12 for p in plants)
+    tau = next(c for c in halves[0].constants if c.key == "plant.M.tau")
+    assert "never changes" in tau.why
