@@ -152,7 +152,7 @@ def _relax(m, i, f, q, z, P):  # type: ignore[no-untyped-def]
 def update(m, y, power, count, p, z, P, ig, gain):  # type: ignore[no-untyped-def]
     """Kalman update with a block's mean, and the evidence of mean and white power; returns the log-likelihood.
 
-    A block that the model cannot explain costs it a fixed amount and teaches it nothing.
+    A block that the model cannot explain costs it a fixed amount and teaches it nothing but that its constant was wrong.
     """
     s = SENSOR[m]
     white, constant = p[7], p[8]
@@ -191,6 +191,8 @@ def update(m, y, power, count, p, z, P, ig, gain):  # type: ignore[no-untyped-de
     told -= 0.5 * (innovation * innovation / total + log(2 * pi * total))
     floor = _OUTLIER - log(p[4]) - 0.5 * nu * (1 + log(max(power, constant)))
     if told < floor:
+        if s == STUCK:
+            _forget(m, 5, p[4], z, P)
         return floor
     ig[m, 0], ig[m, 1] = after, scaled
     for i in range(STATES):
@@ -222,6 +224,14 @@ def _learn_gain(m, seen, var, z, P, gain):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
+def _forget(m, i, std, z, P):  # type: ignore[no-untyped-def]
+    """Give the constant x_i its prior again: it was learned from a block that a fault entered halfway."""
+    for j in range(STATES):
+        P[m, i, j] = P[m, j, i] = 0.0
+    P[m, i, i] = std * std
+
+
+@njit(cache=True)
 def measure(m, second, p, z, P, row):  # type: ignore[no-untyped-def]
     """Update with what is measured twice.
 
@@ -249,7 +259,10 @@ def measure(m, second, p, z, P, row):  # type: ignore[no-untyped-def]
             if which == 1 and a != GAIN:
                 h[3] = 1 / g
                 expected += z[m, 3] / g
-        told += _linear(m, y - expected, r, h, z, P, row[1])
+        one = _linear(m, y - expected, r, h, z, P, row[1])
+        if one == _OUTLIER and a == STUCK and which == 1:
+            _forget(m, 3, p[3], z, P)
+        told += one
     if a in (GAIN, NOISY):
         z[m, 2] = min(max(z[m, 2], _LEAST_GAIN), _MOST_GAIN)
     return told
