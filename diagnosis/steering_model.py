@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from diagnosis.steering_blocks import WHITE_DOF, SensorNoise, SteeringBlocks
 from diagnosis.steering_plant import SteeringPlant, windows_of
+from diagnosis.steering_scan import DISTURBANCE_S, SENSOR_DRIFT_S
 
 Array = NDArray[np.float64]
 
@@ -82,7 +83,7 @@ class SteeringModel:
                 self.plant.rate,
                 self.stop,
                 self.load,
-                _LOAD_S,
+                np.exp(-self.dt / _LOAD_S),
                 noise.white,
                 constant,
                 WHITE_DOF if noise.resolved else 0.02,
@@ -97,6 +98,8 @@ class SteeringModel:
                 noise.step,
                 self._freedom(noise.white / self.count + rounding),
                 float(self.twice),
+                np.exp(-self.dt / DISTURBANCE_S),
+                np.exp(-self.dt / SENSOR_DRIFT_S),
             ]
         )
 

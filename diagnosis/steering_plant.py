@@ -6,9 +6,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 from scipy.optimize import minimize
-from scipy.signal import lfilter
 
 from diagnosis.steering_blocks import WHITE_DOF, SensorNoise, SteeringBlocks, window_means
 
@@ -49,10 +49,18 @@ class SteeringPlant:
         return self.windows >= _LEAST_WINDOWS and self.misfit < 0.25
 
 
-def _lagged(driven: Array, lag: float, dt: float) -> Array:
-    """Rate behind a first-order lag."""
-    a = float(np.exp(-dt / max(lag, 1e-4)))
-    return np.asarray(lfilter([1 - a], [1, -a], driven))
+@njit(cache=True)
+def _scan_rates(u, gain, limit, a, length):  # type: ignore[no-untyped-def]
+    """Means over windows of `length` of r' = a·r + (1 − a)·sat(gain·u)."""
+    out = np.zeros(u.size // length)
+    r = 0.0
+    for w in range(out.size):
+        total = 0.0
+        for k in range(w * length, (w + 1) * length):
+            r = a * r + (1 - a) * min(max(gain * u[k], -limit), limit)
+            total += r
+        out[w] = total / length
+    return out
 
 
 @dataclass(frozen=True)
@@ -68,9 +76,9 @@ class Windows:
 
     def predicted(self, gain: float, limit: float, lag: float) -> Array:
         """Rates that a plant gives at these openings."""
-        r = _lagged(np.clip(gain * self.u, -limit, limit), lag, self.dt)
-        means = window_means(r, self.length)
-        return (means[:-1] + means[1:]) / 2
+        a = float(np.exp(-self.dt / max(lag, 1e-4)))
+        means = _scan_rates(self.u, gain, limit, a, self.length)
+        return np.asarray((means[:-1] + means[1:]) / 2)
 
 
 def windows_of(blocks: SteeringBlocks, noise: SensorNoise, stop: float, window_s: float) -> Windows:
@@ -106,7 +114,9 @@ def _loss(parts: Sequence[Windows], gain: float, limit: float, lag: float, scale
     return total / count if count else np.inf
 
 
-def _fit(parts: Sequence[Windows], short: Sequence[Windows]) -> SteeringPlant | None:
+def _fit(
+    parts: Sequence[Windows], short: Sequence[Windows], start: SteeringPlant | None = None
+) -> SteeringPlant | None:
     """Gain, rate limit and lag with the smallest loss: a coarse grid, then one after the other.
 
     `parts` are long windows for the grid, `short` ones show the lag.
@@ -125,12 +135,16 @@ def _fit(parts: Sequence[Windows], short: Sequence[Windows]) -> SteeringPlant | 
         return None
     typical = scale / float(np.median(openings))
     top = float(np.quantile(moving, 0.98))
-    grid = [
-        (_loss(parts, gain, limit, lag, scale, 0.1), gain, limit, lag)
-        for gain in typical * np.geomspace(0.3, 5.0, 14)
-        for limit in top * np.array([0.6, 0.8, 1.0, 1.25])
-        for lag in (0.02, 0.06, 0.18)
-    ]
+    grid = (
+        [(0.0, start.gain, start.rate, start.lag)]
+        if start is not None
+        else [
+            (_loss(parts, gain, limit, lag, scale, 0.1), gain, limit, lag)
+            for gain in typical * np.geomspace(0.3, 5.0, 14)
+            for limit in top * np.array([0.6, 0.8, 1.0, 1.25])
+            for lag in (0.02, 0.06, 0.18)
+        ]
+    )
     best = min(grid)[1:]
     for tolerance in (0.05, 0.02, 0.006):
         # gain and lag trade off against each other: a simplex in their logarithms follows the valley
@@ -141,7 +155,7 @@ def _fit(parts: Sequence[Windows], short: Sequence[Windows]) -> SteeringPlant | 
             options={
                 "initial_simplex": np.log(best)
                 + np.array([[0, 0, 0], [1, 0, 0.0], [0, 1, 0], [0, 0, 5]]) * 3 * tolerance,
-                "maxfev": 60,
+                "maxfev": 45,
                 "xatol": 1e-3,
                 "fatol": 1e-4,
             },
@@ -186,7 +200,7 @@ def identify_plants(
         return [None for _ in axles]
     out: list[SteeringPlant | None] = []
     for w in windows:
-        own = pooled if w is None or len(usable) == 1 else _fit([w[0]], [w[1]])
+        own = pooled if w is None or len(usable) == 1 else _fit([w[0]], [w[1]], pooled)
         agrees = own is not None and own.reliable and abs(np.log(own.gain / pooled.gain)) < 0.2
         limit = max(pooled.rate, own.rate) if own is not None and agrees else pooled.rate
         out.append(

@@ -11,7 +11,7 @@ tells how much noise the sensor still shows. p holds the constants in the order 
 
 from __future__ import annotations
 
-from math import exp, lgamma, log, pi
+from math import lgamma, log, pi
 
 import numpy as np
 from numba import njit
@@ -25,11 +25,19 @@ ACTUATOR = np.array([0, 0, 0, 0, 0, 0, 3, 1, 2, 4, 3, 1, 2, 4, 3, 1, 2, 4, 3, 1,
 SECOND = 18
 MODELS = SENSOR.size
 STATES = 6
+# states that a model frees, φ, r and b first; the others have no variance
+ACTIVE = np.array([[0, 1, 3, 2, 2, 2]] * MODELS)
+FREE = np.full(MODELS, 3)
+for _m in range(MODELS):
+    for _i, _on in ((2, ACTUATOR[_m] in (GAIN, NOISY)), (4, SENSOR[_m] >= GAIN), (5, SENSOR[_m] in (1, 4, 5))):
+        if _on:
+            ACTIVE[_m, FREE[_m]] = _i
+            FREE[_m] += 1
 _LEARNING_COST = 8.0
 _SILENT_COST = -6.0
 _OUTLIER = -18.0
-_DISTURBANCE_S = 0.8
-_SENSOR_DRIFT_S = 0.08
+DISTURBANCE_S = 0.8  # how fast a valve's disturbance and a sensor's coloured noise change
+SENSOR_DRIFT_S = 0.08
 _LEAST_GAIN, _MOST_GAIN = 0.1, 0.92  # of an inefficient part
 
 
@@ -85,7 +93,7 @@ def enter(m, old, p, z, P, ig):  # type: ignore[no-untyped-def]
 @njit(cache=True)
 def predict(m, driven, u, p, z, P, row):  # type: ignore[no-untyped-def]
     """x = f(x, u), P = F P Fᵀ + Q over one block; `driven` is the mean of sat(g·u) over the block's samples."""
-    dt, fade, g, lift, stop, load, load_s = p[0], p[1], p[2], p[3], p[4], p[5], p[6]
+    dt, fade, g, lift, stop, load = p[0], p[1], p[2], p[3], p[4], p[5]
     a = ACTUATOR[m]
     by_a, by_b = 0.0, 1.0
     if a == OK:
@@ -102,32 +110,35 @@ def predict(m, driven, u, p, z, P, row):  # type: ignore[no-untyped-def]
     r = z[m, 1]
     z[m, 0] += k_r * r + k_f * f
     z[m, 1] = fade * r + (1 - fade) * f
-    for j in range(STATES):
+    for n in range(FREE[m]):
+        j = ACTIVE[m, n]
         force = by_a * P[m, 2, j] + by_b * P[m, 3, j]
         row[0, j] = P[m, 0, j] + k_r * P[m, 1, j] + k_f * force
         row[1, j] = fade * P[m, 1, j] + (1 - fade) * force
-    for j in range(STATES):
+    for n in range(FREE[m]):
+        j = ACTIVE[m, n]
         P[m, 0, j], P[m, 1, j] = row[0, j], row[1, j]
-    for i in range(STATES):
+    for n in range(FREE[m]):
+        i = ACTIVE[m, n]
         force = by_a * P[m, i, 2] + by_b * P[m, i, 3]
         p0 = P[m, i, 0] + k_r * P[m, i, 1] + k_f * force
         P[m, i, 1] = fade * P[m, i, 1] + (1 - fade) * force
         P[m, i, 0] = p0
     P[m, 0, 0] += p[12]
     if a in (OK, GAIN, NONE):
-        f_b = exp(-dt / load_s)
+        f_b = p[6]
         # the valve's characteristic is known to a share only: the error grows with the rate
         q_b = (1 - f_b * f_b) * (load * load + p[17] * driven * driven * (a != NONE))
     elif a == STUCK:
         f_b, q_b = 1.0, (0.02 * lift) ** 2 * dt
     else:
-        f_b = exp(-dt / _DISTURBANCE_S)
+        f_b = p[21]
         q_b = (1 - f_b * f_b) * (0.6 * lift) ** 2
     _relax(m, 3, f_b, q_b, z, P)
     if SENSOR[m] == NOISY:
         P[m, 5, 5] += (0.02 * stop) ** 2 * dt
     elif SENSOR[m] == DRIFT:
-        f_c = exp(-dt / _SENSOR_DRIFT_S)
+        f_c = p[22]
         _relax(m, 5, f_c, (1 - f_c * f_c) * (0.1 * stop) ** 2, z, P)
     if abs(z[m, 0]) > stop:
         # an end stop holds the axle
@@ -141,10 +152,10 @@ def predict(m, driven, u, p, z, P, row):  # type: ignore[no-untyped-def]
 def _relax(m, i, f, q, z, P):  # type: ignore[no-untyped-def]
     """One step of x_i' = f·x_i + noise of variance q."""
     z[m, i] *= f
-    for j in range(STATES):
-        P[m, i, j] *= f
-    for j in range(STATES):
-        P[m, j, i] *= f
+    for n in range(FREE[m]):
+        P[m, i, ACTIVE[m, n]] *= f
+    for n in range(FREE[m]):
+        P[m, ACTIVE[m, n], i] *= f
     P[m, i, i] += q
 
 
@@ -179,12 +190,17 @@ def update(m, y, power, count, p, z, P, ig, gain):  # type: ignore[no-untyped-de
         r = v / count + p[14]
     else:
         # V ~ inverse gamma (α, β): p(power) = Γ(α+ν/2)/Γ(α) · β^α/(β+ν·power/2)^(α+ν/2)
-        told = lgamma(after) - lgamma(alpha) + alpha * log(beta) - after * log(scaled)
+        if alpha > 10.0:  # Γ(α+h)/Γ(α) ≈ (α + (h−1)/2)^h
+            told = 0.5 * nu * log((alpha + 0.25 * nu - 0.5) / scaled) + alpha * log(beta / scaled)
+        else:
+            told = lgamma(after) - lgamma(alpha) + alpha * log(beta) - after * log(scaled)
         r = max(scaled / after, constant) / count + p[14]
     d, phi = z[m, 4], z[m, 0]
     # S = H P Hᵀ + R with H = [d, 0, 0, 0, φ, 1]
     total = r
-    for i in range(STATES):
+    gain[:] = 0.0
+    for n in range(FREE[m]):
+        i = ACTIVE[m, n]
         gain[i] = P[m, i, 0] * d + P[m, i, 4] * phi + P[m, i, 5]
     total += gain[0] * d + gain[4] * phi + gain[5]
     innovation = y - d * phi - z[m, 5]
@@ -195,10 +211,12 @@ def update(m, y, power, count, p, z, P, ig, gain):  # type: ignore[no-untyped-de
             _forget(m, 5, p[4], z, P)
         return floor
     ig[m, 0], ig[m, 1] = after, scaled
-    for i in range(STATES):
-        z[m, i] += gain[i] * innovation / total
-        for j in range(STATES):
-            P[m, i, j] -= gain[i] * gain[j] / total
+    for n in range(FREE[m]):
+        i = ACTIVE[m, n]
+        share = gain[i] / total
+        z[m, i] += share * innovation
+        for k in range(FREE[m]):
+            P[m, i, ACTIVE[m, k]] -= share * gain[ACTIVE[m, k]]
     if s == GAIN and p[9] > 0.1:
         # the sensor scales its noise too: √((power − rounding)/σ²) measures d
         seen = (max(power - p[18], 0.0) / max(white - p[18], 1e-30)) ** 0.5
