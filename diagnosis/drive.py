@@ -9,7 +9,6 @@ or where the log's faults were written into it afterwards.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -18,7 +17,7 @@ from numpy.typing import NDArray
 from diagnosis.assessment import CODE, Assessment, Finding, unassessed
 from diagnosis.drive_echo import DriveRecord, echoed_speed, identify_echo, window_size
 from diagnosis.drive_effort import load_findings
-from diagnosis.drive_load import LoadTrack, identify_effort, track_load
+from diagnosis.drive_load import LoadTrack, track_load
 from diagnosis.drive_rows import EchoPair, find_rows
 from diagnosis.modes import BLIND, PAIR
 from diagnosis.noise import moving_sum, rounding_step
@@ -32,7 +31,7 @@ Array = NDArray[np.float64]
 _NOISE_RANGE = (0.7, 1.5)
 _STEP_RANGE = 0.1
 _QUIET = 0.4
-_SLOW_S, _SLACK = 0.5, 0.06
+_SLOW_S, _SLACK = 0.5, 0.03
 _LEAST_NOISE = 2e-3  # of the span: no echo is believed beyond that
 
 
@@ -86,20 +85,6 @@ class DriveData:
         """The channels without their circumstances; an effort at its limit echoes nothing."""
         free = np.abs(np.nan_to_num(self.u)) < 0.99 * self.u_max
         return DriveRecord(self.y, self.command, np.where(free, self.u, np.nan), self.dt)
-
-
-def identify_drive(missions: Sequence[DriveData], least_speed: float) -> DriveModel:
-    """Find echo and effort map of a drive from several healthy missions.
-
-    Parameters
-    ----------
-    missions : Sequence[DriveData]
-        Healthy missions; their models are not used.
-    least_speed : float
-        Commanded speed from which the drive is driven [m/s].
-    """
-    records = [m.record for m in missions]
-    return DriveModel(echo=identify_echo(records), effort=identify_effort(records, least_speed))
 
 
 def assess_drive(data: DriveData, limits: Limits) -> tuple[Assessment, Assessment]:
@@ -206,7 +191,7 @@ def _pair(data: DriveData, echo: EchoModel, x: Array, limits: Limits) -> EchoPai
     return EchoPair(
         y=data.y,
         x=x,
-        slack=_slack(x - data.command, data.dt),
+        slack=_slack(x - data.command, data.dt, echo.memory_std_s / echo.memory_s),
         status=status,
         quiet=np.asarray(quiet),
         lead=echo.first + len(echo.gains) - 1,
@@ -220,10 +205,10 @@ def _pair(data: DriveData, echo: EchoModel, x: Array, limits: Limits) -> EchoPai
     )
 
 
-def _slack(error: Array, dt: float) -> Array:
-    """What the echo may be off where the drive is long off its command: its share of the slow tracking error."""
+def _slack(error: Array, dt: float, share: float) -> Array:
+    """What the echo may be off where the drive is long off its command: a share of the slow tracking error."""
     width = max(1, round(_SLOW_S / dt))
-    return np.asarray(_SLACK * np.abs(moving_sum(np.nan_to_num(error), width)) / width, dtype=np.float64)
+    return np.asarray((_SLACK + share) * np.abs(moving_sum(np.nan_to_num(error), width)) / width, dtype=np.float64)
 
 
 def _mission_noise(residual: Array, dt: float, known: float) -> float:

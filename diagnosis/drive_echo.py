@@ -26,8 +26,9 @@ _LEAST_S = 4.0
 _MOST_SAMPLES = 60_000
 _TUKEY = 4.0
 _LEAST_EXPLAINED = 0.5
-_DRIFT_S = 2.0
-_LEAST_KNOWN = 10.0  # slope of the integral part [its standard errors]
+_DRIFT_S = 1.0
+_LEAST_STRETCHES = 3
+_UNSURE = 0.1  # of Ti where one mission alone gives it
 _WINDOW_S = 0.5
 _QUANTILE = 0.4
 
@@ -137,48 +138,64 @@ def identify_echo(records: Sequence[DriveRecord]) -> EchoModel | None:
     assert best is not None
     _, memory, first = best
     _, theta, _ = fitted(memory, range(first, first + _TAPS))
-    memory = _integral_time(parts, theta[:_TAPS], first, dt) or memory
+    memory, unsure = _integral_time(parts, theta[:_TAPS], first, dt) or (memory, _UNSURE * memory)
     _, theta, rest = fitted(memory, range(first, first + _TAPS))
     noise = window_size(rest, dt)
     if not 0 < noise**2 < (1 - _LEAST_EXPLAINED) * window_size(target, dt) ** 2:
         return None
     exact, core = _exact_share(rest[:: max(1, rest.size // _MOST_SAMPLES)], noise)
-    return EchoModel(tuple(float(g) for g in theta[:_TAPS]), first, memory, float(theta[_TAPS]), noise, exact, core, dt)
+    return EchoModel(
+        gains=tuple(float(g) for g in theta[:_TAPS]),
+        first=first,
+        memory_s=memory,
+        memory_std_s=unsure,
+        setpoint=float(theta[_TAPS]),
+        noise=noise,
+        exact=exact,
+        core=core,
+        step_s=dt,
+    )
 
 
-def _integral_time(parts: Sequence[tuple[Array, Array, Array]], gains: Array, first: int, dt: float) -> float | None:
-    """Ti from how the integral part u + Kp·e moves over seconds with ∫e; None where it hardly does.
+def _integral_time(
+    parts: Sequence[tuple[Array, Array, Array]], gains: Array, first: int, dt: float
+) -> tuple[float, float] | None:
+    """Ti and its standard deviation from how the integral part u + Kp·e follows ∫e; None where fewer than three stretches show it.
 
-    The high-passed effort fixes Ti only loosely, while a drive that is long off its command needs it well.
+    The high-passed effort fixes Ti only loosely, while a drive that is long off its command needs it well. The median
+    over stretches bears faults in some of them; with a single mission they could not be told from another Ti.
     """
     total = float(np.sum(gains))
-    if total >= 0:
+    if total >= 0 or len(parts) < _LEAST_STRETCHES:
         return None
     lead = first + int(np.argmin(gains))
     length = max(4, round(_DRIFT_S / dt))
-    moved, pushed = [], []
+    slopes, weights = [], []
     for y, r, u in parts:
         e = y - r
-        integral = _led(u, lead) - e / total
         count = e.size // length
-        if count < 2:
+        if count < 4:
             continue
-        sums = np.cumsum(e) * dt
-        middle = [np.median(x[: count * length].reshape(count, length), axis=1) for x in (integral, sums)]
-        moved.append(np.diff(middle[0]))
-        pushed.append(-np.diff(middle[1]))
-    if not moved:
+        middle = [
+            np.median(x[: count * length].reshape(count, length), axis=1)
+            for x in (_led(u, lead) - e / total, -np.cumsum(e) * dt)
+        ]
+        moved, pushed = (x - np.mean(x) for x in middle)
+        weight = float(pushed @ pushed)
+        if weight > 0:
+            slopes.append(float(pushed @ moved) / weight)
+            weights.append(weight)
+    if len(slopes) < _LEAST_STRETCHES:
         return None
-    a, b = np.concatenate(pushed), np.concatenate(moved)
-    moving = np.abs(a) > 0
-    if not moving.any():
+    found, share = np.array(slopes), np.array(weights) / float(np.sum(weights))
+    order = np.argsort(found)
+    slope = float(found[order][np.searchsorted(np.cumsum(share[order]), 0.5)])
+    if slope <= 0:
         return None
-    # least absolute deviations: the median of b/a with weights |a|
-    ratio, weight = b[moving] / a[moving], np.abs(a[moving])
-    order = np.argsort(ratio)
-    slope = float(ratio[order][np.searchsorted(np.cumsum(weight[order]), 0.5 * float(weight.sum()))])
-    error = _spread(b - slope * a) / max(float(np.sqrt(a @ a)), 1e-300)
-    return -1 / (total * slope) if slope > _LEAST_KNOWN * error else None
+    # spread of the stretches, each with its weight, over their effective number
+    spread = float(np.sqrt(share @ (found - slope) ** 2 * float(share @ share) / max(1 - float(share @ share), 0.1)))
+    memory = -1 / (total * slope)
+    return memory, memory * min(spread / slope, 1.0)
 
 
 def _exact_share(rest: Array, noise: float) -> tuple[float, float]:

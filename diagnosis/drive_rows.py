@@ -155,7 +155,8 @@ def _finding(run: Run, pair: EchoPair, model: RowModel, limits: Limits, lead: Ar
     elif use.any() and y.size < _SHORTEST_HARD:
         return None
     gain = float(evidence[row] - evidence[modes.HEALTHY])
-    if gain < 2 * model.switch_cost:
+    # into the row and out of it again; a fault that lasts to the end of the log need not end
+    if gain < (2.0 if run.stop < pair.y.size else 1.5) * model.switch_cost:
         return None
     if row == modes.STUCK and abs(float(np.mean(y))) <= max(3 * model.constant_noise, limits.min_sat):
         row = modes.NO_SIGNAL

@@ -10,6 +10,7 @@ from dataclasses import dataclass, field, replace
 from typing import Literal
 
 from replay.checks import check_range
+from replay.drive_model import DriveModel
 from replay.errors import ConfigError
 from replay.geometry import Geometry, four_wheel_geometry
 from replay.sources import SignalSource, SourceOptions
@@ -224,6 +225,8 @@ class Machine:
         Given signals; those absent are searched for.
     sources : Mapping[str, SourceOptions]
         Options per source, keyed by file name pattern.
+    drives : Mapping[str, DriveModel]
+        How single drives answer, by wheel; from healthy missions.
     """
 
     name: str
@@ -239,6 +242,7 @@ class Machine:
     limits: Limits = field(default_factory=Limits)
     sources: Mapping[str, SourceOptions] = field(default_factory=dict)
     signals: Mapping[str, SignalSource] = field(default_factory=dict)
+    drives: Mapping[str, DriveModel] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         """Check values and that signals name this machine's wheels and axles."""
@@ -255,9 +259,15 @@ class Machine:
         check_range("geometry.gear_ratio", self.gear_ratio, 1e-3, 1e4, "")
         check_range("geometry.max_speed", self.max_speed, 1e-6, 1e6, "m/s")
         check_range("geometry.max_steer", self.max_steer, 0.0, 3.2, "rad")
+        self._check_drives()
         for section, names in (("signals", self.signals), ("noise", self.noise)):
             for name in names:
                 self._check_name(section, name)
+
+    def _check_drives(self) -> None:
+        for name in self.drives:
+            if name not in self.wheels:
+                raise ConfigError(f"[drive] {name!r}: no such wheel; machine.wheels has {list(self.wheels)}")
 
     def _check_name(self, section: str, name: str) -> None:
         """Raise where a signal is not known or names no part of this machine."""

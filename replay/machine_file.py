@@ -9,6 +9,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, TypeVar
 
+from replay.drive_model import drive_from_table, drive_table
 from replay.errors import ConfigError
 from replay.geometry import Geometry, WheelGeometry, four_wheel_geometry
 from replay.machine import Control, Limits, Machine, Noise, Plant, WheelPlant, haulotte
@@ -16,7 +17,7 @@ from replay.sources import SignalSource, SourceOptions
 from replay.units import si_factor
 
 _T = TypeVar("_T")
-_SECTIONS = {"machine", "geometry", "control", "plant", "noise", "limits", "sources", "signals"}
+_SECTIONS = {"machine", "geometry", "control", "plant", "drive", "noise", "limits", "sources", "signals"}
 _STANDARD = ("wheelbase", "joint_spacing", "wheel_offset")
 _MACHINE_LEVEL = ("gear_ratio", "max_speed", "max_steer")
 
@@ -77,6 +78,7 @@ def _machine(data: Mapping[str, Any]) -> Machine:
         limits=_build(Limits, "limits", limits),
         sources={k: _build(SourceOptions, f"sources.{k}", v) for k, v in data.get("sources", {}).items()},
         signals={k: _signal(k, v) for k, v in data.get("signals", {}).items()},
+        drives={k: drive_from_table(f"drive.{k}", v) for k, v in data.get("drive", {}).items()},
     )
     for name, source in machine.signals.items():
         if source.unit:
@@ -235,6 +237,8 @@ def dump_machine(machine: Machine, notes: Mapping[str, Sequence[str]] | None = N
     if machine.plant.flow is not None:
         lines.append(f"flow = {_real(machine.plant.flow)}")
     lines += [f"{_key(w)} = {{ {', '.join(_table(p))} }}" for w, p in machine.plant.wheels.items()]
+    if machine.drives:
+        lines += ["", *head("drive"), *(f"{_key(w)} = {_inline(drive_table(d))}" for w, d in machine.drives.items())]
     lines += ["", *head("limits"), *_table(machine.limits)]
     for section, items in (("noise", machine.noise), ("sources", machine.sources), ("signals", machine.signals)):
         lines += ["", *head(section), *(f"{_key(k)} = {{ {', '.join(_table(v))} }}" for k, v in items.items())]
@@ -257,6 +261,15 @@ def _table(item: Any, rename: Mapping[str, str] | None = None) -> list[str]:
         )
         out.append(f"{(rename or {}).get(f.name, f.name)} = {text}")
     return out
+
+
+def _inline(value: Any) -> str:
+    """Nested tables and lists of numbers on one line."""
+    if isinstance(value, Mapping):
+        return "{ " + ", ".join(f"{_key(k)} = {_inline(v)}" for k, v in value.items()) + " }"
+    if isinstance(value, list):
+        return "[" + ", ".join(_inline(v) for v in value) + "]"
+    return str(value) if isinstance(value, int) else _real(value)
 
 
 def _real(value: float) -> str:

@@ -2,17 +2,26 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 import pytest
 
+from diagnosis.drive import DriveData, assess_drive
+from diagnosis.drive_fit import drive_data, identify_drive
 from diagnosis.pipeline import diagnose
 from diagnosis.result import MissionResult
+from replay.drive_model import DriveModel
 from replay.errors import LogError, NotJudged
+from replay.faults import FaultMode, FaultSpec, Side
+from replay.injection import inject_signals
 from replay.machine import Machine, haulotte
 from replay.machine_file import load_machine
+from replay.mission import read_signals
+from replay.signals import Signals
+from replay.timeline import align
 
 ROSA = """
 [machine]
@@ -132,3 +141,102 @@ def test_faults_put_into_a_real_motors_sensor_are_found(
         assert fault["side"] == "sensor"
         assert abs(fault["start_s"] - 8) < 0.5
         assert abs(fault["stop_s"] - 16) < 0.5
+
+
+FINE = """[limits]
+min_epsilon = 0.02
+min_sat = 2.0
+driving_speed = 20.0
+"""
+FITTED = (93, 136, 100, 112, 130, 87, 99)
+
+
+def rosa_signals(reference_data: Path, folder: str, number: int, rig: Machine) -> Signals:
+    return read_signals([reference_data / "fault_data/rosa" / folder / f"merged_data{number}.csv.gz"], rig)[1]
+
+
+def rosa_drive(signals: Signals, rig: Machine, model: DriveModel | None = None) -> DriveData:
+    timeline = align(signals)
+    data = drive_data(timeline, timeline.signals["wheel.M.v_ref"], rig, "M")
+    assert data is not None
+    return replace(data, model=model)
+
+
+@pytest.fixture(scope="module")
+def rig(reference_data: Path, tmp_path_factory: pytest.TempPathFactory) -> tuple[Machine, DriveModel]:
+    """The motor, and its model from a few healthy runs."""
+    found = machine(ROSA + FINE, tmp_path_factory.mktemp("rig"))
+    runs = [rosa_drive(rosa_signals(reference_data, "healthy_mode", n, found), found) for n in FITTED]
+    return found, identify_drive(runs, found.limits.driving_speed)
+
+
+def test_the_motors_controller_is_read_off_its_effort(rig: tuple[Machine, DriveModel]) -> None:
+    _, model = rig
+    assert model.echo is not None
+    assert model.effort is not None
+    assert min(model.echo.gains) == pytest.approx(-20.0, rel=0.02)
+    assert model.echo.memory_s == pytest.approx(1.18, rel=0.1)
+
+
+@pytest.mark.parametrize(("number", "known"), [(106, True), (118, True), (106, False)])
+@pytest.mark.parametrize(
+    ("mode", "epsilon", "sat", "std"),
+    [
+        (FaultMode.STUCK, 1.0, float("nan"), 0.0),
+        (FaultMode.NO_SIGNAL, 1.0, 0.0, 0.0),
+        (FaultMode.INEFFICIENT, 0.3, 0.0, 0.0),
+        (FaultMode.INEFFICIENT, 0.05, 0.0, 0.0),
+        (FaultMode.NOISY, 0.3, 200.0, 100.0),
+        (FaultMode.NOISY, 0.05, 200.0, 100.0),
+    ],
+)
+def test_small_faults_written_into_a_healthy_run_are_found(
+    reference_data: Path,
+    rig: tuple[Machine, DriveModel],
+    number: int,
+    mode: FaultMode,
+    epsilon: float,
+    sat: float,
+    std: float,
+    known: bool,
+) -> None:
+    found, model = rig
+    fault = FaultSpec("M", Side.SENSOR, mode, 6.0, 12.0, epsilon, sat, std)
+    signals = inject_signals(rosa_signals(reference_data, "healthy_mode", number, found), [fault], found, number)[0]
+    data = rosa_drive(signals, found, model if known else None)
+    sensor, _ = assess_drive(data, found.limits)
+    (finding,) = sensor.findings
+    assert (finding.side, finding.mode) == (Side.SENSOR, mode)
+    assert abs(finding.start * data.dt - 6.0) < 0.3
+    assert abs(finding.stop * data.dt - 12.0) < 0.3
+    assert finding.detected is not None
+    assert finding.detected * data.dt < 6.6
+
+
+@pytest.mark.parametrize("number", [46, 69, 75, 81, 106])
+def test_a_healthy_motor_raises_nothing(reference_data: Path, rig: tuple[Machine, DriveModel], number: int) -> None:
+    found, model = rig
+    sensor, actuator = assess_drive(
+        rosa_drive(rosa_signals(reference_data, "healthy_mode", number, found), found, model), found.limits
+    )
+    assert sensor.findings == actuator.findings == ()
+
+
+@pytest.mark.parametrize(
+    ("folder", "number", "start"),
+    [("manual_d_mode", 449, 3.4), ("manual_n_mode", 212, 1.9), ("mc-generated_v_mode", 325, 2.0)],
+)
+def test_the_motors_own_loads_are_extra_effort_and_no_fault_of_its_sensor_alone(
+    reference_data: Path, rig: tuple[Machine, DriveModel], folder: str, number: int, start: float
+) -> None:
+    found, model = rig
+    data = rosa_drive(rosa_signals(reference_data, folder, number, found), found, model)
+    sensor, actuator = assess_drive(data, found.limits)
+    assert all(f.side is not Side.SENSOR for f in sensor.findings)
+    assert abs(actuator.findings[0].start * data.dt - start) < 1.5
+
+
+@pytest.mark.parametrize("motor", [1, 2, 3, 4])
+def test_a_steady_state_error_of_the_arm_is_no_standstill(reference_data: Path, tmp_path: Path, motor: int) -> None:
+    log = reference_data / "fault_data/dtr_robot_arm" / f"Motor_{motor}_Steady_state_error_01.csv"
+    assert serious(diagnose([log], machine(ARM, tmp_path))) == []

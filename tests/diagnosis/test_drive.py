@@ -9,8 +9,9 @@ import pytest
 from numpy.typing import NDArray
 
 from diagnosis.assessment import STATES, Assessment
-from diagnosis.drive import DriveData, assess_drive, identify_drive
+from diagnosis.drive import DriveData, assess_drive
 from diagnosis.drive_effort import onset_of
+from diagnosis.drive_fit import identify_drive
 from replay.drive_model import DriveModel
 from replay.faults import FaultMode, Side, State
 from replay.machine import Limits

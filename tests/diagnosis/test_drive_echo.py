@@ -42,7 +42,7 @@ def test_a_controllers_gain_integral_time_and_delay_are_found() -> None:
 
 
 def test_the_echo_is_the_speed_that_the_controller_saw() -> None:
-    model = EchoModel((-1 / KP,), 1, TI, 0.0, 0.01, 0.5, 0.01, DT)
+    model = EchoModel((-1 / KP,), 1, TI, 0.0, 0.0, 0.01, 0.5, 0.01, DT)
     record = loop(3)
     assert np.nanmax(np.abs(echoed_speed(model, record) - record.y)[50:-2]) < 0.03
 
@@ -70,7 +70,7 @@ def test_an_effort_that_answers_to_nothing_gives_no_model() -> None:
 
 
 def test_a_gap_starts_the_echo_anew() -> None:
-    model = EchoModel((-1 / KP,), 1, TI, 0.0, 0.01, 0.5, 0.01, DT)
+    model = EchoModel((-1 / KP,), 1, TI, 0.0, 0.0, 0.01, 0.5, 0.01, DT)
     record = loop(6)
     u = record.u.copy()
     u[600:700] = np.nan
@@ -100,4 +100,4 @@ def test_window_size_ignores_loud_windows() -> None:
 
 def test_a_model_without_gains_is_refused() -> None:
     with pytest.raises(ConfigError, match=r"drive\.gains is empty"):
-        EchoModel((), 1, TI, 0.0, 0.01, 0.5, 0.01, DT)
+        EchoModel((), 1, TI, 0.0, 0.0, 0.01, 0.5, 0.01, DT)

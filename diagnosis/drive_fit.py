@@ -1,0 +1,68 @@
+"""Channels of a single drive on a mission's time axis, and its model from several healthy missions."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from diagnosis.channels import alive, alive_sources
+from diagnosis.drive import DriveData
+from diagnosis.drive_echo import identify_echo
+from diagnosis.drive_load import identify_effort
+from replay.drive_model import DriveModel
+from replay.machine import Machine, Noise
+from replay.timeline import Timeline
+
+Array = NDArray[np.float64]
+
+_SPAN = 2.2  # largest plausible speed [top speed]
+
+
+def drive_data(timeline: Timeline, command: Array, machine: Machine, wheel: str) -> DriveData | None:
+    """Channels of a drive, or None where its speed, command or effort is not in the log.
+
+    Parameters
+    ----------
+    timeline : Timeline
+        The aligned mission.
+    command : Array, shape (n,)
+        Commanded speed [m/s].
+    machine : Machine
+        The machine.
+    wheel : str
+        Which of its drives.
+    """
+    names = (f"wheel.{wheel}.v", f"wheel.{wheel}.v_ref", f"wheel.{wheel}.u")
+    y, u = timeline.get(names[0]), timeline.get(names[2])
+    if y is None or u is None or not all(np.isfinite(x).any() for x in (y, u, command)):
+        return None
+    return DriveData(
+        y=y,
+        y_fresh=timeline.fresh[names[0]],
+        alive=alive(timeline, alive_sources(timeline), names[0]),
+        command=command,
+        u=u,
+        dt=timeline.dt,
+        model=machine.drives.get(wheel),
+        span=_SPAN * machine.max_speed,
+        u_max=max(machine.control.u_max, 1e-6),
+        lsb=machine.noise.get(names[0], Noise()).lsb,
+        names=names,
+        open_loop=timeline.open_loop,
+    )
+
+
+def identify_drive(missions: Sequence[DriveData], least_speed: float) -> DriveModel:
+    """Find echo and effort map of a drive from several healthy missions.
+
+    Parameters
+    ----------
+    missions : Sequence[DriveData]
+        Healthy missions; their models are not used.
+    least_speed : float
+        Commanded speed from which the drive is driven [m/s].
+    """
+    records = [m.record for m in missions]
+    return DriveModel(echo=identify_echo(records), effort=identify_effort(records, least_speed))
