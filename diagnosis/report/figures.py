@@ -5,7 +5,6 @@ A row is plain JSON: the page draws it, the server only chooses. Angles are show
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -14,10 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from diagnosis.report.names import FAULT_MODES, state_label
+from diagnosis.report.pair import DEGREES, VALVE_UNIT, by_valve, sides_of
 
 Columns = Mapping[str, NDArray[np.floating]]
 
-_DEG = 180.0 / math.pi
 _Z95 = 1.959964
 
 
@@ -43,6 +42,7 @@ class Row:
     band: tuple[str, str] | None = None
     band_scale: float = 1.0
     threshold: str | None = None
+    level: float | None = None
     limits: tuple[float, float] | None = None
     clip: tuple[float, float] | None = None
     right: tuple[str, str] | None = None
@@ -67,7 +67,7 @@ def derived(columns: Columns, faults: Sequence[Mapping[str, Any]]) -> dict[str, 
     """Columns with ε̂ = 1 − δ̂ and the 95 % bounds of ε̂ and of the saturation term added for the faults shown."""
     result = dict(columns)
     for fault in faults:
-        for side in _sides(fault["side"]):
+        for side in sides_of(fault["side"]):
             base = f"evidence.{fault['component']}.{side}."
             delta, bar = columns.get(base + "delta"), columns.get(base + "delta_bar")
             if delta is not None and base + "epsilon" not in result:
@@ -79,10 +79,6 @@ def derived(columns: Columns, faults: Sequence[Mapping[str, Any]]) -> dict[str, 
                 result[base + "delta_bar_low"] = bar - _Z95 * std
                 result[base + "delta_bar_high"] = bar + _Z95 * std
     return result
-
-
-def _sides(side: str) -> tuple[str, ...]:
-    return ("sensor", "actuator") if side == "sensor_or_actuator" else (side,)
 
 
 def _row(columns: Columns, key: str, title: str, unit: str, traces: Sequence[Trace], **extra: Any) -> list[Row]:
@@ -105,12 +101,14 @@ def _motion(c: str, kind: str, columns: Columns) -> tuple[str, str, float, str, 
     """Measured, commanded and second measurement of a component: names, unit and factor."""
     if kind == "steer":
         ref = _first(columns, f"replay.{c}.phi_ref", f"steer.{c}.phi_ref")
-        return "Steering angle", "°", _DEG, f"steer.{c}.phi", ref, f"steer.{c}.phi_true"
+        return "Steering angle", "°", DEGREES, f"steer.{c}.phi", ref, f"steer.{c}.phi_true"
     ref = _first(columns, f"replay.{c}.v_ref", f"wheel.{c}.v_ref")
     return "Wheel speed", "m/s", 1.0, f"wheel.{c}.v", ref, f"wheel.{c}.v_true"
 
 
-def fault_rows(fault: Mapping[str, Any], peers: Sequence[str], columns: Columns) -> tuple[Row, ...]:
+def fault_rows(
+    fault: Mapping[str, Any], peers: Sequence[str], columns: Columns, limit: float | None = None
+) -> tuple[Row, ...]:
     """Rows of evidence for one fault.
 
     Parameters
@@ -121,31 +119,33 @@ def fault_rows(fault: Mapping[str, Any], peers: Sequence[str], columns: Columns)
         Components of the same kind, the faulty one included.
     columns : Mapping[str, NDArray[np.floating]]
         Columns with those of `derived`.
+    limit : float or None
+        Probability from which a fault is stated.
     """
     c, kind, side = fault["component"], fault["kind"], fault["side"]
     group = "steer" if kind == "steer" else "wheel"
     title, unit, scale, measured, commanded, second = _motion(c, kind, columns)
     applied = f"{group}.{c}.u_applied"
-    by_valve = side == "actuator" and fault.get("tier") == "direct" and applied in columns
-    expected = f"evidence.{c}.{_sides(side)[0]}.expected"
+    valve_read = by_valve(fault, columns)
+    expected = f"evidence.{c}.{sides_of(side)[0]}.expected"
     motion = [
         Trace(commanded, "commanded", "commanded", scale),
         Trace(second, "second measurement", "reference", scale),
-        *([] if by_valve else [Trace(expected, "expected", "expected", scale)]),
+        *([] if valve_read else [Trace(expected, "expected", "expected", scale)]),
         Trace(measured, "measured", "measured", scale),
     ]
     valve = [
         Trace(f"{group}.{c}.u", "recorded", "measured"),
         Trace(f"replay.{c}.u", "replayed", "replayed"),
         Trace(applied, "applied", "applied"),
-        *([Trace(expected, "expected", "expected")] if by_valve else []),
+        *([Trace(expected, "expected", "expected")] if valve_read else []),
     ]
     valve_row = _row(columns, "u", "Valve command", "of full opening", valve)
     rows = _row(columns, "v", title, unit, motion)
     if side == "actuator":
         rows += valve_row
-    for s in _sides(side):
-        rows += _side_rows(fault, s, ("of full opening", 1.0) if by_valve else (unit, scale), columns)
+    for s in sides_of(side):
+        rows += _side_rows(fault, s, (VALVE_UNIT, 1.0) if valve_read else (unit, scale), columns, limit)
     if kind == "wheel":
         rows += _psi_row(c, columns)
     if side != "actuator":
@@ -157,14 +157,16 @@ def fault_rows(fault: Mapping[str, Any], peers: Sequence[str], columns: Columns)
     return tuple(rows)
 
 
-def _side_rows(fault: Mapping[str, Any], side: str, residual_unit: tuple[str, float], columns: Columns) -> list[Row]:
-    """Residual, ε̂, saturation term and mode probabilities of one side."""
+def _side_rows(
+    fault: Mapping[str, Any], side: str, residual_unit: tuple[str, float], columns: Columns, limit: float | None
+) -> list[Row]:
+    """Residual, probability that the side is not healthy, ε̂, saturation term and mode probabilities of one side."""
     base = f"evidence.{fault['component']}.{side}."
     of = f" ({side})" if fault["side"] == "sensor_or_actuator" else ""
     unit, scale = residual_unit
     natural = "rad" if fault["kind"] == "steer" else "m/s"
     sat_unit = (fault.get("sat") or {}).get("unit") or (natural if side == "sensor" else "of full opening")
-    sat_scale = _DEG if sat_unit == "rad" else 1.0
+    sat_scale = DEGREES if sat_unit == "rad" else 1.0
     rows = _row(
         columns,
         f"residual{of}",
@@ -173,6 +175,15 @@ def _side_rows(fault: Mapping[str, Any], side: str, residual_unit: tuple[str, fl
         [Trace(base + "residual", "residual", "measured", scale)],
         threshold=base + "threshold",
         band_scale=scale,
+    )
+    rows += _row(
+        columns,
+        f"probability{of}",
+        f"Probability that it is not healthy{of}",
+        "1",
+        [Trace(base + "probability", "not healthy", "measured")],
+        level=limit,
+        limits=(-0.03, 1.03),
     )
     rows += _row(
         columns,
@@ -266,6 +277,8 @@ def row_json(row: Row, index: Mapping[str, int]) -> dict[str, Any]:
         data["threshold"] = index[row.threshold]
     if row.band or row.threshold:
         data["bandScale"] = row.band_scale
+    if row.level is not None:
+        data["level"] = row.level
     if row.limits:
         data["limits"] = list(row.limits)
     if row.clip:

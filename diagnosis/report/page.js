@@ -32,6 +32,7 @@
     one("#live").textContent = `Showing ${id}: ${f.title}`;
     if (scroll) one("#evidence").scrollIntoView({ behavior: matchMedia("(prefers-reduced-motion: reduce)").matches ? "auto" : "smooth" });
     if (!evidence) return;
+    one(`article[data-ev="${CSS.escape(id)}"] .slot`).append(one("#figure"));
     one("#figure").hidden = !f.rows.length;
     if (!f.rows.length) return;
     const shades = view.faults.filter((g) => g.component === f.component).map((g) => ({ ...g, main: g.id === id }));

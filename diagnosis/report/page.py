@@ -19,12 +19,14 @@ from typing import Any
 import jinja2
 import numpy as np
 from jinja2.utils import htmlsafe_json_dumps
-from markupsafe import Markup
+from markupsafe import Markup, escape
 from numpy.typing import NDArray
 
 from diagnosis.report import names, tables
 from diagnosis.report.encode import Channel, encode
+from diagnosis.report.evidence import evidence_of
 from diagnosis.report.figures import Columns, Group, Row, derived, fault_rows, loop_groups, row_json
+from diagnosis.report.pair import pair_of
 from diagnosis.report.picture import machine_picture
 from diagnosis.report.svg import icon, path_picture, thumbnail
 from diagnosis.report.timeline import timeline
@@ -69,8 +71,10 @@ def build_page(
     machine = report.get("machine") or {}
     wheels, axles = machine.get("wheels") or (), machine.get("axles") or ()
     shown = derived({k: v for k, v in cols.items() if np.isfinite(v).any()}, faults) if samples else {}
+    limit = (report.get("limits") or {}).get("min_probability")
     figures = {
-        f["id"]: fault_rows(f, axles if f["kind"] == "steer" else wheels, shown) if samples else () for f in faults
+        f["id"]: fault_rows(f, axles if f["kind"] == "steer" else wheels, shown, limit) if samples else ()
+        for f in faults
     }
     groups = loop_groups(wheels, axles, shown) if samples else ()
     plots = bool(groups or any(figures.values()))
@@ -78,13 +82,14 @@ def build_page(
     duration = _duration(report, start, step, samples)
     context = {
         **tables.context(report, duration),
-        "css": Markup((_HERE / "report.css").read_text("utf-8")),
+        "css": Markup("".join(_script(name) for name in ("report.css", "evidence.css"))),
         "timeline": timeline(report, duration),
         "picture": machine_picture(report),
         "path": path_picture(cols["path.x"], cols["path.y"], start, step, faults)
         if samples and {"path.x", "path.y"} <= set(cols)
         else Markup(""),
-        "thumbs": {f["id"]: _thumbnail(f, figures[f["id"]], shown, start, step) for f in faults[:_THUMBNAILS]},
+        "thumbs": {f["id"]: _thumbnail(f, shown, start, step) for f in faults[:_THUMBNAILS]} if samples else {},
+        "evidence": evidence_of(report, shown, (start, step)),
         "groups": groups,
         "has_plots": plots,
         "plotly_version": version,
@@ -92,7 +97,8 @@ def build_page(
     head, scripts = _script("theme.js"), [_script(name) for name in _SCRIPTS]
     context |= {"head": Markup(head), "scripts": [Markup(s) for s in scripts], "plotly": packed}
     context["csp"] = _policy([head, *scripts, *([plotly] if plots else [])])
-    budget = int(max_size_mb * 1e6) - len(packed) - 400_000 - 12_000 * len(faults)
+    drawn = sum(len(p.picture) for e in context["evidence"].values() for p in (*e.edges, *e.course))
+    budget = int(max_size_mb * 1e6) - len(packed) - 400_000 - 6_000 * len(faults) - drawn
     channels = _channels(report, shown, figures, groups, (start, step), max(budget, 200_000))
     context["blocks"] = [(f"c{i}-{j}", s.text) for i, c in enumerate(channels) for j, s in enumerate(c.segments)]
     context["channels"] = [c.name for c in channels]
@@ -121,13 +127,11 @@ def _duration(report: Mapping[str, Any], start: float, step: float, samples: int
     return float(max([known, start + step * samples if samples else 0.0, *ends]))
 
 
-def _thumbnail(fault: Mapping[str, Any], rows: Sequence[Row], columns: Columns, start: float, step: float) -> Markup:
-    if not rows:
+def _thumbnail(fault: Mapping[str, Any], columns: Columns, start: float, step: float) -> Markup:
+    pair = pair_of(fault, columns)
+    if pair is None:
         return Markup("")
-    roles = {t.role: t.column for t in rows[0].traces}
-    measured = roles.get("applied") or roles.get("measured") or rows[0].traces[-1].column
-    commanded = roles.get("measured") if "applied" in roles else roles.get("commanded")
-    return thumbnail(fault, columns[measured], columns[commanded] if commanded else None, start, step)
+    return thumbnail(fault, columns[pair.measured], columns[pair.reference] if pair.reference else None, start, step)
 
 
 def _channels(
@@ -165,6 +169,7 @@ def _view(
             "id": f["id"],
             "start": f["start_s"],
             "stop": f["stop_s"],
+            "detected": f.get("detected_s"),
             "mode": names.known(f["mode"]),
             "component": f["component"],
             "title": names.fault_title(f),
@@ -223,6 +228,16 @@ def _policy(scripts: Sequence[str]) -> str:
     )
 
 
+def _headed(rows: Markup, heads: Sequence[str]) -> Markup:
+    """Rows of a table whose cells carry their column's heading, for screens on which they stand below each other."""
+
+    def row(text: str) -> str:
+        words = (str(escape(h.removeprefix(">"))) for h in heads)
+        return re.sub(r"<(td|th scope=\"row\")", lambda cell: f'{cell[0]} data-h="{next(words, "")}"', text)
+
+    return Markup("</tr>").join(Markup(row(part)) for part in str(rows).split("</tr>"))
+
+
 @lru_cache
 def _environment() -> jinja2.Environment:
     environment = jinja2.Environment(
@@ -233,5 +248,6 @@ def _environment() -> jinja2.Environment:
         lstrip_blocks=True,
     )
     environment.filters |= {"clock": names.clock, "span": names.span, "num": names.number, "state": names.state_label}
+    environment.filters["headed"] = _headed
     environment.globals |= {"icon": icon, "known": names.known, "part": names.part, "title": names.fault_title}
     return environment

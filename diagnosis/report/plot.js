@@ -30,6 +30,9 @@ class Figure {
     return Figure.styles[role];
   }
 
+  // Dots where few enough samples are in view to tell them apart.
+  static mode(curve) { return curve.exact && curve.x.length <= 160 ? "lines+markers" : "lines"; }
+
   pixels() { return Math.max(200, this.element.clientWidth - 70); }
 
   // Curves of all rows for the current range, in the order of `traces`.
@@ -75,13 +78,13 @@ class Figure {
     const list = [], add = (i, role, name, unit, right, more) => {
       const s = Figure.style(role), d = curves[list.length];
       list.push({
-        type: "scatter", mode: "lines", x: d.x, y: d.y, name: Figure.text(name), connectgaps: false, xaxis: "x",
+        type: "scatter", mode: Figure.mode(d), marker: { size: 4 }, x: d.x, y: d.y, name: Figure.text(name), connectgaps: false, xaxis: "x",
         yaxis: right ? `y${100 + i}` : `y${i ? i + 1 : ""}`, line: { color: Figure.colour(s.colour), width: s.width, dash: s.dash || "solid" },
         hovertemplate: `%{y:.4~g} ${unit === "1" ? "" : Figure.text(unit)}<extra>${Figure.text(name)}</extra>`, ...more,
       });
     };
     this.rows.forEach((row, i) => {
-      if (row.band) add(i, "band", "95 % band", row.unit, false, { fill: "toself", opacity: 0.22, fillcolor: Figure.colour("accent"), hoverinfo: "skip", hovertemplate: null });
+      if (row.band) add(i, "band", "95 % band", row.unit, false, { fill: "toself", opacity: 0.22, fillcolor: Figure.colour("accent"), mode: "lines", hoverinfo: "skip", hovertemplate: null });
       if (row.threshold !== undefined) {
         add(i, "threshold", "+ threshold", row.unit, false);
         add(i, "threshold", "− threshold", row.unit, false);
@@ -97,6 +100,7 @@ class Figure {
     const peers = row.traces.filter((t) => t.role === "peer").map((t) => t.name);
     if (peers.length) entries.unshift([Figure.style("peer"), peers.join(", ")]);
     if (row.threshold !== undefined) entries.push([Figure.style("threshold"), "± threshold"]);
+    if (row.level !== undefined) entries.push([Figure.style("threshold"), `limit ${row.level}`]);
     const muted = Figure.colour("muted"), room = this.pixels() / 6.4, title = `${row.title} (${row.unit})`;
     let text = `<b>${Figure.text(row.title)}</b> (${Figure.text(row.unit)})`, used = title.length, lines = 1;
     for (const [s, n] of entries) {
@@ -134,6 +138,7 @@ class Figure {
         ...(row.limits ? { range: row.limits } : {}), ...(row.clip ? { autorangeoptions: { clipmin: row.clip[0], clipmax: row.clip[1] } } : {}),
       };
       if (row.rightUnit) layout[`yaxis${100 + i}`] = { overlaying: `y${i ? i + 1 : ""}`, side: "right", anchor: "x", showgrid: false, zeroline: false, fixedrange: true, nticks: 4, tickfont: { color: muted }, tickformat: ".3~g", title: { text: Figure.text(`${row.rightUnit.title} (${row.rightUnit.unit})`), font: { size: 11, color: muted }, standoff: 2 } };
+      if (row.level !== undefined) layout.shapes.push({ type: "line", xref: "paper", yref: `y${i ? i + 1 : ""}`, x0: 0, x1: 1, y0: row.level, y1: row.level, line: { color: Figure.colour("stuck"), width: 1.3, dash: "dash" } });
       layout.annotations.push({
         xref: "paper", yref: "paper", x: 0, y: top, yshift: 3, xanchor: "left", yanchor: "bottom", showarrow: false, align: "left", font: { size: 12 },
         text: headings[i].text,
@@ -152,6 +157,7 @@ class Figure {
         const yref = `y${i ? i + 1 : ""} domain`, box = { xref: "x", yref, x0, y0: 0, y1: 1 };
         layout.shapes.push({ ...box, type: "rect", x1, fillcolor: fill, opacity: s.main ? 0.15 : 0.09, line: { width: 0 }, layer: "below" });
         if (s.main) for (const x of [x0, x1]) layout.shapes.push({ ...box, type: "line", x0: x, x1: x, line: { color: fill, width: 1.2 } });
+        if (s.main && s.detected != null) layout.shapes.push({ ...box, type: "line", x0: s.detected, x1: s.detected, line: { color: Figure.colour("text"), width: 1.2, dash: "dash" } });
       }
       if (s.main || !rows.length || this.shades.length > 30) continue;
       layout.annotations.push({
@@ -214,11 +220,17 @@ class Figure {
       do {
         this.again = false;
         const target = [...this.range], curves = await this.fetch(target);
-        await Plotly.update(this.element, { x: curves.map((c) => c.x), y: curves.map((c) => c.y) }, { "xaxis.range": target });
+        await Plotly.update(this.element, this.restyled(curves), { "xaxis.range": target });
         this.curves = curves;
         this.label(curves);
       } while (this.again);
     } finally { this.busy = false; }
+  }
+
+  // Samples of the curves as Plotly.update takes them; areas stay without dots.
+  restyled(curves) {
+    const mode = this.element.data.map((d, i) => (d.fill ? "lines" : Figure.mode(curves[i])));
+    return { x: curves.map((c) => c.x), y: curves.map((c) => c.y), mode };
   }
 
   csv() {

@@ -46,8 +46,8 @@ def badge(state: str, x: float, y: float, size: float) -> Markup:
     ).format(state, x - size / 2, y - size / 2, size, size, size / 4, size * 0.2, size * 0.2, inner, _glyph(state))
 
 
-def _extremes(y: NDArray[np.floating], count: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Smallest and largest value in each of `count` stretches; NaN where a stretch is empty."""
+def extremes(y: NDArray[np.floating], count: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Smallest and largest value in each of `count` stretches of a series; NaN where a stretch is empty."""
     edges = np.linspace(0, len(y), count + 1).astype(int)
     starts = np.minimum(edges[:-1], len(y) - 1)
     low = np.fmin.reduceat(y.astype(np.float64), starts)
@@ -95,7 +95,7 @@ def thumbnail(
     last = min(len(measured), int((fault["stop_s"] + pad - start) / step) + 2)
     if last - first < 2:
         return Markup("")
-    curves = [_extremes(c[first:last], width - 2) for c in (commanded, measured) if c is not None]
+    curves = [extremes(c[first:last], width - 2) for c in (commanded, measured) if c is not None]
     values = np.concatenate([v[np.isfinite(v)] for pair in curves for v in pair])
     if not len(values):
         return Markup("")

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from diagnosis.report.edges import time_words
 from diagnosis.report.names import (
     FAULT_MODES,
     UNDECIDED,
@@ -18,8 +19,11 @@ from diagnosis.report.names import (
     state_label,
     utc,
 )
+from diagnosis.report.pair import tier_words
 from diagnosis.report.picture import judged_sides
 from diagnosis.report.timeline import kind_of
+
+_SHOWN = 0.001
 
 
 def machine_name(report: Mapping[str, Any]) -> str:
@@ -62,7 +66,7 @@ def context(report: Mapping[str, Any], duration: float) -> dict[str, Any]:
     state, words = VERDICTS.get(status, VERDICTS["not_assessed"])
     faults = [_fault(f) for f in report.get("intervals") or ()]
     modes = {f["id"]: f["mode"] for f in faults}
-    log = report.get("log") or {}
+    log, limit = report.get("log") or {}, (report.get("limits") or {}).get("min_probability")
     return {
         "machine": machine_name(report),
         "mission": " + ".join(f.get("path", "") for f in log.get("files") or ()) or "no log named",
@@ -87,6 +91,8 @@ def context(report: Mapping[str, Any], duration: float) -> dict[str, Any]:
         "tool": " ".join(str((report.get("tool") or {}).get(k, "")) for k in ("name", "version")).strip(),
         "schema": report.get("schema", ""),
         "undecided": UNDECIDED,
+        "open_loop": bool(log.get("open_loop")),
+        "min_percent": f"{100 * limit:g} %" if isinstance(limit, int | float) else "",
         "judged": any(judged_sides(report).values()),
     }
 
@@ -106,16 +112,32 @@ def _fault(fault: Mapping[str, Any]) -> dict[str, Any]:
         figures.append(("sat", sat_text(sat["mean"], unit), bounds))
         figures.append(("sat r.m.s.", sat_text(sat["rms"], unit), ""))
     p = fault.get("probability")
+    hypotheses = sorted(fault.get("hypotheses") or (), key=lambda h: -h["p"])
+    likely = max(1, sum(h["p"] >= _SHOWN for h in hypotheses))
     return {
         **fault,
         "advice": fault.get("advice") or "",
         "evidence": fault.get("evidence") or [],
-        "tier": {"direct": "a second measurement", "model": "the wheel model", "signal": "the channel alone"}.get(
-            fault.get("tier", ""), fault.get("tier", "")
+        "tier": tier_words(fault),
+        "delay": _delay(fault),
+        "likely": hypotheses[:likely],
+        "unlikely": ", ".join(
+            f"{state_label(h['mode'], h['side']).lower()} ({h['side']})" for h in hypotheses[likely:]
         ),
         "figures": figures,
         "percent": f"{100 * p:.1f} %" if p is not None else "–",
     }
+
+
+def _delay(fault: Mapping[str, Any]) -> str:
+    detected = fault.get("detected_s")
+    return (
+        ""
+        if detected is None
+        else "at once"
+        if detected <= fault["start_s"]
+        else "+" + time_words(detected - fault["start_s"])
+    )
 
 
 def _action(action: Mapping[str, Any], modes: Mapping[str, str]) -> dict[str, Any]:

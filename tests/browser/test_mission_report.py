@@ -2,109 +2,31 @@
 
 from __future__ import annotations
 
-import os
 import re
-import shutil
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-from diagnosis.report.page import build_page
 from tests import report_samples as samples
 
 playwright = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
 expect = playwright.expect
 
-ARGS = ["--no-sandbox", "--disable-gpu", "--disable-background-networking", "--no-first-run"]
-WATCH = (
-    "window.breaches = [];"
-    "document.addEventListener('securitypolicyviolation', e => breaches.push(e.violatedDirective + ' ' + e.blockedURI))"
-)
 OPEN = Callable[..., Any]
 SHOW = Callable[..., Any]
 
 
 @pytest.fixture(scope="module")
-def browser() -> Iterator[Any]:
-    chromium = os.environ.get("CHROMIUM") or shutil.which("chromium") or shutil.which("google-chrome")
-    if not chromium:
-        pytest.skip("no Chromium found; install it or set CHROMIUM to its path")
-    with playwright.sync_playwright() as p:
-        browser = p.chromium.launch(executable_path=chromium, args=ARGS)
-        yield browser
-        browser.close()
-
-
-@pytest.fixture(scope="module")
-def pages(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Path]:
-    folder = tmp_path_factory.mktemp("pages")
-
-    def written(name: str) -> Path:
-        path = folder / f"{name} # 1.html"
-        if not path.exists():
-            path.write_text(build_page(*getattr(samples, name)()), encoding="utf-8", newline="\n")
-        return path
-
-    return written
-
-
-class Watch:
-    """Opens pages offline and keeps what no page may do: errors, console messages, requests, breaches of the policy."""
-
-    def __init__(self, browser: Any, pages: Callable[[str], Path]) -> None:
-        self.browser, self.pages = browser, pages
-        self.contexts: list[Any] = []
-        self.wrong: list[str] = []
-
-    def open(
-        self, name: str, address: str = "", *, width: int = 1280, theme: str = "light", script: bool = True
-    ) -> Any:
-        context = self.browser.new_context(
-            viewport={"width": width, "height": 900}, color_scheme=theme, java_script_enabled=script, offline=True
-        )
-        self.contexts.append(context)
-        page = context.new_page()
-        page.add_init_script(WATCH)
-        page.on("pageerror", lambda e: self.wrong.append(f"error {e}"))
-        page.on("console", lambda m: self.wrong.append(f"console {m.type} {m.text}"))
-        url = self.pages(name).as_uri()
-        own = (url, "blob:")
-        page.on("request", lambda r: None if r.url.startswith(own) else self.wrong.append(r.url))
-        page.goto(url + address)
-        if script:
-            page.locator("html[data-ready]").wait_for(state="attached")
-        return page
-
-    def check(self) -> None:
-        for context in self.contexts:
-            for page in context.pages:
-                self.wrong += page.evaluate("window.breaches || []")
-        assert self.wrong == []
-
-    def close(self) -> None:
-        for context in self.contexts:
-            context.close()
-
-
-@pytest.fixture
-def open_page(browser: Any, pages: Callable[[str], Path]) -> Iterator[Callable[..., Any]]:
-    watch = Watch(browser, pages)
-    yield watch.open
-    watch.check()
-    watch.close()
-
-
-@pytest.fixture(scope="module")
-def watched(browser: Any, pages: Callable[[str], Path]) -> Iterator[tuple[Watch, Any]]:
-    watch = Watch(browser, pages)
+def watched(new_watch: Callable[[], Any]) -> Iterator[tuple[Any, Any]]:
+    watch = new_watch()
     yield watch, drawn(watch.open("five_faults"))
     watch.close()
 
 
 @pytest.fixture
-def show(watched: tuple[Watch, Any]) -> Iterator[Callable[[str], Any]]:
+def show(watched: tuple[Any, Any]) -> Iterator[Callable[[str], Any]]:
     """Brings the one open page with five faults to an address; opening it anew for each test would take a minute."""
     watch, page = watched
 
@@ -165,7 +87,7 @@ def test_hostile_names_stay_text(open_page: OPEN) -> None:
 
 def test_first_fault_is_shown_and_table_bars_wheels_and_actions_select_others(show: SHOW) -> None:
     page = show()
-    heading = page.locator(".evh:not([hidden]) h2")
+    heading = page.locator(".ev:not([hidden]) h2")
     expect(heading).to_have_text("F1 · FR speed sensor stuck at 0.21 m/s")
     for place, name in (
         ("tr.fault[data-f=F2] td.num", "F2"),
@@ -185,7 +107,7 @@ def test_wheel_can_be_chosen_from_the_keyboard(show: SHOW) -> None:
     page = show()
     page.locator(".machine .hit[data-f=F3]").focus()
     page.keyboard.press("Enter")
-    expect(page.locator(".evh:not([hidden]) h2")).to_have_text(re.compile("^F3 · "))
+    expect(page.locator(".ev:not([hidden]) h2")).to_have_text(re.compile("^F3 · "))
 
 
 def test_zoom_buttons_and_badge(show: SHOW) -> None:
@@ -249,7 +171,7 @@ def test_hover_names_the_curves(show: SHOW) -> None:
 
 def test_keys_and_help(show: SHOW) -> None:
     page = show()
-    heading = page.locator(".evh:not([hidden]) h2")
+    heading = page.locator(".ev:not([hidden]) h2")
     page.keyboard.press("j")
     expect(heading).to_have_text(re.compile("^F2 · "))
     page.keyboard.press("k")
@@ -277,9 +199,9 @@ def test_deep_link_and_change_of_address(open_page: OPEN) -> None:
     page = drawn(open_page("five_faults", "#fault=F3&t=44,46"))
     assert x_range(page) == [44.0, 46.0]
     page.evaluate("location.hash = '#fault=F2'")
-    expect(page.locator(".evh:not([hidden]) h2")).to_have_text(re.compile("^F2 · "))
+    expect(page.locator(".ev:not([hidden]) h2")).to_have_text(re.compile("^F2 · "))
     page.evaluate("location.hash = '#fault=nothing&t=x'")
-    expect(page.locator(".evh:not([hidden]) h2")).to_have_text(re.compile("^F2 · "))
+    expect(page.locator(".ev:not([hidden]) h2")).to_have_text(re.compile("^F2 · "))
 
 
 def test_csv_of_the_view(show: SHOW) -> None:
@@ -329,9 +251,9 @@ def test_lanes_without_faults_unfold(show: SHOW) -> None:
 
 def test_page_without_javascript(open_page: OPEN) -> None:
     page = open_page("five_faults", script=False)
-    expect(page.get_by_text("The plots need JavaScript;")).to_be_visible()
-    expect(page.locator("article.why")).to_have_count(5)
-    expect(page.locator("article.why").last).to_be_visible()
+    expect(page.get_by_text("The linked plots need JavaScript;")).to_be_visible()
+    expect(page.locator("article.ev")).to_have_count(5)
+    expect(page.locator("article.ev").last).to_be_visible()
     expect(page.get_by_role("button", name="CSV of view")).to_have_count(0)
 
 
@@ -339,6 +261,6 @@ def test_print_shows_every_fault_in_light_colours(open_page: OPEN) -> None:
     page = drawn(open_page("five_faults", theme="dark"))
     page.pdf(format="A4")
     page.emulate_media(media="print")
-    expect(page.locator("article.why").last).to_be_visible()
+    expect(page.locator("article.ev").last).to_be_visible()
     expect(page.locator("header.top")).to_be_hidden()
     assert page.locator("html").get_attribute("data-theme") == "dark"

@@ -103,7 +103,7 @@ def test_page_tells_everything_without_javascript() -> None:
     assert kinds.count("spark") == 5
     assert sum(k.startswith("fb ") for k in kinds) == 5
     assert sum(k.startswith("mark ") for k in kinds) == 5
-    assert "The plots need JavaScript" in tree.text
+    assert "The linked plots need JavaScript" in tree.text
 
 
 def test_hostile_names_are_shown_verbatim_and_inert() -> None:

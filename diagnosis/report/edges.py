@@ -1,0 +1,172 @@
+"""The samples around a fault's onset and end, and how far they lie off against the noise of the healthy side."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from diagnosis.report.names import number
+from diagnosis.report.pair import Pair, sides_of
+
+Array = NDArray[np.float64]
+
+_SAMPLES = 30
+_SECONDS = 0.05
+_MOST = 100
+_HEALTHY = 120
+_LEAST_HEALTHY = 8
+
+
+@dataclass(frozen=True)
+class Edge:
+    """Onset or end of one fault at the rate of the columns.
+
+    Attributes
+    ----------
+    name : str
+        ``onset`` or ``end``.
+    t : Array, shape (m,)
+        Time from the edge [s].
+    y, reference : Array, shape (m,)
+        Samples of the channel and of its reference, in the pair's unit; NaN where there is none.
+    at : float
+        Mission time of the edge [s].
+    step : float
+        Sample time [s].
+    gap : tuple[float, float] or None
+        Where the faulty sample next to the edge should have been and where it is.
+    most : float
+        Largest distance of a faulty sample of the window from where it should have been.
+    noise : float or None
+        Standard deviation on the healthy side; None where there are too few healthy samples.
+    """
+
+    name: str
+    t: Array
+    y: Array
+    reference: Array
+    at: float
+    step: float
+    gap: tuple[float, float] | None
+    most: float
+    noise: float | None
+
+    @property
+    def reach(self) -> float:
+        """Half of the window [s]."""
+        return float(max(-self.t[0], self.t[-1]))
+
+
+def edge_of(
+    name: str,
+    fault: Mapping[str, Any],
+    others: Sequence[Mapping[str, Any]],
+    pair: Pair,
+    columns: Mapping[str, NDArray[np.floating]],
+    axis: tuple[float, float],
+) -> Edge | None:
+    """Samples around the onset or end of a fault; None where the log holds no sample on one of its sides.
+
+    Parameters
+    ----------
+    name : str
+        ``onset`` or ``end``.
+    fault : Mapping[str, Any]
+        The fault.
+    others : Sequence[Mapping[str, Any]]
+        All faults of the mission, whose samples do not count as healthy.
+    pair : Pair
+        The fault's channel and reference.
+    columns : Mapping[str, NDArray[np.floating]], each of shape (n,)
+        Columns by name.
+    axis : tuple[float, float]
+        Time of the first sample and sample time [s].
+    """
+    start, step = axis
+    onset = name == "onset"
+    at = float(fault["start_s" if onset else "stop_s"])
+    size = len(columns[pair.measured])
+    place = round((at - start) / step)
+    half = min(_MOST, max(_SAMPLES, math.ceil(_SECONDS / step)))
+    first, last = max(0, place - half), min(size, place + half + 1)
+    if not first < place < last:
+        return None
+    wide = (max(0, place - _HEALTHY), place) if onset else (place, min(size, place + _HEALTHY))
+
+    def cut(column: str | None, a: int, b: int) -> Array:
+        return np.full(b - a, np.nan) if column is None else columns[column][a:b].astype(np.float64) * pair.scale
+
+    y, reference = cut(pair.measured, first, last), cut(pair.reference, first, last)
+    if not (np.isfinite(y[: place - first]).any() or np.isfinite(y[place - first :]).any()):
+        return None
+    calm = ~_faulty(wide, fault, others, axis)
+    healthy = cut(pair.measured, *wide) - (cut(pair.reference, *wide) if pair.reference else 0.0)
+    level, noise = _level(healthy[calm & np.isfinite(healthy)], onset, pair.reference is not None)
+    gap, most = None, math.nan
+    inside = slice(place - first, None) if onset else slice(None, place - first)
+    if level is not None:
+        right = reference[inside] + level if pair.reference else np.full(len(y[inside]), level)
+        off = y[inside] - right
+        use = np.flatnonzero(np.isfinite(off))
+        if use.size:
+            near = use[0] if onset else use[-1]
+            gap, most = (float(right[near]), float(y[inside][near])), float(np.abs(off[use]).max())
+    t = (np.arange(first, last, dtype=np.float64) - place) * step
+    return Edge(name, t, y, reference, at, step, gap, most, noise)
+
+
+def _faulty(
+    span: tuple[int, int], fault: Mapping[str, Any], others: Sequence[Mapping[str, Any]], axis: tuple[float, float]
+) -> NDArray[np.bool_]:
+    """Samples of a span that lie in any fault of the same part."""
+    start, step = axis
+    out = np.zeros(span[1] - span[0], dtype=np.bool_)
+    for other in others:
+        if other["component"] == fault["component"] and set(sides_of(other["side"])) & set(sides_of(fault["side"])):
+            a, b = (round((other[k] - start) / step) - span[0] for k in ("start_s", "stop_s"))
+            out[max(0, a) : max(0, b)] = True
+    return out
+
+
+def _level(healthy: Array, onset: bool, referred: bool) -> tuple[float | None, float | None]:
+    """Usual distance from the reference on the healthy side, and its standard deviation."""
+    if healthy.size < _LEAST_HEALTHY:
+        return None, None
+    if not referred:  # a channel alone wanders: only its last samples tell where it should go on
+        healthy = healthy[-_LEAST_HEALTHY:] if onset else healthy[:_LEAST_HEALTHY]
+    level = float(np.median(healthy))
+    noise = 1.4826 * float(np.median(np.abs(healthy - level))) or float(np.std(healthy))
+    return level, noise or None
+
+
+def edge_words(edge: Edge, pair: Pair) -> str:
+    """How far the samples at an edge lie off, against the noise."""
+    onset = edge.name == "onset"
+    if edge.gap is None:
+        where = "before" if onset else "after"
+        return f"Too few healthy samples {where} it to tell its noise."
+    which, window = ("First", "after") if onset else ("Last", "before")
+    gap = abs(edge.gap[1] - edge.gap[0])
+    text = f"{which} faulty sample off by {pair.text(gap)}{_times(gap, edge)}"
+    if edge.most > 1.5 * gap:
+        text += f", {time_words(edge.reach)} {window} by up to {pair.text(edge.most)}{_times(edge.most, edge)}"
+    if edge.noise is not None:
+        text += f"; σ of the healthy samples {'before' if onset else 'after'} it: {pair.text(edge.noise)}"
+    return text + "."
+
+
+def _times(value: float, edge: Edge) -> str:
+    if edge.noise is None:
+        return ""
+    ratio = value / edge.noise
+    return f" ({number(round(ratio)) if ratio >= 9.5 else number(ratio, 2)} σ)"
+
+
+def time_words(seconds: float) -> str:
+    """Short time in ms, else in s, to three digits."""
+    return f"{number(seconds * 1e3)} ms" if abs(seconds) < 1.0 else f"{number(seconds)} s"

@@ -1,0 +1,148 @@
+"""What the page shows of each fault beside the linked plots: on what it rests, its edges and its course."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from markupsafe import Markup
+from numpy.typing import NDArray
+
+from diagnosis.report.edges import edge_of, edge_words, time_words
+from diagnosis.report.names import clock, number
+from diagnosis.report.pair import Pair, pair_of, rests_on, shape_sentence
+from diagnosis.report.panels import course_picture, edge_picture
+
+Columns = Mapping[str, NDArray[np.floating]]
+
+_COURSES = 40
+_EDGES = 150
+
+
+@dataclass(frozen=True)
+class Panel:
+    """One small picture: heading, what stands beside it, the picture, a sentence below."""
+
+    title: str
+    unit: str
+    picture: Markup
+    words: str = ""
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """Everything of one fault that is drawn without JavaScript.
+
+    Attributes
+    ----------
+    rests : str
+        Kind of evidence and channels.
+    delay : str
+        When the fault would have been raised.
+    shape : str
+        What the onset's shape says; empty where nothing was said.
+    keys : tuple[tuple[str, str], ...]
+        Marks and what they stand for.
+    edges, course : tuple[Panel, ...]
+        Pictures of onset and end, and of the whole fault.
+    note : str
+        What keeps the pictures from showing every recorded sample.
+    """
+
+    rests: str
+    delay: str
+    shape: str
+    keys: tuple[tuple[str, str], ...]
+    edges: tuple[Panel, ...]
+    course: tuple[Panel, ...]
+    note: str
+
+
+def evidence_of(report: Mapping[str, Any], columns: Columns, axis: tuple[float, float]) -> dict[str, Evidence]:
+    """Evidence of all faults by their names; pictures for the first ones only.
+
+    Parameters
+    ----------
+    report : Mapping[str, Any]
+        The parsed ``report.json``.
+    columns : Mapping[str, NDArray[np.floating]], each of shape (n,)
+        Columns that hold samples.
+    axis : tuple[float, float]
+        Time of the first sample and sample time [s].
+    """
+    faults: Sequence[Mapping[str, Any]] = report.get("intervals") or ()
+    limit = (report.get("limits") or {}).get("min_probability")
+    rates = {s["name"]: s.get("rate_hz") for s in report.get("signals") or ()}
+    out = {}
+    for i, fault in enumerate(faults):
+        pair = pair_of(fault, columns)
+        edges = _edges(fault, faults, pair, columns, axis) if pair and i < _EDGES else ()
+        course = _course(fault, pair, columns, axis, limit) if pair and i < _COURSES else ()
+        keys = _keys(pair) if pair and edges else ()
+        note = _note(pair, rates, axis[1]) if pair and edges else ""
+        out[fault["id"]] = Evidence(
+            rests_on(fault, columns), delay_words(fault), shape_sentence(fault), keys, edges, course, note
+        )
+    return out
+
+
+def delay_words(fault: Mapping[str, Any]) -> str:
+    """When a causal reading of the same evidence would have raised a fault."""
+    detected = fault.get("detected_s")
+    if detected is None:
+        return "detection time not known"
+    delay = detected - fault["start_s"]
+    return f"detected {time_words(delay)} after onset" if delay > 0 else "detected at its first sample"
+
+
+def _keys(pair: Pair) -> tuple[tuple[str, str], ...]:
+    keys = [("smp", pair.measured)]
+    return (*keys, ("ref", f"{pair.reference} ({pair.words})")) if pair.reference else tuple(keys)
+
+
+def _note(pair: Pair, rates: Mapping[str, Any], step: float) -> str:
+    """Channels that are slower than the time axis: between their samples the last one stands."""
+    rate = 1.0 / step
+    slow = [n for n in (pair.measured, pair.reference) if n and (rates.get(n) or rate) < 0.75 * rate]
+    each = ", ".join(f"{n} came at {number(rates[n])} Hz" for n in slow)
+    return f"{each}; until its next sample the last one is shown at {number(rate)} Hz." if slow else ""
+
+
+def _edges(
+    fault: Mapping[str, Any],
+    faults: Sequence[Mapping[str, Any]],
+    pair: Pair,
+    columns: Columns,
+    axis: tuple[float, float],
+) -> tuple[Panel, ...]:
+    out = []
+    for name, key in (("onset", "start_s"), ("end", "stop_s")):
+        edge = edge_of(name, fault, faults, pair, columns, axis)
+        title = f"{name.capitalize()} at {clock(fault[key], 3)}"
+        if edge is None:
+            where = "begins with" if name == "onset" else "lasts to the end of"
+            out.append(Panel(title, "", Markup(""), f"The fault {where} the samples of {pair.measured}."))
+        else:
+            out.append(Panel(title, pair.unit, edge_picture(edge, fault), edge_words(edge, pair)))
+    return tuple(out)
+
+
+def _course(
+    fault: Mapping[str, Any], pair: Pair, columns: Columns, axis: tuple[float, float], limit: float | None
+) -> tuple[Panel, ...]:
+    """Channel against reference, residual against threshold, probability against its limit: those that exist."""
+    curves = {"r": columns[pair.reference]} if pair.reference else {}
+    curves["m"] = columns[pair.measured]
+    against = f", dashed the {pair.words}" if pair.reference else ""
+    out = [Panel(pair.title, pair.unit, course_picture(pair.title, fault, curves, axis, scale=pair.scale), against)]
+    if (residual := columns.get(pair.evidence + "residual")) is not None:
+        threshold = columns.get(pair.evidence + "threshold")
+        picture = course_picture("Residual", fault, {"m": residual}, axis, scale=pair.scale, threshold=threshold)
+        out.append(Panel("Residual", pair.unit, picture, ", band: ± threshold" if threshold is not None else ""))
+    if (probability := columns.get(pair.evidence + "probability")) is not None:
+        title = "Probability that it is not healthy"
+        picture = course_picture(title, fault, {"m": probability}, axis, level=limit, span=(-0.04, 1.04))
+        out.append(Panel(title, "", picture))
+    return tuple(p for p in out if p.picture)

@@ -1,0 +1,187 @@
+"""Small pictures of a fault's evidence that need no JavaScript: its edges sample by sample, and its course."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from markupsafe import Markup
+from numpy.typing import NDArray
+
+from diagnosis.report.edges import Edge, time_words
+from diagnosis.report.frame import Frame, label, limits
+from diagnosis.report.names import known, number
+from diagnosis.report.svg import extremes
+
+Array = NDArray[np.float64]
+
+_WIDTH = 360.0
+_EDGE_HEIGHT, _COURSE_HEIGHT = 176.0, 108.0
+_SCALES = 44.0
+_STRETCHES = 150
+
+
+def edge_picture(edge: Edge, fault: Mapping[str, Any]) -> Markup:
+    """Samples around one edge as dots, those of the reference as ticks, with the gap beside the noise at the right.
+
+    Parameters
+    ----------
+    edge : Edge
+        The samples.
+    fault : Mapping[str, Any]
+        One of the report's intervals.
+    """
+    span = limits(edge.y, edge.reference, np.array(edge.gap or ()), least=8 * (edge.noise or 0.0))
+    if span is None:
+        return Markup("")
+    frame = Frame(_WIDTH, _EDGE_HEIGHT, (float(edge.t[0]), float(edge.t[-1])), span, _SCALES if edge.gap else 8.0)
+    mode, onset = known(fault["mode"]), edge.name == "onset"
+    in_seconds = edge.reach >= 2.0
+    parts = [
+        frame.axes(*(("s", 1.0) if in_seconds else ("ms", 1e3))),
+        frame.shade(fault["start_s"] - edge.at, fault["stop_s"] - edge.at, mode),
+        frame.line(0.0, f"mk {mode}"),
+        label(float(frame.px(0.0)) + (-4 if onset else 4), frame.top - 5, edge.name, "fin" if onset else "beg"),
+        _detected(edge, fault, frame),
+        _marks(edge.t, edge.reference, frame, "ref", "v5", -2.5),
+        _marks(edge.t, edge.y, frame, "smp", "h0", 0.0),
+        _scales(edge, frame),
+    ]
+    return _picture(_EDGE_HEIGHT, f"Samples around the {edge.name} of {fault['id']}", parts)
+
+
+def _marks(t: Array, y: Array, frame: Frame, style: str, shape: str, down: float) -> Markup:
+    """One mark for each sample."""
+    use = np.isfinite(y)
+    if not use.any():
+        return Markup("")
+    places = zip(frame.px(t[use]), frame.py(y[use]) + down, strict=True)
+    return Markup('<path class="{}" d="{}"/>').format(style, "".join(f"M{a:.1f} {b:.1f}{shape}" for a, b in places))
+
+
+def _detected(edge: Edge, fault: Mapping[str, Any], frame: Frame) -> Markup:
+    """Line at the causal detection, or at the border a word that it came later."""
+    detected = fault.get("detected_s")
+    if detected is None:
+        return Markup("")
+    at, delay = detected - edge.at, detected - fault["start_s"]
+    words = f"detected +{time_words(delay)}"
+    if frame.x[0] <= at <= frame.x[1]:
+        place = float(frame.px(at))
+        return frame.line(at, "det") + label(place + 4, frame.top - 5, words, "beg b")
+    if edge.name == "onset" and at > 0:
+        return label(frame.right, frame.top - 5, words + " →", "fin b")
+    return Markup("")
+
+
+def _scales(edge: Edge, frame: Frame) -> Markup:
+    """Two rulers beside the samples: from where the faulty sample should have been to where it is, and ±σ there."""
+    if edge.gap is None:
+        return Markup("")
+    a, b = (float(v) for v in frame.py(np.array(edge.gap)))
+    x = frame.right + 11
+    parts = [
+        Markup('<path class="gap" d="M{:.1f} {:.1f}h-6m3 0V{:.1f}m-3 0h6"/>').format(x + 3, a, b),
+        label(x, frame.bottom + 14, "gap", "mid"),
+    ]
+    if edge.noise is not None:
+        low, high = (float(frame.py(edge.gap[0] + k * edge.noise)) for k in (-1, 1))
+        middle = (low + high) / 2
+        low, high = max(low, middle + 0.75), min(high, middle - 0.75)
+        parts += [
+            Markup('<rect class="sig" x="{:.1f}" y="{:.1f}" width="7" height="{:.1f}"/>').format(
+                x + 14, high, low - high
+            ),
+            label(x + 18, frame.bottom + 14, "±σ", "mid"),
+        ]
+    return Markup("").join(parts)
+
+
+def course_picture(
+    name: str,
+    fault: Mapping[str, Any],
+    curves: Mapping[str, NDArray[np.floating]],
+    axis: tuple[float, float],
+    *,
+    scale: float = 1.0,
+    threshold: NDArray[np.floating] | None = None,
+    level: float | None = None,
+    span: tuple[float, float] | None = None,
+) -> Markup:
+    """Some curves around one fault, as extremes per stretch.
+
+    Parameters
+    ----------
+    name : str
+        What is shown, for readers that do not see it.
+    fault : Mapping[str, Any]
+        One of the report's intervals.
+    curves : Mapping[str, NDArray[np.floating]], each of shape (n,)
+        Whole columns by the style of their line.
+    axis : tuple[float, float]
+        Time of the first sample and sample time [s].
+    scale : float
+        Factor from the columns' unit to the one shown.
+    threshold : NDArray[np.floating] or None, shape (n,)
+        Half the height of a band about zero.
+    level : float or None
+        Value of a dashed line.
+    span : tuple[float, float] or None
+        Range of values; None: all that occur.
+    """
+    start, step = axis
+    size = len(next(iter(curves.values())))
+    pad = max(0.5, 0.35 * (fault["stop_s"] - fault["start_s"]))
+    first = max(0, int((fault["start_s"] - pad - start) / step))
+    last = min(size, int((fault["stop_s"] + pad - start) / step) + 2)
+    if last - first < 2:
+        return Markup("")
+    count = min(_STRETCHES, last - first)
+    pairs = {k: tuple(v * scale for v in extremes(c[first:last], count)) for k, c in curves.items()}
+    band = None if threshold is None else extremes(threshold[first:last], count)[1] * scale
+    values = [v for pair in pairs.values() for v in pair] + ([] if band is None else [band, -band])
+    found = span or limits(*values)
+    if found is None:
+        return Markup("")
+    frame = Frame(_WIDTH, _COURSE_HEIGHT, (start + first * step, start + last * step), found)
+    t = start + (first + (np.arange(count) + 0.5) * (last - first) / count) * step
+    parts = [frame.axes("s"), frame.shade(fault["start_s"], fault["stop_s"], known(fault["mode"]))]
+    if band is not None:
+        parts.append(_band(t, band, frame))
+    parts += [_curve(t, low, high, frame, style) for style, (low, high) in pairs.items()]
+    if level is not None:
+        y = float(frame.py(level))
+        parts.append(Markup('<path class="lim" d="M{:.1f} {:.1f}H{:.1f}"/>').format(frame.left, y, frame.right))
+        parts.append(label(frame.right, y + 11, f"limit {number(level)}", "fin"))
+    return _picture(_COURSE_HEIGHT, f"{name} around {fault['id']}", parts)
+
+
+def _curve(t: Array, low: Array, high: Array, frame: Frame, style: str) -> Markup:
+    """Line through the extremes of each stretch, broken where a stretch is empty."""
+    out, pen = [], "M"
+    for x, a, b in zip(frame.px(t), frame.py(low), frame.py(high), strict=True):
+        if not np.isfinite(a):
+            pen = "M"
+            continue
+        out.append(f"{pen}{x:.1f} {a:.1f}" + (f"V{b:.1f}" if abs(a - b) >= 0.1 or pen == "M" else ""))
+        pen = "L"
+    return Markup('<path class="{}" d="{}"/>').format(style, "".join(out))
+
+
+def _band(t: Array, half: Array, frame: Frame) -> Markup:
+    """Area within the threshold, in one piece for each stretch of time that has one."""
+    edges = np.flatnonzero(np.diff(np.r_[False, np.isfinite(half), False].astype(np.int8)))
+    out = []
+    for a, b in zip(edges[::2], edges[1::2], strict=True):
+        x, top, low = frame.px(t[a:b]), frame.py(half[a:b]), frame.py(-half[a:b])
+        upper = "L".join(f"{p:.1f} {q:.1f}" for p, q in zip(x, top, strict=True))
+        lower = "L".join(f"{p:.1f} {q:.1f}" for p, q in zip(x[::-1], low[::-1], strict=True))
+        out.append(f"M{upper}L{lower}Z")
+    return Markup('<path class="band" d="{}"/>').format("".join(out))
+
+
+def _picture(height: float, name: str, parts: list[Markup]) -> Markup:
+    return Markup('<svg class="panel" viewBox="0 0 {:.0f} {:.0f}" role="img" aria-label="{}">{}</svg>').format(
+        _WIDTH, height, name, Markup("").join(parts)
+    )
