@@ -19,7 +19,7 @@ from replay.drive_model import EchoModel
 Array = NDArray[np.float64]
 
 _MEMORIES = np.geomspace(0.1, 12.0, 19)  # integral times that are tried [s]
-_LEADS = range(-1, 9)
+_MOST_LEAD_S = 0.1
 _TAPS = 3
 _SETTLE_S = 0.6  # from this much of a stretch the controller's state before it is found
 _LEAST_S = 4.0
@@ -122,24 +122,24 @@ def identify_echo(records: Sequence[DriveRecord]) -> EchoModel | None:
     target = np.concatenate([y - r for y, r, _ in parts])
     every = max(1, target.size // _MOST_SAMPLES)
 
-    def fitted(memory: float, leads: range) -> tuple[float, Array, Array]:
-        design, error = _regression(parts, memory, dt, leads)
-        theta = _robust(design[::every], error[::every])
-        rest = error - design @ theta
-        return _spread(rest), theta, rest
+    def fitted(memory: float, first: int) -> tuple[float, Array]:
+        design, error = _regression(parts, memory, dt, range(first, first + _TAPS), every)
+        theta = _robust(design, error)
+        return _spread(error - design @ theta), theta
 
     best: tuple[float, float, int] | None = None
     for memory in _MEMORIES:
-        _, theta, _ = fitted(float(memory), _LEADS)
-        first = _LEADS[int(np.argmax(np.abs(theta[: len(_LEADS)])))] - _TAPS // 2
-        spread, _, _ = fitted(float(memory), range(first, first + _TAPS))
+        first = _lead(parts, float(memory), dt, every) - _TAPS // 2
+        spread, _ = fitted(float(memory), first)
         if best is None or spread < best[0]:
             best = spread, float(memory), first
     assert best is not None
     _, memory, first = best
-    _, theta, _ = fitted(memory, range(first, first + _TAPS))
+    _, theta = fitted(memory, first)
     memory, unsure = _integral_time(parts, theta[:_TAPS], first, dt) or (memory, _UNSURE * memory)
-    _, theta, rest = fitted(memory, range(first, first + _TAPS))
+    _, theta = fitted(memory, first)
+    design, error = _regression(parts, memory, dt, range(first, first + _TAPS), 1)
+    rest = error - design @ theta
     noise = window_size(rest, dt)
     if not 0 < noise**2 < (1 - _LEAST_EXPLAINED) * window_size(target, dt) ** 2:
         return None
@@ -212,15 +212,27 @@ def _exact_share(rest: Array, noise: float) -> tuple[float, float]:
     return share, core
 
 
+def _lead(parts: Sequence[tuple[Array, Array, Array]], memory: float, dt: float, every: int) -> int:
+    """Steps by which the effort answers later than the speed: where the high-passed effort opposes it most."""
+    leads = range(-1, max(8, round(_MOST_LEAD_S / dt)) + 1)
+    total = np.zeros(len(leads))
+    for y, r, u in parts:
+        h, e = high_passed(u, memory, dt), (y - r)[::every]
+        e = np.clip(e - np.median(e), -3 * _spread(e), 3 * _spread(e))
+        total += [float(_led(h, k)[::every] @ e) for k in leads]
+    return leads[int(np.argmin(total))]
+
+
 def _regression(
-    parts: Sequence[tuple[Array, Array, Array]], memory: float, dt: float, leads: range
+    parts: Sequence[tuple[Array, Array, Array]], memory: float, dt: float, leads: range, every: int
 ) -> tuple[Array, Array]:
     """Design and target of e = v − r on the high-passed effort; the state before each stretch is projected out."""
     designs, targets = [], []
     for y, r, u in parts:
         h = high_passed(u, memory, dt)
-        design = np.column_stack([*(_led(h, k) for k in leads), high_passed(r, memory, dt), y - r])
-        fade = _fading(y.size, memory, dt)
+        columns = [*(_led(h, k) for k in leads), high_passed(r, memory, dt), y - r]
+        design = np.column_stack([c[::every] for c in columns])
+        fade = _fading(y.size, memory, dt)[::every]
         fade /= np.sqrt(float(fade @ fade))
         design -= np.outer(fade, fade @ design)
         designs.append(design[:, :-1])

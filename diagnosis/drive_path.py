@@ -22,7 +22,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from diagnosis.modes import BLIND, HEALTHY, INEFFICIENT, NO_SIGNAL, NOISY, PAIR, SILENT, SKIP, STUCK
+from diagnosis.modes import BLIND, HEALTHY, INEFFICIENT, NO_SIGNAL, NOISY, PAIR, SILENT, SKIP, STAY, STUCK
 
 Array = NDArray[np.float64]
 
@@ -119,7 +119,7 @@ def emission(m, y, x, slack, last, status, quiet, row, eps, half, bias, added, p
 
 @njit(cache=True)
 def _scan_rows(y, x, slack, last, status, quiet, row, eps, half, bias, added, p, score, back, lead):  # type: ignore[no-untyped-def]
-    """Viterbi over the states; `back` holds where a state was entered from, −1 where it stayed; `lead` fault − healthy."""
+    """Viterbi over the states; `back` holds where a state was entered from, `STAY` where it went on; `lead` fault − healthy."""
     states = score.size
     for k in range(y.size):
         if status[k] == SKIP:
@@ -155,7 +155,7 @@ def _trace(back, state):  # type: ignore[no-untyped-def]
     path = np.empty(back.shape[0], dtype=np.int16)
     for k in range(back.shape[0] - 1, -1, -1):
         path[k] = state
-        if back[k, state] >= 0:
+        if back[k, state] != STAY:
             state = back[k, state]
     return path
 
@@ -200,7 +200,7 @@ def forward(
     quiet: NDArray[np.bool_],
     model: RowModel,
     state: RowState,
-) -> tuple[NDArray[np.int16], Array, RowState]:
+) -> tuple[NDArray[np.uint8], Array, RowState]:
     """Run the recursion over one block.
 
     Parameters
@@ -220,14 +220,14 @@ def forward(
 
     Returns
     -------
-    back : NDArray[np.int16], shape (n, states)
-        Where a state was entered from; −1 where it went on.
+    back : NDArray[np.uint8], shape (n, states)
+        Where a state was entered from; `STAY` where it went on.
     lead : Array, shape (n,)
         Score of the best faulty state minus that of the healthy one, by what was known at each step.
     state : RowState
         For the next block.
     """
-    back = np.full((y.size, STATES), -1, dtype=np.int16)
+    back = np.full((y.size, STATES), STAY, dtype=np.uint8)
     lead = np.zeros(y.size)
     score = state.score.copy()
     last = _before(y, status, state.last)

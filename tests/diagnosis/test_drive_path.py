@@ -58,7 +58,7 @@ def test_the_scan_is_viterbis_recursion() -> None:
             assert lead[k] == pytest.approx(score[1:].max() - score[0])
             last = float(y[k])
     assert state.score - state.score.max() == pytest.approx(score - score.max())
-    assert (back[status == modes.SKIP] == -1).all()
+    assert (back[status == modes.SKIP] == modes.STAY).all()
 
 
 @pytest.mark.parametrize("cut", [1, 57, 140, 299])
