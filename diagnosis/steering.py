@@ -14,7 +14,7 @@ from diagnosis.steering_blocks import SensorNoise, SteeringBlocks, blocks_of, se
 from diagnosis.steering_filter import SteeringPath, allowed_models, most_probable
 from diagnosis.steering_findings import judge_side
 from diagnosis.steering_model import model_of
-from diagnosis.steering_onset import refined
+from diagnosis.steering_onset import refined, refined_valve
 from diagnosis.steering_plant import SteeringPlant, identify_plants
 from diagnosis.steering_second import with_position, with_second_angle
 from diagnosis.steering_states import BLIND_ROWS, REASONS, states_of
@@ -92,6 +92,7 @@ class _Axle:
     command: Array
     blocks: SteeringBlocks | None
     noise: SensorNoise
+    off: Array | None
     measured: str
 
     @property
@@ -112,7 +113,7 @@ class _Axle:
         if u is None or not np.isfinite(u).any():
             u = replay.steer_u[:, j]
         measured = "phi" if "phi" in have else "phi_true"
-        blocks, noise = None, SensorNoise(1.0, 1.0, 0.0, 0.0)
+        blocks, noise, off = None, SensorNoise(1.0, 1.0, 0.0, 0.0), None
         if measured in have and np.isfinite(u).any():
             channel = f"steer.{name}.{measured}"
             y, fresh = timeline.signals[channel], timeline.fresh[channel]
@@ -124,8 +125,8 @@ class _Axle:
                 blocks = with_second_angle(blocks, y, timeline.signals[true], timeline.fresh[true], timeline.dt)
             if {"u", "u_applied"} <= have:
                 spool = f"steer.{name}.u_applied"
-                blocks = with_position(blocks, u, timeline.signals[spool], timeline.fresh[spool], timeline.dt)
-        return cls(name, timeline, dict(counts), have, u, blocks, noise, measured)
+                blocks, off = with_position(blocks, u, timeline.signals[spool], timeline.fresh[spool], timeline.dt)
+        return cls(name, timeline, dict(counts), have, u, blocks, noise, off, measured)
 
     def channel(self, leaf: str) -> str:
         """Canonical name."""
@@ -181,6 +182,8 @@ def _by_model(
         side: [refined(j.finding, y, fresh, axle.noise, blocks.length) for j in found if j.finding is not None]
         for side, found in judged.items()
     }
+    if axle.off is not None:
+        findings[Side.ACTUATOR] = [refined_valve(f, axle.off, blocks.length) for f in findings[Side.ACTUATOR]]
     masked = (
         []
         if axle.twice

@@ -14,6 +14,37 @@ from replay.faults import FaultMode, Side
 Array = NDArray[np.float64]
 
 _JUMP = 6.0
+_OFF, _FOLLOWING = 4.0, 10
+
+
+def refined_valve(finding: Finding, off: Array, length: int) -> Finding:
+    """Move a valve fault's ends, known to a block, to the samples in which its position leaves and meets its command.
+
+    Parameters
+    ----------
+    finding : Finding
+        With ends on blocks.
+    off : Array, shape (n,)
+        Position less command as multiples of its noise; see `diagnosis.steering_second.with_position`.
+    length : int
+        Samples per block.
+    """
+    if finding.side is not Side.ACTUATOR:
+        return finding
+    reach = 5 * length + 2
+    start = _first_off(off, finding.start, reach)
+    stop = off.size - _first_off(off[::-1], off.size - finding.stop, reach) if finding.stop < off.size else off.size
+    return replace(finding, start=start, stop=stop) if start < stop else finding
+
+
+def _first_off(off: Array, place: int, reach: int) -> int:
+    """First sample near `place` that is off and is followed by more of them; `place` where there is none."""
+    a, b = max(0, place - reach), min(off.size, place + reach)
+    large = np.abs(np.nan_to_num(off[a : b + _FOLLOWING])) > _OFF
+    ahead = np.convolve(np.abs(np.nan_to_num(off[a : b + _FOLLOWING])) > _OFF / 2, np.ones(_FOLLOWING), mode="full")
+    lasting = ahead[_FOLLOWING - 1 :][: large.size] >= 0.6 * _FOLLOWING
+    found = np.flatnonzero((large & lasting)[: b - a])
+    return a + int(found[0]) if found.size else place
 
 
 def refined(finding: Finding, y: Array, fresh: NDArray[np.bool_], noise: SensorNoise, length: int) -> Finding:

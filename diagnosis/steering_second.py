@@ -45,7 +45,9 @@ def with_second_angle(blocks: SteeringBlocks, y: Array, true: Array, fresh: Flag
     return replace(blocks, second=second)
 
 
-def with_position(blocks: SteeringBlocks, u: Array, position: Array, fresh: Flags, dt: float) -> SteeringBlocks:
+def with_position(
+    blocks: SteeringBlocks, u: Array, position: Array, fresh: Flags, dt: float
+) -> tuple[SteeringBlocks, Array]:
     """Add the valve's position: its mean beside the command's, and how much of the command's changes it follows.
 
     The second says whether a valve obeys even where only the sensor's noise moves its command.
@@ -60,10 +62,18 @@ def with_position(blocks: SteeringBlocks, u: Array, position: Array, fresh: Flag
         Steps with a new position.
     dt : float
         Step [s].
+
+    Returns
+    -------
+    SteeringBlocks
+        With the position.
+    Array, shape (n,)
+        Position less command, at the command's time, as multiples of its healthy noise; NaN where unknown.
     """
     use = fresh & np.isfinite(u) & np.isfinite(position)
     most = max(1, round(_MAX_LAG_S / dt)) if dt <= _MAX_LAG_S else 0
-    command = shifted(u, relative_lag(position, u, use, 0, most))
+    lag = relative_lag(position, u, use, 0, most)
+    command = shifted(u, lag)
     known = use & np.isfinite(command)
     off = np.where(known, position - command, 0.0)
     power = max(_white(off[known]), 1e-8)
@@ -89,7 +99,8 @@ def with_position(blocks: SteeringBlocks, u: Array, position: Array, fresh: Flag
         if _SHARE_RANGE[0] < float(np.median(share[windows[1] > 0])) < _SHARE_RANGE[1]:
             second[lively, 4] = together[lively] / changes[lively]
             second[lively, 5] = power / changes[lively]
-    return replace(blocks, second=second)
+    off = shifted(np.where(known, off / np.sqrt(power), np.nan), -round(lag))
+    return replace(blocks, second=second), off
 
 
 def _means(x: Array, known: Flags, blocks: SteeringBlocks) -> tuple[Array, Array]:
