@@ -69,7 +69,7 @@ driving_speed = 20.0
 FOLDERS = {"healthy": "healthy_mode", "D": "manual_d_mode", "N": "manual_n_mode", "V": "mc-generated_v_mode"}
 ROWS = (State.HEALTHY, State.STUCK, State.NO_SIGNAL, State.INEFFICIENT, State.NOISY)
 EPSILONS = (0.3, 0.1, 0.05, 0.03)
-SAT, SAT_STD = 200.0, 100.0
+SAT = (200.0, 100.0, 0.0)
 LONGEST_S = 8.0
 CAUSAL_S = 0.5
 
@@ -116,12 +116,12 @@ def longest(data: DriveData) -> slice:
     return max(stretches(np.isfinite(data.y), 2), key=lambda s: s.stop - s.start)
 
 
-def faults_of(epsilon: float, start: float, stop: float) -> Iterator[FaultSpec]:
+def faults_of(epsilon: float, start: float, stop: float, sat: tuple[float, float, float]) -> Iterator[FaultSpec]:
     """One fault per row of the table; stuck and no signal have ε = 1."""
     yield FaultSpec("M", Side.SENSOR, FaultMode.STUCK, start, stop, 1.0, float("nan"))
     yield FaultSpec("M", Side.SENSOR, FaultMode.NO_SIGNAL, start, stop, 1.0, 0.0)
     yield FaultSpec("M", Side.SENSOR, FaultMode.INEFFICIENT, start, stop, epsilon, 0.0)
-    yield FaultSpec("M", Side.SENSOR, FaultMode.NOISY, start, stop, epsilon, SAT, SAT_STD)
+    yield FaultSpec("M", Side.SENSOR, FaultMode.NOISY, start, stop, epsilon, *sat)
 
 
 def confusion(assessment: Assessment, data: DriveData, fault: FaultSpec | None, dt: float) -> Array:
@@ -151,7 +151,7 @@ def poisson_bound(count: int, hours: float) -> float:
     return float(chi2.ppf(0.95, 2 * count + 2) / 2 / hours)
 
 
-def injected(part: str, machine: Machine, model: DriveModel | None) -> None:
+def injected(part: str, machine: Machine, model: DriveModel | None, sat: tuple[float, float, float]) -> None:
     """Print the scores of faults written into healthy runs."""
     total = {e: np.zeros((len(ROWS), len(ROWS) + 1)) for e in EPSILONS}
     delays: dict[tuple[float, str], list[float]] = {}
@@ -177,7 +177,7 @@ def injected(part: str, machine: Machine, model: DriveModel | None) -> None:
         start = round(stretch.start + 0.4 * (stretch.stop - stretch.start)) * data.dt
         stop = start + min(LONGEST_S, 0.35 * length)
         for epsilon in EPSILONS:
-            for fault in faults_of(epsilon, start, stop):
+            for fault in faults_of(epsilon, start, stop, sat):
                 hard = fault.epsilon == 1.0
                 faulty = inject_signals(signals, [fault], machine, number)[0]
                 now, _ = drive_of(faulty, machine, model)
@@ -300,11 +300,19 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--part", choices=("tuning", "reporting"), default="reporting")
     parser.add_argument("--without-model", action="store_true", help="find the echo in each run instead of by fit")
+    parser.add_argument(
+        "--sat",
+        type=float,
+        nargs=3,
+        default=SAT,
+        metavar=("MEAN", "STD", "TAU_S"),
+        help="saturation term of noisy sensors",
+    )
     args = parser.parse_args()
     machine = rig()
     model = fit(machine)
     print(f"model: {model}")
-    injected(args.part, machine, None if args.without_model else model)
+    injected(args.part, machine, None if args.without_model else model, tuple(args.sat))
     own_faults(args.part, machine, model)
 
 
