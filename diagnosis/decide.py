@@ -29,17 +29,18 @@ _UNEXPLAINED_S = 0.5
 _SHORT_NOISE_S = 1.0
 
 
-def severity_of(finding: Finding, seconds: float, limits: Limits) -> tuple[Severity, str]:
-    """Severity and advice of one fault; see the module's docstring."""
+def severity_of(finding: Finding, seconds: float, limits: Limits, kind: str = "wheel") -> tuple[Severity, str]:
+    """Severity and advice of one fault of a ``wheel`` or a ``steer`` axle; see the module's docstring."""
     faulty = 1.0 - sum(h.p for h in finding.hypotheses if h.mode == "healthy")
     if faulty < limits.min_probability:
         return "info", "Not certain enough to act on. Compare with the next mission."
     if finding.mode is FaultMode.NOISY and finding.tier == "model" and seconds < _SHORT_NOISE_S:
-        return "info", "Too short to act on: the wheel model alone shows it. Compare with the next mission."
+        return "info", "Too short to act on: a model alone shows it. Compare with the next mission."
     if finding.mode in GONE and finding.side is Side.ACTUATOR:
         return "high", "Stop at once and repair: the valve does not answer its command (Assumption 2)."
     if finding.mode in GONE and finding.side is Side.SENSOR_OR_ACTUATOR:
-        return "high", "Stop and find out whether the drive or its sensor fails; treat it as the drive until then."
+        part = "steering valve" if kind == "steer" else "drive"
+        return "high", f"Stop and find out whether the {part} or its sensor fails; treat it as the {part} until then."
     if finding.mode in GONE:
         if seconds <= limits.brief:
             return "low", (
@@ -56,7 +57,8 @@ def severity_of(finding: Finding, seconds: float, limits: Limits) -> tuple[Sever
             "Check scaling and sign of the channel: its gain lies outside what a fault of the table can give.",
         )
     if finding.side is Side.SENSOR:
-        what = "gap, magnet and scaling" if finding.mode is FaultMode.INEFFICIENT else "shield, ground and supply"
+        scaling = "wire, mount and scaling" if kind == "steer" else "gap, magnet and scaling"
+        what = scaling if finding.mode is FaultMode.INEFFICIENT else "shield, ground and supply"
         return severity, f"May go out; check the sensor's {what}."
     if finding.side is Side.ACTUATOR:
         what = (
@@ -65,7 +67,10 @@ def severity_of(finding: Finding, seconds: float, limits: Limits) -> tuple[Sever
             else "command wiring and pilot"
         )
         return severity, f"May go out; check the valve's {what}."
-    return severity, "May go out; measure speed and valve travel to tell sensor from valve."
+    return (
+        severity,
+        f"May go out; measure {'angle' if kind == 'steer' else 'speed'} and valve travel to tell sensor from valve.",
+    )
 
 
 def intervals_of(
@@ -77,7 +82,7 @@ def intervals_of(
         kind = "steer" if component in axles else "wheel"
         for f in assessment.findings:
             seconds = (f.stop - f.start) * step_ns * 1e-9
-            severity, advice = severity_of(f, seconds, limits)
+            severity, advice = severity_of(f, seconds, limits, kind)
             found[component, f.side.value, f.start, f.stop] = FaultInterval(
                 id="",
                 component=component,

@@ -72,7 +72,8 @@ def with_position(
     """
     use = fresh & np.isfinite(u) & np.isfinite(position)
     most = max(1, round(_MAX_LAG_S / dt)) if dt <= _MAX_LAG_S else 0
-    lag = relative_lag(position, u, use, 0, most)
+    lag = _jitter_lag(position, u, use, most)
+    lag = relative_lag(position, u, use, 0, most) if lag is None else lag
     command = shifted(u, lag)
     known = use & np.isfinite(command)
     off = np.where(known, position - command, 0.0)
@@ -101,6 +102,19 @@ def with_position(
             second[lively, 5] = power / changes[lively]
     off = shifted(np.where(known, off / np.sqrt(power), np.nan), -round(lag))
     return replace(blocks, second=second), off
+
+
+def _jitter_lag(position: Array, u: Array, use: Flags, most: int) -> float | None:
+    """Delay [steps] at which the position's changes from sample to sample follow the command's; None where none do."""
+    du = np.diff(np.where(use, u, 0.0), prepend=0.0)
+    dp = np.diff(np.where(use, position, 0.0), prepend=0.0)
+    limit = 10 * float(np.median(np.abs(du))) + 1e-12  # the small jitter of a healthy sensor, not jumps
+    du[np.abs(du) > limit] = 0.0
+    inner = dp[most:] * (np.abs(dp[most:]) < 10 * float(np.median(np.abs(dp))) + 1e-12)
+    together = np.array([float(inner @ du[most - k : du.size - k]) for k in range(most + 1)])
+    scale = float(np.sqrt((inner @ inner) * (du @ du) / max(inner.size, 1)))
+    best = int(np.argmax(together))
+    return float(best) if scale > 0 and together[best] > 8 * scale else None
 
 
 def _means(x: Array, known: Flags, blocks: SteeringBlocks) -> tuple[Array, Array]:
