@@ -19,7 +19,7 @@ from diagnosis.drive_echo import DriveRecord, echoed_speed, identify_echo, windo
 from diagnosis.drive_effort import load_findings
 from diagnosis.drive_load import LoadTrack, track_load
 from diagnosis.drive_rows import EchoPair, find_rows
-from diagnosis.modes import BLIND, PAIR
+from diagnosis.modes import BLIND, PAIR, SILENT
 from diagnosis.noise import moving_sum, rounding_step
 from diagnosis.pairs import sample_status
 from replay.drive_model import DriveModel, EchoModel
@@ -31,6 +31,7 @@ Array = NDArray[np.float64]
 _NOISE_RANGE = (0.7, 1.5)
 _STEP_RANGE = 0.1
 _QUIET = 0.4
+_NOTHING = 1e-9
 _SLOW_S, _SLACK = 0.5, 0.03
 _LEAST_NOISE = 2e-3  # of the span: no echo is believed beyond that
 
@@ -82,8 +83,12 @@ class DriveData:
 
     @property
     def record(self) -> DriveRecord:
-        """The channels without their circumstances; an effort at its limit echoes nothing."""
-        free = np.abs(np.nan_to_num(self.u)) < 0.99 * self.u_max
+        """The channels without their circumstances.
+
+        An effort at its limit echoes nothing, nor does a controller that is off: no effort where nothing is commanded.
+        """
+        off = (np.abs(self.u) <= _NOTHING * self.u_max) & (np.abs(self.command) <= _NOTHING * self.span)
+        free = (np.abs(np.nan_to_num(self.u)) < 0.99 * self.u_max) & ~off
         return DriveRecord(self.y, self.command, np.where(free, self.u, np.nan), self.dt)
 
 
@@ -125,7 +130,8 @@ def assess_drive(data: DriveData, limits: Limits) -> tuple[Assessment, Assessmen
         load = track_load(clean, model.effort, limits.driving_speed)
     loaded = np.ones(data.y.size) if load is None else load.sampled(load.probability, data.y.size)
     states = np.where(quiet, CODE[State.NOT_EXCITED], CODE[State.HEALTHY]).astype(np.int8)
-    states[~known & (pair.status != 2)] = CODE[State.NO_DATA]
+    states[~known & ~quiet & np.isfinite(data.y)] = CODE[State.NOT_ASSESSED]  # the effort is at its limit
+    states[~np.isfinite(data.y) & (pair.status != SILENT)] = CODE[State.NO_DATA]
     actuator = states.copy()
     if not data.open_loop:
         states[(states == CODE[State.HEALTHY]) & ~(loaded < 0.5)] = CODE[State.NOT_ASSESSED]
@@ -148,7 +154,7 @@ def assess_drive(data: DriveData, limits: Limits) -> tuple[Assessment, Assessmen
     reasons = {
         State.NOT_EXCITED: "the drive is neither commanded nor moving",
         State.MASKED: "the speed sensor that would show it delivers nothing usable",
-        State.NO_DATA: "no samples, or an effort at its limit",
+        State.NO_DATA: "no samples",
         State.NOT_ASSESSED: "no effort of healthy missions to compare with"
         if load is None
         else "the drive takes more effort than healthy missions did; a sensor that reads low would look the same",
