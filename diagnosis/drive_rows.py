@@ -149,8 +149,8 @@ def _finding(run: Run, pair: EchoPair, model: RowModel, limits: Limits, lead: Ar
     evidence = np.array([by_state[i == ROW].max() for i in range(len(modes.ROWS))])
     row = run.row
     if row in _SOFT:
-        if seconds < _SHORTEST_SOFT_S or y.size < 5:
-            return None
+        if np.count_nonzero(status == modes.PAIR) < max(5, _SHORTEST_SOFT_S / pair.dt):
+            return None  # too little of it has an echo beside it
         row = modes.NOISY if evidence[modes.NOISY] > evidence[modes.INEFFICIENT] else modes.INEFFICIENT
     elif use.any() and y.size < _SHORTEST_HARD:
         return None

@@ -155,11 +155,11 @@ def test_lost_samples_are_no_data_and_a_silent_channel_is_no_signal(model: Drive
 def test_a_controller_that_is_switched_off_and_on_raises_nothing(model: DriveModel) -> None:
     data = mission(80, model=model)
     y, command, u = data.y.copy(), data.command.copy(), data.u.copy()
-    command[600:800], u[600:800] = 0.0, 0.0
+    command[600:800], u[602:800] = 0.0, 0.0  # the effort follows its command
     y[600:800] = y[599] * np.exp(-np.arange(200) * DT / 0.3)  # the drive runs out
     sensor, actuator = assess_drive(drive(y, command, u, model), LIMITS)
     assert sensor.findings == actuator.findings == ()
-    assert share(sensor, State.NOT_EXCITED, slice(600, 800)) == 1.0
+    assert share(sensor, State.NOT_EXCITED, slice(602, 800)) == 1.0
 
 
 def test_the_side_of_an_onset_is_open_where_a_jump_could_be_overlooked() -> None:
