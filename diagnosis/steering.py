@@ -28,6 +28,8 @@ Array = NDArray[np.float64]
 Key = tuple[str, str]
 Counts = Mapping[str, NDArray[np.int16]]
 
+_TOLERANCE = 0.15  # of the smallest saturation term: what two healthy angle sensors may differ by
+
 
 @dataclass(frozen=True)
 class SteeringResult:
@@ -122,7 +124,14 @@ class _Axle:
             noise = sensor_noise(blocks, y[fresh & np.isfinite(y)], known, machine.max_steer)
             if {"phi", "phi_true"} <= have:
                 true = f"steer.{name}.phi_true"
-                blocks = with_second_angle(blocks, y, timeline.signals[true], timeline.fresh[true], timeline.dt)
+                blocks = with_second_angle(
+                    blocks,
+                    y,
+                    timeline.signals[true],
+                    timeline.fresh[true],
+                    timeline.dt,
+                    _TOLERANCE * machine.limits.min_sat,
+                )
             if {"u", "u_applied"} <= have:
                 spool = f"steer.{name}.u_applied"
                 blocks, off = with_position(blocks, u, timeline.signals[spool], timeline.fresh[spool], timeline.dt)

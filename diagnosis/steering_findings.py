@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -53,11 +53,24 @@ def judge_side(side: Side, data: SteeringData, path: SteeringPath, limits: Limit
     """Judge every faulty run of one side."""
     rows = path.sensor if side is Side.SENSOR else path.actuator
     rows = np.where(rows == ss.DRIFT, ss.NOISY, rows)
-    out = []
+    out: list[Judged] = []
     for a, b, row in runs_of(rows):
-        if row != ss.OK:
-            out.append(_judge(side, a, b, row, data, path, limits))
+        if row == ss.OK:
+            continue
+        one = _judge(side, a, b, row, data, path, limits)
+        last = out[-1] if out else None
+        if last is not None and last.stop == a and _same(last.finding, one.finding):
+            longer = max(last, one, key=lambda j: j.stop - j.start)
+            assert longer.finding is not None
+            finding = replace(longer.finding, start=last.start * data.blocks.length, stop=b * data.blocks.length)
+            out[-1] = Judged(side, last.start, b, longer.row, finding)
+        else:
+            out.append(one)
     return out
+
+
+def _same(a: Finding | None, b: Finding | None) -> bool:
+    return a is not None and b is not None and (a.side, a.mode) == (b.side, b.mode)
 
 
 def _alternatives(

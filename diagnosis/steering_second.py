@@ -18,7 +18,9 @@ _SHARE_RANGE = (0.85, 1.15)
 _LEAST_CHANGES = 4
 
 
-def with_second_angle(blocks: SteeringBlocks, y: Array, true: Array, fresh: Flags, dt: float) -> SteeringBlocks:
+def with_second_angle(
+    blocks: SteeringBlocks, y: Array, true: Array, fresh: Flags, dt: float, tolerance: float
+) -> SteeringBlocks:
     """Add a second measurement of the angle.
 
     Parameters
@@ -31,6 +33,8 @@ def with_second_angle(blocks: SteeringBlocks, y: Array, true: Array, fresh: Flag
         Steps with a new second angle.
     dt : float
         Step [s].
+    tolerance : float
+        What two healthy instruments may differ by [rad].
     """
     use = fresh & np.isfinite(y) & np.isfinite(true)
     most = max(1, round(_MAX_LAG_S / dt)) if dt <= _MAX_LAG_S else 0
@@ -41,7 +45,7 @@ def with_second_angle(blocks: SteeringBlocks, y: Array, true: Array, fresh: Flag
     slow = np.nan_to_num(slow_mismatch(moved - y, use & np.isfinite(moved), dt))
     second = blocks.second.copy()
     second[:, 0] = np.where(count > 0, mean, np.nan)
-    second[:, 1] = power / np.maximum(count, 1) + max(slow**2 - power, 0.0) + 0.1 * power
+    second[:, 1] = power / np.maximum(count, 1) + max(slow**2 - power, 0.0) + tolerance**2
     return replace(blocks, second=second)
 
 
