@@ -233,13 +233,14 @@ def _by_prefix(data: DriveData, machine: Machine, start: float) -> bool:
     return any(f.stop * data.dt > start for f in sensor.findings)
 
 
-def labels_of(path: Path, timeline: Timeline) -> NDArray[np.str_]:
-    """Label of every step: H, D, N or V."""
+def labels_of(path: Path, timeline: Timeline) -> tuple[NDArray[np.str_], Array]:
+    """Label of every step, H, D, N or V, and the setting of its damper: 15 is normal, less is more load."""
     frame = pd.read_csv(path, skipinitialspace=True)
     stamps = np.round(frame["Rel Time"].to_numpy(dtype=float) * 1e6).astype(np.int64)
     at = np.round(timeline.t * 1e9).astype(np.int64) + timeline.step_ns // 2 + stamps[0]
     latest = np.clip(np.searchsorted(stamps, at, side="right") - 1, 0, None)
-    return np.asarray(frame["Multi-class Sublevel Mode"].str.strip().to_numpy(dtype=str)[latest])
+    label = frame["Multi-class Sublevel Mode"].str.strip().to_numpy(dtype=str)
+    return np.asarray(label[latest]), frame["D-mode attribute"].to_numpy(dtype=float)[latest]
 
 
 def auroc(faulty: Array, healthy: Array) -> float:
@@ -252,19 +253,33 @@ def own_faults(part: str, machine: Machine, model: DriveModel) -> None:
     """Print how well the extra load tells the rig's own faults from healthy steps."""
     if model.effort is None:
         sys.exit("the healthy runs give no effort map")
-    steps: list[tuple[str, str, str, float, float]] = []
+    steps: list[tuple[str, str, str, float, float, float]] = []
+    runs, flagged = 0, []
     for kind in FOLDERS:
         for path in files_of(kind, part):
             data, timeline = drive_of(read_signals([path], machine)[1], machine, model)
             load = track_load(data.record, model.effort, machine.limits.driving_speed)
-            labels = labels_of(path, timeline)
+            labels, damper = labels_of(path, timeline)
+            if kind != "healthy":
+                runs += 1
+                sensor, _ = assess_drive(data, machine.limits)
+                flagged += [path.name for f in sensor.findings if f.side is Side.SENSOR]
             for k in np.flatnonzero(np.isfinite(load.level)):
                 inside = slice(k * load.length, (k + 1) * load.length)
                 if len(set(labels[inside])) == 1:
                     excess = float(np.nanmean(data.u[inside])) - model.effort.offset
                     excess -= model.effort.slope * float(np.nanmean(data.y[inside]))
-                    steps.append((kind, str(labels[inside][0]), path.name, float(load.level[k]), excess))
-    table = pd.DataFrame(steps, columns=["kind", "label", "run", "load", "excess"])
+                    steps.append(
+                        (
+                            kind,
+                            str(labels[inside][0]),
+                            path.name,
+                            float(load.level[k]),
+                            excess,
+                            float(damper[inside].mean()),
+                        )
+                    )
+    table = pd.DataFrame(steps, columns=["kind", "label", "run", "load", "excess", "damper"])
     healthy = table[table.kind == "healthy"]
     every = table[table.label == "H"]
     # told: the excess over the mean of the run's own healthy steps, where the run has any
@@ -286,6 +301,14 @@ def own_faults(part: str, machine: Machine, model: DriveModel) -> None:
         f"in {bare.run.nunique()} runs damped throughout ({len(bare)} steps): {auroc(bare.load.to_numpy(), healthy.load.to_numpy()):.3f}; "
         f"a reader told each run's healthy effort, where it has any: {auroc(damped.told.to_numpy(), table.told[healthy.index].to_numpy()):.3f}"
     )
+    for low, high in ((0, 6), (6, 9), (9, 15)):
+        rows = damped[(damped.damper > low) & (damped.damper <= high)]
+        if len(rows):
+            print(
+                f"  D, damper at {low + 1} to {high}: {len(rows)} steps; {auroc(rows.load.to_numpy(), healthy.load.to_numpy()):.3f}, "
+                f"told {auroc(rows.told.to_numpy(), table.told[healthy.index].to_numpy()):.3f}"
+            )
+    print(f"  the sensor is blamed in {len(set(flagged))} of these {runs} runs {sorted(set(flagged)) or ''}")
     for run, rows in damped.groupby("run"):
         print(
             f"    {run}: {len(rows)} steps, mean extra load {rows.load.mean():.2f}, mean excess over the map {rows.excess.mean():+.2f}"
