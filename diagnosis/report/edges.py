@@ -20,6 +20,7 @@ _SECONDS = 0.05
 _MOST = 100
 _HEALTHY = 120
 _LEAST_HEALTHY = 8
+_COURSE = 30
 
 
 @dataclass(frozen=True)
@@ -102,21 +103,22 @@ def edge_of(
         return np.full(b - a, np.nan) if column is None else columns[column][a:b].astype(np.float64) * pair.scale
 
     y, reference = cut(pair.measured, first, last), cut(pair.reference, first, last)
+    inside = slice(place - first, None) if onset else slice(None, place - first)
     if not (np.isfinite(y[: place - first]).any() or np.isfinite(y[place - first :]).any()):
         return None
-    calm = ~_faulty(wide, fault, others, axis)
-    healthy = cut(pair.measured, *wide) - (cut(pair.reference, *wide) if pair.reference else 0.0)
-    level, noise = _level(healthy[calm & np.isfinite(healthy)], onset, pair.reference is not None)
-    gap, most = None, math.nan
-    inside = slice(place - first, None) if onset else slice(None, place - first)
-    if level is not None:
-        right = reference[inside] + level if pair.reference else np.full(len(y[inside]), level)
-        off = y[inside] - right
-        use = np.flatnonzero(np.isfinite(off))
-        if use.size:
-            near = use[0] if onset else use[-1]
-            gap, most = (float(right[near]), float(y[inside][near])), float(np.abs(off[use]).max())
     t = (np.arange(first, last, dtype=np.float64) - place) * step
+    wide_t = (np.arange(*wide, dtype=np.float64) - place) * step
+    healthy = cut(pair.measured, *wide) - (cut(pair.reference, *wide) if pair.apart else 0.0)
+    use = np.isfinite(healthy) & ~_faulty(wide, fault, others, axis)
+    gap, most, noise = None, math.nan, None
+    if np.count_nonzero(use) >= _LEAST_HEALTHY:
+        course, noise = _course(wide_t[use], healthy[use], t[inside], onset, pair.apart)
+        right = course + (reference[inside] if pair.apart else 0.0)
+        off = y[inside] - right
+        seen = np.flatnonzero(np.isfinite(off))
+        if seen.size:
+            near = seen[0] if onset else seen[-1]
+            gap, most = (float(right[near]), float(y[inside][near])), float(np.abs(off[seen]).max())
     return Edge(name, t, y, reference, at, step, gap, most, noise)
 
 
@@ -133,15 +135,21 @@ def _faulty(
     return out
 
 
-def _level(healthy: Array, onset: bool, referred: bool) -> tuple[float | None, float | None]:
-    """Usual distance from the reference on the healthy side, and its standard deviation."""
-    if healthy.size < _LEAST_HEALTHY:
-        return None, None
-    if not referred:  # a channel alone wanders: only its last samples tell where it should go on
-        healthy = healthy[-_LEAST_HEALTHY:] if onset else healthy[:_LEAST_HEALTHY]
-    level = float(np.median(healthy))
-    noise = 1.4826 * float(np.median(np.abs(healthy - level))) or float(np.std(healthy))
-    return level, noise or None
+def _course(t: Array, healthy: Array, at: Array, onset: bool, apart: bool) -> tuple[Array, float | None]:
+    """Where healthy samples would go on, and their standard deviation about that.
+
+    Against a reference that the fault leaves as it is: at their usual distance; else along the line through the
+    nearest ones.
+    """
+    if apart:
+        level = float(np.median(healthy))
+        course, rest = np.full(at.size, level), healthy - level
+    else:
+        near = slice(-_COURSE, None) if onset else slice(None, _COURSE)
+        slope, level = np.polyfit(t[near], healthy[near], 1)
+        course, rest = slope * at + level, healthy[near] - (slope * t[near] + level)
+    noise = 1.4826 * float(np.median(np.abs(rest))) or float(np.std(rest))
+    return course, noise if noise > 1e-12 else None
 
 
 def edge_words(edge: Edge, pair: Pair) -> str:
@@ -152,7 +160,8 @@ def edge_words(edge: Edge, pair: Pair) -> str:
         return f"Too few healthy samples {where} it to tell its noise."
     which, window = ("First", "after") if onset else ("Last", "before")
     gap = abs(edge.gap[1] - edge.gap[0])
-    text = f"{which} faulty sample off by {pair.text(gap)}{_times(gap, edge)}"
+    off = f"off the {pair.words}" if pair.apart else "off the course before it" if onset else "off the course after it"
+    text = f"{which} faulty sample {off} by {pair.text(gap)}{_times(gap, edge)}"
     if edge.most > 1.5 * gap:
         text += f", {time_words(edge.reach)} {window} by up to {pair.text(edge.most)}{_times(edge.most, edge)}"
     if edge.noise is not None:
@@ -164,7 +173,9 @@ def _times(value: float, edge: Edge) -> str:
     if edge.noise is None:
         return ""
     ratio = value / edge.noise
-    return f" ({number(round(ratio)) if ratio >= 9.5 else number(ratio, 2)} σ)"
+    return (
+        f" ({number(round(ratio)) if ratio >= 9.5 else number(ratio, 2)} σ{', within the noise' if ratio < 3 else ''})"
+    )
 
 
 def time_words(seconds: float) -> str:

@@ -11,18 +11,19 @@ from numpy.typing import NDArray
 
 from diagnosis.report.names import number
 
-_LEFT, _TOP, _BOTTOM = 46.0, 17.0, 21.0
+_LEFT, _BOTTOM = 46.0, 21.0
 
 
 @dataclass(frozen=True)
 class Frame:
-    """Rectangle of a picture: its size in the picture, and the values at its borders."""
+    """Rectangle of a picture: size of the picture, values at the borders, room at the right and above."""
 
     width: float
     height: float
     x: tuple[float, float]
     y: tuple[float, float]
     margin: float = 8.0
+    top: float = 6.0
 
     @property
     def left(self) -> float:
@@ -33,11 +34,6 @@ class Frame:
     def right(self) -> float:
         """Place of the right border."""
         return self.width - self.margin
-
-    @property
-    def top(self) -> float:
-        """Place of the upper border."""
-        return _TOP
 
     @property
     def bottom(self) -> float:

@@ -33,6 +33,8 @@ class Pair:
         Columns.
     words : str
         What the reference is.
+    apart : bool
+        Whether the reference is recorded apart from the channel, so that a fault leaves it as it is.
     unit : str
         Unit of the values shown.
     scale : float
@@ -45,6 +47,7 @@ class Pair:
     measured: str
     reference: str | None
     words: str
+    apart: bool
     unit: str
     scale: float
     evidence: str
@@ -86,7 +89,9 @@ def pair_of(fault: Mapping[str, Any], columns: Mapping[str, Any]) -> Pair | None
     own = f"{group}.{c}."
     if by_valve(fault, columns):
         reference = own + "u" if own + "u" in columns else None
-        return Pair("Valve position", own + "u_applied", reference, "command", VALVE_UNIT, 1.0, base)
+        return Pair(
+            "Valve position", own + "u_applied", reference, "command", reference is not None, VALVE_UNIT, 1.0, base
+        )
     if own + leaf not in columns:
         return None
     choices = [
@@ -98,7 +103,8 @@ def pair_of(fault: Mapping[str, Any], columns: Mapping[str, Any]) -> Pair | None
         choices.insert(0, (f"{own}{leaf}_true", "second measurement"))
     reference, words = next(((name, words) for name, words in choices if name in columns), (None, ""))
     unit, scale = ("°", DEGREES) if steer else ("m/s", 1.0)
-    return Pair("Steering angle" if steer else "Wheel speed", own + leaf, reference, words, unit, scale, base)
+    title, apart = "Steering angle" if steer else "Wheel speed", reference == f"{own}{leaf}_true"
+    return Pair(title, own + leaf, reference, words, apart, unit, scale, base)
 
 
 def tier_words(fault: Mapping[str, Any]) -> str:

@@ -17,7 +17,8 @@ from diagnosis.report.svg import extremes
 Array = NDArray[np.float64]
 
 _WIDTH = 360.0
-_EDGE_HEIGHT, _COURSE_HEIGHT = 176.0, 108.0
+_EDGE_HEIGHT, _COURSE_HEIGHT = 176.0, 98.0
+_HEAD = 17.0
 _SCALES = 44.0
 _STRETCHES = 150
 
@@ -35,7 +36,8 @@ def edge_picture(edge: Edge, fault: Mapping[str, Any]) -> Markup:
     span = limits(edge.y, edge.reference, np.array(edge.gap or ()), least=8 * (edge.noise or 0.0))
     if span is None:
         return Markup("")
-    frame = Frame(_WIDTH, _EDGE_HEIGHT, (float(edge.t[0]), float(edge.t[-1])), span, _SCALES if edge.gap else 8.0)
+    room = _SCALES if edge.gap else 8.0
+    frame = Frame(_WIDTH, _EDGE_HEIGHT, (float(edge.t[0]), float(edge.t[-1])), span, room, _HEAD)
     mode, onset = known(fault["mode"]), edge.name == "onset"
     in_seconds = edge.reach >= 2.0
     parts = [
@@ -66,7 +68,7 @@ def _detected(edge: Edge, fault: Mapping[str, Any], frame: Frame) -> Markup:
     if detected is None:
         return Markup("")
     at, delay = detected - edge.at, detected - fault["start_s"]
-    words = f"detected +{time_words(delay)}"
+    words = f"detected +{time_words(delay)}" if delay > 0 else "detected at once"
     if frame.x[0] <= at <= frame.x[1]:
         place = float(frame.px(at))
         return frame.line(at, "det") + label(place + 4, frame.top - 5, words, "beg b")

@@ -205,3 +205,40 @@ def test_own_bundle_of_plotly(tmp_path: Path) -> None:
     assert re.search(r"<dt>plotly\.js</dt><dd>9\.8\.7</dd>", text)
     with pytest.raises(ConfigError, match="cannot be read"):
         build_page(report, columns, plotlyjs=tmp_path / "none.js")
+
+
+def test_injected_faults_are_announced_above_the_verdict() -> None:
+    report, columns = samples.one_wheel()
+    report["log"]["open_loop"] = True
+    text = build_page(report, columns)
+    assert text.index('class="banner"') < text.index('id="verdict"')
+    report["log"]["open_loop"] = False
+    assert 'class="banner"' not in build_page(report, columns)
+
+
+def test_table_and_evidence_tell_the_delay_and_what_a_fault_rests_on() -> None:
+    report, columns = samples.one_wheel()
+    report["intervals"][0] |= {"detected_s": 30.25, "tier": "signal", "evidence": ["wheel.drive.v stood still."]}
+    words = " ".join(Tree(build_page(report, columns)).text.split())
+    assert "detected +250 ms" in words
+    assert "detected 250 ms after onset" in words
+    assert "Rests on channel alone: wheel.drive.v" in words
+
+
+def test_unlikely_explanations_are_named_without_a_bar() -> None:
+    report, columns = samples.one_wheel()
+    report["intervals"][0]["hypotheses"] = [
+        {"side": "sensor", "mode": "stuck", "p": 0.9995},
+        {"side": "sensor", "mode": "noisy", "p": 1e-300},
+    ]
+    text = build_page(report, columns)
+    assert "Below 0.1 %: noisy (sensor)." in text
+    assert text.count('<b class="noisy"') == 0
+    assert "--limit:90%" in text
+
+
+def test_cells_of_stacked_tables_carry_their_headings() -> None:
+    report, columns = samples.one_wheel()
+    text = build_page(report, columns)
+    assert '<th scope="row" data-h="Wheel">drive</th>' in text
+    assert '<td data-h="Check">' in text

@@ -1,0 +1,98 @@
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from diagnosis.report.edges import Edge, edge_of, edge_words, time_words
+from diagnosis.report.pair import Pair, pair_of
+
+STEP = 0.005
+FAULT = {"component": "FR", "kind": "wheel", "side": "sensor", "tier": "direct", "start_s": 5.0, "stop_s": 6.0}
+
+
+def log(*, second: bool) -> dict[str, np.ndarray[Any, Any]]:
+    """A speed with noise of 0.01 m/s that lacks 0.5 m/s from 5 s to 6 s."""
+    rng = np.random.default_rng(3)
+    t = np.arange(2000) * STEP
+    v = 1.0 + 0.01 * rng.standard_normal(t.size)
+    v[1000:1200] -= 0.5
+    return {"wheel.FR.v": v, **({"wheel.FR.v_true": np.ones(t.size)} if second else {})}
+
+
+def edge(name: str, columns: dict[str, Any], *others: dict[str, Any], **changes: Any) -> tuple[Edge | None, Pair]:
+    fault = {**FAULT, **changes}
+    pair = pair_of(fault, columns)
+    assert pair is not None
+    return edge_of(name, fault, [fault, *others], pair, columns, (0.0, STEP)), pair
+
+
+@pytest.mark.parametrize("second", [True, False])
+@pytest.mark.parametrize(("name", "words"), [("onset", "First faulty sample off the"), ("end", "Last faulty sample")])
+def test_a_jump_is_measured_against_the_noise(second: bool, name: str, words: str) -> None:
+    found, pair = edge(name, log(second=second))
+    assert found is not None
+    assert found.gap is not None
+    assert found.gap[0] - found.gap[1] == pytest.approx(0.5, abs=0.04)
+    assert found.noise == pytest.approx(0.01, rel=0.4)
+    assert edge_words(found, pair).startswith(words)
+    assert "within the noise" not in edge_words(found, pair)
+
+
+def test_window_holds_thirty_samples_or_fifty_milliseconds_on_each_side() -> None:
+    columns = log(second=True)
+    found, _ = edge("onset", columns)
+    assert found is not None
+    np.testing.assert_allclose(found.t[[0, 30, -1]], [-0.15, 0.0, 0.15], atol=1e-12)
+    np.testing.assert_array_equal(found.y, columns["wheel.FR.v"][970:1031])
+    pair = pair_of(FAULT, columns)
+    assert pair is not None
+    fast = edge_of("onset", {**FAULT, "start_s": 1.0, "stop_s": 1.2}, [], pair, columns, (0.0, 0.001))
+    assert fast is not None
+    assert fast.reach == pytest.approx(0.05)
+
+
+def test_a_bend_starts_within_the_noise() -> None:
+    columns = log(second=True)
+    columns["wheel.FR.v"][1000:1200] += 0.5 * np.exp(-np.arange(200) / 100)
+    found, pair = edge("onset", columns)
+    assert found is not None
+    assert "within the noise), 150 ms after by up to" in edge_words(found, pair)
+
+
+def test_lost_samples_stay_lost() -> None:
+    columns = log(second=True)
+    columns["wheel.FR.v"][1000:1003] = np.nan
+    found, _ = edge("onset", columns)
+    assert found is not None
+    assert np.isnan(found.y[30:33]).all()
+    assert found.gap is not None
+
+
+def test_samples_of_another_fault_do_not_count_as_healthy() -> None:
+    before = {**FAULT, "start_s": 4.0, "stop_s": 5.0}
+    found, pair = edge("onset", log(second=True), before)
+    assert found is not None
+    assert (found.gap, found.noise) == (None, None)
+    assert edge_words(found, pair) == "Too few healthy samples before it to tell its noise."
+    other_wheel, _ = edge("onset", log(second=True), {**before, "component": "RL"})
+    assert other_wheel is not None
+    assert other_wheel.noise is not None
+
+
+def test_a_fault_to_the_end_of_the_log_has_no_end() -> None:
+    assert edge("end", log(second=True), stop_s=10.0)[0] is None
+    assert edge("onset", log(second=True), start_s=0.0)[0] is None
+
+
+def test_a_constant_before_has_no_noise() -> None:
+    columns = {"wheel.FR.v": np.r_[np.ones(1000), np.zeros(1000)]}
+    found, pair = edge("onset", columns)
+    assert found is not None
+    assert found.noise is None
+    assert edge_words(found, pair) == "First faulty sample off the course before it by 1 m/s."
+
+
+def test_times() -> None:
+    assert [time_words(s) for s in (0.005, -0.02, 1.25)] == ["5 ms", "−20 ms", "1.25 s"]
