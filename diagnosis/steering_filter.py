@@ -7,10 +7,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from diagnosis import steering_rows as sr
 from diagnosis import steering_scan as ss
 from diagnosis.modes import PAIR, STAY, trace
 from diagnosis.steering_blocks import SteeringBlocks
 from diagnosis.steering_model import SteeringModel
+from diagnosis.steering_step import enter
 
 Array = NDArray[np.float64]
 
@@ -42,30 +44,30 @@ class SteeringPath:
     @property
     def sensor(self) -> NDArray[np.int64]:
         """Row of the sensor."""
-        return np.asarray(ss.SENSOR[self.model])
+        return np.asarray(sr.SENSOR[self.model])
 
     @property
     def actuator(self) -> NDArray[np.int64]:
         """Row of the valve."""
-        return np.asarray(ss.ACTUATOR[self.model])
+        return np.asarray(sr.ACTUATOR[self.model])
 
 
 def allowed_models(*, sensor: bool, actuator: bool, twice: bool) -> NDArray[np.bool_]:
     """Models that leave a side healthy which is not judged here, and combine more where something is measured twice."""
-    rows = ((ss.SENSOR == ss.OK) | sensor) & ((ss.ACTUATOR == ss.OK) | actuator)
-    return np.asarray(rows & ((np.arange(ss.MODELS) < ss.SECOND) | twice))
+    rows = ((sr.SENSOR == sr.OK) | sensor) & ((sr.ACTUATOR == sr.OK) | actuator)
+    return np.asarray(rows & ((np.arange(sr.MODELS) < sr.SECOND) | twice))
 
 
 def start_state(first: float, p: Array) -> tuple[Array, Array, Array, Array]:
     """Scores, means, covariances and noise before the first block of a mission that may begin with a fault."""
-    score = np.full(ss.MODELS, -0.5 * p[15])
+    score = np.full(sr.MODELS, -0.5 * p[15])
     score[0] = 0.0
-    z, P = np.zeros((ss.MODELS, ss.STATES)), np.zeros((ss.MODELS, ss.STATES, ss.STATES))
-    ig = np.ones((ss.MODELS, 2))
-    for m in range(ss.MODELS):
+    z, P = np.zeros((sr.MODELS, sr.STATES)), np.zeros((sr.MODELS, sr.STATES, sr.STATES))
+    ig = np.ones((sr.MODELS, 2))
+    for m in range(sr.MODELS):
         z[m, 0] = np.clip(first, -p[4], p[4])
         P[m, 0, 0], P[m, 1, 1] = p[4] ** 2, (0.2 * p[3]) ** 2
-        ss.enter(m, m, p, z, P, ig)
+        enter(m, m, p, z, P, ig)
     return score, z, P, ig
 
 
@@ -88,7 +90,7 @@ def most_probable(
     p = model.packed()
     score, z, P, ig = start_state(_first(blocks), p)
     score[~allowed] = -1e12
-    back = np.full((blocks.mean.size, ss.MODELS), STAY, dtype=np.uint8)
+    back = np.full((blocks.mean.size, sr.MODELS), STAY, dtype=np.uint8)
     b = blocks
     ss.scan(b.mean, b.power, b.count, driven, b.u, b.status, b.second, allowed, p, score, z, P, ig, back)
     path, _ = trace(back, int(np.argmax(score)))
@@ -98,7 +100,7 @@ def most_probable(
 def follow_path(blocks: SteeringBlocks, driven: Array, model: SteeringModel, path: NDArray[np.uint8]) -> SteeringPath:
     """States along a given path."""
     size = path.size
-    mean, cov = np.zeros((size, ss.STATES)), np.zeros((size, ss.STATES, ss.STATES))
+    mean, cov = np.zeros((size, sr.STATES)), np.zeros((size, sr.STATES, sr.STATES))
     noise = np.ones((size, 2))
     b = blocks
     ss.follow(

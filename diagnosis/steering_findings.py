@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from diagnosis import steering_scan as ss
+from diagnosis import steering_rows as sr
 from diagnosis.assessment import Finding
 from diagnosis.modes import PAIR
 from diagnosis.result import Epsilon, Hypothesis, Sat
@@ -20,11 +20,11 @@ Array = NDArray[np.float64]
 Path = NDArray[np.uint8]
 
 MODES = {
-    ss.STUCK: FaultMode.STUCK,
-    ss.NONE: FaultMode.NO_SIGNAL,
-    ss.GAIN: FaultMode.INEFFICIENT,
-    ss.NOISY: FaultMode.NOISY,
-    ss.DRIFT: FaultMode.NOISY,
+    sr.STUCK: FaultMode.STUCK,
+    sr.NONE: FaultMode.NO_SIGNAL,
+    sr.GAIN: FaultMode.INEFFICIENT,
+    sr.NOISY: FaultMode.NOISY,
+    sr.DRIFT: FaultMode.NOISY,
 }
 _TEMPER = 0.35
 _MOST = 0.6
@@ -43,19 +43,19 @@ class Judged:
 
 def model_number(sensor: int, actuator: int, *, twice: bool) -> int:
     """Model that combines two rows; -1 where there is none. Behind a dead sensor a valve is seen only if measured."""
-    if sensor in (ss.STUCK, ss.NONE) and not twice:
-        actuator = ss.OK
-    found = np.flatnonzero((sensor == ss.SENSOR) & (actuator == ss.ACTUATOR))
+    if sensor in (sr.STUCK, sr.NONE) and not twice:
+        actuator = sr.OK
+    found = np.flatnonzero((sensor == sr.SENSOR) & (actuator == sr.ACTUATOR))
     return int(found[0]) if found.size else -1
 
 
 def judge_side(side: Side, data: SteeringData, path: SteeringPath, limits: Limits) -> list[Judged]:
     """Judge every faulty run of one side."""
     rows = path.sensor if side is Side.SENSOR else path.actuator
-    rows = np.where(rows == ss.DRIFT, ss.NOISY, rows)
+    rows = np.where(rows == sr.DRIFT, sr.NOISY, rows)
     out: list[Judged] = []
     for a, b, row in runs_of(rows):
-        if row == ss.OK:
+        if row == sr.OK:
             continue
         one = _judge(side, a, b, row, data, path, limits)
         last = out[-1] if out else None
@@ -81,30 +81,30 @@ def _alternatives(
     A valve stuck closed is one without control signal.
     """
     path = known.model
-    sensor, actuator = ss.SENSOR[path[a:b]], ss.ACTUATOR[path[a:b]]
-    other_free = bool(np.mean((actuator if side is Side.SENSOR else sensor) == ss.OK) > 0.5)
+    sensor, actuator = sr.SENSOR[path[a:b]], sr.ACTUATOR[path[a:b]]
+    other_free = bool(np.mean((actuator if side is Side.SENSOR else sensor) == sr.OK) > 0.5)
     out: dict[tuple[str, int], float] = {}
     trial = path.copy()
     for name, rows in ((Side.SENSOR, range(6)), (Side.ACTUATOR, range(1, 5))):
         if name is not side and not other_free:
             continue
         for row in rows:
-            if row == ss.OK or name is side:
+            if row == sr.OK or name is side:
                 pairs = [(row, ac) if side is Side.SENSOR else (s, row) for s, ac in zip(sensor, actuator, strict=True)]
             else:
-                pairs = [(row, ss.OK) if name is Side.SENSOR else (ss.OK, row)] * (b - a)
+                pairs = [(row, sr.OK) if name is Side.SENSOR else (sr.OK, row)] * (b - a)
             numbers = {pair: model_number(*pair, twice=data.model.twice) for pair in set(pairs)}
             if any(m < 0 or not data.allowed[m] for m in numbers.values()):
                 continue
             trial[a:b] = [numbers[pair] for pair in pairs]
-            key = ("none", ss.OK) if row == ss.OK else (name.value, row)
+            key = ("none", sr.OK) if row == sr.OK else (name.value, row)
             told = evidence_of(data, known, trial, a, b)
-            if key == ("actuator", ss.STUCK) and abs(_opening_at(data, known, trial, a, b)) < min_sat:
-                key = ("actuator", ss.NONE)
+            if key == ("actuator", sr.STUCK) and abs(_opening_at(data, known, trial, a, b)) < min_sat:
+                key = ("actuator", sr.NONE)
             out[key] = max(told, out.get(key, -np.inf))
-    if ("none", ss.OK) not in out:
+    if ("none", sr.OK) not in out:
         trial[a:b] = 0
-        out["none", ss.OK] = evidence_of(data, known, trial, a, b)
+        out["none", sr.OK] = evidence_of(data, known, trial, a, b)
     return out
 
 
@@ -118,16 +118,16 @@ def _judge(side: Side, a: int, b: int, row: int, data: SteeringData, path: Steer
     top = max(evidence.values())
     weight = {key: np.exp(max(-700.0, _TEMPER * (value - top))) for key, value in evidence.items()}
     total = sum(weight.values())
-    silent = row in (ss.STUCK, ss.NONE) and side is Side.SENSOR and _level(a, b, data)[0] == 0.0
+    silent = row in (sr.STUCK, sr.NONE) and side is Side.SENSOR and _level(a, b, data)[0] == 0.0
     pooled: dict[tuple[str, str], float] = {}
     for (name, r), w in weight.items():
-        mode = "healthy" if r == ss.OK else MODES[r].value
-        if silent and (name, r) == ("sensor", ss.STUCK):
+        mode = "healthy" if r == sr.OK else MODES[r].value
+        if silent and (name, r) == ("sensor", sr.STUCK):
             mode = "no_signal"  # stuck at zero and no signal are one row of the table
         pooled[name, mode] = pooled.get((name, mode), 0.0) + float(w / total)
     ranked = sorted(pooled.items(), key=lambda item: -item[1])
     (name, mode), probability = ranked[0]
-    gain = top - evidence["none", ss.OK]
+    gain = top - evidence["none", sr.OK]
     if mode == "healthy" or gain <= 0:
         return Judged(side, a, b, row, None)
     mine = Side(name)
@@ -201,23 +201,23 @@ def _estimate(
     last, var = path.mean[b - 1], path.variance[b - 1]
     gain = data.model.plant.gain
     if side is Side.SENSOR:
-        if row in (ss.STUCK, ss.NONE):
+        if row in (sr.STUCK, sr.NONE):
             level, spread, count = _level(a, b, data)
             half = 1.96 * float(np.sqrt(data.model.noise.step)) + spread
             return gone, Sat(level, abs(level), level - half, level + half, "rad") if count else None
         bounds = _bounds(float(last[4]), float(np.sqrt(var[4])))
-        if row == ss.GAIN:
+        if row == sr.GAIN:
             return bounds, None
         use = data.blocks.status[a:b] == PAIR
         rest = (data.blocks.mean[a:b] - last[4] * path.mean[a:b, 0])[use] / max(bounds.value, 0.1)
         return bounds, _sat(rest, "rad")
-    if row == ss.NONE:
+    if row == sr.NONE:
         return gone, None
-    if row == ss.STUCK:
+    if row == sr.STUCK:
         level, half = float(last[3]) / gain, 1.96 * float(np.sqrt(var[3])) / gain
         return gone, Sat(level, abs(level), level - half, level + half, "of full opening")
     bounds = _bounds(float(last[2]), float(np.sqrt(var[2])))
-    if row == ss.GAIN:
+    if row == sr.GAIN:
         return bounds, None
     return bounds, _sat(path.mean[a:b, 3] / gain / max(bounds.value, 0.1), "of full opening")
 

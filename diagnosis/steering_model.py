@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from diagnosis.steering_blocks import WHITE_DOF, SensorNoise, SteeringBlocks
 from diagnosis.steering_plant import SteeringPlant, windows_of
-from diagnosis.steering_scan import DISTURBANCE_S, SENSOR_DRIFT_S
+from diagnosis.steering_step import DISTURBANCE_S, SENSOR_DRIFT_S
 
 Array = NDArray[np.float64]
 

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from diagnosis import steering_scan as ss
+from diagnosis import steering_rows as sr
 from diagnosis.assessment import CODE, Finding
 from diagnosis.noise import moving_sum
 from diagnosis.steering_filter import SteeringPath
@@ -102,7 +102,7 @@ def states_of(
     shown = exercised(data)
     if side is Side.SENSOR and data.model.noise.resolved:
         shown[:] = True
-    well = vouched(rows == ss.OK, shown, blocks.dt)
+    well = vouched(rows == sr.OK, shown, blocks.dt)
     by_block = np.where(well, CODE[State.HEALTHY], CODE[State.NOT_EXCITED]).astype(np.int8)
     if side is Side.ACTUATOR and not reliable:
         by_block[:] = CODE[State.NOT_ASSESSED]

@@ -7,7 +7,8 @@ import pytest
 from filterpy.kalman import ExtendedKalmanFilter
 from numpy.testing import assert_allclose
 
-from diagnosis import steering_scan as ss
+from diagnosis import steering_rows as sr
+from diagnosis import steering_step as ss
 from diagnosis.modes import PAIR
 from diagnosis.steering_blocks import SensorNoise
 from diagnosis.steering_filter import start_state
@@ -32,7 +33,7 @@ NOTHING = np.full(7, np.nan)
 
 def force(m: int, x: np.ndarray, u: float, driven: float) -> tuple[float, float, float]:
     """What drives the rate, and its derivatives by a and b."""
-    if ss.ACTUATOR[m] == ss.OK:
+    if sr.ACTUATOR[m] == sr.OK:
         return driven + x[3], 0.0, 1.0
     f = GAIN * x[2] * u + x[3]
     return (f, GAIN * u, 1.0) if abs(f) <= RATE else (np.sign(f) * RATE, 0.0, 0.0)
@@ -42,25 +43,25 @@ def process_noise(m: int, driven: float) -> tuple[np.ndarray, np.ndarray]:
     """Decay of each state over a block, and Q."""
     decay, q = np.ones(6), np.zeros(6)
     q[0] = (0.1 * MODEL.load * DT) ** 2
-    a, s = ss.ACTUATOR[m], ss.SENSOR[m]
-    if a in (ss.OK, ss.GAIN, ss.NONE):
-        share = 0.0 if a == ss.NONE else 0.02 * driven
+    a, s = sr.ACTUATOR[m], sr.SENSOR[m]
+    if a in (sr.OK, sr.GAIN, sr.NONE):
+        share = 0.0 if a == sr.NONE else 0.02 * driven
         decay[3] = np.exp(-DT)
         q[3] = (1 - decay[3] ** 2) * (MODEL.load**2 + share**2)
-    elif a == ss.STUCK:
+    elif a == sr.STUCK:
         q[3] = (0.02 * RATE) ** 2 * DT
     else:
         decay[3] = np.exp(-DT / 0.8)
         q[3] = (1 - decay[3] ** 2) * (0.6 * RATE) ** 2
-    if s == ss.NOISY:
+    if s == sr.NOISY:
         q[5] = (0.02 * STOP) ** 2 * DT
-    elif s == ss.DRIFT:
+    elif s == sr.DRIFT:
         decay[5] = np.exp(-DT / 0.08)
         q[5] = (1 - decay[5] ** 2) * (0.1 * STOP) ** 2
     return decay, np.diag(q)
 
 
-@pytest.mark.parametrize("m", [m for m in range(ss.MODELS) if ss.SENSOR[m] in (ss.OK, ss.STUCK, ss.NONE)])
+@pytest.mark.parametrize("m", [m for m in range(sr.MODELS) if sr.SENSOR[m] in (sr.OK, sr.STUCK, sr.NONE)])
 def test_model_is_filterpys_extended_kalman_filter(m: int) -> None:
     rng = np.random.default_rng(m)
     p = MODEL.packed()
@@ -68,7 +69,7 @@ def test_model_is_filterpys_extended_kalman_filter(m: int) -> None:
     P[m, 0, 0] = 1e-4
     kf = ExtendedKalmanFilter(dim_x=6, dim_z=1)
     kf.x, kf.P = z[m].reshape(6, 1).copy(), P[m].copy()
-    dead = ss.SENSOR[m] in (ss.STUCK, ss.NONE)
+    dead = sr.SENSOR[m] in (sr.STUCK, sr.NONE)
     r = p[8] if dead else MODEL.noise.white / 10 + p[14]
     kf.R = np.array([[r]])
     row = np.zeros((3, 6))
@@ -84,7 +85,7 @@ def test_model_is_filterpys_extended_kalman_filter(m: int) -> None:
         after = decay * x
         after[0] = x[0] + K_R * x[1] + K_F * f
         after[1] = FADE * x[1] + (1 - FADE) * f
-        y = after[0] + 1e-4 * rng.normal() if not dead else 0.05 * (ss.SENSOR[m] == ss.STUCK)
+        y = after[0] + 1e-4 * rng.normal() if not dead else 0.05 * (sr.SENSOR[m] == sr.STUCK)
         kf.x = after.reshape(6, 1)
         kf.P = F @ kf.P @ F.T + q
         kf.update(
@@ -92,7 +93,7 @@ def test_model_is_filterpys_extended_kalman_filter(m: int) -> None:
             HJacobian=lambda x: np.array([[x[4, 0], 0, 0, 0, x[0, 0], 1.0]]),
             Hx=lambda x: np.array([[x[4, 0] * x[0, 0] + x[5, 0]]]),
         )
-        if ss.ACTUATOR[m] in (ss.GAIN, ss.NOISY):
+        if sr.ACTUATOR[m] in (sr.GAIN, sr.NOISY):
             kf.x[2, 0] = min(max(kf.x[2, 0], 0.1), 0.92)
         ss.advance(m, y, 2.6e-7 if not dead else 0.0, 10.0, driven, u, PAIR, NOTHING, p, z, P, ig, row)
         assert_allclose(z[m], kf.x[:, 0], atol=1e-9, rtol=1e-9)
@@ -102,7 +103,7 @@ def test_model_is_filterpys_extended_kalman_filter(m: int) -> None:
 def test_an_end_stop_holds_the_axle() -> None:
     p = MODEL.packed()
     _, z, P, _ = start_state(0.7, p)
-    m = int(np.flatnonzero((ss.ACTUATOR == ss.STUCK) & (ss.SENSOR == ss.OK))[0])
+    m = int(np.flatnonzero((sr.ACTUATOR == sr.STUCK) & (sr.SENSOR == sr.OK))[0])
     z[m, 3], row = RATE, np.zeros((3, 6))
     for _ in range(100):
         ss.predict(m, 0.0, 0.0, p, z, P, row)
