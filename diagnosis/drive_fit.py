@@ -12,6 +12,7 @@ from diagnosis.drive import DriveData
 from diagnosis.drive_echo import identify_echo
 from diagnosis.drive_load import identify_effort
 from replay.drive_model import DriveModel
+from replay.loop import Replay
 from replay.machine import Machine, Noise
 from replay.timeline import Timeline
 
@@ -66,3 +67,22 @@ def identify_drive(missions: Sequence[DriveData], least_speed: float) -> DriveMo
     """
     records = [m.record for m in missions]
     return DriveModel(echo=identify_echo(records), effort=identify_effort(records, least_speed))
+
+
+def fit_drives(missions: Sequence[tuple[Timeline, Replay]], machine: Machine) -> dict[str, DriveModel]:
+    """Models of a machine's drives from several healthy missions, by wheel; wheels that show neither part are left out.
+
+    Parameters
+    ----------
+    missions : Sequence[tuple[Timeline, Replay]]
+        Aligned healthy missions and their replayed loops.
+    machine : Machine
+        The machine; its own drive models are not used.
+    """
+    out = {}
+    for i, wheel in enumerate(machine.wheels):
+        found = [drive_data(timeline, replay.v_ref[:, i], machine, wheel) for timeline, replay in missions]
+        model = identify_drive([d for d in found if d is not None], machine.limits.driving_speed)
+        if model.echo is not None or model.effort is not None:
+            out[wheel] = model
+    return out

@@ -199,7 +199,14 @@ def _finding(run: Run, pair: EchoPair, model: RowModel, limits: Limits, lead: Ar
 
 def _instrument(pair: EchoPair, model: RowModel) -> modes.ModeModel:
     """The same noise for the estimate of ε and sat, which knows no late samples."""
-    return modes.ModeModel(model.noise, model.constant_noise, model.core, model.span, model.switch_cost, pair.dt)
+    return modes.ModeModel(
+        noise=model.noise,
+        constant_noise=model.constant_noise,
+        tolerance=model.core,
+        span=model.span,
+        switch_cost=model.switch_cost,
+        dt=pair.dt,
+    )
 
 
 def _raised(lead: Array, run: Run, slack: int) -> int | None:

@@ -10,15 +10,16 @@ import pandas as pd
 import pytest
 
 from diagnosis.drive import DriveData, assess_drive
-from diagnosis.drive_fit import drive_data, identify_drive
-from diagnosis.pipeline import diagnose
+from diagnosis.drive_fit import drive_data, fit_drives
+from diagnosis.pipeline import diagnose, diagnose_signals
 from diagnosis.result import MissionResult
 from replay.drive_model import DriveModel
 from replay.errors import LogError, NotJudged
 from replay.faults import FaultMode, FaultSpec, Side
 from replay.injection import inject_signals
+from replay.loop import replay_loop
 from replay.machine import Machine, haulotte
-from replay.machine_file import load_machine
+from replay.machine_file import dump_machine, load_machine
 from replay.mission import read_signals
 from replay.signals import Signals
 from replay.timeline import align
@@ -166,8 +167,9 @@ def rosa_drive(signals: Signals, rig: Machine, model: DriveModel | None = None) 
 def rig(reference_data: Path, tmp_path_factory: pytest.TempPathFactory) -> tuple[Machine, DriveModel]:
     """The motor, and its model from a few healthy runs."""
     found = machine(ROSA + FINE, tmp_path_factory.mktemp("rig"))
-    runs = [rosa_drive(rosa_signals(reference_data, "healthy_mode", n, found), found) for n in FITTED]
-    return found, identify_drive(runs, found.limits.driving_speed)
+    runs = [align(rosa_signals(reference_data, "healthy_mode", n, found)) for n in FITTED]
+    drives = fit_drives([(t, replay_loop(t, found)) for t in runs], found)
+    return found, drives["M"]
 
 
 def test_the_motors_controller_is_read_off_its_effort(rig: tuple[Machine, DriveModel]) -> None:
@@ -240,3 +242,21 @@ def test_the_motors_own_loads_are_extra_effort_and_no_fault_of_its_sensor_alone(
 def test_a_steady_state_error_of_the_arm_is_no_standstill(reference_data: Path, tmp_path: Path, motor: int) -> None:
     log = reference_data / "fault_data/dtr_robot_arm" / f"Motor_{motor}_Steady_state_error_01.csv"
     assert serious(diagnose([log], machine(ARM, tmp_path))) == []
+
+
+@pytest.mark.parametrize("mode", [None, FaultMode.INEFFICIENT, FaultMode.NOISY])
+def test_the_whole_diagnosis_with_a_fitted_machine_file(
+    reference_data: Path, rig: tuple[Machine, DriveModel], tmp_path: Path, mode: FaultMode | None
+) -> None:
+    found, model = rig
+    path = tmp_path / "fitted.toml"
+    path.write_text(dump_machine(replace(found, drives={"M": model})), encoding="utf-8")
+    fitted = load_machine(path)
+    signals = rosa_signals(reference_data, "healthy_mode", 106, fitted)
+    if mode is not None:
+        sat = (200.0, 100.0) if mode is FaultMode.NOISY else (0.0, 0.0)
+        signals = inject_signals(signals, [FaultSpec("M", Side.SENSOR, mode, 8.0, 16.0, 0.05, *sat)], fitted, 1)[0]
+    result = diagnose_signals(signals, fitted)
+    assert serious(result) == ([] if mode is None else [("M", mode.value)])
+    if mode is not None:
+        assert result.report["intervals"][0]["side"] == "sensor"
