@@ -23,7 +23,8 @@ _MOST_LEAD_S = 0.1
 _TAPS = 3
 _SETTLE_S = 0.6  # from this much of a stretch the controller's state before it is found
 _LEAST_S = 4.0
-_MOST_SAMPLES = 60_000
+_MOST_SAMPLES = 20_000
+_USUAL_S = 1.0  # integral time with which the delay is found
 _TUKEY = 4.0
 _LEAST_EXPLAINED = 0.5
 _DRIFT_S = 1.0
@@ -127,14 +128,8 @@ def identify_echo(records: Sequence[DriveRecord]) -> EchoModel | None:
         theta = _robust(design, error)
         return _spread(error - design @ theta), theta
 
-    best: tuple[float, float, int] | None = None
-    for memory in _MEMORIES:
-        first = _lead(parts, float(memory), dt, every) - _TAPS // 2
-        spread, _ = fitted(float(memory), first)
-        if best is None or spread < best[0]:
-            best = spread, float(memory), first
-    assert best is not None
-    _, memory, first = best
+    first = _lead(parts, _USUAL_S, dt, every) - _TAPS // 2
+    memory = float(_MEMORIES[int(np.argmin([fitted(float(m), first)[0] for m in _MEMORIES]))])
     _, theta = fitted(memory, first)
     memory, unsure = _integral_time(parts, theta[:_TAPS], first, dt) or (memory, _UNSURE * memory)
     _, theta = fitted(memory, first)
