@@ -124,13 +124,10 @@ class _Axle:
             noise = sensor_noise(blocks, y[fresh & np.isfinite(y)], known, machine.max_steer)
             if {"phi", "phi_true"} <= have:
                 true = f"steer.{name}.phi_true"
+                # a coarse rounding is no disagreement
+                tolerance = _TOLERANCE * machine.limits.min_sat + (0.0 if noise.resolved else noise.lsb)
                 blocks = with_second_angle(
-                    blocks,
-                    y,
-                    timeline.signals[true],
-                    timeline.fresh[true],
-                    timeline.dt,
-                    _TOLERANCE * machine.limits.min_sat,
+                    blocks, y, timeline.signals[true], timeline.fresh[true], timeline.dt, tolerance
                 )
             if {"u", "u_applied"} <= have:
                 spool = f"steer.{name}.u_applied"

@@ -28,6 +28,7 @@ MODES = {
 }
 _TEMPER = 0.35
 _MOST = 0.6
+_BRIEF_S = 0.05
 
 
 @dataclass(frozen=True)
@@ -142,7 +143,8 @@ def _judge(side: Side, a: int, b: int, row: int, data: SteeringData, path: Steer
     states_rest = mine is side or mine is Side.SENSOR_OR_ACTUATOR
     too_much = b - a > _MOST * path.model.size and name == "actuator"
     small = mode == "inefficient" and epsilon is not None and epsilon.value < limits.min_epsilon
-    if probability < limits.min_probability or too_much or small or not states_rest:
+    flicker = (b - a) * data.blocks.dt < _BRIEF_S and not (name == "sensor" and mode in ("stuck", "no_signal"))
+    if probability < limits.min_probability or too_much or small or flicker or not states_rest:
         return Judged(side, a, b, row, None)
     second = next((item for item in ranked[1:] if item[0][1] != "healthy"), None)
     lines = [
