@@ -1,4 +1,4 @@
-"""The samples around a fault's onset and end, and how far they lie off against the noise of the healthy side."""
+"""The samples around a fault's onset and end, and how far they lie off against the noise beyond the edge."""
 
 from __future__ import annotations
 
@@ -21,6 +21,7 @@ _MOST = 100
 _HEALTHY = 120
 _LEAST_HEALTHY = 8
 _COURSE = 30
+_APART = 3.5
 
 
 @dataclass(frozen=True)
@@ -44,7 +45,7 @@ class Edge:
     most : float
         Largest distance of a faulty sample of the window from where it should have been.
     noise : float or None
-        Standard deviation on the healthy side; None where there are too few healthy samples.
+        Standard deviation on the other side of the edge; None where that holds too few samples.
     """
 
     name: str
@@ -103,16 +104,23 @@ def edge_of(
         return np.full(b - a, np.nan) if column is None else columns[column][a:b].astype(np.float64) * pair.scale
 
     y, reference = cut(pair.measured, first, last), cut(pair.reference, first, last)
-    inside = slice(place - first, None) if onset else slice(None, place - first)
+    other_end = round((float(fault["stop_s" if onset else "start_s"]) - start) / step)
+    inside = (
+        slice(place - first, max(place, other_end) - first)
+        if onset
+        else slice(max(other_end - first, 0), place - first)
+    )
     if not (np.isfinite(y[: place - first]).any() or np.isfinite(y[place - first :]).any()):
         return None
     t = (np.arange(first, last, dtype=np.float64) - place) * step
     wide_t = (np.arange(*wide, dtype=np.float64) - place) * step
-    healthy = cut(pair.measured, *wide) - (cut(pair.reference, *wide) if pair.apart else 0.0)
-    use = np.isfinite(healthy) & ~_faulty(wide, fault, others, axis)
+    beyond = cut(pair.measured, *wide) - (cut(pair.reference, *wide) if pair.apart else 0.0)
+    use = np.isfinite(beyond)
+    if pair.apart:  # the distance from a reference is the usual one only where nothing is faulty
+        use &= ~_faulty(wide, fault, others, axis)
     gap, most, noise = None, math.nan, None
     if np.count_nonzero(use) >= _LEAST_HEALTHY:
-        course, noise = _course(wide_t[use], healthy[use], t[inside], onset, pair.apart)
+        course, noise = _course(wide_t[use], beyond[use], t[inside], onset, pair.apart)
         right = course + (reference[inside] if pair.apart else 0.0)
         off = y[inside] - right
         seen = np.flatnonzero(np.isfinite(off))
@@ -135,19 +143,19 @@ def _faulty(
     return out
 
 
-def _course(t: Array, healthy: Array, at: Array, onset: bool, apart: bool) -> tuple[Array, float | None]:
-    """Where healthy samples would go on, and their standard deviation about that.
+def _course(t: Array, y: Array, at: Array, onset: bool, apart: bool) -> tuple[Array, float | None]:
+    """Where samples y at times t would go on at other times, and their standard deviation about that.
 
     Against a reference that the fault leaves as it is: at their usual distance; else along the line through the
     nearest ones.
     """
     if apart:
-        level = float(np.median(healthy))
-        course, rest = np.full(at.size, level), healthy - level
+        level = float(np.median(y))
+        course, rest = np.full(at.size, level), y - level
     else:
         near = slice(-_COURSE, None) if onset else slice(None, _COURSE)
-        slope, level = np.polyfit(t[near], healthy[near], 1)
-        course, rest = slope * at + level, healthy[near] - (slope * t[near] + level)
+        slope, level = np.polyfit(t[near], y[near], 1)
+        course, rest = slope * at + level, y[near] - (slope * t[near] + level)
     noise = 1.4826 * float(np.median(np.abs(rest))) or float(np.std(rest))
     return course, noise if noise > 1e-12 else None
 
@@ -157,15 +165,19 @@ def edge_words(edge: Edge, pair: Pair) -> str:
     onset = edge.name == "onset"
     if edge.gap is None:
         where = "before" if onset else "after"
-        return f"Too few healthy samples {where} it to tell its noise."
+        return f"Too few {'healthy ' if pair.apart else ''}samples {where} it to tell the noise."
     which, window = ("First", "after") if onset else ("Last", "before")
     gap = abs(edge.gap[1] - edge.gap[0])
     off = f"off the {pair.words}" if pair.apart else "off the course before it" if onset else "off the course after it"
-    text = f"{which} faulty sample {off} by {pair.text(gap)}{_times(gap, edge)}"
-    if edge.most > 1.5 * gap:
-        text += f", {time_words(edge.reach)} {window} by up to {pair.text(edge.most)}{_times(edge.most, edge)}"
+    if edge.noise is not None and edge.most < _APART * edge.noise:
+        text = f"No sample of the {time_words(edge.reach)} {window} stands out: at most {pair.text(edge.most)} {off}"
+        text += _times(edge.most, edge)
+    else:
+        text = f"{which} faulty sample {off} by {pair.text(gap)}{_times(gap, edge)}"
+        if edge.most > 1.5 * gap:
+            text += f", {time_words(edge.reach)} {window} by up to {number(edge.most)}{_times(edge.most, edge)}"
     if edge.noise is not None:
-        text += f"; σ of the healthy samples {'before' if onset else 'after'} it: {pair.text(edge.noise)}"
+        text += f"; σ {'before' if onset else 'after'} it: {number(edge.noise)}"
     return text + "."
 
 
@@ -173,9 +185,7 @@ def _times(value: float, edge: Edge) -> str:
     if edge.noise is None:
         return ""
     ratio = value / edge.noise
-    return (
-        f" ({number(round(ratio)) if ratio >= 9.5 else number(ratio, 2)} σ{', within the noise' if ratio < 3 else ''})"
-    )
+    return f" ({number(round(ratio)) if ratio >= 9.5 else number(ratio, 2)} σ)"
 
 
 def time_words(seconds: float) -> str:

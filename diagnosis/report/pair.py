@@ -53,9 +53,7 @@ class Pair:
     evidence: str
 
     def text(self, value: float) -> str:
-        """Value with its unit; a share of full opening in percent."""
-        if self.unit == VALVE_UNIT:
-            return f"{number(100 * value)} %"
+        """Value with its unit."""
         return f"{number(value)}{'' if self.unit == '°' else ' '}{self.unit}"
 
 

@@ -101,6 +101,7 @@ class Figure {
     if (peers.length) entries.unshift([Figure.style("peer"), peers.join(", ")]);
     if (row.threshold !== undefined) entries.push([Figure.style("threshold"), "± threshold"]);
     if (row.level !== undefined) entries.push([Figure.style("threshold"), `limit ${row.level}`]);
+    if (row === this.rows[0] && this.shades.some((s) => s.main && s.detected != null)) entries.push([{ colour: "text", sign: "╎" }, "detected"]);
     const muted = Figure.colour("muted"), room = this.pixels() / 6.4, title = `${row.title} (${row.unit})`;
     let text = `<b>${Figure.text(row.title)}</b> (${Figure.text(row.unit)})`, used = title.length, lines = 1;
     for (const [s, n] of entries) {

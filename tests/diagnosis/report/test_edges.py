@@ -37,7 +37,7 @@ def test_a_jump_is_measured_against_the_noise(second: bool, name: str, words: st
     assert found.gap[0] - found.gap[1] == pytest.approx(0.5, abs=0.04)
     assert found.noise == pytest.approx(0.01, rel=0.4)
     assert edge_words(found, pair).startswith(words)
-    assert "within the noise" not in edge_words(found, pair)
+    assert "m/s (" in edge_words(found, pair)
 
 
 def test_window_holds_thirty_samples_or_fifty_milliseconds_on_each_side() -> None:
@@ -58,7 +58,24 @@ def test_a_bend_starts_within_the_noise() -> None:
     columns["wheel.FR.v"][1000:1200] += 0.5 * np.exp(-np.arange(200) / 100)
     found, pair = edge("onset", columns)
     assert found is not None
-    assert "within the noise), 150 ms after by up to" in edge_words(found, pair)
+    assert edge_words(found, pair).startswith("First faulty sample off the second measurement by 0.0")
+    assert ", 150 ms after by up to 0.15" in edge_words(found, pair)
+
+
+def test_an_onset_that_does_not_show_is_said() -> None:
+    columns = log(second=True)
+    columns["wheel.FR.v"][1000:1200] += 0.5
+    found, pair = edge("onset", columns)
+    assert found is not None
+    assert edge_words(found, pair).startswith("No sample of the 150 ms after stands out: at most 0.0")
+
+
+def test_a_brief_fault_is_measured_inside_it_alone() -> None:
+    columns = log(second=True)
+    columns["wheel.FR.v"][1005:1200] += 3.0
+    found, _ = edge("onset", columns, stop_s=5.025)
+    assert found is not None
+    assert found.most == pytest.approx(0.5, abs=0.04)
 
 
 def test_lost_samples_stay_lost() -> None:
@@ -75,7 +92,7 @@ def test_samples_of_another_fault_do_not_count_as_healthy() -> None:
     found, pair = edge("onset", log(second=True), before)
     assert found is not None
     assert (found.gap, found.noise) == (None, None)
-    assert edge_words(found, pair) == "Too few healthy samples before it to tell its noise."
+    assert edge_words(found, pair) == "Too few healthy samples before it to tell the noise."
     other_wheel, _ = edge("onset", log(second=True), {**before, "component": "RL"})
     assert other_wheel is not None
     assert other_wheel.noise is not None
