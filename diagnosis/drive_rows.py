@@ -151,6 +151,7 @@ def _finding(run: Run, pair: EchoPair, model: RowModel, limits: Limits, lead: Ar
     if row in _SOFT:
         if np.count_nonzero(status == modes.PAIR) < max(5, _SHORTEST_SOFT_S / pair.dt):
             return None  # too little of it has an echo beside it
+        y, x = pair.y[part][status == modes.PAIR], pair.x[part][status == modes.PAIR]
         row = modes.NOISY if evidence[modes.NOISY] > evidence[modes.INEFFICIENT] else modes.INEFFICIENT
     elif use.any() and y.size < _SHORTEST_HARD:
         return None
@@ -170,7 +171,8 @@ def _finding(run: Run, pair: EchoPair, model: RowModel, limits: Limits, lead: Ar
             mode = FaultMode.OUTSIDE_TABLE
         elif epsilon is not None and epsilon.value < limits.min_epsilon:
             return None
-    deviation = float(np.sqrt(np.mean((y - x) ** 2))) if y.size else float("inf")
+    beside = y[np.isfinite(x)] - x[np.isfinite(x)]
+    deviation = float(np.sqrt(np.mean(beside**2))) if beside.size else 0.0
     if row == modes.NOISY and math.sqrt(max(deviation**2 - pair.noise**2, 0.0)) < limits.min_sat:
         return None
     prior = np.log(np.array([0.8, 0.05, 0.05, 0.05, 0.05]))
@@ -233,7 +235,7 @@ def _sentences(
     if row in (modes.STUCK, modes.NO_SIGNAL) and y.size:
         out.append(
             f"{pair.name} stayed within {float(np.ptp(y)):.2g} m/s of {float(np.mean(y)):.4g} m/s for {seconds:.2f} s, while the "
-            f"controller answered to a speed that moved over {float(np.ptp(x)):.3g} m/s."
+            f"drive was commanded; healthy samples differ by {pair.noise:.2g} m/s."
         )
     elif row in (modes.STUCK, modes.NO_SIGNAL):
         out.append(f"{pair.name} delivered nothing for {seconds:.2f} s while the controller went on.")
@@ -242,9 +244,10 @@ def _sentences(
             f"{pair.name} was {delta:.3f} times the speed that the controller answered to, over {seconds:.2f} s; the rest has a "
             f"root mean square of {float(np.sqrt(np.mean((y - delta * x) ** 2))):.3g} m/s, healthy noise is {pair.noise:.2g} m/s."
         )
-    out.append(
-        f"The logged speed is not the one that the controller acted on (difference {deviation:.3g} m/s root mean square), "
-        "so the drive obeys and the speed's channel is at fault."
-    )
+    if deviation > pair.noise:
+        out.append(
+            f"The logged speed is not the one that the controller acted on (difference {deviation:.3g} m/s root mean square), "
+            "so the drive obeys and the speed's channel is at fault."
+        )
     out.append(f"Log-evidence against healthy: {gain:.0f}; a fault is considered from {least:.0f}.")
     return tuple(out)

@@ -108,6 +108,7 @@ def test_a_constant_sensor_is_found_in_the_loop_too(model: DriveModel, mode: Fau
     assert [(f.side, f.mode) for f in sensor.findings if f.start < STOP] == [(Side.SENSOR, mode)]
     assert abs(sensor.findings[0].start - START) <= 5
     assert share(actuator, State.MASKED, slice(START + 5, STOP - 5)) > 0.95
+    assert "nan" not in " ".join(sensor.findings[0].evidence)
 
 
 def test_a_sensor_that_loses_gain_in_the_loop_jumps(model: DriveModel) -> None:
