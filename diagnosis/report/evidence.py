@@ -81,7 +81,7 @@ def evidence_of(report: Mapping[str, Any], columns: Columns, axis: tuple[float, 
         edges = _edges(fault, faults, pair, columns, axis) if pair and i < _EDGES else ()
         course = _course(fault, pair, columns, axis, limit) if pair and i < _COURSES else ()
         keys = _keys(pair) if pair and edges else ()
-        note = _note(pair, rates, axis[1]) if pair and edges else ""
+        note = _note(pair, rates, axis[1]) if pair and edges else _missing(pair, columns)
         out[fault["id"]] = Evidence(
             rests_on(fault, columns), delay_words(fault), shape_sentence(fault), keys, edges, course, note
         )
@@ -108,6 +108,15 @@ def _note(pair: Pair, rates: Mapping[str, Any], step: float) -> str:
     slow = [n for n in (pair.measured, pair.reference) if n and (rates.get(n) or rate) < 0.75 * rate]
     each = ", ".join(f"{n} came at {number(rates[n])} Hz" for n in slow)
     return f"{each}; until its next sample the last one is shown at {number(rate)} Hz." if slow else ""
+
+
+def _missing(pair: Pair | None, columns: Columns) -> str:
+    """Why a fault has no pictures; empty where the whole page has none."""
+    if not columns:
+        return ""
+    if pair is None:
+        return "The channel of this fault is not among the saved time series."
+    return f"Pictures of onset and end are drawn for the first {_EDGES} faults."
 
 
 def _edges(

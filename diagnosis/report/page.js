@@ -141,8 +141,8 @@
     if (key) { e.preventDefault(); key(); }
   });
 
-  function fromAddress(scroll) {
-    const q = new URLSearchParams(location.hash.slice(1)), t = (q.get("t") || "").split(",").map(Number);
+  function fromAddress(hash, scroll) {
+    const q = new URLSearchParams(hash.slice(1)), t = (q.get("t") || "").split(",").map(Number);
     const range = t.length === 2 && t.every(Number.isFinite) && t[1] > t[0] ? t : undefined;
     if (faults.has(q.get("fault"))) select(q.get("fault"), { range, scroll });
     else if (!current && faults.size) select(faults.keys().next().value);
@@ -167,11 +167,11 @@
     e.target.value = "";
   });
   root.addEventListener("theme", themed);
-  addEventListener("hashchange", () => fromAddress(true));
+  addEventListener("hashchange", (e) => fromAddress(new URL(e.newURL).hash, true));
   let resizing = 0;
   addEventListener("resize", () => { clearTimeout(resizing); resizing = setTimeout(() => { evidence?.redraw(); loop?.redraw(); }, 200); });
   one("#theme").setAttribute("aria-pressed", String(root.dataset.theme === "dark"));
-  fromAddress(false);
+  fromAddress(location.hash, false);
   if (loop) {
     // Drawn when it comes near, or a little later so that it is there to be printed.
     const begin = () => { seen.disconnect(); clearTimeout(later); drawLoop(loopKey); };

@@ -42,3 +42,14 @@ def test_delay() -> None:
     assert delay_words({"start_s": 5.0, "detected_s": 5.02}) == "detected 20 ms after onset"
     assert delay_words({"start_s": 5.0, "detected_s": 5.0}) == "detected at its first sample"
     assert delay_words({"start_s": 5.0}) == "detection time not known"
+
+
+def test_missing_pictures_are_explained() -> None:
+    report, columns = samples.one_wheel()
+    del columns["wheel.drive.v"]
+    found = evidence_of(report, columns, (0.0, 0.01))["F1"]
+    assert found.note == "The channel of this fault is not among the saved time series."
+    report, columns = samples.one_wheel()
+    report["intervals"] = [{**report["intervals"][0], "id": f"F{i}"} for i in range(151)]
+    found = evidence_of(report, columns, (0.0, 0.01))["F150"]
+    assert (found.edges, found.note) == ((), "Pictures of onset and end are drawn for the first 150 faults.")
