@@ -13,12 +13,14 @@ from numpy.typing import NDArray
 
 from diagnosis import modes
 from diagnosis.assessment import CODE, Assessment, Finding
+from diagnosis.boundary import Channel, refine
 from diagnosis.estimate import estimate_fault
 from diagnosis.kalman import GainBiasModel, track_gain_bias
 from diagnosis.mode_path import ModePath, most_probable
 from diagnosis.noise import relative_lag, shifted, unresolved
-from diagnosis.pairs import Pair, mode_model, sample_status, timing_explains
+from diagnosis.pairs import Pair, mode_model, neighbours, sample_status, timing_explains, unsettled
 from diagnosis.result import Epsilon, Hypothesis, Sat
+from diagnosis.screen import screened
 from diagnosis.segments import Run, absorb_short, join_noisy, merge_equal, runs_of, trim
 from replay.faults import FaultMode, Side, State
 from replay.machine import Limits
@@ -35,6 +37,9 @@ _TEMPER = 0.25
 _MAX_LAG_S = 0.05
 _SHORTEST_S = 0.01
 _HOLD_S = 0.1
+_COARSE_COST = 0.2  # where a log is too slow for its commands, what is left of them looks like a fault's drift
+_BRIDGE_S = 5.0
+_BRIEF_S = 0.1
 
 
 def assess_pair(pair: Pair, limits: Limits) -> Assessment:
@@ -58,13 +63,21 @@ def assess_pair(pair: Pair, limits: Limits) -> Assessment:
     if pair.side is Side.ACTUATOR:  # a command may jump from step to step, a speed may not
         paired = status == modes.PAIR
         blind, share = unresolved(np.where(paired, pair.y - x, np.nan), x, paired, model.noise, pair.dt)
-    status[blind & (status == modes.PAIR)] = modes.BLIND
-    path = most_probable(pair.y, x, status, pair.quiet, model)
+    if share:
+        blind &= unsettled(x, model.noise)
+        status[blind & paired] = modes.BLIND
+        model = replace(model, drift_cost=model.drift_cost + _COARSE_COST)
+    channel = Channel(pair.y, x, status, pair.quiet)
+    path = most_probable(pair.y, x, screened(pair.y, x, status, model.noise), pair.quiet, model)
     shortest = max(3, round(_SHORTEST_S / pair.dt))
     findings = []
     below = 0
-    for run in _tidy(path, pair, status, shortest):
-        finding = _finding(run, pair, x, status, model, limits, lag)
+    runs = _tidy(path, channel, model, pair.dt, shortest)
+    coarse = neighbours(x) if share else None
+    for i, found in enumerate(runs):
+        before, after = runs[i - 1].stop if i else 0, runs[i + 1].start if i + 1 < len(runs) else x.size
+        run = _refined(found, pair, channel, model, coarse, (before, after))
+        finding = _finding(run, pair, channel, model, limits, lag, coarse)
         if finding is None:
             below += 1
         elif timing_explains(pair, x, run, finding.mode, share):
@@ -98,18 +111,18 @@ def _detected(path: ModePath, run: Run, dt: float, slack: int, lag: float) -> in
     return None if raised is None else min(raised + max(0, math.ceil(-lag)), path.model.size - 1)
 
 
-def _tidy(path: ModePath, pair: Pair, status: NDArray[np.int8], shortest: int) -> list[Run]:
+def _tidy(path: ModePath, channel: Channel, model: modes.ModeModel, dt: float, shortest: int) -> list[Run]:
     """Faulty runs of a path, joined where they belong together, without the ends in which nothing moves."""
     runs = absorb_short(runs_of(path), shortest)
     runs = join_noisy(runs)
-    runs = merge_equal(runs, max(2, round(0.02 / pair.dt)), (modes.NOISY, modes.INEFFICIENT, modes.NO_SIGNAL))
+    runs = merge_equal(runs, max(2, round(0.02 / dt)), (modes.NOISY, modes.INEFFICIENT, modes.NO_SIGNAL))
+    runs = _bridged([r for r in runs if r.row != modes.HEALTHY], channel, model)
     out = []
     for run in runs:
-        if run.row == modes.HEALTHY:
-            continue
         if run.row in (modes.INEFFICIENT, modes.NO_SIGNAL):
-            silent = status[run.start : run.stop] == modes.SILENT
-            still = pair.quiet.copy() if not silent.any() else pair.quiet & (status != modes.SILENT)
+            status = channel.status[run.start : run.stop]
+            silent = status == modes.SILENT
+            still = channel.quiet if not silent.any() else channel.quiet & (channel.status != modes.SILENT)
             kept = trim(run, still)
             if kept is None:
                 continue
@@ -118,16 +131,80 @@ def _tidy(path: ModePath, pair: Pair, status: NDArray[np.int8], shortest: int) -
     return out
 
 
+def _bridged(runs: list[Run], channel: Channel, model: modes.ModeModel) -> list[Run]:
+    """Join runs of one row where the same fault explains them and what lies between as well as parts of their own do.
+
+    Between them may lie a healthy stretch or a shorter run of another row.
+    """
+    out: list[Run] = []
+    for run in runs:
+        out.append(run)
+        while len(out) > 1:
+            if _one_fault(out[-2], out[-1], channel, model):
+                out[-2:] = [Run(out[-2].start, out[-1].stop, out[-1].row)]
+            elif len(out) > 2 and _interrupted(*out[-3:], channel, model):
+                out[-3:] = [Run(out[-3].start, out[-1].stop, out[-1].row)]
+            else:
+                break
+    return out
+
+
+def _interrupted(first: Run, middle: Run, last: Run, channel: Channel, model: modes.ModeModel) -> bool:
+    """Whether a run of another row merely interrupts one fault, such as a value that rests for a moment."""
+    if first.row != last.row or middle.size >= min(first.size, last.size):
+        return False
+    brief = last.start - first.stop <= min(_BRIEF_S / model.dt, min(first.size, last.size) / 4)
+    return brief or _one_fault(first, last, channel, model)
+
+
+def _one_fault(first: Run, second: Run, channel: Channel, model: modes.ModeModel) -> bool:
+    """Whether two runs and what lies between are one fault rather than three parts."""
+    reach = round(_BRIDGE_S / model.dt)
+    a, b, c, d = max(first.start, first.stop - reach), first.stop, second.start, min(second.stop, second.start + reach)
+    if first.row != second.row or c - b > reach:
+        return False
+    whole = channel.part(a, d).evidence(model)[first.row]
+    parts = channel.part(a, b).evidence(model)[first.row] + channel.part(c, d).evidence(model)[first.row]
+    return bool(whole > parts + channel.part(b, c).evidence(model).max() - 2 * model.switch_cost)
+
+
+def _estimate(
+    run: Run, pair: Pair, channel: Channel, model: modes.ModeModel, coarse: Array | None
+) -> tuple[Epsilon | None, Sat | None, float] | None:
+    """ε̂, the saturation term and δ̂ of a run; see `estimate_fault`."""
+    part = slice(run.start, run.stop)
+    use = np.isin(channel.status[part], (modes.PAIR, modes.BLIND))
+    known = pair.instruments if coarse is None else coarse
+    instruments = None if known is None else np.nan_to_num(known[part][use])
+    return estimate_fault(run.row, pair.y[part][use], channel.x[part][use], model, pair.unit, instruments)
+
+
+def _refined(
+    run: Run, pair: Pair, channel: Channel, model: modes.ModeModel, coarse: Array | None, between: tuple[int, int]
+) -> Run:
+    """A noisy run with its ends where its own gain puts them."""
+    estimate = _estimate(run, pair, channel, model, coarse) if run.row == modes.NOISY else None
+    return run if estimate is None else refine(run, channel, estimate[2], model, *between)
+
+
 def _finding(
-    run: Run, pair: Pair, x: Array, status: NDArray[np.int8], model: modes.ModeModel, limits: Limits, lag: float
+    run: Run,
+    pair: Pair,
+    channel: Channel,
+    model: modes.ModeModel,
+    limits: Limits,
+    lag: float,
+    coarse: Array | None,
 ) -> Finding | None:
     """Estimate ε and sat of a run; None where it lies below the limits or the evidence is thin."""
+    estimate = _estimate(run, pair, channel, model, coarse)
+    if estimate is None:
+        return None
     part = slice(run.start, run.stop)
-    y, ref, st, quiet = pair.y[part], x[part], status[part], pair.quiet[part]
-    use = (st == modes.PAIR) | (st == modes.BLIND)
+    y, ref, st = pair.y[part], channel.x[part], channel.status[part]
+    use = np.isin(st, (modes.PAIR, modes.BLIND))
     edge = min(5, (run.stop - run.start) // 20)  # a delay leaves a sample or two of the neighbours at the ends
-    inner = slice(edge, y.size - edge)
-    evidence = modes.segment_evidence(y[inner], ref[inner], st[inner], quiet[inner], model)
+    evidence = channel.part(run.start + edge, run.stop - edge).evidence(model)
     gain = evidence[run.row] - evidence[modes.HEALTHY]
     if gain < model.switch_cost:
         return None
@@ -137,14 +214,10 @@ def _finding(
     p /= p.sum()
     if run.row in (modes.STUCK, modes.NO_SIGNAL) and (
         not use.any() or abs(float(np.mean(y[use]))) <= 3 * model.constant_noise / np.sqrt(min(use.sum(), 100))
-    ):  # stuck at zero and no signal are one row of the table
+    ):  # stuck at zero, a gain of zero and no signal are one row of the table
         run = Run(run.start, run.stop, modes.NO_SIGNAL)
-        p[modes.NO_SIGNAL] += p[modes.STUCK]
-        p[modes.STUCK] = 0.0
-    instruments = None if pair.instruments is None else np.nan_to_num(pair.instruments[part][use])
-    estimate = estimate_fault(run.row, y[use], ref[use], model, pair.unit, instruments)
-    if estimate is None:
-        return None
+        p[modes.NO_SIGNAL] += p[modes.STUCK] + p[modes.INEFFICIENT]
+        p[[modes.STUCK, modes.INEFFICIENT]] = 0.0
     mode = _MODE[run.row]
     epsilon, sat, delta = estimate
     deviation = float(np.sqrt(np.mean((y[use] - ref[use]) ** 2))) if use.any() else float("inf")
@@ -153,6 +226,8 @@ def _finding(
             mode = FaultMode.OUTSIDE_TABLE
         elif epsilon is not None and epsilon.value < limits.min_epsilon:
             return None
+        if abs(1.0 - delta) * float(np.sqrt(np.mean(ref[use] ** 2))) < 0.5 * model.noise:
+            return None  # what is lost of hardly anything is the reference's own noise
     if pair.side is Side.ACTUATOR and mode in (FaultMode.STUCK, FaultMode.NO_SIGNAL) and deviation < 2.5 * model.noise:
         return None  # the command hardly moved: a noisy reading of it looks constant too
     if mode is FaultMode.NOISY and deviation < max(2.5 * model.noise, limits.min_sat / 2):
@@ -268,5 +343,7 @@ def _columns(
         "delta_bar": track.bias,
         "delta_bar_std": track.bias_std,
     }
-    columns.update({f"p_{name}": path.filtered[:, i] for i, name in enumerate(modes.ROWS)})
+    filtered = path.filtered
+    columns["probability"] = np.float32(1.0) - filtered[:, modes.HEALTHY]
+    columns.update({f"p_{name}": filtered[:, i] for i, name in enumerate(modes.ROWS)})
     return columns

@@ -14,6 +14,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from diagnosis.modes import (
+    CLEAR,
     HEALTHY,
     MODELS,
     NOISY_MODELS,
@@ -61,6 +62,13 @@ def _scan_modes(y, x, status, quiet, p, noisy, row, score, mean, cov, back, filt
         for m in range(1, models):
             if score[m] > score[best]:
                 best = m
+        if status[k] == CLEAR and row[best] == HEALTHY:
+            if best != 0:
+                back[k, 0] = best
+            score[:] = -np.inf
+            score[0] = 0.0
+            filtered[k, HEALTHY] = 1.0
+            continue
         top = score[best]
         if status[k] != SKIP:
             for m in range(models):
@@ -72,19 +80,19 @@ def _scan_modes(y, x, status, quiet, p, noisy, row, score, mean, cov, back, filt
                     score[m] = top - cost
                     back[k, m] = best
                     enter(m, p, mean, cov)
-            likelihoods(y[k], x[k], status[k], quiet[k], p, noisy, mean, cov, gain)
+            likelihoods(y[k], x[k], status[k], quiet[k], p, noisy, row, mean, cov, gain)
+            top = -np.inf
             for m in range(models):
                 score[m] += gain[m]
-            top = score[0]
-            for m in range(1, models):
                 top = max(top, score[m])
             for m in range(models):
                 score[m] -= top
         total = 0.0
         for m in range(models):
-            w = np.exp(score[m])
-            filtered[k, row[m]] += w
-            total += w
+            if score[m] > -50.0:
+                w = np.exp(score[m])
+                filtered[k, row[m]] += w
+                total += w
         for i in range(filtered.shape[1]):
             filtered[k, i] /= total
 
@@ -99,13 +107,13 @@ class ModePath:
         Model per sample.
     entered : NDArray[np.bool_], shape (n,)
         Samples at which a model was entered.
-    filtered : NDArray[np.float64], shape (n, 5)
+    filtered : NDArray[np.float32], shape (n, 5)
         Causal probability of each row (softmax of the survivors' scores).
     """
 
     model: NDArray[np.uint8]
     entered: NDArray[np.bool_]
-    filtered: Array
+    filtered: NDArray[np.float32]
 
     @property
     def row(self) -> NDArray[np.int64]:
@@ -149,8 +157,13 @@ def first_lasting(raised: NDArray[np.bool_], start: int, stop: int, slack: int, 
 
 
 def forward(
-    y: Array, x: Array, status: NDArray[np.int8], quiet: NDArray[np.bool_], model: ModeModel, state: ModeState
-) -> tuple[NDArray[np.uint8], Array, ModeState]:
+    y: Array,
+    x: Array,
+    status: NDArray[np.int8],
+    quiet: NDArray[np.bool_],
+    model: ModeModel,
+    state: ModeState,
+) -> tuple[NDArray[np.uint8], NDArray[np.float32], ModeState]:
     """Run the recursion over one block.
 
     Parameters
@@ -158,8 +171,9 @@ def forward(
     y, x : Array, shape (n,)
         Measured value and reference.
     status : NDArray[np.int8], shape (n,)
-        `SKIP` (nothing new), `PAIR` (both valid), `SILENT` (y silent while its source lives) or `BLIND` (both valid,
-        but x changes faster than the log resolves).
+        `SKIP` (nothing new), `PAIR` (both valid), `SILENT` (y silent while its source lives), `BLIND` (both valid, but
+        x changes faster than the log resolves) or `CLEAR` (a pair far from anything that contradicts healthy: taken as
+        healthy unmeasured where the path is healthy, to save time).
     quiet : NDArray[np.bool_], shape (n,)
         Where the machine stands, so that a reading of zero is what a healthy channel gives too.
     model : ModeModel
@@ -177,13 +191,20 @@ def forward(
         For the next block.
     """
     back = np.full((y.size, MODELS), STAY, dtype=np.uint8)
-    filtered = np.zeros((y.size, len(ROWS)))
+    filtered = np.zeros((y.size, len(ROWS)), dtype=np.float32)
     score, mean, cov = state.score.copy(), state.mean.copy(), state.cov.copy()
-    _scan_modes(y, x, status, quiet, model.packed(), NOISY_MODELS, ROW_OF_MODEL, score, mean, cov, back, filtered)
+    p = model.packed()
+    _scan_modes(y, x, status, quiet, p, NOISY_MODELS, ROW_OF_MODEL, score, mean, cov, back, filtered)
     return back, filtered, ModeState(score, mean, cov)
 
 
-def most_probable(y: Array, x: Array, status: NDArray[np.int8], quiet: NDArray[np.bool_], model: ModeModel) -> ModePath:
+def most_probable(
+    y: Array,
+    x: Array,
+    status: NDArray[np.int8],
+    quiet: NDArray[np.bool_],
+    model: ModeModel,
+) -> ModePath:
     """Most probable rows of a whole channel; see `forward` for the arguments."""
     back, filtered, state = forward(y, x, status, quiet, model, initial_state(model))
     path, entered = trace(back, int(np.argmax(state.score)))

@@ -31,11 +31,12 @@ ROW_OF_MODEL = np.array([HEALTHY, STUCK, NO_SIGNAL, INEFFICIENT, HEALTHY] + [NOI
 _MISMATCH, _FIRST_NOISY = 4, 5
 MODELS = ROW_OF_MODEL.size
 
-SKIP, PAIR, SILENT, BLIND = 0, 1, 2, 3
+SKIP, PAIR, SILENT, BLIND, CLEAR = range(5)
 STAY = 255
 _OUTLIER = -18.0
 _SILENT_COST = -6.0
-_MISMATCH_S = 0.05
+_MISMATCH_S = 0.05  # correlation time of a passing mismatch of two healthy instruments
+_FAULT_COST, DRIFT_COST = 0.02, 0.04  # what a faulty row must gain per sample to be preferred
 
 
 @dataclass(frozen=True)
@@ -56,6 +57,10 @@ class ModeModel:
         Minus the log-probability of entering a row at one sample.
     dt : float
         Step [s].
+    drift_cost : float
+        What the noisy row must gain per sample to be preferred.
+    own_cost : float
+        What the noisy row gains per sample at most by explaining x's own noise away, which says nothing about y.
     """
 
     noise: float
@@ -64,21 +69,30 @@ class ModeModel:
     span: float
     switch_cost: float
     dt: float
+    drift_cost: float = DRIFT_COST
+    own_cost: float = 0.0
 
     def packed(self) -> Array:
-        """Parameters in the order of the compiled scan.
-
-        The last one is what a drifting row must gain per sample to be preferred: as much as the mismatch model of
-        healthy loses by its freedom, and a little more. Without it a fault row would follow any small mismatch.
-        """
-        f2 = np.exp(-2 * self.dt / _MISMATCH_S)
-        p, r, q = self.tolerance**2, self.noise**2, (1 - f2) * self.tolerance**2
-        for _ in range(200):  # Riccati recursion to its steady state
-            p = f2 * p + q
-            p = p * r / (p + r)
-        occam = 0.5 * np.log(1 + (f2 * p + q) / r) + 0.02
+        """Parameters in the order of the compiled scan; the first three are r, r of a constant, and span."""
+        r, constant = self.noise**2, self.constant_noise**2
+        log_r, log_constant = (float(np.log(2 * np.pi * v)) for v in (r, constant))
+        floor = _OUTLIER - float(np.log(self.span))
+        decay = float(np.exp(-self.dt / _MISMATCH_S))
+        cost = self.drift_cost + self.own_cost
         return np.array(
-            [self.noise, self.constant_noise, self.span, self.dt, self.switch_cost, self.tolerance, float(occam)]
+            [
+                r,
+                constant,
+                self.span,
+                self.dt,
+                self.switch_cost,
+                self.tolerance**2,
+                log_r,
+                log_constant,
+                floor,
+                decay,
+                cost,
+            ]
         )
 
 
@@ -91,7 +105,7 @@ def enter(m, p, mean, cov):  # type: ignore[no-untyped-def]
     if m == 0:
         mean[m, 0] = 1.0
     elif m == _MISMATCH:
-        mean[m, 0], cov[m, 2] = 1.0, p[5] ** 2
+        mean[m, 0], cov[m, 2] = 1.0, p[5]
     elif m == 1:
         cov[m, 0] = span * span
     elif m == 3:
@@ -102,63 +116,83 @@ def enter(m, p, mean, cov):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _step(m, y, x, p, noisy, mean, cov):  # type: ignore[no-untyped-def]
-    """Kalman update of one model with y = H·[·,·] + n; returns the innovation's log-likelihood."""
-    r = p[0] * p[0]
-    h0, h1 = x, 0.0
-    if m == _MISMATCH:
-        h1 = 1.0
-        f = np.exp(-p[3] / _MISMATCH_S)
-        mean[m, 1] *= f
-        cov[m, 2] = f * f * cov[m, 2] + (1 - f * f) * p[5] ** 2
-    elif m == 1:
-        h0, r = 1.0, p[1] * p[1]
-    elif m == 2:
-        h0, r = 0.0, p[1] * p[1]
-    elif m >= _FIRST_NOISY:
-        h1 = 1.0
-        cov[m, 2] += (noisy[m - _FIRST_NOISY, 0] * p[2]) ** 2 * p[3]
-        r *= noisy[m - _FIRST_NOISY, 1] ** 2
-    a, b, c = cov[m, 0], cov[m, 1], cov[m, 2]
-    # S = H P Hᵀ + R
-    g0, g1 = a * h0 + b * h1, b * h0 + c * h1
-    s = h0 * g0 + h1 * g1 + r
-    innovation = y - h0 * mean[m, 0] - h1 * mean[m, 1]
-    k0, k1 = g0 / s, g1 / s
-    mean[m, 0] += k0 * innovation
-    mean[m, 1] += k1 * innovation
-    # P = (I − K H) P
-    cov[m, 0] = a - k0 * g0
-    cov[m, 1] = b - k0 * g1
-    cov[m, 2] = c - k1 * g1
-    return -0.5 * (innovation * innovation / s + np.log(2 * np.pi * s))
+def _update(y, x, p, noisy, mean, cov, out):  # type: ignore[no-untyped-def]
+    """Kalman update of every model with y = H·[·,·] + n; writes the innovations' log-likelihoods."""
+    e = y - x
+    out[0] = -0.5 * (e * e / p[0] + p[6])
+    out[2] = -0.5 * (y * y / p[1] + p[7])
+    # one unknown: H = 1 or x, P = (I − K H) P
+    for m in (1, 3):
+        h, r = (1.0, p[1]) if m == 1 else (x, p[0])
+        if m == 3 and p[0] > 4.0 * p[1]:  # a sensor's noise comes before its gain, that of a valve's feedback after it
+            r *= max(1.0, mean[m, 0] ** 2)
+        s = h * h * cov[m, 0] + r
+        i = 1.0 / s
+        e = y - h * mean[m, 0]
+        mean[m, 0] += h * cov[m, 0] * i * e
+        cov[m, 0] *= r * i
+        out[m] = -0.5 * (e * e * i + np.log(2 * np.pi * s))
+    m, f = _MISMATCH, p[9]
+    c = f * f * cov[m, 2] + (1 - f * f) * p[5]
+    s = c + p[0]
+    e = y - x - f * mean[m, 1]
+    mean[m, 1] = f * mean[m, 1] + c / s * e
+    cov[m, 2] = c * p[0] / s
+    out[m] = -0.5 * (e * e / s + np.log(2 * np.pi * s))
+    for m in range(_FIRST_NOISY, out.size):
+        j = m - _FIRST_NOISY
+        a, b = cov[m, 0], cov[m, 1]
+        c = cov[m, 2] + (noisy[j, 0] * p[2]) ** 2 * p[3]
+        # S = H P Hᵀ + R
+        g0, g1 = a * x + b, b * x + c
+        s = x * g0 + g1 + p[0] * noisy[j, 1] ** 2
+        i = 1.0 / s
+        e = y - x * mean[m, 0] - mean[m, 1]
+        k0, k1 = g0 * i, g1 * i
+        mean[m, 0] += k0 * e
+        mean[m, 1] += k1 * e
+        # P = (I − K H) P
+        cov[m, 0] = a - k0 * g0
+        cov[m, 1] = b - k0 * g1
+        cov[m, 2] = c - k1 * g1
+        out[m] = -0.5 * (e * e * i + np.log(2 * np.pi * s))
 
 
 @njit(cache=True)
-def likelihoods(y, x, status, quiet, p, noisy, mean, cov, out):  # type: ignore[no-untyped-def]
+def _blind(y, x, p, mean, cov, out):  # type: ignore[no-untyped-def]
+    """Log-likelihood of one sample where x jumps about: only a y that does not join in says something, one bit at most."""
+    noise, constant = np.sqrt(p[0]), np.sqrt(p[1])
+    level = mean[1, 0] if cov[1, 0] < p[2] ** 2 / 2 else y
+    out[:] = 0.0
+    for m, value in ((1, level), (2, 0.0)):
+        if abs(y - value) > 3.5 * constant:
+            out[m] = -4.0
+        elif abs(x - value) > 5 * noise:
+            out[m] = 0.69
+    s = cov[1, 0] + p[1]
+    mean[1, 0] += cov[1, 0] / s * (y - mean[1, 0])
+    cov[1, 0] *= p[1] / s
+
+
+@njit(cache=True)
+def likelihoods(y, x, status, quiet, p, noisy, row, mean, cov, out):  # type: ignore[no-untyped-def]
     """Log-likelihood of one sample under every model; where nothing moves, a zero reading speaks for no fault."""
-    floor = _OUTLIER - np.log(p[2])
+    if status == SILENT:
+        out[:] = _SILENT_COST
+        out[2] = 0.0
+        return
+    if status == BLIND:
+        _blind(y, x, p, mean, cov, out)
+        return
+    _update(y, x, p, noisy, mean, cov, out)
     for m in range(out.size):
-        if status == SILENT:
-            out[m] = 0.0 if m == 2 else _SILENT_COST
-        elif status == BLIND:
-            # x jumps about between samples: only a y that does not join in says something, at most one bit a sample
-            out[m] = 0.0
-            if m in (1, 2):
-                level = mean[1, 0] if m == 1 and cov[1, 0] < p[2] ** 2 / 2 else (y if m == 1 else 0.0)
-                if abs(y - level) > 3.5 * p[1]:
-                    out[m] = -4.0
-                elif abs(x - level) > 5 * p[0]:
-                    out[m] = 0.69
-                _step(m, y, x, p, noisy, mean, cov)
-        else:
-            out[m] = max(_step(m, y, x, p, noisy, mean, cov), floor)
-            if m >= _FIRST_NOISY:
-                out[m] -= p[6]
-            elif m == 3:
-                out[m] -= 0.02
-    if quiet and status == PAIR:
-        if abs(mean[1, 0]) < 3 * p[0]:
+        out[m] = max(out[m], p[8])
+        if row[m] == NOISY:
+            out[m] -= p[10]
+        elif row[m] != HEALTHY:
+            out[m] -= _FAULT_COST
+    if quiet:
+        if abs(mean[1, 0]) < 3 * np.sqrt(p[0]):
             out[1] = min(out[1], out[0])
         out[2] = min(out[2], out[0])
 
@@ -186,18 +220,19 @@ def segment_evidence(y: Array, x: Array, status: NDArray[np.int8], quiet: NDArra
     Array, shape (5,)
         Natural log; the best of its models for each row.
     """
-    by_model = _scan_evidence(y, x, status, quiet, model.packed(), NOISY_MODELS, MODELS)
+    by_model = _scan_evidence(y, x, status, quiet, model.packed(), NOISY_MODELS, ROW_OF_MODEL)
     return np.array([by_model[i == ROW_OF_MODEL].max() for i in range(len(ROWS))])
 
 
 @njit(cache=True)
-def _scan_evidence(y, x, status, quiet, p, noisy, models):  # type: ignore[no-untyped-def]
+def _scan_evidence(y, x, status, quiet, p, noisy, row):  # type: ignore[no-untyped-def]
+    models = row.size
     out, gain = np.zeros(models), np.zeros(models)
     mean, cov = np.zeros((models, 2)), np.zeros((models, 3))
     for m in range(models):
         enter(m, p, mean, cov)
     for k in range(y.size):
         if status[k] != SKIP:
-            likelihoods(y[k], x[k], status[k], quiet[k], p, noisy, mean, cov, gain)
+            likelihoods(y[k], x[k], status[k], quiet[k], p, noisy, row, mean, cov, gain)
             out += gain
     return out

@@ -6,9 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import maximum_filter1d, minimum_filter1d
 
 from diagnosis import modes
-from diagnosis.noise import rounding_step, slow_mismatch, white_noise, white_part
+from diagnosis.noise import moving_sum, rounding_step, slow_mismatch, white_noise, white_part
 from diagnosis.segments import Run
 from replay.faults import FaultMode, Side
 from replay.machine import Noise
@@ -19,6 +20,8 @@ _MEAN_HEALTHY_S = 60.0
 _EDGE_S = 0.1
 _SPOOL_DELAY_S = 0.005
 _SENSOR_DELAY_S = 0.01
+_AROUND = 11
+_SETTLED = 7
 _FLIPS = 25  # samples in a row on one side of a command that switches to and fro between samples
 
 
@@ -83,6 +86,18 @@ def sample_status(
     return status
 
 
+def unsettled(x: Array, noise: float) -> NDArray[np.bool_]:
+    """Where a reference changes within three samples by more than the noise, shape (n,)."""
+    known = np.nan_to_num(x)
+    return np.asarray(maximum_filter1d(known, _SETTLED) - minimum_filter1d(known, _SETTLED) > 2 * noise)
+
+
+def neighbours(x: Array) -> Array:
+    """Mean of the samples around each one, itself and the next ones left out, shape (n, 1): x but for its quick part."""
+    known = np.nan_to_num(x)
+    return ((moving_sum(known, _AROUND) - moving_sum(known, 3)) / (_AROUND - 3))[:, np.newaxis]
+
+
 def timing_explains(pair: Pair, x: Array, run: Run, mode: FaultMode, share: float) -> bool:
     """Whether a deviation may be nothing but a delay between y and its reference.
 
@@ -134,6 +149,9 @@ def mode_model(pair: Pair, x: Array, status: NDArray[np.int8], tolerance: float)
     # a stuck sensor has no noise left, a stuck valve is still read by a noisy spool sensor
     constant = max(lsb / np.sqrt(12), noise / 50) if pair.side is Side.SENSOR else noise
     rate = 1.0 / period
+    # a command is known to the last digit, a second speed has noise of its own
+    own = white_noise(pair.x[status == modes.PAIR], period) if pair.side is Side.SENSOR else 0.0
+    explained = min(0.5, np.nan_to_num(own) ** 2 / noise**2)
     model = modes.ModeModel(
         noise=noise,
         constant_noise=constant,
@@ -141,5 +159,6 @@ def mode_model(pair: Pair, x: Array, status: NDArray[np.int8], tolerance: float)
         span=pair.span,
         switch_cost=float(np.log(_MEAN_HEALTHY_S * rate * 8)),
         dt=period,
+        own_cost=-0.5 * float(np.log(1.0 - explained)),
     )
     return model, lsb

