@@ -49,8 +49,7 @@ class Channel:
 
     def reversed(self) -> Channel:
         """The same samples backwards."""
-        back = (a[::-1] for a in (self.y, self.x, self.status, self.quiet))
-        return Channel(*(np.ascontiguousarray(a) for a in back))
+        return Channel(self.y[::-1].copy(), self.x[::-1].copy(), self.status[::-1].copy(), self.quiet[::-1].copy())
 
     def evidence(self, model: modes.ModeModel) -> Array:
         """Log-evidence of each row; see `modes.segment_evidence`."""

@@ -142,7 +142,7 @@ def _bridged(runs: list[Run], channel: Channel, model: modes.ModeModel) -> list[
         while len(out) > 1:
             if _one_fault(out[-2], out[-1], channel, model):
                 out[-2:] = [Run(out[-2].start, out[-1].stop, out[-1].row)]
-            elif len(out) > 2 and _interrupted(*out[-3:], channel, model):
+            elif len(out) > 2 and _interrupted(out[-3], out[-2], out[-1], channel, model):
                 out[-3:] = [Run(out[-3].start, out[-1].stop, out[-1].row)]
             else:
                 break

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 
 from diagnosis import modes
@@ -70,12 +71,29 @@ def _epsilon(delta: float, half: float) -> Epsilon:
 
 def _long_run_variance(residual: Array) -> float:
     """Variance of the mean times n: AR(1) inflation of the sample variance."""
-    centred = residual - residual.mean()
-    var = float(centred @ centred) / max(1, residual.size - 1)
+    if residual.size < 2:
+        return 0.0
+    now, before, both = _moments(np.stack((residual - residual.mean(), np.ones_like(residual))))[:3]
+    power = float(now[0, 0] + before[0, 0]) / 2
+    var = power / (residual.size - 1)
     if var <= 0 or residual.size < 8:
         return var
-    rho = min(0.999, max(0.0, float(centred[1:] @ centred[:-1]) / float(centred @ centred)))
+    rho = min(0.999, max(0.0, float(both[0, 0]) / power))
     return var * (1 + rho) / (1 - rho)
+
+
+@njit(cache=True)
+def _moments(rows):  # type: ignore[no-untyped-def]
+    """Products summed over the samples from the second on: rows now, rows before, now with before; (k, k) each."""
+    k, n = rows.shape
+    now, before, both = np.zeros((k, k)), np.zeros((k, k)), np.zeros((k, k))
+    for t in range(1, n):
+        for i in range(k):
+            for j in range(k):
+                now[i, j] += rows[i, t] * rows[j, t]
+                before[i, j] += rows[i, t - 1] * rows[j, t - 1]
+                both[i, j] += rows[i, t] * rows[j, t - 1]
+    return now, before, both
 
 
 def _gain_by_instruments(y: Array, x: Array, instruments: Array, model: modes.ModeModel) -> tuple[float, float]:
@@ -85,8 +103,12 @@ def _gain_by_instruments(y: Array, x: Array, instruments: Array, model: modes.Mo
     part of x that follows the command is free of that. The noise enters by its long-run variance over 0.25 s.
     """
     base = np.column_stack([instruments, np.ones_like(x)])
-    driven = base @ np.linalg.lstsq(base, x, rcond=None)[0]
-    design = np.column_stack([driven, np.ones_like(x)])
+    gram = np.einsum("ni,nj->ij", base, base)
+    driven = np.einsum("ni,i->n", base, np.linalg.lstsq(gram, np.einsum("ni,n->i", base, x), rcond=None)[0])
+    ones = float(x.size)
+    across = float(driven.sum())
+    normal = np.array([[float(np.sum(driven * driven)), across], [across, ones]])
+    seen = np.array([float(np.sum(driven * y)), float(y.sum())])
     rest = y - _PRIOR[0] * x
     rest = rest - rest.mean()
     length = max(1, round(0.25 / model.dt))
@@ -97,8 +119,8 @@ def _gain_by_instruments(y: Array, x: Array, instruments: Array, model: modes.Mo
         variance = float(np.var(rest)) * length / 5
     variance = max(variance, model.noise**2)
     ridge = np.diag([1 / 0.3**2, 1 / (0.06 * model.span) ** 2])
-    covariance = np.linalg.inv(ridge + design.T @ design / variance)
-    theta = covariance @ (ridge @ _PRIOR + design.T @ y / variance)
+    covariance = np.linalg.inv(ridge + normal / variance)
+    theta = covariance @ (ridge @ _PRIOR + seen / variance)
     return float(theta[0]), float(np.sqrt(covariance[0, 0]))
 
 
@@ -108,16 +130,18 @@ def _gain_with_drift(y: Array, x: Array, model: modes.ModeModel) -> tuple[float,
     ridge = np.diag([1 / 0.3**2, 1 / (0.1 * model.span) ** 2])
     rho, sigma = 0.0, spread
     theta: Array = _PRIOR
-    design = np.stack([x, np.ones_like(x)], axis=1)
+    now, before, both = _moments(np.stack((x, np.ones_like(x), y)))
     covariance = np.asarray(np.linalg.inv(ridge), dtype=np.float64)
     for _ in range(6):
-        a = (design[1:] - rho * design[:-1]) / sigma
-        b = (y[1:] - rho * y[:-1]) / sigma
-        information = ridge + a.T @ a
-        covariance = np.asarray(np.linalg.inv(information), dtype=np.float64)
-        theta = np.asarray(covariance @ (ridge @ _PRIOR + a.T @ b), dtype=np.float64)
-        residual = np.asarray(y - design @ theta, dtype=np.float64)
-        norm = float(residual[:-1] @ residual[:-1])
-        rho = min(0.9995, max(0.0, float(residual[1:] @ residual[:-1]) / norm)) if norm > 0 else 0.0
-        sigma = max(float(np.std(residual[1:] - rho * residual[:-1])), 1e-9 * model.span)
+        # products of what is left of [x, 1, y] when ρ times the sample before is taken away
+        left = now - rho * (both + both.T) + rho**2 * before
+        covariance = np.asarray(np.linalg.inv(ridge + left[:2, :2] / sigma**2), dtype=np.float64)
+        theta = np.asarray(covariance @ (ridge @ _PRIOR + left[:2, 2] / sigma**2), dtype=np.float64)
+        weights = np.append(-theta, 1.0)
+        norm = float(weights @ before @ weights)
+        rho = min(0.9995, max(0.0, float(weights @ both @ weights) / norm)) if norm > 0 else 0.0
+        left = now - rho * (both + both.T) + rho**2 * before
+        mean = float(weights @ (now[:, 1] - rho * before[:, 1])) / (y.size - 1)
+        power = float(weights @ left @ weights) / (y.size - 1) - mean**2
+        sigma = max(float(np.sqrt(max(power, 0.0))), 1e-9 * model.span)
     return float(theta[0]), float(np.sqrt(covariance[0, 0]))

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import uniform_filter1d
 
 from replay.resolution import rounding_step as rounding_step
 from replay.resolution import white_noise as white_noise
@@ -17,6 +18,7 @@ Array = NDArray[np.float64]
 
 COARSE_STEP_S = 0.005  # slower logs do not fix the delay between a command and its measurement
 _COARSE_SHARE = 0.3
+_PLACES = 4000
 
 
 def moving_sum(x: NDArray[np.float64] | NDArray[np.bool_], width: int) -> Array:
@@ -95,14 +97,19 @@ def relative_lag(y: Array, x: Array, use: NDArray[np.bool_], least_lag: int, max
     moving &= smooth >= np.quantile(smooth[moving], 0.7)
     places = np.flatnonzero(moving)
     places = places[(places > max_lag) & (places < y.size - max_lag - 1)]
-    places = places[:: max(1, places.size // 20_000)]
+    places = places[:: max(1, places.size // _PLACES)]
     if places.size < 50:
         return 0.0
+    there = y[places]
 
     def misfit(lag: float) -> float:
         whole = int(np.floor(lag))
-        moved = (1 - (lag - whole)) * x[places - whole] + (lag - whole) * x[places - whole - 1]
-        return float(np.nanmedian(np.abs(y[places] - moved)))
+        off = np.abs(there - x[places - whole])
+        if lag != whole:
+            off = np.abs(there - (1 - (lag - whole)) * x[places - whole] - (lag - whole) * x[places - whole - 1])
+        half = off.size // 2
+        middle = float(np.partition(off, half)[half])
+        return float(np.nanmedian(off)) if np.isnan(off.max()) else middle
 
     best, least = 0.0, misfit(0.0)
     for reach, step in ((max_lag, 1.0), (0.5, 0.1)):
@@ -153,11 +160,11 @@ def unresolved(
     kept = use & np.isfinite(residual) & np.isfinite(x)
     white = np.where(kept, white_part(x), 0.0)
     width = max(3, round(0.3 / dt))
-    power = moving_sum(white**2, width) / width
+    power = uniform_filter1d(white**2, width, mode="constant")
     lively = power > (3 * noise) ** 2
     share = _COARSE_SHARE if dt >= COARSE_STEP_S else 0.0
     if np.count_nonzero(lively) >= 10 * width:
-        seen = moving_sum(np.where(kept, residual, 0.0) ** 2, width) / width
+        seen = uniform_filter1d(np.where(kept, residual, 0.0) ** 2, width, mode="constant")
         share = max(share, float(np.median(seen[lively] / power[lively])))
     if share <= 0.05:
         return np.zeros(x.size, dtype=np.bool_), 0.0
