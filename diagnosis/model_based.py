@@ -1,6 +1,9 @@
-"""Model evidence: a wheel judged by its valve command and speed alone, or with one of them measured twice."""
+"""Model evidence: wheels judged by valve openings and speeds alone, or with one of them measured twice."""
 
 from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -8,202 +11,274 @@ from numpy.typing import NDArray
 from diagnosis import wheel_filter as wf
 from diagnosis import wheel_scan as ws
 from diagnosis.assessment import CODE, Assessment, Finding
-from diagnosis.noise import COARSE_STEP_S, moving_sum, quick_noise, rounding_step, slow_mismatch, white_noise
-from diagnosis.wheel_findings import WheelData, judge
+from diagnosis.mode_path import first_lasting
+from diagnosis.modes import PAIR
+from diagnosis.noise import moving_sum, quick_noise, rounding_step, slow_mismatch, white_noise
+from diagnosis.wheel_blocks import WheelBlocks, blocks_of, per_sample
+from diagnosis.wheel_findings import Run, judge, onset_sentence, refined
+from diagnosis.wheel_runs import runs_of
 from replay.faults import FaultMode, Side, State
-from replay.machine import Limits, WheelPlant
+from replay.machine import Limits, Noise, WheelPlant
 
 Array = NDArray[np.float64]
 
 _MEAN_HEALTHY_S = 60.0
-_MOST = 0.6
-_LEAST_DISTURBANCE_S = 3.0
+_LEAST_LOAD, _MOST_LOAD = 0.0175, 0.1  # of the span
+_TYRES = (0.06, 0.125, 0.25)  # largest load of a tyre, of the span
+_TRIAL_S = 60.0
+_HOLD_S = 0.1
+_DOUBTED = 0.02  # probability of a fault from which on slip and a sensor's loss are not told apart
+_REASONS = {
+    State.NOT_EXCITED: "the wheel is neither commanded nor moving",
+    State.MASKED: "the speed sensor that would show it delivers nothing usable",
+    State.NOT_ASSESSED: "the wheel model is too uncertain here, or no single fault explains it well enough",
+    State.NO_DATA: "no samples",
+    State.SLIP: "the wheel breaks the parity of the body while it obeys its valve: it slips, or its sensor is off",
+}
 
 
-def filter_model(data: WheelData, plant: WheelPlant, residual: Array) -> wf.WheelFilterModel:
-    """Constants of the filter: noise and load are found from the mission."""
-    pair = data.status == 1
-    fresh = data.y[pair]
+@dataclass(frozen=True)
+class WheelsData:
+    """All wheels of a machine; arrays are (n, wheels).
+
+    Attributes
+    ----------
+    y, u : Array
+        Measured speed [m/s] and valve opening [fraction], the second measurement where there is one.
+    status : NDArray[np.int8]
+        As in `diagnosis.modes`.
+    quiet, slip : NDArray[np.bool_]
+        Where a wheel is neither commanded nor moving, and where it breaks the parity of the body.
+    ratio, turn : Array
+        As in `WheelBlocks`; NaN without geometry.
+    measured : Sequence[bool]
+        Whether a wheel's opening is the measured one, so that its valve is judged elsewhere.
+    plants : Sequence[WheelPlant | None]
+        Wheel models; None where a wheel cannot be judged.
+    noise : Sequence[Noise]
+        Known noise of the speeds.
+    names : Sequence[tuple[str, str]]
+        Names of speed and opening.
+    span, flow : float
+        Largest plausible speed and what the pump feeds, as a sum of speeds [m/s].
+    coupling : str
+        ``auto``, ``free`` or ``ground``.
+    dt : float
+        Step [s].
+    """
+
+    y: Array
+    u: Array
+    status: NDArray[np.int8]
+    quiet: NDArray[np.bool_]
+    slip: NDArray[np.bool_]
+    ratio: Array
+    turn: Array
+    measured: Sequence[bool]
+    plants: Sequence[WheelPlant | None]
+    noise: Sequence[Noise]
+    names: Sequence[tuple[str, str]]
+    span: float
+    flow: float
+    coupling: str
+    dt: float
+
+
+def filter_model(data: WheelsData, i: int, residual: Array) -> wf.WheelFilterModel:
+    """Constants of one wheel's filter: noise and load are found from the mission where the machine file has none."""
+    plant = data.plants[i]
+    assert plant is not None
+    pair, y = data.status[:, i] == PAIR, data.y[:, i]
+    fresh = y[pair]
     period = data.dt * (float(np.median(np.diff(np.flatnonzero(pair)[:20_000]))) if fresh.size > 1 else 1.0)
-    lsb = data.noise.lsb if data.noise.lsb is not None else rounding_step(fresh)
-    white = data.noise.std or float(np.nan_to_num(white_noise(fresh, period)))
-    width = max(3, round(0.5 / data.dt))
-    changing = moving_sum(np.diff(data.y, prepend=data.y[:1]) != 0, width) > 0.1 * width
-    quick = quick_noise(np.where(pair & ~data.quiet & changing, residual, np.nan), data.dt)
-    noise = max(white, float(np.nan_to_num(quick)), lsb / np.sqrt(12), 1e-4 * data.span)
-    load = slow_mismatch(residual - data.common, pair & ~data.quiet, data.dt)
+    known = data.noise[i]
+    lsb = known.lsb if known.lsb is not None else rounding_step(fresh)
+    white = known.std or float(np.nan_to_num(white_noise(fresh, period)))
+    rounding = lsb / np.sqrt(12)
+    noise = max(float(np.hypot(white, rounding)) if known.std else white, rounding, 1e-4 * data.span)
+    if period > 0.005:  # too slow to tell noise from motion by steps alone
+        width = max(3, round(0.5 / data.dt))
+        changing = moving_sum(np.diff(y, prepend=y[:1]) != 0, width) > 0.1 * width
+        quick = quick_noise(np.where(pair & ~data.quiet[:, i] & changing, residual, np.nan), data.dt)
+        noise = max(noise, float(np.nan_to_num(quick)))
+    load = plant.load
+    if load is None:
+        load = float(np.nan_to_num(slow_mismatch(residual, pair & ~data.quiet[:, i], data.dt)))
     return wf.WheelFilterModel(
         K=plant.K,
         tau=plant.tau,
         noise=noise,
-        constant_noise=max(lsb / np.sqrt(12), noise / 50),
-        load=max(float(np.nan_to_num(load)), noise, 0.02 * data.span),
-        load_s=3.0,
+        constant_noise=max(rounding / 3, noise / 50) if noise > rounding else noise,
+        rounding=max(rounding, 1e-5 * data.span),
+        load=max(min(load, _MOST_LOAD * data.span), _LEAST_LOAD * data.span, 0.5 * noise),
         span=data.span,
         valve_span=0.15 if data.span < 1.5 * plant.K else 0.5 * data.span / plant.K,
-        switch_cost=float(np.log(_MEAN_HEALTHY_S / period * 8)),
-        dt=data.dt,
+        offset=plant.offset,
+        measured=data.measured[i],
     )
 
 
-def assess_wheel(
-    data: WheelData, plant: WheelPlant, residual: Array, slip: NDArray[np.bool_], limits: Limits, *, gains: bool
-) -> tuple[Assessment, Assessment]:
-    """Judge sensor and actuator of a wheel by its model.
+def assess_wheels(
+    data: WheelsData, residual: Array, limits: Limits, *, gains: bool
+) -> dict[int, tuple[Assessment, Assessment]]:
+    """Judge sensor and actuator of every wheel that has a model.
 
     Parameters
     ----------
-    data : WheelData
+    data : WheelsData
         Channels.
-    plant : WheelPlant
-        Wheel model.
-    residual : Array, shape (n,)
+    residual : Array, shape (n, wheels)
         y − K·lowpass(u) [m/s].
-    slip : NDArray[np.bool_], shape (n,)
-        Where the wheel breaks the parity of the body.
     limits : Limits
         What counts.
     gains : bool
-        Whether the model is good enough to judge gains and the valve by.
+        Whether the models are good enough to judge gains and valves by.
 
     Returns
     -------
-    tuple[Assessment, Assessment]
-        Sensor and actuator.
+    dict[int, tuple[Assessment, Assessment]]
+        Sensor and actuator by wheel.
     """
-    model = filter_model(data, plant, residual)
-    path = wf.most_probable(data.y, data.u, data.common, data.slack, data.status, data.quiet, model)
+    dead = np.array([0.0 if p is None else p.dead for p in data.plants])
+    blocks = blocks_of(data.y, data.u, data.status, data.quiet, data.ratio, data.turn, dead, data.dt)
+    model = wf.JointModel(
+        wheels=tuple(None if p is None else filter_model(data, i, residual[:, i]) for i, p in enumerate(data.plants)),
+        flow=data.flow,
+        switch_cost=float(np.log(_MEAN_HEALTHY_S / blocks.dt * 12)),
+    )
+    model = _coupled(blocks, model, data)
+    done = wf.forward(blocks, model)
+    return {
+        i: _one_wheel(i, data, blocks, model, done, limits, gains) for i, w in enumerate(model.wheels) if w is not None
+    }
+
+
+def _coupled(blocks: WheelBlocks, model: wf.JointModel, data: WheelsData) -> wf.JointModel:
+    """Tyres on the ground or wheels in the air: whichever explains a minute of driving best."""
+    if data.coupling == "free" or not np.isfinite(blocks.ratio).any():
+        return model
+    trials = [model.on_ground(share * data.span) for share in _TYRES]
+    if data.coupling != "ground":
+        trials.insert(0, model)
+    driven = np.flatnonzero(~blocks.quiet.all(axis=1))
+    if not driven.size:
+        return trials[0]
+    length = round(_TRIAL_S / blocks.dt)
+    middle = int(np.clip(driven[driven.size // 2] - length // 2, 0, max(0, blocks.y.shape[0] - length)))
+    part = blocks.part(middle, middle + length)
+    return max(trials, key=lambda trial: wf.forward(part, trial).evidence)
+
+
+def _one_wheel(
+    i: int,
+    data: WheelsData,
+    blocks: WheelBlocks,
+    model: wf.JointModel,
+    done: wf.JointPass,
+    limits: Limits,
+    gains: bool,
+) -> tuple[Assessment, Assessment]:
+    """Runs, findings, states and columns of one wheel."""
+    own = model.wheels[i]
+    assert own is not None
+    y, size, width = data.y[:, i], data.y.shape[0], blocks.width
+    path, entered = wf.most_probable(done, i)
+    runs = runs_of(path, entered, blocks.quiet[:, i], blocks.status[:, i], blocks.dt)
+    found = wf.evidence_of_runs(blocks, model, done, i, runs)
+    raised = done.best[:, i] != ws.HEALTHY
     findings: list[Finding] = []
-    doubtful = np.zeros(data.y.size, dtype=np.bool_)
-    for start, stop, kind in _runs(path, data, model):
-        finding = judge(start, stop, kind, data, model, limits, gains)
-        if finding is None:
+    opened = {side: np.zeros(size, dtype=np.bool_) for side in (Side.SENSOR, Side.ACTUATOR)}
+    delta = {side: np.ones(size) for side in opened}
+    for r, m in enumerate(runs.model):
+        if m == ws.HEALTHY:
             continue
-        if _holds(finding, data, limits):
-            findings.append(finding)
-        else:
-            doubtful[start:stop] = True
+        first, last = int(runs.start[r]), int(runs.stop[r])
+        start = refined(first * width, y, 2 * width, int(m), own.noise)
+        after = int(runs.model[r + 1]) if r + 1 < runs.model.size else ws.HEALTHY
+        stop = min(size, last * width)
+        if after == ws.HEALTHY and stop < size:
+            stop = (
+                refined(stop, y, 2 * width, int(m), own.noise)
+                if m not in (ws.S_STUCK, ws.S_NONE)
+                else _release(stop, y, 2 * width)
+            )
+        if stop <= start:
+            continue
+        run = Run(start, stop, int(m), found.evidence[r], found.mean[r], found.cov[r])
+        verdict = judge(run, y[start:stop], own, limits, data.names[i], data.dt, gains=gains)
+        for side in verdict.open_sides:
+            opened[side][start:stop] = True
+        if verdict.finding is None:
+            continue
+        causal = first_lasting(raised, first, last, 2, max(1, round(_HOLD_S / blocks.dt)))
+        seen = None if causal is None else max(start, min(causal * width, stop - 1))
+        shape = onset_sentence(start, y, own.noise, data.names[i][0], verdict.finding.side)
+        finding = replace(verdict.finding, detected=seen, evidence=(*verdict.finding.evidence, shape))
+        findings.append(finding)
+        if finding.epsilon is not None and finding.side in delta:
+            delta[finding.side][start:stop] = 1 - finding.epsilon.value
+    return _assessments(i, data, own, done, found, findings, opened, delta, gains, width)
+
+
+def _release(stop: int, y: Array, reach: int) -> int:
+    """First sample at which a constant sensor moves again."""
+    low, high = max(1, stop - reach), min(y.size, stop + reach + 1)
+    moved = np.flatnonzero(np.nan_to_num(y[low:high] - y[low - 1 : high - 1]) != 0)
+    return low + int(moved[0]) if moved.size else stop
+
+
+def _assessments(
+    i: int,
+    data: WheelsData,
+    own: wf.WheelFilterModel,
+    done: wf.JointPass,
+    found: wf.RunEvidence,
+    findings: list[Finding],
+    opened: dict[Side, NDArray[np.bool_]],
+    delta: dict[Side, Array],
+    gains: bool,
+    width: int,
+) -> tuple[Assessment, Assessment]:
+    y, quiet, slip, size = data.y[:, i], data.quiet[:, i], data.slip[:, i], data.y.shape[0]
     sensor = [f for f in findings if f.side in (Side.SENSOR, Side.SENSOR_OR_ACTUATOR)]
     actuator = [f for f in findings if f.side in (Side.ACTUATOR, Side.SENSOR_OR_ACTUATOR)]
-    base = np.where(data.quiet, CODE[State.NOT_EXCITED], CODE[State.HEALTHY]).astype(np.int8)
-    base[~np.isfinite(data.y) & (data.status != 2)] = CODE[State.NO_DATA]
+    base = np.where(quiet, CODE[State.NOT_EXCITED], CODE[State.HEALTHY]).astype(np.int8)
+    base[~np.isfinite(y) & (data.status[:, i] != 2)] = CODE[State.NO_DATA]
     states_s, states_a = base.copy(), base.copy()
-    states_a[~np.isfinite(data.u)] = CODE[State.NO_DATA]
-    states_s[(doubtful | (not gains)) & (states_s == CODE[State.HEALTHY])] = CODE[State.NOT_ASSESSED]
-    states_s[slip & (states_s == CODE[State.HEALTHY])] = CODE[State.SLIP]
-    blind = doubtful | (not gains) | (data.slack > 0)
-    states_a[blind & (states_a == CODE[State.HEALTHY])] = CODE[State.NOT_ASSESSED]
+    states_a[~np.isfinite(data.u[:, i])] = CODE[State.NO_DATA]
+    healthy = CODE[State.HEALTHY]
+    states_s[(opened[Side.SENSOR] | (not gains)) & (states_s == healthy)] = CODE[State.NOT_ASSESSED]
+    if own.grip_most > 0:  # wheels in the air obey their own valves, not the body
+        doubted = np.asarray(per_sample(done.fault[:, i], width, size)) > _DOUBTED
+        states_s[slip & doubted & (states_s == healthy)] = CODE[State.SLIP]
+    states_a[(opened[Side.ACTUATOR] | (not gains)) & (states_a == healthy)] = CODE[State.NOT_ASSESSED]
     for f in sensor:
         states_s[f.start : f.stop] = CODE[State(f.mode.value)]
         if f.side is Side.SENSOR and f.mode in (FaultMode.STUCK, FaultMode.NO_SIGNAL):
             states_a[f.start : f.stop] = CODE[State.MASKED]
     for f in actuator:
         states_a[f.start : f.stop] = CODE[State(f.mode.value)]
-    reasons = {
-        State.NOT_EXCITED: "the wheel is neither commanded nor moving",
-        State.MASKED: "the speed sensor that would show it delivers nothing usable",
-        State.NOT_ASSESSED: "the wheel model does not hold here (too uncertain, or the pump at its limit), or no single fault explains it",
-        State.NO_DATA: "no samples",
-        State.SLIP: "the wheel breaks the parity of the body while it obeys its valve: it slips, or its sensor is off",
+    covered = np.zeros(size, dtype=np.bool_)
+    for f in findings:
+        covered[f.start : f.stop] = True
+    expected = np.asarray(per_sample(found.expected, width, size))
+    spread = np.asarray(per_sample(found.spread, width, size))
+    shared = {
+        "residual": np.where(data.status[:, i] == PAIR, y - expected, np.nan),
+        "threshold": 3 * np.sqrt(spread + own.noise**2),
+        "expected": expected,
+        "probability": np.asarray(per_sample(done.fault[:, i], width, size)),
     }
-    unexplained = float(np.count_nonzero(doubtful & ~data.quiet)) * data.dt
-    v, var, g, g_var, b, b_var = path.track
-    series = {
-        "residual": np.where(data.status == 1, data.y - v, np.nan),
-        "threshold": 3 * np.sqrt(var + model.noise**2),
-        "expected": v,
-    }
-    on_sensor = (path.model >= ws.S_STUCK) & (path.model <= ws.S_WHITE_25)
-    on_actuator = path.model >= ws.A_GAIN
-    per_side = [
-        {
-            **series,
-            "delta": np.where(mine, g, 1.0),
-            "delta_std": np.sqrt(np.where(mine, g_var, 0.0)),
-            "delta_bar": np.where(mine, b, 0.0),
-            "delta_bar_std": np.sqrt(np.where(mine, b_var, 0.0)),
-        }
-        for mine in (on_sensor, on_actuator)
-    ]
-    per_side[1]["delta_bar"] = per_side[1]["delta_bar"] / model.K
-    per_side[1]["delta_bar_std"] = per_side[1]["delta_bar_std"] / model.K
+    air = own.grip_most <= 0
     note = (
-        f"{data.names[0]} by the wheel model with {data.names[1]}: noise {model.noise:.2g} m/s, load and model error "
-        f"{model.load:.2g} m/s, K {model.K:.3g} m/s per full opening, τ {model.tau:.2g} s."
+        f"{data.names[i][0]} by the wheel model with {data.names[i][1]}: noise {own.noise:.2g} m/s, load and model error "
+        f"{own.load:.2g} m/s, K {own.K:.3g} m/s per full opening, τ {own.tau:.2g} s, "
+        + ("no coupling by the ground." if air else f"tyres that hold up to {own.grip_most:.2g} m/s of load.")
     )
-    return (
-        Assessment(states_s, reasons, tuple(sensor), per_side[0], "model", (note,), unexplained),
-        Assessment(states_a, reasons, tuple(actuator), per_side[1], "model", (note,), unexplained),
-    )
-
-
-def _holds(finding: Finding, data: WheelData, limits: Limits) -> bool:
-    """Whether a finding may be stated: probable enough, and a valve's not resting on a model in doubt."""
-    if finding.tier == "signal":
-        return True
-    if finding.probability < limits.min_probability:
-        return False
-    if finding.stop - finding.start > _MOST * np.count_nonzero(data.status == 1):
-        return False  # noise and model come from the same mission: what fills it cannot be told from their error
-    if finding.side is Side.SENSOR:
-        return True
-    if finding.mode is FaultMode.NOISY and finding.epsilon is not None and finding.epsilon.low < 0:
-        return False  # the data do not even say that something is lost
-    seconds = (finding.stop - finding.start) * data.dt
-    if finding.mode is FaultMode.NOISY and seconds < _LEAST_DISTURBANCE_S:
-        return False
-    if data.dt >= COARSE_STEP_S and finding.mode is not FaultMode.INEFFICIENT:
-        return False  # in a slow log a valve that does not answer and one whose sensor lost gain look alike
-    in_doubt = float(np.mean(data.slack[finding.start : finding.stop] > 0))
-    possible = finding.epsilon is None or 0 < finding.epsilon.value < 1.1
-    return in_doubt < 0.3 and possible
-
-
-def _runs(path: wf.WheelPath, data: WheelData, model: wf.WheelFilterModel) -> list[tuple[int, int, int]]:
-    """Faulty runs (start, stop, model); short ones join a longer faulty neighbour, quiet ends are cut."""
-    rows = ws.ROW[path.model]
-    anew = path.entered & np.isin(rows, (1, 3, 5, 6))
-    cut = np.flatnonzero(np.r_[True, (rows[1:] != rows[:-1]) | anew[1:]])
-    runs = [[int(a), int(b), int(path.model[b - 1])] for a, b in zip(cut, np.r_[cut[1:], rows.size], strict=True)]
-    short = max(3, round(0.05 / data.dt))
-    runs = _episodes(runs, round(0.1 / data.dt))
-    k = 0
-    while k < len(runs):
-        a, b, m = runs[k]
-        if m != ws.HEALTHY and b - a < short:
-            near = [j for j in (k + 1, k - 1) if 0 <= j < len(runs) and runs[j][2] != ws.HEALTHY]
-            near = [j for j in near if runs[j][1] - runs[j][0] >= short]
-            if near:
-                j = near[0]
-                runs[min(j, k) : max(j, k) + 1] = [[min(a, runs[j][0]), max(b, runs[j][1]), runs[j][2]]]
-                k = max(0, min(j, k) - 1)
-                continue
-        k += 1
     out = []
-    for a, b, m in runs:
-        if m == ws.HEALTHY:
-            continue
-        keep = np.flatnonzero(~data.quiet[a:b] | (data.status[a:b] == 2))
-        if m in (ws.S_STUCK, ws.S_DRIFT, ws.S_WHITE_3, ws.S_WHITE_8, ws.S_WHITE_25, ws.A_STUCK):
-            out.append((a, b, m))
-        elif keep.size:
-            out.append((a + int(keep[0]), a + int(keep[-1]) + 1, m))
-    return out
-
-
-def _episodes(runs: list[list[int]], gap: int) -> list[list[int]]:
-    """Join valve faults that follow each other within `gap` samples; which row they are is judged as a whole."""
-    out: list[list[int]] = []
-    for a, b, m in runs:
-        if m >= ws.A_GAIN:
-            if out and out[-1][2] >= ws.A_GAIN:
-                longer = out[-1][2] if out[-1][1] - out[-1][0] >= b - a else m
-                out[-1] = [out[-1][0], b, longer]
-                continue
-            if len(out) > 1 and out[-1][2] == ws.HEALTHY and out[-1][1] - out[-1][0] < gap and out[-2][2] >= ws.A_GAIN:
-                out.pop()
-                longer = out[-1][2] if out[-1][1] - out[-1][0] >= b - a else m
-                out[-1] = [out[-1][0], b, longer]
-                continue
-        out.append([a, b, m])
-    return out
+    for side, states, faults in ((Side.SENSOR, states_s, sensor), (Side.ACTUATOR, states_a, actuator)):
+        loose = opened[side] & ~covered & ~quiet
+        columns = {**shared, "delta": delta[side]}
+        seconds = float(np.count_nonzero(loose)) * data.dt
+        out.append(Assessment(states, _REASONS, tuple(faults), columns, "model", (note,), seconds))
+    return out[0], out[1]

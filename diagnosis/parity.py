@@ -15,7 +15,7 @@ from replay.kinematics import low_pass, speed_ratios
 Array = NDArray[np.float64]
 
 _SMOOTH_HZ = 1.5
-_SHARE = 0.10
+_SHARE = 0.25
 _DOUBTFUL_ANGLE = 0.15
 
 

@@ -1,21 +1,23 @@
-"""Which fault of either side holds on a wheel of which only u and v are known: mode-conditioned Kalman filters.
+"""Which fault of either side holds on which wheel, where only openings and speeds are known: filters of all wheels.
 
-Wheel: τ·v̇ = −v + K(δ_a·u + b_a) + load; sensor: y = δ_s·v + b_s + n. The state of every model is [ν, g, b, c]:
-ν the speed as the sensor scales it, g the unknown gain, b the load or actuator bias as a speed, c the stuck value or
-the sensor's bias. A sensor's loss of gain scales ν at once when the model is entered; an actuator's only bends it, so
-the shape of an onset tells the two apart without a test of its own. As in `modes`, Viterbi's recursion keeps the most
-probable entry of each model.
+Wheel: τ·v̇ = −v + K(δ_a·u + b_a)·share + load; sensor: y = δ_s·v + b_s + n. Every row of the two tables is a Kalman
+model, and Viterbi's recursion keeps the most probable entry of each. A sensor's loss of gain scales ν at once when its
+model is entered; an actuator's only bends it, so the shape of an onset tells the two apart without a test of its own.
+The wheels share one pump and, on the ground, one body: `wheel_joint` runs them side by side.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from diagnosis.modes import PAIR, STAY, trace
-from diagnosis.wheel_scan import HEALTHY, MODELS, WHITE, enter, scan, scan_evidence
+from diagnosis import wheel_joint
+from diagnosis.modes import STAY, trace
+from diagnosis.wheel_blocks import WheelBlocks
+from diagnosis.wheel_runs import Runs
+from diagnosis.wheel_scan import A_GAIN, HEALTHY, MODELS, WheelConstants, enter
 
 Array = NDArray[np.float64]
 
@@ -34,175 +36,272 @@ class WheelFilterModel:
         White noise of the speed sensor [m/s].
     constant_noise : float
         Noise left in a stuck sensor: its rounding [m/s].
+    rounding : float
+        Noise of the rounding alone [m/s].
     load : float
         Standard deviation of load and model error, as a speed [m/s].
-    load_s : float
-        Correlation time of the load [s].
     span : float
         Largest plausible speed [m/s].
     valve_span : float
         Standard deviation of a stuck valve's opening [fraction].
-    switch_cost : float
-        Minus the log-probability of entering a model at one sample.
-    dt : float
-        Step [s].
+    grip : float
+        Load per slip while the tyre holds [1].
+    grip_most : float
+        Largest load that a tyre transmits, as a speed [m/s]; 0 for wheels off the ground.
+    offset : float
+        Constant load, as a speed [m/s].
+    measured : bool
+        Whether the opening is the measured one, so that the valve is judged elsewhere.
     """
 
     K: float
     tau: float
     noise: float
     constant_noise: float
+    rounding: float
     load: float
-    load_s: float
     span: float
     valve_span: float
-    switch_cost: float
-    dt: float
+    grip: float = 2.2
+    grip_most: float = 0.0
+    offset: float = 0.0
+    measured: bool = False
 
-    def packed(self) -> Array:
-        """Parameters in the order of the compiled scan."""
-        return np.array(
-            [
-                self.K,
-                np.exp(-self.dt / self.tau),
-                self.noise,
-                self.constant_noise,
-                self.load,
-                np.exp(-self.dt / self.load_s),
-                self.span,
-                self.valve_span * self.K,
-                self.switch_cost,
-                self.dt,
-            ]
+    load_s = 6.0  # correlation time of the load [s]
+    drift = 0.008  # process noise of the speed [m/s/√s]
+
+    def constants(self, dt: float, raw_dt: float) -> WheelConstants:
+        """Constants for blocks of dt of samples of raw_dt [s]."""
+        return WheelConstants(
+            self.K,
+            dt / self.tau,
+            self.noise,
+            self.constant_noise,
+            self.rounding,
+            self.load,
+            float(np.exp(-dt / self.load_s)),
+            self.drift,
+            self.span,
+            self.valve_span * self.K,
+            self.grip,
+            self.grip_most,
+            self.offset,
+            dt,
+            raw_dt,
         )
 
 
 @dataclass(frozen=True)
-class WheelPath:
-    """Most probable models of a wheel.
+class JointModel:
+    """All wheels and what they share.
 
     Attributes
     ----------
-    model : NDArray[np.uint8], shape (n,)
-        Index into `NAMES`.
-    entered : NDArray[np.bool_], shape (n,)
-        Samples at which a model was entered.
-    track : Array, shape (6, n)
-        Predicted healthy speed and its variance, gain and its variance, bias and its variance of the best model.
+    wheels : tuple[WheelFilterModel | None, ...]
+        None where one is not modelled.
+    flow : float
+        What the pump feeds, as a sum of speeds [m/s].
+    switch_cost : float
+        Minus the log-probability of entering a model in one block.
     """
 
-    model: NDArray[np.uint8]
-    entered: NDArray[np.bool_]
-    track: Array
+    wheels: tuple[WheelFilterModel | None, ...]
+    flow: float
+    switch_cost: float
 
-
-def start_state(first: float, p: Array) -> tuple[Array, Array, Array]:
-    """Scores, means and covariances before the first sample of a mission that may begin with a fault."""
-    score = np.full(MODELS, -0.5 * p[8])
-    score[HEALTHY] = 0.0
-    z, P = np.zeros((MODELS, 4)), np.zeros((MODELS, 4, 4))
-    z[HEALTHY] = [first, 1.0, 0.0, 0.0]
-    P[HEALTHY, 0, 0], P[HEALTHY, 2, 2] = p[6] ** 2, p[4] ** 2
-    for m in range(1, MODELS):
-        enter(m, HEALTHY, p, z, P)
-    return score, z, P
+    def on_ground(self, grip_most: float) -> JointModel:
+        """The same with tyres that transmit `grip_most` [m/s]."""
+        return replace(self, wheels=tuple(None if w is None else replace(w, grip_most=grip_most) for w in self.wheels))
 
 
 @dataclass(frozen=True)
-class WheelFilterState:
-    """What the recursion carries from block to block: score, mean and covariance of every model."""
+class JointState:
+    """What the recursion carries from blocks to blocks.
+
+    Attributes
+    ----------
+    score : Array, shape (wheels, models)
+    mean : Array, shape (wheels, models, 4)
+    cov : Array, shape (wheels, models, 4, 4)
+    spill : Array, shape (wheels, 4)
+        What the last samples' openings still drive in the next block, and the lagged drive.
+    """
 
     score: Array
     mean: Array
     cov: Array
+    spill: Array
 
 
-def initial_state(first: float, model: WheelFilterModel) -> WheelFilterState:
-    """State before the first sample of a mission that may begin with a fault; `first` is the first speed [m/s]."""
-    return WheelFilterState(*start_state(first, model.packed()))
+@dataclass(frozen=True)
+class JointPass:
+    """One run of the recursion over n blocks.
 
-
-def forward(
-    y: Array,
-    u: Array,
-    common: Array,
-    slack: Array,
-    status: NDArray[np.int8],
-    quiet: NDArray[np.bool_],
-    model: WheelFilterModel,
-    state: WheelFilterState,
-) -> tuple[NDArray[np.uint8], Array, WheelFilterState]:
-    """Run the recursion over one block; see `most_probable` for the arguments.
-
-    Returns
-    -------
-    back : NDArray[np.uint8], shape (n, models)
+    Attributes
+    ----------
+    back : NDArray[np.uint8], shape (wheels, n, models)
         Back-pointers.
-    track : Array, shape (6, n)
-        As in `WheelPath`.
-    state : WheelFilterState
-        For the next block.
+    best : NDArray[np.uint8], shape (n, wheels)
+        Most probable model by what came before: a causal reading.
+    fault : Array, shape (n, wheels)
+        Probability by the same that the wheel is not healthy.
+    inputs : Array, shape (n, wheels, 8)
+        Openings as fed, shares, speed and uncertainty of the body (see `wheel_scan.WheelInput`), log-likelihood.
+    state : JointState
+        For the next blocks.
     """
-    back = np.full((y.size, MODELS), STAY, dtype=np.uint8)
-    track = np.zeros((6, y.size))
-    score, z, P = state.score.copy(), state.mean.copy(), state.cov.copy()
-    scan(y, u, common, slack, status, quiet, model.packed(), WHITE, score, z, P, back, track)
-    return back, track, WheelFilterState(score, z, P)
+
+    back: NDArray[np.uint8]
+    best: NDArray[np.uint8]
+    fault: Array
+    inputs: Array
+    state: JointState
+
+    @property
+    def evidence(self) -> float:
+        """Log-likelihood of the most probable paths."""
+        return float(self.inputs[:, :, 7].sum())
 
 
-def most_probable(
-    y: Array,
-    u: Array,
-    common: Array,
-    slack: Array,
-    status: NDArray[np.int8],
-    quiet: NDArray[np.bool_],
-    model: WheelFilterModel,
-) -> WheelPath:
-    """Most probable models of a wheel over a mission.
+def initial_state(first: Array, model: JointModel, dt: float, raw_dt: float) -> JointState:
+    """State before the first block of a mission that may begin with a fault; `first` (wheels,) is the speed [m/s]."""
+    count = len(model.wheels)
+    score = np.full((count, MODELS), -0.5 * model.switch_cost)
+    score[:, HEALTHY] = 0.0
+    mean, cov = np.zeros((count, MODELS, 4)), np.zeros((count, MODELS, 4, 4))
+    for i, wheel in enumerate(model.wheels):
+        if wheel is None:
+            continue
+        k = wheel.constants(dt, raw_dt)
+        mean[i, HEALTHY] = [first[i], 1.0, 0.0, 0.0]
+        cov[i, HEALTHY, 0, 0], cov[i, HEALTHY, 2, 2] = (0.2 * wheel.span) ** 2, 1.0
+        for m in range(1, MODELS):
+            enter(m, HEALTHY, k, mean[i], cov[i])
+    spill = np.zeros((count, 4))
+    spill[:, 3] = first
+    return JointState(score, mean, cov, spill)
+
+
+def first_speeds(blocks: WheelBlocks) -> Array:
+    """First known speed of each wheel [m/s], 0 where there is none."""
+    out = np.zeros(blocks.y.shape[1])
+    for i in range(out.size):
+        known = np.flatnonzero(blocks.count[:, i] > 0)
+        if known.size:
+            out[i] = blocks.y[known[0], i]
+    return out
+
+
+def forward(blocks: WheelBlocks, model: JointModel, state: JointState | None = None) -> JointPass:
+    """Run the recursion; without a state from the mission's beginning."""
+    n, wheels = blocks.y.shape
+    dt, raw_dt = blocks.dt, blocks.raw_dt
+    if state is None:
+        state = initial_state(first_speeds(blocks), model, dt, raw_dt)
+    dummy = WheelFilterModel(1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0)
+    used = [dummy if w is None else w for w in model.wheels]
+    per_opening = np.array([w.K * raw_dt / w.tau for w in used])
+    back = np.full((n, wheels, MODELS), STAY, dtype=np.uint8)
+    best, fault = np.zeros((n, wheels), dtype=np.uint8), np.zeros((n, wheels))
+    inputs = np.zeros((n, wheels, 8))
+    score, mean, cov, spill = (x.copy() for x in (state.score, state.mean, state.cov, state.spill))
+    wheel_joint.forward(
+        blocks.u,
+        blocks.y,
+        blocks.count,
+        blocks.jitter,
+        blocks.unsteady * per_opening,
+        blocks.wander(per_opening),
+        blocks.ratio,
+        blocks.turn,
+        blocks.status,
+        blocks.quiet,
+        np.array([w is not None for w in model.wheels]),
+        np.array([A_GAIN if w.measured else MODELS for w in used]),
+        model.flow,
+        model.switch_cost,
+        tuple(w.constants(dt, raw_dt) for w in used),
+        score,
+        mean,
+        cov,
+        spill,
+        back,
+        best,
+        fault,
+        inputs,
+    )
+    back = np.ascontiguousarray(back.transpose(1, 0, 2))
+    return JointPass(back, best, fault, inputs, JointState(score, mean, cov, spill))
+
+
+def most_probable(done: JointPass, wheel: int) -> tuple[NDArray[np.uint8], NDArray[np.bool_]]:
+    """Most probable models of one wheel, shape (n,), and the blocks at which one was entered."""
+    models, entered = trace(done.back[wheel], int(np.argmax(done.state.score[wheel])))
+    return models, entered
+
+
+@dataclass(frozen=True)
+class RunEvidence:
+    """Every model entered at every run's start and followed to its end.
+
+    Attributes
+    ----------
+    evidence : Array, shape (runs, models)
+        Log-likelihoods over the run.
+    mean, cov : Array, shape (runs, models, 4) and (runs, models, 4, 4)
+        States at its end.
+    expected, spread : Array, shape (n,)
+        Speed that a healthy wheel would have [m/s], carried on by the model alone during faults, and its variance.
+    """
+
+    evidence: Array
+    mean: Array
+    cov: Array
+    expected: Array
+    spread: Array
+
+
+def evidence_of_runs(blocks: WheelBlocks, model: JointModel, done: JointPass, wheel: int, runs: Runs) -> RunEvidence:
+    """Weigh all models over the runs of one wheel's path.
 
     Parameters
     ----------
-    y, u : Array, shape (n,)
-        Measured speed [m/s] and valve opening [fraction] in force since the step before.
-    common : Array, shape (n,)
-        Load shared with the other wheels, as a speed [m/s].
-    slack : Array, shape (n,)
-        Standard deviation of the wheel model's error beyond the load [m/s]; 0 where it holds.
-    status : NDArray[np.int8], shape (n,)
-        As in `diagnosis.modes`.
-    quiet : NDArray[np.bool_], shape (n,)
-        Where the wheel is neither commanded nor moving.
-    model : WheelFilterModel
-        Constants.
+    blocks, model, done
+        As in `forward`, and what it gave.
+    wheel : int
+        Which.
+    runs : Runs
+        Of its path.
     """
-    known = np.flatnonzero(status == PAIR)
-    state = initial_state(float(y[known[0]]) if known.size else 0.0, model)
-    back, track, state = forward(y, u, common, slack, status, quiet, model, state)
-    path, entered = trace(back, int(np.argmax(state.score)))
-    return WheelPath(path, entered, track)
-
-
-def segment_evidence(
-    y: Array,
-    u: Array,
-    common: Array,
-    slack: Array,
-    status: NDArray[np.int8],
-    quiet: NDArray[np.bool_],
-    begin: int,
-    model: WheelFilterModel,
-) -> tuple[Array, Array, Array]:
-    """Log-evidence of every model over samples from `begin` on, after a healthy run-in before it.
-
-    Returns
-    -------
-    evidence : Array, shape (models,)
-        Natural log.
-    mean, covariance : Array, shape (models, 4) and (models, 4, 4)
-        States [ν, g, b, c] at the end.
-    """
-    p = model.packed()
-    known = np.flatnonzero(status == PAIR)
-    _, z, P = start_state(float(y[known[0]]) if known.size else 0.0, p)
-    return scan_evidence(y, u, common, slack, status, quiet, begin, p, WHITE, z, P)  # type: ignore[no-any-return]
+    own = model.wheels[wheel]
+    assert own is not None
+    k = own.constants(blocks.dt, blocks.raw_dt)
+    per_opening = np.array([own.K * blocks.raw_dt / own.tau])
+    n, size = blocks.y.shape[0], runs.model.size
+    evidence, mean, cov = np.zeros((size, MODELS)), np.zeros((size, MODELS, 4)), np.zeros((size, MODELS, 4, 4))
+    expected, spread = np.zeros(n), np.zeros(n)
+    count = A_GAIN if own.measured else MODELS
+    wheel_joint.along_runs(
+        np.ascontiguousarray(blocks.y[:, wheel]),
+        np.ascontiguousarray(blocks.count[:, wheel]),
+        np.ascontiguousarray(blocks.jitter[:, wheel]),
+        blocks.unsteady[:, wheel] * per_opening[0],
+        np.ascontiguousarray(blocks.wander(per_opening)[:, wheel]),
+        np.ascontiguousarray(done.inputs[:, wheel]),
+        np.ascontiguousarray(blocks.status[:, wheel]),
+        np.ascontiguousarray(blocks.quiet[:, wheel]),
+        count,
+        k,
+        runs.entry,
+        runs.stop,
+        runs.model,
+        float(first_speeds(blocks)[wheel]),
+        (0.2 * own.span) ** 2,
+        evidence,
+        mean,
+        cov,
+        expected,
+        spread,
+    )
+    evidence[:, count:] = -np.inf
+    return RunEvidence(evidence, mean, cov, expected, spread)

@@ -1,4 +1,4 @@
-"""One run of a wheel's path turned into a finding: alternatives with their probabilities, ε̂, saturation term, reasons."""
+"""From a wheel's run in one model to a finding: alternatives with probabilities, ε̂ and saturation term, raw-rate edges."""
 
 from __future__ import annotations
 
@@ -7,170 +7,229 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from diagnosis import wheel_filter as wf
 from diagnosis import wheel_scan as ws
 from diagnosis.assessment import Finding
-from diagnosis.noise import COARSE_STEP_S, white_part
 from diagnosis.result import Epsilon, Hypothesis, Sat
+from diagnosis.wheel_filter import WheelFilterModel
 from replay.faults import FaultMode, Side
-from replay.machine import Limits, Noise
+from replay.machine import Limits
 
 Array = NDArray[np.float64]
 
 _TEMPER = 0.1
-_RUN_IN_S = 2.0
+_PRIOR = np.log(np.where(np.arange(ws.MODELS) == ws.HEALTHY, 0.6, 0.4 / (ws.MODELS - 1)))
+_SIDES = (Side.SENSOR, Side.ACTUATOR)
+_LEAST_PART = 0.02  # a hypothesis below this is left out of the text
 
 
 @dataclass(frozen=True)
-class WheelData:
-    """One wheel's channels; shapes (n,).
+class Run:
+    """One stretch of one wheel: samples [start, stop), the path's model, and every model's evidence and state.
 
     Attributes
     ----------
-    y, u : Array
-        Measured speed [m/s] and valve opening [fraction] in force since the step before, the measured one where
-        logged.
-    common : Array
-        Load shared with the other wheels, as a speed [m/s].
-    slack : Array
-        Error of the wheel model beyond the load [m/s]; 0 where it holds.
-    status : NDArray[np.int8]
-        As in `diagnosis.modes`.
-    quiet : NDArray[np.bool_]
-        Where the wheel is neither commanded nor moving.
-    u_measured : bool
-        Whether `u` is the measured opening, so that the valve is judged elsewhere.
+    evidence : Array, shape (models,)
+        Log-likelihoods; −inf where a model is not considered.
+    mean, cov : Array, shape (models, 4) and (models, 4, 4)
+        States at its end.
     """
 
-    y: Array
-    u: Array
-    common: Array
-    slack: Array
-    status: NDArray[np.int8]
-    quiet: NDArray[np.bool_]
-    u_measured: bool
-    dt: float
-    span: float
-    noise: Noise
-    names: tuple[str, str]
+    start: int
+    stop: int
+    model: int
+    evidence: Array
+    mean: Array
+    cov: Array
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """What a run says: a finding or none, and the sides of which it leaves open whether they are healthy."""
+
+    finding: Finding | None
+    open_sides: tuple[Side, ...] = ()
+
+
+def probabilities(run: Run) -> dict[tuple[str, str], float]:
+    """Probability of every row; several models of one row add up.
+
+    The models' errors are no white noise, so that their log-likelihoods count for a tenth (calibrated on simulated
+    missions by `tests/benchmarks/accuracy.py`).
+    """
+    weight = _PRIOR + np.clip(_TEMPER * (run.evidence - run.evidence.max()), -700.0, 0.0)
+    p = np.exp(weight - weight.max())
+    p /= p.sum()
+    out: dict[tuple[str, str], float] = {}
+    for name, q in zip(ws.NAMES, p, strict=True):
+        out[name] = out.get(name, 0.0) + float(q)
+    return out
 
 
 def judge(
-    start: int, stop: int, kind: int, data: WheelData, model: wf.WheelFilterModel, limits: Limits, gains: bool
-) -> Finding | None:
-    """Turn a run into a finding with the alternatives' probabilities; None where it does not hold."""
-    begin = max(0, start - round(_RUN_IN_S / data.dt))
-    part = slice(begin, stop)
-    evidence, z, P = wf.segment_evidence(
-        data.y[part],
-        data.u[part],
-        data.common[part],
-        data.slack[part],
-        data.status[part],
-        data.quiet[part],
-        start - begin,
-        model,
-    )
-    if evidence[kind] - evidence[ws.HEALTHY] < model.switch_cost:
-        return None
-    prior = np.log(np.where(np.arange(ws.MODELS) == ws.HEALTHY, 0.6, 0.05))
-    if data.u_measured:
-        prior[ws.A_GAIN :] = -50.0  # the valve is judged by its own measurement
-    tempered = prior + np.clip(_TEMPER * (evidence - evidence.max()), -700, 0)
-    p = np.exp(tempered - tempered.max())
-    p /= p.sum()
-    use = data.status[start:stop] == 1
-    y = data.y[start:stop][use]
-    pooled: dict[tuple[str, str], float] = {}
-    for name, q in zip(ws.NAMES, p, strict=True):
-        pooled[name] = pooled.get(name, 0.0) + float(q)
-    silent = y.size == 0 or abs(float(np.mean(y))) <= 3 * model.constant_noise
-    if silent and kind in (ws.S_STUCK, ws.S_NONE):  # stuck at zero and no signal are one row of the table
+    run: Run, y: Array, model: WheelFilterModel, limits: Limits, names: tuple[str, str], dt: float, *, gains: bool
+) -> Verdict:
+    """Turn a run into a finding.
+
+    Parameters
+    ----------
+    run : Run
+        The run.
+    y : Array, shape (stop − start,)
+        Measured speed [m/s]; NaN where there is none.
+    model : WheelFilterModel
+        The wheel.
+    limits : Limits
+        What counts.
+    names : tuple[str, str]
+        Speed and opening, for the text.
+    dt : float
+        Step [s].
+    gains : bool
+        Whether the wheel model is good enough to judge gains and the valve by.
+    """
+    pooled = probabilities(run)
+    known = y[np.isfinite(y)]
+    silent = known.size == 0 or abs(float(np.mean(known))) <= 3 * model.rounding
+    if silent and run.model in (ws.S_STUCK, ws.S_NONE):  # stuck at zero and no signal are one row of the table
         pooled["sensor", "no_signal"] += pooled.pop(("sensor", "stuck"))
+    drained = float(run.mean[ws.A_STUCK, 3]) / model.K
+    if abs(drained) < max(limits.min_sat, 1.5 * model.load / model.K):  # stuck shut is no control signal
+        pooled["actuator", "no_signal"] += pooled.pop(("actuator", "stuck"))
     ranked = sorted(pooled.items(), key=lambda item: -item[1])
-    (side_name, mode_name), probability = ranked[0]
-    if mode_name == "healthy":
-        return None
-    side = Side(side_name)
-    if probability < limits.min_probability:
+    faulty = {side: sum(p for (s, _), p in ranked if s == side.value) for side in _SIDES}
+    open_sides = tuple(side for side in _SIDES if faulty[side] > 1 - limits.min_probability)
+    side = max(_SIDES, key=lambda s: faulty[s])
+    best = next(((name, p) for name, p in ranked if name[0] == side.value), None)
+    if best is None:
+        return Verdict(None)
+    (_, mode), probability = best
+    stated = side
+    if faulty[side] < limits.min_probability:
         other = Side.ACTUATOR if side is Side.SENSOR else Side.SENSOR
-        both = probability + pooled.get((other.value, mode_name), 0.0)
-        if both >= limits.min_probability and mode_name == "inefficient":
-            side, probability = Side.SENSOR_OR_ACTUATOR, both
-    m = int(np.argmax(np.where([n == (side_name, mode_name) for n in ws.NAMES], evidence, -np.inf)))
-    if not gains and m not in (ws.S_STUCK, ws.S_NONE, ws.S_WHITE_3, ws.S_WHITE_8, ws.S_WHITE_25):
-        return None
-    epsilon, sat = _estimate(m, y, z[m], P[m], model)
-    if m == ws.A_STUCK and sat is not None and abs(sat.mean) < max(limits.min_sat, 2 * model.load / model.K):
-        m, mode_name = ws.A_NONE, "no_signal"
+        both = probability + pooled.get((other.value, mode), 0.0)
+        if mode != "inefficient" or both < limits.min_probability:
+            return Verdict(None, open_sides)
+        stated, probability = Side.SENSOR_OR_ACTUATOR, both
+    m = int(np.argmax(np.where([n == (side.value, mode) for n in ws.NAMES], run.evidence, -np.inf)))
+    if mode == "no_signal":
+        m = ws.S_NONE if side is Side.SENSOR else ws.A_NONE
+    plain = m in (ws.S_STUCK, ws.S_NONE, *range(ws.S_WHITE_3, ws.S_OU_SMALL))
+    if not gains and not plain:
+        return Verdict(None, _SIDES)
+    epsilon, sat = _estimate(m, known, run, model)
     if epsilon is not None and m in (ws.S_GAIN, ws.A_GAIN) and epsilon.value < limits.min_epsilon:
-        return None
-    if data.u_measured and side is not Side.SENSOR:
-        return None
-    if _model_error_explains(m, data.y[start:stop], data.slack[start:stop], data.dt):
-        probability = 0.0
-    seconds = (stop - start) * data.dt
+        return Verdict(None)
+    if m == ws.A_BIAS and epsilon is not None and epsilon.high < 0:
+        return Verdict(None, open_sides)  # the data do not even say that something is lost
+    return Verdict(
+        Finding(
+            start=run.start,
+            stop=run.stop,
+            side=stated,
+            mode=FaultMode(mode),
+            probability=min(1.0, probability),
+            hypotheses=tuple(Hypothesis(s, n, q) for (s, n), q in ranked if q >= 5e-4),
+            epsilon=epsilon,
+            sat=sat,
+            evidence=_sentences(run, m, stated, mode, known, ranked, names, dt),
+            tier="signal" if m in (ws.S_STUCK, ws.S_NONE) else "model",
+        ),
+        tuple(s for s in open_sides if s is not side),
+    )
+
+
+def _sentences(
+    run: Run,
+    m: int,
+    side: Side,
+    mode: str,
+    known: Array,
+    ranked: list[tuple[tuple[str, str], float]],
+    names: tuple[str, str],
+    dt: float,
+) -> tuple[str, ...]:
+    """What decided, with figures."""
+    seconds = (run.stop - run.start) * dt
+    ahead = run.evidence[m] - run.evidence[ws.HEALTHY]
     lines = [
-        f"Over {seconds:.3f} s the model “{side_name} {mode_name.replace('_', ' ')}” explains {data.names[0]} better than "
-        f"a healthy wheel by a log-evidence of {evidence[m] - evidence[ws.HEALTHY]:.0f}; a fault is considered from "
-        f"{model.switch_cost:.0f}."
+        f"Over {seconds:.3f} s the model “{ws.NAMES[m][0]} {mode.replace('_', ' ')}” explains {names[0]} better than a "
+        f"healthy wheel by a log-evidence of {ahead:.0f}."
     ]
-    if m in (ws.S_STUCK, ws.S_NONE) and y.size:
-        lines.append(f"{data.names[0]} stayed within {float(np.ptp(y)):.2g} m/s of {float(np.mean(y)):.4g} m/s.")
+    if m in (ws.S_STUCK, ws.S_NONE) and known.size:
+        lines.append(f"{names[0]} stayed within {float(np.ptp(known)):.2g} m/s of {float(np.mean(known)):.4g} m/s.")
     second = next((item for item in ranked[1:] if item[0][1] != "healthy"), None)
-    if second is not None and second[1] >= 0.005:
-        lines.append(f"Next best: {second[0][0]} {second[0][1].replace('_', ' ')} with {100 * second[1]:.1f} %.")
+    if second is not None and second[1] >= _LEAST_PART:
+        lines.append(f"Next best: {second[0][0]} {second[0][1].replace('_', ' ')} with {100 * second[1]:.0f} %.")
     if side is Side.SENSOR_OR_ACTUATOR:
         lines.append("Without a second measurement a loss of gain of the sensor and of the valve look alike here.")
-    return Finding(
-        start=start,
-        stop=stop,
-        side=side,
-        mode=FaultMode(mode_name),
-        probability=min(1.0, probability),
-        hypotheses=tuple(Hypothesis(s, n, q) for (s, n), q in ranked if q >= 5e-4),
-        epsilon=epsilon,
-        sat=sat,
-        evidence=tuple(lines),
-        tier="signal" if m in (ws.S_STUCK, ws.S_NONE) else "model",
-    )
+    return tuple(lines)
 
 
-def _model_error_explains(m: int, y: Array, slack: Array, dt: float) -> bool:
-    """Whether a finding may be nothing but the wheel model's error where it is in doubt.
-
-    A model in doubt looks like a drifting sensor, and in a slow log like any fault of gain; in such a log noise must
-    also exceed what the valve's switching between samples does to the speed.
-    """
-    if float(np.mean(slack > 0)) <= 0.3:
-        return False
-    if m == ws.S_DRIFT:
-        return True
-    if dt < COARSE_STEP_S or m < ws.S_GAIN:
-        return False
-    if m not in (ws.S_WHITE_8, ws.S_WHITE_25):
-        return True
-    return float(np.sqrt(np.mean(white_part(y) ** 2))) < float(np.mean(slack))
-
-
-def _estimate(m: int, y: Array, z: Array, P: Array, model: wf.WheelFilterModel) -> tuple[Epsilon | None, Sat | None]:
+def _estimate(m: int, y: Array, run: Run, model: WheelFilterModel) -> tuple[Epsilon | None, Sat | None]:
     """ε̂ and the saturation term of a model from its state at the end of the run."""
+    z, P = run.mean[m], run.cov[m]
     g, g_std = float(z[1]), float(np.sqrt(max(P[1, 1], 0.0)))
+    loss = Epsilon(1 - g, 1 - g - 1.96 * g_std, 1 - g + 1.96 * g_std)
     if m in (ws.S_STUCK, ws.S_NONE):
         if not y.size:
             return Epsilon(1.0, 1.0, 1.0), None
         level, rms = float(np.mean(y)), float(np.sqrt(np.mean(y**2)))
-        half = 1.96 * model.constant_noise
+        half = 1.96 * model.rounding
         return Epsilon(1.0, 1.0, 1.0), Sat(level, rms, level - half, level + half, "m/s")
     if m in (ws.S_GAIN, ws.A_GAIN):
-        return Epsilon(1 - g, 1 - g - 1.96 * g_std, 1 - g + 1.96 * g_std), None
+        return loss, None
+    half = 1.96 * float(np.sqrt(max(P[3, 3], 0.0)))
     if m in (ws.A_STUCK, ws.A_NONE):
-        level = float(z[2]) / model.K if m == ws.A_STUCK else 0.0
-        half = 1.96 * float(np.sqrt(max(P[2, 2], 0.0))) / model.K
+        level = float(z[3]) / model.K if m == ws.A_STUCK else 0.0
+        half /= model.K
         return Epsilon(1.0, 0.0, 1.0), Sat(level, abs(level), level - half, level + half, "of full opening")
+    eps = max(1 - g, 0.05)
     if m == ws.A_BIAS:
-        eps = max(1 - g, 0.05)
-        level, half = float(z[2]) / model.K, 1.96 * float(np.sqrt(max(P[2, 2], 0.0))) / model.K
-        bounds = Epsilon(1 - g, 1 - g - 1.96 * g_std, 1 - g + 1.96 * g_std)
-        return bounds, Sat(level / eps, abs(level) / eps, (level - half) / eps, (level + half) / eps, "of full opening")
-    return None, None
+        level, half = float(z[3]) / model.K, half / model.K
+        return loss, Sat(level / eps, abs(level) / eps, (level - half) / eps, (level + half) / eps, "of full opening")
+    noise = float(np.sqrt(np.mean((y - np.mean(y)) ** 2))) if y.size else 0.0
+    level = float(z[3]) / eps
+    return loss, Sat(level, float(np.hypot(level, noise / eps)), level - half / eps, level + half / eps, "m/s")
+
+
+def onset_sentence(start: int, y: Array, noise: float, name: str, side: Side) -> str:
+    """What the shape of the onset says; a sensor's fault jumps, a valve's bends."""
+    low, high = max(1, start - 2), min(y.size, start + 3)
+    if high <= low or start == 0:
+        return "The fault was there from the first sample, so its onset says nothing."
+    steps = np.abs(np.nan_to_num(y[low:high] - y[low - 1 : high - 1]))
+    largest = float(steps.max())
+    if largest > 8 * noise:
+        return f"At its onset {name} jumps by {largest:.2g} m/s within one sample ({largest / noise:.0f} times its noise): a sensor can, a wheel cannot."
+    if side is Side.ACTUATOR:
+        return f"At its onset {name} bends with its lag, no step exceeds {largest:.2g} m/s: as a wheel does that its valve leaves."
+    return f"At its onset no step of {name} exceeds {largest:.2g} m/s."
+
+
+def refined(start: int, y: Array, reach: int, m: int, noise: float) -> int:
+    """Onset of a sensor's fault at the raw rate: it jumps within one sample, or stops changing.
+
+    Parameters
+    ----------
+    start : int
+        Sample at which the run begins, to a block.
+    y : Array, shape (n,)
+        Measured speed [m/s].
+    reach : int
+        Samples to look around.
+    m : int
+        Model of the run.
+    noise : float
+        White noise of the sensor [m/s].
+    """
+    low, high = max(1, start - reach), min(y.size, start + reach + 1)
+    if high - low < 2 or not (ws.S_STUCK <= m <= ws.S_OU_LARGE):
+        return start
+    steps = np.abs(np.nan_to_num(y[low:high] - y[low - 1 : high - 1]))
+    at = int(np.argmax(steps))
+    if steps[at] > 8 * noise:
+        return low + at
+    if m in (ws.S_STUCK, ws.S_NONE):
+        moving = np.flatnonzero(steps > 0)
+        return low + int(moving[-1]) if moving.size else low
+    return start

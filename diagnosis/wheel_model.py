@@ -1,8 +1,8 @@
 """Identification of the wheel model τ·v̇ = −v + K·u + load from a mission that may hold faults.
 
-Each window of a few seconds gives its own gain; the median over windows and wheels stands for healthy wheels as long
-as fewer than half of the windows are faulty. Wheels of one machine are alike, so a wheel's own gain is believed only
-near the machine's.
+Each window of two seconds gives its own gain. Healthy windows agree and faulty ones scatter, so that the mode of the
+gains stands for a healthy wheel even where most windows are faulty. Wheels of one machine are alike, so a wheel's own
+mode is believed only near the machine's.
 """
 
 from __future__ import annotations
@@ -13,15 +13,15 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import lfilter
 
-from diagnosis.noise import COARSE_STEP_S, moving_sum, white_part
 from replay.machine import WheelPlant
 
 Array = NDArray[np.float64]
 
-_TAUS = (0.02, 0.05, 0.08, 0.12, 0.17, 0.25, 0.35, 0.5, 0.7, 1.0)
-_WINDOW_S = 2.5
+_TAUS = (0.02, 0.035, 0.05, 0.075, 0.1, 0.14, 0.19, 0.25, 0.32, 0.4, 0.5, 0.65, 0.85, 1.1)
+_WINDOW_S = 2.0
 _MAX_SPREAD = 0.25
-_OWN_RANGE = 0.1
+_OWN_RANGE = 0.2
+_LEAST_OWN = 6  # windows near the machine's gain that a wheel needs for its own
 
 
 @dataclass(frozen=True)
@@ -66,6 +66,7 @@ def identify(
     dt: float,
     given: dict[int, WheelPlant],
     flow: float | None = None,
+    effort: Array | None = None,
 ) -> WheelModelFit:
     """Fit K and τ of every wheel where the pump feeds all that is asked of it.
 
@@ -81,87 +82,29 @@ def identify(
         Models from the machine file by wheel index; they are taken as they are.
     flow : float or None
         Sum of speeds that the pump can feed [m/s].
+    effort : Array, shape (n, wheels), or None
+        Mean |u| where y and u are means over blocks [fraction]; None: |u|.
     """
     if flow is None:
         return _identify(y, u, moving, dt, given)
-    asked = np.abs(np.nan_to_num(u)).sum(axis=1)
+    effort = np.abs(np.nan_to_num(u)) if effort is None else effort
+    asked = effort.sum(axis=1)
     driving = moving.any(axis=1)
     fed = asked <= (np.quantile(asked[driving], 0.6) if driving.any() else 0.0)
     fit = _identify(y, u, moving & fed[:, None], dt, given)
     for _ in range(2):
         if not any(fit.plants):
             return fit
-        fed = demand(u, fit) <= flow
+        fed = demand(effort, fit) <= flow
         fit = _identify(y, u, moving & fed[:, None], dt, given)
     return fit
 
 
-def demand(u: Array, fit: WheelModelFit) -> Array:
-    """Sum of the speeds that the valves ask for [m/s], shape (n,)."""
+def demand(effort: Array, fit: WheelModelFit) -> Array:
+    """Sum of the speeds that openings of size `effort`, shape (n, wheels), ask for [m/s], shape (n,)."""
     known = [p.K for p in fit.plants if p is not None]
     gains = np.array([p.K if p is not None else float(np.median(known)) for p in fit.plants])
-    return np.asarray(np.abs(np.nan_to_num(u)) @ gains)
-
-
-def fed_openings(y: Array, u: Array, fit: WheelModelFit, flow: float | None, dt: float) -> tuple[Array, Array]:
-    """Openings as the shared pump feeds them, and the wheel model's error where it is at its limit.
-
-    Where the valves ask for more than the pump gives, each gets a share between flow/demand and 1, since a faulty
-    valve may not take what it asks for. The share is read off the other wheels: the median of their speed over what
-    they ask for.
-
-    Parameters
-    ----------
-    y, u : Array, shape (n, wheels)
-        Measured speed [m/s] and valve opening [fraction].
-    fit : WheelModelFit
-        The wheels' models.
-    flow : float or None
-        Sum of speeds that the pump can feed [m/s].
-    dt : float
-        Step [s].
-
-    Returns
-    -------
-    opening : Array, shape (n, wheels)
-        Fed openings [fraction].
-    slack : Array, shape (n, wheels)
-        Standard deviation of the model's error [m/s]; 0 where the pump feeds everything.
-    """
-    slack = np.zeros_like(u)
-    if flow is None or not any(fit.plants):
-        return u, slack
-    asked = demand(u, fit)
-    last = np.maximum.accumulate(np.where(asked > flow, np.arange(asked.size), -(10**9)))
-    lag = max(p.tau for p in fit.plants if p is not None)
-    limited = np.arange(asked.size) - last <= 3 * lag / dt
-    if not limited.any():
-        return u, slack
-    ratio = np.full_like(u, np.nan)
-    a = 1 - np.exp(-dt / 0.1)
-    for i, plant in enumerate(fit.plants):
-        if plant is None:
-            continue
-        pushed = lfilter([a], [1.0, -(1 - a)], plant.K * low_passed(u[:, i], plant.tau, dt))
-        speed = lfilter([a], [1.0, -(1 - a)], np.nan_to_num(y[:, i]))
-        clear = np.abs(pushed) > 0.02 * flow
-        ratio[clear, i] = speed[clear] / pushed[clear]
-    floor = np.minimum(1.0, flow / np.maximum(asked, 1e-12))
-    opening = u.copy()
-    for i, plant in enumerate(fit.plants):
-        if plant is None:
-            continue
-        others = np.delete(ratio, i, axis=1)[limited]
-        known = np.isfinite(others).sum(axis=1) >= 2
-        share = floor[limited].copy()
-        seen = np.full(share.size, np.nan)
-        seen[known] = np.nanmedian(others[known], axis=1)
-        unlike = seen > 1.3 * share  # a faulty valve takes less than it asks for, and leaves more to the others
-        share = np.where(unlike, np.minimum(seen, 1.0), share)
-        opening[limited, i] = u[limited, i] * share
-        doubt = np.where(known, 0.1, 0.5 * (1 - floor[limited]))
-        slack[limited, i] = doubt * plant.K * np.abs(np.nan_to_num(u[limited, i])) * share + 1e-6
-    return opening, slack
+    return np.asarray(effort @ gains)
 
 
 def _identify(y: Array, u: Array, moving: NDArray[np.bool_], dt: float, given: dict[int, WheelPlant]) -> WheelModelFit:
@@ -190,8 +133,8 @@ def _identify(y: Array, u: Array, moving: NDArray[np.bool_], dt: float, given: d
             gains.append(g)
             misfits.append(r)
         pooled = np.concatenate(misfits) if misfits else np.empty(0)
-        if pooled.size >= 3 and (best is None or np.median(pooled) < best[0]):
-            best = (float(np.median(pooled)), tau, gains)
+        if pooled.size >= 3 and (best is None or np.quantile(pooled, 0.25) < best[0]):
+            best = (float(np.quantile(pooled, 0.25)), tau, gains)
     plants: list[WheelPlant | None] = [None] * y.shape[1]
     for i, plant in given.items():
         plants[i] = plant
@@ -201,13 +144,14 @@ def _identify(y: Array, u: Array, moving: NDArray[np.bool_], dt: float, given: d
         return WheelModelFit(tuple(plants), 0.0, 0, known, f"Wheel model: {why}.", not known)
     _, tau, gains = best
     pooled = np.concatenate(gains)
-    centre = float(np.median(pooled))
-    spread = 1.4826 * float(np.median(np.abs(pooled - centre))) / abs(centre) if centre else float("inf")
+    centre = mode(pooled)
+    near = np.sort(np.abs(pooled - centre))[: max(1, pooled.size // 2)]  # the half that agrees best
+    spread = 1.4826 * float(np.median(near)) / abs(centre) if centre else float("inf")
     for i, g in zip(wheels, gains, strict=True):
         if i in given:
             continue
-        own = float(np.median(g)) if g.size >= 5 else centre
-        K = own if abs(own - centre) <= _OWN_RANGE * abs(centre) else centre
+        like = g[np.abs(g - centre) <= _OWN_RANGE * abs(centre)]
+        K = mode(like) if like.size >= _LEAST_OWN else centre
         if K > 0:
             plants[i] = WheelPlant(K=K, tau=tau, K_std=spread * abs(K) / np.sqrt(max(1, g.size)))
     reliable = len(given) == len(wheels) or (pooled.size >= 5 and spread <= _MAX_SPREAD and centre > 0)
@@ -218,6 +162,17 @@ def _identify(y: Array, u: Array, moving: NDArray[np.bool_], dt: float, given: d
         + ("." if reliable else f": too uncertain to judge gains by (limit {100 * _MAX_SPREAD:.0f} %).")
     )
     return WheelModelFit(tuple(plants), spread, int(pooled.size), reliable, note, any(i not in given for i in wheels))
+
+
+def mode(values: Array) -> float:
+    """Half-sample mode: the densest half, over and over, until a few values are left; their median."""
+    x = np.sort(values)
+    while x.size > 4:
+        half = (x.size + 1) // 2
+        widths = x[half - 1 :] - x[: x.size - half + 1]
+        k = int(np.argmin(widths))
+        x = x[k : k + half]
+    return float(np.median(x))
 
 
 def _windowed(y: Array, p: Array, moving: NDArray[np.bool_], length: int) -> tuple[Array, Array]:
@@ -232,43 +187,3 @@ def _windowed(y: Array, p: Array, moving: NDArray[np.bool_], length: int) -> tup
     g = syp[good] / spp[good]
     misfit = (syy[good] - g * syp[good]) / np.maximum(syy[good], 1e-300)
     return g, misfit
-
-
-def aliasing_slack(u: Array, plant: WheelPlant, dt: float) -> Array:
-    """Error of the model [m/s], shape (n,), where u jumps about between samples of a slow log; else 0."""
-    if dt < COARSE_STEP_S:
-        return np.zeros(u.size)
-    width = max(3, round(0.5 / dt))
-    rms = np.sqrt(moving_sum(white_part(u) ** 2, width) / width)
-    error = plant.K * rms * np.sqrt(dt / plant.tau)
-    usual = plant.K * float(np.sqrt(np.nanmean(u**2)))
-    return np.where(error > 0.1 * usual, error, 0.0)
-
-
-def common_load(residuals: Array, dt: float, smooth_s: float = 0.5) -> Array:
-    """Load that the other wheels share, as a speed: median of their residuals, smoothed (slope, not a wheel's fault).
-
-    Parameters
-    ----------
-    residuals : Array, shape (n, wheels)
-        y − K·lowpass(u) [m/s]; NaN where not known.
-    dt : float
-        Step [s].
-    smooth_s : float
-        Time constant of the smoothing [s].
-
-    Returns
-    -------
-    Array, shape (n, wheels)
-        Zero with fewer than three wheels.
-    """
-    n, wheels = residuals.shape
-    out = np.zeros((n, wheels))
-    if wheels < 3:
-        return out
-    a = 1 - np.exp(-dt / smooth_s)
-    filled = np.where(np.isfinite(residuals), residuals, 0.0)
-    for i in range(wheels):
-        others = np.delete(filled, i, axis=1)
-        out[:, i] = lfilter([a], [1.0, -(1 - a)], np.median(others, axis=1))
-    return out

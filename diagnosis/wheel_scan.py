@@ -1,18 +1,21 @@
-"""The compiled recursion of `wheel_filter`: entry, prediction and update of every model, and Viterbi's step.
+"""Compiled Kalman step of one wheel's models: entry, prediction and correction on means over a block of samples.
 
-The state of a model is z = [ν, g, b, c] with covariance P; p holds the constants in the order of
-`WheelFilterModel.packed`.
+A model's state is z = [ν, g, x, c] with covariance P: ν the speed as its sensor scales it, g the unknown gain of the
+faulty side, x the load in units of its present standard deviation, c the stuck value or bias of the faulty side.
 """
 
 from __future__ import annotations
 
+# ruff: noqa: SIM109 (compiled: a tuple of constants costs a search)
+
+from typing import NamedTuple
+
 import numpy as np
 from numba import njit
 
-from diagnosis.modes import PAIR, SILENT, SKIP
-
-HEALTHY, S_STUCK, S_NONE, S_GAIN, S_DRIFT, S_WHITE_3, S_WHITE_8, S_WHITE_25, A_GAIN, A_STUCK, A_NONE, A_BIAS = range(12)
-MODELS = 12
+HEALTHY, S_STUCK, S_NONE, S_GAIN, S_WHITE_3, S_WHITE_8, S_WHITE_24, S_OU_SMALL, S_OU_LARGE = range(9)
+A_GAIN, A_STUCK, A_NONE, A_BIAS = range(9, 13)
+MODELS = 13
 NAMES = (
     ("none", "healthy"),
     ("sensor", "stuck"),
@@ -22,197 +25,233 @@ NAMES = (
     ("sensor", "noisy"),
     ("sensor", "noisy"),
     ("sensor", "noisy"),
+    ("sensor", "noisy"),
     ("actuator", "inefficient"),
     ("actuator", "stuck"),
     ("actuator", "no_signal"),
     ("actuator", "noisy"),
 )
-ROW = np.array([0, 1, 2, 3, 4, 4, 4, 4, 5, 6, 7, 8])
-WHITE = np.array([1.0, 3.0, 8.0, 25.0])
-_OUTLIER = -18.0
-_LEARNING_COST = 10.0
-_OCCAM = 0.5  # what a row with an unknown gain or opening must gain on healthy per second
-_SILENT_COST = -6.0
+ROW = np.array([0, 1, 2, 3, 4, 4, 4, 4, 4, 5, 6, 7, 8])
+_DISTURBED_S = 0.8  # correlation time of a valve's disturbance [s]
+_COLOURED_S = 0.05  # correlation time of a coloured sensor noise [s]
+
+
+class WheelConstants(NamedTuple):
+    """Constants of one wheel; see `wheel_filter.WheelFilterModel` for their meaning. SI units."""
+
+    K: float
+    lag: float  # dt / τ of one block
+    noise: float
+    constant_noise: float
+    rounding: float
+    load: float
+    load_keep: float  # share of the load's deviation that is left after one block
+    drift: float  # process noise of the speed [m/s/√s]
+    span: float
+    valve_span: float  # standard deviation of a stuck valve's speed [m/s]
+    grip: float  # load per slip of a tyre that holds [1]
+    grip_most: float  # largest load that a tyre transmits, as a speed [m/s]
+    offset: float  # constant load, as a speed [m/s]
+    dt: float  # block [s]
+    raw_dt: float
+
+
+class WheelInput(NamedTuple):
+    """One block of one wheel."""
+
+    y: float  # mean measured speed [m/s]
+    count: float  # new samples in it
+    jitter: float  # mean squared step from sample to sample [m²/s²]
+    drive: float  # mean opening as the pump feeds it, as this wheel's healthy valve asks [fraction]
+    drive_half: float  # the same if its valve took half of that
+    drive_none: float  # and if it took nothing
+    share_none: float  # what the pump feeds of a demand while this valve takes nothing
+    share_some: float  # and while it stands open by 15 %
+    chatter: float  # speed error from openings that change within a sample [m/s]
+    wander: float  # the same, where the log is too slow to sum them up [m/s]
+    body: float  # speed at which this wheel would roll without slip [m/s]; NaN where unknown
+    doubt: float  # its uncertainty [m/s]
 
 
 @njit(cache=True)
-def enter(m, old, p, z, P):  # type: ignore[no-untyped-def]
+def is_scaled(m):  # type: ignore[no-untyped-def]
+    """Whether ν of model m is in the scale of a faulty sensor."""
+    return m >= S_GAIN and m <= S_OU_LARGE
+
+
+@njit(cache=True)
+def enter(m, old, k, z, P):  # type: ignore[no-untyped-def]
     """Start model m from the state of model `old`: speed and load are carried over, the unknowns get their priors."""
     v, var = z[old, 0], P[old, 0, 0]
-    load, load_var = z[old, 2], P[old, 2, 2]
-    if old == S_GAIN:
-        g = max(z[old, 1], 0.05)
-        v, var = v / g, var / (g * g) + (v / g) ** 2 * P[old, 1, 1] / (g * g)
-        load, load_var = load / g, load_var / (g * g)
-    elif old in (S_STUCK, S_NONE):
-        var += (0.1 * p[6]) ** 2  # the model alone has carried the speed
-    elif old in (A_STUCK, A_BIAS):
-        load, load_var = 0.0, p[4] ** 2
-    load_var = min(load_var, p[4] ** 2)
-    for i in range(4):
-        z[m, i] = 0.0
-        for j in range(4):
-            P[m, i, j] = 0.0
-    z[m, 0], P[m, 0, 0] = v, var
-    z[m, 1] = 1.0
-    z[m, 2], P[m, 2, 2] = load, load_var
+    x, x_var = z[old, 2], min(P[old, 2, 2], 1.0)
+    if is_scaled(old):
+        g = max(z[old, 1], 0.1)
+        var = var / (g * g) + (v / g) ** 2 * P[old, 1, 1] / (g * g)
+        v = v / g
+    elif old == S_STUCK or old == S_NONE:
+        var += (0.05 * k.span) ** 2  # the model alone has carried the speed
+    if old != HEALTHY:
+        x_var = max(x_var, 0.5)
+    z[m, :] = 0.0
+    P[m, :, :] = 0.0
+    z[m, 0], z[m, 1], z[m, 2] = v, 1.0, x
+    P[m, 0, 0], P[m, 2, 2] = var, x_var
     if m == S_STUCK:
-        P[m, 3, 3] = p[6] ** 2
-    elif m >= S_DRIFT and m <= S_WHITE_25:
-        P[m, 3, 3] = (0.3 * p[6]) ** 2
-    elif m == S_GAIN:
-        z[m, 0], z[m, 1], z[m, 2] = 0.5 * v, 0.5, 0.5 * load
-        P[m, 0, 0], P[m, 1, 1] = 0.09 * v * v + 0.34 * var, 0.09
-        P[m, 0, 1] = P[m, 1, 0] = 0.09 * v
-        P[m, 2, 2] = 0.34 * load_var
+        P[m, 3, 3] = k.span**2
+    elif is_scaled(m):
+        g, g_var = (0.5, 0.09) if m == S_GAIN else (0.65, 0.04)
+        z[m, 0], z[m, 1] = g * v, g
+        P[m, 0, 0] = g_var * v * v + (g * g + g_var) * var
+        P[m, 1, 1] = g_var
+        P[m, 0, 1] = P[m, 1, 0] = g_var * v
+        if m == S_OU_SMALL:
+            P[m, 3, 3] = (0.08 * k.span) ** 2
+        elif m == S_OU_LARGE:
+            P[m, 3, 3] = (0.15 * k.span) ** 2
+        elif m != S_GAIN:
+            P[m, 3, 3] = (0.1 * k.span) ** 2
     elif m == A_GAIN:
         z[m, 1], P[m, 1, 1] = 0.5, 0.09
     elif m == A_NONE:
         z[m, 1] = 0.0
     elif m == A_STUCK:
-        z[m, 1], z[m, 2], P[m, 2, 2] = 0.0, 0.0, p[7] ** 2
+        z[m, 1], P[m, 3, 3] = 0.0, k.valve_span**2
     elif m == A_BIAS:
-        z[m, 1], P[m, 1, 1] = 0.6, 0.09
-        z[m, 2], P[m, 2, 2] = 0.0, (0.5 * p[7]) ** 2
+        z[m, 1], P[m, 1, 1] = 0.6, 0.04
+        P[m, 3, 3] = (0.5 * k.valve_span) ** 2
 
 
 @njit(cache=True)
-def predict(m, u, common, p, z, P):  # type: ignore[no-untyped-def]
-    """z = F z, P = F P Fᵀ + Q of one model over one step with valve command u and common load."""
-    a, dt = p[1], p[9]
-    f_b, q_b = p[5], (1 - p[5] * p[5]) * p[4] ** 2
+def fed(m, q, k, z):  # type: ignore[no-untyped-def]
+    """Opening as the pump feeds it, and the share that it feeds, while model m takes its part of the flow."""
+    if m == A_GAIN or m == A_BIAS:
+        g = min(max(z[m, 1], 0.0), 1.0)
+        if g > 0.5:
+            drive = q.drive_half + (q.drive - q.drive_half) * (2.0 * g - 1.0)
+        else:
+            drive = q.drive_none + (q.drive_half - q.drive_none) * 2.0 * g
+        return drive, q.share_some if m == A_BIAS else q.share_none
+    share = q.share_none
     if m == A_STUCK:
-        f_b, q_b = 1.0, (0.02 * p[7]) ** 2 * dt
-    elif m == A_BIAS:
-        f_b = np.exp(-dt / 0.8)
-        q_b = (1 - f_b * f_b) * (0.5 * p[7]) ** 2
-    k_u = (1 - a) * p[0] * u
-    if m == S_GAIN:  # ν is in the sensor's scale, and so is the shared load
-        k_u += (1 - a) * common
-        common = 0.0
-    # row of ν: [a, (1−a)K u, 1−a, 0]
-    v = a * z[m, 0] + k_u * z[m, 1] + (1 - a) * (z[m, 2] + common)
-    r0 = np.empty(4)
-    for j in range(4):
-        r0[j] = a * P[m, 0, j] + k_u * P[m, 1, j] + (1 - a) * P[m, 2, j]
-    p00 = a * r0[0] + k_u * r0[1] + (1 - a) * r0[2] + p[2] ** 2 * dt * 0.05
-    z[m, 0] = v
-    z[m, 2] *= f_b
-    P[m, 0, 0] = p00
-    P[m, 0, 1] = P[m, 1, 0] = r0[1]
-    P[m, 0, 2] = P[m, 2, 0] = f_b * r0[2]
-    P[m, 0, 3] = P[m, 3, 0] = r0[3]
-    P[m, 1, 2] = P[m, 2, 1] = f_b * P[m, 1, 2]
-    P[m, 2, 2] = f_b * f_b * P[m, 2, 2] + q_b
-    P[m, 2, 3] = P[m, 3, 2] = f_b * P[m, 2, 3]
-    if m >= S_DRIFT and m <= S_WHITE_25:
-        P[m, 3, 3] += (0.06 * p[6]) ** 2 * dt
+        share += (q.share_some - q.share_none) * min(abs(z[m, 3]) / (0.15 * k.K), 2.0)
+    return q.drive, share
 
 
 @njit(cache=True)
-def update(m, y, p, white, z, P):  # type: ignore[no-untyped-def]
-    """Kalman update of one model with the measured speed; returns the innovation's log-likelihood."""
-    h0, h3, r = 1.0, 0.0, p[2] ** 2
+def predict(m, q, k, z, P):  # type: ignore[no-untyped-def]
+    """z = F z + G, P = F P Fᵀ + Q of model m over one block.
+
+    τ ν̇ = −ν + K·opening + load, and the load is a tyre's: grip·(body − ν) up to `grip_most`, plus what x makes of it.
+    """
+    drive, share = fed(m, q, k, z)
+    drive *= k.K
+    scaled = is_scaled(m)
+    a = np.exp(-k.lag)
+    b, add, held = 1.0 - a, 0.0, 0.0
+    if q.body == q.body and k.grip_most > 0.0:
+        nu = z[m, 0] / max(z[m, 1], 0.1) if scaled else z[m, 0]
+        held = k.grip * (q.body - nu)
+        if held > k.grip_most:
+            held = k.grip_most
+            add = held
+        elif held < -k.grip_most:
+            held = -k.grip_most
+            add = held
+        else:  # the tyre holds: the wheel follows the body, faster than its own lag
+            a = np.exp(-k.lag * (1.0 + k.grip))
+            b = (1.0 - a) / (1.0 + k.grip)
+            add = k.grip * q.body
+    add += k.offset
+    doubt = min(k.grip * q.doubt, k.grip_most)
+    s = np.sqrt(k.load**2 + (0.3 * held) ** 2 + doubt**2)
+    if held < 0.0:
+        s = -s
+    f0, f1, f2, f3, g = a, 0.0, b * s, 0.0, 0.0
+    if scaled:
+        f1 = b * (drive + add)
+        f2 *= max(z[m, 1], 0.1)
+    elif m >= A_GAIN:
+        f1, f3, g = b * drive, b * share, b * add
+    else:
+        g = b * (drive + add)
+    keep, noise = 1.0, 0.0  # of c
+    if m == A_BIAS:
+        keep = np.exp(-k.dt / _DISTURBED_S)
+        noise = (1.0 - keep * keep) * (0.5 * k.valve_span) ** 2
+    elif m == A_STUCK:
+        noise = (0.02 * k.valve_span) ** 2 * k.dt
+    elif m == S_OU_SMALL or m == S_OU_LARGE:
+        keep = np.exp(-k.dt / _COLOURED_S)
+        noise = (1.0 - keep * keep) * ((0.05 if m == S_OU_SMALL else 0.12) * k.span) ** 2
+    elif m >= S_WHITE_3 and m <= S_WHITE_24:
+        noise = (0.05 * k.span) ** 2 * k.dt
+    p0 = f0 * P[m, 0, 0] + f1 * P[m, 1, 0] + f2 * P[m, 2, 0] + f3 * P[m, 3, 0]
+    p1 = f0 * P[m, 0, 1] + f1 * P[m, 1, 1] + f2 * P[m, 2, 1] + f3 * P[m, 3, 1]
+    p2 = f0 * P[m, 0, 2] + f1 * P[m, 1, 2] + f2 * P[m, 2, 2] + f3 * P[m, 3, 2]
+    p3 = f0 * P[m, 0, 3] + f1 * P[m, 1, 3] + f2 * P[m, 2, 3] + f3 * P[m, 3, 3]
+    z[m, 0] = f0 * z[m, 0] + f1 * z[m, 1] + f2 * z[m, 2] + f3 * z[m, 3] + g
+    z[m, 2] *= k.load_keep
+    z[m, 3] *= keep
+    P[m, 0, 0] = f0 * p0 + f1 * p1 + f2 * p2 + f3 * p3 + k.drift**2 * k.dt + q.wander**2
+    P[m, 0, 1] = P[m, 1, 0] = p1
+    P[m, 0, 2] = P[m, 2, 0] = k.load_keep * p2
+    P[m, 0, 3] = P[m, 3, 0] = keep * p3
+    P[m, 1, 2] = P[m, 2, 1] = k.load_keep * P[m, 1, 2]
+    P[m, 1, 3] = P[m, 3, 1] = keep * P[m, 1, 3]
+    P[m, 2, 2] = k.load_keep**2 * P[m, 2, 2] + 1.0 - k.load_keep**2
+    P[m, 2, 3] = P[m, 3, 2] = k.load_keep * keep * P[m, 2, 3]
+    P[m, 3, 3] = keep * keep * P[m, 3, 3] + noise
+    return share
+
+
+@njit(cache=True)
+def readout(m, k, z):  # type: ignore[no-untyped-def]
+    """Row H = [h0, 0, 0, h3] of model m, variance of one sample's noise, and of its steps from sample to sample."""
+    own = k.noise**2
     if m == S_STUCK:
-        h0, h3, r = 0.0, 1.0, p[3] ** 2
-    elif m == S_NONE:
-        h0, r = 0.0, p[3] ** 2
-    elif m >= S_DRIFT and m <= S_WHITE_25:
-        h3, r = 1.0, r * white[m - S_DRIFT] ** 2
-    # S = H P Hᵀ + R, K = P Hᵀ / S, P = P − K S Kᵀ
+        return 0.0, 1.0, k.constant_noise**2, k.constant_noise**2
+    if m == S_NONE:
+        return 0.0, 0.0, k.constant_noise**2, k.constant_noise**2
+    if m == S_GAIN:
+        g = min(max(z[m, 1], 0.1), 1.0)
+        white = own * g * g + k.rounding**2
+        return 1.0, 0.0, white, white
+    if m == S_WHITE_3:
+        return 1.0, 1.0, 9.0 * own, 9.0 * own
+    if m == S_WHITE_8:
+        return 1.0, 1.0, 66.0 * own, 66.0 * own
+    if m == S_WHITE_24:
+        return 1.0, 1.0, 576.0 * own, 576.0 * own
+    if m == S_OU_SMALL or m == S_OU_LARGE:
+        level = (0.05 if m == S_OU_SMALL else 0.12) * k.span
+        return 1.0, 1.0, own, own + level**2 * k.raw_dt / _COLOURED_S
+    return 1.0, 0.0, own, own
+
+
+@njit(cache=True)
+def correct(m, q, share, k, z, P):  # type: ignore[no-untyped-def]
+    """Kalman update of model m with the block's mean; log-likelihood of mean and steps.
+
+    The steps from sample to sample tell noise, and constancy, without any model of the wheel: their mean square is
+    distributed as χ² with two thirds of a degree of freedom each.
+    """
+    h0, h3, white, steps = readout(m, k, z)
+    r = white / max(q.count, 1.0) + 1e-12
+    if h0 > 0.0:
+        r += (q.chatter * share) ** 2
     g = np.empty(4)
     for i in range(4):
         g[i] = P[m, i, 0] * h0 + P[m, i, 3] * h3
     s = h0 * g[0] + h3 * g[3] + r
-    innovation = y - h0 * z[m, 0] - h3 * z[m, 3]
+    innovation = q.y - h0 * z[m, 0] - h3 * z[m, 3]
     for i in range(4):
         z[m, i] += g[i] * innovation / s
         for j in range(4):
             P[m, i, j] -= g[i] * g[j] / s
-    return -0.5 * (innovation * innovation / s + np.log(2 * np.pi * s))
-
-
-@njit(cache=True)
-def advance(y, u, common, slack, status, quiet, p, white, z, P, gain):  # type: ignore[no-untyped-def]
-    """One step of all models; writes each one's log-likelihood into `gain`."""
-    floor = _OUTLIER - np.log(p[6])
-    for m in range(MODELS):
-        if slack > 0.0 and m != A_STUCK and m != A_BIAS:
-            # while the wheel model is in doubt, the load is as wide as the doubt and changes within half a second
-            f = np.exp(-p[9] / 0.5)
-            z[m, 2] *= f
-            for j in range(4):
-                P[m, 2, j] *= f
-                P[m, j, 2] *= f
-            P[m, 2, 2] += (1 - f * f) * (slack * slack + p[4] * p[4])
-        predict(m, u, common, p, z, P)
-        gain[m] = 0.0
-        if status == SILENT:
-            gain[m] = 0.0 if m == S_NONE else _SILENT_COST
-        elif status == PAIR:
-            gain[m] = max(update(m, y, p, white, z, P), floor)
-            if m >= S_DRIFT and m <= S_WHITE_25:
-                gain[m] -= 0.05
-            elif m >= S_GAIN:
-                gain[m] -= _OCCAM * p[9]
-    if quiet and status == PAIR:
-        if abs(z[S_STUCK, 3]) < 3 * p[2]:
-            gain[S_STUCK] = min(gain[S_STUCK], gain[HEALTHY])
-        gain[S_NONE] = min(gain[S_NONE], gain[HEALTHY])
-
-
-@njit(cache=True)
-def scan(y, u, common, slack, status, quiet, p, white, score, z, P, back, track):  # type: ignore[no-untyped-def]
-    """Viterbi over the models; writes back-pointers (n, models) and the series of `WheelPath.track`."""
-    gain = np.zeros(MODELS)
-    for k in range(y.size):
-        best = 0
-        for m in range(1, MODELS):
-            if score[m] > score[best]:
-                best = m
-        top = score[best]
-        if status[k] != SKIP:
-            for m in range(MODELS):
-                if m == best:
-                    continue
-                cost = p[8]
-                if m >= S_DRIFT and m <= S_WHITE_25 and best >= S_DRIFT and best <= S_WHITE_25:
-                    cost = 3.0
-                if m not in (HEALTHY, S_NONE, A_NONE):
-                    cost += _LEARNING_COST
-                if top - cost > score[m]:
-                    score[m] = top - cost
-                    if m not in (HEALTHY, S_NONE, A_NONE):
-                        score[m] += _LEARNING_COST
-                    back[k, m] = best
-                    enter(m, best, p, z, P)
-        advance(y[k], u[k], common[k], slack[k], status[k], quiet[k], p, white, z, P, gain)
-        top = -1e300
-        for m in range(MODELS):
-            score[m] += gain[m]
-            top = max(top, score[m])
-        best = 0
-        for m in range(MODELS):
-            score[m] -= top
-            if score[m] > score[best]:
-                best = m
-        track[0, k] = z[HEALTHY, 0]
-        track[1, k] = P[HEALTHY, 0, 0]
-        track[2, k] = z[best, 1]
-        track[3, k] = P[best, 1, 1]
-        track[4, k] = z[best, 2] if best >= A_GAIN else z[best, 3]
-        track[5, k] = P[best, 2, 2] if best >= A_GAIN else P[best, 3, 3]
-
-
-@njit(cache=True)
-def scan_evidence(y, u, common, slack, status, quiet, begin, p, white, z, P):  # type: ignore[no-untyped-def]
-    """Run healthy up to `begin`, enter every model there, and sum their log-likelihoods to the end."""
-    gain, out = np.zeros(MODELS), np.zeros(MODELS)
-    for k in range(y.size):
-        if k == begin:
-            for m in range(1, MODELS):
-                enter(m, HEALTHY, p, z, P)
-        advance(y[k], u[k], common[k], slack[k], status[k], quiet[k], p, white, z, P, gain)
-        if k >= begin:
-            out += gain
-    return out, z, P
+    out = -0.5 * (innovation * innovation / s + np.log(2.0 * np.pi * s))
+    if q.count > 1.5:
+        freedom = 2.0 * q.count / 3.0
+        seen = max(0.5 * q.jitter, k.constant_noise**2)
+        most = -0.5 * freedom * (1.0 + np.log(seen))
+        out += max(-0.5 * freedom * (0.5 * q.jitter / steps + np.log(steps)), most - 25.0)
+    return out
