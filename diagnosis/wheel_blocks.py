@@ -165,7 +165,7 @@ def blocks_of(
         u=np.ascontiguousarray(opening),
         unsteady=unsteady,
         status=state,
-        quiet=np.pad(quiet, edge, mode="edge").reshape(n, width, wheels).all(axis=1),
+        quiet=np.asarray(np.pad(quiet, edge, mode="edge").reshape(n, width, wheels).all(axis=1)),
         ratio=np.pad(ratio, edge, mode="edge").reshape(n, width, wheels).mean(axis=1),
         turn=np.pad(turn, edge, mode="edge").reshape(n, width, wheels).mean(axis=1),
     )

@@ -98,7 +98,7 @@ def slip_of(
         return np.zeros(v.shape, dtype=np.bool_)
     least = 2.5 * machine.limits.min_sat
     slip = slipping(v, angle, replay.phi_ref, wheel_angles(angle, geometry), geometry, timeline.dt, least)
-    return np.asarray(slip & ~doubtful.any(axis=1)[:, None])
+    return np.asarray(slip & ~np.asarray(doubtful.any(axis=1))[:, None])
 
 
 def wheels_data(

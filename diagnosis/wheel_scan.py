@@ -7,7 +7,6 @@ faulty side, x the load in units of its present standard deviation, c the stuck 
 from __future__ import annotations
 
 # ruff: noqa: SIM109 (compiled: a tuple of constants costs a search)
-
 from typing import NamedTuple
 
 import numpy as np
@@ -60,7 +59,7 @@ class WheelInput(NamedTuple):
     """One block of one wheel."""
 
     y: float  # mean measured speed [m/s]
-    count: float  # new samples in it
+    samples: float  # new ones in it
     jitter: float  # mean squared step from sample to sample [m²/s²]
     drive: float  # mean opening as the pump feeds it, as this wheel's healthy valve asks [fraction]
     drive_half: float  # the same if its valve took half of that
@@ -236,7 +235,7 @@ def correct(m, q, share, k, z, P):  # type: ignore[no-untyped-def]
     distributed as χ² with two thirds of a degree of freedom each.
     """
     h0, h3, white, steps = readout(m, k, z)
-    r = white / max(q.count, 1.0) + 1e-12
+    r = white / max(q.samples, 1.0) + 1e-12
     if h0 > 0.0:
         r += (q.chatter * share) ** 2
     g = np.empty(4)
@@ -249,8 +248,8 @@ def correct(m, q, share, k, z, P):  # type: ignore[no-untyped-def]
         for j in range(4):
             P[m, i, j] -= g[i] * g[j] / s
     out = -0.5 * (innovation * innovation / s + np.log(2.0 * np.pi * s))
-    if q.count > 1.5:
-        freedom = 2.0 * q.count / 3.0
+    if q.samples > 1.5:
+        freedom = 2.0 * q.samples / 3.0
         seen = max(0.5 * q.jitter, k.constant_noise**2)
         most = -0.5 * freedom * (1.0 + np.log(seen))
         out += max(-0.5 * freedom * (0.5 * q.jitter / steps + np.log(steps)), most - 25.0)
