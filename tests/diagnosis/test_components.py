@@ -68,7 +68,7 @@ def share(assessment: Assessment, state: State) -> float:
 def test_everything_measured_twice_is_judged_directly(direct: SimulatedMission) -> None:
     got = assess(dict(direct.columns))
     assert set(got.assessments) == {(c, s) for c in (*WHEELS, "front", "rear") for s in ("sensor", "actuator")}
-    assert {a.tier for a in got.assessments.values()} == {"direct"}
+    assert {got.assessments[w, s].tier for w in WHEELS for s in ("sensor", "actuator")} == {"direct"}
     assert [f for a in got.assessments.values() for f in a.findings] == []
     assert got.wheel_model is None
     for wheel in WHEELS:
@@ -88,7 +88,7 @@ def test_spool_alone_judges_the_valve_directly(direct: SimulatedMission) -> None
     for wheel in WHEELS:
         assert got.assessments[wheel, "sensor"].tier == "model"
         assert got.assessments[wheel, "actuator"].tier == "direct"
-    assert got.assessments["front", "sensor"].tier == "none"
+    assert got.assessments["front", "sensor"].tier == "model"
 
 
 def test_speed_and_valve_command_alone_go_by_the_model(base: SimulatedMission) -> None:
@@ -97,17 +97,25 @@ def test_speed_and_valve_command_alone_go_by_the_model(base: SimulatedMission) -
         assert (got.assessments[wheel, "sensor"].tier, got.assessments[wheel, "actuator"].tier) == ("model", "model")
     for axle in ("front", "rear"):
         for side in ("sensor", "actuator"):
-            one = got.assessments[axle, side]
-            assert one.tier == "none"
-            assert share(one, State.NOT_ASSESSED) == 1.0
-            assert "measured twice" in one.reasons[State.NOT_ASSESSED]
+            assert got.assessments[axle, side].tier == "model"
+    assert [f for a in got.assessments.values() for f in a.findings] == []
 
 
 def test_without_valve_command_the_drive_is_judged_by_its_tracking(base: SimulatedMission) -> None:
     got = assess(without(base, ".u"))
     for wheel in WHEELS:
         assert got.assessments[wheel, "sensor"].tier == "tracking"
-    assert share(got.assessments["front", "actuator"], State.NO_DATA) == 1.0
+    # a steering axle's command follows from its reference, so that its valve needs no recorded one
+    assert got.assessments["front", "actuator"].tier == "model"
+
+
+def test_axle_that_is_not_logged_is_no_data(base: SimulatedMission) -> None:
+    columns = {k: x for k, x in base.columns.items() if not k.startswith("steer.front.")}
+    got = assess(columns)
+    for side in ("sensor", "actuator"):
+        one = got.assessments["front", side]
+        assert one.tier == "none"
+        assert share(one, State.NO_DATA) + share(one, State.NOT_ASSESSED) == 1.0
 
 
 def test_speed_alone_is_not_assessed(base: SimulatedMission) -> None:
