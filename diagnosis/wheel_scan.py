@@ -218,7 +218,7 @@ def readout(m, k, z):  # type: ignore[no-untyped-def]
     if m == S_WHITE_3:
         return 1.0, 1.0, 9.0 * own, 9.0 * own
     if m == S_WHITE_8:
-        return 1.0, 1.0, 66.0 * own, 66.0 * own
+        return 1.0, 1.0, 64.0 * own, 64.0 * own
     if m == S_WHITE_24:
         return 1.0, 1.0, 576.0 * own, 576.0 * own
     if m == S_OU_SMALL or m == S_OU_LARGE:
