@@ -60,8 +60,11 @@ class _Draft:
     notes: list[str] = field(default_factory=list)
     named: list[str] = field(default_factory=list)
 
-    def take(self, name: str, log: RawLog, converted: Converted, origin: SignalSource, guessed: bool) -> None:
-        self.items[name] = Signal(name, converted.stamps, converted.values, origin, log.source, guessed)
+    def take(
+        self, name: str, log: RawLog, channel: Channel, converted: Converted, origin: SignalSource, guessed: bool
+    ) -> None:
+        beside = "" if channel.topic else next(n for n, c in log.channels.items() if c.stamps is channel.stamps)
+        self.items[name] = Signal(name, converted.stamps, converted.values, origin, log.source, guessed, beside)
         self.notes += [f"{name}: {note}" for note in converted.notes]
         unsure = doubt(name, converted.values, origin, self.machine)
         if unsure:
@@ -121,7 +124,8 @@ def _take_given(draft: _Draft, name: str, source: SignalSource, logs: Sequence[R
         if not unit and channel.unit:
             draft.notes.append(f"{name}: the recorded unit {channel.unit!r} is not known; SI is assumed")
         origin = replace(source, unit=unit)
-        draft.take(name, log, convert(name, _data(log, channel, origin), origin, draft.machine), origin, False)
+        converted = convert(name, _data(log, channel, origin), origin, draft.machine)
+        draft.take(name, log, channel, converted, origin, False)
         return
     known = [k for log in chosen for k in log.channels]
     near = difflib.get_close_matches(source.label, known, 3, 0.6)
@@ -148,7 +152,7 @@ def _take_guess(draft: _Draft, name: str, found: list[tuple[Candidate, RawLog]])
         except ConfigError as error:
             reason = str(error)
             continue
-        draft.take(name, log, converted, origin, True)
+        draft.take(name, log, channel, converted, origin, True)
         if candidate.rank == 0:
             draft.named.append(name)
             return

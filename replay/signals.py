@@ -29,6 +29,8 @@ class Signal:
         The file it came from.
     guessed : bool
         Whether the mapping was found automatically rather than given.
+    recorded_with : str
+        For channels of a table: the first channel that shares their time column; empty where there is but one.
     """
 
     name: str
@@ -37,6 +39,20 @@ class Signal:
     origin: SignalSource
     source: str
     guessed: bool
+    recorded_with: str = ""
+
+    @property
+    def group(self) -> str:
+        """What is lost together: a topic's messages; of a table's rows, which hold what came apart, one quantity."""
+        if self.origin.topic is not None:
+            return f"{self.source} {self.origin.topic}"
+        return f"{self.source} {self.recorded_with} {quantity_kind(self.name)}"
+
+
+def quantity_kind(name: str) -> str:
+    """Canonical name without wheel or axle: ``wheel.v`` for ``wheel.FR.v``."""
+    parts = name.split(".")
+    return f"{parts[0]}.{parts[-1]}"
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ arrived, so that estimators count each sample once.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -45,6 +45,8 @@ class Timeline:
         What was unusual, one sentence each.
     open_loop : bool
         As in `Signals`.
+    groups : Mapping[str, str]
+        `Signal.group` of each signal; empty: those of one file are one group.
     """
 
     start_ns: int
@@ -56,6 +58,7 @@ class Timeline:
     periods_ns: Mapping[str, int]
     notes: tuple[str, ...] = ()
     open_loop: bool = False
+    groups: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def dt(self) -> float:
@@ -130,6 +133,7 @@ def align(signals: Signals, start_s: float | None = None, stop_s: float | None =
         periods_ns={k: median_period(s.stamps) for k, s in signals.items.items()},
         notes=tuple(notes),
         open_loop=signals.open_loop,
+        groups={k: s.group for k, s in signals.items.items()},
     )
 
 
