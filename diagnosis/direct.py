@@ -21,7 +21,7 @@ from diagnosis.noise import relative_lag, shifted, unresolved
 from diagnosis.pairs import Pair, mode_model, neighbours, sample_status, timing_explains, unsettled
 from diagnosis.result import Epsilon, Hypothesis, Sat
 from diagnosis.screen import screened
-from diagnosis.segments import Run, absorb_short, join_noisy, merge_equal, runs_of, trim
+from diagnosis.segments import Run, absorb_short, join_noisy, merge_equal, runs_of, trim, with_leads
 from replay.faults import FaultMode, Side, State
 from replay.machine import Limits
 
@@ -40,6 +40,8 @@ _HOLD_S = 0.1
 _COARSE_COST = 0.2  # where a log is too slow for its commands, what is left of them looks like a fault's drift
 _BRIDGE_S = 5.0
 _BRIEF_S = 0.1
+_LEAD_S, _TAIL_S, _CHAIN_S = 0.3, 0.1, 0.05
+_SAID_S = 0.1
 
 
 def assess_pair(pair: Pair, limits: Limits) -> Assessment:
@@ -73,17 +75,24 @@ def assess_pair(pair: Pair, limits: Limits) -> Assessment:
     findings = []
     below = 0
     runs = _tidy(path, channel, model, pair.dt, shortest)
+    chained = with_leads(runs, *(max(2, round(s / pair.dt)) for s in (_LEAD_S, _TAIL_S, _CHAIN_S)))
     coarse = neighbours(x) if share else None
-    for i, found in enumerate(runs):
-        before, after = runs[i - 1].stop if i else 0, runs[i + 1].start if i + 1 < len(runs) else x.size
-        run = _refined(found, pair, channel, model, coarse, (before, after))
+    for i, (main, start, stop) in enumerate(chained):
+        before, after = chained[i - 1][2] if i else 0, chained[i + 1][1] if i + 1 < len(chained) else x.size
+        limit = (before if start == main.start else main.start, after if stop == main.stop else main.stop)
+        run = _refined(main, pair, channel, model, coarse, limit)
         finding = _finding(run, pair, channel, model, limits, lag, coarse)
         if finding is None:
             below += 1
         elif timing_explains(pair, x, run, finding.mode, share):
             blind[run.start : run.stop] = True
         else:
-            findings.append(replace(finding, detected=_detected(path, run, pair.dt, shortest, lag)))
+            whole = Run(
+                min(start, run.start) if start < main.start else run.start,
+                max(stop, run.stop) if stop > main.stop else run.stop,
+                run.row,
+            )
+            findings.append(_widened(finding, run, whole, pair.dt, _detected(path, whole, pair.dt, shortest, lag)))
     states = _states(pair, x, status, blind, findings)
     notes = [
         f"{pair.y_name} against {pair.x_name}: noise {model.noise:.2g} {pair.unit}, rounding step {lsb:.2g} {pair.unit}, "
@@ -102,6 +111,20 @@ def assess_pair(pair: Pair, limits: Limits) -> Assessment:
         columns=_columns(pair, x, status, model, path),
         tier="direct",
         notes=tuple(notes),
+    )
+
+
+def _widened(finding: Finding, run: Run, whole: Run, dt: float, detected: int | None) -> Finding:
+    """A finding with the time in which it grew or faded, and the moment at which it was raised."""
+    evidence = finding.evidence
+    if run.start - whole.start > _SAID_S / dt:
+        evidence += (f"Before that it grew for {(run.start - whole.start) * dt:.2f} s.",)
+    return replace(
+        finding,
+        start=max(0, finding.start - (run.start - whole.start)),
+        stop=finding.stop + (whole.stop - run.stop),
+        evidence=evidence,
+        detected=detected,
     )
 
 
@@ -161,7 +184,7 @@ def _one_fault(first: Run, second: Run, channel: Channel, model: modes.ModeModel
     """Whether two runs and what lies between are one fault rather than three parts."""
     reach = round(_BRIDGE_S / model.dt)
     a, b, c, d = max(first.start, first.stop - reach), first.stop, second.start, min(second.stop, second.start + reach)
-    if first.row != second.row or c - b > reach:
+    if first.row != second.row or (c - b > reach and not channel.quiet[b:c].all()):
         return False
     whole = channel.part(a, d).evidence(model)[first.row]
     parts = channel.part(a, b).evidence(model)[first.row] + channel.part(c, d).evidence(model)[first.row]

@@ -195,6 +195,8 @@ def likelihoods(y, x, status, quiet, p, noisy, row, mean, cov, out):  # type: ig
         if abs(mean[1, 0]) < 3 * np.sqrt(p[0]):
             out[1] = min(out[1], out[0])
         out[2] = min(out[2], out[0])
+        if abs(mean[3, 0]) < 0.1:  # a gain of zero
+            out[3] = min(out[3], out[0])
 
 
 @njit(cache=True)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -85,6 +86,44 @@ def merge_equal(runs: Iterable[Run], gap: int, rows: tuple[int, ...] = (NOISY,))
                 continue
         out.append(run)
     return out
+
+
+def with_leads(runs: list[Run], lead: int, tail: int, gap: int) -> list[tuple[Run, int, int]]:
+    """Faulty runs with the start and stop of the fault that each stands for.
+
+    A fault that grows drifts before it is what it becomes: noisy runs before another one, without a gap and no longer
+    than twice that, and runs shorter than `lead` are its beginning; runs shorter than `tail` behind it are its end.
+
+    Parameters
+    ----------
+    runs : list[Run]
+        Faulty runs in order.
+    lead, tail : int
+        Samples.
+    gap : int
+        Healthy samples between two runs that count as none.
+
+    Returns
+    -------
+    list[tuple[Run, int, int]]
+        In order of time.
+    """
+    cuts = [0, *(i + 1 for i, (a, b) in enumerate(pairwise(runs)) if b.start - a.stop > gap), len(runs)]
+    out: list[tuple[Run, int, int]] = []
+    open_chains = [runs[a:b] for a, b in pairwise(cuts)]
+    while open_chains:
+        chain = open_chains.pop()
+        if not chain:
+            continue
+        main = max(range(len(chain)), key=lambda i: chain[i].size / (2 if chain[i].row == NOISY else 1))
+        first = last = main
+        while first and (chain[first - 1].row == NOISY or chain[first - 1].size < lead):
+            first -= 1
+        while last + 1 < len(chain) and chain[last + 1].size < tail:
+            last += 1
+        out.append((chain[main], chain[first].start, chain[last].stop))
+        open_chains += [chain[:first], chain[last + 1 :]]
+    return sorted(out, key=lambda item: item[0].start)
 
 
 def trim(run: Run, quiet: NDArray[np.bool_]) -> Run | None:
