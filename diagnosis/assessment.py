@@ -51,7 +51,7 @@ class Assessment:
     columns : Mapping[str, NDArray[np.float64]], each of shape (n,)
         Evidence series by leaf name (``residual``, ``threshold``, ``delta``, …).
     tier : str
-        ``direct``, ``model``, ``signal`` or ``none``.
+        ``direct``, ``model``, ``drive``, ``tracking`` or ``none``; see `diagnosis.result.FaultInterval`.
     notes : tuple[str, ...]
         Figures that the judgement used, one sentence each.
     unexplained_s : float

@@ -56,10 +56,10 @@ def assess_components(
     channels = wheel_channels(timeline, machine)
     fit: WheelModelFit | None = None
     models: dict[int, tuple[Assessment, Assessment]] = {}
-    if not (channels.has_true & channels.has_applied).all():
+    if len(machine.wheels) > 1 and not (channels.has_true & channels.has_applied).all():
         progress("identifying the wheels")
         fit = wheel_fit(channels, replay, timeline, machine)
-    if fit is not None and len(machine.wheels) > 1:
+    if fit is not None:
         progress("judging the wheels by their models")
         slip = slip_of(timeline, replay, machine, channels.v, steering.angle, steering.doubtful)
         data, residual = wheels_data(timeline, replay, machine, channels, fit, counts, steering.angle, slip)

@@ -180,8 +180,8 @@ def assess_drive(data: DriveData, limits: Limits) -> tuple[Assessment, Assessmen
             "expected": load.sampled(load.expected, size),
         }
     return (
-        Assessment(states, reasons, tuple(on_sensor), columns, "model", tuple(notes)),
-        Assessment(actuator, reasons, tuple(on_actuator), drive_columns, "model", tuple(notes)),
+        Assessment(states, reasons, tuple(on_sensor), columns, "drive", tuple(notes)),
+        Assessment(actuator, reasons, tuple(on_actuator), drive_columns, "drive", tuple(notes)),
     )
 
 

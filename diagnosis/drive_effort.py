@@ -131,7 +131,7 @@ def load_findings(
                 evidence=_sentences(
                     name, float(np.mean(level)), float(np.mean(expected)), seconds, side, onset, open_loop
                 ),
-                tier="model",
+                tier="drive",
             )
         )
     return out

@@ -194,7 +194,7 @@ def _finding(run: Run, pair: EchoPair, model: RowModel, limits: Limits, lead: Ar
         epsilon=epsilon,
         sat=sat,
         evidence=_sentences(row, pair, y, x, seconds, delta, deviation, gain, model.switch_cost),
-        tier="echo",
+        tier="drive",
         detected=None if raised is None else min(max(raised + max(0, pair.lead), run.start), pair.y.size - 1),
     )
 

@@ -74,7 +74,8 @@ class FaultInterval:
     evidence : tuple[str, ...]
         What decided, one sentence each with its figures.
     tier : str
-        ``direct`` (a second measurement), ``model`` (wheel model), ``signal`` (the channel alone).
+        ``direct`` (a second measurement), ``model`` (model of the wheels or of the steering), ``drive`` (model of a
+        single drive), ``signal`` (the channel alone), ``tracking`` (the command that is not followed).
     detected_s : float or None
         Mission time [s] at which the same evidence, read without anything later, would have raised the fault; None
         where that is not known.

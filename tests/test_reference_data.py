@@ -258,5 +258,18 @@ def test_the_whole_diagnosis_with_a_fitted_machine_file(
         signals = inject_signals(signals, [FaultSpec("M", Side.SENSOR, mode, 8.0, 16.0, 0.05, *sat)], fitted, 1)[0]
     result = diagnose_signals(signals, fitted)
     assert serious(result) == ([] if mode is None else [("M", mode.value)])
-    if mode is not None:
-        assert result.report["intervals"][0]["side"] == "sensor"
+    verdict = result.report["verdict"]
+    if mode is None:
+        assert (verdict["status"], verdict["caveats"]) == ("ready", [])
+    else:
+        fault = result.report["intervals"][0]
+        assert (fault["side"], fault["tier"]) == ("sensor", "drive")
+
+
+def test_a_healthy_motor_without_a_fitted_machine_file_is_not_called_ready(
+    reference_data: Path, rig: tuple[Machine, DriveModel]
+) -> None:
+    found, _ = rig
+    verdict = diagnose_signals(rosa_signals(reference_data, "healthy_mode", 106, found), found).report["verdict"]
+    assert verdict["status"] == "not_assessed"
+    assert "no effort of healthy missions to compare with" in verdict["caveats"][0]

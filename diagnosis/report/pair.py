@@ -15,7 +15,6 @@ _TIERS = {
     "direct": "second measurement",
     "signal": "channel alone",
     "tracking": "command tracking",
-    "echo": "drive model",
     "drive": "drive model",
     "steering": "steering model",
 }

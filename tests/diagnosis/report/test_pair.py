@@ -55,7 +55,7 @@ def test_a_loss_on_either_side_takes_the_side_that_has_evidence() -> None:
         ("steer", "model", "steering model"),
         ("wheel", "signal", "channel alone"),
         ("wheel", "tracking", "command tracking"),
-        ("wheel", "echo", "drive model"),
+        ("wheel", "drive", "drive model"),
         ("wheel", "something new", "something new"),
     ],
 )
