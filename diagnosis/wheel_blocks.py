@@ -133,7 +133,7 @@ def blocks_of(
     fill = n * width - size
     opening = np.nan_to_num(u)
     opening = np.sign(opening) * np.maximum(np.abs(opening) - dead, 0.0)
-    opening = np.pad(opening, ((0, fill), (0, 0)))
+    opening = np.pad(opening, ((0, fill), (0, 0)), mode="edge")
     parts = opening.reshape(n, width, wheels)
     unsteady = parts.std(axis=1)
     if width < 4:  # too few samples to see by themselves what changes within a block

@@ -64,7 +64,7 @@ def tyre(speed: float, q: ws.WheelInput, most: float) -> tuple[float, float, flo
     else:
         a, b = lag(1 / MODEL.tau)
         force = held = most * np.sign(q.body - speed)
-    spread = np.linalg.norm([MODEL.load, 0.3 * held, min(MODEL.grip * q.doubt, most)])
+    spread = float(np.linalg.norm([MODEL.load, 0.3 * held, min(MODEL.grip * q.doubt, most)]))
     return a, b, force + MODEL.offset, spread * (-1 if held < 0 else 1), held
 
 
@@ -222,8 +222,9 @@ def test_steps_of_a_constant_channel_are_no_surer_than_its_rounding() -> None:
     got = {}
     for m in (ws.HEALTHY, ws.S_STUCK):
         z, P, k = entered(m, 0.0)
+        oracle = Oracle(m, z[m], P[m], 0.0)
         q = block(3, np.nan, 10.0)._replace(jitter=0.0, chatter=0.0)
-        got[m] = ws.correct(m, q, 1.0, k, z, P) - Oracle(m, *(x[m] for x in entered(m, 0.0)[:2]), 0.0).correct(q)
+        got[m] = ws.correct(m, q, 1.0, k, z, P) - oracle.correct(q)
     most = -0.5 * (20 / 3) * (1 + np.log(MODEL.constant_noise**2))
     assert got[ws.S_STUCK] == pytest.approx(-0.5 * (20 / 3) * np.log(MODEL.constant_noise**2))
     assert got[ws.HEALTHY] == pytest.approx(max(-0.5 * (20 / 3) * np.log(MODEL.noise**2), most - 25.0))
