@@ -38,7 +38,7 @@ _MAX_LAG_S = 0.05
 _SHORTEST_S = 0.01
 _HOLD_S = 0.1
 _COARSE_COST = 0.2  # where a log is too slow for its commands, what is left of them looks like a fault's drift
-_BRIDGE_S = 5.0
+_BRIDGE_S, _APART_S = 5.0, 30.0
 _BRIEF_S = 0.1
 _LEAD_S, _TAIL_S, _CHAIN_S = 0.3, 0.1, 0.05
 _SAID_S = 0.1
@@ -184,7 +184,7 @@ def _one_fault(first: Run, second: Run, channel: Channel, model: modes.ModeModel
     """Whether two runs and what lies between are one fault rather than three parts."""
     reach = round(_BRIDGE_S / model.dt)
     a, b, c, d = max(first.start, first.stop - reach), first.stop, second.start, min(second.stop, second.start + reach)
-    if first.row != second.row or (c - b > reach and not channel.quiet[b:c].all()):
+    if first.row != second.row or c - b > _APART_S / model.dt:
         return False
     whole = channel.part(a, d).evidence(model)[first.row]
     parts = channel.part(a, b).evidence(model)[first.row] + channel.part(c, d).evidence(model)[first.row]

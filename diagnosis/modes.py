@@ -192,11 +192,12 @@ def likelihoods(y, x, status, quiet, p, noisy, row, mean, cov, out):  # type: ig
         elif row[m] != HEALTHY:
             out[m] -= _FAULT_COST
     if quiet:
+        most = max(out[0], out[_MISMATCH])
         if abs(mean[1, 0]) < 3 * np.sqrt(p[0]):
-            out[1] = min(out[1], out[0])
-        out[2] = min(out[2], out[0])
+            out[1] = min(out[1], most)
+        out[2] = min(out[2], most)
         if abs(mean[3, 0]) < 0.1:  # a gain of zero
-            out[3] = min(out[3], out[0])
+            out[3] = min(out[3], most)
 
 
 @njit(cache=True)

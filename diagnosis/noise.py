@@ -88,7 +88,7 @@ def relative_lag(y: Array, x: Array, use: NDArray[np.bool_], least_lag: int, max
     """Delay of y against x in steps, to a tenth, by the smallest mean square of y(t) − x(t − lag) where x changes.
 
     What is ten times as large as the lower third counts no more than that, so that faults for half of the time leave the
-    delay alone. It must lower the mean square by 3 % to be believed; a valve cannot answer before its command, so there
+    delay alone. It must lower the mean square by 2 % to be believed; a valve cannot answer before its command, so there
     `least_lag` is 0.
     """
     rate = np.abs(np.diff(x, prepend=x[:1]))
@@ -116,7 +116,7 @@ def relative_lag(y: Array, x: Array, use: NDArray[np.bool_], least_lag: int, max
     most = _SOUND * min(lower(c) for c in steps) or np.inf
     misfits = np.array([float(np.nanmean(np.minimum(off(c), most) ** 2)) for c in steps])
     k, none = int(np.argmin(misfits)), int(np.flatnonzero(steps == max(0, least_lag))[0])
-    if misfits[k] >= 0.97 * misfits[none]:
+    if misfits[k] >= 0.98 * misfits[none]:
         k = none
     if not 0 < k < steps.size - 1:
         return float(steps[k])
