@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+from typing import Any
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
@@ -37,11 +40,11 @@ def cut(y: Array, u: Array, status: Array, quiet: Array, dt: float, dead: float 
     return blocks_of(y, u, status, quiet, ratio, turn, np.full(WHEELS, dead), dt)
 
 
-def naive(y: Array, u: Array, status: Array, width: int, i: int) -> list[tuple[float, float, float, int, float]]:
+def naive(y: Array, u: Array, status: Array, width: int, i: int) -> list[tuple[Any, ...]]:
     """Mean, count, mean squared step, status and unsteadiness of every block of wheel i."""
     places = [k for k in range(y.shape[0]) if status[k, i] == PAIR]
     usual = np.median(np.diff(places))
-    before = {k: j for j, k in zip(places, places[1:], strict=False)}
+    before = {k: j for j, k in pairwise(places)}
     out = []
     for first in range(0, y.shape[0], width):
         block = range(first, min(first + width, y.shape[0]))
@@ -68,7 +71,8 @@ def test_blocks_are_what_a_loop_finds(rate: int, every: int, size: int) -> None:
     y, u, status, quiet = recorded(size, every)
     got = cut(y, u, status, quiet, 1 / rate)
     width = rate // 100
-    assert (got.width, got.dt) == (width, pytest.approx(0.01))
+    assert got.width == width
+    assert got.dt == pytest.approx(0.01)
     assert got.y.shape == (-(-size // width), WHEELS)
     for i in range(WHEELS):
         mean, count, jitter, state, unsteady = (np.array(x) for x in zip(*naive(y, u, status, width, i), strict=True))
