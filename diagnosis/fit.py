@@ -7,9 +7,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from diagnosis.drive_fit import drive_data, fit_drives
 from diagnosis.fit_control import fit_control, lambda_doubt
 from diagnosis.fit_geometry import fit_offset
-from diagnosis.fit_machine import Constant, with_control, with_noise, with_offset, with_plants
+from diagnosis.fit_machine import Constant, with_control, with_drives, with_noise, with_offset, with_plants
 from diagnosis.fit_noise import fit_noise
 from diagnosis.fit_plants import fit_plants
 from diagnosis.fit_units import UnitError, find_unit_errors, speed_mistakes
@@ -117,6 +118,16 @@ def fit_missions(
     out = with_offset(machine, offset, blocks, len(turned), constants)
     out = with_control(out, machine, control, bool(doubt), constants)
     out = with_plants(out, machine, plants, spoiled, constants)
+    if len(machine.wheels) == 1 or machine.geometry is None:
+        tell("fitting the drives")
+        logged = {
+            w: sum(
+                drive_data(t, r.v_ref[:, i], machine, w) is not None for t, r in zip(timelines, replays, strict=True)
+            )
+            for i, w in enumerate(machine.wheels)
+        }
+        drives = fit_drives(list(zip(timelines, replays, strict=True)), machine)
+        out = with_drives(out, drives, dict(zip(machine.wheels, spoiled, strict=True)), logged, constants)
     out = with_noise(out, noise, bad, constants)
     left_out += _left_plants(plants, machine, names)
     left_out += [f"{names[m]}: the control law fits it badly or unlike the others" for m in control.left_missions]

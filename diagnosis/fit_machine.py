@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from math import isfinite
 
@@ -10,6 +11,7 @@ from diagnosis.fit_geometry import offset_pattern
 from diagnosis.fit_noise import NoiseFit
 from diagnosis.fit_robust import Estimate
 from diagnosis.fit_wheels import WheelFit
+from replay.drive_model import DriveModel
 from replay.machine import Law, Machine, Noise, PsiMode, WheelPlant
 
 
@@ -136,6 +138,74 @@ def with_plants(
 
 def _known(x: float) -> float | None:
     return float(x) if isfinite(x) else None
+
+
+_ECHO = (
+    ("gains", "m/s per unit of effort"),
+    ("memory_s", "s"),
+    ("setpoint", "of the command"),
+    ("noise", "m/s"),
+)
+_EFFORT = (
+    ("offset", "unit of effort"),
+    ("slope", "unit of effort per m/s"),
+    ("between", "unit of effort"),
+    ("drift", "unit of effort per √s"),
+    ("noise", "unit of effort"),
+)
+_NO_ECHO = "command and effort do not tell which speed the controller saw"
+_NO_EFFORT = "three missions are needed in which the drive is driven for five seconds"
+
+
+def with_drives(
+    machine: Machine,
+    drives: Mapping[str, DriveModel],
+    spoiled: Mapping[str, str],
+    missions: Mapping[str, int],
+    constants: list[Constant],
+) -> Machine:
+    """Put the models of single drives into the drive section; what was not found stays as it was.
+
+    Parameters
+    ----------
+    machine : Machine
+        What they are put into.
+    drives : Mapping[str, DriveModel]
+        By wheel, as found.
+    spoiled : Mapping[str, str]
+        By wheel: a signal with a wrong unit that its model would rest on, else empty.
+    missions : Mapping[str, int]
+        By wheel: missions that log its speed, command and effort.
+    constants : list[Constant]
+        Takes the constants.
+    """
+    out = dict(machine.drives)
+    for wheel, count in missions.items():
+        found = DriveModel() if spoiled[wheel] else drives.get(wheel, DriveModel())
+        before = out.get(wheel, DriveModel())
+        wrong = f"{spoiled[wheel]} has a wrong unit or sign" if spoiled[wheel] else "" if count else "not logged"
+        for part, fields, why in (("echo", _ECHO, _NO_ECHO), ("effort", _EFFORT, _NO_EFFORT)):
+            new, old = getattr(found, part), getattr(before, part)
+            for name, unit in fields:
+                remark = ("the largest of them" if name == "gains" else "") if new is not None else wrong or why
+                e = Estimate(_first(new, name), _std(new, name), remark)
+                was = _known(_first(old, name))
+                key = f"drive.{wheel}.{part}.{name}"
+                constants.append(_constant(key, e, unit, was, 0, count, written=True))
+        kept = DriveModel(echo=found.echo or before.echo, effort=found.effort or before.effort)
+        if kept != DriveModel():
+            out[wheel] = kept
+    return replace(machine, drives=out)
+
+
+def _first(part: object, name: str) -> float:
+    """A field of a drive's model, of gains the largest; NaN where there is no model."""
+    value = getattr(part, name, float("nan"))
+    return float(max(value, key=abs) if isinstance(value, tuple) else value)
+
+
+def _std(part: object, name: str) -> float:
+    return float(getattr(part, "memory_std_s", float("nan"))) if name == "memory_s" else float("nan")
 
 
 def with_noise(out: Machine, fits: dict[str, NoiseFit], bad: set[str], constants: list[Constant]) -> Machine:

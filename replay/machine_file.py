@@ -237,7 +237,7 @@ def dump_machine(machine: Machine, notes: Mapping[str, Sequence[str]] | None = N
     if machine.plant.flow is not None:
         lines.append(f"flow = {_real(machine.plant.flow)}")
     lines += [f"{_key(w)} = {{ {', '.join(_table(p))} }}" for w, p in machine.plant.wheels.items()]
-    if machine.drives:
+    if machine.drives or "drive" in said:
         lines += ["", *head("drive"), *(f"{_key(w)} = {_inline(drive_table(d))}" for w, d in machine.drives.items())]
     lines += ["", *head("limits"), *_table(machine.limits)]
     for section, items in (("noise", machine.noise), ("sources", machine.sources), ("signals", machine.signals)):

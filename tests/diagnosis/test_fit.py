@@ -14,7 +14,7 @@ from diagnosis.fit import FitResult, fit_missions
 from diagnosis.fit_document import fit_document, fit_toml
 from replay.errors import NotJudged
 from replay.faults import FaultMode, FaultSpec, Side
-from replay.machine import haulotte
+from replay.machine import Control, Machine, haulotte
 from replay.machine_file import load_machine
 from replay.mission import Mission, load_mission
 from replay.signals import Signal, Signals
@@ -212,3 +212,60 @@ u_max = 100
     assert all(10 < p.K < 22 and 3 < p.dead < 12 for p in plants)
     tau = next(c for c in halves[0].constants if c.key == "plant.M.tau")
     assert "never changes" in tau.why
+
+
+def drive_mission(seed: int) -> Mission:
+    """20 s at 50 Hz of one drive, v = 8·(u − 0.2) with a lag of 0.3 s, in a proportional-integral loop (0.2, 0.8 s)."""
+    rng = np.random.default_rng(seed)
+    n, dt, kp, ti = 1000, 0.02, 0.2, 0.8
+    command = 1.5 + 0.5 * seed + 0.5 * np.repeat(rng.uniform(-1, 1, 5), n // 5)
+    y, u = np.empty(n), np.empty(n)
+    v, effort = command[0], command[0] / 8 + 0.2
+    integral = effort
+    for k in range(n):
+        v += dt / 0.3 * (-v + 8 * (effort - 0.2) + rng.normal(0, 0.4))
+        y[k], u[k] = v + rng.normal(0, 0.03), effort
+        integral += kp / ti * dt * (command[k] - y[k])
+        effort = integral + kp * (command[k] - y[k])
+    stamps = 20_000_000 * np.arange(n, dtype=np.int64)
+    signals = Signals(
+        {
+            f"wheel.M.{leaf}": Signal(f"wheel.M.{leaf}", stamps, x, SignalSource(column=leaf), "rig", False)
+            for leaf, x in (("v_ref", command), ("v", y), ("u", u))
+        },
+        {},
+    )
+    return Mission((), signals, align(signals))
+
+
+RIG = Machine("rig", "", ("M",), None, control=Control(law="none"), max_speed=5.0)
+
+
+def test_a_single_drive_is_measured_into_the_machine_file(tmp_path: Path) -> None:
+    result = fit_missions([drive_mission(s) for s in (1, 2, 3)], RIG)
+    found = {c.key: c for c in result.constants if c.written and c.key.startswith("drive.M.")}
+    assert found["drive.M.echo.gains"].value == pytest.approx(-1 / 0.2, rel=0.05)
+    assert found["drive.M.echo.memory_s"].value == pytest.approx(0.8, rel=0.2)
+    assert found["drive.M.effort.offset"].value == pytest.approx(0.2, abs=0.05)
+    assert found["drive.M.effort.slope"].value == pytest.approx(1 / 8, rel=0.1)
+    assert found["drive.M.effort.slope"].missions == 3
+    path = tmp_path / "machine.toml"
+    path.write_text(fit_toml(result), encoding="utf-8")
+    assert "# drive.M.effort.slope = 0.1" in path.read_text(encoding="utf-8")
+    assert load_machine(path).drives == result.machine.drives
+
+
+def test_what_a_single_drive_did_not_show_is_said_and_stays(tmp_path: Path) -> None:
+    known = fit_missions([drive_mission(s) for s in (1, 2, 3)], RIG).machine
+    result = fit_missions([drive_mission(4)], known)
+    slope = next(c for c in result.constants if c.key == "drive.M.effort.slope")
+    assert (slope.value, slope.written) == (None, False)
+    assert "three missions" in slope.why
+    assert "drive.M.effort.slope: unchanged; not identifiable: three missions" in fit_toml(result)
+    assert result.machine.drives["M"].effort == known.drives["M"].effort
+    assert result.machine.drives["M"].echo != known.drives["M"].echo
+
+
+def test_wheels_of_a_machine_with_geometry_are_no_single_drives(free: FitResult) -> None:
+    assert [c.key for c in free.constants if c.key.startswith("drive.")] == []
+    assert dict(free.machine.drives) == {}
