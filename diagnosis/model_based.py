@@ -17,6 +17,7 @@ from diagnosis.noise import moving_sum, quick_noise, rounding_step, slow_mismatc
 from diagnosis.wheel_blocks import WheelBlocks, blocks_of, per_sample
 from diagnosis.wheel_findings import Run, judge, onset_sentence, refined
 from diagnosis.wheel_runs import runs_of
+from diagnosis.wheel_settle import settled
 from replay.faults import FaultMode, Side, State
 from replay.machine import Limits, Noise, WheelPlant
 
@@ -147,7 +148,7 @@ def assess_wheels(
         switch_cost=float(np.log(_MEAN_HEALTHY_S / blocks.dt * 12)),
     )
     model = _coupled(blocks, model, data)
-    done = wf.forward(blocks, model)
+    done = settled(blocks, model, wf.forward(blocks, model))
     return {
         i: _one_wheel(i, data, blocks, model, done, limits, gains) for i, w in enumerate(model.wheels) if w is not None
     }
@@ -205,7 +206,7 @@ def _one_wheel(
         if stop <= start:
             continue
         run = Run(start, stop, int(m), found.evidence[r], found.mean[r], found.cov[r])
-        verdict = judge(run, y[start:stop], own, limits, data.names[i], data.dt, gains=gains)
+        verdict = judge(run, y[start:stop], own, limits, data.names[i], data.dt, gains=gains, blocks=last - first)
         for side in verdict.open_sides:
             opened[side][start:stop] = True
         if verdict.finding is None:

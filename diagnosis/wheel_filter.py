@@ -192,9 +192,26 @@ def first_speeds(blocks: WheelBlocks) -> Array:
     return out
 
 
-def forward(blocks: WheelBlocks, model: JointModel, state: JointState | None = None) -> JointPass:
-    """Run the recursion; without a state from the mission's beginning."""
+def forward(
+    blocks: WheelBlocks,
+    model: JointModel,
+    state: JointState | None = None,
+    given: NDArray[np.uint8] | None = None,
+) -> JointPass:
+    """Run the recursion.
+
+    Parameters
+    ----------
+    blocks, model
+        The wheels.
+    state : JointState or None
+        From the blocks before; None: the mission's beginning.
+    given : NDArray[np.uint8], shape (n, wheels), or None
+        In which model each wheel is taken to be by the others; `STAY`, and None: in its own most probable one.
+    """
     n, wheels = blocks.y.shape
+    if given is None:
+        given = np.full((n, wheels), STAY, dtype=np.uint8)
     dt, raw_dt = blocks.dt, blocks.raw_dt
     if state is None:
         state = initial_state(first_speeds(blocks), model, dt, raw_dt)
@@ -217,6 +234,7 @@ def forward(blocks: WheelBlocks, model: JointModel, state: JointState | None = N
         blocks.status,
         blocks.quiet,
         np.array([w is not None for w in model.wheels]),
+        given,
         np.array([A_GAIN if w.measured else MODELS for w in used]),
         model.flow,
         model.switch_cost,

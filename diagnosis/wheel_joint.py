@@ -8,11 +8,10 @@ wheel's healthy valve, nor the reverse.
 from __future__ import annotations
 
 # ruff: noqa: SIM109 (compiled: a tuple of constants costs a search)
-
 import numpy as np
 from numba import njit
 
-from diagnosis.modes import PAIR, SILENT, SKIP
+from diagnosis.modes import PAIR, SILENT, SKIP, STAY
 from diagnosis.wheel_scan import (
     A_BIAS,
     A_GAIN,
@@ -115,6 +114,7 @@ def forward(  # type: ignore[no-untyped-def]
     status,
     quiet,
     known,
+    given,
     m_on,
     flow,
     cost,
@@ -134,13 +134,16 @@ def forward(  # type: ignore[no-untyped-def]
     gain = np.zeros(MODELS)
     took, roll, trust = np.zeros(wheels), np.zeros(wheels), np.zeros(wheels)
     now, here, after = np.zeros((wheels, 5)), np.zeros((wheels, width)), np.zeros((wheels, width))
-    top = np.zeros(wheels, dtype=np.int64)
+    top, seen = np.zeros(wheels, dtype=np.int64), np.zeros(wheels, dtype=np.int64)
     for i in range(wheels):
         here[i], after[i] = weights(width, constants[i].lag)
     for n in range(blocks):
         for i in range(wheels):
             m = int(np.argmax(score[i, : m_on[i]]))
             top[i] = m
+            if given[n, i] != STAY:
+                m = int(given[n, i])
+            seen[i] = m
             v = z[i, m, 0] / max(z[i, m, 1], 0.1) if is_scaled(m) else z[i, m, 0]
             k = constants[i]
             if k.grip_most > 0.0:  # a driven wheel that the body holds back runs a little off it
@@ -162,7 +165,7 @@ def forward(  # type: ignore[no-untyped-def]
             total = 0.0
             for j in range(wheels):
                 took[j] = (
-                    taken(top[j], z[j, top[j], 1], z[j, top[j], 3], constants[j].K, u[n * width + q, j])
+                    taken(seen[j], z[j, seen[j], 1], z[j, seen[j], 3], constants[j].K, u[n * width + q, j])
                     if known[j]
                     else 0.0
                 )
@@ -201,7 +204,7 @@ def forward(  # type: ignore[no-untyped-def]
                     if far < least:
                         least, body = far, roll[j] * ratio[n, i] - turn[n, i]
                 doubt = least / total
-            m = top[i]
+            m = seen[i]
             takes = now[i, 0]
             if m == A_GAIN or m == A_BIAS:
                 takes *= z[i, m, 1]
