@@ -33,7 +33,9 @@ _MODE = {
     modes.INEFFICIENT: FaultMode.INEFFICIENT,
     modes.NOISY: FaultMode.NOISY,
 }
-_TEMPER = 0.25
+# From tuning missions, by `python tests/benchmarks/calibrate_direct.py`: share of findings that are not what they seem, and
+# the length at which half of those in a log too slow for its commands are.
+_TEMPER, _LAPSE, _COARSE_S = 0.25, 0.01, 1.7
 _MAX_LAG_S = 0.05
 _SHORTEST_S = 0.01
 _HOLD_S = 0.1
@@ -139,7 +141,7 @@ def _tidy(path: ModePath, channel: Channel, model: modes.ModeModel, dt: float, s
     runs = absorb_short(runs_of(path), shortest)
     runs = join_noisy(runs)
     runs = merge_equal(runs, max(2, round(0.02 / dt)), (modes.NOISY, modes.INEFFICIENT, modes.NO_SIGNAL))
-    runs = _bridged([r for r in runs if r.row != modes.HEALTHY], channel, model)
+    runs = _bridged(_renamed([r for r in runs if r.row != modes.HEALTHY], channel, model), channel, model)
     out = []
     for run in runs:
         if run.row in (modes.INEFFICIENT, modes.NO_SIGNAL):
@@ -152,6 +154,30 @@ def _tidy(path: ModePath, channel: Channel, model: modes.ModeModel, dt: float, s
             run = kept
         out.append(run)
     return out
+
+
+def _renamed(runs: list[Run], channel: Channel, model: modes.ModeModel) -> list[Run]:
+    """Noisy runs beside another one under that one's row, where it explains them better: the path never went back."""
+    out = list(runs)
+    for i, run in enumerate(runs):
+        near = [
+            r
+            for r in out[max(0, i - 1) : i] + runs[i + 1 : i + 2]
+            if min(abs(run.start - r.stop), abs(r.start - run.stop)) < 3
+        ]
+        if run.row != modes.NOISY or not near:
+            continue
+        evidence = channel.part(*_inner(run)).evidence(model)
+        best = max((r.row for r in near), key=lambda row: evidence[row])
+        if evidence[best] > evidence[modes.NOISY] + model.switch_cost:
+            out[i] = Run(run.start, run.stop, best)
+    return out
+
+
+def _inner(run: Run) -> tuple[int, int]:
+    """First sample and the one after the last, without a few at both ends: a delay leaves some of the neighbours there."""
+    edge = min(5, run.size // 20)
+    return run.start + edge, run.stop - edge
 
 
 def _bridged(runs: list[Run], channel: Channel, model: modes.ModeModel) -> list[Run]:
@@ -226,8 +252,7 @@ def _finding(
     part = slice(run.start, run.stop)
     y, ref, st = pair.y[part], channel.x[part], channel.status[part]
     use = np.isin(st, (modes.PAIR, modes.BLIND))
-    edge = min(5, (run.stop - run.start) // 20)  # a delay leaves a sample or two of the neighbours at the ends
-    evidence = channel.part(run.start + edge, run.stop - edge).evidence(model)
+    evidence = channel.part(*_inner(run)).evidence(model)
     gain = evidence[run.row] - evidence[modes.HEALTHY]
     if gain < model.switch_cost:
         return None
@@ -235,12 +260,20 @@ def _finding(
     tempered = prior + np.clip(_TEMPER * (evidence - evidence.max()), -700, 0)
     p = np.exp(tempered - tempered.max())
     p /= p.sum()
+    p = _with_lapses(p, run.row, None if coarse is None else run.size * pair.dt)
     if run.row in (modes.STUCK, modes.NO_SIGNAL) and (
         not use.any() or abs(float(np.mean(y[use]))) <= 3 * model.constant_noise / np.sqrt(min(use.sum(), 100))
     ):  # stuck at zero, a gain of zero and no signal are one row of the table
         run = Run(run.start, run.stop, modes.NO_SIGNAL)
         p[modes.NO_SIGNAL] += p[modes.STUCK] + p[modes.INEFFICIENT]
         p[[modes.STUCK, modes.INEFFICIENT]] = 0.0
+    still = use.any() and float(np.std(ref[use])) < 2 * model.noise
+    shifted_away = still and abs(float(np.mean(ref[use]))) > 3 * model.noise and not 0.0 <= estimate[2] <= 1.0
+    if run.row == modes.INEFFICIENT and shifted_away:  # a constant of its own, not a share
+        run = Run(run.start, run.stop, modes.STUCK)
+        estimate = _estimate(run, pair, channel, model, coarse)
+        if estimate is None:
+            return None
     mode = _MODE[run.row]
     epsilon, sat, delta = estimate
     deviation = float(np.sqrt(np.mean((y[use] - ref[use]) ** 2))) if use.any() else float("inf")
@@ -256,7 +289,7 @@ def _finding(
     if mode is FaultMode.NOISY and deviation < max(2.5 * model.noise, limits.min_sat / 2):
         return None
     lines = _sentences(run.row, mode, pair, y, ref, use, st, model, epsilon, sat, gain, deviation)
-    if run.row in (modes.STUCK, modes.INEFFICIENT) and use.any() and float(np.std(ref[use])) < 2 * model.noise:
+    if run.row in (modes.STUCK, modes.INEFFICIENT) and still:
         # nothing moved: a constant value and a constant share of a constant are the same
         p[modes.STUCK] = p[modes.INEFFICIENT] = (p[modes.STUCK] + p[modes.INEFFICIENT]) / 2
         lines += (f"{pair.x_name} hardly moved in this time, so that stuck and inefficient look alike.",)
@@ -275,6 +308,22 @@ def _finding(
         evidence=lines,
         tier="direct",
     )
+
+
+def _with_lapses(p: Array, row: int, seconds: float | None) -> Array:
+    """Probabilities of the rows, lessened by how often a finding is not the fault that it seems, shape (5,).
+
+    In a log too slow for its commands (`seconds` long; None elsewhere) most short findings are pieces of another fault,
+    so that what the row loses goes to the other faults.
+    """
+    kept = 1.0 - _LAPSE
+    if seconds is not None:
+        kept *= seconds**2 / (seconds**2 + _COARSE_S**2)
+    out = p.copy()
+    others = [r for r in range(p.size) if r not in (modes.HEALTHY, row)]
+    out[others] += p[row] * (1.0 - kept) / len(others)
+    out[row] = p[row] * kept
+    return out
 
 
 def _sentences(

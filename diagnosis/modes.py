@@ -192,12 +192,15 @@ def likelihoods(y, x, status, quiet, p, noisy, row, mean, cov, out):  # type: ig
         elif row[m] != HEALTHY:
             out[m] -= _FAULT_COST
     if quiet:
+        # a reading of zero says as much for no signal as for none wanted
         most = max(out[0], out[_MISMATCH])
+        zero = abs(y) < 3.5 * np.sqrt(p[1])
         if abs(mean[1, 0]) < 3 * np.sqrt(p[0]):
-            out[1] = min(out[1], most)
-        out[2] = min(out[2], most)
-        if abs(mean[3, 0]) < 0.1:  # a gain of zero
-            out[3] = min(out[3], most)
+            out[1] = most if zero else min(out[1], most)
+        out[2] = most if zero else min(out[2], most)
+        for m in range(3, out.size):
+            if row[m] != HEALTHY and abs(mean[m, 0]) < 0.1:
+                out[m] = min(out[m], most)
 
 
 @njit(cache=True)
