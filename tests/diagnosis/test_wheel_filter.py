@@ -66,7 +66,8 @@ def rolled(u: Array, flow: float = 1e9) -> Array:
 
 
 def noisy(v: Array, seed: int = 1) -> Array:
-    return np.asarray(np.round(v + WHEEL.noise * np.random.default_rng(seed).normal(size=v.shape), 3))
+    measured: Array = np.round(v + WHEEL.noise * np.random.default_rng(seed).normal(size=v.shape), 3)
+    return measured
 
 
 def blocks(y: Array, u: Array, status: Array | None = None) -> WheelBlocks:
