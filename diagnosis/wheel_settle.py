@@ -17,7 +17,7 @@ from diagnosis.wheel_runs import Runs, runs_of
 
 _NEAR_S = 0.3
 _MARGIN_S = 0.05
-_ROUNDS = 2
+_ROUNDS = 1
 
 
 def settled(blocks: WheelBlocks, model: wf.JointModel, done: wf.JointPass) -> wf.JointPass:
