@@ -303,6 +303,6 @@ def along_runs(  # type: ignore[no-untyped-def]
                     evidence[r, m] += gain[m]
                 mean[r], cov[r] = z, P
             hold_z[:], hold_P[:] = z, P
-            if model[r] == HEALTHY:  # a fault leaves the expectation alone
+            if model[r] == HEALTHY and n < stop[r]:  # a fault leaves the expectation alone
                 free_z[0], free_P[0] = z[HEALTHY], P[HEALTHY]
         old = model[r]
