@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,6 +12,7 @@ from scipy.ndimage import maximum_filter1d, minimum_filter1d
 from diagnosis import modes
 from diagnosis.noise import moving_sum, rounding_step, slow_mismatch, white_noise, white_part
 from diagnosis.segments import Run
+from diagnosis.spells import FALSE_SPELLS
 from replay.faults import FaultMode, Side
 from replay.machine import Noise
 
@@ -22,6 +24,7 @@ _SPOOL_DELAY_S = 0.005
 _SENSOR_DELAY_S = 0.01
 _AROUND = 11
 _SETTLED = 7
+_JUMPY = 0.6  # share of a command's size that jumps between samples, where there is nothing else to it
 _FLIPS = 25  # samples in a row on one side of a command that switches to and fro between samples
 
 
@@ -99,11 +102,13 @@ def neighbours(x: Array) -> Array:
 
 
 def timing_explains(pair: Pair, x: Array, run: Run, mode: FaultMode, share: float) -> bool:
-    """Whether a deviation may be nothing but a delay between y and its reference.
+    """Whether a deviation may be nothing but a delay between y and its reference, or its rounding.
 
     Shorter than a spool sensor's delay; or, where a log is too slow for its commands: what changes from sample to
     sample is as large, or y is x with its sign at other moments, or a constant y is met by most samples of x. For a
-    speed: shorter than half a second and no more than 10 ms of the reference's slope.
+    speed: shorter than half a second and no more than 10 ms of the reference's slope, or a reading that rests beside a
+    reference that hardly moves, no longer than its noise allows. Whatever the rate, the answer to a command of which
+    nothing is left but jumps between samples depends on the valve's lag.
     """
     part = slice(run.start, run.stop)
     y, ref = pair.y[part], x[part]
@@ -113,18 +118,42 @@ def timing_explains(pair: Pair, x: Array, run: Run, mode: FaultMode, share: floa
     if pair.side is Side.SENSOR:
         slope = np.gradient(np.nan_to_num(x[max(0, run.start - 1) : run.stop + 1]), pair.dt)
         moves = float(np.sqrt(np.mean(slope**2))) * _SENSOR_DELAY_S
+        if mode in (FaultMode.STUCK, FaultMode.NO_SIGNAL):
+            return _rests_by_chance(pair, x, run, deviation)
         return mode is FaultMode.NOISY and seconds < 0.5 and deviation < moves
     if seconds <= _SPOOL_DELAY_S:
         return True
+    gone = mode in (FaultMode.STUCK, FaultMode.NO_SIGNAL)
+    jumps = float(np.sqrt(np.mean(white_part(pair.x)[part] ** 2)))
+    if not gone and deviation < 2 * jumps and jumps > _JUMPY * float(np.sqrt(np.nanmean(ref**2))):
+        return True
     if not share:
         return False
-    if mode in (FaultMode.STUCK, FaultMode.NO_SIGNAL):
-        return run.size < _FLIPS or float(np.nanmedian(off)) < 0.5 * deviation
+    if gone:
+        return run.size < _FLIPS or (np.isfinite(deviation) and float(np.nanmedian(off)) < 0.5 * deviation)
     if mode is not FaultMode.NOISY:
         return False
     sudden = max(float(np.sqrt(np.mean(white_part(z)[part] ** 2))) for z in (pair.x, pair.y))
     size = np.sqrt(np.nanmean((np.abs(y) - np.abs(pair.x[part])) ** 2))
     return bool(sudden > 0.3 * deviation or size < 0.3 * deviation)
+
+
+def _rests_by_chance(pair: Pair, x: Array, run: Run, deviation: float) -> bool:
+    """Whether a healthy sensor's noise may keep its readings as close as they are, beside a reference that explains them.
+
+    Within w = ptp(y) + lsb one reading is with probability erf(w / (√8·noise)) at most; see `diagnosis.spells`.
+    """
+    known = pair.fresh & np.isfinite(pair.y)
+    if not np.isfinite(pair.y[run.start : run.stop]).all():
+        return False  # a silent channel does not rest
+    y = pair.y[run.start : run.stop][known[run.start : run.stop]]
+    white, own = (float(np.nan_to_num(white_noise(z[known], pair.dt))) for z in (pair.y, x))
+    if not y.size or deviation > 2.5 * math.hypot(white, own):
+        return False
+    lsb = pair.known_noise.lsb if pair.known_noise.lsb is not None else rounding_step(pair.y[known])
+    noise = math.sqrt(max(white**2 - lsb**2 / 12, 0.0))
+    close = math.erf((float(np.ptp(y)) + lsb) / (math.sqrt(8.0) * noise)) if noise else 1.0
+    return bool(np.count_nonzero(known) * close ** (y.size - 1) > FALSE_SPELLS)
 
 
 def mode_model(pair: Pair, x: Array, status: NDArray[np.int8], tolerance: float) -> tuple[modes.ModeModel, float]:
