@@ -292,3 +292,49 @@ def test_late_start_and_early_stop_of_a_channel_are_no_silence() -> None:
     y[:40], y[-30:] = np.nan, np.nan
     status = sample_status(y, x, np.isfinite(y), np.ones(2000, dtype=np.bool_), DT)
     assert (status == modes.SILENT).sum() == 0
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+@pytest.mark.parametrize("level", [0.31, 0.0], ids=["stuck", "silent"])
+def test_spell_of_20_ms_is_found(level: float, seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    clean = drive() + 0.004 * rng.normal(size=N)
+    clean[START : START + 20] = level
+    y, x = measured(drive(), Side.SENSOR, rng, clean)
+    found = single(assess_pair(pair(Side.SENSOR, y, x), LIMITS))
+    assert found.mode is (FaultMode.STUCK if level else FaultMode.NO_SIGNAL)
+    assert abs(found.start - START) <= 1
+    assert abs(found.stop - START - 20) <= 1
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_fault_that_grows_is_one_fault(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    clean = drive() + 0.004 * rng.normal(size=N)
+    share = np.clip((np.arange(N) - 3000) / 1500, 0, 1) * 0.6
+    faulty = np.where(np.arange(N) < 9000, (1 - share) * clean, clean)
+    y, x = measured(drive(), Side.SENSOR, rng, faulty)
+    found = single(assess_pair(pair(Side.SENSOR, y, x), LIMITS))
+    assert found.mode is FaultMode.INEFFICIENT
+    assert 3000 <= found.start <= 4000
+    assert abs(found.stop - 9000) <= 3
+    assert found.epsilon is not None
+    assert found.epsilon.value == pytest.approx(0.6, abs=0.02)
+
+
+def test_silent_channel_is_one_fault_through_a_standstill() -> None:
+    rng = np.random.default_rng(2)
+    rest = (np.arange(N) > 5000) & (np.arange(N) < 7000)
+    true = np.where(rest, 0.0, drive())
+    y, x = measured(true, Side.SENSOR, rng)
+    y[3000:9500] = 0.0
+    found = single(assess_pair(pair(Side.SENSOR, y, x, quiet=rest), LIMITS))
+    assert found.mode is FaultMode.NO_SIGNAL
+    assert (abs(found.start - 3000), abs(found.stop - 9500)) <= (3, 3)
+
+
+def test_causal_probability_of_a_fault() -> None:
+    probability = judged(Side.SENSOR, l4(0.45, 0.0), 1).columns["probability"]
+    assert probability.shape == (N,)
+    assert np.median(probability[: START - 10]) < 0.01
+    assert np.median(probability[START + 50 : STOP]) > 0.99

@@ -11,7 +11,7 @@ from diagnosis.modes import HEALTHY, NO_SIGNAL, NOISY, PAIR, ModeModel
 
 def told(healthy: str) -> ModePath:
     """A path whose causal reading is healthy (h) or faulty (f) sample by sample."""
-    filtered = np.zeros((len(healthy), 5))
+    filtered = np.zeros((len(healthy), 5), dtype=np.float32)
     filtered[:, HEALTHY] = [0.9 if c == "h" else 0.2 for c in healthy]
     filtered[:, NOISY] = 1.0 - filtered[:, HEALTHY]
     nothing = np.zeros(len(healthy), dtype=np.uint8)

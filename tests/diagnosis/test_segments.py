@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from diagnosis.mode_path import ModePath
 from diagnosis.modes import HEALTHY, INEFFICIENT, NO_SIGNAL, NOISY, STUCK
-from diagnosis.segments import Run, absorb_short, merge_equal, runs_of, trim
+from diagnosis.segments import Run, absorb_short, merge_equal, runs_of, trim, with_leads
 
 # of the models, the first four stand for the first four rows
 H, S, N, I = 0, 1, 2, 3  # noqa: E741
@@ -22,7 +22,7 @@ def path(models: list[int], entered: list[int] | None = None) -> ModePath:
     marks = np.zeros(model.size, dtype=np.bool_)
     marks[1:] = model[1:] != model[:-1]
     marks[entered or []] = True
-    return ModePath(model, marks, np.zeros((model.size, 5)))
+    return ModePath(model, marks, np.zeros((model.size, 5), dtype=np.float32))
 
 
 def test_cut_where_the_row_changes() -> None:
@@ -86,3 +86,14 @@ def test_ends_in_which_nothing_moves_are_cut() -> None:
     assert trim(Run(1, 8, NO_SIGNAL), quiet) == Run(3, 6, NO_SIGNAL)
     assert trim(Run(6, 8, NO_SIGNAL), quiet) is None
     assert trim(Run(0, 1, NO_SIGNAL), quiet) == Run(0, 1, NO_SIGNAL)
+
+
+def test_what_grows_before_a_fault_is_its_beginning() -> None:
+    runs = [Run(100, 180, NOISY), Run(180, 190, INEFFICIENT), Run(190, 400, STUCK), Run(402, 404, NOISY)]
+    assert with_leads(runs, lead=20, tail=5, gap=3) == [(runs[2], 100, 404)]
+    assert with_leads([], lead=20, tail=5, gap=3) == []
+
+
+def test_a_fault_before_another_one_stays_its_own() -> None:
+    runs = [Run(100, 180, INEFFICIENT), Run(180, 400, NO_SIGNAL), Run(450, 900, NOISY)]
+    assert with_leads(runs, lead=20, tail=5, gap=3) == [(r, r.start, r.stop) for r in runs]
