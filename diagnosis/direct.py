@@ -106,7 +106,9 @@ def assess_pair(pair: Pair, limits: Limits) -> Assessment:
         reasons={
             State.NOT_EXCITED: "nothing is commanded and nothing moves",
             State.NO_DATA: "no samples",
-            State.NOT_ASSESSED: "the command changes faster than the log's rate can resolve",
+            State.NOT_ASSESSED: "the command changes faster than the log's rate or the valve's lag can resolve"
+            if pair.side is Side.ACTUATOR
+            else "what deviates may be a delay or the rounding of the channel",
         },
         findings=tuple(findings),
         columns=_columns(pair, x, status, model, path),
