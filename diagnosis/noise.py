@@ -19,6 +19,7 @@ Array = NDArray[np.float64]
 COARSE_STEP_S = 0.005  # slower logs do not fix the delay between a command and its measurement
 _COARSE_SHARE = 0.3
 _PLACES = 8000
+_SOUND_SHARE = 0.25  # quantile of windows that stands for healthy ones
 _HEALTHY_SHARE, _SOUND = 0.3, 10.0  # of the places; times their misfit
 
 
@@ -143,7 +144,7 @@ def unresolved(
     """Where a reference changes faster than the log's rate can resolve, so that a delay below a step decides y − x.
 
     The share of the reference's white part that shows up in the residual is read off the mission: where that part is
-    large, its median over windows of 0.3 s. It is near 0 where the delay is a whole number of steps.
+    large, the lower quartile over windows of 0.3 s. It is near 0 where the delay is a whole number of steps.
 
     Parameters
     ----------
@@ -171,7 +172,7 @@ def unresolved(
     share = _COARSE_SHARE if dt >= COARSE_STEP_S else 0.0
     if np.count_nonzero(lively) >= 10 * width:
         seen = uniform_filter1d(np.where(kept, residual, 0.0) ** 2, width, mode="constant")
-        share = max(share, float(np.median(seen[lively] / power[lively])))
+        share = max(share, float(np.quantile(seen[lively] / power[lively], _SOUND_SHARE)))
     if share <= 0.05:
         return np.zeros(x.size, dtype=np.bool_), 0.0
     return np.asarray(share * power > (2 * noise) ** 2), share
