@@ -31,8 +31,8 @@ def alive_sources(timeline: Timeline) -> dict[str, NDArray[np.int16]]:
 def alive(timeline: Timeline, counts: dict[str, NDArray[np.int16]], name: str) -> NDArray[np.bool_]:
     """Whether other signals that were recorded with this one bring new samples where it may be silent, shape (n,).
 
-    Those of its group; for the only signal of a group the same quantity of the other wheels or axles, or where there is
-    none the other signals of its own, in which case a short gap is lost data as long as others have gaps like it.
+    Those of its group. For the only signal of a group: the same quantity of the file's other wheels or axles, or, where
+    there is none, the other signals of its own; a short gap is then lost data where others of the file have gaps like it.
     """
     group = _group(timeline, name)
     if any(_group(timeline, other) == group for other in timeline.fresh if other != name):

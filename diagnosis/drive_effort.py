@@ -114,6 +114,7 @@ def load_findings(
         if varying:
             mean, rms = -float(np.mean(level)), float(np.sqrt(np.mean(level**2)))
             sat = Sat(mean, rms, -float(np.max(level)), -float(np.min(level)), "of full opening")
+        shares: tuple[Hypothesis, ...]
         if side is Side.SENSOR_OR_ACTUATOR:
             shares = (Hypothesis("actuator", mode.value, p / 2), Hypothesis("sensor", mode.value, p / 2))
         else:

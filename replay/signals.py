@@ -30,7 +30,7 @@ class Signal:
     guessed : bool
         Whether the mapping was found automatically rather than given.
     recorded_with : str
-        For channels of a table: the first channel that shares their time column; empty where there is but one.
+        For channels of a table file: the first one that stands on the same time column; else empty.
     """
 
     name: str
