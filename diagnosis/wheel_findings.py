@@ -278,5 +278,5 @@ def refined(start: int, y: Array, reach: int, m: int, noise: float) -> int:
         return low + at
     if m in (ws.S_STUCK, ws.S_NONE):
         moving = np.flatnonzero(steps > 0)
-        return low + int(moving[-1]) if moving.size else low
+        return low + int(moving[-1]) if moving.size else low - 1
     return start

@@ -222,7 +222,8 @@ def test_a_stuck_sensor_begins_with_the_last_change() -> None:
     y = 0.2 + 0.002 * np.sin(np.arange(200) / 3)
     y[103:] = y[103]
     assert refined(110, y, 20, ws.S_STUCK, 0.004) == 103
-    assert refined(150, y, 20, ws.S_STUCK, 0.004) == 130
+    assert refined(150, y, 20, ws.S_STUCK, 0.004) == 129
+    assert refined(0, y[103:], 20, ws.S_STUCK, 0.004) == 0
 
 
 def test_onsets_in_words() -> None:
