@@ -14,7 +14,7 @@ from replay.signals import quantity_kind
 from replay.timeline import Timeline
 
 _GAP_PERIODS = 2.5
-_LOST_S = 0.2  # a topic of one signal loses as much with its messages
+_LOST_S = 1.0  # longest gap of a topic of one signal that lost messages may explain
 _ALIKE = 3.0
 _LEAST_SAMPLES = 3
 
