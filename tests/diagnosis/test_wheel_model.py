@@ -1,4 +1,4 @@
-"""The wheel model is identified from a mission, also one with faults; slope and pump limit are told apart."""
+"""The wheel model is identified from a mission, also one with many faults or at the limit of the pump."""
 
 from __future__ import annotations
 
