@@ -149,7 +149,7 @@ def _fit(
     for tolerance in (0.05, 0.02, 0.006):
         # gain and lag trade off against each other: a simplex in their logarithms follows the valley
         found = minimize(
-            lambda x, tolerance=tolerance: _loss(short, *np.exp(x), scale, tolerance),
+            lambda x, tolerance=tolerance: _loss(short, np.exp(x[0]), np.exp(x[1]), np.exp(x[2]), scale, tolerance),
             np.log(best),
             method="Nelder-Mead",
             options={

@@ -110,6 +110,8 @@ def with_position(
 
 def _jitter_lag(position: Array, u: Array, use: Flags, most: int) -> float | None:
     """Delay [steps] at which the position's changes from sample to sample follow the command's; None where none do."""
+    if u.size <= 2 * most:
+        return None
     du = np.diff(np.where(use, u, 0.0), prepend=0.0)
     dp = np.diff(np.where(use, position, 0.0), prepend=0.0)
     limit = 10 * float(np.median(np.abs(du))) + 1e-12  # the small jitter of a healthy sensor, not jumps

@@ -24,7 +24,7 @@ _WEAK_GAIN = 0.35  # a sensor's gain below this hides what the valve does
 _LEAST_DISTURBANCE_S = 2.0  # shorter ones are what the model gets wrong while a wheel recovers
 _STEEP, _HALF = 1.2, 5.9  # calibrated on tuning seeds: half of the valve findings with exp(5.9) are right
 _NOISY_EVIDENCE = 5.0  # per block
-_LEAST_TRUST = 0.5
+_LEAST_TRUST, _NO_TRUST = 0.5, 0.1  # a finding is stated from the first on; below the second it leaves nothing open
 _LEAST_PART = 0.02  # a hypothesis below this is left out of the text
 
 
@@ -122,6 +122,9 @@ def judge(
     if own[0] == side.value and pooled.get(own, 0.0) > _PATH_SHARE * best[1]:
         best = own, pooled[own]  # the path knows what came before and after
     (_, mode), probability = best
+    ahead = float(np.max(run.evidence[[n[0] == side.value for n in ws.NAMES]]) - run.evidence[ws.HEALTHY])
+    if side is Side.ACTUATOR and _chance(ahead) < _NO_TRUST:
+        return Verdict(None)
     stated = side
     if faulty[side] < limits.min_probability:
         other = Side.ACTUATOR if side is Side.SENSOR else Side.SENSOR
@@ -137,7 +140,7 @@ def judge(
         return Verdict(None, _SIDES)
     trust = _trust(run, m, blocks)
     if trust < _LEAST_TRUST:
-        return Verdict(None, (*open_sides, side))
+        return Verdict(None, tuple({*open_sides, side}))
     probability *= trust
     ranked = [(name, p * trust + (1 - trust if name[1] == "healthy" else 0.0)) for name, p in ranked]
     epsilon, sat = _estimate(m, known, run, model)
@@ -169,12 +172,17 @@ def _trust(run: Run, m: int, blocks: float) -> float:
     A wheel that recovers, a tyre that slips or a wrong share of the pump's flow may speak against a healthy wheel too,
     with hundreds of units of log-evidence; a loss of a sensor's gain, its silence or constancy are never their work.
     """
-    ahead = max(float(run.evidence[m] - run.evidence[ws.HEALTHY]), 1.0)
+    ahead = float(run.evidence[m] - run.evidence[ws.HEALTHY])
     if m >= ws.A_GAIN:
-        return float(1 / (1 + np.exp(-_STEEP * (np.log(ahead) - _HALF))))
+        return _chance(ahead)
     if m >= ws.S_WHITE_3:
         return 1.0 if ahead > _NOISY_EVIDENCE * blocks else 0.3
     return 1.0
+
+
+def _chance(ahead: float) -> float:
+    """The same for valves by their log-evidence against a healthy wheel."""
+    return float(1 / (1 + np.exp(-_STEEP * (np.log(max(ahead, 1.0)) - _HALF))))
 
 
 def _left_open(open_sides: tuple[Side, ...], side: Side, m: int, run: Run) -> tuple[Side, ...]:

@@ -67,11 +67,11 @@ def wheel_fit(channels: WheelChannels, replay: Replay, timeline: Timeline, machi
         return None
     given = {i: p for i, w in enumerate(machine.wheels) if (p := machine.plant.wheels.get(w)) is not None}
     moving = np.abs(np.where(np.isfinite(replay.v_ref), replay.v_ref, channels.speed)) > machine.limits.driving_speed
-    width = block_width(timeline.dt)
+    width = min(block_width(timeline.dt), timeline.size)
     n = timeline.size // width
 
     def mean(x: Array) -> Array:
-        return np.asarray(x[: n * width].reshape(n, width, -1).mean(axis=1))
+        return np.asarray(x[: n * width].reshape(n, width, x.shape[1]).mean(axis=1))
 
     return identify(
         mean(channels.speed),
