@@ -206,7 +206,7 @@ def _one_wheel(
         if stop <= start:
             continue
         run = Run(start, stop, int(m), found.evidence[r], found.mean[r], found.cov[r])
-        verdict = judge(run, y[start:stop], own, limits, data.names[i], data.dt, gains=gains, blocks=last - first)
+        verdict = judge(run, y[start:stop], own, limits, data.names[i], data.dt, gains=gains)
         for side in verdict.open_sides:
             opened[side][start:stop] = True
         if verdict.finding is None:

@@ -23,8 +23,8 @@ _PATH_SHARE = 0.05  # of the most probable row's probability, from which on the 
 _WEAK_GAIN = 0.35  # a sensor's gain below this hides what the valve does
 _LEAST_DISTURBANCE_S = 2.0  # shorter ones are what the model gets wrong while a wheel recovers
 _STEEP, _HALF = 1.2, 5.9  # calibrated on tuning seeds: half of the valve findings with exp(5.9) are right
-_NOISY_EVIDENCE = 5.0  # per block
-_LEAST_TRUST, _NO_TRUST = 0.5, 0.1  # a finding is stated from the first on; below the second it leaves nothing open
+_NOISY_EVIDENCE, _LEAST_NOISE_S = 500.0, 1.0  # per second; seconds
+_LEAST_TRUST, _NO_TRUST = 0.5, 0.05  # a finding is stated from the first on; below the second it leaves nothing open
 _LEAST_PART = 0.02  # a hypothesis below this is left out of the text
 
 
@@ -80,7 +80,6 @@ def judge(
     dt: float,
     *,
     gains: bool,
-    blocks: float = 1.0,
 ) -> Verdict:
     """Turn a run into a finding.
 
@@ -100,8 +99,6 @@ def judge(
         Step [s].
     gains : bool
         Whether the wheel model is good enough to judge gains and the valve by.
-    blocks : float
-        Blocks of the run.
     """
     pooled = probabilities(run)
     own = ws.NAMES[run.model]
@@ -133,12 +130,15 @@ def judge(
             return Verdict(None, open_sides)
         stated, probability = Side.SENSOR_OR_ACTUATOR, both
     m = int(np.argmax(np.where([n == (side.value, mode) for n in ws.NAMES], run.evidence, -np.inf)))
-    if mode == "no_signal":
+    supported = m
+    if mode == "no_signal":  # also what is stuck at nothing
         m = ws.S_NONE if side is Side.SENSOR else ws.A_NONE
+        stuck = ws.S_STUCK if side is Side.SENSOR else ws.A_STUCK
+        supported = m if run.evidence[m] >= run.evidence[stuck] else stuck
     plain = m in (ws.S_STUCK, ws.S_NONE, *range(ws.S_WHITE_3, ws.S_OU_SMALL))
     if not gains and not plain:
         return Verdict(None, _SIDES)
-    trust = _trust(run, m, blocks)
+    trust = _trust(run, supported, (run.stop - run.start) * dt)
     if trust < _LEAST_TRUST:
         return Verdict(None, tuple({*open_sides, side}))
     probability *= trust
@@ -166,7 +166,7 @@ def judge(
     )
 
 
-def _trust(run: Run, m: int, blocks: float) -> float:
+def _trust(run: Run, m: int, seconds: float) -> float:
     """Share of findings with this much evidence that are faults at all, on simulated missions with many faults.
 
     A wheel that recovers, a tyre that slips or a wrong share of the pump's flow may speak against a healthy wheel too,
@@ -175,8 +175,8 @@ def _trust(run: Run, m: int, blocks: float) -> float:
     ahead = float(run.evidence[m] - run.evidence[ws.HEALTHY])
     if m >= ws.A_GAIN:
         return _chance(ahead)
-    if m >= ws.S_WHITE_3:
-        return 1.0 if ahead > _NOISY_EVIDENCE * blocks else 0.3
+    if m >= ws.S_WHITE_3:  # what a recovering wheel does may look like a second of noise
+        return 1.0 if ahead > _NOISY_EVIDENCE * seconds and seconds > _LEAST_NOISE_S else 0.4
     return 1.0
 
 
