@@ -189,6 +189,7 @@ def _one_wheel(
     raised = done.best[:, i] != ws.HEALTHY
     findings: list[Finding] = []
     opened = {side: np.zeros(size, dtype=np.bool_) for side in (Side.SENSOR, Side.ACTUATOR)}
+    unexplained = {side: np.zeros(size, dtype=np.bool_) for side in opened}
     delta = {side: np.ones(size) for side in opened}
     for r, m in enumerate(runs.model):
         if m == ws.HEALTHY:
@@ -209,6 +210,8 @@ def _one_wheel(
         verdict = judge(run, y[start:stop], own, limits, data.names[i], data.dt, gains=gains)
         for side in verdict.open_sides:
             opened[side][start:stop] = True
+            if not verdict.usual:
+                unexplained[side][start:stop] = True
         if verdict.finding is None:
             continue
         causal = first_lasting(raised, first, last, 2, max(1, round(_HOLD_S / blocks.dt)))
@@ -218,7 +221,7 @@ def _one_wheel(
         findings.append(finding)
         if finding.epsilon is not None and finding.side in delta:
             delta[finding.side][start:stop] = 1 - finding.epsilon.value
-    return _assessments(i, data, own, done, found, findings, opened, delta, gains, width)
+    return _assessments(i, data, own, done, found, findings, opened, unexplained, delta, gains, width)
 
 
 def _release(stop: int, y: Array, reach: int) -> int:
@@ -236,6 +239,7 @@ def _assessments(
     found: wf.RunEvidence,
     findings: list[Finding],
     opened: dict[Side, NDArray[np.bool_]],
+    unexplained: dict[Side, NDArray[np.bool_]],
     delta: dict[Side, Array],
     gains: bool,
     width: int,
@@ -278,7 +282,7 @@ def _assessments(
     )
     out = []
     for side, states, faults in ((Side.SENSOR, states_s, sensor), (Side.ACTUATOR, states_a, actuator)):
-        loose = opened[side] & ~covered & ~quiet
+        loose = unexplained[side] & ~covered & ~quiet
         columns = {**shared, "delta": delta[side]}
         seconds = float(np.count_nonzero(loose)) * data.dt
         out.append(Assessment(states, _REASONS, tuple(faults), columns, "model", (note,), seconds))

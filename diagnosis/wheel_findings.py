@@ -24,6 +24,7 @@ _WEAK_GAIN = 0.35  # a sensor's gain below this hides what the valve does
 _LEAST_DISTURBANCE_S = 2.0  # shorter ones are what the model gets wrong while a wheel recovers
 _STEEP, _HALF = 1.2, 5.9  # calibrated on tuning seeds: half of the valve findings with exp(5.9) are right
 _NOISY_EVIDENCE, _LEAST_NOISE_S = 500.0, 1.0  # per second; seconds
+_USUAL = 0.25
 _LEAST_TRUST, _NO_TRUST = 0.5, 0.05  # a finding is stated from the first on; below the second it leaves nothing open
 _NOISY_LOSS = 0.35  # 95 % of the errors of a noisy sensor's ε̂ on tuning seeds
 _LEAST_PART = 0.02  # a hypothesis below this is left out of the text
@@ -51,10 +52,21 @@ class Run:
 
 @dataclass(frozen=True)
 class Verdict:
-    """What a run says: a finding or none, and the sides of which it leaves open whether they are healthy."""
+    """What a run says.
+
+    Attributes
+    ----------
+    finding : Finding or None
+        Where it is a fault.
+    open_sides : tuple[Side, ...]
+        Sides of which it leaves open whether they are healthy.
+    usual : bool
+        Whether that is no more than what the model's own errors do on healthy missions too.
+    """
 
     finding: Finding | None
     open_sides: tuple[Side, ...] = ()
+    usual: bool = False
 
 
 def probabilities(run: Run) -> dict[tuple[str, str], float]:
@@ -123,12 +135,13 @@ def judge(
     ahead = float(np.max(run.evidence[[n[0] == side.value for n in ws.NAMES]]) - run.evidence[ws.HEALTHY])
     if side is Side.ACTUATOR and _chance(ahead) < _NO_TRUST:
         return Verdict(None)
+    usual = side is Side.ACTUATOR and _chance(ahead) < _USUAL
     stated = side
     if faulty[side] < limits.min_probability:
         other = Side.ACTUATOR if side is Side.SENSOR else Side.SENSOR
         both = probability + pooled.get((other.value, mode), 0.0)
         if mode != "inefficient" or both < limits.min_probability:
-            return Verdict(None, open_sides)
+            return Verdict(None, open_sides, usual)
         stated, probability = Side.SENSOR_OR_ACTUATOR, both
     m = int(np.argmax(np.where([n == (side.value, mode) for n in ws.NAMES], run.evidence, -np.inf)))
     supported = m
@@ -141,7 +154,7 @@ def judge(
         return Verdict(None, _SIDES)
     trust = _trust(run, supported, (run.stop - run.start) * dt)
     if trust < _LEAST_TRUST:
-        return Verdict(None, tuple({*open_sides, side}))
+        return Verdict(None, tuple({*open_sides, side}), usual)
     probability *= trust
     ranked = [(name, p * trust + (1 - trust if name[1] == "healthy" else 0.0)) for name, p in ranked]
     epsilon, sat = _estimate(m, known, run, model)
@@ -149,7 +162,7 @@ def judge(
         return Verdict(None)
     brief = (run.stop - run.start) * dt < _LEAST_DISTURBANCE_S
     if m == ws.A_BIAS and (brief or (epsilon is not None and epsilon.high < 0)):
-        return Verdict(None, (*open_sides, Side.ACTUATOR))  # the model's own error, or nothing that is lost
+        return Verdict(None, (*open_sides, Side.ACTUATOR), usual)  # the model's own error, or nothing that is lost
     return Verdict(
         Finding(
             start=run.start,
