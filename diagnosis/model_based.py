@@ -109,7 +109,8 @@ def filter_model(data: WheelsData, i: int, residual: Array) -> wf.WheelFilterMod
         K=plant.K,
         tau=plant.tau,
         noise=noise,
-        constant_noise=max(rounding / 3, noise / 50) if noise > rounding else noise,
+        # noise within one rounding step leaves readings constant for a while: that proves nothing then
+        constant_noise=max(rounding / 3, noise / 50) if noise > lsb else noise,
         rounding=max(rounding, 1e-5 * data.span),
         load=max(min(load, _MOST_LOAD * data.span), _LEAST_LOAD * data.span, 0.5 * noise),
         span=data.span,
@@ -206,6 +207,14 @@ def _one_wheel(
             )
         if stop <= start:
             continue
+        if m in (ws.S_STUCK, ws.S_NONE) and own.constant_noise >= own.noise:
+            held = y[start:stop][np.isfinite(y[start:stop])]
+            if held.size and float(np.ptp(held)) > 0:
+                continue  # it moves, by a rounding step at least
+            off = np.abs(found.expected[first:last] - (float(held[0]) if held.size else 0.0))
+            if held.size and float(off.max(initial=0.0)) < 3 * own.load:
+                opened[Side.SENSOR][start:stop] = True  # a steady speed reads the same while rounding hides the noise
+                continue
         run = Run(start, stop, int(m), found.evidence[r], found.mean[r], found.cov[r])
         verdict = judge(run, y[start:stop], own, limits, data.names[i], data.dt, gains=gains)
         for side in verdict.open_sides:
