@@ -145,6 +145,8 @@ class _Wheel:
             return unassessed(size, State.NOT_ASSESSED, "the valve's position is logged but not its command")
         if model is not None:
             return model[1]
+        if np.isfinite(self.values("u")).any():
+            return unassessed(size, State.NOT_ASSESSED, "the valve's command is logged, but no speed that answers it")
         return unassessed(size, State.NO_DATA, "the wheel's valve command is not in the log")
 
     def alone(self) -> tuple[Assessment, Assessment] | None:

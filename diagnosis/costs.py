@@ -15,9 +15,9 @@ _WHEEL = {
 _STEER = {
     "phi_ref": "φ_c is computed from v_c and ω_c by the kinematics; without those the steering loop is not replayed",
     "phi": "the steering sensor is not assessed, and the wheels' own angles are unknown",
-    "phi_true": "the steering sensor is replayed and shown but not judged: that takes a second measurement",
+    "phi_true": "the steering sensor is judged by the model of its axle alone, which holds while the axle is steered",
     "u": "the steering valve is not judged, and its replayed command has no recorded one beside it",
-    "u_applied": "the steering valve is replayed and shown but not judged: that takes its measured opening",
+    "u_applied": "the steering valve is judged by how the angle follows its command, so that a held angle says nothing of it",
 }
 _OTHER = {
     "cmd.v": "without recorded v_c,i no wheel has a command: no e, no Ψ̂, no driving time",

@@ -21,6 +21,7 @@ from replay.machine import Limits
 Key = tuple[str, str]
 
 _RANK: dict[Severity, int] = {"high": 0, "medium": 1, "low": 2, "info": 3}
+_LIKELY = 0.6  # probability of any fault from which on one is worth a check
 _MARKED_EPSILON = 0.3
 _LEAST_SHARE = 0.8
 _MODEL_RESOLUTION = 0.25
@@ -32,8 +33,12 @@ _SHORT_NOISE_S = 1.0
 def severity_of(finding: Finding, seconds: float, limits: Limits, kind: str = "wheel") -> tuple[Severity, str]:
     """Severity and advice of one fault of a ``wheel`` or a ``steer`` axle; see the module's docstring."""
     faulty = 1.0 - sum(h.p for h in finding.hypotheses if h.mode == "healthy")
-    if faulty < limits.min_probability:
+    if faulty < _LIKELY:
         return "info", "Not certain enough to act on. Compare with the next mission."
+    if faulty < limits.min_probability:
+        if finding.mode in GONE and finding.side is not Side.SENSOR:
+            return "medium", "Probably a valve that does not answer: check it before the machine goes out again."
+        return "low", "Probable, not certain: check it at the next service, and compare with the next mission."
     if finding.mode is FaultMode.NOISY and finding.tier == "model" and seconds < _SHORT_NOISE_S:
         return "info", "Too short to act on: a model alone shows it. Compare with the next mission."
     if finding.mode in GONE and finding.side is Side.ACTUATOR:

@@ -19,7 +19,7 @@ Array = NDArray[np.float64]
 _TEMPER = 0.1
 _PRIOR = np.log(np.where(np.arange(ws.MODELS) == ws.HEALTHY, 0.6, 0.4 / (ws.MODELS - 1)))
 _SIDES = (Side.SENSOR, Side.ACTUATOR)
-_PATH_SHARE = 0.05  # of the most probable row's probability, from which on the path's row is stated
+_PATH_SHARE = 0.5  # of the most probable row's probability, from which on the path's row is stated
 _WEAK_GAIN = 0.35  # a sensor's gain below this hides what the valve does
 _LEAST_DISTURBANCE_S = 2.0  # shorter ones are what the model gets wrong while a wheel recovers
 _STEEP, _HALF = 1.2, 5.9  # calibrated on tuning seeds: half of the valve findings with exp(5.9) are right

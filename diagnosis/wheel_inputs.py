@@ -168,7 +168,7 @@ def wheels_data(
 
 def _starved(fit: WheelModelFit, u: Array, flow: float | None, dt: float) -> NDArray[np.bool_]:
     """Where the pump cannot feed what the valves ask for, or could not within the last three lags; shape (n,)."""
-    if flow is None:
+    if flow is None or not any(fit.plants):
         return np.zeros(u.shape[0], dtype=np.bool_)
     asked = demand(np.abs(np.nan_to_num(u)), fit) > flow
     last = np.maximum.accumulate(np.where(asked, np.arange(asked.size), -(10**9)))

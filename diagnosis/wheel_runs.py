@@ -141,6 +141,10 @@ def _trimmed(runs: list[list[int]], idle: NDArray[np.bool_]) -> list[list[int]]:
             out.append([a, b, ws.HEALTHY, a])
         else:
             first, last = a + int(keep[0]), a + int(keep[-1]) + 1
-            parts = ((a, first, ws.HEALTHY, a), (first, last, m, min(max(entry, first), last - 1)), (last, b, ws.HEALTHY, last))
+            parts = (
+                (a, first, ws.HEALTHY, a),
+                (first, last, m, min(max(entry, first), last - 1)),
+                (last, b, ws.HEALTHY, last),
+            )
             out += [list(part) for part in parts if part[1] > part[0]]
     return _merged(out)

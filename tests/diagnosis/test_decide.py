@@ -112,7 +112,14 @@ def test_gain_outside_the_table_is_checked() -> None:
 @pytest.mark.parametrize("side", list(Side))
 @pytest.mark.parametrize("mode", list(FaultMode))
 def test_improbable_faults_are_no_ground_to_act(side: Side, mode: FaultMode) -> None:
-    assert severity_of(finding(side, mode, p=0.89), 60.0, LIMITS)[0] == "info"
+    assert severity_of(finding(side, mode, p=0.59), 60.0, LIMITS)[0] == "info"
+
+
+@pytest.mark.parametrize("side", list(Side))
+@pytest.mark.parametrize("mode", list(FaultMode))
+def test_probable_faults_are_worth_a_check(side: Side, mode: FaultMode) -> None:
+    dead_valve = side is not Side.SENSOR and mode in (FaultMode.STUCK, FaultMode.NO_SIGNAL)
+    assert severity_of(finding(side, mode, p=0.89), 60.0, LIMITS)[0] == ("medium" if dead_valve else "low")
 
 
 def test_healthy_machine_is_ready() -> None:
@@ -129,7 +136,8 @@ def test_healthy_machine_is_ready() -> None:
         (finding(Side.ACTUATOR, FaultMode.STUCK), "stop"),
         (finding(Side.ACTUATOR, FaultMode.INEFFICIENT, epsilon=0.5), "watch"),
         (finding(Side.ACTUATOR, FaultMode.NOISY, epsilon=0.1), "watch"),
-        (finding(Side.ACTUATOR, FaultMode.STUCK, p=0.6), "ready"),
+        (finding(Side.ACTUATOR, FaultMode.STUCK, p=0.7), "watch"),
+        (finding(Side.ACTUATOR, FaultMode.STUCK, p=0.5), "ready"),
     ],
 )
 def test_verdict_follows_the_worst_fault(part: Finding, expected: str) -> None:
