@@ -134,7 +134,7 @@ def judge(
     (_, mode), probability = best
     ahead = float(np.max(run.evidence[[n[0] == side.value for n in ws.NAMES]]) - run.evidence[ws.HEALTHY])
     if side is Side.ACTUATOR and _chance(ahead) < _NO_TRUST:
-        return Verdict(None)
+        return Verdict(None, tuple(s for s in open_sides if s is not side))
     usual = side is Side.ACTUATOR and _chance(ahead) < _USUAL
     stated = side
     if faulty[side] < limits.min_probability:
@@ -156,7 +156,8 @@ def judge(
     if trust < _LEAST_TRUST:
         return Verdict(None, tuple({*open_sides, side}), usual)
     probability *= trust
-    ranked = [(name, p * trust + (1 - trust if name[1] == "healthy" else 0.0)) for name, p in ranked]
+    trusted = [(name, p * trust + (1 - trust if name[1] == "healthy" else 0.0)) for name, p in ranked]
+    ranked = sorted(trusted, key=lambda item: -item[1])
     epsilon, sat = _estimate(m, known, run, model)
     if epsilon is not None and m in (ws.S_GAIN, ws.A_GAIN) and epsilon.value < limits.min_epsilon:
         return Verdict(None)
@@ -226,7 +227,8 @@ def _sentences(
     ]
     if m in (ws.S_STUCK, ws.S_NONE) and known.size:
         lines.append(f"{names[0]} stayed within {float(np.ptp(known)):.2g} m/s of {float(np.mean(known)):.4g} m/s.")
-    second = next((item for item in ranked[1:] if item[0][1] != "healthy"), None)
+    stated = ws.NAMES[m][0], mode
+    second = next((item for item in ranked if item[0][1] != "healthy" and item[0] != stated), None)
     if second is not None and second[1] >= _LEAST_PART:
         lines.append(f"Next best: {second[0][0]} {second[0][1].replace('_', ' ')} with {100 * second[1]:.0f} %.")
     if side is Side.SENSOR_OR_ACTUATOR:
