@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 Clock = Literal["header", "log", "publish"]
+Window = tuple[int, int]
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,7 @@ from collections.abc import Collection
 from pathlib import Path
 from typing import Protocol
 
-from replay.rawlog import Clock, LogSummary, RawLog
+from replay.rawlog import Clock, LogSummary, RawLog, Window
 from replay.sources import SourceOptions
 
 
@@ -35,8 +35,23 @@ class Reader(Protocol):
         options: SourceOptions,
         topics: Collection[str] | None = None,
         clock: Clock = "header",
+        window: Window | None = None,
     ) -> RawLog:
         """Decode the numeric fields of the given topics (all where None) into columns.
+
+        Parameters
+        ----------
+        path : Path
+            File or folder.
+        options : SourceOptions
+            How it is read.
+        topics : Collection[str] or None
+            Topics to decode; tables have none and ignore it.
+        clock : str
+            Clock of the stamps of a message log.
+        window : tuple[int, int] or None
+            Only messages with first ≤ log stamp < second [ns] (tables: their own stamps); None: all. What the index
+            places outside is not opened.
 
         Raises
         ------

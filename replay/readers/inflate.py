@@ -5,13 +5,26 @@ from __future__ import annotations
 import bz2
 
 import lz4.frame
+import numpy as np
 import zstandard
+from numpy.typing import NDArray
 
 MAX_CHUNK = 512 << 20
 
 
 class InflateError(Exception):
     """Compressed bytes cannot be expanded; the text says why."""
+
+
+class Inflater:
+    """Expands chunks one after another."""
+
+    def expand(self, compression: str, data: NDArray[np.uint8], size: int) -> NDArray[np.uint8]:
+        """Expand a chunk to exactly its declared size; see `inflate`.
+
+        The result is valid until the next call; nothing may keep a view of it longer.
+        """
+        return np.frombuffer(inflate(compression, data.tobytes(), size), np.uint8)
 
 
 def inflate(compression: str, data: bytes, size: int) -> bytes:

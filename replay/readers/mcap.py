@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from replay.errors import LogError
-from replay.rawlog import Clock, LogSummary, RawLog, TopicInfo
+from replay.rawlog import Clock, LogSummary, RawLog, TopicInfo, Window
 from replay.readers.assemble import Assembler, Block, Connection
 from replay.readers.clocks import Report
 from replay.readers.mcap_file import MAGIC, MESSAGE, McapFile, chunk_records, open_file
@@ -50,6 +50,7 @@ class McapReader:
         options: SourceOptions,
         topics: Collection[str] | None = None,
         clock: Clock = "header",
+        window: Window | None = None,
     ) -> RawLog:
         """Decode the given topics.
 

@@ -6,7 +6,7 @@ from collections.abc import Collection
 from pathlib import Path
 
 from replay.errors import LogError
-from replay.rawlog import Clock, LogSummary, RawLog
+from replay.rawlog import Clock, LogSummary, RawLog, Window
 from replay.readers.base import Reader
 from replay.readers.mcap import McapReader
 from replay.readers.ros1_bag import Ros1BagReader
@@ -74,13 +74,17 @@ def summarise_log(path: Path, options: SourceOptions) -> LogSummary:
 
 
 def read_log(
-    path: Path, options: SourceOptions, topics: Collection[str] | None = None, clock: Clock | None = None
+    path: Path,
+    options: SourceOptions,
+    topics: Collection[str] | None = None,
+    clock: Clock | None = None,
+    window: Window | None = None,
 ) -> RawLog:
-    """Decode a log, or the given topics of it; the clock is that of the options unless given.
+    """Decode a log, or the given topics and time of it; the clock is that of the options unless given.
 
     Raises
     ------
     LogError
         Where nothing in the log can be read.
     """
-    return open_log(path).read(path, options, topics, clock or options.stamp)
+    return open_log(path).read(path, options, topics, clock or options.stamp, window)

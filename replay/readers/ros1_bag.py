@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from replay.errors import LogError
-from replay.rawlog import Clock, LogSummary, RawLog, TopicInfo
+from replay.rawlog import Clock, LogSummary, RawLog, TopicInfo, Window
 from replay.readers.assemble import Assembler, Block, Connection
 from replay.readers.clocks import Report
 from replay.readers.inflate import InflateError, inflate
@@ -73,6 +73,7 @@ class Ros1BagReader:
         options: SourceOptions,
         topics: Collection[str] | None = None,
         clock: Clock = "header",
+        window: Window | None = None,
     ) -> RawLog:
         """Decode the given topics.
 

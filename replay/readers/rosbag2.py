@@ -11,7 +11,7 @@ from pathlib import Path
 import zstandard
 
 from replay.errors import LogError
-from replay.rawlog import Clock, LogSummary, RawLog
+from replay.rawlog import Clock, LogSummary, RawLog, Window
 from replay.readers import mcap, sqlite_bag
 from replay.readers.clocks import Report
 from replay.sources import SourceOptions
@@ -56,6 +56,7 @@ class Rosbag2Reader:
         options: SourceOptions,
         topics: Collection[str] | None = None,
         clock: Clock = "header",
+        window: Window | None = None,
     ) -> RawLog:
         """Decode the given topics of all parts.
 

@@ -13,7 +13,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from replay.errors import LogError
-from replay.rawlog import Channel, Clock, LogSummary, RawLog, TopicInfo
+from replay.rawlog import Channel, Clock, LogSummary, RawLog, TopicInfo, Window
 from replay.readers.clocks import Report
 from replay.readers.columns import epoch_ns, numbers, parse, stamps, unit_of
 from replay.readers.textfile import first_text, read_text
@@ -64,6 +64,7 @@ class CsvReader:
         options: SourceOptions,
         topics: Collection[str] | None = None,
         clock: Clock = "header",
+        window: Window | None = None,
     ) -> RawLog:
         """Read all columns.
 
@@ -104,6 +105,7 @@ class ParquetReader:
         options: SourceOptions,
         topics: Collection[str] | None = None,
         clock: Clock = "header",
+        window: Window | None = None,
     ) -> RawLog:
         """Read all columns of numbers.
 

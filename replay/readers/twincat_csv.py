@@ -13,7 +13,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from replay.errors import LogError
-from replay.rawlog import Channel, Clock, LogSummary, RawLog, TopicInfo
+from replay.rawlog import Channel, Clock, LogSummary, RawLog, TopicInfo, Window
 from replay.readers.clocks import Report
 from replay.readers.columns import FILETIME_EPOCH, numbers, parse, stamps
 from replay.readers.textfile import first_text, read_text
@@ -76,6 +76,7 @@ class TwincatCsvReader:
         options: SourceOptions,
         topics: Collection[str] | None = None,
         clock: Clock = "header",
+        window: Window | None = None,
     ) -> RawLog:
         """Read all channels.
 
