@@ -1,48 +1,25 @@
-"""ROS 1 bags (format 2.0): indexed or not, complete or cut off."""
+"""ROS 1 bags (format 2.0): indexed or not, complete, cut off or damaged."""
 
 from __future__ import annotations
 
-import struct
+import bz2
+from collections import Counter
 from collections.abc import Collection, Iterator
-from dataclasses import dataclass, field
 from pathlib import Path
 
+import lz4.frame
 import numpy as np
 from numpy.typing import NDArray
 
-from replay.errors import LogError
 from replay.rawlog import Clock, LogSummary, RawLog, TopicInfo, Window
 from replay.readers.assemble import Assembler, Block, Connection
+from replay.readers.bag_records import CONNECTION, MESSAGE, BagRecords, scan_bag
 from replay.readers.clocks import Report
-from replay.readers.inflate import InflateError, inflate
-from replay.readers.records import BagRecords, scan_bag
+from replay.readers.inflate import MAX_CHUNK, InflateError, Inflater
+from replay.readers.ros1_file import MAGIC, Bag, Chunk, open_bag, take_connection
 from replay.sources import SourceOptions
 
-MAGIC = b"#ROSBAG V"
-_VERSION = b"#ROSBAG V2.0\n"
-_MESSAGE, _HEADER, _INDEX, _CHUNK, _INFO, _CONNECTION = 2, 3, 4, 5, 6, 7
-
-
-@dataclass(frozen=True)
-class _Chunk:
-    start: int
-    compression: str
-    size: int
-    body: int
-    packed: int
-
-
-@dataclass
-class _Bag:
-    """One opened bag."""
-
-    path: Path
-    data: NDArray[np.uint8]
-    report: Report
-    connections: dict[int, Connection] = field(default_factory=dict)
-    chunks: list[_Chunk] = field(default_factory=list)
-    indexed: dict[int, dict[int, int]] = field(default_factory=dict)
-    bounds: list[int] = field(default_factory=list)
+_MAGICS = {b"\x04\x22\x4d\x18": "lz4", b"BZh": "bz2"}
 
 
 class Ros1BagReader:
@@ -65,7 +42,10 @@ class Ros1BagReader:
         LogError
             Where nothing in the bag can be read.
         """
-        return _summary(_open(path, Report()))
+        reading = _Reading(open_bag(path, Report(), whole=False), (), None)
+        for _ in reading.blocks():
+            pass
+        return reading.summary()
 
     def read(
         self,
@@ -75,7 +55,7 @@ class Ros1BagReader:
         clock: Clock = "header",
         window: Window | None = None,
     ) -> RawLog:
-        """Decode the given topics.
+        """Decode the given topics and time; chunks that the index places outside are not opened.
 
         Raises
         ------
@@ -83,169 +63,147 @@ class Ros1BagReader:
             Where nothing in the bag can be read.
         """
         report = Report()
-        bag = _open(path, report)
+        reading = _Reading(open_bag(path, report, whole=window is None), topics, window)
         assembler = Assembler(clock, report)
-        for i, chunk in enumerate(bag.chunks):
-            if topics is not None and not _may_hold(bag, bag.indexed.get(i), topics):
+        for blocks in reading.blocks():
+            assembler.add(blocks)
+        return assembler.finish(reading.summary())
+
+
+class _Reading:
+    """One pass over a bag: what is wanted, and counts of what was there."""
+
+    def __init__(self, bag: Bag, topics: Collection[str] | None, window: Window | None) -> None:
+        self.bag, self.topics, self.window = bag, topics, window
+        self.inflater = Inflater()
+        self.found: Counter[int] = Counter()
+        self.stated: Counter[int] = Counter(bag.absent)
+        self.skipped: Counter[int] = Counter()
+        self.bounds: list[int] = []
+
+    def blocks(self) -> Iterator[list[Block]]:
+        """Messages chunk by chunk; loose ones first, as they may name connections."""
+        bag = self.bag
+        for records in bag.loose:
+            loose = list(self._split(bag.data, records))
+            count = int(np.count_nonzero(records.op == MESSAGE))
+            bag.lost(f"{count} messages stand outside of chunks (a chunk's header is damaged); they were read")
+            yield loose
+        for chunk in bag.chunks:
+            stated = chunk.stated
+            if stated is not None and not self._may_hold(chunk, stated):
+                self.skipped.update(stated)
+                self.bounds += [chunk.first_ns, chunk.last_ns]
                 continue
-            opened = _open_chunk(bag, chunk)
-            if opened is not None:
-                assembler.add(_split(bag, *opened, topics))
-        assembler.add(_split(bag, bag.data, scan_bag(bag.data, len(_VERSION)), topics))
-        return assembler.finish(_summary(bag))
+            self.stated.update(stated or {})
+            data = self._expand(chunk)
+            if data is None:
+                continue
+            records = scan_bag(data)
+            self._check(chunk, data, records)
+            yield list(self._split(data, records))
 
+    def _may_hold(self, chunk: Chunk, stated: dict[int, int]) -> bool:
+        """Whether a chunk may hold a wanted message; one that the index says too little about may."""
+        if chunk.first_ns < 0 or any(n not in self.bag.connections for n in stated):
+            return True
+        if self.window is not None and (chunk.last_ns < self.window[0] or chunk.first_ns >= self.window[1]):
+            return False
+        return self.topics is None or any(self.bag.connections[n].topic in self.topics for n in stated)
 
-def _open(path: Path, report: Report) -> _Bag:
-    try:
-        size = path.stat().st_size
-        if size == 0:
-            raise LogError(f"{path} is empty (0 bytes); the recording was not written, copy or record it again")
-        data: NDArray[np.uint8] = np.memmap(path, np.uint8, "r")
-    except OSError as error:
-        raise LogError(f"{path} cannot be read: {error.strerror or error}") from error
-    first = data[: len(_VERSION)].tobytes()
-    if first != _VERSION:
-        raise LogError(f"{path} is not a ROS bag of version 2.0; found {first!r}; convert it with `rosbag migrate`")
-    bag = _Bag(path, data, report)
-    records = scan_bag(data, len(_VERSION))
-    stated = _take_top(bag, records)
-    if records.end < len(data):
-        report.lost(
-            f"{path.name}: {len(data) - records.end} bytes after byte {records.end} hold no complete record and were "
-            "left out"
-        )
-    if stated is not None and not stated[0]:
-        report.lost(f"{path.name} has no index (the recorder was not closed); its complete chunks were read in order")
-    elif stated is not None and stated[1] != len(bag.chunks):
-        report.lost(f"{path.name}: its header counts {stated[1]} chunks, {len(bag.chunks)} were found")
-    return bag
-
-
-def _fields(raw: bytes) -> dict[str, bytes]:
-    """Header fields ``name=value`` of one record."""
-    out, at = {}, 0
-    while at + 4 <= len(raw):
-        (size,) = struct.unpack_from("<I", raw, at)
-        name, _, value = raw[at + 4 : at + 4 + size].partition(b"=")
-        out[name.decode("ascii", "replace")] = value
-        at += 4 + size
-    return out
-
-
-def _take_top(bag: _Bag, records: BagRecords) -> tuple[int, int] | None:
-    """Take connections, chunks and index records; return index position and chunk count of the bag header."""
-    stated = None
-    for i, op in enumerate(records.op.tolist()):
-        head, body, size = int(records.head[i]), int(records.body[i]), int(records.size[i])
-        try:
-            if op == _CONNECTION:
-                _take_connection(bag, bag.data, records, i)
-            elif op == _CHUNK:
-                fields = _fields(bag.data[head : body - 4].tobytes())
-                (full,) = struct.unpack("<I", fields["size"])
-                compression = fields["compression"].decode("ascii", "replace")
-                bag.chunks.append(_Chunk(head - 4, compression, full, body, size))
-            elif op == _INDEX and bag.chunks:
-                counts = bag.indexed.setdefault(len(bag.chunks) - 1, {})
-                number = int(records.conn[i])
-                counts[number] = counts.get(number, 0) + size // 12
-                _take_bounds(bag, bag.data[body : body + size - size % 12].tobytes())
-            elif op == _HEADER:
-                fields = _fields(bag.data[head : body - 4].tobytes())
-                stated = struct.unpack("<Q", fields["index_pos"])[0], struct.unpack("<I", fields["chunk_count"])[0]
-                if fields.get("encryptor"):
-                    raise LogError(f"{bag.path} is encrypted ({fields['encryptor']!r}); decrypt it with rosbag first")
-        except (struct.error, KeyError, UnicodeDecodeError) as error:
-            bag.report.lost(f"{bag.path.name}: record at byte {head - 4} is damaged ({type(error).__name__})")
-    return stated
-
-
-def _take_bounds(bag: _Bag, raw: bytes) -> None:
-    stamps = np.frombuffer(raw, "<u4").reshape(-1, 3).astype(np.int64)
-    if len(stamps):
-        ns = stamps[:, 0] * 1_000_000_000 + stamps[:, 1]
-        bag.bounds += [int(ns.min()), int(ns.max())]
-
-
-def _take_connection(bag: _Bag, data: NDArray[np.uint8], records: BagRecords, i: int) -> None:
-    head, body, size, number = (int(a[i]) for a in (records.head, records.body, records.size, records.conn))
-    fields = _fields(data[head : body - 4].tobytes())
-    inner = _fields(data[body : body + size].tobytes())
-    topic = fields["topic"].decode("utf-8", "replace")
-    text = inner["message_definition"].decode("utf-8", "replace")
-    name = inner["type"].decode("ascii", "replace")
-    bag.connections.setdefault(number, Connection(topic, name, "ros1", "ros1msg", text))
-
-
-def _open_chunk(bag: _Bag, chunk: _Chunk) -> tuple[NDArray[np.uint8], BagRecords] | None:
-    try:
-        raw = inflate(chunk.compression, bag.data[chunk.body : chunk.body + chunk.packed].tobytes(), chunk.size)
-    except InflateError as error:
-        bag.report.lost(f"{bag.path.name}: the chunk at byte {chunk.start} was left out: {error}")
-        return None
-    data = np.frombuffer(raw, np.uint8)
-    records = scan_bag(data)
-    if records.end < len(data):
-        bag.report.lost(
-            f"{bag.path.name}: the chunk at byte {chunk.start} is damaged: its last {len(data) - records.end} bytes "
-            "hold no complete record"
-        )
-    for i in np.flatnonzero(records.op == _CONNECTION):
-        if int(records.conn[i]) not in bag.connections:
+    def _expand(self, chunk: Chunk) -> NDArray[np.uint8] | None:
+        bag = self.bag
+        packed = bag.data[chunk.body : chunk.body + chunk.packed]
+        if chunk.compression == "none":
+            if not chunk.cut and chunk.size != chunk.packed:
+                bag.lost(f"the chunk at byte {chunk.start} states {chunk.size} bytes and holds {chunk.packed}")
+            return packed
+        reason = "it is cut off"
+        if not chunk.cut:
             try:
-                _take_connection(bag, data, records, int(i))
-            except (struct.error, KeyError, UnicodeDecodeError):
-                bag.report.lost(f"{bag.path.name}: a connection in the chunk at byte {chunk.start} is damaged")
-    return data, records
+                return self.inflater.expand(chunk.compression, packed, chunk.size)
+            except InflateError as error:
+                reason = str(error)
+        raw, complete = _expand_as_found(packed.tobytes())
+        if raw and (complete or chunk.cut):
+            bag.lost(f"the chunk at byte {chunk.start} was read as far as it can be expanded: {reason}")
+            return np.frombuffer(raw, np.uint8)
+        bag.lost(f"the chunk at byte {chunk.start} was left out: {reason}")
+        return None
 
+    def _check(self, chunk: Chunk, data: NDArray[np.uint8], records: BagRecords) -> None:
+        """Take the connections of a chunk and say which of its bytes hold no record."""
+        if records.lost or records.mended:
+            self.bag.lost(
+                f"the chunk at byte {chunk.start} is damaged: {records.lost} of its {len(data)} bytes hold no "
+                f"complete record, the lengths of {records.mended} records are wrong"
+            )
+        for i in np.flatnonzero(records.op == CONNECTION).tolist():
+            take_connection(self.bag, data, records, i)
 
-def _may_hold(bag: _Bag, counts: dict[int, int] | None, topics: Collection[str]) -> bool:
-    """Whether a chunk with this index may hold one of the topics; one without index may."""
-    if counts is None or any(n not in bag.connections for n in counts):
-        return True
-    return any(bag.connections[n].topic in topics for n in counts)
-
-
-def _split(bag: _Bag, data: NDArray[np.uint8], records: BagRecords, topics: Collection[str] | None) -> Iterator[Block]:
-    """Blocks of one buffer, one per connection."""
-    messages = records.op == _MESSAGE
-    for number in np.unique(records.conn[messages]):
-        mine = messages & (records.conn == number)
-        connection = bag.connections.get(int(number))
-        if connection is None:
-            bag.report.lost(f"{bag.path.name}: {mine.sum()} messages belong to connection {number}, which is not named")
-        elif topics is None or connection.topic in topics:
-            yield Block(connection, data, records.body[mine], records.size[mine], records.stamp[mine])
-
-
-def _summary(bag: _Bag) -> LogSummary:
-    counts: dict[int, int] = {}
-    bounds = list(bag.bounds)
-    for i, chunk in enumerate(bag.chunks):
-        indexed = bag.indexed.get(i)
-        if indexed is None or any(n not in bag.connections for n in indexed):
-            opened = _open_chunk(bag, chunk)
-            if opened is None:
+    def _split(self, data: NDArray[np.uint8], records: BagRecords) -> Iterator[Block]:
+        """Blocks of one buffer, one per connection."""
+        rows = np.flatnonzero(records.op == MESSAGE)
+        if not len(rows):
+            return
+        stamps, numbers = records.stamp[rows], records.conn[rows]
+        self.bounds += [int(stamps.min()), int(stamps.max())]
+        order = np.argsort(numbers, kind="stable")
+        edges = np.flatnonzero(np.diff(numbers[order])) + 1
+        for mine in np.split(rows[order], edges):
+            number = int(records.conn[mine[0]])
+            self.found[number] += len(mine)
+            connection = self.bag.connections.get(number)
+            if connection is None or (self.topics is not None and connection.topic not in self.topics):
                 continue
-            messages = opened[1].op == _MESSAGE
-            numbers, repeats = np.unique(opened[1].conn[messages], return_counts=True)
-            indexed = dict(zip(numbers.tolist(), repeats.tolist(), strict=True))
-            stamps = opened[1].stamp[messages]
-            bounds += [int(stamps.min()), int(stamps.max())] if len(stamps) else []
-        for number, n in indexed.items():
-            counts[number] = counts.get(number, 0) + n
-    totals: dict[Connection, int] = {}
-    for number, connection in bag.connections.items():
-        totals[connection] = totals.get(connection, 0) + counts.get(number, 0)
-    topics = tuple(TopicInfo(c.topic, c.type_name, n, c.encoding, (), c.why_not()) for c, n in totals.items())
-    start, stop = (min(bounds), max(bounds)) if bounds else (0, 0)
-    return LogSummary(
-        str(bag.path),
-        "bag",
-        start,
-        stop,
-        topics,
-        tuple(bag.report.notes),
-        tuple(bag.report.damage),
-        {"integrity": "unverifiable"},
-    )
+            if self.window is not None:
+                stamp = records.stamp[mine]
+                mine = mine[(stamp >= self.window[0]) & (stamp < self.window[1])]
+            if len(mine):
+                yield Block(connection, data, records.body[mine], records.size[mine], records.stamp[mine])
+
+    def summary(self) -> LogSummary:
+        """Return the bag's contents: counts of what was opened as found, of the rest as its index states."""
+        bag, totals = self.bag, self.found + self.skipped
+        for number in sorted(self.stated.keys() | self.found.keys()):
+            stated, found = self.stated[number], self.found[number]
+            connection = bag.connections.get(number)
+            name = f"{connection.topic[:80]}" if connection else f"connection {number}"
+            if self.stated and stated > found:
+                bag.lost(f"{name}: {stated - found} of {stated} messages that the index counts were not found")
+            elif self._indexed() and stated < found:
+                bag.lost(f"{name}: {found} messages were found and read, the index counts {stated}")
+            if connection is None and found:
+                bag.lost(f"{found} messages belong to connection {number}, which is not named")
+        topics: dict[Connection, int] = {}
+        for number, connection in bag.connections.items():
+            topics[connection] = topics.get(connection, 0) + totals[number]
+        infos = tuple(TopicInfo(c.topic, c.type_name, n, c.encoding, (), c.why_not()) for c, n in topics.items())
+        bounds = [b for b in self.bounds if b >= 0]
+        start, stop = (min(bounds), max(bounds)) if bounds else (0, 0)
+        return LogSummary(
+            str(bag.path), "bag", start, stop, infos, tuple(bag.report.notes), tuple(bag.report.damage),
+            {"integrity": "unverifiable"},
+        )  # fmt: skip
+
+    def _indexed(self) -> bool:
+        return bool(self.bag.chunks) and all(c.stated is not None for c in self.bag.chunks)
+
+
+def _expand_as_found(packed: bytes) -> tuple[bytes, bool]:
+    """Expand as far as possible by the data's own magic bytes: (result, whether the data end as they should)."""
+    kind = next((k for m, k in _MAGICS.items() if packed.startswith(m)), "")
+    out: list[bytes] = []
+    size, ended = 0, False
+    stream = lz4.frame.LZ4FrameDecompressor() if kind == "lz4" else bz2.BZ2Decompressor()
+    if not kind:
+        return packed, bool(len(scan_bag(np.frombuffer(packed, np.uint8)).op))
+    try:
+        for at in range(0, len(packed), 4096):
+            out.append(stream.decompress(packed[at : at + 4096]))
+            size, ended = size + len(out[-1]), stream.eof
+            if ended or size > MAX_CHUNK:
+                break
+    except (RuntimeError, OSError, EOFError, ValueError):
+        pass
+    return b"".join(out), ended
