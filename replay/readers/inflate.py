@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import bz2
-
-import lz4.frame
+import cramjam
 import numpy as np
-import zstandard
 from numpy.typing import NDArray
 
 MAX_CHUNK = 512 << 20
+_COMMON_WINDOW, _MAX_WINDOW = 1 << 27, 1 << 28
 
 
 class InflateError(Exception):
@@ -17,55 +15,89 @@ class InflateError(Exception):
 
 
 class Inflater:
-    """Expands chunks one after another."""
+    """Expands chunks one after another into one buffer: fresh memory for each would cost more than decompression."""
+
+    def __init__(self) -> None:
+        self._room: NDArray[np.uint8] = np.empty(0, np.uint8)
 
     def expand(self, compression: str, data: NDArray[np.uint8], size: int) -> NDArray[np.uint8]:
-        """Expand a chunk to exactly its declared size; see `inflate`.
+        """Expand a chunk to exactly its declared size.
 
-        The result is valid until the next call; nothing may keep a view of it longer.
+        Parameters
+        ----------
+        compression : str
+            Empty or ``none``, ``lz4``, ``zstd`` or ``bz2``.
+        data : NDArray[np.uint8], shape (b,)
+            Compressed bytes.
+        size : int
+            Declared size [bytes].
+
+        Returns
+        -------
+        NDArray[np.uint8], shape (size,)
+            Valid until the next call; nothing may keep a view of it longer. Uncompressed data are returned as they are.
+
+        Raises
+        ------
+        InflateError
+            Where the declared size is beyond `MAX_CHUNK`, the compression unknown, the bytes damaged or of another
+            size.
         """
-        return np.frombuffer(inflate(compression, data.tobytes(), size), np.uint8)
+        if not 0 <= size <= MAX_CHUNK:
+            raise InflateError(f"it declares {size} bytes; at most {MAX_CHUNK} are expanded")
+        data = data.view(np.ndarray)
+        if compression in ("", "none"):
+            if len(data) != size:
+                raise InflateError(f"it holds {len(data)} bytes, not {size}")
+            return data
+        if compression not in ("lz4", "zstd", "bz2"):
+            raise InflateError(f"its compression {compression[:20]!r} is not known; expected lz4, zstd, bz2 or none")
+        if not size and not len(data):
+            return data
+        try:
+            if len(self._room) < size:
+                self._room = np.empty(size, np.uint8)
+            room = self._room[:size]
+            count = _expand(compression, data, room)
+        except MemoryError as error:
+            raise InflateError(f"its {size} bytes find no room in memory") from error
+        if count != size:
+            raise InflateError(f"it expands to {count} bytes, not {size}")
+        return room
+
+
+def _expand(compression: str, data: NDArray[np.uint8], room: NDArray[np.uint8]) -> int:
+    """Expand into `room` and return how many bytes came out."""
+    codec = {"lz4": cramjam.lz4, "zstd": cramjam.zstd, "bz2": cramjam.bzip2}[compression]
+    try:
+        return int(codec.decompress_into(data, room))
+    except cramjam.DecompressionError as error:
+        if "whole buffer" in str(error):
+            raise InflateError(f"it expands to more than {len(room)} bytes") from error
+        if compression == "zstd" and (count := _expand_wide(data, room)) is not None:
+            return count
+        raise InflateError(f"its {compression} data are damaged ({error})") from error
+
+
+def _expand_wide(data: NDArray[np.uint8], room: NDArray[np.uint8]) -> int | None:
+    """Expand zstd data of a window beyond the library's usual limit; None where that is not why they failed."""
+    import zstandard
+
+    raw, count = data.tobytes(), 0
+    try:
+        if not _COMMON_WINDOW < zstandard.get_frame_parameters(raw).window_size <= _MAX_WINDOW:
+            return None
+        window = zstandard.ZstdDecompressor(max_window_size=_MAX_WINDOW)
+        with window.stream_reader(raw, read_across_frames=True) as stream:
+            while count < len(room) and (got := stream.readinto(room[count:].data)):
+                count += got
+            if count == len(room) and stream.read(1):
+                raise InflateError(f"it expands to more than {len(room)} bytes")
+    except (zstandard.ZstdError, ValueError) as error:
+        raise InflateError(f"its zstd data are damaged ({error})") from error
+    return count
 
 
 def inflate(compression: str, data: bytes, size: int) -> bytes:
-    """Expand a chunk to exactly its declared size.
-
-    Parameters
-    ----------
-    compression : str
-        Empty or ``none``, ``lz4``, ``zstd`` or ``bz2``.
-    data : bytes
-        Compressed bytes.
-    size : int
-        Declared size [bytes].
-
-    Raises
-    ------
-    InflateError
-        Where the declared size is beyond `MAX_CHUNK`, the compression unknown or the bytes damaged.
-    """
-    if size > MAX_CHUNK:
-        raise InflateError(f"it declares {size} bytes; at most {MAX_CHUNK} are expanded")
-    if compression in ("", "none"):
-        out = data
-    elif compression not in ("lz4", "zstd", "bz2"):
-        raise InflateError(f"its compression {compression[:20]!r} is not known; expected lz4, zstd, bz2 or none")
-    else:
-        try:
-            out = _expand(compression, data, size)
-        except (RuntimeError, ValueError, OSError, EOFError, MemoryError, zstandard.ZstdError) as error:
-            raise InflateError(f"its {compression} data are damaged ({type(error).__name__})") from error
-    if len(out) != size:
-        raise InflateError(f"it expands to {'more than ' if len(out) > size else ''}{len(out)} bytes, not {size}")
-    return out
-
-
-def _expand(compression: str, data: bytes, size: int) -> bytes:
-    if compression == "lz4":
-        out: bytes = lz4.frame.LZ4FrameDecompressor().decompress(data, max_length=size + 1)
-        return out
-    if compression == "bz2":
-        return bz2.BZ2Decompressor().decompress(data, max_length=size + 1)
-    window = zstandard.ZstdDecompressor(max_window_size=1 << 28)
-    with window.stream_reader(data, read_across_frames=True) as stream:
-        return stream.read(size + 1)
+    """Expand a chunk into bytes of its own; see `Inflater.expand`."""
+    return Inflater().expand(compression, np.frombuffer(data, np.uint8), size).tobytes()
