@@ -10,9 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from replay.rawlog import Channel, Clock, LogSummary, RawLog
-from replay.readers import cdr, jsonmsg
+from replay.readers import cdr, jsonmsg, protobuf
 from replay.readers.clocks import Clocks, Report
 from replay.readers.definitions import DefinitionError, MessageType, resolve
+from replay.readers.protobuf_schema import Schema, schema_of
 
 _SLOW_SHARE = 0.2
 
@@ -26,9 +27,10 @@ class Connection:
     topic, type_name : str
         As recorded.
     encoding : str
-        Serialisation of the payloads: ``cdr``, ``ros1`` or ``json``; others are not decoded.
+        Serialisation of the payloads: ``cdr``, ``ros1``, ``json`` or ``protobuf``; others are not decoded.
     schema_encoding, definition : str
-        Language and text of the message definition; empty where the log holds none.
+        Language and text of the message definition, one character per byte for ``protobuf``; empty where the log holds
+        none.
     """
 
     topic: str
@@ -41,10 +43,10 @@ class Connection:
         """Return why messages of this stream cannot be decoded, or an empty string."""
         if self.encoding == "json":
             return ""
-        if self.encoding not in ("cdr", "ros1"):
+        if self.encoding not in ("cdr", "ros1", "protobuf"):
             return f"{self.encoding or 'unnamed'} serialisation is not decoded"
         try:
-            self.message_type()
+            self.protobuf_schema() if self.encoding == "protobuf" else self.message_type()
         except DefinitionError as error:
             return str(error)
         return ""
@@ -52,6 +54,10 @@ class Connection:
     def message_type(self) -> MessageType:
         """Return the resolved type; raises `DefinitionError`."""
         return resolve(self.type_name, self.schema_encoding, self.definition, self.encoding == "ros1")
+
+    def protobuf_schema(self) -> Schema:
+        """Return the resolved type of protobuf messages; raises `DefinitionError`."""
+        return schema_of(self.type_name, self.definition if self.schema_encoding == "protobuf" else "")
 
 
 @dataclass(frozen=True)
@@ -94,6 +100,7 @@ class _Topic:
     skipped: set[str] = field(default_factory=set)
     outcome: cdr.Outcome = field(default_factory=cdr.Outcome)
     decoders: dict[Connection, cdr.Decoder] = field(default_factory=dict)
+    walkers: dict[Connection, protobuf.Decoder] = field(default_factory=dict)
     mute: str = ""
 
     def add(self, block: Block, serial: int) -> None:
@@ -105,6 +112,13 @@ class _Topic:
             return
         if block.connection.encoding == "json":
             self.stamp, parts = jsonmsg.decode(block.data, block.starts, block.lengths, self.outcome)
+        elif block.connection.encoding == "protobuf":
+            walker = self.walkers.get(block.connection)
+            if walker is None:
+                schema = block.connection.protobuf_schema()
+                self.stamp = schema.stamp and schema.stamp[0]
+                walker = self.walkers[block.connection] = protobuf.Decoder(schema, self.outcome)
+            parts = list(walker.decode(block.data, block.starts, block.lengths))
         else:
             decoder = self.decoders.get(block.connection)
             if decoder is None:
@@ -182,6 +196,9 @@ class Assembler:
         report, outcome = self.report, topic.outcome
         if topic.mute:
             report.note(f"{label} is not decoded: {topic.mute}")
+        for walker in topic.walkers.values():
+            for text in walker.schema.notes:
+                report.note(f"{label}: {text}")
         if topic.skipped:
             report.note(f"{label}: left out arrays of more than 64 elements: {', '.join(sorted(topic.skipped)[:5])}")
         if outcome.bad:

@@ -204,7 +204,7 @@ def _take_name(file: McapFile, op: int, raw: bytes) -> None:
         name, at = _text(raw, 2)
         encoding, at = _text(raw, at)
         (size,) = struct.unpack_from("<I", raw, at)
-        text = raw[at + 4 : at + 4 + size].decode("utf-8", "replace")
+        text = raw[at + 4 : at + 4 + size].decode("latin-1" if encoding == "protobuf" else "utf-8", "replace")
         _keep(file, file.schemas, number, (name, encoding, text), "schema")
     else:
         (schema,) = struct.unpack_from("<H", raw, 2)

@@ -1,0 +1,275 @@
+"""Columns of protobuf messages equal what the protobuf package reads, message by message."""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from mcap.writer import Writer
+
+from replay.readers.cdr import Outcome
+from replay.readers.definitions import DefinitionError
+from replay.readers.names import is_key_list
+from replay.readers.protobuf import Decoder
+from replay.readers.protobuf_schema import schema_of
+from replay.readers.mcap import McapReader
+from replay.sources import SourceOptions
+
+pytest.importorskip("google.protobuf", reason="the oracle of protobuf decoding is not installed")
+from google.protobuf import descriptor_pb2, descriptor_pool, message_factory, text_format, timestamp_pb2  # noqa: E402
+from google.protobuf.message import DecodeError  # noqa: E402
+
+FILES = """
+file {
+  name: "robot.proto" package: "robot" syntax: "proto3" dependency: "google/protobuf/timestamp.proto"
+  enum_type { name: "Mode" value { name: "OFF" number: 0 } value { name: "ON" number: 1 } }
+  message_type {
+    name: "Wheel"
+    field { name: "speed" number: 1 type: TYPE_DOUBLE label: LABEL_OPTIONAL }
+    field { name: "ticks" number: 3 type: TYPE_SINT64 label: LABEL_OPTIONAL }
+    field { name: "mode" number: 200 type: TYPE_ENUM type_name: ".robot.Mode" label: LABEL_OPTIONAL }
+    field { name: "samples" number: 4 type: TYPE_FLOAT label: LABEL_REPEATED }
+    field { name: "tyre" number: 2 type: TYPE_MESSAGE type_name: ".robot.Wheel.Tyre" label: LABEL_OPTIONAL }
+    nested_type { name: "Tyre" field { name: "bar" number: 1 type: TYPE_FLOAT label: LABEL_OPTIONAL } }
+  }
+  message_type {
+    name: "State"
+    field { name: "timestamp" number: 1 type: TYPE_MESSAGE type_name: ".google.protobuf.Timestamp" label: LABEL_OPTIONAL }
+    field { name: "frame" number: 2 type: TYPE_STRING label: LABEL_OPTIONAL }
+    field { name: "d" number: 3 type: TYPE_DOUBLE label: LABEL_OPTIONAL }
+    field { name: "f" number: 4 type: TYPE_FLOAT label: LABEL_OPTIONAL }
+    field { name: "i64" number: 5 type: TYPE_INT64 label: LABEL_OPTIONAL }
+    field { name: "u64" number: 6 type: TYPE_UINT64 label: LABEL_OPTIONAL }
+    field { name: "i32" number: 7 type: TYPE_INT32 label: LABEL_OPTIONAL }
+    field { name: "x64" number: 8 type: TYPE_FIXED64 label: LABEL_OPTIONAL }
+    field { name: "x32" number: 9 type: TYPE_FIXED32 label: LABEL_OPTIONAL }
+    field { name: "b" number: 10 type: TYPE_BOOL label: LABEL_OPTIONAL }
+    field { name: "u32" number: 11 type: TYPE_UINT32 label: LABEL_OPTIONAL }
+    field { name: "mode" number: 12 type: TYPE_ENUM type_name: ".robot.Mode" label: LABEL_OPTIONAL }
+    field { name: "sx32" number: 13 type: TYPE_SFIXED32 label: LABEL_OPTIONAL }
+    field { name: "sx64" number: 14 type: TYPE_SFIXED64 label: LABEL_OPTIONAL }
+    field { name: "s32" number: 15 type: TYPE_SINT32 label: LABEL_OPTIONAL }
+    field { name: "s64" number: 16 type: TYPE_SINT64 label: LABEL_OPTIONAL }
+    field { name: "blob" number: 17 type: TYPE_BYTES label: LABEL_OPTIONAL }
+    field { name: "maybe" number: 18 type: TYPE_DOUBLE label: LABEL_OPTIONAL proto3_optional: true oneof_index: 1 }
+    field { name: "left" number: 19 type: TYPE_INT32 label: LABEL_OPTIONAL oneof_index: 0 }
+    field { name: "wheel" number: 20 type: TYPE_MESSAGE type_name: ".robot.Wheel" label: LABEL_OPTIONAL oneof_index: 0 }
+    field { name: "word" number: 21 type: TYPE_STRING label: LABEL_OPTIONAL oneof_index: 0 }
+    field { name: "packed" number: 22 type: TYPE_SINT32 label: LABEL_REPEATED }
+    field { name: "unpacked" number: 23 type: TYPE_DOUBLE label: LABEL_REPEATED options { packed: false } }
+    field { name: "joint_names" number: 24 type: TYPE_STRING label: LABEL_REPEATED }
+    field { name: "position" number: 25 type: TYPE_DOUBLE label: LABEL_REPEATED }
+    field { name: "wheels" number: 26 type: TYPE_MESSAGE type_name: ".robot.Wheel" label: LABEL_REPEATED }
+    field { name: "next" number: 27 type: TYPE_MESSAGE type_name: ".robot.State" label: LABEL_OPTIONAL }
+    field { name: "notes" number: 28 type: TYPE_MESSAGE type_name: ".robot.State.NotesEntry" label: LABEL_REPEATED }
+    field { name: "flags" number: 29 type: TYPE_BOOL label: LABEL_REPEATED }
+    oneof_decl { name: "choice" } oneof_decl { name: "_maybe" }
+    nested_type {
+      name: "NotesEntry" options { map_entry: true }
+      field { name: "key" number: 1 type: TYPE_STRING label: LABEL_OPTIONAL }
+      field { name: "value" number: 2 type: TYPE_MESSAGE type_name: ".robot.Wheel" label: LABEL_OPTIONAL }
+    }
+  }
+}
+file {
+  name: "old.proto" package: "old" syntax: "proto2"
+  message_type {
+    name: "State"
+    field { name: "d" number: 1 type: TYPE_DOUBLE label: LABEL_OPTIONAL default_value: "7" }
+    field { name: "n" number: 2 type: TYPE_UINT32 label: LABEL_REPEATED }
+    field { name: "text" number: 3 type: TYPE_STRING label: LABEL_OPTIONAL }
+    field { name: "inner" number: 4 type: TYPE_MESSAGE type_name: "State" label: LABEL_REPEATED }
+  }
+}
+"""
+
+
+def _descriptors() -> descriptor_pb2.FileDescriptorSet:
+    files = text_format.Parse(FILES, descriptor_pb2.FileDescriptorSet())
+    timestamp_pb2.DESCRIPTOR.CopyToProto(files.file.add())
+    return files
+
+
+DESCRIPTORS = _descriptors()
+DEFINITION = DESCRIPTORS.SerializeToString().decode("latin-1")
+POOL = descriptor_pool.DescriptorPool()
+for _file in reversed(DESCRIPTORS.file):
+    POOL.AddSerializedFile(_file.SerializeToString())
+
+
+def message(name: str) -> Any:
+    return message_factory.GetMessageClass(POOL.FindMessageTypeByName(name))
+
+
+STATE, OLD = message("robot.State"), message("old.State")
+
+
+def numbers(found: Any, scopes: tuple[list[list[str]], ...] = ()) -> Iterator[tuple[str, int | float]]:
+    """Every number of a message of the oracle, with its path."""
+    fields = found.DESCRIPTOR.fields
+    lists = [list(getattr(found, f.name)) for f in fields if f.type == f.TYPE_STRING and f.is_repeated and is_key_list(f.name)]
+    scopes = ([n for n in lists if len(n) <= 64 and all(x.strip() for x in n)], *scopes)
+    for f in fields:
+        if f.message_type is not None and f.message_type.GetOptions().map_entry:
+            continue
+        if f.is_repeated:
+            items = list(getattr(found, f.name))
+            if len(items) > 64:
+                continue
+            names = [n for scope in scopes for n in scope if len(n) == len(items) and len({x.strip() for x in n}) == len(n)]
+            labels = [n.rstrip("\0").strip() for n in names[0]] if names else [str(i) for i in range(len(items))]
+            for label, item in zip(labels, items, strict=True):
+                yield from entry(f"{f.name}[{label}]", f, item, scopes)
+        elif not f.has_presence or found.HasField(f.name):
+            yield from entry(f.name, f, getattr(found, f.name), scopes)
+
+
+def entry(path: str, f: Any, value: Any, scopes: tuple[list[list[str]], ...]) -> Iterator[tuple[str, int | float]]:
+    if f.message_type is not None:
+        yield from ((f"{path}.{p}", v) for p, v in numbers(value, scopes))
+    elif f.type not in (f.TYPE_STRING, f.TYPE_BYTES):
+        yield path, value
+
+
+def columns(name: str, payloads: list[bytes], outcome: Outcome, gap: bytes = b"\xff\xff") -> list[dict[str, Any]]:
+    """Decode payloads, and give the numbers of each row."""
+    data = np.frombuffer(gap + gap.join(payloads) + gap, np.uint8)
+    lengths = np.array([len(p) for p in payloads], np.int64)
+    starts = np.cumsum(lengths + len(gap)) - lengths
+    rows: list[dict[str, Any]] = [{} for _ in payloads]
+    for part in Decoder(schema_of(name, DEFINITION), outcome).decode(data, starts, lengths):
+        for path, values in part.columns.items():
+            assert len(values) == len(part.rows)
+            for row, value in zip(part.rows.tolist(), values.tolist(), strict=True):
+                assert path not in rows[row]
+                rows[row][path] = value
+    return rows
+
+
+def expected(found: Any) -> dict[str, Any]:
+    out = dict(numbers(found))
+    if "timestamp" in found.DESCRIPTOR.fields_by_name:
+        out["timestamp.sec"] = out.pop("timestamp.seconds", 0)
+        out["timestamp.nanosec"] = out.pop("timestamp.nanos", 0)
+        if abs(out["timestamp.sec"]) > 9_000_000_000:
+            out["timestamp.sec"] = out["timestamp.nanosec"] = 0
+    return out
+
+
+def same(a: dict[str, Any], b: dict[str, Any]) -> bool:
+    return a.keys() == b.keys() and all(_bits(a[k]) == _bits(b[k]) for k in a)
+
+
+def _bits(value: Any) -> bytes | int:
+    if isinstance(value, float):
+        return struct.pack("<d", value) if value == value else b"NaN"
+    return int(value)
+
+
+INT32, INT64 = st.integers(-(2**31), 2**31 - 1), st.integers(-(2**63), 2**63 - 1)
+UINT32, UINT64 = st.integers(0, 2**32 - 1), st.integers(0, 2**64 - 1)
+FLOAT, DOUBLE = st.floats(width=32), st.floats()
+SCALARS = {
+    "d": DOUBLE, "f": FLOAT, "i64": INT64, "u64": UINT64, "i32": INT32, "x64": UINT64, "x32": UINT32, "b": st.booleans(),
+    "u32": UINT32, "mode": INT32, "sx32": INT32, "sx64": INT64, "s32": INT32, "s64": INT64, "frame": st.text(max_size=5),
+    "blob": st.binary(max_size=5), "maybe": DOUBLE,
+}  # fmt: skip
+WHEEL = st.fixed_dictionaries(
+    {},
+    optional={
+        "speed": DOUBLE, "ticks": INT64, "mode": INT32, "samples": st.lists(FLOAT, max_size=70),
+        "tyre": st.fixed_dictionaries({}, optional={"bar": FLOAT}),
+    },
+)  # fmt: skip
+CHOICE = st.one_of(
+    st.just({}), st.fixed_dictionaries({"left": INT32}), st.fixed_dictionaries({"wheel": WHEEL}), st.just({"word": "x"})
+)
+ARRAYS = {
+    "timestamp": st.fixed_dictionaries({}, optional={"seconds": INT64, "nanos": INT32}),
+    "packed": st.lists(INT32, max_size=4),
+    "unpacked": st.lists(DOUBLE, max_size=4),
+    "flags": st.lists(st.booleans(), max_size=4),
+    "joint_names": st.lists(st.sampled_from(["fl", "fr", "rl", "ä", "fl "]), max_size=3),
+    "position": st.lists(DOUBLE, max_size=3),
+    "wheels": st.lists(WHEEL, max_size=4),
+    "notes": st.dictionaries(st.text(max_size=3), WHEEL, max_size=2),
+}
+
+
+def _with_choice(plain: st.SearchStrategy[dict[str, Any]]) -> st.SearchStrategy[dict[str, Any]]:
+    return st.builds(lambda a, b: a | b, plain, CHOICE)
+
+
+STATES = st.recursive(
+    _with_choice(st.fixed_dictionaries({}, optional=SCALARS | ARRAYS)),
+    lambda inner: _with_choice(st.fixed_dictionaries({"next": inner}, optional=SCALARS | ARRAYS)),
+    max_leaves=3,
+).map(lambda fields: STATE(**fields))
+
+
+@settings(max_examples=150, deadline=None)
+@given(st.lists(STATES, min_size=1, max_size=6))
+def test_columns_are_the_oracles_numbers(states: list[Any]) -> None:
+    outcome = Outcome()
+    rows = columns("robot.State", [s.SerializeToString() for s in states], outcome)
+    assert outcome.bad == 0
+    for row, state in zip(rows, states, strict=True):
+        assert same(row, expected(state))
+
+
+@st.composite
+def damaged(draw: st.DrawFn) -> bytes:
+    """A payload, or two behind one another, with a few bytes replaced, removed or repeated."""
+    raw = bytearray(b"".join(s.SerializeToString() for s in draw(st.lists(STATES, min_size=1, max_size=2))))
+    for _ in range(draw(st.integers(0, 3))):
+        if not raw:
+            break
+        at = draw(st.integers(0, len(raw) - 1))
+        action = draw(st.integers(0, 3))
+        if action == 0:
+            raw[at] = draw(st.integers(0, 255))
+        elif action == 1:
+            del raw[at : at + draw(st.integers(1, 4))]
+        elif action == 2:
+            raw[at:at] = raw[at : at + draw(st.integers(1, 8))]
+        else:
+            raw[at:at] = draw(st.binary(max_size=4))
+    return bytes(raw)
+
+
+@settings(max_examples=300, deadline=None)
+@given(st.lists(damaged(), min_size=1, max_size=4), st.sampled_from(["robot.State", "old.State"]))
+def test_damaged_payloads_give_the_oracles_numbers_or_none(payloads: list[bytes], name: str) -> None:
+    outcome = Outcome()
+    rows = columns(name, payloads, outcome)
+    refused = 0
+    for row, payload in zip(rows, payloads, strict=True):
+        found = message(name)()
+        try:
+            found.ParseFromString(payload)
+        except DecodeError:
+            assert row == {}
+            refused += 1
+            continue
+        if row:
+            assert same(row, expected(found))
+    assert outcome.bad >= refused
+
+
+@settings(max_examples=100, deadline=None)
+@given(st.lists(st.binary(max_size=30), min_size=1, max_size=8))
+def test_any_bytes_give_the_oracles_numbers_or_none(payloads: list[bytes]) -> None:
+    rows = columns("robot.State", payloads, Outcome())
+    for row, payload in zip(rows, payloads, strict=True):
+        try:
+            found = STATE.FromString(payload)
+        except DecodeError:
+            assert row == {}
+        else:
+            assert not row or same(row, expected(found))
