@@ -19,6 +19,7 @@ from replay.readers.inflate import MAX_CHUNK, InflateError, Inflater
 from replay.readers.ros1_file import MAGIC, Bag, Chunk, open_bag, take_connection
 from replay.sources import SourceOptions
 
+_LOOK, _RECORDS = 4 << 20, 3
 _MAGICS = {b"\x04\x22\x4d\x18": "lz4", b"BZh": "bz2"}
 
 
@@ -28,11 +29,14 @@ class Ros1BagReader:
     format = "bag"
 
     def matches(self, path: Path) -> bool:
-        """Whether the file starts with a bag's magic line."""
+        """Whether the file starts with a bag's magic line, or is called a bag and holds a bag's records."""
         if not path.is_file():
             return False
         with path.open("rb") as file:
-            return file.read(len(MAGIC)) == MAGIC
+            head = file.read(len(MAGIC))
+            if head == MAGIC or path.suffix != ".bag":
+                return head == MAGIC
+            return len(scan_bag(np.frombuffer(file.read(_LOOK), np.uint8)).op) >= _RECORDS
 
     def summarise(self, path: Path, options: SourceOptions) -> LogSummary:
         """List topics and counts from the index, opening chunks only where it is absent.

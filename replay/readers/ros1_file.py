@@ -104,9 +104,11 @@ def open_bag(path: Path, report: Report, whole: bool) -> Bag:
     except OSError as error:
         raise LogError(f"{path} cannot be read: {error.strerror or error}") from error
     first = data[: len(_VERSION)].tobytes()
-    if first != _VERSION:
+    if first.startswith(MAGIC) and first != _VERSION:
         raise LogError(f"{path} is not a ROS bag of version 2.0; found {first!r}; convert it with `rosbag migrate`")
     bag = Bag(path, data, report)
+    if first != _VERSION:
+        bag.lost(f"its first line is damaged; found {first!r}, expected {_VERSION!r}")
     header = _header(bag)
     index = None if header is None or not 0 < header[0] <= len(data) else scan_bag(data, header[0])
     sound = header is not None and index is not None and _sound(index, header)
