@@ -111,7 +111,8 @@ class _Topic:
         if self.mute:
             return
         if block.connection.encoding == "json":
-            self.stamp, parts = jsonmsg.decode(block.data, block.starts, block.lengths, self.outcome)
+            stamp, parts = jsonmsg.decode(block.data, block.starts, block.lengths, self.outcome)
+            self.stamp = stamp or self.stamp
         elif block.connection.encoding == "protobuf":
             walker = self.walkers.get(block.connection)
             if walker is None:
@@ -184,7 +185,7 @@ class Assembler:
         publish = np.concatenate(topic.publish)
         if rank is not None:
             log, publish = (a[np.argsort(rank)] for a in (log, publish))
-        header = _take_header(topic.stamp, columns, len(log))
+        header = _take_header(topic.stamp, columns, len(log), topic.outcome.bad)
         stamps = self.clocks.stamps(label, header, log, publish)
         for path, (rows, values) in columns.items():
             yield Channel(
@@ -210,15 +211,15 @@ class Assembler:
 
 
 def _take_header(
-    path: str | None, columns: dict[str, tuple[NDArray[np.int64], NDArray[Any]]], count: int
+    path: str | None, columns: dict[str, tuple[NDArray[np.int64], NDArray[Any]]], count: int, bad: int
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]] | None:
-    """Take the header stamp out of the columns: rows that have one, and stamps of all rows [ns]."""
+    """Take the header stamp out of the columns: rows that should have one, and stamps of all rows [ns], 0 for none."""
     sec, nsec = (columns.pop(f"{path}.{part}", None) for part in ("sec", "nanosec"))
     if sec is None or nsec is None or len(sec[0]) != len(nsec[0]):
         return None
     header = np.zeros(count, np.int64)
     header[sec[0]] = sec[1].astype(np.int64) * 1_000_000_000 + nsec[1].astype(np.int64)
-    return sec[0], header
+    return sec[0] if len(sec[0]) >= count - bad else np.arange(count), header
 
 
 def _within_range(block: Block, report: Report) -> Block:
