@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from fnmatch import fnmatch
 from pathlib import Path
 
+from replay.clock_align import SourceClock, align_clocks
 from replay.errors import LogError
 from replay.machine import Machine
 from replay.mapping import map_signals, plan_topics
@@ -40,6 +41,8 @@ class MissionFile:
         As in `LogSummary`.
     summary : LogSummary
         Contents, notes and damage after decoding.
+    clock : SourceClock or None
+        How its clock was put onto the mission's.
     """
 
     path: Path
@@ -47,6 +50,7 @@ class MissionFile:
     bytes: int
     format: str
     summary: LogSummary
+    clock: SourceClock | None = None
 
 
 @dataclass(frozen=True)
@@ -123,7 +127,8 @@ def read_signals(
     Returns
     -------
     tuple[tuple[MissionFile, ...], Signals]
-        The files in the given order, and the signals at their own stamps.
+        The files in the given order, and the signals at their own stamps, on the clock of the first file where the
+        files' clocks could be compared (`replay.clock_align`).
 
     Raises
     ------
@@ -148,10 +153,15 @@ def read_signals(
         sha256, size = content_hash(path)
         logs.append(log)
         files.append(MissionFile(path, sha256, size, log.format, _complete(summary, log.summary)))
+    if len(logs) > 1:
+        tell("comparing clocks")
+    logs, clocks = align_clocks(logs, machine, options)
     tell("mapping signals")
     marked = [log for log in logs if is_open_loop(log.summary)]
     signals = map_signals(logs, _without_given(machine, marked))
-    return tuple(files), replace(signals, open_loop=bool(marked))
+    notes = (*signals.notes, *(clock.sentence for clock in clocks if clock.sentence))
+    dated = tuple(replace(file, clock=clock) for file, clock in zip(files, clocks, strict=True))
+    return dated, replace(signals, notes=notes, open_loop=bool(marked))
 
 
 def _without_given(machine: Machine, marked: Sequence[RawLog]) -> Machine:
@@ -211,6 +221,7 @@ def load_mission(
         timeline = align(signals, start_s, stop_s)
     except LogError as error:
         damage = [text for file in files for text in file.summary.damage]
-        also = f"; the log is damaged: {damage[0]}" if damage else ""
+        clocks = [f.clock.sentence for f in files if f.clock is not None and f.clock.reason]
+        also = f"; the log is damaged: {damage[0]}" if damage else f"; {clocks[0]}" if clocks else ""
         raise LogError(f"{', '.join(str(p) for p in paths)}: {error}{also}") from error
     return Mission(files, signals, timeline)
