@@ -10,7 +10,7 @@ from __future__ import annotations
 import json
 import secrets
 from collections.abc import Iterable, Iterator, Sequence
-from itertools import compress
+from itertools import chain, compress
 from operator import itemgetter
 from typing import Any
 
@@ -27,7 +27,8 @@ MAX_PATHS = 20_000
 MAX_DEPTH = 32
 _STAMPS = ("header.stamp", "header.timestamp", "stamp", "timestamp")
 _PARTS = (("sec", "nanosec"), ("sec", "nsec"), ("secs", "nsecs"), ("seconds", "nanos"))
-_BATCH_BYTES = 4 << 20
+_BATCH_BYTES = 1 << 17  # what the caches hold as objects
+_MANY_SHAPES = 24
 _LAST_SECOND = 9_000_000_000
 _WORDS = {"NaN": np.nan, "Infinity": np.inf, "-Infinity": -np.inf}
 
@@ -83,7 +84,8 @@ def _batch(
         outcome.reason = outcome.reason or f"its messages have more than {MAX_PATHS} different fields"
         return None, []
     stamp = _take_stamp(taker.columns, rows)
-    return stamp, list(_parts(taker.columns))
+    outcome.slow += taker.slow
+    return stamp, [Part(np.empty(0, np.int64), {}, tuple(taker.skipped)), *_parts(taker.columns)]
 
 
 @njit(cache=True)
@@ -144,6 +146,8 @@ class _Taker:
 
     def __init__(self) -> None:
         self.columns: Columns = {}
+        self.skipped: set[str] = set()
+        self.slow = 0
         self.full = False
 
     def take(self, path: str, rows: Sequence[int], values: Sequence[Any], scopes: list[Any], depth: int) -> None:
@@ -166,7 +170,7 @@ class _Taker:
         if depth > MAX_DEPTH or self.full or kinds <= {str, type(None)}:
             return
         if kinds <= _NUMBERS:
-            self._add(path, rows, _column(values, kinds))
+            self._add(path or "value", rows, _column(values, kinds))
         elif kinds == {dict}:
             self._objects(path, rows, values, scopes, depth)
         elif kinds == {list}:
@@ -203,6 +207,8 @@ class _Taker:
             own_rows, own = by_shape.setdefault(tuple(value), ([], []))
             own_rows.append(row)
             own.append(value)
+        if len(by_shape) > _MANY_SHAPES:
+            self.slow = max(self.slow, len(values))
         for own_rows, own in by_shape.values():
             self._objects(path, own_rows, own, scopes, depth)
             if self.full:
@@ -210,15 +216,23 @@ class _Taker:
 
     def _lists(self, path: str, rows: Sequence[int], values: Sequence[Any], scopes: list[Any], depth: int) -> None:
         sizes = set(map(len, values))
+        if max(sizes) > MAX_ELEMENTS:
+            self.skipped.add(path)
         for size in sizes:
             if not 0 < size <= MAX_ELEMENTS:
                 continue
             pick = [len(v) == size for v in values] if len(sizes) > 1 else None
             own_rows = rows if pick is None else list(compress(rows, pick))
             own = values if pick is None else list(compress(values, pick))
-            labels = next((n for n in scopes if len(n) == size), range(size))
-            for label, column in zip(labels, zip(*own, strict=True), strict=True):
-                self.take(f"{path}[{_clean(label)}]", own_rows, column, scopes, depth + 1)
+            labels = [f"{path}[{_clean(n)}]" for n in next((n for n in scopes if len(n) == size), range(size))]
+            kinds = set(map(type, chain.from_iterable(own)))
+            if len(kinds) == 1 and kinds <= _NUMBERS:  # one conversion for all elements
+                table = _column(list(chain.from_iterable(own)), kinds).reshape(-1, size)
+                for i, label in enumerate(labels):
+                    self._add(label, own_rows, table[:, i].copy())
+            else:
+                for label, column in zip(labels, zip(*own, strict=True), strict=True):
+                    self.take(label, own_rows, column, scopes, depth + 1)
 
     def _add(self, path: str, rows: Sequence[int], column: NDArray[Any]) -> None:
         known = self.columns.get(path)
@@ -235,8 +249,9 @@ def _by_names(
 ) -> Iterator[tuple[list[tuple[str, ...]], Sequence[int], Sequence[Any]]]:
     """Yield groups of objects whose arrays of names agree, with these names."""
     lists = [k for k in keys if is_key_list(k)]
-    if not lists:
-        yield [], rows, values
+    first = [values[0][k] for k in lists]
+    if all(list(map(itemgetter(k), values)).count(v) == len(values) for k, v in zip(lists, first, strict=True)):
+        yield _distinct(map(_names, first)), rows, values
         return
     groups: dict[tuple[tuple[str, ...], ...], tuple[list[int], list[Any]]] = {}
     for row, value in zip(rows, values, strict=True):
@@ -244,7 +259,11 @@ def _by_names(
         own_rows.append(row)
         own.append(value)
     for names, (own_rows, own) in groups.items():
-        yield [n for n in names if n and len(set(n)) == len(n) and all(n)], own_rows, own
+        yield _distinct(names), own_rows, own
+
+
+def _distinct(names: Iterable[tuple[str, ...]]) -> list[tuple[str, ...]]:
+    return [n for n in names if n and len(set(n)) == len(n) and all(n)]
 
 
 def _names(value: Any) -> tuple[str, ...]:

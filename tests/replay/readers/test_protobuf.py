@@ -15,15 +15,15 @@ from mcap.writer import Writer
 
 from replay.readers.cdr import Outcome
 from replay.readers.definitions import DefinitionError
+from replay.readers.mcap import McapReader
 from replay.readers.names import is_key_list
 from replay.readers.protobuf import Decoder
 from replay.readers.protobuf_schema import schema_of
-from replay.readers.mcap import McapReader
 from replay.sources import SourceOptions
 
 pytest.importorskip("google.protobuf", reason="the oracle of protobuf decoding is not installed")
-from google.protobuf import descriptor_pb2, descriptor_pool, message_factory, text_format, timestamp_pb2  # noqa: E402
-from google.protobuf.message import DecodeError  # noqa: E402
+from google.protobuf import descriptor_pb2, descriptor_pool, message_factory, text_format, timestamp_pb2
+from google.protobuf.message import DecodeError
 
 FILES = """
 file {
@@ -113,7 +113,11 @@ STATE, OLD = message("robot.State"), message("old.State")
 def numbers(found: Any, scopes: tuple[list[list[str]], ...] = ()) -> Iterator[tuple[str, int | float]]:
     """Every number of a message of the oracle, with its path."""
     fields = found.DESCRIPTOR.fields
-    lists = [list(getattr(found, f.name)) for f in fields if f.type == f.TYPE_STRING and f.is_repeated and is_key_list(f.name)]
+    lists = [
+        list(getattr(found, f.name))
+        for f in fields
+        if f.type == f.TYPE_STRING and f.is_repeated and is_key_list(f.name)
+    ]
     scopes = ([n for n in lists if len(n) <= 64 and all(x.strip() for x in n)], *scopes)
     for f in fields:
         if f.message_type is not None and f.message_type.GetOptions().map_entry:
@@ -122,7 +126,9 @@ def numbers(found: Any, scopes: tuple[list[list[str]], ...] = ()) -> Iterator[tu
             items = list(getattr(found, f.name))
             if len(items) > 64:
                 continue
-            names = [n for scope in scopes for n in scope if len(n) == len(items) and len({x.strip() for x in n}) == len(n)]
+            names = [
+                n for scope in scopes for n in scope if len(n) == len(items) and len({x.strip() for x in n}) == len(n)
+            ]
             labels = [n.rstrip("\0").strip() for n in names[0]] if names else [str(i) for i in range(len(items))]
             for label, item in zip(labels, items, strict=True):
                 yield from entry(f"{f.name}[{label}]", f, item, scopes)
@@ -273,3 +279,142 @@ def test_any_bytes_give_the_oracles_numbers_or_none(payloads: list[bytes]) -> No
             assert row == {}
         else:
             assert not row or same(row, expected(found))
+
+
+def test_names_beside_arrays_become_keys_and_change_with_the_message() -> None:
+    first = STATE(joint_names=["fl", "fr"], position=[1, 2], wheels=[{"speed": 3}, {"speed": 4}], packed=[7])
+    second = STATE(joint_names=["fr", "fl"], position=[2, 1])
+    nameless = STATE(position=[5, 6])
+    rows = columns("robot.State", [m.SerializeToString() for m in (first, second, nameless)], Outcome())
+    assert {k: v for k, v in rows[0].items() if "[" in k and v} == {
+        "position[fl]": 1, "position[fr]": 2, "wheels[fl].speed": 3, "wheels[fr].speed": 4, "packed[0]": 7,
+    }  # fmt: skip
+    assert (rows[1]["position[fl]"], rows[1]["position[fr]"]) == (1, 2)
+    assert (rows[2]["position[0]"], rows[2]["position[1]"]) == (5, 6)
+
+
+def test_long_arrays_are_left_out_whole_and_named() -> None:
+    decoder = Decoder(schema_of("robot.State", DEFINITION), Outcome())
+    raw = STATE(packed=range(65), wheels=[{"samples": range(65)}] * 2, unpacked=range(64)).SerializeToString()
+    parts = list(decoder.decode(np.frombuffer(raw, np.uint8), np.array([0]), np.array([len(raw)])))
+    found = {path for part in parts for path in part.columns}
+    assert "unpacked[63]" in found
+    assert not any(p == "packed[0]" or "samples" in p for p in found)
+    assert {s for part in parts for s in part.skipped} == {"packed", "wheels[0].samples", "wheels[1].samples"}
+
+
+def test_messages_that_hold_themselves_go_as_deep_as_the_data_and_no_deeper() -> None:
+    deep = STATE(d=1.0)
+    for _ in range(70):
+        deep = STATE(next=deep)
+    shallow = STATE(next=STATE(next=STATE(d=2.0)))
+    outcome = Outcome()
+    rows = columns("robot.State", [deep.SerializeToString(), shallow.SerializeToString()], outcome)
+    assert (outcome.bad, outcome.reason) == (1, "it is nested deeper than 64")
+    assert rows[0] == {}
+    assert rows[1]["next.next.d"] == 2.0
+
+
+def test_groups_are_refused() -> None:
+    outcome = Outcome()
+    assert columns("robot.State", [b"\xf3\x07\xf4\x07"], outcome) == [{}]
+    assert (outcome.bad, outcome.reason) == (1, "it holds a group, which is not supported")
+
+
+def test_one_message_with_too_many_numbers_costs_only_itself() -> None:
+    greedy = STATE(wheels=[{"samples": range(64)}] * 64)
+    for _ in range(40):
+        greedy = STATE(next=greedy, wheels=[{"samples": range(64)}] * 64)
+    small = STATE(d=4.0)
+    outcome = Outcome()
+    rows = columns("robot.State", [m.SerializeToString() for m in (small, greedy, small)], outcome)
+    assert (outcome.bad, outcome.reason) == (1, "it holds too many numbers")
+    assert [r.get("d") for r in rows] == [4.0, None, 4.0]
+
+
+def _log(path: Path, type_name: str, definition: bytes, payloads: list[bytes], encoding: str = "protobuf") -> Path:
+    with path.open("wb") as file:
+        writer = Writer(file)
+        writer.start()
+        schema = writer.register_schema(type_name, encoding, definition)
+        channel = writer.register_channel("/state", "protobuf", schema)
+        for i, payload in enumerate(payloads):
+            writer.add_message(channel, 1_000_000_000 * (i + 1), payload, 0)
+        writer.finish()
+    return path
+
+
+def test_a_log_has_channels_on_its_own_stamps(tmp_path: Path) -> None:
+    states = [STATE(d=i, timestamp={"seconds": 100 + i, "nanos": 5}, notes={"a": {"speed": 1}}) for i in range(3)]
+    states.append(STATE(d=3))
+    payloads = [s.SerializeToString() for s in states]
+    path = _log(tmp_path / "a.mcap", "robot.State", DESCRIPTORS.SerializeToString(), payloads)
+    log = McapReader().read(path, SourceOptions())
+    channel = log.channels["/state.d"]
+    assert channel.values.tolist() == [0, 1, 2, 3]
+    assert channel.stamps.tolist()[:3] == [100_000_000_005, 101_000_000_005, 102_000_000_005]
+    assert channel.type_name == "robot.State"
+    assert "timestamp" not in "".join(log.channels)
+    assert any("1 of 4 header stamps are zero" in note for note in log.summary.notes)
+    assert "/state: left out maps and groups: notes" in log.summary.notes
+    assert log.summary.damage == ()
+
+
+@pytest.mark.parametrize(
+    ("type_name", "definition", "encoding", "words"),
+    [
+        (
+            "robot.Tractor",
+            DESCRIPTORS.SerializeToString(),
+            "protobuf",
+            "does not hold the message type 'robot.Tractor'",
+        ),
+        ("robot.State", DESCRIPTORS.SerializeToString()[:-30], "protobuf", "is no FileDescriptorSet"),
+        ("robot.State", DESCRIPTORS.file[0].SerializeToString(), "protobuf", "schema"),
+        ("robot.State", b"message State {}", "proto", "does not hold the message type"),
+    ],
+)
+def test_schemas_that_do_not_serve_are_told(
+    tmp_path: Path, type_name: str, definition: bytes, encoding: str, words: str
+) -> None:
+    path = _log(tmp_path / "a.mcap", type_name, definition, [b""], encoding)
+    (topic,) = McapReader().summarise(path, SourceOptions()).topics
+    assert words in topic.note
+    log = McapReader().read(path, SourceOptions())
+    assert log.channels == {}
+    assert any("/state is not decoded" in note for note in log.summary.notes)
+
+
+@settings(max_examples=100, deadline=None)
+@given(st.data())
+def test_damaged_schemas_are_refused_or_read_in_bounds(data: st.DataObject) -> None:
+    raw = bytearray(DESCRIPTORS.SerializeToString())
+    for _ in range(data.draw(st.integers(1, 3))):
+        raw[data.draw(st.integers(0, len(raw) - 1))] = data.draw(st.integers(0, 255))
+    payload = STATE(d=1, wheels=[{"speed": 2}], packed=[1, 2], joint_names=["a"]).SerializeToString()
+    try:
+        schema = schema_of("robot.State", raw.decode("latin-1"))
+    except DefinitionError:
+        return
+    list(Decoder(schema, Outcome()).decode(np.frombuffer(payload, np.uint8), np.array([0]), np.array([len(payload)])))
+
+
+def test_a_schema_without_its_imports_is_refused() -> None:
+    files = descriptor_pb2.FileDescriptorSet(file=[DESCRIPTORS.file[0]])
+    with pytest.raises(DefinitionError, match=r"does not hold the message type '\.google\.protobuf\.Timestamp'"):
+        schema_of("robot.State", files.SerializeToString().decode("latin-1"))
+
+
+def test_editions_say_where_absence_is_a_value() -> None:
+    files = text_format.Parse(
+        'file { name: "e.proto" syntax: "editions" edition: EDITION_2023 '
+        "options { features { field_presence: IMPLICIT } } "
+        'message_type { name: "E" '
+        'field { name: "a" number: 1 type: TYPE_INT32 label: LABEL_OPTIONAL } '
+        'field { name: "b" number: 2 type: TYPE_INT32 label: LABEL_OPTIONAL '
+        "options { features { field_presence: EXPLICIT } } } } }",
+        descriptor_pb2.FileDescriptorSet(),
+    )
+    schema = schema_of("E", files.SerializeToString().decode("latin-1"))
+    (part,) = Decoder(schema, Outcome()).decode(np.empty(0, np.uint8), np.array([0]), np.array([0]))
+    assert {k: v.tolist() for k, v in part.columns.items()} == {"a": [0]}
