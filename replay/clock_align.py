@@ -18,12 +18,19 @@ from numpy.typing import NDArray
 
 from replay.clock_coarse import match
 from replay.clock_fit import Line, fit_line
-from replay.clock_series import shared_series
+from replay.clock_series import Shared, shared_series
 from replay.machine import Machine
 from replay.mapping import map_signals
 from replay.rawlog import Channel, RawLog
 from replay.signals import Signal
 from replay.sources import SourceOptions
+
+_ONE_DAY_S = 26 * 3600.0  # any time zone, and two hours
+_SET_NS = 946_684_800_000_000_000  # clocks that show an earlier year than 2000 were not set, or count from a start
+_STRETCH_S = 30.0
+_SEARCH_S = 7200.0
+_STEP_S = 0.1
+_SURE = 0.75
 
 Method = Literal["reference", "estimated", "common", "as recorded", "given"]
 
@@ -118,13 +125,16 @@ def estimate(
     shared = shared_series(reference, other, origins)
     if not shared:
         return replace(unknown, reason="no signal that moves is recorded in both"), None, 0
-    found = match(shared)
-    if found.reason:
-        return replace(unknown, reason=f"{_list(tuple(s.name for s in shared))}: {found.reason}"), None, 0
-    line = fit_line(shared, found.lag_s, found.at_s)
-    if line.reason:
-        return replace(unknown, reason=line.reason), None, 0
     between = origins[0] - origins[1]
+    found = match(shared, -between * 1e-9)
+    reason = f"{_list(tuple(s.name for s in shared))}: {found.reason}" if found.reason else ""
+    reason = reason or _too_far(found.lag_s + between * 1e-9, origins)
+    if reason:
+        return replace(unknown, reason=reason), None, 0
+    line = fit_line(shared, found.lag_s, found.at_s)
+    reason = line.reason or _steps(shared, line)
+    if reason:
+        return replace(unknown, reason=reason), None, 0
     ends = np.array([0.0, (spans[1][1] - spans[1][0]) * 1e-9])
     offset = line.lag(ends) + between * 1e-9
     uncertainty = float(line.bound(ends).max())
@@ -135,6 +145,40 @@ def estimate(
         sources[1], sources[0], method, float(offset[0]), line.drift * 1e6, uncertainty, line.signals, float(overlap)
     )
     return clock, line, between
+
+
+def _too_far(offset: float, origins: tuple[int, int]) -> str:
+    """Refuse a shift of days between clocks that were both set: it may be another drive of the same kind."""
+    if abs(offset) < _ONE_DAY_S or min(origins) < _SET_NS:
+        return ""
+    return (
+        f"they agree under a shift of {offset:+.3f} s ({offset / 86400:+.1f} days), which may as well be another drive of the "
+        "same kind"
+    )
+
+
+def _steps(shared: Sequence[Shared], line: Line) -> str:
+    """Say where signals that tell nothing of the line agree under another shift."""
+    longest = max((s.other for s in shared), key=lambda s: len(s.t)).t
+    count = min(8, max(1, int(np.ptp(longest) // _STRETCH_S)))
+    found: list[tuple[float, float]] = []
+    for rows in np.array_split(longest, count):
+        first, last = float(rows[0]), min(float(rows[-1]), float(rows[0]) + 2 * _STRETCH_S)
+        if ((line.seen >= first) & (line.seen <= last)).any():
+            continue
+        lag = float(line.lag(np.array([first]))[0])
+        near = (first + lag - _SEARCH_S, last + lag + _SEARCH_S)
+        parts = [replace(s, reference=s.reference.within(*near), other=s.other.within(first, last)) for s in shared]
+        parts = [s for s in parts if all(len(x.t) > 20 and np.ptp(x.x) > 0 for x in (s.reference, s.other))]
+        if not parts:
+            continue
+        place = match(parts, lag)
+        step = place.lag_s - lag
+        if not place.reason and abs(step) > _STEP_S:
+            found.append((first, step))
+            if place.correlation > _SURE or any(abs(step - other) < _STEP_S for _, other in found[:-1]):
+                return f"its clock jumps: {first - longest[0]:.0f} s after its start signals agree under a shift by another {step:+.2f} s"
+    return ""
 
 
 def align_clocks(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -24,6 +24,8 @@ _LEAST_OVERLAP_S = 10.0
 _LEAST_INFORMATION = 25.0  # far above log(shifts tried), what the best of that many chance matches reaches
 _RIVAL = 0.6
 _LEAST_CORRELATION = 0.3
+_NEAR_S = 5.0
+_FEWEST_EVENTS = 4.0
 
 
 @dataclass(frozen=True)
@@ -38,21 +40,42 @@ class Match:
         Middle of the matched part [s of the other file].
     reason : str
         Why no shift is sure; else empty.
+    correlation : float
+        Of the signals' changes under that shift.
     """
 
     lag_s: float
     at_s: float
     reason: str = ""
+    correlation: float = 0.0
 
 
-def match(shared: Sequence[Shared]) -> Match:
+def match(shared: Sequence[Shared], wall_s: float = np.inf) -> Match:
     """Find the one shift under which the signals agree.
 
     Parameters
     ----------
     shared : Sequence[Shared]
         Quantities in both files.
+    wall_s : float
+        Lag by which the two clocks would show the same time [s]; a few changes tell a moment near it only.
     """
+    found = _match(shared, wall_s, _calm_scale)
+    return _match(shared, wall_s, _rms_scale) if found.reason else found
+
+
+def _calm_scale(size: Array) -> float:
+    """Usual change of a signal that moves all the time: jumps of a faulty sensor do not outweigh the drive."""
+    return float(np.percentile(size, 80))
+
+
+def _rms_scale(size: Array) -> float:
+    """Usual change of a signal that moves now and then."""
+    scale = float(np.sqrt(np.mean(np.square(size))))
+    return float(np.sqrt(np.mean(np.square(np.minimum(size, 3 * scale)))))
+
+
+def _match(shared: Sequence[Shared], wall_s: float, scaled: Callable[[Array], float]) -> Match:
     ends = [(s.reference.t[0], s.reference.t[-1], s.other.t[0], s.other.t[-1]) for s in shared]
     a0, a1 = min(e[0] for e in ends), max(e[1] for e in ends)
     b0, b1 = min(e[2] for e in ends), max(e[3] for e in ends)
@@ -63,23 +86,27 @@ def match(shared: Sequence[Shared]) -> Match:
     if longest > _LONG_S:
         shared = shared[:3]
     swap = b1 - b0 > a1 - a0  # parts are cut from the shorter one
-    whole = [_changes(s.other if swap else s.reference, (b0, b1) if swap else (a0, a1), width) for s in shared]
-    parted = [_changes(s.reference if swap else s.other, (a0, a1) if swap else (b0, b1), width) for s in shared]
+    spans = ((b0, b1), (a0, a1)) if swap else ((a0, a1), (b0, b1))
+    whole = [_changes(s.other if swap else s.reference, spans[0], width, scaled) for s in shared]
+    parted = [_changes(s.reference if swap else s.other, spans[1], width, scaled) for s in shared]
     best = Match(np.nan, np.nan, "its signals hardly move")
     for first, last in _busiest(parted, round(_PART_S / width)):
-        lag, reason = _correlate(whole, [x[first:last] for x in parted], width)
+        part = [x[first:last] for x in parted]
+        lag, r, reason = _correlate(whole, part, width)
         middle = (first + last) / 2 * width
         if swap:
-            found = Match(-(lag - first * width + b0 - a0), b0 + middle + lag - first * width, reason)
+            found = Match(-(lag - first * width + b0 - a0), b0 + middle + lag - first * width, reason, r)
         else:
-            found = Match(lag - first * width + a0 - b0, b0 + middle, reason)
+            found = Match(lag - first * width + a0 - b0, b0 + middle, reason, r)
+        if not reason and abs(found.lag_s - wall_s) > _NEAR_S and _events(part, width) < _FEWEST_EVENTS:
+            reason = "they change too seldom to tell that the files show the same drive"
         if not reason:
             return found
         best = Match(np.nan, np.nan, reason)
     return best
 
 
-def _changes(series: Series, span: tuple[float, float], width: float) -> Array:
+def _changes(series: Series, span: tuple[float, float], width: float, scaled: Callable[[Array], float]) -> Array:
     """Change over 0.2 s in each bin, scaled to its usual size and without outliers; NaN where nothing is known."""
     size = int((span[1] - span[0]) / width) + 1
     at = ((series.t - span[0]) / width).astype(np.int64)
@@ -96,8 +123,8 @@ def _changes(series: Series, span: tuple[float, float], width: float) -> Array:
     change[step:] = mean[step:] - mean[:-step]
     size_of = np.abs(change[np.isfinite(change)])
     scale = 0.0
-    if size_of.size:  # jumps of a faulty sensor must not outweigh the drive
-        scale = float(np.percentile(size_of, 80)) or float(np.sqrt(np.mean(np.square(size_of))))
+    if size_of.size:
+        scale = scaled(size_of) or _rms_scale(size_of)
         change = np.clip(change, -2 * scale, 2 * scale)
     return change / scale if scale > 0 else np.full(size, np.nan)
 
@@ -113,8 +140,16 @@ def _busiest(parts: Sequence[Array], length: int) -> list[tuple[int, int]]:
     return [(int(i) * length, (int(i) + 1) * length) for i in np.argsort(-sums, kind="stable")[:_PARTS]]
 
 
-def _correlate(whole: Sequence[Array], part: Sequence[Array], width: float) -> tuple[float, str]:
-    """Shift of the part in the whole [s], and why it is not sure."""
+def _events(part: Sequence[Array], width: float) -> float:
+    """How many seconds the changes fill, counted by their energy."""
+    energy = np.nansum(np.square(part), axis=0)
+    second = round(1.0 / width)
+    sums = energy[: len(energy) // second * second].reshape(-1, second).sum(axis=1)
+    return float(sums.sum() ** 2 / max(float(np.square(sums).sum()), 1e-300))
+
+
+def _correlate(whole: Sequence[Array], part: Sequence[Array], width: float) -> tuple[float, float, str]:
+    """Shift of the part in the whole [s], correlation there, and why it is not sure."""
     n, m = len(whole[0]), len(part[0])
     size = fft.next_fast_len(n + m, real=True)
 
@@ -135,17 +170,21 @@ def _correlate(whole: Sequence[Array], part: Sequence[Array], width: float) -> t
     score = np.where(r > 0, -0.5 * overlap * (width / _CHANGE_S) * np.log1p(-np.minimum(np.square(r), 0.9999)), 0.0)
     peak = int(np.argmax(score))
     if score[peak] < _LEAST_INFORMATION or r[peak] < _LEAST_CORRELATION:
-        return np.nan, f"no shift makes them agree (best correlation {max(float(r[peak]), 0.0):.2f})"
+        return np.nan, 0.0, f"no shift makes them agree (best correlation {max(float(r[peak]), 0.0):.2f})"
     low = np.flatnonzero(score[: peak + 1] < 0.3 * score[peak])
     high = np.flatnonzero(score[peak:] < 0.3 * score[peak])
     margin = round(1.0 / width)
     first = min(int(low[-1]) if len(low) else 0, peak - margin)
     last = max(peak + int(high[0]) if len(high) else len(score), peak + margin)
     if (last - first) * width > 20.0:
-        return np.nan, "they change too slowly to tell a moment"
+        return np.nan, 0.0, "they change too slowly to tell a moment"
     rivals = np.concatenate([score[: max(first, 0)], np.zeros(1), score[last + 1 :]])
     rival = int(np.argmax(rivals))
     if rivals[rival] > _RIVAL * score[peak]:
         place = rival if rival < max(first, 0) else rival - max(first, 0) + last
-        return np.nan, f"they repeat themselves: a shift by another {(place - peak) * width:+.1f} s fits nearly as well"
-    return (peak - m) * width, ""
+        return (
+            np.nan,
+            0.0,
+            f"they repeat themselves: a shift by another {(place - peak) * width:+.1f} s fits nearly as well",
+        )
+    return (peak - m) * width, float(r[peak]), ""

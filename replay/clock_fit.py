@@ -9,7 +9,8 @@ differ from one another, widens the bound.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +19,7 @@ from replay.clock_series import Series, Shared
 
 Array = NDArray[np.float64]
 
-_WINDOW_S = 16.0
+_WINDOW_S = (4.0, 16.0)
 _MOST_WINDOWS = 90
 _BIN_S = 0.01
 _SLOPE_S = 0.1
@@ -30,6 +31,8 @@ _STAGE_S = 600.0
 _LEAST_EXPLAINED = 0.5
 _LEAST_AGREEING = 0.5
 _LEAST_SIGNAL = 0.5
+_STRETCHES = 8
+_STEP_S = 0.005
 _FEWEST = 3
 _TUKEY = 4.685
 
@@ -48,6 +51,8 @@ class Line:
         Of lag and drift.
     signals : tuple[str, ...]
         Quantities whose readings were used.
+    seen : NDArray[np.float64], shape (n,)
+        When these readings were taken [s of the other file].
     reason : str
         Why the line is not to be trusted; else empty.
     """
@@ -57,6 +62,7 @@ class Line:
     drift: float
     covariance: Array
     signals: tuple[str, ...] = ()
+    seen: Array = field(default_factory=lambda: np.zeros(0))
     reason: str = ""
 
     def lag(self, t: Array) -> Array:
@@ -132,18 +138,19 @@ def _prepared(shared: Shared, line: Line, span: tuple[float, float]) -> _Part:
     shift = line.lag(np.array(span))
     slack = 1.0 + _CAPTURE_S
     reference = shared.reference.within(span[0] + shift[0] - slack, span[1] + shift[1] + slack)
-    timing = 0.3 * max(shared.other.period, shared.reference.period)
+    timing = 0.3 * max(shared.other.recorded, shared.reference.recorded)
     length = span[1] - span[0]
-    every = max(1.0, length / _WINDOW_S / _MOST_WINDOWS)
+    width = float(np.clip(length / 12.0, *_WINDOW_S))
+    every = max(1.0, length / width / _MOST_WINDOWS)
     other, reference = other.thinned(_BIN_S), reference.thinned(_BIN_S)
     backwards = other.period < reference.period
     samples, template = (reference, other) if backwards else (other, reference)
     at = samples.t - (line.lag(samples.t - line.lag_s) if backwards else 0.0) - span[0]
-    window = (at / _WINDOW_S).astype(np.int64)
+    window = (at / width).astype(np.int64)
     if every > 1.0:  # of a long mission some windows, evenly spread
         kept = np.unique((np.arange(_MOST_WINDOWS) * every).astype(np.int64))
         rows = np.isin(window, kept)
-        samples, window = Series(samples.t[rows], samples.x[rows], samples.period), window[rows]
+        samples, window = Series(samples.t[rows], samples.x[rows], samples.period, samples.recorded), window[rows]
     return _Part(template, samples, window, backwards, timing)
 
 
@@ -277,7 +284,7 @@ def _robust_line(readings: _Readings, shared: Sequence[Shared], start: Line) -> 
     t, lag, variance = readings.t, readings.lag, readings.variance
     if len(t) < _FEWEST:
         return _refused(start, "too few moments show in both recordings")
-    floor = float(np.median([0.05 * max(s.reference.period, s.other.period) for s in shared])) ** 2
+    floor = float(np.median([0.05 * max(s.reference.recorded, s.other.recorded) for s in shared])) ** 2
     weight0 = 1.0 / (variance + floor)
     at = float(np.sum(weight0 * t) / weight0.sum())
     u = t - at
@@ -302,10 +309,35 @@ def _robust_line(readings: _Readings, shared: Sequence[Shared], start: Line) -> 
         return _refused(start, f"only {agreeing:.0%} of the moments agree on one offset and drift")
     if abs(line[1]) > _MOST_DRIFT:
         return _refused(start, f"the drift would be {line[1] * 1e6:.0f} ppm")
+    residual = lag - line[0] - line[1] * u
+    uneven, more = _uneven(u, residual, weight0, weight)
+    if uneven:
+        return _refused(start, uneven)
     used = [i for i in range(len(shared)) if (weight[readings.signal == i] > 0).any()]
     covariance = covariance.copy()
-    covariance[0, 0] += _between(readings, weight / scale**2, lag - line[0] - line[1] * u, shared, used)
-    return Line(at, float(line[0]), float(line[1]), covariance, tuple(shared[i].name for i in used))
+    covariance[0, 0] += _between(readings, weight / scale**2, residual, shared, used) + more**2
+    return Line(at, float(line[0]), float(line[1]), covariance, tuple(shared[i].name for i in used), t[weight > 0])
+
+
+def _uneven(u: Array, residual: Array, weight0: Array, weight: Array) -> tuple[str, float]:
+    """Say where a whole stretch of time agrees on another offset than the line, or how far a stretch is off [s]."""
+    edges = np.linspace(u.min(), u.max() + 1e-9, _STRETCHES + 1)
+    worst = 0.0
+    for first, last in pairwise(edges):
+        mine = (u >= first) & (u < last)
+        if mine.sum() < 2:
+            continue
+        off = float(np.average(residual[mine], weights=weight0[mine]))
+        error = float(np.sqrt(np.average(np.square(residual[mine] - off), weights=weight0[mine])))
+        if not (weight[mine] > 0.1 * weight0[mine]).any():
+            if abs(off) > max(3.0 * error, _STEP_S):
+                return (
+                    f"the clocks do not run evenly against each other: {last - first:.0f} s are off by {off * 1e3:+.0f} ms"
+                ), 0.0
+        elif weight[mine].any():
+            off = float(np.average(residual[mine], weights=weight[mine]))
+            worst = max(worst, abs(off) - 3.0 / float(np.sqrt(weight[mine].sum())))
+    return "", worst
 
 
 def _between(readings: _Readings, weight: Array, residual: Array, shared: Sequence[Shared], used: list[int]) -> float:
@@ -321,13 +353,13 @@ def _between(readings: _Readings, weight: Array, residual: Array, shared: Sequen
     if len(used) > 1:
         q = float((size * np.square(mean - (share * mean).sum())).sum())
         excess = max(0.0, (q - (len(used) - 1)) / (size.sum() - np.square(size).sum() / size.sum()))
-    timing = 0.29 * min(min(s.reference.period, s.other.period) for s in shared)
+    timing = 0.29 * min(min(s.reference.recorded, s.other.recorded) for s in shared)
     delay = max(shared[i].delay_s for i in used) / 1.96
     return float(excess * np.square(share).sum() + timing**2 + delay**2)
 
 
 def _refused(line: Line, reason: str) -> Line:
-    return Line(line.at_s, line.lag_s, line.drift, line.covariance, (), reason)
+    return Line(line.at_s, line.lag_s, line.drift, line.covariance, reason=reason)
 
 
 def _weighted_median(values: Array, weight: Array) -> float:

@@ -10,10 +10,14 @@ from numpy.typing import NDArray
 
 from replay.mapping_convert import slope
 from replay.signals import Signal, quantity_kind
+from replay.spill import blocks
 
 Array = NDArray[np.float64]
 
 _MOST = 10
+_MOST_LONG = 4
+_LONG = 1 << 20
+_BIN_S = 0.01
 _LARGEST = 1e9
 _FEWEST = 50
 # Quantities whose copies show the same moment, the surest first; a plant lies between commands and speeds.
@@ -37,17 +41,20 @@ class Series:
     x : NDArray[np.float64], shape (n,)
         Finite values.
     period : float
-        Median distance of samples [s].
+        Median distance of these samples [s].
+    recorded : float
+        Median distance of the samples that were recorded [s].
     """
 
     t: Array
     x: Array
     period: float
+    recorded: float
 
     def within(self, first: float, last: float) -> Series:
         """Samples of a stretch of time."""
         a, b = np.searchsorted(self.t, (first, last))
-        return Series(self.t[a:b], self.x[a:b], self.period)
+        return Series(self.t[a:b], self.x[a:b], self.period, self.recorded)
 
     def thinned(self, width: float) -> Series:
         """Means of stamps and values over bins, so that a straight line stays where it is; slow samples stay as they are."""
@@ -57,7 +64,7 @@ class Series:
         count = np.diff(np.append(first, len(self.t)))
         start = self.t[first]
         t = start + np.add.reduceat(self.t - np.repeat(start, count), first) / count
-        return Series(t, np.add.reduceat(self.x, first) / count, max(width, self.period))
+        return Series(t, np.add.reduceat(self.x, first) / count, max(width, self.period), self.recorded)
 
 
 @dataclass(frozen=True)
@@ -96,14 +103,18 @@ def shared_series(
         (n for n in reference.keys() & other.keys() if quantity_kind(n) in _KINDS),
         key=lambda n: (_KINDS.index(quantity_kind(n)), n),
     )
-    found = [Shared(n, a, b) for n in names if (a := _series(reference[n], origins[0])) is not None and (b := _series(other[n], origins[1])) is not None]  # fmt: skip
-    if found:
-        return tuple(found[:_MOST])
-    for mine, theirs in _two_sensors(reference, other):
-        a, b = _series(mine, origins[0]), _series(theirs, origins[1])
-        if a is not None and b is not None:
-            found.append(Shared(f"{mine.name} with {theirs.name}", a, b, _SENSOR_DELAY_S))
-    return tuple(found[:_MOST])
+    long = any(len(reference[n].stamps) > _LONG or len(other[n].stamps) > _LONG for n in names)
+    pairs = [(n, reference[n], other[n], 0.0) for n in names] or [
+        (f"{mine.name} with {theirs.name}", mine, theirs, _SENSOR_DELAY_S)
+        for mine, theirs in _two_sensors(reference, other)
+    ]
+    found: list[Shared] = []
+    for name, mine, theirs, delay in pairs:
+        if len(found) < (_MOST_LONG if long else _MOST):
+            a, b = _series(mine, origins[0]), _series(theirs, origins[1])
+            if a is not None and b is not None:
+                found.append(Shared(name, a, b, delay))
+    return tuple(found)
 
 
 def _two_sensors(reference: Mapping[str, Signal], other: Mapping[str, Signal]) -> list[tuple[Signal, Signal]]:
@@ -127,13 +138,30 @@ def _rate(signal: Signal) -> Signal:
 
 def _series(signal: Signal, origin: int) -> Series | None:
     """Finite samples that move, or None."""
-    good = np.abs(signal.values) < _LARGEST
-    x = signal.values[good]
-    if len(x) < _FEWEST or not np.ptp(x) > 0:
+    parts = [p for rows in blocks(len(signal.stamps), _LONG) if (p := _part(signal, rows, origin)) is not None]
+    if not parts or sum(len(p.x) for p in parts) < _FEWEST:
         return None
-    t = np.asarray((signal.stamps[good] - origin) * 1e-9, np.float64)
-    t, x = _without_holds(t, x)
-    return Series(t, x, float(np.median(np.diff(t)))) if len(x) >= _FEWEST else None
+    if len(parts) == 1:
+        whole = parts[0]
+        t, x = _without_holds(whole.t, whole.x)
+        period = float(np.median(np.diff(t))) if len(t) > 1 else 0.0
+        whole = Series(t, x, period, period)
+    else:  # hours at a high rate: kept as means
+        thin = [p.thinned(_BIN_S) for p in parts]
+        whole = Series(
+            np.concatenate([p.t for p in thin]), np.concatenate([p.x for p in thin]), thin[0].period, parts[0].period
+        )
+    return whole if len(whole.x) >= _FEWEST and whole.period > 0 and np.ptp(whole.x) > 0 else None
+
+
+def _part(signal: Signal, rows: slice, origin: int) -> Series | None:
+    values = signal.values[rows]
+    good = np.abs(values) < _LARGEST
+    if not good.any():
+        return None
+    t = np.asarray((signal.stamps[rows][good] - origin) * 1e-9, np.float64)
+    period = float(np.median(np.diff(t))) if len(t) > 1 else 0.0
+    return Series(t, np.asarray(values[good], np.float64), period, period)
 
 
 def _without_holds(t: Array, x: Array) -> tuple[Array, Array]:
