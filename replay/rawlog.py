@@ -70,6 +70,30 @@ class TopicInfo:
 
 
 @dataclass(frozen=True)
+class AttachmentInfo:
+    """A file that a log carries within it.
+
+    Attributes
+    ----------
+    name, media_type : str
+        As recorded.
+    size : int
+        Length of its content [bytes].
+    log_ns, create_ns : int
+        When it was recorded and created [ns]; 0 where not stated.
+    checksum : str
+        ``right``, ``wrong``, ``none`` (the log has none) or ``unchecked`` (only the index was read).
+    """
+
+    name: str
+    media_type: str
+    size: int
+    log_ns: int = 0
+    create_ns: int = 0
+    checksum: str = "unchecked"
+
+
+@dataclass(frozen=True)
 class LogSummary:
     """A log's contents without its samples.
 
@@ -89,6 +113,8 @@ class LogSummary:
         What was lost and why, one sentence each; a log with damage is ``degraded``.
     metadata : Mapping[str, str]
         Key-value pairs stored in the container.
+    attachments : tuple[AttachmentInfo, ...]
+        Files within the log.
     """
 
     source: str
@@ -99,6 +125,7 @@ class LogSummary:
     notes: tuple[str, ...] = ()
     damage: tuple[str, ...] = ()
     metadata: Mapping[str, str] = field(default_factory=dict)
+    attachments: tuple[AttachmentInfo, ...] = ()
 
 
 @dataclass(frozen=True)

@@ -1,24 +1,24 @@
-"""MCAP files: chunked or not, with or without index, complete or cut off."""
+"""MCAP files: chunked or not, with or without index, complete, cut off or damaged."""
 
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from replay.errors import LogError
-from replay.rawlog import Clock, LogSummary, RawLog, TopicInfo, Window
+from replay.rawlog import AttachmentInfo, Clock, LogSummary, RawLog, TopicInfo, Window
+from replay.readers import mcap_format as fmt
 from replay.readers.assemble import Assembler, Block, Connection
 from replay.readers.clocks import Report
-from replay.readers.mcap_file import MAGIC, MESSAGE, McapFile, chunk_records, open_file
-from replay.readers.records import Records, scan_mcap
+from replay.readers.mcap_account import account, check_data, counts_of
+from replay.readers.mcap_chunk import name_channels, open_chunk
+from replay.readers.mcap_file import McapFile, looks_like_mcap
+from replay.readers.mcap_open import open_file
+from replay.readers.mcap_walk import walk_file
 from replay.sources import SourceOptions
-
-_MESSAGE_HEAD = 22
-_HEAD = np.dtype([("channel", "<u2"), ("sequence", "<u4"), ("log", "<i8"), ("publish", "<i8")])
 
 
 class McapReader:
@@ -27,14 +27,16 @@ class McapReader:
     format = "mcap"
 
     def matches(self, path: Path) -> bool:
-        """Whether the file starts with MCAP's magic bytes."""
+        """Whether the file starts with MCAP's magic bytes, give or take two, or ends with them."""
         if not path.is_file():
             return False
         with path.open("rb") as file:
-            return file.read(len(MAGIC)) == MAGIC
+            head = file.read(len(fmt.MAGIC))
+            file.seek(max(path.stat().st_size - len(fmt.MAGIC), 0))
+            return looks_like_mcap(head, file.read(len(fmt.MAGIC)))
 
     def summarise(self, path: Path, options: SourceOptions) -> LogSummary:
-        """List topics and counts from index records, opening chunks only where these are absent.
+        """List topics and counts from the summary; the records are walked only where it does not tell all.
 
         Raises
         ------
@@ -42,7 +44,7 @@ class McapReader:
             Where nothing in the file can be read.
         """
         report = Report()
-        return summary_of([open_file(path, report)], path, self.format, report)
+        return summary_of(open_files([path], path, report, walk=False), path, self.format, report)
 
     def read(
         self,
@@ -52,34 +54,56 @@ class McapReader:
         clock: Clock = "header",
         window: Window | None = None,
     ) -> RawLog:
-        """Decode the given topics.
+        """Decode the given topics and time.
 
         Raises
         ------
         LogError
             Where nothing in the file can be read.
         """
-        return read_files([path], path, self.format, Report(), topics, clock)
+        return read_files([path], path, self.format, Report(), topics, clock, window)
 
 
 def read_files(
-    files: list[Path], source: Path, name: str, report: Report, topics: Collection[str] | None, clock: Clock
+    files: list[Path],
+    source: Path,
+    name: str,
+    report: Report,
+    topics: Collection[str] | None,
+    clock: Clock,
+    window: Window | None = None,
 ) -> RawLog:
-    """Read the files of one recording as one log; a file that cannot be read is damage unless it is the only one."""
-    opened = open_files(files, source, report)
+    """Read the files of one recording as one log; a file that cannot be read is damage unless it is the only one.
+
+    Without a window every record of every file is walked and held against index and statistics; with one, only what
+    the index places inside it is opened.
+    """
+    opened = open_files(files, source, report, walk=window is None)
     assembler = Assembler(clock, report)
     for file in opened:
-        for blocks in _blocks(file, topics):
+        for blocks in _blocks(file, topics, window):
             assembler.add(blocks)
     return assembler.finish(summary_of(opened, source, name, report))
 
 
-def open_files(files: list[Path], source: Path, report: Report) -> list[McapFile]:
-    """Open the files of one recording; raises `LogError` where none can be opened."""
+def open_files(files: list[Path], source: Path, report: Report, walk: bool = False) -> list[McapFile]:
+    """Open the files of one recording; raises `LogError` where none can be opened.
+
+    Parameters
+    ----------
+    files : list[Path]
+        The files.
+    source : Path
+        What the user gave.
+    report : Report
+        Takes losses.
+    walk : bool
+        Whether to walk over all records even where the summary accounts for them.
+    """
     opened, last = [], LogError(f"{source}: no MCAP file in it")
     for path in files:
         try:
-            opened.append(open_file(path, report))
+            opened.append(open_file(path, report, walk))
         except LogError as error:
             last = error
             report.lost(str(error))
@@ -88,68 +112,92 @@ def open_files(files: list[Path], source: Path, report: Report) -> list[McapFile
     return opened
 
 
-def _heads(data: NDArray[np.uint8], records: Records) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[Any]]:
-    """Payload starts, payload lengths and heads of the messages in a buffer."""
-    pick = (records.op == MESSAGE) & (records.size >= _MESSAGE_HEAD)
-    body, size = records.body[pick], records.size[pick]
-    if not len(body):
-        return body, size, np.empty(0, _HEAD)
-    windows: NDArray[Any] = np.ndarray((len(data) - _MESSAGE_HEAD + 1,), f"V{_MESSAGE_HEAD}", data, strides=(1,))
-    return body + _MESSAGE_HEAD, size - _MESSAGE_HEAD, windows[body].view(_HEAD)
-
-
 def _split(
-    file: McapFile, data: NDArray[np.uint8], records: Records, topics: Collection[str] | None
-) -> Iterator[Block]:
-    """Blocks of one buffer, one per channel."""
-    start, size, head = _heads(data, records)
-    for number in np.unique(head["channel"]):
-        connection = file.channels.get(int(number))
-        mine = head["channel"] == number
-        if connection is None:
-            file.report.lost(f"{file.path.name}: {mine.sum()} messages belong to channel {number}, which is not named")
-        elif topics is None or connection.topic in topics:
-            yield Block(connection, data, start[mine], size[mine], head["log"][mine], head["publish"][mine])
+    file: McapFile,
+    data: NDArray[np.uint8],
+    run: tuple[int, int],
+    verified: bool,
+    topics: Collection[str] | None,
+    window: Window | None,
+    place: str,
+) -> Iterator[list[Block]]:
+    """Blocks of one stretch of records, one per channel, some hundred thousand messages at a time."""
+    at, stop = run
+    while at < stop:
+        census = file.scanner.census(data, at, stop)
+        for op, body, size in census.names.tolist():
+            file.names.take(op, data[body : body + size].tobytes(), verified, place)
+        np.add.at(file.found.counts, census.channels, census.counts)
+        file.found.bounds[0] = min(file.found.bounds[0], census.bounds[0])
+        file.found.bounds[1] = max(file.found.bounds[1], census.bounds[1])
+        if census.unknown:
+            file.report.note(f"{file.path.name}: {census.unknown} records of unknown type {place} were left out")
+        known = {int(n): file.names.connection(int(n)) for n in census.channels}
+        for n, count in zip(census.channels.tolist(), census.counts.tolist(), strict=True):
+            if known[n] is None:
+                file.lost("unnamed", f"{count} messages {place} belong to channel {n}, which is not named")
+        wanted = np.array([c is not None and (topics is None or c.topic in topics) for c in known.values()], np.bool_)
+        blocks = []
+        for group in file.scanner.collect(data, at, census, wanted, window):
+            connection = known[group.channel]
+            if connection is not None:
+                blocks.append(Block(connection, data, group.body, group.size, group.log, group.publish))
+        yield blocks
+        if census.end <= at:
+            file.lost("bytes", f"the records {place} end {stop - at} bytes early")
+            return
+        at = census.end
 
 
-def _blocks(file: McapFile, topics: Collection[str] | None) -> Iterator[Iterator[Block]]:
-    for start, stop in file.loose:
-        yield _split(file, file.data, scan_mcap(file.data, start, stop), topics)
-    wanted = None if topics is None else {n for n, c in file.channels.items() if c.topic in topics}
-    for i, chunk in enumerate(file.chunks):
-        counts = file.indexed.get(i)
-        known = counts is not None and all(n in file.channels for n in counts)
-        if wanted is not None and known and counts is not None and wanted.isdisjoint(counts):
-            continue
-        opened = chunk_records(file, chunk)
-        if opened is not None:
-            yield _split(file, *opened, topics)
+def _blocks(file: McapFile, topics: Collection[str] | None, window: Window | None) -> Iterator[list[Block]]:
+    """Blocks of a file in the order of places; then what was found is held against what should be there."""
+    if not len(file.chunks):
+        walk_file(file)
+    skipped = set() if topics is None and window is None else _skipped(file, topics, window)
+    order: list[tuple[int, int, int]] = [(start, stop, -1) for start, stop in file.runs]
+    order += [(int(c[0]), int(c[1]), i) for i, c in enumerate(file.chunks) if i not in skipped]
+    for start, stop, row in sorted(order):
+        if row < 0:
+            yield from _split(file, file.data, (start, stop), False, topics, window, f"at byte {start}")
+        else:
+            yield from _chunk_blocks(file, row, topics, window)
+    if window is None:
+        late = account(file, file.found, topics, skipped)
+        for row in late:
+            yield from _chunk_blocks(file, row, topics, window)
+        if late:
+            account(file, file.found, topics, set())
+        check_data(file, whole=not skipped or bool(late))
+        file.read_whole, file.read_topics = True, None if topics is None else frozenset(topics)
 
 
-def _counts(file: McapFile) -> tuple[dict[int, int], list[int]]:
-    """Messages per channel, and the log stamps that bound them."""
-    counts: dict[int, int] = {}
-    bounds: list[int] = []
+def _chunk_blocks(
+    file: McapFile, row: int, topics: Collection[str] | None, window: Window | None
+) -> Iterator[list[Block]]:
+    chunk = open_chunk(file, row)
+    if chunk is None:
+        return
+    place = f"in the chunk at byte {file.chunks[row, 0]}"
+    for run in chunk.runs:
+        yield from _split(file, chunk.data, run, chunk.verified, topics, window, place)
 
-    def add(data: NDArray[np.uint8], records: Records) -> None:
-        head = _heads(data, records)[2]
-        if len(head):
-            bounds.extend((int(head["log"].min()), int(head["log"].max())))
-        for channel, n in zip(*np.unique(head["channel"], return_counts=True), strict=True):
-            counts[int(channel)] = counts.get(int(channel), 0) + int(n)
 
-    for start, stop in file.loose:
-        add(file.data, scan_mcap(file.data, start, stop))
-    for i, chunk in enumerate(file.chunks):
-        indexed = file.indexed.get(i)
-        if indexed is not None and all(n in file.channels for n in indexed):
-            for channel, n in indexed.items():
-                counts[channel] = counts.get(channel, 0) + n
-            if any(indexed.values()):
-                bounds += [chunk.first_ns, chunk.last_ns]
-        elif (opened := chunk_records(file, chunk)) is not None:
-            add(*opened)
-    return counts, bounds
+def _skipped(file: McapFile, topics: Collection[str] | None, window: Window | None) -> set[int]:
+    """Rows of chunks that hold no wanted message by an index whose checksum is right."""
+    if file.summary is None or not file.summary.checked or not file.summary.sound or not name_channels(file):
+        return set()
+    skip: NDArray[np.bool_] = np.zeros(len(file.chunks), np.bool_)
+    if window is not None:
+        first, last = file.chunks[:, 2], file.chunks[:, 3]
+        skip |= ((last < window[0]) | (first >= window[1])) & (last >= first) & (last > 0)
+    if topics is not None:
+        wanted = [n for n, c in file.names.channels.items() if c.topic in topics]
+        indexed, holding = np.zeros(len(skip), np.bool_), np.zeros(len(skip), np.bool_)
+        indexed[file.indexes[:, 0]] = True
+        unnamed = file.names.named[file.indexes[:, 1]] == 0
+        holding[file.indexes[np.isin(file.indexes[:, 1], wanted) | unnamed, 0]] = True
+        skip |= indexed & ~holding
+    return set(np.flatnonzero(skip).tolist())
 
 
 def summary_of(files: list[McapFile], source: Path, name: str, report: Report) -> LogSummary:
@@ -157,19 +205,23 @@ def summary_of(files: list[McapFile], source: Path, name: str, report: Report) -
     totals: dict[Connection, int] = {}
     bounds: list[int] = []
     metadata: dict[str, str] = {}
+    attachments: list[AttachmentInfo] = []
     for file in files:
-        counts, edges = _counts(file)
+        counts, edges = counts_of(file)
         bounds += [b for b in edges if 0 <= b < 2**63]
-        for number, connection in file.channels.items():
+        for number, connection in file.names.channels.items():
             totals[connection] = totals.get(connection, 0) + counts.get(number, 0)
         for key, value in file.metadata.items():
             metadata.setdefault(key, value)
-        stated = file.statistics
-        if stated is not None and sum(stated.values()) != sum(counts.values()):
-            report.lost(
-                f"{file.path.name}: its statistics count {sum(stated.values())} messages, {sum(counts.values())} "
-                "were found"
-            )
+        if file.bare:
+            metadata["integrity"] = "unverifiable"
+        attachments += file.attachments
+        file.say_rest()
+    metadata.setdefault("integrity", "checksums")
     topics = tuple(TopicInfo(c.topic, c.type_name, n, c.encoding, (), c.why_not()) for c, n in totals.items())
     start, stop = (min(bounds), max(bounds)) if bounds else (0, 0)
-    return LogSummary(str(source), name, start, stop, topics, tuple(report.notes), tuple(report.damage), metadata)
+    if not any(totals.values()):
+        report.note(f"{source.name} holds no messages")
+    return LogSummary(
+        str(source), name, start, stop, topics, tuple(report.notes), tuple(report.damage), metadata, tuple(attachments)
+    )  # fmt: skip

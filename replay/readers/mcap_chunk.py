@@ -1,0 +1,220 @@
+"""Opening one chunk of an MCAP file, whole or as much of it as can be believed.
+
+What is believed. A chunk whose checksum is wrong is left out as a whole: one wrong value in it would be taken for a
+fault of the machine, and nothing tells which of its messages are right. A chunk that the end of the file cuts off, or
+that ends in nothing but zeros as after a power failure, lost its end but its beginning stands as it was written: the
+messages that its decompressed beginning completes are taken, and said to be unverified because the checksum covers
+the whole chunk. A chunk without a checksum cannot be verified in any case: what can be decompressed is taken up to
+the damage. Nothing is ever taken from behind a place at which decompression failed.
+"""
+
+from __future__ import annotations
+
+import zlib
+from dataclasses import dataclass
+from io import BytesIO
+from typing import NamedTuple
+
+import lz4.frame
+import numpy as np
+import zstandard
+from numpy.typing import NDArray
+
+from replay.readers import mcap_format as fmt
+from replay.readers import mcap_scan as scan
+from replay.readers.inflate import MAX_CHUNK, InflateError
+from replay.readers.mcap_file import McapFile
+
+_FIXED = 49
+_PIECE = 1 << 16
+_ZEROS = 512
+_COMPRESSIONS = {"": 0, "none": 4, "lz4": 3, "zstd": 4}
+_FRAMES = {b"\x28\xb5\x2f\xfd": "zstd", b"\x04\x22\x4d\x18": "lz4"}
+
+
+@dataclass(frozen=True)
+class Chunk:
+    """An opened chunk.
+
+    Attributes
+    ----------
+    data : NDArray[np.uint8], shape (b,)
+        Its records, valid until the next chunk is opened.
+    runs : list[tuple[int, int]]
+        Stretches of complete records.
+    verified : bool
+        Whether its checksum is right.
+    """
+
+    data: NDArray[np.uint8]
+    runs: list[tuple[int, int]]
+    verified: bool
+
+
+class _Head(NamedTuple):
+    size: int
+    crc: int
+    compression: str
+    body: int
+    packed: int
+
+
+def _head(data: NDArray[np.uint8], start: int, end: int, cut: bool) -> _Head | None:
+    """Read a chunk's head; where the length of its compression's name is wrong, the packed size finds it."""
+    raw = data[start + 9 : min(end, start + 9 + 64)].tobytes()
+    if len(raw) < _FIXED - 9:
+        return None
+    size, crc, stated = (int.from_bytes(raw[a:b], "little") for a, b in ((16, 24), (24, 28), (28, 32)))
+    for text in (stated, 0, 3, 4):
+        if text > 16 or 40 + text > len(raw):
+            continue
+        packed = int.from_bytes(raw[32 + text : 40 + text], "little")
+        left = end - (start + _FIXED + text)
+        if packed > left if cut else left - 64 <= packed <= left:
+            name = raw[32 : 32 + text].decode("ascii", "replace")
+            body = start + _FIXED + text
+            if name not in _COMPRESSIONS:
+                name = _FRAMES.get(data[body : body + 4].tobytes(), name)
+            return _Head(size, crc, name, body, min(packed, left))
+    return None
+
+
+def open_chunk(file: McapFile, row: int) -> Chunk | None:
+    """Open a chunk by its row in `file.chunks`; None where nothing in it can be believed (which is reported)."""
+    start, end = (int(n) for n in file.chunks[row, :2])
+    cut = start == file.cut
+    where = f"the chunk at byte {start}"
+    head = _head(file.data, start, end, cut) if file.data[start : start + 9].size == 9 else None
+    if head is None:
+        file.lost("chunk", f"{where} was left out: its head is damaged{file.held(row)}")
+        return None
+    packed = file.data[head.body : head.body + head.packed]
+    if cut:
+        return _beginning(file, where, head, packed, "is cut off by the end of the file")
+    size = _size(file, start, head, where)
+    try:
+        data = file.inflater.expand(head.compression, packed, size)
+    except InflateError as error:
+        return _in_part(file, row, where, head, packed, str(error))
+    if head.crc and zlib.crc32(data.data) != head.crc:
+        return _in_part(file, row, where, head, packed, "its checksum differs")
+    if head.crc:
+        return Chunk(data, [(0, len(data))], True)
+    file.bare = True
+    return Chunk(data, _runs(file, where, data), False)
+
+
+def take_names(file: McapFile, row: int, chunk: Chunk) -> None:
+    """Take the schemas and channels of a chunk."""
+    place = f"in the chunk at byte {file.chunks[row, 0]}"
+    for run in chunk.runs:
+        for op, body, size in file.scanner.census(chunk.data, *run).names.tolist():
+            file.names.take(op, chunk.data[body : body + size].tobytes(), chunk.verified, place)
+
+
+def name_channels(file: McapFile) -> bool:
+    """Open chunks until every channel in the indexes has its name, for summaries that do not repeat the names.
+
+    Returns
+    -------
+    bool
+        Whether all are named: the summary or the indexes tell every channel.
+    """
+    for row in _first_rows(file):
+        if not file.names.ready[file.indexes[file.indexes[:, 0] == row, 1]].all():
+            _open_for_names(file, row)
+    indexed = set(file.indexes[:, 0].tolist())
+    for row in range(len(file.chunks)):
+        if file.names.ready[file.names.named > 0].all():
+            break
+        if row not in indexed:
+            _open_for_names(file, row)
+    listed = file.summary is not None and any(op == fmt.CHANNEL for op, _, _ in file.summary.names)
+    return listed or len(indexed) == len(file.chunks)
+
+
+def _first_rows(file: McapFile) -> list[int]:
+    """Rows of the chunks that hold the first messages of channels whose name or schema is not yet known."""
+    late = file.indexes[file.names.ready[file.indexes[:, 1]] == 0]
+    first = np.unique(late[:, 1], return_index=True)[1]
+    return sorted(set(late[first, 0].tolist()))
+
+
+def _open_for_names(file: McapFile, row: int) -> None:
+    chunk = open_chunk(file, row)
+    if chunk is not None:
+        take_names(file, row, chunk)
+
+
+def _size(file: McapFile, start: int, head: _Head, where: str) -> int:
+    """Full size of a chunk: as its head says, or as the checked summary does where the two differ."""
+    summary = file.summary
+    if summary is None or not len(summary.chunks):
+        return head.size
+    row = int(np.searchsorted(summary.chunks[:, 2], start))
+    if row == len(summary.chunks) or summary.chunks[row, 2] != start or summary.chunks[row, 6] == head.size:
+        return head.size
+    file.lost("index", f"{where} states {head.size} bytes, its index {summary.chunks[row, 6]}")
+    return int(summary.chunks[row, 6]) if summary.checked else head.size
+
+
+def _in_part(file: McapFile, row: int, where: str, head: _Head, packed: NDArray[np.uint8], reason: str) -> Chunk | None:
+    """Take the beginning of a damaged chunk where it can be believed."""
+    if not head.crc and head.compression in ("lz4", "zstd"):
+        return _beginning(file, where, head, packed, f"is damaged ({reason})")
+    if head.compression in ("lz4", "zstd") and len(packed) > _ZEROS and not packed[-_ZEROS:].any():
+        kept = packed[: int(np.flatnonzero(packed)[-1]) + 1] if packed.any() else packed[:0]
+        return _beginning(file, where, head, kept, f"ends in {len(packed) - len(kept)} zeros")
+    file.lost("chunk", f"{where} was left out: {reason}{file.held(row)}")
+    return None
+
+
+def _beginning(file: McapFile, where: str, head: _Head, packed: NDArray[np.uint8], reason: str) -> Chunk:
+    """Take the complete messages that the beginning of a chunk holds."""
+    data = _expand_beginning(head.compression, packed, min(head.size, MAX_CHUNK))
+    runs = _runs(file, where, data, cut=True)
+    count = sum(int(file.scanner.census(data, *run).counts.sum()) for run in runs)
+    file.bare = True
+    file.lost("part", f"{where} {reason}; {count} messages that its first {len(data)} bytes hold were taken unverified")
+    return Chunk(data, runs, False)
+
+
+def _runs(file: McapFile, where: str, data: NDArray[np.uint8], cut: bool = False) -> list[tuple[int, int]]:
+    """Stretches of complete records in bytes that no checksum covers."""
+    rows = scan.walk(data, 0, len(data), file.names.named.copy(), scan.Tally()).rows
+    runs: list[tuple[int, int]] = []
+    for op, start, stop, flag in rows.tolist():
+        if op == fmt.MESSAGE or (op in (fmt.SCHEMA, fmt.CHANNEL) and flag == fmt.SOUND):
+            if runs and runs[-1][1] == start:
+                runs[-1] = (runs[-1][0], stop)
+            else:
+                runs.append((start, stop))
+        elif not (cut and stop == len(data)):
+            file.lost("bytes", f"{where}: its bytes {start} to {stop} hold no message and were left out")
+    return runs
+
+
+def _expand_beginning(compression: str, packed: NDArray[np.uint8], size: int) -> NDArray[np.uint8]:
+    """Expand as much as can be, at most `size` bytes, up to the end or the first damaged place."""
+    raw = packed.tobytes()
+    if compression not in ("lz4", "zstd"):
+        return packed[:size] if compression in ("", "none") else packed[:0]
+    parts, count = [], 0
+    try:
+        if compression == "zstd":
+            stream = zstandard.ZstdDecompressor(max_window_size=1 << 28).stream_reader(BytesIO(raw))
+            while count < size and (part := stream.read(min(_PIECE, size - count))):
+                parts.append(part)
+                count += len(part)
+        else:
+            frame = lz4.frame.LZ4FrameDecompressor()
+            part = frame.decompress(raw, max_length=min(_PIECE, size))
+            while part:
+                parts.append(part)
+                count += len(part)
+                if frame.eof or count >= size:
+                    break
+                part = frame.decompress(b"", max_length=min(_PIECE, size - count))
+    except (zstandard.ZstdError, RuntimeError, ValueError, EOFError, MemoryError):
+        pass
+    return np.frombuffer(b"".join(parts), np.uint8)

@@ -1,0 +1,331 @@
+"""Compiled walks over the bytes of an MCAP file that trust no length without looking at what it leads to.
+
+A record is an opcode (u8), a length (u64) and its content. A record *fits* where its inner lengths agree with its own;
+a walk goes on where the next record fits too, and searches byte by byte for the next place from which several records
+follow one another where it does not.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from replay.readers.mcap_format import (
+    ATTACHMENT,
+    ATTACHMENT_INDEX,
+    CHANNEL,
+    CHUNK,
+    CHUNK_INDEX,
+    DATA_END,
+    FOOTER,
+    HEADER,
+    HOLE,
+    MENDED,
+    MESSAGE,
+    MESSAGE_HEAD,
+    MESSAGE_INDEX,
+    METADATA,
+    METADATA_INDEX,
+    PRIVATE,
+    SCHEMA,
+    SHORT,
+    SOUND,
+    STATISTICS,
+    SUMMARY_OFFSET,
+)
+
+_SLACK = 64
+
+
+@njit(cache=True)
+def _number(data, at, width):  # type: ignore[no-untyped-def]
+    value = np.uint64(0)
+    for i in range(width):
+        value |= np.uint64(data[at + i]) << np.uint64(8 * i)
+    return value
+
+
+@njit(cache=True)
+def _end(data, at, stop):  # type: ignore[no-untyped-def]
+    """End of the record by its length, or −1 where it leaves the bytes."""
+    if at + 9 > stop:
+        return np.int64(-1)
+    length = _number(data, at + 1, 8)
+    if length > np.uint64(stop - at - 9):
+        return np.int64(-1)
+    return np.int64(at + 9) + np.int64(length)
+
+
+@njit(cache=True)
+def _over(data, at, end, parts):  # type: ignore[no-untyped-def]
+    """Behind `parts` length-prefixed parts, or −1 where they leave the record."""
+    for _ in range(parts):
+        if at < 0 or at + 4 > end:
+            return np.int64(-1)
+        size = np.int64(_number(data, at, 4))
+        if size > end - at - 4:
+            return np.int64(-1)
+        at += 4 + size
+    return np.int64(at)
+
+
+@njit(cache=True)
+def _chunk_fits(data, at, end):  # type: ignore[no-untyped-def]
+    """Whether a record of any opcode has the content of a chunk: the packed size ends where the record does."""
+    if end - at < 49:
+        return False
+    text = np.int64(_number(data, at + 37, 4))
+    if text > 16 or at + 49 + text > end:
+        return False
+    packed = _number(data, at + 41 + text, 8)
+    left = end - at - 49 - text
+    return packed <= np.uint64(left) and np.int64(packed) >= left - _SLACK
+
+
+@njit(cache=True)
+def _fits(data, at, stop):  # type: ignore[no-untyped-def]
+    """End of the record where its content agrees with its length, else −1."""
+    end = _end(data, at, stop)
+    if end < 0:
+        return end
+    op, body, size = data[at], at + 9, end - at - 9
+    if op == MESSAGE:
+        return end if size >= MESSAGE_HEAD else np.int64(-1)
+    if op == CHUNK:
+        return end if _chunk_fits(data, at, end) else np.int64(-1)
+    last = np.int64(-1)
+    if op == MESSAGE_INDEX:
+        last = _over(data, body + 2, end, 1)
+    elif op == HEADER:
+        last = _over(data, body, end, 2)
+    elif op == SCHEMA:
+        last = _over(data, body + 2, end, 3)
+    elif op == CHANNEL:
+        last = _over(data, body + 4, end, 3)
+    elif op == METADATA:
+        last = _over(data, body, end, 2)
+    elif op == STATISTICS:
+        last = _over(data, body + 42, end, 1)
+    elif op == METADATA_INDEX:
+        last = _over(data, body + 16, end, 1)
+    elif op == ATTACHMENT_INDEX:
+        last = _over(data, body + 40, end, 2)
+    elif op == CHUNK_INDEX:
+        last = _over(data, body + 32, end, 1)
+        if last >= 0:
+            last = _over(data, last + 8, end, 1)
+        if last >= 0:
+            last += 16
+    elif op == ATTACHMENT:
+        last = _over(data, body + 16, end, 2)
+        if last < 0 or last + 12 > end or _number(data, last, 8) > np.uint64(end - last - 12):
+            return np.int64(-1)
+        last += 12 + np.int64(_number(data, last, 8))
+    elif op == FOOTER:
+        last = body + 20
+    elif op == DATA_END:
+        last = body + 4
+    elif op == SUMMARY_OFFSET:
+        last = body + 17
+    elif op >= PRIVATE and (end == stop or (_end(data, end, stop) >= 0 and data[end] != 0)):
+        last = end
+    if last < 0 or last > end or last < end - _SLACK:
+        return np.int64(-1)
+    return end
+
+
+@njit(cache=True)
+def _mended(data, at, stop):  # type: ignore[no-untyped-def]
+    """End of a record whose opcode, content or length is wrong, where something else tells it, else −1."""
+    end = _end(data, at, stop)
+    if end >= 0 and (end == stop or _fits(data, end, stop) >= 0):
+        return end
+    for text in (0, 3, 4):
+        if at + 49 + text > stop or _number(data, at + 37, 4) != np.uint64(text):
+            continue
+        packed = _number(data, at + 41 + text, 8)
+        if packed and packed <= np.uint64(stop - at - 49 - text):
+            end = np.int64(at + 49 + text) + np.int64(packed)
+            if end < stop and _fits(data, end, stop) >= 0:
+                return end
+    return np.int64(-1)
+
+
+@njit(cache=True)
+def _named(data, at, named):  # type: ignore[no-untyped-def]
+    """Whether the record is no message, or one of a channel that is named."""
+    return data[at] != MESSAGE or named[np.int64(_number(data, at + 9, 2))] > 0
+
+
+@njit(cache=True)
+def _resume(data, at, stop, named):  # type: ignore[no-untyped-def]
+    """First place from which three records follow one another, or fewer up to the end; −1 where there is none."""
+    for p in range(at, stop - 8):
+        op = data[p]
+        if op == 0 or op > DATA_END or data[p + 8] or data[p + 7] or data[p + 6]:
+            continue
+        q, links = np.int64(p), 0
+        while links < 3 and q != stop:
+            end = _fits(data, q, stop)
+            if end < 0 or not _named(data, q, named):
+                break
+            if data[q] == FOOTER:
+                links = 3 if end - q == 29 and end + 8 == stop else -1
+                break
+            q = end
+            links += 1
+        if links == 3 or (q == stop and links > 0):
+            return np.int64(p)
+    return np.int64(-1)
+
+
+@njit(cache=True)
+def scan_walk(data, at, stop, named, rows, counts, bounds, state):  # type: ignore[no-untyped-def]
+    """Fill rows until they are full or the bytes end; `state` keeps where the last lookahead ended.
+
+    counts, bounds: messages per channel outside chunks, and the lowest and highest log stamp of them.
+    """
+    n = 0
+    end, flag = state[0], state[1]
+    if end == 0:
+        end, flag = _fits(data, at, stop), SOUND
+        if end < 0:
+            end, flag = _mended(data, at, stop), MENDED
+    while at < stop and n + 3 <= len(rows):
+        if end < 0:
+            again = _resume(data, at + 1, stop, named)
+            if again < 0:
+                again = stop
+            rows[n, 0], rows[n, 1], rows[n, 2], rows[n, 3] = HOLE, at, again, 0
+            n += 1
+            at = again
+            end, flag = (_fits(data, at, stop), SOUND) if at < stop else (np.int64(-1), SOUND)
+            continue
+        op = np.int64(data[at])
+        if op == CHANNEL and end - at >= 11:
+            named[np.int64(_number(data, at + 9, 2))] = 1
+        ended = op == FOOTER and flag == SOUND
+        after, after_flag = np.int64(-1), SOUND
+        if end < stop and not ended:
+            after = _fits(data, end, stop)
+            if after < 0:
+                after, after_flag = _mended(data, end, stop), MENDED
+            if after < 0 and not (op == CHUNK and flag == SOUND):
+                again = _resume(data, at + 1, stop, named)
+                if 0 <= again < end:  # its length leads past a record: it cannot be believed
+                    rows[n, 0], rows[n, 1], rows[n, 2], rows[n, 3] = HOLE, at, again, 0
+                    n += 1
+                    at = again
+                    end, flag = _fits(data, at, stop), SOUND
+                    continue
+        if (flag == MENDED or op > DATA_END) and op != CHUNK and _chunk_fits(data, at, end):
+            op, flag = np.int64(CHUNK), MENDED
+        if op == MESSAGE and flag == SOUND:
+            channel = np.int64(_number(data, at + 9, 2))
+            counts[channel] += 1
+            stamp = np.int64(_number(data, at + 15, 8))
+            if stamp >= 0:
+                bounds[0], bounds[1] = min(bounds[0], stamp), max(bounds[1], stamp)
+            if n and rows[n - 1, 0] == MESSAGE and rows[n - 1, 2] == at:
+                rows[n - 1, 2] = end
+                rows[n - 1, 3] += 1
+                n -= 1
+            else:
+                rows[n, 0], rows[n, 1], rows[n, 2], rows[n, 3] = op, at, end, 1
+        else:
+            if op == MESSAGE:
+                op = np.int64(SHORT + MESSAGE)
+            rows[n, 0], rows[n, 1], rows[n, 2], rows[n, 3] = op, at, end, flag
+        n += 1
+        at, end, flag = end, after, after_flag
+        if ended:
+            break
+    state[0], state[1] = end, flag
+    return n, at
+
+
+@njit(cache=True)
+def scan_census(data, at, stop, most, counts, touched, names, bounds):  # type: ignore[no-untyped-def]
+    """Count messages per channel over sound records, at most `most`; note channels met and name records."""
+    n, met, named, other = 0, 0, 0, 0
+    while at + 9 <= stop and n < most:
+        length = _number(data, at + 1, 8)
+        op = data[at]
+        if length > np.uint64(stop - at - 9) or op == 0:
+            break
+        if op == MESSAGE and length >= np.uint64(MESSAGE_HEAD):
+            channel = np.int64(_number(data, at + 9, 2))
+            if counts[channel] == 0:
+                touched[met] = channel
+                met += 1
+            counts[channel] += 1
+            n += 1
+            stamp = np.int64(_number(data, at + 15, 8))
+            if stamp >= 0:
+                bounds[0], bounds[1] = min(bounds[0], stamp), max(bounds[1], stamp)
+        elif op in (SCHEMA, CHANNEL):
+            if named < len(names):
+                names[named, 0], names[named, 1], names[named, 2] = op, at + 9, np.int64(length)
+            named += 1
+        else:
+            other += 1
+        at += 9 + np.int64(length)
+    return n, met, named, other, at
+
+
+@njit(cache=True)
+def scan_collect(data, at, stop, slot, first, last, body, size, log, publish):  # type: ignore[no-untyped-def]
+    """Place messages of wanted channels (slot ≥ 0) that lie in the window, grouped by channel."""
+    while at + 9 <= stop:
+        length = np.int64(_number(data, at + 1, 8))
+        if data[at] == MESSAGE and length >= MESSAGE_HEAD:
+            channel = np.int64(_number(data, at + 9, 2))
+            k = slot[channel]
+            if k >= 0:
+                stamp = np.int64(_number(data, at + 15, 8))
+                if first <= stamp <= last:
+                    body[k], size[k] = at + 9 + MESSAGE_HEAD, length - MESSAGE_HEAD
+                    log[k], publish[k] = stamp, np.int64(_number(data, at + 23, 8))
+                    slot[channel] = k + 1
+        at += 9 + length
+
+
+@njit(cache=True)
+def scan_chunk_heads(data, rows, out):  # type: ignore[no-untyped-def]
+    """First and last stamp of each chunk."""
+    for i in range(len(rows)):
+        at = rows[i, 1]
+        for k in range(2):
+            out[i, k] = np.int64(_number(data, at + 9 + 8 * k, 8))
+
+
+@njit(cache=True)
+def scan_index_heads(data, rows, out):  # type: ignore[no-untyped-def]
+    """Channel and number of entries of each message index."""
+    for i in range(len(rows)):
+        at = rows[i, 1]
+        out[i, 0] = np.int64(_number(data, at + 9, 2))
+        out[i, 1] = np.int64(_number(data, at + 11, 4)) // 16
+
+
+@njit(cache=True)
+def scan_chunk_indexes(data, rows, out, pairs):  # type: ignore[no-untyped-def]
+    """Fields of chunk index records, and (chunk, channel, offset) of their message indexes; returns their number."""
+    n = 0
+    for i in range(len(rows)):
+        at = rows[i, 1] + 9
+        for k in range(4):
+            out[i, k] = np.int64(_number(data, at + 8 * k, 8))
+        size = np.int64(_number(data, at + 32, 4)) // 10
+        for j in range(size):
+            if n < len(pairs):
+                p = at + 36 + 10 * j
+                pairs[n, 0], pairs[n, 1] = i, np.int64(_number(data, p, 2))
+                pairs[n, 2] = np.int64(_number(data, p + 2, 8))
+            n += 1
+        p = at + 36 + np.int64(_number(data, at + 32, 4))
+        out[i, 4] = np.int64(_number(data, p, 8))
+        text = np.int64(_number(data, p + 8, 4))
+        out[i, 5] = np.int64(_number(data, p + 12 + text, 8))
+        out[i, 6] = np.int64(_number(data, p + 20 + text, 8))
+    return n

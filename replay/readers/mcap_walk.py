@@ -1,0 +1,177 @@
+"""Walking all records of an MCAP file, and holding what was found against its summary."""
+
+from __future__ import annotations
+
+import zlib
+
+import numpy as np
+from numpy.typing import NDArray
+
+from replay.rawlog import AttachmentInfo
+from replay.readers import mcap_format as fmt
+from replay.readers import mcap_scan as scan
+from replay.readers.mcap_file import McapFile
+from replay.readers.mcap_records import BAD_RECORD, DataEnd, Header, Metadata, parse
+from replay.readers.mcap_summary import Summary, read_summary, summary_from
+
+
+def walk_file(file: McapFile) -> None:
+    """Walk the whole file, where that was not yet done, and hold what was found against the summary."""
+    if file.walked:
+        return
+    data, file.walked = file.data, True
+    file.attachments, file.metadata_count = [], 0
+    found = scan.walk(data, len(fmt.MAGIC), len(data), file.names.named.copy(), file.loose)
+    rows = found.rows
+    closed = bool(len(rows)) and rows[-1, 0] == fmt.FOOTER
+    if closed and file.summary is None:
+        file.summary = read_summary(data, int(rows[-1, 1]))
+        if file.summary is not None:
+            take_listed_names(file, file.summary)
+    _say_ending(file, rows, closed)
+    ends = np.flatnonzero(rows[:, 0] == fmt.DATA_END)
+    inside = rows
+    if file.summary is not None:
+        inside = rows[rows[:, 1] < file.summary.start]
+    elif len(ends):
+        inside, behind = rows[: ends[-1] + 1], rows[ends[-1] + 1 :]
+        if len(behind) and not closed:
+            place = int(behind[0, 1]), int(behind[-1, 2])
+            file.summary = summary_from(data, behind[behind[:, 3] == fmt.SOUND], place, False, False)
+            take_listed_names(file, file.summary)
+    if file.summary is not None and closed and not file.summary.sound:
+        file.lost("summary", "its summary is damaged (checksum or records); topics and counts may be wrong")
+    _take_rows(file, inside, closed)
+    if not closed:
+        _find_cut(file, inside)
+    _index_chunks(file, inside)
+
+
+def _say_ending(file: McapFile, rows: NDArray[np.int64], closed: bool) -> None:
+    if closed:
+        end = int(rows[-1, 2])
+        rest = file.data[end:]
+        if rest.tobytes() != fmt.MAGIC:
+            extra = len(rest) - len(fmt.MAGIC)
+            text = f"{extra} bytes follow its end at byte {end + len(fmt.MAGIC)}; they were left out"
+            if extra <= 0 or rest[: len(fmt.MAGIC)].tobytes() != fmt.MAGIC:
+                text = f"its closing bytes after byte {end} are damaged or missing"
+            file.lost("ending", text)
+        return
+    last = int(rows[-1, 1]) if len(rows) and rows[-1, 0] == fmt.HOLE else len(file.data)
+    where = "after the data" if (rows[:, 0] == fmt.DATA_END).any() else "while data were written"
+    file.report.lost(
+        f"{file.path.name} ends without a footer ({where}): {len(file.data) - last} bytes after byte {last} "
+        "hold no complete record and were left out"
+    )
+
+
+def _take_rows(file: McapFile, rows: NDArray[np.int64], closed: bool) -> None:
+    op = rows[:, 0]
+    file.runs = [(a, b) for a, b in rows[op == fmt.MESSAGE][:, 1:3].tolist()]
+    chunk = rows[op == fmt.CHUNK]
+    file.chunks = np.concatenate((chunk[:, 1:3], scan.chunk_times(file.data, chunk)), axis=1)
+    for _, start, _, _ in chunk[chunk[:, 3] == fmt.MENDED].tolist():
+        file.lost("mended", f"the opcode or a length of the chunk at byte {start} was damaged; its content told it")
+    plain = ~np.isin(op, (fmt.MESSAGE, fmt.CHUNK, fmt.MESSAGE_INDEX))
+    for code, start, stop, _ in rows[plain].tolist():
+        if code == fmt.HOLE:
+            if closed or stop < len(file.data):
+                file.lost("bytes", f"bytes {start} to {stop} hold no complete record and were left out")
+        elif code > fmt.DATA_END:
+            file.unknown.append((code, start))
+        elif code in (fmt.SCHEMA, fmt.CHANNEL):
+            file.names.take(code, file.data[start + 9 : stop].tobytes(), False, f"at byte {start}")
+        else:
+            take_record(file, code, start, stop)
+    flawed = rows[(op == fmt.MESSAGE_INDEX) & (rows[:, 3] == fmt.MENDED)]
+    for start in flawed[:, 1].tolist():
+        file.lost("index", f"the message index at byte {start} is damaged")
+
+
+def take_record(file: McapFile, op: int, start: int, stop: int) -> None:
+    """Take one of the few records beside messages and their indexes."""
+    try:
+        if op == fmt.ATTACHMENT:
+            _take_attachment(file, start, stop)
+            return
+        record = parse(op, file.data[start + 9 : stop].tobytes())
+    except BAD_RECORD as error:
+        file.lost("record", f"record at byte {start} is damaged ({type(error).__name__})")
+        return
+    if isinstance(record, Header):
+        file.metadata.update(profile=record.profile, library=record.library)
+    elif isinstance(record, Metadata):
+        file.metadata_count += 1
+        file.metadata.update({f"{record.name}.{k}": v for k, v in record.metadata.items()})
+    elif isinstance(record, DataEnd):
+        file.data_end = (start, record.data_section_crc)
+
+
+def _take_attachment(file: McapFile, start: int, stop: int) -> None:
+    """Take an attachment's head and check its content where it stands, whatever its size."""
+    data, body = file.data, start + 9
+    log, created = (int.from_bytes(data[body + k : body + k + 8].tobytes(), "little") for k in (0, 8))
+    texts, at = [], body + 16
+    for _ in range(2):
+        size = int.from_bytes(data[at : at + 4].tobytes(), "little")
+        if at + 4 + size + 12 > stop:
+            raise ValueError("a part reaches beyond its record")
+        texts.append(data[at + 4 : at + 4 + size].tobytes().decode())
+        at += 4 + size
+    size = int.from_bytes(data[at : at + 8].tobytes(), "little")
+    if at + 12 + size > stop:
+        raise ValueError("its content reaches beyond its record")
+    stated = int.from_bytes(data[at + 8 + size : at + 12 + size].tobytes(), "little")
+    state = "none" if not stated else "right" if zlib.crc32(data[body : at + 8 + size].data) == stated else "wrong"
+    if state == "wrong":
+        file.lost("attachment", f"the checksum of the attachment {texts[0][:80]!r} at byte {start} differs")
+    file.attachments.append(AttachmentInfo(texts[0], texts[1], size, log, created, state))
+
+
+def _find_cut(file: McapFile, rows: NDArray[np.int64]) -> None:
+    """Take the chunk that the end of the file cuts off, if one does."""
+    if not len(rows) or rows[-1, 0] != fmt.HOLE or rows[-1, 2] != len(file.data):
+        return
+    start = int(rows[-1, 1])
+    if file.data[start] == fmt.CHUNK and len(file.data) - start > 49:
+        file.cut = start
+        times = scan.chunk_times(file.data, rows[-1:])
+        file.chunks = np.concatenate((file.chunks, np.concatenate((rows[-1:, 1:3], times), axis=1)))
+
+
+def _index_chunks(file: McapFile, rows: NDArray[np.int64]) -> None:
+    """Give each message index to the chunk before it, and hold chunks and indexes against the summary."""
+    found = rows[(rows[:, 0] == fmt.MESSAGE_INDEX) & (rows[:, 3] == fmt.SOUND)]
+    owner = np.searchsorted(file.chunks[:, 0], found[:, 1]) - 1
+    file.indexes = np.concatenate((owner[:, None], scan.index_counts(file.data, found)), axis=1)[owner >= 0]
+    summary = file.summary
+    if summary is None or not summary.sound or not len(summary.chunks):
+        return
+    listed = listed_chunks(summary)
+    for start, stop in listed[~np.isin(listed[:, 0], file.chunks[:, 0])][:, :2].tolist():
+        file.lost("index", f"the index lists a chunk at byte {start} (to {stop}), where none was found")
+    for start in file.chunks[~np.isin(file.chunks[:, 0], listed[:, 0])][:, 0].tolist():
+        file.lost("index", f"the index does not list the chunk at byte {start}; it was read all the same")
+    if (listed[1:, 0] < listed[:-1, 1]).any():
+        file.lost("index", "the index lists chunks that overlap; each was read once")
+    mine, theirs = np.isin(file.chunks[:, 0], listed[:, 0]), np.isin(listed[:, 0], file.chunks[:, 0])
+    if mine.sum() == theirs.sum():
+        differ = (file.chunks[mine] != listed[theirs]).any(axis=1)
+        for start in file.chunks[mine][differ][:, 0].tolist():
+            file.lost("index", f"the index and the chunk at byte {start} disagree about its length or stamps")
+    places = np.sort(summary.indexes[:, 2])
+    if len(places) and not np.array_equal(places, found[owner >= 0][:, 1]):
+        file.lost("index", "the summary and the message indexes in the file disagree about where these lie")
+
+
+def take_listed_names(file: McapFile, summary: Summary) -> None:
+    """Take the schemas and channels that the summary repeats."""
+    for op, raw, at in summary.names:
+        file.names.take(op, raw, summary.checked, f"in the summary at byte {at}")
+
+
+def listed_chunks(summary: Summary) -> NDArray[np.int64]:
+    """Start, end, first and last stamp of the listed chunks."""
+    first, last, start, length = summary.chunks[:, :4].T
+    return np.stack((start, start + length, first, last), axis=1)
