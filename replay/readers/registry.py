@@ -9,9 +9,10 @@ from replay.errors import LogError
 from replay.rawlog import Clock, LogSummary, RawLog, Window
 from replay.readers.base import Reader
 from replay.readers.mcap import McapReader
+from replay.readers.parquet_table import ParquetReader
 from replay.readers.ros1_bag import Ros1BagReader
 from replay.readers.rosbag2 import Rosbag2Reader
-from replay.readers.table import CsvReader, ParquetReader
+from replay.readers.table import CsvReader
 from replay.readers.twincat_csv import TwincatCsvReader
 from replay.sources import SourceOptions
 

@@ -1,83 +1,179 @@
-"""Text of a table file: gzip or not, in the encodings that exports use."""
+"""Bytes of a text table: plain or packed, in the encodings that exports use, block by block."""
 
 from __future__ import annotations
 
+import codecs
+import re
 import zlib
+from collections.abc import Iterator
 from pathlib import Path
+from typing import IO
+
+import pyarrow as pa
 
 from replay.errors import LogError
 from replay.readers.clocks import Report
 
-GZIP = b"\x1f\x8b"
-MAX_TEXT = 4 << 30
+GZIP, ZSTD = b"\x1f\x8b", b"\x28\xb5\x2f\xfd"
+MAX_EXPANDED = 32 << 30
+BLOCK = 4 << 20
 _PIECE = 1 << 20
+_ZEROS = re.compile(rb"\0{16,}")
 
 
 def first_text(path: Path, size: int = 65_536) -> str:
     """Return the beginning of a text file, or an empty string where it is not text."""
     try:
-        with path.open("rb") as file:
-            head = file.read(size)
-        if head.startswith(GZIP):
-            head = zlib.decompressobj(31).decompress(head, size)
-    except (OSError, zlib.error):
+        raw = TextFile(path, Report()).head(size)
+    except LogError:
         return ""
-    text = _decoded(head)[0]
+    text = decoded(raw)
     odd = sum(c < " " and c not in "\t\r\n\f" for c in text[:4096])
     return "" if odd else text
 
 
-def read_text(path: Path, report: Report) -> str:
-    """Return a whole text file; every line ends in a line feed.
-
-    Raises
-    ------
-    LogError
-        Where the file cannot be opened, is empty or larger than `MAX_TEXT`.
-    """
+def decoded(raw: bytes) -> str:
+    """Return text of UTF-8 bytes, or else of Windows-1252; a letter cut in two at the end is left out."""
     try:
-        with path.open("rb") as file:
-            packed = file.read(2) == GZIP
-        raw = _unzip(path, report) if packed else path.read_bytes()
-    except OSError as error:
-        raise LogError(f"{path} cannot be read: {error.strerror or error}") from error
-    if len(raw) > MAX_TEXT:
-        raise LogError(f"{path} holds more than {MAX_TEXT >> 30} GiB of text; split it or export fewer channels")
-    text, encoding = _decoded(raw)
-    if encoding == "cp1252":
-        report.note(f"{path.name} is not UTF-8; it was read as Windows-1252, so some letters may be wrong")
-    return text.replace("\r\n", "\n").replace("\r", "\n")
+        return raw.decode("utf-8")
+    except UnicodeDecodeError as error:
+        if error.end >= len(raw) - 3 and error.reason == "unexpected end of data":
+            return raw[: error.start].decode("utf-8")
+        return raw.decode("cp1252", "replace")
 
 
-def _unzip(path: Path, report: Report) -> bytes:
-    """Expand as far as the file is whole, members one after the other."""
-    pieces: list[bytes] = []
-    size, member = 0, zlib.decompressobj(31)
-    trouble = ""
-    with path.open("rb") as file:
+class TextFile:
+    """A text file whose bytes come in blocks, expanded, as UTF-8 (or Windows-1252) without a byte-order mark.
+
+    Parameters
+    ----------
+    path : Path
+        The file; gzip and zstd are expanded, UTF-16 is turned into UTF-8.
+    report : Report
+        Takes what is lost, and a note on the encoding.
+    """
+
+    def __init__(self, path: Path, report: Report) -> None:
+        self.path, self.report = path, report
+        first = next(self._expanded(Report(), 4096), b"")
+        self.packed = self._packed
+        self._codec = {b"\xff\xfe": "utf-16-le", b"\xfe\xff": "utf-16-be"}.get(first[:2], "")
+        self._skip = 2 if self._codec else 3 if first.startswith(codecs.BOM_UTF8) else 0
+        self.recoded = bool(self._codec)
+        self._bare_returns = b"\r" in first and b"\n" not in first and not self._codec
+
+    def head(self, size: int) -> bytes:
+        """Return the first bytes, at least `size` where the file has so many; nothing of it is reported."""
+        parts, held = [], 0
+        for block in self._clean(Report(), min(size, BLOCK)):
+            parts.append(block)
+            held += len(block)
+            if held >= size:
+                break
+        return b"".join(parts)
+
+    def quiet(self, skip: int) -> Iterator[bytes]:
+        """Yield the bytes behind the first `skip`; nothing of them is reported."""
+        for block in self._clean(Report(), BLOCK):
+            piece = block[skip:]
+            skip = max(skip - len(block), 0)
+            if piece:
+                yield piece
+
+    def position_after(self, size: int) -> int:
+        """Return how many bytes of a gzip file its first `size` bytes of text take."""
+        member, taken, held = zlib.decompressobj(31), 0, 0
+        with self.path.open("rb") as file:
+            while held < size and (piece := file.read(1 << 16)):
+                held += len(member.decompress(piece))
+                taken += len(piece)
+        return taken
+
+    def blocks(self, skip: int = 0) -> Iterator[bytes]:
+        """Yield the bytes behind the first `skip`; zeros of blocks that were never written are told and taken out.
+
+        Raises
+        ------
+        LogError
+            Where the file cannot be opened or expands beyond all measure.
+        """
+        at = zeros = 0
+        for block in self._clean(self.report, BLOCK):
+            size = len(block)
+            piece = block[max(skip - at, 0) :] if at < skip else block
+            at += size
+            if b"\0" * 16 in piece:
+                short = _ZEROS.sub(b"\0", piece)
+                zeros += len(piece) - len(short)
+                piece = short
+            if piece:
+                yield piece
+        if zeros:
+            self.report.lost(
+                f"{self.path.name}: {zeros} bytes are zero where text was expected; the recorder reserved them or lost "
+                "power before it wrote them"
+            )
+
+    def _clean(self, report: Report, size: int) -> Iterator[bytes]:
+        """Blocks without byte-order mark, as UTF-8, with line feeds."""
+        decoder = codecs.getincrementaldecoder(self._codec)("replace") if self._codec else None
+        skip = self._skip
+        for raw in self._expanded(report, size):
+            block, skip = raw[skip:], 0
+            if decoder is not None:
+                block = decoder.decode(block).encode("utf-8", "replace")
+            yield block.replace(b"\r", b"\n") if self._bare_returns else block
+
+    def _expanded(self, report: Report, size: int) -> Iterator[bytes]:
+        try:
+            with self.path.open("rb") as file:
+                magic = file.read(4)
+                file.seek(0)
+                self._packed = "gzip" if magic.startswith(GZIP) else "zstd" if magic == ZSTD else ""
+                if not self._packed:
+                    while block := file.read(size):
+                        yield block
+                    return
+                total = 0
+                unpack = self._unzip if self._packed == "gzip" else self._unzstd
+                for block in unpack(file, report):
+                    total += len(block)
+                    if total > MAX_EXPANDED:
+                        raise LogError(
+                            f"{self.path} expands to more than {MAX_EXPANDED >> 30} GiB of text; expand and split it"
+                        )
+                    yield block
+        except OSError as error:
+            raise LogError(f"{self.path} cannot be read: {error.strerror or error}") from error
+
+    def _unzip(self, file: IO[bytes], report: Report) -> Iterator[bytes]:
+        """Expand as far as the file is whole, members one after the other."""
+        size, member, trouble = 0, zlib.decompressobj(31), ""
         left = file.read(_PIECE)
-        while left and size <= MAX_TEXT and not trouble:
+        while left:
             try:
                 piece = member.decompress(left, _PIECE)
             except zlib.error:
                 trouble = "damaged"
                 break
-            pieces.append(piece)
             size += len(piece)
+            if piece:
+                yield piece
             left = (member.unused_data if member.eof else member.unconsumed_tail) or file.read(_PIECE)
             if member.eof and left:
+                if not left.startswith(GZIP[: len(left)]):
+                    trouble = "" if not left.strip(b"\0") else "followed by something else"
+                    break
                 member = zlib.decompressobj(31)
-    if not member.eof or trouble:
-        report.lost(f"{path.name}: its gzip data are {trouble or 'cut off'} after {size} bytes of text")
-    return b"".join(pieces)
+        if not member.eof or trouble:
+            report.lost(f"{self.path.name}: its gzip data are {trouble or 'cut off'} after {size} bytes of text")
 
-
-def _decoded(raw: bytes) -> tuple[str, str]:
-    if raw.startswith((b"\xff\xfe", b"\xfe\xff")):
-        return raw.decode("utf-16", "replace"), "utf-16"
-    try:
-        return raw.decode("utf-8-sig"), "utf-8"
-    except UnicodeDecodeError as error:
-        if error.end >= len(raw) - 3 and error.reason == "unexpected end of data":
-            return raw[: error.start].decode("utf-8-sig"), "utf-8"
-        return raw.decode("cp1252", "replace"), "cp1252"
+    def _unzstd(self, file: IO[bytes], report: Report) -> Iterator[bytes]:
+        size = 0
+        try:
+            with pa.CompressedInputStream(pa.PythonFile(file, "r"), "zstd") as stream:
+                while piece := stream.read(_PIECE):
+                    size += len(piece)
+                    yield piece
+        except (OSError, pa.ArrowException) as error:
+            report.lost(f"{self.path.name}: its zstd data are damaged or cut off after {size} bytes of text ({error})")

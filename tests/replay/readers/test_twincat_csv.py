@@ -151,7 +151,7 @@ def test_a_symbol_shown_twice_and_a_comment_of_several_lines(target: Path) -> No
     lines[7] = "SymbolComment\tfirst\n\n2 lines\tzweite\tSymbolComment\t"
     log = read(write(target, lines, newline="\n"))
     assert log.channels["MAIN.fbWheel[1].fVelocity"].values.tolist() == [1.5, 1.75, 2.0, 2.25]
-    assert log.channels["Druck Öl ²"].values.tolist() == [100, 101]
+    assert log.channels["MAIN.fbWheel[1].fVelocity (0,2 ms)"].values.tolist() == [100, 101]
 
 
 def test_a_trigger_table_before_the_data(target: Path) -> None:
