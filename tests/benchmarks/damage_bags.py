@@ -116,7 +116,7 @@ def peer(path: Path, kind: str) -> int:
         if kind == "db3":
             with Reader2(path.parent) as reader:
                 for connection, _, raw in reader.messages():
-                    if connection.topic == "/speed" and len(raw) == 12:
+                    if connection.topic == "/speed" and len(raw) == 12 and raw[:4] == b"\0\1\0\0":
                         values.append(float(np.frombuffer(raw[4:], "<f8")[0]))
         else:
             with Reader1(path) as old:
