@@ -13,8 +13,13 @@ from replay.rawlog import Channel, Clock, LogSummary, RawLog
 from replay.readers import cdr, jsonmsg, protobuf
 from replay.readers.clocks import Clocks, Report
 from replay.readers.definitions import DefinitionError, MessageType, resolve
+from replay.readers.growing import Cells, Store
+from replay.readers.layout import MAX_ELEMENTS
+from replay.readers.program import Spec
 from replay.readers.protobuf_schema import Schema, schema_of
+from replay.spill import in_blocks
 
+MEMORY = 512 << 20
 _SLOW_SHARE = 0.2
 
 
@@ -88,54 +93,86 @@ class Block:
 
 @dataclass
 class _Topic:
-    """Columns of one topic and type, gathered block by block."""
+    """Columns of one topic and type, gathered batch by batch."""
 
     connection: Connection
+    store: Store
+    stamps: Store
     stamp: str | None = None
-    count: int = 0
-    log: list[NDArray[np.int64]] = field(default_factory=list)
-    publish: list[NDArray[np.int64]] = field(default_factory=list)
-    order: list[NDArray[np.int64]] = field(default_factory=list)
-    columns: dict[str, list[tuple[NDArray[np.int64], NDArray[Any]]]] = field(default_factory=dict)
-    skipped: set[str] = field(default_factory=set)
     outcome: cdr.Outcome = field(default_factory=cdr.Outcome)
+    known: set[Connection] = field(default_factory=set)
     decoders: dict[Connection, cdr.Decoder] = field(default_factory=dict)
     walkers: dict[Connection, protobuf.Decoder] = field(default_factory=dict)
     mute: str = ""
 
-    def add(self, block: Block, serial: int) -> None:
+    def add(self, blocks: list[Block], publish: bool) -> None:
+        """Decode the blocks of one buffer as one batch, in the order of their places."""
+        for connection in {b.connection for b in blocks} - self.known:
+            self.known.add(connection)
+            self.mute = self.mute or connection.why_not()
         if self.mute:
             return
-        first, n = self.count, len(block.starts)
-        self.mute = block.connection.why_not()
-        if self.mute:
+        slots = _slots(blocks)
+        count = sum(len(b.starts) for b in blocks)
+        self.store.begin(count)
+        for block, slot in zip(blocks, slots, strict=True):
+            self._decode(block, slot)
+        self.store.end()
+        self._keep_stamps(blocks, slots, count, publish)
+
+    def _decode(self, block: Block, slots: NDArray[np.int64] | None) -> None:
+        connection, places = block.connection, (block.data, block.starts, block.lengths)
+        if connection.encoding in ("json", "protobuf"):
+            for part in self._parts(connection, places):
+                self.store.add(part if slots is None else replace(part, rows=slots[part.rows]))
             return
-        if block.connection.encoding == "json":
-            stamp, parts = jsonmsg.decode(block.data, block.starts, block.lengths, self.outcome)
+        decoder = self.decoders.get(connection)
+        if decoder is None:
+            kind = connection.message_type()
+            self.stamp = kind.stamp
+            decoder = self.decoders[connection] = cdr.Decoder(kind, self.outcome, self.store)
+        decoder.decode(*places, slots)
+
+    def _parts(
+        self, connection: Connection, places: tuple[NDArray[np.uint8], NDArray[np.int64], NDArray[np.int64]]
+    ) -> Iterable[cdr.Part]:
+        if connection.encoding == "json":
+            stamp, parts = jsonmsg.decode(*places, self.outcome)
             self.stamp = stamp or self.stamp
-        elif block.connection.encoding == "protobuf":
-            walker = self.walkers.get(block.connection)
-            if walker is None:
-                schema = block.connection.protobuf_schema()
-                self.stamp = schema.stamp and schema.stamp[0]
-                walker = self.walkers[block.connection] = protobuf.Decoder(schema, self.outcome)
-            parts = list(walker.decode(block.data, block.starts, block.lengths))
-        else:
-            decoder = self.decoders.get(block.connection)
-            if decoder is None:
-                kind = block.connection.message_type()
-                self.stamp = kind.stamp
-                decoder = self.decoders[block.connection] = cdr.Decoder(kind, self.outcome)
-            parts = list(decoder.decode(block.data, block.starts, block.lengths))
-        for part in parts:
-            self.skipped.update(part.skipped)
-            rows = part.rows + first
-            for path, values in part.columns.items():
-                self.columns.setdefault(path, []).append((rows, values))
-        self.count += n
-        self.log.append(block.log_ns)
-        self.publish.append(block.log_ns if block.publish_ns is None else block.publish_ns)
-        self.order.append(block.starts + (serial << 40))
+            return parts
+        walker = self.walkers.get(connection)
+        if walker is None:
+            schema = connection.protobuf_schema()
+            self.stamp = schema.stamp and schema.stamp[0]
+            walker = self.walkers[connection] = protobuf.Decoder(schema, self.outcome)
+        return walker.decode(*places)
+
+    def _keep_stamps(
+        self, blocks: list[Block], slots: list[NDArray[np.int64] | None], count: int, publish: bool
+    ) -> None:
+        """Copy the container's stamps; publish stamps only where they are asked for."""
+        table = self.stamps.table([Spec("log", "i8"), Spec("publish", "i8")] if publish else [Spec("log", "i8")])
+        self.stamps.begin(count)
+        at = self.stamps.room(table)
+        cells = table.grid.cells[3].view(np.int64)[:, at : at + count]
+        for block, slot in zip(blocks, slots, strict=True):
+            where = slice(None) if slot is None else slot
+            cells[0, where] = block.log_ns
+            if publish:
+                cells[1, where] = block.log_ns if block.publish_ns is None else block.publish_ns
+        self.stamps.owner[:] = table.number
+        self.stamps.end()
+
+
+def _slots(blocks: list[Block]) -> list[NDArray[np.int64] | None]:
+    """Rows of a batch that each block's messages are; None where a block is the whole batch in order."""
+    starts = [b.starts for b in blocks]
+    if len(blocks) == 1 and np.all(starts[0][1:] >= starts[0][:-1]):
+        return [None]
+    order = np.argsort(np.concatenate(starts), kind="stable")
+    rank = np.empty(len(order), np.int64)
+    rank[order] = np.arange(len(order))
+    return list(np.split(rank, np.cumsum([len(s) for s in starts])[:-1]))
 
 
 class Assembler:
@@ -144,22 +181,43 @@ class Assembler:
     def __init__(self, clock: Clock, report: Report) -> None:
         self.clock, self.report = clock, report
         self.topics: dict[tuple[str, str], _Topic] = {}
-        self.serial = 0
+        self.expected: dict[tuple[str, str], int] = {}
         self.clocks = Clocks(clock, report)
 
-    def add(self, blocks: Iterable[Block]) -> None:
-        """Decode blocks; `starts` order messages within one call of one buffer."""
-        for block in blocks:
-            key = (block.connection.topic, block.connection.type_name)
-            topic = self.topics.setdefault(key, _Topic(block.connection))
-            topic.add(_within_range(block, self.report), self.serial)
-        self.serial += 1
+    def expect(self, connection: Connection, count: int) -> None:
+        """Foretell how many messages of a connection will come, which spares memory and time; it need not be true."""
+        key = connection.topic, connection.type_name
+        self.expected[key] = self.expected.get(key, 0) + count
+
+    def add(self, arrived: Iterable[Block]) -> None:
+        """Decode blocks; `starts` order messages within one call of one buffer, and nothing keeps the buffer."""
+        batches: dict[tuple[str, str], list[Block]] = {}
+        for block in arrived:
+            batches.setdefault((block.connection.topic, block.connection.type_name), []).append(block)
+        for key, batch in batches.items():
+            topic = self.topics.get(key)
+            if topic is None:
+                count = self.expected.get(key, 0)
+                topic = self.topics[key] = _Topic(batch[0].connection, Store(count), Store(count))
+            topic.add([_within_range(b, self.report) for b in batch], self.clock == "publish")
+        self._spill()
+
+    def _spill(self) -> None:
+        """Send the largest topics to temporary files once all together are too large for memory."""
+        held = {key: t.store.held + t.stamps.held for key, t in self.topics.items()}
+        total = sum(held.values())
+        while total > MEMORY:
+            largest = max(held, key=lambda key: held[key])
+            self.topics[largest].store.spill()
+            self.topics[largest].stamps.spill()
+            total -= held.pop(largest)
 
     def finish(self, summary: LogSummary) -> RawLog:
         """Build the channels and complete the summary's notes and damage."""
         channels: dict[str, Channel] = {}
         seen: set[str] = set()
-        for (name, type_name), topic in self.topics.items():
+        for name, type_name in list(self.topics):
+            topic = self.topics.pop((name, type_name))
             label = name
             if name in seen:
                 label = f"{name} ({type_name})"
@@ -176,50 +234,66 @@ class Assembler:
         return RawLog(summary.source, summary.format, self.clock, channels, summary)
 
     def _channels(self, label: str, topic: _Topic) -> Iterable[Channel]:
+        count = topic.store.count
+        columns = topic.store.finish()
         self._say(label, topic)
-        if topic.mute or not topic.count:
+        if topic.mute or not count:
             return
-        log, order = np.concatenate(topic.log), np.concatenate(topic.order)
-        rank = None if np.all(order[1:] > order[:-1]) else np.argsort(np.argsort(order, kind="stable"))
-        columns = {path: _join(parts, rank) for path, parts in topic.columns.items()}
-        publish = np.concatenate(topic.publish)
-        if rank is not None:
-            log, publish = (a[np.argsort(rank)] for a in (log, publish))
-        header = _take_header(topic.stamp, columns, len(log), topic.outcome.bad)
-        stamps = self.clocks.stamps(label, header, log, publish)
+        own = topic.stamps.finish()
+        log = own["log"][1]
+        header = _take_header(topic.stamp, columns, count, topic.outcome.bad)
+        stamps = self.clocks.stamps(label, header, log, own["publish"][1] if "publish" in own else log)
+        shared: dict[int, tuple[NDArray[np.int64], NDArray[np.int64]]] = {}
         for path, (rows, values) in columns.items():
-            yield Channel(
-                f"{label}.{path}", label, path, stamps if len(rows) == len(stamps) else stamps[rows], values, None,
-                topic.connection.type_name,
-            )  # fmt: skip
+            at = stamps
+            if rows is not None:
+                if id(rows) not in shared:
+                    shared[id(rows)] = rows, stamps[rows]
+                at = shared[id(rows)][1]
+            yield Channel(f"{label}.{path}", label, path, at, values, None, topic.connection.type_name)
 
     def _say(self, label: str, topic: _Topic) -> None:
-        report, outcome = self.report, topic.outcome
+        report, outcome, skipped = self.report, topic.outcome, sorted(topic.store.skipped)
         if topic.mute:
             report.note(f"{label} is not decoded: {topic.mute}")
         for walker in topic.walkers.values():
             for text in walker.schema.notes:
                 report.note(f"{label}: {text}")
-        if topic.skipped:
-            report.note(f"{label}: left out arrays of more than 64 elements: {', '.join(sorted(topic.skipped)[:5])}")
+        if skipped:
+            more = f" and {len(skipped) - 5} more" if len(skipped) > 5 else ""
+            report.note(
+                f"{label}: left out arrays of more than {MAX_ELEMENTS} elements: {', '.join(skipped[:5])}{more}"
+            )
         if outcome.bad:
-            text = f"{label}: {outcome.bad} of {topic.count} messages cannot be decoded: {outcome.reason}"
-            guessed = not topic.connection.definition and outcome.bad == topic.count
+            text = f"{label}: {outcome.bad} of {topic.store.count} messages cannot be decoded: {outcome.reason}"
+            guessed = not topic.connection.definition and outcome.bad == topic.store.count
             (report.note if guessed else report.lost)(text)
-        if outcome.slow > _SLOW_SHARE * max(topic.count, 1):
-            report.note(f"{label}: {outcome.slow} of {topic.count} messages change their layout; decoded one by one")
+        if outcome.slow > _SLOW_SHARE * max(topic.store.count, 1):
+            report.note(
+                f"{label}: {outcome.slow} of {topic.store.count} messages change their names; decoded one by one"
+            )
 
 
 def _take_header(
-    path: str | None, columns: dict[str, tuple[NDArray[np.int64], NDArray[Any]]], count: int, bad: int
+    path: str | None, columns: dict[str, Cells], count: int, bad: int
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]] | None:
     """Take the header stamp out of the columns: rows that should have one, and stamps of all rows [ns], 0 for none."""
     sec, nsec = (columns.pop(f"{path}.{part}", None) for part in ("sec", "nanosec"))
-    if sec is None or nsec is None or len(sec[0]) != len(nsec[0]):
+    if sec is None or nsec is None or len(sec[1]) != len(nsec[1]):
         return None
-    header = np.zeros(count, np.int64)
-    header[sec[0]] = sec[1].astype(np.int64) * 1_000_000_000 + nsec[1].astype(np.int64)
-    return sec[0] if len(sec[0]) >= count - bad else np.arange(count), header
+    whole = in_blocks(_nanoseconds, sec[1], nsec[1])
+    if sec[0] is not None:
+        header = np.zeros(count, np.int64)
+        header[sec[0]] = whole
+        return sec[0] if len(whole) >= count - bad else np.arange(count), header
+    return np.arange(count), whole if whole.all() else np.array(whole)  # zeros are filled in later, never in a map
+
+
+def _nanoseconds(sec: NDArray[Any], nanosec: NDArray[Any]) -> NDArray[np.int64]:
+    stamps = sec.astype(np.int64)
+    stamps *= 1_000_000_000
+    stamps += nanosec.astype(np.int64)
+    return stamps
 
 
 def _within_range(block: Block, report: Report) -> Block:
@@ -233,17 +307,3 @@ def _within_range(block: Block, report: Report) -> Block:
     return replace(
         block, starts=block.starts[keep], lengths=block.lengths[keep], log_ns=block.log_ns[keep], publish_ns=publish
     )
-
-
-def _join(
-    parts: list[tuple[NDArray[np.int64], NDArray[Any]]], rank: NDArray[np.int64] | None
-) -> tuple[NDArray[np.int64], NDArray[Any]]:
-    """Rows in recorded order and their values."""
-    rows = np.concatenate([r for r, _ in parts]) if len(parts) > 1 else parts[0][0]
-    values = np.concatenate([v for _, v in parts]) if len(parts) > 1 else parts[0][1]
-    if rank is not None:
-        rows = rank[rows]
-    if np.all(rows[1:] > rows[:-1]):
-        return rows, values
-    order = np.argsort(rows, kind="stable")
-    return rows[order], values[order]

@@ -1,43 +1,31 @@
 """Columnar decoding of serialised messages (CDR of both byte orders, ROS 1).
 
-One payload is walked; every payload that agrees with it in length and in all bytes that fix the layout is then
-decoded by strided views. What remains starts the next round, up to a limit; the rest is decoded message by message.
+One payload is walked; every payload that agrees with it in length and in all bytes that fix the layout is then copied
+into columns by a compiled loop. Where layouts hardly repeat, for strings and sequences change their lengths, a compiled
+program walks over each payload. What is left after many shapes is decoded message by message.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from replay.readers.definitions import MessageType
-from replay.readers.layout import Layout, LayoutError, layout_of
+from replay.readers.growing import FREE, Part, Store
+from replay.readers.layout import MAX_ELEMENTS, Layout, LayoutError, Place, layout_of, width_of
+from replay.readers.program import Compiler, Program, Spec, TooWide
 
-MAX_ROUNDS = 24
+__all__ = ["Decoder", "Outcome", "Part"]
+
+MAX_LAYOUTS = 6
+MAX_PROGRAMS = 64
 GIVE_UP = 500
-_ROW_BYTES = 8192
-
-
-@dataclass(frozen=True)
-class Part:
-    """Numbers of some rows that share one layout.
-
-    Attributes
-    ----------
-    rows : NDArray[np.int64], shape (m,)
-        Row numbers, increasing.
-    columns : Mapping[str, NDArray], each of shape (m,)
-        Values by field path.
-    skipped : tuple[str, ...]
-        Arrays too long to become channels.
-    """
-
-    rows: NDArray[np.int64]
-    columns: Mapping[str, NDArray[Any]]
-    skipped: tuple[str, ...]
+_WORTH = 0.25
+_SIZES = (1, 2, 4, 8)
+_BAD = -2
 
 
 @dataclass
@@ -49,6 +37,81 @@ class Outcome:
     slow: int = 0
 
 
+@dataclass(frozen=True)
+class Batch:
+    """Payloads of one connection: their bytes as numbers of every size, their places, and their rows in the batch."""
+
+    views: tuple[NDArray[Any], ...]
+    limit: int
+    starts: NDArray[np.int64]
+    lengths: NDArray[np.int64]
+    slots: NDArray[np.int64]
+
+    def payload(self, row: int) -> bytes:
+        """Copy one payload."""
+        start, size = int(self.starts[row]), int(self.lengths[row])
+        if start < 0 or size < 0 or start + size > self.limit:
+            return b""
+        raw: bytes = self.views[0][start : start + size].tobytes()
+        return raw
+
+
+class _Fixed:
+    """The layout of payloads whose bytes lie alike."""
+
+    def __init__(self, layout: Layout, store: Store) -> None:
+        self.layout, self.skipped = layout, layout.skipped
+        specs = [Spec(s.path, s.dtype) for s in layout.slots]
+        self.table = store.table(specs)
+        self.check_at, self.check_mask, self.check_word = layout.words()
+        self.swap = layout.dialect.order == ">"
+        self.columns: list[NDArray[np.int64]] = []
+        for size in _SIZES:
+            mine = [(slot.offset, spec) for slot, spec in zip(layout.slots, specs, strict=True) if slot.size == size]
+            self.columns += [
+                np.array([at for at, _ in mine], np.int64),
+                np.array([self.table.place[spec] for _, spec in mine], np.int64),
+            ]
+
+    def take(self, batch: Batch, store: Store) -> tuple[int, int]:
+        """Decode the rows that fit; return how many, and the first that nobody owns or −1."""
+        from replay.readers.kernels import take_fixed
+
+        first = store.room(self.table)
+        taken, left = take_fixed(
+            *batch.views, batch.limit, batch.starts, batch.lengths, batch.slots, store.owner, self.table.number,
+            self.layout.size, self.swap, self.check_at, self.check_mask, self.check_word, *self.columns,
+            *self.table.grid.cells, first,
+        )  # fmt: skip
+        return int(taken), int(left)
+
+
+class _Walked:
+    """A program for payloads whose strings and sequences have any length."""
+
+    def __init__(self, program: Program, skipped: tuple[str, ...], store: Store) -> None:
+        self.program, self.skipped = program, skipped
+        self.table = store.table(program.specs)
+        self.swap = program.dialect.order == ">"
+        self.head = np.frombuffer(program.dialect.head, np.uint8)
+        self.places = np.array([self.table.place[s] for s in program.specs], np.int64)
+        self.hidden = np.array([i for i, s in enumerate(program.specs) if s.dtype == "#"], np.int64)
+
+    def take(self, batch: Batch, store: Store) -> tuple[int, int, int, int]:
+        """Decode the rows that fit; return how many fit, how many are damaged, the first left and the first damaged."""
+        from replay.readers.kernels import take_program
+
+        first = store.room(self.table)
+        program = self.program
+        taken, bad, left, first_bad = take_program(
+            *batch.views, batch.limit, batch.starts, batch.lengths, batch.slots, store.owner, self.table.number,
+            self.head, self.swap, program.dialect.align, program.dialect.slack, program.ops, program.names,
+            self.places, self.hidden, *self.table.grid.cells, first,
+        )  # fmt: skip
+        return int(taken), int(bad), int(left), int(first_bad)
+
+
+@dataclass
 class Decoder:
     """Decodes payloads of one message type; remembers the layouts it has met.
 
@@ -58,117 +121,138 @@ class Decoder:
         The type of all payloads.
     outcome : Outcome
         Counts of undecodable and slowly decoded messages, added to.
+    store : Store
+        Takes the numbers; the caller begins and ends its batches.
     """
 
-    def __init__(self, kind: MessageType, outcome: Outcome) -> None:
-        self.kind, self.outcome = kind, outcome
-        self.met: dict[int, list[Layout]] = {}
+    kind: MessageType
+    outcome: Outcome
+    store: Store
+    fixed: list[_Fixed] = field(default_factory=list)
+    walked: list[_Walked] = field(default_factory=list)
+    room: dict[Place, int] = field(default_factory=dict)
+    tried: int = 0
 
-    def decode(self, data: NDArray[np.uint8], starts: NDArray[np.int64], lengths: NDArray[np.int64]) -> Iterator[Part]:
-        """Decode payloads into columns.
+    def decode(
+        self,
+        data: NDArray[np.uint8],
+        starts: NDArray[np.int64],
+        lengths: NDArray[np.int64],
+        slots: NDArray[np.int64] | None = None,
+    ) -> None:
+        """Decode payloads into the store's batch.
 
         Parameters
         ----------
         data : NDArray[np.uint8], shape (b,)
-            Bytes that hold all payloads.
+            Bytes that hold all payloads; nothing keeps them.
         starts, lengths : NDArray[np.int64], shape (n,)
             Place of each payload in `data`.
-
-        Yields
-        ------
-        Part
-            Every decodable row stands in exactly one part.
+        slots : NDArray[np.int64], shape (n,) or None
+            Rows of the batch that they are; None: the first to the last.
         """
-        for size in np.unique(lengths):
-            left = np.flatnonzero(lengths == size)
-            met = self.met.setdefault(int(size), [])
-            for layout in met:
-                left, part = _take(layout, data, starts, left)
-                if part is not None:
-                    yield part
-            while len(left) and len(met) < MAX_ROUNDS and not self._hopeless():
-                new = self._walk(data, int(starts[left[0]]), int(size))
-                if new is None:
-                    left = left[1:]
-                    continue
-                met.append(new)
-                left, part = _take(new, data, starts, left)
-                if part is not None:
-                    yield part
-            if self._hopeless():
-                self.outcome.bad += len(left)
-                continue
-            for row in left:  # slow fallback: layouts that hardly repeat
-                single = self._walk(data, int(starts[row]), int(size))
-                if single is not None:
-                    self.outcome.slow += 1
-                    part = _take(single, data, starts, np.array([row]))[1]
-                    if part is not None:
-                        yield part
+        from replay.readers.kernels import views
+
+        slots = np.arange(len(starts)) if slots is None else slots
+        batch = Batch(
+            views(data), len(data), np.ascontiguousarray(starts, np.int64), np.ascontiguousarray(lengths, np.int64),
+            np.ascontiguousarray(slots, np.int64),
+        )  # fmt: skip
+        left = 0 if len(starts) else -1
+        for fixed in self.fixed:
+            left = self._fixed(fixed, batch)[1] if left >= 0 else left
+        for walked in self.walked:
+            left = self._walked(walked, batch)[1] if left >= 0 else left
+        while left >= 0 and not self._hopeless():
+            left = self._learn(batch, left)
+        if left >= 0:
+            rest = self.store.owner[batch.slots] == FREE
+            self.outcome.bad += int(np.count_nonzero(rest))
+            self.store.owner[batch.slots[rest]] = _BAD
 
     def _hopeless(self) -> bool:
         """Whether so many payloads failed and none fitted that the definition is not theirs."""
-        return self.outcome.bad >= GIVE_UP and not any(self.met.values())
+        return self.outcome.bad >= GIVE_UP and not self.fixed and not self.walked
 
-    def _walk(self, data: NDArray[np.uint8], start: int, size: int) -> Layout | None:
+    def _fixed(self, plan: _Fixed, batch: Batch) -> tuple[int, int]:
+        taken, left = plan.take(batch, self.store)
+        if taken:
+            self.store.skipped.update(plan.skipped)
+        return taken, left
+
+    def _walked(self, plan: _Walked, batch: Batch) -> tuple[int, int]:
+        taken, bad, left, first_bad = plan.take(batch, self.store)
+        if taken:
+            self.store.skipped.update(plan.skipped)
+        if bad:
+            self.outcome.bad += bad
+            if not self.outcome.reason:
+                self.outcome.reason = self._why(batch.payload(first_bad))
+        return taken, left
+
+    def _why(self, payload: bytes) -> str:
         try:
-            return layout_of(self.kind, data[start : start + size].tobytes())
+            layout_of(self.kind, payload)
+        except LayoutError as error:
+            return str(error)
+        return "a message has too many parts"
+
+    def _learn(self, batch: Batch, row: int) -> int:
+        """Learn the layout of one payload and decode what is like it; return the first row left, or −1."""
+        try:
+            payload = batch.payload(row)
+            layout = layout_of(self.kind, payload)
         except LayoutError as error:
             self.outcome.bad += 1
             self.outcome.reason = self.outcome.reason or str(error)
-            return None
+            self.store.owner[batch.slots[row]] = _BAD
+            return self._next(batch, row)
+        for place, count in layout.counts.items():
+            if count <= MAX_ELEMENTS:
+                site = tuple(p for p in place if isinstance(p, str))
+                self.room[site] = max(self.room.get(site, 0), 1 << (count - 1).bit_length() if count else 0)
+        waiting = int(np.count_nonzero(self.store.owner[batch.slots] == FREE))
+        left = row
+        if self.tried < MAX_LAYOUTS and layout.size >= 8:
+            self.tried += 1
+            plan = _Fixed(layout, self.store)
+            taken, left = self._fixed(plan, batch)
+            if taken >= _WORTH * waiting:
+                self.fixed.append(plan)
+                return left
+            if left < 0:
+                return left
+        return self._program(layout, payload, batch, row, left)
 
+    def _program(self, layout: Layout, payload: bytes, batch: Batch, row: int, left: int) -> int:
+        """Compile a program for a payload's shape and decode what follows it."""
+        try:
+            program = Compiler(self.kind, layout, self.room).run() if len(self.walked) < MAX_PROGRAMS else None
+        except TooWide:
+            program = None
+        if program is not None:
+            self.walked = [w for w in self.walked if w.program.shape != program.shape]
+            plan = _Walked(program, layout.skipped, self.store)
+            self.walked.insert(0, plan)
+            left = self._walked(plan, batch)[1]
+        if self.store.owner[batch.slots[row]] == FREE:  # slow fallback: shapes that hardly repeat
+            self._single(layout, payload, int(batch.slots[row]))
+            self.store.owner[batch.slots[row]] = _BAD
+            return self._next(batch, row)
+        return left
 
-def _take(
-    layout: Layout, data: NDArray[np.uint8], starts: NDArray[np.int64], rows: NDArray[np.int64]
-) -> tuple[NDArray[np.int64], Part | None]:
-    """Decode the rows that fit a layout; return the others."""
-    if not len(rows):
-        return rows, None
-    fits, columns = _extract(layout, data, starts[rows])
-    part = Part(rows[fits], columns, layout.skipped) if fits.any() and (columns or layout.skipped) else None
-    return rows[~fits], part
+    def _single(self, layout: Layout, payload: bytes, slot: int) -> None:
+        self.outcome.slow += 1
+        columns = {}
+        for s in layout.slots:
+            order = "" if width_of(s.dtype) == 1 else layout.dialect.order
+            value = np.frombuffer(payload, f"{order}{s.dtype}".replace("?", "u1"), 1, s.offset)
+            columns[s.path] = value.astype(value.dtype.newbyteorder("="))
+            if s.dtype == "?":
+                columns[s.path] = np.minimum(columns[s.path], 1)
+        self.store.add(Part(np.array([slot]), columns, layout.skipped))
 
-
-def _extract(
-    layout: Layout, data: NDArray[np.uint8], starts: NDArray[np.int64]
-) -> tuple[NDArray[np.bool_], dict[str, NDArray[Any]]]:
-    """Rows that fit the layout, and their columns."""
-    span, fixed = layout.span, layout.fixed
-    if not span:
-        return np.ones(len(starts), np.bool_), {}
-    if span > _ROW_BYTES:
-        return _extract_far(layout, data, starts)
-    rows = _gather(data, starts, 0, span).view(np.uint8).reshape(len(starts), span)
-    fits: NDArray[np.bool_] = (rows[:, fixed[0]] == fixed[1]).all(axis=1)
-    if not fits.all():
-        rows = rows[fits]
-    return fits, {s.path: _native(rows[:, s.offset : s.offset + s.dtype.itemsize], s.dtype) for s in layout.slots}
-
-
-def _extract_far(
-    layout: Layout, data: NDArray[np.uint8], starts: NDArray[np.int64]
-) -> tuple[NDArray[np.bool_], dict[str, NDArray[Any]]]:
-    """Do the same cell by cell, for long payloads of which few bytes are wanted."""
-    fits = np.ones(len(starts), np.bool_)
-    for offset, content in layout.checks:
-        if content:
-            cells = _gather(data, starts, offset, len(content)).view(np.uint8).reshape(len(starts), -1)
-            fits &= (cells == np.frombuffer(content, np.uint8)).all(axis=1)
-    kept = starts[fits]
-    sizes = ((s, s.dtype.itemsize) for s in layout.slots)
-    return fits, {
-        s.path: _native(_gather(data, kept, s.offset, n).view(np.uint8).reshape(-1, n), s.dtype) for s, n in sizes
-    }
-
-
-def _native(cells: NDArray[np.uint8], dtype: np.dtype[Any]) -> NDArray[Any]:
-    """Bytes of shape (n, size) as n numbers in this machine's byte order."""
-    values = np.ascontiguousarray(cells).view(dtype).reshape(-1)
-    return values.astype(dtype.newbyteorder("="), copy=False)
-
-
-def _gather(data: NDArray[np.uint8], starts: NDArray[np.int64], offset: int, size: int) -> NDArray[Any]:
-    """Copy `size` bytes from each start + offset."""
-    windows: NDArray[Any] = np.ndarray((len(data) - size + 1,), f"V{size}", data, strides=(1,))
-    return windows[starts + offset]
+    def _next(self, batch: Batch, row: int) -> int:
+        """Return the first row behind `row` that nobody owns, or −1."""
+        rest = np.flatnonzero(self.store.owner[batch.slots[row + 1 :]] == FREE)
+        return row + 1 + int(rest[0]) if len(rest) else -1

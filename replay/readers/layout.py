@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import re
 import struct
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +19,7 @@ MAX_ELEMENTS = 64
 MAX_STEPS = 50_000
 
 _DTYPES = {
-    "bool": "u1",
+    "bool": "?",
     "byte": "u1",
     "octet": "u1",
     "char": "u1",
@@ -33,8 +34,12 @@ _DTYPES = {
     "uint64": "u8",
     "float64": "f8",
 }
-_KEYS = re.compile(r"(^|_)(names?|joints?|labels?|symbols?|keys?)$|Names?$|Symbols?$", re.ASCII)
-_PLACEHOLDER = "structure_needs_at_least_one_member"
+KEYS = re.compile(r"(^|_)(names?|joints?|labels?|symbols?|keys?)$|Names?$|Symbols?$", re.ASCII)
+PLACEHOLDER = "structure_needs_at_least_one_member"
+
+
+Field: TypeAlias = tuple[Any, Any]
+Place: TypeAlias = tuple[str | int, ...]
 
 
 class LayoutError(Exception):
@@ -42,12 +47,78 @@ class LayoutError(Exception):
 
 
 @dataclass(frozen=True)
+class Dialect:
+    """A serialisation.
+
+    Attributes
+    ----------
+    head : bytes
+        First bytes of every payload; none in ROS 1.
+    order : str
+        Byte order as NumPy writes it.
+    align : int
+        Largest alignment, counted from behind the four bytes of the encapsulation; 0 where nothing is aligned.
+    boxed : bool
+        Whether collections of strings and messages start with their size in bytes (XCDR2).
+    slack : int
+        Padding that may follow the last field [bytes].
+    """
+
+    head: bytes
+    order: str
+    align: int
+    boxed: bool
+    slack: int
+
+    @property
+    def base(self) -> int:
+        """Where the first field stands."""
+        return 4 if self.head else 0
+
+
+ROS1 = Dialect(b"", "<", 0, False, 0)
+# encapsulations of plain CDR (XCDR1) and plain CDR2 (XCDR2); what their types' definitions do not tell is not here
+_CDR = {
+    b"\0\0": Dialect(b"\0\0", ">", 8, False, 3),
+    b"\0\1": Dialect(b"\0\1", "<", 8, False, 3),
+    b"\0\6": Dialect(b"\0\6", ">", 4, True, 3),
+    b"\0\7": Dialect(b"\0\7", "<", 4, True, 3),
+}
+
+
+def dialect_of(payload: bytes, ros1: bool) -> Dialect:
+    """Tell a payload's serialisation.
+
+    Raises
+    ------
+    LayoutError
+        Where it is none that can be decoded.
+    """
+    if ros1:
+        return ROS1
+    if len(payload) < 4:
+        raise LayoutError(f"a payload of {len(payload)} bytes has no encapsulation header")
+    found = _CDR.get(payload[:2])
+    if found is None:
+        raise LayoutError(
+            f"encapsulation {payload[:2].hex()} is not plain CDR (0000, 0001) or plain CDR2 (0006, 0007); record with "
+            "final types, as ROS 2 does"
+        )
+    return found
+
+
+@dataclass(frozen=True)
 class Slot:
-    """One number in a payload: its path, byte offset and type."""
+    """One number in a payload: its path, byte offset and type (``?`` for truth values)."""
 
     path: str
     offset: int
-    dtype: np.dtype[Any]
+    dtype: str
+
+    @property
+    def size(self) -> int:
+        """Bytes that it takes."""
+        return width_of(self.dtype)
 
 
 @dataclass(frozen=True)
@@ -61,47 +132,73 @@ class Layout:
     slots : tuple[Slot, ...]
         Numbers in message order.
     checks : tuple[tuple[int, bytes], ...]
-        Offset and content of what fixes the layout: encapsulation, length words, names that serve as keys.
+        Offset and content of what fixes the layout: encapsulation, length words, ends of strings, names that serve as
+        keys.
     skipped : tuple[str, ...]
         Arrays too long to become channels.
+    dialect : Dialect
+        Serialisation.
+    counts : Mapping[Place, int]
+        Length of every sequence.
+    names : Mapping[Place, tuple[bytes, ...]]
+        Raw strings of every array of names that may key others.
     """
 
     size: int
     slots: tuple[Slot, ...]
     checks: tuple[tuple[int, bytes], ...]
     skipped: tuple[str, ...]
+    dialect: Dialect
+    counts: Mapping[Place, int]
+    names: Mapping[Place, tuple[bytes, ...]]
 
     @cached_property
-    def span(self) -> int:
-        """Bytes from the start that hold every slot and check."""
-        ends = [s.offset + s.dtype.itemsize for s in self.slots] + [o + len(b) for o, b in self.checks]
-        return max(ends, default=0)
+    def naming(self) -> frozenset[Place]:
+        """Messages that hold an array of names."""
+        return frozenset(place[:-1] for place in self.names)
 
-    @cached_property
-    def fixed(self) -> tuple[NDArray[np.int64], NDArray[np.uint8]]:
-        """Offset and value of every checked byte."""
-        at = [np.arange(o, o + len(b)) for o, b in self.checks]
-        value = b"".join(b for _, b in self.checks)
-        return np.concatenate(at) if at else np.empty(0, np.int64), np.frombuffer(value, np.uint8)
+    def words(self) -> tuple[NDArray[np.int64], NDArray[np.uint64], NDArray[np.uint64]]:
+        """Offset, mask and content of words of eight bytes that hold every checked byte of a payload of eight or more.
+
+        Returns
+        -------
+        tuple[NDArray[np.int64], NDArray[np.uint64], NDArray[np.uint64]], each of shape (k,)
+            Words lie inside the payload; bytes outside the checks are masked.
+        """
+        whole, mask = np.zeros(self.size, np.uint8), np.zeros(self.size, np.uint8)
+        for at, content in self.checks:
+            whole[at : at + len(content)] = np.frombuffer(content, np.uint8)
+            mask[at : at + len(content)] = 255
+        at_words = np.minimum(np.unique(np.flatnonzero(mask) // 8) * 8, self.size - 8)
+        cells = at_words[:, None] + np.arange(8)
+        masks, words = (np.ascontiguousarray(a[cells]).view(np.uint64)[:, 0] for a in (mask, whole))
+        return at_words, masks, words
 
 
 @dataclass
-class _Scope:
+class Scope:
     """Arrays of names inside one message, which key the arrays beside them."""
 
-    parent: _Scope | None
+    parent: Scope | None
     keys: list[tuple[bool, list[str]]] = field(default_factory=list)
+
+    def add(self, fixed: bool, raw: tuple[bytes, ...]) -> None:
+        """Take an array of names; `fixed` where its length is part of the definition."""
+        self.keys.append((fixed, [r.rstrip(b"\0").decode("utf-8", "replace").strip() for r in raw]))
 
 
 @dataclass(frozen=True)
-class _Index:
+class Index:
+    """One element of an array; arrays of one length and kind share names."""
+
     number: int
     length: int
     fixed: bool
-    scope: _Scope
+    scope: Scope
 
     def label(self) -> str:
-        scope: _Scope | None = self.scope
+        """Return the element's name in brackets, or its number where none names it."""
+        scope: Scope | None = self.scope
         while scope is not None:
             for fixed, names in scope.keys:
                 if fixed == self.fixed and len(names) == self.length and len(set(names)) == len(names) and all(names):
@@ -110,7 +207,7 @@ class _Index:
         return f"[{self.number}]"
 
 
-_Path = tuple[str | _Index, ...]
+Path: TypeAlias = tuple[str | Index, ...]
 
 
 class _Walk:
@@ -119,31 +216,29 @@ class _Walk:
     def __init__(self, kind: MessageType, data: bytes) -> None:
         self.kind, self.data, self.end = kind, data, len(data)
         self.checks: list[tuple[int, bytes]] = []
-        self.slots: list[tuple[_Path, int, str]] = []
-        self.skipped: list[_Path] = []
-        self.order, self.base, self.steps = "<", 0, 0
-        if not kind.ros1:
-            if self.end < 4:
-                raise LayoutError(f"a payload of {self.end} bytes has no encapsulation header")
-            if data[0] != 0 or data[1] > 1:
-                raise LayoutError(f"encapsulation {data[0]:02x}{data[1]:02x} is not plain CDR")
-            self.order, self.base = "<" if data[1] else ">", 4
-            self.checks.append((0, data[:2]))
-        self.pos = self.base
+        self.slots: list[tuple[Path, int, str]] = []
+        self.skipped: list[Path] = []
+        self.counts: dict[Place, int] = {}
+        self.names: dict[Place, tuple[bytes, ...]] = {}
+        self.steps = 0
+        self.dialect = dialect_of(data, kind.ros1)
+        self.base = self.pos = self.dialect.base
+        if self.dialect.head:
+            self.checks.append((0, self.dialect.head))
 
     def run(self) -> Layout:
         self.message((), self.kind.name, None, True)
-        slack = 0 if self.kind.ros1 else 3
-        if self.end - self.pos > slack:
+        if self.end - self.pos > self.dialect.slack:
             raise LayoutError(f"{self.end - self.pos} bytes follow the last field; the definition does not fit")
-        slots = tuple(Slot(_text(p), o, np.dtype(self.order + t)) for p, o, t in self.slots)
-        return Layout(self.end, slots, tuple(self.checks), tuple(_text(p) for p in self.skipped))
+        slots = tuple(Slot(text_of(p), o, t) for p, o, t in self.slots)
+        skipped = tuple(text_of(p) for p in self.skipped)
+        return Layout(self.end, slots, tuple(self.checks), skipped, self.dialect, self.counts, self.names)
 
     def take(self, size: int, align: int) -> int:
         """Reserve `size` bytes, aligned in CDR, and return where they start."""
         self.step()
-        at = self.pos
-        if not self.kind.ros1:
+        at, align = self.pos, min(align, self.dialect.align)
+        if align:
             at = self.base + (at - self.base + align - 1) // align * align
         if at + size > self.end:
             raise LayoutError(f"a payload of {self.end} bytes ends inside a field at byte {at}")
@@ -159,18 +254,23 @@ class _Walk:
     def word(self) -> int:
         at = self.take(4, 4)
         self.checks.append((at, self.data[at : at + 4]))
-        value: int = struct.unpack_from(f"{self.order}I", self.data, at)[0]
+        value: int = struct.unpack_from(f"{self.dialect.order}I", self.data, at)[0]
         return value
 
     def string(self) -> tuple[int, int]:
         length = self.word()
-        return self.take(length, 1), length
+        at = self.take(length, 1)
+        if self.dialect.head:
+            if not length or self.data[self.pos - 1]:
+                raise LayoutError(f"the string at byte {at} does not end with a zero byte")
+            self.checks.append((self.pos - 1, b"\0"))
+        return at, length
 
-    def message(self, path: _Path, name: str, parent: _Scope | None, emit: bool) -> None:
+    def message(self, path: Path, name: str, parent: Scope | None, emit: bool) -> None:
         self.step()
         if len(path) > 2 * MAX_DEPTH:
             raise LayoutError("messages are nested too deep")
-        scope = _Scope(parent)
+        scope = Scope(parent)
         fields = self.kind.fields[name]
         if self.kind.ros1 and name == TIME:
             self.number((*path, "sec"), "u4", emit)
@@ -179,68 +279,113 @@ class _Walk:
         if not fields and not self.kind.ros1:
             self.take(1, 1)
         for label, (kind, value) in fields:
-            if label == _PLACEHOLDER:
+            if label == PLACEHOLDER:
                 if not self.kind.ros1:
                     self.take(1, 1)
             elif kind in (Nodetype.ARRAY, Nodetype.SEQUENCE):
+                stop = self.box(value[0])
                 self.array((*path, label), value[0], value[1], kind == Nodetype.ARRAY, scope, emit)
+                if stop is not None and stop != self.pos:
+                    raise LayoutError(f"the collection at byte {stop} is of another size than stated")
             else:
                 self.one((*path, label), (kind, value), scope, emit)
 
-    def one(self, path: _Path, kind: Any, scope: _Scope, emit: bool) -> None:
+    def box(self, kind: Field) -> int | None:
+        """Read the size of a collection where the serialisation states it, and return where it ends."""
+        if not self.dialect.boxed or is_number(kind):
+            return None
+        size = self.word()
+        return self.pos + size
+
+    def one(self, path: Path, kind: Field, scope: Scope, emit: bool) -> None:
         if kind[0] == Nodetype.NAME:
             self.message(path, kind[1], scope, emit)
         elif kind[1][0] == "string":
             self.string()
         else:
-            self.number(path, _dtype(kind[1][0]), emit)
+            self.number(path, type_of(kind[1][0]), emit)
 
-    def number(self, path: _Path, dtype: str, emit: bool) -> None:
-        size = int(dtype[1])
+    def number(self, path: Path, dtype: str, emit: bool) -> None:
+        size = width_of(dtype)
         at = self.take(size, size)
         if emit:
             self.slots.append((path, at, dtype))
 
-    def array(self, path: _Path, kind: Any, count: int, fixed: bool, scope: _Scope, emit: bool) -> None:
+    def array(self, path: Path, kind: Field, count: int, fixed: bool, scope: Scope, emit: bool) -> None:
         if not fixed:
-            count = self.word()
+            count = self.counts[place_of(path)] = self.word()
         if kind[0] == Nodetype.BASE and kind[1][0] == "string":
-            self.strings(str(path[-1]), count, fixed, scope)
+            self.strings(path, count, fixed, scope)
             return
         wanted = emit and count <= MAX_ELEMENTS
         if emit and not wanted:
             self.skipped.append(path)
         if kind[0] == Nodetype.BASE:
-            dtype = _dtype(kind[1][0])
-            size = int(dtype[1])
+            dtype = type_of(kind[1][0])
+            size = width_of(dtype)
             at = self.take(size * count, size) if count else self.pos
             if wanted:
-                self.slots += [((*path, _Index(i, count, fixed, scope)), at + size * i, dtype) for i in range(count)]
+                self.slots += [((*path, Index(i, count, fixed, scope)), at + size * i, dtype) for i in range(count)]
             return
-        for i in range(count):
-            self.message((*path, _Index(i, count, fixed, scope)), kind[1], scope, wanted)
+        plain = count > MAX_ELEMENTS and self.plain(kind[1])
+        met: dict[int, tuple[int, int]] = {}
+        i = 0
+        while i < count:
+            self.message((*path, Index(i, count, fixed, scope)), kind[1], scope, wanted)
+            i += 1
+            if plain:  # elements of one size: their pattern repeats once an alignment has come back
+                before = met.setdefault((self.pos - self.base) % 8, (i, self.pos))
+                if before[0] < i:
+                    laps = (count - i) // (i - before[0])
+                    self.take(laps * (self.pos - before[1]), 1)
+                    i += laps * (i - before[0])
+                    plain = False
 
-    def strings(self, label: str, count: int, fixed: bool, scope: _Scope) -> None:
-        keys = _KEYS.search(label) is not None and count <= MAX_ELEMENTS
+    def plain(self, name: str) -> bool:
+        """Whether a message holds numbers alone."""
+        return all(
+            self.plain(value) if kind == Nodetype.NAME else is_number((kind, value))
+            for _, (kind, value) in self.kind.fields[name]
+        )
+
+    def strings(self, path: Path, count: int, fixed: bool, scope: Scope) -> None:
+        keys = KEYS.search(str(path[-1])) is not None and count <= MAX_ELEMENTS
         names = []
         for _ in range(count):
             at, length = self.string()
             if keys:
-                raw = self.data[at : at + length]
-                self.checks.append((at, raw))
-                names.append(raw.rstrip(b"\0").decode("utf-8", "replace").strip())
+                names.append(self.data[at : at + length])
+                self.checks.append((at, names[-1]))
         if names:
-            scope.keys.append((fixed, names))
+            self.names[place_of(path)] = tuple(names)
+            scope.add(fixed, tuple(names))
 
 
-def _dtype(name: str) -> str:
+def is_number(kind: Field) -> bool:
+    """Whether a field is one number."""
+    return bool(kind[0] == Nodetype.BASE and kind[1][0] != "string")
+
+
+def width_of(dtype: str) -> int:
+    """Bytes that a number type takes."""
+    return 1 if dtype == "?" else int(dtype[1])
+
+
+def type_of(name: str) -> str:
+    """Return the number type of a primitive; raises `LayoutError` for those that are none."""
     if name not in _DTYPES:
         raise LayoutError(f"fields of type {name} are not supported")
     return _DTYPES[name]
 
 
-def _text(path: _Path) -> str:
-    parts = [p.label() if isinstance(p, _Index) else f".{p}" for p in path]
+def place_of(path: Path) -> Place:
+    """Return a path with plain numbers."""
+    return tuple(p.number if isinstance(p, Index) else p for p in path)
+
+
+def text_of(path: Path) -> str:
+    """Return a path as users write it."""
+    parts = [p.label() if isinstance(p, Index) else f".{p}" for p in path]
     return "".join(parts).removeprefix(".")
 
 

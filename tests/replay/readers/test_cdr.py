@@ -11,8 +11,9 @@ from rosbags.interfaces import Nodetype
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from rosbags.typesys.store import Typestore
 
-from replay.readers.cdr import Decoder, Outcome
+from replay.readers.cdr import MAX_PROGRAMS, Decoder, Outcome
 from replay.readers.definitions import DefinitionError, resolve
+from replay.readers.growing import Store
 
 Flatten = Callable[..., dict[str, Any]]
 
@@ -21,13 +22,15 @@ def columns(kind: Any, payloads: list[bytes]) -> tuple[dict[str, dict[int, Any]]
     """Decode payloads into path → row → value."""
     data = np.frombuffer(b"".join(payloads) or b"\0", np.uint8)
     lengths = np.array([len(p) for p in payloads], np.int64)
-    outcome = Outcome()
+    outcome, store = Outcome(), Store()
+    store.begin(len(payloads))
+    Decoder(kind, outcome, store).decode(data, np.cumsum(lengths) - lengths, lengths)
+    store.end()
     found: dict[str, dict[int, Any]] = {}
-    for part in Decoder(kind, outcome).decode(data, np.cumsum(lengths) - lengths, lengths):
-        for path, values in part.columns.items():
-            for row, value in zip(part.rows.tolist(), values.tolist(), strict=True):
-                assert row not in found.setdefault(path, {})
-                found[path][row] = value
+    for path, (rows, values) in store.finish().items():
+        numbers = list(range(len(payloads))) if rows is None else rows.tolist()
+        assert numbers == sorted(set(numbers))
+        found[path] = dict(zip(numbers, values.tolist(), strict=True))
     return found, outcome
 
 
@@ -172,12 +175,17 @@ def test_names_of_the_outer_message_key_arrays_of_inner_messages() -> None:
 def test_integers_keep_their_type() -> None:
     kind = resolve("p/msg/U", "ros2msg", "uint64 u", False)
     data = np.frombuffer(b"\0\1\0\0" + (2**64 - 1).to_bytes(8, "little"), np.uint8)
-    (part,) = Decoder(kind, Outcome()).decode(data, np.array([0]), np.array([12]))
-    assert part.columns["u"].dtype == np.uint64
-    assert part.columns["u"][0] == 2**64 - 1
+    store = Store()
+    store.begin(1)
+    Decoder(kind, Outcome(), store).decode(data, np.array([0]), np.array([12]))
+    store.end()
+    rows, values = store.finish()["u"]
+    assert rows is None
+    assert values.dtype == np.uint64
+    assert values[0] == 2**64 - 1
 
 
-def test_layouts_that_never_repeat_are_decoded_one_by_one_and_counted() -> None:
+def test_strings_that_change_their_length_all_the_time_need_no_slow_way() -> None:
     kind = resolve("p/msg/S", "ros2msg", "string[] note\nfloat64 v", False)
     store = get_typestore(Stores.EMPTY)
     store.register(get_types_from_msg("string[] note\nfloat64 v", "p/msg/S"))
@@ -188,14 +196,26 @@ def test_layouts_that_never_repeat_are_decoded_one_by_one_and_counted() -> None:
         for i, (a, b) in enumerate(cuts)
     ]
     found, outcome = columns(kind, payloads)
-    assert found["v"] == {i: float(i) for i in range(len(cuts))}
+    assert found == {"v": {i: float(i) for i in range(len(cuts))}}
+    assert outcome.slow == 0
+
+
+def test_names_that_change_all_the_time_are_decoded_one_by_one_and_counted() -> None:
+    kind = resolve("p/msg/S", "ros2msg", "string[] name\nfloat64[] v", False)
+    store = get_typestore(Stores.EMPTY)
+    store.register(get_types_from_msg("string[] name\nfloat64[] v", "p/msg/S"))
+    make = store.types["p/msg/S"]
+    count = MAX_PROGRAMS + 10
+    payloads = [bytes(store.serialize_cdr(make([f"n{i:03}"], np.array([float(i)])), "p/msg/S")) for i in range(count)]
+    found, outcome = columns(kind, payloads)
+    assert found == {f"v[n{i:03}]": {i: float(i)} for i in range(count)}
     assert outcome.slow > 0
 
 
 def payload_errors() -> Iterator[tuple[str, bytes, str]]:
     yield "float64[] v", b"\0\1\0\0" + (5).to_bytes(4, "little"), "ends inside a field"
     yield "float64 v", b"\0\1\0\0" + bytes(16), "follow the last field"
-    yield "float64 v", b"\0\7\0\0" + bytes(8), "not plain CDR"
+    yield "float64 v", b"\0\3\0\0" + bytes(8), "not plain CDR"
     yield "float64 v", b"\0", "no encapsulation"
     yield "int8[] v", b"\0\1\0\0" + (2**32 - 1).to_bytes(4, "little"), "ends inside a field"
 

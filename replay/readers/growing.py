@@ -1,0 +1,315 @@
+"""Tables that grow while a log is read: numbers of one topic, in recorded order, in memory or in a temporary file.
+
+Decoders write whole batches into a table's open grid. What every message holds needs no row numbers. A grid that is
+full is kept as it is; grids are joined, each let go of in turn, when the log has ended, or sent to temporary files
+before that where they would outgrow memory.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from replay.readers.layout import MAX_ELEMENTS, width_of
+from replay.readers.program import Spec
+from replay.spill import Column
+
+FREE = -1
+_SIZES = (1, 2, 4, 8)
+_FEWEST_ROWS = 256
+_MOST_BYTES = 64 << 20
+
+Rows = NDArray[np.int64]
+Cells = tuple[Rows | None, NDArray[Any]]
+
+
+@dataclass(frozen=True)
+class Part:
+    """Numbers of some rows of a batch.
+
+    Attributes
+    ----------
+    rows : NDArray[np.int64], shape (m,)
+        Row numbers, increasing.
+    columns : Mapping[str, NDArray], each of shape (m,)
+        Values by field path.
+    skipped : tuple[str, ...]
+        Arrays too long to become channels.
+    """
+
+    rows: Rows
+    columns: Mapping[str, NDArray[Any]]
+    skipped: tuple[str, ...]
+
+
+def _stored(spec: Spec) -> str:
+    """Number type of a column in memory: truth values are bytes, hidden counts 32-bit."""
+    return {"#": "u4", "?": "u1"}.get(spec.dtype, spec.dtype)
+
+
+class _Spilled(Column):
+    """A column that goes to its file at once: many of them are long together, though none is alone."""
+
+    def append(self, values: NDArray[Any]) -> None:
+        """Add a block and write it."""
+        super().append(values)
+        self._flush()
+
+
+class Grid:
+    """Room for rows, grouped by the size of a number; shape (columns, rows) each."""
+
+    def __init__(self, counts: tuple[int, ...], rows: int) -> None:
+        self.rows = rows // 64 * 64 + 72 if rows else 0  # so that columns start in different cache sets
+        self.cells: tuple[NDArray[Any], ...] = tuple(
+            np.empty((n, self.rows if n else 0), f"u{size}") for n, size in zip(counts, _SIZES, strict=True)
+        )
+
+
+class Table:
+    """Columns that some or all messages of a topic fill together.
+
+    Parameters
+    ----------
+    number : int
+        Its number among the topic's tables.
+    specs : tuple[Spec, ...]
+        Its columns.
+    expected : int
+        How many rows are foretold; 0 where nothing is known.
+    """
+
+    def __init__(self, number: int, specs: tuple[Spec, ...], expected: int = 0) -> None:
+        self.number, self.specs, self.expected = number, specs, expected
+        widths = [width_of(_stored(s)) for s in specs]
+        self.counts = tuple(widths.count(size) for size in _SIZES)
+        seen = dict.fromkeys(_SIZES, -1)
+        self.place: dict[Spec, int] = {}
+        for spec, width in zip(specs, widths, strict=True):
+            seen[width] += 1
+            self.place[spec] = seen[width]
+        self.width = sum(widths)
+        self.grid = Grid(self.counts, 0)
+        self.used = self.count = 0
+        self.full: list[tuple[Grid, int]] = []
+        self.spilled: list[Column] | None = None
+        self.rows: Column | None = None
+
+    @property
+    def held(self) -> int:
+        """Bytes in memory."""
+        return self.width * (self.used + sum(n for _, n in self.full))
+
+    def open(self, rows: int) -> int:
+        """Make room for a batch, and return where in the grid it starts."""
+        if self.used + rows > self.grid.rows:
+            self._renew(rows)
+        return self.used
+
+    def _renew(self, rows: int) -> None:
+        self._keep()
+        most = _MOST_BYTES // max(self.width, 1)
+        guess = self.expected - self.count if self.expected > self.count else max(self.count // 2, _FEWEST_ROWS)
+        self.grid = Grid(self.counts, max(rows, min(guess, most)))
+
+    def _keep(self) -> None:
+        if self.used:
+            if self.spilled is None:
+                self.full.append((self.grid, self.used))
+            else:
+                self._spill(self.grid, self.used)
+        self.used = 0
+
+    def close(self, picked: Rows | None, rows: int, before: int) -> None:
+        """Take the rows of a batch that were written; those between move up.
+
+        Parameters
+        ----------
+        picked : NDArray[np.int64] or None
+            Rows of the batch, increasing; None for all.
+        rows : int
+            Rows of the batch.
+        before : int
+            Rows of the topic before the batch.
+        """
+        count = rows if picked is None else len(picked)
+        if picked is not None:
+            for cells in self.grid.cells:
+                if len(cells):
+                    cells[:, self.used : self.used + count] = cells[:, self.used + picked]
+        if self.rows is None and (picked is not None or before != self.count):
+            self.rows = Column(np.int64)
+            self.rows.append(np.arange(self.count))
+        if self.rows is not None:
+            self.rows.append(before + (np.arange(rows) if picked is None else picked))
+        self.used += count
+        self.count += count
+
+    def spill(self) -> None:
+        """Send everything to temporary files, and what comes later too."""
+        if self.spilled is None:
+            self.spilled = [_Spilled(_stored(s)) for s in self.specs]
+            for grid, used in self.full:
+                self._spill(grid, used)
+            self.full = []
+        self._keep()
+        self.grid = Grid(self.counts, 0)
+
+    def _spill(self, grid: Grid, used: int) -> None:
+        assert self.spilled is not None
+        for spec, column in zip(self.specs, self.spilled, strict=True):
+            column.append(self._cells(grid, used, spec))
+
+    def _cells(self, grid: Grid, used: int, spec: Spec) -> NDArray[Any]:
+        dtype = _stored(spec)
+        cells: NDArray[Any] = grid.cells[_SIZES.index(width_of(dtype))][self.place[spec], :used]
+        return (cells != 0).view(np.uint8) if spec.dtype == "?" else cells.view(dtype)
+
+    def finish(self) -> tuple[Rows | None, list[NDArray[Any]]]:
+        """Return the rows (None for the first to the last of the topic) and all columns; the table is empty then."""
+        rows = None if self.rows is None else self.rows.finish()
+        if self.spilled is not None:
+            self._keep()
+            return rows, [c.finish() for c in self.spilled]
+        if not self.full:
+            return rows, [self._cells(self.grid, self.used, s) for s in self.specs]
+        self._keep()
+        self.grid = Grid(self.counts, 0)
+        columns: list[NDArray[Any]] = [np.empty(self.count, _stored(s)) for s in self.specs]
+        at = 0
+        while self.full:
+            grid, used = self.full.pop(0)
+            for spec, column in zip(self.specs, columns, strict=True):
+                column[at : at + used] = self._cells(grid, used, spec)
+            at += used
+            del grid
+        return rows, columns
+
+
+@dataclass
+class Store:
+    """All numbers of one topic.
+
+    Attributes
+    ----------
+    count : int
+        Messages of the batches that have ended.
+    expected : int
+        How many are foretold; 0 where nothing is known.
+    skipped : set[str]
+        Arrays too long to become channels.
+    """
+
+    expected: int = 0
+    count: int = 0
+    skipped: set[str] = field(default_factory=set)
+    tables: dict[frozenset[Spec], Table] = field(default_factory=dict)
+    parts: dict[str, list[tuple[Rows, NDArray[Any]]]] = field(default_factory=dict)
+    owner: NDArray[np.int32] = field(default_factory=lambda: np.empty(0, np.int32))
+    opened: dict[int, tuple[Table, int]] = field(default_factory=dict)
+
+    def table(self, specs: Iterable[Spec]) -> Table:
+        """Return the table of these columns."""
+        specs = tuple(specs)
+        key = frozenset(specs)
+        if key not in self.tables:
+            self.tables[key] = Table(len(self.tables), specs, 0 if self.tables else self.expected)
+        return self.tables[key]
+
+    def begin(self, rows: int) -> None:
+        """Start a batch of so many messages; nobody owns any of them yet."""
+        self.owner = np.full(rows, FREE, np.int32)
+        self.opened = {}
+
+    def room(self, table: Table) -> int:
+        """Return where in the table's grid the batch stands."""
+        if table.number not in self.opened:
+            self.opened[table.number] = table, table.open(len(self.owner))
+        return self.opened[table.number][1]
+
+    def add(self, part: Part) -> None:
+        """Add numbers that were decoded one by one."""
+        self.skipped.update(part.skipped)
+        rows = part.rows + self.count
+        for path, values in part.columns.items():
+            self.parts.setdefault(path, []).append((rows, values))
+
+    def end(self) -> None:
+        """End the batch: each table keeps the rows that it owns."""
+        rows = len(self.owner)
+        for table, _ in self.opened.values():
+            mine = self.owner == table.number
+            count = int(np.count_nonzero(mine))
+            if count:
+                table.close(None if count == rows else np.flatnonzero(mine), rows, self.count)
+        self.count += rows
+        self.opened = {}
+
+    @property
+    def held(self) -> int:
+        """Bytes in memory."""
+        return sum(t.held for t in self.tables.values())
+
+    def spill(self) -> None:
+        """Send all tables to temporary files."""
+        for table in self.tables.values():
+            table.spill()
+
+    def finish(self) -> dict[str, Cells]:
+        """Return rows (None for all) and values by path, in recorded order; the store is empty then."""
+        found: dict[str, list[Cells]] = {}
+        for table in self.tables.values():
+            for path, cells in self._visible(table):
+                found.setdefault(path, []).append(cells)
+        self.tables = {}
+        for path, parts in self.parts.items():
+            found.setdefault(path, []).extend(parts)
+        self.parts = {}
+        joined: dict[tuple[int, ...], tuple[Rows | None, NDArray[np.int64] | None]] = {}
+        kept = [rows for cells in found.values() for rows, _ in cells]  # so that no identity is used twice
+        out = {path: self._join(found.pop(path), joined) for path in list(found)}
+        del kept
+        return out
+
+    def _visible(self, table: Table) -> Iterable[tuple[str, Cells]]:
+        rows, columns = table.finish()
+        if rows is None and table.count < self.count:
+            rows = np.arange(table.count)
+        hidden = {s.path: c for s, c in zip(table.specs, columns, strict=True) if s.dtype == "#"}
+        self.skipped.update(path for path, counts in hidden.items() if (counts > MAX_ELEMENTS).any())
+        guarded: dict[tuple[str, int], tuple[NDArray[np.int64], Rows]] = {}
+        for i, spec in enumerate(table.specs):
+            values, columns[i] = columns[i], np.empty(0)
+            if spec.dtype == "#":
+                continue
+            if not spec.guard:
+                yield spec.path, (rows, values)
+                continue
+            key = spec.guard, spec.number
+            if key not in guarded:
+                counts = hidden[spec.guard]
+                there = np.flatnonzero((counts > spec.number) & (counts <= MAX_ELEMENTS))
+                guarded[key] = there, there if rows is None else rows[there]
+            there, named = guarded[key]
+            if len(there):
+                yield spec.path, (named, values[there])
+
+    def _join(
+        self, cells: list[Cells], joined: dict[tuple[int, ...], tuple[Rows | None, NDArray[np.int64] | None]]
+    ) -> Cells:
+        """Bring the values of several tables into recorded order."""
+        if len(cells) == 1:
+            rows, values = cells[0]
+            return None if len(values) == self.count else rows, values
+        key = tuple(id(rows) for rows, _ in cells)
+        if key not in joined:
+            every = np.concatenate([rows for rows, _ in cells if rows is not None])
+            order = None if np.all(every[1:] > every[:-1]) else np.argsort(every, kind="stable")
+            joined[key] = None if len(every) == self.count else every if order is None else every[order], order
+        rows, order = joined[key]
+        values = np.concatenate([v for _, v in cells])
+        return rows, values if order is None else values[order]
