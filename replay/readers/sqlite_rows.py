@@ -138,7 +138,7 @@ class Database:
         starts = np.arange(len(image.seen) - 1) * image.page
         starts = starts[starts < len(image.data)]
         pages = np.flatnonzero((image.data[starts] == scan.LEAF) & (image.seen[1 : len(starts) + 1] == 0)) + 1
-        pages = np.union1d(pages, [p for p in set(image.suspects) if p > 1])
+        pages = np.union1d(pages, np.array([p for p in set(image.suspects) if p > 1], np.int64))
         stray = np.array([p for p in pages.tolist() if self._holds_messages(p)], np.int64)
         if len(stray):
             image.seen[stray] = 1

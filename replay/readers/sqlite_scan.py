@@ -164,7 +164,7 @@ def parse(data, at, stop, total, topic_column, stamp_column, data_column):  # ty
         elif column == data_column:
             if kind < 12 or kind % 2:
                 status = OTHER_TYPES
-            start, length = body, width
+            start, length = np.int64(body), np.int64(width)
             found += 1
         body += width
         column += 1
