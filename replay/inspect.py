@@ -2,97 +2,47 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections import Counter
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from replay.rawlog import Channel, RawLog
+from replay.inspect_mcap import mcap_index
+from replay.inspection import Depth, InspectReport, TopicTiming, mean_rate
+from replay.rawlog import Channel, LogSummary, RawLog, TopicInfo
 from replay.readers.registry import open_log
 from replay.sources import SourceOptions
 
 GAP_PERIODS = 5.0
 
 
-@dataclass(frozen=True)
-class TopicTiming:
-    """Timing of one topic, or of one group of table columns.
+def inspect_index(path: Path, options: SourceOptions) -> InspectReport:
+    """Read a log's index.
 
-    Attributes
+    Parameters
     ----------
-    name, type_name : str
-        As in `replay.rawlog.TopicInfo`.
-    count : int
-        Messages or rows by the container's index.
-    rate_hz : float or None
-        1 / median period [Hz]; None below two stamps.
-    gaps : int
-        Periods longer than `GAP_PERIODS` medians.
-    longest_gap_s : float or None
-        Longest period [s].
-    jitter_p99_s : float or None
-        99th percentile of |period − median| without the gaps [s].
-    backwards, duplicates : int
-        Stamps earlier than, and equal to, the one before.
-    offset_s : float or None
-        Median header stamp − log stamp [s]; None where only one clock exists.
-    start_ns, stop_ns : int
-        First and last stamp [ns]; 0 where there is none.
-    note : str
-        Why the topic was not decoded.
+    path : Path
+        File or rosbag2 folder.
+    options : SourceOptions
+        How to read it.
+
+    Raises
+    ------
+    LogError
+        Where nothing in the log can be read.
     """
-
-    name: str
-    type_name: str
-    count: int
-    rate_hz: float | None = None
-    gaps: int = 0
-    longest_gap_s: float | None = None
-    jitter_p99_s: float | None = None
-    backwards: int = 0
-    duplicates: int = 0
-    offset_s: float | None = None
-    start_ns: int = 0
-    stop_ns: int = 0
-    note: str = ""
-
-
-@dataclass(frozen=True)
-class InspectReport:
-    """Contents and timing of one log.
-
-    Attributes
-    ----------
-    source, format : str
-        As in `replay.rawlog.LogSummary`.
-    start_ns, stop_ns : int
-        First and last log stamp [ns].
-    topics : tuple[TopicTiming, ...]
-        Every topic.
-    channels : tuple[str, ...]
-        Names of all decoded channels.
-    notes, damage : tuple[str, ...]
-        One sentence each.
-    metadata : Mapping[str, str]
-        Stored in the container.
-    """
-
-    source: str
-    format: str
-    start_ns: int
-    stop_ns: int
-    topics: tuple[TopicTiming, ...]
-    channels: tuple[str, ...]
-    notes: tuple[str, ...] = ()
-    damage: tuple[str, ...] = ()
-    metadata: Mapping[str, str] = field(default_factory=dict)
-
-    @property
-    def duration_s(self) -> float:
-        """Time between the first and the last log stamp [s]."""
-        return (self.stop_ns - self.start_ns) / 1e9
+    summary = open_log(path).summarise(path, options)
+    seconds = (summary.stop_ns - summary.start_ns) / 1e9
+    topics = tuple(
+        TopicTiming(
+            t.name, t.type_name, t.count, mean_rate(t.count, seconds), None, None, None, None, None, note=t.note,
+            encoding=t.encoding, channels=len(t.fields) or None,
+        )
+        for t in summary.topics
+    )  # fmt: skip
+    return _report(path, summary, options, topics, (), "quick")
 
 
 def inspect_log(path: Path, options: SourceOptions) -> InspectReport:
@@ -112,25 +62,65 @@ def inspect_log(path: Path, options: SourceOptions) -> InspectReport:
     """
     reader = open_log(path)
     log = reader.read(path, options, None, options.stamp)
-    summary = log.summary
-    other: RawLog | None = None
+    summary, channels = log.summary, tuple(log.channels)
+    stamps, numbers = _by_topic(log), Counter(c.topic for c in log.channels.values())
+    grouped = {i: _group(log, info) for i, info in enumerate(summary.topics)}
+    del log  # the columns, before those of the other clock
+    against: dict[str, NDArray[np.int64]] = {}
     if any(t.encoding != "table" for t in summary.topics):
-        other = reader.read(path, options, None, "log" if options.stamp != "log" else "header")
-    stamps, against = _by_topic(log), {} if other is None else _by_topic(other)
+        against = _by_topic(reader.read(path, options, None, "log" if options.stamp != "log" else "header"))
     sign = -1 if options.stamp == "log" else 1
     topics = []
-    for info in summary.topics:
-        members = {f: log.channels[f] for f in info.fields if f in log.channels}
-        own = next((c.stamps for c in members.values()), stamps.get(info.name))
+    for i, info in enumerate(summary.topics):
+        own, count = grouped[i] or (stamps.get(info.name), numbers[info.name])
         beside = against.get(info.name)
         offset = None
         if own is not None and beside is not None and len(own) == len(beside) and len(own):
             offset = sign * float(np.median(own - beside)) / 1e9
-        topics.append(_timing(info.name, info.type_name, info.count, own, offset, info.note))
+        timing = _timing(info.name, info.type_name, info.count, own, offset, info.note)
+        decoded = 0 if own is None else len(own)
+        topics.append(replace(timing, encoding=info.encoding, channels=count, decoded=decoded))
+    return _report(path, summary, options, tuple(topics), channels, "full")
+
+
+def _report(
+    path: Path,
+    summary: LogSummary,
+    options: SourceOptions,
+    topics: tuple[TopicTiming, ...],
+    channels: tuple[str, ...],
+    depth: Depth,
+) -> InspectReport:
+    index = mcap_index(path, options.stamp) if summary.format == "mcap" else None
+    attachments = getattr(summary, "attachments", ())
     return InspectReport(
-        summary.source, summary.format, summary.start_ns, summary.stop_ns, tuple(topics), tuple(log.channels),
-        summary.notes, summary.damage, summary.metadata,
+        summary.source, summary.format, summary.start_ns, summary.stop_ns, topics, channels, summary.notes,
+        summary.damage, summary.metadata, depth, _size(path), "own" if _is_table(summary) else options.stamp,
+        _integrity(summary, depth), {} if index is None else index.container,
+        tuple({"name": a.name, "media_type": a.media_type, "size": a.size} for a in attachments),
     )  # fmt: skip
+
+
+def _is_table(summary: LogSummary) -> bool:
+    return all(t.encoding == "table" for t in summary.topics)
+
+
+def _integrity(summary: LogSummary, depth: Depth) -> str:
+    """What checksums there are and which of them were verified."""
+    kind = summary.metadata.get("integrity", "")
+    if kind == "unverifiable" or _is_table(summary) or not kind:
+        return "not every part has a checksum; damage there cannot be noticed"
+    return "checksums, all read and right" if depth == "full" and not summary.damage else "checksums"
+
+
+def _size(path: Path) -> int:
+    return sum(p.stat().st_size for p in path.rglob("*") if p.is_file()) if path.is_dir() else path.stat().st_size
+
+
+def _group(log: RawLog, info: TopicInfo) -> tuple[NDArray[np.int64], int] | None:
+    """Stamps and number of a table's columns, where the container lists them."""
+    members = [log.channels[f] for f in info.fields if f in log.channels]
+    return (members[0].stamps, len(members)) if members else None
 
 
 def _by_topic(log: RawLog) -> dict[str, NDArray[np.int64]]:

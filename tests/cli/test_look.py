@@ -8,19 +8,63 @@ from pathlib import Path
 import pytest
 
 from cli.console import Terminal
-from cli.listing import inspect_parts
+from cli.listing import inspect_parts, list_parts
 from cli.main import run
-from replay.inspect import InspectReport, TopicTiming
+from replay.inspection import InspectReport, TopicTiming
 
 
-def test_inspect_lists_topics_with_rates(mission_log: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_inspect_lists_topics_of_the_index_and_says_what_it_does_not_know(
+    mission_log: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     assert run(["inspect", str(mission_log)]) == 0
     seen = capsys.readouterr()
     rows = {line.split()[0]: line.split() for line in seen.out.splitlines() if line.startswith("/")}
-    assert rows["/joint_states"][1:4] == ["JointState", "1200", "100"]
+    assert rows["/joint_states"][1:5] == ["JointState", "cdr", "1200", "100"]
     assert rows["/imu"][1] == "Imu"
     assert "2025-10-09 08:53:20" in seen.out
+    assert "compression zstd" in seen.out
+    assert "Only the index was read" in seen.out
     assert seen.err == ""
+
+
+def test_full_inspection_measures_timing_and_says_that_checksums_are_right(
+    mission_log: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert run(["inspect", str(mission_log), "--full"]) == 0
+    out = capsys.readouterr().out
+    rows = {line.split()[0]: line.split() for line in out.splitlines() if line.startswith("/")}
+    assert rows["/joint_states"][1:4] == ["JointState", "1200", "100"]
+    assert "checksums: all read and right" in out
+    assert "Only the index" not in out
+
+
+def test_several_logs_are_a_table_and_degraded_ones_are_told(
+    mission_log: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    torn = tmp_path / "torn.mcap"
+    torn.write_bytes(mission_log.read_bytes()[:-4000])
+    assert run(["inspect", str(mission_log), str(torn)]) == 0
+    seen = capsys.readouterr()
+    lines = {line.split()[0]: line for line in seen.out.splitlines() if line.strip()}
+    assert lines[str(mission_log)].endswith("index ok")
+    assert lines["degraded:"].startswith("degraded: ")
+    assert "2 logs read, 1 degraded" in seen.out
+    assert run(["inspect", str(torn), "--json"]) == 0
+    seen = capsys.readouterr()
+    assert json.loads(seen.out)["logs"][0]["status"] == "degraded"
+    assert seen.err.startswith(f"note: {torn} is degraded: ")
+
+
+def test_detail_of_each_log_with_verbose(mission_log: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    copy = tmp_path / "copy.mcap"
+    copy.write_bytes(mission_log.read_bytes())
+    assert run(["inspect", str(mission_log), str(copy), "-v"]) == 0
+    assert capsys.readouterr().out.count("/joint_states ") == 2
+
+
+def test_an_inspection_of_nothing_readable_is_told(capsys: pytest.CaptureFixture[str]) -> None:
+    Terminal().show(*list_parts([], ["a: no such file", "b: no such file"]))
+    assert "0 logs read, 2 could not be read" in capsys.readouterr().out
 
 
 def test_one_bad_file_does_not_stop_the_others(
@@ -28,7 +72,7 @@ def test_one_bad_file_does_not_stop_the_others(
 ) -> None:
     bad = tmp_path / "bad.mcap"
     bad.write_bytes(b"nothing of the kind")
-    assert run(["inspect", str(bad), str(mission_log), str(tmp_path / "absent.bag"), "--json"]) == 3
+    assert run(["inspect", str(bad), str(mission_log), str(tmp_path / "absent.bag"), "--full", "--json"]) == 3
     seen = capsys.readouterr()
     document = json.loads(seen.out)
     assert [log["source"] for log in document["logs"]] == [str(mission_log)]
@@ -55,7 +99,7 @@ def test_damage_is_told(mission_log: Path, tmp_path: Path, capsys: pytest.Captur
     torn = tmp_path / "torn.mcap"
     torn.write_bytes(mission_log.read_bytes()[:-4000])
     assert run(["inspect", str(torn)]) == 0
-    assert "Damage" in capsys.readouterr().out
+    assert "degraded: " in capsys.readouterr().out
     assert run(["channels", str(torn)]) == 0
     assert "Damage" in capsys.readouterr().out
 
@@ -111,19 +155,21 @@ def test_tables_keep_to_the_width(
 ) -> None:
     monkeypatch.setenv("COLUMNS", columns)
     assert run(["channels", str(mission_log)]) == 0
+    assert run(["inspect", str(mission_log)]) == 0
+    assert run(["inspect", str(mission_log), "--full"]) == 0
     assert max(len(line) for line in capsys.readouterr().out.splitlines()) <= int(columns)
 
 
 def test_a_crash_in_one_file_does_not_stop_the_others(
     mission_log: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    def inspect_log(path: Path, options: object) -> InspectReport:
+    def inspect_index(path: Path, options: object) -> InspectReport:
         if path.name == "poison.mcap":
             raise ValueError("boom")
         return InspectReport(str(path), "mcap", 0, 0, (), ())
 
     (tmp_path / "poison.mcap").write_text("x")
-    monkeypatch.setattr("replay.inspect.inspect_log", inspect_log)
+    monkeypatch.setattr("replay.inspect.inspect_index", inspect_index)
     assert run(["inspect", str(tmp_path), str(mission_log)]) == 70
     seen = capsys.readouterr()
     assert "poison.mcap: ValueError: boom" in seen.err

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from replay.inspect import inspect_log
+from replay.inspect import inspect_index, inspect_log
 from replay.sources import SourceOptions
 
 
@@ -41,3 +41,13 @@ def test_real_log_has_rate_and_clock_offset(reference_data: Path) -> None:
     assert topics["/imu/data"].offset_s == pytest.approx(-0.025, abs=0.001)
     on_log = {t.name: t for t in inspect_log(path, SourceOptions(stamp="log")).topics}
     assert on_log["/imu/data"].offset_s == pytest.approx(-0.025, abs=0.001)
+
+
+def test_the_index_of_a_table_has_counts_but_no_timing(tmp_path: Path) -> None:
+    path = tmp_path / "t.csv"
+    path.write_text("t,v\n" + "".join(f"{i / 100},{i}\n" for i in range(101)))
+    report = inspect_index(path, SourceOptions())
+    (topic,) = report.topics
+    assert (topic.count, topic.gaps, topic.jitter_p99_s, topic.backwards) == (101, None, None, None)
+    assert topic.rate_hz == pytest.approx(100.0)
+    assert (report.depth, report.status, report.clock, report.size) == ("quick", "index_ok", "own", path.stat().st_size)
