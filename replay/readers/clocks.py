@@ -8,8 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from replay.rawlog import Channel, Clock
+from replay.readers.clock_lead import Lead
+from replay.readers.clock_steps import Step, find_steps, lead_of, steady, strays, unwrapped, usual_step, without_steps
 
 FAR_NS = 1_000_000_000
+_OFFSET_NS = 100_000_000
 
 
 @dataclass
@@ -30,41 +33,17 @@ class Report:
             self.damage.append(text)
 
 
-@dataclass(frozen=True)
-class _Lead:
-    """Header clock against log clock, as a straight line through the medians of the first and last third."""
-
-    count: int
-    at: tuple[int, int]
-    ahead: tuple[int, int]
-
-    @staticmethod
-    def of(log: NDArray[np.int64], header: NDArray[np.int64]) -> _Lead | None:
-        """Return the line, or None where the stamps are too few or do not run with the log."""
-        n = len(log)
-        if n < 12 or not 0.1 < float(np.ptp(header)) / max(float(np.ptp(log)), 1.0) < 10:
-            return None
-        ends = slice(0, n // 3), slice(n - n // 3, n)
-        at = tuple(int(np.median(log[e] - log[0])) + int(log[0]) for e in ends)
-        ahead = tuple(int(np.median(header[e] - log[e])) for e in ends)
-        return _Lead(n, (at[0], at[1]), (ahead[0], ahead[1]))
-
-    def to_header(self, log: NDArray[np.int64]) -> NDArray[np.int64]:
-        """Header stamps that messages with these log stamps would carry."""
-        rate = (self.ahead[1] - self.ahead[0]) / max(self.at[1] - self.at[0], 1)
-        moved: NDArray[np.int64] = log + self.ahead[0] + np.rint(rate * (log - self.at[0])).astype(np.int64)
-        return moved
-
-
 class Clocks:
-    """Chooses stamps topic by topic and remembers what to say about them."""
+    """Chooses stamps topic by topic, repairs what a second clock proves wrong, and remembers what to say about it."""
 
     def __init__(self, clock: Clock, report: Report) -> None:
         self.clock, self.report = clock, report
         self.no_header: list[str] = []
         self.far: dict[str, list[str]] = {}
         self.near = 0
-        self.lead: _Lead | None = None
+        self.lead: Lead | None = None
+        self.leads: dict[str, Lead] = {}
+        self.log_steps: dict[str, list[int]] = {}
 
     def stamps(
         self,
@@ -85,56 +64,197 @@ class Clocks:
             The container's stamps [ns].
         """
         if self.clock == "publish":
-            if publish.any():
-                return publish
-            self.report.note(f"{label} has no publish stamps; it stands on the log clock")
-            return log
-        if header is None:
+            given = publish != 0
+            if not given.any():
+                self.report.note(f"{label} has no publish stamps; it stands on the log clock")
+                return log
+            return self._repaired(label, "publish", publish, given, log)
+        given = np.zeros(len(log), np.bool_)
+        if header is not None:
+            given[header[0]] = header[1][header[0]] != 0
+        if header is None or not given.any():
             self.no_header.append(label)
             return log
-        rows, stamps = header
-        given = stamps != 0
-        if not given.any():
-            self.no_header.append(label)
-            return log
-        ahead = int(np.median(stamps[given] - log[given]))
+        stamps = self._repaired(label, "header", header[1], given, log)
+        self._compare(label, stamps[given], log[given])
+        if self.clock == "log":
+            return self._log_without_steps(label, log, stamps, given)
+        return stamps
+
+    def _repaired(
+        self, label: str, name: str, stamps: NDArray[np.int64], given: NDArray[np.bool_], log: NDArray[np.int64]
+    ) -> NDArray[np.int64]:
+        """Stamps without wraps, steps, strays and zeros, as far as the log clock proves them."""
+        say = self.report.note if self.clock == name else lambda text: None
+        if given.all() and steady(stamps, log):
+            return stamps
+        rows = np.flatnonzero(given)
+        own, beside = stamps[rows], log[rows]
+        own, wraps, span = unwrapped(own, beside)
+        if wraps:
+            say(
+                f"{label}: its {name} stamps are a 32-bit counter that starts again every {span / 1e9:.3f} s; {wraps} wraps "
+                "were continued by the log's stamps"
+            )
+        steps, log_steps = find_steps(own, beside)
+        if log_steps and name == "header":
+            self.log_steps[label] = [s.size for s in log_steps]
+        if steps:
+            own = without_steps(own, steps, lead_of(own, beside))
+            say(
+                f"{label}: its {name} stamps jump {_times(len(steps))} while the log's run on ("
+                + ", ".join(f"{_signed(s.size)} after {_since(beside, s.at)}" for s in steps[:3])
+                + (", …" if len(steps) > 3 else "")
+                + "); the jumps were taken out"
+            )
+        stray, expected = strays(own, beside)
+        if stray.any():
+            first = int(np.argmax(stray))
+            say(
+                f"{label}: {stray.sum()} of {len(own)} {name} stamps leave the course of the others (the first by "
+                f"{_signed(int(own[first]) - int(expected[first]))}, {_since(beside, first)} after its start); log stamps stand in"
+            )
+            own = np.where(stray, expected, own)
+        out = stamps.copy()
+        out[rows] = own
+        zero = ~given & (stamps == 0)
+        if zero.any():
+            lead = int(np.median(lead_of(own, beside)))
+            shift = lead if abs(lead) > FAR_NS else 0
+            if name == "header" or self.clock == name:
+                say(f"{label}: {zero.sum()} of {len(log)} {name} stamps are zero; log stamps stand in")
+            out[zero] = log[zero] + shift
+        return out
+
+    def _compare(self, label: str, stamps: NDArray[np.int64], log: NDArray[np.int64]) -> None:
+        """Remember how a topic's header clock relates to the log clock, and say where it drifts."""
+        ahead = int(np.median(lead_of(stamps, log)))
+        lead = Lead.of(log, stamps)
         if abs(ahead) > FAR_NS:
             self.far.setdefault(_span(ahead), []).append(label)
-            lead = _Lead.of(log[given], stamps[given])
             if lead is not None and (self.lead is None or lead.count > self.lead.count):
                 self.lead = lead
         else:
-            self.near = max(self.near, len(rows))
-        if self.clock == "log":
+            self.near = max(self.near, len(stamps))
+            if lead is not None:
+                self.leads[label] = lead
+        if lead is not None and lead.drifts:
+            self.report.note(
+                f"{label}: its header clock runs {lead.rate * 1e6:+.0f} ppm against the log's ("
+                f"{(lead.ahead[1] - lead.ahead[0]) / 1e6:+.0f} ms over the log)"
+                + ("; header stamps are kept" if self.clock == "header" else "")
+            )
+
+    def _log_without_steps(
+        self, label: str, log: NDArray[np.int64], header: NDArray[np.int64], given: NDArray[np.bool_]
+    ) -> NDArray[np.int64]:
+        """Log stamps without the jumps that header stamps prove."""
+        rows = np.flatnonzero(given)
+        steps, _ = find_steps(log[rows], header[rows])
+        if not steps:
             return log
-        zero = np.zeros(len(log), np.bool_)
-        zero[rows] = ~given[rows]
-        if zero.any():
-            shift = ahead if abs(ahead) > FAR_NS else 0
-            self.report.note(f"{label}: {zero.sum()} of {len(rows)} header stamps are zero; log stamps stand in")
-            stamps[zero] = log[zero] + shift
-        return stamps
+        self.report.note(
+            f"{label}: the log's stamps jump {_times(len(steps))} while header stamps run on ("
+            + ", ".join(_signed(s.size) for s in steps[:3])
+            + "); the jumps were taken out"
+        )
+        moved = [Step(int(rows[s.at]), s.size) for s in steps]
+        return without_steps(log, moved, lead_of(log, header))
 
     def finish(self, channels: dict[str, Channel]) -> None:
-        """Bring topics without header stamps to a far header clock, and write the notes."""
+        """Bring topics without header stamps to the header clock where that is another one, and write the notes."""
         for span, topics in self.far.items():
             self.report.note(f"header stamps lie {span} the log's stamps (median): {_some(topics)}")
+        jumps = self._jumps_of_log()
         if self.clock != "header" or not self.no_header:
+            if jumps and self.clock == "header":
+                self.report.note(
+                    f"the log's stamps jump by {_list_of(jumps)} while header stamps, which are used, run on"
+                )
             return
-        if self.lead is None or self.near >= self.lead.count:
+        lead = self.lead if self.lead is not None and self.near < self.lead.count else self._near_lead()
+        if lead is None and not jumps:
             self.report.note(f"no header stamps (or all zero), so on the log clock: {_some(self.no_header)}")
             return
         moved: dict[int, tuple[NDArray[np.int64], NDArray[np.int64]]] = {}
+        found = 0
         for name, channel in channels.items():
             if channel.topic in self.no_header:
                 old = channel.stamps
                 if id(old) not in moved:
-                    moved[id(old)] = (old, self.lead.to_header(old))
+                    steady, count = _without_jumps(old, jumps)
+                    found += count
+                    moved[id(old)] = (old, steady if lead is None else lead.to_header(steady))
                 channels[name] = replace(channel, stamps=moved[id(old)][1])
-        self.report.note(
-            "no header stamps (or all zero), so moved from the log clock by the other topics' header offset: "
-            + _some(self.no_header)
-        )
+        if jumps:
+            self.report.note(
+                f"the log's stamps jump by {_list_of(jumps)} while header stamps run on; {found} such jumps were taken out of "
+                f"topics without header stamps: {_some(self.no_header)}"
+            )
+        if lead is None:
+            self.report.note(f"no header stamps (or all zero), so on the log clock: {_some(self.no_header)}")
+        else:
+            self.report.note(
+                "no header stamps (or all zero), so moved from the log clock by the other topics' header offset: "
+                + _some(self.no_header)
+            )
+
+    def _jumps_of_log(self) -> list[int]:
+        """Jumps of the log clock that every topic with enough header stamps shows [ns]."""
+        if not self.log_steps or (set(self.leads) - set(self.log_steps)):
+            return []
+        first, *rest = self.log_steps.values()
+        near = [r for r in rest if len(r) == len(first)]
+        if len(near) < len(rest):
+            return []
+        agree = all(abs(a - b) <= max(20_000_000, 0.05 * abs(a)) for r in near for a, b in zip(first, r, strict=True))
+        sure = len(near) > 0 or all(abs(s) > 10 * FAR_NS or s < 0 for s in first)
+        return first if agree and sure else []
+
+    def _near_lead(self) -> Lead | None:
+        """Header offset below a second, where all topics agree on one that no transport explains."""
+        leads = list(self.leads.values())
+        if not leads or self.far:
+            return None
+        ahead = np.array([x.ahead for x in leads], np.float64)
+        if np.abs(ahead).min() < _OFFSET_NS or np.ptp(ahead, axis=0).max() > 0.5 * _OFFSET_NS:
+            return None
+        return max(leads, key=lambda x: x.count)
+
+
+def _without_jumps(log: NDArray[np.int64], jumps: list[int]) -> tuple[NDArray[np.int64], int]:
+    """Take known jumps out of one topic's log stamps, each where its own stamps show it."""
+    out = log
+    usual = usual_step(log)
+    count = 0
+    for jump in jumps:
+        if len(out) < 2:
+            break
+        off = np.abs(np.diff(out) - usual - jump)
+        k = int(np.argmin(off))
+        if off[k] <= max(0.3 * abs(jump), 2 * usual):
+            out = np.concatenate([out[: k + 1], out[k + 1 :] - jump])
+            count += 1
+    return out, count
+
+
+def _times(count: int) -> str:
+    return "once" if count == 1 else f"{count} times"
+
+
+def _signed(ns: int) -> str:
+    seconds = ns / 1e9
+    if abs(seconds) >= 2 * 86400:
+        return f"{seconds / 86400:+.1f} days"
+    return f"{seconds:+.3f} s"
+
+
+def _list_of(jumps: list[int]) -> str:
+    return ", ".join(_signed(j) for j in jumps[:3]) + (" and more" if len(jumps) > 3 else "")
+
+
+def _since(log: NDArray[np.int64], row: int) -> str:
+    return f"{(int(log[row]) - int(log[0])) / 1e9:.1f} s"
 
 
 def _span(ns: int) -> str:
