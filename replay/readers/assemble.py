@@ -13,7 +13,7 @@ from replay.rawlog import Channel, Clock, LogSummary, RawLog
 from replay.readers import cdr, jsonmsg, protobuf
 from replay.readers.clocks import Clocks, Report
 from replay.readers.definitions import DefinitionError, MessageType, resolve
-from replay.readers.growing import Cells, Store
+from replay.readers.growing import Cells, Store, Table
 from replay.readers.layout import MAX_ELEMENTS
 from replay.readers.program import Spec
 from replay.readers.protobuf_schema import Schema, schema_of
@@ -21,6 +21,7 @@ from replay.spill import in_blocks
 
 MEMORY = 512 << 20
 _SLOW_SHARE = 0.2
+_LOOK_EVERY = 16
 
 
 @dataclass(frozen=True)
@@ -97,7 +98,8 @@ class _Topic:
 
     connection: Connection
     store: Store
-    stamps: Store
+    stamps: Table
+    last: Connection | None = None
     stamp: str | None = None
     outcome: cdr.Outcome = field(default_factory=cdr.Outcome)
     known: set[Connection] = field(default_factory=set)
@@ -105,11 +107,13 @@ class _Topic:
     walkers: dict[Connection, protobuf.Decoder] = field(default_factory=dict)
     mute: str = ""
 
-    def add(self, blocks: list[Block], publish: bool) -> None:
+    def add(self, blocks: list[Block]) -> None:
         """Decode the blocks of one buffer as one batch, in the order of their places."""
-        for connection in {b.connection for b in blocks} - self.known:
-            self.known.add(connection)
-            self.mute = self.mute or connection.why_not()
+        for block in blocks:
+            if block.connection is not self.last and block.connection not in self.known:
+                self.known.add(block.connection)
+                self.mute = self.mute or block.connection.why_not()
+            self.last = block.connection
         if self.mute:
             return
         slots = _slots(blocks)
@@ -118,7 +122,7 @@ class _Topic:
         for block, slot in zip(blocks, slots, strict=True):
             self._decode(block, slot)
         self.store.end()
-        self._keep_stamps(blocks, slots, count, publish)
+        self._keep_stamps(blocks, slots, count)
 
     def _decode(self, block: Block, slots: NDArray[np.int64] | None) -> None:
         connection, places = block.connection, (block.data, block.starts, block.lengths)
@@ -147,21 +151,16 @@ class _Topic:
             walker = self.walkers[connection] = protobuf.Decoder(schema, self.outcome)
         return walker.decode(*places)
 
-    def _keep_stamps(
-        self, blocks: list[Block], slots: list[NDArray[np.int64] | None], count: int, publish: bool
-    ) -> None:
+    def _keep_stamps(self, blocks: list[Block], slots: list[NDArray[np.int64] | None], count: int) -> None:
         """Copy the container's stamps; publish stamps only where they are asked for."""
-        table = self.stamps.table([Spec("log", "i8"), Spec("publish", "i8")] if publish else [Spec("log", "i8")])
-        self.stamps.begin(count)
-        at = self.stamps.room(table)
-        cells = table.grid.cells[3].view(np.int64)[:, at : at + count]
+        at = self.stamps.open(count)
+        cells = self.stamps.grid.cells[3].view(np.int64)[:, at : at + count]
         for block, slot in zip(blocks, slots, strict=True):
             where = slice(None) if slot is None else slot
             cells[0, where] = block.log_ns
-            if publish:
+            if len(cells) > 1:
                 cells[1, where] = block.log_ns if block.publish_ns is None else block.publish_ns
-        self.stamps.owner[:] = table.number
-        self.stamps.end()
+        self.stamps.close(None, count, self.stamps.count)
 
 
 def _slots(blocks: list[Block]) -> list[NDArray[np.int64] | None]:
@@ -182,6 +181,8 @@ class Assembler:
         self.clock, self.report = clock, report
         self.topics: dict[tuple[str, str], _Topic] = {}
         self.expected: dict[tuple[str, str], int] = {}
+        self.stamps = (Spec("log", "i8"), Spec("publish", "i8"))[: 2 if clock == "publish" else 1]
+        self.batches = 0
         self.clocks = Clocks(clock, report)
 
     def expect(self, connection: Connection, count: int) -> None:
@@ -198,9 +199,12 @@ class Assembler:
             topic = self.topics.get(key)
             if topic is None:
                 count = self.expected.get(key, 0)
-                topic = self.topics[key] = _Topic(batch[0].connection, Store(count), Store(count))
-            topic.add([_within_range(b, self.report) for b in batch], self.clock == "publish")
-        self._spill()
+                stamps = Table(0, self.stamps, count)
+                topic = self.topics[key] = _Topic(batch[0].connection, Store(count), stamps)
+            topic.add([_within_range(b, self.report) for b in batch])
+        self.batches += 1
+        if self.batches % _LOOK_EVERY == 0:
+            self._spill()
 
     def _spill(self) -> None:
         """Send the largest topics to temporary files once all together are too large for memory."""
@@ -239,10 +243,9 @@ class Assembler:
         self._say(label, topic)
         if topic.mute or not count:
             return
-        own = topic.stamps.finish()
-        log = own["log"][1]
+        log, *publish = topic.stamps.finish()[1]
         header = _take_header(topic.stamp, columns, count, topic.outcome.bad)
-        stamps = self.clocks.stamps(label, header, log, own["publish"][1] if "publish" in own else log)
+        stamps = self.clocks.stamps(label, header, log, publish[0] if publish else log)
         shared: dict[int, tuple[NDArray[np.int64], NDArray[np.int64]]] = {}
         for path, (rows, values) in columns.items():
             at = stamps

@@ -132,6 +132,7 @@ class Decoder:
     walked: list[_Walked] = field(default_factory=list)
     room: dict[Place, int] = field(default_factory=dict)
     tried: int = 0
+    count: NDArray[np.int64] = field(default_factory=lambda: np.arange(0))
 
     def decode(
         self,
@@ -153,7 +154,10 @@ class Decoder:
         """
         from replay.readers.kernels import views
 
-        slots = np.arange(len(starts)) if slots is None else slots
+        if slots is None:
+            if len(self.count) < len(starts):
+                self.count = np.arange(len(starts))
+            slots = self.count[: len(starts)]
         batch = Batch(
             views(data), len(data), np.ascontiguousarray(starts, np.int64), np.ascontiguousarray(lengths, np.int64),
             np.ascontiguousarray(slots, np.int64),

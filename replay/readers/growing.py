@@ -21,7 +21,7 @@ from replay.spill import Column
 FREE = -1
 _SIZES = (1, 2, 4, 8)
 _FEWEST_ROWS = 256
-_MOST_BYTES = 64 << 20
+_MOST_BYTES = 128 << 20
 
 Rows = NDArray[np.int64]
 Cells = tuple[Rows | None, NDArray[Any]]

@@ -68,6 +68,13 @@ def _turn2(v):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
+def _copy(numbers, source, offset, column, target, m):  # type: ignore[no-untyped-def]
+    """Copy one number of each of m rows; indexes are unsigned, which spares a test for negative ones."""
+    for k in range(m):
+        column[np.uint64(target[k])] = numbers[np.uint64(source[k] + offset)]
+
+
+@njit(cache=True)
 def take_fixed(  # type: ignore[no-untyped-def]
     b1, b2, b4, b8, limit, starts, lengths, slots, owner, own, size, swap, check_at, check_mask, check_word,
     at1, to1, at2, to2, at4, to4, at8, to8, out1, out2, out4, out8, first,
@@ -95,20 +102,21 @@ def take_fixed(  # type: ignore[no-untyped-def]
                 left = row
         taken += m
         for c in range(len(at8)):
-            for k in range(m):
-                word8 = b8[source[k] + at8[c]]
-                out8[to8[c], target[k]] = _turn8(word8) if swap else word8
+            _copy(b8, source, at8[c], out8[to8[c]], target, m)
         for c in range(len(at4)):
-            for k in range(m):
-                word4 = b4[source[k] + at4[c]]
-                out4[to4[c], target[k]] = _turn4(word4) if swap else word4
+            _copy(b4, source, at4[c], out4[to4[c]], target, m)
         for c in range(len(at2)):
-            for k in range(m):
-                word2 = b2[source[k] + at2[c]]
-                out2[to2[c], target[k]] = _turn2(word2) if swap else word2
+            _copy(b2, source, at2[c], out2[to2[c]], target, m)
         for c in range(len(at1)):
+            _copy(b1, source, at1[c], out1[to1[c]], target, m)
+        if swap:
             for k in range(m):
-                out1[to1[c], target[k]] = b1[source[k] + at1[c]]
+                for c in to8:
+                    out8[c, target[k]] = _turn8(out8[c, target[k]])
+                for c in to4:
+                    out4[c, target[k]] = _turn4(out4[c, target[k]])
+                for c in to2:
+                    out2[c, target[k]] = _turn2(out2[c, target[k]])
     return taken, left
 
 

@@ -13,7 +13,7 @@ from replay.rawlog import AttachmentInfo, Clock, LogSummary, RawLog, TopicInfo, 
 from replay.readers import mcap_format as fmt
 from replay.readers.assemble import Assembler, Block, Connection
 from replay.readers.clocks import Report
-from replay.readers.mcap_account import account, check_data, counts_of
+from replay.readers.mcap_account import account, check_data, counts_of, expected
 from replay.readers.mcap_chunk import name_channels, open_chunk
 from replay.readers.mcap_file import McapFile, looks_like_mcap
 from replay.readers.mcap_open import open_file
@@ -81,6 +81,10 @@ def read_files(
     opened = open_files(files, source, report, walk=window is None)
     assembler = Assembler(clock, report)
     for file in opened:
+        if window is None:
+            for number, count in expected(file)[0].items():
+                if number in file.names.channels:
+                    assembler.expect(file.names.channels[number], count)
         for blocks in _blocks(file, topics, window):
             assembler.add(blocks)
     return assembler.finish(summary_of(opened, source, name, report))
