@@ -123,14 +123,14 @@ def name_channels(file: McapFile) -> bool:
     for row in _first_rows(file):
         if not file.names.ready[file.indexes[file.indexes[:, 0] == row, 1]].all():
             _open_for_names(file, row)
-    indexed = set(file.indexes[:, 0].tolist())
-    for row in range(len(file.chunks)):
+    indexed = np.zeros(len(file.chunks), np.bool_)
+    indexed[file.indexes[:, 0]] = True
+    for row in np.flatnonzero(~indexed).tolist():
         if file.names.ready[file.names.named > 0].all():
             break
-        if row not in indexed:
-            _open_for_names(file, row)
+        _open_for_names(file, row)
     listed = file.summary is not None and any(op == fmt.CHANNEL for op, _, _ in file.summary.names)
-    return listed or len(indexed) == len(file.chunks)
+    return listed or bool(indexed.all())
 
 
 def _first_rows(file: McapFile) -> list[int]:

@@ -37,12 +37,23 @@ from replay.readers.mcap_format import (
 _SLACK = 64
 
 
+# The indexes below are unsigned, so that none is checked for counting from the end, and a number becomes one load.
+
+
 @njit(cache=True)
-def _number(data, at, width):  # type: ignore[no-untyped-def]
-    value = np.uint64(0)
-    for i in range(width):
-        value |= np.uint64(data[at + i]) << np.uint64(8 * i)
-    return value
+def _u16(data, at):  # type: ignore[no-untyped-def]
+    p = np.uint64(at)
+    return np.uint64(data[p]) | np.uint64(data[p + np.uint64(1)]) << np.uint64(8)
+
+
+@njit(cache=True)
+def _u32(data, at):  # type: ignore[no-untyped-def]
+    return _u16(data, at) | _u16(data, np.uint64(at) + np.uint64(2)) << np.uint64(16)
+
+
+@njit(cache=True)
+def _u64(data, at):  # type: ignore[no-untyped-def]
+    return _u32(data, at) | _u32(data, np.uint64(at) + np.uint64(4)) << np.uint64(32)
 
 
 @njit(cache=True)
@@ -50,7 +61,7 @@ def _end(data, at, stop):  # type: ignore[no-untyped-def]
     """End of the record by its length, or −1 where it leaves the bytes."""
     if at + 9 > stop:
         return np.int64(-1)
-    length = _number(data, at + 1, 8)
+    length = _u64(data, at + 1)
     if length > np.uint64(stop - at - 9):
         return np.int64(-1)
     return np.int64(at + 9) + np.int64(length)
@@ -62,7 +73,7 @@ def _over(data, at, end, parts):  # type: ignore[no-untyped-def]
     for _ in range(parts):
         if at < 0 or at + 4 > end:
             return np.int64(-1)
-        size = np.int64(_number(data, at, 4))
+        size = np.int64(_u32(data, at))
         if size > end - at - 4:
             return np.int64(-1)
         at += 4 + size
@@ -74,10 +85,10 @@ def _chunk_fits(data, at, end):  # type: ignore[no-untyped-def]
     """Whether a record of any opcode has the content of a chunk: the packed size ends where the record does."""
     if end - at < 49:
         return False
-    text = np.int64(_number(data, at + 37, 4))
+    text = np.int64(_u32(data, at + 37))
     if text > 16 or at + 49 + text > end:
         return False
-    packed = _number(data, at + 41 + text, 8)
+    packed = _u64(data, at + 41 + text)
     left = end - at - 49 - text
     return packed <= np.uint64(left) and np.int64(packed) >= left - _SLACK
 
@@ -118,9 +129,9 @@ def _fits(data, at, stop):  # type: ignore[no-untyped-def]
             last += 16
     elif op == ATTACHMENT:
         last = _over(data, body + 16, end, 2)
-        if last < 0 or last + 12 > end or _number(data, last, 8) > np.uint64(end - last - 12):
+        if last < 0 or last + 12 > end or _u64(data, last) > np.uint64(end - last - 12):
             return np.int64(-1)
-        last += 12 + np.int64(_number(data, last, 8))
+        last += 12 + np.int64(_u64(data, last))
     elif op == FOOTER:
         last = body + 20
     elif op == DATA_END:
@@ -141,9 +152,9 @@ def _mended(data, at, stop):  # type: ignore[no-untyped-def]
     if end >= 0 and (end == stop or _fits(data, end, stop) >= 0):
         return end
     for text in (0, 3, 4):
-        if at + 49 + text > stop or _number(data, at + 37, 4) != np.uint64(text):
+        if at + 49 + text > stop or _u32(data, at + 37) != np.uint64(text):
             continue
-        packed = _number(data, at + 41 + text, 8)
+        packed = _u64(data, at + 41 + text)
         if packed and packed <= np.uint64(stop - at - 49 - text):
             end = np.int64(at + 49 + text) + np.int64(packed)
             if end < stop and _fits(data, end, stop) >= 0:
@@ -154,7 +165,7 @@ def _mended(data, at, stop):  # type: ignore[no-untyped-def]
 @njit(cache=True)
 def _named(data, at, named):  # type: ignore[no-untyped-def]
     """Whether the record is no message, or one of a channel that is named."""
-    return data[at] != MESSAGE or named[np.int64(_number(data, at + 9, 2))] > 0
+    return data[at] != MESSAGE or named[np.int64(_u16(data, at + 9))] > 0
 
 
 @njit(cache=True)
@@ -203,7 +214,7 @@ def scan_walk(data, at, stop, named, rows, counts, bounds, state):  # type: igno
             continue
         op = np.int64(data[at])
         if op == CHANNEL and end - at >= 11:
-            named[np.int64(_number(data, at + 9, 2))] = 1
+            named[np.int64(_u16(data, at + 9))] = 1
         ended = op == FOOTER and flag == SOUND
         after, after_flag = np.int64(-1), SOUND
         if end < stop and not ended:
@@ -221,9 +232,9 @@ def scan_walk(data, at, stop, named, rows, counts, bounds, state):  # type: igno
         if (flag == MENDED or op > DATA_END) and op != CHUNK and _chunk_fits(data, at, end):
             op, flag = np.int64(CHUNK), MENDED
         if op == MESSAGE and flag == SOUND:
-            channel = np.int64(_number(data, at + 9, 2))
+            channel = np.int64(_u16(data, at + 9))
             counts[channel] += 1
-            stamp = np.int64(_number(data, at + 15, 8))
+            stamp = np.int64(_u64(data, at + 15))
             if stamp >= 0:
                 bounds[0], bounds[1] = min(bounds[0], stamp), max(bounds[1], stamp)
             if n and rows[n - 1, 0] == MESSAGE and rows[n - 1, 2] == at:
@@ -249,18 +260,18 @@ def scan_census(data, at, stop, most, counts, touched, names, bounds):  # type: 
     """Count messages per channel over sound records, at most `most`; note channels met and name records."""
     n, met, named, other = 0, 0, 0, 0
     while at + 9 <= stop and n < most:
-        length = _number(data, at + 1, 8)
+        length = _u64(data, at + 1)
         op = data[at]
         if length > np.uint64(stop - at - 9) or op == 0:
             break
         if op == MESSAGE and length >= np.uint64(MESSAGE_HEAD):
-            channel = np.int64(_number(data, at + 9, 2))
+            channel = np.int64(_u16(data, at + 9))
             if counts[channel] == 0:
                 touched[met] = channel
                 met += 1
             counts[channel] += 1
             n += 1
-            stamp = np.int64(_number(data, at + 15, 8))
+            stamp = np.int64(_u64(data, at + 15))
             if stamp >= 0:
                 bounds[0], bounds[1] = min(bounds[0], stamp), max(bounds[1], stamp)
         elif op in (SCHEMA, CHANNEL):
@@ -277,15 +288,15 @@ def scan_census(data, at, stop, most, counts, touched, names, bounds):  # type: 
 def scan_collect(data, at, stop, slot, first, last, body, size, log, publish):  # type: ignore[no-untyped-def]
     """Place messages of wanted channels (slot ≥ 0) that lie in the window, grouped by channel."""
     while at + 9 <= stop:
-        length = np.int64(_number(data, at + 1, 8))
+        length = np.int64(_u64(data, at + 1))
         if data[at] == MESSAGE and length >= MESSAGE_HEAD:
-            channel = np.int64(_number(data, at + 9, 2))
+            channel = np.int64(_u16(data, at + 9))
             k = slot[channel]
             if k >= 0:
-                stamp = np.int64(_number(data, at + 15, 8))
+                stamp = np.int64(_u64(data, at + 15))
                 if first <= stamp <= last:
                     body[k], size[k] = at + 9 + MESSAGE_HEAD, length - MESSAGE_HEAD
-                    log[k], publish[k] = stamp, np.int64(_number(data, at + 23, 8))
+                    log[k], publish[k] = stamp, np.int64(_u64(data, at + 23))
                     slot[channel] = k + 1
         at += 9 + length
 
@@ -296,7 +307,7 @@ def scan_chunk_heads(data, rows, out):  # type: ignore[no-untyped-def]
     for i in range(len(rows)):
         at = rows[i, 1]
         for k in range(2):
-            out[i, k] = np.int64(_number(data, at + 9 + 8 * k, 8))
+            out[i, k] = np.int64(_u64(data, at + 9 + 8 * k))
 
 
 @njit(cache=True)
@@ -304,8 +315,8 @@ def scan_index_heads(data, rows, out):  # type: ignore[no-untyped-def]
     """Channel and number of entries of each message index."""
     for i in range(len(rows)):
         at = rows[i, 1]
-        out[i, 0] = np.int64(_number(data, at + 9, 2))
-        out[i, 1] = np.int64(_number(data, at + 11, 4)) // 16
+        out[i, 0] = np.int64(_u16(data, at + 9))
+        out[i, 1] = np.int64(_u32(data, at + 11)) // 16
 
 
 @njit(cache=True)
@@ -315,17 +326,16 @@ def scan_chunk_indexes(data, rows, out, pairs):  # type: ignore[no-untyped-def]
     for i in range(len(rows)):
         at = rows[i, 1] + 9
         for k in range(4):
-            out[i, k] = np.int64(_number(data, at + 8 * k, 8))
-        size = np.int64(_number(data, at + 32, 4)) // 10
+            out[i, k] = np.int64(_u64(data, at + 8 * k))
+        size = np.int64(_u32(data, at + 32)) // 10
         for j in range(size):
-            if n < len(pairs):
-                p = at + 36 + 10 * j
-                pairs[n, 0], pairs[n, 1] = i, np.int64(_number(data, p, 2))
-                pairs[n, 2] = np.int64(_number(data, p + 2, 8))
+            p = at + 36 + 10 * j
+            pairs[n, 0], pairs[n, 1] = i, np.int64(_u16(data, p))
+            pairs[n, 2] = np.int64(_u64(data, p + 2))
             n += 1
-        p = at + 36 + np.int64(_number(data, at + 32, 4))
-        out[i, 4] = np.int64(_number(data, p, 8))
-        text = np.int64(_number(data, p + 8, 4))
-        out[i, 5] = np.int64(_number(data, p + 12 + text, 8))
-        out[i, 6] = np.int64(_number(data, p + 20 + text, 8))
+        p = at + 36 + np.int64(_u32(data, at + 32))
+        out[i, 4] = np.int64(_u64(data, p))
+        text = np.int64(_u32(data, p + 8))
+        out[i, 5] = np.int64(_u64(data, p + 12 + text))
+        out[i, 6] = np.int64(_u64(data, p + 20 + text))
     return n

@@ -166,10 +166,6 @@ def chunk_indexes(data: NDArray[np.uint8], rows: NDArray[np.int64]) -> tuple[NDA
         Row, channel and place of each message index.
     """
     out: NDArray[np.int64] = np.empty((len(rows), 7), np.int64)
-    room = 4 * len(rows)
-    while True:
-        pairs = np.empty((room, 3), np.int64)
-        n = scan_chunk_indexes(data, rows, out, pairs)
-        if n <= room:
-            return out, pairs[:n]
-        room = n
+    pairs: NDArray[np.int64] = np.empty((int((rows[:, 2] - rows[:, 1]).sum()) // 10, 3), np.int64)
+    count = scan_chunk_indexes(data, rows, out, pairs)
+    return out, pairs[:count]

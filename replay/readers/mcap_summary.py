@@ -117,11 +117,10 @@ def summary_from(
     """Gather the summary from the rows of a walk over it."""
     listed = rows[(rows[:, 0] == fmt.CHUNK_INDEX) & (rows[:, 3] == fmt.SOUND)]
     chunks, indexes = scan.chunk_indexes(data, listed)
-    order = np.argsort(chunks[:, 2], kind="stable")
-    back = np.empty(len(order), np.int64)
-    back[order] = np.arange(len(order))
-    indexes[:, 0] = back[indexes[:, 0]]
-    indexes = indexes[np.argsort(indexes[:, 0], kind="stable")]
+    if (chunks[1:, 2] < chunks[:-1, 2]).any():
+        order = np.argsort(chunks[:, 2], kind="stable")
+        chunks, indexes[:, 0] = chunks[order], np.argsort(order, kind="stable")[indexes[:, 0]]
+        indexes = indexes[np.argsort(indexes[:, 0], kind="stable")]
     names: list[tuple[int, bytes, int]] = []
     statistics: Statistics | None = None
     attachments, metadata = [], []
@@ -143,7 +142,7 @@ def summary_from(
             metadata.append(record)
     return Summary(
         *place, checked, sound, tuple(names), statistics,
-        chunks[order], indexes, tuple(attachments), tuple(metadata),
+        chunks, indexes, tuple(attachments), tuple(metadata),
     )  # fmt: skip
 
 
