@@ -23,8 +23,8 @@ class BagRecords(NamedTuple):
         Where header fields and data start, and length of the data [bytes].
     conn, stamp : NDArray[np.int64], shape (n,)
         Connection (−1 where a record has none) and time [ns].
-    end : int
-        End of the last complete record.
+    end, stop : int
+        End of the last complete record, and where the walk stopped: at a chunk that reaches too far, or at the end.
     lost, gaps, first : int
         Bytes that belong to no record, in how many places, and where the first of them is (−1: none).
     mended : int
@@ -38,6 +38,7 @@ class BagRecords(NamedTuple):
     conn: NDArray[np.int64]
     stamp: NDArray[np.int64]
     end: int
+    stop: int
     lost: int
     gaps: int
     first: int
@@ -170,6 +171,6 @@ def scan_bag(data: NDArray[np.uint8], start: int = 0, stop: int | None = None) -
                 lost, gaps, first = lost + stop - at, gaps + 1, at if first < 0 else first
             return BagRecords(
                 op[:count], head[:count], body[:count], size[:count], conn[:count], stamp[:count],
-                int(end), int(lost), int(gaps), int(first), int(mended),
+                int(end), int(at), int(lost), int(gaps), int(first), int(mended),
             )  # fmt: skip
         room = count

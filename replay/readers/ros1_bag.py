@@ -15,11 +15,12 @@ from replay.rawlog import Clock, LogSummary, RawLog, TopicInfo, Window
 from replay.readers.assemble import Assembler, Block, Connection
 from replay.readers.bag_records import CONNECTION, MESSAGE, BagRecords, scan_bag
 from replay.readers.clocks import Report
-from replay.readers.inflate import MAX_CHUNK, InflateError, Inflater
+from replay.readers.inflate import InflateError, Inflater
 from replay.readers.ros1_file import MAGIC, Bag, Chunk, open_bag, take_connection
 from replay.sources import SourceOptions
 
 _LOOK, _RECORDS = 4 << 20, 3
+_MOST = 64 << 20  # of a chunk whose stated size is wrong
 _MAGICS = {b"\x04\x22\x4d\x18": "lz4", b"BZh": "bz2"}
 
 
@@ -86,26 +87,32 @@ class _Reading:
         self.bounds: list[int] = []
 
     def blocks(self) -> Iterator[list[Block]]:
-        """Messages chunk by chunk; loose ones first, as they may name connections."""
+        """Messages in the order of the file, chunk by chunk; those outside of chunks where the first of them stands."""
         bag = self.bag
-        for records in bag.loose:
-            loose = list(self._split(bag.data, records))
-            count = int(np.count_nonzero(records.op == MESSAGE))
+        places = [(int(r.head[np.argmax(r.op == MESSAGE)]), r) for r in bag.loose]
+        parts: list[tuple[int, BagRecords | Chunk]] = [*places, *((c.start, c) for c in bag.chunks)]
+        for _, part in sorted(parts, key=lambda p: p[0]):
+            if isinstance(part, Chunk):
+                yield self._chunk(part)
+                continue
+            count = int(np.count_nonzero(part.op == MESSAGE))
             bag.lost(f"{count} messages stand outside of chunks (a chunk's header is damaged); they were read")
-            yield loose
-        for chunk in bag.chunks:
-            stated = chunk.stated
-            if stated is not None and not self._may_hold(chunk, stated):
-                self.skipped.update(stated)
-                self.bounds += [chunk.first_ns, chunk.last_ns]
-                continue
-            self.stated.update(stated or {})
-            data = self._expand(chunk)
-            if data is None:
-                continue
-            records = scan_bag(data)
-            self._check(chunk, data, records)
-            yield list(self._split(data, records))
+            yield list(self._split(bag.data, part))
+
+    def _chunk(self, chunk: Chunk) -> list[Block]:
+        """Blocks of one chunk, unless it holds nothing that is wanted."""
+        stated = chunk.stated
+        if stated is not None and not self._may_hold(chunk, stated):
+            self.skipped.update(stated)
+            self.bounds += [chunk.first_ns, chunk.last_ns]
+            return []
+        self.stated.update(stated or {})
+        data = self._expand(chunk)
+        if data is None:
+            return []
+        records = scan_bag(data)
+        self._check(chunk, data, records)
+        return list(self._split(data, records))
 
     def _may_hold(self, chunk: Chunk, stated: dict[int, int]) -> bool:
         """Whether a chunk may hold a wanted message; one that the index says too little about may."""
@@ -174,9 +181,13 @@ class _Reading:
             connection = bag.connections.get(number)
             name = f"{connection.topic[:80]}" if connection else f"connection {number}"
             if self.stated and stated > found:
-                bag.lost(f"{name}: {stated - found} of {stated} messages that the index counts were not found")
+                bag.report.lost(
+                    f"{bag.path.name}: {name}: {stated - found} of {stated} messages that the index counts were not found"
+                )
             elif self._indexed() and stated < found:
-                bag.lost(f"{name}: {found} messages were found and read, the index counts {stated}")
+                bag.report.lost(
+                    f"{bag.path.name}: {name}: {found} messages were found and read, the index counts {stated}"
+                )
             if connection is None and found:
                 bag.lost(f"{found} messages belong to connection {number}, which is not named")
         topics: dict[Connection, int] = {}
@@ -206,7 +217,7 @@ def _expand_as_found(packed: bytes) -> tuple[bytes, bool]:
         for at in range(0, len(packed), 4096):
             out.append(stream.decompress(packed[at : at + 4096]))
             size, ended = size + len(out[-1]), stream.eof
-            if ended or size > MAX_CHUNK:
+            if ended or size > _MOST:
                 break
     except (RuntimeError, OSError, EOFError, ValueError):
         pass

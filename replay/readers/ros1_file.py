@@ -19,6 +19,7 @@ MAGIC = b"#ROSBAG V"
 _VERSION = b"#ROSBAG V2.0\n"
 _BAD = (struct.error, KeyError, ValueError)
 _LONGEST_TEXT = 1 << 20
+_MOST_TOLD = 200
 
 
 @dataclass
@@ -74,10 +75,15 @@ class Bag:
     loose: list[BagRecords] = field(default_factory=list)
     absent: dict[int, int] = field(default_factory=dict)
     raw: dict[int, bytes] = field(default_factory=dict)
+    told: int = 0
 
     def lost(self, text: str) -> None:
-        """Report a loss in this file."""
-        self.report.lost(f"{self.path.name}: {text}")
+        """Report a loss in this file; of very many, the first ones."""
+        self.told += 1
+        if self.told <= _MOST_TOLD:
+            self.report.lost(f"{self.path.name}: {text}")
+        elif self.told == _MOST_TOLD + 1:
+            self.report.lost(f"{self.path.name}: more than {_MOST_TOLD} places are damaged; the others are not listed")
 
 
 def open_bag(path: Path, report: Report, whole: bool) -> Bag:
@@ -267,14 +273,13 @@ def _behind(bag: Bag, records: BagRecords) -> int:
         bag.lost(f"{records.mended} records have a damaged length; they were read up to the next record")
     if cut is None:
         return len(bag.data)
+    if cut.compression == "none":
+        return cut.body  # its records stand there as they are
     following = scan_bag(bag.data, cut.body)
-    if cut.compression == "none" or not len(following.op):
-        cut.packed = rest - (cut.body - cut.start)
-        bag.chunks.append(cut)
-        return len(bag.data)
-    cut.packed = int(following.head[0]) - 4 - cut.body
+    stop = int(following.head[0]) - 4 if len(following.op) else following.stop
+    cut.packed = stop - cut.body
     bag.chunks.append(cut)
-    return int(following.head[0]) - 4
+    return stop
 
 
 def _overlong(bag: Bag, at: int) -> Chunk | None:
