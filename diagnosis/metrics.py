@@ -9,9 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from diagnosis.assessment import STATES, Assessment
+from replay.envelope import shown
 from replay.faults import FAULT_STATES, State
-from replay.loop import Replay, stack
+from replay.loop import Replay, any_finite, stack
 from replay.machine import Machine
+from replay.spill import blocks, in_blocks
 from replay.timeline import Timeline
 
 Array = NDArray[np.float64]
@@ -30,9 +32,10 @@ _EARTH_RADIUS = 6_371_008.8
 def driving(replay: Replay, timeline: Timeline, machine: Machine) -> NDArray[np.bool_]:
     """|v_c,i| above the driving speed, shape (n, wheels); the measured speed stands in where nothing is commanded."""
     v = stack(timeline, [f"wheel.{w}.v" for w in machine.wheels])
-    asked = np.where(np.isfinite(replay.v_ref).any(axis=0), replay.v_ref, v)
+    commanded = any_finite(replay.v_ref)
+    limit = machine.limits.driving_speed
     with np.errstate(invalid="ignore"):
-        return np.asarray(np.abs(asked) > machine.limits.driving_speed)
+        return in_blocks(lambda ref, y: np.abs(np.where(commanded, ref, y)) > limit, replay.v_ref, v)
 
 
 def loop_metrics(timeline: Timeline, replay: Replay, machine: Machine, moving: NDArray[np.bool_]) -> dict[str, Any]:
@@ -40,19 +43,20 @@ def loop_metrics(timeline: Timeline, replay: Replay, machine: Machine, moving: N
 
     e is taken with v_true where that is logged, and not with a speed into which faults were injected.
     """
-    u = stack(timeline, [f"wheel.{w}.u" for w in machine.wheels])
-    true = stack(timeline, [f"wheel.{w}.v_true" for w in machine.wheels])
-    e = np.where(np.isfinite(true).any(axis=0), true - replay.v_ref, np.nan if timeline.open_loop else replay.e)
+    nothing = np.broadcast_to(np.nan, (timeline.size,))
     per_wheel = {}
     for i, wheel in enumerate(machine.wheels):
+        v, true, u = (timeline.signals.get(f"wheel.{wheel}.{x}", nothing) for x in ("v", "v_true", "u"))
+        if any(np.isfinite(true[part]).any() for part in blocks(timeline.size)):
+            v = true
+        elif timeline.open_loop:
+            v = nothing
         per_wheel[wheel] = {
-            "tracking_error": _both(np.abs(e[:, i]), moving[:, i]),
-            "control_effort": _both(np.abs(u[:, i]), moving[:, i]),
+            "tracking_error": _mean_size(moving[:, i], v, replay.v_ref[:, i]),
+            "control_effort": _mean_size(moving[:, i], u),
         }
     average = {
-        name: {
-            part: _mean(np.array([per_wheel[w][name][part] for w in machine.wheels])) for part in ("mission", "driving")
-        }
+        name: {part: _mean([per_wheel[w][name][part] for w in machine.wheels]) for part in ("mission", "driving")}
         for name in ("tracking_error", "control_effort")
     }
     paper = [
@@ -61,13 +65,21 @@ def loop_metrics(timeline: Timeline, replay: Replay, machine: Machine, moving: N
     return {"wheels": per_wheel, "average": average, "paper": paper}
 
 
-def _mean(x: Array) -> float:
-    known = x[np.isfinite(x)]
-    return float(known.mean()) if known.size else float("nan")
+def _mean(x: list[float]) -> float:
+    known = [value for value in x if np.isfinite(value)]
+    return float(np.mean(known)) if known else float("nan")
 
 
-def _both(x: Array, moving: NDArray[np.bool_]) -> dict[str, float]:
-    return {"mission": _mean(x), "driving": _mean(x[moving])}
+def _mean_size(moving: NDArray[np.bool_], x: Array, less: Array | None = None) -> dict[str, float]:
+    """Mean |x − less| of the mission and of driving."""
+    total, count = np.zeros(2), np.zeros(2)
+    for part in blocks(x.size):
+        size = np.abs(x[part] if less is None else x[part] - less[part])
+        for j, known in enumerate((np.isfinite(size), np.isfinite(size) & moving[part])):
+            total[j] += size[known].sum()
+            count[j] += np.count_nonzero(known)
+    mission, driving_ = (float(t / c) if c else float("nan") for t, c in zip(total, count, strict=True))
+    return {"mission": mission, "driving": driving_}
 
 
 def coverage(
@@ -98,24 +110,30 @@ def body_motion(timeline: Timeline, replay: Replay, machine: Machine) -> tuple[A
     """Commanded or mean measured speed of the body [m/s], and its yaw rate where known [rad/s]."""
     v = timeline.get("cmd.v")
     if v is None or not np.isfinite(v).any():
-        speeds = np.where(
-            np.isfinite(replay.v_ref), replay.v_ref, stack(timeline, [f"wheel.{w}.v" for w in machine.wheels])
-        )
-        count = np.isfinite(speeds).sum(axis=1)
-        v = np.where(count > 0, np.nansum(speeds, axis=1) / np.maximum(count, 1), np.nan)
+        v = in_blocks(_mean_speed, replay.v_ref, stack(timeline, [f"wheel.{w}.v" for w in machine.wheels]))
     omega = timeline.get("cmd.omega")
-    return v, np.zeros_like(v) if omega is None else omega
+    return v, np.broadcast_to(0.0, v.shape) if omega is None else omega
+
+
+def _mean_speed(v_ref: Array, v: Array) -> Array:
+    speeds = np.where(np.isfinite(v_ref), v_ref, v)
+    count = np.isfinite(speeds).sum(axis=1)
+    return np.where(count > 0, np.nansum(speeds, axis=1) / np.maximum(count, 1), np.nan)
 
 
 def phases(timeline: Timeline, replay: Replay, machine: Machine) -> list[dict[str, Any]]:
     """Forward, reverse, standstill and turning, by the command; pieces below 0.5 s join the one before."""
     v, omega = body_motion(timeline, replay, machine)
     limit = machine.limits.driving_speed / 2
-    reach = 0.15 * np.abs(np.nan_to_num(v)) + 1e-9
     half = 1.0 if machine.geometry is None else max(abs(w.x) for w in machine.geometry.wheels.values())
-    turning = np.abs(np.nan_to_num(omega)) * half > reach
-    code = np.where(np.nan_to_num(v) > limit, 1, np.where(np.nan_to_num(v) < -limit, 2, 0))
-    code = np.where((code > 0) & turning, 3, code)
+
+    def coded(speed: Array, rate: Array) -> NDArray[np.int8]:
+        speed = np.nan_to_num(speed)
+        turning = np.abs(np.nan_to_num(rate)) * half > 0.15 * np.abs(speed) + 1e-9
+        code = np.where(speed > limit, 1, np.where(speed < -limit, 2, 0))
+        return np.where((code > 0) & turning, 3, code).astype(np.int8)
+
+    code = in_blocks(coded, v, omega)
     names = ("standstill", "forward", "reverse", "turning")
     cut = np.flatnonzero(np.r_[True, code[1:] != code[:-1]])
     out: list[dict[str, Any]] = []
@@ -129,14 +147,14 @@ def phases(timeline: Timeline, replay: Replay, machine: Machine) -> list[dict[st
 
 
 def path_of(timeline: Timeline) -> dict[str, Array]:
-    """The machine's path [m] from odometry, else from GNSS on a local plane; empty where neither is logged."""
+    """The machine's path [m] for pictures, from odometry, else from GNSS on a local plane; empty where neither is logged."""
     x, y = timeline.get("odom.x"), timeline.get("odom.y")
     if x is not None and y is not None and np.isfinite(x).any():
-        return {"path.x": x, "path.y": y}
+        return {"path.x": shown(x), "path.y": shown(y)}
     lat, lon = timeline.get("gnss.lat"), timeline.get("gnss.lon")
     if lat is None or lon is None or not np.isfinite(lat).any():
         return {}
     k = int(np.flatnonzero(np.isfinite(lat) & np.isfinite(lon))[0])
     north = np.radians(lat - lat[k]) * _EARTH_RADIUS
     east = np.radians(lon - lon[k]) * _EARTH_RADIUS * np.cos(np.radians(lat[k]))
-    return {"path.x": east, "path.y": north}
+    return {"path.x": shown(east), "path.y": shown(north)}

@@ -13,11 +13,12 @@ from diagnosis import wheel_scan as ws
 from diagnosis.assessment import CODE, Assessment, Finding
 from diagnosis.mode_path import first_lasting
 from diagnosis.modes import PAIR
-from diagnosis.noise import moving_sum, quick_noise, rounding_step, slow_mismatch, white_noise
+from diagnosis.noise import moving_sum, quick_noise, rounding_step, slow_mismatch, usual_distance, white_noise
 from diagnosis.wheel_blocks import WheelBlocks, blocks_of, per_sample
 from diagnosis.wheel_findings import Run, judge, onset_sentence, refined
 from diagnosis.wheel_runs import runs_of
 from diagnosis.wheel_settle import settled
+from replay.envelope import shown
 from replay.faults import FaultMode, Side, State
 from replay.machine import Limits, Noise, WheelPlant
 
@@ -91,7 +92,7 @@ def filter_model(data: WheelsData, i: int, residual: Array) -> wf.WheelFilterMod
     assert plant is not None
     pair, y = data.status[:, i] == PAIR, data.y[:, i]
     fresh = y[pair]
-    period = data.dt * (float(np.median(np.diff(np.flatnonzero(pair)[:20_000]))) if fresh.size > 1 else 1.0)
+    period = data.dt * (usual_distance(pair) if fresh.size > 1 else 1.0)
     known = data.noise[i]
     lsb = known.lsb if known.lsb is not None else rounding_step(fresh)
     white = known.std or float(np.nan_to_num(white_noise(fresh, period)))
@@ -191,7 +192,6 @@ def _one_wheel(
     findings: list[Finding] = []
     opened = {side: np.zeros(size, dtype=np.bool_) for side in (Side.SENSOR, Side.ACTUATOR)}
     unexplained = {side: np.zeros(size, dtype=np.bool_) for side in opened}
-    delta = {side: np.ones(size) for side in opened}
     for r, m in enumerate(runs.model):
         if m == ws.HEALTHY:
             continue
@@ -228,9 +228,7 @@ def _one_wheel(
         shape = onset_sentence(start, y, own.noise, data.names[i][0], verdict.finding.side)
         finding = replace(verdict.finding, detected=seen, evidence=(*verdict.finding.evidence, shape))
         findings.append(finding)
-        if finding.epsilon is not None and finding.side in delta:
-            delta[finding.side][start:stop] = 1 - finding.epsilon.value
-    return _assessments(i, data, own, done, found, findings, opened, unexplained, delta, gains, width)
+    return _assessments(i, data, own, done, found, findings, opened, unexplained, gains, width)
 
 
 def _release(stop: int, y: Array, reach: int) -> int:
@@ -249,7 +247,6 @@ def _assessments(
     findings: list[Finding],
     opened: dict[Side, NDArray[np.bool_]],
     unexplained: dict[Side, NDArray[np.bool_]],
-    delta: dict[Side, Array],
     gains: bool,
     width: int,
 ) -> tuple[Assessment, Assessment]:
@@ -263,7 +260,7 @@ def _assessments(
     healthy = CODE[State.HEALTHY]
     states_s[(opened[Side.SENSOR] | (not gains)) & (states_s == healthy)] = CODE[State.NOT_ASSESSED]
     if own.grip_most > 0:  # wheels in the air obey their own valves, not the body
-        doubted = np.asarray(per_sample(done.fault[:, i], width, size)) > _DOUBTED
+        doubted = np.asarray(per_sample(done.fault[:, i] > _DOUBTED, width, size))
         states_s[slip & doubted & (states_s == healthy)] = CODE[State.SLIP]
     states_a[(opened[Side.ACTUATOR] | (not gains)) & (states_a == healthy)] = CODE[State.NOT_ASSESSED]
     for f in sensor:
@@ -275,14 +272,20 @@ def _assessments(
     covered = np.zeros(size, dtype=np.bool_)
     for f in findings:
         covered[f.start : f.stop] = True
-    expected = np.asarray(per_sample(found.expected, width, size))
-    spread = np.asarray(per_sample(found.spread, width, size))
+
+    def held(values: Array) -> Array:
+        return np.asarray(per_sample(values, width, size))
+
+    residual = held(found.expected)
+    np.subtract(y, residual, out=residual)
+    residual[data.status[:, i] != PAIR] = np.nan
     shared = {
-        "residual": np.where(data.status[:, i] == PAIR, y - expected, np.nan),
-        "threshold": 3 * np.sqrt(spread + own.noise**2),
-        "expected": expected,
-        "probability": np.asarray(per_sample(done.fault[:, i], width, size)),
+        "residual": shown(residual),
+        "threshold": shown(held(3 * np.sqrt(found.spread + own.noise**2))),
+        "expected": shown(held(found.expected)),
+        "probability": shown(held(done.fault[:, i])),
     }
+    del residual
     air = own.grip_most <= 0
     note = (
         f"{data.names[i][0]} by the wheel model with {data.names[i][1]}: noise {own.noise:.2g} m/s, load and model error "
@@ -292,7 +295,16 @@ def _assessments(
     out = []
     for side, states, faults in ((Side.SENSOR, states_s, sensor), (Side.ACTUATOR, states_a, actuator)):
         loose = unexplained[side] & ~covered & ~quiet
-        columns = {**shared, "delta": delta[side]}
+        columns = {**shared, "delta": shown(_delta(faults, side, size))}
         seconds = float(np.count_nonzero(loose)) * data.dt
         out.append(Assessment(states, _REASONS, tuple(faults), columns, "model", (note,), seconds))
     return out[0], out[1]
+
+
+def _delta(faults: list[Finding], side: Side, size: int) -> Array:
+    """Estimated gain of every sample: 1 outside of faults."""
+    delta = np.ones(size)
+    for f in faults:
+        if f.epsilon is not None and f.side is side:
+            delta[f.start : f.stop] = 1 - f.epsilon.value
+    return delta

@@ -13,6 +13,7 @@ from scipy.ndimage import uniform_filter1d
 from replay.resolution import rounding_step as rounding_step
 from replay.resolution import white_noise as white_noise
 from replay.resolution import windows as _windows
+from replay.spill import blocks
 
 Array = NDArray[np.float64]
 
@@ -27,6 +28,15 @@ def moving_sum(x: NDArray[np.float64] | NDArray[np.bool_], width: int) -> Array:
     """Sum over a centred window of `width` samples, shape (n,); the window is cut at the ends, and to n."""
     width = min(width, x.size)
     return np.convolve(np.asarray(x, dtype=np.float64), np.ones(width), mode="same") if width else np.zeros(0)
+
+
+def usual_distance(new: NDArray[np.bool_]) -> float:
+    """Median distance of the first 20 000 new samples in steps."""
+    for size in (1 << 16, new.size):
+        places = np.flatnonzero(new[:size])
+        if places.size >= 20_000 or size == new.size:
+            break
+    return float(np.median(np.diff(places[:20_000])))
 
 
 def quick_noise(residual: Array, dt: float) -> float:
@@ -59,9 +69,13 @@ def slow_mismatch(residual: Array, use: NDArray[np.bool_], dt: float, quantile: 
         The quantile over windows of 0.5 s with at least a quarter of their samples; NaN where there is none.
     """
     length = max(10, round(0.5 / dt))
-    kept = use & np.isfinite(residual)
-    squares = _windows(np.where(kept, residual, 0.0) ** 2, length).sum(axis=1)
-    counts = _windows(kept.astype(np.float64), length).sum(axis=1)
+    summed, counted = [np.zeros(0)], [np.zeros(0)]
+    for part in blocks(residual.size, length):
+        near = residual[part]
+        kept = use[part] & np.isfinite(near)
+        summed.append(_windows(np.where(kept, near, 0.0) ** 2, length).sum(axis=1))
+        counted.append(_windows(kept.astype(np.float64), length).sum(axis=1))
+    squares, counts = np.concatenate(summed), np.concatenate(counted)
     good = counts >= length / 4
     return float(np.quantile(np.sqrt(squares[good] / counts[good]), quantile)) if good.any() else float("nan")
 

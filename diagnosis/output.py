@@ -59,7 +59,7 @@ def write_result(result: MissionResult, folder: Path, *, max_size_mb: float = 15
     return folder / HTML, folder / JSON, folder / PARQUET
 
 
-def _shortened(name: str, values: NDArray[np.float64]) -> NDArray[np.float32]:
+def _shortened(name: str, values: NDArray[np.float64] | NDArray[np.float32]) -> NDArray[np.float32]:
     """Column as stored: recorded signals as 32-bit floats, replayed ones to 4·10⁻⁵, evidence to 5·10⁻⁴ of each value.
 
     Probabilities are rounded to 1/256.

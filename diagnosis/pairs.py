@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import maximum_filter1d, minimum_filter1d
 
 from diagnosis import modes
-from diagnosis.noise import moving_sum, rounding_step, slow_mismatch, white_noise, white_part
+from diagnosis.noise import moving_sum, rounding_step, slow_mismatch, usual_distance, white_noise, white_part
 from diagnosis.segments import Run
 from diagnosis.spells import FALSE_SPELLS
 from replay.faults import FaultMode, Side
@@ -164,9 +164,7 @@ def mode_model(pair: Pair, x: Array, status: NDArray[np.int8], tolerance: float)
     period = pair.dt * max(
         1.0,
         float(
-            np.median(
-                np.diff(np.flatnonzero(status == modes.PAIR)[:20_000]),
-            )
+            usual_distance(status == modes.PAIR),
         )
         if fresh_y.size > 1
         else 1.0,

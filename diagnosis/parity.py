@@ -6,11 +6,14 @@ cannot be told at that moment.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 
 from replay.geometry import Geometry
 from replay.kinematics import low_pass, speed_ratios
+from replay.spill import Column, blocks, release
 
 Array = NDArray[np.float64]
 
@@ -19,7 +22,23 @@ _SHARE = 0.25
 _DOUBTFUL_ANGLE = 0.15
 
 
-def parity_residuals(v: Array, axle_angle: Array, wheel_angle: Array, geometry: Geometry, dt: float) -> Array:
+@dataclass
+class ParityState:
+    """Low-passed speed [m/s], last angle [rad] and low-passed turning rate [rad/s] of each wheel in the block before."""
+
+    speed: list[float]
+    angle: list[float]
+    rate: list[float]
+
+
+def parity_residuals(
+    v: Array,
+    axle_angle: Array,
+    wheel_angle: Array,
+    geometry: Geometry,
+    dt: float,
+    state: ParityState | None = None,
+) -> Array:
     """Speed of each wheel beyond what the body's motion asks of it.
 
     Parameters
@@ -32,6 +51,8 @@ def parity_residuals(v: Array, axle_angle: Array, wheel_angle: Array, geometry: 
         Places of the wheels.
     dt : float
         Step [s].
+    state : ParityState or None
+        Carried from the block before, and updated; None: a whole mission.
 
     Returns
     -------
@@ -39,10 +60,16 @@ def parity_residuals(v: Array, axle_angle: Array, wheel_angle: Array, geometry: 
         Residuals [m/s], smoothed; NaN where a speed or an angle is missing.
     """
     ratios = speed_ratios(axle_angle, geometry)
-    smooth = np.stack([low_pass(v[:, i], dt, _SMOOTH_HZ) for i in range(v.shape[1])], axis=1)
+    if state is None:
+        unknown = [np.nan] * v.shape[1]
+        state = ParityState(list(unknown), [float(a) for a in wheel_angle[0]], list(unknown))
+    smooth = np.stack([low_pass(v[:, i], dt, _SMOOTH_HZ, state.speed[i]) for i in range(v.shape[1])], axis=1)
+    state.speed = [float(x) for x in smooth[-1]]
     for i, w in enumerate(geometry.wheels.values()):
-        turning = low_pass(np.diff(wheel_angle[:, i], prepend=wheel_angle[:1, i]) / dt, dt, _SMOOTH_HZ)
+        rate = np.diff(wheel_angle[:, i], prepend=state.angle[i]) / dt
+        turning = low_pass(rate, dt, _SMOOTH_HZ, state.rate[i])
         smooth[:, i] += turning * w.offset  # the wheel rolls around its joint while it steers
+        state.angle[i], state.rate[i] = float(wheel_angle[-1, i]), float(turning[-1])
     body = np.median(smooth / ratios, axis=1)
     out = smooth - ratios * body[:, None]
     out[~np.isfinite(v)] = np.nan
@@ -78,8 +105,15 @@ def slipping(
     NDArray[np.bool_], shape (n, wheels)
         True where the wheel slips or its speed is wrong.
     """
-    residual = parity_residuals(v, axle_angle, wheel_angle, geometry, dt)
-    limit = np.maximum(least, _SHARE * np.abs(np.nan_to_num(v)))
-    doubtful = np.asarray((np.abs(axle_angle - axle_command) > _DOUBTFUL_ANGLE).any(axis=1))
-    with np.errstate(invalid="ignore"):
-        return np.asarray((np.abs(residual) > limit) & ~doubtful[:, None])
+    unknown = [np.nan] * v.shape[1]
+    state = ParityState(list(unknown), [float(a) for a in wheel_angle[0]], list(unknown))
+    out = Column(np.bool_, v.shape[1:])
+    for part in blocks(len(v)):
+        angle = axle_angle[part]
+        residual = parity_residuals(v[part], angle, wheel_angle[part], geometry, dt, state)
+        limit = np.maximum(least, _SHARE * np.abs(np.nan_to_num(v[part])))
+        doubtful = np.asarray((np.abs(angle - axle_command[part]) > _DOUBTFUL_ANGLE).any(axis=1))
+        with np.errstate(invalid="ignore"):
+            out.append((np.abs(residual) > limit) & ~doubtful[:, None])
+        release(v, axle_angle, axle_command, wheel_angle)
+    return out.finish()

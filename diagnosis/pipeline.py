@@ -15,15 +15,17 @@ from diagnosis.components import ComponentResult, assess_components
 from diagnosis.decide import Decision, decide, intervals_of, spans_of
 from diagnosis.result import SCHEMA, MissionResult, to_json
 from replay.columns import replay_columns
+from replay.envelope import bucket_of
 from replay.errors import ConfigError, NotJudged
 from replay.loop import Replay, replay_loop
 from replay.machine import Machine
 from replay.mission import Mission, load_mission
 from replay.signals import Signals
+from replay.spill import blocks
 from replay.timeline import align
 from replay.version import __version__
 
-Array = NDArray[np.float64]
+Array = NDArray[np.float64] | NDArray[np.float32]
 
 
 def _silent(_: str) -> None:
@@ -115,7 +117,7 @@ def diagnose_mission(
     """
     chosen = tuple(machine.wheels if wheels is None else wheels)
     progress("replaying the loop")
-    replay = replay_loop(mission.timeline, machine)
+    replay = replay_loop(mission.timeline, machine, bucket_of(mission.timeline.size))
     found = assess_components(mission.timeline, replay, machine, chosen, progress)
     _require_something(found.assessments, mission, machine)
     progress("deciding")
@@ -227,11 +229,12 @@ def _named_status(report: dict[str, Any]) -> dict[str, Any]:
 def _log(mission: Mission, moving: NDArray[np.bool_], machine: Machine) -> dict[str, Any]:
     timeline = mission.timeline
     speeds = [timeline.signals[n] for w in machine.wheels if (n := f"wheel.{w}.v") in timeline.signals]
-    distance = float("nan")
-    if speeds:
-        counted = np.isfinite(speeds).sum(axis=0)
-        mean = np.nansum(np.abs(speeds), axis=0) / np.maximum(counted, 1)
-        distance = float(mean.sum()) * timeline.dt
+    distance = 0.0 if speeds else float("nan")
+    for part in blocks(timeline.size):
+        near = [v[part] for v in speeds]
+        if near:
+            mean = np.nansum(np.abs(near), axis=0) / np.maximum(np.isfinite(near).sum(axis=0), 1)
+            distance += float(mean.sum()) * timeline.dt
     return {
         "files": [
             {

@@ -122,11 +122,11 @@ class MissionResult:
     report : Mapping[str, Any]
         The document written as ``report.json``.
     columns : Mapping[str, NDArray[np.float32 | np.float64]], each of shape (n,)
-        Time series on one uniform axis; ``t`` [s] first.
+        Time series on one uniform axis; ``t`` [s] first. Of long missions they are envelopes: see `replay.envelope`.
     """
 
     report: Mapping[str, Any]
-    columns: Mapping[str, NDArray[np.float64]] = field(default_factory=dict)
+    columns: Mapping[str, NDArray[np.float64] | NDArray[np.float32]] = field(default_factory=dict)
 
 
 def _plain(value: Any) -> Any:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,9 +20,12 @@ from diagnosis.steering_plant import SteeringPlant, identify_plants
 from diagnosis.steering_second import with_position, with_second_angle
 from diagnosis.steering_states import BLIND_ROWS, REASONS, states_of
 from diagnosis.steering_tidy import SteeringData, tidy
+from replay.envelope import shown
 from replay.faults import Side, State
 from replay.loop import Replay
 from replay.machine import Machine, Noise
+from replay.spill import Column, beside, in_blocks
+from replay.spill import blocks as cut
 from replay.timeline import Timeline
 
 Array = NDArray[np.float64]
@@ -73,14 +77,18 @@ def assess_steering(
         found = identify_plants([a.blocks for a in modelled], [a.noise for a in modelled], machine.max_steer)
         plants = {a.name: plant for a, plant in zip(modelled, found, strict=True)}
     assessments: dict[Key, Assessment] = {}
-    angle = np.full((timeline.size, len(axles)), np.nan)
-    doubtful = np.ones(angle.shape, dtype=np.bool_)
-    for j, axle in enumerate(axles):
+    angles: list[Array] = []
+    doubts: list[NDArray[np.bool_]] = []
+    for axle in axles:
         progress(f"judging steering {axle.name}")
         sensor, actuator, model_angle = _judge_axle(axle, plants.get(axle.name), machine)
         assessments[axle.name, "sensor"], assessments[axle.name, "actuator"] = sensor, actuator
-        angle[:, j], doubtful[:, j] = _best_angle(axle, sensor, model_angle)
-    return SteeringResult(assessments, angle, doubtful)
+        angle, doubt = _best_angle(axle, sensor, model_angle)
+        angles.append(angle)
+        doubts.append(doubt)
+    if not axles:
+        return SteeringResult({}, np.empty((timeline.size, 0)), np.empty((timeline.size, 0), np.bool_))
+    return SteeringResult(assessments, beside(angles), beside(doubts))
 
 
 @dataclass(frozen=True)
@@ -140,7 +148,11 @@ class _Axle:
 
     def values(self, leaf: str) -> Array:
         """Values on the timeline; NaN where it is not logged."""
-        return self.timeline.signals[self.channel(leaf)] if leaf in self.have else np.full(self.timeline.size, np.nan)
+        return (
+            self.timeline.signals[self.channel(leaf)]
+            if leaf in self.have
+            else np.broadcast_to(np.nan, (self.timeline.size,))
+        )
 
 
 def _judge_axle(
@@ -214,21 +226,24 @@ def _by_model(
             notes=(note,),
             unexplained_s=doubt * axle.timeline.dt,
         )
-    angle = np.interp(
-        np.arange(y.size), np.arange(path.model.size) * blocks.length + (blocks.length - 1) / 2, path.mean[:, 0]
-    )
-    return out, np.asarray(angle)
+    middles = np.arange(path.model.size) * blocks.length + (blocks.length - 1) / 2
+    angle = Column(np.float64)
+    for part in cut(y.size):
+        angle.append(np.interp(np.arange(part.start, part.stop), middles, path.mean[:, 0]))
+    return out, angle.finish()
 
 
 def _series(path: SteeringPath, blocks: SteeringBlocks, gain: float, y: Array) -> dict[Side, dict[str, Array]]:
     """Evidence columns of both sides, each value held over its block."""
 
     def held(x: Array) -> Array:
-        return np.repeat(x, blocks.length)[: y.size]
+        return shown(np.repeat(x, blocks.length)[: y.size])
 
     mean, std = path.mean, np.sqrt(np.maximum(path.variance, 0.0))
-    expected = held(mean[:, 0])
-    shared = {"residual": y - expected, "threshold": held(3 * std[:, 0]), "expected": expected}
+    residual = np.repeat(mean[:, 0], blocks.length)[: y.size]
+    np.subtract(y, residual, out=residual)
+    shared = {"residual": shown(residual), "threshold": held(3 * std[:, 0]), "expected": held(mean[:, 0])}
+    del residual
     return {
         Side.SENSOR: shared
         | {
@@ -249,12 +264,16 @@ def _series(path: SteeringPath, blocks: SteeringBlocks, gain: float, y: Array) -
 
 def _best_angle(axle: _Axle, sensor: Assessment, model_angle: Array | None) -> tuple[Array, NDArray[np.bool_]]:
     """Best estimate of an axle's true angle, and where it is in doubt."""
-    true = axle.values("phi_true")
+    true, phi = axle.values("phi_true"), axle.values("phi")
     fine = (sensor.states == CODE[State.HEALTHY]) | (sensor.states == CODE[State.NOT_EXCITED])
-    phi = axle.values("phi")
     usable = fine if model_angle is not None else fine | (sensor.states == CODE[State.NOT_ASSESSED])
-    angle = np.where(usable, phi, np.nan if model_angle is None else model_angle)
-    doubtful = ~fine | ~np.isfinite(angle)
-    if model_angle is not None:
-        angle = np.where(np.isfinite(angle), angle, model_angle)
-    return np.where(np.isfinite(true), true, angle), doubtful & ~np.isfinite(true)
+    model = np.broadcast_to(np.nan, phi.shape) if model_angle is None else model_angle
+
+    def chosen(usable: NDArray[np.bool_], phi: Array, model: Array, true: Array) -> Array:
+        angle = np.where(usable & np.isfinite(phi), phi, model)
+        return np.where(np.isfinite(true), true, angle)
+
+    def doubted(fine: NDArray[np.bool_], usable: NDArray[np.bool_], phi: Array, model: Array, true: Array) -> Any:
+        return (~fine | ~np.isfinite(np.where(usable, phi, model))) & ~np.isfinite(true)
+
+    return in_blocks(chosen, usable, phi, model, true), in_blocks(doubted, fine, usable, phi, model, true)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,6 +11,8 @@ from numpy.typing import NDArray
 from diagnosis.modes import PAIR, SILENT, SKIP
 from diagnosis.noise import rounding_step
 from replay.machine import Noise
+from replay.spill import Column, release
+from replay.spill import blocks as cut
 
 Array = NDArray[np.float64]
 
@@ -57,15 +60,20 @@ class SteeringBlocks:
 
     def driven(self, gain: float, rate: float) -> Array:
         """Mean of sat(gain·u) between the middles of blocks [rad/s], shape (m,)."""
-        return _between(np.clip(gain * self.raw_u, -rate, rate), self.length, self.mean.size)
+        return _between(self.raw_u, self.length, self.mean.size, lambda u: np.clip(gain * u, -rate, rate))
 
 
-def _between(x: Array, length: int, blocks: int) -> Array:
-    """Mean of x over `length` samples up to the middle of each block."""
-    total = np.concatenate([[0.0], np.cumsum(x)])
+def _between(x: Array, length: int, blocks: int, function: Callable[[Array], Array] = np.asarray) -> Array:
+    """Mean of function(x) over `length` samples up to the middle of each block."""
     middle = np.minimum(np.arange(blocks) * length + length // 2, x.size)
-    before = np.maximum(middle - length, 0)
-    return np.asarray((total[middle] - total[before]) / np.maximum(middle - before, 1))
+    until, total = np.empty(blocks), 0.0
+    for part in cut(x.size, length):
+        sums = total + np.concatenate([[0.0], np.cumsum(function(x[part]))])
+        a, b = part.start // length, -(-part.stop // length)
+        until[a:b] = sums[middle[a:b] - part.start]
+        total = float(sums[-1])
+    before = np.concatenate([[0.0], until[:-1]])
+    return np.asarray((until - before) / np.maximum(np.diff(middle, prepend=0), 1))
 
 
 def second_differences(values: Array) -> Array:
@@ -91,27 +99,36 @@ def blocks_of(y: Array, u: Array, fresh: NDArray[np.bool_], alive: NDArray[np.bo
         Step [s].
     """
     length = max(1, round(_BLOCK_S / dt))
-    starts = np.arange(0, y.size, length)
-    new = fresh & np.isfinite(y)
-    places = np.flatnonzero(new)
-    power = np.zeros(y.size)
-    power[places] = second_differences(y[places])
-    count = np.add.reduceat(new.astype(np.float64), starts)
-    mean = np.add.reduceat(np.where(new, y, 0.0), starts) / np.maximum(count, 1.0)
-    status = np.where(count > 0, PAIR, SKIP).astype(np.int8)
-    silent = np.add.reduceat((~np.isfinite(y) & alive).astype(np.float64), starts) > 0.5 * length
-    status[silent & (count == 0)] = SILENT
-    opening = np.nan_to_num(u)
+    opening, parts = Column(np.float64), []
+    before = np.zeros(0)  # the last two new samples of the cut before
+    for part in cut(y.size, length):
+        near, alone = y[part], ~np.isfinite(y[part])
+        starts = np.arange(0, near.size, length)
+        new = fresh[part] & ~alone
+        power = np.zeros(near.size)
+        values = np.concatenate([before, near[new]])
+        power[new] = second_differences(values)[before.size :]
+        before = values[-2:]
+        count = np.add.reduceat(new.astype(np.float64), starts)
+        mean = np.add.reduceat(np.where(new, near, 0.0), starts) / np.maximum(count, 1.0)
+        status = np.where(count > 0, PAIR, SKIP).astype(np.int8)
+        silent = np.add.reduceat((alone & alive[part]).astype(np.float64), starts) > 0.5 * length
+        status[silent & (count == 0)] = SILENT
+        parts.append((mean, np.add.reduceat(power, starts) / np.maximum(count, 1.0), count, status))
+        opening.append(np.nan_to_num(u[part]))
+        release(y, u)
+    mean, power, count, status = (np.concatenate(x) for x in zip(*parts, strict=True))
+    raw_u = opening.finish()
     return SteeringBlocks(
         length=length,
         dt=length * dt,
         mean=mean,
-        power=np.add.reduceat(power, starts) / np.maximum(count, 1.0),
+        power=power,
         count=count,
-        u=_between(opening, length, starts.size),
+        u=_between(raw_u, length, mean.size),
         status=status,
-        raw_u=opening,
-        second=np.full((starts.size, 7), np.nan),
+        raw_u=raw_u,
+        second=np.full((mean.size, 7), np.nan),
     )
 
 

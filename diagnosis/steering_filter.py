@@ -13,6 +13,7 @@ from diagnosis.modes import PAIR, STAY, trace
 from diagnosis.steering_blocks import SteeringBlocks
 from diagnosis.steering_model import SteeringModel
 from diagnosis.steering_step import enter
+from replay.spill import scratch
 
 Array = NDArray[np.float64]
 
@@ -100,7 +101,7 @@ def most_probable(
 def follow_path(blocks: SteeringBlocks, driven: Array, model: SteeringModel, path: NDArray[np.uint8]) -> SteeringPath:
     """States along a given path."""
     size = path.size
-    mean, cov = np.zeros((size, sr.STATES)), np.zeros((size, sr.STATES, sr.STATES))
+    mean, cov = scratch((size, sr.STATES), np.float64), scratch((size, sr.STATES, sr.STATES), np.float64)
     noise = np.ones((size, 2))
     b = blocks
     ss.follow(

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from diagnosis.modes import PAIR, SILENT, SKIP
 from diagnosis.noise import white_part
+from replay.spill import Column, blocks, release
 
 Array = NDArray[np.float64]
 
@@ -129,46 +130,85 @@ def blocks_of(
         Step [s].
     """
     width, (size, wheels) = block_width(dt), y.shape
-    n = -(-size // width)
-    fill = n * width - size
-    opening = np.nan_to_num(u)
-    opening = np.sign(opening) * np.maximum(np.abs(opening) - dead, 0.0)
-    opening = np.pad(opening, ((0, fill), (0, 0)), mode="edge")
-    parts = opening.reshape(n, width, wheels)
-    unsteady = parts.std(axis=1)
-    if width < 4:  # too few samples to see by themselves what changes within a block
-        quick = np.stack([np.abs(white_part(opening[:, i])) for i in range(wheels)], axis=1)
-        unsteady = np.maximum(unsteady, quick.reshape(n, width, wheels).mean(axis=1))
-    mean, count, jitter = np.zeros((n, wheels)), np.zeros((n, wheels)), np.zeros((n, wheels))
-    state = np.full((n, wheels), SKIP, dtype=np.int8)
-    for i in range(wheels):
-        new = np.flatnonzero(status[:, i] == PAIR)
-        place = new // width
-        count[:, i] = np.bincount(place, minlength=n)
-        mean[:, i] = np.bincount(place, weights=y[new, i], minlength=n) / np.maximum(count[:, i], 1)
-        if new.size > 1:
-            gap = np.diff(new)
-            near = gap <= 1.5 * float(np.median(gap))
-            steps = np.where(near, np.diff(y[new, i]) ** 2, 0.0)
-            known = np.bincount(place[1:], weights=near, minlength=n)
-            jitter[:, i] = np.bincount(place[1:], weights=steps, minlength=n) / np.maximum(known, 1)
-        silent = np.bincount(np.flatnonzero(status[:, i] == SILENT) // width, minlength=n) > 0.5 * width
-        state[silent, i] = SILENT
-        state[count[:, i] > 0, i] = PAIR
+    fill = -size % width
     edge = ((0, fill), (0, 0))
+    opening, parts = Column(np.float64, (wheels,)), []
+    ends = [_Ends() for _ in range(wheels)]
+    usual = [_usual_gap(status[:, i]) for i in range(wheels)]
+    for cut in blocks(size, width):
+        last = edge if cut.stop == size else ((0, 0), (0, 0))
+        beyond = np.nan_to_num(u[cut])
+        beyond = np.pad(np.sign(beyond) * np.maximum(np.abs(beyond) - dead, 0.0), last, mode="edge")
+        n = len(beyond) // width
+        state = np.full((n, wheels), SKIP, dtype=np.int8)
+        sums = np.zeros((3, n, wheels))
+        for i in range(wheels):
+            sums[:, :, i] = _samples(y[cut, i], status[cut, i], n, width, usual[i], ends[i])
+            silent = np.bincount(np.flatnonzero(status[cut, i] == SILENT) // width, minlength=n) > 0.5 * width
+            state[silent, i] = SILENT
+            state[sums[1, :, i] > 0, i] = PAIR
+        opening.append(beyond)
+        shape = (n, width, wheels)
+        parts.append(
+            (
+                *sums,
+                beyond.reshape(shape).std(axis=1),
+                state,
+                np.pad(quiet[cut], last, mode="edge").reshape(shape).all(axis=1),
+                np.pad(ratio[cut], last, mode="edge").reshape(shape).mean(axis=1),
+                np.pad(turn[cut], last, mode="edge").reshape(shape).mean(axis=1),
+            )
+        )
+        release(y, u, ratio, turn)
+    mean, count, jitter, unsteady, state, still, ratios, turns = (np.concatenate(x) for x in zip(*parts, strict=True))
+    driven = opening.finish()
+    if width < 4:  # too few samples to see by themselves what changes within a block
+        quick = np.stack([np.abs(white_part(driven[:, i])) for i in range(wheels)], axis=1)
+        unsteady = np.maximum(unsteady, quick.reshape(-1, width, wheels).mean(axis=1))
     return WheelBlocks(
         width=width,
         raw_dt=dt,
         y=mean,
         count=count,
         jitter=jitter,
-        u=np.ascontiguousarray(opening),
+        u=driven,
         unsteady=unsteady,
         status=state,
-        quiet=np.asarray(np.pad(quiet, edge, mode="edge").reshape(n, width, wheels).all(axis=1)),
-        ratio=np.pad(ratio, edge, mode="edge").reshape(n, width, wheels).mean(axis=1),
-        turn=np.pad(turn, edge, mode="edge").reshape(n, width, wheels).mean(axis=1),
+        quiet=still,
+        ratio=ratios,
+        turn=turns,
     )
+
+
+@dataclass
+class _Ends:
+    """Last new sample of the cut before: its place from the next cut's first sample, and its value."""
+
+    place: int | None = None
+    value: float = 0.0
+
+
+def _usual_gap(status: NDArray[np.int8]) -> float:
+    """Median distance of new samples in steps; 0 where there are fewer than two."""
+    new = np.flatnonzero(status == PAIR)
+    return float(np.median(np.diff(new))) if new.size > 1 else 0.0
+
+
+def _samples(y: Array, status: NDArray[np.int8], n: int, width: int, usual: float, ends: _Ends) -> Array:
+    """Mean, number and mean squared step of the new samples of n blocks, shape (3, n)."""
+    new = np.flatnonzero(status == PAIR)
+    place, values = new // width, y[new]
+    count = np.bincount(place, minlength=n)
+    mean = np.bincount(place, weights=values, minlength=n) / np.maximum(count, 1)
+    if ends.place is not None:
+        new, values, place = np.r_[ends.place, new], np.r_[ends.value, values], np.r_[0, place]
+    near = np.diff(new) <= 1.5 * usual
+    steps = np.where(near, np.diff(values) ** 2, 0.0)
+    known = np.bincount(place[1:], weights=near, minlength=n)
+    jitter = np.bincount(place[1:], weights=steps, minlength=n) / np.maximum(known, 1)
+    if new.size:
+        ends.place, ends.value = int(new[-1]) - status.size, float(values[-1])
+    return np.stack([mean, count, jitter])
 
 
 def per_sample(values: NDArray[np.generic], width: int, size: int) -> NDArray[np.generic]:

@@ -8,7 +8,9 @@ The wheels share one pump and, on the ground, one body: `wheel_joint` runs them 
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +20,8 @@ from diagnosis.modes import STAY, trace
 from diagnosis.wheel_blocks import WheelBlocks
 from diagnosis.wheel_runs import Runs
 from diagnosis.wheel_scan import A_GAIN, HEALTHY, MODELS, WheelConstants, enter
+from replay import spill
+from replay.spill import Column, release
 
 Array = NDArray[np.float64]
 
@@ -139,7 +143,7 @@ class JointPass:
 
     Attributes
     ----------
-    back : NDArray[np.uint8], shape (wheels, n, models)
+    back : tuple of NDArray[np.uint8], one per wheel, shape (n, models)
         Back-pointers.
     best : NDArray[np.uint8], shape (n, wheels)
         Most probable model by what came before: a causal reading.
@@ -151,7 +155,7 @@ class JointPass:
         For the next blocks.
     """
 
-    back: NDArray[np.uint8]
+    back: tuple[NDArray[np.uint8], ...]
     best: NDArray[np.uint8]
     fault: Array
     inputs: Array
@@ -160,7 +164,12 @@ class JointPass:
     @property
     def evidence(self) -> float:
         """Log-likelihood of the most probable paths."""
-        return float(self.inputs[:, :, 7].sum())
+        return float(self.gains.sum())
+
+    @cached_property
+    def gains(self) -> Array:
+        """Log-likelihood of each block of each wheel, shape (n, wheels)."""
+        return np.ascontiguousarray(self.inputs[:, :, 7])
 
 
 def initial_state(first: Array, model: JointModel, dt: float, raw_dt: float) -> JointState:
@@ -210,18 +219,41 @@ def forward(
         In which model each wheel is taken to be by the others; `STAY`, and None: in its own most probable one.
     """
     n, wheels = blocks.y.shape
-    if given is None:
-        given = np.full((n, wheels), STAY, dtype=np.uint8)
-    dt, raw_dt = blocks.dt, blocks.raw_dt
     if state is None:
-        state = initial_state(first_speeds(blocks), model, dt, raw_dt)
+        state = initial_state(first_speeds(blocks), model, blocks.dt, blocks.raw_dt)
+    back = [Column(np.uint8, (MODELS,)) for _ in range(wheels)]
+    best, fault, inputs = Column(np.uint8, (wheels,)), Column(np.float64, (wheels,)), Column(np.float64, (wheels, 8))
+    for cut in cuts(n, width=blocks.width):
+        part = blocks if cut.stop - cut.start == n else blocks.part(cut.start, cut.stop)
+        taken = np.full(part.y.shape, STAY, dtype=np.uint8) if given is None else given[cut]
+        done = _forward(part, model, state, taken)
+        state = done.state
+        best.append(done.best)
+        fault.append(done.fault)
+        inputs.append(done.inputs)
+        for column, pointers in zip(back, done.back, strict=True):
+            column.append(pointers)
+        release(blocks.u)
+    return JointPass(tuple(column.finish() for column in back), best.finish(), fault.finish(), inputs.finish(), state)
+
+
+def cuts(size: int, width: int) -> Iterator[slice]:
+    """Parts of `size` blocks of `width` samples that hold about `replay.spill.BLOCK` samples each."""
+    step = max(1, spill.BLOCK // width)
+    return (slice(at, min(at + step, size)) for at in range(0, size, step))
+
+
+def _forward(blocks: WheelBlocks, model: JointModel, state: JointState, given: NDArray[np.uint8]) -> JointPass:
+    """Run the recursion over blocks that are in memory at once."""
+    n, wheels = blocks.y.shape
+    dt, raw_dt = blocks.dt, blocks.raw_dt
     dummy = WheelFilterModel(1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0)
     used = [dummy if w is None else w for w in model.wheels]
     per_opening = np.array([w.K * raw_dt / w.tau for w in used])
     back = np.full((n, wheels, MODELS), STAY, dtype=np.uint8)
     best, fault = np.zeros((n, wheels), dtype=np.uint8), np.zeros((n, wheels))
     inputs = np.zeros((n, wheels, 8))
-    score, mean, cov, spill = (x.copy() for x in (state.score, state.mean, state.cov, state.spill))
+    score, mean, cov, rest = (x.copy() for x in (state.score, state.mean, state.cov, state.spill))
     wheel_joint.forward(
         blocks.u,
         blocks.y,
@@ -242,14 +274,14 @@ def forward(
         score,
         mean,
         cov,
-        spill,
+        rest,
         back,
         best,
         fault,
         inputs,
     )
-    back = np.ascontiguousarray(back.transpose(1, 0, 2))
-    return JointPass(back, best, fault, inputs, JointState(score, mean, cov, spill))
+    pointers = tuple(np.ascontiguousarray(back[:, i]) for i in range(wheels))
+    return JointPass(pointers, best, fault, inputs, JointState(score, mean, cov, rest))
 
 
 def most_probable(done: JointPass, wheel: int) -> tuple[NDArray[np.uint8], NDArray[np.bool_]]:

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,10 +15,11 @@ from diagnosis.model_based import WheelsData
 from diagnosis.pairs import sample_status
 from diagnosis.parity import slipping
 from diagnosis.wheel_blocks import block_width
-from diagnosis.wheel_model import WheelModelFit, demand, identify, low_passed
+from diagnosis.wheel_model import WheelModelFit, demand, identify, low_passed_on
 from replay.kinematics import low_pass, speed_ratios, wheel_angles
-from replay.loop import Replay, stack
+from replay.loop import Replay, any_finite, stack
 from replay.machine import Machine, Noise, WheelPlant
+from replay.spill import Column, blocks, in_blocks, release
 from replay.timeline import Timeline
 
 Array = NDArray[np.float64]
@@ -33,25 +37,25 @@ class WheelChannels:
     true: Array
     applied: Array
 
-    @property
+    @cached_property
     def has_true(self) -> NDArray[np.bool_]:
         """Wheels with a second speed."""
-        return np.asarray(np.isfinite(self.true).any(axis=0))
+        return any_finite(self.true)
 
-    @property
+    @cached_property
     def has_applied(self) -> NDArray[np.bool_]:
         """Wheels whose opening is measured."""
-        return np.asarray(np.isfinite(self.applied).any(axis=0))
+        return any_finite(self.applied)
 
-    @property
+    @cached_property
     def speed(self) -> Array:
         """The better speed of each wheel [m/s]."""
-        return np.where(self.has_true, self.true, self.v)
+        return in_blocks(lambda true, v: np.asarray(np.where(self.has_true, true, v)), self.true, self.v)
 
-    @property
+    @cached_property
     def opening(self) -> Array:
         """The better opening of each wheel [fraction]."""
-        return np.where(self.has_applied, self.applied, self.u)
+        return in_blocks(lambda applied, u: np.asarray(np.where(self.has_applied, applied, u)), self.applied, self.u)
 
 
 def wheel_channels(timeline: Timeline, machine: Machine) -> WheelChannels:
@@ -63,24 +67,29 @@ def wheel_channels(timeline: Timeline, machine: Machine) -> WheelChannels:
 
 def wheel_fit(channels: WheelChannels, replay: Replay, timeline: Timeline, machine: Machine) -> WheelModelFit | None:
     """Wheel models of the machine file, or identified in this mission; None where nothing allows it."""
-    if not (np.isfinite(channels.opening).any() and np.isfinite(channels.speed).any()):
+    if not (any_finite(channels.opening).any() and any_finite(channels.speed).any()):
         return None
     given = {i: p for i, w in enumerate(machine.wheels) if (p := machine.plant.wheels.get(w)) is not None}
-    moving = np.abs(np.where(np.isfinite(replay.v_ref), replay.v_ref, channels.speed)) > machine.limits.driving_speed
     width = min(block_width(timeline.dt), timeline.size)
-    n = timeline.size // width
+    limit = machine.limits.driving_speed
 
-    def mean(x: Array) -> Array:
-        return np.asarray(x[: n * width].reshape(n, width, x.shape[1]).mean(axis=1))
+    def mean(function: Callable[..., NDArray[Any]], *columns: Array) -> Array:
+        out = []
+        for part in blocks(timeline.size // width * width, width):
+            x = np.asarray(function(*(c[part] for c in columns)), np.float64)
+            out.append(x.reshape(-1, width, x.shape[1]).mean(axis=1))
+            release(*columns)
+        return np.concatenate(out)
 
+    moving = mean(lambda ref, v: np.abs(np.where(np.isfinite(ref), ref, v)) > limit, replay.v_ref, channels.speed)
     return identify(
-        mean(channels.speed),
-        mean(channels.opening),
-        np.asarray(mean(moving.astype(np.float64)) > 0.5),
+        mean(np.asarray, channels.speed),
+        mean(np.asarray, channels.opening),
+        np.asarray(moving > 0.5),
         timeline.dt * width,
         given,
         machine.plant.flow,
-        mean(np.abs(np.nan_to_num(channels.opening))),
+        mean(lambda u: np.abs(np.nan_to_num(u)), channels.opening),
     )
 
 
@@ -89,16 +98,12 @@ def slip_of(
 ) -> NDArray[np.bool_]:
     """Where a wheel breaks the parity of the body; nowhere without geometry, or where an axle's angle is in doubt."""
     geometry = machine.geometry
-    if (
-        geometry is None
-        or v.shape[1] < 4
-        or not np.isfinite(v).any(axis=0).all()
-        or not np.isfinite(angle).any(axis=0).all()
-    ):
+    if geometry is None or v.shape[1] < 4 or not any_finite(v).all() or not any_finite(angle).all():
         return np.zeros(v.shape, dtype=np.bool_)
     least = 2.5 * machine.limits.min_sat
-    slip = slipping(v, angle, replay.phi_ref, wheel_angles(angle, geometry), geometry, timeline.dt, least)
-    return np.asarray(slip & ~np.asarray(doubtful.any(axis=1))[:, None])
+    turned = in_blocks(lambda a: wheel_angles(a, geometry), angle)
+    slip = slipping(v, angle, replay.phi_ref, turned, geometry, timeline.dt, least)
+    return in_blocks(lambda s, d: s & ~d.any(axis=1)[:, None], slip, doubtful)
 
 
 def wheels_data(
@@ -124,7 +129,9 @@ def wheels_data(
     y, u = channels.speed, channels.opening
     status = np.zeros((size, wheels), dtype=np.int8)
     quiet = np.ones((size, wheels), dtype=np.bool_)
-    residual = np.full((size, wheels), np.nan)
+    nothing = np.broadcast_to(np.nan, (size,))
+    residuals: list[Array] = [nothing] * wheels
+    has = any_finite(y) & any_finite(u)
     names: list[tuple[str, str]] = []
     plants: list[WheelPlant | None] = []
     limit = _QUIET * machine.limits.driving_speed
@@ -133,16 +140,14 @@ def wheels_data(
         opening = f"wheel.{wheel}.{'u_applied' if channels.has_applied[i] else 'u'}"
         names.append((speed, opening))
         plant = fit.plants[i]
-        if plant is None or not np.isfinite(y[:, i]).any() or not np.isfinite(u[:, i]).any():
+        if plant is None or not has[i]:
             plants.append(None)
             continue
         plants.append(plant)
         status[:, i] = sample_status(y[:, i], u[:, i], timeline.fresh[speed], alive(timeline, counts, speed), dt)
-        beyond = np.sign(u[:, i]) * np.maximum(np.abs(u[:, i]) - plant.dead, 0.0)
-        asked = np.abs(plant.K * np.nan_to_num(beyond))
-        quiet[:, i] = (np.abs(np.nan_to_num(replay.v_ref[:, i])) < limit) & (asked < limit)
-        residual[:, i] = y[:, i] - plant.K * low_passed(beyond, plant.tau, dt) - plant.offset
-    residual[_starved(fit, u, machine.plant.flow, dt)] = np.nan
+        residuals[i], quiet[:, i] = _apart(y[:, i], u[:, i], replay.v_ref[:, i], plant, limit, dt)
+    starved = _starved(fit, u, machine.plant.flow, dt)
+    residual = in_blocks(lambda s, *r: np.where(s[:, None], np.nan, np.stack(r, axis=1)), starved, *residuals)
     ratio, turn = _in_motion(angle, machine, size, dt)
     return (
         WheelsData(
@@ -166,26 +171,52 @@ def wheels_data(
     )
 
 
+def _apart(
+    y: Array, u: Array, v_ref: Array, plant: WheelPlant, limit: float, dt: float
+) -> tuple[Array, NDArray[np.bool_]]:
+    """Speed beyond what the opening drives [m/s], and where the wheel is neither commanded nor driven."""
+    residual, quiet = Column(np.float64), Column(np.bool_)
+    state: float | None = None
+    for part in blocks(y.size):
+        beyond = np.sign(u[part]) * np.maximum(np.abs(u[part]) - plant.dead, 0.0)
+        asked = np.abs(plant.K * np.nan_to_num(beyond))
+        quiet.append((np.abs(np.nan_to_num(v_ref[part])) < limit) & (asked < limit))
+        driven, state = low_passed_on(beyond, plant.tau, dt, state)
+        residual.append(y[part] - plant.K * driven - plant.offset)
+        release(y, u, v_ref)
+    return residual.finish(), quiet.finish()
+
+
 def _starved(fit: WheelModelFit, u: Array, flow: float | None, dt: float) -> NDArray[np.bool_]:
     """Where the pump cannot feed what the valves ask for, or could not within the last three lags; shape (n,)."""
     if flow is None or not any(fit.plants):
         return np.zeros(u.shape[0], dtype=np.bool_)
-    asked = demand(np.abs(np.nan_to_num(u)), fit) > flow
-    last = np.maximum.accumulate(np.where(asked, np.arange(asked.size), -(10**9)))
     lag = max(p.tau for p in fit.plants if p is not None)
-    return np.asarray(np.arange(asked.size) - last <= 3 * lag / dt)
+    out, last = Column(np.bool_), -(10**9)
+    for part in blocks(len(u)):
+        steps = np.arange(part.start, part.stop)
+        asked = demand(np.abs(np.nan_to_num(u[part])), fit) > flow
+        near = np.maximum.accumulate(np.where(asked, steps, last))
+        out.append(steps - near <= 3 * lag / dt)
+        last = int(near[-1])
+        release(u)
+    return out.finish()
 
 
 def _in_motion(angle: Array, machine: Machine, size: int, dt: float) -> tuple[Array, Array]:
     """Wheel speed per speed of the body [1], and what each wheel rolls less because it steers [m/s]."""
     wheels = len(machine.wheels)
     geometry = machine.geometry
-    if geometry is None or not np.isfinite(angle).any(axis=0).all():
-        return np.full((size, wheels), np.nan), np.zeros((size, wheels))
-    ratio = speed_ratios(angle, geometry)
-    turned = wheel_angles(angle, geometry)
-    turn = np.zeros((size, wheels))
-    for i, wheel in enumerate(geometry.wheels.values()):
-        rate = np.diff(turned[:, i], prepend=turned[:1, i]) / dt
-        turn[:, i] = low_pass(rate, dt, _STEER_HZ) * wheel.offset
-    return ratio, turn
+    if geometry is None or not any_finite(angle).all():
+        return np.broadcast_to(np.nan, (size, wheels)), np.broadcast_to(0.0, (size, wheels))
+    ratio = in_blocks(lambda a: speed_ratios(a, geometry), angle)
+    turn = Column(np.float64, (wheels,))
+    before, state = wheel_angles(angle[:1], geometry), [np.nan] * wheels
+    for part in blocks(size):
+        turned = wheel_angles(angle[part], geometry)
+        rate = np.diff(turned, axis=0, prepend=before) / dt
+        smooth = np.stack([low_pass(rate[:, i], dt, _STEER_HZ, state[i]) for i in range(wheels)], axis=1)
+        turn.append(smooth * np.array([w.offset for w in geometry.wheels.values()]))
+        before, state = turned[-1:], [float(x) for x in smooth[-1]]
+        release(angle)
+    return ratio, turn.finish()

@@ -54,9 +54,15 @@ class WheelModelFit:
 
 def low_passed(u: Array, tau: float, dt: float) -> Array:
     """Response of a first-order lag to u held over each step; NaN counts as 0."""
+    return low_passed_on(u, tau, dt, None)[0] if u.size else u
+
+
+def low_passed_on(u: Array, tau: float, dt: float, state: float | None) -> tuple[Array, float]:
+    """`low_passed` of a block, with the state from the block before and for the next; None before the first."""
     a = np.exp(-dt / tau)
     filled = np.nan_to_num(u)
-    return np.asarray(lfilter([0.0, 1 - a], [1.0, -a], filled, zi=[filled[0]])[0]) if u.size else u
+    out, last = lfilter([0.0, 1 - a], [1.0, -a], filled, zi=[filled[0] if state is None else state])
+    return np.asarray(out), float(last[0])
 
 
 def identify(

@@ -39,7 +39,7 @@ def settled(blocks: WheelBlocks, model: wf.JointModel, done: wf.JointPass) -> wf
         for i, a, b in doubted:
             without[a:b, i] = ws.HEALTHY
         trial = wf.forward(blocks, model, given=without)
-        gain = np.cumsum((trial.inputs[:, :, 7] - done.inputs[:, :, 7]).sum(axis=1))
+        gain = np.cumsum((trial.gains - done.gains).sum(axis=1))
         margin = round(_MARGIN_S / blocks.dt)
         taken_back = 0
         for i, a, b in doubted:

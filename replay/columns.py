@@ -5,11 +5,12 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from replay.envelope import envelope, rows_of, step_of
 from replay.loop import Replay
 from replay.machine import Machine
 from replay.timeline import Timeline
 
-Array = NDArray[np.float64]
+Array = NDArray[np.float64] | NDArray[np.float32]
 
 # Leaf of the column name and field of `Replay`; shown in reports, and for the export alone.
 _WHEEL = (
@@ -27,6 +28,7 @@ _WHEEL_DETAIL = (
     ("psi_implied_squared", "implied_squared"),
     ("psi_forcing", "forcing"),
 )
+_AT_FULL_RATE = ("v_ref", "phi_ref", "steer_u")
 _AXLE = (("phi_ref", "phi_ref"), ("u", "steer_u"), ("u_difference", "steer_difference"))
 
 
@@ -46,17 +48,20 @@ def replay_columns(timeline: Timeline, replay: Replay, machine: Machine, *, deta
 
     Returns
     -------
-    dict[str, NDArray[np.float64]], each of shape (n,)
+    dict[str, NDArray[np.float64]], each of the rows of `replay.envelope` for the replay's bucket
         ``t`` [s], then signals under their canonical names, then ``replay.<part>.<quantity>``; SI, NaN where there
         is no sample. A replayed quantity that is nowhere defined has no column.
     """
-    columns = {"t": timeline.t}
+    bucket = replay.bucket
+    columns = {"t": np.arange(rows_of(timeline.size, bucket)) * (timeline.dt * step_of(bucket))}
     names = (*machine.canonical_signals(), *timeline.signals)
-    columns |= {name: timeline.signals[name] for name in dict.fromkeys(names) if name in timeline.signals}
+    columns |= {n: envelope(timeline.signals[n], bucket) for n in dict.fromkeys(names) if n in timeline.signals}
     for parts, leaves in ((machine.wheels, _WHEEL + (_WHEEL_DETAIL if detail else ())), (machine.axles, _AXLE)):
         for i, part in enumerate(parts):
             for leaf, field in leaves:
-                values: Array = getattr(replay, field)[:, i]
+                values = getattr(replay, field)[:, i]
+                if field in _AT_FULL_RATE:
+                    values = envelope(values, bucket)
                 if np.isfinite(values).any():
                     columns[f"replay.{part}.{leaf}"] = values
     return columns

@@ -7,7 +7,7 @@ not turn the wheels round (φ = atan2(s·v_ky, s·v_kx), s = sgn(v_kx)), and ω_
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numba import njit
@@ -38,10 +38,29 @@ class WheelCommands:
     axle_angle: NDArray[np.float64]
 
 
-def steering_angle(v_x: NDArray[np.float64], v_y: NDArray[np.float64], max_steer: float) -> NDArray[np.float64]:
+@dataclass
+class CommandState:
+    """What `wheel_commands` carries from block to block; empty before the first one.
+
+    Attributes
+    ----------
+    held : dict[str, float]
+        Last commanded angle of each wheel and axle [rad].
+    source, rate : dict[str, float]
+        Last angle whose derivative was taken [rad], and its low-passed derivative [rad/s], of each wheel.
+    """
+
+    held: dict[str, float] = field(default_factory=dict)
+    source: dict[str, float] = field(default_factory=dict)
+    rate: dict[str, float] = field(default_factory=dict)
+
+
+def steering_angle(
+    v_x: NDArray[np.float64], v_y: NDArray[np.float64], max_steer: float, held: float = 0.0
+) -> NDArray[np.float64]:
     """Steering angle of a point that moves with (v_x, v_y): L2 (2) along the rolling direction.
 
-    At standstill (|v| ≤ 1 mm/s, or NaN) the last angle is held; before any motion it is 0.
+    At standstill (|v| ≤ 1 mm/s, or NaN) the last angle is held; before any motion it is `held`.
 
     Parameters
     ----------
@@ -49,6 +68,8 @@ def steering_angle(v_x: NDArray[np.float64], v_y: NDArray[np.float64], max_steer
         Velocity of the joint in the body frame [m/s].
     max_steer : float
         The angle is clipped to ±max_steer [rad].
+    held : float
+        Last angle of the block before [rad].
 
     Returns
     -------
@@ -59,13 +80,13 @@ def steering_angle(v_x: NDArray[np.float64], v_y: NDArray[np.float64], max_steer
     angle = np.clip(np.arctan2(s * v_y, s * v_x), -max_steer, max_steer)
     moving = np.hypot(v_x, v_y) > _STANDSTILL
     last = np.maximum.accumulate(np.where(moving, np.arange(angle.size), -1))
-    return np.where(last >= 0, angle[np.maximum(last, 0)], 0.0)
+    return np.where(last >= 0, angle[np.maximum(last, 0)], held)
 
 
-def low_pass(x: NDArray[np.float64], dt: float, cutoff_hz: float) -> NDArray[np.float64]:
-    """First-order low-pass, started at the first sample; NaN is passed over."""
+def low_pass(x: NDArray[np.float64], dt: float, cutoff_hz: float, state: float = np.nan) -> NDArray[np.float64]:
+    """First-order low-pass, started at the first sample or at the last output of the block before; NaN is passed over."""
     a = 1.0 - np.exp(-2 * np.pi * cutoff_hz * dt)
-    return np.asarray(_scan_low_pass(x, a, np.nan)[0])
+    return np.asarray(_scan_low_pass(x, a, state)[0])
 
 
 @njit(cache=True)
@@ -91,6 +112,7 @@ def wheel_commands(
     phi_dot: PhiDot = "command",
     phi_dot_hz: float = 5.0,
     measured_angle: NDArray[np.float64] | None = None,
+    state: CommandState | None = None,
 ) -> WheelCommands:
     """Map the commanded body motion to wheel speeds and steering angles: L1 (1), L2 (2).
 
@@ -110,7 +132,10 @@ def wheel_commands(
         Cut-off of the low-pass on φ̇ [Hz].
     measured_angle : NDArray[np.float64], shape (n, wheels), or None
         Measured φ_i [rad], for ``phi_dot="measured"``.
+    state : CommandState or None
+        Carried from the block before, and updated for the next one; None: a whole mission.
     """
+    state = CommandState() if state is None else state
     names = list(geometry.wheels)
     n = v.size
     speed = np.empty((n, len(names)))
@@ -123,12 +148,15 @@ def wheel_commands(
             angle[:, i] = 0.0
             speed[:, i] = v_x - omega * w.offset
             continue
-        angle[:, i] = steering_angle(v_x, v_y, max_steer)
+        angle[:, i] = steering_angle(v_x, v_y, max_steer, state.held.get(name, 0.0))
+        state.held[name] = float(angle[-1, i])
         if phi_dot == "zero" or (phi_dot == "measured" and measured_angle is None):
             rate = np.zeros(n)
         else:
             source = angle[:, i] if measured_angle is None or phi_dot == "command" else measured_angle[:, i]
-            rate = low_pass(np.diff(source, prepend=source[:1]) / dt, dt, phi_dot_hz)
+            before = state.source.get(name, float(source[0]))
+            rate = low_pass(np.diff(source, prepend=before) / dt, dt, phi_dot_hz, state.rate.get(name, np.nan))
+            state.source[name], state.rate[name] = float(source[-1]), float(rate[-1])
         # L1 (1): v_c,i = s·|v_k| − (ω_b + φ̇)·d_i
         speed[:, i] = s * np.hypot(v_x, v_y) - (omega + rate) * w.offset
     axles = geometry.axles
@@ -136,7 +164,9 @@ def wheel_commands(
     for j, axle in enumerate(axles):
         x = geometry.axle_x(axle)
         y = geometry.wheels[axle].y if axle in geometry.wheels else 0.0
-        axle_angle[:, j] = steering_angle(v - omega * y, omega * x, max_steer)
+        key = f"axle {axle}"
+        axle_angle[:, j] = steering_angle(v - omega * y, omega * x, max_steer, state.held.get(key, 0.0))
+        state.held[key] = float(axle_angle[-1, j])
     return WheelCommands(speed, angle, axle_angle)
 
 

@@ -1,7 +1,8 @@
 """Which reading of the law, and which λ, explain a recorded valve command.
 
 For every reading the command is linear in λ and in one more unknown: Ψ̂(0)² where Ψ̂ decays as printed, ζ² where it is
-forced from zero (Ψ̂ = ζ·G, G' = −ρG + ½e²). Fitting both together keeps Ψ̂ from biasing λ.
+forced from zero (Ψ̂ = ζ·G, G' = −ρG + ½e²). Fitting both together keeps Ψ̂ from biasing λ. Of long missions every few
+samples are fitted; Ψ̂ runs through all of them.
 """
 
 from __future__ import annotations
@@ -11,7 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from replay.mfhca import LAW_TEXT, Array, adaptive_sign, decay_rate, forced_psi, printed_decay, proportional_part
+from replay.loop_scan import decay_shapes, decimated
+from replay.mfhca import LAW_TEXT, Array, adaptive_sign, proportional_part
 
 FIT_PSI = ("printed", "forced")
 MIN_EXPLAINED = 0.9
@@ -78,15 +80,16 @@ def fit_law(
     tuple[LawFit, ...]
         Empty where no wheel has 100 usable samples.
     """
+    stride = decimated(u.shape[0])
+    whole_v, whole_v_c = v, v_c
+    u, v, v_c = (np.ascontiguousarray(x[::stride]) for x in (u, v, v_c))
     usable = np.isfinite(u) & np.isfinite(v) & np.isfinite(v_c) & (np.abs(u) < u_max * (1 - 1e-9))
     wheels = [i for i in range(u.shape[1]) if np.count_nonzero(usable[:, i]) >= 100]
     if not wheels:
         return ()
     shapes: dict[tuple[int, str], Array] = {}
     for i in wheels:
-        rho = decay_rate(v[:, i], v_c[:, i], xi, beta)
-        shapes[i, "printed"] = printed_decay(rho, dt)[0] ** 2
-        shapes[i, "forced"] = forced_psi(rho, v[:, i] - v_c[:, i], dt, 1.0)[0] ** 2
+        shapes[i, "printed"], shapes[i, "forced"] = decay_shapes(whole_v[:, i], whole_v_c[:, i], dt, xi, beta)
     fits = [_fit_one(law, psi, u, v, v_c, usable, wheels, shapes) for law in laws for psi in FIT_PSI]
     return tuple(sorted(fits, key=lambda f: f.rms))
 

@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from replay import mfhca
-from replay.kinematics import WheelCommands, wheel_angles, wheel_commands
+from replay.envelope import envelope, in_buckets, rows_of
+from replay.kinematics import CommandState, wheel_angles, wheel_commands
 from replay.law_fit import MIN_EXPLAINED, LawFit, fit_law
+from replay.loop_scan import LoopLaw, scan_wheel
 from replay.machine import Machine
+from replay.spill import Column, beside, blocks, in_blocks, release
 from replay.timeline import Timeline
 
 Array = NDArray[np.float64]
@@ -29,12 +33,19 @@ class Reading:
 class Replay:
     """The replayed loop; arrays are (n, wheels) or (n, axles), NaN where not defined.
 
+    All but `v_ref`, `phi_ref` and `steer_u` are for pictures and exports: they have the rows of `replay.envelope` for
+    `bucket`, which are the n steps themselves where it is 1.
+
     Attributes
     ----------
     v_ref : Array
         Commanded wheel speed v_c,i [m/s], recorded where logged, else by L1 (1).
     phi_ref : Array
         Commanded axle angle [rad], recorded where logged, else by L2 (2).
+    steer_u : Array
+        Replayed steering command L17 (15) [fraction].
+    bucket : int
+        Steps per bucket of the fields below.
     wheel_phi : Array
         Measured angle of each wheel [rad].
     e : Array
@@ -53,8 +64,8 @@ class Replay:
         Replayed valve command [fraction].
     u_difference : Array
         Recorded − replayed valve command [fraction].
-    steer_u, steer_difference : Array
-        Replayed steering command L17 (15), and recorded − replayed [fraction].
+    steer_difference : Array
+        Recorded − replayed steering command [fraction].
     fits : tuple[LawFit, ...]
         Readings of the law fitted to the recorded command, best first.
     readings : tuple[Reading, ...]
@@ -63,6 +74,8 @@ class Replay:
 
     v_ref: Array
     phi_ref: Array
+    steer_u: Array
+    bucket: int
     wheel_phi: Array
     e: Array
     rho: Array
@@ -73,7 +86,6 @@ class Replay:
     psi: Array
     u: Array
     u_difference: Array
-    steer_u: Array
     steer_difference: Array
     fits: tuple[LawFit, ...]
     readings: tuple[Reading, ...]
@@ -81,15 +93,13 @@ class Replay:
 
 def stack(timeline: Timeline, names: list[str]) -> Array:
     """Columns of a timeline side by side; NaN columns for signals that are not logged."""
-    nothing = np.full(timeline.size, np.nan)
-    return (
-        np.stack([timeline.signals.get(name, nothing) for name in names], axis=1)
-        if names
-        else np.empty((timeline.size, 0))
-    )
+    nothing = np.broadcast_to(np.nan, (timeline.size,))
+    if not names:
+        return np.empty((timeline.size, 0))
+    return beside([timeline.signals.get(name, nothing) for name in names])
 
 
-def replay_loop(timeline: Timeline, machine: Machine) -> Replay:
+def replay_loop(timeline: Timeline, machine: Machine, bucket: int = 1) -> Replay:
     """Replay the MFHCA loop open-loop with the recorded measurements.
 
     Parameters
@@ -98,88 +108,90 @@ def replay_loop(timeline: Timeline, machine: Machine) -> Replay:
         Aligned signals.
     machine : Machine
         Geometry, law and readings.
+    bucket : int
+        Steps per bucket of what is for pictures alone; see `replay.envelope`.
     """
     readings: list[Reading] = []
-    wheels, axles = machine.wheels, machine.axles
-    v = stack(timeline, [f"wheel.{w}.v" for w in wheels])
-    u = stack(timeline, [f"wheel.{w}.u" for w in wheels])
-    phi = stack(timeline, [f"steer.{a}.phi" for a in axles])
-    v_ref, phi_ref, wheel_phi = _commands(timeline, machine, phi, readings)
     control = machine.control
-    rho = mfhca.decay_rate(v, v_ref, control.xi, control.beta)
-    e = v - v_ref
-    unfit = "" if np.isfinite(u).any() else "no recorded valve command to fit"
+    v = stack(timeline, [f"wheel.{w}.v" for w in machine.wheels])
+    u = stack(timeline, [f"wheel.{w}.u" for w in machine.wheels])
+    phi = stack(timeline, [f"steer.{a}.phi" for a in machine.axles])
+    v_ref, phi_ref, wheel_phi = _commands(timeline, machine, phi, readings)
+    unfit = (
+        "" if any(np.isfinite(u[part]).any() for part in blocks(timeline.size)) else "no recorded valve command to fit"
+    )
+    steer_recorded = stack(timeline, [f"steer.{a}.u" for a in machine.axles])
     if timeline.open_loop:  # the recorded commands answer to other measurements than these
-        u, unfit = np.full_like(u, np.nan), "faults were injected into this recording, its controller never met them"
-    law, psi_mode, lambda_, zeta, psi0, fits = _choose(machine, u, v, v_ref, timeline.dt, unfit, readings)
-    shape = v.shape
-    nothing = np.full(shape, np.nan)
-    psi_printed, implied, psi, u_replayed, forcing = (nothing.copy() for _ in range(5))
-    if law != "none":
-        for i in range(len(wheels)):
-            if not np.isfinite(v[:, i]).any() or not np.isfinite(v_ref[:, i]).any():
-                continue
-            squared, bound = mfhca.implied_psi_squared(law, u[:, i], v[:, i], v_ref[:, i], lambda_, control.u_max)
-            decay, _ = mfhca.printed_decay(rho[:, i], timeline.dt)
-            start = control.psi0 if control.psi0 is not None else mfhca.fit_psi0(decay, squared, ~bound)
-            if psi_mode == "printed" and control.psi0 is None and fits:
-                start = psi0[i]
-            psi_printed[:, i] = start * decay
-            implied[:, i] = squared
-            forcing[:, i] = mfhca.implied_forcing(np.where(bound, np.nan, squared), rho[:, i], timeline.dt)
-            psi[:, i] = _psi(psi_mode, psi_printed[:, i], squared, bound, rho[:, i], e[:, i], timeline.dt, zeta)
-            u_replayed[:, i] = mfhca.drive_command(law, v[:, i], v_ref[:, i], psi[:, i] ** 2, lambda_, control.u_max)
-    steer_u = mfhca.steering_command(phi_ref, phi, control.k_ps, control.u_max)
-    steer_recorded = stack(timeline, [f"steer.{a}.u" for a in axles])
-    if timeline.open_loop:
-        steer_recorded = np.full_like(steer_recorded, np.nan)
+        u, steer_recorded = (np.broadcast_to(np.nan, x.shape) for x in (u, steer_recorded))
+        unfit = "faults were injected into this recording, its controller never met them"
+    law, psi0, fits = _choose(machine, u, v, v_ref, timeline.dt, unfit, readings)
+    scanned = _scan(law, u, v, v_ref, timeline.dt, psi0, bucket)
+    steer_u = in_blocks(lambda a, b: mfhca.steering_command(a, b, control.k_ps, control.u_max), phi_ref, phi)
+
+    def shown(function: Callable[..., Array], *arrays: Array) -> Array:
+        return in_buckets(function, bucket, *arrays)
+
     return Replay(
         v_ref=v_ref,
         phi_ref=phi_ref,
-        wheel_phi=wheel_phi,
-        e=e,
-        rho=rho,
-        psi_printed=psi_printed,
-        psi_implied=np.sqrt(np.maximum(implied, 0.0)),
-        implied_squared=implied,
-        forcing=forcing,
-        psi=psi,
-        u=u_replayed,
-        u_difference=u - u_replayed,
         steer_u=steer_u,
-        steer_difference=steer_recorded - steer_u,
+        bucket=bucket,
+        wheel_phi=shown(np.asarray, wheel_phi),
+        e=shown(np.subtract, v, v_ref),
+        rho=shown(lambda a, b: mfhca.decay_rate(a, b, control.xi, control.beta), v, v_ref),
+        psi_printed=scanned["psi_printed"],
+        psi_implied=in_blocks(lambda x: np.sqrt(np.maximum(x, 0.0)), scanned["implied_squared"]),
+        implied_squared=scanned["implied_squared"],
+        forcing=scanned["forcing"],
+        psi=scanned["psi"],
+        u=scanned["u"],
+        u_difference=scanned["u_difference"],
+        steer_difference=shown(np.subtract, steer_recorded, steer_u),
         fits=fits,
         readings=tuple(readings),
     )
 
 
 def _commands(timeline: Timeline, machine: Machine, phi: Array, readings: list[Reading]) -> tuple[Array, Array, Array]:
-    """Commanded wheel speeds and axle angles: recorded where logged, else by L1 and L2."""
-    v_ref = stack(timeline, [f"wheel.{w}.v_ref" for w in machine.wheels])
-    phi_ref = stack(timeline, [f"steer.{a}.phi_ref" for a in machine.axles])
-    wheel_phi = np.full(v_ref.shape, np.nan)
-    if machine.geometry is not None:
-        wheel_phi = wheel_angles(phi, machine.geometry)
-    logged_v = [bool(np.isfinite(v_ref[:, i]).any()) for i in range(v_ref.shape[1])]
-    logged_phi = [bool(np.isfinite(phi_ref[:, i]).any()) for i in range(phi_ref.shape[1])]
+    """Commanded wheel speeds and axle angles: recorded where logged, else by L1 and L2; and each wheel's angle."""
+    wheels, axles = machine.wheels, machine.axles
+    v_ref = stack(timeline, [f"wheel.{w}.v_ref" for w in wheels])
+    phi_ref = stack(timeline, [f"steer.{a}.phi_ref" for a in axles])
+    logged_v, logged_phi = any_finite(v_ref), any_finite(phi_ref)
     speed, omega = timeline.get("cmd.v"), timeline.get("cmd.omega")
-    mapped: WheelCommands | None = None
-    if machine.geometry is not None and speed is not None:
-        mapped = wheel_commands(
-            speed,
-            np.zeros_like(speed) if omega is None else omega,
-            machine.geometry,
-            dt=timeline.dt,
-            max_steer=machine.max_steer,
-            phi_dot=machine.control.phi_dot,
-            phi_dot_hz=machine.control.phi_dot_hz,
-            measured_angle=wheel_phi,
-        )
-        v_ref[:, [not x for x in logged_v]] = mapped.speed[:, [not x for x in logged_v]]
-        phi_ref[:, [not x for x in logged_phi]] = mapped.axle_angle[:, [not x for x in logged_phi]]
-    if all(logged_v):
+    geometry = machine.geometry
+    mapped = geometry is not None and speed is not None
+    out = [Column(np.float64, (len(wheels),)), Column(np.float64, (len(axles),)), Column(np.float64, (len(wheels),))]
+    state = CommandState()
+    for part in blocks(timeline.size):
+        v_part, phi_part = v_ref[part].copy(), phi_ref[part].copy()
+        angle = np.full(v_part.shape, np.nan) if geometry is None else wheel_angles(phi[part], geometry)
+        if geometry is not None and speed is not None:
+            found = wheel_commands(
+                speed[part],
+                np.zeros(len(v_part)) if omega is None else omega[part],
+                geometry,
+                dt=timeline.dt,
+                max_steer=machine.max_steer,
+                phi_dot=machine.control.phi_dot,
+                phi_dot_hz=machine.control.phi_dot_hz,
+                measured_angle=angle,
+                state=state,
+            )
+            v_part[:, ~logged_v] = found.speed[:, ~logged_v]
+            phi_part[:, ~logged_phi] = found.axle_angle[:, ~logged_phi]
+        for column, values in zip(out, (v_part, phi_part, angle), strict=True):
+            column.append(values)
+        release(v_ref, phi_ref, phi, speed, omega)
+    _say_commands(machine, bool(logged_v.all()), mapped, readings)
+    v_all, phi_all, angles = (column.finish() for column in out)
+    return v_all, phi_all, angles
+
+
+def _say_commands(machine: Machine, logged: bool, mapped: bool, readings: list[Reading]) -> None:
+    if logged:
         readings.append(Reading("commanded wheel speed v_c,i", "as recorded"))
-    elif mapped is not None:
+    elif mapped:
         assert machine.geometry is not None
         offsets = sorted({abs(w.offset) for w in machine.geometry.wheels.values()})
         readings.append(
@@ -194,18 +206,53 @@ def _commands(timeline: Timeline, machine: Machine, phi: Array, readings: list[R
         readings.append(Reading("steering angle φ_c,i", "by L2 (2)", "along the rolling direction, held at standstill"))
     else:
         readings.append(Reading("commanded wheel speed v_c,i", "not available", "neither v_c,i nor v_c with geometry"))
-    return v_ref, phi_ref, wheel_phi
+
+
+def any_finite(values: Array) -> NDArray[np.bool_]:
+    """Which columns of an (n, k) array hold a number anywhere, shape (k,)."""
+    found = np.zeros(values.shape[1], np.bool_)
+    for part in blocks(len(values)):
+        found |= np.isfinite(values[part]).any(axis=0)
+        release(values)
+    return found
+
+
+def _scan(
+    law: LoopLaw | None, u: Array, v: Array, v_ref: Array, dt: float, psi0: list[float | None], bucket: int
+) -> dict[str, Array]:
+    """Fields of `Replay` that depend on the law; NaN where there is none, or where a wheel lacks a speed."""
+    wheels = v.shape[1]
+    names = ("psi_printed", "implied_squared", "forcing", "psi", "u", "u_difference")
+    if law is None:
+        return dict.fromkeys(names, np.broadcast_to(np.nan, (rows_of(len(v), bucket), wheels)))
+    usable = any_finite(v) & any_finite(v_ref)
+    scans = {i: scan_wheel(law, u[:, i], v[:, i], v_ref[:, i], dt, psi0[i]) for i in range(wheels) if usable[i]}
+    columns = {name: Column(np.float64, (wheels,)) for name in names}
+    for part in blocks(len(v)):
+        found = {name: np.full((part.stop - part.start, wheels), np.nan) for name in names}
+        for i, scan in scans.items():
+            block = next(scan)
+            for name in names[:-1]:
+                found[name][:, i] = getattr(block, name)
+            found["u_difference"][:, i] = u[part, i] - block.u
+        for name, values in found.items():
+            columns[name].append(envelope(values, bucket))
+    return {name: column.finish() for name, column in columns.items()}
 
 
 def _choose(
     machine: Machine, u: Array, v: Array, v_ref: Array, dt: float, unfit: str, readings: list[Reading]
-) -> tuple[str, str, float, float, tuple[float, ...], tuple[LawFit, ...]]:
-    """Law, mode of Ψ̂ and constants to replay with."""
+) -> tuple[LoopLaw | None, list[float | None], tuple[LawFit, ...]]:
+    """Law, mode of Ψ̂ and constants to replay with; and Ψ̂(0) of each wheel, None where it is to be fitted."""
     control = machine.control
-    zeros = (0.0,) * len(machine.wheels)
+    given = [control.psi0] * len(machine.wheels)
+
+    def chosen(law: str, psi: str, lambda_: float, zeta: float) -> LoopLaw:
+        return LoopLaw(law, psi, lambda_, zeta, control.u_max, control.xi, control.beta)
+
     if control.law == "none":
         readings.append(Reading("control law", "none", "another controller: no Ψ̂ and no controller evidence"))
-        return "none", "printed", 0.0, 0.0, zeros, ()
+        return None, given, ()
     laws = tuple(mfhca.LAW_TEXT) if control.law == "auto" else (control.law,)
     fits = (
         fit_law(u, v, v_ref, dt, xi=control.xi, beta=control.beta, u_max=control.u_max, laws=laws) if not unfit else ()
@@ -215,7 +262,7 @@ def _choose(
         why = unfit or "too few usable samples to fit"
         readings.append(Reading("control law", f"{law}: {mfhca.LAW_TEXT[law]}", f"{why}; λ = {control.lambda_:g} s/m"))
         readings.append(Reading("adaptive law Ψ̂", "printed only", why))
-        return law, "printed", control.lambda_, control.zeta, zeros, ()
+        return chosen(law, "printed", control.lambda_, control.zeta), given, ()
     best = fits[0]
     fitted = control.law == "auto" and best.explained >= MIN_EXPLAINED
     law = best.law
@@ -244,16 +291,6 @@ def _choose(
         "forced": f"Ψ̂' = −ρΨ̂ + ½ζe², ζ = {zeta:.4g} s/m²",
     }[mode]
     readings.append(Reading("adaptive law Ψ̂", mode, text))
-    return law, mode, lambda_, zeta, best.psi0, fits
-
-
-def _psi(
-    mode: str, printed: Array, squared: Array, bound: NDArray[np.bool_], rho: Array, e: Array, dt: float, zeta: float
-) -> Array:
-    if mode == "implied":
-        return np.sqrt(np.maximum(squared, 0.0))
-    if mode == "event_reset":
-        return mfhca.event_reset_psi(rho, np.where(bound, np.nan, squared), dt)[0]
-    if mode == "forced":
-        return mfhca.forced_psi(rho, e, dt, zeta)[0]
-    return printed
+    if mode == "printed" and control.psi0 is None:
+        given = list(best.psi0)
+    return chosen(law, mode, lambda_, zeta), given, fits

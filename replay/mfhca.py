@@ -92,7 +92,7 @@ def implied_psi_squared(
     return np.where(sign == 0, np.nan, value), np.abs(u) >= u_max * (1 - 1e-9)
 
 
-def printed_decay(rho: Array, dt: float, start: float = 0.0) -> tuple[Array, float]:
+def printed_decay(rho: Array, dt: float, start: float = 0.0, before: float = 0.0) -> tuple[Array, float]:
     """E(t) = exp(−∫ρ) of the printed law, exact for ρ held over each step.
 
     Parameters
@@ -103,6 +103,8 @@ def printed_decay(rho: Array, dt: float, start: float = 0.0) -> tuple[Array, flo
         Step [s].
     start : float
         ∫ρ up to the first sample [1], to carry on from an earlier block.
+    before : float
+        Last known ρ of that block [1/s].
 
     Returns
     -------
@@ -111,7 +113,7 @@ def printed_decay(rho: Array, dt: float, start: float = 0.0) -> tuple[Array, flo
     stop : float
         ∫ρ up to the sample after the last, for the next block.
     """
-    filled = fill_forward(rho)
+    filled = fill_forward(rho, before)
     total = start + np.concatenate(([0.0], np.cumsum(filled * dt)))
     return np.exp(-total[:-1]), float(total[-1])
 
@@ -135,9 +137,14 @@ def _scan_forced(rho, e, dt, gain, psi):  # type: ignore[no-untyped-def]
     return out, psi
 
 
-def forced_psi(rho: Array, e: Array, dt: float, zeta: float, start: float = 0.0) -> tuple[Array, float]:
-    """Ψ̂ of the forced mode, Ψ̂' = −ρΨ̂ + ½ζe²; returns Ψ̂, shape (n,), and the state to carry on with."""
-    out, state = _scan_forced(fill_forward(rho), e, dt, 0.5 * zeta, start)
+def forced_psi(
+    rho: Array, e: Array, dt: float, zeta: float, start: float = 0.0, before: float = 0.0
+) -> tuple[Array, float]:
+    """Ψ̂ of the forced mode, Ψ̂' = −ρΨ̂ + ½ζe²; returns Ψ̂, shape (n,), and the state to carry on with.
+
+    `start` and `before` are the state and the last known ρ of the block before.
+    """
+    out, state = _scan_forced(fill_forward(rho, before), e, dt, 0.5 * zeta, start)
     return np.asarray(out), float(state)
 
 
@@ -164,9 +171,22 @@ def _scan_event_reset(rho, implied, dt, threshold, run, state, count):  # type: 
     return out, reset, state, count
 
 
+def jump_threshold(steps: Array) -> float:
+    """Change of the implied Ψ̂² from step to step that counts as a jump: six robust standard deviations [fraction]."""
+    steps = steps[np.isfinite(steps)]
+    spread = 1.4826 * float(np.median(np.abs(steps - np.median(steps)))) if steps.size else 0.0
+    return max(6 * spread, 1e-4)
+
+
 def event_reset_psi(
-    rho: Array, implied: Array, dt: float, threshold: float | None = None, run: int = 3
-) -> tuple[Array, NDArray[np.bool_]]:
+    rho: Array,
+    implied: Array,
+    dt: float,
+    threshold: float | None = None,
+    run: int = 3,
+    state: tuple[float, int] = (np.nan, 0),
+    before: float = 0.0,
+) -> tuple[Array, NDArray[np.bool_], tuple[float, int]]:
     """Ψ̂ that decays as printed and is re-initialised where the implied Ψ̂² jumps.
 
     Parameters
@@ -176,9 +196,13 @@ def event_reset_psi(
     dt : float
         Step [s].
     threshold : float or None
-        Jump that counts [fraction]; None takes six robust standard deviations of the implied steps.
+        Jump that counts [fraction]; None takes `jump_threshold` of the implied steps.
     run : int
         Steps in a row that the jump must last.
+    state : tuple[float, int]
+        Ψ̂² and steps beyond the threshold at the end of the block before.
+    before : float
+        Last known ρ of that block [1/s].
 
     Returns
     -------
@@ -186,14 +210,13 @@ def event_reset_psi(
         Ψ̂; NaN before the first implied value.
     reset : NDArray[np.bool_], shape (n,)
         Where it was re-initialised.
+    state : tuple[float, int]
+        To carry on with.
     """
     if threshold is None:
-        steps = np.diff(implied)
-        steps = steps[np.isfinite(steps)]
-        spread = 1.4826 * float(np.median(np.abs(steps - np.median(steps)))) if steps.size else 0.0
-        threshold = max(6 * spread, 1e-4)
-    out, reset, _, _ = _scan_event_reset(fill_forward(rho), implied, dt, threshold, run, np.nan, 0)
-    return np.sqrt(out), reset
+        threshold = jump_threshold(np.diff(implied))
+    out, reset, last, count = _scan_event_reset(fill_forward(rho, before), implied, dt, threshold, run, *state)
+    return np.sqrt(out), reset, (float(last), int(count))
 
 
 def fit_psi0(decay: Array, implied: Array, usable: NDArray[np.bool_]) -> float:

@@ -5,6 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from replay.spill import blocks
+
 Array = NDArray[np.float64]
 
 _WINDOW_S = 0.25
@@ -18,7 +20,7 @@ def rounding_step(values: Array) -> float:
     values : Array, shape (n,)
         New samples only; NaN are left out.
     """
-    known = values[np.isfinite(values)][:200_000]
+    known = _first_known(values, 200_000)
     steps = np.abs(np.diff(known))
     steps = steps[steps > 1e-12 * max(1.0, float(np.max(np.abs(known), initial=0.0)))]
     if steps.size < 20:
@@ -30,6 +32,18 @@ def rounding_step(values: Array) -> float:
     off = np.abs(steps / step - np.round(steps / step))
     small = steps < 50 * step
     return step if np.count_nonzero(small) >= 20 and float(np.mean(off[small] < 0.1)) > 0.97 else 0.0
+
+
+def _first_known(values: Array, count: int) -> Array:
+    found: list[Array] = []
+    for part in blocks(values.size):
+        near = values[part]
+        found.append(near[np.isfinite(near)])
+        count -= found[-1].size
+        if count <= 0:
+            break
+    known = np.concatenate(found) if found else values
+    return known[: known.size + min(count, 0)]
 
 
 def windows(values: Array, length: int) -> Array:
@@ -55,11 +69,16 @@ def white_noise(values: Array, dt: float, quantile: float = 0.4) -> float:
     float
         The quantile over windows of 0.25 s (at least 12 samples); NaN where no window is usable.
     """
-    second = values[2:] - 2 * values[1:-1] + values[:-2]
-    blocks = windows(second, max(12, round(_WINDOW_S / dt)))
-    if not blocks.size:
+    length = max(12, round(_WINDOW_S / dt))
+    found = []
+    for part in blocks(values.size - 2, length):
+        near = values[part.start : part.stop + 2]
+        second = windows(near[2:] - 2 * near[1:-1] + near[:-2], length)
+        if second.size:
+            moving = np.mean(np.abs(second) > 0, axis=1) > 0.3
+            found.append(np.where(moving, np.sqrt(np.mean(second**2, axis=1) / 6.0), np.nan))
+    if not found:
         return float("nan")
-    moving = np.mean(np.abs(blocks) > 0, axis=1) > 0.3
-    rms = np.sqrt(np.mean(blocks**2, axis=1) / 6.0)
-    rms = rms[moving & np.isfinite(rms)]
+    rms = np.concatenate(found)
+    rms = rms[np.isfinite(rms)]
     return float(np.quantile(rms, quantile)) if rms.size >= 3 else float("nan")

@@ -8,9 +8,11 @@ to a folder on a disk with room (not on a memory file system).
 
 from __future__ import annotations
 
+import math
 import mmap
+import os
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
 from typing import IO, Any
 
 import numpy as np
@@ -18,8 +20,9 @@ from numpy.typing import DTypeLike, NDArray
 
 from replay.errors import LogError
 
-SPILL_BYTES = 32 << 20
-BLOCK = 1 << 20
+SPILL_BYTES = 8 << 20
+FLUSH_BYTES = 4 << 20
+BLOCK = 1 << 19
 
 
 class Column:
@@ -29,20 +32,20 @@ class Column:
     ----------
     dtype : DTypeLike
         Number type of the column; blocks are converted to it.
-    spill_bytes : int
-        Size beyond which it moves to a temporary file [bytes].
+    width : tuple[int, ...]
+        Shape of one row; empty for plain numbers.
     """
 
-    def __init__(self, dtype: DTypeLike, spill_bytes: int = SPILL_BYTES) -> None:
+    def __init__(self, dtype: DTypeLike, width: tuple[int, ...] = ()) -> None:
         self.dtype: np.dtype[Any] = np.dtype(dtype)
         self.size = 0
-        self._limit = spill_bytes
+        self._width = width
         self._parts: list[NDArray[Any]] = []
         self._held = 0
         self._file: IO[bytes] | None = None
 
     def append(self, values: NDArray[Any]) -> None:
-        """Add a block, shape (m,); it is kept as it is, so the caller must not change it afterwards.
+        """Add a block, shape (m, *width); it is kept as it is, so the caller must not change it afterwards.
 
         Raises
         ------
@@ -53,7 +56,7 @@ class Column:
         self.size += len(block)
         self._parts.append(block)
         self._held += block.nbytes
-        if self._held > (self._limit if self._file is None else BLOCK):
+        if self._held > (SPILL_BYTES if self._file is None else FLUSH_BYTES):
             self._flush()
 
     def _flush(self) -> None:
@@ -61,31 +64,102 @@ class Column:
             if self._file is None:
                 self._file = tempfile.TemporaryFile(prefix="mfhca-")  # noqa: SIM115
             for part in self._parts:
-                self._file.write(part.view(np.uint8).data)
+                self._file.write(part.data.cast("B") if part.size else b"")
             self._file.flush()
         except OSError as error:
-            raise LogError(
-                f"the temporary folder {tempfile.gettempdir()} cannot take the mission's columns: "
-                f"{error.strerror or error}; set TMPDIR to a folder with more room"
-            ) from error
+            raise _no_room(error) from error
         self._parts, self._held = [], 0
 
     def finish(self) -> NDArray[Any]:
-        """Return all blocks as one array, shape (n,); the column must not be used afterwards."""
+        """Return all blocks as one array, shape (n, *width); the column must not be used afterwards."""
         if self._file is None:
             parts, self._parts = self._parts, []
             if len(parts) == 1:
                 return parts[0]
-            return np.concatenate(parts) if parts else np.empty(0, self.dtype)
+            return np.concatenate(parts) if parts else np.empty((0, *self._width), self.dtype)
         self._flush()
         with self._file as file:
-            mapped = mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ)
-        return np.frombuffer(mapped, self.dtype)
+            mapped = mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_WRITE)
+        return np.frombuffer(mapped, self.dtype).reshape(-1, *self._width)
 
 
-def blocks(size: int, step: int = BLOCK) -> Iterator[slice]:
-    """Cut ``range(size)`` into slices of at most `step`."""
+def scratch(shape: tuple[int, ...], dtype: DTypeLike) -> NDArray[Any]:
+    """Zeros to be filled in by a compiled scan; in a temporary file where they are many.
+
+    Raises
+    ------
+    LogError
+        Where the temporary folder has no room left.
+    """
+    kind = np.dtype(dtype)
+    size = kind.itemsize * math.prod(shape)
+    if size <= SPILL_BYTES:
+        return np.zeros(shape, kind)
+    try:
+        with tempfile.TemporaryFile(prefix="mfhca-") as file:
+            if hasattr(os, "posix_fallocate"):  # a map of a file with holes would fault where the disk is full
+                os.posix_fallocate(file.fileno(), 0, size)
+            else:
+                file.truncate(size)
+            mapped = mmap.mmap(file.fileno(), size, access=mmap.ACCESS_WRITE)
+    except OSError as error:
+        raise _no_room(error) from error
+    return np.frombuffer(mapped, kind).reshape(shape)
+
+
+def _no_room(error: OSError) -> LogError:
+    return LogError(
+        f"the temporary folder {tempfile.gettempdir()} cannot take the mission's columns: {error.strerror or error}; set "
+        "TMPDIR to a folder with more room"
+    )
+
+
+def blocks(size: int, multiple: int = 1) -> Iterator[slice]:
+    """Cut ``range(size)`` into slices of about `BLOCK` steps; all but the last are a multiple of `multiple` long."""
+    step = max(BLOCK // multiple, 1) * multiple
     return (slice(at, min(at + step, size)) for at in range(0, size, step))
+
+
+def in_blocks(function: Callable[..., NDArray[Any]], *arrays: NDArray[Any]) -> NDArray[Any]:
+    """Apply a function of whole rows, one block of rows after another, so that only blocks of it are in memory.
+
+    Parameters
+    ----------
+    function : Callable
+        Takes as many arrays as are given, each of shape (m, …), and returns one of m rows; a row of the result may
+        depend on the same row of the arguments alone.
+    *arrays : NDArray
+        Of n rows each.
+
+    Returns
+    -------
+    NDArray, n rows
+        Spilled where long.
+    """
+    size = len(arrays[0])
+    if size <= BLOCK:
+        return function(*arrays)
+    column: Column | None = None
+    for part in blocks(size):
+        values = np.asarray(function(*(a[part] for a in arrays)))
+        if column is None:
+            column = Column(values.dtype, values.shape[1:])
+        column.append(values)
+        release(*arrays)
+    assert column is not None
+    return column.finish()
+
+
+def keep(values: NDArray[Any]) -> NDArray[Any]:
+    """The same numbers, spilled where they are long; the argument should be let go of."""
+    if values.nbytes <= SPILL_BYTES:
+        return values
+    return in_blocks(np.copy, values)
+
+
+def beside(columns: Sequence[NDArray[Any]]) -> NDArray[Any]:
+    """Columns of n rows side by side, shape (n, columns); spilled where long."""
+    return in_blocks(lambda *parts: np.stack(parts, axis=1), *columns)
 
 
 def release(*arrays: NDArray[Any] | None) -> None:

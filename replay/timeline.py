@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from replay.errors import LogError
 from replay.signals import Signal, Signals
+from replay.spill import Column, blocks, release
 
 MAX_STEPS = 200_000_000
 _LARGEST = 1e9
@@ -80,6 +81,20 @@ def median_period(stamps: NDArray[np.int64]) -> int:
     return int(np.median(np.diff(stamps))) if stamps.size > 1 else 0
 
 
+class _Periods:
+    """Median periods, found once for signals that share their stamps."""
+
+    def __init__(self) -> None:
+        self._known: dict[tuple[int, int], int] = {}
+
+    def of(self, stamps: NDArray[np.int64]) -> int:
+        key = (stamps.__array_interface__["data"][0], stamps.size)
+        if key not in self._known:
+            self._known[key] = median_period(stamps)
+            release(stamps)
+        return self._known[key]
+
+
 def align(signals: Signals, start_s: float | None = None, stop_s: float | None = None) -> Timeline:
     """Put signals on one uniform axis.
 
@@ -102,7 +117,8 @@ def align(signals: Signals, start_s: float | None = None, stop_s: float | None =
             "name them in the machine file's [signals]"
         )
     notes = list(_check_overlap(signals))
-    step = _snap(min(median_period(s.stamps) for s in wheel.values()))
+    periods = _Periods()
+    step = _snap(min(periods.of(s.stamps) for s in wheel.values()))
     first = min(int(s.stamps[0]) for s in wheel.values())
     last = max(int(s.stamps[-1]) for s in wheel.values())
     start = first if start_s is None else first + round(start_s * 1e9 / step) * step
@@ -119,10 +135,10 @@ def align(signals: Signals, start_s: float | None = None, stop_s: float | None =
     fresh: dict[str, NDArray[np.bool_]] = {}
     for name, signal in signals.items.items():
         if signal.stamps.size:
-            absurd = np.count_nonzero(np.isinf(signal.values) | (np.abs(signal.values) > _LARGEST))
+            absurd = sum(np.count_nonzero(np.abs(signal.values[part]) > _LARGEST) for part in blocks(signal.values.size))
             if absurd:
                 notes.append(f"{name}: {absurd} values that are infinite or beyond {_LARGEST:g} count as no sample.")
-            values[name], fresh[name] = _hold(signal, start, step, size)
+            values[name], fresh[name] = _hold(signal, periods.of(signal.stamps), start, step, size)
     return Timeline(
         start_ns=start,
         step_ns=step,
@@ -130,7 +146,7 @@ def align(signals: Signals, start_s: float | None = None, stop_s: float | None =
         signals=values,
         fresh=fresh,
         sources={k: s.source for k, s in signals.items.items()},
-        periods_ns={k: median_period(s.stamps) for k, s in signals.items.items()},
+        periods_ns={k: periods.of(s.stamps) for k, s in signals.items.items()},
         notes=tuple(notes),
         open_loop=signals.open_loop,
         groups={k: s.group for k, s in signals.items.items()},
@@ -145,24 +161,33 @@ def _snap(period: int) -> int:
     return max(1000, round(period / 1000) * 1000)
 
 
-def _hold(signal: Signal, start: int, step: int, size: int) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+def _hold(
+    signal: Signal, period: int, start: int, step: int, size: int
+) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
     """Latest sample at each step (half a step of tolerance), NaN once older than its holding time."""
-    period = median_period(signal.stamps)
     command = signal.name.startswith("cmd.") or signal.name.endswith("_ref")
     longest = max(_HOLD_PERIODS * period, 1.5 * step)
     if command:
         longest = max(longest, float(_COMMAND_HOLD_NS))
-    grid = start + step * np.arange(size, dtype=np.int64)
-    index = np.searchsorted(signal.stamps, grid + step // 2, side="right") - 1
-    known = index >= 0
-    safe = np.maximum(index, 0)
-    age = grid - signal.stamps[safe]
-    usable = np.where(np.abs(signal.values) <= _LARGEST, signal.values, np.nan)
-    values = np.where(known & (age <= longest), usable[safe], np.nan)
-    new = np.empty(size, dtype=np.bool_)
-    new[0] = bool(known[0])
-    new[1:] = index[1:] != index[:-1]
-    return values, new & np.isfinite(values)
+    values, fresh = Column(np.float64), Column(np.bool_)
+    last = -1  # sample held at the step before
+    for part in blocks(size):
+        grid = start + step * np.arange(part.start, part.stop, dtype=np.int64)
+        index = np.searchsorted(signal.stamps, grid + step // 2, side="right") - 1
+        first, stop = max(int(index[0]), 0), int(index[-1]) + 1
+        near, stamps = signal.values[first:stop], signal.stamps[first:stop]
+        if not near.size:
+            values.append(np.full(grid.size, np.nan))
+            fresh.append(np.zeros(grid.size, np.bool_))
+            continue
+        safe = np.maximum(index - first, 0)
+        usable = np.where(np.abs(near) <= _LARGEST, near, np.nan)
+        held = np.where((index >= 0) & (grid - stamps[safe] <= longest), usable[safe], np.nan)
+        values.append(held)
+        fresh.append((np.diff(index, prepend=last) != 0) & np.isfinite(held))
+        last = int(index[-1])
+        release(signal.values, signal.stamps)
+    return values.finish(), fresh.finish()
 
 
 def _check_overlap(signals: Signals) -> list[str]:

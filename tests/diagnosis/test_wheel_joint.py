@@ -216,7 +216,7 @@ def test_models_are_entered_where_that_pays(top: int, status: int) -> None:
             price = 4.0  # one row: what changes is how strong its noise is
         price += 0.0 if m in (ws.HEALTHY, ws.S_NONE, ws.A_NONE) else wj._LEARNING
         enters = m != top and status != SKIP and at.score[1, m] < -price
-        assert done.back[1, 0, m] == (top if enters else STAY)
+        assert done.back[1][0, m] == (top if enters else STAY)
 
 
 def advanced(q: ws.WheelInput, status: int, quiet: bool = False, speed: float = 0.2) -> tuple[Array, Array, Array]:

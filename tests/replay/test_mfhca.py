@@ -164,7 +164,7 @@ def test_event_reset_follows_jumps_and_decays_between_them() -> None:
     rho = 1.2 + 0.3 * np.sin(np.arange(n) * dt)
     decay = mfhca.printed_decay(rho, dt)[0] ** 2
     squared = decay * np.repeat([0.1, 0.4, 1.5], 300) / np.repeat(decay[[0, 300, 600]], 300)
-    psi, reset = mfhca.event_reset_psi(rho, squared, dt)
+    psi, reset, _ = mfhca.event_reset_psi(rho, squared, dt)
     assert_array_equal(np.flatnonzero(reset), [302, 602])  # a jump must last three steps
     for part in (slice(0, 302), slice(302, 602), slice(602, n)):
         slope = np.diff(np.log(psi[part] ** 2)) / dt
@@ -178,10 +178,10 @@ def test_event_reset_ignores_spikes_and_gaps() -> None:
     spiky = implied.copy()
     spiky[100:102] += 1.0
     spiky[200:220] = np.nan
-    psi, reset = mfhca.event_reset_psi(rho, spiky, 0.01, threshold=0.01)
+    psi, reset, _ = mfhca.event_reset_psi(rho, spiky, 0.01, threshold=0.01)
     assert not reset.any()
     assert_allclose(psi**2, implied, rtol=1e-9)
-    late, _ = mfhca.event_reset_psi(rho, np.r_[np.full(5, np.nan), implied[5:]], 0.01, threshold=0.01)
+    late, *_ = mfhca.event_reset_psi(rho, np.r_[np.full(5, np.nan), implied[5:]], 0.01, threshold=0.01)
     assert_array_equal(np.isnan(late), np.arange(300) < 5)
 
 

@@ -1,0 +1,84 @@
+"""Columns for pictures of long missions: smallest and largest value of every few steps, so that no spike is lost.
+
+Up to `FULL_STEPS` steps a picture has every step. Beyond, each bucket of `bucket_of(n)` steps becomes two rows, its
+smallest and its largest finite value in the order in which they occur; NaN where the whole bucket has none.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from replay.spill import Column, blocks, in_blocks
+
+FULL_STEPS = 1 << 21
+_BUCKETS = 1 << 19
+
+
+def bucket_of(size: int) -> int:
+    """Steps per bucket for a mission of so many steps: 1 (every step is kept) or a power of two."""
+    bucket = 1
+    while size > FULL_STEPS and size > bucket * _BUCKETS:
+        bucket *= 2
+    return bucket
+
+
+def rows_of(size: int, bucket: int) -> int:
+    """Rows that `size` steps become."""
+    return size if bucket == 1 else 2 * -(-size // bucket)
+
+
+def step_of(bucket: int) -> float:
+    """Steps between rows."""
+    return 1.0 if bucket == 1 else bucket / 2
+
+
+def envelope(values: NDArray[Any], bucket: int) -> NDArray[Any]:
+    """Reduce steps to rows.
+
+    Parameters
+    ----------
+    values : NDArray, shape (n, …)
+        Steps; the last bucket may be short.
+    bucket : int
+        From `bucket_of`.
+
+    Returns
+    -------
+    NDArray, shape (rows, …)
+        The values themselves where the bucket is 1.
+    """
+    if bucket == 1:
+        return values
+    out = Column(values.dtype, values.shape[1:])
+    for part in blocks(len(values), bucket):
+        out.append(_reduced(values[part], bucket))
+    return out.finish()
+
+
+def shown(values: NDArray[Any]) -> NDArray[Any]:
+    """A column of n steps for pictures; the envelope of long ones, as 32-bit numbers."""
+    bucket = bucket_of(len(values))
+    return values if bucket == 1 else envelope(values, bucket).astype(np.float32)
+
+
+def _reduced(values: NDArray[Any], bucket: int) -> NDArray[Any]:
+    fill = -len(values) % bucket
+    if fill:
+        values = np.concatenate([values, np.repeat(values[-1:], fill, axis=0)])
+    parts = values.reshape(-1, bucket, *values.shape[1:])
+    low, high = (
+        np.where(np.isnan(parts), worst, parts) if parts.dtype.kind == "f" else parts for worst in (np.inf, -np.inf)
+    )
+    at_low, at_high = low.argmin(axis=1), high.argmax(axis=1)
+    first = np.take_along_axis(parts, np.minimum(at_low, at_high)[:, None], axis=1)
+    second = np.take_along_axis(parts, np.maximum(at_low, at_high)[:, None], axis=1)
+    return np.concatenate([first, second], axis=1).reshape(-1, *values.shape[1:])
+
+
+def in_buckets(function: Callable[..., NDArray[Any]], bucket: int, *arrays: NDArray[Any]) -> NDArray[Any]:
+    """Envelope of a function of whole rows, one block after another; see `replay.spill.in_blocks`."""
+    return in_blocks(lambda *parts: envelope(np.asarray(function(*parts)), bucket), *arrays)
