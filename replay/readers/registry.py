@@ -12,7 +12,9 @@ from replay.readers.mcap import McapReader
 from replay.readers.parquet_table import ParquetReader
 from replay.readers.ros1_bag import Ros1BagReader
 from replay.readers.rosbag2 import Rosbag2Reader
+from replay.readers.svdx import SvdxReader
 from replay.readers.table import CsvReader
+from replay.readers.tdms import TdmsReader
 from replay.readers.twincat_csv import TwincatCsvReader
 from replay.sources import SourceOptions
 
@@ -22,10 +24,15 @@ READERS: tuple[Reader, ...] = (
     Ros1BagReader(),
     Rosbag2Reader(),
     ParquetReader(),
+    TdmsReader(),
+    SvdxReader(),
     TwincatCsvReader(),
     CsvReader(),
 )
-FORMATS = "MCAP, ROS 1 bag, rosbag2 (folder, .db3), TwinCAT Scope export (CSV, TXT), CSV (also .gz) and Parquet"
+FORMATS = (
+    "MCAP, ROS 1 bag, rosbag2 (folder, .db3), TwinCAT Scope export (CSV, TXT) and recording (.svdx), TDMS, CSV (also .gz, "
+    ".zst) and Parquet"
+)
 
 
 def open_log(path: Path) -> Reader:

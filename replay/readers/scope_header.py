@@ -23,9 +23,9 @@ _ROWS = frozenset(
         *("unit", "unit scalefactor", "unit offset"),
     )
 )
-_HEADS = (1 << 20, 16 << 20, 64 << 20)
+_HEADS = (256 << 10, 4 << 20, 64 << 20)
 _LINES = 5000
-_SAMPLE = 2_000_000
+_SAMPLE = 256 << 10
 
 
 @dataclass(frozen=True)
@@ -121,7 +121,7 @@ def open_scope(path: Path, report: Report) -> Scope:
     sample = file.head(skip + _SAMPLE)[skip:]
     if len(sample) >= _SAMPLE:
         sample = sample[: sample.rfind(b"\n") + 1]
-    dialect, sure = _dialect(path, sample, separator)
+    dialect, sure = _dialect(path, sample + file.tail(skip), separator)
     return _checked(path, Scope(file, dialect, sure, rows, (), skip, sample, start, metadata), report)
 
 

@@ -18,13 +18,12 @@ from replay.readers.rows import Rows
 from replay.readers.stamps import TimeBase, epoch_ns
 from replay.readers.table_log import RowTimes, table_log
 from replay.readers.text_summary import row_count, span
-from replay.readers.text_table import HEAD, SEPARATORS, TextTable, is_text, open_text, separator_of, tail_of
+from replay.readers.text_table import HEAD, SEPARATORS, TextTable, is_text, open_text, separator_of
 from replay.readers.textfile import first_text
 from replay.readers.time_column import Sample, find_time
 from replay.sources import SourceOptions
 
 _SAMPLES = (HEAD, 16 << 20)
-_TAIL = 64 << 10
 _NAMED = (".csv", ".tsv")
 
 
@@ -56,7 +55,7 @@ class CsvReader:
         report = Report()
         table = open_text(path, options, report)
         sample, name, unit = _time(table, options, report)
-        tail = table.sample(tail_of(table.file, _TAIL)) if unit != "dc32" else {}
+        tail = table.sample(table.file.tail(table.skip)) if unit != "dc32" else {}
         count, exact = row_count(table.file, table.skip)
         base = TimeBase(unit, epoch_ns(options, str(path)), path.name, Report())
         start, stop = span(base, sample[name], tail.get(name), count)

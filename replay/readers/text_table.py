@@ -23,7 +23,7 @@ from replay.readers.textfile import TextFile, decoded
 from replay.sources import SourceOptions
 
 SEPARATORS = ("\t", ";", ",", "|")
-HEAD = 256 << 10
+HEAD = 128 << 10
 _LONGEST_HEAD = 4 << 20
 _MOSTLY = 0.5
 
@@ -182,23 +182,12 @@ def open_text(path: Path, options: SourceOptions, report: Report) -> TextTable:
     if repeated:
         report.note(f"{path.name}: names occur more than once and got a number: {', '.join(sorted(repeated)[:5])}")
     skip = at + size
-    decimal, sure = _decimal(head[skip:] + tail_of(file, 64 << 10), separator)
+    decimal, sure = _decimal(head[skip:] + file.tail(skip), separator)
     if options.decimal is not None:
         decimal, sure = options.decimal, True
     if decimal not in (".", ","):
         raise LogError(f"{path}: decimal = {decimal!r} is no decimal sign; give [sources] decimal = '.' or ','")
     return TextTable(file, tuple(unique), Dialect(separator, decimal, True), skip, sure)
-
-
-def tail_of(file: TextFile, size: int) -> bytes:
-    """Return the whole lines in the last bytes of a plain file; nothing of a packed one."""
-    if file.packed or file.recoded:
-        return b""
-    with file.path.open("rb") as raw:
-        at = max(raw.seek(0, 2) - size, 0)
-        raw.seek(at)
-        text = raw.read(size)
-    return text if at == 0 else text[text.find(b"\n") + 1 :]
 
 
 def _header(path: Path, head: bytes, separator: str) -> tuple[list[str], int]:

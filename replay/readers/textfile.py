@@ -18,6 +18,7 @@ GZIP, ZSTD = b"\x1f\x8b", b"\x28\xb5\x2f\xfd"
 MAX_EXPANDED = 32 << 30
 BLOCK = 4 << 20
 _PIECE = 1 << 20
+_TAIL = 64 << 10
 _ZEROS = re.compile(rb"\0{16,}")
 
 
@@ -59,7 +60,6 @@ class TextFile:
         self.packed = self._packed
         self._codec = {b"\xff\xfe": "utf-16-le", b"\xfe\xff": "utf-16-be"}.get(first[:2], "")
         self._skip = 2 if self._codec else 3 if first.startswith(codecs.BOM_UTF8) else 0
-        self.recoded = bool(self._codec)
         self._bare_returns = b"\r" in first and b"\n" not in first and not self._codec
 
     def head(self, size: int) -> bytes:
@@ -71,6 +71,16 @@ class TextFile:
             if held >= size:
                 break
         return b"".join(parts)
+
+    def tail(self, skip: int) -> bytes:
+        """Return the whole lines in the last bytes of a plain file, behind the first `skip`; nothing of a packed one."""
+        if self.packed or self._codec:
+            return b""
+        with self.path.open("rb") as raw:
+            at = max(raw.seek(0, 2) - _TAIL, skip)
+            raw.seek(at)
+            text = raw.read(_TAIL)
+        return text if at == skip else text[text.find(b"\n") + 1 :]
 
     def quiet(self, skip: int) -> Iterator[bytes]:
         """Yield the bytes behind the first `skip`; nothing of them is reported."""

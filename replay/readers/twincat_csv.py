@@ -18,11 +18,9 @@ from replay.readers.rows import Rows
 from replay.readers.scope_groups import Group, Repeats, finished_stamps, labels, make_groups, period_cell
 from replay.readers.scope_header import HOW, START, Scope, open_scope
 from replay.readers.text_summary import row_count
-from replay.readers.text_table import is_text, tail_of
+from replay.readers.text_table import is_text
 from replay.readers.textfile import first_text
 from replay.sources import SourceOptions
-
-_TAIL = 64 << 10
 
 
 class TwincatCsvReader:
@@ -49,7 +47,7 @@ class TwincatCsvReader:
         report = Report()
         scope = open_scope(path, report)
         head, kinds, rows = _sampled(scope, scope.sample)
-        tail, tail_kinds, _ = _sampled(scope, tail_of(scope.file, _TAIL))
+        tail, tail_kinds, _ = _sampled(scope, scope.file.tail(scope.skip))
         count, exact = row_count(scope.file, scope.skip)
         count -= scope.ends_in_eof
         names, texts = labels(scope), is_text(rows)
