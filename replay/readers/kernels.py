@@ -33,19 +33,17 @@ _TILE = 32
 _DEEP = 80
 _MAX_STEPS = 1_000_000
 _SHORT = 64
+_NUMBERS = tuple(np.dtype(f"u{size}") for size in (1, 2, 4, 8))
 
 
 def views(data: NDArray[np.uint8]) -> tuple[NDArray[Any], ...]:
     """View bytes as numbers of 1, 2, 4 and 8 bytes that start at every byte."""
-    data = np.ascontiguousarray(data.view(np.ndarray))
-    if len(data) < _SHORT:
+    data = data.view(np.ndarray)
+    if len(data) < _SHORT or not data.flags.c_contiguous:
         data = np.concatenate([data, np.zeros(_SHORT, np.uint8)])
-    out = []
-    for size in (1, 2, 4, 8):
-        view: NDArray[Any] = np.ndarray((len(data) - size + 1,), f"u{size}", data, strides=(1,))
-        view.flags.writeable = False
-        out.append(view)
-    return tuple(out)
+    data.flags.writeable = False  # so are all views of it: one compiled version serves all
+    size = len(data)
+    return tuple(np.ndarray((size + 1 - d.itemsize,), d, data, strides=(1,)) for d in _NUMBERS)
 
 
 @njit(cache=True)
