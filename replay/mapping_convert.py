@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from replay.clock_order import spread_ticks
 from replay.errors import ConfigError
 from replay.machine import Machine
 from replay.mapping_rules import SI_UNITS
@@ -102,13 +103,17 @@ def convert(
 def _ordered(
     stamps: NDArray[np.int64], values: NDArray[Any]
 ) -> tuple[NDArray[np.int64], NDArray[Any], tuple[str, ...]]:
-    """Sort by stamp and keep the last of equal stamps."""
+    """Sort by stamp, spread the ticks of a coarse clock, and keep the last of equal stamps."""
     notes = []
     back = int((np.diff(stamps) < 0).sum())
     if back:
         order = np.argsort(stamps, kind="stable")
         stamps, values = stamps[order], values[order]
         notes.append(f"stamps ran backwards {back} times and were sorted")
+    ticks = spread_ticks(stamps, values)
+    if ticks is not None:
+        stamps, tick = ticks
+        notes.append(f"its clock ticks every {tick / 1e6:g} ms only; samples of one tick were spread evenly over it")
     last = np.append(stamps[1:] != stamps[:-1], True) if len(stamps) else np.ones(0, np.bool_)
     if not last.all():
         notes.append(f"{(~last).sum()} samples share their stamp with a later one and were dropped")

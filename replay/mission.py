@@ -9,6 +9,7 @@ from fnmatch import fnmatch
 from pathlib import Path
 
 from replay.clock_align import SourceClock, align_clocks
+from replay.clock_order import in_order
 from replay.errors import LogError
 from replay.machine import Machine
 from replay.mapping import map_signals, plan_topics
@@ -148,7 +149,7 @@ def read_signals(
     files: list[MissionFile] = []
     for path, option, summary in zip(paths, options, summaries, strict=True):
         tell(f"reading {path.name}")
-        log = read_log(path, option, plan.get(summary.source))
+        log = in_order(read_log(path, option, plan.get(summary.source)))
         tell(f"hashing {path.name}")
         sha256, size = content_hash(path)
         logs.append(log)

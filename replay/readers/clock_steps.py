@@ -18,6 +18,7 @@ _FAR = 2**62
 _COUNTERS = (2**32, 2**32 * 1000)  # 32 bits of nanoseconds and of microseconds [ns]
 _COUNTER_SLACK_NS = 500_000_000
 _LEAST_NS = 50_000_000
+_DRIFT_NS = 1_000_000
 _SIDE = 25
 _FEWEST = 5
 _MOST = 200
@@ -91,11 +92,14 @@ def find_steps(stamps: Stamps, other: Stamps) -> tuple[list[Step], list[Step]]:
     mine: list[Step] = []
     theirs: list[Step] = []
     for k in places.tolist():
-        before, after = lead[max(0, k - _SIDE) : k], lead[k : k + _SIDE]
-        if min(len(before), len(after)) < _FEWEST:
+        if not _FEWEST <= k <= len(lead) - _FEWEST:
             continue
+        near = lead[max(0, k - _SIDE) : k + _SIDE] - lead[k - 1]  # small numbers keep their nanoseconds
+        before, after = near[: min(k, _SIDE)], near[min(k, _SIDE) :]
         low, high = float(np.median(before)), float(np.median(after))
-        size = high - low
+        drift = float(np.median(np.delete(change[max(0, k - _SIDE) : k + _SIDE - 1], min(k, _SIDE) - 1)))
+        drift *= 0.5 * (len(before) + len(after))
+        size = high - low - (drift if abs(drift) > _DRIFT_NS else 0.0)
         scatter = max(float(np.median(np.abs(before - low))), float(np.median(np.abs(after - high))))
         if abs(size) < max(limit, 6 * scatter) or abs(size - change[k - 1]) > 0.3 * abs(size):
             continue
