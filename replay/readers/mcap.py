@@ -85,7 +85,7 @@ def read_files(
             for number, count in expected(file)[0].items():
                 if number in file.names.channels:
                     assembler.expect(file.names.channels[number], count)
-        for blocks in _blocks(file, topics, window):
+        for blocks in blocks_of(file, topics, window):
             assembler.add(blocks)
     return assembler.finish(summary_of(opened, source, name, report))
 
@@ -153,7 +153,7 @@ def _split(
         at = census.end
 
 
-def _blocks(file: McapFile, topics: Collection[str] | None, window: Window | None) -> Iterator[list[Block]]:
+def blocks_of(file: McapFile, topics: Collection[str] | None, window: Window | None) -> Iterator[list[Block]]:
     """Blocks of a file in the order of places; then what was found is held against what should be there."""
     if not len(file.chunks):
         walk_file(file)
