@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -48,7 +49,7 @@ class Assessment:
         Why a state that is no judgement was given.
     findings : tuple[Finding, ...]
         Faults in order of time.
-    columns : Mapping[str, NDArray[np.float64]], each of shape (n,)
+    columns : Mapping[str, NDArray[np.float32 | np.float64]], each of the rows of `replay.envelope` for n steps
         Evidence series by leaf name (``residual``, ``threshold``, ``delta``, …).
     tier : str
         ``direct``, ``model``, ``drive``, ``tracking`` or ``none``; see `diagnosis.result.FaultInterval`.
@@ -61,7 +62,7 @@ class Assessment:
     states: NDArray[np.int8]
     reasons: Mapping[State, str] = field(default_factory=dict)
     findings: tuple[Finding, ...] = ()
-    columns: Mapping[str, NDArray[np.float64]] = field(default_factory=dict)
+    columns: Mapping[str, NDArray[Any]] = field(default_factory=dict)
     tier: str = "none"
     notes: tuple[str, ...] = ()
     unexplained_s: float = 0.0

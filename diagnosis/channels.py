@@ -11,6 +11,7 @@ from diagnosis.pairs import Pair
 from replay.faults import Side
 from replay.machine import Machine, Noise
 from replay.signals import quantity_kind
+from replay.spill import blocks
 from replay.timeline import Timeline
 
 _GAP_PERIODS = 2.5
@@ -84,7 +85,9 @@ def make_pair(
 ) -> Pair:
     """Channel and reference of one component and side."""
     y, x = timeline.signals[y_name], timeline.signals[x_name]
-    largest = float(np.nanmax(np.abs(np.concatenate((y, x))), initial=0.0)) if np.isfinite(y).any() else 0.0
+    largest = 0.0
+    if np.isfinite(y).any():
+        largest = max(float(np.nanmax(np.abs(z[part]), initial=0.0)) for z in (y, x) for part in blocks(timeline.size))
     return Pair(
         side=side,
         y=y,

@@ -21,6 +21,7 @@ from diagnosis.wheel_model import WheelModelFit, low_passed
 from replay.faults import Side, State
 from replay.loop import Replay
 from replay.machine import Machine, Noise
+from replay.spill import beside, in_blocks, keep
 from replay.timeline import Timeline
 
 Array = NDArray[np.float64]
@@ -97,14 +98,16 @@ class _Wheel:
 
     def values(self, leaf: str) -> Array:
         found = self.timeline.get(self.name(leaf))
-        return np.full(self.timeline.size, np.nan) if found is None else found
+        return np.broadcast_to(np.nan, (self.timeline.size,)) if found is None else found
 
     def quiet(self, expected: Array) -> NDArray[np.bool_]:
         """Neither commanded nor expected to move."""
         limit = _QUIET * self.machine.limits.driving_speed
-        return (np.abs(np.nan_to_num(self.replay.v_ref[:, self.index])) < limit) & (
-            np.abs(np.nan_to_num(expected)) < limit
-        )
+
+        def low(command: Array, speed: Array) -> NDArray[np.bool_]:
+            return np.asarray((np.abs(np.nan_to_num(command)) < limit) & (np.abs(np.nan_to_num(speed)) < limit))
+
+        return in_blocks(low, self.replay.v_ref[:, self.index], expected)
 
     def span(self, leaf: str) -> float:
         if leaf in ("u", "u_applied"):
@@ -121,7 +124,7 @@ class _Wheel:
         command = self.replay.v_ref[:, self.index]
         if not np.isfinite(command).any():
             return None
-        return np.column_stack([command, *(low_passed(command, lag, self.timeline.dt) for lag in (0.1, 0.3))])
+        return beside([command, *(keep(low_passed(command, lag, self.timeline.dt)) for lag in (0.1, 0.3))])
 
     def sensor(self, direct: bool, model: tuple[Assessment, Assessment] | None) -> Assessment:
         size = self.timeline.size
@@ -139,7 +142,8 @@ class _Wheel:
     def actuator(self, direct: bool, model: tuple[Assessment, Assessment] | None) -> Assessment:
         size = self.timeline.size
         if direct and np.isfinite(self.values("u")).any():
-            idle = np.abs(np.nan_to_num(self.values("u"))) < 0.02 * self.span("u")
+            least = 0.02 * self.span("u")
+            idle = in_blocks(lambda u: np.abs(np.nan_to_num(u)) < least, self.values("u"))
             return assess_pair(self.pair(Side.ACTUATOR, "u_applied", "u", idle, "of full opening"), self.machine.limits)
         if direct:
             return unassessed(size, State.NOT_ASSESSED, "the valve's position is logged but not its command")

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,8 +24,10 @@ from diagnosis.pairs import Pair, mode_model, neighbours, sample_status, timing_
 from diagnosis.result import Epsilon, Hypothesis, Sat
 from diagnosis.screen import screened
 from diagnosis.segments import Run, with_leads
+from replay.envelope import bucket_of, envelope, in_buckets
 from replay.faults import FaultMode, Side, State
 from replay.machine import Limits
+from replay.spill import Column, blocks, in_blocks, keep, release
 
 Array = NDArray[np.float64]
 
@@ -43,6 +46,7 @@ _HOLD_S = 0.1
 _COARSE_COST = 0.2  # where a log is too slow for its commands, what is left of them looks like a fault's drift
 _LEAD_S, _TAIL_S, _CHAIN_S = 0.3, 0.1, 0.05
 _SAID_S = 0.1
+_SERIES = ("residual", "threshold", "expected", "delta", "delta_std", "delta_bar", "delta_bar_std")
 
 
 def assess_pair(pair: Pair, limits: Limits) -> Assessment:
@@ -59,7 +63,8 @@ def assess_pair(pair: Pair, limits: Limits) -> Assessment:
     max_lag = max(1, round(_MAX_LAG_S / pair.dt)) if pair.dt <= _MAX_LAG_S else 0
     least_lag = 0 if pair.side is Side.ACTUATOR else -max_lag
     lag = relative_lag(pair.y, pair.x, usable & ~pair.quiet, least_lag, max_lag)
-    x = shifted(pair.x, lag)
+    x = keep(shifted(pair.x, lag))
+    pair = replace(pair, moved=x)
     status = sample_status(pair.y, x, pair.fresh, pair.alive, pair.dt)
     model, lsb = mode_model(pair, x, status, 0.25 * limits.min_sat)
     blind, share = np.zeros(x.size, dtype=np.bool_), 0.0
@@ -85,7 +90,7 @@ def assess_pair(pair: Pair, limits: Limits) -> Assessment:
         finding = _finding(run, pair, channel, model, limits, lag, coarse)
         if finding is None:
             below += 1
-        elif timing_explains(pair, x, run, finding.mode, share):
+        elif timing_explains(pair, run, finding.mode, share):
             blind[run.start : run.stop] = True
         else:
             whole = Run(
@@ -309,33 +314,31 @@ def _states(
 
 def _columns(
     pair: Pair, x: Array, status: NDArray[np.int8], model: modes.ModeModel, path: ModePath
-) -> dict[str, Array]:
+) -> dict[str, NDArray[Any]]:
     """Series for the evidence plots."""
-    use = status == modes.PAIR
-    track = track_gain_bias(
-        pair.y,
-        x,
-        use,
-        GainBiasModel(
-            noise=model.noise,
-            gain_walk=0.3,
-            bias_walk=0.1 * pair.span,
-            gain_std=0.3,
-            bias_std=0.3 * pair.span,
-            relax_s=5.0,
-            dt=pair.dt,
-        ),
+    bucket = bucket_of(x.size)
+    tracked = GainBiasModel(
+        noise=model.noise,
+        gain_walk=0.3,
+        bias_walk=0.1 * pair.span,
+        gain_std=0.3,
+        bias_std=0.3 * pair.span,
+        relax_s=5.0,
+        dt=pair.dt,
     )
-    columns = {
-        "residual": np.where(use, pair.y - x, np.nan),
-        "threshold": np.full(pair.y.size, 3 * model.noise),
-        "expected": x,
-        "delta": track.delta,
-        "delta_std": track.delta_std,
-        "delta_bar": track.bias,
-        "delta_bar_std": track.bias_std,
-    }
-    filtered = path.filtered
-    columns["probability"] = np.float32(1.0) - filtered[:, modes.HEALTHY]
-    columns.update({f"p_{name}": filtered[:, i] for i, name in enumerate(modes.ROWS)})
-    return columns
+    columns = {name: Column(np.float64 if bucket == 1 else np.float32) for name in _SERIES}
+    state = None
+    for part in blocks(x.size):
+        use, y, ref = status[part] == modes.PAIR, pair.y[part], x[part]
+        track = track_gain_bias(y, ref, use, tracked, state)
+        state = track.state
+        residual, threshold = np.where(use, y - ref, np.nan), np.full(y.size, 3 * model.noise)
+        series = (residual, threshold, ref, track.delta, track.delta_std, track.bias, track.bias_std)
+        for column, values in zip(columns.values(), series, strict=True):
+            column.append(envelope(values, bucket))
+        release(pair.y, x)
+    out = {name: column.finish() for name, column in columns.items()}
+    rows = in_buckets(np.asarray, bucket, path.filtered)
+    out["probability"] = in_blocks(lambda p: np.float32(1.0) - p[:, modes.HEALTHY], rows)
+    out.update({f"p_{name}": rows[:, i] for i, name in enumerate(modes.ROWS)})
+    return out

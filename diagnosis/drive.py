@@ -23,6 +23,7 @@ from diagnosis.modes import BLIND, PAIR, SILENT
 from diagnosis.noise import moving_sum, rounding_step
 from diagnosis.pairs import sample_status
 from replay.drive_model import DriveModel, EchoModel
+from replay.envelope import shown
 from replay.faults import FaultMode, Side, State
 from replay.machine import Limits
 
@@ -180,8 +181,15 @@ def assess_drive(data: DriveData, limits: Limits) -> tuple[Assessment, Assessmen
             "expected": load.sampled(load.expected, size),
         }
     return (
-        Assessment(states, reasons, tuple(on_sensor), columns, "drive", tuple(notes)),
-        Assessment(actuator, reasons, tuple(on_actuator), drive_columns, "drive", tuple(notes)),
+        Assessment(states, reasons, tuple(on_sensor), {k: shown(x) for k, x in columns.items()}, "drive", tuple(notes)),
+        Assessment(
+            actuator,
+            reasons,
+            tuple(on_actuator),
+            {k: shown(x) for k, x in drive_columns.items()},
+            "drive",
+            tuple(notes),
+        ),
     )
 
 

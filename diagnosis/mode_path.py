@@ -27,6 +27,7 @@ from diagnosis.modes import (
     likelihoods,
     trace,
 )
+from replay.spill import Column, blocks, release
 
 Array = NDArray[np.float64]
 
@@ -116,13 +117,16 @@ class ModePath:
     filtered: NDArray[np.float32]
 
     @property
-    def row(self) -> NDArray[np.int64]:
+    def row(self) -> NDArray[np.int8]:
         """Row of the table per sample."""
-        return np.asarray(ROW_OF_MODEL[self.model])
+        return np.asarray(ROW_OF_MODEL.astype(np.int8)[self.model])
 
     def crossing(self, start: int, stop: int, slack: int, hold: int) -> int | None:
         """First sample of [start, stop) from which on a fault is lastingly more probable than none; see `first_lasting`."""
-        return first_lasting(self.filtered[:, HEALTHY] < 0.5, start, stop, slack, hold)
+        near = slice(max(0, start - slack), stop)  # nothing outside is looked at
+        raised = self.filtered[near, HEALTHY] < 0.5
+        found = first_lasting(raised, start - near.start, stop - near.start, slack, hold)
+        return None if found is None else near.start + found
 
 
 def first_lasting(raised: NDArray[np.bool_], start: int, stop: int, slack: int, hold: int) -> int | None:
@@ -206,6 +210,14 @@ def most_probable(
     model: ModeModel,
 ) -> ModePath:
     """Most probable rows of a whole channel; see `forward` for the arguments."""
-    back, filtered, state = forward(y, x, status, quiet, model, initial_state(model))
-    path, entered = trace(back, int(np.argmax(state.score)))
-    return ModePath(path, entered, filtered)
+    state = initial_state(model)
+    pointers, probabilities = Column(np.uint8, (MODELS,)), Column(np.float32, (len(ROWS),))
+    for part in blocks(y.size):
+        back, filtered, state = forward(y[part], x[part], status[part], quiet[part], model, state)
+        pointers.append(back)
+        probabilities.append(filtered)
+        release(y, x)
+    whole = pointers.finish()
+    path, entered = trace(whole, int(np.argmax(state.score)))
+    release(whole)
+    return ModePath(path, entered, probabilities.finish())

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,7 +29,7 @@ _JUMPY = 0.6  # share of a command's size that jumps between samples, where ther
 _FLIPS = 25  # samples in a row on one side of a command that switches to and fro between samples
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Pair:
     """A channel and its reference.
 
@@ -56,6 +57,8 @@ class Pair:
         From the machine file.
     instruments : Array, shape (n, k), or None
         Signals that drive x but know nothing of the fault; see `diagnosis.estimate`.
+    moved : Array, shape (n,), or None
+        x delayed as y is; None: x.
     """
 
     side: Side
@@ -71,6 +74,16 @@ class Pair:
     x_name: str
     known_noise: Noise
     instruments: Array | None = None
+    moved: Array | None = None
+
+    @cached_property
+    def texture(self) -> tuple[int, float, float, float]:
+        """Number of new samples of y, their white noise and rounding step, and the reference's white noise there."""
+        known = self.fresh & np.isfinite(self.y)
+        y, x = self.y[known], (self.x if self.moved is None else self.moved)[known]
+        lsb = self.known_noise.lsb if self.known_noise.lsb is not None else rounding_step(y)
+        white, own = (float(np.nan_to_num(white_noise(z, self.dt))) for z in (y, x))
+        return y.size, white, lsb, own
 
 
 def sample_status(
@@ -101,7 +114,7 @@ def neighbours(x: Array) -> Array:
     return ((moving_sum(known, _AROUND) - moving_sum(known, 3)) / (_AROUND - 3))[:, np.newaxis]
 
 
-def timing_explains(pair: Pair, x: Array, run: Run, mode: FaultMode, share: float) -> bool:
+def timing_explains(pair: Pair, run: Run, mode: FaultMode, share: float) -> bool:
     """Whether a deviation may be nothing but a delay between y and its reference, or its rounding.
 
     Shorter than a spool sensor's delay; or, where a log is too slow for its commands: what changes from sample to
@@ -111,6 +124,7 @@ def timing_explains(pair: Pair, x: Array, run: Run, mode: FaultMode, share: floa
     nothing is left but jumps between samples depends on the valve's lag.
     """
     part = slice(run.start, run.stop)
+    x = pair.x if pair.moved is None else pair.moved
     y, ref = pair.y[part], x[part]
     seconds = (run.stop - run.start) * pair.dt
     off = np.abs(y - ref)
@@ -119,12 +133,12 @@ def timing_explains(pair: Pair, x: Array, run: Run, mode: FaultMode, share: floa
         slope = np.gradient(np.nan_to_num(x[max(0, run.start - 1) : run.stop + 1]), pair.dt)
         moves = float(np.sqrt(np.mean(slope**2))) * _SENSOR_DELAY_S
         if mode in (FaultMode.STUCK, FaultMode.NO_SIGNAL):
-            return _rests_by_chance(pair, x, run, deviation)
+            return _rests_by_chance(pair, run, deviation)
         return mode is FaultMode.NOISY and seconds < 0.5 and deviation < moves
     if seconds <= _SPOOL_DELAY_S:
         return True
     gone = mode in (FaultMode.STUCK, FaultMode.NO_SIGNAL)
-    jumps = float(np.sqrt(np.mean(white_part(pair.x)[part] ** 2)))
+    jumps = _sudden(pair.x, run)
     if not gone and deviation < 2 * jumps and jumps > _JUMPY * float(np.sqrt(np.nanmean(ref**2))):
         return True
     if not share:
@@ -133,27 +147,31 @@ def timing_explains(pair: Pair, x: Array, run: Run, mode: FaultMode, share: floa
         return run.size < _FLIPS or (np.isfinite(deviation) and float(np.nanmedian(off)) < 0.5 * deviation)
     if mode is not FaultMode.NOISY:
         return False
-    sudden = max(float(np.sqrt(np.mean(white_part(z)[part] ** 2))) for z in (pair.x, pair.y))
+    sudden = max(_sudden(z, run) for z in (pair.x, pair.y))
     size = np.sqrt(np.nanmean((np.abs(y) - np.abs(pair.x[part])) ** 2))
     return bool(sudden > 0.3 * deviation or size < 0.3 * deviation)
 
 
-def _rests_by_chance(pair: Pair, x: Array, run: Run, deviation: float) -> bool:
+def _sudden(x: Array, run: Run) -> float:
+    """Root mean square of what changes from sample to sample in a run."""
+    first = max(0, run.start - 1)
+    return float(np.sqrt(np.mean(white_part(x[first : run.stop + 1])[run.start - first :][: run.size] ** 2)))
+
+
+def _rests_by_chance(pair: Pair, run: Run, deviation: float) -> bool:
     """Whether a healthy sensor's noise may keep its readings as close as they are, beside a reference that explains them.
 
     Within w = ptp(y) + lsb one reading is with probability erf(w / (√8·noise)) at most; see `diagnosis.spells`.
     """
-    known = pair.fresh & np.isfinite(pair.y)
     if not np.isfinite(pair.y[run.start : run.stop]).all():
         return False  # a silent channel does not rest
-    y = pair.y[run.start : run.stop][known[run.start : run.stop]]
-    white, own = (float(np.nan_to_num(white_noise(z[known], pair.dt))) for z in (pair.y, x))
+    y = pair.y[run.start : run.stop][pair.fresh[run.start : run.stop]]
+    count, white, lsb, own = pair.texture
     if not y.size or deviation > 2.5 * math.hypot(white, own):
         return False
-    lsb = pair.known_noise.lsb if pair.known_noise.lsb is not None else rounding_step(pair.y[known])
     noise = math.sqrt(max(white**2 - lsb**2 / 12, 0.0))
     close = math.erf((float(np.ptp(y)) + lsb) / (math.sqrt(8.0) * noise)) if noise else 1.0
-    return bool(np.count_nonzero(known) * close ** (y.size - 1) > FALSE_SPELLS)
+    return bool(count * close ** (y.size - 1) > FALSE_SPELLS)
 
 
 def mode_model(pair: Pair, x: Array, status: NDArray[np.int8], tolerance: float) -> tuple[modes.ModeModel, float]:

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from diagnosis.assessment import CODE, Assessment, Finding
 from diagnosis.noise import moving_sum, shifted
 from diagnosis.result import Epsilon, Hypothesis, Sat
+from replay.envelope import shown
 from replay.faults import FaultMode, Side, State
 from replay.machine import Limits
 
@@ -101,7 +102,7 @@ def assess_tracking(
             )
         )
         states[start:] = CODE[State.NO_SIGNAL]
-    columns = {"residual": np.where(np.isfinite(v), v - reference, np.nan), "expected": reference}
+    columns = {"residual": shown(np.where(np.isfinite(v), v - reference, np.nan)), "expected": shown(reference)}
     reasons = {
         State.NOT_ASSESSED: "without a valve command or a second measurement only a standstill under command would show",
         State.NOT_EXCITED: "nothing is commanded",

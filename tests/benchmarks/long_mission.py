@@ -39,7 +39,9 @@ def repeat(source: Path, target: Path, copies: int, shift_s: int) -> None:
     per_chunk = len(indexes) // len(chunks)
     head = [r for r in records if type(r).__name__ == "Header"]
     names = list({(type(r).__name__, r.id): r for r in records if type(r).__name__ in ("Schema", "Channel")}.values())
-    plain = [np.frombuffer(zstandard.ZstdDecompressor().decompress(c.data, c.uncompressed_size), np.uint8) for c in chunks]
+    plain = [
+        np.frombuffer(zstandard.ZstdDecompressor().decompress(c.data, c.uncompressed_size), np.uint8) for c in chunks
+    ]
     places = [_stamps(data) for data in plain]
     packer = zstandard.ZstdCompressor(level=1)
     with target.open("wb") as out:
@@ -90,9 +92,10 @@ def _stamps(data: np.ndarray) -> tuple[tuple[np.ndarray, np.ndarray], np.ndarray
         size = int.from_bytes(raw[at + 1 : at + 9], "little")
         if raw[at] == 5:
             log.append(at + 9 + 6)
-            if int.from_bytes(raw[at + 9 + 22 + 4 : at + 9 + 22 + 8], "little") == int.from_bytes(
-                raw[at + 15 : at + 23], "little"
-            ) // _SECOND:
+            if (
+                int.from_bytes(raw[at + 9 + 22 + 4 : at + 9 + 22 + 8], "little")
+                == int.from_bytes(raw[at + 15 : at + 23], "little") // _SECOND
+            ):
                 header.append(at + 9 + 22 + 4)
         at += 9 + size
     places = np.array(log, np.int64)
@@ -121,7 +124,12 @@ def _measure(log: Path, out: Path) -> tuple[float, float, float, str]:
     after = resource.getrusage(resource.RUSAGE_CHILDREN)
     cpu = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
     said = child.stdout.read().strip() if child.stdout else ""
-    return time.monotonic() - begun, cpu, largest / 2**20, f"{anonymous / 2**20:.2f} GiB private, exit {child.returncode} {said}"
+    return (
+        time.monotonic() - begun,
+        cpu,
+        largest / 2**20,
+        f"{anonymous / 2**20:.2f} GiB private, exit {child.returncode} {said}",
+    )
 
 
 def main() -> None:
@@ -151,7 +159,10 @@ def main() -> None:
             if not options.only_write:
                 wall, cpu, rss, rest = _measure(log, options.folder / f"{log.stem}-report")
                 size = log.stat().st_size / 1e6
-                print(f"{evidence:6s} {hours:5g} h {size:6.0f} MB log: {wall:6.1f} s wall, {cpu:6.1f} s CPU, {rss:.2f} GiB, {rest}", flush=True)
+                print(
+                    f"{evidence:6s} {hours:5g} h {size:6.0f} MB log: {wall:6.1f} s wall, {cpu:6.1f} s CPU, {rss:.2f} GiB, {rest}",
+                    flush=True,
+                )
 
 
 if __name__ == "__main__":

@@ -124,7 +124,9 @@ def places(path: Path) -> dict[str, Callable[[], Any]]:
             pairs = file.data[start + 15 : stop].view(np.dtype("<u8").newbyteorder("=")).reshape(-1, 2)
             at = pairs[:, 1].astype(np.int64)
             heads = np.ndarray((len(data) - 30,), "V31", data, strides=(1,))[at]
-            dtype = np.dtype({"names": ["size", "publish"], "formats": ["<u8", "<u8"], "offsets": [1, 23], "itemsize": 31})
+            dtype = np.dtype(
+                {"names": ["size", "publish"], "formats": ["<u8", "<u8"], "offsets": [1, 23], "itemsize": 31}
+            )
             found = heads.view(dtype)
             count += len(found["size"] - 22) + 0 * len(found["publish"].astype(np.int64))
         return count

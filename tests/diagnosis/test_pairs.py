@@ -21,7 +21,7 @@ def pair(side: Side, y: Array, x: Array) -> Pair:
 
 
 def explained(p: Pair, mode: FaultMode, start: int = A, stop: int = B, share: float = 0.0) -> bool:
-    return timing_explains(p, p.x, Run(start, stop, 1), mode, share)
+    return timing_explains(p, Run(start, stop, 1), mode, share)
 
 
 def speeds(noise: float, lsb: float = 0.0015) -> tuple[Array, Array]:
