@@ -17,6 +17,7 @@ from replay.errors import ConfigError, OutputError
 from replay.export.layout import Layout, TopicBatch
 from replay.export.mcap_log import write_mcap
 from replay.files import atomic_path
+from replay.inspect_mcap import mcap_index
 from replay.loop import Replay
 from replay.machine import Machine
 from replay.open_loop import COLUMN
@@ -116,6 +117,33 @@ def write_replay(path: Path, timeline: Timeline, replay: Replay, machine: Machin
             table = table.replace_schema_metadata({"mfhca.machine": machine.name, "mfhca.readings": readings})
             pa.parquet.write_table(table, temporary, compression="zstd")
     return tuple(table.column_names)
+
+
+def refuse_foreign_file(path: Path) -> None:
+    """Raise an `OutputError` where a file stands in the place of a result that no replay wrote.
+
+    Parameters
+    ----------
+    path : Path
+        File to write.
+    """
+    if path.is_file() and path.stat().st_size and not _is_own(path):
+        raise OutputError(f"{path}: exists, and no replay wrote it; give another name, or --force to replace it")
+
+
+def _is_own(path: Path) -> bool:
+    """Whether a replay wrote a file."""
+    kind = format_of(path)
+    if kind == "mcap":
+        index = mcap_index(path, "log")
+        return index is not None and bool(index.topics) and all(t.name.startswith("/mfhca/") for t in index.topics)
+    if kind == "csv":
+        with path.open("rb") as file:
+            return file.readline(20).replace(b'"', b"").startswith(b"stamp_ns,t,")
+    try:
+        return b"mfhca.readings" in (pa.parquet.read_schema(path).metadata or {})
+    except (pa.ArrowException, OSError, ValueError):
+        return False
 
 
 def _stamps(timeline: Timeline) -> NDArray[np.int64]:

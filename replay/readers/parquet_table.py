@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -89,7 +90,7 @@ class ParquetReader:
                 keep = times.keep(cells[name])
                 for label, column in columns.items():
                     column.append(cells[label][keep])
-            return table_log(path, self.format, clock, times, columns, table.texts, {})
+            return table.named(table_log(path, self.format, clock, times, columns, table.texts, table.about))
 
 
 @contextmanager
@@ -109,6 +110,11 @@ class _Parquet:
         self.path, self.file = path, file
         schema = file.schema_arrow
         names = unique_names(list(schema.names))[0]
+        # What a conversion of a log has written about it (see `replay.export.raw_log`).
+        about = {
+            k.decode(): v.decode("utf-8", "replace") for k, v in (schema.metadata or {}).items() if k[:6] == b"mfhca."
+        }
+        self.about: dict[str, str] = about if "mfhca.time" in about else {}
         twice = len(set(schema.names)) < len(schema.names)
         flat = [i for i, field in enumerate(schema) if not pa.types.is_nested(field.type)]
         self.numeric = {names[i]: schema.field(i) for i in flat if _is_number(schema.field(i).type)}
@@ -120,6 +126,9 @@ class _Parquet:
 
     def time(self, options: SourceOptions, report: Report) -> tuple[str, str]:
         """Name and unit of the time column."""
+        stated = self.about.get("mfhca.time")
+        if stated in self.numeric and options.time is None:
+            return stated, "ns"
         wanted = (options.time or "").strip()
         dated = [n for n in self.texts if n == wanted and options.time_unit in ("iso", "dt")]
         if dated:
@@ -133,6 +142,19 @@ class _Parquet:
         shown = {n: c.view("M8[ns]") if n in moments and c.dtype == np.int64 else c for n, c in sample.items()}
         return find_time(self.path, shown, options, report)
 
+    def named(self, log: RawLog) -> RawLog:
+        """Give the channels of a converted log their topics, fields, types and units again."""
+        if not self.about:
+            return log
+        channels = {}
+        for name, channel in log.channels.items():
+            told = {k: v.decode("utf-8", "replace") for k, v in (self.numeric[name].metadata or {}).items()}
+            channels[name] = replace(
+                channel, topic=told.get(b"topic", ""), field=told.get(b"field", name), unit=told.get(b"unit"),
+                type_name=told.get(b"type", channel.type_name),
+            )  # fmt: skip
+        return replace(log, channels=channels)
+
     def groups(self, name: str, unit: str, epoch: int, window: Window | None) -> list[int]:
         """Row groups whose stamps may lie in the window, by the statistics of the time column."""
         every = list(range(self.file.metadata.num_row_groups))
@@ -142,6 +164,7 @@ class _Parquet:
         flat = [i for i in range(len(self.file.schema)) if self.file.schema.column(i).path == name]
         if index < 0 or len(flat) != 1:
             return every
+        slack = _ROUNDING if pa.types.is_temporal(self.numeric[name].type) else 0
         kept = []
         for group in every:
             statistics = self.file.metadata.row_group(group).column(flat[0]).statistics
@@ -150,7 +173,7 @@ class _Parquet:
                 continue
             ends = pa.array([statistics.min, statistics.max]).cast(self.numeric[name].type)
             low, high = TimeBase(unit, epoch, "", Report()).stamps(_cells(ends)).tolist()
-            if MISSING in (low, high) or (low - _ROUNDING < window[1] and high + _ROUNDING >= window[0]):
+            if MISSING in (low, high) or (low - slack < window[1] and high + slack >= window[0]):
                 kept.append(group)
         return kept
 

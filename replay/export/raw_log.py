@@ -1,0 +1,242 @@
+"""Write a log as it was recorded: one Parquet file for each topic, in a folder with an index.
+
+Channels of one topic that have the same stamps stand in one file; those that only some of its messages hold stand in
+further ones, so that every sample comes back as it was: ``/imu`` → ``imu.parquet``, ``imu~2.parquet``.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import shutil
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+from numpy.typing import NDArray
+
+from replay.errors import LogError, OutputError
+from replay.mission import content_hash
+from replay.rawlog import Channel, RawLog, Window
+from replay.readers.registry import read_log, summarise_log
+from replay.sources import SourceOptions
+from replay.spill import release
+
+INDEX = "index.json"
+SCHEMA = "mfhca-raw/1"
+STAMP = "stamp_ns"
+_GROUP_CELLS = 1 << 22
+_LONGEST_NAME = 80
+
+
+@dataclass(frozen=True)
+class _Group:
+    """Channels that share their stamps."""
+
+    topic: str
+    stamps: NDArray[np.int64]
+    channels: tuple[Channel, ...]
+
+
+def write_raw(
+    path: Path,
+    folder: Path,
+    options: SourceOptions,
+    *,
+    start_s: float | None = None,
+    stop_s: float | None = None,
+    force: bool = False,
+    progress: Callable[[str], None] | None = None,
+) -> dict[str, Any]:
+    """Convert one log.
+
+    Parameters
+    ----------
+    path : Path
+        File or rosbag2 folder.
+    folder : Path
+        Folder to write; one that an earlier conversion wrote is replaced.
+    options : SourceOptions
+        How the log is read.
+    start_s, stop_s : float or None
+        Part of the log [s from its first stamp].
+    force : bool
+        Whether to write into a folder that holds something else; files of other names stay.
+    progress : callable or None
+        Called with one line about each step.
+
+    Returns
+    -------
+    dict
+        The index: source and its SHA-256, clock, files with their columns, notes, damage.
+
+    Raises
+    ------
+    LogError
+        Where the log cannot be read or holds no numbers.
+    OutputError
+        Where the folder cannot be written, or holds something else.
+    """
+    tell = progress or (lambda text: None)
+    refuse_foreign_folder(folder, force=force)
+    tell(f"reading {path.name}")
+    log = read_log(path, options, window=_window(path, options, start_s, stop_s))
+    groups = _groups(log)
+    if not groups:
+        said = "; ".join((*log.summary.damage, *log.summary.notes)) or "it holds no topics"
+        raise LogError(f"{path}: no numbers to convert: {said}")
+    tell(f"hashing {path.name}")
+    sha256, size = content_hash(path)
+    head = {
+        "schema": SCHEMA, "source": path.name, "sha256": sha256, "bytes": size, "format": log.format,
+        "clock": log.clock, "start_ns": log.summary.start_ns, "stop_ns": log.summary.stop_ns,
+    }  # fmt: skip
+    damage = log.summary.damage
+    files = []
+    try:
+        with _new_folder(folder) as temporary:
+            for group, name in zip(groups, _names(groups), strict=True):
+                tell(f"writing {name}")
+                files.append({"file": name, **_write(temporary / name, group, head)})
+                release(group.stamps, *(c.values for c in group.channels))
+            index = head | {
+                "status": "degraded" if damage else "ok", "damage": list(damage), "notes": list(log.summary.notes),
+                "files": files,
+            }  # fmt: skip
+            (temporary / INDEX).write_text(json.dumps(index, indent=2, ensure_ascii=False) + "\n", encoding="utf-8")
+            _place(temporary, folder)
+    except (OSError, pa.ArrowException) as error:
+        said = getattr(error, "strerror", None) or " ".join(str(error).split())
+        raise OutputError(f"{folder}: cannot be written ({said}); give another place") from error
+    return index
+
+
+def _window(path: Path, options: SourceOptions, start_s: float | None, stop_s: float | None) -> Window | None:
+    if start_s is None and stop_s is None:
+        return None
+    summary = summarise_log(path, options)
+    first = summary.start_ns + round((start_s or 0.0) * 1e9)
+    return first, summary.stop_ns + 1 if stop_s is None else summary.start_ns + round(stop_s * 1e9)
+
+
+def _groups(log: RawLog) -> list[_Group]:
+    """Channels by topic and stamps, in recorded order."""
+    listed = {field: info.name for info in log.summary.topics for field in info.fields}
+    topics: dict[str, dict[int, list[Channel]]] = {}
+    for channel in log.channels.values():
+        topic = channel.topic or listed.get(channel.name, Path(log.source).stem)
+        same = topics.setdefault(topic, {})
+        key = id(channel.stamps)
+        if key not in same:
+            equal = (k for k, held in same.items() if np.array_equal(held[0].stamps, channel.stamps))
+            key = next(equal, key)
+        same.setdefault(key, []).append(channel)
+    return [_Group(topic, held[0].stamps, tuple(held)) for topic, same in topics.items() for held in same.values()]
+
+
+def _names(groups: Iterable[_Group]) -> list[str]:
+    """File names that every system can hold, each once."""
+    names: list[str] = []
+    seen: dict[str, int] = {}
+    for group in groups:
+        plain = re.sub(r"[^A-Za-z0-9_-]+", ".", group.topic).strip(".")[:_LONGEST_NAME] or "topic"
+        number = seen[plain.lower()] = seen.get(plain.lower(), 0) + 1
+        names.append(f"{plain}.parquet" if number == 1 else f"{plain}~{number}.parquet")
+    return names
+
+
+def _write(path: Path, group: _Group, head: dict[str, Any]) -> dict[str, Any]:
+    """Write one file, some rows at a time, and describe it."""
+    names = [c.name for c in group.channels]
+    stamp = STAMP if STAMP not in names else f"log.{STAMP}"
+    fields = [pa.field(stamp, pa.int64(), nullable=False, metadata={"unit": "ns"})]
+    for c in group.channels:
+        told = {"topic": c.topic, "field": c.field, "type": c.type_name} | ({"unit": c.unit} if c.unit else {})
+        fields.append(pa.field(c.name, pa.from_numpy_dtype(c.values.dtype), nullable=False, metadata=told))
+    about = {f"mfhca.{key}": str(value) for key, value in head.items()} | {
+        "mfhca.topic": group.topic,
+        "mfhca.time": stamp,
+    }
+    schema = pa.schema(fields, metadata=about)
+    count = len(group.stamps)
+    step = max(_GROUP_CELLS // len(fields), 1 << 10)
+    with pq.ParquetWriter(path, schema, compression="zstd", write_page_checksum=True) as writer:
+        for at in range(0, count, step):
+            part = slice(at, min(at + step, count))
+            arrays = [pa.array(group.stamps[part]), *(pa.array(c.values[part]) for c in group.channels)]
+            writer.write_batch(pa.record_batch(arrays, schema=schema))
+    return {
+        "topic": group.topic,
+        "type": group.channels[0].type_name,
+        "rows": count,
+        "first_ns": int(group.stamps.min()) if count else None,
+        "last_ns": int(group.stamps.max()) if count else None,
+        "columns": [
+            {"name": c.name, "field": c.field, "dtype": str(c.values.dtype), "unit": c.unit} for c in group.channels
+        ],
+    }
+
+
+def refuse_foreign_folder(folder: Path, *, force: bool) -> None:
+    """Raise an `OutputError` where a place holds something that no conversion wrote.
+
+    Parameters
+    ----------
+    folder : Path
+        Place to write to.
+    force : bool
+        Whether a folder with other files will do.
+    """
+    if folder.suffix.lower() in (".parquet", ".csv", ".mcap"):
+        raise OutputError(
+            f"{folder}: a folder is to be written, one file for each topic; give a name without an ending"
+        )
+    if not folder.exists():
+        return
+    if not folder.is_dir():
+        raise OutputError(f"{folder}: is a file, a folder is to be written; give another name")
+    if not force and any(folder.iterdir()) and not _is_own(folder):
+        raise OutputError(f"{folder}: holds other files; give a new folder, or --force to write among them")
+
+
+def _is_own(folder: Path) -> bool:
+    """Whether a folder holds an earlier conversion and nothing else."""
+    try:
+        index = json.loads((folder / INDEX).read_text(encoding="utf-8"))
+        files = {INDEX, *(str(f["file"]) for f in index["files"])}
+        return index["schema"] == SCHEMA and {p.name for p in folder.iterdir()} <= files
+    except (OSError, ValueError, KeyError, TypeError):
+        return False
+
+
+@contextmanager
+def _new_folder(folder: Path) -> Iterator[Path]:
+    """Give a temporary folder beside the one to write; what is left of it in the end is removed."""
+    temporary = folder.with_name(f".{folder.name}.{os.getpid()}.part")
+    folder.parent.mkdir(parents=True, exist_ok=True)
+    shutil.rmtree(temporary, ignore_errors=True)
+    temporary.mkdir()
+    try:
+        yield temporary
+    finally:
+        shutil.rmtree(temporary, ignore_errors=True)
+
+
+def _place(temporary: Path, folder: Path) -> None:
+    """Put a finished folder where it belongs: in place of an earlier conversion, else file by file, the index last."""
+    if folder.exists() and _is_own(folder):
+        old = folder.with_name(f".{folder.name}.{os.getpid()}.old")
+        folder.rename(old)
+        temporary.rename(folder)
+        shutil.rmtree(old, ignore_errors=True)
+    elif folder.exists():
+        for file in sorted(temporary.iterdir(), key=lambda p: p.name == INDEX):
+            file.replace(folder / file.name)
+    else:
+        temporary.rename(folder)
