@@ -60,6 +60,7 @@ class Database:
     damaged: int = 0
     met: int = 0
     spread: int = 0
+    buffer: NDArray[np.uint8] = field(default_factory=lambda: np.empty(0, np.uint8))
 
     @property
     def name(self) -> str:
@@ -209,7 +210,10 @@ class Database:
         """Copy the payloads of rows to one buffer."""
         image = self.image
         into = np.cumsum(length) - length
-        out = np.empty(int(length.sum()), np.uint8)
+        size = int(length.sum())
+        if len(self.buffer) < size:
+            self.buffer = np.empty(max(size, min(2 * size, _BYTES)), np.uint8)
+        out = self.buffer[:size]
         status = np.zeros(len(place), np.uint8)
         scan.gather(image.data, image.page, image.usable, place, local, start, length, out, into, status)
         whole = status == scan.OK
