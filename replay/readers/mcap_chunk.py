@@ -4,7 +4,7 @@ What is believed. A chunk whose checksum is wrong is left out as a whole: one wr
 fault of the machine, and nothing tells which of its messages are right. A chunk that the end of the file cuts off, or
 that ends in nothing but zeros as after a power failure, lost its end but its beginning stands as it was written: the
 messages that its decompressed beginning completes are taken, and said to be unverified because the checksum covers
-the whole chunk. A chunk without a checksum cannot be verified in any case: what can be decompressed is taken up to
+the whole chunk. A checksum that differs in a single bit was itself damaged: by chance that happens once in 10⁸. A chunk without a checksum cannot be verified in any case: what can be decompressed is taken up to
 the damage. Nothing is ever taken from behind a place at which decompression failed.
 """
 
@@ -28,7 +28,8 @@ from replay.readers.mcap_file import McapFile
 _FIXED = 49
 _PIECE = 1 << 16
 _ZEROS = 512
-_COMPRESSIONS = {"": 0, "none": 4, "lz4": 3, "zstd": 4}
+_FRAME_HEAD = 32
+_COMPRESSIONS = ("", "none", "lz4", "zstd", "bz2")
 _FRAMES = {b"\x28\xb5\x2f\xfd": "zstd", b"\x04\x22\x4d\x18": "lz4"}
 
 
@@ -60,23 +61,33 @@ class _Head(NamedTuple):
 
 
 def _head(data: NDArray[np.uint8], start: int, end: int, cut: bool) -> _Head | None:
-    """Read a chunk's head; where the length of its compression's name is wrong, the packed size finds it."""
+    """Read a chunk's head; where its lengths disagree, that of the record and the frame's first bytes tell the rest."""
     raw = data[start + 9 : min(end, start + 9 + 64)].tobytes()
     if len(raw) < _FIXED - 9:
         return None
     size, crc, stated = (int.from_bytes(raw[a:b], "little") for a, b in ((16, 24), (24, 28), (28, 32)))
+    fits: list[tuple[int, int]] = []
     for text in (stated, 0, 3, 4):
         if text > 16 or 40 + text > len(raw):
             continue
         packed = int.from_bytes(raw[32 + text : 40 + text], "little")
         left = end - (start + _FIXED + text)
         if packed > left if cut else left - 64 <= packed <= left:
-            name = raw[32 : 32 + text].decode("ascii", "replace")
-            body = start + _FIXED + text
-            if name not in _COMPRESSIONS:
-                name = _FRAMES.get(data[body : body + 4].tobytes(), name)
-            return _Head(size, crc, name, body, min(packed, left))
-    return None
+            fits.append((text, min(packed, left)))
+    if not fits and not cut:
+        fits = [(n, end - start - _FIXED - n) for n in (4, 3) if _frame(data, start + _FIXED + n)]
+        fits += [(0, end - start - _FIXED)] if stated == 0 else []
+    if not fits:
+        return None
+    text, packed = fits[0]
+    body = start + _FIXED + text
+    name = raw[32 : 32 + text].decode("ascii", "replace")
+    return _Head(size, crc, name if name in _COMPRESSIONS else _frame(data, body) or name, body, packed)
+
+
+def _frame(data: NDArray[np.uint8], body: int) -> str:
+    """Compression whose frames begin as these bytes do, or nothing."""
+    return _FRAMES.get(data[body : body + 4].tobytes(), "")
 
 
 def open_chunk(file: McapFile, row: int) -> Chunk | None:
@@ -91,17 +102,45 @@ def open_chunk(file: McapFile, row: int) -> Chunk | None:
     packed = file.data[head.body : head.body + head.packed]
     if cut:
         return _beginning(file, where, head, packed, "is cut off by the end of the file")
-    size = _size(file, start, head, where)
+    reason = ""
+    for size in _sizes(file, start, head, packed):
+        try:
+            data = file.inflater.expand(head.compression, packed, size)
+        except InflateError as error:
+            reason = reason or str(error)
+            continue
+        if size != head.size:
+            file.lost("size", f"{where} states {head.size} bytes, but holds {size}")
+        if not head.crc:
+            file.bare = True
+            return Chunk(data, _runs(file, where, data), False)
+        differs = zlib.crc32(data.data) ^ head.crc
+        if differs.bit_count() == 1:
+            file.lost("checksum", f"one bit of the checksum of {where} was wrong, its content is not")
+        if differs.bit_count() <= 1:
+            return Chunk(data, [(0, len(data))], True)
+        reason = "its checksum differs"
+    return _in_part(file, row, where, head, packed, reason)
+
+
+def _sizes(file: McapFile, start: int, head: _Head, packed: NDArray[np.uint8]) -> list[int]:
+    """Full sizes that a chunk may have: as its head, the summary and its frame say."""
+    sizes, summary = [head.size], file.summary
+    if summary is not None and len(summary.chunks):
+        row = int(np.searchsorted(summary.chunks[:, 2], start))
+        if row < len(summary.chunks) and summary.chunks[row, 2] == start:
+            sizes.append(int(summary.chunks[row, 6]))
+    first = packed[:_FRAME_HEAD].tobytes()
     try:
-        data = file.inflater.expand(head.compression, packed, size)
-    except InflateError as error:
-        return _in_part(file, row, where, head, packed, str(error))
-    if head.crc and zlib.crc32(data.data) != head.crc:
-        return _in_part(file, row, where, head, packed, "its checksum differs")
-    if head.crc:
-        return Chunk(data, [(0, len(data))], True)
-    file.bare = True
-    return Chunk(data, _runs(file, where, data), False)
+        if head.compression == "zstd":
+            sizes.append(int(zstandard.get_frame_parameters(first).content_size))
+        elif head.compression == "lz4":
+            sizes.append(int(lz4.frame.get_frame_info(first)["content_size"]))
+        else:
+            sizes.append(len(packed))
+    except (zstandard.ZstdError, RuntimeError, ValueError):
+        pass
+    return [s for s in dict.fromkeys(sizes) if 0 < s <= MAX_CHUNK or s == head.size]
 
 
 def take_names(file: McapFile, row: int, chunk: Chunk) -> None:
@@ -144,18 +183,6 @@ def _open_for_names(file: McapFile, row: int) -> None:
     chunk = open_chunk(file, row)
     if chunk is not None:
         take_names(file, row, chunk)
-
-
-def _size(file: McapFile, start: int, head: _Head, where: str) -> int:
-    """Full size of a chunk: as its head says, or as the checked summary does where the two differ."""
-    summary = file.summary
-    if summary is None or not len(summary.chunks):
-        return head.size
-    row = int(np.searchsorted(summary.chunks[:, 2], start))
-    if row == len(summary.chunks) or summary.chunks[row, 2] != start or summary.chunks[row, 6] == head.size:
-        return head.size
-    file.lost("index", f"{where} states {head.size} bytes, its index {summary.chunks[row, 6]}")
-    return int(summary.chunks[row, 6]) if summary.checked else head.size
 
 
 def _in_part(file: McapFile, row: int, where: str, head: _Head, packed: NDArray[np.uint8], reason: str) -> Chunk | None:
