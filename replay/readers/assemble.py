@@ -13,7 +13,7 @@ from replay.rawlog import Channel, Clock, LogSummary, RawLog
 from replay.readers import cdr, jsonmsg, protobuf
 from replay.readers.clocks import Clocks, Report
 from replay.readers.definitions import DefinitionError, MessageType, resolve
-from replay.readers.growing import Cells, Store, Table
+from replay.readers.growing import Budget, Cells, Store, Table
 from replay.readers.layout import MAX_ELEMENTS
 from replay.readers.program import Spec
 from replay.readers.protobuf_schema import Schema, schema_of
@@ -182,7 +182,7 @@ class Assembler:
         self.topics: dict[tuple[str, str], _Topic] = {}
         self.expected: dict[tuple[str, str], int] = {}
         self.stamps = (Spec("log", "i8"), Spec("publish", "i8"))[: 2 if clock == "publish" else 1]
-        self.batches = 0
+        self.batches, self.budget = 0, Budget(MEMORY)
         self.clocks = Clocks(clock, report)
 
     def expect(self, connection: Connection, count: int) -> None:
@@ -199,8 +199,8 @@ class Assembler:
             topic = self.topics.get(key)
             if topic is None:
                 count = self.expected.get(key, 0)
-                stamps = Table(0, self.stamps, count)
-                topic = self.topics[key] = _Topic(batch[0].connection, Store(count), stamps)
+                stamps = Table(0, self.stamps, count, self.budget)
+                topic = self.topics[key] = _Topic(batch[0].connection, Store(count, self.budget), stamps)
             topic.add([_within_range(b, self.report) for b in batch])
         self.batches += 1
         if self.batches % _LOOK_EVERY == 0:

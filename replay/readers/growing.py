@@ -21,7 +21,7 @@ from replay.spill import Column
 FREE = -1
 _SIZES = (1, 2, 4, 8)
 _FEWEST_ROWS = 256
-_MOST_BYTES = 128 << 20
+_MOST_BYTES = 64 << 20
 
 Rows = NDArray[np.int64]
 Cells = tuple[Rows | None, NDArray[Any]]
@@ -49,6 +49,20 @@ class Part:
 def _stored(spec: Spec) -> str:
     """Number type of a column in memory: truth values are bytes, hidden counts 32-bit."""
     return {"#": "u4", "?": "u1"}.get(spec.dtype, spec.dtype)
+
+
+@dataclass
+class Budget:
+    """Memory that may be taken on the word of an index, which may be wrong [bytes]."""
+
+    left: int = 0
+
+    def take(self, size: int) -> bool:
+        """Take memory, unless there is not so much left."""
+        if not 0 < size <= self.left:
+            return False
+        self.left -= size
+        return True
 
 
 class _Spilled(Column):
@@ -81,10 +95,12 @@ class Table:
         Its columns.
     expected : int
         How many rows are foretold; 0 where nothing is known.
+    budget : Budget or None
+        Where room for them is taken from.
     """
 
-    def __init__(self, number: int, specs: tuple[Spec, ...], expected: int = 0) -> None:
-        self.number, self.specs, self.expected = number, specs, expected
+    def __init__(self, number: int, specs: tuple[Spec, ...], expected: int = 0, budget: Budget | None = None) -> None:
+        self.number, self.specs = number, specs
         widths = [width_of(_stored(s)) for s in specs]
         self.counts = tuple(widths.count(size) for size in _SIZES)
         seen = dict.fromkeys(_SIZES, -1)
@@ -93,6 +109,7 @@ class Table:
             seen[width] += 1
             self.place[spec] = seen[width]
         self.width = sum(widths)
+        self.expected = expected if budget is not None and budget.take(expected * self.width) else 0
         self.grid = Grid(self.counts, 0)
         self.used = self.count = 0
         self.full: list[tuple[Grid, int]] = []
@@ -112,9 +129,10 @@ class Table:
 
     def _renew(self, rows: int) -> None:
         self._keep()
-        most = _MOST_BYTES // max(self.width, 1)
-        guess = self.expected - self.count if self.expected > self.count else max(self.count // 2, _FEWEST_ROWS)
-        self.grid = Grid(self.counts, max(rows, min(guess, most)))
+        guess = min(max(self.count // 2, _FEWEST_ROWS), _MOST_BYTES // max(self.width, 1))
+        if not self.count:
+            guess = max(guess, self.expected)
+        self.grid = Grid(self.counts, max(rows, guess))
 
     def _keep(self) -> None:
         if self.used:
@@ -200,11 +218,14 @@ class Store:
         Messages of the batches that have ended.
     expected : int
         How many are foretold; 0 where nothing is known.
+    budget : Budget or None
+        Where room for them is taken from.
     skipped : set[str]
         Arrays too long to become channels.
     """
 
     expected: int = 0
+    budget: Budget | None = None
     count: int = 0
     skipped: set[str] = field(default_factory=set)
     tables: dict[frozenset[Spec], Table] = field(default_factory=dict)
@@ -217,7 +238,8 @@ class Store:
         specs = tuple(specs)
         key = frozenset(specs)
         if key not in self.tables:
-            self.tables[key] = Table(len(self.tables), specs, 0 if self.tables else self.expected)
+            expected = 0 if self.tables else self.expected
+            self.tables[key] = Table(len(self.tables), specs, expected, self.budget)
         return self.tables[key]
 
     def begin(self, rows: int) -> None:
