@@ -55,7 +55,7 @@ class ParquetReader:
         with _opened(path) as file:
             table = _Parquet(path, file)
             name, unit = table.time(options, report)
-            base = TimeBase(unit, epoch_ns(options, str(path)), path.name, Report())
+            base = TimeBase("iso" if table.dated(name) else unit, epoch_ns(options, str(path)), path.name, Report())
             ends = [base.stamps(cells) for cells in table.ends(name)]
             given = np.concatenate(ends) if ends else np.empty(0, np.int64)
             given = given[given != MISSING]
@@ -83,7 +83,7 @@ class ParquetReader:
         with _opened(path) as file:
             table = _Parquet(path, file)
             name, unit = table.time(options, report)
-            times = RowTimes(path, name, unit, options, window, report)
+            times = RowTimes(path, name, unit, table.dated(name), options, window, report)
             columns = {n: ArrayColumn() for n in table.numeric if n != name}
             groups = table.groups(name, unit, epoch_ns(options, str(path)), window)
             for cells in table.blocks([name, *columns], groups):
@@ -138,8 +138,7 @@ class _Parquet:
         labels = list(self.numeric)
         first = next(self.blocks(labels, [0], _SAMPLE), None)
         sample = first if first is not None else {n: np.empty(0) for n in labels}
-        moments = {n for n, f in self.numeric.items() if pa.types.is_temporal(f.type) or n in dated}
-        shown = {n: c.view("M8[ns]") if n in moments and c.dtype == np.int64 else c for n, c in sample.items()}
+        shown = {n: c.view("M8[ns]") if self.dated(n) and c.dtype == np.int64 else c for n, c in sample.items()}
         return find_time(self.path, shown, options, report)
 
     def named(self, log: RawLog) -> RawLog:
@@ -154,6 +153,11 @@ class _Parquet:
                 type_name=told.get(b"type", channel.type_name),
             )  # fmt: skip
         return replace(log, channels=channels)
+
+    def dated(self, name: str) -> bool:
+        """Whether a column holds moments rather than numbers."""
+        kind = self.numeric[name].type
+        return bool(pa.types.is_timestamp(kind) or pa.types.is_date(kind) or not _is_number(kind))
 
     def groups(self, name: str, unit: str, epoch: int, window: Window | None) -> list[int]:
         """Row groups whose stamps may lie in the window, by the statistics of the time column."""

@@ -102,7 +102,7 @@ class TimeBase:
             self._inexact |= bool((np.abs(whole) > 2.0**53).any())
             return self._of_integers(np.where(good, np.rint(whole).astype(np.int64), MISSING))
         factor = _NANOSECONDS.get(self.unit, 1)
-        good = np.abs(reals) * factor < _FAR
+        good = np.abs(reals) < _FAR / factor
         reals = np.where(good, reals, 0.0)
         base = np.floor(reals)
         ns = base.astype(np.int64) * factor + self.epoch

@@ -55,9 +55,11 @@ class CsvReader:
         report = Report()
         table = open_text(path, options, report)
         sample, name, unit = _time(table, options, report)
-        tail = table.sample(table.file.tail(table.skip)) if unit != "dc32" else {}
+        last = table.file.tail(table.skip) if unit != "dc32" else b""
+        tail = table.sample(last) if last else {}
         count, exact = row_count(table.file, table.skip)
-        base = TimeBase(unit, epoch_ns(options, str(path)), path.name, Report())
+        dated = sample[name].dtype.kind == "M"
+        base = TimeBase("iso" if dated else unit, epoch_ns(options, str(path)), path.name, Report())
         start, stop = span(base, sample[name], tail.get(name), count)
         fields = tuple(n for n in table.names if n != name and (n in sample or n in tail))
         note = "" if exact else "rows and end are estimated from the first rows; reading the file counts them"
@@ -82,10 +84,10 @@ class CsvReader:
         report = Report()
         table = open_text(path, options, report)
         sample, name, unit = _time(table, options, report)
-        dates = [n for n, c in sample.items() if c.dtype.kind == "M" and n == name]
-        found = _read(table, (name, unit), dates, options, window)
+        time = name, unit, unit == "iso" or sample[name].dtype.kind == "M"
+        found = _read(table, time, options, window)
         if not table.sure and any(_has_comma(cell) for cell in found.rows.examples.values()):
-            found = _read(table.commas(), (name, unit), dates, options, window)
+            found = _read(table.commas(), time, options, window)
         report.damage += found.rows.report.damage
         return _log(table, found, report, clock)
 
@@ -117,16 +119,15 @@ def _time(table: TextTable, options: SourceOptions, report: Report) -> tuple[Sam
     raise AssertionError("unreachable")
 
 
-def _read(
-    table: TextTable, time: tuple[str, str], dates: list[str], options: SourceOptions, window: Window | None
-) -> _Found:
-    name, unit = time
+def _read(table: TextTable, time: tuple[str, str, bool], options: SourceOptions, window: Window | None) -> _Found:
+    """One pass over a table whose time column has this name and unit, and may hold dates."""
+    name, unit, dated = time
     report = Report()
     rows = table.rows(report)
     at = table.names.index(name)
-    if dates or unit == "iso":
+    if dated:
         rows.kinds[at] = MOMENT
-    times = RowTimes(table.file.path, name, unit, options, window, report)
+    times = RowTimes(table.file.path, name, unit, dated, options, window, report)
     columns = {n: CellColumn() for n in table.names if n != name}
     order = [(i, columns[n]) for i, n in enumerate(table.names) if n != name]
     for cells in table.blocks(rows):

@@ -35,6 +35,8 @@ class RowTimes:
         File, for messages.
     name, unit : str
         Time column.
+    dated : bool
+        Whether its cells are moments [ns since 1970] already.
     options : SourceOptions
         Its epoch.
     window : tuple[int, int] or None
@@ -44,10 +46,19 @@ class RowTimes:
     """
 
     def __init__(
-        self, path: Path, name: str, unit: str, options: SourceOptions, window: Window | None, report: Report
+        self,
+        path: Path,
+        name: str,
+        unit: str,
+        dated: bool,
+        options: SourceOptions,
+        window: Window | None,
+        report: Report,
     ) -> None:
         self.path, self.name, self.unit, self.report = path, name, unit, report
-        self.base = TimeBase(unit, epoch_ns(options, str(path)), f"{path.name}, column {name!r}", report)
+        self.base = TimeBase(
+            "iso" if dated else unit, epoch_ns(options, str(path)), f"{path.name}, column {name!r}", report
+        )
         self._early = None if unit == "dt" else window
         self._late = window if unit == "dt" else None
         self._stamps = Column(np.int64)

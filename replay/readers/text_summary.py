@@ -12,14 +12,14 @@ from replay.readers.stamps import TimeBase
 from replay.readers.textfile import BLOCK, TextFile
 
 COUNTED = 256 << 20
-_PACKED = 8 << 20
+PACKED = 8 << 20
 _PIECE = 1 << 20
 
 
 def row_count(file: TextFile, skip: int) -> tuple[int, bool]:
     """Lines behind the first `skip` bytes, and whether they were counted rather than estimated."""
     size = file.path.stat().st_size
-    if file.packed and size > _PACKED:
+    if file.packed and size > PACKED:
         head = file.head(BLOCK)
         share = file.position_after(BLOCK)
         return int(head.count(b"\n", skip) * size / max(share, 1)), False

@@ -118,11 +118,14 @@ def separator_of(lines: list[str]) -> str | None:
     """Separator under which most lines have the same number of cells and hold numbers, two cells at least."""
     best, score = None, 1.0
     for mark in SEPARATORS:
-        counts = Counter(len(line.split(mark)) for line in lines)
-        width, agree = counts.most_common(1)[0]
-        cells = lines[-1].split(mark) if len(lines) < 3 else lines[-2].split(mark)
+        try:
+            rows = [row for row in csv.reader(lines, delimiter=mark) if row]
+        except csv.Error:
+            rows = [line.split(mark) for line in lines]
+        width, agree = Counter(len(row) for row in rows).most_common(1)[0]
+        cells = rows[-1] if len(rows) < 3 else rows[-2]
         numeric = sum(_is_number(c) for c in cells)
-        if width > 1 and agree * 2 > len(lines) and numeric and numeric * (mark != "," or 0.9) > score - 1:
+        if width > 1 and agree * 2 > len(rows) and numeric and numeric * (mark != "," or 0.9) > score - 1:
             best, score = (mark, numeric + 1.0) if best is None or numeric > score - 1 else (best, score)
     return best
 
@@ -172,6 +175,11 @@ def open_text(path: Path, options: SourceOptions, report: Report) -> TextTable:
     if len(names) > MAX_COLUMNS:
         raise LogError(f"{path} has {len(names)} columns; at most {MAX_COLUMNS} are read")
     if all(_is_number(c) or not c for c in names):
+        if file.tail(at).rstrip().endswith(b"EOF"):
+            raise LogError(
+                f'{path} looks like a TwinCAT Scope export without its header (header "None"), so that its columns cannot be '
+                "told apart; export again with the full header"
+            )
         named = [c.strip() for c in decoded(skipped).lstrip("# ").split(separator)]
         names = named if len(named) == len(names) else [f"column {i + 1}" for i in range(len(names))]
         report.note(f"{path.name} has no header; its columns are called {names[0]!r}, {names[-1]!r} and so on")
@@ -203,7 +211,7 @@ def _header(path: Path, head: bytes, separator: str) -> tuple[list[str], int]:
     if reader.line_num > 5:  # a quote that nothing closes
         size = head.find(b"\n") + 1 or len(head)
         names = decoded(head[:size]).split(separator)
-    return [n.strip().strip('"').strip() for n in names], size
+    return [n.strip() for n in names], size
 
 
 def _decimal(text: bytes, separator: str) -> tuple[str, bool]:

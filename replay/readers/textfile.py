@@ -25,7 +25,7 @@ _ZEROS = re.compile(rb"\0{16,}")
 def first_text(path: Path, size: int = 65_536) -> str:
     """Return the beginning of a text file, or an empty string where it is not text."""
     try:
-        raw = TextFile(path, Report()).head(size)
+        raw = TextFile(path, Report()).head(size).partition(b"\0" * 16)[0]
     except LogError:
         return ""
     text = decoded(raw)

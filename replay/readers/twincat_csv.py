@@ -120,13 +120,15 @@ class _Pass:
 
 
 def _without_eof(scope: Scope, text: bytes, report: Report) -> bytes:
-    """Cut ``EOF`` off; without it the full dialect was cut off, and its last row with it."""
+    """Cut ``EOF`` off; without it the full dialect was cut off, mostly in the middle of a row."""
     body = text.rstrip(b"\0 \r\n\t")
     if body.endswith(b"EOF"):
         return body[:-3]
     if scope.ends_in_eof:
-        report.lost(f"{scope.file.path.name} does not end in EOF; the export was cut off and its last row left out")
-        return body[: body.rfind(b"\n") + 1]
+        rest = text.rstrip(b"\0")
+        torn = "" if rest.endswith(b"\n") else " and its last row left out"
+        report.lost(f"{scope.file.path.name} does not end in EOF; the export was cut off{torn}")
+        return rest[: rest.rfind(b"\n") + 1]
     return text
 
 

@@ -1,17 +1,22 @@
 from __future__ import annotations
 
 import gzip
+from datetime import datetime, timedelta, timezone
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 import pytest
+import zstandard
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from replay.errors import LogError
 from replay.rawlog import RawLog
+from replay.readers import text_summary, text_table, textfile
+from replay.readers.iso_kernel import iso_ns
 from replay.readers.registry import open_log, read_log, summarise_log
+from replay.readers.row_kernel import MISSING
 from replay.sources import SourceOptions
 
 
@@ -141,6 +146,147 @@ def test_gzip_whole_and_cut_off(tmp_path: Path) -> None:
     log = read(path)
     assert 0 < len(log.channels["a"].values) < 5000
     assert any("gzip data are cut off" in d for d in log.summary.damage)
+
+
+def test_zstd_whole_and_cut_off(tmp_path: Path) -> None:
+    path = tmp_path / "t.csv.zst"
+    text = "t,a\n" + "".join(f"{i},{i * 7919 % 1000}\n" for i in range(200_000))
+    path.write_bytes(zstandard.compress(text.encode()))
+    assert open_log(path).format == "csv"
+    assert len(read(path).channels["a"].values) == 200_000
+    path.write_bytes(path.read_bytes()[:-2000])
+    log = read(path)
+    assert 0 < len(log.channels["a"].values) < 200_000
+    assert any("zstd data are damaged or cut off" in d for d in log.summary.damage)
+
+
+def test_quoted_cells_hold_separators_quotes_and_line_feeds(target: Path) -> None:
+    target.write_text('"t","a, ""b""","multi\nline",c\n0,"1.5",-2,"x, y"\n1,"2.5", "3" ,"x\ny"\n"2",3.5,4,"z"\n')
+    log = read(target)
+    assert [*log.channels] == ['a, "b"', "multi\nline"]
+    assert log.channels["multi\nline"].values.tolist() == [-2, 3, 4]
+
+
+@pytest.mark.parametrize("size", [64, 101])
+def test_blocks_change_nothing(target: Path, size: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    rows = [f'{i},{i % 7},{i + 0.5 if i > 50 else i},"{i}\n{i}",{"" if i == 30 else i}' for i in range(100)]
+    target.write_text("t,a,b,c,d\n" + "\n".join(rows) + "\n")
+    whole = read(target)
+    monkeypatch.setattr(textfile, "BLOCK", size)
+    parts = read(target)
+    assert parts.summary == whole.summary
+    assert [str(c.values.dtype) for c in whole.channels.values()] == ["int64", "float64", "float64"]
+    for name, channel in whole.channels.items():
+        np.testing.assert_array_equal(parts.channels[name].values, channel.values)
+
+
+def test_a_decimal_comma_that_comes_late(target: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(textfile.TextFile, "tail", lambda self, skip: b"")
+    monkeypatch.setattr(text_table, "HEAD", 100)
+    target.write_text("t;v\n" + "".join(f"{i};{i % 3}\n" for i in range(50)) + "50;0,5\n51;-,25\n")
+    log = read(target)
+    assert log.channels["v"].values[-3:].tolist() == [1, 0.5, -0.25]
+    assert log.summary.damage == ()
+
+
+def test_rows_of_other_lengths_are_counted(target: Path) -> None:
+    target.write_text("t,a,b\n0,1,2\n1,2\n2,3,4,5\n3,4,5,\n\n  \n4,5,6\n5,6,7\n6,7,8\n")
+    log = read(target)
+    np.testing.assert_array_equal(log.channels["b"].values, [2, np.nan, 4, 5, 6, 7, 8])
+    assert any("1 rows have fewer cells than the header" in d for d in log.summary.damage)
+    assert any("1 rows have more cells than the header (the first at byte 16)" in d for d in log.summary.damage)
+
+
+def test_words_for_numbers(target: Path) -> None:
+    words = "t;a\n0;NaN\n1;-inf\n2;+Infinity\n3;1.#QNAN\n4;n. def.\n5;-1.#IND\n6;TRUE\n7;off\n8;null\n9;\n"
+    target.write_text(words)
+    expected = [np.nan, -np.inf, np.inf, np.nan, np.nan, np.nan, 1, 0, np.nan, np.nan]
+    log = read(target)
+    np.testing.assert_array_equal(log.channels["a"].values, expected)
+    assert log.summary.damage == ()
+
+
+def test_numbers_that_only_python_can_round(target: Path) -> None:
+    cells = ["2.4703282292062327208e-324", "1e400", "9007199254740993.00000000000000000000001", "-1e-400"]
+    target.write_text("t,v\n" + "".join(f"{i},{c}\n" for i, c in enumerate(cells)))
+    assert read(target).channels["v"].values.tolist() == [float(c) for c in cells]
+
+
+def test_columns_that_turn_from_text_to_numbers_are_not_dropped(target: Path) -> None:
+    target.write_text(
+        "t,v\n" + "".join(f"{i},ERR\n" for i in range(30_000)) + "".join(f"{i},1.5\n" for i in range(30_000, 90_000))
+    )
+    log = read(target)
+    assert np.isfinite(log.channels["v"].values).sum() == 60_000
+    assert any(
+        "30000 cells of 'v' are no numbers; they became empty (the first is 'ERR' at byte 6)" in d
+        for d in log.summary.damage
+    )
+
+
+@pytest.mark.parametrize(
+    ("unit", "cells", "expected"),
+    [
+        ("dc", ["5", "1000000005"], [946_684_800_000_000_005, 946_684_801_000_000_005]),
+        ("dc32", ["4294967290", "4"], [946_684_804_294_967_290, 946_684_804_294_967_300]),
+        ("dt", ["10", "10", "11", "11", "12", "12"], [10_000, 10_500, 11_000, 11_500, 12_000, 12_500]),
+        ("dt", ["DT#1970-01-01-00:00:10", "DT#1970-01-01-00:00:10", "DT#1970-01-01-00:00:11", "DT#1970-01-01-00:00:11",
+                "DT#1970-01-01-00:00:12"], [10_000, 10_500, 11_000, 11_500, 12_000]),
+        ("iso", ["01.02.2024 10:00:00,25", "29.02.2024 10:00:00"], [1_706_781_600_250, 1_709_200_800_000]),
+    ],
+)  # fmt: skip
+def test_time_bases_of_plcs(target: Path, unit: str, cells: list[str], expected: list[int]) -> None:
+    target.write_text("when;v\n" + "".join(f"{c};{i}\n" for i, c in enumerate(cells)))
+    stamps = read(target, time="when", time_unit=unit).channels["v"].stamps.tolist()
+    assert stamps == [e if e > 1e15 else e * 1_000_000 for e in expected]
+
+
+@given(when=st.datetimes(datetime(1700, 1, 1), datetime(2250, 1, 1)), zone=st.integers(-720, 720))
+def test_dates_come_back(when: datetime, zone: int) -> None:
+    text = when.replace(tzinfo=timezone(timedelta(minutes=zone))).isoformat().encode()
+    since = when - timedelta(minutes=zone) - datetime(1970, 1, 1)
+    expected = (since.days * 86_400 + since.seconds) * 10**9 + since.microseconds * 1000
+    assert iso_ns(np.frombuffer(text, np.uint8), 0, len(text)) == expected
+
+
+@pytest.mark.parametrize(
+    "text", ["2024-02-30", "2023-02-29", "2024-13-01", "2024-01-01T25:00", "2024-01-01x", "20240101", "abc"]
+)
+def test_what_is_no_date(text: str) -> None:
+    assert iso_ns(np.frombuffer(text.encode(), np.uint8), 0, len(text)) == MISSING
+
+
+def test_a_window_of_a_text_table(target: Path) -> None:
+    target.write_text("t,v\n" + "".join(f"{i},{i}\n" for i in range(10)))
+    log = read_log(target, SourceOptions(), window=(3 * 10**9, 5 * 10**9))
+    assert log.channels["v"].values.tolist() == [3, 4]
+    assert read_log(target, SourceOptions(), window=(0, 0)).channels["v"].values.tolist() == []
+
+
+@pytest.mark.parametrize("packed", [False, True])
+def test_the_summary_reads_head_and_tail_only(tmp_path: Path, packed: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = tmp_path / "t.csv"
+    raw = ("t,v,label\n" + "".join(f"{i / 10},{i * 7 % 11},x\n" for i in range(50_000))).encode()
+    path.write_bytes(gzip.compress(raw) if packed else raw)
+    log, index = read(path), summarise_log(path, SourceOptions())
+    assert (index.start_ns, index.stop_ns) == (log.summary.start_ns, log.summary.stop_ns)
+    assert index.topics == log.summary.topics
+    monkeypatch.setattr(text_summary, "COUNTED", 0)
+    monkeypatch.setattr(text_summary, "PACKED", 0)
+    index = summarise_log(path, SourceOptions())
+    assert "estimated" in index.topics[0].note
+    assert abs(index.topics[0].count - 50_000) < 5000
+
+
+@pytest.mark.parametrize("text", ["time,speed,pressure\n", "time;speed\r\n\r\n", "# made by x\nt,v"])
+def test_a_header_without_rows_is_told_as_such(target: Path, text: str) -> None:
+    target.write_text(text)
+    with pytest.raises(
+        LogError, match=r"has a header.*and no row of data; the recording ended before its first sample"
+    ):
+        read(target)
+    with pytest.raises(LogError, match="no row of data"):
+        summarise_log(target, SourceOptions())
 
 
 def test_parquet_keeps_types(tmp_path: Path) -> None:
