@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator
+from collections.abc import Callable, Collection, Iterable, Iterator
 from pathlib import Path
 
 import numpy as np
@@ -72,11 +72,12 @@ def read_files(
     topics: Collection[str] | None,
     clock: Clock,
     window: Window | None = None,
+    unpack: Callable[[Iterable[Block]], Iterator[list[Block]]] | None = None,
 ) -> RawLog:
     """Read the files of one recording as one log; a file that cannot be read is damage unless it is the only one.
 
     Without a window every record of every file is walked and held against index and statistics; with one, only what
-    the index places inside it is opened.
+    the index places inside it is opened. `unpack` expands messages that were compressed one by one.
     """
     opened = open_files(files, source, report, walk=window is None)
     assembler = Assembler(clock, report)
@@ -86,7 +87,8 @@ def read_files(
                 if number in file.names.channels:
                     assembler.expect(file.names.channels[number], count)
         for blocks in blocks_of(file, topics, window):
-            assembler.add(blocks)
+            for part in (blocks,) if unpack is None else unpack(blocks):
+                assembler.add(part)
     return assembler.finish(summary_of(opened, source, name, report))
 
 

@@ -20,6 +20,7 @@ from replay.readers.ros1_file import MAGIC, Bag, Chunk, open_bag, take_connectio
 from replay.sources import SourceOptions
 
 _LOOK, _RECORDS = 4 << 20, 3
+_SMALLEST = 43  # bytes of a message's record
 _MOST = 64 << 20  # of a chunk whose stated size is wrong
 _MAGICS = {b"\x04\x22\x4d\x18": "lz4", b"BZh": "bz2"}
 
@@ -70,6 +71,7 @@ class Ros1BagReader:
         report = Report()
         reading = _Reading(open_bag(path, report, whole=window is None), topics, window)
         assembler = Assembler(clock, report)
+        reading.foretell(assembler)
         for blocks in reading.blocks():
             assembler.add(blocks)
         return assembler.finish(reading.summary())
@@ -85,6 +87,17 @@ class _Reading:
         self.stated: Counter[int] = Counter(bag.absent)
         self.skipped: Counter[int] = Counter()
         self.bounds: list[int] = []
+
+    def foretell(self, assembler: Assembler) -> None:
+        """Tell how many messages the index counts, as far as a bag of this size can hold them."""
+        stated: Counter[int] = Counter()
+        for chunk in self.bag.chunks:
+            if chunk.stated is not None and self._may_hold(chunk, chunk.stated):
+                stated.update(chunk.stated)
+        room = sum(min(c.size, _MOST) for c in self.bag.chunks) // _SMALLEST
+        for number, count in stated.items():
+            if number in self.bag.connections and 0 < count <= room:
+                assembler.expect(self.bag.connections[number], count)
 
     def blocks(self) -> Iterator[list[Block]]:
         """Messages in the order of the file, chunk by chunk; those outside of chunks where the first of them stands."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import tempfile
 from collections.abc import Collection
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 from replay.errors import LogError
@@ -14,6 +15,7 @@ from replay.readers.bag_metadata import Metadata
 from replay.readers.bag_parts import find_parts, is_compressed, storage_files
 from replay.readers.clocks import Report
 from replay.readers.sqlite_file import MAGIC
+from replay.readers.unpack import unpacked
 from replay.sources import SourceOptions
 
 _SERVICE = "/_service_event"
@@ -71,15 +73,13 @@ class Rosbag2Reader:
             files, meta = find_parts(path, report, Path(scratch))
             packed = meta.facts.get("compression_mode") == "message"
             if _is_mcap(files, path):
-                if packed:
-                    report.lost(
-                        f"{path.name}: its messages are compressed one by one, which is read from .db3 files only; "
-                        "convert it with `ros2 bag convert`"
-                    )
-                log = mcap.read_files(files, path, self.format, report, topics, clock, window)
+                unpack = partial(unpacked, name=path.name, report=report) if packed else None
+                log = mcap.read_files(files, path, self.format, report, topics, clock, window, unpack)
             else:
                 log = sqlite_bag.read(files, path, report, topics, clock, window, packed, meta.counts)
-            return replace(log, summary=_complete(log.summary, meta, compare=window is None))
+            calls = _services(log.summary)
+            channels = {name: c for name, c in log.channels.items() if c.topic not in calls}
+            return replace(log, channels=channels, summary=_complete(log.summary, meta, compare=window is None))
 
 
 def _is_mcap(files: list[Path], path: Path) -> bool:
@@ -88,6 +88,11 @@ def _is_mcap(files: list[Path], path: Path) -> bool:
     if len(kinds) > 1:
         raise LogError(f"{path} mixes .db3 and .mcap files; give the files of one recording")
     return kinds == {True}
+
+
+def _services(summary: LogSummary) -> list[str]:
+    """Topics on which the calls of services and actions were recorded."""
+    return [t.name for t in summary.topics if t.name.endswith(_SERVICE) or t.type_name.endswith("_Event")]
 
 
 def _complete(summary: LogSummary, meta: Metadata, compare: bool) -> LogSummary:
@@ -104,7 +109,7 @@ def _complete(summary: LogSummary, meta: Metadata, compare: bool) -> LogSummary:
             )
         elif count > stated:
             notes.append(f"{name[:80]}: metadata.yaml counts {stated} messages, {count} were found; all count")
-    services = [t.name for t in summary.topics if t.name.endswith(_SERVICE) or t.type_name.endswith("_Event")]
+    services = _services(summary)
     if services:
         more = f" and {len(services) - _SHOWN} more" if len(services) > _SHOWN else ""
         notes = [n for n in notes if not any(n.startswith(f"{s} is not decoded") for s in services)]

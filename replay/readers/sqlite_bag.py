@@ -7,17 +7,16 @@ from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
-import zstandard
 
 from replay.errors import LogError
 from replay.rawlog import Clock, LogSummary, RawLog, TopicInfo, Window
 from replay.readers.assemble import Assembler, Block, Connection
 from replay.readers.clocks import Report
-from replay.readers.inflate import MAX_CHUNK
 from replay.readers.sqlite_file import SqliteError, open_image
 from replay.readers.sqlite_rows import Database, Rows, open_database
+from replay.readers.unpack import unpacked
 
-_UNPACKED = 64 << 20
+_SMALLEST_ROW = 16
 
 
 def read(
@@ -54,10 +53,13 @@ def read(
     """
     assembler = Assembler(clock, report)
     bases = _open(files, source, report)
+    if window is None:
+        _expect(assembler, bases, counted or {})
     for base in bases:
         for rows in base.messages(topics, window, payloads=True):
-            for part in _unpacked(base, rows, report) if packed else (rows,):
-                assembler.add(_split(base, part))
+            blocks = _split(base, rows)
+            for part in unpacked(blocks, base.name, report) if packed else (blocks,):
+                assembler.add(part)
     if window is None:
         _compare_times(bases, report)
     elif counted is None:
@@ -104,6 +106,14 @@ def _open(files: list[Path], source: Path, report: Report) -> list[Database]:
     return bases
 
 
+def _expect(assembler: Assembler, bases: list[Database], counted: Mapping[str, int]) -> None:
+    """Foretell counts, as far as files of this size can hold them."""
+    room = sum(len(b.image.data) for b in bases) // _SMALLEST_ROW
+    for connection in {c: None for b in bases for c in b.connections.values()}:
+        if 0 < counted.get(connection.topic, 0) <= room:
+            assembler.expect(connection, counted[connection.topic])
+
+
 def _compare_times(bases: list[Database], report: Report) -> None:
     """Say where a part starts before the one before it ends."""
     timed = [b for b in bases if b.bounds]
@@ -121,37 +131,6 @@ def _split(base: Database, rows: Rows) -> Iterator[Block]:
         connection = base.connections.get(int(rows.topic[mine[0]])) if len(mine) else None
         if connection is not None:
             yield Block(connection, rows.data, rows.start[mine], rows.length[mine], rows.stamp[mine])
-
-
-def _unpacked(base: Database, rows: Rows, report: Report) -> Iterator[Rows]:
-    """Expand messages that were compressed one by one, in parts of bounded size."""
-    expander = zstandard.ZstdDecompressor(max_window_size=1 << 28)
-    parts: list[bytes] = []
-    keep: list[int] = []
-    held = bad = 0
-    for i, (start, length) in enumerate(zip(rows.start.tolist(), rows.length.tolist(), strict=True)):
-        try:
-            frame = rows.data[start : start + length].data
-            if zstandard.get_frame_parameters(frame).content_size > MAX_CHUNK:
-                raise zstandard.ZstdError("declared size")
-            parts.append(expander.decompress(frame, max_output_size=MAX_CHUNK))
-            keep.append(i)
-            held += len(parts[-1])
-        except zstandard.ZstdError:
-            bad += 1
-        if held > _UNPACKED:
-            yield _joined(rows, parts, keep)
-            parts, keep, held = [], [], 0
-    if keep:
-        yield _joined(rows, parts, keep)
-    if bad:
-        report.lost(f"{base.name}: {bad} compressed messages are damaged; they were left out")
-
-
-def _joined(rows: Rows, parts: list[bytes], keep: list[int]) -> Rows:
-    lengths = np.fromiter(map(len, parts), np.int64, len(parts))
-    data = np.frombuffer(b"".join(parts), np.uint8)
-    return Rows(rows.topic[keep], rows.stamp[keep], data, np.cumsum(lengths) - lengths, lengths)
 
 
 def _summary(bases: list[Database], source: Path, report: Report, counted: Mapping[str, int] | None) -> LogSummary:

@@ -12,6 +12,8 @@ from typing import Any
 import numpy as np
 import pytest
 import zstandard
+from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin, Writer
+from rosbags.typesys import Stores, get_typestore
 
 from replay.errors import LogError
 from replay.rawlog import RawLog
@@ -304,4 +306,18 @@ SENTENCES: dict[str, Check] = {
 def test_official_oddities_end_in_sentences(reference_data: Path, name: str) -> None:
     log = read_log(reference_data / "reference_logs" / "rosbag2" / name, OPTIONS)
     assert SENTENCES[name](" ".join(log.summary.notes))
+    assert log.summary.damage == ()
+
+
+def test_mcap_messages_compressed_one_by_one(tmp_path: Path) -> None:
+    writer = Writer(tmp_path / "bag", version=9, storage_plugin=StoragePlugin.MCAP)
+    writer.set_compression(CompressionMode.MESSAGE, CompressionFormat.ZSTD)
+    store = get_typestore(Stores.LATEST)
+    with writer:
+        speeds = [writer.add_connection(n, "std_msgs/msg/Float64", typestore=store) for n in ("/speed", "/other")]
+        for i in range(300):
+            writer.write(speeds[i % 2], T0 + i * STEP, b"\0\1\0\0" + np.float64(i).tobytes())
+    log = read_log(tmp_path / "bag", OPTIONS)
+    np.testing.assert_array_equal(speed(log), np.arange(0.0, 300.0, 2))
+    np.testing.assert_array_equal(log.channels["/other.data"].values, np.arange(1.0, 300.0, 2))
     assert log.summary.damage == ()
