@@ -45,6 +45,8 @@ class Rows:
         Number of columns; cells beyond are counted, missing ones are empty.
     report : Report
         Takes what is lost.
+    sparse : int
+        Cells per byte of text that are taken for a table.
 
     Attributes
     ----------
@@ -60,13 +62,14 @@ class Rows:
         First cell of text of columns that have one.
     """
 
-    def __init__(self, label: str, dialect: Dialect, width: int, report: Report) -> None:
+    def __init__(self, label: str, dialect: Dialect, width: int, report: Report, sparse: int = 16) -> None:
         if width > MAX_COLUMNS:
             raise LogError(f"{label} has {width} columns; at most {MAX_COLUMNS} are read")
         self.label, self.dialect, self.report = label, dialect, report
         self.kinds = np.zeros(width, np.int8)
         self.columns = np.zeros((width, 4), np.int64)
         self.table = np.zeros(5, np.int64)
+        self._sparse = sparse
         self.examples: dict[int, str] = {}
         self.count = self._bytes = 0
         self._room = max(_CELLS // max(width, 1), 1)
@@ -148,7 +151,7 @@ class Rows:
             self.table[2:4][odd & (self.table[:2] > 0)] += base
             self._bytes += used - at
             self.count += rows
-            if self.count * len(self.kinds) > 1_000_000 + 256 * self._bytes:
+            if self.count * len(self.kinds) > 1_000_000 + self._sparse * self._bytes:
                 raise LogError(
                     f"{self.label}: {len(self.kinds)} columns, but {self.count} rows in {self._bytes} bytes; its rows "
                     "are almost empty, so this is no table"

@@ -37,8 +37,8 @@ class CsvReader:
         if not path.is_file():
             return False
         text = first_text(path)
-        if "\n" not in text and len(text) >= 65_536:
-            text = first_text(path, 1 << 20)
+        if text.count("\n") < 3 and len(text) > 30_000:
+            text = first_text(path, 2 << 20)
         lines = [x for x in text.splitlines()[:50] if x.strip() and not x.startswith("#")]
         if len(lines) == 1 and any(s.lower() in _NAMED for s in path.suffixes):
             return any(mark in lines[0] for mark in SEPARATORS)

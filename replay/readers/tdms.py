@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import struct
+import logging
 from collections.abc import Collection, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -22,20 +22,6 @@ from replay.spill import Column, blocks
 
 MISSING_LIBRARY = "npTDMS is not installed, which reads TDMS; install it with: pip install 'mfhca-replay[tdms]'"
 _TIME = ("time", "timestamp", "time stamp", "t", "zeit")
-_DAMAGE = (
-    *(
-        ValueError,
-        KeyError,
-        TypeError,
-        ArithmeticError,
-        MemoryError,
-        IndexError,
-        EOFError,
-        AttributeError,
-        RuntimeError,
-    ),
-    *(AssertionError, struct.error),
-)
 
 
 class TdmsReader:
@@ -83,7 +69,7 @@ class TdmsReader:
         topics: list[TopicInfo] = []
         ends: list[int] = []
         untimed: list[str] = []
-        with _opened(path) as file:
+        with _opened(path, report) as file:
             size = path.stat().st_size
             for group in file.groups():
                 times = _GroupTimes(path, group, options, report)
@@ -113,6 +99,8 @@ class TdmsReader:
                 f"{path.name}: {len(untimed)} channels have no time (neither wf_increment nor a time channel of the same "
                 f"length in their group) and were left out: {', '.join(untimed[:6])}"
             )
+        if not any(t.fields for t in topics) and report.damage and not untimed:
+            raise LogError(f"{path} holds no whole samples: {report.damage[0]}; copy or record it again")
         if not any(t.fields for t in topics):
             raise LogError(
                 f"{path}: none of its channels has a time; give [sources] time = the name of the time channel, or record "
@@ -134,20 +122,43 @@ def _most(stamps: NDArray[np.int64]) -> int:
     return int(stamps.max())
 
 
+class _Warnings(logging.Handler):
+    """Takes what npTDMS would print: a file that was cut off is read as far as it goes, and said here alone."""
+
+    def __init__(self, path: Path, report: Report) -> None:
+        super().__init__(logging.WARNING)
+        self.path, self.report = path, report
+
+    def emit(self, record: logging.LogRecord) -> None:
+        """Report a warning as a loss."""
+        said = " ".join(record.getMessage().split())[:160]
+        self.report.lost(f"{self.path.name} is cut off or damaged; npTDMS says: {said}")
+
+
 @contextmanager
-def _opened(path: Path) -> Iterator[Any]:
+def _opened(path: Path, report: Report) -> Iterator[Any]:
     try:
         import nptdms  # type: ignore[import-untyped]
+        from nptdms.log import log_manager  # type: ignore[import-untyped]
     except ImportError as error:
         raise LogError(f"{path}: {MISSING_LIBRARY}") from error
+    logger, handler = logging.getLogger("nptdms"), _Warnings(path, report)
+    level = log_manager.console_handler.level
+    log_manager.console_handler.setLevel(logging.CRITICAL + 1)
+    logger.addHandler(handler)
     try:
-        with nptdms.TdmsFile.open(path) as file:
-            yield file
+        with path.open("rb") as file, nptdms.TdmsFile.open(file) as tdms:
+            yield tdms
+    except LogError:
+        raise
     except OSError as error:
         raise LogError(f"{path} cannot be read: {error.strerror or error}") from error
-    except _DAMAGE as error:
+    except Exception as error:  # npTDMS raises anything on damaged files, even bare exceptions
         said = " ".join(str(error).split())[:200]
         raise LogError(f"{path} is a damaged TDMS file ({said}); copy or record it again") from error
+    finally:
+        logger.removeHandler(handler)
+        log_manager.console_handler.setLevel(level)
 
 
 def _is_number(channel: Any) -> bool:

@@ -22,6 +22,8 @@ from replay.readers.text_table import is_text
 from replay.readers.textfile import first_text
 from replay.sources import SourceOptions
 
+_SPARSE = 1024  # right-hand groups may end early
+
 
 class TwincatCsvReader:
     """Reader of TwinCAT Scope text exports."""
@@ -109,7 +111,7 @@ class _Pass:
         self.report = Report()
         head, kinds, _ = _sampled(scope, scope.sample)
         self.groups = make_groups(scope, head, kinds, self.report)
-        self.rows = Rows(scope.file.path.name, scope.dialect, scope.width, self.report)
+        self.rows = Rows(scope.file.path.name, scope.dialect, scope.width, self.report, _SPARSE)
 
         def end(text: bytes) -> bytes:
             return _without_eof(scope, text, self.report)
