@@ -140,7 +140,8 @@ class Database:
         starts = starts[starts < len(image.data)]
         pages = np.flatnonzero((image.data[starts] == scan.LEAF) & (image.seen[1 : len(starts) + 1] == 0)) + 1
         pages = np.union1d(pages, np.array([p for p in set(image.suspects) if p > 1], np.int64))
-        stray = np.array([p for p in pages.tolist() if self._holds_messages(p)], np.int64)
+        held, _ = self._judge(pages)
+        stray = pages[held]
         if len(stray):
             image.seen[stray] = 1
             self.report.lost(
@@ -148,20 +149,24 @@ class Database:
                 "and read"
             )
         every = np.concatenate((leaves, stray))
-        firsts = np.array([self._first_row(p) for p in every.tolist()], np.int64)
-        return every[np.argsort(firsts, kind="stable")]
+        return every[np.argsort(self._judge(every)[1], kind="stable")]
 
-    def _first_row(self, page: int) -> int:
-        row, *_, status = scan.locate(self.image.data, self.image.page, self.image.usable, np.array([page]))
-        return int(row[status == scan.OK][0]) if np.any(status == scan.OK) else 0
-
-    def _holds_messages(self, page: int) -> bool:
-        """Whether most rows of a page are messages of topics that exist."""
-        *_, topic, _, _, _, status = self._parse(np.array([page]))
-        fine = status == scan.OK
-        if self.connections:
-            fine &= np.isin(topic, list(self.connections))
-        return bool(2 * np.count_nonzero(fine) > np.count_nonzero(status != scan.DAMAGED)) and bool(fine.any())
+    def _judge(self, pages: NDArray[np.int64]) -> tuple[NDArray[np.bool_], NDArray[np.int64]]:
+        """Whether most rows of each page are messages of topics that exist, and the first row of each page."""
+        held, first = np.zeros(len(pages), np.bool_), np.zeros(len(pages), np.int64)
+        batch = max(1, _PAGES // self.image.page)
+        for at in range(0, len(pages), batch):
+            some = pages[at : at + batch]
+            row, *_, topic, _, _, _, status = self._parse(some)
+            owner = np.repeat(np.arange(len(some)), scan.cells_of(self.image.data, self.image.page, some))
+            whole, fine = status != scan.DAMAGED, status == scan.OK
+            if self.connections:
+                fine &= np.isin(topic, list(self.connections))
+            good = np.bincount(owner[fine], minlength=len(some))
+            held[at : at + batch] = 2 * good > np.bincount(owner[whole], minlength=len(some))
+            own, places = np.unique(owner[whole], return_index=True)
+            first[at + own] = row[whole][places]
+        return held, first
 
     def _parse(self, leaves: NDArray[np.int64]) -> tuple[NDArray[np.int64], ...]:
         """Row number, place, local and whole length, topic, stamp, start, length and status of rows."""

@@ -208,19 +208,19 @@ def copy_payload(data, page, usable, place, local, begin, size, out, to):  # typ
 
 @njit(cache=True)
 def cells_of(data, page, numbers):  # type: ignore[no-untyped-def]
-    """Count of the cells that leaves state, each at most as many as fit."""
-    count = 0
-    for number in numbers:
-        _, head, stop = _head(data, page, number)
+    """Count of the cells that each leaf states, at most as many as fit."""
+    counts = np.zeros(len(numbers), np.int64)
+    for k in range(len(numbers)):
+        _, head, stop = _head(data, page, numbers[k])
         if head + 8 <= stop:
-            count += min(_u16(data, head + 3), (page - 8) // 2)
-    return count
+            counts[k] = min(_u16(data, head + 3), (page - 8) // 2)
+    return counts
 
 
 @njit(cache=True)
 def locate(data, page, usable, numbers):  # type: ignore[no-untyped-def]
     """Row number, place, local and whole length of each cell's payload in leaves; status OK or DAMAGED."""
-    n = cells_of(data, page, numbers)
+    n = cells_of(data, page, numbers).sum()
     row, place = np.empty(n, np.int64), np.empty(n, np.int64)
     local, total, status = np.empty(n, np.int64), np.empty(n, np.int64), np.empty(n, np.uint8)
     k = 0
