@@ -9,94 +9,29 @@ file's recorder needs to get and stamp a sample is part of the offset: the two c
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
-from pathlib import PurePath
-from typing import Literal
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from replay.clock_coarse import match
-from replay.clock_fit import Line, fit_line
+from replay.clock_fit import fit_line
 from replay.clock_series import Shared, shared_series
+from replay.clock_windows import Line
 from replay.machine import Machine
 from replay.mapping import map_signals
 from replay.rawlog import Channel, RawLog
 from replay.signals import Signal
+from replay.source_clock import Method, SourceClock, some
 from replay.sources import SourceOptions
 
 _ONE_DAY_S = 26 * 3600.0  # any time zone, and two hours
 _SET_NS = 946_684_800_000_000_000  # clocks that show an earlier year than 2000 were not set, or count from a start
-_STRETCH_S = 30.0
+_STRETCH_S = 20.0
+_MOST_GAPS = 8
 _SEARCH_S = 7200.0
 _STEP_S = 0.1
 _SURE = 0.75
-
-Method = Literal["reference", "estimated", "common", "as recorded", "given"]
-
-
-@dataclass(frozen=True)
-class SourceClock:
-    """How the clock of one source relates to the mission's.
-
-    Attributes
-    ----------
-    source : str
-        The file.
-    reference : str
-        File with whose signals it was compared; empty where it was not.
-    method : str
-        ``reference`` (its clock is the mission's), ``estimated`` (offset and drift were applied), ``common`` (measured, and
-        too small to be told from none: stamps are unchanged), ``given`` (applied as the machine file says), ``as recorded``
-        (unchanged: asked for, or nothing to compare, see `reason`).
-    offset_s : float
-        Seconds that a stamp at the source's first sample gets, or for ``common`` would have got.
-    drift_ppm : float
-        Change of the offset [microseconds per second].
-    uncertainty_s : float or None
-        95 % bound of the error of the offset anywhere in the source [s]; None where nothing was measured.
-    signals : tuple[str, ...]
-        Signals that were compared.
-    overlap_s : float
-        Time that both files cover after that [s].
-    reason : str
-        Why nothing was estimated; else empty.
-    """
-
-    source: str
-    reference: str
-    method: Method
-    offset_s: float = 0.0
-    drift_ppm: float = 0.0
-    uncertainty_s: float | None = None
-    signals: tuple[str, ...] = ()
-    overlap_s: float = 0.0
-    reason: str = ""
-
-    @property
-    def sentence(self) -> str:
-        """What was found and done, for the report; empty for the reference."""
-        name, base = PurePath(self.source).name, PurePath(self.reference).name
-        change = f"{_seconds(self.offset_s)} at its start and {self.drift_ppm:+.1f} ppm"
-        if self.method == "estimated":
-            return (
-                f"{name}: its stamps were moved onto the clock of {base} by {change} (95 % within ±{_size(self.uncertainty_s)} "
-                f"throughout), from {_list(self.signals)}, recorded in both for {self.overlap_s:.0f} s"
-            )
-        if self.method == "common":
-            return (
-                f"{name} and {base} share one clock: {change} is no more than the ±{_size(self.uncertainty_s)} that "
-                f"{_list(self.signals)} leave open; stamps are unchanged"
-            )
-        if self.method == "given":
-            return f"{name}: its stamps were moved by {change}, as the machine file says"
-        if self.method == "as recorded" and self.reason:
-            return (
-                f"{name}: its clock could not be compared with {base}: {self.reason}; its stamps are taken as recorded. "
-                "Set clock_offset and clock_drift in the machine file's [sources] if they are known, or clock = "
-                '"as recorded" if the clocks are common'
-            )
-        return f"{name}: its stamps are taken as recorded, as the machine file says" if self.reference else ""
 
 
 def estimate(
@@ -127,7 +62,7 @@ def estimate(
         return replace(unknown, reason="no signal that moves is recorded in both"), None, 0
     between = origins[0] - origins[1]
     found = match(shared, -between * 1e-9)
-    reason = f"{_list(tuple(s.name for s in shared))}: {found.reason}" if found.reason else ""
+    reason = f"{some(tuple(s.name for s in shared))}: {found.reason}" if found.reason else ""
     reason = reason or _too_far(found.lag_s + between * 1e-9, origins)
     if reason:
         return replace(unknown, reason=reason), None, 0
@@ -159,13 +94,17 @@ def _too_far(offset: float, origins: tuple[int, int]) -> str:
 
 def _steps(shared: Sequence[Shared], line: Line) -> str:
     """Say where signals that tell nothing of the line agree under another shift."""
-    longest = max((s.other for s in shared), key=lambda s: len(s.t)).t
-    count = min(8, max(1, int(np.ptp(longest) // _STRETCH_S)))
+    start, stop = min(s.other.t[0] for s in shared), max(s.other.t[-1] for s in shared)
+    seen = np.unique(np.concatenate([[start], line.seen, [stop]]))
+    gaps = np.diff(seen)
     found: list[tuple[float, float]] = []
-    for rows in np.array_split(longest, count):
-        first, last = float(rows[0]), min(float(rows[-1]), float(rows[0]) + 2 * _STRETCH_S)
-        if ((line.seen >= first) & (line.seen <= last)).any():
-            continue
+    for i in np.argsort(-gaps, kind="stable")[:_MOST_GAPS].tolist():
+        if gaps[i] < max(_STRETCH_S, 3.0 * float(np.median(gaps))):
+            break
+        first, last = float(seen[i]), float(seen[i + 1])
+        if i == len(gaps) - 1:  # what follows the last reading shows best at the end
+            first = max(first, last - 2 * _STRETCH_S)
+        last = min(last, first + 2 * _STRETCH_S)
         lag = float(line.lag(np.array([first]))[0])
         near = (first + lag - _SEARCH_S, last + lag + _SEARCH_S)
         parts = [replace(s, reference=s.reference.within(*near), other=s.other.within(first, last)) for s in shared]
@@ -177,7 +116,7 @@ def _steps(shared: Sequence[Shared], line: Line) -> str:
         if not place.reason and abs(step) > _STEP_S:
             found.append((first, step))
             if place.correlation > _SURE or any(abs(step - other) < _STEP_S for _, other in found[:-1]):
-                return f"its clock jumps: {first - longest[0]:.0f} s after its start signals agree under a shift by another {step:+.2f} s"
+                return f"its clock jumps: {first - start:.0f} s after its start signals agree under a shift by another {step:+.2f} s"
     return ""
 
 
@@ -284,18 +223,3 @@ def _moved(log: RawLog, line: Line, start: int, between: int) -> RawLog:
             known[key] = _shifted(channel.stamps, line, start, between)
         channels[name] = replace(channel, stamps=known[key])
     return replace(log, channels=channels)
-
-
-def _seconds(value: float) -> str:
-    size = abs(value)
-    if size < 0.9995:
-        return f"{value * 1e3:+.2f} ms"
-    return f"{value:+.4f} s" if size < 1000 else f"{value:+.3f} s ({value / 3600:+.3f} h)"
-
-
-def _size(value: float | None) -> str:
-    return "?" if value is None else f"{value * 1e3:.2g} ms" if value < 0.9995 else f"{value:.2g} s"
-
-
-def _list(names: Sequence[str]) -> str:
-    return ", ".join(names[:4]) + (f" and {len(names) - 4} more" if len(names) > 4 else "")

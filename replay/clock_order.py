@@ -19,7 +19,8 @@ from replay.rawlog import Channel, RawLog
 
 Stamps = NDArray[np.int64]
 
-_LEAST_NS = 1_000_000_000
+_LEAST_NS = 50_000_000
+_LEAST_MESSAGES_NS = 1_000_000_000
 _LEAST_PERIODS = 20
 _PAUSE_NS = 600_000_000_000
 _LONGEST_NS = 86_400_000_000_000
@@ -92,7 +93,7 @@ def _course(label: str, stamps: Stamps, rows_in_order: bool) -> _Course | None:
     if not len(rising):
         return None
     usual = float(np.median(rising))
-    limit = max(_LEAST_NS, round(_LEAST_PERIODS * usual))
+    limit = max(_LEAST_NS if rows_in_order else _LEAST_MESSAGES_NS, round(_LEAST_PERIODS * usual))
     odd = (steps < -limit) | (steps > max(limit, _PAUSE_NS))
     if not odd.any():
         return None

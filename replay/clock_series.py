@@ -56,6 +56,10 @@ class Series:
         a, b = np.searchsorted(self.t, (first, last))
         return Series(self.t[a:b], self.x[a:b], self.period, self.recorded)
 
+    def rows(self, kept: NDArray[np.bool_]) -> Series:
+        """Some of the samples."""
+        return Series(self.t[kept], self.x[kept], self.period, self.recorded)
+
     def thinned(self, width: float) -> Series:
         """Means of stamps and values over bins, so that a straight line stays where it is; slow samples stay as they are."""
         if self.period > 0.6 * width or len(self.t) < 2:

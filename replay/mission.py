@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from fnmatch import fnmatch
 from pathlib import Path
 
-from replay.clock_align import SourceClock, align_clocks
+from replay.clock_align import align_clocks
 from replay.clock_order import in_order
 from replay.errors import LogError
 from replay.machine import Machine
@@ -18,6 +18,7 @@ from replay.open_loop import is_open_loop, is_open_loop_table
 from replay.rawlog import LogSummary, RawLog
 from replay.readers.registry import read_log, summarise_log
 from replay.signals import Signals
+from replay.source_clock import SourceClock
 from replay.sources import SourceOptions
 from replay.timeline import Timeline, align
 
