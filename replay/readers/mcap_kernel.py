@@ -169,11 +169,27 @@ def _named(data, at, named):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _resume(data, at, stop, named):  # type: ignore[no-untyped-def]
-    """First place from which three records follow one another, or fewer up to the end; −1 where there is none."""
+def _packed(data, at, stop):  # type: ignore[no-untyped-def]
+    """Whether a zstd or lz4 frame begins where that of a chunk would."""
+    for text in (3, 4):
+        p = at + 49 + text
+        if p + 4 <= stop and (_u32(data, p) == np.uint64(0xFD2FB528) or _u32(data, p) == np.uint64(0x184D2204)):
+            return True
+    return False
+
+
+@njit(cache=True)
+def _resume(data, at, stop, named, packed):  # type: ignore[no-untyped-def]
+    """First place from which three records follow one another, or fewer up to the end; −1 where there is none.
+
+    In a file of compressed chunks (`packed`) messages and their names are not looked for: what resembles them there
+    stands inside a frame, whose bytes lie between theirs.
+    """
     for p in range(at, stop - 8):
         op = data[p]
         if op == 0 or op > DATA_END or data[p + 8] or data[p + 7] or data[p + 6]:
+            continue
+        if packed and (op in (MESSAGE, SCHEMA, CHANNEL)):
             continue
         q, links = np.int64(p), 0
         while links < 3 and q != stop:
@@ -191,25 +207,34 @@ def _resume(data, at, stop, named):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
+def _cut(data, at, stop):  # type: ignore[no-untyped-def]
+    """Whether a record that the end of the bytes cuts off may start here."""
+    return at + 9 > stop or (0 < data[at] <= DATA_END and _u64(data, at + 1) < np.uint64(1 << 40))
+
+
+@njit(cache=True)
 def scan_walk(data, at, stop, named, rows, counts, bounds, state):  # type: ignore[no-untyped-def]
-    """Fill rows until they are full or the bytes end; `state` keeps where the last lookahead ended.
+    """Fill rows until they are full or the bytes end.
+
+    state: end and flag of the record ahead, whether chunks are compressed, and whether the walk has just resumed.
 
     counts, bounds: messages per channel outside chunks, and the lowest and highest log stamp of them.
     """
     n = 0
-    end, flag = state[0], state[1]
+    end, flag, packed, resumed = state[0], state[1], state[2] > 0, state[3] > 0
     if end == 0:
         end, flag = _fits(data, at, stop), SOUND
         if end < 0:
             end, flag = _mended(data, at, stop), MENDED
     while at < stop and n + 3 <= len(rows):
         if end < 0:
-            again = _resume(data, at + 1, stop, named)
+            packed = packed or (data[at] == CHUNK and _packed(data, at, stop))
+            again = _resume(data, at + 1, stop, named, packed)
             if again < 0:
                 again = stop
             rows[n, 0], rows[n, 1], rows[n, 2], rows[n, 3] = HOLE, at, again, 0
             n += 1
-            at = again
+            at, resumed = again, True
             end, flag = (_fits(data, at, stop), SOUND) if at < stop else (np.int64(-1), SOUND)
             continue
         op = np.int64(data[at])
@@ -222,15 +247,22 @@ def scan_walk(data, at, stop, named, rows, counts, bounds, state):  # type: igno
             if after < 0:
                 after, after_flag = _mended(data, end, stop), MENDED
             if after < 0 and not (op == CHUNK and flag == SOUND):
-                again = _resume(data, at + 1, stop, named)
-                if 0 <= again < end:  # its length leads past a record: it cannot be believed
+                again = _resume(data, at + 1, stop, named, packed)
+                wrong = 0 <= again < end  # its length leads past a record
+                if not wrong and op == MESSAGE and resumed and (again >= 0 or not _cut(data, end, stop)):
+                    wrong, again = True, max(again, end)  # behind damage, and nothing confirms its length
+                if wrong:
                     rows[n, 0], rows[n, 1], rows[n, 2], rows[n, 3] = HOLE, at, again, 0
                     n += 1
-                    at = again
+                    at, resumed = again, True
                     end, flag = _fits(data, at, stop), SOUND
                     continue
         if (flag == MENDED or op > DATA_END) and op != CHUNK and _chunk_fits(data, at, end):
             op, flag = np.int64(CHUNK), MENDED
+        if op == CHUNK:
+            packed = packed or _packed(data, at, stop)
+        if op != MESSAGE:
+            resumed = False
         if op == MESSAGE and flag == SOUND:
             channel = np.int64(_u16(data, at + 9))
             counts[channel] += 1
@@ -251,7 +283,7 @@ def scan_walk(data, at, stop, named, rows, counts, bounds, state):  # type: igno
         at, end, flag = end, after, after_flag
         if ended:
             break
-    state[0], state[1] = end, flag
+    state[0], state[1], state[2], state[3] = end, flag, packed, resumed
     return n, at
 
 

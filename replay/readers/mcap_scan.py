@@ -60,7 +60,7 @@ def walk(data: NDArray[np.uint8], start: int, stop: int, named: NDArray[np.uint8
     tally : Tally
         Takes the messages met.
     """
-    at, state = start, np.zeros(2, np.int64)
+    at, state = start, np.zeros(4, np.int64)
     parts: list[NDArray[np.int64]] = []
     while at < stop:
         rows = np.empty((_ROOM, 4), np.int64)

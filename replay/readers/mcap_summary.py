@@ -88,7 +88,7 @@ def _plain(data: NDArray[np.uint8], start: int, stop: int) -> bool:
     return not odd.any() and not flag.any()
 
 
-def read_summary(data: NDArray[np.uint8], footer: int) -> Summary | None:
+def read_summary(data: NDArray[np.uint8], footer: int, place: int | None = None) -> Summary | None:
     """Read the summary section that a footer points to; None where there is none.
 
     Parameters
@@ -97,13 +97,17 @@ def read_summary(data: NDArray[np.uint8], footer: int) -> Summary | None:
         The file.
     footer : int
         Where the footer record starts.
+    place : int or None
+        Where the summary starts, if not where the footer says.
     """
     if footer < len(fmt.MAGIC) or footer + _FOOTER_SIZE > len(data) or data[footer] != fmt.FOOTER:
         return None
     ends = parse(fmt.FOOTER, data[footer + 9 : footer + _FOOTER_SIZE].tobytes())
-    if not isinstance(ends, Footer) or not len(fmt.MAGIC) <= ends.summary_start < footer:
+    if not isinstance(ends, Footer) or not ends.summary_start:
         return None
-    start = ends.summary_start
+    start = ends.summary_start if place is None else place
+    if not len(fmt.MAGIC) <= start < footer:
+        return None
     crc = zlib.crc32(data[start : footer + _FOOTER_SIZE - _CRC_SIZE].data) if ends.summary_crc else 0
     found = scan.walk(data, start, footer, np.zeros(fmt.CHANNELS, np.uint8), scan.Tally())
     right = crc == ends.summary_crc

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import zlib
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,25 +27,30 @@ def walk_file(file: McapFile) -> None:
     closed = bool(len(rows)) and rows[-1, 0] == fmt.FOOTER
     if closed and file.summary is None:
         file.summary = read_summary(data, int(rows[-1, 1]))
-        if file.summary is not None:
-            take_listed_names(file, file.summary)
-    _say_ending(file, rows, closed)
     ends = np.flatnonzero(rows[:, 0] == fmt.DATA_END)
-    inside = rows
+    inside, behind = (rows[: ends[-1] + 1], rows[ends[-1] + 1 :]) if len(ends) else (rows, rows[:0])
+    _say_ending(file, rows, closed)
+    if len(behind) > closed and (file.summary is None or not file.summary.sound):
+        _mend_summary(file, behind, closed)
     if file.summary is not None:
-        inside = rows[rows[:, 1] < file.summary.start]
-    elif len(ends):
-        inside, behind = rows[: ends[-1] + 1], rows[ends[-1] + 1 :]
-        if len(behind) and not closed:
-            place = int(behind[0, 1]), int(behind[-1, 2])
-            file.summary = summary_from(data, behind[behind[:, 3] == fmt.SOUND], place, False, False)
-            take_listed_names(file, file.summary)
-    if file.summary is not None and closed and not file.summary.sound:
-        file.lost("summary", "its summary is damaged (checksum or records); topics and counts may be wrong")
+        take_listed_names(file, file.summary)
+        if closed and not file.summary.sound:
+            file.lost("summary", "its summary is damaged (checksum or records); topics and counts may be wrong")
     _take_rows(file, inside, closed)
     if not closed:
         _find_cut(file, inside)
     _index_chunks(file, inside)
+
+
+def _mend_summary(file: McapFile, behind: NDArray[np.int64], closed: bool) -> None:
+    """Find a summary by the walk where the footer is missing or does not lead to it."""
+    start, stop = int(behind[0, 1]), int(behind[-1, 1] if closed else behind[-1, 2])
+    moved = read_summary(file.data, stop, start) if closed else None
+    if moved is not None and moved.checked and moved.sound:
+        file.lost("summary", f"its summary stands at byte {start}, not where its footer says; its index was not used")
+        file.summary = replace(moved, chunks=moved.chunks[:0], indexes=moved.indexes[:0])
+    else:
+        file.summary = summary_from(file.data, behind[behind[:, 3] == fmt.SOUND], (start, stop), False, False)
 
 
 def _say_ending(file: McapFile, rows: NDArray[np.int64], closed: bool) -> None:
