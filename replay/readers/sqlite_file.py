@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import mmap
 import re
 import shutil
 import tempfile
@@ -217,6 +218,12 @@ def _wal_frames(log, page, little):  # type: ignore[no-untyped-def]
     return complete
 
 
+def _holds(path: Path, text: bytes, start: int) -> bool:
+    """Whether these bytes stand in a file somewhere behind `start`."""
+    with path.open("rb") as file, mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as mapped:
+        return mapped.find(text, start) >= 0
+
+
 def _with_wal(path: Path, data: NDArray[np.uint8], report: Report) -> NDArray[np.uint8]:
     """Return the database as its write-ahead log leaves it."""
     wal = path.with_name(path.name + "-wal")
@@ -228,13 +235,11 @@ def _with_wal(path: Path, data: NDArray[np.uint8], report: Report) -> NDArray[np
         report.lost(f"{wal.name} does not start as a write-ahead log; it was left out")
         return data
     complete = int(_wal_frames(_plain(log), page, magic == _WAL_MAGICS[0]))
-    held = (len(log) - 32) // (24 + page)
-    salt = log[16:24].tobytes()
-    behind = [k for k in range(complete, held) if log[40 + k * (24 + page) : 48 + k * (24 + page)].tobytes() == salt]
-    if behind:
+    until = 32 + complete * (24 + page)
+    if len(log) > until and ((len(log) - until) % (24 + page) or _holds(wal, log[16:24].tobytes(), until)):
         report.lost(
-            f"{wal.name}: {len(behind)} of its {held} pages after byte {32 + complete * (24 + page)} belong to no "
-            "complete transaction or fail their checksums; they were left out"
+            f"{wal.name}: {len(log) - until} bytes after byte {until} belong to no complete transaction or fail their "
+            "checksums; they were left out"
         )
     if not complete:
         return data

@@ -1,23 +1,29 @@
-"""Damage ROS 1 bags and rosbag2 databases at random and count what comes back, here and with rosbags.
+"""Damage ROS 1 bags and rosbag2 recordings at random and count what comes back, here and with rosbags.
+
+Files: bags of each compression, a database alone (db3), the write-ahead log of an open one (wal), a compressed database
+(zstd), and metadata.yaml of a folder (yaml).
 
 Every file holds counting values, so that a message that comes back intact is recognised. Each mutation must end in a
-log or in a `LogError`; fewer intact messages than rosbags gives, or a loss that no sentence tells, is a failure and
-is printed with its seed.
+log or in a `LogError`; fewer intact messages than rosbags gives is a failure. Losses that no sentence tells are counted:
+they are changed values, which no checksum of these formats could show. Both are printed with their seeds.
 """
 
 from __future__ import annotations
 
 import argparse
+import shutil
+import sqlite3
 import tempfile
 from collections import Counter
 from collections.abc import Iterator
+from contextlib import closing
 from pathlib import Path
 
 import numpy as np
 from rosbags.rosbag1 import Reader as Reader1
 from rosbags.rosbag1 import Writer as Writer1
+from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin
 from rosbags.rosbag2 import Reader as Reader2
-from rosbags.rosbag2 import StoragePlugin
 from rosbags.rosbag2 import Writer as Writer2
 from rosbags.typesys import Stores, get_typestore
 
@@ -28,14 +34,17 @@ from replay.sources import SourceOptions
 ROS1, ROS2 = get_typestore(Stores.ROS1_NOETIC), get_typestore(Stores.LATEST)
 T0 = 1_700_000_000_000_000_000
 FLOAT, ARRAY = "std_msgs/msg/Float64", "std_msgs/msg/Float64MultiArray"
-KINDS = ("none", "lz4", "bz2", "db3")
+KINDS = ("none", "lz4", "bz2", "db3", "wal", "zstd", "yaml")
+ROSBAG2 = KINDS[3:]
 LONG = 700
 
 
-def build(kind: str, folder: Path, count: int) -> Path:
-    """Write /speed and, every tenth message, the long /scan; return the file to damage."""
-    if kind == "db3":
+def build(kind: str, folder: Path, count: int) -> tuple[Path, Path]:
+    """Write /speed and, every tenth message, the long /scan; return the file to damage and the log to read."""
+    if kind in ROSBAG2:
         writer = Writer2(folder / "bag", version=9, storage_plugin=StoragePlugin.SQLITE3)
+        if kind == "zstd":
+            writer.set_compression(CompressionMode.FILE, CompressionFormat.ZSTD)
         with writer:
             speed = writer.add_connection("/speed", FLOAT, typestore=ROS2)
             scan = writer.add_connection("/scan", ARRAY, typestore=ROS2)
@@ -43,7 +52,12 @@ def build(kind: str, folder: Path, count: int) -> Path:
                 writer.write(speed, T0 + i * 10_000_000, payload(i))
                 if i % 10 == 0:
                     writer.write(scan, T0 + i * 10_000_000, payload(i, LONG))
-        return folder / "bag" / "bag.db3"
+        base = folder / "bag" / "bag.db3"
+        if kind == "wal":
+            return hot(base, folder / "hot", count), folder / "hot" / "bag.db3"
+        if kind == "db3":
+            return base, base
+        return folder / "bag" / ("bag.db3.zstd" if kind == "zstd" else "metadata.yaml"), folder / "bag"
     path = folder / "log.bag"
     old = Writer1(path)
     old.chunk_threshold = 2048
@@ -56,7 +70,27 @@ def build(kind: str, folder: Path, count: int) -> Path:
             old.write(first, T0 + i * 10_000_000, payload(i)[4:])
             if i % 10 == 0:
                 old.write(second, T0 + i * 10_000_000, payload(i, 40, ros1=True))
-    return path
+    return path, path
+
+
+def hot(base: Path, folder: Path, count: int) -> Path:
+    """Copy a database whose second half is still in its write-ahead log, transaction by transaction; return the log."""
+    folder.mkdir()
+    with closing(sqlite3.connect(base, isolation_level=None)) as connection:
+        connection.execute("pragma journal_mode = wal")
+        connection.execute("pragma wal_autocheckpoint = 0")
+        half = "select topic_id, timestamp, data from messages where timestamp >= ? order by id"
+        rows = connection.execute(half, (T0 + count // 2 * 10_000_000,)).fetchall()
+        connection.execute("delete from messages where timestamp >= ?", (rows[0][1],))
+        connection.execute("pragma wal_checkpoint(truncate)")
+        for at in range(0, len(rows), 20):
+            connection.execute("begin")
+            text = "insert into messages(topic_id, timestamp, data) values (?, ?, ?)"
+            connection.executemany(text, rows[at : at + 20])
+            connection.execute("commit")
+        for name in ("bag.db3", "bag.db3-wal"):
+            shutil.copyfile(base.with_name(name), folder / name)
+    return folder / "bag.db3-wal"
 
 
 def payload(i: int, long: int = 0, ros1: bool = False) -> bytes:
@@ -113,8 +147,8 @@ def peer(path: Path, kind: str) -> int:
     """Intact messages of /speed that rosbags gives before it stops."""
     values: list[float] = []
     try:
-        if kind == "db3":
-            with Reader2(path.parent) as reader:
+        if kind in ROSBAG2:
+            with Reader2(path if kind in ("zstd", "yaml") else path.parent) as reader:
                 for connection, _, raw in reader.messages():
                     if connection.topic == "/speed" and len(raw) == 12 and raw[:4] == b"\0\1\0\0":
                         values.append(float(np.frombuffer(raw[4:], "<f8")[0]))
@@ -139,10 +173,10 @@ def main() -> None:
     for kind in options.kinds:
         totals: Counter[str] = Counter()
         with tempfile.TemporaryDirectory() as folder:
-            path = build(kind, Path(folder), options.count)
-            raw = path.read_bytes()
+            target, path = build(kind, Path(folder), options.count)
+            raw = target.read_bytes()
             for seed in range(*options.seeds):
-                path.write_bytes(mutate(raw, seed))
+                target.write_bytes(mutate(raw, seed))
                 mine, told, error = here(path)
                 theirs = peer(path, kind)
                 totals.update(mine=mine, theirs=theirs, refused=bool(error))
