@@ -57,6 +57,7 @@ def decode(
         Path of the stamp, and the columns.
     """
     stamp, parts = None, []
+    lengths = np.where((starts >= 0) & (starts + lengths <= len(data)), lengths, 0)
     ends = np.cumsum(lengths)
     first = 0
     while first < len(starts):

@@ -65,14 +65,16 @@ class Decoder:
             Numbers that stand in the same rows; rows of undecodable messages stand in none.
         """
         t = self.schema.tables
+        words, halves = _numbers_at(data, 8), _numbers_at(data, 4)
         at = 0
         while at < len(starts):
             size = self.places.shape[1]
             n = min(len(starts) - at, max(_CELLS // size, 16), _MAX_ROWS)
-            values, present = np.zeros((size, n), np.uint64), np.zeros((size, n), np.uint8)
+            room = n // 64 * 64 + 72  # so that places start in different cache sets
+            values, present = np.zeros((size, room), np.uint64), np.zeros((size, room), np.uint8)
             status = np.zeros(n, np.uint8)
             done = compiled.walk(
-                data, starts[at : at + n], lengths[at : at + n], self.visit, MAX_ELEMENTS, t.first, t.number, t.kind,
+                data, words, halves, starts[at : at + n], lengths[at : at + n], self.visit, MAX_ELEMENTS, t.first, t.number, t.kind,
                 t.choice, t.target, self.flags, self.used, self.places, self.slots, values, present, status,
             )  # fmt: skip
             self.visit += n
@@ -244,6 +246,11 @@ class Decoder:
             if all(held) and len(set(held)) == len(held):
                 names[slot] = held
         return names
+
+
+def _numbers_at(data: NDArray[np.uint8], size: int) -> NDArray[Any]:
+    """Unsigned numbers of a size that start at each byte."""
+    return np.ndarray((max(len(data) - size + 1, 0),), f"<u{size}", data, strides=(1,))
 
 
 def _mark(columns: NDArray[np.uint64]) -> NDArray[np.uint64]:

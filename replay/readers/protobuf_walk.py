@@ -45,14 +45,6 @@ def _varint(data, at, stop, most):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _fixed(data, at, width):  # type: ignore[no-untyped-def]
-    value = np.uint64(0)
-    for i in range(width):
-        value |= np.uint64(data[at + i]) << np.uint64(8 * i)
-    return value
-
-
-@njit(cache=True)
 def _is_text(data, at, stop):  # type: ignore[no-untyped-def]
     """Whether bytes are UTF-8 without surrogates and overlong forms."""
     while at < stop:
@@ -97,10 +89,8 @@ def _wire_of(kind):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _find(number, low, high, code, hint):  # type: ignore[no-untyped-def]
-    """Field of a type by its number on the wire, the expected one first; −1 for none."""
-    if hint < high and number[hint] == code:
-        return hint
+def _find(number, low, high, code):  # type: ignore[no-untyped-def]
+    """Field of a type by its number on the wire; −1 for none."""
     end = high
     while low < end:
         middle = (low + end) >> 1
@@ -112,14 +102,14 @@ def _find(number, low, high, code, hint):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _number(data, at, stop, kind):  # type: ignore[no-untyped-def]
+def _number(data, words, halves, at, stop, kind):  # type: ignore[no-untyped-def]
     """One number as 64 bits, and the place behind it or −1."""
     wire = _wire_of(kind)
     if wire != 0:
         width = 8 if wire == 1 else 4
         if at + width > stop:
             return np.uint64(0), -1
-        return _fixed(data, at, width), at + width
+        return words[at] if wire == 1 else np.uint64(halves[at]), at + width
     value, after = _varint(data, at, stop, 10)
     if kind == 7:
         value = np.uint64(1) if value != 0 else np.uint64(0)
@@ -181,8 +171,17 @@ def _clear(slot, row, used, places, slots, values, present):  # type: ignore[no-
 
 
 @njit(cache=True)
-def _element(slot, visit, message, limit, used, places, slots, first, flags, target):  # type: ignore[no-untyped-def]
-    """Place of an array's next element; −1 beyond the limit, −2 where there is no room."""
+def _add_hash(data, at, stop, place, row, values):  # type: ignore[no-untyped-def]
+    """Add one name to the hash of an array of names."""
+    mark = values[place, row] ^ np.uint64(0xCBF29CE484222325)
+    for i in range(at, stop):
+        mark = (mark ^ np.uint64(data[i])) * np.uint64(0x100000001B3)
+    values[place, row] = (mark ^ np.uint64(stop - at)) * np.uint64(0x100000001B3)
+
+
+@njit(cache=True)
+def _element(slot, visit, limit, used, places, slots, first, flags, target):  # type: ignore[no-untyped-def]
+    """Place of the next message in an array; −1 beyond the limit, −2 where there is no room."""
     if slots[4, slot] != visit:
         slots[4, slot], slots[5, slot], slots[6, slot] = visit, -1, 0
     index = slots[6, slot]
@@ -192,10 +191,7 @@ def _element(slot, visit, message, limit, used, places, slots, first, flags, tar
     last = slots[5, slot]
     place = slots[2, slot] if last < 0 else places[2, last]
     if place < 0:
-        if message:
-            place = new_message(slot, index, target[slots[1, slot]], used, places, slots, first, flags)
-        else:
-            place = _new_place(slot, index, used, places)
+        place = new_message(slot, index, target[slots[1, slot]], used, places, slots, first, flags)
         if place < 0:
             return -2
         if last < 0:
@@ -208,15 +204,17 @@ def _element(slot, visit, message, limit, used, places, slots, first, flags, tar
 
 @njit(cache=True)
 def walk(  # type: ignore[no-untyped-def]
-    data, starts, lengths, visit, limit, first, number, kinds, choice, target, flags, used, places, slots, values,
+    data, words, halves, starts, lengths, visit, limit, first, number, kinds, choice, target, flags, used, places, slots, values,
     present, status,
 ):  # fmt: skip
     """Walk payloads row by row; return how many rows were done before room for places ran out.
 
     Parameters
     ----------
-    data, starts, lengths : arrays
-        Bytes, and where the payloads lie in them.
+    data, words, halves : arrays
+        Bytes, and the 8-byte and 4-byte numbers that start at each of them.
+    starts, lengths : arrays
+        Where the payloads lie.
     visit : int
         Number that no row had before; rows count on from it.
     limit : int
@@ -246,6 +244,9 @@ def walk(  # type: ignore[no-untyped-def]
         at, depth, cleared, state = starts[row], 0, 0, OK
         ends[0], nodes[0], types[0], hints[0] = starts[row] + lengths[row], 0, 0, first[0]
         present[0, row] = 1
+        if at < 0 or lengths[row] < 0 or ends[0] > len(data):
+            status[row] = CUT
+            continue
         while True:
             stop = ends[depth]
             if at == stop:
@@ -253,12 +254,16 @@ def walk(  # type: ignore[no-untyped-def]
                     break
                 depth -= 1
                 continue
-            tag, at = _varint(data, at, stop, 5)
-            if at < 0:
-                state = CUT
-                break
-            wire = np.int64(tag & np.uint64(7))
-            code = np.int64(tag >> np.uint64(3))
+            tag = np.int64(data[at])
+            if tag < 128:
+                at += 1
+            else:
+                long, at = _varint(data, at, stop, 5)
+                tag = np.int64(long)
+                if at < 0:
+                    state = CUT
+                    break
+            wire, code = tag & 7, tag >> 3
             if code == 0 or code >= 1 << 29 or wire > 5:
                 state = BAD_TAG
                 break
@@ -266,14 +271,20 @@ def walk(  # type: ignore[no-untyped-def]
                 state = GROUP_FOUND
                 break
             low, high = first[types[depth]], first[types[depth] + 1]
-            field = _find(number, low, high, code, hints[depth])
+            field = hints[depth]
+            if field >= high or number[field] != code:
+                field = _find(number, low, high, code)
             size = np.int64(0)
             if wire == 2:
-                length, at = _varint(data, at, stop, 5)
-                if at < 0 or length > np.uint64(stop - at):
+                if at < stop and data[at] < 128:
+                    size = np.int64(data[at])
+                    at += 1
+                else:
+                    long, at = _varint(data, at, stop, 5)
+                    size = np.int64(long)
+                if at < 0 or size > stop - at:
                     state = CUT
                     break
-                size = np.int64(length)
             kind = -1 if field < 0 else kinds[field]
             packed = field >= 0 and wire == 2 and kind < _KIND_BYTES and flags[0, field]
             if field < 0 or (_wire_of(kind) != wire and not packed):  # unknown: skipped
@@ -306,7 +317,7 @@ def walk(  # type: ignore[no-untyped-def]
             if kind == _KIND_MESSAGE:
                 inner = -1
                 if slot >= 0 and flags[0, field]:
-                    inner = _element(slot, visit, True, limit, used, places, slots, first, flags, target)
+                    inner = _element(slot, visit, limit, used, places, slots, first, flags, target)
                     if inner >= 0:
                         values[slots[3, slot], row] = slots[6, slot]
                     elif inner == -1 and slots[6, slot] == limit + 1:
@@ -341,48 +352,63 @@ def walk(  # type: ignore[no-untyped-def]
             if kind >= _KIND_BYTES and not flags[3, field]:
                 at += size
                 continue
-            until = at + size if packed else at + 1
-            while at < until:
-                if kind == _KIND_STRING:
-                    value = (np.uint64(at) << np.uint64(20)) | np.uint64(size if size < 1 << 20 else 0)
-                    after = at + size
-                else:
-                    value, after = _number(data, at, until if packed else stop, kind)
-                if after < 0:
+            if not flags[0, field]:
+                value, at = _number(data, words, halves, at, stop, kind)
+                if at < 0:
                     state = CUT
                     break
-                place = -1
-                if slot >= 0 and flags[0, field]:
-                    place = _element(slot, visit, False, limit, used, places, slots, first, flags, target)
-                    if place == -2:
-                        return row
-                    if kind == _KIND_STRING:
-                        head = slots[3, slot] + 1
-                        mark = values[head, row] ^ np.uint64(0xCBF29CE484222325)
-                        for i in range(at, after):
-                            mark = (mark ^ np.uint64(data[i])) * np.uint64(0x100000001B3)
-                        values[head, row] = (mark ^ np.uint64(size)) * np.uint64(0x100000001B3)
-                    if place >= 0:
-                        values[slots[3, slot], row] = slots[6, slot]
-                    elif slots[6, slot] == limit + 1:
-                        values[slots[3, slot], row] = 0
-                        slots[7, slot] = 1
-                        gone = slots[2, slot]
-                        while gone >= 0:
-                            present[gone, row] = 0
-                            gone = places[2, gone]
-                elif slot >= 0:
+                if slot >= 0:
                     place = slots[2, slot]
                     if place < 0:
                         place = _new_place(slot, -1, used, places)
                         if place < 0:
                             return row
                         slots[2, slot] = place
-                if place >= 0:
                     values[place, row], present[place, row] = value, 1
-                at = after
-                if kind == _KIND_STRING:
+                continue
+            index, last = 0, -1
+            if slot >= 0 and slots[4, slot] == visit:
+                index, last = slots[6, slot], slots[5, slot]
+            before = index
+            until = at + size if packed or kind == _KIND_STRING else stop
+            while True:
+                if packed and at == until:
                     break
+                if kind == _KIND_STRING:
+                    value, after = (np.uint64(at) << np.uint64(20)) | np.uint64(size if size < 1 << 20 else 0), until
+                    if slot >= 0:
+                        _add_hash(data, at, until, slots[3, slot] + 1, row, values)
+                elif kind == 0 and at + 8 <= until:
+                    value, after = words[at], at + 8
+                else:
+                    value, after = _number(data, words, halves, at, until, kind)
+                if after < 0:
+                    state = CUT
+                    break
+                at = after
+                index += 1
+                if slot >= 0 and index <= limit:
+                    place = slots[2, slot] if last < 0 else places[2, last]
+                    if place < 0:
+                        place = _new_place(slot, index - 1, used, places)
+                        if place < 0:
+                            return row
+                        if last < 0:
+                            slots[2, slot] = place
+                        else:
+                            places[2, last] = place
+                    last = place
+                    values[place, row], present[place, row] = value, 1
+                if not packed:
+                    break
+            if slot >= 0 and index:
+                slots[4, slot], slots[5, slot], slots[6, slot] = visit, last, index
+                values[slots[3, slot], row] = index if index <= limit else 0
+                if index > limit and before <= limit:
+                    slots[7, slot], gone = 1, slots[2, slot]
+                    while gone >= 0:
+                        present[gone, row] = 0
+                        gone = places[2, gone]
             if state != OK:
                 break
         status[row] = state

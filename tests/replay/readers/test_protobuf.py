@@ -418,3 +418,11 @@ def test_editions_say_where_absence_is_a_value() -> None:
     schema = schema_of("E", files.SerializeToString().decode("latin-1"))
     (part,) = Decoder(schema, Outcome()).decode(np.empty(0, np.uint8), np.array([0]), np.array([0]))
     assert {k: v.tolist() for k, v in part.columns.items()} == {"a": [0]}
+
+
+def test_places_outside_the_data_are_refused() -> None:
+    outcome, raw = Outcome(), STATE(d=1).SerializeToString()
+    decoder = Decoder(schema_of("robot.State", DEFINITION), outcome)
+    places = np.array([-1, 0, 3]), np.array([5, len(raw) + 1, -1])
+    assert list(decoder.decode(np.frombuffer(raw, np.uint8), *places)) == []
+    assert outcome.bad == 3
