@@ -14,7 +14,8 @@ from diagnosis.noise import rounding_step
 from diagnosis.wheel_model import WheelModelFit
 from replay.machine import Machine
 from replay.signals import Signal, Signals
-from replay.timeline import Timeline, median_period
+from replay.spill import blocks, release
+from replay.timeline import Timeline
 
 _GAP_PERIODS = 5
 _UNITS = {"v": "m/s", "v_ref": "m/s", "v_true": "m/s", "omega": "rad/s", "yaw_rate": "rad/s", "speed": "m/s"}
@@ -38,10 +39,11 @@ def signal_rows(signals: Signals, timeline: Timeline) -> list[dict[str, Any]]:
     """One row per mapped signal: origin, rate, gaps, missing share, rounding step."""
     rows = []
     for name, signal in signals.items.items():
-        period = median_period(signal.stamps)
+        period = timeline.periods_ns[name]
         gaps, longest = _gaps(signal, period)
         values = timeline.signals.get(name)
         missing = 1.0 if values is None else float(np.mean(~np.isfinite(values)))
+        release(values, signal.stamps)
         rows.append(
             {
                 "name": name,
@@ -64,8 +66,12 @@ def signal_rows(signals: Signals, timeline: Timeline) -> list[dict[str, Any]]:
 def _gaps(signal: Signal, period: int) -> tuple[int, float]:
     if signal.stamps.size < 2:
         return 0, 0.0
-    steps = np.diff(signal.stamps)
-    return int(np.count_nonzero(steps > _GAP_PERIODS * period)), float(steps.max()) * 1e-9
+    count = longest = 0
+    for part in blocks(signal.stamps.size - 1):
+        steps = np.diff(signal.stamps[part.start : part.stop + 1])
+        count += int(np.count_nonzero(steps > _GAP_PERIODS * period))
+        longest = max(longest, int(steps.max()))
+    return count, longest * 1e-9
 
 
 def missing_rows(signals: Signals, machine: Machine) -> list[dict[str, str]]:
@@ -110,7 +116,7 @@ def checks(
         )
     for text in damage:
         row("Damage", text, "what is lost is not assessed; no “ready” from a damaged log", False)
-    gaps = {n: _gaps(s, median_period(s.stamps)) for n, s in signals.items.items() if not n.startswith("cmd.")}
+    gaps = {n: _gaps(s, timeline.periods_ns[n]) for n, s in signals.items.items() if not n.startswith("cmd.")}
     worst = [n for n, (count, _) in gaps.items() if count]
     if worst:
         longest = max(gaps[n][1] for n in worst)
@@ -143,9 +149,11 @@ def checks(
 
 def _jitter_ms(signals: Signals, timeline: Timeline) -> float:
     """99 % quantile of |stamp step − period| over the wheel signals [ms]."""
-    out = 0.0
+    out, seen = 0.0, set()
     for name, signal in signals.items.items():
-        period = median_period(signal.stamps)
+        period, place = timeline.periods_ns[name], signal.stamps.__array_interface__["data"][0]
         if name.startswith("wheel.") and 0 < period < 2 * timeline.step_ns and signal.stamps.size > 2:
-            out = max(out, float(np.quantile(np.abs(np.diff(signal.stamps) - period), 0.99)) * 1e-6)
+            if place not in seen:
+                out = max(out, float(np.quantile(np.abs(np.diff(signal.stamps) - period), 0.99)) * 1e-6)
+            seen.add(place)
     return out

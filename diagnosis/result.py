@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from typing import Any, Literal
 
 import numpy as np
@@ -147,7 +147,7 @@ def _plain(value: Any) -> Any:
 def to_json(value: Any) -> Any:
     """Turn a dataclass, mapping or sequence into plain JSON values; NaN becomes null."""
     if hasattr(value, "__dataclass_fields__"):
-        return _plain(asdict(value))
+        return {name: to_json(getattr(value, name)) for name in value.__dataclass_fields__}
     if isinstance(value, Mapping):
         return {str(k): to_json(v) for k, v in value.items()}
     if isinstance(value, list | tuple):

@@ -20,7 +20,7 @@ from numpy.typing import DTypeLike, NDArray
 
 from replay.errors import LogError
 
-SPILL_BYTES = 8 << 20
+SPILL_BYTES = 16 << 20
 FLUSH_BYTES = 4 << 20
 BLOCK = 1 << 19
 
