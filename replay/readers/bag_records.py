@@ -23,8 +23,8 @@ class BagRecords(NamedTuple):
         Where header fields and data start, and length of the data [bytes].
     conn, stamp : NDArray[np.int64], shape (n,)
         Connection (−1 where a record has none) and time [ns].
-    end, stop : int
-        End of the last complete record, and where the walk stopped: at a chunk that reaches too far, or at the end.
+    end : int
+        End of the last complete record.
     lost, gaps, first : int
         Bytes that belong to no record, in how many places, and where the first of them is (−1: none).
     mended : int
@@ -38,7 +38,6 @@ class BagRecords(NamedTuple):
     conn: NDArray[np.int64]
     stamp: NDArray[np.int64]
     end: int
-    stop: int
     lost: int
     gaps: int
     first: int
@@ -96,14 +95,17 @@ def _record(data, at, stop):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _find(data, start, stop):  # type: ignore[no-untyped-def]
-    """Place of the next record that is complete in all its fields; stop where there is none."""
+def _find(data, start, stop, outer):  # type: ignore[no-untyped-def]
+    """Place of the next record that is complete in all its fields; stop where there is none.
+
+    Before `outer` only records count that never stand inside a chunk: compressed ones hold some of theirs as they are.
+    """
     for at in range(start, stop - 7):
         # the header is short and its first field lies in it: all but a few places fail here
         if data[at + 2] or data[at + 3] or data[at + 6] or data[at + 7]:
             continue
         op, body, _, _, sure = _record(data, at, stop)
-        if op and sure and (body + 4 + _u32(data, body) <= stop or op == 5):
+        if op and sure and (body + 4 + _u32(data, body) <= stop or op == 5) and (at >= outer or 4 <= op <= 6):
             return at
     return stop
 
@@ -112,21 +114,21 @@ def _find(data, start, stop):  # type: ignore[no-untyped-def]
 def _scan(data, start, stop, op, head, body, size, conn, stamp):  # type: ignore[no-untyped-def]
     at, n, end = start, 0, start
     lost, gaps, first, mended = 0, 0, -1, 0
-    last_body, last = np.int64(-1), False
+    last_body, last_op, last = np.int64(-1), 0, False
     while at < stop:
         code, data_at, who, when, sure = _record(data, at, stop)
         inner = data_at + 4
         length = _u32(data, data_at) if code else np.int64(0)
         if code and inner + length > stop and sure and code == 2:
             # a message whose length cannot be right: it ends where the next record starts
-            again = _find(data, inner, stop)
+            again = _find(data, inner, stop, 0)
             if again < stop:
                 length = again - inner
                 mended += 1
         if not code or inner + length > stop:
             if code == 5 and sure:
                 break  # a chunk that is cut off, or whose length is wrong: the caller looks into it
-            again = _find(data, max(last_body, start) if last else at + 1, stop)
+            again = _find(data, last_body if last else at + 1, stop, at if last_op == 5 else 0)
             if again < at and n and n <= len(op):
                 size[n - 1] = again - body[n - 1]
                 mended += 1
@@ -142,9 +144,14 @@ def _scan(data, start, stop, op, head, body, size, conn, stamp):  # type: ignore
         if n < len(op):
             op[n], head[n], body[n], size[n], conn[n], stamp[n] = code, at + 4, inner, length, who, when
         n += 1
-        last_body, last = inner, True
+        last_body, last_op, last = inner, code, True
         at = end = inner + length
     return n, at, end, lost, gaps, first, mended
+
+
+def end_of_chunk(data: NDArray[np.uint8], body: int) -> int:
+    """Where the record behind a chunk starts whose length is not to be trusted; the end of the data without one."""
+    return int(_find(data, body, len(data), len(data)))
 
 
 def scan_bag(data: NDArray[np.uint8], start: int = 0, stop: int | None = None) -> BagRecords:
@@ -171,6 +178,6 @@ def scan_bag(data: NDArray[np.uint8], start: int = 0, stop: int | None = None) -
                 lost, gaps, first = lost + stop - at, gaps + 1, at if first < 0 else first
             return BagRecords(
                 op[:count], head[:count], body[:count], size[:count], conn[:count], stamp[:count],
-                int(end), int(at), int(lost), int(gaps), int(first), int(mended),
+                int(end), int(lost), int(gaps), int(first), int(mended),
             )  # fmt: skip
         room = count

@@ -12,7 +12,17 @@ from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from replay.errors import LogError
 from replay.readers.assemble import Connection
-from replay.readers.bag_records import CHUNK, CONNECTION, HEADER, INDEX, INFO, MESSAGE, BagRecords, scan_bag
+from replay.readers.bag_records import (
+    CHUNK,
+    CONNECTION,
+    HEADER,
+    INDEX,
+    INFO,
+    MESSAGE,
+    BagRecords,
+    end_of_chunk,
+    scan_bag,
+)
 from replay.readers.clocks import Report
 
 MAGIC = b"#ROSBAG V"
@@ -273,10 +283,7 @@ def _behind(bag: Bag, records: BagRecords) -> int:
         bag.lost(f"{records.mended} records have a damaged length; they were read up to the next record")
     if cut is None:
         return len(bag.data)
-    if cut.compression == "none":
-        return cut.body  # its records stand there as they are
-    following = scan_bag(bag.data, cut.body)
-    stop = int(following.head[0]) - 4 if len(following.op) else following.stop
+    stop = end_of_chunk(bag.data, cut.body)
     cut.packed = stop - cut.body
     bag.chunks.append(cut)
     return stop

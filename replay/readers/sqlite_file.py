@@ -303,8 +303,10 @@ def _values(payload: NDArray[np.uint8], encoding: str) -> list[Value]:
     body = int(size)
     while p < size:
         kind, p = scan.varint(payload, p, size)
+        if p < 0 or kind < 0:
+            return []
         width = (kind - 12) // 2 if kind >= 12 else (0, 1, 2, 3, 4, 6, 8, 8, 0, 0, 0, 0)[kind]
-        if p < 0 or kind < 0 or body + width > len(payload):
+        if body + width > len(payload):
             return []
         raw: Any = payload[body : body + width].tobytes()
         if kind >= 12:

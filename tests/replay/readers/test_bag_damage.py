@@ -76,7 +76,7 @@ class Bag:
             times, at = b"", 0
             for part in parts:
                 if b"op=\x02" in part:
-                    times += stamp(k * PER_CHUNK) + struct.pack("<I", at)
+                    times += stamp(k * PER_CHUNK + len(times) // 12) + struct.pack("<I", at)
                 at += len(part)
             counts = struct.pack("<II", 0, len(times) // 12)
             infos += record(

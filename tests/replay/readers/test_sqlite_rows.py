@@ -276,3 +276,13 @@ def test_random_damage_never_raises_nor_falls_behind_sqlite(make: Make) -> None:
         got, _, report = found(path)
         assert set(got) & whole >= peer & whole
         assert len(set(got) & whole) == len(whole) or report.damage or len(got) == len(rows)
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_pages_of_noise_hold_nothing(make: Make, seed: int) -> None:
+    path = make([])
+    head = path.read_bytes()[:100]
+    noise = np.random.default_rng(seed).integers(0, 256, 400 << 10, dtype=np.uint8)
+    noise[::4096] = (13, 5, 2, 10)[seed % 4]
+    path.write_bytes(head + noise.tobytes())
+    assert found(path)[0] == []
