@@ -46,6 +46,14 @@ _MASK = np.uint64((2**64 - 1) >> 55)
 _HIDDEN = np.uint64(1 << 52)
 _NINETEEN = 19
 
+_ZEROS, _HIGH_HALVES, _SIXES = (np.uint64(int(d * 8, 16)) for d in ("30", "f0", "06"))
+_PAIRS = np.uint64(0x000000FF000000FF)
+_UPPER, _LOWER = np.uint64(1_000_000 * 2**32 + 100), np.uint64(10_000 * 2**32 + 1)
+_U8, _U16 = np.uint64(8), np.uint64(16)
+_THREES = np.uint64(int("33" * 8, 16))
+_LARGEST, _EXACT = np.uint64(2**63 - 1), np.uint64(1 << 53)
+_U32, _EIGHT = np.uint64(32), np.uint64(100_000_000)
+
 
 @intrinsic
 def _bits(_context: Any, _value: Any) -> Any:
@@ -55,6 +63,29 @@ def _bits(_context: Any, _value: Any) -> Any:
         return builder.bitcast(args[0], ir.IntType(64))
 
     return types.int64(types.float64), build
+
+
+@intrinsic
+def byte_at(_context: Any, _data: Any, _at: Any) -> Any:
+    """Byte of a contiguous array, without the check for places counted from the end."""
+
+    def build(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        array = context.make_array(signature.args[0])(context, builder, args[0])
+        return builder.load(builder.gep(array.data, [args[1]]))
+
+    return types.uint8(_data, types.int64), build
+
+
+@intrinsic
+def _eight_at(_context: Any, _data: Any, _at: Any) -> Any:
+    """Eight bytes of a contiguous array as a little-endian number."""
+
+    def build(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        array = context.make_array(signature.args[0])(context, builder, args[0])
+        place = builder.bitcast(builder.gep(array.data, [args[1]]), ir.IntType(64).as_pointer())
+        return builder.load(place, align=1)
+
+    return types.uint64(_data, types.int64), build
 
 
 @intrinsic
@@ -80,16 +111,16 @@ def _leading_zeros(_context: Any, _w: Any) -> Any:
 
 
 @njit(cache=True)
-def bits_of(w: Any, q: int, fives: NDArray[np.uint64]) -> tuple[bool, Any]:
+def bits_of(w: Any, q: int) -> tuple[bool, Any]:
     """Bits of the double nearest to w · 10**q, w > 0; False where the caller has to find it."""
     if q < _LOWEST or q > _HIGHEST:
         return False, _U0
     zeros = _leading_zeros(w)
     w = w << np.uint64(zeros)
-    five = fives[q - _LOWEST, 0]
+    five = FIVES[q - _LOWEST, 0]
     high, low = _high(w, five), w * five
     if high & _MASK == _MASK:
-        more = _high(w, fives[q - _LOWEST, 1])
+        more = _high(w, FIVES[q - _LOWEST, 1])
         low = low + more
         if more > low:
             high = high + _U1
@@ -111,22 +142,29 @@ def bits_of(w: Any, q: int, fives: NDArray[np.uint64]) -> tuple[bool, Any]:
 
 
 @njit(cache=True)
-def number(
-    data: NDArray[np.uint8], at: int, stop: int, decimal: np.uint8, tens: NDArray[np.float64],
-    fives: NDArray[np.uint64],
-) -> tuple[int, Any, int]:  # fmt: skip
+def _settled(w: Any, q: int, negative: bool, inexact: bool) -> tuple[int, Any]:
+    """Kind and bits of ±w · 10**q, w > 0, where more digits than w holds may follow (`inexact`)."""
+    good, bits = bits_of(w, q)
+    if good and inexact:
+        good, above = bits_of(w + _U1, q)
+        good = good and above == bits
+    if not good:
+        return HARD, np.int64(0)
+    return FLOAT, np.int64(bits | (_U1 << _U63)) if negative else np.int64(bits)
+
+
+@njit(cache=True, inline="always")
+def number(data: NDArray[np.uint8], at: int, decimal: np.uint8) -> tuple[int, Any, int]:
     """Read one number.
 
     Parameters
     ----------
     data : NDArray[np.uint8]
-        Text.
-    at, stop : int
-        Where the number begins, and where the text ends.
+        Text; it holds a line feed behind the number, and eight more bytes.
+    at : int
+        Where the number begins.
     decimal : np.uint8
         Decimal sign.
-    tens, fives : NDArray
-        `TENS` and `FIVES`.
 
     Returns
     -------
@@ -134,20 +172,92 @@ def number(
         `BAD`, `INTEGER`, `FLOAT` or `HARD`; the integer, or the bits of the double; the first byte behind the number.
     """
     i = at
-    negative = False
-    if i < stop and (data[i] == 45 or data[i] == 43):
-        negative = data[i] == 45
+    d = byte_at(data, i)
+    negative = d == 45
+    if negative or d == 43:
         i += 1
-    w = _U0
-    digits = 0  # significant ones taken into w
-    dropped = 0  # integer digits that w has no room for
-    q = 0
-    inexact = False
     first = i
-    while i < stop:
+    w = _U0
+    d = byte_at(data, i) - np.uint8(48)
+    while d <= 9:
+        w = w * _U10 + np.uint64(d)
+        i += 1
+        d = byte_at(data, i) - np.uint8(48)
+    count = i - first
+    q: Any = 0
+    point = byte_at(data, i) == decimal
+    if point:
+        i += 1
+        part = i
+        eight = _eight_at(data, i)
+        while ((eight & _HIGH_HALVES) | (((eight + _SIXES) & _HIGH_HALVES) >> np.uint64(4))) == _THREES:
+            eight = eight - _ZEROS
+            eight = eight * _U10 + (eight >> _U8)
+            eight = ((eight & _PAIRS) * _UPPER + ((eight >> _U16) & _PAIRS) * _LOWER) >> _U32
+            w = w * _EIGHT + eight
+            i += 8
+            eight = _eight_at(data, i)
+        d = byte_at(data, i) - np.uint8(48)
+        while d <= 9:
+            w = w * _U10 + np.uint64(d)
+            i += 1
+            d = byte_at(data, i) - np.uint8(48)
+        q = part - i
+        count += i - part
+    kind = BAD
+    value: Any = np.int64(0)
+    if count > 0:
+        inexact = False
+        dropped = 0
+        if count > _NINETEEN:  # w may have run over: take 19 significant digits again
+            w, dropped, inexact = _again(data, first, i, decimal)
+            q += dropped
+        whole = not point
+        good = True
+        if (byte_at(data, i) | 32) == 101:
+            whole = False
+            j = i + 1
+            d = byte_at(data, j)
+            minus = d == 45
+            if minus or d == 43:
+                j += 1
+            digits = j
+            e: Any = np.int64(0)
+            d = byte_at(data, j) - np.uint8(48)
+            while d <= 9:
+                if e < 100_000:
+                    e = e * 10 + np.int64(d)
+                j += 1
+                d = byte_at(data, j) - np.uint8(48)
+            if j == digits:
+                good = False
+            else:
+                q += -e if minus else e
+                i = j
+        if good:
+            if whole and dropped == 0 and w <= _LARGEST and not (negative and w == _U0):
+                kind, value = INTEGER, -np.int64(w) if negative else np.int64(w)
+            elif w == _U0:
+                kind, value = FLOAT, _bits(-0.0 if negative else 0.0)
+            elif not inexact and w <= _EXACT and -22 <= q <= 22:
+                real = np.float64(w)
+                real = real / TENS[-q] if q < 0 else real * TENS[q]
+                kind, value = FLOAT, _bits(-real if negative else real)
+            else:
+                kind, value = _settled(w, q, negative, inexact)
+    return kind, value, i
+
+
+@njit(cache=True)
+def _again(data: NDArray[np.uint8], at: int, stop: int, decimal: np.uint8) -> tuple[Any, int, bool]:
+    """First 19 significant digits, how many digits were left out, and whether one of these is not zero."""
+    w: Any = _U0
+    digits = dropped = 0
+    inexact = False
+    for i in range(at, stop):
+        if data[i] == decimal:
+            continue
         d = data[i] - np.uint8(48)
-        if d > 9:
-            break
         if digits < _NINETEEN:
             w = w * _U10 + np.uint64(d)
             if w != _U0:
@@ -155,63 +265,4 @@ def number(
         else:
             dropped += 1
             inexact |= d != 0
-        i += 1
-    count = i - first
-    whole = True
-    if i < stop and data[i] == decimal:
-        whole = False
-        i += 1
-        first = i
-        while i < stop:
-            d = data[i] - np.uint8(48)
-            if d > 9:
-                break
-            if digits < _NINETEEN:
-                w = w * _U10 + np.uint64(d)
-                if w != _U0:
-                    digits += 1
-                q -= 1
-            else:
-                inexact |= d != 0
-            i += 1
-        count += i - first
-    if count == 0:
-        return BAD, 0, i
-    if i < stop and (data[i] | 32) == 101:
-        whole = False
-        j = i + 1
-        minus = False
-        if j < stop and (data[j] == 45 or data[j] == 43):
-            minus = data[j] == 45
-            j += 1
-        first = j
-        e: Any = 0
-        while j < stop:
-            d = data[j] - np.uint8(48)
-            if d > 9:
-                break
-            if e < 100_000:
-                e = e * 10 + np.int64(d)
-            j += 1
-        if j == first:
-            return BAD, 0, i
-        q += -e if minus else e
-        i = j
-    if whole and dropped == 0 and w <= _ONES >> _U1 and not (negative and w == _U0):
-        return INTEGER, -np.int64(w) if negative else np.int64(w), i
-    q += dropped
-    if w == _U0:
-        return FLOAT, _bits(-0.0 if negative else 0.0), i
-    if not inexact and w <= _HIDDEN << _U1 and -22 <= q <= 22:
-        value = np.float64(w)
-        value = value / tens[-q] if q < 0 else value * tens[q]
-        return FLOAT, _bits(-value if negative else value), i
-    good, bits = bits_of(w, q, fives)
-    if good and inexact:
-        good, above = bits_of(w + _U1, q, fives)
-        good = good and above == bits
-    if not good:
-        return HARD, 0, i
-    if negative:
-        bits = bits | (_U1 << _U63)
-    return FLOAT, np.int64(bits), i
+    return w, dropped, inexact

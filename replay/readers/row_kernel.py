@@ -9,7 +9,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from replay.readers.iso_kernel import iso_ns
-from replay.readers.number_kernel import BAD, FLOAT, HARD, INTEGER, number
+from replay.readers.number_kernel import BAD, FLOAT, HARD, INTEGER, byte_at, number
 
 UNKNOWN, WHOLE, REAL, MOMENT = 0, 1, 2, 3  # kinds of columns; cells of MOMENT are dates, kept as ns since 1970
 MISSING = -(2**63)
@@ -36,7 +36,7 @@ WORDS = np.array([(*_packed(w), code) for code, row in _WORDS.items() for w in r
 
 
 @njit(cache=True)
-def _word(data: NDArray[np.uint8], at: int, stop: int, words: NDArray[np.uint64]) -> Any:
+def _word(data: NDArray[np.uint8], at: int, stop: int) -> Any:
     """What a cell that is no number says; 0 where it is text."""
     if stop - at > 16:
         return 0
@@ -50,9 +50,9 @@ def _word(data: NDArray[np.uint8], at: int, stop: int, words: NDArray[np.uint64]
             low |= np.uint64(c) << np.uint64(8 * k)
         else:
             high |= np.uint64(c) << np.uint64(8 * (k - 8))
-    for j in range(len(words)):
-        if words[j, 0] == low and words[j, 1] == high:
-            return np.int64(words[j, 2])
+    for j in range(len(WORDS)):
+        if WORDS[j, 0] == low and WORDS[j, 1] == high:
+            return np.int64(WORDS[j, 2])
     return 0
 
 
@@ -63,18 +63,61 @@ def _to_real(column: NDArray[np.int64], reals: NDArray[np.float64], rows: int) -
         reals[i] = np.nan if value == MISSING else np.float64(value)
 
 
+@njit(cache=True)
+def _quoted(data: NDArray[np.uint8], at: int, stop: int) -> int:
+    """Where the quote that closes the one before `at` stands; `stop` where it does not come."""
+    j = at
+    while j < stop:
+        if data[j] == 34:
+            if j + 1 < stop and data[j + 1] == 34:
+                j += 1
+            else:
+                return j
+        j += 1
+    return stop
+
+
+@njit(cache=True)
+def _moment(data: NDArray[np.uint8], start: int, end: int, counters: NDArray[np.int64]) -> Any:
+    value = iso_ns(data, start, end)
+    if value == MISSING:
+        if counters[TEXT] == 0:
+            counters[FIRST_TEXT] = start
+        counters[TEXT] += 1
+    return value
+
+
+@njit(cache=True)
+def _worded(data: NDArray[np.uint8], start: int, end: int, counters: NDArray[np.int64]) -> tuple[int, Any]:
+    """Kind and value of a cell that is no number: a truth, an infinity, nothing, or text (both `BAD`)."""
+    said = _word(data, start, end)
+    sign = data[start]
+    if said == 0 and (sign == 45 or sign == 43):
+        said = _word(data, start + 1, end)
+        said = said if said in (_INFINITE, _ABSENT) else 0
+    if said in (_ONE, _ZERO):
+        return INTEGER, np.int64(said == _ONE)
+    if said == _INFINITE:
+        return FLOAT, np.int64(_NEGATIVE if sign == 45 else _POSITIVE)
+    if said == 0:
+        if counters[TEXT] == 0:
+            counters[FIRST_TEXT] = start
+        counters[TEXT] += 1
+    return BAD, np.int64(0)
+
+
 @njit(cache=True, nogil=True)
 def scan(
     data: NDArray[np.uint8], at: int, final: bool, marks: tuple[np.uint8, np.uint8, bool],
     kinds: NDArray[np.int8], cells: NDArray[np.int64], reals: NDArray[np.float64], hard: NDArray[np.int64],
-    columns: NDArray[np.int64], table: NDArray[np.int64], tables: tuple[NDArray[np.float64], NDArray[np.uint64], NDArray[np.uint64]],
+    columns: NDArray[np.int64], table: NDArray[np.int64],
 ) -> tuple[int, int, int]:  # fmt: skip
     """Parse rows until the text, the room for rows or the list of hard cells ends.
 
     Parameters
     ----------
     data : NDArray[np.uint8]
-        Text; unless final it ends with a line feed.
+        Text that ends with a line feed; eight more bytes may be read behind it.
     at : int
         Where a row begins.
     final : bool
@@ -91,8 +134,6 @@ def scan(
         Counters of each column.
     table : NDArray[np.int64], shape (5,)
         Counters of the table.
-    tables : tuple
-        `TENS`, `FIVES`, `WORDS`.
 
     Returns
     -------
@@ -100,134 +141,116 @@ def scan(
         First byte behind the last whole row, rows, and hard cells.
     """
     separator, decimal, quoted = marks
-    tens, fives, words = tables
     width, room = cells.shape
     stop = len(data)
     rows = hards = 0
+    widest = table[WIDEST]
     row_at = at
     while row_at < stop and rows < room and hards + width <= len(hard):
-        i = row_at
+        i = first = row_at
         c = 0
         ended = False
-        filled = 0
+        filled = 0  # cells up to the last that is not empty
+        start = i
         while not ended:
-            while i < stop and data[i] == 32:
+            while byte_at(data, i) == 32:
                 i += 1
             start = i
-            inside = -1
-            if quoted and i < stop and data[i] == 34:  # a cell in quotes: its text, and the first byte behind it
-                j = i + 1
-                limit = min(stop, i + LONGEST_QUOTE)
-                while j < limit:
-                    if data[j] == 34:
-                        if j + 1 < limit and data[j + 1] == 34:
-                            j += 1
+            known = kinds[c] if c < width else np.int8(MOMENT)
+            kind = BAD
+            value: Any = np.int64(0)
+            if known != MOMENT:
+                kind, value, i = number(data, start, decimal)
+                while byte_at(data, i) == 32 or byte_at(data, i) == 13:
+                    i += 1
+                d = byte_at(data, i)
+                if d != separator and d != 10:
+                    kind = BAD
+            end = i
+            if kind == BAD:
+                i = start
+                closed = stop
+                if quoted and byte_at(data, i) == 34:  # a cell in quotes
+                    limit = min(stop, i + LONGEST_QUOTE)
+                    closed = _quoted(data, i + 1, limit)
+                    if closed == limit:
+                        if limit == stop and not final:
+                            columns[:, FILLED] += rows
+                            table[WIDEST] = widest
+                            return row_at, rows, hards
+                        closed = stop
+                if closed < stop:
+                    start, i = start + 1, closed + 1
+                    if known != MOMENT:
+                        while byte_at(data, start) == 32:
+                            start += 1
+                        kind, value, end = number(data, start, decimal)
+                        while byte_at(data, end) == 32:
+                            end += 1
+                        if end != closed:
+                            kind = BAD
+                d = byte_at(data, i)
+                while d != separator and d != 10:
+                    i += 1
+                    d = byte_at(data, i)
+                if closed < stop:
+                    for j in range(closed + 1, i):
+                        if data[j] != 32 and data[j] != 13:
+                            kind = BAD
+                if kind == BAD:
+                    end = closed if closed < stop else i
+                    while end > start and (data[end - 1] == 32 or data[end - 1] == 13):
+                        end -= 1
+                    if end > start and c < width:
+                        if known == MOMENT:
+                            kind, value = INTEGER, _moment(data, start, end, columns[c])
                         else:
-                            break
-                    j += 1
-                if j < limit:
-                    start, inside = i + 1, j
-                elif limit == stop and not final:
-                    return row_at, rows, hards
-            kind = np.int8(-1)
-            value: Any = 0
-            end = start
-            bound = stop if inside < 0 else inside
-            if c < width and kinds[c] != MOMENT:
-                while end < bound and data[end] == 32:
-                    end += 1
-                kind, value, end = number(data, end, bound, decimal, tens, fives)
-            while end < bound and (data[end] == 32 or data[end] == 13):
-                end += 1
-            if inside >= 0:
-                whole = end == inside
-                i = inside + 1
-                while i < stop and (data[i] == 32 or data[i] == 13):
-                    i += 1
-                if i < stop and data[i] != separator and data[i] != 10:
-                    whole = False
-            else:
-                whole = end >= stop or data[end] == separator or data[end] == 10
-                i = end
-            if not whole or kind <= BAD:
-                kind = np.int8(BAD)
-                while i < stop and data[i] != separator and data[i] != 10:
-                    i += 1
-                end = i if inside < 0 else inside
-                while end > start and (data[end - 1] == 32 or data[end - 1] == 13):
-                    end -= 1
-            empty = end == start
+                            kind, value = _worded(data, start, end, columns[c])
+            if end > start:
+                filled = c + 1
             if c < width:
-                if empty:
-                    if kinds[c] == REAL:
-                        cells[c, rows] = _NAN
+                if kind == INTEGER:
+                    if known == REAL:
+                        reals[c, rows] = np.float64(value)
                     else:
-                        cells[c, rows] = MISSING
-                else:
-                    filled += 1
-                    columns[c, FILLED] += 1
-                    if kinds[c] == MOMENT:
-                        value = iso_ns(data, start, end)
+                        if known == UNKNOWN:
+                            kinds[c] = WHOLE
                         cells[c, rows] = value
-                        if value == MISSING:
-                            if columns[c, TEXT] == 0:
-                                columns[c, FIRST_TEXT] = start
-                            columns[c, TEXT] += 1
-                    else:
-                        if kind == BAD:
-                            said = _word(data, start, end, words)
-                            sign = data[start]
-                            if said == 0 and (sign == 45 or sign == 43):
-                                said = _word(data, start + 1, end, words)
-                                said = said if said in (_INFINITE, _ABSENT) else 0
-                            if said in (_ONE, _ZERO):
-                                kind, value = np.int8(INTEGER), np.int64(said == _ONE)
-                            elif said == _INFINITE:
-                                kind, value = np.int8(FLOAT), _NEGATIVE if sign == 45 else _POSITIVE
-                            else:
-                                if said == 0:
-                                    if columns[c, TEXT] == 0:
-                                        columns[c, FIRST_TEXT] = start
-                                    columns[c, TEXT] += 1
-                                value = MISSING if kinds[c] != REAL else _NAN
-                        if kind == INTEGER:
-                            if kinds[c] == REAL:
-                                reals[c, rows] = np.float64(value)
-                            else:
-                                kinds[c] = WHOLE
-                                cells[c, rows] = value
-                        elif kind == BAD:
-                            cells[c, rows] = value
-                        else:
-                            if kinds[c] != REAL:
-                                _to_real(cells[c], reals[c], rows)
-                                kinds[c] = REAL
-                            if kind == HARD:
-                                hard[hards, 0], hard[hards, 1], hard[hards, 2], hard[hards, 3] = c, rows, start, end
-                                hards += 1
-                                value = _NAN
-                            cells[c, rows] = value
-            elif not empty:
-                if table[LONG] == 0 or c == width:
-                    if table[LONG] == 0:
-                        table[FIRST_LONG] = row_at
-                    if c == width:
-                        table[LONG] += 1
-                filled += 1
-            if not empty:
-                table[WIDEST] = max(table[WIDEST], c + 1)
+                elif kind == BAD:
+                    if end == start:
+                        columns[c, FILLED] -= 1
+                    cells[c, rows] = _NAN if known == REAL else MISSING
+                else:
+                    if known != REAL:
+                        _to_real(cells[c], reals[c], rows)
+                        kinds[c] = REAL
+                    if kind == HARD:
+                        hard[hards, 0], hard[hards, 1], hard[hards, 2], hard[hards, 3] = c, rows, start, end
+                        hards += 1
+                        value = _NAN
+                    cells[c, rows] = value
             c += 1
-            if i >= stop or data[i] == 10:
-                ended = True
+            ended = byte_at(data, i) == 10
             i += 1
-        row_at = min(i, stop)
+        row_at = i
         if filled == 0 and c == 1:
+            if width > 0:
+                columns[0, FILLED] += 1
             continue
+        if filled > width:
+            if table[LONG] == 0:
+                table[FIRST_LONG] = first
+            table[LONG] += 1
+        if filled > widest:
+            widest = filled
         if c < width:
             if table[SHORT] == 0:
                 table[FIRST_SHORT] = start
             table[SHORT] += 1
             for k in range(c, width):
                 cells[k, rows] = _NAN if kinds[k] == REAL else MISSING
+                columns[k, FILLED] -= 1
         rows += 1
+    columns[:, FILLED] += rows
+    table[WIDEST] = widest
     return row_at, rows, hards

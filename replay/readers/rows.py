@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 from replay.errors import LogError
 from replay.readers import row_kernel as kernel
 from replay.readers.clocks import Report
-from replay.readers.number_kernel import FIVES, TENS
 from replay.readers.textfile import decoded
 
 MAX_COLUMNS = 20_000
@@ -20,6 +19,8 @@ LONGEST_ROW = 16 << 20
 _CELLS = 1 << 21
 _HARD = 1 << 16
 _TAIL = 256
+_BEHIND = 16  # bytes that the parser may look at behind the last line feed
+_PADDING = b"\n" + bytes(_BEHIND)
 _NAN = np.array([np.nan]).view(np.int64)[0]
 
 
@@ -118,8 +119,8 @@ class Rows:
             text = left + piece if left else piece
             stop = len(text)
             if final:
-                text = end(text) if end is not None else text
-                stop = len(text)
+                text = (end(text) if end is not None else text) + _PADDING
+                stop = len(text) - _BEHIND
             else:
                 stop = text.rfind(b"\n", 0, max(stop - _TAIL, 0)) + 1
             used = yield from self._parse(text, stop, at, final, cells)
@@ -141,7 +142,7 @@ class Rows:
             before, odd = self.columns[:, kernel.TEXT] == 0, self.table[:2] == 0
             used, rows, hards = kernel.scan(
                 data, at, final, marks, self.kinds, cells, cells.view(np.float64), self._hard, self.columns,
-                self.table, (TENS, FIVES, kernel.WORDS),
+                self.table,
             )  # fmt: skip
             for i in np.flatnonzero(before & (self.columns[:, kernel.TEXT] > 0)):
                 first = int(self.columns[i, kernel.FIRST_TEXT])

@@ -91,13 +91,15 @@ class TextFile:
                 yield piece
 
     def position_after(self, size: int) -> int:
-        """Return how many bytes of a gzip file its first `size` bytes of text take."""
-        member, taken, held = zlib.decompressobj(31), 0, 0
+        """Return about how many bytes of a packed file its first `size` bytes of text take."""
         with self.path.open("rb") as file:
-            while held < size and (piece := file.read(1 << 16)):
-                held += len(member.decompress(piece))
-                taken += len(piece)
-        return taken
+            unpack = self._unzip if self.packed == "gzip" else self._unzstd
+            held = 0
+            for piece in unpack(file, Report()):
+                held += len(piece)
+                if held >= size:
+                    break
+            return file.tell()
 
     def blocks(self, skip: int = 0) -> Iterator[bytes]:
         """Yield the bytes behind the first `skip`; zeros of blocks that were never written are told and taken out.
