@@ -11,6 +11,7 @@ import lz4.frame
 import numpy as np
 from numpy.typing import NDArray
 
+from replay.errors import LogError
 from replay.rawlog import Clock, LogSummary, RawLog, TopicInfo, Window
 from replay.readers.assemble import Assembler, Block, Connection
 from replay.readers.bag_records import CONNECTION, MESSAGE, BagRecords, scan_bag
@@ -187,8 +188,16 @@ class _Reading:
                 yield Block(connection, data, records.body[mine], records.size[mine], records.stamp[mine])
 
     def summary(self) -> LogSummary:
-        """Return the bag's contents: counts of what was opened as found, of the rest as its index states."""
+        """Return the bag's contents: counts of what was opened as found, of the rest as its index states.
+
+        Raises
+        ------
+        LogError
+            Where a damaged bag holds neither connections nor messages.
+        """
         bag, totals = self.bag, self.found + self.skipped
+        if bag.report.damage and not bag.connections and not totals:
+            raise LogError(f"{bag.path} holds nothing that can be read: {'; '.join(bag.report.damage[:3])}")
         for number in sorted(self.stated.keys() | self.found.keys()):
             stated, found = self.stated[number], self.found[number]
             connection = bag.connections.get(number)

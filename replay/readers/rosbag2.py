@@ -115,6 +115,6 @@ def _complete(summary: LogSummary, meta: Metadata, compare: bool) -> LogSummary:
         notes = [n for n in notes if not any(n.startswith(f"{s} is not decoded") for s in services)]
         notes.append(f"calls of services and actions are no signals and were left out: "
                      f"{', '.join(services[:_SHOWN])}{more}")  # fmt: skip
-    if compare and not sum(found.values()):
+    if compare and not damage and not sum(found.values()):
         notes.append("the recording holds no messages: it was started and stopped with nothing received")
     return replace(summary, notes=tuple(notes), damage=tuple(damage), metadata={**meta.facts, **summary.metadata})

@@ -134,6 +134,8 @@ def _split(base: Database, rows: Rows) -> Iterator[Block]:
 
 
 def _summary(bases: list[Database], source: Path, report: Report, counted: Mapping[str, int] | None) -> LogSummary:
+    if not any(b.met or "messages" in b.tables or b.connections for b in bases):
+        raise LogError(f"{source} holds nothing that can be read: {'; '.join(report.damage[:3])}")
     totals: dict[Connection, int] = {}
     for base in bases:
         for number, connection in sorted(base.connections.items()):

@@ -142,7 +142,7 @@ def test_a_window_opens_its_chunks_alone(read: Read, compression: str) -> None:
 
 
 @pytest.mark.parametrize("compression", PACK)
-@pytest.mark.parametrize("share", np.linspace(0.05, 0.99, 12))
+@pytest.mark.parametrize("share", np.linspace(0.2, 0.99, 12))
 def test_a_cut_bag_gives_all_complete_chunks(read: Read, compression: str, share: float) -> None:
     bag = Bag(compression)
     raw = bag.bytes()
@@ -282,6 +282,12 @@ def test_a_chunk_that_the_index_alone_knows_is_told(read: Read) -> None:
     assert told(log, "/speed: 10 of 60 messages that the index counts were not found")
 
 
+@pytest.mark.parametrize("content", [b"", bytes(1 << 20), bytes(range(256)) * 4096])
+def test_a_bag_without_any_record_is_refused(read: Read, content: bytes) -> None:
+    with pytest.raises(LogError, match="holds nothing that can be read"):
+        read(b"#ROSBAG V2.0\n" + content)
+
+
 def test_encrypted_bags_are_refused(read: Read) -> None:
     with pytest.raises(LogError, match=r"is encrypted \('rosbag/AesCbcEncryptor'\); decrypt it"):
         read(Bag().bytes(encryptor=b"rosbag/AesCbcEncryptor"))
@@ -324,7 +330,8 @@ def test_random_damage_never_raises_nor_falls_behind_rosbags(read: Read, tmp_pat
     with Reader(tmp_path / "log.bag") as reader:
         assert len(list(reader.messages())) == len(EVERY)
     for i in range(50):
-        log = read(mutated(raw, i))
+        changed = mutated(raw, i)
+        (tmp_path / "log.bag").write_bytes(changed)
         peer: set[float] = set()
         try:
             with Reader(tmp_path / "log.bag") as reader:
@@ -332,5 +339,10 @@ def test_random_damage_never_raises_nor_falls_behind_rosbags(read: Read, tmp_pat
                     peer.update(struct.unpack("<d", data))
         except Exception:  # rosbags fails in any way; what it gave before counts
             pass
+        try:
+            log = read(changed)
+        except LogError:
+            assert not peer & whole, i
+            continue
         assert set(speed(log)) & whole >= peer & whole, i
         assert set(speed(log)) >= whole or log.summary.damage or len(speed(log)) == len(EVERY), i

@@ -12,9 +12,12 @@ from typing import Any
 import numpy as np
 import pytest
 
+from replay.errors import LogError
 from replay.readers.clocks import Report
+from replay.readers.registry import read_log
 from replay.readers.sqlite_file import open_image
 from replay.readers.sqlite_rows import Database, open_database
+from replay.sources import SourceOptions
 
 TABLES = """
 create table topics(id integer primary key, name text not null, type text not null, serialization_format text not null);
@@ -286,3 +289,5 @@ def test_pages_of_noise_hold_nothing(make: Make, seed: int) -> None:
     noise[::4096] = (13, 5, 2, 10)[seed % 4]
     path.write_bytes(head + noise.tobytes())
     assert found(path)[0] == []
+    with pytest.raises(LogError, match="can be read"):
+        read_log(path, SourceOptions())
