@@ -11,6 +11,7 @@ from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import stdtrit
 
 from replay.clock_series import Shared
 from replay.clock_windows import TOLERANCES_S, Line, Readings, prepared, read_windows
@@ -67,7 +68,7 @@ def _robust_line(readings: Readings, shared: Sequence[Shared], start: Line) -> L
     t, lag, variance = readings.t, readings.lag, readings.variance
     if len(t) < _FEWEST:
         return _refused(start, "too few moments show in both recordings")
-    floor = float(np.median([0.05 * max(s.reference.recorded, s.other.recorded) for s in shared])) ** 2
+    floor = float(np.median([0.1 * max(s.reference.recorded, s.other.recorded) for s in shared])) ** 2
     weight0 = 1.0 / (variance + floor)
     at = float(np.sum(weight0 * t) / weight0.sum())
     u = t - at
@@ -97,7 +98,9 @@ def _robust_line(readings: Readings, shared: Sequence[Shared], start: Line) -> L
     if uneven:
         return _refused(start, uneven)
     used = [i for i in range(len(shared)) if (weight[readings.signal == i] > 0).any()]
-    covariance = covariance.copy()
+    counted = int((weight > 0.1 * weight0).sum())
+    freedom = max(1, counted - 2)
+    covariance = covariance * (stdtrit(freedom, 0.975) / 1.96) ** 2 * max(1.0, counted / freedom)  # few readings tell less
     covariance[0, 0] += _between(readings, weight / scale**2, residual, shared, used) + more**2
     return Line(at, float(line[0]), float(line[1]), covariance, tuple(shared[i].name for i in used), t[weight > 0])
 
