@@ -71,8 +71,8 @@ def account(file: McapFile, tally: scan.Tally, topics: Collection[str] | None, s
         return sorted(skipped)
     if file.statistics is not None or not file.runs:
         for n in short:
-            if not due.get(n, 0) and file.statistics is None:
-                continue
+            if file.statistics is None and found[n] > due.get(n, 0):
+                continue  # not every chunk has indexes
             file.lost(
                 "count",
                 f"{file.names.topic(n)}: {found[n]} of {due.get(n, 0)} messages that the log's {who} were found",
@@ -93,8 +93,9 @@ def _say_unknown(file: McapFile, short: bool) -> None:
     """Records of unknown type: a loss, but for private ones in a log in which nothing is missing."""
     if not file.unknown:
         return
-    text = f"{len(file.unknown)} records of unknown type (first at byte {file.unknown[0][1]}) were left out"
-    if not short and file.statistics is not None and all(code in _PRIVATE for code, _ in file.unknown):
+    count = sum(n for _, _, n in file.unknown)
+    text = f"{count} records of unknown type (first at byte {file.unknown[0][1]}) were left out"
+    if not short and file.statistics is not None and all(code in _PRIVATE for code, _, _ in file.unknown):
         file.report.note(f"{file.path.name}: {text}")
     else:
         file.lost("record", text)

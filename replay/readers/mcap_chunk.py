@@ -11,6 +11,7 @@ the damage. Nothing is ever taken from behind a place at which decompression fai
 from __future__ import annotations
 
 import zlib
+from collections.abc import Iterator
 from dataclasses import dataclass
 from io import BytesIO
 from typing import NamedTuple
@@ -29,6 +30,7 @@ _FIXED = 49
 _PIECE = 1 << 16
 _ZEROS = 512
 _FRAME_HEAD = 32
+_MOST_BYTES, _MOST_TIMES = 4 << 30, 4096
 _COMPRESSIONS = ("", "none", "lz4", "zstd", "bz2")
 _FRAMES = {b"\x28\xb5\x2f\xfd": "zstd", b"\x04\x22\x4d\x18": "lz4"}
 
@@ -100,8 +102,14 @@ def open_chunk(file: McapFile, row: int) -> Chunk | None:
         file.lost("chunk", f"{where} was left out: its head is damaged{file.held(row)}")
         return None
     packed = file.data[head.body : head.body + head.packed]
-    if cut:
+    if cut and head.size <= MAX_CHUNK:
         return _beginning(file, where, head, packed, "is cut off by the end of the file")
+    file.expanded += min(head.size, MAX_CHUNK)
+    if file.expanded > _MOST_BYTES + _MOST_TIMES * len(file.data):
+        file.lost(
+            "size", f"{where} was left out: the chunks before it expand to more than {_MOST_TIMES} times the file"
+        )
+        return None
     reason = ""
     for size in _sizes(file, start, head, packed):
         try:
@@ -112,7 +120,7 @@ def open_chunk(file: McapFile, row: int) -> Chunk | None:
         if size != head.size:
             file.lost("size", f"{where} states {head.size} bytes, but holds {size}")
         if not head.crc:
-            file.bare = True
+            file.bare = file.bare or bool(len(data))
             return Chunk(data, _runs(file, where, data), False)
         differs = zlib.crc32(data.data) ^ head.crc
         if differs.bit_count() == 1:
@@ -123,24 +131,25 @@ def open_chunk(file: McapFile, row: int) -> Chunk | None:
     return _in_part(file, row, where, head, packed, reason)
 
 
-def _sizes(file: McapFile, start: int, head: _Head, packed: NDArray[np.uint8]) -> list[int]:
-    """Full sizes that a chunk may have: as its head, the summary and its frame say."""
-    sizes, summary = [head.size], file.summary
+def _sizes(file: McapFile, start: int, head: _Head, packed: NDArray[np.uint8]) -> Iterator[int]:
+    """Full sizes that a chunk may have, the likeliest first: as its head, the summary and its frame say."""
+    yield head.size
+    others, summary = [], file.summary
     if summary is not None and len(summary.chunks):
         row = int(np.searchsorted(summary.chunks[:, 2], start))
         if row < len(summary.chunks) and summary.chunks[row, 2] == start:
-            sizes.append(int(summary.chunks[row, 6]))
+            others.append(int(summary.chunks[row, 6]))
     first = packed[:_FRAME_HEAD].tobytes()
     try:
         if head.compression == "zstd":
-            sizes.append(int(zstandard.get_frame_parameters(first).content_size))
+            others.append(int(zstandard.get_frame_parameters(first).content_size))
         elif head.compression == "lz4":
-            sizes.append(int(lz4.frame.get_frame_info(first)["content_size"]))
+            others.append(int(lz4.frame.get_frame_info(first)["content_size"]))
         else:
-            sizes.append(len(packed))
+            others.append(len(packed))
     except (zstandard.ZstdError, RuntimeError, ValueError):
         pass
-    return [s for s in dict.fromkeys(sizes) if 0 < s <= MAX_CHUNK or s == head.size]
+    yield from (s for s in dict.fromkeys(others) if 0 < s <= MAX_CHUNK and s != head.size)
 
 
 def take_names(file: McapFile, row: int, chunk: Chunk) -> None:
@@ -187,7 +196,7 @@ def _open_for_names(file: McapFile, row: int) -> None:
 
 def _in_part(file: McapFile, row: int, where: str, head: _Head, packed: NDArray[np.uint8], reason: str) -> Chunk | None:
     """Take the beginning of a damaged chunk where it can be believed."""
-    if not head.crc and head.compression in ("lz4", "zstd"):
+    if not head.crc and head.compression in ("lz4", "zstd") and head.size <= MAX_CHUNK:
         return _beginning(file, where, head, packed, f"is damaged ({reason})")
     if head.compression in ("lz4", "zstd") and len(packed) > _ZEROS and not packed[-_ZEROS:].any():
         kept = packed[: int(np.flatnonzero(packed)[-1]) + 1] if packed.any() else packed[:0]
@@ -198,7 +207,7 @@ def _in_part(file: McapFile, row: int, where: str, head: _Head, packed: NDArray[
 
 def _beginning(file: McapFile, where: str, head: _Head, packed: NDArray[np.uint8], reason: str) -> Chunk:
     """Take the complete messages that the beginning of a chunk holds."""
-    data = _expand_beginning(head.compression, packed, min(head.size, MAX_CHUNK))
+    data = _expand_beginning(head.compression, packed, head.size)
     runs = _runs(file, where, data, cut=True)
     count = sum(int(file.scanner.census(data, *run).counts.sum()) for run in runs)
     file.bare = True
@@ -208,14 +217,11 @@ def _beginning(file: McapFile, where: str, head: _Head, packed: NDArray[np.uint8
 
 def _runs(file: McapFile, where: str, data: NDArray[np.uint8], cut: bool = False) -> list[tuple[int, int]]:
     """Stretches of complete records in bytes that no checksum covers."""
-    rows = scan.walk(data, 0, len(data), file.names.named.copy(), scan.Tally()).rows
+    rows = scan.walk(data, 0, len(data), file.names.named.copy(), scan.Tally(), inside=True).rows
     runs: list[tuple[int, int]] = []
-    for op, start, stop, flag in rows.tolist():
-        if op == fmt.MESSAGE or (op in (fmt.SCHEMA, fmt.CHANNEL) and flag == fmt.SOUND):
-            if runs and runs[-1][1] == start:
-                runs[-1] = (runs[-1][0], stop)
-            else:
-                runs.append((start, stop))
+    for op, start, stop, _ in rows.tolist():
+        if op == fmt.MESSAGE:
+            runs.append((start, stop))
         elif not (cut and stop == len(data)):
             file.lost("bytes", f"{where}: its bytes {start} to {stop} hold no message and were left out")
     return runs

@@ -46,10 +46,12 @@ class McapFile:
         Whether the whole file was walked, not only the summary.
     data_end : tuple[int, int]
         Place of the record that ends the data, −1 where none was met, and the checksum it states.
-    unknown : list[tuple[int, int]]
-        Opcode and place of records of unknown type.
+    unknown : list[tuple[int, int, int]]
+        Opcode, place and number of records of unknown type.
     bare : bool
         Whether messages were met that no checksum covers.
+    expanded : int
+        Bytes that chunks expanded to so far.
     read_whole, read_topics : bool, frozenset[str] or None
         Whether all of its time was read, and which topics (None: all).
     loose, found : Tally
@@ -70,8 +72,9 @@ class McapFile:
     metadata: dict[str, str] = field(default_factory=dict)
     metadata_count: int = 0
     attachments: list[AttachmentInfo] = field(default_factory=list)
-    unknown: list[tuple[int, int]] = field(default_factory=list)
+    unknown: list[tuple[int, int, int]] = field(default_factory=list)
     bare: bool = False
+    expanded: int = 0
     read_whole: bool = False
     read_topics: frozenset[str] | None = None
     loose: scan.Tally = field(default_factory=scan.Tally)
@@ -79,6 +82,7 @@ class McapFile:
     inflater: Inflater = field(default_factory=Inflater)
     scanner: scan.Scanner = field(default_factory=scan.Scanner)
     _said: Counter[str] = field(default_factory=Counter)
+    _texts: set[str] = field(default_factory=set)
 
     def __post_init__(self) -> None:
         self.names = Names(self.lost)
@@ -89,7 +93,10 @@ class McapFile:
         return None if self.summary is None else self.summary.statistics
 
     def lost(self, kind: str, text: str) -> None:
-        """Report a loss; beyond a few of one kind they are only counted."""
+        """Report a loss once; beyond a few of one kind they are only counted."""
+        if text in self._texts:
+            return
+        self._texts.add(text)
         self._said[kind] += 1
         if self._said[kind] <= _SAME_KIND:
             self.report.lost(f"{self.path.name}: {text}")
@@ -100,10 +107,11 @@ class McapFile:
             if count > _SAME_KIND:
                 self.report.lost(f"{self.path.name}: {count - _SAME_KIND} more losses of the same kind ({kind})")
         self._said.clear()
+        self._texts.clear()
 
     def held(self, row: int) -> str:
         """Say what the indexes say about a chunk's messages."""
-        mine = self.indexes[self.indexes[:, 0] == row]
+        mine = self.indexes[slice(*np.searchsorted(self.indexes[:, 0], (row, row + 1)))]
         parts = [f"{n} of {self.names.topic(int(c))}" for _, c, n in mine.tolist() if n > 0]
         return (
             f"; by its index it held {', '.join(parts[:6])}{' and others' if len(parts) > 6 else ''}" if parts else ""

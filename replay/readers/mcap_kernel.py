@@ -213,9 +213,10 @@ def _cut(data, at, stop):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def scan_walk(data, at, stop, named, rows, counts, bounds, state):  # type: ignore[no-untyped-def]
+def scan_walk(data, at, stop, inside, named, rows, counts, bounds, state):  # type: ignore[no-untyped-def]
     """Fill rows until they are full or the bytes end.
 
+    inside: whether these are the records of a chunk, so that names may stand among messages and nothing else is wanted.
     state: end and flag of the record ahead, whether chunks are compressed, and whether the walk has just resumed.
 
     counts, bounds: messages per channel outside chunks, and the lowest and highest log stamp of them.
@@ -269,16 +270,17 @@ def scan_walk(data, at, stop, named, rows, counts, bounds, state):  # type: igno
             stamp = np.int64(_u64(data, at + 15))
             if stamp >= 0:
                 bounds[0], bounds[1] = min(bounds[0], stamp), max(bounds[1], stamp)
-            if n and rows[n - 1, 0] == MESSAGE and rows[n - 1, 2] == at:
-                rows[n - 1, 2] = end
-                rows[n - 1, 3] += 1
-                n -= 1
-            else:
-                rows[n, 0], rows[n, 1], rows[n, 2], rows[n, 3] = op, at, end, 1
+        elif op == MESSAGE:
+            op = np.int64(SHORT + MESSAGE)
+        elif inside:
+            op = np.int64(MESSAGE if op in (SCHEMA, CHANNEL) and flag == SOUND else SHORT)
+        many = op == MESSAGE or op > DATA_END
+        if many and n and rows[n - 1, 0] == op and rows[n - 1, 2] == at:
+            n -= 1
+            rows[n, 2] = end
+            rows[n, 3] += 1
         else:
-            if op == MESSAGE:
-                op = np.int64(SHORT + MESSAGE)
-            rows[n, 0], rows[n, 1], rows[n, 2], rows[n, 3] = op, at, end, flag
+            rows[n, 0], rows[n, 1], rows[n, 2], rows[n, 3] = op, at, end, 1 if many else flag
         n += 1
         at, end, flag = end, after, after_flag
         if ended:

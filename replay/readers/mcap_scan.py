@@ -29,7 +29,7 @@ class Walk(NamedTuple):
     ----------
     rows : NDArray[np.int64], shape (n, 4)
         Opcode, first byte, byte behind the last, and `SOUND` or `MENDED` (its opcode or one of its lengths was wrong);
-        for a run of messages the number of them. `HOLE` rows hold no complete record.
+        for runs of messages and of records of unknown type their number. `HOLE` rows hold no complete record.
     end : int
         Where the walk ended: behind the footer, or at the end of the bytes.
     """
@@ -46,7 +46,9 @@ class Tally:
         self.bounds = np.array([2**63 - 1, -1], np.int64)
 
 
-def walk(data: NDArray[np.uint8], start: int, stop: int, named: NDArray[np.uint8], tally: Tally) -> Walk:
+def walk(
+    data: NDArray[np.uint8], start: int, stop: int, named: NDArray[np.uint8], tally: Tally, inside: bool = False
+) -> Walk:
     """Walk the records from `start` to `stop`, or to a footer; every byte stands in exactly one row.
 
     Parameters
@@ -59,12 +61,14 @@ def walk(data: NDArray[np.uint8], start: int, stop: int, named: NDArray[np.uint8
         1 for channels that are known; those met are added.
     tally : Tally
         Takes the messages met.
+    inside : bool
+        Whether these are the records of a chunk: names among messages belong to their runs.
     """
     at, state = start, np.zeros(4, np.int64)
     parts: list[NDArray[np.int64]] = []
     while at < stop:
         rows = np.empty((_ROOM, 4), np.int64)
-        n, at = scan_walk(data, at, stop, named, rows, tally.counts, tally.bounds, state)
+        n, at = scan_walk(data, at, stop, inside, named, rows, tally.counts, tally.bounds, state)
         parts.append(rows[:n])
         if n and rows[n - 1, 0] == FOOTER and rows[n - 1, 3] == SOUND:
             break

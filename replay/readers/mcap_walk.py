@@ -15,6 +15,8 @@ from replay.readers.mcap_file import McapFile
 from replay.readers.mcap_records import BAD_RECORD, DataEnd, Header, Metadata, parse
 from replay.readers.mcap_summary import Summary, read_summary, summary_from
 
+_MOST_RECORDS = 1 << 20
+
 
 def walk_file(file: McapFile) -> None:
     """Walk the whole file, where that was not yet done, and hold what was found against the summary."""
@@ -68,7 +70,7 @@ def _say_ending(file: McapFile, rows: NDArray[np.int64], closed: bool) -> None:
     where = "after the data" if (rows[:, 0] == fmt.DATA_END).any() else "while data were written"
     file.report.lost(
         f"{file.path.name} ends without a footer ({where}): {len(file.data) - last} bytes after byte {last} "
-        "hold no complete record and were left out"
+        "hold no complete record"
     )
 
 
@@ -80,12 +82,17 @@ def _take_rows(file: McapFile, rows: NDArray[np.int64], closed: bool) -> None:
     for _, start, _, _ in chunk[chunk[:, 3] == fmt.MENDED].tolist():
         file.lost("mended", f"the opcode or a length of the chunk at byte {start} was damaged; its content told it")
     plain = ~np.isin(op, (fmt.MESSAGE, fmt.CHUNK, fmt.MESSAGE_INDEX))
-    for code, start, stop, _ in rows[plain].tolist():
+    few = rows[plain]
+    if len(few) > _MOST_RECORDS:
+        file.lost(
+            "record", f"{len(few) - _MOST_RECORDS} records behind byte {few[_MOST_RECORDS, 1]} were left out: too many"
+        )
+    for code, start, stop, count in few[:_MOST_RECORDS].tolist():
         if code == fmt.HOLE:
             if closed or stop < len(file.data):
                 file.lost("bytes", f"bytes {start} to {stop} hold no complete record and were left out")
         elif code > fmt.DATA_END:
-            file.unknown.append((code, start))
+            file.unknown.append((code, start, count))
         elif code in (fmt.SCHEMA, fmt.CHANNEL):
             file.names.take(code, file.data[start + 9 : stop].tobytes(), False, f"at byte {start}")
         else:

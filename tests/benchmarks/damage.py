@@ -52,9 +52,12 @@ FILES: dict[str, dict[str, Any]] = {
     "zstd without checksums": {"compression": CompressionType.ZSTD, "enable_crcs": False},
     "none without checksums": {"compression": CompressionType.NONE, "enable_crcs": False},
     "unchunked, data checksum": {"use_chunking": False, "enable_data_crcs": True},
+    "zstd, one chunk": {"compression": CompressionType.ZSTD, "chunk_size": 1 << 30},
+    "lz4, one chunk": {"compression": CompressionType.LZ4, "chunk_size": 1 << 30},
     "unchunked": {"use_chunking": False, "enable_crcs": False, "use_statistics": False, "index_types": IndexType.NONE},
 }  # fmt: skip
-CHECKED = ("zstd", "lz4", "none", "zstd unindexed", "unchunked, data checksum")
+LONG = ("zstd, one chunk", "lz4, one chunk")  # of more messages, fewer of them damaged
+CHECKED = (*LONG, "zstd", "lz4", "none", "zstd unindexed", "unchunked, data checksum")
 Row = tuple[str, int, int, bytes]
 
 
@@ -62,7 +65,7 @@ def build(path: Path, options: dict[str, Any], count: int) -> Counter[Row]:
     """Write a file and return its messages."""
     rng, rows = np.random.default_rng(5), []
     with path.open("wb") as file:
-        writer = Writer(file, chunk_size=4000, **options)
+        writer = Writer(file, **{"chunk_size": 4000, **options})
         writer.start("ros2", "benchmark")
         channels = []
         for topic, kind, _ in TOPICS:
@@ -289,11 +292,12 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "log.mcap"
         for k, (name, options) in enumerate(FILES.items()):
-            truth = build(path, options, choice.messages)
+            times = 16 if name in LONG else 1
+            truth = build(path, options, choice.messages * times)
             raw = path.read_bytes()
             kinds: dict[str, dict[str, Score]] = {}
             foreign: Counter[str] = Counter()
-            cases = list(mutations(raw, choice.cuts // share, choice.flips // share, choice.seed + k))
+            cases = list(mutations(raw, choice.cuts // share, choice.flips // share // times, choice.seed + k))
             for i, (what, content) in enumerate(cases):
                 path.write_bytes(content)
                 judge(path, name, what, truth, kinds.setdefault(what.split()[0], {}))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import struct
+import tracemalloc
 import zlib
 from collections import Counter
 from collections.abc import Callable, Iterator
@@ -11,10 +12,11 @@ from typing import Any
 
 import numpy as np
 import pytest
+import zstandard
 from mcap.writer import CompressionType, IndexType, Writer
 
 from replay.errors import LogError
-from replay.readers import mcap
+from replay.readers import mcap, mcap_chunk
 from replay.readers.clocks import Report
 from replay.readers.registry import read_log, summarise_log
 from replay.sources import SourceOptions
@@ -308,6 +310,29 @@ def test_sizes_beyond_reason_are_refused(tmp_path: Path) -> None:
         path.write_bytes(b"\x89MCAP0\r\n" + record * 3)
         with pytest.raises(LogError, match="without a channel or message"):
             read_log(path, OPTIONS)
+
+
+@pytest.mark.parametrize("record", [b"\x80" + bytes(8), b"\x05" + bytes([30, *bytes(7)]) + bytes(30), bytes(9)])
+def test_a_flood_of_small_records_stays_small(tmp_path: Path, record: bytes) -> None:
+    path = tmp_path / "flood.mcap"
+    size = 16_000_000 // len(record) * len(record)
+    path.write_bytes(bomb(size, zstandard.compress(record * (size // len(record)))))
+    read_log(path, OPTIONS)  # loads compiled code
+    tracemalloc.start()
+    assert read_log(path, OPTIONS).summary.damage
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert peak < 3 * size
+
+
+def test_chunks_that_expand_without_end_are_left_out(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = tmp_path / "log.mcap"
+    write(path)
+    monkeypatch.setattr(mcap_chunk, "_MOST_BYTES", 10_000)
+    monkeypatch.setattr(mcap_chunk, "_MOST_TIMES", 0)
+    log = read_log(path, OPTIONS)
+    assert 0 < len(log.channels[f"{FAST}.data"].values) < COUNT
+    assert any("expand to more than" in d for d in log.summary.damage)
 
 
 def mutations(raw: bytes, seed: int) -> Iterator[bytes]:
