@@ -12,8 +12,9 @@ from replay.errors import LogError
 from replay.rawlog import Clock, LogSummary, RawLog, TopicInfo, Window
 from replay.readers.assemble import Assembler, Block, Connection
 from replay.readers.clocks import Report
-from replay.readers.sqlite_file import SqliteError, open_image
+from replay.readers.sqlite_file import open_image
 from replay.readers.sqlite_rows import Database, Rows, open_database
+from replay.readers.sqlite_wal import SqliteError
 from replay.readers.unpack import unpacked
 
 _SMALLEST_ROW = 16
