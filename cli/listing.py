@@ -36,7 +36,7 @@ def inspect_parts(report: InspectReport) -> list[RenderableType]:
         Text.assemble(text(report.source, "bold"), "  ", text(report.format), ", ", text(_when(report)))
     ]
     if report.damage:
-        parts += [_degraded(report), bullets(report.damage, "red")]
+        parts += [_degraded(report), bullets(report.damage, "red"), ""]
     parts.append(_topics(report) if report.topics else text("It holds no topics."))
     unusual = [f"{t.name}: {words}" for t in report.topics if (words := _unusual(t))]
     stored = _stored(report)

@@ -110,7 +110,9 @@ def _integrity(summary: LogSummary, depth: Depth) -> str:
     kind = summary.metadata.get("integrity", "")
     if kind == "unverifiable" or _is_table(summary) or not kind:
         return "not every part has a checksum; damage there cannot be noticed"
-    return "checksums, all read and right" if depth == "full" and not summary.damage else "checksums"
+    if summary.damage:
+        return "checksums; not all of the log is there or right"
+    return "checksums, all read and right" if depth == "full" else "checksums; the data were not read"
 
 
 def _size(path: Path) -> int:

@@ -219,7 +219,7 @@ STATES = st.recursive(
 ).map(lambda fields: STATE(**fields))
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=80, deadline=None)
 @given(st.lists(STATES, min_size=1, max_size=6))
 def test_columns_are_the_oracles_numbers(states: list[Any]) -> None:
     outcome = Outcome()
@@ -249,7 +249,7 @@ def damaged(draw: st.DrawFn) -> bytes:
     return bytes(raw)
 
 
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=150, deadline=None)
 @given(st.lists(damaged(), min_size=1, max_size=4), st.sampled_from(["robot.State", "old.State"]))
 def test_damaged_payloads_give_the_oracles_numbers_or_none(payloads: list[bytes], name: str) -> None:
     outcome = Outcome()
@@ -426,3 +426,18 @@ def test_places_outside_the_data_are_refused() -> None:
     places = np.array([-1, 0, 3]), np.array([5, len(raw) + 1, -1])
     assert list(decoder.decode(np.frombuffer(raw, np.uint8), *places)) == []
     assert outcome.bad == 3
+
+
+def test_columns_that_outgrow_memory_are_the_same(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    states = [STATE(d=i, position=[i, 2], packed=[1] * (i // 500), maybe=i if i % 3 else None) for i in range(1000)]
+    payloads = [s.SerializeToString() for s in states]
+    path = _log(tmp_path / "a.mcap", "robot.State", DESCRIPTORS.SerializeToString(), payloads)
+    whole = McapReader().read(path, SourceOptions())
+    assert whole.channels["/state.maybe"].values.tolist() == [float(i) for i in range(1000) if i % 3]
+    assert whole.channels["/state.packed[0]"].stamps.tolist() == whole.channels["/state.d"].stamps.tolist()[500:]
+    monkeypatch.setattr("replay.readers.assemble.MEMORY", 0)
+    spilled = McapReader().read(path, SourceOptions())
+    assert spilled.channels.keys() == whole.channels.keys()
+    for name, channel in whole.channels.items():
+        np.testing.assert_array_equal(spilled.channels[name].values, channel.values)
+        np.testing.assert_array_equal(spilled.channels[name].stamps, channel.stamps)
