@@ -13,7 +13,8 @@ from replay.rawlog import Channel, Clock, LogSummary, RawLog
 from replay.readers import cdr, jsonmsg, protobuf
 from replay.readers.clocks import Clocks, Report
 from replay.readers.definitions import DefinitionError, MessageType, resolve
-from replay.readers.growing import Budget, Cells, Store, Table
+from replay.readers.grids import Budget, Cells, Table
+from replay.readers.growing import Store
 from replay.readers.layout import MAX_ELEMENTS
 from replay.readers.program import Spec
 from replay.readers.protobuf_schema import Schema, schema_of

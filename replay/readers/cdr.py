@@ -14,8 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from replay.readers.definitions import MessageType
+from replay.readers.dialect import LayoutError, width_of
 from replay.readers.growing import FREE, Part, Store
-from replay.readers.layout import MAX_ELEMENTS, Layout, LayoutError, Place, layout_of, width_of
+from replay.readers.layout import MAX_ELEMENTS, Layout, layout_of
+from replay.readers.places import Place
 from replay.readers.program import Compiler, Program, Spec, TooWide
 
 __all__ = ["Decoder", "Outcome", "Part"]

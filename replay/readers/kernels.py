@@ -170,7 +170,7 @@ def take_program(  # type: ignore[no-untyped-def]
                 state = 2
                 break
             count = np.int64(0)
-            if op == COUNT or op == SEQUENCE or op == STRINGS or op == LOOP or ((op == MUTES or op == MUTE) and b < 0):
+            if op in (COUNT, SEQUENCE, STRINGS, LOOP) or (op in (MUTES, MUTE) and b < 0):
                 if biggest:
                     pos = base + ((pos - base + 3) & ~3)
                 if pos + 4 > end:
@@ -178,7 +178,7 @@ def take_program(  # type: ignore[no-untyped-def]
                     break
                 count = np.int64(_turn4(b4[pos]) if swap else b4[pos])
                 pos += 4
-            if op == NUMBERS or op == SEQUENCE or op == MUTES:
+            if op in (NUMBERS, SEQUENCE, MUTES):
                 many = count
                 if op == NUMBERS:
                     many = c
@@ -249,7 +249,7 @@ def take_program(  # type: ignore[no-untyped-def]
                     if b1[pos + 4 + k] != names[a + k]:
                         state = 1
                 pos = after
-            elif op == LOOP or op == MUTE:
+            elif op in (LOOP, MUTE):
                 if op == MUTE and b >= 0:
                     count = b
                 elif (op == MUTE and count < c) or (op == LOOP and count > c and count <= MAX_ELEMENTS):

@@ -2,109 +2,23 @@
 
 from __future__ import annotations
 
-import re
 import struct
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 from rosbags.interfaces import Nodetype
 
 from replay.readers.definitions import MAX_DEPTH, TIME, MessageType
+from replay.readers.dialect import Dialect, Field, LayoutError, dialect_of, is_number, type_of, width_of
+from replay.readers.names import is_key_list
+from replay.readers.places import Index, Path, Place, Scope, place_of, text_of
 
 MAX_ELEMENTS = 64
 MAX_STEPS = 50_000
-
-_DTYPES = {
-    "bool": "?",
-    "byte": "u1",
-    "octet": "u1",
-    "char": "u1",
-    "int8": "i1",
-    "uint8": "u1",
-    "int16": "i2",
-    "uint16": "u2",
-    "int32": "i4",
-    "uint32": "u4",
-    "float32": "f4",
-    "int64": "i8",
-    "uint64": "u8",
-    "float64": "f8",
-}
-KEYS = re.compile(r"(^|_)(names?|joints?|labels?|symbols?|keys?)$|Names?$|Symbols?$", re.ASCII)
 PLACEHOLDER = "structure_needs_at_least_one_member"
-
-
-Field: TypeAlias = tuple[Any, Any]
-Place: TypeAlias = tuple[str | int, ...]
-
-
-class LayoutError(Exception):
-    """A payload does not fit its definition; the text says where."""
-
-
-@dataclass(frozen=True)
-class Dialect:
-    """A serialisation.
-
-    Attributes
-    ----------
-    head : bytes
-        First bytes of every payload; none in ROS 1.
-    order : str
-        Byte order as NumPy writes it.
-    align : int
-        Largest alignment, counted from behind the four bytes of the encapsulation; 0 where nothing is aligned.
-    boxed : bool
-        Whether collections of strings and messages start with their size in bytes (XCDR2).
-    slack : int
-        Padding that may follow the last field [bytes].
-    """
-
-    head: bytes
-    order: str
-    align: int
-    boxed: bool
-    slack: int
-
-    @property
-    def base(self) -> int:
-        """Where the first field stands."""
-        return 4 if self.head else 0
-
-
-ROS1 = Dialect(b"", "<", 0, False, 0)
-# encapsulations of plain CDR (XCDR1) and plain CDR2 (XCDR2); what their types' definitions do not tell is not here
-_CDR = {
-    b"\0\0": Dialect(b"\0\0", ">", 8, False, 3),
-    b"\0\1": Dialect(b"\0\1", "<", 8, False, 3),
-    b"\0\6": Dialect(b"\0\6", ">", 4, True, 3),
-    b"\0\7": Dialect(b"\0\7", "<", 4, True, 3),
-}
-
-
-def dialect_of(payload: bytes, ros1: bool) -> Dialect:
-    """Tell a payload's serialisation.
-
-    Raises
-    ------
-    LayoutError
-        Where it is none that can be decoded.
-    """
-    if ros1:
-        return ROS1
-    if len(payload) < 4:
-        raise LayoutError(f"a payload of {len(payload)} bytes has no encapsulation header")
-    found = _CDR.get(payload[:2])
-    if found is None:
-        raise LayoutError(
-            f"encapsulation {payload[:2].hex()} is not plain CDR (0000, 0001) or plain CDR2 (0006, 0007); record with "
-            "final types, as ROS 2 does"
-        )
-    return found
 
 
 @dataclass(frozen=True)
@@ -173,41 +87,6 @@ class Layout:
         cells = at_words[:, None] + np.arange(8)
         masks, words = (np.ascontiguousarray(a[cells]).view(np.uint64)[:, 0] for a in (mask, whole))
         return at_words, masks, words
-
-
-@dataclass
-class Scope:
-    """Arrays of names inside one message, which key the arrays beside them."""
-
-    parent: Scope | None
-    keys: list[tuple[bool, list[str]]] = field(default_factory=list)
-
-    def add(self, fixed: bool, raw: tuple[bytes, ...]) -> None:
-        """Take an array of names; `fixed` where its length is part of the definition."""
-        self.keys.append((fixed, [r.rstrip(b"\0").decode("utf-8", "replace").strip() for r in raw]))
-
-
-@dataclass(frozen=True)
-class Index:
-    """One element of an array; arrays of one length and kind share names."""
-
-    number: int
-    length: int
-    fixed: bool
-    scope: Scope
-
-    def label(self) -> str:
-        """Return the element's name in brackets, or its number where none names it."""
-        scope: Scope | None = self.scope
-        while scope is not None:
-            for fixed, names in scope.keys:
-                if fixed == self.fixed and len(names) == self.length and len(set(names)) == len(names) and all(names):
-                    return f"[{names[self.number]}]"
-            scope = scope.parent
-        return f"[{self.number}]"
-
-
-Path: TypeAlias = tuple[str | Index, ...]
 
 
 class _Walk:
@@ -349,7 +228,7 @@ class _Walk:
         )
 
     def strings(self, path: Path, count: int, fixed: bool, scope: Scope) -> None:
-        keys = KEYS.search(str(path[-1])) is not None and count <= MAX_ELEMENTS
+        keys = is_key_list(str(path[-1])) and count <= MAX_ELEMENTS
         names = []
         for _ in range(count):
             at, length = self.string()
@@ -359,34 +238,6 @@ class _Walk:
         if names:
             self.names[place_of(path)] = tuple(names)
             scope.add(fixed, tuple(names))
-
-
-def is_number(kind: Field) -> bool:
-    """Whether a field is one number."""
-    return bool(kind[0] == Nodetype.BASE and kind[1][0] != "string")
-
-
-def width_of(dtype: str) -> int:
-    """Bytes that a number type takes."""
-    return 1 if dtype == "?" else int(dtype[1])
-
-
-def type_of(name: str) -> str:
-    """Return the number type of a primitive; raises `LayoutError` for those that are none."""
-    if name not in _DTYPES:
-        raise LayoutError(f"fields of type {name} are not supported")
-    return _DTYPES[name]
-
-
-def place_of(path: Path) -> Place:
-    """Return a path with plain numbers."""
-    return tuple(p.number if isinstance(p, Index) else p for p in path)
-
-
-def text_of(path: Path) -> str:
-    """Return a path as users write it."""
-    parts = [p.label() if isinstance(p, Index) else f".{p}" for p in path]
-    return "".join(parts).removeprefix(".")
 
 
 def layout_of(kind: MessageType, payload: bytes) -> Layout:

@@ -15,23 +15,10 @@ from numpy.typing import NDArray
 from rosbags.interfaces import Nodetype
 
 from replay.readers.definitions import TIME, MessageType
-from replay.readers.layout import (
-    KEYS,
-    MAX_ELEMENTS,
-    PLACEHOLDER,
-    Dialect,
-    Field,
-    Index,
-    Layout,
-    Path,
-    Place,
-    Scope,
-    is_number,
-    place_of,
-    text_of,
-    type_of,
-    width_of,
-)  # fmt: skip
+from replay.readers.dialect import Dialect, Field, is_number, type_of, width_of
+from replay.readers.layout import MAX_ELEMENTS, PLACEHOLDER, Layout
+from replay.readers.names import is_key_list
+from replay.readers.places import Index, Path, Place, Scope, place_of, text_of
 
 # a number field n times: size, column, n
 NUMBERS = 0
@@ -135,6 +122,7 @@ class Compiler:
         return Program(ops, names, specs, (self.layout.dialect, *self.exact), self.layout.dialect)
 
     def column(self, path: Path, dtype: str, guard: tuple[str, int] | None = None) -> int:
+        """Add a column and return its number."""
         if len(self.specs) >= MAX_COLUMNS:
             raise TooWide
         self.specs.append((path, dtype, *(self.guard if guard is None else guard)))
@@ -170,10 +158,12 @@ class Compiler:
                 self.number((*path, label), type_of(value[0]), emit)
 
     def number(self, path: Path, dtype: str, emit: bool) -> None:
+        """Compile one number."""
         size = width_of(dtype)
         self.ops.append([NUMBERS, size, self.column(path, dtype), 1] if emit else [MUTES, size, 1])
 
     def array(self, path: Path, kind: Field, length: int, scope: Scope, emit: bool, loose: bool) -> None:
+        """Compile an array (`length` as defined) or a sequence (−1)."""
         fixed, counted = length >= 0, -1
         if not loose and not fixed:
             counted = self.layout.counts.get(place_of(path), -1)
@@ -211,7 +201,7 @@ class Compiler:
             if inner[0] == Nodetype.NAME:
                 if self.keyed(inner[1]):
                     return True
-            elif inner[1][0] == "string" and KEYS.search(label) and kind != Nodetype.BASE:
+            elif inner[1][0] == "string" and is_key_list(label) and kind != Nodetype.BASE:
                 return True
         return False
 
@@ -267,6 +257,7 @@ class Compiler:
             self.ops[at] = [MUTE, len(self.ops) - 1, length, fewest]
 
     def strings(self, path: Path, length: int, counted: int, scope: Scope, loose: bool) -> None:
+        """Compile an array of strings, which may be names."""
         names = None if loose else self.layout.names.get(place_of(path))
         if names is not None:
             scope.add(length >= 0, names)
@@ -278,10 +269,10 @@ class Compiler:
                 self.names += name
         elif length >= 0:
             self.ops += [[STRING]] * length
-        elif counted == 0 and KEYS.search(str(path[-1])):
+        elif counted == 0 and is_key_list(str(path[-1])):
             self.exact.append((place_of(path), ()))
             self.ops.append([COUNT, 0])
         else:
-            long = counted > MAX_ELEMENTS and KEYS.search(str(path[-1])) is not None
+            long = counted > MAX_ELEMENTS and is_key_list(str(path[-1]))
             self.exact += [(place_of(path), None)] if long else []
             self.ops.append([STRINGS, MAX_ELEMENTS + 1 if long else 0])

@@ -85,7 +85,8 @@ def flatten(store: Typestore, kind: str, message: Any, scopes: tuple[Any, ...] =
     out: dict[str, Any] = {}
     fields = store.fielddefs[kind][1]
     own = [getattr(message, n) for n, (k, _) in fields if KEY.match(n) and k == Nodetype.SEQUENCE]
-    scopes = (*[names for names in own if names], *scopes)
+    own = [[n.rstrip("\0").strip() for n in names] for names in own]
+    scopes = (*[names for names in own if names and all(names)], *scopes)
 
     def walk(path: str, desc: Any, value: Any) -> None:
         if desc[0] == Nodetype.NAME:
