@@ -94,12 +94,12 @@ class TextFile:
         """Return about how many bytes of a packed file its first `size` bytes of text take."""
         with self.path.open("rb") as file:
             unpack = self._unzip if self.packed == "gzip" else self._unzstd
-            held = 0
+            held = taken = 0
             for piece in unpack(file, Report()):
-                held += len(piece)
+                held, taken = held + len(piece), file.tell()
                 if held >= size:
                     break
-            return file.tell()
+            return taken
 
     def blocks(self, skip: int = 0) -> Iterator[bytes]:
         """Yield the bytes behind the first `skip`; zeros of blocks that were never written are told and taken out.

@@ -4,7 +4,7 @@ Tables are made once and kept in the folder: TwinCAT Scope exports in both defau
 decimal comma, a full header and groups of different lengths; the dialog's with a comma and a point), plain tables, packed
 ones, and Parquet. Each reading takes place after one that fills the caches; medians. Peers parse the same plain tables
 with one thread: pandas, polars and pyarrow; those that are not installed are left out. `--memory` adds the peak of a
-process that reads the table once, and what its columns take.
+process before and after it reads the table once (Linux), and what its columns take.
 """
 
 from __future__ import annotations
@@ -39,16 +39,17 @@ from replay.sources import SourceOptions  # noqa: E402
 
 KINDS = ("scope_tool", "scope_dialog", "plain", "comma", "short", "gzip", "zstd", "parquet")
 _ONE_RUN = """
-import resource, sys
-sys.path.insert(0, sys.argv[2])
+import re, sys
+sys.path.insert(0, sys.argv[3])
 from pathlib import Path
 from replay.readers.registry import read_log
 from replay.sources import SourceOptions
-before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+peak = lambda: int(re.search(r"VmHWM:\\s*(\\d+)", Path("/proc/self/status").read_text())[1]) / 1024
+read_log(Path(sys.argv[2]), SourceOptions())  # loads the compiled parser
+before = peak()
 log = read_log(Path(sys.argv[1]), SourceOptions())
-after = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
 seen = {id(a): a.nbytes for c in log.channels.values() for a in (c.stamps, c.values)}
-print(before / 1024, after / 1024, sum(seen.values()) / 2**20)
+print(before, peak(), sum(seen.values()) / 2**20)
 """
 
 
@@ -179,7 +180,8 @@ def main() -> None:
             row = {"table": kind, "what": what, "mb": round(size, 1), "cpu_s": round(cpu, 4), "wall_s": round(wall, 4)}
             print(json.dumps(row | {"mb_per_cpu_s": round(size / cpu)}), flush=True)
         if options.memory:
-            command = [sys.executable, "-c", _ONE_RUN, str(path), str(ROOT)]
+            small = make(options.folder, kind, 0.1)
+            command = [sys.executable, "-c", _ONE_RUN, str(path), str(small), str(ROOT)]
             said = subprocess.run(command, check=True, capture_output=True, text=True).stdout.split()
             names = ("before_mib", "peak_mib", "columns_mib")
             print(

@@ -263,11 +263,13 @@ def test_a_window_of_a_text_table(target: Path) -> None:
     assert read_log(target, SourceOptions(), window=(0, 0)).channels["v"].values.tolist() == []
 
 
-@pytest.mark.parametrize("packed", [False, True])
-def test_the_summary_reads_head_and_tail_only(tmp_path: Path, packed: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("packed", [None, gzip.compress, zstandard.compress])
+def test_the_summary_reads_head_and_tail_only(
+    tmp_path: Path, packed: Callable[[bytes], bytes] | None, monkeypatch: pytest.MonkeyPatch
+) -> None:
     path = tmp_path / "t.csv"
     raw = ("t,v,label\n" + "".join(f"{i / 10},{i * 7 % 11},x\n" for i in range(50_000))).encode()
-    path.write_bytes(gzip.compress(raw) if packed else raw)
+    path.write_bytes(packed(raw) if packed else raw)
     log, index = read(path), summarise_log(path, SourceOptions())
     assert (index.start_ns, index.stop_ns) == (log.summary.start_ns, log.summary.stop_ns)
     assert index.topics == log.summary.topics
