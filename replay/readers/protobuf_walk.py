@@ -11,6 +11,9 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
+from replay.readers.protobuf_schema import BYTES, DOUBLE, MESSAGE, STRING
+from replay.readers.protobuf_wire import add_hash, find, is_text, number_at, varint, wire_of
+
 MAX_DEPTH = 64
 MAX_CLEARED = 64
 OK, FULL, CUT, GROUP_FOUND, BAD_TAG, BAD_TEXT, TOO_DEEP, TOO_CHANGEABLE, TOO_MANY = range(9)
@@ -25,100 +28,6 @@ REASONS = (
     f"it replaces parts of itself more than {MAX_CLEARED} times",
     "it holds too many numbers",
 )
-_KIND_BYTES, _KIND_STRING, _KIND_MESSAGE, _KIND_GROUP = 14, 15, 16, 17
-
-
-@njit(cache=True)
-def _varint(data, at, stop, most):  # type: ignore[no-untyped-def]
-    """Value and the place behind it; place −1 where it is cut or longer than `most` bytes."""
-    if at < stop and data[at] < 128:
-        return np.uint64(data[at]), at + 1
-    value = np.uint64(0)
-    for i in range(most):
-        if at + i >= stop:
-            return value, -1
-        byte = np.uint64(data[at + i])
-        value |= (byte & np.uint64(127)) << np.uint64(7 * i)
-        if byte < 128:
-            return value, at + i + 1
-    return value, -1
-
-
-@njit(cache=True)
-def _is_text(data, at, stop):  # type: ignore[no-untyped-def]
-    """Whether bytes are UTF-8 without surrogates and overlong forms."""
-    while at < stop:
-        lead = data[at]
-        if lead < 0x80:
-            at += 1
-            continue
-        more = 1 if 0xC2 <= lead < 0xE0 else 2 if 0xE0 <= lead < 0xF0 else 3 if 0xF0 <= lead < 0xF5 else 0
-        if more == 0 or at + more >= stop:
-            return False
-        second = data[at + 1]
-        low, high = 0x80, 0xC0
-        if lead == 0xE0:
-            low = 0xA0
-        elif lead == 0xED:
-            high = 0xA0
-        elif lead == 0xF0:
-            low = 0x90
-        elif lead == 0xF4:
-            high = 0x90
-        if second < low or second >= high:
-            return False
-        for i in range(2, more + 1):
-            if data[at + i] & 0xC0 != 0x80:
-                return False
-        at += more + 1
-    return True
-
-
-@njit(cache=True)
-def _wire_of(kind):  # type: ignore[no-untyped-def]
-    """Wire type of a single value."""
-    if kind in (0, 5, 11):
-        return 1
-    if kind in (1, 6, 10):
-        return 5
-    if kind in (14, 15, 16):
-        return 2
-    if kind == 17:
-        return 3
-    return 0
-
-
-@njit(cache=True)
-def _find(number, low, high, code):  # type: ignore[no-untyped-def]
-    """Field of a type by its number on the wire; −1 for none."""
-    end = high
-    while low < end:
-        middle = (low + end) >> 1
-        if number[middle] < code:
-            low = middle + 1
-        else:
-            end = middle
-    return low if low < high and number[low] == code else -1
-
-
-@njit(cache=True)
-def _number(data, words, halves, at, stop, kind):  # type: ignore[no-untyped-def]
-    """One number as 64 bits, and the place behind it or −1."""
-    wire = _wire_of(kind)
-    if wire != 0:
-        width = 8 if wire == 1 else 4
-        if at + width > stop:
-            return np.uint64(0), -1
-        return words[at] if wire == 1 else np.uint64(halves[at]), at + width
-    value, after = _varint(data, at, stop, 10)
-    if kind == 7:
-        value = np.uint64(1) if value != 0 else np.uint64(0)
-    elif kind == 12:
-        value &= np.uint64(0xFFFFFFFF)
-        value = (value >> np.uint64(1)) ^ (np.uint64(0) - (value & np.uint64(1)))
-    elif kind == 13:
-        value = (value >> np.uint64(1)) ^ (np.uint64(0) - (value & np.uint64(1)))
-    return value, after
 
 
 @njit(cache=True)
@@ -168,15 +77,6 @@ def _clear(slot, row, used, places, slots, values, present):  # type: ignore[no-
             up = places[0, slots[0, up]]
         if up == slot:
             slots[4, other] = -1
-
-
-@njit(cache=True)
-def _add_hash(data, at, stop, place, row, values):  # type: ignore[no-untyped-def]
-    """Add one name to the hash of an array of names."""
-    mark = values[place, row] ^ np.uint64(0xCBF29CE484222325)
-    for i in range(at, stop):
-        mark = (mark ^ np.uint64(data[i])) * np.uint64(0x100000001B3)
-    values[place, row] = (mark ^ np.uint64(stop - at)) * np.uint64(0x100000001B3)
 
 
 @njit(cache=True)
@@ -258,7 +158,7 @@ def walk(  # type: ignore[no-untyped-def]
             if tag < 128:
                 at += 1
             else:
-                long, at = _varint(data, at, stop, 5)
+                long, at = varint(data, at, stop, 5)
                 tag = np.int64(long)
                 if at < 0:
                     state = CUT
@@ -273,23 +173,23 @@ def walk(  # type: ignore[no-untyped-def]
             low, high = first[types[depth]], first[types[depth] + 1]
             field = hints[depth]
             if field >= high or number[field] != code:
-                field = _find(number, low, high, code)
+                field = find(number, low, high, code)
             size = np.int64(0)
             if wire == 2:
                 if at < stop and data[at] < 128:
                     size = np.int64(data[at])
                     at += 1
                 else:
-                    long, at = _varint(data, at, stop, 5)
+                    long, at = varint(data, at, stop, 5)
                     size = np.int64(long)
                 if at < 0 or size > stop - at:
                     state = CUT
                     break
             kind = -1 if field < 0 else kinds[field]
-            packed = field >= 0 and wire == 2 and kind < _KIND_BYTES and flags[0, field]
-            if field < 0 or (_wire_of(kind) != wire and not packed):  # unknown: skipped
+            packed = field >= 0 and wire == 2 and kind < BYTES and flags[0, field]
+            if field < 0 or (wire_of(kind) != wire and not packed):  # unknown: skipped
                 if wire == 0:
-                    at = _varint(data, at, stop, 10)[1]
+                    at = varint(data, at, stop, 10)[1]
                 else:
                     at += size if wire == 2 else 8 if wire == 1 else 4
                 if at < 0 or at > stop:
@@ -299,7 +199,7 @@ def walk(  # type: ignore[no-untyped-def]
             hints[depth] = field if flags[0, field] else field + 1
             node = nodes[depth]
             slot = -1 if node < 0 or flags[4, field] else places[4, node] + field - low
-            if kind == _KIND_STRING and flags[2, field] and not _is_text(data, at, at + size):
+            if kind == STRING and flags[2, field] and not is_text(data, at, at + size):
                 state = BAD_TEXT
                 break
             if slot >= 0 and choice[field] >= 0:  # the last one of a oneof counts
@@ -314,7 +214,7 @@ def walk(  # type: ignore[no-untyped-def]
                 if cleared > MAX_CLEARED:
                     state = TOO_CHANGEABLE
                     break
-            if kind == _KIND_MESSAGE:
+            if kind == MESSAGE:
                 inner = -1
                 if slot >= 0 and flags[0, field]:
                     inner = _element(slot, visit, limit, used, places, slots, first, flags, target)
@@ -349,11 +249,11 @@ def walk(  # type: ignore[no-untyped-def]
                     first[target[field]],
                 )
                 continue
-            if kind >= _KIND_BYTES and not flags[3, field]:
+            if kind >= BYTES and not flags[3, field]:
                 at += size
                 continue
             if not flags[0, field]:
-                value, at = _number(data, words, halves, at, stop, kind)
+                value, at = number_at(data, words, halves, at, stop, kind)
                 if at < 0:
                     state = CUT
                     break
@@ -370,18 +270,18 @@ def walk(  # type: ignore[no-untyped-def]
             if slot >= 0 and slots[4, slot] == visit:
                 index, last = slots[6, slot], slots[5, slot]
             before = index
-            until = at + size if packed or kind == _KIND_STRING else stop
+            until = at + size if packed or kind == STRING else stop
             while True:
                 if packed and at == until:
                     break
-                if kind == _KIND_STRING:
+                if kind == STRING:
                     value, after = (np.uint64(at) << np.uint64(20)) | np.uint64(size if size < 1 << 20 else 0), until
                     if slot >= 0:
-                        _add_hash(data, at, until, slots[3, slot] + 1, row, values)
-                elif kind == 0 and at + 8 <= until:
+                        add_hash(data, at, until, slots[3, slot] + 1, row, values)
+                elif kind == DOUBLE and at + 8 <= until:
                     value, after = words[at], at + 8
                 else:
-                    value, after = _number(data, words, halves, at, until, kind)
+                    value, after = number_at(data, words, halves, at, until, kind)
                 if after < 0:
                     state = CUT
                     break
