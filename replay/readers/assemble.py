@@ -23,6 +23,7 @@ from replay.spill import in_blocks
 MEMORY = 512 << 20
 _SLOW_SHARE = 0.2
 _LOOK_EVERY = 16
+_MOST_ROWS = 1 << 14
 
 
 @dataclass(frozen=True)
@@ -119,6 +120,10 @@ class _Topic:
             return
         slots = _slots(blocks)
         count = sum(len(b.starts) for b in blocks)
+        if slots[0] is None and count > _MOST_ROWS:
+            for part in (slice(at, at + _MOST_ROWS) for at in range(0, count, _MOST_ROWS)):
+                self.add([_cut(blocks[0], part)])
+            return
         self.store.begin(count)
         for block, slot in zip(blocks, slots, strict=True):
             self._decode(block, slot)
@@ -274,7 +279,7 @@ class Assembler:
             (report.note if guessed else report.lost)(text)
         if outcome.slow > _SLOW_SHARE * max(topic.store.count, 1):
             report.note(
-                f"{label}: {outcome.slow} of {topic.store.count} messages change their names; decoded one by one"
+                f"{label}: {outcome.slow} of {topic.store.count} messages change their layout; decoded one by one"
             )
 
 
@@ -306,8 +311,12 @@ def _within_range(block: Block, report: Report) -> Block:
     if not late.any():
         return block
     report.lost(f"{block.connection.topic}: {late.sum()} messages with impossible log stamps were left out")
-    keep = ~late
-    publish = None if block.publish_ns is None else block.publish_ns[keep]
+    return _cut(block, ~late)
+
+
+def _cut(block: Block, kept: NDArray[np.bool_] | slice) -> Block:
+    """Return a block of some of its messages."""
+    publish = None if block.publish_ns is None else block.publish_ns[kept]
     return replace(
-        block, starts=block.starts[keep], lengths=block.lengths[keep], log_ns=block.log_ns[keep], publish_ns=publish
+        block, starts=block.starts[kept], lengths=block.lengths[kept], log_ns=block.log_ns[kept], publish_ns=publish
     )

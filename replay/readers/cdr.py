@@ -209,6 +209,8 @@ class Decoder:
             payload = batch.payload(row)
             layout = layout_of(self.kind, payload)
         except LayoutError as error:
+            if self.fixed and not self.walked and (known := self._compile(self.fixed[0].layout)):
+                return self._walked(known, batch)[1]  # tells damaged payloads without walking over each here
             self.outcome.bad += 1
             self.outcome.reason = self.outcome.reason or str(error)
             self.store.owner[batch.slots[row]] = _BAD
@@ -230,16 +232,22 @@ class Decoder:
                 return left
         return self._program(layout, payload, batch, row, left)
 
+    def _compile(self, layout: Layout) -> _Walked | None:
+        """Compile a program and put it before all others; None where there are too many or it would be too wide."""
+        if len(self.walked) >= MAX_PROGRAMS:
+            return None
+        try:
+            program = Compiler(self.kind, layout, self.room).run()
+        except TooWide:
+            return None
+        plan = _Walked(program, layout.skipped, self.store)
+        self.walked = [plan, *(w for w in self.walked if w.program.shape != program.shape)]
+        return plan
+
     def _program(self, layout: Layout, payload: bytes, batch: Batch, row: int, left: int) -> int:
         """Compile a program for a payload's shape and decode what follows it."""
-        try:
-            program = Compiler(self.kind, layout, self.room).run() if len(self.walked) < MAX_PROGRAMS else None
-        except TooWide:
-            program = None
-        if program is not None:
-            self.walked = [w for w in self.walked if w.program.shape != program.shape]
-            plan = _Walked(program, layout.skipped, self.store)
-            self.walked.insert(0, plan)
+        plan = self._compile(layout)
+        if plan is not None:
             left = self._walked(plan, batch)[1]
         if self.store.owner[batch.slots[row]] == FREE:  # slow fallback: shapes that hardly repeat
             self._single(layout, payload, int(batch.slots[row]))

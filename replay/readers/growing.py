@@ -63,7 +63,7 @@ class Store:
 
     def table(self, specs: Iterable[Spec]) -> Table:
         """Return the table of these columns."""
-        specs = tuple(specs)
+        specs = tuple(dict.fromkeys(specs))
         key = frozenset(specs)
         if key not in self.tables:
             expected = 0 if self.tables else self.expected
@@ -173,7 +173,7 @@ class Store:
             return None if len(values) == self.count else rows, values
         key = tuple(id(rows) for rows, _ in cells)
         if key not in joined:
-            every = np.concatenate([rows for rows, _ in cells if rows is not None])
+            every = np.concatenate([np.arange(self.count) if rows is None else rows for rows, _ in cells])
             order = None if np.all(every[1:] > every[:-1]) else np.argsort(every, kind="stable")
             joined[key] = None if len(every) == self.count else every if order is None else every[order], order
         rows, order = joined[key]
