@@ -6,7 +6,19 @@ import numpy as np
 from numba import njit
 
 from replay.readers.protobuf_schema import (
-    BOOL, BYTES, DOUBLE, FIXED32, FIXED64, FLOAT, GROUP, MESSAGE, SFIXED32, SFIXED64, SINT32, SINT64, STRING,
+    BOOL,
+    BYTES,
+    DOUBLE,
+    FIXED32,
+    FIXED64,
+    FLOAT,
+    GROUP,
+    MESSAGE,
+    SFIXED32,
+    SFIXED64,
+    SINT32,
+    SINT64,
+    STRING,
 )  # fmt: skip
 
 

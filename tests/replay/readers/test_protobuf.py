@@ -219,7 +219,7 @@ STATES = st.recursive(
 ).map(lambda fields: STATE(**fields))
 
 
-@settings(max_examples=80, deadline=None)
+@settings(max_examples=60, deadline=None)
 @given(st.lists(STATES, min_size=1, max_size=6))
 def test_columns_are_the_oracles_numbers(states: list[Any]) -> None:
     outcome = Outcome()
@@ -249,7 +249,7 @@ def damaged(draw: st.DrawFn) -> bytes:
     return bytes(raw)
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=100, deadline=None)
 @given(st.lists(damaged(), min_size=1, max_size=4), st.sampled_from(["robot.State", "old.State"]))
 def test_damaged_payloads_give_the_oracles_numbers_or_none(payloads: list[bytes], name: str) -> None:
     outcome = Outcome()
@@ -441,3 +441,20 @@ def test_columns_that_outgrow_memory_are_the_same(tmp_path: Path, monkeypatch: p
     for name, channel in whole.channels.items():
         np.testing.assert_array_equal(spilled.channels[name].values, channel.values)
         np.testing.assert_array_equal(spilled.channels[name].stamps, channel.stamps)
+
+
+def test_logs_of_the_usual_writer_are_read(tmp_path: Path) -> None:
+    writer = pytest.importorskip("mcap_protobuf.writer", reason="mcap-protobuf-support is not installed")
+    path = tmp_path / "a.mcap"
+    with path.open("wb") as file, writer.Writer(file) as out:
+        for i in range(50):
+            stamp = 1_760_000_000_000_000_000 + i * 10_000_000
+            message = STATE(
+                timestamp={"seconds": stamp // 10**9, "nanos": stamp % 10**9}, wheels=[{"speed": i, "tyre": {"bar": 2}}]
+            )
+            out.write_message("/wheels", message, log_time=stamp + 5, publish_time=stamp)
+    log = McapReader().read(path, SourceOptions())
+    assert log.channels["/wheels.wheels[0].speed"].values.tolist() == list(range(50))
+    assert log.channels["/wheels.wheels[0].tyre.bar"].stamps[1] == 1_760_000_000_010_000_000
+    assert log.channels["/wheels.d"].values.tolist() == [0.0] * 50
+    assert log.summary.damage == ()
