@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 DEFAULT_MACHINE = "paper defaults"
 _PART = re.compile(r"_\d+\.(db3|mcap)$", re.IGNORECASE)
-LOG_ENDINGS = (".mcap", ".bag", ".db3", ".csv", ".csv.gz", ".txt", ".parquet", ".svdx", ".tdms")
+LOG_ENDINGS = (".mcap", ".bag", ".db3", ".csv", ".csv.gz", ".csv.zst", ".txt", ".parquet", ".svdx", ".tdms")
 
 
 def machine_of(path: Path | None) -> tuple[Machine, str]:
