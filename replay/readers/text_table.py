@@ -157,8 +157,12 @@ def open_text(path: Path, options: SourceOptions, report: Report) -> TextTable:
     while head.startswith((b"#", b"\n", b"\r\n", b" \n"), at) and (stop := head.find(b"\n", at)) >= 0:
         skipped = head[at:stop] if head.startswith(b"#", at) else skipped
         at = stop + 1
+    stated = re.match(rb"sep=([^\r\n])\r?\n", head[at : at + 8])  # Excel's
+    at += stated.end() if stated else 0
     lines = [x for x in decoded(head[at : at + HEAD]).splitlines()[:50] if x.strip()]
-    separator = options.separator or (separator_of(lines) if len(lines) > 1 else None)
+    separator = options.separator or (decoded(stated[1]) if stated else None)
+    if separator is None and len(lines) > 1:
+        separator = separator_of(lines)
     if len(lines) < 2:
         shown = f": {lines[0][:120]!r}" if lines else ""
         raise LogError(

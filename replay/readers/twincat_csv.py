@@ -131,6 +131,11 @@ def _without_eof(scope: Scope, text: bytes, report: Report) -> bytes:
         torn = "" if rest.endswith(b"\n") else " and its last row left out"
         report.lost(f"{scope.file.path.name} does not end in EOF; the export was cut off{torn}")
         return rest[: rest.rfind(b"\n") + 1]
+    before, _, last = text.rpartition(b"\n")
+    mark = scope.dialect.separator.encode()
+    if last.strip() and last.count(mark) < before[before.rfind(b"\n") + 1 :].count(mark):
+        report.lost(f"{scope.file.path.name} ends in the middle of a row, which was left out")
+        return before + b"\n"
     return text
 
 

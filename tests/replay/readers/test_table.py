@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import gzip
+from collections.abc import Callable
 from datetime import datetime, timedelta, timezone
 from pathlib import Path
 
@@ -254,6 +255,14 @@ def test_dates_come_back(when: datetime, zone: int) -> None:
 )
 def test_what_is_no_date(text: str) -> None:
     assert iso_ns(np.frombuffer(text.encode(), np.uint8), 0, len(text)) == MISSING
+
+
+def test_letters_of_windows_and_the_separator_that_excel_states(target: Path) -> None:
+    target.write_bytes("sep=;\r\nt;Öldruck [bar];weiß\r\n0;1,5;2\r\n1;2,5;3\r\n".encode("cp1252"))
+    log = read(target)
+    assert [*log.channels] == ["Öldruck [bar]", "weiß"]
+    assert log.channels["Öldruck [bar]"].values.tolist() == [1.5, 2.5]
+    assert any("read as Windows-1252" in n for n in log.summary.notes)
 
 
 def test_a_window_of_a_text_table(target: Path) -> None:

@@ -376,6 +376,14 @@ def test_the_summary_comes_from_head_and_tail(target: Path) -> None:
     assert abs(index.topics[1].count - 1800) <= 2  # as if it went on to the end of the first group
 
 
+def test_a_last_row_of_the_dialog_dialect_that_was_cut_off(target: Path) -> None:
+    lines = [*HEAD, "Name,a,Name,b", "", "0,1.5,0,2.5", "1,2.5,1,3.5", "2,4.5,2"]
+    target.write_text("\n".join(lines))
+    log = read(target)
+    assert log.channels["a"].values.tolist() == [1.5, 2.5]
+    assert any("ends in the middle of a row" in d for d in log.summary.damage)
+
+
 def test_zeros_of_a_lost_tail_are_told(target: Path) -> None:
     raw = write(target, TOOL).read_bytes()
     target.write_bytes(raw[: raw.index(b"2\t2\tNaN")] + bytes(5000))
