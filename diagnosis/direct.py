@@ -24,6 +24,7 @@ from diagnosis.pairs import Pair, mode_model, neighbours, sample_status, timing_
 from diagnosis.result import Epsilon, Hypothesis, Sat
 from diagnosis.screen import screened
 from diagnosis.segments import Run, with_leads
+from diagnosis.steady import FLICKER_S, steadied
 from replay.envelope import bucket_of, envelope, in_buckets
 from replay.faults import FaultMode, Side, State
 from replay.machine import Limits
@@ -302,7 +303,9 @@ def _states(
     pair: Pair, x: Array, status: NDArray[np.int8], blind: NDArray[np.bool_], findings: list[Finding]
 ) -> NDArray[np.int8]:
     """State of every sample: faults, healthy where something moves, else not excited or no data."""
-    states = np.where(pair.quiet, CODE[State.NOT_EXCITED], CODE[State.HEALTHY]).astype(np.int8)
+    brief = round(FLICKER_S / pair.dt)
+    quiet = ~steadied(~pair.quiet, brief, brief)
+    states = np.where(quiet, CODE[State.NOT_EXCITED], CODE[State.HEALTHY]).astype(np.int8)
     known = np.isfinite(pair.y) & np.isfinite(pair.x)
     nothing = ~known & (status != modes.SILENT)
     states[nothing] = CODE[State.NO_DATA]

@@ -14,6 +14,7 @@ from diagnosis.assessment import CODE, Assessment, Finding
 from diagnosis.mode_path import first_lasting
 from diagnosis.modes import PAIR
 from diagnosis.noise import moving_sum, quick_noise, rounding_step, slow_mismatch, usual_distance, white_noise
+from diagnosis.steady import FLICKER_S, steadied
 from diagnosis.wheel_blocks import WheelBlocks, blocks_of, per_sample
 from diagnosis.wheel_findings import Run, judge, onset_sentence, refined
 from diagnosis.wheel_runs import runs_of
@@ -250,7 +251,9 @@ def _assessments(
     gains: bool,
     width: int,
 ) -> tuple[Assessment, Assessment]:
-    y, quiet, slip, size = data.y[:, i], data.quiet[:, i], data.slip[:, i], data.y.shape[0]
+    y, slip, size = data.y[:, i], data.slip[:, i], data.y.shape[0]
+    gap, least = (round(s / data.dt) for s in (FLICKER_S, FLICKER_S / 2))
+    quiet = steadied(np.ascontiguousarray(data.quiet[:, i]), gap, 1)
     sensor = [f for f in findings if f.side in (Side.SENSOR, Side.SENSOR_OR_ACTUATOR)]
     actuator = [f for f in findings if f.side in (Side.ACTUATOR, Side.SENSOR_OR_ACTUATOR)]
     base = np.where(quiet, CODE[State.NOT_EXCITED], CODE[State.HEALTHY]).astype(np.int8)
@@ -261,7 +264,7 @@ def _assessments(
     states_s[(opened[Side.SENSOR] | (not gains)) & (states_s == healthy)] = CODE[State.NOT_ASSESSED]
     if own.grip_most > 0:  # wheels in the air obey their own valves, not the body
         doubted = np.asarray(per_sample(done.fault[:, i] > _DOUBTED, width, size))
-        states_s[slip & doubted & (states_s == healthy)] = CODE[State.SLIP]
+        states_s[steadied(slip & doubted, gap, least) & (states_s == healthy)] = CODE[State.SLIP]
     states_a[(opened[Side.ACTUATOR] | (not gains)) & (states_a == healthy)] = CODE[State.NOT_ASSESSED]
     for f in sensor:
         states_s[f.start : f.stop] = CODE[State(f.mode.value)]
