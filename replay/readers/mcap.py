@@ -136,8 +136,7 @@ def _split(
         np.add.at(file.found.counts, census.channels, census.counts)
         file.found.bounds[0] = min(file.found.bounds[0], census.bounds[0])
         file.found.bounds[1] = max(file.found.bounds[1], census.bounds[1])
-        if census.unknown:
-            file.report.note(f"{file.path.name}: {census.unknown} records of unknown type {place} were left out")
+        file.strange += census.unknown
         known = {int(n): file.names.connection(int(n)) for n in census.channels}
         for n, count in zip(census.channels.tolist(), census.counts.tolist(), strict=True):
             if known[n] is None:
@@ -162,6 +161,7 @@ def blocks_of(file: McapFile, topics: Collection[str] | None, window: Window | N
     skipped = set() if topics is None and window is None else _skipped(file, topics, window)
     order: list[tuple[int, int, int]] = [(start, stop, -1) for start, stop in file.runs]
     order += [(int(c[0]), int(c[1]), i) for i, c in enumerate(file.chunks) if i not in skipped]
+    file.bare |= bool(file.runs)
     for start, stop, row in sorted(order):
         if row < 0:
             yield from _split(file, file.data, (start, stop), False, topics, window, f"at byte {start}")
@@ -221,6 +221,8 @@ def summary_of(files: list[McapFile], source: Path, name: str, report: Report) -
             metadata.setdefault(key, value)
         if file.bare:
             metadata["integrity"] = "unverifiable"
+        if file.strange:
+            report.note(f"{file.path.name}: {file.strange} records of unknown type in its chunks were left out")
         attachments += file.attachments
         file.say_rest()
     metadata.setdefault("integrity", "checksums")

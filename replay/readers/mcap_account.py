@@ -24,7 +24,8 @@ def expected(file: McapFile) -> tuple[dict[int, int], str]:
     stated = file.statistics
     if stated is not None and _consistent(file, stated):
         return {c: n for c, n in stated.channel_message_counts.items() if n}, "statistics count"
-    indexed = _sums(file.indexes[:, 1], file.indexes[:, 2])
+    heads = np.concatenate((file.indexes[:, 1:], file.orphans))
+    indexed = _sums(heads[:, 0], heads[:, 1])
     for channel in np.flatnonzero(file.loose.counts).tolist():
         indexed[channel] = indexed.get(channel, 0) + int(file.loose.counts[channel])
     return indexed, "message indexes count"
@@ -141,8 +142,6 @@ def check_data(file: McapFile, whole: bool) -> None:
             )
     if right:
         file.bare = False
-    elif file.runs:
-        file.bare = True
 
 
 def counts_of(file: McapFile) -> tuple[Mapping[int, int], tuple[int, int]]:
@@ -236,4 +235,4 @@ def _look_for_checksums(file: McapFile) -> None:
     """Look at the first chunk alone: whether this log has checksums."""
     if not file.walked:
         start = int(file.chunks[0, 0]) if len(file.chunks) else -1
-        file.bare = start < 0 or not file.data[start + 33 : start + 37].any()
+        file.bare |= start < 0 or not file.data[start + 33 : start + 37].any()

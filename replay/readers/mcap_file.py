@@ -38,6 +38,8 @@ class McapFile:
         Start, end, first and last stated stamp [ns] of each chunk, in the order of places.
     indexes : NDArray[np.int64], shape (m, 3)
         Row in `chunks`, channel and number of messages (−1: not known) of each message index.
+    orphans : NDArray[np.int64], shape (k, 2)
+        Channel and number of messages of message indexes whose chunk was not found.
     runs : list[tuple[int, int]]
         Stretches of messages outside chunks.
     cut : int
@@ -48,6 +50,8 @@ class McapFile:
         Place of the record that ends the data, −1 where none was met, and the checksum it states.
     unknown : list[tuple[int, int, int]]
         Opcode, place and number of records of unknown type.
+    strange : int
+        Number of records of unknown type in the chunks read.
     bare : bool
         Whether messages were met that no checksum covers.
     expanded : int
@@ -65,6 +69,7 @@ class McapFile:
     summary: Summary | None = None
     chunks: NDArray[np.int64] = field(default_factory=lambda: np.empty((0, 4), np.int64))
     indexes: NDArray[np.int64] = field(default_factory=lambda: np.empty((0, 3), np.int64))
+    orphans: NDArray[np.int64] = field(default_factory=lambda: np.empty((0, 2), np.int64))
     runs: list[tuple[int, int]] = field(default_factory=list)
     cut: int = -1
     walked: bool = False
@@ -73,6 +78,7 @@ class McapFile:
     metadata_count: int = 0
     attachments: list[AttachmentInfo] = field(default_factory=list)
     unknown: list[tuple[int, int, int]] = field(default_factory=list)
+    strange: int = 0
     bare: bool = False
     expanded: int = 0
     read_whole: bool = False

@@ -155,10 +155,17 @@ def _find_cut(file: McapFile, rows: NDArray[np.int64]) -> None:
 
 def _index_chunks(file: McapFile, rows: NDArray[np.int64]) -> None:
     """Give each message index to the chunk before it, and hold chunks and indexes against the summary."""
-    found = rows[(rows[:, 0] == fmt.MESSAGE_INDEX) & (rows[:, 3] == fmt.SOUND)]
-    owner = np.searchsorted(file.chunks[:, 0], found[:, 1]) - 1
-    file.indexes = np.concatenate((owner[:, None], scan.index_counts(file.data, found)), axis=1)[owner >= 0]
     summary = file.summary
+    if summary is not None and summary.checked:
+        _add_listed(file, rows, listed_chunks(summary))
+    found = rows[(rows[:, 0] == fmt.MESSAGE_INDEX) & (rows[:, 3] == fmt.SOUND)]
+    holes = rows[rows[:, 0] == fmt.HOLE, 1]
+    before = np.concatenate(([-1], file.chunks[:, 0]))[np.searchsorted(file.chunks[:, 0], found[:, 1])]
+    owned = (before >= 0) & (np.concatenate(([-1], holes))[np.searchsorted(holes, found[:, 1])] <= before)
+    counts = scan.index_counts(file.data, found)
+    owner = np.searchsorted(file.chunks[:, 0], before[owned])
+    file.indexes = np.concatenate((owner[:, None], counts[owned]), axis=1)
+    file.orphans = counts[~owned]
     if summary is None or not summary.sound or not len(summary.chunks):
         return
     listed = listed_chunks(summary)
@@ -174,8 +181,23 @@ def _index_chunks(file: McapFile, rows: NDArray[np.int64]) -> None:
         for start in file.chunks[mine][differ][:, 0].tolist():
             file.lost("index", f"the index and the chunk at byte {start} disagree about its length or stamps")
     places = np.sort(summary.indexes[:, 2])
-    if len(places) and not np.array_equal(places, found[owner >= 0][:, 1]):
+    if len(places) and not np.array_equal(places, found[:, 1]):
         file.lost("index", "the summary and the message indexes in the file disagree about where these lie")
+
+
+def _add_listed(file: McapFile, rows: NDArray[np.int64], listed: NDArray[np.int64]) -> None:
+    """Take chunks that the index places where the walk found no record: their heads are damaged, maybe not all."""
+    holes = rows[rows[:, 0] == fmt.HOLE, 1:3]
+    missing = listed[~np.isin(listed[:, 0], file.chunks[:, 0])]
+    if not len(holes) or not len(missing):
+        return
+    around = holes[np.maximum(np.searchsorted(holes[:, 0], missing[:, 0], "right") - 1, 0)]
+    inside = missing[(around[:, 0] <= missing[:, 0]) & (missing[:, 1] <= around[:, 1]) & (missing[:, 0] >= 0)]
+    inside = inside[np.unique(inside[:, 0], return_index=True)[1]]
+    for start in inside[:, 0].tolist():
+        file.lost("mended", f"the head of the chunk at byte {start} is damaged; the index told where it is")
+    chunks = np.concatenate((file.chunks, inside))
+    file.chunks = chunks[np.argsort(chunks[:, 0], kind="stable")]
 
 
 def take_listed_names(file: McapFile, summary: Summary) -> None:

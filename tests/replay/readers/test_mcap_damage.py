@@ -101,6 +101,32 @@ def test_a_flipped_opcode_of_a_chunk_costs_nothing_and_is_said(
     assert summarise_log(path, OPTIONS).topics[0].count == COUNT
 
 
+def test_a_chunk_whose_head_is_overwritten_is_found_by_the_index(tmp_path: Path) -> None:
+    path = tmp_path / "log.mcap"
+    raw = bytearray(write(path))
+    start, _ = places(raw, 6)[2]
+    raw[start : start + 9] = b"\xa5" * 9
+    raw[start + 37] = 99  # length of the compression's name
+    path.write_bytes(raw)
+    log = read_log(path, OPTIONS)
+    np.testing.assert_array_equal(log.channels[f"{FAST}.data"].values, np.arange(COUNT))
+    assert any(f"chunk at byte {start} is damaged; the index told" in d for d in log.summary.damage)
+
+
+def test_a_lost_chunk_is_counted_by_the_index_that_follows_it(tmp_path: Path) -> None:
+    path = tmp_path / "log.mcap"
+    raw = bytearray(write(path, use_statistics=False, use_summary_offsets=False))
+    start, end = places(raw, 6)[2]
+    raw[start:end] = np.random.default_rng(4).bytes(end - start)
+    path.write_bytes(raw[:-37])
+    for summary in (read_log(path, OPTIONS).summary, summarise_log(path, OPTIONS)):
+        left = summary.topics[0].count
+        assert 200 < left < COUNT
+        assert any(
+            f"{FAST}: {left} of {COUNT} messages that the log's message indexes count" in d for d in summary.damage
+        )
+
+
 def test_a_chunk_missing_from_the_index_is_read_and_said(tmp_path: Path) -> None:
     path = tmp_path / "log.mcap"
     raw = write(path, use_summary_offsets=False)
