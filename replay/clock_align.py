@@ -24,6 +24,7 @@ from replay.rawlog import Channel, RawLog
 from replay.signals import Signal
 from replay.source_clock import Method, SourceClock, some
 from replay.sources import SourceOptions
+from replay.spill import Column, blocks
 
 _ONE_DAY_S = 26 * 3600.0  # any time zone, and two hours
 _SET_NS = 946_684_800_000_000_000  # clocks that show an earlier year than 2000 were not set, or count from a start
@@ -208,9 +209,11 @@ def _first_stamp(log: RawLog) -> int:
 
 
 def _shifted(stamps: NDArray[np.int64], line: Line, start: int, between: int) -> NDArray[np.int64]:
-    lag = line.lag(np.asarray((stamps - start) * 1e-9, np.float64))
-    moved: NDArray[np.int64] = stamps + between + np.rint(lag * 1e9).astype(np.int64)
-    return moved
+    column = Column(np.int64)
+    for rows in blocks(len(stamps)):
+        lag = line.lag(np.asarray((stamps[rows] - start) * 1e-9, np.float64))
+        column.append(stamps[rows] + between + np.rint(lag * 1e9).astype(np.int64))
+    return column.finish()
 
 
 def _moved(log: RawLog, line: Line, start: int, between: int) -> RawLog:

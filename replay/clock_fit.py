@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import stdtrit
 
+from replay.clock_copies import copied
 from replay.clock_series import Shared
 from replay.clock_windows import TOLERANCES_S, Line, Readings, prepared, read_windows
 
@@ -45,8 +46,11 @@ def fit_line(shared: Sequence[Shared], lag_s: float, at_s: float) -> Line:
     while True:
         line = _stage(shared, line, (at_s + max(first, -reach), at_s + min(last, reach)))
         if line.reason or (-reach <= first and last <= reach):
-            return line
+            break
         reach *= 3
+    copies = None if line.reason else copied(shared, line)
+    exact = line if copies is None else _robust_line(copies, shared, line, floor=0.0)
+    return line if exact.reason else exact
 
 
 def _stage(shared: Sequence[Shared], line: Line, span: tuple[float, float]) -> Line:
@@ -63,13 +67,16 @@ def _stage(shared: Sequence[Shared], line: Line, span: tuple[float, float]) -> L
     return line
 
 
-def _robust_line(readings: Readings, shared: Sequence[Shared], start: Line) -> Line:
-    """Fit a line to the readings; outliers lose their weight, and disagreement widens the covariance."""
+def _robust_line(readings: Readings, shared: Sequence[Shared], start: Line, floor: float = 0.1) -> Line:
+    """Fit a line to the readings; outliers lose their weight, and disagreement widens the covariance.
+
+    No reading counts as better than `floor` of the slower file's period.
+    """
     t, lag, variance = readings.t, readings.lag, readings.variance
     if len(t) < _FEWEST:
         return _refused(start, "too few moments show in both recordings")
-    floor = float(np.median([0.1 * max(s.reference.recorded, s.other.recorded) for s in shared])) ** 2
-    weight0 = 1.0 / (variance + floor)
+    least = floor * float(np.median([max(s.reference.recorded, s.other.recorded) for s in shared]))
+    weight0 = 1.0 / (variance + least**2)
     at = float(np.sum(weight0 * t) / weight0.sum())
     u = t - at
     line = np.array([_weighted_median(lag - start.drift * u, weight0), start.drift])
@@ -100,7 +107,9 @@ def _robust_line(readings: Readings, shared: Sequence[Shared], start: Line) -> L
     used = [i for i in range(len(shared)) if (weight[readings.signal == i] > 0).any()]
     counted = int((weight > 0.1 * weight0).sum())
     freedom = max(1, counted - 2)
-    covariance = covariance * (stdtrit(freedom, 0.975) / 1.96) ** 2 * max(1.0, counted / freedom)  # few readings tell less
+    covariance = (
+        covariance * (stdtrit(freedom, 0.975) / 1.96) ** 2 * max(1.0, counted / freedom)
+    )  # few readings tell less
     covariance[0, 0] += _between(readings, weight / scale**2, residual, shared, used) + more**2
     return Line(at, float(line[0]), float(line[1]), covariance, tuple(shared[i].name for i in used), t[weight > 0])
 

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from replay.rawlog import Channel, RawLog
+from replay.spill import blocks
 
 Stamps = NDArray[np.int64]
 
@@ -25,6 +26,7 @@ _LEAST_PERIODS = 20
 _PAUSE_NS = 600_000_000_000
 _LONGEST_NS = 86_400_000_000_000
 _SIDE = 5
+_SAMPLE = 20_000
 _MOST = 100
 _MOST_STRAYS = 0.05
 _WHOLE_NS = 1_800_000_000_000
@@ -88,14 +90,9 @@ def _course(label: str, stamps: Stamps, rows_in_order: bool) -> _Course | None:
     """
     if len(stamps) < 2 * _SIDE:
         return None
-    steps = np.diff(np.clip(stamps, -(2**62), 2**62))
-    rising = steps[steps > 0]
-    if not len(rising):
-        return None
-    usual = float(np.median(rising))
+    usual = _usual(stamps)
     limit = max(_LEAST_NS if rows_in_order else _LEAST_MESSAGES_NS, round(_LEAST_PERIODS * usual))
-    odd = (steps < -limit) | (steps > max(limit, _PAUSE_NS))
-    if not odd.any():
+    if not usual or not _leaves_order(stamps, limit):
         return None
     course = _Course(stamps, np.ones(len(stamps), np.bool_), [], [])
     _leave_out_strays(course, label, limit, rows_in_order)
@@ -118,6 +115,23 @@ def _course(label: str, stamps: Stamps, rows_in_order: bool) -> _Course | None:
         course.stamps[rows] = own
     _part(course, label, limit)
     return course if course.notes or course.damage else None
+
+
+def _usual(stamps: Stamps) -> float:
+    """Median distance of stamps that rise, over some of them; 0 where none do [ns]."""
+    parts = [stamps[k : k + _SAMPLE] for k in range(0, len(stamps), max(_SAMPLE, len(stamps) // 8))]
+    steps = np.concatenate([np.diff(np.clip(p, -(2**62), 2**62)) for p in parts])
+    rising = steps[steps > 0]
+    return float(np.median(rising)) if len(rising) else 0.0
+
+
+def _leaves_order(stamps: Stamps, limit: int) -> bool:
+    """Whether stamps fall back by more than the limit, or jump ahead by ten minutes."""
+    for rows in blocks(len(stamps)):
+        steps = np.diff(np.clip(stamps[rows.start : rows.stop + 1], -(2**62), 2**62))
+        if len(steps) and (int(steps.min()) < -limit or int(steps.max()) > max(limit, _PAUSE_NS)):
+            return True
+    return False
 
 
 def _twice(stamps: Stamps, at: int, back: NDArray[np.int64]) -> bool:

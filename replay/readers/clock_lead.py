@@ -32,8 +32,8 @@ class Lead:
     scatter: float
 
     @staticmethod
-    def of(log: NDArray[np.int64], header: NDArray[np.int64]) -> Lead | None:
-        """Return the line, or None where the stamps are too few or do not run with the log."""
+    def of(log: NDArray[np.int64], header: NDArray[np.int64], count: int) -> Lead | None:
+        """Return the line of some of `count` stamps, or None where the stamps are too few or do not run with the log."""
         n = len(log)
         if n < 12 or not 0.1 < _extent(header) / max(_extent(log), 1.0) < 10:
             return None
@@ -42,7 +42,7 @@ class Lead:
         lead = lead_of(header, log)
         ahead = tuple(int(np.median(lead[e])) for e in ends)
         scatter = max(float(np.median(np.abs(lead[e] - a))) for e, a in zip(ends, ahead, strict=True))
-        return Lead(n, (at[0], at[1]), (ahead[0], ahead[1]), scatter)
+        return Lead(count, (at[0], at[1]), (ahead[0], ahead[1]), scatter)
 
     @property
     def rate(self) -> float:

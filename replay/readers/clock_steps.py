@@ -12,6 +12,8 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from replay.spill import blocks
+
 Stamps = NDArray[np.int64]
 
 _FAR = 2**62
@@ -44,8 +46,12 @@ def lead_of(stamps: Stamps, other: Stamps) -> Stamps:
 
 def steady(stamps: Stamps, other: Stamps) -> bool:
     """Whether the lead stays within 50 ms, so that nothing is to be repaired."""
-    lead = lead_of(stamps, other)
-    return int(lead.max()) - int(lead.min()) < _LEAST_NS
+    low, high = [], []
+    for rows in blocks(len(stamps)):
+        lead = lead_of(stamps[rows], other[rows])
+        low.append(int(lead.min()))
+        high.append(int(lead.max()))
+    return max(high) - min(low) < _LEAST_NS
 
 
 def unwrapped(stamps: Stamps, other: Stamps) -> tuple[Stamps, int, int]:

@@ -163,6 +163,20 @@ def test_a_slow_command_that_a_fast_table_repeats() -> None:
     assert clock.offset_s == pytest.approx(-0.5, abs=2e-3)
 
 
+def test_a_bridge_that_publishes_the_newest_samples_of_the_plc() -> None:
+    plc, _ = two_clocks(drive(), 0.0, 0.0, ("FR",))
+    sent = ROS + np.random.default_rng(8).uniform(0.0, 0.002, ROS.size)
+    newest = np.searchsorted(PLC, sent, side="right") - 1
+    own = sent + 0.319 + 50e-6 * sent
+    ros = {"wheel.FR.v": signal("wheel.FR.v", own, plc["wheel.FR.v"].values[newest] / 0.427 * 0.427)}
+    clock, line, between = estimate(plc, ros)
+    assert line is not None
+    stamps = ros["wheel.FR.v"].stamps
+    error = (stamps - T0 + between) * 1e-9 + line.lag((stamps - stamps[0]) * 1e-9) - sent
+    assert clock.uncertainty_s is not None
+    assert np.abs(error).max() < 3e-4 < clock.uncertainty_s < 2e-3
+
+
 def test_two_sensors_stand_in_with_a_wider_bound() -> None:
     f = drive()
     plc = {"wheel.FR.v": signal("wheel.FR.v", PLC, recorded(f, PLC, 1))}
