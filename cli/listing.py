@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
 from dataclasses import asdict
 from datetime import UTC, datetime, timedelta
+from pathlib import PurePath
 from typing import TYPE_CHECKING, Any
 
 from rich.text import Text
@@ -50,9 +52,10 @@ def inspect_parts(report: InspectReport) -> list[RenderableType]:
 
 def list_parts(reports: Sequence[InspectReport], failures: Sequence[str]) -> list[RenderableType]:
     """A line per log, and how many of them are degraded or cannot be read."""
+    folder = _common_folder([r.source for r in reports])
     rows = [
         (
-            r.source, r.format, _start(r.start_ns) if r.stop_ns else "–", f"{r.duration_s:.1f}", r.messages,
+            r.source.removeprefix(folder), r.format, _start(r.start_ns) if r.stop_ns else "–", f"{r.duration_s:.1f}", r.messages,
             len(r.topics), _bytes(r.size), _state(r),
         )
         for r in reports
@@ -65,7 +68,20 @@ def list_parts(reports: Sequence[InspectReport], failures: Sequence[str]) -> lis
     words = [f"{len(reports)} log{'' if len(reports) == 1 else 's'} read"]
     words += [f"{degraded} degraded"] if degraded else []
     words += [f"{len(failures)} could not be read"] if failures else []
-    return [ByWidth(wide, narrow, _WIDE_LIST), text(", ".join(words), "bold red" if degraded or failures else "bold")]
+    head: list[RenderableType] = [text(f"in {folder}", "dim")] if folder else []
+    return [
+        *head,
+        ByWidth(wide, narrow, _WIDE_LIST),
+        text(", ".join(words), "bold red" if degraded or failures else "bold"),
+    ]
+
+
+def _common_folder(sources: Sequence[str]) -> str:
+    """Give the folder that several logs share, with the separator behind it, or nothing."""
+    if len(sources) < 2 or len({PurePath(s).is_absolute() for s in sources}) > 1:
+        return ""
+    common = os.path.commonpath([str(PurePath(s).parent) for s in sources])
+    return common if not common or common.endswith(os.sep) else common + os.sep
 
 
 def damage_parts(report: InspectReport) -> list[RenderableType]:
