@@ -25,6 +25,7 @@ __all__ = ["Decoder", "Outcome", "Part"]
 MAX_LAYOUTS = 6
 MAX_PROGRAMS = 64
 GIVE_UP = 500
+PATIENCE = 2_000_000
 _WORTH = 0.25
 _SIZES = (1, 2, 4, 8)
 _BAD = -2
@@ -134,6 +135,7 @@ class Decoder:
     walked: list[_Walked] = field(default_factory=list)
     room: dict[Place, int] = field(default_factory=dict)
     tried: int = 0
+    spent: int = 0
     count: NDArray[np.int64] = field(default_factory=lambda: np.arange(0))
 
     def decode(
@@ -177,8 +179,9 @@ class Decoder:
             self.store.owner[batch.slots[rest]] = _BAD
 
     def _hopeless(self) -> bool:
-        """Whether so many payloads failed and none fitted that the definition is not theirs."""
-        return self.outcome.bad >= GIVE_UP and not self.fixed and not self.walked
+        """Whether so many payloads failed and none fitted that the definition is not theirs, or so many parts were read."""
+        hopeless = self.outcome.bad >= GIVE_UP and not self.fixed and not self.walked
+        return hopeless or self.spent > PATIENCE
 
     def _fixed(self, plan: _Fixed, batch: Batch) -> tuple[int, int]:
         taken, left = plan.take(batch, self.store)
@@ -213,6 +216,7 @@ class Decoder:
                 return self._walked(known, batch)[1]  # tells damaged payloads without walking over each here
             self.outcome.bad += 1
             self.outcome.reason = self.outcome.reason or str(error)
+            self.spent += error.steps
             self.store.owner[batch.slots[row]] = _BAD
             return self._next(batch, row)
         for place, count in layout.counts.items():

@@ -28,7 +28,9 @@ Field: TypeAlias = tuple[Any, Any]
 
 
 class LayoutError(Exception):
-    """A payload does not fit its definition; the text says where."""
+    """A payload does not fit its definition; the text says where, `steps` after how many parts of it."""
+
+    steps = 0
 
 
 @dataclass(frozen=True)

@@ -31,7 +31,7 @@ from replay.readers.program import (
 FREE, BAD = -1, -2
 _TILE = 32
 _DEEP = 80
-_MAX_STEPS = 1_000_000
+_FREE_STEPS, _STEPS_PER_BYTE = 4096, 16
 _SHORT = 64
 _NUMBERS = tuple(np.dtype(f"u{size}") for size in (1, 2, 4, 8))
 
@@ -162,11 +162,12 @@ def take_program(  # type: ignore[no-untyped-def]
         for k in range(len(hidden)):
             out4[places[hidden[k]], slot] = 0
         pc, depth, opened, shift, mute, steps = 0, 0, 0, 0, 0, 0
+        limit_steps = _FREE_STEPS + _STEPS_PER_BYTE * (lengths[row] + len(ops))  # for elements that take no bytes
         while state == 0 and pc < len(ops):
             op, a, b, c, d = ops[pc, 0], ops[pc, 1], ops[pc, 2], ops[pc, 3], ops[pc, 4]
             pc += 1
             steps += 1
-            if steps > _MAX_STEPS:
+            if steps > limit_steps:
                 state = 2
                 break
             count = np.int64(0)

@@ -17,7 +17,7 @@ from replay.readers.names import is_key_list
 from replay.readers.places import Index, Path, Place, Scope, place_of, text_of
 
 MAX_ELEMENTS = 64
-MAX_STEPS = 50_000
+MAX_STEPS = 300_000
 PLACEHOLDER = "structure_needs_at_least_one_member"
 
 
@@ -248,4 +248,9 @@ def layout_of(kind: MessageType, payload: bytes) -> Layout:
     LayoutError
         Where the payload does not fit the definition.
     """
-    return _Walk(kind, payload).run()
+    walk = _Walk(kind, payload)
+    try:
+        return walk.run()
+    except LayoutError as error:
+        error.steps = walk.steps
+        raise

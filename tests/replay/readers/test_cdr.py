@@ -12,6 +12,8 @@ from replay.readers.cdr import MAX_PROGRAMS, Decoder, Outcome
 from replay.readers.definitions import DefinitionError, resolve
 from replay.readers.growing import Store
 
+BAR = "=" * 80
+
 
 def columns(kind: Any, payloads: list[bytes]) -> tuple[dict[str, dict[int, Any]], Outcome]:
     """Decode payloads into path → row → value."""
@@ -155,3 +157,33 @@ def test_plain_cdr2_aligns_to_four_bytes_and_states_the_size_of_collections_of_t
     found, outcome = columns(kind, [wrong, payload])
     assert outcome.bad == 1
     assert set(found["a"]) == {1}
+
+
+def test_long_arrays_of_messages_are_passed_over_and_named() -> None:
+    text = f"float64 a\np/Inner[] path\np/Plain[] cloud\nfloat64 b\n{BAR}\nMSG: p/Inner\nstring frame\nfloat64 x"
+    text += f"\n{BAR}\nMSG: p/Plain\nfloat32 x\nuint8 y\nfloat64 z\nuint8 w"
+    store = get_typestore(Stores.EMPTY)
+    store.register(get_types_from_msg(text, "p/msg/T"))
+    inner, plain, outer = (store.types[f"p/msg/{name}"] for name in ("Inner", "Plain", "T"))
+    kind = resolve("p/msg/T", "ros2msg", text, False)
+    counts = [(5000, 40_003), (66, 65), (5001, 40_000), (65, 70)]
+    payloads = [
+        bytes(
+            store.serialize_cdr(
+                outer(i, [inner("f" * (k % 3), 0.5) for k in range(m)], [plain(0.5, 1, 2.5, 3)] * n, -i), "p/msg/T"
+            )
+        )
+        for i, (m, n) in enumerate(counts)
+    ]
+    found, outcome = columns(kind, payloads)
+    assert outcome.bad == outcome.slow == 0
+    assert found == {"a": {i: float(i) for i in range(4)}, "b": {i: float(-i) for i in range(4)}}
+
+
+def test_endless_sequences_of_nothing_are_refused() -> None:
+    kind = resolve("p/Outer", "ros1msg", f"float64 a\np/Nothing[] b\n{BAR}\nMSG: p/Nothing\n", True)
+    good, endless = struct.pack("<dI", 2.5, 3), struct.pack("<dI", 2.5, 2**32 - 1)
+    found, outcome = columns(kind, [good, *[endless] * 20, good])
+    assert found == {"a": {0: 2.5, 21: 2.5}}
+    assert outcome.bad == 20
+    assert "parts" in outcome.reason
