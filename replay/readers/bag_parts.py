@@ -54,13 +54,16 @@ def find_parts(path: Path, report: Report, scratch: Path) -> tuple[list[Path], M
     Raises
     ------
     LogError
-        Where there is no part.
+        Where there is no part, or the folder cannot be read.
     """
     if path.is_file():
         files, meta = [path], Metadata()
     else:
         meta = read_metadata(path, report)
-        files = _listed(path, meta, report)
+        try:
+            files = _listed(path, meta, report)
+        except OSError as error:
+            raise LogError(f"the folder {path} cannot be read: {error.strerror or error}") from error
     if not files:
         raise LogError(
             f"{path} holds no storage file that can be read; expected .db3 or .mcap files beside metadata.yaml"

@@ -19,6 +19,8 @@ from replay.readers.sqlite_file import Image, Table, Value
 _PAGES = 8 << 20
 _BYTES = 32 << 20
 _LAYOUT = ["id", "topic_id", "timestamp", "data"]
+_STAMPS = re.compile(r"""\bon\s+["'`\[]?messages["'`\]]?\s*\(\s*["'`\[]?timestamp""", re.IGNORECASE)
+_PARTLY = re.compile(r"\b(desc|where)\b", re.IGNORECASE)
 _TYPE = re.compile(r"[A-Za-z]\w*(/[A-Za-z]\w*)+")
 
 
@@ -111,9 +113,8 @@ class Database:
         return self._stray(found) if self.image.suspects else found
 
     def _index(self) -> Table | None:
-        """Return the index of the stamps."""
-        pattern = re.compile(r"""\bon\s+["'`\[]?messages["'`\]]?\s*\(\s*["'`\[]?timestamp""", re.IGNORECASE)
-        return next((t for t in self.tables.values() if pattern.search(t.sql)), None)
+        """Return the index of the stamps, if it holds all of them in rising order."""
+        return next((t for t in self.tables.values() if _STAMPS.search(t.sql) and not _PARTLY.search(t.sql)), None)
 
     def _stamped(self, window: Window) -> NDArray[np.int64] | None:
         """Rows that the index places in the window; None without a sound index."""

@@ -83,8 +83,12 @@ def test_a_window_is_taken_from_the_index_and_is_exact(make: Make, window: tuple
     path = make(rows)
     expected = [r for r in oracle(path) if window[0] <= r[1] < window[1]]
     assert found(path, window)[0] == expected
-    plain = make(rows, tables=TABLES.replace("create index", "-- create index"), name="plain.db3")
-    assert found(plain, window)[0] == expected
+    for k, text in enumerate(("-- create index", "create unique index")):
+        plain = make(rows, tables=TABLES.replace("create index", text), name=f"{k}.db3")
+        assert found(plain, window)[0] == expected
+    for k, text in enumerate(("(timestamp desc)", "(timestamp) where topic_id = 1", "(topic_id, timestamp)")):
+        odd = make(rows, tables=TABLES.replace("(timestamp asc)", text), name=f"odd{k}.db3")
+        assert found(odd, window)[0] == expected
 
 
 @pytest.mark.parametrize("pragma", ["encoding = 'UTF-16le'", "encoding = 'UTF-16be'", "auto_vacuum = full"])
