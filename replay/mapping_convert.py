@@ -13,10 +13,12 @@ from replay.errors import ConfigError
 from replay.machine import Machine
 from replay.mapping_rules import SI_UNITS
 from replay.sources import SignalSource
+from replay.spill import in_blocks, keep, release
 from replay.units import quantity_of, si_factor
 
 _TOO_FAST = 3.0
 _WIDE = 1.5
+_PEAK_SAMPLES = 1 << 18
 
 
 @dataclass(frozen=True)
@@ -95,8 +97,9 @@ def convert(
     if origin.derivative and recorded.dtype.kind in "iu" and len(recorded):
         recorded = recorded.astype(np.int64) - np.int64(recorded[0])  # exact before they become floats
     with np.errstate(all="ignore"):  # damaged logs hold any bits
-        values = (np.asarray(recorded, np.float64) * origin.gain + origin.offset) * factor
-        values = slope(stamps, values) if origin.derivative else values
+        values = in_blocks(lambda x: (np.asarray(x, np.float64) * origin.gain + origin.offset) * factor, recorded)
+        values = keep(slope(stamps, values)) if origin.derivative else values
+    release(stamps, recorded)
     return Converted(stamps, values, notes)
 
 
@@ -145,8 +148,9 @@ def slope(stamps: NDArray[np.int64], position: NDArray[np.float64]) -> NDArray[n
 
 
 def _peak(values: NDArray[Any]) -> float:
-    """99th percentile of the magnitude; 0 where there is no number."""
-    finite = np.abs(values[np.isfinite(values)].astype(np.float64))
+    """99th percentile of the magnitude, of a long signal that of every few samples; 0 where there is no number."""
+    some = values[:: max(1, len(values) // _PEAK_SAMPLES)]
+    finite = np.abs(some[np.isfinite(some)].astype(np.float64))
     return float(np.percentile(finite, 99)) if len(finite) else 0.0
 
 

@@ -5,6 +5,7 @@
 The simulated mission (``--piece`` seconds) is recorded once; its chunks are then repeated with later stamps, one second
 apart, so that ten hours at 1 kHz are written in a minute. Wall and CPU time and the largest resident set of a child process
 that runs the whole of `mfhca diagnose` are printed; divide two lengths by each other to see whether cost is linear.
+The resident set counts pages of files that the system may drop at will; ``--limit`` shows what is really needed.
 """
 
 from __future__ import annotations
@@ -108,9 +109,20 @@ def _add(data: np.ndarray, at: np.ndarray, kind: str, amount: int) -> None:
     data[cells] = (data[cells].copy().view(kind) + np.array(amount, kind)).view(np.uint8)
 
 
-def _measure(log: Path, out: Path) -> tuple[float, float, float, str]:
+def _limited(gib: float) -> tuple[Path, list[str]]:
+    """A control group that may use so much memory, caches of files included, and the command's words to enter it."""
+    first = Path("/sys/fs/cgroup/memory")
+    group = (first if first.is_dir() else Path("/sys/fs/cgroup")) / f"mfhca-{gib:g}"
+    group.mkdir(exist_ok=True)
+    file = "memory.limit_in_bytes" if first.is_dir() else "memory.max"
+    (group / file).write_text(str(round(gib * 2**30)))
+    return group, ["sh", "-c", f'echo $$ > {group}/cgroup.procs; exec "$@"', "sh"]
+
+
+def _measure(log: Path, out: Path, limit: float | None) -> tuple[float, float, float, str]:
     before, begun = resource.getrusage(resource.RUSAGE_CHILDREN), time.monotonic()
-    command = [sys.executable, "-m", "cli.main", "diagnose", str(log), "-o", str(out), "--quiet"]
+    group, enter = (None, []) if limit is None else _limited(limit)
+    command = [*enter, sys.executable, "-m", "cli.main", "diagnose", str(log), "-o", str(out), "--quiet"]
     child = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
     largest = anonymous = 0
     while child.poll() is None:
@@ -124,12 +136,11 @@ def _measure(log: Path, out: Path) -> tuple[float, float, float, str]:
     after = resource.getrusage(resource.RUSAGE_CHILDREN)
     cpu = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
     said = child.stdout.read().strip() if child.stdout else ""
-    return (
-        time.monotonic() - begun,
-        cpu,
-        largest / 2**20,
-        f"{anonymous / 2**20:.2f} GiB private, exit {child.returncode} {said}",
-    )
+    if group is not None:
+        said += f" (within {limit:g} GiB, caches included)"
+        group.rmdir()
+    rest = f"{anonymous / 2**20:.2f} GiB private, exit {child.returncode} {said}"
+    return time.monotonic() - begun, cpu, largest / 2**20, rest
 
 
 def main() -> None:
@@ -141,6 +152,7 @@ def main() -> None:
     parser.add_argument("--scenario", default="random", choices=["random", "healthy", "paper"])
     parser.add_argument("--seed", type=int, default=2000)
     parser.add_argument("--folder", type=Path, default=Path(tempfile.gettempdir()) / "mfhca-long")
+    parser.add_argument("--limit", type=float, metavar="GIB", help="run in a control group of that much memory (root)")
     parser.add_argument("--only-write", action="store_true")
     options = parser.parse_args()
     options.folder.mkdir(parents=True, exist_ok=True)
@@ -157,7 +169,7 @@ def main() -> None:
                 repeat(piece, partial, max(1, round(hours * 3600 / (options.piece + 1))), options.piece + 1)
                 partial.rename(log)
             if not options.only_write:
-                wall, cpu, rss, rest = _measure(log, options.folder / f"{log.stem}-report")
+                wall, cpu, rss, rest = _measure(log, options.folder / f"{log.stem}-report", options.limit)
                 size = log.stat().st_size / 1e6
                 print(
                     f"{evidence:6s} {hours:5g} h {size:6.0f} MB log: {wall:6.1f} s wall, {cpu:6.1f} s CPU, {rss:.2f} GiB, {rest}",
