@@ -208,7 +208,8 @@ class Repeats:
         zero = int(stamps[changes[0]] if len(changes) else stamps[0])
         phase = (stamps[changes] - zero) % period
         if len(changes) and (np.minimum(phase, period - phase) > step / 2).any():
-            self.suspected.append(label)
+            if len(changes) * ratio < 1.5 * len(stamps):
+                self.suspected.append(label)
             return stamps, values
         key = group.first, period, zero % period
         if key not in self._rows:

@@ -199,7 +199,7 @@ def _checked(path: Path, scope: Scope, report: Report) -> Scope:
     rows = {key: _mended(cells, key, times, len(names)) for key, cells in rows.items()}
     if times[:1] != [0] or len(times) == len(names):
         raise LogError(f'{path}: its time columns cannot be found (timelines "None"?); {HOW}')
-    if sum(c > len(names) for c in counts) * 2 > len(counts):
+    if sum(c > len(names) for c in counts) > max(1, len(counts) // 100):
         raise LogError(
             f"{path}: rows of data have {width} cells, its header names {len(names)} columns; "
             f"{scope.dialect.separator!r} is probably both separator and decimal sign; {HOW}"
