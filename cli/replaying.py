@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
 
@@ -16,9 +16,9 @@ from replay.errors import ConfigError
 EXAMPLES = """\b
 Examples:
   mfhca replay mission.mcap -o loop.parquet
-  mfhca replay mission.bag -o loop.mcap     # open beside the log in Foxglove or PlotJuggler
+  mfhca replay mission.bag -o loop.mcap     # for Foxglove or PlotJuggler
   mfhca replay mission.mcap -o part.csv --start 100 --end 110
-  mfhca replay mission.mcap --raw -o recorded   # every topic as recorded, a Parquet file each"""
+  mfhca replay mission.mcap --raw -o recorded   # every topic as Parquet"""
 
 
 @command
@@ -40,7 +40,7 @@ def replay(
     force: Annotated[bool, typer.Option("--force", help="Replace files that something else wrote.")] = False,
     json: Json = False,
 ) -> None:
-    """Replay the control loop: v_c, e, ρ, Ψ̂ printed and implied, u_a and u_s, to Parquet, CSV or MCAP."""
+    """Replay the control loop: v_c, e, ρ, Ψ̂ printed and implied, u_a and u_s, to Parquet, CSV or MCAP; or the log as recorded."""
     paths = mission_paths(logs)
     check_times(start, end)
     check_output([output], paths)
@@ -117,8 +117,9 @@ def _convert(
 
     rows = [(f["file"], text(f["type"], "dim"), f["rows"], len(f["columns"])) for f in index["files"]]
     terminal.show(table(("file", "type", "rows", "columns"), rows, right=(2, 3)))
-    said: list[tuple[str, list[Any]]] = [("Notes", index["notes"]), ("Degraded: the log is damaged", index["damage"])]
-    for title, lines in said:
-        if lines:
-            terminal.show(section(title), bullets(lines))
+    if index["notes"]:
+        terminal.show(section("Notes"), bullets(index["notes"]))
+    if index["damage"]:
+        terminal.show("", text("degraded: the log is damaged; what is left was written", "bold red"))
+        terminal.show(bullets(index["damage"], "red"))
     terminal.show("", text(f"Wrote {folder}: {len(rows)} Parquet files and index.json"))
