@@ -138,8 +138,8 @@ class _Warnings(logging.Handler):
 @contextmanager
 def _opened(path: Path, report: Report) -> Iterator[Any]:
     try:
-        import nptdms  # type: ignore[import-untyped]
-        from nptdms.log import log_manager  # type: ignore[import-untyped]
+        import nptdms  # type: ignore[import-untyped,import-not-found,unused-ignore]
+        from nptdms.log import log_manager  # type: ignore[import-untyped,import-not-found,unused-ignore]
     except ImportError as error:
         raise LogError(f"{path}: {MISSING_LIBRARY}") from error
     logger, handler = logging.getLogger("nptdms"), _Warnings(path, report)
