@@ -50,7 +50,7 @@ class Rosbag2Reader:
             if _is_mcap(files, path):
                 summary = mcap.summary_of(mcap.open_files(files, path, report), path, self.format, report)
             else:
-                summary = sqlite_bag.summarise(files, path, report)
+                summary = sqlite_bag.summarise(files, path, report, meta.counts is not None)
             return _complete(summary, meta, compare=True)
 
     def read(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Collection, Iterator, Mapping
 from itertools import pairwise
 from pathlib import Path
@@ -54,6 +55,8 @@ def read(
     """
     assembler = Assembler(clock, report)
     bases = _open(files, source, report)
+    own = bases[0].stated if counted is None and len(bases) == 1 else None
+    counted = own if counted is None else counted
     if window is None:
         _expect(assembler, bases, counted or {})
     for base in bases:
@@ -63,6 +66,7 @@ def read(
                 assembler.add(part)
     if window is None:
         _compare_times(bases, report)
+        _compare_counts(bases, own, report)
     elif counted is None:
         bases = _open(files, source, Report())
         for base in bases:
@@ -71,8 +75,8 @@ def read(
     return assembler.finish(_summary(bases, source, report, counted if window is not None else None))
 
 
-def summarise(files: list[Path], source: Path, report: Report) -> LogSummary:
-    """Summarise the files of one recording.
+def summarise(files: list[Path], source: Path, report: Report, counted: bool = False) -> LogSummary:
+    """Summarise the files of one recording; `counted` says that its metadata are compared elsewhere.
 
     Raises
     ------
@@ -83,6 +87,7 @@ def summarise(files: list[Path], source: Path, report: Report) -> LogSummary:
     for base in bases:
         for _ in base.messages((), None, payloads=False):
             pass
+    _compare_counts(bases, bases[0].stated if not counted and len(bases) == 1 else None, report)
     return _summary(bases, source, report, None)
 
 
@@ -113,6 +118,19 @@ def _expect(assembler: Assembler, bases: list[Database], counted: Mapping[str, i
     for connection in {c: None for b in bases for c in b.connections.values()}:
         if 0 < counted.get(connection.topic, 0) <= room:
             assembler.expect(connection, counted[connection.topic])
+
+
+def _compare_counts(bases: list[Database], own: Mapping[str, int] | None, report: Report) -> None:
+    """Hold a database's own metadata against what was found in it."""
+    found: Counter[str] = Counter()
+    for number, connection in bases[0].connections.items():
+        found[connection.topic] += bases[0].counts[number]
+    for name, stated in sorted((own or {}).items()):
+        if stated > found[name]:
+            report.lost(
+                f"{bases[0].name}: its metadata count {stated} messages on {name[:80]}, {found[name]} were found; "
+                f"{stated - found[name]} are missing"
+            )
 
 
 def _compare_times(bases: list[Database], report: Report) -> None:

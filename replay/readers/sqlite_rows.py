@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from replay.rawlog import Window
 from replay.readers import sqlite_scan as scan
 from replay.readers.assemble import Connection
+from replay.readers.bag_metadata import MAX_BYTES, Metadata, parse_metadata
 from replay.readers.clocks import Report
 from replay.readers.sqlite_file import Image, Table, Value
 
@@ -49,6 +50,8 @@ class Database:
         Messages by topic number, as far as they were met.
     bounds : list[int]
         First and last stamps of batches [ns].
+    stated : dict[str, int] or None
+        Messages per topic as a database that is a recording of its own states them.
     """
 
     image: Image
@@ -57,6 +60,7 @@ class Database:
     connections: dict[int, Connection] = field(default_factory=dict)
     counts: Counter[int] = field(default_factory=Counter)
     bounds: list[int] = field(default_factory=list)
+    stated: dict[str, int] | None = None
     broken: Counter[int] = field(default_factory=Counter)
     other: int = 0
     damaged: int = 0
@@ -286,6 +290,7 @@ def open_database(image: Image, report: Report) -> Database:
     texts = _named(base, "message_definitions", ["topic_type", "encoding", "encoded_message_definition"])
     if not topics and image.suspects:
         topics, texts = _stray_topics(image)
+    base.stated = _own_counts(base)
     definitions = {str(name): (str(encoding), str(text)) for name, encoding, text in texts}
     for number, name, kind, encoding in topics:
         if isinstance(number, int):
@@ -293,6 +298,13 @@ def open_database(image: Image, report: Report) -> Database:
                 str(name), str(kind), str(encoding), *definitions.get(str(kind), ("", ""))
             )
     return base
+
+
+def _own_counts(base: Database) -> dict[str, int] | None:
+    """Messages per topic from the recorder's last copy of its metadata; None for a part among others."""
+    texts = [str(text) for (text,) in _named(base, "metadata", ["metadata"])]
+    meta = parse_metadata(texts[-1][:MAX_BYTES]) if texts else Metadata()
+    return meta.counts if meta.counts and len(meta.files or []) == 1 and any(meta.counts.values()) else None
 
 
 def _named(base: Database, table: str, names: list[str]) -> list[list[Value]]:

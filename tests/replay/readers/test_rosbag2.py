@@ -160,6 +160,8 @@ def test_a_database_that_was_cut_off_gives_what_is_left(make_bag: Make) -> None:
     assert 0 < len(found) < 300
     np.testing.assert_array_equal(found, np.arange(float(len(found))))
     assert any("was cut off" in d for d in log.summary.damage)
+    text = f"its metadata count 300 messages on /speed, {len(found)} were found; {300 - len(found)} are missing"
+    assert any(text in d for d in log.summary.damage)
 
 
 def test_rows_without_a_message_are_counted(make_bag: Make) -> None:
