@@ -21,7 +21,7 @@ from replay.loop import Replay, replay_loop
 from replay.machine import Machine
 from replay.mission import Mission, load_mission
 from replay.signals import Signals
-from replay.spill import blocks
+from replay.spill import blocks, release_all
 from replay.timeline import align
 from replay.version import __version__
 
@@ -116,11 +116,16 @@ def diagnose_mission(
         Where nothing in the mission can be judged.
     """
     chosen = tuple(machine.wheels if wheels is None else wheels)
-    progress("replaying the loop")
+
+    def stage(text: str) -> None:
+        release_all()
+        progress(text)
+
+    stage("replaying the loop")
     replay = replay_loop(mission.timeline, machine, bucket_of(mission.timeline.size))
-    found = assess_components(mission.timeline, replay, machine, chosen, progress)
+    found = assess_components(mission.timeline, replay, machine, chosen, stage)
     _require_something(found.assessments, mission, machine)
-    progress("deciding")
+    stage("deciding")
     return _result(mission, machine, replay, found, machine_source, machine_id)
 
 

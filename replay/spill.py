@@ -12,6 +12,7 @@ import math
 import mmap
 import os
 import tempfile
+import weakref
 from collections.abc import Callable, Iterator, Sequence
 from typing import IO, Any
 
@@ -23,6 +24,7 @@ from replay.errors import LogError
 SPILL_BYTES = 16 << 20
 FLUSH_BYTES = 4 << 20
 BLOCK = 1 << 19
+_MAPS: weakref.WeakSet[mmap.mmap] = weakref.WeakSet()
 
 
 class Column:
@@ -80,6 +82,7 @@ class Column:
         self._flush()
         with self._file as file:
             mapped = mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_WRITE)
+        _MAPS.add(mapped)
         return np.frombuffer(mapped, self.dtype).reshape(-1, *self._width)
 
 
@@ -104,6 +107,7 @@ def scratch(shape: tuple[int, ...], dtype: DTypeLike) -> NDArray[Any]:
             mapped = mmap.mmap(file.fileno(), size, access=mmap.ACCESS_WRITE)
     except OSError as error:
         raise _no_room(error) from error
+    _MAPS.add(mapped)
     return np.frombuffer(mapped, kind).reshape(shape)
 
 
@@ -170,5 +174,16 @@ def release(*arrays: NDArray[Any] | None) -> None:
             base = base.base
         if isinstance(base, memoryview):
             base = base.obj
-        if isinstance(base, mmap.mmap) and hasattr(base, "madvise"):
-            base.madvise(mmap.MADV_DONTNEED)
+        if isinstance(base, mmap.mmap):
+            _let_go(base)
+
+
+def release_all() -> None:
+    """Let go of the memory of all spilled columns: for the end of a stage."""
+    for mapped in list(_MAPS):
+        _let_go(mapped)
+
+
+def _let_go(mapped: mmap.mmap) -> None:
+    if hasattr(mapped, "madvise"):  # not on Windows
+        mapped.madvise(mmap.MADV_DONTNEED)
