@@ -41,6 +41,7 @@ class _Course:
     kept: NDArray[np.bool_]
     notes: list[str]
     damage: list[str]
+    span: tuple[int, int] | None = None
 
 
 def in_order(log: RawLog) -> RawLog:
@@ -60,15 +61,21 @@ def in_order(log: RawLog) -> RawLog:
     arrays: dict[int, tuple[str, Stamps, bool]] = {}
     for name, channel in log.channels.items():
         arrays.setdefault(id(channel.stamps), (channel.topic or _place(log, name), channel.stamps, not channel.topic))
-    courses = {key: c for key, array in arrays.items() if (c := _course(*array)) is not None}
+    courses: dict[int, _Course] = {}
+    span: tuple[int, int] | None = None  # of parts days apart the whole log keeps the one that its longest array keeps
+    for key, array in sorted(arrays.items(), key=lambda item: -len(item[1][1])):
+        course = _course(*array, span)
+        if course is not None:
+            courses[key] = course
+            span = span or course.span
     if not courses:
         return log
     channels: dict[str, Channel] = {}
     new = {key: c.stamps[c.kept] for key, c in courses.items()}
     for name, channel in log.channels.items():
-        course = courses.get(id(channel.stamps))
-        if course is not None:
-            values = channel.values if course.kept.all() else channel.values[course.kept]
+        own = courses.get(id(channel.stamps))
+        if own is not None:
+            values = channel.values if own.kept.all() else channel.values[own.kept]
             channel = replace(channel, stamps=new[id(channel.stamps)], values=values)
         channels[name] = channel
     notes = tuple(dict.fromkeys((*log.summary.notes, *(n for c in courses.values() for n in c.notes))))
@@ -82,7 +89,7 @@ def _place(log: RawLog, name: str) -> str:
     return f"{file}, {groups[0].name}" if groups and groups[0].name != file else file
 
 
-def _course(label: str, stamps: Stamps, rows_in_order: bool) -> _Course | None:
+def _course(label: str, stamps: Stamps, rows_in_order: bool, span: tuple[int, int] | None) -> _Course | None:
     """Repair one array of stamps; None where nothing is wrong.
 
     Rows of a table stand in the order in which they were written. Messages may not (chunks of several threads, joined
@@ -113,7 +120,7 @@ def _course(label: str, stamps: Stamps, rows_in_order: bool) -> _Course | None:
         )
         course.stamps = course.stamps.copy()
         course.stamps[rows] = own
-    _part(course, label, limit)
+    _part(course, label, limit, span)
     return course if course.notes or course.damage else None
 
 
@@ -192,7 +199,7 @@ def _continued(stamps: Stamps, back: NDArray[np.int64], usual: float) -> Stamps:
     return moved
 
 
-def _part(course: _Course, label: str, limit: int) -> None:
+def _part(course: _Course, label: str, limit: int, span: tuple[int, int] | None) -> None:
     """Say where stamps jump ahead; of parts a day and more apart only the one with most samples is kept."""
     rows = np.flatnonzero(course.kept)
     own = course.stamps[rows]
@@ -202,10 +209,12 @@ def _part(course: _Course, label: str, limit: int) -> None:
         return
     far = ahead[steps[ahead - 1] > _LONGEST_NS]
     if len(far):
-        edges = np.array([0, *far.tolist(), len(own)])
-        best = int(np.argmax(np.diff(edges)))
-        lost = np.ones(len(own), np.bool_)
-        lost[edges[best] : edges[best + 1]] = False
+        if span is None:
+            edges = np.array([0, *far.tolist(), len(own)])
+            best = int(np.argmax(np.diff(edges)))
+            part = own[edges[best] : edges[best + 1]]
+            span = course.span = (int(part.min()), int(part.max()))
+        lost = (own < span[0] - _LONGEST_NS) | (own > span[1] + _LONGEST_NS)
         course.kept[rows[lost]] = False
         course.damage.append(
             f"{label}: its stamps jump ahead by {_seconds(float(steps[far[0] - 1]))}, more than a recording pauses; the "

@@ -229,6 +229,34 @@ def test_table_clock(tmp_path: Path, case: str) -> None:
         assert any(word in text for text in said), (word, said)
 
 
+def test_both_clocks_unset_until_4_s(tmp_path: Path) -> None:
+    header = np.where(TRUE < 4 * S, S + TRUE, GOOD)
+    signals, said = read(write_log(tmp_path / "a.mcap", header, header + LATE))
+    for name in ("wheel.FR.v", "wheel.FL.v"):
+        assert len(signals.items[name].stamps) == 400
+        assert worst(signals, name) <= 1.0
+        assert signals.items[name].values[0] == 4.0
+    assert sum("200 samples on the other side" in text for text in said) == 2
+
+
+def test_both_clocks_set_back_within_the_log(tmp_path: Path) -> None:
+    header = GOOD + after(8, -5 * S)
+    signals, said = read(write_log(tmp_path / "a.mcap", header, header + LATE))
+    for name in ("wheel.FR.v", "wheel.FL.v"):
+        assert len(signals.items[name].stamps) == N
+        assert worst(signals, name) <= 1.0
+    assert sum("set back once" in text for text in said) == 2
+
+
+def test_chunks_out_of_order_are_sorted(tmp_path: Path) -> None:
+    order = np.concatenate([np.arange(0, 200), np.arange(400, 600), np.arange(200, 400)])
+    stamps = GOOD[order]
+    signals, said = read(write_log(tmp_path / "a.mcap", stamps, stamps + LATE))
+    assert np.array_equal(signals.items["wheel.FR.v"].stamps, GOOD)
+    assert np.array_equal(signals.items["wheel.FR.v"].values[200:400], np.arange(400, 600) * STEP / S)
+    assert not any("set back" in text or "left out" in text for text in said)
+
+
 def test_samples_left_out_are_damage(tmp_path: Path) -> None:
     path = write_table(tmp_path / "a.csv", at([10], [0])(GOOD))
     machine = replace(haulotte(), sources={"*": SourceOptions(time="time_ns", time_unit="ns")})
