@@ -146,11 +146,23 @@ def _fits(data, at, stop):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
+def _packed(data, at, stop):  # type: ignore[no-untyped-def]
+    """Whether a zstd or lz4 frame begins where that of a chunk would."""
+    for text in (3, 4):
+        p = at + 49 + text
+        if p + 4 <= stop and (_u32(data, p) == np.uint64(0xFD2FB528) or _u32(data, p) == np.uint64(0x184D2204)):
+            return True
+    return False
+
+
+@njit(cache=True)
 def _mended(data, at, stop):  # type: ignore[no-untyped-def]
     """End of a record whose opcode, content or length is wrong, where something else tells it, else −1."""
     end = _end(data, at, stop)
     if end >= 0 and (end == stop or _fits(data, end, stop) >= 0):
         return end
+    if data[at] != CHUNK and not _packed(data, at, stop):
+        return np.int64(-1)
     for text in (0, 3, 4):
         if at + 49 + text > stop or _u32(data, at + 37) != np.uint64(text):
             continue
@@ -166,16 +178,6 @@ def _mended(data, at, stop):  # type: ignore[no-untyped-def]
 def _named(data, at, named):  # type: ignore[no-untyped-def]
     """Whether the record is no message, or one of a channel that is named."""
     return data[at] != MESSAGE or named[np.int64(_u16(data, at + 9))] > 0
-
-
-@njit(cache=True)
-def _packed(data, at, stop):  # type: ignore[no-untyped-def]
-    """Whether a zstd or lz4 frame begins where that of a chunk would."""
-    for text in (3, 4):
-        p = at + 49 + text
-        if p + 4 <= stop and (_u32(data, p) == np.uint64(0xFD2FB528) or _u32(data, p) == np.uint64(0x184D2204)):
-            return True
-    return False
 
 
 @njit(cache=True)

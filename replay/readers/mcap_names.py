@@ -18,7 +18,7 @@ class Names:
     """The schemas and channels met so far.
 
     Copies of one record must agree. Where they do not, one that stood under a checksum is believed before one that did
-    not, and the first among equals.
+    not, one among the data before the summary's, and the first among equals.
 
     Parameters
     ----------
@@ -33,7 +33,7 @@ class Names:
 
     def __init__(self, lost: Callable[[str, str], None]) -> None:
         self._lost = lost
-        self._known: dict[tuple[int, int], tuple[bytes, bool]] = {}
+        self._known: dict[tuple[int, int], tuple[bytes, int]] = {}
         self._schemas: dict[int, Schema] = {}
         self._channels: dict[int, Channel] = {}
         self._connections: dict[int, Connection] = {}
@@ -50,12 +50,26 @@ class Names:
         """Connections by channel number, in the order met."""
         return {number: self._connection(number) for number in self._channels}
 
-    def take(self, op: int, raw: bytes, verified: bool, place: str) -> None:
-        """Take a schema or channel record; a damaged one is said and left out."""
-        key = (op, int.from_bytes(raw[:2], "little"))
+    def take(self, op: int, raw: bytes, verified: bool, place: str, data: bool = True) -> None:
+        """Take a schema or channel record; a damaged one is said and left out.
+
+        Parameters
+        ----------
+        op : int
+            Its opcode.
+        raw : bytes
+            Its content.
+        verified : bool
+            Whether it stood under a checksum that is right.
+        place : str
+            Where it stood, in words.
+        data : bool
+            Whether it stood among the data, not in the summary.
+        """
+        key, rank = (op, int.from_bytes(raw[:2], "little")), 2 * verified + data
         known = self._known.get(key)
         if known is not None and known[0] == raw:
-            self._known[key] = (raw, known[1] or verified)
+            self._known[key] = (raw, max(known[1], rank))
             return
         what = "schema" if op == fmt.SCHEMA else "channel"
         try:
@@ -66,13 +80,13 @@ class Names:
             self._lost("name", f"the {what} record {place} is damaged ({type(error).__name__})")
             return
         if known is not None:
-            better = verified and not known[1]
+            better = rank > known[1]
             if record != (self._schemas if op == fmt.SCHEMA else self._channels)[key[1]]:
                 taken = "the one" if better else "the first, not the one"
                 self._lost("name", f"two copies of {what} {key[1]} differ; {taken} {place} was taken")
             if not better:
                 return
-        self._known[key] = (raw, verified)
+        self._known[key] = (raw, rank)
         self._connections.clear()
         if isinstance(record, Schema):
             self._schemas[record.id] = record

@@ -15,7 +15,7 @@ from replay.readers.mcap_file import McapFile
 from replay.readers.mcap_records import BAD_RECORD, DataEnd, Header, Metadata, parse
 from replay.readers.mcap_summary import Summary, read_summary, summary_from
 
-_MOST_RECORDS = 1 << 20
+_MOST_RECORDS = 1 << 18
 
 
 def walk_file(file: McapFile) -> None:
@@ -76,7 +76,11 @@ def _say_ending(file: McapFile, rows: NDArray[np.int64], closed: bool) -> None:
 
 def _take_rows(file: McapFile, rows: NDArray[np.int64], closed: bool) -> None:
     op = rows[:, 0]
-    file.runs = [(a, b) for a, b in rows[op == fmt.MESSAGE][:, 1:3].tolist()]
+    runs = rows[op == fmt.MESSAGE]
+    file.runs = [(a, b) for a, b in runs[:_MOST_RECORDS, 1:3].tolist()]
+    if len(runs) > _MOST_RECORDS:
+        count, at = int(runs[_MOST_RECORDS:, 3].sum()), int(runs[_MOST_RECORDS, 1])
+        file.lost("record", f"{count} messages behind byte {at} were left out: the log is damaged in too many places")
     chunk = rows[op == fmt.CHUNK]
     file.chunks = np.concatenate((chunk[:, 1:3], scan.chunk_times(file.data, chunk)), axis=1)
     for _, start, _, _ in chunk[chunk[:, 3] == fmt.MENDED].tolist():
@@ -203,7 +207,7 @@ def _add_listed(file: McapFile, rows: NDArray[np.int64], listed: NDArray[np.int6
 def take_listed_names(file: McapFile, summary: Summary) -> None:
     """Take the schemas and channels that the summary repeats."""
     for op, raw, at in summary.names:
-        file.names.take(op, raw, summary.checked, f"in the summary at byte {at}")
+        file.names.take(op, raw, summary.checked, f"in the summary at byte {at}", data=False)
 
 
 def listed_chunks(summary: Summary) -> NDArray[np.int64]:
