@@ -53,7 +53,13 @@ def estimate(
         What was found; the lag [s] over the seconds since the other file's first stamp, to which the third, the distance
         of the two first stamps [ns], is to be added. None where nothing was found.
     """
-    unknown = SourceClock(sources[1], sources[0], "as recorded")
+    with np.errstate(all="ignore"):  # damaged logs hold any bits
+        return _estimate(reference, other, SourceClock(sources[1], sources[0], "as recorded"))
+
+
+def _estimate(
+    reference: Mapping[str, Signal], other: Mapping[str, Signal], unknown: SourceClock
+) -> tuple[SourceClock, Line | None, int]:
     spans = [_span(reference), _span(other)]
     if spans[0] is None or spans[1] is None:
         return replace(unknown, reason="one of them holds no signal of the machine"), None, 0
@@ -69,6 +75,8 @@ def estimate(
         return replace(unknown, reason=reason), None, 0
     line = fit_line(shared, found.lag_s, found.at_s)
     reason = line.reason or _steps(shared, line)
+    if not reason and not np.isfinite([line.lag_s, line.drift, *line.covariance.ravel()]).all():
+        reason = "their stamps or values are damaged"
     if reason:
         return replace(unknown, reason=reason), None, 0
     ends = np.array([0.0, (spans[1][1] - spans[1][0]) * 1e-9])
@@ -77,8 +85,14 @@ def estimate(
     moved = ends + line.lag(ends)
     overlap = min(moved[1], (spans[0][1] - origins[0]) * 1e-9) - max(moved[0], 0.0)
     method: Method = "estimated" if float(np.abs(offset).max()) > uncertainty else "common"
-    clock = SourceClock(
-        sources[1], sources[0], method, float(offset[0]), line.drift * 1e6, uncertainty, line.signals, float(overlap)
+    clock = replace(
+        unknown,
+        method=method,
+        offset_s=float(offset[0]),
+        drift_ppm=line.drift * 1e6,
+        uncertainty_s=uncertainty,
+        signals=line.signals,
+        overlap_s=float(overlap),
     )
     return clock, line, between
 

@@ -178,6 +178,8 @@ def _without_holds(t: Array, x: Array) -> tuple[Array, Array]:
         return t, x
     spacing = np.diff(t[change])
     usual = float(np.median(spacing))
+    if not usual > 0:
+        return t, x
     turns = spacing / usual
     regular = float((np.abs(turns - np.rint(turns)) < 0.15).mean())
     if usual < 2.5 * float(np.median(np.diff(t))) or regular < 0.9:
