@@ -43,7 +43,9 @@ def _sums(channels: NDArray[np.int64], counts: NDArray[np.int64]) -> dict[int, i
     return {int(c): int(sums[c]) for c in np.flatnonzero(sums)}
 
 
-def account(file: McapFile, tally: scan.Tally, topics: Collection[str] | None, skipped: set[int]) -> list[int]:
+def account(
+    file: McapFile, tally: scan.Tally, topics: Collection[str] | None, skipped: set[int], opened: bool = True
+) -> list[int]:
     """Say what is missing, channel by channel.
 
     Parameters
@@ -56,6 +58,8 @@ def account(file: McapFile, tally: scan.Tally, topics: Collection[str] | None, s
         What was wanted.
     skipped : set[int]
         Rows of chunks that were not opened because they hold no wanted message.
+    opened : bool
+        Whether the other chunks were opened; else their indexes were believed.
 
     Returns
     -------
@@ -81,7 +85,9 @@ def account(file: McapFile, tally: scan.Tally, topics: Collection[str] | None, s
     _say_missing_schemas(file)
     _say_unknown(file, bool(short))
     if file.statistics is not None and file.summary is not None and file.summary.sound:
-        _compare(file, tally, file.statistics, whole=topics is None and not skipped and not short)
+        _compare(file, file.statistics, names=opened and not skipped)
+        if topics is None and not skipped and not short:
+            _compare_stamps(file, tally, file.statistics)
     return []
 
 
@@ -102,30 +108,37 @@ def _say_unknown(file: McapFile, short: bool) -> None:
         file.lost("record", text)
 
 
-def _compare(file: McapFile, tally: scan.Tally, stated: Statistics, whole: bool) -> None:
-    """Hold the other counts and the time bounds against what was found."""
-    chunks = len(file.chunks)
-    for what, said, found in (
-        ("chunks", stated.chunk_count, chunks),
+def _compare(file: McapFile, stated: Statistics, names: bool) -> None:
+    """Hold the other counts against what was found; names may stand in chunks that were not opened."""
+    found = [
+        ("chunks", stated.chunk_count, len(file.chunks)),
         ("attachments", stated.attachment_count, len(file.attachments)),
         ("metadata records", stated.metadata_count, file.metadata_count),
-        ("schemas", stated.schema_count, file.names.schema_count),
-        ("channels", stated.channel_count, len(file.names.channels)),
-    ):
-        if found < said:
-            file.lost("count", f"{found} of {said} {what} that the log's statistics count were found")
-        elif found > said and what not in ("schemas", "channels"):  # some writers count only those with messages
-            file.report.note(f"{file.path.name}: {found} {what} were found, its statistics count {said}")
+    ]
+    for what, said, count in found:
+        if count > said:
+            file.report.note(f"{file.path.name}: {count} {what} were found, its statistics count {said}")
+    if names:  # some writers count only those with messages
+        found.append(("schemas", stated.schema_count, file.names.schema_count))
+        found.append(("channels", stated.channel_count, len(file.names.channels)))
+    for what, said, count in found:
+        if count < said:
+            file.lost("count", f"{count} of {said} {what} that the log's statistics count were found")
+
+
+def _compare_stamps(file: McapFile, tally: scan.Tally, stated: Statistics) -> None:
+    """Hold the time bounds against what was found; a difference is the writer's where checksums cover the messages."""
     first, last = (int(b) for b in tally.bounds)
-    if whole and last >= 0 and (first, last) != (stated.message_start_time, stated.message_end_time):
-        text = (
-            f"its log stamps reach from {first} to {last} ns, its statistics say {stated.message_start_time} to "
-            f"{stated.message_end_time}"
-        )
-        if file.bare or file.runs:
-            file.lost("stamps", text)
-        else:
-            file.report.note(f"{file.path.name}: {text}")
+    if last < 0 or (first, last) == (stated.message_start_time, stated.message_end_time):
+        return
+    text = (
+        f"its log stamps reach from {first} to {last} ns, its statistics say {stated.message_start_time} to "
+        f"{stated.message_end_time}"
+    )
+    if (file.bare or file.runs) and first:  # some writers take a first stamp of 0 for none
+        file.lost("stamps", text)
+    else:
+        file.report.note(f"{file.path.name}: {text}")
 
 
 def check_data(file: McapFile, whole: bool) -> None:
@@ -168,7 +181,7 @@ def counts_of(file: McapFile) -> tuple[Mapping[int, int], tuple[int, int]]:
         walk_file(file)
         tally = _survey(file)
         if not file.read_whole:
-            account(file, tally, None, set())
+            account(file, tally, None, set(), opened=False)
         counts, bounds = _held(tally)
     if file.read_whole and file.read_topics is not None:
         for number, connection in file.names.channels.items():

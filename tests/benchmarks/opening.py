@@ -81,8 +81,8 @@ def peer_windows(path: Path, window: tuple[int, int]) -> dict[str, Callable[[], 
         def with_mcap() -> int:
             with path.open("rb") as file:
                 reader = make_reader(file, decoder_factories=[DecoderFactory()])
-                found = reader.iter_decoded_messages([TOPIC], window[0], window[1], log_time_order=False)
-                return sum(1 for _ in found)
+                times: Any = {"starting_at": window[0], "ending_before": window[1]}
+                return sum(1 for _ in reader.iter_decoded_messages([TOPIC], log_time_order=False, **times))
 
         runs["mcap + mcap-ros2-support"] = with_mcap
     except ImportError:

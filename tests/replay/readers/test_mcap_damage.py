@@ -433,3 +433,31 @@ def test_a_window_opens_only_the_chunks_inside_it(tmp_path: Path) -> None:
     assert log.channels[f"{FAST}.data"].values.tolist() == list(range(200, 210))
     assert log.summary.damage == ()
     assert read_log(path, OPTIONS).summary.damage
+
+
+@pytest.mark.parametrize("window", [None, (T0, T0 + COUNT * STEP)])
+def test_chunks_without_the_wanted_topic_are_not_opened(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, window: tuple[int, int] | None
+) -> None:
+    path = tmp_path / "log.mcap"
+    with path.open("wb") as file:
+        writer = Writer(file, chunk_size=1000, repeat_channels=False, repeat_schemas=False)
+        writer.start()
+        schema = writer.register_schema("p/msg/T", "ros2msg", b"float64 data")
+        first, second = (writer.register_channel(t, "cdr", schema) for t in (FAST, SLOW))
+        for i in range(COUNT):
+            data = b"\0\1\0\0" + struct.pack("<d", i)
+            writer.add_message(first if i < 250 else second, T0 + i * STEP, data, T0 + i * STEP)
+        writer.finish()
+    opened: list[int] = []
+
+    def count(file: Any, row: int) -> Any:
+        opened.append(row)
+        return mcap_chunk.open_chunk(file, row)
+
+    monkeypatch.setattr(mcap, "open_chunk", count)
+    log = read_log(path, OPTIONS, [SLOW], "log", window)
+    np.testing.assert_array_equal(log.channels[f"{SLOW}.data"].values, np.arange(250, COUNT))
+    assert len(opened) <= 4
+    assert log.summary.damage == ()
+    assert [t.count for t in log.summary.topics] == [250, 50]
