@@ -14,6 +14,7 @@ import os
 import tempfile
 import weakref
 from collections.abc import Callable, Iterator, Sequence
+from functools import cache
 from typing import IO, Any
 
 import numpy as np
@@ -64,6 +65,7 @@ class Column:
     def _flush(self) -> None:
         try:
             if self._file is None:
+                _allow_many_files()
                 self._file = tempfile.TemporaryFile(prefix="mfhca-")  # noqa: SIM115
             for part in self._parts:
                 self._file.write(part.data.cast("B") if part.size else b"")
@@ -109,6 +111,19 @@ def scratch(shape: tuple[int, ...], dtype: DTypeLike) -> NDArray[Any]:
         raise _no_room(error) from error
     _MAPS.add(mapped)
     return np.frombuffer(mapped, kind).reshape(shape)
+
+
+@cache
+def _allow_many_files() -> None:
+    """Let the process hold a file per column, as far as the system allows."""
+    try:
+        import resource
+    except ImportError:  # Windows has no such limit
+        return
+    soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
+    most = 1 << 16 if hard == resource.RLIM_INFINITY else min(hard, 1 << 16)
+    if soft != resource.RLIM_INFINITY and soft < most:
+        resource.setrlimit(resource.RLIMIT_NOFILE, (most, hard))
 
 
 def _no_room(error: OSError) -> LogError:
