@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any, TypeAlias
@@ -37,6 +38,10 @@ _STORES = (
     Stores.ROS2_FOXY,
     Stores.ROS2_DASHING,
 )
+
+
+_IDL_FILE = re.compile(r"^=+[ \t\r]*\nIDL:[^\n]*\n", re.MULTILINE)
+_DIRECTIVE = re.compile(r"^[ \t]*#[^\n]*$", re.MULTILINE)
 
 
 class DefinitionError(Exception):
@@ -83,7 +88,7 @@ def resolve(name: str, encoding: str, text: str, ros1: bool) -> MessageType:
     name : str
         Message type as recorded.
     encoding : str
-        ``ros2msg``, ``ros1msg``, ``ros2idl`` or empty.
+        ``ros2msg``, ``ros1msg``, ``ros2idl``, ``omgidl`` or empty.
     text : str
         Definition as recorded; empty where the log holds none.
     ros1 : bool
@@ -108,10 +113,19 @@ def _parse(root: str, encoding: str, text: str) -> dict[str, Fields]:
     if len(text) > MAX_DEFINITION:
         raise DefinitionError(f"its definition has {len(text)} characters; at most {MAX_DEFINITION} are read")
     try:
-        parsed = get_types_from_idl(text) if encoding == "ros2idl" else get_types_from_msg(text, root)
+        parsed = _parse_idl(text) if encoding in ("ros2idl", "omgidl") else get_types_from_msg(text, root)
     except Exception as error:  # the parser raises many kinds on hostile text, RecursionError among them
         raise DefinitionError(f"its definition cannot be parsed ({type(error).__name__})") from error
     return {name: tuple(parts[1]) for name, parts in parsed.items()}
+
+
+def _parse_idl(text: str) -> dict[str, Any]:
+    """Parse IDL: one file, or several that lines ``IDL: name`` divide; they hold what they include."""
+    parsed: dict[str, Any] = {}
+    for file in _IDL_FILE.split(text):
+        if file.strip():
+            parsed.update(get_types_from_idl(_DIRECTIVE.sub("", file)))
+    return parsed
 
 
 @lru_cache(maxsize=1024)

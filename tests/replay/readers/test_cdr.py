@@ -187,3 +187,65 @@ def test_endless_sequences_of_nothing_are_refused() -> None:
     assert found == {"a": {0: 2.5, 21: 2.5}}
     assert outcome.bad == 20
     assert "parts" in outcome.reason
+
+
+IDL = f"""{BAR}
+IDL: p/msg/Outer
+// generated from rosidl_adapter/resource/msg.idl.em
+#include "builtin_interfaces/msg/Time.idl"
+#include "p/msg/Inner.idl"
+
+module p {{
+  module msg {{
+    typedef double double__2[2];
+    @verbatim (language="comment", text=
+      "Two lines" "\\n"
+      "# of comment")
+    struct Outer {{
+      builtin_interfaces::msg::Time stamp;
+      boolean ready;
+      sequence<p::msg::Inner> many;
+      @unit (value="m/s")
+      double__2 speeds;
+    }};
+  }};
+}};
+
+{BAR}
+IDL: p/msg/Inner
+module p {{
+  module msg {{
+    module Inner_Constants {{
+      const uint8 LEFT = 1;
+    }};
+    struct Inner {{
+      string<10> label;
+      octet side;
+      unsigned long long ticks;
+    }};
+  }};
+}};
+
+{BAR}
+IDL: builtin_interfaces/msg/Time
+module builtin_interfaces {{
+  module msg {{
+    struct Time {{
+      long sec;
+      unsigned long nanosec;
+    }};
+  }};
+}};
+"""
+
+
+@pytest.mark.parametrize("encoding", ["ros2idl", "omgidl"])
+def test_definitions_in_idl_decode_like_the_same_in_msg(encoding: str) -> None:
+    text = f"builtin_interfaces/Time stamp\nbool ready\np/Inner[] many\nfloat64[2] speeds\n{BAR}\nMSG: p/Inner\n"
+    text += f"string<=10 label\nbyte side\nuint64 ticks\n{BAR}\nMSG: builtin_interfaces/Time\nint32 sec\nuint32 nanosec"
+    inner = b"\3\0\0\0ab\0\1" + struct.pack("<Q", 2**60), b"\1\0\0\0\0\2\0\0" + struct.pack("<Q", 7)
+    payload = b"\0\1\0\0" + struct.pack("<iIB3xI", -1, 5, 1, 2) + b"".join(inner) + struct.pack("<2d", 0.5, -2)
+    idl, outcome = columns(resolve("p/msg/Outer", encoding, IDL, False), [payload])
+    assert outcome.bad == 0, outcome.reason
+    assert idl == columns(resolve("p/msg/Outer", "ros2msg", text, False), [payload])[0]
+    assert (idl["stamp.sec"], idl["many[0].ticks"], idl["speeds[1]"]) == ({0: -1}, {0: 2**60}, {0: -2.0})
