@@ -109,7 +109,7 @@ def _course(label: str, stamps: Stamps, rows_in_order: bool, span: tuple[int, in
     back = np.flatnonzero(steps < -limit) + 1
     if not rows_in_order and 0 < len(back) <= _MOST:
         back = np.array([k for k in back.tolist() if _twice(own, k, back)], np.int64)
-    if len(back) > _MOST:
+    if len(back) > _MOST or float(np.abs(steps[back - 1].astype(np.float64)).sum()) > 2.0**61:
         course.notes.append(f"{label}: its stamps run backwards {len(back)} times; they were sorted")
     elif len(back):
         own = _continued(own, back, usual)

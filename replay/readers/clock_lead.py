@@ -56,7 +56,8 @@ class Lead:
 
     def to_header(self, log: NDArray[np.int64]) -> NDArray[np.int64]:
         """Header stamps that messages with these log stamps would carry."""
-        moved: NDArray[np.int64] = log + self.ahead[0] + np.rint(self.rate * (log - self.at[0])).astype(np.int64)
+        drift = np.clip(self.rate * (log.astype(np.float64) - self.at[0]), -(2.0**61), 2.0**61)
+        moved: NDArray[np.int64] = log + self.ahead[0] + np.rint(drift).astype(np.int64)
         return moved
 
 
