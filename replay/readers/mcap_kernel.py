@@ -33,27 +33,9 @@ from replay.readers.mcap_format import (
     STATISTICS,
     SUMMARY_OFFSET,
 )
+from replay.readers.mcap_numbers import u16, u32, u64
 
 _SLACK = 64
-
-
-# The indexes below are unsigned, so that none is checked for counting from the end, and a number becomes one load.
-
-
-@njit(cache=True)
-def _u16(data, at):  # type: ignore[no-untyped-def]
-    p = np.uint64(at)
-    return np.uint64(data[p]) | np.uint64(data[p + np.uint64(1)]) << np.uint64(8)
-
-
-@njit(cache=True)
-def _u32(data, at):  # type: ignore[no-untyped-def]
-    return _u16(data, at) | _u16(data, np.uint64(at) + np.uint64(2)) << np.uint64(16)
-
-
-@njit(cache=True)
-def _u64(data, at):  # type: ignore[no-untyped-def]
-    return _u32(data, at) | _u32(data, np.uint64(at) + np.uint64(4)) << np.uint64(32)
 
 
 @njit(cache=True)
@@ -61,7 +43,7 @@ def _end(data, at, stop):  # type: ignore[no-untyped-def]
     """End of the record by its length, or −1 where it leaves the bytes."""
     if at + 9 > stop:
         return np.int64(-1)
-    length = _u64(data, at + 1)
+    length = u64(data, at + 1)
     if length > np.uint64(stop - at - 9):
         return np.int64(-1)
     return np.int64(at + 9) + np.int64(length)
@@ -73,7 +55,7 @@ def _over(data, at, end, parts):  # type: ignore[no-untyped-def]
     for _ in range(parts):
         if at < 0 or at + 4 > end:
             return np.int64(-1)
-        size = np.int64(_u32(data, at))
+        size = np.int64(u32(data, at))
         if size > end - at - 4:
             return np.int64(-1)
         at += 4 + size
@@ -85,10 +67,10 @@ def _chunk_fits(data, at, end):  # type: ignore[no-untyped-def]
     """Whether a record of any opcode has the content of a chunk: the packed size ends where the record does."""
     if end - at < 49:
         return False
-    text = np.int64(_u32(data, at + 37))
+    text = np.int64(u32(data, at + 37))
     if text > 16 or at + 49 + text > end:
         return False
-    packed = _u64(data, at + 41 + text)
+    packed = u64(data, at + 41 + text)
     left = end - at - 49 - text
     return packed <= np.uint64(left) and np.int64(packed) >= left - _SLACK
 
@@ -129,9 +111,9 @@ def _fits(data, at, stop):  # type: ignore[no-untyped-def]
             last += 16
     elif op == ATTACHMENT:
         last = _over(data, body + 16, end, 2)
-        if last < 0 or last + 12 > end or _u64(data, last) > np.uint64(end - last - 12):
+        if last < 0 or last + 12 > end or u64(data, last) > np.uint64(end - last - 12):
             return np.int64(-1)
-        last += 12 + np.int64(_u64(data, last))
+        last += 12 + np.int64(u64(data, last))
     elif op == FOOTER:
         last = body + 20
     elif op == DATA_END:
@@ -150,7 +132,7 @@ def _packed(data, at, stop):  # type: ignore[no-untyped-def]
     """Whether a zstd or lz4 frame begins where that of a chunk would."""
     for text in (3, 4):
         p = at + 49 + text
-        if p + 4 <= stop and (_u32(data, p) == np.uint64(0xFD2FB528) or _u32(data, p) == np.uint64(0x184D2204)):
+        if p + 4 <= stop and (u32(data, p) == np.uint64(0xFD2FB528) or u32(data, p) == np.uint64(0x184D2204)):
             return True
     return False
 
@@ -164,9 +146,9 @@ def _mended(data, at, stop):  # type: ignore[no-untyped-def]
     if data[at] != CHUNK and not _packed(data, at, stop):
         return np.int64(-1)
     for text in (0, 3, 4):
-        if at + 49 + text > stop or _u32(data, at + 37) != np.uint64(text):
+        if at + 49 + text > stop or u32(data, at + 37) != np.uint64(text):
             continue
-        packed = _u64(data, at + 41 + text)
+        packed = u64(data, at + 41 + text)
         if packed and packed <= np.uint64(stop - at - 49 - text):
             end = np.int64(at + 49 + text) + np.int64(packed)
             if end < stop and _fits(data, end, stop) >= 0:
@@ -177,7 +159,7 @@ def _mended(data, at, stop):  # type: ignore[no-untyped-def]
 @njit(cache=True)
 def _named(data, at, named):  # type: ignore[no-untyped-def]
     """Whether the record is no message, or one of a channel that is named."""
-    return data[at] != MESSAGE or named[np.int64(_u16(data, at + 9))] > 0
+    return data[at] != MESSAGE or named[np.int64(u16(data, at + 9))] > 0
 
 
 @njit(cache=True)
@@ -211,7 +193,7 @@ def _resume(data, at, stop, named, packed):  # type: ignore[no-untyped-def]
 @njit(cache=True)
 def _cut(data, at, stop):  # type: ignore[no-untyped-def]
     """Whether a record that the end of the bytes cuts off may start here."""
-    return at + 9 > stop or (0 < data[at] <= DATA_END and _u64(data, at + 1) < np.uint64(1 << 40))
+    return at + 9 > stop or (0 < data[at] <= DATA_END and u64(data, at + 1) < np.uint64(1 << 40))
 
 
 @njit(cache=True)
@@ -242,7 +224,7 @@ def scan_walk(data, at, stop, inside, named, rows, counts, bounds, state):  # ty
             continue
         op = np.int64(data[at])
         if op == CHANNEL and end - at >= 11:
-            named[np.int64(_u16(data, at + 9))] = 1
+            named[np.int64(u16(data, at + 9))] = 1
         ended = op == FOOTER and flag == SOUND
         after, after_flag = np.int64(-1), SOUND
         if end < stop and not ended:
@@ -267,9 +249,9 @@ def scan_walk(data, at, stop, inside, named, rows, counts, bounds, state):  # ty
         if op != MESSAGE:
             resumed = False
         if op == MESSAGE and flag == SOUND:
-            channel = np.int64(_u16(data, at + 9))
+            channel = np.int64(u16(data, at + 9))
             counts[channel] += 1
-            stamp = np.int64(_u64(data, at + 15))
+            stamp = np.int64(u64(data, at + 15))
             if stamp >= 0:
                 bounds[0], bounds[1] = min(bounds[0], stamp), max(bounds[1], stamp)
         elif op == MESSAGE:
@@ -289,89 +271,3 @@ def scan_walk(data, at, stop, inside, named, rows, counts, bounds, state):  # ty
             break
     state[0], state[1], state[2], state[3] = end, flag, packed, resumed
     return n, at
-
-
-@njit(cache=True)
-def scan_census(data, at, stop, most, counts, touched, names, bounds):  # type: ignore[no-untyped-def]
-    """Count messages per channel over sound records, at most `most`; note channels met and name records."""
-    n, met, named, other = 0, 0, 0, 0
-    while at + 9 <= stop and n < most:
-        length = _u64(data, at + 1)
-        op = data[at]
-        if length > np.uint64(stop - at - 9) or op == 0:
-            break
-        if op == MESSAGE and length >= np.uint64(MESSAGE_HEAD):
-            channel = np.int64(_u16(data, at + 9))
-            if counts[channel] == 0:
-                touched[met] = channel
-                met += 1
-            counts[channel] += 1
-            n += 1
-            stamp = np.int64(_u64(data, at + 15))
-            if stamp >= 0:
-                bounds[0], bounds[1] = min(bounds[0], stamp), max(bounds[1], stamp)
-        elif op in (SCHEMA, CHANNEL):
-            if named < len(names):
-                names[named, 0], names[named, 1], names[named, 2] = op, at + 9, np.int64(length)
-            named += 1
-        else:
-            other += 1
-        at += 9 + np.int64(length)
-    return n, met, named, other, at
-
-
-@njit(cache=True)
-def scan_collect(data, at, stop, slot, first, last, body, size, log, publish):  # type: ignore[no-untyped-def]
-    """Place messages of wanted channels (slot ≥ 0) that lie in the window, grouped by channel."""
-    while at + 9 <= stop:
-        length = np.int64(_u64(data, at + 1))
-        if data[at] == MESSAGE and length >= MESSAGE_HEAD:
-            channel = np.int64(_u16(data, at + 9))
-            k = slot[channel]
-            if k >= 0:
-                stamp = np.int64(_u64(data, at + 15))
-                if first <= stamp <= last:
-                    body[k], size[k] = at + 9 + MESSAGE_HEAD, length - MESSAGE_HEAD
-                    log[k], publish[k] = stamp, np.int64(_u64(data, at + 23))
-                    slot[channel] = k + 1
-        at += 9 + length
-
-
-@njit(cache=True)
-def scan_chunk_heads(data, rows, out):  # type: ignore[no-untyped-def]
-    """First and last stamp of each chunk."""
-    for i in range(len(rows)):
-        at = rows[i, 1]
-        for k in range(2):
-            out[i, k] = np.int64(_u64(data, at + 9 + 8 * k))
-
-
-@njit(cache=True)
-def scan_index_heads(data, rows, out):  # type: ignore[no-untyped-def]
-    """Channel and number of entries of each message index."""
-    for i in range(len(rows)):
-        at = rows[i, 1]
-        out[i, 0] = np.int64(_u16(data, at + 9))
-        out[i, 1] = np.int64(_u32(data, at + 11)) // 16
-
-
-@njit(cache=True)
-def scan_chunk_indexes(data, rows, out, pairs):  # type: ignore[no-untyped-def]
-    """Fields of chunk index records, and (chunk, channel, offset) of their message indexes; returns their number."""
-    n = 0
-    for i in range(len(rows)):
-        at = rows[i, 1] + 9
-        for k in range(4):
-            out[i, k] = np.int64(_u64(data, at + 8 * k))
-        size = np.int64(_u32(data, at + 32)) // 10
-        for j in range(size):
-            p = at + 36 + 10 * j
-            pairs[n, 0], pairs[n, 1] = i, np.int64(_u16(data, p))
-            pairs[n, 2] = np.int64(_u64(data, p + 2))
-            n += 1
-        p = at + 36 + np.int64(_u32(data, at + 32))
-        out[i, 4] = np.int64(_u64(data, p))
-        text = np.int64(_u32(data, p + 8))
-        out[i, 5] = np.int64(_u64(data, p + 12 + text))
-        out[i, 6] = np.int64(_u64(data, p + 20 + text))
-    return n

@@ -7,15 +7,15 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from replay.readers.mcap_format import CHANNELS, FOOTER, SOUND
-from replay.readers.mcap_kernel import (
+from replay.readers.mcap_collect import (
     scan_census,
     scan_chunk_heads,
     scan_chunk_indexes,
     scan_collect,
     scan_index_heads,
-    scan_walk,
 )
+from replay.readers.mcap_format import CHANNELS, FOOTER, SOUND
+from replay.readers.mcap_kernel import scan_walk
 
 MAX_NAMES = 1 << 16
 BATCH = 1 << 19
