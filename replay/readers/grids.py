@@ -7,12 +7,17 @@ before that where they would outgrow memory.
 
 from __future__ import annotations
 
+import mmap
+import tempfile
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import Any
+from typing import IO, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from replay.errors import LogError
 from replay.readers.dialect import width_of
 from replay.readers.program import Spec
 from replay.spill import Column
@@ -44,13 +49,56 @@ class Budget:
         return True
 
 
-class _Spilled(Column):
-    """A column that goes to its file at once: many of them are long together, though none is alone."""
+class _Spill:
+    """Columns in one temporary file: many of them are long together, and each file of its own would be too many."""
 
-    def append(self, values: NDArray[Any]) -> None:
-        """Add a block and write it."""
-        super().append(values)
-        self._flush()
+    def __init__(self, dtypes: list[np.dtype[Any]]) -> None:
+        self.dtypes = dtypes
+        self.blocks: list[int] = []
+        self.file = _scratch()
+
+    def append(self, columns: Iterable[NDArray[Any]], rows: int) -> None:
+        """Add rows, column by column."""
+        with _room():
+            for column in columns:
+                self.file.write(np.ascontiguousarray(column).view(np.uint8).data)
+        self.blocks.append(rows)
+
+    def finish(self) -> list[NDArray[Any]]:
+        """Return all columns as views of one map of a file in which each stands in one piece."""
+        rows = sum(self.blocks)
+        first = np.cumsum([0, *((rows * d.itemsize + 63) // 64 * 64 for d in self.dtypes)]).tolist()
+        with self.file as file, _scratch() as joined:
+            if not rows or not first[-1]:
+                return [np.empty(rows, d) for d in self.dtypes]
+            with _room():
+                file.seek(0)
+                at = 0
+                for count in self.blocks:
+                    for start, dtype in zip(first, self.dtypes, strict=False):
+                        joined.seek(start + at * dtype.itemsize)
+                        joined.write(file.read(count * dtype.itemsize))
+                    at += count
+                joined.truncate(first[-1])
+                joined.flush()
+            mapped = mmap.mmap(joined.fileno(), 0, access=mmap.ACCESS_COPY)
+        return [np.frombuffer(mapped, d, rows, start) for d, start in zip(self.dtypes, first, strict=False)]
+
+
+def _scratch() -> IO[bytes]:
+    with _room():
+        return tempfile.TemporaryFile(prefix="mfhca-")
+
+
+@contextmanager
+def _room() -> Iterator[None]:
+    try:
+        yield
+    except OSError as error:
+        raise LogError(
+            f"the temporary folder {tempfile.gettempdir()} cannot take the log's columns: {error.strerror or error}; "
+            "set TMPDIR to a folder with more room"
+        ) from error
 
 
 class Grid:
@@ -92,7 +140,7 @@ class Table:
         self.grid = Grid(self.counts, 0)
         self.used = self.count = 0
         self.full: list[tuple[Grid, int]] = []
-        self.spilled: list[Column] | None = None
+        self.spilled: _Spill | None = None
         self.rows: Column | None = None
 
     @property
@@ -149,7 +197,7 @@ class Table:
     def spill(self) -> None:
         """Send everything to temporary files, and what comes later too."""
         if self.spilled is None:
-            self.spilled = [_Spilled(_stored(s)) for s in self.specs]
+            self.spilled = _Spill([np.dtype(_stored(s)) for s in self.specs])
             for grid, used in self.full:
                 self._spill(grid, used)
             self.full = []
@@ -158,8 +206,7 @@ class Table:
 
     def _spill(self, grid: Grid, used: int) -> None:
         assert self.spilled is not None
-        for spec, column in zip(self.specs, self.spilled, strict=True):
-            column.append(self._cells(grid, used, spec))
+        self.spilled.append((self._cells(grid, used, s) for s in self.specs), used)
 
     def _cells(self, grid: Grid, used: int, spec: Spec) -> NDArray[Any]:
         dtype = _stored(spec)
@@ -171,7 +218,7 @@ class Table:
         rows = None if self.rows is None else self.rows.finish()
         if self.spilled is not None:
             self._keep()
-            return rows, [c.finish() for c in self.spilled]
+            return rows, self.spilled.finish()
         if not self.full:
             return rows, [self._cells(self.grid, self.used, s) for s in self.specs]
         self._keep()

@@ -1,11 +1,14 @@
 from __future__ import annotations
 
+import tempfile
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 from rosbags.typesys import Stores, get_typestore
 
+from replay.errors import LogError
 from replay.rawlog import LogSummary, RawLog
 from replay.readers import assemble
 from replay.readers.assemble import Assembler, Block, Connection
@@ -94,6 +97,14 @@ def test_a_log_that_outgrows_memory_goes_to_files_and_comes_back_the_same(monkey
     monkeypatch.setattr(assemble, "_LOOK_EVERY", 1)
     for two in (False, True):
         assert contents(assembled(payloads(60), 7, two=two)) == wanted(60)
+
+
+def test_a_temporary_folder_that_takes_nothing_is_named(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setattr(assemble, "MEMORY", 1000)
+    monkeypatch.setattr(assemble, "_LOOK_EVERY", 1)
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / "absent"))
+    with pytest.raises(LogError, match="the temporary folder .*absent cannot take .*set TMPDIR"):
+        assembled(payloads(60), 7)
 
 
 def test_long_blocks_are_taken_in_parts(monkeypatch: pytest.MonkeyPatch) -> None:
