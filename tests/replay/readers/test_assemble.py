@@ -103,7 +103,7 @@ def test_a_temporary_folder_that_takes_nothing_is_named(monkeypatch: pytest.Monk
     monkeypatch.setattr(assemble, "MEMORY", 1000)
     monkeypatch.setattr(assemble, "_LOOK_EVERY", 1)
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / "absent"))
-    with pytest.raises(LogError, match="the temporary folder .*absent cannot take .*set TMPDIR"):
+    with pytest.raises(LogError, match=r"the temporary folder .*absent cannot take .*set TMPDIR"):
         assembled(payloads(60), 7)
 
 
