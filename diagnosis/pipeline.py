@@ -185,7 +185,15 @@ def _result(
         "metrics": metrics.loop_metrics(timeline, replay, machine, moving),
         "signals": quality.signal_rows(mission.signals, timeline),
         "missing": quality.missing_rows(mission.signals, machine),
-        "quality": quality.checks(mission.signals, timeline, damage, notes, found.assessments, found.wheel_model),
+        "quality": quality.checks(
+            mission.signals,
+            timeline,
+            damage,
+            notes,
+            found.assessments,
+            found.wheel_model,
+            [f.clock for f in mission.files if f.clock is not None],
+        ),
         "limits": machine.limits,
     }
     columns: dict[str, Array] = dict(replay_columns(timeline, replay, machine))
@@ -249,6 +257,7 @@ def _log(mission: Mission, moving: NDArray[np.bool_], machine: Machine) -> dict[
                 "format": f.format,
                 "damage": list(f.summary.damage),
                 "notes": list(f.summary.notes),
+                "clock": quality.clock_row(f.clock),
             }
             for f in mission.files
         ],

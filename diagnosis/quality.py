@@ -14,6 +14,7 @@ from diagnosis.noise import rounding_step
 from diagnosis.wheel_model import WheelModelFit
 from replay.machine import Machine
 from replay.signals import Signal, Signals
+from replay.source_clock import SourceClock
 from replay.spill import blocks, release
 from replay.timeline import Timeline
 
@@ -93,6 +94,7 @@ def checks(
     notes: Sequence[str],
     assessments: Mapping[tuple[str, str], Assessment],
     model: WheelModelFit | None,
+    clocks: Sequence[SourceClock] = (),
 ) -> list[dict[str, Any]]:
     """Checks of the data with their effect on the verdict."""
     rows: list[dict[str, Any]] = []
@@ -140,11 +142,41 @@ def checks(
         row(
             "Wheel model", model.note, "none" if model.reliable else "gains and valves are not assessed", model.reliable
         )
+    for clock in clocks:
+        if clock.sentence:
+            row("Clock", clock.sentence, *_effect_of(clock))
+    told = {clock.sentence for clock in clocks}
     for text in dict.fromkeys((*signals.notes, *timeline.notes, *notes)):
-        row("Note", text, "see text")
+        if text not in told:
+            row("Note", text, "see text")
     for text in dict.fromkeys(note for a in assessments.values() for note in a.notes):
         row("Evidence", text)
     return rows
+
+
+def _effect_of(clock: SourceClock) -> tuple[str, bool]:
+    """What a source's clock means for the verdict, and whether all is well."""
+    if clock.reason:
+        return "delays between the files are not known: what one file says of another's signals may be off", False
+    if clock.uncertainty_s is None:
+        return "times are as good as what the machine file says", True
+    return f"times of one file on the other's axis are right within ±{1e3 * clock.uncertainty_s:.2g} ms (95 %)", True
+
+
+def clock_row(clock: SourceClock | None) -> dict[str, Any] | None:
+    """How a file's clock was put onto the mission's, for ``report.json``; None for a mission of one file."""
+    if clock is None or (clock.method == "reference" and not clock.reference):
+        return None
+    return {
+        "reference": PurePath(clock.reference).name,
+        "method": clock.method,
+        "offset_s": clock.offset_s,
+        "drift_ppm": clock.drift_ppm,
+        "uncertainty_s": clock.uncertainty_s,
+        "signals": list(clock.signals),
+        "overlap_s": clock.overlap_s,
+        "reason": clock.reason,
+    }
 
 
 def _jitter_ms(signals: Signals, timeline: Timeline) -> float:
