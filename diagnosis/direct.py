@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,9 +14,9 @@ from numpy.typing import NDArray
 from diagnosis import modes
 from diagnosis.assessment import CODE, Assessment, Finding
 from diagnosis.boundary import Channel, refine
+from diagnosis.direct_evidence import evidence_columns, sentences
 from diagnosis.estimate import estimate_fault
 from diagnosis.fault_runs import fault_runs, inner
-from diagnosis.kalman import GainBiasModel, track_gain_bias
 from diagnosis.mode_path import ModePath, most_probable
 from diagnosis.noise import relative_lag, shifted, unresolved
 from diagnosis.pairs import Pair, mode_model, neighbours, sample_status, timing_explains, unsettled
@@ -25,10 +24,9 @@ from diagnosis.result import Epsilon, Hypothesis, Sat
 from diagnosis.screen import screened
 from diagnosis.segments import Run, with_leads
 from diagnosis.steady import FLICKER_S, steadied
-from replay.envelope import bucket_of, envelope, in_buckets
 from replay.faults import FaultMode, Side, State
 from replay.machine import Limits
-from replay.spill import Column, blocks, in_blocks, keep, release
+from replay.spill import keep
 
 Array = NDArray[np.float64]
 
@@ -47,7 +45,6 @@ _HOLD_S = 0.1
 _COARSE_COST = 0.2  # where a log is too slow for its commands, what is left of them looks like a fault's drift
 _LEAD_S, _TAIL_S, _CHAIN_S = 0.3, 0.1, 0.05
 _SAID_S = 0.1
-_SERIES = ("residual", "threshold", "expected", "delta", "delta_std", "delta_bar", "delta_bar_std")
 
 
 def assess_pair(pair: Pair, limits: Limits) -> Assessment:
@@ -117,7 +114,7 @@ def assess_pair(pair: Pair, limits: Limits) -> Assessment:
             else "what deviates may be a delay or the rounding of the channel",
         },
         findings=tuple(findings),
-        columns=_columns(pair, x, status, model, path),
+        columns=evidence_columns(pair, x, status, model, path),
         tier="direct",
         notes=tuple(notes),
     )
@@ -214,7 +211,7 @@ def _finding(
         return None  # the command hardly moved: a noisy reading of it looks constant too
     if mode is FaultMode.NOISY and deviation < max(2.5 * model.noise, limits.min_sat / 2):
         return None
-    lines = _sentences(run.row, mode, pair, y, ref, use, st, model, epsilon, sat, gain, deviation)
+    lines = sentences(run.row, mode, pair, y, ref, use, st, model, epsilon, sat, gain, deviation)
     if run.row in (modes.STUCK, modes.INEFFICIENT) and still:
         # nothing moved: a constant value and a constant share of a constant are the same
         p[modes.STUCK] = p[modes.INEFFICIENT] = (p[modes.STUCK] + p[modes.INEFFICIENT]) / 2
@@ -252,53 +249,6 @@ def _with_lapses(p: Array, row: int, seconds: float | None) -> Array:
     return out
 
 
-def _sentences(
-    row: int,
-    mode: FaultMode,
-    pair: Pair,
-    y: Array,
-    x: Array,
-    use: NDArray[np.bool_],
-    status: NDArray[np.int8],
-    model: modes.ModeModel,
-    epsilon: Epsilon | None,
-    sat: Sat | None,
-    gain: float,
-    deviation: float,
-) -> tuple[str, ...]:
-    """What decided, in figures."""
-    out = []
-    seconds = y.size * pair.dt
-    silent = int(np.count_nonzero(status == modes.SILENT))
-    if silent:
-        out.append(
-            f"{pair.y_name} delivered nothing for {silent * pair.dt:.3f} s while other channels of its source did."
-        )
-    if use.any() and row in (modes.STUCK, modes.NO_SIGNAL):
-        out.append(
-            f"{pair.y_name} stayed within {float(np.ptp(y[use])):.2g} {pair.unit} of {float(np.mean(y[use])):.4g} {pair.unit} "
-            f"for {seconds:.3f} s while {pair.x_name} moved over {float(np.ptp(x[use])):.2g} {pair.unit}."
-        )
-    elif use.any() and epsilon is not None:
-        out.append(
-            f"{pair.y_name} followed {1 - epsilon.value:.3f} × {pair.x_name} (95 %: {1 - epsilon.high:.3f} to "
-            f"{1 - epsilon.low:.3f}) over {seconds:.3f} s."
-        )
-        if sat is not None:
-            out.append(
-                f"The rest has a mean of {sat.mean * epsilon.value:.3g} and a root mean square of {sat.rms * epsilon.value:.3g} "
-                f"{pair.unit}; healthy noise is {model.noise:.2g} {pair.unit}."
-            )
-    if use.any():
-        out.append(
-            f"Residual {deviation:.3g} {pair.unit} root mean square; threshold {3 * model.noise:.2g} {pair.unit}."
-        )
-    if mode is FaultMode.OUTSIDE_TABLE:
-        out.append("The gain lies outside 0…1, which no row of the table describes.")
-    out.append(f"Log-evidence against healthy: {gain:.0f}; a fault is considered from {model.switch_cost:.0f}.")
-    return tuple(out)
-
-
 def _states(
     pair: Pair, x: Array, status: NDArray[np.int8], blind: NDArray[np.bool_], findings: list[Finding]
 ) -> NDArray[np.int8]:
@@ -313,35 +263,3 @@ def _states(
     for f in findings:
         states[f.start : f.stop] = CODE[State(f.mode.value)]
     return states
-
-
-def _columns(
-    pair: Pair, x: Array, status: NDArray[np.int8], model: modes.ModeModel, path: ModePath
-) -> dict[str, NDArray[Any]]:
-    """Series for the evidence plots."""
-    bucket = bucket_of(x.size)
-    tracked = GainBiasModel(
-        noise=model.noise,
-        gain_walk=0.3,
-        bias_walk=0.1 * pair.span,
-        gain_std=0.3,
-        bias_std=0.3 * pair.span,
-        relax_s=5.0,
-        dt=pair.dt,
-    )
-    columns = {name: Column(np.float64 if bucket == 1 else np.float32) for name in _SERIES}
-    state = None
-    for part in blocks(x.size):
-        use, y, ref = status[part] == modes.PAIR, pair.y[part], x[part]
-        track = track_gain_bias(y, ref, use, tracked, state)
-        state = track.state
-        residual, threshold = np.where(use, y - ref, np.nan), np.full(y.size, 3 * model.noise)
-        series = (residual, threshold, ref, track.delta, track.delta_std, track.bias, track.bias_std)
-        for column, values in zip(columns.values(), series, strict=True):
-            column.append(envelope(values, bucket))
-        release(pair.y, x)
-    out = {name: column.finish() for name, column in columns.items()}
-    rows = in_buckets(np.asarray, bucket, path.filtered)
-    out["probability"] = in_blocks(lambda p: np.float32(1.0) - p[:, modes.HEALTHY], rows)
-    out.update({f"p_{name}": rows[:, i] for i, name in enumerate(modes.ROWS)})
-    return out

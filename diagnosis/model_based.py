@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from diagnosis import wheel_filter as wf
 from diagnosis import wheel_scan as ws
+from diagnosis import wheel_types as wt
 from diagnosis.assessment import CODE, Assessment, Finding
 from diagnosis.mode_path import first_lasting
 from diagnosis.modes import PAIR
@@ -87,7 +88,7 @@ class WheelsData:
     dt: float
 
 
-def filter_model(data: WheelsData, i: int, residual: Array) -> wf.WheelFilterModel:
+def filter_model(data: WheelsData, i: int, residual: Array) -> wt.WheelFilterModel:
     """Constants of one wheel's filter: noise and load are found from the mission where the machine file has none."""
     plant = data.plants[i]
     assert plant is not None
@@ -107,7 +108,7 @@ def filter_model(data: WheelsData, i: int, residual: Array) -> wf.WheelFilterMod
     load = plant.load
     if load is None:
         load = float(np.nan_to_num(slow_mismatch(residual, pair & ~data.quiet[:, i], data.dt)))
-    return wf.WheelFilterModel(
+    return wt.WheelFilterModel(
         K=plant.K,
         tau=plant.tau,
         noise=noise,
@@ -145,7 +146,7 @@ def assess_wheels(
     """
     dead = np.array([0.0 if p is None else p.dead for p in data.plants])
     blocks = blocks_of(data.y, data.u, data.status, data.quiet, data.ratio, data.turn, dead, data.dt)
-    model = wf.JointModel(
+    model = wt.JointModel(
         wheels=tuple(None if p is None else filter_model(data, i, residual[:, i]) for i, p in enumerate(data.plants)),
         flow=data.flow,
         switch_cost=float(np.log(_MEAN_HEALTHY_S / blocks.dt * 12)),
@@ -157,7 +158,7 @@ def assess_wheels(
     }
 
 
-def _coupled(blocks: WheelBlocks, model: wf.JointModel, data: WheelsData) -> wf.JointModel:
+def _coupled(blocks: WheelBlocks, model: wt.JointModel, data: WheelsData) -> wt.JointModel:
     """Tyres on the ground or wheels in the air: whichever explains a minute of driving best."""
     if data.coupling == "free" or not np.isfinite(blocks.ratio).any():
         return model
@@ -177,8 +178,8 @@ def _one_wheel(
     i: int,
     data: WheelsData,
     blocks: WheelBlocks,
-    model: wf.JointModel,
-    done: wf.JointPass,
+    model: wt.JointModel,
+    done: wt.JointPass,
     limits: Limits,
     gains: bool,
 ) -> tuple[Assessment, Assessment]:
@@ -242,8 +243,8 @@ def _release(stop: int, y: Array, reach: int) -> int:
 def _assessments(
     i: int,
     data: WheelsData,
-    own: wf.WheelFilterModel,
-    done: wf.JointPass,
+    own: wt.WheelFilterModel,
+    done: wt.JointPass,
     found: wf.RunEvidence,
     findings: list[Finding],
     opened: dict[Side, NDArray[np.bool_]],

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from diagnosis import wheel_scan as ws
 from diagnosis.assessment import Finding
 from diagnosis.result import Epsilon, Hypothesis, Sat
-from diagnosis.wheel_filter import WheelFilterModel
+from diagnosis.wheel_types import WheelFilterModel
 from replay.faults import FaultMode, Side
 from replay.machine import Limits
 

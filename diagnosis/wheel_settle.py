@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from diagnosis import wheel_filter as wf
 from diagnosis import wheel_scan as ws
+from diagnosis import wheel_types as wt
 from diagnosis.wheel_blocks import WheelBlocks
 from diagnosis.wheel_runs import Runs, runs_of
 
@@ -20,7 +21,7 @@ _MARGIN_S = 0.05
 _ROUNDS = 1
 
 
-def settled(blocks: WheelBlocks, model: wf.JointModel, done: wf.JointPass) -> wf.JointPass:
+def settled(blocks: WheelBlocks, model: wt.JointModel, done: wt.JointPass) -> wt.JointPass:
     """The pass with faults taken back that another wheel's change explains better.
 
     Parameters
@@ -56,7 +57,7 @@ def settled(blocks: WheelBlocks, model: wf.JointModel, done: wf.JointPass) -> wf
     return done
 
 
-def _paths(blocks: WheelBlocks, model: wf.JointModel, done: wf.JointPass) -> tuple[dict[int, Runs], NDArray[np.uint8]]:
+def _paths(blocks: WheelBlocks, model: wt.JointModel, done: wt.JointPass) -> tuple[dict[int, Runs], NDArray[np.uint8]]:
     """Runs of every wheel, and its models by block, shape (n, wheels)."""
     paths = np.zeros(blocks.y.shape, dtype=np.uint8)
     runs = {}

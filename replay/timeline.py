@@ -135,7 +135,9 @@ def align(signals: Signals, start_s: float | None = None, stop_s: float | None =
     fresh: dict[str, NDArray[np.bool_]] = {}
     for name, signal in signals.items.items():
         if signal.stamps.size:
-            absurd = sum(np.count_nonzero(np.abs(signal.values[part]) > _LARGEST) for part in blocks(signal.values.size))
+            absurd = sum(
+                np.count_nonzero(np.abs(signal.values[part]) > _LARGEST) for part in blocks(signal.values.size)
+            )
             if absurd:
                 notes.append(f"{name}: {absurd} values that are infinite or beyond {_LARGEST:g} count as no sample.")
             values[name], fresh[name] = _hold(signal, periods.of(signal.stamps), start, step, size)
@@ -207,7 +209,7 @@ def _check_overlap(signals: Signals) -> list[str]:
         )
         raise LogError(
             f"the files do not overlap in time, so they are not one mission or their clocks are unrelated ({shown}); "
-            "diagnose them one by one, or set the table's epoch in the machine file's [sources]"
+            "diagnose them one by one, or set the table's epoch or clock_offset in the machine file's [sources]"
         )
     shortest = min(b - a for a, b in spans.values())
     if end - begin < 0.5 * shortest:

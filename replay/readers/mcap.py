@@ -19,6 +19,9 @@ from replay.readers.mcap_file import McapFile, looks_like_mcap
 from replay.readers.mcap_open import open_file
 from replay.readers.mcap_walk import walk_file
 from replay.sources import SourceOptions
+from replay.spill import release
+
+_HELD = 64 << 20
 
 
 class McapReader:
@@ -162,7 +165,11 @@ def blocks_of(file: McapFile, topics: Collection[str] | None, window: Window | N
     order: list[tuple[int, int, int]] = [(start, stop, -1) for start, stop in file.runs]
     order += [(int(c[0]), int(c[1]), i) for i, c in enumerate(file.chunks) if i not in skipped]
     file.bare |= bool(file.runs)
+    held = 0
     for start, stop, row in sorted(order):
+        if start - held > _HELD:  # pages of the file that were read count as memory of this process
+            release(file.data)
+            held = start
         if row < 0:
             yield from _split(file, file.data, (start, stop), False, topics, window, f"at byte {start}")
         else:

@@ -13,16 +13,9 @@ from diagnosis import wheel_joint as wj
 from diagnosis import wheel_scan as ws
 from diagnosis.modes import PAIR, SILENT, SKIP
 from diagnosis.wheel_blocks import WheelBlocks, blocks_of
-from diagnosis.wheel_filter import (
-    JointModel,
-    WheelFilterModel,
-    evidence_of_runs,
-    first_speeds,
-    forward,
-    initial_state,
-    most_probable,
-)
+from diagnosis.wheel_filter import evidence_of_runs, first_speeds, forward, initial_state, most_probable
 from diagnosis.wheel_runs import Runs
+from diagnosis.wheel_types import JointModel, WheelFilterModel
 
 RAW, WIDTH, DT = 0.001, 10, 0.01
 WHEEL = WheelFilterModel(

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from diagnosis import wheel_scan as ws
-from diagnosis.wheel_filter import WheelFilterModel
 from diagnosis.wheel_findings import Run, Verdict, judge, onset_sentence, probabilities, refined
+from diagnosis.wheel_types import WheelFilterModel
 from replay.faults import FaultMode, Side
 from replay.machine import Limits
 

@@ -12,7 +12,8 @@ from diagnosis import wheel_joint as wj
 from diagnosis import wheel_scan as ws
 from diagnosis.modes import PAIR, SILENT, SKIP, STAY
 from diagnosis.wheel_blocks import WheelBlocks, blocks_of
-from diagnosis.wheel_filter import JointModel, JointPass, JointState, WheelFilterModel, forward, initial_state
+from diagnosis.wheel_filter import forward, initial_state
+from diagnosis.wheel_types import JointModel, JointPass, JointState, WheelFilterModel
 
 RAW, WIDTH, DT = 0.001, 10, 0.01
 GAINS, LAGS = (2.4, 2.3, 2.5, 2.45), (0.25, 0.24, 0.26, 0.25)

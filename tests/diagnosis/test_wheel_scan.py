@@ -13,7 +13,7 @@ from scipy.linalg import expm
 from scipy.stats import gamma
 
 from diagnosis import wheel_scan as ws
-from diagnosis.wheel_filter import WheelFilterModel
+from diagnosis.wheel_types import WheelFilterModel
 
 MODEL = WheelFilterModel(
     K=2.4,

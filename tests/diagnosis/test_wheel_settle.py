@@ -9,8 +9,9 @@ from numpy.testing import assert_allclose, assert_array_equal
 from diagnosis import wheel_scan as ws
 from diagnosis.modes import PAIR, STAY
 from diagnosis.wheel_blocks import WheelBlocks, blocks_of
-from diagnosis.wheel_filter import JointModel, WheelFilterModel, forward, most_probable
+from diagnosis.wheel_filter import forward, most_probable
 from diagnosis.wheel_settle import settled
+from diagnosis.wheel_types import JointModel, WheelFilterModel
 
 RAW, WIDTH, N, ONSET, STOP = 0.001, 10, 9000, 4000, 7000
 WHEEL = WheelFilterModel(
