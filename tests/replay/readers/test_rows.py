@@ -69,7 +69,8 @@ def test_rows_equal_their_naive_twin(
         lines.append(mark.join(cells))
     text = newline.join([*lines, ""]).encode()
     rows, columns = parsed(text, width, Dialect(mark, "," if comma else ".", True), cuts)
-    kept = [row for row, line in zip(table, lines, strict=True) if line.strip(" ")]
+    # a line of one blank cell, quoted or not, is a blank line
+    kept = [row for row, line in zip(table, lines, strict=True) if mark in line or line.strip(' "')]
     assert rows.count == len(kept)
     for i, column in enumerate(columns):
         cells = [row[i] if i < len(row) else "" for row in kept]
