@@ -100,6 +100,9 @@ const Data = (() => {
     return { lo, hi, at, top, gap };
   }
 
+  // Samples that stand behind a point of a curve: of long missions two rows hold the extremes of `per` samples.
+  const samples = (curve) => (view.per > 1 ? Math.max(view.per, Math.round(curve.stride * view.per / 2)) : curve.stride);
+
   // Curve over [t0, t1] for about `pixels` pixels: every sample where few enough, else the extremes per pixel.
   async function curve(c, t0, t1, pixels) {
     const { step, base } = view.channels[c], [a, b] = range(t0, t1);
@@ -110,7 +113,7 @@ const Data = (() => {
     const exact = per === 1 && n <= 2 * pixels;
     if (exact) {
       for (let i = i0; i < i1; i++) { x.push(time(s.start + i)); y.push(value(s.q[i])); }
-      return { x, y, exact, stride: 1 };
+      return { x, y, exact: view.per === 1, stride: 1 };
     }
     const buckets = Math.min(n, pixels), width = n / buckets;
     for (let k = 0; k < buckets; k++) {
@@ -136,7 +139,8 @@ const Data = (() => {
     const [a, b] = range(t0, t1), parts = await Promise.all(columns.map(({ c }) => segment(c, covering(c, a, b))));
     const stride = Math.max(...parts.map((s) => s.stride)), lines = [];
     const guard = (s) => `"${(/^[=+\-@\t\r]/.test(s) ? "'" : "") + s.replaceAll('"', '""')}"`;
-    const heads = columns.map(({ c, unit }) => `${view.channels[c].name} [${unit}]`);
+    const kind = view.per > 1 && stride === 1 ? `, extremes of ${view.per} samples` : "";
+    const heads = columns.map(({ c, unit }) => `${view.channels[c].name} [${unit}]${kind}`);
     lines.push(["t [s]", ...(stride > 1 ? heads.flatMap((h) => [h + " min", h + " max"]) : heads)].map(guard).join(","));
     const cell = (v, c, k) => (v ? ((view.channels[c].base + v) * view.channels[c].step * k).toPrecision(7) : "");
     const digits = Math.max(3, Math.ceil(-Math.log10(view.dt)) + 1);
@@ -171,5 +175,12 @@ const Data = (() => {
     return loading;
   }
 
-  return { view, curve, csv, plotly };
+  // Every fault as in report.json, by its name.
+  let reading = null;
+  function intervals() {
+    reading ??= inflated("intervals").then((r) => r.json());
+    return reading;
+  }
+
+  return { view, curve, samples, csv, plotly, intervals, fromBase64 };
 })();

@@ -11,14 +11,13 @@ from markupsafe import Markup
 from numpy.typing import NDArray
 
 from diagnosis.report.edges import edge_of, edge_words, time_words
-from diagnosis.report.names import clock, number
+from diagnosis.report.names import clock, grouped, number
 from diagnosis.report.pair import Pair, pair_of, rests_on, shape_sentence
 from diagnosis.report.panels import course_picture, edge_picture
 
 Columns = Mapping[str, NDArray[np.floating]]
 
 _COURSES = 40
-_EDGES = 150
 
 
 @dataclass(frozen=True)
@@ -60,8 +59,14 @@ class Evidence:
     note: str
 
 
-def evidence_of(report: Mapping[str, Any], columns: Columns, axis: tuple[float, float]) -> dict[str, Evidence]:
-    """Evidence of all faults by their names; pictures for the first ones only.
+def evidence_of(
+    report: Mapping[str, Any],
+    columns: Columns,
+    axis: tuple[float, float],
+    per: int = 1,
+    faults: Sequence[Mapping[str, Any]] | None = None,
+) -> dict[str, Evidence]:
+    """Evidence of faults by their names; the course is drawn for the first ones only.
 
     Parameters
     ----------
@@ -70,18 +75,25 @@ def evidence_of(report: Mapping[str, Any], columns: Columns, axis: tuple[float, 
     columns : Mapping[str, NDArray[np.floating]], each of shape (n,)
         Columns that hold samples.
     axis : tuple[float, float]
-        Time of the first sample and sample time [s].
+        Time of the first row and between rows [s].
+    per : int
+        Samples whose extremes two rows hold, 1 where each row is a sample: only then onset and end can be drawn.
+    faults : Sequence[Mapping[str, Any]] or None
+        Those of the report's intervals that are wanted; None: all.
     """
-    faults: Sequence[Mapping[str, Any]] = report.get("intervals") or ()
     limit = (report.get("limits") or {}).get("min_probability")
     rates = {s["name"]: s.get("rate_hz") for s in report.get("signals") or ()}
+    every: Sequence[Mapping[str, Any]] = report.get("intervals") or ()
+    peers: dict[str, list[Mapping[str, Any]]] = {}
+    for fault in every:
+        peers.setdefault(fault["component"], []).append(fault)
     out = {}
-    for i, fault in enumerate(faults):
+    for i, fault in enumerate(every if faults is None else faults):
         pair = pair_of(fault, columns)
-        edges = _edges(fault, faults, pair, columns, axis) if pair and i < _EDGES else ()
+        edges = _edges(fault, peers[fault["component"]], pair, columns, axis) if pair and per == 1 else ()
         course = _course(fault, pair, columns, axis, limit) if pair and i < _COURSES else ()
         keys = _keys(pair) if pair and edges else ()
-        note = _note(pair, rates, axis[1]) if pair and edges else _missing(pair, columns)
+        note = _note(pair, rates, axis[1]) if pair and edges else _missing(pair, columns, per)
         out[fault["id"]] = Evidence(
             rests_on(fault, columns), delay_words(fault), shape_sentence(fault), keys, edges, course, note
         )
@@ -110,13 +122,16 @@ def _note(pair: Pair, rates: Mapping[str, Any], step: float) -> str:
     return f"{each}; until its next sample the last one is shown at {number(rate)} Hz." if slow else ""
 
 
-def _missing(pair: Pair | None, columns: Columns) -> str:
-    """Why a fault has no pictures; empty where the whole page has none."""
+def _missing(pair: Pair | None, columns: Columns, per: int) -> str:
+    """Why a fault has no pictures of its edges; empty where the whole page has none."""
     if not columns:
         return ""
     if pair is None:
         return "The channel of this fault is not among the saved time series."
-    return f"Pictures of onset and end are drawn for the first {_EDGES} faults."
+    return (
+        f"Of this long mission the smallest and largest of every {grouped(per)} samples are kept, "
+        "so single samples around onset and end cannot be shown."
+    )
 
 
 def _edges(

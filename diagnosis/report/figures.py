@@ -75,7 +75,9 @@ def derived(columns: Columns, faults: Sequence[Mapping[str, Any]]) -> dict[str, 
                 if (std := columns.get(base + "delta_std")) is not None:
                     result[base + "epsilon_low"] = 1.0 - delta - _Z95 * std
                     result[base + "epsilon_high"] = 1.0 - delta + _Z95 * std
-            if bar is not None and (std := columns.get(base + "delta_bar_std")) is not None:
+            if bar is not None and base + "delta_bar_low" not in result:
+                if (std := columns.get(base + "delta_bar_std")) is None:
+                    continue
                 result[base + "delta_bar_low"] = bar - _Z95 * std
                 result[base + "delta_bar_high"] = bar + _Z95 * std
     return result

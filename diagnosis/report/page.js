@@ -10,33 +10,85 @@
     end: (f) => [f.stop - 0.5, f.stop + 0.5],
     mission: () => [0, view.duration],
   };
-  let current = null, loopKey = view.loop[0]?.key;
+  const SHADES = 40;
+  let current = null, shared = null, loopKey = view.loop[0]?.key;
+
+  // Time shown in the evidence: marked on the timeline, kept in the address, followed by the explorer where linked.
   const evidence = one("#figure") && new Figure(one("#figure"), one("#badge"), (range) => {
+    shared = range;
     for (const w of all(".win")) {
       w.style.left = `${100 * range[0] / view.duration}%`;
       w.style.width = `${100 * (range[1] - range[0]) / view.duration}%`;
     }
-    if (current) history.replaceState(null, "", `#fault=${encodeURIComponent(current)}&t=${range.map((v) => v.toFixed(4)).join(",")}`);
+    follow(explorer?.active && explorer.figure, range);
+    remember();
   });
   const loop = one("#loop-figure") && new Figure(one("#loop-figure"), one("#loop-badge"));
+  const explorer = one("#signals") && new Explorer(showSignals, (range) => {
+    if (!current || !evidence?.drawn) shared = range;
+    follow(evidence?.drawn && !one("#figure").hidden && evidence, range);
+    remember();
+  });
+  const figures = { evidence, loop, signals: explorer?.figure };
+
+  function follow(figure, range) {
+    if (figure && one("#linked").checked && figure.range.some((v, i) => Math.abs(v - range[i]) > 1e-9)) figure.zoom(range);
+  }
+
+  // The address restores what is shown: fault, time, chosen signals. A new fault is a step of the browser's history.
+  function remember(step) {
+    const parts = current ? [`fault=${encodeURIComponent(current)}`] : [];
+    if (shared) parts.push(`t=${shared.map((v) => v.toFixed(4)).join(",")}`);
+    if (explorer?.plots.length) parts.push(`plots=${explorer.plots.map((p) => p.map(encodeURIComponent).join(",")).join(";")}`);
+    const address = `#${parts.join("&")}`;
+    if (parts.length && address !== location.hash) history[step ? "pushState" : "replaceState"](null, "", address);
+  }
 
   const failed = (where) => (e) => { one(where).replaceChildren(`The plots cannot be drawn: ${e.message}`); throw e; };
 
-  function select(id, { range, scroll } = {}) {
+  // The faults to shade: of many those nearest to a time.
+  function shadesOf(list, at) {
+    if (list.length <= SHADES) return list;
+    return at === undefined ? list.slice(0, SHADES) : list.toSorted((f, g) => Math.abs(f.start - at) - Math.abs(g.start - at)).slice(0, SHADES);
+  }
+
+  // Evidence of a fault that has none in the markup.
+  async function brief(f) {
+    const article = one("#brief");
+    article.dataset.ev = f.id;
+    article.querySelector("h2").textContent = `${f.id} · ${f.title}`;
+    const words = (await Data.intervals())[f.id];
+    if (article.dataset.ev !== f.id) return;
+    const times = `${f.start.toFixed(3)} s to ${f.stop.toFixed(3)} s · ${(f.stop - f.start).toFixed(3)} s · severity ${f.severity}`;
+    article.querySelector("p").textContent = times;
+    article.dataset.text = `${f.id} ${f.title}, ${times}`;
+    article.querySelector("ul").replaceChildren(...(words.evidence || []).map((s) => { const li = document.createElement("li"); li.textContent = s; return li; }));
+    article.querySelector(".advice").textContent = words.advice || "Nothing was recorded.";
+  }
+
+  const articleOf = (id) => one(`article[data-ev="${CSS.escape(id)}"]`);
+
+  function select(id, { range, scroll, step: stepped } = {}) {
     const f = faults.get(id);
     if (!f) return;
+    const before = current;
     current = id;
+    if (!articleOf(id)) brief(f);
     for (const e of all("[data-ev]")) e.hidden = e.dataset.ev !== id;
-    for (const e of all(".fb, tr.fault")) e.dataset.f === id ? e.setAttribute("aria-current", "true") : e.removeAttribute("aria-current");
+    for (const e of all("[aria-current]")) e.removeAttribute("aria-current");
+    for (const e of all(`[data-f="${CSS.escape(id)}"]`)) if (e.matches(".fb, tr.fault")) e.setAttribute("aria-current", "true");
     keepInTable(one("tr.fault[aria-current]"));
     one("#live").textContent = `Showing ${id}: ${f.title}`;
     if (scroll) one("#evidence").scrollIntoView({ behavior: matchMedia("(prefers-reduced-motion: reduce)").matches ? "auto" : "smooth" });
+    shared = range || ranges.fault(f);
+    remember(stepped && before && before !== id);
     if (!evidence) return;
-    one(`article[data-ev="${CSS.escape(id)}"] .slot`).append(one("#figure"));
-    one("#figure").hidden = !f.rows.length;
-    if (!f.rows.length) return;
-    const shades = view.faults.filter((g) => g.component === f.component).map((g) => ({ ...g, main: g.id === id }));
-    evidence.draw(f.rows, shades, range || ranges.fault(f)).catch(failed("#figure"));
+    const rows = view.figures[f.rows];
+    articleOf(id).querySelector(".slot").append(one("#figure"));
+    one("#figure").hidden = !rows.length;
+    if (!rows.length) return;
+    const shades = shadesOf(view.faults.filter((g) => g.component === f.component), f.start).map((g) => ({ ...g, main: g.id === id }));
+    evidence.draw(rows, shades, shared).catch(failed("#figure"));
   }
 
   function keepInTable(row) {
@@ -46,7 +98,15 @@
 
   function step(by) {
     const ids = [...faults.keys()], at = ids.indexOf(current);
-    select(ids[Math.min(ids.length - 1, Math.max(0, at + by))]);
+    select(ids[Math.min(ids.length - 1, Math.max(0, at + by))], { step: true });
+  }
+
+  // The plots that keys act on: those with the focus, else the evidence.
+  function active() {
+    const at = document.activeElement;
+    if (explorer?.active && one("#signals").contains(at)) return explorer.figure;
+    if (loop?.drawn && one("#loop").contains(at)) return loop;
+    return evidence?.drawn ? evidence : explorer?.active ? explorer.figure : loop?.drawn ? loop : null;
   }
 
   const zoom = (name) => current && evidence?.drawn && evidence.zoom(ranges[name](faults.get(current)));
@@ -56,47 +116,14 @@
     if (!loop || !group) return;
     loopKey = key;
     for (const b of all("[data-loop]")) b.setAttribute("aria-pressed", String(b.dataset.loop === key));
-    loop.draw(group.rows, view.faults.map((f) => ({ ...f, main: false })), loop.drawn ? loop.range : [0, view.duration]).catch(failed("#loop-figure"));
+    loop.draw(group.rows, shadesOf(view.faults).map((f) => ({ ...f, main: false })), loop.drawn ? loop.range : [0, view.duration]).catch(failed("#loop-figure"));
   }
 
-  // Unit and factor of a channel, from the first row that shows it.
-  function unitOf(c) {
-    for (const row of [...view.faults, ...view.loop].flatMap((g) => g.rows)) {
-      const t = row.traces.find((u) => u.c === c);
-      if (t) return { unit: t.right ? row.rightUnit.unit : row.unit, k: t.k };
-      if (row.threshold === c || row.band?.includes(c)) return { unit: row.unit, k: row.bandScale };
-    }
-    return { unit: "1", k: 1 };
-  }
-
-  function addSignal(c) {
-    const { unit, k } = unitOf(c), { name } = view.channels[c], row = { key: name, title: name, unit, traces: [{ c, name, role: "measured", k }] };
-    loop.draw([...loop.rows, row], loop.shades, loop.range).catch(failed("#loop-figure"));
-  }
-
-  function save(name, type, text) {
-    const url = URL.createObjectURL(new Blob([text], { type })), a = document.createElement("a");
-    a.href = url;
-    a.download = name;
-    a.click();
-    setTimeout(() => URL.revokeObjectURL(url), 1000);
-  }
-
-  async function copy(button) {
-    const article = one(`article[data-ev="${CSS.escape(current)}"]`);
-    const text = `${view.name}\n${article.dataset.text}\n` + [...article.querySelectorAll("li, .advice")].map((e) => `- ${e.textContent.trim()}`).join("\n") + "\n";
-    try { await navigator.clipboard.writeText(text); } catch {
-      const area = document.createElement("textarea");
-      area.value = text;
-      document.body.append(area);
-      area.select();
-      document.execCommand("copy");
-      area.remove();
-    }
-    button.dataset.copied = text;
-    const words = button.textContent;
-    button.textContent = "Copied";
-    setTimeout(() => { button.textContent = words; }, 1500);
+  function showSignals() {
+    remember();
+    const range = one("#linked").checked && shared ? shared : explorer.figure.drawn ? explorer.figure.range : shared || [0, view.duration];
+    const shades = shadesOf(view.faults, range[0]).map((f) => ({ ...f, main: false }));
+    explorer.draw(shades, range)?.catch(failed("#signals-figure"));
   }
 
   function setTheme(theme) {
@@ -106,19 +133,21 @@
     root.dispatchEvent(new Event("theme"));
   }
 
-  function themed() {
-    one("#theme").setAttribute("aria-pressed", String(root.dataset.theme === "dark"));
-    return Promise.all([evidence?.redraw(), loop?.redraw()]);
-  }
+  const redraw = () => Promise.all([evidence?.redraw(), loop?.redraw(), explorer?.active && explorer.figure.redraw()]);
+  const fileName = (of) => ({ evidence: current, loop: `loop-${loopKey}`, signals: "signals" })[of];
 
   const actions = {
     zoom: (b) => zoom(b.dataset.zoom),
-    csv: () => evidence.csv().then((text) => save(`${current}.csv`.replace(/[^\w.-]/g, "_"), "text/csv", text)),
-    "loop-csv": () => loop.csv().then((text) => save(`loop-${loopKey}.csv`, "text/csv", text)),
+    csv: (b) => figures[b.dataset.of].csv().then((text) => Export.save(`${fileName(b.dataset.of)}.csv`, "text/csv", text)),
+    image: (b) => Export.image(figures[b.dataset.of], fileName(b.dataset.of), b.dataset.form),
+    json: () => Export.json(current),
+    copy: (b) => Export.copy(articleOf(current), b),
+    add: () => explorer.add(one("#columns").value),
+    "signals-clear": () => { explorer.set([]); one("#find").focus(); },
     "loop-all": () => loop.zoom([0, view.duration]),
-    copy,
     theme: () => setTheme(root.dataset.theme === "dark" ? "light" : "dark"),
     print: () => window.print(),
+    "print-all": () => { root.dataset.print = "all"; window.print(); },
     help: () => one("#help").showModal(),
     close: () => one("#help").close(),
   };
@@ -128,24 +157,31 @@
     if (!target) return;
     if (target.dataset.act) actions[target.dataset.act](target);
     else if (target.dataset.loop) drawLoop(target.dataset.loop);
-    else { e.preventDefault(); select(target.dataset.f, { scroll: "scroll" in target.dataset }); }
+    else { e.preventDefault(); select(target.dataset.f, { scroll: "scroll" in target.dataset, step: true }); }
   });
 
   document.addEventListener("keydown", (e) => {
-    if (e.ctrlKey || e.metaKey || e.altKey || e.target.matches("input, select, textarea") || one("#help").open) return;
-    if ((e.key === "Enter" || e.key === " ") && e.target.matches("g[data-f]")) { e.preventDefault(); select(e.target.dataset.f, { scroll: true }); return; }
+    if (e.ctrlKey || e.metaKey || e.altKey || one("#help").open || e.target.matches("input:not([type=checkbox]), select, textarea")) return;
+    if ((e.key === "Enter" || e.key === " ") && e.target.matches("g[data-f]")) { e.preventDefault(); select(e.target.dataset.f, { scroll: true, step: true }); return; }
+    if (e.key.startsWith("Arrow") && e.target.closest(".scroll")) return;
     const key = {
-      j: () => step(1), k: () => step(-1), f: () => zoom("fault"), o: () => zoom("onset"), e: () => zoom("end"), m: () => zoom("mission"),
-      t: actions.theme, "?": actions.help,
+      j: () => step(1), k: () => step(-1), f: () => zoom("fault"), o: () => zoom("onset"), e: () => zoom("end"),
+      m: () => active()?.zoom(ranges.mission()), ArrowLeft: () => active()?.pan(-0.25), ArrowRight: () => active()?.pan(0.25),
+      "+": () => active()?.scale(0.5), "=": () => active()?.scale(0.5), "-": () => active()?.scale(2),
+      s: () => one("#find")?.focus(), t: actions.theme, "?": actions.help,
     }[e.key];
     if (key) { e.preventDefault(); key(); }
   });
 
   function fromAddress(hash, scroll) {
-    const q = new URLSearchParams(hash.slice(1)), t = (q.get("t") || "").split(",").map(Number);
-    const range = t.length === 2 && t.every(Number.isFinite) && t[1] > t[0] ? t : undefined;
-    if (faults.has(q.get("fault"))) select(q.get("fault"), { range, scroll });
-    else if (!current && faults.size) select(faults.keys().next().value);
+    const read = (key) => new RegExp(`[#&]${key}=([^&]*)`).exec(hash)?.[1] ?? "";
+    const plain = (s) => { try { return decodeURIComponent(s); } catch { return ""; } };
+    const t = read("t").split(",").map(Number), range = t.length === 2 && t.every(Number.isFinite) && t[1] > t[0] ? t : undefined;
+    const plots = read("plots"), wanted = plots ? plots.split(";").map((p) => p.split(",").map(plain)) : [], id = plain(read("fault"));
+    if (faults.has(id)) select(id, { range, scroll });
+    else if (!current && faults.size) select(faults.keys().next().value, { range });
+    else if (!faults.size && range) shared = range;
+    if (explorer && (plots || faults.has(id)) && JSON.stringify(wanted) !== JSON.stringify(explorer.plots)) explorer.set(wanted);
   }
 
   // Paper: light colours and the width of a page, then back.
@@ -153,23 +189,19 @@
   addEventListener("beforeprint", () => {
     before = root.dataset.theme;
     root.dataset.theme = "light";
-    evidence?.print(680);
-    loop?.print(680);
+    for (const f of [evidence, loop, explorer?.active && explorer.figure]) f && f.print(680);
   });
   addEventListener("afterprint", () => {
     root.dataset.theme = before;
-    evidence?.redraw();
-    loop?.redraw();
+    delete root.dataset.print;
+    redraw();
   });
 
-  one("#explore")?.addEventListener("change", (e) => {
-    if (e.target.value !== "" && loop.drawn) addSignal(+e.target.value);
-    e.target.value = "";
-  });
-  root.addEventListener("theme", themed);
+  root.addEventListener("theme", () => { one("#theme").setAttribute("aria-pressed", String(root.dataset.theme === "dark")); redraw(); });
+  one("#linked")?.addEventListener("change", () => explorer.active && showSignals());
   addEventListener("hashchange", (e) => fromAddress(new URL(e.newURL).hash, true));
   let resizing = 0;
-  addEventListener("resize", () => { clearTimeout(resizing); resizing = setTimeout(() => { evidence?.redraw(); loop?.redraw(); }, 200); });
+  addEventListener("resize", () => { clearTimeout(resizing); resizing = setTimeout(redraw, 200); });
   one("#theme").setAttribute("aria-pressed", String(root.dataset.theme === "dark"));
   fromAddress(location.hash, false);
   if (loop) {

@@ -2,7 +2,8 @@
 
 Words, tables, timeline and thumbnails are in the page's markup and need no JavaScript. Plots are drawn in the page by
 plotly.js, which is taken from the installed plotly package and embedded compressed. A content security policy admits
-exactly the embedded scripts and no request.
+exactly the embedded scripts and no request. Of thousands of faults all stand in the table; the most severe have their
+evidence in the markup, the others get it from the page's scripts.
 """
 
 from __future__ import annotations
@@ -23,18 +24,19 @@ from markupsafe import Markup, escape
 from numpy.typing import NDArray
 
 from diagnosis.report import names, tables
-from diagnosis.report.encode import Channel, encode
 from diagnosis.report.evidence import evidence_of
-from diagnosis.report.figures import Columns, Group, Row, derived, fault_rows, loop_groups, row_json
+from diagnosis.report.figures import Columns, derived, loop_groups
 from diagnosis.report.pair import pair_of
 from diagnosis.report.picture import machine_picture
 from diagnosis.report.svg import icon, path_picture, thumbnail
 from diagnosis.report.timeline import timeline
+from diagnosis.report.view import Axis, axis_of, channels_of, figures_of, packed_intervals, view, worst
 from replay.errors import ConfigError
 
 _HERE = Path(__file__).parent
-_SCRIPTS = ("data.js", "plot.js", "page.js")
-_THUMBNAILS = 300
+_STYLES = ("report.css", "evidence.css", "explorer.css", "print.css")
+_SCRIPTS = ("data.js", "plot.js", "export.js", "explorer.js", "page.js")
+_LISTED, _THUMBNAILS, _DETAILED = 5000, 300, 120
 
 
 def build_page(
@@ -64,67 +66,58 @@ def build_page(
     ValueError
         Where the columns differ in length or ``t`` is not uniform.
     """
-    report = tables.repaired(names.made_visible(report))
+    whole = names.made_visible(report)
+    every: Sequence[Mapping[str, Any]] = whole.get("intervals") or ()
+    report = tables.repaired({**whole, "intervals": worst(every, _LISTED)})
     cols = {names.visible(k): np.asarray(v) for k, v in columns.items()}
-    start, step, samples = _time_axis(cols)
-    faults: Sequence[Mapping[str, Any]] = report.get("intervals") or ()
+    axis = axis_of(cols, (report.get("log") or {}).get("rate_hz"))
+    faults: Sequence[Mapping[str, Any]] = report["intervals"]
+    detailed = worst(faults, _DETAILED)
     machine = report.get("machine") or {}
-    wheels, axles = machine.get("wheels") or (), machine.get("axles") or ()
-    shown = derived({k: v for k, v in cols.items() if np.isfinite(v).any()}, faults) if samples else {}
+    filled = {k: v for k, v in cols.items() if np.isfinite(v).any()} if axis.rows else {}
+    shown = derived(filled, faults)
     limit = (report.get("limits") or {}).get("min_probability")
-    figures = {
-        f["id"]: fault_rows(f, axles if f["kind"] == "steer" else wheels, shown, limit) if samples else ()
-        for f in faults
-    }
-    groups = loop_groups(wheels, axles, shown) if samples else ()
-    plots = bool(groups or any(figures.values()))
+    figures = figures_of(faults, machine, shown, limit)
+    groups = loop_groups(machine.get("wheels") or (), machine.get("axles") or (), shown)
+    plots = len(filled) > 1
     plotly, packed, version = _plotly(plotlyjs) if plots else ("", "", "none, no plots")
-    duration = _duration(report, start, step, samples)
+    duration = _duration(report, axis)
+    place = (axis.start, axis.step)
     context = {
         **tables.context(report, duration),
-        "css": Markup("".join(_script(name) for name in ("report.css", "evidence.css"))),
-        "timeline": timeline(report, duration),
+        "css": Markup("".join(_script(name) for name in _STYLES)),
+        "timeline": timeline(report, duration, {f["id"] for f in detailed}),
         "picture": machine_picture(report),
-        "path": path_picture(cols["path.x"], cols["path.y"], start, step, faults)
-        if samples and {"path.x", "path.y"} <= set(cols)
+        "path": path_picture(cols["path.x"], cols["path.y"], *place, detailed)
+        if axis.rows and {"path.x", "path.y"} <= set(cols)
         else Markup(""),
-        "thumbs": {f["id"]: _thumbnail(f, shown, start, step) for f in faults[:_THUMBNAILS]} if samples else {},
-        "evidence": evidence_of(report, shown, (start, step)),
+        "thumbs": {f["id"]: _thumbnail(f, shown, *place) for f in worst(faults, _THUMBNAILS)} if axis.rows else {},
+        "evidence": evidence_of(report, shown, place, axis.per, detailed),
+        "unlisted": len(every) - len(faults),
         "groups": groups,
         "has_plots": plots,
+        "empty": [k for k in cols if k not in filled],
         "plotly_version": version,
     }
     head, scripts = _script("theme.js"), [_script(name) for name in _SCRIPTS]
     context |= {"head": Markup(head), "scripts": [Markup(s) for s in scripts], "plotly": packed}
     context["csp"] = _policy([head, *scripts, *([plotly] if plots else [])])
+    intervals = packed_intervals(worst(every, _LISTED))
     drawn = sum(len(p.picture) for e in context["evidence"].values() for p in (*e.edges, *e.course))
-    budget = int(max_size_mb * 1e6) - len(packed) - 400_000 - 6_000 * len(faults) - drawn
-    channels = _channels(report, shown, figures, groups, (start, step), max(budget, 200_000))
+    words = 400_000 + 6_000 * len(detailed) + 1_500 * len(faults) + len(intervals)
+    budget = int(max_size_mb * 1e6) - len(packed) - words - drawn
+    worst_first = {**report, "intervals": detailed}
+    channels = channels_of(worst_first, shown, figures, groups, axis, max(budget, 200_000))
     context["blocks"] = [(f"c{i}-{j}", s.text) for i, c in enumerate(channels) for j, s in enumerate(c.segments)]
-    context["channels"] = [c.name for c in channels]
-    context["view"] = htmlsafe_json_dumps(
-        _view(report, channels, figures, groups, (start, step, samples, duration)), sort_keys=True
-    )
+    context["blocks"].append(("intervals", intervals))
+    context["view"] = htmlsafe_json_dumps(view(report, channels, figures, groups, axis, duration), sort_keys=True)
     return _environment().get_template("template.html.j2").render(context)
 
 
-def _time_axis(columns: Mapping[str, NDArray[np.floating]]) -> tuple[float, float, int]:
-    """First time [s], sample time [s] and number of samples; zero samples where there is no axis."""
-    t = columns.get("t")
-    if t is None or len(t) < 2:
-        return 0.0, 1.0, 0
-    if wrong := next((k for k, v in columns.items() if v.shape != t.shape), None):
-        raise ValueError(f"column {wrong!r} has shape {columns[wrong].shape}, but t has {t.shape}")
-    step = float(t[-1] - t[0]) / (len(t) - 1)
-    if not step > 0 or np.abs(t - (t[0] + step * np.arange(len(t)))).max() > 0.5 * step:
-        raise ValueError("column 't' is not uniform; resample the columns first")
-    return float(t[0]), step, len(t)
-
-
-def _duration(report: Mapping[str, Any], start: float, step: float, samples: int) -> float:
+def _duration(report: Mapping[str, Any], axis: Axis) -> float:
     ends = [s["stop_s"] for key in ("states", "phases", "intervals") for s in report.get(key) or ()]
     known = (report.get("log") or {}).get("duration_s") or 0.0
-    return float(max([known, start + step * samples if samples else 0.0, *ends]))
+    return float(max([known, axis.start + axis.step * axis.rows if axis.rows else 0.0, *ends]))
 
 
 def _thumbnail(fault: Mapping[str, Any], columns: Columns, start: float, step: float) -> Markup:
@@ -132,69 +125,6 @@ def _thumbnail(fault: Mapping[str, Any], columns: Columns, start: float, step: f
     if pair is None:
         return Markup("")
     return thumbnail(fault, columns[pair.measured], columns[pair.reference] if pair.reference else None, start, step)
-
-
-def _channels(
-    report: Mapping[str, Any],
-    columns: Columns,
-    figures: Mapping[str, Sequence[Row]],
-    groups: Sequence[Group],
-    axis: tuple[float, float],
-    budget: int,
-) -> list[Channel]:
-    """Encode the columns that some figure shows, in the order of first use."""
-    rows = [r for group in figures.values() for r in group] + [r for g in groups for r in g.rows]
-    used = dict.fromkeys(c for r in rows for c in r.columns())
-    lsb = {s["name"]: s["lsb"] for s in report.get("signals") or () if s.get("lsb")}
-    start, step = axis
-    faults = [
-        (f["start_s"] - start, f["stop_s"] - start, frozenset(c for r in figures[f["id"]] for c in r.columns()))
-        for f in report.get("intervals") or ()
-    ]
-    return encode({c: columns[c] for c in used}, lsb, faults, step, budget)
-
-
-def _view(
-    report: Mapping[str, Any],
-    channels: Sequence[Channel],
-    figures: Mapping[str, Sequence[Row]],
-    groups: Sequence[Group],
-    axis: tuple[float, float, int, float],
-) -> dict[str, Any]:
-    """What the page's scripts need to know."""
-    index = {c.name: i for i, c in enumerate(channels)}
-    start, step, samples, duration = axis
-    faults = [
-        {
-            "id": f["id"],
-            "start": f["start_s"],
-            "stop": f["stop_s"],
-            "detected": f.get("detected_s"),
-            "mode": names.known(f["mode"]),
-            "component": f["component"],
-            "title": names.fault_title(f),
-            "rows": [row_json(r, index) for r in figures[f["id"]]],
-        }
-        for f in report.get("intervals") or ()
-    ]
-    return {
-        "t0": start,
-        "dt": step,
-        "n": samples,
-        "duration": duration,
-        "name": tables.machine_name(report),
-        "faults": faults,
-        "loop": [{"key": g.key, "title": g.title, "rows": [row_json(r, index) for r in g.rows]} for g in groups],
-        "channels": [
-            {
-                "name": c.name,
-                "step": c.step,
-                "base": c.base,
-                "segments": [[s.start, s.count, s.stride, s.planes] for s in c.segments],
-            }
-            for c in channels
-        ],
-    }
 
 
 @lru_cache

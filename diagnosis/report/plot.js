@@ -18,6 +18,12 @@ class Figure {
     applied: { colour: "teal", width: 1.5, sign: "━━" },
     right: { colour: "muted", width: 1, dash: "dot", sign: "···" },
     peer: { colour: "peer", width: 1.1, sign: "──" },
+    "free-0": { colour: "accent", width: 1.6, sign: "━━" },
+    "free-1": { colour: "stuck", width: 1.4, dash: "dash", sign: "╌╌" },
+    "free-2": { colour: "teal", width: 1.6, sign: "━━" },
+    "free-3": { colour: "alt", width: 1.4, dash: "dash", sign: "╌╌" },
+    "free-4": { colour: "ineff-line", width: 1.6, dash: "dot", sign: "···" },
+    "free-5": { colour: "text", width: 1.1, sign: "──" },
     band: { colour: "accent", width: 0 },
     threshold: { colour: "stuck", width: 1.3, dash: "dash", sign: "╌╌" },
   };
@@ -89,13 +95,24 @@ class Figure {
         add(i, "threshold", "+ threshold", row.unit, false);
         add(i, "threshold", "− threshold", row.unit, false);
       }
-      for (const t of row.traces) add(i, t.role, t.name, t.right ? row.rightUnit.unit : row.unit, t.right);
+      for (const t of row.traces) add(i, t.role, t.name, t.unit ?? (t.right ? row.rightUnit.unit : row.unit), t.right);
     });
     return list;
   }
 
-  // Title and legend of a row, wrapped to the figure's width.
-  heading(row) {
+  // For each row the curves drawn in it.
+  perRow(curves) {
+    let from = 0;
+    return this.rows.map((r) => curves.slice(from, from += r.traces.length + (r.band ? 1 : 0) + (r.threshold === undefined ? 0 : 2)));
+  }
+
+  // Whether a row shows every sample or the extremes of several.
+  static drawn(curves) {
+    return curves.every((c) => c.exact) ? "▪ every sample" : `▤ min–max of ${Math.max(...curves.map(Data.samples))} samples`;
+  }
+
+  // Title and legend of a row, wrapped to the figure's width; at the end how it is drawn.
+  heading(row, curves) {
     const entries = row.traces.filter((t) => t.role !== "peer").map((t) => [Figure.style(t.role), t.name]);
     const peers = row.traces.filter((t) => t.role === "peer").map((t) => t.name);
     if (peers.length) entries.unshift([Figure.style("peer"), peers.join(", ")]);
@@ -109,12 +126,19 @@ class Figure {
       used += n.length + 6;
       text += `<span style="color:${Figure.colour(s.colour)}">${s.sign}</span> <span style="color:${muted}">${Figure.text(n)}</span>`;
     }
-    return { text, lines };
+    const drawn = Figure.drawn(curves);
+    if (used + 30 > room) { text += "<br>"; lines += 1; } else text += "   ";
+    return { text: `${text}<span style="color:${muted}"><i>${drawn}</i></span>`, lines };
+  }
+
+  headings(curves) {
+    const parts = this.perRow(curves);
+    return this.rows.map((r, i) => this.heading(r, parts[i]));
   }
 
   layout(width) {
     const [text, muted, line, grid] = ["text", "muted", "line", "line2"].map(Figure.colour);
-    const panel = width ? 78 : this.rows.length > 5 ? 104 : 128, foot = 44, headings = this.rows.map((r) => this.heading(r));
+    const panel = width ? 78 : this.rows.length > 5 ? 104 : 128, foot = 44, headings = this.headings(this.curves);
     const heads = headings.map((h) => 15 + 16 * h.lines), plot = heads.reduce((sum, h) => sum + h + panel, 0), height = plot + foot;
     const last = this.rows.length;
     const layout = {
@@ -124,7 +148,7 @@ class Figure {
       font: { color: text, size: 12, family: getComputedStyle(document.body).fontFamily },
       hovermode: "x unified", hoverlabel: { bgcolor: Figure.colour("surface"), bordercolor: line, font: { color: text } },
       xaxis: {
-        range: [...this.range], anchor: last > 1 ? `y${last}` : "y", gridcolor: grid, zeroline: false, linecolor: line, tickcolor: line,
+        range: [...this.range], tickformat: ".9~g", anchor: last > 1 ? `y${last}` : "y", gridcolor: grid, zeroline: false, linecolor: line, tickcolor: line,
         ticks: "outside", unifiedhovertitle: { text: "%{x:.4f} s" }, showspikes: true, spikemode: "across", spikesnap: "cursor", spikethickness: 1, spikedash: "solid",
         spikecolor: muted, title: { text: "mission time (s)", standoff: 4, font: { color: muted, size: 12 } },
       },
@@ -170,12 +194,12 @@ class Figure {
 
   label(curves) {
     if (!this.badge) return;
-    const every = curves.every((c) => c.exact), stride = Math.max(...curves.map((c) => c.stride));
-    const stored = Math.max(...curves.map((c) => c.stored || 1)), s = stride * Data.view.dt;
-    const time = s < 1 ? `${+(s * 1e3).toPrecision(2)} ms` : `${+s.toPrecision(2)} s`, rate = 1 / Data.view.dt;
+    const every = curves.every((c) => c.exact), { dt, per } = Data.view, rate = 1 / dt;
+    const stored = Math.max(...curves.map((c) => c.stored || 1)), s = Math.max(...curves.map(Data.samples)) * dt / (per > 1 ? per / 2 : 1);
+    const time = s < 1 ? `${+(s * 1e3).toPrecision(2)} ms` : `${+s.toPrecision(2)} s`;
     this.badge.textContent = every
       ? `every sample drawn · ${+rate.toPrecision(4)} Hz`
-      : `min–max envelope · ${time}` + (stored > 1 ? " · samples stored around faults only" : " per pixel");
+      : `min–max envelope · ${time}` + (per > 1 ? ` · extremes of ${per} samples stored` : stored > 1 ? " · samples stored around faults only" : " per pixel");
     this.badge.classList.toggle("full", every);
   }
 
@@ -185,7 +209,7 @@ class Figure {
     if (job !== this.job) return;
     const config = {
       responsive: true, displaylogo: false, showSendToCloud: false, plotlyServerURL: "", doubleClick: false,
-      modeBarButtonsToRemove: ["select2d", "lasso2d", "autoScale2d", "resetScale2d"],
+      modeBarButtonsToRemove: ["toImage", "select2d", "lasso2d", "autoScale2d", "resetScale2d"],
     };
     this.curves = curves;
     await Plotly.react(this.element, this.traces(curves), this.layout(), config);
@@ -221,7 +245,8 @@ class Figure {
       do {
         this.again = false;
         const target = [...this.range], curves = await this.fetch(target);
-        await Plotly.update(this.element, this.restyled(curves), { "xaxis.range": target });
+        const heads = Object.fromEntries(this.headings(curves).map((h, i) => [`annotations[${i}].text`, h.text]));
+        await Plotly.update(this.element, this.restyled(curves), { "xaxis.range": target, ...heads });
         this.curves = curves;
         this.label(curves);
       } while (this.again);
@@ -234,10 +259,29 @@ class Figure {
     return { x: curves.map((c) => c.x), y: curves.map((c) => c.y), mode };
   }
 
+  // Part of the range earlier (−) or later, and closer (below 1) or wider about its middle.
+  pan(part) {
+    const [a, b] = this.range, [first, last] = this.clip([-Infinity, Infinity]), width = b - a;
+    const from = Math.min(Math.max(first, a + part * width), last - width);
+    return this.zoom([from, from + width]);
+  }
+
+  scale(factor) {
+    const [a, b] = this.range, middle = (a + b) / 2, half = factor * (b - a) / 2;
+    return this.zoom([middle - half, middle + half]);
+  }
+
+  // Address of a picture of the figure on the page's background.
+  image(form) {
+    const { data, layout, clientWidth } = this.element, width = Math.max(600, clientWidth);
+    const paper = Figure.colour("surface");
+    return Plotly.toImage({ data, layout: { ...layout, width, autosize: false, paper_bgcolor: paper, plot_bgcolor: paper } }, { format: form, width, height: layout.height, scale: form === "png" ? 2 : 1 });
+  }
+
   csv() {
     const columns = new Map();
     for (const row of this.rows) {
-      for (const t of row.traces) columns.set(t.c, { c: t.c, k: t.k, unit: t.right ? row.rightUnit.unit : row.unit });
+      for (const t of row.traces) columns.set(t.c, { c: t.c, k: t.k, unit: t.unit ?? (t.right ? row.rightUnit.unit : row.unit) });
       for (const c of row.band || []) columns.set(c, { c, k: row.bandScale, unit: row.unit });
       if (row.threshold !== undefined) columns.set(row.threshold, { c: row.threshold, k: row.bandScale, unit: row.unit });
     }

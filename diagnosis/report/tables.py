@@ -84,7 +84,10 @@ def context(report: Mapping[str, Any], duration: float) -> dict[str, Any]:
         "metrics": _metrics(report.get("metrics") or {}),
         "signals": [_signal(s) for s in report.get("signals") or ()],
         "missing": _missing(report.get("missing") or ()),
-        "quality": [{"ok": True, "effect": "", "result": "", "check": "", **q} for q in report.get("quality") or ()],
+        "quality": sorted(
+            ({"ok": True, "effect": "", "result": "", "check": "", **q} for q in report.get("quality") or ()),
+            key=lambda q: bool(q["ok"]),
+        ),
         "files": [_file(f) for f in log.get("files") or ()],
         "readings": [{"detail": "", "value": "", **r} for r in report.get("readings") or ()],
         "limits": [(k.replace("_", " "), _plain(v)) for k, v in (report.get("limits") or {}).items()],

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import groupby
 from typing import Any
@@ -133,7 +133,7 @@ def ticks(duration: float) -> tuple[tuple[float, str], ...]:
     return tuple((100 * k * step / duration, clock(k * step, 0 if step >= 1 else 1)) for k in range(count + 1))
 
 
-def timeline(report: Mapping[str, Any], duration: float) -> Timeline:
+def timeline(report: Mapping[str, Any], duration: float, bars: Collection[str] | None = None) -> Timeline:
     """Lanes for the components of a report in machine order, sensor before actuator.
 
     Parameters
@@ -142,6 +142,8 @@ def timeline(report: Mapping[str, Any], duration: float) -> Timeline:
         The parsed ``report.json``.
     duration : float
         Length of the time axis [s].
+    bars : Collection[str] or None
+        Names of the faults that get a bar of their own, the others are part of their lane's line; None: all.
     """
     machine, faults = report.get("machine") or {}, report.get("intervals") or ()
     by_lane: dict[tuple[str, str, str], list[Mapping[str, Any]]] = {}
@@ -156,14 +158,17 @@ def timeline(report: Mapping[str, Any], duration: float) -> Timeline:
     quiet: list[Lane] = []
     for (c, kind, side), spans in by_lane.items():
         mine = [f for f in faults if _on_lane(f, c, kind, side)]
-        bars = tuple(_bar(f, duration) for f in sorted(mine, key=lambda f: f["start_s"])) if duration > 0 else ()
+        own = [f for f in sorted(mine, key=lambda f: f["start_s"]) if bars is None or f["id"] in bars]
+        drawn = tuple(_bar(f, duration) for f in own) if duration > 0 else ()
+        if len(own) < len(mine):
+            spans = [*spans, *({**f, "state": f["mode"]} for f in mine)]
         total = sum(f["stop_s"] - f["start_s"] for f in mine)
         share = 100 * total / duration if duration > 0 else 0.0
         faulty = "" if not mine else f"{share:.1f} %" if share >= 0.05 else span(total)
         state = known(mine[0]["mode"]) if mine else _quiet_state(spans)
         group = lanes if mine else quiet
         first = not group or group[-1].component != c
-        group.append(Lane(c, part(kind, side), state, _lines(spans, side, duration), bars, faulty, first))
+        group.append(Lane(c, part(kind, side), state, _lines(spans, side, duration), drawn, faulty, first))
     counts: dict[str, int] = {}
     for lane in quiet:
         words = {"healthy": "healthy"}.get(lane.state, f"{state_label(lane.state).lower()} throughout")

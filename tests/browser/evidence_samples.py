@@ -1,4 +1,4 @@
-"""Report with everything that the evidence section can show."""
+"""Reports with everything that the evidence section can show, with thousands of faults, and of a long mission."""
 
 from __future__ import annotations
 
@@ -23,3 +23,52 @@ def decided() -> tuple[dict[str, Any], samples.Columns]:
     ]
     report["log"]["open_loop"] = True
     return report, {k: np.asarray(v) for k, v in columns.items()}
+
+
+def many_faults(count: int, spans: int) -> tuple[dict[str, Any], samples.Columns]:
+    """Faults of falling severity one after the other on two wheels, and as many states as wanted."""
+    report, columns = samples.five_faults()
+    first, wheels = report["intervals"][0], ("FR", "FL")
+    report["intervals"] = [
+        {
+            **first,
+            "id": f"F{i + 1}",
+            "component": wheels[i % 2],
+            "start_s": 120.0 * i / count,
+            "stop_s": 120.0 * (i + 0.5) / count,
+            "severity": "high" if i % 10 == 0 else "low",
+        }
+        for i in range(count)
+    ]
+    names = ("healthy", "not_excited", "stuck")
+    report["states"] = [
+        {
+            "component": wheels[i % 2],
+            "side": "sensor",
+            "state": names[i % 3],
+            "start_s": 120.0 * (i // 2) / spans * 2,
+            "stop_s": 120.0 * (i // 2 + 1) / spans * 2,
+            "reason": "held still",
+        }
+        for i in range(spans)
+    ]
+    return report, columns
+
+
+def thousands() -> tuple[dict[str, Any], samples.Columns]:
+    """1200 faults."""
+    return many_faults(1200, 12_000)
+
+
+def long_mission() -> tuple[dict[str, Any], samples.Columns]:
+    """Five faults in a mission whose rows are the extremes of 64 samples each."""
+    report, columns = samples.five_faults()
+    report["log"]["rate_hz"] = 3200.0
+    return report, columns
+
+
+def spike() -> tuple[dict[str, Any], samples.Columns]:
+    """A single sample of another value, in a signal that no figure shows."""
+    report, columns = samples.five_faults()
+    columns["imu.yaw_rate"] = np.where(np.arange(12_000) == 7_777, 0.5, 0.1)
+    return report, columns

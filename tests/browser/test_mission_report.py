@@ -236,9 +236,6 @@ def test_loop_replay(open_page: OPEN) -> None:
         page.get_by_role("button", name=re.compile(name)).click()
         expect(page.locator("#loop-figure")).to_contain_text(words)
     assert x_range(page, "loop-figure") == [0.0, 120.0]
-    page.locator("#explore").select_option(label="wheel.FL.v")
-    expect(page.locator("#loop-figure")).to_contain_text("wheel.FL.v (m/s)")
-    expect(page.locator("#explore")).to_have_value("")
 
 
 def test_lanes_without_faults_unfold(show: SHOW) -> None:
@@ -255,12 +252,3 @@ def test_page_without_javascript(open_page: OPEN) -> None:
     expect(page.locator("article.ev")).to_have_count(5)
     expect(page.locator("article.ev").last).to_be_visible()
     expect(page.get_by_role("button", name="CSV of view")).to_have_count(0)
-
-
-def test_print_shows_every_fault_in_light_colours(open_page: OPEN) -> None:
-    page = drawn(open_page("five_faults", theme="dark"))
-    page.pdf(format="A4")
-    page.emulate_media(media="print")
-    expect(page.locator("article.ev").last).to_be_visible()
-    expect(page.locator("header.top")).to_be_hidden()
-    assert page.locator("html").get_attribute("data-theme") == "dark"

@@ -49,7 +49,11 @@ def test_missing_pictures_are_explained() -> None:
     del columns["wheel.drive.v"]
     found = evidence_of(report, columns, (0.0, 0.01))["F1"]
     assert found.note == "The channel of this fault is not among the saved time series."
-    report, columns = samples.one_wheel()
-    report["intervals"] = [{**report["intervals"][0], "id": f"F{i}"} for i in range(151)]
-    found = evidence_of(report, columns, (0.0, 0.01))["F150"]
-    assert (found.edges, found.note) == ((), "Pictures of onset and end are drawn for the first 150 faults.")
+    found = evidence_of(*samples.one_wheel(), (0.0, 0.01), per=64)["F1"]
+    assert found.edges == ()
+    assert found.note.startswith("Of this long mission the smallest and largest of every 64 samples are kept")
+
+
+def test_only_the_wanted_faults() -> None:
+    report, columns = samples.five_faults()
+    assert set(evidence_of(report, columns, (0.0, 0.01), faults=report["intervals"][1:3])) == {"F2", "F3"}

@@ -15,6 +15,7 @@ import pytest
 from diagnosis.report.page import build_page
 from replay.errors import ConfigError
 from tests import report_samples as samples
+from tests.browser import evidence_samples
 
 SAMPLES: list[Callable[[], tuple[dict[str, Any], samples.Columns]]] = [
     samples.five_faults,
@@ -63,7 +64,7 @@ def test_scripts_match_the_policy_and_nothing_is_fetched(sample: Callable[[], An
     tree = Tree(build_page(*sample()))
     policy = next(a["content"] for t, a in tree.tags if t == "meta" and a.get("http-equiv")) or ""
     code = [text for attrs, text in tree.scripts if "type" not in attrs]
-    assert len(code) == 4
+    assert len(code) == 6
     for text in code:
         digest = base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()
         assert f"'sha256-{digest}'" in policy
@@ -73,7 +74,7 @@ def test_scripts_match_the_policy_and_nothing_is_fetched(sample: Callable[[], An
     for tag, attrs in tree.tags:
         assert tag not in {"link", "iframe", "object", "embed", "base", "img", "form"}
         assert "src" not in attrs
-        assert attrs.get("href", "#").startswith("#")  # type: ignore[union-attr]
+        assert attrs.get("href", "#").startswith("#") or attrs["href"] == "report.json"  # type: ignore[union-attr]
         assert not any(name.startswith("on") for name in attrs)
 
 
@@ -242,3 +243,43 @@ def test_cells_of_stacked_tables_carry_their_headings() -> None:
     text = build_page(report, columns)
     assert '<th scope="row" data-h="Wheel">drive</th>' in text
     assert '<td data-h="Check">' in text
+
+
+def test_thousands_of_faults_stay_within_the_size() -> None:
+    report, columns = evidence_samples.many_faults(3000, 100_000)
+    text = build_page(report, columns, max_size_mb=7.0)
+    assert len(text.encode()) < 7.0e6
+    tree = Tree(text)
+    kinds = [a.get("class") or "" for _, a in tree.tags]
+    assert kinds.count("fault") == 3000
+    assert sum(k.startswith("fb ") for k in kinds) == 120
+    shown = [a["data-ev"] for t, a in tree.tags if t == "article" and "data-ev" in a]
+    assert len(shown) == 120
+    assert all(int(str(name)[1:]) % 10 == 1 for name in shown)
+    assert "that of all 3\u202f000 is in" in tree.text
+
+
+def test_faults_beyond_the_table_are_counted() -> None:
+    report, _ = evidence_samples.many_faults(5200, 10)
+    tree = Tree(build_page(report, {}))
+    assert sum(a.get("class") == "fault" for _, a in tree.tags) == 5000
+    assert "200 less severe faults are not in this table" in tree.text
+
+
+def test_every_column_is_in_the_page() -> None:
+    report, columns = samples.one_wheel()
+    columns["gnss.speed"], columns["imu.yaw_rate"] = np.ones(12_000), np.full(12_000, np.nan)
+    tree = Tree(build_page(report, columns))
+    view = json.loads(next(s for a, s in tree.scripts if a.get("id") == "view"))
+    names = {c["name"] for c in view["channels"]}
+    assert set(columns) - names == {"t", "imu.yaw_rate"}
+    assert "imu.yaw_rate" in tree.text
+
+
+def test_extremes_of_long_missions_are_named_and_not_drawn_as_samples() -> None:
+    report, columns = samples.five_faults()
+    report["log"]["rate_hz"] = 3200.0
+    tree = Tree(build_page(report, columns))
+    assert json.loads(next(s for a, s in tree.scripts if a.get("id") == "view"))["per"] == 64
+    assert "the smallest and largest of every 64 samples are kept" in tree.text
+    assert "one mark for each sample" not in tree.text

@@ -1,0 +1,43 @@
+"use strict";
+// Files and text that leave the page: CSV, pictures, JSON, the clipboard.
+const Export = (() => {
+  const safe = (name) => name.replace(/[^\w.-]+/g, "_").slice(0, 120);
+
+  function save(name, type, content) {
+    const url = URL.createObjectURL(new Blob([content], { type })), a = document.createElement("a");
+    a.href = url;
+    a.download = safe(name);
+    a.click();
+    setTimeout(() => URL.revokeObjectURL(url), 1000);
+  }
+
+  async function image(figure, name, form) {
+    const address = await figure.image(form), data = address.slice(address.indexOf(",") + 1);
+    if (form === "svg") save(`${name}.svg`, "image/svg+xml", decodeURIComponent(data));
+    else save(`${name}.png`, "image/png", Data.fromBase64(data));
+  }
+
+  async function json(id) {
+    const faults = await Data.intervals();
+    save(`${id}.json`, "application/json", JSON.stringify(faults[id], null, 2) + "\n");
+  }
+
+  // What the article of a fault says, as lines of text.
+  async function copy(article, button) {
+    const text = `${Data.view.name}\n${article.dataset.text}\n` + [...article.querySelectorAll("li, .advice")].map((e) => `- ${e.textContent.trim()}`).join("\n") + `\n${location.hash}\n`;
+    try { await navigator.clipboard.writeText(text); } catch {
+      const area = document.createElement("textarea");
+      area.value = text;
+      document.body.append(area);
+      area.select();
+      document.execCommand("copy");
+      area.remove();
+    }
+    button.dataset.copied = text;
+    const words = "Copy as text";
+    button.textContent = "Copied";
+    setTimeout(() => { button.textContent = words; }, 1500);
+  }
+
+  return { save, image, json, copy };
+})();

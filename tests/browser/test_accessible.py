@@ -1,0 +1,72 @@
+"""WCAG 2.2 AA as far as axe-core can tell, and the contrast of the page's colours, in both themes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from importlib.resources import files
+from typing import Any
+
+import pytest
+
+pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
+
+OPEN = Callable[..., Any]
+TAGS = ["wcag2a", "wcag2aa", "wcag21a", "wcag21aa", "wcag22aa"]
+
+
+@pytest.fixture(scope="module")
+def axe() -> str:
+    pytest.importorskip("axe_playwright_python", reason="axe-core is not installed: pip install axe-playwright-python")
+    return (files("axe_playwright_python") / "axe.min.js").read_text("utf-8")
+
+
+def breaches(page: Any, axe: str) -> list[str]:
+    page.evaluate(axe)
+    found = page.evaluate(
+        "tags => axe.run(document, { runOnly: tags, resultTypes: ['violations'] }).then(r => r.violations"
+        ".flatMap(v => v.nodes.map(n => v.id + ' ' + n.target.join(' '))))",
+        TAGS,
+    )
+    return [str(f) for f in found]
+
+
+@pytest.mark.parametrize("theme", ["light", "dark"])
+@pytest.mark.parametrize(("name", "width"), [("five_faults", 1280), ("not_assessed", 420)])
+def test_no_breach_of_wcag(open_page: OPEN, axe: str, name: str, width: int, theme: str) -> None:
+    address = "#fault=F1&t=20,50&plots=wheel.FR.v,wheel.FR.u;path.x" if name == "five_faults" else ""
+    page = open_page(name, address, width=width, theme=theme)
+    for figure in ("#figure", "#loop-figure", "#signals-figure:not([hidden])"):
+        if page.locator(figure).count():
+            page.locator(figure).scroll_into_view_if_needed()
+            page.locator(f"{figure} .main-svg").first.wait_for()
+    assert breaches(page, axe) == []
+    page.keyboard.press("Escape")
+    page.locator("[data-act=help]").click()
+    assert breaches(page, axe) == []
+
+
+def luminance(colour: str) -> float:
+    levels = [int(colour[i : i + 2], 16) / 255 for i in (1, 3, 5)]
+    red, green, blue = (v / 12.92 if v <= 0.04045 else ((v + 0.055) / 1.055) ** 2.4 for v in levels)
+    return 0.2126 * red + 0.7152 * green + 0.0722 * blue
+
+
+@pytest.mark.parametrize("theme", ["light", "dark"])
+@pytest.mark.parametrize(
+    ("least", "front", "back"),
+    [
+        (4.5, ("text", "muted", "accent"), ("surface", "surface2", "bg", "accent-bg")),
+        (3.0, ("stuck", "no_signal", "ineff-line", "noisy", "healthy-text", "teal", "alt"), ("surface",)),
+    ],
+)
+def test_colours_stand_out(
+    open_page: OPEN, theme: str, least: float, front: tuple[str, ...], back: tuple[str, ...]
+) -> None:
+    page = open_page("not_assessed", theme=theme)
+    read = "n => getComputedStyle(document.documentElement).getPropertyValue('--' + n).trim()"
+    colours = {n: page.evaluate(read, n) for n in (*front, *back)}
+    full = {n: "#" + "".join(2 * c for c in v[1:]) if len(v) == 4 else v for n, v in colours.items()}
+    for f in front:
+        for b in back:
+            light, dark = sorted((luminance(full[f]), luminance(full[b])), reverse=True)
+            assert (light + 0.05) / (dark + 0.05) >= least, (f, b)

@@ -1,0 +1,121 @@
+"""The signal explorer in Chromium: any column, in any plot, by keyboard alone, at the time of the evidence."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+playwright = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
+expect = playwright.expect
+
+OPEN = Callable[..., Any]
+
+
+def x_range(page: Any, figure: str) -> list[float]:
+    return [float(v) for v in page.evaluate(f"document.getElementById('{figure}').layout.xaxis.range")]
+
+
+def settled(page: Any, address: str) -> None:
+    page.wait_for_url(re.compile(address))
+
+
+def test_signals_are_chosen_and_removed_without_a_mouse(open_page: OPEN) -> None:
+    page = open_page("five_faults", "#fault=F1&t=27,39")
+    expect(page.locator("#found")).to_have_text(re.compile(r"^(\d+) of \1$"))
+    page.keyboard.press("s")
+    page.keyboard.type("FR.v_t")
+    expect(page.locator("#columns option")).to_have_text(["wheel.FR.v_true"])
+    page.keyboard.press("Enter")
+    settled(page, "plots=wheel.FR.v_true$")
+    page.locator("#signals-figure .main-svg").first.wait_for()
+    expect(page.locator("#signals-badge")).to_have_text("every sample drawn · 100 Hz")
+    page.keyboard.press("ControlOrMeta+A")
+    page.keyboard.type("path")
+    page.keyboard.press("ArrowDown")
+    page.keyboard.press("ArrowDown")
+    page.keyboard.press("Enter")
+    settled(page, "plots=wheel.FR.v_true;path.y$")
+    page.locator("#into").select_option(label="plot 1")
+    page.get_by_role("button", name="Add", exact=True).press("Enter")
+    settled(page, "plots=wheel.FR.v_true,path.y;path.y$")
+    expect(page.locator("#signals-figure")).to_contain_text("(m/s, m)")
+    expect(page.locator("#signals-figure")).to_contain_text("every sample")
+    page.get_by_role("button", name="Remove path.y from plot 1").press("Enter")
+    settled(page, "plots=wheel.FR.v_true;path.y$")
+    page.get_by_role("button", name="Remove all").press("Enter")
+    settled(page, r"#fault=F1&t=27\.0000,39\.0000$")
+    expect(page.locator("#signals-figure")).to_be_hidden()
+
+
+def test_plots_keep_the_time_of_the_evidence_while_linked(open_page: OPEN) -> None:
+    page = open_page("five_faults", "#fault=F1&t=27,39&plots=wheel.FR.v;wheel.FR.u")
+    page.locator("#signals-figure .main-svg").first.wait_for()
+    page.locator("#figure .main-svg").first.wait_for()
+    assert x_range(page, "signals-figure") == [27.0, 39.0]
+    page.locator("#signals-figure").focus()
+    page.keyboard.press("ArrowRight")
+    settled(page, r"t=30\.0000,42\.0000&")
+    page.keyboard.press("+")
+    settled(page, r"t=33\.0000,39\.0000&")
+    expect(page.locator("#figure").get_by_text("34", exact=True)).to_be_visible()
+    assert x_range(page, "figure") == [33.0, 39.0]
+    page.get_by_label("same time as the evidence").uncheck()
+    page.locator("#signals-figure").focus()
+    page.keyboard.press("m")
+    expect(page.locator("#signals-badge")).to_contain_text("envelope")
+    assert x_range(page, "signals-figure") == [0.0, 120.0]
+    assert x_range(page, "figure") == [33.0, 39.0]
+
+
+def test_one_sample_is_seen_in_the_whole_mission(open_page: OPEN) -> None:
+    page = open_page("spike", "#fault=F1&t=0,120&plots=imu.yaw_rate")
+    page.locator("#signals-figure .main-svg").first.wait_for()
+    expect(page.locator("#signals-figure")).to_contain_text("min–max of")
+    x, y = page.evaluate("(d => [Array.from(d.x), Array.from(d.y)])(document.getElementById('signals-figure').data[0])")
+    assert max(y) == pytest.approx(np.degrees(0.5), rel=2e-3)
+    assert x[int(np.argmax(y))] == pytest.approx(77.77)
+    assert len(y) < 4000
+
+
+def test_files_of_the_chosen_signals(open_page: OPEN) -> None:
+    page = open_page("five_faults", "#fault=F1&t=30,30.05&plots=wheel.FR.v,cmd;path.x")
+    page.locator("#signals-figure .main-svg").first.wait_for()
+    tools = page.locator("#signals-tools")
+    with page.expect_download() as download:
+        tools.get_by_role("button", name="CSV of view").click()
+    lines = Path(download.value.path()).read_text(encoding="utf-8").splitlines()
+    assert lines[0] == '"t [s]","wheel.FR.v [m/s]","path.x [m]"'
+    for form, begin in (("PNG", b"\x89PNG\r\n\x1a\n"), ("SVG", b"<svg")):
+        with page.expect_download() as download:
+            tools.get_by_role("button", name=form).click()
+        assert download.value.suggested_filename == f"signals.{form.lower()}"
+        assert Path(download.value.path()).read_bytes().startswith(begin)
+
+
+def test_hostile_names_are_found_and_stay_text(open_page: OPEN) -> None:
+    page = open_page("hostile")
+    page.keyboard.press("s")
+    page.keyboard.type("<script>")
+    page.keyboard.press("Enter")
+    page.locator("#signals-figure .main-svg").first.wait_for()
+    expect(page.locator("#plots")).to_contain_text("<script>alert(1)</script>")
+    expect(page.locator("#signals-figure")).to_contain_text("<script>alert(1)</script>")
+    assert page.evaluate("document.querySelectorAll('img, main script').length") == 0
+    address = page.evaluate("location.hash")
+    page.evaluate("history.replaceState(null, '', '#')")
+    page.get_by_role("button", name="Remove all").click()
+    page.evaluate("a => { location.hash = a }", address)
+    expect(page.locator("#plots")).to_contain_text("<script>alert(1)</script>")
+
+
+def test_no_fault_no_link_to_evidence_but_signals(open_page: OPEN) -> None:
+    page = open_page("no_faults", "#t=10,20&plots=wheel.FR.v")
+    page.locator("#signals-figure .main-svg").first.wait_for()
+    assert x_range(page, "signals-figure") == [10.0, 20.0]
+    page.keyboard.press("-")
+    settled(page, r"#t=5\.0000,25\.0000&plots=wheel.FR.v$")
