@@ -8,6 +8,8 @@ from typing import Annotated, Any
 import typer
 
 from cli.app import command
+from cli.browsing import open_page as show_page
+from cli.clipping import FOLDER, show_clips
 from cli.console import Terminal
 from cli.inputs import check_output, check_times, check_wheels, machine_of, mission_paths
 from cli.options import End, FailOn, Json, Logs, MachineFile, MaxSize, Start
@@ -17,6 +19,7 @@ Examples:
   mfhca diagnose mission.mcap
   mfhca diagnose drive.bag plc-export.csv -m machine.toml -o reports/monday
   mfhca diagnose mission.mcap --start 100 --end 160 --wheel FR --fail-on high
+  mfhca diagnose mission.mcap --clips --open        # each fault cut out for Foxglove and PlotJuggler
   mfhca diagnose mission.mcap --json | jq .verdict"""
 REPORT_EXAMPLES = """\b
 Examples:
@@ -56,6 +59,13 @@ def diagnose(
     json: Json = False,
     dry_run: Annotated[bool, typer.Option("--dry-run", help="Say what would be read and written, and stop.")] = False,
     open_page: Annotated[bool, typer.Option("--open", help="Open the report in the browser.")] = False,
+    clips: Annotated[
+        bool, typer.Option("--clips", help="Cut each fault of at least low severity into an MCAP file of its own.")
+    ] = False,
+    clip_margin: Annotated[
+        float,
+        typer.Option("--clip-margin", metavar="S", min=0.0, max=3600.0, help="Time before and behind each clip [s]."),
+    ] = 5.0,
     max_size: MaxSize = 15.0,
 ) -> None:
     """Diagnose one mission: report.html, report.json, and a verdict as exit code."""
@@ -64,24 +74,25 @@ def diagnose(
     the_machine, source = machine_of(machine)
     wheels = check_wheels(wheel, the_machine)
     folder = output if output is not None else _default_folder(paths[0])
-    check_output([folder / name for name in _OUTPUTS], paths)
+    outputs = [folder / name for name in (*_OUTPUTS, *((FOLDER,) if clips else ()))]
+    check_output(outputs, paths)
     if dry_run:
-        _plan(terminal, paths, the_machine, source, folder, json)
+        _plan(terminal, paths, the_machine, source, outputs, json)
         return
     with terminal.progress("starting") as progress:
+        from diagnosis import pipeline
         from diagnosis.output import write_result
-        from diagnosis.pipeline import diagnose as diagnose_mission
 
-        result = diagnose_mission(
-            paths,
-            the_machine,
-            machine_source=source,
-            start_s=start,
-            stop_s=end,
-            wheels=wheels,
-            machine_id=machine_id,
-            progress=progress,
-        )
+        judged: dict[str, Any] = {"machine_source": source, "wheels": wheels, "machine_id": machine_id}
+        judged["progress"] = progress
+        mission = None
+        if clips:  # cut from the same mission
+            from replay.mission import load_mission
+
+            mission = load_mission(paths, the_machine, start_s=start, stop_s=end, progress=progress)
+            result = pipeline.diagnose_mission(mission, the_machine, **judged)
+        else:
+            result = pipeline.diagnose(paths, the_machine, start_s=start, stop_s=end, **judged)
         progress("writing the report")
         written = write_result(result, folder, max_size_mb=max_size)
     page = next((p for p in written if p.name == "report.html"), written[0])
@@ -92,8 +103,14 @@ def diagnose(
 
         terminal.show(*verdict_parts(result.report))
     terminal.show(f"Report: {page}")
+    if mission is not None:
+        with terminal.progress("cutting clips") as progress:
+            from diagnosis.clips import write_clips
+
+            cut = write_clips(mission, result, the_machine, folder / FOLDER, margin_s=clip_margin, progress=progress)
+        show_clips(terminal, cut, folder / FOLDER)
     if open_page:
-        _open(page)
+        show_page(terminal, page)
     if _reaches(result.report, fail_on):
         raise typer.Exit(_FAULTS)
     if fail_on is not FailOn.NEVER and result.report["verdict"]["status"] == "not_assessed":
@@ -117,7 +134,7 @@ def report(
         page = rebuild(result, max_size_mb=max_size)
     terminal.show(f"Report: {page}")
     if open_page:
-        _open(page)
+        show_page(terminal, page)
 
 
 def _default_folder(log: Path) -> Path:
@@ -134,7 +151,7 @@ def _reaches(report: Any, fail_on: FailOn) -> bool:
     )
 
 
-def _plan(terminal: Terminal, paths: list[Path], machine: Any, source: str, folder: Path, json: bool) -> None:
+def _plan(terminal: Terminal, paths: list[Path], machine: Any, source: str, outputs: list[Path], json: bool) -> None:
     """Show what a run would read and write."""
     from replay.mission import source_options
     from replay.readers.registry import summarise_log
@@ -145,19 +162,13 @@ def _plan(terminal: Terminal, paths: list[Path], machine: Any, source: str, fold
         found.append(
             {"path": str(path), "format": summary.format, "duration_s": (summary.stop_ns - summary.start_ns) * 1e-9}
         )
-    outputs = [str(folder / name) for name in _OUTPUTS]
+    written = [str(path) for path in outputs]
     if json:
         machine_part = {"name": machine.name, "source": source}
-        terminal.show_json({"would_read": found, "machine": machine_part, "would_write": outputs})
+        terminal.show_json({"would_read": found, "machine": machine_part, "would_write": written})
         return
     from cli.tables import key_values
 
     rows = [("read", f"{f['path']}  ({f['format']}, {f['duration_s']:.1f} s)") for f in found]
-    rows += [("machine", f"{machine.name} ({source})"), *(("write", name) for name in outputs)]
+    rows += [("machine", f"{machine.name} ({source})"), *(("write", name) for name in written)]
     terminal.show(key_values(rows))
-
-
-def _open(page: Path) -> None:
-    import webbrowser
-
-    webbrowser.open(page.resolve().as_uri())

@@ -50,6 +50,11 @@ class Names:
         """Connections by channel number, in the order met."""
         return {number: self._connection(number) for number in self._channels}
 
+    @property
+    def records(self) -> list[tuple[int, bytes]]:
+        """Opcode and content of every schema and channel record that is believed, as it stands in the file."""
+        return [(op, raw) for (op, _), (raw, _) in self._known.items()]
+
     def take(self, op: int, raw: bytes, verified: bool, place: str, data: bool = True) -> None:
         """Take a schema or channel record; a damaged one is said and left out.
 

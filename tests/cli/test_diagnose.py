@@ -172,11 +172,37 @@ def test_a_dry_run_writes_nothing(mission_log: Path, calls: dict[str, Any], caps
     assert not Path("drive-report").exists()
 
 
-def test_open_shows_the_page(calls: dict[str, Any], monkeypatch: pytest.MonkeyPatch) -> None:
+def test_open_shows_the_page(
+    calls: dict[str, Any], monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
     opened: list[str] = []
-    monkeypatch.setattr("webbrowser.open", opened.append)
-    run(["diagnose", "drive.mcap", "--open"])
+    monkeypatch.setenv("DISPLAY", ":0")
+    monkeypatch.setattr("webbrowser.open", lambda page: not opened.append(page))
+    assert run(["diagnose", "drive.mcap", "--open"]) == 0
     assert opened == [(Path.cwd() / "drive-report" / "report.html").as_uri()]
+    assert capsys.readouterr().err == ""
+
+
+def test_clips_are_cut_from_the_mission_that_was_diagnosed(
+    mission_log: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert run(["diagnose", str(mission_log), "--clips", "--clip-margin", "1", "--json"]) == 1
+    seen = capsys.readouterr()
+    report = json.loads(seen.out)
+    names = [p.name for p in (tmp_path / "drive-report" / "clips").glob("*.mcap")]
+    assert len(names) == sum(i["severity"] != "info" for i in report["intervals"])
+    assert any(name.endswith("FR sensor stuck.mcap") for name in names)
+    assert f"Clips: {len(names)} in drive-report/clips" in seen.err
+    assert run(["diagnose", str(mission_log), "-o", "plain", "--json"]) == 1
+    assert json.loads(capsys.readouterr().out) == report
+
+
+def test_a_dry_run_names_the_clips(
+    mission_log: Path, calls: dict[str, Any], capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert run(["diagnose", str(mission_log), "--dry-run", "--json", "--clips"]) == 0
+    assert json.loads(capsys.readouterr().out)["would_write"][-1] == "drive-report/clips"
 
 
 def test_a_real_mission_from_log_to_page_and_again(
