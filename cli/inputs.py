@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from replay.errors import ConfigError, LogError
+from replay.readers.regular import check_regular
 
 if TYPE_CHECKING:
     from replay.machine import Machine
@@ -35,7 +36,7 @@ def mission_paths(paths: Sequence[Path]) -> list[Path]:
     Raises
     ------
     LogError
-        Where one does not exist, or is a folder of separate logs.
+        Where one does not exist, is a pipe or a device, or is a folder of separate logs.
     ConfigError
         Where one is given twice.
     """
@@ -43,6 +44,7 @@ def mission_paths(paths: Sequence[Path]) -> list[Path]:
         if not path.exists():
             hint = "; give each file of the mission by its name" if glob.has_magic(str(path)) else ""
             raise LogError(f"{path}: no such file{hint}")
+        check_regular(path)
         if path.is_dir():
             _check_one_recording(path)
     real = [p.resolve() for p in paths]

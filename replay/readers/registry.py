@@ -10,6 +10,7 @@ from replay.rawlog import Clock, LogSummary, RawLog, Window
 from replay.readers.base import Reader
 from replay.readers.mcap import McapReader
 from replay.readers.parquet_table import ParquetReader
+from replay.readers.regular import check_regular
 from replay.readers.ros1_bag import Ros1BagReader
 from replay.readers.rosbag2 import Rosbag2Reader
 from replay.readers.svdx import SvdxReader
@@ -46,13 +47,14 @@ def open_log(path: Path) -> Reader:
     Raises
     ------
     LogError
-        Where the path does not exist, is empty, or no reader knows its content.
+        Where the path does not exist, is empty, is neither file nor folder, or no reader knows its content.
     """
     try:
         if not path.exists():
             raise LogError(f"{path} does not exist; expected a log file or a rosbag2 folder")
         if path.is_file() and path.stat().st_size == 0:
             raise LogError(f"{path} is empty (0 bytes); the recording was not written, copy or record it again")
+        check_regular(path)
         for reader in READERS:
             if reader.matches(path):
                 return reader

@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import IO
 
-import pyarrow as pa
+import zstandard
 
 from replay.errors import LogError
 from replay.readers.clocks import Report
@@ -18,6 +18,8 @@ GZIP, ZSTD = b"\x1f\x8b", b"\x28\xb5\x2f\xfd"
 MAX_EXPANDED = 32 << 30
 BLOCK = 4 << 20
 _PIECE = 1 << 20
+_ZSTD_PIECE = 4 << 10  # packed bytes that are expanded at once; each may become 32 KiB
+_ZSTD_WINDOW = 1 << 28
 _TAIL = 64 << 10
 _ZEROS = re.compile(rb"\0{16,}")
 
@@ -181,11 +183,22 @@ class TextFile:
             report.lost(f"{self.path.name}: its gzip data are {trouble or 'cut off'} after {size} bytes of text")
 
     def _unzstd(self, file: IO[bytes], report: Report) -> Iterator[bytes]:
-        size = 0
-        try:
-            with pa.CompressedInputStream(pa.PythonFile(file, "r"), "zstd") as stream:
-                while piece := stream.read(_PIECE):
-                    size += len(piece)
-                    yield piece
-        except (OSError, pa.ArrowException) as error:
-            report.lost(f"{self.path.name}: its zstd data are damaged or cut off after {size} bytes of text ({error})")
+        """Expand as far as the file is whole, frames one after the other."""
+        size, trouble = 0, ""
+        expander = zstandard.ZstdDecompressor(max_window_size=_ZSTD_WINDOW)
+        frame = expander.decompressobj()
+        left = file.read(_ZSTD_PIECE)
+        while left:
+            try:
+                piece = frame.decompress(left)
+            except zstandard.ZstdError as error:
+                trouble = f"damaged ({error})"
+                break
+            size += len(piece)
+            for at in range(0, len(piece), _PIECE):
+                yield piece[at : at + _PIECE]
+            left = (frame.unused_data if frame.eof else b"") or file.read(_ZSTD_PIECE)
+            if frame.eof and left:
+                frame = expander.decompressobj()
+        if trouble or not frame.eof:
+            report.lost(f"{self.path.name}: its zstd data are {trouble or 'cut off'} after {size} bytes of text")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import os
 from pathlib import Path
 
 import pytest
@@ -107,3 +108,9 @@ def test_results_never_replace_a_log_or_stand_in_a_recording(tmp_path: Path) -> 
     for output in ("a.mcap", "x/../a.mcap", "rec/report/report.html"):
         with pytest.raises(ConfigError, match="would be changed"):
             check_output([tmp_path / output], [tmp_path / "a.mcap", tmp_path / "rec"])
+
+
+def test_a_pipe_is_no_file_of_a_mission(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "a.mcap")
+    with pytest.raises(LogError, match="is not a regular file"):
+        mission_paths([tmp_path / "a.mcap"])

@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 import pytest
@@ -40,6 +41,14 @@ def test_an_empty_file_of_any_name(tmp_path: Path, name: str) -> None:
 def test_a_path_that_does_not_exist(tmp_path: Path) -> None:
     with pytest.raises(LogError, match="does not exist"):
         open_log(tmp_path / "nothing.mcap")
+
+
+def test_a_pipe_or_a_device_is_refused_and_not_waited_for(tmp_path: Path) -> None:
+    pipe = tmp_path / "pipe.mcap"
+    os.mkfifo(pipe)
+    for path, found in ((pipe, "a pipe"), (Path(os.devnull), "a device")):
+        with pytest.raises(LogError, match=rf"is not a regular file \(found {found}\)"):
+            open_log(path)
 
 
 def test_every_reader_has_a_name_of_its_own() -> None:

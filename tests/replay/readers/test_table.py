@@ -158,7 +158,26 @@ def test_zstd_whole_and_cut_off(tmp_path: Path) -> None:
     path.write_bytes(path.read_bytes()[:-2000])
     log = read(path)
     assert 0 < len(log.channels["a"].values) < 200_000
-    assert any("zstd data are damaged or cut off" in d for d in log.summary.damage)
+    assert any("zstd data are cut off" in d for d in log.summary.damage)
+
+
+def test_zstd_cut_off_or_damaged_in_its_first_blocks_gives_what_comes_before(tmp_path: Path) -> None:
+    path = tmp_path / "t.csv.zst"
+    noise = np.random.default_rng(1).integers(0, 10**9, (20_000, 3))
+    text = "t,a,b,c\n" + "".join(f"{i},{a},{b},{c}\n" for i, (a, b, c) in enumerate(noise.tolist()))
+    packed = zstandard.compress(text.encode())
+    path.write_bytes(packed[: len(packed) // 2])
+    log = read(path)
+    assert 5000 < len(log.channels["a"].values) < 15_000
+    assert log.channels["a"].values[:5000].tolist() == noise[:5000, 0].tolist()
+    assert any("zstd data are cut off" in d for d in log.summary.damage)
+    frames = zstandard.compress(text[:100_000].encode()) + zstandard.compress(text[100_000:].encode())
+    path.write_bytes(frames)
+    assert len(read(path).channels["a"].values) == 20_000
+    path.write_bytes(frames[:-100_000] + b"no zstd" * 10)
+    log = read(path)
+    assert 2000 < len(log.channels["a"].values) < 20_000
+    assert any("zstd data are" in d for d in log.summary.damage)
 
 
 def test_quoted_cells_hold_separators_quotes_and_line_feeds(target: Path) -> None:
