@@ -1,6 +1,7 @@
 "use strict";
 // Files and text that leave the page: CSV, pictures, JSON, the clipboard.
 const Export = (() => {
+  const faults = Object.fromEntries(Data.view.faults.map((f) => [f.id, f.title]));
   const safe = (name) => name.replace(/[^\w.-]+/g, "_").slice(0, 120);
 
   function save(name, type, content) {
@@ -12,7 +13,8 @@ const Export = (() => {
   }
 
   async function image(figure, name, form) {
-    const address = await figure.image(form), data = address.slice(address.indexOf(",") + 1);
+    const times = figure.range.map((v) => `${+v.toFixed(4)} s`).join(" to "), fault = name in faults ? `${name} ${faults[name]}` : name;
+    const address = await figure.image(form, `${Data.view.name} · ${fault} · ${times}`), data = address.slice(address.indexOf(",") + 1);
     if (form === "svg") save(`${name}.svg`, "image/svg+xml", decodeURIComponent(data));
     else save(`${name}.png`, "image/png", Data.fromBase64(data));
   }

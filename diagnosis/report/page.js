@@ -41,7 +41,8 @@
     if (shared) parts.push(`t=${shared.map((v) => v.toFixed(4)).join(",")}`);
     if (explorer?.plots.length) parts.push(`plots=${explorer.plots.map((p) => p.map(encodeURIComponent).join(",")).join(";")}`);
     const address = `#${parts.join("&")}`;
-    if (parts.length && address !== location.hash) history[step ? "pushState" : "replaceState"](null, "", address);
+    if (!parts.length || address === location.hash) return;
+    try { history[step ? "pushState" : "replaceState"](null, "", address); } catch { /* browsers limit how often; the next change tells */ }
   }
 
   const failed = (where) => (e) => { one(where).replaceChildren(`The plots cannot be drawn: ${e.message}`); throw e; };
@@ -86,6 +87,7 @@
     const rows = view.figures[f.rows];
     articleOf(id).querySelector(".slot").append(one("#figure"));
     one("#figure").hidden = !rows.length;
+    for (const b of all("[data-of=evidence], [data-zoom]")) b.disabled = !rows.length;
     if (!rows.length) return;
     const shades = shadesOf(view.faults.filter((g) => g.component === f.component), f.start).map((g) => ({ ...g, main: g.id === id }));
     evidence.draw(rows, shades, shared).catch(failed("#figure"));
@@ -106,10 +108,10 @@
     const at = document.activeElement;
     if (explorer?.active && one("#signals").contains(at)) return explorer.figure;
     if (loop?.drawn && one("#loop").contains(at)) return loop;
-    return evidence?.drawn ? evidence : explorer?.active ? explorer.figure : loop?.drawn ? loop : null;
+    return evidence?.drawn && !one("#figure").hidden ? evidence : explorer?.active ? explorer.figure : loop?.drawn ? loop : null;
   }
 
-  const zoom = (name) => current && evidence?.drawn && evidence.zoom(ranges[name](faults.get(current)));
+  const zoom = (name) => current && evidence?.drawn && !one("#figure").hidden && evidence.zoom(ranges[name](faults.get(current)));
 
   function drawLoop(key) {
     const group = view.loop.find((g) => g.key === key);
@@ -138,8 +140,8 @@
 
   const actions = {
     zoom: (b) => zoom(b.dataset.zoom),
-    csv: (b) => figures[b.dataset.of].csv().then((text) => Export.save(`${fileName(b.dataset.of)}.csv`, "text/csv", text)),
-    image: (b) => Export.image(figures[b.dataset.of], fileName(b.dataset.of), b.dataset.form),
+    csv: ({ dataset: { of } }) => figures[of].drawn && figures[of].csv().then((text) => Export.save(`${fileName(of)}.csv`, "text/csv", text)),
+    image: ({ dataset: { of, form } }) => figures[of].drawn && Export.image(figures[of], fileName(of), form),
     json: () => Export.json(current),
     copy: (b) => Export.copy(articleOf(current), b),
     add: () => explorer.add(one("#columns").value),
@@ -189,7 +191,7 @@
   addEventListener("beforeprint", () => {
     before = root.dataset.theme;
     root.dataset.theme = "light";
-    for (const f of [evidence, loop, explorer?.active && explorer.figure]) f && f.print(680);
+    if (root.dataset.print) for (const f of [evidence, loop, explorer?.active && explorer.figure]) f && f.print(680);
   });
   addEventListener("afterprint", () => {
     root.dataset.theme = before;

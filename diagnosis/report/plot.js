@@ -244,7 +244,8 @@ class Figure {
     try {
       do {
         this.again = false;
-        const target = [...this.range], curves = await this.fetch(target);
+        const target = [...this.range], { rows } = this, curves = await this.fetch(target);
+        if (rows !== this.rows) return;
         const heads = Object.fromEntries(this.headings(curves).map((h, i) => [`annotations[${i}].text`, h.text]));
         await Plotly.update(this.element, this.restyled(curves), { "xaxis.range": target, ...heads });
         this.curves = curves;
@@ -271,11 +272,13 @@ class Figure {
     return this.zoom([middle - half, middle + half]);
   }
 
-  // Address of a picture of the figure on the page's background.
-  image(form) {
-    const { data, layout, clientWidth } = this.element, width = Math.max(600, clientWidth);
-    const paper = Figure.colour("surface");
-    return Plotly.toImage({ data, layout: { ...layout, width, autosize: false, paper_bgcolor: paper, plot_bgcolor: paper } }, { format: form, width, height: layout.height, scale: form === "png" ? 2 : 1 });
+  // Address of a picture of the figure on the page's background, with a line above that says what it shows.
+  image(form, words) {
+    const { data, layout, clientWidth } = this.element, width = Math.max(600, clientWidth), height = layout.height + 26;
+    const paper = Figure.colour("surface"), margin = { ...layout.margin, t: 26 };
+    const title = { text: Figure.text(words), x: 0.01, xanchor: "left", y: 1, yref: "container", yanchor: "top", pad: { t: 7 }, font: { size: 13 } };
+    const whole = { ...layout, width, height, margin, title, autosize: false, paper_bgcolor: paper, plot_bgcolor: paper };
+    return Plotly.toImage({ data, layout: whole }, { format: form, width, height, scale: form === "png" ? 2 : 1 });
   }
 
   csv() {

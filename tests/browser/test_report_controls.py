@@ -107,8 +107,7 @@ def test_thousands_of_faults_all_have_their_evidence(open_page: OPEN) -> None:
     assert pages_of(page.pdf(format="A4")) == 2
 
 
-@pytest.mark.parametrize("script", [True, False])
-@pytest.mark.parametrize("name", ["five_faults", "no_faults", "hostile"])
+@pytest.mark.parametrize(("name", "script"), [("five_faults", True), ("no_faults", False), ("hostile", False)])
 def test_two_pages_on_paper(open_page: OPEN, name: str, script: bool) -> None:
     page = open_page(name, theme="dark", script=script)
     for paper in ("A4", "Letter"):
