@@ -17,11 +17,12 @@ from replay.inspection import UNKNOWN
 if TYPE_CHECKING:
     from rich.console import RenderableType
 
-    from replay.inspection import InspectReport, TopicTiming
+    from replay.inspection import InspectReport, OddValues, TopicTiming
 
 _EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
 _LONG_VALUE = 60
 _SHOWN_METADATA = 12
+_SHOWN_ODD, _SHOWN_NAMES = 8, 6
 _WIDE, _WIDE_LIST = 100, 110
 
 
@@ -41,6 +42,12 @@ def inspect_parts(report: InspectReport) -> list[RenderableType]:
         parts += [_degraded(report), bullets(report.damage, "red"), ""]
     parts.append(_topics(report) if report.topics else text("It holds no topics."))
     unusual = [f"{t.name}: {words}" for t in report.topics if (words := _unusual(t))]
+    unusual += [f"{t.name}: {_odd(o, t)}" for t in report.topics for o in t.odd_values[:_SHOWN_ODD]]
+    unusual += [
+        f"{t.name}: and {len(t.odd_values) - _SHOWN_ODD} more groups of channels without usable numbers (--json shows all)"
+        for t in report.topics
+        if len(t.odd_values) > _SHOWN_ODD
+    ]
     stored = _stored(report)
     for title, lines in (("Unusual", unusual), ("Stored", stored), ("Notes", report.notes)):
         if lines:
@@ -150,6 +157,30 @@ def _unusual(topic: TopicTiming) -> str:
     if topic.channels and topic.decoded is not None and topic.decoded < topic.count:
         words.append(f"{topic.decoded} of {topic.count} messages gave numbers")
     return "; ".join(words)
+
+
+def _odd(odd: OddValues, topic: TopicTiming) -> str:
+    """Say which channels hold no usable number, and how often."""
+    names = [n.removeprefix(f"{topic.name}.") for n in odd.channels]
+    who = ", ".join(names[:_SHOWN_NAMES]) + (
+        f" and {len(names) - _SHOWN_NAMES} more" if len(names) > _SHOWN_NAMES else ""
+    )
+    if len(names) == topic.channels and len(names) > 1:
+        who = f"all {len(names)} channels"
+    one = len(names) == 1
+    words = []
+    if odd.missing == odd.samples:
+        words.append(f"{'holds' if one else 'hold'} no number at all")
+    elif odd.missing:
+        words.append(
+            f"{odd.missing} of {odd.samples} samples hold no number, the longest stretch lasts {odd.longest_s:.3g} s, "
+            f"from {odd.longest_at_s:.1f} s on"
+        )
+    if odd.infinite:
+        words.append(f"{odd.infinite} of {odd.samples} values are infinite")
+    if odd.absurd:
+        words.append(f"{odd.absurd} of {odd.samples} values are absurdly large (up to {odd.largest:.3g})")
+    return who + (" " if odd.missing == odd.samples else ": ") + "; ".join(words)
 
 
 def _stored(report: InspectReport) -> list[str]:

@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from replay.inspect_mcap import mcap_index
-from replay.inspection import Depth, InspectReport, TopicTiming, mean_rate
+from replay.inspect_values import odd_values
+from replay.inspection import Depth, InspectReport, OddValues, TopicTiming, mean_rate
 from replay.rawlog import Channel, LogSummary, RawLog, TopicInfo
 from replay.readers.registry import open_log
 from replay.sources import SourceOptions
@@ -65,6 +66,7 @@ def inspect_log(path: Path, options: SourceOptions) -> InspectReport:
     summary, channels = log.summary, tuple(log.channels)
     stamps, numbers = _by_topic(log), Counter(c.topic for c in log.channels.values())
     grouped = {i: _group(log, info) for i, info in enumerate(summary.topics)}
+    odd = _odd_values(log)
     del log  # the columns, before those of the other clock
     against: dict[str, NDArray[np.int64]] = {}
     if any(t.encoding != "table" for t in summary.topics):
@@ -79,7 +81,7 @@ def inspect_log(path: Path, options: SourceOptions) -> InspectReport:
             offset = sign * float(np.median(own - beside)) / 1e9
         timing = _timing(info.name, info.type_name, info.count, own, offset, info.note)
         decoded = 0 if own is None else len(own)
-        topics.append(replace(timing, encoding=info.encoding, channels=count, decoded=decoded))
+        topics.append(replace(timing, encoding=info.encoding, channels=count, decoded=decoded, odd_values=odd[i]))
     return _report(path, summary, options, tuple(topics), channels, "full")
 
 
@@ -123,6 +125,17 @@ def _group(log: RawLog, info: TopicInfo) -> tuple[NDArray[np.int64], int] | None
     """Stamps and number of a table's columns, where the container lists them."""
     members = [log.channels[f] for f in info.fields if f in log.channels]
     return (members[0].stamps, len(members)) if members else None
+
+
+def _odd_values(log: RawLog) -> list[tuple[OddValues, ...]]:
+    """Give what each topic's samples lack."""
+    members: dict[str, list[Channel]] = {}
+    for channel in log.channels.values():
+        members.setdefault(channel.topic, []).append(channel)
+    return [
+        odd_values([log.channels[f] for f in info.fields if f in log.channels] or members.get(info.name, []))
+        for info in log.summary.topics
+    ]
 
 
 def _by_topic(log: RawLog) -> dict[str, NDArray[np.int64]]:

@@ -14,6 +14,38 @@ UNKNOWN = (
 
 
 @dataclass(frozen=True)
+class OddValues:
+    """Channels of one topic that hold no usable number in the same number of samples.
+
+    Attributes
+    ----------
+    channels : tuple[str, ...]
+        Their names.
+    samples : int
+        Samples of each.
+    missing : int
+        Samples without a number (empty or NaN).
+    longest_s : float
+        Longest time between two numbers with such samples between [s]; 0 where there is no number at all.
+    longest_at_s : float
+        Its start from the topic's first stamp [s].
+    infinite, absurd : int
+        Values that are infinite, or beyond `replay.inspect_values.ABSURD`.
+    largest : float
+        Largest of the latter without its sign.
+    """
+
+    channels: tuple[str, ...]
+    samples: int
+    missing: int = 0
+    longest_s: float = 0.0
+    longest_at_s: float = 0.0
+    infinite: int = 0
+    absurd: int = 0
+    largest: float = 0.0
+
+
+@dataclass(frozen=True)
 class TopicTiming:
     """Timing of one topic, or of one group of table columns.
 
@@ -45,6 +77,8 @@ class TopicTiming:
         Decoded numbers; None where only the index was read.
     decoded : int or None
         Samples of the longest channel.
+    odd_values : tuple[OddValues, ...]
+        Channels with samples that hold no usable number; empty where only the index was read.
     """
 
     name: str
@@ -63,6 +97,7 @@ class TopicTiming:
     encoding: str = ""
     channels: int | None = None
     decoded: int | None = None
+    odd_values: tuple[OddValues, ...] = ()
 
 
 @dataclass(frozen=True)

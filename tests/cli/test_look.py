@@ -177,3 +177,16 @@ def test_a_crash_in_one_file_does_not_stop_the_others(
     seen = capsys.readouterr()
     assert "poison.mcap: ValueError: boom" in seen.err
     assert str(mission_log) in seen.out
+
+
+def test_holes_in_the_values_are_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    log = tmp_path / "t.csv"
+    log.write_text(
+        "t,a,b,c\n"
+        + "".join(f"{i / 10},{'' if 20 <= i < 50 else i},NaN,{'1e300' if i == 3 else 1.5}\n" for i in range(100))
+    )
+    assert run(["inspect", str(log), "--full"]) == 0
+    out = " ".join(capsys.readouterr().out.split())
+    assert "a: 30 of 100 samples hold no number, the longest stretch lasts 3.1 s, from 1.9 s on" in out
+    assert "b holds no number at all" in out
+    assert "c: 1 of 100 values are absurdly large (up to 1e+300)" in out
