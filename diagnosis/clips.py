@@ -7,25 +7,22 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import chain
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from diagnosis.clip_plots import plots_of
+from diagnosis.clip_sources import APART_S, Source, open_sources
 from diagnosis.result import SEVERITIES, MissionResult
-from replay.errors import LogError, OutputError
+from replay.errors import OutputError
 from replay.export.clip_layouts import foxglove_layout, plotjuggler_layout
 from replay.export.clip_mcap import MARK, Definitions, Records, batch_records, write_clip
-from replay.export.clip_source import ClipSource
 from replay.export.clip_topics import evidence_topic, loop_topics, open_loop_topic, signal_topics
 from replay.files import atomic_path
 from replay.loop import Replay, replay_loop
 from replay.machine import Machine
 from replay.mission import Mission
-from replay.signals import Signals
-
-Stamps = NDArray[np.int64]
 
 MOST = 50
 ENDINGS = (".mcap", ".foxglove.json", ".plotjuggler.xml")
@@ -33,7 +30,6 @@ _LAST_ROS_NS = 2**32 * 1_000_000_000
 _UNSAFE = re.compile(r"[^\w.+-]+")
 _LONGEST_NAME = 80
 _LONGEST_NS = 600_000_000_000
-_APART_S = 0.1
 
 
 @dataclass(frozen=True)
@@ -126,11 +122,13 @@ def write_clips(
         for f in faults
         if _end(f) < f["stop_ns"]
     ]
-    sources = list(_sources(mission, notes))
     written = []
-    for fault, name in zip(faults, names, strict=True):
-        progress(f"writing {name}")
-        written.append(_write(fault, folder / name, (mission, replay, machine, result), sources, round(margin_s * 1e9)))
+    with TemporaryDirectory(prefix="mfhca-") as scratch:
+        sources = list(open_sources(mission, Path(scratch), notes))
+        for fault, name in zip(faults, names, strict=True):
+            progress(f"writing {name}")
+            judged = mission, replay, machine, result
+            written.append(_write(fault, folder / name, judged, sources, round(margin_s * 1e9)))
     return Clips(tuple(written), left_out, tuple(notes))
 
 
@@ -157,70 +155,6 @@ def _is_own(path: Path) -> bool:
         return MARK.encode() in file.read(4096)
 
 
-@dataclass(frozen=True)
-class _Source:
-    """An MCAP log, and its log stamps against the mission's clock; empty arrays where they are the same."""
-
-    log: ClipSource
-    mission_ns: Stamps
-    log_ns: Stamps
-
-    def place(self, ns: int) -> int:
-        """Log stamp of a moment of the mission; beyond both ends the clocks run alike."""
-        if not self.mission_ns.size:
-            return ns
-        return int(self.places(np.array([ns]))[0])
-
-    def places(self, ns: Stamps) -> Stamps:
-        """The same for many moments, in nanoseconds up to rounding of their distance from the first one."""
-        a, b = self.mission_ns, self.log_ns
-        inner = b[0] + np.round(np.interp((ns - a[0]).astype(float), (a - a[0]).astype(float), b - b[0])).astype(
-            np.int64
-        )
-        out: Stamps = np.where(ns < a[0], ns - a[0] + b[0], np.where(ns > a[-1], ns - a[-1] + b[-1], inner))
-        return out
-
-    @property
-    def apart_s(self) -> float:
-        """How far the log's clock is from the mission's [s]."""
-        return float(np.median(self.log_ns - self.mission_ns)) * 1e-9 if self.mission_ns.size else 0.0
-
-
-def _sources(mission: Mission, notes: list[str]) -> Iterator[_Source]:
-    """The MCAP logs of a mission."""
-    for file in mission.files:
-        if file.format != "mcap":
-            notes.append(f"{file.path.name}: not MCAP; its clips hold the mapped signals, not the original messages.")
-            continue
-        stamps, topic = _longest(mission.signals, str(file.path))
-        try:
-            log = ClipSource(file.path, topic)
-        except LogError as error:
-            notes.append(f"Without original messages: {error}")
-            continue
-        # Messages of the topic in order of either clock; where some were left out, the rest is spread evenly.
-        count = min(stamps.size, log.log_stamps.size)
-        if count < 2:
-            yield _Source(log, stamps[:0], stamps[:0])
-            continue
-        picks = [np.linspace(0, x.size - 1, count).round().astype(np.int64) for x in (stamps, log.log_stamps)]
-        source = _Source(log, stamps[picks[0]], log.log_stamps[picks[1]])
-        if abs(source.apart_s) >= _APART_S:
-            notes.append(
-                f"{file.path.name}: its log stamps lie {source.apart_s:+.3f} s from the mission's clock; the clips keep them."
-            )
-        yield source
-
-
-def _longest(signals: Signals, source: str) -> tuple[Stamps, str]:
-    """Stamps and topic of a file's signal with the most samples."""
-    own = [s for s in signals.items.values() if s.source == source and s.origin.topic is not None]
-    if not own:
-        return np.empty(0, np.int64), ""
-    best = max(own, key=lambda s: s.stamps.size)
-    return best.stamps, str(best.origin.topic)
-
-
 def _end(fault: Mapping[str, Any]) -> int:
     """Stamp up to which a fault is cut out: of a long one the beginning."""
     return min(int(fault["stop_ns"]), int(fault["start_ns"]) + _LONGEST_NS)
@@ -230,7 +164,7 @@ def _write(
     fault: Mapping[str, Any],
     stem: Path,
     judged: tuple[Mission, Replay, Machine, MissionResult],
-    sources: Sequence[_Source],
+    sources: Sequence[Source],
     margin_ns: int,
 ) -> Path:
     """Write one clip and its layouts."""
@@ -239,8 +173,8 @@ def _write(
     definitions = Definitions()
     copied: list[Iterator[Records]] = []
     for source in sources:
-        numbers = source.log.define(definitions)
-        copied.append(source.log.messages(source.place(start), source.place(stop), numbers))
+        first, last = source.places(np.array([start, stop])).tolist()
+        copied += [part.messages(first, last, part.define(definitions)) for part in source.parts]
     signals = signal_topics(mission.signals, start, stop)
     loop = loop_topics(mission.timeline, replay, machine, start, stop)
     evidence = evidence_topic(result.columns, str(fault["component"]), mission.timeline.start_ns, start, stop)
@@ -248,7 +182,7 @@ def _write(
     batches = [*(b for b, _ in named), *loop]
     if mission.open_loop:
         batches.append(open_loop_topic(max(start, mission.timeline.start_ns)))
-    if sources and abs(sources[0].apart_s) >= _APART_S:  # beside the original messages, not hours from them
+    if sources and abs(sources[0].apart_s) >= APART_S:  # beside the original messages, not hours from them
         batches = [replace(b, log_stamps=sources[0].places(b.log_stamps)) for b in batches]
     own = [batch_records(batch, definitions) for batch in batches]
     about = {

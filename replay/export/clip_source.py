@@ -17,9 +17,11 @@ from replay.readers.mcap_open import open_file
 from replay.readers.mcap_records import BAD_RECORD, Channel, Schema, parse
 from replay.readers.mcap_scan import Census
 from replay.readers.mcap_walk import walk_file
+from replay.spill import release
 
 _HEAD = 9 + fmt.MESSAGE_HEAD
 _LARGE = 4096
+_HELD = 64 << 20
 _EVER = (-(2**63), 2**63 - 1)
 
 
@@ -59,7 +61,11 @@ class ClipSource:
         self._pieces.sort()
         self._bounds: list[tuple[int, int]] = []
         stamps: list[NDArray[np.int64]] = []
+        held = 0
         for piece in self._pieces:
+            if piece[0] - held > _HELD:  # pages of the file that were read count as memory of this process
+                release(self._file.data)
+                held = piece[0]
             first, last = 2**63 - 1, -1
             for data, start, census in self._stretches(piece):
                 first, last = min(first, census.bounds[0]), max(last, census.bounds[1])

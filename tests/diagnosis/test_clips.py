@@ -151,7 +151,54 @@ def test_every_curve_of_the_layouts_is_in_the_clip(mission: tuple[Mission, Missi
 def test_logs_of_other_formats_give_signals_and_loop_alone(tmp_path: Path) -> None:
     clips = cut(judged(tmp_path, "csv"), tmp_path / "clips")
     assert all(topic.startswith("/mfhca/") for topic in contents(clips.paths[0]))
-    assert "not MCAP" in clips.notes[0]
+    assert "cannot be copied into MCAP" in clips.notes[0]
+
+
+def test_messages_of_a_rosbag2_recording_in_mcap_are_copied(
+    mission: tuple[Mission, MissionResult], tmp_path: Path
+) -> None:
+    folder = tmp_path / "bag"
+    folder.mkdir()
+    (folder / "bag_0.mcap").write_bytes(mission[0].files[0].path.read_bytes())
+    again = load_mission([folder], haulotte())
+    assert again.files[0].format == "rosbag2"
+    clips = cut((again, diagnose_mission(again, haulotte())), tmp_path / "clips")
+    plain = cut(mission, tmp_path / "plain")
+    assert clips.notes == ()
+    assert contents(clips.paths[0]) == contents(plain.paths[0])
+
+
+def test_of_a_long_mission_the_clips_have_every_step(
+    mission: tuple[Mission, MissionResult], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("replay.envelope.FULL_STEPS", 500)
+    monkeypatch.setattr("replay.envelope._BUCKETS", 500)
+    long = diagnose_mission(mission[0], haulotte())
+    assert long.columns["t"].size < mission[0].timeline.size
+    found = contents(cut((mission[0], long), tmp_path / "long").paths[0])
+    plain = contents(cut(mission, tmp_path / "plain").paths[0])
+    assert 0 < len(found["/mfhca/evidence"]) < len(plain["/mfhca/evidence"])
+    assert found["/mfhca/u_replayed"] == plain["/mfhca/u_replayed"]
+
+
+def test_a_long_fault_is_cut_to_its_beginning(
+    mission: tuple[Mission, MissionResult], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("diagnosis.clips._LONGEST_NS", 10**9)
+    clips = cut(mission, tmp_path, margin_s=0.5)
+    stamps = contents(clips.paths[0])["/mfhca/mapped_1"]
+    assert (stamps[-1] - stamps[0]) * 1e-9 == pytest.approx(2.0, abs=0.03)
+    assert clips.notes == ("F1: lasts 4 s; its clip holds the first 1 s.",)
+
+
+def test_clips_of_injected_faults_say_so(mission: tuple[Mission, MissionResult], tmp_path: Path) -> None:
+    marked = replace(
+        mission[0],
+        signals=replace(mission[0].signals, open_loop=True),
+        timeline=replace(mission[0].timeline, open_loop=True),
+    )
+    clip = cut((marked, mission[1]), tmp_path).paths[0]
+    assert load_mission([clip], haulotte()).open_loop
 
 
 def test_own_clips_are_replaced_and_others_left_alone(mission: tuple[Mission, MissionResult], tmp_path: Path) -> None:
