@@ -23,6 +23,7 @@ Key = tuple[str, str]
 _RANK: dict[Severity, int] = {"high": 0, "medium": 1, "low": 2, "info": 3}
 _LIKELY = 0.6  # probability of any fault from which on one is worth a check
 _MARKED_EPSILON = 0.3
+_OPEN_S, _OPEN_SHARE = 1.0, 0.02  # driving that was not judged and is worth a word
 _LEAST_SHARE = 0.8
 _MODEL_RESOLUTION = 0.25
 _COMPARED_WHEELS = 3
@@ -243,7 +244,8 @@ def _caveats(
 ) -> tuple[str, ...]:
     out = []
     if damage:
-        out.append(f"The log is damaged: {damage[0]}" + (f" (and {len(damage) - 1} more)" if len(damage) > 1 else ""))
+        said = "" if " was left out: its clock " in damage[0] else "The log is damaged: "
+        out.append(f"{said}{damage[0]}" + (f" (and {len(damage) - 1} more)" if len(damage) > 1 else ""))
     for key in short:
         reason = _main_reason(assessments[key])
         out.append(
@@ -251,6 +253,18 @@ def _caveats(
             f"{max(limits.min_assessed, _LEAST_SHARE * driven.get(key, 0.0)):.3g} s needed"
             + (f" ({reason})" if reason else "")
             + "."
+        )
+    open_s = {
+        k: driven[k] - decided_s.get(k, 0.0)
+        for k in assessments
+        if k in driven and k not in short and k[0] not in axles
+    }
+    most = max(open_s, key=lambda k: open_s[k], default=None)
+    if most is not None and open_s[most] > max(_OPEN_S, _OPEN_SHARE * driven[most]):
+        out.append(
+            f"{part_words('wheel', *most)}: {open_s[most]:.1f} s of {driven[most]:.1f} s of driving could not be judged"
+            + (f" ({reason})" if (reason := _main_reason(assessments[most])) else "")
+            + "; no wheel has more. The timeline shows when."
         )
     unjudged = [k for k in assessments if k[0] in axles and assessments[k].tier == "none"]
     if unjudged:

@@ -35,7 +35,7 @@ _DOUBTED = 0.02  # probability of a fault from which on slip and a sensor's loss
 _REASONS = {
     State.NOT_EXCITED: "the wheel is neither commanded nor moving",
     State.MASKED: "the speed sensor that would show it delivers nothing usable",
-    State.NOT_ASSESSED: "the wheel model is too uncertain here, or no single fault explains it well enough",
+    State.NOT_ASSESSED: "no valve command to compare with, the wheel model too uncertain here, or no single fault explains it",
     State.NO_DATA: "no samples",
     State.SLIP: "the wheel breaks the parity of the body while it obeys its valve: it slips, or its sensor is off",
 }
@@ -262,7 +262,8 @@ def _assessments(
     states_s, states_a = base.copy(), base.copy()
     states_a[~np.isfinite(data.u[:, i])] = CODE[State.NO_DATA]
     healthy = CODE[State.HEALTHY]
-    states_s[(opened[Side.SENSOR] | (not gains)) & (states_s == healthy)] = CODE[State.NOT_ASSESSED]
+    unseen = opened[Side.SENSOR] | (not gains) | ~np.isfinite(data.u[:, i])
+    states_s[unseen & (states_s == healthy)] = CODE[State.NOT_ASSESSED]
     if own.grip_most > 0:  # wheels in the air obey their own valves, not the body
         doubted = np.asarray(per_sample(done.fault[:, i] > _DOUBTED, width, size))
         states_s[steadied(slip & doubted, gap, least) & (states_s == healthy)] = CODE[State.SLIP]

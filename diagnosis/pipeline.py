@@ -22,10 +22,13 @@ from replay.machine import Machine
 from replay.mission import Mission, load_mission
 from replay.signals import Signals
 from replay.spill import blocks, release_all
-from replay.timeline import align
+from replay.timeline import Timeline, align
 from replay.version import __version__
 
 Array = NDArray[np.float64] | NDArray[np.float32]
+
+
+_EMPTY_S = 1.0
 
 
 def _silent(_: str) -> None:
@@ -211,6 +214,9 @@ def _more_caveats(mission: Mission, machine: Machine) -> list[str]:
             "Faults were injected into this recording; the controller did not react to them: evidence that rests on the "
             "closed loop and on controller consistency is switched off."
         )
+    empty = _without_speed(mission.timeline, machine)
+    if empty > _EMPTY_S:
+        out.append(f"For {empty:.1f} s no wheel speed was recorded: nothing is known of that time.")
     absent = [name for name in machine.signals if name not in mission.signals.items]
     if absent:
         reason = mission.signals.missing.get(absent[0], "")
@@ -224,6 +230,16 @@ def _more_caveats(mission: Mission, machine: Machine) -> list[str]:
     if cut > mission.timeline.dt:
         out.append(f"Only a part of the mission was judged; times count from its start, {cut:.3f} s into the log.")
     return out
+
+
+def _without_speed(timeline: Timeline, machine: Machine) -> float:
+    """Time in which no wheel speed is valid [s]."""
+    names = [f"wheel.{w}.{x}" for w in machine.wheels for x in ("v", "v_true")]
+    speeds = [timeline.signals[n] for n in names if n in timeline.signals]
+    steps = sum(
+        int(np.count_nonzero(~np.isfinite([v[part] for v in speeds]).any(axis=0))) for part in blocks(timeline.size)
+    )
+    return steps * timeline.dt if speeds else 0.0
 
 
 def _named_status(report: dict[str, Any]) -> dict[str, Any]:

@@ -65,13 +65,15 @@ def signal_rows(signals: Signals, timeline: Timeline) -> list[dict[str, Any]]:
 
 
 def _gaps(signal: Signal, period: int) -> tuple[int, float]:
-    if signal.stamps.size < 2:
-        return 0, 0.0
+    """Number and length [s] of the longest of the times without a number; samples that hold none count as missing."""
     count = longest = 0
-    for part in blocks(signal.stamps.size - 1):
-        steps = np.diff(signal.stamps[part.start : part.stop + 1])
+    last: list[int] = []
+    for part in blocks(signal.stamps.size):
+        known = signal.stamps[part][np.isfinite(signal.values[part])]
+        steps = np.diff(np.concatenate([np.array(last, np.int64), known]))
         count += int(np.count_nonzero(steps > _GAP_PERIODS * period))
-        longest = max(longest, int(steps.max()))
+        longest = max(longest, int(steps.max(initial=0)))
+        last = [int(known[-1])] if known.size else last
     return count, longest * 1e-9
 
 
@@ -157,7 +159,7 @@ def checks(
 def _effect_of(clock: SourceClock) -> tuple[str, bool]:
     """What a source's clock means for the verdict, and whether all is well."""
     if clock.reason:
-        return "delays between the files are not known: what one file says of another's signals may be off", False
+        return "delays between the files are not known: its signals are not used", False
     if clock.uncertainty_s is None:
         return "times are as good as what the machine file says", True
     return f"times of one file on the other's axis are right within ±{1e3 * clock.uncertainty_s:.2g} ms (95 %)", True

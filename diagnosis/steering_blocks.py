@@ -43,6 +43,8 @@ class SteeringBlocks:
         `PAIR`, `SILENT` or `SKIP` of `diagnosis.modes`.
     raw_u : Array, shape (n,)
         Valve opening of every sample, 0 where unknown.
+    blind : NDArray[np.bool_], shape (m,)
+        Blocks in most of which nobody knows the opening.
     second : Array, shape (m, 7)
         What is measured twice, each with its variance: angle [rad], opening [fraction], share of the command's changes
         in the opening [1]; then the command that belongs to the opening [fraction]. NaN where it is not.
@@ -56,11 +58,13 @@ class SteeringBlocks:
     u: Array
     status: NDArray[np.int8]
     raw_u: Array
+    blind: NDArray[np.bool_]
     second: Array
 
     def driven(self, gain: float, rate: float) -> Array:
-        """Mean of sat(gain·u) between the middles of blocks [rad/s], shape (m,)."""
-        return _between(self.raw_u, self.length, self.mean.size, lambda u: np.clip(gain * u, -rate, rate))
+        """Mean of sat(gain·u) between the middles of blocks [rad/s], shape (m,); NaN in blind blocks."""
+        driven = _between(self.raw_u, self.length, self.mean.size, lambda u: np.clip(gain * u, -rate, rate))
+        return np.where(self.blind, np.nan, driven)
 
 
 def _between(x: Array, length: int, blocks: int, function: Callable[[Array], Array] = np.asarray) -> Array:
@@ -114,10 +118,12 @@ def blocks_of(y: Array, u: Array, fresh: NDArray[np.bool_], alive: NDArray[np.bo
         status = np.where(count > 0, PAIR, SKIP).astype(np.int8)
         silent = np.add.reduceat((alone & alive[part]).astype(np.float64), starts) > 0.5 * length
         status[silent & (count == 0)] = SILENT
-        parts.append((mean, np.add.reduceat(power, starts) / np.maximum(count, 1.0), count, status))
+        unknown = np.add.reduceat((~np.isfinite(u[part])).astype(np.float64), starts)
+        blind = unknown > 0.5 * np.diff(np.append(starts, near.size))
+        parts.append((mean, np.add.reduceat(power, starts) / np.maximum(count, 1.0), count, status, blind))
         opening.append(np.nan_to_num(u[part]))
         release(y, u)
-    mean, power, count, status = (np.concatenate(x) for x in zip(*parts, strict=True))
+    mean, power, count, status, blind = (np.concatenate(x) for x in zip(*parts, strict=True))
     raw_u = opening.finish()
     return SteeringBlocks(
         length=length,
@@ -128,6 +134,7 @@ def blocks_of(y: Array, u: Array, fresh: NDArray[np.bool_], alive: NDArray[np.bo
         u=_between(raw_u, length, mean.size),
         status=status,
         raw_u=raw_u,
+        blind=blind,
         second=np.full((mean.size, 7), np.nan),
     )
 

@@ -94,6 +94,7 @@ def windows_of(blocks: SteeringBlocks, noise: SensorNoise, stop: float, window_s
     counts = float(np.median(blocks.count[known])) * length if known.any() else 1.0
     usual = 1 + max(0.3, 4 * float(np.sqrt(2 / (WHITE_DOF * counts))))
     alive = (window_means(known.astype(np.float64), length) > 0.9) & (np.abs(middle) < 0.97 * stop)
+    alive &= window_means(blocks.blind.astype(np.float64), length) == 0.0
     alive &= power < usual * noise.white
     if noise.resolved:
         alive &= power > noise.white / usual

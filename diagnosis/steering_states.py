@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from diagnosis import steering_rows as sr
 from diagnosis.assessment import CODE, Finding
+from diagnosis.modes import PAIR
 from diagnosis.noise import moving_sum
 from diagnosis.steering_filter import SteeringPath
 from diagnosis.steering_tidy import SteeringData
@@ -22,7 +23,7 @@ _ALONE_S, _BETWEEN_S = 6.0, 30.0
 REASONS: dict[Side, Mapping[State, str]] = {
     Side.SENSOR: {
         State.NOT_EXCITED: "the axle was not steered, and the sensor's rounding hides its noise",
-        State.NOT_ASSESSED: "no single fault explains the angle well enough",
+        State.NOT_ASSESSED: "no valve command to compare with, or no single fault explains the angle well enough",
         State.NO_DATA: "no samples",
     },
     Side.ACTUATOR: {
@@ -37,7 +38,7 @@ REASONS: dict[Side, Mapping[State, str]] = {
 def exercised(data: SteeringData) -> NDArray[np.bool_]:
     """Blocks in which the command moves the axle by much more than the sensor's noise. Shape (m,)."""
     width = max(1, round(0.5 / data.blocks.dt))
-    travel = np.abs(moving_sum(data.driven, width)) * data.blocks.dt
+    travel = np.abs(moving_sum(np.nan_to_num(data.driven), width)) * data.blocks.dt
     noise = data.model.noise
     least = 10 * np.sqrt(noise.white / max(1.0, width * float(np.median(data.blocks.count)))) + noise.lsb
     return np.asarray(travel > max(least, 0.5 * data.model.load, 1e-3 * data.model.stop))
@@ -106,6 +107,9 @@ def states_of(
     by_block = np.where(well, CODE[State.HEALTHY], CODE[State.NOT_EXCITED]).astype(np.int8)
     if side is Side.ACTUATOR and not reliable:
         by_block[:] = CODE[State.NOT_ASSESSED]
+    if side is Side.SENSOR:
+        unseen = blocks.blind & (blocks.status == PAIR) & ~np.isfinite(blocks.second).any(axis=1)
+        by_block[unseen & (by_block == CODE[State.HEALTHY])] = CODE[State.NOT_ASSESSED]
     doubt = 0
     for a, b in open_runs:
         by_block[a:b] = CODE[State.NOT_ASSESSED]

@@ -294,14 +294,25 @@ def _linear(m, innovation, r, h, z, P, gain):  # type: ignore[no-untyped-def]
 
 @njit(cache=True)
 def advance(m, y, power, count, driven, u, status, second, p, z, P, ig, row):  # type: ignore[no-untyped-def]
-    """One block of one model: prediction, update, log-likelihood."""
-    predict(m, driven, u, p, z, P, row)
+    """One block of one model: prediction, update, log-likelihood; `driven` is NaN where nobody knows the opening."""
+    blind = np.isnan(driven)
+    if blind:
+        predict(m, 0.0, 0.0, p, z, P, row)
+        # the axle may turn either way at its full rate; without a sample to follow it, to anywhere
+        P[m, 1, 1] = max(P[m, 1, 1], p[3] ** 2)
+        reach = (p[3] * p[0]) ** 2 + ((0.2 * p[4]) ** 2 if status != PAIR else 0.0)
+        P[m, 0, 0] = max(P[m, 0, 0], min(P[m, 0, 0] + reach, p[4] ** 2))
+    else:
+        predict(m, driven, u, p, z, P, row)
     seen = measure(m, second, p, z, P, row) if p[20] > 0 else 0.0
     if status == SILENT:
         return seen if SENSOR[m] == NONE else seen + _SILENT_COST
     if status != PAIR:
         return seen
-    out = seen + update(m, y, power, count, p, z, P, ig, row[2])
+    told = update(m, y, power, count, p, z, P, ig, row[2])
+    if blind:  # a free angle fits everything; a smaller gain would only seem surer of it
+        return seen
+    out = seen + told
     if SENSOR[m] >= GAIN or ACTUATOR[m] == GAIN or ACTUATOR[m] == NOISY:
         out -= p[16]
     return out

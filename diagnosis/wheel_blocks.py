@@ -48,6 +48,8 @@ class WheelBlocks:
     ratio, turn : Array, shape (n, wheels)
         Speed of each wheel per speed of the body [1], and what it rolls less because it steers [m/s]; NaN without
         geometry.
+    blind : NDArray[np.bool_], shape (n, wheels)
+        Blocks in most of which nobody knows the opening.
     """
 
     width: int
@@ -61,6 +63,7 @@ class WheelBlocks:
     quiet: NDArray[np.bool_]
     ratio: Array
     turn: Array
+    blind: NDArray[np.bool_]
 
     @property
     def dt(self) -> float:
@@ -82,6 +85,7 @@ class WheelBlocks:
             quiet=self.quiet[cut],
             ratio=self.ratio[cut],
             turn=self.turn[cut],
+            blind=self.blind[cut],
         )
 
     def wander(self, speed_per_opening: Array) -> Array:
@@ -92,9 +96,10 @@ class WheelBlocks:
         speed_per_opening : Array, shape (wheels,)
             K·dt/τ of one sample [m/s].
         """
-        if self.raw_dt <= _RESOLVED_S:
-            return np.zeros_like(self.unsteady)
-        return np.asarray(self.unsteady * speed_per_opening * np.sqrt(self.width))
+        unseen = np.where(self.blind, 2.0 * np.sqrt(self.width), 0.0)  # any opening, either way
+        if self.raw_dt > _RESOLVED_S:
+            unseen = np.maximum(unseen, self.unsteady)
+        return np.asarray(unseen * speed_per_opening * np.sqrt(self.width))
 
 
 def block_width(dt: float) -> int:
@@ -137,6 +142,7 @@ def blocks_of(
     usual = [_usual_gap(status[:, i]) for i in range(wheels)]
     for cut in blocks(size, width):
         last = edge if cut.stop == size else ((0, 0), (0, 0))
+        unknown = np.pad(~np.isfinite(u[cut]), last, mode="edge")
         beyond = np.nan_to_num(u[cut])
         beyond = np.pad(np.sign(beyond) * np.maximum(np.abs(beyond) - dead, 0.0), last, mode="edge")
         n = len(beyond) // width
@@ -157,10 +163,13 @@ def blocks_of(
                 np.pad(quiet[cut], last, mode="edge").reshape(shape).all(axis=1),
                 np.pad(ratio[cut], last, mode="edge").reshape(shape).mean(axis=1),
                 np.pad(turn[cut], last, mode="edge").reshape(shape).mean(axis=1),
+                unknown.reshape(shape).mean(axis=1) > 0.5,
             )
         )
         release(y, u, ratio, turn)
-    mean, count, jitter, unsteady, state, still, ratios, turns = (np.concatenate(x) for x in zip(*parts, strict=True))
+    mean, count, jitter, unsteady, state, still, ratios, turns, blind = (
+        np.concatenate(x) for x in zip(*parts, strict=True)
+    )
     driven = opening.finish()
     if width < 4:  # too few samples to see by themselves what changes within a block
         quick = np.stack([np.abs(white_part(driven[:, i])) for i in range(wheels)], axis=1)
@@ -177,6 +186,7 @@ def blocks_of(
         quiet=still,
         ratio=ratios,
         turn=turns,
+        blind=blind,
     )
 
 

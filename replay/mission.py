@@ -20,7 +20,7 @@ from replay.readers.registry import read_log, summarise_log
 from replay.signals import Signals
 from replay.source_clock import SourceClock
 from replay.sources import SourceOptions
-from replay.timeline import Timeline, align
+from replay.timeline import Timeline, align, check_overlap
 
 Progress = Callable[[str], None]
 
@@ -45,6 +45,8 @@ class MissionFile:
         Contents, notes and damage after decoding.
     clock : SourceClock or None
         How its clock was put onto the mission's.
+    left_out : bool
+        Whether its signals are not used, because its clock could not be compared with the others'.
     """
 
     path: Path
@@ -53,6 +55,7 @@ class MissionFile:
     format: str
     summary: LogSummary
     clock: SourceClock | None = None
+    left_out: bool = False
 
 
 @dataclass(frozen=True)
@@ -166,6 +169,25 @@ def read_signals(
     return dated, replace(signals, notes=notes, open_loop=bool(marked))
 
 
+def _on_one_clock(files: tuple[MissionFile, ...], signals: Signals) -> tuple[tuple[MissionFile, ...], Signals]:
+    """Leave out files whose clock could not be compared: what depends on their delay would look like faults."""
+    apart = {str(f.path) for f in files if f.clock is not None and f.clock.reason}
+    apart &= {s.source for s in signals.items.values()}
+    if not apart:
+        return files, signals
+    check_overlap(signals)
+    kept = {name: s for name, s in signals.items.items() if s.source not in apart}
+    gone = {name: f"{Path(s.source).name} was left out" for name, s in signals.items.items() if s.source in apart}
+    told = replace(signals, items=kept, missing={**signals.missing, **gone})
+    return tuple(_left_out(f) if str(f.path) in apart else f for f in files), told
+
+
+def _left_out(file: MissionFile) -> MissionFile:
+    assert file.clock is not None
+    text = f"{file.path.name} was left out: {file.clock.sentence.removeprefix(f'{file.path.name}: ')}"
+    return replace(file, summary=replace(file.summary, damage=(*file.summary.damage, text)), left_out=True)
+
+
 def _without_given(machine: Machine, marked: Sequence[RawLog]) -> Machine:
     """Leave out given signals that logs with injected faults hold under their own names: they stood in the original."""
     own = {c.signal for log in marked for c in candidates(log.channels, machine) if c.rank == 0}
@@ -220,6 +242,7 @@ def load_mission(
             "or name its signals with source = in the machine file's [signals]"
         )
     try:
+        files, signals = _on_one_clock(files, signals)
         timeline = align(signals, start_s, stop_s)
     except LogError as error:
         damage = [text for file in files for text in file.summary.damage]

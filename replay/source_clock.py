@@ -67,7 +67,7 @@ class SourceClock:
             return f"{name}: its stamps were moved by {change}, as the machine file says"
         if self.reason:
             return (
-                f"{name}: its clock could not be compared with {base}: {self.reason}; its stamps are taken as recorded. "
+                f"{name}: its clock could not be compared with {base}: {self.reason}. "
                 "Set clock_offset and clock_drift in the machine file's [sources] if they are known, or clock = "
                 '"as recorded" if the clocks are common'
             )

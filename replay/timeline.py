@@ -116,7 +116,7 @@ def align(signals: Signals, start_s: float | None = None, stop_s: float | None =
             "no wheel signal with at least two samples was found; run `mfhca channels` to see how signals map, and "
             "name them in the machine file's [signals]"
         )
-    notes = list(_check_overlap(signals))
+    notes = list(check_overlap(signals))
     periods = _Periods()
     step = _snap(min(periods.of(s.stamps) for s in wheel.values()))
     first = min(int(s.stamps[0]) for s in wheel.values())
@@ -192,7 +192,7 @@ def _hold(
     return values.finish(), fresh.finish()
 
 
-def _check_overlap(signals: Signals) -> list[str]:
+def check_overlap(signals: Signals) -> list[str]:
     """Refuse sources whose stamps do not overlap; say where they barely do."""
     spans: dict[str, tuple[int, int]] = {}
     for s in signals.items.values():

@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from diagnosis.quality import checks, clock_row
-from replay.signals import Signals
+from replay.signals import Signal, Signals
 from replay.source_clock import SourceClock
+from replay.sources import SignalSource
 from replay.timeline import Timeline
 
 LINE = Timeline(0, 1_000_000, 2, {"wheel.FR.v": np.zeros(2)}, {}, {}, {})
@@ -23,7 +24,7 @@ def rows(*clocks: SourceClock) -> list[dict[str, object]]:
 
 @pytest.mark.parametrize(
     ("clock", "ok", "effect"),
-    [(MOVED, True, "±0.4 ms (95 %)"), (ALONE, False, "delays between the files are not known")],
+    [(MOVED, True, "±0.4 ms (95 %)"), (ALONE, False, "its signals are not used")],
 )
 def test_clocks_are_told_once_with_their_effect(clock: SourceClock, ok: bool, effect: str) -> None:
     (row,) = rows(FIRST, clock)
@@ -37,3 +38,14 @@ def test_clock_in_the_report_names_no_folder() -> None:
     assert (found["reference"], found["method"], found["offset_s"]) == ("drive.mcap", "estimated", 0.319)
     assert clock_row(FIRST) is None
     assert clock_row(None) is None
+
+
+def test_samples_without_a_number_are_a_gap() -> None:
+    stamps = np.arange(1000, dtype=np.int64) * 10_000_000
+    values = np.ones(1000)
+    values[300:500] = np.nan
+    signal = Signal("wheel.FR.v", stamps, values, SignalSource(column="v"), "a.csv", False)
+    line = Timeline(0, 10_000_000, 2, {"wheel.FR.v": np.zeros(2)}, {}, {}, {"wheel.FR.v": 10_000_000})
+    (row,) = [r for r in checks(Signals({"wheel.FR.v": signal}, {}), line, (), (), {}, None) if r["check"] == "Gaps"]
+    assert row["ok"] is False
+    assert "longest 2.01 s" in str(row["result"])

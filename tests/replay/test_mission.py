@@ -23,12 +23,23 @@ def write_table(path: Path, name: str, values: np.ndarray, step_ns: int = 10_000
     return path
 
 
+def test_a_file_whose_clock_is_unknown_is_left_out(tmp_path: Path) -> None:
+    a = write_table(tmp_path / "a.csv", "wheel.FR.v", np.linspace(0.0, 0.3, 200))
+    b = write_table(tmp_path / "b.csv", "wheel.FR.u", np.linspace(0.0, 0.2, 100), step_ns=20_000_000)
+    mission = load_mission([a, b], haulotte())
+    assert list(mission.timeline.signals) == ["wheel.FR.v"]
+    assert [f.left_out for f in mission.files] == [False, True]
+    assert "b.csv was left out: its clock could not be compared with a.csv" in mission.files[1].summary.damage[0]
+    assert mission.signals.missing["wheel.FR.u"] == "b.csv was left out"
+
+
 def test_two_files_become_one_mission(tmp_path: Path) -> None:
     speed, command = np.linspace(0.0, 0.3, 200), np.linspace(0.0, 0.2, 100)
     a = write_table(tmp_path / "a.csv", "wheel.FR.v", speed)
     b = write_table(tmp_path / "b.csv", "wheel.FR.u", command, step_ns=20_000_000)
     told: list[str] = []
-    mission = load_mission([a, b], haulotte(), progress=told.append)
+    machine = dataclasses.replace(haulotte(), sources={"b.csv": SourceOptions(clock="as recorded")})
+    mission = load_mission([a, b], machine, progress=told.append)
     assert [(f.path, f.format, f.bytes) for f in mission.files] == [
         (a, "csv", a.stat().st_size),
         (b, "csv", b.stat().st_size),
