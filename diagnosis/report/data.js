@@ -134,11 +134,13 @@ const Data = (() => {
     return { x, y, exact, stride: Math.max(per, Math.round(width * per)), stored: per };
   }
 
+  // Text as a cell that no spreadsheet takes for a formula.
+  const guard = (s) => `"${(/^[=+\-@\t\r]/.test(s) ? "'" : "") + s.replaceAll('"', '""')}"`;
+
   // Every stored value of some channels over [t0, t1] as CSV text; extremes where samples are not stored.
   async function csv(columns, t0, t1) {
     const [a, b] = range(t0, t1), parts = await Promise.all(columns.map(({ c }) => segment(c, covering(c, a, b))));
     const stride = Math.max(...parts.map((s) => s.stride)), lines = [];
-    const guard = (s) => `"${(/^[=+\-@\t\r]/.test(s) ? "'" : "") + s.replaceAll('"', '""')}"`;
     const kind = view.per > 1 && stride === 1 ? `, extremes of ${view.per} samples` : "";
     const heads = columns.map(({ c, unit }) => `${view.channels[c].name} [${unit}]${kind}`);
     lines.push(["t [s]", ...(stride > 1 ? heads.flatMap((h) => [h + " min", h + " max"]) : heads)].map(guard).join(","));
@@ -182,5 +184,5 @@ const Data = (() => {
     return reading;
   }
 
-  return { view, curve, samples, csv, plotly, intervals, fromBase64 };
+  return { view, curve, samples, csv, plotly, intervals, guard, fromBase64 };
 })();

@@ -24,6 +24,18 @@ const Export = (() => {
     save(`${id}.json`, "application/json", JSON.stringify(faults[id], null, 2) + "\n");
   }
 
+  // All faults, a line for each.
+  async function table() {
+    const columns = {
+      id: (f) => f.id, component: (f) => f.component, side: (f) => f.side, mode: (f) => f.mode, "start [s]": (f) => f.start_s, "stop [s]": (f) => f.stop_s,
+      epsilon: (f) => f.epsilon?.value, "epsilon low": (f) => f.epsilon?.low, "epsilon high": (f) => f.epsilon?.high,
+      saturation: (f) => f.sat?.mean, "saturation unit": (f) => f.sat?.unit, probability: (f) => f.probability, severity: (f) => f.severity, advice: (f) => f.advice,
+    };
+    const cell = (v) => (typeof v === "number" ? String(v) : v == null ? "" : Data.guard(String(v))), list = Object.values(await Data.intervals());
+    const lines = [Object.keys(columns).map(Data.guard), ...list.map((f) => Object.values(columns).map((read) => cell(read(f))))];
+    save("faults.csv", "text/csv", lines.map((l) => l.join(",")).join("\n") + "\n");
+  }
+
   // What the article of a fault says, as lines of text.
   async function copy(article, button) {
     const text = `${Data.view.name}\n${article.dataset.text}\n` + [...article.querySelectorAll("li, .advice")].map((e) => `- ${e.textContent.trim()}`).join("\n") + `\n${location.hash}\n`;
@@ -41,5 +53,5 @@ const Export = (() => {
     setTimeout(() => { button.textContent = words; }, 1500);
   }
 
-  return { save, image, json, copy };
+  return { save, image, json, table, copy };
 })();

@@ -50,7 +50,7 @@
   // The faults to shade: of many those nearest to a time.
   function shadesOf(list, at) {
     if (list.length <= SHADES) return list;
-    return at === undefined ? list.slice(0, SHADES) : list.toSorted((f, g) => Math.abs(f.start - at) - Math.abs(g.start - at)).slice(0, SHADES);
+    return at === undefined ? list.slice(0, SHADES) : [...list].sort((f, g) => Math.abs(f.start - at) - Math.abs(g.start - at)).slice(0, SHADES);
   }
 
   // Evidence of a fault that has none in the markup.
@@ -143,6 +143,7 @@
     csv: ({ dataset: { of } }) => figures[of].drawn && figures[of].csv().then((text) => Export.save(`${fileName(of)}.csv`, "text/csv", text)),
     image: ({ dataset: { of, form } }) => figures[of].drawn && Export.image(figures[of], fileName(of), form),
     json: () => Export.json(current),
+    table: () => Export.table(),
     copy: (b) => Export.copy(articleOf(current), b),
     add: () => explorer.add(one("#columns").value),
     "signals-clear": () => { explorer.set([]); one("#find").focus(); },

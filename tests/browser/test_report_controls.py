@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import json
 import re
 from collections.abc import Callable
@@ -90,6 +91,19 @@ def test_files_of_a_fault(open_page: OPEN) -> None:
             page.locator("#evidence").get_by_role("button", name=form).click()
         assert download.value.suggested_filename == f"F1.{form.lower()}"
         assert Path(download.value.path()).read_bytes().startswith(begin)
+
+
+def test_table_of_faults_as_csv(open_page: OPEN) -> None:
+    page = open_page("hostile")
+    with page.expect_download() as download:
+        page.get_by_role("button", name="CSV", exact=True).click()
+    with Path(download.value.path()).open(encoding="utf-8", newline="") as file:
+        head, *rows = csv.reader(file)
+    assert head[:6] == ["id", "component", "side", "mode", "start [s]", "stop [s]"]
+    intervals = samples.hostile()[0]["intervals"]
+    assert [r[0] for r in rows] == [f["id"] for f in intervals]
+    assert [float(r[4]) for r in rows] == [f["start_s"] for f in intervals]
+    assert not any(cell.startswith(("=", "+", "@")) for r in rows for cell in r)
 
 
 def test_thousands_of_faults_all_have_their_evidence(open_page: OPEN) -> None:
