@@ -13,6 +13,7 @@ from diagnosis.wording import join_words, mode_words
 GONE = ("stuck", "no_signal")
 EITHER = "sensor_or_actuator"
 _LONGER, _LEAST_S = 2.0, 1.0
+_LEAST_EPSILON = 0.05  # bounds are those of one mission; the same fault differs more from mission to mission
 _MODEL_RESOLUTION = 0.25
 _STRENGTH = {"direct": 3, "model": 2, "drive": 2, "signal": 1, "tracking": 1}
 
@@ -218,12 +219,12 @@ def _sign(a: float, b: float) -> int:
 
 
 def _epsilon(a: FoundFault, b: FoundFault) -> int:
-    """+1 or −1 where each value of ε̂ lies outside the other's 95 % bounds; 0 between different rows."""
+    """+1 or −1 where each ε̂ lies outside the other's 95 % bounds and they differ by 0.05; 0 between different rows."""
     x, y = a.epsilon, b.epsilon
     if x is None or y is None or a.mode != b.mode:
         return 0
     apart = not x["low"] <= y["value"] <= x["high"] and not y["low"] <= x["value"] <= y["high"]
-    return _sign(x["value"], y["value"]) if apart else 0
+    return _sign(x["value"], y["value"]) if apart and abs(x["value"] - y["value"]) >= _LEAST_EPSILON else 0
 
 
 def _duration(a: FoundFault, b: FoundFault) -> int:
@@ -245,11 +246,20 @@ def _unseen_before(b: FoundFault, sides: Sides) -> str:
 
 
 def _other_faults(a: FoundFault, newer: Sequence[FoundFault]) -> str:
-    """Say that a part whose fault is gone has another one."""
+    """Say that a part whose fault is gone has another one, or that its fault may be told as one of the other side."""
     keys = set(_keys(a.component, a.side))
-    others = [b for b in newer if keys & set(_keys(b.component, b.side)) and b.severity != "info"]
-    words = join_words(list(dict.fromkeys(mode_words(b.side, b.mode) for b in others)))
-    return f"The part is not sound: in the newer mission it is {words}." if words else ""
+    near = [b for b in newer if b.component == a.component and b.severity != "info"]
+    own = [b for b in near if keys & set(_keys(b.component, b.side))]
+    if own:
+        words = join_words(list(dict.fromkeys(mode_words(b.side, b.mode) for b in own)))
+        return f"The part is not sound: in the newer mission it is {words}."
+    other = next((b for b in near if "direct" not in (a.tier, b.tier)), None)
+    if other is None:
+        return ""
+    return (
+        f"In the newer mission the {other.side} of {a.component} is {mode_words(other.side, other.mode)}; without second "
+        "measurements one can be taken for the other."
+    )
 
 
 def _why_not_assessed(a: FoundFault, sides: Sides) -> str:

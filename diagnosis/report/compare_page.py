@@ -30,7 +30,7 @@ _SIGNS = {
 _DEFINITIONS = (
     "Faults are matched by component, side and row of the tables; missions differ in time, so times are not compared. All "
     "faults of one component and side in one row count once.",
-    "Changed: another row or side, another severity, ε̂ of each mission outside the other's 95 % bounds, or time that changed "
+    "Changed: another row or side, another severity, ε̂ of each mission outside the other's 95 % bounds and 0.05 apart, or time that changed "
     "by more than a factor of two, both in seconds and as a share of the judged time, and by a second at least.",
     "Worse: a higher severity, else a larger ε̂ or more time.",
     "Resolved: not found again although the side was assessed in the newer mission: with evidence, for the seconds that the "

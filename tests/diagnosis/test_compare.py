@@ -164,6 +164,8 @@ def test_a_row_that_is_gone_from_a_part_with_another_fault_says_so() -> None:
         ({"epsilon": {"value": 0.7, "low": 0.6, "high": 0.8}}, ("epsilon",), "worse"),
         ({"epsilon": {"value": 0.3, "low": 0.2, "high": 0.4}}, ("epsilon",), "better"),
         ({"epsilon": {"value": 0.7, "low": 0.4, "high": 1.0}}, (), ""),
+        ({"epsilon": {"value": 0.56, "low": 0.551, "high": 0.569}}, ("epsilon",), "worse"),
+        ({"epsilon": {"value": 0.54, "low": 0.53, "high": 0.55}}, (), ""),
         ({"epsilon": None}, (), ""),
         ({"stop_s": 25.0}, ("duration",), "worse"),
         ({"stop_s": 12.0}, ("duration",), "better"),
@@ -208,6 +210,20 @@ def test_a_side_that_is_told_apart_now_is_the_same_fault() -> None:
 def test_sensor_and_valve_are_never_one_fault() -> None:
     found = compared(report(fault("FR", "sensor", "stuck")), later(fault("FR", "actuator", "stuck")))
     assert [(c.status, c.side) for c in found.faults] == [("new", "actuator"), ("resolved", "sensor")]
+
+
+@pytest.mark.parametrize(("tier", "noted"), [("model", True), ("direct", False)])
+def test_a_model_may_tell_the_same_fault_as_one_of_the_other_side(tier: str, noted: bool) -> None:
+    older = report(fault("FR", "sensor", "noisy", tier=tier))
+    found = compared(older, later(fault("FR", "actuator", "inefficient", tier=tier)))
+    gone = next(c for c in found.faults if c.status == "resolved")
+    assert ("the actuator of FR is inefficient" in gone.note) == noted
+
+
+def test_narrow_bounds_do_not_make_a_small_difference_a_change() -> None:
+    narrow = [{"value": v, "low": v - 0.001, "high": v + 0.001} for v in (0.40, 0.41)]
+    a, b = (fault("FR", "sensor", "inefficient", epsilon=e) for e in narrow)
+    assert only(compared(report(a), later(b))).status == "unchanged"
 
 
 def test_swapping_the_missions_swaps_new_and_resolved() -> None:
