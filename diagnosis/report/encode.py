@@ -9,7 +9,7 @@ from __future__ import annotations
 import base64
 import math
 import zlib
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 
@@ -20,6 +20,7 @@ _LEVELS = 2**24
 _HUGE, _TINY = 1e30, 1e-30
 _RESOLUTION = 1024
 _PROBE = 8192
+_BLOCK = 1 << 15
 _WORKERS = 4
 
 
@@ -104,23 +105,34 @@ def levels_of(values: NDArray[np.floating], step: float) -> tuple[NDArray[np.int
     step, base : float
         value = (base + level)·step; the step grows where the range needs more than 2²⁴ levels.
     """
-    y = values.astype(np.float64)
-    good = np.abs(y) < _HUGE
-    if not good.any():
-        return np.zeros(len(y), np.int32), step, 0.0
-    low, high = float(y.min(where=good, initial=_HUGE)), float(y.max(where=good, initial=-_HUGE))
+    low, high = _HUGE, -_HUGE
+    for part in _blocks(len(values)):
+        y = values[part]
+        good = np.abs(y) < _HUGE
+        low = min(low, float(y.min(where=good, initial=_HUGE)))
+        high = max(high, float(y.max(where=good, initial=-_HUGE)))
+    if low > high:
+        return np.zeros(len(values), np.int32), step, 0.0
     step = max(step, (high - low) / _LEVELS, max(abs(low), abs(high)) * 1e-15)
     base = float(np.rint(low / step)) - 1.0
-    return _quantised(y, step, base), step, base
+    return _quantised(values, step, base), step, base
+
+
+def _blocks(size: int) -> Iterator[slice]:
+    """Parts of a column that stay in the processor's cache."""
+    return (slice(i, i + _BLOCK) for i in range(0, size, _BLOCK))
 
 
 def _quantised(values: NDArray[np.floating], step: float, base: float) -> NDArray[np.int32]:
-    y = values.astype(np.float64)
-    y[~(np.abs(y) < _HUGE)] = base * step
-    y /= step
-    np.rint(y, out=y)
-    y -= base
-    return y.astype(np.int32)
+    out = np.empty(len(values), np.int32)
+    for part in _blocks(len(values)):
+        y = values[part].astype(np.float64)
+        y[~(np.abs(y) < _HUGE)] = base * step
+        y /= step
+        np.rint(y, out=y)
+        y -= base
+        out[part] = y
+    return out
 
 
 def _zigzag(levels: NDArray[np.int32]) -> NDArray[np.uint32]:

@@ -49,7 +49,7 @@ class Explorer {
   }
 
   set(plots) {
-    this.plots = plots.map((p) => p.filter((n) => this.names.has(n))).filter((p) => p.length);
+    this.plots = plots.slice(0, 20).map((p) => [...new Set(p)].filter((n) => this.names.has(n)).slice(0, 20)).filter((p) => p.length);
     this.changed("");
   }
 

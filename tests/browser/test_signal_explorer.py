@@ -83,8 +83,9 @@ def test_one_sample_is_seen_in_the_whole_mission(open_page: OPEN) -> None:
 
 
 def test_files_of_the_chosen_signals(open_page: OPEN) -> None:
-    page = open_page("five_faults", "#fault=F1&t=30,30.05&plots=wheel.FR.v,cmd;path.x")
+    page = open_page("five_faults", "#fault=F1&t=30,30.05&plots=wheel.FR.v,cmd,wheel.FR.v;path.x;cmd")
     page.locator("#signals-figure .main-svg").first.wait_for()
+    settled(page, "plots=wheel.FR.v;path.x$")
     tools = page.locator("#signals-tools")
     with page.expect_download() as download:
         tools.get_by_role("button", name="CSV of view").click()
