@@ -38,6 +38,8 @@ def _days(year: int, month: int, day: int) -> int:
 def iso_ns(data: NDArray[np.uint8], at: int, stop: int) -> Any:
     """Moment of ``2024-05-01T10:00:00.25+02:00``, ``DT#2024-05-01-10:00:00`` or ``01.05.2024 10:00:00,25``.
 
+    Also of ``05/31/2024 10:00:00.25 AM`` (month first, with AM or PM alone) and of ``10:00:00.25``, on 1970-01-01.
+
     Parameters
     ----------
     data : NDArray[np.uint8]
@@ -52,9 +54,17 @@ def iso_ns(data: NDArray[np.uint8], at: int, stop: int) -> Any:
     """
     if at + 3 < stop and data[at] == 68 and data[at + 1] == 84 and data[at + 2] == 35:
         at += 3
-    if stop - at < 10:
+    if stop - at < 8:
         return _MISSING
-    if data[at + 2] == 46 and data[at + 5] == 46:
+    clock_alone = data[at + 2] == 58 and data[at + 5] == 58
+    if stop - at < 10 and not clock_alone:
+        return _MISSING
+    slashes = data[at + 2] == 47 and data[at + 5] == 47
+    if clock_alone:
+        day, month, year = 1, 1, 1970
+    elif slashes:
+        month, day, year = _digits(data, at, 2, stop), _digits(data, at + 3, 2, stop), _digits(data, at + 6, 4, stop)
+    elif data[at + 2] == 46 and data[at + 5] == 46:
         day, month, year = _digits(data, at, 2, stop), _digits(data, at + 3, 2, stop), _digits(data, at + 6, 4, stop)
     else:
         year, month, day = _digits(data, at, 4, stop), _digits(data, at + 5, 2, stop), _digits(data, at + 8, 2, stop)
@@ -66,8 +76,11 @@ def iso_ns(data: NDArray[np.uint8], at: int, stop: int) -> Any:
         return _MISSING
     seconds: Any = _days(year, month, day) * 86_400
     part: Any = 0
-    i = at + 10
-    if i < stop and (data[i] == 84 or data[i] == 32 or data[i] == 45 or data[i] == 116 or data[i] == 95):
+    i = at - 1 if clock_alone else at + 10
+    halves = False
+    if clock_alone or (
+        i < stop and (data[i] == 84 or data[i] == 32 or data[i] == 45 or data[i] == 116 or data[i] == 95)
+    ):
         hour, minute = _digits(data, i + 1, 2, stop), _digits(data, i + 4, 2, stop)
         if hour < 0 or hour > 23 or minute < 0 or minute > 59 or data[i + 3] != 58:
             return _MISSING
@@ -88,7 +101,13 @@ def iso_ns(data: NDArray[np.uint8], at: int, stop: int) -> Any:
                 i += 1
         while i < stop and data[i] == 32:
             i += 1
-        if i < stop and (data[i] == 90 or data[i] == 122):
+        if slashes and i + 1 < stop and (data[i] == 65 or data[i] == 80) and data[i + 1] == 77:
+            if hour < 1 or hour > 12:
+                return _MISSING
+            seconds += 3600 * ((hour % 12 + (12 if data[i] == 80 else 0)) - hour)
+            halves = True
+            i += 2
+        elif i < stop and (data[i] == 90 or data[i] == 122):
             i += 1
         elif i < stop and (data[i] == 43 or data[i] == 45):
             sign = 1 if data[i] == 43 else -1
@@ -99,7 +118,7 @@ def iso_ns(data: NDArray[np.uint8], at: int, stop: int) -> Any:
                 return _MISSING
             seconds -= sign * (hour * 3600 + max(minute, 0) * 60)
             i += 3 if minute < 0 else 6 if colon else 5
-    if i != stop:
+    if i != stop or slashes != halves:
         return _MISSING
     return seconds * 1_000_000_000 + part
 

@@ -55,7 +55,9 @@ class ParquetReader:
         with _opened(path) as file:
             table = _Parquet(path, file)
             name, unit = table.time(options, report)
-            base = TimeBase("iso" if table.dated(name) else unit, epoch_ns(options, str(path)), path.name, Report())
+            base = TimeBase(
+                "iso" if table.dated(name) else unit, epoch_ns(options, str(path), unit), path.name, Report()
+            )
             ends = [base.stamps(cells) for cells in table.ends(name)]
             given = np.concatenate(ends) if ends else np.empty(0, np.int64)
             given = given[given != MISSING]
@@ -85,7 +87,7 @@ class ParquetReader:
             name, unit = table.time(options, report)
             times = RowTimes(path, name, unit, table.dated(name), options, window, report)
             columns = {n: ArrayColumn() for n in table.numeric if n != name}
-            groups = table.groups(name, unit, epoch_ns(options, str(path)), window)
+            groups = table.groups(name, unit, epoch_ns(options, str(path), unit), window)
             for cells in table.blocks([name, *columns], groups):
                 keep = times.keep(cells[name])
                 for label, column in columns.items():

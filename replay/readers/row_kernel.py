@@ -79,6 +79,7 @@ def _quoted(data: NDArray[np.uint8], at: int, stop: int) -> int:
 
 @njit(cache=True)
 def _moment(data: NDArray[np.uint8], start: int, end: int, counters: NDArray[np.int64]) -> Any:
+    """Moment of a cell of text that may hold a date or a time of day."""
     value = iso_ns(data, start, end)
     if value == MISSING:
         if counters[TEXT] == 0:

@@ -20,10 +20,20 @@ _WRAP = 1 << 32
 _BACK = 100_000_000
 _FAR = 2**62
 _SECOND = 1_000_000_000
+_DAY = 86_400 * _SECOND
 
 
-def epoch_ns(options: SourceOptions, source: str) -> int:
+def epoch_ns(options: SourceOptions, source: str, unit: str = "") -> int:
     """Zero of the time column [ns since 1970].
+
+    Parameters
+    ----------
+    options : SourceOptions
+        Its epoch, where one is given.
+    source : str
+        File, for messages.
+    unit : str
+        Unit that was found; that of the options where empty.
 
     Raises
     ------
@@ -31,7 +41,7 @@ def epoch_ns(options: SourceOptions, source: str) -> int:
         Where the epoch is not an ISO date and time.
     """
     if options.epoch is None:
-        return DC_EPOCH if options.time_unit in ("dc", "dc32") else 0
+        return DC_EPOCH if (unit or options.time_unit) in ("dc", "dc32") else 0
     try:
         moment = datetime.fromisoformat(options.epoch)
     except ValueError as error:
@@ -61,7 +71,7 @@ class TimeBase:
     def __init__(self, unit: str, epoch: int, label: str, report: Report) -> None:
         self.unit, self.epoch, self.label, self.report = unit, epoch, label, report
         self.rows = self.missing = 0
-        self._inexact = False
+        self._inexact = self._dated = False
         self._last: int | None = None
         self._turns = 0
         self._longest = 0
@@ -84,7 +94,9 @@ class TimeBase:
         if cells.dtype == np.uint64:
             ticks = np.where(cells > np.uint64(_FAR), MISSING, ticks)
         if self.unit == "dc32":
-            ticks = self._unwrapped(ticks)
+            ticks = self._unwrapped(ticks, _WRAP, _BACK)
+        elif self.unit == "iso" and self._of_day(ticks):
+            ticks = self._unwrapped(ticks, _DAY, _DAY // 2)
         if self.unit == "filetime":
             factor, zero = 100, -FILETIME_EPOCH * 100
             near = np.abs(ticks - FILETIME_EPOCH) < _FAR // 100
@@ -109,15 +121,22 @@ class TimeBase:
         ns += np.rint((reals - base) * factor).astype(np.int64)
         return np.where(good, ns, MISSING)
 
-    def _unwrapped(self, ticks: NDArray[np.int64]) -> NDArray[np.int64]:
-        """Count the turns of a 32-bit counter; a small step back is a row out of order, not a turn."""
-        given = (ticks >= 0) & (ticks < _WRAP)
+    def _of_day(self, ticks: NDArray[np.int64]) -> bool:
+        """Whether the cells are times of day without a date, which begin again at midnight."""
+        if not self._dated:
+            given = ticks[ticks != MISSING]
+            self._dated = bool(((given < 0) | (given >= _DAY)).any())
+        return not self._dated
+
+    def _unwrapped(self, ticks: NDArray[np.int64], span: int, back: int) -> NDArray[np.int64]:
+        """Count the turns of a counter that starts again; a step back of less than `back` is a row out of order, not a turn."""
+        given = (ticks >= 0) & (ticks < span)
         values = ticks[given]
         if not len(values):
             return np.full(len(ticks), MISSING)
         before = values[0] if self._last is None else self._last
-        steps = np.diff(values, prepend=before) % _WRAP
-        steps = np.where(steps > _WRAP - _BACK, steps - _WRAP, steps)
+        steps = np.diff(values, prepend=before) % span
+        steps = np.where(steps > span - back, steps - span, steps)
         start = int(values[0]) - int(steps[0]) if self._last is None else self._turns
         total = start + np.cumsum(steps)
         self._last, self._turns = int(values[-1]), int(total[-1])
@@ -136,6 +155,10 @@ class TimeBase:
             self.report.note(
                 f"{self.label}: its long stamps were written as floating-point numbers, so they are exact only to about a "
                 "microsecond; write them as integers"
+            )
+        if self.unit == "iso" and self._turns and not self._dated and self.rows > self.missing:
+            self.report.note(
+                f"{self.label}: times of day without a date, counted on over midnight; [sources] epoch gives the date"
             )
         if self.unit == "dc32" and self.rows > self.missing:
             self.report.note(

@@ -59,7 +59,7 @@ class CsvReader:
         tail = table.sample(last) if last else {}
         count, exact = row_count(table.file, table.skip)
         dated = sample[name].dtype.kind == "M"
-        base = TimeBase("iso" if dated else unit, epoch_ns(options, str(path)), path.name, Report())
+        base = TimeBase("iso" if dated else unit, epoch_ns(options, str(path), unit), path.name, Report())
         start, stop = span(base, sample[name], tail.get(name), count)
         fields = tuple(n for n in table.names if n != name and (n in sample or n in tail))
         note = "" if exact else "rows and end are estimated from the first rows; reading the file counts them"
@@ -108,7 +108,7 @@ def _time(table: TextTable, options: SourceOptions, report: Report) -> tuple[Sam
         try:
             said = Report()
             columns = sample if options.time is None else {n: sample.get(n, np.empty(0)) for n in table.names}
-            name, unit = find_time(table.file.path, columns, options, said)
+            name, unit = find_time(table.file.path, columns, options, said, table.texts(head, columns))
         except LogError:
             if whole or size == _SAMPLES[-1]:
                 raise

@@ -57,7 +57,7 @@ class RowTimes:
     ) -> None:
         self.path, self.name, self.unit, self.report = path, name, unit, report
         self.base = TimeBase(
-            "iso" if dated else unit, epoch_ns(options, str(path)), f"{path.name}, column {name!r}", report
+            "iso" if dated else unit, epoch_ns(options, str(path), unit), f"{path.name}, column {name!r}", report
         )
         self._early = None if unit == "dt" else window
         self._late = window if unit == "dt" else None

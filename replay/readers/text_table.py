@@ -6,7 +6,7 @@ import csv
 import io
 import re
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -98,6 +98,11 @@ class TextTable:
                 out[self.names[i]] = columns[i].view("M8[ns]") if columns[i].dtype.kind == "i" else np.empty(0)
             texts &= is_text(rows)
         return {n: c for i, (n, c) in enumerate(out.items()) if not texts[i]}
+
+    def texts(self, text: bytes, known: Collection[str]) -> dict[str, str]:
+        """First cells of the columns that are not known, from the first of some rows."""
+        cells = decoded(text.split(b"\n", 1)[0]).split(self.dialect.separator)
+        return {n: c.strip(' "\r')[:40] for n, c in zip(self.names, cells, strict=False) if n not in known}
 
 
 def _gathered(rows: Rows, text: bytes) -> list[NDArray[Any]]:

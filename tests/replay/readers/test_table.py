@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import gzip
 from collections.abc import Callable
-from datetime import datetime, timedelta, timezone
+from datetime import UTC, datetime, timedelta, timezone
 from pathlib import Path
 
 import numpy as np
@@ -385,3 +385,65 @@ def test_real_robot_arm(reference_data: Path) -> None:
     log = read(reference_data / "fault_data" / "dtr_robot_arm" / "Healthy_01.csv")
     assert len(log.channels["resp_m1_rad"].values) == 1000
     assert log.channels["cmd_m5_rad"].stamps[-1] == 9_990_000_000
+
+
+def table_of(target: Path, name: str, cells: list[str]) -> Path:
+    target.write_text(f"{name},a,b\n" + "".join(f"{c},{i}.5,1.5\n" for i, c in enumerate(cells)))
+    return target
+
+
+@pytest.mark.parametrize("step", [1_000_000, 10_000_000, 100_000_000])
+def test_a_32_bit_clock_is_known_by_its_turns(target: Path, step: int) -> None:
+    ticks = 4_000_000_000 + step * np.arange(2000)
+    log = read(table_of(target, "clk", [str(t % 2**32) for t in ticks.tolist()]))
+    stamps = log.channels["a"].stamps
+    assert (np.diff(stamps) == step).all()
+    assert any("in dc32, found because it rises and starts again at 2^32" in n for n in log.summary.notes)
+
+
+def test_a_count_that_cannot_be_seconds_is_refused_with_what_it_may_be(target: Path) -> None:
+    table_of(target, "clk", [str(5_000_000 + 1_000_000 * i) for i in range(500)])
+    with pytest.raises(LogError, match=r"'clk' rises by 1e\+06 from row to row.*'dc32' \(a 32-bit distributed clock\)"):
+        read(target)
+    assert read(target, time="clk", time_unit="dc32").channels["a"].stamps[1] % 10**9 == 6_000_000
+
+
+def test_a_64_bit_distributed_clock_is_known_by_its_size(target: Path) -> None:
+    since_2000 = 820_000_000_000_000_000
+    table_of(target, "dc_time", [str(since_2000 + 10_000_000 * i) for i in range(50)])
+    assert read(target).channels["a"].stamps[:2].tolist() == [946_684_800 * 10**9 + since_2000 + k for k in (0, 10**7)]
+
+
+def test_it_only_rises_is_said_where_it_does(target: Path) -> None:
+    cells = [f"{i / 100}" for i in range(500)]
+    cells[100], cells[101] = cells[101], cells[100]
+    notes = read(table_of(target, "foo", cells)).summary.notes
+    assert any("because it rises in all but 1 of its first 500 rows" in n for n in notes)
+
+
+def test_times_of_day_run_on_over_midnight_and_take_their_date_from_the_epoch(target: Path) -> None:
+    moments = [datetime(2025, 1, 1, 23, 59, 58) + timedelta(seconds=i / 100) for i in range(400)]
+    table_of(target, "time", [f"{m:%H:%M:%S.%f}" for m in moments])
+    log = read(target)
+    assert (np.diff(log.channels["a"].stamps) == 10_000_000).all()
+    assert any("times of day without a date" in n for n in log.summary.notes)
+    dated = read(target, epoch="2025-08-19T00:00:00Z").channels["a"].stamps
+    assert datetime.fromtimestamp(int(dated[200]) / 1e9, tz=UTC).isoformat() == "2025-08-20T00:00:00+00:00"
+
+
+@pytest.mark.parametrize(
+    ("text", "hour"), [("08:00:00.5 AM", 8), ("12:00:00.5 AM", 0), ("12:00:00.5 PM", 12), ("11:00:00.5 PM", 23)]
+)
+def test_dates_with_the_month_first_need_am_or_pm(text: str, hour: int) -> None:
+    moment = datetime(2025, 8, 19, hour, tzinfo=UTC)
+    raw = f"08/19/2025 {text}".encode()
+    assert iso_ns(np.frombuffer(raw, np.uint8), 0, len(raw)) == int(moment.timestamp()) * 10**9 + 500_000_000
+    assert iso_ns(np.frombuffer(raw, np.uint8), 0, len(raw) - 3) == MISSING
+
+
+def test_a_column_of_text_that_may_be_time_is_named(target: Path) -> None:
+    table_of(target, "Date", [f"Tue 19 Aug 08:00:{i:02d}" for i in range(20)])
+    with pytest.raises(
+        LogError, match=r"'Date' looks like it, but its text 'Tue 19 Aug 08:00:00' .* columns are Date, a, b"
+    ):
+        read(target)
