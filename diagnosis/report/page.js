@@ -179,7 +179,8 @@
   function fromAddress(hash, scroll) {
     const read = (key) => new RegExp(`[#&]${key}=([^&]*)`).exec(hash)?.[1] ?? "";
     const plain = (s) => { try { return decodeURIComponent(s); } catch { return ""; } };
-    const t = read("t").split(",").map(Number), range = t.length === 2 && t.every(Number.isFinite) && t[1] > t[0] ? t : undefined;
+    const t = read("t") ? read("t").split(",").map(Number) : [], around = t.length === 1 ? [t[0] - 0.5, t[0] + 0.5] : t;
+    const range = around.length === 2 && around.every(Number.isFinite) && around[1] > around[0] ? around : undefined;
     const plots = read("plots"), wanted = plots ? plots.split(";").map((p) => p.split(",").map(plain)) : [], id = plain(read("fault"));
     if (faults.has(id)) select(id, { range, scroll });
     else if (!current && faults.size) select(faults.keys().next().value, { range });

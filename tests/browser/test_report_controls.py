@@ -59,6 +59,8 @@ def test_back_and_forward_walk_through_the_faults(open_page: OPEN) -> None:
     page.wait_for_url(re.compile(r"#fault=F1&t=20\.0000,40\.0000$"))
     page.go_forward()
     expect(heading).to_have_text(re.compile("^F2 · "))
+    page.evaluate("location.hash = '#fault=F1&t=31'")
+    page.wait_for_url(re.compile(r"#fault=F1&t=30\.5000,31\.5000$"))
 
 
 def test_each_plot_tells_how_it_is_drawn(open_page: OPEN) -> None:
