@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from replay.clock_coarse import match
 from replay.clock_fit import fit_line
+from replay.clock_jumps import jumps, pauses, widened
 from replay.clock_series import Shared, shared_series
 from replay.clock_windows import Line
 from replay.machine import Machine
@@ -74,9 +75,13 @@ def _estimate(
     if reason:
         return replace(unknown, reason=reason), None, 0
     line = fit_line(shared, found.lag_s, found.at_s)
-    reason = line.reason or _steps(shared, line)
+    reason = line.reason
     if not reason and not np.isfinite([line.lag_s, line.drift, *line.covariance.ravel()]).all():
         reason = "their stamps or values are damaged"
+    if not reason:
+        reason, more = jumps(shared, line, pauses(reference, other, origins, line))
+        line = widened(line, more, (spans[1][1] - spans[1][0]) * 1e-9)
+    reason = reason or _steps(shared, line)
     if reason:
         return replace(unknown, reason=reason), None, 0
     ends = np.array([0.0, (spans[1][1] - spans[1][0]) * 1e-9])

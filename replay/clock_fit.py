@@ -11,9 +11,9 @@ from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import stdtrit
+from scipy.special import chdtri, stdtrit
 
-from replay.clock_copies import copied
+from replay.clock_copies import NEWEST, PAIRED, copied
 from replay.clock_series import Shared
 from replay.clock_windows import TOLERANCES_S, Line, Readings, prepared, read_windows
 
@@ -27,6 +27,11 @@ _STRETCHES = 8
 _STEP_S = 0.005
 _FEWEST = 3
 _TUKEY = 4.685
+_COARSE_S = 0.15
+_UNLIKELY = 1e-3
+_BENDS = (0.25, 0.5, 0.75)
+_BEND_STD = 15e-6
+_SHOWN = 4.0
 
 
 def fit_line(shared: Sequence[Shared], lag_s: float, at_s: float) -> Line:
@@ -48,8 +53,15 @@ def fit_line(shared: Sequence[Shared], lag_s: float, at_s: float) -> Line:
         if line.reason or (-reach <= first and last <= reach):
             break
         reach *= 3
-    copies = None if line.reason else copied(shared, line)
-    exact = line if copies is None else _robust_line(copies, shared, line, floor=0.0)
+    if line.reason:  # equal noise in both leaves little that windows can compare
+        copies = copied(shared, Line(at_s, lag_s, 0.0, line.covariance), _COARSE_S)
+        if copies is None or copies[1] != PAIRED:
+            return line
+    else:
+        copies = copied(shared, line)
+        if copies is None:
+            return line
+    exact = _robust_line(copies[0], shared, line, floor=0.0, known=copies[1])
     return line if exact.reason else exact
 
 
@@ -67,10 +79,12 @@ def _stage(shared: Sequence[Shared], line: Line, span: tuple[float, float]) -> L
     return line
 
 
-def _robust_line(readings: Readings, shared: Sequence[Shared], start: Line, floor: float = 0.1) -> Line:
+def _robust_line(
+    readings: Readings, shared: Sequence[Shared], start: Line, floor: float = 0.1, known: float = NEWEST
+) -> Line:
     """Fit a line to the readings; outliers lose their weight, and disagreement widens the covariance.
 
-    No reading counts as better than `floor` of the slower file's period.
+    No reading counts as better than `floor` of the slower file's period; samples' ages are known to `known` of the faster's.
     """
     t, lag, variance = readings.t, readings.lag, readings.variance
     if len(t) < _FEWEST:
@@ -101,7 +115,7 @@ def _robust_line(readings: Readings, shared: Sequence[Shared], start: Line, floo
     if abs(line[1]) > _MOST_DRIFT:
         return _refused(start, f"the drift would be {line[1] * 1e6:.0f} ppm")
     residual = lag - line[0] - line[1] * u
-    uneven, more = _uneven(u, residual, weight0, weight)
+    uneven, more = _uneven(u, residual, weight0, weight, scale)
     if uneven:
         return _refused(start, uneven)
     used = [i for i in range(len(shared)) if (weight[readings.signal == i] > 0).any()]
@@ -110,14 +124,15 @@ def _robust_line(readings: Readings, shared: Sequence[Shared], start: Line, floo
     covariance = (
         covariance * (stdtrit(freedom, 0.975) / 1.96) ** 2 * max(1.0, counted / freedom)
     )  # few readings tell less
-    covariance[0, 0] += _between(readings, weight / scale**2, residual, shared, used) + more**2
+    covariance[0, 0] += _between(readings, weight / scale**2, residual, shared, used, known) + more**2
+    covariance[0, 0] += _bent(u, residual, weight / scale**2, _ends(shared, at))
     return Line(at, float(line[0]), float(line[1]), covariance, tuple(shared[i].name for i in used), t[weight > 0])
 
 
-def _uneven(u: Array, residual: Array, weight0: Array, weight: Array) -> tuple[str, float]:
+def _uneven(u: Array, residual: Array, weight0: Array, weight: Array, scale: float) -> tuple[str, float]:
     """Say where a whole stretch of time agrees on another offset than the line, or how far a stretch is off [s]."""
     edges = np.linspace(u.min(), u.max() + 1e-9, _STRETCHES + 1)
-    worst = 0.0
+    offs, errors = [], []
     for first, last in pairwise(edges):
         mine = (u >= first) & (u < last)
         if mine.sum() < 2:
@@ -130,12 +145,44 @@ def _uneven(u: Array, residual: Array, weight0: Array, weight: Array) -> tuple[s
                     f"the clocks do not run evenly against each other: {last - first:.0f} s are off by {off * 1e3:+.0f} ms"
                 ), 0.0
         elif weight[mine].any():
-            off = float(np.average(residual[mine], weights=weight[mine]))
-            worst = max(worst, abs(off) - 3.0 / float(np.sqrt(weight[mine].sum())))
-    return "", worst
+            offs.append(float(np.average(residual[mine], weights=weight[mine])))
+            errors.append(scale / float(np.sqrt(weight[mine].sum())))
+    if not offs:
+        return "", 0.0
+    z = np.divide(offs, errors)
+    if float(np.square(z).sum()) < chdtri(max(1, len(z) - 2), _UNLIKELY):
+        return "", 0.0
+    return "", float(np.abs(np.array(offs)[np.abs(z) > 1.0]).max(initial=0.0))
 
 
-def _between(readings: Readings, weight: Array, residual: Array, shared: Sequence[Shared], used: list[int]) -> float:
+def _ends(shared: Sequence[Shared], at: float) -> tuple[float, float]:
+    """First and last sample [s of the other file, from `at`]."""
+    return min(float(s.other.t[0]) for s in shared) - at, max(float(s.other.t[-1]) for s in shared) - at
+
+
+def _bent(u: Array, residual: Array, weight: Array, ends: tuple[float, float]) -> float:
+    """Variance of the offset that a drift which changes once adds: as far as readings show it or leave it open."""
+    wide = np.linspace(*ends, 33)
+    line, free = np.stack([np.ones(len(u)), u]), np.stack([np.ones(len(wide)), wide])
+    normal = (line * weight) @ line.T
+    if not np.linalg.det(normal) > 0:
+        return 0.0
+    worst = 0.0
+    for share in _BENDS:
+        at = ends[0] + share * (ends[1] - ends[0])
+        bend = np.maximum(u - at, 0.0)
+        straight = np.linalg.solve(normal, (line * weight) @ bend)
+        mine, shape = bend - straight @ line, np.maximum(wide - at, 0.0) - straight @ free
+        known = float((weight * mine * mine).sum()) + 1.0 / _BEND_STD**2
+        size = float((weight * mine * residual).sum()) / known
+        square = (size**2 if size**2 * known > _SHOWN else 0.0) + 1.0 / known
+        worst = max(worst, square * float(np.square(shape).max()))
+    return worst
+
+
+def _between(
+    readings: Readings, weight: Array, residual: Array, shared: Sequence[Shared], used: list[int], known: float
+) -> float:
     """Variance of what signals are late against each other, and of what stamps within a period cannot tell."""
     means, sizes = [], []
     for i in used:
@@ -148,7 +195,7 @@ def _between(readings: Readings, weight: Array, residual: Array, shared: Sequenc
     if len(used) > 1:
         q = float((size * np.square(mean - (share * mean).sum())).sum())
         excess = max(0.0, (q - (len(used) - 1)) / (size.sum() - np.square(size).sum() / size.sum()))
-    timing = 0.29 * min(min(s.reference.recorded, s.other.recorded) for s in shared)
+    timing = known * min(min(s.reference.recorded, s.other.recorded) for s in shared)
     delay = max(shared[i].delay_s for i in used) / 1.96
     return float(excess * np.square(share).sum() + timing**2 + delay**2)
 
