@@ -20,7 +20,8 @@ def show_clips(terminal: Terminal, clips: Clips, folder: Path) -> None:
     if not count:
         terminal.show(text("Clips: no fault of at least low severity to cut out"))
         return
-    terminal.show(text(f"Clips: {count} in {folder}, each with layouts for Foxglove and PlotJuggler"))
+    size = sum(path.stat().st_size for path in clips.paths) / 1e6
+    terminal.show(text(f"Clips: {count} in {folder} ({size:.3g} MB), each with layouts for Foxglove and PlotJuggler"))
     if clips.left_out:
         terminal.note(f"{clips.left_out} more faults have no clip: the {count} most severe ones were cut out")
     for note in clips.notes:

@@ -159,7 +159,7 @@ def _metrics(rows: Sequence[MetricChange]) -> RenderableType:
 
 
 def _pair(a: float | None, b: float | None) -> tuple[str, str, str]:
-    change = f"{100 * (b / a - 1):+.0f} %" if a and b is not None else ""
+    change = f"{round(100 * (b / a - 1)):+d} %" if a and b is not None else ""
     return _number(a), _number(b), change
 
 

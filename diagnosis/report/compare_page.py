@@ -167,6 +167,6 @@ def _metric(m: Mapping[str, Any]) -> dict[str, Any]:
     cells: list[str] = []
     for quantity in ("tracking_error", "control_effort"):
         a, b = m[f"{quantity}_older"], m[f"{quantity}_newer"]
-        change = f"{100 * (b / a - 1):+.0f} %".replace("-", "−") if a and b is not None else ""
+        change = f"{round(100 * (b / a - 1)):+d} %".replace("-", "−") if a and b is not None else ""
         cells += ["–" if a is None else f"{a:.3f}", "–" if b is None else f"{b:.3f}", change]
     return {"wheel": m["wheel"], "cells": cells}

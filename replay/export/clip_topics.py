@@ -39,7 +39,7 @@ def signal_topics(signals: Signals, start_ns: int, stop_ns: int) -> list[tuple[T
 
 
 def loop_topics(timeline: Timeline, replay: Replay, machine: Machine, start_ns: int, stop_ns: int) -> list[TopicBatch]:
-    """Topics of the replayed loop (`replay.export.replay_log`) between two stamps.
+    """Topics of the replayed loop (`replay.export.replay_log`) between two stamps, values to single precision.
 
     Raises
     ------
@@ -53,7 +53,7 @@ def loop_topics(timeline: Timeline, replay: Replay, machine: Machine, start_ns: 
         return []
     part = replace(timeline, start_ns=timeline.start_ns + a * timeline.step_ns, size=b - a)
     values = {f.name: getattr(replay, f.name) for f in fields(replay)}
-    cut: dict[str, Any] = {n: x[a:b] for n, x in values.items() if isinstance(x, np.ndarray)}
+    cut: dict[str, Any] = {n: _single(x[a:b]) for n, x in values.items() if isinstance(x, np.ndarray)}
     return replay_topics(part, replace(replay, **cut), machine)
 
 
@@ -78,12 +78,15 @@ def evidence_topic(
     stamps = first_ns + np.round(np.asarray(columns["t"], np.float64) * 1e9).astype(np.int64)
     a, b = np.searchsorted(stamps, (start_ns, stop_ns))
     prefix = f"evidence.{component}."
-    found = {
-        n.removeprefix("evidence."): np.asarray(c[a:b], np.float64) for n, c in columns.items() if n.startswith(prefix)
-    }
+    found = {n.removeprefix("evidence."): _single(c[a:b]) for n, c in columns.items() if n.startswith(prefix)}
     found |= {n.replace(".threshold", ".minus_threshold"): -c for n, c in found.items() if n.endswith(".threshold")}
     found = {n: c for n, c in found.items() if np.isfinite(c).any()}
     return (joint_states(EVIDENCE, found, stamps[a:b]), tuple(found)) if found else None
+
+
+def _single(values: NDArray[np.floating]) -> NDArray[np.float64]:
+    """Values to single precision, which halves what they take in the file."""
+    return np.asarray(values, np.float32).astype(np.float64)
 
 
 def open_loop_topic(stamp: int) -> TopicBatch:
