@@ -20,6 +20,8 @@ if TYPE_CHECKING:
     from replay.inspection import InspectReport, OddValues, TopicTiming
 
 _EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
+_WITHOUT_INDEX = ("csv", "twincat")
+_END_NS = (1 << 63) - 10**10  # where 64 bits end, no clock stands
 _LONG_VALUE = 60
 _SHOWN_METADATA = 12
 _SHOWN_ODD, _SHOWN_NAMES = 8, 6
@@ -53,7 +55,12 @@ def inspect_parts(report: InspectReport) -> list[RenderableType]:
         if lines:
             parts += [section(title), bullets(lines)]
     if quick:
-        parts += ["", text(UNKNOWN[0].upper() + UNKNOWN[1:] + ".", "dim")]
+        known = (
+            UNKNOWN.replace("the index was", "the first and last rows were")
+            if report.format in _WITHOUT_INDEX
+            else UNKNOWN
+        )
+        parts += ["", text(known[0].upper() + known[1:] + ".", "dim")]
     return parts
 
 
@@ -62,7 +69,7 @@ def list_parts(reports: Sequence[InspectReport], failures: Sequence[str]) -> lis
     folder = _common_folder([r.source for r in reports])
     rows = [
         (
-            r.source.removeprefix(folder), r.format, _start(r.start_ns) if r.stop_ns else "–", f"{r.duration_s:.1f}", r.messages,
+            r.source.removeprefix(folder), r.format, _start(r.start_ns) if 0 < r.stop_ns < _END_NS else "–", f"{r.duration_s:.1f}", r.messages,
             len(r.topics), _bytes(r.size), _state(r),
         )
         for r in reports
@@ -209,6 +216,8 @@ def _stored(report: InspectReport) -> list[str]:
 
 
 def _when(report: InspectReport) -> str:
+    if report.stop_ns >= _END_NS:
+        return "no usable stamps"
     return f"{_start(report.start_ns, 3)} UTC, {report.duration_s:.3f} s" if report.stop_ns else "no stamps"
 
 
@@ -233,4 +242,6 @@ def _bytes(size: Any) -> str:
 def _state(report: InspectReport) -> Text:
     if report.damage:
         return text("degraded", "bold red")
-    return text("ok", "green") if report.depth == "full" else text("index ok")
+    if report.depth == "full":
+        return text("ok", "green")
+    return text("head ok" if report.format in _WITHOUT_INDEX else "index ok")

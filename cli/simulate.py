@@ -17,6 +17,7 @@ from replay.errors import ConfigError
 
 if TYPE_CHECKING:
     from replay.simulation.options import SimulationOptions
+    from replay.truth import MissionTruth
 
 EXAMPLES = """\b
 Examples:
@@ -167,6 +168,9 @@ def simulate(
         bool,
         typer.Option("--vary", help="Draw all that is not given from wide ranges (seeds from 2000: wider ones)."),
     ] = False,
+    force: Annotated[
+        bool, typer.Option("--force", help="Replace an earlier simulated log, or the truth of another one.")
+    ] = False,
     json: Json = False,
 ) -> None:
     """Simulate a mission with known faults: a log, and its truth beside it."""
@@ -178,6 +182,8 @@ def simulate(
     truth = truth_path(log, folder=kind is LogFormat.ROSBAG2)
     if log.exists() and not truth.exists():
         raise ConfigError(f"{log}: exists and was not simulated, so it is left as it is; give another name with -o")
+    if log.exists() and not force:
+        raise ConfigError(f"{log}: exists already; give another name with -o, or --force to replace it and its truth")
     faults = tuple(parse_fault(words) for words in fault) if fault else None
     with terminal.progress("simulating") as progress:
         from replay.export.mission import write_mission
@@ -197,6 +203,8 @@ def simulate(
         }
         options = replace(options, evidence=evidence.value, faults=faults, **given)
         mission = simulate_mission(_changed(options, setting or []))
+        if not force:
+            _keep_other_truth(truth, mission.truth)
         progress(f"writing {log.name}")
         write_mission(mission, log, "ros1" if kind is LogFormat.BAG else kind.value)
         write_truth(mission.truth, truth)
@@ -220,6 +228,21 @@ def simulate(
         ("truth", f"{truth}  ({count} fault{'' if count == 1 else 's'})"),
     ]
     terminal.show(key_values([*rows, ("next", shlex.join(words))]))
+
+
+def _keep_other_truth(path: Path, truth: MissionTruth) -> None:
+    """Raise a `ConfigError` where a truth file of another mission stands where this one's belongs."""
+    from replay.errors import MfhcaError
+    from replay.truth import read_truth
+
+    try:
+        same = not path.exists() or read_truth(path) == truth
+    except MfhcaError:
+        same = False
+    if not same:
+        raise ConfigError(
+            f"{path}: belongs to another mission, whose truth would be lost; give another name with -o, or --force to replace it"
+        )
 
 
 def _changed(options: SimulationOptions, settings: list[str]) -> SimulationOptions:

@@ -72,7 +72,7 @@ def _longest(stamps: NDArray[np.int64], edges: NDArray[np.int64], missing: int) 
     if len(stops) < len(starts):
         stops = np.append(stops, last)
     starts = np.maximum(starts - 1, 0)
-    lengths = np.abs(stamps[stops] - stamps[starts])
+    lengths = np.maximum(stamps[stops] - stamps[starts], 0)
     k = int(np.argmax(lengths))
     sparse = missing > 0.5 * len(stamps) and lengths[k] <= GAP_PERIODS * float(np.median(lengths))
     if sparse and len(lengths) > 2:

@@ -89,8 +89,7 @@ def write_raw(
     log = read_log(path, options, window=_window(path, options, start_s, stop_s))
     groups = _groups(log)
     if not groups:
-        said = "; ".join((*log.summary.damage, *log.summary.notes)) or "it holds no topics"
-        raise LogError(f"{path}: no numbers to convert: {said}")
+        raise LogError(f"{path}: no numbers to convert: {_nothing(log)}")
     tell(f"hashing {path.name}")
     sha256, size = content_hash(path)
     head = {
@@ -105,9 +104,9 @@ def write_raw(
                 tell(f"writing {name}")
                 files.append({"file": name, **_write(temporary / name, group, head)})
                 release(group.stamps, *(c.values for c in group.channels))
+            notes = [*log.summary.notes, *_split_topics(files)]
             index = head | {
-                "status": "degraded" if damage else "ok", "damage": list(damage), "notes": list(log.summary.notes),
-                "files": files,
+                "status": "degraded" if damage else "ok", "damage": list(damage), "notes": notes, "files": files,
             }  # fmt: skip
             (temporary / INDEX).write_text(json.dumps(index, indent=2, ensure_ascii=False) + "\n", encoding="utf-8")
             _place(temporary, folder)
@@ -115,6 +114,16 @@ def write_raw(
         said = getattr(error, "strerror", None) or " ".join(str(error).split())
         raise OutputError(f"{folder}: cannot be written ({said}); give another place") from error
     return index
+
+
+def _nothing(log: RawLog) -> str:
+    """Say why a log holds no numbers."""
+    topics = log.summary.topics
+    if not topics or not any(t.count for t in topics):
+        return "; ".join(log.summary.damage) or ("its topics hold no messages" if topics else "it holds no topics")
+    shown = ", ".join(f"{t.name} ({t.note or t.type_name or t.encoding or 'no type'})" for t in topics[:6])
+    more = f" and {len(topics) - 6} more" if len(topics) > 6 else ""
+    return "; ".join((f"its topics hold none: {shown}{more}", *log.summary.damage))
 
 
 def _window(path: Path, options: SourceOptions, start_s: float | None, stop_s: float | None) -> Window | None:
@@ -138,6 +147,24 @@ def _groups(log: RawLog) -> list[_Group]:
             key = next(equal, key)
         same.setdefault(key, []).append(channel)
     return [_Group(topic, held[0].stamps, tuple(held)) for topic, same in topics.items() for held in same.values()]
+
+
+def _split_topics(files: list[dict[str, Any]]) -> list[str]:
+    """Say why one topic stands in several files."""
+    topics: dict[str, list[str]] = {}
+    for file in files:
+        topics.setdefault(file["topic"], []).append(file["file"])
+    several = {topic: names for topic, names in topics.items() if len(names) > 1}
+    if not several:
+        return []
+    shown = "; ".join(
+        f"{t}: {n[0]} to {n[-1]}" if len(n) > 2 else f"{t}: {n[0]}, {n[1]}" for t, n in [*several.items()][:6]
+    )
+    more = f" and {len(several) - 6} more" if len(several) > 6 else ""
+    return [
+        "topics stand in several files where only some of their messages hold a number (lists of changing length, empty "
+        f"fields), so that every number keeps its own stamp: {shown}{more}"
+    ]
 
 
 def _names(groups: Iterable[_Group]) -> list[str]:

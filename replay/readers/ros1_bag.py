@@ -198,6 +198,7 @@ class _Reading:
         bag, totals = self.bag, self.found + self.skipped
         if bag.report.damage and not bag.connections and not totals:
             raise LogError(f"{bag.path} holds nothing that can be read: {'; '.join(bag.report.damage[:3])}")
+        beyond: list[str] = []
         for number in sorted(self.stated.keys() | self.found.keys()):
             stated, found = self.stated[number], self.found[number]
             connection = bag.connections.get(number)
@@ -207,11 +208,14 @@ class _Reading:
                     f"{bag.path.name}: {name}: {stated - found} of {stated} messages that the index counts were not found"
                 )
             elif self._indexed() and stated < found:
-                bag.report.lost(
-                    f"{bag.path.name}: {name}: {found} messages were found and read, the index counts {stated}"
-                )
+                beyond.append(f"{name} {found} instead of {stated}")
             if connection is None and found:
                 bag.lost(f"{found} messages belong to connection {number}, which is not named")
+        if beyond:
+            bag.report.lost(
+                f"{bag.path.name}: what is left of the index names fewer messages than were read, so how many were recorded is "
+                f"not known ({'; '.join(beyond[:6])}{' and more' if len(beyond) > 6 else ''})"
+            )
         topics: dict[Connection, int] = {}
         for number, connection in bag.connections.items():
             topics[connection] = topics.get(connection, 0) + totals[number]

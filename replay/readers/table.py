@@ -13,7 +13,7 @@ from replay.errors import LogError
 from replay.rawlog import Clock, LogSummary, RawLog, TopicInfo, Window
 from replay.readers.clocks import Report
 from replay.readers.columns import CellColumn
-from replay.readers.row_kernel import FIRST_LONG, FIRST_SHORT, LONG, MOMENT, REAL, SHORT, TEXT
+from replay.readers.row_kernel import FIRST_LONG, FIRST_SHORT, FIRST_TEXT, LONG, MOMENT, REAL, SHORT, TEXT
 from replay.readers.rows import Rows
 from replay.readers.stamps import TimeBase, epoch_ns
 from replay.readers.table_log import RowTimes, table_log
@@ -143,14 +143,39 @@ def _has_comma(cell: str) -> bool:
     return bool(comma) and part.isdigit() and whole.lstrip("+-").isdigit()
 
 
+def _headers_again(table: TextTable, rows: Rows, texts: NDArray[Any], report: Report) -> int:
+    """Count rows that repeat the header, as in several exports that were joined, and tell where the first stands."""
+    odd = [i for i in np.flatnonzero((rows.columns[:, TEXT] > 0) & ~texts).tolist() if i in rows.examples]
+    cells = {i: rows.examples[i].strip(' "\r') for i in odd}
+    same = [i for i in odd if cells[i] and table.names[i].startswith(cells[i])]
+    if len(same) < 2 or len(same) < 0.5 * len(odd):
+        return 0
+    count, at = int(min(rows.columns[i, TEXT] for i in odd)), int(min(rows.columns[i, FIRST_TEXT] for i in same))
+    line, held = 1, 0
+    for piece in table.file.quiet(0):
+        line += piece.count(b"\n", 0, max(at - held, 0))
+        held += len(piece)
+        if held >= at:
+            break
+    what = "a second header" if count == 1 else f"{count} more headers, the first"
+    report.lost(
+        f"{table.file.path.name}: {what} in line {line}: several exports stand in one file, one behind the other; the rows of "
+        "all were read"
+    )
+    return count
+
+
 def _log(table: TextTable, found: _Found, report: Report, clock: Clock) -> RawLog:
     path, rows = table.file.path, found.rows
     if not rows.count:
         raise LogError(f"{path} has a header and no row of data; record or export it again")
     texts: NDArray[Any] = is_text(rows)
+    again = _headers_again(table, rows, texts, report)
+    found.times.base.rows -= again
+    found.times.base.missing -= again
     for i, label in enumerate(table.names):
-        bad = int(rows.columns[i, TEXT])
-        if bad and not texts[i] and label in found.columns:
+        bad = int(rows.columns[i, TEXT]) - again
+        if bad > 0 and not texts[i] and label in found.columns:
             report.lost(f"{path.name}: {bad} cells of {label!r} are no numbers; they became empty ({rows.example(i)})")
     found.times.report = found.times.base.report = report
     if rows.table[SHORT]:

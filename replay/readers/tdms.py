@@ -70,7 +70,7 @@ class TdmsReader:
         ends: list[int] = []
         untimed: list[str] = []
         with _opened(path, report) as file:
-            size = path.stat().st_size
+            size, cut = path.stat().st_size, bool(report.damage)
             for group in file.groups():
                 times = _GroupTimes(path, group, options, report)
                 members, count = [], 0
@@ -93,6 +93,8 @@ class TdmsReader:
                         ends += [int(stamps.min()), int(stamps.max())]
                     if decode:
                         channels[label] = _channel(label, channel, stamps, window, times)
+                if cut:
+                    _tell_short(path, group, report)
                 topics.append(TopicInfo(group.name, "table", count, "table", tuple(members)))
         if untimed:
             report.lost(
@@ -112,6 +114,20 @@ class TdmsReader:
         start, stop = (min(ends), max(ends)) if ends else (0, 0)
         summary = LogSummary(str(path), self.format, start, stop, tuple(topics), *said)
         return RawLog(str(path), self.format, clock, channels, summary)
+
+
+def _tell_short(path: Path, group: Any, report: Report) -> None:
+    """Name the channels of a group that a file which was cut off holds in part or not at all."""
+    numbers = [c for c in group.channels() if c.dtype is not None and c.dtype.kind in "iufb"]
+    longest = max((len(c) for c in numbers), default=0)
+    none = [c.name for c in numbers if not len(c)]
+    short = [f"{c.name} ({len(c)} of {longest} samples)" for c in numbers if 0 < len(c) < longest]
+    for names, what in ((none, "lost"), (short, "shorter than others of the group")):
+        if names:
+            more = f" and {len(names) - 12} more" if len(names) > 12 else ""
+            report.lost(
+                f"{path.name}, group {group.name!r}: {len(names)} channels are {what}: {', '.join(names[:12])}{more}"
+            )
 
 
 def _least(stamps: NDArray[np.int64]) -> int:

@@ -190,3 +190,22 @@ def test_holes_in_the_values_are_told(tmp_path: Path, capsys: pytest.CaptureFixt
     assert "a: 30 of 100 samples hold no number, the longest stretch lasts 3.1 s, from 1.9 s on" in out
     assert "b holds no number at all" in out
     assert "c: 1 of 100 values are absurdly large (up to 1e+300)" in out
+
+
+def test_a_table_has_no_index_that_could_be_right(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    for name in ("a.csv", "b.csv"):
+        (tmp_path / name).write_text("t,v\n" + "".join(f"{i / 10},{i}\n" for i in range(50)))
+    assert run(["inspect", str(tmp_path)]) == 0
+    out = capsys.readouterr().out
+    assert out.count("head ok") == 2
+    assert "index ok" not in out
+    assert run(["inspect", str(tmp_path / "a.csv")]) == 0
+    assert "Only the first and last rows were read" in capsys.readouterr().out
+
+
+def test_stamps_where_64_bits_end_are_no_date(capsys: pytest.CaptureFixture[str]) -> None:
+    end = 2**63 - 1
+    Terminal().show(*inspect_parts(InspectReport("a.mcap", "mcap", end, end, (), ())))
+    out = capsys.readouterr().out
+    assert "no usable stamps" in out
+    assert "2262" not in out

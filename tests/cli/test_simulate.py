@@ -95,3 +95,21 @@ def test_constants_and_varied_machines(tmp_path: Path, capsys: pytest.CaptureFix
         assert word in capsys.readouterr().err
     assert run(["simulate", "-o", str(tmp_path / "x.csv"), "--vary", "--seed", "1500"]) == 2
     assert "at least 2000" in capsys.readouterr().err
+
+
+def test_an_earlier_log_and_the_truth_of_another_are_kept_without_force(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    log, other = tmp_path / "s.csv", tmp_path / "s.mcap"
+    assert run(["simulate", "-q", "-o", str(log), *SHORT]) == 0
+    kept, truth = log.read_bytes(), (tmp_path / "s.truth.json").read_bytes()
+    another = [*SHORT, "--fault", "FR sensor stuck 1 2"]
+    assert run(["simulate", "-o", str(log), *another]) == 2
+    assert f"{log}: exists already; give another name with -o, or --force" in capsys.readouterr().err
+    assert run(["simulate", "-o", str(other), *another]) == 2
+    assert "s.truth.json: belongs to another mission" in capsys.readouterr().err
+    assert not other.exists()
+    assert (log.read_bytes(), (tmp_path / "s.truth.json").read_bytes()) == (kept, truth)
+    assert run(["simulate", "-q", "-o", str(other), *SHORT]) == 0  # the same mission once more
+    assert run(["simulate", "-q", "-o", str(log), *another, "--force"]) == 0
+    assert len(read_truth(tmp_path / "s.truth.json").intervals) == 1

@@ -137,9 +137,18 @@ def test_places_that_do_not_serve_are_refused(tmp_path: Path) -> None:
         write_raw(path, path.rename(tmp_path / "a"), SourceOptions(), force=True)
 
 
+def test_why_a_topic_stands_in_several_files_is_said(tmp_path: Path) -> None:
+    path = write_log(
+        tmp_path / "a.mcap",
+        {"/a": [(1, {"v": 1}), (2, {"v": 2, "rare": 0.5}), (3, {"v": 3})], "/b": [(1, {"v": 1}), (2, {"v": 2})]},
+    )
+    (note,) = (n for n in write_raw(path, tmp_path / "out", SourceOptions())["notes"] if "several files" in n)
+    assert note.endswith("keeps its own stamp: /a: a.parquet, a~2.parquet")
+
+
 def test_a_log_without_numbers_writes_nothing(tmp_path: Path) -> None:
     path = write_log(tmp_path / "a.mcap", {"/a": [(1, {"v": "text"})]})
-    with pytest.raises(LogError, match="no numbers to convert"):
+    with pytest.raises(LogError, match=r"no numbers to convert: its topics hold none: /a \(V\)$"):
         write_raw(path, tmp_path / "out", SourceOptions())
     assert not (tmp_path / "out").exists()
 

@@ -447,3 +447,18 @@ def test_a_column_of_text_that_may_be_time_is_named(target: Path) -> None:
         LogError, match=r"'Date' looks like it, but its text 'Tue 19 Aug 08:00:00' .* columns are Date, a, b"
     ):
         read(target)
+
+
+def test_a_second_header_is_one_loss_and_its_line_is_named(target: Path) -> None:
+    rows = [f"{i / 100},{i}.5,{i * i}" for i in range(300)]
+    target.write_text("\n".join(["t,speed,pressure", *rows[:200], '"t","speed","pressure"', *rows[200:]]) + "\n")
+    log = read(target)
+    assert [len(c.values) for c in log.channels.values()] == [300, 300]
+    (said,) = log.summary.damage
+    assert "a second header in line 202" in said
+
+
+def test_a_word_in_one_cell_is_no_second_header(target: Path) -> None:
+    target.write_text("t,speed,pressure\n" + "".join(f"{i},{'speed' if i == 7 else i},{i}\n" for i in range(50)))
+    (said,) = read(target).summary.damage
+    assert "1 cells of 'speed' are no numbers" in said

@@ -92,3 +92,15 @@ def test_a_file_that_was_cut_off_or_damaged(target: Path) -> None:
     target.write_bytes(raw[:60])
     with pytest.raises(LogError, match=r"run\.tdms"):
         read_log(target, SourceOptions())
+
+
+def test_channels_that_a_cut_file_lost_are_named(tmp_path: Path) -> None:
+    nptdms = pytest.importorskip("nptdms", reason="npTDMS is an extra")
+    wave = {"wf_start_time": START, "wf_increment": 0.001, "wf_start_offset": 0.0}
+    path = tmp_path / "run.tdms"
+    with nptdms.TdmsWriter(path) as writer:
+        writer.write_segment([nptdms.ChannelObject("g", name, np.arange(1000.0), wave) for name in "abc"])
+    path.write_bytes(path.read_bytes()[: -8000 - 3200])
+    damage = read_log(path, SourceOptions()).summary.damage
+    assert any("1 channels are lost: c" in d for d in damage)
+    assert any("shorter than others of the group: b (600 of 1000 samples)" in d for d in damage)
