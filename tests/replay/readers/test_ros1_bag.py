@@ -87,6 +87,18 @@ def test_a_truncated_bag_gives_its_complete_chunks(make_bag: Callable[..., Path]
     assert log.summary.damage
 
 
+def test_an_index_that_was_cut_off_does_not_say_how_much_was_recorded(make_bag: Callable[..., Path]) -> None:
+    path = make_bag()
+    raw = path.read_bytes()
+    last = raw.rindex(b"op=\x05", 0, raw.index(b"op=\x06"))  # op 5: a chunk; op 6: what it holds, at the end
+    first = raw.index(b"op=\x04", last)  # op 4: its index data, a record for each connection
+    path.write_bytes(raw[: raw.index(b"op=\x04", first + 1)])
+    log = read_log(path, OPTIONS)
+    assert len(log.channels["/speed.data"].values) == 200
+    damage = log.summary.damage
+    assert any("how many were recorded is not known (/" in d for d in damage)
+
+
 def test_another_version_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "old.bag"
     path.write_bytes(b"#ROSBAG V1.2\n" + bytes(100))
