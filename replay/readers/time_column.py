@@ -64,6 +64,11 @@ def find_time(
         wanted = options.time.strip()
         if wanted not in sample:
             raise LogError(f"{path} has no column {wanted!r} for time; its columns are {_some(names)}")
+        if options.time_unit == "s" and turns(sample[wanted]):
+            raise LogError(
+                f"{path}: column {wanted!r} counts evenly and starts again at 2^32, so it is not in seconds; give [sources] "
+                "time_unit = 'dc32' (a 32-bit distributed clock)"
+            )
         moment = sample[wanted].dtype.kind == "M" and options.time_unit != "dt"
         return wanted, "iso" if moment else options.time_unit
     called = [n for n in names if _TIME.match(_bare(n).lower())]
