@@ -399,7 +399,7 @@ def test_a_32_bit_clock_is_known_by_its_turns(target: Path, step: int) -> None:
     stamps = log.channels["a"].stamps
     assert (np.diff(stamps) == step).all()
     assert any("in dc32, found because it rises and starts again at 2^32" in n for n in log.summary.notes)
-    with pytest.raises(LogError, match="not in seconds; give .* time_unit = 'dc32'"):
+    with pytest.raises(LogError, match=r"not in seconds; give .* time_unit = 'dc32'"):
         read(target, time="clk")
 
 
