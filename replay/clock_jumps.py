@@ -33,10 +33,12 @@ _MOST_OF_ONE = 8.0
 _LEAST_LOSS = 1e-4
 _WINDOW_S = 4.0
 _WIDENED_S = 0.1
+_DOUBTED = 6.0
+_HABIT = 3
 _STRETCH_S = 10.0
 _MOST_STRETCHES = 12
 _SEARCH_S = 8.0
-_STEP_S = 0.1
+_STEP_S = 0.3
 _CORRELATION = 0.75
 
 
@@ -118,24 +120,37 @@ def jumps(shared: Sequence[Shared], line: Line, found: Sequence[Pause]) -> tuple
         Why the line does not hold everywhere, else empty; how far it may be off beyond its bound [s].
     """
     start = min(float(s.other.t[0]) for s in shared)
-    open_s = 0.0
+    proven: list[Pause] = []
+    unknown: list[Pause] = []
+    doubted_s = 0.0
     for pause in found:
         evidence = 0.0
         for side in _SIDES_S:
             evidence = _evidence(shared, line, pause, side)
             if abs(evidence) > _SURE:
                 break
-        where = f"{pause.at_s - start:.0f} s after its start"
         if evidence > _SURE:
+            where = f"{pause.at_s - start:.0f} s after its start"
             return f"its clock jumps by {-pause.step_s:+.3f} s against the other, {where}", 0.0
         if evidence > -_SURE:
-            open_s += pause.size_s
-            if open_s > _WIDENED_S:
-                return (
-                    f"no sample is recorded for {pause.size_s:.3g} s, {where}, and no signal that moves tells a pause of the "
-                    "recording from a clock that was set"
-                ), 0.0
-    return _elsewhere(shared, line), open_s
+            unknown.append(pause)
+            continue
+        proven.append(pause)
+        if pause.size_s < _DOUBTED * float(line.bound(np.array([pause.at_s]))[0]):
+            doubted_s = max(doubted_s, pause.size_s)  # a line that is hardly better than the pause may lie between two
+    unknown = [p for p in unknown if sum(_alike(p, q) for q in proven) < _HABIT]
+    open_s = sum(p.size_s for p in unknown)
+    if open_s > _WIDENED_S:
+        return (
+            f"no sample is recorded for {unknown[0].size_s:.3g} s, {unknown[0].at_s - start:.0f} s after its start, and no signal "
+            "that moves tells a pause of the recording from a clock that was set"
+        ), 0.0
+    return _elsewhere(shared, line), open_s + doubted_s
+
+
+def _alike(pause: Pause, proven: Pause) -> bool:
+    """Whether the same file paused as long elsewhere, so that it is known to lose samples."""
+    return pause.step_s * proven.step_s > 0 and pause.size_s < 2.0 * proven.size_s
 
 
 def widened(line: Line, more: float, length: float) -> Line:

@@ -113,6 +113,18 @@ def test_a_pause_of_the_recording_is_no_jump(wheels: int) -> None:
     assert clock.offset_s == pytest.approx(-0.3, abs=2e-3)
 
 
+@pytest.mark.parametrize("wheels", [1, 3])
+def test_a_recording_that_often_loses_samples_is_aligned(wheels: int) -> None:
+    kept = np.abs(ROS % 5.0 - 2.5) > 0.03
+    ros = {
+        n: replace(s, stamps=s.stamps[kept], values=s.values[kept])
+        for n, s in recorded(ROS, ROS + 0.3, 2, wheels, (70.0, 100.0)).items()
+    }
+    clock, line, _ = estimate(recorded(PLC, PLC, 1, wheels, (70.0, 100.0)), ros)
+    assert line is not None, clock.reason
+    assert clock.offset_s == pytest.approx(-0.3, abs=5e-3)
+
+
 def test_a_pause_after_which_nothing_moves_stays_open() -> None:
     own = ROS + 0.3 + np.where(ROS > 80.0, 1.0, 0.0)
     clock, _ = compared(own, 1, still=(70.0, 100.0))
