@@ -64,6 +64,8 @@ def context(report: Mapping[str, Any], duration: float) -> dict[str, Any]:
     verdict = report.get("verdict") or {}
     status = verdict.get("status", "not_assessed")
     state, words = VERDICTS.get(status, VERDICTS["not_assessed"])
+    if status == "watch" and not report.get("intervals"):
+        words = "Look at it: not all of the log is there"
     faults = [_fault(f) for f in report.get("intervals") or ()]
     modes = {f["id"]: f["mode"] for f in faults}
     log, limit = report.get("log") or {}, (report.get("limits") or {}).get("min_probability")
