@@ -6,6 +6,7 @@ import os
 import signal
 import subprocess
 import sys
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -178,7 +179,9 @@ def test_full_output_is_said_and_no_internal_error() -> None:
 @pytest.mark.parametrize("asked", [signal.SIGINT, signal.SIGTERM])
 def test_an_interrupt_ends_with_130_and_leaves_nothing_behind(asked: signal.Signals, tmp_path: Path) -> None:
     command = [*MFHCA, "simulate", "-v", "-o", str(tmp_path / "long.mcap"), "--duration", "100000"]
-    with subprocess.Popen(command, cwd=ROOT, stderr=subprocess.PIPE, text=True) as process:
+    # a shell's background job ignores interrupts, and so would what it starts
+    default = partial(signal.signal, asked, signal.SIG_DFL)
+    with subprocess.Popen(command, cwd=ROOT, stderr=subprocess.PIPE, text=True, preexec_fn=default) as process:
         assert process.stderr is not None
         assert process.stderr.readline() == "simulating\n"
         process.send_signal(asked)
