@@ -1,0 +1,50 @@
+"""How auditing one mission can end: exactly one of six states, with a reason in one sentence."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, Literal, get_args
+
+State = Literal["ok", "degraded", "unreadable", "timeout", "out_of_memory", "crashed"]
+
+STATES: tuple[State, ...] = get_args(State)
+READ: frozenset[State] = frozenset({"ok", "degraded"})
+TRANSIENT: frozenset[State] = frozenset({"timeout", "out_of_memory", "crashed"})
+"""Ends that may be the machine's fault rather than the log's: worth another attempt."""
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """End of one attempt at one mission.
+
+    Attributes
+    ----------
+    state : State
+        ``ok``: read whole. ``degraded``: read, but parts are damaged or left out, or nothing in it can be judged.
+        ``unreadable``: no log that can be read. ``timeout``, ``out_of_memory``: stopped at a limit. ``crashed``: the
+        process ended otherwise.
+    reason : str
+        One sentence; empty where ok.
+    wall_s, cpu_s : float
+        Time that it took, and time of a processor [s].
+    peak_mb : float
+        Most memory held at once [MB].
+    summary : Mapping or None
+        From `diagnosis.audit.summary.summarise`; None where there is no report.
+    """
+
+    state: State
+    reason: str = ""
+    wall_s: float = 0.0
+    cpu_s: float = 0.0
+    peak_mb: float = 0.0
+    summary: Mapping[str, Any] | None = None
+
+    def __post_init__(self) -> None:
+        if self.state not in STATES:
+            raise ValueError(f"state {self.state!r}: expected one of {', '.join(STATES)}")
+        if (self.state == "ok") != (not self.reason):
+            raise ValueError(
+                f"{self.state} with the reason {self.reason!r}: every state but ok has a reason, ok has none"
+            )
