@@ -121,7 +121,7 @@ def compare_reports(
         Where a document lacks what every report holds.
     """
     a, b = (_mission(r, n) for r, n in zip((older, newer), names, strict=True))
-    difference = _other_machine(older, newer, a, b)
+    difference = machine_difference(older["machine"], newer["machine"], names)
     if difference and not force:
         raise ConfigError(f"{difference}; compare two missions of one machine, or add --force")
     try:
@@ -178,15 +178,14 @@ def _mission(report: Mapping[str, Any], name: str) -> ComparedMission:
         raise LogError(f"{name}: {_damaged(error)}") from error
 
 
-def _other_machine(older: Mapping[str, Any], newer: Mapping[str, Any], a: ComparedMission, b: ComparedMission) -> str:
-    """Say how the machines differ; empty where nothing shows that they do."""
-    wheels = [[str(w) for w in r["machine"].get("wheels", ())] for r in (older, newer)]
-    if a.machine_id != b.machine_id and a.machine_id and b.machine_id:
-        return f"{b.name}: is of machine {b.machine_id}, {a.name} of machine {a.machine_id}"
+def machine_difference(older: Mapping[str, Any], newer: Mapping[str, Any], names: tuple[str, str]) -> str:
+    """Say how two machines of reports differ; empty where nothing shows that they do."""
+    ids = [str(m.get("id") or "") for m in (older, newer)]
+    wheels = [[str(w) for w in m.get("wheels", ())] for m in (older, newer)]
+    if all(ids) and ids[0] != ids[1]:
+        return f"{names[1]}: is of machine {ids[1]}, {names[0]} of machine {ids[0]}"
     if set(wheels[0]) != set(wheels[1]):
-        return (
-            f"{b.name}: is of a machine with the wheels {_listed(wheels[1])}, {a.name} of one with {_listed(wheels[0])}"
-        )
+        return f"{names[1]}: is of a machine with the wheels {_listed(wheels[1])}, {names[0]} of one with {_listed(wheels[0])}"
     return ""
 
 

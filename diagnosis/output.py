@@ -12,16 +12,17 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
+from diagnosis.previous import with_previous
 from diagnosis.report.page import build_page
 from diagnosis.result import SCHEMA, MissionResult
 from replay.errors import LogError, OutputError
-from replay.files import atomic_path
+from replay.files import atomic_path, atomic_paths
 
 HTML, JSON, PARQUET = "report.html", "report.json", "report.parquet"
 
 
 def write_result(result: MissionResult, folder: Path, *, max_size_mb: float = 15.0) -> tuple[Path, ...]:
-    """Write the three files of a result, each under a temporary name first.
+    """Write the three files of a result: all of them, or on a full disk none.
 
     Parameters
     ----------
@@ -49,13 +50,10 @@ def write_result(result: MissionResult, folder: Path, *, max_size_mb: float = 15
             f"{folder}: cannot make the folder ({error.strerror or error}); give another with -o"
         ) from error
     columns = {k: v if k == "t" else _shortened(k, v) for k, v in result.columns.items()}
-    with atomic_path(folder / PARQUET) as temporary:
-        pq.write_table(
-            pa.table(columns), temporary, compression="zstd", use_dictionary=False, use_byte_stream_split=True
-        )
-    with atomic_path(folder / JSON) as temporary:
-        temporary.write_bytes(orjson.dumps(result.report, option=orjson.OPT_INDENT_2))
-    _write_page(result.report, columns, folder / HTML, max_size_mb)
+    with atomic_paths(folder / HTML, folder / JSON, folder / PARQUET) as (html, document, table):
+        pq.write_table(pa.table(columns), table, compression="zstd", use_dictionary=False, use_byte_stream_split=True)
+        document.write_bytes(_json(result.report))
+        _write_page(result.report, columns, html, max_size_mb)
     return folder / HTML, folder / JSON, folder / PARQUET
 
 
@@ -76,7 +74,7 @@ def _shortened(name: str, values: NDArray[np.float64] | NDArray[np.float32]) -> 
     return np.where(np.isfinite(out), rounded, raw).view(np.float32)
 
 
-def rebuild(path: Path, *, max_size_mb: float = 15.0) -> Path:
+def rebuild(path: Path, *, max_size_mb: float = 15.0, previous: tuple[Path, Mapping[str, Any]] | None = None) -> Path:
     """Make ``report.html`` again from a saved result, without the log.
 
     Parameters
@@ -85,14 +83,21 @@ def rebuild(path: Path, *, max_size_mb: float = 15.0) -> Path:
         A result's folder or its ``report.json``.
     max_size_mb : float
         Size the page should keep to [MB].
+    previous : tuple[Path, Mapping[str, Any]] or None
+        Name and document of an earlier result of the machine to compare with; kept in ``report.json``.
 
     Raises
     ------
     LogError
         Where the saved result is missing or not one of this tool.
+    ConfigError
+        Where `previous` is of another machine.
     """
     folder = path if path.is_dir() else path.parent
-    report = load_report(folder / JSON if path.is_dir() else path)
+    source = folder / JSON if path.is_dir() else path
+    report = load_report(source)
+    if previous is not None:
+        report = with_previous(report, previous[1], str(previous[0]))
     try:
         table = pq.read_table(folder / PARQUET)
     except (OSError, pa.ArrowException) as error:
@@ -100,7 +105,13 @@ def rebuild(path: Path, *, max_size_mb: float = 15.0) -> Path:
             f"{folder / PARQUET}: cannot be read ({error}); run `mfhca diagnose` on the log again"
         ) from error
     columns = {name: table.column(name).to_numpy() for name in table.column_names}
-    _write_page(report, columns, folder / HTML, max_size_mb)
+    if previous is None:
+        with atomic_path(folder / HTML) as html:
+            _write_page(report, columns, html, max_size_mb)
+    else:
+        with atomic_paths(folder / HTML, source) as (html, document):
+            document.write_bytes(_json(report))
+            _write_page(report, columns, html, max_size_mb)
     return folder / HTML
 
 
@@ -124,9 +135,11 @@ def load_report(path: Path) -> dict[str, Any]:
     return report
 
 
+def _json(report: Mapping[str, Any]) -> bytes:
+    return orjson.dumps(report, option=orjson.OPT_INDENT_2)
+
+
 def _write_page(
     report: Mapping[str, Any], columns: Mapping[str, NDArray[np.floating]], path: Path, size: float
 ) -> None:
-    page = build_page(report, columns, max_size_mb=size)
-    with atomic_path(path) as temporary:
-        temporary.write_text(page, encoding="utf-8", newline="\n")
+    path.write_text(build_page(report, columns, max_size_mb=size), encoding="utf-8", newline="\n")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import shutil
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 
 from replay.errors import OutputError
@@ -48,6 +48,22 @@ def atomic_path(path: Path, *, folder: bool = False) -> Iterator[Path]:
         raise OutputError(f"{path}: cannot be written ({error.strerror or error}); give another place") from error
     finally:
         _remove(temporary)
+
+
+@contextmanager
+def atomic_paths(*paths: Path) -> Iterator[tuple[Path, ...]]:
+    """Give a temporary name for each of several files that belong together; all are renamed, or none.
+
+    Raises
+    ------
+    OutputError
+        Where one of them cannot be written, e.g. on a full disk; what stood there before still stands then.
+    """
+    with ExitStack() as stack:
+        temporary = tuple(stack.enter_context(atomic_path(path)) for path in paths)
+        yield temporary
+        for path in temporary:
+            _flush(path)
 
 
 def _refuse_other_content(path: Path, folder: bool) -> None:

@@ -95,3 +95,31 @@ def test_report_without_its_columns(tmp_path: Path) -> None:
     (tmp_path / "report.parquet").write_bytes(b"PAR1 no table")
     with pytest.raises(LogError, match=r"report\.parquet: cannot be read"):
         rebuild(tmp_path)
+
+
+def test_full_disk_leaves_the_earlier_result_whole(
+    result: MissionResult, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    write_result(result, tmp_path)
+    before = {p.name: p.read_bytes() for p in tmp_path.iterdir()}
+
+    def full(*_: object, **__: object) -> str:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr("diagnosis.output.build_page", full)
+    newer = MissionResult({**result.report, "tool": {"name": "mfhca-replay", "version": "9"}}, result.columns)
+    with pytest.raises(OutputError, match="No space left on device"):
+        write_result(newer, tmp_path)
+    assert {p.name: p.read_bytes() for p in tmp_path.iterdir()} == before
+
+
+def test_comparison_is_kept_with_the_result(result: MissionResult, tmp_path: Path) -> None:
+    older = {**result.report, "log": {**result.report["log"], "start_ns": result.report["log"]["start_ns"] - 10**12}}
+    page, report, _ = write_result(result, tmp_path)
+    rebuild(tmp_path, previous=(Path("monday"), older))
+    kept = load_report(report)
+    assert kept["previous"]["order"] == "earlier"
+    assert {k: v for k, v in kept.items() if k != "previous"} == result.report
+    with_it = page.read_bytes()
+    rebuild(tmp_path)
+    assert page.read_bytes() == with_it
