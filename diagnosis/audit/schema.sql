@@ -3,7 +3,7 @@ CREATE TABLE meta (name TEXT PRIMARY KEY, value TEXT NOT NULL) STRICT;
 
 -- One row per file that was ever hashed: a resume looks here before it reads a log again.
 CREATE TABLE file (
-    path TEXT PRIMARY KEY,          -- as discovered: below the audited root, or a URL
+    path TEXT PRIMARY KEY,          -- relative to the store's folder, or a URL
     size INTEGER NOT NULL,
     stamp TEXT NOT NULL,            -- mtime in ns, or the object's version or ETag
     sha256 TEXT NOT NULL
@@ -11,12 +11,14 @@ CREATE TABLE file (
 
 -- One row per mission as found in the tree; several may share a result (copies).
 CREATE TABLE mission (
-    name TEXT PRIMARY KEY,          -- relative name without ending, unique in the audit
+    name TEXT PRIMARY KEY,          -- relative name without ending, unique in the audit; name of its report's folder
     files TEXT NOT NULL,            -- JSON list of paths of `file`
     bytes INTEGER NOT NULL,
-    result INTEGER REFERENCES result (id),
-    seen INTEGER NOT NULL           -- number of the audit run that saw it last
+    result INTEGER REFERENCES result (id),  -- NULL: not audited yet, or changed since
+    seen INTEGER NOT NULL,          -- number of the audit run that saw it last
+    gone INTEGER                    -- number of the run that looked where it was and did not find it; NULL: it is there
 ) STRICT;
+CREATE INDEX mission_result ON mission (result);
 
 -- One row per log content, configuration and version: the last attempt's outcome.
 CREATE TABLE result (
