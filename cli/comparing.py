@@ -11,8 +11,7 @@ from cli.app import command
 from cli.console import Terminal
 from cli.inputs import check_output
 from cli.options import Json
-from cli.scored import saved_report
-from replay.errors import LogError
+from cli.scored import result_file
 
 if TYPE_CHECKING:
     from diagnosis.compare import Comparison
@@ -46,7 +45,7 @@ def compare(
     json: Json = False,
 ) -> None:
     """Compare two missions: faults that are new, worse, changed, gone; and what was not assessed."""
-    files = [_result(path) for path in (older, newer)]
+    files = [result_file(path) for path in (older, newer)]
     if html is not None:
         check_output([html], files)
     from diagnosis.compare import compare_reports, comparison_json
@@ -67,23 +66,6 @@ def compare(
         terminal.show(text(f"Wrote {html}"))
     if found.worse:
         raise typer.Exit(_WORSE)
-
-
-def _result(path: Path) -> Path:
-    """The report.json that a word names.
-
-    Raises
-    ------
-    LogError
-        Where there is none.
-    """
-    if not path.exists():
-        raise LogError(f"{path}: no such file; give the folder of a report, or its report.json")
-    saved = saved_report(path)
-    if saved is None:
-        what = "holds no report.json" if path.is_dir() else "is no report.json"
-        raise LogError(f"{path}: {what}; run `mfhca diagnose` on the log first, and give the folder that it writes")
-    return saved
 
 
 def _write_page(found: Comparison, path: Path) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -13,6 +14,7 @@ from cli.clipping import FOLDER, show_clips
 from cli.console import Terminal
 from cli.inputs import check_output, check_times, check_wheels, machine_of, mission_paths
 from cli.options import End, FailOn, Json, Logs, MachineFile, MaxSize, Start
+from cli.scored import result_file
 
 DIAGNOSE_EXAMPLES = """\b
 Examples:
@@ -20,13 +22,24 @@ Examples:
   mfhca diagnose drive.bag plc-export.csv -m machine.toml -o reports/monday
   mfhca diagnose mission.mcap --start 100 --end 160 --wheel FR --fail-on high
   mfhca diagnose mission.mcap --clips --open        # each fault cut out for Foxglove and PlotJuggler
+  mfhca diagnose tuesday.mcap --previous monday-report   # what is new, resolved, changed
   mfhca diagnose mission.mcap --json | jq .verdict"""
 REPORT_EXAMPLES = """\b
 Examples:
   mfhca report mission-report
+  mfhca report tuesday-report --previous monday-report
   mfhca report mission-report/report.json --max-size 5"""
 
 _FAULTS, _NOT_JUDGED = 1, 3
+Previous = Annotated[
+    Path | None,
+    typer.Option(
+        "--previous",
+        metavar="RESULT",
+        help="Earlier result of the same machine (folder or report.json) to compare with.",
+        show_default=False,
+    ),
+]
 _OUTPUTS = ("report.html", "report.json", "report.parquet")
 
 
@@ -56,6 +69,7 @@ def diagnose(
         str | None,
         typer.Option("--machine-id", metavar="ID", help="Machine that the mission belongs to.", show_default=False),
     ] = None,
+    previous: Previous = None,
     json: Json = False,
     dry_run: Annotated[bool, typer.Option("--dry-run", help="Say what would be read and written, and stop.")] = False,
     open_page: Annotated[bool, typer.Option("--open", help="Open the report in the browser.")] = False,
@@ -76,6 +90,12 @@ def diagnose(
     folder = output if output is not None else _default_folder(paths[0])
     outputs = [folder / name for name in (*_OUTPUTS, *((FOLDER,) if clips else ()))]
     check_output(outputs, paths)
+    other = _previous(previous)
+    if previous is not None and other is not None:
+        from diagnosis.previous import require_same_machine
+
+        identity = {"id": machine_id or the_machine.id, "wheels": list(the_machine.wheels)}
+        require_same_machine(identity, other, str(previous))
     if dry_run:
         _plan(terminal, paths, the_machine, source, outputs, json)
         return
@@ -93,6 +113,10 @@ def diagnose(
             result = pipeline.diagnose_mission(mission, the_machine, **judged)
         else:
             result = pipeline.diagnose(paths, the_machine, start_s=start, stop_s=end, **judged)
+        if other is not None:
+            from diagnosis.previous import with_previous
+
+            result = replace(result, report=with_previous(result.report, other, str(previous)))
         progress("writing the report")
         written = write_result(result, folder, max_size_mb=max_size)
     page = next((p for p in written if p.name == "report.html"), written[0])
@@ -123,18 +147,36 @@ def report(
     result: Annotated[
         Path, typer.Argument(metavar="RESULT", help="Folder of a report, or its report.json.", show_default=False)
     ],
+    previous: Previous = None,
     max_size: MaxSize = 15.0,
     open_page: Annotated[bool, typer.Option("--open", help="Open the report in the browser.")] = False,
 ) -> None:
     """Write report.html again from a saved result; the log is not needed."""
     mission_paths([result])
+    other = _previous(previous)
     with terminal.progress("writing the report"):
         from diagnosis.output import rebuild
 
-        page = rebuild(result, max_size_mb=max_size)
+        known = None if previous is None or other is None else (previous, other)
+        page = rebuild(result, max_size_mb=max_size, previous=known)
     terminal.show(f"Report: {page}")
     if open_page:
         show_page(terminal, page)
+
+
+def _previous(path: Path | None) -> dict[str, Any] | None:
+    """Document of the result to compare with.
+
+    Raises
+    ------
+    LogError
+        Where it is no result.
+    """
+    if path is None:
+        return None
+    from diagnosis.output import load_report
+
+    return load_report(result_file(path))
 
 
 def _default_folder(log: Path) -> Path:

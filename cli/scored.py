@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from cli.inputs import LOG_ENDINGS, mission_paths
-from replay.errors import ConfigError
+from replay.errors import ConfigError, LogError
 
 
 def results_and_truths(words: Sequence[Path], truth: Path | None) -> list[tuple[Path, Path]]:
@@ -54,6 +54,23 @@ def saved_report(path: Path) -> Path | None:
     if path.is_dir():
         return path / "report.json" if (path / "report.json").is_file() else None
     return path if path.suffix.lower() == ".json" else None
+
+
+def result_file(path: Path) -> Path:
+    """The report.json that a word names.
+
+    Raises
+    ------
+    LogError
+        Where there is none.
+    """
+    if not path.exists():
+        raise LogError(f"{path}: no such file; give the folder of a report, or its report.json")
+    saved = saved_report(path)
+    if saved is None:
+        what = "holds no report.json" if path.is_dir() else "is no report.json"
+        raise LogError(f"{path}: {what}; run `mfhca diagnose` on the log first, and give the folder that it writes")
+    return saved
 
 
 def _missions_at(path: Path) -> list[Path]:

@@ -10,6 +10,8 @@ from rich.table import Table
 from rich.text import Text
 
 from cli.tables import MODE_SIGNS, MODE_STYLES, SEVERITY_STYLES, ByWidth, bullets, section, table, text
+from diagnosis.compare_words import OUTCOMES, headline
+from diagnosis.wording import mode_words, part_words
 
 _STATUS = {
     "ready": ("READY", "bold white on #1d7a63"),
@@ -35,9 +37,27 @@ def verdict_parts(report: Mapping[str, Any]) -> list[RenderableType]:
         rest = len(report["intervals"]) - _SHOWN
         if rest > 0:
             parts.append(text(f"… and {rest} more in the report", "dim"))
+    if report.get("previous"):
+        parts += [section("Against another mission of the machine"), *_previous(report["previous"])]
     if verdict.get("caveats"):
         parts += [section("To bear in mind"), bullets(verdict["caveats"])]
     return [*parts, ""]
+
+
+def _previous(found: Mapping[str, Any]) -> list[RenderableType]:
+    """How many faults became what, and the new and worse ones."""
+    mission = found["mission"]
+    which = "later" if found["order"] == "later" else "previous"
+    logs = " + ".join(mission.get("files") or ()) or "no log named"
+    parts: list[RenderableType] = [text(f"{headline(found['counts'])} ({which} mission: {logs})")]
+    told = [c for c in found["faults"] if (c["trend"] or c["status"]) in ("new", "worse", "resolved", "not_seen_again")]
+    parts += [bullets([_became(c) for c in told[:_SHOWN]])] if told else []
+    return parts
+
+
+def _became(c: Mapping[str, Any]) -> str:
+    words = OUTCOMES[c["trend"] or c["status"]]
+    return f"{words}: {part_words(c['kind'], c['component'], c['side'])} {mode_words(c['side'], c['mode'])}"
 
 
 def _actions(actions: list[Mapping[str, Any]]) -> Table:

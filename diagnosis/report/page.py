@@ -27,7 +27,9 @@ from diagnosis.report import names, tables
 from diagnosis.report.evidence import evidence_of
 from diagnosis.report.figures import Columns, derived, loop_groups
 from diagnosis.report.pair import pair_of
+from diagnosis.report.path import driven_path
 from diagnosis.report.picture import machine_picture
+from diagnosis.report.previous import previous_section
 from diagnosis.report.svg import icon, path_picture, thumbnail
 from diagnosis.report.timeline import timeline
 from diagnosis.report.view import Axis, axis_of, channels_of, figures_of, packed_intervals, view, worst
@@ -83,14 +85,16 @@ def build_page(
     plotly, packed, version = _plotly(plotlyjs) if plots else ("", "", "none, no plots")
     duration = _duration(report, axis)
     place = (axis.start, axis.step)
+    path = driven_path(report, filled, axis.step)
     context = {
         **tables.context(report, duration),
         "css": Markup("".join(_script(name) for name in _STYLES)),
         "timeline": timeline(report, duration, {f["id"] for f in detailed}),
         "picture": machine_picture(report),
-        "path": path_picture(cols["path.x"], cols["path.y"], *place, detailed)
-        if axis.rows and {"path.x", "path.y"} <= set(cols)
-        else Markup(""),
+        "path": Markup("") if path.x is None or path.y is None else path_picture(path.x, path.y, *place, detailed),
+        "path_words": path.words,
+        "path_modes": [m for m in names.FAULT_MODES if any(f["mode"] == m for f in detailed)],
+        "previous": previous_section(report),
         "thumbs": {f["id"]: _thumbnail(f, shown, *place) for f in worst(faults, _THUMBNAILS)} if axis.rows else {},
         "evidence": evidence_of(report, shown, place, axis.per, detailed),
         "unlisted": len(every) - len(faults),

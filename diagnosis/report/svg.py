@@ -172,32 +172,39 @@ def path_picture(
         parts.append(
             Markup(
                 '<g class="mark {m}" data-f="{id}" data-scroll role="button" tabindex="0" aria-label="{id} on the path"'
-                ' transform="translate({x:.1f},{y:.1f})"><circle r="10"/><text y="3.6">{id}</text></g>'
-            ).format(m=known(fault["mode"]), id=fault["id"], x=cx, y=cy)
+                ' transform="translate({x:.1f},{y:.1f})"><circle r="12"/><text y="3.6">{id}</text>{b}</g>'
+            ).format(m=known(fault["mode"]), id=fault["id"], x=cx, y=cy, b=badge(known(fault["mode"]), 10, -9, 11))
         )
-    first = int(np.flatnonzero(good)[0])
-    parts.append(_start_and_scale(float(px[first]), float(py[first]), scale, width, height))
+    first, last = np.flatnonzero(good)[[0, -1]].tolist()
+    ends = [(float(px[k]), float(py[k])) for k in (first, last)]
+    parts.append(_ends_and_scale(ends[0], ends[1], scale, width, height))
     return Markup(
         '<svg class="map" viewBox="0 0 {} {}" role="group" aria-label="Driven path with the places of faults">{}</svg>'
     ).format(int(width), int(height), Markup("").join(parts))
 
 
-def _start_and_scale(x: float, y: float, scale: float, width: float, height: float) -> Markup:
-    """Start of the path and a bar of a round length in metres."""
+def _ends_and_scale(
+    start: tuple[float, float], end: tuple[float, float], scale: float, width: float, height: float
+) -> Markup:
+    """Start (a dot) and end (a square) of the path, and a bar of a round length in metres."""
     bar = 10.0 ** math.floor(math.log10(max(width / 3 / scale, 1e-6)))
     bar *= max(m for m in (1, 2, 5) if m * bar * scale <= width / 3)
     right, length = width - 16, bar * scale
-    return Markup(
-        '<circle class="dot" cx="{:.1f}" cy="{:.1f}" r="4"/>{}<path class="bar" d="M{:.1f},{:.0f}v4h{:.1f}v-4"/>{}'
-    ).format(
-        x,
-        y,
-        text(x + 8, y + 14, "start", "lbl"),
-        right - length,
-        height - 12,
-        length,
-        text(right - length / 2, height - 14, f"{number(bar)} m", "lbl mid"),
-    )
+    near = math.hypot(end[0] - start[0], end[1] - start[1]) < 30
+    shapes = Markup('<circle class="dot" cx="{:.1f}" cy="{:.1f}" r="4.5"/>').format(*start)
+    shapes += Markup('<rect class="stop" x="{:.1f}" y="{:.1f}" width="8" height="8"/>').format(end[0] - 4, end[1] - 4)
+    if near:
+        shapes += _named(*start, "start, end", width, height)
+    else:
+        shapes += _named(*start, "start", width, height) + _named(*end, "end", width, height)
+    shapes += Markup('<path class="bar" d="M{:.1f},{:.0f}v4h{:.1f}v-4"/>').format(right - length, height - 12, length)
+    return shapes + text(right - length / 2, height - 14, f"{number(bar)} m", "lbl mid")
+
+
+def _named(x: float, y: float, words: str, width: float, height: float) -> Markup:
+    """Name beside a place, inside the picture."""
+    left = x > width - 12 * len(words)
+    return text(x - 9 if left else x + 9, min(height - 18, y + 14), words, "lbl fin" if left else "lbl")
 
 
 def _spread(points: list[list[float]], width: float, height: float) -> None:
@@ -208,7 +215,7 @@ def _spread(points: list[list[float]], width: float, height: float) -> None:
             for q in points[i + 1 :]:
                 dx, dy = q[0] - p[0], q[1] - p[1]
                 gap = math.hypot(dx, dy)
-                if gap < 22:
+                if gap < 27:
                     ux, uy = (dx / gap, dy / gap) if gap > 0.1 else (0.8, 0.6)
                     p[0], p[1], q[0], q[1] = p[0] - ux, p[1] - uy, q[0] + ux, q[1] + uy
                     moved = True

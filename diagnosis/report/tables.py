@@ -21,9 +21,16 @@ from diagnosis.report.names import (
 )
 from diagnosis.report.pair import tier_words
 from diagnosis.report.picture import judged_sides
+from diagnosis.report.sureness import judged, sure_of, sure_of_verdict
 from diagnosis.report.timeline import kind_of
 
 _SHOWN = 0.001
+_ANSWERS = {
+    "stop": "must not go out as it is",
+    "watch": "may go out",
+    "not_assessed": "whether it may go out is not known",
+}
+_TOLD = 4  # notes and evidence beyond this number fold away
 
 
 def machine_name(report: Mapping[str, Any]) -> str:
@@ -67,7 +74,12 @@ def context(report: Mapping[str, Any], duration: float) -> dict[str, Any]:
     if status == "watch" and not report.get("intervals"):
         words = "Look at it: not all of the log is there"
     faults = [_fault(f) for f in report.get("intervals") or ()]
-    modes = {f["id"]: f["mode"] for f in faults}
+    worst = {f["id"]: f for f in report.get("intervals") or ()}
+    quality = sorted(
+        ({"ok": True, "effect": "", "result": "", "check": "", **q} for q in report.get("quality") or ()),
+        key=lambda q: bool(q["ok"]),
+    )
+    checks, folded = _folded(quality)
     log, limit = report.get("log") or {}, (report.get("limits") or {}).get("min_probability")
     return {
         "machine": machine_name(report),
@@ -75,10 +87,12 @@ def context(report: Mapping[str, Any], duration: float) -> dict[str, Any]:
         "verdict": {
             "state": state,
             "words": words,
+            "answer": _answer(status, report),
+            "sure": "" if verdict.get("actions") else sure_of_verdict(report),
             "title": verdict.get("title") or words,
             "text": verdict.get("text") or "",
             "caveats": verdict.get("caveats") or [],
-            "actions": [_action(a, modes) for a in verdict.get("actions") or ()],
+            "actions": [_action(a, worst, report) for a in verdict.get("actions") or ()],
         },
         "facts": _facts(report, log, duration),
         "faults": faults,
@@ -86,10 +100,8 @@ def context(report: Mapping[str, Any], duration: float) -> dict[str, Any]:
         "metrics": _metrics(report.get("metrics") or {}),
         "signals": [_signal(s) for s in report.get("signals") or ()],
         "missing": _missing(report.get("missing") or ()),
-        "quality": sorted(
-            ({"ok": True, "effect": "", "result": "", "check": "", **q} for q in report.get("quality") or ()),
-            key=lambda q: bool(q["ok"]),
-        ),
+        "quality": checks,
+        "quality_folded": folded,
         "files": [_file(f) for f in log.get("files") or ()],
         "readings": [{"detail": "", "value": "", **r} for r in report.get("readings") or ()],
         "limits": [(k.replace("_", " "), _plain(v)) for k, v in (report.get("limits") or {}).items()],
@@ -145,15 +157,45 @@ def _delay(fault: Mapping[str, Any]) -> str:
     )
 
 
-def _action(action: Mapping[str, Any], modes: Mapping[str, str]) -> dict[str, Any]:
-    faults = [f for f in action.get("faults") or () if f in modes]
-    state = known(modes[faults[0]]) if faults else "warning"
-    return {"text": action.get("text", ""), "faults": faults, "state": state, "severity": action.get("severity", "")}
+def _answer(status: str, report: Mapping[str, Any]) -> str:
+    """Whether the machine may go out, where the verdict's own words do not say it."""
+    if status == "watch" and not report.get("intervals"):
+        return ""
+    return _ANSWERS.get(status, "" if status in VERDICTS else _ANSWERS["not_assessed"])
+
+
+def _folded(
+    quality: Sequence[Mapping[str, Any]],
+) -> tuple[list[Mapping[str, Any]], list[tuple[str, list[Mapping[str, Any]]]]]:
+    """Checks to be read, and what only tells how the data were read: notes and evidence of many channels."""
+    shown, folded = list(quality), []
+    for name, words in (
+        ("Note", "notes on where signals come from"),
+        ("Evidence", "lines on what each channel resolves"),
+    ):
+        rows = [q for q in quality if q["ok"] and q["check"] == name]
+        if len(rows) > _TOLD:
+            folded.append((f"{len(rows)} {words}", rows))
+            shown = [q for q in shown if q not in rows]
+    return shown, folded
+
+
+def _action(
+    action: Mapping[str, Any], intervals: Mapping[str, Mapping[str, Any]], report: Mapping[str, Any]
+) -> dict[str, Any]:
+    faults = [f for f in action.get("faults") or () if f in intervals]
+    first = intervals[faults[0]] if faults else None
+    return {
+        "text": action.get("text", ""),
+        "faults": faults,
+        "state": known(first["mode"]) if first else "warning",
+        "severity": action.get("severity", ""),
+        "sure": sure_of(first, report) if first else "",
+    }
 
 
 def _facts(report: Mapping[str, Any], log: Mapping[str, Any], duration: float) -> list[tuple[str, str]]:
     machine = report.get("machine") or {}
-    wheels, axles = machine.get("wheels") or (), machine.get("axles") or ()
     facts = [
         ("Machine", str(machine.get("id") or machine.get("name") or "unnamed")),
         ("Start (UTC)", utc(log.get("start_ns"))),
@@ -165,8 +207,15 @@ def _facts(report: Mapping[str, Any], log: Mapping[str, Any], duration: float) -
         facts.append(("Distance", f"{number(log['distance_m'])} m"))
     if log.get("rate_hz"):
         facts.append(("Sample rate", f"{number(log['rate_hz'])} Hz"))
-    facts.append(("Wheels", str(len(wheels)) + (f", {len(axles)} steering" if axles else "")))
+    parts = judged(report)
+    facts.append(("Judged", parts) if parts else ("Wheels", _count(report)))
     return facts
+
+
+def _count(report: Mapping[str, Any]) -> str:
+    machine = report.get("machine") or {}
+    wheels, axles = machine.get("wheels") or (), machine.get("axles") or ()
+    return str(len(wheels)) + (f", {len(axles)} steering" if axles else "")
 
 
 def _coverage(report: Mapping[str, Any]) -> list[dict[str, Any]]:

@@ -13,12 +13,13 @@ import numpy as np
 from diagnosis.report.names import FAULT_MODES, clock, fault_title, known, part, span, state_label
 
 _BUCKETS = 2000
+_GONE = ("stuck", "no_signal")
 _TICKS = (0.1, 0.2, 0.5, 1, 2, 5, 10, 15, 30, 60, 120, 300, 600, 900, 1800, 3600, 7200, 14400, 43200, 86400)
 
 
 @dataclass(frozen=True)
 class Bar:
-    """One fault on a lane; places in percent of the mission."""
+    """One fault on a lane; places in percent of the mission. `follows`: another fault may be its cause."""
 
     fault: str
     state: str
@@ -26,6 +27,7 @@ class Bar:
     width: float
     label: str
     title: str
+    follows: bool = False
 
 
 @dataclass(frozen=True)
@@ -59,6 +61,7 @@ class Timeline:
     summary: str
     phases: tuple[Bar, ...]
     ticks: tuple[tuple[float, str], ...]
+    follows: bool = False
 
 
 def kind_of(component: str, machine: Mapping[str, Any]) -> str:
@@ -101,14 +104,37 @@ def _lines(spans: Sequence[Mapping[str, Any]], side: str, duration: float) -> tu
     )
 
 
-def _bar(fault: Mapping[str, Any], duration: float) -> Bar:
+def causes(faults: Sequence[Mapping[str, Any]]) -> dict[str, str]:
+    """Faults that may be no more than a consequence, each with the fault that may be its cause.
+
+    A stuck or silent part misleads what is inferred of its component's other side: a fault there that a model told,
+    without a second measurement, and most of which lies within the other's time, may follow from it.
+    """
+    gone: dict[tuple[str, str], list[Mapping[str, Any]]] = {}
+    for f in faults:
+        if f["mode"] in _GONE:
+            gone.setdefault((f["component"], f["kind"]), []).append(f)
+    out = {}
+    for f in faults:
+        if f.get("tier") == "direct" or f["mode"] in _GONE or f["side"] == "sensor_or_actuator":
+            continue
+        length = f["stop_s"] - f["start_s"]
+        for g in gone.get((f["component"], f["kind"]), ()):
+            shared = min(f["stop_s"], g["stop_s"]) - max(f["start_s"], g["start_s"])
+            if g["side"] not in (f["side"], "sensor_or_actuator") and shared > 0.5 * length:
+                out[f["id"]] = g["id"]
+    return out
+
+
+def _bar(fault: Mapping[str, Any], duration: float, cause: str = "") -> Bar:
     left = 100 * fault["start_s"] / duration
     width = 100 * (fault["stop_s"] - fault["start_s"]) / duration
     mode = state_label(fault["mode"], fault["side"])
     words = f"{fault['id']} {mode.lower()}"
     label = words if width > 10 else fault["id"] if width > 0.9 + 0.8 * len(fault["id"]) else ""
     times = f"{clock(fault['start_s'], 2)} to {clock(fault['stop_s'], 2)}"
-    return Bar(fault["id"], known(fault["mode"]), left, width, label, f"{fault['id']}: {fault_title(fault)}, {times}")
+    title = f"{fault['id']}: {fault_title(fault)}, {times}" + (f"; may follow from {cause}" if cause else "")
+    return Bar(fault["id"], known(fault["mode"]), left, width, label, title, bool(cause))
 
 
 def _on_lane(fault: Mapping[str, Any], component: str, kind: str, side: str) -> bool:
@@ -154,12 +180,13 @@ def timeline(report: Mapping[str, Any], duration: float, bars: Collection[str] |
     for s in report.get("states") or ():
         kind = s.get("kind") or kind_of(s["component"], machine)
         by_lane.setdefault((s["component"], kind, s["side"]), []).append(s)
+    cause = causes([f for f in faults if bars is None or f["id"] in bars])
     lanes: list[Lane] = []
     quiet: list[Lane] = []
     for (c, kind, side), spans in by_lane.items():
         mine = [f for f in faults if _on_lane(f, c, kind, side)]
         own = [f for f in sorted(mine, key=lambda f: f["start_s"]) if bars is None or f["id"] in bars]
-        drawn = tuple(_bar(f, duration) for f in own) if duration > 0 else ()
+        drawn = tuple(_bar(f, duration, cause.get(f["id"], "")) for f in own) if duration > 0 else ()
         if len(own) < len(mine):
             spans = [*spans, *({**f, "state": f["mode"]} for f in mine)]
         total = sum(f["stop_s"] - f["start_s"] for f in mine)
@@ -176,7 +203,7 @@ def timeline(report: Mapping[str, Any], duration: float, bars: Collection[str] |
     summary = f"{len(quiet)} lane{'s' * (len(quiet) != 1)} without a fault: " + ", ".join(
         f"{n} {words}" for words, n in counts.items()
     )
-    return Timeline(tuple(lanes), tuple(quiet), summary, _phases(report, duration), ticks(duration))
+    return Timeline(tuple(lanes), tuple(quiet), summary, _phases(report, duration), ticks(duration), bool(cause))
 
 
 def _phases(report: Mapping[str, Any], duration: float) -> tuple[Bar, ...]:

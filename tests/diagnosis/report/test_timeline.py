@@ -1,6 +1,6 @@
 from __future__ import annotations
 
-from diagnosis.report.timeline import merged, ticks, timeline
+from diagnosis.report.timeline import causes, merged, ticks, timeline
 from tests import report_samples as samples
 
 
@@ -43,3 +43,13 @@ def test_ticks() -> None:
     assert [w for _, w in ticks(240.0)] == ["0:00", "0:30", "1:00", "1:30", "2:00", "2:30", "3:00", "3:30", "4:00"]
     assert ticks(0.0) == ()
     assert len(ticks(0.25)) == 3
+
+
+def test_faults_that_may_follow_from_another_are_faded() -> None:
+    stuck = {"id": "F1", "component": "FR", "kind": "wheel", "side": "sensor", "mode": "stuck", "tier": "model"}
+    loss = {**stuck, "id": "F2", "side": "actuator", "mode": "inefficient", "start_s": 11.0, "stop_s": 16.0}
+    stuck |= {"start_s": 10.0, "stop_s": 20.0}
+    assert causes([stuck, loss]) == {"F2": "F1"}
+    assert causes([stuck, {**loss, "tier": "direct"}]) == {}, "measured by itself"
+    assert causes([stuck, {**loss, "start_s": 19.0, "stop_s": 30.0}]) == {}, "mostly outside"
+    assert causes([stuck, {**loss, "component": "FL"}]) == {}

@@ -1,0 +1,110 @@
+"""How sure the tool is, in a plain phrase: probability, how it was decided, and how much of the driving was judged."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from diagnosis.compare_coverage import sides_of
+from diagnosis.report.names import state_label
+
+_WORDS = ((0.99, "Practically certain"), (0.9, "Very likely"), (0.7, "Likely"))
+_OPEN = 0.9
+_HOW = {
+    ("wheel", "sensor", "direct"): "measured against a second speed sensor",
+    ("wheel", "actuator", "direct"): "measured against the valve's position",
+    ("steer", "sensor", "direct"): "measured against a second angle sensor",
+    ("steer", "actuator", "direct"): "measured against the valve's position",
+    ("wheel", "model"): "by the wheel model, without a second measurement",
+    ("steer", "model"): "by the steering model, without a second measurement",
+    "drive": "by the drive's own effort, without a second measurement",
+    "signal": "from the channel alone",
+    "tracking": "because the command is not followed; sensor and drive cannot be told apart",
+}
+_TIERS = {
+    "direct": "second measurements",
+    "model": "a model of the wheels",
+    "drive": "a model of the drive",
+    "signal": "single channels",
+    "tracking": "how the command is followed",
+}
+
+
+def percent(p: float) -> str:
+    """Probability or share as a percentage that never claims certainty it does not have."""
+    return "over 99.9 %" if p > 0.999 else f"{100 * p:.1f} %" if p > 0.9 else f"{100 * p:.0f} %"
+
+
+def sure_of(fault: Mapping[str, Any], report: Mapping[str, Any]) -> str:
+    """How sure the tool is of one fault.
+
+    Parameters
+    ----------
+    fault : Mapping[str, Any]
+        One of the report's intervals.
+    report : Mapping[str, Any]
+        The parsed ``report.json``.
+    """
+    p, tier = fault.get("probability"), fault.get("tier") or ""
+    faulty = 1.0 - sum(h["p"] for h in fault.get("hypotheses") or () if h["mode"] == "healthy")
+    words = []
+    if p is not None and (p >= _OPEN or faulty <= p + 0.05 or not fault.get("hypotheses")):
+        words.append(f"{_likely(p)} ({percent(p)})")
+    elif p is not None:
+        words.append(
+            f"{_likely(faulty)} faulty ({percent(faulty)}), {state_label(fault['mode'], fault['side']).lower()} at {percent(p)}"
+        )
+    how = _HOW.get((fault["kind"], fault["side"], tier)) or _HOW.get((fault["kind"], tier)) or _HOW.get(tier, "")
+    words += [how] if how else []
+    wanted = ("sensor", "actuator") if fault["side"] == "sensor_or_actuator" else (fault["side"],)
+    shares = [
+        float(row["decided_driving_s"]) / row["driving_s"]
+        for row in report.get("coverage") or ()
+        if row["component"] == fault["component"] and row["side"] in wanted and row.get("driving_s")
+    ]
+    if shares:
+        words.append(f"{_share(min(shares))} of its driving was judged")
+    return ", ".join(words)
+
+
+def _likely(p: float) -> str:
+    return next((words for least, words in _WORDS if p >= least), "Possible" if p < 0.5 else "Probable")
+
+
+def judged(report: Mapping[str, Any]) -> str:
+    """How many parts were judged as far as a verdict of *ready* takes; empty where nothing says so."""
+    sides = _sides(report)
+    done = sum(s.assessed for s in sides.values())
+    return f"{done} of {len(sides)} parts" if sides else ""
+
+
+def sure_of_verdict(report: Mapping[str, Any]) -> str:
+    """How sure the tool is of a verdict without faults: how much was judged, and by what."""
+    sides = _sides(report)
+    axles = (report.get("machine") or {}).get("axles") or ()
+    wheels = [s for (c, _), s in sides.items() if c not in axles]
+    if not wheels:
+        return ""
+    done = [s for s in wheels if s.assessed]
+    tiers = list(dict.fromkeys(_TIERS[s.tier] for s in wheels if s.tier in _TIERS))
+    how = f", by {' and '.join(tiers)}" if tiers else ""
+    if len(done) < len(wheels):
+        return f"{len(done)} of {len(wheels)} wheel parts were judged long enough{how}."
+    shares = [s.decided_s / s.driving_s for s in wheels if s.driving_s > 0]
+    least = f", each for {_least(min(shares))} of its driving" if shares else ""
+    return f"All {len(wheels)} wheel parts were judged{least}{how}."
+
+
+def _sides(report: Mapping[str, Any]) -> Mapping[tuple[str, str], Any]:
+    rows: Sequence[Mapping[str, Any]] = report.get("coverage") or ()
+    if not all("decided_driving_s" in row and "seconds" in row for row in rows):
+        return {}
+    return sides_of(report)
+
+
+def _share(x: float) -> str:
+    return "all" if x >= 1 else f"{min(99.0, 100 * x):.0f} %"
+
+
+def _least(x: float) -> str:
+    return "all" if x >= 1 else f"at least {_share(x)}"

@@ -1,0 +1,52 @@
+"""The section that compares with another mission of the machine."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from diagnosis.previous import with_previous
+from diagnosis.report.page import build_page
+from diagnosis.report.previous import previous_section
+from tests import report_samples as samples
+
+
+def earlier(**changes: Any) -> dict[str, Any]:
+    report, _ = samples.five_faults()
+    log = {**report["log"], "start_ns": report["log"]["start_ns"] - 10**13, "files": [{"path": "monday.mcap"}]}
+    return {**report, "log": log, **changes}
+
+
+def test_nothing_is_said_without_a_comparison() -> None:
+    report, columns = samples.five_faults()
+    page = build_page(report, columns)
+    assert previous_section(report) is None
+    assert 'id="previous"' not in page
+    assert "#previous" not in page
+
+
+def test_new_and_resolved_faults() -> None:
+    report, columns = samples.five_faults()
+    first, *rest = report["intervals"]
+    page = build_page(with_previous({**report, "intervals": rest}, earlier(intervals=[first])), columns)
+    section = page[page.index('id="previous"') :].partition("</section>")[0]
+    assert "Against the previous mission" in section
+    assert "monday.mcap" in section
+    assert f'data-f="{rest[0]["id"]}"' in section
+    assert f"{len(rest)} new" in section
+    assert f"{len(rest)} new" in page[: page.index('id="timeline"')], "also on the first screen"
+
+
+def test_a_later_mission_is_called_so() -> None:
+    report, _ = samples.five_faults()
+    section = previous_section(with_previous(earlier(), report))
+    assert section is not None
+    assert section["title"] == "Against a later mission"
+    assert section["own"] == 0
+
+
+def test_words_from_the_other_log_stay_text() -> None:
+    report, columns = samples.five_faults()
+    other = earlier(log={**earlier()["log"], "files": [{"path": "<script>alert(1)</script>\u202e"}]})
+    page = build_page(with_previous(report, other), columns)
+    assert "<script>alert(1)" not in page
+    assert "\u202e" not in page

@@ -1,0 +1,72 @@
+"""How sure the tool is, in words."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from diagnosis.report.sureness import judged, percent, sure_of, sure_of_verdict
+
+
+def fault(p: float, **changes: Any) -> dict[str, Any]:
+    return {
+        "component": "FR",
+        "kind": "wheel",
+        "side": "actuator",
+        "mode": "stuck",
+        "tier": "direct",
+        "probability": p,
+        "hypotheses": [
+            {"side": "actuator", "mode": "stuck", "p": p},
+            {"side": "actuator", "mode": "healthy", "p": 0.0},
+        ],
+        **changes,
+    }
+
+
+def row(side: str, decided_s: float, component: str = "FR", tier: str = "direct") -> dict[str, Any]:
+    return {
+        "component": component,
+        "side": side,
+        "tier": tier,
+        "seconds": {"healthy": decided_s},
+        "driving_s": 100.0,
+        "decided_driving_s": decided_s,
+    }
+
+
+@pytest.mark.parametrize(
+    ("p", "words"),
+    [(0.9999, "over 99.9 %"), (0.99, "99.0 %"), (0.95, "95.0 %"), (0.5, "50 %")],
+)
+def test_no_certainty_that_is_not_there(p: float, words: str) -> None:
+    assert percent(p) == words
+
+
+def test_phrase_of_a_fault() -> None:
+    report = {"coverage": [row("actuator", 91.0), row("sensor", 100.0)]}
+    assert sure_of(fault(0.995), report) == (
+        "Practically certain (99.5 %), measured against the valve's position, 91 % of its driving was judged"
+    )
+    # certainly faulty, the row less so
+    words = sure_of(fault(0.49, hypotheses=[{"side": "actuator", "mode": "stuck", "p": 0.49}]), {})
+    assert words.startswith("Practically certain faulty (over 99.9 %), stuck at 49 %")
+    assert sure_of(fault(0.75, tier="model"), {}).endswith("by the wheel model, without a second measurement")
+
+
+def test_both_sides_count_where_they_are_not_told_apart() -> None:
+    report = {"coverage": [row("actuator", 40.0), row("sensor", 100.0)]}
+    assert "40 % of its driving" in sure_of(fault(0.99, side="sensor_or_actuator", tier="tracking"), report)
+
+
+def test_phrase_of_a_verdict() -> None:
+    done = {"machine": {"axles": []}, "coverage": [row("sensor", 98.0), row("actuator", 90.0, tier="model")]}
+    assert sure_of_verdict(done) == (
+        "All 2 wheel parts were judged, each for at least 90 % of its driving, by second measurements and a model of the "
+        "wheels."
+    )
+    assert judged(done) == "2 of 2 parts"
+    short = {**done, "coverage": [row("sensor", 98.0), row("actuator", 0.0, tier="none")]}
+    assert sure_of_verdict(short).startswith("1 of 2 wheel parts were judged long enough")
+    assert sure_of_verdict({}) == ""
