@@ -93,7 +93,7 @@ def most_probable(
     score[~allowed] = -1e12
     back = np.full((blocks.mean.size, sr.MODELS), STAY, dtype=np.uint8)
     b = blocks
-    ss.scan(b.mean, b.power, b.count, driven, b.u, b.status, b.second, allowed, p, score, z, P, ig, back)
+    ss.scan(b.mean, b.power, b.count, driven, b.u, b.status, b.second, allowed, p, score, z, P, ig, _row(), back)
     path, _ = trace(back, int(np.argmax(score)))
     return np.asarray(path)
 
@@ -103,7 +103,8 @@ def follow_path(blocks: SteeringBlocks, driven: Array, model: SteeringModel, pat
     size = path.size
     mean, cov = scratch((size, sr.STATES), np.float64), scratch((size, sr.STATES, sr.STATES), np.float64)
     noise = np.ones((size, 2))
-    b = blocks
+    b, p = blocks, model.packed()
+    z, P, ig = ss.started(path[0], _first(blocks), p)
     ss.follow(
         b.mean,
         b.power,
@@ -113,13 +114,20 @@ def follow_path(blocks: SteeringBlocks, driven: Array, model: SteeringModel, pat
         b.status,
         b.second,
         path,
-        _first(blocks),
-        model.packed(),
+        p,
+        z,
+        P,
+        ig,
+        _row(),
         mean,
         cov,
         noise,
     )
     return SteeringPath(path.copy(), mean, cov, noise)
+
+
+def _row() -> Array:
+    return np.zeros((3, sr.STATES))
 
 
 def _first(blocks: SteeringBlocks) -> float:

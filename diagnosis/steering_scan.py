@@ -8,11 +8,12 @@ from numba import njit
 from diagnosis.modes import SKIP
 from diagnosis.steering_rows import ACTUATOR, MODELS, NOISY, NONE, SENSOR, STATES, STUCK
 from diagnosis.steering_step import advance, enter
+from diagnosis.uncounted import uncounted
 
 _LEARNING_COST = 8.0
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def switch_cost(m, old, cost, second):  # type: ignore[no-untyped-def]
     """Minus the log-probability of going from model `old` to m within one block."""
     s, s0 = SENSOR[m], SENSOR[old]
@@ -24,10 +25,17 @@ def switch_cost(m, old, cost, second):  # type: ignore[no-untyped-def]
     return out
 
 
-@njit(cache=True)
-def scan(y, power, count, driven, u, status, second, allowed, p, score, z, P, ig, back):  # type: ignore[no-untyped-def]
-    """Viterbi over the models; writes back-pointers (n, models)."""
-    row = np.zeros((3, STATES))
+@njit(cache=True, error_model="numpy")
+def scan(y, power, count, driven, u, status, second, allowed, p, score, z, P, ig, row, back):  # type: ignore[no-untyped-def]
+    """Viterbi over the models; writes back-pointers (n, models); `row` (3, states) is room to work in."""
+    second, p, z, P, ig, row = (
+        uncounted(second),
+        uncounted(p),
+        uncounted(z),
+        uncounted(P),
+        uncounted(ig),
+        uncounted(row),
+    )
     for k in range(y.size):
         best = 0
         for m in range(1, MODELS):
@@ -55,11 +63,20 @@ def scan(y, power, count, driven, u, status, second, allowed, p, score, z, P, ig
             score[m] -= top
 
 
-@njit(cache=True)
-def follow(y, power, count, driven, u, status, second, path, first, p, Z, C, G):  # type: ignore[no-untyped-def]
-    """Run only the model that `path` names in each block; writes its mean, covariance and noise after each block."""
-    z, P, ig = _started(path[0], first, p)
-    row = np.zeros((3, STATES))
+@njit(cache=True, error_model="numpy")
+def follow(y, power, count, driven, u, status, second, path, p, z, P, ig, row, Z, C, G):  # type: ignore[no-untyped-def]
+    """Run only the model that `path` names in each block; writes its mean, covariance and noise after each block.
+
+    z, P and `ig` hold the first model as `started` gives it; `row` (3, states) is room to work in.
+    """
+    second, p, z, P, ig, row = (
+        uncounted(second),
+        uncounted(p),
+        uncounted(z),
+        uncounted(P),
+        uncounted(ig),
+        uncounted(row),
+    )
     for k in range(y.size):
         m = path[k]
         if k > 0 and m != path[k - 1]:
@@ -68,8 +85,8 @@ def follow(y, power, count, driven, u, status, second, path, first, p, Z, C, G):
         Z[k], C[k], G[k] = z[m], P[m], ig[m]
 
 
-@njit(cache=True)
-def _started(m, first, p):  # type: ignore[no-untyped-def]
+@njit(cache=True, error_model="numpy")
+def started(m, first, p):  # type: ignore[no-untyped-def]
     """States in which model m has just begun at the measured angle `first`."""
     z, P, ig = np.zeros((MODELS, STATES)), np.zeros((MODELS, STATES, STATES)), np.ones((MODELS, 2))
     z[m, 0] = min(max(first, -p[4]), p[4])
@@ -78,7 +95,7 @@ def _started(m, first, p):  # type: ignore[no-untyped-def]
     return z, P, ig
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def path_evidence(y, power, count, driven, u, status, second, path, a, b, known, p, Z, C, G):  # type: ignore[no-untyped-def]
     """Log-evidence of blocks a…b of a path, less the price of its switches, and [φ, r, a, b, d, c] at the end.
 
@@ -90,7 +107,7 @@ def path_evidence(y, power, count, driven, u, status, second, path, a, b, known,
         z[before], P[before], ig[before] = Z[a - 1], C[a - 1], G[a - 1]
     else:
         before = path[0]
-        z, P, ig = _started(before, y[0], p)
+        z, P, ig = started(before, y[0], p)
     row = np.zeros((3, STATES))
     total = 0.0
     for k in range(a, b):

@@ -26,7 +26,7 @@ SENSOR_DRIFT_S = 0.08
 _LEAST_GAIN, _MOST_GAIN = 0.1, 0.92  # of an inefficient part
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def enter(m, old, p, z, P, ig):  # type: ignore[no-untyped-def]
     """Start model m from model `old`: the axle is carried over, a side that changes gets its prior."""
     stop, lift, load, white = p[4], p[3], p[5], p[7]
@@ -75,7 +75,7 @@ def enter(m, old, p, z, P, ig):  # type: ignore[no-untyped-def]
             P[m, 1, 1] += (0.3 * lift) ** 2
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def predict(m, driven, u, p, z, P, row):  # type: ignore[no-untyped-def]
     """x = f(x, u), P = F P Fᵀ + Q over one block; `driven` is the mean of sat(g·u) over the block's samples."""
     dt, fade, g, lift, stop, load = p[0], p[1], p[2], p[3], p[4], p[5]
@@ -133,7 +133,7 @@ def predict(m, driven, u, p, z, P, row):  # type: ignore[no-untyped-def]
         P[m, 0, 0], P[m, 1, 1] = p[13], (0.02 * lift) ** 2
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _relax(m, i, f, q, z, P):  # type: ignore[no-untyped-def]
     """One step of x_i' = f·x_i + noise of variance q."""
     z[m, i] *= f
@@ -144,7 +144,7 @@ def _relax(m, i, f, q, z, P):  # type: ignore[no-untyped-def]
     P[m, i, i] += q
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def update(m, y, power, count, p, z, P, ig, gain):  # type: ignore[no-untyped-def]
     """Kalman update with a block's mean, and the evidence of mean and white power; returns the log-likelihood.
 
@@ -213,7 +213,7 @@ def update(m, y, power, count, p, z, P, ig, gain):  # type: ignore[no-untyped-de
     return told
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _learn_gain(m, seen, var, z, P, gain):  # type: ignore[no-untyped-def]
     """Kalman update of the sensor's gain d with a direct measurement of it."""
     for i in range(STATES):
@@ -226,7 +226,7 @@ def _learn_gain(m, seen, var, z, P, gain):  # type: ignore[no-untyped-def]
             P[m, i, j] -= gain[i] * gain[j] / total
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _forget(m, i, std, z, P):  # type: ignore[no-untyped-def]
     """Give the constant x_i its prior again: it was learned from a block that a fault entered halfway."""
     for j in range(STATES):
@@ -234,7 +234,7 @@ def _forget(m, i, std, z, P):  # type: ignore[no-untyped-def]
     P[m, i, i] = std * std
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def measure(m, second, p, z, P, row):  # type: ignore[no-untyped-def]
     """Update with what is measured twice.
 
@@ -271,7 +271,7 @@ def measure(m, second, p, z, P, row):  # type: ignore[no-untyped-def]
     return told
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _linear(m, innovation, r, h, z, P, gain):  # type: ignore[no-untyped-def]
     """Kalman update with one linear measurement H = h; an outlier teaches nothing. Returns the log-likelihood."""
     total = r
@@ -292,7 +292,7 @@ def _linear(m, innovation, r, h, z, P, gain):  # type: ignore[no-untyped-def]
     return told
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def advance(m, y, power, count, driven, u, status, second, p, z, P, ig, row):  # type: ignore[no-untyped-def]
     """One block of one model: prediction, update, log-likelihood; `driven` is NaN where nobody knows the opening."""
     blind = np.isnan(driven)

@@ -201,6 +201,8 @@ def evidence_of_runs(blocks: WheelBlocks, model: JointModel, done: JointPass, wh
         runs.model,
         float(first_speeds(blocks)[wheel]),
         (0.2 * own.span) ** 2,
+        np.zeros((MODELS, 4)),
+        np.zeros((MODELS, 4, 4)),
         evidence,
         mean,
         cov,

@@ -175,7 +175,7 @@ def _apart(
     y: Array, u: Array, v_ref: Array, plant: WheelPlant, limit: float, dt: float
 ) -> tuple[Array, NDArray[np.bool_]]:
     """Speed beyond what the opening drives [m/s], and where the wheel is neither commanded nor driven."""
-    residual, quiet = Column(np.float64), Column(np.bool_)
+    residual, quiet = Column(np.float64, rows=y.size), Column(np.bool_, rows=y.size)
     state: float | None = None
     for part in blocks(y.size):
         beyond = np.sign(u[part]) * np.maximum(np.abs(u[part]) - plant.dead, 0.0)
@@ -192,7 +192,7 @@ def _starved(fit: WheelModelFit, u: Array, flow: float | None, dt: float) -> NDA
     if flow is None or not any(fit.plants):
         return np.zeros(u.shape[0], dtype=np.bool_)
     lag = max(p.tau for p in fit.plants if p is not None)
-    out, last = Column(np.bool_), -(10**9)
+    out, last = Column(np.bool_, rows=len(u)), -(10**9)
     for part in blocks(len(u)):
         steps = np.arange(part.start, part.stop)
         asked = demand(np.abs(np.nan_to_num(u[part])), fit) > flow
@@ -210,7 +210,7 @@ def _in_motion(angle: Array, machine: Machine, size: int, dt: float) -> tuple[Ar
     if geometry is None or not any_finite(angle).all():
         return np.broadcast_to(np.nan, (size, wheels)), np.broadcast_to(0.0, (size, wheels))
     ratio = in_blocks(lambda a: speed_ratios(a, geometry), angle)
-    turn = Column(np.float64, (wheels,))
+    turn = Column(np.float64, (wheels,), size)
     before, state = wheel_angles(angle[:1], geometry), [np.nan] * wheels
     for part in blocks(size):
         turned = wheel_angles(angle[part], geometry)

@@ -12,6 +12,7 @@ import numpy as np
 from numba import njit
 
 from diagnosis.modes import PAIR, SILENT, SKIP, STAY
+from diagnosis.uncounted import uncounted
 from diagnosis.wheel_scan import (
     A_BIAS,
     A_GAIN,
@@ -40,7 +41,7 @@ _REVERSED = 1.0  # what a block costs a gain below zero
 _NO_LOSS = 0.9  # a gain above this is none
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def advance(m_on, q, status, quiet, k, z, P, gain):  # type: ignore[no-untyped-def]
     """One block of all models of one wheel; writes each one's log-likelihood into `gain`."""
     top = -1e300
@@ -73,7 +74,7 @@ def advance(m_on, q, status, quiet, k, z, P, gain):  # type: ignore[no-untyped-d
             gain[m] -= _REVERSED
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def taken(m, gain_m, bias, K, x):  # type: ignore[no-untyped-def]
     """Speed for which a valve in model m takes flow, at commanded opening x [m/s]."""
     if m == A_STUCK:
@@ -87,7 +88,7 @@ def taken(m, gain_m, bias, K, x):  # type: ignore[no-untyped-def]
     return abs(K * x)
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def weights(width, lag):  # type: ignore[no-untyped-def]
     """Weights with which an opening at place q of a block drives the mean speed of its own and of the next block."""
     here, after = np.zeros(width), np.zeros(width)
@@ -101,7 +102,7 @@ def weights(width, lag):  # type: ignore[no-untyped-def]
     return here, after
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def forward(  # type: ignore[no-untyped-def]
     u,
     y,
@@ -130,6 +131,7 @@ def forward(  # type: ignore[no-untyped-def]
 ):
     """Run all wheels over the blocks; see `wheel_filter.forward` for the arguments."""
     blocks, wheels = y.shape
+    z, P = uncounted(z), uncounted(P)
     width = u.shape[0] // blocks
     gain = np.zeros(MODELS)
     took, roll, trust = np.zeros(wheels), np.zeros(wheels), np.zeros(wheels)
@@ -175,17 +177,20 @@ def forward(  # type: ignore[no-untyped-def]
                     continue
                 x, others = u[n * width + q, i], total - took[i]
                 own = constants[i].K * abs(x)
-                full = x * min(1.0, flow / max(others + own, 1e-9))
-                half = x * min(1.0, flow / max(others + 0.5 * own, 1e-9))
-                share = min(1.0, flow / max(others, 1e-9))
+                full, half, idle, some = x, x, 1.0, 1.0
+                if others + max(own, 0.15 * constants[i].K) > flow:  # the pump cannot feed all
+                    full *= min(1.0, flow / max(others + own, 1e-9))
+                    half *= min(1.0, flow / max(others + 0.5 * own, 1e-9))
+                    idle = min(1.0, flow / max(others, 1e-9))
+                    some = min(1.0, flow / max(others + 0.15 * constants[i].K, 1e-9))
                 now[i, 0] += here[i, q] * full
                 now[i, 1] += here[i, q] * half
-                now[i, 2] += here[i, q] * x * share
-                now[i, 3] += share / width
-                now[i, 4] += min(1.0, flow / max(others + 0.15 * constants[i].K, 1e-9)) / width
+                now[i, 2] += here[i, q] * x * idle
+                now[i, 3] += idle / width
+                now[i, 4] += some / width
                 spill[i, 0] += after[i, q] * full
                 spill[i, 1] += after[i, q] * half
-                spill[i, 2] += after[i, q] * x * share
+                spill[i, 2] += after[i, q] * x * idle
         for i in range(wheels):
             if not known[i]:
                 continue
@@ -248,7 +253,7 @@ def forward(  # type: ignore[no-untyped-def]
             inputs[n, i, 7] = most
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def along_runs(  # type: ignore[no-untyped-def]
     y,
     count,
@@ -265,6 +270,8 @@ def along_runs(  # type: ignore[no-untyped-def]
     model,
     first,
     var,
+    z,
+    P,
     evidence,
     mean,
     cov,
@@ -273,9 +280,9 @@ def along_runs(  # type: ignore[no-untyped-def]
 ):
     """Follow one wheel's path run by run: every model is entered at the run's start, and its log-likelihoods summed.
 
-    `expected` is what a healthy wheel would read: carried on by the model alone during faults.
+    z (models, 4) and P (models, 4, 4) are zeros to work in. `expected` is what a healthy wheel would read: carried on by the model alone during faults.
     """
-    z, P, gain = np.zeros((MODELS, 4)), np.zeros((MODELS, 4, 4)), np.zeros(MODELS)
+    z, P, gain = uncounted(z), uncounted(P), np.zeros(MODELS)
     z[HEALTHY, 0], z[HEALTHY, 1], P[HEALTHY, 0, 0], P[HEALTHY, 2, 2] = first, 1.0, var, 1.0
     old = HEALTHY
     for m in range(1, m_on):

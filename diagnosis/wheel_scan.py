@@ -31,8 +31,8 @@ NAMES = (
     ("actuator", "noisy"),
 )
 ROW = np.array([0, 1, 2, 3, 4, 4, 4, 4, 4, 5, 6, 7, 8])
-_DISTURBED_S = 0.8  # correlation time of a valve's disturbance [s]
-_COLOURED_S = 0.05  # correlation time of a coloured sensor noise [s]
+DISTURBED_S = 0.8  # correlation time of a valve's disturbance [s]
+COLOURED_S = 0.05  # correlation time of a coloured sensor noise [s]
 
 
 class WheelConstants(NamedTuple):
@@ -53,6 +53,10 @@ class WheelConstants(NamedTuple):
     offset: float  # constant load, as a speed [m/s]
     dt: float  # block [s]
     raw_dt: float
+    fade: float  # e^(−lag)
+    fade_held: float  # e^(−lag·(1 + grip))
+    keep_bias: float  # share of a valve's disturbance that is left after one block
+    keep_noise: float  # and of a coloured sensor noise
 
 
 class WheelInput(NamedTuple):
@@ -72,13 +76,13 @@ class WheelInput(NamedTuple):
     doubt: float  # its uncertainty [m/s]
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def is_scaled(m):  # type: ignore[no-untyped-def]
     """Whether ν of model m is in the scale of a faulty sensor."""
     return m >= S_GAIN and m <= S_OU_LARGE
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def enter(m, old, k, z, P):  # type: ignore[no-untyped-def]
     """Start model m from the state of model `old`: speed and load are carried over, the unknowns get their priors."""
     v, var = z[old, 0], P[old, 0, 0]
@@ -120,7 +124,7 @@ def enter(m, old, k, z, P):  # type: ignore[no-untyped-def]
         P[m, 3, 3] = (0.5 * k.valve_span) ** 2
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def fed(m, q, k, z):  # type: ignore[no-untyped-def]
     """Opening as the pump feeds it, and the share that it feeds, while model m takes its part of the flow."""
     if m == A_GAIN or m == A_BIAS:
@@ -136,7 +140,7 @@ def fed(m, q, k, z):  # type: ignore[no-untyped-def]
     return q.drive, share
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def predict(m, q, k, z, P):  # type: ignore[no-untyped-def]
     """z = F z + G, P = F P Fᵀ + Q of model m over one block.
 
@@ -145,7 +149,7 @@ def predict(m, q, k, z, P):  # type: ignore[no-untyped-def]
     drive, share = fed(m, q, k, z)
     drive *= k.K
     scaled = is_scaled(m)
-    a = np.exp(-k.lag)
+    a = k.fade
     b, add, held = 1.0 - a, 0.0, 0.0
     if q.body == q.body and k.grip_most > 0.0:
         nu = z[m, 0] / max(z[m, 1], 0.1) if scaled else z[m, 0]
@@ -157,7 +161,7 @@ def predict(m, q, k, z, P):  # type: ignore[no-untyped-def]
             held = -k.grip_most
             add = held
         else:  # the tyre holds: the wheel follows the body, faster than its own lag
-            a = np.exp(-k.lag * (1.0 + k.grip))
+            a = k.fade_held
             b = (1.0 - a) / (1.0 + k.grip)
             add = k.grip * q.body
     add += k.offset
@@ -175,12 +179,12 @@ def predict(m, q, k, z, P):  # type: ignore[no-untyped-def]
         g = b * (drive + add)
     keep, noise = 1.0, 0.0  # of c
     if m == A_BIAS:
-        keep = np.exp(-k.dt / _DISTURBED_S)
+        keep = k.keep_bias
         noise = (1.0 - keep * keep) * (0.5 * k.valve_span) ** 2
     elif m == A_STUCK:
         noise = (0.02 * k.valve_span) ** 2 * k.dt
     elif m == S_OU_SMALL or m == S_OU_LARGE:
-        keep = np.exp(-k.dt / _COLOURED_S)
+        keep = k.keep_noise
         noise = (1.0 - keep * keep) * ((0.05 if m == S_OU_SMALL else 0.12) * k.span) ** 2
     elif m >= S_WHITE_3 and m <= S_WHITE_24:
         noise = (0.05 * k.span) ** 2 * k.dt
@@ -203,7 +207,7 @@ def predict(m, q, k, z, P):  # type: ignore[no-untyped-def]
     return share
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def readout(m, k, z):  # type: ignore[no-untyped-def]
     """Row H = [h0, 0, 0, h3] of model m, variance of one sample's noise, and of its steps from sample to sample."""
     own = k.noise**2
@@ -223,11 +227,11 @@ def readout(m, k, z):  # type: ignore[no-untyped-def]
         return 1.0, 1.0, 576.0 * own, 576.0 * own
     if m == S_OU_SMALL or m == S_OU_LARGE:
         level = (0.05 if m == S_OU_SMALL else 0.12) * k.span
-        return 1.0, 1.0, own, own + level**2 * k.raw_dt / _COLOURED_S
+        return 1.0, 1.0, own, own + level**2 * k.raw_dt / COLOURED_S
     return 1.0, 0.0, own, own
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def correct(m, q, share, k, z, P):  # type: ignore[no-untyped-def]
     """Kalman update of model m with the block's mean; log-likelihood of mean and steps.
 
@@ -238,19 +242,34 @@ def correct(m, q, share, k, z, P):  # type: ignore[no-untyped-def]
     r = white / max(q.samples, 1.0) + 1e-12
     if h0 > 0.0:
         r += (q.chatter * share) ** 2
-    g = np.empty(4)
-    for i in range(4):
-        g[i] = P[m, i, 0] * h0 + P[m, i, 3] * h3
-    s = h0 * g[0] + h3 * g[3] + r
+    g0, g1 = P[m, 0, 0] * h0 + P[m, 0, 3] * h3, P[m, 0, 1] * h0 + P[m, 1, 3] * h3
+    g2, g3 = P[m, 0, 2] * h0 + P[m, 2, 3] * h3, P[m, 0, 3] * h0 + P[m, 3, 3] * h3
+    s = h0 * g0 + h3 * g3 + r
     innovation = q.y - h0 * z[m, 0] - h3 * z[m, 3]
-    for i in range(4):
-        z[m, i] += g[i] * innovation / s
-        for j in range(4):
-            P[m, i, j] -= g[i] * g[j] / s
-    out = -0.5 * (innovation * innovation / s + np.log(2.0 * np.pi * s))
-    if q.samples > 1.5:
-        freedom = 2.0 * q.samples / 3.0
-        seen = max(0.5 * q.jitter, k.constant_noise**2)
-        most = -0.5 * freedom * (1.0 + np.log(seen))
-        out += max(-0.5 * freedom * (0.5 * q.jitter / steps + np.log(steps)), most - 25.0)
-    return out
+    part = 1.0 / s
+    k0, k1, k2, k3 = g0 * part, g1 * part, g2 * part, g3 * part
+    z[m, 0] += k0 * innovation
+    z[m, 1] += k1 * innovation
+    z[m, 2] += k2 * innovation
+    z[m, 3] += k3 * innovation
+    P[m, 0, 0] -= k0 * g0
+    P[m, 1, 1] -= k1 * g1
+    P[m, 2, 2] -= k2 * g2
+    P[m, 3, 3] -= k3 * g3
+    P[m, 0, 1] -= k0 * g1
+    P[m, 0, 2] -= k0 * g2
+    P[m, 0, 3] -= k0 * g3
+    P[m, 1, 2] -= k1 * g2
+    P[m, 1, 3] -= k1 * g3
+    P[m, 2, 3] -= k2 * g3
+    P[m, 1, 0], P[m, 2, 0], P[m, 3, 0] = P[m, 0, 1], P[m, 0, 2], P[m, 0, 3]
+    P[m, 2, 1], P[m, 3, 1], P[m, 3, 2] = P[m, 1, 2], P[m, 1, 3], P[m, 2, 3]
+    if q.samples <= 1.5:
+        return -0.5 * (innovation * innovation * part + np.log(2.0 * np.pi * s))
+    freedom = 2.0 * q.samples / 3.0
+    least = max(0.5 * q.jitter, k.constant_noise**2)
+    # −½·freedom·(jitter/2/steps + log steps), but not below what noise of just this power gives, less 25
+    spoken = freedom * (0.5 * q.jitter / steps + np.log(steps / least))
+    return -0.5 * (
+        innovation * innovation * part + np.log(2.0 * np.pi * s) + freedom * np.log(least) + min(spoken, freedom + 50.0)
+    )

@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from diagnosis.wheel_scan import WheelConstants
+from diagnosis.wheel_scan import COLOURED_S, DISTURBED_S, WheelConstants
 
 Array = NDArray[np.float64]
 
@@ -79,6 +79,10 @@ class WheelFilterModel:
             self.offset,
             dt,
             raw_dt,
+            float(np.exp(-dt / self.tau)),
+            float(np.exp(-dt / self.tau * (1 + self.grip))),
+            float(np.exp(-dt / DISTURBED_S)),
+            float(np.exp(-dt / COLOURED_S)),
         )
 
 

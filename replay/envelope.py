@@ -53,7 +53,7 @@ def envelope(values: NDArray[Any], bucket: int) -> NDArray[Any]:
     """
     if bucket == 1:
         return values
-    out = Column(values.dtype, values.shape[1:])
+    out = Column(values.dtype, values.shape[1:], rows_of(len(values), bucket))
     for part in blocks(len(values), bucket):
         out.append(_reduced(values[part], bucket))
     return out.finish()

@@ -161,12 +161,13 @@ def _commands(timeline: Timeline, machine: Machine, phi: Array, readings: list[R
     speed, omega = timeline.get("cmd.v"), timeline.get("cmd.omega")
     geometry = machine.geometry
     mapped = geometry is not None and speed is not None
-    out = [Column(np.float64, (len(wheels),)), Column(np.float64, (len(axles),)), Column(np.float64, (len(wheels),))]
+    wanted = not (logged_v.all() and logged_phi.all())
+    out = [Column(np.float64, (count,), timeline.size) for count in (len(wheels), len(axles), len(wheels))]
     state = CommandState()
     for part in blocks(timeline.size):
         v_part, phi_part = v_ref[part].copy(), phi_ref[part].copy()
         angle = np.full(v_part.shape, np.nan) if geometry is None else wheel_angles(phi[part], geometry)
-        if geometry is not None and speed is not None:
+        if geometry is not None and speed is not None and wanted:
             found = wheel_commands(
                 speed[part],
                 np.zeros(len(v_part)) if omega is None else omega[part],
@@ -227,7 +228,7 @@ def _scan(
         return dict.fromkeys(names, np.broadcast_to(np.nan, (rows_of(len(v), bucket), wheels)))
     usable = any_finite(v) & any_finite(v_ref)
     scans = {i: scan_wheel(law, u[:, i], v[:, i], v_ref[:, i], dt, psi0[i]) for i in range(wheels) if usable[i]}
-    columns = {name: Column(np.float64, (wheels,)) for name in names}
+    columns = {name: Column(np.float64, (wheels,), rows_of(len(v), bucket)) for name in names}
     for part in blocks(len(v)):
         found = {name: np.full((part.stop - part.start, wheels), np.nan) for name in names}
         for i, scan in scans.items():

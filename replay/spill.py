@@ -1,8 +1,8 @@
 """Columns that outgrow memory: gathered block by block, kept in an unnamed temporary file once they are long.
 
-A mission of hours has more samples than memory has room. A `Column` takes its blocks one after another; a short one
-ends as a plain array, a long one as a read-only map of a temporary file, which the system may drop from memory and load
-again at will. The file has no name from the start, so that it vanishes with the process however that ends. Set TMPDIR
+A mission of hours has more samples than memory has room. A `Column` takes its blocks one after another; it ends as a
+plain array while all long ones together are smaller than `ROOM`, else as a map of a temporary file, which the system
+may drop from memory and load again at will. The file has no name from the start, so that it vanishes with the process however that ends. Set TMPDIR
 to a folder on a disk with room (not on a memory file system).
 """
 
@@ -24,8 +24,33 @@ from replay.errors import LogError
 
 SPILL_BYTES = 16 << 20
 FLUSH_BYTES = 4 << 20
+ROOM = 512 << 20
 BLOCK = 1 << 19
 _MAPS: weakref.WeakSet[mmap.mmap] = weakref.WeakSet()
+
+
+class _Memory:
+    """Count of the long columns that stay in memory."""
+
+    def __init__(self) -> None:
+        self.used = 0
+
+    def has_room(self, size: int) -> bool:
+        """Whether a column of `size` bytes may stay in memory."""
+        return size <= SPILL_BYTES or self.used + size <= ROOM
+
+    def counted(self, array: NDArray[Any]) -> NDArray[Any]:
+        """The same array, counted for as long as it lives."""
+        if array.nbytes > SPILL_BYTES:
+            self.used += array.nbytes
+            weakref.finalize(array, self._forget, array.nbytes)
+        return array
+
+    def _forget(self, size: int) -> None:
+        self.used -= size
+
+
+_MEMORY = _Memory()
 
 
 class Column:
@@ -37,11 +62,16 @@ class Column:
         Number type of the column; blocks are converted to it.
     width : tuple[int, ...]
         Shape of one row; empty for plain numbers.
+    rows : int or None
+        How many there will be, where that is known: the column is then filled in place.
     """
 
-    def __init__(self, dtype: DTypeLike, width: tuple[int, ...] = ()) -> None:
+    def __init__(self, dtype: DTypeLike, width: tuple[int, ...] = (), rows: int | None = None) -> None:
         self.dtype: np.dtype[Any] = np.dtype(dtype)
         self.size = 0
+        self._whole: NDArray[Any] | None = None
+        if rows is not None and _MEMORY.has_room(rows * math.prod(width) * self.dtype.itemsize):
+            self._whole = _MEMORY.counted(np.empty((rows, *width), self.dtype))
         self._width = width
         self._parts: list[NDArray[Any]] = []
         self._held = 0
@@ -55,11 +85,14 @@ class Column:
         LogError
             Where the temporary folder has no room left.
         """
+        at, self.size = self.size, self.size + len(values)
+        if self._whole is not None:
+            self._whole[at : self.size] = values
+            return
         block = np.ascontiguousarray(values, self.dtype)
-        self.size += len(block)
         self._parts.append(block)
         self._held += block.nbytes
-        if self._held > (SPILL_BYTES if self._file is None else FLUSH_BYTES):
+        if self._held > FLUSH_BYTES if self._file is not None else not _MEMORY.has_room(self._held):
             self._flush()
 
     def _flush(self) -> None:
@@ -76,11 +109,13 @@ class Column:
 
     def finish(self) -> NDArray[Any]:
         """Return all blocks as one array, shape (n, *width); the column must not be used afterwards."""
+        if self._whole is not None:
+            return self._whole if self.size == len(self._whole) else self._whole[: self.size]
         if self._file is None:
             parts, self._parts = self._parts, []
             if len(parts) == 1:
                 return parts[0]
-            return np.concatenate(parts) if parts else np.empty((0, *self._width), self.dtype)
+            return _MEMORY.counted(np.concatenate(parts)) if parts else np.empty((0, *self._width), self.dtype)
         self._flush()
         with self._file as file:
             mapped = mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_WRITE)
@@ -98,8 +133,8 @@ def scratch(shape: tuple[int, ...], dtype: DTypeLike) -> NDArray[Any]:
     """
     kind = np.dtype(dtype)
     size = kind.itemsize * math.prod(shape)
-    if size <= SPILL_BYTES:
-        return np.zeros(shape, kind)
+    if _MEMORY.has_room(size):
+        return _MEMORY.counted(np.zeros(shape, kind))
     try:
         with tempfile.TemporaryFile(prefix="mfhca-") as file:
             if hasattr(os, "posix_fallocate"):  # a map of a file with holes would fault where the disk is full
@@ -162,7 +197,7 @@ def in_blocks(function: Callable[..., NDArray[Any]], *arrays: NDArray[Any]) -> N
     for part in blocks(size):
         values = np.asarray(function(*(a[part] for a in arrays)))
         if column is None:
-            column = Column(values.dtype, values.shape[1:])
+            column = Column(values.dtype, values.shape[1:], size)
         column.append(values)
         release(*arrays)
     assert column is not None
@@ -171,8 +206,8 @@ def in_blocks(function: Callable[..., NDArray[Any]], *arrays: NDArray[Any]) -> N
 
 def keep(values: NDArray[Any]) -> NDArray[Any]:
     """The same numbers, spilled where they are long; the argument should be let go of."""
-    if values.nbytes <= SPILL_BYTES:
-        return values
+    if _MEMORY.has_room(values.nbytes):
+        return _MEMORY.counted(values)
     return in_blocks(np.copy, values)
 
 

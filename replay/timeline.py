@@ -11,6 +11,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 
 from replay.errors import LogError
@@ -171,25 +172,30 @@ def _hold(
     longest = max(_HOLD_PERIODS * period, 1.5 * step)
     if command:
         longest = max(longest, float(_COMMAND_HOLD_NS))
-    values, fresh = Column(np.float64), Column(np.bool_)
-    last = -1  # sample held at the step before
+    values, fresh = Column(np.float64, rows=size), Column(np.bool_, rows=size)
+    at = -1
     for part in blocks(size):
-        grid = start + step * np.arange(part.start, part.stop, dtype=np.int64)
-        index = np.searchsorted(signal.stamps, grid + step // 2, side="right") - 1
-        first, stop = max(int(index[0]), 0), int(index[-1]) + 1
-        near, stamps = signal.values[first:stop], signal.stamps[first:stop]
-        if not near.size:
-            values.append(np.full(grid.size, np.nan))
-            fresh.append(np.zeros(grid.size, np.bool_))
-            continue
-        safe = np.maximum(index - first, 0)
-        usable = np.where(np.abs(near) <= _LARGEST, near, np.nan)
-        held = np.where((index >= 0) & (grid - stamps[safe] <= longest), usable[safe], np.nan)
+        held, new = np.empty(part.stop - part.start), np.empty(part.stop - part.start, np.bool_)
+        begin = start + part.start * step
+        at = _scan_hold(signal.stamps, signal.values, begin, step, longest, _LARGEST, at, held, new)
         values.append(held)
-        fresh.append((np.diff(index, prepend=last) != 0) & np.isfinite(held))
-        last = int(index[-1])
+        fresh.append(new)
         release(signal.values, signal.stamps)
     return values.finish(), fresh.finish()
+
+
+@njit(cache=True)
+def _scan_hold(stamps, values, start, step, longest, largest, at, held, fresh):  # type: ignore[no-untyped-def]
+    """Walk along both axes; `at` is the newest sample at the step before, and is returned for the next one."""
+    for k in range(held.size):
+        time, before = start + k * step, at
+        while at + 1 < stamps.size and stamps[at + 1] <= time + step // 2:
+            at += 1
+        held[k] = np.nan
+        if at >= 0 and time - stamps[at] <= longest and abs(values[at]) <= largest:
+            held[k] = values[at]
+        fresh[k] = at != before and held[k] == held[k]
+    return at
 
 
 def check_overlap(signals: Signals) -> list[str]:

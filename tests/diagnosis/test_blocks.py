@@ -43,6 +43,7 @@ def in_blocks_of(steps: int, log: Path, monkeypatch: pytest.MonkeyPatch) -> Miss
     with monkeypatch.context() as patch:
         patch.setattr(spill, "BLOCK", steps)
         patch.setattr(spill, "SPILL_BYTES", 10_000)
+        patch.setattr(spill, "ROOM", 0)
         patch.setattr(spill, "FLUSH_BYTES", 5_000)
         return diagnose([log], haulotte())
 

@@ -21,6 +21,7 @@ from replay.spill import Column, beside, blocks, in_blocks, keep, release, scrat
 def tiny(monkeypatch: pytest.MonkeyPatch) -> None:
     """Everything beyond a few numbers is spilled."""
     monkeypatch.setattr(spill, "SPILL_BYTES", 64)
+    monkeypatch.setattr(spill, "ROOM", 0)
     monkeypatch.setattr(spill, "FLUSH_BYTES", 32)
     monkeypatch.setattr(spill, "BLOCK", 7)
 
