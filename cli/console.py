@@ -49,7 +49,7 @@ class Terminal:
         """Print results; a reader that closed the pipe early is no error."""
         if not self.quiet:
             stream = sys.stderr if self.json else sys.stdout
-            _write(stream, _rendered(_console(stream), parts))
+            _write(stream, _rendered(console_of(stream), parts))
 
     def show_text(self, text: str) -> None:
         """Print text of our own as it is."""
@@ -71,14 +71,15 @@ class Terminal:
         """One line on stderr, also when quiet."""
         self._line("error", "bold red", text)
 
-    def _progress_line(self, text: str) -> None:
+    def tell(self, text: str) -> None:
+        """One plain line on stderr."""
         _write(sys.stderr, clean(text) + "\n")
 
     def _line(self, label: str, style: str, text: object) -> None:
         from rich.text import Text
 
         line = Text.assemble((f"{label}:", style), " ", clean(text).strip())
-        _write(sys.stderr, _rendered(_console(sys.stderr), (line,), wrap=False))
+        _write(sys.stderr, _rendered(console_of(sys.stderr), (line,), wrap=False))
 
     @contextmanager
     def progress(self, first: str) -> Iterator[Progress]:
@@ -86,15 +87,16 @@ class Terminal:
         from rich.text import Text
 
         if self.quiet or not sys.stderr.isatty():
-            tell = self._progress_line if self.verbose and not self.quiet else lambda text: None
+            tell = self.tell if self.verbose and not self.quiet else lambda text: None
             tell(first)
             yield tell
             return
-        with _console(sys.stderr).status(Text(clean(first))) as status:
+        with console_of(sys.stderr).status(Text(clean(first))) as status:
             yield lambda text: status.update(Text(clean(text)))
 
 
-def _console(stream: IO[str]) -> Console:
+def console_of(stream: IO[str]) -> Console:
+    """Console of rich on a stream, without markup, as wide as a page where it is no terminal."""
     from rich.console import Console
 
     width = None if stream.isatty() or "COLUMNS" in os.environ else _PIPE_WIDTH

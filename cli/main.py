@@ -17,7 +17,7 @@ from typing import Annotated
 
 import typer
 
-from cli import comparing, configure, diagnose, evaluating, fitting, injecting, look, replaying, simulate
+from cli import auditing, comparing, configure, diagnose, evaluating, fitting, injecting, look, replaying, simulate
 from cli.app import App, Quiet, Verbose, terminal_of
 from cli.console import Terminal, discard
 from replay.errors import MfhcaError
@@ -63,6 +63,7 @@ _DIAGNOSE, _LOOK, _MAKE = "Diagnose", "Look into a log", "Set up and try"
 for _panel, _function, _name, _epilog in (
     (_DIAGNOSE, diagnose.diagnose, "diagnose", diagnose.DIAGNOSE_EXAMPLES),
     (_DIAGNOSE, diagnose.report, "report", diagnose.REPORT_EXAMPLES),
+    (_DIAGNOSE, auditing.audit, "audit", auditing.EXAMPLES),
     (_DIAGNOSE, comparing.compare, "compare", comparing.EXAMPLES),
     (_DIAGNOSE, evaluating.evaluate, "evaluate", evaluating.EXAMPLES),
     (_LOOK, look.inspect, "inspect", look.INSPECT_EXAMPLES),

@@ -1,0 +1,170 @@
+"""The work on one mission, in a process of its own.
+
+It reads the log, writes the report into a folder that nobody else looks at yet, and leaves ``outcome.json`` beside it.
+Whatever ends it earlier leaves no ``outcome.json``, and who started it says what the reason was.
+"""
+
+from __future__ import annotations
+
+import errno
+import faulthandler
+import os
+import signal
+import sys
+import tempfile
+import traceback
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+import orjson
+
+from diagnosis.audit.limits import Limits, die_with, hold
+from replay.errors import ConfigError, LogError, NotJudged, OutputError
+from replay.machine import Machine
+
+OUTCOME, REPORT, TEMPORARY, MESSAGES = "outcome.json", "report", "tmp", "messages.txt"
+_FULL = {errno.ENOSPC, errno.EFBIG, errno.EDQUOT}
+
+
+@dataclass(frozen=True)
+class Work:
+    """What a child is given.
+
+    Attributes
+    ----------
+    files : tuple[str, ...]
+        Files of the mission on this machine.
+    machine : Machine
+        The machine.
+    machine_source : str
+        Where its settings come from.
+    machine_id : str
+        Identity for trends; empty: what the log and the machine file say.
+    fallback_id : str
+        Identity where nothing else says one.
+    folder : str
+        Folder of this attempt's own: the outcome and the report.
+    temporary : str
+        Folder of this attempt's own for temporary files.
+    max_size_mb : float
+        Size the page should keep to [MB].
+    judge : str
+        ``module:function`` that does the work; for tests.
+    """
+
+    files: tuple[str, ...]
+    machine: Machine
+    machine_source: str
+    machine_id: str
+    fallback_id: str
+    folder: str
+    temporary: str
+    max_size_mb: float = 15.0
+    judge: str = "diagnosis.audit.child:judge"
+
+
+def judge(work: Work) -> dict[str, Any]:
+    """Diagnose the mission and write its report.
+
+    Returns
+    -------
+    dict
+        ``state``, ``reason``, ``summary`` as in `Outcome`.
+    """
+    from diagnosis.audit.summary import summarise
+    from diagnosis.output import write_result
+    from diagnosis.pipeline import diagnose
+
+    result = diagnose(
+        [Path(name) for name in work.files],
+        work.machine,
+        machine_source=work.machine_source,
+        machine_id=work.machine_id or None,
+    )
+    if not result.report["machine"]["id"]:
+        machine = {**result.report["machine"], "id": work.fallback_id}
+        result = replace(result, report={**result.report, "machine": machine})
+    write_result(result, Path(work.folder) / REPORT, max_size_mb=work.max_size_mb)
+    damage = [text for file in result.report["log"]["files"] for text in file["damage"]]
+    return {
+        "state": "degraded" if damage else "ok",
+        "reason": _first_of(damage),
+        "summary": summarise(result.report),
+    }
+
+
+def _first_of(damage: list[str]) -> str:
+    more = f" (and {len(damage) - 1} more)" if len(damage) > 1 else ""
+    return f"{damage[0]}{more}" if damage else ""
+
+
+def attempt(work: Work) -> dict[str, Any]:
+    """Do the work; every error becomes a state with its reason. ``not_written`` where the report has no place."""
+    module, _, function = work.judge.partition(":")
+    try:
+        found: dict[str, Any] = getattr(import_module(module), function)(work)
+    except NotJudged as error:
+        facts = {"verdict": "not_assessed", "title": "Not assessed", "machine_name": work.machine.name}
+        facts["machine_id"] = work.machine_id or work.machine.id or work.fallback_id
+        return {"state": "degraded", "reason": str(error), "summary": {"result": facts, "faults": [], "components": []}}
+    except OutputError as error:
+        return {"state": "not_written", "reason": str(error), "summary": None}
+    except (LogError, ConfigError) as error:
+        full = isinstance(error.__cause__, OSError) and error.__cause__.errno in _FULL
+        return {"state": "crashed" if full else "unreadable", "reason": str(error), "summary": None}
+    except MemoryError as error:
+        return {"state": "out_of_memory", "reason": _where(error), "summary": None}
+    except OSError as error:
+        full, what = error.errno in _FULL, error.strerror or error
+        name = f"{error.filename}: " if error.filename else ""
+        reason = f"cannot keep temporary data: {what}" if full else f"{name}cannot be read: {what}"
+        return {"state": "crashed" if full else "unreadable", "reason": reason, "summary": None}
+    except Exception as error:
+        traceback.print_exc()
+        text = f"internal error: {type(error).__name__}: {error} ({_where(error)})"
+        return {"state": "crashed", "reason": text, "summary": None}
+    return found
+
+
+def _where(error: BaseException) -> str:
+    frames = traceback.extract_tb(error.__traceback__)
+    return f"in {Path(frames[-1].filename).name}, line {frames[-1].lineno}" if frames else ""
+
+
+def run(work: Work, limits: Limits, parent: int) -> None:
+    """Be the child: take on the limits, work, leave the outcome; never returns."""
+    code = 1
+    try:
+        die_with(parent)
+        for number in (signal.SIGINT, signal.SIGTERM):
+            signal.signal(number, signal.SIG_DFL)
+        messages = os.open(Path(work.folder) / MESSAGES, os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o600)
+        for stream in (1, 2):
+            os.dup2(messages, stream)
+        sys.stdout = sys.stderr = os.fdopen(messages, "w", buffering=1, encoding="utf-8", errors="replace")
+        faulthandler.enable(sys.stderr)
+        os.environ["TMPDIR"] = tempfile.tempdir = work.temporary
+        hold(limits)
+        leave(work, attempt(work))
+        code = 0
+    except MemoryError:
+        code = OUT_OF_MEMORY
+    except BaseException:
+        traceback.print_exc()
+    finally:
+        os._exit(code)
+
+
+OUT_OF_MEMORY = 97
+"""Exit code of a child that had no memory left to say so."""
+
+
+def leave(work: Work, found: Mapping[str, Any]) -> None:
+    """Leave the outcome for who started the child, whole or not at all."""
+    path = Path(work.folder) / OUTCOME
+    part = path.with_suffix(".part")
+    part.write_bytes(orjson.dumps(dict(found)))
+    part.replace(path)

@@ -1,0 +1,159 @@
+"""How an audit's missions stand in the store after a run, what exit code they make, and what failed."""
+
+from __future__ import annotations
+
+import os
+import re
+import shlex
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from diagnosis.audit.outcome import READ
+from diagnosis.audit.places import write_whole
+from diagnosis.audit.plan import Planned
+from diagnosis.audit.store import Store
+from diagnosis.result import SEVERITIES
+
+FAILURES = "failures.txt"
+NEVER = "never"
+_FAULT, _NOT_READ, _CRASHED = 1, 3, 70
+_HIDDEN = re.compile("[\x00-\x1f\x7f-\x9f\u2028\u2029\ud800-\udfff]")
+
+
+@dataclass(frozen=True)
+class Ending:
+    """How a mission stands.
+
+    Attributes
+    ----------
+    name : str
+        Of the mission.
+    state, reason : str
+        As in `Outcome`.
+    attempts : int
+        Attempts so far.
+    machine_id, machine_name : str
+        Its machine.
+    verdict : str or None
+        ``ready``, ``watch``, ``stop``, ``not_assessed``; None where there is no report.
+    title : str
+        Verdict in words.
+    report : str or None
+        Folder of the report, relative to the output.
+    faults : int
+        Number of faults.
+    severity : str
+        Of the worst fault; empty where there is none.
+    """
+
+    name: str
+    state: str
+    reason: str
+    attempts: int
+    machine_id: str
+    machine_name: str
+    verdict: str | None
+    title: str
+    report: str | None
+    faults: int
+    severity: str
+
+
+def endings(store: Store, names: Iterable[str]) -> list[Ending]:
+    """Ends of the named missions, in the order of their names; those without a result are left out."""
+    wanted = set(names)
+    faults: dict[int, list[str]] = {}
+    for row in store.database.rows("SELECT result, severity FROM fault"):
+        faults.setdefault(row[0], []).append(row[1])
+    columns = ("state", "reason", "attempts", "machine_id", "machine_name", "verdict", "title", "report")
+    query = (
+        f"SELECT m.name, r.id, {', '.join(f'r.{c}' for c in columns)} FROM mission m JOIN result r ON r.id = m.result "
+        "ORDER BY m.name"
+    )
+    out = []
+    for row in store.database.rows(query):
+        if row["name"] in wanted:
+            found = faults.get(row["id"], [])
+            worst = max(found, key=SEVERITIES.index, default="")
+            facts = {column: row[column] for column in columns}
+            out.append(Ending(name=row["name"], faults=len(found), severity=worst, **facts))
+    return out
+
+
+def exit_code(ends: Iterable[Ending], fail_on: str) -> int:
+    """Exit code of the worst mission: 0 no fault, 1 faults, 3 not read or not judged, 70 crashed.
+
+    Parameters
+    ----------
+    ends : Iterable[Ending]
+        The missions.
+    fail_on : str
+        Lowest severity that counts as a fault; ``never``: none does, nor a mission that could not be judged.
+    """
+    return max((_code(end, fail_on) for end in ends), default=0)
+
+
+def _code(end: Ending, fail_on: str) -> int:
+    if end.state == "crashed":
+        return _CRASHED
+    if end.state not in READ or (end.verdict == "not_assessed" and fail_on != NEVER):
+        return _NOT_READ
+    serious = fail_on != NEVER and end.severity and SEVERITIES.index(end.severity) >= SEVERITIES.index(fail_on)
+    return _FAULT if serious else 0
+
+
+def write_failures(output: Path, planned: Sequence[Planned], ends: Sequence[Ending], machine: Path | None) -> int:
+    """Write ``failures.txt``: each mission that failed, why, and the command that shows it again.
+
+    Returns
+    -------
+    int
+        Number of missions that failed; the file is removed where there is none.
+
+    Raises
+    ------
+    OutputError
+        Where it cannot be written.
+    """
+    by_name = {one.mission.name: one for one in planned}
+    lines = []
+    for end in ends:
+        if end.state not in READ and end.name in by_name:
+            one = by_name[end.name]
+            tried = "" if end.attempts == 1 else f", {end.attempts} attempts"
+            lines.append(f"{end.name}: {end.state}{tried}: {_HIDDEN.sub('?', end.reason)}\n")
+            lines.append(f"  {command(one, machine)}\n\n")
+    path = output / FAILURES
+    if lines:
+        write_whole(path, "".join(lines).encode("utf-8", "surrogateescape"))
+    else:
+        path.unlink(missing_ok=True)
+    return len(lines) // 2
+
+
+def command(one: Planned, machine: Path | None) -> str:
+    """Command line that diagnoses a mission by itself."""
+    mission = one.mission
+    remote = any("://" in file for file in mission.files)
+    words: list[str] = ["mfhca", "audit" if remote else "diagnose", "-v"]
+    words += [file if "://" in file else os.path.abspath(file) for file in mission.files]  # noqa: PTH100 - links stay
+    file = mission.machine_file or (str(machine) if machine is not None else "")
+    if file:
+        words += ["-m", os.path.abspath(file)]  # noqa: PTH100
+    if one.machine_id:
+        words += ["--machine-id", one.machine_id]
+    words += ["-o", f"{mission.name}-report"]
+    return " ".join(quoted(word) for word in words)
+
+
+def quoted(word: str) -> str:
+    """A word for a POSIX shell; bytes that no terminal should see are written out, as bash, zsh and ksh read them."""
+    if not _HIDDEN.search(word):
+        return shlex.quote(word)
+    out: list[Any] = []
+    for byte in os.fsencode(word):
+        printable = 0x20 <= byte < 0x7F and byte not in b"'\\"
+        out.append(chr(byte) if printable else f"\\x{byte:02x}")
+    return "$'" + "".join(out) + "'"

@@ -1,0 +1,214 @@
+"""Places in an audit's folder: a run's own working folder, claims on missions, and reports that appear whole."""
+
+from __future__ import annotations
+
+import ctypes
+import hashlib
+import os
+import secrets
+import shutil
+import sys
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import IO
+
+from replay.errors import OutputError
+
+MISSIONS, RESULTS, WORKING = "missions", "results", ".work"
+_AT_FDCWD, _RENAME_EXCHANGE = -100, 2
+
+
+class Claim:
+    """A file lock that the system lets go of when its holder ends, however that happens."""
+
+    def __init__(self, path: Path) -> None:
+        self._file: IO[bytes] = path.open("ab")
+        self.path = path
+
+    def take(self) -> bool:
+        """Take it unless another process holds it."""
+        try:
+            if sys.platform == "win32":
+                import msvcrt
+
+                self._file.seek(0)
+                msvcrt.locking(self._file.fileno(), msvcrt.LK_NBLCK, 1)
+            else:
+                import fcntl
+
+                fcntl.flock(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError:
+            return False
+        return True
+
+    def drop(self) -> None:
+        """Let go of it."""
+        self._file.close()
+
+
+@dataclass(frozen=True)
+class Working:
+    """A run's own folders, gone after it.
+
+    Attributes
+    ----------
+    folder : Path
+        Below the output, so that a finished report is moved and not copied.
+    temporary : Path
+        Below the system's folder for temporary files.
+    """
+
+    folder: Path
+    temporary: Path
+
+
+@contextmanager
+def working(output: Path) -> Iterator[Working]:
+    """Make the run's own folders; remove them at the end, and those that runs ended by force have left.
+
+    Raises
+    ------
+    OutputError
+        Where the output cannot be written.
+    """
+    base = output / WORKING
+    try:
+        for name in (MISSIONS, RESULTS, WORKING):
+            (output / name).mkdir(parents=True, exist_ok=True)
+        _sweep(base)
+        folder, claim = _own_folder(base)
+        temporary = Path(tempfile.mkdtemp(prefix="mfhca-audit-"))
+        claim.path.write_text(str(temporary), encoding="utf-8")
+    except OSError as error:
+        raise cannot_write(error, output) from error
+    try:
+        yield Working(folder, temporary)
+    finally:
+        for gone in (folder, temporary):
+            shutil.rmtree(gone, ignore_errors=True)
+        with suppress(OSError):
+            claim.path.unlink()
+        claim.drop()
+
+
+def _own_folder(base: Path) -> tuple[Path, Claim]:
+    while True:
+        folder = base / f"{os.getpid()}-{secrets.token_hex(4)}"
+        claim = Claim(base / f"{folder.name}.lock")
+        if claim.take():
+            folder.mkdir()
+            return folder, claim
+        claim.drop()  # another run that sweeps was faster
+
+
+def _sweep(base: Path) -> None:
+    """Remove what runs that were ended by force have left: their locks are free."""
+    for lock in base.glob("*.lock"):
+        try:
+            claim = Claim(lock)
+        except OSError:
+            continue
+        if claim.take():
+            temporary = Path(lock.read_text(encoding="utf-8").strip() or ".")
+            if temporary.name.startswith("mfhca-audit-"):
+                shutil.rmtree(temporary, ignore_errors=True)
+            shutil.rmtree(lock.with_suffix(""), ignore_errors=True)
+            with suppress(OSError):
+                lock.unlink()
+        claim.drop()
+
+
+def claim_mission(output: Path, name: str) -> Claim | None:
+    """Claim a mission for this run; None where another run on the same output is at it.
+
+    Raises
+    ------
+    OutputError
+        Where the output cannot be written.
+    """
+    folder = output / WORKING / "claims"
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        claim = Claim(folder / hashlib.sha256(name.encode("utf-8", "surrogateescape")).hexdigest()[:24])
+    except OSError as error:
+        raise cannot_write(error, output) from error
+    if claim.take():
+        return claim
+    claim.drop()
+    return None
+
+
+def publish(made: Path, place: Path) -> None:
+    """Move a finished report to its place; one that stands there is exchanged in one step where the system can.
+
+    Raises
+    ------
+    OutputError
+        Where the place cannot be written; what stood there stands still.
+    """
+    try:
+        place.parent.mkdir(parents=True, exist_ok=True)
+        for file in made.iterdir():
+            _flush(file)
+        if not place.exists():
+            made.rename(place)
+        elif not _exchange(made, place):
+            aside = made.with_name(f"{made.name}.old")
+            place.rename(aside)
+            made.rename(place)
+        _flush(place.parent)
+    except OSError as error:
+        raise cannot_write(error, place) from error
+
+
+def write_whole(path: Path, data: bytes) -> None:
+    """Write a file under a temporary name, and give it its own once it is on the disk.
+
+    Raises
+    ------
+    OutputError
+        Where it cannot be written.
+    """
+    part = path.with_name(f".{path.name}.{os.getpid()}-{secrets.token_hex(4)}.part")
+    try:
+        with part.open("wb") as file:
+            file.write(data)
+            file.flush()
+            os.fsync(file.fileno())
+        part.replace(path)
+    except OSError as error:
+        with suppress(OSError):
+            part.unlink()
+        raise cannot_write(error, path) from error
+
+
+def cannot_write(error: OSError, path: Path) -> OutputError:
+    """One sentence for an output that cannot be written."""
+    return OutputError(
+        f"{error.filename or path}: cannot be written ({error.strerror or error}); what is finished stays, "
+        "run the same command again to continue"
+    )
+
+
+def _exchange(one: Path, other: Path) -> bool:
+    if sys.platform != "linux":
+        return False
+    try:
+        call = ctypes.CDLL(None, use_errno=True).renameat2
+    except (AttributeError, OSError):
+        return False
+    done: int = call(_AT_FDCWD, os.fsencode(one), _AT_FDCWD, os.fsencode(other), _RENAME_EXCHANGE)
+    return done == 0
+
+
+def _flush(path: Path) -> None:
+    if os.name == "nt":
+        return
+    descriptor = os.open(path, os.O_RDONLY)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)

@@ -1,0 +1,201 @@
+"""Audit missions: leave what is done, run the rest on an engine, keep each end in the store as soon as it is known."""
+
+from __future__ import annotations
+
+import time
+from collections import deque
+from collections.abc import Sequence
+from concurrent.futures import FIRST_COMPLETED, Future, wait
+from dataclasses import dataclass, replace
+from typing import Any
+
+from diagnosis.audit.engines import Engine, is_lost
+from diagnosis.audit.events import Tell
+from diagnosis.audit.outcome import TRANSIENT, Outcome
+from diagnosis.audit.places import Claim, Working, claim_mission
+from diagnosis.audit.plan import Asked, Planned, is_done, known_hashes, stored_result
+from diagnosis.audit.store import Store, StoredResult
+from diagnosis.audit.task import Attempt, Task, audit_one, key_of
+
+TICK_S = 0.5
+_AHEAD = 2
+_LOST_TRIES = 5
+
+
+@dataclass
+class _Running:
+    planned: Planned
+    claim: Claim
+    number: int
+    tries: int = 1
+    lost: int = 0
+
+
+class Runner:
+    """One run over planned missions.
+
+    Parameters
+    ----------
+    asked : Asked
+        What is wanted.
+    store : Store
+        Where ends are kept; a run has begun in it.
+    engine : Engine
+        Where tasks run.
+    place : Working
+        The run's own folders.
+    tell : Tell
+        Told of every event: ``skipped``, ``mission``, ``retry``, ``waiting``, ``tick``.
+    """
+
+    def __init__(self, asked: Asked, store: Store, engine: Engine, place: Working, tell: Tell) -> None:
+        self._asked, self._store, self._engine, self._place, self._tell = asked, store, engine, place, tell
+        self._queue: deque[Planned] = deque()
+        self._elsewhere: deque[Planned] = deque()
+        self._running: dict[Future[Attempt], _Running] = {}
+
+    def run(self, planned: Sequence[Planned]) -> None:
+        """Run until every mission has ended.
+
+        Raises
+        ------
+        OutputError
+            Where the output cannot be written; what was kept before stays.
+        """
+        self._queue.extend(planned)
+        looked = time.monotonic()
+        try:
+            while self._queue or self._running or self._elsewhere:
+                self._fill()
+                if self._running:
+                    done, _ = wait(self._running, TICK_S, return_when=FIRST_COMPLETED)
+                    for future in done:
+                        self._finish(future)
+                elif not self._queue:
+                    time.sleep(TICK_S)
+                self._tell("tick", {})
+                if not self._queue and self._elsewhere and time.monotonic() - looked > 2 * TICK_S:
+                    looked = time.monotonic()
+                    self._queue, self._elsewhere = self._elsewhere, deque()
+        except BaseException:
+            self._engine.stop()
+            raise
+        finally:
+            for one in self._running.values():
+                one.claim.drop()
+
+    def _fill(self) -> None:
+        """Hand out as much as can run, and a little more, so that nobody waits."""
+        room = self._engine.capacity() + _AHEAD - len(self._running)
+        while self._queue and room > 0:
+            planned = self._queue.popleft()
+            if planned.problem:
+                self._refuse(planned)
+                continue
+            claim = claim_mission(self._asked.output, planned.mission.name)
+            if claim is None:
+                self._elsewhere.append(planned)
+                self._tell("waiting", {"name": planned.mission.name})
+                continue
+            result = stored_result(planned, self._store)
+            if self._asked.resume and result is not None and is_done(result, self._asked):  # by another run meanwhile
+                claim.drop()
+                skip(planned, result, self._store, self._tell)
+                continue
+            number = result.attempts + 1 if result is not None else 1
+            self._submit(_Running(planned, claim, number))
+            room -= 1
+
+    def _submit(self, one: _Running) -> None:
+        planned, asked = one.planned, self._asked
+        task = Task(
+            mission=planned.mission,
+            output=str(asked.output),
+            machine=planned.machine,
+            machine_source=planned.source,
+            machine_id=planned.machine_id,
+            config_hash=planned.config_hash,
+            folder=str(self._place.folder),
+            temporary="" if self._engine.shared else str(self._place.temporary),
+            attempt=one.number,
+            known=known_hashes(planned, self._store),
+            limits=asked.limits,
+            max_size_mb=asked.max_size_mb,
+            isolation=asked.isolation,
+            judge=asked.judge,
+        )
+        self._running[self._engine.executor.submit(audit_one, task)] = one
+
+    def _finish(self, future: Future[Attempt]) -> None:
+        one = self._running.pop(future)
+        try:
+            attempt = future.result()
+        except BaseException as error:
+            if not is_lost(error):
+                one.claim.drop()
+                raise
+            one.lost += 1
+            if one.lost < _LOST_TRIES:
+                self._tell("retry", {"name": one.planned.mission.name, "reason": "the worker was lost"})
+                self._submit(one)
+                return
+            attempt = self._lost(one)
+        again = attempt.outcome.state in TRANSIENT and one.tries <= self._asked.retries
+        keep(attempt, one.planned, self._store)
+        if again:
+            told = {"name": attempt.mission.name, "state": attempt.outcome.state, "reason": attempt.outcome.reason}
+            self._tell("retry", told)
+            self._submit(replace(one, number=one.number + 1, tries=one.tries + 1))
+            return
+        one.claim.drop()
+        self._tell("mission", facts_of(attempt))
+
+    def _lost(self, one: _Running) -> Attempt:
+        planned = one.planned
+        key = key_of(planned.mission, (), planned.machine, planned.config_hash)
+        outcome = Outcome("crashed", f"{_LOST_TRIES} workers were lost while they were at it")
+        return Attempt(planned.mission, key, outcome, one.number, None, ())
+
+    def _refuse(self, planned: Planned) -> None:
+        key = key_of(planned.mission, (), planned.machine, planned.config_hash)
+        attempt = Attempt(planned.mission, key, Outcome("unreadable", planned.problem), 1, None, ())
+        keep(attempt, planned, self._store)
+        self._tell("mission", facts_of(attempt))
+
+
+def keep(attempt: Attempt, planned: Planned, store: Store) -> None:
+    """Keep an attempt in the store, and what its files' hashes are."""
+    mission = attempt.mission
+    sizes = mission.sizes or (mission.bytes,) * len(mission.files)
+    if attempt.hashes:
+        for path, size, stamp, sha256 in zip(mission.files, sizes, mission.stamps, attempt.hashes, strict=True):
+            if store.known_hash(path, size, stamp) != sha256:
+                store.remember_hash(path, size, stamp, sha256)
+    store.record(mission, attempt.key, attempt.outcome, attempt.report, machine_id=planned.machine_id)
+
+
+def skip(planned: Planned, result: StoredResult, store: Store, tell: Tell) -> None:
+    """Let a mission have the result that is there."""
+    store.reuse(planned.mission, result)
+    facts = {"name": planned.mission.name, "state": result.state, "reason": result.reason, "verdict": result.verdict}
+    tell("skipped", {**facts, "report": result.report})
+
+
+def facts_of(attempt: Attempt) -> dict[str, Any]:
+    """Facts about a mission's end, for events."""
+    outcome = attempt.outcome
+    result = (outcome.summary or {}).get("result", {})
+    return {
+        "name": attempt.mission.name,
+        "files": list(attempt.mission.files),
+        "state": outcome.state,
+        "reason": outcome.reason,
+        "verdict": result.get("verdict"),
+        "title": result.get("title", ""),
+        "faults": len((outcome.summary or {}).get("faults", ())),
+        "report": attempt.report,
+        "attempt": attempt.number,
+        "wall_s": round(outcome.wall_s, 3),
+        "cpu_s": round(outcome.cpu_s, 3),
+        "peak_mb": round(outcome.peak_mb, 1),
+    }

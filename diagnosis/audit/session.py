@@ -1,0 +1,139 @@
+"""A whole audit: what is there, what is done, the rest, and the fleet page."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from contextlib import AbstractContextManager
+from dataclasses import dataclass, field
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+from diagnosis.audit.discover import Discovery
+from diagnosis.audit.endings import Ending, endings, write_failures
+from diagnosis.audit.engines import Engine
+from diagnosis.audit.events import Tell
+from diagnosis.audit.places import working
+from diagnosis.audit.plan import Asked, Planned, is_done, plan, stored_result
+from diagnosis.audit.runner import Runner, skip
+from diagnosis.audit.store import FILE_NAME, Store
+
+PAGE_S = 60.0
+_PAGE_SHARE = 20.0
+
+
+@dataclass(frozen=True)
+class Audited:
+    """What came of an audit.
+
+    Attributes
+    ----------
+    ends : tuple[Ending, ...]
+        How the missions stand.
+    skipped : int
+        Missions that were done before.
+    failed : int
+        Missions in ``failures.txt``.
+    """
+
+    ends: tuple[Ending, ...]
+    skipped: int
+    failed: int
+
+
+def overview(discovery: Discovery, asked: Asked) -> list[tuple[Planned, str]]:
+    """Each mission with its state: that of its result, or ``to do``; nothing is written."""
+    path = asked.output / FILE_NAME
+    planned = plan(discovery.missions, asked)
+    if not path.is_file():
+        return [(one, "to do") for one in planned]
+    out: list[tuple[Planned, str]] = []
+    with Store.open(path, read_only=True) as store:
+        for one in planned:
+            result = stored_result(one, store) if asked.resume else None
+            out.append((one, result.state if result is not None and is_done(result, asked) else "to do"))
+    return out
+
+
+def audit(
+    discovery: Discovery,
+    asked: Asked,
+    engine: Callable[[], AbstractContextManager[Engine]],
+    tell: Tell,
+    *,
+    baseline: Path | None = None,
+) -> Audited:
+    """Audit discovered missions.
+
+    Parameters
+    ----------
+    discovery : Discovery
+        From `diagnosis.audit.discover.discover`.
+    asked : Asked
+        What is wanted.
+    engine : Callable
+        Makes the engine, where there is something to do.
+    tell : Tell
+        Told of every event.
+    baseline : Path or None
+        Store of another audit to compare the fleet with.
+
+    Raises
+    ------
+    ConfigError
+        Where the machine file is off or the engine is not there.
+    OutputError
+        Where the output cannot be written; what was kept before stays.
+    """
+    with Store.open(asked.output / FILE_NAME) as store:
+        store.begin_run()
+        missions = store.adopt(discovery.missions, discovery.roots)
+        planned = plan(missions, asked)
+        rest = []
+        tell("start", {"missions": len(planned), "bytes": sum(m.bytes for m in missions)})
+        for one in planned:
+            result = stored_result(one, store) if asked.resume else None
+            if result is not None and is_done(result, asked):
+                skip(one, result, store, tell)
+            else:
+                rest.append(one)
+        page = _Page(asked.output, baseline, tell)
+        tell("planned", {"rest": len(rest), "bytes": sum(one.mission.bytes for one in rest)})
+        if rest:
+            with working(asked.output) as place, engine() as made:
+                Runner(asked, store, made, place, page.telling).run(rest)
+        ends = endings(store, [one.mission.name for one in planned])
+        failed = write_failures(asked.output, planned, ends, asked.machine)
+    page.write(always=bool(rest))
+    return Audited(tuple(ends), len(planned) - len(rest), failed)
+
+
+@dataclass
+class _Page:
+    """The fleet page, written anew every now and then while missions end."""
+
+    output: Path
+    baseline: Path | None
+    tell: Tell
+    due: float = field(default_factory=lambda: time.monotonic() + PAGE_S)
+
+    def telling(self, event: str, facts: dict[str, Any]) -> None:
+        """Pass an event on, and write the page when it is due."""
+        self.tell(event, facts)
+        if event == "tick" and time.monotonic() > self.due:
+            self.write(always=True)
+
+    def write(self, *, always: bool) -> None:
+        """Write the page; a failing page costs no mission."""
+        try:
+            write_fleet = import_module("diagnosis.audit.fleet").write_fleet
+        except ImportError:
+            return
+        if not always and self.baseline is None and (self.output / "fleet.html").is_file():
+            return
+        start = time.monotonic()
+        files = write_fleet(self.output / FILE_NAME, self.output, baseline=self.baseline)
+        took = time.monotonic() - start
+        self.due = time.monotonic() + max(PAGE_S, _PAGE_SHARE * took)
+        self.tell("page", {"path": str(files.html), "wall_s": round(took, 3)})

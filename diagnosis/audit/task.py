@@ -1,0 +1,180 @@
+"""One attempt at one mission, from its files to a result object: the function that every engine runs."""
+
+from __future__ import annotations
+
+import os
+import secrets
+import shutil
+import tempfile
+from collections.abc import Mapping
+from contextlib import suppress
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from diagnosis.audit import child
+from diagnosis.audit.child import Work
+from diagnosis.audit.discover import MissionSource
+from diagnosis.audit.identity import fallback_id
+from diagnosis.audit.isolated import isolation, run_isolated
+from diagnosis.audit.keys import Key, file_roles, log_hash, unhashed_log
+from diagnosis.audit.limits import Limits
+from diagnosis.audit.outcome import READ, Outcome
+from diagnosis.audit.places import MISSIONS, cannot_write, publish
+from replay.errors import LogError
+from replay.machine import Machine
+from replay.mission import content_hash
+from replay.version import __version__
+
+
+@dataclass(frozen=True)
+class Task:
+    """One attempt at one mission.
+
+    Attributes
+    ----------
+    mission : MissionSource
+        As found.
+    output : str
+        Folder of the audit.
+    machine : Machine
+        The mission's machine.
+    machine_source : str
+        Where its settings come from.
+    machine_id : str
+        Identity for trends; empty: what the log and the machine file say.
+    config_hash : str
+        From `diagnosis.audit.keys.config_hash`.
+    folder : str
+        The run's working folder, on the disk of the output.
+    temporary : str
+        The run's folder for temporary files; empty: one of this machine's own.
+    attempt : int
+        Number of the attempt: 1, 2, …
+    known : tuple[str, ...]
+        SHA-256 of each file where it is known already; empty: all are to be hashed.
+    limits : Limits
+        Of the child.
+    max_size_mb : float
+        Size the page should keep to [MB].
+    isolation : str
+        As in `diagnosis.audit.isolated.isolation`.
+    judge : str
+        As in `Work`; for tests.
+    """
+
+    mission: MissionSource
+    output: str
+    machine: Machine
+    machine_source: str
+    machine_id: str
+    config_hash: str
+    folder: str
+    temporary: str = ""
+    attempt: int = 1
+    known: tuple[str, ...] = ()
+    limits: Limits = field(default_factory=Limits)
+    max_size_mb: float = 15.0
+    isolation: str = ""
+    judge: str = "diagnosis.audit.child:judge"
+
+
+@dataclass(frozen=True)
+class Attempt:
+    """What came of a task.
+
+    Attributes
+    ----------
+    mission : MissionSource
+        As in the task.
+    key : Key
+        Of the result.
+    outcome : Outcome
+        How it ended.
+    number : int
+        Number of the attempt.
+    report : str or None
+        Folder of the report, relative to the output.
+    hashes : tuple[str, ...]
+        SHA-256 of each file; empty where they could not be read.
+    """
+
+    mission: MissionSource
+    key: Key
+    outcome: Outcome
+    number: int
+    report: str | None
+    hashes: tuple[str, ...]
+
+
+def key_of(mission: MissionSource, hashes: tuple[str, ...], machine: Machine, config_hash: str) -> Key:
+    """Key of a mission's result; without hashes, that of files which cannot be read."""
+    content = unhashed_log(mission)
+    if hashes:
+        content = log_hash(hashes, file_roles([Path(name).name for name in mission.files], machine))
+    return Key(content, config_hash, __version__)
+
+
+def audit_one(task: Task) -> Attempt:
+    """Hash a mission's files, diagnose them in a child, and move the report to its place.
+
+    Raises
+    ------
+    OutputError
+        Where the output cannot be written: no outcome of the mission, but of the audit.
+    """
+    name = f"{os.getpid()}-{secrets.token_hex(6)}"
+    folder = Path(task.folder) / name
+    try:
+        folder.mkdir(parents=True)
+        temporary = Path(tempfile.mkdtemp(prefix="mfhca-audit-", dir=task.temporary or None))
+    except OSError as error:
+        raise cannot_write(error, folder) from error
+    try:
+        return _audit(task, folder, temporary)
+    finally:
+        shutil.rmtree(folder, ignore_errors=True)
+        shutil.rmtree(temporary, ignore_errors=True)
+
+
+def _audit(task: Task, folder: Path, temporary: Path) -> Attempt:
+    files = tuple(Path(name) for name in task.mission.files)
+    before = _signature(files)
+    hashes = task.known
+    try:
+        hashes = hashes or tuple(content_hash(path)[0] for path in files)
+    except LogError as error:
+        key = key_of(task.mission, (), task.machine, task.config_hash)
+        return Attempt(task.mission, key, Outcome("unreadable", str(error)), task.attempt, None, ())
+    key = key_of(task.mission, hashes, task.machine, task.config_hash)
+    work = Work(
+        tuple(str(path) for path in files),
+        task.machine,
+        task.machine_source,
+        task.machine_id,
+        fallback_id(task.mission),
+        str(folder),
+        str(temporary),
+        task.max_size_mb,
+        task.judge,
+    )
+    outcome = run_isolated(work, task.limits, isolation(task.isolation, process=os.getpid()))
+    if _signature(files) != before:
+        gone = "was changed or removed while it was read; audit again once it is complete"
+        outcome = Outcome("unreadable", gone, outcome.wall_s, outcome.cpu_s, outcome.peak_mb)
+    report = None
+    if outcome.state in READ and (folder / child.REPORT).is_dir():
+        report = f"{MISSIONS}/{task.mission.name}"
+        publish(folder / child.REPORT, Path(task.output) / report)
+    return Attempt(task.mission, key, outcome, task.attempt, report, hashes)
+
+
+def _signature(files: tuple[Path, ...]) -> Mapping[str, tuple[int, ...]]:
+    """What changes with the files' content or place."""
+    found: dict[str, Any] = {}
+    for path in files:
+        for file in sorted(path.rglob("*")) if path.is_dir() else [path]:
+            with suppress(OSError):
+                status = file.stat()
+                found[str(file)] = (status.st_size, status.st_mtime_ns, status.st_ino)
+    return found
