@@ -19,6 +19,7 @@ from replay.errors import LogError, OutputError
 from replay.files import atomic_path, atomic_paths
 
 HTML, JSON, PARQUET = "report.html", "report.json", "report.parquet"
+_BLOCK = 1 << 15
 
 
 def write_result(result: MissionResult, folder: Path, *, max_size_mb: float = 15.0) -> tuple[Path, ...]:
@@ -51,7 +52,7 @@ def write_result(result: MissionResult, folder: Path, *, max_size_mb: float = 15
         ) from error
     columns = {k: v if k == "t" else _shortened(k, v) for k, v in result.columns.items()}
     with atomic_paths(folder / HTML, folder / JSON, folder / PARQUET) as (html, document, table):
-        pq.write_table(pa.table(columns), table, compression="zstd", use_dictionary=False, use_byte_stream_split=True)
+        pq.write_table(_table(columns), table, compression="zstd", use_dictionary=False, use_byte_stream_split=True)
         document.write_bytes(_json(result.report))
         _write_page(result.report, columns, html, max_size_mb)
     return folder / HTML, folder / JSON, folder / PARQUET
@@ -62,16 +63,30 @@ def _shortened(name: str, values: NDArray[np.float64] | NDArray[np.float32]) -> 
 
     Probabilities are rounded to 1/256.
     """
-    out = np.ascontiguousarray(values, dtype=np.float32)
-    if ".p_" in name:
-        return np.round(out * 256) / np.float32(256)
-    bits = {"evidence": 10, "replay": 14}.get(name.partition(".")[0])
+    bits = 8 if ".p_" in name else {"evidence": 10, "replay": 14}.get(name.partition(".")[0])
     if bits is None:
-        return out
-    drop = 23 - bits
-    raw = out.view(np.uint32)
-    rounded = ((raw.astype(np.uint64) + (1 << (drop - 1))) >> drop << drop).astype(np.uint32)
-    return np.where(np.isfinite(out), rounded, raw).view(np.float32)
+        return np.ascontiguousarray(values, dtype=np.float32)
+    out = np.empty(len(values), np.float32)
+    half, kept = np.uint32(1 << (22 - bits)), np.uint32(0xFFFFFFFF << (23 - bits) & 0xFFFFFFFF)
+    for i in range(0, len(out), _BLOCK):
+        part = out[i : i + _BLOCK]
+        part[:] = values[i : i + _BLOCK]
+        if ".p_" in name:
+            np.round(part * 256, out=part)
+            part /= 256
+            continue
+        raw = part.view(np.uint32)
+        np.copyto(raw, (raw + half) & kept, where=np.isfinite(part))
+    return out
+
+
+def _table(columns: Mapping[str, NDArray[Any]]) -> pa.Table:
+    """Table of columns without a copy (and without pandas, which pyarrow would load for its own conversion)."""
+    arrays = [
+        pa.Array.from_buffers(pa.from_numpy_dtype(v.dtype), len(v), [None, pa.py_buffer(np.ascontiguousarray(v))])
+        for v in columns.values()
+    ]
+    return pa.Table.from_arrays(arrays, names=list(columns))
 
 
 def rebuild(path: Path, *, max_size_mb: float = 15.0, previous: tuple[Path, Mapping[str, Any]] | None = None) -> Path:

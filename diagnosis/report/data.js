@@ -2,8 +2,9 @@
 // Time series of the report: decoded from the page's own text when first needed, thinned per pixel for drawing.
 const Data = (() => {
   const view = JSON.parse(document.getElementById("view").textContent);
-  const BLOCK = 64;
+  const BLOCK = 64, HELD = 64e6;
   const decoded = new Map();
+  let held = 0;
 
   function fromBase64(text) {
     if (Uint8Array.fromBase64) return Uint8Array.fromBase64(text);
@@ -12,10 +13,10 @@ const Data = (() => {
     return bytes;
   }
 
-  async function inflated(id) {
+  async function inflated(id, once) {
     const element = document.getElementById(id);
     const stream = new Blob([fromBase64(element.textContent)]).stream().pipeThrough(new DecompressionStream("deflate"));
-    element.textContent = "";
+    if (once) element.textContent = "";
     return new Response(stream);
   }
 
@@ -48,17 +49,29 @@ const Data = (() => {
     return { low, high };
   }
 
+  const bytes = ([, count, stride]) => 4 * count * (stride > 1 ? 2 : 1);
+
+  // A segment's levels. What was not drawn for longest is let go: its text stays in the page.
   function segment(c, j) {
-    const id = `c${c}-${j}`;
-    if (!decoded.has(id)) {
-      const [start, count, stride, planes] = view.channels[c].segments[j];
-      decoded.set(id, inflated(id).then((r) => r.arrayBuffer()).then((buffer) => {
-        const bytes = new Uint8Array(buffer), low = levels(bytes, 0, count, planes);
-        if (stride > 1) return { start, count, stride, low, high: levels(bytes, count * planes, count, planes) };
+    const shape = view.channels[c].segments[j], [start, count, stride, planes, block] = shape;
+    let entry = decoded.get(block);
+    if (entry) decoded.delete(block);
+    else {
+      held += bytes(shape);
+      const levelled = inflated(`b${block}`).then((r) => r.arrayBuffer()).then((buffer) => {
+        const raw = new Uint8Array(buffer), low = levels(raw, 0, count, planes);
+        if (stride > 1) return { start, count, stride, low, high: levels(raw, count * planes, count, planes) };
         return { start, count, stride, q: low, ...extremes(low) };
-      }));
+      });
+      entry = { shape, levelled };
     }
-    return decoded.get(id);
+    decoded.set(block, entry);
+    for (const [key, { shape: oldest }] of decoded) {
+      if (held <= HELD || key === block) break;
+      decoded.delete(key);
+      held -= bytes(oldest);
+    }
+    return entry.levelled;
   }
 
   // The segment with every sample that covers [a, b), else the extremes of the whole mission.
@@ -100,9 +113,6 @@ const Data = (() => {
     return { lo, hi, at, top, gap };
   }
 
-  // Samples that stand behind a point of a curve: of long missions two rows hold the extremes of `per` samples.
-  const samples = (curve) => (view.per > 1 ? Math.max(view.per, Math.round(curve.stride * view.per / 2)) : curve.stride);
-
   // Curve over [t0, t1] for about `pixels` pixels: every sample where few enough, else the extremes per pixel.
   async function curve(c, t0, t1, pixels) {
     const { step, base } = view.channels[c], [a, b] = range(t0, t1);
@@ -113,7 +123,7 @@ const Data = (() => {
     const exact = per === 1 && n <= 2 * pixels;
     if (exact) {
       for (let i = i0; i < i1; i++) { x.push(time(s.start + i)); y.push(value(s.q[i])); }
-      return { x, y, exact: view.per === 1, stride: 1 };
+      return { x, y, exact, stride: 1 };
     }
     const buckets = Math.min(n, pixels), width = n / buckets;
     for (let k = 0; k < buckets; k++) {
@@ -137,25 +147,35 @@ const Data = (() => {
   // Text as a cell that no spreadsheet takes for a formula.
   const guard = (s) => `"${(/^[=+\-@\t\r]/.test(s) ? "'" : "") + s.replaceAll('"', '""')}"`;
 
-  // Every stored value of some channels over [t0, t1] as CSV text; extremes where samples are not stored.
+  const ROWS = 200_000;
+
+  // Values of some channels over [t0, t1] as CSV text: every sample where any channel has it, else extremes of blocks.
   async function csv(columns, t0, t1) {
     const [a, b] = range(t0, t1), parts = await Promise.all(columns.map(({ c }) => segment(c, covering(c, a, b))));
-    const stride = Math.max(...parts.map((s) => s.stride)), lines = [];
-    const kind = view.per > 1 && stride === 1 ? `, extremes of ${view.per} samples` : "";
-    const heads = columns.map(({ c, unit }) => `${view.channels[c].name} [${unit}]${kind}`);
-    lines.push(["t [s]", ...(stride > 1 ? heads.flatMap((h) => [h + " min", h + " max"]) : heads)].map(guard).join(","));
+    const every = parts.some((s) => s.stride === 1) && (b - a <= ROWS || parts.every((s) => s.stride === 1));
+    const stride = every ? 1 : Math.max(...parts.map((s) => s.stride)), two = parts.map((s) => stride > 1 || s.stride > 1), lines = [];
+    const heads = columns.flatMap(({ c, unit }, j) => {
+      const name = `${view.channels[c].name} [${unit}]`;
+      return two[j] ? [`${name} min of ${Math.max(stride, parts[j].stride)}`, `${name} max of ${Math.max(stride, parts[j].stride)}`] : [name];
+    });
+    lines.push(["t [s]", ...heads].map(guard).join(","));
     const cell = (v, c, k) => (v ? ((view.channels[c].base + v) * view.channels[c].step * k).toPrecision(7) : "");
-    const digits = Math.max(3, Math.ceil(-Math.log10(view.dt)) + 1);
-    for (let i = Math.ceil(a / stride) * stride; i < b; i += stride) {
+    const digits = Math.max(3, Math.ceil(-Math.log10(view.dt)) + 1), half = view.dt / 2;
+    for (let i = Math.floor(a / stride) * stride; i < b; i += stride) {
       const t = view.t0 + i * view.dt;
-      if (t < t0 - view.dt / 2 || t > t1 + view.dt / 2) continue;
-      const row = [t.toFixed(digits)];
+      if (t + (stride - 1) * view.dt < t0 - half || t > t1 + half) continue;
+      const row = [t.toFixed(digits)], first = lines.length === 1;
       parts.forEach((s, j) => {
         const { c, k } = columns[j];
-        if (stride === 1) { row.push(cell(s.q[i - s.start], c, k)); return; }
+        if (!two[j]) { row.push(cell(s.q[i - s.start], c, k)); return; }
         let lo = 0, hi = 0;
-        if (s.stride > 1) { const p = Math.floor((i - s.start) / s.stride); lo = s.low[p]; hi = s.high[p]; }
-        else { const r = scan(s, Math.max(0, i - s.start), Math.min(s.count, i - s.start + stride)); if (r.hi) { lo = r.lo; hi = r.hi; } }
+        if (s.stride === 1) {
+          const r = scan(s, Math.max(0, i - s.start), Math.min(s.count, i - s.start + stride));
+          if (r.hi) { lo = r.lo; hi = r.hi; }
+        } else if (first || (i - s.start) % s.stride === 0) {
+          const p = Math.floor((i - s.start) / s.stride), e = Math.ceil((i - s.start + stride) / s.stride);
+          for (let q = p; q < Math.min(e, s.count); q++) if (s.high[q]) { lo = lo ? Math.min(lo, s.low[q]) : s.low[q]; hi = Math.max(hi, s.high[q]); }
+        }
         const [p, q] = k < 0 ? [hi, lo] : [lo, hi];
         row.push(cell(p, c, k), cell(q, c, k));
       });
@@ -167,7 +187,7 @@ const Data = (() => {
   // plotly.js: expanded from the page's own text; its hash stands in the page's policy.
   let loading = null;
   function plotly() {
-    loading ??= inflated("plotlyjs").then((r) => r.text()).then((source) => {
+    loading ??= inflated("plotlyjs", true).then((r) => r.text()).then((source) => {
       const script = document.createElement("script");
       script.textContent = source;
       document.head.append(script);
@@ -180,9 +200,9 @@ const Data = (() => {
   // Every fault as in report.json, by its name.
   let reading = null;
   function intervals() {
-    reading ??= inflated("intervals").then((r) => r.json());
+    reading ??= inflated("intervals", true).then((r) => r.json());
     return reading;
   }
 
-  return { view, curve, samples, csv, plotly, intervals, guard, fromBase64 };
+  return { view, curve, csv, plotly, intervals, guard, fromBase64 };
 })();

@@ -9,8 +9,7 @@ from __future__ import annotations
 import base64
 import math
 import zlib
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -19,9 +18,10 @@ from numpy.typing import NDArray
 _LEVELS = 2**24
 _HUGE, _TINY = 1e30, 1e-30
 _RESOLUTION = 1024
-_PROBE = 8192
+_PROBE, _PROBES = 4096, 5
 _BLOCK = 1 << 15
-_WORKERS = 4
+_NEARLY = 1.05
+_RUNS, _WORDS = (5, zlib.Z_RLE), (4, zlib.Z_DEFAULT_STRATEGY)
 
 
 @dataclass(frozen=True)
@@ -61,12 +61,31 @@ class Channel:
 
 
 @dataclass(frozen=True)
-class Window:
-    """Stretch of one fault that is wanted at full rate, in samples, with the columns that show it."""
+class Plan:
+    """How a column is encoded: quantisation step, way of deflating, bytes per sample that it may take."""
 
-    start: int
-    stop: int
-    columns: frozenset[str]
+    step: float
+    way: tuple[int, int]
+    rate: float
+
+
+def plan_of(values: NDArray[np.floating], lsb: float | None) -> Plan:
+    """Try a few stretches of a column: differences deflate better by their runs or by their repeated words.
+
+    Parameters
+    ----------
+    values : NDArray[np.floating], shape (n,)
+        Column; NaN where there is no sample.
+    lsb : float or None
+        Smallest increment of the recorded signal, in the column's unit.
+    """
+    step, n = step_of(values, lsb), len(values)
+    starts = range(0, n, max(_PROBE, n // _PROBES))
+    probes = [levels_of(values[i : i + _PROBE], step)[0] for i in starts]
+    raws = [_planes([p])[1] for p in probes]
+    sizes = {way: sum(len(_deflated(r, way)) for r in raws) for way in (_RUNS, _WORDS)}
+    way = _RUNS if sizes[_RUNS] <= _NEARLY * sizes[_WORDS] else _WORDS
+    return Plan(step, way, 4 / 3 * sizes[way] / max(1, sum(len(p) for p in probes)))
 
 
 def step_of(values: NDArray[np.floating], lsb: float | None) -> float:
@@ -135,141 +154,81 @@ def _quantised(values: NDArray[np.floating], step: float, base: float) -> NDArra
     return out
 
 
-def _zigzag(levels: NDArray[np.int32]) -> NDArray[np.uint32]:
-    delta = np.empty_like(levels)
-    delta[:1] = levels[:1]
-    np.subtract(levels[1:], levels[:-1], out=delta[1:])
-    return ((delta << 1) ^ (delta >> 31)).view(np.uint32)
+def _planes(parts: Sequence[NDArray[np.int32]]) -> tuple[int, bytes]:
+    """Bytes of the zigzag differences, lowest bytes of all first, and how many bytes a level takes."""
+    out = [np.zeros((4, len(p)), np.uint8) for p in parts]
+    planes = 1
+    for levels, rows in zip(parts, out, strict=True):
+        last = np.int32(0)
+        for part in _blocks(len(levels)):
+            delta = np.diff(levels[part], prepend=last)
+            last = levels[part][-1]
+            coded = ((delta << 1) ^ (delta >> 31)).view(np.uint32).astype("<u4", copy=False)
+            used = max(1, (int(coded.max()).bit_length() + 7) // 8)
+            rows[:used, part] = coded.view(np.uint8).reshape(-1, 4).T[:used]
+            planes = max(planes, used)
+    return planes, b"".join(rows[:planes].tobytes() for rows in out)
 
 
-def _segment(start: int, stride: int, parts: Sequence[NDArray[np.int32]]) -> Segment:
-    coded = [_zigzag(p) for p in parts]
-    top = max((int(c.max()) for c in coded if len(c)), default=0)
-    planes = max(1, (top.bit_length() + 7) // 8)
-    raw = b"".join(
-        np.ascontiguousarray(c.astype("<u4").view(np.uint8).reshape(-1, 4).T[:planes]).tobytes() for c in coded
-    )
-    text = base64.b64encode(zlib.compress(raw, 5)).decode("ascii")
+def _deflated(raw: bytes, way: tuple[int, int]) -> bytes:
+    packer = zlib.compressobj(way[0], zlib.DEFLATED, zlib.MAX_WBITS, 9, way[1])
+    return packer.compress(raw) + packer.flush()
+
+
+def _segment(start: int, stride: int, parts: Sequence[NDArray[np.int32]], way: tuple[int, int]) -> Segment:
+    planes, raw = _planes(parts)
+    text = base64.b64encode(_deflated(raw, way)).decode("ascii")
     return Segment(start, len(parts[0]), stride, planes, text)
 
 
-def _extremes(levels: NDArray[np.int32], stride: int) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
-    count = -(-len(levels) // stride)
-    padded = np.zeros(count * stride, np.int32)
-    padded[: len(levels)] = levels
-    blocks = padded.reshape(count, stride)
-    low = np.where(blocks == 0, np.int32(2**31 - 1), blocks).min(axis=1)
-    high = blocks.max(axis=1)
-    return np.where(high == 0, np.int32(0), low), high
+def _extremes(
+    low: NDArray[np.int32], high: NDArray[np.int32], times: int
+) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
+    """Extremes of every `times` of them; 0 where there is none."""
+    count = -(-len(low) // times)
+    blocks = np.zeros((2, count * times), np.int32)
+    blocks[0, : len(low)], blocks[1, : len(high)] = low, high
+    low, high = blocks[0].reshape(count, times), blocks[1].reshape(count, times)
+    least = np.where(low == 0, np.int32(2**31 - 1), low).min(axis=1)
+    most = high.max(axis=1)
+    return np.where(most == 0, np.int32(0), least), most
 
 
-def _full_size(values: NDArray[np.floating], step: float) -> float:
-    """Bytes per sample in the page, estimated from a few stretches."""
-    n = len(values)
-    starts = range(0, n, max(_PROBE, n // 6))
-    probes = [levels_of(values[i : i + _PROBE], step)[0] for i in starts]
-    return sum(len(_segment(0, 1, [p]).text) for p in probes) / max(1, sum(len(p) for p in probes))
+def whole(name: str, values: NDArray[np.floating], plan: Plan) -> Channel:
+    """Channel with every sample."""
+    levels, step, base = levels_of(values, plan.step)
+    return Channel(name, step, base, (_segment(0, 1, [levels], plan.way),))
 
 
-def _merged(windows: Iterable[Window], column: str) -> list[tuple[int, int]]:
-    spans: list[tuple[int, int]] = []
-    for w in sorted((w.start, w.stop) for w in windows if column in w.columns):
-        if spans and w[0] <= spans[-1][1]:
-            spans[-1] = (spans[-1][0], max(spans[-1][1], w[1]))
-        else:
-            spans.append(w)
-    return spans
-
-
-def _encode_one(name: str, values: NDArray[np.floating], step: float, stride: int) -> Channel:
-    levels, step, base = levels_of(values, step)
-    parts = [levels] if stride == 1 else _extremes(levels, stride)
-    return Channel(name, step, base, (_segment(0, stride, parts),))
-
-
-def _with_windows(channel: Channel, values: NDArray[np.floating], spans: Sequence[tuple[int, int]]) -> Channel:
-    """Channel of extremes with every sample of some stretches beside them."""
-    full = [_segment(a, 1, [_quantised(values[a:b], channel.step, channel.base)]) for a, b in spans if b > a]
-    return replace(channel, segments=(*channel.segments, *full))
-
-
-def windows_of(
-    faults: Sequence[tuple[float, float, frozenset[str]]], pad_s: float, step_s: float, samples: int
-) -> list[Window]:
-    """Stretches around onset and end of each fault (start [s], stop [s], columns), `pad_s` [s] on either side."""
-    windows = []
-    for start, stop, columns in faults:
-        edges = [(start, stop)] if stop - start <= 4 * pad_s else [(start, start), (stop, stop)]
-        for a, b in edges:
-            first, last = int((a - pad_s) / step_s), int((b + pad_s) / step_s) + 1
-            windows.append(Window(max(0, first), min(samples, last), columns))
-    return windows
-
-
-def encode(
-    columns: Mapping[str, NDArray[np.floating]],
-    lsb: Mapping[str, float],
-    faults: Sequence[tuple[float, float, frozenset[str]]],
-    step_s: float,
-    budget: int,
-) -> list[Channel]:
-    """Encode columns: every sample where that fits the budget, else extremes with full rate around faults.
+def reduced(name: str, values: NDArray[np.floating], plan: Plan, per: int, stride: int) -> Channel:
+    """Channel with the extremes of every `stride` samples.
 
     Parameters
     ----------
-    columns : Mapping[str, NDArray[np.floating]], each of shape (n,)
-        Columns to show.
-    lsb : Mapping[str, float]
-        Smallest increments of recorded columns, in their units.
-    faults : Sequence[tuple[float, float, frozenset[str]]]
-        Start [s] and stop [s] after the first sample, and the columns that show the fault; worst first.
-    step_s : float
-        Sample time [s].
-    budget : int
-        Bytes that the encoded columns may take together.
+    name : str
+        Column.
+    values : NDArray[np.floating], shape (n,)
+        Samples, or two rows with the extremes of each `per` samples.
+    plan : Plan
+        From `plan_of`.
+    per : int
+        1 for samples; `stride` is a multiple of it.
+    stride : int
+        Samples per block.
     """
-    if not columns:
-        return []
-    steps = {name: step_of(values, lsb.get(name)) for name, values in columns.items()}
-    samples = max(len(v) for v in columns.values())
-    with ThreadPoolExecutor(_WORKERS) as pool:
-
-        def run(stride: int) -> list[Channel]:
-            return list(pool.map(lambda c: _encode_one(c, columns[c], steps[c], stride), columns))
-
-        rates = dict(zip(columns, pool.map(lambda c: _full_size(columns[c], steps[c]), columns), strict=True))
-        if sum(rates.values()) * samples <= budget:
-            channels = run(1)
-            if sum(c.size for c in channels) <= budget:
-                return channels
-        stride = 64
-        while samples // stride > 32_768:
-            stride *= 2
-        while True:
-            channels = run(stride)
-            left = budget - sum(c.size for c in channels)
-            if left >= 0 or samples // stride <= 1024:
-                break
-            stride *= 2
-        chosen = _affordable(columns, rates, faults, step_s, samples, left)
-        return [_with_windows(c, columns[c.name], _merged(chosen, c.name)) for c in channels]
+    levels, step, base = levels_of(values, plan.step)
+    if per == 1:
+        low = high = levels
+    else:
+        low, high = _extremes(levels, levels, 2)
+    return Channel(name, step, base, (_segment(0, stride, _extremes(low, high, stride // per), _WORDS),))
 
 
-def _affordable(
-    columns: Mapping[str, NDArray[np.floating]],
-    rates: Mapping[str, float],
-    faults: Sequence[tuple[float, float, frozenset[str]]],
-    step_s: float,
-    samples: int,
-    budget: float,
-) -> list[Window]:
-    """Widest windows around as many faults, worst first, as the budget [bytes] pays for."""
-    count = len(faults)
-    while count:
-        for pad in (20.0, 10.0, 5.0, 2.0, 1.0):
-            windows = windows_of(faults[:count], pad, step_s, samples)
-            cost = sum(rates[c] * sum(b - a for a, b in _merged(windows, c)) for c in columns)
-            if cost <= 0.9 * budget:
-                return windows
-        count //= 2
-    return []
+def with_pieces(channel: Channel, pieces: Sequence[tuple[int, NDArray[np.floating]]], plan: Plan) -> Channel:
+    """Channel of extremes with every sample of some stretches (first sample and values) beside them."""
+    full = []
+    for start, values in pieces:
+        levels = _quantised(values, channel.step, channel.base)
+        levels[(levels < 1) & (np.abs(values) < _HUGE)] = 1
+        full.append(_segment(start, 1, [levels], plan.way))
+    return replace(channel, segments=(*channel.segments, *full))

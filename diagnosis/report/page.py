@@ -24,6 +24,7 @@ from markupsafe import Markup, escape
 from numpy.typing import NDArray
 
 from diagnosis.report import names, tables
+from diagnosis.report.choose import Closeups
 from diagnosis.report.evidence import evidence_of
 from diagnosis.report.figures import Columns, derived, loop_groups
 from diagnosis.report.pair import pair_of
@@ -32,7 +33,7 @@ from diagnosis.report.picture import machine_picture
 from diagnosis.report.previous import previous_section
 from diagnosis.report.svg import icon, path_picture, thumbnail
 from diagnosis.report.timeline import timeline
-from diagnosis.report.view import Axis, axis_of, channels_of, figures_of, packed_intervals, view, worst
+from diagnosis.report.view import Axis, axis_of, blocks_of, channels_of, figures_of, packed_intervals, view, worst
 from replay.errors import ConfigError
 
 _HERE = Path(__file__).parent
@@ -45,6 +46,7 @@ def build_page(
     report: Mapping[str, Any],
     columns: Mapping[str, NDArray[np.floating]],
     *,
+    closeups: Closeups | None = None,
     max_size_mb: float = 15.0,
     plotlyjs: Path | None = None,
 ) -> str:
@@ -56,6 +58,8 @@ def build_page(
         The parsed ``report.json``.
     columns : Mapping[str, NDArray[np.floating]], each of shape (n,)
         Time series on the uniform axis ``t`` [s]; NaN where there is no sample. May be empty.
+    closeups : Closeups or None
+        Every sample of some stretches, where the columns of a long mission are envelopes.
     max_size_mb : float
         Size the page should keep to [MB]; beyond it, extremes per block stand for samples except around faults.
     plotlyjs : Path or None
@@ -111,8 +115,12 @@ def build_page(
     words = 400_000 + 6_000 * len(detailed) + 1_500 * len(faults) + len(intervals)
     budget = int(max_size_mb * 1e6) - len(packed) - words - drawn
     worst_first = {**report, "intervals": detailed}
-    channels = channels_of(worst_first, shown, figures, groups, axis, max(budget, 200_000))
-    context["blocks"] = [(f"c{i}-{j}", s.text) for i, c in enumerate(channels) for j, s in enumerate(c.segments)]
+    near = None
+    if closeups is not None:
+        samples = {names.visible(k): v for k, v in closeups.columns.items()}
+        near = Closeups(closeups.step, derived(samples, faults))
+    channels = channels_of(worst_first, shown, figures, groups, axis, max(budget, 200_000), near)
+    context["blocks"] = [(f"b{i}", s.text) for i, s in enumerate(blocks_of(channels))]
     context["blocks"].append(("intervals", intervals))
     context["view"] = htmlsafe_json_dumps(view(report, channels, figures, groups, axis, duration), sort_keys=True)
     return _environment().get_template("template.html.j2").render(context)

@@ -108,7 +108,7 @@ class Figure {
 
   // Whether a row shows every sample or the extremes of several.
   static drawn(curves) {
-    return curves.every((c) => c.exact) ? "▪ every sample" : `▤ min–max of ${Math.max(...curves.map(Data.samples))} samples`;
+    return curves.every((c) => c.exact) ? "▪ every sample" : `▤ min–max of ${Math.max(...curves.map((c) => c.stride))} samples`;
   }
 
   // Title and legend of a row, wrapped to the figure's width; at the end how it is drawn.
@@ -194,12 +194,12 @@ class Figure {
 
   label(curves) {
     if (!this.badge) return;
-    const every = curves.every((c) => c.exact), { dt, per } = Data.view, rate = 1 / dt;
-    const stored = Math.max(...curves.map((c) => c.stored || 1)), s = Math.max(...curves.map(Data.samples)) * dt / (per > 1 ? per / 2 : 1);
+    const every = curves.every((c) => c.exact), { dt } = Data.view, rate = 1 / dt;
+    const stored = Math.max(...curves.map((c) => c.stored || 1)), s = Math.max(...curves.map((c) => c.stride)) * dt;
     const time = s < 1 ? `${+(s * 1e3).toPrecision(2)} ms` : `${+s.toPrecision(2)} s`;
     this.badge.textContent = every
       ? `every sample drawn · ${+rate.toPrecision(4)} Hz`
-      : `min–max envelope · ${time}` + (per > 1 ? ` · extremes of ${per} samples stored` : stored > 1 ? " · samples stored around faults only" : " per pixel");
+      : `min–max envelope · ${time}` + (stored === 1 ? " per pixel" : Data.view.closeups ? " · every sample around faults" : ` · extremes of ${stored} samples stored`);
     this.badge.classList.toggle("full", every);
   }
 

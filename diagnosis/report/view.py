@@ -13,7 +13,8 @@ import orjson
 from numpy.typing import NDArray
 
 from diagnosis.report import names, tables
-from diagnosis.report.encode import Channel, encode
+from diagnosis.report.choose import Closeups, Mission, encode
+from diagnosis.report.encode import Channel, Segment
 from diagnosis.report.figures import Columns, Group, Row, fault_rows, row_json
 from diagnosis.report.pair import DEGREES, VALVE_UNIT
 
@@ -46,6 +47,16 @@ class Axis:
     step: float
     rows: int
     per: int = 1
+
+    @property
+    def sample_s(self) -> float:
+        """Time between samples [s]."""
+        return self.step if self.per == 1 else 2 * self.step / self.per
+
+    @property
+    def samples(self) -> int:
+        """Samples of the mission."""
+        return self.rows if self.per == 1 else self.rows // 2 * self.per
 
 
 def axis_of(columns: Mapping[str, NDArray[np.floating]], rate: Any) -> Axis:
@@ -106,6 +117,7 @@ def channels_of(
     groups: Sequence[Group],
     axis: Axis,
     budget: int,
+    closeups: Closeups | None = None,
 ) -> list[Channel]:
     """Encode all columns: those that a figure shows first, the others with what is left of the budget [bytes]."""
     rows = [r for group in {id(g): g for g in figures.values()}.values() for r in group]
@@ -113,18 +125,20 @@ def channels_of(
     used = dict.fromkeys(c for r in rows for c in r.columns())
     others = [c for c in columns if c not in used and c != "t"]
     lsb = {s["name"]: s["lsb"] for s in report.get("signals") or () if s.get("lsb")}
+    rank = {"high": 0, "medium": 1, "low": 2}
     faults = [
         (
             f["start_s"] - axis.start,
             f["stop_s"] - axis.start,
             frozenset(c for r in figures[f["id"]] for c in r.columns()),
         )
-        for f in report.get("intervals") or ()
+        for f in sorted(report.get("intervals") or (), key=lambda f: rank.get(str(f.get("severity")), 3))
     ]
+    near = closeups if axis.per > 1 else None
     first = int((1 - _OTHERS) * budget) if others else budget
-    shown = encode({c: columns[c] for c in used}, lsb, faults, axis.step, first)
-    left = max(budget - sum(c.size for c in shown), _LEAST)
-    return shown + encode({c: columns[c] for c in others}, lsb, [], axis.step, left)
+    shown = encode(Mission({c: columns[c] for c in used}, lsb, faults, axis.sample_s, axis.per, near), first)
+    left = max(budget - sum({id(s): len(s.text) for c in shown for s in c.segments}.values()), _LEAST)
+    return shown + encode(Mission({c: columns[c] for c in others}, lsb, [], axis.sample_s, axis.per), left)
 
 
 def units_of(
@@ -167,6 +181,11 @@ def packed_intervals(faults: Sequence[Mapping[str, Any]]) -> str:
     return base64.b64encode(zlib.compress(orjson.dumps({f["id"]: f for f in faults}), 6)).decode("ascii")
 
 
+def blocks_of(channels: Sequence[Channel]) -> list[Segment]:
+    """The segments of all channels, those that several channels share once."""
+    return list({id(s): s for c in channels for s in c.segments}.values())
+
+
 def view(
     report: Mapping[str, Any],
     channels: Sequence[Channel],
@@ -175,7 +194,8 @@ def view(
     axis: Axis,
     duration: float,
 ) -> dict[str, Any]:
-    """What the page's scripts need to know, as JSON."""
+    """What the page's scripts need to know, as JSON; a segment's last number is its place among `blocks_of`."""
+    block = {id(s): i for i, s in enumerate(blocks_of(channels))}
     index = {c.name: i for i, c in enumerate(channels)}
     distinct = {id(rows): rows for rows in figures.values()}
     place = {key: i for i, key in enumerate(distinct)}
@@ -196,9 +216,9 @@ def view(
     units = units_of([c.name for c in channels], report, figures, groups)
     return {
         "t0": axis.start,
-        "dt": axis.step,
-        "n": axis.rows,
-        "per": axis.per,
+        "dt": axis.sample_s,
+        "n": axis.samples,
+        "closeups": any(len(c.segments) > 1 for c in channels),
         "duration": duration,
         "name": tables.machine_name(report),
         "faults": faults,
@@ -211,7 +231,7 @@ def view(
                 "k": k,
                 "step": c.step,
                 "base": c.base,
-                "segments": [[s.start, s.count, s.stride, s.planes] for s in c.segments],
+                "segments": [[s.start, s.count, s.stride, s.planes, block[id(s)]] for s in c.segments],
             }
             for c, (unit, k) in zip(channels, units, strict=True)
         ],

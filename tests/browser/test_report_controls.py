@@ -79,7 +79,7 @@ def test_extremes_stored_of_a_long_mission_are_never_called_samples(open_page: O
     expect(page.locator("#figure")).not_to_contain_text("every sample")
     with page.expect_download() as download:
         page.locator("[data-act=csv][data-of=evidence]").click()
-    assert ", extremes of 64 samples" in Path(download.value.path()).read_text(encoding="utf-8").splitlines()[0]
+    assert " min of 64" in Path(download.value.path()).read_text(encoding="utf-8").splitlines()[0]
 
 
 def test_files_of_a_fault(open_page: OPEN) -> None:

@@ -11,7 +11,8 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from diagnosis.report.encode import Channel, Segment, encode, levels_of, step_of, windows_of
+from diagnosis.report.choose import Closeups, Mission, encode, spans_of
+from diagnosis.report.encode import Channel, Segment, levels_of, step_of
 
 
 def decoded(channel: Channel, segment: Segment) -> list[NDArray[np.float64]]:
@@ -31,19 +32,19 @@ def decoded(channel: Channel, segment: Segment) -> list[NDArray[np.float64]]:
 
 def test_values_on_the_sensors_grid_come_back_exactly() -> None:
     values = 0.0015 * np.array([0, 3, 3, -2, 240, 0, 1])
-    (channel,) = encode({"v": values}, {"v": 0.0015}, [], 0.001, 10**6)
+    (channel,) = encode(Mission({"v": values}, {"v": 0.0015}, [], 0.001), 10**6)
     np.testing.assert_allclose(decoded(channel, channel.segments[0])[0], values, atol=1e-12)
 
 
 def test_gaps_stay_gaps() -> None:
     values = np.array([1.0, np.nan, np.inf, 2.0, np.nan])
-    (channel,) = encode({"v": values}, {}, [], 0.001, 10**6)
+    (channel,) = encode(Mission({"v": values}, {}, [], 0.001), 10**6)
     back = decoded(channel, channel.segments[0])[0]
     assert np.isnan(back).tolist() == [False, True, True, False, True]
 
 
 def test_column_without_any_sample() -> None:
-    (channel,) = encode({"v": np.full(5, np.nan)}, {}, [], 0.001, 10**6)
+    (channel,) = encode(Mission({"v": np.full(5, np.nan)}, {}, [], 0.001), 10**6)
     assert np.isnan(decoded(channel, channel.segments[0])[0]).all()
 
 
@@ -64,7 +65,7 @@ def test_outlier_coarsens_the_step_instead_of_overflowing() -> None:
 @example([1e29, -1e29, 0.0])
 def test_every_value_comes_back_within_half_a_step(values: list[float]) -> None:
     column = np.array(values)
-    (channel,) = encode({"v": column}, {}, [], 0.001, 10**7)
+    (channel,) = encode(Mission({"v": column}, {}, [], 0.001), 10**7)
     back = decoded(channel, channel.segments[0])[0]
     assert (np.isnan(back) == np.isnan(column)).all()
     assert np.nanmax(np.append(np.abs(back - column), 0.0)) <= 0.501 * channel.step
@@ -73,7 +74,7 @@ def test_every_value_comes_back_within_half_a_step(values: list[float]) -> None:
 def test_beyond_the_budget_extremes_stand_everywhere_and_samples_around_faults() -> None:
     rng = np.random.default_rng(1)
     values = {"v": rng.normal(size=200_000), "w": rng.normal(size=200_000)}
-    channels = encode(values, {}, [(50.0, 51.0, frozenset({"v"}))], 0.001, 150_000)
+    channels = encode(Mission(values, {}, [(50.0, 51.0, frozenset({"v"}))], 0.001), 150_000)
     v, w = channels
     assert sum(c.size for c in channels) <= 150_000
     assert [s.stride > 1 for s in v.segments] == [True, False]
@@ -88,11 +89,58 @@ def test_beyond_the_budget_extremes_stand_everywhere_and_samples_around_faults()
     np.testing.assert_allclose(high, np.nanmax(blocks, axis=1), atol=v.step)
 
 
-def test_long_fault_has_windows_at_onset_and_end() -> None:
-    windows = windows_of([(100.0, 200.0, frozenset({"v"}))], 2.0, 0.01, 100_000)
-    assert [(w.start, w.stop) for w in windows] == [(9_800, 10_201), (19_800, 20_201)]
+def test_long_fault_has_stretches_at_onset_and_end_and_a_short_one_is_whole() -> None:
+    assert spans_of([(100.0, 200.0)], 2.0, 0.01, 100_000) == [(9_800, 10_202), (19_800, 20_202)]
+    assert spans_of([(100.0, 104.0)], 1.0, 0.01, 100_000) == [(9_790, 10_612)]
+    assert spans_of([(100.0, 104.0), (105.0, 105.2)], 1.0, 0.01, 100_000) == [(9_790, 10_632)]
+    assert spans_of([(0.0, 1.0)], 1.0, 0.01, 150) == [(0, 150)]
+
+
+def long_mission() -> tuple[dict[str, NDArray[np.float64]], Mission]:
+    """Samples of two columns, and the same as extremes of 16 samples with every sample of two stretches."""
+    rng = np.random.default_rng(2)
+    samples = {name: np.round(rng.normal(size=160_000), 3) for name in ("v", "w")}
+    samples["w"][90_000:90_400] = np.nan
+    rows = {k: np.stack([v.reshape(-1, 16).min(1), v.reshape(-1, 16).max(1)], 1).ravel() for k, v in samples.items()}
+    step = np.r_[48_000:54_000, 88_000:94_000]
+    near = {k: v[step] for k, v in samples.items()}
+    near["w"][:6_000] = np.nan
+    faults = [(50.0, 51.0, frozenset({"v", "w"})), (90.0, 91.0, frozenset({"v", "w"}))]
+    return samples, Mission(rows, {"v": 0.001, "w": 0.001}, faults, 0.001, 16, Closeups(step, near))
+
+
+def test_extremes_of_a_long_mission_keep_its_stretches_of_samples() -> None:
+    samples, mission = long_mission()
+    v, w = encode(mission, 10**6)
+    assert [(s.start, s.stride) for s in v.segments] == [(0, 64), (48_000, 1), (88_000, 1)]
+    assert [(s.start, s.count) for s in w.segments[1:]] == [(88_000, 6_000)]  # of the first stretch nothing was kept
+    for full in v.segments[1:]:
+        exact = samples["v"][full.start : full.start + full.count]
+        np.testing.assert_allclose(decoded(v, full)[0], exact, atol=1e-9)
+    assert np.isnan(decoded(w, w.segments[1])[0]).sum() == 400
+    low, high = decoded(w, w.segments[0])
+    blocks = np.pad(samples["w"], (0, -160_000 % 64)).reshape(-1, 64)
+    empty = np.isnan(low)
+    assert empty.sum() > 0
+    np.testing.assert_allclose(low[~empty], np.nanmin(blocks[~empty], axis=1), atol=1e-9)
+    np.testing.assert_allclose(high[~empty], np.nanmax(blocks[~empty], axis=1), atol=1e-9)
+
+
+def test_columns_with_the_same_numbers_share_their_text() -> None:
+    one = np.sin(np.arange(9000) / 100)
+    a, b, c = encode(Mission({"a": one, "b": one.copy(), "c": -one}, {}, [], 0.001), 10**6)
+    assert a.segments[0] is b.segments[0]
+    assert (a.name, b.name) == ("a", "b")
+    assert c.segments[0] is not a.segments[0]
+
+
+def test_recorded_columns_keep_every_sample_where_only_some_can() -> None:
+    rng = np.random.default_rng(3)
+    columns = {f"{part}.{i}": rng.normal(size=200_000) for part in ("evidence.A", "wheel.A") for i in range(3)}
+    found = {c.name: c.segments[0].stride for c in encode(Mission(columns, {}, [], 0.001), 1_400_000)}
+    assert {k for k, stride in found.items() if stride == 1} == {"wheel.A.0", "wheel.A.1", "wheel.A.2"}
 
 
 def test_same_input_gives_the_same_text() -> None:
     values = {f"c{i}": np.sin(np.arange(5000) / (i + 1)) for i in range(6)}
-    assert encode(values, {}, [], 0.01, 10**6) == encode(values, {}, [], 0.01, 10**6)
+    assert encode(Mission(values, {}, [], 0.01), 10**6) == encode(Mission(values, {}, [], 0.01), 10**6)
