@@ -5,13 +5,13 @@ from __future__ import annotations
 import glob
 import math
 import re
-import sys
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from replay.errors import ConfigError, LogError
+from replay.log_files import LOG_ENDINGS, is_result, words_of
 from replay.readers.regular import check_regular
 
 if TYPE_CHECKING:
@@ -19,7 +19,6 @@ if TYPE_CHECKING:
 
 DEFAULT_MACHINE = "paper defaults"
 _PART = re.compile(r"_\d+\.(db3|mcap)$", re.IGNORECASE)
-LOG_ENDINGS = (".mcap", ".bag", ".db3", ".csv", ".csv.gz", ".csv.zst", ".txt", ".parquet", ".svdx", ".tdms")
 
 
 def machine_of(path: Path | None) -> tuple[Machine, str]:
@@ -122,7 +121,7 @@ def find_logs(words: Iterable[str]) -> FoundLogs:
     """Expand files, folders, globs and ``-`` (paths on stdin, one per line)."""
     found = FoundLogs([], [])
     seen: set[Path] = set()
-    for word in _words(words):
+    for word in words_of(words):
         path = Path(word)
         if path.exists():
             hits = [path]
@@ -142,14 +141,6 @@ def find_logs(words: Iterable[str]) -> FoundLogs:
     return found
 
 
-def _words(words: Iterable[str]) -> Iterator[str]:
-    for word in words:
-        if word == "-":
-            yield from (line.rstrip("\r\n") for line in sys.stdin if line.strip())
-        else:
-            yield word
-
-
 def _logs_at(path: Path, found: FoundLogs) -> Iterator[Path]:
     """Yield a file itself, a rosbag2 folder as one log, or the logs in a folder and below; links to folders are not followed."""
     if not path.is_dir() or (path / "metadata.yaml").is_file():
@@ -159,12 +150,7 @@ def _logs_at(path: Path, found: FoundLogs) -> Iterator[Path]:
         if child.is_dir():
             if not child.is_symlink() and not child.name.startswith("."):
                 yield from _logs_at(child, found)
-        elif child.name.lower().endswith(LOG_ENDINGS) and not child.name.startswith(".") and not _is_result(child):
+        elif child.name.lower().endswith(LOG_ENDINGS) and not child.name.startswith(".") and not is_result(child):
             yield child
         else:
             found.left_aside += 1
-
-
-def _is_result(path: Path) -> bool:
-    """Whether a table is the saved result of a diagnosis."""
-    return path.name == "report.parquet" and path.with_name("report.json").is_file()

@@ -6,8 +6,9 @@ import json
 from collections.abc import Sequence
 from pathlib import Path
 
-from cli.inputs import LOG_ENDINGS, mission_paths
+from cli.inputs import mission_paths
 from replay.errors import ConfigError, LogError
+from replay.log_files import LOG_ENDINGS
 
 
 def results_and_truths(words: Sequence[Path], truth: Path | None) -> list[tuple[Path, Path]]:

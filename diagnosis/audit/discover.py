@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+import os
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+
+from diagnosis.audit.finder import Finder
+from diagnosis.audit.names import unique_names
+from replay.log_files import words_of
 
 
 @dataclass(frozen=True)
@@ -63,6 +68,9 @@ class Discovery:
 def discover(words: Iterable[str], *, exclude: Path | None = None) -> Discovery:
     """Find missions behind files, folders, globs, ``-`` (names on stdin, one per line) and URLs.
 
+    One mission each: a rosbag2 folder; the numbered parts of a split recording; a recording with tables of the same stem
+    beside it; a folder with a ``mission.toml``; any other log.
+
     Parameters
     ----------
     words : Iterable[str]
@@ -70,10 +78,43 @@ def discover(words: Iterable[str], *, exclude: Path | None = None) -> Discovery:
     exclude : Path or None
         Folder of the audit's own results, which is not looked into.
     """
-    missions = []
-    for word in words:
-        place = Path(word)
-        for path in [place] if place.is_file() else sorted(place.rglob("*.mcap")):
-            size, stamp = path.stat().st_size, str(path.stat().st_mtime_ns)
-            missions.append(MissionSource(path.stem, (str(path),), size, (stamp,), sizes=(size,)))
-    return Discovery(tuple(missions))
+    finder = Finder(os.path.realpath(exclude) if exclude is not None else "")
+    local, remote = list[str](), list[str]()
+    for word in dict.fromkeys(words_of(words)):
+        (remote if "://" in word else local).append(word)
+    finder.local(local)
+    if remote:
+        from diagnosis.audit.remote import look_remotely
+
+        look_remotely(finder, remote)
+    found = finder.missions()
+    base = _common(finder.bases)
+    paths = [(f"{f.folder}/{f.stem}", f"{f.folder}/{f.files[0].name}") for f in found]
+    names = unique_names([(_below(stem, base), _below(path, base)) for stem, path in paths])
+    missions = [
+        MissionSource(
+            name=name,
+            files=tuple(e.path for e in f.files),
+            bytes=sum(e.size for e in f.files),
+            stamps=tuple(e.stamp for e in f.files),
+            machine_id=f.told.machine_id,
+            machine_file=f.told.machine,
+            sizes=tuple(e.size for e in f.files),
+        )
+        for f, name in zip(found, names, strict=True)
+    ]
+    missions.sort(key=lambda m: (m.name.casefold(), m.name))
+    return Discovery(tuple(missions), tuple(finder.problems), finder.left_aside, tuple(dict.fromkeys(finder.roots)))
+
+
+def _common(bases: Sequence[str]) -> list[str]:
+    """Parts of the path that all bases share."""
+    parts = [base.replace(os.sep, "/").split("/") for base in bases]
+    shared = min(parts, key=len, default=[])
+    while any(p[: len(shared)] != shared for p in parts):
+        shared = shared[:-1]
+    return shared
+
+
+def _below(path: str, base: Sequence[str]) -> str:
+    return "/".join(path.replace(os.sep, "/").split("/")[len(base) :])

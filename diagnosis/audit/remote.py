@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
+from diagnosis.audit.finder import Finder
 from replay.errors import ConfigError
 
 
@@ -26,3 +28,8 @@ def file_system(url: str) -> tuple[Any, str]:
     except ValueError as error:
         raise ConfigError(f"{url}: {error}; expected a path, s3://, gs:// or another URL that fsspec knows") from error
     return system, path
+
+
+def look_remotely(finder: Finder, urls: Sequence[str]) -> None:
+    """Find what URLs stand for."""
+    raise NotImplementedError

@@ -1,4 +1,4 @@
-"""ROS 1 bags (format 2.0): indexed or not, complete, cut off or damaged."""
+"""ROS 1 bags (format 2.0): indexed or not, complete, cut off or damaged; and folders with the parts of a split one."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from replay.errors import LogError
 from replay.rawlog import Clock, LogSummary, RawLog, TopicInfo, Window
+from replay.readers import ros1_parts
 from replay.readers.assemble import Assembler, Block, Connection
 from replay.readers.bag_records import CONNECTION, MESSAGE, BagRecords, scan_bag
 from replay.readers.clocks import Report
@@ -32,9 +33,12 @@ class Ros1BagReader:
     format = "bag"
 
     def matches(self, path: Path) -> bool:
-        """Whether the file starts with a bag's magic line, or is called a bag and holds a bag's records."""
-        if not path.is_file():
-            return False
+        """Whether the file starts with a bag's magic line, or is called a bag and holds a bag's records.
+
+        Of a folder: whether it holds the numbered parts of one split bag.
+        """
+        if path.is_dir():
+            return bool(ros1_parts.parts_in(path))
         with path.open("rb") as file:
             head = file.read(len(MAGIC))
             if head == MAGIC or path.suffix != ".bag":
@@ -49,10 +53,14 @@ class Ros1BagReader:
         LogError
             Where nothing in the bag can be read.
         """
-        reading = _Reading(open_bag(path, Report(), whole=False), (), None)
-        for _ in reading.blocks():
-            pass
-        return reading.summary()
+
+        def summarise(part: Path) -> LogSummary:
+            reading = _Reading(open_bag(part, Report(), whole=False), (), None)
+            for _ in reading.blocks():
+                pass
+            return reading.summary()
+
+        return ros1_parts.over_parts(path, summarise) if path.is_dir() else summarise(path)
 
     def read(
         self,
@@ -69,13 +77,17 @@ class Ros1BagReader:
         LogError
             Where nothing in the bag can be read.
         """
-        report = Report()
-        reading = _Reading(open_bag(path, report, whole=window is None), topics, window)
-        assembler = Assembler(clock, report)
-        reading.foretell(assembler)
-        for blocks in reading.blocks():
-            assembler.add(blocks)
-        return assembler.finish(reading.summary())
+        assembler = Assembler(clock, report := Report())
+
+        def take(part: Path) -> LogSummary:
+            mine = Report() if path.is_dir() else report
+            reading = _Reading(open_bag(part, mine, whole=window is None), topics, window)
+            reading.foretell(assembler)
+            for blocks in reading.blocks():
+                assembler.add(blocks)
+            return reading.summary()
+
+        return assembler.finish(ros1_parts.over_parts(path, take) if path.is_dir() else take(path))
 
 
 class _Reading:
