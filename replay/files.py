@@ -47,7 +47,8 @@ def atomic_path(path: Path, *, folder: bool = False) -> Iterator[Path]:
     except OSError as error:
         raise OutputError(f"{path}: cannot be written ({error.strerror or error}); give another place") from error
     finally:
-        _remove(temporary)
+        with suppress(OSError):  # a read-only place refuses this too
+            _remove(temporary)
 
 
 @contextmanager

@@ -2,22 +2,18 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping, Sequence
 from functools import lru_cache
-from pathlib import Path
 from typing import Any
 
 import jinja2
-from markupsafe import Markup
 
 from diagnosis.compare_faults import GONE
 from diagnosis.compare_words import CHANGES, OUTCOMES, headline, times
 from diagnosis.report import names
+from diagnosis.report.plain import POLICY, environment, plain_style
 from diagnosis.report.svg import icon
 
-_HERE = Path(__file__).parent
-_POLICY = "default-src 'none'; style-src 'unsafe-inline'; img-src data:; base-uri 'none'; form-action 'none'"
 _SIGNS = {
     "new": "+",
     "worse": "▲",
@@ -55,12 +51,14 @@ def build_compare_page(document: Mapping[str, Any]) -> str:
         groups.append(
             {"outcome": outcome, "words": words[0].upper() + words[1:], "sign": _SIGNS[outcome], "rows": rows}
         )
+    missions = [_mission(word, document[word]) for word in ("older", "newer")]
     context = {
-        "css": Markup(_css()),
-        "csp": _POLICY,
+        "title": f"{missions[0]['name']} and {missions[1]['name']}",
+        "css": plain_style("compare.css"),
+        "csp": POLICY,
         "worse": document["worse"],
         "headline": headline(document["counts"]),
-        "missions": [_mission(word, document[word]) for word in ("older", "newer")],
+        "missions": missions,
         "groups": groups,
         "coverage": [_coverage(c) for c in document["coverage"]],
         "metrics": [_metric(m) for m in document["metrics"]],
@@ -71,24 +69,10 @@ def build_compare_page(document: Mapping[str, Any]) -> str:
 
 
 @lru_cache
-def _css() -> str:
-    """Style of the mission report, dark by the system's choice alone, and what is special to this page."""
-    shared = (_HERE / "report.css").read_text("utf-8")
-    dark = re.sub(r"\[data-theme=dark\] \{([^}]*)\}", r"@media (prefers-color-scheme: dark) { :root {\1} }", shared)
-    return dark + (_HERE / "compare.css").read_text("utf-8")
-
-
-@lru_cache
 def _environment() -> jinja2.Environment:
-    environment = jinja2.Environment(
-        loader=jinja2.FileSystemLoader(_HERE),
-        autoescape=True,
-        undefined=jinja2.StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
-    environment.globals |= {"icon": icon}
-    return environment
+    found = environment()
+    found.globals |= {"icon": icon}
+    return found
 
 
 def _mission(word: str, m: Mapping[str, Any]) -> dict[str, Any]:

@@ -30,6 +30,7 @@ from diagnosis.report.figures import Columns, derived, loop_groups
 from diagnosis.report.pair import pair_of
 from diagnosis.report.path import driven_path
 from diagnosis.report.picture import machine_picture
+from diagnosis.report.plain import environment
 from diagnosis.report.previous import previous_section
 from diagnosis.report.svg import icon, path_picture, thumbnail
 from diagnosis.report.timeline import timeline
@@ -182,14 +183,8 @@ def _headed(rows: Markup, heads: Sequence[str]) -> Markup:
 
 @lru_cache
 def _environment() -> jinja2.Environment:
-    environment = jinja2.Environment(
-        loader=jinja2.FileSystemLoader(_HERE),
-        autoescape=True,
-        undefined=jinja2.StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
-    environment.filters |= {"clock": names.clock, "span": names.span, "num": names.number, "state": names.state_label}
-    environment.filters["headed"] = _headed
-    environment.globals |= {"icon": icon, "known": names.known, "part": names.part, "title": names.fault_title}
-    return environment
+    found = environment()
+    found.filters |= {"clock": names.clock, "span": names.span, "num": names.number, "state": names.state_label}
+    found.filters["headed"] = _headed
+    found.globals |= {"icon": icon, "known": names.known, "part": names.part, "title": names.fault_title}
+    return found

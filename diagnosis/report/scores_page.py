@@ -2,21 +2,18 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterator, Mapping, Sequence
 from functools import lru_cache
-from pathlib import Path
 from typing import Any
 
 import jinja2
 from markupsafe import Markup
 
 from diagnosis.report import names
+from diagnosis.report.plain import POLICY, environment, plain_style
 from diagnosis.report.scores_svg import distribution, reliability_diagram
 from diagnosis.report.svg import icon
 
-_HERE = Path(__file__).parent
-_POLICY = "default-src 'none'; style-src 'unsafe-inline'; img-src data:; base-uri 'none'; form-action 'none'"
 _TITLES = {"wheel": "Wheels", "steer": "Steering"}
 _TIMES = {
     "detection_delay_s": "Detection delay",
@@ -66,10 +63,12 @@ def build_scores_page(document: Mapping[str, Any]) -> str:
     results = document["results"]
     groups = [_group(key, figures, results) for key, figures in document["all"].items()]
     left_out = [f"{r['result']}: {', '.join(r['left_out'])}" for r in results if r["left_out"]]
+    count = f"{names.grouped(len(results))} mission{'s' if len(results) != 1 else ''}"
     context = {
-        "css": Markup(_css()),
-        "csp": _POLICY,
-        "count": f"{names.grouped(len(results))} mission{'s' if len(results) != 1 else ''}",
+        "title": f"Evaluation of {count}",
+        "css": plain_style("scores.css"),
+        "csp": POLICY,
+        "count": count,
         "groups": groups,
         "left_out": left_out,
         "missions": _missions(results),
@@ -79,25 +78,11 @@ def build_scores_page(document: Mapping[str, Any]) -> str:
 
 
 @lru_cache
-def _css() -> str:
-    """Style of the mission report, dark by the system's choice alone, and what is special to this page."""
-    shared = (_HERE / "report.css").read_text("utf-8")
-    dark = re.sub(r"\[data-theme=dark\] \{([^}]*)\}", r"@media (prefers-color-scheme: dark) { :root {\1} }", shared)
-    return dark + (_HERE / "scores.css").read_text("utf-8")
-
-
-@lru_cache
 def _environment() -> jinja2.Environment:
-    environment = jinja2.Environment(
-        loader=jinja2.FileSystemLoader(_HERE),
-        autoescape=True,
-        undefined=jinja2.StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
-    environment.filters |= {"num": names.number, "share": _share, "both": _both, "state": names.state_label}
-    environment.globals |= {"icon": icon, "known": names.known}
-    return environment
+    found = environment()
+    found.filters |= {"num": names.number, "share": _share, "both": _both, "state": names.state_label}
+    found.globals |= {"icon": icon, "known": names.known}
+    return found
 
 
 def _share(value: float | None) -> str:

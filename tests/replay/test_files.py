@@ -1,0 +1,40 @@
+"""Results appear whole or not at all; several that belong together all or none."""
+
+from __future__ import annotations
+
+import errno
+from pathlib import Path
+
+import pytest
+
+from replay.errors import OutputError
+from replay.files import atomic_path, atomic_paths
+
+
+def fill(names: list[Path]) -> None:
+    with atomic_paths(*names) as temporary:
+        temporary[0].write_text("second")
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+
+def test_all_of_them_or_none(tmp_path: Path) -> None:
+    names = [tmp_path / "a", tmp_path / "b"]
+    with atomic_paths(*names) as temporary:
+        for t in temporary:
+            t.write_text("first")
+        assert not any(n.exists() for n in names)
+    assert [n.read_text() for n in names] == ["first", "first"]
+    with pytest.raises(OutputError, match="No space left"):
+        fill(names)
+    assert [n.read_text() for n in names] == ["first", "first"]
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["a", "b"]
+
+
+def test_a_read_only_place_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def refuse(self: Path, missing_ok: bool = False) -> None:
+        raise OSError(errno.EROFS, "Read-only file system", str(self))
+
+    monkeypatch.setattr(Path, "unlink", refuse)
+    words = r"out\.mcap: cannot be written \(Read-only file system\); give another place"
+    with pytest.raises(OutputError, match=words), atomic_path(tmp_path / "out.mcap"):
+        pass
