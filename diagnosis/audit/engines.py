@@ -50,22 +50,24 @@ def local(jobs: int, kind: str = "") -> Iterator[Engine]:
         How children start: see `diagnosis.audit.isolated.isolation`.
     """
     children = isolation(kind)
+    children.start()
     executor = ThreadPoolExecutor(jobs, thread_name_prefix="audit")
     try:
         yield Engine("local", executor, lambda: jobs, children.close)
     finally:
-        children.close()
         executor.shutdown(wait=True, cancel_futures=True)
 
 
 @contextmanager
-def dask(address: str) -> Iterator[Engine]:
+def dask(address: str, wait_s: float = 20.0) -> Iterator[Engine]:
     """Workers of a Dask cluster that can read the logs and write the output under the same paths.
 
     Parameters
     ----------
     address : str
         Of the scheduler, e.g. ``tcp://host:8786``.
+    wait_s : float
+        How long to wait for its answer [s].
 
     Raises
     ------
@@ -79,7 +81,7 @@ def dask(address: str) -> Iterator[Engine]:
             "--dask needs Dask: pip install 'mfhca-replay[dask]', on every host of the cluster"
         ) from error
     try:
-        client = distributed.Client(address, set_as_default=False, timeout=20, name="mfhca-audit")
+        client = distributed.Client(address, set_as_default=False, timeout=wait_s, name="mfhca-audit")
     except (OSError, ValueError, TimeoutError) as error:
         raise ConfigError(f"--dask {address}: the scheduler does not answer ({error}); see `dask scheduler`") from error
     try:
@@ -98,7 +100,8 @@ def dask(address: str) -> Iterator[Engine]:
 def _careful(dask_scheduler: Any) -> None:
     """Hand each worker what it can do at once, and take a task from a lost worker to no second one by itself."""
     dask_scheduler.allowed_failures = 0
-    dask_scheduler.WORKER_SATURATION = 1.0
+    if dask_scheduler.WORKER_SATURATION < 100:  # not infinite: queues are on
+        dask_scheduler.WORKER_SATURATION = 1.0
 
 
 def is_lost(error: BaseException) -> bool:

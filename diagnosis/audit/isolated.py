@@ -15,7 +15,6 @@ import sys
 import threading
 from concurrent.futures import Future
 from contextlib import suppress
-from functools import lru_cache
 from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any, Protocol
@@ -26,7 +25,7 @@ from diagnosis.audit import child
 from diagnosis.audit.child import Work
 from diagnosis.audit.limits import LINUX, Limits, memory_kills
 from diagnosis.audit.outcome import Outcome
-from diagnosis.audit.zygote import Ended
+from diagnosis.audit.zygote import Ended, Stopped
 from replay.errors import OutputError
 
 _GRACE_S = 30.0
@@ -46,8 +45,13 @@ _ONE_THREAD = {
 class Isolation(Protocol):
     """A way to start children; safe to use from several threads."""
 
+    closed: bool
+
+    def start(self) -> None:
+        """Make ready what can be before the first mission."""
+
     def run(self, work: Work, limits: Limits) -> Ended | str:
-        """Run one mission to its end; a text where no child could be started."""
+        """Run one mission to its end; a text where no child could be started; raises `Stopped`."""
 
     def close(self) -> None:
         """End all children and whatever starts them."""
@@ -144,14 +148,14 @@ class ForkServer:
         self._process: subprocess.Popen[bytes] | None = None
         self._connection: Connection | None = None
         self._waiting: dict[int, Future[Ended | str]] = {}
-        self._closed = False
+        self.closed = False
 
     def run(self, work: Work, limits: Limits) -> Ended | str:
         """As in `Isolation`."""
         waiting: Future[Ended | str] = Future()
         with self._lock:
-            if self._closed:
-                return "the audit was ended"
+            if self.closed:
+                raise Stopped
             number = next(self._numbers)
             if self._connection is None:
                 self._start()
@@ -168,9 +172,9 @@ class ForkServer:
             return "the process that starts missions does not answer"
 
     def start(self) -> None:
-        """Start the server now rather than with the first mission."""
+        """As in `Isolation`."""
         with self._lock:
-            if self._connection is None and not self._closed:
+            if self._connection is None and not self.closed:
                 self._start()
 
     def _start(self) -> None:
@@ -210,12 +214,15 @@ class ForkServer:
             return
         self._connection = None
         connection.close()
-        if self._process is not None and not self._closed:
+        if self._process is not None and not self.closed:
             self._process.kill()
             self._process.wait()
         waiting, self._waiting = self._waiting, {}
         for one in waiting.values():
-            one.set_result("the process that starts missions was ended from outside")
+            if self.closed:
+                one.set_exception(Stopped())
+            else:
+                one.set_result("the process that starts missions was ended from outside")
 
     def _kill(self) -> None:
         process = self._process
@@ -225,12 +232,12 @@ class ForkServer:
     def close(self) -> None:
         """End the server; it ends its children and removes their folders first."""
         with self._lock:
-            self._closed = True
+            self.closed = True
             process, connection = self._process, self._connection
         if process is None or connection is None:
             return
-        with suppress(OSError):
-            socket.socket(fileno=os.dup(connection.fileno())).shutdown(socket.SHUT_RDWR)
+        with suppress(OSError), socket.socket(fileno=os.dup(connection.fileno())) as end:
+            end.shutdown(socket.SHUT_RDWR)
         try:
             process.wait(_CLOSE_S)
         except subprocess.TimeoutExpired:
@@ -238,23 +245,28 @@ class ForkServer:
             process.wait()
 
 
-@lru_cache(maxsize=4)
-def isolation(kind: str = "", *, process: int = 0) -> Isolation:
-    """Way to start children in this process: ``fork`` (Linux), ``fork-cold`` (not warmed) or ``spawn``.
+_MADE: dict[tuple[str, int], Isolation] = {}
+_MAKING = threading.Lock()
+
+
+def isolation(kind: str = "") -> Isolation:
+    """Way to start children in this process; the same one until it is closed.
 
     Parameters
     ----------
     kind : str
-        Empty: what the platform does best.
-    process : int
-        Number of this process, so that a forked process does not use its parent's.
+        ``fork`` (Linux), ``fork-cold`` (not warmed) or ``spawn``; empty: what the platform does best.
     """
-    made: Isolation
-    if (kind or ("fork" if LINUX else "spawn")) == "spawn":
-        from diagnosis.audit.spawned import Spawner
+    kind = kind or ("fork" if LINUX else "spawn")
+    with _MAKING:
+        made = _MADE.get((kind, os.getpid()))
+        if made is None or made.closed:
+            if kind == "spawn":
+                from diagnosis.audit.spawned import Spawner
 
-        made = Spawner()
-    else:
-        made = ForkServer(warmed=kind != "fork-cold")
-    atexit.register(made.close)
+                made = Spawner()
+            else:
+                made = ForkServer(warmed=kind == "fork")
+            _MADE[kind, os.getpid()] = made
+            atexit.register(made.close)
     return made

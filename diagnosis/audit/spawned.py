@@ -15,7 +15,7 @@ from pathlib import Path
 from diagnosis.audit import child
 from diagnosis.audit.child import Work
 from diagnosis.audit.limits import Limits, held_mb
-from diagnosis.audit.zygote import LOOK_S, Ended
+from diagnosis.audit.zygote import LOOK_S, Ended, Stopped
 
 _TASK = "task.pickle"
 _CALL = "import json, sys; sys.path[:] = json.loads(sys.argv[1]); from diagnosis.audit.spawned import main; main(sys.argv[2])"
@@ -26,12 +26,15 @@ class Spawner:
 
     def __init__(self) -> None:
         self._running: set[subprocess.Popen[bytes]] = set()
-        self._closed = False
+        self.closed = False
+
+    def start(self) -> None:
+        """Nothing can be made ready."""
 
     def run(self, work: Work, limits: Limits) -> Ended | str:
         """As in `diagnosis.audit.isolated.Isolation`."""
-        if self._closed:
-            return "the audit was ended"
+        if self.closed:
+            raise Stopped
         task = Path(work.folder) / _TASK
         start = time.monotonic()
         try:
@@ -53,18 +56,20 @@ class Spawner:
                 stopped = "memory"
             if not stopped and time.monotonic() - start > limits.wall_s:
                 stopped = "wall"
-            if stopped or self._closed:
+            if stopped or self.closed:
                 process.kill()
             with suppress(subprocess.TimeoutExpired):
                 process.wait(LOOK_S)
         self._running.discard(process)
         assert process.stdin is not None
         process.stdin.close()
+        if self.closed:
+            raise Stopped
         return Ended(process.returncode, stopped, time.monotonic() - start, 0.0, peak)
 
     def close(self) -> None:
         """End all children."""
-        self._closed = True
+        self.closed = True
         for process in list(self._running):
             process.kill()
 

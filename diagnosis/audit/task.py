@@ -158,7 +158,7 @@ def _audit(task: Task, folder: Path, temporary: Path) -> Attempt:
         task.max_size_mb,
         task.judge,
     )
-    outcome = run_isolated(work, task.limits, isolation(task.isolation, process=os.getpid()))
+    outcome = run_isolated(work, task.limits, isolation(task.isolation))
     if _signature(files) != before:
         gone = "was changed or removed while it was read; audit again once it is complete"
         outcome = Outcome("unreadable", gone, outcome.wall_s, outcome.cpu_s, outcome.peak_mb)

@@ -30,6 +30,10 @@ from diagnosis.audit.limits import Limits, held_mb
 LOOK_S = 0.05
 
 
+class Stopped(Exception):
+    """Children were ended because the audit ends: no end of a mission."""
+
+
 @dataclass(frozen=True)
 class Ended:
     """How a child ended.
@@ -192,3 +196,4 @@ def main(descriptor: int, *, warmed: bool) -> None:
     gc.collect()
     gc.freeze()
     Zygote(connection).serve()
+    os._exit(0)

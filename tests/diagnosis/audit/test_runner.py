@@ -1,0 +1,177 @@
+from __future__ import annotations
+
+import threading
+from collections import Counter
+from pathlib import Path
+
+import pytest
+
+from diagnosis.audit.endings import Ending, exit_code, quoted
+from diagnosis.audit.places import claim_mission, publish, working
+from diagnosis.audit.session import overview
+from diagnosis.audit.store import Store
+from replay.errors import OutputError
+from tests.diagnosis.audit.samples import asked_for, missions, run
+
+
+def test_a_bad_mission_costs_no_other_one_and_a_second_run_does_nothing(tmp_path: Path) -> None:
+    found = missions(tmp_path / "logs", "fine-1", "raise", "broken", "damaged", "fine-2")
+    asked = asked_for(tmp_path / "out")
+    ends, _ = run(found, asked)
+    assert {n: e.state for n, e in ends.items()} == {
+        "fine-1": "ok", "raise": "crashed", "broken": "unreadable", "damaged": "degraded", "fine-2": "ok",
+    }  # fmt: skip
+    assert (tmp_path / "out" / "missions" / "fine-2" / "report.json").is_file()
+    assert sorted(p.name for p in (tmp_path / "out" / ".work").iterdir()) == ["claims"]
+    failures = (tmp_path / "out" / "failures.txt").read_text(encoding="utf-8")
+    assert "broken: unreadable: x.bag ends at byte 12\n  mfhca diagnose -v " in failures
+    assert failures.count("mfhca diagnose") == 2
+    again, events = run(found, asked)
+    assert again == ends
+    assert {kind for kind, _ in events} == {"skipped"}
+
+
+def test_only_what_changed_is_audited_again(tmp_path: Path) -> None:
+    found = missions(tmp_path / "logs", "fine-1", "fine-2")
+    asked = asked_for(tmp_path / "out")
+    run(found, asked)
+    (tmp_path / "logs" / "fine-2.bag").write_text("fine, changed", encoding="utf-8")
+    changed = missions(tmp_path / "logs", "fine-1", "fine-2")
+    assert [state for _, state in overview(changed, asked)] == ["ok", "to do"]
+    _, events = run(changed, asked)
+    assert events == [("skipped", "fine-1"), ("mission", "fine-2")]
+    _, events = run(changed, asked_for(tmp_path / "out", resume=False))
+    assert sorted(events) == [("mission", "fine-1"), ("mission", "fine-2")]
+
+
+def test_attempts_are_counted_and_more_retries_go_on(tmp_path: Path) -> None:
+    found = missions(tmp_path / "logs", "leave", "once", "broken")
+    ends, events = run(found, asked_for(tmp_path / "out", retries=1))
+    assert [(n, e.state, e.attempts) for n, e in sorted(ends.items())] == [
+        ("broken", "unreadable", 1), ("leave", "crashed", 2), ("once", "ok", 2),
+    ]  # fmt: skip
+    assert Counter(kind for kind, _ in events) == {"mission": 3, "retry": 2}
+    _, events = run(found, asked_for(tmp_path / "out", retries=1))
+    assert {kind for kind, _ in events} == {"skipped"}
+    ends, _ = run(found, asked_for(tmp_path / "out", retries=2))
+    assert ends["leave"].attempts >= 3
+
+
+def test_a_failed_audit_of_a_changed_log_leaves_the_earlier_report(tmp_path: Path) -> None:
+    found = missions(tmp_path / "logs", "fine-1")
+    run(found, asked_for(tmp_path / "out"))
+    before = (tmp_path / "out" / "missions" / "fine-1" / "report.json").read_bytes()
+    (tmp_path / "logs" / "fine-1.bag").write_text("kill", encoding="utf-8")
+    ends, _ = run(missions(tmp_path / "logs", "fine-1"), asked_for(tmp_path / "out"))
+    assert (ends["fine-1"].state, ends["fine-1"].report) == ("crashed", None)
+    assert (tmp_path / "out" / "missions" / "fine-1" / "report.json").read_bytes() == before
+
+
+def test_a_log_changed_while_it_is_read_has_no_report(tmp_path: Path) -> None:
+    ends, _ = run(missions(tmp_path / "logs", "changed"), asked_for(tmp_path / "out"))
+    assert ends["changed"].state == "unreadable"
+    assert "was changed or removed while it was read" in ends["changed"].reason
+    assert not (tmp_path / "out" / "missions" / "changed").exists()
+
+
+def test_a_log_that_is_gone_is_unreadable(tmp_path: Path) -> None:
+    found = missions(tmp_path / "logs", "fine-1")
+    (tmp_path / "logs" / "fine-1.bag").unlink()
+    ends, _ = run(found, asked_for(tmp_path / "out"))
+    assert ends["fine-1"].state == "unreadable"
+
+
+def test_a_report_without_room_ends_the_audit_and_keeps_what_is_done(tmp_path: Path) -> None:
+    run(missions(tmp_path / "logs", "fine-1"), asked_for(tmp_path / "out"))
+    found = missions(tmp_path / "logs", "fine-1", "unwritten", "fine-2")
+    with pytest.raises(OutputError, match="No space left on device"):
+        run(found, asked_for(tmp_path / "out"))
+    assert (tmp_path / "out" / "missions" / "fine-1" / "report.json").is_file()
+    assert [p.name for p in (tmp_path / "out" / ".work").iterdir()] == ["claims"]
+    with Store.open(tmp_path / "out" / "fleet.sqlite") as store:
+        assert store.counts()["ok"] >= 1
+
+
+def test_two_audits_of_one_folder_share_the_work(tmp_path: Path) -> None:
+    found = missions(tmp_path / "logs", *(f"slow-{i}" for i in range(6)))
+    results: list[tuple[dict[str, Ending], list[tuple[str, str]]]] = []
+    threads = [
+        threading.Thread(target=lambda: results.append(run(found, asked_for(tmp_path / "out"), jobs=1)))
+        for _ in range(2)
+    ]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    done = [name for _, events in results for kind, name in events if kind == "mission"]
+    assert sorted(done) == sorted(m.name for m in found.missions)
+    assert all(e.state == "ok" and e.attempts == 1 for ends, _ in results for e in ends.values())
+
+
+def test_a_claim_is_for_one(tmp_path: Path) -> None:
+    first = claim_mission(tmp_path, "a")
+    assert first is not None
+    assert claim_mission(tmp_path, "a") is None
+    other = claim_mission(tmp_path, "b")
+    assert other is not None
+    first.drop()
+    again = claim_mission(tmp_path, "a")
+    assert again is not None
+    other.drop()
+    again.drop()
+
+
+def test_a_report_takes_the_place_of_an_earlier_one(tmp_path: Path) -> None:
+    for text in ("first", "second"):
+        made = tmp_path / "made"
+        made.mkdir(exist_ok=True)
+        (made / "report.json").write_text(text, encoding="utf-8")
+        publish(made, tmp_path / "missions" / "a")
+        assert (tmp_path / "missions" / "a" / "report.json").read_text(encoding="utf-8") == text
+
+
+def test_what_a_killed_run_left_is_removed_by_the_next(tmp_path: Path) -> None:
+    left = tmp_path / ".work" / "1-abc"
+    left.mkdir(parents=True)
+    (tmp_path / ".work" / "1-abc.lock").touch()
+    with working(tmp_path) as place:
+        assert not left.exists()
+        with working(tmp_path) as beside:  # one at work is left alone
+            assert place.folder.is_dir()
+            assert beside.folder != place.folder
+    assert not place.temporary.exists()
+
+
+def test_read_only_output_is_one_sentence(tmp_path: Path) -> None:
+    (tmp_path / "out").write_text("a file", encoding="utf-8")
+    with pytest.raises(OutputError, match="out"):
+        run(missions(tmp_path / "logs", "fine-1"), asked_for(tmp_path / "out"))
+
+
+def ending(state: str, verdict: str | None = None, severity: str = "") -> Ending:
+    return Ending("m", state, "", 1, "M1", "", verdict, "", None, int(bool(severity)), severity)
+
+
+@pytest.mark.parametrize(
+    ("ends", "fail_on", "code"),
+    [
+        ([], "low", 0),
+        ([ending("ok", "ready")], "low", 0),
+        ([ending("ok", "watch", "low"), ending("ok", "ready")], "low", 1),
+        ([ending("ok", "watch", "low")], "high", 0),
+        ([ending("ok", "stop", "high"), ending("degraded", "not_assessed")], "low", 3),
+        ([ending("degraded", "not_assessed"), ending("ok", "stop", "high")], "never", 0),
+        ([ending("timeout")], "never", 3),
+        ([ending("unreadable"), ending("crashed")], "low", 70),
+    ],
+)
+def test_the_exit_code_is_that_of_the_worst_mission(ends: list[Ending], fail_on: str, code: int) -> None:
+    assert exit_code(ends, fail_on) == code
+
+
+@pytest.mark.parametrize(
+    ("word", "shown"),
+    [("a b.bag", "'a b.bag'"), ("it's", "'it'\"'\"'s'"), ("a\nb'", r"$'a\x0ab\x27'"), ("\udcff", r"$'\xff'")],
+)
+def test_words_are_quoted_for_a_shell(word: str, shown: str) -> None:
+    assert quoted(word) == shown
