@@ -15,7 +15,7 @@ from replay.version import __version__
 
 SCHEMA = "1"
 _APPLICATION = 0x6D666863  # "mfhc": tells the file from other SQLite files
-_BUSY_MS = 2_000
+_BUSY_MS = 1_000
 _PATIENCE_S = 120.0
 _TABLES = {"meta", "file", "mission", "result", "attempt", "fault", "component"}
 _FULL = ("database or disk is full", "disk I/O error", "unable to open database file")

@@ -28,6 +28,18 @@ def safe_name(path: str) -> str:
     return f"_{name}" if _RESERVED.fullmatch(name) else name
 
 
+def is_safe(name: str) -> bool:
+    """Whether a text is a name such as these functions give: one part of a path, nothing hidden or reserved."""
+    return (
+        not _UNSAFE.search(name)
+        and bool(name.strip("._"))
+        and not name.startswith((".", "-"))
+        and not name.endswith(".")
+        and not _RESERVED.fullmatch(name)
+        and len(name.encode()) <= 2 * _MOST_BYTES
+    )
+
+
 def unique_names(paths: Sequence[tuple[str, str]]) -> list[str]:
     """Safe names of missions, unique also where letter case does not count.
 

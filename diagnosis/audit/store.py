@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import os
+import time
 from collections.abc import Iterable, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
@@ -78,6 +79,11 @@ class Store:
         Whether nothing is to be written.
     objects : bool
         Whether each attempt is written as a result object too, in the folder ``results`` beside the store.
+
+    Attributes
+    ----------
+    run : int
+        Number of the last audit that began.
     """
 
     def __init__(self, path: Path, *, read_only: bool = False, objects: bool = True) -> None:
@@ -86,7 +92,7 @@ class Store:
         self._real = os.path.realpath(self.folder)
         self.database = Database(path, read_only=read_only)
         self._objects = Objects(str(self.folder / RESULTS)) if objects and not read_only else None
-        self._run = int(self.database.rows("SELECT value FROM meta WHERE name = 'run'")[0][0])
+        self.run = int(self.database.rows("SELECT value FROM meta WHERE name = 'run'")[0][0])
 
     @classmethod
     def open(cls, path: Path, *, read_only: bool = False) -> Self:
@@ -113,8 +119,8 @@ class Store:
         """Count this audit; its number marks the missions that it sees."""
         with self.database.transaction() as connection:
             connection.execute("UPDATE meta SET value = CAST(value AS INTEGER) + 1 WHERE name = 'run'")
-            self._run = int(connection.execute("SELECT value FROM meta WHERE name = 'run'").fetchone()[0])
-        return self._run
+            self.run = int(connection.execute("SELECT value FROM meta WHERE name = 'run'").fetchone()[0])
+        return self.run
 
     def adopt(self, missions: Iterable[MissionSource], roots: Sequence[str] = ()) -> tuple[MissionSource, ...]:
         """Enter discovered missions, and say which known ones are gone.
@@ -136,7 +142,7 @@ class Store:
 
         given = [(mission, self._files(mission)) for mission in missions]
         with self.database.transaction() as connection:
-            names = adopt(connection, given, [self.relative(r) for r in roots], self._run, self._real)
+            names = adopt(connection, given, [self.relative(r) for r in roots], self.run, self._real)
         return tuple(replace(mission, name=name) for (mission, _), name in zip(given, names, strict=True))
 
     def known_hash(self, path: str, size: int, stamp: str) -> str | None:
@@ -196,6 +202,7 @@ class Store:
                 {
                     "mission": self._described(mission),
                     "key": asdict(key),
+                    "made_ns": time.time_ns(),
                     "attempt": {**told, "number": 0},
                     "report": report if attempt is outcome else None,
                     "machine_id": machine_id,
@@ -214,7 +221,7 @@ class Store:
             if self._objects is None:
                 number = int(connection.execute(query, values).fetchone()[0]) + 1
             document["attempt"]["number"] = number
-            records.write_document(connection, document, self._run)
+            records.write_document(connection, document, self.run)
 
     def reuse(self, mission: MissionSource, result: StoredResult) -> None:
         """Let a mission point to a result that is there already: of an earlier run, or of a copy.
@@ -229,12 +236,13 @@ class Store:
         same = "SELECT 1 FROM mission WHERE name = ? AND result = ? AND files = ? AND gone IS NULL"
         if self.database.rows(same, row):
             return
-        document = {"schema": records.SCHEMA, "mission": described, "key": asdict(result.key)}
-        content = encode(document)
+        document: dict[str, Any] = {"schema": records.SCHEMA, "mission": described, "key": asdict(result.key)}
+        mark = hashlib.sha256(encode(document)).hexdigest()[:8]
+        document["made_ns"] = time.time_ns()
         if self._objects is not None:
-            self._objects.put(f"{result.key.stem}-m{hashlib.sha256(content).hexdigest()[:8]}.json", content)
+            self._objects.put(f"{result.key.stem}-m{mark}.json", encode(document))
         with self.database.transaction() as connection:
-            records.write_document(connection, document, self._run)
+            records.write_document(connection, document, self.run)
 
     def missions(self) -> list[StoredMission]:
         """All missions in the order of their names, those that are gone too."""
