@@ -14,6 +14,8 @@ from typing import IO, TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from rich.console import Console, RenderableType
 
+    from cli.stages import Stages
+
 Progress = Callable[[str], None]
 
 # C0 and C1 controls, bidirectional overrides, zero-width marks, lone surrogates of undecodable file names.
@@ -82,17 +84,18 @@ class Terminal:
         _write(sys.stderr, _rendered(console_of(sys.stderr), (line,), wrap=False))
 
     @contextmanager
-    def progress(self, first: str) -> Iterator[Progress]:
-        """Give a function that shows what is being done: a spinner on a terminal, lines with ``--verbose``."""
-        from rich.text import Text
-
+    def progress(self, first: str, stages: Stages | None = None) -> Iterator[Progress]:
+        """Give a function that shows what is being done and for how long: on a terminal, else lines with ``--verbose``."""
         if self.quiet or not sys.stderr.isatty():
             tell = self.tell if self.verbose and not self.quiet else lambda text: None
             tell(first)
             yield tell
             return
-        with console_of(sys.stderr).status(Text(clean(first))) as status:
-            yield lambda text: status.update(Text(clean(text)))
+        from cli.stages import Stages, shown_stages
+
+        with shown_stages(stages or Stages([]), sys.stderr) as tell:
+            tell(first)
+            yield tell
 
 
 def console_of(stream: IO[str]) -> Console:

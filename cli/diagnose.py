@@ -99,7 +99,10 @@ def diagnose(
     if dry_run:
         _plan(terminal, paths, the_machine, source, outputs, json)
         return
-    with terminal.progress("starting") as progress:
+    from cli.stages import diagnosis_stages
+
+    stages = diagnosis_stages(paths, wheels or the_machine.wheels, the_machine.axles)
+    with terminal.progress("starting", stages) as progress:
         from diagnosis import pipeline
         from diagnosis.output import write_result
 
