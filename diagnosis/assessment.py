@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from diagnosis.result import Epsilon, Hypothesis, Sat
+from diagnosis.result import Closeups, Epsilon, Hypothesis, Sat
 from replay.faults import FaultMode, Side, State
 
 STATES: tuple[State, ...] = tuple(State)
@@ -57,6 +57,8 @@ class Assessment:
         Figures that the judgement used, one sentence each.
     unexplained_s : float
         Time [s] in which something deviates that no single fault explains well enough to be stated.
+    closeups : Closeups or None
+        Every sample of `columns` around the findings, where they are envelopes.
     """
 
     states: NDArray[np.int8]
@@ -66,6 +68,7 @@ class Assessment:
     tier: str = "none"
     notes: tuple[str, ...] = ()
     unexplained_s: float = 0.0
+    closeups: Closeups | None = None
 
 
 def unassessed(size: int, state: State, reason: str) -> Assessment:

@@ -20,6 +20,7 @@ from diagnosis.fault_runs import fault_runs, inner
 from diagnosis.mode_path import ModePath, most_probable
 from diagnosis.noise import relative_lag, shifted, unresolved
 from diagnosis.pairs import Pair, mode_model, neighbours, sample_status, timing_explains, unsettled
+from diagnosis.pictured import steps_of
 from diagnosis.result import Epsilon, Hypothesis, Sat
 from diagnosis.screen import screened
 from diagnosis.segments import Run, with_leads
@@ -98,6 +99,7 @@ def assess_pair(pair: Pair, limits: Limits) -> Assessment:
             )
             findings.append(_widened(finding, run, whole, pair.dt, _detected(path, whole, pair.dt, shortest, lag)))
     states = _states(pair, x, status, blind, findings)
+    pictured = evidence_columns(pair, x, status, model, path, steps_of(findings, x.size, pair.dt))
     notes = [
         f"{pair.y_name} against {pair.x_name}: noise {model.noise:.2g} {pair.unit}, rounding step {lsb:.2g} {pair.unit}, "
         f"delay {lag * pair.dt * 1e3:.3g} ms."
@@ -114,7 +116,8 @@ def assess_pair(pair: Pair, limits: Limits) -> Assessment:
             else "what deviates may be a delay or the rounding of the channel",
         },
         findings=tuple(findings),
-        columns=evidence_columns(pair, x, status, model, path),
+        columns=pictured.columns,
+        closeups=pictured.closeups,
         tier="direct",
         notes=tuple(notes),
     )

@@ -11,6 +11,7 @@ from diagnosis import modes
 from diagnosis.kalman import GainBiasModel, track_gain_bias
 from diagnosis.mode_path import ModePath
 from diagnosis.pairs import Pair
+from diagnosis.pictured import Pictured
 from diagnosis.result import Epsilon, Sat
 from replay.envelope import bucket_of, envelope, in_buckets
 from replay.faults import FaultMode
@@ -69,9 +70,9 @@ def sentences(
 
 
 def evidence_columns(
-    pair: Pair, x: Array, status: NDArray[np.int8], model: modes.ModeModel, path: ModePath
-) -> dict[str, NDArray[Any]]:
-    """Series for the evidence plots."""
+    pair: Pair, x: Array, status: NDArray[np.int8], model: modes.ModeModel, path: ModePath, step: NDArray[np.int64]
+) -> Pictured:
+    """Series for the evidence plots, and every sample of them at some steps."""
     bucket = bucket_of(x.size)
     tracked = GainBiasModel(
         noise=model.noise,
@@ -83,18 +84,25 @@ def evidence_columns(
         dt=pair.dt,
     )
     columns = {name: Column(np.float64 if bucket == 1 else np.float32) for name in _SERIES}
+    near: dict[str, list[NDArray[Any]]] = {name: [] for name in _SERIES}
     state = None
     for part in blocks(x.size):
+        at = step[np.searchsorted(step, part.start) : np.searchsorted(step, part.stop)] - part.start
         use, y, ref = status[part] == modes.PAIR, pair.y[part], x[part]
         track = track_gain_bias(y, ref, use, tracked, state)
         state = track.state
         residual, threshold = np.where(use, y - ref, np.nan), np.full(y.size, 3 * model.noise)
         series = (residual, threshold, ref, track.delta, track.delta_std, track.bias, track.bias_std)
-        for column, values in zip(columns.values(), series, strict=True):
+        for (name, column), values in zip(columns.items(), series, strict=True):
             column.append(envelope(values, bucket))
+            near[name].append(values[at].astype(np.float32))
         release(pair.y, x)
     out = {name: column.finish() for name, column in columns.items()}
     rows = in_buckets(np.asarray, bucket, path.filtered)
     out["probability"] = in_blocks(lambda p: np.float32(1.0) - p[:, modes.HEALTHY], rows)
     out.update({f"p_{name}": rows[:, i] for i, name in enumerate(modes.ROWS)})
-    return out
+    samples = {name: np.concatenate(parts) for name, parts in near.items()}
+    exact = path.filtered[step]
+    samples["probability"] = np.float32(1.0) - exact[:, modes.HEALTHY]
+    samples.update({f"p_{name}": exact[:, i] for i, name in enumerate(modes.ROWS)})
+    return Pictured(step, out, samples)

@@ -22,8 +22,8 @@ from diagnosis.drive_rows import EchoPair, find_rows
 from diagnosis.modes import BLIND, PAIR, SILENT
 from diagnosis.noise import moving_sum, rounding_step
 from diagnosis.pairs import sample_status
+from diagnosis.pictured import Pictured, steps_of
 from replay.drive_model import DriveModel, EchoModel
-from replay.envelope import shown
 from replay.faults import FaultMode, Side, State
 from replay.machine import Limits
 
@@ -180,16 +180,12 @@ def assess_drive(data: DriveData, limits: Limits) -> tuple[Assessment, Assessmen
             "load": load.sampled(load.level, size),
             "expected": load.sampled(load.expected, size),
         }
+    step = steps_of([*on_sensor, *on_actuator], x.size, data.dt)
+    sensor, valve = (Pictured.of(step, c.items()) for c in (columns, drive_columns))
+    said = tuple(notes)
     return (
-        Assessment(states, reasons, tuple(on_sensor), {k: shown(x) for k, x in columns.items()}, "drive", tuple(notes)),
-        Assessment(
-            actuator,
-            reasons,
-            tuple(on_actuator),
-            {k: shown(x) for k, x in drive_columns.items()},
-            "drive",
-            tuple(notes),
-        ),
+        Assessment(states, reasons, tuple(on_sensor), sensor.columns, "drive", said, closeups=sensor.closeups),
+        Assessment(actuator, reasons, tuple(on_actuator), valve.columns, "drive", said, closeups=valve.closeups),
     )
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -15,12 +15,12 @@ from diagnosis.assessment import CODE, Assessment, Finding
 from diagnosis.mode_path import first_lasting
 from diagnosis.modes import PAIR
 from diagnosis.noise import moving_sum, quick_noise, rounding_step, slow_mismatch, usual_distance, white_noise
+from diagnosis.pictured import Pictured, steps_of
 from diagnosis.steady import FLICKER_S, steadied
 from diagnosis.wheel_blocks import WheelBlocks, blocks_of, per_sample
 from diagnosis.wheel_findings import Run, judge, onset_sentence, refined
 from diagnosis.wheel_runs import runs_of
 from diagnosis.wheel_settle import settled
-from replay.envelope import shown
 from replay.faults import FaultMode, Side, State
 from replay.machine import Limits, Noise, WheelPlant
 
@@ -281,16 +281,18 @@ def _assessments(
     def held(values: Array) -> Array:
         return np.asarray(per_sample(values, width, size))
 
-    residual = held(found.expected)
-    np.subtract(y, residual, out=residual)
-    residual[data.status[:, i] != PAIR] = np.nan
-    shared = {
-        "residual": shown(residual),
-        "threshold": shown(held(3 * np.sqrt(found.spread + own.noise**2))),
-        "expected": shown(held(found.expected)),
-        "probability": shown(held(done.fault[:, i])),
-    }
-    del residual
+    def series() -> Iterator[tuple[str, Array]]:
+        residual = held(found.expected)
+        np.subtract(y, residual, out=residual)
+        residual[data.status[:, i] != PAIR] = np.nan
+        yield "residual", residual
+        del residual
+        yield "threshold", held(3 * np.sqrt(found.spread + own.noise**2))
+        yield "expected", held(found.expected)
+        yield "probability", held(done.fault[:, i])
+
+    step = steps_of(findings, size, data.dt)
+    shared = Pictured.of(step, series())
     air = own.grip_most <= 0
     note = (
         f"{data.names[i][0]} by the wheel model with {data.names[i][1]}: noise {own.noise:.2g} m/s, load and model error "
@@ -300,9 +302,9 @@ def _assessments(
     out = []
     for side, states, faults in ((Side.SENSOR, states_s, sensor), (Side.ACTUATOR, states_a, actuator)):
         loose = unexplained[side] & ~covered & ~quiet
-        columns = {**shared, "delta": shown(_delta(faults, side, size))}
+        both = shared | Pictured.of(step, [("delta", _delta(faults, side, size))])
         seconds = float(np.count_nonzero(loose)) * data.dt
-        out.append(Assessment(states, _REASONS, tuple(faults), columns, "model", (note,), seconds))
+        out.append(Assessment(states, _REASONS, tuple(faults), both.columns, "model", (note,), seconds, both.closeups))
     return out[0], out[1]
 
 

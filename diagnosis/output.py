@@ -14,16 +14,16 @@ from numpy.typing import NDArray
 
 from diagnosis.previous import with_previous
 from diagnosis.report.page import build_page
-from diagnosis.result import SCHEMA, MissionResult
+from diagnosis.result import SCHEMA, Closeups, MissionResult
 from replay.errors import LogError, OutputError
 from replay.files import atomic_path, atomic_paths
 
-HTML, JSON, PARQUET = "report.html", "report.json", "report.parquet"
+HTML, JSON, PARQUET, WINDOWS = "report.html", "report.json", "report.parquet", "report.windows.parquet"
 _BLOCK = 1 << 15
 
 
 def write_result(result: MissionResult, folder: Path, *, max_size_mb: float = 15.0) -> tuple[Path, ...]:
-    """Write the three files of a result: all of them, or on a full disk none.
+    """Write the files of a result: all of them, or on a full disk none.
 
     Parameters
     ----------
@@ -37,7 +37,8 @@ def write_result(result: MissionResult, folder: Path, *, max_size_mb: float = 15
     Returns
     -------
     tuple[Path, ...]
-        ``report.html``, ``report.json``, ``report.parquet``.
+        ``report.html``, ``report.json``, ``report.parquet``, and of long missions with faults
+        ``report.windows.parquet``: every sample around the worst of them, at the steps of its column ``step``.
 
     Raises
     ------
@@ -51,11 +52,19 @@ def write_result(result: MissionResult, folder: Path, *, max_size_mb: float = 15
             f"{folder}: cannot make the folder ({error.strerror or error}); give another with -o"
         ) from error
     columns = {k: v if k == "t" else _shortened(k, v) for k, v in result.columns.items()}
-    with atomic_paths(folder / HTML, folder / JSON, folder / PARQUET) as (html, document, table):
-        pq.write_table(_table(columns), table, compression="zstd", use_dictionary=False, use_byte_stream_split=True)
+    windows = result.windows
+    if windows is not None:
+        windows = Closeups(windows.step, {k: _shortened(k, v) for k, v in windows.columns.items()})
+    paths = tuple(folder / name for name in (HTML, JSON, PARQUET, *([] if windows is None else [WINDOWS])))
+    with atomic_paths(*paths) as (html, document, table, *more):
+        _write_table(columns, table)
+        for path in more:
+            _write_table({"step": windows.step, **windows.columns} if windows else {}, path)
         document.write_bytes(_json(result.report))
-        _write_page(result.report, columns, html, max_size_mb)
-    return folder / HTML, folder / JSON, folder / PARQUET
+        _write_page(result.report, columns, windows, html, max_size_mb)
+    if windows is None:
+        (folder / WINDOWS).unlink(missing_ok=True)
+    return paths
 
 
 def _shortened(name: str, values: NDArray[np.float64] | NDArray[np.float32]) -> NDArray[np.float32]:
@@ -80,13 +89,32 @@ def _shortened(name: str, values: NDArray[np.float64] | NDArray[np.float32]) -> 
     return out
 
 
-def _table(columns: Mapping[str, NDArray[Any]]) -> pa.Table:
-    """Table of columns without a copy (and without pandas, which pyarrow would load for its own conversion)."""
+def _write_table(columns: Mapping[str, NDArray[Any]], path: Path) -> None:
+    """Write columns without a copy (and without pandas, which pyarrow would load for its own conversion)."""
     arrays = [
         pa.Array.from_buffers(pa.from_numpy_dtype(v.dtype), len(v), [None, pa.py_buffer(np.ascontiguousarray(v))])
         for v in columns.values()
     ]
-    return pa.Table.from_arrays(arrays, names=list(columns))
+    table = pa.Table.from_arrays(arrays, names=list(columns))
+    pq.write_table(table, path, compression="zstd", use_dictionary=False, use_byte_stream_split=True)
+
+
+def _read_table(path: Path) -> dict[str, NDArray[Any]]:
+    try:
+        table = pq.read_table(path)
+    except (OSError, pa.ArrowException) as error:
+        raise LogError(f"{path}: cannot be read ({error}); run `mfhca diagnose` on the log again") from error
+    return {name: table.column(name).to_numpy() for name in table.column_names}
+
+
+def _read_windows(path: Path) -> Closeups | None:
+    if not path.exists():
+        return None
+    columns = _read_table(path)
+    step = columns.pop("step", None)
+    if step is None or step.dtype.kind != "i" or (np.diff(step) < 1).any():
+        raise LogError(f"{path}: column 'step' is missing or does not increase; run `mfhca diagnose` on the log again")
+    return Closeups(step, columns)
 
 
 def rebuild(path: Path, *, max_size_mb: float = 15.0, previous: tuple[Path, Mapping[str, Any]] | None = None) -> Path:
@@ -113,20 +141,14 @@ def rebuild(path: Path, *, max_size_mb: float = 15.0, previous: tuple[Path, Mapp
     report = load_report(source)
     if previous is not None:
         report = with_previous(report, previous[1], str(previous[0]))
-    try:
-        table = pq.read_table(folder / PARQUET)
-    except (OSError, pa.ArrowException) as error:
-        raise LogError(
-            f"{folder / PARQUET}: cannot be read ({error}); run `mfhca diagnose` on the log again"
-        ) from error
-    columns = {name: table.column(name).to_numpy() for name in table.column_names}
+    columns, windows = _read_table(folder / PARQUET), _read_windows(folder / WINDOWS)
     if previous is None:
         with atomic_path(folder / HTML) as html:
-            _write_page(report, columns, html, max_size_mb)
+            _write_page(report, columns, windows, html, max_size_mb)
     else:
         with atomic_paths(folder / HTML, source) as (html, document):
             document.write_bytes(_json(report))
-            _write_page(report, columns, html, max_size_mb)
+            _write_page(report, columns, windows, html, max_size_mb)
     return folder / HTML
 
 
@@ -155,6 +177,11 @@ def _json(report: Mapping[str, Any]) -> bytes:
 
 
 def _write_page(
-    report: Mapping[str, Any], columns: Mapping[str, NDArray[np.floating]], path: Path, size: float
+    report: Mapping[str, Any],
+    columns: Mapping[str, NDArray[np.floating]],
+    windows: Closeups | None,
+    path: Path,
+    size: float,
 ) -> None:
-    path.write_text(build_page(report, columns, max_size_mb=size), encoding="utf-8", newline="\n")
+    page = build_page(report, columns, closeups=windows, max_size_mb=size)
+    path.write_text(page, encoding="utf-8", newline="\n")

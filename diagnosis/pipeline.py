@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from diagnosis import metrics, quality
 from diagnosis.assessment import Assessment
+from diagnosis.closeups import closeups_of
 from diagnosis.components import ComponentResult, assess_components
 from diagnosis.decide import Decision, decide, intervals_of, spans_of
 from diagnosis.result import SCHEMA, MissionResult, to_json
@@ -203,7 +204,8 @@ def _result(
     for (component, side), assessment in found.assessments.items():
         columns.update({f"evidence.{component}.{side}.{leaf}": x for leaf, x in assessment.columns.items()})
     columns.update(metrics.path_of(timeline))
-    return MissionResult(report=to_json(_named_status(report)), columns=columns)
+    windows = closeups_of(timeline, replay, machine, found.assessments, intervals)
+    return MissionResult(to_json(_named_status(report)), columns, windows)
 
 
 def _more_caveats(mission: Mission, machine: Machine) -> list[str]:
@@ -281,6 +283,7 @@ def _log(mission: Mission, moving: NDArray[np.bool_], machine: Machine) -> dict[
         "open_loop": mission.open_loop,
         "duration_s": timeline.size * timeline.dt,
         "rate_hz": 1e9 / timeline.step_ns,
+        **({"samples_per_bucket": bucket} if (bucket := bucket_of(timeline.size)) > 1 else {}),
         "distance_m": distance,
         "driving_s": float(np.count_nonzero(moving.any(axis=1))) * timeline.dt,
     }

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from itertools import pairwise
 from typing import Any, Literal
 
 import numpy as np
@@ -114,6 +115,27 @@ class StateSpan:
 
 
 @dataclass(frozen=True)
+class Closeups:
+    """Stretches with every sample, of a mission whose columns are envelopes.
+
+    Attributes
+    ----------
+    step : NDArray[np.int64], shape (m,)
+        Steps of the mission, increasing; consecutive ones are one stretch.
+    columns : Mapping[str, NDArray[np.float32]], each of shape (m,)
+        Samples at those steps; NaN where there is none or where a column was not kept.
+    """
+
+    step: NDArray[np.int64]
+    columns: Mapping[str, NDArray[Any]]
+
+    def runs(self) -> list[tuple[int, int]]:
+        """Places of the first row of each stretch and of the row behind its last."""
+        cuts = np.flatnonzero(np.diff(self.step) != 1) + 1
+        return [(a, b) for a, b in pairwise([0, *cuts.tolist(), len(self.step)]) if b > a]
+
+
+@dataclass(frozen=True)
 class MissionResult:
     """Everything that a report shows; `report` is JSON, `columns` the time series.
 
@@ -123,10 +145,13 @@ class MissionResult:
         The document written as ``report.json``.
     columns : Mapping[str, NDArray[np.float32 | np.float64]], each of shape (n,)
         Time series on one uniform axis; ``t`` [s] first. Of long missions they are envelopes: see `replay.envelope`.
+    windows : Closeups or None
+        Every sample around the worst faults, where the columns are envelopes.
     """
 
     report: Mapping[str, Any]
     columns: Mapping[str, NDArray[np.float64] | NDArray[np.float32]] = field(default_factory=dict)
+    windows: Closeups | None = None
 
 
 def _plain(value: Any) -> Any:

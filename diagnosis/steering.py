@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from diagnosis.assessment import CODE, Assessment, Finding, unassessed
 from diagnosis.channels import alive
+from diagnosis.pictured import Pictured, steps_of
 from diagnosis.steering_blocks import SensorNoise, SteeringBlocks, blocks_of, sensor_noise
 from diagnosis.steering_filter import SteeringPath, allowed_models, most_probable
 from diagnosis.steering_findings import judge_side
@@ -20,7 +21,6 @@ from diagnosis.steering_plant import SteeringPlant, identify_plants
 from diagnosis.steering_second import with_position, with_second_angle
 from diagnosis.steering_states import BLIND_ROWS, REASONS, states_of
 from diagnosis.steering_tidy import SteeringData, tidy
-from replay.envelope import shown
 from replay.faults import Side, State
 from replay.loop import Replay
 from replay.machine import Machine, Noise
@@ -207,7 +207,8 @@ def _by_model(
         if axle.twice
         else [(f.start, f.stop) for f in findings[Side.SENSOR] if CODE[State(f.mode.value)] in BLIND_ROWS]
     )
-    series = _series(path, blocks, model.plant.gain, y)
+    step = steps_of([*findings[Side.SENSOR], *findings[Side.ACTUATOR]], y.size, axle.timeline.dt)
+    series = _series(path, blocks, model.plant.gain, y, step)
     note = (
         f"{names[0]} by the steering model with {names[1]}: {plant.gain:.3g} rad/s per full opening, at most "
         f"{plant.rate:.3g} rad/s, lag {plant.lag:.2g} s, noise {axle.noise.std:.2g} rad, rounding step "
@@ -221,7 +222,8 @@ def _by_model(
             states=states,
             reasons=REASONS[side],
             findings=tuple(findings[side]),
-            columns=series[side],
+            columns=series[side].columns,
+            closeups=series[side].closeups,
             tier="model",
             notes=(note,),
             unexplained_s=doubt * axle.timeline.dt,
@@ -233,32 +235,33 @@ def _by_model(
     return out, angle.finish()
 
 
-def _series(path: SteeringPath, blocks: SteeringBlocks, gain: float, y: Array) -> dict[Side, dict[str, Array]]:
-    """Evidence columns of both sides, each value held over its block."""
+def _series(
+    path: SteeringPath, blocks: SteeringBlocks, gain: float, y: Array, step: NDArray[np.int64]
+) -> dict[Side, Pictured]:
+    """Evidence columns of both sides, each value held over its block, and every sample of them at some steps."""
+    mean, std = path.mean, np.sqrt(np.maximum(path.variance, 0.0))
 
     def held(x: Array) -> Array:
-        return shown(np.repeat(x, blocks.length)[: y.size])
+        return np.repeat(x, blocks.length)[: y.size]
 
-    mean, std = path.mean, np.sqrt(np.maximum(path.variance, 0.0))
-    residual = np.repeat(mean[:, 0], blocks.length)[: y.size]
-    np.subtract(y, residual, out=residual)
-    shared = {"residual": shown(residual), "threshold": held(3 * std[:, 0]), "expected": held(mean[:, 0])}
-    del residual
+    def shared() -> Iterator[tuple[str, Array]]:
+        residual = held(mean[:, 0])
+        np.subtract(y, residual, out=residual)
+        yield "residual", residual
+        del residual
+        yield "threshold", held(3 * std[:, 0])
+        yield "expected", held(mean[:, 0])
+
+    def gains(i: int, scale: float) -> Iterator[tuple[str, Array]]:
+        yield "delta", held(mean[:, i])
+        yield "delta_std", held(std[:, i])
+        yield "delta_bar", held(mean[:, i + 1] / scale)
+        yield "delta_bar_std", held(std[:, i + 1] / scale)
+
+    both = Pictured.of(step, shared())
     return {
-        Side.SENSOR: shared
-        | {
-            "delta": held(mean[:, 4]),
-            "delta_std": held(std[:, 4]),
-            "delta_bar": held(mean[:, 5]),
-            "delta_bar_std": held(std[:, 5]),
-        },
-        Side.ACTUATOR: shared
-        | {
-            "delta": held(mean[:, 2]),
-            "delta_std": held(std[:, 2]),
-            "delta_bar": held(mean[:, 3]) / gain,
-            "delta_bar_std": held(std[:, 3]) / gain,
-        },
+        Side.SENSOR: both | Pictured.of(step, gains(4, 1.0)),
+        Side.ACTUATOR: both | Pictured.of(step, gains(2, gain)),
     }
 
 

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from diagnosis.assessment import CODE, Assessment, Finding
 from diagnosis.noise import moving_sum, shifted
+from diagnosis.pictured import Pictured, steps_of
 from diagnosis.result import Epsilon, Hypothesis, Sat
-from replay.envelope import shown
 from replay.faults import FaultMode, Side, State
 from replay.machine import Limits
 
@@ -102,12 +102,15 @@ def assess_tracking(
             )
         )
         states[start:] = CODE[State.NO_SIGNAL]
-    columns = {"residual": shown(np.where(np.isfinite(v), v - reference, np.nan)), "expected": shown(reference)}
+    series = (("residual", np.where(np.isfinite(v), v - reference, np.nan)), ("expected", reference))
+    pictured = Pictured.of(steps_of(findings, v.size, dt), series)
     reasons = {
         State.NOT_ASSESSED: "without a valve command or a second measurement only a standstill under command would show",
         State.NOT_EXCITED: "nothing is commanded",
         State.NO_DATA: "no samples",
     }
     note = f"{names[0]} against {names[1]}: lag {lag * dt:.3g} s."
-    one = Assessment(states, reasons, tuple(findings), columns, "tracking", (note,))
+    one = Assessment(
+        states, reasons, tuple(findings), pictured.columns, "tracking", (note,), closeups=pictured.closeups
+    )
     return one, Assessment(states.copy(), reasons, tuple(findings), {}, "tracking", (note,))

@@ -29,7 +29,7 @@ def part_of(name: str) -> tuple[str, int, str] | None:
 
 def is_result(path: Path) -> bool:
     """Whether a table is the saved result of a diagnosis."""
-    return path.name == "report.parquet" and path.with_name("report.json").is_file()
+    return path.name in ("report.parquet", "report.windows.parquet") and path.with_name("report.json").is_file()
 
 
 def words_of(words: Iterable[str]) -> Iterator[str]:

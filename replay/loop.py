@@ -70,6 +70,10 @@ class Replay:
         Readings of the law fitted to the recorded command, best first.
     readings : tuple[Reading, ...]
         What was used.
+    law : LoopLaw or None
+        Law that was replayed.
+    psi0 : tuple[float or None, ...]
+        Ψ̂(0) of each wheel; None where it was fitted.
     """
 
     v_ref: Array
@@ -89,6 +93,8 @@ class Replay:
     steer_difference: Array
     fits: tuple[LawFit, ...]
     readings: tuple[Reading, ...]
+    law: LoopLaw | None = None
+    psi0: tuple[float | None, ...] = ()
 
 
 def stack(timeline: Timeline, names: list[str]) -> Array:
@@ -149,6 +155,8 @@ def replay_loop(timeline: Timeline, machine: Machine, bucket: int = 1) -> Replay
         steer_difference=shown(np.subtract, steer_recorded, steer_u),
         fits=fits,
         readings=tuple(readings),
+        law=law,
+        psi0=tuple(psi0),
     )
 
 

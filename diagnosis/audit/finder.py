@@ -19,6 +19,7 @@ _AUDIT = "fleet.sqlite"
 _AUDIT_FOLDERS = ("missions", "results")
 _AUDIT_FILES = ("fleet.csv", "failures.txt")
 _REPORT = {"report.json", "report.parquet"}
+_TABLES = ("report.parquet", "report.windows.parquet")
 _CLIPS = "clips"
 
 
@@ -167,7 +168,7 @@ class Finder:
         own = _AUDIT_FILES if _AUDIT in names or folder.real == self._exclude else ()
         logs = []
         for file in files:
-            result = file.name in own or (file.name == "report.parquet" and names >= _REPORT)
+            result = file.name in own or (file.name in _TABLES and names >= _REPORT)
             if not result and self._is_log(place, file):
                 logs.append(file)
             else:

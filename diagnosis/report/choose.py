@@ -9,45 +9,22 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
-from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
 from diagnosis.report.encode import Channel, Plan, plan_of, reduced, whole, with_pieces
+from diagnosis.result import Closeups
 
 Values = NDArray[np.floating]
 Spans = list[tuple[int, int]]
 
-_PADS_S = (20.0, 10.0, 5.0, 2.0, 1.0)
-_ALL_S = 10.0
+_PADS_S = ((20.0, 40.0), (10.0, 20.0), (5.0, 10.0), (2.0, 10.0), (2.0, 4.0), (1.0, 2.0))
 _MARGIN_S = 0.1
 _STRIDE, _BLOCKS, _FEWEST = 64, 32_768, 1024
 _AROUND, _MOST = 0.5, 0.9
 _RANK = {"replay": 1, "evidence": 2}
 _WORKERS = 4
-
-
-@dataclass(frozen=True)
-class Closeups:
-    """Stretches with every sample of a mission whose columns are extremes.
-
-    Attributes
-    ----------
-    step : NDArray[np.int64], shape (m,)
-        Steps of the mission, increasing; consecutive ones are one stretch.
-    columns : Mapping[str, NDArray[np.floating]], each of shape (m,)
-        Samples at those steps; NaN where there is none or where a column was not kept.
-    """
-
-    step: NDArray[np.int64]
-    columns: Mapping[str, Values]
-
-    def runs(self) -> Spans:
-        """Places of the first row of each stretch and of the row behind its last."""
-        cuts = np.flatnonzero(np.diff(self.step) != 1) + 1
-        edges = [0, *cuts.tolist(), len(self.step)]
-        return [(a, b) for a, b in pairwise(edges) if b > a]
 
 
 @dataclass(frozen=True)
@@ -109,7 +86,7 @@ class Mission:
         return [(start + a, values[a:b]) for a, b in parts]
 
 
-def spans_of(faults: Iterable[tuple[float, float]], pad_s: float, step_s: float, samples: int) -> Spans:
+def spans_of(faults: Iterable[tuple[float, float]], pad_s: float, whole_s: float, step_s: float, samples: int) -> Spans:
     """Stretches [samples] around onset and end of faults, joined where they meet; short faults as a whole.
 
     Parameters
@@ -117,7 +94,9 @@ def spans_of(faults: Iterable[tuple[float, float]], pad_s: float, step_s: float,
     faults : Iterable[tuple[float, float]]
         Start and stop [s].
     pad_s : float
-        Time on either side [s]; a fault that is shown as a whole has at least half its length on either side.
+        Time on either side [s].
+    whole_s : float
+        Faults up to this long [s] are shown as a whole, with at least half their length on either side.
     step_s : float
         Sample time [s].
     samples : int
@@ -125,7 +104,7 @@ def spans_of(faults: Iterable[tuple[float, float]], pad_s: float, step_s: float,
     """
     cuts = []
     for start, stop in faults:
-        if stop - start <= max(_ALL_S, 4 * pad_s) / 2:
+        if stop - start <= whole_s:
             room = max(pad_s, 0.5, 0.5 * (stop - start)) + _MARGIN_S
             edges = [(start - room, stop + room)]
         else:
@@ -231,19 +210,20 @@ def _affordable(mission: Mission, plans: Mapping[str, Plan], budget: float) -> d
         shows.setdefault(tuple(i for i, f in enumerate(mission.faults) if c in f[2]), []).append(c)
     rates = {faults: sum(plans[c].rate for c in columns) for faults, columns in shows.items()}
 
-    def spans(count: int, pad: float) -> dict[tuple[int, ...], Spans]:
+    def spans(count: int, pad: tuple[float, float]) -> dict[tuple[int, ...], Spans]:
         times = [(a, b) for a, b, _ in mission.faults[:count]]
         return {
-            faults: spans_of([times[i] for i in faults if i < count], pad, mission.step_s, mission.samples)
+            faults: spans_of([times[i] for i in faults if i < count], *pad, mission.step_s, mission.samples)
             for faults in shows
         }
 
-    def fits(count: int, pad: float) -> bool:
+    def fits(count: int, pad: tuple[float, float]) -> bool:
         return sum(rates[f] * sum(b - a for a, b in found) for f, found in spans(count, pad).items()) <= budget
 
     least, most = 0, len(mission.faults)
     while least < most:
         middle = (least + most + 1) // 2
         least, most = (middle, most) if fits(middle, _PADS_S[-1]) else (least, middle - 1)
-    pad = next((p for p in _PADS_S if fits(least, p)), _PADS_S[-1])
+    kept = _PADS_S if mission.per == 1 else _PADS_S[-3:]
+    pad = next((p for p in kept if fits(least, p)), kept[-1])
     return {c: found for faults, found in spans(least, pad).items() for c in shows[faults]}

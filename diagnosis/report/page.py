@@ -24,7 +24,6 @@ from markupsafe import Markup, escape
 from numpy.typing import NDArray
 
 from diagnosis.report import names, tables
-from diagnosis.report.choose import Closeups
 from diagnosis.report.evidence import evidence_of
 from diagnosis.report.figures import Columns, derived, loop_groups
 from diagnosis.report.pair import pair_of
@@ -35,6 +34,7 @@ from diagnosis.report.previous import previous_section
 from diagnosis.report.svg import icon, path_picture, thumbnail
 from diagnosis.report.timeline import timeline
 from diagnosis.report.view import Axis, axis_of, blocks_of, channels_of, figures_of, packed_intervals, view, worst
+from diagnosis.result import Closeups
 from replay.errors import ConfigError
 
 _HERE = Path(__file__).parent

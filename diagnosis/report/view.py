@@ -13,10 +13,11 @@ import orjson
 from numpy.typing import NDArray
 
 from diagnosis.report import names, tables
-from diagnosis.report.choose import Closeups, Mission, encode
+from diagnosis.report.choose import Mission, encode
 from diagnosis.report.encode import Channel, Segment
 from diagnosis.report.figures import Columns, Group, Row, fault_rows, row_json
 from diagnosis.report.pair import DEGREES, VALVE_UNIT
+from diagnosis.result import Closeups
 
 _OTHERS = 0.1
 _LEAST = 50_000
