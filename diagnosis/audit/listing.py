@@ -7,10 +7,12 @@ import os
 import stat
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 from typing import Protocol
 
 from replay.errors import LogError
+from replay.rawlog import LogSummary
 from replay.readers.registry import READERS, summarise_log
 from replay.sources import SourceOptions
 
@@ -152,19 +154,10 @@ class LocalPlace:
 
     def continuous(self, parts: Sequence[Entry]) -> bool:
         """Whether logs go on from one to the next, by their indexes."""
-        last = None
-        for part in parts:
-            try:
-                summary = summarise_log(Path(part.path), SourceOptions())
-            except LogError:
-                return False
-            topics = {t.name for t in summary.topics}
-            if last is not None:
-                pause = summary.start_ns - last[0]
-                if not (-_OVERLAP_NS <= pause <= _PAUSE_NS and (topics <= last[1] or topics >= last[1])):
-                    return False
-            last = (summary.stop_ns, topics)
-        return True
+        try:
+            return continues([summarise_log(Path(part.path), SourceOptions()) for part in parts])
+        except LogError:
+            return False
 
     def is_log(self, file: Entry) -> bool:
         """Whether a reader knows the content."""
@@ -179,6 +172,16 @@ def joined(folder: Entry, rows: Iterable[tuple[str, int, str]]) -> Entry:
     held = sorted(rows)
     digest = hashlib.sha256(repr(held).encode("utf-8", "backslashreplace")).hexdigest()
     return Entry(folder.path, folder.name, folder.real, sum(r[1] for r in held), digest[:32], folder.link)
+
+
+def continues(parts: Sequence[LogSummary]) -> bool:
+    """Whether each log goes on where the one before ended, with the same topics."""
+    for before, after in pairwise(parts):
+        pause = after.start_ns - before.stop_ns
+        known, found = ({t.name for t in part.topics} for part in (before, after))
+        if not (-_OVERLAP_NS <= pause <= _PAUSE_NS and (found <= known or known <= found)):
+            return False
+    return True
 
 
 def _order(entry: Entry) -> tuple[bool, str]:
