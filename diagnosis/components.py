@@ -19,6 +19,7 @@ from diagnosis.tracking import assess_tracking
 from diagnosis.wheel_inputs import slip_of, wheel_channels, wheel_fit, wheels_data
 from diagnosis.wheel_model import WheelModelFit, low_passed
 from replay.faults import Side, State
+from replay.gaps import without_nan
 from replay.loop import Replay
 from replay.machine import Machine, Noise
 from replay.spill import beside, in_blocks, keep
@@ -63,8 +64,8 @@ def assess_components(
     if fit is not None:
         progress("judging the wheels by their models")
         slip = slip_of(timeline, replay, machine, channels.v, steering.angle, steering.doubtful)
-        data, residual = wheels_data(timeline, replay, machine, channels, fit, counts, steering.angle, slip)
-        models = assess_wheels(data, residual, machine.limits, gains=fit.reliable)
+        data, residuals = wheels_data(timeline, replay, machine, channels, fit, counts, steering.angle, slip)
+        models = assess_wheels(data, residuals, machine.limits, gains=fit.reliable)
     out: dict[Key, Assessment] = {}
     for i, wheel in enumerate(machine.wheels):
         if wheel not in wheels:
@@ -105,7 +106,7 @@ class _Wheel:
         limit = _QUIET * self.machine.limits.driving_speed
 
         def low(command: Array, speed: Array) -> NDArray[np.bool_]:
-            return np.asarray((np.abs(np.nan_to_num(command)) < limit) & (np.abs(np.nan_to_num(speed)) < limit))
+            return np.asarray((np.abs(without_nan(command)) < limit) & (np.abs(without_nan(speed)) < limit))
 
         return in_blocks(low, self.replay.v_ref[:, self.index], expected)
 
@@ -143,7 +144,7 @@ class _Wheel:
         size = self.timeline.size
         if direct and np.isfinite(self.values("u")).any():
             least = 0.02 * self.span("u")
-            idle = in_blocks(lambda u: np.abs(np.nan_to_num(u)) < least, self.values("u"))
+            idle = in_blocks(lambda u: np.abs(without_nan(u)) < least, self.values("u"))
             return assess_pair(self.pair(Side.ACTUATOR, "u_applied", "u", idle, "of full opening"), self.machine.limits)
         if direct:
             return unassessed(size, State.NOT_ASSESSED, "the valve's position is logged but not its command")

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from diagnosis.assessment import STATES, Assessment
 from replay.envelope import shown
 from replay.faults import FAULT_STATES, State
+from replay.gaps import without_nan
 from replay.loop import Replay, any_finite, stack
 from replay.machine import Machine
 from replay.spill import blocks, in_blocks
@@ -31,9 +32,9 @@ _EARTH_RADIUS = 6_371_008.8
 
 def driving(replay: Replay, timeline: Timeline, machine: Machine) -> NDArray[np.bool_]:
     """|v_c,i| above the driving speed, shape (n, wheels); the measured speed stands in where nothing is commanded."""
-    v = stack(timeline, [f"wheel.{w}.v" for w in machine.wheels])
     commanded = any_finite(replay.v_ref)
     limit = machine.limits.driving_speed
+    v = replay.v_ref if commanded.all() else stack(timeline, [f"wheel.{w}.v" for w in machine.wheels])
     with np.errstate(invalid="ignore"):
         return in_blocks(lambda ref, y: np.abs(np.where(commanded, ref, y)) > limit, replay.v_ref, v)
 
@@ -128,8 +129,8 @@ def phases(timeline: Timeline, replay: Replay, machine: Machine) -> list[dict[st
     half = 1.0 if machine.geometry is None else max(abs(w.x) for w in machine.geometry.wheels.values())
 
     def coded(speed: Array, rate: Array) -> NDArray[np.int8]:
-        speed = np.nan_to_num(speed)
-        turning = np.abs(np.nan_to_num(rate)) * half > 0.15 * np.abs(speed) + 1e-9
+        speed = without_nan(speed)
+        turning = np.abs(without_nan(rate)) * half > 0.15 * np.abs(speed) + 1e-9
         code = np.where(speed > limit, 1, np.where(speed < -limit, 2, 0))
         return np.where((code > 0) & turning, 3, code).astype(np.int8)
 

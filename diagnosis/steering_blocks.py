@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from diagnosis.modes import PAIR, SILENT, SKIP
 from diagnosis.noise import rounding_step
+from replay.gaps import without_nan
 from replay.machine import Noise
 from replay.spill import Column, release
 from replay.spill import blocks as cut
@@ -121,7 +122,7 @@ def blocks_of(y: Array, u: Array, fresh: NDArray[np.bool_], alive: NDArray[np.bo
         unknown = np.add.reduceat((~np.isfinite(u[part])).astype(np.float64), starts)
         blind = unknown > 0.5 * np.diff(np.append(starts, near.size))
         parts.append((mean, np.add.reduceat(power, starts) / np.maximum(count, 1.0), count, status, blind))
-        opening.append(np.nan_to_num(u[part]))
+        opening.append(without_nan(u[part]))
         release(y, u)
     mean, power, count, status, blind = (np.concatenate(x) for x in zip(*parts, strict=True))
     raw_u = opening.finish()

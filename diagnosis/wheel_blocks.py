@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from diagnosis.modes import PAIR, SILENT, SKIP
 from diagnosis.noise import white_part
+from replay.gaps import without_nan
 from replay.spill import Column, blocks, release
 
 Array = NDArray[np.float64]
@@ -143,7 +144,7 @@ def blocks_of(
     for cut in blocks(size, width):
         last = edge if cut.stop == size else ((0, 0), (0, 0))
         unknown = np.pad(~np.isfinite(u[cut]), last, mode="edge")
-        beyond = np.nan_to_num(u[cut])
+        beyond = without_nan(u[cut])
         beyond = np.pad(np.sign(beyond) * np.maximum(np.abs(beyond) - dead, 0.0), last, mode="edge")
         n = len(beyond) // width
         state = np.full((n, wheels), SKIP, dtype=np.int8)

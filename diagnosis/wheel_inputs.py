@@ -16,6 +16,7 @@ from diagnosis.pairs import sample_status
 from diagnosis.parity import slipping
 from diagnosis.wheel_blocks import block_width
 from diagnosis.wheel_model import WheelModelFit, demand, identify, low_passed_on
+from replay.gaps import without_nan
 from replay.kinematics import low_pass, speed_ratios, wheel_angles
 from replay.loop import Replay, any_finite, stack
 from replay.machine import Machine, Noise, WheelPlant
@@ -50,11 +51,15 @@ class WheelChannels:
     @cached_property
     def speed(self) -> Array:
         """The better speed of each wheel [m/s]."""
+        if not self.has_true.any():
+            return self.v
         return in_blocks(lambda true, v: np.asarray(np.where(self.has_true, true, v)), self.true, self.v)
 
     @cached_property
     def opening(self) -> Array:
         """The better opening of each wheel [fraction]."""
+        if not self.has_applied.any():
+            return self.u
         return in_blocks(lambda applied, u: np.asarray(np.where(self.has_applied, applied, u)), self.applied, self.u)
 
 
@@ -89,7 +94,7 @@ def wheel_fit(channels: WheelChannels, replay: Replay, timeline: Timeline, machi
         timeline.dt * width,
         given,
         machine.plant.flow,
-        mean(lambda u: np.abs(np.nan_to_num(u)), channels.opening),
+        mean(lambda u: np.abs(without_nan(u)), channels.opening),
     )
 
 
@@ -115,8 +120,8 @@ def wheels_data(
     counts: dict[str, NDArray[np.int16]],
     angle: Array,
     slip: NDArray[np.bool_],
-) -> tuple[WheelsData, Array]:
-    """Channels for the wheel models, and y − K·lowpass(u) [m/s] where the pump feeds it, shape (n, wheels).
+) -> tuple[WheelsData, list[Array]]:
+    """Channels for the wheel models, and y − K·lowpass(u) [m/s] of each wheel where the pump feeds it, shape (n,).
 
     Parameters
     ----------
@@ -147,7 +152,7 @@ def wheels_data(
         status[:, i] = sample_status(y[:, i], u[:, i], timeline.fresh[speed], alive(timeline, counts, speed), dt)
         residuals[i], quiet[:, i] = _apart(y[:, i], u[:, i], replay.v_ref[:, i], plant, limit, dt)
     starved = _starved(fit, u, machine.plant.flow, dt)
-    residual = in_blocks(lambda s, *r: np.where(s[:, None], np.nan, np.stack(r, axis=1)), starved, *residuals)
+    residuals = [x if x is nothing else in_blocks(lambda s, r: np.where(s, np.nan, r), starved, x) for x in residuals]
     ratio, turn = _in_motion(angle, machine, size, dt)
     return (
         WheelsData(
@@ -167,7 +172,7 @@ def wheels_data(
             coupling=machine.plant.coupling,
             dt=dt,
         ),
-        residual,
+        residuals,
     )
 
 
@@ -179,8 +184,8 @@ def _apart(
     state: float | None = None
     for part in blocks(y.size):
         beyond = np.sign(u[part]) * np.maximum(np.abs(u[part]) - plant.dead, 0.0)
-        asked = np.abs(plant.K * np.nan_to_num(beyond))
-        quiet.append((np.abs(np.nan_to_num(v_ref[part])) < limit) & (asked < limit))
+        asked = np.abs(plant.K * without_nan(beyond))
+        quiet.append((np.abs(without_nan(v_ref[part])) < limit) & (asked < limit))
         driven, state = low_passed_on(beyond, plant.tau, dt, state)
         residual.append(y[part] - plant.K * driven - plant.offset)
         release(y, u, v_ref)
@@ -195,7 +200,7 @@ def _starved(fit: WheelModelFit, u: Array, flow: float | None, dt: float) -> NDA
     out, last = Column(np.bool_, rows=len(u)), -(10**9)
     for part in blocks(len(u)):
         steps = np.arange(part.start, part.stop)
-        asked = demand(np.abs(np.nan_to_num(u[part])), fit) > flow
+        asked = demand(np.abs(without_nan(u[part])), fit) > flow
         near = np.maximum.accumulate(np.where(asked, steps, last))
         out.append(steps - near <= 3 * lag / dt)
         last = int(near[-1])

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import lfilter
 
+from replay.gaps import without_nan
 from replay.machine import WheelPlant
 
 Array = NDArray[np.float64]
@@ -60,7 +61,7 @@ def low_passed(u: Array, tau: float, dt: float) -> Array:
 def low_passed_on(u: Array, tau: float, dt: float, state: float | None) -> tuple[Array, float]:
     """`low_passed` of a block, with the state from the block before and for the next; None before the first."""
     a = np.exp(-dt / tau)
-    filled = np.nan_to_num(u)
+    filled = without_nan(u)
     out, last = lfilter([0.0, 1 - a], [1.0, -a], filled, zi=[filled[0] if state is None else state])
     return np.asarray(out), float(last[0])
 
@@ -93,7 +94,7 @@ def identify(
     """
     if flow is None:
         return _identify(y, u, moving, dt, given)
-    effort = np.abs(np.nan_to_num(u)) if effort is None else effort
+    effort = np.abs(without_nan(u)) if effort is None else effort
     asked = effort.sum(axis=1)
     driving = moving.any(axis=1)
     fed = asked <= (np.quantile(asked[driving], 0.6) if driving.any() else 0.0)

@@ -10,6 +10,7 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 
 from replay.spill import Column, blocks, in_blocks
@@ -66,17 +67,30 @@ def shown(values: NDArray[Any]) -> NDArray[Any]:
 
 
 def _reduced(values: NDArray[Any], bucket: int) -> NDArray[Any]:
-    fill = -len(values) % bucket
-    if fill:
-        values = np.concatenate([values, np.repeat(values[-1:], fill, axis=0)])
-    parts = values.reshape(-1, bucket, *values.shape[1:])
-    low, high = (
-        np.where(np.isnan(parts), worst, parts) if parts.dtype.kind == "f" else parts for worst in (np.inf, -np.inf)
-    )
-    at_low, at_high = low.argmin(axis=1), high.argmax(axis=1)
-    first = np.take_along_axis(parts, np.minimum(at_low, at_high)[:, None], axis=1)
-    second = np.take_along_axis(parts, np.maximum(at_low, at_high)[:, None], axis=1)
-    return np.concatenate([first, second], axis=1).reshape(-1, *values.shape[1:])
+    rows = values.reshape(len(values), -1)
+    out = np.empty((rows_of(len(rows), bucket), rows.shape[1]), values.dtype)
+    plain = (x.view(np.uint8) if x.dtype == np.bool_ else x for x in (rows, out))
+    _scan_extremes(*plain, bucket)
+    return out.reshape(-1, *values.shape[1:])
+
+
+@njit(cache=True)
+def _scan_extremes(rows, out, bucket):  # type: ignore[no-untyped-def]
+    """Least and greatest number of every bucket, in the order of time; the first number where all are NaN."""
+    for b in range(out.shape[0] // 2):
+        first, stop = b * bucket, min((b + 1) * bucket, rows.shape[0])
+        for j in range(rows.shape[1]):
+            low = high = -1
+            for i in range(first, stop):
+                x = rows[i, j]
+                if x == x:
+                    if low < 0 or x < rows[low, j]:
+                        low = i
+                    if high < 0 or x > rows[high, j]:
+                        high = i
+            if low < 0:
+                low = high = first
+            out[2 * b, j], out[2 * b + 1, j] = rows[min(low, high), j], rows[max(low, high), j]
 
 
 def in_buckets(function: Callable[..., NDArray[Any]], bucket: int, *arrays: NDArray[Any]) -> NDArray[Any]:

@@ -16,6 +16,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from replay.gaps import without_nan
+
 Array = NDArray[np.float64]
 
 LAW_TEXT = {
@@ -120,9 +122,17 @@ def printed_decay(rho: Array, dt: float, start: float = 0.0, before: float = 0.0
 
 def fill_forward(x: Array, first: float = 0.0) -> Array:
     """Replace NaN by the last value before it (`first` before any)."""
-    known = np.isfinite(x)
-    last = np.maximum.accumulate(np.where(known, np.arange(x.size), -1))
-    return np.where(last >= 0, x[np.maximum(last, 0)], first)
+    out = np.empty(x.size)
+    _scan_fill(x, first, out)
+    return out
+
+
+@njit(cache=True)
+def _scan_fill(x, last, out):  # type: ignore[no-untyped-def]
+    for k in range(x.size):
+        if np.isfinite(x[k]):
+            last = x[k]
+        out[k] = last
 
 
 @njit(cache=True)
@@ -239,7 +249,7 @@ def implied_forcing(implied: Array, rho: Array, dt: float, window_s: float = 0.2
     out = np.full(implied.size, np.nan)
     if implied.size <= 2 * half:
         return out
-    total = np.concatenate(([0.0], np.cumsum(np.nan_to_num(rho * implied)))) * dt
+    total = np.concatenate(([0.0], np.cumsum(without_nan(rho * implied)))) * dt
     missing = np.concatenate(([0], np.cumsum(~np.isfinite(rho * implied))))
     span = 2 * half * dt
     a, b = implied[: -2 * half], implied[2 * half :]

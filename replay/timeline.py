@@ -7,7 +7,7 @@ arrived, so that estimators count each sample once.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from replay.errors import LogError
 from replay.signals import Signal, Signals
-from replay.spill import Column, blocks, release
+from replay.spill import Column, beside, blocks, release
 
 MAX_STEPS = 200_000_000
 _LARGEST = 1e9
@@ -61,6 +61,7 @@ class Timeline:
     notes: tuple[str, ...] = ()
     open_loop: bool = False
     groups: Mapping[str, str] = field(default_factory=dict)
+    _beside: dict[tuple[str, ...], NDArray[np.float64]] = field(default_factory=dict, repr=False, compare=False)
 
     @property
     def dt(self) -> float:
@@ -75,6 +76,16 @@ class Timeline:
     def get(self, name: str) -> NDArray[np.float64] | None:
         """Values of a signal, or None where it is not in the log."""
         return self.signals.get(name)
+
+    def beside(self, names: Sequence[str]) -> NDArray[np.float64]:
+        """Signals side by side, shape (n, names), kept for the next who asks; NaN columns for what is not logged."""
+        key = tuple(names)
+        if not any(name in self.signals for name in key):
+            return np.broadcast_to(np.nan, (self.size, len(key)))
+        if key not in self._beside:
+            nothing = np.broadcast_to(np.nan, (self.size,))
+            self._beside[key] = beside([self.signals.get(name, nothing) for name in key])
+        return self._beside[key]
 
 
 def median_period(stamps: NDArray[np.int64]) -> int:

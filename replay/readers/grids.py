@@ -12,6 +12,7 @@ import tempfile
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from itertools import accumulate
 from typing import IO, Any
 
 import numpy as np
@@ -25,6 +26,8 @@ from replay.spill import Column
 SIZES = (1, 2, 4, 8)
 _FEWEST_ROWS = 256
 _MOST_BYTES = 64 << 20
+_COPY_BYTES = 4 << 20
+_MOST_FORETOLD = 1 << 40
 
 Rows = NDArray[np.int64]
 Cells = tuple[Rows | None, NDArray[Any]]
@@ -50,39 +53,54 @@ class Budget:
 
 
 class _Spill:
-    """Columns in one temporary file: many of them are long together, and each file of its own would be too many."""
+    """Columns in one temporary file: many of them are long together, and each file of its own would be too many.
 
-    def __init__(self, dtypes: list[np.dtype[Any]]) -> None:
+    Each column has its place for `expected` rows; where more come, all move to a file with more room.
+    """
+
+    def __init__(self, dtypes: list[np.dtype[Any]], expected: int) -> None:
         self.dtypes = dtypes
-        self.blocks: list[int] = []
+        self.rows = 0
+        self.room = max(expected, 1)
         self.file = _scratch()
+
+    def _first(self, rows: int) -> list[int]:
+        """Where each column stands if it has room for so many rows, and the size of all [bytes]."""
+        return list(accumulate(((rows * d.itemsize + 63) // 64 * 64 for d in self.dtypes), initial=0))
 
     def append(self, columns: Iterable[NDArray[Any]], rows: int) -> None:
         """Add rows, column by column."""
+        if self.rows + rows > self.room:
+            self._widen(max(2 * self.room, self.rows + rows))
         with _room():
-            for column in columns:
+            for start, dtype, column in zip(self._first(self.room), self.dtypes, columns, strict=False):
+                self.file.seek(start + self.rows * dtype.itemsize)
                 self.file.write(np.ascontiguousarray(column).view(np.uint8).data)
-        self.blocks.append(rows)
+        self.rows += rows
+
+    def _widen(self, room: int) -> None:
+        """Move all columns to a file with more room."""
+        with _room(), self.file as file:
+            self.file = _scratch()
+            for old, new, dtype in zip(self._first(self.room), self._first(room), self.dtypes, strict=False):
+                file.seek(old)
+                self.file.seek(new)
+                left = self.rows * dtype.itemsize
+                while left > 0:
+                    left -= self.file.write(file.read(min(left, _COPY_BYTES)))
+        self.room = room
 
     def finish(self) -> list[NDArray[Any]]:
-        """Return all columns as views of one map of a file in which each stands in one piece."""
-        rows = sum(self.blocks)
-        first = np.cumsum([0, *((rows * d.itemsize + 63) // 64 * 64 for d in self.dtypes)]).tolist()
-        with self.file as file, _scratch() as joined:
-            if not rows or not first[-1]:
-                return [np.empty(rows, d) for d in self.dtypes]
+        """Return all columns as views of one map of the file."""
+        first = self._first(self.room)
+        with self.file as file:
+            if not self.rows or not first[-1]:
+                return [np.empty(self.rows, d) for d in self.dtypes]
             with _room():
-                file.seek(0)
-                at = 0
-                for count in self.blocks:
-                    for start, dtype in zip(first, self.dtypes, strict=False):
-                        joined.seek(start + at * dtype.itemsize)
-                        joined.write(file.read(count * dtype.itemsize))
-                    at += count
-                joined.truncate(first[-1])
-                joined.flush()
-            mapped = mmap.mmap(joined.fileno(), 0, access=mmap.ACCESS_COPY)
-        return [np.frombuffer(mapped, d, rows, start) for d, start in zip(self.dtypes, first, strict=False)]
+                file.truncate(first[-1])
+                file.flush()
+            mapped = mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_COPY)
+        return [np.frombuffer(mapped, d, self.rows, start) for d, start in zip(self.dtypes, first, strict=False)]
 
 
 def _scratch() -> IO[bytes]:
@@ -136,6 +154,7 @@ class Table:
             seen[width] += 1
             self.place[spec] = seen[width]
         self.width = sum(widths)
+        self.foretold = expected
         self.expected = expected if budget is not None and budget.take(expected * self.width) else 0
         self.grid = Grid(self.counts, 0)
         self.used = self.count = 0
@@ -197,7 +216,8 @@ class Table:
     def spill(self) -> None:
         """Send everything to temporary files, and what comes later too."""
         if self.spilled is None:
-            self.spilled = _Spill([np.dtype(_stored(s)) for s in self.specs])
+            foretold = self.foretold if self.foretold * self.width < _MOST_FORETOLD else 0
+            self.spilled = _Spill([np.dtype(_stored(s)) for s in self.specs], max(foretold, self.count))
             for grid, used in self.full:
                 self._spill(grid, used)
             self.full = []
