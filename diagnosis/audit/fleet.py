@@ -1,0 +1,122 @@
+"""The fleet of an audit as page, document and table: `fleet.html`, `fleet.json` and `fleet.csv` beside the store."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import orjson
+
+from diagnosis.audit.fleet_csv import fleet_csv
+from diagnosis.audit.fleet_document import Fleet, fleet_document, fleet_of
+from diagnosis.audit.fleet_machines import Limits, machines_of
+from diagnosis.audit.fleet_read import read_missions
+from diagnosis.audit.fleet_trends import Axis
+from replay.files import atomic_path
+
+_MOST_BYTES = 50_000_000
+
+
+@dataclass(frozen=True)
+class FleetFiles:
+    """Where the three stand."""
+
+    html: Path
+    json: Path
+    csv: Path
+
+
+def write_fleet(store_path: Path, out: Path, *, baseline: Path | None = None, axis: Axis = "hours") -> FleetFiles:
+    """Read the store and write page, document and table; each appears whole or not at all.
+
+    Parameters
+    ----------
+    store_path : Path
+        ``fleet.sqlite`` of an audit, or the folder that holds it.
+    out : Path
+        Folder of the audit, to which the reports' folders in the store are relative.
+    baseline : Path or None
+        Store of another, earlier audit to compare with, or its folder.
+    axis : str
+        Trends over ``hours`` of driving or ``days``.
+
+    Raises
+    ------
+    OutputError
+        Where a store cannot be read, or a file cannot be written.
+    """
+    from diagnosis.report.fleet_page import build_fleet_page
+
+    document = fleet_json(load_fleet(store_path, out, axis), baseline)
+    files = FleetFiles(out / "fleet.html", out / "fleet.json", out / "fleet.csv")
+    texts = {
+        files.json: orjson.dumps(document, option=orjson.OPT_APPEND_NEWLINE),
+        files.csv: fleet_csv(document).encode("utf-8-sig", "backslashreplace"),
+        files.html: build_fleet_page(document).encode("utf-8", "backslashreplace"),
+    }
+    for path, content in texts.items():
+        with atomic_path(path) as temporary:
+            temporary.write_bytes(content)
+    return files
+
+
+def load_fleet(store_path: Path, out: Path | None = None, axis: Axis = "hours") -> Fleet:
+    """Missions, machines and trends of a store.
+
+    Parameters
+    ----------
+    store_path : Path
+        Store or its folder.
+    out : Path or None
+        Folder of the reports; None for the store's. Where a machine's last report is not there, its limits are the
+        defaults.
+    axis : str
+        ``hours`` or ``days``.
+
+    Raises
+    ------
+    OutputError
+        Where the store cannot be read.
+    """
+    folder = out if out is not None else store_path if store_path.is_dir() else store_path.parent
+    missions = read_missions(store_path)
+    machines, _ = machines_of(missions, lambda report: _limits(folder / report / "report.json"))
+    return fleet_of(machines, missions, axis)
+
+
+def fleet_json(fleet: Fleet, baseline: Path | None = None) -> dict[str, Any]:
+    """Document of a fleet, compared with an earlier audit where one is given.
+
+    Raises
+    ------
+    OutputError
+        Where the baseline cannot be read.
+    """
+    if baseline is None:
+        return fleet_document(fleet)
+    from diagnosis.audit.compare_fleet import compare_fleets
+
+    return fleet_document(fleet, compare_fleets(load_fleet(baseline), fleet))
+
+
+def _limits(path: Path) -> Limits:
+    """Limits and components from a machine's last report; defaults where it cannot be read."""
+    try:
+        if path.stat().st_size > _MOST_BYTES:
+            return Limits()
+        report = orjson.loads(path.read_bytes())
+        limits, machine = report.get("limits") or {}, report.get("machine") or {}
+        return Limits(
+            min_epsilon=float(limits.get("min_epsilon", Limits.min_epsilon)),
+            min_assessed=float(limits.get("min_assessed", Limits.min_assessed)),
+            wheels=_names(machine, "wheels"),
+            axles=_names(machine, "axles"),
+        )
+    except (OSError, ValueError, TypeError, AttributeError):
+        return Limits()
+
+
+def _names(machine: Mapping[str, Any], key: str) -> tuple[str, ...]:
+    return tuple(str(name) for name in machine.get(key) or ())

@@ -1,0 +1,284 @@
+"""What `fleet.json` says, as the schema ``mfhca-fleet/1``; fields may be added within it, not change their meaning.
+
+- ``schema``, ``version`` (of the tool), ``axis`` of the trends (``hours`` of driving in the audited missions, or ``days``).
+- ``verdict``: ``status`` (the worst machine's: ``stop``, ``watch``, ``not_assessed``, ``ready``), ``tag``, ``title``, ``text``.
+- ``counts``: ``machines``, ``missions`` and how they ended by ``states``, ``pending`` (not audited yet), ``copies`` (of a log
+  that stands under another name too), ``gone`` (the log is no longer there), ``undated`` (its clock does not know the date),
+  ``with_faults``, ``driving_s``, ``distance_m``, ``decided`` (share of driving time that was judged), ``faults`` by status,
+  ``first_ns`` and ``last_ns`` (start of the first and last dated mission).
+- ``machines``, worst first: ``id``, ``name``, ``label``, ``verdict``, ``note``, ``missions`` and ``undated`` (places in the list
+  ``missions``, those with a date in its order), ``failed``, ``with_faults``, ``driving_s``, ``decided``, ``min_epsilon``, ``parts``:
+  per component and side ``assessed`` (missions), ``assessed_last``, and ``modes`` (missions with each).
+- ``faults``: ``machine`` (place in ``machines``), ``component``, ``kind``, ``side``, ``mode``, ``severity``, ``status`` (``new``,
+  ``recurring``, ``once``, ``past``), ``missions`` with it of ``assessed``, ``first`` and ``last`` (places), ``last_id``, ``epsilon``.
+- ``trends``: ``machine``, ``component``, ``kind``, ``side``, ``limit``, ``points`` as [mission, place on the axis, ε̂, low, high],
+  ``now`` (end of the axis), ``outliers`` and ``changes`` (by point; ``drop``, ``rise``, ``bend``), ``first`` point of the last
+  stretch, ``direction``, ``line`` of that stretch (``level`` with 95 % bounds at ``now``, ``slope`` per unit of the axis with 95 %
+  bounds, ``tau``) or null, ``forecast`` from now on with its ``words``.
+- ``missions``, by machine and time: ``name``, ``machine`` (place or null), ``state``, ``reason``, ``verdict``, ``title``, ``start_ns``,
+  ``duration_s``, ``driving_s``, ``faults`` (of at least low severity, worst first), ``report`` (folder), ``files``, ``copy_of``, ``gone``.
+- ``baseline``: null, or what changed against another audit; see `diagnosis.audit.compare_fleet`.
+
+Lengths are in seconds and metres, ε and shares plain, times nanoseconds since 1970.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from diagnosis.audit import fleet_words as words
+from diagnosis.audit.fleet_machines import VERDICTS, FleetFault, Machine
+from diagnosis.audit.fleet_read import Bounds, FoundFault, Mission
+from diagnosis.audit.fleet_trends import Axis, PartTrend, trends_of
+from diagnosis.audit.outcome import READ, STATES
+from diagnosis.audit.trend_fit import Line
+from diagnosis.result import SEVERITIES
+from replay.version import __version__
+
+SCHEMA = "mfhca-fleet/1"
+_STATUSES = ("new", "recurring", "once", "past")
+
+
+@dataclass(frozen=True)
+class Fleet:
+    """Machines worst first with their trends, and all missions by machine and time."""
+
+    machines: tuple[Machine, ...]
+    trends: tuple[tuple[PartTrend, ...], ...]
+    missions: tuple[Mission, ...]
+    axis: Axis
+
+
+def fleet_of(machines: Sequence[Machine], missions: Sequence[Mission], axis: Axis = "hours") -> Fleet:
+    """Order machines worst first: by verdict, then by how soon a limit comes near, then by missions with faults."""
+    found = [(m, tuple(trends_of(m, axis))) for m in machines]
+
+    def rank(pair: tuple[Machine, tuple[PartTrend, ...]]) -> tuple[Any, ...]:
+        m, trends = pair
+        soon = min((t.trend.forecast.likely or 0.0 for t in trends if t.approaching), default=np.inf)
+        worst = max((SEVERITIES.index(f.severity) for f in m.faults if f.standing), default=-1)
+        return VERDICTS.index(m.verdict), -worst, soon, -m.with_faults, m.label
+
+    found.sort(key=rank)
+    place = {(m.id, "" if m.id else m.name): k for k, (m, _) in enumerate(found)}
+
+    def order(m: Mission) -> tuple[Any, ...]:
+        r = m.result
+        if r is None:
+            return len(found) + 1, 0, 0, m.name
+        k = place.get((r.machine_id, "" if r.machine_id else r.machine_name), len(found))
+        return k, r.start_ns is None, r.start_ns or 0, m.name
+
+    ordered = tuple(sorted(missions, key=order))
+    return Fleet(tuple(m for m, _ in found), tuple(t for _, t in found), ordered, axis)
+
+
+def fleet_document(fleet: Fleet, baseline: Mapping[str, Any] | None = None) -> dict[str, Any]:
+    """The document of a fleet; the same fleet gives the same document."""
+    owner = {id(r.result): k for k, m in enumerate(fleet.machines) for r in m.runs}
+    owner |= {id(f.result): k for k, m in enumerate(fleet.machines) for f in m.failed}
+    first: dict[int, str] = {}
+    for mission in sorted(fleet.missions, key=lambda m: m.name):
+        if mission.result is not None:
+            first.setdefault(mission.result.id, mission.name)
+    at = {mission.name: k for k, mission in enumerate(fleet.missions)}
+    status, tag, title = words.headline(fleet.machines)
+    unread = sum(m.result is not None and m.result.state not in READ for m in fleet.missions)
+    return {
+        "schema": SCHEMA,
+        "version": __version__,
+        "axis": fleet.axis,
+        "verdict": {
+            "status": status,
+            "tag": tag,
+            "title": title,
+            "text": words.sentences(fleet.machines, fleet.trends, unread, fleet.axis),
+        },
+        "counts": _counts(fleet, first),
+        "machines": [_machine(m, at) for m in fleet.machines],
+        "faults": [_fault(k, f, at) for k, m in enumerate(fleet.machines) for f in m.faults],
+        "trends": [_trend(k, t, at, fleet.axis) for k, own in enumerate(fleet.trends) for t in own],
+        "missions": [_mission(m, owner, first) for m in fleet.missions],
+        "baseline": baseline,
+    }
+
+
+def _counts(fleet: Fleet, first: Mapping[int, str]) -> dict[str, Any]:
+    results = [m.result for m in fleet.missions if m.result is not None]
+    states = Counter(r.state for r in results)
+    runs = [r for m in fleet.machines for r in m.runs]
+    starts = [r.result.start_ns for r in runs if r.result.start_ns is not None]
+    parts = [p for r in runs for p in r.result.parts]
+    driving = sum(p.driving_s for p in parts)
+    faults = Counter(str(f.status) for m in fleet.machines for f in m.faults)
+    return {
+        "machines": len(fleet.machines),
+        "missions": len(fleet.missions),
+        "states": {s: states[s] for s in STATES},
+        "pending": len(fleet.missions) - len(results),
+        "copies": len(results) - len(first),
+        "gone": sum(m.gone for m in fleet.missions),
+        "undated": sum(len(m.undated) for m in fleet.machines),
+        "with_faults": sum(bool(r.faults) for r in runs),
+        "driving_s": _round(sum(r.result.driving_s or 0.0 for r in runs)),
+        "distance_m": _round(sum(r.result.distance_m or 0.0 for r in runs)),
+        "decided": _round(sum(p.decided_s for p in parts) / driving) if driving > 0 else None,
+        "faults": {s: faults[s] for s in _STATUSES},
+        "first_ns": min(starts, default=None),
+        "last_ns": max(starts, default=None),
+    }
+
+
+def _machine(m: Machine, at: Mapping[str, int]) -> dict[str, Any]:
+    return {
+        "id": m.id,
+        "name": m.name,
+        "label": m.label,
+        "verdict": m.verdict,
+        "note": m.note,
+        "missions": [at[r.name] for r in m.dated],
+        "undated": [at[r.name] for r in m.undated],
+        "failed": [at[f.name] for f in m.failed],
+        "with_faults": m.with_faults,
+        "driving_s": _round(m.driving_s),
+        "decided": _round(m.decided),
+        "min_epsilon": m.limits.min_epsilon,
+        "parts": [_part(m, *key) for key in m.parts],
+    }
+
+
+def _part(m: Machine, component: str, side: str) -> dict[str, Any]:
+    assessed = [r.assessed(component, side, m.limits) for r in m.runs]
+    modes: Counter[str] = Counter()
+    for run in m.runs:
+        modes.update(
+            {f.mode for f in run.faults if f.component == component and f.side in (side, "sensor_or_actuator")}
+        )
+    return {
+        "component": component,
+        "side": side,
+        "kind": m.kind(component),
+        "assessed": sum(assessed),
+        "assessed_last": assessed[len(m.dated) - 1] if m.dated else None,
+        "modes": dict(sorted(modes.items())),
+    }
+
+
+def _fault(k: int, f: FleetFault, at: Mapping[str, int]) -> dict[str, Any]:
+    return {
+        "machine": k,
+        "component": f.component,
+        "kind": f.kind,
+        "side": f.side,
+        "mode": f.mode,
+        "severity": f.severity,
+        "status": f.status,
+        "missions": f.missions,
+        "assessed": f.assessed,
+        "first": at[f.first.name],
+        "last": at[f.last.name],
+        "last_id": f.last_id,
+        "since": f.since,
+        "epsilon": bounds_json(f.epsilon),
+    }
+
+
+def _trend(k: int, t: PartTrend, at: Mapping[str, int], axis: Axis) -> dict[str, Any]:
+    s, f = t.series, t.trend.forecast
+    columns = [[_round(float(v)) for v in c] for c in (s.x, s.value, s.low, s.high)]
+    return {
+        "machine": k,
+        "component": t.component,
+        "kind": t.kind,
+        "side": t.side,
+        "limit": t.limit,
+        "now": _round(s.now),
+        "points": [list(p) for p in zip([at[r.name] for r in t.runs], *columns, strict=True)],
+        "outliers": list(t.trend.outliers),
+        "changes": [{"index": c.index, "kind": c.kind, "size": _round(c.size)} for c in t.trend.changes],
+        "first": t.trend.first,
+        "direction": t.trend.direction,
+        "approaching": t.approaching,
+        "line": _line(t.trend.line, s.now),
+        "forecast": {
+            "state": f.state,
+            "soonest": _round(f.soonest),
+            "likely": _round(f.likely),
+            "latest": _round(f.latest),
+            "horizon": _round(f.horizon),
+            "words": words.forecast_words(f, t.limit, axis),
+        },
+    }
+
+
+def _line(line: Line | None, now: float) -> dict[str, Any] | None:
+    if line is None:
+        return None
+    level, half = line.at(now), line.half(now, 0.95)
+    spread = line.quantile(0.95) * line.slope_var**0.5
+    return {
+        "level": {"value": _round(level), "low": _round(level - half), "high": _round(level + half)},
+        "slope": {
+            "value": _round(line.slope),
+            "low": _round(line.slope - spread),
+            "high": _round(line.slope + spread),
+        },
+        "tau": _round(line.tau),
+        "centre": _round(line.centre),
+        "dof": line.dof,
+    }
+
+
+def _mission(m: Mission, owner: Mapping[int, int], first: Mapping[int, str]) -> dict[str, Any]:
+    r = m.result
+    head: dict[str, Any] = {"name": m.name, "files": list(m.files), "bytes": m.bytes, "gone": m.gone}
+    if r is None:
+        return {**head, "machine": None, "state": "pending", "reason": "not audited yet", "verdict": None, "faults": []}
+    faults = sorted(
+        (f for f in r.faults if f.severity != "info"), key=lambda f: (-SEVERITIES.index(f.severity), -f.seconds)
+    )
+    return {
+        **head,
+        "machine": owner.get(id(r)),
+        "state": r.state,
+        "reason": r.reason,
+        "verdict": r.verdict,
+        "title": r.title,
+        "start_ns": r.start_ns,
+        "duration_s": _round(r.duration_s),
+        "driving_s": _round(r.driving_s),
+        "distance_m": _round(r.distance_m),
+        "open_loop": r.open_loop,
+        "attempts": r.attempts,
+        "version": r.version,
+        "report": r.report,
+        "copy_of": None if first[r.id] == m.name else first[r.id],
+        "faults": [_found(f) for f in faults],
+    }
+
+
+def _found(f: FoundFault) -> dict[str, Any]:
+    told = {k: getattr(f, k) for k in ("id", "component", "kind", "side", "mode", "severity")}
+    return {
+        **told,
+        "seconds": _round(f.seconds),
+        "epsilon": bounds_json(f.epsilon),
+        "probability": _round(f.probability),
+    }
+
+
+def bounds_json(b: Bounds | None) -> dict[str, float | None] | None:
+    """ε̂ with its bounds, rounded."""
+    return None if b is None else {"value": _round(b.value), "low": _round(b.low), "high": _round(b.high)}
+
+
+def _round(value: float | None) -> float | None:
+    """Six significant digits; the same on every computer."""
+    if value is None or not np.isfinite(value):
+        return None
+    return float(f"{value:.6g}") + 0.0

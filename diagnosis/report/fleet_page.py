@@ -1,0 +1,254 @@
+"""The fleet page of an audit: one HTML file that works offline and can be read without JavaScript.
+
+Its scripts choose light or dark, sort the machines and search the missions. A content security policy admits exactly
+them and no request. Links lead to the missions' reports below the page's folder.
+"""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+import re
+from collections.abc import Mapping, Sequence
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+import jinja2
+from markupsafe import Markup
+
+from diagnosis.audit.fleet_words import count
+from diagnosis.report import fleet_rows as rows
+from diagnosis.report import names
+from diagnosis.report.fleet_changes import VERDICTS, changes_of
+from diagnosis.report.fleet_courses import MOST, chosen, course, interest, level_words
+from diagnosis.report.fleet_matrix import matrix
+from diagnosis.report.fleet_svg import mark, sparkline, sprite
+
+_HERE = Path(__file__).parent
+_FAULTS = 400
+_OPEN_ROWS = 40
+_UNITS = {"hours": "h", "days": "d"}
+_STATUS = {"new": "New", "recurring": "Recurring", "once": "Once", "past": "Past"}
+_DEFINITIONS = (
+    "A machine stands as its last mission that could be assessed, or worse where no later mission assessed the part of an "
+    "earlier fault. Missions whose log does not know the date count, but cannot be ordered.",
+    "New: in the machine's last mission and in none before, of which one assessed the part. Recurring: in several missions. "
+    "Past: not found in the last three missions that assessed the part. Faults of severity “info” are left out.",
+    "Assessed: judged for the seconds that the verdict “ready” takes, and for four fifths of its driving.",
+    "Trend: weighted line through the missions' ε̂ over the driving hours of the audited missions, with a spread from mission "
+    "to mission of its own; missions off the line (×) are set aside, and a step or bend (↓ ↑ ∠) starts the line anew, so that "
+    "a repair does. The band is its 90 % interval, the bar on the limit the 90 % interval of the crossing.",
+    "No forecast is made from fewer than five missions since the last change, nor further ahead than three times the hours "
+    "that it rests on. It says when the mean of missions reaches the limit if wear goes on as it does.",
+    "Copies of a log count once in machines, faults and trends.",
+)
+
+
+def build_fleet_page(document: Mapping[str, Any]) -> str:
+    """Page of a fleet; the same document gives the same text.
+
+    Parameters
+    ----------
+    document : Mapping[str, Any]
+        From `diagnosis.audit.fleet_document.fleet_document`.
+    """
+    trends = document["trends"]
+    document = names.made_visible(_addressed(document))
+    trends = [{**t, "component": names.visible(t["component"])} for t in trends]
+    axis = document["axis"]
+    scripts = [_text("theme.js"), _text("fleet.js")]
+    told = [f for f in document["faults"] if f["status"] != "past"]
+    shown = chosen(trends)
+    context = {
+        "css": Markup(_css()),
+        "csp": _policy(scripts),
+        "head": Markup(scripts[0]),
+        "script": Markup(scripts[1]),
+        "sprite": sprite(),
+        "verdict": {**document["verdict"], "icon": rows.verdict_symbol(document["verdict"]["status"])},
+        "counts": document["counts"],
+        "span": _span(document["counts"]),
+        "kpis": _kpis(document),
+        "baseline": changes_of(document["baseline"]),
+        "strip": rows.STRIP,
+        "machines": [_machine(k, m, document, trends) for k, m in enumerate(document["machines"])],
+        "faults": [_fault(f, document, trends) for f in told[:_FAULTS]],
+        "unlisted": len(told) - len(told[:_FAULTS]),
+        "past": [_fault(f, document, trends) for f in document["faults"] if f["status"] == "past"][:_FAULTS],
+        "trends": [course(t, document["machines"], _UNITS[axis]) for t in shown],
+        "quiet": len(trends) - len(shown),
+        "crowded": len(shown) == MOST,
+        "matrix": matrix(document["machines"]),
+        "groups": [(*g, len(document["missions"]) <= _OPEN_ROWS) for g in rows.groups(document)],
+        "failures": [m for m in document["missions"] if m["verdict"] is None],
+        "states": rows.STATES,
+        "definitions": _DEFINITIONS,
+        "version": document["version"],
+        "axis": {"hours": "driving hours of the audited missions", "days": "days"}[axis],
+    }
+    return _environment().get_template("fleet.html.j2").render(context)
+
+
+def _addressed(document: Mapping[str, Any]) -> dict[str, Any]:
+    """Document without its trends whose missions know their pages; names are made visible later, addresses stay."""
+    missions = [{**m, "address": rows.link(m.get("report"))} for m in document["missions"]]
+    out = {k: v for k, v in document.items() if k != "trends"} | {"missions": missions}
+    if out["baseline"] is not None:
+        changed = [
+            {**f, "address": rows.to_fault(rows.link(f["newer"]["report"]), f["newer"]["id"]) if f["newer"] else ""}
+            for f in out["baseline"]["faults"]
+        ]
+        out["baseline"] = {**out["baseline"], "faults": changed}
+    return out
+
+
+def _policy(scripts: Sequence[str]) -> str:
+    hashes = " ".join(f"'sha256-{base64.b64encode(hashlib.sha256(s.encode()).digest()).decode()}'" for s in scripts)
+    return (
+        f"default-src 'none'; script-src {hashes}; style-src 'unsafe-inline'; img-src data:; base-uri 'none'; "
+        "form-action 'none'"
+    )
+
+
+@lru_cache
+def _text(name: str) -> str:
+    return (_HERE / name).read_text("utf-8")
+
+
+@lru_cache
+def _css() -> str:
+    """Style of the mission report, dark without scripts by the system's choice, and what is special to this page."""
+    shared = _text("report.css")
+    dark = re.search(r"\[data-theme=dark\] \{([^}]*)\}", shared)
+    plain = f"@media (prefers-color-scheme: dark) {{ :root:not(.js) {{{dark[1]}}} }}\n" if dark else ""
+    return shared + plain + _text("fleet.css")
+
+
+@lru_cache
+def _environment() -> jinja2.Environment:
+    environment = jinja2.Environment(
+        loader=jinja2.FileSystemLoader(_HERE),
+        autoescape=True,
+        undefined=jinja2.StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    environment.filters |= {"state": names.state_label, "grouped": names.grouped}
+    environment.globals |= {"mark": mark}
+    return environment
+
+
+def _span(counts: Mapping[str, Any]) -> str:
+    days = [rows.day(counts[k]) for k in ("first_ns", "last_ns") if counts[k] is not None]
+    return " to ".join(dict.fromkeys(days))
+
+
+def _kpis(document: Mapping[str, Any]) -> list[tuple[str, str, str]]:
+    """Value, what it is, and what belongs to it."""
+    c = document["counts"]
+    unread = [
+        f"{names.grouped(c['states'][s])} {w}" for s, w in rows.STATES.items() if s != "ok" and c["states"].get(s)
+    ]
+    rest = [
+        f"{names.grouped(c[k])} {w}"
+        for k, w in (("pending", "not audited yet"), ("copies", "copies"), ("gone", "logs no longer there"))
+        if c[k]
+    ]
+    judged = sum(len(m["missions"]) + len(m["undated"]) for m in document["machines"])
+    share = f"{100 * c['with_faults'] / judged:.0f} % of those judged" if judged else "none judged"
+    f = c["faults"]
+    blind = sum(p["assessed_last"] is False for m in document["machines"] for p in m["parts"])
+    return [
+        (names.grouped(c["missions"]), "missions", ", ".join([*unread, *rest]) or "all read whole"),
+        (f"{c['driving_s'] / 3600:.1f} h", "driving time", f"{c['distance_m'] / 1000:.1f} km"),
+        (names.grouped(c["with_faults"]), "missions with faults", share),
+        (
+            f"{f['new']} / {f['recurring']} / {f['past']}",
+            "new, recurring, past faults",
+            f"{f['once']} found once, earlier",
+        ),
+        (
+            "–" if c["decided"] is None else f"{100 * c['decided']:.1f} %",
+            "of driving time judged",
+            f"{count(blind, 'part')} not assessed in the last mission"
+            if blind
+            else "every part assessed in the last mission",
+        ),
+    ]
+
+
+def _machine(
+    k: int, m: Mapping[str, Any], document: Mapping[str, Any], trends: Sequence[Mapping[str, Any]]
+) -> dict[str, Any]:
+    standing = [f for f in document["faults"] if f["machine"] == k and f["status"] != "past"]
+    own = [t for t in trends if t["machine"] == k and t["line"] is not None]
+    leading = max(own, key=interest, default=None)
+    judged = len(m["missions"]) + len(m["undated"])
+    words, symbol = VERDICTS[m["verdict"]], rows.verdict_symbol(m["verdict"])
+    if m["verdict"] == "ready" and standing:
+        words, symbol = "Ready, fault comes and goes", "warning"
+    elif m["verdict"] == "ready" and any(t["approaching"] for t in own):
+        words, symbol = "Ready, limit comes near", "warning"
+    return {
+        "label": m["label"],
+        "name": m["name"] if m["name"] != m["label"] else "",
+        "rank": k,
+        "symbol": symbol,
+        "words": words,
+        "note": m["note"],
+        "open": len(standing),
+        "faults": "; ".join(rows.fault_words(f) for f in standing[:2])
+        + (f" +{len(standing) - 2}" if len(standing) > 2 else ""),
+        "strip": rows.strip(document["missions"], m),
+        "with_faults": m["with_faults"],
+        "judged": judged,
+        "trend": sparkline(leading) if leading else "",
+        "trend_words": f"{leading['component']} {names.part(leading['kind'], leading['side'])}: {level_words(leading)}"
+        if leading
+        else "",
+        "level": leading["line"]["level"]["value"] if leading else -1.0,
+        "driven": f"{m['driving_s'] / 3600:.1f} h",
+        "driving_s": m["driving_s"],
+        "decided": "–" if m["decided"] is None else f"{100 * m['decided']:.0f} %",
+        "share": m["decided"] or 0.0,
+        "group": k,
+    }
+
+
+def _fault(f: Mapping[str, Any], document: Mapping[str, Any], trends: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+    first, last = (document["missions"][f[k]] for k in ("first", "last"))
+    e = f["epsilon"]
+    told = []
+    if e and f["mode"] == "inefficient":
+        told.append(f"ε̂ {e['value']:.2f} ({e['low']:.2f} to {e['high']:.2f})".replace("-", "−"))
+        own = next(
+            (
+                t
+                for t in trends
+                if (t["machine"], t["component"], t["side"]) == (f["machine"], f["component"], f["side"])
+            ),
+            None,
+        )
+        if own is not None and own["direction"] != "not_known":
+            told.append(own["direction"])
+    if f["since"]:
+        told.append(
+            f"not in the last {count(f['since'], 'mission')} that assessed it"
+            if f["since"] > 1
+            else "not in the last mission"
+        )
+    return {
+        "machine": document["machines"][f["machine"]]["label"],
+        "symbol": names.known(f["mode"]),
+        "words": names.state_label(f["mode"], f["side"]),
+        "part": f"{f['component']} {names.part(f['kind'], f['side'])}",
+        "severity": f["severity"],
+        "status": _STATUS[f["status"]],
+        "kind": f["status"],
+        "count": f"{f['missions']} of {f['assessed']}",
+        "first": rows.day(first.get("start_ns")),
+        "last": rows.day(last.get("start_ns")),
+        "address": rows.to_fault(last["address"], f["last_id"]),
+        "told": ", ".join(told) or "–",
+    }
