@@ -124,7 +124,7 @@ def filter_model(data: WheelsData, i: int, residual: Array) -> wt.WheelFilterMod
 
 
 def assess_wheels(
-    data: WheelsData, residual: Array, limits: Limits, *, gains: bool
+    data: WheelsData, residuals: Sequence[Array], limits: Limits, *, gains: bool
 ) -> dict[int, tuple[Assessment, Assessment]]:
     """Judge sensor and actuator of every wheel that has a model.
 
@@ -132,7 +132,7 @@ def assess_wheels(
     ----------
     data : WheelsData
         Channels.
-    residual : Array, shape (n, wheels)
+    residuals : Sequence[Array], each of shape (n,)
         y − K·lowpass(u) [m/s].
     limits : Limits
         What counts.
@@ -147,7 +147,7 @@ def assess_wheels(
     dead = np.array([0.0 if p is None else p.dead for p in data.plants])
     blocks = blocks_of(data.y, data.u, data.status, data.quiet, data.ratio, data.turn, dead, data.dt)
     model = wt.JointModel(
-        wheels=tuple(None if p is None else filter_model(data, i, residual[:, i]) for i, p in enumerate(data.plants)),
+        wheels=tuple(None if p is None else filter_model(data, i, residuals[i]) for i, p in enumerate(data.plants)),
         flow=data.flow,
         switch_cost=float(np.log(_MEAN_HEALTHY_S / blocks.dt * 12)),
     )

@@ -14,7 +14,7 @@ from replay.kinematics import CommandState, wheel_angles, wheel_commands
 from replay.law_fit import MIN_EXPLAINED, LawFit, fit_law
 from replay.loop_scan import LoopLaw, scan_wheel
 from replay.machine import Machine
-from replay.spill import Column, beside, blocks, in_blocks, release
+from replay.spill import Column, blocks, in_blocks, release
 from replay.timeline import Timeline
 
 Array = NDArray[np.float64]
@@ -98,11 +98,8 @@ class Replay:
 
 
 def stack(timeline: Timeline, names: list[str]) -> Array:
-    """Columns of a timeline side by side; NaN columns for signals that are not logged."""
-    nothing = np.broadcast_to(np.nan, (timeline.size,))
-    if not names:
-        return np.empty((timeline.size, 0))
-    return beside([timeline.signals.get(name, nothing) for name in names])
+    """Columns of a timeline side by side, not to be written to; NaN columns for signals that are not logged."""
+    return timeline.beside(names)
 
 
 def replay_loop(timeline: Timeline, machine: Machine, bucket: int = 1) -> Replay:
@@ -122,7 +119,8 @@ def replay_loop(timeline: Timeline, machine: Machine, bucket: int = 1) -> Replay
     v = stack(timeline, [f"wheel.{w}.v" for w in machine.wheels])
     u = stack(timeline, [f"wheel.{w}.u" for w in machine.wheels])
     phi = stack(timeline, [f"steer.{a}.phi" for a in machine.axles])
-    v_ref, phi_ref, wheel_phi = _commands(timeline, machine, phi, readings)
+    v_ref, phi_ref = _commands(timeline, machine, phi, readings)
+    geometry = machine.geometry
     unfit = (
         "" if any(np.isfinite(u[part]).any() for part in blocks(timeline.size)) else "no recorded valve command to fit"
     )
@@ -142,7 +140,10 @@ def replay_loop(timeline: Timeline, machine: Machine, bucket: int = 1) -> Replay
         phi_ref=phi_ref,
         steer_u=steer_u,
         bucket=bucket,
-        wheel_phi=shown(np.asarray, wheel_phi),
+        wheel_phi=shown(
+            lambda a: np.full((len(a), len(machine.wheels)), np.nan) if geometry is None else wheel_angles(a, geometry),
+            phi,
+        ),
         e=shown(np.subtract, v, v_ref),
         rho=shown(lambda a, b: mfhca.decay_rate(a, b, control.xi, control.beta), v, v_ref),
         psi_printed=scanned["psi_printed"],
@@ -160,8 +161,8 @@ def replay_loop(timeline: Timeline, machine: Machine, bucket: int = 1) -> Replay
     )
 
 
-def _commands(timeline: Timeline, machine: Machine, phi: Array, readings: list[Reading]) -> tuple[Array, Array, Array]:
-    """Commanded wheel speeds and axle angles: recorded where logged, else by L1 and L2; and each wheel's angle."""
+def _commands(timeline: Timeline, machine: Machine, phi: Array, readings: list[Reading]) -> tuple[Array, Array]:
+    """Commanded wheel speeds and axle angles: recorded where logged, else by L1 and L2."""
     wheels, axles = machine.wheels, machine.axles
     v_ref = stack(timeline, [f"wheel.{w}.v_ref" for w in wheels])
     phi_ref = stack(timeline, [f"steer.{a}.phi_ref" for a in axles])
@@ -169,32 +170,31 @@ def _commands(timeline: Timeline, machine: Machine, phi: Array, readings: list[R
     speed, omega = timeline.get("cmd.v"), timeline.get("cmd.omega")
     geometry = machine.geometry
     mapped = geometry is not None and speed is not None
-    wanted = not (logged_v.all() and logged_phi.all())
-    out = [Column(np.float64, (count,), timeline.size) for count in (len(wheels), len(axles), len(wheels))]
+    _say_commands(machine, bool(logged_v.all()), mapped, readings)
+    if geometry is None or speed is None or (logged_v.all() and logged_phi.all()):
+        return v_ref, phi_ref
+    out = [Column(np.float64, (count,), timeline.size) for count in (len(wheels), len(axles))]
     state = CommandState()
     for part in blocks(timeline.size):
         v_part, phi_part = v_ref[part].copy(), phi_ref[part].copy()
-        angle = np.full(v_part.shape, np.nan) if geometry is None else wheel_angles(phi[part], geometry)
-        if geometry is not None and speed is not None and wanted:
-            found = wheel_commands(
-                speed[part],
-                np.zeros(len(v_part)) if omega is None else omega[part],
-                geometry,
-                dt=timeline.dt,
-                max_steer=machine.max_steer,
-                phi_dot=machine.control.phi_dot,
-                phi_dot_hz=machine.control.phi_dot_hz,
-                measured_angle=angle,
-                state=state,
-            )
-            v_part[:, ~logged_v] = found.speed[:, ~logged_v]
-            phi_part[:, ~logged_phi] = found.axle_angle[:, ~logged_phi]
-        for column, values in zip(out, (v_part, phi_part, angle), strict=True):
+        found = wheel_commands(
+            speed[part],
+            np.zeros(len(v_part)) if omega is None else omega[part],
+            geometry,
+            dt=timeline.dt,
+            max_steer=machine.max_steer,
+            phi_dot=machine.control.phi_dot,
+            phi_dot_hz=machine.control.phi_dot_hz,
+            measured_angle=wheel_angles(phi[part], geometry),
+            state=state,
+        )
+        v_part[:, ~logged_v] = found.speed[:, ~logged_v]
+        phi_part[:, ~logged_phi] = found.axle_angle[:, ~logged_phi]
+        for column, values in zip(out, (v_part, phi_part), strict=True):
             column.append(values)
         release(v_ref, phi_ref, phi, speed, omega)
-    _say_commands(machine, bool(logged_v.all()), mapped, readings)
-    v_all, phi_all, angles = (column.finish() for column in out)
-    return v_all, phi_all, angles
+    v_all, phi_all = (column.finish() for column in out)
+    return v_all, phi_all
 
 
 def _say_commands(machine: Machine, logged: bool, mapped: bool, readings: list[Reading]) -> None:
@@ -220,6 +220,8 @@ def _say_commands(machine: Machine, logged: bool, mapped: bool, readings: list[R
 def any_finite(values: Array) -> NDArray[np.bool_]:
     """Which columns of an (n, k) array hold a number anywhere, shape (k,)."""
     found = np.zeros(values.shape[1], np.bool_)
+    if not any(values.strides):  # one number for all
+        return np.isfinite(values[0]) if len(values) else found
     for part in blocks(len(values)):
         found |= np.isfinite(values[part]).any(axis=0)
         release(values)
