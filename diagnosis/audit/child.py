@@ -26,7 +26,7 @@ from replay.errors import ConfigError, LogError, NotJudged, OutputError
 from replay.machine import Machine
 
 OUTCOME, REPORT, TEMPORARY, MESSAGES = "outcome.json", "report", "tmp", "messages.txt"
-_FULL = {errno.ENOSPC, errno.EFBIG, errno.EDQUOT}
+FULL = {errno.ENOSPC, errno.EFBIG, errno.EDQUOT}
 
 
 @dataclass(frozen=True)
@@ -113,12 +113,12 @@ def attempt(work: Work) -> dict[str, Any]:
     except OutputError as error:
         return {"state": "not_written", "reason": str(error), "summary": None}
     except (LogError, ConfigError) as error:
-        full = isinstance(error.__cause__, OSError) and error.__cause__.errno in _FULL
+        full = isinstance(error.__cause__, OSError) and error.__cause__.errno in FULL
         return {"state": "crashed" if full else "unreadable", "reason": str(error), "summary": None}
     except MemoryError as error:
         return {"state": "out_of_memory", "reason": _where(error), "summary": None}
     except OSError as error:
-        full, what = error.errno in _FULL, error.strerror or error
+        full, what = error.errno in FULL, error.strerror or error
         name = f"{error.filename}: " if error.filename else ""
         reason = f"cannot keep temporary data: {what}" if full else f"{name}cannot be read: {what}"
         return {"state": "crashed" if full else "unreadable", "reason": reason, "summary": None}

@@ -88,9 +88,9 @@ def discover(words: Iterable[str], *, exclude: Path | None = None) -> Discovery:
 
         look_remotely(finder, remote)
     found = finder.missions()
-    base = _common(finder.bases)
+    base = {where: _common([b for b in finder.bases if _where(b) == where]) for where in map(_where, finder.bases)}
     paths = [(f"{f.folder}/{f.stem}", f"{f.folder}/{f.files[0].name}") for f in found]
-    names = unique_names([(_below(stem, base), _below(path, base)) for stem, path in paths])
+    names = unique_names([(_below(stem, base[_where(stem)]), _below(path, base[_where(path)])) for stem, path in paths])
     missions = [
         MissionSource(
             name=name,
@@ -105,6 +105,11 @@ def discover(words: Iterable[str], *, exclude: Path | None = None) -> Discovery:
     ]
     missions.sort(key=lambda m: (m.name.casefold(), m.name))
     return Discovery(tuple(missions), tuple(finder.problems), finder.left_aside, tuple(dict.fromkeys(finder.roots)))
+
+
+def _where(path: str) -> str:
+    """Kind of a URL; empty for local paths."""
+    return path.partition("://")[0] if "://" in path else ""
 
 
 def _common(bases: Sequence[str]) -> list[str]:

@@ -12,11 +12,12 @@ from diagnosis.audit.identity import given_id, stated_id
 from diagnosis.audit.keys import config_hash
 from diagnosis.audit.limits import Limits
 from diagnosis.audit.outcome import TRANSIENT
+from diagnosis.audit.staging import machine_at
 from diagnosis.audit.store import Store, StoredResult
 from diagnosis.audit.task import key_of
 from replay.errors import ConfigError
 from replay.machine import Machine, haulotte
-from replay.machine_file import dump_machine, load_machine
+from replay.machine_file import dump_machine
 
 PAPER = "paper defaults"
 
@@ -97,7 +98,7 @@ def plan(missions: Iterable[MissionSource], asked: Asked) -> list[Planned]:
 
     @cache
     def loaded(name: str | None) -> tuple[Machine, bytes]:
-        machine = haulotte() if name is None else load_machine(Path(name))
+        machine = haulotte() if name is None else machine_at(name)
         return machine, dump_machine(machine).encode()
 
     usual = str(asked.machine) if asked.machine is not None else None

@@ -14,6 +14,7 @@ from diagnosis.audit.discover import Discovery
 from diagnosis.audit.endings import Ending, endings, write_failures
 from diagnosis.audit.engines import Engine
 from diagnosis.audit.events import Tell
+from diagnosis.audit.ingest import ingest
 from diagnosis.audit.places import working
 from diagnosis.audit.plan import Asked, Planned, is_done, plan, stored_result
 from diagnosis.audit.runner import Runner, skip
@@ -88,6 +89,9 @@ def audit(
     """
     with Store.open(asked.output / FILE_NAME) as store:
         store.begin_run()
+        taken = ingest(store)
+        if taken.attempts or taken.links or taken.problems:
+            tell("ingested", {"attempts": taken.attempts, "links": taken.links, "problems": list(taken.problems)})
         missions = store.adopt(discovery.missions, discovery.roots)
         planned = plan(missions, asked)
         rest = []

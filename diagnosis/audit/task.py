@@ -21,9 +21,9 @@ from diagnosis.audit.keys import Key, file_roles, log_hash, unhashed_log
 from diagnosis.audit.limits import Limits
 from diagnosis.audit.outcome import READ, Outcome
 from diagnosis.audit.places import MISSIONS, cannot_write, publish
-from replay.errors import LogError
+from diagnosis.audit.staging import stage
+from replay.errors import ConfigError, LogError
 from replay.machine import Machine
-from replay.mission import content_hash
 from replay.version import __version__
 
 
@@ -138,17 +138,19 @@ def audit_one(task: Task) -> Attempt:
 
 
 def _audit(task: Task, folder: Path, temporary: Path) -> Attempt:
-    files = tuple(Path(name) for name in task.mission.files)
+    files = tuple(Path(name) for name in task.mission.files if "://" not in name)
     before = _signature(files)
-    hashes = task.known
     try:
-        hashes = hashes or tuple(content_hash(path)[0] for path in files)
-    except LogError as error:
+        staged = stage(task.mission, temporary / "files", task.known)
+    except (LogError, ConfigError) as error:
         key = key_of(task.mission, (), task.machine, task.config_hash)
-        return Attempt(task.mission, key, Outcome("unreadable", str(error)), task.attempt, None, ())
+        full = isinstance(error.__cause__, OSError) and error.__cause__.errno in child.FULL
+        outcome = Outcome("crashed" if full else "unreadable", str(error))
+        return Attempt(task.mission, key, outcome, task.attempt, None, ())
+    hashes = staged.hashes
     key = key_of(task.mission, hashes, task.machine, task.config_hash)
     work = Work(
-        tuple(str(path) for path in files),
+        tuple(str(path) for path in staged.paths),
         task.machine,
         task.machine_source,
         task.machine_id,
