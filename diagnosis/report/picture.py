@@ -9,6 +9,7 @@ from typing import Any
 from markupsafe import Markup
 
 from diagnosis.report.names import FAULT_MODES, known, part, span, state_label
+from diagnosis.report.sureness import known_sides
 from diagnosis.report.svg import badge, text
 
 _SEVERITY = {"high": 3, "medium": 2, "low": 1, "info": 0}
@@ -26,7 +27,11 @@ class Condition:
 
 
 def condition(
-    component: str, kind: str, faults: Sequence[Mapping[str, Any]], judged: Mapping[tuple[str, str], bool]
+    component: str,
+    kind: str,
+    faults: Sequence[Mapping[str, Any]],
+    judged: Mapping[tuple[str, str], bool],
+    enough: Mapping[tuple[str, str], bool] | None = None,
 ) -> Condition:
     """Worst fault of a component, or whether it was judged at all.
 
@@ -38,6 +43,8 @@ def condition(
         The report's intervals.
     judged : Mapping[tuple[str, str], bool]
         Whether any time of a component and side was decided.
+    enough : Mapping[tuple[str, str], bool] or None
+        Whether it was decided for as long as a verdict of *ready* takes; None: not known.
     """
     mine = [f for f in faults if f["component"] == component and f["kind"] == kind]
     if mine:
@@ -51,8 +58,13 @@ def condition(
         return Condition(known(worst["mode"]), (words, label, length, *more), worst["id"], title)
     sides = {side: done for (c, side), done in judged.items() if c == component}
     open_sides = [part(kind, side) for side, done in sides.items() if not done]
+    brief = [part(kind, side) for (c, side), done in (enough or {}).items() if c == component and not done]
     if not sides or len(open_sides) == len(sides):
         return Condition("not_assessed", ("Not assessed",), "", f"{component}: not assessed")
+    if brief and not open_sides:
+        who = brief[0] if len(brief) < len(sides) else ""
+        lines = ("No fault found", *((who,) if who else ()), "judged too briefly")
+        return Condition("not_assessed", lines, "", f"{component}: {', '.join(x.lower() for x in lines)}")
     if open_sides:
         lines = ("No fault found", f"{open_sides[0]}", "not assessed")
         return Condition("not_assessed", lines, "", f"{component}: no fault found, {open_sides[0]} not assessed")
@@ -108,6 +120,7 @@ def machine_picture(report: Mapping[str, Any]) -> Markup:
     geometry: Mapping[str, Any] = machine.get("geometry") or {}
     faults = report.get("intervals") or ()
     judged = judged_sides(report)
+    enough = {key: side.assessed for key, side in known_sides(report).items()}
     rows = _rows(wheels, geometry)
     placed = bool(wheels) and all(w in geometry for w in wheels)
     top = 40.0 if placed else 26.0
@@ -125,12 +138,12 @@ def machine_picture(report: Mapping[str, Any]) -> Markup:
         y = top + i * _PITCH
         for j, w in enumerate(row):
             centre, outward = _column(j, len(row), wide)
-            parts.append(_wheel(w, centre, y, outward, condition(w, "wheel", faults, judged)))
+            parts.append(_wheel(w, centre, y, outward, condition(w, "wheel", faults, judged, enough)))
             if placed:
                 axle_rows.setdefault(str(geometry[w].get("axle", "")), y + _TYRE_H / 2)
     extra = 0
     for a in axles:
-        c = condition(a, "steer", faults, judged)
+        c = condition(a, "steer", faults, judged, enough)
         if a in axle_rows and a not in wheels:
             parts.append(_axle(a, 186, axle_rows[a], c))
         else:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from diagnosis.compare_coverage import sides_of
+from diagnosis.compare_coverage import SideCoverage, sides_of
 from diagnosis.report.names import state_label
 
 _WORDS = ((0.99, "Practically certain"), (0.9, "Very likely"), (0.7, "Likely"))
@@ -73,14 +73,14 @@ def _likely(p: float) -> str:
 
 def judged(report: Mapping[str, Any]) -> str:
     """How many parts were judged as far as a verdict of *ready* takes; empty where nothing says so."""
-    sides = _sides(report)
+    sides = known_sides(report)
     done = sum(s.assessed for s in sides.values())
     return f"{done} of {len(sides)} parts" if sides else ""
 
 
 def sure_of_verdict(report: Mapping[str, Any]) -> str:
     """How sure the tool is of a verdict without faults: how much was judged, and by what."""
-    sides = _sides(report)
+    sides = known_sides(report)
     axles = (report.get("machine") or {}).get("axles") or ()
     wheels = [s for (c, _), s in sides.items() if c not in axles]
     if not wheels:
@@ -95,7 +95,8 @@ def sure_of_verdict(report: Mapping[str, Any]) -> str:
     return f"All {len(wheels)} wheel parts were judged{least}{how}."
 
 
-def _sides(report: Mapping[str, Any]) -> Mapping[tuple[str, str], Any]:
+def known_sides(report: Mapping[str, Any]) -> Mapping[tuple[str, str], SideCoverage]:
+    """How long each component and side was judged; empty where a report does not say it."""
     rows: Sequence[Mapping[str, Any]] = report.get("coverage") or ()
     if not all("decided_driving_s" in row and "seconds" in row for row in rows):
         return {}

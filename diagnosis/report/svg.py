@@ -172,7 +172,7 @@ def path_picture(
         parts.append(
             Markup(
                 '<g class="mark {m}" data-f="{id}" data-scroll role="button" tabindex="0" aria-label="{id} on the path"'
-                ' transform="translate({x:.1f},{y:.1f})"><circle r="12"/><text y="3.6">{id}</text>{b}</g>'
+                ' transform="translate({x:.1f},{y:.1f})"><circle class="area" r="20"/><circle class="ring" r="12"/><text y="3.6">{id}</text>{b}</g>'
             ).format(m=known(fault["mode"]), id=fault["id"], x=cx, y=cy, b=badge(known(fault["mode"]), 10, -9, 11))
         )
     first, last = np.flatnonzero(good)[[0, -1]].tolist()

@@ -91,7 +91,7 @@ def context(report: Mapping[str, Any], duration: float) -> dict[str, Any]:
             "sure": "" if verdict.get("actions") else sure_of_verdict(report),
             "title": verdict.get("title") or words,
             "text": verdict.get("text") or "",
-            "caveats": verdict.get("caveats") or [],
+            "caveats": merged_caveats(verdict.get("caveats") or ()),
             "actions": [_action(a, worst, report) for a in verdict.get("actions") or ()],
         },
         "facts": _facts(report, log, duration),
@@ -155,6 +155,15 @@ def _delay(fault: Mapping[str, Any]) -> str:
         if detected <= fault["start_s"]
         else "+" + time_words(detected - fault["start_s"])
     )
+
+
+def merged_caveats(caveats: Sequence[str]) -> list[str]:
+    """Sentences that say the same of several parts as one, with the parts named before the colon."""
+    parts: dict[str, list[str]] = {}
+    for i, sentence in enumerate(caveats):
+        head, colon, tail = sentence.partition(": ")
+        parts.setdefault(tail if colon else f"{i}:", []).append(head if colon else sentence)
+    return [", ".join(heads) + ("" if tail.endswith(":") else f": {tail}") for tail, heads in parts.items()]
 
 
 def _answer(status: str, report: Mapping[str, Any]) -> str:

@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 
 from diagnosis.report.page import build_page
+from diagnosis.report.tables import merged_caveats
 from replay.errors import ConfigError
 from tests import report_samples as samples
 from tests.browser import evidence_samples
@@ -283,3 +284,20 @@ def test_extremes_of_long_missions_are_named_and_not_drawn_as_samples() -> None:
     assert json.loads(next(s for a, s in tree.scripts if a.get("id") == "view"))["dt"] == pytest.approx(1 / 3200)
     assert "the smallest and largest of every 64 samples are kept" in tree.text
     assert "one mark for each sample" not in tree.text
+
+
+def test_caveats_that_say_the_same_are_one_line() -> None:
+    same = "judged for 6.5 s of driving, of 10 s needed."
+    caveats = [f"FR speed sensor: {same}", "The log is damaged: a hole", f"FL speed sensor: {same}", "No colon here"]
+    assert merged_caveats(caveats) == [
+        f"FR speed sensor, FL speed sensor: {same}",
+        "The log is damaged: a hole",
+        "No colon here",
+    ]
+
+
+def test_a_verdict_without_an_answer_says_that_it_is_not_known() -> None:
+    report, columns = samples.not_assessed()
+    assert "whether it may go out is not known" in build_page(report, columns)
+    report, columns = samples.five_faults()
+    assert "must not go out" in build_page(report, columns)

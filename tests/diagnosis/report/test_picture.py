@@ -65,3 +65,11 @@ def test_path_breaks_at_gaps_and_survives_standing_still() -> None:
     x[40:50] = np.nan
     assert "nan" not in path_picture(x, np.zeros(100), 0.0, 0.1, [FAULT])
     assert path_picture(np.zeros(100), np.zeros(100), 0.0, 0.1, [FAULT]).count('class="mark') == 1
+
+
+def test_a_part_that_was_judged_too_briefly_is_not_called_healthy() -> None:
+    judged = {("FR", "sensor"): True, ("FR", "actuator"): True}
+    short = condition("FR", "wheel", [], judged, {("FR", "sensor"): True, ("FR", "actuator"): False})
+    assert short.state == "not_assessed"
+    assert short.lines == ("No fault found", "drive valve", "judged too briefly")
+    assert condition("FR", "wheel", [], judged, dict.fromkeys(judged, True)).lines == ("Healthy",)
