@@ -18,6 +18,7 @@ from diagnosis.result import SCHEMA, MissionResult, to_json
 from replay.columns import replay_columns
 from replay.envelope import bucket_of
 from replay.errors import ConfigError, NotJudged
+from replay.log_identity import stated_machine
 from replay.loop import Replay, replay_loop
 from replay.machine import Machine
 from replay.mission import Mission, load_mission
@@ -62,7 +63,7 @@ def diagnose(
     wheels : Sequence[str] or None
         Wheels to judge; None: all.
     machine_id : str or None
-        Identity for trends; None: the machine file's.
+        Identity for trends; None: what the logs' metadata state, else the machine file's.
     progress : Callable[[str], None]
         Told what is being done.
 
@@ -178,7 +179,9 @@ def _result(
         "schema": SCHEMA,
         "tool": {"name": "mfhca-replay", "version": __version__},
         "log": _log(mission, moving, machine),
-        "machine": _machine(machine, machine_source, machine_id),
+        "machine": _machine(
+            machine, machine_source, machine_id or stated_machine(f.summary.metadata for f in mission.files)
+        ),
         "readings": list(replay.readings),
         "verdict": decision,
         "caveats": _more_caveats(mission, machine),

@@ -17,6 +17,8 @@ MAX_BYTES = 4 << 20
 _KEYS = ("version", "compression_mode", "compression_format", "ros_distro", "storage_identifier", "message_count")
 _READABLE_MODES = ("", "none", "file", "message")
 _NEWEST = 9
+_CUSTOM = re.compile(r"""\s*["']?custom_data["']?:""")
+_MOST_CUSTOM = 100
 
 
 @dataclass
@@ -33,12 +35,15 @@ class Metadata:
         Messages per topic, or None where they are not stated.
     parts : dict[str, int]
         Messages per part, where stated.
+    custom : dict[str, str]
+        What the recorder was told to note (``custom_data``).
     """
 
     facts: dict[str, str] = field(default_factory=dict)
     files: list[str] | None = None
     counts: dict[str, int] | None = None
     parts: dict[str, int] = field(default_factory=dict)
+    custom: dict[str, str] = field(default_factory=dict)
 
 
 def read_metadata(folder: Path, report: Report) -> Metadata:
@@ -90,7 +95,7 @@ def parse_metadata(text: str) -> Metadata:
             parts[name] = int(count)
     files = _items(lines, "relative_file_paths")
     names = None if files is None else [n for item in files if (n := scalar(item[0].strip()[1:]))]
-    return Metadata(facts, names, None if topics is None else counts, parts)
+    return Metadata(facts, names, None if topics is None else counts, parts, _custom(lines))
 
 
 def _value(lines: list[str], key: str) -> str:
@@ -98,6 +103,21 @@ def _value(lines: list[str], key: str) -> str:
     pattern = re.compile(rf"""\s*(?:-[ \t]+)?["']?{key}["']?:(?:[ \t]+(.*))?$""")
     found = next((m for line in lines if key in line and (m := pattern.match(line))), None)
     return scalar(found.group(1) or "") if found else ""
+
+
+def _custom(lines: list[str]) -> dict[str, str]:
+    """Texts by their keys below ``custom_data``."""
+    start = next((i for i, line in enumerate(lines) if _CUSTOM.match(line)), None)
+    if start is None:
+        return {}
+    head = lines[start]
+    rows = [part for part in head.partition(":")[2].strip(" {}").split(",") if part.strip()]
+    for line in lines[start + 1 :]:
+        if len(line) - len(line.lstrip()) <= len(head) - len(head.lstrip()):
+            break
+        rows.append(line)
+    pairs = ((key, value) for key, colon, value in (row.partition(":") for row in rows[:_MOST_CUSTOM]) if colon)
+    return {scalar(key): scalar(value) for key, value in pairs}
 
 
 def _items(lines: list[str], key: str) -> list[list[str]] | None:

@@ -117,4 +117,7 @@ def _complete(summary: LogSummary, meta: Metadata, compare: bool) -> LogSummary:
                      f"{', '.join(services[:_SHOWN])}{more}")  # fmt: skip
     if compare and not damage and not sum(found.values()):
         notes.append("the recording holds no messages: it was started and stopped with nothing received")
-    return replace(summary, notes=tuple(notes), damage=tuple(damage), metadata={**meta.facts, **summary.metadata})
+    custom = {f"custom_data.{key}": value for key, value in meta.custom.items()}
+    return replace(
+        summary, notes=tuple(notes), damage=tuple(damage), metadata={**custom, **meta.facts, **summary.metadata}
+    )
