@@ -140,6 +140,8 @@ def _internal_error(terminal: Terminal, error: Exception) -> int:
 
 def main() -> None:
     """Entry of the installed command."""
+    # Products of two or three columns gain nothing from threads of the linear algebra, which spin while they wait.
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     for name, mode in (("stdin", "r"), ("stdout", "w"), ("stderr", "w")):
         if getattr(sys, name) is None:  # closed by the caller
             setattr(sys, name, Path(os.devnull).open(mode, encoding="utf-8"))  # noqa: SIM115 - for the whole run

@@ -12,7 +12,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import lfilter
 
 from replay.drive_model import EchoModel
 
@@ -52,6 +51,8 @@ def stretches(valid: NDArray[np.bool_], least: int) -> list[slice]:
 
 def high_passed(x: Array, memory_s: float, dt: float) -> Array:
     """First-order high-pass of x with its first value as the level before it, shape (n,)."""
+    from scipy.signal import lfilter
+
     a = memory_s / (memory_s + dt)
     return np.asarray(lfilter([a, -a], [1.0, -a], x - x[0]), dtype=np.float64)
 

@@ -6,11 +6,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
-from filterpy.kalman import KalmanFilter
 from numba import njit
 from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from filterpy.kalman import KalmanFilter
 
 Array = NDArray[np.float64]
 
@@ -46,6 +49,8 @@ class GainBiasModel:
 
 def gain_bias_filter(model: GainBiasModel) -> KalmanFilter:
     """Build the filter of [δ − 1, δ̄] with filterpy; the caller sets ``H = [[x, 1]]`` and updates with ``y − x``."""
+    from filterpy.kalman import KalmanFilter
+
     kf = KalmanFilter(dim_x=2, dim_z=1)
     kf.x = np.zeros((2, 1))
     kf.P = np.diag([model.gain_std**2, model.bias_std**2])

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import uniform_filter1d
 
 from replay.resolution import rounding_step as rounding_step
 from replay.resolution import white_noise as white_noise
@@ -178,6 +177,8 @@ def unresolved(
     share : float
         Share of the power of the white part that shows up; 0 where all is resolved.
     """
+    from scipy.ndimage import uniform_filter1d
+
     kept = use & np.isfinite(residual) & np.isfinite(x)
     white = np.where(kept, white_part(x), 0.0)
     width = max(3, round(0.3 / dt))

@@ -8,7 +8,6 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import maximum_filter1d, minimum_filter1d
 
 from diagnosis import modes
 from diagnosis.noise import moving_sum, rounding_step, slow_mismatch, usual_distance, white_noise, white_part
@@ -104,6 +103,8 @@ def sample_status(
 
 def unsettled(x: Array, noise: float) -> NDArray[np.bool_]:
     """Where a reference changes within three samples by more than the noise, shape (n,)."""
+    from scipy.ndimage import maximum_filter1d, minimum_filter1d
+
     known = np.nan_to_num(x)
     return np.asarray(maximum_filter1d(known, _SETTLED) - minimum_filter1d(known, _SETTLED) > 2 * noise)
 

@@ -10,8 +10,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
-from scipy.signal import lfilter
 
 from replay.gaps import without_nan
 from replay.machine import WheelPlant
@@ -62,8 +62,18 @@ def low_passed_on(u: Array, tau: float, dt: float, state: float | None) -> tuple
     """`low_passed` of a block, with the state from the block before and for the next; None before the first."""
     a = np.exp(-dt / tau)
     filled = without_nan(u)
-    out, last = lfilter([0.0, 1 - a], [1.0, -a], filled, zi=[filled[0] if state is None else state])
-    return np.asarray(out), float(last[0])
+    out = np.empty(u.size)
+    last = _scan_lag(filled, a, float(filled[0]) if state is None else state, out)
+    return out, float(last)
+
+
+@njit(cache=True)
+def _scan_lag(u, a, x, out):  # type: ignore[no-untyped-def]
+    """Write x and carry on with x ← a·x + (1 − a)·u."""
+    for k in range(u.size):
+        out[k] = x
+        x = a * x + (1.0 - a) * u[k]
+    return x
 
 
 def identify(
