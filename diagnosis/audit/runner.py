@@ -11,6 +11,7 @@ from typing import Any
 
 from diagnosis.audit.engines import Engine, is_lost
 from diagnosis.audit.events import Tell
+from diagnosis.audit.identity import fallback_id
 from diagnosis.audit.outcome import TRANSIENT, Outcome
 from diagnosis.audit.places import Claim, Working, claim_mission
 from diagnosis.audit.plan import Asked, Planned, is_done, known_hashes, stored_result
@@ -171,7 +172,8 @@ def keep(attempt: Attempt, planned: Planned, store: Store) -> None:
         for path, size, stamp, sha256 in zip(mission.files, sizes, mission.stamps, attempt.hashes, strict=True):
             if store.known_hash(path, size, stamp) != sha256:
                 store.remember_hash(path, size, stamp, sha256)
-    store.record(mission, attempt.key, attempt.outcome, attempt.report, machine_id=planned.machine_id)
+    machine_id = planned.machine_id or planned.machine.id or fallback_id(mission)
+    store.record(mission, attempt.key, attempt.outcome, attempt.report, machine_id=machine_id)
 
 
 def skip(planned: Planned, result: StoredResult, store: Store, tell: Tell) -> None:

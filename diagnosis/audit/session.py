@@ -10,6 +10,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
+from diagnosis.audit.copies import without_copies
 from diagnosis.audit.discover import Discovery
 from diagnosis.audit.endings import Ending, endings, write_failures
 from diagnosis.audit.engines import Engine
@@ -106,7 +107,9 @@ def audit(
         tell("planned", {"rest": len(rest), "bytes": sum(one.mission.bytes for one in rest)})
         if rest:
             with working(asked.output) as place, engine() as made:
-                Runner(asked, store, made, place, page.telling).run(rest)
+                runner = Runner(asked, store, made, place, page.telling)
+                for part in without_copies(rest, store):
+                    runner.run(part)
         ends = endings(store, [one.mission.name for one in planned])
         failed = write_failures(asked.output, planned, ends, asked.machine)
     page.write(always=bool(rest))
