@@ -2,7 +2,7 @@
 // Time series of the report: decoded from the page's own text when first needed, thinned per pixel for drawing.
 const Data = (() => {
   const view = JSON.parse(document.getElementById("view").textContent);
-  const BLOCK = 64, HELD = 64e6;
+  const BLOCK = 64, HELD = 32e6;
   const decoded = new Map();
   let held = 0;
 
@@ -15,7 +15,7 @@ const Data = (() => {
 
   async function inflated(id, once) {
     const element = document.getElementById(id);
-    const stream = new Blob([fromBase64(element.textContent)]).stream().pipeThrough(new DecompressionStream("deflate"));
+    const stream = new Response(fromBase64(element.textContent)).body.pipeThrough(new DecompressionStream("deflate"));
     if (once) element.textContent = "";
     return new Response(stream);
   }
@@ -131,14 +131,16 @@ const Data = (() => {
       if (per === 1) {
         const { lo, hi, at, top, gap } = scan(s, p, e);
         if (!hi) { x.push(time(s.start + p)); y.push(NaN); continue; }
-        if (at <= top) { x.push(time(s.start + at), time(s.start + top)); y.push(value(lo), value(hi)); }
+        if (lo === hi) { x.push(time(s.start + at)); y.push(value(lo)); }
+        else if (at <= top) { x.push(time(s.start + at), time(s.start + top)); y.push(value(lo), value(hi)); }
         else { x.push(time(s.start + top), time(s.start + at)); y.push(value(hi), value(lo)); }
         if (gap) { x.push(time(s.start + e - 1)); y.push(NaN); }
       } else {
         let lo = 0x7fffffff, hi = 0;
         for (let i = p; i < e; i++) if (s.high[i]) { lo = Math.min(lo, s.low[i]); hi = Math.max(hi, s.high[i]); }
-        x.push(time(s.start + p * per), time(s.start + (p + e) / 2 * per));
-        if (hi) y.push(value(lo), value(hi)); else y.push(NaN, NaN);
+        x.push(time(s.start + p * per));
+        y.push(hi ? value(lo) : NaN);
+        if (hi > lo) { x.push(time(s.start + (p + e) / 2 * per)); y.push(value(hi)); }
       }
     }
     return { x, y, exact, stride: Math.max(per, Math.round(width * per)), stored: per };
@@ -191,6 +193,7 @@ const Data = (() => {
       const script = document.createElement("script");
       script.textContent = source;
       document.head.append(script);
+      script.remove();
       if (!window.Plotly) throw new Error("plotly.js did not start");
       return window.Plotly;
     });

@@ -181,17 +181,13 @@ def _segment(start: int, stride: int, parts: Sequence[NDArray[np.int32]], way: t
     return Segment(start, len(parts[0]), stride, planes, text)
 
 
-def _extremes(
-    low: NDArray[np.int32], high: NDArray[np.int32], times: int
-) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
-    """Extremes of every `times` of them; 0 where there is none."""
-    count = -(-len(low) // times)
-    blocks = np.zeros((2, count * times), np.int32)
-    blocks[0, : len(low)], blocks[1, : len(high)] = low, high
-    low, high = blocks[0].reshape(count, times), blocks[1].reshape(count, times)
-    least = np.where(low == 0, np.int32(2**31 - 1), low).min(axis=1)
-    most = high.max(axis=1)
-    return np.where(most == 0, np.int32(0), least), most
+def _extremes(values: NDArray[np.floating], rows: int) -> NDArray[np.floating]:
+    """Smallest, then largest value of every `rows` rows; NaN where there is none."""
+    starts = np.arange(0, len(values), rows)
+    both = np.concatenate([f.reduceat(values, starts) for f in (np.fmin, np.fmax)])
+    if (np.abs(both) >= _HUGE).any() and (wrong := np.abs(values) >= _HUGE).any():
+        return _extremes(np.where(wrong, np.nan, values), rows)
+    return both
 
 
 def whole(name: str, values: NDArray[np.floating], plan: Plan) -> Channel:
@@ -216,12 +212,9 @@ def reduced(name: str, values: NDArray[np.floating], plan: Plan, per: int, strid
     stride : int
         Samples per block.
     """
-    levels, step, base = levels_of(values, plan.step)
-    if per == 1:
-        low = high = levels
-    else:
-        low, high = _extremes(levels, levels, 2)
-    return Channel(name, step, base, (_segment(0, stride, _extremes(low, high, stride // per), _WORDS),))
+    both = _extremes(values, stride if per == 1 else 2 * stride // per)
+    levels, step, base = levels_of(both, plan.step)
+    return Channel(name, step, base, (_segment(0, stride, np.split(levels, 2), _WORDS),))
 
 
 def with_pieces(channel: Channel, pieces: Sequence[tuple[int, NDArray[np.floating]]], plan: Plan) -> Channel:

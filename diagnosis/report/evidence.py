@@ -14,8 +14,10 @@ from diagnosis.report.edges import edge_of, edge_words, time_words
 from diagnosis.report.names import clock, grouped, number
 from diagnosis.report.pair import Pair, pair_of, rests_on, shape_sentence
 from diagnosis.report.panels import course_picture, edge_picture
+from diagnosis.result import Closeups
 
 Columns = Mapping[str, NDArray[np.floating]]
+Stretch = tuple[Columns, tuple[float, float]]
 
 _COURSES = 40
 
@@ -65,6 +67,7 @@ def evidence_of(
     axis: tuple[float, float],
     per: int = 1,
     faults: Sequence[Mapping[str, Any]] | None = None,
+    closeups: Closeups | None = None,
 ) -> dict[str, Evidence]:
     """Evidence of faults by their names; the course is drawn for the first ones only.
 
@@ -77,9 +80,11 @@ def evidence_of(
     axis : tuple[float, float]
         Time of the first row and between rows [s].
     per : int
-        Samples whose extremes two rows hold, 1 where each row is a sample: only then onset and end can be drawn.
+        Samples whose extremes two rows hold, 1 where each row is a sample.
     faults : Sequence[Mapping[str, Any]] or None
         Those of the report's intervals that are wanted; None: all.
+    closeups : Closeups or None
+        Where rows are extremes: the samples from which onset and end can be drawn.
     """
     limit = (report.get("limits") or {}).get("min_probability")
     rates = {s["name"]: s.get("rate_hz") for s in report.get("signals") or ()}
@@ -87,13 +92,16 @@ def evidence_of(
     peers: dict[str, list[Mapping[str, Any]]] = {}
     for fault in every:
         peers.setdefault(fault["component"], []).append(fault)
+    step = axis[1] if per == 1 else 2 * axis[1] / per
+    stretches = _stretches(closeups, axis[0], step)
     out = {}
     for i, fault in enumerate(every if faults is None else faults):
         pair = pair_of(fault, columns)
-        edges = _edges(fault, peers[fault["component"]], pair, columns, axis) if pair and per == 1 else ()
+        whole = (columns, axis) if per == 1 else None
+        edges = _edges(fault, peers[fault["component"]], pair, whole, stretches) if pair else ()
         course = _course(fault, pair, columns, axis, limit) if pair and i < _COURSES else ()
         keys = _keys(pair) if pair and edges else ()
-        note = _note(pair, rates, axis[1]) if pair and edges else _missing(pair, columns, per)
+        note = _note(pair, rates, step) if pair and edges else _missing(pair, columns, per)
         out[fault["id"]] = Evidence(
             rests_on(fault, columns), delay_words(fault), shape_sentence(fault), keys, edges, course, note
         )
@@ -134,16 +142,36 @@ def _missing(pair: Pair | None, columns: Columns, per: int) -> str:
     )
 
 
+def _stretches(closeups: Closeups | None, start: float, step: float) -> list[Stretch]:
+    """Stretches with every sample: their columns, and time of their first sample and between samples [s]."""
+    if closeups is None:
+        return []
+    return [
+        ({k: v[a:b] for k, v in closeups.columns.items()}, (start + float(closeups.step[a]) * step, step))
+        for a, b in closeups.runs()
+    ]
+
+
+def _holds(part: Stretch, pair: Pair, at: float) -> bool:
+    """Whether a stretch has the pair's samples at a time."""
+    columns, (start, step) = part
+    names = {pair.measured, *([pair.reference] if pair.reference else [])}
+    return names <= set(columns) and -0.5 <= (at - start) / step <= len(columns[pair.measured]) + 0.5
+
+
 def _edges(
     fault: Mapping[str, Any],
     faults: Sequence[Mapping[str, Any]],
     pair: Pair,
-    columns: Columns,
-    axis: tuple[float, float],
+    whole: Stretch | None,
+    parts: Sequence[Stretch],
 ) -> tuple[Panel, ...]:
     out = []
     for name, key in (("onset", "start_s"), ("end", "stop_s")):
-        edge = edge_of(name, fault, faults, pair, columns, axis)
+        part = whole or next((p for p in parts if _holds(p, pair, fault[key])), None)
+        if part is None:
+            continue
+        edge = edge_of(name, fault, faults, pair, *part)
         title = f"{name.capitalize()} at {clock(fault[key], 3)}"
         if edge is None:
             where = "begins with" if name == "onset" else "lasts to the end of"

@@ -86,6 +86,10 @@ def build_page(
     limit = (report.get("limits") or {}).get("min_probability")
     figures = figures_of(faults, machine, shown, limit)
     groups = loop_groups(machine.get("wheels") or (), machine.get("axles") or (), shown)
+    near = None
+    if closeups is not None:
+        samples = {names.visible(k): v for k, v in closeups.columns.items()}
+        near = Closeups(closeups.step, derived(samples, faults))
     plots = len(filled) > 1
     plotly, packed, version = _plotly(plotlyjs) if plots else ("", "", "none, no plots")
     duration = _duration(report, axis)
@@ -101,7 +105,7 @@ def build_page(
         "path_modes": [m for m in names.FAULT_MODES if any(f["mode"] == m for f in detailed)],
         "previous": previous_section(report),
         "thumbs": {f["id"]: _thumbnail(f, shown, *place) for f in worst(faults, _THUMBNAILS)} if axis.rows else {},
-        "evidence": evidence_of(report, shown, place, axis.per, detailed),
+        "evidence": evidence_of(report, shown, place, axis.per, detailed, near),
         "unlisted": len(every) - len(faults),
         "groups": groups,
         "has_plots": plots,
@@ -116,10 +120,6 @@ def build_page(
     words = 400_000 + 6_000 * len(detailed) + 1_500 * len(faults) + len(intervals)
     budget = int(max_size_mb * 1e6) - len(packed) - words - drawn
     worst_first = {**report, "intervals": detailed}
-    near = None
-    if closeups is not None:
-        samples = {names.visible(k): v for k, v in closeups.columns.items()}
-        near = Closeups(closeups.step, derived(samples, faults))
     channels = channels_of(worst_first, shown, figures, groups, axis, max(budget, 200_000), near)
     context["blocks"] = [(f"b{i}", s.text) for i, s in enumerate(blocks_of(channels))]
     context["blocks"].append(("intervals", intervals))

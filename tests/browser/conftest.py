@@ -11,6 +11,7 @@ from typing import Any
 import pytest
 
 from diagnosis.report.page import build_page
+from diagnosis.result import Closeups
 from tests import report_samples as samples
 from tests.browser import evidence_samples
 
@@ -33,7 +34,7 @@ def browser() -> Iterator[Any]:
         browser.close()
 
 
-def _sample(name: str) -> tuple[dict[str, Any], samples.Columns]:
+def _sample(name: str) -> tuple[dict[str, Any], samples.Columns, *tuple[Closeups, ...]]:
     module = evidence_samples if hasattr(evidence_samples, name) else samples
     return getattr(module, name)()  # type: ignore[no-any-return]
 
@@ -45,7 +46,9 @@ def pages(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Path]:
     def written(name: str) -> Path:
         path = folder / f"{name} # 1.html"
         if not path.exists():
-            path.write_text(build_page(*_sample(name)), encoding="utf-8", newline="\n")
+            report, columns, *near = _sample(name)
+            page = build_page(report, columns, closeups=near[0] if near else None)
+            path.write_text(page, encoding="utf-8", newline="\n")
         return path
 
     return written

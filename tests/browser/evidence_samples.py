@@ -6,7 +6,12 @@ from typing import Any
 
 import numpy as np
 
+from diagnosis.pictured import steps_around
+from diagnosis.result import Closeups
+from replay.envelope import envelope
 from tests import report_samples as samples
+
+SPIKES = (32.5, 77.7)
 
 
 def decided() -> tuple[dict[str, Any], samples.Columns]:
@@ -72,3 +77,22 @@ def spike() -> tuple[dict[str, Any], samples.Columns]:
     report, columns = samples.five_faults()
     columns["imu.yaw_rate"] = np.where(np.arange(12_000) == 7_777, 0.5, 0.1)
     return report, columns
+
+
+def spikes() -> tuple[dict[str, Any], samples.Columns]:
+    """Two minutes at 1 kHz; three samples of wheel FR's speed jump, once within a fault and once far from any."""
+    wheels, axles = ["FR", "FL", "RR", "RL"], ["front", "rear"]
+    report, columns = samples.mission(wheels, axles, samples.FAULTS, rate=1000.0, geometry=samples.PLACES)
+    for at in SPIKES:
+        columns["wheel.FR.v"][round(at * 1000) : round(at * 1000) + 3] = 1.998
+    return report, columns
+
+
+def spikes_long() -> tuple[dict[str, Any], samples.Columns, Closeups]:
+    """The same as extremes of 16 samples, with every sample around the faults."""
+    report, columns = spikes()
+    spans = [(round(1000 * f["start_s"]), round(1000 * f["stop_s"])) for f in report["intervals"]]
+    step = steps_around(spans, 120_000, 0.001)
+    near = {k: v[step] for k, v in columns.items() if k != "t"}
+    rows = {k: envelope(v, 16) for k, v in columns.items() if k != "t"}
+    return report, {"t": 0.008 * np.arange(15_000), **rows}, Closeups(step, near)
