@@ -3,7 +3,8 @@
 - ``schema``, ``version`` (of the tool), ``axis`` of the trends (``hours`` of driving in the audited missions, or ``days``).
 - ``verdict``: ``status`` (the worst machine's: ``stop``, ``watch``, ``not_assessed``, ``ready``), ``tag``, ``title``, ``text``.
 - ``counts``: ``machines``, ``missions`` and how they ended by ``states``, ``pending`` (not audited yet), ``copies`` (of a log
-  that stands under another name too), ``gone`` (the log is no longer there), ``undated`` (its clock does not know the date),
+  that stands under another name too), ``gone`` (the log is no longer there), ``undated`` (its clock does not know the date, or another mission
+  of the machine starts at the same moment),
   ``with_faults``, ``driving_s``, ``distance_m``, ``decided`` (share of driving time that was judged), ``faults`` by status,
   ``first_ns`` and ``last_ns`` (start of the first and last dated mission).
 - ``machines``, worst first: ``id``, ``name``, ``label``, ``verdict``, ``note``, ``missions`` and ``undated`` (places in the list
@@ -14,7 +15,8 @@
 - ``trends``: ``machine``, ``component``, ``kind``, ``side``, ``limit``, ``points`` as [mission, place on the axis, ε̂, low, high],
   ``now`` (end of the axis), ``outliers`` and ``changes`` (by point; ``drop``, ``rise``, ``bend``), ``first`` point of the last
   stretch, ``direction``, ``line`` of that stretch (``level`` with 95 % bounds at ``now``, ``slope`` per unit of the axis with 95 %
-  bounds, ``tau``) or null, ``forecast`` from now on with its ``words``.
+  bounds, ``tau``, ``centre`` and ``dof`` as in `diagnosis.audit.trend_fit`) or null, ``approaching`` (rises for certain and
+  likely reaches the limit within as long as the stretch has lasted), ``forecast`` from now on with its ``words``.
 - ``missions``, by machine and time: ``name``, ``machine`` (place or null), ``state``, ``reason``, ``verdict``, ``title``, ``start_ns``,
   ``duration_s``, ``driving_s``, ``faults`` (of at least low severity, worst first), ``report`` (folder), ``files``, ``copy_of``, ``gone``.
 - ``baseline``: null, or what changed against another audit; see `diagnosis.audit.compare_fleet`.

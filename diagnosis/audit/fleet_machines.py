@@ -1,13 +1,13 @@
 """Machines of a fleet: their missions in order of the log's clock, where each stands, and the faults that return.
 
-Copies of a log count once. Missions whose log does not know the date cannot be ordered: they count, but they take no part
-in strips, trends, or what is new. Where one of them is worse than the last dated one, the machine stands as the worse.
+Copies of a log count once. Missions whose log does not know the date, or which start at the same moment as another one of
+the machine, cannot be ordered: they count, but they take no part in trends or what is new. Where one of them is worse than the last dated one, the machine stands as the worse.
 """
 
 from __future__ import annotations
 
 import itertools
-from collections import defaultdict
+from collections import Counter, defaultdict
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -130,7 +130,7 @@ class Machine:
     dated : tuple[Run, ...]
         Judged missions in order of their logs' clocks.
     undated : tuple[Run, ...]
-        Judged missions whose log does not know the date, by name.
+        Judged missions that cannot be ordered, by name.
     failed : tuple[Mission, ...]
         Missions without a report.
     limits : Limits
@@ -178,7 +178,7 @@ class Machine:
         if trailing and len(trailing) < len(self.dated):
             out.append(f"its last {_count(len(trailing), 'mission')} could not be assessed")
         if self.undated:
-            out.append(f"{_count(len(self.undated), 'mission')} without a date")
+            out.append(f"{_count(len(self.undated), 'mission')} of unknown order")
         if self.failed:
             out.append(f"{_count(len(self.failed), 'log')} not read")
         return ", ".join(out)
@@ -253,18 +253,15 @@ def machines_of(
     out = []
     for key in sorted({*runs, *failed}):
         found = list(runs[key].values())
-        dated = sorted((r for r in found if r.result.start_ns is not None), key=_when)
-        undated = sorted((r for r in found if r.result.start_ns is None), key=lambda r: r.name)
+        starts = Counter(r.result.start_ns for r in found if r.result.start_ns is not None)
+        dated = sorted((r for r in found if starts[r.result.start_ns] == 1), key=lambda r: r.result.start_ns or 0)
+        undated = sorted((r for r in found if starts[r.result.start_ns] != 1), key=lambda r: r.name)
         last = next((r for r in (*reversed(dated), *undated) if r.result.report is not None), None)
         own = limits(last.result.report or "") if limits and last else Limits()
         name = key[1] or (last.result.machine_name if last else "")
         machine = Machine(key[0], name, tuple(dated), tuple(undated), tuple(failed[key]), own)
         out.append(_with_faults(machine))
     return out, nowhere
-
-
-def _when(run: Run) -> tuple[int, str]:
-    return run.result.start_ns or 0, run.name
 
 
 def _with_faults(m: Machine) -> Machine:

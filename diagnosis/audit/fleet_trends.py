@@ -9,7 +9,7 @@ from typing import Literal
 import numpy as np
 
 from diagnosis.audit.fleet_machines import Machine, Run
-from diagnosis.audit.trend import Forecast, Series, Trend, trend_of
+from diagnosis.audit.trend import REACH, Forecast, Series, Trend, trend_of
 
 Axis = Literal["hours", "days"]
 
@@ -30,8 +30,9 @@ class PartTrend:
 
     @property
     def approaching(self) -> bool:
-        """Whether it rises for certain and its likely crossing is within reach."""
-        return self.trend.direction == "rising" and self.trend.forecast.likely is not None
+        """Whether it rises for certain and likely reaches the limit within as long as the stretch has lasted."""
+        f = self.trend.forecast
+        return self.trend.direction == "rising" and f.likely is not None and f.likely <= f.horizon / REACH
 
 
 def trends_of(machine: Machine, axis: Axis = "hours") -> list[PartTrend]:

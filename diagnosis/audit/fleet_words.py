@@ -61,7 +61,9 @@ def headline(machines: Sequence[Machine]) -> tuple[str, str, str]:
     if not n:
         return "not_assessed", "nothing judged", "No mission could be judged"
     tag = f"{count(verdicts.count(status), 'machine')}: {_TAGS[status]}"
-    if work:
+    if work and n == 1:
+        title = "The machine needs work"
+    elif work:
         title = f"{work} of {count(n, 'machine')} {'needs' if work == 1 else 'need'} work"
     elif open_ == n:
         title = "The machine could not be assessed" if n == 1 else f"None of {n} machines could be assessed"

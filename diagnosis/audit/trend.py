@@ -24,7 +24,7 @@ from diagnosis.audit.trend_fit import Array, Line, fit_line, sigmas
 
 CONFIDENCE = 0.9
 LEAST_MISSIONS = 5
-_REACH = 3.0
+REACH = 3.0
 
 State = Literal["crossing", "above", "not_within", "not_known"]
 
@@ -126,7 +126,7 @@ def trend_of(series: Series, limit: float) -> Trend:
         forecast = Forecast("not_known", why=why or "the missions do not differ in driving time")
     else:
         lines = [line, *_faster(x[kept], y[kept], sigma[kept], line)]
-        forecast = _forecast(lines, limit, series.now, _REACH * float(series.now - _begin(x, first)))
+        forecast = _forecast(lines, limit, series.now, REACH * float(series.now - _begin(x, first)))
     return Trend(line, first, found.outliers, found.changes, _direction(line if not why else None), forecast)
 
 

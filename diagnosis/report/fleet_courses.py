@@ -37,7 +37,7 @@ def chosen(trends: Sequence[Mapping[str, Any]]) -> list[Mapping[str, Any]]:
         or t["forecast"]["state"] == "above"
         or t["changes"]
         or t["outliers"]
-        or t["direction"] == "rising"
+        or (t["direction"] == "rising" and t["forecast"]["likely"] is not None)
     ]
     return sorted(told, key=interest, reverse=True)[:MOST]
 

@@ -32,7 +32,7 @@ _UNITS = {"hours": "h", "days": "d"}
 _STATUS = {"new": "New", "recurring": "Recurring", "once": "Once", "past": "Past"}
 _DEFINITIONS = (
     "A machine stands as its last mission that could be assessed, or worse where no later mission assessed the part of an "
-    "earlier fault. Missions whose log does not know the date count, but cannot be ordered.",
+    "earlier fault. Missions whose log does not know the date, or which start at the same moment, count, but cannot be ordered.",
     "New: in the machine's last mission and in none before, of which one assessed the part. Recurring: in several missions. "
     "Past: not found in the last three missions that assessed the part. Faults of severity “info” are left out.",
     "Assessed: judged for the seconds that the verdict “ready” takes, and for four fifths of its driving.",
@@ -118,11 +118,17 @@ def _text(name: str) -> str:
 
 @lru_cache
 def _css() -> str:
-    """Style of the mission report, dark without scripts by the system's choice, and what is special to this page."""
+    """Style of the mission report and what is special to this page.
+
+    Dark is for screens, and without scripts by the system's choice; paper stays light.
+    """
     shared = _text("report.css")
     dark = re.search(r"\[data-theme=dark\] \{([^}]*)\}", shared)
-    plain = f"@media (prefers-color-scheme: dark) {{ :root:not(.js) {{{dark[1]}}} }}\n" if dark else ""
-    return shared + plain + _text("fleet.css")
+    if dark:
+        chosen_dark = f"@media screen {{ {dark[0]} }}\n"
+        system_dark = f"@media screen and (prefers-color-scheme: dark) {{ :root:not(.js) {{{dark[1]}}} }}\n"
+        shared = shared.replace(dark[0], chosen_dark + system_dark)
+    return shared + _text("fleet.css")
 
 
 @lru_cache
@@ -144,6 +150,10 @@ def _span(counts: Mapping[str, Any]) -> str:
     return " to ".join(dict.fromkeys(days))
 
 
+def _hours(seconds: float) -> str:
+    return f"{seconds / 3600:.1f} h" if seconds >= 1800 else names.span(seconds)
+
+
 def _kpis(document: Mapping[str, Any]) -> list[tuple[str, str, str]]:
     """Value, what it is, and what belongs to it."""
     c = document["counts"]
@@ -161,7 +171,11 @@ def _kpis(document: Mapping[str, Any]) -> list[tuple[str, str, str]]:
     blind = sum(p["assessed_last"] is False for m in document["machines"] for p in m["parts"])
     return [
         (names.grouped(c["missions"]), "missions", ", ".join([*unread, *rest]) or "all read whole"),
-        (f"{c['driving_s'] / 3600:.1f} h", "driving time", f"{c['distance_m'] / 1000:.1f} km"),
+        (
+            _hours(c["driving_s"]),
+            "driving time",
+            f"{c['distance_m'] / 1000:.{1 if c['distance_m'] >= 1000 else 3}f} km",
+        ),
         (names.grouped(c["with_faults"]), "missions with faults", share),
         (
             f"{f['new']} / {f['recurring']} / {f['past']}",
@@ -208,7 +222,7 @@ def _machine(
         if leading
         else "",
         "level": leading["line"]["level"]["value"] if leading else -1.0,
-        "driven": f"{m['driving_s'] / 3600:.1f} h",
+        "driven": _hours(m["driving_s"]),
         "driving_s": m["driving_s"],
         "decided": "–" if m["decided"] is None else f"{100 * m['decided']:.0f} %",
         "share": m["decided"] or 0.0,

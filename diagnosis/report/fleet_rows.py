@@ -70,16 +70,16 @@ def day(start_ns: int | None) -> str:
 
 
 def strip(missions: Sequence[Mapping[str, Any]], machine: Mapping[str, Any]) -> Markup:
-    """The last missions, oldest first, then apart those without a date and those that were not read."""
+    """The last missions, oldest first, then apart those of unknown order and those that were not read."""
     dated = [missions[k] for k in machine["missions"]]
     shown = Markup("").join(_cell(m) for m in dated[-STRIP:])
     apart = [missions[k] for k in (*machine["undated"], *machine["failed"])]
     extra = Markup("").join(_cell(m) for m in apart[:6])
     more = Markup('<span class="muted">+{}</span>').format(len(apart) - 6) if len(apart) > 6 else Markup("")
     if extra:
-        extra = Markup('<span class="apart" role="group" aria-label="without a date or not read">{}{}</span>').format(
-            extra, more
-        )
+        extra = Markup(
+            '<span class="apart" role="group" aria-label="of unknown order, or not read">{}{}</span>'
+        ).format(extra, more)
     return Markup('<div class="cells">{}{}</div>').format(shown, extra)
 
 

@@ -37,7 +37,14 @@ def test_missions_follow_the_logs_clock_and_those_without_a_date_stand_apart(tmp
     (m,) = machines(tmp_path, Sample("c", day=1.0), Sample("a", day=2.0), Sample("b", day=0.0), Sample("d", day=None))
     assert [r.name for r in m.dated] == ["b", "c", "a"]
     assert [r.name for r in m.undated] == ["d"]
-    assert m.note == "1 mission without a date"
+    assert m.note == "1 mission of unknown order"
+
+
+def test_missions_that_start_at_the_same_moment_have_no_order(tmp_path: Path) -> None:
+    (m,) = machines(tmp_path, Sample("a", verdict="stop"), Sample("b"), Sample("c", day=1.0))
+    assert [r.name for r in m.dated] == ["c"]
+    assert [r.name for r in m.undated] == ["a", "b"]
+    assert m.verdict == "stop"
 
 
 def test_a_clock_that_starts_in_1970_knows_no_date(tmp_path: Path) -> None:
