@@ -72,6 +72,9 @@ def _lines(terminal: Terminal, counted: Counted) -> Tell:
     def show(event: str, facts: dict[str, Any]) -> None:
         nonlocal last
         counted.take(event, facts)
+        if event == "ingested":
+            for problem in facts["problems"]:
+                terminal.note(problem)
         if event == "retry":
             terminal.note(f"{facts['name']}: {facts['reason']}; trying again")
         if event == "mission" and facts["reason"]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -194,9 +193,16 @@ def _run(
             store = baseline / "fleet.sqlite" if baseline is not None and baseline.is_dir() else baseline
             audited = audit(found, asked, engine, tell, baseline=store)
             if export:
-                import_module("diagnosis.audit.export").export_parquet(asked.output / "fleet.sqlite", asked.output)
+                from diagnosis.audit.export import export as export_tables
+                from diagnosis.audit.store import Store
+
+                with Store.open(asked.output / "fleet.sqlite", read_only=True) as opened:
+                    export_tables(opened, asked.output / "tables")
             code = exit_code(audited.ends, fail_on.value)
             tell("end", {"code": code, "failed": audited.failed})
+    except KeyboardInterrupt:
+        terminal.note("what is finished is kept; the same command again does the rest")
+        raise
     finally:
         if log is not None:
             log.close()

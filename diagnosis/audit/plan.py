@@ -14,7 +14,7 @@ from diagnosis.audit.limits import Limits
 from diagnosis.audit.outcome import TRANSIENT
 from diagnosis.audit.staging import machine_at
 from diagnosis.audit.store import Store, StoredResult
-from diagnosis.audit.task import key_of
+from diagnosis.audit.task import key_of, sizes_of
 from replay.errors import ConfigError
 from replay.machine import Machine, haulotte
 from replay.machine_file import dump_machine
@@ -122,8 +122,8 @@ def plan(missions: Iterable[MissionSource], asked: Asked) -> list[Planned]:
 def known_hashes(planned: Planned, store: Store) -> tuple[str, ...]:
     """SHA-256 of each file of a mission, as far as they were hashed before and have not changed; else none."""
     mission = planned.mission
-    sizes = mission.sizes or (mission.bytes,) * len(mission.files)
-    found = [store.known_hash(*file) for file in zip(mission.files, sizes, mission.stamps, strict=True)]
+    files = zip(mission.files, sizes_of(mission), mission.stamps, strict=True)
+    found = [store.known_hash(*file) for file in files]
     return tuple(h for h in found if h) if all(found) else ()
 
 

@@ -12,11 +12,12 @@ from typing import Any
 from diagnosis.audit.engines import Engine, is_lost
 from diagnosis.audit.events import Tell
 from diagnosis.audit.identity import fallback_id
+from diagnosis.audit.ingest import ingest
 from diagnosis.audit.outcome import TRANSIENT, Outcome
-from diagnosis.audit.places import Claim, Working, claim_mission
+from diagnosis.audit.places import RESULTS, Claim, Working, claim_mission
 from diagnosis.audit.plan import Asked, Planned, is_done, known_hashes, stored_result
 from diagnosis.audit.store import Store, StoredResult
-from diagnosis.audit.task import Attempt, Task, audit_one, key_of
+from diagnosis.audit.task import Attempt, Task, audit_one, key_of, sizes_of
 
 TICK_S = 0.5
 _AHEAD = 2
@@ -70,8 +71,7 @@ class Runner:
                 self._fill()
                 if self._running:
                     done, _ = wait(self._running, TICK_S, return_when=FIRST_COMPLETED)
-                    for future in done:
-                        self._finish(future)
+                    self._finish([(self._running.pop(future), future) for future in done])
                 elif not self._queue:
                     time.sleep(TICK_S)
                 self._tell("tick", {})
@@ -111,45 +111,54 @@ class Runner:
         planned, asked = one.planned, self._asked
         task = Task(
             mission=planned.mission,
-            output=str(asked.output),
+            output=str(asked.output.absolute()),
             machine=planned.machine,
             machine_source=planned.source,
             machine_id=planned.machine_id,
             config_hash=planned.config_hash,
-            folder=str(self._place.folder),
+            folder=str(self._place.folder.absolute()),
             temporary="" if self._engine.shared else str(self._place.temporary),
             attempt=one.number,
             known=known_hashes(planned, self._store),
             limits=asked.limits,
             max_size_mb=asked.max_size_mb,
+            objects=str(asked.output.absolute() / RESULTS) if self._engine.shared else "",
+            described=tuple(self._store.relative(file) for file in planned.mission.files),
             isolation=asked.isolation,
             judge=asked.judge,
         )
         self._running[self._engine.executor.submit(audit_one, task)] = one
 
-    def _finish(self, future: Future[Attempt]) -> None:
-        one = self._running.pop(future)
+    def _finish(self, done: Sequence[tuple[_Running, Future[Attempt]]]) -> None:
+        """Keep what has ended, then say so."""
+        ended = [(one, attempt) for one, future in done if (attempt := self._attempt_of(one, future)) is not None]
+        if any(attempt.kept for _, attempt in ended):
+            ingest(self._store)
+        for one, attempt in ended:
+            if not attempt.kept:
+                keep(attempt, one.planned, self._store)
+            if attempt.outcome.state in TRANSIENT and one.tries <= self._asked.retries:
+                told = {"name": attempt.mission.name, "state": attempt.outcome.state, "reason": attempt.outcome.reason}
+                self._tell("retry", told)
+                self._submit(replace(one, number=one.number + 1, tries=one.tries + 1))
+            else:
+                one.claim.drop()
+                self._tell("mission", facts_of(attempt))
+
+    def _attempt_of(self, one: _Running, future: Future[Attempt]) -> Attempt | None:
+        """What came of a task; None where its worker was lost and another one is at it now."""
         try:
-            attempt = future.result()
+            return future.result()
         except BaseException as error:
             if not is_lost(error):
                 one.claim.drop()
                 raise
-            one.lost += 1
-            if one.lost < _LOST_TRIES:
-                self._tell("retry", {"name": one.planned.mission.name, "reason": "the worker was lost"})
-                self._submit(one)
-                return
-            attempt = self._lost(one)
-        again = attempt.outcome.state in TRANSIENT and one.tries <= self._asked.retries
-        keep(attempt, one.planned, self._store)
-        if again:
-            told = {"name": attempt.mission.name, "state": attempt.outcome.state, "reason": attempt.outcome.reason}
-            self._tell("retry", told)
-            self._submit(replace(one, number=one.number + 1, tries=one.tries + 1))
-            return
-        one.claim.drop()
-        self._tell("mission", facts_of(attempt))
+        one.lost += 1
+        if one.lost >= _LOST_TRIES:
+            return self._lost(one)
+        self._tell("retry", {"name": one.planned.mission.name, "reason": "the worker was lost"})
+        self._submit(one)
+        return None
 
     def _lost(self, one: _Running) -> Attempt:
         planned = one.planned
@@ -167,9 +176,10 @@ class Runner:
 def keep(attempt: Attempt, planned: Planned, store: Store) -> None:
     """Keep an attempt in the store, and what its files' hashes are."""
     mission = attempt.mission
-    sizes = mission.sizes or (mission.bytes,) * len(mission.files)
     if attempt.hashes:
-        for path, size, stamp, sha256 in zip(mission.files, sizes, mission.stamps, attempt.hashes, strict=True):
+        for path, size, stamp, sha256 in zip(
+            mission.files, sizes_of(mission), mission.stamps, attempt.hashes, strict=True
+        ):
             if store.known_hash(path, size, stamp) != sha256:
                 store.remember_hash(path, size, stamp, sha256)
     machine_id = planned.machine_id or planned.machine.id or fallback_id(mission)

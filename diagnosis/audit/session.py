@@ -6,7 +6,6 @@ import time
 from collections.abc import Callable
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, field
-from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -112,7 +111,8 @@ def audit(
                     runner.run(part)
         ends = endings(store, [one.mission.name for one in planned])
         failed = write_failures(asked.output, planned, ends, asked.machine)
-    page.write(always=bool(rest))
+        gone = store.database.rows("SELECT count(*) FROM mission WHERE gone = ?", (store.run,))[0][0]
+    page.write(always=bool(rest or gone or taken.attempts))
     return Audited(tuple(ends), len(planned) - len(rest), failed)
 
 
@@ -133,10 +133,8 @@ class _Page:
 
     def write(self, *, always: bool) -> None:
         """Write the page; a failing page costs no mission."""
-        try:
-            write_fleet = import_module("diagnosis.audit.fleet").write_fleet
-        except ImportError:
-            return
+        from diagnosis.audit.fleet import write_fleet
+
         if not always and self.baseline is None and (self.output / "fleet.html").is_file():
             return
         start = time.monotonic()

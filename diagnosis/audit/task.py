@@ -6,9 +6,10 @@ import os
 import secrets
 import shutil
 import tempfile
+import time
 from collections.abc import Mapping
 from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +20,7 @@ from diagnosis.audit.identity import fallback_id
 from diagnosis.audit.isolated import isolation, run_isolated
 from diagnosis.audit.keys import Key, file_roles, log_hash, unhashed_log
 from diagnosis.audit.limits import Limits
+from diagnosis.audit.objects import Objects
 from diagnosis.audit.outcome import READ, Outcome
 from diagnosis.audit.places import MISSIONS, cannot_write, publish
 from diagnosis.audit.staging import stage
@@ -57,6 +59,10 @@ class Task:
         Of the child.
     max_size_mb : float
         Size the page should keep to [MB].
+    objects : str
+        Folder where the attempt is to leave its result object; empty: whoever handed the task out keeps it.
+    described : tuple[str, ...]
+        Names of the files in the result object.
     isolation : str
         As in `diagnosis.audit.isolated.isolation`.
     judge : str
@@ -75,6 +81,8 @@ class Task:
     known: tuple[str, ...] = ()
     limits: Limits = field(default_factory=Limits)
     max_size_mb: float = 15.0
+    objects: str = ""
+    described: tuple[str, ...] = ()
     isolation: str = ""
     judge: str = "diagnosis.audit.child:judge"
 
@@ -97,6 +105,8 @@ class Attempt:
         Folder of the report, relative to the output.
     hashes : tuple[str, ...]
         SHA-256 of each file; empty where they could not be read.
+    kept : bool
+        Whether its result object stands already.
     """
 
     mission: MissionSource
@@ -105,6 +115,7 @@ class Attempt:
     number: int
     report: str | None
     hashes: tuple[str, ...]
+    kept: bool = False
 
 
 def key_of(mission: MissionSource, hashes: tuple[str, ...], machine: Machine, config_hash: str) -> Key:
@@ -131,7 +142,10 @@ def audit_one(task: Task) -> Attempt:
     except OSError as error:
         raise cannot_write(error, folder) from error
     try:
-        return _audit(task, folder, temporary)
+        attempt = _audit(task, folder, temporary)
+        if task.objects:
+            _put(task, attempt)
+        return replace(attempt, kept=bool(task.objects))
     finally:
         shutil.rmtree(folder, ignore_errors=True)
         shutil.rmtree(temporary, ignore_errors=True)
@@ -169,6 +183,32 @@ def _audit(task: Task, folder: Path, temporary: Path) -> Attempt:
         report = f"{MISSIONS}/{task.mission.name}"
         publish(folder / child.REPORT, Path(task.output) / report)
     return Attempt(task.mission, key, outcome, task.attempt, report, hashes)
+
+
+def _put(task: Task, attempt: Attempt) -> None:
+    """Leave the attempt's result object, as `Store.record` would."""
+    mission, outcome = attempt.mission, asdict(attempt.outcome)
+    hashes = attempt.hashes or (None,) * len(mission.files)
+    files = zip(task.described, sizes_of(mission), mission.stamps, hashes, strict=True)
+    document = {
+        "mission": {
+            "name": mission.name,
+            "files": [dict(zip(("path", "size", "stamp", "sha256"), file, strict=True)) for file in files],
+            "bytes": mission.bytes,
+        },
+        "key": asdict(attempt.key),
+        "summary": outcome.pop("summary"),
+        "attempt": outcome,
+        "report": attempt.report,
+        "machine_id": task.machine_id or task.machine.id or fallback_id(mission),
+        "made_ns": time.time_ns(),
+    }
+    Objects(task.objects).put_attempt(attempt.key.stem, document, attempt.number)
+
+
+def sizes_of(mission: MissionSource) -> tuple[int, ...]:
+    """Size of each of a mission's files [bytes]."""
+    return mission.sizes or (mission.bytes,) * len(mission.files)
 
 
 def _signature(files: tuple[Path, ...]) -> Mapping[str, tuple[int, ...]]:

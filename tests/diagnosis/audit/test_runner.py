@@ -175,3 +175,13 @@ def test_the_exit_code_is_that_of_the_worst_mission(ends: list[Ending], fail_on:
 )
 def test_words_are_quoted_for_a_shell(word: str, shown: str) -> None:
     assert quoted(word) == shown
+
+
+def test_a_lost_store_is_made_again_from_the_result_objects(tmp_path: Path) -> None:
+    found = missions(tmp_path / "logs", "fine-1", "broken")
+    before, _ = run(found, asked_for(tmp_path / "out"))
+    for file in (tmp_path / "out").glob("fleet.sqlite*"):
+        file.unlink()
+    after, events = run(found, asked_for(tmp_path / "out"))
+    assert after == before
+    assert {kind for kind, _ in events} == {"skipped"}
