@@ -11,6 +11,7 @@ from rich.text import Text
 
 from cli.tables import MODE_SIGNS, MODE_STYLES, SEVERITY_STYLES, ByWidth, bullets, section, table, text
 from diagnosis.compare_words import OUTCOMES, headline
+from diagnosis.report.sureness import sure_of
 from diagnosis.wording import mode_words, part_words
 
 _STATUS = {
@@ -31,7 +32,7 @@ def verdict_parts(report: Mapping[str, Any]) -> list[RenderableType]:
     if verdict.get("text") and verdict["text"] != title:
         parts.append(text(verdict["text"]))
     if verdict.get("actions"):
-        parts += [section("What to do"), _actions(verdict["actions"])]
+        parts += [section("What to do"), _actions(verdict["actions"], report)]
     if report["intervals"]:
         parts += [section("Faults"), _faults(report["intervals"])]
         rest = len(report["intervals"]) - _SHOWN
@@ -60,13 +61,18 @@ def _became(c: Mapping[str, Any]) -> str:
     return f"{words}: {part_words(c['kind'], c['component'], c['side'])} {mode_words(c['side'], c['mode'])}"
 
 
-def _actions(actions: list[Mapping[str, Any]]) -> Table:
+def _actions(actions: list[Mapping[str, Any]], report: Mapping[str, Any]) -> Table:
+    """Each action with its faults, and how sure the tool is of the worst of them."""
+    intervals = {i["id"]: i for i in report["intervals"]}
     out = Table.grid(padding=(0, 2, 0, 0))
     for action in actions:
         style = SEVERITY_STYLES.get(str(action.get("severity")), "")
         faults = ", ".join(str(f) for f in action.get("faults", ())[:6])
         more = "" if len(action.get("faults", ())) <= 6 else ", …"
         out.add_row(text(action.get("n", ""), style), Text.assemble(text(action["text"]), "  ", (faults + more, "dim")))
+        worst = next((intervals[f] for f in action.get("faults", ()) if f in intervals), None)
+        if worst is not None and (sure := sure_of(worst, report)):
+            out.add_row("", text(f"{sure}.", "dim"))
     return out
 
 

@@ -177,14 +177,19 @@ def path_picture(
         )
     first, last = np.flatnonzero(good)[[0, -1]].tolist()
     ends = [(float(px[k]), float(py[k])) for k in (first, last)]
-    parts.append(_ends_and_scale(ends[0], ends[1], scale, width, height))
+    parts.append(_ends_and_scale(ends[0], ends[1], [m[1] for m in marks], scale, width, height))
     return Markup(
         '<svg class="map" viewBox="0 0 {} {}" role="group" aria-label="Driven path with the places of faults">{}</svg>'
     ).format(int(width), int(height), Markup("").join(parts))
 
 
 def _ends_and_scale(
-    start: tuple[float, float], end: tuple[float, float], scale: float, width: float, height: float
+    start: tuple[float, float],
+    end: tuple[float, float],
+    marks: Sequence[Sequence[float]],
+    scale: float,
+    width: float,
+    height: float,
 ) -> Markup:
     """Start (a dot) and end (a square) of the path, and a bar of a round length in metres."""
     bar = 10.0 ** math.floor(math.log10(max(width / 3 / scale, 1e-6)))
@@ -193,18 +198,25 @@ def _ends_and_scale(
     near = math.hypot(end[0] - start[0], end[1] - start[1]) < 30
     shapes = Markup('<circle class="dot" cx="{:.1f}" cy="{:.1f}" r="4.5"/>').format(*start)
     shapes += Markup('<rect class="stop" x="{:.1f}" y="{:.1f}" width="8" height="8"/>').format(end[0] - 4, end[1] - 4)
-    if near:
-        shapes += _named(*start, "start, end", width, height)
-    else:
-        shapes += _named(*start, "start", width, height) + _named(*end, "end", width, height)
+    named = [(start, "start, end")] if near else [(start, "start"), (end, "end")]
+    for place, words in named:
+        shapes += _named(*place, words, marks, width, height)
     shapes += Markup('<path class="bar" d="M{:.1f},{:.0f}v4h{:.1f}v-4"/>').format(right - length, height - 12, length)
     return shapes + text(right - length / 2, height - 14, f"{number(bar)} m", "lbl mid")
 
 
-def _named(x: float, y: float, words: str, width: float, height: float) -> Markup:
-    """Name beside a place, inside the picture."""
-    left = x > width - 12 * len(words)
-    return text(x - 9 if left else x + 9, min(height - 18, y + 14), words, "lbl fin" if left else "lbl")
+def _named(x: float, y: float, words: str, marks: Sequence[Sequence[float]], width: float, height: float) -> Markup:
+    """Name beside a place, inside the picture and as far from the marks as it can be."""
+    length = 6.2 * len(words)
+    corners = [(side, y + down) for side in (1, -1) for down in (15, -8)]
+    fits = [(s, v) for s, v in corners if 4 < x + s * (9 + length) < width - 4 and 12 < v < height - 18] or corners
+
+    def room(corner: tuple[int, float]) -> float:
+        centre = x + corner[0] * (9 + length / 2)
+        return min((math.hypot((centre - m[0]) / 1.5, corner[1] - 4 - m[1]) for m in marks), default=0.0)
+
+    side, v = max(fits, key=room)
+    return text(x + 9 * side, v, words, "lbl" if side > 0 else "lbl fin")
 
 
 def _spread(points: list[list[float]], width: float, height: float) -> None:
