@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from diagnosis.loss import Loss
 from diagnosis.result import Closeups, Epsilon, Hypothesis, Sat
 from replay.faults import FaultMode, Side, State
 
@@ -59,6 +60,8 @@ class Assessment:
         Time [s] in which something deviates that no single fault explains well enough to be stated.
     closeups : Closeups or None
         Every sample of `columns` around the findings, where they are envelopes.
+    loss : Loss or None
+        Loss of effectiveness over the mission, where a second measurement shows it.
     """
 
     states: NDArray[np.int8]
@@ -69,6 +72,7 @@ class Assessment:
     notes: tuple[str, ...] = ()
     unexplained_s: float = 0.0
     closeups: Closeups | None = None
+    loss: Loss | None = None
 
 
 def unassessed(size: int, state: State, reason: str) -> Assessment:

@@ -17,6 +17,7 @@ from diagnosis.boundary import Channel, refine
 from diagnosis.direct_evidence import evidence_columns, sentences
 from diagnosis.estimate import estimate_fault
 from diagnosis.fault_runs import fault_runs, inner
+from diagnosis.loss import loss_of
 from diagnosis.mode_path import ModePath, most_probable
 from diagnosis.noise import relative_lag, shifted, unresolved
 from diagnosis.pairs import Pair, mode_model, neighbours, sample_status, timing_explains, unsettled
@@ -37,6 +38,7 @@ _MODE = {
     modes.INEFFICIENT: FaultMode.INEFFICIENT,
     modes.NOISY: FaultMode.NOISY,
 }
+_WEARING = (CODE[State.HEALTHY], CODE[State.INEFFICIENT])
 # From tuning missions, by `python tests/benchmarks/calibrate_direct.py`: share of findings that are not what they seem, and
 # the length at which half of those in a log too slow for its commands are.
 _TEMPER, _LAPSE, _COARSE_S = 0.25, 0.01, 1.7
@@ -118,6 +120,7 @@ def assess_pair(pair: Pair, limits: Limits) -> Assessment:
         findings=tuple(findings),
         columns=pictured.columns,
         closeups=pictured.closeups,
+        loss=loss_of(pair.y, x, (status == modes.PAIR) & np.isin(states, _WEARING), pair.dt),
         tier="direct",
         notes=tuple(notes),
     )

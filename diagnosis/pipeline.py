@@ -14,6 +14,7 @@ from diagnosis.assessment import Assessment
 from diagnosis.closeups import closeups_of
 from diagnosis.components import ComponentResult, assess_components
 from diagnosis.decide import Decision, decide, intervals_of, spans_of
+from diagnosis.loss import loss_rows
 from diagnosis.result import SCHEMA, MissionResult, to_json
 from replay.columns import replay_columns
 from replay.envelope import bucket_of
@@ -189,6 +190,7 @@ def _result(
         "states": list(spans_of(found.assessments, timeline.step_ns)),
         "phases": metrics.phases(timeline, replay, machine),
         "coverage": rows,
+        "loss": loss_rows({key: a.loss for key, a in found.assessments.items()}),
         "metrics": metrics.loop_metrics(timeline, replay, machine, moving),
         "signals": quality.signal_rows(mission.signals, timeline),
         "missing": quality.missing_rows(mission.signals, machine),

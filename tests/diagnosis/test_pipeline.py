@@ -258,6 +258,7 @@ FIELDS: dict[str, Any] = {
     "states": [{"component": str, "side": str, "state": str, **SPAN, "reason": str}],
     "phases": [{"name": str, **SPAN}],
     "coverage": [{"component": str, "side": str, "seconds": dict, "decided_driving_s": NUMBER}],
+    "loss": list,
     "metrics": {"wheels": dict, "average": dict, "paper": [{"controller": str, "parameters": int}]},
     "signals": [
         {
