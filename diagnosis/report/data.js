@@ -126,6 +126,7 @@ const Data = (() => {
       return { x, y, exact, stride: 1 };
     }
     const buckets = Math.min(n, pixels), width = n / buckets;
+    let before = 0;
     for (let k = 0; k < buckets; k++) {
       const p = i0 + Math.floor(k * width), e = i0 + Math.floor((k + 1) * width);
       if (per === 1) {
@@ -138,9 +139,13 @@ const Data = (() => {
       } else {
         let lo = 0x7fffffff, hi = 0;
         for (let i = p; i < e; i++) if (s.high[i]) { lo = Math.min(lo, s.low[i]); hi = Math.max(hi, s.high[i]); }
+        // In which order they came is not known: the one nearer to what was drawn before stands first.
         x.push(time(s.start + p * per));
-        y.push(hi ? value(lo) : NaN);
-        if (hi > lo) { x.push(time(s.start + (p + e) / 2 * per)); y.push(value(hi)); }
+        if (!hi) { y.push(NaN); before = 0; continue; }
+        const [u, w] = before && Math.abs(hi - before) < Math.abs(lo - before) ? [hi, lo] : [lo, hi];
+        y.push(value(u));
+        if (u !== w) { x.push(time(s.start + (p + e) / 2 * per)); y.push(value(w)); }
+        before = w;
       }
     }
     return { x, y, exact, stride: Math.max(per, Math.round(width * per)), stored: per };

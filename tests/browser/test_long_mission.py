@@ -18,9 +18,9 @@ expect = playwright.expect
 OPEN = Callable[..., Any]
 
 
-def shown(page: Any, low: float, high: float) -> list[list[float]]:
+def shown(page: Any, low: float, high: float, column: str = "wheel.FR.v") -> list[list[float]]:
     """Brings the explorer's plot to a time and gives its curve."""
-    page.evaluate(f"location.hash = '#fault=F1&t={low},{high}&plots=wheel.FR.v'")
+    page.evaluate(f"location.hash = '#fault=F1&t={low},{high}&plots={column}'")
     page.wait_for_url(re.compile(f"t={low:.4f},{high:.4f}&plots"))
     figure = page.locator("#signals-figure")
     for _ in range(100):
@@ -42,12 +42,22 @@ def test_three_milliseconds_are_seen_at_every_zoom(open_page: OPEN, name: str) -
     page.locator("#signals-figure .main-svg").first.wait_for()
     for low, high in ((0.0, 120.0), *((at - w, at + w) for at in SPIKES for w in (20.0, 3.0, 0.4, 0.01))):
         x, y = shown(page, round(low, 4), round(high, 4))
-        peaks = [t for t, v in zip(x, y, strict=True) if v is not None and v > 1.9]
+        peaks = [t for t, v in zip(x, y, strict=True) if v > 1.9]
         wide = (high - low) / 100 + 0.07
         for at in SPIKES:
             if low <= at <= high:
                 assert any(abs(t - at) < wide for t in peaks), (low, high, at)
         assert all(min(abs(t - at) for at in SPIKES) < wide for t in peaks), (low, high, peaks)
+
+
+def test_extremes_add_no_turns_to_a_curve_that_rises_and_falls_once(open_page: OPEN) -> None:
+    page = open_page("spikes_long", "#fault=F1&t=0,60&plots=evidence.FR.sensor.p_stuck")
+    page.locator("#signals-figure .main-svg").first.wait_for()
+    _, y = shown(page, 10.0, 60.0, "evidence.FR.sensor.p_stuck")
+    turns = np.sign(np.diff(y))
+    turns = turns[turns != 0]
+    assert np.count_nonzero(turns[1:] != turns[:-1]) == 1
+    assert max(y) == pytest.approx(0.96, abs=0.01)
 
 
 def test_buttons_land_where_every_sample_is_kept(open_page: OPEN) -> None:
