@@ -9,6 +9,7 @@ from __future__ import annotations
 import base64
 import hashlib
 import re
+from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from functools import lru_cache
 from pathlib import Path
@@ -59,7 +60,10 @@ def build_fleet_page(document: Mapping[str, Any]) -> str:
     axis = document["axis"]
     scripts = [_text("theme.js"), _text("fleet.js")]
     told = [f for f in document["faults"] if f["status"] != "past"]
+    past = [f for f in document["faults"] if f["status"] == "past"]
     shown = chosen(trends)
+    standing, own = _by_machine(told), _by_machine(trends)
+    directions = {(t["machine"], t["component"], t["side"]): t["direction"] for t in trends}
     context = {
         "css": Markup(_css()),
         "csp": _policy(scripts),
@@ -72,10 +76,11 @@ def build_fleet_page(document: Mapping[str, Any]) -> str:
         "kpis": _kpis(document),
         "baseline": changes_of(document["baseline"]),
         "strip": rows.STRIP,
-        "machines": [_machine(k, m, document, trends) for k, m in enumerate(document["machines"])],
-        "faults": [_fault(f, document, trends) for f in told[:_FAULTS]],
-        "unlisted": len(told) - len(told[:_FAULTS]),
-        "past": [_fault(f, document, trends) for f in document["faults"] if f["status"] == "past"][:_FAULTS],
+        "machines": [_machine(k, m, document, standing[k], own[k]) for k, m in enumerate(document["machines"])],
+        "faults": [_fault(f, document, directions) for f in told[:_FAULTS]],
+        "unlisted": max(0, len(told) - _FAULTS),
+        "past": [_fault(f, document, directions) for f in past[:_FAULTS]],
+        "past_count": len(past),
         "trends": [course(t, document["machines"], _UNITS[axis]) for t in shown],
         "quiet": len(trends) - len(shown),
         "crowded": len(shown) == MOST,
@@ -88,6 +93,13 @@ def build_fleet_page(document: Mapping[str, Any]) -> str:
         "axis": {"hours": "driving hours of the audited missions", "days": "days"}[axis],
     }
     return _environment().get_template("fleet.html.j2").render(context)
+
+
+def _by_machine(found: Sequence[Mapping[str, Any]]) -> dict[int, list[Mapping[str, Any]]]:
+    out: dict[int, list[Mapping[str, Any]]] = defaultdict(list)
+    for f in found:
+        out[f["machine"]].append(f)
+    return out
 
 
 def _addressed(document: Mapping[str, Any]) -> dict[str, Any]:
@@ -185,7 +197,9 @@ def _kpis(document: Mapping[str, Any]) -> list[tuple[str, str, str]]:
         (
             "–" if c["decided"] is None else f"{100 * c['decided']:.1f} %",
             "of driving time judged",
-            f"{count(blind, 'part')} not assessed in the last mission"
+            "nothing judged"
+            if not judged
+            else f"{count(blind, 'part')} not assessed in the last mission"
             if blind
             else "every part assessed in the last mission",
         ),
@@ -193,16 +207,19 @@ def _kpis(document: Mapping[str, Any]) -> list[tuple[str, str, str]]:
 
 
 def _machine(
-    k: int, m: Mapping[str, Any], document: Mapping[str, Any], trends: Sequence[Mapping[str, Any]]
+    k: int,
+    m: Mapping[str, Any],
+    document: Mapping[str, Any],
+    standing: Sequence[Mapping[str, Any]],
+    trends: Sequence[Mapping[str, Any]],
 ) -> dict[str, Any]:
-    standing = [f for f in document["faults"] if f["machine"] == k and f["status"] != "past"]
-    own = [t for t in trends if t["machine"] == k and t["line"] is not None]
-    leading = max(own, key=interest, default=None)
+    leading = max((t for t in trends if t["line"] is not None), key=interest, default=None)
     judged = len(m["missions"]) + len(m["undated"])
     words, symbol = VERDICTS[m["verdict"]], rows.verdict_symbol(m["verdict"])
     if m["verdict"] == "ready" and standing:
-        words, symbol = "Ready, fault comes and goes", "warning"
-    elif m["verdict"] == "ready" and any(t["approaching"] for t in own):
+        often = any(f["status"] == "recurring" for f in standing)
+        words, symbol = f"Ready, fault {'comes and goes' if often else 'seen lately'}", "warning"
+    elif m["verdict"] == "ready" and any(t["approaching"] for t in trends):
         words, symbol = "Ready, limit comes near", "warning"
     return {
         "label": m["label"],
@@ -230,28 +247,19 @@ def _machine(
     }
 
 
-def _fault(f: Mapping[str, Any], document: Mapping[str, Any], trends: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+def _fault(
+    f: Mapping[str, Any], document: Mapping[str, Any], directions: Mapping[tuple[int, str, str], str]
+) -> dict[str, Any]:
     first, last = (document["missions"][f[k]] for k in ("first", "last"))
     e = f["epsilon"]
     told = []
     if e and f["mode"] == "inefficient":
         told.append(f"ε̂ {e['value']:.2f} ({e['low']:.2f} to {e['high']:.2f})".replace("-", "−"))
-        own = next(
-            (
-                t
-                for t in trends
-                if (t["machine"], t["component"], t["side"]) == (f["machine"], f["component"], f["side"])
-            ),
-            None,
-        )
-        if own is not None and own["direction"] != "not_known":
-            told.append(own["direction"])
+        direction = directions.get((f["machine"], f["component"], f["side"]), "not_known")
+        told += [direction] if direction != "not_known" else []
     if f["since"]:
-        told.append(
-            f"not in the last {count(f['since'], 'mission')} that assessed it"
-            if f["since"] > 1
-            else "not in the last mission"
-        )
+        last_ones = f"last {count(f['since'], 'mission')}" if f["since"] > 1 else "last mission"
+        told.append(f"not in the {last_ones} that assessed it")
     return {
         "machine": document["machines"][f["machine"]]["label"],
         "symbol": names.known(f["mode"]),

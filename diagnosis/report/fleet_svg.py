@@ -40,7 +40,7 @@ def mark(state: str) -> Markup:
 def sparkline(trend: Mapping[str, Any]) -> Markup:
     """Values of a trend and its limit in little room."""
     values = np.array([p[2] for p in trend["points"]], dtype=np.float64)
-    values = values[:: max(1, math.ceil(values.size / _SPARK))]
+    values = values[::-1][:: max(1, math.ceil(values.size / _SPARK))][::-1]
     width, height = 96.0, 26.0
     top = max(float(values.max()), trend["limit"], 1e-3)
     low = min(0.0, float(values.min()))
