@@ -12,6 +12,8 @@ from numpy.typing import NDArray
 from diagnosis.report.figures import Columns
 
 _AXLE_GAP_M = 0.1
+_POINTS = 200_000  # enough for a picture
+_SKIPPED = ("replay.", "evidence.")
 _GONE = ("stuck", "no_signal")
 Array = NDArray[np.float64]
 
@@ -48,6 +50,9 @@ def driven_path(report: Mapping[str, Any], columns: Columns, step: float) -> Pat
         source = "odometry" if logged else "GNSS" if "gnss.lat" in columns else "logged positions"
         return Path(columns["path.x"], columns["path.y"], f"from {source}, in metres")
     machine = report.get("machine") or {}
+    rows = max((len(v) for v in columns.values()), default=0)
+    every = max(1, rows // _POINTS)
+    columns, step = {k: v[::every] for k, v in columns.items() if not k.startswith(_SKIPPED)}, step * every
     speed = _speed(machine, report.get("intervals") or (), columns, step)
     if speed is None:
         return Path(None, None, "Not shown: neither odometry nor GNSS nor a wheel's speed was logged.")
@@ -63,6 +68,7 @@ def driven_path(report: Mapping[str, Any], columns: Columns, step: float) -> Pat
     yaw = np.cumsum(np.nan_to_num(rate)) * step
     forward = np.nan_to_num(speed) * step
     x, y = np.cumsum(forward * np.cos(yaw + slip)), np.cumsum(forward * np.sin(yaw + slip))
+    x, y = (np.repeat(v, every)[:rows] for v in (x, y))
     return Path(x, y, f"integrated from wheel speeds and {source}: its shape drifts, no position was logged")
 
 
@@ -82,11 +88,10 @@ def _speed(
         found.append(v)
     if not found:
         return None
-    stacked = np.array(found)
-    known = np.isfinite(stacked).any(axis=0)
-    out = np.full(stacked.shape[1], np.nan)
-    out[known] = np.nanmedian(stacked[:, known], axis=0)
-    return out
+    ordered = np.sort(np.array(found), axis=0)  # NaN stands last
+    count = np.isfinite(ordered).sum(axis=0)
+    middle = [np.take_along_axis(ordered, np.maximum(k, 0)[None], axis=0)[0] for k in ((count - 1) // 2, count // 2)]
+    return np.where(count > 0, 0.5 * (middle[0] + middle[1]), np.nan)
 
 
 def _turning(machine: Mapping[str, Any], columns: Columns, speed: Array) -> tuple[Array, Array, str] | None:

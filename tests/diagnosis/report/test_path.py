@@ -74,3 +74,15 @@ def test_start_and_end_are_marked() -> None:
     assert ">end<" in picture
     round_trip = str(path_picture(np.sin(0.628 * t), np.cos(0.628 * t), 0.0, STEP, []))
     assert ">start, end<" in round_trip
+
+
+def test_speed_is_the_median_of_what_is_there() -> None:
+    one, two, four = 1.0 * ONE, 2.0 * ONE, 4.0 * ONE
+    two[500:] = np.nan
+    four[800:] = np.nan
+    one[900:] = np.nan
+    columns = {"wheel.FL.v": one, "wheel.FR.v": two, "wheel.RL.v": four, "cmd.omega": 0.0 * ONE}
+    path = driven_path(report(), columns, STEP)
+    assert path.x is not None
+    # 5 s at 2, 3 s at the mean of 1 and 4, 1 s at 1 m/s, then nothing is known
+    assert path.x[-1] == pytest.approx(5 * 2 + 3 * 2.5 + 1)
