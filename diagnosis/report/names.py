@@ -124,6 +124,14 @@ def number(value: Any, digits: int = 3) -> str:
     return text.replace("-", "−")
 
 
+def bounded(epsilon: Mapping[str, Any], digits: int = 3) -> str:
+    """An estimate with its 95 % bounds."""
+    value, low, high = (
+        f"{round(epsilon[k], digits) + 0.0:.{digits}f}".replace("-", "−") for k in ("value", "low", "high")
+    )
+    return f"{value} ({low} to {high})"
+
+
 def grouped(value: int) -> str:
     """Integer with thin spaces between thousands."""
     return f"{value:,}".replace(",", "\u202f").replace("-", "−")

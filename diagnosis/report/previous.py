@@ -34,6 +34,7 @@ def previous_section(report: Mapping[str, Any]) -> dict[str, Any] | None:
         return None
     later = found.get("order") == "later"
     faults: Sequence[Mapping[str, Any]] = found.get("faults") or ()
+    losses: Sequence[Mapping[str, Any]] = found.get("loss") or ()
     counts = {name: n for name, n in (found.get("counts") or {}).items() if name in OUTCOMES and n}
     return {
         "title": "Against a later mission" if later else "Against the previous mission",
@@ -48,7 +49,8 @@ def previous_section(report: Mapping[str, Any]) -> dict[str, Any] | None:
         or "no fault in either",
         "faults": [_row(c) for c in faults],
         "coverage": [_coverage(c) for c in found.get("coverage") or ()],
-        "loss": [_loss(x, report) for x in found.get("loss") or ()],
+        "loss": [_loss(x, report) for x in losses if _differs(x)],
+        "same_loss": sum(not _differs(x) for x in losses),
         "notes": list(found.get("notes") or ()),
     }
 
@@ -111,12 +113,18 @@ def _judged(side: Mapping[str, Any] | None) -> str:
     return f"{side['decided_s']:.1f} of {side['driving_s']:.1f} s driving"
 
 
+def _differs(x: Mapping[str, Any]) -> bool:
+    """Whether each ε̂ lies outside the other's bounds."""
+    a, b = x["older"], x["newer"]
+    return not a["low"] <= b["value"] <= a["high"] and not b["low"] <= a["value"] <= b["high"]
+
+
 def _loss(x: Mapping[str, Any], report: Mapping[str, Any]) -> dict[str, Any]:
     axles = (report.get("machine") or {}).get("axles") or ()
     kind = "steer" if x["component"] in axles else "wheel"
     change = x["newer"]["value"] - x["older"]["value"]
     return {
         "part": f"{x['component']} {names.part(kind, x['side'])}",
-        "cells": [_epsilon(x["older"]), _epsilon(x["newer"])],
-        "change": f"{change:+.2f}".replace("-", "−"),
+        "cells": [names.bounded(x["older"]), names.bounded(x["newer"])],
+        "change": f"{change:+.3f}".replace("-", "−"),
     }

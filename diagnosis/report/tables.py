@@ -10,6 +10,7 @@ from diagnosis.report.names import (
     FAULT_MODES,
     UNDECIDED,
     VERDICTS,
+    bounded,
     clock,
     grouped,
     known,
@@ -229,6 +230,7 @@ def _count(report: Mapping[str, Any]) -> str:
 
 def _coverage(report: Mapping[str, Any]) -> list[dict[str, Any]]:
     machine, rows, why = report.get("machine") or {}, [], _why_undecided(report)
+    loss = {(x["component"], x["side"]): x.get("epsilon") for x in report.get("loss") or ()}
     for row in report.get("coverage") or ():
         seconds = {k: float(v or 0.0) for k, v in (row.get("seconds") or {}).items()}
         total = sum(seconds.values())
@@ -245,10 +247,17 @@ def _coverage(report: Mapping[str, Any]) -> list[dict[str, Any]]:
                 "faulty": faulty,
                 "open": total - healthy - faulty,
                 "driving": row.get("decided_driving_s"),
+                "loss": _bounds(loss.get((row["component"], row["side"]))),
                 "why": why.get((row["component"], row["side"]), []),
             }
         )
     return rows
+
+
+def _bounds(epsilon: Mapping[str, Any] | None) -> str:
+    if not epsilon or any(epsilon.get(k) is None for k in ("value", "low", "high")):
+        return ""
+    return bounded(epsilon)
 
 
 def _why_undecided(report: Mapping[str, Any]) -> dict[tuple[str, str], list[str]]:

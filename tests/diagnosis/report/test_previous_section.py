@@ -50,3 +50,24 @@ def test_words_from_the_other_log_stay_text() -> None:
     page = build_page(with_previous(report, other), columns)
     assert "<script>alert(1)" not in page
     assert "\u202e" not in page
+
+
+def test_losses_are_listed_where_they_differ() -> None:
+    def loss(*values: float) -> list[dict[str, Any]]:
+        return [
+            {
+                "component": c,
+                "side": "actuator",
+                "epsilon": {"value": v, "low": v - 0.01, "high": v + 0.01},
+                "seconds": 9.0,
+            }
+            for c, v in zip(("FL", "FR"), values, strict=True)
+        ]
+
+    report, _ = samples.five_faults()
+    section = previous_section(with_previous({**report, "loss": loss(0.3, -0.0002)}, earlier(loss=loss(0.1, 0.0))))
+    assert section is not None
+    assert section["loss"] == [
+        {"part": "FL drive valve", "cells": ["0.100 (0.090 to 0.110)", "0.300 (0.290 to 0.310)"], "change": "+0.200"}
+    ]
+    assert section["same_loss"] == 1
