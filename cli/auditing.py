@@ -196,7 +196,7 @@ def _run(
                 from diagnosis.audit.export import export as export_tables
                 from diagnosis.audit.store import Store
 
-                with Store.open(asked.output / "fleet.sqlite", read_only=True) as opened:
+                with Store.open(asked.output / "fleet.sqlite") as opened:
                     export_tables(opened, asked.output / "tables")
             code = exit_code(audited.ends, fail_on.value)
             tell("end", {"code": code, "failed": audited.failed})

@@ -111,7 +111,7 @@ def attempt(work: Work) -> dict[str, Any]:
         facts["machine_id"] = work.machine_id or work.machine.id or work.fallback_id
         return {"state": "degraded", "reason": str(error), "summary": {"result": facts, "faults": [], "components": []}}
     except OutputError as error:
-        return {"state": "not_written", "reason": str(error), "summary": None}
+        return {"state": "not_written", "reason": _system_reason(error), "summary": None}
     except (LogError, ConfigError) as error:
         full = isinstance(error.__cause__, OSError) and error.__cause__.errno in FULL
         return {"state": "crashed" if full else "unreadable", "reason": str(error), "summary": None}
@@ -127,6 +127,11 @@ def attempt(work: Work) -> dict[str, Any]:
         text = f"internal error: {type(error).__name__}: {error} ({_where(error)})"
         return {"state": "crashed", "reason": text, "summary": None}
     return found
+
+
+def _system_reason(error: BaseException) -> str:
+    cause = error.__cause__
+    return (cause.strerror or str(cause)) if isinstance(cause, OSError) else str(error)
 
 
 def _where(error: BaseException) -> str:

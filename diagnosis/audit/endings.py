@@ -13,6 +13,7 @@ from typing import Any
 from diagnosis.audit.outcome import READ
 from diagnosis.audit.places import write_whole
 from diagnosis.audit.plan import Planned
+from diagnosis.audit.runner import absolute
 from diagnosis.audit.store import Store
 from diagnosis.result import SEVERITIES
 
@@ -138,10 +139,10 @@ def command(one: Planned, machine: Path | None) -> str:
     mission = one.mission
     remote = any("://" in file for file in mission.files)
     words: list[str] = ["mfhca", "audit" if remote else "diagnose", "-v"]
-    words += [file if "://" in file else os.path.abspath(file) for file in mission.files]  # noqa: PTH100 - links stay
+    words += [absolute(file) for file in mission.files]
     file = mission.machine_file or (str(machine) if machine is not None else "")
     if file:
-        words += ["-m", os.path.abspath(file)]  # noqa: PTH100
+        words += ["-m", absolute(file)]
     if one.machine_id:
         words += ["--machine-id", one.machine_id]
     words += ["-o", f"{mission.name}-report"]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import time
 from collections import deque
 from collections.abc import Sequence
@@ -109,20 +110,23 @@ class Runner:
 
     def _submit(self, one: _Running) -> None:
         planned, asked = one.planned, self._asked
+        mission = planned.mission
+        if self._engine.shared:  # workers have folders of their own to start from
+            mission = replace(mission, files=tuple(absolute(name) for name in mission.files))
         task = Task(
-            mission=planned.mission,
-            output=str(asked.output.absolute()),
+            mission=mission,
+            output=absolute(str(asked.output)),
             machine=planned.machine,
             machine_source=planned.source,
             machine_id=planned.machine_id,
             config_hash=planned.config_hash,
-            folder=str(self._place.folder.absolute()),
+            folder=absolute(str(self._place.folder)),
             temporary="" if self._engine.shared else str(self._place.temporary),
             attempt=one.number,
             known=known_hashes(planned, self._store),
             limits=asked.limits,
             max_size_mb=asked.max_size_mb,
-            objects=str(asked.output.absolute() / RESULTS) if self._engine.shared else "",
+            objects=absolute(str(asked.output / RESULTS)) if self._engine.shared else "",
             described=tuple(self._store.relative(file) for file in planned.mission.files),
             isolation=asked.isolation,
             judge=asked.judge,
@@ -184,6 +188,11 @@ def keep(attempt: Attempt, planned: Planned, store: Store) -> None:
                 store.remember_hash(path, size, stamp, sha256)
     machine_id = planned.machine_id or planned.machine.id or fallback_id(mission)
     store.record(mission, attempt.key, attempt.outcome, attempt.report, machine_id=machine_id)
+
+
+def absolute(name: str) -> str:
+    """A path from the root on, links as they are; URLs stay."""
+    return name if "://" in name else os.path.abspath(name)  # noqa: PTH100
 
 
 def skip(planned: Planned, result: StoredResult, store: Store, tell: Tell) -> None:

@@ -112,7 +112,7 @@ def audit(
         ends = endings(store, [one.mission.name for one in planned])
         failed = write_failures(asked.output, planned, ends, asked.machine)
         gone = store.database.rows("SELECT count(*) FROM mission WHERE gone = ?", (store.run,))[0][0]
-    page.write(always=bool(rest or gone or taken.attempts))
+        page.write(always=bool(rest or gone or taken.attempts))
     return Audited(tuple(ends), len(planned) - len(rest), failed)
 
 

@@ -24,7 +24,7 @@ from diagnosis.audit.objects import Objects
 from diagnosis.audit.outcome import READ, Outcome
 from diagnosis.audit.places import MISSIONS, cannot_write, publish
 from diagnosis.audit.staging import stage
-from replay.errors import ConfigError, LogError
+from replay.errors import ConfigError, LogError, OutputError
 from replay.machine import Machine
 from replay.version import __version__
 
@@ -174,7 +174,13 @@ def _audit(task: Task, folder: Path, temporary: Path) -> Attempt:
         task.max_size_mb,
         task.judge,
     )
-    outcome = run_isolated(work, task.limits, isolation(task.isolation))
+    try:
+        outcome = run_isolated(work, task.limits, isolation(task.isolation))
+    except OutputError as error:
+        raise OutputError(
+            f"{task.output}: the report of {task.mission.name} cannot be written ({error}); what is finished stays, run the "
+            "same command again to continue"
+        ) from error
     if _signature(files) != before:
         gone = "was changed or removed while it was read; audit again once it is complete"
         outcome = Outcome("unreadable", gone, outcome.wall_s, outcome.cpu_s, outcome.peak_mb)
