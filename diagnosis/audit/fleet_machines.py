@@ -254,8 +254,9 @@ def machines_of(
     for key in sorted({*runs, *failed}):
         found = list(runs[key].values())
         starts = Counter(r.result.start_ns for r in found if r.result.start_ns is not None)
-        dated = sorted((r for r in found if starts[r.result.start_ns] == 1), key=lambda r: r.result.start_ns or 0)
-        undated = sorted((r for r in found if starts[r.result.start_ns] != 1), key=lambda r: r.name)
+        alone = {start for start, count in starts.items() if count == 1}
+        dated = sorted((r for r in found if r.result.start_ns in alone), key=lambda r: r.result.start_ns or 0)
+        undated = sorted((r for r in found if r.result.start_ns not in alone), key=lambda r: r.name)
         last = next((r for r in (*reversed(dated), *undated) if r.result.report is not None), None)
         own = limits(last.result.report or "") if limits and last else Limits()
         name = key[1] or (last.result.machine_name if last else "")
