@@ -1,7 +1,8 @@
 """What of a mission's columns goes into the page at which rate, so that the page keeps to its size.
 
 Every sample of every column where that fits. Else the extremes of blocks everywhere, every sample around the onset and
-the end of the most severe faults, and every sample of as many whole columns as there is room left for.
+the end of the most severe faults, and, of missions of some minutes, every sample of as many whole columns as there is room
+for: what a browser can hold ends before what a page can.
 """
 
 from __future__ import annotations
@@ -25,6 +26,7 @@ _STRIDE, _BLOCKS, _FEWEST = 64, 32_768, 1024
 _AROUND, _MOST = 0.5, 0.9
 _RANK = {"replay": 1, "evidence": 2}
 _WORKERS = 4
+_MOST_WHOLE = 720_000
 
 
 @dataclass(frozen=True)
@@ -139,7 +141,7 @@ def _same(mission: Mission) -> dict[str, str]:
     out = {}
     closeups = mission.closeups.columns if mission.closeups else {}
     for name, values in mission.columns.items():
-        few = values[:: max(1, len(values) // 64)].tobytes()
+        few = values[:: max(1, len(values) // 1024)].tobytes()
         alike = seen.setdefault((values.dtype.str, mission.lsb.get(name), few), [])
         for other in alike:
             near = [c.get(x) for c in (mission.columns, closeups) for x in (name, other)]
@@ -155,7 +157,8 @@ def _same(mission: Mission) -> dict[str, str]:
 def _equal(a: Values | None, b: Values | None) -> bool:
     if a is None or b is None:
         return a is b
-    return a.tobytes() == b.tobytes() if len(a) < 4096 else bool(np.array_equal(a, b, equal_nan=True))
+    bits = f"u{a.dtype.itemsize}"
+    return a.dtype == b.dtype and bool(np.array_equal(a.view(bits), b.view(bits)))
 
 
 def _encoded(mission: Mission, budget: int) -> list[Channel]:
@@ -179,13 +182,13 @@ def _encoded(mission: Mission, budget: int) -> list[Channel]:
             if left >= 0 or samples // stride <= _FEWEST:
                 break
             stride *= 2
-        spans = _affordable(mission, plans, left * (_AROUND if per == 1 else _MOST))
+        spans = _affordable(mission, plans, left * (_AROUND if per == 1 and samples <= _MOST_WHOLE else _MOST))
 
         def near(channel: Channel) -> Channel:
             return with_pieces(channel, mission.pieces(channel.name, spans[channel.name]), plans[channel.name])
 
         channels = list(pool.map(near, channels))
-        if per > 1:
+        if per > 1 or samples > _MOST_WHOLE:
             return channels
         chosen = _whole_columns(channels, plans, samples, budget - sum(c.size for c in channels))
         full = {c.name: c for c in pool.map(lambda c: whole(c, columns[c], plans[c]), chosen)}
