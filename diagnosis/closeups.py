@@ -12,7 +12,7 @@ from diagnosis.pictured import Steps, steps_around
 from diagnosis.result import Closeups, FaultInterval
 from replay import mfhca
 from replay.envelope import bucket_of
-from replay.loop import Replay, stack
+from replay.loop import Replay
 from replay.loop_scan import scan_wheel
 from replay.machine import Machine
 from replay.spill import blocks
@@ -66,18 +66,16 @@ def _single(values: NDArray[np.floating]) -> NDArray[np.float32]:
 def _replayed(timeline: Timeline, replay: Replay, machine: Machine, step: Steps) -> dict[str, NDArray[np.float32]]:
     """Columns of the replayed loop as `replay.columns.replay_columns` names them, at some steps."""
     out: dict[str, NDArray[np.float32]] = {}
-    v = stack(timeline, [f"wheel.{w}.v" for w in machine.wheels])
-    u = stack(timeline, [f"wheel.{w}.u" for w in machine.wheels])
-    if timeline.open_loop:
-        u = np.broadcast_to(np.nan, u.shape)
-    control = machine.control
+    nothing, control = np.broadcast_to(np.nan, (timeline.size,)), machine.control
     for i, wheel in enumerate(machine.wheels):
-        speed, command = v[step, i], replay.v_ref[step, i]
+        v = timeline.signals.get(f"wheel.{wheel}.v", nothing)
+        u = nothing if timeline.open_loop else timeline.signals.get(f"wheel.{wheel}.u", nothing)
+        speed, command = v[step], replay.v_ref[step, i]
         found = {
             "v_ref": command,
             "e": speed - command,
             "rho": mfhca.decay_rate(speed, command, control.xi, control.beta),
-            **_scanned(replay, i, (u, v), timeline.dt, step),
+            **_scanned(replay, i, u, v, timeline.dt, step),
         }
         out |= {f"replay.{wheel}.{leaf}": _single(x) for leaf, x in found.items()}
     for j, axle in enumerate(machine.axles):
@@ -89,9 +87,8 @@ def _replayed(timeline: Timeline, replay: Replay, machine: Machine, step: Steps)
     return out
 
 
-def _scanned(replay: Replay, i: int, recorded: tuple[Array, Array], dt: float, step: Steps) -> dict[str, Array]:
+def _scanned(replay: Replay, i: int, u: Array, v: Array, dt: float, step: Steps) -> dict[str, Array]:
     """What depends on the loop's state: replayed once more, because only envelopes of it were kept."""
-    u, v = (x[:, i] for x in recorded)
     v_ref = replay.v_ref[:, i]
     if replay.law is None or not (_any(v) and _any(v_ref)):
         return {}
