@@ -82,7 +82,8 @@ def _lines(terminal: Terminal, counted: Counted) -> Tell:
         now = time.monotonic()
         if now - last > _LINE_S or event in ("planned", "page"):
             last = now
-            terminal.tell(f"{sum(counted.states.values())} of {counted.total} · {clean(counted.text())}")
+            parts = (f"{sum(counted.states.values())} of {counted.total}", clean(counted.text()))
+            terminal.tell(" · ".join(part for part in parts if part))
 
     return show
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -11,7 +12,7 @@ import typer
 from cli.app import command
 from cli.console import Terminal
 from cli.options import FailOn, Json, MachineFile, MaxSize
-from replay.errors import ConfigError, LogError
+from replay.errors import ConfigError, LogError, OutputError
 
 if TYPE_CHECKING:
     from diagnosis.audit.discover import Discovery
@@ -46,7 +47,12 @@ def audit(
     jobs: Annotated[
         int | None,
         typer.Option(
-            "--jobs", "-j", metavar="N", min=1, help="Missions at once. Default: one per processor.", show_default=False
+            "--jobs",
+            "-j",
+            metavar="N",
+            min=1,
+            help="Missions at once on this machine. Default: one per processor.",
+            show_default=False,
         ),
     ] = None,
     memory: Annotated[
@@ -118,7 +124,7 @@ def audit(
 
         found = discover(paths, exclude=output)
         count = jobs or _processors()
-        limits = Limits(memory or usual_memory_mb(count), timeout, cpu)
+        limits = Limits(memory or (usual_memory_mb(count) if dask is None else Limits.memory_mb), timeout, cpu)
         asked = Asked(output, machine, machine_id or "", limits, retries, resume, max_size)
     for problem in found.problems:
         terminal.note(problem)
@@ -200,8 +206,12 @@ def _run(
                     export_tables(opened, asked.output / "tables")
             code = exit_code(audited.ends, fail_on.value)
             tell("end", {"code": code, "failed": audited.failed})
-    except KeyboardInterrupt:
-        terminal.note("what is finished is kept; the same command again does the rest")
+    except BaseException as error:
+        if isinstance(error, KeyboardInterrupt):
+            terminal.note("what is finished is kept; the same command again does the rest")
+        if log is not None:
+            with suppress(OutputError):
+                log.tell("stopped", {"reason": str(error) or "interrupted"})
         raise
     finally:
         if log is not None:

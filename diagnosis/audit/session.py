@@ -19,6 +19,7 @@ from diagnosis.audit.places import working
 from diagnosis.audit.plan import Asked, Planned, is_done, plan, stored_result
 from diagnosis.audit.runner import Runner, skip
 from diagnosis.audit.store import FILE_NAME, Store
+from replay.errors import OutputError
 
 PAGE_S = 60.0
 _PAGE_SHARE = 20.0
@@ -129,10 +130,16 @@ class _Page:
         """Pass an event on, and write the page when it is due."""
         self.tell(event, facts)
         if event == "tick" and time.monotonic() > self.due:
-            self.write(always=True)
+            try:
+                self.write(always=True)
+            except OutputError:
+                raise
+            except Exception as error:  # costs no mission; it shows again at the end
+                self.due = time.monotonic() + PAGE_S
+                self.tell("page_failed", {"reason": f"{type(error).__name__}: {error}"})
 
     def write(self, *, always: bool) -> None:
-        """Write the page; a failing page costs no mission."""
+        """Write the page, unless the one that is there is still right."""
         from diagnosis.audit.fleet import write_fleet
 
         if not always and self.baseline is None and (self.output / "fleet.html").is_file():

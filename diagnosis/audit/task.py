@@ -23,7 +23,7 @@ from diagnosis.audit.limits import Limits
 from diagnosis.audit.objects import Objects
 from diagnosis.audit.outcome import READ, Outcome
 from diagnosis.audit.places import MISSIONS, cannot_write, publish
-from diagnosis.audit.staging import stage
+from diagnosis.audit.staging import Staged, stage
 from replay.errors import ConfigError, LogError, OutputError
 from replay.machine import Machine
 from replay.version import __version__
@@ -184,11 +184,20 @@ def _audit(task: Task, folder: Path, temporary: Path) -> Attempt:
     if _signature(files) != before:
         gone = "was changed or removed while it was read; audit again once it is complete"
         outcome = Outcome("unreadable", gone, outcome.wall_s, outcome.cpu_s, outcome.peak_mb)
+    outcome = replace(outcome, reason=named(outcome.reason, staged, task.mission, temporary))
     report = None
     if outcome.state in READ and (folder / child.REPORT).is_dir():
         report = f"{MISSIONS}/{task.mission.name}"
         publish(folder / child.REPORT, Path(task.output) / report)
     return Attempt(task.mission, key, outcome, task.attempt, report, hashes)
+
+
+def named(reason: str, staged: Staged, mission: MissionSource, temporary: Path) -> str:
+    """A reason that names files as they were found, not their copies of this attempt."""
+    for path, name in zip(staged.paths, mission.files, strict=False):
+        if temporary in path.parents:
+            reason = reason.replace(str(path), name)
+    return reason.replace(f"{temporary}{os.sep}", "")
 
 
 def _put(task: Task, attempt: Attempt) -> None:

@@ -5,8 +5,8 @@
 - scaling: missions of 60 s with ``-j 1`` and ``-j 2`` on the command line, everything included.
 - resume: a finished audit again. Its logs are made-up texts that end as unreadable; what a resume does does not depend
   on how they ended.
-- kills: an audit of short missions is ended by SIGKILL at random moments and started again until it is complete; what it
-  had acknowledged in its events must stand in the store, whole, and the rest is done exactly once more.
+- kills: an audit of short missions is ended by SIGKILL at random moments, one in five while it starts and the others after
+  its next mission, and started again until it is complete; what it had acknowledged in its events must stand in the store, whole, and the rest is done exactly once more.
 """
 
 from __future__ import annotations
@@ -24,6 +24,7 @@ import subprocess
 import sys
 import tempfile
 import time
+from contextlib import suppress
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -126,10 +127,14 @@ def kills(folder: Path, count: int, seed: int) -> None:
             stderr=subprocess.DEVNULL,
             start_new_session=True,
         )
-        wait = draw.uniform(0.2, 9.0)
-        try:
-            process.wait(wait)
-        except subprocess.TimeoutExpired:
+        before = len(_ended(events))
+        if draw.random() < 0.2:
+            _wait(process, draw.uniform(0.1, 5.0))
+        else:
+            while process.poll() is None and len(_ended(events)) == before:
+                time.sleep(0.02)
+            _wait(process, draw.uniform(0.0, 1.5))
+        if process.poll() is None:
             children = _below(process.pid)
             os.kill(process.pid, signal.SIGKILL)
             process.wait()
@@ -146,6 +151,11 @@ def kills(folder: Path, count: int, seed: int) -> None:
         f"\nkills: {done}; {complete} audits completed; acknowledged and lost {lost}, done again {again}, processes left "
         f"{orphans}, folders left after completion {left}"
     )
+
+
+def _wait(process: subprocess.Popen[bytes], seconds: float) -> None:
+    with suppress(subprocess.TimeoutExpired):
+        process.wait(seconds)
 
 
 def _lost(out: Path, events: Path) -> int:
@@ -180,7 +190,7 @@ def _again(events: Path) -> int:
 def _ended(events: Path) -> list[str]:
     if not events.is_file():
         return []
-    lines = [json.loads(line) for line in events.read_text(encoding="utf-8").splitlines()]
+    lines = [json.loads(line) for line in events.read_text(encoding="utf-8").splitlines() if line.endswith("}")]
     return [line["name"] for line in lines if line["event"] == "mission"]
 
 

@@ -2,14 +2,18 @@ from __future__ import annotations
 
 import threading
 from collections import Counter
+from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
 from diagnosis.audit.endings import Ending, exit_code, quoted
 from diagnosis.audit.places import claim_mission, publish, working
 from diagnosis.audit.session import overview
+from diagnosis.audit.staging import Staged
 from diagnosis.audit.store import Store
+from diagnosis.audit.task import named
 from replay.errors import OutputError
 from tests.diagnosis.audit.samples import asked_for, missions, run
 
@@ -185,3 +189,28 @@ def test_a_lost_store_is_made_again_from_the_result_objects(tmp_path: Path) -> N
     after, events = run(found, asked_for(tmp_path / "out"))
     assert after == before
     assert {kind for kind, _ in events} == {"skipped"}
+
+
+def test_a_page_that_fails_on_the_way_costs_no_mission(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    tries = []
+
+    def write_fleet(*_: object, **__: object) -> object:
+        tries.append(1)
+        if len(tries) == 1:
+            raise KeyError("machine")
+        return SimpleNamespace(html=tmp_path)
+
+    monkeypatch.setattr("diagnosis.audit.session.PAGE_S", 0.0)
+    monkeypatch.setattr("diagnosis.audit.fleet.write_fleet", write_fleet)
+    ends, _ = run(missions(tmp_path / "logs", "fine-1", "fine-2"), asked_for(tmp_path / "out"))
+    assert [e.state for e in ends.values()] == ["ok", "ok"]
+    assert len(tries) > 1
+
+
+def test_a_reason_names_the_log_and_not_its_copy(tmp_path: Path) -> None:
+    mission = missions(tmp_path / "logs", "fine-1").missions[0]
+    copy = tmp_path / "tmp" / "files" / "0" / "x.bag"
+    there = replace(mission, files=("s3://fleet/x.bag",))
+    assert named(f"{copy}: ends at byte 12", Staged((copy,), ("",)), there, tmp_path / "tmp") == (
+        "s3://fleet/x.bag: ends at byte 12"
+    )
