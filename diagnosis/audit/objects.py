@@ -125,6 +125,10 @@ def encode(document: Mapping[str, Any]) -> bytes:
 
 
 def _put_file(folder: Path, name: str, content: bytes) -> bool:
+    """Write a file under a temporary name, to the disk, and give it its own; False where that is taken.
+
+    The folder's list of names is left to the system: after a loss of power the store holds what an object's name may lack.
+    """
     target = folder / name
     if target.exists():
         return False
@@ -146,15 +150,4 @@ def _put_file(folder: Path, name: str, content: bytes) -> bool:
     finally:
         with suppress(OSError):
             temporary.unlink()
-    _flush_folder(folder)
     return True
-
-
-def _flush_folder(folder: Path) -> None:
-    """Write the folder's list of names to the disk, where the system can."""
-    with suppress(OSError):
-        descriptor = os.open(folder, os.O_RDONLY)
-        try:
-            os.fsync(descriptor)
-        finally:
-            os.close(descriptor)

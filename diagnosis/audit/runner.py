@@ -18,7 +18,7 @@ from diagnosis.audit.outcome import TRANSIENT, Outcome
 from diagnosis.audit.places import RESULTS, Claim, Working, claim_mission
 from diagnosis.audit.plan import Asked, Planned, is_done, known_hashes, stored_result
 from diagnosis.audit.store import Store, StoredResult
-from diagnosis.audit.task import Attempt, Task, audit_one, key_of, sizes_of
+from diagnosis.audit.task import Attempt, Task, audit_one, key_of
 
 TICK_S = 0.5
 _AHEAD = 2
@@ -180,14 +180,8 @@ class Runner:
 def keep(attempt: Attempt, planned: Planned, store: Store) -> None:
     """Keep an attempt in the store, and what its files' hashes are."""
     mission = attempt.mission
-    if attempt.hashes:
-        for path, size, stamp, sha256 in zip(
-            mission.files, sizes_of(mission), mission.stamps, attempt.hashes, strict=True
-        ):
-            if store.known_hash(path, size, stamp) != sha256:
-                store.remember_hash(path, size, stamp, sha256)
     machine_id = planned.machine_id or planned.machine.id or fallback_id(mission)
-    store.record(mission, attempt.key, attempt.outcome, attempt.report, machine_id=machine_id)
+    store.record(mission, attempt.key, attempt.outcome, attempt.report, machine_id=machine_id, hashes=attempt.hashes)
 
 
 def absolute(name: str) -> str:

@@ -172,6 +172,7 @@ class Store:
         attempts: Sequence[Outcome] = (),
         *,
         machine_id: str = "",
+        hashes: Sequence[str] = (),
     ) -> None:
         """Keep how an attempt ended; when this returns, it stands on the disk.
 
@@ -189,6 +190,8 @@ class Store:
             Earlier attempts of the same go that were not recorded yet, in their order.
         machine_id : str
             Machine where the report names none, or there is no report.
+        hashes : Sequence[str]
+            SHA-256 of each file, to be remembered; empty: what is known of them stays.
 
         Raises
         ------
@@ -200,7 +203,7 @@ class Store:
             summary = told.pop("summary")
             self._record(
                 {
-                    "mission": self._described(mission),
+                    "mission": self._described(mission, hashes),
                     "key": asdict(key),
                     "made_ns": time.time_ns(),
                     "attempt": {**told, "number": 0},
@@ -292,10 +295,13 @@ class Store:
             for path, size, stamp in zip(mission.files, sizes, mission.stamps, strict=True)
         ]
 
-    def _described(self, mission: MissionSource) -> dict[str, Any]:
+    def _described(self, mission: MissionSource, hashes: Sequence[str] = ()) -> dict[str, Any]:
         files = self._files(mission)
-        for told, path in zip(files, mission.files, strict=True):
-            told["sha256"] = self.known_hash(path, told["size"], told["stamp"])
+        known: Sequence[str | None] = hashes or [
+            self.known_hash(f, t["size"], t["stamp"]) for f, t in zip(mission.files, files, strict=True)
+        ]
+        for told, sha256 in zip(files, known, strict=True):
+            told["sha256"] = sha256
         return {"name": mission.name, "files": files, "bytes": mission.bytes}
 
 

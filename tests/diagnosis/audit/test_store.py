@@ -67,8 +67,7 @@ def test_a_mission_from_discovery_to_result(
         (mission,) = store.adopt([make_mission("m1")])
         assert store.missions()[0].result is None
         assert store.lookup(key) is None
-        store.remember_hash(mission.files[0], mission.bytes, mission.stamps[0], "ab" * 32)
-        store.record(mission, key, Outcome("ok", summary=summarise(make_report())), "missions/m1")
+        store.record(mission, key, Outcome("ok", summary=summarise(make_report())), "missions/m1", hashes=["ab" * 32])
     with Store.open(path, read_only=True) as store:
         found = store.lookup(key)
         assert found is not None
