@@ -145,7 +145,7 @@ def run(work: Work, limits: Limits, parent: int) -> None:
     try:
         die_with(parent)
         for number in (signal.SIGINT, signal.SIGTERM):
-            signal.signal(number, signal.SIG_DFL)
+            signal.signal(number, signal.SIG_IGN)  # who started this one decides when it ends
         messages = os.open(Path(work.folder) / MESSAGES, os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o600)
         for stream in (1, 2):
             os.dup2(messages, stream)

@@ -214,15 +214,22 @@ class ForkServer:
             return
         self._connection = None
         connection.close()
-        if self._process is not None and not self.closed:
-            self._process.kill()
-            self._process.wait()
+        how = "" if self.closed else self._end_of_server()
         waiting, self._waiting = self._waiting, {}
         for one in waiting.values():
             if self.closed:
                 one.set_exception(Stopped())
             else:
-                one.set_result("the process that starts missions was ended from outside")
+                one.set_result(f"the process that starts missions ended {how}")
+
+    def _end_of_server(self) -> str:
+        assert self._process is not None
+        try:
+            code = self._process.wait(_CLOSE_S)
+        except subprocess.TimeoutExpired:
+            self._process.kill()
+            code = self._process.wait()
+        return f"with {_signal_name(-code)}" if code < 0 else f"with code {code}"
 
     def _kill(self) -> None:
         process = self._process

@@ -104,11 +104,25 @@ def memory_kills() -> int:
 
 def usual_memory_mb(jobs: int) -> float:
     """Memory limit where none is given: 4 GB, or an equal part of 80 % of what is available now [MB]."""
+    available = min(_available(), _left_in_container())
+    return max(min(4096.0, 0.8 * available / jobs), 256.0)
+
+
+def _available() -> float:
     with suppress(OSError, ValueError, IndexError):
         for line in Path("/proc/meminfo").read_text(encoding="ascii").splitlines():
             if line.startswith("MemAvailable:"):
-                return max(min(4096.0, 0.8 * int(line.split()[1]) / 1024 / jobs), 256.0)
-    return 4096.0
+                return int(line.split()[1]) / 1024
+    return math.inf
+
+
+def _left_in_container() -> float:
+    """What the process's control group may still take, where it is limited."""
+    group = Path("/sys/fs/cgroup")
+    with suppress(OSError, ValueError):
+        most, used = ((group / f"memory.{name}").read_text(encoding="ascii") for name in ("max", "current"))
+        return (int(most) - int(used)) / MB
+    return math.inf
 
 
 def _private_virtual() -> int:

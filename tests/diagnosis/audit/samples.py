@@ -16,7 +16,7 @@ from diagnosis.audit.session import audit
 
 JUDGE = "poison:judge"
 COLD = "fork-cold"
-LIMITS = Limits(memory_mb=150, wall_s=1.5, file_mb=20)
+LIMITS = Limits(memory_mb=150, wall_s=3.0, file_mb=20)
 
 
 def missions(folder: Path, *works: str) -> Discovery:

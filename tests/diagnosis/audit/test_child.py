@@ -85,9 +85,7 @@ def test_a_child_ends_with_the_server_that_started_it(tmp_path: Path) -> None:
     assert server._process is not None
     os.kill(server._process.pid, signal.SIGKILL)
     thread.join()
-    assert [(e.state, e.reason) for e in ends] == [
-        ("crashed", "the process that starts missions was ended from outside")
-    ]
+    assert [(e.state, e.reason) for e in ends] == [("crashed", "the process that starts missions ended with SIGKILL")]
     _wait_until_gone(child)
     again = run_isolated(work_of("fine", _made(tmp_path / "again")), LIMITS, server)  # it starts anew
     server.close()

@@ -58,6 +58,13 @@ def test_processes_give_the_same_table(tmp_path: Path) -> None:
     assert {n: e.state for n, e in ends.items()} == TABLE
 
 
+def test_fresh_interpreters_give_the_same_table(tmp_path: Path) -> None:
+    works = [work for work in WORKS if work != "hang"]
+    asked = asked_for(tmp_path / "out", isolation="spawn", limits=Limits(memory_mb=150, wall_s=30.0))
+    ends, _ = run(missions(tmp_path / "logs", *works), asked, lambda: engines.local(2, "spawn"))
+    assert {n: e.state for n, e in ends.items()} == {n: s for n, s in TABLE.items() if n != "hang"}
+
+
 @pytest.mark.filterwarnings("ignore")
 def test_a_dask_cluster_gives_the_same_table(cluster: Any, tmp_path: Path) -> None:
     def made() -> Any:
