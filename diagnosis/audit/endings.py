@@ -16,6 +16,7 @@ from diagnosis.audit.plan import Planned
 from diagnosis.audit.runner import absolute
 from diagnosis.audit.store import Store
 from diagnosis.result import SEVERITIES
+from replay.log_files import part_of
 
 FAILURES = "failures.txt"
 NEVER = "never"
@@ -138,7 +139,8 @@ def command(one: Planned, machine: Path | None) -> str:
     """Command line that diagnoses a mission by itself."""
     mission = one.mission
     remote = any("://" in file for file in mission.files)
-    words: list[str] = ["mfhca", "audit" if remote else "diagnose", "-v"]
+    parts = [part[::2] for file in mission.files if (part := part_of(Path(file).name)) is not None]
+    words = ["mfhca", "audit" if remote or len(set(parts)) < len(parts) else "diagnose", "-v"]
     words += [absolute(file) for file in mission.files]
     file = mission.machine_file or (str(machine) if machine is not None else "")
     if file:

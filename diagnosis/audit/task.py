@@ -194,9 +194,10 @@ def _audit(task: Task, folder: Path, temporary: Path) -> Attempt:
 
 def named(reason: str, staged: Staged, mission: MissionSource, temporary: Path) -> str:
     """A reason that names files as they were found, not their copies of this attempt."""
-    for path, name in zip(staged.paths, mission.files, strict=False):
-        if temporary in path.parents:
-            reason = reason.replace(str(path), name)
+    if len(staged.paths) == len(mission.files):
+        for path, name in zip(staged.paths, mission.files, strict=True):
+            if temporary in path.parents:
+                reason = reason.replace(str(path), name)
     return reason.replace(f"{temporary}{os.sep}", "")
 
 

@@ -8,13 +8,16 @@ from types import SimpleNamespace
 
 import pytest
 
-from diagnosis.audit.endings import Ending, exit_code, quoted
+from diagnosis.audit.discover import MissionSource
+from diagnosis.audit.endings import Ending, command, exit_code, quoted
 from diagnosis.audit.places import claim_mission, publish, working
+from diagnosis.audit.plan import Planned
 from diagnosis.audit.session import overview
 from diagnosis.audit.staging import Staged
 from diagnosis.audit.store import Store
 from diagnosis.audit.task import named
 from replay.errors import OutputError
+from replay.machine import haulotte
 from tests.diagnosis.audit.samples import asked_for, missions, run
 
 
@@ -171,6 +174,20 @@ def ending(state: str, verdict: str | None = None, severity: str = "") -> Ending
 )
 def test_the_exit_code_is_that_of_the_worst_mission(ends: list[Ending], fail_on: str, code: int) -> None:
     assert exit_code(ends, fail_on) == code
+
+
+@pytest.mark.parametrize(
+    ("files", "start"),
+    [
+        (("/logs/a b.bag", "/logs/plc.csv"), "mfhca diagnose -v '/logs/a b.bag' /logs/plc.csv -o m-report"),
+        (("s3://fleet/a.bag",), "mfhca audit -v s3://fleet/a.bag -o m-report"),
+        (("/logs/a_0.bag", "/logs/a_1.bag"), "mfhca audit -v /logs/a_0.bag /logs/a_1.bag -o m-report"),
+        (("/logs/a_0.bag",), "mfhca diagnose -v /logs/a_0.bag -o m-report"),
+    ],
+)
+def test_a_failure_has_the_command_that_shows_it_again(files: tuple[str, ...], start: str) -> None:
+    mission = MissionSource("m", files, 1, ("1",) * len(files))
+    assert command(Planned(mission, haulotte(), "", "", ""), None) == start
 
 
 @pytest.mark.parametrize(
