@@ -199,8 +199,7 @@ class Store:
             Where it cannot be written; nothing of it counts then.
         """
         for attempt in (*attempts, outcome):
-            told = asdict(attempt)
-            summary = told.pop("summary")
+            told = {name: getattr(attempt, name) for name in ("state", "reason", "wall_s", "cpu_s", "peak_mb")}
             self._record(
                 {
                     "mission": self._described(mission, hashes),
@@ -209,7 +208,7 @@ class Store:
                     "attempt": {**told, "number": 0},
                     "report": report if attempt is outcome else None,
                     "machine_id": machine_id,
-                    "summary": summary,
+                    "summary": attempt.summary,
                 },
                 key,
             )

@@ -7,6 +7,7 @@ disk before the next; then asks what a fleet page and a resume ask. Result objec
 from __future__ import annotations
 
 import argparse
+import hashlib
 import sys
 import tempfile
 import time
@@ -78,7 +79,7 @@ def measure(folder: Path, count: int, *, objects: bool) -> None:
         MissionSource(f"m{i}", (str(folder / "logs" / f"m{i}.mcap"),), 1000 + i, (str(i),), sizes=(1000 + i,))
         for i in range(count)
     ]
-    keys = [Key(f"{i:064x}", "c" * 64, "1") for i in range(count)]
+    keys = [Key(hashlib.sha256(str(i).encode()).hexdigest(), "c" * 64, "1") for i in range(count)]
     ends = [Outcome("ok", wall_s=1.0, cpu_s=1.0, peak_mb=300.0, summary=summary_of(i)) for i in range(count)]
     with Store(path, objects=objects) as store:
         store.begin_run()

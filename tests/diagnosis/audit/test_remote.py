@@ -11,6 +11,7 @@ import pytest
 
 from diagnosis.audit.discover import MissionSource, discover
 from diagnosis.audit.listing import Entry
+from diagnosis.audit.objects import Objects
 from diagnosis.audit.remote import RemotePlace, file_system, summarise_url
 from diagnosis.audit.staging import machine_at, stage
 from replay.errors import ConfigError, LogError
@@ -256,6 +257,17 @@ def test_parts_behind_urls_are_one_mission_where_they_go_on(memory: Any) -> None
     parts = [Entry(f"memory://fleet/run_{i}.mcap", f"run_{i}.mcap", "", len(raw)) for i in range(2)]
     assert not place.continuous(parts)
     assert place.continuous(parts[:1])
+
+
+def test_result_objects_in_a_bucket_are_never_changed(bucket: Bucket) -> None:
+    objects = Objects(f"{bucket.url}/results")
+    name = "0123abcd-0123abcd-1.0-1.json"
+    assert objects.names() == []
+    assert objects.put(name, b"first")
+    assert not objects.put(name, b"second")
+    assert objects.read(name) == b"first"
+    assert objects.put_attempt("0123abcd-0123abcd-1.0", {"attempt": {"state": "ok"}}, 1) == 2
+    assert len(objects.names()) == 2
 
 
 def test_packages_that_are_not_installed(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -26,7 +26,7 @@ ROOT = Path(__file__).resolve().parents[3]
 
 # records missions n, n + step, … and says which are recorded
 WRITER = """
-import sys
+import hashlib, sys
 from pathlib import Path
 from diagnosis.audit.discover import MissionSource
 from diagnosis.audit.keys import Key
@@ -42,8 +42,9 @@ with Store.open(path) as store:
     store.begin_run()
     for n in range(first, count, step):
         mission = MissionSource(f"m{n}", (f"m{n}.mcap",), 1, ("1",), sizes=(1,))
-        store.remember_hash(mission.files[0], 1, "1", f"{n:064d}")
-        store.record(mission, Key(f"{n:064d}", "c" * 64, "1"), Outcome("ok", summary=rows), f"missions/m{n}")
+        sha256 = hashlib.sha256(str(n).encode()).hexdigest()
+        store.remember_hash(mission.files[0], 1, "1", sha256)
+        store.record(mission, Key(sha256, "c" * 64, "1"), Outcome("ok", summary=rows), f"missions/m{n}")
         print(n, flush=True)
 """
 
@@ -109,6 +110,14 @@ def test_every_try_is_a_row_and_a_failed_one_does_not_replace_a_result(
         store.record(mission, key, degraded, "missions/m1")
         assert store.database.rows("SELECT * FROM fault") == []
         assert store.counts() == {"degraded": 1}
+
+
+def test_keys_that_begin_alike_have_objects_of_their_own(path: Path, make_mission: Missions) -> None:
+    with Store.open(path) as store:
+        for mission, last in zip(store.adopt([make_mission("m1"), make_mission("m2")]), "ab", strict=True):
+            store.record(mission, Key("0" * 63 + last, "c" * 64, "1"), Outcome("crashed", "signal 9"), None)
+        assert store.counts() == {"crashed": 2}
+        assert store.object_names() == {"00000000-cccccccc-1-1.json", "00000000-cccccccc-1-2.json"}
 
 
 def test_copies_share_a_result_and_count_as_missions(
