@@ -181,7 +181,7 @@ class ForkServer:
         ours, theirs = socket.socketpair()
         call = (
             "import json, sys; sys.path[:] = json.loads(sys.argv[1]); from diagnosis.audit.zygote import main; "
-            f"main({theirs.fileno()}, warmed={self._warmed})"
+            f"main({theirs.fileno()}, {os.getpid()}, warmed={self._warmed})"
         )
         self._process = subprocess.Popen(
             [sys.executable, "-P", "-c", call, json.dumps([p for p in sys.path if p])],
@@ -245,6 +245,7 @@ class ForkServer:
             return
         with suppress(OSError), socket.socket(fileno=os.dup(connection.fileno())) as end:
             end.shutdown(socket.SHUT_RDWR)
+        process.terminate()  # heeded only while it starts and does not listen yet
         try:
             process.wait(_CLOSE_S)
         except subprocess.TimeoutExpired:

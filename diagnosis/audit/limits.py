@@ -72,12 +72,18 @@ def hold(limits: Limits) -> None:
 
 def die_with(parent: int) -> None:
     """Let the system end this process when its parent ends, however that happens; exits where it has ended already."""
+    follow(signal.SIGKILL)
     if LINUX:
-        ctypes.CDLL(None, use_errno=True).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL, 0, 0, 0)
         with suppress(OSError):  # if memory runs out, this process goes first
             Path("/proc/self/oom_score_adj").write_text("900", encoding="ascii")
     if os.getppid() != parent:
         os._exit(1)
+
+
+def follow(number: int) -> None:
+    """Let the system send this process a signal when the thread ends that started it; 0: none any more."""
+    if LINUX:
+        ctypes.CDLL(None, use_errno=True).prctl(_PR_SET_PDEATHSIG, number, 0, 0, 0)
 
 
 def held_mb(pid: int) -> float:

@@ -15,6 +15,7 @@ import select
 import shutil
 import signal
 import socket
+import sys
 import tempfile
 import time
 from contextlib import suppress
@@ -25,7 +26,7 @@ from typing import Any
 
 from diagnosis.audit import child
 from diagnosis.audit.child import Work
-from diagnosis.audit.limits import Limits, held_mb
+from diagnosis.audit.limits import Limits, follow, held_mb
 
 LOOK_S = 0.05
 
@@ -183,17 +184,22 @@ def warm() -> None:
         child.judge(Work((str(log),), haulotte(), "", "", "", folder, folder))
 
 
-def main(descriptor: int, *, warmed: bool) -> None:
+def main(descriptor: int, parent: int, *, warmed: bool) -> None:
     """Entry of the server's process."""
-    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+    for number in (signal.SIGINT, signal.SIGHUP):
         signal.signal(number, signal.SIG_IGN)  # the audit decides when it ends
-    connection = Connection(descriptor)
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(1))
+    follow(signal.SIGTERM)  # while it does not listen to its socket
+    if os.getppid() != parent:
+        os._exit(1)
     importlib.import_module("diagnosis.pipeline")
     importlib.import_module("diagnosis.output")
     if warmed:
         with suppress(Exception):  # each child then loads what it needs; what is wrong shows there
             warm()
+    signal.signal(signal.SIGTERM, signal.SIG_IGN)
+    follow(0)
     gc.collect()
     gc.freeze()
-    Zygote(connection).serve()
+    Zygote(Connection(descriptor)).serve()
     os._exit(0)

@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import os
 import signal
+import subprocess
 import sys
 import threading
 import time
@@ -107,6 +108,23 @@ def test_closing_the_server_ends_its_children_and_removes_their_folders(tmp_path
     thread.join()
     _wait_until_gone(child)
     assert not (tmp_path / "work").exists()
+
+
+def test_a_server_that_is_still_starting_ends_with_the_audit(tmp_path: Path) -> None:
+    call = (
+        "import time; from diagnosis.audit.isolated import ForkServer; server = ForkServer(); server.start(); "
+        "print(server._process.pid, flush=True); time.sleep(60)"
+    )
+    environment = os.environ | {"PYTHONPATH": os.pathsep.join(p for p in sys.path if p), "TMPDIR": str(tmp_path)}
+    with subprocess.Popen([sys.executable, "-c", call], env=environment, stdout=subprocess.PIPE, text=True) as audit:
+        assert audit.stdout is not None
+        server = int(audit.stdout.readline())
+        until = time.monotonic() + 20
+        while not list(tmp_path.iterdir()) and time.monotonic() < until:  # its made-up mission
+            time.sleep(0.01)
+        audit.kill()
+    _wait_until_gone(server)
+    assert not list(tmp_path.iterdir())
 
 
 def test_a_real_log_is_diagnosed(forks: Isolation, mission_log: Path, tmp_path: Path) -> None:
