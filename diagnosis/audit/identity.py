@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from pathlib import PurePosixPath
+from pathlib import Path, PurePosixPath
 from typing import TYPE_CHECKING
 
 from diagnosis.audit.discover import MissionSource
@@ -19,11 +19,9 @@ def given_id(option: str | None, mission: MissionSource) -> str | None:
 def fallback_id(mission: MissionSource) -> str:
     """Name of the folder that holds the mission: the identity where nothing else states one."""
     first = mission.files[0].rstrip("/")
-    if "://" in first:
-        return PurePosixPath(first.partition("://")[2]).parent.name
-    from pathlib import Path
-
-    return Path(first).resolve().parent.name
+    url = "://" in first
+    folder = PurePosixPath(first.partition("://")[2]).parent if url else Path(first).resolve().parent
+    return folder.name.encode("utf-8", "surrogateescape").decode("utf-8", "backslashreplace")
 
 
 def stated_id(option: str | None, mission: MissionSource, machine: Machine) -> str:

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import hashlib
+import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
-
-import orjson
 
 if TYPE_CHECKING:
     from diagnosis.audit.discover import MissionSource
@@ -90,4 +89,6 @@ def config_hash(machine_document: bytes | Mapping[str, Any], options: Mapping[st
 
 
 def _sha256(value: object) -> str:
-    return hashlib.sha256(orjson.dumps(value, option=orjson.OPT_SORT_KEYS)).hexdigest()
+    return hashlib.sha256(
+        json.dumps(value, sort_keys=True).encode("ascii")
+    ).hexdigest()  # also of undecodable file names

@@ -155,7 +155,7 @@ class LocalPlace:
     def continuous(self, parts: Sequence[Entry]) -> bool:
         """Whether logs go on from one to the next, by their indexes."""
         try:
-            return continues([summarise_log(Path(part.path), SourceOptions()) for part in parts])
+            return continues(summarise_log(Path(part.path), SourceOptions()) for part in parts)
         except LogError:
             return False
 
@@ -174,8 +174,8 @@ def joined(folder: Entry, rows: Iterable[tuple[str, int, str]]) -> Entry:
     return Entry(folder.path, folder.name, folder.real, sum(r[1] for r in held), digest[:32], folder.link)
 
 
-def continues(parts: Sequence[LogSummary]) -> bool:
-    """Whether each log goes on where the one before ended, with the same topics."""
+def continues(parts: Iterable[LogSummary]) -> bool:
+    """Whether each log goes on where the one before ended, with the same topics; none is taken behind one that does not."""
     for before, after in pairwise(parts):
         pause = after.start_ns - before.stop_ns
         known, found = ({t.name for t in part.topics} for part in (before, after))

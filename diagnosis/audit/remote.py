@@ -190,7 +190,7 @@ class RemotePlace:
         if any(split_ending(part.name)[1] != ".mcap" for part in parts):
             return False
         try:
-            return continues([_outlined(self._system, self._path(part), part.size) for part in parts])
+            return continues(_outlined(self._system, self._path(part), part.size) for part in parts)
         except LogError:
             return False
 

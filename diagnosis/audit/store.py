@@ -199,7 +199,8 @@ class Store:
             Where it cannot be written; nothing of it counts then.
         """
         for attempt in (*attempts, outcome):
-            told = {name: getattr(attempt, name) for name in ("state", "reason", "wall_s", "cpu_s", "peak_mb")}
+            told = {name: getattr(attempt, name) for name in ("state", "wall_s", "cpu_s", "peak_mb")}
+            told["reason"] = attempt.reason.encode("utf-8", "backslashreplace").decode()
             self._record(
                 {
                     "mission": self._described(mission, hashes),

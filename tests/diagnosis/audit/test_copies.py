@@ -76,6 +76,18 @@ def test_missions_that_are_gone_are_marked_and_keep_their_results(tmp_path: Path
         }
 
 
+def test_names_that_are_no_text(tmp_path: Path) -> None:
+    logs, asked = tmp_path / "logs", asked_for(tmp_path / "out")
+    write(logs / "a\udcff" / "m.mcap", "fine one")
+    write(logs / "a\udcff" / "b\udcff.mcap", "broken")
+    ends, _ = run(discover([str(logs)]), asked)
+    assert {n: (e.state, e.machine_id) for n, e in ends.items()} == {
+        "a__b": ("unreadable", "a\\xff"), "a__m": ("ok", "M1"),
+    }  # fmt: skip
+    _, events = run(discover([str(logs)]), asked)
+    assert counted(events) == {"skipped": ["a__b", "a__m"]}
+
+
 def test_objects_are_audited_and_not_fetched_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     system = fsspec.filesystem("memory")
     try:

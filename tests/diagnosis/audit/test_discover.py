@@ -8,7 +8,10 @@ import pytest
 from rosbags.rosbag1 import Writer
 from rosbags.typesys import Stores, get_typestore
 
+from diagnosis.audit import listing
 from diagnosis.audit.discover import Discovery, discover
+from replay.rawlog import LogSummary
+from replay.sources import SourceOptions
 
 STORE = get_typestore(Stores.ROS1_NOETIC)
 T0 = 1_700_000_000
@@ -151,6 +154,23 @@ def test_numbered_parts_are_one_mission_where_they_go_on(tmp_path: Path) -> None
     found = shown(discover([str(tmp_path)]), tmp_path)
     assert found.pop("drive") == ["drive_0.bag", "drive_1.bag", "drive_2.bag", "drive.csv"]
     assert sorted(found) == ["gap_0", "gap_2", "kind_0", "kind_1", "run_0", "run_1", "run_2"]
+
+
+def test_numbered_missions_are_looked_at_no_further_than_to_tell(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for i in range(5):
+        bag(tmp_path / f"run_{i}.bag", 600.0 * i)
+    looked = []
+    look = listing.summarise_log
+
+    def counted(path: Path, options: SourceOptions) -> LogSummary:
+        looked.append(path.name)
+        return look(path, options)
+
+    monkeypatch.setattr(listing, "summarise_log", counted)
+    assert len(discover([str(tmp_path)]).missions) == 5
+    assert looked == ["run_0.bag", "run_1.bag"]
 
 
 def test_mission_file(tmp_path: Path) -> None:
