@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 from rich.console import RenderableType
 from rich.text import Text
 
-from cli.tables import key_values, section, table, text
+from cli.tables import bullets, key_values, section, table, text
 
 if TYPE_CHECKING:
     from diagnosis.audit.discover import Discovery
@@ -22,6 +22,7 @@ SCHEMA = "mfhca-audit/1"
 _VERDICTS = {"stop": "stop and repair", "watch": "watch", "ready": "ready", "not_assessed": "not assessed"}
 _STYLES = {"stop": "bold #e4571e", "watch": "#d99a00", "ready": "#2fa98c"}
 _READ = ("ok", "degraded")
+_WORST_FIRST = ("crashed", "out_of_memory", "timeout", "unreadable")
 _SHOWN, _MACHINES = 10, 5
 
 
@@ -42,10 +43,13 @@ def summary_parts(audited: Audited, found: Discovery, output: Path) -> list[Rend
     """What failed, the worst machines, counts, and where the page is."""
     ends = audited.ends
     parts: list[RenderableType] = []
-    failed = [end for end in ends if end.state not in _READ]
+    failed = sorted((end for end in ends if end.state not in _READ), key=lambda end: _WORST_FIRST.index(end.state))
     if failed:
-        rows = [(text(e.state.replace("_", " "), "bold red"), e.name, e.reason) for e in failed[:_SHOWN]]
-        parts += [section("Failed"), table(("", "mission", "reason"), rows)]
+        rows = [
+            Text.assemble(text(e.state.replace("_", " "), "bold red"), f"  {e.name}  ", text(e.reason, "dim"))
+            for e in failed[:_SHOWN]
+        ]
+        parts += [section("Failed"), bullets(rows)]
         if len(failed) > _SHOWN:
             parts.append(text(f"… and {len(failed) - _SHOWN} more", "dim"))
     machines: dict[str, Counter[str]] = {}

@@ -102,7 +102,7 @@ def test_the_summary_names_failures_first_and_the_page_last(
     shown, progress = capsys.readouterr()
     lines = shown.strip().splitlines()
     assert lines[0] == "Failed"
-    assert "text" in lines[2]
+    assert lines[1].startswith("• unreadable  text  ")
     assert "fleet.html" in lines[-2]
     assert "failures.txt" in lines[-1]
     assert progress == ""  # no terminal
