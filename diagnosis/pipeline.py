@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -82,14 +83,9 @@ def diagnose(
         if wheel not in machine.wheels:
             raise ConfigError(f"--wheel {wheel}: no such wheel; the machine has {', '.join(machine.wheels)}")
     mission = load_mission(paths, machine, start_s=start_s, stop_s=stop_s, progress=progress)
-    return diagnose_mission(
-        mission,
-        machine,
-        machine_source=machine_source,
-        wheels=chosen,
-        machine_id=machine_id,
-        progress=progress,
-    )
+    told = quality.recorded(mission.signals, mission.timeline)
+    mission = replace(mission, signals=mission.signals.without_samples())  # which leaves their memory to the diagnosis
+    return _diagnosed(mission, told, machine, machine_source, chosen, machine_id, progress)
 
 
 def diagnose_signals(signals: Signals, machine: Machine) -> MissionResult:
@@ -122,7 +118,19 @@ def diagnose_mission(
         Where nothing in the mission can be judged.
     """
     chosen = tuple(machine.wheels if wheels is None else wheels)
+    told = quality.recorded(mission.signals, mission.timeline)
+    return _diagnosed(mission, told, machine, machine_source, chosen, machine_id, progress)
 
+
+def _diagnosed(
+    mission: Mission,
+    told: quality.Recorded,
+    machine: Machine,
+    machine_source: str,
+    chosen: tuple[str, ...],
+    machine_id: str | None,
+    progress: Callable[[str], None],
+) -> MissionResult:
     def stage(text: str) -> None:
         release_all()
         progress(text)
@@ -132,7 +140,7 @@ def diagnose_mission(
     found = assess_components(mission.timeline, replay, machine, chosen, stage)
     _require_something(found.assessments, mission, machine)
     stage("deciding")
-    return _result(mission, machine, replay, found, machine_source, machine_id)
+    return _result(mission, told, machine, replay, found, machine_source, machine_id)
 
 
 def _require_something(assessments: Mapping[tuple[str, str], Assessment], mission: Mission, machine: Machine) -> None:
@@ -154,6 +162,7 @@ def _require_something(assessments: Mapping[tuple[str, str], Assessment], missio
 
 def _result(
     mission: Mission,
+    told: quality.Recorded,
     machine: Machine,
     replay: Replay,
     found: ComponentResult,
@@ -185,17 +194,18 @@ def _result(
         ),
         "readings": list(replay.readings),
         "verdict": decision,
-        "caveats": _more_caveats(mission, machine),
+        "caveats": _more_caveats(mission, told.first_ns, machine),
         "intervals": list(intervals),
         "states": list(spans_of(found.assessments, timeline.step_ns)),
         "phases": metrics.phases(timeline, replay, machine),
         "coverage": rows,
         "loss": loss_rows({key: a.loss for key, a in found.assessments.items()}),
         "metrics": metrics.loop_metrics(timeline, replay, machine, moving),
-        "signals": quality.signal_rows(mission.signals, timeline),
+        "signals": told.rows,
         "missing": quality.missing_rows(mission.signals, machine),
         "quality": quality.checks(
             mission.signals,
+            told,
             timeline,
             damage,
             notes,
@@ -205,6 +215,7 @@ def _result(
         ),
         "limits": machine.limits,
     }
+    release_all()
     columns: dict[str, Array] = dict(replay_columns(timeline, replay, machine))
     for (component, side), assessment in found.assessments.items():
         columns.update({f"evidence.{component}.{side}.{leaf}": x for leaf, x in assessment.columns.items()})
@@ -213,7 +224,7 @@ def _result(
     return MissionResult(to_json(_named_status(report)), columns, windows)
 
 
-def _more_caveats(mission: Mission, machine: Machine) -> list[str]:
+def _more_caveats(mission: Mission, first_ns: int, machine: Machine) -> list[str]:
     """What the reader should know beside the verdict: parts of a mission, signals that were named and not found."""
     out = []
     if mission.open_loop:
@@ -232,8 +243,7 @@ def _more_caveats(mission: Mission, machine: Machine) -> list[str]:
             + (f" ({reason})" if reason else "")
             + "."
         )
-    first = min((int(s.stamps[0]) for n, s in mission.signals.items.items() if n.startswith("wheel.")), default=0)
-    cut = (mission.timeline.start_ns - first) * 1e-9
+    cut = (mission.timeline.start_ns - first_ns) * 1e-9
     if cut > mission.timeline.dt:
         out.append(f"Only a part of the mission was judged; times count from its start, {cut:.3f} s into the log.")
     return out

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import PurePath
 from typing import Any
 
@@ -34,6 +35,31 @@ def unit_of(signal: str) -> str:
     if leaf in ("lat", "lon"):
         return "deg"
     return "m" if signal.startswith("odom.") else "of full opening"
+
+
+@dataclass(frozen=True)
+class Recorded:
+    """What a report says of signals as they were recorded; found before their samples are let go of.
+
+    Attributes
+    ----------
+    rows : Sequence[Mapping[str, Any]]
+        `signal_rows`.
+    jitter_ms : float
+        99 % quantile of the distance of wheel stamps from their period [ms].
+    first_ns : int
+        First stamp of a wheel signal; 0 where there is none.
+    """
+
+    rows: Sequence[Mapping[str, Any]]
+    jitter_ms: float
+    first_ns: int
+
+
+def recorded(signals: Signals, timeline: Timeline) -> Recorded:
+    """Look through the samples of all signals."""
+    first = min((int(s.stamps[0]) for n, s in signals.items.items() if n.startswith("wheel.")), default=0)
+    return Recorded(signal_rows(signals, timeline), _jitter_ms(signals, timeline), first)
 
 
 def signal_rows(signals: Signals, timeline: Timeline) -> list[dict[str, Any]]:
@@ -91,6 +117,7 @@ def missing_rows(signals: Signals, machine: Machine) -> list[dict[str, str]]:
 
 def checks(
     signals: Signals,
+    found: Recorded,
     timeline: Timeline,
     damage: Sequence[str],
     notes: Sequence[str],
@@ -104,7 +131,7 @@ def checks(
     def row(check: str, result: str, effect: str = "none", ok: bool = True) -> None:
         rows.append({"check": check, "result": result, "effect": effect, "ok": ok})
 
-    jitter = _jitter_ms(signals, timeline)
+    jitter = found.jitter_ms
     row(
         "Sample rate",
         f"{1e9 / timeline.step_ns:.4g} Hz, jitter {jitter:.3g} ms (99 %)",
@@ -120,10 +147,10 @@ def checks(
         )
     for text in damage:
         row("Damage", text, "what is lost is not assessed; no “ready” from a damaged log", False)
-    gaps = {n: _gaps(s, timeline.periods_ns[n]) for n, s in signals.items.items() if not n.startswith("cmd.")}
-    worst = [n for n, (count, _) in gaps.items() if count]
+    gaps = {s["name"]: s["longest_gap_s"] for s in found.rows if s["gaps"] and not s["name"].startswith("cmd.")}
+    worst = list(gaps)
     if worst:
-        longest = max(gaps[n][1] for n in worst)
+        longest = max(gaps.values())
         shown = ", ".join(worst[:4]) + (f" and {len(worst) - 4} more" if len(worst) > 4 else "")
         row(
             "Gaps",

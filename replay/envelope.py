@@ -13,10 +13,10 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from replay.spill import Column, blocks, in_blocks
+from replay.spill import Column, blocks, in_blocks, release
 
-FULL_STEPS = 1 << 21
-_BUCKETS = 1 << 19
+FULL_STEPS = 1 << 20
+_BUCKETS = 1 << 18
 
 
 def bucket_of(size: int) -> int:
@@ -57,6 +57,7 @@ def envelope(values: NDArray[Any], bucket: int) -> NDArray[Any]:
     out = Column(values.dtype, values.shape[1:], rows_of(len(values), bucket))
     for part in blocks(len(values), bucket):
         out.append(_reduced(values[part], bucket))
+        release(values)
     return out.finish()
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -75,3 +75,8 @@ class Signals:
     missing: Mapping[str, str]
     notes: tuple[str, ...] = ()
     open_loop: bool = False
+
+    def without_samples(self) -> Signals:
+        """The same signals with no sample left in them."""
+        items = {n: replace(s, stamps=np.empty(0, np.int64), values=np.empty(0)) for n, s in self.items.items()}
+        return replace(self, items=items)

@@ -92,6 +92,7 @@ def read_files(
         for blocks in blocks_of(file, topics, window):
             for part in (blocks,) if unpack is None else unpack(blocks):
                 assembler.add(part)
+        release(file.data)
     return assembler.finish(summary_of(opened, source, name, report))
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from diagnosis.quality import checks, clock_row
+from diagnosis.quality import Recorded, checks, clock_row, recorded
 from replay.signals import Signal, Signals
 from replay.source_clock import SourceClock
 from replay.sources import SignalSource
@@ -19,7 +19,11 @@ FIRST = SourceClock("logs/drive.mcap", "", "reference")
 
 def rows(*clocks: SourceClock) -> list[dict[str, object]]:
     told = tuple(c.sentence for c in clocks if c.sentence)
-    return [r for r in checks(Signals({}, {}, told), LINE, (), (), {}, None, clocks) if told and r["result"] in told]
+    return [
+        r
+        for r in checks(Signals({}, {}, told), Recorded((), 0.0, 0), LINE, (), (), {}, None, clocks)
+        if told and r["result"] in told
+    ]
 
 
 @pytest.mark.parametrize(
@@ -46,6 +50,8 @@ def test_samples_without_a_number_are_a_gap() -> None:
     values[300:500] = np.nan
     signal = Signal("wheel.FR.v", stamps, values, SignalSource(column="v"), "a.csv", False)
     line = Timeline(0, 10_000_000, 2, {"wheel.FR.v": np.zeros(2)}, {}, {}, {"wheel.FR.v": 10_000_000})
-    (row,) = [r for r in checks(Signals({"wheel.FR.v": signal}, {}), line, (), (), {}, None) if r["check"] == "Gaps"]
+    signals = Signals({"wheel.FR.v": signal}, {})
+    told = recorded(signals, line)
+    (row,) = [r for r in checks(signals, told, line, (), (), {}, None) if r["check"] == "Gaps"]
     assert row["ok"] is False
     assert "longest 2.01 s" in str(row["result"])
