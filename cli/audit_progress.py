@@ -75,6 +75,8 @@ def _lines(terminal: Terminal, counted: Counted) -> Tell:
         if event == "ingested":
             for problem in facts["problems"]:
                 terminal.note(problem)
+        if event == "waiting":
+            terminal.note(f"{facts['name']}: another audit of this output is at it")
         if event == "retry":
             terminal.note(f"{facts['name']}: {facts['reason']}; trying again")
         if event == "mission" and facts["reason"]:

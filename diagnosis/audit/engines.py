@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Callable, Iterator
 from concurrent.futures import BrokenExecutor, Executor, ThreadPoolExecutor
 from contextlib import contextmanager
@@ -80,6 +81,7 @@ def dask(address: str, wait_s: float = 20.0) -> Iterator[Engine]:
         raise ConfigError(
             "--dask needs Dask: pip install 'mfhca-replay[dask]', on every host of the cluster"
         ) from error
+    logging.getLogger("distributed").setLevel(logging.CRITICAL)  # what matters is said here
     try:
         client = distributed.Client(address, set_as_default=False, timeout=wait_s, name="mfhca-audit")
     except (OSError, ValueError, TimeoutError) as error:
@@ -89,7 +91,15 @@ def dask(address: str, wait_s: float = 20.0) -> Iterator[Engine]:
         executor = client.get_executor(pure=False, retries=0)
 
         def capacity() -> int:
-            threads: dict[str, int] = client.nthreads()
+            try:
+                if client.status != "running":
+                    raise OSError(client.status)
+                threads: dict[str, int] = client.nthreads()
+            except (OSError, ValueError, TimeoutError) as error:
+                raise ConfigError(
+                    f"--dask {address}: the scheduler was lost ({error}); what is finished stays, start it and run the same "
+                    "command again to continue"
+                ) from error
             return max(sum(threads.values()), 1)
 
         yield Engine("dask", executor, capacity, lambda: executor.shutdown(wait=False), shared=True)

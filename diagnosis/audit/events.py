@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import time
 from collections.abc import Callable
+from contextlib import suppress
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import IO, Any
@@ -51,6 +52,8 @@ class EventLog:
         try:
             self._file.write(line)
         except BrokenPipeError:
+            with suppress(OSError):
+                self._file.close()
             self._file = Path(os.devnull).open("wb", 0)  # noqa: SIM115 - for the rest of the run
         except OSError as error:
             raise OutputError(

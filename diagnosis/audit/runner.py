@@ -157,6 +157,7 @@ class Runner:
             if not is_lost(error):
                 one.claim.drop()
                 raise
+        self._engine.capacity()  # raises where not the worker alone was lost
         one.lost += 1
         if one.lost >= _LOST_TRIES:
             return self._lost(one)
