@@ -25,7 +25,7 @@ from diagnosis.audit.limits import Limits, die_with, hold
 from replay.errors import ConfigError, LogError, NotJudged, OutputError
 from replay.machine import Machine
 
-OUTCOME, REPORT, TEMPORARY, MESSAGES = "outcome.json", "report", "tmp", "messages.txt"
+OUTCOME, REPORT, MESSAGES = "outcome.json", "report", "messages.txt"
 FULL = {errno.ENOSPC, errno.EFBIG, errno.EDQUOT}
 
 

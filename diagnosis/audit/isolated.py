@@ -162,7 +162,7 @@ class ForkServer:
             assert self._connection is not None
             self._waiting[number] = waiting
             try:
-                self._connection.send_bytes(pickle.dumps(("run", number, work, limits)))
+                self._connection.send_bytes(pickle.dumps((number, work, limits)))
             except OSError:
                 self._lose(self._connection)
         try:

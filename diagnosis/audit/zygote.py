@@ -100,11 +100,7 @@ class Zygote:
         self._reap()
         self._watch()
         if self._connection in ready:
-            request = pickle.loads(self._connection.recv_bytes())
-            if request[0] == "stop":
-                self._stop(request[1])
-            else:
-                self._fork(*request[1:])
+            self._fork(*pickle.loads(self._connection.recv_bytes()))
         return True
 
     def _fork(self, number: int, work: Work, limits: Limits) -> None:
@@ -148,11 +144,6 @@ class Zygote:
             elif now - one.start > one.limits.wall_s:
                 one.stopped = "wall"
             if one.stopped:
-                _kill(pid)
-
-    def _stop(self, number: int) -> None:
-        for pid, one in self._children.items():
-            if one.number == number:
                 _kill(pid)
 
     def _end_children(self) -> None:
