@@ -18,6 +18,7 @@ from typing import IO
 from replay.errors import OutputError
 
 MISSIONS, RESULTS, WORKING = "missions", "results", ".work"
+_TEMPORARY = "mfhca-audit-"
 _AT_FDCWD, _RENAME_EXCHANGE = -100, 2
 
 
@@ -80,8 +81,9 @@ def working(output: Path) -> Iterator[Working]:
             (output / name).mkdir(parents=True, exist_ok=True)
         _sweep(base)
         folder, claim = _own_folder(base)
-        temporary = Path(tempfile.mkdtemp(prefix="mfhca-audit-"))
-        claim.path.write_text(str(temporary), encoding="utf-8")
+        temporary = Path(tempfile.gettempdir()) / f"{_TEMPORARY}{secrets.token_hex(8)}"
+        claim.path.write_text(str(temporary), encoding="utf-8")  # first, so that the next run finds it in any case
+        temporary.mkdir(0o700)
     except OSError as error:
         raise cannot_write(error, output) from error
     try:
@@ -113,7 +115,7 @@ def _sweep(base: Path) -> None:
             continue
         if claim.take():
             temporary = Path(lock.read_text(encoding="utf-8").strip() or ".")
-            if temporary.name.startswith("mfhca-audit-"):
+            if temporary.name.startswith(_TEMPORARY):
                 shutil.rmtree(temporary, ignore_errors=True)
             shutil.rmtree(lock.with_suffix(""), ignore_errors=True)
             with suppress(OSError):
@@ -200,7 +202,9 @@ def _exchange(one: Path, other: Path) -> bool:
         call = ctypes.CDLL(None, use_errno=True).renameat2
     except (AttributeError, OSError):
         return False
-    done: int = call(_AT_FDCWD, os.fsencode(one), _AT_FDCWD, os.fsencode(other), _RENAME_EXCHANGE)
+    done: int = call(_TEMPORARY = "mfhca-audit-"
+_AT_FDCWD, os.fsencode(one), _TEMPORARY = "mfhca-audit-"
+_AT_FDCWD, os.fsencode(other), _RENAME_EXCHANGE)
     return done == 0
 
 
