@@ -202,9 +202,7 @@ def _exchange(one: Path, other: Path) -> bool:
         call = ctypes.CDLL(None, use_errno=True).renameat2
     except (AttributeError, OSError):
         return False
-    done: int = call(_TEMPORARY = "mfhca-audit-"
-_AT_FDCWD, os.fsencode(one), _TEMPORARY = "mfhca-audit-"
-_AT_FDCWD, os.fsencode(other), _RENAME_EXCHANGE)
+    done: int = call(_AT_FDCWD, os.fsencode(one), _AT_FDCWD, os.fsencode(other), _RENAME_EXCHANGE)
     return done == 0
 
 
