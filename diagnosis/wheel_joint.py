@@ -288,14 +288,15 @@ def along_runs(  # type: ignore[no-untyped-def]
     for m in range(1, m_on):
         enter(m, HEALTHY, k, z, P)
     free_z, free_P = z[:1].copy(), P[:1].copy()
-    fresh_z, fresh_P, hold_z, hold_P = z.copy(), P.copy(), z.copy(), P.copy()
+    fresh_z, fresh_P, hold_z, hold_P = z.copy(), P.copy(), z[0].copy(), P[0].copy()
     for r in range(model.size):
         if r > 0:
             fresh_z[:], fresh_P[:] = z, P
+            hold_z[:], hold_P[:] = z[old], P[old]
             for m in range(m_on):
                 enter(m, old, k, fresh_z, fresh_P)
                 z[m], P[m] = fresh_z[m], fresh_P[m]
-                fresh_z[old], fresh_P[old] = hold_z[old], hold_P[old]
+                fresh_z[old], fresh_P[old] = hold_z, hold_P
         last = entry[r + 1] if r + 1 < model.size else y.size
         for n in range(entry[r] if r > 0 else 0, last):
             q = inputs[n]
@@ -309,7 +310,6 @@ def along_runs(  # type: ignore[no-untyped-def]
                 for m in range(m_on):
                     evidence[r, m] += gain[m]
                 mean[r], cov[r] = z, P
-            hold_z[:], hold_P[:] = z, P
             if model[r] == HEALTHY and n < stop[r]:  # a fault leaves the expectation alone
                 free_z[0], free_P[0] = z[HEALTHY], P[HEALTHY]
         old = model[r]
