@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
-from scipy.optimize import minimize
 
+from diagnosis.simplex import minimize
 from diagnosis.steering_blocks import WHITE_DOF, SensorNoise, SteeringBlocks, window_means
 
 Array = NDArray[np.float64]
@@ -149,19 +149,18 @@ def _fit(
     best = min(grid)[1:]
     for tolerance in (0.05, 0.02, 0.006):
         # gain and lag trade off against each other: a simplex in their logarithms follows the valley
+
+        def misfit(x: Array, tolerance: float = tolerance) -> float:
+            return _loss(short, np.exp(x[0]), np.exp(x[1]), np.exp(x[2]), scale, tolerance)
+
         found = minimize(
-            lambda x, tolerance=tolerance: _loss(short, np.exp(x[0]), np.exp(x[1]), np.exp(x[2]), scale, tolerance),
-            np.log(best),
-            method="Nelder-Mead",
-            options={
-                "initial_simplex": np.log(best)
-                + np.array([[0, 0, 0], [1, 0, 0.0], [0, 1, 0], [0, 0, 5]]) * 3 * tolerance,
-                "maxfev": 45,
-                "xatol": 1e-3,
-                "fatol": 1e-4,
-            },
+            misfit,
+            np.log(best) + np.array([[0, 0, 0], [1, 0, 0.0], [0, 1, 0], [0, 0, 5]]) * 3 * tolerance,
+            calls=45,
+            x_tol=1e-3,
+            f_tol=1e-4,
         )
-        best = tuple(np.exp(found.x))
+        best = tuple(np.exp(found))
     gain, limit, lag = best
     off = []
     for w in parts:

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import fft
 
 from replay.clock_series import Series, Shared
 
@@ -150,6 +149,8 @@ def _events(part: Sequence[Array], width: float) -> float:
 
 def _correlate(whole: Sequence[Array], part: Sequence[Array], width: float) -> tuple[float, float, str]:
     """Shift of the part in the whole [s], correlation there, and why it is not sure."""
+    from scipy import fft
+
     n, m = len(whole[0]), len(part[0])
     size = fft.next_fast_len(n + m, real=True)
 

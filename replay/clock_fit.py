@@ -11,7 +11,6 @@ from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import chdtri, stdtrit
 
 from replay.clock_copies import NEWEST, PAIRED, copied
 from replay.clock_series import Shared
@@ -121,6 +120,8 @@ def _robust_line(
     used = [i for i in range(len(shared)) if (weight[readings.signal == i] > 0).any()]
     counted = int((weight > 0.1 * weight0).sum())
     freedom = max(1, counted - 2)
+    from scipy.special import stdtrit
+
     covariance = (
         covariance * (stdtrit(freedom, 0.975) / 1.96) ** 2 * max(1.0, counted / freedom)
     )  # few readings tell less
@@ -149,6 +150,8 @@ def _uneven(u: Array, residual: Array, weight0: Array, weight: Array, scale: flo
             errors.append(scale / float(np.sqrt(weight[mine].sum())))
     if not offs:
         return "", 0.0
+    from scipy.special import chdtri
+
     z = np.divide(offs, errors)
     if float(np.square(z).sum()) < chdtri(max(1, len(z) - 2), _UNLIKELY):
         return "", 0.0
