@@ -163,15 +163,12 @@ def _kill(group: int) -> None:
 
 def warm() -> None:
     """Import what a mission needs, and diagnose a short made-up one, so that compiled scans and the page are loaded."""
-    from replay.export.mission import write_mission
     from replay.machine import haulotte
-    from replay.simulation.options import SimulationOptions
-    from replay.simulation.run import simulate_mission
+    from replay.made_up import write_made_up_log
 
-    options = SimulationOptions(scenario="healthy", duration_s=12.0, rate_hz=100.0)
     with tempfile.TemporaryDirectory(prefix="mfhca-") as folder:
         log = Path(folder) / "warm.mcap"
-        write_mission(simulate_mission(options), log, "mcap")
+        write_made_up_log(log)
         child.judge(Work((str(log),), haulotte(), "", "", "", folder, folder))
 
 
