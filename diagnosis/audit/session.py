@@ -17,6 +17,7 @@ from diagnosis.audit.events import Tell
 from diagnosis.audit.ingest import ingest
 from diagnosis.audit.places import working
 from diagnosis.audit.plan import Asked, Planned, is_done, plan, stored_result
+from diagnosis.audit.previous_pages import compare_newest
 from diagnosis.audit.runner import Runner, skip
 from diagnosis.audit.store import FILE_NAME, Store
 from replay.errors import OutputError
@@ -110,6 +111,7 @@ def audit(
                 runner = Runner(asked, store, made, place, page.telling)
                 for part in without_copies(rest, store):
                     runner.run(part)
+                compare_newest(store, [one.mission.name for one in rest], asked.max_size_mb, tell)
         ends = endings(store, [one.mission.name for one in planned])
         failed = write_failures(asked.output, planned, ends, asked.machine)
         gone = store.database.rows("SELECT count(*) FROM mission WHERE gone = ?", (store.run,))[0][0]

@@ -1,0 +1,59 @@
+"""The newest report of each machine says what changed since the machine's mission before it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from diagnosis.audit.events import Tell
+from diagnosis.audit.fleet_previous import previous_report
+from diagnosis.audit.fleet_read import CALENDAR_NS
+from diagnosis.audit.store import Store
+from replay.errors import MfhcaError, OutputError
+
+_NEWEST = (
+    "SELECT id, report FROM result WHERE machine_id = ? AND verdict IS NOT NULL AND report IS NOT NULL "
+    "AND start_ns >= ? ORDER BY start_ns DESC, id DESC LIMIT 1"
+)
+_MACHINES = "SELECT DISTINCT r.machine_id FROM mission m JOIN result r ON r.id = m.result WHERE m.name = ? AND r.machine_id <> ''"
+
+
+def compare_newest(store: Store, names: Sequence[str], max_size_mb: float, tell: Tell) -> None:
+    """Write the comparison into the newest report of every machine that has one of the named missions.
+
+    Parameters
+    ----------
+    store : Store
+        Where the missions are.
+    names : Sequence[str]
+        Missions that this run has audited.
+    max_size_mb : float
+        Size that a page should keep to [MB].
+    tell : Tell
+        Told where a report cannot be compared; that costs nothing else.
+
+    Raises
+    ------
+    OutputError
+        Where the output cannot be written.
+    """
+    for machine in sorted({row[0] for name in names for row in store.database.rows(_MACHINES, (name,))}):
+        for result, report in store.database.rows(_NEWEST, (machine, CALENDAR_NS)):
+            try:
+                _compare(store, int(result), Path(store.folder) / report, max_size_mb)
+            except OutputError:
+                raise
+            except (MfhcaError, KeyError, TypeError, ValueError) as error:
+                tell("not_compared", {"report": report, "reason": str(error)})
+
+
+def _compare(store: Store, result: int, folder: Path, max_size_mb: float) -> None:
+    from diagnosis.output import load_report, rebuild
+
+    found = previous_report(store, result)
+    if found is None:
+        return
+    previous, document = found
+    told = (load_report(folder / "report.json").get("previous") or {}).get("mission") or {}
+    if told.get("start_ns") != previous.start_ns:
+        rebuild(folder, max_size_mb=max_size_mb, previous=(Path(previous.report), document))

@@ -1,0 +1,73 @@
+"""The newest report of a machine is held against the machine's mission before it, once."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from diagnosis.audit.previous_pages import compare_newest
+from diagnosis.audit.store import Store
+from diagnosis.output import write_result
+from diagnosis.result import MissionResult
+from tests import fleet_samples as samples
+from tests import report_samples
+from tests.fleet_samples import Sample
+
+
+def written(folder: Path, sample: Sample, made: tuple[dict[str, Any], Any], start_ns: int) -> None:
+    """Report of a mission of the store."""
+    report, columns = made
+    report["log"]["start_ns"], report["machine"]["id"] = start_ns, sample.machine
+    write_result(MissionResult(report, columns), folder / "missions" / sample.name)
+
+
+@pytest.fixture
+def store(tmp_path: Path) -> Path:
+    missions = [Sample("new", day=1.0), Sample("old", day=0.0), Sample("other", "HX-2", day=2.0)]
+    path = samples.write_store(tmp_path / "fleet.sqlite", missions)
+    with Store.open(path, read_only=True) as opened:
+        starts = dict(
+            opened.database.rows("SELECT m.name, r.start_ns FROM mission m JOIN result r ON r.id = m.result", ())
+        )
+    written(tmp_path, missions[0], report_samples.five_faults(), starts["new"])
+    written(tmp_path, missions[1], report_samples.no_faults(), starts["old"])
+    written(tmp_path, missions[2], report_samples.no_faults(), starts["other"])
+    return path
+
+
+def compare(path: Path, *names: str) -> list[tuple[str, dict[str, Any]]]:
+    told: list[tuple[str, dict[str, Any]]] = []
+    with Store.open(path) as opened:
+        compare_newest(opened, names, 15.0, lambda event, facts: told.append((event, facts)))
+    return told
+
+
+def document(path: Path, name: str) -> dict[str, Any]:
+    found: dict[str, Any] = json.loads((path.parent / "missions" / name / "report.json").read_text("utf-8"))
+    return found
+
+
+def test_newest_report_is_compared_and_the_others_are_left(store: Path) -> None:
+    assert compare(store, "old") == []  # one of the machine's missions is enough
+    assert document(store, "new")["previous"]["counts"]["new"] == 5
+    assert "previous" not in document(store, "old")
+    assert "previous" not in document(store, "other")
+    assert "previous mission" in (store.parent / "missions/new/report.html").read_text("utf-8")
+
+
+def test_a_report_that_says_it_already_is_left(store: Path) -> None:
+    compare(store, "new")
+    page = store.parent / "missions/new/report.html"
+    before = page.stat().st_mtime_ns
+    compare(store, "new", "old")
+    assert page.stat().st_mtime_ns == before
+
+
+def test_a_broken_report_is_told_and_costs_nothing(store: Path) -> None:
+    (store.parent / "missions/new/report.json").write_text("{", "utf-8")
+    ((event, facts),) = compare(store, "new")
+    assert event == "not_compared"
+    assert "not JSON" in facts["reason"]
