@@ -13,7 +13,7 @@ from replay.spill import blocks, release
 
 Array = NDArray[np.float64]
 
-FIT_SAMPLES = 1 << 18
+FIT_SAMPLES = 1 << 16
 _FORCING_S = 0.25
 
 

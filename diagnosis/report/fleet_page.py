@@ -25,6 +25,7 @@ from diagnosis.report.fleet_changes import VERDICTS, changes_of
 from diagnosis.report.fleet_courses import MOST, chosen, course, interest, level_words
 from diagnosis.report.fleet_matrix import matrix
 from diagnosis.report.fleet_svg import mark, sparkline, sprite
+from diagnosis.report.plain import environment
 
 _HERE = Path(__file__).parent
 _FAULTS = 400
@@ -145,16 +146,10 @@ def _css() -> str:
 
 @lru_cache
 def _environment() -> jinja2.Environment:
-    environment = jinja2.Environment(
-        loader=jinja2.FileSystemLoader(_HERE),
-        autoescape=True,
-        undefined=jinja2.StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
-    environment.filters |= {"state": names.state_label, "grouped": names.grouped}
-    environment.globals |= {"mark": mark}
-    return environment
+    found = environment()
+    found.filters |= {"state": names.state_label, "grouped": names.grouped}
+    found.globals |= {"mark": mark}
+    return found
 
 
 def _span(counts: Mapping[str, Any]) -> str:

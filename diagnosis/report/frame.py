@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from markupsafe import Markup
+from markupsafe import Markup, escape
 from numpy.typing import NDArray
 
 from diagnosis.report.names import number
@@ -52,17 +52,17 @@ class Frame:
 
     def axes(self, unit: str, scale: float = 1.0) -> Markup:
         """Grid, ticks and their words; `scale` is the factor of the times shown, `unit` their unit."""
-        parts = [Markup('<path class="grid" d="')]
+        parts = ['<path class="grid" d="']
         xs, ys = ticks(self.x[0] * scale, self.x[1] * scale, 5), ticks(*self.y, 4)
         down, across = [float(self.px(v / scale)) for v in xs], [float(self.py(v)) for v in ys]
-        parts += [Markup("M{:.1f} {:.1f}V{:.1f}").format(p, self.top, self.bottom) for p in down]
-        parts += [Markup("M{:.1f} {:.1f}H{:.1f}").format(self.left, p, self.right) for p in across]
-        parts.append(Markup('"/>'))
+        parts += [f"M{p:.1f} {self.top:.1f}V{self.bottom:.1f}" for p in down]
+        parts += [f"M{self.left:.1f} {p:.1f}H{self.right:.1f}" for p in across]
+        parts.append('"/>')
         for k, (p, v) in enumerate(zip(down, xs, strict=True)):
             words = number(v, 6) + (f" {unit}" if k == len(xs) - 1 else "")
             parts.append(label(p, self.bottom + 14, words, "mid"))
         parts += [label(self.left - 5, p + 3.5, number(v, 6), "fin") for p, v in zip(across, ys, strict=True)]
-        return Markup("").join(parts)
+        return Markup("".join(parts))
 
     def line(self, x: float, style: str) -> Markup:
         """Upright line at a time."""
@@ -101,4 +101,4 @@ def limits(*series: NDArray[np.float64], least: float = 0.0) -> tuple[float, flo
 
 def label(x: float, y: float, words: str, style: str) -> Markup:
     """Text of a picture; `words` may come from a log."""
-    return Markup('<text x="{:.1f}" y="{:.1f}" class="{}">{}</text>').format(x, y, style, words)
+    return Markup(f'<text x="{x:.1f}" y="{y:.1f}" class="{style}">{escape(words)}</text>')

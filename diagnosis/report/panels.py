@@ -59,7 +59,8 @@ def _marks(t: Array, y: Array, frame: Frame, style: str, shape: str, down: float
     if not use.any():
         return Markup("")
     places = zip(frame.px(t[use]), frame.py(y[use]) + down, strict=True)
-    return Markup('<path class="{}" d="{}"/>').format(style, "".join(f"M{a:.1f} {b:.1f}{shape}" for a, b in places))
+    d = "".join(f"M{a:.1f} {b:.1f}{shape}" for a, b in places)
+    return Markup(f'<path class="{style}" d="{d}"/>')
 
 
 def _detected(edge: Edge, fault: Mapping[str, Any], frame: Frame) -> Markup:
@@ -168,7 +169,8 @@ def _curve(t: Array, low: Array, high: Array, frame: Frame, style: str) -> Marku
             continue
         out.append(f"{pen}{x:.1f} {a:.1f}" + (f"V{b:.1f}" if abs(a - b) >= 0.1 or pen == "M" else ""))
         pen = "L"
-    return Markup('<path class="{}" d="{}"/>').format(style, "".join(out))
+    d = "".join(out)
+    return Markup(f'<path class="{style}" d="{d}"/>')
 
 
 def _band(t: Array, half: Array, frame: Frame) -> Markup:
@@ -180,7 +182,8 @@ def _band(t: Array, half: Array, frame: Frame) -> Markup:
         upper = "L".join(f"{p:.1f} {q:.1f}" for p, q in zip(x, top, strict=True))
         lower = "L".join(f"{p:.1f} {q:.1f}" for p, q in zip(x[::-1], low[::-1], strict=True))
         out.append(f"M{upper}L{lower}Z")
-    return Markup('<path class="band" d="{}"/>').format("".join(out))
+    d = "".join(out)
+    return Markup(f'<path class="band" d="{d}"/>')
 
 
 def _picture(height: float, name: str, parts: list[Markup]) -> Markup:

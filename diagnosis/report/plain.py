@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import os
 import re
+import sys
 from functools import lru_cache
 from pathlib import Path
 
@@ -29,4 +31,13 @@ def environment() -> jinja2.Environment:
         undefined=jinja2.StrictUndefined,
         trim_blocks=True,
         lstrip_blocks=True,
+        bytecode_cache=_compiled_before(),
     )
+
+
+def _compiled_before() -> jinja2.BytecodeCache | None:
+    """Compiled templates beside the compiled modules, where those may be written."""
+    folder = _HERE / "__pycache__"
+    if sys.dont_write_bytecode or not (folder.is_dir() and os.access(folder, os.W_OK)):
+        return None
+    return jinja2.FileSystemBytecodeCache(str(folder), "template-%s.pyc")
