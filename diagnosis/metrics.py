@@ -123,19 +123,19 @@ def _mean_speed(v_ref: Array, v: Array) -> Array:
 
 
 def phases(timeline: Timeline, replay: Replay, machine: Machine) -> list[dict[str, Any]]:
-    """Forward, reverse, standstill and turning, by the command; pieces below 0.5 s join the one before."""
+    """Forward, reverse, standstill and turning by the command, or unknown; pieces below 0.5 s join the one before."""
     v, omega = body_motion(timeline, replay, machine)
     limit = machine.limits.driving_speed / 2
     half = 1.0 if machine.geometry is None else max(abs(w.x) for w in machine.geometry.wheels.values())
 
     def coded(speed: Array, rate: Array) -> NDArray[np.int8]:
-        speed = without_nan(speed)
+        unknown, speed = np.isnan(speed), without_nan(speed)
         turning = np.abs(without_nan(rate)) * half > 0.15 * np.abs(speed) + 1e-9
         code = np.where(speed > limit, 1, np.where(speed < -limit, 2, 0))
-        return np.where((code > 0) & turning, 3, code).astype(np.int8)
+        return np.where(unknown, 4, np.where((code > 0) & turning, 3, code)).astype(np.int8)
 
     code = in_blocks(coded, v, omega)
-    names = ("standstill", "forward", "reverse", "turning")
+    names = ("standstill", "forward", "reverse", "turning", "unknown")
     cut = np.flatnonzero(np.r_[True, code[1:] != code[:-1]])
     out: list[dict[str, Any]] = []
     for a, b in zip(cut, np.r_[cut[1:], code.size], strict=True):

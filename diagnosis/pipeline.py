@@ -15,6 +15,7 @@ from diagnosis.assessment import Assessment
 from diagnosis.closeups import closeups_of
 from diagnosis.components import ComponentResult, assess_components
 from diagnosis.decide import Decision, decide, intervals_of, spans_of
+from diagnosis.holes import holes_of, without_holes
 from diagnosis.loss import loss_rows
 from diagnosis.result import SCHEMA, MissionResult, to_json
 from replay.columns import replay_columns
@@ -138,6 +139,9 @@ def _diagnosed(
     stage("replaying the loop")
     replay = replay_loop(mission.timeline, machine, bucket_of(mission.timeline.size))
     found = assess_components(mission.timeline, replay, machine, chosen, stage)
+    holes = holes_of(mission.timeline)
+    judged = {key: without_holes(a, holes, mission.timeline) for key, a in found.assessments.items()}
+    found = replace(found, assessments=judged)
     _require_something(found.assessments, mission, machine)
     stage("deciding")
     return _result(mission, told, machine, replay, found, machine_source, machine_id)
