@@ -11,6 +11,8 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import IO, TYPE_CHECKING, Any
 
+from cli.interrupts import check
+
 if TYPE_CHECKING:
     from rich.console import Console, RenderableType
 
@@ -89,13 +91,23 @@ class Terminal:
         if self.quiet or not sys.stderr.isatty():
             tell = self.tell if self.verbose and not self.quiet else lambda text: None
             tell(first)
-            yield tell
+            yield _checked(tell)
             return
         from cli.stages import Stages, shown_stages
 
         with shown_stages(stages or Stages([]), sys.stderr) as tell:
             tell(first)
-            yield tell
+            yield _checked(tell)
+
+
+def _checked(tell: Progress) -> Progress:
+    """The same; ends the run between two stages where that was asked for in the one before."""
+
+    def told(text: str) -> None:
+        check()
+        tell(text)
+
+    return told
 
 
 def console_of(stream: IO[str]) -> Console:

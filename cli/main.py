@@ -7,7 +7,6 @@
 from __future__ import annotations
 
 import os
-import signal
 import sys
 import traceback
 import warnings
@@ -20,6 +19,7 @@ import typer
 from cli import auditing, comparing, configure, diagnose, evaluating, fitting, injecting, look, replaying, simulate
 from cli.app import App, Quiet, Verbose, terminal_of
 from cli.console import Terminal, discard
+from cli.interrupts import asked, check, forget, listen
 from replay.errors import MfhcaError
 from replay.version import __version__
 
@@ -80,9 +80,11 @@ app.add_typer(configure.app, name="config", rich_help_panel=_MAKE)
 def run(arguments: Sequence[str] | None = None) -> int:
     """Run one command line and give its exit code; every error becomes one line on stderr."""
     terminal = Terminal()
+    forget()
     try:
         result = app(args=arguments, obj=terminal, standalone_mode=False, prog_name="mfhca")
         code = result if isinstance(result, int) else 0
+        check()
         sys.stdout.flush()
         return code if code != INTERRUPTED else _interrupted(terminal)
     except (KeyboardInterrupt, typer.Abort):
@@ -94,8 +96,10 @@ def run(arguments: Sequence[str] | None = None) -> int:
         discard(sys.stdout)
         return 0
     except OSError as error:
-        return _system_error(terminal, error)
+        return _interrupted(terminal) if asked() else _system_error(terminal, error)
     except Exception as error:
+        if asked():  # what compiled code makes of it
+            return _interrupted(terminal)
         if isinstance(error, _UsageError):
             return _usage_error(terminal, error)
         return _internal_error(terminal, error)
@@ -149,8 +153,7 @@ def main() -> None:
         stream.reconfigure(errors="replace")  # type: ignore[union-attr]
     if not sys.warnoptions:
         warnings.simplefilter("ignore")
-    # Being asked to end removes unfinished files too.
-    signal.signal(signal.SIGTERM, signal.default_int_handler)
+    listen()  # being asked to end removes unfinished files too
     sys.exit(run())
 
 

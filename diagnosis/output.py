@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +17,7 @@ from diagnosis.previous import with_previous
 from diagnosis.report.page import build_page
 from diagnosis.result import SCHEMA, Closeups, MissionResult
 from replay.errors import LogError, OutputError
-from replay.files import atomic_path, atomic_paths
+from replay.files import atomic_path, atomic_paths, made_folder
 
 HTML, JSON, PARQUET, WINDOWS = "report.html", "report.json", "report.parquet", "report.windows.parquet"
 _BLOCK = 1 << 15
@@ -45,18 +46,12 @@ def write_result(result: MissionResult, folder: Path, *, max_size_mb: float = 15
     OutputError
         Where the folder cannot be written.
     """
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise OutputError(
-            f"{folder}: cannot make the folder ({error.strerror or error}); give another with -o"
-        ) from error
     columns = {k: v if k == "t" else _shortened(k, v) for k, v in result.columns.items()}
     windows = result.windows
     if windows is not None:
         windows = Closeups(windows.step, {k: _shortened(k, v) for k, v in windows.columns.items()})
     paths = tuple(folder / name for name in (HTML, JSON, PARQUET, *([] if windows is None else [WINDOWS])))
-    with atomic_paths(*paths) as (html, document, table, *more):
+    with _made(folder), atomic_paths(*paths) as (html, document, table, *more):
         _write_table(columns, table)
         for path in more:
             _write_table({"step": windows.step, **windows.columns} if windows else {}, path)
@@ -65,6 +60,19 @@ def write_result(result: MissionResult, folder: Path, *, max_size_mb: float = 15
     if windows is None:
         (folder / WINDOWS).unlink(missing_ok=True)
     return paths
+
+
+@contextmanager
+def _made(folder: Path) -> Iterator[None]:
+    """Make the folder; where nothing can be written into it, nothing of it is left."""
+    with ExitStack() as stack:
+        try:
+            stack.enter_context(made_folder(folder))
+        except OSError as error:
+            raise OutputError(
+                f"{folder}: cannot make the folder ({error.strerror or error}); give another with -o"
+            ) from error
+        yield
 
 
 def _shortened(name: str, values: NDArray[np.float64] | NDArray[np.float32]) -> NDArray[np.float32]:

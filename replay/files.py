@@ -12,6 +12,24 @@ from replay.errors import OutputError
 
 
 @contextmanager
+def made_folder(folder: Path) -> Iterator[None]:
+    """Make a folder for the block; where the block fails, remove what was made of its path and is empty."""
+    made = []
+    for path in (folder, *folder.parents):
+        if path.exists():
+            break
+        made.append(path)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        yield
+    except BaseException:
+        with suppress(OSError):  # the first that is not empty, or was not made
+            for path in made:
+                path.rmdir()
+        raise
+
+
+@contextmanager
 def atomic_path(path: Path, *, folder: bool = False) -> Iterator[Path]:
     """Give a temporary name beside `path`; rename it to `path` when the block ends well, else remove it.
 
@@ -34,21 +52,22 @@ def atomic_path(path: Path, *, folder: bool = False) -> Iterator[Path]:
     temporary = path.with_name(f".{path.name}.{os.getpid()}.part")
     _refuse_other_content(path, folder)
     try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        _remove(temporary)
-        if folder:
-            temporary.mkdir()
-        yield temporary
-        if folder:
-            _remove(path)
-        else:
-            _flush(temporary)
-        temporary.replace(path)
+        with made_folder(path.parent):
+            try:
+                _remove(temporary)
+                if folder:
+                    temporary.mkdir()
+                yield temporary
+                if folder:
+                    _remove(path)
+                else:
+                    _flush(temporary)
+                temporary.replace(path)
+            finally:
+                with suppress(OSError):  # a read-only place refuses this too
+                    _remove(temporary)
     except OSError as error:
         raise OutputError(f"{path}: cannot be written ({error.strerror or error}); give another place") from error
-    finally:
-        with suppress(OSError):  # a read-only place refuses this too
-            _remove(temporary)
 
 
 @contextmanager

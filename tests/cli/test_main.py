@@ -6,6 +6,7 @@ import os
 import signal
 import subprocess
 import sys
+from contextlib import suppress
 from functools import partial
 from pathlib import Path
 
@@ -13,7 +14,7 @@ import pytest
 import typer
 from typer.testing import CliRunner
 
-from cli import main
+from cli import interrupts, main
 from cli.main import app, run
 from replay.errors import ConfigError, LogError, NotJudged, OutputError
 
@@ -189,6 +190,54 @@ def test_an_interrupt_ends_with_130_and_leaves_nothing_behind(asked: signal.Sign
     assert process.returncode == 130
     assert only_line(rest) == "error: interrupted"
     assert list(tmp_path.iterdir()) == []
+
+
+_SWALLOWS = """
+import os, signal, sys, ctypes
+from pathlib import Path
+import cli.diagnose
+from diagnosis import pipeline
+from cli.main import main
+
+def diagnose(paths, machine, *, progress, **_):
+    called = ctypes.CFUNCTYPE(None)(lambda: os.kill(os.getpid(), signal.{asked}))
+    called()
+    {after}
+
+pipeline.diagnose = diagnose
+signal.signal(signal.SIGINT, signal.default_int_handler)
+sys.argv = ["mfhca", "diagnose", sys.argv[1], "-o", sys.argv[2]]
+main()
+"""
+
+
+@pytest.mark.skipif(os.name == "nt", reason="POSIX signals")
+@pytest.mark.parametrize("asked", ["SIGINT", "SIGTERM"])
+@pytest.mark.parametrize("after", ["progress('next'); print('goes on')", "raise RuntimeError('torn')"])
+def test_an_interrupt_that_compiled_code_swallows_ends_the_run_too(asked: str, after: str, tmp_path: Path) -> None:
+    log = tmp_path / "a.mcap"
+    log.touch()
+    code = _SWALLOWS.format(asked=asked, after=after)
+    done = subprocess.run(
+        [sys.executable, "-c", code, log, tmp_path / "out"], cwd=ROOT, capture_output=True, text=True, check=False
+    )
+    assert (done.returncode, done.stdout, done.stderr) == (130, "", "error: interrupted\n")
+    assert list(tmp_path.iterdir()) == [log]
+
+
+def test_an_interrupt_swallowed_in_the_last_stage_is_told_at_the_end(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def swallowed(*_: object) -> None:
+        with suppress(KeyboardInterrupt):
+            interrupts._interrupt(signal.SIGINT, None)
+        raise typer.Exit(1)
+
+    monkeypatch.setattr("cli.configure.machine_of", swallowed)
+    assert run(["config", "show"]) == 130
+    assert only_line(capsys.readouterr().err) == "error: interrupted"
+    monkeypatch.undo()
+    assert run(["config", "show"]) == 0
 
 
 def test_no_colours_without_a_terminal_or_with_no_color() -> None:

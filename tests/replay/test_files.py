@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from replay.errors import OutputError
-from replay.files import atomic_path, atomic_paths
+from replay.files import atomic_path, atomic_paths, made_folder
 
 
 def fill(names: list[Path]) -> None:
@@ -38,3 +38,17 @@ def test_a_read_only_place_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPa
     words = r"out\.mcap: cannot be written \(Read-only file system\); give another place"
     with pytest.raises(OutputError, match=words), atomic_path(tmp_path / "out.mcap"):
         pass
+
+
+def test_folders_made_for_nothing_are_removed_and_others_stay(tmp_path: Path) -> None:
+    (tmp_path / "old").mkdir()
+    with pytest.raises(OutputError, match="No space left"):
+        fill([tmp_path / "old" / "new" / "deep" / "a"])
+    with pytest.raises(OutputError, match="No space left"):
+        fill([tmp_path / "old" / "a"])
+    assert [p.name for p in tmp_path.rglob("*")] == ["old"]
+    (tmp_path / "kept").mkdir()
+    (tmp_path / "kept" / "file").touch()
+    with pytest.raises(OutputError, match="No space left"), made_folder(tmp_path / "kept" / "empty"):
+        fill([tmp_path / "kept" / "empty" / "a"])
+    assert sorted(p.name for p in tmp_path.rglob("*")) == ["file", "kept", "old"]
