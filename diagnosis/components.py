@@ -12,6 +12,7 @@ from diagnosis.assessment import Assessment, unassessed
 from diagnosis.channels import alive, alive_sources, make_pair
 from diagnosis.direct import assess_pair
 from diagnosis.drive import DriveData, assess_drive
+from diagnosis.frozen import frozen_sensor, frozen_speeds
 from diagnosis.model_based import assess_wheels
 from diagnosis.pairs import Pair
 from diagnosis.steering import assess_steering
@@ -56,6 +57,11 @@ def assess_components(
     counts = alive_sources(timeline)
     steering = assess_steering(timeline, replay, machine, counts, progress)
     channels = wheel_channels(timeline, machine)
+    frozen = frozen_speeds(channels.v, replay.v_ref, machine.limits.driving_speed, timeline.dt)
+    frozen = {i: value for i, value in frozen.items() if not channels.has_true[i]}
+    measured = channels.v
+    if frozen:
+        channels = channels.without_speed(list(frozen))
     fit: WheelModelFit | None = None
     models: dict[int, tuple[Assessment, Assessment]] = {}
     if len(machine.wheels) > 1 and not (channels.has_true & channels.has_applied).all():
@@ -72,6 +78,11 @@ def assess_components(
             continue
         progress(f"judging wheel {wheel}")
         one = _Wheel(timeline, replay, machine, i, counts)
+        if i in frozen:
+            alive_ones = np.delete(measured, list(frozen), axis=1)
+            out[wheel, "sensor"] = frozen_sensor(measured[:, i], frozen[i], alive_ones, one.name("v"), timeline.dt)
+            out[wheel, "actuator"] = one.behind_dead_sensor(bool(channels.has_applied[i]))
+            continue
         model = models.get(i)
         has_true, has_applied = bool(channels.has_true[i]), bool(channels.has_applied[i])
         if model is None and not has_true and np.isfinite(channels.v[:, i]).any():
@@ -154,6 +165,12 @@ class _Wheel:
             return unassessed(size, State.NOT_ASSESSED, "the valve's command is logged, but no speed that answers it")
         return unassessed(size, State.NO_DATA, "the wheel's valve command is not in the log")
 
+    def behind_dead_sensor(self, direct: bool) -> Assessment:
+        """The valve of a wheel whose speed sensor is dead all the time."""
+        if direct:
+            return self.actuator(True, None)
+        return unassessed(self.timeline.size, State.MASKED, "the speed sensor is dead for the whole mission")
+
     def alone(self) -> tuple[Assessment, Assessment] | None:
         """Judge a drive without a body: by its controller's echo and effort, or by whether it follows its command."""
         wheel, command = self.machine.wheels[self.index], self.replay.v_ref[:, self.index]
@@ -161,6 +178,11 @@ class _Wheel:
             return None
         names = (self.name("v"), self.name("v_ref"), self.name("u"))
         if np.isfinite(self.values("u")).any():
+            if self.machine.geometry is not None and wheel not in self.machine.drives:
+                # wheels of one body under one pump push each other: alone, none of them can be told from the others
+                why = "no model of the wheels could be found in this mission"
+                found = unassessed(self.timeline.size, State.NOT_ASSESSED, why)
+                return found, found
             return assess_drive(
                 DriveData(
                     y=self.values("v"),

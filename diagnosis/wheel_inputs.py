@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -37,6 +37,12 @@ class WheelChannels:
     u: Array
     true: Array
     applied: Array
+
+    def without_speed(self, wheels: Sequence[int]) -> WheelChannels:
+        """The same with the measured speeds of some wheels left out."""
+        v = np.array(self.v)
+        v[:, wheels] = np.nan
+        return replace(self, v=v)
 
     @cached_property
     def has_true(self) -> NDArray[np.bool_]:
