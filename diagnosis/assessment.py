@@ -21,7 +21,7 @@ CODE = {state: np.int8(i) for i, state in enumerate(STATES)}
 class Finding:
     """One fault of one component on samples [start, stop); see `FaultInterval` for the other fields.
 
-    `detected` is the sample at which a causal reading of the same evidence, without anything later, would have raised
+    `epsilon` keeps within [0, 1] unless the fault lies outside the table. `detected` is the sample at which a causal reading of the same evidence, without anything later, would have raised
     it; None where that is not known.
     """
 
@@ -36,6 +36,10 @@ class Finding:
     evidence: tuple[str, ...]
     tier: str
     detected: int | None = None
+
+    def __post_init__(self) -> None:
+        if self.epsilon is not None and self.mode is not FaultMode.OUTSIDE_TABLE:
+            object.__setattr__(self, "epsilon", self.epsilon.as_share())
 
 
 @dataclass(frozen=True)

@@ -48,6 +48,7 @@ _HOLD_S = 0.1
 _COARSE_COST = 0.2  # where a log is too slow for its commands, what is left of them looks like a fault's drift
 _LEAD_S, _TAIL_S, _CHAIN_S = 0.3, 0.1, 0.05
 _SAID_S = 0.1
+_CLEARLY = 2.0  # times as probable as the path's row, from which on another one is stated
 
 
 def assess_pair(pair: Pair, limits: Limits) -> Assessment:
@@ -182,21 +183,26 @@ def _finding(
     y, ref, st = pair.y[part], channel.x[part], channel.status[part]
     use = np.isin(st, (modes.PAIR, modes.BLIND))
     evidence = channel.part(*inner(run)).evidence(model)
-    gain = evidence[run.row] - evidence[modes.HEALTHY]
-    if gain < model.switch_cost:
+    if evidence[run.row] - evidence[modes.HEALTHY] < model.switch_cost:
         return None
     prior = np.log(np.array([0.8, 0.05, 0.05, 0.05, 0.05]))
     tempered = prior + np.clip(_TEMPER * (evidence - evidence.max()), -700, 0)
     p = np.exp(tempered - tempered.max())
     p /= p.sum()
+    zero = not use.any() or abs(float(np.mean(y[use]))) <= 3 * model.constant_noise / np.sqrt(min(use.sum(), 100))
+    still = bool(use.any()) and float(np.std(ref[use])) < 2 * model.noise
+    row = _row(run.row, p, zero=zero, still=still)
+    if row != run.row:  # the path came by this one from its neighbours or for want of time to change
+        other = _estimate(replace(run, row=row), pair, channel, model, coarse)
+        if other is not None:
+            run, estimate = replace(run, row=row), other
+    gain = evidence[run.row] - evidence[modes.HEALTHY]
     p = _with_lapses(p, run.row, None if coarse is None else run.size * pair.dt)
-    if run.row in (modes.STUCK, modes.NO_SIGNAL) and (
-        not use.any() or abs(float(np.mean(y[use]))) <= 3 * model.constant_noise / np.sqrt(min(use.sum(), 100))
-    ):  # stuck at zero, a gain of zero and no signal are one row of the table
+    if run.row in (modes.STUCK, modes.NO_SIGNAL) and zero:
+        # stuck at zero, a gain of zero and no signal are one row of the table
         run = Run(run.start, run.stop, modes.NO_SIGNAL)
         p[modes.NO_SIGNAL] += p[modes.STUCK] + p[modes.INEFFICIENT]
         p[[modes.STUCK, modes.INEFFICIENT]] = 0.0
-    still = use.any() and float(np.std(ref[use])) < 2 * model.noise
     shifted_away = still and abs(float(np.mean(ref[use]))) > 3 * model.noise and not 0.0 <= estimate[2] <= 1.0
     if run.row == modes.INEFFICIENT and shifted_away:  # a constant of its own, not a share
         run = Run(run.start, run.stop, modes.STUCK)
@@ -217,6 +223,8 @@ def _finding(
         return None  # the command hardly moved: a noisy reading of it looks constant too
     if mode is FaultMode.NOISY and deviation < max(2.5 * model.noise, limits.min_sat / 2):
         return None
+    if epsilon is not None and mode is not FaultMode.OUTSIDE_TABLE:
+        epsilon = epsilon.as_share()
     lines = sentences(run.row, mode, pair, y, ref, use, st, model, epsilon, sat, gain, deviation)
     if run.row in (modes.STUCK, modes.INEFFICIENT) and still:
         # nothing moved: a constant value and a constant share of a constant are the same
@@ -237,6 +245,25 @@ def _finding(
         evidence=lines,
         tier="direct",
     )
+
+
+def _row(row: int, p: Array, *, zero: bool, still: bool) -> int:
+    """The path's row of a run, or another fault's where that is clearly more probable.
+
+    Parameters
+    ----------
+    row : int
+        Row of the path.
+    p : Array, shape (5,)
+        Probabilities of the rows.
+    zero, still : bool
+        Whether the channel stays at zero, and whether its reference hardly moves: some rows are alike then.
+    """
+    faults = [r for r in range(p.size) if r != modes.HEALTHY]
+    best = max(faults, key=lambda r: float(p[r]))
+    constant = {modes.STUCK, modes.NO_SIGNAL, *([modes.INEFFICIENT] if row != modes.INEFFICIENT else [])}
+    alike = (zero and {row, best} <= constant) or (still and {row, best} <= {modes.STUCK, modes.INEFFICIENT})
+    return best if p[best] > _CLEARLY * p[row] and not alike else row
 
 
 def _with_lapses(p: Array, row: int, seconds: float | None) -> Array:

@@ -27,6 +27,10 @@ class Epsilon:
     low: float
     high: float
 
+    def as_share(self) -> Epsilon:
+        """The same within [0, 1], where every fault of the table has its ε."""
+        return Epsilon(*(min(1.0, max(0.0, x)) for x in (self.value, self.low, self.high)))
+
 
 @dataclass(frozen=True)
 class Sat:

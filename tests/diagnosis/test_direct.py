@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -11,8 +12,9 @@ from numpy.testing import assert_array_equal
 
 from diagnosis import modes
 from diagnosis.assessment import CODE, Assessment, Finding
-from diagnosis.direct import assess_pair
+from diagnosis.direct import _row, assess_pair
 from diagnosis.pairs import Pair, sample_status
+from diagnosis.result import Epsilon
 from replay.faults import FaultMode, Side, State, fault_affected
 from replay.machine import Limits, Noise
 
@@ -123,6 +125,31 @@ def test_every_row_of_the_tables(
     assert (state[others] == CODE[State.HEALTHY]).all()
     assert found.hypotheses[0].mode == mode.value
     assert sum(h.p for h in found.hypotheses) == pytest.approx(1.0)
+
+
+def test_a_clearly_more_probable_row_is_stated_unless_the_rows_are_alike() -> None:
+    def row(path: int, best: int, *, zero: bool = False, still: bool = False) -> int:
+        p = np.full(5, 0.04)
+        p[best] = 0.84
+        return _row(path, p, zero=zero, still=still)
+
+    assert row(modes.STUCK, modes.NOISY) == row(modes.STUCK, modes.NOISY, zero=True, still=True) == modes.NOISY
+    assert row(modes.STUCK, modes.HEALTHY) == modes.STUCK  # whether it is one at all is told beside it
+    assert row(modes.NO_SIGNAL, modes.STUCK) == modes.STUCK
+    assert row(modes.NO_SIGNAL, modes.STUCK, zero=True) == modes.NO_SIGNAL
+    assert row(modes.STUCK, modes.INEFFICIENT, zero=True) == modes.STUCK
+    assert row(modes.INEFFICIENT, modes.NO_SIGNAL, zero=True) == modes.NO_SIGNAL
+    assert row(modes.STUCK, modes.INEFFICIENT, still=True) == modes.STUCK
+    assert row(modes.INEFFICIENT, modes.STUCK, still=True) == modes.INEFFICIENT
+    near = np.array([0.0, 0.3, 0.0, 0.2, 0.5])
+    assert _row(modes.STUCK, near, zero=False, still=False) == modes.STUCK
+
+
+def test_epsilon_is_a_share_unless_outside_the_table() -> None:
+    wide = Epsilon(0.28, -0.11, 1.02)
+    fault = Finding(0, 1, Side.SENSOR, FaultMode.NOISY, 1.0, (), wide, None, (), "direct")
+    assert fault.epsilon == Epsilon(0.28, 0.0, 1.0)
+    assert replace(fault, epsilon=wide, mode=FaultMode.OUTSIDE_TABLE).epsilon == wide
 
 
 @SIDES
