@@ -41,7 +41,7 @@ def comparison_parts(found: Comparison) -> list[RenderableType]:
         key_values([("older", _mission(found.older)), ("newer", _mission(found.newer))]),
     ]
     parts += _faults(found.faults)
-    parts += [section("Assessed"), *_coverage(found.coverage)]
+    parts += [section("Assessed long enough"), *_coverage(found.coverage)]
     if found.metrics:
         parts += [section("While driving"), _metrics(found.metrics)]
     if found.notes:
@@ -131,7 +131,7 @@ def _coverage(changes: Sequence[CoverageChange]) -> list[RenderableType]:
     else:
         parts.append(text("The same parts in both missions."))
     if neither:
-        parts.append(text(f"In neither: {', '.join(neither)}.", "dim"))
+        parts.append(text(f"In neither mission: {', '.join(neither)}.", "dim"))
     return parts
 
 

@@ -8,7 +8,7 @@ from typing import Any
 
 from replay.faults import FAULT_STATES, State
 
-_LEAST_SHARE = 0.8
+_LEAST_SHARE, _HARDLY = 0.8, 0.5
 _DECIDED = frozenset({State.HEALTHY.value, *(s.value for s in FAULT_STATES)})
 
 
@@ -42,6 +42,14 @@ class SideCoverage:
         return f"judged for {self.decided_s:.1f} s of {self.driving_s:.1f} s driving" + (
             "" if self.assessed else ", which is too little"
         )
+
+    @property
+    def short_words(self) -> str:
+        """How little it was judged, to follow *was*: not, hardly (less than half of the driving) or partly."""
+        if self.tier == "none" or not self.judged_s:
+            return "not assessed"
+        much = "hardly" if self.decided_s < _HARDLY * self.driving_s else "only partly"
+        return f"{much} assessed ({self.decided_s:.1f} of {self.driving_s:.1f} s of driving)"
 
 
 @dataclass(frozen=True)

@@ -240,9 +240,14 @@ def _duration(a: FoundFault, b: FoundFault) -> int:
 
 
 def _unseen_before(b: FoundFault, sides: Sides) -> str:
-    if all(k in sides and sides[k].assessed for k in _keys(b.component, b.side)):
-        return ""
-    return "This part was not assessed in the older mission: the fault may be older."
+    keys = _keys(b.component, b.side)
+    for key in keys:
+        side = sides.get(key)
+        if side is None or not side.assessed:
+            part = "This part" if len(keys) == 1 else f"The {key[1]}"
+            words = "not assessed" if side is None else side.short_words
+            return f"{part} was {words} in the older mission: the fault may be older."
+    return ""
 
 
 def _other_faults(a: FoundFault, newer: Sequence[FoundFault]) -> str:

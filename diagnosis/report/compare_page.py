@@ -9,7 +9,7 @@ from typing import Any
 import jinja2
 
 from diagnosis.compare_faults import GONE
-from diagnosis.compare_words import CHANGES, OUTCOMES, headline, times
+from diagnosis.compare_words import CHANGES, OUTCOMES, coverage_words, headline, times
 from diagnosis.report import names
 from diagnosis.report.plain import POLICY, environment, plain_style
 from diagnosis.report.svg import icon
@@ -127,13 +127,10 @@ def _few(ids: Sequence[str]) -> list[str]:
 
 def _coverage(c: Mapping[str, Any]) -> dict[str, Any]:
     sides = [c["older"], c["newer"]]
-    words = {"lost": "no longer assessed", "gained": "assessed now"}.get(c["change"], "")
-    if not words and not any(s and s["assessed"] for s in sides):
-        words = "assessed in neither"
     return {
         "part": _part(c),
         "change": c["change"],
-        "words": words,
+        "words": coverage_words(c),
         "older": _judged(sides[0]),
         "newer": _judged(sides[1]),
     }

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from diagnosis.compare_faults import GONE
-from diagnosis.compare_words import CHANGES, OUTCOMES, times
+from diagnosis.compare_words import CHANGES, OUTCOMES, coverage_words, times
 from diagnosis.report import names
 
 SIGNS = {
@@ -100,7 +100,7 @@ def _coverage(c: Mapping[str, Any]) -> dict[str, Any]:
     return {
         "part": f"{c['component']} {names.part(c['kind'], c['side'])}",
         "lost": c["change"] == "lost",
-        "words": {"lost": "no longer assessed", "gained": "assessed now"}.get(c["change"], ""),
+        "words": coverage_words(c),
         "cells": [_judged(c.get("older")), _judged(c.get("newer"))],
     }
 

@@ -9,6 +9,7 @@ import pytest
 
 from diagnosis.compare import Comparison, compare_reports, comparison_json
 from diagnosis.compare_faults import FaultChange
+from diagnosis.compare_words import coverage_words
 from replay.errors import ConfigError, LogError
 
 WHEELS = ("FR", "FL")
@@ -106,6 +107,44 @@ def test_a_new_fault_of_a_part_that_was_not_assessed_before_says_so() -> None:
     assert only(found).status == "new"
     assert "the fault may be older" in only(found).note
     assert [c.change for c in found.coverage if c.component == "FL" and c.side == "actuator"] == ["gained"]
+
+
+@pytest.mark.parametrize(
+    ("row", "words"),
+    [
+        (NOTHING, "This part was not assessed in the older"),
+        ({"decided_driving_s": 44.0}, "This part was hardly assessed (44.0 of 100.0 s of driving) in the older"),
+        ({"decided_driving_s": 79.0}, "This part was only partly assessed (79.0 of 100.0 s of driving) in the older"),
+    ],
+)
+def test_how_far_the_part_of_a_new_fault_was_assessed_before(row: dict[str, Any], words: str) -> None:
+    older = report(fault("FL", "actuator", "stuck"), FL_actuator=row)
+    found = compared(older, later(fault("FL", "actuator", "stuck"), fault("FL", "actuator", "noisy")))
+    new = next(c for c in found.faults if c.status == "new")
+    assert new.note == f"{words} mission: the fault may be older."
+
+
+def test_the_side_of_a_new_fault_of_either_side_that_was_not_assessed_before_is_named() -> None:
+    found = compared(report(FL_actuator=NOTHING), later(fault("FL", "sensor_or_actuator", "inefficient")))
+    assert only(found).note == "The actuator was not assessed in the older mission: the fault may be older."
+
+
+@pytest.mark.parametrize(
+    ("older", "newer", "words"),
+    [
+        ({}, {}, ""),
+        ({}, NOTHING, "no longer assessed"),
+        ({}, {"decided_driving_s": 9.0}, "no longer long enough"),
+        (NOTHING, {}, "assessed now"),
+        ({"decided_driving_s": 9.0}, {}, "long enough now"),
+        (NOTHING, NOTHING, "assessed in neither"),
+        ({"decided_driving_s": 9.0}, NOTHING, "long enough in neither"),
+    ],
+)
+def test_words_of_what_was_assessed(older: dict[str, Any], newer: dict[str, Any], words: str) -> None:
+    rows = comparison_json(compared(report(FL_actuator=older), later(FL_actuator=newer)))["coverage"]
+    (row,) = [r for r in rows if (r["component"], r["side"]) == ("FL", "actuator")]
+    assert coverage_words(row) == words
 
 
 def test_gone_and_assessed_is_resolved() -> None:
