@@ -5,30 +5,40 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from rich.console import RenderableType
+from rich.console import Console, ConsoleOptions, RenderableType, RenderResult
+from rich.measure import Measurement
 from rich.table import Table
 from rich.text import Text
 
-from cli.tables import MODE_SIGNS, MODE_STYLES, SEVERITY_STYLES, ByWidth, bullets, section, table, text
+from cli.tables import MODE_SIGNS, MODE_STYLES, SEVERITY_STYLES, bullets, section, table, text
 from diagnosis.compare_words import OUTCOMES, headline
+from diagnosis.report.names import state_label
+from diagnosis.report.sureness import headline as verdict_words
 from diagnosis.report.sureness import sure_of
+from diagnosis.report.tables import merged_caveats
 from diagnosis.wording import mode_words, part_words
 
-_STATUS = {
-    "ready": ("READY", "bold white on #1d7a63"),
-    "watch": ("WATCH", "bold black on #f2b11b"),
-    "stop": ("STOP AND REPAIR", "bold white on #b63a00"),
-    "not_assessed": ("NOT ASSESSED", "bold reverse"),
+_STYLES = {
+    "ready": "bold white on #1d7a63",
+    "watch": "bold black on #f2b11b",
+    "stop": "bold white on #b63a00",
+    "not_assessed": "bold reverse",
 }
-_SHOWN = 40
+_SHOWN, _ENDLESS = 40, 10_000
+_WORDS, _SATURATION = (1, 2), 5  # columns of words, which may wrap between them, and the one that is needed least
 
 
 def verdict_parts(report: Mapping[str, Any]) -> list[RenderableType]:
     """Verdict, what to do, faults and caveats of a report document."""
     verdict = report["verdict"]
-    label, style = _STATUS.get(verdict["status"], (str(verdict["status"]), "bold"))
+    label, answer = verdict_words(report)
     title = str(verdict.get("title", ""))
-    parts: list[RenderableType] = [Text.assemble((f" {label} ", style), "  ", text(title, "bold"))]
+    first = Text.assemble((f" {label.upper()} ", _STYLES.get(verdict["status"], "bold")))
+    if answer:
+        first.append_text(text(f"– {answer}", "bold"))
+    parts: list[RenderableType] = [first]
+    if title.casefold() != label.casefold():
+        parts.append(text(title, "bold"))
     if verdict.get("text") and verdict["text"] != title:
         parts.append(text(verdict["text"]))
     if verdict.get("actions"):
@@ -41,7 +51,7 @@ def verdict_parts(report: Mapping[str, Any]) -> list[RenderableType]:
     if report.get("previous"):
         parts += [section("Against another mission of the machine"), *_previous(report["previous"])]
     if verdict.get("caveats"):
-        parts += [section("To bear in mind"), bullets(verdict["caveats"])]
+        parts += [section("To bear in mind"), bullets(merged_caveats(verdict["caveats"]))]
     return [*parts, ""]
 
 
@@ -76,17 +86,34 @@ def _actions(actions: list[Mapping[str, Any]], report: Mapping[str, Any]) -> Tab
     return out
 
 
-def _faults(intervals: list[Mapping[str, Any]]) -> ByWidth:
-    """Table of faults; on a narrow terminal without the bounds of ε."""
-    wide, narrow = (
-        table(
-            ("", "part", "fault", "time [s]", "ε", "saturation", "p", "severity"),
-            [_fault(i, bounds) for i in intervals[:_SHOWN]],
-            right=(3, 6),
+class _Fitting:
+    """The first of some tables that fits on the terminal, else the last."""
+
+    def __init__(self, tables: list[Table]) -> None:
+        self._tables = tables
+
+    def __rich_console__(self, console: Console, options: ConsoleOptions) -> RenderResult:
+        wide = options.update(width=_ENDLESS)
+        fitting = (t for t in self._tables if Measurement.get(console, wide, t).maximum <= options.max_width)
+        yield next(fitting, self._tables[-1])
+
+
+def _faults(intervals: list[Mapping[str, Any]]) -> _Fitting:
+    """Table of faults; on a narrow terminal without the saturation, on a narrower one without the bounds of ε."""
+    heads = ("", "part", "fault", "time [s]", "ε", "saturation", "p", "severity")
+    forms = []
+    for left_out, bounds in (((), True), ((_SATURATION,), True), ((_SATURATION,), False)):
+        keep = [k for k in range(len(heads)) if k not in left_out]
+        rows = [_fault(i, bounds) for i in intervals[:_SHOWN]]
+        form = table(
+            [heads[k] for k in keep],
+            [[row[k] for k in keep] for row in rows],
+            right=[keep.index(k) for k in (3, 6)],
         )
-        for bounds in (True, False)
-    )
-    return ByWidth(wide, narrow, 100)
+        for k, column in zip(keep, form.columns, strict=True):
+            column.no_wrap = k not in _WORDS
+        forms.append(form)
+    return _Fitting(forms)
 
 
 def _fault(fault: Mapping[str, Any], bounds: bool) -> tuple[object, ...]:
@@ -95,7 +122,7 @@ def _fault(fault: Mapping[str, Any], bounds: bool) -> tuple[object, ...]:
     return (
         text(fault["id"], "dim"),
         f"{fault['component']} {str(fault['side']).replace('_', ' ')}",
-        text(f"{MODE_SIGNS.get(mode, '·')} {mode.replace('_', ' ')}", MODE_STYLES.get(mode, "")),
+        text(f"{MODE_SIGNS.get(mode, '·')} {state_label(mode, str(fault['side'])).lower()}", MODE_STYLES.get(mode, "")),
         f"{fault['start_s']:.{digits}f}–{fault['stop_s']:.{digits}f}",
         _epsilon(fault.get("epsilon"), bounds),
         _sat(fault.get("sat")),

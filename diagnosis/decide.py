@@ -12,10 +12,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from diagnosis.assessment import STATES, Assessment, Finding
+from diagnosis.caveats import LEAST_SHARE, caveats_of, doubt_of
 from diagnosis.result import FaultInterval, Severity, StateSpan, Verdict
 from diagnosis.wheel_model import WheelModelFit
 from diagnosis.wording import GONE, actions_of, count_words, join_words, part_words, seconds_words, sentence_of
-from replay.faults import FAULT_STATES, FaultMode, Side, State
+from replay.faults import FaultMode, Side
 from replay.machine import Limits
 
 Key = tuple[str, str]
@@ -23,8 +24,6 @@ Key = tuple[str, str]
 _RANK: dict[Severity, int] = {"high": 0, "medium": 1, "low": 2, "info": 3}
 _LIKELY = 0.6  # probability of any fault from which on one is worth a check
 _MARKED_EPSILON = 0.3
-_OPEN_S, _OPEN_SHARE = 1.0, 0.02  # driving that was not judged and is worth a word
-_LEAST_SHARE = 0.8
 _MODEL_RESOLUTION = 0.25
 _COMPARED_WHEELS = 3
 _UNEXPLAINED_S = 0.5
@@ -65,17 +64,18 @@ def severity_of(finding: Finding, seconds: float, limits: Limits, kind: str = "w
     if finding.side is Side.SENSOR:
         scaling = "wire, mount and scaling" if kind == "steer" else "gap, magnet and scaling"
         what = scaling if finding.mode is FaultMode.INEFFICIENT else "shield, ground and supply"
-        return severity, f"May go out; check the sensor's {what}."
+        return severity, f"By itself no reason to stop; check the sensor's {what}."
     if finding.side is Side.ACTUATOR:
         what = (
             "pressure, leakage and spool travel"
             if finding.mode is FaultMode.INEFFICIENT
             else "command wiring and pilot"
         )
-        return severity, f"May go out; check the valve's {what}."
+        return severity, f"By itself no reason to stop; check the valve's {what}."
     return (
         severity,
-        f"May go out; measure {'angle' if kind == 'steer' else 'speed'} and valve travel to tell sensor from valve.",
+        "By itself no reason to stop; measure "
+        f"{'angle' if kind == 'steer' else 'speed'} and valve travel to tell sensor from valve.",
     )
 
 
@@ -136,13 +136,23 @@ def spans_of(assessments: Mapping[Key, Assessment], step_ns: int) -> tuple[State
 
 @dataclass(frozen=True)
 class Decision:
-    """The verdict and what to do."""
+    """The verdict and what to do.
+
+    Attributes
+    ----------
+    cleared : bool
+        Whether the machine may go out: ``ready``, or faults to watch in a mission that is ``ready`` but for them.
+    not_cleared : str
+        Why ``watch`` gives no such leave, to follow *not cleared:*; empty otherwise.
+    """
 
     status: Verdict
     title: str
     text: str
     caveats: tuple[str, ...]
     actions: tuple[dict[str, object], ...]
+    cleared: bool = False
+    not_cleared: str = ""
 
 
 def decide(
@@ -161,7 +171,8 @@ def decide(
     ``stop`` with a fault of high severity, ``watch`` with one of low or medium; without faults ``ready`` only where
     every wheel and side was decided for `min_assessed` seconds and for four fifths of its driving, and the log lost
     nothing, else ``not_assessed``. A wheel model found in the mission itself is compared across wheels; with fewer
-    than three of them a loss that lasts the whole mission would not show, so that it gives no ``ready`` either.
+    than three of them a loss that lasts the whole mission would not show, so that it gives no ``ready`` either. What
+    stands against ``ready`` beside the faults keeps ``watch`` from being cleared.
 
     Parameters
     ----------
@@ -186,16 +197,18 @@ def decide(
     short = [
         k
         for k in assessments
-        if k[0] not in axles and decided_s.get(k, 0.0) < max(limits.min_assessed, _LEAST_SHARE * driven.get(k, 0.0))
+        if k[0] not in axles and decided_s.get(k, 0.0) < max(limits.min_assessed, LEAST_SHARE * driven.get(k, 0.0))
     ]
     modelled = [k for k, a in assessments.items() if a.tier == "model"]
-    caveats = _caveats(short, assessments, decided_s, driven, axles, limits, damage)
+    caveats = caveats_of(short, assessments, decided_s, driven, axles, limits, damage)
     if modelled and model is not None and model.identified:
         caveats += (
             "Speed sensors and valves that are not measured twice were judged by a wheel model found in this mission: a "
             f"loss below about {100 * _MODEL_RESOLUTION:.0f} %, or one that lasts the whole mission on every wheel, does "
             "not show. A machine file with [plant], or a second measurement, would.",
         )
+    odd = [k for k, a in assessments.items() if k[0] not in axles and a.unexplained_s >= _UNEXPLAINED_S]
+    alone = bool(modelled) and model is not None and model.identified and len(model.plants) < _COMPARED_WHEELS
     actions = actions_of(intervals)
     worst = intervals[0].severity if intervals else None
     stop = [f for f in intervals if f.severity == "high"]
@@ -204,12 +217,12 @@ def decide(
         title = f"{count_words(len(stop), 'fault')} to repair" + (f", {len(watch)} to watch" if watch else "")
         return Decision("stop", title, sentence_of(stop), caveats, actions)
     if watch:
-        return Decision("watch", f"{count_words(len(watch), 'fault')} to watch", sentence_of(watch), caveats, actions)
+        title, doubt = f"{count_words(len(watch), 'fault')} to watch", doubt_of(watch, len(short), odd, alone, damage)
+        return Decision("watch", title, sentence_of(watch), caveats, actions, not doubt, doubt)
     if short:
         who = join_words(sorted({part_words("wheel", c, s) for c, s in short}))
         text = f"No fault was found, but {who} could not be judged long enough to say that they are healthy."
-        return Decision("not_assessed", "Not assessed", text, caveats, actions)
-    odd = [k for k, a in assessments.items() if k[0] not in axles and a.unexplained_s >= _UNEXPLAINED_S]
+        return Decision("not_assessed", "Not judged long enough", text, caveats, actions)
     if odd:
         who = join_words(sorted({part_words("wheel", c, "sensor_or_actuator") for c, _ in odd}))
         most = max(assessments[k].unexplained_s for k in odd)
@@ -218,70 +231,15 @@ def decide(
             "explains well enough. Measure speed or valve position a second time, or inspect."
         )
         return Decision("not_assessed", "Deviations that are not explained", text, caveats, actions)
-    if modelled and model is not None and model.identified and len(model.plants) < _COMPARED_WHEELS:
+    if alone:
         text = (
             "No fault was found, but the wheel model comes from this mission alone: a loss that lasted all of it would "
             "not show. Give the wheels' K and tau in a machine file's [plant]."
         )
         return Decision("not_assessed", "No fault found, not fully assessed", text, caveats, actions)
     if damage:
-        return Decision(
-            "watch", "No fault found in a damaged log", "Parts of the log are lost: " + damage[0], caveats, actions
-        )
+        title, doubt = "No fault found in a damaged log", doubt_of((), 0, (), False, damage)
+        return Decision("watch", title, "Parts of the log are lost: " + damage[0], caveats, actions, False, doubt)
     least = min((decided_s[k] for k in assessments if k[0] not in axles), default=0.0)
     text = f"Every wheel's speed sensor and drive valve was judged healthy over at least {least:.0f} s of driving."
-    return Decision("ready", "No fault found", text, caveats, actions)
-
-
-def _caveats(
-    short: Sequence[Key],
-    assessments: Mapping[Key, Assessment],
-    decided_s: Mapping[Key, float],
-    driven: Mapping[Key, float],
-    axles: Sequence[str],
-    limits: Limits,
-    damage: Sequence[str],
-) -> tuple[str, ...]:
-    out = []
-    if damage:
-        said = "" if " was left out: its clock " in damage[0] else "The log is damaged: "
-        out.append(f"{said}{damage[0]}" + (f" (and {len(damage) - 1} more)" if len(damage) > 1 else ""))
-    for key in short:
-        reason = _main_reason(assessments[key])
-        out.append(
-            f"{part_words('wheel', *key)}: judged for {decided_s.get(key, 0.0):.1f} s of driving, of "
-            f"{max(limits.min_assessed, _LEAST_SHARE * driven.get(key, 0.0)):.3g} s needed"
-            + (f" ({reason})" if reason else "")
-            + "."
-        )
-    open_s = {
-        k: driven[k] - decided_s.get(k, 0.0)
-        for k in assessments
-        if k in driven and k not in short and k[0] not in axles
-    }
-    most = max(open_s, key=lambda k: open_s[k], default=None)
-    if most is not None and open_s[most] > max(_OPEN_S, _OPEN_SHARE * driven[most]):
-        out.append(
-            f"{part_words('wheel', *most)}: {open_s[most]:.1f} s of {driven[most]:.1f} s of driving could not be judged"
-            + (f" ({reason})" if (reason := _main_reason(assessments[most])) else "")
-            + "; no wheel has more. The timeline shows when."
-        )
-    unjudged = [k for k in assessments if k[0] in axles and assessments[k].tier == "none"]
-    if unjudged:
-        who = join_words([part_words("steer", *k) for k in unjudged])
-        out.append(f"Not assessed: {who} ({_main_reason(assessments[unjudged[0]])}).")
-    return tuple(out)
-
-
-def _main_reason(assessment: Assessment) -> str:
-    """Reason of the commonest state that is no judgement."""
-    best, most = "", 0.0
-    for state, reason in assessment.reasons.items():
-        if state is State.HEALTHY or state in FAULT_STATES:
-            continue
-        count = float(np.count_nonzero(assessment.states == STATES.index(state)))
-        if state is State.NOT_ASSESSED:
-            count *= 1e3  # a judgement that failed says more than a machine at rest
-        if count > most:
-            best, most = reason, count
-    return best
+    return Decision("ready", "No fault found", text, caveats, actions, cleared=True)

@@ -35,10 +35,12 @@ _DOUBTED = 0.02  # probability of a fault from which on slip and a sensor's loss
 _REASONS = {
     State.NOT_EXCITED: "the wheel is neither commanded nor moving",
     State.MASKED: "the speed sensor that would show it delivers nothing usable",
-    State.NOT_ASSESSED: "no valve command to compare with, the wheel model too uncertain here, or no single fault explains it",
     State.NO_DATA: "no samples",
     State.SLIP: "the wheel breaks the parity of the body while it obeys its valve: it slips, or its sensor is off",
 }
+_NO_COMMAND = "no valve command to compare with"
+_UNCERTAIN = "the wheel model is too uncertain in this mission"
+_UNTOLD = "what deviates here is not explained well enough by any one fault"
 
 
 @dataclass(frozen=True)
@@ -302,9 +304,14 @@ def _assessments(
     out = []
     for side, states, faults in ((Side.SENSOR, states_s, sensor), (Side.ACTUATOR, states_a, actuator)):
         loose = unexplained[side] & ~covered & ~quiet
+        open_ = states == CODE[State.NOT_ASSESSED]
+        silent = open_ & ~np.isfinite(data.u[:, i])
+        commanded = _UNTOLD if gains else _UNCERTAIN
+        reason = _NO_COMMAND if 2 * np.count_nonzero(silent) > np.count_nonzero(open_) else commanded
+        reasons = _REASONS | {State.NOT_ASSESSED: reason}
         both = shared | Pictured.of(step, [("delta", _delta(faults, side, size))])
         seconds = float(np.count_nonzero(loose)) * data.dt
-        out.append(Assessment(states, _REASONS, tuple(faults), both.columns, "model", (note,), seconds, both.closeups))
+        out.append(Assessment(states, reasons, tuple(faults), both.columns, "model", (note,), seconds, both.closeups))
     return out[0], out[1]
 
 

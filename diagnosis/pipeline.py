@@ -268,6 +268,8 @@ def _named_status(report: dict[str, Any]) -> dict[str, Any]:
     verdict: Decision = report["verdict"]
     report["verdict"] = {
         "status": verdict.status,
+        "cleared": verdict.cleared,
+        "not_cleared": verdict.not_cleared,
         "title": verdict.title,
         "text": verdict.text,
         "caveats": [*verdict.caveats, *report.pop("caveats")],

@@ -1,4 +1,4 @@
-"""Faults in words: parts and modes as the paper names them, what to do about each part, and the verdict's sentence."""
+"""Faults in words: parts and modes, what to do about each part, and the verdict's sentence."""
 
 from __future__ import annotations
 
@@ -14,21 +14,21 @@ MODE_WORDS = {
         "stuck": "stuck",
         "no_signal": "without signal",
         "inefficient": "inefficient",
-        "noisy": "noise-affected",
-        "outside_table": "outside the table",
+        "noisy": "noisy",
+        "outside_table": "outside the tables",
     },
     "actuator": {
         "stuck": "stuck",
         "no_signal": "without control signal",
         "inefficient": "inefficient",
-        "noisy": "disturbance-affected",
-        "outside_table": "outside the table",
+        "noisy": "disturbed",
+        "outside_table": "outside the tables",
     },
 }
 
 
 def mode_words(side: str, mode: str) -> str:
-    """A fault mode in the paper's words for its side."""
+    """A fault mode in words for its side, to follow *was*."""
     return MODE_WORDS["actuator" if side == "actuator" else "sensor"][mode]
 
 
@@ -45,13 +45,13 @@ def part_words(kind: str, component: str, side: str) -> str:
 
 
 def actions_of(intervals: Sequence[FaultInterval]) -> tuple[dict[str, object], ...]:
-    """One action per component and side, worst first."""
+    """One action per component and side: valves to stop at once for, then other stops, then the rest, worst first."""
     parts: dict[tuple[str, str, str], list[FaultInterval]] = {}
     for f in intervals:
         if f.severity != "info":
             parts.setdefault((f.kind, f.component, f.side.value), []).append(f)
     out: list[dict[str, object]] = []
-    for (kind, component, side), faults in parts.items():
+    for (kind, component, side), faults in sorted(parts.items(), key=lambda part: _urgency(part[1][0])):
         modes: dict[str, list[FaultInterval]] = {}
         for f in faults:
             modes.setdefault(f.mode.value, []).append(f)
@@ -65,7 +65,21 @@ def _order(worst: FaultInterval) -> str:
     """What to do with a part, by its worst fault."""
     if worst.severity == "high":
         return "Stop at once and repair" if worst.side is Side.ACTUATOR else "Stop and repair"
-    return "Check at the next service" if worst.mode in GONE else "May go out; check"
+    if unanswered(worst):
+        return "Before the machine goes out, check"
+    return "Check at the next service" if worst.mode in GONE else "Check"
+
+
+def unanswered(fault: FaultInterval) -> bool:
+    """Whether a valve probably does not answer, though that is not certain enough to stop for."""
+    return fault.severity == "medium" and fault.mode in GONE and fault.side is not Side.SENSOR
+
+
+def _urgency(worst: FaultInterval) -> int:
+    """Place of a part among the actions, by its worst fault; equal ones keep their order."""
+    if worst.severity == "high":
+        return {Side.ACTUATOR: 0, Side.SENSOR_OR_ACTUATOR: 1}.get(worst.side, 2)
+    return {"medium": 3, "low": 4}.get(worst.severity, 5)
 
 
 def _spells(side: str, mode: str, faults: Sequence[FaultInterval]) -> str:

@@ -42,7 +42,7 @@ _PARTS = {
 }
 VERDICTS = {
     "ready": ("healthy", "Ready for the next mission"),
-    "watch": ("inefficient", "Ready, with faults to watch"),
+    "watch": ("inefficient", "Watch"),
     "stop": ("stuck", "Stop and repair"),
     "not_assessed": ("not_assessed", "Not assessed"),
 }

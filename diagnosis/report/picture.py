@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import textwrap
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -13,6 +14,7 @@ from diagnosis.report.sureness import known_sides
 from diagnosis.report.svg import badge, text
 
 _SEVERITY = {"high": 3, "medium": 2, "low": 1, "info": 0}
+_MARGIN, _LINE = 26.0, 15  # room for text on either side, and characters that fit in a line of it
 _W, _TYRE_W, _TYRE_H, _PITCH = 372.0, 50.0, 96.0, 132.0
 
 
@@ -53,7 +55,7 @@ def condition(
         label = state_label(worst["mode"], worst["side"]).lower()
         length = span(worst["stop_s"] - worst["start_s"])
         more = (f"and {len(mine) - 1} more",) if len(mine) > 1 else ()
-        words = name[0].upper() + name[1:] if len(name) <= 14 else name.split()[0].capitalize()
+        words = name[0].upper() + name[1:]
         title = f"{component}: {name} {label}, {length}{', ' + more[0] if more else ''}"
         return Condition(known(worst["mode"]), (words, label, length, *more), worst["id"], title)
     sides = {side: done for (c, side), done in judged.items() if c == component}
@@ -152,8 +154,8 @@ def machine_picture(report: Mapping[str, Any]) -> Markup:
     height = bottom + 20 + (48 * ((extra + 1) // 2) + 4 if extra else 0)
     note = "front at the top" if placed else "positions not known, wheels in their listed order"
     return Markup(
-        '<svg class="machine" viewBox="0 0 {w:.0f} {h:.0f}" role="group" aria-label="Machine from above, {n}">{p}</svg>'
-    ).format(w=_W, h=height, n=note, p=Markup("").join(parts))
+        '<svg class="machine" viewBox="{x:.0f} 0 {w:.0f} {h:.0f}" role="group" aria-label="Machine from above, {n}">{p}</svg>'
+    ).format(x=-_MARGIN, w=_W + 2 * _MARGIN, h=height, n=note, p=Markup("").join(parts))
 
 
 def _column(j: int, count: int, wide: int) -> tuple[float, int]:
@@ -171,12 +173,13 @@ def _wheel(name: str, x: float, y: float, outward: int, c: Condition) -> Markup:
     )
     shapes += text(x, y + 30, _short(name, 6), "name") + badge(c.state, x, y + 60, 24)
     style = "side end" if outward < 0 else "side"
-    for i, line in enumerate(c.lines if outward else ()):
+    lines = [(piece, not i) for i, line in enumerate(c.lines) for piece in textwrap.wrap(line, _LINE)]
+    for i, (line, bold) in enumerate(lines if outward else ()):
         shapes += text(
             x + outward * 36,
-            y + _TYRE_H / 2 + 5 + 17 * (i - (len(c.lines) - 1) / 2),
+            y + _TYRE_H / 2 + 5 + 17 * (i - (len(lines) - 1) / 2),
             line,
-            style + (" b" if not i else ""),
+            style + (" b" if bold else ""),
         )
     return _hit(c, shapes)
 

@@ -6,10 +6,11 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from diagnosis.compare_coverage import SideCoverage, sides_of
-from diagnosis.report.names import state_label
+from diagnosis.report.names import VERDICTS, state_label
 
 _WORDS = ((0.99, "Practically certain"), (0.9, "Very likely"), (0.7, "Likely"))
 _OPEN = 0.9
+_ANSWERS = {"stop": "must not go out as it is", "ready": "", "not_assessed": "whether it may go out is not known"}
 _HOW = {
     ("wheel", "sensor", "direct"): "measured against a second speed sensor",
     ("wheel", "actuator", "direct"): "measured against the valve's position",
@@ -52,7 +53,8 @@ def sure_of(fault: Mapping[str, Any], report: Mapping[str, Any]) -> str:
         words.append(f"{_likely(p)} ({percent(p)})")
     elif p is not None:
         words.append(
-            f"{_likely(faulty)} faulty ({percent(faulty)}), {state_label(fault['mode'], fault['side']).lower()} at {percent(p)}"
+            f"{_likely(faulty)} faulty ({percent(faulty)}), "
+            f"most likely {state_label(fault['mode'], fault['side']).lower()} ({percent(p)})"
         )
     how = _HOW.get((fault["kind"], fault["side"], tier)) or _HOW.get((fault["kind"], tier)) or _HOW.get(tier, "")
     words += [how] if how else []
@@ -93,6 +95,34 @@ def sure_of_verdict(report: Mapping[str, Any]) -> str:
     shares = [s.decided_s / s.driving_s for s in wheels if s.driving_s > 0]
     least = f", each for {_least(min(shares))} of its driving" if shares else ""
     return f"All {len(wheels)} wheel parts were judged{least}{how}."
+
+
+def headline(report: Mapping[str, Any]) -> tuple[str, str]:
+    """Verdict in a word or two, and whether the machine may go out; the latter empty where the former says it.
+
+    Faults to watch give leave only where every wheel part was judged long enough and nothing of the log is lost; see
+    `diagnosis.decide`.
+    """
+    verdict = report.get("verdict") or {}
+    status = verdict.get("status", "not_assessed")
+    if status != "watch":
+        return VERDICTS.get(status, VERDICTS["not_assessed"])[1], _ANSWERS.get(status, _ANSWERS["not_assessed"])
+    doubt = str(verdict.get("not_cleared") or "") or ("" if verdict.get("cleared") else _doubt(report))
+    if doubt:
+        return VERDICTS["watch"][1], f"not cleared: {doubt}"
+    return "Ready, with faults to watch", "may go out"
+
+
+def _doubt(report: Mapping[str, Any]) -> str:
+    """Why a report that does not say so itself gives no leave to go out."""
+    if any(f.get("damage") for f in (report.get("log") or {}).get("files") or ()):
+        return "the log is damaged"
+    axles = (report.get("machine") or {}).get("axles") or ()
+    wheels = [s for (c, _), s in known_sides(report).items() if c not in axles]
+    short = sum(not s.assessed for s in wheels)
+    if short:
+        return f"{short} part{'s were' if short > 1 else ' was'} not judged long enough"
+    return "" if wheels else "how long its parts were judged is not known"
 
 
 def known_sides(report: Mapping[str, Any]) -> Mapping[tuple[str, str], SideCoverage]:

@@ -22,15 +22,10 @@ from diagnosis.report.names import (
 )
 from diagnosis.report.pair import tier_words
 from diagnosis.report.picture import judged_sides
-from diagnosis.report.sureness import judged, sure_of, sure_of_verdict
+from diagnosis.report.sureness import headline, judged, sure_of, sure_of_verdict
 from diagnosis.report.timeline import kind_of
 
 _SHOWN = 0.001
-_ANSWERS = {
-    "stop": "must not go out as it is",
-    "watch": "may go out",
-    "not_assessed": "whether it may go out is not known",
-}
 _TOLD = 4  # notes and evidence beyond this number fold away
 
 
@@ -70,10 +65,8 @@ def context(report: Mapping[str, Any], duration: float) -> dict[str, Any]:
         Length of the mission [s].
     """
     verdict = report.get("verdict") or {}
-    status = verdict.get("status", "not_assessed")
-    state, words = VERDICTS.get(status, VERDICTS["not_assessed"])
-    if status == "watch" and not report.get("intervals"):
-        words = "Look at it: not all of the log is there"
+    state, _ = VERDICTS.get(verdict.get("status", "not_assessed"), VERDICTS["not_assessed"])
+    words, answer = headline(report)
     faults = [_fault(f) for f in report.get("intervals") or ()]
     worst = {f["id"]: f for f in report.get("intervals") or ()}
     quality = sorted(
@@ -88,7 +81,7 @@ def context(report: Mapping[str, Any], duration: float) -> dict[str, Any]:
         "verdict": {
             "state": state,
             "words": words,
-            "answer": _answer(status, report),
+            "answer": answer,
             "sure": "" if verdict.get("actions") else sure_of_verdict(report),
             "title": verdict.get("title") or words,
             "text": verdict.get("text") or "",
@@ -165,13 +158,6 @@ def merged_caveats(caveats: Sequence[str]) -> list[str]:
         head, colon, tail = sentence.partition(": ")
         parts.setdefault(tail if colon else f"{i}:", []).append(head if colon else sentence)
     return [", ".join(heads) + ("" if tail.endswith(":") else f": {tail}") for tail, heads in parts.items()]
-
-
-def _answer(status: str, report: Mapping[str, Any]) -> str:
-    """Whether the machine may go out, where the verdict's own words do not say it."""
-    if status == "watch" and not report.get("intervals"):
-        return ""
-    return _ANSWERS.get(status, "" if status in VERDICTS else _ANSWERS["not_assessed"])
 
 
 def _folded(

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from diagnosis.report.names import FAULT_MODES, clock, fault_title, known, part, span, state_label
+from diagnosis.report.sureness import known_sides
 
 _BUCKETS = 2000
 _GONE = ("stuck", "no_signal")
@@ -180,9 +181,11 @@ def timeline(report: Mapping[str, Any], duration: float, bars: Collection[str] |
     for s in report.get("states") or ():
         kind = s.get("kind") or kind_of(s["component"], machine)
         by_lane.setdefault((s["component"], kind, s["side"]), []).append(s)
+    brief = {key for key, side in known_sides(report).items() if not side.assessed}
     cause = causes([f for f in faults if bars is None or f["id"] in bars])
     lanes: list[Lane] = []
     quiet: list[Lane] = []
+    counts: dict[str, int] = {}
     for (c, kind, side), spans in by_lane.items():
         mine = [f for f in faults if _on_lane(f, c, kind, side)]
         own = [f for f in sorted(mine, key=lambda f: f["start_s"]) if bars is None or f["id"] in bars]
@@ -194,12 +197,13 @@ def timeline(report: Mapping[str, Any], duration: float, bars: Collection[str] |
         faulty = "" if not mine else f"{share:.1f} %" if share >= 0.05 else span(total)
         state = known(mine[0]["mode"]) if mine else _quiet_state(spans)
         group = lanes if mine else quiet
+        if not mine:
+            words = "healthy" if state == "healthy" else f"{state_label(state).lower()} throughout"
+            if state == "healthy" and (c, side) in brief:
+                state, words = "not_assessed", "not judged long enough"
+            counts[words] = counts.get(words, 0) + 1
         first = not group or group[-1].component != c
         group.append(Lane(c, part(kind, side), state, _lines(spans, side, duration), drawn, faulty, first))
-    counts: dict[str, int] = {}
-    for lane in quiet:
-        words = {"healthy": "healthy"}.get(lane.state, f"{state_label(lane.state).lower()} throughout")
-        counts[words] = counts.get(words, 0) + 1
     summary = f"{len(quiet)} lane{'s' * (len(quiet) != 1)} without a fault: " + ", ".join(
         f"{n} {words}" for words, n in counts.items()
     )

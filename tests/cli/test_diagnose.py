@@ -9,8 +9,10 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
+from rich.console import Console
 
 from cli.main import run
+from cli.verdict import verdict_parts
 from diagnosis.result import MissionResult
 from replay.errors import NotJudged
 from replay.export.mission import write_mission
@@ -120,7 +122,7 @@ def test_the_verdict_is_printed(calls: dict[str, Any], capsys: pytest.CaptureFix
     calls["result"] = result("high")
     run(["diagnose", "drive.mcap"])
     seen = capsys.readouterr()
-    assert seen.out.startswith(" STOP AND REPAIR   1 faults [/]\n")
+    assert seen.out.startswith(" STOP AND REPAIR – must not go out as it is\n1 faults [/]\n")
     for words in (
         "Repair it.  F1",
         "■ stuck",
@@ -280,3 +282,27 @@ def test_a_part_of_a_mission_says_so(tmp_path: Path) -> None:
     run(["diagnose", str(tmp_path / "ok.csv"), "-o", str(out), "--start", "10", "--end", "25"])
     report = json.loads((out / "report.json").read_text(encoding="utf-8"))
     assert any("10.000 s into the log" in text for text in report["verdict"]["caveats"])
+
+
+@pytest.mark.parametrize("width", [80, 120])
+def test_the_fault_table_breaks_no_number(width: int) -> None:
+    fault = {
+        "component": "FR",
+        "kind": "wheel",
+        "side": "sensor_or_actuator",
+        "mode": "noisy",
+        "start_s": 1000.0,
+        "stop_s": 1105.18,
+        "epsilon": {"value": 0.94, "low": 0.87, "high": 1.01},
+        "sat": {"mean": 0.3, "unit": "m/s"},
+        "probability": 0.998,
+        "severity": "medium",
+    }
+    report = {"verdict": {"status": "not_assessed", "title": "Not assessed"}, "intervals": [{**fault, "id": "F10"}]}
+    console = Console(width=width, color_system=None)
+    with console.capture() as seen:
+        console.print(*verdict_parts(report))
+    out = seen.get()
+    assert all(word in out for word in ("1000.00–1105.18", "0.94", "0.998", "medium", "sensor or"))
+    assert ("+0.300 m/s" in out) == (width == 120)
+    assert out.lower().count("not assessed") == 1, "once"

@@ -192,7 +192,7 @@ def test_a_row_that_is_gone_from_a_part_with_another_fault_says_so() -> None:
     older = report(fault("FR", "sensor", "stuck"), fault("FR", "sensor", "noisy"))
     found = compared(older, later(fault("FR", "sensor", "noisy")))
     gone = next(c for c in found.faults if c.status == "resolved")
-    assert gone.note == "The part is not sound: in the newer mission it is noise-affected."
+    assert gone.note == "The part is not sound: in the newer mission it is noisy."
 
 
 @pytest.mark.parametrize(

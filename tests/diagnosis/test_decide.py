@@ -100,7 +100,7 @@ def test_other_rows_are_watched(side: Side, mode: FaultMode) -> None:
     marked, advice = severity_of(finding(side, mode, epsilon=0.5), 60.0, LIMITS)
     slight, _ = severity_of(finding(side, mode, epsilon=0.15), 60.0, LIMITS)
     assert (marked, slight) == ("medium", "low")
-    assert "May go out" in advice
+    assert "no reason to stop" in advice
 
 
 def test_gain_outside_the_table_is_checked() -> None:
@@ -265,8 +265,8 @@ def test_spans_leave_no_gap() -> None:
 
 
 def test_words_of_the_paper() -> None:
-    assert mode_words("actuator", "noisy") == "disturbance-affected"
-    assert mode_words("sensor", "noisy") == "noise-affected"
+    assert mode_words("actuator", "noisy") == "disturbed"
+    assert mode_words("sensor", "noisy") == "noisy"
     assert mode_words("actuator", "no_signal") == "without control signal"
     for side in Side:
         for mode in FaultMode:
@@ -288,3 +288,82 @@ def test_a_fifth_of_the_driving_undecided_gives_no_all_clear() -> None:
     driven = dict.fromkeys(parts, 30.0)
     assert decide((), parts, dict.fromkeys(parts, 23.0), AXLES, Limits(), (), driving_s=driven).status == "not_assessed"
     assert decide((), parts, dict.fromkeys(parts, 25.0), AXLES, Limits(), (), driving_s=driven).status == "ready"
+
+
+WATCHED = finding(Side.ACTUATOR, FaultMode.INEFFICIENT, epsilon=0.5)
+
+
+def test_faults_to_watch_are_cleared_only_where_all_else_is_ready() -> None:
+    parts = machine(FR_actuator=assessed(WATCHED))
+    assert (verdict(parts).cleared, verdict(parts).not_cleared) == (True, "")
+    short = verdict(parts, dict.fromkeys(parts, 20.0) | {("FL", "sensor"): 9.9, ("FL", "actuator"): 0.0})
+    assert (short.status, short.cleared) == ("watch", False)
+    assert short.not_cleared == "2 parts were not judged long enough"
+    damaged = verdict(parts, damage=("chunk 7 is cut off",))
+    assert (damaged.status, damaged.cleared, damaged.not_cleared) == ("watch", False, "the log is damaged")
+    odd = parts | {("FL", "sensor"): replace(parts["FL", "sensor"], unexplained_s=6.0)}
+    assert verdict(odd).not_cleared == "something deviates that no fault explains"
+
+
+def test_a_valve_that_may_not_answer_is_not_cleared() -> None:
+    got = verdict(machine(FR_actuator=assessed(finding(Side.ACTUATOR, FaultMode.STUCK, p=0.7))))
+    assert (got.status, got.cleared, got.not_cleared) == ("watch", False, "the FR drive valve may not answer")
+    assert str(got.actions[0]["text"]).startswith("Before the machine goes out, check the FR drive valve")
+
+
+def test_only_ready_and_watch_are_ever_cleared() -> None:
+    assert verdict(machine()).cleared
+    assert not verdict(machine(), 0.0).cleared
+    assert not verdict(machine(), damage=("chunk 7 is cut off",)).cleared
+    assert not verdict(machine(FR_actuator=assessed(finding(Side.ACTUATOR, FaultMode.STUCK)))).cleared
+
+
+def test_no_action_and_no_advice_gives_leave_to_go_out() -> None:
+    for side in Side:
+        for mode in FaultMode:
+            parts = machine(FR_sensor=assessed(finding(side, mode, epsilon=0.5)))
+            words = [str(a["text"]) for a in verdict(parts, 0.0).actions]
+            words += [f.advice for f in intervals_of(parts, AXLES, 0, STEP, LIMITS)]
+            assert not any("may go out" in w.lower() for w in words)
+
+
+def test_stop_at_once_stands_before_other_stops() -> None:
+    got = verdict(
+        machine(
+            FR_sensor=assessed(finding(Side.SENSOR, FaultMode.STUCK, 0, 9000)),
+            FR_actuator=assessed(WATCHED),
+            FL_actuator=assessed(finding(Side.ACTUATOR, FaultMode.NO_SIGNAL, 5000, 9000)),
+        )
+    )
+    assert [str(a["text"]).split(" the ")[0] for a in got.actions] == [
+        "Stop at once and repair",
+        "Stop and repair",
+        "Check",
+    ]
+    assert [a["n"] for a in got.actions] == [1, 2, 3]
+
+
+def test_the_worst_open_time_is_named_truly() -> None:
+    parts = machine()
+    driven = dict.fromkeys(parts, 60.0)
+    decided = dict.fromkeys(parts, 60.0) | {("FL", "sensor"): 50.0}
+    only = decide((), parts, decided, AXLES, LIMITS, (), driving_s=driven)
+    assert any("10.0 s of 60.0 s" in c and "no other part has more" in c for c in only.caveats)
+    worse = decide((), parts, decided | {("FR", "sensor"): 20.0}, AXLES, LIMITS, (), driving_s=driven)
+    assert any("FL" in c and "none of the parts judged long enough has more" in c for c in worse.caveats)
+
+
+def test_a_short_drive_is_the_reason_not_the_standstill() -> None:
+    states = np.full(N, CODE[State.HEALTHY])
+    states[:20_000] = CODE[State.NOT_EXCITED]
+    parts = {k: replace(a, states=states, reasons={State.NOT_EXCITED: "nothing moves"}) for k, a in machine().items()}
+    got = decide((), parts, dict.fromkeys(parts, 4.7), AXLES, LIMITS, (), driving_s=dict.fromkeys(parts, 5.0))
+    assert all("only 5.0 s were driven" in c for c in got.caveats)
+    assert len(got.caveats) == 4
+    states = states.copy()
+    states[20_000:25_000] = CODE[State.MASKED]
+    reasons = {State.NOT_EXCITED: "nothing moves", State.MASKED: "F1 hides it"}
+    parts["FR", "sensor"] = replace(parts["FR", "sensor"], states=states, reasons=reasons)
+    seconds = dict.fromkeys(parts, 30.0) | {("FR", "sensor"): 5.0}
+    got = decide((), parts, seconds, AXLES, LIMITS, (), driving_s=dict.fromkeys(parts, 30.0))
+    assert "F1 hides it" in got.caveats[0]

@@ -73,3 +73,26 @@ def test_a_part_that_was_judged_too_briefly_is_not_called_healthy() -> None:
     assert short.state == "not_assessed"
     assert short.lines == ("No fault found", "drive valve", "judged too briefly")
     assert condition("FR", "wheel", [], judged, dict.fromkeys(judged, True)).lines == ("Healthy",)
+
+
+def test_long_words_stand_in_several_lines() -> None:
+    wheels = ["FL", "FR"]
+    geometry = {w: {"x": 1.0, "y": y, "offset": 0.0, "axle": ""} for w, y in zip(wheels, (1.0, -1.0), strict=True)}
+    fault = {**FAULT, "side": "sensor_or_actuator", "mode": "outside_table", "severity": "medium"}
+    rows = [
+        {"component": "FL", "side": s, "tier": "model", "seconds": {"healthy": 5.0}, "decided_driving_s": 5.0}
+        for s in ("sensor", "actuator")
+    ]
+    report = {"machine": {"wheels": wheels, "geometry": geometry}, "intervals": [fault], "coverage": rows}
+    words = re.findall(r'class="side[^"]*">([^<]*)<', machine_picture(report))
+    assert words == [
+        "No fault found",
+        "judged too",
+        "briefly",
+        "Speed sensor or",
+        "drive valve",
+        "outside the",
+        "tables",
+        "1.0 s",
+    ]
+    assert max(map(len, words)) <= 15

@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from diagnosis.report.sureness import judged, percent, sure_of, sure_of_verdict
+from diagnosis.report.sureness import headline, judged, percent, sure_of, sure_of_verdict
 
 
 def fault(p: float, **changes: Any) -> dict[str, Any]:
@@ -51,7 +51,7 @@ def test_phrase_of_a_fault() -> None:
     )
     # certainly faulty, the row less so
     words = sure_of(fault(0.49, hypotheses=[{"side": "actuator", "mode": "stuck", "p": 0.49}]), {})
-    assert words.startswith("Practically certain faulty (over 99.9 %), stuck at 49 %")
+    assert words.startswith("Practically certain faulty (over 99.9 %), most likely stuck (49 %)")
     assert sure_of(fault(0.75, tier="model"), {}).endswith("by the wheel model, without a second measurement")
 
 
@@ -70,3 +70,29 @@ def test_phrase_of_a_verdict() -> None:
     short = {**done, "coverage": [row("sensor", 98.0), row("actuator", 0.0, tier="none")]}
     assert sure_of_verdict(short).startswith("1 of 2 wheel parts were judged long enough")
     assert sure_of_verdict({}) == ""
+
+
+def watched(**verdict: Any) -> dict[str, Any]:
+    rows = [row("sensor", 98.0), row("actuator", 90.0)]
+    return {"machine": {"axles": []}, "verdict": {"status": "watch", **verdict}, "coverage": rows}
+
+
+def test_leave_to_go_out_is_given_only_where_nothing_stands_against_it() -> None:
+    leave = ("Ready, with faults to watch", "may go out")
+    assert headline(watched(cleared=True, not_cleared="")) == leave
+    assert headline(watched(cleared=False, not_cleared="the log is damaged")) == (
+        "Watch",
+        "not cleared: the log is damaged",
+    )
+    assert headline({"verdict": {"status": "stop"}}) == ("Stop and repair", "must not go out as it is")
+    assert headline({"verdict": {"status": "ready"}}) == ("Ready for the next mission", "")
+    assert headline({}) == ("Not assessed", "whether it may go out is not known")
+
+
+def test_leave_of_reports_that_do_not_say_it() -> None:
+    assert headline(watched())[1] == "may go out"
+    short = {**watched(), "coverage": [row("sensor", 98.0), row("actuator", 3.0)]}
+    assert headline(short) == ("Watch", "not cleared: 1 part was not judged long enough")
+    damaged = {**watched(), "log": {"files": [{"damage": ["chunk 7 is cut off"]}]}}
+    assert headline(damaged)[1] == "not cleared: the log is damaged"
+    assert headline({"verdict": {"status": "watch"}})[1].startswith("not cleared: ")

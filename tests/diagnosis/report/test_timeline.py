@@ -53,3 +53,27 @@ def test_faults_that_may_follow_from_another_are_faded() -> None:
     assert causes([stuck, {**loss, "tier": "direct"}]) == {}, "measured by itself"
     assert causes([stuck, {**loss, "start_s": 19.0, "stop_s": 30.0}]) == {}, "mostly outside"
     assert causes([stuck, {**loss, "component": "FL"}]) == {}
+
+
+def test_a_part_that_was_judged_too_briefly_does_not_count_as_healthy() -> None:
+    rows = [("sensor", 60.0), ("actuator", 18.0)]
+    report = {
+        "machine": {"wheels": ["FR"]},
+        "states": [
+            {"component": "FR", "side": side, "state": "healthy", "start_s": 0.0, "stop_s": s} for side, s in rows
+        ],
+        "coverage": [
+            {
+                "component": "FR",
+                "side": side,
+                "tier": "model",
+                "seconds": {"healthy": s},
+                "driving_s": 66.0,
+                "decided_driving_s": s,
+            }
+            for side, s in rows
+        ],
+    }
+    t = timeline(report, 66.0)
+    assert [lane.state for lane in t.quiet] == ["healthy", "not_assessed"]
+    assert t.summary == "2 lanes without a fault: 1 healthy, 1 not judged long enough"
