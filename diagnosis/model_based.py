@@ -229,7 +229,7 @@ def _one_wheel(
             continue
         causal = first_lasting(raised, first, last, 2, max(1, round(_HOLD_S / blocks.dt)))
         seen = None if causal is None else max(start, min(causal * width, stop - 1))
-        shape = onset_sentence(start, y, own.noise, data.names[i][0], verdict.finding.side)
+        shape = onset_sentence(start, y, own, data.dt, data.names[i][0], verdict.finding.side)
         finding = replace(verdict.finding, detected=seen, evidence=(*verdict.finding.evidence, shape))
         findings.append(finding)
     return _assessments(i, data, own, done, found, findings, opened, unexplained, gains, width)

@@ -266,18 +266,24 @@ def _estimate(m: int, y: Array, run: Run, model: WheelFilterModel) -> tuple[Epsi
     return loss, Sat(level, float(np.hypot(level, noise / eps)), level - half / eps, level + half / eps, "m/s")
 
 
-def onset_sentence(start: int, y: Array, noise: float, name: str, side: Side) -> str:
-    """What the shape of the onset says; a sensor's fault jumps, a valve's bends."""
+def onset_sentence(start: int, y: Array, model: WheelFilterModel, dt: float, name: str, side: Side) -> str:
+    """What the shape of the onset says: a sensor's fault may jump by more than a wheel can, a valve's bends."""
     low, high = max(1, start - 2), min(y.size, start + 3)
     if high <= low or start == 0:
         return "The fault was there from the first sample, so its onset says nothing."
     steps = np.abs(np.nan_to_num(y[low:high] - y[low - 1 : high - 1]))
     largest = float(steps.max())
-    if largest > 8 * noise:
-        return f"At its onset {name} jumps by {largest:.2g} m/s within one sample ({largest / noise:.0f} times its noise): a sensor can, a wheel cannot."
+    fastest = float(np.nan_to_num(np.abs(y[low - 1 : high])).max())
+    able = (model.K + fastest) * min(1.0, dt / model.tau)  # by a wheel whose valve opens wholly the other way
+    jump = f"At its onset {name} jumps by {largest:.2g} m/s within one sample ({largest / model.noise:.0f} times its noise)"
+    beyond = largest > max(8 * model.noise, able)
     if side is Side.ACTUATOR:
+        if beyond:
+            return f"{jump}: a valve's fault alone does not explain that."
         return f"At its onset {name} bends with its lag, no step exceeds {largest:.2g} m/s: as a wheel does that its valve leaves."
-    return f"At its onset no step of {name} exceeds {largest:.2g} m/s."
+    if beyond:
+        return f"{jump}: a sensor can, a wheel cannot."
+    return f"{jump}." if largest > 8 * model.noise else f"At its onset no step of {name} exceeds {largest:.2g} m/s."
 
 
 def refined(start: int, y: Array, reach: int, m: int, noise: float) -> int:

@@ -228,8 +228,16 @@ def test_a_stuck_sensor_begins_with_the_last_change() -> None:
 
 def test_onsets_in_words() -> None:
     y = jumping()
-    assert "jumps by 0.15 m/s" in onset_sentence(100, y, 0.004, "v", Side.SENSOR)
-    assert "bends with its lag" in onset_sentence(50, y, 0.004, "v", Side.ACTUATOR)
-    assert "no step of v exceeds" in onset_sentence(50, y, 0.004, "v", Side.SENSOR)
-    assert "from the first sample" in onset_sentence(0, y, 0.004, "v", Side.SENSOR)
-    assert "exceeds 0 m/s" in onset_sentence(5, np.full(9, np.nan), 0.004, "v", Side.SENSOR)
+
+    def words(start: int, side: Side, y: Array = y, dt: float = DT) -> str:
+        return onset_sentence(start, y, MODEL, dt, "v", side)
+
+    assert "jumps by 0.15 m/s" in words(100, Side.SENSOR)
+    assert words(100, Side.SENSOR).endswith("(38 times its noise): a sensor can, a wheel cannot.")
+    assert words(100, Side.SENSOR, dt=0.02).endswith("(38 times its noise).")  # in 20 ms a wheel can
+    assert words(100, Side.ACTUATOR).endswith("a valve's fault alone does not explain that.")
+    assert "bends with its lag" in words(100, Side.ACTUATOR, dt=0.02)
+    assert "bends with its lag" in words(50, Side.ACTUATOR)
+    assert "no step of v exceeds" in words(50, Side.SENSOR)
+    assert "from the first sample" in words(0, Side.SENSOR)
+    assert "exceeds 0 m/s" in words(5, Side.SENSOR, np.full(9, np.nan))
