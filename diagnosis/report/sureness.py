@@ -9,7 +9,7 @@ from diagnosis.compare_coverage import SideCoverage, sides_of
 from diagnosis.report.names import VERDICTS, state_label
 
 _WORDS = ((0.99, "Practically certain"), (0.9, "Very likely"), (0.7, "Likely"))
-_OPEN = 0.9
+_OPEN, _TIE = 0.9, 1e-3
 _ANSWERS = {"stop": "must not go out as it is", "ready": "", "not_assessed": "whether it may go out is not known"}
 _HOW = {
     ("wheel", "sensor", "direct"): "measured against a second speed sensor",
@@ -52,10 +52,9 @@ def sure_of(fault: Mapping[str, Any], report: Mapping[str, Any]) -> str:
     if p is not None and (p >= _OPEN or faulty <= p + 0.05 or not fault.get("hypotheses")):
         words.append(f"{_likely(p)} ({percent(p)})")
     elif p is not None:
-        words.append(
-            f"{_likely(faulty)} faulty ({percent(faulty)}), "
-            f"most likely {state_label(fault['mode'], fault['side']).lower()} ({percent(p)})"
-        )
+        first = max(h["p"] for h in fault["hypotheses"] if h["mode"] != "healthy") <= p + _TIE
+        row = f"{'most likely' if first else 'perhaps'} {state_label(fault['mode'], fault['side']).lower()}"
+        words.append(f"{_likely(faulty)} faulty ({percent(faulty)}), {row} ({percent(p)})")
     how = _HOW.get((fault["kind"], fault["side"], tier)) or _HOW.get((fault["kind"], tier)) or _HOW.get(tier, "")
     words += [how] if how else []
     wanted = ("sensor", "actuator") if fault["side"] == "sensor_or_actuator" else (fault["side"],)

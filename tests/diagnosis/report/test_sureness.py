@@ -52,6 +52,12 @@ def test_phrase_of_a_fault() -> None:
     # certainly faulty, the row less so
     words = sure_of(fault(0.49, hypotheses=[{"side": "actuator", "mode": "stuck", "p": 0.49}]), {})
     assert words.startswith("Practically certain faulty (over 99.9 %), most likely stuck (49 %)")
+    rows = [
+        {"side": "actuator", "mode": m, "p": p} for m, p in (("inefficient", 0.35), ("stuck", 0.21), ("noisy", 0.44))
+    ]
+    assert sure_of(fault(0.21, hypotheses=rows), {}).startswith(
+        "Practically certain faulty (over 99.9 %), perhaps stuck (21 %)"
+    )
     assert sure_of(fault(0.75, tier="model"), {}).endswith("by the wheel model, without a second measurement")
 
 
