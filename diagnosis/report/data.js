@@ -81,6 +81,12 @@ const Data = (() => {
     return full >= 0 ? full : 0;
   }
 
+  // Whether every sample of a channel is stored at a time, or somewhere between two.
+  function full(c, t0, t1 = t0) {
+    const a = (t0 - view.t0) / view.dt, b = (t1 - view.t0) / view.dt;
+    return view.channels[c].segments.some(([start, count, stride]) => stride === 1 && start <= b && start + count > a);
+  }
+
   const range = (t0, t1) => [
     Math.max(0, Math.floor((t0 - view.t0) / view.dt) - 1),
     Math.min(view.n, Math.ceil((t1 - view.t0) / view.dt) + 2),
@@ -212,5 +218,5 @@ const Data = (() => {
     return reading;
   }
 
-  return { view, curve, csv, plotly, intervals, guard, fromBase64 };
+  return { view, full, curve, csv, plotly, intervals, guard, fromBase64 };
 })();

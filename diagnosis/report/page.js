@@ -72,6 +72,7 @@
   function select(id, { range, scroll, step: stepped } = {}) {
     const f = faults.get(id);
     if (!f) return;
+    tell("");
     const before = current;
     current = id;
     if (!articleOf(id)) brief(f);
@@ -186,6 +187,27 @@
     else if (!current && faults.size) select(faults.keys().next().value, { range });
     else if (!faults.size && range) shared = range;
     if (explorer && (plots || faults.has(id)) && JSON.stringify(wanted) !== JSON.stringify(explorer.plots)) explorer.set(wanted);
+    const lacking = explorer ? [...new Set(wanted.flat())].filter((n) => !explorer.names.has(n)) : [];
+    tell([
+      read("fault") && !faults.has(id) ? `There is no fault ${cut(id || read("fault"))} in this report${current ? `: ${current} is shown` : ""}.` : "",
+      read("t") && !range ? `“${cut(plain(read("t")) || read("t"))}” is no time: expected t=seconds or t=from,to.` : "",
+      lacking.length ? `There is no signal ${lacking.slice(0, 3).map(cut).join(", ")}${lacking.length > 3 ? ` and ${lacking.length - 3} more` : ""} in this report.` : "",
+    ].filter(Boolean).join(" "));
+  }
+
+  const cut = (s) => (s.length > 60 ? `${s.slice(0, 60)}…` : s);
+
+  // What the address asks for and the page does not have, until the next address.
+  function tell(words) {
+    let note = one("#missing");
+    if (!words) { note?.remove(); return; }
+    if (!note) {
+      note = document.createElement("p");
+      Object.assign(note, { id: "missing", className: "note" });
+      one("main").before(note);
+    }
+    note.textContent = words;
+    one("#live").textContent = words;
   }
 
   // Paper: light colours and the width of a page, then back.

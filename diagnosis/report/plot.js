@@ -106,10 +106,20 @@ class Figure {
     return this.rows.map((r) => curves.slice(from, from += r.traces.length + (r.band ? 1 : 0) + (r.threshold === undefined ? 0 : 2)));
   }
 
-  // Whether a row shows every sample or the extremes of several.
+  static duration(s) { return s < 1 ? `${+(s * 1e3).toPrecision(2)} ms` : `${+s.toPrecision(2)} s`; }
+
+  // Samples of which the extremes alone are stored, where curves are drawn from such; else 1.
+  static stored(curves) { return Math.max(1, ...curves.map((c) => c.stored || 1)); }
+
+  // Whether a row shows every sample or the extremes of several, and how far that moves what it shows.
   static drawn(curves) {
-    return curves.every((c) => c.exact) ? "▪ every sample" : `▤ min–max of ${Math.max(...curves.map((c) => c.stride))} samples`;
+    if (curves.every((c) => c.exact)) return "▪ every sample";
+    const stored = Figure.stored(curves), moved = stored > 1 ? `, times to ${Figure.duration(stored * Data.view.dt)}` : "";
+    return `▤ min–max of ${Math.max(...curves.map((c) => c.stride))} samples${moved}`;
   }
+
+  // Channels that a row draws.
+  static channels(row) { return [...row.traces.map((t) => t.c), ...(row.band || []), ...(row.threshold === undefined ? [] : [row.threshold])]; }
 
   // Title and legend of a row, wrapped to the figure's width; at the end how it is drawn.
   heading(row, curves) {
@@ -175,6 +185,7 @@ class Figure {
 
   // Intervals of faults behind the panels that show their component, named in the first.
   shade(layout) {
+    const stored = this.perRow(this.curves).map(Figure.stored), { t0, dt } = Data.view;
     for (const s of this.shades) {
       const fill = Figure.colour(s.mode), x0 = s.start, x1 = Math.max(s.stop, s.start + Data.view.dt);
       const rows = [...this.rows.keys()].filter((i) => !this.rows[i].component || this.rows[i].component === s.component);
@@ -182,6 +193,9 @@ class Figure {
         const yref = `y${i ? i + 1 : ""} domain`, box = { xref: "x", yref, x0, y0: 0, y1: 1 };
         layout.shapes.push({ ...box, type: "rect", x1, fillcolor: fill, opacity: s.main ? 0.15 : 0.09, line: { width: 0 }, layer: "below" });
         if (s.main) for (const x of [x0, x1]) layout.shapes.push({ ...box, type: "line", x0: x, x1: x, line: { color: fill, width: 1.2 } });
+        // Extremes stand somewhere in their block: what bends within the one of an edge may bend at the edge.
+        const block = stored[i] * dt, begin = (x) => t0 + Math.floor((x - t0) / block + 1e-6) * block;
+        if (s.main && stored[i] > 1) for (const x of [s.start, s.stop]) layout.shapes.push({ ...box, type: "rect", x0: begin(x), x1: begin(x) + block, fillcolor: Figure.colour("muted"), opacity: 0.3, line: { width: 0 }, layer: "below" });
         if (s.main && s.detected != null) layout.shapes.push({ ...box, type: "line", x0: s.detected, x1: s.detected, line: { color: Figure.colour("text"), width: 1.2, dash: "dash" } });
       }
       if (s.main || !rows.length || this.shades.length > 30) continue;
@@ -192,15 +206,38 @@ class Figure {
     }
   }
 
+  // What is drawn in the current view, and where every sample is to be had.
   label(curves) {
     if (!this.badge) return;
-    const every = curves.every((c) => c.exact), { dt } = Data.view, rate = 1 / dt;
-    const stored = Math.max(...curves.map((c) => c.stored || 1)), s = Math.max(...curves.map((c) => c.stride)) * dt;
-    const time = s < 1 ? `${+(s * 1e3).toPrecision(2)} ms` : `${+s.toPrecision(2)} s`;
-    this.badge.textContent = every
-      ? `every sample drawn · ${+rate.toPrecision(4)} Hz`
-      : `min–max envelope · ${time}` + (stored === 1 ? " per pixel" : Data.view.closeups ? " · every sample around faults" : ` · extremes of ${stored} samples stored`);
+    const { dt } = Data.view, parts = this.perRow(curves), exact = parts.filter((p) => p.every((c) => c.exact)).length, every = exact === parts.length;
     this.badge.classList.toggle("full", every);
+    if (every) {
+      this.badge.textContent = `every sample drawn · ${+(1 / dt).toPrecision(4)} Hz`;
+      return;
+    }
+    const time = Figure.duration(Math.max(...curves.map((c) => c.stride)) * dt), words = [`min–max envelope · ${time}`], stored = Figure.stored(curves);
+    if (exact) words.unshift(`every sample in ${exact} of ${parts.length} plots, else`);
+    if (stored === 1) words.push("per pixel");
+    else words.push(`· ${this.near(parts) ? "every sample around faults: zoom in" : `extremes of ${stored} samples stored${this.command()}`}`);
+    this.badge.textContent = words.join(" ");
+  }
+
+  // Whether the plots that draw stored extremes show every sample once zoomed in: to the chosen fault, else anywhere in view.
+  near(parts) {
+    const main = this.shades.find((s) => s.main), coarse = this.rows.filter((_, i) => Figure.stored(parts[i]) > 1).flatMap(Figure.channels);
+    const [a, b] = this.range;
+    return main && main.start < b && main.stop > a
+      ? coarse.some((c) => Data.full(c, main.start) || Data.full(c, main.stop))
+      : coarse.some((c) => Data.full(c, a, b));
+  }
+
+  // Which rows draw stored extremes of how many samples: their edges are shaded.
+  coarseness(curves) { return this.perRow(curves).map(Figure.stored).join(); }
+
+  // How to get every sample of a view short enough for a page of its own.
+  command() {
+    const [a, b] = this.range;
+    return b - a > 300 ? "" : ` · every sample: mfhca diagnose LOG --start ${Math.max(0, Math.floor(a - 5))} --end ${Math.ceil(b + 5)}`;
   }
 
   async draw(rows, shades, range) {
@@ -212,6 +249,7 @@ class Figure {
       modeBarButtonsToRemove: ["toImage", "select2d", "lasso2d", "autoScale2d", "resetScale2d"],
     };
     this.curves = curves;
+    this.coarse = this.coarseness(curves);
     await Plotly.react(this.element, this.traces(curves), this.layout(), config);
     this.label(curves);
     if (!this.drawn) {
@@ -247,8 +285,10 @@ class Figure {
         const target = [...this.range], { rows } = this, curves = await this.fetch(target);
         if (rows !== this.rows) return;
         const heads = Object.fromEntries(this.headings(curves).map((h, i) => [`annotations[${i}].text`, h.text]));
-        await Plotly.update(this.element, this.restyled(curves), { "xaxis.range": target, ...heads });
         this.curves = curves;
+        const coarse = this.coarseness(curves), shapes = coarse === this.coarse ? {} : { shapes: this.layout().shapes };
+        this.coarse = coarse;
+        await Plotly.update(this.element, this.restyled(curves), { "xaxis.range": target, ...heads, ...shapes });
         this.label(curves);
       } while (this.again);
     } finally { this.busy = false; }

@@ -63,6 +63,23 @@ def test_back_and_forward_walk_through_the_faults(open_page: OPEN) -> None:
     page.wait_for_url(re.compile(r"#fault=F1&t=30\.5000,31\.5000$"))
 
 
+@pytest.mark.parametrize(
+    ("asked", "words"),
+    [
+        ("fault=F99", "There is no fault F99 in this report: F1 is shown."),
+        ("fault=F2&t=abc", "“abc” is no time: expected t=seconds or t=from,to."),
+        ("fault=F2&plots=wheel.FR.v,nope.v", "There is no signal nope.v in this report."),
+        ("fault=%3Cb%3E&t=3,1", "There is no fault <b> in this report: F1 is shown. “3,1” is no time"),
+    ],
+)
+def test_what_the_address_asks_for_and_is_not_there_is_said(open_page: OPEN, asked: str, words: str) -> None:
+    page = drawn(open_page("five_faults", f"#{asked}"))
+    expect(page.locator("#missing")).to_contain_text(words)
+    expect(page.locator("#live")).to_contain_text(words)
+    page.keyboard.press("j")
+    expect(page.locator("#missing")).to_have_count(0)
+
+
 def test_each_plot_tells_how_it_is_drawn(open_page: OPEN) -> None:
     page = drawn(open_page("five_faults", "#fault=F1&t=29,31"))
     rows = page.evaluate("document.getElementById('figure').layout.annotations.filter(a => a.xref === 'paper').length")
@@ -75,7 +92,14 @@ def test_each_plot_tells_how_it_is_drawn(open_page: OPEN) -> None:
 def test_extremes_stored_of_a_long_mission_are_never_called_samples(open_page: OPEN) -> None:
     page = drawn(open_page("long_mission", "#fault=F1&t=29,31"))
     expect(page.locator("#badge")).to_contain_text("extremes of 64 samples stored")
-    expect(page.locator("#figure")).to_contain_text("min–max of 64 samples")
+    expect(page.locator("#badge")).to_contain_text("every sample: mfhca diagnose LOG --start 24 --end 36")
+    expect(page.locator("#figure")).to_contain_text("min–max of 64 samples, times to ")
+    dt, start, grey = page.evaluate(
+        "[Data.view.dt, Data.view.faults.find((f) => f.id === 'F1').start,"
+        " document.getElementById('figure').layout.shapes.filter((s) => s.opacity === 0.3).map((s) => [s.x0, s.x1])]"
+    )
+    assert grey[0][0] <= start <= grey[0][1] + 1e-9
+    assert grey[0][1] - grey[0][0] == pytest.approx(64 * dt)
     expect(page.locator("#figure")).not_to_contain_text("every sample")
     with page.expect_download() as download:
         page.locator("[data-act=csv][data-of=evidence]").click()
