@@ -9,9 +9,11 @@ from typing import Any
 
 import orjson
 
+from diagnosis.audit.fleet_arrivals import arrivals
 from diagnosis.audit.fleet_csv import fleet_csv
 from diagnosis.audit.fleet_document import Fleet, fleet_document, fleet_of
-from diagnosis.audit.fleet_machines import Limits, machines_of
+from diagnosis.audit.fleet_gather import machines_of
+from diagnosis.audit.fleet_machines import Limits
 from diagnosis.audit.fleet_read import read_missions
 from diagnosis.audit.fleet_trends import Axis
 from replay.files import atomic_path
@@ -82,8 +84,9 @@ def load_fleet(store_path: Path, out: Path | None = None, axis: Axis = "hours") 
     """
     folder = out if out is not None else store_path if store_path.is_dir() else store_path.parent
     missions = read_missions(store_path)
-    machines, _ = machines_of(missions, lambda report: _limits(folder / report / "report.json"))
-    return fleet_of(machines, missions, axis)
+    came = arrivals(store_path if store_path.is_dir() else store_path.parent, missions)
+    machines, unknown = machines_of(missions, lambda report: _limits(folder / report / "report.json"), came)
+    return fleet_of(machines, missions, axis, unknown)
 
 
 def fleet_json(fleet: Fleet, baseline: Path | None = None) -> dict[str, Any]:
@@ -108,11 +111,13 @@ def _limits(path: Path) -> Limits:
             return Limits()
         report = orjson.loads(path.read_bytes())
         limits, machine = report.get("limits") or {}, report.get("machine") or {}
+        cleared = (report.get("verdict") or {}).get("cleared")
         return Limits(
             min_epsilon=float(limits.get("min_epsilon", Limits.min_epsilon)),
             min_assessed=float(limits.get("min_assessed", Limits.min_assessed)),
             wheels=_names(machine, "wheels"),
             axles=_names(machine, "axles"),
+            cleared=cleared if isinstance(cleared, bool) else None,
         )
     except (OSError, ValueError, TypeError, AttributeError):
         return Limits()

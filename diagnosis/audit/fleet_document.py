@@ -2,12 +2,15 @@
 
 - ``schema``, ``version`` (of the tool), ``axis`` of the trends (``hours`` of driving in the audited missions, or ``days``).
 - ``verdict``: ``status`` (the worst machine's: ``stop``, ``watch``, ``not_assessed``, ``ready``), ``tag``, ``title``, ``text``.
-- ``counts``: ``machines``, ``missions`` and how they ended by ``states``, ``pending`` (not audited yet), ``copies`` (of a log
+- ``counts``: ``machines``, ``missions`` and how they ended by ``states``, ``not_assessed`` (read, but nothing
+  could be assessed), ``unknown`` (not judged, perhaps newer than what was, and of no known machine), ``pending`` (not audited yet), ``copies`` (of a log
   that stands under another name too), ``gone`` (the log is no longer there), ``undated`` (its clock does not know the date, or another mission
   of the machine starts at the same moment),
   ``with_faults``, ``driving_s``, ``distance_m``, ``decided`` (share of driving time that was judged), ``faults`` by status,
   ``first_ns`` and ``last_ns`` (start of the first and last dated mission).
-- ``machines``, worst first: ``id``, ``name``, ``label``, ``verdict``, ``note``, ``missions`` and ``undated`` (places in the list
+- ``machines``, worst first: ``id``, ``name``, ``label``, ``verdict``, ``standing`` (the same in words), ``last_verdict`` and
+  ``last_judged_ns`` (of its last judged mission), ``unjudged`` (missions that were not judged and may be later: such a machine is not
+  ``ready``), ``cleared`` (whether its last judged mission's report lets it go out; null: not said), ``note``, ``missions`` and ``undated`` (places in the list
   ``missions``, those with a date in its order), ``failed``, ``with_faults``, ``driving_s``, ``decided``, ``min_epsilon``, ``parts``:
   per component and side ``assessed`` (missions), ``assessed_last``, and ``modes`` (missions with each).
 - ``faults``: ``machine`` (place in ``machines``), ``component``, ``kind``, ``side``, ``mode``, ``severity``, ``status`` (``new``,
@@ -54,9 +57,13 @@ class Fleet:
     trends: tuple[tuple[PartTrend, ...], ...]
     missions: tuple[Mission, ...]
     axis: Axis
+    unknown: tuple[Mission, ...] = ()
+    """Logs that were not judged, whose machine is not known and that may be later than what was judged."""
 
 
-def fleet_of(machines: Sequence[Machine], missions: Sequence[Mission], axis: Axis = "hours") -> Fleet:
+def fleet_of(
+    machines: Sequence[Machine], missions: Sequence[Mission], axis: Axis = "hours", unknown: Sequence[Mission] = ()
+) -> Fleet:
     """Order machines worst first: by verdict, then by how soon a limit comes near, then by missions with faults."""
     found = [(m, tuple(trends_of(m, axis))) for m in machines]
 
@@ -77,19 +84,20 @@ def fleet_of(machines: Sequence[Machine], missions: Sequence[Mission], axis: Axi
         return k, r.start_ns is None, r.start_ns or 0, m.name
 
     ordered = tuple(sorted(missions, key=order))
-    return Fleet(tuple(m for m, _ in found), tuple(t for _, t in found), ordered, axis)
+    return Fleet(tuple(m for m, _ in found), tuple(t for _, t in found), ordered, axis, tuple(unknown))
 
 
 def fleet_document(fleet: Fleet, baseline: Mapping[str, Any] | None = None) -> dict[str, Any]:
     """The document of a fleet; the same fleet gives the same document."""
     owner = {id(r.result): k for k, m in enumerate(fleet.machines) for r in m.runs}
-    owner |= {id(f.result): k for k, m in enumerate(fleet.machines) for f in m.failed}
+    failed = {f.name: k for k, m in enumerate(fleet.machines) for f in m.failed}
     first: dict[int, str] = {}
     for mission in sorted(fleet.missions, key=lambda m: m.name):
         if mission.result is not None:
             first.setdefault(mission.result.id, mission.name)
     at = {mission.name: k for k, mission in enumerate(fleet.missions)}
-    status, tag, title = words.headline(fleet.machines)
+    status, tag, title = words.headline(fleet.machines, len(fleet.unknown))
+    counts = _counts(fleet, first)
     unread = sum(m.result is not None and m.result.state not in READ for m in fleet.missions)
     return {
         "schema": SCHEMA,
@@ -99,13 +107,15 @@ def fleet_document(fleet: Fleet, baseline: Mapping[str, Any] | None = None) -> d
             "status": status,
             "tag": tag,
             "title": title,
-            "text": words.sentences(fleet.machines, fleet.trends, unread, fleet.axis),
+            "text": words.sentences(
+                fleet.machines, fleet.trends, (unread, counts["not_assessed"], counts["pending"]), fleet.axis
+            ),
         },
-        "counts": _counts(fleet, first),
+        "counts": counts,
         "machines": [_machine(m, at) for m in fleet.machines],
         "faults": [_fault(k, f, at) for k, m in enumerate(fleet.machines) for f in m.faults],
         "trends": [_trend(k, t, at, fleet.axis) for k, own in enumerate(fleet.trends) for t in own],
-        "missions": [_mission(m, owner, first) for m in fleet.missions],
+        "missions": [_mission(m, failed.get(m.name, owner.get(id(m.result))), first) for m in fleet.missions],
         "baseline": baseline,
     }
 
@@ -122,6 +132,8 @@ def _counts(fleet: Fleet, first: Mapping[int, str]) -> dict[str, Any]:
         "machines": len(fleet.machines),
         "missions": len(fleet.missions),
         "states": {s: states[s] for s in STATES},
+        "not_assessed": sum(r.verdict == "not_assessed" for r in results),
+        "unknown": len(fleet.unknown),
         "pending": len(fleet.missions) - len(results),
         "copies": len(results) - len(first),
         "gone": sum(m.gone for m in fleet.missions),
@@ -142,6 +154,11 @@ def _machine(m: Machine, at: Mapping[str, int]) -> dict[str, Any]:
         "name": m.name,
         "label": m.label,
         "verdict": m.verdict,
+        "standing": words.standing(m),
+        "last_verdict": m.last_verdict,
+        "last_judged_ns": m.last_judged.result.start_ns if m.last_judged else None,
+        "cleared": m.cleared,
+        "unjudged": m.unjudged,
         "note": m.note,
         "missions": [at[r.name] for r in m.dated],
         "undated": [at[r.name] for r in m.undated],
@@ -236,17 +253,24 @@ def _line(line: Line | None, now: float) -> dict[str, Any] | None:
     }
 
 
-def _mission(m: Mission, owner: Mapping[int, int], first: Mapping[int, str]) -> dict[str, Any]:
+def _mission(m: Mission, owner: int | None, first: Mapping[int, str]) -> dict[str, Any]:
     r = m.result
     head: dict[str, Any] = {"name": m.name, "files": list(m.files), "bytes": m.bytes, "gone": m.gone}
     if r is None:
-        return {**head, "machine": None, "state": "pending", "reason": "not audited yet", "verdict": None, "faults": []}
+        return {
+            **head,
+            "machine": owner,
+            "state": "pending",
+            "reason": "not audited yet",
+            "verdict": None,
+            "faults": [],
+        }
     faults = sorted(
         (f for f in r.faults if f.severity != "info"), key=lambda f: (-SEVERITIES.index(f.severity), -f.seconds)
     )
     return {
         **head,
-        "machine": owner.get(id(r)),
+        "machine": owner,
         "state": r.state,
         "reason": r.reason,
         "verdict": r.verdict,

@@ -2,14 +2,15 @@
 
 Copies of a log count once. Missions whose log does not know the date, or which start at the same moment as another one of
 the machine, cannot be ordered: they count, but they take no part in trends or what is new. Where one of them is worse than the last dated one, the machine stands as the worse.
+
+A machine is ``ready`` only where no mission that was not judged may be later than its last judged one. A log that was not
+read, or does not know the date, may be later unless an audit looked at it before that mission began.
 """
 
 from __future__ import annotations
 
 import itertools
-from collections import Counter, defaultdict
-from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Literal
 
@@ -21,18 +22,21 @@ EITHER = "sensor_or_actuator"
 STANDING = 3
 _LEAST_SHARE = 0.8
 
-Key = tuple[str, str, str]
 Status = Literal["new", "recurring", "once", "past"]
 
 
 @dataclass(frozen=True)
 class Limits:
-    """What the machine file says of limits, and which components steer; the defaults are those of the paper's machine."""
+    """What a report says of limits, which components steer, and whether the machine may go out (None: it does not say).
+
+    The defaults are those of the paper's machine.
+    """
 
     min_epsilon: float = 0.1
     min_assessed: float = 10.0
     wheels: tuple[str, ...] = ("FR", "FL", "RR", "RL")
     axles: tuple[str, ...] = ("front", "rear")
+    cleared: bool | None = None
 
 
 @dataclass(frozen=True)
@@ -132,9 +136,13 @@ class Machine:
     undated : tuple[Run, ...]
         Judged missions that cannot be ordered, by name.
     failed : tuple[Mission, ...]
-        Missions without a report.
+        Missions without a report, also those that name no machine but lie among its logs alone.
     limits : Limits
         Of its last report.
+    cleared : bool or None
+        Whether the report of its last judged mission lets it go out; None where it does not say.
+    unjudged : int
+        Missions that were not judged and may be later than the last judged one.
     faults : tuple[FleetFault, ...]
         Faults by part and row, those that stand and the severe ones first.
     """
@@ -145,6 +153,8 @@ class Machine:
     undated: tuple[Run, ...]
     failed: tuple[Mission, ...]
     limits: Limits = field(default_factory=Limits)
+    cleared: bool | None = None
+    unjudged: int = 0
     faults: tuple[FleetFault, ...] = ()
 
     @property
@@ -157,18 +167,28 @@ class Machine:
         """All judged missions."""
         return self.dated + self.undated
 
+    @property
+    def last_judged(self) -> Run | None:
+        """The last dated mission that assessed anything."""
+        return next((r for r in reversed(self.dated) if r.result.verdict not in (None, "not_assessed")), None)
+
     @cached_property
-    def verdict(self) -> str:
-        """Where it stands: verdict of its last mission that assessed anything.
+    def last_verdict(self) -> str:
+        """Where it stood when it was judged last.
 
         Worse where a mission of unknown date says so, or where no later mission assessed the part of an earlier fault.
         """
-        known = [r.result.verdict or "not_assessed" for r in self.dated]
-        last = next((v for v in reversed(known) if v != "not_assessed"), "not_assessed" if known else None)
-        found = [*([last] if last else []), *(r.result.verdict or "not_assessed" for r in self.undated)]
+        last = self.last_judged
+        found = [r.result.verdict for r in ((last,) if last else ()) + self.undated]
         found += ["stop" if f.severity == "high" else "watch" for f in self.faults if not f.since]
-        found = [v for v in found if v != "not_assessed"] or found
-        return min(found, key=VERDICTS.index) if found else "not_assessed"
+        known = [v for v in found if v is not None and v != "not_assessed"]
+        return min(known, key=VERDICTS.index, default="not_assessed")
+
+    @property
+    def verdict(self) -> str:
+        """Where it stands: as it was judged last, but ready only where that is known of its newest mission too."""
+        held = self.unjudged > 0 or self.cleared is False
+        return "not_assessed" if self.last_verdict == "ready" and held else self.last_verdict
 
     @property
     def note(self) -> str:
@@ -179,8 +199,11 @@ class Machine:
             out.append(f"its last {_count(len(trailing), 'mission')} could not be assessed")
         if self.undated:
             out.append(f"{_count(len(self.undated), 'mission')} of unknown order")
-        if self.failed:
-            out.append(f"{_count(len(self.failed), 'log')} not read")
+        unread = sum(m.result is not None for m in self.failed)
+        if unread:
+            out.append(f"{_count(unread, 'log')} not read")
+        if len(self.failed) > unread:
+            out.append(f"{_count(len(self.failed) - unread, 'log')} not audited yet")
         return ", ".join(out)
 
     @property
@@ -217,92 +240,3 @@ class Machine:
 
 def _count(n: int, word: str) -> str:
     return f"{n} {word}{'' if n == 1 else 's'}"
-
-
-def machines_of(
-    missions: Iterable[Mission], limits: Callable[[str], Limits] | None = None
-) -> tuple[list[Machine], list[Mission]]:
-    """Gather missions by machine.
-
-    Parameters
-    ----------
-    missions : Iterable[Mission]
-        From `read_missions`.
-    limits : Callable[[str], Limits] or None
-        Gives the limits by the folder of a report, asked for the last one of each machine; None for the defaults.
-
-    Returns
-    -------
-    tuple[list[Machine], list[Mission]]
-        Machines by identity and name; and missions without a report whose machine is not known.
-    """
-    runs: dict[tuple[str, str], dict[int, Run]] = defaultdict(dict)
-    failed: dict[tuple[str, str], list[Mission]] = defaultdict(list)
-    nowhere: list[Mission] = []
-    for m in missions:
-        if m.result is None:
-            continue
-        key = (m.result.machine_id, "" if m.result.machine_id else m.result.machine_name)
-        if m.result.judged:
-            known = runs[key].get(m.result.id)
-            runs[key][m.result.id] = Run(known.name if known else m.name, m.result, known.copies + 1 if known else 0)
-        elif m.result.machine_id:
-            failed[key].append(m)
-        else:
-            nowhere.append(m)
-    out = []
-    for key in sorted({*runs, *failed}):
-        found = list(runs[key].values())
-        starts = Counter(r.result.start_ns for r in found if r.result.start_ns is not None)
-        alone = {start for start, count in starts.items() if count == 1}
-        dated = sorted((r for r in found if r.result.start_ns in alone), key=lambda r: r.result.start_ns or 0)
-        undated = sorted((r for r in found if r.result.start_ns not in alone), key=lambda r: r.name)
-        last = next((r for r in (*reversed(dated), *undated) if r.result.report is not None), None)
-        own = limits(last.result.report or "") if limits and last else Limits()
-        name = key[1] or (last.result.machine_name if last else "")
-        machine = Machine(key[0], name, tuple(dated), tuple(undated), tuple(failed[key]), own)
-        out.append(_with_faults(machine))
-    return out, nowhere
-
-
-def _with_faults(m: Machine) -> Machine:
-    groups: dict[Key, list[tuple[Run, FoundFault]]] = defaultdict(list)
-    for run in m.runs:
-        for f in run.faults:
-            groups[f.component, f.side, f.mode].append((run, f))
-    faults = [_fleet_fault(m, found) for found in groups.values()]
-    faults.sort(key=lambda f: (not f.standing, -SEVERITIES.index(f.severity), -f.missions, f.component, f.side, f.mode))
-    return replace(m, faults=tuple(faults))
-
-
-def _fleet_fault(m: Machine, found: Sequence[tuple[Run, FoundFault]]) -> FleetFault:
-    f = found[0][1]
-    ids = list(dict.fromkeys(r.result.id for r, _ in found))
-    last_run = found[-1][0]
-    dated = [k for k, r in enumerate(m.dated) if r.result.id in set(ids)]
-    if dated:
-        last_run = m.dated[dated[-1]]
-    in_last = [g for r, g in found if r.result.id == last_run.result.id]
-    worst = max(in_last, key=lambda g: (SEVERITIES.index(g.severity), g.seconds))
-    assessed = [r.assessed(f.component, f.side, m.limits) for r in m.dated]
-    since = sum(assessed[dated[-1] + 1 :]) if dated and len(dated) == len(ids) else 0
-    before = sum(assessed[: dated[0]]) if dated else 0
-    undated = sum(r.assessed(f.component, f.side, m.limits) for r in m.undated)
-    status: Status = "past" if since >= STANDING else "recurring" if len(ids) > 1 else "once"
-    if len(ids) == 1 and dated and dated[0] == len(m.dated) - 1 and before:
-        status = "new"
-    return FleetFault(
-        component=f.component,
-        kind=f.kind,
-        side=f.side,
-        mode=f.mode,
-        severity=max((g.severity for _, g in found), key=SEVERITIES.index),
-        status=status,
-        missions=len(ids),
-        assessed=max(len(ids), sum(assessed) + undated),
-        first=m.dated[dated[0]] if dated else found[0][0],
-        last=last_run,
-        last_id=worst.id,
-        since=since,
-        epsilon=worst.epsilon,
-    )

@@ -73,6 +73,7 @@ class Result:
     open_loop: bool
     report: str | None
     version: str
+    log_hash: str
     faults: tuple[FoundFault, ...]
     parts: tuple[Part, ...]
 
@@ -95,7 +96,7 @@ class Mission:
 
 _RESULTS = (
     "SELECT id, state, reason, attempts, machine_id, machine_name, verdict, title, start_ns, duration_s, driving_s, "
-    "distance_m, open_loop, report, version FROM result WHERE id IN (SELECT result FROM mission) ORDER BY id"
+    "distance_m, open_loop, report, version, log_hash FROM result WHERE id IN (SELECT result FROM mission) ORDER BY id"
 )
 _FAULTS = (
     "SELECT result, id, component, kind, side, mode, severity, stop_s - start_s, epsilon, epsilon_low, epsilon_high, "
@@ -135,6 +136,19 @@ def read_missions(store: Path) -> list[Mission]:
             Mission(name, tuple(map(str, json.loads(files))), size, results.get(r), bool(gone))
             for name, files, size, r, gone in db.rows(_MISSIONS)
         ]
+
+
+def read_run(store: Path) -> int:
+    """Number of the last audit run of a store; 0 where there was none.
+
+    Raises
+    ------
+    OutputError
+        As `read_missions`.
+    """
+    with closing(Database(store / FILE_NAME if store.is_dir() else store, read_only=True)) as db:
+        rows = db.rows("SELECT value FROM meta WHERE name = 'run'")
+        return int(rows[0][0]) if rows else 0
 
 
 def _result(row: Any, faults: tuple[FoundFault, ...], parts: tuple[Part, ...]) -> Result:

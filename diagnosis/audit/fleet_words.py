@@ -7,13 +7,15 @@ from collections.abc import Sequence
 from diagnosis.audit.fleet_machines import VERDICTS, FleetFault, Machine
 from diagnosis.audit.fleet_trends import Axis, PartTrend
 from diagnosis.audit.trend import Forecast
+from diagnosis.report.names import utc
 from diagnosis.wording import MODE_WORDS, join_words, part_words
 
 _SHOWN = 3
+_NAMED = 12
 _UNITS = {"hours": "h of driving", "days": "days"}
 _TAGS = {
     "stop": "stop and repair",
-    "watch": "ready, with faults to watch",
+    "watch": "faults to watch",
     "not_assessed": "not assessed",
     "ready": "ready",
 }
@@ -52,8 +54,37 @@ def forecast_words(f: Forecast, limit: float, axis: Axis = "hours") -> str:
     return f"reaches {round_to(limit)} in {round_to(f.soonest)} to {round_to(f.latest)} {unit} (90 %)"
 
 
-def headline(machines: Sequence[Machine]) -> tuple[str, str, str]:
-    """Status of the fleet, a few words above its sentence, and the sentence."""
+def standing(m: Machine) -> str:
+    """Where a machine stands: ``Stop and repair, and later missions not judged``."""
+    if m.verdict == "ready":
+        return "Ready"
+    if m.verdict == "not_assessed":
+        if m.last_verdict == "not_assessed":
+            return "Not assessed"
+        last = m.last_judged
+        since = f" since {utc(last.result.start_ns)[:10]}" if last and last.result.start_ns is not None else ""
+        return f"Not assessed{since}: last judged ready" + (", but not cleared" if m.cleared is False else "")
+    words = "Stop and repair"
+    if m.verdict == "watch":
+        lasting = m.last_judged is not None and m.last_judged.result.verdict == "watch"
+        words = "Faults to watch"
+        if lasting and m.cleared is False:
+            words = "Faults to watch, not cleared"
+        elif lasting and m.cleared and not m.unjudged:
+            words = "Ready, with faults to watch"
+    return words + (", and later missions not judged" if m.unjudged else "")
+
+
+def headline(machines: Sequence[Machine], unknown: int = 0) -> tuple[str, str, str]:
+    """Status of the fleet, a few words above its sentence, and the sentence.
+
+    Parameters
+    ----------
+    machines : Sequence[Machine]
+        All machines.
+    unknown : int
+        Logs that were not judged, whose machine is not known: none is ready for certain then.
+    """
     verdicts = [m.verdict for m in machines]
     status = min(verdicts, key=VERDICTS.index, default="not_assessed")
     n, work = len(machines), sum(v in ("stop", "watch") for v in verdicts)
@@ -66,9 +97,13 @@ def headline(machines: Sequence[Machine]) -> tuple[str, str, str]:
     elif work:
         title = f"{work} of {count(n, 'machine')} {'needs' if work == 1 else 'need'} work"
     elif open_ == n:
-        title = "The machine could not be assessed" if n == 1 else f"None of {n} machines could be assessed"
+        title = _none_ready(machines)
     elif open_:
         title = f"{n - open_} of {count(n, 'machine')} {'is' if n - open_ == 1 else 'are'} ready"
+    elif unknown:
+        status, tag = "not_assessed", "not all assessed"
+        known = "The machine is" if n == 1 else f"{n} machines are"
+        title = f"{known} ready, but {count(unknown, 'log')} of no known machine {_was(unknown)} not judged"
     else:
         title = "The machine is ready" if n == 1 else f"All {n} machines are ready"
     if open_ and open_ < n:
@@ -76,28 +111,70 @@ def headline(machines: Sequence[Machine]) -> tuple[str, str, str]:
     return status, tag, title
 
 
+def _none_ready(machines: Sequence[Machine]) -> str:
+    n = len(machines)
+    if any(m.last_verdict != "not_assessed" for m in machines):
+        return "The machine is not known to be ready" if n == 1 else f"None of {n} machines is known to be ready"
+    return "The machine could not be assessed" if n == 1 else f"None of {n} machines could be assessed"
+
+
+def _was(n: int) -> str:
+    return "was" if n == 1 else "were"
+
+
 def sentences(
-    machines: Sequence[Machine], trends: Sequence[Sequence[PartTrend]], unread: int, axis: Axis = "hours"
+    machines: Sequence[Machine],
+    trends: Sequence[Sequence[PartTrend]],
+    failed: tuple[int, int, int],
+    axis: Axis = "hours",
 ) -> list[str]:
-    """What stands behind the headline: the worst machines, limits that come near, logs that were not read."""
-    out = []
+    """What stands behind the headline: the worst machines, limits that come near, logs that were not judged.
+
+    Parameters
+    ----------
+    machines, trends
+        Machines, worst first, and their trends.
+    failed : tuple[int, int, int]
+        Logs that were not read, missions that were read but not assessed, and those not audited yet.
+    axis : str
+        ``hours`` or ``days``.
+    """
     bad = [m for m in machines if m.verdict in ("stop", "watch")]
+    out = []
+    for verdict, words in (("stop", "Must not go out"), ("watch", "Faults to watch"), ("not_assessed", "Not assessed")):
+        found = [m for m in machines if m.verdict == verdict]
+        if len(found) > _SHOWN or (found and verdict == "not_assessed") or (found and len(bad) > _SHOWN):
+            out.append(f"{words} ({len(found)}): {_named(found)}.")
     for m in bad[:_SHOWN]:
         told = [_found(m, f) for f in m.faults if f.standing][:2]
         note = f" ({m.note})" if m.note else ""
-        out.append(f"{m.label} – {_TAGS[m.verdict]}: {join_words(told) or 'see its last mission'}{note}.")
-    if len(bad) > _SHOWN:
-        out.append(
-            f"{count(len(bad) - _SHOWN, 'further machine')} {'has' if len(bad) == _SHOWN + 1 else 'have'} faults."
-        )
+        words = standing(m)
+        out.append(f"{m.label} – {words[0].lower() + words[1:]}: {join_words(told) or 'see its last mission'}{note}.")
     near = [(m, t) for m, own in zip(machines, trends, strict=True) for t in own if t.approaching]
     near.sort(key=lambda p: p[1].trend.forecast.likely or 0.0)
     for m, t in near[:2]:
         words = forecast_words(t.trend.forecast, t.limit, axis)
         out.append(f"{m.label}: the loss of the {part_words(t.kind, t.component, t.side)} {words}.")
-    if unread:
-        out.append(f"{count(unread, 'log')} could not be read or judged.")
+    unread, open_, pending = failed
+    if unread or open_:
+        both = f": {unread} not read, {open_} read but not assessed" if unread and open_ else ""
+        out.append(f"{count(unread + open_, 'log')} could not be read or judged{both}.")
+    if pending:
+        out.append(f"{count(pending, 'mission')} {'is' if pending == 1 else 'are'} not audited yet.")
     return out
+
+
+def _named(machines: Sequence[Machine]) -> str:
+    """Names of machines, where one is not ready any more with the reason."""
+    told = [m.label for m in machines[:_NAMED]]
+    if machines[0].verdict == "not_assessed":
+        told = [
+            m.label + (f" ({words.partition(' ')[2]})" if (words := standing(m)) != "Not assessed" else "")
+            for m in machines[:_NAMED]
+        ]
+        told = [t.replace("(assessed since", "(since").replace("(assessed: ", "(") for t in told]
+    more = len(machines) - len(told)
+    return ", ".join(told) + (f" and {more} more: listed below" if more else "")
 
 
 def _found(m: Machine, f: FleetFault) -> str:

@@ -11,7 +11,7 @@ from diagnosis.report import names
 
 VERDICTS = {
     "stop": "Stop and repair",
-    "watch": "Ready, with faults to watch",
+    "watch": "Faults to watch",
     "ready": "Ready",
     "not_assessed": "Not assessed",
 }

@@ -42,7 +42,7 @@ def matrix(machines: Sequence[Mapping[str, Any]]) -> Matrix:
             quiet += 1
             continue
         sums = [a + b for a, b in zip(sums, counts, strict=True)]
-        cells = [_cell(table.get(c), n, most) for c, n in zip(columns, counts, strict=True)]
+        cells = [_cell(table.get(c), n, most, bool(table)) for c, n in zip(columns, counts, strict=True)]
         rows.append((m["label"], cells, sum(counts)))
     heads: list[tuple[str, int]] = []
     for component, _ in columns:
@@ -58,11 +58,11 @@ def _count(part: Mapping[str, Any]) -> int:
     return sum(part["modes"].values())
 
 
-def _cell(part: Mapping[str, Any] | None, count: int, most: int) -> Markup:
-    if part is None:
+def _cell(part: Mapping[str, Any] | None, count: int, most: int, judged: bool) -> Markup:
+    if part is None and judged:
         return Markup('<td class="nil"><span class="sr">no such part</span></td>')
-    if not count:
-        if part["assessed"]:
+    if part is None or not count:
+        if part is not None and part["assessed"]:
             return Markup('<td class="nil"><span class="sr">0</span></td>')
         return Markup('<td class="blind" title="never assessed">–<span class="sr"> never assessed</span></td>')
     level = 1 + (_LEVELS - 1) * (count - 1) // max(1, most - 1)

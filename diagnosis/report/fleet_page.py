@@ -21,7 +21,7 @@ from markupsafe import Markup
 from diagnosis.audit.fleet_words import count
 from diagnosis.report import fleet_rows as rows
 from diagnosis.report import names
-from diagnosis.report.fleet_changes import VERDICTS, changes_of
+from diagnosis.report.fleet_changes import changes_of
 from diagnosis.report.fleet_courses import MOST, chosen, course, interest, level_words
 from diagnosis.report.fleet_matrix import matrix
 from diagnosis.report.fleet_svg import mark, sparkline, sprite
@@ -34,7 +34,9 @@ _UNITS = {"hours": "h", "days": "d"}
 _STATUS = {"new": "New", "recurring": "Recurring", "once": "Once", "past": "Past"}
 _DEFINITIONS = (
     "A machine stands as its last mission that could be assessed, or worse where no later mission assessed the part of an "
-    "earlier fault. Missions whose log does not know the date, or which start at the same moment, count, but cannot be ordered.",
+    "earlier fault. It is ready only where no mission that was not judged may be later: a log that cannot be read or knows "
+    "no date may be, unless an earlier audit run looked at it before that mission began. A log that names no machine counts "
+    "for the one that alone has judged missions in its folder. Missions whose log does not know the date, or which start at the same moment, count, but cannot be ordered.",
     "New: in the machine's last mission and in none before, of which one assessed the part. Recurring: in several missions. "
     "Past: not found in the last three missions that assessed the part. Faults of severity “info” are left out.",
     "Assessed: judged for the seconds that the verdict “ready” takes, and for four fifths of its driving.",
@@ -169,7 +171,12 @@ def _kpis(document: Mapping[str, Any]) -> list[tuple[str, str, str]]:
     ]
     rest = [
         f"{names.grouped(c[k])} {w}"
-        for k, w in (("pending", "not audited yet"), ("copies", "copies"), ("gone", "logs no longer there"))
+        for k, w in (
+            ("not_assessed", "not assessed"),
+            ("pending", "not audited yet"),
+            ("copies", "copies"),
+            ("gone", "logs no longer there"),
+        )
         if c[k]
     ]
     judged = sum(len(m["missions"]) + len(m["undated"]) for m in document["machines"])
@@ -210,7 +217,7 @@ def _machine(
 ) -> dict[str, Any]:
     leading = max((t for t in trends if t["line"] is not None), key=interest, default=None)
     judged = len(m["missions"]) + len(m["undated"])
-    words, symbol = VERDICTS[m["verdict"]], rows.verdict_symbol(m["verdict"])
+    words, symbol = m["standing"], rows.verdict_symbol(m["verdict"])
     if m["verdict"] == "ready" and standing:
         often = any(f["status"] == "recurring" for f in standing)
         words, symbol = f"Ready, fault {'comes and goes' if often else 'seen lately'}", "warning"

@@ -1,0 +1,157 @@
+"""No machine is ready whose newest mission was not judged; the headline names what must not go out."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from diagnosis.audit.fleet import fleet_json, load_fleet
+from diagnosis.report.fleet_matrix import matrix
+from diagnosis.report.fleet_page import build_fleet_page
+from tests import fleet_samples as samples
+from tests.fleet_samples import DAY_NS, START_NS, Fault, Sample
+
+READY = [Sample("d0"), Sample("d1", day=1.0)]
+EMPTY = Sample("d2", "", state="unreadable", reason="d2.csv: is empty.")
+BLIND = Sample("d1", day=1.0, verdict="not_assessed")
+
+
+def document(tmp_path: Path, *missions: Sample) -> dict[str, Any]:
+    return fleet_json(load_fleet(samples.write_store(tmp_path / "fleet.sqlite", missions)))
+
+
+def write_object(folder: Path, k: int, mission: str, day: float) -> None:
+    """Result object that says when an audit looked at the k-th mission."""
+    place = folder / "results" / f"{k:064x}"[:8]
+    place.parent.mkdir(parents=True, exist_ok=True)
+    made = int(START_NS + day * DAY_NS)
+    text = json.dumps({"made_ns": made, "mission": {"name": mission}})
+    place.with_name(f"{place.name}-cccccccc-1.0-{k}.json").write_text(text, encoding="utf-8")
+
+
+@pytest.mark.parametrize(
+    ("missions", "standing"),
+    [
+        ([*READY, EMPTY], "Not assessed since 2026-10-27: last judged ready"),
+        ([Sample("d0"), BLIND], "Not assessed since 2026-10-26: last judged ready"),
+        ([Sample("d0"), Sample("d1", state="crashed")], "Not assessed since 2026-10-26: last judged ready"),
+        ([Sample("d0"), Sample("d1", state=None)], "Not assessed since 2026-10-26: last judged ready"),
+        (
+            [Sample("d0"), Sample("d1", day=None, verdict="not_assessed")],
+            "Not assessed since 2026-10-26: last judged ready",
+        ),
+        ([Sample("d0", day=None), EMPTY], "Not assessed: last judged ready"),
+        ([BLIND], "Not assessed"),
+        ([EMPTY, Sample("d0", verdict="not_assessed")], "Not assessed"),
+    ],
+)
+def test_a_newest_mission_that_was_not_judged_is_no_leave(
+    tmp_path: Path, missions: list[Sample], standing: str
+) -> None:
+    d = document(tmp_path, *missions)
+    (m,) = d["machines"]
+    assert (m["verdict"], m["standing"]) == ("not_assessed", standing)
+    assert d["verdict"]["status"] == "not_assessed"
+    page = build_fleet_page(d)
+    assert "machines are ready" not in page
+    assert "machine is ready" not in page
+    assert 'class="card verdict not_assessed"' in page
+    assert standing in page
+
+
+def test_an_earlier_mission_that_was_not_judged_takes_nothing_away(tmp_path: Path) -> None:
+    d = document(tmp_path, Sample("d0", verdict="not_assessed"), *READY[1:])
+    assert d["verdict"]["title"] == "The machine is ready"
+
+
+@pytest.mark.parametrize(("day", "verdict"), [(0.9, "ready"), (1.1, "not_assessed")])
+def test_a_log_that_was_there_before_the_last_mission_began_is_older(tmp_path: Path, day: float, verdict: str) -> None:
+    write_object(tmp_path, 2, "d1", 1.5)
+    write_object(tmp_path, 3, "d2", day)
+    assert document(tmp_path, *READY, EMPTY)["machines"][0]["verdict"] == verdict
+
+
+def test_an_empty_log_is_as_new_as_its_own_name_though_an_older_one_was_empty_too(tmp_path: Path) -> None:
+    write_object(tmp_path, 2, "d1", 1.5)
+    write_object(tmp_path, 3, "another", 0.1)
+    assert document(tmp_path, *READY, EMPTY)["machines"][0]["verdict"] == "not_assessed"
+
+
+def test_a_log_whose_clock_runs_ahead_makes_no_other_one_older(tmp_path: Path) -> None:
+    write_object(tmp_path, 2, "d1", 0.5)
+    write_object(tmp_path, 3, "d2", 0.9)
+    assert document(tmp_path, *READY, EMPTY)["machines"][0]["verdict"] == "not_assessed"
+
+
+@pytest.mark.parametrize(
+    ("verdict", "severity", "standing"),
+    [
+        ("stop", "high", "Stop and repair, and later missions not judged"),
+        ("watch", "low", "Faults to watch, and later missions not judged"),
+    ],
+)
+def test_a_finding_stays_though_later_missions_were_not_judged(
+    tmp_path: Path, verdict: str, severity: str, standing: str
+) -> None:
+    d = document(tmp_path, Sample("d0", verdict=verdict, faults=[Fault(severity=severity)]), BLIND)
+    assert (d["machines"][0]["verdict"], d["machines"][0]["standing"]) == (verdict, standing)
+
+
+@pytest.mark.parametrize(
+    ("verdict", "cleared", "shown", "standing"),
+    [
+        ("watch", True, "watch", "Ready, with faults to watch"),
+        ("watch", False, "watch", "Faults to watch, not cleared"),
+        ("watch", None, "watch", "Faults to watch"),
+        ("ready", True, "ready", "Ready"),
+        ("ready", False, "not_assessed", "Not assessed since 2026-10-26: last judged ready, but not cleared"),
+    ],
+)
+def test_what_is_not_cleared_is_not_worded_as_ready(
+    tmp_path: Path, verdict: str, cleared: bool | None, shown: str, standing: str
+) -> None:
+    samples.write_report(tmp_path, "d0")
+    path = tmp_path / "missions/d0/report.json"
+    path.write_text(json.dumps({"verdict": {"cleared": cleared}}), encoding="utf-8")
+    d = document(tmp_path, Sample("d0", verdict=verdict))
+    assert (d["machines"][0]["verdict"], d["machines"][0]["standing"]) == (shown, standing)
+
+
+def test_a_log_that_may_be_of_several_machines_leaves_none_ready_for_certain(tmp_path: Path) -> None:
+    d = document(tmp_path, Sample("d0"), Sample("d1", "HX-2"), EMPTY)
+    assert [m["verdict"] for m in d["machines"]] == ["ready", "ready"]
+    assert d["verdict"]["status"] == "not_assessed"
+    assert d["verdict"]["title"] == "2 machines are ready, but 1 log of no known machine was not judged"
+
+
+def test_a_log_counts_for_the_machine_that_alone_has_judged_missions_around_it(tmp_path: Path) -> None:
+    broken = Sample("a/new/day2", "", state="unreadable")
+    d = document(tmp_path, Sample("a/old/day0"), Sample("a/old/day1", day=1.0), Sample("b/day0", "HX-2"), broken)
+    assert {m["label"]: m["verdict"] for m in d["machines"]} == {"HX-1": "not_assessed", "HX-2": "ready"}
+    assert d["verdict"]["title"] == "1 of 2 machines is ready, 1 is not assessed"
+    assert "Not assessed (1): HX-1 (since 2026-10-27: last judged ready)." in d["verdict"]["text"]
+
+
+def test_logs_not_read_and_missions_not_assessed_are_both_counted(tmp_path: Path) -> None:
+    bad = [Sample(f"u{k}", state="unreadable") for k in range(2)]
+    open_ = [Sample(f"n{k}", day=k + 1.0, verdict="not_assessed") for k in range(2)]
+    text = document(tmp_path, Sample("a"), *bad, *open_)["verdict"]["text"]
+    assert "4 logs could not be read or judged: 2 not read, 2 read but not assessed." in text
+
+
+@pytest.mark.parametrize(("n", "more"), [(5, ""), (12, ""), (15, " and 3 more: listed below")])
+def test_all_machines_that_must_not_go_out_are_named(tmp_path: Path, n: int, more: str) -> None:
+    stuck = [Fault(mode="stuck", severity="high")]
+    text = document(tmp_path, *(Sample(f"{k}", f"M{k:02d}", verdict="stop", faults=stuck) for k in range(n)))
+    named = ", ".join(f"M{k:02d}" for k in range(min(n, 12)))
+    assert f"Must not go out ({n}): {named}{more}." in text["verdict"]["text"]
+
+
+def test_a_machine_without_any_part_that_was_assessed_shows_so(tmp_path: Path) -> None:
+    d = document(tmp_path, Sample("a", faults=[Fault()]), Sample("b", "HX-2", verdict="not_assessed", parts=[]))
+    rows = {label: cells for label, cells, _ in matrix(d["machines"]).rows}
+    assert len(rows["HX-2"]) == 12
+    assert all("never assessed" in c for c in rows["HX-2"])
