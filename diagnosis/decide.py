@@ -28,6 +28,7 @@ _MODEL_RESOLUTION = 0.25
 _COMPARED_WHEELS = 3
 _UNEXPLAINED_S = 0.5
 _SHORT_NOISE_S = 1.0
+_PROBABLY_DEAD = 0.5
 
 
 def severity_of(finding: Finding, seconds: float, limits: Limits, kind: str = "wheel") -> tuple[Severity, str]:
@@ -41,6 +42,8 @@ def severity_of(finding: Finding, seconds: float, limits: Limits, kind: str = "w
         return "low", "Probable, not certain: check it at the next service, and compare with the next mission."
     if finding.mode is FaultMode.NOISY and finding.tier == "model" and seconds < _SHORT_NOISE_S:
         return "info", "Too short to act on: a model alone shows it. Compare with the next mission."
+    if finding.mode in GONE and sum(h.p for h in finding.hypotheses if h.mode in GONE) < _PROBABLY_DEAD:
+        return "medium", "Faulty, but more probably in another way than dead: check it before the next mission."
     if finding.mode in GONE and finding.side is Side.ACTUATOR:
         return "high", "Stop at once and repair: the valve does not answer its command (Assumption 2)."
     if finding.mode in GONE and finding.side is Side.SENSOR_OR_ACTUATOR:

@@ -122,6 +122,12 @@ def test_probable_faults_are_worth_a_check(side: Side, mode: FaultMode) -> None:
     assert severity_of(finding(side, mode, p=0.89), 60.0, LIMITS)[0] == ("medium" if dead_valve else "low")
 
 
+def test_what_is_more_probably_alive_does_not_stop_the_machine() -> None:
+    found = finding(Side.ACTUATOR, FaultMode.STUCK, p=0.3)
+    found = replace(found, hypotheses=(Hypothesis("actuator", "stuck", 0.3), Hypothesis("actuator", "noisy", 0.69)))
+    assert severity_of(found, 8.0, LIMITS)[0] == "medium"
+
+
 def test_healthy_machine_is_ready() -> None:
     got = verdict(machine())
     assert (got.status, got.title) == ("ready", "No fault found")
