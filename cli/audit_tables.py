@@ -88,7 +88,7 @@ def document(audited: Audited, found: Discovery, output: Path, code: int) -> dic
         "skipped": audited.skipped,
         "counts": dict(Counter(end.state for end in audited.ends)),
         "verdicts": dict(Counter(end.verdict for end in audited.ends if end.verdict)),
-        "problems": list(found.problems),
+        "problems": [*found.problems, *found.notes],
         "missions": [asdict(end) for end in audited.ends],
     }
 

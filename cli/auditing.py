@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from contextlib import suppress
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -120,18 +121,23 @@ def audit(
     with terminal.progress("looking for missions"):
         from diagnosis.audit.discover import discover
         from diagnosis.audit.limits import Limits, usual_memory_mb
-        from diagnosis.audit.plan import Asked
+        from diagnosis.audit.plan import Asked, merged_machines
 
         found = discover(paths, exclude=output)
         count = jobs or _processors()
         limits = Limits(memory or (usual_memory_mb(count) if dask is None else Limits.memory_mb), timeout, cpu)
         asked = Asked(output, machine, machine_id or "", limits, retries, resume, max_size)
+        found = replace(found, notes=(*found.notes, *merged_machines(found.missions, asked)))
     for problem in found.problems:
-        terminal.note(problem)
-    if not found.missions:
-        raise LogError(f"{' '.join(paths)}: no mission was found ({found.left_aside} other files were left aside)")
-    if dry_run:
+        terminal.error(problem)  # also when quiet: a disk may not be there
+    for note in found.notes:
+        terminal.note(note)
+    if dry_run and found.missions:
+        from diagnosis.audit.endings import NOT_READ
+
         _list(terminal, found, asked, json)
+        if found.problems:
+            raise typer.Exit(NOT_READ)
         return
     _run(terminal, found, asked, count, dask, events, json, baseline, export, fail_on)
 
@@ -143,6 +149,10 @@ def _check(json: bool, events: str | None, export: str | None, machine_id: str |
         raise ConfigError(f"--export {export}: expected parquet")
     if machine_id is not None and not machine_id.strip():
         raise ConfigError("--machine-id: is empty; give a name or leave it out")
+
+
+def _said(found: Discovery) -> list[str]:
+    return [*found.problems, *found.notes]
 
 
 def _processors() -> int:
@@ -159,7 +169,7 @@ def _list(terminal: Terminal, found: Discovery, asked: Asked, json: bool) -> Non
             {"name": one.mission.name, "files": list(one.mission.files), "bytes": one.mission.bytes, "state": state}
             for one, state in rows
         ]
-        terminal.show_json({"missions": listed, "problems": list(found.problems), "left_aside": found.left_aside})
+        terminal.show_json({"missions": listed, "problems": _said(found), "left_aside": found.left_aside})
         return
     from cli.audit_tables import plan_parts
 
@@ -181,7 +191,7 @@ def _run(
     from cli.audit_progress import shown_progress
     from cli.audit_tables import document, summary_parts
     from diagnosis.audit import engines
-    from diagnosis.audit.endings import exit_code
+    from diagnosis.audit.endings import NOT_READ, exit_code
     from diagnosis.audit.events import EventLog
     from diagnosis.audit.session import audit
 
@@ -195,6 +205,10 @@ def _run(
                 if log is not None and event != "tick":
                     log.tell(event, facts)
 
+            for text in (*found.problems, *found.notes):
+                tell("problem", {"reason": text})
+            if not found.missions:
+                raise LogError(f"no mission was found ({found.left_aside} other files were left aside)")
             engine = (lambda: engines.dask(dask)) if dask else (lambda: engines.local(jobs))
             store = baseline / "fleet.sqlite" if baseline is not None and baseline.is_dir() else baseline
             audited = audit(found, asked, engine, tell, baseline=store)
@@ -204,7 +218,7 @@ def _run(
 
                 with Store.open(asked.output / "fleet.sqlite") as opened:
                     export_tables(opened, asked.output / "tables")
-            code = exit_code(audited.ends, fail_on.value)
+            code = max(exit_code(audited.ends, fail_on.value), NOT_READ if found.problems else 0)
             tell("end", {"code": code, "failed": audited.failed})
     except BaseException as error:
         if isinstance(error, KeyboardInterrupt):

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from diagnosis.audit.finder import Finder
+from diagnosis.audit.finder import Finder, Found
 from diagnosis.audit.names import unique_names
 from replay.log_files import words_of
 
@@ -32,6 +32,10 @@ class MissionSource:
         From ``mission.toml``: the machine file's path.
     sizes : tuple[int, ...]
         Of each file [bytes].
+    problem : str
+        Why it cannot be audited, of a folder whose ``mission.toml`` is off; empty where it can.
+    folder : str
+        Name of the folder it was found in, where that is not the one which its files' real paths tell; else empty.
     """
 
     name: str
@@ -41,6 +45,8 @@ class MissionSource:
     machine_id: str = ""
     machine_file: str | None = None
     sizes: tuple[int, ...] = ()
+    problem: str = ""
+    folder: str = ""
 
 
 @dataclass(frozen=True)
@@ -52,17 +58,21 @@ class Discovery:
     missions : tuple[MissionSource, ...]
         In the order of their names.
     problems : tuple[str, ...]
-        Words and folders behind which there is no mission, one sentence each.
+        Words, folders and links behind which there is no mission though one was to be expected, one sentence each.
     left_aside : int
         Files that are no logs, or results of earlier runs.
     roots : tuple[str, ...]
-        Folders and URLs that were looked through: a known mission below them that was not found is gone.
+        Folders and URLs that were looked through: a known mission below them that was not found is gone. One that holds
+        nothing at all is not among them, as its disk may not be there.
+    notes : tuple[str, ...]
+        What else is to be known, one sentence each.
     """
 
     missions: tuple[MissionSource, ...]
     problems: tuple[str, ...] = ()
     left_aside: int = 0
     roots: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
 
 
 def discover(words: Iterable[str], *, exclude: Path | None = None) -> Discovery:
@@ -89,7 +99,7 @@ def discover(words: Iterable[str], *, exclude: Path | None = None) -> Discovery:
         look_remotely(finder, remote)
     found = finder.missions()
     base = {where: _common([b for b in finder.bases if _where(b) == where]) for where in map(_where, finder.bases)}
-    paths = [(f"{f.folder}/{f.stem}", f"{f.folder}/{f.files[0].name}") for f in found]
+    paths = [(f"{f.folder}/{f.stem}", f"{f.folder}/{_second_name(f)}") for f in found]
     names = unique_names([(_below(stem, base[_where(stem)]), _below(path, base[_where(path)])) for stem, path in paths])
     missions = [
         MissionSource(
@@ -100,11 +110,21 @@ def discover(words: Iterable[str], *, exclude: Path | None = None) -> Discovery:
             machine_id=f.told.machine_id,
             machine_file=f.told.machine,
             sizes=tuple(e.size for e in f.files),
+            problem=f.problem,
+            folder=f.linked,
         )
         for f, name in zip(found, names, strict=True)
     ]
     missions.sort(key=lambda m: (m.name.casefold(), m.name))
-    return Discovery(tuple(missions), tuple(finder.problems), finder.left_aside, tuple(dict.fromkeys(finder.roots)))
+    roots, notes = dict.fromkeys(finder.roots), dict.fromkeys(finder.notes)
+    return Discovery(
+        tuple(missions), tuple(dict.fromkeys(finder.problems)), finder.left_aside, tuple(roots), tuple(notes)
+    )
+
+
+def _second_name(found: Found) -> str:
+    """Name of a mission whose first one is another's too: with its ending, or what it is called and its folder's name."""
+    return f"{found.told.name}-{found.home}" if found.told.name else found.files[0].name
 
 
 def _where(path: str) -> str:

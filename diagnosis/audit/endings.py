@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from diagnosis.audit.outcome import READ
+from diagnosis.audit.outcome import READ, limit_met
 from diagnosis.audit.places import write_whole
 from diagnosis.audit.plan import Planned
 from diagnosis.audit.runner import absolute
@@ -20,7 +20,8 @@ from replay.log_files import part_of
 
 FAILURES = "failures.txt"
 NEVER = "never"
-_FAULT, _NOT_READ, _CRASHED = 1, 3, 70
+NOT_READ = 3
+_FAULT, _CRASHED = 1, 70
 _HIDDEN = re.compile("[\x00-\x1f\x7f-\x9f\u2028\u2029\ud800-\udfff]")
 
 
@@ -101,7 +102,7 @@ def _code(end: Ending, fail_on: str) -> int:
     if end.state == "crashed":
         return _CRASHED
     if end.state not in READ or (end.verdict == "not_assessed" and fail_on != NEVER):
-        return _NOT_READ
+        return NOT_READ
     serious = fail_on != NEVER and end.severity and SEVERITIES.index(end.severity) >= SEVERITIES.index(fail_on)
     return _FAULT if serious else 0
 
@@ -126,7 +127,7 @@ def write_failures(output: Path, planned: Sequence[Planned], ends: Sequence[Endi
             one = by_name[end.name]
             tried = "" if end.attempts == 1 else f", {end.attempts} attempts"
             lines.append(f"{end.name}: {end.state}{tried}: {_HIDDEN.sub('?', end.reason)}\n")
-            lines.append(f"  {command(one, machine)}\n\n")
+            lines.append(f"  {again(end, one, machine, output)}\n\n")
     path = output / FAILURES
     if lines:
         write_whole(path, "".join(lines).encode("utf-8", "surrogateescape"))
@@ -135,19 +136,35 @@ def write_failures(output: Path, planned: Sequence[Planned], ends: Sequence[Endi
     return len(lines) // 2
 
 
+def again(end: Ending, one: Planned, machine: Path | None, output: Path) -> str:
+    """Command line that shows how a mission ended; where it met a limit, the audit of that mission with twice as much."""
+    limit = limit_met(end.state, end.reason)
+    if limit is None:
+        return command(one, machine)
+    option, value = limit
+    words = ["mfhca", "audit", *(absolute(file) for file in one.mission.files), "--no-resume", option, f"{2 * value:g}"]
+    words += _machine_words(one, machine)
+    return " ".join(quoted(word) for word in [*words, "-o", absolute(str(output))])
+
+
+def _machine_words(one: Planned, machine: Path | None) -> list[str]:
+    file = one.mission.machine_file or (str(machine) if machine is not None else "")
+    words = ["-m", absolute(file)] if file else []
+    return [*words, "--machine-id", one.machine_id] if one.machine_id else words
+
+
 def command(one: Planned, machine: Path | None) -> str:
     """Command line that diagnoses a mission by itself."""
     mission = one.mission
+    if mission.problem:
+        return " ".join(
+            quoted(word) for word in ("mfhca", "audit", absolute(mission.files[-1]), "-o", f"{mission.name}-audit")
+        )
     remote = any("://" in file for file in mission.files)
     parts = [part[::2] for file in mission.files if (part := part_of(Path(file).name)) is not None]
     words = ["mfhca", "audit" if remote or len(set(parts)) < len(parts) else "diagnose", "-v"]
     words += [absolute(file) for file in mission.files]
-    file = mission.machine_file or (str(machine) if machine is not None else "")
-    if file:
-        words += ["-m", absolute(file)]
-    if one.machine_id:
-        words += ["--machine-id", one.machine_id]
-    words += ["-o", f"{mission.name}-report"]
+    words += [*_machine_words(one, machine), "-o", f"{mission.name}-report"]
     return " ".join(quoted(word) for word in words)
 
 

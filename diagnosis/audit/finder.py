@@ -25,12 +25,31 @@ _CLIPS = "clips"
 
 @dataclass(frozen=True)
 class Found:
-    """A mission before it has its name: the folder it lies in, its stem there, its files, what ``mission.toml`` says."""
+    """A mission before it has its name.
+
+    Attributes
+    ----------
+    folder, stem : str
+        The folder its name is made of, and its stem there.
+    files : tuple[Entry, ...]
+        Its files.
+    told : MissionFile
+        What ``mission.toml`` says.
+    home : str
+        Name of the folder with the ``mission.toml``.
+    problem : str
+        What is wrong with that; empty where nothing is.
+    linked : str
+        Name of the folder its files are in, where a link to a folder leads to them.
+    """
 
     folder: str
     stem: str
     files: tuple[Entry, ...]
     told: MissionFile
+    home: str = ""
+    problem: str = ""
+    linked: str = ""
 
 
 class Finder:
@@ -43,7 +62,7 @@ class Finder:
 
     Attributes
     ----------
-    problems, roots : list[str]
+    problems, roots, notes : list[str]
         As in `Discovery`.
     left_aside : int
         As in `Discovery`.
@@ -54,10 +73,14 @@ class Finder:
     def __init__(self, exclude: str) -> None:
         self.problems: list[str] = []
         self.roots: list[str] = []
+        self.notes: list[str] = []
         self.bases: list[str] = []
         self.left_aside = 0
         self._exclude = exclude
         self._found: list[Found] = []
+        self._links: list[Entry] = []
+        self._seen: set[str] = set()
+        self._linked = False
 
     def missions(self) -> list[Found]:
         """Missions found so far: each file in the first of them, where links stand behind what they lead to."""
@@ -107,13 +130,20 @@ class Finder:
 
     def look(self, place: Place, files: Sequence[Entry], folders: Sequence[Entry]) -> None:
         """Look through folders, then at single files."""
+        empty = set()
         for folder in dict.fromkeys(folders):
             before = len(self._found), len(self.problems)
-            self.roots.append(folder.path)
             alone = self._walk(place, folder)
             self.bases.append(place.parent(folder.real) if alone else folder.real)
             if (len(self._found), len(self.problems)) == before:
+                empty.add(folder)
+        self._follow(place, [folder.real for folder in folders])
+        reals = [e.real for found in self._found for e in found.files] if empty else []
+        for folder in dict.fromkeys(folders):
+            if folder in empty and not any(_below(real, folder.real) for real in reals):
                 self.problems.append(f"{folder.path}: holds no log ({', '.join(LOG_ENDINGS)} or a rosbag2 folder)")
+            else:
+                self.roots.append(folder.path)
         together: dict[str, dict[str, Entry]] = {}
         for file in files:
             together.setdefault(place.home(file), {}).setdefault(file.real, file)
@@ -122,11 +152,29 @@ class Finder:
             self.bases.append(home)
             self._add(home, group(place, list(held.values())))
 
+    def _follow(self, place: Place, roots: Sequence[str]) -> None:
+        """Look through what links to folders lead to, within the given folders, and only what was not looked through."""
+        self._linked = True
+        while self._links:
+            link = self._links.pop(0)
+            if link.real in self._seen or (self._exclude and _below(link.real, self._exclude)):
+                continue
+            if any(_below(link.real, root) for root in roots):
+                self._walk(place, link)
+            else:
+                self.notes.append(
+                    f"{link.path}: left aside, as the link leads to {link.real}, which is outside of what was given; give that too"
+                )
+        self._linked = False
+
     def _walk(self, place: Place, top: Entry) -> bool:
         """Look through a folder and those below; whether it is itself one mission."""
         waiting, alone = [top], False
         while waiting:
             folder = waiting.pop()
+            if self._linked and folder.real in self._seen:
+                continue
+            self._seen.add(folder.real)
             try:
                 one = self._enter(place, folder, waiting)
             except OSError as error:
@@ -137,7 +185,9 @@ class Finder:
 
     def _enter(self, place: Place, folder: Entry, waiting: list[Entry]) -> bool:
         """Take the missions of one folder; whether it is itself one."""
-        files, folders = place.listed(folder)
+        files, found = place.listed(folder)
+        folders = [child for child in found if not child.link]
+        self.problems += place.lost(folder)
         names = {f.name: f for f in files}
         if MISSION_FILE in names:
             self._stated(place, folder, names[MISSION_FILE], files, folders)
@@ -146,11 +196,13 @@ class Finder:
             self._add(place.parent(folder.real), [Group(folder.name, (place.whole(folder),))])
             return True
         recordings = []
-        for child in folders:
+        for child in found:
             if child.name.startswith(".") or self._own(folder, names, child):
                 continue
-            if self._has(place, child, _METADATA) and not self._has(place, child, MISSION_FILE):
-                recordings.append(place.whole(child))
+            if child.link:
+                self._links.append(child)
+            elif self._has(place, child, _METADATA) and not self._has(place, child, MISSION_FILE):
+                recordings += self._whole(place, child)
             else:
                 waiting.append(child)
         self._add(folder.real, group(place, self._logs(place, folder, files), recordings))
@@ -186,22 +238,43 @@ class Finder:
     def _stated(
         self, place: Place, folder: Entry, file: Entry, files: Sequence[Entry], folders: Sequence[Entry]
     ) -> None:
-        """Take the mission that a ``mission.toml`` describes."""
+        """Take the mission that a ``mission.toml`` describes; one that is off makes a mission with a problem."""
+        told, problem = MissionFile(), ""
         try:
             told = read_mission_file(place, folder, file)
         except ConfigError as error:
-            self.problems.append(str(error))
-            return
+            problem = str(error)
         logs = list(told.files)
         if not logs and self._has(place, folder, _METADATA):
-            logs = [place.whole(folder)]
+            logs = self._whole(place, folder)
         elif not logs:
-            recordings = [place.whole(c) for c in folders if self._has(place, c, _METADATA)]
+            recordings = [e for c in folders if self._has(place, c, _METADATA) for e in self._whole(place, c)]
             logs = [e for g in group(place, self._logs(place, folder, files), recordings) for e in g.files]
         if not logs:
-            self.problems.append(f"{file.path}: there is no log beside it; name the mission's files in it")
-            return
-        self._found.append(Found(place.parent(folder.real), told.name or folder.name, tuple(logs), told))
+            problem = problem or f"{file.path}: there is no log beside it; name the mission's files in it"
+        if problem:
+            logs.append(file)
+        found = Found(place.parent(folder.real), told.name or folder.name, tuple(logs), told, folder.name, problem)
+        self._found.append(replace(found, linked=self._folder_of(found.files)))
+
+    def _whole(self, place: Place, folder: Entry) -> list[Entry]:
+        """A recording's folder as one log, if all that is in it can be looked at."""
+        try:
+            return [place.whole(folder)]
+        except OSError as error:
+            self.problems.append(f"{folder.path}: the recording cannot be looked through ({error.strerror or error})")
+            return []
+
+    def _folder_of(self, files: Sequence[Entry]) -> str:
+        return os.path.basename(os.path.dirname(files[0].path)) if self._linked else ""  # noqa: PTH119, PTH120
 
     def _add(self, folder: str, groups: Sequence[Group]) -> None:
-        self._found += [Found(folder, found.stem, found.files, MissionFile()) for found in groups]
+        self._found += [
+            Found(folder, found.stem, found.files, MissionFile(), linked=self._folder_of(found.files))
+            for found in groups
+        ]
+
+
+def _below(path: str, folder: str) -> bool:
+    """Whether a real path is a folder or in it."""
+    return path == folder or path.startswith(folder.rstrip(os.sep) + os.sep)

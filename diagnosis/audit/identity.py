@@ -17,11 +17,11 @@ def given_id(option: str | None, mission: MissionSource) -> str | None:
 
 
 def fallback_id(mission: MissionSource) -> str:
-    """Name of the folder that holds the mission: the identity where nothing else states one."""
+    """Name of the folder that the mission was found in: the identity where nothing else states one."""
     first = mission.files[0].rstrip("/")
     url = "://" in first
-    folder = PurePosixPath(first.partition("://")[2]).parent if url else Path(first).resolve().parent
-    return folder.name.encode("utf-8", "surrogateescape").decode("utf-8", "backslashreplace")
+    folder = PurePosixPath(first.partition("://")[2]).parent if url else Path(first).parent.resolve()
+    return (mission.folder or folder.name).encode("utf-8", "surrogateescape").decode("utf-8", "backslashreplace")
 
 
 def stated_id(option: str | None, mission: MissionSource, machine: Machine) -> str:

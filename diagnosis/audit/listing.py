@@ -6,7 +6,7 @@ import hashlib
 import os
 import stat
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from pathlib import Path
 from typing import Protocol
@@ -52,7 +52,11 @@ class Place(Protocol):
     """Where missions may be found."""
 
     def listed(self, folder: Entry) -> tuple[list[Entry], list[Entry]]:
-        """Files and folders in a folder, sorted by name, links last; raises `OSError`."""
+        """Files and folders in a folder, sorted by name, links last, links to folders among them; raises `OSError`."""
+        ...
+
+    def lost(self, folder: Entry) -> list[str]:
+        """What `listed` left out because it leads nowhere, one sentence each."""
         ...
 
     def text(self, file: Entry) -> str:
@@ -91,6 +95,9 @@ class Place(Protocol):
 class LocalPlace:
     """The file system."""
 
+    def __init__(self) -> None:
+        self._lost: dict[str, list[str]] = {}
+
     def entry(self, path: str) -> Entry:
         """Entry of an existing path; raises `OSError`."""
         state = os.stat(path)  # noqa: PTH116 - also for names that pathlib would change
@@ -101,18 +108,26 @@ class LocalPlace:
         return Entry(path, name, real, size, stamp, os.path.islink(path))  # noqa: PTH114
 
     def listed(self, folder: Entry) -> tuple[list[Entry], list[Entry]]:
-        """Files and folders in a folder; links to folders, pipes and devices are left out."""
+        """Files and folders in a folder; pipes and devices are left out."""
         files, folders = [], []
+        lost = self._lost[folder.path] = []
         with os.scandir(folder.path) as found:
             for item in found:
                 try:
-                    if item.is_dir(follow_symlinks=False):
-                        folders.append(self.entry(item.path))
+                    if item.is_dir():
+                        folders.append(replace(self.entry(item.path), name=item.name))
                     elif item.is_file():
                         files.append(self.entry(item.path))
-                except OSError:  # a link that leads nowhere, or gone since
-                    continue
+                    elif item.is_symlink() and not item.name.startswith("."):
+                        item.stat()  # says where it leads nowhere
+                except OSError as error:
+                    if item.is_symlink() and not item.name.startswith("."):
+                        lost.append(f"{item.path}: the link leads nowhere ({error.strerror or error})")
         return sorted(files, key=_order), sorted(folders, key=_order)
+
+    def lost(self, folder: Entry) -> list[str]:
+        """Links in a folder that lead nowhere."""
+        return self._lost.get(folder.path, [])
 
     def text(self, file: Entry) -> str:
         """Text of a small file."""

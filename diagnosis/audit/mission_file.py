@@ -78,4 +78,8 @@ def _inside(place: Place, folder: Entry, file: Entry, key: str, name: str) -> En
     found = place.inside(folder, name)
     if found is None:
         raise ConfigError(f"{file.path}: {key} names {name[:120]!r}, which is not in the folder; expected a name in it")
-    return place.whole(found) if place.is_folder(found) else found
+    try:
+        return place.whole(found) if place.is_folder(found) else found
+    except OSError as error:
+        reason = error.strerror or error
+        raise ConfigError(f"{file.path}: {key} names {name[:120]!r}, which cannot be read ({reason})") from error

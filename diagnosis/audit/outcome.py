@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Literal, get_args
@@ -12,6 +13,25 @@ STATES: tuple[State, ...] = get_args(State)
 READ: frozenset[State] = frozenset({"ok", "degraded"})
 TRANSIENT: frozenset[State] = frozenset({"timeout", "out_of_memory", "crashed"})
 """Ends that may be the machine's fault rather than the log's: worth another attempt."""
+
+_LIMITS = (
+    ("timeout", "--timeout", re.compile(r"took longer than ([\d.e+-]+) s; allow more with --timeout$")),
+    ("timeout", "--cpu", re.compile(r"took more than ([\d.e+-]+) s of a processor; allow more with --cpu$")),
+    (
+        "out_of_memory",
+        "--memory",
+        re.compile(r"needed more than (\d+) MB of memory.*; allow more with --memory$", re.DOTALL),
+    ),
+)
+
+
+def limit_met(state: str, reason: str) -> tuple[str, float] | None:
+    """Option and value of the limit at which a mission was stopped, as its reason tells; None where it was at none."""
+    for of, option, pattern in _LIMITS:
+        found = pattern.match(reason) if state == of else None
+        if found:
+            return option, float(found[1])
+    return None
 
 
 @dataclass(frozen=True)

@@ -8,10 +8,10 @@ from functools import cache
 from pathlib import Path
 
 from diagnosis.audit.discover import MissionSource
-from diagnosis.audit.identity import given_id, stated_id
+from diagnosis.audit.identity import fallback_id, given_id, stated_id
 from diagnosis.audit.keys import config_hash
 from diagnosis.audit.limits import Limits
-from diagnosis.audit.outcome import TRANSIENT
+from diagnosis.audit.outcome import TRANSIENT, limit_met
 from diagnosis.audit.staging import machine_at
 from diagnosis.audit.store import Store, StoredResult
 from diagnosis.audit.task import key_of, sizes_of
@@ -20,6 +20,7 @@ from replay.machine import Machine, haulotte
 from replay.machine_file import dump_machine
 
 PAPER = "paper defaults"
+_CLEARLY = 1.05  # what is free varies from one night to the next
 
 
 @dataclass(frozen=True)
@@ -106,17 +107,41 @@ def plan(missions: Iterable[MissionSource], asked: Asked) -> list[Planned]:
     options = {"max_size_mb": asked.max_size_mb}
     planned = []
     for mission in missions:
-        name, problem = mission.machine_file or usual, ""
+        name, problem = mission.machine_file or usual, mission.problem
         try:
             machine, document = loaded(name)
         except ConfigError as error:
-            problem = str(error)
-            machine, document = haulotte(), problem.encode("utf-8", "backslashreplace")
+            problem = problem or str(error)
+            machine, document = haulotte(), b""
+        if problem:
+            document = problem.encode("utf-8", "backslashreplace")
         source = PAPER if name is None else Path(name).name
         stated = stated_id(asked.machine_id, mission, machine)
         given = given_id(asked.machine_id, mission) or ""
         planned.append(Planned(mission, machine, source, given, config_hash(document, options, stated), problem))
     return planned
+
+
+def merged_machines(missions: Iterable[MissionSource], asked: Asked) -> tuple[str, ...]:
+    """Say so where the machine file's identity makes one machine of what folders would tell apart; else nothing.
+
+    Raises
+    ------
+    ConfigError
+        Where the machine file is off.
+    """
+    if asked.machine is None or asked.machine_id:
+        return ()
+    name = machine_at(str(asked.machine)).id
+    usual = [m for m in missions if not m.machine_id and m.machine_file is None]
+    folders = list(dict.fromkeys(fallback_id(m) for m in usual)) if name else []
+    if len(folders) < 2:
+        return ()
+    shown = ", ".join(folders[:3]) + (", …" if len(folders) > 3 else "")
+    return (
+        f"{asked.machine}: its id {name!r} makes one machine of the logs of {len(folders)} folders ({shown}), unless the "
+        "logs name their own; leave the id out where each folder is a machine",
+    )
 
 
 def known_hashes(planned: Planned, store: Store) -> tuple[str, ...]:
@@ -129,14 +154,25 @@ def known_hashes(planned: Planned, store: Store) -> tuple[str, ...]:
 
 def stored_result(planned: Planned, store: Store) -> StoredResult | None:
     """Result that the store holds for a mission as it is now."""
+    if planned.problem:
+        return store.lookup(key_of(planned.mission, (), planned.machine, planned.config_hash))
     hashes = known_hashes(planned, store)
     return store.lookup(key_of(planned.mission, hashes, planned.machine, planned.config_hash)) if hashes else None
 
 
+def _allows_more(limits: Limits, result: StoredResult) -> bool:
+    """Whether limits are larger than that at which a mission was stopped."""
+    met = limit_met(result.state, result.reason)
+    if met is None:
+        return False
+    now = {"--timeout": limits.wall_s, "--cpu": limits.cpu_s, "--memory": limits.memory_mb}[met[0]]
+    return now is None or now > met[1] * (_CLEARLY if met[0] == "--memory" else 1.00001)
+
+
 def is_done(result: StoredResult | None, asked: Asked) -> bool:
-    """Whether a result is final: its report is there, and no attempts are left where it failed."""
+    """Whether a result is final: its report is there; where it failed, no attempts are left and its limit is no larger now."""
     if result is None:
         return False
-    if result.state in TRANSIENT and result.attempts <= asked.retries:
+    if result.state in TRANSIENT and (result.attempts <= asked.retries or _allows_more(asked.limits, result)):
         return False
     return result.report is None or (asked.output / result.report / "report.json").is_file()

@@ -144,6 +144,10 @@ class RemotePlace:
         files, folders = self._files.get(folder.path, {}), self._folders.get(folder.path, {})
         return [files[name] for name in sorted(files)], [folders[name] for name in sorted(folders)]
 
+    def lost(self, folder: Entry) -> list[str]:
+        """Nothing: there are no links."""
+        return []
+
     def text(self, file: Entry) -> str:
         """Text of a small object."""
         try:

@@ -129,6 +129,69 @@ def test_another_machine_file_audits_again(
     assert [m["state"] for m in document(capsys)["missions"]] == ["to do"]
 
 
+def test_a_missing_path_is_an_error_also_when_quiet(
+    audited: Path, logs: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    events = tmp_path / "events.jsonl"
+    words = ["audit", "nope", str(logs / "drive.mcap"), "-o", str(audited), "-q", "--events", str(events)]
+    assert run(words) == 3
+    assert capsys.readouterr().err == "error: nope: no such file\n"
+    told = [json.loads(line) for line in events.read_text(encoding="utf-8").splitlines()]
+    assert [e["reason"] for e in told if e["event"] == "problem"] == ["nope: no such file"]
+    assert run([*words, "--json"]) == 3
+    assert document(capsys)["problems"] == ["nope: no such file"]
+    assert run([*words, "--dry-run"]) == 3
+    assert run(["audit", "nope", "-q", "--events", str(events)]) == 3
+    last = [json.loads(line) for line in events.read_text(encoding="utf-8").splitlines()[-2:]]
+    assert [e["event"] for e in last] == ["problem", "stopped"]
+
+
+def test_a_mission_file_that_is_off_is_an_unreadable_mission(
+    logs: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "tree" / "s").mkdir(parents=True)
+    (tmp_path / "tree" / "s" / "a.mcap").write_bytes((logs / "drive.mcap").read_bytes())
+    (tmp_path / "tree" / "s" / "mission.toml").write_text('machin_id = "AX-1"\n', encoding="utf-8")
+    out = tmp_path / "out"
+    for skipped in (0, 1):
+        assert run(["audit", str(tmp_path / "tree"), "-o", str(out), "-q", "--json"]) == 3
+        found = document(capsys)
+        (mission,) = found["missions"]
+        assert (mission["name"], mission["state"], mission["attempts"]) == ("s", "unreadable", 1)
+        assert "'machin_id' is not a key" in mission["reason"]
+        assert found["skipped"] == skipped
+    failures = (out / "failures.txt").read_text(encoding="utf-8")
+    assert failures.splitlines()[1].strip() == f"mfhca audit {tmp_path}/tree/s/mission.toml -o s-audit"
+    assert "machin_id" in (out / "fleet.html").read_text(encoding="utf-8")
+    (tmp_path / "tree" / "s" / "mission.toml").write_text('machine_id = "AX-1"\n', encoding="utf-8")
+    assert run(["audit", str(tmp_path / "tree"), "-o", str(out), "-q", "--json"]) == 1
+    assert [(m["name"], m["state"], m["machine_id"]) for m in document(capsys)["missions"]] == [("s", "ok", "AX-1")]
+
+
+def test_an_id_in_the_machine_file_for_logs_of_several_folders_is_said(
+    logs: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    for name in ("AX-1", "AX-2"):
+        (tmp_path / "tree" / name).mkdir(parents=True)
+        (tmp_path / "tree" / name / "m.mcap").write_bytes((logs / "text.mcap").read_bytes())
+    (tmp_path / "machine.toml").write_text('[machine]\nid = "H7"\n', encoding="utf-8")
+    words = [
+        "audit",
+        str(tmp_path / "tree"),
+        "-o",
+        str(tmp_path / "out"),
+        "-m",
+        str(tmp_path / "machine.toml"),
+        "--dry-run",
+    ]
+    assert run([*words, "--json"]) == 0
+    shown = capsys.readouterr()
+    assert shown.err.count("its id 'H7' makes one machine of the logs of 2 folders (AX-1, AX-2)") == 1
+    assert len(json.loads(shown.out)["problems"]) == 1
+    assert run([*words, "--machine-id", "H7", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["problems"] == []
+
+
 @pytest.mark.parametrize(
     ("words", "code", "text"),
     [

@@ -10,6 +10,8 @@ from rosbags.typesys import Stores, get_typestore
 
 from diagnosis.audit import listing
 from diagnosis.audit.discover import Discovery, discover
+from diagnosis.audit.identity import fallback_id
+from replay.log_files import LOG_ENDINGS
 from replay.rawlog import LogSummary
 from replay.sources import SourceOptions
 
@@ -211,10 +213,76 @@ def test_mission_file_that_is_off(tmp_path: Path, text: str, said: str) -> None:
     (tmp_path / "s/link.mcap").symlink_to(tmp_path / "secret.mcap")
     (tmp_path / "s/mission.toml").write_text(text)
     found = discover([str(tmp_path / "s"), str(tmp_path / "ok")])
-    assert [Path(m.files[0]).name for m in found.missions] == ["b.mcap"]
-    assert len(found.problems) == 1
-    assert said in found.problems[0]
-    assert "\n" not in found.problems[0]
+    assert [[Path(f).name for f in m.files[:1] + m.files[-1:]] for m in found.missions] == [
+        ["b.mcap", "b.mcap"],
+        ["a.mcap", "mission.toml"],
+    ]
+    assert [m.name for m in found.missions] == ["ok__b", "s"]
+    assert found.missions[0].problem == ""
+    assert said in found.missions[1].problem
+    assert "\n" not in found.missions[1].problem
+
+
+def test_mission_file_without_logs(tmp_path: Path) -> None:
+    put(tmp_path, "s/mission.toml")
+    (tmp_path / "s/mission.toml").write_text('name = "x"')
+    (found,) = discover([str(tmp_path)]).missions
+    assert found.files == (str(tmp_path / "s/mission.toml"),)
+    assert "there is no log beside it" in found.problem
+
+
+def test_missions_of_one_name_have_their_folders_names_too(tmp_path: Path) -> None:
+    put(tmp_path, "s/a.mcap", "t/a.mcap")
+    for folder in ("s", "t"):
+        (tmp_path / folder / "mission.toml").write_text('name = "Monday"')
+    assert [m.name for m in discover([str(tmp_path)]).missions] == ["Monday-s", "Monday-t"]
+
+
+def test_links_to_folders_are_followed_within_what_was_given(tmp_path: Path) -> None:
+    put(
+        tmp_path,
+        "logs/.pool/x/m.mcap",
+        "logs/.pool/rec/metadata.yaml",
+        "logs/.pool/rec/r.db3",
+        "other/n.mcap",
+        "logs/z/z.mcap",
+    )
+    for link, target in (
+        ("AX-31", ".pool/x"),
+        ("again", ".pool/x"),
+        ("rec", ".pool/rec"),
+        ("far", "../other"),
+        ("loop", "."),
+    ):
+        (tmp_path / "logs" / link).symlink_to(target)
+    (tmp_path / "logs/zz").symlink_to("z")
+    found = discover([str(tmp_path / "logs")])
+    assert sorted(shown(found, tmp_path).values()) == [["logs/AX-31/m.mcap"], ["logs/rec"], ["logs/z/z.mcap"]]
+    assert sorted(fallback_id(m) for m in found.missions) == ["AX-31", "logs", "z"]
+    assert found.problems == ()
+    (note,) = found.notes
+    assert note.startswith(f"{tmp_path}/logs/far: left aside, as the link leads to {tmp_path}/other")
+    both = discover([str(tmp_path / "logs"), str(tmp_path / "other")])
+    assert (len(both.missions), both.notes) == (4, ())
+
+
+def test_a_linked_file_belongs_to_the_folder_of_its_link(tmp_path: Path) -> None:
+    put(tmp_path, "pool/m.mcap")
+    (tmp_path / "AX-31").mkdir()
+    (tmp_path / "AX-31/m.mcap").symlink_to("../pool/m.mcap")
+    assert [fallback_id(m) for m in discover([str(tmp_path / "AX-31")]).missions] == ["AX-31"]
+
+
+def test_a_folder_that_may_be_an_unmounted_disk_is_said_and_not_looked_through(tmp_path: Path) -> None:
+    put(tmp_path, "m.mcap")
+    (tmp_path / "disk").mkdir()
+    (tmp_path / "lost.mcap").symlink_to(tmp_path / "nowhere")
+    found = discover([str(tmp_path), str(tmp_path / "disk")])
+    assert found.problems == (
+        f"{tmp_path}/lost.mcap: the link leads nowhere (No such file or directory)",
+        f"{tmp_path}/disk: holds no log ({', '.join(LOG_ENDINGS)} or a rosbag2 folder)",
+    )
+    assert found.roots == (str(tmp_path),)
 
 
 def test_text_files_that_are_no_tables_are_left_aside(tmp_path: Path) -> None:

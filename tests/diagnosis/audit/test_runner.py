@@ -10,6 +10,7 @@ import pytest
 
 from diagnosis.audit.discover import MissionSource
 from diagnosis.audit.endings import Ending, command, exit_code, quoted
+from diagnosis.audit.limits import Limits
 from diagnosis.audit.places import claim_mission, publish, working
 from diagnosis.audit.plan import Planned
 from diagnosis.audit.session import overview
@@ -231,3 +232,20 @@ def test_a_reason_names_the_log_and_not_its_copy(tmp_path: Path) -> None:
     assert named(f"{copy}: ends at byte 12", Staged((copy,), ("",)), there, tmp_path / "tmp") == (
         "s3://fleet/x.bag: ends at byte 12"
     )
+
+
+def test_a_larger_limit_tries_again_what_met_it(tmp_path: Path) -> None:
+    found = missions(tmp_path / "logs", "hang", "exhaust")
+    tight = Limits(memory_mb=150, wall_s=2.0, file_mb=20)
+    ends, _ = run(found, asked_for(tmp_path / "out", limits=tight))
+    assert {n: e.state for n, e in ends.items()} == {"exhaust": "out_of_memory", "hang": "timeout"}
+    failures = (tmp_path / "out" / "failures.txt").read_text(encoding="utf-8")
+    for log, words in (("hang", "--timeout 4"), ("exhaust", "--memory 300")):
+        assert f"mfhca audit {tmp_path}/logs/{log}.bag --no-resume {words} -o {tmp_path}/out\n" in failures
+    _, events = run(found, asked_for(tmp_path / "out", limits=replace(tight, memory_mb=151)))
+    assert {kind for kind, _ in events} == {"skipped"}
+    _, events = run(found, asked_for(tmp_path / "out", limits=replace(tight, wall_s=2.1)))
+    assert sorted(events) == [("mission", "hang"), ("skipped", "exhaust")]
+    ends, events = run(found, asked_for(tmp_path / "out", limits=replace(tight, memory_mb=170)))
+    assert sorted(events) == [("mission", "exhaust"), ("skipped", "hang")]
+    assert "170 MB" in ends["exhaust"].reason
