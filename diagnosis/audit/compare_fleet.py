@@ -6,8 +6,9 @@ stand any more is ``resolved`` only where a mission assessed the part after the 
 ``not_seen_again``: nothing shows that it was repaired.
 
 The document has ``counts`` by outcome, ``faults``, ``coverage`` (parts that were assessed in the last mission of one audit
-alone: ``lost`` or ``gained``), ``machines`` (``new``, ``missing``, ``changed`` verdicts), ``missions`` (``older``, ``newer``, ``new``),
-and ``worse``: whether a fault is new or worse.
+alone: ``lost`` or ``gained``), ``machines`` (``new``, ``missing``, ``changed`` verdicts), ``missions`` (``older``, ``newer``, ``new``,
+and ``missing``: names that the later audit lacks, where both hold some of the same missions), and ``worse``: whether a fault is
+new or worse, or machines or missions are missing.
 """
 
 from __future__ import annotations
@@ -45,13 +46,15 @@ def compare_fleets(older: Fleet, newer: Fleet) -> dict[str, Any]:
     rank = {name: k for k, name in enumerate(OUTCOMES)}
     faults.sort(key=lambda f: (rank[f["outcome"]], -SEVERITIES.index(f["severity"])))
     names = [{m.name for m in fleet.missions} for fleet in (older, newer)]
+    lost = sorted(names[0] - names[1]) if names[0] & names[1] else []  # of another period all are others
+    missing = [before[k].label for k in before if k not in now]
     return {
-        "worse": any(f["outcome"] in ("new", "worse") for f in faults),
+        "worse": bool(lost or missing) or any(f["outcome"] in ("new", "worse") for f in faults),
         "counts": {name: sum(f["outcome"] == name for f in faults) for name in OUTCOMES},
-        "missions": {"older": len(names[0]), "newer": len(names[1]), "new": len(names[1] - names[0])},
+        "missions": {"older": len(names[0]), "newer": len(names[1]), "new": len(names[1] - names[0]), "missing": lost},
         "machines": {
             "new": [now[k].label for k in now if k not in before],
-            "missing": [before[k].label for k in before if k not in now],
+            "missing": missing,
             "changed": [
                 {"machine": now[k].label, "older": before[k].verdict, "newer": now[k].verdict}
                 for k in now

@@ -3,19 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import orjson
 
-from diagnosis.audit.fleet_arrivals import arrivals
+from diagnosis.audit.fleet_arrivals import arrivals, last_made
 from diagnosis.audit.fleet_csv import fleet_csv
 from diagnosis.audit.fleet_document import Fleet, fleet_document, fleet_of
 from diagnosis.audit.fleet_gather import machines_of
 from diagnosis.audit.fleet_machines import Limits
-from diagnosis.audit.fleet_read import read_missions
+from diagnosis.audit.fleet_news import first_runs
+from diagnosis.audit.fleet_read import read_missions, read_run
 from diagnosis.audit.fleet_trends import Axis
+from diagnosis.audit.store import FILE_NAME
+from replay.errors import ConfigError
 from replay.files import atomic_path
 
 _MOST_BYTES = 50_000_000
@@ -46,12 +49,20 @@ def write_fleet(store_path: Path, out: Path, *, baseline: Path | None = None, ax
 
     Raises
     ------
+    ConfigError
+        Where the baseline is the store itself.
     OutputError
         Where a store cannot be read, or a file cannot be written.
     """
     from diagnosis.report.fleet_page import build_fleet_page
 
-    document = fleet_json(load_fleet(store_path, out, axis), baseline)
+    if baseline is not None and _store(baseline).resolve() == _store(store_path).resolve():
+        raise ConfigError(
+            f"--baseline {baseline}: is the store of this audit itself; give that of another, earlier audit"
+        )
+    fleet = load_fleet(store_path, out, axis)
+    fleet = replace(fleet, first_runs=first_runs(out / "fleet.json", fleet.missions, fleet.run))
+    document = fleet_json(fleet, baseline)
     files = FleetFiles(out / "fleet.html", out / "fleet.json", out / "fleet.csv")
     texts = {
         files.json: orjson.dumps(document, option=orjson.OPT_APPEND_NEWLINE),
@@ -82,11 +93,13 @@ def load_fleet(store_path: Path, out: Path | None = None, axis: Axis = "hours") 
     OutputError
         Where the store cannot be read.
     """
-    folder = out if out is not None else store_path if store_path.is_dir() else store_path.parent
+    place = _store(store_path).parent
+    folder = out if out is not None else place
     missions = read_missions(store_path)
-    came = arrivals(store_path if store_path.is_dir() else store_path.parent, missions)
+    came = arrivals(place, missions)
     machines, unknown = machines_of(missions, lambda report: _limits(folder / report / "report.json"), came)
-    return fleet_of(machines, missions, axis, unknown)
+    fleet = fleet_of(machines, missions, axis, unknown)
+    return replace(fleet, run=read_run(store_path), made_ns=last_made(place, missions))
 
 
 def fleet_json(fleet: Fleet, baseline: Path | None = None) -> dict[str, Any]:
@@ -102,6 +115,11 @@ def fleet_json(fleet: Fleet, baseline: Path | None = None) -> dict[str, Any]:
     from diagnosis.audit.compare_fleet import compare_fleets
 
     return fleet_document(fleet, compare_fleets(load_fleet(baseline), fleet))
+
+
+def _store(path: Path) -> Path:
+    """Store at a path, or in a folder."""
+    return path / FILE_NAME if path.is_dir() else path
 
 
 def _limits(path: Path) -> Limits:

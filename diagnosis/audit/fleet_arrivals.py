@@ -55,6 +55,27 @@ def arrivals(folder: Path, missions: Iterable[Mission]) -> Came:
     return came
 
 
+def last_made(folder: Path, missions: Iterable[Mission]) -> int | None:
+    """When the newest result of a store was made [ns since 1970]; None where its objects do not say.
+
+    Parameters
+    ----------
+    folder : Path
+        Folder of the store.
+    missions : Iterable[Mission]
+        From `diagnosis.audit.fleet_read.read_missions`.
+    """
+    results = [m.result for m in missions if m.result is not None]
+    if not results:
+        return None
+    start, objects = max(results, key=lambda r: r.id).log_hash[:_HASH], Objects(str(folder / RESULTS))
+    try:
+        made = [looked_at(objects, name) for name in objects.names() if name.startswith(start)]
+    except OutputError:
+        return None
+    return max((m for m in made if m is not None), default=None)
+
+
 def looked_at(objects: Objects, name: str, mission: str | None = None) -> int | None:
     """When a result object was made; None where it cannot be read, or is of another mission than the one asked for."""
     try:

@@ -1,6 +1,7 @@
 """What `fleet.json` says, as the schema ``mfhca-fleet/1``; fields may be added within it, not change their meaning.
 
 - ``schema``, ``version`` (of the tool), ``axis`` of the trends (``hours`` of driving in the audited missions, or ``days``).
+- ``audit``: ``run`` (its number in this store), ``made_ns`` (when its newest result was made), each null where not known.
 - ``verdict``: ``status`` (the worst machine's: ``stop``, ``watch``, ``not_assessed``, ``ready``), ``tag``, ``title``, ``text``.
 - ``counts``: ``machines``, ``missions`` and how they ended by ``states``, ``not_assessed`` (read, but nothing
   could be assessed), ``unknown`` (not judged, perhaps newer than what was, and of no known machine), ``pending`` (not audited yet), ``copies`` (of a log
@@ -14,7 +15,8 @@
   ``missions``, those with a date in its order), ``failed``, ``with_faults``, ``driving_s``, ``decided``, ``min_epsilon``, ``parts``:
   per component and side ``assessed`` (missions), ``assessed_last``, and ``modes`` (missions with each).
 - ``faults``: ``machine`` (place in ``machines``), ``component``, ``kind``, ``side``, ``mode``, ``severity``, ``status`` (``new``,
-  ``recurring``, ``once``, ``past``), ``missions`` with it of ``assessed``, ``first`` and ``last`` (places), ``last_id``, ``epsilon``.
+  ``recurring``, ``once``, ``past``), ``missions`` with it of ``assessed``, ``first`` and ``last`` (places), ``last_id``, ``epsilon``,
+  ``first_run`` (audit run that brought the first mission with it; null: not known; also of missions).
 - ``trends``: ``machine``, ``component``, ``kind``, ``side``, ``limit``, ``points`` as [mission, place on the axis, ε̂, low, high],
   ``now`` (end of the axis), ``outliers`` and ``changes`` (by point; ``drop``, ``rise``, ``bend``), ``first`` point of the last
   stretch, ``direction``, ``line`` of that stretch (``level`` with 95 % bounds at ``now``, ``slope`` per unit of the axis with 95 %
@@ -31,13 +33,14 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
 from diagnosis.audit import fleet_words as words
 from diagnosis.audit.fleet_machines import VERDICTS, FleetFault, Machine
+from diagnosis.audit.fleet_news import news, since_run
 from diagnosis.audit.fleet_read import Bounds, FoundFault, Mission
 from diagnosis.audit.fleet_trends import Axis, PartTrend, trends_of
 from diagnosis.audit.outcome import READ, STATES
@@ -51,14 +54,28 @@ _STATUSES = ("new", "recurring", "once", "past")
 
 @dataclass(frozen=True)
 class Fleet:
-    """Machines worst first with their trends, and all missions by machine and time."""
+    """Machines worst first with their trends, and all missions by machine and time.
+
+    Attributes
+    ----------
+    unknown : tuple[Mission, ...]
+        Logs that were not judged, whose machine is not known and that may be later than what was judged.
+    run : int
+        Number of the audit run; 0: not known.
+    made_ns : int or None
+        When its newest result was made.
+    first_runs : Mapping[str, int]
+        Run in which each mission was first judged, as far as that is known.
+    """
 
     machines: tuple[Machine, ...]
     trends: tuple[tuple[PartTrend, ...], ...]
     missions: tuple[Mission, ...]
     axis: Axis
     unknown: tuple[Mission, ...] = ()
-    """Logs that were not judged, whose machine is not known and that may be later than what was judged."""
+    run: int = 0
+    made_ns: int | None = None
+    first_runs: Mapping[str, int] = field(default_factory=dict)
 
 
 def fleet_of(
@@ -103,19 +120,26 @@ def fleet_document(fleet: Fleet, baseline: Mapping[str, Any] | None = None) -> d
         "schema": SCHEMA,
         "version": __version__,
         "axis": fleet.axis,
+        "audit": {"run": fleet.run or None, "made_ns": fleet.made_ns},
         "verdict": {
             "status": status,
             "tag": tag,
             "title": title,
-            "text": words.sentences(
+            "text": words.new_words(*news(fleet.machines, fleet.first_runs, fleet.run))
+            + words.sentences(
                 fleet.machines, fleet.trends, (unread, counts["not_assessed"], counts["pending"]), fleet.axis
             ),
         },
         "counts": counts,
         "machines": [_machine(m, at) for m in fleet.machines],
-        "faults": [_fault(k, f, at) for k, m in enumerate(fleet.machines) for f in m.faults],
+        "faults": [
+            _fault(k, f, at, since_run(m, f, fleet.first_runs)) for k, m in enumerate(fleet.machines) for f in m.faults
+        ],
         "trends": [_trend(k, t, at, fleet.axis) for k, own in enumerate(fleet.trends) for t in own],
-        "missions": [_mission(m, failed.get(m.name, owner.get(id(m.result))), first) for m in fleet.missions],
+        "missions": [
+            _mission(m, failed.get(m.name, owner.get(id(m.result))), first, fleet.first_runs.get(m.name))
+            for m in fleet.missions
+        ],
         "baseline": baseline,
     }
 
@@ -188,7 +212,7 @@ def _part(m: Machine, component: str, side: str) -> dict[str, Any]:
     }
 
 
-def _fault(k: int, f: FleetFault, at: Mapping[str, int]) -> dict[str, Any]:
+def _fault(k: int, f: FleetFault, at: Mapping[str, int], first_run: int | None) -> dict[str, Any]:
     return {
         "machine": k,
         "component": f.component,
@@ -203,6 +227,7 @@ def _fault(k: int, f: FleetFault, at: Mapping[str, int]) -> dict[str, Any]:
         "last": at[f.last.name],
         "last_id": f.last_id,
         "since": f.since,
+        "first_run": first_run,
         "epsilon": bounds_json(f.epsilon),
     }
 
@@ -253,7 +278,7 @@ def _line(line: Line | None, now: float) -> dict[str, Any] | None:
     }
 
 
-def _mission(m: Mission, owner: int | None, first: Mapping[int, str]) -> dict[str, Any]:
+def _mission(m: Mission, owner: int | None, first: Mapping[int, str], first_run: int | None) -> dict[str, Any]:
     r = m.result
     head: dict[str, Any] = {"name": m.name, "files": list(m.files), "bytes": m.bytes, "gone": m.gone}
     if r is None:
@@ -283,6 +308,7 @@ def _mission(m: Mission, owner: int | None, first: Mapping[int, str]) -> dict[st
         "attempts": r.attempts,
         "version": r.version,
         "report": r.report,
+        "first_run": first_run,
         "copy_of": None if first[r.id] == m.name else first[r.id],
         "faults": [_found(f) for f in faults],
     }

@@ -164,6 +164,17 @@ def sentences(
     return out
 
 
+def new_words(missions: int, faults: Sequence[tuple[Machine, FleetFault]]) -> list[str]:
+    """What the last audit run brought, in no or one sentence; see `diagnosis.audit.fleet_news.news`."""
+    if not missions:
+        return []
+    told = [f"{m.label} {fault_words(f)} ({f.severity})" for m, f in faults[:_NAMED]]
+    more = f" and {len(faults) - len(told)} more" if len(faults) > len(told) else ""
+    return [
+        f"New since the run before, in {count(missions, 'mission')}: {'; '.join(told) + more if told else 'no new fault'}."
+    ]
+
+
 def _named(machines: Sequence[Machine]) -> str:
     """Names of machines, where one is not ready any more with the reason."""
     told = [m.label for m in machines[:_NAMED]]

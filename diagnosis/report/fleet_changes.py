@@ -50,11 +50,16 @@ def changes_of(b: Mapping[str, Any] | None) -> dict[str, Any] | None:
         }
         for c in b["coverage"]
     ]
-    m = b["missions"]
+    m, gone = b["missions"], b["machines"]["missing"]
+    if m["missing"]:
+        notes.append(f"Missions missing: {', '.join(m['missing'][:20])}" + (" …" if len(m["missing"]) > 20 else ""))
+    lost = " and ".join(count(len(x), w) for x, w in ((gone, "machine"), (m["missing"], "mission")) if x)
+    one = len(gone) + len(m["missing"]) == 1
+    lost = f"{lost} of the earlier audit {'is' if one else 'are'} missing. " if lost else ""
     told = [f"{n} {_CHANGES[k][1]}" for k, n in b["counts"].items() if n]
     return {
         "worse": b["worse"],
-        "headline": "Faults: " + ", ".join(told) if told else "No fault in either audit",
+        "headline": lost + ("Faults: " + ", ".join(told) if told else "No fault in either audit"),
         "missions": f"{count(m['newer'], 'mission')} now, {count(m['older'], 'mission')} then; {count(m['new'], 'mission')} new",
         "groups": groups,
         "notes": notes,

@@ -76,6 +76,7 @@ def build_fleet_page(document: Mapping[str, Any]) -> str:
         "verdict": {**document["verdict"], "icon": rows.verdict_symbol(document["verdict"]["status"])},
         "counts": document["counts"],
         "span": _span(document["counts"]),
+        "audit": _audit(document["audit"]),
         "kpis": _kpis(document),
         "baseline": changes_of(document["baseline"]),
         "strip": rows.STRIP,
@@ -156,7 +157,13 @@ def _environment() -> jinja2.Environment:
 
 def _span(counts: Mapping[str, Any]) -> str:
     days = [rows.day(counts[k]) for k in ("first_ns", "last_ns") if counts[k] is not None]
-    return " to ".join(dict.fromkeys(days))
+    return "logs from " + " to ".join(dict.fromkeys(days)) if days else ""
+
+
+def _audit(audit: Mapping[str, Any]) -> str:
+    run, made = audit["run"], audit["made_ns"]
+    told = [f"audit run {run}"] if run else []
+    return ", ".join([*told, f"newest result made {names.utc(made)[:16]} UTC"] if made else told)
 
 
 def _hours(seconds: float) -> str:

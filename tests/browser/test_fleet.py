@@ -152,6 +152,28 @@ def test_a_machines_name_opens_its_missions(open_page: OPEN) -> None:
     expect(page.locator("#m2 tbody tr").first).to_be_visible()
 
 
+def test_missions_show_their_result_on_a_telephone(open_page: OPEN) -> None:
+    page = open_page("few", width=420)
+    page.locator("#m0 summary").click()
+    row = page.locator("#m0 tbody tr").first
+    for cell in row.locator("td").all():
+        box = cell.bounding_box()
+        assert box["x"] >= 0
+        assert box["x"] + box["width"] <= 420
+    expect(row.locator(".st")).to_be_visible()
+    scrolled = page.locator("#m0 .scroll")
+    assert scrolled.evaluate("e => e.scrollWidth <= e.clientWidth")
+
+
+def test_paper_has_a_title_and_a_date(open_page: OPEN) -> None:
+    page = open_page("few")
+    page.emulate_media(media="print")
+    expect(page.locator("#verdict h1")).to_be_visible()
+    expect(page.locator("#verdict .dated")).to_be_visible()
+    expect(page.locator("#verdict .dated")).to_contain_text("logs from 2026-10-26 to 2026-11-08")
+    assert "logs from 2026-10-26" in page.title()
+
+
 def test_theme_can_be_chosen(open_page: OPEN) -> None:
     page = open_page("few", theme="light")
     page.locator("#theme").click()

@@ -7,7 +7,9 @@ from typing import Any
 
 import pytest
 
-from diagnosis.audit.fleet import fleet_json, load_fleet
+from diagnosis.audit.fleet import fleet_json, load_fleet, write_fleet
+from diagnosis.report.fleet_changes import changes_of
+from replay.errors import ConfigError
 from tests import fleet_samples as samples
 from tests.fleet_samples import Fault, Sample, bounds
 
@@ -118,4 +120,30 @@ def test_coverage_and_machines(tmp_path: Path) -> None:
     ]
     assert found["machines"]["new"] == ["new"]
     assert found["machines"]["missing"] == ["gone"]
+    assert found["worse"]
     assert found["machines"]["changed"] == [{"machine": "HX-1", "older": "ready", "newer": "stop"}]
+
+
+def test_missing_machines_and_missions_are_worse_and_told(tmp_path: Path) -> None:
+    older = [Sample(f"{m}/{k}", m, float(k)) for m in ("HX-1", "HX-2", "HX-3") for k in range(3)]
+    found = compared(tmp_path, older, older[:2])
+    assert found["worse"]
+    assert found["machines"]["missing"] == ["HX-2", "HX-3"]
+    assert len(found["missions"]["missing"]) == 7
+    changes = changes_of(found)
+    assert changes
+    assert changes["headline"].startswith("2 machines and 7 missions of the earlier audit are missing. ")
+    assert changes["notes"][-1].startswith("Missions missing: HX-1/2, HX-2/0, ")
+
+
+def test_missions_of_another_period_are_not_missing(tmp_path: Path) -> None:
+    found = compared(tmp_path, [Sample("a")], [Sample("b", day=1.0)])
+    assert not found["worse"]
+    assert found["missions"]["missing"] == []
+
+
+@pytest.mark.parametrize("baseline", ["", "fleet.sqlite", "../now"])
+def test_the_own_store_is_no_baseline(tmp_path: Path, baseline: str) -> None:
+    store = samples.write_store(tmp_path / "now/fleet.sqlite", [Sample("a")])
+    with pytest.raises(ConfigError, match="is the store of this audit itself"):
+        write_fleet(store, store.parent, baseline=store.parent / baseline)
