@@ -13,6 +13,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
+from diagnosis.json_text import writable
 from diagnosis.previous import with_previous
 from diagnosis.report.page import build_page
 from diagnosis.result import SCHEMA, Closeups, MissionResult
@@ -51,12 +52,13 @@ def write_result(result: MissionResult, folder: Path, *, max_size_mb: float = 15
     if windows is not None:
         windows = Closeups(windows.step, {k: _shortened(k, v) for k, v in windows.columns.items()})
     paths = tuple(folder / name for name in (HTML, JSON, PARQUET, *([] if windows is None else [WINDOWS])))
+    report = writable(result.report)
     with _made(folder), atomic_paths(*paths) as (html, document, table, *more):
         _write_table(columns, table)
         for path in more:
             _write_table({"step": windows.step, **windows.columns} if windows else {}, path)
-        document.write_bytes(_json(result.report))
-        _write_page(result.report, columns, windows, html, max_size_mb)
+        document.write_bytes(_json(report))
+        _write_page(report, columns, windows, html, max_size_mb)
     if windows is None:
         (folder / WINDOWS).unlink(missing_ok=True)
     return paths
@@ -104,12 +106,14 @@ def _write_table(columns: Mapping[str, NDArray[Any]], path: Path) -> None:
         for v in columns.values()
     ]
     table = pa.Table.from_arrays(arrays, names=list(columns))
-    pq.write_table(table, path, compression="zstd", use_dictionary=False, use_byte_stream_split=True)
+    with path.open("wb") as file:  # pyarrow opens no name that is not UTF-8
+        pq.write_table(table, file, compression="zstd", use_dictionary=False, use_byte_stream_split=True)
 
 
 def _read_table(path: Path) -> dict[str, NDArray[Any]]:
     try:
-        table = pq.read_table(path)
+        with path.open("rb") as file:
+            table = pq.read_table(file)
     except (OSError, pa.ArrowException) as error:
         raise LogError(f"{path}: cannot be read ({error}); run `mfhca diagnose` on the log again") from error
     return {name: table.column(name).to_numpy() for name in table.column_names}
@@ -148,7 +152,7 @@ def rebuild(path: Path, *, max_size_mb: float = 15.0, previous: tuple[Path, Mapp
     source = folder / JSON if path.is_dir() else path
     report = load_report(source)
     if previous is not None:
-        report = with_previous(report, previous[1], str(previous[0]))
+        report = writable(with_previous(report, previous[1], str(previous[0])))
     columns, windows = _read_table(folder / PARQUET), _read_windows(folder / WINDOWS)
     if previous is None:
         with atomic_path(folder / HTML) as html:

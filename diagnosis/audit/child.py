@@ -19,9 +19,8 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
-import orjson
-
 from diagnosis.audit.limits import Limits, die_with, hold
+from diagnosis.json_text import dump_json
 from replay.errors import ConfigError, LogError, NotJudged, OutputError
 from replay.machine import Machine
 
@@ -171,5 +170,5 @@ def leave(work: Work, found: Mapping[str, Any]) -> None:
     """Leave the outcome for who started the child, whole or not at all."""
     path = Path(work.folder) / OUTCOME
     part = path.with_suffix(".part")
-    part.write_bytes(orjson.dumps(dict(found)))
+    part.write_bytes(dump_json(dict(found)))
     part.replace(path)

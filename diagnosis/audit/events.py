@@ -10,8 +10,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import IO, Any
 
-import orjson
-
+from diagnosis.json_text import dump_json
 from replay.errors import OutputError
 
 SCHEMA = "mfhca-events/1"
@@ -48,7 +47,7 @@ class EventLog:
             Where the file cannot be written.
         """
         at = datetime.fromtimestamp(time.time(), UTC).isoformat(timespec="milliseconds")
-        line = orjson.dumps({"event": event, "time": at, **_plain(facts)}) + b"\n"
+        line = dump_json({"event": event, "time": at, **facts}) + b"\n"
         try:
             self._file.write(line)
         except BrokenPipeError:
@@ -63,8 +62,3 @@ class EventLog:
     def close(self) -> None:
         """Close the stream."""
         self._file.close()
-
-
-def _plain(facts: dict[str, Any]) -> dict[str, Any]:
-    """Facts without lone surrogates of undecodable file names, which JSON cannot hold."""
-    return {k: v.encode("utf-8", "backslashreplace").decode() if isinstance(v, str) else v for k, v in facts.items()}

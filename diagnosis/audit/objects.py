@@ -13,6 +13,7 @@ from typing import Any
 import orjson
 
 from diagnosis.audit.records import SCHEMA
+from diagnosis.json_text import dump_json
 from replay.errors import OutputError
 
 _NAME = re.compile(r"[0-9a-f]{8}-[0-9a-f]{8}-.+-(?:[0-9]+|m[0-9a-f]{8})\.json")
@@ -121,7 +122,7 @@ def attempt_name(stem: str, number: int) -> str:
 
 def encode(document: Mapping[str, Any]) -> bytes:
     """Bytes of a document; the same document gives the same bytes."""
-    return orjson.dumps(document, option=orjson.OPT_SORT_KEYS | orjson.OPT_INDENT_2)
+    return dump_json(document, option=orjson.OPT_SORT_KEYS | orjson.OPT_INDENT_2)
 
 
 def _put_file(folder: Path, name: str, content: bytes) -> bool:

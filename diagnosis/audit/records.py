@@ -111,9 +111,9 @@ def point(connection: sqlite3.Connection, mission: Mapping[str, Any], result: in
 
 def names_of(files: Sequence[Mapping[str, Any]]) -> str:
     """JSON list of files' paths, as the store holds it."""
-    import orjson
+    from diagnosis.json_text import dump_json
 
-    return orjson.dumps([f["path"] for f in files]).decode()
+    return dump_json([f["path"] for f in files]).decode()
 
 
 def _insert(

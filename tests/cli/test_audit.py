@@ -168,6 +168,24 @@ def test_a_mission_file_that_is_off_is_an_unreadable_mission(
     assert [(m["name"], m["state"], m["machine_id"]) for m in document(capsys)["missions"]] == [("s", "ok", "AX-1")]
 
 
+def test_names_that_are_not_utf8(logs: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    tree, out = tmp_path / "tr\udcffee", tmp_path / "out"
+    tree.mkdir()
+    for name in ("drive", "text"):
+        (tree / f"{name}\udce9.mcap").write_bytes((logs / f"{name}.mcap").read_bytes())
+    assert run(["audit", str(tree), "-o", str(out), "-q", "--events", "events.jsonl"]) == 3
+    events = [json.loads(line) for line in Path("events.jsonl").read_text(encoding="utf-8").splitlines()]
+    assert {e["state"]: e["files"] for e in events if e["event"] == "mission"} == {
+        "ok": [f"{tmp_path}/tr\\udcffee/drive\\udce9.mcap"],
+        "unreadable": [f"{tmp_path}/tr\\udcffee/text\\udce9.mcap"],
+    }
+    (report,) = out.glob("missions/*/report.json")
+    assert "drive\\udce9.mcap" in json.loads(report.read_bytes())["log"]["files"][0]["path"]
+    assert run(["diagnose", str(tree / "drive\udce9.mcap"), "-q"]) == 1
+    assert run(["report", "drive\udce9-report", "-q"]) == 0
+
+
 def test_an_id_in_the_machine_file_for_logs_of_several_folders_is_said(
     logs: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

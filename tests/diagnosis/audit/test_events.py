@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 from diagnosis.audit.events import EventLog
+from diagnosis.json_text import dump_json
 from replay.errors import OutputError
 
 
@@ -46,3 +47,9 @@ def test_a_full_disk_is_one_sentence() -> None:
     with pytest.raises(OutputError, match="No space left on device"):
         log.tell("start", {})
     log.close()
+
+
+def test_documents_with_names_that_are_not_utf8_are_written_with_escapes() -> None:
+    assert (
+        dump_json({"a\udcff": ["b\udcfe", ("é", 1.5, None)]}) == '{"a\\\\udcff":["b\\\\udcfe",["é",1.5,null]]}'.encode()
+    )
