@@ -141,15 +141,18 @@ def sentences(
     """
     bad = [m for m in machines if m.verdict in ("stop", "watch")]
     out = []
-    for verdict, words in (("stop", "Must not go out"), ("watch", "Faults to watch"), ("not_assessed", "Not assessed")):
+    for verdict, words in (("stop", "Must not go out"), ("watch", "Faults to watch")):
         found = [m for m in machines if m.verdict == verdict]
-        if len(found) > _SHOWN or (found and verdict == "not_assessed") or (found and len(bad) > _SHOWN):
+        if found and len(bad) > _SHOWN:
             out.append(f"{words} ({len(found)}): {_named(found)}.")
     for m in bad[:_SHOWN]:
         told = [_found(m, f) for f in m.faults if f.standing][:2]
         note = f" ({m.note})" if m.note else ""
         words = standing(m)
         out.append(f"{m.label} – {words[0].lower() + words[1:]}: {join_words(told) or 'see its last mission'}{note}.")
+    open_machines = [m for m in machines if m.verdict == "not_assessed"]
+    if open_machines:
+        out.append(f"Not assessed ({len(open_machines)}): {_named(open_machines)}.")
     near = [(m, t) for m, own in zip(machines, trends, strict=True) for t in own if t.approaching]
     near.sort(key=lambda p: p[1].trend.forecast.likely or 0.0)
     for m, t in near[:2]:

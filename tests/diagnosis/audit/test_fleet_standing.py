@@ -150,6 +150,13 @@ def test_all_machines_that_must_not_go_out_are_named(tmp_path: Path, n: int, mor
     assert f"Must not go out ({n}): {named}{more}." in text["verdict"]["text"]
 
 
+def test_what_must_not_go_out_is_told_before_what_was_not_assessed(tmp_path: Path) -> None:
+    stuck = Sample("a", "HX-1", verdict="stop", faults=[Fault(mode="stuck", severity="high")])
+    blind = Sample("b", "HX-2", verdict="not_assessed")
+    text = document(tmp_path, stuck, blind)["verdict"]["text"]
+    assert text[:2] == ["HX-1 – stop and repair: RL drive valve stuck.", "Not assessed (1): HX-2."]
+
+
 def test_a_machine_without_any_part_that_was_assessed_shows_so(tmp_path: Path) -> None:
     d = document(tmp_path, Sample("a", faults=[Fault()]), Sample("b", "HX-2", verdict="not_assessed", parts=[]))
     rows = {label: cells for label, cells, _ in matrix(d["machines"]).rows}
