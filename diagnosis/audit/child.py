@@ -17,12 +17,15 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from importlib import import_module
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from diagnosis.audit.limits import Limits, die_with, hold
 from diagnosis.json_text import dump_json
 from replay.errors import ConfigError, LogError, NotJudged, OutputError
 from replay.machine import Machine
+
+if TYPE_CHECKING:
+    from diagnosis.result import MissionResult
 
 OUTCOME, REPORT, MESSAGES = "outcome.json", "report", "messages.txt"
 FULL = {errno.ENOSPC, errno.EFBIG, errno.EDQUOT}
@@ -75,14 +78,8 @@ def judge(work: Work) -> dict[str, Any]:
     """
     from diagnosis.audit.summary import summarise
     from diagnosis.output import write_result
-    from diagnosis.pipeline import diagnose
 
-    result = diagnose(
-        [Path(name) for name in work.files],
-        work.machine,
-        machine_source=work.machine_source,
-        machine_id=work.machine_id or None,
-    )
+    result = _diagnosed(work)
     if not result.report["machine"]["id"]:
         machine = {**result.report["machine"], "id": work.fallback_id}
         result = replace(result, report={**result.report, "machine": machine})
@@ -93,6 +90,41 @@ def judge(work: Work) -> dict[str, Any]:
         "reason": _first_of(damage),
         "summary": summarise(result.report),
     }
+
+
+def _diagnosed(work: Work) -> MissionResult:
+    """Diagnose all files; where that fails for files beside the first one, without them, which counts as damage."""
+    from diagnosis.pipeline import diagnose, diagnose_mission
+    from replay.mission import load_mission
+
+    paths, left = [Path(name) for name in work.files], list[str]()
+    first: LogError | ConfigError | None = None
+    while True:
+        try:
+            if not left:
+                return diagnose(
+                    paths, work.machine, machine_source=work.machine_source, machine_id=work.machine_id or None
+                )
+            mission = load_mission(paths, work.machine)
+            main, *others = mission.files
+            main = replace(main, summary=replace(main.summary, damage=(*main.summary.damage, *left)))
+            return diagnose_mission(
+                replace(mission, files=(main, *others)),
+                work.machine,
+                machine_source=work.machine_source,
+                machine_id=work.machine_id or None,
+            )
+        except (LogError, ConfigError) as error:
+            if len(paths) == 1:
+                if first is None or str(paths[0]) in str(first):
+                    raise
+                raise first  # noqa: B904 - what the side file lacks, not what this one lacks without it
+            first, text = first or error, str(error)
+            off = [path for path in paths[1:] if str(path) in text] or paths[1:]
+            for path in paths:
+                text = text.replace(str(path), path.name)
+            left += [f"{path.name} was left out: {text}" for path in off]
+            paths = [path for path in paths if path not in off]
 
 
 def _first_of(damage: list[str]) -> str:

@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import json
 import os
 import signal
 import subprocess
@@ -7,6 +8,7 @@ import sys
 import threading
 import time
 from contextlib import suppress
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -18,7 +20,10 @@ from diagnosis.audit.outcome import Outcome
 from diagnosis.audit.spawned import Spawner
 from diagnosis.audit.zygote import Stopped
 from replay.errors import OutputError
+from replay.export.mission import write_mission
 from replay.machine import haulotte
+from replay.simulation.options import SimulationOptions
+from replay.simulation.run import simulate_mission
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="limits are held on Linux")
 LIMITS = Limits(memory_mb=150, wall_s=15.0, file_mb=20)
@@ -165,3 +170,41 @@ def _wait_until_gone(pid: int) -> None:
             return
         time.sleep(0.01)
     raise AssertionError(f"process {pid} is still there")
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [("", "side.csv was left out: side.csv"), ("t,a,b\n0,1,2\n1,1,2\n2,1,2\n", "side.csv was left out: ")],
+    ids=["empty", "other columns"],
+)
+def test_a_side_file_that_is_off_costs_itself_alone(
+    text: str, said: str, mission_log: Path, forks: Isolation, tmp_path: Path
+) -> None:
+    (tmp_path / "side.csv").write_text(text, encoding="utf-8")
+    work = work_of(str(mission_log), tmp_path, "diagnosis.audit.child:judge")
+    outcome = run_isolated(replace(work, files=(str(mission_log), str(tmp_path / "side.csv"))), Limits(), forks)
+    assert (outcome.state, outcome.reason[: len(said)]) == ("degraded", said)
+    assert str(tmp_path) not in outcome.reason
+    assert outcome.summary is not None
+    assert outcome.summary["result"]["verdict"] == "watch"  # a log with damage is never ready
+    report = json.loads((tmp_path / "report" / "report.json").read_bytes())
+    assert [file["damage"] for file in report["log"]["files"]] == [[outcome.reason]]
+
+
+def test_the_same_signals_twice_are_judged_from_the_recording(
+    mission_log: Path, forks: Isolation, tmp_path: Path
+) -> None:
+    options = SimulationOptions(scenario="healthy", duration_s=12.0, rate_hz=100.0)
+    write_mission(simulate_mission(options), tmp_path / "side.csv", "twincat")
+    work = work_of(str(mission_log), tmp_path, "diagnosis.audit.child:judge")
+    outcome = run_isolated(replace(work, files=(str(mission_log), str(tmp_path / "side.csv"))), Limits(), forks)
+    assert (outcome.state, "side.csv was left out: " in outcome.reason) == ("degraded", True), outcome
+
+
+def test_a_bad_recording_beside_a_good_table_is_unreadable(forks: Isolation, tmp_path: Path) -> None:
+    for name in ("a.mcap", "a.csv"):
+        (tmp_path / name).write_text("no log", encoding="utf-8")
+    work = work_of(str(tmp_path / "a.mcap"), tmp_path, "diagnosis.audit.child:judge")
+    outcome = run_isolated(replace(work, files=(*work.files, str(tmp_path / "a.csv"))), Limits(), forks)
+    assert outcome.state == "unreadable"
+    assert outcome.reason.startswith(f"{tmp_path}/a.mcap ")
