@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import signal
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
@@ -118,6 +119,7 @@ def audit(
 ) -> None:
     """Diagnose a tree of logs: a report per mission and a page about the fleet."""
     _check(json, events, export, machine_id)
+    _end_with_the_terminal()
     with terminal.progress("looking for missions"):
         from diagnosis.audit.discover import discover
         from diagnosis.audit.limits import Limits, usual_memory_mb
@@ -149,6 +151,13 @@ def _check(json: bool, events: str | None, export: str | None, machine_id: str |
         raise ConfigError(f"--export {export}: expected parquet")
     if machine_id is not None and not machine_id.strip():
         raise ConfigError("--machine-id: is empty; give a name or leave it out")
+
+
+def _end_with_the_terminal() -> None:
+    """Take a lost terminal as being asked to end, where SIGTERM is and the caller (nohup) does not ignore it."""
+    ended = signal.getsignal(signal.SIGTERM)
+    if hasattr(signal, "SIGHUP") and callable(ended) and signal.getsignal(signal.SIGHUP) is signal.SIG_DFL:
+        signal.signal(signal.SIGHUP, ended)
 
 
 def _said(found: Discovery) -> list[str]:

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from diagnosis.audit.discover import MissionSource
 from diagnosis.audit.outcome import READ, limit_met
 from diagnosis.audit.places import write_whole
 from diagnosis.audit.plan import Planned
@@ -64,9 +65,9 @@ class Ending:
     severity: str
 
 
-def endings(store: Store, names: Iterable[str]) -> list[Ending]:
-    """Ends of the named missions, in the order of their names; those without a result are left out."""
-    wanted = set(names)
+def endings(store: Store, missions: Iterable[MissionSource]) -> list[Ending]:
+    """Ends of missions, in the order of their names; those without a result are left out."""
+    wanted = {mission.name: mission.files for mission in missions}
     faults: dict[int, list[str]] = {}
     for row in store.database.rows("SELECT result, severity FROM fault"):
         faults.setdefault(row[0], []).append(row[1])
@@ -81,6 +82,8 @@ def endings(store: Store, names: Iterable[str]) -> list[Ending]:
             found = faults.get(row["id"], [])
             worst = max(found, key=SEVERITIES.index, default="")
             facts = {column: row[column] for column in columns}
+            if row["reason"]:
+                facts["reason"] = store.own_reason(row["id"], row["reason"], wanted[row["name"]])
             out.append(Ending(name=row["name"], faults=len(found), severity=worst, **facts))
     return out
 

@@ -19,6 +19,7 @@ from replay.errors import OutputError
 
 MISSIONS, RESULTS, WORKING = "missions", "results", ".work"
 _TEMPORARY = "mfhca-audit-"
+_HELD = ".held"
 _AT_FDCWD, _RENAME_EXCHANGE = -100, 2
 
 
@@ -79,16 +80,15 @@ def working(output: Path) -> Iterator[Working]:
     try:
         for name in (MISSIONS, RESULTS, WORKING):
             (output / name).mkdir(parents=True, exist_ok=True)
-        _sweep(base)
+        sweep(output)
         folder, claim = _own_folder(base)
-        temporary = Path(tempfile.gettempdir()) / f"{_TEMPORARY}{secrets.token_hex(8)}"
-        claim.path.write_text(str(temporary), encoding="utf-8")  # first, so that the next run finds it in any case
-        temporary.mkdir(0o700)
+        temporary, held = _own_temporary(claim.path)
     except OSError as error:
         raise cannot_write(error, output) from error
     try:
         yield Working(folder, temporary)
     finally:
+        held.drop()
         for gone in (folder, temporary):
             shutil.rmtree(gone, ignore_errors=True)
         with suppress(OSError):
@@ -106,20 +106,43 @@ def _own_folder(base: Path) -> tuple[Path, Claim]:
         claim.drop()  # another run that sweeps was faster
 
 
-def _sweep(base: Path) -> None:
-    """Remove what runs that were ended by force have left: their locks are free."""
+def _own_temporary(told: Path) -> tuple[Path, Claim]:
+    while True:
+        temporary = Path(tempfile.gettempdir()) / f"{_TEMPORARY}{secrets.token_hex(8)}"
+        told.write_bytes(os.fsencode(temporary))  # first, so that the next run finds it in any case
+        temporary.mkdir(0o700)
+        held = Claim(temporary / _HELD)
+        if held.take():
+            return temporary, held
+        held.drop()  # another run that sweeps was faster
+
+
+def sweep(output: Path) -> None:
+    """Remove what runs that were ended by force have left, of this output and of others: their locks are free."""
+    base = output / WORKING
     for lock in base.glob("*.lock"):
         try:
             claim = Claim(lock)
         except OSError:
             continue
         if claim.take():
-            temporary = Path(lock.read_text(encoding="utf-8").strip() or ".")
-            if temporary.name.startswith(_TEMPORARY):
-                shutil.rmtree(temporary, ignore_errors=True)
-            shutil.rmtree(lock.with_suffix(""), ignore_errors=True)
             with suppress(OSError):
+                temporary = Path(os.fsdecode(lock.read_bytes()).strip() or ".")
+                if temporary.name.startswith(_TEMPORARY):
+                    shutil.rmtree(temporary, ignore_errors=True)
+                shutil.rmtree(lock.with_suffix(""), ignore_errors=True)
                 lock.unlink()
+        claim.drop()
+    for folder in base.glob("[0-9]*-*"):  # a run makes its lock before its folder
+        if folder.is_dir() and not folder.with_name(f"{folder.name}.lock").exists():
+            shutil.rmtree(folder, ignore_errors=True)
+    for held in Path(tempfile.gettempdir()).glob(f"{_TEMPORARY}*/{_HELD}"):
+        try:
+            claim = Claim(held)
+        except OSError:  # another user's
+            continue
+        if claim.take():
+            shutil.rmtree(held.parent, ignore_errors=True)
         claim.drop()
 
 

@@ -20,6 +20,7 @@ from replay.machine import Machine, haulotte
 from replay.machine_file import dump_machine
 
 PAPER = "paper defaults"
+_REPORT = ("report.json", "report.html")
 _CLEARLY = 1.05  # what is free varies from one night to the next
 
 
@@ -175,4 +176,4 @@ def is_done(result: StoredResult | None, asked: Asked) -> bool:
         return False
     if result.state in TRANSIENT and (result.attempts <= asked.retries or _allows_more(asked.limits, result)):
         return False
-    return result.report is None or (asked.output / result.report / "report.json").is_file()
+    return result.report is None or all((asked.output / result.report / name).is_file() for name in _REPORT)

@@ -193,7 +193,8 @@ def absolute(name: str) -> str:
 def skip(planned: Planned, result: StoredResult, store: Store, tell: Tell) -> None:
     """Let a mission have the result that is there."""
     store.reuse(planned.mission, result)
-    facts = {"name": planned.mission.name, "state": result.state, "reason": result.reason, "verdict": result.verdict}
+    reason = store.own_reason(result.id, result.reason, planned.mission.files)
+    facts = {"name": planned.mission.name, "state": result.state, "reason": reason, "verdict": result.verdict}
     tell("skipped", {**facts, "report": result.report})
 
 

@@ -15,12 +15,12 @@ from diagnosis.audit.endings import Ending, endings, write_failures
 from diagnosis.audit.engines import Engine
 from diagnosis.audit.events import Tell
 from diagnosis.audit.ingest import ingest
-from diagnosis.audit.places import working
+from diagnosis.audit.places import sweep, working
 from diagnosis.audit.plan import Asked, Planned, is_done, plan, stored_result
 from diagnosis.audit.previous_pages import compare_newest
 from diagnosis.audit.runner import Runner, skip
-from diagnosis.audit.store import FILE_NAME, Store
-from replay.errors import OutputError
+from diagnosis.audit.store import FILE_NAME, Store, StoredResult
+from replay.errors import LogError, OutputError
 
 PAGE_S = 60.0
 _PAGE_SHARE = 20.0
@@ -90,6 +90,7 @@ def audit(
         Where the output cannot be written; what was kept before stays.
     """
     with Store.open(asked.output / FILE_NAME) as store:
+        sweep(asked.output)
         store.begin_run()
         taken = ingest(store)
         if taken.attempts or taken.links or taken.problems:
@@ -100,6 +101,8 @@ def audit(
         tell("start", {"missions": len(planned), "bytes": sum(m.bytes for m in missions)})
         for one in planned:
             result = stored_result(one, store) if asked.resume else None
+            if result is not None:
+                _remake_page(result, asked, tell)
             if result is not None and is_done(result, asked):
                 skip(one, result, store, tell)
             else:
@@ -112,11 +115,25 @@ def audit(
                 for part in without_copies(rest, store):
                     runner.run(part)
                 compare_newest(store, [one.mission.name for one in rest], asked.max_size_mb, tell)
-        ends = endings(store, [one.mission.name for one in planned])
+        ends = endings(store, [one.mission for one in planned])
         failed = write_failures(asked.output, planned, ends, asked.machine)
         gone = store.database.rows("SELECT count(*) FROM mission WHERE gone = ?", (store.run,))[0][0]
         page.write(always=bool(rest or gone or taken.attempts))
     return Audited(tuple(ends), len(planned) - len(rest), failed)
+
+
+def _remake_page(result: StoredResult, asked: Asked, tell: Tell) -> None:
+    """Make a result's page again where it was removed and the rest of the report is there."""
+    folder = asked.output / (result.report or "")
+    if result.report is None or (folder / "report.html").is_file() or not (folder / "report.json").is_file():
+        return
+    from diagnosis.output import rebuild
+
+    try:
+        rebuild(folder, max_size_mb=asked.max_size_mb)
+    except (LogError, KeyError, TypeError, ValueError):  # the mission is diagnosed again
+        return
+    tell("rebuilt", {"report": result.report})
 
 
 @dataclass

@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import os
+import re
 import time
 from collections.abc import Iterable, Sequence
 from dataclasses import asdict, dataclass, replace
@@ -246,6 +247,19 @@ class Store:
             self._objects.put(f"{result.key.stem}-m{mark}.json", encode(document))
         with self.database.transaction() as connection:
             records.write_document(connection, document, self.run)
+
+    def own_reason(self, result: int, reason: str, files: Sequence[str]) -> str:
+        """Reason of a result for one of the missions that share it: it names that mission's files, not its copies'."""
+        for row in self.database.rows("SELECT files FROM mission WHERE result = ?", (result,)):
+            theirs = json.loads(row[0])
+            for path, own in zip(theirs, files, strict=False):
+                if "://" in path or path == self.relative(own):
+                    continue
+                whole = os.path.normpath(os.path.join(self._real, path))  # noqa: PTH118
+                for shown in dict.fromkeys((whole, os.path.relpath(whole))):
+                    at = re.compile(rf"(?<![\w./\\-]){re.escape(shown)}(?![\w/\\-]|\.\w)")
+                    reason = at.sub(lambda _, own=own: own, reason)  # type: ignore[misc]
+        return reason
 
     def missions(self) -> list[StoredMission]:
         """All missions in the order of their names, those that are gone too."""

@@ -168,6 +168,31 @@ def test_a_mission_file_that_is_off_is_an_unreadable_mission(
     assert [(m["name"], m["state"], m["machine_id"]) for m in document(capsys)["missions"]] == [("s", "ok", "AX-1")]
 
 
+def test_a_copy_that_failed_names_its_own_file(logs: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    for name in ("AX-1", "AX-2"):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "text.mcap").write_bytes((logs / "text.mcap").read_bytes())
+    words = ["audit", str(tmp_path / "AX-1"), str(tmp_path / "AX-2"), "-o", str(tmp_path / "out"), "--machine-id", "7"]
+    for skipped in (0, 2):
+        assert run([*words, "-q", "--json"]) == 3
+        found = document(capsys)
+        assert found["skipped"] == skipped
+        for mission, name in zip(found["missions"], ("AX-1", "AX-2"), strict=True):
+            assert mission["reason"].startswith(f"{tmp_path}/{name}/text.mcap ")
+        assert (tmp_path / "out" / "failures.txt").read_text(encoding="utf-8").count(f"{tmp_path}/AX-1/") == 2
+
+
+def test_a_page_that_was_removed_is_made_again(audited: Path, logs: Path) -> None:
+    page = audited / "missions" / "drive" / "report.html"
+    before = page.read_bytes()
+    page.unlink()
+    events = audited.with_name("again.jsonl")
+    assert run(["audit", str(logs / "drive.mcap"), "-o", str(audited), "-q", "--events", str(events)]) == 1
+    told = [json.loads(line)["event"] for line in events.read_text(encoding="utf-8").splitlines()]
+    assert (told.count("rebuilt"), told.count("skipped"), told.count("mission")) == (1, 1, 0)
+    assert page.read_bytes() == before
+
+
 def test_names_that_are_not_utf8(logs: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     tree, out = tmp_path / "tr\udcffee", tmp_path / "out"
@@ -277,14 +302,14 @@ def test_ended_at_any_moment_it_goes_on_where_it_was(
     monkeypatch.setenv("TMPDIR", str(tmp_path))
     out = tmp_path / "out"
     draw = random.Random(5)
-    for asked in (signal.SIGINT, signal.SIGKILL):
+    for asked in (signal.SIGINT, signal.SIGHUP, signal.SIGKILL):
         before = len(acknowledged(out))
         with started(short, out, "-j", "1") as process:
             until(lambda done=before: len(acknowledged(out)) > done)
             time.sleep(draw.uniform(0.0, 0.2))
             os.kill(process.pid, asked)
             _, errors = process.communicate()
-        if asked is signal.SIGINT:
+        if asked is not signal.SIGKILL:
             assert process.returncode == 130
             assert errors.splitlines() == [
                 "note: what is finished is kept; the same command again does the rest",

@@ -249,3 +249,23 @@ def test_a_larger_limit_tries_again_what_met_it(tmp_path: Path) -> None:
     ends, events = run(found, asked_for(tmp_path / "out", limits=replace(tight, memory_mb=170)))
     assert sorted(events) == [("mission", "exhaust"), ("skipped", "hang")]
     assert "170 MB" in ends["exhaust"].reason
+
+
+def test_what_killed_runs_left_is_removed_also_where_nothing_is_to_do(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
+    found = missions(tmp_path / "logs", "fine-1")
+    run(found, asked_for(tmp_path / "out"))
+    work = tmp_path / "out" / ".work"
+    for folder in (work / "7-ab", work / "8-cd", tmp_path / "mfhca-audit-1", tmp_path / "mfhca-audit-2"):
+        folder.mkdir()
+        (folder / "data").write_bytes(b"1")
+    (work / "7-ab.lock").write_text(str(tmp_path / "mfhca-audit-1"), encoding="utf-8")
+    (tmp_path / "mfhca-audit-2" / ".held").touch()
+    with working(tmp_path / "other") as live:
+        _, events = run(found, asked_for(tmp_path / "out"))
+        assert live.folder.is_dir()
+        assert [p.name for p in tmp_path.glob("mfhca-audit-*")] == [live.temporary.name]
+    assert {kind for kind, _ in events} == {"skipped"}
+    assert [p.name for p in work.iterdir()] == ["claims"]
