@@ -202,7 +202,7 @@ def _run(
     from diagnosis.audit import engines
     from diagnosis.audit.endings import NOT_READ, exit_code
     from diagnosis.audit.events import EventLog
-    from diagnosis.audit.session import audit
+    from diagnosis.audit.session import Audited, audit
 
     log = EventLog(None if events == "-" else Path(events)) if events else None
     terminal.json |= events == "-"
@@ -217,6 +217,8 @@ def _run(
             for text in (*found.problems, *found.notes):
                 tell("problem", {"reason": text})
             if not found.missions:
+                if json:
+                    terminal.show_json(document(Audited((), 0, 0), found, asked.output, NOT_READ))
                 raise LogError(f"no mission was found ({found.left_aside} other files were left aside)")
             engine = (lambda: engines.dask(dask)) if dask else (lambda: engines.local(jobs))
             store = baseline / "fleet.sqlite" if baseline is not None and baseline.is_dir() else baseline

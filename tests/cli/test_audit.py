@@ -141,7 +141,10 @@ def test_a_missing_path_is_an_error_also_when_quiet(
     assert run([*words, "--json"]) == 3
     assert document(capsys)["problems"] == ["nope: no such file"]
     assert run([*words, "--dry-run"]) == 3
-    assert run(["audit", "nope", "-q", "--events", str(events)]) == 3
+    capsys.readouterr()
+    assert run(["audit", "nope", "-q", "--json", "--events", str(events)]) == 3
+    nothing = document(capsys)
+    assert (nothing["code"], nothing["missions"], nothing["problems"]) == (3, [], ["nope: no such file"])
     last = [json.loads(line) for line in events.read_text(encoding="utf-8").splitlines()[-2:]]
     assert [e["event"] for e in last] == ["problem", "stopped"]
 
