@@ -61,7 +61,9 @@ class Timeline:
     notes: tuple[str, ...] = ()
     open_loop: bool = False
     groups: Mapping[str, str] = field(default_factory=dict)
-    _beside: dict[tuple[str, ...], NDArray[np.float64]] = field(default_factory=dict, repr=False, compare=False)
+    _beside: dict[tuple[str, ...], NDArray[np.float64]] = field(
+        default_factory=dict, init=False, repr=False, compare=False
+    )
 
     @property
     def dt(self) -> float:

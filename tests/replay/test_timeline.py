@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -11,7 +13,7 @@ from numpy.testing import assert_array_equal
 from replay.errors import LogError
 from replay.signals import Signal, Signals
 from replay.sources import SignalSource
-from replay.timeline import align, median_period
+from replay.timeline import Timeline, align, median_period
 
 START = 1_760_000_000_000_000_000
 MS = 1_000_000
@@ -204,3 +206,11 @@ def test_shifting_the_clock_shifts_the_start_alone(shift: int, drop: set[int]) -
 def test_median_period() -> None:
     assert median_period(np.array([0, 10, 20, 50, 60])) == 10
     assert median_period(np.array([5])) == 0
+
+
+def test_a_changed_timeline_keeps_no_columns_of_the_former_one() -> None:
+    line = Timeline(0, 10, 3, {"a": np.arange(3.0)}, {}, {}, {})
+    assert_array_equal(line.beside(["a"])[:, 0], [0, 1, 2])
+    assert line.beside(["a"]) is line.beside(["a"])
+    changed = replace(line, signals={"a": np.full(3, 7.0)})
+    assert_array_equal(changed.beside(["a"])[:, 0], [7, 7, 7])
