@@ -10,12 +10,16 @@ from diagnosis.assessment import STATES, Assessment
 from diagnosis.result import FaultInterval
 from diagnosis.wording import count_words, join_words, part_words, unanswered
 from replay.faults import FAULT_STATES, State
-from replay.machine import Limits
+from replay.machine import Limits, Machine
+from replay.mission import Mission
+from replay.spill import blocks
+from replay.timeline import Timeline
 
 Key = tuple[str, str]
 
 LEAST_SHARE = 0.8  # of its driving in which a part must be judged
 _OPEN_S, _OPEN_SHARE = 1.0, 0.02  # driving that was not judged and is worth a word
+_EMPTY_S = 1.0  # without any wheel speed
 _LEFT_OUT = " was left out: its clock "
 
 
@@ -95,3 +99,38 @@ def _main_reason(assessment: Assessment) -> str:
         if count > most:
             best, most = reason, count
     return best
+
+
+def more_caveats(mission: Mission, first_ns: int, machine: Machine) -> list[str]:
+    """What the reader should know beside the verdict: parts of a mission, signals that were named and not found."""
+    out = []
+    if mission.open_loop:
+        out.append(
+            "Faults were injected into this recording; the controller did not react to them: evidence that rests on the "
+            "closed loop and on controller consistency is switched off."
+        )
+    empty = _without_speed(mission.timeline, machine)
+    if empty > _EMPTY_S:
+        out.append(f"For {empty:.1f} s no wheel speed was recorded: nothing is known of that time.")
+    absent = [name for name in machine.signals if name not in mission.signals.items]
+    if absent:
+        reason = mission.signals.missing.get(absent[0], "")
+        out.append(
+            f"Named in the machine file but not found in the log: {', '.join(absent)}"
+            + (f" ({reason})" if reason else "")
+            + "."
+        )
+    cut = (mission.timeline.start_ns - first_ns) * 1e-9
+    if cut > mission.timeline.dt:
+        out.append(f"Only a part of the mission was judged; times count from its start, {cut:.3f} s into the log.")
+    return out
+
+
+def _without_speed(timeline: Timeline, machine: Machine) -> float:
+    """Time in which no wheel speed is valid [s]."""
+    names = [f"wheel.{w}.{x}" for w in machine.wheels for x in ("v", "v_true")]
+    speeds = [timeline.signals[n] for n in names if n in timeline.signals]
+    steps = sum(
+        int(np.count_nonzero(~np.isfinite([v[part] for v in speeds]).any(axis=0))) for part in blocks(timeline.size)
+    )
+    return steps * timeline.dt if speeds else 0.0

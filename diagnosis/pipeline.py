@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from diagnosis import metrics, quality
 from diagnosis.assessment import Assessment
+from diagnosis.caveats import more_caveats
 from diagnosis.closeups import closeups_of
 from diagnosis.components import ComponentResult, assess_components
 from diagnosis.decide import Decision, decide, intervals_of, spans_of
@@ -27,13 +28,10 @@ from replay.machine import Machine
 from replay.mission import Mission, load_mission
 from replay.signals import Signals
 from replay.spill import blocks, release_all
-from replay.timeline import Timeline, align
+from replay.timeline import align
 from replay.version import __version__
 
 Array = NDArray[np.float64] | NDArray[np.float32]
-
-
-_EMPTY_S = 1.0
 
 
 def _silent(_: str) -> None:
@@ -198,7 +196,7 @@ def _result(
         ),
         "readings": list(replay.readings),
         "verdict": decision,
-        "caveats": _more_caveats(mission, told.first_ns, machine),
+        "caveats": more_caveats(mission, told.first_ns, machine),
         "intervals": list(intervals),
         "states": list(spans_of(found.assessments, timeline.step_ns)),
         "phases": metrics.phases(timeline, replay, machine),
@@ -226,41 +224,6 @@ def _result(
     columns.update(metrics.path_of(timeline))
     windows = closeups_of(timeline, replay, machine, found.assessments, intervals)
     return MissionResult(to_json(_named_status(report)), columns, windows)
-
-
-def _more_caveats(mission: Mission, first_ns: int, machine: Machine) -> list[str]:
-    """What the reader should know beside the verdict: parts of a mission, signals that were named and not found."""
-    out = []
-    if mission.open_loop:
-        out.append(
-            "Faults were injected into this recording; the controller did not react to them: evidence that rests on the "
-            "closed loop and on controller consistency is switched off."
-        )
-    empty = _without_speed(mission.timeline, machine)
-    if empty > _EMPTY_S:
-        out.append(f"For {empty:.1f} s no wheel speed was recorded: nothing is known of that time.")
-    absent = [name for name in machine.signals if name not in mission.signals.items]
-    if absent:
-        reason = mission.signals.missing.get(absent[0], "")
-        out.append(
-            f"Named in the machine file but not found in the log: {', '.join(absent)}"
-            + (f" ({reason})" if reason else "")
-            + "."
-        )
-    cut = (mission.timeline.start_ns - first_ns) * 1e-9
-    if cut > mission.timeline.dt:
-        out.append(f"Only a part of the mission was judged; times count from its start, {cut:.3f} s into the log.")
-    return out
-
-
-def _without_speed(timeline: Timeline, machine: Machine) -> float:
-    """Time in which no wheel speed is valid [s]."""
-    names = [f"wheel.{w}.{x}" for w in machine.wheels for x in ("v", "v_true")]
-    speeds = [timeline.signals[n] for n in names if n in timeline.signals]
-    steps = sum(
-        int(np.count_nonzero(~np.isfinite([v[part] for v in speeds]).any(axis=0))) for part in blocks(timeline.size)
-    )
-    return steps * timeline.dt if speeds else 0.0
 
 
 def _named_status(report: dict[str, Any]) -> dict[str, Any]:
