@@ -14,6 +14,15 @@ OUTCOMES = {
     "resolved": "resolved",
     "unchanged": "unchanged",
 }
+SIGNS = {
+    "new": "+",
+    "worse": "▲",
+    "other": "≠",
+    "better": "▼",
+    "not_seen_again": "?",
+    "resolved": "✓",
+    "unchanged": "=",
+}
 CHANGES = {"row": "row", "side": "side", "severity": "severity", "epsilon": "ε̂", "duration": "duration"}
 
 

@@ -9,20 +9,11 @@ from typing import Any
 import jinja2
 
 from diagnosis.compare_faults import GONE
-from diagnosis.compare_words import CHANGES, OUTCOMES, coverage_words, headline, times
+from diagnosis.compare_words import CHANGES, OUTCOMES, SIGNS, coverage_words, headline, times
 from diagnosis.report import names
 from diagnosis.report.plain import POLICY, environment, plain_style
 from diagnosis.report.svg import icon
 
-_SIGNS = {
-    "new": "+",
-    "worse": "▲",
-    "other": "≠",
-    "better": "▼",
-    "not_seen_again": "?",
-    "resolved": "✓",
-    "unchanged": "=",
-}
 _DEFINITIONS = (
     "Faults are matched by component, side and row of the tables; missions differ in time, so times are not compared. All "
     "faults of one component and side in one row count once.",
@@ -48,9 +39,7 @@ def build_compare_page(document: Mapping[str, Any]) -> str:
     groups = []
     for outcome, words in OUTCOMES.items():
         rows = [_row(c) for c in document["faults"] if (c["trend"] or c["status"]) == outcome]
-        groups.append(
-            {"outcome": outcome, "words": words[0].upper() + words[1:], "sign": _SIGNS[outcome], "rows": rows}
-        )
+        groups.append({"outcome": outcome, "words": words[0].upper() + words[1:], "sign": SIGNS[outcome], "rows": rows})
     missions = [_mission(word, document[word]) for word in ("older", "newer")]
     context = {
         "title": f"{missions[0]['name']} and {missions[1]['name']}",

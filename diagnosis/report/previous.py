@@ -6,18 +6,9 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from diagnosis.compare_faults import GONE
-from diagnosis.compare_words import CHANGES, OUTCOMES, coverage_words, times
+from diagnosis.compare_words import CHANGES, OUTCOMES, SIGNS, coverage_words, times
 from diagnosis.report import names
 
-SIGNS = {
-    "new": "+",
-    "worse": "▲",
-    "other": "≠",
-    "better": "▼",
-    "not_seen_again": "?",
-    "resolved": "✓",
-    "unchanged": "=",
-}
 _BAD = ("new", "worse")
 
 
