@@ -26,8 +26,8 @@ from diagnosis.modes import BLIND, HEALTHY, INEFFICIENT, NO_SIGNAL, NOISY, PAIR,
 
 Array = NDArray[np.float64]
 
-_EPSILONS = np.r_[np.arange(0.03, 0.1, 0.01), np.arange(0.1, 0.97, 0.02)]
-_HALF_STEPS = np.r_[np.full(7, 0.005), np.full(44, 0.01)]
+_EPSILONS = np.r_[np.arange(3, 10), np.arange(10, 97, 2)] / 100
+_HALF_STEPS = np.where(_EPSILONS < 0.1, 0.005, 0.01)
 _POWERS = np.array([0.5, 1.0, 2.0, 4.0, 8.0, 16.0, 32.0, 64.0])  # of the added noise [healthy noise]
 _BIASES = np.arange(-3.0, 3.5)  # of the noisy row [its noise]
 _TAIL_SHARE, _TAIL_SIZE = 0.01, 3.0

@@ -72,6 +72,13 @@ def test_blocks_change_nothing(cut: int) -> None:
     assert whole[2].score == pytest.approx(tail[2].score)
 
 
+def test_every_state_has_its_values() -> None:
+    assert {STATES} == {values.size for values in (ROW, EPSILON, HALF_STEP, MODEL.bias, MODEL.added)}
+    inefficient = ROW == modes.INEFFICIENT
+    assert (np.diff(EPSILON[inefficient]) > 0).all()
+    assert (HALF_STEP[inefficient] > 0).all()
+
+
 @pytest.mark.parametrize("m", [0, 10, 40, STATES - 25, STATES - 1])
 def test_a_state_is_a_density(m: int) -> None:
     y = np.linspace(-200, 200, 400_001)
