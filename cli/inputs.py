@@ -6,7 +6,7 @@ import glob
 import math
 import re
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -110,19 +110,28 @@ class FoundLogs:
         Words behind which nothing was found, with the reason.
     left_aside : int
         Files in given folders that are no logs.
+    urls : list[str]
+        Words that are URLs, as given.
     """
 
     paths: list[Path]
     missing: list[str]
     left_aside: int = 0
+    urls: list[str] = field(default_factory=list)
 
 
-def find_logs(words: Iterable[str]) -> FoundLogs:
-    """Expand files, folders, globs and ``-`` (paths on stdin, one per line)."""
+def find_logs(words: Iterable[str], *, urls: bool = False) -> FoundLogs:
+    """Expand files, folders, globs and ``-`` (paths on stdin, one per line); URLs are taken as they are where asked for."""
     found = FoundLogs([], [])
     seen: set[Path] = set()
     for word in words_of(words):
         path = Path(word)
+        if "://" in word:
+            if urls:
+                found.urls.append(word)
+            else:
+                found.missing.append(f"{word}: only audit and inspect read URLs; copy the log here and give the copy")
+            continue
         if path.exists():
             hits = [path]
         elif glob.has_magic(word):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import traceback
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -11,17 +12,19 @@ import typer
 
 from cli.app import command
 from cli.console import Terminal
-from cli.inputs import find_logs, machine_of, mission_paths
+from cli.inputs import FoundLogs, find_logs, machine_of, mission_paths
 from cli.options import Json, Logs, MachineFile
 
 if TYPE_CHECKING:
     from replay.inspection import InspectReport
+    from replay.machine import Machine
 
 INSPECT_EXAMPLES = """\b
 Examples:
   mfhca inspect mission.mcap                  # from the index, at once
   mfhca inspect mission.mcap --full           # reads everything
   mfhca inspect logs/ "archive/**/*.bag" --json
+  mfhca inspect s3://fleet/2026/              # of MCAP files by a few small requests
   find . -name "*.mcap" | mfhca inspect -"""
 CHANNELS_EXAMPLES = """\b
 Examples:
@@ -36,7 +39,9 @@ def inspect(
     terminal: Terminal,
     paths: Annotated[
         list[str],
-        typer.Argument(metavar="PATH...", help="Files, folders, globs; - reads paths from stdin.", show_default=False),
+        typer.Argument(
+            metavar="PATH...", help="Files, folders, globs, URLs; - reads them from stdin.", show_default=False
+        ),
     ],
     full: Annotated[
         bool, typer.Option("--full", "-f", help="Read everything: gaps, jitter, clocks, checksums, channels, losses.")
@@ -48,17 +53,20 @@ def inspect(
     from cli.listing import damage_parts, inspect_document, inspect_parts, list_parts
     from replay.errors import MfhcaError
 
-    found = find_logs(paths)
+    found = find_logs(paths, urls=True)
     failures = list(found.missing)
+    look = _looker(full, machine)
+    logs: list[tuple[str, Callable[[], InspectReport]]] = [(str(path), partial(look, path)) for path in found.paths]
+    if found.urls:
+        failures += _remote_logs(terminal, found, full, machine, look, logs)
     code = _UNREADABLE if failures else 0
     seen: list[InspectReport] = []
-    for line in found.missing:
+    for line in failures:
         terminal.error(line)
-    look = _looker(full, machine)
-    for path in found.paths:
+    for path, looked in logs:
         try:
             with terminal.progress(f"reading {path}"):
-                seen.append(look(path))
+                seen.append(looked())
         except Exception as error:
             known = isinstance(error, MfhcaError)
             code = max(code, _UNREADABLE if known or isinstance(error, OSError) else _INTERNAL)
@@ -69,19 +77,47 @@ def inspect(
             continue
         if json and seen[-1].damage:
             terminal.note(f"{path} is degraded: {seen[-1].damage[0]}")
-        if not json and (terminal.verbose or len(found.paths) == 1):
+        if not json and (terminal.verbose or len(logs) == 1):
             terminal.show(*inspect_parts(seen[-1]), "")
     if found.left_aside:
         terminal.note(f"files in the folders that are no logs by their names: {found.left_aside}")
     if json:
         terminal.show_json({"logs": [inspect_document(s) for s in seen], "errors": failures})
-    elif len(found.paths) > 1:
+    elif len(logs) > 1:
         terminal.show(*list_parts(seen, failures))
         if not terminal.verbose:
             terminal.show(*(part for s in seen for part in damage_parts(s)))
             terminal.note("-v shows each log's topics" + ("" if full else ", --full reads everything"))
     if code:
         raise typer.Exit(code)
+
+
+def _remote_logs(
+    terminal: Terminal,
+    found: FoundLogs,
+    full: bool,
+    machine: Path | None,
+    look: Callable[[Path], InspectReport],
+    logs: list[tuple[str, Callable[[], InspectReport]]],
+) -> list[str]:
+    """Add the logs behind URLs, and give why there is none behind some."""
+    with terminal.progress("looking for logs"):
+        from diagnosis.audit.looked_at import inspect_remotely, logs_at
+
+        remote, problems, left_aside = logs_at(found.urls)
+    found.left_aside += left_aside
+    for log in remote:
+        clock = None if full else _clock(Path(log.files[0]), machine_of(machine)[0] if machine is not None else None)
+        logs.append((log.files[0], partial(inspect_remotely, log, look, clock)))
+    return problems
+
+
+def _clock(path: Path, machine: Machine | None) -> str:
+    if machine is None:
+        return "header"
+    from replay.mission import source_options
+
+    return source_options(path, machine).stamp
 
 
 def _looker(full: bool, machine: Path | None) -> Callable[[Path], InspectReport]:
@@ -91,19 +127,13 @@ def _looker(full: bool, machine: Path | None) -> Callable[[Path], InspectReport]
     def look(path: Path) -> InspectReport:
         from replay.inspect_mcap import mcap_index
 
-        machine = the_machine
-        clock = "header"
-        if machine is not None:
-            from replay.mission import source_options
-
-            clock = source_options(path, machine).stamp
-        quick = None if full else mcap_index(path, clock)
+        quick = None if full else mcap_index(path, _clock(path, the_machine))
         if quick is not None:
             return quick
         from replay import inspect
         from replay.mission import source_options
 
-        options = source_options(path, machine or machine_of(None)[0])
+        options = source_options(path, the_machine or machine_of(None)[0])
         return inspect.inspect_log(path, options) if full else inspect.inspect_index(path, options)
 
     return look

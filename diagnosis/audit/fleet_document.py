@@ -106,7 +106,7 @@ def fleet_of(
 
 def fleet_document(fleet: Fleet, baseline: Mapping[str, Any] | None = None) -> dict[str, Any]:
     """The document of a fleet; the same fleet gives the same document."""
-    owner = {id(r.result): k for k, m in enumerate(fleet.machines) for r in m.runs}
+    owner = {r.result.id: k for k, m in enumerate(fleet.machines) for r in m.runs}
     failed = {f.name: k for k, m in enumerate(fleet.machines) for f in m.failed}
     first: dict[int, str] = {}
     for mission in sorted(fleet.missions, key=lambda m: m.name):
@@ -137,7 +137,12 @@ def fleet_document(fleet: Fleet, baseline: Mapping[str, Any] | None = None) -> d
         ],
         "trends": [_trend(k, t, at, fleet.axis) for k, own in enumerate(fleet.trends) for t in own],
         "missions": [
-            _mission(m, failed.get(m.name, owner.get(id(m.result))), first, fleet.first_runs.get(m.name))
+            _mission(
+                m,
+                failed.get(m.name, owner.get(m.result.id if m.result is not None else -1)),
+                first,
+                fleet.first_runs.get(m.name),
+            )
             for m in fleet.missions
         ],
         "baseline": baseline,

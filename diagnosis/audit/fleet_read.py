@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import json
 import math
+import os
 from collections import defaultdict
+from collections.abc import Sequence
 from contextlib import closing
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 from diagnosis.audit.database import Database
+from diagnosis.audit.own_reason import own_reason, whole_path
 from diagnosis.audit.store import FILE_NAME
 
 CALENDAR_NS = 946_684_800 * 10**9  # a clock that says a time before 2000 does not know the date
@@ -132,10 +135,27 @@ def read_missions(store: Path) -> list[Mission]:
         for r, component, side, driving, decided, e, low, high in db.rows(_PARTS):
             parts[r].append(Part(component, side, driving, decided, _bounds(e, low, high)))
         results = {row[0]: _result(row, tuple(faults[row[0]]), tuple(parts[row[0]])) for row in db.rows(_RESULTS)}
-        return [
+        missions = [
             Mission(name, tuple(map(str, json.loads(files))), size, results.get(r), bool(gone))
             for name, files, size, r, gone in db.rows(_MISSIONS)
         ]
+    return _with_own_reasons(missions, os.path.realpath(store if store.is_dir() else store.parent))
+
+
+def _with_own_reasons(missions: Sequence[Mission], folder: str) -> list[Mission]:
+    """Missions whose results' reasons name their own files, also where a copy was diagnosed in their place."""
+    sharing: dict[int, list[Sequence[str]]] = defaultdict(list)
+    for one in missions:
+        if one.result is not None and one.result.reason:
+            sharing[one.result.id].append(one.files)
+    out = []
+    for one in missions:
+        if one.result is not None and len(theirs := sharing[one.result.id]) > 1:
+            shown = [whole_path(folder, file) for file in one.files]
+            reason = own_reason(one.result.reason, theirs, one.files, shown, folder)
+            one = replace(one, result=replace(one.result, reason=reason))
+        out.append(one)
+    return out
 
 
 def read_run(store: Path) -> int:

@@ -4,27 +4,18 @@ from __future__ import annotations
 
 import glob
 import posixpath
-import re
-import tempfile
 from collections.abc import Mapping, Sequence
 from datetime import datetime
-from pathlib import Path
 from typing import Any
 
 from diagnosis.audit.finder import Finder
 from diagnosis.audit.listing import Entry, continues, joined
+from diagnosis.audit.ranges import outlined, why
 from replay.errors import ConfigError, LogError
 from replay.log_files import split_ending
-from replay.rawlog import LogSummary
-from replay.readers.registry import summarise_log
-from replay.sources import SourceOptions
 
 _STAMPS = ("ETag", "etag", "VersionId", "generation", "mtime", "LastModified", "last_modified", "created")
-_AHEAD = 1 << 20
-_BEFORE_SUMMARY = 1 << 16
-_FOOTER = 37  # footer record and magic of an MCAP file
 _MOST_TEXT = 1 << 20
-_MOST_RECORDS = 16
 
 
 def file_system(url: str) -> tuple[Any, str]:
@@ -194,7 +185,7 @@ class RemotePlace:
         if any(split_ending(part.name)[1] != ".mcap" for part in parts):
             return False
         try:
-            return continues(_outlined(self._system, self._path(part), part.size) for part in parts)
+            return continues(outlined(self._system, self._path(part), part.size) for part in parts)
         except LogError:
             return False
 
@@ -207,69 +198,3 @@ def stamp_of(info: Mapping[str, Any]) -> str:
     """What changes when an object is replaced: its ETag, version or time; empty where nothing is told."""
     value = next((info[name] for name in _STAMPS if info.get(name)), "")
     return str(value.timestamp() if isinstance(value, datetime) else value)
-
-
-def why(error: Exception) -> str:
-    """Reason of an error of a file system, in one line."""
-    text = " ".join(str(getattr(error, "strerror", None) or error).split())
-    return text[:300] or type(error).__name__
-
-
-def summarise_url(url: str) -> LogSummary:
-    """List an MCAP file's contents from its summary, read by ranges: a few requests, whatever the file's size.
-
-    Raises
-    ------
-    LogError
-        Where it cannot be read, is no MCAP file, or its summary does not account for the whole file: read it whole then.
-    ConfigError
-        Where the kind of URL is not known.
-    """
-    system, path = file_system(url)
-    try:
-        info = system.info(path)
-    except Exception as error:
-        raise LogError(f"{url}: cannot be read ({why(error)})") from error
-    return _outlined(system, path, int(info["size"]))
-
-
-def _outlined(system: Any, path: str, size: int) -> LogSummary:
-    """Summary of a local file that has holes wherever nothing was fetched."""
-    with tempfile.TemporaryDirectory(prefix="mfhca-") as folder:
-        local = Path(folder) / (re.sub(r"[^\w.-]", "_", path.rpartition("/")[2]) or "log.mcap")
-        try:
-            with local.open("wb") as file:
-                file.truncate(size)
-
-                def take(start: int, stop: int) -> bytes:
-                    start, stop = max(start, 0), min(stop, size)
-                    raw: bytes = system.cat_file(path, start=start, end=stop)
-                    file.seek(start)
-                    file.write(raw)
-                    return raw
-
-                tail = take(size - _AHEAD, size)
-                if size > _AHEAD:
-                    take(0, _BEFORE_SUMMARY)
-                start = int.from_bytes(tail[-_FOOTER + 9 : -_FOOTER + 17], "little")
-                if 0 < start < size - _AHEAD + _BEFORE_SUMMARY:
-                    take(start - _BEFORE_SUMMARY, size - _AHEAD)
-                file.flush()
-                for offset, length in _told_elsewhere(local)[:_MOST_RECORDS]:
-                    take(offset, offset + length)
-        except OSError as error:
-            raise LogError(f"{path}: cannot be read ({why(error)})") from error
-        summary = summarise_log(local, SourceOptions())
-    if summary.format != "mcap" or summary.damage:
-        raise LogError(f"{path}: its summary does not account for the whole file; read it whole")
-    return summary
-
-
-def _told_elsewhere(local: Path) -> list[tuple[int, int]]:
-    """Where the metadata records lie of which the summary tells."""
-    from replay.readers.mcap_file import mapped_bytes
-    from replay.readers.mcap_summary import read_summary
-
-    data = mapped_bytes(local)
-    summary = read_summary(data, len(data) - _FOOTER)
-    return [(m.offset, m.length) for m in summary.metadata] if summary is not None else []

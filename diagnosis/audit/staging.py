@@ -13,7 +13,8 @@ from typing import Any
 from diagnosis.audit.discover import MissionSource
 from diagnosis.audit.listing import Entry, joined
 from diagnosis.audit.names import safe_name
-from diagnosis.audit.remote import file_system, stamp_of, why
+from diagnosis.audit.ranges import why
+from diagnosis.audit.remote import file_system, stamp_of
 from replay.errors import ConfigError, LogError
 from replay.log_files import part_of, split_ending
 from replay.machine import Machine

@@ -5,7 +5,6 @@ from __future__ import annotations
 import hashlib
 import json
 import os
-import re
 import time
 from collections.abc import Iterable, Sequence
 from dataclasses import asdict, dataclass, replace
@@ -19,6 +18,7 @@ from diagnosis.audit.discover import MissionSource
 from diagnosis.audit.keys import Key
 from diagnosis.audit.objects import Objects, attempt_name, encode
 from diagnosis.audit.outcome import Outcome, State
+from diagnosis.audit.own_reason import own_reason
 
 FILE_NAME = "fleet.sqlite"
 RESULTS = "results"
@@ -250,16 +250,10 @@ class Store:
 
     def own_reason(self, result: int, reason: str, files: Sequence[str]) -> str:
         """Reason of a result for one of the missions that share it: it names that mission's files, not its copies'."""
-        for row in self.database.rows("SELECT files FROM mission WHERE result = ?", (result,)):
-            theirs = json.loads(row[0])
-            for path, own in zip(theirs, files, strict=False):
-                if "://" in path or path == self.relative(own):
-                    continue
-                whole = os.path.normpath(os.path.join(self._real, path))  # noqa: PTH118
-                for shown in dict.fromkeys((whole, os.path.relpath(whole))):
-                    at = re.compile(rf"(?<![\w./\\-]){re.escape(shown)}(?![\w/\\-]|\.\w)")
-                    reason = at.sub(lambda _, own=own: own, reason)  # type: ignore[misc]
-        return reason
+        theirs = [
+            json.loads(row[0]) for row in self.database.rows("SELECT files FROM mission WHERE result = ?", (result,))
+        ]
+        return own_reason(reason, theirs, [self.relative(file) for file in files], files, self._real)
 
     def missions(self) -> list[StoredMission]:
         """All missions in the order of their names, those that are gone too."""

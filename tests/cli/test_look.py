@@ -6,6 +6,7 @@ import json
 import os
 from pathlib import Path
 
+import fsspec
 import pytest
 
 from cli.console import Terminal
@@ -26,6 +27,23 @@ def test_inspect_lists_topics_of_the_index_and_says_what_it_does_not_know(
     assert "compression zstd" in seen.out
     assert "Only the index was read" in seen.out
     assert seen.err == ""
+
+
+def test_inspect_looks_behind_urls(mission_log: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    system = fsspec.filesystem("memory")
+    system.pipe_file("/looked/drive.mcap", mission_log.read_bytes())
+    try:
+        assert run(["inspect", "memory://looked/drive.mcap"]) == 0
+        first = capsys.readouterr().out
+        assert run(["inspect", "memory://looked", "memory://none", str(mission_log), "--full", "--json"]) == 3
+        seen = capsys.readouterr()
+    finally:
+        system.rm("/looked", recursive=True)
+    assert "Only the index was read" in first
+    logs = json.loads(seen.out)["logs"]
+    assert [log["source"] for log in logs] == [str(mission_log), "memory:///looked/drive.mcap"]
+    assert logs[0]["topics"] == logs[1]["topics"]
+    assert "memory://none" in seen.err
 
 
 def test_full_inspection_measures_timing_and_says_that_checksums_are_right(

@@ -62,6 +62,13 @@ def test_copies_count_once(tmp_path: Path) -> None:
     assert [m["copy_of"] for m in d["missions"]] == [None, "a", "a", None]
 
 
+def test_a_copys_reason_names_its_own_file(tmp_path: Path) -> None:
+    reason = f"{tmp_path.resolve()}/logs/a.mcap: is empty"
+    d = document(tmp_path, Sample("a", state="unreadable", reason=reason, copies=["b"]))
+    assert [m["reason"] for m in d["missions"]] == [reason, reason.replace("a.mcap", "b.mcap")]
+    assert [m["machine"] for m in d["missions"]] == [0, 0]
+
+
 def test_every_way_to_end_is_counted_and_told(tmp_path: Path) -> None:
     ends = ("ok", "degraded", "unreadable", "timeout", "out_of_memory", "crashed")
     d = document(tmp_path, *(Sample(s, state=s, day=k) for k, s in enumerate(ends)), Sample("w", state=None))

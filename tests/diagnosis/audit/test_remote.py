@@ -1,8 +1,10 @@
 from __future__ import annotations
 
 import os
+import re
 import uuid
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -11,12 +13,16 @@ import pytest
 
 from diagnosis.audit.discover import MissionSource, discover
 from diagnosis.audit.listing import Entry
+from diagnosis.audit.looked_at import inspect_remotely, logs_at
 from diagnosis.audit.objects import Objects
-from diagnosis.audit.remote import RemotePlace, file_system, summarise_url
+from diagnosis.audit.ranges import outlined
+from diagnosis.audit.remote import RemotePlace, file_system
 from diagnosis.audit.staging import machine_at, stage
 from replay.errors import ConfigError, LogError
+from replay.inspect import inspect_index
+from replay.inspect_mcap import mcap_index
+from replay.inspection import InspectReport
 from replay.mission import content_hash
-from replay.rawlog import LogSummary
 from replay.readers.registry import read_log, summarise_log
 from replay.sources import SourceOptions
 
@@ -220,30 +226,56 @@ def test_machine_files_behind_urls(memory: Any) -> None:
         machine_at("memory://fleet/none.toml")
 
 
-def plain(summary: LogSummary) -> LogSummary:
-    from dataclasses import replace
-
-    return replace(summary, source="")
+def never(path: Path) -> InspectReport:
+    raise AssertionError(f"{path} was read whole")
 
 
-def test_the_summary_of_a_large_mcap_file_takes_few_requests(bucket: Bucket) -> None:
+def test_the_index_of_a_large_mcap_file_takes_few_requests(bucket: Bucket) -> None:
     path = SAMPLES / "paper.mcap"
     assert path.stat().st_size > 2 << 20
     bucket.put("paper.mcap", path.read_bytes())
+    url = f"{bucket.url}/paper.mcap"
+    logs, problems, left_aside = logs_at([url])
+    assert (len(logs), problems, left_aside) == (1, [], 0)
     bucket.counted()
-    assert plain(summarise_url(f"{bucket.url}/paper.mcap")) == plain(summarise_log(path, SourceOptions()))
+    here = mcap_index(path, "header")
+    assert here is not None
+    assert inspect_remotely(logs[0], never, "header") == replace(here, source=url)
     met = bucket.counted()
-    assert [r.split()[0] for r in met] == ["HEAD", "GET", "GET"]
-    assert all("bytes=" in r for r in met[1:])
+    assert [r.split()[0] for r in met] == ["GET", "GET"]
+    assert all("bytes=" in r for r in met)
+    system, name = file_system(url)
+    assert replace(outlined(system, name, logs[0].bytes), source="") == replace(
+        summarise_log(path, SourceOptions()), source=""
+    )
 
 
-def test_a_damaged_mcap_file_has_no_summary_by_ranges(memory: Any) -> None:
+def test_what_an_index_does_not_tell_is_read_whole(memory: Any) -> None:
     raw = (SAMPLES / "paper.mcap").read_bytes()
     memory.pipe_file("/fleet/cut.mcap", raw[: 2 << 20])
     memory.pipe_file("/fleet/none.mcap", b"")
-    for name in ("cut", "none", "missing"):
+    memory.pipe_file("/fleet/table.csv", b"t,v\n0,1\n1,2\n")
+    logs, problems, _ = logs_at(["memory://fleet", "memory://nothing"])
+    urls = [log.files[0] for log in logs]
+    assert [url.rpartition("/")[2] for url in urls] == ["cut.mcap", "none.mcap", "table.csv"]
+    assert len(problems) == 1
+
+    def look(path: Path) -> InspectReport:
+        return inspect_index(path, SourceOptions())
+
+    cut = inspect_remotely(logs[0], look, "header")
+    assert cut.source == urls[0]
+    assert cut.damage
+    with pytest.raises(LogError, match=f"^{re.escape(urls[1])} is empty"):
+        inspect_remotely(logs[1], look, "header")
+    assert inspect_remotely(logs[2], look, None).messages == 2
+
+
+def test_a_damaged_mcap_file_has_no_outline(memory: Any) -> None:
+    memory.pipe_file("/fleet/cut.mcap", (SAMPLES / "paper.mcap").read_bytes()[: 2 << 20])
+    for name, size in (("cut", 2 << 20), ("missing", 100)):
         with pytest.raises(LogError):
-            summarise_url(f"memory://fleet/{name}.mcap")
+            outlined(memory, f"/fleet/{name}.mcap", size)
 
 
 def test_parts_behind_urls_are_one_mission_where_they_go_on(memory: Any) -> None:
