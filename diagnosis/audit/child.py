@@ -14,6 +14,7 @@ import sys
 import tempfile
 import traceback
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from importlib import import_module
 from pathlib import Path
@@ -188,14 +189,18 @@ def run(work: Work, limits: Limits, parent: int) -> None:
         code = 0
     except MemoryError:
         code = OUT_OF_MEMORY
+    except OSError as error:
+        code = NOT_WRITTEN if error.errno in FULL else 1
+        with suppress(OSError):
+            traceback.print_exc()
     except BaseException:
         traceback.print_exc()
     finally:
         os._exit(code)
 
 
-OUT_OF_MEMORY = 97
-"""Exit code of a child that had no memory left to say so."""
+OUT_OF_MEMORY, NOT_WRITTEN = 97, 98
+"""Exit codes of a child that had no memory left to say so, or no room on the disk."""
 
 
 def leave(work: Work, found: Mapping[str, Any]) -> None:

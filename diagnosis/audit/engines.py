@@ -53,8 +53,13 @@ def local(jobs: int, kind: str = "") -> Iterator[Engine]:
     children = isolation(kind)
     children.start()
     executor = ThreadPoolExecutor(jobs, thread_name_prefix="audit")
+
+    def stop() -> None:
+        executor.shutdown(wait=False, cancel_futures=True)  # first: a thread that is free takes the next mission
+        children.close()
+
     try:
-        yield Engine("local", executor, lambda: jobs, children.close)
+        yield Engine("local", executor, lambda: jobs, stop)
     finally:
         executor.shutdown(wait=True, cancel_futures=True)
 

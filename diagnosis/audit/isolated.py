@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import atexit
+import errno
 import itertools
 import json
 import os
@@ -75,8 +76,8 @@ def run_isolated(work: Work, limits: Limits, isolation: Isolation) -> Outcome:
     except (OSError, orjson.JSONDecodeError):
         found = {}
     state, reason, summary = found.get("state", ""), str(found.get("reason", "")), found.get("summary")
-    if state == "not_written":
-        raise OutputError(reason)
+    if state == "not_written" or ended.code == child.NOT_WRITTEN:
+        raise OutputError(reason or os.strerror(errno.ENOSPC))
     if state == "out_of_memory":
         reason = _over_memory(limits, reason)
     elif not state:

@@ -10,7 +10,7 @@ import shutil
 import sys
 import tempfile
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import IO
@@ -77,44 +77,47 @@ def working(output: Path) -> Iterator[Working]:
         Where the output cannot be written.
     """
     base = output / WORKING
-    try:
-        for name in (MISSIONS, RESULTS, WORKING):
-            (output / name).mkdir(parents=True, exist_ok=True)
-        sweep(output)
-        folder, claim = _own_folder(base)
-        temporary, held = _own_temporary(claim.path)
-    except OSError as error:
-        raise cannot_write(error, output) from error
-    try:
+    with ExitStack() as ending:
+        try:
+            for name in (MISSIONS, RESULTS, WORKING):
+                (output / name).mkdir(parents=True, exist_ok=True)
+            sweep(output)
+            folder, claim = _own_folder(base, ending)
+            temporary = _own_temporary(claim.path, ending)
+        except OSError as error:
+            raise cannot_write(error, output) from error
         yield Working(folder, temporary)
-    finally:
-        held.drop()
-        for gone in (folder, temporary):
-            shutil.rmtree(gone, ignore_errors=True)
-        with suppress(OSError):
-            claim.path.unlink()
-        claim.drop()
 
 
-def _own_folder(base: Path) -> tuple[Path, Claim]:
+def _own_folder(base: Path, ending: ExitStack) -> tuple[Path, Claim]:
     while True:
         folder = base / f"{os.getpid()}-{secrets.token_hex(4)}"
         claim = Claim(base / f"{folder.name}.lock")
         if claim.take():
+            ending.callback(claim.drop)
+            ending.callback(_unlink, claim.path)
+            ending.callback(shutil.rmtree, folder, ignore_errors=True)
             folder.mkdir()
             return folder, claim
         claim.drop()  # another run that sweeps was faster
 
 
-def _own_temporary(told: Path) -> tuple[Path, Claim]:
+def _own_temporary(told: Path, ending: ExitStack) -> Path:
     while True:
         temporary = Path(tempfile.gettempdir()) / f"{_TEMPORARY}{secrets.token_hex(8)}"
         told.write_bytes(os.fsencode(temporary))  # first, so that the next run finds it in any case
         temporary.mkdir(0o700)
+        ending.callback(shutil.rmtree, temporary, ignore_errors=True)
         held = Claim(temporary / _HELD)
+        ending.callback(held.drop)
         if held.take():
-            return temporary, held
+            return temporary
         held.drop()  # another run that sweeps was faster
+
+
+def _unlink(path: Path) -> None:
+    with suppress(OSError):
+        path.unlink()
 
 
 def sweep(output: Path) -> None:

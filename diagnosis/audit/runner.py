@@ -56,6 +56,7 @@ class Runner:
         self._queue: deque[Planned] = deque()
         self._elsewhere: deque[Planned] = deque()
         self._running: dict[Future[Attempt], _Running] = {}
+        self._claims: set[Claim] = set()
 
     def run(self, planned: Sequence[Planned]) -> None:
         """Run until every mission has ended.
@@ -83,8 +84,8 @@ class Runner:
             self._engine.stop()
             raise
         finally:
-            for one in self._running.values():
-                one.claim.drop()
+            for claim in self._claims:
+                claim.drop()
 
     def _fill(self) -> None:
         """Hand out as much as can run, and a little more, so that nobody waits."""
@@ -99,9 +100,10 @@ class Runner:
                 self._elsewhere.append(planned)
                 self._tell("waiting", {"name": planned.mission.name})
                 continue
+            self._claims.add(claim)
             result = stored_result(planned, self._store)
             if self._asked.resume and result is not None and is_done(result, self._asked):  # by another run meanwhile
-                claim.drop()
+                self._drop(claim)
                 skip(planned, result, self._store, self._tell)
                 continue
             number = result.attempts + 1 if result is not None else 1
@@ -146,8 +148,12 @@ class Runner:
                 self._tell("retry", told)
                 self._submit(replace(one, number=one.number + 1, tries=one.tries + 1))
             else:
-                one.claim.drop()
+                self._drop(one.claim)
                 self._tell("mission", facts_of(attempt))
+
+    def _drop(self, claim: Claim) -> None:
+        claim.drop()
+        self._claims.discard(claim)
 
     def _attempt_of(self, one: _Running, future: Future[Attempt]) -> Attempt | None:
         """What came of a task; None where its worker was lost and another one is at it now."""
@@ -155,7 +161,6 @@ class Runner:
             return future.result()
         except BaseException as error:
             if not is_lost(error):
-                one.claim.drop()
                 raise
         self._engine.capacity()  # raises where not the worker alone was lost
         one.lost += 1

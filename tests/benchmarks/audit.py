@@ -160,7 +160,7 @@ def _wait(process: subprocess.Popen[bytes], seconds: float) -> None:
 
 def _lost(out: Path, events: Path) -> int:
     """Missions that were acknowledged but do not stand in the store with a whole report."""
-    if not (out / "fleet.sqlite").is_file():
+    if not _ended(events):
         return 0
     store = sqlite3.connect(out / "fleet.sqlite")
     try:

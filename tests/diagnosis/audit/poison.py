@@ -20,9 +20,12 @@ def judge(work: Work) -> dict[str, Any]:
     told = Path(work.files[0]).read_text(encoding="utf-8").split()
     found = globals()[f"_{told[0]}"](work) if told[0] != "fine" else None
     report = Path(work.folder) / REPORT
-    report.mkdir()
-    for name in ("report.html", "report.json", "report.parquet"):
-        (report / name).write_text(f"{told}", encoding="utf-8")
+    try:
+        report.mkdir()
+        for name in ("report.html", "report.json", "report.parquet"):
+            (report / name).write_text(f"{told}", encoding="utf-8")
+    except OSError as error:
+        raise OutputError(f"{report}: cannot be written ({error.strerror})") from error
     facts = {"machine_id": "M1", "machine_name": "test", "verdict": "ready", "title": "No fault found"}
     return found or {"state": "ok", "reason": "", "summary": {"result": facts, "faults": [], "components": []}}
 

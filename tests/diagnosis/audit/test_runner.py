@@ -8,18 +8,19 @@ from types import SimpleNamespace
 
 import pytest
 
+from diagnosis.audit import engines
 from diagnosis.audit.discover import MissionSource
 from diagnosis.audit.endings import Ending, command, exit_code, quoted
 from diagnosis.audit.limits import Limits
 from diagnosis.audit.places import claim_mission, publish, working
 from diagnosis.audit.plan import Planned
-from diagnosis.audit.session import overview
+from diagnosis.audit.session import audit, overview
 from diagnosis.audit.staging import Staged
 from diagnosis.audit.store import Store
 from diagnosis.audit.task import named
 from replay.errors import OutputError
 from replay.machine import haulotte
-from tests.diagnosis.audit.samples import asked_for, missions, run
+from tests.diagnosis.audit.samples import COLD, asked_for, missions, run
 
 
 def test_a_bad_mission_costs_no_other_one_and_a_second_run_does_nothing(tmp_path: Path) -> None:
@@ -269,3 +270,15 @@ def test_what_killed_runs_left_is_removed_also_where_nothing_is_to_do(
         assert [p.name for p in tmp_path.glob("mfhca-audit-*")] == [live.temporary.name]
     assert {kind for kind, _ in events} == {"skipped"}
     assert [p.name for p in work.iterdir()] == ["claims"]
+
+
+def test_an_interrupted_audit_begins_no_other_mission(tmp_path: Path) -> None:
+    found = missions(tmp_path / "logs", "hang", "once")  # the second waits for the first
+
+    def tell(event: str, facts: dict[str, object]) -> None:
+        if event == "tick":
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        audit(found, asked_for(tmp_path / "out"), lambda: engines.local(1, COLD), tell)
+    assert not (tmp_path / "logs" / "once.bag.mark").exists()
