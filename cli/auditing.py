@@ -6,6 +6,7 @@ import os
 import signal
 from contextlib import suppress
 from dataclasses import replace
+from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -29,6 +30,13 @@ Examples:
   find logs -name '*.bag' -mtime -1 | mfhca audit - --json | jq .counts"""
 
 OUTPUT = Path("mfhca-audit")
+
+
+class TrendAxis(StrEnum):
+    """What trends are drawn over."""
+
+    HOURS = "hours"
+    DAYS = "days"
 
 
 @command
@@ -107,6 +115,9 @@ def audit(
             "--baseline", metavar="STORE", help="Store or folder of an audit to compare with.", show_default=False
         ),
     ] = None,
+    trends: Annotated[
+        TrendAxis, typer.Option("--trends", help="Trends over hours of driving or over days.")
+    ] = TrendAxis.HOURS,
     export: Annotated[
         str | None,
         typer.Option("--export", metavar="FORMAT", help="Also write the store's tables: parquet.", show_default=False),
@@ -141,7 +152,7 @@ def audit(
         if found.problems:
             raise typer.Exit(NOT_READ)
         return
-    _run(terminal, found, asked, count, dask, events, json, baseline, export, fail_on)
+    _run(terminal, found, asked, count, dask, events, json, baseline, trends, export, fail_on)
 
 
 def _check(json: bool, events: str | None, export: str | None, machine_id: str | None) -> None:
@@ -194,6 +205,7 @@ def _run(
     events: str | None,
     json: bool,
     baseline: Path | None,
+    trends: TrendAxis,
     export: str | None,
     fail_on: FailOn,
 ) -> None:
@@ -222,7 +234,7 @@ def _run(
                 raise LogError(f"no mission was found ({found.left_aside} other files were left aside)")
             engine = (lambda: engines.dask(dask)) if dask else (lambda: engines.local(jobs))
             store = baseline / "fleet.sqlite" if baseline is not None and baseline.is_dir() else baseline
-            audited = audit(found, asked, engine, tell, baseline=store)
+            audited = audit(found, asked, engine, tell, baseline=store, axis=trends.value)
             if export:
                 from diagnosis.audit.export import export as export_tables
                 from diagnosis.audit.store import Store

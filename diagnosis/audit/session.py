@@ -7,7 +7,9 @@ from collections.abc import Callable
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
+import orjson
 
 from diagnosis.audit.copies import without_copies
 from diagnosis.audit.discover import Discovery
@@ -21,6 +23,9 @@ from diagnosis.audit.previous_pages import compare_newest
 from diagnosis.audit.runner import Runner, skip
 from diagnosis.audit.store import FILE_NAME, Store, StoredResult
 from replay.errors import LogError, OutputError
+
+if TYPE_CHECKING:
+    from diagnosis.audit.fleet_trends import Axis
 
 PAGE_S = 60.0
 _PAGE_SHARE = 20.0
@@ -66,6 +71,7 @@ def audit(
     tell: Tell,
     *,
     baseline: Path | None = None,
+    axis: Axis = "hours",
 ) -> Audited:
     """Audit discovered missions.
 
@@ -81,6 +87,8 @@ def audit(
         Told of every event.
     baseline : Path or None
         Store of another audit to compare the fleet with.
+    axis : str
+        Trends over ``hours`` of driving or ``days``.
 
     Raises
     ------
@@ -107,7 +115,7 @@ def audit(
                 skip(one, result, store, tell)
             else:
                 rest.append(one)
-        page = _Page(asked.output, baseline, tell)
+        page = _Page(asked.output, baseline, axis, tell)
         tell("planned", {"rest": len(rest), "bytes": sum(one.mission.bytes for one in rest)})
         if rest:
             with working(asked.output) as place, engine() as made:
@@ -142,6 +150,7 @@ class _Page:
 
     output: Path
     baseline: Path | None
+    axis: Axis
     tell: Tell
     due: float = field(default_factory=lambda: time.monotonic() + PAGE_S)
 
@@ -161,10 +170,18 @@ class _Page:
         """Write the page, unless the one that is there is still right."""
         from diagnosis.audit.fleet import write_fleet
 
-        if not always and self.baseline is None and (self.output / "fleet.html").is_file():
+        if not always and self.baseline is None and self._stands():
             return
         start = time.monotonic()
-        files = write_fleet(self.output / FILE_NAME, self.output, baseline=self.baseline)
+        files = write_fleet(self.output / FILE_NAME, self.output, baseline=self.baseline, axis=self.axis)
         took = time.monotonic() - start
         self.due = time.monotonic() + max(PAGE_S, _PAGE_SHARE * took)
         self.tell("page", {"path": str(files.html), "wall_s": round(took, 3)})
+
+    def _stands(self) -> bool:
+        """Whether there is a page, with trends over what is asked for."""
+        try:
+            axis = orjson.loads((self.output / "fleet.json").read_bytes())["axis"]
+        except (OSError, ValueError, LookupError, TypeError):
+            return False
+        return bool(axis == self.axis) and (self.output / "fleet.html").is_file()

@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import json
 import threading
 from collections import Counter
 from dataclasses import replace
@@ -282,3 +283,16 @@ def test_an_interrupted_audit_begins_no_other_mission(tmp_path: Path) -> None:
     with pytest.raises(KeyboardInterrupt):
         audit(found, asked_for(tmp_path / "out"), lambda: engines.local(1, COLD), tell)
     assert not (tmp_path / "logs" / "once.bag.mark").exists()
+
+
+def test_a_page_stands_until_trends_are_wanted_over_something_else(tmp_path: Path) -> None:
+    found = missions(tmp_path / "logs", "fine")
+    pages: list[str] = []
+
+    def tell(event: str, facts: dict[str, object]) -> None:
+        if event == "page":
+            pages.append(json.loads((tmp_path / "out" / "fleet.json").read_bytes())["axis"])
+
+    for axis in ("hours", "hours", "days", "days", "hours"):
+        audit(found, asked_for(tmp_path / "out"), lambda: engines.local(1, COLD), tell, axis=axis)
+    assert pages == ["hours", "days", "hours"]
