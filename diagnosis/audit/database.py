@@ -116,6 +116,16 @@ class Database:
             except sqlite3.Error as error:
                 raise self.plain(error) from error
 
+    @contextmanager
+    def snapshot(self) -> Iterator[None]:
+        """Let the queries within it see the store at one moment, whatever others write meanwhile."""
+        self.rows("BEGIN")
+        try:
+            yield
+        finally:
+            with suppress(sqlite3.Error):
+                self._connection.execute("COMMIT")
+
     def rows(self, query: str, parameters: tuple[object, ...] = ()) -> list[sqlite3.Row]:
         """Rows of a query.
 

@@ -15,7 +15,7 @@ from diagnosis.audit.fleet_document import Fleet, fleet_document, fleet_of
 from diagnosis.audit.fleet_gather import machines_of
 from diagnosis.audit.fleet_machines import Limits
 from diagnosis.audit.fleet_news import first_runs
-from diagnosis.audit.fleet_read import read_missions, read_run
+from diagnosis.audit.fleet_read import content_mark, read_missions, read_run
 from diagnosis.audit.fleet_trends import Axis
 from diagnosis.audit.store import FILE_NAME
 from replay.errors import ConfigError
@@ -56,13 +56,13 @@ def write_fleet(store_path: Path, out: Path, *, baseline: Path | None = None, ax
     """
     from diagnosis.report.fleet_page import build_fleet_page
 
-    if baseline is not None and _store(baseline).resolve() == _store(store_path).resolve():
-        raise ConfigError(
-            f"--baseline {baseline}: is the store of this audit itself; give that of another, earlier audit"
-        )
+    if baseline is not None:
+        check_baseline(baseline, store_path)
+    mark = content_mark(store_path)  # first: what is written meanwhile makes the page an old one
     fleet = load_fleet(store_path, out, axis)
     fleet = replace(fleet, first_runs=first_runs(out / "fleet.json", fleet.missions, fleet.run))
     document = fleet_json(fleet, baseline)
+    document["mark"] = mark
     files = FleetFiles(out / "fleet.html", out / "fleet.json", out / "fleet.csv")
     texts = {
         files.json: orjson.dumps(document, option=orjson.OPT_APPEND_NEWLINE),
@@ -73,6 +73,23 @@ def write_fleet(store_path: Path, out: Path, *, baseline: Path | None = None, ax
         with atomic_path(path) as temporary:
             temporary.write_bytes(content)
     return files
+
+
+def check_baseline(baseline: Path, store_path: Path) -> None:
+    """See that a store to compare with can be read and is another one.
+
+    Raises
+    ------
+    ConfigError
+        Where it is the store itself.
+    OutputError
+        Where it cannot be read.
+    """
+    if _store(baseline).resolve() == _store(store_path).resolve():
+        raise ConfigError(
+            f"--baseline {baseline}: is the store of this audit itself; give that of another, earlier audit"
+        )
+    content_mark(baseline)
 
 
 def load_fleet(store_path: Path, out: Path | None = None, axis: Axis = "hours") -> Fleet:

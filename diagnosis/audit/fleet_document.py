@@ -24,6 +24,7 @@
   likely reaches the limit within as long as the stretch has lasted), ``forecast`` from now on with its ``words``.
 - ``missions``, by machine and time: ``name``, ``machine`` (place or null), ``state``, ``reason``, ``verdict``, ``title``, ``start_ns``,
   ``duration_s``, ``driving_s``, ``faults`` (of at least low severity, worst first), ``report`` (folder), ``files``, ``copy_of``, ``gone``.
+- ``mark``: of the store's content when the document was begun; another mark there means that it is out of date.
 - ``baseline``: null, or what changed against another audit; see `diagnosis.audit.compare_fleet`.
 
 Lengths are in seconds and metres, ε and shares plain, times nanoseconds since 1970.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 import math
 import os
@@ -13,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from diagnosis.audit.database import Database
-from diagnosis.audit.own_reason import own_reason, whole_path
+from diagnosis.audit.own_reason import SharedReason, shared_reason, whole_path
 from diagnosis.audit.store import FILE_NAME
 
 CALENDAR_NS = 946_684_800 * 10**9  # a clock that says a time before 2000 does not know the date
@@ -110,6 +111,7 @@ _PARTS = (
     "ORDER BY result, rowid"
 )
 _MISSIONS = "SELECT name, files, bytes, result, gone IS NOT NULL FROM mission ORDER BY name"
+_CONTENT = ("SELECT id, attempts, state, reason, machine_id, verdict, report FROM result ORDER BY id", _MISSIONS)
 
 
 def read_missions(store: Path) -> list[Mission]:
@@ -125,7 +127,7 @@ def read_missions(store: Path) -> list[Mission]:
     OutputError
         Where there is no store, it is damaged, or of another kind or version.
     """
-    with closing(Database(store / FILE_NAME if store.is_dir() else store, read_only=True)) as db:
+    with closing(_opened(store)) as db, db.snapshot():
         faults: dict[int, list[FoundFault]] = defaultdict(list)
         for row in db.rows(_FAULTS):
             r, name, component, kind, side, mode, severity, seconds, e, low, high, p = row
@@ -148,11 +150,13 @@ def _with_own_reasons(missions: Sequence[Mission], folder: str) -> list[Mission]
     for one in missions:
         if one.result is not None and one.result.reason:
             sharing[one.result.id].append(one.files)
+    reasons: dict[int, SharedReason] = {}
     out = []
     for one in missions:
         if one.result is not None and len(theirs := sharing[one.result.id]) > 1:
-            shown = [whole_path(folder, file) for file in one.files]
-            reason = own_reason(one.result.reason, theirs, one.files, shown, folder)
+            if one.result.id not in reasons:
+                reasons[one.result.id] = shared_reason(one.result.reason, theirs, folder)
+            reason = reasons[one.result.id].of([whole_path(folder, file) for file in one.files])
             one = replace(one, result=replace(one.result, reason=reason))
         out.append(one)
     return out
@@ -166,9 +170,29 @@ def read_run(store: Path) -> int:
     OutputError
         As `read_missions`.
     """
-    with closing(Database(store / FILE_NAME if store.is_dir() else store, read_only=True)) as db:
+    with closing(_opened(store)) as db:
         rows = db.rows("SELECT value FROM meta WHERE name = 'run'")
         return int(rows[0][0]) if rows else 0
+
+
+def content_mark(store: Path) -> str:
+    """What changes with the missions and results of a store, and not with runs that bring nothing.
+
+    Raises
+    ------
+    OutputError
+        As `read_missions`.
+    """
+    digest = hashlib.sha256()
+    with closing(_opened(store)) as db, db.snapshot():
+        for query in _CONTENT:
+            for row in db.rows(query):
+                digest.update(repr(tuple(row)).encode("utf-8", "backslashreplace"))
+    return digest.hexdigest()[:16]
+
+
+def _opened(store: Path) -> Database:
+    return Database(store / FILE_NAME if store.is_dir() else store, read_only=True)
 
 
 def _result(row: Any, faults: tuple[FoundFault, ...], parts: tuple[Part, ...]) -> Result:

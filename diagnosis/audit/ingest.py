@@ -15,11 +15,13 @@ from diagnosis.audit.objects import Objects
 from diagnosis.audit.outcome import STATES
 from diagnosis.audit.records import SCHEMA, write_document
 from diagnosis.audit.store import RESULTS, Store
+from diagnosis.result import SEVERITIES
 
 _MOST_BYTES = 64 << 20
 _AT_ONCE = 200
 _LINK = re.compile(r"-m[0-9a-f]{8}\.json$")
 _MISSIONS = "missions/"
+_VERDICTS = ("ready", "watch", "stop", "not_assessed")
 
 
 @dataclass(frozen=True)
@@ -104,6 +106,12 @@ def _checked(name: str, content: bytes) -> dict[str, Any]:
     report = document.get("report")
     if report is not None and not (report.startswith(_MISSIONS) and is_safe(report.removeprefix(_MISSIONS))):
         raise ValueError("the report is not in the folder missions")
+    summary = document.get("summary") or {}
+    verdict = (summary.get("result") or {}).get("verdict")
+    if verdict is not None and verdict not in _VERDICTS:
+        raise ValueError(f"verdict {str(verdict)[:40]!r}")
+    if any(fault["severity"] not in SEVERITIES for fault in summary.get("faults") or ()):
+        raise ValueError("a fault's severity is none of this tool's")
     if not isinstance(document["made_ns"], int) or not isinstance(mission["files"], list) or not mission["files"]:
         raise ValueError("files or time of making are missing")
     return dict(document)

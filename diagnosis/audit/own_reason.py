@@ -5,6 +5,55 @@ from __future__ import annotations
 import os
 import re
 from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class SharedReason:
+    """A reason, and the files that it names.
+
+    Attributes
+    ----------
+    text : str
+        As the mission that was diagnosed met it.
+    named : tuple[tuple[str, int], ...]
+        Each file as the text names it, and its place in the mission's list of files.
+    """
+
+    text: str
+    named: tuple[tuple[str, int], ...]
+
+    def of(self, shown: Sequence[str]) -> str:
+        """The reason for a mission whose files are shown like this."""
+        text = self.text
+        for said, place in self.named:
+            if place < len(shown):
+                text = _as_word(said).sub(lambda _, own=shown[place]: own, text)  # type: ignore[misc]
+        return text
+
+
+def shared_reason(reason: str, theirs: Iterable[Sequence[str]], folder: str) -> SharedReason:
+    """Find which of the missions' files a reason names.
+
+    Parameters
+    ----------
+    reason : str
+        Of the result that they share.
+    theirs : Iterable[Sequence[str]]
+        Files of each mission with that result, as the store holds them.
+    folder : str
+        Real path of the store's folder.
+    """
+    named: dict[str, int] = {}
+    for files in theirs:
+        for place, path in enumerate(files):
+            if "://" in path or os.path.basename(path) not in reason:  # noqa: PTH119
+                continue
+            whole = whole_path(folder, path)
+            for said in (whole, os.path.relpath(whole)):
+                if said in reason and _as_word(said).search(reason):
+                    named.setdefault(said, place)
+    return SharedReason(reason, tuple(named.items()))
 
 
 def whole_path(folder: str, path: str) -> str:
@@ -12,28 +61,5 @@ def whole_path(folder: str, path: str) -> str:
     return path if "://" in path else os.path.normpath(os.path.join(folder, path))  # noqa: PTH118
 
 
-def own_reason(
-    reason: str, theirs: Iterable[Sequence[str]], own: Sequence[str], shown: Sequence[str], folder: str
-) -> str:
-    """Reason of a result for one of the missions that share it: it names that mission's files, not its copies'.
-
-    Parameters
-    ----------
-    reason : str
-        As the mission that was diagnosed met it.
-    theirs : Iterable[Sequence[str]]
-        Files of each mission with that result, as the store holds them.
-    own, shown : Sequence[str]
-        Files of this mission, as the store holds them and as they are to be shown.
-    folder : str
-        Real path of the store's folder.
-    """
-    for files in theirs:
-        for path, mine, name in zip(files, own, shown, strict=False):
-            if "://" in path or path == mine:
-                continue
-            whole = whole_path(folder, path)
-            for said in dict.fromkeys((whole, os.path.relpath(whole))):
-                at = re.compile(rf"(?<![\w./\\-]){re.escape(said)}(?![\w/\\-]|\.\w)")
-                reason = at.sub(lambda _, name=name: name, reason)  # type: ignore[misc]
-    return reason
+def _as_word(path: str) -> re.Pattern[str]:
+    return re.compile(rf"(?<![\w./\\-]){re.escape(path)}(?![\w/\\-]|\.\w)")

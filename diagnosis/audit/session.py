@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -16,6 +16,7 @@ from diagnosis.audit.discover import Discovery
 from diagnosis.audit.endings import Ending, endings, write_failures
 from diagnosis.audit.engines import Engine
 from diagnosis.audit.events import Tell
+from diagnosis.audit.fleet_read import content_mark
 from diagnosis.audit.ingest import ingest
 from diagnosis.audit.places import sweep, working
 from diagnosis.audit.plan import Asked, Planned, is_done, plan, stored_result
@@ -23,12 +24,14 @@ from diagnosis.audit.previous_pages import compare_newest
 from diagnosis.audit.runner import Runner, skip
 from diagnosis.audit.store import FILE_NAME, Store, StoredResult
 from replay.errors import LogError, OutputError
+from replay.version import __version__
 
 if TYPE_CHECKING:
     from diagnosis.audit.fleet_trends import Axis
 
 PAGE_S = 60.0
 _PAGE_SHARE = 20.0
+_PAGE_TRIES = 3
 
 
 @dataclass(frozen=True)
@@ -97,7 +100,13 @@ def audit(
     OutputError
         Where the output cannot be written; what was kept before stays.
     """
+    if baseline is not None:
+        from diagnosis.audit.fleet import check_baseline
+
+        check_baseline(baseline, asked.output / FILE_NAME)
     with Store.open(asked.output / FILE_NAME) as store:
+        page = _Page(asked.output, baseline, axis, tell)
+        whole = page.is_current()  # else an earlier run was ended before its last steps
         sweep(asked.output)
         store.begin_run()
         taken = ingest(store)
@@ -115,18 +124,17 @@ def audit(
                 skip(one, result, store, tell)
             else:
                 rest.append(one)
-        page = _Page(asked.output, baseline, axis, tell)
         tell("planned", {"rest": len(rest), "bytes": sum(one.mission.bytes for one in rest)})
         if rest:
             with working(asked.output) as place, engine() as made:
                 runner = Runner(asked, store, made, place, page.telling)
                 for part in without_copies(rest, store):
                     runner.run(part)
-                compare_newest(store, [one.mission.name for one in rest], asked.max_size_mb, tell)
+        names = [one.mission.name for one in (rest if whole else planned)]
+        compare_newest(store, names, asked.max_size_mb, tell)
         ends = endings(store, [one.mission for one in planned])
         failed = write_failures(asked.output, planned, ends, asked.machine)
-        gone = store.database.rows("SELECT count(*) FROM mission WHERE gone = ?", (store.run,))[0][0]
-        page.write(always=bool(rest or gone or taken.attempts))
+        page.finish()
     return Audited(tuple(ends), len(planned) - len(rest), failed)
 
 
@@ -170,7 +178,7 @@ class _Page:
         """Write the page, unless the one that is there is still right."""
         from diagnosis.audit.fleet import write_fleet
 
-        if not always and self.baseline is None and self._stands():
+        if not always and self._stands():
             return
         start = time.monotonic()
         files = write_fleet(self.output / FILE_NAME, self.output, baseline=self.baseline, axis=self.axis)
@@ -178,10 +186,30 @@ class _Page:
         self.due = time.monotonic() + max(PAGE_S, _PAGE_SHARE * took)
         self.tell("page", {"path": str(files.html), "wall_s": round(took, 3)})
 
+    def finish(self) -> None:
+        """Write the page until it shows what the store holds; another audit of this output may write both meanwhile."""
+        for _ in range(_PAGE_TRIES):
+            self.write(always=False)
+            if self.is_current():
+                return
+
+    def is_current(self) -> bool:
+        """Whether there is a page of what the store holds now."""
+        return self._current(self._document())
+
     def _stands(self) -> bool:
-        """Whether there is a page, with trends over what is asked for."""
+        """Whether the page is current, and as it is asked for."""
+        told = self._document()
+        asked = self.baseline is None and told.get("baseline") is None and told.get("axis") == self.axis
+        return asked and self._current(told)
+
+    def _current(self, told: Mapping[str, Any]) -> bool:
+        page, mark = self.output / "fleet.html", content_mark(self.output / FILE_NAME)
+        return (told.get("mark"), told.get("version")) == (mark, __version__) and page.is_file()
+
+    def _document(self) -> Mapping[str, Any]:
         try:
-            axis = orjson.loads((self.output / "fleet.json").read_bytes())["axis"]
-        except (OSError, ValueError, LookupError, TypeError):
-            return False
-        return bool(axis == self.axis) and (self.output / "fleet.html").is_file()
+            document = orjson.loads((self.output / "fleet.json").read_bytes())
+        except (OSError, ValueError):
+            return {}
+        return document if isinstance(document, dict) else {}

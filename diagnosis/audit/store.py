@@ -18,7 +18,7 @@ from diagnosis.audit.discover import MissionSource
 from diagnosis.audit.keys import Key
 from diagnosis.audit.objects import Objects, attempt_name, encode
 from diagnosis.audit.outcome import Outcome, State
-from diagnosis.audit.own_reason import own_reason
+from diagnosis.audit.own_reason import SharedReason, shared_reason
 
 FILE_NAME = "fleet.sqlite"
 RESULTS = "results"
@@ -93,6 +93,7 @@ class Store:
         self._real = os.path.realpath(self.folder)
         self.database = Database(path, read_only=read_only)
         self._objects = Objects(str(self.folder / RESULTS)) if objects and not read_only else None
+        self._reasons: dict[tuple[int, str], SharedReason] = {}
         self.run = int(self.database.rows("SELECT value FROM meta WHERE name = 'run'")[0][0])
 
     @classmethod
@@ -250,10 +251,10 @@ class Store:
 
     def own_reason(self, result: int, reason: str, files: Sequence[str]) -> str:
         """Reason of a result for one of the missions that share it: it names that mission's files, not its copies'."""
-        theirs = [
-            json.loads(row[0]) for row in self.database.rows("SELECT files FROM mission WHERE result = ?", (result,))
-        ]
-        return own_reason(reason, theirs, [self.relative(file) for file in files], files, self._real)
+        if (result, reason) not in self._reasons:
+            rows = self.database.rows("SELECT files FROM mission WHERE result = ?", (result,))
+            self._reasons[result, reason] = shared_reason(reason, (json.loads(row[0]) for row in rows), self._real)
+        return self._reasons[result, reason].of(files)
 
     def missions(self) -> list[StoredMission]:
         """All missions in the order of their names, those that are gone too."""

@@ -296,3 +296,49 @@ def test_a_page_stands_until_trends_are_wanted_over_something_else(tmp_path: Pat
     for axis in ("hours", "hours", "days", "days", "hours"):
         audit(found, asked_for(tmp_path / "out"), lambda: engines.local(1, COLD), tell, axis=axis)
     assert pages == ["hours", "days", "hours"]
+
+
+def test_a_page_that_an_interrupted_audit_left_behind_is_written_anew(tmp_path: Path) -> None:
+    asked = asked_for(tmp_path / "out")
+    run(missions(tmp_path / "logs", "fine-1"), asked)
+    found = missions(tmp_path / "logs", "fine-1", "damaged")
+
+    def stop(event: str, facts: dict[str, object]) -> None:
+        if event == "mission":
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        audit(found, asked, lambda: engines.local(1, COLD), stop)
+    assert shown(tmp_path / "out") == ["fine-1"]
+    _, events = run(found, asked)
+    assert {kind for kind, _ in events} == {"skipped"}
+    assert shown(tmp_path / "out") == ["damaged", "fine-1"]
+
+
+def test_a_page_shows_which_result_counts_now(tmp_path: Path) -> None:
+    found = missions(tmp_path / "logs", "fine-1", "fine-2")
+    run(found, asked_for(tmp_path / "out"))
+    (tmp_path / "logs" / "fine-2.bag").unlink()
+    run(missions(tmp_path / "logs", "fine-1"), asked_for(tmp_path / "out"))
+    document = json.loads((tmp_path / "out" / "fleet.json").read_bytes())
+    assert [m["gone"] for m in document["missions"]] == [False, True]
+    run(found, asked_for(tmp_path / "out"))  # it is back
+    document = json.loads((tmp_path / "out" / "fleet.json").read_bytes())
+    assert [m["gone"] for m in document["missions"]] == [False, False]
+
+
+def shown(output: Path) -> list[str]:
+    return sorted(m["name"] for m in json.loads((output / "fleet.json").read_bytes())["missions"])
+
+
+def test_a_baseline_that_cannot_be_read_is_said_before_any_work(tmp_path: Path) -> None:
+    found = missions(tmp_path / "logs", "fine-1")
+    with pytest.raises(OutputError, match="there is no store"):
+        audit(
+            found,
+            asked_for(tmp_path / "out"),
+            lambda: engines.local(1, COLD),
+            lambda *_: None,
+            baseline=tmp_path / "typo",
+        )
+    assert not (tmp_path / "out" / "fleet.sqlite").exists()
