@@ -23,7 +23,7 @@ FAILURES = "failures.txt"
 NEVER = "never"
 NOT_READ = 3
 _FAULT, _CRASHED = 1, 70
-_HIDDEN = re.compile("[\x00-\x1f\x7f-\x9f\u2028\u2029\ud800-\udfff]")
+_HIDDEN = re.compile("[\x00-\x1f\x7f-\x9f\u061c\u200e\u200f\u2028-\u202e\u2066-\u2069\ud800-\udfff]")
 
 
 @dataclass(frozen=True)

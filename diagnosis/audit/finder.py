@@ -80,6 +80,7 @@ class Finder:
         self._found: list[Found] = []
         self._links: list[Entry] = []
         self._seen: set[str] = set()
+        self._unlisted: list[str] = []
         self._linked = False
 
     def missions(self) -> list[Found]:
@@ -142,7 +143,7 @@ class Finder:
         for folder in dict.fromkeys(folders):
             if folder in empty and not any(_below(real, folder.real) for real in reals):
                 self.problems.append(f"{folder.path}: holds no log ({', '.join(LOG_ENDINGS)} or a rosbag2 folder)")
-            else:
+            elif not any(_below(real, folder.real) for real in self._unlisted):
                 self.roots.append(folder.path)
         together: dict[str, dict[str, Entry]] = {}
         for file in files:
@@ -179,6 +180,7 @@ class Finder:
                 one = self._enter(place, folder, waiting)
             except OSError as error:
                 self.problems.append(f"{folder.path}: cannot be looked through ({error.strerror or error})")
+                self._unlisted.append(folder.real)
                 continue
             alone = alone or (one and folder is top)
         return alone
@@ -263,6 +265,7 @@ class Finder:
             return [place.whole(folder)]
         except OSError as error:
             self.problems.append(f"{folder.path}: the recording cannot be looked through ({error.strerror or error})")
+            self._unlisted.append(folder.real)
             return []
 
     def _folder_of(self, files: Sequence[Entry]) -> str:

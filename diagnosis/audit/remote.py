@@ -25,6 +25,8 @@ def file_system(url: str) -> tuple[Any, str]:
     ------
     ConfigError
         Where the kind of URL is not known, or its package is not installed.
+    LogError
+        Where the server cannot be reached.
     """
     import fsspec
 
@@ -36,6 +38,8 @@ def file_system(url: str) -> tuple[Any, str]:
         ) from error
     except ValueError as error:
         raise ConfigError(f"{url}: {error}; expected a path, s3://, gs:// or another URL that fsspec knows") from error
+    except Exception as error:  # each package raises its own kinds
+        raise LogError(f"{url}: cannot be reached ({why(error)})") from error
     return system, path
 
 
@@ -49,7 +53,11 @@ def look_remotely(finder: Finder, urls: Sequence[str]) -> None:
     """
     places: dict[int, tuple[RemotePlace, list[Entry], list[Entry]]] = {}
     for url in urls:
-        system, path = file_system(url)
+        try:
+            system, path = file_system(url)
+        except LogError as error:
+            finder.problems.append(str(error))
+            continue
         place, files, folders = places.setdefault(id(system), (RemotePlace(system), [], []))
         try:
             hits = place.hits(path.rstrip("/") or path)

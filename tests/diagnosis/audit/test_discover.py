@@ -305,3 +305,11 @@ def test_folder_that_may_not_be_read(tmp_path: Path, monkeypatch: pytest.MonkeyP
     found = discover([str(tmp_path)])
     assert [m.name for m in found.missions] == ["b__n"]
     assert found.problems == (f"{tmp_path}/a: cannot be looked through (Permission denied)",)
+    assert found.roots == ()  # what was there may still be
+
+
+def test_a_server_that_is_not_there_costs_nothing_else(tmp_path: Path) -> None:
+    put(tmp_path, "m.mcap")
+    found = discover(["ftp://127.0.0.1:1/logs", str(tmp_path)])
+    assert [m.name for m in found.missions] == ["m"]
+    assert found.problems == ("ftp://127.0.0.1:1/logs: cannot be reached (Connection refused)",)

@@ -195,7 +195,13 @@ def test_a_failure_has_the_command_that_shows_it_again(files: tuple[str, ...], s
 
 @pytest.mark.parametrize(
     ("word", "shown"),
-    [("a b.bag", "'a b.bag'"), ("it's", "'it'\"'\"'s'"), ("a\nb'", r"$'a\x0ab\x27'"), ("\udcff", r"$'\xff'")],
+    [
+        ("a b.bag", "'a b.bag'"),
+        ("it's", "'it'\"'\"'s'"),
+        ("a\nb'", r"$'a\x0ab\x27'"),
+        ("\udcff", r"$'\xff'"),
+        ("a\u202eb", r"$'a\xe2\x80\xaeb'"),
+    ],
 )
 def test_words_are_quoted_for_a_shell(word: str, shown: str) -> None:
     assert quoted(word) == shown
