@@ -12,6 +12,8 @@ from typing import Any
 import numpy as np
 
 from diagnosis.audit.database import Database
+from diagnosis.audit.keys import Key
+from diagnosis.audit.places import mark_report
 
 WHEELS, AXLES = ("FR", "FL", "RR", "RL"), ("front", "rear")
 START_NS, DAY_NS = 1_793_000_000 * 10**9, 86_400 * 10**9
@@ -58,11 +60,15 @@ class Sample:
 
 
 def write_store(path: Path, samples: Iterable[Sample]) -> Path:
-    """Make a store of these missions, and of each machine a report that says its limits."""
+    """Make a store of these missions, and folders for their reports, marked as theirs."""
     path.parent.mkdir(parents=True, exist_ok=True)
     with closing(Database(path)) as db, db.transaction() as c:
         for k, s in enumerate(samples, 1):
             _write(c, k, s)
+            if s.state in ("ok", "degraded") and ".." not in s.name:
+                place = path.parent / "missions" / s.name
+                place.mkdir(parents=True, exist_ok=True)
+                mark_report(place, Key(f"{k:064x}", "c" * 64, "1.0"))
     return path
 
 
@@ -108,7 +114,7 @@ def _write(c: Any, k: int, s: Sample) -> None:
 def write_report(folder: Path, name: str, **limits: float) -> None:
     """A report that says no more than the fleet asks of it."""
     place = folder / "missions" / name
-    place.mkdir(parents=True)
+    place.mkdir(parents=True, exist_ok=True)
     machine = {"wheels": WHEELS, "axles": AXLES}
     (place / "report.json").write_text(json.dumps({"limits": limits, "machine": machine}), encoding="utf-8")
     (place / "report.html").write_text(f"<title>{len(name)}</title>", encoding="utf-8")

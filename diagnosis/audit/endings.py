@@ -11,8 +11,9 @@ from pathlib import Path
 from typing import Any
 
 from diagnosis.audit.discover import MissionSource
+from diagnosis.audit.keys import Key
 from diagnosis.audit.outcome import READ, limit_met
-from diagnosis.audit.places import write_whole
+from diagnosis.audit.places import holds_report, write_whole
 from diagnosis.audit.plan import Planned
 from diagnosis.audit.runner import absolute
 from diagnosis.audit.store import Store
@@ -73,8 +74,8 @@ def endings(store: Store, missions: Iterable[MissionSource]) -> list[Ending]:
         faults.setdefault(row[0], []).append(row[1])
     columns = ("state", "reason", "attempts", "machine_id", "machine_name", "verdict", "title", "report")
     query = (
-        f"SELECT m.name, r.id, {', '.join(f'r.{c}' for c in columns)} FROM mission m JOIN result r ON r.id = m.result "
-        "ORDER BY m.name"
+        f"SELECT m.name, r.id, r.log_hash, r.config_hash, r.version, {', '.join(f'r.{c}' for c in columns)} "
+        "FROM mission m JOIN result r ON r.id = m.result ORDER BY m.name"
     )
     out = []
     for row in store.database.rows(query):
@@ -82,6 +83,8 @@ def endings(store: Store, missions: Iterable[MissionSource]) -> list[Ending]:
             found = faults.get(row["id"], [])
             worst = max(found, key=SEVERITIES.index, default="")
             facts = {column: row[column] for column in columns}
+            if row["report"] and not holds_report(store.folder / row["report"], Key(*row[2:5])):
+                facts["report"] = None  # another result's stands there
             if row["reason"]:
                 facts["reason"] = store.own_reason(row["id"], row["reason"], wanted[row["name"]])
             out.append(Ending(name=row["name"], faults=len(found), severity=worst, **facts))

@@ -15,8 +15,10 @@ from diagnosis.audit.fleet_document import Fleet, fleet_document, fleet_of
 from diagnosis.audit.fleet_gather import machines_of
 from diagnosis.audit.fleet_machines import Limits
 from diagnosis.audit.fleet_news import first_runs
-from diagnosis.audit.fleet_read import content_mark, read_missions, read_run
+from diagnosis.audit.fleet_read import Mission, content_mark, read_missions, read_run
 from diagnosis.audit.fleet_trends import Axis
+from diagnosis.audit.keys import Key
+from diagnosis.audit.places import holds_report
 from diagnosis.audit.store import FILE_NAME
 from replay.errors import ConfigError
 from replay.files import atomic_path
@@ -112,7 +114,7 @@ def load_fleet(store_path: Path, out: Path | None = None, axis: Axis = "hours") 
     """
     place = _store(store_path).parent
     folder = out if out is not None else place
-    missions = read_missions(store_path)
+    missions = [_with_own_report(mission, folder) for mission in read_missions(store_path)]
     came = arrivals(place, missions)
     machines, unknown = machines_of(missions, lambda report: _limits(folder / report / "report.json"), came)
     fleet = fleet_of(machines, missions, axis, unknown)
@@ -137,6 +139,16 @@ def fleet_json(fleet: Fleet, baseline: Path | None = None) -> dict[str, Any]:
 def _store(path: Path) -> Path:
     """Store at a path, or in a folder."""
     return path / FILE_NAME if path.is_dir() else path
+
+
+def _with_own_report(mission: Mission, folder: Path) -> Mission:
+    """Mission without the report of its result where another result's report has taken that one's place."""
+    result = mission.result
+    if result is None or result.report is None:
+        return mission
+    if holds_report(folder / result.report, Key(result.log_hash, result.config_hash, result.version)):
+        return mission
+    return replace(mission, result=replace(result, report=None))
 
 
 def _limits(path: Path) -> Limits:

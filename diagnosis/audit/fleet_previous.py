@@ -7,11 +7,14 @@ from pathlib import Path
 from typing import Any
 
 from diagnosis.audit.fleet_read import CALENDAR_NS
+from diagnosis.audit.keys import Key
+from diagnosis.audit.places import holds_report
 from diagnosis.audit.store import Store
 from replay.errors import LogError
 
 _QUERY = (
-    "SELECT b.id AS id, min(m.name) AS name, b.report AS report, b.start_ns AS start_ns FROM result a "
+    "SELECT b.id AS id, min(m.name) AS name, b.report AS report, b.start_ns AS start_ns, "
+    "b.log_hash, b.config_hash, b.version FROM result a "
     "JOIN result b ON b.machine_id = a.machine_id AND b.start_ns < a.start_ns AND b.start_ns >= ? "
     "JOIN mission m ON m.result = b.id "
     "WHERE a.id = ? AND a.machine_id <> '' AND b.verdict IS NOT NULL AND b.report IS NOT NULL "
@@ -33,12 +36,15 @@ class Previous:
         Folder of its report, relative to the store's.
     start_ns : int
         Start on the log's clock [ns since 1970].
+    key : Key
+        Of its result.
     """
 
     result: int
     name: str
     report: str
     start_ns: int
+    key: Key
 
 
 def previous_of(store: Store, result: int) -> Previous | None:
@@ -52,11 +58,14 @@ def previous_of(store: Store, result: int) -> Previous | None:
         Where the store cannot be read.
     """
     rows = store.database.rows(_QUERY, (CALENDAR_NS, result))
-    return Previous(*rows[0]) if rows else None
+    if not rows:
+        return None
+    number, name, report, start_ns, *key = rows[0]
+    return Previous(number, name, report, start_ns, Key(*key))
 
 
 def previous_report(store: Store, result: int) -> tuple[Previous, dict[str, Any]] | None:
-    """The same with its ``report.json``; None also where that can no longer be read.
+    """The same with its ``report.json``; None also where that can no longer be read, or another result's stands there.
 
     Raises
     ------
@@ -68,7 +77,10 @@ def previous_report(store: Store, result: int) -> tuple[Previous, dict[str, Any]
     previous = previous_of(store, result)
     if previous is None:
         return None
+    folder = Path(store.folder) / previous.report
+    if not holds_report(folder, previous.key):
+        return None
     try:
-        return previous, dict(load_report(Path(store.folder) / previous.report / "report.json"))
+        return previous, dict(load_report(folder / "report.json"))
     except LogError:
         return None

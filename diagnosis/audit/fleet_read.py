@@ -78,6 +78,7 @@ class Result:
     report: str | None
     version: str
     log_hash: str
+    config_hash: str
     faults: tuple[FoundFault, ...]
     parts: tuple[Part, ...]
 
@@ -100,7 +101,7 @@ class Mission:
 
 _RESULTS = (
     "SELECT id, state, reason, attempts, machine_id, machine_name, verdict, title, start_ns, duration_s, driving_s, "
-    "distance_m, open_loop, report, version, log_hash FROM result WHERE id IN (SELECT result FROM mission) ORDER BY id"
+    "distance_m, open_loop, report, version, log_hash, config_hash FROM result WHERE id IN (SELECT result FROM mission) ORDER BY id"
 )
 _FAULTS = (
     "SELECT result, id, component, kind, side, mode, severity, stop_s - start_s, epsilon, epsilon_low, epsilon_high, "

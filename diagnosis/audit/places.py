@@ -15,11 +15,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import IO
 
+from diagnosis.audit.keys import Key
 from replay.errors import OutputError
 
 MISSIONS, RESULTS, WORKING = "missions", "results", ".work"
 _TEMPORARY = "mfhca-audit-"
 _HELD = ".held"
+_MARK = ".key"
 _AT_FDCWD, _RENAME_EXCHANGE = -100, 2
 
 
@@ -42,6 +44,8 @@ class Claim:
                 import fcntl
 
                 fcntl.flock(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                # a run that sweeps may have removed the file before it was locked
+                return os.path.samestat(os.fstat(self._file.fileno()), self.path.stat())
         except OSError:
             return False
         return True
@@ -169,8 +173,11 @@ def claim_mission(output: Path, name: str) -> Claim | None:
     return None
 
 
-def publish(made: Path, place: Path) -> None:
+def publish(made: Path, place: Path, key: Key) -> None:
     """Move a finished report to its place; one that stands there is exchanged in one step where the system can.
+
+    The report is marked with the key of its result: the next one of the mission, under another configuration or of
+    another content, takes the same place.
 
     Raises
     ------
@@ -179,6 +186,7 @@ def publish(made: Path, place: Path) -> None:
     """
     try:
         place.parent.mkdir(parents=True, exist_ok=True)
+        mark_report(made, key)
         for file in made.iterdir():
             _flush(file)
         if not place.exists():
@@ -190,6 +198,42 @@ def publish(made: Path, place: Path) -> None:
         _flush(place.parent)
     except OSError as error:
         raise cannot_write(error, place) from error
+
+
+def mark_report(folder: Path, key: Key) -> None:
+    """Mark a report with the key of its result."""
+    (folder / _MARK).write_bytes(_marked(key))
+
+
+def holds_report(folder: Path, key: Key) -> bool:
+    """Whether the report in a folder is that of a key's result, not of another one that took its place."""
+    try:
+        with (folder / _MARK).open("rb") as file:
+            return file.read(1 << 12) == _marked(key)
+    except (OSError, ValueError):  # a name from a damaged store
+        return False
+
+
+@contextmanager
+def own_report(output: Path, report: str, key: Key) -> Iterator[Path | None]:
+    """Claim a result's report to change it; None where another run is at its mission, or it is not there any more.
+
+    Raises
+    ------
+    OutputError
+        Where the output cannot be written.
+    """
+    claim = claim_mission(output, report.removeprefix(f"{MISSIONS}/"))
+    try:
+        folder = output / report
+        yield folder if claim is not None and holds_report(folder, key) else None
+    finally:
+        if claim is not None:
+            claim.drop()
+
+
+def _marked(key: Key) -> bytes:
+    return f"{key.log_hash}\n{key.config_hash}\n{key.version}\n".encode()
 
 
 def write_whole(path: Path, data: bytes) -> None:

@@ -12,6 +12,7 @@ from diagnosis.audit.identity import fallback_id, given_id, stated_id
 from diagnosis.audit.keys import config_hash
 from diagnosis.audit.limits import Limits
 from diagnosis.audit.outcome import TRANSIENT, limit_met
+from diagnosis.audit.places import holds_report
 from diagnosis.audit.staging import machine_at
 from diagnosis.audit.store import Store, StoredResult
 from diagnosis.audit.task import key_of, sizes_of
@@ -176,4 +177,7 @@ def is_done(result: StoredResult | None, asked: Asked) -> bool:
         return False
     if result.state in TRANSIENT and (result.attempts <= asked.retries or _allows_more(asked.limits, result)):
         return False
-    return result.report is None or all((asked.output / result.report / name).is_file() for name in _REPORT)
+    if result.report is None:
+        return True
+    folder = asked.output / result.report
+    return holds_report(folder, result.key) and all((folder / name).is_file() for name in _REPORT)

@@ -8,12 +8,14 @@ from pathlib import Path
 from diagnosis.audit.events import Tell
 from diagnosis.audit.fleet_previous import previous_report
 from diagnosis.audit.fleet_read import CALENDAR_NS
+from diagnosis.audit.keys import Key
+from diagnosis.audit.places import own_report
 from diagnosis.audit.store import Store
 from replay.errors import MfhcaError, OutputError
 
 _NEWEST = (
-    "SELECT id, report FROM result WHERE machine_id = ? AND verdict IS NOT NULL AND report IS NOT NULL "
-    "AND start_ns >= ? ORDER BY start_ns DESC, id DESC LIMIT 1"
+    "SELECT id, report, log_hash, config_hash, version FROM result WHERE machine_id = ? AND verdict IS NOT NULL "
+    "AND report IS NOT NULL AND start_ns >= ? AND id IN (SELECT result FROM mission) ORDER BY start_ns DESC, id DESC LIMIT 1"
 )
 _MACHINES = "SELECT DISTINCT r.machine_id FROM mission m JOIN result r ON r.id = m.result WHERE m.name = ? AND r.machine_id <> ''"
 
@@ -38,13 +40,15 @@ def compare_newest(store: Store, names: Sequence[str], max_size_mb: float, tell:
         Where the output cannot be written.
     """
     for machine in sorted({row[0] for name in names for row in store.database.rows(_MACHINES, (name,))}):
-        for result, report in store.database.rows(_NEWEST, (machine, CALENDAR_NS)):
-            try:
-                _compare(store, int(result), Path(store.folder) / report, max_size_mb)
-            except OutputError:
-                raise
-            except (MfhcaError, KeyError, TypeError, ValueError) as error:
-                tell("not_compared", {"report": report, "reason": str(error)})
+        for result, report, *key in store.database.rows(_NEWEST, (machine, CALENDAR_NS)):
+            with own_report(store.folder, report, Key(*key)) as folder:
+                try:
+                    if folder is not None:
+                        _compare(store, int(result), folder, max_size_mb)
+                except OutputError:
+                    raise
+                except (MfhcaError, KeyError, TypeError, ValueError) as error:
+                    tell("not_compared", {"report": report, "reason": str(error)})
 
 
 def _compare(store: Store, result: int, folder: Path, max_size_mb: float) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -18,7 +18,7 @@ from diagnosis.audit.engines import Engine
 from diagnosis.audit.events import Tell
 from diagnosis.audit.fleet_read import content_mark
 from diagnosis.audit.ingest import ingest
-from diagnosis.audit.places import sweep, working
+from diagnosis.audit.places import own_report, sweep, working
 from diagnosis.audit.plan import Asked, Planned, is_done, plan, stored_result
 from diagnosis.audit.previous_pages import compare_newest
 from diagnosis.audit.runner import Runner, skip
@@ -114,7 +114,7 @@ def audit(
             tell("ingested", {"attempts": taken.attempts, "links": taken.links, "problems": list(taken.problems)})
         missions = store.adopt(discovery.missions, discovery.roots)
         planned = plan(missions, asked)
-        rest = []
+        done, rest = [], []
         tell("start", {"missions": len(planned), "bytes": sum(m.bytes for m in missions)})
         for one in planned:
             result = stored_result(one, store) if asked.resume else None
@@ -122,14 +122,19 @@ def audit(
                 _remake_page(result, asked, tell)
             if result is not None and is_done(result, asked):
                 skip(one, result, store, tell)
+                done.append(one)
             else:
                 rest.append(one)
         tell("planned", {"rest": len(rest), "bytes": sum(one.mission.bytes for one in rest)})
         if rest:
             with working(asked.output) as place, engine() as made:
                 runner = Runner(asked, store, made, place, page.telling)
-                for part in without_copies(rest, store):
-                    runner.run(part)
+                now = rest
+                while now:  # also what shared a report whose place another result has taken meanwhile
+                    for part in without_copies(now, store):
+                        runner.run(part)
+                    done, now = _parted(done, asked, store)
+                    rest += now
         names = [one.mission.name for one in (rest if whole else planned)]
         compare_newest(store, names, asked.max_size_mb, tell)
         ends = endings(store, [one.mission for one in planned])
@@ -138,17 +143,27 @@ def audit(
     return Audited(tuple(ends), len(planned) - len(rest), failed)
 
 
+def _parted(done: Sequence[Planned], asked: Asked, store: Store) -> tuple[list[Planned], list[Planned]]:
+    """Missions that are done still, and those that are not any more."""
+    parts: tuple[list[Planned], list[Planned]] = [], []
+    for one in done:
+        parts[not is_done(stored_result(one, store), asked)].append(one)
+    return parts
+
+
 def _remake_page(result: StoredResult, asked: Asked, tell: Tell) -> None:
     """Make a result's page again where it was removed and the rest of the report is there."""
-    folder = asked.output / (result.report or "")
-    if result.report is None or (folder / "report.html").is_file() or not (folder / "report.json").is_file():
+    if result.report is None or (asked.output / result.report / "report.html").is_file():
         return
     from diagnosis.output import rebuild
 
-    try:
-        rebuild(folder, max_size_mb=asked.max_size_mb)
-    except (LogError, KeyError, TypeError, ValueError):  # the mission is diagnosed again
-        return
+    with own_report(asked.output, result.report, result.key) as folder:
+        if folder is None or not (folder / "report.json").is_file():
+            return
+        try:
+            rebuild(folder, max_size_mb=asked.max_size_mb)
+        except (LogError, KeyError, TypeError, ValueError):  # the mission is diagnosed again
+            return
     tell("rebuilt", {"report": result.report})
 
 

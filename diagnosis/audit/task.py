@@ -188,7 +188,7 @@ def _audit(task: Task, folder: Path, temporary: Path) -> Attempt:
     report = None
     if outcome.state in READ and (folder / child.REPORT).is_dir():
         report = f"{MISSIONS}/{task.mission.name}"
-        publish(folder / child.REPORT, Path(task.output) / report)
+        publish(folder / child.REPORT, Path(task.output) / report, key)
     return Attempt(task.mission, key, outcome, task.attempt, report, hashes)
 
 

@@ -70,7 +70,7 @@ def test_every_mission_has_an_end_and_a_report_where_it_could_be_read(audited: P
     }
     assert "ends without a footer" in ends["cut"]["reason"]
     assert ends["drive"]["peak_mb"] > 0
-    reports = ["report.html", "report.json", "report.parquet"]
+    reports = [".key", "report.html", "report.json", "report.parquet"]
     assert sorted(p.name for p in (audited / "missions" / "drive").iterdir()) == reports
     assert (audited / "tables" / "result.parquet").is_file()
     command = (audited / "failures.txt").read_text(encoding="utf-8").splitlines()[1].strip()

@@ -34,6 +34,19 @@ def test_each_content_is_diagnosed_once(tmp_path: Path) -> None:
     assert counted(events) == {"skipped": ["a__m", "b__m", "c__m", "d__m"]}
 
 
+def test_a_copy_whose_originals_report_was_replaced_gets_its_own(tmp_path: Path) -> None:
+    logs, asked = tmp_path / "logs", asked_for(tmp_path / "out", machine_id="H-07")
+    for name in ("a", "b", "c"):
+        write(logs / f"{name}.mcap", "fine one")
+    run(discover([str(logs)]), asked)
+    write(logs / "a.mcap", "fine other")
+    ends, events = run(discover([str(logs)]), asked)
+    assert {n: e.report for n, e in ends.items()} == {"a": "missions/a", "b": "missions/b", "c": "missions/b"}
+    shown = {n: (asked.output / str(e.report) / "report.json").read_text("utf-8") for n, e in ends.items()}
+    assert shown == {"a": "['fine', 'other']", "b": "['fine', 'one']", "c": "['fine', 'one']"}
+    assert [name for kind, name in events if kind == "mission"] == ["a", "b"]
+
+
 def test_a_resume_reads_no_log(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     logs, asked = tmp_path / "logs", asked_for(tmp_path / "out")
     for i in range(3):

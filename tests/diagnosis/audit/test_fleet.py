@@ -17,6 +17,8 @@ from diagnosis.audit.fleet_csv import COLUMNS
 from diagnosis.audit.fleet_machines import Machine
 from diagnosis.audit.fleet_previous import previous_of, previous_report
 from diagnosis.audit.fleet_trends import trends_of
+from diagnosis.audit.keys import Key
+from diagnosis.audit.places import mark_report
 from diagnosis.audit.store import Store
 from replay.errors import OutputError
 from tests import fleet_samples as samples
@@ -190,7 +192,7 @@ def test_the_same_store_gives_the_same_bytes_and_leaves_no_other_file(tmp_path: 
     write_fleet(tmp_path, tmp_path)
     assert [p.read_bytes() for p in (files.html, files.json, files.csv)] == first
     left = {p.name for p in tmp_path.iterdir() if not p.name.startswith("fleet.sqlite")}
-    assert left == {"fleet.html", "fleet.json", "fleet.csv"}
+    assert left == {"fleet.html", "fleet.json", "fleet.csv", "missions"}
     d = json.loads(first[1])
     assert d["schema"] == "mfhca-fleet/1"
     assert d["counts"]["machines"] == 6
@@ -234,6 +236,16 @@ def test_hostile_names_stay_text_and_links_stay_below_the_page(tmp_path: Path) -
     assert not any(".." in unquote(a) for a in links)
 
 
+def test_a_report_of_another_result_is_not_linked_and_says_no_limits(tmp_path: Path) -> None:
+    store = samples.write_store(tmp_path / "fleet.sqlite", [Sample("a"), Sample("b", "HX-2")])
+    for name in ("a", "b"):
+        samples.write_report(tmp_path, name, min_epsilon=0.25)
+    mark_report(tmp_path / "missions" / "b", Key("d" * 64, "c" * 64, "1.0"))
+    fleet = load_fleet(store)
+    assert [m.limits.min_epsilon for m in fleet.machines] == [0.25, 0.1]
+    assert {m["name"]: m["report"] for m in fleet_json(fleet)["missions"]} == {"a": "missions/a", "b": None}
+
+
 def test_gone_logs_keep_their_results_and_are_marked(tmp_path: Path) -> None:
     d = document(tmp_path, Sample("a", gone=True), Sample("b", day=1.0))
     assert d["counts"]["gone"] == 1
@@ -257,7 +269,6 @@ def test_the_previous_mission_is_the_last_before_by_the_logs_clock(tmp_path: Pat
         assert [p and p.name for p in found] == ["also", None, "first", None, None, None, None, None]
         assert previous_report(store, 1) is None
         folder = tmp_path / "missions/second"
-        folder.mkdir(parents=True)
         (folder / "report.json").write_text('{"schema": "mfhca-report/1"}', encoding="utf-8")
         previous = previous_report(store, 1)
         assert previous is not None

@@ -8,6 +8,8 @@ from typing import Any
 
 import pytest
 
+from diagnosis.audit.keys import Key
+from diagnosis.audit.places import claim_mission, mark_report
 from diagnosis.audit.previous_pages import compare_newest
 from diagnosis.audit.store import Store
 from diagnosis.output import write_result
@@ -64,6 +66,23 @@ def test_a_report_that_says_it_already_is_left(store: Path) -> None:
     before = page.stat().st_mtime_ns
     compare(store, "new", "old")
     assert page.stat().st_mtime_ns == before
+
+
+@pytest.mark.parametrize("name", ["new", "old"])
+def test_a_report_of_another_result_is_not_compared(store: Path, name: str) -> None:
+    mark_report(store.parent / "missions" / name, Key("d" * 64, "c" * 64, "1.0"))
+    assert compare(store, "new") == []
+    assert "previous" not in document(store, "new")
+
+
+def test_a_report_that_another_audit_makes_anew_is_left_to_it(store: Path) -> None:
+    claim = claim_mission(store.parent, "new")
+    assert claim is not None
+    assert compare(store, "new") == []
+    assert "previous" not in document(store, "new")
+    claim.drop()
+    compare(store, "new")
+    assert "previous" in document(store, "new")
 
 
 def test_a_broken_report_is_told_and_costs_nothing(store: Path) -> None:

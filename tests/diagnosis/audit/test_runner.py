@@ -12,6 +12,7 @@ import pytest
 from diagnosis.audit import engines
 from diagnosis.audit.discover import MissionSource
 from diagnosis.audit.endings import Ending, command, exit_code, quoted
+from diagnosis.audit.keys import Key
 from diagnosis.audit.limits import Limits
 from diagnosis.audit.places import claim_mission, publish, working
 from diagnosis.audit.plan import Planned
@@ -52,6 +53,16 @@ def test_only_what_changed_is_audited_again(tmp_path: Path) -> None:
     assert events == [("skipped", "fine-1"), ("mission", "fine-2")]
     _, events = run(changed, asked_for(tmp_path / "out", resume=False))
     assert sorted(events) == [("mission", "fine-1"), ("mission", "fine-2")]
+
+
+def test_a_report_that_another_configuration_has_replaced_is_made_again(tmp_path: Path) -> None:
+    found = missions(tmp_path / "logs", "fine-1")
+    for name in ("A", "B", "A"):
+        asked = asked_for(tmp_path / "out", machine_id=name)
+        assert [state for _, state in overview(found, asked)] == ["to do"]
+        ends, events = run(found, asked)
+        assert (events, ends["fine-1"].report) == ([("mission", "fine-1")], "missions/fine-1")
+    assert [state for _, state in overview(found, asked)] == ["ok"]
 
 
 def test_attempts_are_counted_and_more_retries_go_on(tmp_path: Path) -> None:
@@ -136,7 +147,7 @@ def test_a_report_takes_the_place_of_an_earlier_one(tmp_path: Path) -> None:
         made = tmp_path / "made"
         made.mkdir(exist_ok=True)
         (made / "report.json").write_text(text, encoding="utf-8")
-        publish(made, tmp_path / "missions" / "a")
+        publish(made, tmp_path / "missions" / "a", Key("1", "2", "3"))
         assert (tmp_path / "missions" / "a" / "report.json").read_text(encoding="utf-8") == text
 
 
