@@ -30,6 +30,13 @@ if TYPE_CHECKING:
 
 OUTCOME, REPORT, MESSAGES = "outcome.json", "report", "messages.txt"
 FULL = {errno.ENOSPC, errno.EFBIG, errno.EDQUOT}
+_PASSING = (
+    "EIO", "ESTALE", "ETIMEDOUT", "EAGAIN", "EBUSY", "ENXIO", "ENODEV", "EACCES", "EPERM", "EMFILE", "ENFILE",
+    "ENETDOWN", "ENETUNREACH", "EHOSTDOWN", "EHOSTUNREACH", "ECONNREFUSED", "ECONNRESET", "ECONNABORTED", "ENOTCONN",
+    "ESHUTDOWN", "ENOLINK", "EREMOTEIO",
+)  # fmt: skip
+PASSING = {getattr(errno, name) for name in _PASSING if hasattr(errno, name)}
+"""Errors of disks, networks and rights: they say nothing of a file's content."""
 
 
 @dataclass(frozen=True)
@@ -75,7 +82,7 @@ def judge(work: Work) -> dict[str, Any]:
     Returns
     -------
     dict
-        ``state``, ``reason``, ``summary`` as in `Outcome`.
+        ``state``, ``reason``, ``summary``, and ``passing`` where it is true, as in `Outcome`.
     """
     from diagnosis.audit.summary import summarise
     from diagnosis.output import write_result
@@ -145,20 +152,26 @@ def attempt(work: Work) -> dict[str, Any]:
     except OutputError as error:
         return {"state": "not_written", "reason": _system_reason(error), "summary": None}
     except (LogError, ConfigError) as error:
-        full = isinstance(error.__cause__, OSError) and error.__cause__.errno in FULL
-        return {"state": "crashed" if full else "unreadable", "reason": str(error), "summary": None}
+        number = error.__cause__.errno if isinstance(error.__cause__, OSError) else None
+        return _unread(number, str(error))
     except MemoryError as error:
         return {"state": "out_of_memory", "reason": _where(error), "summary": None}
     except OSError as error:
         full, what = error.errno in FULL, error.strerror or error
         name = f"{error.filename}: " if error.filename else ""
         reason = f"cannot keep temporary data: {what}" if full else f"{name}cannot be read: {what}"
-        return {"state": "crashed" if full else "unreadable", "reason": reason, "summary": None}
+        return _unread(error.errno, reason)
     except Exception as error:
         traceback.print_exc()
         text = f"internal error: {type(error).__name__}: {error} ({_where(error)})"
         return {"state": "crashed", "reason": text, "summary": None}
     return found
+
+
+def _unread(number: int | None, reason: str) -> dict[str, Any]:
+    """End of a mission that cannot be read, by the number of the system's error where there is one."""
+    state = "crashed" if number in FULL else "unreadable"
+    return {"state": state, "reason": reason, "summary": None, "passing": number in PASSING}
 
 
 def _system_reason(error: BaseException) -> str:

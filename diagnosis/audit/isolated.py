@@ -16,6 +16,7 @@ import sys
 import threading
 from concurrent.futures import Future
 from contextlib import suppress
+from dataclasses import replace
 from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any, Protocol
@@ -31,6 +32,7 @@ from replay.errors import OutputError
 
 _GRACE_S = 30.0
 _CLOSE_S = 2.0
+_LEAST_S = 0.01
 _NO_MEMORY = re.compile(r"bad_alloc|MemoryError|out of memory|cannot allocate memory|LLVM ERROR", re.IGNORECASE)
 _FRAME = re.compile(r'^  File "([^"]+)", line (\d+) in (\S+)', re.MULTILINE)
 # One thread for each child: missions run beside each other, and a process with one thread may be forked.
@@ -58,8 +60,8 @@ class Isolation(Protocol):
         """End all children and whatever starts them."""
 
 
-def run_isolated(work: Work, limits: Limits, isolation: Isolation) -> Outcome:
-    """Do the work in a child.
+def run_isolated(work: Work, limits: Limits, isolation: Isolation, spent_s: float = 0.0) -> Outcome:
+    """Do the work in a child, in what is left of the mission's time after `spent_s` [s].
 
     Raises
     ------
@@ -67,10 +69,10 @@ def run_isolated(work: Work, limits: Limits, isolation: Isolation) -> Outcome:
         Where the report has no place to be written.
     """
     kills = memory_kills()
-    ended = isolation.run(work, limits)
+    ended = isolation.run(work, replace(limits, wall_s=max(limits.wall_s - spent_s, _LEAST_S)))
     if isinstance(ended, str):
         return Outcome("crashed", ended)
-    took = {"wall_s": ended.wall_s, "cpu_s": ended.cpu_s, "peak_mb": ended.peak_mb}
+    took = {"wall_s": ended.wall_s + spent_s, "cpu_s": ended.cpu_s, "peak_mb": ended.peak_mb}
     try:
         found: dict[str, Any] = orjson.loads((Path(work.folder) / child.OUTCOME).read_bytes()) if not ended.code else {}
     except (OSError, orjson.JSONDecodeError):
@@ -82,14 +84,14 @@ def run_isolated(work: Work, limits: Limits, isolation: Isolation) -> Outcome:
         reason = _over_memory(limits, reason)
     elif not state:
         state, reason = _why(ended, _messages(work), limits, killed=memory_kills() > kills)
-    return Outcome(state, reason, **took, summary=summary)
+    return Outcome(state, reason, **took, summary=summary, passing=found.get("passing", False))
 
 
 def _why(ended: Ended, messages: str, limits: Limits, *, killed: bool) -> tuple[Any, str]:
     """State and reason of a child that left no outcome."""
     over_cpu = limits.cpu_s is not None and ended.cpu_s >= limits.cpu_s
     if ended.stopped == "wall":
-        return "timeout", f"took longer than {limits.wall_s:g} s; allow more with --timeout"
+        return "timeout", over_time(limits)
     if ended.stopped == "memory" or ended.code == child.OUT_OF_MEMORY:
         return "out_of_memory", _over_memory(limits)
     if ended.code >= 0:
@@ -106,6 +108,11 @@ def _why(ended: Ended, messages: str, limits: Limits, *, killed: bool) -> tuple[
     if name == "SIGBUS":
         return "crashed", f"its process ended with SIGBUS: a file became shorter while it was read{_place(messages)}"
     return "crashed", f"its process ended with {name}{_place(messages)}"
+
+
+def over_time(limits: Limits) -> str:
+    """Reason of a mission that took longer than it may."""
+    return f"took longer than {limits.wall_s:g} s; allow more with --timeout"
 
 
 def _over_memory(limits: Limits, place: str = "") -> str:

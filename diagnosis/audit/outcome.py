@@ -52,6 +52,8 @@ class Outcome:
         Most memory held at once [MB].
     summary : Mapping or None
         From `diagnosis.audit.summary.summarise`; None where there is no report.
+    passing : bool
+        Whether the files could not be read for a reason outside of them, which may pass: no result of their content.
     """
 
     state: State
@@ -60,6 +62,7 @@ class Outcome:
     cpu_s: float = 0.0
     peak_mb: float = 0.0
     summary: Mapping[str, Any] | None = None
+    passing: bool = False
 
     def __post_init__(self) -> None:
         if self.state not in STATES:

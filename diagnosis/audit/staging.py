@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import math
 import os
 import shutil
 import tempfile
+import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -38,7 +40,11 @@ class Staged:
     hashes: tuple[str, ...]
 
 
-def stage(mission: MissionSource, folder: Path, known: Sequence[str] = ()) -> Staged:
+class Late(Exception):
+    """The files were not ready in time."""
+
+
+def stage(mission: MissionSource, folder: Path, known: Sequence[str] = (), until: float = math.inf) -> Staged:
     """Make a mission's files local, and hash them.
 
     Parameters
@@ -50,9 +56,14 @@ def stage(mission: MissionSource, folder: Path, known: Sequence[str] = ()) -> St
         recordings.
     known : Sequence[str]
         SHA-256 of each file where they are known, so that local files need not be read for them.
+    until : float
+        Time of `time.monotonic` at which they must be ready [s]; looked at with each piece that comes from a server, and
+        after each file.
 
     Raises
     ------
+    Late
+        Where they are not.
     LogError
         Where a file cannot be read, or was replaced since the missions were listed.
     ConfigError
@@ -62,11 +73,12 @@ def stage(mission: MissionSource, folder: Path, known: Sequence[str] = ()) -> St
     paths, hashes = [], []
     for i, (name, size, stamp) in enumerate(zip(mission.files, sizes, mission.stamps, strict=True)):
         if "://" in name:
-            paths.append(_fetch(name, folder / str(i), size, stamp))
+            paths.append(_fetch(name, folder / str(i), size, stamp, until))
             hashes.append(content_hash(paths[-1])[0])
         else:
             paths.append(Path(name))
             hashes.append(known[i] if i < len(known) else content_hash(paths[-1])[0])
+        _in_time(until)
     return Staged(_recordings(paths, folder), tuple(hashes))
 
 
@@ -90,22 +102,30 @@ def machine_at(name: str) -> Machine:
         return load_machine(local)
 
 
-def _fetch(url: str, folder: Path, size: int, stamp: str) -> Path:
+def _in_time(until: float) -> None:
+    if time.monotonic() > until:
+        raise Late
+
+
+def _fetch(url: str, folder: Path, size: int, stamp: str, until: float) -> Path:
     """Copy an object, or all below a folder; refuse what was replaced since it was listed."""
+    from fsspec.callbacks import Callback
+
     system, path = file_system(url)
+    piece = Callback(hooks={"time": lambda *_, **__: _in_time(until)})
     stem, ending = split_ending(path.rstrip("/").rpartition("/")[2])
     local = folder / (safe_name(stem) + ending)
     try:
         folder.mkdir(parents=True)
         info = system.info(path)
         if info["type"] == "directory":
-            found = _fetch_folder(system, path, url, local)
+            found = _fetch_folder(system, path, url, local, piece)
         else:
-            system.get_file(path, str(local))
+            system.get_file(path, str(local), callback=piece)
             found = _checked(system, path, url, local)
     except OSError as error:
         raise LogError(f"{url}: cannot be read ({why(error)})") from error
-    except LogError:
+    except (LogError, Late):
         raise
     except Exception as error:  # each package raises its own kinds
         raise LogError(f"{url}: cannot be read ({why(error)})") from error
@@ -123,7 +143,7 @@ def _checked(system: Any, path: str, url: str, local: Path) -> tuple[int, str]:
     return int(info["size"]), stamp_of(info)
 
 
-def _fetch_folder(system: Any, path: str, url: str, local: Path) -> tuple[int, str]:
+def _fetch_folder(system: Any, path: str, url: str, local: Path, piece: Any) -> tuple[int, str]:
     local.mkdir()
     for other in sorted(system.find(path)):
         relative = other[len(path) :].strip("/")
@@ -131,7 +151,7 @@ def _fetch_folder(system: Any, path: str, url: str, local: Path) -> tuple[int, s
             raise LogError(f"{url}: holds an object with the name {relative[:80]!r}, which is no file's name")
         target = local / relative
         target.parent.mkdir(parents=True, exist_ok=True)
-        system.get_file(other, str(target))
+        system.get_file(other, str(target), callback=piece)
     system.invalidate_cache()
     rows = []
     for other, info in system.find(path, detail=True).items():

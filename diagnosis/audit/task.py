@@ -17,13 +17,13 @@ from diagnosis.audit import child
 from diagnosis.audit.child import Work
 from diagnosis.audit.discover import MissionSource
 from diagnosis.audit.identity import fallback_id
-from diagnosis.audit.isolated import isolation, run_isolated
+from diagnosis.audit.isolated import isolation, over_time, run_isolated
 from diagnosis.audit.keys import Key, file_roles, log_hash, unhashed_log
 from diagnosis.audit.limits import Limits
 from diagnosis.audit.objects import Objects
 from diagnosis.audit.outcome import READ, Outcome
 from diagnosis.audit.places import MISSIONS, cannot_write, publish
-from diagnosis.audit.staging import Staged, stage
+from diagnosis.audit.staging import Late, Staged, stage
 from replay.errors import ConfigError, LogError, OutputError
 from replay.machine import Machine
 from replay.version import __version__
@@ -153,14 +153,15 @@ def audit_one(task: Task) -> Attempt:
 
 def _audit(task: Task, folder: Path, temporary: Path) -> Attempt:
     files = tuple(Path(name) for name in task.mission.files if "://" not in name)
-    before = _signature(files)
+    before, start = _signature(files), time.monotonic()
     try:
-        staged = stage(task.mission, temporary / "files", task.known)
+        staged = stage(task.mission, temporary / "files", task.known, start + task.limits.wall_s)
+    except Late:
+        outcome = Outcome("timeout", over_time(task.limits), time.monotonic() - start)
+        return _unhashed(task, outcome)
     except (LogError, ConfigError) as error:
-        key = key_of(task.mission, (), task.machine, task.config_hash)
         full = isinstance(error.__cause__, OSError) and error.__cause__.errno in child.FULL
-        outcome = Outcome("crashed" if full else "unreadable", str(error))
-        return Attempt(task.mission, key, outcome, task.attempt, None, ())
+        return _unhashed(task, Outcome("crashed" if full else "unreadable", str(error)))
     hashes = staged.hashes
     key = key_of(task.mission, hashes, task.machine, task.config_hash)
     work = Work(
@@ -175,7 +176,7 @@ def _audit(task: Task, folder: Path, temporary: Path) -> Attempt:
         task.judge,
     )
     try:
-        outcome = run_isolated(work, task.limits, isolation(task.isolation))
+        outcome = run_isolated(work, task.limits, isolation(task.isolation), time.monotonic() - start)
     except OutputError as error:
         raise OutputError(
             f"{task.output}: the report of {task.mission.name} cannot be written ({error}); what is finished stays, run the "
@@ -183,13 +184,22 @@ def _audit(task: Task, folder: Path, temporary: Path) -> Attempt:
         ) from error
     if _signature(files) != before:
         gone = "was changed or removed while it was read; audit again once it is complete"
-        outcome = Outcome("unreadable", gone, outcome.wall_s, outcome.cpu_s, outcome.peak_mb)
+        outcome = Outcome("unreadable", gone, outcome.wall_s, outcome.cpu_s, outcome.peak_mb, passing=True)
     outcome = replace(outcome, reason=named(outcome.reason, staged, task.mission, temporary))
+    if outcome.passing:
+        return _unhashed(task, outcome)
     report = None
     if outcome.state in READ and (folder / child.REPORT).is_dir():
         report = f"{MISSIONS}/{task.mission.name}"
         publish(folder / child.REPORT, Path(task.output) / report, key)
     return Attempt(task.mission, key, outcome, task.attempt, report, hashes)
+
+
+def _unhashed(task: Task, outcome: Outcome) -> Attempt:
+    """End that says nothing of the files' content: the next audit tries again."""
+    return Attempt(
+        task.mission, key_of(task.mission, (), task.machine, task.config_hash), outcome, task.attempt, None, ()
+    )
 
 
 def named(reason: str, staged: Staged, mission: MissionSource, temporary: Path) -> str:
@@ -204,6 +214,7 @@ def named(reason: str, staged: Staged, mission: MissionSource, temporary: Path) 
 def _put(task: Task, attempt: Attempt) -> None:
     """Leave the attempt's result object, as `Store.record` would."""
     mission, outcome = attempt.mission, asdict(attempt.outcome)
+    del outcome["passing"]
     hashes = attempt.hashes or (None,) * len(mission.files)
     files = zip(task.described, sizes_of(mission), mission.stamps, hashes, strict=True)
     document = {

@@ -29,6 +29,7 @@ from diagnosis.audit.child import Work
 from diagnosis.audit.limits import Limits, follow, held_mb
 
 LOOK_S = 0.05
+_STUCK_S = 10.0
 
 
 class Stopped(Exception):
@@ -64,6 +65,8 @@ class _Child:
     base_mb: float
     start: float = field(default_factory=time.monotonic)
     stopped: str = ""
+    stopped_at: float = 0.0
+    answered: bool = False
     peak_mb: float = 0.0
 
 
@@ -129,8 +132,12 @@ class Zygote:
                 _kill(pid)  # what it may have started
                 wall, peak = time.monotonic() - one.start, max(one.peak_mb, used.ru_maxrss / 1024)
                 code = os.waitstatus_to_exitcode(status)
-                ended = Ended(code, one.stopped, wall, used.ru_utime + used.ru_stime, peak)
-                self._connection.send((one.number, ended))
+                self._answer(one, Ended(code, one.stopped, wall, used.ru_utime + used.ru_stime, peak))
+
+    def _answer(self, one: _Child, ended: Ended) -> None:
+        if not one.answered:
+            one.answered = True
+            self._connection.send((one.number, ended))
 
     def _watch(self) -> None:
         now = time.monotonic()
@@ -138,12 +145,15 @@ class Zygote:
             held = held_mb(pid)
             one.peak_mb = max(one.peak_mb, held)
             if one.stopped:
+                if now - one.stopped_at > _STUCK_S:  # within the system, as on a server that is gone: it ends some time
+                    self._answer(one, Ended(-signal.SIGKILL, one.stopped, now - one.start, 0.0, one.peak_mb))
                 continue
             if held - one.base_mb > one.limits.memory_mb:
                 one.stopped = "memory"
             elif now - one.start > one.limits.wall_s:
                 one.stopped = "wall"
             if one.stopped:
+                one.stopped_at = now
                 _kill(pid)
 
     def _end_children(self) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+import errno
 import mmap
 import os
 import signal
@@ -102,13 +103,37 @@ def _changed(work: Work) -> None:
     Path(work.files[0]).write_text("fine but longer", encoding="utf-8")
 
 
+def _touched(work: Work) -> None:
+    """Is given another time while it is read, once."""
+    if _first(work):
+        os.utime(work.files[0], (1e9, 1e9))
+
+
+def _away(work: Work) -> None:
+    """Is on a disk that fails once."""
+    if _first(work):
+        raise OSError(errno.EIO, os.strerror(errno.EIO), work.files[0])
+
+
+def _dropped(work: Work) -> None:
+    """Is on a server that loses the connection once."""
+    if _first(work):
+        raise LogError("x.bag: cannot be read") from ConnectionResetError(errno.ECONNRESET, "reset")
+
+
 def _slow(work: Work) -> None:
     time.sleep(0.3)
 
 
 def _once(work: Work) -> None:
     """Ends badly the first time."""
-    mark = Path(f"{work.files[0]}.mark")
-    if not mark.exists():
-        mark.touch()
+    if _first(work):
         os.abort()
+
+
+def _first(work: Work) -> bool:
+    mark = Path(f"{work.files[0]}.mark")
+    if mark.exists():
+        return False
+    mark.touch()
+    return True

@@ -10,15 +10,17 @@ import time
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
+from diagnosis.audit import zygote
 from diagnosis.audit.child import Work
 from diagnosis.audit.isolated import ForkServer, Isolation, run_isolated
 from diagnosis.audit.limits import Limits
 from diagnosis.audit.outcome import Outcome
 from diagnosis.audit.spawned import Spawner
-from diagnosis.audit.zygote import Stopped
+from diagnosis.audit.zygote import Ended, Stopped, Zygote, _Child
 from replay.errors import OutputError
 from replay.export.mission import write_mission
 from replay.machine import haulotte
@@ -144,6 +146,22 @@ def test_a_real_log_is_diagnosed(forks: Isolation, mission_log: Path, tmp_path: 
 def _made(folder: Path) -> Path:
     folder.mkdir()
     return folder
+
+
+def test_a_child_that_does_not_die_is_answered_for_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    told: list[tuple[int, Ended]] = []
+    server = Zygote.__new__(Zygote)
+    server._connection = SimpleNamespace(send=told.append)  # type: ignore[assignment]
+    one = _Child(7, work_of("hang", tmp_path), Limits(wall_s=1.0), 0.0, start=time.monotonic() - 2.0)
+    server._children = {os.getpid(): one}
+    monkeypatch.setattr(zygote, "_kill", lambda pid: None)  # as of a process that waits for a server that is gone
+    server._watch()
+    assert told == []
+    one.stopped_at -= 20.0
+    for _ in range(2):
+        server._watch()
+    ((number, ended),) = told
+    assert (number, ended.code, ended.stopped) == (7, -signal.SIGKILL, "wall")
 
 
 def _first_child_of_server(server: ForkServer) -> int:

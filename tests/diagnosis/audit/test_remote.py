@@ -156,8 +156,8 @@ def test_an_object_replaced_or_gone_while_it_is_read_is_refused(
     (mission,) = discover([f"{bucket.url}/m1.mcap"]).missions
     get = bucket.system.get_file
 
-    def slowly(path: str, local: str) -> None:
-        get(path, local)
+    def slowly(path: str, local: str, **more: Any) -> None:
+        get(path, local, **more)
         bucket.put("m1.mcap", b"other")
 
     monkeypatch.setattr(bucket.system, "get_file", slowly)

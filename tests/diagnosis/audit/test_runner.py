@@ -95,6 +95,15 @@ def test_a_log_changed_while_it_is_read_has_no_report(tmp_path: Path) -> None:
     assert not (tmp_path / "out" / "missions" / "changed").exists()
 
 
+@pytest.mark.parametrize("work", ["touched", "away", "dropped"])
+def test_what_kept_a_log_from_being_read_counts_in_that_audit_alone(tmp_path: Path, work: str) -> None:
+    asked, states = asked_for(tmp_path / "out"), []
+    for _ in range(3):
+        ends, events = run(missions(tmp_path / "logs", work), asked)
+        states.append((ends[work].state, events[0][0]))
+    assert states == [("unreadable", "mission"), ("ok", "mission"), ("ok", "skipped")]
+
+
 def test_a_log_that_is_gone_is_unreadable(tmp_path: Path) -> None:
     found = missions(tmp_path / "logs", "fine-1")
     (tmp_path / "logs" / "fine-1.bag").unlink()
