@@ -41,7 +41,10 @@ class Fault:
 
 @dataclass(frozen=True)
 class Sample:
-    """A mission with its result; `epsilon` by part, parts in `blind` are not assessed. `state` None: not audited yet."""
+    """A mission with its result; `epsilon` by part, parts in `blind` are not assessed. `state` None: not audited yet.
+
+    Without a machine, one that was not judged has its folder's name, as an audit gives it.
+    """
 
     name: str
     machine: str = "HX-1"
@@ -75,12 +78,13 @@ def write_store(path: Path, samples: Iterable[Sample]) -> Path:
 def _write(c: Any, k: int, s: Sample) -> None:
     if s.state is not None:
         judged = s.state in ("ok", "degraded")
+        folder = f"logs/{s.name}".split("/")[-2] if not judged or s.verdict == "not_assessed" else ""
         start = None if s.day is None or not judged else int(START_NS + s.day * DAY_NS)
         c.execute(
             "INSERT INTO result VALUES (?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?)",
             (k, f"{k:064x}", "c" * 64, "1.0", s.state, s.reason or ("" if s.state == "ok" else "It ends too early."), 1)
             + (
-                s.machine,
+                s.machine or folder,
                 s.machine_name if judged else "",
                 s.verdict if judged else None,
                 f"Sentence on {s.name}.",
@@ -111,12 +115,13 @@ def _write(c: Any, k: int, s: Sample) -> None:
         )
 
 
-def write_report(folder: Path, name: str, **limits: float) -> None:
+def write_report(folder: Path, name: str, cleared: bool | None = None, **limits: float) -> None:
     """A report that says no more than the fleet asks of it."""
     place = folder / "missions" / name
     place.mkdir(parents=True, exist_ok=True)
     machine = {"wheels": WHEELS, "axles": AXLES}
-    (place / "report.json").write_text(json.dumps({"limits": limits, "machine": machine}), encoding="utf-8")
+    said = {"limits": limits, "machine": machine, "verdict": {"cleared": cleared}}
+    (place / "report.json").write_text(json.dumps(said), encoding="utf-8")
     (place / "report.html").write_text(f"<title>{len(name)}</title>", encoding="utf-8")
 
 

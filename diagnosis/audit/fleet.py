@@ -9,7 +9,7 @@ from typing import Any
 
 import orjson
 
-from diagnosis.audit.fleet_arrivals import arrivals, last_made
+from diagnosis.audit.fleet_arrivals import arrivals, last_made, without_false_dates
 from diagnosis.audit.fleet_csv import fleet_csv
 from diagnosis.audit.fleet_document import Fleet, fleet_document, fleet_of
 from diagnosis.audit.fleet_gather import machines_of
@@ -116,7 +116,8 @@ def load_fleet(store_path: Path, out: Path | None = None, axis: Axis = "hours") 
     folder = out if out is not None else place
     missions = [_with_own_report(mission, folder) for mission in read_missions(store_path)]
     came = arrivals(place, missions)
-    machines, unknown = machines_of(missions, lambda report: _limits(folder / report / "report.json"), came)
+    missions = without_false_dates(missions, came)
+    machines, unknown = machines_of(missions, lambda report: _limits(folder / report / "report.json"), came, str(place))
     fleet = fleet_of(machines, missions, axis, unknown)
     return replace(fleet, run=read_run(store_path), made_ns=last_made(place, missions))
 

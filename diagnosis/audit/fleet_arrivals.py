@@ -7,7 +7,8 @@ mission began is the older of the two, even where nothing in it can be read.
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
@@ -20,6 +21,7 @@ from replay.errors import OutputError
 
 Came = Callable[[str], int | None]
 _HASH = 8
+_ZONES_NS = 86_400 * 10**9  # a log's clock may say local time
 
 
 def arrivals(folder: Path, missions: Iterable[Mission]) -> Came:
@@ -46,13 +48,40 @@ def arrivals(folder: Path, missions: Iterable[Mission]) -> Came:
         return out
 
     @cache
+    def first_looks(start: str) -> dict[str, int]:
+        out: dict[str, int] = {}
+        for name in stored().get(start, ()):
+            mission, made = _said(objects, name)
+            if made is not None:
+                out[mission] = min(made, out.get(mission, made))
+        return out
+
     def came(mission: str) -> int | None:
-        if mission not in hashes:
-            return None
-        made = [looked_at(objects, name, mission) for name in stored().get(hashes[mission], ())]
-        return min((m for m in made if m is not None), default=None)
+        return first_looks(hashes[mission]).get(mission) if mission in hashes else None
 
     return came
+
+
+def without_false_dates(missions: Sequence[Mission], came: Came) -> list[Mission]:
+    """Missions without the starts that lie more than a day after an audit first looked at the log: its clock is wrong.
+
+    Parameters
+    ----------
+    missions : Sequence[Mission]
+        From `diagnosis.audit.fleet_read.read_missions`.
+    came : callable
+        From `arrivals`.
+    """
+    false = set()
+    for m in missions:
+        if m.result is not None and m.result.start_ns is not None and m.result.id not in false:
+            looked = came(m.name)
+            if looked is not None and m.result.start_ns > looked + _ZONES_NS:
+                false.add(m.result.id)
+    return [
+        replace(m, result=replace(m.result, start_ns=None)) if m.result is not None and m.result.id in false else m
+        for m in missions
+    ]
 
 
 def last_made(folder: Path, missions: Iterable[Mission]) -> int | None:
@@ -70,18 +99,17 @@ def last_made(folder: Path, missions: Iterable[Mission]) -> int | None:
         return None
     start, objects = max(results, key=lambda r: r.id).log_hash[:_HASH], Objects(str(folder / RESULTS))
     try:
-        made = [looked_at(objects, name) for name in objects.names() if name.startswith(start)]
+        made = [_said(objects, name)[1] for name in objects.names() if name.startswith(start)]
     except OutputError:
         return None
     return max((m for m in made if m is not None), default=None)
 
 
-def looked_at(objects: Objects, name: str, mission: str | None = None) -> int | None:
-    """When a result object was made; None where it cannot be read, or is of another mission than the one asked for."""
+def _said(objects: Objects, name: str) -> tuple[str, int | None]:
+    """Mission of a result object and when this was made; None where it cannot be read."""
     try:
         document = orjson.loads(objects.read(name))
-        made = document["made_ns"]
-        asked = mission is None or document["mission"]["name"] == mission
+        mission, made = str(document["mission"]["name"]), document["made_ns"]
     except (OSError, ValueError, KeyError, TypeError):
-        return None
-    return made if asked and isinstance(made, int) and not isinstance(made, bool) else None
+        return "", None
+    return mission, made if isinstance(made, int) and not isinstance(made, bool) else None

@@ -5,16 +5,16 @@
 - ``verdict``: ``status`` (the worst machine's: ``stop``, ``watch``, ``not_assessed``, ``ready``), ``tag``, ``title``, ``text``.
 - ``counts``: ``machines``, ``missions`` and how they ended by ``states``, ``not_assessed`` (read, but nothing
   could be assessed), ``unknown`` (not judged, perhaps newer than what was, and of no known machine), ``pending`` (not audited yet), ``copies`` (of a log
-  that stands under another name too), ``gone`` (the log is no longer there), ``undated`` (its clock does not know the date, or another mission
+  that stands under another name too), ``gone`` (the log is no longer there), ``undated`` (its clock does not know the date or is more than a day ahead, or another mission
   of the machine starts at the same moment),
   ``with_faults``, ``driving_s``, ``distance_m``, ``decided`` (share of driving time that was judged), ``faults`` by status,
   ``first_ns`` and ``last_ns`` (start of the first and last dated mission).
 - ``machines``, worst first: ``id``, ``name``, ``label``, ``verdict``, ``standing`` (the same in words), ``last_verdict`` and
   ``last_judged_ns`` (of its last judged mission), ``unjudged`` (missions that were not judged and may be later: such a machine is not
-  ``ready``), ``cleared`` (whether its last judged mission's report lets it go out; null: not said), ``note``, ``missions`` and ``undated`` (places in the list
+  ``ready``), ``cleared`` (whether its last judged mission's report lets it go out, and that of each which may be later; null: not said), ``note``, ``missions`` and ``undated`` (places in the list
   ``missions``, those with a date in its order), ``failed``, ``with_faults``, ``driving_s``, ``decided``, ``min_epsilon``, ``parts``:
   per component and side ``assessed`` (missions), ``assessed_last``, and ``modes`` (missions with each).
-- ``faults``: ``machine`` (place in ``machines``), ``component``, ``kind``, ``side``, ``mode``, ``severity``, ``status`` (``new``,
+- ``faults``: ``machine`` (place in ``machines``), ``component``, ``kind``, ``side``, ``mode``, ``severity`` (the worst since the part was last assessed without it), ``status`` (``new``,
   ``recurring``, ``once``, ``past``), ``missions`` with it of ``assessed``, ``first`` and ``last`` (places), ``last_id``, ``epsilon``,
   ``first_run`` (audit run that brought the first mission with it; null: not known; also of missions).
 - ``trends``: ``machine``, ``component``, ``kind``, ``side``, ``limit``, ``points`` as [mission, place on the axis, ε̂, low, high],
@@ -128,7 +128,11 @@ def fleet_document(fleet: Fleet, baseline: Mapping[str, Any] | None = None) -> d
             "title": title,
             "text": words.new_words(*news(fleet.machines, fleet.first_runs, fleet.run))
             + words.sentences(
-                fleet.machines, fleet.trends, (unread, counts["not_assessed"], counts["pending"]), fleet.axis
+                fleet.machines,
+                fleet.trends,
+                (unread, counts["not_assessed"], counts["pending"]),
+                fleet.axis,
+                len(fleet.unknown),
             ),
         },
         "counts": counts,

@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections import Counter, defaultdict
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
+from functools import cache
 
-from diagnosis.audit.fleet_guess import Owner, guess, owner_of, owners_by_folder
+from diagnosis.audit.fleet_guess import Owner, Owners
 from diagnosis.audit.fleet_machines import STANDING, FleetFault, Limits, Machine, Run, Status
 from diagnosis.audit.fleet_read import FoundFault, Mission
 from diagnosis.result import SEVERITIES
@@ -18,6 +19,7 @@ def machines_of(
     missions: Iterable[Mission],
     limits: Callable[[str], Limits] | None = None,
     came: Callable[[str], int | None] | None = None,
+    folder: str = ".",
 ) -> tuple[list[Machine], list[Mission]]:
     """Gather missions by machine.
 
@@ -29,29 +31,32 @@ def machines_of(
         Gives the limits by the folder of a report, asked for the last one of each machine; None for the defaults.
     came : Callable[[str], int or None] or None
         Gives when a mission was first looked at by its name, from `diagnosis.audit.fleet_arrivals`; None: not known.
+    folder : str
+        Folder of the store.
 
     Returns
     -------
     tuple[list[Machine], list[Mission]]
-        Machines by identity and name; and missions without a report whose machine is not known and that are still
+        Machines by identity and name; and missions that were not judged, whose machine is not known and that are still
         there, as far as they may be later than the last judged mission of a machine that is ready.
     """
     runs: dict[Owner, dict[int, Run]] = defaultdict(dict)
     failed: dict[Owner, list[Mission]] = defaultdict(list)
     nowhere: list[Mission] = []
     missions = list(missions)
-    owners = owners_by_folder(missions)
+    limits = cache(limits) if limits else None
+    owners = Owners(missions, folder)
     for m in missions:
+        key, other = owners.of(m)
+        if other:
+            nowhere.append(m)
+        if key is None:
+            continue
         if m.result is not None and m.result.judged:
-            key = owner_of(m.result)
             known = runs[key].get(m.result.id)
             runs[key][m.result.id] = Run(known.name if known else m.name, m.result, known.copies + 1 if known else 0)
-            continue
-        whose = owner_of(m.result) if m.result is not None and m.result.machine_id else guess(m, owners)
-        if whose is not None:
-            failed[whose].append(m)
         else:
-            nowhere.append(m)
+            failed[key].append(m)
     came = came or (lambda _: None)
     out = [_machine(key, runs[key].values(), failed[key], limits, came) for key in sorted({*runs, *failed})]
     ready = [_began(m, came) for m in out if m.verdict == "ready"]
@@ -75,10 +80,13 @@ def _machine(
     own = limits(last.result.report or "") if limits and last else Limits()
     name = key[1] or (last.result.machine_name if last else "")
     m = Machine(key[0], name, tuple(dated), tuple(undated), tuple(failed), own)
-    judged, cleared = m.last_judged, own.cleared
-    if judged is not None and judged is not last:
-        cleared = limits(judged.result.report).cleared if limits and judged.result.report else None
-    return _with_faults(replace(m, cleared=cleared, unjudged=_unjudged(m, came)))
+    return _with_faults(replace(m, cleared=_cleared(m, limits), unjudged=_unjudged(m, came)))
+
+
+def _cleared(m: Machine, limits: Callable[[str], Limits] | None) -> bool | None:
+    """Whether its last judged mission lets it go out, and every judged one that may be later."""
+    said = {limits(r.result.report).cleared if limits and r.result.report else None for r in m.newest}
+    return False if False in said else None if None in said or not said else True
 
 
 def _unjudged(m: Machine, came: Callable[[str], int | None]) -> int:
@@ -124,6 +132,8 @@ def _fleet_fault(m: Machine, found: Sequence[tuple[Run, FoundFault]]) -> FleetFa
     since = sum(assessed[dated[-1] + 1 :]) if dated and len(dated) == len(ids) else 0
     before = sum(assessed[: dated[0]]) if dated else 0
     undated = sum(r.assessed(f.component, f.side, m.limits) for r in m.undated)
+    without = [k for k in range(dated[-1]) if assessed[k] and k not in set(dated)] if dated else []
+    past = {m.dated[k].result.id for k in dated if without and k < without[-1]}
     status: Status = "past" if since >= STANDING else "recurring" if len(ids) > 1 else "once"
     if len(ids) == 1 and dated and dated[0] == len(m.dated) - 1 and before:
         status = "new"
@@ -132,7 +142,7 @@ def _fleet_fault(m: Machine, found: Sequence[tuple[Run, FoundFault]]) -> FleetFa
         kind=f.kind,
         side=f.side,
         mode=f.mode,
-        severity=max((g.severity for _, g in found), key=SEVERITIES.index),
+        severity=max((g.severity for r, g in found if r.result.id not in past), key=SEVERITIES.index),
         status=status,
         missions=len(ids),
         assessed=max(len(ids), sum(assessed) + undated),

@@ -1,7 +1,7 @@
 """Machines of a fleet: their missions in order of the log's clock, where each stands, and the faults that return.
 
-Copies of a log count once. Missions whose log does not know the date, or which start at the same moment as another one of
-the machine, cannot be ordered: they count, but they take no part in trends or what is new. Where one of them is worse than the last dated one, the machine stands as the worse.
+Copies of a log count once. Missions whose log does not know the date (or says one after an audit had looked at it), or which
+start at the same moment as another one of the machine, cannot be ordered: they count, but they take no part in trends or what is new. Where one of them is worse than the last dated one, the machine stands as the worse.
 
 A machine is ``ready`` only where no mission that was not judged may be later than its last judged one. A log that was not
 read, or does not know the date, may be later unless an audit looked at it before that mission began.
@@ -87,7 +87,7 @@ class FleetFault:
     component, kind, side, mode : str
         As in the missions' reports.
     severity : str
-        The worst.
+        The worst in its last missions: those after the last mission before them that assessed the part without it.
     status : str
         ``new``: in the machine's last mission and in none of the earlier ones, of which one assessed the part;
         ``recurring``: in several missions; ``once``; ``past``: not found in the last three missions that assessed it.
@@ -140,7 +140,8 @@ class Machine:
     limits : Limits
         Of its last report.
     cleared : bool or None
-        Whether the report of its last judged mission lets it go out; None where it does not say.
+        Whether the report of its last judged mission lets it go out, and that of each one which may be later; None where
+        one does not say.
     unjudged : int
         Missions that were not judged and may be later than the last judged one.
     faults : tuple[FleetFault, ...]
@@ -172,16 +173,21 @@ class Machine:
         """The last dated mission that assessed anything."""
         return next((r for r in reversed(self.dated) if r.result.verdict not in (None, "not_assessed")), None)
 
+    @property
+    def newest(self) -> tuple[Run, ...]:
+        """Missions that assessed anything and of which each may be the last: the last dated one, and those without order."""
+        undated = tuple(r for r in self.undated if r.result.verdict not in (None, "not_assessed"))
+        return ((self.last_judged,) if self.last_judged else ()) + undated
+
     @cached_property
     def last_verdict(self) -> str:
         """Where it stood when it was judged last.
 
         Worse where a mission of unknown date says so, or where no later mission assessed the part of an earlier fault.
         """
-        last = self.last_judged
-        found = [r.result.verdict for r in ((last,) if last else ()) + self.undated]
+        found = [r.result.verdict for r in self.newest]
         found += ["stop" if f.severity == "high" else "watch" for f in self.faults if not f.since]
-        known = [v for v in found if v is not None and v != "not_assessed"]
+        known = [v for v in found if v is not None]
         return min(known, key=VERDICTS.index, default="not_assessed")
 
     @property

@@ -127,6 +127,7 @@ def sentences(
     trends: Sequence[Sequence[PartTrend]],
     failed: tuple[int, int, int],
     axis: Axis = "hours",
+    unknown: int = 0,
 ) -> list[str]:
     """What stands behind the headline: the worst machines, limits that come near, logs that were not judged.
 
@@ -138,6 +139,8 @@ def sentences(
         Logs that were not read, missions that were read but not assessed, and those not audited yet.
     axis : str
         ``hours`` or ``days``.
+    unknown : int
+        As for `headline`.
     """
     bad = [m for m in machines if m.verdict in ("stop", "watch")]
     out = []
@@ -162,6 +165,8 @@ def sentences(
     if unread or open_:
         both = f": {unread} not read, {open_} read but not assessed" if unread and open_ else ""
         out.append(f"{count(unread + open_, 'log')} could not be read or judged{both}.")
+    if unknown and any(m.verdict != "ready" for m in machines):  # else the headline says so
+        out.append(f"{count(unknown, 'log')} {_was(unknown)} not judged and may be of a machine that stands as ready.")
     if pending:
         out.append(f"{count(pending, 'mission')} {'is' if pending == 1 else 'are'} not audited yet.")
     return out

@@ -35,8 +35,9 @@ _STATUS = {"new": "New", "recurring": "Recurring", "once": "Once", "past": "Past
 _DEFINITIONS = (
     "A machine stands as its last mission that could be assessed, or worse where no later mission assessed the part of an "
     "earlier fault. It is ready only where no mission that was not judged may be later: a log that cannot be read or knows "
-    "no date may be, unless an earlier audit run looked at it before that mission began. A log that names no machine counts "
-    "for the one that alone has judged missions in its folder. Missions whose log does not know the date, or which start at the same moment, count, but cannot be ordered.",
+    "no date may be, unless an earlier audit run looked at it before that mission began. A log that was not judged and "
+    "for which no machine is stated counts for the one that alone has judged missions in its folder. Missions whose log does not know the date "
+    "(or tells one more than a day after an audit looked at it), or which start at the same moment, count, but cannot be ordered.",
     "New: in the machine's last mission and in none before, of which one assessed the part. Recurring: in several missions. "
     "Past: not found in the last three missions that assessed the part. Faults of severity “info” are left out.",
     "Assessed: judged for the seconds that the verdict “ready” takes, and for four fifths of its driving.",
@@ -189,7 +190,6 @@ def _kpis(document: Mapping[str, Any]) -> list[tuple[str, str, str]]:
     judged = sum(len(m["missions"]) + len(m["undated"]) for m in document["machines"])
     share = f"{100 * c['with_faults'] / judged:.0f} % of those judged" if judged else "none judged"
     f = c["faults"]
-    blind = sum(p["assessed_last"] is False for m in document["machines"] for p in m["parts"])
     return [
         (names.grouped(c["missions"]), "missions", ", ".join([*unread, *rest]) or "all read whole"),
         (
@@ -201,18 +201,25 @@ def _kpis(document: Mapping[str, Any]) -> list[tuple[str, str, str]]:
         (
             f"{f['new']} / {f['recurring']} / {f['past']}",
             "new, recurring, past faults",
-            f"{f['once']} found once, earlier",
+            f"{count(f['once'], 'other')} found once",
         ),
         (
             "–" if c["decided"] is None else f"{100 * c['decided']:.1f} %",
             "of driving time judged",
-            "nothing judged"
-            if not judged
-            else f"{count(blind, 'part')} not assessed in the last mission"
-            if blind
-            else "every part assessed in the last mission",
+            "nothing judged" if c["decided"] is None else _coverage(document["machines"]),
         ),
     ]
+
+
+def _coverage(machines: Sequence[Mapping[str, Any]]) -> str:
+    """What the machines' last missions assessed; not known where the last one may be one without a date or a report."""
+    blind = sum(p["assessed_last"] is False for m in machines for p in m["parts"])
+    dark = sum(
+        not m["parts"] or m["unjudged"] > 0 or any(p["assessed_last"] is None for p in m["parts"]) for m in machines
+    )
+    told = [f"{count(blind, 'part')} not assessed in the last mission"] if blind else []
+    told += [f"{'' if blind else 'last mission '}not known of {count(dark, 'machine')}"] if dark else []
+    return ", ".join(told) or "every part assessed in the last mission"
 
 
 def _machine(

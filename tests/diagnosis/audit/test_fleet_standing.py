@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 from typing import Any
 
@@ -113,26 +114,79 @@ def test_a_finding_stays_though_later_missions_were_not_judged(
 def test_what_is_not_cleared_is_not_worded_as_ready(
     tmp_path: Path, verdict: str, cleared: bool | None, shown: str, standing: str
 ) -> None:
-    samples.write_report(tmp_path, "d0")
-    path = tmp_path / "missions/d0/report.json"
-    path.write_text(json.dumps({"verdict": {"cleared": cleared}}), encoding="utf-8")
+    samples.write_report(tmp_path, "d0", cleared)
     d = document(tmp_path, Sample("d0", verdict=verdict))
     assert (d["machines"][0]["verdict"], d["machines"][0]["standing"]) == (shown, standing)
 
 
-def test_a_log_that_may_be_of_several_machines_leaves_none_ready_for_certain(tmp_path: Path) -> None:
-    d = document(tmp_path, Sample("d0"), Sample("d1", "HX-2"), EMPTY)
-    assert [m["verdict"] for m in d["machines"]] == ["ready", "ready"]
-    assert d["verdict"]["status"] == "not_assessed"
-    assert d["verdict"]["title"] == "2 machines are ready, but 1 log of no known machine was not judged"
+NO_SIGNAL = Sample("z", "", state="degraded", verdict="not_assessed", day=None, parts=(), reason="no wheel speed")
 
 
-def test_a_log_counts_for_the_machine_that_alone_has_judged_missions_around_it(tmp_path: Path) -> None:
-    broken = Sample("a/new/day2", "", state="unreadable")
-    d = document(tmp_path, Sample("a/old/day0"), Sample("a/old/day1", day=1.0), Sample("b/day0", "HX-2"), broken)
-    assert {m["label"]: m["verdict"] for m in d["machines"]} == {"HX-1": "not_assessed", "HX-2": "ready"}
-    assert d["verdict"]["title"] == "1 of 2 machines is ready, 1 is not assessed"
-    assert "Not assessed (1): HX-1 (since 2026-10-27: last judged ready)." in d["verdict"]["text"]
+def test_a_clock_that_is_ahead_hides_no_stop(tmp_path: Path) -> None:
+    write_object(tmp_path, 1, "ahead", 0.5)
+    write_object(tmp_path, 2, "real", 1.5)
+    ahead, real = Sample("ahead", day=365.0 * 70), Sample("real", day=1.0, verdict="stop")
+    d = document(tmp_path, ahead, real)
+    (m,) = d["machines"]
+    assert (m["standing"], m["note"]) == ("Stop and repair", "1 mission of unknown order")
+    assert d["counts"]["last_ns"] == START_NS + DAY_NS
+    assert "2096" not in build_fleet_page(d)
+
+
+@pytest.mark.parametrize(("day", "undated"), [(1.4, 0), (1.6, 1)])
+def test_a_clock_may_say_another_time_zone(tmp_path: Path, day: float, undated: int) -> None:
+    write_object(tmp_path, 1, "a", 0.5)
+    assert document(tmp_path, Sample("a", day=day))["counts"]["undated"] == undated
+
+
+@pytest.mark.parametrize(
+    ("verdict", "cleared", "standing"),
+    [
+        ("watch", True, "Ready, with faults to watch"),
+        ("watch", False, "Faults to watch, not cleared"),
+        ("watch", None, "Faults to watch"),
+        ("ready", False, "Not assessed since 2026-10-26: last judged ready, but not cleared"),
+    ],
+)
+def test_a_mission_that_may_be_the_last_is_cleared_too(
+    tmp_path: Path, verdict: str, cleared: bool | None, standing: str
+) -> None:
+    samples.write_report(tmp_path, "a", True)
+    samples.write_report(tmp_path, "b", cleared)
+    found = [Fault()] if verdict == "watch" else []
+    d = document(tmp_path, *(Sample(n, day=t, verdict=verdict, faults=found) for n, t in (("a", 0.0), ("b", None))))
+    assert d["machines"][0]["standing"] == standing
+
+
+@pytest.mark.parametrize(
+    ("between", "severity", "verdict"), [("....", "medium", "watch"), (".", "medium", "watch"), ("b", "high", "stop")]
+)
+def test_a_fault_that_comes_back_is_as_severe_as_it_is_now(
+    tmp_path: Path, between: str, severity: str, verdict: str
+) -> None:
+    part = ("FR", "sensor")
+    old, new = (Fault(*part, "stuck", s) for s in ("high", "medium"))
+    middle = [Sample(f"m{k}", day=k, blind=[part] if b == "b" else []) for k, b in enumerate(between, 1)]
+    last = Sample("m9", day=9.0, verdict="watch", faults=[new])
+    d = document(tmp_path, Sample("m0", verdict="stop", faults=[old]), *middle, last)
+    assert (d["faults"][0]["severity"], d["machines"][0]["verdict"]) == (severity, verdict)
+
+
+@pytest.mark.parametrize(
+    ("missions", "told"),
+    [
+        ([Sample("a")], "every part assessed in the last mission"),
+        ([Sample("a"), Sample("b", day=None)], "every part assessed in the last mission"),
+        ([Sample("a", blind=[("FR", "sensor")])], "1 part not assessed in the last mission"),
+        ([NO_SIGNAL], "nothing judged"),
+        ([Sample("a", day=None, verdict="not_assessed", blind=samples.PARTS)], "last mission not known of 1 machine"),
+        ([Sample("a"), Sample("b", "HX-2", state="crashed")], "last mission not known of 1 machine"),
+        ([Sample("a"), Sample("b", state="crashed")], "last mission not known of 1 machine"),
+    ],
+)
+def test_every_part_is_assessed_only_where_that_is_known(tmp_path: Path, missions: list[Sample], told: str) -> None:
+    page = build_fleet_page(document(tmp_path, *missions))
+    assert re.findall('of driving time judged</dt>.*?class="more">([^<]*)', page) == [told]
 
 
 def test_logs_not_read_and_missions_not_assessed_are_both_counted(tmp_path: Path) -> None:
