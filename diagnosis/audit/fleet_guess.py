@@ -56,7 +56,7 @@ class Owners:
             return own, False
         place = next((f for f in _folders(m) if f in self._around), None)
         owners = self._around[place] if place is not None else {}
-        if own and all(owners.values()) and (own in owners or place != next(_folders(m))):
+        if own and all(owners.values()) and (own in owners or place != next(_folders(m), "")):
             return own, False
         if len(owners) == 1:
             return next(iter(owners)), False
