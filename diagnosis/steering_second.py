@@ -16,6 +16,10 @@ Flags = NDArray[np.bool_]
 _MAX_LAG_S = 0.05
 _SHARE_RANGE = (0.85, 1.15)
 _LEAST_CHANGES = 4
+_LEAST_SHARE = 0.5
+_JITTER_S = 0.25
+_JITTER = 4.0  # standard deviations
+_MEDIAN_SQUARE = 0.455  # of a standard normal variable
 
 
 def with_second_angle(
@@ -76,8 +80,8 @@ def with_position(
     """
     use = fresh & np.isfinite(u) & np.isfinite(position)
     most = max(1, round(_MAX_LAG_S / dt)) if dt <= _MAX_LAG_S else 0
-    lag = _jitter_lag(position, u, use, most)
-    lag = relative_lag(position, u, use, 0, most) if lag is None else lag
+    linked = _jitter_lag(position, u, use, most)
+    lag = relative_lag(position, u, use, 0, most) if linked is None else linked
     command = shifted(u, lag)
     known = use & np.isfinite(command)
     off = np.where(known, position - command, 0.0)
@@ -96,6 +100,10 @@ def with_position(
     some = count > 0
     second[:, 2] = np.where(some, p_mean, np.nan)
     second[:, 3] = power / np.maximum(count, 1) + max(slow**2 - power, 0.0) / 4 + 0.05 * power
+    if linked is None:
+        even, jitter = _without_jitter(command, known, dt)
+        u_mean = _means(even, known, blocks)[0]
+        second[:, 3] += _means(jitter, known, blocks)[0] / np.maximum(count, 1)
     second[:, 6] = np.where(some, u_mean, np.nan)
     lively = (changes > 1e-3 * power) & (count >= _LEAST_CHANGES)
     if lively.any():
@@ -109,18 +117,40 @@ def with_position(
 
 
 def _jitter_lag(position: Array, u: Array, use: Flags, most: int) -> float | None:
-    """Delay [steps] at which the position's changes from sample to sample follow the command's; None where none do."""
+    """Delay [steps] at which the position follows the command's jitter from sample to sample; None where it does not."""
     if u.size <= 2 * most:
         return None
-    du = np.diff(np.where(use, u, 0.0), prepend=0.0)
-    dp = np.diff(np.where(use, position, 0.0), prepend=0.0)
+    du, dp = (np.diff(np.where(use, x, 0.0), 2, prepend=[0.0, 0.0]) for x in (u, position))
     limit = 10 * float(np.median(np.abs(du))) + 1e-12  # the small jitter of a healthy sensor, not jumps
     du[np.abs(du) > limit] = 0.0
     inner = dp[most:] * (np.abs(dp[most:]) < 10 * float(np.median(np.abs(dp))) + 1e-12)
     together = np.array([float(inner @ du[most - k : du.size - k]) for k in range(most + 1)])
     scale = float(np.sqrt((inner @ inner) * (du @ du) / max(inner.size, 1)))
     best = int(np.argmax(together))
-    return float(best) if scale > 0 and together[best] > 8 * scale else None
+    follows = together[best] > max(8 * scale, _LEAST_SHARE * float(du @ du))
+    return float(best) if scale > 0 and follows else None
+
+
+def _without_jitter(command: Array, known: Flags, dt: float) -> tuple[Array, Array]:
+    """The command with its sample-to-sample jitter evened out, and the jitter's local power.
+
+    A log slower than the controller shows jitter that its record of the position does not follow sample by sample: a
+    healthy valve would look like one that rests, or does what it likes.
+    """
+    size = command.size
+    filled = np.interp(np.arange(size), np.flatnonzero(known), command[known]) if known.any() else np.zeros(size)
+    width = max(3, round(_JITTER_S / dt))
+    squares = second_differences(filled)
+    rows = np.pad(squares, (0, -size % width), mode="edge").reshape(-1, width)
+    power = np.median(rows, axis=1) / _MEDIAN_SQUARE  # a jump is no jitter
+    near = np.pad(power, 1, mode="edge")
+    jitter = np.repeat(np.maximum(np.maximum(near[:-2], near[2:]), power), width)[:size]
+    half = width
+    total = np.concatenate([[0.0], np.cumsum(filled)])
+    before, after = (np.clip(np.arange(size) + k, 0, size) for k in (-half, half + 1))
+    even = (total[after] - total[before]) / (after - before)
+    small = np.abs(filled - even) < _JITTER * np.sqrt(jitter)
+    return np.where(small, even, filled), jitter
 
 
 def _means(x: Array, known: Flags, blocks: SteeringBlocks) -> tuple[Array, Array]:

@@ -87,6 +87,26 @@ def test_a_fault_is_found_on_its_side_and_nowhere_else(fault: FaultSpec, evidenc
     assert finding.stop * timeline.dt == pytest.approx(27.0, abs=0.2)
 
 
+@pytest.mark.parametrize("rate", [100.0, 200.0])
+@pytest.mark.parametrize("seed", [2, 4])
+def test_a_held_axle_in_a_slow_log_is_no_dead_valve(rate: float, seed: int) -> None:
+    # the position does not follow, sample by sample, the jitter that the log shows of a faster controller's command
+    options = SimulationOptions(scenario="healthy", seed=seed, duration_s=60.0, rate_hz=rate, evidence="direct")
+    result, _ = judged(simulate_mission(options))
+    assert [f.mode for a in result.assessments.values() for f in a.findings] == []
+
+
+@pytest.mark.parametrize("std", [0.01, 0.03])
+def test_a_noisy_sensor_in_a_slow_log_makes_no_valve_faults(std: float) -> None:
+    fault = front(Side.SENSOR, FaultMode.NOISY, 0.45, std=std)
+    options = SimulationOptions(
+        scenario="random", seed=1, duration_s=60.0, rate_hz=100.0, evidence="spool", faults=(fault,)
+    )
+    result, _ = judged(simulate_mission(options))
+    found = [(name, f.mode) for name, a in result.assessments.items() for f in a.findings]
+    assert found == [(("front", "sensor"), FaultMode.NOISY)]
+
+
 def test_angle_of_a_stuck_sensor_comes_from_the_model_and_its_valve_is_masked() -> None:
     mission = mission_of(front(Side.SENSOR, FaultMode.STUCK, sat=0.1))
     result, _ = judged(mission)
