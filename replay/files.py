@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import secrets
 import shutil
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager, suppress
@@ -49,7 +50,7 @@ def atomic_path(path: Path, *, folder: bool = False) -> Iterator[Path]:
     path = Path(path)
     if not path.name:
         raise OutputError(f"{str(path)!r} is no file name; give a name to write to")
-    temporary = path.with_name(f".{path.name}.{os.getpid()}.part")
+    temporary = path.with_name(f".{path.name}.{os.getpid()}-{secrets.token_hex(4)}.part")
     _refuse_other_content(path, folder)
     try:
         with made_folder(path.parent):

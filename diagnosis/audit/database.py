@@ -17,6 +17,7 @@ SCHEMA = "1"
 _APPLICATION = 0x6D666863  # "mfhc": tells the file from other SQLite files
 _BUSY_MS = 1_000
 _PATIENCE_S = 120.0
+_WHAT = "SELECT application_id FROM pragma_application_id UNION ALL SELECT name FROM sqlite_schema WHERE type = 'table'"
 _TABLES = {"meta", "file", "mission", "result", "attempt", "fault", "component"}
 _FULL = ("database or disk is full", "disk I/O error", "unable to open database file")
 
@@ -59,8 +60,8 @@ class Database:
 
     def _check(self, *, empty: bool) -> None:
         """Refuse a file that is no store of this schema; a new, empty one passes where `empty`."""
-        mark = self._patiently("PRAGMA application_id")[0][0]
-        names = {row[0] for row in self._patiently("SELECT name FROM sqlite_schema WHERE type = 'table'")}
+        found = self._patiently(_WHAT)  # at once: another process may just make it
+        mark, names = found[0][0], {row[0] for row in found[1:]}
         if empty and not mark and not names:
             return
         if mark != _APPLICATION or "meta" not in names:

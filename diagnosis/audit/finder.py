@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 from diagnosis.audit.grouping import Group, group
 from diagnosis.audit.listing import Entry, LocalPlace, Place
 from diagnosis.audit.mission_file import NAME as MISSION_FILE
-from diagnosis.audit.mission_file import MissionFile, read_mission_file
+from diagnosis.audit.mission_file import MissionFile, read_mission_file, stated_machine
 from replay.errors import ConfigError
 from replay.log_files import LOG_ENDINGS, split_ending
 
@@ -245,7 +245,7 @@ class Finder:
         try:
             told = read_mission_file(place, folder, file)
         except ConfigError as error:
-            problem = str(error)
+            told, problem = MissionFile(machine_id=stated_machine(place, file)), str(error)
         logs = list(told.files)
         if not logs and self._has(place, folder, _METADATA):
             logs = self._whole(place, folder)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import tomllib
 from dataclasses import dataclass
 
@@ -12,6 +13,8 @@ NAME = "mission.toml"
 _KEYS = ("files", "machine_id", "machine", "name")
 _MOST_BYTES = 1 << 20
 _LONGEST = 200
+
+_MACHINE_ID = re.compile(r"""^[ \t]*machine_id[ \t]*=[ \t]*["']([^"'\\\n]+)["']""", re.MULTILINE)
 
 
 @dataclass(frozen=True)
@@ -65,6 +68,16 @@ def read_mission_file(place: Place, folder: Entry, file: Entry) -> MissionFile:
         _text(file, data, "name"),
         _inside(place, folder, file, "machine", machine).path if machine else None,
     )
+
+
+def stated_machine(place: Place, file: Entry) -> str:
+    """The machine that a ``mission.toml`` names which is off otherwise; empty where it names none."""
+    try:
+        text = place.text(file) if file.size <= _MOST_BYTES else ""
+    except (OSError, UnicodeDecodeError):
+        return ""
+    found = _MACHINE_ID.search(text)
+    return found[1].strip()[:_LONGEST] if found else ""
 
 
 def _text(file: Entry, data: dict[str, object], key: str) -> str:

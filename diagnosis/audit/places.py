@@ -9,6 +9,7 @@ import secrets
 import shutil
 import sys
 import tempfile
+import time
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass
@@ -21,6 +22,7 @@ from replay.errors import OutputError
 MISSIONS, RESULTS, WORKING = "missions", "results", ".work"
 _TEMPORARY = "mfhca-audit-"
 _HELD = ".held"
+_LOOK_S = 0.05
 _MARK = ".key"
 _AT_FDCWD, _RENAME_EXCHANGE = -100, 2
 
@@ -171,6 +173,27 @@ def claim_mission(output: Path, name: str) -> Claim | None:
         return claim
     claim.drop()
     return None
+
+
+@contextmanager
+def alone(output: Path, name: str, patience_s: float) -> Iterator[None]:
+    """Do something that only one audit of an output may do at a time; after `patience_s` it is done all the same.
+
+    Raises
+    ------
+    OutputError
+        Where the output cannot be written.
+    """
+    end = time.monotonic() + patience_s
+    claim = claim_mission(output, name)
+    while claim is None and time.monotonic() < end:
+        time.sleep(_LOOK_S)
+        claim = claim_mission(output, name)
+    try:
+        yield
+    finally:
+        if claim is not None:
+            claim.drop()
 
 
 def publish(made: Path, place: Path, key: Key) -> None:

@@ -162,7 +162,7 @@ def stored_result(planned: Planned, store: Store) -> StoredResult | None:
     return store.lookup(key_of(planned.mission, hashes, planned.machine, planned.config_hash)) if hashes else None
 
 
-def _allows_more(limits: Limits, result: StoredResult) -> bool:
+def allows_more(limits: Limits, result: StoredResult) -> bool:
     """Whether limits are larger than that at which a mission was stopped."""
     met = limit_met(result.state, result.reason)
     if met is None:
@@ -175,7 +175,7 @@ def is_done(result: StoredResult | None, asked: Asked) -> bool:
     """Whether a result is final: its report is there; where it failed, no attempts are left and its limit is no larger now."""
     if result is None:
         return False
-    if result.state in TRANSIENT and (result.attempts <= asked.retries or _allows_more(asked.limits, result)):
+    if result.state in TRANSIENT and (result.attempts <= asked.retries or allows_more(asked.limits, result)):
         return False
     if result.report is None:
         return True

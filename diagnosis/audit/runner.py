@@ -16,7 +16,7 @@ from diagnosis.audit.identity import fallback_id
 from diagnosis.audit.ingest import ingest
 from diagnosis.audit.outcome import TRANSIENT, Outcome
 from diagnosis.audit.places import RESULTS, Claim, Working, claim_mission
-from diagnosis.audit.plan import Asked, Planned, is_done, known_hashes, stored_result
+from diagnosis.audit.plan import Asked, Planned, allows_more, is_done, known_hashes, stored_result
 from diagnosis.audit.store import Store, StoredResult
 from diagnosis.audit.task import Attempt, Task, audit_one, key_of
 
@@ -57,6 +57,7 @@ class Runner:
         self._elsewhere: deque[Planned] = deque()
         self._running: dict[Future[Attempt], _Running] = {}
         self._claims: set[Claim] = set()
+        self._waited: set[str] = set()
 
     def run(self, planned: Sequence[Planned]) -> None:
         """Run until every mission has ended.
@@ -98,7 +99,9 @@ class Runner:
             claim = claim_mission(self._asked.output, planned.mission.name)
             if claim is None:
                 self._elsewhere.append(planned)
-                self._tell("waiting", {"name": planned.mission.name})
+                if planned.mission.name not in self._waited:
+                    self._waited.add(planned.mission.name)
+                    self._tell("waiting", {"name": planned.mission.name})
                 continue
             self._claims.add(claim)
             result = stored_result(planned, self._store)
@@ -107,7 +110,9 @@ class Runner:
                 skip(planned, result, self._store, self._tell)
                 continue
             number = result.attempts + 1 if result is not None else 1
-            self._submit(_Running(planned, claim, number))
+            again = self._asked.resume and result is not None and result.state in TRANSIENT
+            more = again and result is not None and allows_more(self._asked.limits, result)
+            self._submit(_Running(planned, claim, number, tries=number if again and not more else 1))
             room -= 1
 
     def _submit(self, one: _Running) -> None:

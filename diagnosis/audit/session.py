@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping, Sequence
-from contextlib import AbstractContextManager
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import AbstractContextManager, contextmanager, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -18,7 +18,7 @@ from diagnosis.audit.engines import Engine
 from diagnosis.audit.events import Tell
 from diagnosis.audit.fleet_read import content_mark
 from diagnosis.audit.ingest import ingest
-from diagnosis.audit.places import own_report, sweep, working
+from diagnosis.audit.places import alone, own_report, sweep, working
 from diagnosis.audit.plan import Asked, Planned, is_done, plan, stored_result
 from diagnosis.audit.previous_pages import compare_newest
 from diagnosis.audit.runner import Runner, skip
@@ -32,6 +32,7 @@ if TYPE_CHECKING:
 PAGE_S = 60.0
 _PAGE_SHARE = 20.0
 _PAGE_TRIES = 3
+_PAGE_NAME = "the fleet's page"
 
 
 @dataclass(frozen=True)
@@ -127,7 +128,8 @@ def audit(
                 rest.append(one)
         tell("planned", {"rest": len(rest), "bytes": sum(one.mission.bytes for one in rest)})
         if rest:
-            with working(asked.output) as place, engine() as made:
+            page.update(always=False)  # what is still to do may stand against what it says
+            with page.kept_true(), working(asked.output) as place, engine() as made:
                 runner = Runner(asked, store, made, place, page.telling)
                 now = rest
                 while now:  # also what shared a report whose place another result has taken meanwhile
@@ -181,13 +183,17 @@ class _Page:
         """Pass an event on, and write the page when it is due."""
         self.tell(event, facts)
         if event == "tick" and time.monotonic() > self.due:
-            try:
-                self.write(always=True)
-            except OutputError:
-                raise
-            except Exception as error:  # costs no mission; it shows again at the end
-                self.due = time.monotonic() + PAGE_S
-                self.tell("page_failed", {"reason": f"{type(error).__name__}: {error}"})
+            self.update(always=True)
+
+    def update(self, *, always: bool) -> None:
+        """Write the page while missions are still to end: what goes wrong with it costs none, and shows again at the end."""
+        try:
+            self.write(always=always)
+        except OutputError:
+            raise
+        except Exception as error:
+            self.due = time.monotonic() + PAGE_S
+            self.tell("page_failed", {"reason": f"{type(error).__name__}: {error}"})
 
     def write(self, *, always: bool) -> None:
         """Write the page, unless the one that is there is still right."""
@@ -196,10 +202,21 @@ class _Page:
         if not always and self._stands():
             return
         start = time.monotonic()
-        files = write_fleet(self.output / FILE_NAME, self.output, baseline=self.baseline, axis=self.axis)
+        with alone(self.output, _PAGE_NAME, PAGE_S):  # its three files belong together
+            files = write_fleet(self.output / FILE_NAME, self.output, baseline=self.baseline, axis=self.axis)
         took = time.monotonic() - start
         self.due = time.monotonic() + max(PAGE_S, _PAGE_SHARE * took)
         self.tell("page", {"path": str(files.html), "wall_s": round(took, 3)})
+
+    @contextmanager
+    def kept_true(self) -> Iterator[None]:
+        """Write the page also where the audit is interrupted, with what was found until then."""
+        try:
+            yield
+        except BaseException:
+            with suppress(Exception):
+                self.finish()
+            raise
 
     def finish(self) -> None:
         """Write the page until it shows what the store holds; another audit of this output may write both meanwhile."""

@@ -2,7 +2,7 @@
 
 - isolation: a mission of 240 s at 1 kHz diagnosed in this process and in a child, both warm; the difference is what the
   child costs.
-- scaling: missions of 60 s with ``-j 1`` and ``-j 2`` on the command line, everything included.
+- scaling: missions of 60 s with ``-j 1`` on one processor and ``-j 2`` on two, on the command line, everything included.
 - resume: a finished audit again. Its logs are made-up texts that end as unreadable; what a resume does does not depend
   on how they ended.
 - kills: an audit of short missions is ended by SIGKILL at random moments, one in five while it starts and the others after
@@ -46,10 +46,11 @@ def simulate(path: Path, seconds: float, rate: float, seed: int) -> Path:
     return path
 
 
-def audit(*words: str) -> tuple[float, int]:
-    """Wall time and exit code of a command line."""
+def audit(*words: str, processors: int | None = None) -> tuple[float, int]:
+    """Wall time and exit code of a command line, on so many processors."""
     start = time.perf_counter()
-    done = subprocess.run(command(*words), stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, check=False)
+    bound = [] if processors is None else ["taskset", "-c", ",".join(map(str, range(processors)))]
+    done = subprocess.run([*bound, *command(*words)], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, check=False)
     return time.perf_counter() - start, done.returncode
 
 
@@ -94,9 +95,10 @@ def scaling(folder: Path, missions: int, seconds: float) -> None:
     for i in range(missions):
         simulate(logs / f"m{i:04d}.mcap", seconds, 1000.0, 100 + i)
     for jobs in (1, 2):
-        took, code = audit(str(logs), "-o", str(folder / f"out{jobs}"), "-j", str(jobs))
+        took, code = audit(str(logs), "-o", str(folder / f"out{jobs}"), "-j", str(jobs), processors=jobs)
         print(
-            f"-j {jobs}: {missions} missions of {seconds:.0f} s in {took:.1f} s, {missions / took * 60:.0f}/min, code {code}"
+            f"-j {jobs}: {missions} missions of {seconds:.0f} s in {took:.1f} s, {missions / took * 60:.0f}/min, code {code}",
+            flush=True,
         )
 
 

@@ -223,6 +223,17 @@ def test_mission_file_that_is_off(tmp_path: Path, text: str, said: str) -> None:
     assert "\n" not in found.missions[1].problem
 
 
+@pytest.mark.parametrize(
+    "text", ['machine_id = "T1"\nfiles = ["plc.csv"]', "x = 1\n machine_id='T1' # truck", 'machine_id="T1"\n[']
+)
+def test_a_mission_file_that_is_off_still_names_its_machine(tmp_path: Path, text: str) -> None:
+    put(tmp_path, "a.mcap")
+    (tmp_path / "mission.toml").write_text(text)
+    (mission,) = discover([str(tmp_path)]).missions
+    assert mission.machine_id == "T1"
+    assert mission.problem
+
+
 def test_mission_file_without_logs(tmp_path: Path) -> None:
     put(tmp_path, "s/mission.toml")
     (tmp_path / "s/mission.toml").write_text('name = "x"')

@@ -74,8 +74,9 @@ def test_attempts_are_counted_and_more_retries_go_on(tmp_path: Path) -> None:
     assert Counter(kind for kind, _ in events) == {"mission": 3, "retry": 2}
     _, events = run(found, asked_for(tmp_path / "out", retries=1))
     assert {kind for kind, _ in events} == {"skipped"}
-    ends, _ = run(found, asked_for(tmp_path / "out", retries=2))
-    assert ends["leave"].attempts >= 3
+    ends, events = run(found, asked_for(tmp_path / "out", retries=2))
+    assert ends["leave"].attempts == 3
+    assert [kind for kind, name in events if name == "leave"] == ["mission"]
 
 
 def test_a_failed_audit_of_a_changed_log_leaves_the_earlier_report(tmp_path: Path) -> None:
@@ -321,24 +322,40 @@ def test_a_page_stands_until_trends_are_wanted_over_something_else(tmp_path: Pat
 
     for axis in ("hours", "hours", "days", "days", "hours"):
         audit(found, asked_for(tmp_path / "out"), lambda: engines.local(1, COLD), tell, axis=axis)
-    assert pages == ["hours", "days", "hours"]
+    assert pages == ["hours", "hours", "days", "hours"]  # the first time before and after the mission
 
 
-def test_a_page_that_an_interrupted_audit_left_behind_is_written_anew(tmp_path: Path) -> None:
+def states(output: Path) -> dict[str, str]:
+    return {m["name"]: m["state"] for m in json.loads((output / "fleet.json").read_bytes())["missions"]}
+
+
+def test_the_page_of_an_interrupted_audit_tells_what_was_found_and_what_is_to_do(tmp_path: Path) -> None:
     asked = asked_for(tmp_path / "out")
     run(missions(tmp_path / "logs", "fine-1"), asked)
-    found = missions(tmp_path / "logs", "fine-1", "damaged")
+    found = missions(tmp_path / "logs", "fine-1", "damaged", "hang")
+    seen: list[dict[str, str]] = []
 
     def stop(event: str, facts: dict[str, object]) -> None:
         if event == "mission":
+            seen.append(states(tmp_path / "out"))
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
         audit(found, asked, lambda: engines.local(1, COLD), stop)
-    assert shown(tmp_path / "out") == ["fine-1"]
+    assert seen == [{"damaged": "pending", "fine-1": "ok", "hang": "pending"}]
+    assert states(tmp_path / "out") == {"damaged": "degraded", "fine-1": "ok", "hang": "pending"}
+
+
+def test_a_page_that_was_left_behind_is_written_anew(tmp_path: Path) -> None:
+    asked = asked_for(tmp_path / "out")
+    run(missions(tmp_path / "logs", "fine-1"), asked)
+    before = (tmp_path / "out" / "fleet.json").read_bytes()
+    found = missions(tmp_path / "logs", "fine-1", "damaged")
+    run(found, asked)
+    (tmp_path / "out" / "fleet.json").write_bytes(before)  # as where the audit was ended by force
     _, events = run(found, asked)
     assert {kind for kind, _ in events} == {"skipped"}
-    assert shown(tmp_path / "out") == ["damaged", "fine-1"]
+    assert sorted(states(tmp_path / "out")) == ["damaged", "fine-1"]
 
 
 def test_a_page_shows_which_result_counts_now(tmp_path: Path) -> None:
@@ -351,10 +368,6 @@ def test_a_page_shows_which_result_counts_now(tmp_path: Path) -> None:
     run(found, asked_for(tmp_path / "out"))  # it is back
     document = json.loads((tmp_path / "out" / "fleet.json").read_bytes())
     assert [m["gone"] for m in document["missions"]] == [False, False]
-
-
-def shown(output: Path) -> list[str]:
-    return sorted(m["name"] for m in json.loads((output / "fleet.json").read_bytes())["missions"])
 
 
 def test_a_baseline_that_cannot_be_read_is_said_before_any_work(tmp_path: Path) -> None:
