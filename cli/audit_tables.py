@@ -68,6 +68,9 @@ def summary_parts(audited: Audited, found: Discovery, output: Path) -> list[Rend
     notes = [f"{len(ends)} in all, {audited.skipped} of them done before"]
     notes += [f"{states['degraded']} with damage or parts that cannot be judged"] if states["degraded"] else []
     parts.append(text(", ".join(notes), "dim"))
+    if audited.gone:
+        was = "mission that is" if audited.gone == 1 else "missions that are"
+        parts.append(text(f"the fleet page also counts {audited.gone} {was} not there any more", "dim"))
     files: list[tuple[str, object]] = [("fleet page", output / "fleet.html")]
     if audited.failed:
         files.append(("failures", output / "failures.txt"))
@@ -86,6 +89,7 @@ def document(audited: Audited, found: Discovery, output: Path, code: int) -> dic
         "page": str(output / "fleet.html"),
         "code": code,
         "skipped": audited.skipped,
+        "gone": audited.gone,
         "counts": dict(Counter(end.state for end in audited.ends)),
         "verdicts": dict(Counter(end.verdict for end in audited.ends if end.verdict)),
         "problems": [*found.problems, *found.notes],

@@ -131,7 +131,12 @@ def _diagnosed(work: Work) -> MissionResult:
             off = [path for path in paths[1:] if str(path) in text] or paths[1:]
             for path in paths:
                 text = text.replace(str(path), path.name)
-            left += [f"{path.name} was left out: {text}" for path in off]
+            left += [
+                f"{path.name} was left out: {text}"
+                if path.name in text
+                else f"{path.name} was left out, as nothing could be judged with it beside the recording ({text})"
+                for path in off
+            ]
             paths = [path for path in paths if path not in off]
 
 

@@ -65,7 +65,9 @@ def standing(m: Machine) -> str:
         since = f" since {utc(last.result.start_ns)[:10]}" if last and last.result.start_ns is not None else ""
         return f"Not assessed{since}: last judged ready" + (", but not cleared" if m.cleared is False else "")
     words = "Stop and repair"
-    if m.verdict == "watch":
+    if is_damaged(m):
+        words = "No fault found, but its last log is damaged"
+    elif m.verdict == "watch":
         lasting = m.last_judged is not None and m.last_judged.result.verdict == "watch"
         words = "Faults to watch"
         if lasting and m.cleared is False:
@@ -73,6 +75,12 @@ def standing(m: Machine) -> str:
         elif lasting and m.cleared and not m.unjudged:
             words = "Ready, with faults to watch"
     return words + (", and later missions not judged" if m.unjudged else "")
+
+
+def is_damaged(m: Machine) -> bool:
+    """Whether nothing but damage to a log keeps a machine from being ready."""
+    watched = [r.result for r in m.newest if r.result.verdict == "watch"]
+    return m.verdict == "watch" and not any(f.standing for f in m.faults) and not any(r.faults for r in watched)
 
 
 def headline(machines: Sequence[Machine], unknown: int = 0) -> tuple[str, str, str]:
@@ -87,19 +95,23 @@ def headline(machines: Sequence[Machine], unknown: int = 0) -> tuple[str, str, s
     """
     verdicts = [m.verdict for m in machines]
     status = min(verdicts, key=VERDICTS.index, default="not_assessed")
-    n, work = len(machines), sum(v in ("stop", "watch") for v in verdicts)
+    n, damaged = len(machines), sum(map(is_damaged, machines))
+    work = sum(v in ("stop", "watch") for v in verdicts) - damaged
     open_ = verdicts.count("not_assessed")
     if not n:
         return "not_assessed", "nothing judged", "No mission could be judged"
     tag = f"{count(verdicts.count(status), 'machine')}: {_TAGS[status]}"
+    if status == "watch" and not work:
+        tag = f"{count(damaged, 'machine')}: damaged logs"
     if work and n == 1:
         title = "The machine needs work"
     elif work:
         title = f"{work} of {count(n, 'machine')} {'needs' if work == 1 else 'need'} work"
-    elif open_ == n:
+    elif open_ + damaged == n:
         title = _none_ready(machines)
-    elif open_:
-        title = f"{n - open_} of {count(n, 'machine')} {'is' if n - open_ == 1 else 'are'} ready"
+    elif open_ or damaged:
+        fine = n - open_ - damaged
+        title = f"{fine} of {count(n, 'machine')} {'is' if fine == 1 else 'are'} ready"
     elif unknown:
         status, tag = "not_assessed", "not all assessed"
         known = "The machine is" if n == 1 else f"{n} machines are"
@@ -108,6 +120,8 @@ def headline(machines: Sequence[Machine], unknown: int = 0) -> tuple[str, str, s
         title = "The machine is ready" if n == 1 else f"All {n} machines are ready"
     if open_ and open_ < n:
         title += f", {open_} {'is' if open_ == 1 else 'are'} not assessed"
+    if damaged and damaged < n:
+        title += f", {damaged} {'has a damaged log' if damaged == 1 else 'have damaged logs'}"
     return status, tag, title
 
 
@@ -145,14 +159,15 @@ def sentences(
     bad = [m for m in machines if m.verdict in ("stop", "watch")]
     out = []
     for verdict, words in (("stop", "Must not go out"), ("watch", "Faults to watch")):
-        found = [m for m in machines if m.verdict == verdict]
+        found = [m for m in machines if m.verdict == verdict and not is_damaged(m)]
         if found and len(bad) > _SHOWN:
             out.append(f"{words} ({len(found)}): {_named(found)}.")
     for m in bad[:_SHOWN]:
         told = [_found(m, f) for f in m.faults if f.standing][:2]
         note = f" ({m.note})" if m.note else ""
         words = standing(m)
-        out.append(f"{m.label} – {words[0].lower() + words[1:]}: {join_words(told) or 'see its last mission'}{note}.")
+        what = f": {join_words(told)}" if told else ""
+        out.append(f"{m.label} – {words[0].lower() + words[1:]}{what}{note}.")
     open_machines = [m for m in machines if m.verdict == "not_assessed"]
     if open_machines:
         out.append(f"Not assessed ({len(open_machines)}): {_named(open_machines)}.")

@@ -47,11 +47,14 @@ class Audited:
         Missions that were done before.
     failed : int
         Missions in ``failures.txt``.
+    gone : int
+        Known missions that are not there any more.
     """
 
     ends: tuple[Ending, ...]
     skipped: int
     failed: int
+    gone: int = 0
 
 
 def overview(discovery: Discovery, asked: Asked) -> list[tuple[Planned, str]]:
@@ -142,7 +145,8 @@ def audit(
         ends = endings(store, [one.mission for one in planned])
         failed = write_failures(asked.output, planned, ends, asked.machine)
         page.finish()
-    return Audited(tuple(ends), len(planned) - len(rest), failed)
+        gone = store.database.rows("SELECT count(*) FROM mission WHERE gone IS NOT NULL")[0][0]
+    return Audited(tuple(ends), len(planned) - len(rest), failed, gone)
 
 
 def _parted(done: Sequence[Planned], asked: Asked, store: Store) -> tuple[list[Planned], list[Planned]]:

@@ -59,6 +59,7 @@ def changes_of(b: Mapping[str, Any] | None) -> dict[str, Any] | None:
     told = [f"{n} {_CHANGES[k][1]}" for k, n in b["counts"].items() if n]
     return {
         "worse": b["worse"],
+        "missing": bool(lost),
         "headline": lost + ("Faults: " + ", ".join(told) if told else "No fault in either audit"),
         "missions": f"{count(m['newer'], 'mission')} now, {count(m['older'], 'mission')} then; {count(m['new'], 'mission')} new",
         "groups": groups,

@@ -168,6 +168,8 @@ def _audit(audit: Mapping[str, Any]) -> str:
 
 
 def _hours(seconds: float) -> str:
+    if not seconds:
+        return "–"
     return f"{seconds / 3600:.1f} h" if seconds >= 1800 else names.span(seconds)
 
 

@@ -115,7 +115,7 @@ def test_what_is_not_cleared_is_not_worded_as_ready(
     tmp_path: Path, verdict: str, cleared: bool | None, shown: str, standing: str
 ) -> None:
     samples.write_report(tmp_path, "d0", cleared)
-    d = document(tmp_path, Sample("d0", verdict=verdict))
+    d = document(tmp_path, Sample("d0", verdict=verdict, faults=[Fault()] if verdict == "watch" else ()))
     assert (d["machines"][0]["verdict"], d["machines"][0]["standing"]) == (shown, standing)
 
 
@@ -216,3 +216,20 @@ def test_a_machine_without_any_part_that_was_assessed_shows_so(tmp_path: Path) -
     rows = {label: cells for label, cells, _ in matrix(d["machines"]).rows}
     assert len(rows["HX-2"]) == 12
     assert all("never assessed" in c for c in rows["HX-2"])
+
+
+def test_a_damaged_log_is_no_work_to_do(tmp_path: Path) -> None:
+    d = document(
+        tmp_path,
+        Sample("a", "M1", verdict="watch"),
+        Sample("b", "M2"),
+        Sample("c", "M3", verdict="stop", faults=[Fault()]),
+    )
+    assert d["verdict"]["title"] == "1 of 3 machines needs work, 1 has a damaged log"
+    standing = {m["id"]: m["standing"] for m in d["machines"]}
+    assert standing["M1"] == "No fault found, but its last log is damaged"
+    d = document(tmp_path / "two", Sample("a", "M1", verdict="watch"), Sample("b", "M2"))
+    assert d["verdict"]["title"] == "1 of 2 machines is ready, 1 has a damaged log"
+    assert (d["verdict"]["status"], d["verdict"]["tag"]) == ("watch", "1 machine: damaged logs")
+    d = document(tmp_path / "one", Sample("a", "M1", verdict="watch"))
+    assert d["verdict"]["title"] == "The machine is not known to be ready"
