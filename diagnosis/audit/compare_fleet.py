@@ -16,7 +16,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from diagnosis.audit.fleet_document import Fleet, bounds_json
+from diagnosis.audit.fleet_document import Fleet
+from diagnosis.audit.fleet_json import bounds_json
 from diagnosis.audit.fleet_machines import EITHER, FleetFault, Machine, is_assessed
 from diagnosis.result import SEVERITIES
 

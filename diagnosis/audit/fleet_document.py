@@ -40,12 +40,12 @@ from typing import Any
 import numpy as np
 
 from diagnosis.audit import fleet_words as words
+from diagnosis.audit.fleet_json import bounds_json, rounded, trend_json
 from diagnosis.audit.fleet_machines import VERDICTS, FleetFault, Machine
 from diagnosis.audit.fleet_news import news, since_run
-from diagnosis.audit.fleet_read import Bounds, FoundFault, Mission
+from diagnosis.audit.fleet_read import Mission
 from diagnosis.audit.fleet_trends import Axis, PartTrend, trends_of
 from diagnosis.audit.outcome import READ, STATES
-from diagnosis.audit.trend_fit import Line
 from diagnosis.result import SEVERITIES
 from replay.version import __version__
 
@@ -140,7 +140,7 @@ def fleet_document(fleet: Fleet, baseline: Mapping[str, Any] | None = None) -> d
         "faults": [
             _fault(k, f, at, since_run(m, f, fleet.first_runs)) for k, m in enumerate(fleet.machines) for f in m.faults
         ],
-        "trends": [_trend(k, t, at, fleet.axis) for k, own in enumerate(fleet.trends) for t in own],
+        "trends": [trend_json(k, t, at, fleet.axis) for k, own in enumerate(fleet.trends) for t in own],
         "missions": [
             _mission(
                 m,
@@ -173,9 +173,9 @@ def _counts(fleet: Fleet, first: Mapping[int, str]) -> dict[str, Any]:
         "gone": sum(m.gone for m in fleet.missions),
         "undated": sum(len(m.undated) for m in fleet.machines),
         "with_faults": sum(bool(r.faults) for r in runs),
-        "driving_s": _round(sum(r.result.driving_s or 0.0 for r in runs)),
-        "distance_m": _round(sum(r.result.distance_m or 0.0 for r in runs)),
-        "decided": _round(sum(p.decided_s for p in parts) / driving) if driving > 0 else None,
+        "driving_s": rounded(sum(r.result.driving_s or 0.0 for r in runs)),
+        "distance_m": rounded(sum(r.result.distance_m or 0.0 for r in runs)),
+        "decided": rounded(sum(p.decided_s for p in parts) / driving) if driving > 0 else None,
         "faults": {s: faults[s] for s in _STATUSES},
         "first_ns": min(starts, default=None),
         "last_ns": max(starts, default=None),
@@ -198,8 +198,8 @@ def _machine(m: Machine, at: Mapping[str, int]) -> dict[str, Any]:
         "undated": [at[r.name] for r in m.undated],
         "failed": [at[f.name] for f in m.failed],
         "with_faults": m.with_faults,
-        "driving_s": _round(m.driving_s),
-        "decided": _round(m.decided),
+        "driving_s": rounded(m.driving_s),
+        "decided": rounded(m.decided),
         "min_epsilon": m.limits.min_epsilon,
         "parts": [_part(m, *key) for key in m.parts],
     }
@@ -240,107 +240,3 @@ def _fault(k: int, f: FleetFault, at: Mapping[str, int], first_run: int | None) 
         "first_run": first_run,
         "epsilon": bounds_json(f.epsilon),
     }
-
-
-def _trend(k: int, t: PartTrend, at: Mapping[str, int], axis: Axis) -> dict[str, Any]:
-    s, f = t.series, t.trend.forecast
-    columns = [[_round(float(v)) for v in c] for c in (s.x, s.value, s.low, s.high)]
-    return {
-        "machine": k,
-        "component": t.component,
-        "kind": t.kind,
-        "side": t.side,
-        "limit": t.limit,
-        "now": _round(s.now),
-        "points": [list(p) for p in zip([at[r.name] for r in t.runs], *columns, strict=True)],
-        "outliers": list(t.trend.outliers),
-        "changes": [{"index": c.index, "kind": c.kind, "size": _round(c.size)} for c in t.trend.changes],
-        "first": t.trend.first,
-        "direction": t.trend.direction,
-        "approaching": t.approaching,
-        "line": _line(t.trend.line, s.now),
-        "forecast": {
-            "state": f.state,
-            "soonest": _round(f.soonest),
-            "likely": _round(f.likely),
-            "latest": _round(f.latest),
-            "horizon": _round(f.horizon),
-            "words": words.forecast_words(f, t.limit, axis),
-        },
-    }
-
-
-def _line(line: Line | None, now: float) -> dict[str, Any] | None:
-    if line is None:
-        return None
-    level, half = line.at(now), line.half(now, 0.95)
-    spread = line.quantile(0.95) * line.slope_var**0.5
-    return {
-        "level": {"value": _round(level), "low": _round(level - half), "high": _round(level + half)},
-        "slope": {
-            "value": _round(line.slope),
-            "low": _round(line.slope - spread),
-            "high": _round(line.slope + spread),
-        },
-        "tau": _round(line.tau),
-        "centre": _round(line.centre),
-        "dof": line.dof,
-    }
-
-
-def _mission(m: Mission, owner: int | None, first: Mapping[int, str], first_run: int | None) -> dict[str, Any]:
-    r = m.result
-    head: dict[str, Any] = {"name": m.name, "files": list(m.files), "bytes": m.bytes, "gone": m.gone}
-    if r is None:
-        return {
-            **head,
-            "machine": owner,
-            "state": "pending",
-            "reason": "not audited yet",
-            "verdict": None,
-            "faults": [],
-        }
-    faults = sorted(
-        (f for f in r.faults if f.severity != "info"), key=lambda f: (-SEVERITIES.index(f.severity), -f.seconds)
-    )
-    return {
-        **head,
-        "machine": owner,
-        "state": r.state,
-        "reason": r.reason,
-        "verdict": r.verdict,
-        "title": r.title,
-        "start_ns": r.start_ns,
-        "duration_s": _round(r.duration_s),
-        "driving_s": _round(r.driving_s),
-        "distance_m": _round(r.distance_m),
-        "open_loop": r.open_loop,
-        "attempts": r.attempts,
-        "version": r.version,
-        "report": r.report,
-        "first_run": first_run,
-        "copy_of": None if first[r.id] == m.name else first[r.id],
-        "faults": [_found(f) for f in faults],
-    }
-
-
-def _found(f: FoundFault) -> dict[str, Any]:
-    told = {k: getattr(f, k) for k in ("id", "component", "kind", "side", "mode", "severity")}
-    return {
-        **told,
-        "seconds": _round(f.seconds),
-        "epsilon": bounds_json(f.epsilon),
-        "probability": _round(f.probability),
-    }
-
-
-def bounds_json(b: Bounds | None) -> dict[str, float | None] | None:
-    """ε̂ with its bounds, rounded."""
-    return None if b is None else {"value": _round(b.value), "low": _round(b.low), "high": _round(b.high)}
-
-
-def _round(value: float | None) -> float | None:
-    """Six significant digits; the same on every computer."""
-    if value is None or not np.isfinite(value):
-        return None
-    return float(f"{value:.6g}") + 0.0

@@ -3,58 +3,24 @@
 from __future__ import annotations
 
 import ctypes
-import hashlib
 import os
 import secrets
 import shutil
 import sys
 import tempfile
-import time
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
-from typing import IO
 
+from diagnosis.audit.claims import WORKING, Claim, cannot_write, claim_mission
 from diagnosis.audit.keys import Key
-from replay.errors import OutputError
 
-MISSIONS, RESULTS, WORKING = "missions", "results", ".work"
+MISSIONS, RESULTS = "missions", "results"
 _TEMPORARY = "mfhca-audit-"
 _HELD = ".held"
-_LOOK_S = 0.05
 _MARK = ".key"
 _AT_FDCWD, _RENAME_EXCHANGE = -100, 2
-
-
-class Claim:
-    """A file lock that the system lets go of when its holder ends, however that happens."""
-
-    def __init__(self, path: Path) -> None:
-        self._file: IO[bytes] = path.open("ab")
-        self.path = path
-
-    def take(self) -> bool:
-        """Take it unless another process holds it."""
-        try:
-            if sys.platform == "win32":
-                import msvcrt
-
-                self._file.seek(0)
-                msvcrt.locking(self._file.fileno(), msvcrt.LK_NBLCK, 1)
-            else:
-                import fcntl
-
-                fcntl.flock(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-                # a run that sweeps may have removed the file before it was locked
-                return os.path.samestat(os.fstat(self._file.fileno()), self.path.stat())
-        except OSError:
-            return False
-        return True
-
-    def drop(self) -> None:
-        """Let go of it."""
-        self._file.close()
 
 
 @dataclass(frozen=True)
@@ -155,47 +121,6 @@ def sweep(output: Path) -> None:
         claim.drop()
 
 
-def claim_mission(output: Path, name: str) -> Claim | None:
-    """Claim a mission for this run; None where another run on the same output is at it.
-
-    Raises
-    ------
-    OutputError
-        Where the output cannot be written.
-    """
-    folder = output / WORKING / "claims"
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        claim = Claim(folder / hashlib.sha256(name.encode("utf-8", "surrogateescape")).hexdigest()[:24])
-    except OSError as error:
-        raise cannot_write(error, output) from error
-    if claim.take():
-        return claim
-    claim.drop()
-    return None
-
-
-@contextmanager
-def alone(output: Path, name: str, patience_s: float) -> Iterator[None]:
-    """Do something that only one audit of an output may do at a time; after `patience_s` it is done all the same.
-
-    Raises
-    ------
-    OutputError
-        Where the output cannot be written.
-    """
-    end = time.monotonic() + patience_s
-    claim = claim_mission(output, name)
-    while claim is None and time.monotonic() < end:
-        time.sleep(_LOOK_S)
-        claim = claim_mission(output, name)
-    try:
-        yield
-    finally:
-        if claim is not None:
-            claim.drop()
-
-
 def publish(made: Path, place: Path, key: Key) -> None:
     """Move a finished report to its place; one that stands there is exchanged in one step where the system can.
 
@@ -278,14 +203,6 @@ def write_whole(path: Path, data: bytes) -> None:
         with suppress(OSError):
             part.unlink()
         raise cannot_write(error, path) from error
-
-
-def cannot_write(error: OSError, path: Path) -> OutputError:
-    """One sentence for an output that cannot be written."""
-    return OutputError(
-        f"{error.filename or path}: cannot be written ({error.strerror or error}); what is finished stays, "
-        "run the same command again to continue"
-    )
 
 
 def _exchange(one: Path, other: Path) -> bool:

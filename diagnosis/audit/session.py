@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import orjson
 
+from diagnosis.audit.claims import alone
 from diagnosis.audit.copies import without_copies
 from diagnosis.audit.discover import Discovery
 from diagnosis.audit.endings import Ending, endings, write_failures
@@ -18,7 +19,7 @@ from diagnosis.audit.engines import Engine
 from diagnosis.audit.events import Tell
 from diagnosis.audit.fleet_read import content_mark
 from diagnosis.audit.ingest import ingest
-from diagnosis.audit.places import alone, own_report, sweep, working
+from diagnosis.audit.places import own_report, sweep, working
 from diagnosis.audit.plan import Asked, Planned, is_done, plan, stored_result
 from diagnosis.audit.previous_pages import compare_newest
 from diagnosis.audit.runner import Runner, skip

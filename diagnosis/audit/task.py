@@ -15,6 +15,7 @@ from typing import Any
 
 from diagnosis.audit import child
 from diagnosis.audit.child import Work
+from diagnosis.audit.claims import cannot_write
 from diagnosis.audit.discover import MissionSource
 from diagnosis.audit.identity import fallback_id
 from diagnosis.audit.isolated import isolation, over_time, run_isolated
@@ -22,7 +23,7 @@ from diagnosis.audit.keys import Key, file_roles, log_hash, unhashed_log
 from diagnosis.audit.limits import Limits
 from diagnosis.audit.objects import Objects
 from diagnosis.audit.outcome import READ, Outcome
-from diagnosis.audit.places import MISSIONS, cannot_write, publish
+from diagnosis.audit.places import MISSIONS, publish
 from diagnosis.audit.staging import Late, Staged, stage
 from replay.errors import ConfigError, LogError, OutputError
 from replay.machine import Machine

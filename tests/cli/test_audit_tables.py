@@ -49,6 +49,14 @@ def test_of_many_failures_some_are_shown() -> None:
     assert lines[11] == "… and 20 more"
 
 
+def test_missions_that_are_gone_are_told() -> None:
+    console = Console(file=io.StringIO(), width=100, markup=False)
+    for part in summary_parts(Audited((ending("a", "ok", "ready"),), 0, 0, 2), Discovery(()), Path("out")):
+        console.print(part)
+    assert isinstance(console.file, io.StringIO)
+    assert "the fleet page also counts 2 missions that are not there any more" in console.file.getvalue()
+
+
 def test_the_document_counts_states_and_verdicts() -> None:
     audited = Audited((ending("a", "ok", "ready"), ending("b", "timeout")), 1, 1)
     found = document(audited, Discovery((), ("nowhere: no such file",)), Path("out"), 3)

@@ -4,8 +4,8 @@ from pathlib import Path
 
 import pytest
 
-from diagnosis.audit import places
-from diagnosis.audit.places import Claim, sweep, working
+from diagnosis.audit.claims import WORKING, Claim
+from diagnosis.audit.places import sweep, working
 
 
 def test_a_sweep_between_opening_and_locking_costs_no_run_its_folders(
@@ -19,11 +19,11 @@ def test_a_sweep_between_opening_and_locking_costs_no_run_its_folders(
             sweep(tmp_path)
         return take(self)
 
-    (tmp_path / places.WORKING).mkdir()
+    (tmp_path / WORKING).mkdir()
     monkeypatch.setattr(Claim, "take", late)
     with working(tmp_path) as place:
         sweep(tmp_path)  # another audit begins
         assert place.folder.is_dir()
         assert place.temporary.is_dir()
     assert swept
-    assert list((tmp_path / places.WORKING).iterdir()) == []
+    assert list((tmp_path / WORKING).iterdir()) == []

@@ -8,8 +8,9 @@ from typing import Any
 
 import pytest
 
+from diagnosis.audit.claims import claim_mission
 from diagnosis.audit.keys import Key
-from diagnosis.audit.places import claim_mission, mark_report
+from diagnosis.audit.places import mark_report
 from diagnosis.audit.previous_pages import compare_newest
 from diagnosis.audit.store import Store
 from diagnosis.output import write_result

@@ -10,11 +10,12 @@ from types import SimpleNamespace
 import pytest
 
 from diagnosis.audit import engines
+from diagnosis.audit.claims import claim_mission
 from diagnosis.audit.discover import MissionSource
 from diagnosis.audit.endings import Ending, command, exit_code, quoted
 from diagnosis.audit.keys import Key
 from diagnosis.audit.limits import Limits
-from diagnosis.audit.places import claim_mission, publish, working
+from diagnosis.audit.places import publish, working
 from diagnosis.audit.plan import Planned
 from diagnosis.audit.session import audit, overview
 from diagnosis.audit.staging import Staged
