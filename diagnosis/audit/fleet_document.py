@@ -142,7 +142,7 @@ def fleet_document(fleet: Fleet, baseline: Mapping[str, Any] | None = None) -> d
         ],
         "trends": [trend_json(k, t, at, fleet.axis) for k, own in enumerate(fleet.trends) for t in own],
         "missions": [
-            _mission(
+            mission_json(
                 m,
                 failed.get(m.name, owner.get(m.result.id if m.result is not None else -1)),
                 first,
