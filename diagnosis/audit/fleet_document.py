@@ -40,7 +40,7 @@ from typing import Any
 import numpy as np
 
 from diagnosis.audit import fleet_words as words
-from diagnosis.audit.fleet_json import bounds_json, rounded, trend_json
+from diagnosis.audit.fleet_json import bounds_json, mission_json, rounded, trend_json
 from diagnosis.audit.fleet_machines import VERDICTS, FleetFault, Machine
 from diagnosis.audit.fleet_news import news, since_run
 from diagnosis.audit.fleet_read import Mission
