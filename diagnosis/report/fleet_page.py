@@ -234,6 +234,8 @@ def _machine(
     leading = max((t for t in trends if t["line"] is not None), key=interest, default=None)
     judged = len(m["missions"]) + len(m["undated"])
     words, symbol = m["standing"], rows.verdict_symbol(m["verdict"])
+    if m["verdict"] == "watch" and not standing:
+        symbol = "warning"  # a damaged log
     if m["verdict"] == "ready" and standing:
         often = any(f["status"] == "recurring" for f in standing)
         words, symbol = f"Ready, fault {'comes and goes' if often else 'seen lately'}", "warning"
