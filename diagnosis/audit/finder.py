@@ -7,7 +7,7 @@ import os
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-from diagnosis.audit.grouping import Group, group
+from diagnosis.audit.grouping import Group, group, holes
 from diagnosis.audit.listing import Entry, LocalPlace, Place
 from diagnosis.audit.mission_file import NAME as MISSION_FILE
 from diagnosis.audit.mission_file import MissionFile, read_mission_file, stated_machine
@@ -207,7 +207,9 @@ class Finder:
                 recordings += self._whole(place, child)
             else:
                 waiting.append(child)
-        self._add(folder.real, group(place, self._logs(place, folder, files), recordings))
+        logs = self._logs(place, folder, files)
+        self.notes += holes(logs)
+        self._add(folder.real, group(place, logs, recordings))
         return False
 
     def _own(self, folder: Entry, names: dict[str, Entry], child: Entry) -> bool:

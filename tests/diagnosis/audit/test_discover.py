@@ -324,3 +324,22 @@ def test_a_server_that_is_not_there_costs_nothing_else(tmp_path: Path) -> None:
     found = discover(["ftp://127.0.0.1:1/logs", str(tmp_path)])
     assert [m.name for m in found.missions] == ["m"]
     assert found.problems == ("ftp://127.0.0.1:1/logs: cannot be reached (Connection refused)",)
+
+
+def test_a_part_that_is_missing_is_told(tmp_path: Path) -> None:
+    put(
+        tmp_path,
+        "g_0.bag",
+        "g_1.bag",
+        "g_3.bag",
+        "drive_0101.bag",
+        "drive_0102.bag",
+        "drive_0104.bag",
+        "h_0.bag",
+        "h_7.bag",
+    )
+    found = discover([str(tmp_path)])
+    assert len(found.missions) == 9
+    assert found.problems == ()
+    (note,) = found.notes
+    assert note.startswith(f"{tmp_path}/g_0.bag: numbered like parts of one recording, of which g_2.bag is not there")
