@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 from diagnosis.audit.listing import Entry, Place
 from replay.log_files import TABLE_ENDINGS, part_of, split_ending
@@ -87,11 +88,15 @@ def _numbered(files: Sequence[Entry]) -> dict[tuple[str, str], list[tuple[int, E
     return named
 
 
+def _consecutive(numbers: Sequence[int]) -> bool:
+    return all(b == a + 1 for a, b in pairwise(numbers))
+
+
 def _split(place: Place, files: Sequence[Entry]) -> list[Group]:
     """Recordings in numbered parts, each with all of its parts."""
     out = []
     for (stem, _), numbered in _numbered(files).items():
         numbers, parts = [n for n, _ in numbered], [p for _, p in numbered]
-        if len(parts) > 1 and numbers == list(range(numbers[0], numbers[-1] + 1)) and place.continuous(parts):
+        if len(parts) > 1 and _consecutive(numbers) and place.continuous(parts):
             out.append(Group(stem, tuple(parts)))
     return out

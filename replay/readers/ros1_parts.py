@@ -4,11 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from itertools import islice, pairwise
 from pathlib import Path
 
 from replay.errors import LogError
 from replay.log_files import part_of
 from replay.rawlog import LogSummary, TopicInfo
+
+_MOST_GAPS = 5
 
 
 def parts_in(folder: Path) -> list[Path]:
@@ -34,7 +37,7 @@ def over_parts(folder: Path, read: Callable[[Path], LogSummary]) -> LogSummary:
     lost: list[str] = []
     parts = parts_in(folder)
     numbers = [n[1] for p in parts if (n := part_of(p.name)) is not None]
-    gaps = sorted(set(range(numbers[0], numbers[-1])) - set(numbers))[:5] if numbers else []
+    gaps = islice((n for a, b in pairwise(numbers) for n in range(a + 1, b)), _MOST_GAPS)
     lost += [f"{folder.name}: part {number} of the split bag is missing" for number in gaps]
     for part in parts:
         try:

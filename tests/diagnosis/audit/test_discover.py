@@ -337,6 +337,7 @@ def test_a_part_that_is_missing_is_told(tmp_path: Path) -> None:
         "drive_0104.bag",
         "h_0.bag",
         "h_7.bag",
+        "h_999999999.bag",
     )
     found = discover([str(tmp_path)])
     assert len(found.missions) == 9

@@ -67,3 +67,10 @@ def test_folder_of_several_bags_is_no_split_bag(split: Path) -> None:
     write(split / "other_0.bag", 0, 2)
     with pytest.raises(LogError, match="is not a log"):
         open_log(split)
+
+
+def test_a_number_of_a_part_may_be_absurd(split: Path) -> None:
+    last = max(split.glob("*.bag"))
+    last.rename(last.with_name("drive_999999999.bag"))
+    damage = summarise_log(split, OPTIONS).damage
+    assert 0 < sum("of the split bag is missing" in text for text in damage) <= 5
