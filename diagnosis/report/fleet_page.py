@@ -41,10 +41,10 @@ _DEFINITIONS = (
     "New: in the machine's last mission and in none before, of which one assessed the part. Recurring: in several missions. "
     "Past: not found in the last three missions that assessed the part. Faults of severity “info” are left out.",
     "Assessed: judged for the seconds that the verdict “ready” takes, and for four fifths of its driving.",
-    "Trend: weighted line through the missions' ε̂ over the driving hours of the audited missions, with a spread from mission "
-    "to mission of its own; missions off the line (×) are set aside, and a step or bend (↓ ↑ ∠) starts the line anew, so that "
-    "a repair does. The band is its 90 % interval, the bar on the limit the 90 % interval of the crossing.",
-    "No forecast is made from fewer than five missions since the last change, nor further ahead than three times the hours "
+    "Trend: weighted line through the missions' ε̂ over time, with a spread from mission to mission of its own; "
+    "missions off the line (×) are set aside, and a step or bend (↓ ↑ ∠) starts the line anew, so that a repair does. "
+    "The band is its 90 % interval, the bar on the limit the 90 % interval of the crossing.",
+    "No forecast is made from fewer than five missions since the last change, nor further ahead than three times the time "
     "that it rests on. It says when the mean of missions reaches the limit if wear goes on as it does.",
     "Copies of a log count once in machines, faults and trends.",
 )

@@ -90,15 +90,18 @@ def _used() -> float:
     return used.ru_utime + used.ru_stime
 
 
-def scaling(folder: Path, missions: int, seconds: float, logs: Path) -> None:
+def scaling(folder: Path, missions: int, seconds: float, logs: Path, all_jobs: list[int]) -> None:
     logs.mkdir(parents=True, exist_ok=True)
     missing = [i for i in range(missions) if not (logs / f"m{i:04d}.mcap").exists()]
     with ProcessPoolExecutor() as pool:
         made = [pool.submit(simulate, logs / f"m{i:04d}.mcap", seconds, 1000.0, 100 + i) for i in missing]
         for one in made:
             one.result()
-    for jobs in (1, 2):
-        took, code = audit(str(logs), "-o", str(folder / f"out{jobs}"), "-j", str(jobs), processors=jobs)
+    names = [str(logs / f"m{i:04d}.mcap") for i in range(missions)]
+    for jobs in all_jobs:
+        out = folder / f"out{jobs}"
+        took, code = audit(*names, "-o", str(out), "-j", str(jobs), processors=jobs)
+        shutil.rmtree(out)  # 15 MB a mission
         print(
             f"-j {jobs}: {missions} missions of {seconds:.0f} s in {took:.1f} s, {missions / took * 60:.0f}/min, code {code}",
             flush=True,
@@ -231,6 +234,7 @@ def main() -> None:
     parser.add_argument("--runs", type=int, default=5, help="runs of the isolation; 0: none")
     parser.add_argument("--missions", type=int, default=60, help="missions of the scaling; 0: none; 1000 in full")
     parser.add_argument("--seconds", type=float, default=60.0, help="length of each")
+    parser.add_argument("--jobs", type=int, nargs="+", default=[1, 2], help="of the scaling")
     parser.add_argument("--logs", type=Path, help="folder to keep their logs in, for another run")
     parser.add_argument("--resume", type=int, default=1000, help="missions of the resumed audit; 0: none")
     parser.add_argument("--kills", type=int, default=50, help="kills; 0: none; 500 in full")
@@ -241,7 +245,7 @@ def main() -> None:
         if given.runs:
             isolation(folder, given.runs)
         if given.missions:
-            scaling(folder, given.missions, given.seconds, given.logs or folder / "logs")
+            scaling(folder, given.missions, given.seconds, given.logs or folder / "logs", given.jobs)
         if given.resume:
             resume(folder, given.resume)
         if given.kills:
