@@ -145,9 +145,8 @@ def _without_jitter(command: Array, known: Flags, dt: float) -> tuple[Array, Arr
     power = np.median(rows, axis=1) / _MEDIAN_SQUARE  # a jump is no jitter
     near = np.pad(power, 1, mode="edge")
     jitter = np.repeat(np.maximum(np.maximum(near[:-2], near[2:]), power), width)[:size]
-    half = width
     total = np.concatenate([[0.0], np.cumsum(filled)])
-    before, after = (np.clip(np.arange(size) + k, 0, size) for k in (-half, half + 1))
+    before, after = (np.clip(np.arange(size) + k, 0, size) for k in (-width, width + 1))
     even = (total[after] - total[before]) / (after - before)
     small = np.abs(filled - even) < _JITTER * np.sqrt(jitter)
     return np.where(small, even, filled), jitter
