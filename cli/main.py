@@ -16,10 +16,10 @@ from typing import Annotated
 
 import typer
 
-from cli import auditing, comparing, configure, diagnose, evaluating, fitting, injecting, look, replaying, simulate
-from cli.app import App, Quiet, Verbose, terminal_of
-from cli.console import Terminal, discard
-from cli.interrupts import asked, check, forget, listen
+from cli.commands import audit, compare, config, diagnose, evaluate, fit, inject, inspect, replay, simulate
+from cli.terminal.command import App, Quiet, Verbose, terminal_of
+from cli.terminal.console import Terminal, discard
+from cli.terminal.interrupts import asked, check, forget, listen
 from replay.errors import MfhcaError
 from replay.version import __version__
 
@@ -63,18 +63,18 @@ _DIAGNOSE, _LOOK, _MAKE = "Diagnose", "Look into a log", "Set up and try"
 for _panel, _function, _name, _epilog in (
     (_DIAGNOSE, diagnose.diagnose, "diagnose", diagnose.DIAGNOSE_EXAMPLES),
     (_DIAGNOSE, diagnose.report, "report", diagnose.REPORT_EXAMPLES),
-    (_DIAGNOSE, auditing.audit, "audit", auditing.EXAMPLES),
-    (_DIAGNOSE, comparing.compare, "compare", comparing.EXAMPLES),
-    (_DIAGNOSE, evaluating.evaluate, "evaluate", evaluating.EXAMPLES),
-    (_LOOK, look.inspect, "inspect", look.INSPECT_EXAMPLES),
-    (_LOOK, look.channels, "channels", look.CHANNELS_EXAMPLES),
-    (_LOOK, replaying.replay, "replay", replaying.EXAMPLES),
-    (_MAKE, fitting.fit, "fit", fitting.EXAMPLES),
+    (_DIAGNOSE, audit.audit, "audit", audit.EXAMPLES),
+    (_DIAGNOSE, compare.compare, "compare", compare.EXAMPLES),
+    (_DIAGNOSE, evaluate.evaluate, "evaluate", evaluate.EXAMPLES),
+    (_LOOK, inspect.inspect, "inspect", inspect.INSPECT_EXAMPLES),
+    (_LOOK, inspect.channels, "channels", inspect.CHANNELS_EXAMPLES),
+    (_LOOK, replay.replay, "replay", replay.EXAMPLES),
+    (_MAKE, fit.fit, "fit", fit.EXAMPLES),
     (_MAKE, simulate.simulate, "simulate", simulate.EXAMPLES),
-    (_MAKE, injecting.inject, "inject", injecting.EXAMPLES),
+    (_MAKE, inject.inject, "inject", inject.EXAMPLES),
 ):
     app.command(_name, rich_help_panel=_panel, epilog=_epilog)(_function)
-app.add_typer(configure.app, name="config", rich_help_panel=_MAKE)
+app.add_typer(config.app, name="config", rich_help_panel=_MAKE)
 
 
 def run(arguments: Sequence[str] | None = None) -> int:

@@ -13,12 +13,12 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
-from diagnosis.json_text import writable
-from diagnosis.previous import with_previous
+from diagnosis.comparison.previous import with_previous
 from diagnosis.report.page import build_page
-from diagnosis.result import SCHEMA, Closeups, MissionResult
+from diagnosis.results.json_text import writable
+from diagnosis.results.result import SCHEMA, Closeups, MissionResult
+from replay.atomic_write import atomic_path, atomic_paths, made_folder
 from replay.errors import LogError, OutputError
-from replay.files import atomic_path, atomic_paths, made_folder
 
 HTML, JSON, PARQUET, WINDOWS = "report.html", "report.json", "report.parquet", "report.windows.parquet"
 _BLOCK = 1 << 15

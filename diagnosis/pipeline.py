@@ -10,25 +10,25 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from diagnosis import metrics, quality
-from diagnosis.assessment import Assessment
-from diagnosis.caveats import more_caveats
-from diagnosis.closeups import closeups_of
-from diagnosis.components import ComponentResult, assess_components
-from diagnosis.decide import Decision, decide, intervals_of, spans_of
-from diagnosis.holes import holes_of, without_holes
-from diagnosis.loss import loss_rows
-from diagnosis.result import SCHEMA, MissionResult, to_json
-from replay.columns import replay_columns
-from replay.envelope import bucket_of
+from diagnosis.assess import ComponentResult, assess_components
+from diagnosis.channels.recording_gaps import holes_of, without_holes
+from diagnosis.decision import metrics, quality
+from diagnosis.decision.caveats import more_caveats
+from diagnosis.decision.decide import Decision, decide, intervals_of, spans_of
+from diagnosis.results.assessment import Assessment
+from diagnosis.results.closeups import closeups_of
+from diagnosis.results.loss import loss_rows
+from diagnosis.results.result import SCHEMA, MissionResult, to_json
+from replay.arrays.envelope import bucket_of
+from replay.arrays.spill import blocks, release_all
+from replay.control.loop import Replay, replay_loop
+from replay.control.loop_columns import replay_columns
 from replay.errors import ConfigError, NotJudged
-from replay.log_identity import stated_machine
-from replay.loop import Replay, replay_loop
-from replay.machine import Machine
+from replay.machine.config import Machine
 from replay.mission import Mission, load_mission
-from replay.signals import Signals
-from replay.spill import blocks, release_all
-from replay.timeline import align
+from replay.readers.machine_identity import stated_machine
+from replay.signals.signal import Signals
+from replay.signals.timeline import align
 from replay.version import __version__
 
 Array = NDArray[np.float64] | NDArray[np.float32]

@@ -10,6 +10,8 @@ A message is one sentence or two: the file and the place in it, what was found, 
 and what to do.
 """
 
+from __future__ import annotations
+
 
 class MfhcaError(Exception):
     """Base of every error that the command line prints as one line."""
@@ -35,3 +37,9 @@ class LogError(MfhcaError):
 
 class NotJudged(LogError):
     """The log is readable, but it holds nothing from which a fault could be judged."""
+
+
+def check_range(key: str, value: float, low: float, high: float, unit: str) -> None:
+    """Raise a `ConfigError` that names the key, the value, the unit and the range."""
+    if not low <= value <= high:
+        raise ConfigError(f"{key} = {value:g} {unit} is out of range; expected {low:g} to {high:g} {unit}")

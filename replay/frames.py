@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pandas as pd
 
-from replay.rawlog import Channel, RawLog
-from replay.timeline import Timeline
+from replay.log.raw_log import Channel, RawLog
+from replay.signals.timeline import Timeline
 
 
 def log_frames(log: RawLog) -> dict[str, pd.DataFrame]:

@@ -8,19 +8,19 @@ from dataclasses import dataclass, replace
 from fnmatch import fnmatch
 from pathlib import Path
 
-from replay.clock_align import align_clocks
-from replay.clock_order import in_order
+from replay.clocks.align import align_clocks
+from replay.clocks.source_clock import SourceClock
 from replay.errors import LogError
-from replay.machine import Machine
-from replay.mapping import map_signals, plan_topics
-from replay.mapping_rules import candidates
-from replay.open_loop import is_open_loop, is_open_loop_table
-from replay.rawlog import LogSummary, RawLog
+from replay.log.open_loop import is_open_loop, is_open_loop_table
+from replay.log.raw_log import LogSummary, RawLog
+from replay.log.source_options import SourceOptions
+from replay.log.stamp_order import in_order
+from replay.machine.config import Machine
 from replay.readers.registry import read_log, summarise_log
-from replay.signals import Signals
-from replay.source_clock import SourceClock
-from replay.sources import SourceOptions
-from replay.timeline import Timeline, align, check_overlap
+from replay.signals.mapping import map_signals, plan_topics
+from replay.signals.rules import candidates
+from replay.signals.signal import Signals
+from replay.signals.timeline import Timeline, align, check_overlap
 
 Progress = Callable[[str], None]
 
@@ -133,7 +133,7 @@ def read_signals(
     -------
     tuple[tuple[MissionFile, ...], Signals]
         The files in the given order, and the signals at their own stamps, on the clock of the first file where the
-        files' clocks could be compared (`replay.clock_align`).
+        files' clocks could be compared (`replay.clocks.align`).
 
     Raises
     ------

@@ -8,9 +8,9 @@ from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any
 
+from replay.atomic_write import atomic_path
 from replay.errors import ConfigError
 from replay.faults import FaultMode, Side
-from replay.files import atomic_path
 
 SCHEMA = "mfhca-truth/1"
 

@@ -13,14 +13,14 @@ from pathlib import Path
 from typing import Any
 
 from diagnosis.pipeline import diagnose
-from replay.export.mcap_log import write_mcap
-from replay.export.ros1_log import write_ros1_bag
-from replay.export.rosbag2_log import write_rosbag2
-from replay.export.topics import axle_joint, mission_topics, wheel_joint
-from replay.export.twincat_log import plc_symbol, write_twincat
-from replay.files import atomic_path
-from replay.machine import haulotte
-from replay.machine_file import load_machine
+from replay.atomic_write import atomic_path
+from replay.export.formats.mcap import write_mcap
+from replay.export.formats.rosbag1 import write_ros1_bag
+from replay.export.formats.rosbag2 import write_rosbag2
+from replay.export.formats.topics import axle_joint, mission_topics, wheel_joint
+from replay.export.formats.twincat import plc_symbol, write_twincat
+from replay.machine.config import haulotte
+from replay.machine.toml_file import load_machine
 from replay.simulation.options import SimulatedMission, SimulationOptions
 from replay.simulation.run import simulate_mission
 from replay.truth import write_truth

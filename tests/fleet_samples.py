@@ -11,9 +11,9 @@ from typing import Any
 
 import numpy as np
 
-from diagnosis.audit.database import Database
-from diagnosis.audit.keys import Key
-from diagnosis.audit.places import mark_report
+from diagnosis.audit.store.database import Database
+from diagnosis.audit.store.folders import mark_report
+from diagnosis.audit.store.keys import Key
 
 WHEELS, AXLES = ("FR", "FL", "RR", "RL"), ("front", "rear")
 START_NS, DAY_NS = 1_793_000_000 * 10**9, 86_400 * 10**9

@@ -9,20 +9,20 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from diagnosis.drive import DriveData, assess_drive
-from diagnosis.drive_fit import drive_data, fit_drives
+from diagnosis.drives.assess import DriveData, assess_drive
+from diagnosis.fitting.drives import drive_data, fit_drives
 from diagnosis.pipeline import diagnose, diagnose_signals
-from diagnosis.result import MissionResult
-from replay.drive_model import DriveModel
+from diagnosis.results.result import MissionResult
+from replay.control.loop import replay_loop
 from replay.errors import LogError, NotJudged
 from replay.faults import FaultMode, FaultSpec, Side
-from replay.injection import inject_signals
-from replay.loop import replay_loop
-from replay.machine import Machine, haulotte
-from replay.machine_file import dump_machine, load_machine
+from replay.injection.inject import inject_signals
+from replay.machine.config import Machine, haulotte
+from replay.machine.drive_model import DriveModel
+from replay.machine.toml_file import dump_machine, load_machine
 from replay.mission import read_signals
-from replay.signals import Signals
-from replay.timeline import align
+from replay.signals.signal import Signals
+from replay.signals.timeline import align
 
 ROSA = """
 [machine]

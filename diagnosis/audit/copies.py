@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from diagnosis.audit.plan import Planned, known_hashes
-from diagnosis.audit.store import Store
+from diagnosis.audit.store.store import Store
 from diagnosis.audit.task import key_of
 from replay.errors import LogError
 from replay.mission import content_hash

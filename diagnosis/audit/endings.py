@@ -10,15 +10,15 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from diagnosis.audit.discover import MissionSource
-from diagnosis.audit.keys import Key
-from diagnosis.audit.outcome import READ, limit_met
-from diagnosis.audit.places import holds_report, write_whole
+from diagnosis.audit.discovery.discover import MissionSource
 from diagnosis.audit.plan import Planned
 from diagnosis.audit.runner import absolute
-from diagnosis.audit.store import Store
-from diagnosis.result import SEVERITIES
-from replay.log_files import part_of
+from diagnosis.audit.store.folders import holds_report, write_whole
+from diagnosis.audit.store.keys import Key
+from diagnosis.audit.store.outcome import READ, limit_met
+from diagnosis.audit.store.store import Store
+from diagnosis.results.result import SEVERITIES
+from replay.log.file_types import part_of
 
 FAILURES = "failures.txt"
 NEVER = "never"

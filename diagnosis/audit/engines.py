@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from importlib import import_module
 from typing import Any
 
-from diagnosis.audit.isolated import isolation
+from diagnosis.audit.isolation.run import isolation
 from replay.errors import ConfigError
 
 
@@ -48,7 +48,7 @@ def local(jobs: int, kind: str = "") -> Iterator[Engine]:
     jobs : int
         Missions at the same time.
     kind : str
-        How children start: see `diagnosis.audit.isolated.isolation`.
+        How children start: see `diagnosis.audit.isolation.run.isolation`.
     """
     children = isolation(kind)
     children.start()

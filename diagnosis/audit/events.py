@@ -10,7 +10,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import IO, Any
 
-from diagnosis.json_text import dump_json
+from diagnosis.results.json_text import dump_json
 from replay.errors import OutputError
 
 SCHEMA = "mfhca-events/1"

@@ -7,18 +7,18 @@ from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
 
-from diagnosis.audit.discover import MissionSource
-from diagnosis.audit.identity import fallback_id, given_id, stated_id
-from diagnosis.audit.keys import config_hash
-from diagnosis.audit.limits import Limits
-from diagnosis.audit.outcome import TRANSIENT, limit_met
-from diagnosis.audit.places import holds_report
-from diagnosis.audit.staging import machine_at
-from diagnosis.audit.store import Store, StoredResult
+from diagnosis.audit.discovery.discover import MissionSource
+from diagnosis.audit.discovery.identity import fallback_id, given_id, stated_id
+from diagnosis.audit.discovery.staging import machine_at
+from diagnosis.audit.isolation.limits import Limits
+from diagnosis.audit.store.folders import holds_report
+from diagnosis.audit.store.keys import config_hash
+from diagnosis.audit.store.outcome import TRANSIENT, limit_met
+from diagnosis.audit.store.store import Store, StoredResult
 from diagnosis.audit.task import key_of, sizes_of
 from replay.errors import ConfigError
-from replay.machine import Machine, haulotte
-from replay.machine_file import dump_machine
+from replay.machine.config import Machine, haulotte
+from replay.machine.toml_file import dump_machine
 
 PAPER = "paper defaults"
 _REPORT = ("report.json", "report.html")
@@ -46,9 +46,9 @@ class Asked:
     max_size_mb : float
         Size each page should keep to [MB].
     isolation : str
-        As in `diagnosis.audit.isolated.isolation`.
+        As in `diagnosis.audit.isolation.run.isolation`.
     judge : str
-        As in `diagnosis.audit.child.Work`; for tests.
+        As in `diagnosis.audit.isolation.child.Work`; for tests.
     """
 
     output: Path
@@ -59,7 +59,7 @@ class Asked:
     resume: bool = True
     max_size_mb: float = 15.0
     isolation: str = ""
-    judge: str = "diagnosis.audit.child:judge"
+    judge: str = "diagnosis.audit.isolation.child:judge"
 
 
 @dataclass(frozen=True)
@@ -77,7 +77,7 @@ class Planned:
     machine_id : str
         Identity for trends; empty: what the log and the machine file say.
     config_hash : str
-        From `diagnosis.audit.keys.config_hash`.
+        From `diagnosis.audit.store.keys.config_hash`.
     problem : str
         Why the mission cannot be audited; empty where it can.
     """

@@ -6,11 +6,11 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from diagnosis.audit.events import Tell
-from diagnosis.audit.fleet_previous import previous_report
-from diagnosis.audit.fleet_read import CALENDAR_NS
-from diagnosis.audit.keys import Key
-from diagnosis.audit.places import own_report
-from diagnosis.audit.store import Store
+from diagnosis.audit.fleet.read import CALENDAR_NS
+from diagnosis.audit.previous_mission import previous_report
+from diagnosis.audit.store.folders import own_report
+from diagnosis.audit.store.keys import Key
+from diagnosis.audit.store.store import Store
 from replay.errors import MfhcaError, OutputError
 
 _NEWEST = (

@@ -10,15 +10,15 @@ from concurrent.futures import FIRST_COMPLETED, Future, wait
 from dataclasses import dataclass, replace
 from typing import Any
 
-from diagnosis.audit.claims import Claim, claim_mission
+from diagnosis.audit.discovery.identity import fallback_id
 from diagnosis.audit.engines import Engine, is_lost
 from diagnosis.audit.events import Tell
-from diagnosis.audit.identity import fallback_id
-from diagnosis.audit.ingest import ingest
-from diagnosis.audit.outcome import TRANSIENT, Outcome
-from diagnosis.audit.places import RESULTS, Working
 from diagnosis.audit.plan import Asked, Planned, allows_more, is_done, known_hashes, stored_result
-from diagnosis.audit.store import Store, StoredResult
+from diagnosis.audit.store.claims import Claim, claim_mission
+from diagnosis.audit.store.folders import RESULTS, Working
+from diagnosis.audit.store.ingest import ingest
+from diagnosis.audit.store.outcome import TRANSIENT, Outcome
+from diagnosis.audit.store.store import Store, StoredResult
 from diagnosis.audit.task import Attempt, Task, audit_one, key_of
 
 TICK_S = 0.5

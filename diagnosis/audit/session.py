@@ -11,24 +11,24 @@ from typing import TYPE_CHECKING, Any
 
 import orjson
 
-from diagnosis.audit.claims import alone
 from diagnosis.audit.copies import without_copies
-from diagnosis.audit.discover import Discovery
+from diagnosis.audit.discovery.discover import Discovery
 from diagnosis.audit.endings import Ending, endings, write_failures
 from diagnosis.audit.engines import Engine
 from diagnosis.audit.events import Tell
-from diagnosis.audit.fleet_read import content_mark
-from diagnosis.audit.ingest import ingest
-from diagnosis.audit.places import own_report, sweep, working
+from diagnosis.audit.fleet.read import content_mark
 from diagnosis.audit.plan import Asked, Planned, is_done, plan, stored_result
 from diagnosis.audit.previous_pages import compare_newest
 from diagnosis.audit.runner import Runner, skip
-from diagnosis.audit.store import FILE_NAME, Store, StoredResult
+from diagnosis.audit.store.claims import alone
+from diagnosis.audit.store.folders import own_report, sweep, working
+from diagnosis.audit.store.ingest import ingest
+from diagnosis.audit.store.store import FILE_NAME, Store, StoredResult
 from replay.errors import LogError, OutputError
 from replay.version import __version__
 
 if TYPE_CHECKING:
-    from diagnosis.audit.fleet_trends import Axis
+    from diagnosis.audit.fleet.trends import Axis
 
 PAGE_S = 60.0
 _PAGE_SHARE = 20.0
@@ -86,7 +86,7 @@ def audit(
     Parameters
     ----------
     discovery : Discovery
-        From `diagnosis.audit.discover.discover`.
+        From `diagnosis.audit.discovery.discover.discover`.
     asked : Asked
         What is wanted.
     engine : Callable
@@ -106,7 +106,7 @@ def audit(
         Where the output cannot be written; what was kept before stays.
     """
     if baseline is not None:
-        from diagnosis.audit.fleet import check_baseline
+        from diagnosis.audit.fleet_files import check_baseline
 
         check_baseline(baseline, asked.output / FILE_NAME)
     with Store.open(asked.output / FILE_NAME) as store:
@@ -202,7 +202,7 @@ class _Page:
 
     def write(self, *, always: bool) -> None:
         """Write the page, unless the one that is there is still right."""
-        from diagnosis.audit.fleet import write_fleet
+        from diagnosis.audit.fleet_files import write_fleet
 
         if not always and self._stands():
             return

@@ -13,20 +13,20 @@ from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from diagnosis.audit import child
-from diagnosis.audit.child import Work
-from diagnosis.audit.claims import cannot_write
-from diagnosis.audit.discover import MissionSource
-from diagnosis.audit.identity import fallback_id
-from diagnosis.audit.isolated import isolation, over_time, run_isolated
-from diagnosis.audit.keys import Key, file_roles, log_hash, unhashed_log
-from diagnosis.audit.limits import Limits
-from diagnosis.audit.objects import Objects
-from diagnosis.audit.outcome import READ, Outcome
-from diagnosis.audit.places import MISSIONS, publish
-from diagnosis.audit.staging import Late, Staged, stage
+from diagnosis.audit.discovery.discover import MissionSource
+from diagnosis.audit.discovery.identity import fallback_id
+from diagnosis.audit.discovery.staging import Late, Staged, stage
+from diagnosis.audit.isolation import child
+from diagnosis.audit.isolation.child import Work
+from diagnosis.audit.isolation.limits import Limits
+from diagnosis.audit.isolation.run import isolation, over_time, run_isolated
+from diagnosis.audit.store.claims import cannot_write
+from diagnosis.audit.store.folders import MISSIONS, publish
+from diagnosis.audit.store.keys import Key, file_roles, log_hash, unhashed_log
+from diagnosis.audit.store.objects import Objects
+from diagnosis.audit.store.outcome import READ, Outcome
 from replay.errors import ConfigError, LogError, OutputError
-from replay.machine import Machine
+from replay.machine.config import Machine
 from replay.version import __version__
 
 
@@ -47,7 +47,7 @@ class Task:
     machine_id : str
         Identity for trends; empty: what the log and the machine file say.
     config_hash : str
-        From `diagnosis.audit.keys.config_hash`.
+        From `diagnosis.audit.store.keys.config_hash`.
     folder : str
         The run's working folder, on the disk of the output.
     temporary : str
@@ -65,7 +65,7 @@ class Task:
     described : tuple[str, ...]
         Names of the files in the result object.
     isolation : str
-        As in `diagnosis.audit.isolated.isolation`.
+        As in `diagnosis.audit.isolation.run.isolation`.
     judge : str
         As in `Work`; for tests.
     """
@@ -85,7 +85,7 @@ class Task:
     objects: str = ""
     described: tuple[str, ...] = ()
     isolation: str = ""
-    judge: str = "diagnosis.audit.child:judge"
+    judge: str = "diagnosis.audit.isolation.child:judge"
 
 
 @dataclass(frozen=True)

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from diagnosis.report.names import number
-from diagnosis.report.pair import Pair, sides_of
+from diagnosis.pages.labels import number
+from diagnosis.report.compared_channels import Pair, sides_of
 
 Array = NDArray[np.float64]
 

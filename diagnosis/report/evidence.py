@@ -10,11 +10,11 @@ import numpy as np
 from markupsafe import Markup
 from numpy.typing import NDArray
 
+from diagnosis.pages.labels import clock, grouped, number
+from diagnosis.report.compared_channels import Pair, pair_of, rests_on, shape_sentence
 from diagnosis.report.edges import edge_of, edge_words, time_words
-from diagnosis.report.names import clock, grouped, number
-from diagnosis.report.pair import Pair, pair_of, rests_on, shape_sentence
 from diagnosis.report.panels import course_picture, edge_picture
-from diagnosis.result import Closeups
+from diagnosis.results.result import Closeups
 
 Columns = Mapping[str, NDArray[np.floating]]
 Stretch = tuple[Columns, tuple[float, float]]

@@ -23,23 +23,24 @@ from jinja2.utils import htmlsafe_json_dumps
 from markupsafe import Markup, escape
 from numpy.typing import NDArray
 
-from diagnosis.report import names, tables
+from diagnosis.pages import labels
+from diagnosis.pages.environment import SHARED, asset, environment
+from diagnosis.pages.svg import icon, path_picture, thumbnail
+from diagnosis.report import tables
+from diagnosis.report.compared_channels import pair_of
+from diagnosis.report.driven_path import driven_path
 from diagnosis.report.evidence import evidence_of
-from diagnosis.report.figures import Columns, derived, loop_groups
-from diagnosis.report.pair import pair_of
-from diagnosis.report.path import driven_path
-from diagnosis.report.picture import machine_picture
-from diagnosis.report.plain import environment
+from diagnosis.report.machine_picture import machine_picture
+from diagnosis.report.plot_data import Axis, axis_of, blocks_of, channels_of, figures_of, packed_intervals, view, worst
+from diagnosis.report.plot_rows import Columns, derived, loop_groups
 from diagnosis.report.previous import previous_section
-from diagnosis.report.svg import icon, path_picture, thumbnail
 from diagnosis.report.timeline import timeline
-from diagnosis.report.view import Axis, axis_of, blocks_of, channels_of, figures_of, packed_intervals, view, worst
-from diagnosis.result import Closeups
+from diagnosis.results.result import Closeups
 from replay.errors import ConfigError
 
-_HERE = Path(__file__).parent
-_STYLES = ("report.css", "evidence.css", "explorer.css", "print.css")
-_SCRIPTS = ("data.js", "plot.js", "export.js", "explorer.js", "page.js")
+_ASSETS = Path(__file__).parent / "assets"
+_STYLES = (SHARED / "style.css", _ASSETS / "evidence.css", _ASSETS / "explorer.css", _ASSETS / "print.css")
+_SCRIPTS = tuple(_ASSETS / name for name in ("data.js", "plot.js", "export.js", "explorer.js", "page.js"))
 _LISTED, _THUMBNAILS, _DETAILED = 5000, 300, 120
 
 
@@ -73,10 +74,10 @@ def build_page(
     ValueError
         Where the columns differ in length or ``t`` is not uniform.
     """
-    whole = names.made_visible(report)
+    whole = labels.made_visible(report)
     every: Sequence[Mapping[str, Any]] = whole.get("intervals") or ()
     report = tables.repaired({**whole, "intervals": worst(every, _LISTED)})
-    cols = {names.visible(k): np.asarray(v) for k, v in columns.items()}
+    cols = {labels.visible(k): np.asarray(v) for k, v in columns.items()}
     axis = axis_of(cols, (report.get("log") or {}).get("rate_hz"))
     faults: Sequence[Mapping[str, Any]] = report["intervals"]
     detailed = worst(faults, _DETAILED)
@@ -88,7 +89,7 @@ def build_page(
     groups = loop_groups(machine.get("wheels") or (), machine.get("axles") or (), shown)
     near = None
     if closeups is not None:
-        samples = {names.visible(k): v for k, v in closeups.columns.items()}
+        samples = {labels.visible(k): v for k, v in closeups.columns.items()}
         near = Closeups(closeups.step, derived(samples, faults))
     plots = len(filled) > 1
     plotly, packed, version = _plotly(plotlyjs) if plots else ("", "", "none, no plots")
@@ -97,12 +98,12 @@ def build_page(
     path = driven_path(report, filled, axis.step)
     context = {
         **tables.context(report, duration),
-        "css": Markup("".join(_script(name) for name in _STYLES)),
+        "css": Markup("".join(asset(path) for path in _STYLES)),
         "timeline": timeline(report, duration, {f["id"] for f in detailed}),
         "picture": machine_picture(report),
         "path": Markup("") if path.x is None or path.y is None else path_picture(path.x, path.y, *place, detailed),
         "path_words": path.words,
-        "path_modes": [m for m in names.FAULT_MODES if any(f["mode"] == m for f in detailed)],
+        "path_modes": [m for m in labels.FAULT_MODES if any(f["mode"] == m for f in detailed)],
         "previous": previous_section(report),
         "thumbs": {f["id"]: _thumbnail(f, shown, *place) for f in worst(faults, _THUMBNAILS)} if axis.rows else {},
         "evidence": evidence_of(report, shown, place, axis.per, detailed, near),
@@ -112,7 +113,7 @@ def build_page(
         "empty": [k for k in cols if k not in filled],
         "plotly_version": version,
     }
-    head, scripts = _script("theme.js"), [_script(name) for name in _SCRIPTS]
+    head, scripts = asset(SHARED / "theme.js"), [asset(path) for path in _SCRIPTS]
     context |= {"head": Markup(head), "scripts": [Markup(s) for s in scripts], "plotly": packed}
     context["csp"] = _policy([head, *scripts, *([plotly] if plots else [])])
     intervals = packed_intervals(worst(every, _LISTED))
@@ -138,11 +139,6 @@ def _thumbnail(fault: Mapping[str, Any], columns: Columns, start: float, step: f
     if pair is None:
         return Markup("")
     return thumbnail(fault, columns[pair.measured], columns[pair.reference] if pair.reference else None, start, step)
-
-
-@lru_cache
-def _script(name: str) -> str:
-    return (_HERE / name).read_text("utf-8")
 
 
 @lru_cache
@@ -183,8 +179,8 @@ def _headed(rows: Markup, heads: Sequence[str]) -> Markup:
 
 @lru_cache
 def _environment() -> jinja2.Environment:
-    found = environment()
-    found.filters |= {"clock": names.clock, "span": names.span, "num": names.number, "state": names.state_label}
+    found = environment(_ASSETS)
+    found.filters |= {"clock": labels.clock, "span": labels.span, "num": labels.number, "state": labels.state_label}
     found.filters["headed"] = _headed
-    found.globals |= {"icon": icon, "known": names.known, "part": names.part, "title": names.fault_title}
+    found.globals |= {"icon": icon, "known": labels.known, "part": labels.part, "title": labels.fault_title}
     return found

@@ -9,10 +9,10 @@ import numpy as np
 from markupsafe import Markup
 from numpy.typing import NDArray
 
+from diagnosis.pages.axes import Frame, label, limits
+from diagnosis.pages.labels import known, number
+from diagnosis.pages.svg import extremes
 from diagnosis.report.edges import Edge, time_words
-from diagnosis.report.frame import Frame, label, limits
-from diagnosis.report.names import known, number
-from diagnosis.report.svg import extremes
 
 Array = NDArray[np.float64]
 

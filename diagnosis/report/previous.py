@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from diagnosis.compare_faults import GONE
-from diagnosis.compare_words import CHANGES, OUTCOMES, SIGNS, coverage_words, times
-from diagnosis.report import names
+from diagnosis.comparison.faults import GONE
+from diagnosis.comparison.words import CHANGES, OUTCOMES, SIGNS, coverage_words, times
+from diagnosis.pages import labels
 
 _BAD = ("new", "worse")
 
@@ -47,25 +47,25 @@ def previous_section(report: Mapping[str, Any]) -> dict[str, Any] | None:
 
 
 def _mission(m: Mapping[str, Any]) -> dict[str, str]:
-    state, words = names.VERDICTS.get(m.get("verdict", ""), names.VERDICTS["not_assessed"])
+    state, words = labels.VERDICTS.get(m.get("verdict", ""), labels.VERDICTS["not_assessed"])
     return {
         "state": state,
         "verdict": words,
         "files": " + ".join(m.get("files") or ()) or "no log named",
-        "when": f"{names.utc(m.get('start_ns'))} UTC",
-        "length": f"{names.span(m.get('duration_s') or 0.0)}, {names.span(m.get('driving_s') or 0.0)} driving",
+        "when": f"{labels.utc(m.get('start_ns'))} UTC",
+        "length": f"{labels.span(m.get('duration_s') or 0.0)}, {labels.span(m.get('driving_s') or 0.0)} driving",
     }
 
 
 def _row(c: Mapping[str, Any]) -> dict[str, Any]:
     outcome = c.get("trend") or c["status"]
     both = [c.get("older"), c.get("newer")]
-    modes = {f["mode"]: (names.known(f["mode"]), names.state_label(f["mode"], f["side"])) for f in both if f}
+    modes = {f["mode"]: (labels.known(f["mode"]), labels.state_label(f["mode"], f["side"])) for f in both if f}
     return {
         "sign": SIGNS.get(outcome, "·"),
         "outcome": OUTCOMES.get(outcome, outcome),
         "bad": outcome in _BAD,
-        "part": f"{c['component']} {names.part(c['kind'], c['side'])}",
+        "part": f"{c['component']} {labels.part(c['kind'], c['side'])}",
         "modes": list(modes.values()),
         "cells": [_found(f) for f in both],
         "ids": [list(f["ids"][:3]) if f else [] for f in both],
@@ -89,7 +89,7 @@ def _epsilon(e: Mapping[str, float]) -> str:
 
 def _coverage(c: Mapping[str, Any]) -> dict[str, Any]:
     return {
-        "part": f"{c['component']} {names.part(c['kind'], c['side'])}",
+        "part": f"{c['component']} {labels.part(c['kind'], c['side'])}",
         "lost": c["change"] == "lost",
         "words": coverage_words(c),
         "cells": [_judged(c.get("older")), _judged(c.get("newer"))],
@@ -115,7 +115,7 @@ def _loss(x: Mapping[str, Any], report: Mapping[str, Any]) -> dict[str, Any]:
     kind = "steer" if x["component"] in axles else "wheel"
     change = x["newer"]["value"] - x["older"]["value"]
     return {
-        "part": f"{x['component']} {names.part(kind, x['side'])}",
-        "cells": [names.bounded(x["older"]), names.bounded(x["newer"])],
+        "part": f"{x['component']} {labels.part(kind, x['side'])}",
+        "cells": [labels.bounded(x["older"]), labels.bounded(x["newer"])],
         "change": f"{change:+.3f}".replace("-", "−"),
     }

@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from diagnosis.report.edges import time_words
-from diagnosis.report.names import (
+from diagnosis.pages.labels import (
     FAULT_MODES,
     UNDECIDED,
     VERDICTS,
@@ -20,9 +19,10 @@ from diagnosis.report.names import (
     state_label,
     utc,
 )
-from diagnosis.report.pair import tier_words
-from diagnosis.report.picture import judged_sides
-from diagnosis.report.sureness import headline, judged, sure_of, sure_of_verdict
+from diagnosis.report.compared_channels import tier_words
+from diagnosis.report.confidence import headline, judged, sure_of, sure_of_verdict
+from diagnosis.report.edges import time_words
+from diagnosis.report.machine_picture import judged_sides
 from diagnosis.report.timeline import kind_of
 
 _SHOWN = 0.001

@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from diagnosis.report.names import FAULT_MODES, clock, fault_title, known, part, span, state_label
-from diagnosis.report.sureness import known_sides
+from diagnosis.pages.labels import FAULT_MODES, clock, fault_title, known, part, span, state_label
+from diagnosis.report.confidence import known_sides
 
 _BUCKETS = 2000
 _GONE = ("stuck", "no_signal")

@@ -6,12 +6,12 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 
 from replay.errors import ConfigError
-from replay.export.mcap_log import write_mcap
-from replay.export.ros1_log import write_ros1_bag
-from replay.export.rosbag2_log import write_rosbag2
-from replay.export.table_log import write_csv, write_parquet
-from replay.export.topics import mission_topics
-from replay.export.twincat_log import write_twincat
+from replay.export.formats.mcap import write_mcap
+from replay.export.formats.rosbag1 import write_ros1_bag
+from replay.export.formats.rosbag2 import write_rosbag2
+from replay.export.formats.tables import write_csv, write_parquet
+from replay.export.formats.topics import mission_topics
+from replay.export.formats.twincat import write_twincat
 from replay.simulation.options import SimulatedMission
 
 _WRITERS: Mapping[str, Callable[[SimulatedMission, Path], None]] = {

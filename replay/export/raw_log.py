@@ -21,12 +21,12 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
+from replay.arrays.spill import release
 from replay.errors import LogError, OutputError
+from replay.log.raw_log import Channel, RawLog, Window
+from replay.log.source_options import SourceOptions
 from replay.mission import content_hash
-from replay.rawlog import Channel, RawLog, Window
 from replay.readers.registry import read_log, summarise_log
-from replay.sources import SourceOptions
-from replay.spill import release
 
 INDEX = "index.json"
 SCHEMA = "mfhca-raw/1"

@@ -16,18 +16,18 @@ import pyarrow.csv
 import pyarrow.parquet
 from numpy.typing import NDArray
 
+from replay.atomic_write import atomic_path
 from replay.errors import ConfigError, OutputError
-from replay.export.layout import Dialect, Layout, TopicBatch
-from replay.export.mcap_log import write_mcap
-from replay.export.ros1_log import write_ros1_bag
-from replay.export.rosbag2_log import write_rosbag2
-from replay.export.twincat_log import ScopeGroup, write_scope
-from replay.files import atomic_path
-from replay.mapping import sparse_rows
-from replay.mapping_rules import SI_UNITS
-from replay.open_loop import COLUMN, TOPIC
-from replay.signals import Signals
-from replay.units import quantity_of
+from replay.export.formats.mcap import write_mcap
+from replay.export.formats.message_layout import Dialect, Layout, TopicBatch
+from replay.export.formats.rosbag1 import write_ros1_bag
+from replay.export.formats.rosbag2 import write_rosbag2
+from replay.export.formats.twincat import ScopeGroup, write_scope
+from replay.log.open_loop import COLUMN, TOPIC
+from replay.machine.units import quantity_of
+from replay.signals.mapping import sparse_rows
+from replay.signals.rules import SI_UNITS
+from replay.signals.signal import Signals
 
 RECORDING_FORMATS = ("mcap", "bag", "rosbag2", "twincat", "csv", "parquet")
 _LAST_ROS_NS = 2**32 * 1_000_000_000

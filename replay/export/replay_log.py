@@ -12,16 +12,16 @@ import pyarrow.csv
 import pyarrow.parquet
 from numpy.typing import NDArray
 
-from replay.columns import replay_columns
+from replay.atomic_write import atomic_path
+from replay.control.loop import Replay
+from replay.control.loop_columns import replay_columns
 from replay.errors import ConfigError, OutputError
-from replay.export.layout import Layout, TopicBatch
-from replay.export.mcap_log import write_mcap
-from replay.files import atomic_path
-from replay.inspect_mcap import mcap_index
-from replay.loop import Replay
-from replay.machine import Machine
-from replay.open_loop import COLUMN
-from replay.timeline import Timeline
+from replay.export.formats.mcap import write_mcap
+from replay.export.formats.message_layout import Layout, TopicBatch
+from replay.inspection.mcap_index import mcap_index
+from replay.log.open_loop import COLUMN
+from replay.machine.config import Machine
+from replay.signals.timeline import Timeline
 
 REPLAY_FORMATS = ("parquet", "csv", "mcap")
 _LAST_ROS_NS = 2**32 * 1_000_000_000
@@ -64,7 +64,7 @@ def format_of(path: Path) -> str:
 def write_replay(path: Path, timeline: Timeline, replay: Replay, machine: Machine, format: str) -> tuple[str, ...]:  # noqa: A002
     """Write the recorded signals and the replayed loop.
 
-    Tables hold ``stamp_ns`` and the columns of `replay.columns.replay_columns`. MCAP holds a JointState topic
+    Tables hold ``stamp_ns`` and the columns of `replay.control.loop_columns.replay_columns`. MCAP holds a JointState topic
     ``/mfhca/<quantity>`` for each replayed quantity, named by wheel or axle, its value in ``position``; log time and
     header stamp are the time of the step on the log's own clock. NaN stays NaN.
 

@@ -6,18 +6,18 @@ from collections.abc import Collection
 from pathlib import Path
 
 from replay.errors import LogError
-from replay.rawlog import Clock, LogSummary, RawLog, Window
-from replay.readers.base import Reader
-from replay.readers.mcap import McapReader
-from replay.readers.parquet_table import ParquetReader
-from replay.readers.regular import check_regular
-from replay.readers.ros1_bag import Ros1BagReader
-from replay.readers.rosbag2 import Rosbag2Reader
-from replay.readers.svdx import SvdxReader
-from replay.readers.table import CsvReader
-from replay.readers.tdms import TdmsReader
-from replay.readers.twincat_csv import TwincatCsvReader
-from replay.sources import SourceOptions
+from replay.log.file_types import check_regular
+from replay.log.raw_log import Clock, LogSummary, RawLog, Window
+from replay.log.source_options import SourceOptions
+from replay.readers.common.protocol import Reader
+from replay.readers.mcap.reader import McapReader
+from replay.readers.rosbag1.reader import Ros1BagReader
+from replay.readers.rosbag2.reader import Rosbag2Reader
+from replay.readers.tables.csv_reader import CsvReader
+from replay.readers.tables.parquet_reader import ParquetReader
+from replay.readers.tables.tdms_reader import TdmsReader
+from replay.readers.twincat.svdx_reader import SvdxReader
+from replay.readers.twincat.text_reader import TwincatCsvReader
 
 # In order of certainty: magic bytes first, text tables last.
 READERS: tuple[Reader, ...] = (

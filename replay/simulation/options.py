@@ -9,10 +9,9 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from replay.checks import check_range
-from replay.errors import ConfigError
+from replay.errors import ConfigError, check_range
 from replay.faults import FaultSpec, Side
-from replay.machine import Machine, haulotte
+from replay.machine.config import Machine, haulotte
 from replay.simulation.plant_options import PlantOptions
 from replay.truth import MissionTruth
 
@@ -44,7 +43,7 @@ class SimulationOptions:
     coupling : str
         ``ground`` (wheels share the body through their tyres) or ``free`` (wheels off the ground).
     law : str
-        As in `replay.machine.Control`; ``p`` is the proportional part alone, ``event_reset`` is ``signed`` with Ψ̂ set
+        As in `replay.machine.config.Control`; ``p`` is the proportional part alone, ``event_reset`` is ``signed`` with Ψ̂ set
         anew wherever |e| jumps.
     zeta : float or None
         Forcing of Ψ̂ [s/m²]; None: the machine's for ``opposed``, else 0 (L16 (13) as printed).

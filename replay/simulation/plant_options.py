@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from replay.checks import check_range
+from replay.errors import check_range
 
 
 @dataclass(frozen=True)

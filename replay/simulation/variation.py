@@ -13,7 +13,7 @@ from typing import Literal
 import numpy as np
 
 from replay.errors import ConfigError
-from replay.machine import haulotte
+from replay.machine.config import haulotte
 from replay.simulation.options import Scenario, SimulatedLaw, SimulationOptions
 from replay.simulation.plant_options import PlantOptions
 

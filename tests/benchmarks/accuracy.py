@@ -21,17 +21,17 @@ from typing import Any
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
-from diagnosis.evaluate import evaluate_report
-from diagnosis.excitation import speeds_of
-from diagnosis.outcomes import Counts, add
+from diagnosis.evaluation.counts import Counts, add
+from diagnosis.evaluation.evaluate import evaluate_report
+from diagnosis.evaluation.excitation import speeds_of
+from diagnosis.evaluation.scores import figures
 from diagnosis.pipeline import diagnose_signals
-from diagnosis.scores import figures
 from replay.errors import MfhcaError
-from replay.machine import haulotte
-from replay.signals import Signal, Signals
+from replay.log.source_options import SignalSource
+from replay.machine.config import haulotte
+from replay.signals.signal import Signal, Signals
 from replay.simulation.options import SimulatedMission, SimulationOptions
 from replay.simulation.run import simulate_mission
-from replay.sources import SignalSource
 
 TUNING = range(20)
 REPORTING = range(2000, 2040)

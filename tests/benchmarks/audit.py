@@ -31,12 +31,12 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT))
 
-from diagnosis.audit import child  # noqa: E402
-from diagnosis.audit.child import Work  # noqa: E402
-from diagnosis.audit.isolated import ForkServer, run_isolated  # noqa: E402
-from diagnosis.audit.limits import Limits  # noqa: E402
+from diagnosis.audit.isolation import child  # noqa: E402
+from diagnosis.audit.isolation.child import Work  # noqa: E402
+from diagnosis.audit.isolation.limits import Limits  # noqa: E402
+from diagnosis.audit.isolation.run import ForkServer, run_isolated  # noqa: E402
 from replay.export.mission import write_mission  # noqa: E402
-from replay.machine import haulotte  # noqa: E402
+from replay.machine.config import haulotte  # noqa: E402
 from replay.simulation.options import SimulationOptions  # noqa: E402
 from replay.simulation.run import simulate_mission  # noqa: E402
 

@@ -1,6 +1,6 @@
 """How often findings of direct evidence are right, by stated probability and length: `python tests/benchmarks/calibrate_direct.py`.
 
-Tuning missions alone. `_LAPSE` and `_COARSE_S` of `diagnosis.direct` follow from the last two columns: the share of
+Tuning missions alone. `_LAPSE` and `_COARSE_S` of `diagnosis.direct.assess` follow from the last two columns: the share of
 findings at the raw rate that are not what they seem, and the length at which half of the valve findings in a log too slow
 for its commands are.
 """
@@ -16,7 +16,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
 from accuracy import Task, run_task
 
-from diagnosis.outcomes import ReportOutcome
+from diagnosis.evaluation.counts import ReportOutcome
 
 LENGTHS = (0.0, 0.3, 1.0, 2.0, 4.0, float("inf"))
 BANDS = (0.0, 0.45, 0.55, 0.9, 0.98, 1.01)

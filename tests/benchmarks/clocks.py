@@ -19,11 +19,11 @@ from numpy.typing import NDArray
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
-from replay.clock_align import estimate
-from replay.signals import Signal
+from replay.clocks.align import estimate
+from replay.log.source_options import SignalSource
+from replay.signals.signal import Signal
 from replay.simulation.options import SimulatedMission, SimulationOptions
 from replay.simulation.run import simulate_mission
-from replay.sources import SignalSource
 
 SHARED = ("speeds", "commands", "both", "one speed")
 

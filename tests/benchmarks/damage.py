@@ -33,10 +33,10 @@ from rosbags.rosbag2 import ReaderError
 from rosbags.typesys import Stores, get_typestore
 
 from replay.errors import LogError
-from replay.readers import mcap as ours
-from replay.readers.clocks import Report
+from replay.log.reading_notes import Report
+from replay.log.source_options import SourceOptions
+from replay.readers.mcap import reader as ours
 from replay.readers.registry import read_log, summarise_log
-from replay.sources import SourceOptions
 
 STORE = get_typestore(Stores.LATEST)
 TOPICS = (("/speed", "std_msgs/msg/Float64", 1), ("/scan", "std_msgs/msg/Float64MultiArray", 5))

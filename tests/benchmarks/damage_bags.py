@@ -28,8 +28,8 @@ from rosbags.rosbag2 import Writer as Writer2
 from rosbags.typesys import Stores, get_typestore
 
 from replay.errors import LogError
+from replay.log.source_options import SourceOptions
 from replay.readers.registry import read_log, summarise_log
-from replay.sources import SourceOptions
 
 ROS1, ROS2 = get_typestore(Stores.ROS1_NOETIC), get_typestore(Stores.LATEST)
 T0 = 1_700_000_000_000_000_000

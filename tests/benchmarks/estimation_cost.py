@@ -20,15 +20,15 @@ sys.path.insert(0, str(Path(__file__).resolve().parent))
 
 from accuracy import EVIDENCE, signals_of
 
-from diagnosis import components
-from diagnosis.channels import alive_sources
-from diagnosis.decide import intervals_of
-from diagnosis.steering import assess_steering
-from replay.loop import replay_loop
-from replay.machine import haulotte
+from diagnosis import assess
+from diagnosis.channels.liveness import alive_sources
+from diagnosis.decision.decide import intervals_of
+from diagnosis.steering.assess import assess_steering
+from replay.control.loop import replay_loop
+from replay.machine.config import haulotte
+from replay.signals.timeline import align
 from replay.simulation.options import SimulationOptions
 from replay.simulation.run import simulate_mission
-from replay.timeline import align
 
 
 def silent(_: str) -> None:
@@ -56,7 +56,7 @@ def main() -> None:
                 whole, axles = [], []
                 for _ in range(asked.runs + 1):
                     begin = time.process_time()
-                    found = components.assess_components(timeline, replay, machine, machine.wheels, silent)
+                    found = assess.assess_components(timeline, replay, machine, machine.wheels, silent)
                     intervals_of(found.assessments, machine.axles, timeline.start_ns, timeline.step_ns, machine.limits)
                     whole.append(time.process_time() - begin)
                     begin = time.process_time()

@@ -24,10 +24,10 @@ from accuracy import EVIDENCE, number
 from scipy.special import gammaincinv
 from variation import recorded_signals
 
-from diagnosis.evaluate import evaluate_report
+from diagnosis.evaluation.evaluate import evaluate_report
 from diagnosis.pipeline import diagnose_signals
 from replay.errors import MfhcaError
-from replay.machine import haulotte
+from replay.machine.config import haulotte
 from replay.simulation.options import SimulationOptions
 from replay.simulation.plant_options import PlantOptions
 from replay.simulation.run import simulate_mission

@@ -16,15 +16,15 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
 import numpy as np
 
-from diagnosis.fit import fit_missions
-from replay.machine import haulotte
+from diagnosis.fitting.missions import fit_missions
+from replay.log.source_options import SignalSource
+from replay.machine.config import haulotte
 from replay.mission import Mission
-from replay.signals import Signal, Signals
+from replay.signals.signal import Signal, Signals
+from replay.signals.timeline import align
 from replay.simulation.options import SimulationOptions
 from replay.simulation.plant_options import PlantOptions
 from replay.simulation.run import simulate_mission
-from replay.sources import SignalSource
-from replay.timeline import align
 
 TRUTH = {"K": 2.4, "tau": 0.25, "dead": 0.05, "offset": 0.2, "lambda": 1.0}
 

@@ -14,9 +14,9 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
-from diagnosis.audit.fleet import load_fleet, write_fleet
-from diagnosis.audit.fleet_document import fleet_document
-from diagnosis.report.fleet_page import build_fleet_page
+from diagnosis.audit.fleet.document import fleet_document
+from diagnosis.audit.fleet.page.page import build_fleet_page
+from diagnosis.audit.fleet_files import load_fleet, write_fleet
 from tests import fleet_samples as samples
 
 

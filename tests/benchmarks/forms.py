@@ -19,8 +19,8 @@ from google.protobuf import descriptor_pb2, descriptor_pool, message_factory, te
 from mcap.reader import make_reader
 from mcap.writer import Writer
 
+from replay.log.source_options import SourceOptions
 from replay.readers.registry import read_log
-from replay.sources import SourceOptions
 
 NAMES = ["front_left", "front_right", "rear_left", "rear_right", "front_steering", "rear_steering"]
 FILE = """

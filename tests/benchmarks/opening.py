@@ -23,12 +23,13 @@ sys.path[:0] = [str(ROOT), str(Path(__file__).resolve().parent)]
 import numpy as np  # noqa: E402
 from reading_logs import log_at  # noqa: E402
 
-from replay.readers import mcap, mcap_scan  # noqa: E402
-from replay.readers.clocks import Report  # noqa: E402
-from replay.readers.mcap_chunk import open_chunk  # noqa: E402
-from replay.readers.mcap_open import open_file  # noqa: E402
+from replay.log.reading_notes import Report  # noqa: E402
+from replay.log.source_options import SourceOptions  # noqa: E402
+from replay.readers.mcap import reader as ours  # noqa: E402
+from replay.readers.mcap.chunk import open_chunk  # noqa: E402
+from replay.readers.mcap.opening import open_file  # noqa: E402
+from replay.readers.mcap.scan import Tally, walk  # noqa: E402
 from replay.readers.registry import read_log, summarise_log  # noqa: E402
-from replay.sources import SourceOptions  # noqa: E402
 
 TOPICS = 40
 TOPIC = "/cmd_vel_stamped"
@@ -112,7 +113,7 @@ def places(path: Path) -> dict[str, Callable[[], Any]]:
     assert chunk is not None
     data = chunk.data.copy()
     first, after = (int(n) for n in file.chunks[row : row + 2, :1].ravel())
-    rows = mcap_scan.walk(file.data, first, after, np.zeros(1 << 16, np.uint8), mcap_scan.Tally()).rows[1:]
+    rows = walk(file.data, first, after, np.zeros(1 << 16, np.uint8), Tally()).rows[1:]
 
     def scan() -> int:
         census = file.scanner.census(data, 0, len(data))
@@ -147,9 +148,9 @@ def main() -> None:
     rows, options = [], SourceOptions()
     path = large(choice.folder, choice.gigabytes)
     size = f"{path.stat().st_size / 1e9:.2f} GB"
-    rows.append(timed(f"open {size} by its summary", lambda: mcap.open_files([path], path, Report()), choice.repeats))
+    rows.append(timed(f"open {size} by its summary", lambda: ours.open_files([path], path, Report()), choice.repeats))
     rows.append(timed(f"summarise {size}", lambda: summarise_log(path, options), choice.repeats))
-    rows.append(timed(f"walk {size}", lambda: mcap.open_files([path], path, Report(), walk=True), choice.repeats))
+    rows.append(timed(f"walk {size}", lambda: ours.open_files([path], path, Report(), walk=True), choice.repeats))
     log = log_at(choice.folder, "mcap-zstd", choice.duration)
     begin = summarise_log(log, options).start_ns + int(choice.duration / 2) * 10**9
     for span in (0.5, 5.0, 50.0):

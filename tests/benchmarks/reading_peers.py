@@ -54,8 +54,8 @@ def floor(path: Path, crc: bool) -> Callable[[], None]:
 
 
 def ours(path: Path) -> Callable[[], Any]:
+    from replay.log.source_options import SourceOptions
     from replay.readers.registry import open_log
-    from replay.sources import SourceOptions
 
     reader = open_log(path)
     return lambda: reader.read(path, SourceOptions())

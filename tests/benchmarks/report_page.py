@@ -21,10 +21,10 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
-from diagnosis.pictured import steps_around
 from diagnosis.report.page import build_page
-from diagnosis.result import Closeups
-from replay.envelope import bucket_of, envelope, rows_of, step_of
+from diagnosis.results.evidence_columns import steps_around
+from diagnosis.results.result import Closeups
+from replay.arrays.envelope import bucket_of, envelope, rows_of, step_of
 from tests import report_samples as samples
 from tests.browser.evidence_samples import many_faults
 

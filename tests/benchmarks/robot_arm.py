@@ -19,8 +19,8 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
 from diagnosis.pipeline import diagnose
-from replay.machine import Machine
-from replay.machine_file import load_machine
+from replay.machine.config import Machine
+from replay.machine.toml_file import load_machine
 
 ROOT = Path(__file__).resolve().parents[2]
 MACHINE = """

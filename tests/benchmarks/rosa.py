@@ -4,10 +4,10 @@ The data are 82 runs of the public RoSA set: a motor with encoder in a speed loo
 damping (D, 13), lateral load (N, 13) and vibration (V, 13). Of each folder every third file in order of name is for
 tuning and for the drive's model; figures come from the others (``--part reporting``, the default).
 
-1. Faults of L4 are written into the healthy runs (`replay.injection`): the recorded controller never met them. One fault
+1. Faults of L4 are written into the healthy runs (`replay.injection.inject`): the recorded controller never met them. One fault
    per run and row of the table, from 40 % of the run's longest gap-free stretch on, for 8 s or 35 % of it. Stuck at the
    last value; no signal as 0; noisy with white sat of 200 ± 100 (the commands lie between 100 and 500).
-2. The rig's own faults by step of one second, scored by the expected extra load of `diagnosis.drive_load`.
+2. The rig's own faults by step of one second, scored by the expected extra load of `diagnosis.drives.load`.
 
 Units are the rig's own. The data are looked for in the folder named by MFHCA_REFERENCE_DATA (default ``../shared``).
 """
@@ -29,19 +29,19 @@ from scipy.stats import chi2, rankdata
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
-from diagnosis.assessment import CODE, STATES, Assessment
-from diagnosis.drive import DriveData, assess_drive
-from diagnosis.drive_echo import stretches
-from diagnosis.drive_fit import drive_data, identify_drive
-from diagnosis.drive_load import track_load
-from replay.drive_model import DriveModel
+from diagnosis.drives.assess import DriveData, assess_drive
+from diagnosis.drives.echo import stretches
+from diagnosis.drives.load import track_load
+from diagnosis.fitting.drives import drive_data, identify_drive
+from diagnosis.results.assessment import CODE, STATES, Assessment
 from replay.faults import FaultMode, FaultSpec, Side, State
-from replay.injection import inject_signals
-from replay.machine import Machine
-from replay.machine_file import load_machine
+from replay.injection.inject import inject_signals
+from replay.machine.config import Machine
+from replay.machine.drive_model import DriveModel
+from replay.machine.toml_file import load_machine
 from replay.mission import read_signals
-from replay.signals import Signals
-from replay.timeline import Timeline, align
+from replay.signals.signal import Signals
+from replay.signals.timeline import Timeline, align
 
 Array = NDArray[np.float64]
 

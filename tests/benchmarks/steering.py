@@ -19,20 +19,20 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
-from diagnosis.channels import alive_sources
-from diagnosis.decide import intervals_of, spans_of
-from diagnosis.evaluate import evaluate_report
-from diagnosis.outcomes import COLUMNS, ROWS, Counts, add
-from diagnosis.result import to_json
-from diagnosis.scores import figures
-from diagnosis.steering import SteeringResult, assess_steering
-from replay.loop import replay_loop
-from replay.machine import haulotte
-from replay.signals import Signal, Signals
+from diagnosis.channels.liveness import alive_sources
+from diagnosis.decision.decide import intervals_of, spans_of
+from diagnosis.evaluation.counts import COLUMNS, ROWS, Counts, add
+from diagnosis.evaluation.evaluate import evaluate_report
+from diagnosis.evaluation.scores import figures
+from diagnosis.results.result import to_json
+from diagnosis.steering.assess import SteeringResult, assess_steering
+from replay.control.loop import replay_loop
+from replay.log.source_options import SignalSource
+from replay.machine.config import haulotte
+from replay.signals.signal import Signal, Signals
+from replay.signals.timeline import Timeline, align
 from replay.simulation.options import PlantOptions, SimulatedMission, SimulationOptions
 from replay.simulation.run import simulate_mission
-from replay.sources import SignalSource
-from replay.timeline import Timeline, align
 
 FIRST = {"tuning": 0, "reporting": 2000}
 _LACKS: dict[str, tuple[str, ...]] = {

@@ -18,11 +18,11 @@ from typing import Any
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
-from diagnosis.audit.discover import MissionSource
-from diagnosis.audit.ingest import ingest
-from diagnosis.audit.keys import Key
-from diagnosis.audit.outcome import Outcome
-from diagnosis.audit.store import Store
+from diagnosis.audit.discovery.discover import MissionSource
+from diagnosis.audit.store.ingest import ingest
+from diagnosis.audit.store.keys import Key
+from diagnosis.audit.store.outcome import Outcome
+from diagnosis.audit.store.store import Store
 
 _ROWS = 56
 _COMPONENTS = ("FR", "FL", "RR", "RL", "front", "rear")

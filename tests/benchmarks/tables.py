@@ -33,9 +33,9 @@ import pyarrow as pa  # noqa: E402
 import pyarrow.csv as pa_csv  # noqa: E402
 import pyarrow.parquet as pq  # noqa: E402
 
-from replay.export.twincat_log import ScopeGroup, write_scope  # noqa: E402
+from replay.export.formats.twincat import ScopeGroup, write_scope  # noqa: E402
+from replay.log.source_options import SourceOptions  # noqa: E402
 from replay.readers.registry import open_log, read_log, summarise_log  # noqa: E402
-from replay.sources import SourceOptions  # noqa: E402
 
 KINDS = ("scope_tool", "scope_dialog", "plain", "comma", "short", "gzip", "zstd", "parquet")
 _ONE_RUN = """

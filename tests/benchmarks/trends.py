@@ -17,7 +17,7 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
-from diagnosis.audit.trend import Series, Trend, trend_of
+from diagnosis.audit.trends.trend import Series, Trend, trend_of
 
 LIMIT = 0.1
 KINDS = ("line", "outliers", "repair", "repair and outliers", "bend", "flat", "heavy tails")

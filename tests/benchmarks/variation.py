@@ -21,17 +21,17 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
 from accuracy import EVIDENCE, number, signals_of
 
-from diagnosis.evaluate import evaluate_report
-from diagnosis.outcomes import Counts, FaultOutcome, add
+from diagnosis.evaluation.counts import Counts, FaultOutcome, add
+from diagnosis.evaluation.evaluate import evaluate_report
+from diagnosis.evaluation.scores import figures
 from diagnosis.pipeline import diagnose_signals
-from diagnosis.scores import figures
 from replay.errors import MfhcaError
-from replay.machine import haulotte
-from replay.signals import Signals
+from replay.log.source_options import SignalSource
+from replay.machine.config import haulotte
+from replay.signals.signal import Signals
 from replay.simulation.options import SimulatedMission, SimulationOptions, channel_group
 from replay.simulation.run import simulate_mission
 from replay.simulation.variation import POOLS, Kind, varied_options
-from replay.sources import SignalSource
 
 _RATES = ((0.0, 100.0), (100.0, 300.0), (300.0, 1000.0))
 _ONSETS = ("at once", "growing", "from the first sample")

@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 
 from diagnosis.report.page import build_page
-from diagnosis.result import Closeups
+from diagnosis.results.result import Closeups
 from tests import report_samples as samples
 from tests.browser import evidence_samples
 

@@ -6,9 +6,9 @@ from typing import Any
 
 import numpy as np
 
-from diagnosis.pictured import steps_around
-from diagnosis.result import Closeups
-from replay.envelope import envelope
+from diagnosis.results.evidence_columns import steps_around
+from diagnosis.results.result import Closeups
+from replay.arrays.envelope import envelope
 from tests import report_samples as samples
 
 SPIKES = (32.5, 77.7)

@@ -10,7 +10,7 @@ from urllib.parse import unquote, urlparse
 
 import pytest
 
-from diagnosis.audit.fleet import write_fleet
+from diagnosis.audit.fleet_files import write_fleet
 from tests import fleet_samples as samples
 
 playwright = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")

@@ -14,8 +14,9 @@ import pytest
 import typer
 from typer.testing import CliRunner
 
-from cli import interrupts, main
+from cli import main
 from cli.main import app, run
+from cli.terminal import interrupts
 from replay.errors import ConfigError, LogError, NotJudged, OutputError
 
 MFHCA = [sys.executable, "-m", "cli.main"]
@@ -26,7 +27,7 @@ def crash_with(monkeypatch: pytest.MonkeyPatch, error: BaseException) -> None:
     def show(*_: object) -> None:
         raise error
 
-    monkeypatch.setattr("cli.configure.machine_of", show)
+    monkeypatch.setattr("cli.commands.config.machine_of", show)
 
 
 def only_line(text: str) -> str:
@@ -195,7 +196,7 @@ def test_an_interrupt_ends_with_130_and_leaves_nothing_behind(asked: signal.Sign
 _SWALLOWS = """
 import os, signal, sys, ctypes
 from pathlib import Path
-import cli.diagnose
+import cli.commands.diagnose
 from diagnosis import pipeline
 from cli.main import main
 
@@ -233,7 +234,7 @@ def test_an_interrupt_swallowed_in_the_last_stage_is_told_at_the_end(
             interrupts._interrupt(signal.SIGINT, None)
         raise typer.Exit(1)
 
-    monkeypatch.setattr("cli.configure.machine_of", swallowed)
+    monkeypatch.setattr("cli.commands.config.machine_of", swallowed)
     assert run(["config", "show"]) == 130
     assert only_line(capsys.readouterr().err) == "error: interrupted"
     monkeypatch.undo()

@@ -9,10 +9,10 @@ import pytest
 from numpy.testing import assert_allclose
 
 from diagnosis.pipeline import diagnose
-from diagnosis.result import MissionResult
-from replay import envelope, spill
+from diagnosis.results.result import MissionResult
+from replay.arrays import envelope, spill
 from replay.export.mission import write_mission
-from replay.machine import haulotte
+from replay.machine.config import haulotte
 from replay.simulation.options import SimulationOptions
 from replay.simulation.run import simulate_mission
 

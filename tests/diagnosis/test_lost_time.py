@@ -7,13 +7,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from diagnosis.assessment import CODE, Assessment, Finding
-from diagnosis.holes import holes_of, without_holes
+from diagnosis.channels.recording_gaps import holes_of, without_holes
 from diagnosis.pipeline import diagnose
-from replay import spill
+from diagnosis.results.assessment import CODE, Assessment, Finding
+from replay.arrays import spill
 from replay.faults import FaultMode, Side, State
-from replay.machine import haulotte
-from replay.timeline import Timeline
+from replay.machine.config import haulotte
+from replay.signals.timeline import Timeline
 
 SAMPLES = Path(__file__).resolve().parents[2] / "sample_logs"
 MS = 1_000_000

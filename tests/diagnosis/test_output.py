@@ -11,15 +11,15 @@ import pytest
 
 from diagnosis.output import load_report, rebuild, write_result
 from diagnosis.pipeline import diagnose_mission
-from diagnosis.result import SCHEMA, MissionResult
+from diagnosis.results.result import SCHEMA, MissionResult
 from replay.errors import LogError, OutputError
-from replay.machine import haulotte
+from replay.log.source_options import SignalSource
+from replay.machine.config import haulotte
 from replay.mission import Mission
-from replay.signals import Signal, Signals
+from replay.signals.signal import Signal, Signals
+from replay.signals.timeline import align
 from replay.simulation.options import SimulationOptions
 from replay.simulation.run import simulate_mission
-from replay.sources import SignalSource
-from replay.timeline import align
 
 
 @pytest.fixture(scope="module")

@@ -17,17 +17,17 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 import diagnosis
 from diagnosis.pipeline import diagnose, diagnose_mission
-from diagnosis.result import MissionResult
+from diagnosis.results.result import MissionResult
 from replay.errors import ConfigError, LogError, NotJudged
 from replay.export.mission import write_mission
 from replay.faults import FaultMode, FaultSpec, Side, State
-from replay.machine import Machine, haulotte
+from replay.log.source_options import SignalSource
+from replay.machine.config import Machine, haulotte
 from replay.mission import Mission
-from replay.signals import Signal, Signals
+from replay.signals.signal import Signal, Signals
+from replay.signals.timeline import align
 from replay.simulation.options import EvidenceLevel, SimulatedMission, SimulationOptions
 from replay.simulation.run import simulate_mission
-from replay.sources import SignalSource
-from replay.timeline import align
 
 PAPER = haulotte()
 FAULTS = (

@@ -7,8 +7,8 @@ import pandas as pd
 from numpy.testing import assert_array_equal
 
 from replay.frames import log_frames, timeline_frame
-from replay.rawlog import Channel, LogSummary, RawLog
-from replay.timeline import Timeline
+from replay.log.raw_log import Channel, LogSummary, RawLog
+from replay.signals.timeline import Timeline
 
 STAMPS = np.array([0, 1, 2], np.int64) * 500_000_000
 

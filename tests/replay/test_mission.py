@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 from replay.errors import LogError
-from replay.machine import haulotte
+from replay.log.source_options import SourceOptions
+from replay.machine.config import haulotte
 from replay.mission import content_hash, load_mission, read_signals, source_options
-from replay.sources import SourceOptions
 
 START = 1_760_000_000_000_000_000
 

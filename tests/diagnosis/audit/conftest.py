@@ -8,9 +8,9 @@ from typing import Any
 
 import pytest
 
-from diagnosis.audit.discover import MissionSource
-from diagnosis.audit.isolated import ForkServer, Isolation
-from diagnosis.audit.keys import Key, config_hash, log_hash
+from diagnosis.audit.discovery.discover import MissionSource
+from diagnosis.audit.isolation.run import ForkServer, Isolation
+from diagnosis.audit.store.keys import Key, config_hash, log_hash
 from replay.export.mission import write_mission
 from replay.simulation.options import SimulationOptions
 from replay.simulation.run import simulate_mission

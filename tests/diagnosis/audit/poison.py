@@ -12,7 +12,7 @@ import time
 from pathlib import Path
 from typing import Any
 
-from diagnosis.audit.child import REPORT, Work
+from diagnosis.audit.isolation.child import REPORT, Work
 from replay.errors import LogError, NotJudged, OutputError
 
 

@@ -7,10 +7,10 @@ from contextlib import AbstractContextManager
 from pathlib import Path
 
 from diagnosis.audit import engines
-from diagnosis.audit.discover import Discovery, MissionSource
+from diagnosis.audit.discovery.discover import Discovery, MissionSource
 from diagnosis.audit.endings import Ending
 from diagnosis.audit.engines import Engine
-from diagnosis.audit.limits import Limits
+from diagnosis.audit.isolation.limits import Limits
 from diagnosis.audit.plan import Asked
 from diagnosis.audit.session import audit
 

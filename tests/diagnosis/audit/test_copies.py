@@ -6,8 +6,8 @@ from pathlib import Path
 import fsspec
 import pytest
 
-from diagnosis.audit.discover import discover
-from diagnosis.audit.store import Store
+from diagnosis.audit.discovery.discover import discover
+from diagnosis.audit.store.store import Store
 from replay import mission as reading
 from tests.diagnosis.audit.samples import asked_for, run
 

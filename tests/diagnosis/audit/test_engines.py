@@ -17,7 +17,7 @@ import pytest
 
 from diagnosis.audit import engines
 from diagnosis.audit.engines import Engine
-from diagnosis.audit.limits import Limits
+from diagnosis.audit.isolation.limits import Limits
 from replay.errors import ConfigError
 from tests.diagnosis.audit.samples import asked_for, missions, run
 

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from diagnosis.audit.events import EventLog
-from diagnosis.json_text import dump_json
+from diagnosis.results.json_text import dump_json
 from replay.errors import OutputError
 
 

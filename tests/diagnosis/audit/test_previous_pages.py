@@ -8,13 +8,13 @@ from typing import Any
 
 import pytest
 
-from diagnosis.audit.claims import claim_mission
-from diagnosis.audit.keys import Key
-from diagnosis.audit.places import mark_report
 from diagnosis.audit.previous_pages import compare_newest
-from diagnosis.audit.store import Store
+from diagnosis.audit.store.claims import claim_mission
+from diagnosis.audit.store.folders import mark_report
+from diagnosis.audit.store.keys import Key
+from diagnosis.audit.store.store import Store
 from diagnosis.output import write_result
-from diagnosis.result import MissionResult
+from diagnosis.results.result import MissionResult
 from tests import fleet_samples as samples
 from tests import report_samples
 from tests.fleet_samples import Sample

@@ -10,19 +10,19 @@ from types import SimpleNamespace
 import pytest
 
 from diagnosis.audit import engines
-from diagnosis.audit.claims import claim_mission
-from diagnosis.audit.discover import MissionSource
+from diagnosis.audit.discovery.discover import MissionSource
+from diagnosis.audit.discovery.staging import Staged
 from diagnosis.audit.endings import Ending, command, exit_code, quoted
-from diagnosis.audit.keys import Key
-from diagnosis.audit.limits import Limits
-from diagnosis.audit.places import publish, working
+from diagnosis.audit.isolation.limits import Limits
 from diagnosis.audit.plan import Planned
 from diagnosis.audit.session import audit, overview
-from diagnosis.audit.staging import Staged
-from diagnosis.audit.store import Store
+from diagnosis.audit.store.claims import claim_mission
+from diagnosis.audit.store.folders import publish, working
+from diagnosis.audit.store.keys import Key
+from diagnosis.audit.store.store import Store
 from diagnosis.audit.task import named
 from replay.errors import OutputError
-from replay.machine import haulotte
+from replay.machine.config import haulotte
 from tests.diagnosis.audit.samples import COLD, asked_for, missions, run
 
 
@@ -249,7 +249,7 @@ def test_a_page_that_fails_on_the_way_costs_no_mission(tmp_path: Path, monkeypat
         return SimpleNamespace(html=tmp_path)
 
     monkeypatch.setattr("diagnosis.audit.session.PAGE_S", 0.0)
-    monkeypatch.setattr("diagnosis.audit.fleet.write_fleet", write_fleet)
+    monkeypatch.setattr("diagnosis.audit.fleet_files.write_fleet", write_fleet)
     ends, _ = run(missions(tmp_path / "logs", "fine-1", "fine-2"), asked_for(tmp_path / "out"))
     assert [e.state for e in ends.values()] == ["ok", "ok"]
     assert len(tries) > 1

@@ -5,8 +5,8 @@ from typing import Any
 import numpy as np
 import pytest
 
+from diagnosis.report.compared_channels import Pair, pair_of
 from diagnosis.report.edges import Edge, edge_of, edge_words, time_words
-from diagnosis.report.pair import Pair, pair_of
 
 STEP = 0.005
 FAULT = {"component": "FR", "kind": "wheel", "side": "sensor", "tier": "direct", "start_s": 5.0, "stop_s": 6.0}

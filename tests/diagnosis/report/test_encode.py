@@ -11,9 +11,9 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from diagnosis.report.choose import Mission, encode, spans_of
+from diagnosis.report.budget import Mission, encode, spans_of
 from diagnosis.report.encode import Channel, Segment, levels_of, step_of
-from diagnosis.result import Closeups
+from diagnosis.results.result import Closeups
 
 
 def decoded(channel: Channel, segment: Segment) -> list[NDArray[np.float64]]:

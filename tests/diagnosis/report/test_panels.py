@@ -4,8 +4,8 @@ import re
 
 import numpy as np
 
+from diagnosis.pages.axes import Frame, limits, ticks
 from diagnosis.report.edges import Edge
-from diagnosis.report.frame import Frame, limits, ticks
 from diagnosis.report.panels import course_picture, edge_picture
 
 FAULT = {"id": "F1", "mode": "stuck", "start_s": 5.0, "stop_s": 6.0, "detected_s": 5.02}

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from diagnosis.previous import with_previous
+from diagnosis.comparison.previous import with_previous
 from diagnosis.report.page import build_page
 from diagnosis.report.previous import previous_section
 from tests import report_samples as samples

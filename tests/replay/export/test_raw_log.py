@@ -14,9 +14,9 @@ from mcap.writer import Writer
 from replay.errors import LogError, OutputError
 from replay.export import raw_log
 from replay.export.raw_log import INDEX, write_raw
-from replay.rawlog import Channel, RawLog
+from replay.log.raw_log import Channel, RawLog
+from replay.log.source_options import SourceOptions
 from replay.readers.registry import read_log
-from replay.sources import SourceOptions
 
 ODD = [
     (10, {"v": 1, "big": 2**63 - 1, "flag": True}),

@@ -10,10 +10,10 @@ import pytest
 
 from replay.errors import ConfigError, OutputError
 from replay.export.recording import RECORDING_FORMATS, write_recording
-from replay.machine import Machine, haulotte
+from replay.log.source_options import SignalSource, SourceOptions
+from replay.machine.config import Machine, haulotte
 from replay.mission import load_mission, read_signals
-from replay.signals import Signal, Signals
-from replay.sources import SignalSource, SourceOptions
+from replay.signals.signal import Signal, Signals
 
 ENDINGS = {"mcap": ".mcap", "bag": ".bag", "rosbag2": "", "twincat": ".txt", "csv": ".csv", "parquet": ".parquet"}
 START = 1_700_000_000_123_456_789

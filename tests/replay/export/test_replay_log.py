@@ -12,12 +12,12 @@ import pytest
 from mcap.reader import make_reader
 from rosbags.typesys import Stores, get_typestore
 
-from replay.columns import replay_columns
+from replay.control.loop import Replay, replay_loop
+from replay.control.loop_columns import replay_columns
 from replay.errors import ConfigError, OutputError
 from replay.export.replay_log import format_of, write_replay
-from replay.loop import Replay, replay_loop
-from replay.machine import Machine, haulotte
-from replay.timeline import Timeline
+from replay.machine.config import Machine, haulotte
+from replay.signals.timeline import Timeline
 
 START = 1_760_000_000_000_000_000
 N = 300

@@ -12,10 +12,10 @@ from mcap.reader import make_reader
 from mcap.stream_reader import StreamReader
 from mcap.writer import CompressionType, IndexType, Writer
 
-from replay.readers.mcap_listing import records_of
-from replay.readers.mcap_records import Message, Record
+from replay.log.source_options import SourceOptions
+from replay.readers.mcap.reader import records_of
+from replay.readers.mcap.records import Message, Record
 from replay.readers.registry import read_log, summarise_log
-from replay.sources import SourceOptions
 
 OPTIONS = SourceOptions()
 

@@ -10,13 +10,13 @@ import pytest
 
 from replay.errors import LogError
 from replay.export.mission import FORMATS, write_mission
-from replay.machine import haulotte
-from replay.mapping import map_signals
-from replay.rawlog import RawLog
+from replay.log.raw_log import RawLog
+from replay.log.source_options import SourceOptions
+from replay.machine.config import haulotte
 from replay.readers.registry import read_log, summarise_log
+from replay.signals.mapping import map_signals
 from replay.simulation.options import SimulatedMission, SimulationOptions
 from replay.simulation.run import simulate_mission
-from replay.sources import SourceOptions
 
 ROUNDS = 40
 

@@ -14,9 +14,9 @@ from rosbags.serde import SerdeError
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from rosbags.typesys.store import Typestore
 
-from replay.readers.cdr import Decoder, Outcome
-from replay.readers.definitions import resolve
-from replay.readers.growing import Store
+from replay.readers.messages.cdr import Decoder, Outcome
+from replay.readers.messages.definitions import resolve
+from replay.readers.messages.topic_store import Store
 
 INTEGERS = tuple(f"{sign}int{bits}" for sign in ("", "u") for bits in (8, 16, 32, 64))
 NUMBERS = ("bool", "byte", "char", *INTEGERS, "float32", "float64")

@@ -13,8 +13,8 @@ from rosbags.rosbag1 import Reader as Reader1
 from rosbags.rosbag2 import Reader as Reader2
 from rosbags.typesys import Stores, get_types_from_idl, get_types_from_msg, get_typestore
 
+from replay.log.source_options import SourceOptions
 from replay.readers.registry import read_log, summarise_log
-from replay.sources import SourceOptions
 
 OPTIONS = SourceOptions()
 EVERY = 31

@@ -6,8 +6,8 @@ from pathlib import Path
 import pytest
 
 from replay.errors import LogError
+from replay.log.source_options import SourceOptions
 from replay.readers.registry import READERS, open_log, summarise_log
-from replay.sources import SourceOptions
 
 
 @pytest.mark.parametrize(

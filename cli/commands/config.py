@@ -1,0 +1,103 @@
+"""`mfhca config`: machine files."""
+
+from __future__ import annotations
+
+from importlib import resources
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from cli.terminal.command import App, command
+from cli.terminal.console import Terminal
+from cli.terminal.inputs import machine_of, mission_paths
+from cli.terminal.options import Json, MachineFile
+from replay.errors import ConfigError
+
+app = typer.Typer(
+    cls=App,
+    no_args_is_help=True,
+    rich_markup_mode=None,
+    help="Write, check and show machine files.",
+    context_settings={"help_option_names": ["-h", "--help"]},
+    epilog="""\b
+Examples:
+  mfhca config init -o machine.toml
+  mfhca config check machine.toml --log mission.mcap
+  mfhca config show -m machine.toml""",
+)
+
+
+def starter() -> str:
+    """Commented machine file with every key, its unit and default."""
+    return resources.files("cli.commands").joinpath("starter.toml").read_text(encoding="utf-8")
+
+
+@command
+def init(
+    terminal: Terminal,
+    output: Annotated[
+        Path | None,
+        typer.Option("--output", "-o", metavar="FILE", help="File to write.", show_default="printed instead"),
+    ] = None,
+) -> None:
+    """Write a commented starter: every key, its unit and default."""
+    from replay.atomic_write import atomic_path
+
+    if output is None:
+        terminal.show_text(starter())
+        return
+    if output.exists():
+        raise ConfigError(f"{output}: exists and is left as it is; give another name")
+    with atomic_path(output) as temporary:
+        temporary.write_text(starter(), encoding="utf-8")
+    terminal.show(f"Wrote {output}; edit it, then run: mfhca config check {output} --log LOG")
+
+
+@command
+def check(
+    terminal: Terminal,
+    file: Annotated[Path, typer.Argument(metavar="FILE", help="Machine file.", show_default=False)],
+    log: Annotated[
+        list[Path] | None,
+        typer.Option("--log", metavar="LOG", help="Also find its signals in this log.", show_default=False),
+    ] = None,
+    json: Json = False,
+) -> None:
+    """Check a machine file; with --log also that every signal it names is there."""
+    machine, source = machine_of(file)
+    lost: list[str] = []
+    document: dict[str, object] = {"file": str(file), "ok": True, "given_signals": sorted(machine.signals)}
+    if log:
+        with terminal.progress("starting") as progress:
+            from cli.tables.signals import signals_document, signals_parts
+            from replay.mission import read_signals
+
+            files, signals = read_signals(mission_paths(log), machine, progress=progress)
+        lost = [f"{name}: {signals.missing[name]}" for name in machine.signals if name in signals.missing]
+        document |= {"ok": not lost, "signals": signals_document(files, signals, machine, source)}
+        if not json:
+            terminal.show(*signals_parts(signals, machine))
+    if json:
+        terminal.show_json(document)
+    if lost:
+        raise ConfigError(f"{file}: {len(lost)} of its signals are not in the log: {'; '.join(lost)}")
+    count = len(machine.signals)
+    terminal.show(f"{file}: fine. {machine.name}, wheels {', '.join(machine.wheels)}, {count} signals given.")
+
+
+@command
+def show(terminal: Terminal, machine: MachineFile = None) -> None:
+    """Show all settings in use, as a machine file."""
+    from replay.machine.toml_file import dump_machine
+
+    the_machine, source = machine_of(machine)
+    terminal.show_text(f"# {source}\n{dump_machine(the_machine)}")
+
+
+for _function, _example in (
+    (init, "mfhca config init -o machine.toml"),
+    (check, "mfhca config check machine.toml --log mission.mcap"),
+    (show, "mfhca config show -m machine.toml > full.toml"),
+):
+    app.command(epilog=f"\b\nExample:\n  {_example}")(_function)

@@ -1,0 +1,105 @@
+"""An audit in a few lines of the terminal, and as one JSON document."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from rich.console import RenderableType
+from rich.text import Text
+
+from cli.tables.layout import bullets, key_values, section, table, text
+
+if TYPE_CHECKING:
+    from diagnosis.audit.discovery.discover import Discovery
+    from diagnosis.audit.plan import Planned
+    from diagnosis.audit.session import Audited
+
+SCHEMA = "mfhca-audit/1"
+_VERDICTS = {"stop": "stop and repair", "watch": "watch", "ready": "ready", "not_assessed": "not assessed"}
+_STYLES = {"stop": "bold #e4571e", "watch": "#d99a00", "ready": "#2fa98c"}
+_READ = ("ok", "degraded")
+_WORST_FIRST = ("crashed", "out_of_memory", "timeout", "unreadable")
+_SHOWN, _MACHINES = 10, 5
+
+
+def plan_parts(rows: Sequence[tuple[Planned, str]], found: Discovery) -> list[RenderableType]:
+    """List of missions with size and state."""
+    cells = [(one.mission.name, _size(one.mission.bytes), one.problem or state) for one, state in rows]
+    to_do = [one for one, state in rows if state == "to do"]
+    total = _size(sum(one.mission.bytes for one in to_do))
+    aside = f"; {found.left_aside} other files left aside" if found.left_aside else ""
+    return [
+        table(("mission", "size", "state"), cells, right=(1,)),
+        "",
+        text(f"{len(rows)} missions, {len(to_do)} to do ({total}){aside}"),
+    ]
+
+
+def summary_parts(audited: Audited, found: Discovery, output: Path) -> list[RenderableType]:
+    """What failed, the worst machines, counts, and where the page is."""
+    ends = audited.ends
+    parts: list[RenderableType] = []
+    failed = sorted((end for end in ends if end.state not in _READ), key=lambda end: _WORST_FIRST.index(end.state))
+    if failed:
+        rows = [
+            Text.assemble(text(e.state.replace("_", " "), "bold red"), f"  {e.name}  ", text(e.reason, "dim"))
+            for e in failed[:_SHOWN]
+        ]
+        parts += [section("Failed"), bullets(rows)]
+        if len(failed) > _SHOWN:
+            parts.append(text(f"… and {len(failed) - _SHOWN} more", "dim"))
+    machines: dict[str, Counter[str]] = {}
+    for end in ends:
+        if end.verdict in ("stop", "watch"):
+            machines.setdefault(end.machine_id or end.machine_name, Counter())[end.verdict] += 1
+    if machines:
+        worst = sorted(machines.items(), key=lambda m: (-m[1]["stop"], -m[1]["watch"], m[0]))
+        rows_ = [(name, str(c["stop"] or "–"), str(c["watch"] or "–")) for name, c in worst[:_MACHINES]]
+        parts += [section("Worst machines"), table(("machine", "stop", "watch"), rows_, right=(1, 2))]
+    verdicts = Counter(end.verdict for end in ends)
+    states = Counter(end.state for end in ends)
+    counted = [Text.assemble((str(verdicts[v]), s), f" {_VERDICTS[v]}") for v, s in _verdict_styles() if verdicts[v]]
+    counted += [text(f"{n} {s.replace('_', ' ')}") for s, n in sorted(states.items()) if s not in _READ]
+    parts += [section("Missions"), Text(" · ").join(counted)]
+    notes = [f"{len(ends)} in all, {audited.skipped} of them done before"]
+    notes += [f"{states['degraded']} with damage or parts that cannot be judged"] if states["degraded"] else []
+    parts.append(text(", ".join(notes), "dim"))
+    if audited.gone:
+        was = "mission that is" if audited.gone == 1 else "missions that are"
+        parts.append(text(f"the fleet page also counts {audited.gone} {was} not there any more", "dim"))
+    files: list[tuple[str, object]] = [("fleet page", output / "fleet.html")]
+    if audited.failed:
+        files.append(("failures", output / "failures.txt"))
+    return [*parts, "", key_values(files)]
+
+
+def _verdict_styles() -> list[tuple[str, str]]:
+    return [(v, _STYLES.get(v, "")) for v in _VERDICTS]
+
+
+def document(audited: Audited, found: Discovery, output: Path, code: int) -> dict[str, Any]:
+    """The audit as a JSON document."""
+    return {
+        "schema": SCHEMA,
+        "output": str(output),
+        "page": str(output / "fleet.html"),
+        "code": code,
+        "skipped": audited.skipped,
+        "gone": audited.gone,
+        "counts": dict(Counter(end.state for end in audited.ends)),
+        "verdicts": dict(Counter(end.verdict for end in audited.ends if end.verdict)),
+        "problems": [*found.problems, *found.notes],
+        "missions": [asdict(end) for end in audited.ends],
+    }
+
+
+def _size(count: float) -> str:
+    for unit in ("B", "kB", "MB", "GB"):
+        if count < 1000:
+            return f"{count:.0f} {unit}" if unit == "B" or count >= 10 else f"{count:.1f} {unit}"
+        count /= 1000
+    return f"{count:.1f} TB"

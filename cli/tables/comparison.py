@@ -1,0 +1,177 @@
+"""A comparison of two missions on the terminal."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+from rich.text import Text
+
+from cli.tables.layout import (
+    MODE_SIGNS,
+    MODE_STYLES,
+    SEVERITY_STYLES,
+    ByWidth,
+    bullets,
+    key_values,
+    section,
+    table,
+    text,
+)
+from diagnosis.comparison.faults import GONE
+from diagnosis.comparison.words import CHANGES, OUTCOMES, headline, times
+from diagnosis.decision.wording import part_words
+from diagnosis.pages.labels import utc
+
+if TYPE_CHECKING:
+    from rich.console import RenderableType
+
+    from diagnosis.comparison.compare import ComparedMission, Comparison, MetricChange
+    from diagnosis.comparison.coverage import CoverageChange, SideCoverage
+    from diagnosis.comparison.faults import FaultChange, FoundFault
+
+_STYLES = {"new": "bold red", "worse": "bold red", "resolved": "#2fa98c", "better": "#2fa98c", "unchanged": "dim"}
+_VERDICTS = {
+    "ready": ("READY", "bold #2fa98c"),
+    "watch": ("WATCH", "bold #d99a00"),
+    "stop": ("STOP AND REPAIR", "bold red"),
+    "not_assessed": ("NOT ASSESSED", "bold"),
+}
+_SHOWN = 40
+_HEADINGS = ("part", "fault", "older", "newer", "changed")
+_COLUMNS = {"new": (0, 1, 3), "not_seen_again": (0, 1, 2), "resolved": (0, 1, 2), "unchanged": (0, 1, 2, 3)}
+
+
+def comparison_parts(found: Comparison) -> list[RenderableType]:
+    """Headline, the two missions, faults by what became of them, coverage, figures, and what to bear in mind."""
+    label, style = ("WORSE", "bold white on #b63a00") if found.worse else ("NOT WORSE", "bold white on #1d7a63")
+    parts: list[RenderableType] = [
+        Text.assemble((f" {label} ", style), "  ", text(headline(found.counts), "bold")),
+        "",
+        key_values([("older", _mission(found.older)), ("newer", _mission(found.newer))]),
+    ]
+    parts += _faults(found.faults)
+    parts += [section("Assessed long enough"), *_coverage(found.coverage)]
+    if found.metrics:
+        parts += [section("While driving"), _metrics(found.metrics)]
+    if found.notes:
+        parts += [section("To bear in mind"), bullets(found.notes)]
+    return [*parts, ""]
+
+
+def _mission(m: ComparedMission) -> Text:
+    label, style = _VERDICTS.get(m.verdict, (m.verdict, "bold"))
+    when = f"{utc(m.start_ns)} UTC, {m.duration_s:.0f} s, {m.driving_s:.0f} s driving"
+    title = "" if m.title.upper() == label else m.title
+    return Text.assemble(text(m.name), "  ", text(when, "dim"), "\n", text(label, style), "  ", text(title))
+
+
+def _part(c: FaultChange) -> str:
+    return part_words(c.kind, c.component, c.side)
+
+
+def _faults(faults: Sequence[FaultChange]) -> list[RenderableType]:
+    """A table per outcome, their columns in line; what limits a statement stands beneath it."""
+    width = max((len(_part(c)) for c in faults), default=0)
+    parts: list[RenderableType] = []
+    for outcome, words in OUTCOMES.items():
+        mine = [c for c in faults if (c.trend or c.status) == outcome]
+        if not mine:
+            continue
+        style = _STYLES.get(outcome, "bold")
+        parts += ["", text(f"{words[0].upper()}{words[1:]} ({len(mine)})", style)]
+        shown = mine[:_SHOWN]
+        kept = _COLUMNS.get(outcome, range(5))
+        wide, narrow = (
+            table(
+                [_HEADINGS[i] for i in kept],
+                [[(_part(c).ljust(width), _rows(c), *_both(c, bounds), _changed(c))[i] for i in kept] for c in shown],
+            )
+            for bounds in (True, False)
+        )
+        parts.append(ByWidth(wide, narrow, 110))
+        if len(mine) > _SHOWN:
+            parts.append(text(f"… and {len(mine) - _SHOWN} more (--json, -o FILE.html)", "dim"))
+        notes = list(dict.fromkeys(f"{_part(c)}: {c.note}" for c in shown if c.note))
+        if notes:
+            parts.append(bullets(notes, "dim"))
+    return parts
+
+
+def _rows(c: FaultChange) -> Text:
+    modes = list(dict.fromkeys(f.mode for f in (c.older, c.newer) if f is not None))
+    words = [text(f"{MODE_SIGNS.get(m, '·')} {m.replace('_', ' ')}", MODE_STYLES.get(m, "")) for m in modes]
+    return Text(" → ").join(words)
+
+
+def _both(c: FaultChange, bounds: bool) -> tuple[Text, Text]:
+    return _found(c.older, bounds), _found(c.newer, bounds)
+
+
+def _found(f: FoundFault | None, bounds: bool) -> Text:
+    """Severity, number and time of the faults, and ε̂ where the row leaves it open."""
+    if f is None:
+        return text("–")
+    words = f" {times(len(f.ids), f.seconds)}"
+    if f.epsilon is not None and f.mode not in GONE:
+        words += f", ε {f.epsilon['value']:.2f}"
+        words += f" ({f.epsilon['low']:.2f}–{f.epsilon['high']:.2f})" if bounds else ""
+    return Text.assemble(text(f.severity, SEVERITY_STYLES.get(f.severity, "")), text(words))
+
+
+def _changed(c: FaultChange) -> str:
+    return ", ".join(CHANGES[name] for name in c.changes)
+
+
+def _coverage(changes: Sequence[CoverageChange]) -> list[RenderableType]:
+    differing = [c for c in changes if c.change]
+    neither = [part_words(c.kind, c.component, c.side) for c in changes if not c.change and not _assessed(c.newer)]
+    parts: list[RenderableType] = []
+    if differing:
+        rows = [
+            (
+                text(c.change, "bold red" if c.change == "lost" else "#2fa98c"),
+                part_words(c.kind, c.component, c.side),
+                _judged(c.older),
+                _judged(c.newer),
+            )
+            for c in differing
+        ]
+        parts.append(table(("", "part", "driving judged, older", "newer"), rows))
+    else:
+        parts.append(text("The same parts in both missions."))
+    if neither:
+        parts.append(text(f"In neither mission: {', '.join(neither)}.", "dim"))
+    return parts
+
+
+def _assessed(side: SideCoverage | None) -> bool:
+    return side is not None and side.assessed
+
+
+def _judged(side: SideCoverage | None) -> str:
+    if side is None:
+        return "not in the result"
+    return "no evidence" if side.tier == "none" else f"{side.decided_s:.1f} of {side.driving_s:.1f} s ({side.tier})"
+
+
+def _metrics(rows: Sequence[MetricChange]) -> RenderableType:
+    cells = [
+        (
+            r.wheel,
+            *_pair(r.tracking_error_older, r.tracking_error_newer),
+            *_pair(r.control_effort_older, r.control_effort_newer),
+        )
+        for r in rows
+    ]
+    headings = ("", "error, older [m/s]", "newer", "", "effort, older", "newer", "")
+    return table(headings, cells, right=range(1, 7))
+
+
+def _pair(a: float | None, b: float | None) -> tuple[str, str, str]:
+    change = f"{round(100 * (b / a - 1)):+d} %" if a and b is not None else ""
+    return _number(a), _number(b), change
+
+
+def _number(value: float | None) -> str:
+    return "–" if value is None else f"{value:.3f}"

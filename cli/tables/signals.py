@@ -1,0 +1,125 @@
+"""Mapped and missing signals, for the terminal and as JSON."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import PurePath
+from typing import Any
+
+import numpy as np
+from rich.console import RenderableType
+from rich.text import Text
+
+from cli.tables.layout import ByWidth, bullets, section, table, text
+from diagnosis.decision.missing import cost_of_missing
+from replay.machine.config import Machine
+from replay.machine.units import quantity_of
+from replay.mission import MissionFile
+from replay.signals.rules import SI_UNITS
+from replay.signals.signal import Signal, Signals
+from replay.signals.timeline import median_period
+
+_NOT_FOUND = "no channel fits by its name or message type"
+
+
+def signals_document(files: Sequence[MissionFile], signals: Signals, machine: Machine, source: str) -> dict[str, Any]:
+    """Mapped and missing signals as JSON values."""
+    return {
+        "machine": {"name": machine.name, "source": source, "wheels": list(machine.wheels)},
+        "files": [
+            {
+                "path": str(f.path),
+                "sha256": f.sha256,
+                "bytes": f.bytes,
+                "format": f.format,
+                "notes": list(f.summary.notes),
+                "damage": list(f.summary.damage),
+            }
+            for f in files
+        ],
+        "signals": [_signal(s) for s in signals.items.values()],
+        "missing": [
+            {"name": name, "reason": reason, "cost": cost_of_missing(name)} for name, reason in signals.missing.items()
+        ],
+        "notes": list(signals.notes),
+    }
+
+
+def _signal(signal: Signal) -> dict[str, Any]:
+    finite = signal.values[np.isfinite(signal.values)]
+    period = median_period(signal.stamps)
+    return {
+        "name": signal.name,
+        "channel": signal.origin.label,
+        "recorded_unit": signal.origin.unit or None,
+        "unit": SI_UNITS[quantity_of(signal.name)],
+        "guessed": signal.guessed,
+        "source": signal.source,
+        "samples": int(signal.stamps.size),
+        "without_value": int(signal.stamps.size - finite.size),
+        "rate_hz": 1e9 / period if period else None,
+        "min": float(finite.min()) if finite.size else None,
+        "max": float(finite.max()) if finite.size else None,
+    }
+
+
+def signals_parts(signals: Signals, machine: Machine) -> list[RenderableType]:
+    """Mapped signals, missing ones with their cost, and doubts, for the terminal."""
+    parts: list[RenderableType] = [text("No signal of the machine was found.", "bold")]
+    if signals.items:
+        several = len({s.source for s in signals.items.values()}) > 1
+        rows = [_row(s, several) for s in signals.items.values()]
+        wide = table(("signal", "channel", "unit", "Hz", "range"), rows, right=(3,))
+        short = [(Text.assemble(text(name), "\n  ", text(channel, "dim")), *rest) for name, channel, *rest in rows]
+        narrow = table(("signal and channel", "unit", "Hz", "range"), short, right=(2,))
+        parts = [ByWidth(wide, narrow, 110)]
+    if signals.missing:
+        lines = [(name, _cost(cost, reason)) for name, cost, reason in _missing_groups(signals.missing, machine)]
+        parts += [section("Missing, and what it costs"), table(("signal", "cost"), lines)]
+    notes = [n for n in signals.notes if _is_doubt(n)]
+    if notes:
+        parts += [section("Notes"), bullets(notes)]
+    return parts
+
+
+def _row(signal: Signal, several: bool) -> tuple[str, str, str, str, str]:
+    """Signal, channel with its file where there are several, recorded unit, rate, range in SI."""
+    d = _signal(signal)
+    span = "no number" if d["min"] is None else f"{d['min']:.4g} … {d['max']:.4g} {d['unit'].replace('1', '')}"
+    how = (f"  in {PurePath(signal.source).name}" if several else "") + ("" if signal.guessed else "  (given)")
+    rate = f"{d['rate_hz']:.4g}" if d["rate_hz"] else "–"
+    return d["name"], d["channel"] + how, d["recorded_unit"] or "SI", rate, span.strip()
+
+
+def _cost(cost: str, reason: str) -> Text:
+    return text(cost) if reason == _NOT_FOUND else Text.assemble(text(cost), "\n", text(reason, "dim"))
+
+
+def _is_doubt(note: str) -> bool:
+    """Whether a note says more than the table of signals does."""
+    return " is taken from " not in note or "would fit as well" in note or "not stated" in note
+
+
+def _missing_groups(missing: Mapping[str, str], machine: Machine) -> list[tuple[str, str, str]]:
+    """Missing signals of equal cost and reason in one line each: names, cost, reason."""
+    groups: dict[tuple[str, str, str], dict[str, list[str]]] = {}
+    for name, reason in missing.items():
+        group, _, rest = name.partition(".")
+        part, _, leaf = rest.rpartition(".")
+        leaves = groups.setdefault((group, cost_of_missing(name), reason), {})
+        leaves.setdefault(leaf, []).append(part)
+    out = []
+    every = {"wheel": machine.wheels, "steer": machine.axles}
+    for (group, cost, reason), leaves in groups.items():
+        parts = next(iter(leaves.values()))
+        if any(p != parts for p in leaves.values()):
+            out += [(f"{group}.{p}.{leaf}", cost, reason) for leaf, named in leaves.items() for p in named]
+            continue
+        shown = "*" if tuple(parts) == every.get(group) and len(parts) > 1 else _listed(parts)
+        out.append((".".join(x for x in (group, shown, _listed(list(leaves))) if x), cost, reason))
+    return out
+
+
+def _listed(names: Sequence[str]) -> str:
+    """``FR`` or ``{FR,FL}``."""
+    return names[0] if len(names) == 1 else "{" + ",".join(names) + "}"

@@ -1,0 +1,1 @@
+"""Streams, progress, interrupts and options that all commands share."""

@@ -1,0 +1,1 @@
+"""Which missions there are, and whose."""

@@ -1,0 +1,1 @@
+"""The fleet's document and table."""

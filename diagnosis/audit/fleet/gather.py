@@ -1,0 +1,154 @@
+"""Missions of a store gathered by machine: their order, what was not judged, and the faults that return."""
+
+from __future__ import annotations
+
+from collections import Counter, defaultdict
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import replace
+from functools import cache
+
+from diagnosis.audit.fleet.machines import STANDING, FleetFault, Limits, Machine, Run, Status
+from diagnosis.audit.fleet.owners import Owner, Owners
+from diagnosis.audit.fleet.read import FoundFault, Mission
+from diagnosis.results.result import SEVERITIES
+
+Key = tuple[str, str, str]
+
+
+def machines_of(
+    missions: Iterable[Mission],
+    limits: Callable[[str], Limits] | None = None,
+    came: Callable[[str], int | None] | None = None,
+    folder: str = ".",
+) -> tuple[list[Machine], list[Mission]]:
+    """Gather missions by machine.
+
+    Parameters
+    ----------
+    missions : Iterable[Mission]
+        From `read_missions`.
+    limits : Callable[[str], Limits] or None
+        Gives the limits by the folder of a report, asked for the last one of each machine; None for the defaults.
+    came : Callable[[str], int or None] or None
+        Gives when a mission was first looked at by its name, from `diagnosis.audit.fleet.arrivals`; None: not known.
+    folder : str
+        Folder of the store.
+
+    Returns
+    -------
+    tuple[list[Machine], list[Mission]]
+        Machines by identity and name; and missions that were not judged, whose machine is not known and that are still
+        there, as far as they may be later than the last judged mission of a machine that is ready.
+    """
+    runs: dict[Owner, dict[int, Run]] = defaultdict(dict)
+    failed: dict[Owner, list[Mission]] = defaultdict(list)
+    nowhere: list[Mission] = []
+    missions = list(missions)
+    limits = cache(limits) if limits else None
+    owners = Owners(missions, folder)
+    for m in missions:
+        key, other = owners.of(m)
+        if other:
+            nowhere.append(m)
+        if key is None:
+            continue
+        if m.result is not None and m.result.judged:
+            known = runs[key].get(m.result.id)
+            runs[key][m.result.id] = Run(known.name if known else m.name, m.result, known.copies + 1 if known else 0)
+        else:
+            failed[key].append(m)
+    came = came or (lambda _: None)
+    out = [_machine(key, runs[key].values(), failed[key], limits, came) for key in sorted({*runs, *failed})]
+    ready = [_began(m, came) for m in out if m.verdict == "ready"]
+    later = [m for m in nowhere if not m.gone and any(_may_be_later(m.name, began, came) for began in ready)]
+    return out, later
+
+
+def _machine(
+    key: Owner,
+    runs: Iterable[Run],
+    failed: Sequence[Mission],
+    limits: Callable[[str], Limits] | None,
+    came: Callable[[str], int | None],
+) -> Machine:
+    found = list(runs)
+    starts = Counter(r.result.start_ns for r in found if r.result.start_ns is not None)
+    alone = {start for start, count in starts.items() if count == 1}
+    dated = sorted((r for r in found if r.result.start_ns in alone), key=lambda r: r.result.start_ns or 0)
+    undated = sorted((r for r in found if r.result.start_ns not in alone), key=lambda r: r.name)
+    last = next((r for r in (*reversed(dated), *undated) if r.result.report is not None), None)
+    own = limits(last.result.report or "") if limits and last else Limits()
+    name = key[1] or (last.result.machine_name if last else "")
+    m = Machine(key[0], name, tuple(dated), tuple(undated), tuple(failed), own)
+    return _with_faults(replace(m, cleared=_cleared(m, limits), unjudged=_unjudged(m, came)))
+
+
+def _cleared(m: Machine, limits: Callable[[str], Limits] | None) -> bool | None:
+    """Whether its last judged mission lets it go out, and every judged one that may be later."""
+    said = {limits(r.result.report).cleared if limits and r.result.report else None for r in m.newest}
+    return False if False in said else None if None in said or not said else True
+
+
+def _unjudged(m: Machine, came: Callable[[str], int | None]) -> int:
+    """Missions that were not judged and may be later than the last judged one."""
+    last, began = m.last_judged, _began(m, came)
+    after = len(m.dated) - (m.dated.index(last) + 1 if last else 0)
+    others = [r.name for r in m.undated if r.result.verdict == "not_assessed"] + [f.name for f in m.failed]
+    return after + sum(_may_be_later(name, began, came) for name in others)
+
+
+def _began(m: Machine, came: Callable[[str], int | None]) -> int | None:
+    """When the last judged mission began; a clock of the log that runs ahead of the audit's does not count."""
+    last = m.last_judged
+    looked = came(last.name) if last else None
+    return None if last is None or looked is None else min(last.result.start_ns or 0, looked)
+
+
+def _may_be_later(name: str, began: int | None, came: Callable[[str], int | None]) -> bool:
+    looked = came(name) if began is not None else None
+    return began is None or looked is None or looked >= began
+
+
+def _with_faults(m: Machine) -> Machine:
+    groups: dict[Key, list[tuple[Run, FoundFault]]] = defaultdict(list)
+    for run in m.runs:
+        for f in run.faults:
+            groups[f.component, f.side, f.mode].append((run, f))
+    faults = [_fleet_fault(m, found) for found in groups.values()]
+    faults.sort(key=lambda f: (not f.standing, -SEVERITIES.index(f.severity), -f.missions, f.component, f.side, f.mode))
+    return replace(m, faults=tuple(faults))
+
+
+def _fleet_fault(m: Machine, found: Sequence[tuple[Run, FoundFault]]) -> FleetFault:
+    f = found[0][1]
+    ids = list(dict.fromkeys(r.result.id for r, _ in found))
+    last_run = found[-1][0]
+    dated = [k for k, r in enumerate(m.dated) if r.result.id in set(ids)]
+    if dated:
+        last_run = m.dated[dated[-1]]
+    in_last = [g for r, g in found if r.result.id == last_run.result.id]
+    worst = max(in_last, key=lambda g: (SEVERITIES.index(g.severity), g.seconds))
+    assessed = [r.assessed(f.component, f.side, m.limits) for r in m.dated]
+    since = sum(assessed[dated[-1] + 1 :]) if dated and len(dated) == len(ids) else 0
+    before = sum(assessed[: dated[0]]) if dated else 0
+    undated = sum(r.assessed(f.component, f.side, m.limits) for r in m.undated)
+    without = [k for k in range(dated[-1]) if assessed[k] and k not in set(dated)] if dated else []
+    past = {m.dated[k].result.id for k in dated if without and k < without[-1]}
+    status: Status = "past" if since >= STANDING else "recurring" if len(ids) > 1 else "once"
+    if len(ids) == 1 and dated and dated[0] == len(m.dated) - 1 and before:
+        status = "new"
+    return FleetFault(
+        component=f.component,
+        kind=f.kind,
+        side=f.side,
+        mode=f.mode,
+        severity=max((g.severity for r, g in found if r.result.id not in past), key=SEVERITIES.index),
+        status=status,
+        missions=len(ids),
+        assessed=max(len(ids), sum(assessed) + undated),
+        first=m.dated[dated[0]] if dated else found[0][0],
+        last=last_run,
+        last_id=worst.id,
+        since=since,
+        epsilon=worst.epsilon,
+    )

@@ -1,0 +1,248 @@
+"""Machines of a fleet: their missions in order of the log's clock, where each stands, and the faults that return.
+
+Copies of a log count once. Missions whose log does not know the date (or says one after an audit had looked at it), or which
+start at the same moment as another one of the machine, cannot be ordered: they count, but they take no part in trends or what is new. Where one of them is worse than the last dated one, the machine stands as the worse.
+
+A machine is ``ready`` only where no mission that was not judged may be later than its last judged one. A log that was not
+read, or does not know the date, may be later unless an audit looked at it before that mission began.
+"""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Literal
+
+from diagnosis.audit.fleet.read import Bounds, FoundFault, Mission, Part, Result
+from diagnosis.results.result import SEVERITIES
+
+VERDICTS = ("stop", "watch", "not_assessed", "ready")  # worst first
+EITHER = "sensor_or_actuator"
+STANDING = 3
+_LEAST_SHARE = 0.8
+
+Status = Literal["new", "recurring", "once", "past"]
+
+
+@dataclass(frozen=True)
+class Limits:
+    """What a report says of limits, which components steer, and whether the machine may go out (None: it does not say).
+
+    The defaults are those of the paper's machine.
+    """
+
+    min_epsilon: float = 0.1
+    min_assessed: float = 10.0
+    wheels: tuple[str, ...] = ("FR", "FL", "RR", "RL")
+    axles: tuple[str, ...] = ("front", "rear")
+    cleared: bool | None = None
+
+
+@dataclass(frozen=True)
+class Run:
+    """A judged mission of a machine; `name` is that of the first of its copies."""
+
+    name: str
+    result: Result
+    copies: int = 0
+
+    @cached_property
+    def faults(self) -> tuple[FoundFault, ...]:
+        """Faults that count: those of at least low severity."""
+        return tuple(f for f in self.result.faults if f.severity != "info")
+
+    @property
+    def worst(self) -> FoundFault | None:
+        """The most severe and longest of them."""
+        return max(self.faults, key=lambda f: (SEVERITIES.index(f.severity), f.seconds), default=None)
+
+    @cached_property
+    def parts(self) -> dict[tuple[str, str], Part]:
+        """Its parts by component and side."""
+        return {(p.component, p.side): p for p in self.result.parts}
+
+    def assessed(self, component: str, side: str, limits: Limits) -> bool:
+        """Whether a part was judged for as long as a verdict of ``ready`` takes."""
+        keys = [(component, s) for s in sides_of(side)]
+        return all(k in self.parts and is_assessed(self.parts[k], limits) for k in keys)
+
+
+def sides_of(side: str) -> tuple[str, ...]:
+    """The two sides of a fault that may be of either."""
+    return ("sensor", "actuator") if side == EITHER else (side,)
+
+
+def is_assessed(part: Part, limits: Limits) -> bool:
+    """Whether a part was judged for `min_assessed` seconds and four fifths of its driving."""
+    return part.decided_s > 0 and part.decided_s >= max(limits.min_assessed, _LEAST_SHARE * part.driving_s)
+
+
+@dataclass(frozen=True)
+class FleetFault:
+    """All faults of one machine on one component and side in one row.
+
+    Attributes
+    ----------
+    component, kind, side, mode : str
+        As in the missions' reports.
+    severity : str
+        The worst in its last missions: those after the last mission before them that assessed the part without it.
+    status : str
+        ``new``: in the machine's last mission and in none of the earlier ones, of which one assessed the part;
+        ``recurring``: in several missions; ``once``; ``past``: not found in the last three missions that assessed it.
+    missions, assessed : int
+        Missions with it, and missions that assessed the part.
+    first, last : Run
+        Its first and last mission.
+    last_id : str
+        Its number in the report of the last one.
+    since : int
+        Missions that assessed the part after the last one with it.
+    epsilon : Bounds or None
+        ε̂ in the last one.
+    """
+
+    component: str
+    kind: str
+    side: str
+    mode: str
+    severity: str
+    status: Status
+    missions: int
+    assessed: int
+    first: Run
+    last: Run
+    last_id: str
+    since: int
+    epsilon: Bounds | None
+
+    @property
+    def standing(self) -> bool:
+        """Whether it counts as there."""
+        return self.status != "past"
+
+
+@dataclass(frozen=True)
+class Machine:
+    """One machine of the fleet.
+
+    Attributes
+    ----------
+    id, name : str
+        Identity (may be empty) and name.
+    dated : tuple[Run, ...]
+        Judged missions in order of their logs' clocks.
+    undated : tuple[Run, ...]
+        Judged missions that cannot be ordered, by name.
+    failed : tuple[Mission, ...]
+        Missions without a report, also those that name no machine but lie among its logs alone.
+    limits : Limits
+        Of its last report.
+    cleared : bool or None
+        Whether the report of its last judged mission lets it go out, and that of each one which may be later; None where
+        one does not say.
+    unjudged : int
+        Missions that were not judged and may be later than the last judged one.
+    faults : tuple[FleetFault, ...]
+        Faults by part and row, those that stand and the severe ones first.
+    """
+
+    id: str
+    name: str
+    dated: tuple[Run, ...]
+    undated: tuple[Run, ...]
+    failed: tuple[Mission, ...]
+    limits: Limits = field(default_factory=Limits)
+    cleared: bool | None = None
+    unjudged: int = 0
+    faults: tuple[FleetFault, ...] = ()
+
+    @property
+    def label(self) -> str:
+        """What to call it."""
+        return self.id or self.name or "machine without a name"
+
+    @property
+    def runs(self) -> tuple[Run, ...]:
+        """All judged missions."""
+        return self.dated + self.undated
+
+    @property
+    def last_judged(self) -> Run | None:
+        """The last dated mission that assessed anything."""
+        return next((r for r in reversed(self.dated) if r.result.verdict not in (None, "not_assessed")), None)
+
+    @property
+    def newest(self) -> tuple[Run, ...]:
+        """Missions that assessed anything and of which each may be the last: the last dated one, and those without order."""
+        undated = tuple(r for r in self.undated if r.result.verdict not in (None, "not_assessed"))
+        return ((self.last_judged,) if self.last_judged else ()) + undated
+
+    @cached_property
+    def last_verdict(self) -> str:
+        """Where it stood when it was judged last.
+
+        Worse where a mission of unknown date says so, or where no later mission assessed the part of an earlier fault.
+        """
+        found = [r.result.verdict for r in self.newest]
+        found += ["stop" if f.severity == "high" else "watch" for f in self.faults if not f.since]
+        known = [v for v in found if v is not None]
+        return min(known, key=VERDICTS.index, default="not_assessed")
+
+    @property
+    def verdict(self) -> str:
+        """Where it stands: as it was judged last, but ready only where that is known of its newest mission too."""
+        held = self.unjudged > 0 or self.cleared is False
+        return "not_assessed" if self.last_verdict == "ready" and held else self.last_verdict
+
+    @property
+    def note(self) -> str:
+        """What limits that; may be empty."""
+        out = []
+        trailing = list(itertools.takewhile(lambda r: r.result.verdict == "not_assessed", reversed(self.dated)))
+        if trailing and len(trailing) < len(self.dated):
+            out.append(f"its last {_count(len(trailing), 'mission')} could not be assessed")
+        if self.undated:
+            out.append(f"{_count(len(self.undated), 'mission')} of unknown order")
+        unread = sum(m.result is not None for m in self.failed)
+        if unread:
+            out.append(f"{_count(unread, 'log')} not read")
+        if len(self.failed) > unread:
+            out.append(f"{_count(len(self.failed) - unread, 'log')} not audited yet")
+        return ", ".join(out)
+
+    @property
+    def driving_s(self) -> float:
+        """Driving time of all judged missions [s]."""
+        return sum(r.result.driving_s or 0.0 for r in self.runs)
+
+    @property
+    def with_faults(self) -> int:
+        """Judged missions with a fault."""
+        return sum(bool(r.faults) for r in self.runs)
+
+    @cached_property
+    def parts(self) -> tuple[tuple[str, str], ...]:
+        """Components and sides of any mission, in the order of the machine's wheels and axles."""
+        found = dict.fromkeys((p.component, p.side) for r in self.runs for p in r.result.parts)
+        found |= dict.fromkeys((f.component, s) for r in self.runs for f in r.faults for s in sides_of(f.side))
+        order = {name: k for k, name in enumerate((*self.limits.wheels, *self.limits.axles))}
+        return tuple(sorted(found, key=lambda k: order.get(k[0], len(order))))
+
+    def kind(self, component: str) -> str:
+        """Whether a component is a ``wheel`` or steers."""
+        if component in self.limits.axles:
+            return "steer"
+        return next((f.kind for r in self.runs for f in r.result.faults if f.component == component), "wheel")
+
+    @property
+    def decided(self) -> float | None:
+        """Share of the driving time that was judged, over all parts [1]."""
+        parts = [p for r in self.runs for p in r.result.parts]
+        driving = sum(p.driving_s for p in parts)
+        return sum(p.decided_s for p in parts) / driving if driving > 0 else None
+
+
+def _count(n: int, word: str) -> str:
+    return f"{n} {word}{'' if n == 1 else 's'}"

@@ -1,0 +1,86 @@
+"""What the last audit run brought: the run in which each mission was first judged, kept from document to document.
+
+The store does not hold it. The document of the run before says which missions it showed as judged; those that it did not
+are of the run that writes the new one. Without such a document nothing is called new.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import orjson
+
+from diagnosis.audit.fleet.machines import FleetFault, Machine
+from diagnosis.audit.fleet.read import Mission
+
+_MOST_BYTES = 500_000_000
+
+
+def first_runs(path: Path, missions: Iterable[Mission], run: int) -> dict[str, int]:
+    """Run in which each judged mission was first judged; those of which that is not known are left out.
+
+    Parameters
+    ----------
+    path : Path
+        ``fleet.json`` of this audit's last run or of an earlier page of this one; may be absent.
+    missions : Iterable[Mission]
+        From `diagnosis.audit.fleet.read.read_missions`.
+    run : int
+        Number of this run.
+    """
+    judged = {m.name: m.result.start_ns for m in missions if m.result is not None and m.result.judged}
+    if run < 1:
+        return {}
+    known = _known(path, run)
+    if known is None:
+        return dict.fromkeys(judged, run) if run == 1 else {}
+    out = {}
+    for name, start in judged.items():
+        was = known.get(name)
+        if was is None or was[0] != start:
+            out[name] = run
+        elif isinstance(was[1], int) and 0 < was[1] <= run:
+            out[name] = was[1]
+    return out
+
+
+def _known(path: Path, run: int) -> dict[str, tuple[Any, Any]] | None:
+    """Start and first run of the missions that an earlier document shows as judged; None where there is none."""
+    try:
+        if path.stat().st_size > _MOST_BYTES:
+            return None
+        document = orjson.loads(path.read_bytes())
+        if int((document.get("audit") or {}).get("run") or 0) > run:
+            return None
+        return {
+            m["name"]: (m.get("start_ns"), m.get("first_run")) for m in document["missions"] if m["verdict"] is not None
+        }
+    except (OSError, ValueError, KeyError, TypeError, AttributeError):
+        return None
+
+
+def since_run(m: Machine, f: FleetFault, runs: Mapping[str, int]) -> int | None:
+    """Run that first brought a mission with a fault; None where that is not known."""
+    found = [
+        runs.get(r.name, 0)
+        for r in m.runs
+        if any((g.component, g.side, g.mode) == (f.component, f.side, f.mode) for g in r.faults)
+    ]
+    return min(found, default=0) or None
+
+
+def news(
+    machines: Sequence[Machine], runs: Mapping[str, int], run: int
+) -> tuple[int, list[tuple[Machine, FleetFault]]]:
+    """Missions that the last run brought, and the faults that stand in them alone, severe ones first.
+
+    Nothing where all missions are of that run, or nothing is known of earlier ones.
+    """
+    new = sum(runs.get(r.name) == run for m in machines for r in m.runs)
+    if not new or new == sum(len(m.runs) for m in machines):
+        return 0, []
+    found = [(m, f) for m in machines for f in m.faults if f.standing and since_run(m, f, runs) == run]
+    rank = {"high": 0, "medium": 1}
+    return new, sorted(found, key=lambda p: rank.get(p[1].severity, 2))

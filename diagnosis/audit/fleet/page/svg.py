@@ -1,0 +1,153 @@
+"""Pictures of the fleet page that need no JavaScript: symbols used many times, sparklines, and trends of ε̂."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from markupsafe import Markup
+from numpy.typing import NDArray
+from scipy.special import stdtrit
+
+from diagnosis.pages.axes import Frame, label
+from diagnosis.pages.labels import number
+from diagnosis.pages.svg import icon
+
+SYMBOLS = ("stuck", "no_signal", "inefficient", "noisy", "outside_table", "healthy", "warning", "not_assessed")
+_WIDTH, _HEIGHT = 420.0, 190.0
+_MOST_POINTS = 150
+_SPARK = 60
+
+Array = NDArray[np.float64]
+
+
+def sprite() -> Markup:
+    """Every symbol once; `mark` refers to them."""
+    parts = []
+    for state in SYMBOLS:
+        glyph = str(icon(state)).partition('viewBox="0 0 12 12">')[2].partition("</svg>")[0]
+        parts.append(Markup('<symbol id="g-{}" viewBox="0 0 12 12">{}</symbol>').format(state, Markup(glyph)))
+    return Markup('<svg class="sprite" aria-hidden="true">{}</svg>').format(Markup("").join(parts))
+
+
+def mark(state: str) -> Markup:
+    """Symbol of a state; decoration only, its words stand beside it."""
+    return Markup('<span class="ic {0}" aria-hidden="true"><svg><use href="#g-{0}"/></svg></span>').format(state)
+
+
+def sparkline(trend: Mapping[str, Any]) -> Markup:
+    """Values of a trend and its limit in little room."""
+    values = np.array([p[2] for p in trend["points"]], dtype=np.float64)
+    values = values[::-1][:: max(1, math.ceil(values.size / _SPARK))][::-1]
+    width, height = 96.0, 26.0
+    top = max(float(values.max()), trend["limit"], 1e-3)
+    low = min(0.0, float(values.min()))
+    x = 2 + (width - 4) * np.arange(values.size) / max(1, values.size - 1)
+    y = height - 3 - (height - 6) * (values - low) / (top - low)
+    limit = height - 3 - (height - 6) * (trend["limit"] - low) / (top - low)
+    d = "L".join(f"{a:.1f} {b:.1f}" for a, b in zip(x, y, strict=True))
+    return Markup(
+        '<svg class="tl" viewBox="0 0 96 26" aria-hidden="true"><path class="lim" d="M0 {:.1f}H96"/><path class="sig" d="M{}"/>'
+        '<circle cx="{:.1f}" cy="{:.1f}" r="2.2"/></svg>'
+    ).format(limit, d, float(x[-1]), float(y[-1]))
+
+
+def trend_picture(trend: Mapping[str, Any], title: str, unit: str) -> Markup:
+    """Estimates with 95 % bounds, the last stretch's line with its 90 % band, and where that meets the limit.
+
+    Parameters
+    ----------
+    trend : Mapping[str, Any]
+        One of the document's trends.
+    title : str
+        What it is, for those who do not see it.
+    unit : str
+        Unit of the axis.
+    """
+    every = max(1, math.ceil(len(trend["points"]) / _MOST_POINTS))
+    points = np.array([p[1:] for p in trend["points"]], dtype=np.float64)
+    now, limit, f = trend["now"], trend["limit"], trend["forecast"]
+    ahead = next((f[k] for k in ("latest", "likely", "soonest") if f[k] is not None), 0.0)
+    end = max(now + min(1.15 * ahead, f["horizon"]), 1.06 * now, 1e-9)
+    values = points[:, 1]
+    high = max(limit, float(values.max()), min(1.0, float(np.percentile(points[:, 3], 90))))
+    low = min(0.0, float(values.min()))
+    frame = Frame(_WIDTH, _HEIGHT, (0.0, end), (low - 0.04 * (high - low), high + 0.1 * (high - low)), margin=10.0)
+    parts = [frame.axes(unit)]
+    y = float(frame.py(limit))
+    parts.append(Markup('<path class="lim" d="M{:.1f} {:.1f}H{:.1f}"/>').format(frame.left, y, frame.right))
+    parts.append(label(frame.left + 4, y - 4, f"limit {number(limit)}", "lbl"))
+    if now < end * 0.995:
+        parts.append(frame.line(now, "now"))
+    parts += [_change(frame, points, c) for c in trend["changes"]]
+    if trend["line"] is not None:
+        parts += _line(frame, trend, points, end)
+    parts += _points(frame, points, trend["outliers"], every)
+    if f["state"] == "crossing":
+        parts.append(_crossing(frame, limit, now, f, end))
+    words = f"{title}: {len(points)} missions; {f['words']}"
+    return Markup('<svg class="trend" viewBox="0 0 {:.0f} {:.0f}" role="img" aria-label="{}">{}</svg>').format(
+        _WIDTH, _HEIGHT, words, Markup("").join(parts)
+    )
+
+
+def _change(frame: Frame, points: Array, change: Mapping[str, Any]) -> Markup:
+    k = change["index"]
+    place = 0.5 * (points[k - 1, 0] + points[k, 0]) if k else points[0, 0]
+    sign = {"drop": "↓", "rise": "↑"}.get(change["kind"], "∠")
+    x = float(frame.px(place))
+    return frame.line(float(place), "chg") + label(x + 3, frame.top + 10, sign, "lbl")
+
+
+def _points(frame: Frame, points: Array, outliers: Sequence[int], every: int) -> list[Markup]:
+    shown = np.arange(len(points))[::-1][::every][::-1]
+    x, y = frame.px(points[:, 0]), [frame.py(points[:, k]) for k in (1, 2, 3)]
+    bars = "".join(f"M{x[k]:.1f} {y[1][k]:.1f}V{y[2][k]:.1f}" for k in shown)
+    dots = "".join(f"M{x[k]:.1f} {y[0][k]:.1f}h0" for k in shown if k not in outliers)
+    odd = "".join(f"M{x[k] - 3:.1f} {y[0][k] - 3:.1f}l6 6m0-6l-6 6" for k in outliers)
+    out = [Markup('<path class="bar" d="{}"/>').format(bars), Markup('<path class="pt" d="{}"/>').format(dots)]
+    return [*out, Markup('<path class="odd" d="{}"/>').format(odd)] if odd else out
+
+
+def _line(frame: Frame, trend: Mapping[str, Any], points: Array, end: float) -> list[Markup]:
+    """Line and band of the last stretch; dashed from now on."""
+    line, now, first = trend["line"], trend["now"], trend["first"]
+    begin = float(points[first, 0])
+    stop = now if trend["forecast"]["state"] == "not_known" else end
+    x = np.linspace(begin, stop, 40)
+    level, slope, centre = line["level"], line["slope"], line["centre"]
+    spread, half = slope["high"] - slope["value"], level["high"] - level["value"]
+    scale = float(stdtrit(line["dof"], 0.95) / stdtrit(line["dof"], 0.975))  # from 95 % to 90 %
+    inside = half**2 + spread**2 * ((x - centre) ** 2 - (now - centre) ** 2)
+    band = scale * np.sqrt(np.maximum(inside, 0.0))
+    middle = level["value"] + slope["value"] * (x - now)
+    px, upper, lower = frame.px(x), frame.py(middle + band), frame.py(middle - band)
+    path = "L".join(f"{a:.1f} {b:.1f}" for a, b in zip([*px, *px[::-1]], [*upper, *lower[::-1]], strict=True))
+    d = "M{:.1f} {:.1f}L{:.1f} {:.1f}"
+    if slope["value"] > 0:  # to where it leaves the picture
+        stop = min(stop, max(now, now + (frame.y[1] - level["value"]) / slope["value"]))
+    ends = [(v, level["value"] + slope["value"] * (v - now)) for v in (begin, now, stop)]
+    (x0, y0), (x1, y1), (x2, y2) = ((float(frame.px(v)), float(frame.py(w))) for v, w in ends)
+    out = [
+        Markup('<path class="band" d="M{}Z"/>').format(path),
+        Markup('<path class="fit" d="{}"/>').format(d.format(x0, y0, x1, y1)),
+    ]
+    if stop > now:
+        out.append(Markup('<path class="fit far" d="{}"/>').format(d.format(x1, y1, x2, y2)))
+    return out
+
+
+def _crossing(frame: Frame, limit: float, now: float, f: Mapping[str, Any], end: float) -> Markup:
+    """Bar on the limit from the soonest to the latest crossing, open where that is not known, with the likely one."""
+    y, a = float(frame.py(limit)), float(frame.px(now + f["soonest"]))
+    b = float(frame.px(min(end, now + f["latest"]))) if f["latest"] is not None else frame.right
+    out = Markup('<path class="when{}" d="M{:.1f} {:.1f}H{:.1f}"/>').format(
+        "" if f["latest"] is not None else " open", a, y, b
+    )
+    if f["likely"] is not None and now + f["likely"] <= end:
+        out += Markup('<circle class="when" cx="{:.1f}" cy="{:.1f}" r="3.5"/>').format(
+            float(frame.px(now + f["likely"])), y
+        )
+    return out

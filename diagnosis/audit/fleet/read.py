@@ -1,0 +1,210 @@
+"""The audit store as plain values: every mission with its result, faults and parts, in four queries."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import math
+import os
+from collections import defaultdict
+from collections.abc import Sequence
+from contextlib import closing
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from diagnosis.audit.store.database import Database
+from diagnosis.audit.store.shared_reason import SharedReason, shared_reason, whole_path
+from diagnosis.audit.store.store import FILE_NAME
+
+CALENDAR_NS = 946_684_800 * 10**9  # a clock that says a time before 2000 does not know the date
+
+
+@dataclass(frozen=True, slots=True)
+class Bounds:
+    """ε̂ with 95 % bounds [1]."""
+
+    value: float
+    low: float
+    high: float
+
+
+@dataclass(frozen=True, slots=True)
+class FoundFault:
+    """One fault of one mission; see the table ``fault``."""
+
+    id: str
+    component: str
+    kind: str
+    side: str
+    mode: str
+    severity: str
+    seconds: float
+    epsilon: Bounds | None
+    probability: float
+
+
+@dataclass(frozen=True, slots=True)
+class Part:
+    """One component and side of one mission; see the table ``component``."""
+
+    component: str
+    side: str
+    driving_s: float
+    decided_s: float
+    epsilon: Bounds | None
+
+
+@dataclass(frozen=True, slots=True)
+class Result:
+    """What became of one log; see the table ``result``.
+
+    `start_ns` is None where the log's clock does not know the date. `order` is its place in the store.
+    """
+
+    id: int
+    state: str
+    reason: str
+    attempts: int
+    machine_id: str
+    machine_name: str
+    verdict: str | None
+    title: str
+    start_ns: int | None
+    duration_s: float | None
+    driving_s: float | None
+    distance_m: float | None
+    open_loop: bool
+    report: str | None
+    version: str
+    log_hash: str
+    config_hash: str
+    faults: tuple[FoundFault, ...]
+    parts: tuple[Part, ...]
+
+    @property
+    def judged(self) -> bool:
+        """Whether there is a report."""
+        return self.verdict is not None
+
+
+@dataclass(frozen=True, slots=True)
+class Mission:
+    """A mission as found; `result` is None where it is not audited yet. Copies share one; `gone`: the log is no longer there."""
+
+    name: str
+    files: tuple[str, ...]
+    bytes: int
+    result: Result | None
+    gone: bool
+
+
+_RESULTS = (
+    "SELECT id, state, reason, attempts, machine_id, machine_name, verdict, title, start_ns, duration_s, driving_s, "
+    "distance_m, open_loop, report, version, log_hash, config_hash FROM result WHERE id IN (SELECT result FROM mission) ORDER BY id"
+)
+_FAULTS = (
+    "SELECT result, id, component, kind, side, mode, severity, stop_s - start_s, epsilon, epsilon_low, epsilon_high, "
+    "probability FROM fault ORDER BY result, start_ns, length(id), id"
+)
+_PARTS = (
+    "SELECT result, component, side, driving_s, decided_s, epsilon, epsilon_low, epsilon_high FROM component "
+    "ORDER BY result, rowid"
+)
+_MISSIONS = "SELECT name, files, bytes, result, gone IS NOT NULL FROM mission ORDER BY name"
+_CONTENT = ("SELECT id, attempts, state, reason, machine_id, verdict, report FROM result ORDER BY id", _MISSIONS)
+
+
+def read_missions(store: Path) -> list[Mission]:
+    """Every mission of a store, by name.
+
+    Parameters
+    ----------
+    store : Path
+        ``fleet.sqlite`` of an audit, or the folder that holds it.
+
+    Raises
+    ------
+    OutputError
+        Where there is no store, it is damaged, or of another kind or version.
+    """
+    with closing(_opened(store)) as db, db.snapshot():
+        faults: dict[int, list[FoundFault]] = defaultdict(list)
+        for row in db.rows(_FAULTS):
+            r, name, component, kind, side, mode, severity, seconds, e, low, high, p = row
+            found = FoundFault(name, component, kind, side, mode, severity, seconds, _bounds(e, low, high), p)
+            faults[r].append(found)
+        parts: dict[int, list[Part]] = defaultdict(list)
+        for r, component, side, driving, decided, e, low, high in db.rows(_PARTS):
+            parts[r].append(Part(component, side, driving, decided, _bounds(e, low, high)))
+        results = {row[0]: _result(row, tuple(faults[row[0]]), tuple(parts[row[0]])) for row in db.rows(_RESULTS)}
+        missions = [
+            Mission(name, tuple(map(str, json.loads(files))), size, results.get(r), bool(gone))
+            for name, files, size, r, gone in db.rows(_MISSIONS)
+        ]
+    return _with_own_reasons(missions, os.path.realpath(store if store.is_dir() else store.parent))
+
+
+def _with_own_reasons(missions: Sequence[Mission], folder: str) -> list[Mission]:
+    """Missions whose results' reasons name their own files, also where a copy was diagnosed in their place."""
+    sharing: dict[int, list[Sequence[str]]] = defaultdict(list)
+    for one in missions:
+        if one.result is not None and one.result.reason:
+            sharing[one.result.id].append(one.files)
+    reasons: dict[int, SharedReason] = {}
+    out = []
+    for one in missions:
+        if one.result is not None and len(theirs := sharing[one.result.id]) > 1:
+            if one.result.id not in reasons:
+                reasons[one.result.id] = shared_reason(one.result.reason, theirs, folder)
+            reason = reasons[one.result.id].of([whole_path(folder, file) for file in one.files])
+            one = replace(one, result=replace(one.result, reason=reason))
+        out.append(one)
+    return out
+
+
+def read_run(store: Path) -> int:
+    """Number of the last audit run of a store; 0 where there was none.
+
+    Raises
+    ------
+    OutputError
+        As `read_missions`.
+    """
+    with closing(_opened(store)) as db:
+        rows = db.rows("SELECT value FROM meta WHERE name = 'run'")
+        return int(rows[0][0]) if rows else 0
+
+
+def content_mark(store: Path) -> str:
+    """What changes with the missions and results of a store, and not with runs that bring nothing.
+
+    Raises
+    ------
+    OutputError
+        As `read_missions`.
+    """
+    digest = hashlib.sha256()
+    with closing(_opened(store)) as db, db.snapshot():
+        for query in _CONTENT:
+            for row in db.rows(query):
+                digest.update(repr(tuple(row)).encode("utf-8", "backslashreplace"))
+    return digest.hexdigest()[:16]
+
+
+def _opened(store: Path) -> Database:
+    return Database(store / FILE_NAME if store.is_dir() else store, read_only=True)
+
+
+def _result(row: Any, faults: tuple[FoundFault, ...], parts: tuple[Part, ...]) -> Result:
+    told = {k: row[k] for k in row.keys()}  # noqa: SIM118 - a row is no mapping
+    start = told["start_ns"]
+    told["start_ns"] = start if start is not None and start >= CALENDAR_NS else None
+    told["open_loop"] = bool(told["open_loop"])
+    return Result(**told, faults=faults, parts=parts)
+
+
+def _bounds(value: float | None, low: float | None, high: float | None) -> Bounds | None:
+    if value is None or low is None or high is None or not all(map(math.isfinite, (value, low, high))):
+        return None
+    return Bounds(value, low, high)

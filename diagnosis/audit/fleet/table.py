@@ -1,0 +1,59 @@
+"""`fleet.csv`: one row per mission, in a form that no spreadsheet takes for a formula."""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Mapping
+from typing import Any
+
+from diagnosis.pages.labels import utc, visible
+
+COLUMNS = (
+    "machine", "mission", "state", "reason", "verdict", "title", "start_utc", "start_ns", "duration_s", "driving_s",
+    "distance_m", "faults", "worst_component", "worst_side", "worst_mode", "worst_severity", "worst_epsilon",
+    "worst_epsilon_low", "worst_epsilon_high", "injected", "copy_of", "report", "files",
+)  # fmt: skip
+
+
+def fleet_csv(document: Mapping[str, Any]) -> str:
+    """Missions of a fleet's document as comma-separated values with a line of headings."""
+    labels = [m["label"] for m in document["machines"]]
+    out = io.StringIO()
+    rows = csv.writer(out, lineterminator="\n")
+    rows.writerow(COLUMNS)
+    for m in document["missions"]:
+        rows.writerow([_cell(v) for v in _row(m, labels)])
+    return out.getvalue()
+
+
+def _row(m: Mapping[str, Any], labels: list[str]) -> list[Any]:
+    worst: Mapping[str, Any] = m["faults"][0] if m["faults"] else {}
+    epsilon = worst.get("epsilon") or {}
+    start = m.get("start_ns")
+    return [
+        "" if m["machine"] is None else labels[m["machine"]],
+        m["name"],
+        m["state"],
+        m["reason"],
+        m["verdict"],
+        m.get("title"),
+        "" if start is None else utc(start),
+        start,
+        *(m.get(k) for k in ("duration_s", "driving_s", "distance_m")),
+        len(m["faults"]) if m["verdict"] is not None else None,
+        *(worst.get(k) for k in ("component", "side", "mode", "severity")),
+        *(epsilon.get(k) for k in ("value", "low", "high")),
+        {True: "yes", False: "no"}.get(m.get("open_loop", None), ""),
+        m.get("copy_of"),
+        m.get("report"),
+        " ".join(m["files"]),
+    ]
+
+
+def _cell(value: Any) -> Any:
+    """Text made visible, and quoted by an apostrophe where a spreadsheet would run it; numbers as they are."""
+    if not isinstance(value, str):
+        return value
+    text = visible(value)
+    return "'" + text if text.lstrip()[:1] in {"=", "+", "-", "@"} else text

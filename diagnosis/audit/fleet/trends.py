@@ -1,0 +1,80 @@
+"""Trends of a fleet: every component and side of every machine, in order of the missions."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from diagnosis.audit.fleet.machines import Machine, Run
+from diagnosis.audit.trends.trend import REACH, Forecast, Series, Trend, trend_of
+
+Axis = Literal["hours", "days"]
+
+_DAY_NS = 86_400 * 10**9
+
+
+@dataclass(frozen=True)
+class PartTrend:
+    """Trend of ε̂ of one component and side of a machine; `runs` are the missions that have an estimate."""
+
+    component: str
+    side: str
+    kind: str
+    limit: float
+    runs: tuple[Run, ...]
+    series: Series
+    trend: Trend
+
+    @property
+    def approaching(self) -> bool:
+        """Whether it rises for certain and likely reaches the limit within as long as the stretch has lasted."""
+        f = self.trend.forecast
+        return self.trend.direction == "rising" and f.likely is not None and f.likely <= f.horizon / REACH
+
+
+def trends_of(machine: Machine, axis: Axis = "hours") -> list[PartTrend]:
+    """Trends of a machine's parts; those without any estimate are left out.
+
+    Parameters
+    ----------
+    machine : Machine
+        Dated missions count alone.
+    axis : str
+        ``hours`` of driving in the audited missions, or ``days`` since the first of them.
+    """
+    if not machine.dated:
+        return []
+    places, now = _places(machine.dated, axis)
+    out = []
+    for component, side in machine.parts:
+        found = [
+            (x, run, part.epsilon)
+            for x, run in zip(places, machine.dated, strict=True)
+            if (part := run.parts.get((component, side))) is not None and part.epsilon is not None
+        ]
+        if not found:
+            continue
+        x, value, low, high = np.array([(x, e.value, e.low, e.high) for x, _, e in found]).T
+        series = Series(x, value, low, high, now)
+        trend = trend_of(series, machine.limits.min_epsilon)
+        if not machine.id:
+            none = Forecast("not_known", why="the machine has no identity, so that missions of several may be mixed")
+            trend = Trend(None, trend.first, trend.outliers, trend.changes, "not_known", none)
+        runs = tuple(run for _, run, _ in found)
+        kind = machine.kind(component)
+        out.append(PartTrend(component, side, kind, machine.limits.min_epsilon, runs, series, trend))
+    return out
+
+
+def _places(runs: Sequence[Run], axis: Axis) -> tuple[list[float], float]:
+    """Middle of each mission and end of the last, in hours of driving or days."""
+    if axis == "days":
+        begin = runs[0].result.start_ns or 0
+        ends = [((r.result.start_ns or 0) - begin) / _DAY_NS + (r.result.duration_s or 0.0) / 86_400 for r in runs]
+        return [e - (r.result.duration_s or 0.0) / 172_800 for e, r in zip(ends, runs, strict=True)], max(ends)
+    hours = np.array([(r.result.driving_s or 0.0) / 3600 for r in runs])
+    after = np.cumsum(hours)
+    return [float(v) for v in after - hours / 2], float(after[-1])

@@ -1,0 +1,216 @@
+"""Sentences about a fleet, for page, document and terminal."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from diagnosis.audit.fleet.machines import VERDICTS, FleetFault, Machine
+from diagnosis.audit.fleet.trends import Axis, PartTrend
+from diagnosis.audit.trends.trend import Forecast
+from diagnosis.decision.wording import MODE_WORDS, join_words, part_words
+from diagnosis.pages.labels import utc
+
+_SHOWN = 3
+_NAMED = 12
+_UNITS = {"hours": "h of driving", "days": "days"}
+_TAGS = {
+    "stop": "stop and repair",
+    "watch": "faults to watch",
+    "not_assessed": "not assessed",
+    "ready": "ready",
+}
+
+
+def count(n: int, word: str) -> str:
+    """Number and word, the word in the plural where it is not one."""
+    return f"{n} {word}{'' if n == 1 else 's'}"
+
+
+def round_to(value: float, digits: int = 2) -> str:
+    """Few significant digits without an exponent."""
+    text = f"{float(f'{value:.{digits}g}'):f}"
+    return text.rstrip("0").rstrip(".") if "." in text else text
+
+
+def fault_words(f: FleetFault) -> str:
+    """Part and row: ``RL drive valve inefficient``."""
+    words = MODE_WORDS["actuator" if f.side == "actuator" else "sensor"].get(f.mode, f.mode)
+    return f"{part_words(f.kind, f.component, f.side)} {words}"
+
+
+def forecast_words(f: Forecast, limit: float, axis: Axis = "hours") -> str:
+    """When a limit is reached, in one phrase."""
+    unit = _UNITS[axis]
+    if f.state == "not_known":
+        return f"not known: {f.why}"
+    if f.state == "above":
+        return f"already at {round_to(limit)}"
+    if f.state == "not_within" or f.soonest is None:
+        return f"does not reach {round_to(limit)} within {round_to(f.horizon)} {unit}"
+    if f.latest is None:
+        begin = f"in {round_to(f.soonest)} {unit} at the soonest" if f.soonest > 0 else "at any time"
+        likely = f", likely in {round_to(f.likely)}" if f.likely is not None else ""
+        return f"may reach {round_to(limit)} {begin}{likely}; latest not known"
+    return f"reaches {round_to(limit)} in {round_to(f.soonest)} to {round_to(f.latest)} {unit} (90 %)"
+
+
+def standing(m: Machine) -> str:
+    """Where a machine stands: ``Stop and repair, and later missions not judged``."""
+    if m.verdict == "ready":
+        return "Ready"
+    if m.verdict == "not_assessed":
+        if m.last_verdict == "not_assessed":
+            return "Not assessed"
+        last = m.last_judged
+        since = f" since {utc(last.result.start_ns)[:10]}" if last and last.result.start_ns is not None else ""
+        return f"Not assessed{since}: last judged ready" + (", but not cleared" if m.cleared is False else "")
+    words = "Stop and repair"
+    if is_damaged(m):
+        words = "No fault found, but its last log is damaged"
+    elif m.verdict == "watch":
+        lasting = m.last_judged is not None and m.last_judged.result.verdict == "watch"
+        words = "Faults to watch"
+        if lasting and m.cleared is False:
+            words = "Faults to watch, not cleared"
+        elif lasting and m.cleared and not m.unjudged:
+            words = "Ready, with faults to watch"
+    return words + (", and later missions not judged" if m.unjudged else "")
+
+
+def is_damaged(m: Machine) -> bool:
+    """Whether nothing but damage to a log keeps a machine from being ready."""
+    watched = [r.result for r in m.newest if r.result.verdict == "watch"]
+    return m.verdict == "watch" and not any(f.standing for f in m.faults) and not any(r.faults for r in watched)
+
+
+def headline(machines: Sequence[Machine], unknown: int = 0) -> tuple[str, str, str]:
+    """Status of the fleet, a few words above its sentence, and the sentence.
+
+    Parameters
+    ----------
+    machines : Sequence[Machine]
+        All machines.
+    unknown : int
+        Logs that were not judged, whose machine is not known: none is ready for certain then.
+    """
+    verdicts = [m.verdict for m in machines]
+    status = min(verdicts, key=VERDICTS.index, default="not_assessed")
+    n, damaged = len(machines), sum(map(is_damaged, machines))
+    work = sum(v in ("stop", "watch") for v in verdicts) - damaged
+    open_ = verdicts.count("not_assessed")
+    if not n:
+        return "not_assessed", "nothing judged", "No mission could be judged"
+    tag = f"{count(verdicts.count(status), 'machine')}: {_TAGS[status]}"
+    if status == "watch" and not work:
+        tag = f"{count(damaged, 'machine')}: damaged logs"
+    if work and n == 1:
+        title = "The machine needs work"
+    elif work:
+        title = f"{work} of {count(n, 'machine')} {'needs' if work == 1 else 'need'} work"
+    elif open_ + damaged == n:
+        title = _none_ready(machines)
+    elif open_ or damaged:
+        fine = n - open_ - damaged
+        title = f"{fine} of {count(n, 'machine')} {'is' if fine == 1 else 'are'} ready"
+    elif unknown:
+        status, tag = "not_assessed", "not all assessed"
+        known = "The machine is" if n == 1 else f"{n} machines are"
+        title = f"{known} ready, but {count(unknown, 'log')} of no known machine {_was(unknown)} not judged"
+    else:
+        title = "The machine is ready" if n == 1 else f"All {n} machines are ready"
+    if open_ and open_ < n:
+        title += f", {open_} {'is' if open_ == 1 else 'are'} not assessed"
+    if damaged and damaged < n:
+        title += f", {damaged} {'has a damaged log' if damaged == 1 else 'have damaged logs'}"
+    return status, tag, title
+
+
+def _none_ready(machines: Sequence[Machine]) -> str:
+    n = len(machines)
+    if any(m.last_verdict != "not_assessed" for m in machines):
+        return "The machine is not known to be ready" if n == 1 else f"None of {n} machines is known to be ready"
+    return "The machine could not be assessed" if n == 1 else f"None of {n} machines could be assessed"
+
+
+def _was(n: int) -> str:
+    return "was" if n == 1 else "were"
+
+
+def sentences(
+    machines: Sequence[Machine],
+    trends: Sequence[Sequence[PartTrend]],
+    failed: tuple[int, int, int],
+    axis: Axis = "hours",
+    unknown: int = 0,
+) -> list[str]:
+    """What stands behind the headline: the worst machines, limits that come near, logs that were not judged.
+
+    Parameters
+    ----------
+    machines, trends
+        Machines, worst first, and their trends.
+    failed : tuple[int, int, int]
+        Logs that were not read, missions that were read but not assessed, and those not audited yet.
+    axis : str
+        ``hours`` or ``days``.
+    unknown : int
+        As for `headline`.
+    """
+    bad = [m for m in machines if m.verdict in ("stop", "watch")]
+    out = []
+    for verdict, words in (("stop", "Must not go out"), ("watch", "Faults to watch")):
+        found = [m for m in machines if m.verdict == verdict and not is_damaged(m)]
+        if found and len(bad) > _SHOWN:
+            out.append(f"{words} ({len(found)}): {_named(found)}.")
+    for m in bad[:_SHOWN]:
+        told = [_found(m, f) for f in m.faults if f.standing][:2]
+        note = f" ({m.note})" if m.note else ""
+        words = standing(m)
+        what = f": {join_words(told)}" if told else ""
+        out.append(f"{m.label} – {words[0].lower() + words[1:]}{what}{note}.")
+    open_machines = [m for m in machines if m.verdict == "not_assessed"]
+    if open_machines:
+        out.append(f"Not assessed ({len(open_machines)}): {_named(open_machines)}.")
+    near = [(m, t) for m, own in zip(machines, trends, strict=True) for t in own if t.approaching]
+    near.sort(key=lambda p: p[1].trend.forecast.likely or 0.0)
+    for m, t in near[:2]:
+        words = forecast_words(t.trend.forecast, t.limit, axis)
+        out.append(f"{m.label}: the loss of the {part_words(t.kind, t.component, t.side)} {words}.")
+    unread, open_, pending = failed
+    if unread or open_:
+        both = f": {unread} not read, {open_} read but not assessed" if unread and open_ else ""
+        out.append(f"{count(unread + open_, 'log')} could not be read or judged{both}.")
+    if unknown and any(m.verdict != "ready" for m in machines):  # else the headline says so
+        out.append(f"{count(unknown, 'log')} {_was(unknown)} not judged and may be of a machine that stands as ready.")
+    if pending:
+        out.append(f"{count(pending, 'mission')} {'is' if pending == 1 else 'are'} not audited yet.")
+    return out
+
+
+def new_words(missions: int, faults: Sequence[tuple[Machine, FleetFault]]) -> list[str]:
+    """What the last audit run brought, in no or one sentence; see `diagnosis.audit.fleet.news.news`."""
+    if not missions:
+        return []
+    told = [f"{m.label} {fault_words(f)} ({f.severity})" for m, f in faults[:_NAMED]]
+    more = f" and {len(faults) - len(told)} more" if len(faults) > len(told) else ""
+    return [
+        f"New since the run before, in {count(missions, 'mission')}: {'; '.join(told) + more if told else 'no new fault'}."
+    ]
+
+
+def _named(machines: Sequence[Machine]) -> str:
+    """Names of machines, where one is not ready any more with the reason."""
+    told = [m.label for m in machines[:_NAMED]]
+    if machines[0].verdict == "not_assessed":
+        told = [
+            m.label + (f" ({words.partition(' ')[2]})" if (words := standing(m)) != "Not assessed" else "")
+            for m in machines[:_NAMED]
+        ]
+        told = [t.replace("(assessed since", "(since").replace("(assessed: ", "(") for t in told]
+    more = len(machines) - len(told)
+    return ", ".join(told) + (f" and {more} more: listed below" if more else "")
+
+
+def _found(m: Machine, f: FleetFault) -> str:
+    many = f" in {f.missions} of {len(m.runs)} missions" if len(m.runs) > 1 else ""
+    return f"{fault_words(f)}{many}"

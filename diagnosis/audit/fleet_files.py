@@ -1,0 +1,175 @@
+"""The fleet of an audit as page, document and table: `fleet.html`, `fleet.json` and `fleet.csv` beside the store."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import orjson
+
+from diagnosis.audit.fleet.arrivals import arrivals, last_made, without_false_dates
+from diagnosis.audit.fleet.document import Fleet, fleet_document, fleet_of
+from diagnosis.audit.fleet.gather import machines_of
+from diagnosis.audit.fleet.machines import Limits
+from diagnosis.audit.fleet.news import first_runs
+from diagnosis.audit.fleet.read import Mission, content_mark, read_missions, read_run
+from diagnosis.audit.fleet.table import fleet_csv
+from diagnosis.audit.fleet.trends import Axis
+from diagnosis.audit.store.folders import holds_report
+from diagnosis.audit.store.keys import Key
+from diagnosis.audit.store.store import FILE_NAME
+from replay.atomic_write import atomic_path
+from replay.errors import ConfigError
+
+_MOST_BYTES = 50_000_000
+
+
+@dataclass(frozen=True)
+class FleetFiles:
+    """Where the three stand."""
+
+    html: Path
+    json: Path
+    csv: Path
+
+
+def write_fleet(store_path: Path, out: Path, *, baseline: Path | None = None, axis: Axis = "hours") -> FleetFiles:
+    """Read the store and write page, document and table; each appears whole or not at all.
+
+    Parameters
+    ----------
+    store_path : Path
+        ``fleet.sqlite`` of an audit, or the folder that holds it.
+    out : Path
+        Folder of the audit, to which the reports' folders in the store are relative.
+    baseline : Path or None
+        Store of another, earlier audit to compare with, or its folder.
+    axis : str
+        Trends over ``hours`` of driving or ``days``.
+
+    Raises
+    ------
+    ConfigError
+        Where the baseline is the store itself.
+    OutputError
+        Where a store cannot be read, or a file cannot be written.
+    """
+    from diagnosis.audit.fleet.page.page import build_fleet_page
+
+    if baseline is not None:
+        check_baseline(baseline, store_path)
+    mark = content_mark(store_path)  # first: what is written meanwhile makes the page an old one
+    fleet = load_fleet(store_path, out, axis)
+    fleet = replace(fleet, first_runs=first_runs(out / "fleet.json", fleet.missions, fleet.run))
+    document = fleet_json(fleet, baseline)
+    document["mark"] = mark
+    files = FleetFiles(out / "fleet.html", out / "fleet.json", out / "fleet.csv")
+    texts = {
+        files.json: orjson.dumps(document, option=orjson.OPT_APPEND_NEWLINE),
+        files.csv: fleet_csv(document).encode("utf-8-sig", "backslashreplace"),
+        files.html: build_fleet_page(document).encode("utf-8", "backslashreplace"),
+    }
+    for path, content in texts.items():
+        with atomic_path(path) as temporary:
+            temporary.write_bytes(content)
+    return files
+
+
+def check_baseline(baseline: Path, store_path: Path) -> None:
+    """See that a store to compare with can be read and is another one.
+
+    Raises
+    ------
+    ConfigError
+        Where it is the store itself.
+    OutputError
+        Where it cannot be read.
+    """
+    if _store(baseline).resolve() == _store(store_path).resolve():
+        raise ConfigError(
+            f"--baseline {baseline}: is the store of this audit itself; give that of another, earlier audit"
+        )
+    content_mark(baseline)
+
+
+def load_fleet(store_path: Path, out: Path | None = None, axis: Axis = "hours") -> Fleet:
+    """Missions, machines and trends of a store.
+
+    Parameters
+    ----------
+    store_path : Path
+        Store or its folder.
+    out : Path or None
+        Folder of the reports; None for the store's. Where a machine's last report is not there, its limits are the
+        defaults.
+    axis : str
+        ``hours`` or ``days``.
+
+    Raises
+    ------
+    OutputError
+        Where the store cannot be read.
+    """
+    place = _store(store_path).parent
+    folder = out if out is not None else place
+    missions = [_with_own_report(mission, folder) for mission in read_missions(store_path)]
+    came = arrivals(place, missions)
+    missions = without_false_dates(missions, came)
+    machines, unknown = machines_of(missions, lambda report: _limits(folder / report / "report.json"), came, str(place))
+    fleet = fleet_of(machines, missions, axis, unknown)
+    return replace(fleet, run=read_run(store_path), made_ns=last_made(place, missions))
+
+
+def fleet_json(fleet: Fleet, baseline: Path | None = None) -> dict[str, Any]:
+    """Document of a fleet, compared with an earlier audit where one is given.
+
+    Raises
+    ------
+    OutputError
+        Where the baseline cannot be read.
+    """
+    if baseline is None:
+        return fleet_document(fleet)
+    from diagnosis.audit.fleet.compare import compare_fleets
+
+    return fleet_document(fleet, compare_fleets(load_fleet(baseline), fleet))
+
+
+def _store(path: Path) -> Path:
+    """Store at a path, or in a folder."""
+    return path / FILE_NAME if path.is_dir() else path
+
+
+def _with_own_report(mission: Mission, folder: Path) -> Mission:
+    """Mission without the report of its result where another result's report has taken that one's place."""
+    result = mission.result
+    if result is None or result.report is None:
+        return mission
+    if holds_report(folder / result.report, Key(result.log_hash, result.config_hash, result.version)):
+        return mission
+    return replace(mission, result=replace(result, report=None))
+
+
+def _limits(path: Path) -> Limits:
+    """Limits and components from a machine's last report; defaults where it cannot be read."""
+    try:
+        if path.stat().st_size > _MOST_BYTES:
+            return Limits()
+        report = orjson.loads(path.read_bytes())
+        limits, machine = report.get("limits") or {}, report.get("machine") or {}
+        cleared = (report.get("verdict") or {}).get("cleared")
+        return Limits(
+            min_epsilon=float(limits.get("min_epsilon", Limits.min_epsilon)),
+            min_assessed=float(limits.get("min_assessed", Limits.min_assessed)),
+            wheels=_names(machine, "wheels"),
+            axles=_names(machine, "axles"),
+            cleared=cleared if isinstance(cleared, bool) else None,
+        )
+    except (OSError, ValueError, TypeError, AttributeError):
+        return Limits()
+
+
+def _names(machine: Mapping[str, Any], key: str) -> tuple[str, ...]:
+    return tuple(str(name) for name in machine.get(key) or ())

@@ -1,0 +1,1 @@
+"""Each mission in a process of its own, within limits."""

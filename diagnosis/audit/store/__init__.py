@@ -1,0 +1,1 @@
+"""What an audit keeps: SQLite database, objects, report folders."""

@@ -1,0 +1,226 @@
+"""Places in an audit's folder: a run's own working folder, claims on missions, and reports that appear whole."""
+
+from __future__ import annotations
+
+import ctypes
+import os
+import secrets
+import shutil
+import sys
+import tempfile
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager, suppress
+from dataclasses import dataclass
+from pathlib import Path
+
+from diagnosis.audit.store.claims import WORKING, Claim, cannot_write, claim_mission
+from diagnosis.audit.store.keys import Key
+
+MISSIONS, RESULTS = "missions", "results"
+_TEMPORARY = "mfhca-audit-"
+_HELD = ".held"
+_MARK = ".key"
+_AT_FDCWD, _RENAME_EXCHANGE = -100, 2
+
+
+@dataclass(frozen=True)
+class Working:
+    """A run's own folders, gone after it.
+
+    Attributes
+    ----------
+    folder : Path
+        Below the output, so that a finished report is moved and not copied.
+    temporary : Path
+        Below the system's folder for temporary files.
+    """
+
+    folder: Path
+    temporary: Path
+
+
+@contextmanager
+def working(output: Path) -> Iterator[Working]:
+    """Make the run's own folders; remove them at the end, and those that runs ended by force have left.
+
+    Raises
+    ------
+    OutputError
+        Where the output cannot be written.
+    """
+    base = output / WORKING
+    with ExitStack() as ending:
+        try:
+            for name in (MISSIONS, RESULTS, WORKING):
+                (output / name).mkdir(parents=True, exist_ok=True)
+            sweep(output)
+            folder, claim = _own_folder(base, ending)
+            temporary = _own_temporary(claim.path, ending)
+        except OSError as error:
+            raise cannot_write(error, output) from error
+        yield Working(folder, temporary)
+
+
+def _own_folder(base: Path, ending: ExitStack) -> tuple[Path, Claim]:
+    while True:
+        folder = base / f"{os.getpid()}-{secrets.token_hex(4)}"
+        claim = Claim(base / f"{folder.name}.lock")
+        if claim.take():
+            ending.callback(claim.drop)
+            ending.callback(_unlink, claim.path)
+            ending.callback(shutil.rmtree, folder, ignore_errors=True)
+            folder.mkdir()
+            return folder, claim
+        claim.drop()  # another run that sweeps was faster
+
+
+def _own_temporary(told: Path, ending: ExitStack) -> Path:
+    while True:
+        temporary = Path(tempfile.gettempdir()) / f"{_TEMPORARY}{secrets.token_hex(8)}"
+        told.write_bytes(os.fsencode(temporary))  # first, so that the next run finds it in any case
+        temporary.mkdir(0o700)
+        ending.callback(shutil.rmtree, temporary, ignore_errors=True)
+        held = Claim(temporary / _HELD)
+        ending.callback(held.drop)
+        if held.take():
+            return temporary
+        held.drop()  # another run that sweeps was faster
+
+
+def _unlink(path: Path) -> None:
+    with suppress(OSError):
+        path.unlink()
+
+
+def sweep(output: Path) -> None:
+    """Remove what runs that were ended by force have left, of this output and of others: their locks are free."""
+    base = output / WORKING
+    for lock in base.glob("*.lock"):
+        try:
+            claim = Claim(lock)
+        except OSError:
+            continue
+        if claim.take():
+            with suppress(OSError):
+                temporary = Path(os.fsdecode(lock.read_bytes()).strip() or ".")
+                if temporary.name.startswith(_TEMPORARY):
+                    shutil.rmtree(temporary, ignore_errors=True)
+                shutil.rmtree(lock.with_suffix(""), ignore_errors=True)
+                lock.unlink()
+        claim.drop()
+    for folder in base.glob("[0-9]*-*"):  # a run makes its lock before its folder
+        if folder.is_dir() and not folder.with_name(f"{folder.name}.lock").exists():
+            shutil.rmtree(folder, ignore_errors=True)
+    for held in Path(tempfile.gettempdir()).glob(f"{_TEMPORARY}*/{_HELD}"):
+        try:
+            claim = Claim(held)
+        except OSError:  # another user's
+            continue
+        if claim.take():
+            shutil.rmtree(held.parent, ignore_errors=True)
+        claim.drop()
+
+
+def publish(made: Path, place: Path, key: Key) -> None:
+    """Move a finished report to its place; one that stands there is exchanged in one step where the system can.
+
+    The report is marked with the key of its result: the next one of the mission, under another configuration or of
+    another content, takes the same place.
+
+    Raises
+    ------
+    OutputError
+        Where the place cannot be written; what stood there stands still.
+    """
+    try:
+        place.parent.mkdir(parents=True, exist_ok=True)
+        mark_report(made, key)
+        for file in made.iterdir():
+            _flush(file)
+        if not place.exists():
+            made.rename(place)
+        elif not _exchange(made, place):
+            aside = made.with_name(f"{made.name}.old")
+            place.rename(aside)
+            made.rename(place)
+        _flush(place.parent)
+    except OSError as error:
+        raise cannot_write(error, place) from error
+
+
+def mark_report(folder: Path, key: Key) -> None:
+    """Mark a report with the key of its result."""
+    (folder / _MARK).write_bytes(_marked(key))
+
+
+def holds_report(folder: Path, key: Key) -> bool:
+    """Whether the report in a folder is that of a key's result, not of another one that took its place."""
+    try:
+        with (folder / _MARK).open("rb") as file:
+            return file.read(1 << 12) == _marked(key)
+    except (OSError, ValueError):  # a name from a damaged store
+        return False
+
+
+@contextmanager
+def own_report(output: Path, report: str, key: Key) -> Iterator[Path | None]:
+    """Claim a result's report to change it; None where another run is at its mission, or it is not there any more.
+
+    Raises
+    ------
+    OutputError
+        Where the output cannot be written.
+    """
+    claim = claim_mission(output, report.removeprefix(f"{MISSIONS}/"))
+    try:
+        folder = output / report
+        yield folder if claim is not None and holds_report(folder, key) else None
+    finally:
+        if claim is not None:
+            claim.drop()
+
+
+def _marked(key: Key) -> bytes:
+    return f"{key.log_hash}\n{key.config_hash}\n{key.version}\n".encode()
+
+
+def write_whole(path: Path, data: bytes) -> None:
+    """Write a file under a temporary name, and give it its own once it is on the disk.
+
+    Raises
+    ------
+    OutputError
+        Where it cannot be written.
+    """
+    part = path.with_name(f".{path.name}.{os.getpid()}-{secrets.token_hex(4)}.part")
+    try:
+        with part.open("wb") as file:
+            file.write(data)
+            file.flush()
+            os.fsync(file.fileno())
+        part.replace(path)
+    except OSError as error:
+        with suppress(OSError):
+            part.unlink()
+        raise cannot_write(error, path) from error
+
+
+def _exchange(one: Path, other: Path) -> bool:
+    if sys.platform != "linux":
+        return False
+    try:
+        call = ctypes.CDLL(None, use_errno=True).renameat2
+    except (AttributeError, OSError):
+        return False
+    done: int = call(_AT_FDCWD, os.fsencode(one), _AT_FDCWD, os.fsencode(other), _RENAME_EXCHANGE)
+    return done == 0
+
+
+def _flush(path: Path) -> None:
+    if os.name == "nt":
+        return
+    descriptor = os.open(path, os.O_RDONLY)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)

@@ -1,0 +1,133 @@
+"""One attempt at a mission as a document, and as rows of the store."""
+
+from __future__ import annotations
+
+import sqlite3
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+SCHEMA = "mfhca-audit-result/1"
+READ = ("ok", "degraded")
+_KEY = ("log_hash", "config_hash", "version")
+_FROM_REPORT = (
+    "machine_name", "verdict", "title", "start_ns", "duration_s", "driving_s", "decided_s", "distance_m", "open_loop",
+)  # fmt: skip
+_RESULT = (*_KEY, "state", "reason", "attempts", "machine_id", *_FROM_REPORT, "report")
+_ATTEMPT = ("number", "state", "reason", "wall_s", "cpu_s", "peak_mb")
+_FAULT = (
+    "id", "component", "kind", "side", "mode", "severity", "start_s", "stop_s", "start_ns",
+    "epsilon", "epsilon_low", "epsilon_high", "sat", "sat_unit", "probability",
+)  # fmt: skip
+_COMPONENT = (
+    "component", "side", "driving_s", "decided_s", "healthy_s", "faulty_s", "worst",
+    "epsilon", "epsilon_low", "epsilon_high", "epsilon_s",
+)  # fmt: skip
+_EMPTY = {"machine_name": "", "title": "", "open_loop": 0}
+
+
+def write_document(connection: sqlite3.Connection, document: Mapping[str, Any], run: int) -> None:
+    """Write a document's rows, within a transaction.
+
+    A mission points to the document's key afterwards. Where the document holds an attempt, it becomes the result of its
+    key, unless it failed and an earlier one did not.
+
+    Parameters
+    ----------
+    connection : sqlite3.Connection
+        With a transaction begun.
+    document : Mapping[str, Any]
+        From `diagnosis.audit.store.objects`: ``mission``, ``key``, and for an attempt ``attempt``, ``report``, ``summary``.
+    run : int
+        Number of the audit run.
+    """
+    mission, key = document["mission"], tuple(document["key"][k] for k in _KEY)
+    attempt = document.get("attempt")
+    known = connection.execute(
+        f"SELECT id, state FROM result WHERE {' AND '.join(f'{k} = ?' for k in _KEY)}", key
+    ).fetchone()
+    identity: int | None = known["id"] if known else None
+    if attempt is not None:
+        if known is None or attempt["state"] in READ or known["state"] not in READ:
+            identity = _write_result(connection, key, document, identity)
+        _insert(connection, "attempt", ("result", *_ATTEMPT), [{**attempt, "result": identity}], "OR REPLACE")
+        connection.execute(
+            "UPDATE result SET attempts = (SELECT count(*) FROM attempt WHERE result = id) WHERE id = ?", (identity,)
+        )
+    if identity is None:  # a copy whose original is not there yet
+        return
+    write_files(connection, mission["files"])
+    point(connection, mission, identity, run)
+
+
+def _write_result(
+    connection: sqlite3.Connection, key: tuple[str, ...], document: Mapping[str, Any], identity: int | None
+) -> int:
+    summary = document.get("summary") or {"result": {}, "faults": [], "components": []}
+    facts, attempt = summary["result"], document["attempt"]
+    row = {
+        **dict(zip(_KEY, key, strict=True)),
+        **{name: facts.get(name, _EMPTY.get(name)) for name in _FROM_REPORT},
+        "state": attempt["state"],
+        "reason": attempt["reason"],
+        "attempts": 1,
+        "machine_id": facts.get("machine_id") or document.get("machine_id", ""),
+        "report": document.get("report"),
+    }
+    if identity is None:
+        identity = connection.execute(
+            f"INSERT INTO result ({', '.join(_RESULT)}) VALUES ({_marks(_RESULT)})", [row[c] for c in _RESULT]
+        ).lastrowid
+        assert identity is not None
+    else:
+        connection.execute(
+            f"UPDATE result SET {', '.join(f'{c} = ?' for c in _RESULT)} WHERE id = ?",
+            [*(row[c] for c in _RESULT), identity],
+        )
+        for table in ("fault", "component"):
+            connection.execute(f"DELETE FROM {table} WHERE result = ?", (identity,))
+    for table, columns, rows in (
+        ("fault", _FAULT, summary["faults"]),
+        ("component", _COMPONENT, summary["components"]),
+    ):
+        _insert(connection, table, ("result", *columns), [{**r, "result": identity} for r in rows])
+    return identity
+
+
+def write_files(connection: sqlite3.Connection, files: Sequence[Mapping[str, Any]]) -> None:
+    """Write what is known of files' contents: ``path``, ``size``, ``stamp``, ``sha256``."""
+    columns = ("path", "size", "stamp", "sha256")
+    _insert(connection, "file", columns, [f for f in files if f.get("sha256")], "OR REPLACE")
+
+
+def point(connection: sqlite3.Connection, mission: Mapping[str, Any], result: int | None, run: int) -> None:
+    """Enter a mission, or let it point to a result."""
+    connection.execute(
+        "INSERT INTO mission (name, files, bytes, result, seen) VALUES (?, ?, ?, ?, ?) ON CONFLICT (name) DO UPDATE SET "
+        "files = excluded.files, bytes = excluded.bytes, result = excluded.result, seen = max(seen, excluded.seen), "
+        "gone = NULL",
+        (mission["name"], names_of(mission["files"]), mission["bytes"], result, run),
+    )
+
+
+def names_of(files: Sequence[Mapping[str, Any]]) -> str:
+    """JSON list of files' paths, as the store holds it."""
+    from diagnosis.results.json_text import dump_json
+
+    return dump_json([f["path"] for f in files]).decode()
+
+
+def _insert(
+    connection: sqlite3.Connection,
+    table: str,
+    columns: Sequence[str],
+    rows: Sequence[Mapping[str, Any]],
+    how: str = "",
+) -> None:
+    connection.executemany(
+        f"INSERT {how} INTO {table} ({', '.join(columns)}) VALUES ({_marks(columns)})",
+        [[row[c] for c in columns] for row in rows],
+    )
+
+
+def _marks(columns: Sequence[str]) -> str:
+    return ", ".join("?" * len(columns))

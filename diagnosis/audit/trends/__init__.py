@@ -1,0 +1,1 @@
+"""The course of a part's loss over missions."""

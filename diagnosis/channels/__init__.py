@@ -1,0 +1,1 @@
+"""What one channel tells alone: liveness, noise, repeats, gaps."""

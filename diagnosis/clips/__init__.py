@@ -1,0 +1,1 @@
+"""Each fault as a log of its own."""

@@ -1,0 +1,206 @@
+"""Each fault cut out of its mission: an MCAP file with the messages around it, and layouts that show it."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import chain
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+import numpy as np
+
+from diagnosis.clips.plots import plots_of
+from diagnosis.clips.sources import APART_S, Source, open_sources
+from diagnosis.results.result import SEVERITIES, MissionResult
+from replay.atomic_write import atomic_path
+from replay.control.loop import Replay, replay_loop
+from replay.errors import OutputError
+from replay.export.clips.mcap import MARK, Definitions, Records, batch_records, write_clip
+from replay.export.clips.topics import evidence_topic, loop_topics, open_loop_topic, signal_topics
+from replay.export.clips.viewer_layouts import foxglove_layout, plotjuggler_layout
+from replay.machine.config import Machine
+from replay.mission import Mission
+
+MOST = 50
+ENDINGS = (".mcap", ".foxglove.json", ".plotjuggler.xml")
+_LAST_ROS_NS = 2**32 * 1_000_000_000
+_UNSAFE = re.compile(r"[^\w.+-]+")
+_LONGEST_NAME = 80
+_LONGEST_NS = 600_000_000_000
+
+
+@dataclass(frozen=True)
+class Clips:
+    """What was written.
+
+    Attributes
+    ----------
+    paths : tuple[Path, ...]
+        The MCAP files, most severe fault first.
+    left_out : int
+        Faults for which there was no place among the first `MOST`.
+    notes : tuple[str, ...]
+        What the clips do not hold, one sentence each.
+    """
+
+    paths: tuple[Path, ...]
+    left_out: int
+    notes: tuple[str, ...]
+
+
+def clip_name(fault: Mapping[str, Any]) -> str:
+    """File name of a fault's clip without ending, of characters that every file system takes: ``F1 FR sensor stuck``."""
+    words = (fault["id"], fault["component"], fault["side"], fault["mode"])
+    safe = " ".join(_UNSAFE.sub("_", str(w)) for w in words)
+    return safe[:_LONGEST_NAME].rstrip(" .").lstrip(".") or "fault"
+
+
+def chosen_faults(intervals: Sequence[Mapping[str, Any]], most: int = MOST) -> tuple[list[Mapping[str, Any]], int]:
+    """Give the faults of at least low severity, most severe first, and how many more there are than `most`."""
+    faults = [f for f in intervals if f["severity"] != "info"]
+    faults.sort(key=lambda f: (-SEVERITIES.index(f["severity"]), f["start_s"]))
+    return faults[:most], max(len(faults) - most, 0)
+
+
+def write_clips(
+    mission: Mission,
+    result: MissionResult,
+    machine: Machine,
+    folder: Path,
+    *,
+    margin_s: float = 5.0,
+    progress: Callable[[str], None] = lambda text: None,
+) -> Clips:
+    """Write a clip and two layouts per fault.
+
+    A clip holds the original messages of MCAP logs as they were written, all topics, and beside them, for every format,
+    the mapped signals (``/mfhca/mapped_<n>``), the replayed loop (``/mfhca/…``) and the evidence (``/mfhca/evidence``).
+    Clips of an earlier run in the folder are replaced; other files in it are left alone.
+
+    Parameters
+    ----------
+    mission : Mission
+        The mission that was diagnosed.
+    result : MissionResult
+        Its diagnosis.
+    machine : Machine
+        The machine.
+    folder : Path
+        Where to; made if absent.
+    margin_s : float
+        Time before and behind each fault [s].
+    progress : Callable[[str], None]
+        Told what is being done.
+
+    Raises
+    ------
+    OutputError
+        Where the folder cannot be written, or holds another file under the name of a clip.
+    """
+    faults, left_out = chosen_faults(result.report["intervals"])
+    names = [clip_name(f) for f in faults]
+    targets = {folder / (name + ending) for name in names for ending in ENDINGS}
+    _check(mission, targets)
+    if folder.is_dir():
+        for path in folder.iterdir():
+            if path not in targets and path.name.endswith(ENDINGS) and _is_own(path):
+                path.unlink()
+    if not faults:
+        return Clips((), 0, ())
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise OutputError(f"{folder}: cannot make the folder ({error.strerror or error})") from error
+    progress("replaying the loop for the clips")
+    replay = replay_loop(mission.timeline, machine)
+    progress("reading the messages for the clips")
+    notes = [
+        f"{f['id']}: lasts {f['stop_s'] - f['start_s']:.0f} s; its clip holds the first {_LONGEST_NS * 1e-9:.0f} s."
+        for f in faults
+        if _end(f) < f["stop_ns"]
+    ]
+    written = []
+    with TemporaryDirectory(prefix="mfhca-") as scratch:
+        sources = list(open_sources(mission, Path(scratch), notes))
+        for fault, name in zip(faults, names, strict=True):
+            progress(f"writing {name}")
+            judged = mission, replay, machine, result
+            written.append(_write(fault, folder / name, judged, sources, round(margin_s * 1e9)))
+    return Clips(tuple(written), left_out, tuple(notes))
+
+
+def _check(mission: Mission, targets: Iterable[Path]) -> None:
+    """Raise an `OutputError` where a clip cannot be written, before anything is."""
+    timeline = mission.timeline
+    if timeline.start_ns < 0 or timeline.start_ns + timeline.size * timeline.step_ns >= _LAST_ROS_NS:
+        raise OutputError(
+            f"MCAP clips hold 1970 to 2106, the log starts at {np.datetime64(timeline.start_ns, 'ns')}; diagnose without "
+            "--clips"
+        )
+    for path in sorted(targets):
+        if path.exists() and not _is_own(path):
+            raise OutputError(
+                f"{path}: exists, and is no clip of this tool; move it away, or give another folder with -o"
+            )
+
+
+def _is_own(path: Path) -> bool:
+    """Whether a file is a clip or a layout that this tool wrote."""
+    if not path.is_file():
+        return False
+    with path.open("rb") as file:
+        return MARK.encode() in file.read(4096)
+
+
+def _end(fault: Mapping[str, Any]) -> int:
+    """Stamp up to which a fault is cut out: of a long one the beginning."""
+    return min(int(fault["stop_ns"]), int(fault["start_ns"]) + _LONGEST_NS)
+
+
+def _write(
+    fault: Mapping[str, Any],
+    stem: Path,
+    judged: tuple[Mission, Replay, Machine, MissionResult],
+    sources: Sequence[Source],
+    margin_ns: int,
+) -> Path:
+    """Write one clip and its layouts."""
+    mission, replay, machine, result = judged
+    start, stop = int(fault["start_ns"]) - margin_ns, _end(fault) + margin_ns
+    definitions = Definitions()
+    copied: list[Iterator[Records]] = []
+    for source in sources:
+        first, last = source.places(np.array([start, stop])).tolist()
+        copied += [part.messages(first, last, part.define(definitions)) for part in source.parts]
+    signals = signal_topics(mission.signals, start, stop)
+    loop = loop_topics(mission.timeline, replay, machine, start, stop)
+    evidence = evidence_topic(result.columns, str(fault["component"]), mission.timeline.start_ns, start, stop)
+    named = [*signals, *([evidence] if evidence else [])]
+    batches = [*(b for b, _ in named), *loop]
+    if mission.open_loop:
+        batches.append(open_loop_topic(max(start, mission.timeline.start_ns)))
+    if sources and abs(sources[0].apart_s) >= APART_S:  # beside the original messages, not hours from them
+        batches = [replace(b, log_stamps=sources[0].places(b.log_stamps)) for b in batches]
+    own = [batch_records(batch, definitions) for batch in batches]
+    about = {
+        "fault": " ".join(str(fault[k]) for k in ("id", "component", "side", "mode", "severity")),
+        "start_ns": str(fault["start_ns"]),
+        "stop_ns": str(fault["stop_ns"]),
+        "margin_s": f"{margin_ns * 1e-9:g}",
+        "logs": ", ".join(f.path.name for f in mission.files),
+    }
+    path = stem.with_name(stem.name + ENDINGS[0])
+    write_clip(path, definitions, chain(own, *copied), about)
+    parts = [(b.topic, names) for b, names in named] + [
+        (b.topic, machine.axles if b.topic.startswith("/mfhca/steer_") else machine.wheels) for b in loop
+    ]
+    plots = plots_of(fault, parts)
+    for ending, text in zip(
+        ENDINGS[1:], (foxglove_layout(stem.name, plots), plotjuggler_layout(stem.name, plots)), strict=True
+    ):
+        with atomic_path(stem.with_name(stem.name + ending)) as temporary:
+            temporary.write_text(text, encoding="utf-8", newline="\n")
+    return path

@@ -1,0 +1,1 @@
+"""Two missions of one machine: new, worse, changed and resolved faults."""

@@ -1,0 +1,286 @@
+"""Faults of two missions of one machine, matched by component, side and row; times differ and are not compared."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from diagnosis.comparison.coverage import SideCoverage
+from diagnosis.decision.wording import join_words, mode_words
+from diagnosis.results.result import SEVERITIES
+
+GONE = ("stuck", "no_signal")
+EITHER = "sensor_or_actuator"
+_LONGER, _LEAST_S = 2.0, 1.0
+_LEAST_EPSILON = 0.05  # bounds are those of one mission; the same fault differs more from mission to mission
+_MODEL_RESOLUTION = 0.25
+_STRENGTH = {"direct": 3, "model": 2, "drive": 2, "signal": 1, "tracking": 1}
+
+Sides = Mapping[tuple[str, str], SideCoverage]
+
+
+@dataclass(frozen=True)
+class FoundFault:
+    """All faults of one mission on one component and side in one row.
+
+    Attributes
+    ----------
+    component, kind, side, mode : str
+        As in `diagnosis.results.result.FaultInterval`.
+    ids : tuple[str, ...]
+        Their numbers in the report.
+    seconds : float
+        Time of all of them [s].
+    share : float or None
+        The same as a share of the time in which the side was judged; None where that is not known.
+    severity : str
+        The worst.
+    epsilon : Mapping[str, float] or None
+        ``value``, ``low``, ``high`` of the longest of the worst ones.
+    probability : float
+        Of the same one.
+    tier : str
+        Strongest evidence.
+    """
+
+    component: str
+    kind: str
+    side: str
+    mode: str
+    ids: tuple[str, ...]
+    seconds: float
+    share: float | None
+    severity: str
+    epsilon: Mapping[str, float] | None
+    probability: float
+    tier: str
+
+
+@dataclass(frozen=True)
+class FaultChange:
+    """What became of one fault.
+
+    Attributes
+    ----------
+    status : str
+        ``new``, ``changed``, ``unchanged``, ``resolved``, or ``not_seen_again``: gone while nothing shows that it is
+        repaired, because the side was not assessed.
+    trend : str
+        Of a changed fault: ``worse``, ``better``, or ``other``; else empty.
+    component, kind, side, mode : str
+        Of the newer fault, else of the older one.
+    older, newer : FoundFault or None
+        The fault in either mission.
+    changes : tuple[str, ...]
+        ``row``, ``side``, ``severity``, ``epsilon``, ``duration``: what changed.
+    note : str
+        Sentence about what limits the statement; may be empty.
+    """
+
+    status: str
+    trend: str
+    component: str
+    kind: str
+    side: str
+    mode: str
+    older: FoundFault | None
+    newer: FoundFault | None
+    changes: tuple[str, ...] = ()
+    note: str = ""
+
+
+def is_worse(change: FaultChange) -> bool:
+    """Whether a fault is new or worse and of at least low severity."""
+    found = change.newer
+    return found is not None and found.severity != "info" and (change.status == "new" or change.trend == "worse")
+
+
+def found_faults(intervals: Sequence[Mapping[str, Any]], sides: Sides) -> list[FoundFault]:
+    """Gather a report's faults by component, side and row, worst first."""
+    groups: dict[tuple[str, str, str], list[Mapping[str, Any]]] = {}
+    for i in intervals:
+        groups.setdefault((str(i["component"]), str(i["side"]), str(i["mode"])), []).append(i)
+    out = [_found(key, faults, sides) for key, faults in groups.items()]
+    return sorted(out, key=lambda f: (-SEVERITIES.index(f.severity), -f.seconds, f.component, f.side, f.mode))
+
+
+def _found(key: tuple[str, str, str], faults: Sequence[Mapping[str, Any]], sides: Sides) -> FoundFault:
+    component, side, mode = key
+    first = max(faults, key=lambda f: (SEVERITIES.index(f["severity"]), f["stop_s"] - f["start_s"]))
+    seconds = float(sum(f["stop_s"] - f["start_s"] for f in faults))
+    judged = [sides[k].judged_s for k in _keys(component, side) if k in sides]
+    epsilon = first.get("epsilon")
+    return FoundFault(
+        component=component,
+        kind=str(first.get("kind", "wheel")),
+        side=side,
+        mode=mode,
+        ids=tuple(str(f["id"]) for f in faults),
+        seconds=seconds,
+        share=seconds / max(judged) if judged and max(judged) > 0 else None,
+        severity=str(first["severity"]),
+        epsilon=None if not epsilon else {k: float(epsilon[k]) for k in ("value", "low", "high")},
+        probability=float(first["probability"]),
+        tier=max((str(f.get("tier", "")) for f in faults), key=lambda t: _STRENGTH.get(t, 0)),
+    )
+
+
+def _keys(component: str, side: str) -> list[tuple[str, str]]:
+    return [(component, s) for s in (("sensor", "actuator") if side == EITHER else (side,))]
+
+
+def match_faults(
+    older: Sequence[FoundFault], newer: Sequence[FoundFault], older_sides: Sides, newer_sides: Sides
+) -> list[FaultChange]:
+    """Match faults one to one: same side and row, then same row where one side is not told apart, then same side.
+
+    Parameters
+    ----------
+    older, newer : Sequence[FoundFault]
+        From `found_faults`.
+    older_sides, newer_sides : Mapping
+        What was assessed, by component and side.
+
+    Returns
+    -------
+    list[FaultChange]
+        New and worse ones first, then what else changed, what is gone, and what stayed.
+    """
+    left, out = list(older), []
+    open_: list[FoundFault] = list(newer)
+    for alike in (_same, _same_row, _same_side):
+        rest = []
+        for b in open_:
+            a = next((a for a in left if a.component == b.component and alike(a, b)), None)
+            if a is None:
+                rest.append(b)
+                continue
+            left.remove(a)
+            out.append(_both(a, b))
+        open_ = rest
+    out += [_change("new", None, b, note=_unseen_before(b, older_sides)) for b in open_]
+    for a in left:
+        why = _why_not_assessed(a, newer_sides)
+        out.append(_change("not_seen_again" if why else "resolved", a, None, note=why or _other_faults(a, newer)))
+    return sorted(out, key=_order)
+
+
+def _order(c: FaultChange) -> tuple[int, int, str, str, str]:
+    rank = ("new", "worse", "other", "better", "not_seen_again", "resolved", "unchanged").index(c.trend or c.status)
+    fault = c.newer or c.older
+    severity = _rank(fault) if fault else 0
+    return rank, -severity, c.component, c.side, c.mode
+
+
+def _same(a: FoundFault, b: FoundFault) -> bool:
+    return a.side == b.side and a.mode == b.mode
+
+
+def _same_row(a: FoundFault, b: FoundFault) -> bool:
+    return a.mode == b.mode and EITHER in (a.side, b.side)
+
+
+def _same_side(a: FoundFault, b: FoundFault) -> bool:
+    return a.side == b.side
+
+
+def _change(
+    status: str,
+    a: FoundFault | None,
+    b: FoundFault | None,
+    trend: str = "",
+    changes: tuple[str, ...] = (),
+    note: str = "",
+) -> FaultChange:
+    fault = b or a
+    assert fault is not None
+    return FaultChange(status, trend, fault.component, fault.kind, fault.side, fault.mode, a, b, changes, note)
+
+
+def _both(a: FoundFault, b: FoundFault) -> FaultChange:
+    """A fault of both missions."""
+    ups = {"severity": _sign(_rank(a), _rank(b)), "epsilon": _epsilon(a, b), "duration": _duration(a, b)}
+    changes = [name for name, differs in (("row", a.mode != b.mode), ("side", a.side != b.side)) if differs]
+    changes += [name for name, up in ups.items() if up]
+    if not changes:
+        return _change("unchanged", a, b)
+    signs = [ups["severity"]] if ups["severity"] else [ups["epsilon"], ups["duration"]]
+    trend = "worse" if 1 in signs else "better" if -1 in signs else "other"
+    return _change("changed", a, b, trend, tuple(changes))
+
+
+def _rank(f: FoundFault) -> int:
+    return SEVERITIES.index(f.severity)
+
+
+def _sign(a: float, b: float) -> int:
+    return (b > a) - (b < a)
+
+
+def _epsilon(a: FoundFault, b: FoundFault) -> int:
+    """+1 or −1 where each ε̂ lies outside the other's 95 % bounds and they differ by 0.05; 0 between different rows."""
+    x, y = a.epsilon, b.epsilon
+    if x is None or y is None or a.mode != b.mode:
+        return 0
+    apart = not x["low"] <= y["value"] <= x["high"] and not y["low"] <= x["value"] <= y["high"]
+    return _sign(x["value"], y["value"]) if apart and abs(x["value"] - y["value"]) >= _LEAST_EPSILON else 0
+
+
+def _duration(a: FoundFault, b: FoundFault) -> int:
+    """+1 or −1 where time and share of the judged time both changed by more than a factor of two, and by a second."""
+    if abs(a.seconds - b.seconds) < _LEAST_S:
+        return 0
+    pairs = [(a.seconds, b.seconds)]
+    if a.share is not None and b.share is not None:
+        pairs.append((a.share, b.share))
+    if all(y > _LONGER * x for x, y in pairs):
+        return 1
+    return -1 if all(x > _LONGER * y for x, y in pairs) else 0
+
+
+def _unseen_before(b: FoundFault, sides: Sides) -> str:
+    keys = _keys(b.component, b.side)
+    for key in keys:
+        side = sides.get(key)
+        if side is None or not side.assessed:
+            part = "This part" if len(keys) == 1 else f"The {key[1]}"
+            words = "not assessed" if side is None else side.short_words
+            return f"{part} was {words} in the older mission: the fault may be older."
+    return ""
+
+
+def _other_faults(a: FoundFault, newer: Sequence[FoundFault]) -> str:
+    """Say that a part whose fault is gone has another one, or that its fault may be told as one of the other side."""
+    keys = set(_keys(a.component, a.side))
+    near = [b for b in newer if b.component == a.component and b.severity != "info"]
+    own = [b for b in near if keys & set(_keys(b.component, b.side))]
+    if own:
+        words = join_words(list(dict.fromkeys(mode_words(b.side, b.mode) for b in own)))
+        return f"The part is not sound: in the newer mission it is {words}."
+    other = next((b for b in near if "direct" not in (a.tier, b.tier)), None)
+    if other is None:
+        return ""
+    return (
+        f"In the newer mission the {other.side} of {a.component} is {mode_words(other.side, other.mode)}; without second "
+        "measurements one can be taken for the other."
+    )
+
+
+def _why_not_assessed(a: FoundFault, sides: Sides) -> str:
+    """Sentence that says why a fault that is gone cannot count as resolved, empty where it can."""
+    for key in _keys(a.component, a.side):
+        side = sides.get(key)
+        if side is None:
+            return f"The newer result does not hold the {key[1]}."
+        if not side.assessed:
+            return f"In the newer mission the {key[1]} was {side.words}."
+        small = a.epsilon is not None and a.epsilon["low"] < _MODEL_RESOLUTION
+        if side.tier == "tracking" and a.mode not in GONE:
+            return f"In the newer mission the {key[1]} was judged by its tracking alone, which does not show this row."
+        if _STRENGTH.get(side.tier, 0) < _STRENGTH.get(a.tier, 0) and a.mode not in GONE and small:
+            return (
+                f"In the newer mission the {key[1]} was judged by weaker evidence ({side.tier}, not {a.tier}), which does "
+                f"not show a loss below about {100 * _MODEL_RESOLUTION:.0f} %."
+            )
+    return ""

@@ -1,0 +1,145 @@
+"""The page of a comparison of two missions: one HTML file without scripts."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+import jinja2
+
+from diagnosis.comparison.faults import GONE
+from diagnosis.comparison.words import CHANGES, OUTCOMES, SIGNS, coverage_words, headline, times
+from diagnosis.pages import labels
+from diagnosis.pages.environment import POLICY, environment, plain_style
+from diagnosis.pages.svg import icon
+
+_HERE = Path(__file__).parent
+
+_DEFINITIONS = (
+    "Faults are matched by component, side and row of the tables; missions differ in time, so times are not compared. All "
+    "faults of one component and side in one row count once.",
+    "Changed: another row or side, another severity, ε̂ of each mission outside the other's 95 % bounds and 0.05 apart, or time that changed "
+    "by more than a factor of two, both in seconds and as a share of the judged time, and by a second at least.",
+    "Worse: a higher severity, else a larger ε̂ or more time.",
+    "Resolved: not found again although the side was assessed in the newer mission: with evidence, for the seconds that the "
+    "verdict “ready” takes, and for four fifths of its driving. A fault that is gone without that is “not seen again, but "
+    "not assessed”.",
+    "Tracking error: mean |e| while driving. Control effort: mean |u_a| while driving. Both depend on what was driven.",
+)
+
+
+def build_compare_page(document: Mapping[str, Any]) -> str:
+    """Page of a comparison; the same input gives the same text.
+
+    Parameters
+    ----------
+    document : Mapping[str, Any]
+        From `diagnosis.comparison.compare.comparison_json`.
+    """
+    document = labels.made_visible(document)
+    groups = []
+    for outcome, words in OUTCOMES.items():
+        rows = [_row(c) for c in document["faults"] if (c["trend"] or c["status"]) == outcome]
+        groups.append({"outcome": outcome, "words": words[0].upper() + words[1:], "sign": SIGNS[outcome], "rows": rows})
+    missions = [_mission(word, document[word]) for word in ("older", "newer")]
+    context = {
+        "title": f"{missions[0]['name']} and {missions[1]['name']}",
+        "css": plain_style(_HERE / "compare.css"),
+        "csp": POLICY,
+        "worse": document["worse"],
+        "headline": headline(document["counts"]),
+        "missions": missions,
+        "groups": groups,
+        "coverage": [_coverage(c) for c in document["coverage"]],
+        "metrics": [_metric(m) for m in document["metrics"]],
+        "notes": document["notes"],
+        "definitions": _DEFINITIONS,
+    }
+    return _environment().get_template("compare.html.j2").render(context)
+
+
+@lru_cache
+def _environment() -> jinja2.Environment:
+    found = environment(_HERE)
+    found.globals |= {"icon": icon}
+    return found
+
+
+def _mission(word: str, m: Mapping[str, Any]) -> dict[str, Any]:
+    state, words = labels.VERDICTS.get(m["verdict"], ("not_assessed", m["verdict"]))
+    machine = " ".join(x for x in (m["machine"], f"({m['machine_id']})" if m["machine_id"] else "") if x)
+    return {
+        "word": word,
+        "name": m["name"],
+        "files": ", ".join(m["files"]),
+        "when": labels.utc(m["start_ns"]) + " UTC",
+        "length": f"{labels.span(m['duration_s'])}, {labels.span(m['driving_s'])} driving",
+        "machine": machine,
+        "state": state,
+        "verdict": words,
+        "title": m["title"] if m["title"].casefold() != words.casefold() else "",
+    }
+
+
+def _part(c: Mapping[str, Any]) -> str:
+    return f"{c['component']} {labels.part(c['kind'], c['side'])}"
+
+
+def _row(c: Mapping[str, Any]) -> dict[str, Any]:
+    found = [f for f in (c["older"], c["newer"]) if f is not None]
+    rows = {f["mode"]: (labels.known(f["mode"]), labels.state_label(f["mode"], f["side"])) for f in found}
+    return {
+        "part": _part(c),
+        "rows": list(rows.values()),
+        "older": _found(c["older"]),
+        "newer": _found(c["newer"]),
+        "changed": ", ".join(CHANGES.get(name, name) for name in c["changes"]),
+        "note": c["note"],
+    }
+
+
+def _found(f: Mapping[str, Any] | None) -> dict[str, str] | None:
+    if f is None:
+        return None
+    e = f["epsilon"]
+    epsilon = "" if e is None or f["mode"] in GONE else f"ε̂ {e['value']:.2f} ({e['low']:.2f}–{e['high']:.2f})"
+    return {
+        "severity": f["severity"],
+        "times": times(len(f["ids"]), f["seconds"]),
+        "epsilon": epsilon,
+        "more": f"{', '.join(_few(f['ids']))}; p {f['probability']:.3f}" + (f"; {f['tier']}" if f["tier"] else ""),
+    }
+
+
+def _few(ids: Sequence[str]) -> list[str]:
+    return [*ids[:4], "…"] if len(ids) > 4 else list(ids)
+
+
+def _coverage(c: Mapping[str, Any]) -> dict[str, Any]:
+    sides = [c["older"], c["newer"]]
+    return {
+        "part": _part(c),
+        "change": c["change"],
+        "words": coverage_words(c),
+        "older": _judged(sides[0]),
+        "newer": _judged(sides[1]),
+    }
+
+
+def _judged(side: Mapping[str, Any] | None) -> str:
+    if side is None:
+        return "not in the result"
+    if side["tier"] == "none":
+        return "no evidence"
+    return f"{side['decided_s']:.1f} of {side['driving_s']:.1f} s ({side['tier']})"
+
+
+def _metric(m: Mapping[str, Any]) -> dict[str, Any]:
+    cells: list[str] = []
+    for quantity in ("tracking_error", "control_effort"):
+        a, b = m[f"{quantity}_older"], m[f"{quantity}_newer"]
+        change = f"{round(100 * (b / a - 1)):+d} %".replace("-", "−") if a and b is not None else ""
+        cells += ["–" if a is None else f"{a:.3f}", "–" if b is None else f"{b:.3f}", change]
+    return {"wheel": m["wheel"], "cells": cells}

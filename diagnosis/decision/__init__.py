@@ -1,0 +1,1 @@
+"""Verdict, severity, caveats, data quality, what is missing."""

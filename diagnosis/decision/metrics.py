@@ -1,0 +1,161 @@
+"""Figures of a mission: tracking error and control effort beside the paper's table, coverage, phases, path."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from diagnosis.results.assessment import STATES, Assessment
+from replay.arrays.envelope import shown
+from replay.arrays.numeric import without_nan
+from replay.arrays.spill import blocks, in_blocks
+from replay.control.loop import Replay, any_finite, stack
+from replay.faults import FAULT_STATES, State
+from replay.machine.config import Machine
+from replay.signals.timeline import Timeline
+
+Array = NDArray[np.float64]
+
+PAPER_TABLE = (
+    ("MFHCA", 0.019, 0.125, 4),
+    ("Yang", 0.032, 0.130, 16),
+    ("Wang", 0.021, 0.145, 7),
+    ("Yu", 0.024, 0.125, 6),
+    ("Sun", 0.035, 0.135, 12),
+)
+_DECIDED = np.array([s is State.HEALTHY or s in FAULT_STATES for s in STATES])
+_EARTH_RADIUS = 6_371_008.8
+
+
+def driving(replay: Replay, timeline: Timeline, machine: Machine) -> NDArray[np.bool_]:
+    """|v_c,i| above the driving speed, shape (n, wheels); the measured speed stands in where nothing is commanded."""
+    commanded = any_finite(replay.v_ref)
+    limit = machine.limits.driving_speed
+    v = replay.v_ref if commanded.all() else stack(timeline, [f"wheel.{w}.v" for w in machine.wheels])
+    with np.errstate(invalid="ignore"):
+        return in_blocks(lambda ref, y: np.abs(np.where(commanded, ref, y)) > limit, replay.v_ref, v)
+
+
+def loop_metrics(timeline: Timeline, replay: Replay, machine: Machine, moving: NDArray[np.bool_]) -> dict[str, Any]:
+    """Mean |e_i| [m/s] and mean |u_a,i| [fraction] per wheel and on average, for the mission and for driving.
+
+    e is taken with v_true where that is logged, and not with a speed into which faults were injected.
+    """
+    nothing = np.broadcast_to(np.nan, (timeline.size,))
+    per_wheel = {}
+    for i, wheel in enumerate(machine.wheels):
+        v, true, u = (timeline.signals.get(f"wheel.{wheel}.{x}", nothing) for x in ("v", "v_true", "u"))
+        if any(np.isfinite(true[part]).any() for part in blocks(timeline.size)):
+            v = true
+        elif timeline.open_loop:
+            v = nothing
+        per_wheel[wheel] = {
+            "tracking_error": _mean_size(moving[:, i], v, replay.v_ref[:, i]),
+            "control_effort": _mean_size(moving[:, i], u),
+        }
+    average = {
+        name: {part: _mean([per_wheel[w][name][part] for w in machine.wheels]) for part in ("mission", "driving")}
+        for name in ("tracking_error", "control_effort")
+    }
+    paper = [
+        {"controller": c, "tracking_error": e_, "control_effort": u_, "parameters": n} for c, e_, u_, n in PAPER_TABLE
+    ]
+    return {"wheels": per_wheel, "average": average, "paper": paper}
+
+
+def _mean(x: list[float]) -> float:
+    known = [value for value in x if np.isfinite(value)]
+    return float(np.mean(known)) if known else float("nan")
+
+
+def _mean_size(moving: NDArray[np.bool_], x: Array, less: Array | None = None) -> dict[str, float]:
+    """Mean |x − less| of the mission and of driving."""
+    total, count = np.zeros(2), np.zeros(2)
+    for part in blocks(x.size):
+        size = np.abs(x[part] if less is None else x[part] - less[part])
+        for j, known in enumerate((np.isfinite(size), np.isfinite(size) & moving[part])):
+            total[j] += size[known].sum()
+            count[j] += np.count_nonzero(known)
+    mission, driving_ = (float(t / c) if c else float("nan") for t, c in zip(total, count, strict=True))
+    return {"mission": mission, "driving": driving_}
+
+
+def coverage(
+    assessments: Mapping[tuple[str, str], Assessment], moving: NDArray[np.bool_], machine: Machine, dt: float
+) -> tuple[list[dict[str, Any]], dict[tuple[str, str], float]]:
+    """Seconds of each state per component and side, and seconds of driving that were decided."""
+    rows, decided = [], {}
+    anything = moving.any(axis=1)
+    for (component, side), assessment in assessments.items():
+        counts = np.bincount(assessment.states, minlength=len(STATES))
+        drives = moving[:, machine.wheels.index(component)] if component in machine.wheels else anything
+        seconds = float(np.count_nonzero(_DECIDED[assessment.states] & drives)) * dt
+        decided[component, side] = seconds
+        rows.append(
+            {
+                "component": component,
+                "side": side,
+                "tier": assessment.tier,
+                "seconds": {s.value: float(c) * dt for s, c in zip(STATES, counts, strict=True) if c},
+                "driving_s": float(np.count_nonzero(drives)) * dt,
+                "decided_driving_s": seconds,
+            }
+        )
+    return rows, decided
+
+
+def body_motion(timeline: Timeline, replay: Replay, machine: Machine) -> tuple[Array, Array]:
+    """Commanded or mean measured speed of the body [m/s], and its yaw rate where known [rad/s]."""
+    v = timeline.get("cmd.v")
+    if v is None or not np.isfinite(v).any():
+        v = in_blocks(_mean_speed, replay.v_ref, stack(timeline, [f"wheel.{w}.v" for w in machine.wheels]))
+    omega = timeline.get("cmd.omega")
+    return v, np.broadcast_to(0.0, v.shape) if omega is None else omega
+
+
+def _mean_speed(v_ref: Array, v: Array) -> Array:
+    speeds = np.where(np.isfinite(v_ref), v_ref, v)
+    count = np.isfinite(speeds).sum(axis=1)
+    return np.where(count > 0, np.nansum(speeds, axis=1) / np.maximum(count, 1), np.nan)
+
+
+def phases(timeline: Timeline, replay: Replay, machine: Machine) -> list[dict[str, Any]]:
+    """Forward, reverse, standstill and turning by the command, or unknown; pieces below 0.5 s join the one before."""
+    v, omega = body_motion(timeline, replay, machine)
+    limit = machine.limits.driving_speed / 2
+    half = 1.0 if machine.geometry is None else max(abs(w.x) for w in machine.geometry.wheels.values())
+
+    def coded(speed: Array, rate: Array) -> NDArray[np.int8]:
+        unknown, speed = np.isnan(speed), without_nan(speed)
+        turning = np.abs(without_nan(rate)) * half > 0.15 * np.abs(speed) + 1e-9
+        code = np.where(speed > limit, 1, np.where(speed < -limit, 2, 0))
+        return np.where(unknown, 4, np.where((code > 0) & turning, 3, code)).astype(np.int8)
+
+    code = in_blocks(coded, v, omega)
+    names = ("standstill", "forward", "reverse", "turning", "unknown")
+    cut = np.flatnonzero(np.r_[True, code[1:] != code[:-1]])
+    out: list[dict[str, Any]] = []
+    for a, b in zip(cut, np.r_[cut[1:], code.size], strict=True):
+        name = names[int(code[a])]
+        if out and ((b - a) * timeline.dt < 0.5 or out[-1]["name"] == name):
+            out[-1]["stop_s"] = float(b) * timeline.dt
+        else:
+            out.append({"name": name, "start_s": float(a) * timeline.dt, "stop_s": float(b) * timeline.dt})
+    return out
+
+
+def path_of(timeline: Timeline) -> dict[str, Array]:
+    """The machine's path [m] for pictures, from odometry, else from GNSS on a local plane; empty where neither is logged."""
+    x, y = timeline.get("odom.x"), timeline.get("odom.y")
+    if x is not None and y is not None and np.isfinite(x).any():
+        return {"path.x": shown(x), "path.y": shown(y)}
+    lat, lon = timeline.get("gnss.lat"), timeline.get("gnss.lon")
+    if lat is None or lon is None or not np.isfinite(lat).any():
+        return {}
+    k = int(np.flatnonzero(np.isfinite(lat) & np.isfinite(lon))[0])
+    north = np.radians(lat - lat[k]) * _EARTH_RADIUS
+    east = np.radians(lon - lon[k]) * _EARTH_RADIUS * np.cos(np.radians(lat[k]))
+    return {"path.x": shown(east), "path.y": shown(north)}

@@ -1,0 +1,1 @@
+"""Evidence where a quantity is measured twice."""

@@ -1,0 +1,1 @@
+"""Evidence of single drives: the controller's effort, command tracking."""

@@ -1,0 +1,1 @@
+"""Scores of a diagnosis against known truth."""

@@ -1,0 +1,96 @@
+"""Compare a report with the truth: states over driving time, faults one to one.
+
+A fault is right where component, side and mode agree and the intervals overlap enough (`diagnosis.evaluation.matching`). Left-over
+faults are matched with left-over reports of the same component, then of any other: those have the wrong mode, side or
+part. Time in which the truth says that an actuator was masked counts nowhere.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+from diagnosis.evaluation.aligned import Compared
+from diagnosis.evaluation.counts import SIDES, Counts
+from diagnosis.evaluation.events import match_events
+from diagnosis.evaluation.excitation import Speeds
+from diagnosis.evaluation.state_time import state_time
+from replay.errors import ConfigError, LogError
+from replay.truth import MissionTruth
+
+
+@dataclass(frozen=True)
+class MissionScores:
+    """Counts of one mission.
+
+    Attributes
+    ----------
+    groups : Mapping[str, Counts]
+        ``wheel`` and ``steer``, each where the result holds such components.
+    left_out : tuple[str, ...]
+        Components with injected faults that the result does not hold.
+    """
+
+    groups: Mapping[str, Counts]
+    left_out: tuple[str, ...]
+
+
+def evaluate_report(
+    report: Mapping[str, Any], truth: MissionTruth, name: str = "report.json", *, speeds: Speeds | None = None
+) -> MissionScores:
+    """Count what a report got right and wrong.
+
+    Parameters
+    ----------
+    report : Mapping[str, Any]
+        Contents of a ``report.json``.
+    truth : MissionTruth
+        What was injected.
+    name : str
+        The report's name, for messages.
+    speeds : Speeds or None
+        Commanded speeds of the result, from `diagnosis.evaluation.excitation`; without them nothing is divided by speed.
+
+    Raises
+    ------
+    ConfigError
+        Where the truth is that of another mission or machine.
+    LogError
+        Where the report lacks parts.
+    """
+    try:
+        return _evaluate(report, truth, name, speeds)
+    except (KeyError, TypeError, ValueError, AttributeError) as error:
+        raise LogError(f"{name}: is no complete report ({error!r}); run `mfhca diagnose` on the log again") from error
+
+
+def _evaluate(report: Mapping[str, Any], truth: MissionTruth, name: str, speeds: Speeds | None) -> MissionScores:
+    if not truth.rate_hz > 0:
+        raise ConfigError(f"the truth file's rate_hz is {truth.rate_hz:g}; expected the recorded rate, above 0 Hz")
+    shift = (int(report["log"]["start_ns"]) - truth.start_ns) * 1e-9
+    window = (max(0.0, shift), min(truth.duration_s, shift + float(report["log"]["duration_s"])))
+    if window[1] <= window[0]:
+        raise ConfigError(
+            f"{name}: begins {shift:.1f} s after the truth file's mission, which lasts {truth.duration_s:.1f} s, so they "
+            "do not overlap; give the truth file of this log with --truth"
+        )
+    states: dict[str, dict[str, list[tuple[float, float, str]]]] = {}
+    for row in report["states"]:
+        spans = states.setdefault(row["component"], {side: [] for side in SIDES})
+        spans[row["side"]].append((row["start_s"] + shift, row["stop_s"] + shift, row["state"]))
+    if not set(states) & set(truth.wheels):
+        raise ConfigError(
+            f"{name}: its components are {', '.join(states) or 'none'}, the truth file's wheels {', '.join(truth.wheels)}; "
+            "give the truth file of this log with --truth"
+        )
+    groups: dict[str, Counts] = {}
+    for group in ("wheel", "steer"):
+        parts = [c for c in states if (c in truth.wheels) == (group == "wheel")]
+        if parts:
+            part_states = {c: states[c] for c in parts}
+            compared = Compared(report["intervals"], part_states, truth, window, shift, speeds)
+            faults, reports = match_events(compared)
+            groups[group] = replace(state_time(compared), faults=faults, reports=reports)
+    left_out = tuple(dict.fromkeys(f.component for f in truth.intervals if f.component not in states))
+    return MissionScores(groups, left_out)

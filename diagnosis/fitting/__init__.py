@@ -1,0 +1,1 @@
+"""A machine's constants from healthy missions."""

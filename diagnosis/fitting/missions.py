@@ -1,0 +1,220 @@
+"""Machine constants from healthy missions: noise, wheels, wheel offset, control law; unit errors by name."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from diagnosis.fitting.control import fit_control, lambda_doubt
+from diagnosis.fitting.drives import drive_data, fit_drives
+from diagnosis.fitting.geometry import fit_offset
+from diagnosis.fitting.machine import Constant, with_control, with_drives, with_noise, with_offset, with_plants
+from diagnosis.fitting.noise import fit_noise
+from diagnosis.fitting.plants import fit_plants
+from diagnosis.fitting.units import UnitError, find_unit_errors, speed_mistakes
+from diagnosis.fitting.wheels import WheelFit
+from diagnosis.fitting.windows import WheelRecord
+from replay.control.loop import Replay, replay_loop
+from replay.errors import NotJudged
+from replay.machine.config import Machine
+from replay.mission import Mission
+from replay.signals.timeline import Timeline
+
+_LEAST_SECONDS = 10.0
+
+
+@dataclass(frozen=True)
+class FitResult:
+    """What the missions say of the machine.
+
+    Attributes
+    ----------
+    machine : Machine
+        The given machine with the constants that were found.
+    constants : tuple[Constant, ...]
+        All constants that were looked for, in the order of the machine file.
+    unit_errors : tuple[UnitError, ...]
+        Wrong units and signs; constants that rest on these signals are not written.
+    left_out : tuple[str, ...]
+        Missions, wheels and windows that disagree with the others, one sentence each.
+    notes : tuple[str, ...]
+        What else is to be known.
+    missions : tuple[str, ...]
+        Names of the missions.
+    seconds, driving : float
+        Their length together, and the part in which a wheel is commanded to move [s].
+    """
+
+    machine: Machine
+    constants: tuple[Constant, ...]
+    unit_errors: tuple[UnitError, ...]
+    left_out: tuple[str, ...]
+    notes: tuple[str, ...]
+    missions: tuple[str, ...]
+    seconds: float
+    driving: float
+
+
+def fit_missions(
+    missions: Sequence[Mission], machine: Machine, *, progress: Callable[[str], None] | None = None
+) -> FitResult:
+    """Estimate a machine's constants from its healthy missions.
+
+    Parameters
+    ----------
+    missions : Sequence[Mission]
+        Missions of one machine, read with `machine`.
+    machine : Machine
+        Where its signals are, its geometry, limits and law; what is found replaces its constants.
+    progress : callable or None
+        Called with one line about each step.
+
+    Returns
+    -------
+    FitResult
+        The constants with their standard deviations; the machine with those that hold.
+
+    Raises
+    ------
+    NotJudged
+        Where no mission is given, or together they hold too little driving.
+    """
+    tell = progress or (lambda text: None)
+    names = tuple(m.files[0].path.name if m.files else f"mission {k}" for k, m in enumerate(missions, 1))
+    timelines = [m.timeline for m in missions]
+    replays = []
+    for name, timeline in zip(names, timelines, strict=True):
+        tell(f"replaying {name}")
+        replays.append(_slim(replay_loop(timeline, machine)))
+    seconds = sum(t.size * t.dt for t in timelines)
+    records = [_records(t, r, machine) for t, r in zip(timelines, replays, strict=True)]
+    driving = sum(_driving(wheels) for wheels in records)
+    tell("checking units")
+    errors = list(find_unit_errors(timelines, replays, machine))
+    bad = {s for e in errors for s in e.signals}
+    tell("fitting the control law")
+    control = fit_control(timelines, replays, machine, bad)
+    doubt, leaves = lambda_doubt(control, machine, speed_mistakes(machine))
+    if doubt:
+        suspects = tuple(f"wheel.{w}.{leaf}" for leaf in leaves for w in machine.wheels)
+        errors.append(UnitError(suspects, control.lambda_.value / machine.control.lambda_, doubt))
+        bad |= set(suspects)
+    if driving < _LEAST_SECONDS and not errors:
+        raise NotJudged(
+            f"{', '.join(names) or 'no mission'}: {driving:.1f} s in which a wheel is commanded to move, {_LEAST_SECONDS:g} s "
+            "are needed; give missions that drive"
+        )
+    tell("fitting the wheels")
+    spoiled = [_spoiled(w, timelines, bad) for w in machine.wheels]
+    usable = [[None if s else r for r, s in zip(wheels, spoiled, strict=True)] for wheels in records]
+    plants = fit_plants(usable, machine.plant.flow) if usable else []
+    tell("fitting the geometry")
+    offset, blocks, turned = fit_offset(timelines, machine, bad)
+    noise = fit_noise(timelines, machine)
+    constants: list[Constant] = []
+    left_out: list[str] = []
+    out = with_offset(machine, offset, blocks, len(turned), constants)
+    out = with_control(out, machine, control, bool(doubt), constants)
+    out = with_plants(out, machine, plants, spoiled, constants)
+    if len(machine.wheels) == 1 or machine.geometry is None:
+        tell("fitting the drives")
+        logged = {
+            w: sum(
+                drive_data(t, r.v_ref[:, i], machine, w) is not None for t, r in zip(timelines, replays, strict=True)
+            )
+            for i, w in enumerate(machine.wheels)
+        }
+        drives = fit_drives(list(zip(timelines, replays, strict=True)), machine)
+        out = with_drives(out, drives, dict(zip(machine.wheels, spoiled, strict=True)), logged, constants)
+    out = with_noise(out, noise, bad, constants)
+    left_out += _left_plants(plants, machine, names)
+    left_out += [f"{names[m]}: the control law fits it badly or unlike the others" for m in control.left_missions]
+    notes = []
+    if control.law:
+        notes.append(
+            f"Control law {control.law}, Ψ̂ {control.psi}, explains at least {100 * control.explained:.1f} % of the command "
+            f"of {len(control.missions)} missions; λ̂ from increments {control.increments.value:.4g} ± "
+            f"{control.increments.std:.2g} s/m ({control.increments.why})."
+        )
+    return FitResult(
+        machine=out,
+        constants=tuple(constants),
+        unit_errors=tuple(errors),
+        left_out=tuple(left_out),
+        notes=tuple(notes),
+        missions=names,
+        seconds=seconds,
+        driving=driving,
+    )
+
+
+def _slim(replay: Replay) -> Replay:
+    """Keep commands, angles and fits; the rest of a replay is large."""
+    none = np.empty((0, replay.v_ref.shape[1]))
+    return replace(
+        replay,
+        rho=none,
+        psi_printed=none,
+        psi_implied=none,
+        implied_squared=none,
+        forcing=none,
+        psi=none,
+        u=none,
+        u_difference=none,
+        steer_u=none,
+        steer_difference=none,
+    )
+
+
+def _channels(wheel: str, timeline: Timeline) -> tuple[str | None, str | None]:
+    """Best measured speed and opening of a wheel that a mission logs."""
+    found = []
+    for leaves in (("v_true", "v"), ("u_applied", "u")):
+        logged = (f"wheel.{wheel}.{leaf}" for leaf in leaves)
+        found.append(next((n for n in logged if (x := timeline.get(n)) is not None and np.isfinite(x).any()), None))
+    return found[0], found[1]
+
+
+def _records(timeline: Timeline, replay: Replay, machine: Machine) -> list[WheelRecord | None]:
+    out: list[WheelRecord | None] = []
+    for i, w in enumerate(machine.wheels):
+        speed, opening = _channels(w, timeline)
+        if speed is None or opening is None:
+            out.append(None)
+            continue
+        y, command = timeline.signals[speed], replay.v_ref[:, i]
+        if not np.isfinite(command).any():
+            command = y  # a loop holds the speed: it is the better regressor
+        use = np.ones(y.size, dtype=np.bool_)
+        out.append(
+            WheelRecord(y, timeline.signals[opening][:, None], command, use, timeline.dt, machine.limits.driving_speed)
+        )
+    return out
+
+
+def _driving(wheels: list[WheelRecord | None]) -> float:
+    return max((np.count_nonzero(np.abs(r.command) > r.driving) * r.dt for r in wheels if r is not None), default=0.0)
+
+
+def _spoiled(wheel: str, timelines: Sequence[Timeline], bad: set[str]) -> str:
+    """Signal with a unit error that the wheel's constants would rest on; empty where there is none."""
+    used = {f"wheel.{wheel}.v_ref", "cmd.v"}
+    for t in timelines:
+        used |= {n for n in _channels(wheel, t) if n is not None}
+    return next(iter(sorted(used & bad)), "")
+
+
+def _left_plants(fits: list[WheelFit | None], machine: Machine, names: tuple[str, ...]) -> list[str]:
+    out = []
+    for w, fit in zip(machine.wheels, fits, strict=True):
+        if fit is None:
+            continue
+        if fit.refused:
+            out.append(f"wheel {w}: {fit.refused}")
+        out += [f"{names[m]}: wheel {w} disagrees with the other missions" for m in fit.left_missions]
+        gone = fit.considered - fit.used
+        if not fit.refused and gone > 0:
+            out.append(f"wheel {w}: {gone} of {fit.considered} windows disagree with the majority")
+    return out

@@ -1,0 +1,1 @@
+"""What all pages share: labels, axes, SVG, style."""

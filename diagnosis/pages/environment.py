@@ -1,0 +1,50 @@
+"""What all pages share: package data, policy, style, head, and the environment of their templates."""
+
+from __future__ import annotations
+
+import os
+import re
+import sys
+from functools import lru_cache
+from pathlib import Path
+
+import jinja2
+from markupsafe import Markup
+
+#: Style, scripts and templates that several pages share.
+SHARED = Path(__file__).parent
+POLICY = "default-src 'none'; style-src 'unsafe-inline'; img-src data:; base-uri 'none'; form-action 'none'"
+
+
+@lru_cache
+def asset(path: Path) -> str:
+    """Text of a style or script of this package."""
+    return path.read_text("utf-8")
+
+
+@lru_cache
+def plain_style(own: Path) -> Markup:
+    """Style of a page without scripts: the shared one, dark by the system's choice alone, and the page's own."""
+    shared = asset(SHARED / "style.css")
+    dark = re.sub(r"\[data-theme=dark\] \{([^}]*)\}", r"@media (prefers-color-scheme: dark) { :root {\1} }", shared)
+    return Markup(dark + asset(own))
+
+
+def environment(folder: Path) -> jinja2.Environment:
+    """Templates of a folder and the shared ones: everything is escaped, and a name that is missing is an error."""
+    return jinja2.Environment(
+        loader=jinja2.FileSystemLoader([folder, SHARED]),
+        autoescape=True,
+        undefined=jinja2.StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        bytecode_cache=_compiled_before(folder),
+    )
+
+
+def _compiled_before(templates: Path) -> jinja2.BytecodeCache | None:
+    """Compiled templates beside the compiled modules, where those may be written."""
+    folder = templates / "__pycache__"
+    if sys.dont_write_bytecode or not (folder.is_dir() and os.access(folder, os.W_OK)):
+        return None
+    return jinja2.FileSystemBytecodeCache(str(folder), "template-%s.pyc")

@@ -1,0 +1,192 @@
+"""The machine from above: wheels and steering axles with the symbol of their worst fault."""
+
+from __future__ import annotations
+
+import textwrap
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from markupsafe import Markup
+
+from diagnosis.pages.labels import FAULT_MODES, known, part, span, state_label
+from diagnosis.pages.svg import badge, text
+from diagnosis.report.confidence import known_sides
+
+_SEVERITY = {"high": 3, "medium": 2, "low": 1, "info": 0}
+_MARGIN, _LINE = 26.0, 15  # room for text on either side, and characters that fit in a line of it
+_W, _TYRE_W, _TYRE_H, _PITCH = 372.0, 50.0, 96.0, 132.0
+
+
+@dataclass(frozen=True)
+class Condition:
+    """What the picture says of one wheel or axle: state, lines of text, and the fault that it opens."""
+
+    state: str
+    lines: tuple[str, ...]
+    fault: str
+    title: str
+
+
+def condition(
+    component: str,
+    kind: str,
+    faults: Sequence[Mapping[str, Any]],
+    judged: Mapping[tuple[str, str], bool],
+    enough: Mapping[tuple[str, str], bool] | None = None,
+) -> Condition:
+    """Worst fault of a component, or whether it was judged at all.
+
+    Parameters
+    ----------
+    component, kind : str
+        Wheel or axle, ``wheel`` or ``steer``.
+    faults : Sequence[Mapping[str, Any]]
+        The report's intervals.
+    judged : Mapping[tuple[str, str], bool]
+        Whether any time of a component and side was decided.
+    enough : Mapping[tuple[str, str], bool] or None
+        Whether it was decided for as long as a verdict of *ready* takes; None: not known.
+    """
+    mine = [f for f in faults if f["component"] == component and f["kind"] == kind]
+    if mine:
+        worst = min(mine, key=lambda f: (-_SEVERITY.get(f["severity"], 0), f["start_s"]))
+        name = part(kind, worst["side"])
+        label = state_label(worst["mode"], worst["side"]).lower()
+        length = span(worst["stop_s"] - worst["start_s"])
+        more = (f"and {len(mine) - 1} more",) if len(mine) > 1 else ()
+        words = name[0].upper() + name[1:]
+        title = f"{component}: {name} {label}, {length}{', ' + more[0] if more else ''}"
+        return Condition(known(worst["mode"]), (words, label, length, *more), worst["id"], title)
+    sides = {side: done for (c, side), done in judged.items() if c == component}
+    open_sides = [part(kind, side) for side, done in sides.items() if not done]
+    brief = [part(kind, side) for (c, side), done in (enough or {}).items() if c == component and not done]
+    if not sides or len(open_sides) == len(sides):
+        return Condition("not_assessed", ("Not assessed",), "", f"{component}: not assessed")
+    if brief and not open_sides:
+        who = brief[0] if len(brief) < len(sides) else ""
+        lines = ("No fault found", *((who,) if who else ()), "judged too briefly")
+        return Condition("not_assessed", lines, "", f"{component}: {', '.join(x.lower() for x in lines)}")
+    if open_sides:
+        lines = ("No fault found", f"{open_sides[0]}", "not assessed")
+        return Condition("not_assessed", lines, "", f"{component}: no fault found, {open_sides[0]} not assessed")
+    return Condition("healthy", ("Healthy",), "", f"{component}: no fault found")
+
+
+def judged_sides(report: Mapping[str, Any]) -> dict[tuple[str, str], bool]:
+    """Whether any time of each component and side was decided, from the coverage, else from the states."""
+    decided: dict[tuple[str, str], bool] = {}
+    positive = {"healthy", *FAULT_MODES}
+    for row in report.get("coverage") or ():
+        seconds = row.get("seconds") or {}
+        decided[row["component"], row["side"]] = any(seconds.get(s, 0) > 0 for s in positive)
+    if not decided:
+        for row in report.get("states") or ():
+            key = (row["component"], row["side"])
+            decided[key] = decided.get(key, False) or row["state"] in positive
+    return decided
+
+
+def _rows(wheels: Sequence[str], geometry: Mapping[str, Any]) -> list[list[str]]:
+    """Wheels in rows from the front, each from left to right; a grid of two columns without geometry."""
+    if not all(w in geometry for w in wheels):
+        columns = 1 if len(wheels) == 1 else 2 if len(wheels) <= 8 else 4
+        return [list(wheels[i : i + columns]) for i in range(0, len(wheels), columns)]
+    length = max((abs(geometry[w]["x"]) for w in wheels), default=0.0)
+    rows: list[list[str]] = []
+    for w in sorted(wheels, key=lambda w: -geometry[w]["x"]):
+        if rows and abs(geometry[rows[-1][0]]["x"] - geometry[w]["x"]) <= 0.15 * length:
+            rows[-1].append(w)
+        else:
+            rows.append([w])
+    return [sorted(r, key=lambda w: -geometry[w]["y"]) for r in rows]
+
+
+def _hit(c: Condition, shapes: Markup) -> Markup:
+    if not c.fault:
+        return Markup('<g role="img" aria-label="{}"><title>{}</title>{}</g>').format(c.title, c.title, shapes)
+    return Markup(
+        '<g class="hit" data-f="{}" data-scroll role="button" tabindex="0" aria-label="{}"><title>{}</title>{}</g>'
+    ).format(c.fault, c.title, c.title, shapes)
+
+
+def _short(words: str, length: int) -> str:
+    return words if len(words) <= length else words[: length - 1] + "…"
+
+
+def machine_picture(report: Mapping[str, Any]) -> Markup:
+    """Picture of the machine for a report; wheels stand in a grid where the geometry is not known."""
+    machine = report.get("machine") or {}
+    wheels: Sequence[str] = machine.get("wheels") or ()
+    axles: Sequence[str] = machine.get("axles") or ()
+    geometry: Mapping[str, Any] = machine.get("geometry") or {}
+    faults = report.get("intervals") or ()
+    judged = judged_sides(report)
+    enough = {key: side.assessed for key, side in known_sides(report).items()}
+    rows = _rows(wheels, geometry)
+    placed = bool(wheels) and all(w in geometry for w in wheels)
+    top = 40.0 if placed else 26.0
+    wide = max((len(r) for r in rows), default=1)
+    parts: list[Markup] = []
+    bottom = top + _PITCH * len(rows) - (_PITCH - _TYRE_H)
+    if placed:
+        parts.append(Markup('<path class="nose" d="M186 8l9 13h-18z"/>') + text(203, 19, "front", "lbl"))
+        shape = '<rect class="body" x="146" y="{}" width="80" height="{}" rx="18"/>'
+        parts.append(Markup(shape).format(top - 6, bottom - top + 12))
+    else:
+        parts.append(text(186, 12, "positions not known", "lbl mid"))
+    axle_rows: dict[str, float] = {}
+    for i, row in enumerate(rows):
+        y = top + i * _PITCH
+        for j, w in enumerate(row):
+            centre, outward = _column(j, len(row), wide)
+            parts.append(_wheel(w, centre, y, outward, condition(w, "wheel", faults, judged, enough)))
+            if placed:
+                axle_rows.setdefault(str(geometry[w].get("axle", "")), y + _TYRE_H / 2)
+    extra = 0
+    for a in axles:
+        c = condition(a, "steer", faults, judged, enough)
+        if a in axle_rows and a not in wheels:
+            parts.append(_axle(a, 186, axle_rows[a], c))
+        else:
+            parts.append(_axle(a, 100 + 172 * (extra % 2), bottom + 40 + 48 * (extra // 2), c))
+            extra += 1
+    height = bottom + 20 + (48 * ((extra + 1) // 2) + 4 if extra else 0)
+    note = "front at the top" if placed else "positions not known, wheels in their listed order"
+    return Markup(
+        '<svg class="machine" viewBox="{x:.0f} 0 {w:.0f} {h:.0f}" role="group" aria-label="Machine from above, {n}">{p}</svg>'
+    ).format(x=-_MARGIN, w=_W + 2 * _MARGIN, h=height, n=note, p=Markup("").join(parts))
+
+
+def _column(j: int, count: int, wide: int) -> tuple[float, int]:
+    """Centre of a wheel and the side its text stands on (−1 left, 1 right, 0 none)."""
+    if wide > 2:
+        return 40 + (_W - 80) * (j + 0.5) / count, 0
+    if count == 1:
+        return _W / 2, 1
+    return (123.0, -1) if j == 0 else (249.0, 1)
+
+
+def _wheel(name: str, x: float, y: float, outward: int, c: Condition) -> Markup:
+    shapes = Markup('<rect class="tyre {}" x="{}" y="{}" width="{}" height="{}" rx="12"/>').format(
+        c.state, x - _TYRE_W / 2, y, _TYRE_W, _TYRE_H
+    )
+    shapes += text(x, y + 30, _short(name, 6), "name") + badge(c.state, x, y + 60, 24)
+    style = "side end" if outward < 0 else "side"
+    lines = [(piece, not i) for i, line in enumerate(c.lines) for piece in textwrap.wrap(line, _LINE)]
+    for i, (line, bold) in enumerate(lines if outward else ()):
+        shapes += text(
+            x + outward * 36,
+            y + _TYRE_H / 2 + 5 + 17 * (i - (len(lines) - 1) / 2),
+            line,
+            style + (" b" if bold else ""),
+        )
+    return _hit(c, shapes)
+
+
+def _axle(name: str, x: float, y: float, c: Condition) -> Markup:
+    shapes = Markup('<rect class="axle {}" x="{}" y="{}" width="72" height="40" rx="9"/>').format(
+        c.state, x - 36, y - 20
+    )
+    shapes += text(x, y - 6, _short(name, 10), "name small") + badge(c.state, x, y + 9, 17)
+    return _hit(c, shapes)

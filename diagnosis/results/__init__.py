@@ -1,0 +1,1 @@
+"""The report document: result, assessment, loss of effectiveness."""

@@ -1,0 +1,84 @@
+"""What an assessor hands on for one component and side: findings, states and evidence columns."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from diagnosis.results.loss import Loss
+from diagnosis.results.result import Closeups, Epsilon, Hypothesis, Sat
+from replay.faults import FaultMode, Side, State
+
+STATES: tuple[State, ...] = tuple(State)
+CODE = {state: np.int8(i) for i, state in enumerate(STATES)}
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One fault of one component on samples [start, stop); see `FaultInterval` for the other fields.
+
+    `epsilon` keeps within [0, 1] unless the fault lies outside the table. `detected` is the sample at which a causal reading of the same evidence, without anything later, would have raised
+    it; None where that is not known.
+    """
+
+    start: int
+    stop: int
+    side: Side
+    mode: FaultMode
+    probability: float
+    hypotheses: tuple[Hypothesis, ...]
+    epsilon: Epsilon | None
+    sat: Sat | None
+    evidence: tuple[str, ...]
+    tier: str
+    detected: int | None = None
+
+    def __post_init__(self) -> None:
+        if self.epsilon is not None and self.mode is not FaultMode.OUTSIDE_TABLE:
+            object.__setattr__(self, "epsilon", self.epsilon.as_share())
+
+
+@dataclass(frozen=True)
+class Assessment:
+    """One component and side over the whole mission.
+
+    Attributes
+    ----------
+    states : NDArray[np.int8], shape (n,)
+        Index into `STATES` of each sample.
+    reasons : Mapping[State, str]
+        Why a state that is no judgement was given.
+    findings : tuple[Finding, ...]
+        Faults in order of time.
+    columns : Mapping[str, NDArray[np.float32 | np.float64]], each of the rows of `replay.arrays.envelope` for n steps
+        Evidence series by leaf name (``residual``, ``threshold``, ``delta``, …).
+    tier : str
+        ``direct``, ``model``, ``drive``, ``tracking`` or ``none``; see `diagnosis.results.result.FaultInterval`.
+    notes : tuple[str, ...]
+        Figures that the judgement used, one sentence each.
+    unexplained_s : float
+        Time [s] in which something deviates that no single fault explains well enough to be stated.
+    closeups : Closeups or None
+        Every sample of `columns` around the findings, where they are envelopes.
+    loss : Loss or None
+        Loss of effectiveness over the mission, where a second measurement shows it.
+    """
+
+    states: NDArray[np.int8]
+    reasons: Mapping[State, str] = field(default_factory=dict)
+    findings: tuple[Finding, ...] = ()
+    columns: Mapping[str, NDArray[Any]] = field(default_factory=dict)
+    tier: str = "none"
+    notes: tuple[str, ...] = ()
+    unexplained_s: float = 0.0
+    closeups: Closeups | None = None
+    loss: Loss | None = None
+
+
+def unassessed(size: int, state: State, reason: str) -> Assessment:
+    """An assessment that says why nothing is judged."""
+    return Assessment(states=np.full(size, CODE[state], dtype=np.int8), reasons={state: reason})

@@ -1,0 +1,184 @@
+"""A diagnosed mission: what `report.json` holds, and the columns of `report.parquet` beside it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from itertools import pairwise
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from replay.faults import FaultMode, Side, State
+
+SCHEMA = "mfhca-report/1"
+
+Severity = Literal["info", "low", "medium", "high"]
+Verdict = Literal["ready", "watch", "stop", "not_assessed"]
+SEVERITIES: tuple[Severity, ...] = ("info", "low", "medium", "high")
+
+
+@dataclass(frozen=True)
+class Epsilon:
+    """ε̂ with its 95 % bounds [1]."""
+
+    value: float
+    low: float
+    high: float
+
+    def as_share(self) -> Epsilon:
+        """The same within [0, 1], where every fault of the table has its ε."""
+        return Epsilon(*(min(1.0, max(0.0, x)) for x in (self.value, self.low, self.high)))
+
+
+@dataclass(frozen=True)
+class Sat:
+    """Saturation term: mean, its 95 % bounds, and root mean square, in `unit`."""
+
+    mean: float
+    rms: float
+    low: float
+    high: float
+    unit: str
+
+
+@dataclass(frozen=True)
+class Hypothesis:
+    """One explanation of an interval and its probability."""
+
+    side: str
+    mode: str
+    p: float
+
+
+@dataclass(frozen=True)
+class FaultInterval:
+    """One fault.
+
+    Attributes
+    ----------
+    id : str
+        ``F1``, ``F2``, … in order of severity, then time.
+    component : str
+        Wheel or steering axle.
+    kind : str
+        ``wheel`` or ``steer``.
+    start_s, stop_s : float
+        Mission time [s], half open.
+    start_ns, stop_ns : int
+        The same on the log's clock.
+    epsilon, sat : Epsilon or None, Sat or None
+        None where the mode leaves them undefined or the data do not fix them.
+    probability : float
+        Probability of side and mode.
+    hypotheses : tuple[Hypothesis, ...]
+        Alternatives with theirs, most probable first.
+    severity, advice : str
+        By Assumptions 1 and 2.
+    evidence : tuple[str, ...]
+        What decided, one sentence each with its figures.
+    tier : str
+        ``direct`` (a second measurement), ``model`` (model of the wheels or of the steering), ``drive`` (model of a
+        single drive), ``signal`` (the channel alone), ``tracking`` (the command that is not followed).
+    detected_s : float or None
+        Mission time [s] at which the same evidence, read without anything later, would have raised the fault; None
+        where that is not known.
+    """
+
+    id: str
+    component: str
+    kind: Literal["wheel", "steer"]
+    side: Side
+    mode: FaultMode
+    start_s: float
+    stop_s: float
+    start_ns: int
+    stop_ns: int
+    epsilon: Epsilon | None
+    sat: Sat | None
+    probability: float
+    hypotheses: tuple[Hypothesis, ...]
+    severity: Severity
+    advice: str
+    evidence: tuple[str, ...]
+    tier: str
+    detected_s: float | None = None
+
+
+@dataclass(frozen=True)
+class StateSpan:
+    """One stretch of one component and side in one state; the spans of a component and side leave no gap."""
+
+    component: str
+    side: Literal["sensor", "actuator"]
+    state: State
+    start_s: float
+    stop_s: float
+    reason: str = ""
+
+
+@dataclass(frozen=True)
+class Closeups:
+    """Stretches with every sample, of a mission whose columns are envelopes.
+
+    Attributes
+    ----------
+    step : NDArray[np.int64], shape (m,)
+        Steps of the mission, increasing; consecutive ones are one stretch.
+    columns : Mapping[str, NDArray[np.float32]], each of shape (m,)
+        Samples at those steps; NaN where there is none or where a column was not kept.
+    """
+
+    step: NDArray[np.int64]
+    columns: Mapping[str, NDArray[Any]]
+
+    def runs(self) -> list[tuple[int, int]]:
+        """Places of the first row of each stretch and of the row behind its last."""
+        cuts = np.flatnonzero(np.diff(self.step) != 1) + 1
+        return [(a, b) for a, b in pairwise([0, *cuts.tolist(), len(self.step)]) if b > a]
+
+
+@dataclass(frozen=True)
+class MissionResult:
+    """Everything that a report shows; `report` is JSON, `columns` the time series.
+
+    Attributes
+    ----------
+    report : Mapping[str, Any]
+        The document written as ``report.json``.
+    columns : Mapping[str, NDArray[np.float32 | np.float64]], each of shape (n,)
+        Time series on one uniform axis; ``t`` [s] first. Of long missions they are envelopes: see `replay.arrays.envelope`.
+    windows : Closeups or None
+        Every sample around the worst faults, where the columns are envelopes.
+    """
+
+    report: Mapping[str, Any]
+    columns: Mapping[str, NDArray[np.float64] | NDArray[np.float32]] = field(default_factory=dict)
+    windows: Closeups | None = None
+
+
+def _plain(value: Any) -> Any:
+    """JSON value of a dataclass field: no NaN, no NumPy types, floats rounded to nine digits."""
+    if isinstance(value, dict):
+        return {str(k): _plain(v) for k, v in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(v) for v in value]
+    if isinstance(value, float | np.floating):
+        return float(f"{float(value):.9g}") if np.isfinite(value) else None
+    if isinstance(value, np.integer):
+        return int(value)
+    if isinstance(value, np.bool_):
+        return bool(value)
+    return value
+
+
+def to_json(value: Any) -> Any:
+    """Turn a dataclass, mapping or sequence into plain JSON values; NaN becomes null."""
+    if hasattr(value, "__dataclass_fields__"):
+        return {name: to_json(getattr(value, name)) for name in value.__dataclass_fields__}
+    if isinstance(value, Mapping):
+        return {str(k): to_json(v) for k, v in value.items()}
+    if isinstance(value, list | tuple):
+        return [to_json(v) for v in value]
+    return _plain(value)

@@ -1,0 +1,1 @@
+"""Evidence from the model of a steering axle: valve command to angle."""

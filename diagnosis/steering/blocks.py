@@ -1,0 +1,209 @@
+"""A steering axle's samples in blocks of about 10 ms: mean, power of the white part, valve command, status."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from diagnosis.channels.noise import rounding_step
+from diagnosis.estimation.fault_models import PAIR, SILENT, SKIP
+from replay.arrays.numeric import without_nan
+from replay.arrays.spill import Column, release
+from replay.arrays.spill import blocks as cut
+from replay.machine.config import Noise
+
+Array = NDArray[np.float64]
+
+WHITE_DOF = 0.514  # degrees of freedom per sample in the mean square of second differences
+_BLOCK_S = 0.01
+_WINDOW_S = 0.25
+
+
+@dataclass(frozen=True)
+class SteeringBlocks:
+    """One axle in m blocks of `length` samples, the last one cut.
+
+    Attributes
+    ----------
+    length : int
+        Samples per block.
+    dt : float
+        Length of a block [s].
+    mean : Array, shape (m,)
+        Mean of the new samples of the angle [rad]; 0 where there are none.
+    power : Array, shape (m,)
+        Mean square of what changes from sample to sample, from second differences [rad²].
+    count : Array, shape (m,)
+        New samples.
+    u : Array, shape (m,)
+        Mean valve opening between the middles of the block before and this one [fraction].
+    status : NDArray[np.int8], shape (m,)
+        `PAIR`, `SILENT` or `SKIP` of `diagnosis.estimation.fault_models`.
+    raw_u : Array, shape (n,)
+        Valve opening of every sample, 0 where unknown.
+    blind : NDArray[np.bool_], shape (m,)
+        Blocks in most of which nobody knows the opening.
+    second : Array, shape (m, 7)
+        What is measured twice, each with its variance: angle [rad], opening [fraction], share of the command's changes
+        in the opening [1]; then the command that belongs to the opening [fraction]. NaN where it is not.
+    """
+
+    length: int
+    dt: float
+    mean: Array
+    power: Array
+    count: Array
+    u: Array
+    status: NDArray[np.int8]
+    raw_u: Array
+    blind: NDArray[np.bool_]
+    second: Array
+
+    def driven(self, gain: float, rate: float) -> Array:
+        """Mean of sat(gain·u) between the middles of blocks [rad/s], shape (m,); NaN in blind blocks."""
+        driven = _between(self.raw_u, self.length, self.mean.size, lambda u: np.clip(gain * u, -rate, rate))
+        return np.where(self.blind, np.nan, driven)
+
+
+def _between(x: Array, length: int, blocks: int, function: Callable[[Array], Array] = np.asarray) -> Array:
+    """Mean of function(x) over `length` samples up to the middle of each block."""
+    middle = np.minimum(np.arange(blocks) * length + length // 2, x.size)
+    until, total = np.empty(blocks), 0.0
+    for part in cut(x.size, length):
+        sums = total + np.concatenate([[0.0], np.cumsum(function(x[part]))])
+        a, b = part.start // length, -(-part.stop // length)
+        until[a:b] = sums[middle[a:b] - part.start]
+        total = float(sums[-1])
+    before = np.concatenate([[0.0], until[:-1]])
+    return np.asarray((until - before) / np.maximum(np.diff(middle, prepend=0), 1))
+
+
+def second_differences(values: Array) -> Array:
+    """(y_k − 2y_{k−1} + y_{k−2})²/6 of consecutive samples: their mean is the white noise's power; 0 for the first two."""
+    out = np.zeros(values.size)
+    if values.size > 2:
+        out[2:] = (values[2:] - 2 * values[1:-1] + values[:-2]) ** 2 / 6.0
+    return out
+
+
+def blocks_of(y: Array, u: Array, fresh: NDArray[np.bool_], alive: NDArray[np.bool_], dt: float) -> SteeringBlocks:
+    """Cut an axle's channels into blocks.
+
+    Parameters
+    ----------
+    y, u : Array, shape (n,)
+        Angle [rad] and valve opening [fraction]; NaN where not valid.
+    fresh : NDArray[np.bool_], shape (n,)
+        Steps with a new sample of y.
+    alive : NDArray[np.bool_], shape (n,)
+        Whether another channel of y's source delivers.
+    dt : float
+        Step [s].
+    """
+    length = max(1, round(_BLOCK_S / dt))
+    opening, parts = Column(np.float64), []
+    before = np.zeros(0)  # the last two new samples of the cut before
+    for part in cut(y.size, length):
+        near, alone = y[part], ~np.isfinite(y[part])
+        starts = np.arange(0, near.size, length)
+        new = fresh[part] & ~alone
+        power = np.zeros(near.size)
+        values = np.concatenate([before, near[new]])
+        power[new] = second_differences(values)[before.size :]
+        before = values[-2:]
+        count = np.add.reduceat(new.astype(np.float64), starts)
+        mean = np.add.reduceat(np.where(new, near, 0.0), starts) / np.maximum(count, 1.0)
+        status = np.where(count > 0, PAIR, SKIP).astype(np.int8)
+        silent = np.add.reduceat((alone & alive[part]).astype(np.float64), starts) > 0.5 * length
+        status[silent & (count == 0)] = SILENT
+        unknown = np.add.reduceat((~np.isfinite(u[part])).astype(np.float64), starts)
+        blind = unknown > 0.5 * np.diff(np.append(starts, near.size))
+        parts.append((mean, np.add.reduceat(power, starts) / np.maximum(count, 1.0), count, status, blind))
+        opening.append(without_nan(u[part]))
+        release(y, u)
+    mean, power, count, status, blind = (np.concatenate(x) for x in zip(*parts, strict=True))
+    raw_u = opening.finish()
+    return SteeringBlocks(
+        length=length,
+        dt=length * dt,
+        mean=mean,
+        power=power,
+        count=count,
+        u=_between(raw_u, length, mean.size),
+        status=status,
+        raw_u=raw_u,
+        blind=blind,
+        second=np.full((mean.size, 7), np.nan),
+    )
+
+
+def window_means(x: Array, length: int) -> Array:
+    """Means over consecutive windows of `length`; the last, cut one is left out."""
+    count = x.size // length
+    return np.asarray(x[: count * length].reshape(count, length).mean(axis=1))
+
+
+@dataclass(frozen=True)
+class SensorNoise:
+    """Noise of an angle sensor.
+
+    Attributes
+    ----------
+    white : float
+        Power of its white noise, its rounding included, in the median window [rad²].
+    spread : float
+        Variance of the logarithm of that power from window to window.
+    step : float
+        Power of the rounding [rad²].
+    lsb : float
+        Rounding step [rad]; 0 where none.
+    """
+
+    white: float
+    spread: float
+    step: float
+    lsb: float
+
+    @property
+    def std(self) -> float:
+        """Standard deviation without the rounding [rad]."""
+        return float(np.sqrt(max(self.white - self.step, 0.0)))
+
+    @property
+    def resolved(self) -> bool:
+        """Whether it is larger than the rounding step, so that a constant reading means something."""
+        return self.std > 0.6 * self.lsb
+
+
+def sensor_noise(blocks: SteeringBlocks, values: Array, known: Noise, stop: float) -> SensorNoise:
+    """Noise of an axle's sensor from its median window, or from the machine file.
+
+    Parameters
+    ----------
+    blocks : SteeringBlocks
+        The axle.
+    values : Array
+        New samples of the angle [rad].
+    known : Noise
+        From the machine file.
+    stop : float
+        Angle of the end stops [rad]; a millionth of it is the least noise.
+    """
+    lsb = known.lsb if known.lsb is not None else rounding_step(values)
+    step = lsb * lsb / 12
+    length = max(2, round(_WINDOW_S / blocks.dt))
+    counts = window_means(blocks.count, length)
+    powers = window_means(blocks.power * blocks.count, length) / np.maximum(counts, 1e-9)
+    powers = powers[(powers > 0) & (counts > 0)]
+    white, spread = 0.0, 1.0
+    if powers.size >= 4:
+        low, middle, high = np.quantile(np.log(powers), (0.3, 0.5, 0.7))
+        samples = float(np.median(blocks.count[blocks.count > 0])) * length
+        white = float(np.exp(middle))
+        spread = (min(middle - low, high - middle) / 0.524) ** 2 - 2.0 / max(WHITE_DOF * samples, 1.0)
+    if known.std is not None:
+        white = known.std**2 + step
+    return SensorNoise(max(white, step, (1e-6 * stop) ** 2), float(max(spread, 0.003)), step, lsb)

@@ -1,0 +1,169 @@
+"""What is measured twice on a steering axle, in blocks: a second angle, and the valve's position beside its command."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from diagnosis.channels.noise import relative_lag, shifted, slow_mismatch
+from diagnosis.steering.blocks import SteeringBlocks, second_differences
+
+Array = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+
+_MAX_LAG_S = 0.05
+_SHARE_RANGE = (0.85, 1.15)
+_LEAST_CHANGES = 4
+_LEAST_SHARE = 0.5
+_JITTER_S = 0.25
+_JITTER = 4.0  # standard deviations
+_MEDIAN_SQUARE = 0.455  # of a standard normal variable
+
+
+def with_second_angle(
+    blocks: SteeringBlocks, y: Array, true: Array, fresh: Flags, dt: float, tolerance: float
+) -> SteeringBlocks:
+    """Add a second measurement of the angle.
+
+    Parameters
+    ----------
+    blocks : SteeringBlocks
+        The axle.
+    y, true : Array, shape (n,)
+        Angle and second angle [rad]; NaN where not valid.
+    fresh : NDArray[np.bool_], shape (n,)
+        Steps with a new second angle.
+    dt : float
+        Step [s].
+    tolerance : float
+        What two healthy instruments may differ by [rad].
+    """
+    use = fresh & np.isfinite(y) & np.isfinite(true)
+    most = max(1, round(_MAX_LAG_S / dt)) if dt <= _MAX_LAG_S else 0
+    moved = shifted(true, -relative_lag(true, y, use, -most, most))
+    known = np.isfinite(moved)
+    mean, count = _means(moved, known, blocks)
+    power = _white(moved[known])
+    slow = np.nan_to_num(slow_mismatch(moved - y, use & np.isfinite(moved), dt))
+    second = blocks.second.copy()
+    second[:, 0] = np.where(count > 0, mean, np.nan)
+    second[:, 1] = power / np.maximum(count, 1) + max(slow**2 - power, 0.0) + tolerance**2
+    return replace(blocks, second=second)
+
+
+def with_position(
+    blocks: SteeringBlocks, u: Array, position: Array, fresh: Flags, dt: float
+) -> tuple[SteeringBlocks, Array]:
+    """Add the valve's position: its mean beside the command's, and how much of the command's changes it follows.
+
+    The second says whether a valve obeys even where only the sensor's noise moves its command.
+
+    Parameters
+    ----------
+    blocks : SteeringBlocks
+        The axle.
+    u, position : Array, shape (n,)
+        Command and position [fraction]; NaN where not valid.
+    fresh : NDArray[np.bool_], shape (n,)
+        Steps with a new position.
+    dt : float
+        Step [s].
+
+    Returns
+    -------
+    SteeringBlocks
+        With the position.
+    Array, shape (n,)
+        Position less command, at the command's time, as multiples of its healthy noise; NaN where unknown.
+    """
+    use = fresh & np.isfinite(u) & np.isfinite(position)
+    most = max(1, round(_MAX_LAG_S / dt)) if dt <= _MAX_LAG_S else 0
+    linked = _jitter_lag(position, u, use, most)
+    lag = relative_lag(position, u, use, 0, most) if linked is None else linked
+    command = shifted(u, lag)
+    known = use & np.isfinite(command)
+    off = np.where(known, position - command, 0.0)
+    power = max(_white(off[known]), 1e-8)
+    u_mean, count = _means(command, known, blocks)
+    p_mean, _ = _means(position, known, blocks)
+    width = blocks.length
+    places = np.minimum(np.arange(u.size) // width, count.size - 1)
+    du = np.where(known, command - u_mean[places], 0.0)
+    dp = np.where(known, position - p_mean[places], 0.0)
+    starts = np.arange(0, u.size, width)
+    changes = np.add.reduceat(du * du, starts)
+    together = np.add.reduceat(du * dp, starts)
+    slow = np.nan_to_num(slow_mismatch(np.where(known, off, np.nan), known, dt))
+    second = blocks.second.copy()
+    some = count > 0
+    second[:, 2] = np.where(some, p_mean, np.nan)
+    second[:, 3] = power / np.maximum(count, 1) + max(slow**2 - power, 0.0) / 4 + 0.05 * power
+    if linked is None:
+        even, jitter = _without_jitter(command, known, dt)
+        u_mean = _means(even, known, blocks)[0]
+        second[:, 3] += _means(jitter, known, blocks)[0] / np.maximum(count, 1)
+    second[:, 6] = np.where(some, u_mean, np.nan)
+    lively = (changes > 1e-3 * power) & (count >= _LEAST_CHANGES)
+    if lively.any():
+        windows = np.add.reduceat(np.stack([together, changes]) * lively, np.arange(0, starts.size, 100), axis=1)
+        share = windows[0] / np.maximum(windows[1], 1e-30)
+        if _SHARE_RANGE[0] < float(np.median(share[windows[1] > 0])) < _SHARE_RANGE[1]:
+            second[lively, 4] = together[lively] / changes[lively]
+            second[lively, 5] = power / changes[lively]
+    off = shifted(np.where(known, off / np.sqrt(power), np.nan), -round(lag))
+    return replace(blocks, second=second), off
+
+
+def _jitter_lag(position: Array, u: Array, use: Flags, most: int) -> float | None:
+    """Delay [steps] at which the position follows the command's jitter from sample to sample; None where it does not."""
+    if u.size <= 2 * most:
+        return None
+    du, dp = (np.diff(np.where(use, x, 0.0), 2, prepend=[0.0, 0.0]) for x in (u, position))
+    limit = 10 * float(np.median(np.abs(du))) + 1e-12  # the small jitter of a healthy sensor, not jumps
+    du[np.abs(du) > limit] = 0.0
+    inner = dp[most:] * (np.abs(dp[most:]) < 10 * float(np.median(np.abs(dp))) + 1e-12)
+    together = np.array([float(inner @ du[most - k : du.size - k]) for k in range(most + 1)])
+    scale = float(np.sqrt((inner @ inner) * (du @ du) / max(inner.size, 1)))
+    best = int(np.argmax(together))
+    follows = together[best] > max(8 * scale, _LEAST_SHARE * float(du @ du))
+    return float(best) if scale > 0 and follows else None
+
+
+def _without_jitter(command: Array, known: Flags, dt: float) -> tuple[Array, Array]:
+    """The command with its sample-to-sample jitter evened out, and the jitter's local power.
+
+    A log slower than the controller shows jitter that its record of the position does not follow sample by sample: a
+    healthy valve would look like one that rests, or does what it likes.
+    """
+    size = command.size
+    filled = np.interp(np.arange(size), np.flatnonzero(known), command[known]) if known.any() else np.zeros(size)
+    width = max(3, round(_JITTER_S / dt))
+    squares = second_differences(filled)
+    rows = np.pad(squares, (0, -size % width), mode="edge").reshape(-1, width)
+    power = np.median(rows, axis=1) / _MEDIAN_SQUARE  # a jump is no jitter
+    near = np.pad(power, 1, mode="edge")
+    jitter = np.repeat(np.maximum(np.maximum(near[:-2], near[2:]), power), width)[:size]
+    total = np.concatenate([[0.0], np.cumsum(filled)])
+    before, after = (np.clip(np.arange(size) + k, 0, size) for k in (-width, width + 1))
+    even = (total[after] - total[before]) / (after - before)
+    small = np.abs(filled - even) < _JITTER * np.sqrt(jitter)
+    return np.where(small, even, filled), jitter
+
+
+def _means(x: Array, known: Flags, blocks: SteeringBlocks) -> tuple[Array, Array]:
+    """Mean of the known samples of each block, and their number."""
+    starts = np.arange(0, x.size, blocks.length)
+    count = np.add.reduceat(known.astype(np.float64), starts)
+    total = np.add.reduceat(np.where(known, x, 0.0), starts)
+    return np.asarray(total / np.maximum(count, 1.0)), np.asarray(count)
+
+
+def _white(values: Array) -> float:
+    """Power of the white part in the median window of 200 samples."""
+    squares = second_differences(values)
+    count = squares.size // 200
+    if count < 3:
+        return float(squares.mean()) if squares.size else 0.0
+    return float(np.median(squares[: count * 200].reshape(count, 200).mean(axis=1)))

@@ -1,0 +1,1 @@
+"""Evidence from the model of a wheel: valve command to speed."""

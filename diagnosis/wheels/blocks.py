@@ -1,0 +1,227 @@
+"""The wheels' samples in blocks of about 10 ms: mean speed, its steps from sample to sample, valve openings, status.
+
+The valve's lag is tens of blocks long, so that nothing of it is lost in their means; what is quicker (noise, constancy,
+jumps) stays in the mean square of the steps, and onsets are refined at the raw rate.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from diagnosis.channels.noise import white_part
+from diagnosis.estimation.fault_models import PAIR, SILENT, SKIP
+from replay.arrays.numeric import without_nan
+from replay.arrays.spill import Column, blocks, release
+
+Array = NDArray[np.float64]
+
+BLOCK_S = 0.01
+_RESOLVED_S = 0.0015  # a controller's step: openings of slower logs may change unseen between samples
+
+
+@dataclass(frozen=True)
+class WheelBlocks:
+    """All wheels in n blocks of `width` samples; the last one is filled up with samples that say nothing.
+
+    Attributes
+    ----------
+    width : int
+        Samples per block.
+    raw_dt : float
+        Distance of samples [s].
+    y : Array, shape (n, wheels)
+        Mean of the new samples of the speed [m/s]; 0 where there are none.
+    count : Array, shape (n, wheels)
+        New samples.
+    jitter : Array, shape (n, wheels)
+        Mean squared step between consecutive new samples [m²/s²].
+    u : Array, shape (n·width, wheels)
+        Valve opening of every sample beyond its dead zone [fraction]; 0 where unknown.
+    unsteady : Array, shape (n, wheels)
+        Root mean square of what changes within a block in u [fraction].
+    status : NDArray[np.int8], shape (n, wheels)
+        `PAIR`, `SILENT` or `SKIP` of `diagnosis.estimation.fault_models`.
+    quiet : NDArray[np.bool_], shape (n, wheels)
+        Where a wheel is neither commanded nor expected to move.
+    ratio, turn : Array, shape (n, wheels)
+        Speed of each wheel per speed of the body [1], and what it rolls less because it steers [m/s]; NaN without
+        geometry.
+    blind : NDArray[np.bool_], shape (n, wheels)
+        Blocks in most of which nobody knows the opening.
+    """
+
+    width: int
+    raw_dt: float
+    y: Array
+    count: Array
+    jitter: Array
+    u: Array
+    unsteady: Array
+    status: NDArray[np.int8]
+    quiet: NDArray[np.bool_]
+    ratio: Array
+    turn: Array
+    blind: NDArray[np.bool_]
+
+    @property
+    def dt(self) -> float:
+        """Length of a block [s]."""
+        return self.width * self.raw_dt
+
+    def part(self, first: int, last: int) -> WheelBlocks:
+        """Blocks [first, last) alone."""
+        cut = slice(first, last)
+        return WheelBlocks(
+            width=self.width,
+            raw_dt=self.raw_dt,
+            y=self.y[cut],
+            count=self.count[cut],
+            jitter=self.jitter[cut],
+            u=np.ascontiguousarray(self.u[first * self.width : min(last, self.y.shape[0]) * self.width]),
+            unsteady=self.unsteady[cut],
+            status=self.status[cut],
+            quiet=self.quiet[cut],
+            ratio=self.ratio[cut],
+            turn=self.turn[cut],
+            blind=self.blind[cut],
+        )
+
+    def wander(self, speed_per_opening: Array) -> Array:
+        """Error of the modelled speed after a block from openings that the log does not resolve [m/s], (n, wheels).
+
+        Parameters
+        ----------
+        speed_per_opening : Array, shape (wheels,)
+            K·dt/τ of one sample [m/s].
+        """
+        unseen = np.where(self.blind, 2.0 * np.sqrt(self.width), 0.0)  # any opening, either way
+        if self.raw_dt > _RESOLVED_S:
+            unseen = np.maximum(unseen, self.unsteady)
+        return np.asarray(unseen * speed_per_opening * np.sqrt(self.width))
+
+
+def block_width(dt: float) -> int:
+    """Samples in a block."""
+    return max(1, round(BLOCK_S / dt))
+
+
+def blocks_of(
+    y: Array,
+    u: Array,
+    status: NDArray[np.int8],
+    quiet: NDArray[np.bool_],
+    ratio: Array,
+    turn: Array,
+    dead: Array,
+    dt: float,
+) -> WheelBlocks:
+    """Cut the wheels' channels into blocks.
+
+    Parameters
+    ----------
+    y, u : Array, shape (m, wheels)
+        Measured speed [m/s] and opening [fraction].
+    status : NDArray[np.int8], shape (m, wheels)
+        As in `diagnosis.estimation.fault_models`.
+    quiet : NDArray[np.bool_], shape (m, wheels)
+        Where a wheel is neither commanded nor expected to move.
+    ratio, turn : Array, shape (m, wheels)
+        As in `WheelBlocks`.
+    dead : Array, shape (wheels,)
+        Dead zone of each valve [fraction].
+    dt : float
+        Step [s].
+    """
+    width, (size, wheels) = block_width(dt), y.shape
+    fill = -size % width
+    edge = ((0, fill), (0, 0))
+    opening, parts = Column(np.float64, (wheels,)), []
+    ends = [_Ends() for _ in range(wheels)]
+    usual = [_usual_gap(status[:, i]) for i in range(wheels)]
+    for cut in blocks(size, width):
+        last = edge if cut.stop == size else ((0, 0), (0, 0))
+        unknown = np.pad(~np.isfinite(u[cut]), last, mode="edge")
+        beyond = without_nan(u[cut])
+        beyond = np.pad(np.sign(beyond) * np.maximum(np.abs(beyond) - dead, 0.0), last, mode="edge")
+        n = len(beyond) // width
+        state = np.full((n, wheels), SKIP, dtype=np.int8)
+        sums = np.zeros((3, n, wheels))
+        for i in range(wheels):
+            sums[:, :, i] = _samples(y[cut, i], status[cut, i], n, width, usual[i], ends[i])
+            silent = np.bincount(np.flatnonzero(status[cut, i] == SILENT) // width, minlength=n) > 0.5 * width
+            state[silent, i] = SILENT
+            state[sums[1, :, i] > 0, i] = PAIR
+        opening.append(beyond)
+        shape = (n, width, wheels)
+        parts.append(
+            (
+                *sums,
+                beyond.reshape(shape).std(axis=1),
+                state,
+                np.pad(quiet[cut], last, mode="edge").reshape(shape).all(axis=1),
+                np.pad(ratio[cut], last, mode="edge").reshape(shape).mean(axis=1),
+                np.pad(turn[cut], last, mode="edge").reshape(shape).mean(axis=1),
+                unknown.reshape(shape).mean(axis=1) > 0.5,
+            )
+        )
+        release(y, u, ratio, turn)
+    mean, count, jitter, unsteady, state, still, ratios, turns, blind = (
+        np.concatenate(x) for x in zip(*parts, strict=True)
+    )
+    driven = opening.finish()
+    if width < 4:  # too few samples to see by themselves what changes within a block
+        quick = np.stack([np.abs(white_part(driven[:, i])) for i in range(wheels)], axis=1)
+        unsteady = np.maximum(unsteady, quick.reshape(-1, width, wheels).mean(axis=1))
+    return WheelBlocks(
+        width=width,
+        raw_dt=dt,
+        y=mean,
+        count=count,
+        jitter=jitter,
+        u=driven,
+        unsteady=unsteady,
+        status=state,
+        quiet=still,
+        ratio=ratios,
+        turn=turns,
+        blind=blind,
+    )
+
+
+@dataclass
+class _Ends:
+    """Last new sample of the cut before: its place from the next cut's first sample, and its value."""
+
+    place: int | None = None
+    value: float = 0.0
+
+
+def _usual_gap(status: NDArray[np.int8]) -> float:
+    """Median distance of new samples in steps; 0 where there are fewer than two."""
+    new = np.flatnonzero(status == PAIR)
+    return float(np.median(np.diff(new))) if new.size > 1 else 0.0
+
+
+def _samples(y: Array, status: NDArray[np.int8], n: int, width: int, usual: float, ends: _Ends) -> Array:
+    """Mean, number and mean squared step of the new samples of n blocks, shape (3, n)."""
+    new = np.flatnonzero(status == PAIR)
+    place, values = new // width, y[new]
+    count = np.bincount(place, minlength=n)
+    mean = np.bincount(place, weights=values, minlength=n) / np.maximum(count, 1)
+    if ends.place is not None:
+        new, values, place = np.r_[ends.place, new], np.r_[ends.value, values], np.r_[0, place]
+    near = np.diff(new) <= 1.5 * usual
+    steps = np.where(near, np.diff(values) ** 2, 0.0)
+    known = np.bincount(place[1:], weights=near, minlength=n)
+    jitter = np.bincount(place[1:], weights=steps, minlength=n) / np.maximum(known, 1)
+    if new.size:
+        ends.place, ends.value = int(new[-1]) - status.size, float(values[-1])
+    return np.stack([mean, count, jitter])
+
+
+def per_sample(values: NDArray[np.generic], width: int, size: int) -> NDArray[np.generic]:
+    """Values of blocks for every sample, shape (size,)."""
+    return np.repeat(values, width)[:size]

@@ -1,0 +1,206 @@
+"""Identification of the wheel model τ·v̇ = −v + K·u + load from a mission that may hold faults.
+
+Each window of two seconds gives its own gain. Healthy windows agree and faulty ones scatter, so that the mode of the
+gains stands for a healthy wheel even where most windows are faulty. Wheels of one machine are alike, so a wheel's own
+mode is believed only near the machine's.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from replay.arrays.numeric import without_nan
+from replay.machine.config import WheelPlant
+
+Array = NDArray[np.float64]
+
+_TAUS = (0.02, 0.035, 0.05, 0.075, 0.1, 0.14, 0.19, 0.25, 0.32, 0.4, 0.5, 0.65, 0.85, 1.1)
+_WINDOW_S = 2.0
+_MAX_SPREAD = 0.25
+_OWN_RANGE = 0.2
+_LEAST_OWN = 6  # windows near the machine's gain that a wheel needs for its own
+
+
+@dataclass(frozen=True)
+class WheelModelFit:
+    """Wheel models of one mission.
+
+    Attributes
+    ----------
+    plants : tuple[WheelPlant or None, ...]
+        Per wheel; None where nothing can be identified.
+    spread : float
+        Relative spread of the windows' gains (robust standard deviation over median).
+    windows : int
+        Windows used.
+    reliable : bool
+        Whether gains may be judged by it.
+    note : str
+        The figures in words.
+    identified : bool
+        Whether a wheel's model comes from this mission rather than from the machine file.
+    """
+
+    plants: tuple[WheelPlant | None, ...]
+    spread: float
+    windows: int
+    reliable: bool
+    note: str
+    identified: bool = True
+
+
+def low_passed(u: Array, tau: float, dt: float) -> Array:
+    """Response of a first-order lag to u held over each step; NaN counts as 0."""
+    return low_passed_on(u, tau, dt, None)[0] if u.size else u
+
+
+def low_passed_on(u: Array, tau: float, dt: float, state: float | None) -> tuple[Array, float]:
+    """`low_passed` of a block, with the state from the block before and for the next; None before the first."""
+    a = np.exp(-dt / tau)
+    filled = without_nan(u)
+    out = np.empty(u.size)
+    last = _scan_lag(filled, a, float(filled[0]) if state is None else state, out)
+    return out, float(last)
+
+
+@njit(cache=True)
+def _scan_lag(u, a, x, out):  # type: ignore[no-untyped-def]
+    """Write x and carry on with x ← a·x + (1 − a)·u."""
+    for k in range(u.size):
+        out[k] = x
+        x = a * x + (1.0 - a) * u[k]
+    return x
+
+
+def identify(
+    y: Array,
+    u: Array,
+    moving: NDArray[np.bool_],
+    dt: float,
+    given: dict[int, WheelPlant],
+    flow: float | None = None,
+    effort: Array | None = None,
+) -> WheelModelFit:
+    """Fit K and τ of every wheel where the pump feeds all that is asked of it.
+
+    Parameters
+    ----------
+    y, u : Array, shape (n, wheels)
+        Measured speed [m/s] and valve opening [fraction]; NaN where not valid.
+    moving : NDArray[np.bool_], shape (n, wheels)
+        Where the wheel is commanded to move.
+    dt : float
+        Step [s].
+    given : dict[int, WheelPlant]
+        Models from the machine file by wheel index; they are taken as they are.
+    flow : float or None
+        Sum of speeds that the pump can feed [m/s].
+    effort : Array, shape (n, wheels), or None
+        Mean |u| where y and u are means over blocks [fraction]; None: |u|.
+    """
+    if flow is None:
+        return _identify(y, u, moving, dt, given)
+    effort = np.abs(without_nan(u)) if effort is None else effort
+    asked = effort.sum(axis=1)
+    driving = moving.any(axis=1)
+    fed = asked <= (np.quantile(asked[driving], 0.6) if driving.any() else 0.0)
+    fit = _identify(y, u, moving & fed[:, None], dt, given)
+    for _ in range(2):
+        if not any(fit.plants):
+            return fit
+        fed = demand(effort, fit) <= flow
+        fit = _identify(y, u, moving & fed[:, None], dt, given)
+    return fit
+
+
+def demand(effort: Array, fit: WheelModelFit) -> Array:
+    """Sum of the speeds that openings of size `effort`, shape (n, wheels), ask for [m/s], shape (n,)."""
+    known = [p.K for p in fit.plants if p is not None]
+    gains = np.array([p.K if p is not None else float(np.median(known)) for p in fit.plants])
+    return np.asarray(effort @ gains)
+
+
+def _identify(y: Array, u: Array, moving: NDArray[np.bool_], dt: float, given: dict[int, WheelPlant]) -> WheelModelFit:
+    """Fit K and τ of every wheel.
+
+    Parameters
+    ----------
+    y, u : Array, shape (n, wheels)
+        Measured speed [m/s] and valve opening [fraction]; NaN where not valid.
+    moving : NDArray[np.bool_], shape (n, wheels)
+        Where the wheel is commanded to move.
+    dt : float
+        Step [s].
+    given : dict[int, WheelPlant]
+        Models from the machine file by wheel index; they are taken as they are.
+    """
+    wheels = [i for i in range(y.shape[1]) if np.isfinite(u[:, i]).any() and np.isfinite(y[:, i]).any()]
+    length = max(8, round(_WINDOW_S / dt))
+    best: tuple[float, float, list[Array]] | None = None
+    for tau in _TAUS:
+        if tau < dt:
+            continue
+        gains, misfits = [], []
+        for i in wheels:
+            g, r = _windowed(y[:, i], low_passed(u[:, i], tau, dt), moving[:, i], length)
+            gains.append(g)
+            misfits.append(r)
+        pooled = np.concatenate(misfits) if misfits else np.empty(0)
+        if pooled.size >= 3 and (best is None or np.quantile(pooled, 0.25) < best[0]):
+            best = (float(np.quantile(pooled, 0.25)), tau, gains)
+    plants: list[WheelPlant | None] = [None] * y.shape[1]
+    for i, plant in given.items():
+        plants[i] = plant
+    if best is None:
+        known = all(p is not None for p in plants)
+        why = "from the machine file" if known else "no window in which a wheel moves under a recorded valve command"
+        return WheelModelFit(tuple(plants), 0.0, 0, known, f"Wheel model: {why}.", not known)
+    _, tau, gains = best
+    pooled = np.concatenate(gains)
+    centre = mode(pooled)
+    near = np.sort(np.abs(pooled - centre))[: max(1, pooled.size // 2)]  # the half that agrees best
+    spread = 1.4826 * float(np.median(near)) / abs(centre) if centre else float("inf")
+    for i, g in zip(wheels, gains, strict=True):
+        if i in given:
+            continue
+        like = g[np.abs(g - centre) <= _OWN_RANGE * abs(centre)]
+        K = mode(like) if like.size >= _LEAST_OWN else centre
+        if K > 0:
+            plants[i] = WheelPlant(K=K, tau=tau, K_std=spread * abs(K) / np.sqrt(max(1, g.size)))
+    reliable = len(given) == len(wheels) or (pooled.size >= 5 and spread <= _MAX_SPREAD and centre > 0)
+    shown = ", ".join("–" if p is None else f"{p.K:.3g}" for p in plants)
+    note = (
+        f"Wheel model identified in {pooled.size} windows of {_WINDOW_S:g} s: K = {shown} m/s per full opening, "
+        f"τ = {tau:g} s, spread of the windows {100 * spread:.0f} %"
+        + ("." if reliable else f": too uncertain to judge gains by (limit {100 * _MAX_SPREAD:.0f} %).")
+    )
+    return WheelModelFit(tuple(plants), spread, int(pooled.size), reliable, note, any(i not in given for i in wheels))
+
+
+def mode(values: Array) -> float:
+    """Half-sample mode: the densest half, over and over, until a few values are left; their median."""
+    x = np.sort(values)
+    while x.size > 4:
+        half = (x.size + 1) // 2
+        widths = x[half - 1 :] - x[: x.size - half + 1]
+        k = int(np.argmin(widths))
+        x = x[k : k + half]
+    return float(np.median(x))
+
+
+def _windowed(y: Array, p: Array, moving: NDArray[np.bool_], length: int) -> tuple[Array, Array]:
+    """Gain Σyp/Σp² and relative misfit of every window that moves throughout."""
+    count = y.size // length
+    use = moving & np.isfinite(y)
+    shape = (count, length)
+    yy, pp = (np.where(use, q, 0.0)[: count * length].reshape(shape) for q in (y, p))
+    share = use[: count * length].reshape(shape).mean(axis=1)
+    spp, syp, syy = (pp**2).sum(axis=1), (yy * pp).sum(axis=1), (yy**2).sum(axis=1)
+    good = (share > 0.8) & (spp > 0) & (np.ptp(np.where(use, y, 0.0)[: count * length].reshape(shape), axis=1) > 0)
+    g = syp[good] / spp[good]
+    misfit = (syy[good] - g * syp[good]) / np.maximum(syy[good], 1e-300)
+    return g, misfit

@@ -1,0 +1,233 @@
+"""From a mission to what the wheel models need: channels of all wheels, their plants, and the geometry in motion."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from diagnosis.channels.liveness import alive
+from diagnosis.channels.pairs import sample_status
+from diagnosis.wheels.assess import WheelsData
+from diagnosis.wheels.blocks import block_width
+from diagnosis.wheels.identification import WheelModelFit, demand, identify, low_passed_on
+from diagnosis.wheels.parity import slipping
+from replay.arrays.numeric import without_nan
+from replay.arrays.spill import Column, blocks, in_blocks, release
+from replay.control.kinematics import low_pass, speed_ratios, wheel_angles
+from replay.control.loop import Replay, any_finite, stack
+from replay.machine.config import Machine, Noise, WheelPlant
+from replay.signals.timeline import Timeline
+
+Array = NDArray[np.float64]
+
+_QUIET = 0.4
+_STEER_HZ = 3.0
+
+
+@dataclass(frozen=True)
+class WheelChannels:
+    """Speeds and openings of all wheels, shape (n, wheels), and which of them are measured twice (wheels,)."""
+
+    v: Array
+    u: Array
+    true: Array
+    applied: Array
+
+    def without_speed(self, wheels: Sequence[int]) -> WheelChannels:
+        """The same with the measured speeds of some wheels left out."""
+        v = np.array(self.v)
+        v[:, wheels] = np.nan
+        return replace(self, v=v)
+
+    @cached_property
+    def has_true(self) -> NDArray[np.bool_]:
+        """Wheels with a second speed."""
+        return any_finite(self.true)
+
+    @cached_property
+    def has_applied(self) -> NDArray[np.bool_]:
+        """Wheels whose opening is measured."""
+        return any_finite(self.applied)
+
+    @cached_property
+    def speed(self) -> Array:
+        """The better speed of each wheel [m/s]."""
+        if not self.has_true.any():
+            return self.v
+        return in_blocks(lambda true, v: np.asarray(np.where(self.has_true, true, v)), self.true, self.v)
+
+    @cached_property
+    def opening(self) -> Array:
+        """The better opening of each wheel [fraction]."""
+        if not self.has_applied.any():
+            return self.u
+        return in_blocks(lambda applied, u: np.asarray(np.where(self.has_applied, applied, u)), self.applied, self.u)
+
+
+def wheel_channels(timeline: Timeline, machine: Machine) -> WheelChannels:
+    """Channels of all wheels; NaN where a wheel lacks one."""
+    return WheelChannels(
+        *(stack(timeline, [f"wheel.{w}.{x}" for w in machine.wheels]) for x in ("v", "u", "v_true", "u_applied"))
+    )
+
+
+def wheel_fit(channels: WheelChannels, replay: Replay, timeline: Timeline, machine: Machine) -> WheelModelFit | None:
+    """Wheel models of the machine file, or identified in this mission; None where nothing allows it."""
+    if not (any_finite(channels.opening).any() and any_finite(channels.speed).any()):
+        return None
+    given = {i: p for i, w in enumerate(machine.wheels) if (p := machine.plant.wheels.get(w)) is not None}
+    width = min(block_width(timeline.dt), timeline.size)
+    limit = machine.limits.driving_speed
+
+    def mean(function: Callable[..., NDArray[Any]], *columns: Array) -> Array:
+        out = []
+        for part in blocks(timeline.size // width * width, width):
+            x = np.asarray(function(*(c[part] for c in columns)), np.float64)
+            out.append(x.reshape(-1, width, x.shape[1]).mean(axis=1))
+            release(*columns)
+        return np.concatenate(out)
+
+    moving = mean(lambda ref, v: np.abs(np.where(np.isfinite(ref), ref, v)) > limit, replay.v_ref, channels.speed)
+    return identify(
+        mean(np.asarray, channels.speed),
+        mean(np.asarray, channels.opening),
+        np.asarray(moving > 0.5),
+        timeline.dt * width,
+        given,
+        machine.plant.flow,
+        mean(lambda u: np.abs(without_nan(u)), channels.opening),
+    )
+
+
+def slip_of(
+    timeline: Timeline, replay: Replay, machine: Machine, v: Array, angle: Array, doubtful: NDArray[np.bool_]
+) -> NDArray[np.bool_]:
+    """Where a wheel breaks the parity of the body; nowhere without geometry, or where an axle's angle is in doubt."""
+    geometry = machine.geometry
+    if geometry is None or v.shape[1] < 4 or not any_finite(v).all() or not any_finite(angle).all():
+        return np.zeros(v.shape, dtype=np.bool_)
+    least = 2.5 * machine.limits.min_sat
+    turned = in_blocks(lambda a: wheel_angles(a, geometry), angle)
+    slip = slipping(v, angle, replay.phi_ref, turned, geometry, timeline.dt, least)
+    return in_blocks(lambda s, d: s & ~d.any(axis=1)[:, None], slip, doubtful)
+
+
+def wheels_data(
+    timeline: Timeline,
+    replay: Replay,
+    machine: Machine,
+    channels: WheelChannels,
+    fit: WheelModelFit,
+    counts: dict[str, NDArray[np.int16]],
+    angle: Array,
+    slip: NDArray[np.bool_],
+) -> tuple[WheelsData, list[Array]]:
+    """Channels for the wheel models, and y − K·lowpass(u) [m/s] of each wheel where the pump feeds it, shape (n,).
+
+    Parameters
+    ----------
+    angle : Array, shape (n, axles)
+        Best estimate of the axles' angles [rad].
+    slip : NDArray[np.bool_], shape (n, wheels)
+        Where a wheel breaks the parity of the body.
+    """
+    size, wheels, dt = timeline.size, len(machine.wheels), timeline.dt
+    y, u = channels.speed, channels.opening
+    status = np.zeros((size, wheels), dtype=np.int8)
+    quiet = np.ones((size, wheels), dtype=np.bool_)
+    nothing = np.broadcast_to(np.nan, (size,))
+    residuals: list[Array] = [nothing] * wheels
+    has = any_finite(y) & any_finite(u)
+    names: list[tuple[str, str]] = []
+    plants: list[WheelPlant | None] = []
+    limit = _QUIET * machine.limits.driving_speed
+    for i, wheel in enumerate(machine.wheels):
+        speed = f"wheel.{wheel}.{'v_true' if channels.has_true[i] else 'v'}"
+        opening = f"wheel.{wheel}.{'u_applied' if channels.has_applied[i] else 'u'}"
+        names.append((speed, opening))
+        plant = fit.plants[i]
+        if plant is None or not has[i]:
+            plants.append(None)
+            continue
+        plants.append(plant)
+        status[:, i] = sample_status(y[:, i], u[:, i], timeline.fresh[speed], alive(timeline, counts, speed), dt)
+        residuals[i], quiet[:, i] = _apart(y[:, i], u[:, i], replay.v_ref[:, i], plant, limit, dt)
+    starved = _starved(fit, u, machine.plant.flow, dt)
+    residuals = [x if x is nothing else in_blocks(lambda s, r: np.where(s, np.nan, r), starved, x) for x in residuals]
+    ratio, turn = _in_motion(angle, machine, size, dt)
+    return (
+        WheelsData(
+            y=y,
+            u=u,
+            status=status,
+            quiet=quiet,
+            slip=slip,
+            ratio=ratio,
+            turn=turn,
+            measured=[bool(x) for x in channels.has_applied],
+            plants=plants,
+            noise=[machine.noise.get(speed, Noise()) for speed, _ in names],
+            names=names,
+            span=2.2 * machine.max_speed,
+            flow=machine.plant.flow or 1e9,
+            coupling=machine.plant.coupling,
+            dt=dt,
+        ),
+        residuals,
+    )
+
+
+def _apart(
+    y: Array, u: Array, v_ref: Array, plant: WheelPlant, limit: float, dt: float
+) -> tuple[Array, NDArray[np.bool_]]:
+    """Speed beyond what the opening drives [m/s], and where the wheel is neither commanded nor driven."""
+    residual, quiet = Column(np.float64, rows=y.size), Column(np.bool_, rows=y.size)
+    state: float | None = None
+    for part in blocks(y.size):
+        beyond = np.sign(u[part]) * np.maximum(np.abs(u[part]) - plant.dead, 0.0)
+        asked = np.abs(plant.K * without_nan(beyond))
+        quiet.append((np.abs(without_nan(v_ref[part])) < limit) & (asked < limit))
+        driven, state = low_passed_on(beyond, plant.tau, dt, state)
+        residual.append(y[part] - plant.K * driven - plant.offset)
+        release(y, u, v_ref)
+    return residual.finish(), quiet.finish()
+
+
+def _starved(fit: WheelModelFit, u: Array, flow: float | None, dt: float) -> NDArray[np.bool_]:
+    """Where the pump cannot feed what the valves ask for, or could not within the last three lags; shape (n,)."""
+    if flow is None or not any(fit.plants):
+        return np.zeros(u.shape[0], dtype=np.bool_)
+    lag = max(p.tau for p in fit.plants if p is not None)
+    out, last = Column(np.bool_, rows=len(u)), -(10**9)
+    for part in blocks(len(u)):
+        steps = np.arange(part.start, part.stop)
+        asked = demand(np.abs(without_nan(u[part])), fit) > flow
+        near = np.maximum.accumulate(np.where(asked, steps, last))
+        out.append(steps - near <= 3 * lag / dt)
+        last = int(near[-1])
+        release(u)
+    return out.finish()
+
+
+def _in_motion(angle: Array, machine: Machine, size: int, dt: float) -> tuple[Array, Array]:
+    """Wheel speed per speed of the body [1], and what each wheel rolls less because it steers [m/s]."""
+    wheels = len(machine.wheels)
+    geometry = machine.geometry
+    if geometry is None or not any_finite(angle).all():
+        return np.broadcast_to(np.nan, (size, wheels)), np.broadcast_to(0.0, (size, wheels))
+    ratio = in_blocks(lambda a: speed_ratios(a, geometry), angle)
+    turn = Column(np.float64, (wheels,), size)
+    before, state = wheel_angles(angle[:1], geometry), [np.nan] * wheels
+    for part in blocks(size):
+        turned = wheel_angles(angle[part], geometry)
+        rate = np.diff(turned, axis=0, prepend=before) / dt
+        smooth = np.stack([low_pass(rate[:, i], dt, _STEER_HZ, state[i]) for i in range(wheels)], axis=1)
+        turn.append(smooth * np.array([w.offset for w in geometry.wheels.values()]))
+        before, state = turned[-1:], [float(x) for x in smooth[-1]]
+        release(angle)
+    return ratio, turn.finish()

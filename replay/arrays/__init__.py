@@ -1,0 +1,1 @@
+"""Columns longer than memory: blocks, envelopes, missing values."""

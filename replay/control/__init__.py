@@ -1,0 +1,1 @@
+"""Kinematics, the MFHCA law and the loop replayed open-loop."""

@@ -1,0 +1,133 @@
+"""Ψ̂ and the valve command of one wheel through a mission, block by block with carried state."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from replay.arrays.spill import blocks, release
+from replay.control import mfhca
+
+Array = NDArray[np.float64]
+
+FIT_SAMPLES = 1 << 16
+_FORCING_S = 0.25
+
+
+@dataclass(frozen=True)
+class LoopLaw:
+    """What a loop is replayed with: reading of the law, mode of Ψ̂, λ [s/m], ζ [s/m²], u_max, and ξ, β [1/s]."""
+
+    law: str
+    psi: str
+    lambda_: float
+    zeta: float
+    u_max: float
+    xi: float
+    beta: float
+
+
+@dataclass(frozen=True)
+class WheelBlock:
+    """One block of one wheel; fields as in `replay.control.loop.Replay`."""
+
+    psi_printed: Array
+    implied_squared: Array
+    forcing: Array
+    psi: Array
+    u: Array
+
+
+def scan_wheel(law: LoopLaw, u: Array, v: Array, v_ref: Array, dt: float, psi0: float | None) -> Iterator[WheelBlock]:
+    """Replay one wheel.
+
+    Parameters
+    ----------
+    law : LoopLaw
+        What to replay with; its law is not ``none``.
+    u, v, v_ref : Array, shape (n,)
+        Recorded command [fraction], measured and commanded speed [m/s].
+    dt : float
+        Step [s].
+    psi0 : float or None
+        Ψ̂(0) of the printed law; None fits it to the implied values.
+
+    Yields
+    ------
+    WheelBlock
+        Of the blocks of n, in order.
+    """
+    start = _fitted_start(law, u, v, v_ref, dt) if psi0 is None else psi0
+    threshold = _threshold(law, u, v, v_ref) if law.psi == "event_reset" else 0.0
+    total = forced = before = 0.0
+    event = (np.nan, 0)
+    half = round(_FORCING_S / dt) + 2
+    for part in blocks(v.size):
+        rho = mfhca.decay_rate(v[part], v_ref[part], law.xi, law.beta)
+        squared, bound = _implied(law, u[part], v[part], v_ref[part])
+        decay, total = mfhca.printed_decay(rho, dt, total, before)
+        printed = psi = start * decay
+        if law.psi == "implied":
+            psi = np.sqrt(np.maximum(squared, 0.0))
+        elif law.psi == "event_reset":
+            free = np.where(bound, np.nan, squared)
+            psi, _, event = mfhca.event_reset_psi(rho, free, dt, threshold, state=event, before=before)
+        elif law.psi == "forced":
+            psi, forced = mfhca.forced_psi(rho, v[part] - v_ref[part], dt, law.zeta, forced, before)
+        before = float(mfhca.fill_forward(rho, before)[-1])
+        near = slice(max(0, part.start - half), part.stop + half)
+        forcing = _forcing(law, u[near], v[near], v_ref[near], dt)[part.start - near.start :][: rho.size]
+        command = mfhca.drive_command(law.law, v[part], v_ref[part], psi**2, law.lambda_, law.u_max)
+        yield WheelBlock(printed, squared, forcing, psi, command)
+        release(u, v, v_ref)
+
+
+def decimated(size: int) -> int:
+    """Stride at which fits take samples of a mission of so many steps."""
+    return max(1, size // FIT_SAMPLES)
+
+
+def decay_shapes(v: Array, v_ref: Array, dt: float, xi: float, beta: float) -> tuple[Array, Array]:
+    """Ψ̂²/Ψ̂(0)² of the printed law and Ψ̂²/ζ² of the forced one at every `decimated` step; state runs through all."""
+    stride = decimated(v.size)
+    printed, driven = [], []
+    total = forced = before = 0.0
+    for part in blocks(v.size):
+        rho = mfhca.decay_rate(v[part], v_ref[part], xi, beta)
+        decay, total = mfhca.printed_decay(rho, dt, total, before)
+        psi, forced = mfhca.forced_psi(rho, v[part] - v_ref[part], dt, 1.0, forced, before)
+        before = float(mfhca.fill_forward(rho, before)[-1])
+        first = -part.start % stride
+        printed.append(decay[first::stride] ** 2)
+        driven.append(psi[first::stride] ** 2)
+        release(v, v_ref)
+    return np.concatenate(printed), np.concatenate(driven)
+
+
+def _implied(law: LoopLaw, u: Array, v: Array, v_ref: Array) -> tuple[Array, NDArray[np.bool_]]:
+    return mfhca.implied_psi_squared(law.law, u, v, v_ref, law.lambda_, law.u_max)
+
+
+def _forcing(law: LoopLaw, u: Array, v: Array, v_ref: Array, dt: float) -> Array:
+    squared, bound = _implied(law, u, v, v_ref)
+    rho = mfhca.decay_rate(v, v_ref, law.xi, law.beta)
+    return mfhca.implied_forcing(np.where(bound, np.nan, squared), rho, dt, _FORCING_S)
+
+
+def _fitted_start(law: LoopLaw, u: Array, v: Array, v_ref: Array, dt: float) -> float:
+    stride = decimated(v.size)
+    squared, bound = _implied(law, u[::stride], v[::stride], v_ref[::stride])
+    decay = np.sqrt(decay_shapes(v, v_ref, dt, law.xi, law.beta)[0])
+    return mfhca.fit_psi0(decay, squared, ~bound)
+
+
+def _threshold(law: LoopLaw, u: Array, v: Array, v_ref: Array) -> float:
+    stride = decimated(v.size)
+    two = []
+    for first in (0, 1):
+        squared, bound = _implied(law, *(x[first::stride][: (v.size - 1) // stride] for x in (u, v, v_ref)))
+        two.append(np.where(bound, np.nan, squared))
+    return mfhca.jump_threshold(two[1] - two[0])

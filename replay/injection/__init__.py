@@ -1,0 +1,1 @@
+"""Known faults written into a recorded log."""

@@ -1,0 +1,1 @@
+"""The machine: configuration, TOML file, geometry, units."""

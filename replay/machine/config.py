@@ -1,0 +1,313 @@
+"""The machine: geometry, control law, limits and where its signals are recorded.
+
+Defaults are the paper's Haulotte 16RTJ PRO with signals found automatically.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from typing import Literal
+
+from replay.errors import ConfigError, check_range
+from replay.log.source_options import SignalSource, SourceOptions
+from replay.machine.drive_model import DriveModel
+from replay.machine.geometry import Geometry, four_wheel_geometry
+from replay.machine.units import quantity_of
+
+Law = Literal["auto", "signed", "opposed", "printed", "sign_abs", "none"]
+PsiMode = Literal["auto", "printed", "implied", "event_reset", "forced"]
+Coupling = Literal["auto", "free", "ground"]
+PhiDot = Literal["command", "measured", "zero"]
+
+LAWS: tuple[str, ...] = ("auto", "signed", "opposed", "printed", "sign_abs", "none")
+PSI_MODES: tuple[str, ...] = ("auto", "printed", "implied", "event_reset", "forced")
+
+
+@dataclass(frozen=True)
+class Control:
+    """The MFHCA law and its readings (L15 (14), L16 (13), L17 (15)).
+
+    Attributes
+    ----------
+    law : str
+        ``signed`` u = −λ(v−v_c) + sgn(v_c)Ψ̂²; ``opposed`` u = −λ(v−v_c) − sgn(e)Ψ̂²; ``printed``
+        u = −λ|v| + λ|v_c| + Ψ̂²; ``sign_abs`` sgn(v_c)[λ(|v_c|−|v|) + Ψ̂²]; ``auto`` fits the law to the recorded
+        command; ``none`` means another controller.
+    psi : str
+        How Ψ̂ is replayed; see `replay.control.mfhca`.
+    lambda_ : float
+        λ [s/m].
+    xi, beta : float
+        ξ, β of L16 (13) [1/s].
+    zeta : float
+        Forcing of the ``forced`` mode [s/m²].
+    k_ps : float
+        Steering gain of L17 (15) [1/rad].
+    u_max : float
+        Saturation of the valve command [fraction].
+    psi0 : float or None
+        Ψ̂(0); None fits it where u is recorded, else 0.
+    phi_dot : str
+        Source of φ̇ in ω_j = ω_b + φ̇ (L1 (1)).
+    phi_dot_hz : float
+        Cut-off of the low-pass on φ̇ [Hz].
+    """
+
+    law: Law = "auto"
+    psi: PsiMode = "auto"
+    lambda_: float = 1.0
+    xi: float = 1.0
+    beta: float = 0.001
+    zeta: float = 1000.0
+    k_ps: float = 1.0
+    u_max: float = 1.0
+    psi0: float | None = None
+    phi_dot: PhiDot = "command"
+    phi_dot_hz: float = 5.0
+
+    def __post_init__(self) -> None:
+        """Check values."""
+        if self.law not in LAWS:
+            raise ConfigError(f"control.law = {self.law!r} is not known; expected one of {', '.join(LAWS)}")
+        if self.psi not in PSI_MODES:
+            raise ConfigError(f"control.psi = {self.psi!r} is not known; expected one of {', '.join(PSI_MODES)}")
+        if self.phi_dot not in ("command", "measured", "zero"):
+            raise ConfigError(f"control.phi_dot = {self.phi_dot!r} is not known; expected command, measured or zero")
+        check_range("control.lambda", self.lambda_, 1e-6, 1e4, "s/m")
+        check_range("control.xi", self.xi, 0.0, 1e3, "1/s")
+        check_range("control.beta", self.beta, 0.0, 1e3, "1/s")
+        check_range("control.zeta", self.zeta, 0.0, 1e9, "s/m^2")
+        check_range("control.k_ps", self.k_ps, 1e-6, 1e4, "1/rad")
+        check_range("control.u_max", self.u_max, 1e-6, 1e6, "of full opening")
+        check_range("control.phi_dot_hz", self.phi_dot_hz, 0.01, 1e3, "Hz")
+
+
+@dataclass(frozen=True)
+class WheelPlant:
+    """Wheel model τ v̇ = −v + K·sgn(u)·max(|u| − dead, 0) + offset of one wheel.
+
+    Attributes
+    ----------
+    K : float
+        Speed per full opening [m/s].
+    tau : float
+        Lag [s].
+    load : float or None
+        Standard deviation of load and model error in healthy driving, as a speed [m/s]; None where not known.
+    K_std, tau_std, load_std : float or None
+        Standard deviations, same units; None where not known.
+    dead : float
+        Opening that static friction takes, which gives no speed [fraction].
+    dead_std : float or None
+        Its standard deviation [fraction].
+    offset : float
+        Constant load as a speed [m/s].
+    offset_std : float or None
+        Its standard deviation [m/s].
+    """
+
+    K: float
+    tau: float
+    load: float | None = None
+    K_std: float | None = None
+    tau_std: float | None = None
+    load_std: float | None = None
+    dead: float = 0.0
+    dead_std: float | None = None
+    offset: float = 0.0
+    offset_std: float | None = None
+
+    def __post_init__(self) -> None:
+        """Check values."""
+        check_range("plant.K", self.K, 1e-9, 1e9, "m/s per full opening")
+        check_range("plant.tau", self.tau, 1e-4, 60.0, "s")
+        check_range("plant.dead", self.dead, 0.0, 1e6, "of full opening")
+        check_range("plant.offset", self.offset, -1e6, 1e6, "m/s")
+        spreads = (("load", "m/s"), ("K_std", "m/s"), ("tau_std", "s"), ("load_std", "m/s"), ("dead_std", ""))
+        for name, unit in (*spreads, ("offset_std", "m/s")):
+            value = getattr(self, name)
+            if value is not None:
+                check_range(f"plant.{name}", value, 0.0, 1e9, unit)
+
+
+@dataclass(frozen=True)
+class Plant:
+    """What is known of the wheels before the mission.
+
+    Attributes
+    ----------
+    coupling : str
+        ``free`` (wheels off the ground), ``ground``, or ``auto``.
+    flow : float or None
+        Sum of all wheels' speeds that the pump can feed [m/s]; None where every wheel has its own supply.
+    wheels : Mapping[str, WheelPlant]
+        Wheel models by name.
+    """
+
+    coupling: Coupling = "auto"
+    flow: float | None = None
+    wheels: Mapping[str, WheelPlant] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        """Check values."""
+        if self.coupling not in ("auto", "free", "ground"):
+            raise ConfigError(f"plant.coupling = {self.coupling!r} is not known; expected auto, free or ground")
+        if self.flow is not None:
+            check_range("plant.flow", self.flow, 1e-6, 1e6, "m/s, summed over the wheels")
+
+
+@dataclass(frozen=True)
+class Noise:
+    """Known noise of one signal, SI units; None where it is to be estimated."""
+
+    std: float | None = None
+    lsb: float | None = None
+
+
+@dataclass(frozen=True)
+class Limits:
+    """What counts as a fault, and when a verdict may be given.
+
+    Attributes
+    ----------
+    brief : float
+        A stuck or silent sensor that lasts no longer is tolerable (Assumption 1) [s].
+    min_probability : float
+        Probability from which a fault is stated [1].
+    min_epsilon : float
+        Smallest ε that is reported [1].
+    min_sat : float
+        Smallest saturation term that counts as non-zero: m/s, rad or valve fraction.
+    min_assessed : float
+        Decided driving time per wheel and side that ``ready`` needs [s].
+    driving_speed : float
+        |v_c,i| above which a wheel drives [m/s].
+    """
+
+    brief: float = 1.0
+    min_probability: float = 0.9
+    min_epsilon: float = 0.1
+    min_sat: float = 0.02
+    min_assessed: float = 10.0
+    driving_speed: float = 0.05
+
+    def __post_init__(self) -> None:
+        """Check values."""
+        check_range("limits.brief", self.brief, 0.0, 3600.0, "s")
+        check_range("limits.min_probability", self.min_probability, 0.5, 0.9999, "")
+        check_range("limits.min_epsilon", self.min_epsilon, 0.0, 1.0, "")
+        check_range("limits.min_sat", self.min_sat, 0.0, 1e6, "m/s, rad or fraction")
+        check_range("limits.min_assessed", self.min_assessed, 0.0, 1e6, "s")
+        check_range("limits.driving_speed", self.driving_speed, 0.0, 1e6, "m/s")
+
+
+@dataclass(frozen=True)
+class Machine:
+    """A whole machine file.
+
+    Attributes
+    ----------
+    name, id : str
+        Shown name, and identity for trends across missions.
+    wheels : tuple[str, ...]
+        Drive wheels in order (1…N).
+    geometry : Geometry or None
+        None: no kinematic evidence.
+    gear_ratio : float
+        Motor turns per wheel turn [1].
+    max_speed : float
+        Top speed at the rim [m/s].
+    max_steer : float
+        Largest steering angle [rad].
+    signals : Mapping[str, SignalSource]
+        Given signals; those absent are searched for.
+    sources : Mapping[str, SourceOptions]
+        Options per source, keyed by file name pattern.
+    drives : Mapping[str, DriveModel]
+        How single drives answer, by wheel; from healthy missions.
+    """
+
+    name: str
+    id: str
+    wheels: tuple[str, ...]
+    geometry: Geometry | None
+    gear_ratio: float = 1.0
+    max_speed: float = 0.36
+    max_steer: float = 0.7853981633974483
+    control: Control = field(default_factory=Control)
+    plant: Plant = field(default_factory=Plant)
+    noise: Mapping[str, Noise] = field(default_factory=dict)
+    limits: Limits = field(default_factory=Limits)
+    sources: Mapping[str, SourceOptions] = field(default_factory=dict)
+    signals: Mapping[str, SignalSource] = field(default_factory=dict)
+    drives: Mapping[str, DriveModel] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        """Check values and that signals name this machine's wheels and axles."""
+        if not self.wheels or len(set(self.wheels)) != len(self.wheels):
+            raise ConfigError(f"machine.wheels = {list(self.wheels)} must name each wheel once, and at least one")
+        if self.geometry is not None and set(self.geometry.wheels) != set(self.wheels):
+            raise ConfigError(
+                f"geometry names the wheels {sorted(self.geometry.wheels)}, machine.wheels {sorted(self.wheels)}; "
+                "give every wheel its place, or leave geometry out"
+            )
+        if self.geometry is not None:  # columns of the geometry stand in the order of the wheels
+            places = {w: self.geometry.wheels[w] for w in self.wheels}
+            object.__setattr__(self, "geometry", replace(self.geometry, wheels=places))
+        check_range("geometry.gear_ratio", self.gear_ratio, 1e-3, 1e4, "")
+        check_range("geometry.max_speed", self.max_speed, 1e-6, 1e6, "m/s")
+        check_range("geometry.max_steer", self.max_steer, 0.0, 3.2, "rad")
+        self._check_drives()
+        for section, names in (("signals", self.signals), ("noise", self.noise)):
+            for name in names:
+                self._check_name(section, name)
+
+    def _check_drives(self) -> None:
+        for name in self.drives:
+            if name not in self.wheels:
+                raise ConfigError(f"[drive] {name!r}: no such wheel; machine.wheels has {list(self.wheels)}")
+
+    def _check_name(self, section: str, name: str) -> None:
+        """Raise where a signal is not known or names no part of this machine."""
+        quantity_of(name)
+        group, _, rest = name.partition(".")
+        part = rest.partition(".")[0]
+        if group == "wheel" and part not in self.wheels:
+            raise ConfigError(f"[{section}] {name!r}: no wheel {part!r}; machine.wheels has {list(self.wheels)}")
+        if group == "steer" and self.geometry is not None and part not in self.axles:
+            raise ConfigError(f"[{section}] {name!r}: no steering axle {part!r}; geometry has {list(self.axles)}")
+
+    @property
+    def axles(self) -> tuple[str, ...]:
+        """Steered axles; empty without geometry."""
+        return () if self.geometry is None else self.geometry.axles
+
+    @property
+    def wheel_radius(self) -> float | None:
+        """Rolling radius [m], where the geometry gives it."""
+        return None if self.geometry is None else self.geometry.wheel_diameter / 2
+
+    def canonical_signals(self) -> tuple[str, ...]:
+        """Every signal name that this machine can have, in reading order."""
+        wheel = ("v_ref", "v", "v_true", "u", "u_applied", "psi", "pressure_a", "pressure_b")
+        steer = ("phi_ref", "phi", "phi_true", "u", "u_applied")
+        names = ["cmd.v", "cmd.omega"]
+        names += [f"wheel.{w}.{s}" for w in self.wheels for s in wheel]
+        names += [f"steer.{a}.{s}" for a in self.axles for s in steer]
+        names += ["imu.yaw_rate", "gnss.lat", "gnss.lon", "gnss.speed", "odom.x", "odom.y", "odom.yaw"]
+        return tuple(names)
+
+
+def haulotte() -> Machine:
+    """Return the paper's machine: Haulotte 16RTJ PRO."""
+    return Machine(
+        name="Haulotte 16RTJ PRO",
+        id="",
+        wheels=("FR", "FL", "RR", "RL"),
+        geometry=four_wheel_geometry(2.1, 1.46, 0.854, 0.20),
+        gear_ratio=17.7,
+        max_speed=0.36,
+        # 63 l/min over motors of 100 cm³/rev, gear 17.7, wheel ⌀ 0.854 m
+        plant=Plant(flow=1.59),
+    )

@@ -1,0 +1,70 @@
+"""Where the wheels are, and which steering axle they belong to."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from replay.errors import check_range
+
+
+@dataclass(frozen=True)
+class WheelGeometry:
+    """One drive wheel on its steering joint (frame REP-103 at the machine's centre).
+
+    Attributes
+    ----------
+    x, y : float
+        Steering joint [m]; x forward, y left.
+    offset : float
+        Distance from joint to wheel centre along the wheel's axle [m], positive to the left (d_i of L1 (1)).
+    axle : str
+        Steering axle: ``front``, ``rear``, the wheel's own name, or ``fixed``.
+    """
+
+    x: float
+    y: float
+    offset: float
+    axle: str
+
+
+@dataclass(frozen=True)
+class Geometry:
+    """Where the wheels are. `wheels` is keyed by wheel name."""
+
+    wheels: Mapping[str, WheelGeometry]
+    wheel_diameter: float
+
+    def __post_init__(self) -> None:
+        """Check lengths."""
+        check_range("geometry.wheel_diameter", self.wheel_diameter, 0.02, 5.0, "m")
+        for name, w in self.wheels.items():
+            for key, value in (("x", w.x), ("y", w.y)):
+                check_range(f"geometry.{name}.{key}", value, -20.0, 20.0, "m")
+            check_range(f"geometry.{name}.offset", w.offset, -2.0, 2.0, "m")
+
+    @property
+    def axles(self) -> tuple[str, ...]:
+        """Steered axles in order of first use."""
+        return tuple(dict.fromkeys(w.axle for w in self.wheels.values() if w.axle != "fixed"))
+
+    def axle_x(self, axle: str) -> float:
+        """Position of an axle along the machine [m]: mean x of its joints."""
+        xs = [w.x for w in self.wheels.values() if w.axle == axle]
+        return sum(xs) / len(xs)
+
+
+def four_wheel_geometry(wheelbase: float, joint_spacing: float, wheel_diameter: float, wheel_offset: float) -> Geometry:
+    """Four steered wheels FR, FL, RR, RL on a front and a rear axle; all lengths in m."""
+    check_range("geometry.wheelbase", wheelbase, 0.05, 40.0, "m")
+    check_range("geometry.joint_spacing", joint_spacing, 0.05, 20.0, "m")
+    half, side = wheelbase / 2, joint_spacing / 2
+    return Geometry(
+        wheels={
+            "FR": WheelGeometry(half, -side, -wheel_offset, "front"),
+            "FL": WheelGeometry(half, side, wheel_offset, "front"),
+            "RR": WheelGeometry(-half, -side, -wheel_offset, "rear"),
+            "RL": WheelGeometry(-half, side, wheel_offset, "rear"),
+        },
+        wheel_diameter=wheel_diameter,
+    )

@@ -1,0 +1,285 @@
+"""Read and write machine files (TOML)."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+import tomllib
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any, TypeVar
+
+from replay.errors import ConfigError
+from replay.log.source_options import SignalSource, SourceOptions
+from replay.machine.config import Control, Limits, Machine, Noise, Plant, WheelPlant, haulotte
+from replay.machine.drive_model import drive_from_table, drive_table
+from replay.machine.geometry import Geometry, WheelGeometry, four_wheel_geometry
+from replay.machine.units import si_factor
+
+_T = TypeVar("_T")
+_SECTIONS = {"machine", "geometry", "control", "plant", "drive", "noise", "limits", "sources", "signals"}
+_STANDARD = ("wheelbase", "joint_spacing", "wheel_offset")
+_MACHINE_LEVEL = ("gear_ratio", "max_speed", "max_steer")
+
+
+def load_machine(path: Path) -> Machine:
+    """Read a machine file; what it leaves out takes the default of the paper's machine.
+
+    A file that names its own wheels, other than FR, FL, RR, RL, and gives no geometry has none.
+
+    Raises
+    ------
+    ConfigError
+        Where the file cannot be read, is not TOML, or names an unknown key, signal, unit or a value out of range.
+    """
+    try:
+        data = tomllib.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise ConfigError(f"{path}: cannot read the machine file: {error.strerror or error}") from error
+    except UnicodeDecodeError as error:
+        raise ConfigError(f"{path}: byte {error.start} is not UTF-8; a machine file is TOML text in UTF-8") from error
+    except tomllib.TOMLDecodeError as error:
+        raise ConfigError(f"{path}: not valid TOML: {error}") from error
+    try:
+        return _machine(data)
+    except ConfigError as error:
+        raise ConfigError(f"{path}: {error}") from error
+
+
+def _machine(data: Mapping[str, Any]) -> Machine:
+    for section, content in data.items():
+        if section not in _SECTIONS:
+            raise ConfigError(f"[{section}] is not a section; expected {', '.join(sorted(_SECTIONS))}")
+        if not isinstance(content, dict):
+            raise ConfigError(f"{section} = {content!r} must be a section: write [{section}]")
+    base = haulotte()
+    head = _known("machine", data.get("machine", {}), {"name", "id", "wheels"})
+    wheels = head.get("wheels", list(base.wheels))
+    if not isinstance(wheels, list) or not all(isinstance(w, str) and w and "." not in w for w in wheels):
+        raise ConfigError(f"machine.wheels = {wheels!r} must be a list of names without dots")
+    geo = dict(data.get("geometry", {}))
+    top = {key: _number(f"geometry.{key}", geo.pop(key)) for key in _MACHINE_LEVEL if key in geo}
+    geometry = _geometry(geo, tuple(wheels), base)
+    speed = top.get("max_speed", base.max_speed)
+    limits = dict(data.get("limits", {}))
+    limits.setdefault("driving_speed", round(base.limits.driving_speed * speed / base.max_speed, 9))
+    limits.setdefault("min_sat", round(base.limits.min_sat * speed / base.max_speed, 9))
+    machine = Machine(
+        name=str(head.get("name", base.name if wheels == list(base.wheels) else "unnamed machine")),
+        id=str(head.get("id", "")),
+        wheels=tuple(wheels),
+        geometry=geometry,
+        gear_ratio=top.get("gear_ratio", base.gear_ratio if "geometry" not in data else 1.0),
+        max_speed=speed,
+        max_steer=top.get("max_steer", base.max_steer),
+        control=_build(Control, "control", data.get("control", {}), {"lambda": "lambda_"}),
+        plant=_plant(data.get("plant", {}), tuple(wheels), base.plant.flow if geometry == base.geometry else None),
+        noise={k: _build(Noise, f"noise.{k}", v) for k, v in data.get("noise", {}).items()},
+        limits=_build(Limits, "limits", limits),
+        sources={k: _build(SourceOptions, f"sources.{k}", v) for k, v in data.get("sources", {}).items()},
+        signals={k: _signal(k, v) for k, v in data.get("signals", {}).items()},
+        drives={k: drive_from_table(f"drive.{k}", v) for k, v in data.get("drive", {}).items()},
+    )
+    for name, source in machine.signals.items():
+        if source.unit:
+            si_factor(
+                name,
+                source.unit,
+                wheel_radius=machine.wheel_radius,
+                gear_ratio=machine.gear_ratio,
+                at=source.at,
+                derivative=source.derivative,
+            )
+    return machine
+
+
+def _geometry(geo: dict[str, Any], wheels: tuple[str, ...], base: Machine) -> Geometry | None:
+    assert base.geometry is not None
+    if not geo:
+        return base.geometry if wheels == base.wheels else None
+    diameter = geo.pop("wheel_diameter", None)
+    per_wheel = {k: v for k, v in geo.items() if isinstance(v, dict)}
+    if per_wheel:
+        unknown = set(geo) - set(per_wheel)
+        if unknown:
+            raise ConfigError(
+                f"geometry.{sorted(unknown)[0]} does not go with places per wheel ([geometry.{wheels[0]}])"
+            )
+        if diameter is None:
+            raise ConfigError("geometry.wheel_diameter [m] is missing")
+        return Geometry(
+            {w: _place(w, v, wheels) for w, v in per_wheel.items()}, _number("geometry.wheel_diameter", diameter)
+        )
+    _known("geometry", geo, set(_STANDARD))
+    if set(geo) - {"wheel_offset"} == set() and diameter is not None and wheels != base.wheels:
+        raise ConfigError(
+            "geometry gives a wheel_diameter but no places; add x, y, offset and steer per wheel, e.g. "
+            f"[geometry.{wheels[0]}]"
+        )
+    if wheels != base.wheels:
+        raise ConfigError(
+            f"geometry.wheelbase and joint_spacing fit the wheels {list(base.wheels)}; this machine has "
+            f"{list(wheels)}: give x, y, offset and steer per wheel, e.g. [geometry.{wheels[0]}]"
+        )
+    values = {"wheelbase": 2.1, "joint_spacing": 1.46, "wheel_offset": 0.20, "wheel_diameter": 0.854}
+    given = geo if diameter is None else {**geo, "wheel_diameter": diameter}
+    values.update({k: _number(f"geometry.{k}", v) for k, v in given.items()})
+    return four_wheel_geometry(
+        values["wheelbase"], values["joint_spacing"], values["wheel_diameter"], values["wheel_offset"]
+    )
+
+
+def _place(wheel: str, value: Mapping[str, Any], wheels: tuple[str, ...]) -> WheelGeometry:
+    section = f"geometry.{wheel}"
+    if wheel not in wheels:
+        raise ConfigError(f"[{section}]: no wheel {wheel!r}; machine.wheels has {list(wheels)}")
+    _known(section, value, {"x", "y", "offset", "steer"})
+    missing = {"x", "y"} - set(value)
+    if missing:
+        raise ConfigError(f"[{section}]: {sorted(missing)[0]} [m] is missing")
+    steer = value.get("steer", "fixed")
+    if steer not in ("front", "rear", "own", "fixed"):
+        raise ConfigError(f"{section}.steer = {steer!r} is not known; expected front, rear, own or fixed")
+    return WheelGeometry(
+        x=_number(f"{section}.x", value["x"]),
+        y=_number(f"{section}.y", value["y"]),
+        offset=_number(f"{section}.offset", value.get("offset", 0.0)),
+        axle=wheel if steer == "own" else steer,
+    )
+
+
+def _plant(value: Mapping[str, Any], wheels: tuple[str, ...], default_flow: float | None) -> Plant:
+    _known("plant", value, {"coupling", "flow", *wheels})
+    flow = _number("plant.flow", value["flow"]) if "flow" in value else default_flow
+    models = {w: _build(WheelPlant, f"plant.{w}", value[w]) for w in wheels if w in value}
+    return Plant(coupling=value.get("coupling", "auto"), flow=flow, wheels=models)
+
+
+def _signal(name: str, value: Any) -> SignalSource:
+    section = f'signals."{name}"'
+    if not isinstance(value, dict):
+        raise ConfigError(
+            f'{section} must be a table such as {{ topic = "/cmd_vel", field = "linear.x", unit = "m/s" }}'
+        )
+    source: SignalSource = _build(SignalSource, section, value)
+    ways = [source.topic is not None, source.symbol is not None, source.column is not None]
+    if sum(ways) != 1 or (source.topic is None) != (source.field is None):
+        raise ConfigError(f"{section} needs exactly one of topic with field, symbol, or column")
+    if source.at not in ("motor", "wheel"):
+        raise ConfigError(f"{section}: at = {source.at!r} is not known; expected motor or wheel")
+    return source
+
+
+def _known(section: str, value: Any, keys: set[str]) -> dict[str, Any]:
+    if not isinstance(value, dict):
+        raise ConfigError(f"{section} must be a section: write [{section}]")
+    for key in value:
+        if key not in keys:
+            raise ConfigError(f"{section}.{key} is not a known key; expected {', '.join(sorted(keys))}")
+    return value
+
+
+def _number(key: str, value: Any) -> float:
+    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
+        raise ConfigError(f"{key} = {value!r} must be a finite number")
+    return float(value)
+
+
+def _build(kind: type[_T], section: str, value: Any, rename: Mapping[str, str] | None = None) -> _T:
+    """Make a dataclass from a TOML table, checking names and types of its fields."""
+    rename = rename or {}
+    fields = {f.name: f for f in dataclasses.fields(kind)}  # type: ignore[arg-type]
+    shown = {name: next((k for k, v in rename.items() if v == name), name) for name in fields}
+    table = _known(section, value, set(shown.values()))
+    out: dict[str, Any] = {}
+    for name, item in ((rename.get(k, k), v) for k, v in table.items()):
+        kind_text = str(fields[name].type)
+        key = f"{section}.{shown[name]}"
+        if "float" in kind_text:
+            out[name] = _number(key, item)
+        elif kind_text == "bool":
+            if not isinstance(item, bool):
+                raise ConfigError(f"{key} = {item!r} must be true or false")
+            out[name] = item
+        else:
+            if not isinstance(item, str):
+                raise ConfigError(f"{key} = {item!r} must be text")
+            out[name] = item
+    return kind(**out)
+
+
+def dump_machine(machine: Machine, notes: Mapping[str, Sequence[str]] | None = None) -> str:
+    """Write every setting of a machine as TOML that `load_machine` reads back.
+
+    Parameters
+    ----------
+    machine : Machine
+        The settings.
+    notes : Mapping[str, Sequence[str]] or None
+        Comment lines by section; those of "" stand at the top.
+    """
+    said = {section: _comments(lines) for section, lines in (notes or {}).items()}
+
+    def head(section: str) -> list[str]:
+        return [f"[{section}]", *said.get(section, [])]
+
+    lines = [*said.get("", []), *head("machine"), f"name = {_text(machine.name)}", f"id = {_text(machine.id)}"]
+    lines += [f"wheels = [{', '.join(_text(w) for w in machine.wheels)}]", "", *head("geometry")]
+    lines += [f"{key} = {_real(getattr(machine, key))}" for key in _MACHINE_LEVEL]
+    if machine.geometry is not None:
+        lines.append(f"wheel_diameter = {_real(machine.geometry.wheel_diameter)}")
+        for w, g in machine.geometry.wheels.items():
+            steer = "own" if g.axle == w else g.axle
+            place = f"x = {_real(g.x)}, y = {_real(g.y)}, offset = {_real(g.offset)}, steer = {_text(steer)}"
+            lines.append(f"{_key(w)} = {{ {place} }}")
+    lines += ["", *head("control"), *_table(machine.control, {"lambda_": "lambda"})]
+    lines += ["", *head("plant"), f"coupling = {_text(machine.plant.coupling)}"]
+    if machine.plant.flow is not None:
+        lines.append(f"flow = {_real(machine.plant.flow)}")
+    lines += [f"{_key(w)} = {{ {', '.join(_table(p))} }}" for w, p in machine.plant.wheels.items()]
+    if machine.drives or "drive" in said:
+        lines += ["", *head("drive"), *(f"{_key(w)} = {_inline(drive_table(d))}" for w, d in machine.drives.items())]
+    lines += ["", *head("limits"), *_table(machine.limits)]
+    for section, items in (("noise", machine.noise), ("sources", machine.sources), ("signals", machine.signals)):
+        lines += ["", *head(section), *(f"{_key(k)} = {{ {', '.join(_table(v))} }}" for k, v in items.items())]
+    return "\n".join(lines) + "\n"
+
+
+def _comments(lines: Sequence[str]) -> list[str]:
+    """Comment lines; what TOML forbids in comments becomes a space."""
+    return ["# " + "".join(c if c >= " " and c != "\x7f" else " " for c in line) for line in lines]
+
+
+def _table(item: Any, rename: Mapping[str, str] | None = None) -> list[str]:
+    out = []
+    for f in dataclasses.fields(item):
+        value, default = getattr(item, f.name), f.default
+        if value is None or (isinstance(item, SignalSource) and value == default):
+            continue
+        text = (
+            _text(value) if isinstance(value, str) else str(value).lower() if isinstance(value, bool) else _real(value)
+        )
+        out.append(f"{(rename or {}).get(f.name, f.name)} = {text}")
+    return out
+
+
+def _inline(value: Any) -> str:
+    """Nested tables and lists of numbers on one line."""
+    if isinstance(value, Mapping):
+        return "{ " + ", ".join(f"{_key(k)} = {_inline(v)}" for k, v in value.items()) + " }"
+    if isinstance(value, list):
+        return "[" + ", ".join(_inline(v) for v in value) + "]"
+    return str(value) if isinstance(value, int) else _real(value)
+
+
+def _real(value: float) -> str:
+    return repr(float(value))
+
+
+def _text(value: str) -> str:
+    out = value.replace("\\", "\\\\").replace('"', '\\"')
+    return '"' + "".join(c if c >= " " and c != "\x7f" else f"\\u{ord(c):04X}" for c in out) + '"'
+
+
+def _key(name: str) -> str:
+    return name if name.isascii() and name.replace("_", "").replace("-", "").isalnum() else _text(name)

@@ -1,0 +1,1 @@
+"""Messages to columns: CDR, ROS 1, protobuf, JSON."""

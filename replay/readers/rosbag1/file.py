@@ -1,0 +1,339 @@
+"""Structure of a ROS 1 bag: its header, connections, chunks and what its index says about them."""
+
+from __future__ import annotations
+
+import struct
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+
+from replay.errors import LogError
+from replay.log.reading_notes import Report
+from replay.readers.messages.assemble import Connection
+from replay.readers.rosbag1.records_kernel import (
+    CHUNK,
+    CONNECTION,
+    HEADER,
+    INDEX,
+    INFO,
+    MESSAGE,
+    BagRecords,
+    end_of_chunk,
+    scan_bag,
+)
+
+MAGIC = b"#ROSBAG V"
+_VERSION = b"#ROSBAG V2.0\n"
+_BAD = (struct.error, KeyError, ValueError)
+_LONGEST_TEXT = 1 << 20
+_MOST_TOLD = 200
+
+
+@dataclass
+class Chunk:
+    """One chunk, and what the index section states about it.
+
+    Attributes
+    ----------
+    start, body, packed, size : int
+        Place of its record and of its data, their length, and their length when expanded [bytes].
+    compression : str
+        As stated.
+    first_ns, last_ns : int
+        Bounds of its stamps; both −1 where no index states them.
+    stated : dict[int, int] or None
+        Messages per connection, or None where no index states them.
+    cut : bool
+        Whether the file ends before the chunk does, or its length is not to be trusted.
+    """
+
+    start: int
+    body: int
+    packed: int
+    size: int
+    compression: str
+    first_ns: int = -1
+    last_ns: int = -1
+    stated: dict[int, int] | None = None
+    cut: bool = False
+
+
+@dataclass
+class Bag:
+    """One opened bag.
+
+    Attributes
+    ----------
+    connections : dict[int, Connection]
+        Streams by number.
+    chunks : list[Chunk]
+        In the order of the file.
+    loose : list[BagRecords]
+        Walks that met messages outside of chunks.
+    absent : dict[int, int]
+        Messages per connection of chunks that the index names and that are not in their place.
+    """
+
+    path: Path
+    data: NDArray[np.uint8]
+    report: Report
+    connections: dict[int, Connection] = field(default_factory=dict)
+    chunks: list[Chunk] = field(default_factory=list)
+    loose: list[BagRecords] = field(default_factory=list)
+    absent: dict[int, int] = field(default_factory=dict)
+    raw: dict[int, bytes] = field(default_factory=dict)
+    told: int = 0
+
+    def lost(self, text: str) -> None:
+        """Report a loss in this file; of very many, the first ones."""
+        self.told += 1
+        if self.told <= _MOST_TOLD:
+            self.report.lost(f"{self.path.name}: {text}")
+        elif self.told == _MOST_TOLD + 1:
+            self.report.lost(f"{self.path.name}: more than {_MOST_TOLD} places are damaged; the others are not listed")
+
+
+def open_bag(path: Path, report: Report, whole: bool) -> Bag:
+    """Open a bag from its index section, or walk all of it.
+
+    Parameters
+    ----------
+    path : Path
+        The bag.
+    report : Report
+        Takes what is damaged.
+    whole : bool
+        Account for every byte; otherwise the file is walked only where its index section is damaged or absent.
+
+    Raises
+    ------
+    LogError
+        Where the file is empty, unreadable, encrypted or not a bag of version 2.0.
+    """
+    try:
+        if path.stat().st_size == 0:
+            raise LogError(f"{path} is empty (0 bytes); the recording was not written, copy or record it again")
+        data: NDArray[np.uint8] = np.memmap(path, np.uint8, "r")
+    except OSError as error:
+        raise LogError(f"{path} cannot be read: {error.strerror or error}") from error
+    first = data[: len(_VERSION)].tobytes()
+    if first.startswith(MAGIC) and first != _VERSION:
+        raise LogError(f"{path} is not a ROS bag of version 2.0; found {first!r}; convert it with `rosbag migrate`")
+    bag = Bag(path, data, report)
+    if first != _VERSION:
+        bag.lost(f"its first line is damaged; found {first!r}, expected {_VERSION!r}")
+    header = _header(bag)
+    index = None if header is None or not 0 < header[0] <= len(data) else scan_bag(data, header[0])
+    sound = header is not None and index is not None and _sound(index, header)
+    if header is None:
+        bag.lost("its header record is damaged; the whole file was walked instead")
+    elif header[0] == 0:
+        bag.lost("it has no index (the recorder was not closed); its complete chunks were read in order")
+    elif not sound:
+        bag.lost(
+            f"its index section at byte {header[0]} is damaged or cut off (it should hold {header[1]} connections and "
+            f"{header[2]} chunks); the whole file was walked instead"
+        )
+    if sound and not whole and index is not None and _from_index(bag, index):
+        return bag
+    _walk(bag)
+    return bag
+
+
+def fields_of(raw: bytes) -> dict[str, bytes]:
+    """Header fields ``name=value`` of one record."""
+    out, at = {}, 0
+    while at + 4 <= len(raw):
+        (size,) = struct.unpack_from("<I", raw, at)
+        name, _, value = raw[at + 4 : at + 4 + size].partition(b"=")
+        out[name.decode("ascii", "replace")] = value
+        at += 4 + size
+    return out
+
+
+def _header(bag: Bag) -> tuple[int, int, int] | None:
+    """Index position, connection and chunk counts; None where the header record is damaged."""
+    first = scan_bag(bag.data, len(_VERSION), min(len(bag.data), len(_VERSION) + (1 << 16)))
+    if not len(first.op) or first.op[0] != HEADER or first.head[0] != len(_VERSION) + 4:
+        return None
+    try:
+        fields = fields_of(bag.data[int(first.head[0]) : int(first.body[0]) - 4].tobytes())
+        if fields.get("encryptor"):
+            raise LogError(
+                f"{bag.path} is encrypted ({fields['encryptor'][:80].decode('utf-8', 'replace')!r}); "
+                "decrypt it with `rosbag decrypt` first"
+            )
+        (place,) = struct.unpack("<Q", fields["index_pos"])
+        (connections,) = struct.unpack("<I", fields["conn_count"])
+        (chunks,) = struct.unpack("<I", fields["chunk_count"])
+    except _BAD:
+        return None
+    return place, connections, chunks
+
+
+def _sound(index: BagRecords, header: tuple[int, int, int]) -> bool:
+    """Whether the index section is complete and holds what the bag's header says."""
+    named, infos = np.unique(index.conn[index.op == CONNECTION]), int(np.count_nonzero(index.op == INFO))
+    known = np.isin(index.op, (CONNECTION, INFO)).all()
+    return not index.lost and not index.mended and bool(known) and (len(named), infos) == header[1:]
+
+
+def _infos(bag: Bag, records: BagRecords) -> dict[int, tuple[int, int, dict[int, int]]]:
+    """First and last stamp and messages per connection of each chunk by its place, from chunk-info records."""
+    out = {}
+    for i in np.flatnonzero(records.op == INFO).tolist():
+        head, body, size = int(records.head[i]), int(records.body[i]), int(records.size[i])
+        try:
+            fields = fields_of(bag.data[head : body - 4].tobytes())
+            (place,) = struct.unpack("<Q", fields["chunk_pos"])
+            first, last = (
+                s * 1_000_000_000 + n for s, n in (struct.unpack("<II", fields[k]) for k in ("start_time", "end_time"))
+            )
+            pairs = np.frombuffer(bag.data[body : body + size - size % 8].tobytes(), "<u4").reshape(-1, 2)
+            out[place] = first, last, dict(pairs.tolist())
+        except _BAD as error:
+            bag.lost(f"the chunk-info record at byte {head - 4} is damaged ({type(error).__name__})")
+    return out
+
+
+def _chunk(bag: Bag, head: int, body: int, packed: int) -> Chunk:
+    fields = fields_of(bag.data[head : body - 4].tobytes())
+    (size,) = struct.unpack("<I", fields["size"])
+    return Chunk(head - 4, body, packed, size, fields["compression"].decode("ascii", "replace"))
+
+
+def _from_index(bag: Bag, index: BagRecords) -> bool:
+    """Take connections and chunks from the index section; False where a chunk is not in its place."""
+    infos = _infos(bag, index)
+    if len(infos) != np.count_nonzero(index.op == INFO):
+        return False
+    chunks = []
+    for place, (first, last, counts) in sorted(infos.items()):
+        try:
+            (size,) = struct.unpack("<I", bag.data[place : place + 4].tobytes())
+            body = place + 8 + size
+            (packed,) = struct.unpack("<I", bag.data[body - 4 : body].tobytes())
+            chunk = _chunk(bag, place + 4, body, packed)
+        except _BAD:
+            return False
+        if body + packed > len(bag.data):
+            return False
+        chunk.first_ns, chunk.last_ns, chunk.stated = first, last, counts
+        chunks.append(chunk)
+    for i in np.flatnonzero(index.op == CONNECTION).tolist():
+        take_connection(bag, bag.data, index, i)
+    bag.chunks = chunks
+    return True
+
+
+def _walk(bag: Bag) -> None:
+    """Walk the whole file; every byte belongs to a record or is reported."""
+    at = len(_VERSION)
+    infos: dict[int, tuple[int, int, dict[int, int]]] = {}
+    while at < len(bag.data):
+        records = scan_bag(bag.data, at)
+        infos |= _infos(bag, records)
+        for i in np.flatnonzero(records.op == CONNECTION).tolist():
+            take_connection(bag, bag.data, records, i)
+        _take_chunks(bag, records)
+        if np.any(records.op == MESSAGE):
+            bag.loose.append(records)
+        at = _behind(bag, records)
+    for chunk in bag.chunks:
+        if chunk.start in infos:
+            chunk.first_ns, chunk.last_ns, chunk.stated = infos.pop(chunk.start)
+    for place, (_, _, counts) in sorted(infos.items()):
+        bag.lost(f"no chunk stands at byte {place}, where the index names one with {sum(counts.values())} messages")
+        for number, count in counts.items():
+            bag.absent[number] = bag.absent.get(number, 0) + count
+
+
+def _take_chunks(bag: Bag, records: BagRecords) -> None:
+    """Take chunks, and from the index records behind each what it holds."""
+    places = np.flatnonzero(records.op == CHUNK)
+    index = np.flatnonzero(records.op == INDEX)
+    edges = np.searchsorted(index, np.append(places, len(records.op)))
+    for k, i in enumerate(places.tolist()):
+        head, body, size = int(records.head[i]), int(records.body[i]), int(records.size[i])
+        try:
+            chunk = _chunk(bag, head, body, size)
+        except _BAD as error:
+            bag.lost(f"the chunk at byte {head - 4} has a damaged header ({type(error).__name__})")
+            chunk = Chunk(head - 4, body, size, 0, "", cut=True)
+        bag.chunks.append(chunk)
+        mine = index[edges[k] : edges[k + 1]]
+        if len(mine):
+            chunk.stated = {}
+            for number, count in zip(records.conn[mine].tolist(), (records.size[mine] // 12).tolist(), strict=True):
+                chunk.stated[number] = chunk.stated.get(number, 0) + count
+
+
+def _behind(bag: Bag, records: BagRecords) -> int:
+    """Report what a walk passed over, and return where the next one starts."""
+    rest = len(bag.data) - records.end
+    cut = _overlong(bag, records.end) if rest else None
+    lost = records.lost - (rest if cut is not None else 0)
+    if lost > 0:
+        bag.lost(f"{lost} bytes in {records.gaps - (cut is not None)} places (the first at byte {records.first}) "
+                 "hold no complete record and were left out")  # fmt: skip
+    if records.mended:
+        bag.lost(f"{records.mended} records have a damaged length; they were read up to the next record")
+    if cut is None:
+        return len(bag.data)
+    stop = end_of_chunk(bag.data, cut.body)
+    cut.packed = stop - cut.body
+    bag.chunks.append(cut)
+    return stop
+
+
+def _overlong(bag: Bag, at: int) -> Chunk | None:
+    """Return the chunk at `at` that seems to reach beyond the end of the file, if there is one."""
+    try:
+        (size,) = struct.unpack("<I", bag.data[at : at + 4].tobytes())
+        if size > 4096:
+            return None
+        chunk = _chunk(bag, at + 4, at + 8 + size, 0)
+    except _BAD:
+        return None
+    bag.lost(f"the chunk at byte {at} reaches beyond the end of the file; what is there of it was read")
+    chunk.cut = True
+    return chunk
+
+
+def take_connection(bag: Bag, data: NDArray[np.uint8], records: BagRecords, i: int) -> None:
+    """Take a connection record; of two copies that differ, the one that its checksum confirms."""
+    head, body, size, number = (int(a[i]) for a in (records.head, records.body, records.size, records.conn))
+    raw = data[head : body + min(size, _LONGEST_TEXT)].tobytes()
+    if bag.raw.get(number) == raw:
+        return
+    try:
+        topic = fields_of(raw[: body - 4 - head])["topic"].decode("utf-8", "replace")
+        inner = fields_of(raw[body - head :])
+        text = inner["message_definition"].decode("utf-8", "replace")
+        name = inner["type"].decode("ascii", "replace")
+        connection = Connection(topic, name, "ros1", "ros1msg", text)
+    except _BAD as error:
+        bag.lost(f"a record of connection {number} is damaged ({type(error).__name__})")
+        return
+    known = bag.connections.get(number)
+    bag.raw.setdefault(number, raw)
+    if known is None:
+        bag.connections[number] = connection
+    elif known != connection:
+        bag.lost(f"two records of connection {number} ({known.topic[:80]!r}) differ")
+        if not _confirmed(bag.raw[number], known) and _confirmed(raw, connection):
+            bag.connections[number], bag.raw[number] = connection, raw
+
+
+def _confirmed(raw: bytes, connection: Connection) -> bool:
+    """Whether the checksum in a connection record is that of its definition."""
+    try:
+        store = get_typestore(Stores.EMPTY)
+        store.register(get_types_from_msg(connection.definition, connection.type_name))
+        digest: str = store.generate_msgdef(connection.type_name, ros_version=1)[1]
+    except Exception:  # a damaged definition fails in any way
+        return False
+    return digest.encode() in raw

@@ -1,0 +1,1 @@
+"""rosbag2 folders and their SQLite files."""

@@ -1,0 +1,201 @@
+"""Plain text tables: CSV and the like (also gzip, zstd), written by a PLC, a database or a script."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from replay.errors import LogError
+from replay.log.raw_log import Clock, LogSummary, RawLog, TopicInfo, Window
+from replay.log.reading_notes import Report
+from replay.log.source_options import SourceOptions
+from replay.readers.tables.columns import CellColumn
+from replay.readers.tables.row_kernel import FIRST_LONG, FIRST_SHORT, FIRST_TEXT, LONG, MOMENT, REAL, SHORT, TEXT
+from replay.readers.tables.rows import Rows
+from replay.readers.tables.table_log import RowTimes, table_log
+from replay.readers.tables.text_file import first_text
+from replay.readers.tables.text_table import (
+    HEAD,
+    SEPARATORS,
+    TextTable,
+    is_text,
+    open_text,
+    row_count,
+    separator_of,
+    span,
+)
+from replay.readers.tables.time_cells import TimeBase, epoch_ns
+from replay.readers.tables.time_column import Sample, find_time
+
+_SAMPLES = (HEAD, 16 << 20)
+_NAMED = (".csv", ".tsv")
+
+
+class CsvReader:
+    """Reader of plain text tables."""
+
+    format = "csv"
+
+    def matches(self, path: Path) -> bool:
+        """Whether the file is text in rows of at least two cells of which most are numbers, or a header alone."""
+        if not path.is_file():
+            return False
+        text = first_text(path)
+        if text.count("\n") < 3 and len(text) > 30_000:
+            text = first_text(path, 2 << 20)
+        lines = [x for x in text.splitlines()[:50] if x.strip() and not x.startswith("#")]
+        if len(lines) == 1 and any(s.lower() in _NAMED for s in path.suffixes):
+            return any(mark in lines[0] for mark in SEPARATORS)
+        return len(lines) > 1 and separator_of(lines) is not None
+
+    def summarise(self, path: Path, options: SourceOptions) -> LogSummary:
+        """List the columns from the table's head and tail; of a large one the rows are estimated.
+
+        Raises
+        ------
+        LogError
+            Where the table cannot be understood.
+        """
+        report = Report()
+        table = open_text(path, options, report)
+        sample, name, unit = _time(table, options, report)
+        last = table.file.tail(table.skip) if unit != "dc32" else b""
+        tail = table.sample(last) if last else {}
+        count, exact = row_count(table.file, table.skip)
+        dated = sample[name].dtype.kind == "M"
+        base = TimeBase("iso" if dated else unit, epoch_ns(options, str(path), unit), path.name, Report())
+        start, stop = span(base, sample[name], tail.get(name), count)
+        fields = tuple(n for n in table.names if n != name and (n in sample or n in tail))
+        note = "" if exact else "rows and end are estimated from the first rows; reading the file counts them"
+        topic = TopicInfo(path.name, "table", count, "table", fields, note)
+        return LogSummary(str(path), self.format, start, stop, (topic,), tuple(report.notes), tuple(report.damage))
+
+    def read(
+        self,
+        path: Path,
+        options: SourceOptions,
+        topics: Collection[str] | None = None,
+        clock: Clock = "header",
+        window: Window | None = None,
+    ) -> RawLog:
+        """Read all columns.
+
+        Raises
+        ------
+        LogError
+            Where the table cannot be understood or has no time column.
+        """
+        report = Report()
+        table = open_text(path, options, report)
+        sample, name, unit = _time(table, options, report)
+        time = name, unit, unit == "iso" or sample[name].dtype.kind == "M"
+        found = _read(table, time, options, window)
+        if not table.sure and any(_has_comma(cell) for cell in found.rows.examples.values()):
+            found = _read(table.commas(), time, options, window)
+        report.damage += found.rows.report.damage
+        return _log(table, found, report, clock)
+
+
+class _Found:
+    """What one pass over a table gathered."""
+
+    def __init__(self, rows: Rows, times: RowTimes, columns: dict[str, CellColumn]) -> None:
+        self.rows, self.times, self.columns = rows, times, columns
+
+
+def _time(table: TextTable, options: SourceOptions, report: Report) -> tuple[Sample, str, str]:
+    """First rows, and name and unit of the time column; more rows are looked at where few do not tell."""
+    for size in _SAMPLES:
+        head = table.file.head(table.skip + size)[table.skip :]
+        whole = len(head) < size
+        sample = table.sample(head if whole else head[: head.rfind(b"\n") + 1])
+        try:
+            said = Report()
+            columns = sample if options.time is None else {n: sample.get(n, np.empty(0)) for n in table.names}
+            name, unit = find_time(table.file.path, columns, options, said, table.texts(head, columns))
+        except LogError:
+            if whole or size == _SAMPLES[-1]:
+                raise
+            continue
+        for note in said.notes:
+            report.note(note)
+        return columns, name, unit
+    raise AssertionError("unreachable")
+
+
+def _read(table: TextTable, time: tuple[str, str, bool], options: SourceOptions, window: Window | None) -> _Found:
+    """One pass over a table whose time column has this name and unit, and may hold dates."""
+    name, unit, dated = time
+    report = Report()
+    rows = table.rows(report)
+    at = table.names.index(name)
+    if dated:
+        rows.kinds[at] = MOMENT
+    times = RowTimes(table.file.path, name, unit, dated, options, window, report)
+    columns = {n: CellColumn() for n in table.names if n != name}
+    order = [(i, columns[n]) for i, n in enumerate(table.names) if n != name]
+    for cells in table.blocks(rows):
+        keep = times.keep(cells[at].view(np.float64) if rows.kinds[at] == REAL else cells[at])
+        whole = bool(keep.all())
+        for i, column in order:
+            column.append(cells[i] if whole else cells[i][keep], rows.kinds[i])
+    return _Found(rows, times, columns)
+
+
+def _has_comma(cell: str) -> bool:
+    whole, comma, part = cell.partition(",")
+    return bool(comma) and part.isdigit() and whole.lstrip("+-").isdigit()
+
+
+def _headers_again(table: TextTable, rows: Rows, texts: NDArray[Any], report: Report) -> int:
+    """Count rows that repeat the header, as in several exports that were joined, and tell where the first stands."""
+    odd = [i for i in np.flatnonzero((rows.columns[:, TEXT] > 0) & ~texts).tolist() if i in rows.examples]
+    cells = {i: rows.examples[i].strip(' "\r') for i in odd}
+    same = [i for i in odd if cells[i] and table.names[i].startswith(cells[i])]
+    if len(same) < 2 or len(same) < 0.5 * len(odd):
+        return 0
+    count, at = int(min(rows.columns[i, TEXT] for i in odd)), int(min(rows.columns[i, FIRST_TEXT] for i in same))
+    line, held = 1, 0
+    for piece in table.file.quiet(0):
+        line += piece.count(b"\n", 0, max(at - held, 0))
+        held += len(piece)
+        if held >= at:
+            break
+    what = "a second header" if count == 1 else f"{count} more headers, the first"
+    report.lost(
+        f"{table.file.path.name}: {what} in line {line}: several exports stand in one file, one behind the other; the rows of "
+        "all were read"
+    )
+    return count
+
+
+def _log(table: TextTable, found: _Found, report: Report, clock: Clock) -> RawLog:
+    path, rows = table.file.path, found.rows
+    if not rows.count:
+        raise LogError(f"{path} has a header and no row of data; record or export it again")
+    texts: NDArray[Any] = is_text(rows)
+    again = _headers_again(table, rows, texts, report)
+    found.times.base.rows -= again
+    found.times.base.missing -= again
+    for i, label in enumerate(table.names):
+        bad = int(rows.columns[i, TEXT]) - again
+        if bad > 0 and not texts[i] and label in found.columns:
+            report.lost(f"{path.name}: {bad} cells of {label!r} are no numbers; they became empty ({rows.example(i)})")
+    found.times.report = found.times.base.report = report
+    if rows.table[SHORT]:
+        report.lost(
+            f"{path.name}: {rows.table[SHORT]} rows have fewer cells than the header (the first ends near byte "
+            f"{rows.table[FIRST_SHORT]}); the rest of their cells is empty"
+        )
+    if rows.table[LONG]:
+        report.lost(
+            f"{path.name}: {rows.table[LONG]} rows have more cells than the header (the first at byte "
+            f"{rows.table[FIRST_LONG]}); the cells beyond were left out"
+        )
+    kept = {n: c for n, c in found.columns.items() if not texts[table.names.index(n)]}
+    left = [n for n in found.columns if n not in kept]
+    return table_log(path, "csv", clock, found.times, kept, left, {})

@@ -1,0 +1,189 @@
+"""Which column of a table is time, and in which unit."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from replay.errors import LogError
+from replay.log.reading_notes import Report
+from replay.log.source_options import SourceOptions
+from replay.readers.tables.columns import unit_of
+
+_TIME = re.compile(
+    r"^(t|time|times?tamp|stamp|rel(ative)?[ _]?time|elapsed([ _]?time)?|date[ _]?time|zeit|zeitstempel|seconds?|secs?|"
+    r"header\.stamp|log_time)([ _.]?(s|sec|ms|us|ns|nsec))?$"
+)
+_LIKE_TIME = re.compile(r".*(time|date|zeit|datum|stamp|uhr|clock).*|t|dt|ts")
+_SUFFIX = re.compile(r"[ _.](s|sec|ms|us|ns|nsec)$")
+_TURN = 1 << 32
+_LONGEST_STEP = 5000  # a larger usual step is neither of seconds nor of milliseconds
+_UNITS = {"s": "s", "sec": "s", "seconds": "s", "ms": "ms", "us": "us", "µs": "us", "ns": "ns", "nsec": "ns"}
+
+_SIZES = (  # a distributed clock counts from 2000: years 2014 to 2031
+    ("ns", 1e18, 4e18),
+    ("dc", 4.6e17, 1e18),
+    ("filetime", 1.2e17, 1.6e17),
+    ("us", 1e15, 4e15),
+    ("ms", 1e12, 4e12),
+)
+
+Sample = Mapping[str, NDArray[Any]]
+
+
+def find_time(
+    path: Path, sample: Sample, options: SourceOptions, report: Report, texts: Mapping[str, str] | None = None
+) -> tuple[str, str]:
+    """Name and unit of the time column: as given, by its name, or the first that only rises.
+
+    Parameters
+    ----------
+    path : Path
+        File, for messages.
+    sample : Mapping[str, NDArray]
+        First rows of each column: numbers, or ``datetime64[ns]`` for dates.
+    options : SourceOptions
+        Time column and unit, where given.
+    report : Report
+        Takes a note on what was found.
+    texts : Mapping[str, str] or None
+        First cell of each column of text.
+
+    Raises
+    ------
+    LogError
+        Where the given column does not exist, none can be found, or the unit of the one found cannot be told.
+    """
+    names = list(sample)
+    if options.time is not None:
+        wanted = options.time.strip()
+        if wanted not in sample:
+            raise LogError(f"{path} has no column {wanted!r} for time; its columns are {_some(names)}")
+        if options.time_unit == "s" and turns(sample[wanted]):
+            raise LogError(
+                f"{path}: column {wanted!r} counts evenly and starts again at 2^32, so it is not in seconds; give [sources] "
+                "time_unit = 'dc32' (a 32-bit distributed clock)"
+            )
+        moment = sample[wanted].dtype.kind == "M" and options.time_unit != "dt"
+        return wanted, "iso" if moment else options.time_unit
+    called = [n for n in names if _TIME.match(_bare(n).lower())]
+    rising = [n for n in names if rises(sample[n]) or turns(sample[n])]
+    named = [n for n in called if n in rising]
+    texts = texts or {}
+    if not named:
+        _refuse_text(path, texts, names, sure=bool(rising))
+    for name in named or rising:
+        unit = _time_unit(path, name, sample[name], options)
+        how = "by its name" if name in called else _course(sample[name], unit)
+        report.note(f"{path.name}: time is column {name!r} in {unit}, found {how}; [sources] time and time_unit set it")
+        return name, unit
+    for name in called or names:
+        if rises(sample[name], often=False):
+            raise LogError(
+                f"{path} has no time column that rises from row to row; {name!r} rises only now and then: if it counts "
+                f"whole seconds (PLC DT), give [sources] time = {name!r} and time_unit = 'dt'"
+            )
+    raise LogError(
+        f"{path} has no time column (none rises); give [sources] time; its columns are {_some([*texts, *names])}"
+    )
+
+
+def _refuse_text(path: Path, texts: Mapping[str, str], names: list[str], sure: bool) -> None:
+    """Raise a `LogError` where a column of text is called like time: surely, where another column might be it."""
+    for name, cell in texts.items():
+        bare = _bare(name).lower()
+        if _TIME.match(bare) or bare in ("date", "datum") or (not sure and _LIKE_TIME.match(bare)):
+            raise LogError(
+                f"{path} has no time column that can be read; {name!r} looks like it, but its text {cell!r} is none of "
+                "2025-08-19T08:00:00.25, 19.08.2025 08:00:00.25, 08/19/2025 08:00:00.25 AM or 08:00:00.25; write it like one "
+                f"of these, or as seconds, or give [sources] time; its columns are {_some([*texts, *names])}"
+            )
+
+
+def _course(column: NDArray[Any], unit: str) -> str:
+    """Say why a column was taken for time."""
+    if unit == "dc32":
+        return "because it rises and starts again at 2^32, like a 32-bit distributed clock"
+    back = int((np.diff(_given(column)) < 0).sum())
+    return f"because it rises in all but {back} of its first {len(column)} rows" if back else "because it only rises"
+
+
+def _some(names: list[str]) -> str:
+    return ", ".join(names[:12])
+
+
+def _bare(name: str) -> str:
+    """Name without a unit in brackets."""
+    return re.sub(r"\s*[\[(][^\[\]()]*[\])]\s*$", "", name).strip()
+
+
+def _given(column: NDArray[Any]) -> NDArray[Any]:
+    given: NDArray[Any]
+    if column.dtype.kind == "M":
+        given = column[~np.isnat(column)].astype(np.int64)
+        return given
+    given = column[~np.isnan(column)] if column.dtype.kind == "f" else column
+    return given
+
+
+def rises(column: NDArray[Any], often: bool = True) -> bool:
+    """Whether a column never falls, and rises in most steps (or at all); a rare step back is allowed."""
+    values = _given(column)
+    if len(values) < 2 or len(values) < 0.9 * min(len(column), 2000):
+        return often and len(column) == 1 and len(values) == 1
+    steps = np.diff(values) if values.dtype.kind in "iM" else np.diff(values.astype(np.float64))
+    ups = (steps > 0).mean()
+    return bool((steps >= 0).mean() > 0.99 and (ups > 0.5 if often else ups > 0))
+
+
+def turns(column: NDArray[Any]) -> bool:
+    """Whether a column counts evenly and starts again at 2^32, as the lower half of a distributed clock does."""
+    values = _given(column)
+    if len(values) < 3 or column.dtype.kind not in "iu" or values.min() < 0 or values.max() >= _TURN:
+        return False
+    ticks: NDArray[np.int64] = values.astype(np.int64)
+    plain = ticks[1:] - ticks[:-1]
+    steps = plain % _TURN
+    usual = float(np.median(steps))
+    turned = plain < -(_TURN // 2)
+    return bool(
+        turned.any() and 1e4 < usual < 1e9 and (turned == (plain < 0)).all() and (steps < 10 * usual).mean() > 0.95
+    )
+
+
+def _time_unit(path: Path, name: str, column: NDArray[Any], options: SourceOptions) -> str:
+    """Unit of a time column that was found: stated in the options or the name, else by size and step.
+
+    Raises
+    ------
+    LogError
+        Where neither tells.
+    """
+    if column.dtype.kind == "M":
+        return "iso"
+    if options.time_unit != "s":
+        return options.time_unit
+    suffix = _SUFFIX.search(_bare(name).lower())
+    stated = unit_of(name) or (suffix.group(1) if suffix else "")
+    if stated.lower() in _UNITS:
+        return _UNITS[stated.lower()]
+    if turns(column):
+        return "dc32"
+    values = _given(column).astype(np.float64)
+    size = float(np.abs(values).max())
+    for unit, low, high in _SIZES:
+        if low < size < high:
+            return unit
+    step = float(np.median(np.diff(values))) if len(values) > 1 else 1.0
+    if step > _LONGEST_STEP:
+        clock = ", 'dc32' (a 32-bit distributed clock)" if size < _TURN else ", 'dc' (a distributed clock)"
+        raise LogError(
+            f"{path}: column {name!r} rises by {step:.6g} from row to row, which can be neither seconds nor milliseconds; "
+            f"give [sources] time = {name!r} and time_unit = 'us', 'ns'{clock} or what it is"
+        )
+    return "ms" if column.dtype.kind in "iu" and step >= 2 else "s"

@@ -1,0 +1,1 @@
+"""Beckhoff TwinCAT Scope exports: text and `.svdx`."""

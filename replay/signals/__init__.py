@@ -1,0 +1,1 @@
+"""From names and fields to channels in SI units on one time axis."""

@@ -1,0 +1,232 @@
+"""From recorded channels to canonical signals in SI: as the machine file says, or by rules with every guess named."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from fnmatch import fnmatch
+from pathlib import PurePath
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from replay.errors import ConfigError
+from replay.log.raw_log import Channel, LogSummary, RawLog
+from replay.log.source_options import SignalSource
+from replay.machine.config import Machine
+from replay.signals.rules import Candidate, candidates, wanted_type
+from replay.signals.signal import Signal, Signals
+from replay.signals.to_si import Converted, choose_motor_or_wheel, convert, doubt, usable_unit
+
+
+def plan_topics(summaries: Sequence[LogSummary], machine: Machine) -> dict[str, tuple[str, ...] | None]:
+    """Topics worth decoding in each source.
+
+    Parameters
+    ----------
+    summaries : Sequence[LogSummary]
+        What each source holds.
+    machine : Machine
+        Its given signals, and the rules for those not given.
+
+    Returns
+    -------
+    dict[str, tuple[str, ...] or None]
+        By `LogSummary.source`: topics, or None where all is to be read (tables).
+    """
+    given = {_slashed(s.topic) for s in machine.signals.values() if s.topic is not None}
+    plan: dict[str, tuple[str, ...] | None] = {}
+    for summary in summaries:
+        if all(t.encoding == "table" for t in summary.topics):
+            plan[summary.source] = None
+            continue
+        plan[summary.source] = tuple(
+            t.name
+            for t in summary.topics
+            if _slashed(t.name) in given or (not t.note and (t.encoding == "json" or wanted_type(t.type_name)))
+        )
+    return plan
+
+
+@dataclass
+class _Draft:
+    """Signals while they are being found."""
+
+    machine: Machine
+    items: dict[str, Signal] = field(default_factory=dict)
+    missing: dict[str, str] = field(default_factory=dict)
+    notes: list[str] = field(default_factory=list)
+    named: list[str] = field(default_factory=list)
+
+    def take(
+        self, name: str, log: RawLog, channel: Channel, converted: Converted, origin: SignalSource, guessed: bool
+    ) -> None:
+        beside = "" if channel.topic else next(n for n, c in log.channels.items() if c.stamps is channel.stamps)
+        self.items[name] = Signal(name, converted.stamps, converted.values, origin, log.source, guessed, beside)
+        self.notes += [f"{name}: {note}" for note in converted.notes]
+        unsure = doubt(name, converted.values, origin, self.machine)
+        if unsure:
+            self.notes.append(unsure)
+
+
+def map_signals(logs: Sequence[RawLog], machine: Machine) -> Signals:
+    """Find every signal of the machine in the logs of one mission.
+
+    Parameters
+    ----------
+    logs : Sequence[RawLog]
+        Decoded sources.
+    machine : Machine
+        Given signals are taken exactly as they say; the others are searched for by rules.
+
+    Returns
+    -------
+    Signals
+        In SI at their own stamps, with every guess and doubt in `notes` and the reason for each missing one.
+
+    Raises
+    ------
+    ConfigError
+        Where a given unit does not fit its signal.
+    """
+    draft = _Draft(machine)
+    for name, source in machine.signals.items():
+        _take_given(draft, name, source, logs)
+    by_signal: dict[str, list[tuple[Candidate, RawLog]]] = {}
+    for log in logs:
+        for candidate in candidates(log.channels, machine):
+            by_signal.setdefault(candidate.signal, []).append((candidate, log))
+    for name in machine.canonical_signals():
+        if name not in machine.signals:
+            _take_guess(draft, name, by_signal.get(name, []))
+    if draft.named:
+        draft.notes.append(
+            f"{len(draft.named)} signals were recorded under their own names, in SI unless a unit is given"
+        )
+    order = {name: i for i, name in enumerate((*machine.canonical_signals(), *machine.signals))}
+    items = dict(sorted(draft.items.items(), key=lambda item: order[item[0]]))
+    return Signals(items, draft.missing, tuple(dict.fromkeys(draft.notes)))
+
+
+def _take_given(draft: _Draft, name: str, source: SignalSource, logs: Sequence[RawLog]) -> None:
+    """Take a signal exactly from where the machine file says."""
+    chosen = [log for log in logs if _is_source(log.source, source.source)]
+    if not chosen:
+        draft.missing[name] = f"no source matches {source.source!r}"
+        return
+    for log in chosen:
+        channel = _find(log, source)
+        if channel is None:
+            continue
+        unit = source.unit or usable_unit(name, channel.unit) or ""
+        if not unit and channel.unit:
+            draft.notes.append(f"{name}: the recorded unit {channel.unit!r} is not known; SI is assumed")
+        origin = replace(source, unit=unit)
+        converted = convert(name, _data(log, channel, origin), origin, draft.machine)
+        draft.take(name, log, channel, converted, origin, False)
+        return
+    known = [k for log in chosen for k in log.channels]
+    near = difflib.get_close_matches(source.label, known, 3, 0.6)
+    hint = f"; similar: {', '.join(near)}" if near else ""
+    draft.missing[name] = f"the machine file names {source.label!r}, which no source holds{hint}"
+
+
+def _take_guess(draft: _Draft, name: str, found: list[tuple[Candidate, RawLog]]) -> None:
+    """Take the surest candidate that holds a number."""
+    reason = "no channel fits by its name or message type"
+    ranked = sorted(found, key=lambda f: (f[0].rank, -_size(f[1], f[0])))
+    for i, (candidate, log) in enumerate(ranked):
+        channel = _find(log, candidate.origin)
+        if channel is None:
+            continue
+        data = _data(log, channel, candidate.origin)
+        if not np.isfinite(data[1]).any():
+            reason = f"{candidate.origin.label} holds no number"
+            continue
+        unit = candidate.origin.unit or usable_unit(name, channel.unit) or ""
+        origin = choose_motor_or_wheel(name, replace(candidate.origin, unit=unit), data[1], draft.machine)
+        try:
+            converted = convert(name, data, origin, draft.machine)
+        except ConfigError as error:
+            reason = str(error)
+            continue
+        draft.take(name, log, channel, converted, origin, True)
+        if candidate.rank == 0:
+            draft.named.append(name)
+            return
+        text = f"{name} is taken from {origin.label} ({candidate.why}"
+        text += f", in {origin.unit.replace('1', 'fractions')}" if origin.unit else ", unit not stated, SI assumed"
+        text += f" at the {origin.at})" if origin.unit in ("rpm", "rad/s") and name.startswith("wheel.") else ")"
+        rivals = [c.origin.label for c, _ in ranked[i + 1 :] if c.rank == candidate.rank]
+        text += f"; {rivals[0]} would fit as well" if rivals else ""
+        draft.notes.append(text)
+        return
+    draft.missing[name] = reason
+
+
+def _size(log: RawLog, candidate: Candidate) -> int:
+    channel = _find(log, candidate.origin)
+    return 0 if channel is None else len(channel.stamps)
+
+
+def _is_source(path: str, pattern: str | None) -> bool:
+    return pattern is None or fnmatch(PurePath(path).name, pattern) or fnmatch(path, pattern)
+
+
+def _slashed(topic: str) -> str:
+    return "/" + topic.lstrip("/")
+
+
+def _find(log: RawLog, source: SignalSource) -> Channel | None:
+    """Return the channel that a source names: by its name, for tables also by the shown name."""
+    if source.topic is not None:
+        parts = (source.field,) if source.field != "pose.pose.orientation" else ("pose.pose.orientation.w",)
+        for topic in (source.topic, _slashed(source.topic), source.topic.lstrip("/")):
+            for part in parts:
+                if (found := log.channels.get(f"{topic}.{part}")) is not None:
+                    return found
+        return None
+    wanted = (source.symbol or source.column or "").strip()
+    if wanted in log.channels:
+        return log.channels[wanted]
+    shown = [c for c in log.channels.values() if not c.topic and wanted in (c.field, c.name.partition(" [")[0])]
+    return shown[0] if len(shown) == 1 else None
+
+
+def _data(log: RawLog, channel: Channel, source: SignalSource) -> tuple[NDArray[np.int64], NDArray[Any]]:
+    """Stamps and values of a channel; a quaternion becomes its yaw."""
+    if source.field == "pose.pose.orientation":
+        parts = [log.channels.get(f"{channel.topic}.pose.pose.orientation.{a}") for a in "xyzw"]
+        if any(p is None for p in parts):
+            return channel.stamps, np.full(len(channel.stamps), np.nan)
+        x, y, z, w = (np.asarray(p.values, np.float64) for p in parts if p is not None)
+        yaw = np.arctan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))
+        yaw[np.abs(x * x + y * y + z * z + w * w - 1) > 0.1] = np.nan
+        good = np.isfinite(yaw)
+        yaw[good] = np.unwrap(yaw[good])
+        return channel.stamps, yaw
+    values = np.asarray(channel.values)
+    if not channel.topic:
+        return _sparse(channel.stamps, values)
+    return channel.stamps, values
+
+
+def _sparse(stamps: NDArray[np.int64], values: NDArray[Any]) -> tuple[NDArray[np.int64], NDArray[Any]]:
+    """Drop the empty cells of a slow column beside fast ones; cells of a silent channel stay empty."""
+    if values.dtype.kind != "f":
+        return stamps, values
+    rows = sparse_rows(values)
+    return stamps[rows], values[rows]
+
+
+def sparse_rows(values: NDArray[Any]) -> NDArray[np.int64]:
+    """Rows of a slow column beside fast ones that hold its samples; all rows where the column is not slow."""
+    rows = np.flatnonzero(~np.isnan(values))
+    steps = np.diff(rows)
+    if len(rows) < 3 or len(rows) > 0.6 * len(values):
+        return np.arange(len(values))
+    usual = np.median(steps)
+    regular = float((np.abs(steps - usual) <= max(1.0, 0.2 * usual)).mean())
+    return rows if usual >= 2 and regular > 0.8 else np.arange(len(values))

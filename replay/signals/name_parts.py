@@ -1,0 +1,111 @@
+"""Which wheel or steering axle a recorded name speaks of."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable
+
+from replay.machine.config import Machine
+
+_LONG = {
+    "front": "front", "fore": "front", "fwd": "front", "vorne": "front", "vorn": "front",
+    "rear": "rear", "back": "rear", "aft": "rear", "hinten": "rear",
+    "left": "left", "links": "left", "right": "right", "rechts": "right",
+}  # fmt: skip
+_PAIRS = {
+    "fl": ("front", "left"), "lf": ("front", "left"), "fr": ("front", "right"), "rf": ("front", "right"),
+    "rl": ("rear", "left"), "lr": ("rear", "left"), "bl": ("rear", "left"), "lb": ("rear", "left"),
+    "rr": ("rear", "right"), "br": ("rear", "right"), "rb": ("rear", "right"),
+    "vl": ("front", "left"), "vr": ("front", "right"), "hl": ("rear", "left"), "hr": ("rear", "right"),
+}  # fmt: skip
+_STEER = re.compile(r"steer|lenk|kingpin|azimuth|swivel|knuckle")
+_DRIVE = re.compile(r"wheel|drive|motor|rad\b|traction|hub")
+# Type letters that PLC programs put before a name (fVelocity, lrSpeed, fbWheel).
+_PREFIX = re.compile(r"(?<![A-Za-z])(?:lr|fb|st|ar|[abefgimnprstuwx])(?=[A-Z][a-z])")
+_LOOSE = re.compile(r"(?<![A-Za-z0-9])[fblr](?![A-Za-z0-9])")
+_INDEX = re.compile(r"\[(\d+)\]|(?<=[A-Za-z_])(\d+)(?!\d)")
+
+
+def tokens(name: str) -> list[str]:
+    """Lower-case words of a name, split at other characters, at digits and before capitals; no type letters."""
+    return [t.lower() for t in re.findall(r"[A-Z]{1,}(?![a-z])|[A-Z]?[a-z]+|\d+", _PREFIX.sub("", name))]
+
+
+def position(name: str) -> tuple[str | None, str | None]:
+    """Return front or rear, and left or right, as far as a name says."""
+    along = across = None
+    loose = _LOOSE.findall(name.lower())
+    for token in tokens(name):
+        meaning = _LONG.get(token)
+        if meaning in ("front", "rear"):
+            along = along or meaning
+        elif meaning is not None:
+            across = across or meaning
+        elif token in _PAIRS:
+            along, across = along or _PAIRS[token][0], across or _PAIRS[token][1]
+    for token in loose:
+        if token in ("f", "b"):
+            along = along or ("front" if token == "f" else "rear")
+        elif token == "l":
+            across = across or "left"
+    if "r" in loose:
+        if along is None and across is not None:
+            along = "rear"
+        elif across is None and along is not None:
+            across = "right"
+    return along, across
+
+
+def is_steering(name: str) -> bool:
+    """Whether a name speaks of steering."""
+    return _STEER.search(name.lower()) is not None
+
+
+def is_drive(name: str) -> bool:
+    """Whether a name speaks of a driven wheel."""
+    return _DRIVE.search(name.lower()) is not None and not is_steering(name)
+
+
+def wheel_of(name: str, machine: Machine) -> str | None:
+    """Wheel that a name speaks of by its own name or by its place; None where it says neither."""
+    words = tokens(name)
+    for wheel in machine.wheels:
+        if wheel.lower() in words and len(wheel) > 1:
+            return wheel
+    place = position(name)
+    if None in place:
+        return None
+    return next((w for w in machine.wheels if position(w) == place), None)
+
+
+def axle_of(name: str, machine: Machine) -> str | None:
+    """Steering axle that a name speaks of."""
+    wheel = wheel_of(name, machine)
+    if wheel is not None and wheel in machine.axles:
+        return wheel
+    words = tokens(name)
+    for axle in machine.axles:
+        if axle.lower() in words:
+            return axle
+    along = position(name)[0]
+    return along if along in machine.axles else None
+
+
+def index_of(name: str) -> tuple[str, int] | None:
+    """Return the name with its number replaced by ``#``, and that number; None where it has none."""
+    found = list(_INDEX.finditer(name))
+    if not found:
+        return None
+    bracket = [m for m in found if m.group(1)]
+    last = bracket[-1] if bracket else found[-1]
+    return name[: last.start()] + "#" + name[last.end() :], int(last.group(1) or last.group(2))
+
+
+def first_indices(names: Iterable[str]) -> dict[str, int]:
+    """Smallest number of each numbered family of names: 0 or 1 tells where it counts from."""
+    first: dict[str, int] = {}
+    for name in names:
+        found = index_of(name)
+        if found is not None:
+            first[found[0]] = min(found[1], first.get(found[0], found[1]))
+    return first

@@ -1,0 +1,84 @@
+"""Rounding step and white noise of a channel, found from its own samples."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from replay.arrays.spill import blocks
+
+Array = NDArray[np.float64]
+
+_WINDOW_S = 0.25
+
+
+def rounding_step(values: Array) -> float:
+    """Rounding step (LSB) of a channel; 0 where the values lie on no grid.
+
+    Parameters
+    ----------
+    values : Array, shape (n,)
+        New samples only; NaN are left out.
+    """
+    known = _first_known(values, 200_000)
+    steps = np.abs(np.diff(known))
+    steps = steps[steps > 1e-12 * max(1.0, float(np.max(np.abs(known), initial=0.0)))]
+    if steps.size < 20:
+        return 0.0
+    smallest = float(np.quantile(steps, 0.01))
+    step = float(np.median(steps[steps < 1.5 * smallest]))
+    multiple = steps / step
+    step *= float(np.sum(multiple * np.round(multiple)) / max(float(np.sum(np.round(multiple) ** 2)), 1e-300))
+    off = np.abs(steps / step - np.round(steps / step))
+    small = steps < 50 * step
+    return step if np.count_nonzero(small) >= 20 and float(np.mean(off[small] < 0.1)) > 0.97 else 0.0
+
+
+def _first_known(values: Array, count: int) -> Array:
+    found: list[Array] = []
+    for part in blocks(values.size):
+        near = values[part]
+        found.append(near[np.isfinite(near)])
+        count -= found[-1].size
+        if count <= 0:
+            break
+    known = np.concatenate(found) if found else values
+    return known[: known.size + min(count, 0)]
+
+
+def windows(values: Array, length: int) -> Array:
+    """Consecutive windows of `length` samples, shape (n // length, length); the rest is left out."""
+    count = values.size // length
+    return values[: count * length].reshape(count, length)
+
+
+def white_noise(values: Array, dt: float, quantile: float = 0.4) -> float:
+    """Standard deviation of the white part of a sampled signal, from its second differences.
+
+    Parameters
+    ----------
+    values : Array, shape (n,)
+        Consecutive samples; windows with NaN or without change are left out.
+    dt : float
+        Distance of samples [s].
+    quantile : float
+        Which window stands for the signal.
+
+    Returns
+    -------
+    float
+        The quantile over windows of 0.25 s (at least 12 samples); NaN where no window is usable.
+    """
+    length = max(12, round(_WINDOW_S / dt))
+    found = []
+    for part in blocks(values.size - 2, length):
+        near = values[part.start : part.stop + 2]
+        second = windows(near[2:] - 2 * near[1:-1] + near[:-2], length)
+        if second.size:
+            moving = np.mean(np.abs(second) > 0, axis=1) > 0.3
+            found.append(np.where(moving, np.sqrt(np.mean(second**2, axis=1) / 6.0), np.nan))
+    if not found:
+        return float("nan")
+    rms = np.concatenate(found)
+    rms = rms[np.isfinite(rms)]
+    return float(np.quantile(rms, quantile)) if rms.size >= 3 else float("nan")

@@ -1,0 +1,283 @@
+"""Rules that guess where canonical signals are recorded: one candidate per fitting channel."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
+
+from replay.log.raw_log import Channel
+from replay.log.source_options import SignalSource
+from replay.machine.config import Machine
+from replay.machine.units import quantity_of
+from replay.signals.name_parts import axle_of, first_indices, index_of, is_drive, is_steering, tokens, wheel_of
+
+SI_UNITS = {
+    "speed": "m/s", "rotation": "rad/s", "angle": "rad", "length": "m", "fraction": "1", "pressure": "Pa",
+    "acceleration": "m/s^2", "position_deg": "deg",
+}  # fmt: skip
+MESSAGE_TYPES = (
+    "JointState", "DynamicJointState", "Twist", "TwistStamped", "AckermannDrive", "AckermannDriveStamped", "Odometry",
+    "Imu", "NavSatFix", "GPSFix", "Float64MultiArray", "Float32MultiArray", "Float64", "Float32",
+    "JointTrajectoryControllerState",
+)  # fmt: skip
+_COMMON_PACKAGES = frozenset(
+    (
+        *("sensor_msgs", "nav_msgs", "geometry_msgs", "std_msgs", "tf2_msgs", "tf", "rcl_interfaces", "rosgraph_msgs"),
+        *("visualization_msgs", "diagnostic_msgs", "stereo_msgs", "shape_msgs", "rosbag2_interfaces", "map_msgs"),
+        *("foxglove_msgs", "lifecycle_msgs", "statistics_msgs", "service_msgs", "theora_image_transport"),
+    )
+)
+_WORDS_REF = re.compile(r"ref|cmd|command|set|des|target|soll|demand")
+_LEAVES: tuple[tuple[str, str, str], ...] = (
+    # kind of part, leaf, pattern of the last word of a symbol
+    ("both", "u_applied", r"(valve|spool)_?(act|actual|fb|feedback|pos|position|ist)|spool|^u_?applied"),
+    ("both", "u", r"valve_?(cmd|command|out|set|ref|soll)|valve$|^u_?cmd|control_?(out|cmd)|^u$"),
+    ("wheel", "pressure_a", r"press(ure)?_?a$"),
+    ("wheel", "pressure_b", r"press(ure)?_?b$"),
+    ("wheel", "psi", r"^psi"),
+    ("wheel", "v_true", r"(velo(city)?|speed|vel)_?(redundant|true|second)"),
+    ("wheel", "v_ref", r"(velo(city)?|speed|vel|rpm)_?(ref|cmd|command|set|des|target|soll)|"
+                       r"(ref|cmd|set|des(ired)?|target|soll)_?(velo(city)?|speed|vel|rpm)"),
+    ("wheel", "v", r"velo(city)?|speed|^vel|rpm|drehzahl|^omega"),
+    ("steer", "phi_true", r"(angle|phi)_?(redundant|true|second)"),
+    ("steer", "phi_ref", r"(angle|phi|steer\w*)_?(ref|cmd|command|set|des|target|soll)|"
+                         r"(ref|cmd|set|des(ired)?|target|soll)_?(angle|phi|steer)"),
+    ("steer", "phi", r"angle|phi|winkel|act_?pos"),
+)  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """A channel that may hold a signal.
+
+    Attributes
+    ----------
+    signal : str
+        Canonical name.
+    origin : SignalSource
+        Channel and conversion; an empty unit is left to what the channel states.
+    rank : int
+        Smaller is surer.
+    why : str
+        Reason, for the report.
+    """
+
+    signal: str
+    origin: SignalSource
+    rank: int
+    why: str
+
+
+def wanted_type(type_name: str) -> bool:
+    """Whether messages of a type may hold signals: those of the rules, and types of no common package."""
+    package, _, leaf = type_name.replace("/msg/", "/").rpartition("/")
+    return leaf in MESSAGE_TYPES or (bool(package) and package not in _COMMON_PACKAGES and "_interfaces" not in package)
+
+
+def candidates(channels: Mapping[str, Channel], machine: Machine) -> Iterator[Candidate]:
+    """Yield every candidate of one log."""
+    first = first_indices(channels)
+    for channel in channels.values():
+        yield from _by_canonical(channel, machine)
+        if channel.topic:
+            yield from _by_message(channel, machine, channels)
+        yield from _by_symbol(channel, machine, first)
+
+
+def _source(channel: Channel, unit: str = "", derivative: bool = False) -> SignalSource:
+    if channel.topic:
+        return SignalSource(topic=channel.topic, field=channel.field, unit=unit, derivative=derivative)
+    if channel.type_name and channel.name != channel.field:
+        return SignalSource(symbol=channel.name, unit=unit, derivative=derivative)
+    return SignalSource(column=channel.name, unit=unit, derivative=derivative)
+
+
+def _by_canonical(channel: Channel, machine: Machine) -> Iterator[Candidate]:
+    """Yield a channel that already carries a canonical name."""
+    known = {s.lower(): s for s in machine.canonical_signals()}
+    bare = re.sub(r"\s*[\[(][^\[\]()]*[\])]$", "", channel.name).strip()
+    inner = re.search(r"\[([^\[\]]+)\]$", channel.field)
+    path = re.sub(r"^\.|^\.?mfhca\.", "", channel.topic.replace("/", "."))
+    for text in (bare, inner.group(1) if inner else "", path, channel.field):
+        signal = known.get(text.lower())
+        if signal is not None and not (text == path and channel.field != "data"):
+            yield Candidate(
+                signal, _source(channel, channel.unit or _si(signal)), 0, "it carries the signal's own name"
+            )
+            return
+
+
+def _si(signal: str) -> str:
+    return SI_UNITS[quantity_of(signal)]
+
+
+def _by_message(channel: Channel, machine: Machine, others: Mapping[str, Channel]) -> Iterator[Candidate]:
+    """Yield what common message types define."""
+    leaf, topic, field = channel.type_name.rpartition("/")[2], channel.topic, channel.field
+    plain = topic.rpartition("/")[2]
+
+    def found(signal: str, unit: str, rank: int, why: str = "") -> Candidate:
+        return Candidate(signal, _source(channel, unit), rank, why or f"{leaf} on {topic}")
+
+    if leaf in ("Twist", "TwistStamped") and re.search(r"cmd|command", topic.lower()):
+        rank = {"cmd_vel": 1, "cmd": 2}.get(plain, 3) + topic.count("/") - 1
+        if field in ("linear.x", "twist.linear.x"):
+            yield found("cmd.v", "m/s", rank)
+        elif field in ("angular.z", "twist.angular.z"):
+            yield found("cmd.omega", "rad/s", rank)
+    elif leaf.startswith("AckermannDrive"):
+        if field in ("speed", "drive.speed"):
+            yield found("cmd.v", "m/s", 4)
+        elif field in ("steering_angle", "drive.steering_angle") and "front" in machine.axles:
+            yield found("steer.front.phi_ref", "rad", 4)
+    elif leaf == "Odometry":
+        rank = 1 if plain == "odom" else 2 if "odom" in plain else 4
+        rank += 3 * bool(re.search(r"filter|gps|gnss|global|map", topic.lower()))
+        for axis in ("x", "y"):
+            if field == f"pose.pose.position.{axis}":
+                yield found(f"odom.{axis}", "m", rank)
+        if field == "pose.pose.orientation.w":
+            whole = SignalSource(topic=topic, field="pose.pose.orientation", unit="rad")
+            yield Candidate("odom.yaw", whole, rank, f"quaternion of {leaf} on {topic}")
+    elif leaf == "Imu" and field == "angular_velocity.z":
+        yield found("imu.yaw_rate", "rad/s", 1 + ("imu" not in topic.lower()))
+    elif leaf in ("NavSatFix", "GPSFix"):
+        signal = {"latitude": "gnss.lat", "longitude": "gnss.lon", "speed": "gnss.speed"}.get(field)
+        if signal is not None:
+            yield found(signal, "m/s" if field == "speed" else "deg", 1 + (plain != "fix"))
+    elif leaf in ("JointState", "DynamicJointState", "JointTrajectoryControllerState"):
+        yield from _by_joint(channel, machine, others)
+    elif leaf.endswith("MultiArray"):
+        yield from _by_command_array(channel, machine, others)
+
+
+def _role(topic: str, field: str) -> str:
+    """What a joint topic or field describes: ``u``, ``u_applied``, ``ref``, ``true`` or ``measured``."""
+    text = topic.lower()
+    if re.search(r"valve|spool", text):
+        return "u_applied" if re.search(r"feedback|actual|state|spool|measured", text) else "u"
+    if re.search(r"redundant|second|true", text):
+        return "true"
+    lead = field.split(".")[0].lower()
+    if lead in ("reference", "desired") or _WORDS_REF.search(" ".join(tokens(text.rpartition("/")[2]))):
+        return "ref"
+    return "skip" if lead in ("error", "output") else "measured"
+
+
+def _by_joint(channel: Channel, machine: Machine, others: Mapping[str, Channel]) -> Iterator[Candidate]:
+    """Yield joints of wheels and steering axles, matched by name, or by number where all are numbered."""
+    match = re.match(r"(?:(?P<lead>\w+)\.)?(?P<kind>position|velocit|effort)\w*\[(?P<joint>.+)\]$", channel.field)
+    dynamic = re.match(
+        r"interface_values\[(?P<joint>.+)\]\.values\[(?P<kind>position|velocity|effort)\]$", channel.field
+    )
+    found = match or dynamic
+    if found is None:
+        return
+    joint, role = found["joint"], _role(channel.topic, channel.field)
+    kind = "velocity" if found["kind"].startswith("velocit") else found["kind"]
+    rank = 1 + (channel.topic.rpartition("/")[2] != "joint_states") + (dynamic is not None)
+    axle = axle_of(joint, machine) if is_steering(joint) else None
+    wheel = None if is_steering(joint) else wheel_of(joint, machine)
+    if wheel is None and axle is None and is_drive(joint):
+        wheel, rank = _numbered(joint, machine, others, channel), rank + 2
+    why = f"joint {joint!r} on {channel.topic}"
+    if role in ("u", "u_applied"):
+        part = f"wheel.{wheel}" if wheel else f"steer.{axle}" if axle else None
+        if part and kind == "effort":
+            yield Candidate(f"{part}.{role}", _source(channel, "1"), rank, why)
+    elif wheel and kind == "velocity":
+        leaf = {"measured": "v", "ref": "v_ref", "true": "v_true"}.get(role)
+        if leaf:
+            yield Candidate(f"wheel.{wheel}.{leaf}", _source(channel, "rad/s"), rank, why)
+    elif wheel and kind == "position" and role == "measured":
+        yield Candidate(f"wheel.{wheel}.v", _source(channel, "rad", derivative=True), rank + 20, f"position of {why}")
+    elif axle and kind == "position":
+        leaf = {"measured": "phi", "ref": "phi_ref", "true": "phi_true"}.get(role)
+        if leaf:
+            yield Candidate(f"steer.{axle}.{leaf}", _source(channel, "rad"), rank, why)
+
+
+def _numbered(joint: str, machine: Machine, others: Iterable[str], channel: Channel) -> str | None:
+    found = index_of(joint)
+    if found is None:
+        return None
+    prefix = f"{channel.topic}.{channel.field.split('[')[0]}["
+    joints = [o[len(prefix) :].split("]")[0] for o in others if o.startswith(prefix)]
+    at = found[1] - min(first_indices(joints).get(found[0], found[1]), 1)
+    return machine.wheels[at] if 0 <= at < len(machine.wheels) else None
+
+
+def _by_command_array(channel: Channel, machine: Machine, others: Mapping[str, Channel]) -> Iterator[Candidate]:
+    """Yield entries of a controller's command array, in the order of the machine's wheels or axles."""
+    found = re.match(r"data\[(\d+)\]$", channel.field)
+    name = channel.topic.lower()
+    if found is None or not re.search(r"command|cmd|ref", name):
+        return
+    count = sum(1 for o in others if o.startswith(f"{channel.topic}.data["))
+    at = int(found[1])
+    why = f"entry {at} of {channel.topic}, its order taken to be"
+    if re.search(r"steer|position", name) and count == len(machine.axles):
+        signal = f"steer.{machine.axles[at]}.{'u' if 'valve' in name else 'phi_ref'}"
+        yield Candidate(signal, _source(channel, "1" if "valve" in name else "rad"), 6, f"{why} {machine.axles}")
+    elif count == len(machine.wheels):
+        valve = re.search(r"valve|effort|duty|pwm", name) is not None
+        signal = f"wheel.{machine.wheels[at]}.{'u' if valve else 'v_ref'}"
+        yield Candidate(signal, _source(channel, "1" if valve else "rad/s"), 6, f"{why} {machine.wheels}")
+
+
+def _by_symbol(channel: Channel, machine: Machine, first: Mapping[str, int]) -> Iterator[Candidate]:
+    """Yield PLC symbols and table columns that name a wheel or axle and a quantity."""
+    if channel.topic and channel.field not in ("data", "value") and not re.search(r"\[[\w.]+\]$", channel.field):
+        return
+    if channel.topic and channel.type_name.rpartition("/")[2] in MESSAGE_TYPES[:11]:
+        return
+    name = re.sub(r"\s*\[[^\]\d][^\]]*\]\s*$", "", channel.name) if not channel.topic else channel.name
+    inner = re.search(r"\[([A-Za-z_][\w.\[\]]*)\]$", name)
+    name = inner.group(1) if inner and channel.topic else name
+    bare = re.sub(r"\[\d+\]", "", name)
+    last = "_".join(tokens(re.split(r"[./]", bare)[-1]))
+    text = "_".join(tokens(bare))
+    yield from _by_word(channel, text)
+    steering = is_steering(bare)
+    leaf = next(
+        (x for x in _LEAVES if x[0] in ("both", "steer" if steering else "wheel") and re.search(x[2], last)), None
+    )
+    if leaf is None:
+        return
+    part = axle_of(bare, machine) if steering else wheel_of(bare, machine)
+    rank = 8
+    numbered = index_of(name)
+    if part is None and numbered is not None and (steering or is_drive(bare) or "valve" in last):
+        order = machine.axles if steering else machine.wheels
+        at = numbered[1] - min(first.get(_family(channel, numbered[0]), first.get(numbered[0], numbered[1])), 1)
+        part, rank = (order[at] if 0 <= at < len(order) else None), 9
+    if part is None and len(machine.wheels) == 1 and not steering and not re.search(r"gnss|gps|imu|odom", text):
+        part, rank = machine.wheels[0], 10
+    if part is not None:
+        signal = f"{'steer' if steering else 'wheel'}.{part}.{leaf[1]}"
+        how = {9: "by its number", 10: "as the only wheel"}.get(rank, "by its name")
+        yield Candidate(signal, _source(channel, channel.unit or ""), rank, f"{channel.name} {how}")
+
+
+def _family(channel: Channel, template: str) -> str:
+    found = index_of(channel.name)
+    return found[0] if found is not None else template
+
+
+def _by_word(channel: Channel, text: str) -> Iterator[Candidate]:
+    """Yield signals of the whole machine by the words of their symbol or column."""
+    if re.search(r"wheel|steer|valve|axle", text):
+        return
+    rules = (
+        ("imu.yaw_rate", r"(imu|gyro).*(yaw_?rate|gyro_?z|omega_?z|angular_velocity_z)"),
+        ("gnss.lat", r"(gnss|gps).*lat"),
+        ("gnss.lon", r"(gnss|gps).*lon"),
+        ("gnss.speed", r"(gnss|gps).*(speed|velocity)"),
+        ("cmd.omega", r"(joystick|cmd|command|driver|desired|ref).*(yaw_?rate|omega|turn)"),
+        ("cmd.v", r"(joystick|cmd|command|driver|desired|ref).*(velocity|speed|_v$)"),
+    )
+    for signal, pattern in rules:
+        if re.search(pattern, text):
+            yield Candidate(signal, _source(channel, channel.unit or ""), 9, f"{channel.name} by its name")
+            return

@@ -1,0 +1,82 @@
+"""Recorded channels under their canonical names, in SI, still at their own stamps."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from replay.log.source_options import SignalSource
+
+
+@dataclass(frozen=True)
+class Signal:
+    """One canonical signal at its recorded stamps.
+
+    Attributes
+    ----------
+    name : str
+        Canonical name (``wheel.FR.v``).
+    stamps : NDArray[np.int64], shape (n,)
+        Nanoseconds since 1970, strictly increasing.
+    values : NDArray[np.float64], shape (n,)
+        SI values; NaN where NaN was recorded.
+    origin : SignalSource
+        The channel and conversion it came from.
+    source : str
+        The file it came from.
+    guessed : bool
+        Whether the mapping was found automatically rather than given.
+    recorded_with : str
+        For channels of a table file: the first one that stands on the same time column; else empty.
+    """
+
+    name: str
+    stamps: NDArray[np.int64]
+    values: NDArray[np.float64]
+    origin: SignalSource
+    source: str
+    guessed: bool
+    recorded_with: str = ""
+
+    @property
+    def group(self) -> str:
+        """What is lost together: a topic's messages; of a table's rows, which hold what came apart, one quantity."""
+        if self.origin.topic is not None:
+            return f"{self.source} {self.origin.topic}"
+        return f"{self.source} {self.recorded_with} {quantity_kind(self.name)}"
+
+
+def quantity_kind(name: str) -> str:
+    """Canonical name without wheel or axle: ``wheel.v`` for ``wheel.FR.v``."""
+    parts = name.split(".")
+    return f"{parts[0]}.{parts[-1]}"
+
+
+@dataclass(frozen=True)
+class Signals:
+    """All mapped signals of one mission.
+
+    Attributes
+    ----------
+    items : Mapping[str, Signal]
+        By canonical name.
+    missing : Mapping[str, str]
+        Canonical names that were looked for and not found, with the reason.
+    notes : tuple[str, ...]
+        Guesses made and doubts about them, one sentence each.
+    open_loop : bool
+        Whether faults were written into the recording, so that its controller never met them.
+    """
+
+    items: Mapping[str, Signal]
+    missing: Mapping[str, str]
+    notes: tuple[str, ...] = ()
+    open_loop: bool = False
+
+    def without_samples(self) -> Signals:
+        """The same signals with no sample left in them."""
+        items = {n: replace(s, stamps=np.empty(0, np.int64), values=np.empty(0)) for n, s in self.items.items()}
+        return replace(self, items=items)

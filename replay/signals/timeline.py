@@ -1,0 +1,239 @@
+"""One uniform time axis for all signals; a lost sample stays lost.
+
+The axis has the step of the fastest wheel signal. A signal's value at a step is its latest sample, as long as that
+is not older than the signal's own holding time; after that it is NaN. `fresh` marks the steps in which a new sample
+arrived, so that estimators count each sample once.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from replay.arrays.spill import Column, beside, blocks, release
+from replay.errors import LogError
+from replay.signals.signal import Signal, Signals
+
+MAX_STEPS = 200_000_000
+_LARGEST = 1e9
+_HOLD_PERIODS = 2.5
+_COMMAND_HOLD_NS = 500_000_000
+_STANDARD_NS = np.array([1, 2, 4, 5, 8, 10, 20, 25, 40, 50, 100, 200, 500, 1000], dtype=np.int64) * 1_000_000
+
+
+@dataclass(frozen=True)
+class Timeline:
+    """Signals on one uniform axis.
+
+    Attributes
+    ----------
+    start_ns, step_ns : int
+        First step and distance of steps, nanoseconds since 1970.
+    size : int
+        Number of steps n.
+    signals : Mapping[str, NDArray[np.float64]], each of shape (n,)
+        SI values; NaN where no sample is valid.
+    fresh : Mapping[str, NDArray[np.bool_]], each of shape (n,)
+        Whether a new sample arrived in the step.
+    sources : Mapping[str, str]
+        File of each signal.
+    periods_ns : Mapping[str, int]
+        Median sample period of each signal.
+    notes : tuple[str, ...]
+        What was unusual, one sentence each.
+    open_loop : bool
+        As in `Signals`.
+    groups : Mapping[str, str]
+        `Signal.group` of each signal; empty: those of one file are one group.
+    """
+
+    start_ns: int
+    step_ns: int
+    size: int
+    signals: Mapping[str, NDArray[np.float64]]
+    fresh: Mapping[str, NDArray[np.bool_]]
+    sources: Mapping[str, str]
+    periods_ns: Mapping[str, int]
+    notes: tuple[str, ...] = ()
+    open_loop: bool = False
+    groups: Mapping[str, str] = field(default_factory=dict)
+    _beside: dict[tuple[str, ...], NDArray[np.float64]] = field(
+        default_factory=dict, init=False, repr=False, compare=False
+    )
+
+    @property
+    def dt(self) -> float:
+        """Step [s]."""
+        return self.step_ns * 1e-9
+
+    @property
+    def t(self) -> NDArray[np.float64]:
+        """Mission time of each step [s]."""
+        return np.asarray(np.arange(self.size) * self.dt, dtype=np.float64)
+
+    def get(self, name: str) -> NDArray[np.float64] | None:
+        """Values of a signal, or None where it is not in the log."""
+        return self.signals.get(name)
+
+    def beside(self, names: Sequence[str]) -> NDArray[np.float64]:
+        """Signals side by side, shape (n, names), kept for the next who asks; NaN columns for what is not logged."""
+        key = tuple(names)
+        if not any(name in self.signals for name in key):
+            return np.broadcast_to(np.nan, (self.size, len(key)))
+        if key not in self._beside:
+            nothing = np.broadcast_to(np.nan, (self.size,))
+            self._beside[key] = beside([self.signals.get(name, nothing) for name in key])
+        return self._beside[key]
+
+
+def median_period(stamps: NDArray[np.int64]) -> int:
+    """Median distance of stamps [ns]; 0 for fewer than two."""
+    return int(np.median(np.diff(stamps))) if stamps.size > 1 else 0
+
+
+class _Periods:
+    """Median periods, found once for signals that share their stamps."""
+
+    def __init__(self) -> None:
+        self._known: dict[tuple[int, int], int] = {}
+
+    def of(self, stamps: NDArray[np.int64]) -> int:
+        key = (stamps.__array_interface__["data"][0], stamps.size)
+        if key not in self._known:
+            self._known[key] = median_period(stamps)
+            release(stamps)
+        return self._known[key]
+
+
+def align(signals: Signals, start_s: float | None = None, stop_s: float | None = None) -> Timeline:
+    """Put signals on one uniform axis.
+
+    Parameters
+    ----------
+    signals : Signals
+        At their own stamps.
+    start_s, stop_s : float or None
+        Part of the mission [s from its first wheel sample]; None: from the start, to the end.
+
+    Raises
+    ------
+    LogError
+        Where no wheel signal has two samples, sources do not overlap in time, or the asked part is empty.
+    """
+    wheel = {k: s for k, s in signals.items.items() if k.startswith("wheel.") and s.stamps.size > 1}
+    if not wheel:
+        raise LogError(
+            "no wheel signal with at least two samples was found; run `mfhca channels` to see how signals map, and "
+            "name them in the machine file's [signals]"
+        )
+    notes = list(check_overlap(signals))
+    periods = _Periods()
+    step = _snap(min(periods.of(s.stamps) for s in wheel.values()))
+    first = min(int(s.stamps[0]) for s in wheel.values())
+    last = max(int(s.stamps[-1]) for s in wheel.values())
+    start = first if start_s is None else first + round(start_s * 1e9 / step) * step
+    stop = last if stop_s is None else min(last, first + round(stop_s * 1e9))
+    size = (stop - start) // step + 1
+    if size < 2:
+        raise LogError(f"the asked part of the mission is empty: the log lasts {(last - first) * 1e-9:.3f} s")
+    if size > MAX_STEPS:
+        raise LogError(
+            f"stamps span {(last - first) * 1e-9:.0f} s in steps of {step * 1e-6:g} ms: more than {MAX_STEPS} steps; "
+            'the clock probably jumps: choose another one ([sources] stamp = "log") or a part (--start, --end)'
+        )
+    values: dict[str, NDArray[np.float64]] = {}
+    fresh: dict[str, NDArray[np.bool_]] = {}
+    for name, signal in signals.items.items():
+        if signal.stamps.size:
+            absurd = sum(
+                np.count_nonzero(np.abs(signal.values[part]) > _LARGEST) for part in blocks(signal.values.size)
+            )
+            if absurd:
+                notes.append(f"{name}: {absurd} values that are infinite or beyond {_LARGEST:g} count as no sample.")
+            values[name], fresh[name] = _hold(signal, periods.of(signal.stamps), start, step, size)
+    return Timeline(
+        start_ns=start,
+        step_ns=step,
+        size=size,
+        signals=values,
+        fresh=fresh,
+        sources={k: s.source for k, s in signals.items.items()},
+        periods_ns={k: periods.of(s.stamps) for k, s in signals.items.items()},
+        notes=tuple(notes),
+        open_loop=signals.open_loop,
+        groups={k: s.group for k, s in signals.items.items()},
+    )
+
+
+def _snap(period: int) -> int:
+    """Round a measured period to a usual one within 2 %, else to whole microseconds."""
+    near = _STANDARD_NS[np.argmin(np.abs(_STANDARD_NS - period))]
+    if abs(int(near) - period) <= 0.02 * period:
+        return int(near)
+    return max(1000, round(period / 1000) * 1000)
+
+
+def _hold(
+    signal: Signal, period: int, start: int, step: int, size: int
+) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+    """Latest sample at each step (half a step of tolerance), NaN once older than its holding time."""
+    command = signal.name.startswith("cmd.") or signal.name.endswith("_ref")
+    longest = max(_HOLD_PERIODS * period, 1.5 * step)
+    if command:
+        longest = max(longest, float(_COMMAND_HOLD_NS))
+    values, fresh = Column(np.float64, rows=size), Column(np.bool_, rows=size)
+    at = -1
+    for part in blocks(size):
+        held, new = np.empty(part.stop - part.start), np.empty(part.stop - part.start, np.bool_)
+        begin = start + part.start * step
+        at = _scan_hold(signal.stamps, signal.values, begin, step, longest, _LARGEST, at, held, new)
+        values.append(held)
+        fresh.append(new)
+        release(signal.values, signal.stamps)
+    return values.finish(), fresh.finish()
+
+
+@njit(cache=True)
+def _scan_hold(stamps, values, start, step, longest, largest, at, held, fresh):  # type: ignore[no-untyped-def]
+    """Walk along both axes; `at` is the newest sample at the step before, and is returned for the next one."""
+    for k in range(held.size):
+        time, before = start + k * step, at
+        while at + 1 < stamps.size and stamps[at + 1] <= time + step // 2:
+            at += 1
+        held[k] = np.nan
+        if at >= 0 and time - stamps[at] <= longest and abs(values[at]) <= largest:
+            held[k] = values[at]
+        fresh[k] = at != before and held[k] == held[k]
+    return at
+
+
+def check_overlap(signals: Signals) -> list[str]:
+    """Refuse sources whose stamps do not overlap; say where they barely do."""
+    spans: dict[str, tuple[int, int]] = {}
+    for s in signals.items.values():
+        if s.stamps.size:
+            a, b = spans.get(s.source, (int(s.stamps[0]), int(s.stamps[-1])))
+            spans[s.source] = (min(a, int(s.stamps[0])), max(b, int(s.stamps[-1])))
+    if len(spans) < 2:
+        return []
+    begin = max(a for a, _ in spans.values())
+    end = min(b for _, b in spans.values())
+    if end <= begin:
+        shown = "; ".join(
+            f"{src}: {np.datetime64(a, 'ns')} to {np.datetime64(b, 'ns')}" for src, (a, b) in spans.items()
+        )
+        raise LogError(
+            f"the files do not overlap in time, so they are not one mission or their clocks are unrelated ({shown}); "
+            "diagnose them one by one, or set the table's epoch or clock_offset in the machine file's [sources]"
+        )
+    shortest = min(b - a for a, b in spans.values())
+    if end - begin < 0.5 * shortest:
+        return [
+            f"The files overlap for {(end - begin) * 1e-9:.1f} s only, of {shortest * 1e-9:.1f} s that the shortest "
+            "lasts: their stamps may be unrelated."
+        ]
+    return []

@@ -1,0 +1,190 @@
+"""From recorded stamps and values to SI, with doubts about units told in figures."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from replay.arrays.spill import in_blocks, keep, release
+from replay.errors import ConfigError
+from replay.log.source_options import SignalSource
+from replay.log.stamp_order import spread_ticks
+from replay.machine.config import Machine
+from replay.machine.units import quantity_of, si_factor
+from replay.signals.rules import SI_UNITS
+
+_TOO_FAST = 3.0
+_WIDE = 1.5
+_PEAK_SAMPLES = 1 << 18
+
+
+@dataclass(frozen=True)
+class Converted:
+    """A signal in SI.
+
+    Attributes
+    ----------
+    stamps : NDArray[np.int64], shape (n,)
+        Strictly increasing [ns].
+    values : NDArray[np.float64], shape (n,)
+        SI values.
+    notes : tuple[str, ...]
+        What was sorted or dropped.
+    """
+
+    stamps: NDArray[np.int64]
+    values: NDArray[np.float64]
+    notes: tuple[str, ...]
+
+
+def usable_unit(signal: str, unit: str | None) -> str | None:
+    """Return a recorded unit that can describe the signal, else None."""
+    if not unit:
+        return None
+    for text in (unit, unit.lower()):
+        try:
+            si_factor(signal, text, wheel_radius=1.0, gear_ratio=1.0, at="wheel")
+        except ConfigError:
+            continue
+        return text
+    return None
+
+
+def factor_of(signal: str, origin: SignalSource, machine: Machine) -> float:
+    """Factor from the recorded unit to SI; raises `ConfigError` where the unit does not fit."""
+    unit = origin.unit
+    if not unit:
+        quantity = quantity_of(signal)
+        unit = SI_UNITS[quantity]
+        if origin.derivative:
+            unit = {"speed": "m", "rotation": "rad"}.get(quantity, unit)
+    return si_factor(
+        signal,
+        unit,
+        wheel_radius=machine.wheel_radius,
+        gear_ratio=machine.gear_ratio,
+        at=origin.at,
+        derivative=origin.derivative,
+    )
+
+
+def convert(
+    signal: str, data: tuple[NDArray[np.int64], NDArray[Any]], origin: SignalSource, machine: Machine
+) -> Converted:
+    """Order stamps, differentiate where asked, and convert: (recorded · gain + offset) · factor.
+
+    Parameters
+    ----------
+    signal : str
+        Canonical name.
+    data : tuple[NDArray[np.int64], NDArray]
+        Stamps [ns] and recorded values, each of shape (n,).
+    origin : SignalSource
+        Conversion.
+    machine : Machine
+        For wheel size and gear ratio.
+
+    Raises
+    ------
+    ConfigError
+        Where the unit does not fit the signal.
+    """
+    factor = factor_of(signal, origin, machine)
+    stamps, recorded, notes = _ordered(*data)
+    if origin.derivative and recorded.dtype.kind in "iu" and len(recorded):
+        recorded = recorded.astype(np.int64) - np.int64(recorded[0])  # exact before they become floats
+    with np.errstate(all="ignore"):  # damaged logs hold any bits
+        values = in_blocks(lambda x: (np.asarray(x, np.float64) * origin.gain + origin.offset) * factor, recorded)
+        values = keep(slope(stamps, values)) if origin.derivative else values
+    release(stamps, recorded)
+    return Converted(stamps, values, notes)
+
+
+def _ordered(
+    stamps: NDArray[np.int64], values: NDArray[Any]
+) -> tuple[NDArray[np.int64], NDArray[Any], tuple[str, ...]]:
+    """Sort by stamp, spread the ticks of a coarse clock, and keep the last of equal stamps."""
+    notes = []
+    back = int((np.diff(stamps) < 0).sum())
+    if back:
+        order = np.argsort(stamps, kind="stable")
+        stamps, values = stamps[order], values[order]
+        notes.append(f"stamps ran backwards {back} times and were sorted")
+    ticks = spread_ticks(stamps, values)
+    if ticks is not None:
+        stamps, tick = ticks
+        notes.append(f"its clock ticks every {tick / 1e6:g} ms only; samples of one tick were spread evenly over it")
+    last = np.append(stamps[1:] != stamps[:-1], True) if len(stamps) else np.ones(0, np.bool_)
+    if not last.all():
+        notes.append(f"{(~last).sum()} samples share their stamp with a later one and were dropped")
+        stamps, values = stamps[last], values[last]
+    return stamps, values, tuple(notes)
+
+
+def slope(stamps: NDArray[np.int64], position: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Slope between each sample's neighbours.
+
+    Parameters
+    ----------
+    stamps : NDArray[np.int64], shape (n,)
+        Strictly increasing [ns].
+    position : NDArray[np.float64], shape (n,)
+        Any unit.
+
+    Returns
+    -------
+    NDArray[np.float64], shape (n,)
+        Unit per second; one-sided at the ends, NaN for a single sample.
+    """
+    if len(stamps) < 2:
+        return np.full(len(stamps), np.nan)
+    left = np.maximum(np.arange(len(stamps)) - 1, 0)
+    right = np.minimum(np.arange(len(stamps)) + 1, len(stamps) - 1)
+    speed: NDArray[np.float64] = (position[right] - position[left]) / ((stamps[right] - stamps[left]) * 1e-9)
+    return speed
+
+
+def _peak(values: NDArray[Any]) -> float:
+    """99th percentile of the magnitude, of a long signal that of every few samples; 0 where there is no number."""
+    some = values[:: max(1, len(values) // _PEAK_SAMPLES)]
+    finite = np.abs(some[np.isfinite(some)].astype(np.float64))
+    return float(np.percentile(finite, 99)) if len(finite) else 0.0
+
+
+def choose_motor_or_wheel(signal: str, origin: SignalSource, values: NDArray[Any], machine: Machine) -> SignalSource:
+    """Decide where a guessed rotation was measured: at the motor where only that fits the machine's top speed."""
+    if not signal.startswith("wheel.") or origin.unit.lower() != "rpm" or machine.gear_ratio == 1.0:
+        return origin
+    motor = replace(origin, at="motor")
+    try:
+        at_motor = _peak(values) * factor_of(signal, motor, machine)
+    except ConfigError:
+        return origin
+    at_wheel = at_motor * machine.gear_ratio
+    return origin if at_wheel < _WIDE * machine.max_speed and at_motor < 0.02 * machine.max_speed else motor
+
+
+def doubt(signal: str, values: NDArray[np.float64], origin: SignalSource, machine: Machine) -> str:
+    """Return a sentence with figures where a signal is too large for the machine, else an empty string."""
+    quantity = quantity_of(signal)
+    peak = _peak(values)
+    unit = origin.unit or SI_UNITS[quantity]
+    if quantity == "speed" and not signal.startswith("gnss") and peak > _TOO_FAST * machine.max_speed:
+        times = peak / machine.max_speed
+        text = (
+            f"{signal} reaches {peak:.3g} m/s with unit {unit!r}, {times:.1f} times max_speed {machine.max_speed:g} m/s"
+        )
+        gear = machine.gear_ratio
+        if signal.startswith("wheel.") and origin.at == "wheel" and gear > 1 and times / gear <= _WIDE:
+            return f'{text}; it is probably measured at the motor (gear ratio {gear:g}): set at = "motor"'
+        return f"{text}; check its unit"
+    if quantity == "fraction" and not signal.endswith(".psi") and peak > _WIDE * machine.control.u_max:
+        more = "; it is probably %" if _WIDE < peak <= 150 else ""
+        return f"{signal} reaches {peak:.3g} of full opening with unit {unit!r}{more}; check its unit"
+    if quantity == "angle" and signal.startswith("steer.") and peak > 2 * max(machine.max_steer, 0.1):
+        more = "; it is probably deg" if peak * np.pi / 180 <= _WIDE * machine.max_steer else ""
+        return f"{signal} reaches {peak:.3g} rad with unit {unit!r}, max_steer is {machine.max_steer:.3g} rad{more}"
+    return ""

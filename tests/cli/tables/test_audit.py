@@ -1,0 +1,66 @@
+from __future__ import annotations
+
+import io
+from pathlib import Path
+
+from rich.console import Console
+
+from cli.tables.audit import document, summary_parts
+from diagnosis.audit.discovery.discover import Discovery
+from diagnosis.audit.endings import Ending
+from diagnosis.audit.session import Audited
+
+
+def ending(name: str, state: str, verdict: str | None = None, machine: str = "M1") -> Ending:
+    return Ending(name, state, "[/] why" if state != "ok" else "", 1, machine, "Haulotte", verdict, "", None, 0, "")
+
+
+def printed(*ends: Ending) -> list[str]:
+    console = Console(file=io.StringIO(), width=100, markup=False)
+    for part in summary_parts(Audited(ends, 2, sum(e.state == "crashed" for e in ends)), Discovery(()), Path("out")):
+        console.print(part)
+    assert isinstance(console.file, io.StringIO)
+    return [line.rstrip() for line in console.file.getvalue().splitlines() if line.strip()]
+
+
+def test_failures_stand_first_then_machines_then_counts_and_the_page() -> None:
+    ends = (
+        ending("a", "unreadable"), ending("b", "crashed"), ending("c", "ok", "stop", "M2"), ending("d", "ok", "watch"),
+        ending("e", "degraded", "not_assessed"), ending("f", "ok", "ready"),
+    )  # fmt: skip
+    assert printed(*ends) == [
+        "Failed",
+        "• crashed  b  [/] why",
+        "• unreadable  a  [/] why",
+        "Worst machines",
+        "machine  stop  watch",
+        "M2          1      –",
+        "M1          –      1",
+        "Missions",
+        "1 stop and repair · 1 watch · 1 ready · 1 not assessed · 1 crashed · 1 unreadable",
+        "6 in all, 2 of them done before, 1 with damage or parts that cannot be judged",
+        "fleet page  out/fleet.html",
+        "failures    out/failures.txt",
+    ]
+
+
+def test_of_many_failures_some_are_shown() -> None:
+    lines = printed(*(ending(f"m{i:02d}", "crashed") for i in range(30)))
+    assert lines[11] == "… and 20 more"
+
+
+def test_missions_that_are_gone_are_told() -> None:
+    console = Console(file=io.StringIO(), width=100, markup=False)
+    for part in summary_parts(Audited((ending("a", "ok", "ready"),), 0, 0, 2), Discovery(()), Path("out")):
+        console.print(part)
+    assert isinstance(console.file, io.StringIO)
+    assert "the fleet page also counts 2 missions that are not there any more" in console.file.getvalue()
+
+
+def test_the_document_counts_states_and_verdicts() -> None:
+    audited = Audited((ending("a", "ok", "ready"), ending("b", "timeout")), 1, 1)
+    found = document(audited, Discovery((), ("nowhere: no such file",)), Path("out"), 3)
+    assert found["counts"] == {"ok": 1, "timeout": 1}
+    assert found["verdicts"] == {"ready": 1}
+    assert found["problems"] == ["nowhere: no such file"]
+    assert [m["name"] for m in found["missions"]] == ["a", "b"]

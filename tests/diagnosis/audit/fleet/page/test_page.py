@@ -1,0 +1,118 @@
+"""Parts of the fleet page: policy, addresses, symbols, matrix and the pictures of trends."""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+import re
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from diagnosis.audit.fleet.page.matrix import matrix
+from diagnosis.audit.fleet.page.page import build_fleet_page
+from diagnosis.audit.fleet.page.rows import link, symbol
+from diagnosis.audit.fleet.page.svg import sprite, trend_picture
+from diagnosis.audit.fleet_files import fleet_json, load_fleet
+from tests import fleet_samples as samples
+from tests.fleet_samples import Fault, Sample, bounds
+
+VALVE = ("RL", "actuator")
+
+
+def document(tmp_path: Path, *missions: Sample) -> dict[str, Any]:
+    return fleet_json(load_fleet(samples.write_store(tmp_path / "fleet.sqlite", missions)))
+
+
+def test_the_policy_admits_the_two_scripts_of_the_page_alone(tmp_path: Path) -> None:
+    page = build_fleet_page(document(tmp_path, *samples.few()))
+    policy = re.search(r'Content-Security-Policy" content="([^"]*)"', page)
+    assert policy
+    scripts = re.findall(r"<script>(.*?)</script>", page, flags=re.DOTALL)
+    hashes = [base64.b64encode(hashlib.sha256(s.encode()).digest()).decode() for s in scripts]
+    allowed = policy[1].replace("&#39;", "'")
+    assert re.findall(r"'sha256-([^']*)'", allowed) == hashes
+    assert allowed.startswith("default-src 'none'; ")
+    assert "connect-src" not in allowed
+    assert "http" not in page.partition("<body>")[2].replace("http-equiv", "")
+
+
+@pytest.mark.parametrize(
+    ("report", "address"),
+    [
+        ("missions/a", "missions/a/report.html"),
+        ("missions/a b#1?%", "missions/a%20b%231%3F%25/report.html"),
+        ("javascript:alert(1)", "javascript%3Aalert%281%29/report.html"),
+        ("missions/ä", "missions/%C3%A4/report.html"),
+        ("../up", ""),
+        ("missions/../../up", ""),
+        ("/etc", ""),
+        ("", ""),
+        (None, ""),
+    ],
+)
+def test_addresses_are_escaped_and_stay_below_the_page(report: str | None, address: str) -> None:
+    assert link(report) == address
+
+
+@pytest.mark.parametrize(
+    ("verdict", "mode", "shown"),
+    [
+        ("stop", "stuck", "stuck"),
+        ("watch", "of the future", "outside_table"),
+        ("ready", None, "healthy"),
+        ("not_assessed", None, "not_assessed"),
+        ("watch", None, "warning"),
+        (None, None, "warning"),
+    ],
+)
+def test_every_mission_has_a_symbol(verdict: str | None, mode: str | None, shown: str) -> None:
+    assert symbol({"verdict": verdict, "faults": [{"mode": mode}] if mode else []}) == shown
+    assert f'id="g-{shown}"' in sprite()
+
+
+def test_the_matrix_counts_missions_by_part_and_tells_none_from_not_assessed(tmp_path: Path) -> None:
+    d = document(
+        tmp_path,
+        Sample("a", faults=[Fault(), Fault(mode="stuck", severity="high")], blind=[("FR", "sensor")]),
+        Sample("b", day=1.0, faults=[Fault(side="sensor_or_actuator")], blind=[("FR", "sensor")]),
+        Sample("c", "HX-2"),
+    )
+    m = matrix(d["machines"])
+    assert [c for c, _ in m.heads] == ["FR", "FL", "RR", "RL", "front", "rear"]
+    ((label, cells, total),) = m.rows
+    assert (label, total, m.quiet) == ("HX-1", 4, 1)
+    text = [re.sub(r"<[^>]*>", " ", str(c)).split() for c in cells]
+    assert text[0] == ["–", "never", "assessed"]
+    assert text[1] == ["0"]
+    assert text[6] == ["1", "Inefficient"]
+    assert text[7] == ["2", "Inefficient", "1", "Stuck"]
+
+
+def test_a_trend_is_drawn_with_its_limit_its_change_and_its_outlier(tmp_path: Path) -> None:
+    rng = np.random.default_rng(2)
+    wear = np.concatenate([0.02 + 0.012 * np.arange(10), 0.01 + 0.004 * np.arange(12)]) + 0.003 * rng.standard_normal(
+        22
+    )
+    wear[17] = 0.5
+    d = document(tmp_path, *(Sample(f"{k}", day=k, epsilon={VALVE: bounds(float(v))}) for k, v in enumerate(wear)))
+    (t,) = d["trends"]
+    assert [c["kind"] for c in t["changes"]] == ["drop"]
+    assert t["outliers"] == [17]
+    picture = trend_picture(t, "HX-1 · RL drive valve", "h")
+    for style in ('class="lim"', 'class="chg"', 'class="odd"', 'class="band"', 'class="when', 'class="fit far"'):
+        assert style in picture
+    assert "22 missions; " in picture
+    page = build_fleet_page(d)
+    assert "repaired?" in page
+    assert "1 mission set aside" in page
+
+
+@pytest.mark.parametrize(
+    "missions", [[], [Sample("a", state="crashed")], [Sample("a", driving_s=0.0, epsilon={VALVE: bounds(0.1)})]]
+)
+def test_hardly_anything_still_makes_a_page(tmp_path: Path, missions: list[Sample]) -> None:
+    page = build_fleet_page(document(tmp_path, *missions))
+    assert "nan" not in re.sub(r"<(script|style)>.*?</\1>", "", page, flags=re.DOTALL).lower()

@@ -1,0 +1,81 @@
+"""What the timing and rounding of a channel explain is no fault."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from diagnosis.channels.pairs import Pair, timing_explains
+from diagnosis.estimation.segments import Run
+from replay.faults import FaultMode, Side
+from replay.machine.config import Noise
+
+N, DT = 20_000, 0.001
+Array = np.ndarray
+A, B = 10_000, 10_021
+
+
+def pair(side: Side, y: Array, x: Array) -> Pair:
+    every = np.ones(y.size, dtype=np.bool_)
+    return Pair(side, y, x, np.isfinite(y), every, ~every, DT, "m/s", 0.8, "y", "x", Noise())
+
+
+def explained(p: Pair, mode: FaultMode, start: int = A, stop: int = B, share: float = 0.0) -> bool:
+    return timing_explains(p, Run(start, stop, 1), mode, share)
+
+
+def speeds(noise: float, lsb: float = 0.0015) -> tuple[Array, Array]:
+    """A slow speed measured twice; the first sensor rests between `A` and `B`."""
+    rng = np.random.default_rng(5)
+    true = 0.1206 + 0.05 * np.sin(np.linspace(-1.0, 1.0, N))
+    true[A - 500 : B + 500] = true[A]
+    y, x = (np.round((true + noise * rng.normal(size=N)) / lsb) * lsb for _ in range(2))
+    y[A:B] = y[A]
+    return y, x
+
+
+@pytest.mark.parametrize(("noise", "told"), [(0.0008, True), (0.0013, True), (0.004, False)])
+def test_constant_reading_counts_where_noise_would_have_changed_it(noise: float, told: bool) -> None:
+    y, x = speeds(noise)
+    assert explained(pair(Side.SENSOR, y, x), FaultMode.STUCK) is told
+
+
+def test_reading_between_two_steps_of_rounding_is_as_good_as_any() -> None:
+    y, x = speeds(0.0013)
+    y[A:B:2] += 0.0015
+    assert explained(pair(Side.SENSOR, y, x), FaultMode.STUCK)
+
+
+def test_reference_that_moves_shows_that_a_reading_rests() -> None:
+    y, x = speeds(0.0008)
+    x[A:B] += 0.01
+    assert not explained(pair(Side.SENSOR, y, x), FaultMode.STUCK)
+
+
+def test_silent_channel_does_not_rest() -> None:
+    y, x = speeds(0.0008)
+    y[A + 1 : B] = np.nan
+    assert not explained(pair(Side.SENSOR, y, x), FaultMode.NO_SIGNAL)
+
+
+def test_silent_valve_position_is_not_explained() -> None:
+    x = 0.2 * np.sin(np.linspace(0.0, 30.0, N))
+    y = x.copy()
+    y[A : A + 300] = np.nan
+    assert not explained(pair(Side.ACTUATOR, y, x), FaultMode.NO_SIGNAL, stop=A + 300, share=1.0)
+
+
+@pytest.mark.parametrize("mode", [FaultMode.NOISY, FaultMode.INEFFICIENT, FaultMode.OUTSIDE_TABLE])
+@pytest.mark.parametrize(("rest", "told"), [(0.0, True), (0.1, False)])
+def test_lagging_answer_to_a_command_of_jumps_alone_is_no_fault(mode: FaultMode, rest: float, told: bool) -> None:
+    rng = np.random.default_rng(6)
+    x = rest + 0.012 * rng.normal(size=N)
+    y = 0.4 * x + 0.4 * np.r_[0.0, x[:-1]] + 0.003 * rng.normal(size=N)
+    if rest:
+        y *= 0.9
+    assert explained(pair(Side.ACTUATOR, y, x), mode, stop=A + 600) is told
+
+
+def test_disturbance_beside_a_command_of_jumps_alone_is_a_fault() -> None:
+    x = 0.012 * np.random.default_rng(7).normal(size=N)
+    assert not explained(pair(Side.ACTUATOR, x + 0.05, x), FaultMode.NOISY, stop=A + 600)

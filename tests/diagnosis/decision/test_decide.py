@@ -1,0 +1,375 @@
+"""Severity by Assumptions 1 and 2, and a verdict that is never better than what was judged."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from diagnosis.decision.decide import Decision, decide, intervals_of, severity_of, spans_of
+from diagnosis.decision.wording import mode_words, part_words
+from diagnosis.results.assessment import CODE, Assessment, Finding, unassessed
+from diagnosis.results.result import Epsilon, Hypothesis
+from replay.faults import FaultMode, Side, State
+from replay.machine.config import Limits
+
+N, STEP = 30_000, 1_000_000  # 30 s at 1 kHz
+LIMITS = Limits()
+WHEELS, AXLES = ("FR", "FL"), ("front",)
+SIDES = ("sensor", "actuator")
+
+
+def finding(
+    side: Side, mode: FaultMode, start: int = 1000, stop: int = 9000, p: float = 0.99, epsilon: float | None = 1.0
+) -> Finding:
+    return Finding(
+        start=start,
+        stop=stop,
+        side=side,
+        mode=mode,
+        probability=p,
+        hypotheses=(Hypothesis(side.value, mode.value, p), Hypothesis(side.value, "healthy", 1 - p)),
+        epsilon=None if epsilon is None else Epsilon(epsilon, epsilon - 0.01, epsilon + 0.01),
+        sat=None,
+        evidence=("what decided",),
+        tier="direct",
+    )
+
+
+def assessed(*findings: Finding) -> Assessment:
+    states = np.full(N, CODE[State.HEALTHY])
+    for f in findings:
+        states[f.start : f.stop] = CODE[State(f.mode.value)]
+    return Assessment(states=states, findings=findings, tier="direct")
+
+
+def machine(**parts: Assessment) -> dict[tuple[str, str], Assessment]:
+    """Assessments of two wheels and an axle, healthy but for `parts` (``FR_sensor=…``)."""
+    keys = [(c, s) for c in (*WHEELS, *AXLES) for s in SIDES]
+    return {(c, s): parts.get(f"{c}_{s}", assessed()) for c, s in keys}
+
+
+def verdict(
+    assessments: dict[tuple[str, str], Assessment],
+    decided: float | dict[tuple[str, str], float] = 20.0,
+    damage: tuple[str, ...] = (),
+    limits: Limits = LIMITS,
+) -> Decision:
+    seconds = decided if isinstance(decided, dict) else dict.fromkeys(assessments, decided)
+    return decide(intervals_of(assessments, AXLES, 0, STEP, limits), assessments, seconds, AXLES, limits, damage)
+
+
+GONE = pytest.mark.parametrize("mode", [FaultMode.STUCK, FaultMode.NO_SIGNAL])
+
+
+@GONE
+def test_assumption_1_brief_sensor_fault_is_tolerable(mode: FaultMode) -> None:
+    severity, advice = severity_of(finding(Side.SENSOR, mode), 1.0, LIMITS)
+    assert severity == "low"
+    assert "Tolerable" in advice
+    assert "Assumption 1" in advice
+
+
+@GONE
+def test_assumption_1_persistent_sensor_fault_means_stop(mode: FaultMode) -> None:
+    severity, advice = severity_of(finding(Side.SENSOR, mode), 1.001, LIMITS)
+    assert severity == "high"
+    assert "Stop and repair" in advice
+    assert severity_of(finding(Side.SENSOR, mode), 1.5, Limits(brief=2.0))[0] == "low"
+
+
+@GONE
+@pytest.mark.parametrize("seconds", [0.05, 100.0])
+def test_assumption_2_actuator_fault_means_stop_at_once(mode: FaultMode, seconds: float) -> None:
+    severity, advice = severity_of(finding(Side.ACTUATOR, mode), seconds, LIMITS)
+    assert severity == "high"
+    assert "Stop at once" in advice
+    assert "Assumption 2" in advice
+
+
+@GONE
+def test_drive_that_may_be_either_is_treated_as_the_actuator(mode: FaultMode) -> None:
+    assert severity_of(finding(Side.SENSOR_OR_ACTUATOR, mode), 0.5, LIMITS)[0] == "high"
+
+
+@pytest.mark.parametrize("side", list(Side))
+@pytest.mark.parametrize("mode", [FaultMode.INEFFICIENT, FaultMode.NOISY])
+def test_other_rows_are_watched(side: Side, mode: FaultMode) -> None:
+    marked, advice = severity_of(finding(side, mode, epsilon=0.5), 60.0, LIMITS)
+    slight, _ = severity_of(finding(side, mode, epsilon=0.15), 60.0, LIMITS)
+    assert (marked, slight) == ("medium", "low")
+    assert "no reason to stop" in advice
+
+
+def test_gain_outside_the_table_is_checked() -> None:
+    severity, advice = severity_of(finding(Side.SENSOR, FaultMode.OUTSIDE_TABLE, epsilon=-0.4), 60.0, LIMITS)
+    assert severity == "medium"
+    assert "scaling" in advice
+
+
+@pytest.mark.parametrize("side", list(Side))
+@pytest.mark.parametrize("mode", list(FaultMode))
+def test_improbable_faults_are_no_ground_to_act(side: Side, mode: FaultMode) -> None:
+    assert severity_of(finding(side, mode, p=0.59), 60.0, LIMITS)[0] == "info"
+
+
+@pytest.mark.parametrize("side", list(Side))
+@pytest.mark.parametrize("mode", list(FaultMode))
+def test_probable_faults_are_worth_a_check(side: Side, mode: FaultMode) -> None:
+    dead_valve = side is not Side.SENSOR and mode in (FaultMode.STUCK, FaultMode.NO_SIGNAL)
+    assert severity_of(finding(side, mode, p=0.89), 60.0, LIMITS)[0] == ("medium" if dead_valve else "low")
+
+
+def test_what_is_more_probably_alive_does_not_stop_the_machine() -> None:
+    found = finding(Side.ACTUATOR, FaultMode.STUCK, p=0.3)
+    found = replace(found, hypotheses=(Hypothesis("actuator", "stuck", 0.3), Hypothesis("actuator", "noisy", 0.69)))
+    assert severity_of(found, 8.0, LIMITS)[0] == "medium"
+
+
+def test_healthy_machine_is_ready() -> None:
+    got = verdict(machine())
+    assert (got.status, got.title) == ("ready", "No fault found")
+    assert "20 s of driving" in got.text
+    assert got.actions == ()
+    assert got.caveats == ()
+
+
+@pytest.mark.parametrize(
+    ("part", "expected"),
+    [
+        (finding(Side.ACTUATOR, FaultMode.STUCK), "stop"),
+        (finding(Side.ACTUATOR, FaultMode.INEFFICIENT, epsilon=0.5), "watch"),
+        (finding(Side.ACTUATOR, FaultMode.NOISY, epsilon=0.1), "watch"),
+        (finding(Side.ACTUATOR, FaultMode.STUCK, p=0.7), "watch"),
+        (finding(Side.ACTUATOR, FaultMode.STUCK, p=0.5), "ready"),
+    ],
+)
+def test_verdict_follows_the_worst_fault(part: Finding, expected: str) -> None:
+    assert verdict(machine(FR_actuator=assessed(part))).status == expected
+
+
+def test_brief_and_persistent_loss_of_a_sensor() -> None:
+    brief = finding(Side.SENSOR, FaultMode.NO_SIGNAL, 5000, 5800)
+    assert verdict(machine(FL_sensor=assessed(brief))).status == "watch"
+    assert verdict(machine(FL_sensor=assessed(replace(brief, stop=9000)))).status == "stop"
+
+
+def test_steering_fault_counts_too() -> None:
+    got = verdict(machine(front_sensor=assessed(finding(Side.SENSOR, FaultMode.STUCK))))
+    assert got.status == "stop"
+    assert "front steering sensor" in got.text.lower()
+
+
+@pytest.mark.parametrize("side", SIDES)
+def test_too_little_driving_is_not_assessed(side: str) -> None:
+    seconds = dict.fromkeys(machine(), 20.0) | {("FL", side): 9.9}
+    got = verdict(machine(), seconds)
+    assert got.status == "not_assessed"
+    assert part_words("wheel", "FL", side) in got.text
+    assert len(got.caveats) == 1
+    assert "9.9 s of driving, of 10 s needed" in got.caveats[0]
+    assert verdict(machine(), seconds, limits=Limits(min_assessed=9.0)).status == "ready"
+
+
+def test_side_without_any_decision_is_not_assessed() -> None:
+    got = verdict(machine(), {k: 20.0 for k in machine() if k != ("FR", "sensor")})
+    assert got.status == "not_assessed"
+
+
+def test_faults_are_stated_however_little_was_driven() -> None:
+    got = verdict(machine(FR_actuator=assessed(finding(Side.ACTUATOR, FaultMode.STUCK))), 0.0)
+    assert got.status == "stop"
+    assert any("judged for 0.0 s" in c for c in got.caveats)
+
+
+def test_unjudged_steering_is_said() -> None:
+    reason = "steering is judged only where it is measured twice"
+    nothing = unassessed(N, State.NOT_ASSESSED, reason)
+    got = verdict(machine(front_sensor=nothing, front_actuator=nothing), dict.fromkeys(machine(), 20.0))
+    assert got.status == "ready"
+    assert got.caveats == (f"Not assessed: front steering sensor and front steering valve ({reason}).",)
+
+
+@pytest.mark.parametrize("decided", [20.0, 0.0])
+def test_damaged_log_is_never_ready(decided: float) -> None:
+    got = verdict(machine(), decided, damage=("chunk 7 is cut off", "footer is missing"))
+    assert got.status != "ready"
+    assert "The log is damaged: chunk 7 is cut off (and 1 more)" in got.caveats
+    fault = machine(FR_actuator=assessed(finding(Side.ACTUATOR, FaultMode.STUCK)))
+    assert verdict(fault, damage=("chunk 7 is cut off",)).status == "stop"
+
+
+def test_intervals_are_numbered_worst_first_then_by_time() -> None:
+    parts = machine(
+        FL_sensor=assessed(finding(Side.SENSOR, FaultMode.NOISY, 500, 900, epsilon=0.1)),
+        FR_actuator=assessed(
+            finding(Side.ACTUATOR, FaultMode.STUCK, 8000, 9000),
+            finding(Side.ACTUATOR, FaultMode.NO_SIGNAL, 3000, 4000),
+            finding(Side.ACTUATOR, FaultMode.NOISY, 100, 200, p=0.5),
+        ),
+        front_sensor=assessed(finding(Side.SENSOR, FaultMode.INEFFICIENT, 6000, 7000, epsilon=0.5)),
+    )
+    got = intervals_of(parts, AXLES, 5_000_000_000, STEP, LIMITS)
+    assert [(f.id, f.component, f.severity, f.start_s) for f in got] == [
+        ("F1", "FR", "high", 3.0),
+        ("F2", "FR", "high", 8.0),
+        ("F3", "front", "medium", 6.0),
+        ("F4", "FL", "low", 0.5),
+        ("F5", "FR", "info", 0.1),
+    ]
+    assert [f.kind for f in got] == ["wheel", "wheel", "steer", "wheel", "wheel"]
+    assert (got[0].start_ns, got[0].stop_ns) == (8_000_000_000, 9_000_000_000)
+
+
+def test_time_of_detection_is_the_samples() -> None:
+    causal = replace(finding(Side.SENSOR, FaultMode.STUCK, 1000, 9000), detected=1004)
+    parts = machine(FR_sensor=assessed(causal), FL_sensor=assessed(finding(Side.SENSOR, FaultMode.STUCK)))
+    got = {f.component: f.detected_s for f in intervals_of(parts, AXLES, 5_000_000_000, STEP, LIMITS)}
+    assert got == {"FR": pytest.approx(1.004), "FL": None}
+
+
+def test_shared_finding_counts_once() -> None:
+    shared = finding(Side.SENSOR_OR_ACTUATOR, FaultMode.INEFFICIENT, epsilon=0.5)
+    got = intervals_of(machine(FR_sensor=assessed(shared), FR_actuator=assessed(shared)), AXLES, 0, STEP, LIMITS)
+    assert [f.id for f in got] == ["F1"]
+
+
+def test_every_fault_above_info_has_an_action() -> None:
+    parts = machine(
+        FR_sensor=assessed(
+            finding(Side.SENSOR, FaultMode.NO_SIGNAL, 1000, 1200),
+            finding(Side.SENSOR, FaultMode.NO_SIGNAL, 5000, 9000),
+            finding(Side.SENSOR, FaultMode.NOISY, 10_000, 11_000, p=0.5),
+        ),
+        FL_actuator=assessed(finding(Side.ACTUATOR, FaultMode.INEFFICIENT, epsilon=0.4)),
+    )
+    got = verdict(parts)
+    intervals = intervals_of(parts, AXLES, 0, STEP, LIMITS)
+    named = {i for action in got.actions for i in action["faults"]}  # type: ignore[attr-defined]
+    assert named == {f.id for f in intervals if f.severity != "info"}
+    assert [a["n"] for a in got.actions] == list(range(1, len(got.actions) + 1))
+    assert got.actions[0]["severity"] == "high"
+    assert "FR speed sensor" in str(got.actions[0]["text"])
+    assert "without signal" in str(got.actions[0]["text"])
+    assert got.title == "1 fault to repair, 2 to watch"
+
+
+def test_spans_leave_no_gap() -> None:
+    parts = machine(FR_sensor=assessed(finding(Side.SENSOR, FaultMode.STUCK, 0, 100)))
+    parts["front", "actuator"] = unassessed(N, State.NO_DATA, "the valve is not in the log")
+    spans = spans_of(parts, STEP)
+    for component, side in parts:
+        mine = [s for s in spans if (s.component, s.side) == (component, side)]
+        assert mine[0].start_s == 0.0
+        assert mine[-1].stop_s == pytest.approx(30.0)
+        assert all(a.stop_s == b.start_s for a, b in pairwise(mine))
+    first, second = (s for s in spans if (s.component, s.side) == ("FR", "sensor"))
+    assert (first.state, first.stop_s, second.state) == (State.STUCK, 0.1, State.HEALTHY)
+    assert spans[-1].reason == "the valve is not in the log"
+
+
+def test_words_of_the_paper() -> None:
+    assert mode_words("actuator", "noisy") == "disturbed"
+    assert mode_words("sensor", "noisy") == "noisy"
+    assert mode_words("actuator", "no_signal") == "without control signal"
+    for side in Side:
+        for mode in FaultMode:
+            assert mode_words(side.value, mode.value)
+        assert part_words("wheel", "FR", side.value).startswith("FR ")
+        assert "steering" in part_words("steer", "front", side.value)
+
+
+def test_deviations_that_nothing_explains_give_no_all_clear() -> None:
+    parts = machine()
+    parts["FR", "actuator"] = replace(parts["FR", "actuator"], unexplained_s=6.0)
+    got = decide((), parts, dict.fromkeys(parts, 20.0), AXLES, Limits(), ())
+    assert got.status == "not_assessed"
+    assert "FR speed sensor or drive valve" in got.text
+
+
+def test_a_fifth_of_the_driving_undecided_gives_no_all_clear() -> None:
+    parts = machine()
+    driven = dict.fromkeys(parts, 30.0)
+    assert decide((), parts, dict.fromkeys(parts, 23.0), AXLES, Limits(), (), driving_s=driven).status == "not_assessed"
+    assert decide((), parts, dict.fromkeys(parts, 25.0), AXLES, Limits(), (), driving_s=driven).status == "ready"
+
+
+WATCHED = finding(Side.ACTUATOR, FaultMode.INEFFICIENT, epsilon=0.5)
+
+
+def test_faults_to_watch_are_cleared_only_where_all_else_is_ready() -> None:
+    parts = machine(FR_actuator=assessed(WATCHED))
+    assert (verdict(parts).cleared, verdict(parts).not_cleared) == (True, "")
+    short = verdict(parts, dict.fromkeys(parts, 20.0) | {("FL", "sensor"): 9.9, ("FL", "actuator"): 0.0})
+    assert (short.status, short.cleared) == ("watch", False)
+    assert short.not_cleared == "2 parts were not judged long enough"
+    damaged = verdict(parts, damage=("chunk 7 is cut off",))
+    assert (damaged.status, damaged.cleared, damaged.not_cleared) == ("watch", False, "the log is damaged")
+    odd = parts | {("FL", "sensor"): replace(parts["FL", "sensor"], unexplained_s=6.0)}
+    assert verdict(odd).not_cleared == "something deviates that no fault explains"
+
+
+def test_a_valve_that_may_not_answer_is_not_cleared() -> None:
+    got = verdict(machine(FR_actuator=assessed(finding(Side.ACTUATOR, FaultMode.STUCK, p=0.7))))
+    assert (got.status, got.cleared, got.not_cleared) == ("watch", False, "the FR drive valve may not answer")
+    assert str(got.actions[0]["text"]).startswith("Before the machine goes out, check the FR drive valve")
+
+
+def test_only_ready_and_watch_are_ever_cleared() -> None:
+    assert verdict(machine()).cleared
+    assert not verdict(machine(), 0.0).cleared
+    assert not verdict(machine(), damage=("chunk 7 is cut off",)).cleared
+    assert not verdict(machine(FR_actuator=assessed(finding(Side.ACTUATOR, FaultMode.STUCK)))).cleared
+
+
+def test_no_action_and_no_advice_gives_leave_to_go_out() -> None:
+    for side in Side:
+        for mode in FaultMode:
+            parts = machine(FR_sensor=assessed(finding(side, mode, epsilon=0.5)))
+            words = [str(a["text"]) for a in verdict(parts, 0.0).actions]
+            words += [f.advice for f in intervals_of(parts, AXLES, 0, STEP, LIMITS)]
+            assert not any("may go out" in w.lower() for w in words)
+
+
+def test_stop_at_once_stands_before_other_stops() -> None:
+    got = verdict(
+        machine(
+            FR_sensor=assessed(finding(Side.SENSOR, FaultMode.STUCK, 0, 9000)),
+            FR_actuator=assessed(WATCHED),
+            FL_actuator=assessed(finding(Side.ACTUATOR, FaultMode.NO_SIGNAL, 5000, 9000)),
+        )
+    )
+    assert [str(a["text"]).split(" the ")[0] for a in got.actions] == [
+        "Stop at once and repair",
+        "Stop and repair",
+        "Check",
+    ]
+    assert [a["n"] for a in got.actions] == [1, 2, 3]
+
+
+def test_the_worst_open_time_is_named_truly() -> None:
+    parts = machine()
+    driven = dict.fromkeys(parts, 60.0)
+    decided = dict.fromkeys(parts, 60.0) | {("FL", "sensor"): 50.0}
+    only = decide((), parts, decided, AXLES, LIMITS, (), driving_s=driven)
+    assert any("10.0 s of 60.0 s" in c and "no other part has more" in c for c in only.caveats)
+    worse = decide((), parts, decided | {("FR", "sensor"): 20.0}, AXLES, LIMITS, (), driving_s=driven)
+    assert any("FL" in c and "none of the parts judged long enough has more" in c for c in worse.caveats)
+
+
+def test_a_short_drive_is_the_reason_not_the_standstill() -> None:
+    states = np.full(N, CODE[State.HEALTHY])
+    states[:20_000] = CODE[State.NOT_EXCITED]
+    parts = {k: replace(a, states=states, reasons={State.NOT_EXCITED: "nothing moves"}) for k, a in machine().items()}
+    got = decide((), parts, dict.fromkeys(parts, 4.7), AXLES, LIMITS, (), driving_s=dict.fromkeys(parts, 5.0))
+    assert all("only 5.0 s were driven" in c for c in got.caveats)
+    assert len(got.caveats) == 4
+    states = states.copy()
+    states[20_000:25_000] = CODE[State.MASKED]
+    reasons = {State.NOT_EXCITED: "nothing moves", State.MASKED: "F1 hides it"}
+    parts["FR", "sensor"] = replace(parts["FR", "sensor"], states=states, reasons=reasons)
+    seconds = dict.fromkeys(parts, 30.0) | {("FR", "sensor"): 5.0}
+    got = decide((), parts, seconds, AXLES, LIMITS, (), driving_s=dict.fromkeys(parts, 30.0))
+    assert "F1 hides it" in got.caveats[0]

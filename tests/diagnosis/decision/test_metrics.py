@@ -1,0 +1,137 @@
+"""Figures of a mission, by hand."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+
+from diagnosis.decision.metrics import body_motion, coverage, driving, loop_metrics, path_of, phases
+from diagnosis.results.assessment import CODE, Assessment
+from replay.control.loop import Replay, replay_loop
+from replay.faults import State
+from replay.machine.config import Machine
+from replay.signals.timeline import Timeline
+
+STEP = 10_000_000  # 100 Hz
+MACHINE = Machine(name="two", id="", wheels=("A", "B"), geometry=None)
+Array = np.ndarray
+
+
+def timeline(**columns: Array) -> Timeline:
+    named = {name.replace("__", "."): np.asarray(x, dtype=np.float64) for name, x in columns.items()}
+    size = next(iter(named.values())).size
+    return Timeline(
+        start_ns=0,
+        step_ns=STEP,
+        size=size,
+        signals=named,
+        fresh={k: np.isfinite(x) for k, x in named.items()},
+        sources=dict.fromkeys(named, "a.csv"),
+        periods_ns=dict.fromkeys(named, STEP),
+    )
+
+
+def loop(line: Timeline, machine: Machine = MACHINE) -> Replay:
+    return replay_loop(line, machine)
+
+
+def test_driving_is_by_the_command() -> None:
+    line = timeline(
+        wheel__A__v_ref=[0.0, 0.04, 0.06, -0.06, np.nan], wheel__A__v=np.full(5, 0.3), wheel__B__v=[0.3] * 5
+    )
+    got = driving(loop(line), line, MACHINE)
+    assert_array_equal(got[:, 0], [False, False, True, True, False])
+    assert_array_equal(got[:, 1], True)  # nothing is commanded: the measured speed stands in
+
+
+def test_tracking_error_and_effort() -> None:
+    line = timeline(
+        wheel__A__v_ref=[0.0, 0.2, 0.2, np.nan],
+        wheel__A__v=[0.01, 0.17, 0.22, 0.2],
+        wheel__A__u=[0.0, 0.1, -0.3, np.nan],
+        wheel__B__v_ref=[0.0, 0.2, 0.2, 0.2],
+        wheel__B__v=[0.0, 0.1, 0.1, 0.1],
+        wheel__B__v_true=[0.0, 0.2, 0.2, 0.16],
+        wheel__B__u=[0.0, 0.2, 0.2, 0.2],
+    )
+    replay = loop(line)
+    got = loop_metrics(line, replay, MACHINE, driving(replay, line, MACHINE))
+    a, b = got["wheels"]["A"], got["wheels"]["B"]
+    assert a["tracking_error"] == pytest.approx({"mission": 0.02, "driving": 0.025})
+    assert a["control_effort"] == pytest.approx({"mission": 0.4 / 3, "driving": 0.2})
+    # with v_true where it is logged, not with the faulty measurement
+    assert b["tracking_error"] == pytest.approx({"mission": 0.01, "driving": 0.04 / 3})
+    assert got["average"]["tracking_error"]["mission"] == pytest.approx(0.015)
+    assert got["average"]["control_effort"]["driving"] == pytest.approx(0.2)
+
+
+def test_the_papers_table_stands_beside() -> None:
+    line = timeline(wheel__A__v=[0.0, 0.0])
+    replay = loop(line)
+    got = loop_metrics(line, replay, MACHINE, driving(replay, line, MACHINE))
+    rows = [(r["controller"], r["tracking_error"], r["control_effort"], r["parameters"]) for r in got["paper"]]
+    assert rows[0] == ("MFHCA", 0.019, 0.125, 4)
+    assert rows[1:] == [
+        ("Yang", 0.032, 0.13, 16),
+        ("Wang", 0.021, 0.145, 7),
+        ("Yu", 0.024, 0.125, 6),
+        ("Sun", 0.035, 0.135, 12),
+    ]
+    assert np.isnan(got["average"]["tracking_error"]["mission"])
+
+
+def test_coverage_counts_every_sample() -> None:
+    states = np.repeat(
+        [CODE[s] for s in (State.HEALTHY, State.STUCK, State.NOT_EXCITED, State.MASKED)], [40, 30, 20, 10]
+    )
+    moving = np.zeros((100, 2), dtype=bool)
+    moving[20:60, 0] = True
+    moving[60:95, 1] = True
+    one = Assessment(states.astype(np.int8), tier="direct")
+    rows, decided = coverage({("A", "sensor"): one, ("front", "sensor"): one}, moving, MACHINE, 0.01)
+    assert rows[0]["seconds"] == pytest.approx({"healthy": 0.4, "stuck": 0.3, "not_excited": 0.2, "masked": 0.1})
+    assert sum(rows[0]["seconds"].values()) == pytest.approx(1.0)
+    assert rows[0]["driving_s"] == pytest.approx(0.4)
+    assert decided["A", "sensor"] == pytest.approx(0.4)
+    # a steering axle drives while any wheel does
+    assert rows[1]["driving_s"] == pytest.approx(0.75)
+    assert decided["front", "sensor"] == pytest.approx(0.5)
+    assert rows[1]["decided_driving_s"] == decided["front", "sensor"]
+
+
+def test_phases_by_the_command() -> None:
+    n = 200
+    v = np.repeat([0.0, 0.2, 0.2, -0.2, 0.0], n)
+    omega = np.repeat([0.0, 0.0, 0.1, 0.0, 0.0], n)
+    line = timeline(cmd__v=v, cmd__omega=omega, wheel__A__v=v)
+    got = phases(line, loop(line), MACHINE)
+    assert [p["name"] for p in got] == ["standstill", "forward", "turning", "reverse", "standstill"]
+    assert_allclose([p["start_s"] for p in got], [0, 2, 4, 6, 8])
+    assert_allclose([p["stop_s"] for p in got], [2, 4, 6, 8, 10])
+
+
+def test_short_phases_join_the_one_before() -> None:
+    v = np.repeat([0.2, -0.2, 0.2], [200, 20, 200])
+    line = timeline(cmd__v=v, wheel__A__v=v)
+    assert phases(line, loop(line), MACHINE) == [{"name": "forward", "start_s": 0.0, "stop_s": 4.2}]
+
+
+def test_body_motion_without_a_command_is_the_wheels_mean() -> None:
+    line = timeline(wheel__A__v=[0.1, np.nan, np.nan], wheel__B__v=[0.3, 0.2, np.nan])
+    v, omega = body_motion(line, loop(line), MACHINE)
+    assert_allclose(v, [0.2, 0.2, np.nan])
+    assert_array_equal(omega, 0.0)
+    commanded = replace(line, signals={**line.signals, "cmd.v": np.array([0.5, 0.5, 0.5])})
+    assert_array_equal(body_motion(commanded, loop(line), MACHINE)[0], 0.5)
+
+
+def test_path_from_odometry_then_gnss() -> None:
+    odometry = timeline(odom__x=[0.0, 1.0], odom__y=[0.0, 2.0], gnss__lat=[61.0, 61.0], gnss__lon=[24.0, 24.0])
+    assert_array_equal(path_of(odometry)["path.y"], [0.0, 2.0])
+    gnss = path_of(timeline(gnss__lat=[np.nan, 61.0, 61.001], gnss__lon=[np.nan, 24.0, 24.001]))
+    assert_allclose(gnss["path.y"], [np.nan, 0.0, 111.195], atol=0.01)
+    assert_allclose(gnss["path.x"], [np.nan, 0.0, 111.195 * np.cos(np.radians(61))], atol=0.01)
+    assert path_of(timeline(wheel__A__v=[0.0])) == {}

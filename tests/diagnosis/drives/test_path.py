@@ -1,0 +1,142 @@
+"""The path of rows over a grid of faults: against a plain recursion, in blocks, and as densities."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from diagnosis.drives.path import (
+    EPSILON,
+    HALF_STEP,
+    ROW,
+    STATES,
+    RowModel,
+    emission,
+    forward,
+    initial_state,
+    most_probable,
+    state_evidence,
+)
+from diagnosis.estimation import fault_models
+
+Array = NDArray[np.float64]
+
+MODEL = RowModel(noise=0.1, core=0.02, exact=0.6, constant_noise=0.002, span=10.0, switch_cost=8.0)
+
+NONE = np.zeros(300)
+
+
+def one(m: int, y: float, x: float, last: float, status: int = fault_models.PAIR, quiet: bool = False) -> float:
+    return float(
+        emission(m, y, x, 0.0, last, status, quiet, ROW, EPSILON, HALF_STEP, MODEL.bias, MODEL.added, MODEL.packed())
+    )
+
+
+def sample(seed: int, size: int = 300) -> tuple[Array, Array, NDArray[np.int8], NDArray[np.bool_]]:
+    rng = np.random.default_rng(seed)
+    x = 4 + np.cumsum(rng.normal(0, 0.05, size))
+    y = x + np.where(rng.random(size) < 0.6, 0.02, 0.155) * rng.standard_normal(size)
+    status = np.full(size, fault_models.PAIR, dtype=np.int8)
+    status[::7] = fault_models.SKIP
+    return y, x, status, np.zeros(size, dtype=np.bool_)
+
+
+def test_the_scan_is_viterbis_recursion() -> None:
+    y, x, status, quiet = sample(1, 80)
+    y[40:] = 0.8 * y[40:]
+    back, lead, state = forward(y, x, NONE[: y.size], status, quiet, MODEL, initial_state(MODEL))
+    score = initial_state(MODEL).score.copy()
+    last = float("nan")
+    for k in range(y.size):
+        if status[k] != fault_models.SKIP:
+            best = int(np.argmax(score))
+            noisy = int(np.flatnonzero(ROW == fault_models.NOISY)[np.argmax(score[ROW == fault_models.NOISY])])
+            entry = np.full(STATES, score[best] - MODEL.switch_cost)
+            entry = np.where(ROW == fault_models.NOISY, np.maximum(entry, score[noisy] - 4.0), entry)
+            score = np.maximum(score, entry) + [one(m, y[k], x[k], last) for m in range(STATES)]
+            assert lead[k] == pytest.approx(score[1:].max() - score[0])
+            last = float(y[k])
+    assert state.score - state.score.max() == pytest.approx(score - score.max())
+    assert (back[status == fault_models.SKIP] == fault_models.STAY).all()
+
+
+@pytest.mark.parametrize("cut", [1, 57, 140, 299])
+def test_blocks_change_nothing(cut: int) -> None:
+    y, x, status, quiet = sample(2)
+    y[120:180] = y[119]
+    whole = forward(y, x, NONE[: y.size], status, quiet, MODEL, initial_state(MODEL))
+    head = forward(y[:cut], x[:cut], NONE[:cut], status[:cut], quiet[:cut], MODEL, initial_state(MODEL))
+    tail = forward(y[cut:], x[cut:], NONE[cut:300], status[cut:], quiet[cut:], MODEL, head[2])
+    assert np.array_equal(whole[0], np.r_[head[0], tail[0]])
+    assert whole[2].score == pytest.approx(tail[2].score)
+
+
+def test_every_state_has_its_values() -> None:
+    assert {STATES} == {values.size for values in (ROW, EPSILON, HALF_STEP, MODEL.bias, MODEL.added)}
+    inefficient = ROW == fault_models.INEFFICIENT
+    assert (np.diff(EPSILON[inefficient]) > 0).all()
+    assert (HALF_STEP[inefficient] > 0).all()
+
+
+@pytest.mark.parametrize("m", [0, 10, 40, STATES - 25, STATES - 1])
+def test_a_state_is_a_density(m: int) -> None:
+    y = np.linspace(-200, 200, 400_001)
+    density = np.exp([one(m, float(v), 4.0, np.nan) for v in y[::4]])
+    assert float(np.sum(density)) * 4 * (y[1] - y[0]) == pytest.approx(1.0, rel=0.01)
+
+
+@pytest.mark.parametrize(
+    ("row", "fault"),
+    [
+        (fault_models.STUCK, lambda y, rng: np.full(y.size, y[0])),
+        (fault_models.NO_SIGNAL, lambda y, rng: np.zeros(y.size)),
+        (fault_models.INEFFICIENT, lambda y, rng: 0.9 * y),
+        (fault_models.NOISY, lambda y, rng: 0.9 * y + 0.1 * rng.normal(2, 3, y.size)),
+    ],
+)
+def test_each_row_is_found_where_it_is(row: int, fault) -> None:  # type: ignore[no-untyped-def]
+    y, x, status, quiet = sample(3)
+    status[:] = fault_models.PAIR
+    y[100:200] = fault(y[100:200], np.random.default_rng(4))
+    path, lead = most_probable(y, x, NONE, status, quiet, MODEL)
+    truth = np.where((np.arange(300) >= 100) & (np.arange(300) < 200), row, fault_models.HEALTHY)
+    assert np.count_nonzero(path != truth) <= 3
+    assert (lead[20:100] < 0).all()
+    assert (lead[120:200] > 0).all()
+
+
+def test_standing_still_at_zero_is_no_fault() -> None:
+    size = 200
+    y, x = np.zeros(size), np.zeros(size)
+    path, _ = most_probable(
+        y, x, NONE[:size], np.full(size, fault_models.PAIR, dtype=np.int8), np.ones(size, dtype=np.bool_), MODEL
+    )
+    assert (path == fault_models.HEALTHY).all()
+
+
+def test_without_a_reference_only_a_constant_reading_is_a_fault() -> None:
+    y, x, status, quiet = sample(5)
+    status[:] = fault_models.BLIND
+    x[:] = np.nan
+    assert (most_probable(y, x, NONE, status, quiet, MODEL)[0] == fault_models.HEALTHY).all()
+    y[150:] = y[150]
+    path, _ = most_probable(y, x, NONE, status, quiet, MODEL)
+    assert (path[:150] == fault_models.HEALTHY).all()
+    assert (path[152:] == fault_models.STUCK).all()
+
+
+def test_a_silent_channel_beside_living_ones_is_no_signal() -> None:
+    y, x, status, quiet = sample(6)
+    y[100:], status[100:] = np.nan, fault_models.SILENT
+    assert (most_probable(y, x, NONE, status, quiet, MODEL)[0][110:] == fault_models.NO_SIGNAL).all()
+
+
+def test_evidence_of_a_segment_adds_up_its_samples() -> None:
+    y, x, status, quiet = sample(7, 20)
+    got = state_evidence(y, x, NONE[:20], status, quiet, MODEL, 3.0)
+    last, total = 3.0, np.zeros(STATES)
+    for k in np.flatnonzero(status == fault_models.PAIR):
+        total += [one(m, y[k], x[k], last) for m in range(STATES)]
+        last = float(y[k])
+    assert got == pytest.approx(total)

@@ -1,0 +1,57 @@
+"""When a fault could have been raised without knowing what follows."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from diagnosis.estimation.fault_models import HEALTHY, NO_SIGNAL, NOISY, PAIR, ModeModel
+from diagnosis.estimation.viterbi import ModePath, most_probable
+
+
+def told(healthy: str) -> ModePath:
+    """A path whose causal reading is healthy (h) or faulty (f) sample by sample."""
+    filtered = np.zeros((len(healthy), 5), dtype=np.float32)
+    filtered[:, HEALTHY] = [0.9 if c == "h" else 0.2 for c in healthy]
+    filtered[:, NOISY] = 1.0 - filtered[:, HEALTHY]
+    nothing = np.zeros(len(healthy), dtype=np.uint8)
+    return ModePath(nothing, nothing.astype(np.bool_), filtered)
+
+
+@pytest.mark.parametrize(
+    ("healthy", "start", "stop", "slack", "expected"),
+    [
+        ("hhhhffffffffhhhh", 4, 12, 0, 4),
+        ("hhhhhhffffffhhhh", 4, 12, 0, 6),  # two samples of evidence were needed
+        ("hhhhfhhfffffhhhh", 4, 12, 1, 7),  # a blip that is withdrawn is no detection
+        ("hhhhfhffffffhhhh", 4, 12, 2, 4),  # unless it is withdrawn for less than the slack
+        ("hhhhffffhhhhhfff", 4, 16, 1, 4),  # one that lasts is, whatever follows
+        ("hhhhhhhhhhffhhhh", 4, 12, 0, 10),  # raised just before the end
+        ("hhhfffffffffhhhh", 4, 12, 2, 4),  # raised a sample before the start found looking back
+        ("ffffffffffffhhhh", 4, 12, 2, 4),  # raised long before
+        ("hhhhhhhhffffhhhh", 4, 13, 2, 8),  # the end found looking back is a sample late
+        ("hhhhhhhhhhffhhhh", 4, 13, 0, None),  # without slack that decision neither lasts nor reaches the end
+        ("hhhhhhhhhhhhhhhh", 4, 12, 2, None),
+    ],
+)
+def test_first_rise_of_the_causal_decision_that_lasts(
+    healthy: str, start: int, stop: int, slack: int, expected: int | None
+) -> None:
+    assert told(healthy).crossing(start, stop, slack, hold=4) == expected
+
+
+def test_nothing_later_is_used() -> None:
+    """What follows a sample changes the path found looking back, never the causal decision before it."""
+    n = 400
+    model = ModeModel(noise=0.004, constant_noise=0.0005, tolerance=0.005, span=0.8, switch_cost=13.0, dt=0.001)
+    x = 0.2 + 0.1 * np.sin(np.arange(n) / 40)
+    y = x + 0.004 * np.random.default_rng(1).normal(size=n)
+    y[200:] = 0.0
+    status, busy = np.full(n, PAIR, dtype=np.int8), np.zeros(n, dtype=np.bool_)
+    whole = most_probable(y, x, status, busy, model)
+    cut = most_probable(y[:210], x[:210], status[:210], busy[:210], model)
+    np.testing.assert_array_equal(whole.filtered[:210], cut.filtered)
+    assert (whole.row[200:] == NO_SIGNAL).all()
+    raised = whole.crossing(200, n, 3, 100)
+    assert raised is not None
+    assert 200 <= raised <= 201

@@ -1,0 +1,88 @@
+from __future__ import annotations
+
+import pytest
+
+from diagnosis.pages import labels
+
+
+@pytest.mark.parametrize(
+    ("raw", "shown"),
+    [
+        ("/joint_states", "/joint_states"),
+        ("<script>", "<script>"),
+        ("größe ψ 車", "größe ψ 車"),
+        ("a\u202eb", "a\\u202eb"),
+        ("a\x1b[31m\n", "a\\x1b[31m\\x0a"),
+        ("\u2066x\u2069\ufeff", "\\u2066x\\u2069\\ufeff"),
+        ("\ud800", "\\ud800"),
+        ("a\u00a0b", "a\u00a0b"),
+    ],
+)
+def test_invisible_characters_are_spelt_out_and_the_rest_is_verbatim(raw: str, shown: str) -> None:
+    assert labels.visible(raw) == shown
+
+
+def test_made_visible_reaches_keys_and_lists() -> None:
+    assert labels.made_visible({"a\x00": ["\x01", {"b": "\x02", "n": 1.5}]}) == {
+        "a\\x00": ["\\x01", {"b": "\\x02", "n": 1.5}]
+    }
+
+
+@pytest.mark.parametrize(
+    ("seconds", "digits", "words"),
+    [
+        (0, 0, "0:00"),
+        (59.9996, 3, "1:00.000"),
+        (3723.25, 2, "1:02:03.25"),
+        (-1.5, 1, "−0:01.5"),
+        (30.001, 3, "0:30.001"),
+    ],
+)
+def test_clock(seconds: float, digits: int, words: str) -> None:
+    assert labels.clock(seconds, digits) == words
+
+
+@pytest.mark.parametrize(
+    ("value", "words"),
+    [
+        (0.0193, "0.0193"),
+        (None, "–"),
+        (float("nan"), "–"),
+        (-2.5, "−2.5"),
+        (1000.0, "1\u202f000"),
+        (12, "12"),
+        (0.0, "0"),
+    ],
+)
+def test_number(value: object, words: str) -> None:
+    assert labels.number(value) == words
+
+
+@pytest.mark.parametrize("start", [None, "x", 2**80, -(2**80)])
+def test_impossible_start_is_called_unknown(start: object) -> None:
+    assert labels.utc(start) == "unknown"
+
+
+def test_start_in_utc() -> None:
+    assert labels.utc(1_760_000_000_000_000_000) == "2025-10-09 08:53:20"
+
+
+def test_titles_name_part_mode_and_size() -> None:
+    fault = {
+        "component": "FR",
+        "kind": "wheel",
+        "side": "sensor",
+        "mode": "stuck",
+        "sat": {"mean": 0.21, "unit": "m/s"},
+    }
+    assert labels.fault_title(fault) == "FR speed sensor stuck at 0.21 m/s"
+    steer = {
+        "component": "front",
+        "kind": "steer",
+        "side": "sensor",
+        "mode": "stuck",
+        "sat": {"mean": 0.1, "unit": "rad"},
+    }
+    assert labels.fault_title(steer) == "front steering-angle sensor stuck at 5.73°"
+    assert labels.fault_title({**fault, "side": "actuator", "mode": "noisy", "sat": None}) == "FR drive valve disturbed"
+    assert labels.fault_title({**fault, "mode": "something new"}) == "FR speed sensor something new"

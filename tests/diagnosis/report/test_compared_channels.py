@@ -1,0 +1,77 @@
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from diagnosis.report.compared_channels import DEGREES, Pair, pair_of, rests_on, shape_sentence, tier_words
+
+ONE = np.zeros(1)
+
+
+def fault(**changes: Any) -> dict[str, Any]:
+    return {"component": "FR", "kind": "wheel", "side": "sensor", "tier": "direct", "evidence": [], **changes}
+
+
+def pair(found: dict[str, Any], *names: str) -> Pair:
+    result = pair_of(found, dict.fromkeys(names, ONE))
+    assert result is not None
+    return result
+
+
+def test_second_measurement_is_the_reference_of_direct_evidence_alone() -> None:
+    names = ("wheel.FR.v", "wheel.FR.v_true", "evidence.FR.sensor.expected", "replay.FR.v_ref")
+    direct, model = pair(fault(), *names), pair(fault(tier="model"), *names)
+    assert (direct.reference, direct.words, direct.apart) == ("wheel.FR.v_true", "second measurement", True)
+    assert (model.reference, model.words, model.apart) == ("evidence.FR.sensor.expected", "expected value", False)
+    assert pair(fault(tier="tracking"), "wheel.FR.v", "replay.FR.v_ref").words == "commanded"
+    assert pair(fault(), "wheel.FR.v").reference is None
+    assert pair_of(fault(), {}) is None
+
+
+def test_valve_position_is_compared_with_its_command_where_it_decided() -> None:
+    valve = fault(side="actuator")
+    names = ("wheel.FR.v", "wheel.FR.u", "wheel.FR.u_applied")
+    assert (pair(valve, *names).measured, pair(valve, *names).reference) == ("wheel.FR.u_applied", "wheel.FR.u")
+    assert pair({**valve, "tier": "model"}, *names).measured == "wheel.FR.v"
+
+
+def test_steering_angles_are_in_degrees() -> None:
+    found = pair(fault(component="front", kind="steer"), "steer.front.phi", "steer.front.phi_true")
+    assert (found.unit, found.scale, found.text(2.5)) == ("°", DEGREES, "2.5°")
+
+
+def test_a_loss_on_either_side_takes_the_side_that_has_evidence() -> None:
+    found = pair(fault(side="sensor_or_actuator"), "wheel.FR.v", "evidence.FR.actuator.residual")
+    assert found.evidence == "evidence.FR.actuator."
+
+
+@pytest.mark.parametrize(
+    ("kind", "tier", "words"),
+    [
+        ("wheel", "direct", "second measurement"),
+        ("wheel", "model", "wheel model"),
+        ("steer", "model", "steering model"),
+        ("wheel", "signal", "channel alone"),
+        ("wheel", "tracking", "command tracking"),
+        ("wheel", "drive", "drive model"),
+        ("wheel", "something new", "something new"),
+    ],
+)
+def test_plain_words_for_the_kind_of_evidence(kind: str, tier: str, words: str) -> None:
+    assert tier_words(fault(kind=kind, tier=tier)) == words
+
+
+def test_channels_that_the_sentences_name() -> None:
+    found = fault(evidence=["wheel.FR.v_true moved on.", "Noise of wheel.FR.v."])
+    columns = ["t", "wheel.FR.v", "wheel.FR.v_true", "wheel.FR.u", "evidence.FR.sensor.residual"]
+    assert rests_on(found, columns) == "second measurement: wheel.FR.v_true, wheel.FR.v"
+    assert rests_on(fault(evidence=["wheel.FR.v2 moved."]), columns) == "second measurement"
+    assert rests_on(fault(tier="", evidence=None), columns) == ""
+
+
+def test_sentence_about_the_onset() -> None:
+    found = fault(evidence=["Residual 0.1 m/s.", "The speed dropped by 0.2 m/s at once."])
+    assert shape_sentence(found) == "The speed dropped by 0.2 m/s at once."
+    assert shape_sentence(fault()) == ""

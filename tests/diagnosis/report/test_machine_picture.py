@@ -1,0 +1,98 @@
+from __future__ import annotations
+
+import re
+
+import numpy as np
+import pytest
+
+from diagnosis.pages.svg import path_picture, thumbnail
+from diagnosis.report.machine_picture import condition, machine_picture
+from tests import report_samples as samples
+
+FAULT = {
+    "id": "F1",
+    "component": "FR",
+    "kind": "wheel",
+    "side": "sensor",
+    "mode": "stuck",
+    "start_s": 3.0,
+    "stop_s": 4.0,
+}
+
+
+def test_front_left_stands_at_the_top_left() -> None:
+    report, _ = samples.five_faults()
+    picture = machine_picture(report)
+    places = {
+        n: (float(x), float(y))
+        for x, y, n in re.findall(r'<text x="([\d.]+)" y="([\d.]+)" class="name">(\w+)<', picture)
+    }
+    assert places["FL"][0] < places["FR"][0]
+    assert places["FL"][1] == places["FR"][1] < places["RR"][1]
+    assert 'data-f="F4"' in picture
+
+
+@pytest.mark.parametrize("count", [0, 1, 3, 12])
+def test_any_number_of_wheels_without_geometry(count: int) -> None:
+    picture = machine_picture({"machine": {"wheels": [f"w{i}" for i in range(count)]}})
+    assert picture.count('class="tyre not_assessed"') == count
+
+
+def test_part_that_was_never_judged_is_not_called_healthy() -> None:
+    judged = {("FR", "sensor"): True, ("FR", "actuator"): False}
+    half = condition("FR", "wheel", [], judged)
+    assert (half.state, half.lines) == ("not_assessed", ("No fault found", "drive valve", "not assessed"))
+    assert condition("FR", "wheel", [], {}).state == "not_assessed"
+    assert condition("FR", "wheel", [], {("FR", "sensor"): True}).state == "healthy"
+
+
+def test_thumbnail_keeps_gaps_and_clips_to_the_mission() -> None:
+    y = np.where(np.arange(1000) % 300 < 30, np.nan, 1.0)
+    picture = thumbnail(FAULT, y, None, 0.0, 0.01)
+    assert picture.count("M") >= 1
+    assert "nan" not in picture
+    assert thumbnail({**FAULT, "start_s": 9.99, "stop_s": 500.0}, np.zeros(1000), None, 0.0, 0.01)
+    assert thumbnail(FAULT, np.full(1000, np.nan), None, 0.0, 0.01) == ""
+
+
+def test_path_is_empty_where_no_position_is_known() -> None:
+    nothing = np.full(100, np.nan)
+    assert path_picture(nothing, nothing, 0.0, 0.1, [FAULT]) == ""
+
+
+def test_path_breaks_at_gaps_and_survives_standing_still() -> None:
+    x = np.linspace(0, 5, 100)
+    x[40:50] = np.nan
+    assert "nan" not in path_picture(x, np.zeros(100), 0.0, 0.1, [FAULT])
+    assert path_picture(np.zeros(100), np.zeros(100), 0.0, 0.1, [FAULT]).count('class="mark') == 1
+
+
+def test_a_part_that_was_judged_too_briefly_is_not_called_healthy() -> None:
+    judged = {("FR", "sensor"): True, ("FR", "actuator"): True}
+    short = condition("FR", "wheel", [], judged, {("FR", "sensor"): True, ("FR", "actuator"): False})
+    assert short.state == "not_assessed"
+    assert short.lines == ("No fault found", "drive valve", "judged too briefly")
+    assert condition("FR", "wheel", [], judged, dict.fromkeys(judged, True)).lines == ("Healthy",)
+
+
+def test_long_words_stand_in_several_lines() -> None:
+    wheels = ["FL", "FR"]
+    geometry = {w: {"x": 1.0, "y": y, "offset": 0.0, "axle": ""} for w, y in zip(wheels, (1.0, -1.0), strict=True)}
+    fault = {**FAULT, "side": "sensor_or_actuator", "mode": "outside_table", "severity": "medium"}
+    rows = [
+        {"component": "FL", "side": s, "tier": "model", "seconds": {"healthy": 5.0}, "decided_driving_s": 5.0}
+        for s in ("sensor", "actuator")
+    ]
+    report = {"machine": {"wheels": wheels, "geometry": geometry}, "intervals": [fault], "coverage": rows}
+    words = re.findall(r'class="side[^"]*">([^<]*)<', machine_picture(report))
+    assert words == [
+        "No fault found",
+        "judged too",
+        "briefly",
+        "Speed sensor or",
+        "drive valve",
+        "outside the",
+        "tables",
+        "1.0 s",
+    ]
+    assert max(map(len, words)) <= 15

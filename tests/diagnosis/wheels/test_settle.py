@@ -1,0 +1,86 @@
+"""Faults that began together: the others' models may be given, and what one wheel explains is taken back elsewhere."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+
+from diagnosis.estimation.fault_models import PAIR, STAY
+from diagnosis.wheels import step_kernel as ws
+from diagnosis.wheels.blocks import WheelBlocks, blocks_of
+from diagnosis.wheels.filter import forward, most_probable
+from diagnosis.wheels.models import JointModel, WheelFilterModel
+from diagnosis.wheels.settle import settled
+
+RAW, WIDTH, N, ONSET, STOP = 0.001, 10, 9000, 4000, 7000
+WHEEL = WheelFilterModel(
+    K=2.4,
+    tau=0.25,
+    noise=0.004,
+    constant_noise=0.0005,
+    rounding=0.0003,
+    load=0.014,
+    span=0.8,
+    valve_span=0.15,
+)
+FLOW = 0.7
+MODEL = JointModel((WHEEL,) * 4, FLOW, float(np.log(60.0 / (WIDTH * RAW) * 12)))
+Array = np.ndarray
+
+
+def openings() -> Array:
+    t = np.arange(N)[:, None] * RAW
+    return np.asarray(
+        (0.07 * np.sin(2 * np.pi * t / 5.0 + 0.2) + 0.03 * np.sign(np.sin(4 * t + 0.3))) * [1, 0.9, 1.1, 1]
+    )
+
+
+def blocks(applied: Array, u: Array) -> WheelBlocks:
+    """Four wheels whose valves take `applied` of one pump."""
+    v, y = np.zeros(4), np.empty(u.shape)
+    a = np.exp(-RAW / WHEEL.tau)
+    for k in range(N):
+        y[k] = v
+        v = a * v + (1 - a) * WHEEL.K * applied[k] * min(1.0, FLOW / max(WHEEL.K * np.abs(applied[k]).sum(), 1e-9))
+    y += WHEEL.noise * np.random.default_rng(1).normal(size=y.shape)
+    unknown, status = np.full(u.shape, np.nan), np.full(u.shape, PAIR, dtype=np.int8)
+    return blocks_of(y, u, status, np.zeros(u.shape, dtype=np.bool_), unknown, unknown, np.zeros(4), RAW)
+
+
+def test_others_may_be_told_in_which_model_a_wheel_is() -> None:
+    u = openings()
+    cut = blocks(u, u)
+    given = np.full(cut.y.shape, STAY, dtype=np.uint8)
+    own = forward(cut, MODEL)
+    assert_array_equal(forward(cut, MODEL, given=given).inputs, own.inputs)
+    given[:, 2] = ws.A_NONE
+    told = forward(cut, MODEL, given=given)
+    asked = WHEEL.K * np.abs(u)
+    others = asked[:, 1] + asked[:, 3]
+    for done, rest in ((own, others + asked[:, 2]), (told, others)):
+        share = np.minimum(1.0, FLOW / np.maximum(rest, 1e-9)).reshape(-1, WIDTH).mean(axis=1)
+        assert_allclose(done.inputs[:, 0, 3], share, rtol=1e-9)
+
+
+def test_nothing_is_taken_back_from_healthy_wheels() -> None:
+    u = openings()
+    cut = blocks(u, u)
+    done = forward(cut, MODEL)
+    assert settled(cut, MODEL, done) is done
+
+
+@pytest.mark.parametrize("fault", [0.0, 0.5], ids=["no control signal", "inefficient"])
+def test_one_valve_explains_what_all_wheels_suffer(fault: float) -> None:
+    u = openings()
+    applied = u.copy()
+    applied[ONSET:STOP, 2] *= fault
+    cut = blocks(applied, u)
+    done = forward(cut, MODEL)
+    got = settled(cut, MODEL, done)
+    assert got.evidence >= done.evidence
+    paths = np.column_stack([most_probable(got, i)[0] for i in range(4)])
+    assert np.mean(paths[:, [0, 1, 3]] == ws.HEALTHY) > 0.99
+    middle = paths[ONSET // WIDTH + 50 : STOP // WIDTH - 10, 2]
+    assert np.isin(middle, (ws.A_GAIN, ws.A_NONE)).mean() > 0.95
+    assert (paths[: ONSET // WIDTH - 30, 2] == ws.HEALTHY).all()

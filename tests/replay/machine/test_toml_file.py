@@ -1,0 +1,229 @@
+"""Machine files: what is written is read back, and every mistake is named with its key, value and range."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from replay.errors import ConfigError
+from replay.log.source_options import SignalSource, SourceOptions
+from replay.machine.config import Control, Limits, Machine, Noise, Plant, WheelPlant, haulotte
+from replay.machine.geometry import Geometry, WheelGeometry
+from replay.machine.toml_file import dump_machine, load_machine
+
+SETTINGS = settings(max_examples=60, deadline=None)
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return tmp_path_factory.mktemp("machines")
+
+
+def load(folder: Path, text: str) -> Machine:
+    path = folder / "machine.toml"
+    path.write_text(text, encoding="utf-8")
+    return load_machine(path)
+
+
+def test_empty_file_is_the_papers_machine(folder: Path) -> None:
+    assert load(folder, "") == haulotte()
+
+
+def test_papers_machine_round_trip(folder: Path) -> None:
+    assert load(folder, dump_machine(haulotte())) == haulotte()
+
+
+def test_everything_given_round_trip(folder: Path) -> None:
+    machine = Machine(
+        name="six wheels",
+        id="HX4-07",
+        wheels=("L1", "L2", "L3", "R1", "R2", "R3"),
+        geometry=Geometry(
+            {
+                "L1": WheelGeometry(2.0, 0.9, 0.1, "front"),
+                "L2": WheelGeometry(0.0, 0.9, 0.0, "fixed"),
+                "L3": WheelGeometry(-2.0, 0.9, 0.1, "L3"),
+                "R1": WheelGeometry(2.0, -0.9, -0.1, "front"),
+                "R2": WheelGeometry(0.0, -0.9, 0.0, "fixed"),
+                "R3": WheelGeometry(-2.0, -0.9, -0.1, "rear"),
+            },
+            1.25,
+        ),
+        gear_ratio=20.5,
+        max_speed=2.5,
+        max_steer=0.6,
+        control=Control(law="printed", psi="event_reset", lambda_=2.5, psi0=0.25, phi_dot="measured", u_max=100.0),
+        plant=Plant(coupling="free", flow=8.0, wheels={"L1": WheelPlant(2.4, 0.25, 0.01, 0.1, 0.02, 0.003)}),
+        noise={"wheel.L1.v": Noise(std=0.004, lsb=0.0015), "wheel.R1.u": Noise(std=0.001)},
+        limits=Limits(brief=2.0, min_probability=0.95, min_epsilon=0.2, min_sat=0.1, min_assessed=3.0),
+        sources={"*.csv": SourceOptions(time="t", time_unit="ms", epoch="2025-01-01", separator=";", scale=True)},
+        signals={
+            "cmd.v": SignalSource(topic="/cmd_vel", field="twist.linear.x", unit="m/s"),
+            "wheel.L1.u": SignalSource(symbol="MAIN.fbWheel[1].fValve", unit="%", gain=-1.0, offset=0.5),
+            "wheel.L1.v": SignalSource(column="v 1", unit="rpm", at="motor", source="a.csv", derivative=True),
+        },
+    )
+    assert load(folder, dump_machine(machine)) == machine
+
+
+def test_one_wheel_without_geometry_round_trip(folder: Path) -> None:
+    machine = load(folder, '[machine]\nname = "rig"\nwheels = ["M1"]\n[control]\nlaw = "none"\n')
+    assert machine.geometry is None
+    assert machine.plant.flow is None
+    assert load(folder, dump_machine(machine)) == machine
+
+
+def test_constants_as_a_fit_computes_them_round_trip(folder: Path) -> None:
+    plant = Plant(wheels={"A": WheelPlant(K=np.float64(2.4), tau=np.float64(0.25), K_std=np.float64(1e-5))})
+    machine = Machine(name="m", id="", wheels=("A",), geometry=None, plant=plant)
+    assert load(folder, dump_machine(machine)) == machine
+
+
+NAMES = st.text(st.characters(exclude_categories=["Cs"], exclude_characters="."), min_size=1, max_size=8).filter(
+    lambda name: name not in ("coupling", "flow", "wheel_diameter", "front", "rear", "fixed")
+)
+NUMBERS = st.floats(-2.0, 2.0).map(lambda x: x + 0.0)
+
+
+@st.composite
+def machines(draw: st.DrawFn) -> Machine:
+    wheels = tuple(draw(st.lists(NAMES, min_size=1, max_size=6, unique=True)))
+    places = None
+    if draw(st.booleans()):
+        places = Geometry(
+            {
+                w: WheelGeometry(
+                    draw(NUMBERS), draw(NUMBERS), draw(NUMBERS), draw(st.sampled_from(["front", "rear", "fixed", w]))
+                )
+                for w in wheels
+            },
+            draw(st.floats(0.02, 5.0)),
+        )
+    plants = {w: WheelPlant(draw(st.floats(1e-9, 1e3)), draw(st.floats(1e-4, 60.0))) for w in wheels[:2]}
+    return Machine(
+        name=draw(st.text(st.characters(exclude_categories=["Cs"]), max_size=12)),
+        id=draw(st.text(st.characters(exclude_categories=["Cs"]), max_size=12)),
+        wheels=wheels,
+        geometry=places,
+        gear_ratio=draw(st.floats(1e-3, 1e4)),
+        plant=Plant(wheels=plants),
+        limits=Limits(min_sat=draw(st.floats(0.0, 1e6)), brief=draw(st.floats(0.0, 3600.0))),
+        sources={draw(NAMES): SourceOptions(time=draw(NAMES))},
+        signals={f"wheel.{wheels[0]}.v": SignalSource(column=draw(NAMES), unit="m/s")},
+    )
+
+
+@SETTINGS
+@given(machine=machines())
+def test_odd_names_round_trip(folder: Path, machine: Machine) -> None:
+    assert load(folder, dump_machine(machine)) == machine
+
+
+def test_speeds_scale_the_limits(folder: Path) -> None:
+    fast = load(folder, "[geometry]\nmax_speed = 3.6\n")
+    assert fast.limits.driving_speed == pytest.approx(0.5)
+    assert fast.limits.min_sat == pytest.approx(0.2)
+    given_limit = load(folder, "[geometry]\nmax_speed = 3.6\n[limits]\ndriving_speed = 0.05\n")
+    assert given_limit.limits.driving_speed == 0.05
+
+
+def test_standard_lengths_change_the_four_wheels(folder: Path) -> None:
+    machine = load(folder, "[geometry]\nwheelbase = 3.0\nwheel_offset = 0.1\n")
+    assert machine.geometry is not None
+    assert machine.geometry.wheels["RL"] == WheelGeometry(-1.5, 0.73, 0.1, "rear")
+    assert machine.geometry.wheel_diameter == 0.854
+
+
+def test_places_per_wheel(folder: Path) -> None:
+    text = """
+    [machine]
+    wheels = ["A", "B", "C"]
+    [geometry]
+    wheel_diameter = 0.5
+    A = { x = 1.0, y = 0, steer = "own" }
+    B = { x = 0.0, y = 0.4, offset = 0.05, steer = "front" }
+    C = { x = 0.0, y = -0.4 }
+    """
+    machine = load(folder, text)
+    assert machine.geometry is not None
+    assert machine.geometry.wheels["A"].axle == "A"
+    assert machine.geometry.wheels["C"] == WheelGeometry(0.0, -0.4, 0.0, "fixed")
+    assert machine.axles == ("A", "front")
+
+
+TWO = '[machine]\nwheels = ["A", "B"]\n'
+PLACES = "[geometry]\nwheel_diameter = 0.5\nA = { x = 1.0, y = 0 }\n"
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("[geometri]\n", ["[geometri]", "geometry"]),
+        ("machine = 3\n", ["machine", "3", "[machine]"]),
+        ("[machine]\nwheel = []\n", ["machine.wheel ", "wheels"]),
+        ('[machine]\nwheels = "FR"\n', ["machine.wheels", "'FR'", "list"]),
+        ("[machine]\nwheels = []\n", ["machine.wheels", "[]"]),
+        ('[machine]\nwheels = ["A", "A"]\n', ["machine.wheels", "['A', 'A']"]),
+        ('[machine]\nwheels = ["F.R"]\n', ["machine.wheels", "F.R", "without dots"]),
+        ("[control]\nlamda = 1\n", ["control.lamda", "lambda"]),
+        ("[control]\nlambda = 0\n", ["control.lambda = 0", "s/m", "1e-06 to 10000"]),
+        ('[control]\nlambda = "1"\n', ["control.lambda", "'1'", "number"]),
+        ("[control]\nlambda = nan\n", ["control.lambda", "nan", "finite"]),
+        ("[control]\nxi = true\n", ["control.xi", "True", "number"]),
+        ("[control]\nlaw = 3\n", ["control.law", "3", "text"]),
+        ('[control]\nlaw = "pid"\n', ["control.law", "'pid'", "signed"]),
+        ("[plant]\nX = { K = 1.0, tau = 0.1 }\n", ["plant.X", "FR"]),
+        ("[plant]\nFR = 3\n", ["plant.FR", "section"]),
+        ('[plant]\ncoupling = "glue"\n', ["plant.coupling", "'glue'", "ground"]),
+        ("[plant]\nflow = inf\n", ["plant.flow", "inf", "finite"]),
+        ('[noise]\n"wheel.FR.v" = { sd = 1.0 }\n', ["noise.wheel.FR.v.sd", "std"]),
+        ('[noise]\n"wheel.FX.v" = { std = 1.0 }\n', ["noise", "wheel.FX.v"]),
+        ("[limits]\nbrief = -1\n", ["limits.brief = -1 s", "0 to 3600 s"]),
+        ("[limits]\nmin_probability = 1\n", ["limits.min_probability = 1", "0.5 to 0.9999"]),
+        ('[sources]\n"*.csv" = { unit = "ms" }\n', ["sources.*.csv.unit", "time_unit"]),
+        ('[sources]\n"*.csv" = { time_unit = "h" }\n', ["time_unit", "'h'", "ms"]),
+        ('[sources]\n"*.csv" = { scale = 1 }\n', ["sources.*.csv.scale", "true or false"]),
+        ('[signals]\n"cmd.v" = "speed"\n', ['signals."cmd.v"', "table"]),
+        ('[signals]\n"cmd.v" = { topic = "/a" }\n', ['signals."cmd.v"', "topic with field"]),
+        ('[signals]\n"cmd.v" = { column = "a", symbol = "b" }\n', ['signals."cmd.v"', "exactly one"]),
+        ('[signals]\n"cmd.v" = { column = "a", at = "hub" }\n', ["cmd.v", "'hub'", "motor or wheel"]),
+        ('[signals]\n"cmd.w" = { column = "a" }\n', ["cmd.w", "not a known signal"]),
+        ('[signals]\n"wheel.XX.v" = { column = "a" }\n', ["wheel.XX.v", "'XX'", "FR"]),
+        ("[geometry]\nwheelbase = 99\n", ["geometry.wheelbase = 99 m", "0.05 to 40 m"]),
+        ("[geometry]\nwheel_diameter = 0\n", ["geometry.wheel_diameter = 0 m", "0.02 to 5 m"]),
+        ("[geometry]\ngear_ratio = -1\n", ["geometry.gear_ratio = -1", "0.001"]),
+        ("[geometry]\nmax_steer = 45\n", ["geometry.max_steer = 45 rad", "0 to 3.2 rad"]),
+        ("[geometry]\nmax_speed = []\n", ["geometry.max_speed", "[]", "number"]),
+        ("[geometry]\nwheel_base = 2\n", ["geometry.wheel_base", "wheelbase"]),
+        (TWO + "[geometry]\nwheelbase = 2.0\n", ["wheelbase", "['A', 'B']", "[geometry.A]"]),
+        (TWO + "[geometry]\nwheel_diameter = 0.5\n", ["wheel_diameter", "[geometry.A]"]),
+        (TWO + PLACES, ["geometry", "['A']", "['A', 'B']"]),
+        (TWO + PLACES + "B = { x = 1.0 }\n", ["geometry.B", "y [m] is missing"]),
+        (TWO + PLACES + "B = { x = 1.0, y = 0, z = 1 }\n", ["geometry.B.z", "offset"]),
+        (TWO + PLACES + 'B = { x = "far", y = 0 }\n', ["geometry.B.x", "'far'", "number"]),
+        (TWO + PLACES + 'B = { x = 1, y = 0, steer = "left" }\n', ["geometry.B.steer", "'left'", "own"]),
+        (TWO + PLACES + "C = { x = 1, y = 0 }\n", ["geometry.C", "'C'", "['A', 'B']"]),
+        (TWO + "[geometry]\nA = { x = 1, y = 0 }\nB = { x = 0, y = 0 }\n", ["geometry.wheel_diameter", "missing"]),
+        (TWO + PLACES + "wheelbase = 2.0\n", ["geometry.wheelbase", "[geometry.A]"]),
+        ("[machine\n", ["not valid TOML", "line 1"]),
+    ],
+)
+def test_mistake_is_named(folder: Path, text: str, words: list[str]) -> None:
+    with pytest.raises(ConfigError) as caught:
+        load(folder, text)
+    message = str(caught.value)
+    assert message.startswith(str(folder / "machine.toml"))
+    assert [w for w in words if w not in message] == []
+    assert "\n" not in message
+
+
+def test_unreadable_files(folder: Path) -> None:
+    with pytest.raises(ConfigError, match=r"absent\.toml: cannot read"):
+        load_machine(folder / "absent.toml")
+    (folder / "latin.toml").write_bytes(b'[machine]\nname = "H\xe4nsel"\n')
+    with pytest.raises(ConfigError, match=r"latin\.toml: byte 19 is not UTF-8"):
+        load_machine(folder / "latin.toml")

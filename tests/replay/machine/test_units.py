@@ -1,0 +1,105 @@
+"""Recorded units become SI, and a unit that does not fit is refused by name."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import pytest
+
+from replay.errors import ConfigError
+from replay.machine.config import haulotte
+from replay.machine.units import known_units, quantity_of, si_factor
+
+WHEEL = {"wheel_radius": 0.427, "gear_ratio": 17.7}
+
+
+def factor(signal: str, unit: str, **changed: Any) -> float:
+    return si_factor(signal, unit, **({"at": "wheel"} | WHEEL | changed))
+
+
+@pytest.mark.parametrize(
+    ("signal", "unit", "expected"),
+    [
+        ("cmd.v", "m/s", 1.0),
+        ("cmd.v", "km/h", 1 / 3.6),
+        ("cmd.v", "kph", 1 / 3.6),
+        ("gnss.speed", "cm/s", 0.01),
+        ("wheel.FR.v", "mm/s", 0.001),
+        ("cmd.omega", "deg/s", math.pi / 180),
+        ("imu.yaw_rate", "°/s", math.pi / 180),
+        ("imu.yaw_rate", "rev/s", 2 * math.pi),
+        ("steer.front.phi", "deg", math.pi / 180),
+        ("steer.rear.phi_true", " ° ", math.pi / 180),
+        ("wheel.FR.u", "%", 0.01),
+        ("steer.front.u_applied", "percent", 0.01),
+        ("wheel.FR.psi", "1", 1.0),
+        ("wheel.FR.pressure_a", "bar", 1e5),
+        ("wheel.FR.pressure_b", "MPa", 1e6),
+        ("odom.x", "mm", 0.001),
+        ("odom.yaw", "deg", math.pi / 180),
+        ("gnss.lat", "deg", 1.0),
+        # a rotation of the wheel, r = 0.427 m
+        ("wheel.FR.v", "rad/s", 0.427),
+        ("wheel.FR.v_ref", "rpm", 2 * math.pi / 60 * 0.427),
+    ],
+)
+def test_factor_to_si(signal: str, unit: str, expected: float) -> None:
+    assert factor(signal, unit) == pytest.approx(expected, rel=1e-12)
+
+
+def test_motor_turns_of_the_papers_machine() -> None:
+    # 1 motor rpm = 0.0025263 m/s; 0.36 m/s = 142.5 motor rpm
+    one = factor("wheel.RL.v_true", "1/min", at="motor")
+    assert one == pytest.approx(0.0025263, abs=5e-8)
+    assert 0.36 / one == pytest.approx(142.5, abs=0.05)
+
+
+def test_position_whose_derivative_is_the_signal() -> None:
+    assert factor("wheel.FR.v", "mm", derivative=True) == pytest.approx(0.001)
+    assert factor("wheel.FR.v", "rad", derivative=True) == pytest.approx(0.427)
+    assert factor("imu.yaw_rate", "deg", derivative=True) == pytest.approx(math.pi / 180)
+
+
+@pytest.mark.parametrize(
+    ("signal", "unit", "words"),
+    [
+        ("wheel.FR.v", "furlong", ["wheel.FR.v", "furlong", "m/s", "rpm"]),
+        ("wheel.FR.v", "rad", ["wheel.FR.v", "rad", "angle", "speed", "km/h"]),
+        ("cmd.v", "rpm", ["cmd.v", "rotation", "expected a speed"]),
+        ("wheel.FR.u", "bar", ["wheel.FR.u", "pressure", "fraction", "%"]),
+        ("gnss.lon", "rad", ["gnss.lon", "rad", "deg"]),
+        ("steer.front.phi", "m", ["steer.front.phi", "length", "angle"]),
+        ("cmd.v", "m", ["cmd.v", "length", "speed"]),
+    ],
+)
+def test_unfitting_unit_is_named(signal: str, unit: str, words: list[str]) -> None:
+    with pytest.raises(ConfigError) as caught:
+        factor(signal, unit)
+    assert [w for w in words if w not in str(caught.value)] == []
+
+
+def test_rotation_needs_the_wheels_size() -> None:
+    with pytest.raises(ConfigError, match=r"wheel\.FR\.v.*geometry\.wheel_diameter \[m\]"):
+        factor("wheel.FR.v", "rad/s", wheel_radius=None)
+    assert factor("wheel.FR.v", "m/s", wheel_radius=None) == 1.0
+
+
+@pytest.mark.parametrize("name", ["cmd.speed", "wheel.FR.velocity", "steer.front.v", "v", "", "gnss.alt", "imu.v"])
+def test_unknown_signal_is_named(name: str) -> None:
+    with pytest.raises(ConfigError, match="not a known signal") as caught:
+        quantity_of(name)
+    assert repr(name) in str(caught.value)
+
+
+def test_every_signal_of_a_machine_has_a_quantity_and_a_unit() -> None:
+    for signal in haulotte().canonical_signals():
+        quantity_of(signal)
+        assert any(_fits(signal, unit) for unit in known_units()), signal
+
+
+def _fits(signal: str, unit: str) -> bool:
+    try:
+        return factor(signal, unit) > 0
+    except ConfigError:
+        return False
