@@ -18,6 +18,17 @@ class FaultMode(StrEnum):
     NOISY = "noisy"
     OUTSIDE_TABLE = "outside_table"
 
+    @property
+    def total(self) -> bool:
+        """Whether nothing is left of the signal (ε = 1): stuck or no signal."""
+        return self in TOTAL
+
+
+#: Rows of the tables, which can be written into a log.
+TABLE_MODES = (FaultMode.STUCK, FaultMode.NO_SIGNAL, FaultMode.INEFFICIENT, FaultMode.NOISY)
+#: Modes that leave nothing of the signal (ε = 1).
+TOTAL = frozenset({FaultMode.STUCK, FaultMode.NO_SIGNAL})
+
 
 class Side(StrEnum):
     """Where a fault sits; the union only for pairs that cannot be told apart."""
@@ -44,6 +55,10 @@ class State(StrEnum):
 
 
 FAULT_STATES = frozenset(State(m.value) for m in FaultMode)
+#: States that are judgements.
+DECIDED = FAULT_STATES | {State.HEALTHY}
+#: States that say why there is no judgement, in the order of the enumeration.
+UNDECIDED = tuple(s for s in State if s not in DECIDED)
 
 
 @dataclass(frozen=True)

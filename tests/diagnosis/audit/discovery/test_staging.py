@@ -8,7 +8,7 @@ from typing import Any
 
 import fsspec
 import pytest
-from tests.diagnosis.audit.test_child import work_of
+from tests.diagnosis.audit.isolation.test_child import work_of
 
 from diagnosis.audit import task
 from diagnosis.audit.discovery.discover import MissionSource

@@ -1,0 +1,292 @@
+"""`report.json` as types: the document that pages, comparison, audit and scripts read.
+
+Fields may be added within the schema, none renamed or removed. All times are seconds from the mission's start unless a
+name ends in ``_ns``; speeds are m/s, angles rad, shares and ε plain numbers; what is not known is null.
+"""
+
+from __future__ import annotations
+
+from typing import Literal, NotRequired, TypedDict
+
+from diagnosis.results.vocabulary import Kind, Severity, Tier, Verdict
+from replay.faults import FaultMode, Side, State
+
+SCHEMA = "mfhca-report/1"
+
+
+class ToolRow(TypedDict):
+    """Program that made the document."""
+
+    name: str
+    version: str
+
+
+class ClockRow(TypedDict):
+    """How a file's clock was put onto the mission's."""
+
+    reference: str
+    method: str
+    offset_s: float | None
+    drift_ppm: float | None
+    uncertainty_s: float | None
+    signals: list[str]
+    overlap_s: float | None
+    reason: str
+
+
+class FileRow(TypedDict):
+    """One file of the mission."""
+
+    path: str
+    sha256: str
+    bytes: int
+    format: str
+    damage: list[str]
+    notes: list[str]
+    clock: ClockRow | None
+
+
+class LogRow(TypedDict):
+    """The recording."""
+
+    files: list[FileRow]
+    start_ns: int
+    open_loop: bool
+    duration_s: float
+    rate_hz: float
+    samples_per_bucket: NotRequired[int]
+    distance_m: float | None
+    driving_s: float
+
+
+class WheelPlace(TypedDict):
+    """Where a wheel is [m]."""
+
+    x: float
+    y: float
+    offset: float
+    axle: str
+
+
+class MachineRow(TypedDict):
+    """The machine, and where its settings come from."""
+
+    name: str
+    id: str
+    wheels: list[str]
+    axles: list[str]
+    geometry: dict[str, WheelPlace] | None
+    source: str
+
+
+class ReadingRow(TypedDict):
+    """How one of the paper's equations was read."""
+
+    name: str
+    value: str
+    detail: str
+
+
+class ActionRow(TypedDict):
+    """What to do about one part."""
+
+    n: int
+    text: str
+    faults: list[str]
+    severity: Severity
+
+
+class VerdictRow(TypedDict):
+    """Whether the machine may go out, and why not."""
+
+    status: Verdict
+    cleared: bool
+    not_cleared: str
+    title: str
+    text: str
+    caveats: list[str]
+    actions: list[ActionRow]
+
+
+class EpsilonRow(TypedDict):
+    """Loss of effectiveness ε̂ with its 95 % bounds."""
+
+    value: float
+    low: float
+    high: float
+
+
+class SatRow(TypedDict):
+    """Saturation term: mean with its 95 % bounds and root mean square, in `unit`."""
+
+    mean: float
+    rms: float
+    low: float
+    high: float
+    unit: str
+
+
+class HypothesisRow(TypedDict):
+    """One explanation of an interval and its probability; side ``none`` goes with mode ``healthy``."""
+
+    side: str
+    mode: str
+    p: float
+
+
+class IntervalRow(TypedDict):
+    """One fault; see `diagnosis.results.result.FaultInterval`."""
+
+    id: str
+    component: str
+    kind: Kind
+    side: Side
+    mode: FaultMode
+    start_s: float
+    stop_s: float
+    start_ns: int
+    stop_ns: int
+    epsilon: EpsilonRow | None
+    sat: SatRow | None
+    probability: float
+    hypotheses: list[HypothesisRow]
+    severity: Severity
+    advice: str
+    evidence: list[str]
+    tier: Tier
+    detected_s: float | None
+
+
+class StateRow(TypedDict):
+    """One component and side in one state."""
+
+    component: str
+    side: Literal["sensor", "actuator"]
+    state: State
+    start_s: float
+    stop_s: float
+    reason: str
+
+
+class PhaseRow(TypedDict):
+    """What the machine was doing: ``standstill``, ``forward``, ``reverse``, ``turning``."""
+
+    name: str
+    start_s: float
+    stop_s: float
+
+
+class CoverageRow(TypedDict):
+    """How long one component and side was in each state [s]."""
+
+    component: str
+    side: Literal["sensor", "actuator"]
+    tier: Tier
+    seconds: dict[str, float]
+    driving_s: float
+    decided_driving_s: float
+
+
+class LossRow(TypedDict):
+    """Loss of effectiveness of one part over the whole mission, and the driving time behind it."""
+
+    component: str
+    side: str
+    epsilon: EpsilonRow
+    seconds: float
+
+
+class MeanRow(TypedDict):
+    """Mean of the whole mission and of driving."""
+
+    mission: float | None
+    driving: float | None
+
+
+class LoopRow(TypedDict):
+    """Tracking error |e| [m/s] and control effort |u_a| [fraction of full opening]."""
+
+    tracking_error: MeanRow
+    control_effort: MeanRow
+
+
+class PaperRow(TypedDict):
+    """One line of the paper's table of controllers."""
+
+    controller: str
+    tracking_error: float
+    control_effort: float
+    parameters: int
+
+
+class MetricsRow(TypedDict):
+    """Figures of the control loop beside the paper's."""
+
+    wheels: dict[str, LoopRow]
+    average: LoopRow
+    paper: list[PaperRow]
+
+
+class SignalRow(TypedDict):
+    """One signal: where it was found, and how it was recorded."""
+
+    name: str
+    channel: str
+    unit: str
+    recorded_unit: str
+    rate_hz: float | None
+    samples: int
+    gaps: int
+    longest_gap_s: float | None
+    missing_share: float | None
+    lsb: float | None
+    guessed: bool
+    source: str
+
+
+class MissingRow(TypedDict):
+    """A signal that is not in the log, and what that costs the diagnosis."""
+
+    name: str
+    cost: str
+
+
+class QualityRow(TypedDict):
+    """One check of the data."""
+
+    check: str
+    result: str
+    effect: str
+    ok: bool
+
+
+class LimitsRow(TypedDict):
+    """Limits of the machine file; see `replay.machine.config.Limits`."""
+
+    brief: float
+    min_probability: float
+    min_epsilon: float
+    min_sat: float
+    min_assessed: float
+    driving_speed: float
+
+
+class ReportDocument(TypedDict):
+    """`report.json`."""
+
+    schema: str
+    tool: ToolRow
+    log: LogRow
+    machine: MachineRow
+    readings: list[ReadingRow]
+    verdict: VerdictRow
+    intervals: list[IntervalRow]
+    states: list[StateRow]
+    phases: list[PhaseRow]
+    coverage: list[CoverageRow]
+    loss: list[LossRow]
+    metrics: MetricsRow
+    signals: list[SignalRow]
+    missing: list[MissingRow]
+    quality: list[QualityRow]
+    limits: LimitsRow

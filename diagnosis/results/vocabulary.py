@@ -1,0 +1,120 @@
+"""The words of a diagnosis, once: severities, verdicts, tiers of evidence, kinds of component and their parts.
+
+Terminal, pages, JSON, comparison and fleet take rank and words from here; fault modes and states have theirs in
+`diagnosis.results.fault_rows`. Everything is a `StrEnum`, so that a member is its own name in JSON.
+"""
+
+from __future__ import annotations
+
+from enum import StrEnum
+
+from replay.faults import Side
+
+
+class Severity(StrEnum):
+    """How urgent a fault is, by Assumptions 1 and 2; the least urgent first."""
+
+    INFO = "info"
+    LOW = "low"
+    MEDIUM = "medium"
+    HIGH = "high"
+
+    @property
+    def rank(self) -> int:
+        """Place in the order of urgency: 0 for `INFO`."""
+        return _SEVERITY_RANK[self]
+
+
+_SEVERITY_RANK = {member: i for i, member in enumerate(Severity)}
+
+
+class Verdict(StrEnum):
+    """What a mission says about its machine; the best first."""
+
+    READY = "ready"
+    NOT_ASSESSED = "not_assessed"
+    WATCH = "watch"
+    STOP = "stop"
+
+    @property
+    def rank(self) -> int:
+        """How much it asks for: 0 for `READY`, 3 for `STOP`."""
+        return _VERDICT_RANK[self]
+
+    @property
+    def label(self) -> str:
+        """Words for headings: ``Stop and repair``."""
+        return _VERDICT_WORDS[self][0]
+
+    @property
+    def symbol(self) -> str:
+        """Mode or state whose symbol and colour it takes."""
+        return _VERDICT_WORDS[self][1]
+
+
+_VERDICT_RANK = {member: i for i, member in enumerate(Verdict)}
+_VERDICT_WORDS = {
+    Verdict.READY: ("Ready for the next mission", "healthy"),
+    Verdict.NOT_ASSESSED: ("Not assessed", "not_assessed"),
+    Verdict.WATCH: ("Faults to watch", "inefficient"),
+    Verdict.STOP: ("Stop and repair", "stuck"),
+}
+
+
+class Tier(StrEnum):
+    """Kind of evidence behind a judgement; the strongest first."""
+
+    DIRECT = "direct"
+    MODEL = "model"
+    DRIVE = "drive"
+    SIGNAL = "signal"
+    TRACKING = "tracking"
+    NONE = "none"
+
+    @property
+    def rank(self) -> int:
+        """Place in the order of strength: 0 for `DIRECT`."""
+        return _TIER_RANK[self]
+
+    @property
+    def words(self) -> str:
+        """What the evidence is, to follow *by*."""
+        return _TIER_WORDS[self]
+
+
+_TIER_RANK = {member: i for i, member in enumerate(Tier)}
+_TIER_WORDS = {
+    Tier.DIRECT: "second measurements",
+    Tier.MODEL: "a model of the wheels",
+    Tier.DRIVE: "a model of the drive",
+    Tier.SIGNAL: "single channels",
+    Tier.TRACKING: "how the command is followed",
+    Tier.NONE: "nothing",
+}
+
+
+class Kind(StrEnum):
+    """Kind of component."""
+
+    WHEEL = "wheel"
+    STEER = "steer"
+
+
+_PARTS: dict[tuple[str, str], str] = {
+    (Kind.WHEEL, Side.SENSOR): "speed sensor",
+    (Kind.WHEEL, Side.ACTUATOR): "drive valve",
+    (Kind.WHEEL, Side.SENSOR_OR_ACTUATOR): "speed sensor or drive valve",
+    (Kind.STEER, Side.SENSOR): "steering sensor",
+    (Kind.STEER, Side.ACTUATOR): "steering valve",
+    (Kind.STEER, Side.SENSOR_OR_ACTUATOR): "steering sensor or valve",
+}
+
+
+def part_name(kind: str, side: str) -> str:
+    """Words for the part of a component on one side: ``drive valve``; words of other tools' documents stay."""
+    return _PARTS.get((kind, side), side.replace("_", " "))
+
+
+def part_words(kind: str, component: str, side: str) -> str:
+    """A component and its part in words: ``FR speed sensor``, ``front steering valve``."""
+    return f"{component} {part_name(kind, side)}"
