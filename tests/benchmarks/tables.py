@@ -43,7 +43,7 @@ import re, sys
 sys.path.insert(0, sys.argv[3])
 from pathlib import Path
 from replay.readers.registry import read_log
-from replay.sources import SourceOptions
+from replay.log.source_options import SourceOptions
 peak = lambda: int(re.search(r"VmHWM:\\s*(\\d+)", Path("/proc/self/status").read_text())[1]) / 1024
 read_log(Path(sys.argv[2]), SourceOptions())  # loads the compiled parser
 before = peak()

@@ -27,9 +27,6 @@ from typing import Any
 from diagnosis.audit.isolation import child
 from diagnosis.audit.isolation.child import Work
 from diagnosis.audit.isolation.limits import Limits, follow, held_mb
-from replay.export.mission import write_mission
-from replay.simulation.options import SimulationOptions
-from replay.simulation.run import simulate_mission
 
 LOOK_S = 0.05
 _STUCK_S = 10.0
@@ -175,13 +172,13 @@ def _kill(group: int) -> None:
 
 
 def warm() -> None:
-    """Import what a mission needs, and diagnose a short made-up one, so that compiled scans and the page are loaded."""
-    from diagnosis.audit.isolation.fork_server import write_made_up_log
+    """Import what a mission needs, and diagnose a short simulated one, so that compiled scans and the page are loaded."""
     from replay.machine.config import haulotte
+    from replay.warm_up import write_warm_up_log
 
     with tempfile.TemporaryDirectory(prefix="mfhca-") as folder:
         log = Path(folder) / "warm.mcap"
-        write_made_up_log(log)
+        write_warm_up_log(log)
         child.judge(Work((str(log),), haulotte(), "", "", "", folder, folder))
 
 
@@ -204,9 +201,3 @@ def main(descriptor: int, parent: int, *, warmed: bool) -> None:
     gc.freeze()
     Zygote(Connection(descriptor)).serve()
     os._exit(0)
-
-
-def write_made_up_log(path: Path) -> None:
-    """Write twelve seconds of the paper's machine as MCAP; its truth is not kept."""
-    options = SimulationOptions(scenario="healthy", duration_s=12.0, rate_hz=100.0)
-    write_mission(simulate_mission(options), path, "mcap")

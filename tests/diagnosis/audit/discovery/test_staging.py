@@ -8,13 +8,13 @@ from typing import Any
 
 import fsspec
 import pytest
-from tests.diagnosis.audit.isolation.test_child import work_of
 
 from diagnosis.audit import task
 from diagnosis.audit.discovery.discover import MissionSource
 from diagnosis.audit.discovery.staging import Late, stage
 from diagnosis.audit.isolation.limits import Limits
 from diagnosis.audit.isolation.run import Isolation, run_isolated
+from tests.diagnosis.audit.isolation.test_child import work_of
 from tests.diagnosis.audit.samples import asked_for, missions, run
 
 

@@ -28,10 +28,10 @@ ROOT = Path(__file__).resolve().parents[4]
 WRITER = """
 import hashlib, sys
 from pathlib import Path
-from diagnosis.audit.discover import MissionSource
-from diagnosis.audit.keys import Key
-from diagnosis.audit.outcome import Outcome
-from diagnosis.audit.store import Store
+from diagnosis.audit.discovery.discover import MissionSource
+from diagnosis.audit.store.keys import Key
+from diagnosis.audit.store.outcome import Outcome
+from diagnosis.audit.store.store import Store
 
 first, step, count, path = int(sys.argv[1]), int(sys.argv[2]), int(sys.argv[3]), Path(sys.argv[4])
 rows = {"result": {"machine_id": "H"}, "components": [], "faults": [
