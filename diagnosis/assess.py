@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -24,6 +23,7 @@ from replay.arrays.spill import beside, in_blocks, keep
 from replay.control.loop import Replay
 from replay.faults import Side, State
 from replay.machine.config import Machine, Noise
+from replay.progress import Progress, Stage, Subscriber
 from replay.signals.timeline import Timeline
 
 Array = NDArray[np.float64]
@@ -41,7 +41,7 @@ class ComponentResult:
 
 
 def assess_components(
-    timeline: Timeline, replay: Replay, machine: Machine, wheels: tuple[str, ...], progress: Callable[[str], None]
+    timeline: Timeline, replay: Replay, machine: Machine, wheels: tuple[str, ...], progress: Subscriber
 ) -> ComponentResult:
     """Judge wheels and steering axles by the best evidence there is.
 
@@ -51,8 +51,8 @@ def assess_components(
         The aligned mission, the replayed loop and the machine.
     wheels : tuple[str, ...]
         Wheels to judge; the others only help.
-    progress : Callable[[str], None]
-        Told what is being judged.
+    progress : Subscriber
+        Called at the beginning of each stage.
     """
     counts = alive_sources(timeline)
     steering = assess_steering(timeline, replay, machine, counts, progress)
@@ -65,10 +65,10 @@ def assess_components(
     fit: WheelModelFit | None = None
     models: dict[int, tuple[Assessment, Assessment]] = {}
     if len(machine.wheels) > 1 and not (channels.has_true & channels.has_applied).all():
-        progress("identifying the wheels")
+        progress(Progress(Stage.IDENTIFYING_WHEELS))
         fit = wheel_fit(channels, replay, timeline, machine)
     if fit is not None:
-        progress("judging the wheels by their models")
+        progress(Progress(Stage.JUDGING_WHEELS))
         slip = slip_of(timeline, replay, machine, channels.v, steering.angle, steering.doubtful)
         data, residuals = wheels_data(timeline, replay, machine, channels, fit, counts, steering.angle, slip)
         models = assess_wheels(data, residuals, machine.limits, gains=fit.reliable)
@@ -76,7 +76,7 @@ def assess_components(
     for i, wheel in enumerate(machine.wheels):
         if wheel not in wheels:
             continue
-        progress(f"judging wheel {wheel}")
+        progress(Progress(Stage.JUDGING_WHEEL, wheel))
         one = _Wheel(timeline, replay, machine, i, counts)
         if i in frozen:
             alive_ones = np.delete(measured, list(frozen), axis=1)

@@ -14,7 +14,7 @@ A family is one folder (`direct`, `wheels`, `steering`, `drives`) with the same 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Protocol
 
@@ -25,6 +25,7 @@ from diagnosis.results.assessment import Assessment
 from diagnosis.results.vocabulary import Tier
 from replay.control.loop import Replay
 from replay.machine.config import Machine
+from replay.progress import Subscriber
 from replay.signals.timeline import Timeline
 
 Array = NDArray[np.float64]
@@ -53,7 +54,7 @@ class MissionView:
     machine: Machine
     wheels: tuple[str, ...]
     alive: dict[str, NDArray[np.int16]]
-    progress: Callable[[str], None]
+    progress: Subscriber
     known: dict[Part, Assessment] = field(default_factory=dict)
 
 

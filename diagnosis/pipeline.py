@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -26,16 +26,13 @@ from replay.control.loop_columns import replay_columns
 from replay.errors import ConfigError, NotJudged
 from replay.machine.config import Machine
 from replay.mission import Mission, load_mission
+from replay.progress import Progress, Stage, Subscriber, silent
 from replay.readers.machine_identity import stated_machine
 from replay.signals.signal import Signals
 from replay.signals.timeline import align
 from replay.version import __version__
 
 Array = NDArray[np.float64] | NDArray[np.float32]
-
-
-def _silent(_: str) -> None:
-    return
 
 
 def diagnose(
@@ -47,7 +44,7 @@ def diagnose(
     stop_s: float | None = None,
     wheels: Sequence[str] | None = None,
     machine_id: str | None = None,
-    progress: Callable[[str], None] = _silent,
+    progress: Subscriber = silent,
 ) -> MissionResult:
     """Diagnose one mission.
 
@@ -65,8 +62,8 @@ def diagnose(
         Wheels to judge; None: all.
     machine_id : str or None
         Identity for trends; None: what the logs' metadata state, else the machine file's.
-    progress : Callable[[str], None]
-        Told what is being done.
+    progress : Subscriber
+        Called at the beginning of each stage.
 
     Raises
     ------
@@ -107,7 +104,7 @@ def diagnose_mission(
     machine_source: str = "paper defaults",
     wheels: Sequence[str] | None = None,
     machine_id: str | None = None,
-    progress: Callable[[str], None] = _silent,
+    progress: Subscriber = silent,
 ) -> MissionResult:
     """Diagnose a mission that is already aligned; see `diagnose`.
 
@@ -128,20 +125,20 @@ def _diagnosed(
     machine_source: str,
     chosen: tuple[str, ...],
     machine_id: str | None,
-    progress: Callable[[str], None],
+    progress: Subscriber,
 ) -> MissionResult:
-    def stage(text: str) -> None:
+    def publish(stage: Progress) -> None:
         release_all()
-        progress(text)
+        progress(stage)
 
-    stage("replaying the loop")
+    publish(Progress(Stage.REPLAYING_LOOP))
     replay = replay_loop(mission.timeline, machine, bucket_of(mission.timeline.size))
-    found = assess_components(mission.timeline, replay, machine, chosen, stage)
+    found = assess_components(mission.timeline, replay, machine, chosen, publish)
     holes = holes_of(mission.timeline)
     judged = {key: without_holes(a, holes, mission.timeline) for key, a in found.assessments.items()}
     found = replace(found, assessments=judged)
     _require_something(found.assessments, mission, machine)
-    stage("deciding")
+    publish(Progress(Stage.DECIDING))
     return _result(mission, told, machine, replay, found, machine_source, machine_id)
 
 

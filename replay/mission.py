@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from fnmatch import fnmatch
 from pathlib import Path
@@ -16,13 +16,12 @@ from replay.log.raw_log import LogSummary, RawLog
 from replay.log.source_options import SourceOptions
 from replay.log.stamp_order import in_order
 from replay.machine.config import Machine
+from replay.progress import Progress, Stage, Subscriber, silent
 from replay.readers.registry import read_log, summarise_log
 from replay.signals.mapping import map_signals, plan_topics
 from replay.signals.rules import candidates
 from replay.signals.signal import Signals
 from replay.signals.timeline import Timeline, align, check_overlap
-
-Progress = Callable[[str], None]
 
 _BLOCK = 1 << 22
 
@@ -116,7 +115,7 @@ def _feed(digest: hashlib._Hash, path: Path) -> int:
 
 
 def read_signals(
-    paths: Sequence[Path], machine: Machine, *, progress: Progress | None = None
+    paths: Sequence[Path], machine: Machine, *, progress: Subscriber = silent
 ) -> tuple[tuple[MissionFile, ...], Signals]:
     """Read the files of one mission and find the machine's signals in them.
 
@@ -126,8 +125,8 @@ def read_signals(
         Files and rosbag2 folders.
     machine : Machine
         Where its signals are recorded, and how its sources are to be read.
-    progress : callable or None
-        Called with one line about each step.
+    progress : Subscriber
+        Called at the beginning of each stage.
 
     Returns
     -------
@@ -142,26 +141,25 @@ def read_signals(
     ConfigError
         Where a given unit does not fit its signal.
     """
-    tell = progress or (lambda text: None)
     options = [SourceOptions() if is_open_loop_table(path) else source_options(path, machine) for path in paths]
     summaries = []
     for path, option in zip(paths, options, strict=True):
-        tell(f"opening {path.name}")
+        progress(Progress(Stage.OPENING, path.name))
         summaries.append(summarise_log(path, option))
     plan = plan_topics(summaries, machine)
     logs: list[RawLog] = []
     files: list[MissionFile] = []
     for path, option, summary in zip(paths, options, summaries, strict=True):
-        tell(f"reading {path.name}")
+        progress(Progress(Stage.READING, path.name))
         log = in_order(read_log(path, option, plan.get(summary.source)))
-        tell(f"hashing {path.name}")
+        progress(Progress(Stage.HASHING, path.name))
         sha256, size = content_hash(path)
         logs.append(log)
         files.append(MissionFile(path, sha256, size, log.format, _complete(summary, log.summary)))
     if len(logs) > 1:
-        tell("comparing clocks")
+        progress(Progress(Stage.COMPARING_CLOCKS))
     logs, clocks = align_clocks(logs, machine, options)
-    tell("mapping signals")
+    progress(Progress(Stage.MAPPING_SIGNALS))
     marked = [log for log in logs if is_open_loop(log.summary)]
     signals = map_signals(logs, _without_given(machine, marked))
     notes = (*signals.notes, *(clock.sentence for clock in clocks if clock.sentence))
@@ -209,7 +207,7 @@ def load_mission(
     *,
     start_s: float | None = None,
     stop_s: float | None = None,
-    progress: Progress | None = None,
+    progress: Subscriber = silent,
 ) -> Mission:
     """Read the files of one mission onto one time axis.
 
@@ -221,8 +219,8 @@ def load_mission(
         The machine.
     start_s, stop_s : float or None
         Part of the mission [s from its first wheel sample].
-    progress : callable or None
-        Called with one line about each step.
+    progress : Subscriber
+        Called at the beginning of each stage.
 
     Raises
     ------
@@ -232,8 +230,7 @@ def load_mission(
         Where a given unit does not fit its signal.
     """
     files, signals = read_signals(paths, machine, progress=progress)
-    if progress is not None:
-        progress("aligning signals")
+    progress(Progress(Stage.ALIGNING_SIGNALS))
     used = {signal.source for signal in signals.items.values()}
     idle = [file.path for file in files if str(file.path) not in used]
     if len(files) > 1 and idle and used:

@@ -16,6 +16,7 @@ from cli.terminal.command import command
 from cli.terminal.console import Terminal
 from cli.terminal.options import FailOn, Json, MachineFile, MaxSize
 from replay.errors import ConfigError, LogError, OutputError
+from replay.progress import Stage
 
 if TYPE_CHECKING:
     from diagnosis.audit.discovery.discover import Discovery
@@ -131,7 +132,7 @@ def audit(
     """Diagnose a tree of logs: a report per mission and a page about the fleet."""
     _check(json, events, export, machine_id)
     _end_with_the_terminal()
-    with terminal.progress("looking for missions"):
+    with terminal.progress(Stage.LOOKING_FOR_MISSIONS):
         from diagnosis.audit.discovery.discover import discover
         from diagnosis.audit.isolation.limits import Limits, usual_memory_mb
         from diagnosis.audit.plan import Asked, merged_machines

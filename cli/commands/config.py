@@ -13,6 +13,7 @@ from cli.terminal.console import Terminal
 from cli.terminal.inputs import machine_of, mission_paths
 from cli.terminal.options import Json, MachineFile
 from replay.errors import ConfigError
+from replay.progress import Stage
 
 app = typer.Typer(
     cls=App,
@@ -69,7 +70,7 @@ def check(
     lost: list[str] = []
     document: dict[str, object] = {"file": str(file), "ok": True, "given_signals": sorted(machine.signals)}
     if log:
-        with terminal.progress("starting") as progress:
+        with terminal.progress(Stage.STARTING) as progress:
             from cli.tables.signals import signals_document, signals_parts
             from replay.mission import read_signals
 

@@ -15,6 +15,7 @@ from cli.terminal.command import command
 from cli.terminal.console import Terminal
 from cli.terminal.inputs import check_output, check_times, check_wheels, machine_of, mission_paths
 from cli.terminal.options import End, FailOn, Json, Logs, MachineFile, MaxSize, Start
+from replay.progress import Progress, Stage
 
 DIAGNOSE_EXAMPLES = """\b
 Examples:
@@ -99,10 +100,10 @@ def diagnose(
     if dry_run:
         _plan(terminal, paths, the_machine, source, outputs, json)
         return
-    from cli.terminal.progress import diagnosis_stages
+    from cli.terminal.progress import diagnosis_plan
 
-    stages = diagnosis_stages(paths, wheels or the_machine.wheels, the_machine.axles)
-    with terminal.progress("starting", stages) as progress:
+    plan = diagnosis_plan(paths, wheels or the_machine.wheels, the_machine.axles)
+    with terminal.progress(Stage.STARTING, plan=plan) as progress:
         from diagnosis import pipeline
         from diagnosis.output import write_result
 
@@ -120,7 +121,7 @@ def diagnose(
             from diagnosis.comparison.previous import with_previous
 
             result = replace(result, report=with_previous(result.report, other, str(previous)))
-        progress("writing the report")
+        progress(Progress(Stage.WRITING_REPORT))
         written = write_result(result, folder, max_size_mb=max_size)
     page = next((p for p in written if p.name == "report.html"), written[0])
     if json:
@@ -131,7 +132,7 @@ def diagnose(
         terminal.show(*verdict_parts(result.report))
     terminal.show(f"Report: {page}")
     if mission is not None:
-        with terminal.progress("cutting clips") as progress:
+        with terminal.progress(Stage.CUTTING_CLIPS) as progress:
             from diagnosis.clips.write import write_clips
 
             cut = write_clips(mission, result, the_machine, folder / FOLDER, margin_s=clip_margin, progress=progress)
@@ -157,7 +158,7 @@ def report(
     """Write report.html again from a saved result; the log is not needed."""
     mission_paths([result])
     other = _previous(previous)
-    with terminal.progress("writing the report"):
+    with terminal.progress(Stage.WRITING_REPORT):
         from diagnosis.output import rebuild
 
         known = None if previous is None or other is None else (previous, other)

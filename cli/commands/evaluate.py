@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import asdict
+from collections.abc import Mapping
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -14,6 +14,7 @@ from cli.terminal.command import command
 from cli.terminal.console import Terminal
 from cli.terminal.inputs import check_output, machine_of
 from cli.terminal.options import Json, MachineFile
+from replay.progress import Stage, Subscriber
 
 if TYPE_CHECKING:
     from diagnosis.evaluation.evaluate import MissionScores
@@ -58,7 +59,7 @@ def evaluate(
     pairs = results_and_truths(results, truth)
     if html is not None:
         check_output([html], [path for pair in pairs for path in pair if not path.is_dir()])
-    with terminal.progress("starting") as progress:
+    with terminal.progress(Stage.STARTING) as progress:
         from diagnosis.evaluation.counts import add
         from diagnosis.evaluation.evaluate import evaluate_report
         from diagnosis.evaluation.scores import figures
@@ -117,7 +118,7 @@ def _write_page(document: Mapping[str, Any], path: Path) -> None:
 
 
 def _result_of(
-    path: Path, machine: Path | None, wheels: tuple[str, ...], progress: Callable[[str], None]
+    path: Path, machine: Path | None, wheels: tuple[str, ...], progress: Subscriber
 ) -> tuple[Mapping[str, Any], Speeds | None]:
     """A saved report, or the one of a log, and the commanded speeds beside it."""
     from diagnosis.evaluation.excitation import read_speeds, speeds_of
@@ -130,6 +131,6 @@ def _result_of(
 
     the_machine, source = machine_of(machine)
     result = diagnose(
-        [path], the_machine, machine_source=source, progress=lambda text: progress(f"{path.name}: {text}")
+        [path], the_machine, machine_source=source, progress=lambda event: progress(replace(event, mission=path.name))
     )
     return result.report, speeds_of(result.columns, wheels)

@@ -12,6 +12,7 @@ from cli.terminal.console import Terminal
 from cli.terminal.inputs import check_output, find_logs, machine_of
 from cli.terminal.options import Json, MachineFile
 from replay.errors import ConfigError, LogError, NotJudged
+from replay.progress import Stage
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
@@ -55,7 +56,7 @@ def fit(
         check_output([output], found.paths)
         if output.exists() and not force:
             raise ConfigError(f"{output}: exists and is left as it is; give another name, or --force to replace it")
-    with terminal.progress("starting") as progress:
+    with terminal.progress(Stage.STARTING) as progress:
         from diagnosis.fitting.document import fit_document, fit_toml
         from diagnosis.fitting.missions import fit_missions
         from replay.atomic_write import atomic_path

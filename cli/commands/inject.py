@@ -17,6 +17,7 @@ from cli.terminal.console import Terminal
 from cli.terminal.inputs import check_output, machine_of, mission_paths
 from cli.terminal.options import Json, Logs, MachineFile
 from replay.errors import ConfigError, OutputError
+from replay.progress import Progress, Stage
 
 if TYPE_CHECKING:
     from replay.faults import FaultSpec
@@ -99,7 +100,7 @@ def inject(
     if epsilon is not None and not 0.0 < epsilon < 1.0:
         raise ConfigError(f"--epsilon {epsilon:g}: expected more than 0 and less than 1")
     the_machine, source = machine_of(machine)
-    with terminal.progress("starting") as progress:
+    with terminal.progress(Stage.STARTING) as progress:
         from replay.export.recording import write_recording
         from replay.injection.inject import InjectionOptions
         from replay.injection.mission import inject_mission
@@ -112,10 +113,10 @@ def inject(
         check_output([output, truth_file], paths)
         _check_absent([output, truth_file], force)
         files, signals = read_signals(paths, the_machine, progress=progress)
-        progress("injecting faults")
+        progress(Progress(Stage.INJECTING))
         faults = _faults(fault or [], random, count, seed, epsilon, signals, the_machine, options)
         faulty, truth = inject_mission(signals, faults, the_machine, seed, options)
-        progress(f"writing {output.name}")
+        progress(Progress(Stage.WRITING, output.name))
         write_recording(faulty, output, kind.value)
         write_truth(truth, truth_file)
     for text in _doubts(files, paths, signals, faulty):

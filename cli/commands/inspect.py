@@ -14,6 +14,7 @@ from cli.terminal.command import command
 from cli.terminal.console import Terminal
 from cli.terminal.inputs import FoundLogs, find_logs, machine_of, mission_paths
 from cli.terminal.options import Json, Logs, MachineFile
+from replay.progress import Stage
 
 if TYPE_CHECKING:
     from replay.inspection.report import InspectReport
@@ -65,7 +66,7 @@ def inspect(
         terminal.error(line)
     for path, looked in logs:
         try:
-            with terminal.progress(f"reading {path}"):
+            with terminal.progress(Stage.READING, path):
                 seen.append(looked())
         except Exception as error:
             known = isinstance(error, MfhcaError)
@@ -101,7 +102,7 @@ def _remote_logs(
     logs: list[tuple[str, Callable[[], InspectReport]]],
 ) -> list[str]:
     """Add the logs behind URLs, and give why there is none behind some."""
-    with terminal.progress("looking for logs"):
+    with terminal.progress(Stage.LOOKING_FOR_LOGS):
         from diagnosis.audit.discovery.inspect_remote import inspect_remotely, logs_at
 
         remote, problems, left_aside = logs_at(found.urls)
@@ -144,7 +145,7 @@ def channels(terminal: Terminal, logs: Logs, machine: MachineFile = None, json: 
     """Show where each signal was found, what is missing, and what that costs the diagnosis."""
     paths = mission_paths(logs)
     the_machine, source = machine_of(machine)
-    with terminal.progress("starting") as progress:
+    with terminal.progress(Stage.STARTING) as progress:
         from cli.tables.signals import signals_document, signals_parts
         from replay.mission import read_signals
 

@@ -12,6 +12,7 @@ from cli.terminal.console import Terminal
 from cli.terminal.inputs import check_output, check_times, machine_of, mission_paths
 from cli.terminal.options import End, Json, Logs, MachineFile, Start
 from replay.errors import ConfigError
+from replay.progress import Progress, Stage
 
 EXAMPLES = """\b
 Examples:
@@ -48,7 +49,7 @@ def replay(
         _convert(terminal, paths, output, machine, (start, end), force, json)
         return
     the_machine, source = machine_of(machine)
-    with terminal.progress("starting") as progress:
+    with terminal.progress(Stage.STARTING) as progress:
         from replay.control.loop import replay_loop
         from replay.export.replay_log import format_of, refuse_foreign_file, write_replay
         from replay.mission import load_mission
@@ -57,9 +58,9 @@ def replay(
         if not force:
             refuse_foreign_file(output)
         mission = load_mission(paths, the_machine, start_s=start, stop_s=end, progress=progress)
-        progress("replaying the loop")
+        progress(Progress(Stage.REPLAYING_LOOP))
         replayed = replay_loop(mission.timeline, the_machine)
-        progress(f"writing {output.name}")
+        progress(Progress(Stage.WRITING, output.name))
         written = write_replay(output, mission.timeline, replayed, the_machine, kind)
     timeline = mission.timeline
     if json:
@@ -103,7 +104,7 @@ def _convert(
     if len(paths) > 1:
         raise ConfigError(f"--raw converts one log at a time; {len(paths)} were given")
     the_machine, _ = machine_of(machine)
-    with terminal.progress("starting") as progress:
+    with terminal.progress(Stage.STARTING) as progress:
         from replay.export.raw_log import write_raw
         from replay.mission import source_options
 

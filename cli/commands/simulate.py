@@ -14,6 +14,7 @@ from cli.terminal.command import command
 from cli.terminal.console import Terminal
 from cli.terminal.options import Json
 from replay.errors import ConfigError
+from replay.progress import Progress, Stage
 
 if TYPE_CHECKING:
     from replay.simulation.options import SimulationOptions
@@ -185,7 +186,7 @@ def simulate(
     if log.exists() and not force:
         raise ConfigError(f"{log}: exists already; give another name with -o, or --force to replace it and its truth")
     faults = tuple(parse_fault(words) for words in fault) if fault else None
-    with terminal.progress("simulating") as progress:
+    with terminal.progress(Stage.SIMULATING) as progress:
         from replay.export.mission import write_mission
         from replay.simulation.options import SimulationOptions
         from replay.simulation.run import simulate_mission
@@ -205,7 +206,7 @@ def simulate(
         mission = simulate_mission(_changed(options, setting or []))
         if not force:
             _keep_other_truth(truth, mission.truth)
-        progress(f"writing {log.name}")
+        progress(Progress(Stage.WRITING, log.name))
         write_mission(mission, log, "ros1" if kind is LogFormat.BAG else kind.value)
         write_truth(mission.truth, truth)
     words = ["mfhca", "diagnose", str(log)]

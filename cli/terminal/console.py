@@ -12,12 +12,13 @@ from dataclasses import dataclass
 from typing import IO, TYPE_CHECKING, Any
 
 from cli.terminal.interrupts import check
-from cli.terminal.streams import Progress, clean, console_of
+from cli.terminal.streams import clean, console_of
+from replay.progress import Progress, Stage, Subscriber, silent
 
 if TYPE_CHECKING:
     from rich.console import Console, RenderableType
 
-    from cli.terminal.progress import Stages
+    from cli.terminal.progress import Plan
 
 _PADDING = re.compile("[ ]+$", re.MULTILINE)
 
@@ -77,28 +78,39 @@ class Terminal:
         _write(sys.stderr, _rendered(console_of(sys.stderr), (line,), wrap=False))
 
     @contextmanager
-    def progress(self, first: str, stages: Stages | None = None) -> Iterator[Progress]:
-        """Give a function that shows what is being done and for how long: on a terminal, else lines with ``--verbose``."""
+    def progress(self, first: Stage, detail: str = "", *, plan: Plan | None = None) -> Iterator[Subscriber]:
+        """Give a subscriber that shows stages and for how long: on a terminal, else as lines with ``--verbose``.
+
+        Parameters
+        ----------
+        first : Stage
+            What is being done until the first event comes.
+        detail : str
+            On what.
+        plan : Plan or None
+            Stages that will come; None: not known.
+        """
         if self.quiet or not sys.stderr.isatty():
-            tell = self.tell if self.verbose and not self.quiet else lambda text: None
-            tell(first)
-            yield _checked(tell)
+            yield _begun(self._as_line if self.verbose and not self.quiet else silent, Progress(first, detail))
             return
-        from cli.terminal.progress import Stages, shown_stages
+        from cli.terminal.progress import Plan, shown_plan
 
-        with shown_stages(stages or Stages([]), sys.stderr) as tell:
-            tell(first)
-            yield _checked(tell)
+        with shown_plan(plan or Plan([]), sys.stderr) as subscriber:
+            yield _begun(subscriber, Progress(first, detail))
+
+    def _as_line(self, progress: Progress) -> None:
+        self.tell(str(progress))
 
 
-def _checked(tell: Progress) -> Progress:
-    """The same; ends the run between two stages where that was asked for in the one before."""
+def _begun(subscriber: Subscriber, first: Progress) -> Subscriber:
+    """The same after the first event; ends the run between two stages where that was asked for in the one before."""
 
-    def told(text: str) -> None:
+    def checked(progress: Progress) -> None:
         check()
-        tell(text)
+        subscriber(progress)
 
-    return told
+    subscriber(first)
+    return checked
 
 
 def _rendered(console: Console, parts: tuple[RenderableType, ...], *, wrap: bool = True) -> str:

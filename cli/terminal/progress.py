@@ -9,36 +9,33 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from cli.terminal.streams import Progress, clean, console_of
+from cli.terminal.streams import clean, console_of
+from replay.progress import Progress, Stage, Subscriber
 
 if TYPE_CHECKING:
     from typing import IO
 
-#: Seconds for each megabyte of a log; what counts is how they compare with each other.
-_OPEN, _READ, _HASH = 0.004, 0.015, 0.001
-_MAP, _ALIGN, _LOOP, _DECIDE, _WRITE = 0.002, 0.002, 0.05, 0.004, 0.055
-_STEER_FIT, _STEER, _WHEEL_FIT, _WHEELS, _WHEEL = 0.002, 0.008, 0.005, 0.035, 0.006
 _LEAST_MB = 1.0  # what a run costs at least
 _SHOWN_AFTER_S = 1.5  # from then on enough is known to say how long it takes
-_TRUST_S = 1.0  # for which the costs above are believed more than what the first stages took
+_TRUST_S = 1.0  # for which the expected costs are believed more than what the first stages took
 _FULLEST = 0.95  # of a stage that takes longer than thought
 
 
 @dataclass
-class Stages:
-    """Share of the work that is done, from the stages told so far; stages that do not come leave the plan.
+class Plan:
+    """Share of the work that is done, from the stages begun so far; stages that do not come leave the plan.
 
     Attributes
     ----------
-    plan : Sequence[tuple[str, float]]
-        Text and expected time [s] of each stage, in order.
+    stages : Sequence[tuple[Progress, float]]
+        Beginning and expected time [s] of each stage, in order.
     megabytes : float
         Size of what is worked on, for the rate; 0: unknown.
     clock : Callable[[], float]
         Time [s].
     """
 
-    plan: Sequence[tuple[str, float]]
+    stages: Sequence[tuple[Progress, float]]
     megabytes: float = 0.0
     clock: Callable[[], float] = time.monotonic
     text: str = ""
@@ -51,15 +48,15 @@ class Stages:
     def __post_init__(self) -> None:
         self._start = self._stage_start = self.clock()
 
-    def begin(self, text: str) -> None:
-        """Note that a stage begins; a text that is not in the plan is shown and belongs to the stage before."""
-        self.text = text
-        k = next((i for i in range(self._at + 1, len(self.plan)) if self.plan[i][0] == text), None)
+    def begin(self, progress: Progress) -> None:
+        """Note that a stage begins; one that is not in the plan is shown and belongs to the stage before."""
+        self.text = str(progress)
+        k = next((i for i in range(self._at + 1, len(self.stages)) if self.stages[i][0] == progress), None)
         if k is None:
             return
         now = self.clock()
         if self._at >= 0:
-            self._worked += self.plan[self._at][1]
+            self._worked += self.stages[self._at][1]
             self._took += now - self._stage_start
         self._at, self._stage_start = k, now
 
@@ -88,11 +85,11 @@ class Stages:
 
     def _here(self) -> float:
         """Expected seconds of this stage that are done."""
-        return min(_FULLEST * self.plan[self._at][1], (self.clock() - self._stage_start) / self._pace())
+        return min(_FULLEST * self.stages[self._at][1], (self.clock() - self._stage_start) / self._pace())
 
     def _rest(self) -> float:
         """Expected seconds of this stage and of those behind it that are left."""
-        return sum(seconds for _, seconds in self.plan[self._at :]) - self._here()
+        return sum(seconds for _, seconds in self.stages[self._at :]) - self._here()
 
     def _pace(self) -> float:
         """Seconds that pass for one expected second, by the stages that are over."""
@@ -107,22 +104,22 @@ class Stages:
         return " · ".join(parts)
 
 
-def diagnosis_stages(paths: Sequence[Path], wheels: Sequence[str], axles: Sequence[str]) -> Stages:
+def diagnosis_plan(paths: Sequence[Path], wheels: Sequence[str], axles: Sequence[str]) -> Plan:
     """Stages of `mfhca diagnose` for the files of a mission."""
     sizes = [max(_LEAST_MB, _megabytes(path)) for path in paths]
     total = sum(sizes)
-    plan = [
-        (f"{verb} {path.name}", cost * size)
+    files = [
+        (Progress(stage, path.name), stage.cost * size)
         for path, size in zip(paths, sizes, strict=True)
-        for verb, cost in (("opening", _OPEN), ("reading", _READ), ("hashing", _HASH))
+        for stage in (Stage.OPENING, Stage.READING, Stage.HASHING)
     ]
-    rest = [("mapping signals", _MAP), ("aligning signals", _ALIGN), ("replaying the loop", _LOOP)]
+    rest = [Progress(s) for s in (Stage.MAPPING_SIGNALS, Stage.ALIGNING_SIGNALS, Stage.REPLAYING_LOOP)]
     if axles:
-        rest += [("identifying the steering", _STEER_FIT), *((f"judging steering {a}", _STEER) for a in axles)]
-    rest += [("identifying the wheels", _WHEEL_FIT), ("judging the wheels by their models", _WHEELS)]
-    rest += [(f"judging wheel {w}", _WHEEL) for w in wheels]
-    rest += [("deciding", _DECIDE), ("writing the report", _WRITE)]
-    return Stages([*plan, *((text, cost * total) for text, cost in rest)], total)
+        rest += [Progress(Stage.IDENTIFYING_STEERING), *(Progress(Stage.JUDGING_STEERING, a) for a in axles)]
+    rest += [Progress(Stage.IDENTIFYING_WHEELS), Progress(Stage.JUDGING_WHEELS)]
+    rest += [Progress(Stage.JUDGING_WHEEL, w) for w in wheels]
+    rest += [Progress(Stage.DECIDING), Progress(Stage.WRITING_REPORT)]
+    return Plan([*files, *((p, p.stage.cost * total) for p in rest)], total)
 
 
 def _megabytes(path: Path) -> float:
@@ -140,8 +137,8 @@ def _clock(seconds: float) -> str:
 
 
 @contextmanager
-def shown_stages(stages: Stages, stream: IO[str]) -> Iterator[Progress]:
-    """Show stages on a terminal until the block ends; give the function that a stage's text is told to."""
+def shown_plan(plan: Plan, stream: IO[str]) -> Iterator[Subscriber]:
+    """Show the stages of a plan on a terminal until the block ends; give the subscriber that follows them."""
     from rich.live import Live
     from rich.progress_bar import ProgressBar
     from rich.spinner import Spinner
@@ -151,13 +148,13 @@ def shown_stages(stages: Stages, stream: IO[str]) -> Iterator[Progress]:
     spinner = Spinner("dots")
 
     def line() -> Table:
-        share = stages.share()
+        share = plan.share()
         row = Table.grid(padding=(0, 1, 0, 0))
-        text = Text(clean(stages.text), no_wrap=True, overflow="ellipsis")
-        bar = ProgressBar(1.0, share or 0.0, width=24) if stages.plan else Text("")
+        text = Text(clean(plan.text), no_wrap=True, overflow="ellipsis")
+        bar = ProgressBar(1.0, share or 0.0, width=24) if plan.stages else Text("")
         percent = Text(f"{100 * share:3.0f} %" if share is not None else "")
-        row.add_row(spinner, text, bar, percent, Text(stages.words(), style="dim", no_wrap=True))
+        row.add_row(spinner, text, bar, percent, Text(plan.words(), style="dim", no_wrap=True))
         return row
 
     with Live(get_renderable=line, console=console_of(stream), refresh_per_second=8, transient=True):
-        yield stages.begin
+        yield plan.begin

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import chain
 from pathlib import Path
@@ -23,6 +23,7 @@ from replay.export.clips.topics import evidence_topic, loop_topics, open_loop_to
 from replay.export.clips.viewer_layouts import foxglove_layout, plotjuggler_layout
 from replay.machine.config import Machine
 from replay.mission import Mission
+from replay.progress import Progress, Stage, Subscriber, silent
 
 MOST = 50
 ENDINGS = (".mcap", ".foxglove.json", ".plotjuggler.xml")
@@ -72,7 +73,7 @@ def write_clips(
     folder: Path,
     *,
     margin_s: float = 5.0,
-    progress: Callable[[str], None] = lambda text: None,
+    progress: Subscriber = silent,
 ) -> Clips:
     """Write a clip and two layouts per fault.
 
@@ -92,8 +93,8 @@ def write_clips(
         Where to; made if absent.
     margin_s : float
         Time before and behind each fault [s].
-    progress : Callable[[str], None]
-        Told what is being done.
+    progress : Subscriber
+        Called at the beginning of each stage.
 
     Raises
     ------
@@ -114,9 +115,9 @@ def write_clips(
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise OutputError(f"{folder}: cannot make the folder ({error.strerror or error})") from error
-    progress("replaying the loop for the clips")
+    progress(Progress(Stage.REPLAYING_FOR_CLIPS))
     replay = replay_loop(mission.timeline, machine)
-    progress("reading the messages for the clips")
+    progress(Progress(Stage.READING_FOR_CLIPS))
     notes = [
         f"{f['id']}: lasts {f['stop_s'] - f['start_s']:.0f} s; its clip holds the first {_LONGEST_NS * 1e-9:.0f} s."
         for f in faults
@@ -126,7 +127,7 @@ def write_clips(
     with TemporaryDirectory(prefix="mfhca-") as scratch:
         sources = list(open_sources(mission, Path(scratch), notes))
         for fault, name in zip(faults, names, strict=True):
-            progress(f"writing {name}")
+            progress(Progress(Stage.WRITING, name))
             judged = mission, replay, machine, result
             written.append(_write(fault, folder / name, judged, sources, round(margin_s * 1e9)))
     return Clips(tuple(written), left_out, tuple(notes))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -20,6 +20,7 @@ from replay.control.loop import Replay, replay_loop
 from replay.errors import NotJudged
 from replay.machine.config import Machine
 from replay.mission import Mission
+from replay.progress import Progress, Stage, Subscriber, silent
 from replay.signals.timeline import Timeline
 
 _LEAST_SECONDS = 10.0
@@ -57,9 +58,7 @@ class FitResult:
     driving: float
 
 
-def fit_missions(
-    missions: Sequence[Mission], machine: Machine, *, progress: Callable[[str], None] | None = None
-) -> FitResult:
+def fit_missions(missions: Sequence[Mission], machine: Machine, *, progress: Subscriber = silent) -> FitResult:
     """Estimate a machine's constants from its healthy missions.
 
     Parameters
@@ -68,8 +67,8 @@ def fit_missions(
         Missions of one machine, read with `machine`.
     machine : Machine
         Where its signals are, its geometry, limits and law; what is found replaces its constants.
-    progress : callable or None
-        Called with one line about each step.
+    progress : Subscriber
+        Called at the beginning of each stage.
 
     Returns
     -------
@@ -81,20 +80,19 @@ def fit_missions(
     NotJudged
         Where no mission is given, or together they hold too little driving.
     """
-    tell = progress or (lambda text: None)
     names = tuple(m.files[0].path.name if m.files else f"mission {k}" for k, m in enumerate(missions, 1))
     timelines = [m.timeline for m in missions]
     replays = []
     for name, timeline in zip(names, timelines, strict=True):
-        tell(f"replaying {name}")
+        progress(Progress(Stage.REPLAYING_MISSION, name))
         replays.append(_slim(replay_loop(timeline, machine)))
     seconds = sum(t.size * t.dt for t in timelines)
     records = [_records(t, r, machine) for t, r in zip(timelines, replays, strict=True)]
     driving = sum(_driving(wheels) for wheels in records)
-    tell("checking units")
+    progress(Progress(Stage.CHECKING_UNITS))
     errors = list(find_unit_errors(timelines, replays, machine))
     bad = {s for e in errors for s in e.signals}
-    tell("fitting the control law")
+    progress(Progress(Stage.FITTING_LAW))
     control = fit_control(timelines, replays, machine, bad)
     doubt, leaves = lambda_doubt(control, machine, speed_mistakes(machine))
     if doubt:
@@ -106,11 +104,11 @@ def fit_missions(
             f"{', '.join(names) or 'no mission'}: {driving:.1f} s in which a wheel is commanded to move, {_LEAST_SECONDS:g} s "
             "are needed; give missions that drive"
         )
-    tell("fitting the wheels")
+    progress(Progress(Stage.FITTING_WHEELS))
     spoiled = [_spoiled(w, timelines, bad) for w in machine.wheels]
     usable = [[None if s else r for r, s in zip(wheels, spoiled, strict=True)] for wheels in records]
     plants = fit_plants(usable, machine.plant.flow) if usable else []
-    tell("fitting the geometry")
+    progress(Progress(Stage.FITTING_GEOMETRY))
     offset, blocks, turned = fit_offset(timelines, machine, bad)
     noise = fit_noise(timelines, machine)
     constants: list[Constant] = []
@@ -119,7 +117,7 @@ def fit_missions(
     out = with_control(out, machine, control, bool(doubt), constants)
     out = with_plants(out, machine, plants, spoiled, constants)
     if len(machine.wheels) == 1 or machine.geometry is None:
-        tell("fitting the drives")
+        progress(Progress(Stage.FITTING_DRIVES))
         logged = {
             w: sum(
                 drive_data(t, r.v_ref[:, i], machine, w) is not None for t, r in zip(timelines, replays, strict=True)

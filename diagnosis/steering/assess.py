@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -26,6 +26,7 @@ from replay.arrays.spill import blocks as cut
 from replay.control.loop import Replay
 from replay.faults import Side, State
 from replay.machine.config import Machine, Noise
+from replay.progress import Progress, Stage, Subscriber
 from replay.signals.timeline import Timeline
 
 Array = NDArray[np.float64]
@@ -56,7 +57,7 @@ class SteeringResult:
 
 
 def assess_steering(
-    timeline: Timeline, replay: Replay, machine: Machine, counts: Counts, progress: Callable[[str], None]
+    timeline: Timeline, replay: Replay, machine: Machine, counts: Counts, progress: Subscriber
 ) -> SteeringResult:
     """Judge sensor and valve of every steering axle.
 
@@ -66,21 +67,21 @@ def assess_steering(
         The aligned mission, the replayed loop and the machine.
     counts : Mapping[str, NDArray[np.int16]]
         From `diagnosis.channels.liveness.alive_sources`.
-    progress : Callable[[str], None]
-        Told what is being judged.
+    progress : Subscriber
+        Called at the beginning of each stage.
     """
     axles = [_Axle.of(timeline, replay, machine, j, counts) for j in range(len(machine.axles))]
     modelled = [a for a in axles if a.blocks is not None]
     plants: dict[str, SteeringPlant | None] = {}
     if modelled:
-        progress("identifying the steering")
+        progress(Progress(Stage.IDENTIFYING_STEERING))
         found = identify_plants([a.blocks for a in modelled], [a.noise for a in modelled], machine.max_steer)
         plants = {a.name: plant for a, plant in zip(modelled, found, strict=True)}
     assessments: dict[Key, Assessment] = {}
     angles: list[Array] = []
     doubts: list[NDArray[np.bool_]] = []
     for axle in axles:
-        progress(f"judging steering {axle.name}")
+        progress(Progress(Stage.JUDGING_STEERING, axle.name))
         sensor, actuator, model_angle = _judge_axle(axle, plants.get(axle.name), machine)
         assessments[axle.name, "sensor"], assessments[axle.name, "actuator"] = sensor, actuator
         angle, doubt = _best_angle(axle, sensor, model_angle)

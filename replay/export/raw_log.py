@@ -10,7 +10,7 @@ import json
 import os
 import re
 import shutil
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -26,6 +26,7 @@ from replay.errors import LogError, OutputError
 from replay.log.raw_log import Channel, RawLog, Window
 from replay.log.source_options import SourceOptions
 from replay.mission import content_hash
+from replay.progress import Progress, Stage, Subscriber, silent
 from replay.readers.registry import read_log, summarise_log
 
 INDEX = "index.json"
@@ -52,7 +53,7 @@ def write_raw(
     start_s: float | None = None,
     stop_s: float | None = None,
     force: bool = False,
-    progress: Callable[[str], None] | None = None,
+    progress: Subscriber = silent,
 ) -> dict[str, Any]:
     """Convert one log.
 
@@ -68,8 +69,8 @@ def write_raw(
         Part of the log [s from its first stamp].
     force : bool
         Whether to write into a folder that holds something else; files of other names stay.
-    progress : callable or None
-        Called with one line about each step.
+    progress : Subscriber
+        Called at the beginning of each stage.
 
     Returns
     -------
@@ -83,14 +84,13 @@ def write_raw(
     OutputError
         Where the folder cannot be written, or holds something else.
     """
-    tell = progress or (lambda text: None)
     refuse_foreign_folder(folder, force=force)
-    tell(f"reading {path.name}")
+    progress(Progress(Stage.READING, path.name))
     log = read_log(path, options, window=_window(path, options, start_s, stop_s))
     groups = _groups(log)
     if not groups:
         raise LogError(f"{path}: no numbers to convert: {_nothing(log)}")
-    tell(f"hashing {path.name}")
+    progress(Progress(Stage.HASHING, path.name))
     sha256, size = content_hash(path)
     head = {
         "schema": SCHEMA, "source": path.name, "sha256": sha256, "bytes": size, "format": log.format,
@@ -101,7 +101,7 @@ def write_raw(
     try:
         with _new_folder(folder) as temporary:
             for group, name in zip(groups, _names(groups), strict=True):
-                tell(f"writing {name}")
+                progress(Progress(Stage.WRITING, name))
                 files.append({"file": name, **_write(temporary / name, group, head)})
                 release(group.stamps, *(c.values for c in group.channels))
             notes = [*log.summary.notes, *_split_topics(files)]

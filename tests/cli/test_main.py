@@ -199,6 +199,7 @@ from pathlib import Path
 import cli.commands.diagnose
 from diagnosis import pipeline
 from cli.main import main
+from replay.progress import Progress, Stage
 
 def diagnose(paths, machine, *, progress, **_):
     called = ctypes.CFUNCTYPE(None)(lambda: os.kill(os.getpid(), signal.{asked}))
@@ -214,7 +215,9 @@ main()
 
 @pytest.mark.skipif(os.name == "nt", reason="POSIX signals")
 @pytest.mark.parametrize("asked", ["SIGINT", "SIGTERM"])
-@pytest.mark.parametrize("after", ["progress('next'); print('goes on')", "raise RuntimeError('torn')"])
+@pytest.mark.parametrize(
+    "after", ["progress(Progress(Stage.DECIDING)); print('goes on')", "raise RuntimeError('torn')"]
+)
 def test_an_interrupt_that_compiled_code_swallows_ends_the_run_too(asked: str, after: str, tmp_path: Path) -> None:
     log = tmp_path / "a.mcap"
     log.touch()

@@ -13,6 +13,7 @@ from replay.errors import LogError
 from replay.log.source_options import SourceOptions
 from replay.machine.config import haulotte
 from replay.mission import content_hash, load_mission, read_signals, source_options
+from replay.progress import Progress, Stage
 
 START = 1_760_000_000_000_000_000
 
@@ -37,9 +38,9 @@ def test_two_files_become_one_mission(tmp_path: Path) -> None:
     speed, command = np.linspace(0.0, 0.3, 200), np.linspace(0.0, 0.2, 100)
     a = write_table(tmp_path / "a.csv", "wheel.FR.v", speed)
     b = write_table(tmp_path / "b.csv", "wheel.FR.u", command, step_ns=20_000_000)
-    told: list[str] = []
+    published: list[Progress] = []
     machine = dataclasses.replace(haulotte(), sources={"b.csv": SourceOptions(clock="as recorded")})
-    mission = load_mission([a, b], machine, progress=told.append)
+    mission = load_mission([a, b], machine, progress=published.append)
     assert [(f.path, f.format, f.bytes) for f in mission.files] == [
         (a, "csv", a.stat().st_size),
         (b, "csv", b.stat().st_size),
@@ -48,8 +49,8 @@ def test_two_files_become_one_mission(tmp_path: Path) -> None:
     assert (mission.timeline.start_ns, mission.timeline.step_ns, mission.timeline.size) == (START, 10_000_000, 200)
     np.testing.assert_allclose(mission.timeline.signals["wheel.FR.v"], speed)
     assert mission.timeline.sources == {"wheel.FR.v": str(a), "wheel.FR.u": str(b)}
-    assert "reading a.csv" in told
-    assert "reading b.csv" in told
+    assert Progress(Stage.READING, "a.csv") in published
+    assert Progress(Stage.READING, "b.csv") in published
 
 
 def test_a_part_of_a_mission(tmp_path: Path) -> None:

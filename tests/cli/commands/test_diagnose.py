@@ -16,6 +16,7 @@ from cli.tables.verdict import verdict_parts
 from diagnosis.results.result import MissionResult
 from replay.errors import NotJudged
 from replay.export.mission import write_mission
+from replay.progress import Progress, Stage
 from replay.simulation.options import SimulationOptions
 from replay.simulation.run import simulate_mission
 
@@ -55,7 +56,7 @@ def calls(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> dict[str, Any]:
 
     def diagnose(paths: list[Path], machine: Any, **options: Any) -> MissionResult:
         seen.update(paths=paths, machine=machine, **options)
-        options["progress"]("reading")
+        options["progress"](Progress(Stage.READING, "drive.mcap"))
         if isinstance(seen["result"], Exception):
             raise seen["result"]
         return seen["result"]  # type: ignore[no-any-return]

@@ -11,6 +11,7 @@ from rich.text import Text
 from cli.terminal import console
 from cli.terminal.console import Terminal
 from cli.terminal.streams import clean
+from replay.progress import Progress, Stage
 
 
 @pytest.mark.parametrize(
@@ -58,9 +59,13 @@ def test_quiet_keeps_errors_and_json(capsys: pytest.CaptureFixture[str]) -> None
 
 
 def test_progress_is_silent_without_a_terminal_and_lines_when_verbose(capsys: pytest.CaptureFixture[str]) -> None:
-    for terminal, shown in ((Terminal(), ""), (Terminal(verbose=True), "one\ntwo [31m\n"), (Terminal(True, True), "")):
-        with terminal.progress("one") as tell:
-            tell("two\x1b[31m")
+    for terminal, shown in (
+        (Terminal(), ""),
+        (Terminal(verbose=True), "starting\nreading two [31m\n"),
+        (Terminal(True, True), ""),
+    ):
+        with terminal.progress(Stage.STARTING) as subscriber:
+            subscriber(Progress(Stage.READING, "two\x1b[31m"))
         assert capsys.readouterr() == ("", shown)
 
 
