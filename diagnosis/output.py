@@ -15,8 +15,10 @@ from numpy.typing import NDArray
 
 from diagnosis.comparison.previous import with_previous
 from diagnosis.report.page import build_page
+from diagnosis.results.document import ReportDocument
 from diagnosis.results.json_text import writable
-from diagnosis.results.result import SCHEMA, Closeups, MissionResult
+from diagnosis.results.result import Closeups, MissionResult
+from diagnosis.results.validation import report_of
 from replay.atomic_write import atomic_path, atomic_paths, made_folder
 from replay.errors import LogError, OutputError
 
@@ -52,7 +54,7 @@ def write_result(result: MissionResult, folder: Path, *, max_size_mb: float = 15
     if windows is not None:
         windows = Closeups(windows.step, {k: _shortened(k, v) for k, v in windows.columns.items()})
     paths = tuple(folder / name for name in (HTML, JSON, PARQUET, *([] if windows is None else [WINDOWS])))
-    report = writable(result.report)
+    report: ReportDocument = writable(result.report)
     with _made(folder), atomic_paths(*paths) as (html, document, table, *more):
         _write_table(columns, table)
         for path in more:
@@ -129,7 +131,7 @@ def _read_windows(path: Path) -> Closeups | None:
     return Closeups(step, columns)
 
 
-def rebuild(path: Path, *, max_size_mb: float = 15.0, previous: tuple[Path, Mapping[str, Any]] | None = None) -> Path:
+def rebuild(path: Path, *, max_size_mb: float = 15.0, previous: tuple[Path, ReportDocument] | None = None) -> Path:
     """Make ``report.html`` again from a saved result, without the log.
 
     Parameters
@@ -138,7 +140,7 @@ def rebuild(path: Path, *, max_size_mb: float = 15.0, previous: tuple[Path, Mapp
         A result's folder or its ``report.json``.
     max_size_mb : float
         Size the page should keep to [MB].
-    previous : tuple[Path, Mapping[str, Any]] or None
+    previous : tuple[Path, ReportDocument] or None
         Name and document of an earlier result of the machine to compare with; kept in ``report.json``.
 
     Raises
@@ -152,7 +154,8 @@ def rebuild(path: Path, *, max_size_mb: float = 15.0, previous: tuple[Path, Mapp
     source = folder / JSON if path.is_dir() else path
     report = load_report(source)
     if previous is not None:
-        report = writable(with_previous(report, previous[1], str(previous[0])))
+        compared: ReportDocument = writable(with_previous(report, previous[1], str(previous[0])))
+        report = compared
     columns, windows = _read_table(folder / PARQUET), _read_windows(folder / WINDOWS)
     if previous is None:
         with atomic_path(folder / HTML) as html:
@@ -164,32 +167,29 @@ def rebuild(path: Path, *, max_size_mb: float = 15.0, previous: tuple[Path, Mapp
     return folder / HTML
 
 
-def load_report(path: Path) -> dict[str, Any]:
+def load_report(path: Path) -> ReportDocument:
     """Read a ``report.json``.
 
     Raises
     ------
     LogError
-        Where it is missing or not one of this tool.
+        Where it is missing, not one of this tool, or not a whole one.
     """
     try:
-        report = orjson.loads(path.read_bytes())
+        document = orjson.loads(path.read_bytes())
     except OSError as error:
         raise LogError(f"{path}: cannot be read ({error.strerror or error})") from error
     except orjson.JSONDecodeError as error:
         raise LogError(f"{path}: not JSON ({error}); expected a report.json of `mfhca diagnose`") from error
-    if not isinstance(report, dict) or report.get("schema") != SCHEMA:
-        found = report.get("schema") if isinstance(report, dict) else type(report).__name__
-        raise LogError(f"{path}: schema {found!r} found, {SCHEMA!r} expected; run `mfhca diagnose` on the log again")
-    return report
+    return report_of(document, str(path))
 
 
-def _json(report: Mapping[str, Any]) -> bytes:
+def _json(report: ReportDocument) -> bytes:
     return orjson.dumps(report, option=orjson.OPT_INDENT_2)
 
 
 def _write_page(
-    report: Mapping[str, Any],
+    report: ReportDocument,
     columns: Mapping[str, NDArray[np.floating]],
     windows: Closeups | None,
     path: Path,

@@ -17,8 +17,9 @@ from diagnosis.decision.caveats import more_caveats
 from diagnosis.decision.decide import Decision, decide, intervals_of, spans_of
 from diagnosis.results.assessment import Assessment
 from diagnosis.results.closeups import closeups_of
+from diagnosis.results.document import SCHEMA
 from diagnosis.results.loss import loss_rows
-from diagnosis.results.result import SCHEMA, MissionResult, to_json
+from diagnosis.results.result import MissionResult, to_json
 from replay.arrays.envelope import bucket_of
 from replay.arrays.spill import blocks, release_all
 from replay.control.loop import Replay, replay_loop

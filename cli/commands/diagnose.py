@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -16,6 +16,9 @@ from cli.terminal.console import Terminal
 from cli.terminal.inputs import check_output, check_times, check_wheels, machine_of, mission_paths
 from cli.terminal.options import End, FailOn, Json, Logs, MachineFile, MaxSize, Start
 from replay.progress import Progress, Stage
+
+if TYPE_CHECKING:
+    from diagnosis.results.document import MachineIdentity, ReportDocument
 
 DIAGNOSE_EXAMPLES = """\b
 Examples:
@@ -95,7 +98,7 @@ def diagnose(
     if previous is not None and other is not None:
         from diagnosis.comparison.previous import require_same_machine
 
-        identity = {"id": machine_id or the_machine.id, "wheels": list(the_machine.wheels)}
+        identity: MachineIdentity = {"id": machine_id or the_machine.id, "wheels": list(the_machine.wheels)}
         require_same_machine(identity, other, str(previous))
     if dry_run:
         _plan(terminal, paths, the_machine, source, outputs, json)
@@ -168,7 +171,7 @@ def report(
         show_page(terminal, page)
 
 
-def _previous(path: Path | None) -> dict[str, Any] | None:
+def _previous(path: Path | None) -> ReportDocument | None:
     """Document of the result to compare with.
 
     Raises

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 from diagnosis.audit.fleet.read import CALENDAR_NS
 from diagnosis.audit.store.folders import holds_report
 from diagnosis.audit.store.keys import Key
 from diagnosis.audit.store.store import Store
+from diagnosis.results.document import ReportDocument
 from replay.errors import LogError
 
 _QUERY = (
@@ -64,7 +64,7 @@ def previous_of(store: Store, result: int) -> Previous | None:
     return Previous(number, name, report, start_ns, Key(*key))
 
 
-def previous_report(store: Store, result: int) -> tuple[Previous, dict[str, Any]] | None:
+def previous_report(store: Store, result: int) -> tuple[Previous, ReportDocument] | None:
     """The same with its ``report.json``; None also where that can no longer be read, or another result's stands there.
 
     Raises
@@ -81,6 +81,6 @@ def previous_report(store: Store, result: int) -> tuple[Previous, dict[str, Any]
     if not holds_report(folder, previous.key):
         return None
     try:
-        return previous, dict(load_report(folder / "report.json"))
+        return previous, load_report(folder / "report.json")
     except LogError:
         return None

@@ -58,6 +58,6 @@ def _compare(store: Store, result: int, folder: Path, max_size_mb: float) -> Non
     if found is None:
         return
     previous, document = found
-    told = (load_report(folder / "report.json").get("previous") or {}).get("mission") or {}
-    if told.get("start_ns") != previous.start_ns:
+    kept = load_report(folder / "report.json").get("previous")
+    if kept is None or kept["mission"]["start_ns"] != previous.start_ns:
         rebuild(folder, max_size_mb=max_size_mb, previous=(Path(previous.report), document))

@@ -4,14 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
 
 from diagnosis.comparison.coverage import CoverageChange, coverage_changes, sides_of
 from diagnosis.comparison.faults import FaultChange, found_faults, is_worse, match_faults
+from diagnosis.results.comparison_document import SCHEMA, ComparisonDocument
+from diagnosis.results.document import LimitsRow, MachineIdentity, ReportDocument
 from diagnosis.results.result import to_json
-from replay.errors import ConfigError, LogError
+from diagnosis.results.vocabulary import Verdict
+from replay.errors import ConfigError
 
-SCHEMA = "mfhca-compare/1"
 COUNTED = ("new", "worse", "other", "better", "not_seen_again", "resolved", "unchanged")
 
 
@@ -29,8 +30,10 @@ class ComparedMission:
         Start on the log's clock [ns since 1970].
     duration_s, driving_s : float
         Length, and driving time [s].
-    verdict, title : str
-        Status and sentence of the verdict.
+    verdict : Verdict
+        Status.
+    title : str
+        Sentence of it.
     machine, machine_id : str
         Name and identity.
     open_loop : bool
@@ -44,7 +47,7 @@ class ComparedMission:
     start_ns: int
     duration_s: float
     driving_s: float
-    verdict: str
+    verdict: Verdict
     title: str
     machine: str
     machine_id: str
@@ -100,13 +103,13 @@ class Comparison:
 
 
 def compare_reports(
-    older: Mapping[str, Any], newer: Mapping[str, Any], names: tuple[str, str], *, force: bool = False
+    older: ReportDocument, newer: ReportDocument, names: tuple[str, str], *, force: bool = False
 ) -> Comparison:
     """Compare two report documents.
 
     Parameters
     ----------
-    older, newer : Mapping[str, Any]
+    older, newer : ReportDocument
         Documents of `diagnosis.output.load_report`.
     names : tuple[str, str]
         What to call them.
@@ -117,23 +120,14 @@ def compare_reports(
     ------
     ConfigError
         Where the machines differ and `force` is not set.
-    LogError
-        Where a document lacks what every report holds.
     """
     a, b = (_mission(r, n) for r, n in zip((older, newer), names, strict=True))
     difference = machine_difference(older["machine"], newer["machine"], names)
     if difference and not force:
         raise ConfigError(f"{difference}; compare two missions of one machine, or add --force")
-    try:
-        had, has = sides_of(older), sides_of(newer)
-        faults = tuple(
-            match_faults(found_faults(older["intervals"], had), found_faults(newer["intervals"], has), had, has)
-        )
-        axles = {*older["machine"].get("axles", ()), *newer["machine"].get("axles", ())}
-        coverage = coverage_changes(had, has, axles)
-        metrics = _metrics(older, newer)
-    except (KeyError, TypeError, ValueError, AttributeError) as error:
-        raise LogError(f"{names[0]} or {names[1]}: {_damaged(error)}") from error
+    had, has = sides_of(older), sides_of(newer)
+    faults = tuple(match_faults(found_faults(older["intervals"], had), found_faults(newer["intervals"], has), had, has))
+    axles = {*older["machine"]["axles"], *newer["machine"]["axles"]}
     outcomes = [c.trend or c.status for c in faults]
     return Comparison(
         schema=SCHEMA,
@@ -142,46 +136,39 @@ def compare_reports(
         older=a,
         newer=b,
         faults=faults,
-        coverage=coverage,
-        metrics=metrics,
+        coverage=coverage_changes(had, has, axles),
+        metrics=_metrics(older, newer),
         notes=tuple(_notes(older, newer, a, b, difference)),
     )
 
 
-def comparison_json(comparison: Comparison) -> dict[str, Any]:
+def comparison_json(comparison: Comparison) -> ComparisonDocument:
     """The document of a comparison; see `Comparison`."""
-    document: dict[str, Any] = to_json(comparison)
+    document: ComparisonDocument = to_json(comparison)
     return document
 
 
-def _damaged(error: Exception) -> str:
-    return f"not a whole report.json ({type(error).__name__}: {error}); run `mfhca diagnose` on the log again to write it anew"
+def _mission(report: ReportDocument, name: str) -> ComparedMission:
+    log, machine, verdict = report["log"], report["machine"], report["verdict"]
+    return ComparedMission(
+        name=name,
+        files=tuple(f["path"] for f in log["files"]),
+        start_ns=log["start_ns"],
+        duration_s=log["duration_s"],
+        driving_s=log["driving_s"],
+        verdict=verdict["status"],
+        title=verdict["title"],
+        machine=machine["name"],
+        machine_id=machine["id"],
+        open_loop=log["open_loop"],
+        version=report["tool"]["version"],
+    )
 
 
-def _mission(report: Mapping[str, Any], name: str) -> ComparedMission:
-    try:
-        log, machine, verdict = report["log"], report["machine"], report["verdict"]
-        return ComparedMission(
-            name=name,
-            files=tuple(str(f["path"]) for f in log.get("files", ())),
-            start_ns=int(log.get("start_ns") or 0),
-            duration_s=float(log["duration_s"]),
-            driving_s=float(log.get("driving_s") or 0.0),
-            verdict=str(verdict["status"]),
-            title=str(verdict.get("title", "")),
-            machine=str(machine.get("name", "")),
-            machine_id=str(machine.get("id") or ""),
-            open_loop=bool(log.get("open_loop", False)),
-            version=str(report.get("tool", {}).get("version", "")),
-        )
-    except (KeyError, TypeError, ValueError, AttributeError) as error:
-        raise LogError(f"{name}: {_damaged(error)}") from error
-
-
-def machine_difference(older: Mapping[str, Any], newer: Mapping[str, Any], names: tuple[str, str]) -> str:
+def machine_difference(older: MachineIdentity, newer: MachineIdentity, names: tuple[str, str]) -> str:
     """Say how two machines of reports differ; empty where nothing shows that they do."""
-    ids = [str(m.get("id") or "") for m in (older, newer)]
-    wheels = [[str(w) for w in m.get("wheels", ())] for m in (older, newer)]
+    ids = older["id"], newer["id"]
+    wheels = older["wheels"], newer["wheels"]
     if all(ids) and ids[0] != ids[1]:
         return f"{names[1]}: is of machine {ids[1]}, {names[0]} of machine {ids[0]}"
     if set(wheels[0]) != set(wheels[1]):
@@ -194,10 +181,10 @@ def _listed(names: list[str]) -> str:
 
 
 def _notes(
-    older: Mapping[str, Any], newer: Mapping[str, Any], a: ComparedMission, b: ComparedMission, difference: str
+    older: ReportDocument, newer: ReportDocument, a: ComparedMission, b: ComparedMission, difference: str
 ) -> list[str]:
     out = [f"Different machines, compared with --force: {difference}."] if difference else []
-    hashes = [{f.get("sha256") for f in r["log"].get("files", ())} - {None} for r in (older, newer)]
+    hashes = [{f["sha256"] for f in r["log"]["files"]} for r in (older, newer)]
     if hashes[0] and hashes[0] == hashes[1]:
         out.append("Both results are of the same log.")
     elif b.start_ns < a.start_ns:
@@ -221,25 +208,30 @@ def _notes(
     out += [f"Faults were injected into the recording of {m.name}." for m in (a, b) if m.open_loop]
     if a.version != b.version:
         out.append(f"They were judged by different versions of the tool ({a.version or '?'}, {b.version or '?'}).")
-    limits = [r.get("limits") or {} for r in (older, newer)]
-    differing = [k for k in dict.fromkeys([*limits[0], *limits[1]]) if limits[0].get(k) != limits[1].get(k)]
-    if differing and limits[0] and limits[1]:
-        words = ", ".join(f"{k} {limits[0].get(k)} and {limits[1].get(k)}" for k in differing)
-        out.append(f"They were judged by different [limits]: {words}.")
+    out += _different_limits(older["limits"], newer["limits"])
     return out
 
 
-def _metrics(older: Mapping[str, Any], newer: Mapping[str, Any]) -> tuple[MetricChange, ...]:
-    tables = []
-    for report in (older, newer):
-        metrics = report.get("metrics") or {}
-        tables.append({**(metrics.get("wheels") or {}), "average": metrics.get("average") or {}})
+def _different_limits(older: LimitsRow, newer: LimitsRow) -> list[str]:
+    """Sentence that names the limits by which the two were judged differently; none where there are none."""
+    before, now = dict(older), dict(newer)
+    names = [k for k in dict.fromkeys([*before, *now]) if before.get(k) != now.get(k)]
+    words = ", ".join(f"{k} {before.get(k)} and {now.get(k)}" for k in names)
+    return [f"They were judged by different [limits]: {words}."] if names else []
+
+
+def _metrics(older: ReportDocument, newer: ReportDocument) -> tuple[MetricChange, ...]:
+    tables = [{**r["metrics"]["wheels"], "average": r["metrics"]["average"]} for r in (older, newer)]
     names = [n for n in dict.fromkeys([*tables[0], *tables[1]]) if n != "average"]
     out = []
     for name in [*names, "average"]:
-        values = [
-            (t.get(name, {}).get(q) or {}).get("driving") for q in ("tracking_error", "control_effort") for t in tables
-        ]
+        a, b = (t.get(name) for t in tables)
+        values = (
+            None if a is None else a["tracking_error"]["driving"],
+            None if b is None else b["tracking_error"]["driving"],
+            None if a is None else a["control_effort"]["driving"],
+            None if b is None else b["control_effort"]["driving"],
+        )
         if any(v is not None for v in values):
             out.append(MetricChange(name, *values))
     return tuple(out)

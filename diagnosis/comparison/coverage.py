@@ -4,12 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from typing import Any
 
-from replay.faults import FAULT_STATES, State
+from diagnosis.results.assessed import needed_s
+from diagnosis.results.comparison_document import CoverageStep
+from diagnosis.results.document import ReportDocument
+from diagnosis.results.vocabulary import Kind, Tier
+from replay.faults import DECIDED
 
-_LEAST_SHARE, _HARDLY = 0.8, 0.5
-_DECIDED = frozenset({State.HEALTHY.value, *(s.value for s in FAULT_STATES)})
+#: A component and its side.
+Part = tuple[str, str]
+
+_HARDLY = 0.5
 
 
 @dataclass(frozen=True)
@@ -18,8 +23,8 @@ class SideCoverage:
 
     Attributes
     ----------
-    tier : str
-        Evidence, ``none`` where there is none.
+    tier : Tier
+        Evidence.
     driving_s, decided_s : float
         Driving time, and how much of it was decided [s].
     judged_s : float
@@ -28,7 +33,7 @@ class SideCoverage:
         Whether that is as much as a verdict of ``ready`` takes: `min_assessed` seconds and four fifths of the driving.
     """
 
-    tier: str
+    tier: Tier
     driving_s: float
     decided_s: float
     judged_s: float
@@ -37,7 +42,7 @@ class SideCoverage:
     @property
     def words(self) -> str:
         """How far it was judged, to follow *was*."""
-        if self.tier == "none":
+        if self.tier is Tier.NONE:
             return "not assessed"
         return f"judged for {self.decided_s:.1f} s of {self.driving_s:.1f} s driving" + (
             "" if self.assessed else ", which is too little"
@@ -46,7 +51,7 @@ class SideCoverage:
     @property
     def short_words(self) -> str:
         """How little it was judged, to follow *was*: not, hardly (less than half of the driving) or partly."""
-        if self.tier == "none" or not self.judged_s:
+        if self.tier is Tier.NONE or not self.judged_s:
             return "not assessed"
         much = "hardly" if self.decided_s < _HARDLY * self.driving_s else "only partly"
         return f"{much} assessed ({self.decided_s:.1f} of {self.driving_s:.1f} s of driving)"
@@ -60,31 +65,28 @@ class CoverageChange:
     """
 
     component: str
-    kind: str
+    kind: Kind
     side: str
     older: SideCoverage | None
     newer: SideCoverage | None
-    change: str
+    change: CoverageStep
 
 
-def sides_of(report: Mapping[str, Any]) -> dict[tuple[str, str], SideCoverage]:
+def sides_of(report: ReportDocument) -> dict[Part, SideCoverage]:
     """Coverage of a report by component and side."""
-    least = float(report.get("limits", {}).get("min_assessed", 10.0))
-    out = {}
-    for row in report.get("coverage", ()):
-        seconds = {str(k): float(v) for k, v in row["seconds"].items()}
-        judged = sum(v for k, v in seconds.items() if k in _DECIDED)
-        decided = float(row["decided_driving_s"])
-        driving = float(row.get("driving_s", decided))
-        tier = str(row.get("tier", "model" if decided else "none"))
-        assessed = tier != "none" and decided >= max(least, _LEAST_SHARE * driving)
-        out[str(row["component"]), str(row["side"])] = SideCoverage(tier, driving, decided, judged, assessed)
+    least = report["limits"]["min_assessed"]
+    out: dict[Part, SideCoverage] = {}
+    for row in report["coverage"]:
+        judged = sum(v for k, v in row["seconds"].items() if k in DECIDED)
+        decided, driving, tier = row["decided_driving_s"], row["driving_s"], row["tier"]
+        assessed = tier is not Tier.NONE and decided >= needed_s(driving, least)
+        out[row["component"], row["side"]] = SideCoverage(tier, driving, decided, judged, assessed)
     return out
 
 
 def coverage_changes(
-    older: Mapping[tuple[str, str], SideCoverage],
-    newer: Mapping[tuple[str, str], SideCoverage],
+    older: Mapping[Part, SideCoverage],
+    newer: Mapping[Part, SideCoverage],
     axles: Iterable[str],
 ) -> tuple[CoverageChange, ...]:
     """Every component and side of either mission, those that were assessed in one of them alone first."""
@@ -93,7 +95,7 @@ def coverage_changes(
     for component, side in dict.fromkeys([*older, *newer]):
         a, b = older.get((component, side)), newer.get((component, side))
         had, has = a is not None and a.assessed, b is not None and b.assessed
-        change = "lost" if had and not has else "gained" if has and not had else ""
-        kind = "steer" if component in steered else "wheel"
+        change: CoverageStep = "lost" if had and not has else "gained" if has and not had else ""
+        kind = Kind.STEER if component in steered else Kind.WHEEL
         out.append(CoverageChange(component, kind, side, a, b, change))
     return tuple(sorted(out, key=lambda c: ("lost", "gained", "").index(c.change)))

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 from diagnosis.comparison.coverage import SideCoverage
 from diagnosis.decision.wording import join_words, mode_words
+from diagnosis.results.document import IntervalRow
 from diagnosis.results.result import SEVERITIES
+from diagnosis.results.size_rows import EpsilonRow
 
 GONE = ("stuck", "no_signal")
 EITHER = "sensor_or_actuator"
@@ -36,7 +37,7 @@ class FoundFault:
         The same as a share of the time in which the side was judged; None where that is not known.
     severity : str
         The worst.
-    epsilon : Mapping[str, float] or None
+    epsilon : EpsilonRow or None
         ``value``, ``low``, ``high`` of the longest of the worst ones.
     probability : float
         Of the same one.
@@ -52,7 +53,7 @@ class FoundFault:
     seconds: float
     share: float | None
     severity: str
-    epsilon: Mapping[str, float] | None
+    epsilon: EpsilonRow | None
     probability: float
     tier: str
 
@@ -96,33 +97,33 @@ def is_worse(change: FaultChange) -> bool:
     return found is not None and found.severity != "info" and (change.status == "new" or change.trend == "worse")
 
 
-def found_faults(intervals: Sequence[Mapping[str, Any]], sides: Sides) -> list[FoundFault]:
+def found_faults(intervals: Sequence[IntervalRow], sides: Sides) -> list[FoundFault]:
     """Gather a report's faults by component, side and row, worst first."""
-    groups: dict[tuple[str, str, str], list[Mapping[str, Any]]] = {}
+    groups: dict[tuple[str, str, str], list[IntervalRow]] = {}
     for i in intervals:
-        groups.setdefault((str(i["component"]), str(i["side"]), str(i["mode"])), []).append(i)
+        groups.setdefault((i["component"], i["side"], i["mode"]), []).append(i)
     out = [_found(key, faults, sides) for key, faults in groups.items()]
     return sorted(out, key=lambda f: (-SEVERITIES.index(f.severity), -f.seconds, f.component, f.side, f.mode))
 
 
-def _found(key: tuple[str, str, str], faults: Sequence[Mapping[str, Any]], sides: Sides) -> FoundFault:
+def _found(key: tuple[str, str, str], faults: Sequence[IntervalRow], sides: Sides) -> FoundFault:
     component, side, mode = key
     first = max(faults, key=lambda f: (SEVERITIES.index(f["severity"]), f["stop_s"] - f["start_s"]))
     seconds = float(sum(f["stop_s"] - f["start_s"] for f in faults))
     judged = [sides[k].judged_s for k in _keys(component, side) if k in sides]
-    epsilon = first.get("epsilon")
+    epsilon = first["epsilon"]
     return FoundFault(
         component=component,
-        kind=str(first.get("kind", "wheel")),
+        kind=first["kind"],
         side=side,
         mode=mode,
-        ids=tuple(str(f["id"]) for f in faults),
+        ids=tuple(f["id"] for f in faults),
         seconds=seconds,
         share=seconds / max(judged) if judged and max(judged) > 0 else None,
-        severity=str(first["severity"]),
-        epsilon=None if not epsilon else {k: float(epsilon[k]) for k in ("value", "low", "high")},
-        probability=float(first["probability"]),
-        tier=max((str(f.get("tier", "")) for f in faults), key=lambda t: _STRENGTH.get(t, 0)),
+        severity=first["severity"],
+        epsilon=epsilon,
+        probability=first["probability"],
+        tier=max((f["tier"] for f in faults), key=lambda t: _STRENGTH.get(t, 0)),
     )
 
 

@@ -6,31 +6,29 @@ again from the newer result alone. ``older`` and ``newer`` go by the logs' clock
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any
-
-from diagnosis.comparison.compare import ComparedMission, Comparison, compare_reports, machine_difference
-from diagnosis.results.result import to_json
+from diagnosis.comparison.compare import Comparison, compare_reports, comparison_json, machine_difference
+from diagnosis.results.comparison_document import ComparedMissionRow, LossChangeRow, OtherMissionRow, PreviousRow
+from diagnosis.results.document import MachineIdentity, ReportDocument
 from replay.errors import ConfigError
 
 THIS, OTHER = "this mission", "the other mission"
 
 
-def with_previous(report: Mapping[str, Any], previous: Mapping[str, Any], name: str = "") -> dict[str, Any]:
+def with_previous(report: ReportDocument, previous: ReportDocument, name: str = "") -> ReportDocument:
     """Give a report with the comparison with another mission of the same machine under the key ``previous``.
 
     Parameters
     ----------
-    report : Mapping[str, Any]
+    report : ReportDocument
         Document of the mission, as in ``report.json``.
-    previous : Mapping[str, Any]
+    previous : ReportDocument
         Document of the other mission.
     name : str
         What to call the other result in an error.
 
     Returns
     -------
-    dict[str, Any]
+    ReportDocument
         `report` with ``previous``: ``order`` (``earlier``, or ``later`` where the other mission was recorded after
         this one), ``mission`` (the other one), ``worse``, ``counts``, ``faults``, ``coverage`` (what changed),
         ``loss`` (ε̂ of each part in both), ``notes``.
@@ -42,7 +40,7 @@ def with_previous(report: Mapping[str, Any], previous: Mapping[str, Any], name: 
     LogError
         Where a document lacks what every report holds.
     """
-    require_same_machine(report.get("machine") or {}, previous, name or "the previous result")
+    require_same_machine(report["machine"], previous, name or "the previous result")
     later = _start(previous) > _start(report) > 0
     pair = (report, previous) if later else (previous, report)
     names = (THIS, OTHER) if later else (OTHER, THIS)
@@ -50,14 +48,14 @@ def with_previous(report: Mapping[str, Any], previous: Mapping[str, Any], name: 
     return {**report, "previous": _compact(found, pair, later)}
 
 
-def require_same_machine(machine: Mapping[str, Any], previous: Mapping[str, Any], name: str) -> None:
+def require_same_machine(machine: MachineIdentity, previous: ReportDocument, name: str) -> None:
     """Refuse a result of another machine.
 
     Parameters
     ----------
-    machine : Mapping[str, Any]
+    machine : MachineIdentity
         ``id`` and ``wheels`` of this mission's machine.
-    previous : Mapping[str, Any]
+    previous : ReportDocument
         Document of the other mission.
     name : str
         What to call it.
@@ -67,37 +65,49 @@ def require_same_machine(machine: Mapping[str, Any], previous: Mapping[str, Any]
     ConfigError
         Where ids or wheels differ.
     """
-    difference = machine_difference(machine, previous.get("machine") or {}, (THIS, name))
+    difference = machine_difference(machine, previous["machine"], (THIS, name))
     if difference:
         raise ConfigError(f"--previous {difference}; give a result of the same machine")
 
 
-def _start(report: Mapping[str, Any]) -> int:
-    return int((report.get("log") or {}).get("start_ns") or 0)
+def _start(report: ReportDocument) -> int:
+    return report["log"]["start_ns"]
 
 
-def _compact(found: Comparison, pair: tuple[Mapping[str, Any], Mapping[str, Any]], later: bool) -> dict[str, Any]:
-    other: ComparedMission = found.newer if later else found.older
-    mission = {k: v for k, v in to_json(other).items() if k != "name"}
+def _compact(found: Comparison, pair: tuple[ReportDocument, ReportDocument], later: bool) -> PreviousRow:
+    document = comparison_json(found)
     return {
         "order": "later" if later else "earlier",
-        "mission": mission,
-        "worse": found.worse,
-        "counts": {name: n for name, n in found.counts.items() if n},
-        "faults": [to_json(c) for c in found.faults],
-        "coverage": [to_json(c) for c in found.coverage if c.change],
+        "mission": _without_name(document["newer"] if later else document["older"]),
+        "worse": document["worse"],
+        "counts": {name: n for name, n in document["counts"].items() if n},
+        "faults": document["faults"],
+        "coverage": [c for c in document["coverage"] if c["change"]],
         "loss": _losses(*pair),
-        "notes": list(found.notes),
+        "notes": document["notes"],
     }
 
 
-def _losses(older: Mapping[str, Any], newer: Mapping[str, Any]) -> list[dict[str, Any]]:
+def _without_name(mission: ComparedMissionRow) -> OtherMissionRow:
+    return {
+        "files": mission["files"],
+        "start_ns": mission["start_ns"],
+        "duration_s": mission["duration_s"],
+        "driving_s": mission["driving_s"],
+        "verdict": mission["verdict"],
+        "title": mission["title"],
+        "machine": mission["machine"],
+        "machine_id": mission["machine_id"],
+        "open_loop": mission["open_loop"],
+        "version": mission["version"],
+    }
+
+
+def _losses(older: ReportDocument, newer: ReportDocument) -> list[LossChangeRow]:
     """Mission-wide ε̂ of the parts for which both missions have one."""
-    before, now = (
-        {(str(x["component"]), str(x["side"])): x.get("epsilon") for x in r.get("loss") or ()} for r in (older, newer)
-    )
+    before = {(x["component"], x["side"]): x["epsilon"] for x in older["loss"]}
     return [
-        {"component": c, "side": side, "older": before[c, side], "newer": e}
-        for (c, side), e in now.items()
-        if e and before.get((c, side))
+        {"component": x["component"], "side": x["side"], "older": epsilon, "newer": x["epsilon"]}
+        for x in newer["loss"]
+        if (epsilon := before.get((x["component"], x["side"]))) is not None
     ]

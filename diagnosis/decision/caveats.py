@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from diagnosis.decision.wording import count_words, join_words, part_words, unanswered
+from diagnosis.results.assessed import needed_s
 from diagnosis.results.assessment import STATES, Assessment
 from diagnosis.results.result import FaultInterval
 from replay.arrays.spill import blocks
@@ -17,7 +18,6 @@ from replay.signals.timeline import Timeline
 
 Key = tuple[str, str]
 
-LEAST_SHARE = 0.8  # of its driving in which a part must be judged
 _OPEN_S, _OPEN_SHARE = 1.0, 0.02  # driving that was not judged and is worth a word
 _EMPTY_S = 1.0  # without any wheel speed
 _LEFT_OUT = " was left out: its clock "
@@ -56,7 +56,7 @@ def caveats_of(
         reason = _why_short(assessments[key], driven.get(key), limits)
         out.append(
             f"{part_words('wheel', *key)}: judged for {decided_s.get(key, 0.0):.1f} s of driving, of "
-            f"{max(limits.min_assessed, LEAST_SHARE * driven.get(key, 0.0)):.3g} s needed"
+            f"{needed_s(driven.get(key, 0.0), limits.min_assessed):.3g} s needed"
             + (f" ({reason})" if reason else "")
             + "."
         )

@@ -11,8 +11,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from diagnosis.decision.caveats import LEAST_SHARE, caveats_of, doubt_of
+from diagnosis.decision.caveats import caveats_of, doubt_of
 from diagnosis.decision.wording import GONE, actions_of, count_words, join_words, part_words, seconds_words, sentence_of
+from diagnosis.results.assessed import needed_s
 from diagnosis.results.assessment import STATES, Assessment, Finding
 from diagnosis.results.result import FaultInterval, Severity, StateSpan, Verdict
 from diagnosis.wheels.identification import WheelModelFit
@@ -200,7 +201,7 @@ def decide(
     short = [
         k
         for k in assessments
-        if k[0] not in axles and decided_s.get(k, 0.0) < max(limits.min_assessed, LEAST_SHARE * driven.get(k, 0.0))
+        if k[0] not in axles and decided_s.get(k, 0.0) < needed_s(driven.get(k, 0.0), limits.min_assessed)
     ]
     modelled = [k for k, a in assessments.items() if a.tier == "model"]
     caveats = caveats_of(short, assessments, decided_s, driven, axles, limits, damage)

@@ -7,6 +7,7 @@ from typing import Any
 
 from diagnosis.comparison.coverage import SideCoverage, sides_of
 from diagnosis.pages.labels import VERDICTS, state_label
+from diagnosis.results.earlier import completed
 
 _WORDS = ((0.99, "Practically certain"), (0.9, "Very likely"), (0.7, "Likely"))
 _OPEN, _TIE = 0.9, 1e-3
@@ -127,9 +128,10 @@ def _doubt(report: Mapping[str, Any]) -> str:
 def known_sides(report: Mapping[str, Any]) -> Mapping[tuple[str, str], SideCoverage]:
     """How long each component and side was judged; empty where a report does not say it."""
     rows: Sequence[Mapping[str, Any]] = report.get("coverage") or ()
-    if not all("decided_driving_s" in row and "seconds" in row for row in rows):
+    if not rows or not all("decided_driving_s" in row and "seconds" in row for row in rows):
         return {}
-    return sides_of(report)
+    whole: Any = {"limits": {"min_assessed": 10.0}, **completed(dict(report))}
+    return sides_of(whole)
 
 
 def _share(x: float) -> str:

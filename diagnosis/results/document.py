@@ -6,12 +6,14 @@ name ends in ``_ns``; speeds are m/s, angles rad, shares and ε plain numbers; w
 
 from __future__ import annotations
 
-from typing import Literal, NotRequired, TypedDict
+from typing import Final, Literal, NotRequired, TypedDict
 
+from diagnosis.results.comparison_document import PreviousRow
+from diagnosis.results.size_rows import EpsilonRow, SatRow
 from diagnosis.results.vocabulary import Kind, Severity, Tier, Verdict
 from replay.faults import FaultMode, Side, State
 
-SCHEMA = "mfhca-report/1"
+SCHEMA: Final = "mfhca-report/1"
 
 
 class ToolRow(TypedDict):
@@ -68,12 +70,17 @@ class WheelPlace(TypedDict):
     axle: str
 
 
-class MachineRow(TypedDict):
+class MachineIdentity(TypedDict):
+    """What tells machines apart."""
+
+    id: str
+    wheels: list[str]
+
+
+class MachineRow(MachineIdentity):
     """The machine, and where its settings come from."""
 
     name: str
-    id: str
-    wheels: list[str]
     axles: list[str]
     geometry: dict[str, WheelPlace] | None
     source: str
@@ -106,24 +113,6 @@ class VerdictRow(TypedDict):
     text: str
     caveats: list[str]
     actions: list[ActionRow]
-
-
-class EpsilonRow(TypedDict):
-    """Loss of effectiveness ε̂ with its 95 % bounds."""
-
-    value: float
-    low: float
-    high: float
-
-
-class SatRow(TypedDict):
-    """Saturation term: mean with its 95 % bounds and root mean square, in `unit`."""
-
-    mean: float
-    rms: float
-    low: float
-    high: float
-    unit: str
 
 
 class HypothesisRow(TypedDict):
@@ -272,9 +261,12 @@ class LimitsRow(TypedDict):
 
 
 class ReportDocument(TypedDict):
-    """`report.json`."""
+    """`report.json`: one mission, its verdict, faults, states, coverage and data.
 
-    schema: str
+    `previous` is there where the mission was compared with another one of the machine.
+    """
+
+    schema: Literal["mfhca-report/1"]
     tool: ToolRow
     log: LogRow
     machine: MachineRow
@@ -290,3 +282,4 @@ class ReportDocument(TypedDict):
     missing: list[MissingRow]
     quality: list[QualityRow]
     limits: LimitsRow
+    previous: NotRequired[PreviousRow]

@@ -10,9 +10,8 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from diagnosis.results.document import ReportDocument
 from replay.faults import FaultMode, Side, State
-
-SCHEMA = "mfhca-report/1"
 
 Severity = Literal["info", "low", "medium", "high"]
 Verdict = Literal["ready", "watch", "stop", "not_assessed"]
@@ -145,7 +144,7 @@ class MissionResult:
 
     Attributes
     ----------
-    report : Mapping[str, Any]
+    report : ReportDocument
         The document written as ``report.json``.
     columns : Mapping[str, NDArray[np.float32 | np.float64]], each of shape (n,)
         Time series on one uniform axis; ``t`` [s] first. Of long missions they are envelopes: see `replay.arrays.envelope`.
@@ -153,7 +152,7 @@ class MissionResult:
         Every sample around the worst faults, where the columns are envelopes.
     """
 
-    report: Mapping[str, Any]
+    report: ReportDocument
     columns: Mapping[str, NDArray[np.float64] | NDArray[np.float32]] = field(default_factory=dict)
     windows: Closeups | None = None
 

@@ -11,7 +11,8 @@ import pytest
 
 from diagnosis.output import load_report, rebuild, write_result
 from diagnosis.pipeline import diagnose_mission
-from diagnosis.results.result import SCHEMA, MissionResult
+from diagnosis.results.document import SCHEMA
+from diagnosis.results.result import MissionResult
 from replay.errors import LogError, OutputError
 from replay.log.source_options import SignalSource
 from replay.machine.config import haulotte
@@ -74,7 +75,7 @@ def test_place_that_cannot_be_written(result: MissionResult, tmp_path: Path) -> 
     [
         (None, "cannot be read"),
         (b"{", "not JSON"),
-        (b"[]", "'list' found"),
+        (b"[]", "schema array found"),
         (b'{"schema": "other/1"}', f"schema 'other/1' found, '{SCHEMA}' expected"),
     ],
 )
@@ -88,8 +89,8 @@ def test_saved_report_that_is_none(tmp_path: Path, content: bytes | None, words:
     assert str(path) in str(caught.value)
 
 
-def test_report_without_its_columns(tmp_path: Path) -> None:
-    (tmp_path / "report.json").write_bytes(orjson.dumps({"schema": SCHEMA}))
+def test_report_without_its_columns(result: MissionResult, tmp_path: Path) -> None:
+    (tmp_path / "report.json").write_bytes(orjson.dumps(result.report))
     with pytest.raises(LogError, match=r"report\.parquet: cannot be read.*mfhca diagnose"):
         rebuild(tmp_path)
     (tmp_path / "report.parquet").write_bytes(b"PAR1 no table")

@@ -26,6 +26,7 @@ from replay.errors import ConfigError, LogError, NotJudged, OutputError
 from replay.machine.config import Machine
 
 if TYPE_CHECKING:
+    from diagnosis.results.document import MachineRow
     from diagnosis.results.result import MissionResult
 
 OUTCOME, REPORT, MESSAGES = "outcome.json", "report", "messages.txt"
@@ -89,7 +90,7 @@ def judge(work: Work) -> dict[str, Any]:
 
     result = _diagnosed(work)
     if not result.report["machine"]["id"]:
-        machine = {**result.report["machine"], "id": work.fallback_id}
+        machine: MachineRow = {**result.report["machine"], "id": work.fallback_id}
         result = replace(result, report={**result.report, "machine": machine})
     write_result(result, Path(work.folder) / REPORT, max_size_mb=work.max_size_mb)
     damage = [text for file in result.report["log"]["files"] for text in file["damage"]]

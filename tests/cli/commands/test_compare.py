@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import Any
 
 import pytest
 
 from cli.main import run
+from diagnosis.results.document import ReportDocument
+from tests.whole_documents import whole_report
 
 
-def report(*severities: str, start_s: int = 0, machine: str = "M-1") -> dict[str, Any]:
+def report(*severities: str, start_s: int = 0, machine: str = "M-1") -> ReportDocument:
     intervals = [
         {
             "id": f"F{i}",
@@ -29,17 +30,20 @@ def report(*severities: str, start_s: int = 0, machine: str = "M-1") -> dict[str
         for i, (mode, severity) in enumerate(zip(("noisy", "stuck"), severities, strict=False), 1)
     ]
     row = {"component": "FR", "side": "sensor", "tier": "direct", "driving_s": 60.0, "decided_driving_s": 60.0}
-    return {
-        "schema": "mfhca-report/1",
-        "log": {"files": [{"path": "drive.mcap"}], "start_ns": (1_760_000_000 + start_s) * 10**9, "duration_s": 60.0},
+    error, effort = {"mission": None, "driving": 0.02 + start_s * 1e-6}, {"mission": None, "driving": None}
+    given = {
+        "log": {
+            "files": [{"path": "drive.mcap", "sha256": str(start_s)}],
+            "start_ns": (1_760_000_000 + start_s) * 10**9,
+            "duration_s": 60.0,
+        },
         "machine": {"name": "M [/]", "id": machine, "wheels": ["FR"]},
         "verdict": {"status": "watch" if severities else "ready", "title": "title [/]"},
         "intervals": intervals,
         "coverage": [row | {"seconds": {"healthy": 57.0, "noisy": 3.0}}],
-        "metrics": {
-            "average": {"tracking_error": {"driving": 0.02 + start_s * 1e-6}, "control_effort": {"driving": None}}
-        },
+        "metrics": {"average": {"tracking_error": error, "control_effort": effort}},
     }
+    return whole_report(given)
 
 
 @pytest.fixture

@@ -20,7 +20,8 @@ def older(mission_log: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
         == 0
     )
     report = json.loads((folder / "report.json").read_text(encoding="utf-8"))
-    report["log"] |= {"start_ns": report["log"]["start_ns"] - 3600 * 10**9, "files": [{"path": "monday.mcap"}]}
+    report["log"]["start_ns"] -= 3600 * 10**9
+    report["log"]["files"][0]["path"] = "monday.mcap"
     report["intervals"] = []
     (folder / "report.json").write_text(json.dumps(report), encoding="utf-8")
     return folder

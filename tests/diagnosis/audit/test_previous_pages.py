@@ -18,13 +18,14 @@ from diagnosis.results.result import MissionResult
 from tests import fleet_samples as samples
 from tests import report_samples
 from tests.fleet_samples import Sample
+from tests.whole_documents import whole_report
 
 
 def written(folder: Path, sample: Sample, made: tuple[dict[str, Any], Any], start_ns: int) -> None:
     """Report of a mission of the store."""
     report, columns = made
     report["log"]["start_ns"], report["machine"]["id"] = start_ns, sample.machine
-    write_result(MissionResult(report, columns), folder / "missions" / sample.name)
+    write_result(MissionResult(whole_report(report), columns), folder / "missions" / sample.name)
 
 
 @pytest.fixture

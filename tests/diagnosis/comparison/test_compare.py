@@ -10,7 +10,8 @@ import pytest
 from diagnosis.comparison.compare import Comparison, compare_reports, comparison_json
 from diagnosis.comparison.faults import FaultChange
 from diagnosis.comparison.words import coverage_words
-from replay.errors import ConfigError, LogError
+from replay.errors import ConfigError
+from tests.whole_documents import whole_report
 
 WHEELS = ("FR", "FL")
 START = 1_760_000_000_000_000_000
@@ -68,7 +69,7 @@ def report(*faults: dict[str, Any], start_s: float = 0.0, **sides: dict[str, Any
 
 
 def compared(older: dict[str, Any], newer: dict[str, Any], **options: Any) -> Comparison:
-    return compare_reports(older, newer, ("a", "b"), **options)
+    return compare_reports(whole_report(older), whole_report(newer), ("a", "b"), **options)
 
 
 def only(found: Comparison) -> FaultChange:
@@ -324,17 +325,3 @@ def test_the_document_is_plain_json() -> None:
     assert document["faults"][0]["older"]["ids"] == ["F1"]
     assert document["faults"][0]["newer"] is None
     assert document["coverage"][0]["newer"]["assessed"] is True
-
-
-@pytest.mark.parametrize("key", ["intervals", "log", "machine", "verdict"])
-def test_a_document_that_is_not_whole(key: str) -> None:
-    broken = later()
-    del broken[key]
-    with pytest.raises(LogError, match="not a whole report"):
-        compared(report(), broken)
-
-
-@pytest.mark.parametrize("severity", ["catastrophic", None, 3])
-def test_unknown_words_in_a_document(severity: Any) -> None:
-    with pytest.raises(LogError, match="not a whole report"):
-        compared(report(), later(fault("FR", "sensor", "stuck", severity=severity)))

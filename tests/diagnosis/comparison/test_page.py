@@ -7,6 +7,7 @@ from typing import Any
 
 from diagnosis.comparison.compare import compare_reports, comparison_json
 from diagnosis.comparison.page import build_compare_page
+from tests.whole_documents import whole_report
 
 HOSTILE = "</style><script>alert(1)</script>\u202e"
 
@@ -24,11 +25,12 @@ def report(wheel: str, machine: str, *faults: dict[str, Any], decided: float = 9
         for side in ("sensor", "actuator")
     ]
     return {
-        "log": {"files": [{"path": wheel, "sha256": None}], "start_ns": 0, "duration_s": 100.0},
+        "log": {"files": [{"path": wheel}], "start_ns": 0, "duration_s": 100.0},
         "machine": {"name": machine, "id": machine, "wheels": [wheel]},
-        "verdict": {"status": machine, "title": machine},
+        "verdict": {"status": "watch", "title": machine},
         "intervals": list(faults),
         "coverage": rows,
+        "states": [],
     }
 
 
@@ -39,7 +41,9 @@ def fault(wheel: str, mode: str = "stuck") -> dict[str, Any]:
 
 
 def page(older: dict[str, Any], newer: dict[str, Any]) -> str:
-    return build_compare_page(comparison_json(compare_reports(older, newer, ("monday", "tuesday"))))
+    return build_compare_page(
+        comparison_json(compare_reports(whole_report(older), whole_report(newer), ("monday", "tuesday")))
+    )
 
 
 def words(text: str) -> str:
@@ -62,7 +66,7 @@ def test_no_fault_is_said_with_what_it_does_not_mean() -> None:
 
 
 def test_names_are_text_and_the_page_runs_and_fetches_nothing() -> None:
-    text = page(report(HOSTILE, HOSTILE), report(HOSTILE, HOSTILE, fault(HOSTILE, HOSTILE)))
+    text = page(report(HOSTILE, HOSTILE), report(HOSTILE, HOSTILE, fault(HOSTILE)))
     assert "<script" not in text
     assert "\u202e" not in text
     assert text.count("</style>") == 1

@@ -7,7 +7,9 @@ from typing import Any
 import pytest
 
 from diagnosis.comparison.previous import with_previous
+from diagnosis.results.document import ReportDocument
 from replay.errors import ConfigError
+from tests.whole_documents import whole_report
 
 
 def fault(mode: str, epsilon: float | None = None, component: str = "FR", name: str = "F1") -> dict[str, Any]:
@@ -28,7 +30,7 @@ def fault(mode: str, epsilon: float | None = None, component: str = "FR", name: 
 
 def document(
     *faults: dict[str, Any], start_ns: int = 10**18, decided_s: float = 55.0, machine: str = "HX4-07", **more: Any
-) -> dict[str, Any]:
+) -> ReportDocument:
     coverage = [
         {
             "component": component,
@@ -40,8 +42,7 @@ def document(
         }
         for component in ("FR", "FL")
     ]
-    return {
-        "schema": "mfhca-report/1",
+    given = {
         "log": {"files": [{"path": "a.mcap", "sha256": f"{start_ns:x}"}], "start_ns": start_ns, "duration_s": 60.0},
         "machine": {"id": machine, "name": "Haulotte", "wheels": ["FR", "FL"], "axles": []},
         "verdict": {"status": "stop", "title": "1 fault to repair"},
@@ -49,12 +50,13 @@ def document(
         "coverage": coverage,
         **more,
     }
+    return whole_report(given)
 
 
 LATER = 10**18 + 10**12
 
 
-def outcomes(report: dict[str, Any]) -> list[tuple[str, str]]:
+def outcomes(report: ReportDocument) -> list[tuple[str, str]]:
     return [(c["trend"] or c["status"], c["component"]) for c in report["previous"]["faults"]]
 
 
@@ -84,16 +86,14 @@ def test_order_goes_by_the_logs_clocks() -> None:
 
 
 def test_losses_of_both() -> None:
-    def loss(value: float | None) -> list[dict[str, Any]]:
-        epsilon = None if value is None else {"value": value, "low": value - 0.01, "high": value + 0.01}
-        return [
-            {"component": "FR", "side": "actuator", "epsilon": epsilon, "seconds": 40.0},
-            {"component": "FL", "side": "actuator", "epsilon": None, "seconds": 0.0},
-        ]
+    def loss(component: str, value: float) -> dict[str, Any]:
+        epsilon = {"value": value, "low": value - 0.01, "high": value + 0.01}
+        return {"component": component, "side": "actuator", "epsilon": epsilon, "seconds": 40.0}
 
-    got = with_previous(document(start_ns=LATER, loss=loss(0.2)), document(loss=loss(0.1)))["previous"]["loss"]
+    newer = document(start_ns=LATER, loss=[loss("FR", 0.2), loss("FL", 0.0)])
+    got = with_previous(newer, document(loss=[loss("FR", 0.1)]))["previous"]["loss"]
     assert [(x["component"], x["older"]["value"], x["newer"]["value"]) for x in got] == [("FR", 0.1, 0.2)]
-    assert with_previous(document(start_ns=LATER, loss=loss(0.2)), document())["previous"]["loss"] == []
+    assert with_previous(newer, document())["previous"]["loss"] == []
 
 
 def test_another_machine_is_refused() -> None:

@@ -7,13 +7,15 @@ from typing import Any
 from diagnosis.comparison.previous import with_previous
 from diagnosis.report.page import build_page
 from diagnosis.report.previous import previous_section
+from diagnosis.results.document import ReportDocument
 from tests import report_samples as samples
+from tests.whole_documents import whole_report
 
 
-def earlier(**changes: Any) -> dict[str, Any]:
+def earlier(**changes: Any) -> ReportDocument:
     report, _ = samples.five_faults()
     log = {**report["log"], "start_ns": report["log"]["start_ns"] - 10**13, "files": [{"path": "monday.mcap"}]}
-    return {**report, "log": log, **changes}
+    return whole_report({**report, "log": log, **changes})
 
 
 def test_nothing_is_said_without_a_comparison() -> None:
@@ -27,7 +29,7 @@ def test_nothing_is_said_without_a_comparison() -> None:
 def test_new_and_resolved_faults() -> None:
     report, columns = samples.five_faults()
     first, *rest = report["intervals"]
-    page = build_page(with_previous({**report, "intervals": rest}, earlier(intervals=[first])), columns)
+    page = build_page(with_previous(whole_report({**report, "intervals": rest}), earlier(intervals=[first])), columns)
     section = page[page.index('id="previous"') :].partition("</section>")[0]
     assert "Against the previous mission" in section
     assert "monday.mcap" in section
@@ -38,7 +40,7 @@ def test_new_and_resolved_faults() -> None:
 
 def test_a_later_mission_is_called_so() -> None:
     report, _ = samples.five_faults()
-    section = previous_section(with_previous(earlier(), report))
+    section = previous_section(with_previous(earlier(), whole_report(report)))
     assert section is not None
     assert section["title"] == "Against a later mission"
     assert section["own"] == 0
@@ -47,7 +49,7 @@ def test_a_later_mission_is_called_so() -> None:
 def test_words_from_the_other_log_stay_text() -> None:
     report, columns = samples.five_faults()
     other = earlier(log={**earlier()["log"], "files": [{"path": "<script>alert(1)</script>\u202e"}]})
-    page = build_page(with_previous(report, other), columns)
+    page = build_page(with_previous(whole_report(report), other), columns)
     assert "<script>alert(1)" not in page
     assert "\u202e" not in page
 
@@ -65,7 +67,9 @@ def test_losses_are_listed_where_they_differ() -> None:
         ]
 
     report, _ = samples.five_faults()
-    section = previous_section(with_previous({**report, "loss": loss(0.3, -0.0002)}, earlier(loss=loss(0.1, 0.0))))
+    section = previous_section(
+        with_previous(whole_report({**report, "loss": loss(0.3, -0.0002)}), earlier(loss=loss(0.1, 0.0)))
+    )
     assert section is not None
     assert section["loss"] == [
         {"part": "FL drive valve", "cells": ["0.100 (0.090 to 0.110)", "0.300 (0.290 to 0.310)"], "change": "+0.200"}

@@ -1,0 +1,29 @@
+"""The documents that the tool writes as JSON, by name, and their JSON schemas."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import msgspec
+
+from diagnosis.results.comparison_document import ComparisonDocument
+from diagnosis.results.document import ReportDocument
+
+#: Type of each document; its docstrings are the schema's descriptions.
+DOCUMENTS: dict[str, type] = {"report": ReportDocument, "comparison": ComparisonDocument}
+
+
+def schema_of(name: str) -> dict[str, Any]:
+    """JSON schema of a document.
+
+    Parameters
+    ----------
+    name : str
+        One of `DOCUMENTS`.
+
+    Returns
+    -------
+    dict[str, Any]
+        Of JSON Schema 2020-12; further keys are allowed everywhere, because later versions may add some.
+    """
+    return {"$schema": "https://json-schema.org/draft/2020-12/schema", **msgspec.json.schema(DOCUMENTS[name])}
