@@ -20,8 +20,9 @@ from diagnosis.results.closeups import closeups_of
 from diagnosis.results.document import SCHEMA
 from diagnosis.results.loss import loss_rows
 from diagnosis.results.result import MissionResult, to_json
+from replay.arrays import spill
+from replay.arrays.column_store import ColumnStore
 from replay.arrays.envelope import bucket_of
-from replay.arrays.spill import blocks, release_all
 from replay.control.loop import Replay, replay_loop
 from replay.control.loop_columns import replay_columns
 from replay.errors import ConfigError, NotJudged
@@ -46,6 +47,7 @@ def diagnose(
     wheels: Sequence[str] | None = None,
     machine_id: str | None = None,
     progress: Subscriber = silent,
+    store: ColumnStore | None = None,
 ) -> MissionResult:
     """Diagnose one mission.
 
@@ -65,6 +67,8 @@ def diagnose(
         Identity for trends; None: what the logs' metadata state, else the machine file's.
     progress : Subscriber
         Called at the beginning of each stage.
+    store : ColumnStore or None
+        Where the mission's long columns stand; None: one of its own.
 
     Raises
     ------
@@ -79,7 +83,7 @@ def diagnose(
     for wheel in chosen:
         if wheel not in machine.wheels:
             raise ConfigError(f"--wheel {wheel}: no such wheel; the machine has {', '.join(machine.wheels)}")
-    mission = load_mission(paths, machine, start_s=start_s, stop_s=stop_s, progress=progress)
+    mission = load_mission(paths, machine, start_s=start_s, stop_s=stop_s, progress=progress, store=store)
     told = quality.recorded(mission.signals, mission.timeline)
     mission = replace(mission, signals=mission.signals.without_samples())  # which leaves their memory to the diagnosis
     return _diagnosed(mission, told, machine, machine_source, chosen, machine_id, progress)
@@ -129,7 +133,8 @@ def _diagnosed(
     progress: Subscriber,
 ) -> MissionResult:
     def publish(stage: Progress) -> None:
-        release_all()
+        mission.timeline.store.release()
+        spill.STORE.release()
         progress(stage)
 
     publish(Progress(Stage.REPLAYING_LOOP))
@@ -215,7 +220,8 @@ def _result(
         ),
         "limits": machine.limits,
     }
-    release_all()
+    timeline.store.release()
+    spill.STORE.release()
     columns: dict[str, Array] = dict(replay_columns(timeline, replay, machine))
     for (component, side), assessment in found.assessments.items():
         columns.update({f"evidence.{component}.{side}.{leaf}": x for leaf, x in assessment.columns.items()})
@@ -243,7 +249,7 @@ def _log(mission: Mission, moving: NDArray[np.bool_], machine: Machine) -> dict[
     timeline = mission.timeline
     speeds = [timeline.signals[n] for w in machine.wheels if (n := f"wheel.{w}.v") in timeline.signals]
     distance = 0.0 if speeds else float("nan")
-    for part in blocks(timeline.size):
+    for part in timeline.blocks():
         near = [v[part] for v in speeds]
         if near:
             mean = np.nansum(np.abs(near), axis=0) / np.maximum(np.isfinite(near).sum(axis=0), 1)

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from fnmatch import fnmatch
 from pathlib import Path
 
+from replay.arrays.column_store import ColumnStore
 from replay.clocks.align import align_clocks
 from replay.clocks.source_clock import SourceClock
 from replay.errors import LogError
@@ -115,7 +116,7 @@ def _feed(digest: hashlib._Hash, path: Path) -> int:
 
 
 def read_signals(
-    paths: Sequence[Path], machine: Machine, *, progress: Subscriber = silent
+    paths: Sequence[Path], machine: Machine, *, progress: Subscriber = silent, store: ColumnStore | None = None
 ) -> tuple[tuple[MissionFile, ...], Signals]:
     """Read the files of one mission and find the machine's signals in them.
 
@@ -127,6 +128,8 @@ def read_signals(
         Where its signals are recorded, and how its sources are to be read.
     progress : Subscriber
         Called at the beginning of each stage.
+    store : ColumnStore or None
+        Where long columns stand; None: one of the mission's own.
 
     Returns
     -------
@@ -141,6 +144,7 @@ def read_signals(
     ConfigError
         Where a given unit does not fit its signal.
     """
+    store = store or ColumnStore()
     options = [SourceOptions() if is_open_loop_table(path) else source_options(path, machine) for path in paths]
     summaries = []
     for path, option in zip(paths, options, strict=True):
@@ -151,7 +155,7 @@ def read_signals(
     files: list[MissionFile] = []
     for path, option, summary in zip(paths, options, summaries, strict=True):
         progress(Progress(Stage.READING, path.name))
-        log = in_order(read_log(path, option, plan.get(summary.source)))
+        log = in_order(read_log(path, option, plan.get(summary.source), store=store))
         progress(Progress(Stage.HASHING, path.name))
         sha256, size = content_hash(path)
         logs.append(log)
@@ -208,6 +212,7 @@ def load_mission(
     start_s: float | None = None,
     stop_s: float | None = None,
     progress: Subscriber = silent,
+    store: ColumnStore | None = None,
 ) -> Mission:
     """Read the files of one mission onto one time axis.
 
@@ -221,6 +226,8 @@ def load_mission(
         Part of the mission [s from its first wheel sample].
     progress : Subscriber
         Called at the beginning of each stage.
+    store : ColumnStore or None
+        Where long columns stand; None: one of the mission's own.
 
     Raises
     ------
@@ -229,7 +236,7 @@ def load_mission(
     ConfigError
         Where a given unit does not fit its signal.
     """
-    files, signals = read_signals(paths, machine, progress=progress)
+    files, signals = read_signals(paths, machine, progress=progress, store=store)
     progress(Progress(Stage.ALIGNING_SIGNALS))
     used = {signal.source for signal in signals.items.values()}
     idle = [file.path for file in files if str(file.path) not in used]

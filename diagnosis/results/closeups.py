@@ -93,7 +93,8 @@ def _scanned(replay: Replay, i: int, u: Array, v: Array, dt: float, step: Steps)
     if replay.law is None or not (_any(v) and _any(v_ref)):
         return {}
     parts: dict[str, list[Array]] = {leaf: [] for leaf in ("psi_printed", "psi_implied", "u")}
-    for part, block in zip(blocks(len(v)), scan_wheel(replay.law, u, v, v_ref, dt, replay.psi0[i]), strict=True):
+    cuts = tuple(blocks(len(v)))
+    for part, block in zip(cuts, scan_wheel(replay.law, u, v, v_ref, dt, replay.psi0[i], cuts), strict=True):
         at = step[np.searchsorted(step, part.start) : np.searchsorted(step, part.stop)] - part.start
         parts["psi_printed"].append(block.psi_printed[at])
         parts["psi_implied"].append(np.sqrt(np.maximum(block.implied_squared[at], 0.0)))

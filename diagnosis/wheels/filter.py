@@ -92,8 +92,8 @@ def forward(
 
 
 def cuts(size: int, width: int) -> Iterator[slice]:
-    """Parts of `size` blocks of `width` samples that hold about `replay.arrays.spill.BLOCK` samples each."""
-    step = max(1, spill.BLOCK // width)
+    """Parts of `size` blocks of `width` samples that hold about `ColumnStore.block` samples each."""
+    step = max(1, spill.STORE.block // width)
     return (slice(at, min(at + step, size)) for at in range(0, size, step))
 
 

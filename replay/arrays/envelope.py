@@ -13,7 +13,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from replay.arrays.spill import Column, blocks, in_blocks, release
+from replay.arrays.blocks import release
+from replay.arrays.column_store import ColumnStore
 
 FULL_STEPS = 1 << 20
 _BUCKETS = 1 << 18
@@ -37,7 +38,7 @@ def step_of(bucket: int) -> float:
     return 1.0 if bucket == 1 else bucket / 2
 
 
-def envelope(values: NDArray[Any], bucket: int) -> NDArray[Any]:
+def envelope(values: NDArray[Any], bucket: int, store: ColumnStore | None = None) -> NDArray[Any]:
     """Reduce steps to rows.
 
     Parameters
@@ -46,6 +47,8 @@ def envelope(values: NDArray[Any], bucket: int) -> NDArray[Any]:
         Steps; the last bucket may be short.
     bucket : int
         From `bucket_of`.
+    store : ColumnStore or None
+        Where the rows stand if they are many; None: in memory.
 
     Returns
     -------
@@ -54,17 +57,18 @@ def envelope(values: NDArray[Any], bucket: int) -> NDArray[Any]:
     """
     if bucket == 1:
         return values
-    out = Column(values.dtype, values.shape[1:], rows_of(len(values), bucket))
-    for part in blocks(len(values), bucket):
+    store = store or ColumnStore()
+    out = store.column(values.dtype, values.shape[1:], rows_of(len(values), bucket))
+    for part in store.blocks(len(values), bucket):
         out.append(_reduced(values[part], bucket))
         release(values)
     return out.finish()
 
 
-def shown(values: NDArray[Any]) -> NDArray[Any]:
+def shown(values: NDArray[Any], store: ColumnStore | None = None) -> NDArray[Any]:
     """A column of n steps for pictures; the envelope of long ones, as 32-bit numbers."""
     bucket = bucket_of(len(values))
-    return values if bucket == 1 else envelope(values, bucket).astype(np.float32)
+    return values if bucket == 1 else envelope(values, bucket, store).astype(np.float32)
 
 
 def _reduced(values: NDArray[Any], bucket: int) -> NDArray[Any]:
@@ -94,6 +98,13 @@ def _scan_extremes(rows, out, bucket):  # type: ignore[no-untyped-def]
             out[2 * b, j], out[2 * b + 1, j] = rows[min(low, high), j], rows[max(low, high), j]
 
 
-def in_buckets(function: Callable[..., NDArray[Any]], bucket: int, *arrays: NDArray[Any]) -> NDArray[Any]:
-    """Envelope of a function of whole rows, one block after another; see `replay.arrays.spill.in_blocks`."""
-    return in_blocks(lambda *parts: envelope(np.asarray(function(*parts)), bucket), *arrays)
+def in_buckets(
+    function: Callable[..., NDArray[Any]], bucket: int, *columns: NDArray[Any], store: ColumnStore | None = None
+) -> NDArray[Any]:
+    """Envelope of a function of whole rows, one block after another; see `ColumnStore.map`."""
+    store = store or ColumnStore()
+
+    def rows(_: None, *parts: NDArray[Any]) -> tuple[tuple[NDArray[Any]], None]:
+        return (envelope(np.asarray(function(*parts)), bucket, store),), None
+
+    return store.scan(rows, None, *columns, multiple=bucket)[0][0]

@@ -14,7 +14,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from replay.arrays.spill import Column, blocks
+from replay.arrays.column_store import ColumnStore
 from replay.clocks.correlation import match
 from replay.clocks.jumps import jumps, pauses, widened
 from replay.clocks.line_fit import fit_line
@@ -184,7 +184,8 @@ def align_clocks(
             start = _first(signals[i])
             out[i] = _moved(out[i], line_found, start, between)
             signals[i] = {
-                n: replace(s, stamps=_shifted(s.stamps, line_found, start, between)) for n, s in signals[i].items()
+                n: replace(s, stamps=_shifted(s.stamps, line_found, start, between, logs[i].store))
+                for n, s in signals[i].items()
             }
     return out, tuple(clocks[i] for i in range(len(out)))
 
@@ -227,12 +228,12 @@ def _first_stamp(log: RawLog) -> int:
     return min((int(c.stamps.min()) for c in log.channels.values() if len(c.stamps)), default=0)
 
 
-def _shifted(stamps: NDArray[np.int64], line: Line, start: int, between: int) -> NDArray[np.int64]:
-    column = Column(np.int64)
-    for rows in blocks(len(stamps)):
-        lag = line.lag(np.asarray((stamps[rows] - start) * 1e-9, np.float64))
-        column.append(stamps[rows] + between + np.rint(lag * 1e9).astype(np.int64))
-    return column.finish()
+def _shifted(stamps: NDArray[np.int64], line: Line, start: int, between: int, store: ColumnStore) -> NDArray[np.int64]:
+    def moved(rows: NDArray[np.int64]) -> NDArray[np.int64]:
+        lag = line.lag(np.asarray((rows - start) * 1e-9, np.float64))
+        return rows + between + np.rint(lag * 1e9).astype(np.int64)
+
+    return store.map(moved, stamps)
 
 
 def _moved(log: RawLog, line: Line, start: int, between: int) -> RawLog:
@@ -242,6 +243,6 @@ def _moved(log: RawLog, line: Line, start: int, between: int) -> RawLog:
     for name, channel in log.channels.items():
         key = id(channel.stamps)
         if key not in known:
-            known[key] = _shifted(channel.stamps, line, start, between)
+            known[key] = _shifted(channel.stamps, line, start, between, log.store)
         channels[name] = replace(channel, stamps=known[key])
     return replace(log, channels=channels)

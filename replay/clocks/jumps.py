@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from replay.arrays.spill import blocks
+from replay.arrays.blocks import blocks
 from replay.clocks.correlation import match
 from replay.clocks.shared_series import Series, Shared
 from replay.clocks.windows import Line

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from replay.arrays.spill import blocks
+from replay.arrays.blocks import blocks
 from replay.signals.signal import Signal, quantity_kind
 from replay.signals.to_si import slope
 

@@ -8,8 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from replay.arrays.blocks import blocks, release
+from replay.arrays.column_store import ColumnStore
 from replay.arrays.envelope import envelope, in_buckets, rows_of
-from replay.arrays.spill import Column, blocks, in_blocks, release
 from replay.control import mfhca
 from replay.control.kinematics import CommandState, wheel_angles, wheel_commands
 from replay.control.law_fit import MIN_EXPLAINED, LawFit, fit_law
@@ -121,19 +122,17 @@ def replay_loop(timeline: Timeline, machine: Machine, bucket: int = 1) -> Replay
     phi = stack(timeline, [f"steer.{a}.phi" for a in machine.axles])
     v_ref, phi_ref = _commands(timeline, machine, phi, readings)
     geometry = machine.geometry
-    unfit = (
-        "" if any(np.isfinite(u[part]).any() for part in blocks(timeline.size)) else "no recorded valve command to fit"
-    )
+    unfit = "" if any(np.isfinite(u[part]).any() for part in timeline.blocks()) else "no recorded valve command to fit"
     steer_recorded = stack(timeline, [f"steer.{a}.u" for a in machine.axles])
     if timeline.open_loop:  # the recorded commands answer to other measurements than these
         u, steer_recorded = (np.broadcast_to(np.nan, x.shape) for x in (u, steer_recorded))
         unfit = "faults were injected into this recording, its controller never met them"
     law, psi0, fits = _choose(machine, u, v, v_ref, timeline.dt, unfit, readings)
-    scanned = _scan(law, u, v, v_ref, timeline.dt, psi0, bucket)
-    steer_u = in_blocks(lambda a, b: mfhca.steering_command(a, b, control.k_ps, control.u_max), phi_ref, phi)
+    scanned = _scan(law, u, v, v_ref, timeline.dt, psi0, bucket, timeline.store)
+    steer_u = timeline.map(lambda a, b: mfhca.steering_command(a, b, control.k_ps, control.u_max), phi_ref, phi)
 
     def shown(function: Callable[..., Array], *arrays: Array) -> Array:
-        return in_buckets(function, bucket, *arrays)
+        return in_buckets(function, bucket, *arrays, store=timeline.store)
 
     return Replay(
         v_ref=v_ref,
@@ -147,7 +146,7 @@ def replay_loop(timeline: Timeline, machine: Machine, bucket: int = 1) -> Replay
         e=shown(np.subtract, v, v_ref),
         rho=shown(lambda a, b: mfhca.decay_rate(a, b, control.xi, control.beta), v, v_ref),
         psi_printed=scanned["psi_printed"],
-        psi_implied=in_blocks(lambda x: np.sqrt(np.maximum(x, 0.0)), scanned["implied_squared"]),
+        psi_implied=timeline.map(lambda x: np.sqrt(np.maximum(x, 0.0)), scanned["implied_squared"]),
         implied_squared=scanned["implied_squared"],
         forcing=scanned["forcing"],
         psi=scanned["psi"],
@@ -173,27 +172,25 @@ def _commands(timeline: Timeline, machine: Machine, phi: Array, readings: list[R
     _say_commands(machine, bool(logged_v.all()), mapped, readings)
     if geometry is None or speed is None or (logged_v.all() and logged_phi.all()):
         return v_ref, phi_ref
-    out = [Column(np.float64, (count,), timeline.size) for count in (len(wheels), len(axles))]
-    state = CommandState()
-    for part in blocks(timeline.size):
-        v_part, phi_part = v_ref[part].copy(), phi_ref[part].copy()
+
+    def completed(
+        state: CommandState, v_ref: Array, phi_ref: Array, phi: Array, speed: Array, omega: Array
+    ) -> tuple[tuple[Array, Array], CommandState]:
         found = wheel_commands(
-            speed[part],
-            np.zeros(len(v_part)) if omega is None else omega[part],
+            speed,
+            omega,
             geometry,
             dt=timeline.dt,
             max_steer=machine.max_steer,
             phi_dot=machine.control.phi_dot,
             phi_dot_hz=machine.control.phi_dot_hz,
-            measured_angle=wheel_angles(phi[part], geometry),
+            measured_angle=wheel_angles(phi, geometry),
             state=state,
         )
-        v_part[:, ~logged_v] = found.speed[:, ~logged_v]
-        phi_part[:, ~logged_phi] = found.axle_angle[:, ~logged_phi]
-        for column, values in zip(out, (v_part, phi_part), strict=True):
-            column.append(values)
-        release(v_ref, phi_ref, phi, speed, omega)
-    v_all, phi_all = (column.finish() for column in out)
+        return (np.where(logged_v, v_ref, found.speed), np.where(logged_phi, phi_ref, found.axle_angle)), state
+
+    turning = np.broadcast_to(0.0, speed.shape) if omega is None else omega
+    (v_all, phi_all), _ = timeline.scan(completed, CommandState(), v_ref, phi_ref, phi, speed, turning)
     return v_all, phi_all
 
 
@@ -229,7 +226,14 @@ def any_finite(values: Array) -> NDArray[np.bool_]:
 
 
 def _scan(
-    law: LoopLaw | None, u: Array, v: Array, v_ref: Array, dt: float, psi0: list[float | None], bucket: int
+    law: LoopLaw | None,
+    u: Array,
+    v: Array,
+    v_ref: Array,
+    dt: float,
+    psi0: list[float | None],
+    bucket: int,
+    store: ColumnStore,
 ) -> dict[str, Array]:
     """Fields of `Replay` that depend on the law; NaN where there is none, or where a wheel lacks a speed."""
     wheels = v.shape[1]
@@ -237,9 +241,10 @@ def _scan(
     if law is None:
         return dict.fromkeys(names, np.broadcast_to(np.nan, (rows_of(len(v), bucket), wheels)))
     usable = any_finite(v) & any_finite(v_ref)
-    scans = {i: scan_wheel(law, u[:, i], v[:, i], v_ref[:, i], dt, psi0[i]) for i in range(wheels) if usable[i]}
-    columns = {name: Column(np.float64, (wheels,), rows_of(len(v), bucket)) for name in names}
-    for part in blocks(len(v)):
+    parts = tuple(store.blocks(len(v), bucket))
+    scans = {i: scan_wheel(law, u[:, i], v[:, i], v_ref[:, i], dt, psi0[i], parts) for i in range(wheels) if usable[i]}
+    columns = {name: store.column(np.float64, (wheels,), rows_of(len(v), bucket)) for name in names}
+    for part in parts:
         found = {name: np.full((part.stop - part.start, wheels), np.nan) for name in names}
         for i, scan in scans.items():
             block = next(scan)
@@ -247,7 +252,7 @@ def _scan(
                 found[name][:, i] = getattr(block, name)
             found["u_difference"][:, i] = u[part, i] - block.u
         for name, values in found.items():
-            columns[name].append(envelope(values, bucket))
+            columns[name].append(envelope(values, bucket, store))
     return {name: column.finish() for name, column in columns.items()}
 
 

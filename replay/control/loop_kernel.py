@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from replay.arrays.spill import blocks, release
+from replay.arrays.blocks import blocks, release
 from replay.control import mfhca
 
 Array = NDArray[np.float64]
@@ -41,7 +41,9 @@ class WheelBlock:
     u: Array
 
 
-def scan_wheel(law: LoopLaw, u: Array, v: Array, v_ref: Array, dt: float, psi0: float | None) -> Iterator[WheelBlock]:
+def scan_wheel(
+    law: LoopLaw, u: Array, v: Array, v_ref: Array, dt: float, psi0: float | None, parts: Iterable[slice]
+) -> Iterator[WheelBlock]:
     """Replay one wheel.
 
     Parameters
@@ -54,18 +56,20 @@ def scan_wheel(law: LoopLaw, u: Array, v: Array, v_ref: Array, dt: float, psi0: 
         Step [s].
     psi0 : float or None
         Ψ̂(0) of the printed law; None fits it to the implied values.
+    parts : Iterable[slice]
+        Blocks of n, in order.
 
     Yields
     ------
     WheelBlock
-        Of the blocks of n, in order.
+        One for each of the parts.
     """
     start = _fitted_start(law, u, v, v_ref, dt) if psi0 is None else psi0
     threshold = _threshold(law, u, v, v_ref) if law.psi == "event_reset" else 0.0
     total = forced = before = 0.0
     event = (np.nan, 0)
     half = round(_FORCING_S / dt) + 2
-    for part in blocks(v.size):
+    for part in parts:
         rho = mfhca.decay_rate(v[part], v_ref[part], law.xi, law.beta)
         squared, bound = _implied(law, u[part], v[part], v_ref[part])
         decay, total = mfhca.printed_decay(rho, dt, total, before)

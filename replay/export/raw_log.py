@@ -21,7 +21,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
-from replay.arrays.spill import release
+from replay.arrays.blocks import release
 from replay.errors import LogError, OutputError
 from replay.log.raw_log import Channel, RawLog, Window
 from replay.log.source_options import SourceOptions

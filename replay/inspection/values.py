@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from replay.arrays.spill import blocks
+from replay.arrays.blocks import blocks
 from replay.inspection.report import OddValues
 from replay.log.raw_log import Channel
 

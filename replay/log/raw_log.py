@@ -9,6 +9,8 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from replay.arrays.column_store import ColumnStore
+
 Clock = Literal["header", "log", "publish"]
 Window = tuple[int, int]
 
@@ -145,6 +147,8 @@ class RawLog:
         Channels by name, in recorded order of first appearance.
     summary : LogSummary
         The log's contents, with `notes` and `damage` completed by what decoding found.
+    store : ColumnStore
+        Where its long columns stand.
     """
 
     source: str
@@ -152,3 +156,4 @@ class RawLog:
     clock: Clock
     channels: Mapping[str, Channel]
     summary: LogSummary
+    store: ColumnStore = field(default_factory=ColumnStore, repr=False, compare=False)

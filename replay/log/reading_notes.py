@@ -1,16 +1,19 @@
-"""What was found while a log was read: harmless facts, and what was damaged or lost."""
+"""What goes with a log while it is read: notes of harmless facts and of what was lost, and the store of its columns."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
 
+from replay.arrays.column_store import ColumnStore
+
 
 @dataclass
 class Report:
-    """Notes and damage gathered while reading; repeated sentences are kept once."""
+    """Notes and damage gathered while reading, repeated sentences once; and where long columns stand."""
 
     notes: list[str] = field(default_factory=list)
     damage: list[str] = field(default_factory=list)
+    store: ColumnStore = field(default_factory=ColumnStore)
 
     def note(self, text: str) -> None:
         """Add a harmless fact."""

@@ -15,7 +15,7 @@ from pathlib import PurePath
 import numpy as np
 from numpy.typing import NDArray
 
-from replay.arrays.spill import blocks
+from replay.arrays.blocks import blocks
 from replay.log.raw_log import Channel, RawLog
 
 Stamps = NDArray[np.int64]

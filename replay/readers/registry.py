@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection
 from pathlib import Path
 
+from replay.arrays.column_store import ColumnStore
 from replay.errors import LogError
 from replay.log.file_types import check_regular
 from replay.log.raw_log import Clock, LogSummary, RawLog, Window
@@ -89,12 +90,15 @@ def read_log(
     topics: Collection[str] | None = None,
     clock: Clock | None = None,
     window: Window | None = None,
+    store: ColumnStore | None = None,
 ) -> RawLog:
-    """Decode a log, or the given topics and time of it; the clock is that of the options unless given.
+    """Decode a log, or the given topics and time of it, with its long columns in the store (None: one of its own).
+
+    The clock is that of the options unless given.
 
     Raises
     ------
     LogError
         Where nothing in the log can be read.
     """
-    return open_log(path).read(path, options, topics, clock or options.stamp, window)
+    return open_log(path).read(path, options, topics, clock or options.stamp, window, store)

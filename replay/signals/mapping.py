@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from replay.arrays.column_store import ColumnStore
 from replay.errors import ConfigError
 from replay.log.raw_log import Channel, LogSummary, RawLog
 from replay.log.source_options import SignalSource
@@ -107,7 +108,8 @@ def map_signals(logs: Sequence[RawLog], machine: Machine) -> Signals:
         )
     order = {name: i for i, name in enumerate((*machine.canonical_signals(), *machine.signals))}
     items = dict(sorted(draft.items.items(), key=lambda item: order[item[0]]))
-    return Signals(items, draft.missing, tuple(dict.fromkeys(draft.notes)))
+    store = logs[0].store if logs else ColumnStore()
+    return Signals(items, draft.missing, tuple(dict.fromkeys(draft.notes)), store=store)
 
 
 def _take_given(draft: _Draft, name: str, source: SignalSource, logs: Sequence[RawLog]) -> None:
@@ -124,7 +126,7 @@ def _take_given(draft: _Draft, name: str, source: SignalSource, logs: Sequence[R
         if not unit and channel.unit:
             draft.notes.append(f"{name}: the recorded unit {channel.unit!r} is not known; SI is assumed")
         origin = replace(source, unit=unit)
-        converted = convert(name, _data(log, channel, origin), origin, draft.machine)
+        converted = convert(name, _data(log, channel, origin), origin, draft.machine, log.store)
         draft.take(name, log, channel, converted, origin, False)
         return
     known = [k for log in chosen for k in log.channels]
@@ -148,7 +150,7 @@ def _take_guess(draft: _Draft, name: str, found: list[tuple[Candidate, RawLog]])
         unit = candidate.origin.unit or usable_unit(name, channel.unit) or ""
         origin = choose_motor_or_wheel(name, replace(candidate.origin, unit=unit), data[1], draft.machine)
         try:
-            converted = convert(name, data, origin, draft.machine)
+            converted = convert(name, data, origin, draft.machine, log.store)
         except ConfigError as error:
             reason = str(error)
             continue

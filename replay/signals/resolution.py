@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from replay.arrays.spill import blocks
+from replay.arrays.blocks import blocks
 
 Array = NDArray[np.float64]
 

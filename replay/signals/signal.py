@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from replay.arrays.column_store import ColumnStore
 from replay.log.source_options import SignalSource
 
 
@@ -69,12 +70,15 @@ class Signals:
         Guesses made and doubts about them, one sentence each.
     open_loop : bool
         Whether faults were written into the recording, so that its controller never met them.
+    store : ColumnStore
+        Where long columns stand.
     """
 
     items: Mapping[str, Signal]
     missing: Mapping[str, str]
     notes: tuple[str, ...] = ()
     open_loop: bool = False
+    store: ColumnStore = field(default_factory=ColumnStore, repr=False, compare=False)
 
     def without_samples(self) -> Signals:
         """The same signals with no sample left in them."""

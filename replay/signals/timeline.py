@@ -7,16 +7,20 @@ arrived, so that estimators count each sample once.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import Any, TypeVar
 
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from replay.arrays.spill import Column, beside, blocks, release
+from replay.arrays.blocks import blocks, release
+from replay.arrays.column_store import ColumnStore
 from replay.errors import LogError
 from replay.signals.signal import Signal, Signals
+
+State = TypeVar("State")
 
 MAX_STEPS = 200_000_000
 _LARGEST = 1e9
@@ -49,6 +53,8 @@ class Timeline:
         As in `Signals`.
     groups : Mapping[str, str]
         `Signal.group` of each signal; empty: those of one file are one group.
+    store : ColumnStore
+        Where long columns stand.
     """
 
     start_ns: int
@@ -61,6 +67,7 @@ class Timeline:
     notes: tuple[str, ...] = ()
     open_loop: bool = False
     groups: Mapping[str, str] = field(default_factory=dict)
+    store: ColumnStore = field(default_factory=ColumnStore, repr=False, compare=False)
     _beside: dict[tuple[str, ...], NDArray[np.float64]] = field(
         default_factory=dict, init=False, repr=False, compare=False
     )
@@ -86,8 +93,26 @@ class Timeline:
             return np.broadcast_to(np.nan, (self.size, len(key)))
         if key not in self._beside:
             nothing = np.broadcast_to(np.nan, (self.size,))
-            self._beside[key] = beside([self.signals.get(name, nothing) for name in key])
+            self._beside[key] = self.store.beside([self.signals.get(name, nothing) for name in key])
         return self._beside[key]
+
+    def blocks(self, multiple: int = 1) -> Iterator[slice]:
+        """Steps in blocks; see `ColumnStore.blocks`."""
+        return self.store.blocks(self.size, multiple)
+
+    def map(self, function: Callable[..., NDArray[Any]], *columns: NDArray[Any]) -> NDArray[Any]:
+        """Apply a function of whole rows block by block; see `ColumnStore.map`."""
+        return self.store.map(function, *columns)
+
+    def scan(
+        self,
+        kernel: Callable[..., tuple[tuple[NDArray[Any], ...], State]],
+        state: State,
+        *columns: NDArray[Any],
+        multiple: int = 1,
+    ) -> tuple[tuple[NDArray[Any], ...], State]:
+        """Run a recursion block by block with its state carried; see `ColumnStore.scan`."""
+        return self.store.scan(kernel, state, *columns, multiple=multiple)
 
 
 def median_period(stamps: NDArray[np.int64]) -> int:
@@ -154,7 +179,7 @@ def align(signals: Signals, start_s: float | None = None, stop_s: float | None =
             )
             if absurd:
                 notes.append(f"{name}: {absurd} values that are infinite or beyond {_LARGEST:g} count as no sample.")
-            values[name], fresh[name] = _hold(signal, periods.of(signal.stamps), start, step, size)
+            values[name], fresh[name] = _hold(signal, periods.of(signal.stamps), start, step, size, signals.store)
     return Timeline(
         start_ns=start,
         step_ns=step,
@@ -166,6 +191,7 @@ def align(signals: Signals, start_s: float | None = None, stop_s: float | None =
         notes=tuple(notes),
         open_loop=signals.open_loop,
         groups={k: s.group for k, s in signals.items.items()},
+        store=signals.store,
     )
 
 
@@ -178,16 +204,16 @@ def _snap(period: int) -> int:
 
 
 def _hold(
-    signal: Signal, period: int, start: int, step: int, size: int
+    signal: Signal, period: int, start: int, step: int, size: int, store: ColumnStore
 ) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
     """Latest sample at each step (half a step of tolerance), NaN once older than its holding time."""
     command = signal.name.startswith("cmd.") or signal.name.endswith("_ref")
     longest = max(_HOLD_PERIODS * period, 1.5 * step)
     if command:
         longest = max(longest, float(_COMMAND_HOLD_NS))
-    values, fresh = Column(np.float64, rows=size), Column(np.bool_, rows=size)
+    values, fresh = store.column(np.float64, rows=size), store.column(np.bool_, rows=size)
     at = -1
-    for part in blocks(size):
+    for part in store.blocks(size):
         held, new = np.empty(part.stop - part.start), np.empty(part.stop - part.start, np.bool_)
         begin = start + part.start * step
         at = _scan_hold(signal.stamps, signal.values, begin, step, longest, _LARGEST, at, held, new)

@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from replay.arrays.spill import in_blocks, keep, release
+from replay.arrays.blocks import release
+from replay.arrays.column_store import ColumnStore
 from replay.errors import ConfigError
 from replay.log.source_options import SignalSource
 from replay.log.stamp_order import spread_ticks
@@ -72,7 +73,11 @@ def factor_of(signal: str, origin: SignalSource, machine: Machine) -> float:
 
 
 def convert(
-    signal: str, data: tuple[NDArray[np.int64], NDArray[Any]], origin: SignalSource, machine: Machine
+    signal: str,
+    data: tuple[NDArray[np.int64], NDArray[Any]],
+    origin: SignalSource,
+    machine: Machine,
+    store: ColumnStore,
 ) -> Converted:
     """Order stamps, differentiate where asked, and convert: (recorded · gain + offset) · factor.
 
@@ -86,6 +91,8 @@ def convert(
         Conversion.
     machine : Machine
         For wheel size and gear ratio.
+    store : ColumnStore
+        Where long columns stand.
 
     Raises
     ------
@@ -97,8 +104,8 @@ def convert(
     if origin.derivative and recorded.dtype.kind in "iu" and len(recorded):
         recorded = recorded.astype(np.int64) - np.int64(recorded[0])  # exact before they become floats
     with np.errstate(all="ignore"):  # damaged logs hold any bits
-        values = in_blocks(lambda x: (np.asarray(x, np.float64) * origin.gain + origin.offset) * factor, recorded)
-        values = keep(slope(stamps, values)) if origin.derivative else values
+        values = store.map(lambda x: (np.asarray(x, np.float64) * origin.gain + origin.offset) * factor, recorded)
+        values = store.keep(slope(stamps, values)) if origin.derivative else values
     release(stamps, recorded)
     return Converted(stamps, values, notes)
 

@@ -10,7 +10,8 @@ from numpy.testing import assert_allclose
 
 from diagnosis.pipeline import diagnose
 from diagnosis.results.result import MissionResult
-from replay.arrays import envelope, spill
+from replay.arrays import blocks, envelope, spill
+from replay.arrays.column_store import ColumnStore
 from replay.export.mission import write_mission
 from replay.machine.config import haulotte
 from replay.simulation.options import SimulationOptions
@@ -40,12 +41,11 @@ def same(a: object, b: object, where: str = "") -> None:
 
 
 def in_blocks_of(steps: int, log: Path, monkeypatch: pytest.MonkeyPatch) -> MissionResult:
+    store = ColumnStore(block=steps, always=10_000, room=0, flush=5_000)
     with monkeypatch.context() as patch:
-        patch.setattr(spill, "BLOCK", steps)
-        patch.setattr(spill, "SPILL_BYTES", 10_000)
-        patch.setattr(spill, "ROOM", 0)
-        patch.setattr(spill, "FLUSH_BYTES", 5_000)
-        return diagnose([log], haulotte())
+        patch.setattr(blocks, "BLOCK", steps)
+        patch.setattr(spill, "STORE", store)
+        return diagnose([log], haulotte(), store=store)
 
 
 @pytest.mark.parametrize("evidence", ["base", "direct"])

@@ -35,7 +35,7 @@ def seen(size: int, *lost: tuple[int, int]) -> np.ndarray:
 
 @pytest.mark.parametrize("block", [1 << 19, 64, 7])
 def test_holes_are_where_every_signal_is_silent(monkeypatch: pytest.MonkeyPatch, block: int) -> None:
-    monkeypatch.setattr(spill, "BLOCK", block)
+    monkeypatch.setattr(spill.STORE, "block", block)
     a, b = seen(1000, (100, 200), (400, 420), (900, 1000)), seen(1000, (120, 260), (400, 420), (880, 1000))
     assert holes_of(timeline(a, b)) == [(120, 200), (900, 1000)]  # a fifth of a second is no hole
     assert holes_of(timeline(seen(1000, (0, 60)))) == [(0, 60)]

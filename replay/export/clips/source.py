@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from replay.arrays.spill import release
+from replay.arrays.blocks import release
 from replay.export.clips.mcap import Definitions, Records
 from replay.log.reading_notes import Report
 from replay.readers.mcap import format as fmt

@@ -6,6 +6,7 @@ from collections.abc import Collection
 from pathlib import Path
 from typing import Protocol
 
+from replay.arrays.column_store import ColumnStore
 from replay.log.raw_log import Clock, LogSummary, RawLog, Window
 from replay.log.source_options import SourceOptions
 
@@ -36,6 +37,7 @@ class Reader(Protocol):
         topics: Collection[str] | None = None,
         clock: Clock = "header",
         window: Window | None = None,
+        store: ColumnStore | None = None,
     ) -> RawLog:
         """Decode the numeric fields of the given topics (all where None) into columns.
 
@@ -52,6 +54,8 @@ class Reader(Protocol):
         window : tuple[int, int] or None
             Only messages with first ≤ log stamp < second [ns] (tables: their own stamps); None: all. What the index
             places outside is not opened.
+        store : ColumnStore or None
+            Where long columns stand; None: one of the log's own.
 
         Raises
         ------

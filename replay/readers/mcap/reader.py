@@ -8,7 +8,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from replay.arrays.spill import release
+from replay.arrays.blocks import release
+from replay.arrays.column_store import ColumnStore
 from replay.errors import LogError
 from replay.log.raw_log import AttachmentInfo, Clock, LogSummary, RawLog, TopicInfo, Window
 from replay.log.reading_notes import Report
@@ -58,6 +59,7 @@ class McapReader:
         topics: Collection[str] | None = None,
         clock: Clock = "header",
         window: Window | None = None,
+        store: ColumnStore | None = None,
     ) -> RawLog:
         """Decode the given topics and time.
 
@@ -66,7 +68,7 @@ class McapReader:
         LogError
             Where nothing in the file can be read.
         """
-        return read_files([path], path, self.format, Report(), topics, clock, window)
+        return read_files([path], path, self.format, Report(store=store or ColumnStore()), topics, clock, window)
 
 
 def read_files(

@@ -8,7 +8,7 @@ from collections.abc import Collection, Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from replay.arrays.spill import release
+from replay.arrays.blocks import release
 from replay.readers.mcap import format as fmt
 from replay.readers.mcap import scan
 from replay.readers.mcap.chunk import name_channels, open_chunk, take_names

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from replay.arrays.spill import in_blocks
+from replay.arrays.column_store import ColumnStore
 from replay.log.raw_log import Channel, Clock, LogSummary, RawLog
 from replay.log.reading_notes import Report
 from replay.readers.common.message_stamps import Clocks
@@ -206,8 +206,10 @@ class Assembler:
             topic = self.topics.get(key)
             if topic is None:
                 count = self.expected.get(key, 0)
-                stamps = Table(0, self.stamps, count, self.budget)
-                topic = self.topics[key] = _Topic(batch[0].connection, Store(count, self.budget), stamps)
+                stamps = Table(0, self.stamps, self.report.store, count, self.budget)
+                topic = self.topics[key] = _Topic(
+                    batch[0].connection, Store(count, self.budget, self.report.store), stamps
+                )
             topic.add([_within_range(b, self.report) for b in batch])
         self.batches += 1
         if self.batches % _LOOK_EVERY == 0:
@@ -242,7 +244,7 @@ class Assembler:
             notes=tuple(dict.fromkeys((*summary.notes, *self.report.notes))),
             damage=tuple(dict.fromkeys((*summary.damage, *self.report.damage))),
         )
-        return RawLog(summary.source, summary.format, self.clock, channels, summary)
+        return RawLog(summary.source, summary.format, self.clock, channels, summary, self.report.store)
 
     def _channels(self, label: str, topic: _Topic) -> Iterable[Channel]:
         count = topic.store.count
@@ -251,7 +253,7 @@ class Assembler:
         if topic.mute or not count:
             return
         log, *publish = topic.stamps.finish()[1]
-        header = _take_header(topic.stamp, columns, count, topic.outcome.bad)
+        header = _take_header(topic.stamp, columns, count, topic.outcome.bad, self.report.store)
         stamps = self.clocks.stamps(label, header, log, publish[0] if publish else log)
         shared: dict[int, tuple[NDArray[np.int64], NDArray[np.int64]]] = {}
         for path, (rows, values) in columns.items():
@@ -285,13 +287,13 @@ class Assembler:
 
 
 def _take_header(
-    path: str | None, columns: dict[str, Cells], count: int, bad: int
+    path: str | None, columns: dict[str, Cells], count: int, bad: int, store: ColumnStore
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]] | None:
     """Take the header stamp out of the columns: rows that should have one, and stamps of all rows [ns], 0 for none."""
     sec, nsec = (columns.pop(f"{path}.{part}", None) for part in ("sec", "nanosec"))
     if sec is None or nsec is None or len(sec[1]) != len(nsec[1]):
         return None
-    whole = in_blocks(_nanoseconds, sec[1], nsec[1])
+    whole = store.map(_nanoseconds, sec[1], nsec[1])
     if sec[0] is not None:
         header = np.zeros(count, np.int64)
         header[sec[0]] = whole

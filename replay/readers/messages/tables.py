@@ -18,7 +18,7 @@ from typing import IO, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from replay.arrays.spill import Column
+from replay.arrays.column_store import Column, ColumnStore
 from replay.errors import LogError
 from replay.readers.messages.cdr_program import Spec
 from replay.readers.messages.encodings import width_of
@@ -138,14 +138,23 @@ class Table:
         Its number among the topic's tables.
     specs : tuple[Spec, ...]
         Its columns.
+    store : ColumnStore
+        Where long columns stand.
     expected : int
         How many rows are foretold; 0 where nothing is known.
     budget : Budget or None
         Where room for them is taken from.
     """
 
-    def __init__(self, number: int, specs: tuple[Spec, ...], expected: int = 0, budget: Budget | None = None) -> None:
-        self.number, self.specs = number, specs
+    def __init__(
+        self,
+        number: int,
+        specs: tuple[Spec, ...],
+        store: ColumnStore,
+        expected: int = 0,
+        budget: Budget | None = None,
+    ) -> None:
+        self.number, self.specs, self.store = number, specs, store
         widths = [width_of(_stored(s)) for s in specs]
         self.counts = tuple(widths.count(size) for size in SIZES)
         seen = dict.fromkeys(SIZES, -1)
@@ -206,7 +215,7 @@ class Table:
                 if len(cells):
                     cells[:, self.used : self.used + count] = cells[:, self.used + picked]
         if self.rows is None and (picked is not None or before != self.count):
-            self.rows = Column(np.int64)
+            self.rows = self.store.column(np.int64)
             self.rows.append(np.arange(self.count))
         if self.rows is not None:
             self.rows.append(before + (np.arange(rows) if picked is None else picked))

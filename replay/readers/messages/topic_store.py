@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from replay.arrays.column_store import ColumnStore
 from replay.readers.messages.cdr_layout import MAX_ELEMENTS
 from replay.readers.messages.cdr_program import Spec
 from replay.readers.messages.tables import SIZES, Budget, Cells, Rows, Table
@@ -48,12 +49,15 @@ class Store:
         How many are foretold; 0 where nothing is known.
     budget : Budget or None
         Where room for them is taken from.
+    columns : ColumnStore
+        Where long columns stand.
     skipped : set[str]
         Arrays too long to become channels.
     """
 
     expected: int = 0
     budget: Budget | None = None
+    columns: ColumnStore = field(default_factory=ColumnStore)
     count: int = 0
     skipped: set[str] = field(default_factory=set)
     tables: dict[frozenset[Spec], Table] = field(default_factory=dict)
@@ -67,7 +71,7 @@ class Store:
         key = frozenset(specs)
         if key not in self.tables:
             expected = 0 if self.tables else self.expected
-            self.tables[key] = Table(len(self.tables), specs, expected, self.budget)
+            self.tables[key] = Table(len(self.tables), specs, self.columns, expected, self.budget)
         return self.tables[key]
 
     def begin(self, rows: int) -> None:

@@ -11,6 +11,7 @@ import lz4.frame
 import numpy as np
 from numpy.typing import NDArray
 
+from replay.arrays.column_store import ColumnStore
 from replay.errors import LogError
 from replay.log.raw_log import Clock, LogSummary, RawLog, TopicInfo, Window
 from replay.log.reading_notes import Report
@@ -69,6 +70,7 @@ class Ros1BagReader:
         topics: Collection[str] | None = None,
         clock: Clock = "header",
         window: Window | None = None,
+        store: ColumnStore | None = None,
     ) -> RawLog:
         """Decode the given topics and time; chunks that the index places outside are not opened.
 
@@ -77,7 +79,7 @@ class Ros1BagReader:
         LogError
             Where nothing in the bag can be read.
         """
-        assembler = Assembler(clock, report := Report())
+        assembler = Assembler(clock, report := Report(store=store or ColumnStore()))
 
         def take(part: Path) -> LogSummary:
             mine = Report() if path.is_dir() else report

@@ -8,6 +8,7 @@ from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
+from replay.arrays.column_store import ColumnStore
 from replay.errors import LogError
 from replay.log.raw_log import Clock, LogSummary, RawLog, Window
 from replay.log.reading_notes import Report
@@ -61,6 +62,7 @@ class Rosbag2Reader:
         topics: Collection[str] | None = None,
         clock: Clock = "header",
         window: Window | None = None,
+        store: ColumnStore | None = None,
     ) -> RawLog:
         """Decode the given topics and time of all parts.
 
@@ -70,7 +72,7 @@ class Rosbag2Reader:
             Where no part can be read.
         """
         with tempfile.TemporaryDirectory(prefix="mfhca-") as scratch:
-            report = Report()
+            report = Report(store=store or ColumnStore())
             files, meta = find_parts(path, report, Path(scratch))
             packed = meta.facts.get("compression_mode") == "message"
             if _is_mcap(files, path):

@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from replay.arrays.spill import Column, blocks
+from replay.arrays.blocks import blocks
+from replay.arrays.column_store import Column, ColumnStore
 from replay.log.raw_log import Window
 from replay.readers.tables.row_kernel import MISSING, REAL
 
@@ -17,8 +18,9 @@ from replay.readers.tables.row_kernel import MISSING, REAL
 class CellColumn:
     """A growing column of 8-byte cells: integers first, doubles from the block on in which the parser met one."""
 
-    def __init__(self) -> None:
-        self._cells = Column(np.int64)
+    def __init__(self, store: ColumnStore) -> None:
+        self._store = store
+        self._cells = store.column(np.int64)
         self._whole: int | None = None
 
     def append(self, cells: NDArray[np.int64], kind: int) -> None:
@@ -36,7 +38,7 @@ class CellColumn:
         empty = any((cells[s] == MISSING).any() for s in blocks(whole))
         if whole == len(cells) and not empty:
             return cells
-        reals = Column(np.float64)
+        reals = self._store.column(np.float64)
         for s in blocks(whole):
             part = cells[s]
             reals.append(np.where(part == MISSING, np.nan, part.astype(np.float64)))
@@ -52,16 +54,17 @@ class CellColumn:
 class ArrayColumn:
     """A growing column of any number type; blocks of another type than the first make it float64."""
 
-    def __init__(self) -> None:
+    def __init__(self, store: ColumnStore) -> None:
+        self._store = store
         self._parts: Column | None = None
 
     def append(self, values: NDArray[Any]) -> None:
         """Add values, shape (m,)."""
         if self._parts is None:
-            self._parts = Column(values.dtype)
+            self._parts = self._store.column(values.dtype)
         elif self._parts.dtype != values.dtype:
             before, common = self._parts.finish(), np.result_type(self._parts.dtype, values.dtype)
-            self._parts = Column(common)
+            self._parts = self._store.column(common)
             for s in blocks(len(before)):
                 self._parts.append(before[s])
         self._parts.append(values)
@@ -79,11 +82,11 @@ def pick(stamps: NDArray[np.int64], window: Window | None) -> NDArray[np.bool_]:
     return keep
 
 
-def compressed(values: NDArray[Any], keep: NDArray[np.bool_]) -> NDArray[Any]:
-    """Return the kept values; the same array where all are kept, a spilled one where many are."""
+def compressed(values: NDArray[Any], keep: NDArray[np.bool_], store: ColumnStore) -> NDArray[Any]:
+    """Return the kept values, as a column of the store; the same array where all are kept."""
     if keep.all():
         return values
-    kept = Column(values.dtype)
+    kept = store.column(values.dtype)
     for s in blocks(len(values)):
         kept.append(values[s][keep[s]])
     return kept.finish()

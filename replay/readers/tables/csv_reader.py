@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from replay.arrays.column_store import ColumnStore
 from replay.errors import LogError
 from replay.log.raw_log import Clock, LogSummary, RawLog, TopicInfo, Window
 from replay.log.reading_notes import Report
@@ -81,6 +82,7 @@ class CsvReader:
         topics: Collection[str] | None = None,
         clock: Clock = "header",
         window: Window | None = None,
+        store: ColumnStore | None = None,
     ) -> RawLog:
         """Read all columns.
 
@@ -89,13 +91,13 @@ class CsvReader:
         LogError
             Where the table cannot be understood or has no time column.
         """
-        report = Report()
+        report = Report(store=store or ColumnStore())
         table = open_text(path, options, report)
         sample, name, unit = _time(table, options, report)
         time = name, unit, unit == "iso" or sample[name].dtype.kind == "M"
-        found = _read(table, time, options, window)
+        found = _read(table, time, options, window, report.store)
         if not table.sure and any(_has_comma(cell) for cell in found.rows.examples.values()):
-            found = _read(table.commas(), time, options, window)
+            found = _read(table.commas(), time, options, window, report.store)
         report.damage += found.rows.report.damage
         return _log(table, found, report, clock)
 
@@ -127,16 +129,18 @@ def _time(table: TextTable, options: SourceOptions, report: Report) -> tuple[Sam
     raise AssertionError("unreachable")
 
 
-def _read(table: TextTable, time: tuple[str, str, bool], options: SourceOptions, window: Window | None) -> _Found:
+def _read(
+    table: TextTable, time: tuple[str, str, bool], options: SourceOptions, window: Window | None, store: ColumnStore
+) -> _Found:
     """One pass over a table whose time column has this name and unit, and may hold dates."""
     name, unit, dated = time
-    report = Report()
+    report = Report(store=store)
     rows = table.rows(report)
     at = table.names.index(name)
     if dated:
         rows.kinds[at] = MOMENT
     times = RowTimes(table.file.path, name, unit, dated, options, window, report)
-    columns = {n: CellColumn() for n in table.names if n != name}
+    columns = {n: CellColumn(store) for n in table.names if n != name}
     order = [(i, columns[n]) for i, n in enumerate(table.names) if n != name]
     for cells in table.blocks(rows):
         keep = times.keep(cells[at].view(np.float64) if rows.kinds[at] == REAL else cells[at])

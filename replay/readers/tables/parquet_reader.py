@@ -13,6 +13,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
+from replay.arrays.column_store import ColumnStore
 from replay.errors import LogError
 from replay.log.raw_log import Clock, LogSummary, RawLog, TopicInfo, Window
 from replay.log.reading_notes import Report
@@ -73,6 +74,7 @@ class ParquetReader:
         topics: Collection[str] | None = None,
         clock: Clock = "header",
         window: Window | None = None,
+        store: ColumnStore | None = None,
     ) -> RawLog:
         """Read all columns of numbers; row groups whose statistics lie outside the window are not opened.
 
@@ -81,12 +83,12 @@ class ParquetReader:
         LogError
             Where the file cannot be read or has no time column.
         """
-        report = Report()
+        report = Report(store=store or ColumnStore())
         with _opened(path) as file:
             table = _Parquet(path, file)
             name, unit = table.time(options, report)
             times = RowTimes(path, name, unit, table.dated(name), options, window, report)
-            columns = {n: ArrayColumn() for n in table.numeric if n != name}
+            columns = {n: ArrayColumn(report.store) for n in table.numeric if n != name}
             groups = table.groups(name, unit, epoch_ns(options, str(path), unit), window)
             for cells in table.blocks([name, *columns], groups):
                 keep = times.keep(cells[name])

@@ -9,7 +9,6 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from replay.arrays.spill import Column
 from replay.errors import LogError
 from replay.log.raw_log import Channel, Clock, LogSummary, RawLog, TopicInfo, Window
 from replay.log.reading_notes import Report
@@ -61,7 +60,7 @@ class RowTimes:
         )
         self._early = None if unit == "dt" else window
         self._late = window if unit == "dt" else None
-        self._stamps = Column(np.int64)
+        self._stamps = report.store.column(np.int64)
         self.seen = 0
 
     def keep(self, cells: NDArray[Any]) -> NDArray[np.bool_]:
@@ -93,7 +92,7 @@ class RowTimes:
         if self._late is None:
             return stamps, None
         remain = pick(stamps, self._late)
-        return compressed(stamps, remain), remain
+        return compressed(stamps, remain, self.report.store), remain
 
 
 def table_log(
@@ -125,11 +124,11 @@ def table_log(
         Where no row has a time.
     """
     at, remain = times.finish()
+    report = times.report
     channels: dict[str, Channel] = {}
     for label, column in columns.items():
-        values = column.finish() if remain is None else compressed(column.finish(), remain)
+        values = column.finish() if remain is None else compressed(column.finish(), remain, report.store)
         channels[label] = Channel(label, "", label, at, values, unit_of(label), str(values.dtype))
-    report = times.report
     if texts:
         report.note(f"{path.name}: columns of text were left out: {', '.join([*texts][:6])}")
     back = int(sum(np.count_nonzero(np.diff(at[i : i + 1_048_577]) < 0) for i in range(0, len(at), 1_048_576)))
@@ -138,4 +137,5 @@ def table_log(
     topic = TopicInfo(path.name, "table", len(at), "table", tuple(channels))
     start, stop = (int(at.min()), int(at.max())) if len(at) else (0, 0)
     said = tuple(report.notes), tuple(report.damage)
-    return RawLog(str(path), form, clock, channels, LogSummary(str(path), form, start, stop, (topic,), *said, metadata))
+    summary = LogSummary(str(path), form, start, stop, (topic,), *said, metadata)
+    return RawLog(str(path), form, clock, channels, summary, report.store)

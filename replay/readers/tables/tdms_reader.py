@@ -11,7 +11,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from replay.arrays.spill import Column, blocks
+from replay.arrays.blocks import blocks
+from replay.arrays.column_store import ColumnStore
 from replay.errors import LogError
 from replay.log.raw_log import Channel, Clock, LogSummary, RawLog, TopicInfo, Window
 from replay.log.reading_notes import Report
@@ -44,7 +45,7 @@ class TdmsReader:
         LogError
             Where npTDMS is absent or the file cannot be read.
         """
-        return self._log(path, options, "header", None, decode=False).summary
+        return self._log(path, options, "header", None, Report(), decode=False).summary
 
     def read(
         self,
@@ -53,6 +54,7 @@ class TdmsReader:
         topics: Collection[str] | None = None,
         clock: Clock = "header",
         window: Window | None = None,
+        store: ColumnStore | None = None,
     ) -> RawLog:
         """Read all channels of numbers.
 
@@ -61,10 +63,11 @@ class TdmsReader:
         LogError
             Where npTDMS is absent, the file cannot be read, or none of its channels has a time.
         """
-        return self._log(path, options, clock, window, decode=True)
+        return self._log(path, options, clock, window, Report(store=store or ColumnStore()), decode=True)
 
-    def _log(self, path: Path, options: SourceOptions, clock: Clock, window: Window | None, decode: bool) -> RawLog:
-        report = Report()
+    def _log(
+        self, path: Path, options: SourceOptions, clock: Clock, window: Window | None, report: Report, decode: bool
+    ) -> RawLog:
         channels: dict[str, Channel] = {}
         topics: list[TopicInfo] = []
         ends: list[int] = []
@@ -113,7 +116,7 @@ class TdmsReader:
         said = tuple(report.notes), tuple(report.damage)
         start, stop = (min(ends), max(ends)) if ends else (0, 0)
         summary = LogSummary(str(path), self.format, start, stop, tuple(topics), *said)
-        return RawLog(str(path), self.format, clock, channels, summary)
+        return RawLog(str(path), self.format, clock, channels, summary, report.store)
 
 
 def _tell_short(path: Path, group: Any, report: Report) -> None:
@@ -226,7 +229,7 @@ class _GroupTimes:
                 f"{self.label}: wf_increment = {step} s over {len(channel)} samples is no time; record it again"
             )
         if key not in self._waves:
-            stamps = Column(np.int64)
+            stamps = self.report.store.column(np.int64)
             for s in blocks(len(channel)):
                 stamps.append(zero + np.rint((np.arange(s.start, s.stop) * step + ahead) * 1e9).astype(np.int64))
             self._waves[key] = stamps.finish()
@@ -236,7 +239,7 @@ class _GroupTimes:
         """Stamps that are there and lie in the window, and which these are; the same array for the same stamps."""
         if id(stamps) not in self._kept:
             keep = pick(stamps, window)
-            self._kept[id(stamps)] = compressed(stamps, keep), keep
+            self._kept[id(stamps)] = compressed(stamps, keep, self.report.store), keep
         return self._kept[id(stamps)]
 
     def _of_channel(self) -> NDArray[np.int64]:
@@ -247,7 +250,7 @@ class _GroupTimes:
         base = TimeBase(
             "iso" if dated else unit, 0 if dated else epoch, f"{self.label}, {self.channel.name!r}", self.report
         )
-        stamps = Column(np.int64)
+        stamps = self.report.store.column(np.int64)
         for s in blocks(len(self.channel)):
             cells = self.channel[s.start : s.stop]
             stamps.append(base.stamps(cells.astype("M8[ns]").astype(np.int64) if dated else cells))
@@ -258,10 +261,11 @@ class _GroupTimes:
 
 
 def _channel(label: str, channel: Any, stamps: NDArray[np.int64], window: Window | None, times: _GroupTimes) -> Channel:
-    values = Column(channel.dtype)
+    store = times.report.store
+    values = store.column(channel.dtype)
     for s in blocks(len(channel)):
         values.append(np.asarray(channel[s.start : s.stop], channel.dtype))
     at, keep = times.kept(stamps, window)
     unit = channel.properties.get("unit_string")
-    found = compressed(values.finish(), keep)
+    found = compressed(values.finish(), keep, store)
     return Channel(label, "", channel.name, at, found, str(unit).strip() or None if unit else None, str(channel.dtype))

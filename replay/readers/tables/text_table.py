@@ -107,7 +107,7 @@ class TextTable:
 
 
 def _gathered(rows: Rows, text: bytes) -> list[NDArray[Any]]:
-    columns = [CellColumn() for _ in rows.kinds]
+    columns = [CellColumn(rows.report.store) for _ in rows.kinds]
     for cells in rows.blocks([text], 0):
         for column, kind, values in zip(columns, rows.kinds, cells, strict=True):
             column.append(values, int(kind))

@@ -15,7 +15,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from replay.arrays.spill import Column, blocks
+from replay.arrays.blocks import blocks
+from replay.arrays.column_store import ColumnStore
 from replay.errors import LogError
 from replay.log.raw_log import Channel, Clock, LogSummary, RawLog, TopicInfo, Window
 from replay.log.reading_notes import Report
@@ -80,6 +81,7 @@ class SvdxReader:
         topics: Collection[str] | None = None,
         clock: Clock = "header",
         window: Window | None = None,
+        store: ColumnStore | None = None,
     ) -> RawLog:
         """Read all channels.
 
@@ -88,12 +90,12 @@ class SvdxReader:
         LogError
             Where a length does not fit, with its byte.
         """
-        report = Report()
+        report = Report(store=store or ColumnStore())
         channels: dict[str, Channel] = {}
         infos: list[TopicInfo] = []
         with _mapped(path) as (data, frame):
             for name, block, facts, head, dtype in _channels(path, data, frame, report):
-                stamps, values = _samples(path, data, block, head, dtype, window)
+                stamps, values = _samples(path, data, block, head, dtype, window, report.store)
                 gain = _scaling(path, facts) if options.scale else None
                 if gain is not None:
                     values = values * gain[0] + gain[1]
@@ -105,7 +107,7 @@ class SvdxReader:
         start, stop = (int(min(s.min() for s in used)), int(max(s.max() for s in used))) if used else (0, 0)
         said = tuple(report.notes), tuple(report.damage)
         summary = LogSummary(str(path), self.format, start, stop, tuple(infos), *said)
-        return RawLog(str(path), self.format, clock, channels, summary)
+        return RawLog(str(path), self.format, clock, channels, summary, report.store)
 
 
 @contextmanager
@@ -196,12 +198,18 @@ def _segments(
 
 
 def _samples(
-    path: Path, data: NDArray[np.uint8], block: Block, head: BlockHead, dtype: np.dtype[Any], window: Window | None
+    path: Path,
+    data: NDArray[np.uint8],
+    block: Block,
+    head: BlockHead,
+    dtype: np.dtype[Any],
+    window: Window | None,
+    store: ColumnStore,
 ) -> tuple[NDArray[np.int64], NDArray[Any]]:
     """Stamps [ns] and values of one block."""
     starts, counts = _segments(path, data, block, head, dtype.itemsize)
     row = np.dtype([("tick", "<u4"), ("value", dtype)])
-    stamps, values = Column(np.int64), ArrayColumn()
+    stamps, values = store.column(np.int64), ArrayColumn(store)
     at = 0
     while at < len(starts):
         first, count = int(starts[at]), int(counts[at])

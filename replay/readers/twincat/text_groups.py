@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from replay.arrays.spill import Column
+from replay.arrays.column_store import Column
 from replay.errors import LogError
 from replay.log.raw_log import Window
 from replay.log.reading_notes import Report
@@ -30,8 +30,8 @@ class Group:
     first: int
     stop: int
     base: TimeBase
-    stamps: Column = field(default_factory=lambda: Column(np.int64))
-    columns: dict[int, CellColumn] = field(default_factory=dict)
+    stamps: Column
+    columns: dict[int, CellColumn]
 
     def add(self, cells: NDArray[np.int64], kinds: NDArray[np.int8], window: Window | None) -> None:
         """Take the rows of a block in which this group holds a time or a value.
@@ -83,7 +83,8 @@ def make_groups(scope: Scope, sample: NDArray[np.int64], kinds: NDArray[np.int8]
     for g, first in enumerate(scope.times):
         stop = scope.times[g + 1] if g + 1 < len(scope.times) else scope.width
         base = TimeBase(unit, epoch, f"{scope.file.path.name}, group {g + 1}", report)
-        groups.append(Group(first, stop, base, columns={i: CellColumn() for i in range(first + 1, stop)}))
+        columns = {i: CellColumn(report.store) for i in range(first + 1, stop)}
+        groups.append(Group(first, stop, base, report.store.column(np.int64), columns))
     return groups
 
 
@@ -111,7 +112,7 @@ def finished_stamps(
         if left:
             report.lost(f"{group.base.label}: {left} rows hold values without a time and were left out")
         remain = pick(filled, window)
-        stamps = compressed(filled, remain)
+        stamps = compressed(filled, remain, report.store)
     if len(stamps) > 1 and (np.diff(stamps) < 0).mean() > 0.5:
         raise LogError(f"{scope.file.path}: column {group.first + 1} should hold times but runs backwards; {HOW}")
     return stamps, remain
@@ -215,10 +216,10 @@ class Repeats:
         if key not in self._rows:
             phase = (stamps - zero + round(step / 2)) % period
             fresh = phase < step
-            self._rows[key] = compressed(stamps, fresh), fresh
+            self._rows[key] = compressed(stamps, fresh, self.report.store), fresh
         self.thinned.append(label)
         at, fresh = self._rows[key]
-        return at, compressed(values, fresh)
+        return at, compressed(values, fresh, self.report.store)
 
     def finish(self) -> None:
         """Tell what was found."""

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from replay.arrays.column_store import ColumnStore
 from replay.errors import LogError
 from replay.log.raw_log import Channel, Clock, LogSummary, RawLog, TopicInfo, Window
 from replay.log.reading_notes import Report
@@ -84,6 +85,7 @@ class TwincatCsvReader:
         topics: Collection[str] | None = None,
         clock: Clock = "header",
         window: Window | None = None,
+        store: ColumnStore | None = None,
     ) -> RawLog:
         """Read all channels.
 
@@ -92,12 +94,12 @@ class TwincatCsvReader:
         LogError
             Where the export cannot be understood; the message says how to export again.
         """
-        report = Report()
+        report = Report(store=store or ColumnStore())
         scope = open_scope(path, report)
-        found = _Pass(scope, window)
+        found = _Pass(scope, window, report.store)
         if not scope.sure and any("," in cell for cell in found.rows.examples.values()):
             scope = scope.commas()
-            found = _Pass(scope, window)
+            found = _Pass(scope, window, report.store)
         for text in found.report.damage:
             report.lost(text)
         return _log(scope, found, options, clock, window, report)
@@ -106,8 +108,8 @@ class TwincatCsvReader:
 class _Pass:
     """One pass over the rows of an export."""
 
-    def __init__(self, scope: Scope, window: Window | None) -> None:
-        self.report = Report()
+    def __init__(self, scope: Scope, window: Window | None, store: ColumnStore) -> None:
+        self.report = Report(store=store)
         head, kinds, _ = _sampled(scope, scope.sample)
         self.groups = make_groups(scope, head, kinds, self.report)
         self.rows = Rows(scope.file.path.name, scope.dialect, scope.width, self.report, _SPARSE)
@@ -189,7 +191,7 @@ def _log(
                     f"{path.name}: {rows.columns[i, TEXT]} cells of {label} are no numbers; they became empty "
                     f"({rows.example(i)})"
                 )
-            values = column.finish() if remain is None else compressed(column.finish(), remain)
+            values = column.finish() if remain is None else compressed(column.finish(), remain, report.store)
             at, values = repeats.drop(group, i, label, stamps, values)
             shown, unit, kind = scope.rows["name"][i], scope.cell("unit", i), scope.cell("data-type", i)
             members.append(label)
@@ -204,7 +206,7 @@ def _log(
     start, stop = (int(min(s.min() for s in used)), int(max(s.max() for s in used))) if used else (0, 0)
     said = tuple(report.notes), tuple(report.damage)
     summary = LogSummary(str(path), "twincat", start, stop, tuple(topics), *said, scope.metadata)
-    return RawLog(str(path), "twincat", clock, channels, summary)
+    return RawLog(str(path), "twincat", clock, channels, summary, report.store)
 
 
 def _scaled(scope: Scope, values: NDArray[Any], index: int, options: SourceOptions, label: str) -> NDArray[Any]:

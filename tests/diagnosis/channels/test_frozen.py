@@ -28,7 +28,7 @@ def speeds() -> tuple[np.ndarray, np.ndarray]:
 @pytest.mark.parametrize("block", [1 << 19, 100])
 @pytest.mark.parametrize("value", [0.0, 0.21])
 def test_a_number_that_never_changes(monkeypatch: pytest.MonkeyPatch, block: int, value: float) -> None:
-    monkeypatch.setattr(spill, "BLOCK", block)
+    monkeypatch.setattr(spill.STORE, "block", block)
     v, command = speeds()
     v[:, 2] = value
     v[:50, 2] = np.nan

@@ -30,7 +30,7 @@ def results(tmp_path_factory: pytest.TempPathFactory) -> tuple[MissionResult, Mi
         full = diagnose([log], haulotte())
         patch.setattr(envelope, "FULL_STEPS", 10_000)
         patch.setattr(envelope, "_BUCKETS", 6_000)
-        patch.setattr("replay.arrays.spill.BLOCK", 3_304)
+        patch.setattr("replay.arrays.spill.STORE.block", 3_304)
         return full, diagnose([log], haulotte())
 
 

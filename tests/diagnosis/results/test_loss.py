@@ -60,7 +60,7 @@ def test_blocks_change_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
     x, y = drive(3, 0.05)
     use = np.ones(x.size, np.bool_)
     whole = loss_of(y, x, use, DT)
-    monkeypatch.setattr(spill, "BLOCK", 700)
+    monkeypatch.setattr(spill.STORE, "block", 700)
     assert loss_of(y, x, use, DT) == whole
 
 

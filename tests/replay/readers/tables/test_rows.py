@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from replay.arrays.column_store import ColumnStore
 from replay.errors import LogError
 from replay.log.reading_notes import Report
 from replay.readers.tables.columns import CellColumn
@@ -40,7 +41,7 @@ def naive(cell: str) -> tuple[float, bool]:
 
 def parsed(text: bytes, width: int, dialect: Dialect, cuts: int) -> tuple[Rows, list[np.ndarray]]:
     rows = Rows("t.csv", dialect, width, Report())
-    columns = [CellColumn() for _ in range(width)]
+    columns = [CellColumn(ColumnStore()) for _ in range(width)]
     for cells in rows.blocks([text[i : i + cuts] for i in range(0, len(text), cuts)], 0):
         for i, column in enumerate(columns):
             column.append(cells[i], int(rows.kinds[i]))
