@@ -92,10 +92,10 @@ def test_nothing_is_scanned_as_one_empty_block(tiny: ColumnStore) -> None:
 
 
 def test_room_is_shared_by_the_columns_of_a_store_and_free_again_after_them() -> None:
-    store = ColumnStore(always=64, room=1000)
+    store = ColumnStore(block=50, always=64, room=1000)
     first, second = store.keep(np.zeros(100)), store.keep(np.zeros(100))
     assert (in_file(first), in_file(second), store.used) == (False, True, 800)
-    assert not in_file(ColumnStore(always=64, room=1000).keep(np.zeros(100)))
+    assert not in_file(ColumnStore(block=50, always=64, room=1000).keep(np.zeros(100)))
     del first
     gc.collect()
     assert store.used == 0
