@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from diagnosis.channels.frozen import frozen_sensor, frozen_speeds
-from diagnosis.channels.liveness import alive, alive_sources, make_pair
-from diagnosis.channels.pairs import Pair
+from diagnosis.channels.liveness import alive, alive_sources
 from diagnosis.direct.assess import assess_pair
+from diagnosis.direct.inputs import Pair, make_pair
 from diagnosis.drives.assess import DriveData, assess_drive
 from diagnosis.drives.tracking import assess_tracking
 from diagnosis.results.assessment import Assessment, unassessed

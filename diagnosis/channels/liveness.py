@@ -1,4 +1,4 @@
-"""A signal among those recorded with it: whether these live, and a channel paired with its reference."""
+"""A signal among those recorded with it: whether these live."""
 
 from __future__ import annotations
 
@@ -7,10 +7,6 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from diagnosis.channels.pairs import Pair
-from replay.arrays.spill import blocks
-from replay.faults import Side
-from replay.machine.config import Machine, Noise
 from replay.signals.signal import quantity_kind
 from replay.signals.timeline import Timeline
 
@@ -70,35 +66,3 @@ def _gaps(timeline: Timeline, name: str) -> tuple[NDArray[np.intp], NDArray[np.b
     """Steps with a sample, −1 and n at the ends, shape (k + 1,), and which of the k distances are gaps."""
     edge = np.r_[-1, np.flatnonzero(timeline.fresh[name]), timeline.size]
     return edge, np.diff(edge) * timeline.step_ns > _GAP_PERIODS * max(timeline.periods_ns[name], timeline.step_ns)
-
-
-def make_pair(
-    timeline: Timeline,
-    counts: dict[str, NDArray[np.int16]],
-    side: Side,
-    y_name: str,
-    x_name: str,
-    quiet: NDArray[np.bool_],
-    unit: str,
-    span: float,
-    machine: Machine,
-) -> Pair:
-    """Channel and reference of one component and side."""
-    y, x = timeline.signals[y_name], timeline.signals[x_name]
-    largest = 0.0
-    if np.isfinite(y).any():
-        largest = max(float(np.nanmax(np.abs(z[part]), initial=0.0)) for z in (y, x) for part in blocks(timeline.size))
-    return Pair(
-        side=side,
-        y=y,
-        x=x,
-        fresh=timeline.fresh[y_name],
-        alive=alive(timeline, counts, y_name),
-        quiet=quiet,
-        dt=timeline.dt,
-        unit=unit,
-        span=max(span, largest),
-        y_name=y_name,
-        x_name=x_name,
-        known_noise=machine.noise.get(y_name, Noise()),
-    )

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from diagnosis.direct.onset import Channel
-from diagnosis.estimation import fault_models
+from diagnosis.channels.sample_status import SILENT
+from diagnosis.estimation.fault_models import HEALTHY, INEFFICIENT, NO_SIGNAL, NOISY, ModeModel
+from diagnosis.estimation.filter_kernel import segment_evidence
+from diagnosis.estimation.samples import Samples
 from diagnosis.estimation.segments import Run, absorb_short, join_noisy, merge_equal, runs_of, trim
 from diagnosis.estimation.viterbi import ModePath
 
@@ -11,20 +13,17 @@ _BRIDGE_S, _APART_S = 5.0, 30.0
 _BRIEF_S = 0.1
 
 
-def fault_runs(path: ModePath, channel: Channel, model: fault_models.ModeModel, dt: float, shortest: int) -> list[Run]:
+def fault_runs(path: ModePath, samples: Samples, model: ModeModel, dt: float, shortest: int) -> list[Run]:
     """Faulty runs of a path, joined where they belong together, without the ends in which nothing moves."""
     runs = absorb_short(runs_of(path), shortest)
     runs = join_noisy(runs)
-    runs = merge_equal(
-        runs, max(2, round(0.02 / dt)), (fault_models.NOISY, fault_models.INEFFICIENT, fault_models.NO_SIGNAL)
-    )
-    runs = _bridged(_renamed([r for r in runs if r.row != fault_models.HEALTHY], channel, model), channel, model)
+    runs = merge_equal(runs, max(2, round(0.02 / dt)), (NOISY, INEFFICIENT, NO_SIGNAL))
+    runs = _bridged(_renamed([r for r in runs if r.row != HEALTHY], samples, model), samples, model)
     out = []
     for run in runs:
-        if run.row in (fault_models.INEFFICIENT, fault_models.NO_SIGNAL):
-            status = channel.status[run.start : run.stop]
-            silent = status == fault_models.SILENT
-            still = channel.quiet if not silent.any() else channel.quiet & (channel.status != fault_models.SILENT)
+        if run.row in (INEFFICIENT, NO_SIGNAL):
+            silent = samples.status[run.start : run.stop] == SILENT
+            still = samples.quiet if not silent.any() else samples.quiet & (samples.status != SILENT)
             kept = trim(run, still)
             if kept is None:
                 continue
@@ -33,7 +32,7 @@ def fault_runs(path: ModePath, channel: Channel, model: fault_models.ModeModel, 
     return out
 
 
-def _renamed(runs: list[Run], channel: Channel, model: fault_models.ModeModel) -> list[Run]:
+def _renamed(runs: list[Run], samples: Samples, model: ModeModel) -> list[Run]:
     """Noisy runs beside another one under that one's row, where it explains them better: the path never went back."""
     out = list(runs)
     for i, run in enumerate(runs):
@@ -42,11 +41,11 @@ def _renamed(runs: list[Run], channel: Channel, model: fault_models.ModeModel) -
             for r in out[max(0, i - 1) : i] + runs[i + 1 : i + 2]
             if min(abs(run.start - r.stop), abs(r.start - run.stop)) < 3
         ]
-        if run.row != fault_models.NOISY or not near:
+        if run.row != NOISY or not near:
             continue
-        evidence = channel.part(*inner(run)).evidence(model)
+        evidence = segment_evidence(samples.part(*inner(run)), model)
         best = max((r.row for r in near), key=lambda row: evidence[row])
-        if evidence[best] > evidence[fault_models.NOISY] + model.switch_cost:
+        if evidence[best] > evidence[NOISY] + model.switch_cost:
             out[i] = Run(run.start, run.stop, best)
     return out
 
@@ -57,7 +56,7 @@ def inner(run: Run) -> tuple[int, int]:
     return run.start + edge, run.stop - edge
 
 
-def _bridged(runs: list[Run], channel: Channel, model: fault_models.ModeModel) -> list[Run]:
+def _bridged(runs: list[Run], samples: Samples, model: ModeModel) -> list[Run]:
     """Join runs of one row where the same fault explains them and what lies between as well as parts of their own do.
 
     Between them may lie a healthy stretch or a shorter run of another row.
@@ -66,29 +65,31 @@ def _bridged(runs: list[Run], channel: Channel, model: fault_models.ModeModel) -
     for run in runs:
         out.append(run)
         while len(out) > 1:
-            if _one_fault(out[-2], out[-1], channel, model):
+            if _one_fault(out[-2], out[-1], samples, model):
                 out[-2:] = [Run(out[-2].start, out[-1].stop, out[-1].row)]
-            elif len(out) > 2 and _interrupted(out[-3], out[-2], out[-1], channel, model):
+            elif len(out) > 2 and _interrupted(out[-3], out[-2], out[-1], samples, model):
                 out[-3:] = [Run(out[-3].start, out[-1].stop, out[-1].row)]
             else:
                 break
     return out
 
 
-def _interrupted(first: Run, middle: Run, last: Run, channel: Channel, model: fault_models.ModeModel) -> bool:
+def _interrupted(first: Run, middle: Run, last: Run, samples: Samples, model: ModeModel) -> bool:
     """Whether a run of another row merely interrupts one fault, such as a value that rests for a moment."""
     if first.row != last.row or middle.size >= min(first.size, last.size):
         return False
     brief = last.start - first.stop <= min(_BRIEF_S / model.dt, min(first.size, last.size) / 4)
-    return brief or _one_fault(first, last, channel, model)
+    return brief or _one_fault(first, last, samples, model)
 
 
-def _one_fault(first: Run, second: Run, channel: Channel, model: fault_models.ModeModel) -> bool:
+def _one_fault(first: Run, second: Run, samples: Samples, model: ModeModel) -> bool:
     """Whether two runs and what lies between are one fault rather than three parts."""
     reach = round(_BRIDGE_S / model.dt)
     a, b, c, d = max(first.start, first.stop - reach), first.stop, second.start, min(second.stop, second.start + reach)
     if first.row != second.row or c - b > _APART_S / model.dt:
         return False
-    whole = channel.part(a, d).evidence(model)[first.row]
-    parts = channel.part(a, b).evidence(model)[first.row] + channel.part(c, d).evidence(model)[first.row]
-    return bool(whole > parts + channel.part(b, c).evidence(model).max() - 2 * model.switch_cost)
+    whole = segment_evidence(samples.part(a, d), model)[first.row]
+    parts = (
+        segment_evidence(samples.part(a, b), model)[first.row] + segment_evidence(samples.part(c, d), model)[first.row]
+    )
+    return bool(whole > parts + segment_evidence(samples.part(b, c), model).max() - 2 * model.switch_cost)

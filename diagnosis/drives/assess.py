@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from diagnosis.channels.noise import moving_sum, rounding_step
-from diagnosis.channels.pairs import sample_status
+from diagnosis.channels.sample_status import sample_status
 from diagnosis.drives.echo import DriveRecord, echoed_speed, identify_echo, window_size
 from diagnosis.drives.findings import EchoPair, find_rows
 from diagnosis.drives.load import LoadTrack, track_load

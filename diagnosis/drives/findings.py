@@ -13,6 +13,7 @@ from diagnosis.estimation import fault_models
 from diagnosis.estimation.fault_size import estimate_fault
 from diagnosis.estimation.segments import Run, merge_equal
 from diagnosis.results.assessment import Finding
+from diagnosis.results.fault_rows import ROWS
 from diagnosis.results.result import Hypothesis
 from replay.faults import FaultMode, Side
 from replay.machine.config import Limits
@@ -146,7 +147,7 @@ def _finding(run: Run, pair: EchoPair, model: RowModel, limits: Limits, lead: Ar
     before = pair.y[: run.start][np.isin(pair.status[: run.start], (fault_models.PAIR, fault_models.BLIND))]
     last = float(before[-1]) if before.size else float("nan")
     by_state = state_evidence(pair.y[part], pair.x[part], pair.slack[part], status, pair.quiet[part], model, last)
-    evidence = np.array([by_state[i == ROW].max() for i in range(len(fault_models.ROWS))])
+    evidence = np.array([by_state[i == ROW].max() for i in range(len(ROWS))])
     row = run.row
     if row in _SOFT:
         if np.count_nonzero(status == fault_models.PAIR) < max(5, _SHORTEST_SOFT_S / pair.dt):
@@ -186,9 +187,7 @@ def _finding(run: Run, pair: EchoPair, model: RowModel, limits: Limits, lead: Ar
     if row == fault_models.NO_SIGNAL:
         p[fault_models.NO_SIGNAL] += p[fault_models.STUCK]
         p[fault_models.STUCK] = 0.0
-    ranked = sorted(
-        (Hypothesis("sensor", r, float(q)) for r, q in zip(fault_models.ROWS, p, strict=True)), key=lambda h: -h.p
-    )
+    ranked = sorted((Hypothesis("sensor", r, float(q)) for r, q in zip(ROWS, p, strict=True)), key=lambda h: -h.p)
     raised = _raised(lead, run, max(3, round(_EDGE_S / pair.dt)))
     return Finding(
         start=run.start,

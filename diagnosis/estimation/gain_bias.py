@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numba import njit
@@ -85,9 +85,19 @@ class GainBiasTrack:
     state: Array
 
 
+class RandomWalk(NamedTuple):
+    """Constants of one step for the compiled scan: F and Q of [δ − 1, δ̄], and R."""
+
+    decay: float
+    gain_q: float
+    bias_q: float
+    r: float
+
+
 @njit(cache=True)
-def _scan_gain_bias(y, x, use, p, state, out):  # type: ignore[no-untyped-def]
-    f, q0, q1, r = p
+def _scan_gain_bias(y, x, use, walk, state, out):  # type: ignore[no-untyped-def]
+    """Predict and update sample by sample; writes the six columns of `GainBiasTrack` and returns the last state."""
+    f, q0, q1, r = walk.decay, walk.gain_q, walk.bias_q, walk.r
     m0, m1, a, b, c = state
     for k in range(y.size):
         # x = F x, P = F P Fᵀ + Q
@@ -118,7 +128,7 @@ def track_gain_bias(
     Parameters
     ----------
     y, x : Array, shape (n,)
-        Measured value and reference; values where `use` is False are not looked at.
+        Measured value and reference; values where `use` is False do not count.
     use : NDArray[np.bool_], shape (n,)
         Samples to update with; the others only predict (filterpy's ``update(None)``).
     model : GainBiasModel
@@ -128,12 +138,12 @@ def track_gain_bias(
     """
     if state is None:
         state = np.array([0.0, 0.0, model.gain_std**2, 0.0, model.bias_std**2])
-    p = (
-        np.exp(-model.dt / model.relax_s),
-        model.gain_walk**2 * model.dt,
-        model.bias_walk**2 * model.dt,
-        model.noise**2,
+    walk = RandomWalk(
+        decay=float(np.exp(-model.dt / model.relax_s)),
+        gain_q=float(model.gain_walk**2 * model.dt),
+        bias_q=float(model.bias_walk**2 * model.dt),
+        r=float(model.noise**2),
     )
     out = np.empty((6, y.size))
-    last = _scan_gain_bias(y, x, use, p, tuple(state), out)
+    last = _scan_gain_bias(y, x, use, walk, tuple(state), out)
     return GainBiasTrack(out[0], out[1], out[2], out[3], out[4], out[5], np.asarray(last))

@@ -1,4 +1,4 @@
-"""Runs of equal rows: cutting a path into segments and tidying them."""
+"""Runs of equal rows: cutting a path into segments, merging and trimming them."""
 
 from __future__ import annotations
 

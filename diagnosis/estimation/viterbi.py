@@ -8,80 +8,86 @@ have been raised at the earliest.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from diagnosis.estimation.fault_models import (
-    CLEAR,
-    HEALTHY,
-    MODELS,
-    NOISY_MODELS,
-    ROW_OF_MODEL,
-    ROWS,
-    SKIP,
-    STAY,
-    ModeModel,
-    enter,
-    likelihoods,
-    trace,
-)
+from diagnosis.channels.sample_status import CLEAR, SKIP
+from diagnosis.estimation.back_pointers import STAY, trace
+from diagnosis.estimation.fault_models import EXACT, HEALTHY, MODELS, ROW_OF_MODEL, ZERO, ModeModel
+from diagnosis.estimation.filter_kernel import FilterState, enter, entered_state, likelihoods
+from diagnosis.estimation.samples import Samples
+from diagnosis.results.fault_rows import ROWS
 from replay.arrays.spill import Column, blocks, release
 
 Array = NDArray[np.float64]
 
 _LEARNING_COST = 10.0  # what a new entry loses until its filter has settled: a settled one is kept that long
+_SIBLING_COST = 3.0  # of another model of the same row
 
 
-@dataclass(frozen=True)
-class ModeState:
-    """What the recursion carries from block to block: score, mean and covariance per model."""
+class PathPointers(NamedTuple):
+    """What the recursion writes about each sample of a block.
 
-    score: Array
-    mean: Array
-    cov: Array
+    Attributes
+    ----------
+    back : NDArray[np.uint8], shape (n, models)
+        Back-pointers for `trace`.
+    filtered : NDArray[np.float32], shape (n, rows)
+        Causal probability of each row.
+    """
+
+    back: NDArray[np.uint8]
+    filtered: NDArray[np.float32]
 
 
-def initial_state(model: ModeModel) -> ModeState:
+def initial_state(model: ModeModel) -> FilterState:
     """State before the first sample: healthy is as probable as a fault that began long ago is not."""
-    score = np.full(MODELS, -model.switch_cost / 2)
-    score[HEALTHY] = 0.0
-    mean, cov = np.zeros((MODELS, 2)), np.zeros((MODELS, 3))
-    for m in range(MODELS):
-        enter(m, model.packed(), mean, cov)
-    return ModeState(score, mean, cov)
+    state = entered_state(model)
+    state.score[:] = -model.switch_cost / 2
+    state.score[EXACT] = 0.0
+    return state
 
 
 @njit(cache=True)
-def _scan_modes(y, x, status, quiet, p, noisy, row, score, mean, cov, back, filtered):  # type: ignore[no-untyped-def]
+def _enter_from_best(k, best, bank, state, back):  # type: ignore[no-untyped-def]
+    """Let every model be entered from the best one, where that is worth what it costs."""
+    top = state.score[best]
+    for m in range(state.score.size):
+        cost = bank.switch_cost
+        if bank.row[m] == bank.row[best] and m != best:
+            cost = _SIBLING_COST
+        learning = 0.0 if m in (EXACT, ZERO) else _LEARNING_COST
+        if top - cost - learning > state.score[m]:
+            state.score[m] = top - cost
+            back[k, m] = best
+            enter(m, bank, state.mean, state.cov)
+
+
+@njit(cache=True)
+def _scan_modes(samples, bank, state, out):  # type: ignore[no-untyped-def]
     """Viterbi over the models; writes back-pointers (n, models) and softmax of scores by row (n, rows)."""
+    score, back, filtered = state.score, out.back, out.filtered
     models = score.size
     gain = np.zeros(models)
-    for k in range(y.size):
+    for k in range(samples.y.size):
+        status = samples.status[k]
         best = 0
         for m in range(1, models):
             if score[m] > score[best]:
                 best = m
-        if status[k] == CLEAR and row[best] == HEALTHY:
-            if best != 0:
-                back[k, 0] = best
+        if status == CLEAR and bank.row[best] == HEALTHY:
+            if best != EXACT:
+                back[k, EXACT] = best
             score[:] = -np.inf
-            score[0] = 0.0
+            score[EXACT] = 0.0
             filtered[k, HEALTHY] = 1.0
             continue
-        top = score[best]
-        if status[k] != SKIP:
-            for m in range(models):
-                cost = p[4]
-                if row[m] == row[best] and m != best:
-                    cost = 3.0
-                learning = 0.0 if m == 0 or m == 2 else _LEARNING_COST
-                if top - cost - learning > score[m]:
-                    score[m] = top - cost
-                    back[k, m] = best
-                    enter(m, p, mean, cov)
-            likelihoods(y[k], x[k], status[k], quiet[k], p, noisy, row, mean, cov, gain)
+        if status != SKIP:
+            _enter_from_best(k, best, bank, state, back)
+            likelihoods(samples.y[k], samples.x[k], status, samples.quiet[k], bank, state.mean, state.cov, gain)
             top = -np.inf
             for m in range(models):
                 score[m] += gain[m]
@@ -92,7 +98,7 @@ def _scan_modes(y, x, status, quiet, p, noisy, row, score, mean, cov, back, filt
         for m in range(models):
             if score[m] > -50.0:
                 w = np.exp(score[m])
-                filtered[k, row[m]] += w
+                filtered[k, bank.row[m]] += w
                 total += w
         for i in range(filtered.shape[1]):
             filtered[k, i] /= total
@@ -123,7 +129,7 @@ class ModePath:
 
     def crossing(self, start: int, stop: int, slack: int, hold: int) -> int | None:
         """First sample of [start, stop) from which on a fault is lastingly more probable than none; see `first_lasting`."""
-        near = slice(max(0, start - slack), stop)  # nothing outside is looked at
+        near = slice(max(0, start - slack), stop)  # nothing outside counts
         raised = self.filtered[near, HEALTHY] < 0.5
         found = first_lasting(raised, start - near.start, stop - near.start, slack, hold)
         return None if found is None else near.start + found
@@ -160,63 +166,41 @@ def first_lasting(raised: NDArray[np.bool_], start: int, stop: int, slack: int, 
     return max(start, first + int(begins[lasts][0])) if lasts.any() else None
 
 
-def forward(
-    y: Array,
-    x: Array,
-    status: NDArray[np.int8],
-    quiet: NDArray[np.bool_],
-    model: ModeModel,
-    state: ModeState,
-) -> tuple[NDArray[np.uint8], NDArray[np.float32], ModeState]:
+def forward(samples: Samples, model: ModeModel, state: FilterState) -> tuple[PathPointers, FilterState]:
     """Run the recursion over one block.
 
     Parameters
     ----------
-    y, x : Array, shape (n,)
-        Measured value and reference.
-    status : NDArray[np.int8], shape (n,)
-        `SKIP` (nothing new), `PAIR` (both valid), `SILENT` (y silent while its source lives), `BLIND` (both valid, but
-        x changes faster than the log resolves) or `CLEAR` (a pair far from anything that contradicts healthy: taken as
-        healthy unmeasured where the path is healthy, to save time).
-    quiet : NDArray[np.bool_], shape (n,)
-        Where the machine stands, so that a reading of zero is what a healthy channel gives too.
+    samples : Samples
+        The block. A sample that is `CLEAR` is taken as healthy unmeasured where the path is healthy, to save time.
     model : ModeModel
         Noise and prior.
-    state : ModeState
-        From `initial_state` or from the block before.
+    state : FilterState
+        From `initial_state` or from the block before; it stays as it is.
 
     Returns
     -------
-    back : NDArray[np.uint8], shape (n, models)
-        Back-pointers for `trace`.
-    filtered : Array, shape (n, 5)
-        Causal probability of each row.
-    state : ModeState
+    pointers : PathPointers
+        Back-pointers and causal probabilities.
+    state : FilterState
         For the next block.
     """
-    back = np.full((y.size, MODELS), STAY, dtype=np.uint8)
-    filtered = np.zeros((y.size, len(ROWS)), dtype=np.float32)
-    score, mean, cov = state.score.copy(), state.mean.copy(), state.cov.copy()
-    p = model.packed()
-    _scan_modes(y, x, status, quiet, p, NOISY_MODELS, ROW_OF_MODEL, score, mean, cov, back, filtered)
-    return back, filtered, ModeState(score, mean, cov)
+    size = samples.y.size
+    out = PathPointers(np.full((size, MODELS), STAY, dtype=np.uint8), np.zeros((size, len(ROWS)), dtype=np.float32))
+    state = state.copied()
+    _scan_modes(samples, model.bank(), state, out)
+    return out, state
 
 
-def most_probable(
-    y: Array,
-    x: Array,
-    status: NDArray[np.int8],
-    quiet: NDArray[np.bool_],
-    model: ModeModel,
-) -> ModePath:
-    """Most probable rows of a whole channel; see `forward` for the arguments."""
+def most_probable(samples: Samples, model: ModeModel) -> ModePath:
+    """Most probable rows of a whole channel."""
     state = initial_state(model)
     pointers, probabilities = Column(np.uint8, (MODELS,)), Column(np.float32, (len(ROWS),))
-    for part in blocks(y.size):
-        back, filtered, state = forward(y[part], x[part], status[part], quiet[part], model, state)
-        pointers.append(back)
-        probabilities.append(filtered)
-        release(y, x)
+    for part in blocks(samples.y.size):
+        found, state = forward(samples.at(part), model, state)
+        pointers.append(found.back)
+        probabilities.append(found.filtered)
+        release(samples.y, samples.x)
     whole = pointers.finish()
     path, entered = trace(whole, int(np.argmax(state.score)))
     release(whole)

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from diagnosis.channels.liveness import alive
-from diagnosis.channels.pairs import sample_status
+from diagnosis.channels.sample_status import sample_status
 from diagnosis.wheels.assess import WheelsData
 from diagnosis.wheels.blocks import block_width
 from diagnosis.wheels.identification import WheelModelFit, demand, identify, low_passed_on

@@ -10,10 +10,13 @@ import numpy as np
 import pytest
 from numpy.testing import assert_array_equal
 
-from diagnosis.channels.pairs import Pair, sample_status
-from diagnosis.direct.assess import _row, assess_pair
-from diagnosis.estimation import fault_models
+from diagnosis.channels.sample_status import PAIR, SILENT, SKIP, sample_status
+from diagnosis.direct.assess import assess_pair
+from diagnosis.direct.inputs import Pair
+from diagnosis.direct.isolation import stated_row
+from diagnosis.estimation.fault_models import HEALTHY, INEFFICIENT, NO_SIGNAL, NOISY, STUCK
 from diagnosis.results.assessment import CODE, Assessment, Finding
+from diagnosis.results.fault_rows import ROWS
 from diagnosis.results.result import Epsilon
 from replay.faults import FaultMode, Side, State, fault_affected
 from replay.machine.config import Limits, Noise
@@ -131,24 +134,18 @@ def test_a_clearly_more_probable_row_is_stated_unless_the_rows_are_alike() -> No
     def row(path: int, best: int, *, zero: bool = False, still: bool = False) -> int:
         p = np.full(5, 0.04)
         p[best] = 0.84
-        return _row(path, p, zero=zero, still=still)
+        return stated_row(path, p, zero=zero, still=still)
 
-    assert (
-        row(fault_models.STUCK, fault_models.NOISY)
-        == row(fault_models.STUCK, fault_models.NOISY, zero=True, still=True)
-        == fault_models.NOISY
-    )
-    assert (
-        row(fault_models.STUCK, fault_models.HEALTHY) == fault_models.STUCK
-    )  # whether it is one at all is told beside it
-    assert row(fault_models.NO_SIGNAL, fault_models.STUCK) == fault_models.STUCK
-    assert row(fault_models.NO_SIGNAL, fault_models.STUCK, zero=True) == fault_models.NO_SIGNAL
-    assert row(fault_models.STUCK, fault_models.INEFFICIENT, zero=True) == fault_models.STUCK
-    assert row(fault_models.INEFFICIENT, fault_models.NO_SIGNAL, zero=True) == fault_models.NO_SIGNAL
-    assert row(fault_models.STUCK, fault_models.INEFFICIENT, still=True) == fault_models.STUCK
-    assert row(fault_models.INEFFICIENT, fault_models.STUCK, still=True) == fault_models.INEFFICIENT
+    assert row(STUCK, NOISY) == row(STUCK, NOISY, zero=True, still=True) == NOISY
+    assert row(STUCK, HEALTHY) == STUCK
+    assert row(NO_SIGNAL, STUCK) == STUCK
+    assert row(NO_SIGNAL, STUCK, zero=True) == NO_SIGNAL
+    assert row(STUCK, INEFFICIENT, zero=True) == STUCK
+    assert row(INEFFICIENT, NO_SIGNAL, zero=True) == NO_SIGNAL
+    assert row(STUCK, INEFFICIENT, still=True) == STUCK
+    assert row(INEFFICIENT, STUCK, still=True) == INEFFICIENT
     near = np.array([0.0, 0.3, 0.0, 0.2, 0.5])
-    assert _row(fault_models.STUCK, near, zero=False, still=False) == fault_models.STUCK
+    assert stated_row(STUCK, near, zero=False, still=False) == STUCK
 
 
 def test_epsilon_is_a_share_unless_outside_the_table() -> None:
@@ -159,7 +156,7 @@ def test_epsilon_is_a_share_unless_outside_the_table() -> None:
 
 
 @SIDES
-def test_bias_alone_lands_in_the_noisy_row(side: Side) -> None:
+def test_bias_alone_lands_in_the_noisystated_row(side: Side) -> None:
     found = single(judged(side, lambda a, _: a + 0.08, 3))
     assert found.mode is FaultMode.NOISY  # δ = 1, δ̄ ≠ 0 has no row of its own
     assert found.epsilon is not None
@@ -299,7 +296,7 @@ def test_evidence_columns() -> None:
     columns = assessment.columns
     assert {c: x.shape for c, x in columns.items()} == dict.fromkeys(columns, (N,))
     assert {"residual", "threshold", "expected", "delta", "delta_std", "delta_bar", "delta_bar_std"} <= set(columns)
-    total = sum(columns[f"p_{row}"] for row in fault_models.ROWS)
+    total = sum(columns[f"p_{row}"] for row in ROWS)
     assert np.allclose(total, 1.0)
     assert np.median(columns["p_inefficient"][START + 100 : STOP]) > 0.99
     inside, outside = columns["residual"][START:STOP], columns["residual"][:START]
@@ -315,16 +312,16 @@ def test_every_sample_has_a_status() -> None:
     x[700:710] = np.nan
     fresh[800:810] = False
     status = sample_status(y, x, fresh & np.isfinite(y), alive, DT)
-    assert_array_equal(np.flatnonzero(status == fault_models.SILENT), np.arange(500, 550))
-    assert_array_equal(np.flatnonzero(status == fault_models.SKIP), np.r_[550:600, 700:710, 800:810])
-    assert (status == fault_models.PAIR).sum() == 2000 - 120
+    assert_array_equal(np.flatnonzero(status == SILENT), np.arange(500, 550))
+    assert_array_equal(np.flatnonzero(status == SKIP), np.r_[550:600, 700:710, 800:810])
+    assert (status == PAIR).sum() == 2000 - 120
 
 
 def test_late_start_and_early_stop_of_a_channel_are_no_silence() -> None:
     y, x = drive(2000), drive(2000)
     y[:40], y[-30:] = np.nan, np.nan
     status = sample_status(y, x, np.isfinite(y), np.ones(2000, dtype=np.bool_), DT)
-    assert (status == fault_models.SILENT).sum() == 0
+    assert (status == SILENT).sum() == 0
 
 
 @pytest.mark.parametrize("seed", [1, 2, 3])

@@ -5,8 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from diagnosis.direct.onset import Channel, refine
-from diagnosis.estimation.fault_models import NOISY, PAIR, ModeModel
+from diagnosis.channels.sample_status import PAIR
+from diagnosis.direct.onset import refine
+from diagnosis.estimation.fault_models import NOISY, ModeModel
+from diagnosis.estimation.samples import Samples
 from diagnosis.estimation.segments import Run
 
 MODEL = ModeModel(noise=0.003, constant_noise=0.003, tolerance=0.005, span=1.0, switch_cost=13.0, dt=0.001)
@@ -14,7 +16,7 @@ N, START, STOP = 12_000, 4000, 8000
 Array = np.ndarray
 
 
-def disturbed(seed: int) -> Channel:
+def disturbed(seed: int) -> Samples:
     """A valve with a disturbance that drifts (0.8 s) from `START` to `STOP`: u_v = 0.6·u + 0.4·(0.08 + 0.08·OU)."""
     rng = np.random.default_rng(seed)
     u = 0.25 * np.sin(np.arange(N) / 700) + 0.01 * rng.normal(size=N)
@@ -24,7 +26,7 @@ def disturbed(seed: int) -> Channel:
     valve = u.copy()
     valve[START:STOP] = (0.6 * u + 0.4 * (0.08 + 0.08 * drift))[START:STOP]
     y = valve + MODEL.noise * rng.normal(size=N)
-    return Channel(y, u, np.full(N, PAIR, dtype=np.int8), np.zeros(N, dtype=np.bool_))
+    return Samples(y, u, np.full(N, PAIR, dtype=np.int8), np.zeros(N, dtype=np.bool_))
 
 
 @pytest.mark.parametrize("seed", range(4))

@@ -5,11 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from diagnosis.estimation.fault_models import HEALTHY, NO_SIGNAL, NOISY, PAIR, ModeModel
+from diagnosis.channels.sample_status import PAIR
+from diagnosis.estimation.fault_models import HEALTHY, NO_SIGNAL, NOISY, ModeModel
+from diagnosis.estimation.samples import Samples
 from diagnosis.estimation.viterbi import ModePath, most_probable
 
 
-def told(healthy: str) -> ModePath:
+def causal(healthy: str) -> ModePath:
     """A path whose causal reading is healthy (h) or faulty (f) sample by sample."""
     filtered = np.zeros((len(healthy), 5), dtype=np.float32)
     filtered[:, HEALTHY] = [0.9 if c == "h" else 0.2 for c in healthy]
@@ -37,7 +39,7 @@ def told(healthy: str) -> ModePath:
 def test_first_rise_of_the_causal_decision_that_lasts(
     healthy: str, start: int, stop: int, slack: int, expected: int | None
 ) -> None:
-    assert told(healthy).crossing(start, stop, slack, hold=4) == expected
+    assert causal(healthy).crossing(start, stop, slack, hold=4) == expected
 
 
 def test_nothing_later_is_used() -> None:
@@ -47,9 +49,9 @@ def test_nothing_later_is_used() -> None:
     x = 0.2 + 0.1 * np.sin(np.arange(n) / 40)
     y = x + 0.004 * np.random.default_rng(1).normal(size=n)
     y[200:] = 0.0
-    status, busy = np.full(n, PAIR, dtype=np.int8), np.zeros(n, dtype=np.bool_)
-    whole = most_probable(y, x, status, busy, model)
-    cut = most_probable(y[:210], x[:210], status[:210], busy[:210], model)
+    samples = Samples(y, x, np.full(n, PAIR, dtype=np.int8), np.zeros(n, dtype=np.bool_))
+    whole = most_probable(samples, model)
+    cut = most_probable(samples.part(0, 210), model)
     np.testing.assert_array_equal(whole.filtered[:210], cut.filtered)
     assert (whole.row[200:] == NO_SIGNAL).all()
     raised = whole.crossing(200, n, 3, 100)

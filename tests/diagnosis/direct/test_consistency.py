@@ -1,4 +1,4 @@
-"""Stretches that need no weighing: noise alone is cleared, whatever a fault could have left is not."""
+"""Stretches that are consistent with healthy: noise alone is, whatever a fault could have left is not."""
 
 from __future__ import annotations
 
@@ -6,8 +6,10 @@ import numpy as np
 import pytest
 from numpy.testing import assert_array_equal
 
-from diagnosis.direct.screen import screened
-from diagnosis.estimation.fault_models import CLEAR, PAIR, SILENT, SKIP, ModeModel
+from diagnosis.channels.sample_status import CLEAR, PAIR, SILENT, SKIP
+from diagnosis.direct.consistency import with_consistent
+from diagnosis.estimation.fault_models import ModeModel
+from diagnosis.estimation.samples import Samples
 from diagnosis.estimation.viterbi import most_probable
 
 MODEL = ModeModel(noise=0.004, constant_noise=0.0005, tolerance=0.005, span=0.8, switch_cost=13.0, dt=0.001)
@@ -22,9 +24,14 @@ def channel(seed: int = 1) -> tuple[Array, Array, Array]:
     return y, x, np.full(N, PAIR, dtype=np.int8)
 
 
+def consistent(y: Array, x: Array, status: Array) -> Array:
+    """Status of every sample after the test."""
+    return with_consistent(Samples(y, x, status, np.zeros(N, dtype=np.bool_)), MODEL.noise).status
+
+
 def test_most_of_a_healthy_channel_is_cleared() -> None:
     y, x, status = channel()
-    got = screened(y, x, status, MODEL.noise)
+    got = consistent(y, x, status)
     assert np.mean(got == CLEAR) > 0.7
     assert set(np.unique(got)) <= {PAIR, CLEAR}
     assert (status == PAIR).all()  # its input stays
@@ -43,7 +50,7 @@ def test_most_of_a_healthy_channel_is_cleared() -> None:
 def test_a_fault_and_what_lies_around_it_are_not(fault: object) -> None:
     y, x, status = channel()
     y[START:STOP] = fault(x, np.random.default_rng(3))[START:STOP]  # type: ignore[operator]
-    got = screened(y, x, status, MODEL.noise)
+    got = consistent(y, x, status)
     moves = np.abs(x[START:STOP]) > 0.05
     assert np.mean(got[START:STOP][moves] == CLEAR) < 0.02
     assert (got[START - 32 : START] != CLEAR).all()
@@ -53,7 +60,7 @@ def test_silence_and_missing_samples_keep_their_status() -> None:
     y, x, status = channel()
     y[5000:5100], status[5000:5100] = np.nan, SILENT
     status[::3] = SKIP
-    got = screened(y, x, status, MODEL.noise)
+    got = consistent(y, x, status)
     kept = status != PAIR
     assert_array_equal(got[kept], status[kept])
     assert (got[4990:5110] != CLEAR).all()
@@ -65,6 +72,6 @@ def test_the_path_is_the_same_with_and_without(seed: int) -> None:
     y[START:STOP] *= 0.5
     y[15_000:15_400] = 0.0
     quiet = np.zeros(N, dtype=np.bool_)
-    whole = most_probable(y, x, status, quiet, MODEL)
-    quick = most_probable(y, x, screened(y, x, status, MODEL.noise), quiet, MODEL)
+    whole = most_probable(Samples(y, x, status, quiet), MODEL)
+    quick = most_probable(Samples(y, x, consistent(y, x, status), quiet), MODEL)
     assert_array_equal(quick.row, whole.row)

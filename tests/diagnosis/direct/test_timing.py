@@ -5,13 +5,18 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from diagnosis.channels.pairs import Pair, timing_explains
+from diagnosis.direct.identification import IdentifiedPair
+from diagnosis.direct.inputs import Pair
+from diagnosis.direct.timing import timing_explains
+from diagnosis.estimation.fault_models import ModeModel
+from diagnosis.estimation.samples import Samples
 from diagnosis.estimation.segments import Run
 from replay.faults import FaultMode, Side
 from replay.machine.config import Noise
 
 N, DT = 20_000, 0.001
 Array = np.ndarray
+MODEL = ModeModel(noise=0.003, constant_noise=0.003, tolerance=0.005, span=0.8, switch_cost=13.0, dt=DT)
 A, B = 10_000, 10_021
 
 
@@ -21,7 +26,9 @@ def pair(side: Side, y: Array, x: Array) -> Pair:
 
 
 def explained(p: Pair, mode: FaultMode, start: int = A, stop: int = B, share: float = 0.0) -> bool:
-    return timing_explains(p, Run(start, stop, 1), mode, share)
+    samples = Samples(p.y, p.x, np.zeros(N, dtype=np.int8), p.quiet)
+    found = IdentifiedPair(p, 0.0, samples, MODEL, 0.0, ~p.alive, share)
+    return timing_explains(found, Run(start, stop, 1), mode)
 
 
 def speeds(noise: float, lsb: float = 0.0015) -> tuple[Array, Array]:
@@ -34,10 +41,10 @@ def speeds(noise: float, lsb: float = 0.0015) -> tuple[Array, Array]:
     return y, x
 
 
-@pytest.mark.parametrize(("noise", "told"), [(0.0008, True), (0.0013, True), (0.004, False)])
-def test_constant_reading_counts_where_noise_would_have_changed_it(noise: float, told: bool) -> None:
+@pytest.mark.parametrize(("noise", "expected"), [(0.0008, True), (0.0013, True), (0.004, False)])
+def test_constant_reading_counts_where_noise_would_have_changed_it(noise: float, expected: bool) -> None:
     y, x = speeds(noise)
-    assert explained(pair(Side.SENSOR, y, x), FaultMode.STUCK) is told
+    assert explained(pair(Side.SENSOR, y, x), FaultMode.STUCK) is expected
 
 
 def test_reading_between_two_steps_of_rounding_is_as_good_as_any() -> None:
@@ -66,14 +73,14 @@ def test_silent_valve_position_is_not_explained() -> None:
 
 
 @pytest.mark.parametrize("mode", [FaultMode.NOISY, FaultMode.INEFFICIENT, FaultMode.OUTSIDE_TABLE])
-@pytest.mark.parametrize(("rest", "told"), [(0.0, True), (0.1, False)])
-def test_lagging_answer_to_a_command_of_jumps_alone_is_no_fault(mode: FaultMode, rest: float, told: bool) -> None:
+@pytest.mark.parametrize(("rest", "expected"), [(0.0, True), (0.1, False)])
+def test_lagging_answer_to_a_command_of_jumps_alone_is_no_fault(mode: FaultMode, rest: float, expected: bool) -> None:
     rng = np.random.default_rng(6)
     x = rest + 0.012 * rng.normal(size=N)
     y = 0.4 * x + 0.4 * np.r_[0.0, x[:-1]] + 0.003 * rng.normal(size=N)
     if rest:
         y *= 0.9
-    assert explained(pair(Side.ACTUATOR, y, x), mode, stop=A + 600) is told
+    assert explained(pair(Side.ACTUATOR, y, x), mode, stop=A + 600) is expected
 
 
 def test_disturbance_beside_a_command_of_jumps_alone_is_a_fault() -> None:

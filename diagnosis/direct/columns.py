@@ -1,0 +1,68 @@
+"""The series behind the plots of direct evidence: residual, tracked gain and bias, probabilities of the rows."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from diagnosis.channels.sample_status import PAIR
+from diagnosis.direct.identification import IdentifiedPair
+from diagnosis.estimation.fault_models import HEALTHY
+from diagnosis.estimation.gain_bias import GainBiasModel, track_gain_bias
+from diagnosis.estimation.viterbi import ModePath
+from diagnosis.results.evidence_columns import Pictured
+from diagnosis.results.fault_rows import ROWS
+from replay.arrays.envelope import bucket_of, envelope, in_buckets
+from replay.arrays.spill import Column, blocks, in_blocks, release
+
+_SERIES = ("residual", "threshold", "expected", "delta", "delta_std", "delta_bar", "delta_bar_std")
+
+
+def evidence_columns(found: IdentifiedPair, path: ModePath, step: NDArray[np.int64]) -> Pictured:
+    """Series for the evidence plots, and every sample of them at some steps.
+
+    Parameters
+    ----------
+    found : IdentifiedPair
+        The pair.
+    path : ModePath
+        Most probable rows.
+    step : NDArray[np.int64], shape (m,)
+        Steps of which every sample is wanted.
+    """
+    pair, noise, (y_all, x, status, _) = found.pair, found.model.noise, found.samples
+    bucket = bucket_of(x.size)
+    tracked = GainBiasModel(
+        noise=noise,
+        gain_walk=0.3,
+        bias_walk=0.1 * pair.span,
+        gain_std=0.3,
+        bias_std=0.3 * pair.span,
+        relax_s=5.0,
+        dt=pair.dt,
+    )
+    columns = {name: Column(np.float64 if bucket == 1 else np.float32) for name in _SERIES}
+    near: dict[str, list[NDArray[Any]]] = {name: [] for name in _SERIES}
+    state = None
+    for part in blocks(x.size):
+        at = step[np.searchsorted(step, part.start) : np.searchsorted(step, part.stop)] - part.start
+        use, y, ref = status[part] == PAIR, y_all[part], x[part]
+        track = track_gain_bias(y, ref, use, tracked, state)
+        state = track.state
+        residual, threshold = np.where(use, y - ref, np.nan), np.full(y.size, 3 * noise)
+        series = (residual, threshold, ref, track.delta, track.delta_std, track.bias, track.bias_std)
+        for (name, column), values in zip(columns.items(), series, strict=True):
+            column.append(envelope(values, bucket))
+            near[name].append(values[at].astype(np.float32))
+        release(y_all, x)
+    out = {name: column.finish() for name, column in columns.items()}
+    rows = in_buckets(np.asarray, bucket, path.filtered)
+    out["probability"] = in_blocks(lambda p: np.float32(1.0) - p[:, HEALTHY], rows)
+    out.update({f"p_{name}": rows[:, i] for i, name in enumerate(ROWS)})
+    samples = {name: np.concatenate(parts) for name, parts in near.items()}
+    exact = path.filtered[step]
+    samples["probability"] = np.float32(1.0) - exact[:, HEALTHY]
+    samples.update({f"p_{name}": exact[:, i] for i, name in enumerate(ROWS)})
+    return Pictured(step, out, samples)

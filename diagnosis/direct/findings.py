@@ -1,0 +1,166 @@
+"""From the path through the rows to findings: runs with their ends, row, ε̂, saturation term, probability and evidence."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+from diagnosis.direct.fault_runs import fault_runs
+from diagnosis.direct.identification import IdentifiedPair
+from diagnosis.direct.isolation import Isolated, estimate_run, isolate
+from diagnosis.direct.onset import refine
+from diagnosis.direct.sentences import alike_sentence, sentences
+from diagnosis.direct.timing import timing_explains
+from diagnosis.estimation.fault_models import INEFFICIENT, NOISY, STUCK
+from diagnosis.estimation.segments import Run, with_leads
+from diagnosis.estimation.viterbi import ModePath
+from diagnosis.results.assessment import Finding
+from diagnosis.results.fault_rows import ROWS
+from diagnosis.results.result import Hypothesis
+from diagnosis.results.vocabulary import Tier
+from replay.faults import FaultMode, Side
+from replay.machine.config import Limits
+
+_SHORTEST_S = 0.01
+_HOLD_S = 0.1
+_LEAD_S, _TAIL_S, _CHAIN_S = 0.3, 0.1, 0.05
+_GROWTH_S = 0.1  # a shorter time of growth is not worth a sentence
+
+
+@dataclass(frozen=True)
+class FaultsFound:
+    """What the runs of a path come to.
+
+    Attributes
+    ----------
+    findings : list[Finding]
+        In order of time.
+    timing : list[Run]
+        Runs that a delay or rounding explains.
+    below : int
+        Number of runs below the limits or with thin evidence.
+    """
+
+    findings: list[Finding]
+    timing: list[Run]
+    below: int
+
+
+def find_faults(path: ModePath, found: IdentifiedPair, limits: Limits) -> FaultsFound:
+    """Findings of a path.
+
+    Parameters
+    ----------
+    path : ModePath
+        Most probable rows.
+    found : IdentifiedPair
+        The pair.
+    limits : Limits
+        Smallest ε and saturation term that count.
+    """
+    dt, size = found.pair.dt, path.model.size
+    shortest = max(3, round(_SHORTEST_S / dt))
+    runs = fault_runs(path, found.samples, found.model, dt, shortest)
+    chained = with_leads(runs, *(max(2, round(s / dt)) for s in (_LEAD_S, _TAIL_S, _CHAIN_S)))
+    findings, timing, below = [], [], 0
+    for i, (main, start, stop) in enumerate(chained):
+        before, after = chained[i - 1][2] if i else 0, chained[i + 1][1] if i + 1 < len(chained) else size
+        limit = (before if start == main.start else main.start, after if stop == main.stop else main.stop)
+        run = _refined(main, found, limit)
+        finding = finding_of(run, found, limits)
+        if finding is None:
+            below += 1
+        elif timing_explains(found, run, finding.mode):
+            timing.append(run)
+        else:
+            whole = Run(
+                min(start, run.start) if start < main.start else run.start,
+                max(stop, run.stop) if stop > main.stop else run.stop,
+                run.row,
+            )
+            findings.append(_widened(finding, run, whole, dt, _detected(path, whole, dt, shortest, found.lag)))
+    return FaultsFound(findings, timing, below)
+
+
+def finding_of(run: Run, found: IdentifiedPair, limits: Limits) -> Finding | None:
+    """A run as a finding; None where it lies below the limits or the evidence is thin."""
+    isolated = isolate(run, found)
+    if isolated is None:
+        return None
+    mode = _mode_of(isolated, found, limits)
+    if mode is None:
+        return None
+    pair, run, p = found.pair, isolated.run, isolated.p
+    epsilon, sat, _ = isolated.estimate
+    if epsilon is not None and mode is not FaultMode.OUTSIDE_TABLE:
+        epsilon = epsilon.as_share()
+    lines = sentences(isolated, found, mode, epsilon)
+    if run.row in (STUCK, INEFFICIENT) and isolated.seen.still:
+        # nothing moved: a constant value and a constant share of a constant are the same
+        p[STUCK] = p[INEFFICIENT] = (p[STUCK] + p[INEFFICIENT]) / 2
+        lines += (alike_sentence(found),)
+    shift = max(0, round(found.lag)) if pair.side is Side.ACTUATOR else 0
+    hypotheses = [Hypothesis(pair.side.value, row.value, float(q)) for row, q in zip(ROWS, p, strict=True)]
+    return Finding(
+        start=max(0, run.start - shift),
+        stop=max(1, run.stop - shift),
+        side=pair.side,
+        mode=mode,
+        probability=float(p[run.row]),
+        hypotheses=tuple(sorted(hypotheses, key=lambda h: -h.p)),
+        epsilon=epsilon,
+        sat=sat,
+        evidence=lines,
+        tier=Tier.DIRECT,
+    )
+
+
+def _mode_of(isolated: Isolated, found: IdentifiedPair, limits: Limits) -> FaultMode | None:
+    """Mode of an isolated run; None where it lies below the limits or may be noise."""
+    seen, noise = isolated.seen, found.model.noise
+    mode = FaultMode(ROWS[isolated.run.row])
+    if mode is FaultMode.INEFFICIENT:
+        return _mode_of_gain(isolated, noise, limits)
+    if mode is FaultMode.NOISY:
+        return None if seen.deviation < max(2.5 * noise, limits.min_sat / 2) else mode
+    if found.pair.side is Side.ACTUATOR and seen.deviation < 2.5 * noise:
+        return None  # the command hardly moved: a noisy reading of it looks constant too
+    return mode
+
+
+def _mode_of_gain(isolated: Isolated, noise: float, limits: Limits) -> FaultMode | None:
+    """Inefficient, or outside the table where the gain is; None where ε is too small or nothing moves."""
+    epsilon, _, delta = isolated.estimate
+    outside = delta > 1.0 + limits.min_epsilon or delta < -limits.min_epsilon
+    if not outside and epsilon is not None and epsilon.value < limits.min_epsilon:
+        return None
+    reference = isolated.seen.x[isolated.seen.use]
+    if abs(1.0 - delta) * math.sqrt(float((reference**2).mean())) < 0.5 * noise:
+        return None  # what is lost of hardly anything is the reference's own noise
+    return FaultMode.OUTSIDE_TABLE if outside else FaultMode.INEFFICIENT
+
+
+def _refined(run: Run, found: IdentifiedPair, between: tuple[int, int]) -> Run:
+    """A noisy run with its ends where its own gain puts them."""
+    estimate = estimate_run(run, found) if run.row == NOISY else None
+    return run if estimate is None else refine(run, found.samples, estimate[2], found.model, *between)
+
+
+def _widened(finding: Finding, run: Run, whole: Run, dt: float, detected: int | None) -> Finding:
+    """A finding with the time in which it grew or faded, and the moment at which it was raised."""
+    evidence = finding.evidence
+    if run.start - whole.start > _GROWTH_S / dt:
+        evidence += (f"Before that it grew for {(run.start - whole.start) * dt:.2f} s.",)
+    return replace(
+        finding,
+        start=max(0, finding.start - (run.start - whole.start)),
+        stop=finding.stop + (whole.stop - run.stop),
+        evidence=evidence,
+        detected=detected,
+    )
+
+
+def _detected(path: ModePath, run: Run, dt: float, slack: int, lag: float) -> int | None:
+    """Sample at which the fault would have been raised causally: both y and the reference beside it have arrived."""
+    raised = path.crossing(run.start, run.stop, slack, max(slack, round(_HOLD_S / dt)))
+    return None if raised is None else min(raised + max(0, math.ceil(-lag)), path.model.size - 1)

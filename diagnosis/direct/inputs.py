@@ -1,0 +1,93 @@
+"""A channel and an independent measurement of the same quantity, taken from the mission."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from diagnosis.channels.liveness import alive
+from replay.arrays.spill import blocks
+from replay.faults import Side
+from replay.machine.config import Machine, Noise
+from replay.signals.timeline import Timeline
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Pair:
+    """A channel and its reference.
+
+    Attributes
+    ----------
+    side : Side
+        `SENSOR` or `ACTUATOR`.
+    y, x : Array, shape (n,)
+        Measured value and reference, SI; NaN where not valid.
+    fresh : NDArray[np.bool_], shape (n,)
+        Steps with a new sample of y.
+    alive : NDArray[np.bool_], shape (n,)
+        Whether another channel of y's source delivers.
+    quiet : NDArray[np.bool_], shape (n,)
+        Where the component is neither commanded nor moving.
+    dt : float
+        Step [s].
+    unit : str
+        Unit of y.
+    span : float
+        Largest plausible magnitude [unit].
+    y_name, x_name : str
+        Canonical names, for the text.
+    known_noise : Noise
+        From the machine file.
+    instruments : Array, shape (n, k), or None
+        Signals that drive x but know nothing of the fault; see `diagnosis.estimation.fault_size`.
+    """
+
+    side: Side
+    y: Array
+    x: Array
+    fresh: NDArray[np.bool_]
+    alive: NDArray[np.bool_]
+    quiet: NDArray[np.bool_]
+    dt: float
+    unit: str
+    span: float
+    y_name: str
+    x_name: str
+    known_noise: Noise
+    instruments: Array | None = None
+
+
+def make_pair(
+    timeline: Timeline,
+    counts: dict[str, NDArray[np.int16]],
+    side: Side,
+    y_name: str,
+    x_name: str,
+    quiet: NDArray[np.bool_],
+    unit: str,
+    span: float,
+    machine: Machine,
+) -> Pair:
+    """Channel and reference of one component and side."""
+    y, x = timeline.signals[y_name], timeline.signals[x_name]
+    largest = 0.0
+    if np.isfinite(y).any():
+        largest = max(float(np.nanmax(np.abs(z[part]), initial=0.0)) for z in (y, x) for part in blocks(timeline.size))
+    return Pair(
+        side=side,
+        y=y,
+        x=x,
+        fresh=timeline.fresh[y_name],
+        alive=alive(timeline, counts, y_name),
+        quiet=quiet,
+        dt=timeline.dt,
+        unit=unit,
+        span=max(span, largest),
+        y_name=y_name,
+        x_name=x_name,
+        known_noise=machine.noise.get(y_name, Noise()),
+    )

@@ -1,0 +1,181 @@
+"""Which row of the table a faulty run is: the path's, or another one where its evidence and its samples say so."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from diagnosis.channels.sample_status import BLIND, PAIR
+from diagnosis.direct.fault_runs import inner
+from diagnosis.direct.identification import IdentifiedPair
+from diagnosis.estimation.fault_models import HEALTHY, INEFFICIENT, NO_SIGNAL, STUCK
+from diagnosis.estimation.fault_size import estimate_fault
+from diagnosis.estimation.filter_kernel import segment_evidence
+from diagnosis.estimation.row_probability import row_probabilities
+from diagnosis.estimation.segments import Run
+from diagnosis.results.result import Epsilon, Sat
+
+Array = NDArray[np.float64]
+#: ε̂, the saturation term and δ̂.
+Estimate = tuple[Epsilon | None, Sat | None, float]
+
+# From tuning missions, by `python tests/benchmarks/calibrate_direct.py`: share of findings that are not what they seem, and
+# the length at which half of those in a log too slow for its commands are.
+_LAPSE, _COARSE_S = 0.01, 1.7
+_CLEARLY = 2.0  # times as probable as the path's row, from which on another one is stated
+
+
+@dataclass(frozen=True, eq=False)
+class RunSamples:
+    """Samples of one run.
+
+    Attributes
+    ----------
+    y, x : Array, shape (m,)
+        Measured value and reference of all steps [unit of y].
+    status : NDArray[np.int8], shape (m,)
+        See `diagnosis.channels.sample_status`.
+    use : NDArray[np.bool_], shape (m,)
+        Steps with both values.
+    zero : bool
+        Whether the channel stays at zero.
+    still : bool
+        Whether its reference hardly moves.
+    deviation : float
+        Root mean square of y − x [unit of y]; infinite where there is none.
+    """
+
+    y: Array
+    x: Array
+    status: NDArray[np.int8]
+    use: NDArray[np.bool_]
+    zero: bool
+    still: bool
+    deviation: float
+
+
+@dataclass(frozen=True, eq=False)
+class Isolated:
+    """A run with its row.
+
+    Attributes
+    ----------
+    run : Run
+        Samples and row.
+    seen : RunSamples
+        Its samples.
+    estimate : Estimate
+        By that row.
+    p : Array, shape (rows,)
+        Probability of each row.
+    gain : float
+        Log-evidence of the row against healthy.
+    """
+
+    run: Run
+    seen: RunSamples
+    estimate: Estimate
+    p: Array
+    gain: float
+
+
+def run_samples(run: Run, found: IdentifiedPair) -> RunSamples:
+    """Samples of a run and what they look like."""
+    y, x, status, _ = found.samples.part(run.start, run.stop)
+    use = np.isin(status, (PAIR, BLIND))
+    model = found.model
+    zero = not use.any() or abs(float(np.mean(y[use]))) <= 3 * model.constant_noise / np.sqrt(min(use.sum(), 100))
+    still = bool(use.any()) and float(np.std(x[use])) < 2 * model.noise
+    deviation = float(np.sqrt(np.mean((y[use] - x[use]) ** 2))) if use.any() else float("inf")
+    return RunSamples(y, x, status, use, zero, still, deviation)
+
+
+def estimate_run(run: Run, found: IdentifiedPair) -> Estimate | None:
+    """ε̂, the saturation term and δ̂ of a run; see `estimate_fault`."""
+    y, x, status, _ = found.samples.part(run.start, run.stop)
+    use = np.isin(status, (PAIR, BLIND))
+    known = found.instruments
+    instruments = None if known is None else np.nan_to_num(known[run.start : run.stop][use])
+    return estimate_fault(run.row, y[use], x[use], found.model, found.pair.unit, instruments)
+
+
+def isolate(run: Run, found: IdentifiedPair) -> Isolated | None:
+    """Row of a run, its probability and its estimates; None where the evidence against healthy is thin.
+
+    Parameters
+    ----------
+    run : Run
+        Samples, and the row of the path.
+    found : IdentifiedPair
+        The pair.
+    """
+    estimate = estimate_run(run, found)
+    if estimate is None:
+        return None
+    model = found.model
+    evidence = segment_evidence(found.samples.part(*inner(run)), model)
+    if evidence[run.row] - evidence[HEALTHY] < model.switch_cost:
+        return None
+    p = row_probabilities(evidence)
+    seen = run_samples(run, found)
+    row = stated_row(run.row, p, zero=seen.zero, still=seen.still)
+    if row != run.row:  # the path came by this one from its neighbours or for want of time to change
+        other = estimate_run(replace(run, row=row), found)
+        if other is not None:
+            run, estimate = replace(run, row=row), other
+    gain = float(evidence[run.row] - evidence[HEALTHY])
+    p = _with_lapses(p, run.row, run.size * found.pair.dt if found.coarse else None)
+    if run.row in (STUCK, NO_SIGNAL) and seen.zero:
+        # stuck at zero, a gain of zero and no signal are one row of the table
+        run = replace(run, row=NO_SIGNAL)
+        p[NO_SIGNAL] += p[STUCK] + p[INEFFICIENT]
+        p[[STUCK, INEFFICIENT]] = 0.0
+    if run.row == INEFFICIENT and _shifted_away(seen, estimate[2], model.noise):  # a constant of its own, not a share
+        run = replace(run, row=STUCK)
+        other = estimate_run(run, found)
+        if other is None:
+            return None
+        estimate = other
+    return Isolated(run, seen, estimate, p, gain)
+
+
+def _shifted_away(seen: RunSamples, delta: float, noise: float) -> bool:
+    """Whether a gain beside a reference that hardly moves is no share of it."""
+    return seen.still and abs(float(np.mean(seen.x[seen.use]))) > 3 * noise and not 0.0 <= delta <= 1.0
+
+
+def stated_row(row: int, p: Array, *, zero: bool, still: bool) -> int:
+    """The path's row of a run, or another fault's where that is clearly more probable.
+
+    Parameters
+    ----------
+    row : int
+        Row of the path.
+    p : Array, shape (rows,)
+        Probabilities of the rows.
+    zero, still : bool
+        Whether the channel stays at zero, and whether its reference hardly moves: some rows are alike then.
+    """
+    faults = [r for r in range(p.size) if r != HEALTHY]
+    best = max(faults, key=lambda r: float(p[r]))
+    constant = {STUCK, NO_SIGNAL, *([INEFFICIENT] if row != INEFFICIENT else [])}
+    alike = (zero and {row, best} <= constant) or (still and {row, best} <= {STUCK, INEFFICIENT})
+    return best if p[best] > _CLEARLY * p[row] and not alike else row
+
+
+def _with_lapses(p: Array, row: int, seconds: float | None) -> Array:
+    """Probabilities of the rows, lessened by how often a finding is not the fault that it seems, shape (rows,).
+
+    In a log too slow for its commands (`seconds` long; None elsewhere) most short findings are pieces of another fault,
+    so that what the row loses goes to the other faults.
+    """
+    kept = 1.0 - _LAPSE
+    if seconds is not None:
+        kept *= seconds**2 / (seconds**2 + _COARSE_S**2)
+    out = p.copy()
+    others = [r for r in range(p.size) if r not in (HEALTHY, row)]
+    out[others] += p[row] * (1.0 - kept) / len(others)
+    out[row] = p[row] * kept
+    return out

@@ -1,0 +1,76 @@
+"""What decided on a finding of direct evidence, in figures."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from diagnosis.channels.sample_status import SILENT
+from diagnosis.direct.identification import IdentifiedPair
+from diagnosis.direct.isolation import Isolated
+from diagnosis.estimation.fault_models import NO_SIGNAL, STUCK
+from diagnosis.results.result import Epsilon
+from replay.faults import FaultMode
+
+
+def sentences(isolated: Isolated, found: IdentifiedPair, mode: FaultMode, epsilon: Epsilon | None) -> tuple[str, ...]:
+    """Evidence of one finding.
+
+    Parameters
+    ----------
+    isolated : Isolated
+        The run.
+    found : IdentifiedPair
+        The pair.
+    mode : FaultMode
+        What is stated.
+    epsilon : Epsilon or None
+        What is stated of it.
+    """
+    pair, model, seen = found.pair, found.model, isolated.seen
+    out = []
+    seconds = seen.y.size * pair.dt
+    silent = int(np.count_nonzero(seen.status == SILENT))
+    if silent:
+        out.append(
+            f"{pair.y_name} delivered nothing for {silent * pair.dt:.3f} s while other channels of its source did."
+        )
+    if seen.use.any():
+        out += _values(isolated, found, epsilon, seconds)
+        out.append(
+            f"Residual {seen.deviation:.3g} {pair.unit} root mean square; threshold {3 * model.noise:.2g} {pair.unit}."
+        )
+    if mode is FaultMode.OUTSIDE_TABLE:
+        out.append("The gain lies outside 0…1, which no row of the table describes.")
+    out.append(
+        f"Log-evidence against healthy: {isolated.gain:.0f}; a fault is considered from {model.switch_cost:.0f}."
+    )
+    return tuple(out)
+
+
+def alike_sentence(found: IdentifiedPair) -> str:
+    """Why a constant value and a constant share are equally probable."""
+    return f"{found.pair.x_name} hardly moved in this time, so that stuck and inefficient look alike."
+
+
+def _values(isolated: Isolated, found: IdentifiedPair, epsilon: Epsilon | None, seconds: float) -> list[str]:
+    """What the channel said beside its reference."""
+    pair, seen = found.pair, isolated.seen
+    y, x = seen.y[seen.use], seen.x[seen.use]
+    if isolated.run.row in (STUCK, NO_SIGNAL):
+        return [
+            f"{pair.y_name} stayed within {float(np.ptp(y)):.2g} {pair.unit} of {float(np.mean(y)):.4g} {pair.unit} "
+            f"for {seconds:.3f} s while {pair.x_name} moved over {float(np.ptp(x)):.2g} {pair.unit}."
+        ]
+    if epsilon is None:
+        return []
+    out = [
+        f"{pair.y_name} followed {1 - epsilon.value:.3f} × {pair.x_name} (95 %: {1 - epsilon.high:.3f} to "
+        f"{1 - epsilon.low:.3f}) over {seconds:.3f} s."
+    ]
+    sat = isolated.estimate[1]
+    if sat is not None:
+        out.append(
+            f"The rest has a mean of {sat.mean * epsilon.value:.3g} and a root mean square of {sat.rms * epsilon.value:.3g} "
+            f"{pair.unit}; healthy noise is {found.model.noise:.2g} {pair.unit}."
+        )
+    return out

@@ -1,0 +1,81 @@
+"""Deviations that a delay between a channel and its reference, or the rounding of the channel, explains."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from diagnosis.channels.noise import white_part
+from diagnosis.channels.repeats import FALSE_SPELLS
+from diagnosis.direct.identification import IdentifiedPair
+from diagnosis.estimation.segments import Run
+from replay.faults import FaultMode, Side
+
+Array = NDArray[np.float64]
+
+_SPOOL_DELAY_S = 0.005
+_SENSOR_DELAY_S = 0.01
+_JUMPY = 0.6  # share of a command's size that jumps between samples, where there is nothing else to it
+_FLIPS = 25  # samples in a row on one side of a command that switches to and fro between samples
+
+
+def timing_explains(found: IdentifiedPair, run: Run, mode: FaultMode) -> bool:
+    """Whether a deviation may be nothing but a delay between y and its reference, or its rounding.
+
+    Shorter than a spool sensor's delay; or, where a log is too slow for its commands: what changes from sample to
+    sample is as large, or y is x with its sign at other moments, or a constant y is met by most samples of x. For a
+    speed: shorter than half a second and no more than 10 ms of the reference's slope, or a reading that rests beside a
+    reference that hardly moves, no longer than its noise allows. Whatever the rate, the answer to a command of which
+    nothing is left but jumps between samples depends on the valve's lag.
+    """
+    pair, part = found.pair, slice(run.start, run.stop)
+    x = found.samples.x
+    y, ref = pair.y[part], x[part]
+    seconds = (run.stop - run.start) * pair.dt
+    size = np.abs(y - ref)
+    deviation = float(np.sqrt(np.nanmean(size**2))) if np.isfinite(size).any() else np.inf
+    if pair.side is Side.SENSOR:
+        slope = np.gradient(np.nan_to_num(x[max(0, run.start - 1) : run.stop + 1]), pair.dt)
+        moves = float(np.sqrt(np.mean(slope**2))) * _SENSOR_DELAY_S
+        if mode.total:
+            return _rests_by_chance(found, run, deviation)
+        return mode is FaultMode.NOISY and seconds < 0.5 and deviation < moves
+    if seconds <= _SPOOL_DELAY_S:
+        return True
+    jumps = _sudden(pair.x, run)
+    if not mode.total and deviation < 2 * jumps and jumps > _JUMPY * float(np.sqrt(np.nanmean(ref**2))):
+        return True
+    if not found.coarse:
+        return False
+    if mode.total:
+        return run.size < _FLIPS or (np.isfinite(deviation) and float(np.nanmedian(size)) < 0.5 * deviation)
+    if mode is not FaultMode.NOISY:
+        return False
+    sudden = max(_sudden(z, run) for z in (pair.x, pair.y))
+    unsigned = np.sqrt(np.nanmean((np.abs(y) - np.abs(pair.x[part])) ** 2))
+    return bool(sudden > 0.3 * deviation or unsigned < 0.3 * deviation)
+
+
+def _sudden(x: Array, run: Run) -> float:
+    """Root mean square of what changes from sample to sample in a run."""
+    first = max(0, run.start - 1)
+    return float(np.sqrt(np.mean(white_part(x[first : run.stop + 1])[run.start - first :][: run.size] ** 2)))
+
+
+def _rests_by_chance(found: IdentifiedPair, run: Run, deviation: float) -> bool:
+    """Whether a healthy sensor's noise may keep its readings as close as they are, beside a reference that explains them.
+
+    Within w = ptp(y) + lsb one reading is with probability erf(w / (√8·noise)) at most; see `diagnosis.channels.repeats`.
+    """
+    pair = found.pair
+    if not np.isfinite(pair.y[run.start : run.stop]).all():
+        return False  # a silent channel does not rest
+    y = pair.y[run.start : run.stop][pair.fresh[run.start : run.stop]]
+    texture = found.texture
+    if not y.size or deviation > 2.5 * math.hypot(texture.white, texture.reference_white):
+        return False
+    noise = math.sqrt(max(texture.white**2 - texture.lsb**2 / 12, 0.0))
+    close = math.erf((float(np.ptp(y)) + texture.lsb) / (math.sqrt(8.0) * noise)) if noise else 1.0
+    return bool(texture.readings * close ** (y.size - 1) > FALSE_SPELLS)

@@ -1,0 +1,200 @@
+"""Kalman filters of the fault rows of one channel, sample by sample (compiled).
+
+A filter per model starts when the model is entered and carries its unknowns [δ or c, δ̄]. Between two samples of y
+nothing is updated; a y that is silent while its source lives speaks for no_signal.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from diagnosis.channels.sample_status import BLIND, SILENT, SKIP
+from diagnosis.estimation.fault_models import (
+    CONSTANT,
+    EXACT,
+    FIRST_NOISY,
+    GAIN,
+    HEALTHY,
+    MISMATCH,
+    MODELS,
+    NOISY,
+    ROW_OF_MODEL,
+    ZERO,
+    ModeModel,
+)
+from diagnosis.estimation.samples import Samples
+from diagnosis.results.fault_rows import ROWS
+
+Array = NDArray[np.float64]
+
+_SILENT_COST = -6.0
+_FAULT_COST = 0.02  # what a faulty row must gain per sample to be preferred
+
+
+class FilterState(NamedTuple):
+    """What the recursions carry from sample to sample and from block to block; written in place by them.
+
+    Attributes
+    ----------
+    score : Array, shape (models,)
+        Log-probability of the best path to each model, or its log-evidence.
+    mean : Array, shape (models, 2)
+        Mean of the unknowns [δ or c, δ̄].
+    cov : Array, shape (models, 3)
+        Their covariance (P11, P12, P22).
+    """
+
+    score: Array
+    mean: Array
+    cov: Array
+
+    def copied(self) -> FilterState:
+        """The same in arrays of its own."""
+        return FilterState(*(column.copy() for column in self))
+
+
+def entered_state(model: ModeModel) -> FilterState:
+    """Every model entered at the first sample, none more probable than another."""
+    state = FilterState(np.zeros(MODELS), np.zeros((MODELS, 2)), np.zeros((MODELS, 3)))
+    bank = model.bank()
+    for m in range(MODELS):
+        enter(m, bank, state.mean, state.cov)
+    return state
+
+
+@njit(cache=True)
+def enter(m, bank, mean, cov):  # type: ignore[no-untyped-def]
+    """Prior of a model's unknowns [δ or c, δ̄] at entry; cov = (P11, P12, P22)."""
+    span = bank.span
+    mean[m, 0], mean[m, 1] = 0.0, 0.0
+    cov[m, 0], cov[m, 1], cov[m, 2] = 0.0, 0.0, 0.0
+    if m == EXACT:
+        mean[m, 0] = 1.0
+    elif m == MISMATCH:
+        mean[m, 0], cov[m, 2] = 1.0, bank.mismatch_r
+    elif m == CONSTANT:
+        cov[m, 0] = span * span
+    elif m == GAIN:
+        mean[m, 0], cov[m, 0] = 0.5, 0.09
+    elif m >= FIRST_NOISY:
+        mean[m, 0], cov[m, 0] = 0.6, 0.09
+        cov[m, 2] = (0.3 * span) ** 2
+
+
+@njit(cache=True)
+def _update(y, x, bank, mean, cov, out):  # type: ignore[no-untyped-def]
+    """Kalman update of every model with y = H·[·,·] + n; writes the innovations' log-likelihoods."""
+    e = y - x
+    out[EXACT] = -0.5 * (e * e / bank.r + bank.log_r)
+    out[ZERO] = -0.5 * (y * y / bank.constant_r + bank.log_constant_r)
+    # one unknown: H = 1 or x, P = (I − K H) P
+    for m in (CONSTANT, GAIN):
+        h, r = (1.0, bank.constant_r) if m == CONSTANT else (x, bank.r)
+        if (
+            m == GAIN and bank.r > 4.0 * bank.constant_r
+        ):  # a sensor's noise comes before its gain, that of a valve's feedback after it
+            r *= max(1.0, mean[m, 0] ** 2)
+        s = h * h * cov[m, 0] + r
+        i = 1.0 / s
+        e = y - h * mean[m, 0]
+        mean[m, 0] += h * cov[m, 0] * i * e
+        cov[m, 0] *= r * i
+        out[m] = -0.5 * (e * e * i + np.log(2 * np.pi * s))
+    m, f = MISMATCH, bank.decay
+    c = f * f * cov[m, 2] + (1 - f * f) * bank.mismatch_r
+    s = c + bank.r
+    e = y - x - f * mean[m, 1]
+    mean[m, 1] = f * mean[m, 1] + c / s * e
+    cov[m, 2] = c * bank.r / s
+    out[m] = -0.5 * (e * e / s + np.log(2 * np.pi * s))
+    for m in range(FIRST_NOISY, out.size):
+        j = m - FIRST_NOISY
+        a, b = cov[m, 0], cov[m, 1]
+        c = cov[m, 2] + (bank.noisy[j, 0] * bank.span) ** 2 * bank.dt
+        # S = H P Hᵀ + R
+        g0, g1 = a * x + b, b * x + c
+        s = x * g0 + g1 + bank.r * bank.noisy[j, 1] ** 2
+        i = 1.0 / s
+        e = y - x * mean[m, 0] - mean[m, 1]
+        k0, k1 = g0 * i, g1 * i
+        mean[m, 0] += k0 * e
+        mean[m, 1] += k1 * e
+        # P = (I − K H) P
+        cov[m, 0] = a - k0 * g0
+        cov[m, 1] = b - k0 * g1
+        cov[m, 2] = c - k1 * g1
+        out[m] = -0.5 * (e * e * i + np.log(2 * np.pi * s))
+
+
+@njit(cache=True)
+def _blind(y, x, bank, mean, cov, out):  # type: ignore[no-untyped-def]
+    """Log-likelihood of one sample where x jumps about: only a y that does not join in says something, one bit at most."""
+    noise, constant = np.sqrt(bank.r), np.sqrt(bank.constant_r)
+    level = mean[CONSTANT, 0] if cov[CONSTANT, 0] < bank.span**2 / 2 else y
+    out[:] = 0.0
+    for m, value in ((CONSTANT, level), (ZERO, 0.0)):
+        if abs(y - value) > 3.5 * constant:
+            out[m] = -4.0
+        elif abs(x - value) > 5 * noise:
+            out[m] = 0.69
+    s = cov[CONSTANT, 0] + bank.constant_r
+    mean[CONSTANT, 0] += cov[CONSTANT, 0] / s * (y - mean[CONSTANT, 0])
+    cov[CONSTANT, 0] *= bank.constant_r / s
+
+
+@njit(cache=True)
+def likelihoods(y, x, status, quiet, bank, mean, cov, out):  # type: ignore[no-untyped-def]
+    """Log-likelihood of one sample under every model; where nothing moves, a zero reading speaks for no fault."""
+    if status == SILENT:
+        out[:] = _SILENT_COST
+        out[ZERO] = 0.0
+        return
+    if status == BLIND:
+        _blind(y, x, bank, mean, cov, out)
+        return
+    _update(y, x, bank, mean, cov, out)
+    for m in range(out.size):
+        out[m] = max(out[m], bank.floor)
+        if bank.row[m] == NOISY:
+            out[m] -= bank.drift_cost
+        elif bank.row[m] != HEALTHY:
+            out[m] -= _FAULT_COST
+    if quiet:
+        # a reading of zero says as much for no signal as for none wanted
+        most = max(out[EXACT], out[MISMATCH])
+        zero = abs(y) < 3.5 * np.sqrt(bank.constant_r)
+        if abs(mean[CONSTANT, 0]) < 3 * np.sqrt(bank.r):
+            out[CONSTANT] = most if zero else min(out[CONSTANT], most)
+        out[ZERO] = most if zero else min(out[ZERO], most)
+        for m in range(GAIN, out.size):
+            if bank.row[m] != HEALTHY and abs(mean[m, 0]) < 0.1:
+                out[m] = min(out[m], most)
+
+
+@njit(cache=True)
+def _scan_evidence(samples, bank, state):  # type: ignore[no-untyped-def]
+    """Add up the log-likelihoods of all samples in `state.score`."""
+    gain = np.zeros(state.score.size)
+    for k in range(samples.y.size):
+        if samples.status[k] != SKIP:
+            likelihoods(
+                samples.y[k], samples.x[k], samples.status[k], samples.quiet[k], bank, state.mean, state.cov, gain
+            )
+            state.score[:] += gain
+
+
+def segment_evidence(samples: Samples, model: ModeModel) -> Array:
+    """Log-evidence of each row over one segment, its filter started at the segment's first sample.
+
+    Returns
+    -------
+    Array, shape (rows,)
+        Natural log; the best of its models for each row.
+    """
+    state = entered_state(model)
+    _scan_evidence(samples, model.bank(), state)
+    return np.array([state.score[i == ROW_OF_MODEL].max() for i in range(len(ROWS))])
