@@ -16,7 +16,7 @@ from typing import Annotated
 
 import typer
 
-from cli.commands import audit, compare, config, diagnose, evaluate, fit, inject, inspect, replay, simulate
+from cli.commands import audit, compare, config, diagnose, evaluate, fit, inject, inspect, replay, schema, simulate
 from cli.terminal.command import App, Quiet, Verbose, terminal_of
 from cli.terminal.console import Terminal, discard
 from cli.terminal.interrupts import asked, check, forget, listen
@@ -72,6 +72,7 @@ for _panel, _function, _name, _epilog in (
     (_MAKE, fit.fit, "fit", fit.EXAMPLES),
     (_MAKE, simulate.simulate, "simulate", simulate.EXAMPLES),
     (_MAKE, inject.inject, "inject", inject.EXAMPLES),
+    (_MAKE, schema.schema, "schema", schema.EXAMPLES),
 ):
     app.command(_name, rich_help_panel=_panel, epilog=_epilog)(_function)
 app.add_typer(config.app, name="config", rich_help_panel=_MAKE)

@@ -130,7 +130,9 @@ def test_help_lists_every_command_by_topic() -> None:
     assert "130 interrupted" in seen.output
 
 
-@pytest.mark.parametrize("name", ["diagnose", "report", "inspect", "channels", "replay", "simulate", "config"])
+@pytest.mark.parametrize(
+    "name", ["diagnose", "report", "inspect", "channels", "replay", "simulate", "config", "schema"]
+)
 def test_help_of_each_command_has_examples(name: str) -> None:
     seen = CliRunner().invoke(app, [name, "--help"])
     assert seen.exit_code == 0
