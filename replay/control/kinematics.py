@@ -136,12 +136,9 @@ def wheel_commands(
         Carried from the block before, and updated for the next one; None: a whole mission.
     """
     state = CommandState() if state is None else state
-    names = list(geometry.wheels)
-    n = v.size
-    speed = np.empty((n, len(names)))
-    angle = np.empty((n, len(names)))
-    for i, name in enumerate(names):
-        w = geometry.wheels[name]
+    angle = np.empty((v.size, len(geometry.wheels)))
+    speed = np.empty(angle.shape)
+    for i, (name, w) in enumerate(geometry.wheels.items()):
         v_x, v_y = v - omega * w.y, omega * w.x
         s = np.where(v_x < 0, -1.0, 1.0)
         if w.axle == "fixed":
@@ -151,23 +148,37 @@ def wheel_commands(
         angle[:, i] = steering_angle(v_x, v_y, max_steer, state.held.get(name, 0.0))
         state.held[name] = float(angle[-1, i])
         if phi_dot == "zero" or (phi_dot == "measured" and measured_angle is None):
-            rate = np.zeros(n)
+            rate = np.zeros(v.size)
         else:
             source = angle[:, i] if measured_angle is None or phi_dot == "command" else measured_angle[:, i]
-            before = state.source.get(name, float(source[0]))
-            rate = low_pass(np.diff(source, prepend=before) / dt, dt, phi_dot_hz, state.rate.get(name, np.nan))
-            state.source[name], state.rate[name] = float(source[-1]), float(rate[-1])
+            rate = _angle_rate(name, source, dt, phi_dot_hz, state)
         # L1 (1): v_c,i = s·|v_k| − (ω_b + φ̇)·d_i
         speed[:, i] = s * np.hypot(v_x, v_y) - (omega + rate) * w.offset
-    axles = geometry.axles
-    axle_angle = np.empty((n, len(axles)))
-    for j, axle in enumerate(axles):
+    return WheelCommands(speed, angle, _axle_angles(v, omega, geometry, max_steer, state))
+
+
+def _angle_rate(
+    wheel: str, angle: NDArray[np.float64], dt: float, cutoff_hz: float, state: CommandState
+) -> NDArray[np.float64]:
+    """φ̇ [rad/s], low-passed, of a wheel's angle φ [rad]; the state is carried on."""
+    before = state.source.get(wheel, float(angle[0]))
+    rate = low_pass(np.diff(angle, prepend=before) / dt, dt, cutoff_hz, state.rate.get(wheel, np.nan))
+    state.source[wheel], state.rate[wheel] = float(angle[-1]), float(rate[-1])
+    return rate
+
+
+def _axle_angles(
+    v: NDArray[np.float64], omega: NDArray[np.float64], geometry: Geometry, max_steer: float, state: CommandState
+) -> NDArray[np.float64]:
+    """Direction of the velocity at the middle of each steered axle [rad], shape (n, axles); the state is carried on."""
+    out = np.empty((v.size, len(geometry.axles)))
+    for j, axle in enumerate(geometry.axles):
         x = geometry.axle_x(axle)
         y = geometry.wheels[axle].y if axle in geometry.wheels else 0.0
         key = f"axle {axle}"
-        axle_angle[:, j] = steering_angle(v - omega * y, omega * x, max_steer, state.held.get(key, 0.0))
-        state.held[key] = float(axle_angle[-1, j])
-    return WheelCommands(speed, angle, axle_angle)
+        out[:, j] = steering_angle(v - omega * y, omega * x, max_steer, state.held.get(key, 0.0))
+        state.held[key] = float(out[-1, j])
+    return out
 
 
 def rotation(axle_angle: NDArray[np.float64], geometry: Geometry) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

@@ -7,14 +7,10 @@ further ones, so that every sample comes back as it was: ``/imu`` → ``imu.parq
 from __future__ import annotations
 
 import json
-import os
 import re
-import shutil
-from collections.abc import Iterable, Iterator
-from contextlib import contextmanager
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pyarrow as pa
@@ -23,14 +19,13 @@ from numpy.typing import NDArray
 
 from replay.arrays.blocks import release
 from replay.errors import LogError, OutputError
+from replay.export.raw_folder import INDEX, SCHEMA, RawFile, RawHead, RawIndex, new_folder, place, refuse_foreign_folder
 from replay.log.raw_log import Channel, RawLog, Window
 from replay.log.source_options import SourceOptions
 from replay.mission import content_hash
 from replay.progress import Progress, Stage, Subscriber, silent
 from replay.readers.registry import read_log, summarise_log
 
-INDEX = "index.json"
-SCHEMA = "mfhca-raw/1"
 STAMP = "stamp_ns"
 _GROUP_CELLS = 1 << 22
 _LONGEST_NAME = 80
@@ -54,7 +49,7 @@ def write_raw(
     stop_s: float | None = None,
     force: bool = False,
     progress: Subscriber = silent,
-) -> dict[str, Any]:
+) -> RawIndex:
     """Convert one log.
 
     Parameters
@@ -74,8 +69,8 @@ def write_raw(
 
     Returns
     -------
-    dict
-        The index: source and its SHA-256, clock, files with their columns, notes, damage.
+    RawIndex
+        Source and its SHA-256, clock, files with their columns, notes, damage.
 
     Raises
     ------
@@ -91,29 +86,41 @@ def write_raw(
     if not groups:
         raise LogError(f"{path}: no numbers to convert: {_nothing(log)}")
     progress(Progress(Stage.HASHING, path.name))
-    sha256, size = content_hash(path)
-    head = {
-        "schema": SCHEMA, "source": path.name, "sha256": sha256, "bytes": size, "format": log.format,
-        "clock": log.clock, "start_ns": log.summary.start_ns, "stop_ns": log.summary.stop_ns,
-    }  # fmt: skip
-    damage = log.summary.damage
-    files = []
+    head = _head(path, log)
     try:
-        with _new_folder(folder) as temporary:
-            for group, name in zip(groups, _names(groups), strict=True):
-                progress(Progress(Stage.WRITING, name))
-                files.append({"file": name, **_write(temporary / name, group, head)})
-                release(group.stamps, *(c.values for c in group.channels))
-            notes = [*log.summary.notes, *_split_topics(files)]
-            index = head | {
-                "status": "degraded" if damage else "ok", "damage": list(damage), "notes": notes, "files": files,
-            }  # fmt: skip
+        with new_folder(folder) as temporary:
+            index = _write_all(temporary, log, groups, head, progress)
             (temporary / INDEX).write_text(json.dumps(index, indent=2, ensure_ascii=False) + "\n", encoding="utf-8")
-            _place(temporary, folder)
+            place(temporary, folder)
     except (OSError, pa.ArrowException) as error:
         said = getattr(error, "strerror", None) or " ".join(str(error).split())
         raise OutputError(f"{folder}: cannot be written ({said}); give another place") from error
     return index
+
+
+def _head(path: Path, log: RawLog) -> RawHead:
+    sha256, size = content_hash(path)
+    return {
+        "schema": SCHEMA, "source": path.name, "sha256": sha256, "bytes": size, "format": log.format,
+        "clock": log.clock, "start_ns": log.summary.start_ns, "stop_ns": log.summary.stop_ns,
+    }  # fmt: skip
+
+
+def _write_all(folder: Path, log: RawLog, groups: Sequence[_Group], head: RawHead, progress: Subscriber) -> RawIndex:
+    """Write every file, and describe them."""
+    files: list[RawFile] = []
+    for group, name in zip(groups, _names(groups), strict=True):
+        progress(Progress(Stage.WRITING, name))
+        files.append(_write(folder / name, group, head))
+        release(group.stamps, *(c.values for c in group.channels))
+    damage = log.summary.damage
+    return {
+        **head,
+        "status": "degraded" if damage else "ok",
+        "damage": list(damage),
+        "notes": [*log.summary.notes, *_split_topics(files)],
+        "files": files,
+    }
 
 
 def _nothing(log: RawLog) -> str:
@@ -149,7 +156,7 @@ def _groups(log: RawLog) -> list[_Group]:
     return [_Group(topic, held[0].stamps, tuple(held)) for topic, same in topics.items() for held in same.values()]
 
 
-def _split_topics(files: list[dict[str, Any]]) -> list[str]:
+def _split_topics(files: list[RawFile]) -> list[str]:
     """Say why one topic stands in several files."""
     topics: dict[str, list[str]] = {}
     for file in files:
@@ -178,19 +185,19 @@ def _names(groups: Iterable[_Group]) -> list[str]:
     return names
 
 
-def _write(path: Path, group: _Group, head: dict[str, Any]) -> dict[str, Any]:
+def _write(path: Path, group: _Group, head: RawHead) -> RawFile:
     """Write one file, some rows at a time, and describe it."""
     names = [c.name for c in group.channels]
     stamp = STAMP if STAMP not in names else f"log.{STAMP}"
     fields = [pa.field(stamp, pa.int64(), nullable=False, metadata={"unit": "ns"})]
     for c in group.channels:
-        told = {"topic": c.topic, "field": c.field, "type": c.type_name} | ({"unit": c.unit} if c.unit else {})
-        fields.append(pa.field(c.name, pa.from_numpy_dtype(c.values.dtype), nullable=False, metadata=told))
-    about = {f"mfhca.{key}": str(value) for key, value in head.items()} | {
+        about = {"topic": c.topic, "field": c.field, "type": c.type_name} | ({"unit": c.unit} if c.unit else {})
+        fields.append(pa.field(c.name, pa.from_numpy_dtype(c.values.dtype), nullable=False, metadata=about))
+    origin = {f"mfhca.{key}": str(value) for key, value in head.items()} | {
         "mfhca.topic": group.topic,
         "mfhca.time": stamp,
     }
-    schema = pa.schema(fields, metadata=about)
+    schema = pa.schema(fields, metadata=origin)
     count = len(group.stamps)
     step = max(_GROUP_CELLS // len(fields), 1 << 10)
     with pq.ParquetWriter(path, schema, compression="zstd", write_page_checksum=True) as writer:
@@ -199,6 +206,7 @@ def _write(path: Path, group: _Group, head: dict[str, Any]) -> dict[str, Any]:
             arrays = [pa.array(group.stamps[part]), *(pa.array(c.values[part]) for c in group.channels)]
             writer.write_batch(pa.record_batch(arrays, schema=schema))
     return {
+        "file": path.name,
         "topic": group.topic,
         "type": group.channels[0].type_name,
         "rows": count,
@@ -208,62 +216,3 @@ def _write(path: Path, group: _Group, head: dict[str, Any]) -> dict[str, Any]:
             {"name": c.name, "field": c.field, "dtype": str(c.values.dtype), "unit": c.unit} for c in group.channels
         ],
     }
-
-
-def refuse_foreign_folder(folder: Path, *, force: bool) -> None:
-    """Raise an `OutputError` where a place holds something that no conversion wrote.
-
-    Parameters
-    ----------
-    folder : Path
-        Place to write to.
-    force : bool
-        Whether a folder with other files will do.
-    """
-    if folder.suffix.lower() in (".parquet", ".csv", ".mcap"):
-        raise OutputError(
-            f"{folder}: a folder is to be written, one file for each topic; give a name without an ending"
-        )
-    if not folder.exists():
-        return
-    if not folder.is_dir():
-        raise OutputError(f"{folder}: is a file, a folder is to be written; give another name")
-    if not force and any(folder.iterdir()) and not _is_own(folder):
-        raise OutputError(f"{folder}: holds other files; give a new folder, or --force to write among them")
-
-
-def _is_own(folder: Path) -> bool:
-    """Whether a folder holds an earlier conversion and nothing else."""
-    try:
-        index = json.loads((folder / INDEX).read_text(encoding="utf-8"))
-        files = {INDEX, *(str(f["file"]) for f in index["files"])}
-        return index["schema"] == SCHEMA and {p.name for p in folder.iterdir()} <= files
-    except (OSError, ValueError, KeyError, TypeError):
-        return False
-
-
-@contextmanager
-def _new_folder(folder: Path) -> Iterator[Path]:
-    """Give a temporary folder beside the one to write; what is left of it in the end is removed."""
-    temporary = folder.with_name(f".{folder.name}.{os.getpid()}.part")
-    folder.parent.mkdir(parents=True, exist_ok=True)
-    shutil.rmtree(temporary, ignore_errors=True)
-    temporary.mkdir()
-    try:
-        yield temporary
-    finally:
-        shutil.rmtree(temporary, ignore_errors=True)
-
-
-def _place(temporary: Path, folder: Path) -> None:
-    """Put a finished folder where it belongs: in place of an earlier conversion, else file by file, the index last."""
-    if folder.exists() and _is_own(folder):
-        old = folder.with_name(f".{folder.name}.{os.getpid()}.old")
-        folder.rename(old)
-        temporary.rename(folder)
-        shutil.rmtree(old, ignore_errors=True)
-    elif folder.exists():
-        for file in sorted(temporary.iterdir(), key=lambda p: p.name == INDEX):
-            file.replace(folder / file.name)
-    else:
-        temporary.rename(folder)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from replay.control.loop import replay_loop, stack
 from replay.errors import ConfigError
-from replay.faults import FaultMode, FaultSpec, Side
+from replay.faults import TABLE_MODES, FaultMode, FaultSpec, Side
 from replay.injection.inject import InjectionOptions, inject_signals
 from replay.machine.config import Machine
 from replay.signals.signal import Signals
@@ -23,12 +23,7 @@ Array = NDArray[np.float64]
 
 _PAPER_SPEED = 0.36  # top speed for which `draw_fault` draws [m/s]
 _PAPER_DRIVING = 0.05  # speed from which a machine drives for `free_place` [m/s]
-_ROWS = tuple(
-    (side, mode)
-    for side in (Side.SENSOR, Side.ACTUATOR)
-    for mode in (FaultMode.STUCK, FaultMode.NO_SIGNAL, FaultMode.INEFFICIENT, FaultMode.NOISY)
-)
-_PARTIAL = (FaultMode.INEFFICIENT, FaultMode.NOISY)
+_ROWS = tuple((side, mode) for side in (Side.SENSOR, Side.ACTUATOR) for mode in TABLE_MODES)
 
 
 def inject_mission(
@@ -83,9 +78,7 @@ def inject_mission(
         driving_speed=driving,
         intervals=intervals,
         masked=tuple(
-            TruthSpan(i.component, i.start_s, i.stop_s)
-            for i in intervals
-            if i.side is Side.SENSOR and i.mode in (FaultMode.STUCK, FaultMode.NO_SIGNAL)
+            TruthSpan(i.component, i.start_s, i.stop_s) for i in intervals if i.side is Side.SENSOR and i.mode.total
         ),
         open_loop=True,
         driving=tuple(s for i, w in enumerate(machine.wheels) for s in spans_where(w, speed[:, i] > driving, rate)),
@@ -158,28 +151,39 @@ def draw_faults(
         side: _parts(signals, machine, side, options or InjectionOptions()) for side in (Side.SENSOR, Side.ACTUATOR)
     }
     rows = [row for row in _ROWS if parts[row[0]]]
-    length = timeline.size * timeline.dt
-    begin, end = min(20.0, 0.2 * length), length - 0.5
     faults: list[FaultSpec] = []
     while len(faults) < count:
         before = len(faults)
         for j in rng.permutation(len(rows)):
-            if len(faults) == count:
-                break
             side, mode = rows[j]
-            for part in rng.permutation(parts[side]).tolist():
-                busy = [(f.start_s, f.stop_s, f.side) for f in (*beside, *faults) if f.component == part]
-                place = free_place(drives[part], busy, side, begin, end, False, rng)
-                if place is not None:
-                    drawn = draw_fault(part, side, mode, *place, rng, steer=False)
-                    faults.append(_scaled(drawn, machine, epsilon))
-                    break
+            drawn = _draw_one(side, mode, parts[side], drives, (*beside, *faults), rng) if len(faults) < count else None
+            if drawn is not None:
+                faults.append(_scaled(drawn, machine, epsilon))
         if len(faults) == before:
             raise ConfigError(
                 f"the mission drives long enough for {before} of {count} faults of 3 to 12 s that keep apart; ask for "
                 "fewer, or place them with --fault"
             )
     return tuple(sorted(faults, key=lambda f: (f.start_s, f.component, f.side.value)))
+
+
+def _draw_one(
+    side: Side,
+    mode: FaultMode,
+    parts: Sequence[str],
+    drives: Mapping[str, _WheelDrive],
+    taken: Sequence[FaultSpec],
+    rng: np.random.Generator,
+) -> FaultSpec | None:
+    """A fault of one row on the first of the parts, in random order, that has a place free; None where none has."""
+    for part in rng.permutation(parts).tolist():
+        drive = drives[part]
+        length = drive.speed.size * drive.dt
+        busy = [(f.start_s, f.stop_s, f.side) for f in taken if f.component == part]
+        place = free_place(drive, busy, side, min(20.0, 0.2 * length), length - 0.5, False, rng)
+        if place is not None:
+            return draw_fault(part, side, mode, *place, rng, steer=False)
+    return None
 
 
 def _parts(signals: Signals, machine: Machine, side: Side, options: InjectionOptions) -> list[str]:
@@ -199,5 +203,5 @@ def _parts(signals: Signals, machine: Machine, side: Side, options: InjectionOpt
 def _scaled(fault: FaultSpec, machine: Machine, epsilon: float | None) -> FaultSpec:
     """Saturation term of a fault drawn for the paper's machine, in this machine's range."""
     scale = machine.max_speed / _PAPER_SPEED if fault.side is Side.SENSOR else machine.control.u_max
-    strength = epsilon if epsilon is not None and fault.mode in _PARTIAL else fault.epsilon
+    strength = epsilon if epsilon is not None and not fault.mode.total else fault.epsilon
     return replace(fault, sat=fault.sat * scale, sat_std=fault.sat_std * scale, epsilon=strength)

@@ -8,11 +8,10 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from replay.faults import FaultMode, FaultSpec, Side
+from replay.faults import TABLE_MODES, FaultMode, FaultSpec, Side
 from replay.simulation.duty import Duty
 from replay.simulation.options import SIMULATED_AXLES, SimulationOptions
 
-_MODES = (FaultMode.STUCK, FaultMode.NO_SIGNAL, FaultMode.INEFFICIENT, FaultMode.NOISY)
 _NEVER_STOPPED = 0.12  # a fault begins where the machine drives at least this fast [m/s]
 
 
@@ -45,7 +44,7 @@ def varied_onsets(
         if rng.random() >= options.early_share or first < 6.0:
             continue
         side = Side.SENSOR if rng.random() < 0.5 else Side.ACTUATOR
-        mode, stop = _MODES[int(rng.integers(4))], float(rng.uniform(4.0, min(first - 2.0, 20.0)))
+        mode, stop = TABLE_MODES[int(rng.integers(4))], float(rng.uniform(4.0, min(first - 2.0, 20.0)))
         early = draw_fault(wheel, side, mode, 0.0, stop, rng, steer=False)
         if not np.isnan(early.sat):  # a part that has not moved yet has no value to hold
             out.append(early)
@@ -92,7 +91,7 @@ def _paper_faults(options: SimulationOptions, duty: Duty, rng: np.random.Generat
     end = min(235.0, options.duration_s - 1.0)
     for wheel in options.machine.wheels:
         busy = [(f.start_s, f.stop_s, f.side) for f in faults if f.component == wheel]
-        wanted = [(s, m) for s in (Side.SENSOR, Side.ACTUATOR) for m in _MODES]
+        wanted = [(s, m) for s in (Side.SENSOR, Side.ACTUATOR) for m in TABLE_MODES]
         wanted = [w for w in wanted if not (busy and w == (Side.SENSOR, FaultMode.STUCK))]
         for number, j in enumerate(rng.permutation(len(wanted))):
             side, mode = wanted[j]
@@ -157,7 +156,7 @@ def _random_faults(options: SimulationOptions, duty: Duty, rng: np.random.Genera
             both = rng.random() < 1 / 7
             sides = (Side.SENSOR, Side.ACTUATOR) if both else (Side.SENSOR if rng.random() < 0.5 else Side.ACTUATOR,)
             for side in sides:
-                mode = _MODES[int(rng.integers(4))]
+                mode = TABLE_MODES[int(rng.integers(4))]
                 late = float(rng.uniform(0.5, 2.0)) if both and side is Side.ACTUATOR else 0.0
                 faults.append(draw_fault(part, side, mode, t + late, stop, rng, steer=steer))
             t = stop + float(rng.uniform(4.0, 15.0))

@@ -5,13 +5,12 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from replay.faults import FaultMode, FaultSpec, Side
+from replay.faults import FaultSpec, Side
 from replay.simulation.options import SIMULATED_AXLES, SimulationOptions
 from replay.simulation.state import Recording
 from replay.truth import MissionTruth, TruthInterval, TruthSpan
 
 _SLIP_SPEED = 0.03  # rim over ground from which a tyre slips [m/s]
-_BLIND = (FaultMode.STUCK, FaultMode.NO_SIGNAL)
 
 
 def actual_signals(options: SimulationOptions, recording: Recording) -> dict[str, NDArray[np.float64]]:
@@ -55,7 +54,7 @@ def mission_truth(
         masked=tuple(
             TruthSpan(f.component, f.start_s, min(f.stop_s, duration))
             for f, _ in within
-            if f.side is Side.SENSOR and f.mode in _BLIND
+            if f.side is Side.SENSOR and f.mode.total
         ),
         driving=tuple(motion),
     )

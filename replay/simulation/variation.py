@@ -156,11 +156,7 @@ def varied_options(
     ConfigError
         Where the kind is not known, or the seed belongs to the other pool.
     """
-    if kind not in POOLS:
-        raise ConfigError(f"kind = {kind!r} is not known; expected tuning or reporting")
-    if seed not in POOLS[kind]:
-        where = "0 to 999" if kind == "tuning" else "at least 2000"
-        raise ConfigError(f"seed = {seed} is no {kind} seed; expected {where}")
+    _check_seed(seed, kind)
     ranges, rng = RANGES[kind], np.random.default_rng([seed, 91])
 
     def draw(span: Span) -> float:
@@ -199,6 +195,15 @@ def varied_options(
         machine=replace(haulotte(), control=control),
         plant=plant,
     )
+
+
+def _check_seed(seed: int, kind: Kind) -> None:
+    """Raise where the kind is not known, or the seed belongs to the other pool."""
+    if kind not in POOLS:
+        raise ConfigError(f"kind = {kind!r} is not known; expected tuning or reporting")
+    if seed not in POOLS[kind]:
+        where = "0 to 999" if kind == "tuning" else "at least 2000"
+        raise ConfigError(f"seed = {seed} is no {kind} seed; expected {where}")
 
 
 def _tame(lambda_: float, plant: PlantOptions) -> float:

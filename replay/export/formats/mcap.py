@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import struct
 import zlib
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import BinaryIO
 
@@ -66,9 +66,37 @@ def _record(record: McapRecord) -> bytes:
 
 
 def _write(file: BinaryIO, batches: Sequence[TopicBatch], level: int) -> None:
+    definitions, channels = _named(batches)
+    section = _DataSection(file)
+    section.put(
+        _MAGIC + _record(Header(profile="ros2", library=f"mfhca-replay {__version__}")) + definitions + channels
+    )
     topics = list(dict.fromkeys(b.topic for b in batches))
-    types = list(dict.fromkeys(b.type_name for b in batches))
     channel_ids = [topics.index(b.topic) + 1 for b in batches]
+    compressor = zstandard.ZstdCompressor(level=level)
+    sequence = np.zeros(len(topics) + 1, np.int64)
+    indexes = []
+    for plan in plan_chunks(batches, _MESSAGE_HEAD.itemsize, _CHUNK_SIZE):
+        data = _chunk_data(plan, batches, channel_ids, sequence)
+        indexes.append(
+            section.put_chunk(plan, data, compressor.compress(data), _message_indexes(plan, batches, channel_ids))
+        )
+    file.write(_record(DataEnd(section.crc)))
+    statistics = _statistics(sequence, indexes, len({b.type_name for b in batches}))
+    _write_summary(
+        file,
+        {
+            Opcode.SCHEMA: definitions,
+            Opcode.CHANNEL: channels,
+            Opcode.STATISTICS: _record(statistics),
+            Opcode.CHUNK_INDEX: b"".join(_record(c) for c in indexes),
+        },
+    )
+
+
+def _named(batches: Sequence[TopicBatch]) -> tuple[bytes, bytes]:
+    """Records of the message types, and of the topics' channels."""
+    types = list(dict.fromkeys(b.type_name for b in batches))
     store = get_typestore(Stores.ROS2_HUMBLE)
     definitions = b"".join(
         _record(
@@ -78,64 +106,59 @@ def _write(file: BinaryIO, batches: Sequence[TopicBatch], level: int) -> None:
     )
     type_of = {b.topic: b.type_name for b in batches}
     channels = b"".join(
-        _record(Channel(i, topic, "cdr", {}, types.index(type_of[topic]) + 1)) for i, topic in enumerate(topics, 1)
+        _record(Channel(i, topic, "cdr", {}, types.index(name) + 1))
+        for i, (topic, name) in enumerate(type_of.items(), 1)
     )
-    head = _MAGIC + _record(Header(profile="ros2", library=f"mfhca-replay {__version__}"))
-    data_crc = 0
+    return definitions, channels
 
-    def put(octets: bytes) -> None:
-        nonlocal data_crc
-        data_crc = zlib.crc32(octets, data_crc)
-        file.write(octets)
 
-    put(head + definitions + channels)
-    compressor = zstandard.ZstdCompressor(level=level)
-    indexes = []
-    sequence = np.zeros(len(topics) + 1, np.int64)
-    for plan in plan_chunks(batches, _MESSAGE_HEAD.itemsize, _CHUNK_SIZE):
-        data = _chunk_data(plan, batches, channel_ids, sequence)
-        packed = compressor.compress(data)
+class _DataSection:
+    """Data section of a file under way, and the CRC of what it holds."""
+
+    def __init__(self, file: BinaryIO) -> None:
+        self._file = file
+        self.crc = 0
+
+    def put(self, octets: bytes) -> None:
+        """Write records."""
+        self.crc = zlib.crc32(octets, self.crc)
+        self._file.write(octets)
+
+    def put_chunk(self, plan: ChunkPlan, data: bytes, packed: bytes, entries: Mapping[int, bytes]) -> ChunkIndex:
+        """Write a chunk, and the message index of each of its channels."""
         chunk = _record(Chunk("zstd", packed, plan.stop_ns, plan.start_ns, zlib.crc32(data), len(data)))
-        start = file.tell()
-        put(chunk)
-        index_start, offsets = file.tell(), {}
-        for channel, octets in _message_indexes(plan, batches, channel_ids).items():
-            offsets[channel] = file.tell()
-            put(octets)
-        indexes.append(
-            ChunkIndex(
-                chunk_length=len(chunk),
-                chunk_start_offset=start,
-                compression="zstd",
-                compressed_size=len(packed),
-                message_end_time=plan.stop_ns,
-                message_index_length=file.tell() - index_start,
-                message_index_offsets=offsets,
-                message_start_time=plan.start_ns,
-                uncompressed_size=len(data),
-            )
+        start = self._file.tell()
+        self.put(chunk)
+        index_start, offsets = self._file.tell(), {}
+        for channel, octets in entries.items():
+            offsets[channel] = self._file.tell()
+            self.put(octets)
+        return ChunkIndex(
+            chunk_length=len(chunk),
+            chunk_start_offset=start,
+            compression="zstd",
+            compressed_size=len(packed),
+            message_end_time=plan.stop_ns,
+            message_index_length=self._file.tell() - index_start,
+            message_index_offsets=offsets,
+            message_start_time=plan.start_ns,
+            uncompressed_size=len(data),
         )
-    file.write(_record(DataEnd(data_crc)))
+
+
+def _statistics(sequence: np.typing.NDArray[np.int64], indexes: Sequence[ChunkIndex], types: int) -> Statistics:
+    """Counts and span of the file; `sequence` holds the messages of each channel."""
     counts = {i: int(n) for i, n in enumerate(sequence) if i > 0}
-    statistics = Statistics(
+    return Statistics(
         attachment_count=0,
-        channel_count=len(topics),
+        channel_count=len(counts),
         channel_message_counts=counts,
         chunk_count=len(indexes),
         message_count=sum(counts.values()),
         message_start_time=min((c.message_start_time for c in indexes), default=0),
         message_end_time=max((c.message_end_time for c in indexes), default=0),
         metadata_count=0,
-        schema_count=len(types),
-    )
-    _write_summary(
-        file,
-        {
-            Opcode.SCHEMA: definitions,
-            Opcode.CHANNEL: channels,
-            Opcode.STATISTICS: _record(statistics),
-            Opcode.CHUNK_INDEX: b"".join(_record(c) for c in indexes),
-        },
+        schema_count=types,
     )
 
 
