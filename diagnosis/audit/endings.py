@@ -8,16 +8,16 @@ import shlex
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Literal
 
 from diagnosis.audit.discovery.discover import MissionSource
 from diagnosis.audit.plan import Planned
 from diagnosis.audit.runner import absolute
 from diagnosis.audit.store.folders import holds_report, write_whole
 from diagnosis.audit.store.keys import Key
-from diagnosis.audit.store.outcome import READ, limit_met
+from diagnosis.audit.store.outcome import READ, MissionState, limit_met
 from diagnosis.audit.store.store import Store
-from diagnosis.results.result import SEVERITIES
+from diagnosis.results.vocabulary import Severity, Verdict
 from replay.log.file_types import part_of
 
 FAILURES = "failures.txt"
@@ -41,37 +41,37 @@ class Ending:
         Attempts so far.
     machine_id, machine_name : str
         Its machine.
-    verdict : str or None
-        ``ready``, ``watch``, ``stop``, ``not_assessed``; None where there is no report.
+    verdict : Verdict or None
+        None where there is no report.
     title : str
         Verdict in words.
     report : str or None
         Folder of the report, relative to the output.
     faults : int
         Number of faults.
-    severity : str
+    severity : Severity or ""
         Of the worst fault; empty where there is none.
     """
 
     name: str
-    state: str
+    state: MissionState
     reason: str
     attempts: int
     machine_id: str
     machine_name: str
-    verdict: str | None
+    verdict: Verdict | None
     title: str
     report: str | None
     faults: int
-    severity: str
+    severity: Severity | Literal[""]
 
 
 def endings(store: Store, missions: Iterable[MissionSource]) -> list[Ending]:
     """Ends of missions, in the order of their names; those without a result are left out."""
     wanted = {mission.name: mission.files for mission in missions}
-    faults: dict[int, list[str]] = {}
+    faults: dict[int, list[Severity]] = {}
     for row in store.database.rows("SELECT result, severity FROM fault"):
-        faults.setdefault(row[0], []).append(row[1])
+        faults.setdefault(row[0], []).append(Severity(row[1]))
     columns = ("state", "reason", "attempts", "machine_id", "machine_name", "verdict", "title", "report")
     query = (
         f"SELECT m.name, r.id, r.log_hash, r.config_hash, r.version, {', '.join(f'r.{c}' for c in columns)} "
@@ -81,14 +81,31 @@ def endings(store: Store, missions: Iterable[MissionSource]) -> list[Ending]:
     for row in store.database.rows(query):
         if row["name"] in wanted:
             found = faults.get(row["id"], [])
-            worst = max(found, key=SEVERITIES.index, default="")
-            facts = {column: row[column] for column in columns}
-            if row["report"] and not holds_report(store.folder / row["report"], Key(*row[2:5])):
-                facts["report"] = None  # another result's stands there
-            if row["reason"]:
-                facts["reason"] = store.own_reason(row["id"], row["reason"], wanted[row["name"]])
-            out.append(Ending(name=row["name"], faults=len(found), severity=worst, **facts))
+            report, reason = row["report"], row["reason"]
+            if report and not holds_report(store.folder / report, Key(*row[2:5])):
+                report = None  # another result's is there
+            if reason:
+                reason = store.own_reason(row["id"], reason, wanted[row["name"]])
+            out.append(
+                Ending(
+                    name=row["name"],
+                    state=MissionState(row["state"]),
+                    reason=reason,
+                    attempts=row["attempts"],
+                    machine_id=row["machine_id"],
+                    machine_name=row["machine_name"],
+                    verdict=Verdict(row["verdict"]) if row["verdict"] is not None else None,
+                    title=row["title"],
+                    report=report,
+                    faults=len(found),
+                    severity=sorted(found, key=_rank)[-1] if found else "",
+                )
+            )
     return out
+
+
+def _rank(severity: Severity) -> int:
+    return severity.rank
 
 
 def exit_code(ends: Iterable[Ending], fail_on: str) -> int:
@@ -105,11 +122,11 @@ def exit_code(ends: Iterable[Ending], fail_on: str) -> int:
 
 
 def _code(end: Ending, fail_on: str) -> int:
-    if end.state == "crashed":
+    if end.state == MissionState.CRASHED:
         return _CRASHED
-    if end.state not in READ or (end.verdict == "not_assessed" and fail_on != NEVER):
+    if end.state not in READ or (end.verdict == Verdict.NOT_ASSESSED and fail_on != NEVER):
         return NOT_READ
-    serious = fail_on != NEVER and end.severity and SEVERITIES.index(end.severity) >= SEVERITIES.index(fail_on)
+    serious = fail_on != NEVER and end.severity != "" and Severity(end.severity).rank >= Severity(fail_on).rank
     return _FAULT if serious else 0
 
 
@@ -178,7 +195,7 @@ def quoted(word: str) -> str:
     """A word for a POSIX shell; bytes that no terminal should see are written out, as bash, zsh and ksh read them."""
     if not _HIDDEN.search(word):
         return shlex.quote(word)
-    out: list[Any] = []
+    out: list[str] = []
     for byte in os.fsencode(word):
         printable = 0x20 <= byte < 0x7F and byte not in b"'\\"
         out.append(chr(byte) if printable else f"\\x{byte:02x}")

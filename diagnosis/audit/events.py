@@ -8,13 +8,73 @@ from collections.abc import Callable
 from contextlib import suppress
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import IO, Any
+from typing import IO, TypedDict
 
+from diagnosis.audit.store.outcome import MissionState
 from diagnosis.results.json_text import dump_json
 from replay.errors import OutputError
 
 SCHEMA = "mfhca-events/1"
-Tell = Callable[[str, dict[str, Any]], None]
+
+
+class EventFacts(TypedDict, total=False):
+    """Fields of an event, beside its name and time; which of them an event has is in the guide to audits.
+
+    Attributes
+    ----------
+    name : str
+        Of a mission.
+    files : list[str]
+        Its files.
+    state, reason, verdict, title
+        As in `diagnosis.audit.endings.Ending`; the reason also of what is no mission's.
+    faults : int
+        Number of faults.
+    report : str or None
+        Folder of a report, relative to the output.
+    attempt : int
+        Number of the attempt.
+    wall_s, cpu_s : float
+        Time that something took, and time of a processor [s].
+    peak_mb : float
+        Most memory held at once [MB].
+    missions, rest : int
+        Number of missions, and of those to do.
+    bytes : int
+        Size of their files.
+    attempts, links, problems
+        As in `diagnosis.audit.store.ingest.Ingested`.
+    path : str
+        Of the fleet page.
+    code, failed : int
+        Exit code, and missions that failed.
+    """
+
+    name: str
+    files: list[str]
+    state: MissionState
+    reason: str
+    verdict: str | None
+    title: str
+    faults: int
+    report: str | None
+    attempt: int
+    wall_s: float
+    cpu_s: float
+    peak_mb: float
+    missions: int
+    rest: int
+    bytes: int
+    attempts: int
+    links: int
+    problems: list[str]
+    path: str
+    code: int
+    failed: int
+
+
+#: Takes the name of an event and its fields.
+Emit = Callable[[str, EventFacts], None]
 
 
 class EventLog:
@@ -38,7 +98,7 @@ class EventLog:
         except OSError as error:
             raise OutputError(f"{path}: events cannot be written ({error.strerror or error}); see --events") from error
 
-    def tell(self, event: str, facts: dict[str, Any]) -> None:
+    def write(self, event: str, facts: EventFacts) -> None:
         """Write one event; a reader that has gone is no error.
 
         Raises

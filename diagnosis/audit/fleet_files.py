@@ -2,24 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
 
 import orjson
 
 from diagnosis.audit.fleet.arrivals import arrivals, last_made, without_false_dates
 from diagnosis.audit.fleet.document import Fleet, fleet_document, fleet_of
+from diagnosis.audit.fleet.fleet_types import FleetDocument
 from diagnosis.audit.fleet.gather import machines_of
 from diagnosis.audit.fleet.machines import Limits
 from diagnosis.audit.fleet.news import first_runs
 from diagnosis.audit.fleet.read import Mission, content_mark, read_missions, read_run
 from diagnosis.audit.fleet.table import fleet_csv
-from diagnosis.audit.fleet.trends import Axis
+from diagnosis.audit.fleet.trend_types import Axis
 from diagnosis.audit.store.folders import holds_report
 from diagnosis.audit.store.keys import Key
 from diagnosis.audit.store.store import FILE_NAME
+from diagnosis.results.document import ReportDocument
 from replay.atomic_write import atomic_path
 from replay.errors import ConfigError
 
@@ -122,7 +122,7 @@ def load_fleet(store_path: Path, out: Path | None = None, axis: Axis = "hours") 
     return replace(fleet, run=read_run(store_path), made_ns=last_made(place, missions))
 
 
-def fleet_json(fleet: Fleet, baseline: Path | None = None) -> dict[str, Any]:
+def fleet_json(fleet: Fleet, baseline: Path | None = None) -> FleetDocument:
     """Document of a fleet, compared with an earlier audit where one is given.
 
     Raises
@@ -157,19 +157,14 @@ def _limits(path: Path) -> Limits:
     try:
         if path.stat().st_size > _MOST_BYTES:
             return Limits()
-        report = orjson.loads(path.read_bytes())
-        limits, machine = report.get("limits") or {}, report.get("machine") or {}
-        cleared = (report.get("verdict") or {}).get("cleared")
+        report: ReportDocument = orjson.loads(path.read_bytes())
+        limits, machine = report["limits"], report["machine"]
         return Limits(
-            min_epsilon=float(limits.get("min_epsilon", Limits.min_epsilon)),
-            min_assessed=float(limits.get("min_assessed", Limits.min_assessed)),
-            wheels=_names(machine, "wheels"),
-            axles=_names(machine, "axles"),
-            cleared=cleared if isinstance(cleared, bool) else None,
+            min_epsilon=float(limits["min_epsilon"]),
+            min_assessed=float(limits["min_assessed"]),
+            wheels=tuple(map(str, machine["wheels"])),
+            axles=tuple(map(str, machine["axles"])),
+            cleared=report["verdict"]["cleared"],
         )
-    except (OSError, ValueError, TypeError, AttributeError):
+    except (OSError, ValueError, TypeError, KeyError, AttributeError):
         return Limits()
-
-
-def _names(machine: Mapping[str, Any], key: str) -> tuple[str, ...]:
-    return tuple(str(name) for name in machine.get(key) or ())

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from diagnosis.audit.events import Tell
+from diagnosis.audit.events import Emit
 from diagnosis.audit.fleet.read import CALENDAR_NS
 from diagnosis.audit.previous_mission import previous_report
 from diagnosis.audit.store.folders import own_report
@@ -20,7 +20,7 @@ _NEWEST = (
 _MACHINES = "SELECT DISTINCT r.machine_id FROM mission m JOIN result r ON r.id = m.result WHERE m.name = ? AND r.machine_id <> ''"
 
 
-def compare_newest(store: Store, names: Sequence[str], max_size_mb: float, tell: Tell) -> None:
+def compare_newest(store: Store, names: Sequence[str], max_size_mb: float, emit: Emit) -> None:
     """Write the comparison into the newest report of every machine that has one of the named missions.
 
     Parameters
@@ -31,8 +31,8 @@ def compare_newest(store: Store, names: Sequence[str], max_size_mb: float, tell:
         Missions that this run has audited.
     max_size_mb : float
         Size that a page should keep to [MB].
-    tell : Tell
-        Told where a report cannot be compared; that costs nothing else.
+    emit : Emit
+        Takes the event of a report that cannot be compared; that costs nothing else.
 
     Raises
     ------
@@ -48,7 +48,7 @@ def compare_newest(store: Store, names: Sequence[str], max_size_mb: float, tell:
                 except OutputError:
                     raise
                 except (MfhcaError, KeyError, TypeError, ValueError) as error:
-                    tell("not_compared", {"report": report, "reason": str(error)})
+                    emit("not_compared", {"report": report, "reason": str(error)})
 
 
 def _compare(store: Store, result: int, folder: Path, max_size_mb: float) -> None:

@@ -8,17 +8,17 @@ from collections import deque
 from collections.abc import Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, wait
 from dataclasses import dataclass, replace
-from typing import Any
 
 from diagnosis.audit.discovery.identity import fallback_id
 from diagnosis.audit.engines import Engine, is_lost
-from diagnosis.audit.events import Tell
+from diagnosis.audit.events import Emit, EventFacts
 from diagnosis.audit.plan import Asked, Planned, allows_more, is_done, known_hashes, stored_result
 from diagnosis.audit.store.claims import Claim, claim_mission
 from diagnosis.audit.store.folders import RESULTS, Working
 from diagnosis.audit.store.ingest import ingest
-from diagnosis.audit.store.outcome import TRANSIENT, Outcome
+from diagnosis.audit.store.outcome import TRANSIENT, MissionState, Outcome
 from diagnosis.audit.store.store import Store, StoredResult
+from diagnosis.audit.store.summary import MissionSummary
 from diagnosis.audit.task import Attempt, Task, audit_one, key_of
 
 TICK_S = 0.5
@@ -48,12 +48,12 @@ class Runner:
         Where tasks run.
     place : Working
         The run's own folders.
-    tell : Tell
-        Told of every event: ``skipped``, ``mission``, ``retry``, ``waiting``, ``tick``.
+    emit : Emit
+        Takes every event: ``skipped``, ``mission``, ``retry``, ``waiting``, ``tick``.
     """
 
-    def __init__(self, asked: Asked, store: Store, engine: Engine, place: Working, tell: Tell) -> None:
-        self._asked, self._store, self._engine, self._place, self._tell = asked, store, engine, place, tell
+    def __init__(self, asked: Asked, store: Store, engine: Engine, place: Working, emit: Emit) -> None:
+        self._asked, self._store, self._engine, self._place, self._emit = asked, store, engine, place, emit
         self._queue: deque[Planned] = deque()
         self._elsewhere: deque[Planned] = deque()
         self._running: dict[Future[Attempt], _Running] = {}
@@ -78,7 +78,7 @@ class Runner:
                     self._finish([(self._running.pop(future), future) for future in done])
                 elif not self._queue:
                     time.sleep(TICK_S)
-                self._tell("tick", {})
+                self._emit("tick", {})
                 if not self._queue and self._elsewhere and time.monotonic() - looked > 2 * TICK_S:
                     looked = time.monotonic()
                     self._queue, self._elsewhere = self._elsewhere, deque()
@@ -102,13 +102,13 @@ class Runner:
                 self._elsewhere.append(planned)
                 if planned.mission.name not in self._waited:
                     self._waited.add(planned.mission.name)
-                    self._tell("waiting", {"name": planned.mission.name})
+                    self._emit("waiting", {"name": planned.mission.name})
                 continue
             self._claims.add(claim)
             result = stored_result(planned, self._store)
             if self._asked.resume and result is not None and is_done(result, self._asked):  # by another run meanwhile
                 self._drop(claim)
-                skip(planned, result, self._store, self._tell)
+                skip(planned, result, self._store, self._emit)
                 continue
             number = result.attempts + 1 if result is not None else 1
             again = self._asked.resume and result is not None and result.state in TRANSIENT
@@ -150,12 +150,12 @@ class Runner:
             if not attempt.kept:
                 keep(attempt, one.planned, self._store)
             if attempt.outcome.state in TRANSIENT and one.tries <= self._asked.retries:
-                told = {"name": attempt.mission.name, "state": attempt.outcome.state, "reason": attempt.outcome.reason}
-                self._tell("retry", told)
+                outcome = attempt.outcome
+                self._emit("retry", {"name": attempt.mission.name, "state": outcome.state, "reason": outcome.reason})
                 self._submit(replace(one, number=one.number + 1, tries=one.tries + 1))
             else:
                 self._drop(one.claim)
-                self._tell("mission", facts_of(attempt))
+                self._emit("mission", facts_of(attempt))
 
     def _drop(self, claim: Claim) -> None:
         claim.drop()
@@ -172,21 +172,21 @@ class Runner:
         one.lost += 1
         if one.lost >= _LOST_TRIES:
             return self._lost(one)
-        self._tell("retry", {"name": one.planned.mission.name, "reason": "the worker was lost"})
+        self._emit("retry", {"name": one.planned.mission.name, "reason": "the worker was lost"})
         self._submit(one)
         return None
 
     def _lost(self, one: _Running) -> Attempt:
         planned = one.planned
         key = key_of(planned.mission, (), planned.machine, planned.config_hash)
-        outcome = Outcome("crashed", f"{_LOST_TRIES} workers were lost while they were at it")
+        outcome = Outcome(MissionState.CRASHED, f"{_LOST_TRIES} workers were lost while they were at it")
         return Attempt(planned.mission, key, outcome, one.number, None, ())
 
     def _refuse(self, planned: Planned) -> None:
         key = key_of(planned.mission, (), planned.machine, planned.config_hash)
-        attempt = Attempt(planned.mission, key, Outcome("unreadable", planned.problem), 1, None, ())
+        attempt = Attempt(planned.mission, key, Outcome(MissionState.UNREADABLE, planned.problem), 1, None, ())
         keep(attempt, planned, self._store)
-        self._tell("mission", facts_of(attempt))
+        self._emit("mission", facts_of(attempt))
 
 
 def keep(attempt: Attempt, planned: Planned, store: Store) -> None:
@@ -201,18 +201,27 @@ def absolute(name: str) -> str:
     return name if "://" in name else os.path.abspath(name)  # noqa: PTH100
 
 
-def skip(planned: Planned, result: StoredResult, store: Store, tell: Tell) -> None:
+def skip(planned: Planned, result: StoredResult, store: Store, emit: Emit) -> None:
     """Let a mission have the result that is there."""
     store.reuse(planned.mission, result)
     reason = store.own_reason(result.id, result.reason, planned.mission.files)
-    facts = {"name": planned.mission.name, "state": result.state, "reason": reason, "verdict": result.verdict}
-    tell("skipped", {**facts, "report": result.report})
+    emit(
+        "skipped",
+        {
+            "name": planned.mission.name,
+            "state": result.state,
+            "reason": reason,
+            "verdict": result.verdict,
+            "report": result.report,
+        },
+    )
 
 
-def facts_of(attempt: Attempt) -> dict[str, Any]:
+def facts_of(attempt: Attempt) -> EventFacts:
     """Facts about a mission's end, for events."""
     outcome = attempt.outcome
-    result = (outcome.summary or {}).get("result", {})
+    summary = outcome.summary or MissionSummary(result={}, faults=[], components=[])
+    result = summary["result"]
     return {
         "name": attempt.mission.name,
         "files": list(attempt.mission.files),
@@ -220,7 +229,7 @@ def facts_of(attempt: Attempt) -> dict[str, Any]:
         "reason": outcome.reason,
         "verdict": result.get("verdict"),
         "title": result.get("title", ""),
-        "faults": len((outcome.summary or {}).get("faults", ())),
+        "faults": len(summary["faults"]),
         "report": attempt.report,
         "attempt": attempt.number,
         "wall_s": round(outcome.wall_s, 3),

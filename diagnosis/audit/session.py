@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, TypedDict, cast
 
 import orjson
 
@@ -15,7 +15,7 @@ from diagnosis.audit.copies import without_copies
 from diagnosis.audit.discovery.discover import Discovery
 from diagnosis.audit.endings import Ending, endings, write_failures
 from diagnosis.audit.engines import Engine
-from diagnosis.audit.events import Tell
+from diagnosis.audit.events import Emit, EventFacts
 from diagnosis.audit.fleet.read import content_mark
 from diagnosis.audit.plan import Asked, Planned, is_done, plan, stored_result
 from diagnosis.audit.previous_pages import compare_newest
@@ -28,7 +28,7 @@ from replay.errors import LogError, OutputError
 from replay.version import __version__
 
 if TYPE_CHECKING:
-    from diagnosis.audit.fleet.trends import Axis
+    from diagnosis.audit.fleet.trend_types import Axis
 
 PAGE_S = 60.0
 _PAGE_SHARE = 20.0
@@ -76,7 +76,7 @@ def audit(
     discovery: Discovery,
     asked: Asked,
     engine: Callable[[], AbstractContextManager[Engine]],
-    tell: Tell,
+    emit: Emit,
     *,
     baseline: Path | None = None,
     axis: Axis = "hours",
@@ -91,8 +91,8 @@ def audit(
         What is wanted.
     engine : Callable
         Makes the engine, where there is something to do.
-    tell : Tell
-        Told of every event.
+    emit : Emit
+        Takes every event.
     baseline : Path or None
         Store of another audit to compare the fleet with.
     axis : str
@@ -110,44 +110,63 @@ def audit(
 
         check_baseline(baseline, asked.output / FILE_NAME)
     with Store.open(asked.output / FILE_NAME) as store:
-        page = _Page(asked.output, baseline, axis, tell)
-        whole = page.is_current()  # else an earlier run was ended before its last steps
-        sweep(asked.output)
-        store.begin_run()
-        taken = ingest(store)
-        if taken.attempts or taken.links or taken.problems:
-            tell("ingested", {"attempts": taken.attempts, "links": taken.links, "problems": list(taken.problems)})
-        missions = store.adopt(discovery.missions, discovery.roots)
-        planned = plan(missions, asked)
-        done, rest = [], []
-        tell("start", {"missions": len(planned), "bytes": sum(m.bytes for m in missions)})
-        for one in planned:
-            result = stored_result(one, store) if asked.resume else None
-            if result is not None:
-                _remake_page(result, asked, tell)
-            if result is not None and is_done(result, asked):
-                skip(one, result, store, tell)
-                done.append(one)
-            else:
-                rest.append(one)
-        tell("planned", {"rest": len(rest), "bytes": sum(one.mission.bytes for one in rest)})
+        page = _FleetPage(asked.output, baseline, axis, emit)
+        complete = page.is_current()  # else an earlier run was ended before its last steps
+        planned, done, rest = _begin(discovery, asked, store, emit)
         if rest:
-            page.update(always=False)  # what is still to do may stand against what it says
-            with page.kept_true(), working(asked.output) as place, engine() as made:
-                runner = Runner(asked, store, made, place, page.telling)
-                now = rest
-                while now:  # also what shared a report whose place another result has taken meanwhile
-                    for part in without_copies(now, store):
-                        runner.run(part)
-                    done, now = _parted(done, asked, store)
-                    rest += now
-        names = [one.mission.name for one in (rest if whole else planned)]
-        compare_newest(store, names, asked.max_size_mb, tell)
+            page.update(always=False)  # what is still to do may contradict what it says
+            with page.written_on_failure(), working(asked.output) as place, engine() as made:
+                runner = Runner(asked, store, made, place, page.emit_and_update)
+                rest = _run_all(runner, done, rest, asked, store)
+        names = [one.mission.name for one in (rest if complete else planned)]
+        compare_newest(store, names, asked.max_size_mb, emit)
         ends = endings(store, [one.mission for one in planned])
         failed = write_failures(asked.output, planned, ends, asked.machine)
         page.finish()
         gone = store.database.rows("SELECT count(*) FROM mission WHERE gone IS NOT NULL")[0][0]
     return Audited(tuple(ends), len(planned) - len(rest), failed, gone)
+
+
+def _begin(
+    discovery: Discovery, asked: Asked, store: Store, emit: Emit
+) -> tuple[list[Planned], list[Planned], list[Planned]]:
+    """Begin a run of the store: all missions, those that are done, and the rest."""
+    sweep(asked.output)
+    store.begin_run()
+    taken = ingest(store)
+    if taken.attempts or taken.links or taken.problems:
+        emit("ingested", {"attempts": taken.attempts, "links": taken.links, "problems": list(taken.problems)})
+    missions = store.adopt(discovery.missions, discovery.roots)
+    planned = plan(missions, asked)
+    done, rest = list[Planned](), list[Planned]()
+    emit("start", {"missions": len(planned), "bytes": sum(m.bytes for m in missions)})
+    for one in planned:
+        result = stored_result(one, store) if asked.resume else None
+        if result is not None:
+            _remake_page(result, asked, emit)
+        if result is not None and is_done(result, asked):
+            skip(one, result, store, emit)
+            done.append(one)
+        else:
+            rest.append(one)
+    emit("planned", {"rest": len(rest), "bytes": sum(one.mission.bytes for one in rest)})
+    return planned, done, rest
+
+
+def _run_all(
+    runner: Runner, done: Sequence[Planned], rest: Sequence[Planned], asked: Asked, store: Store
+) -> list[Planned]:
+    """Run what is not done; all missions that were run.
+
+    Those that were done are run too where they shared a report whose place another result has taken meanwhile.
+    """
+    now, ran = list(rest), list(rest)
+    while now:
+        for part in without_copies(now, store):
+            runner.run(part)
+        done, now = _parted(done, asked, store)
+        ran += now
+    return ran
 
 
 def _parted(done: Sequence[Planned], asked: Asked, store: Store) -> tuple[list[Planned], list[Planned]]:
@@ -158,7 +177,7 @@ def _parted(done: Sequence[Planned], asked: Asked, store: Store) -> tuple[list[P
     return parts
 
 
-def _remake_page(result: StoredResult, asked: Asked, tell: Tell) -> None:
+def _remake_page(result: StoredResult, asked: Asked, emit: Emit) -> None:
     """Make a result's page again where it was removed and the rest of the report is there."""
     if result.report is None or (asked.output / result.report / "report.html").is_file():
         return
@@ -171,22 +190,31 @@ def _remake_page(result: StoredResult, asked: Asked, tell: Tell) -> None:
             rebuild(folder, max_size_mb=asked.max_size_mb)
         except (LogError, KeyError, TypeError, ValueError):  # the mission is diagnosed again
             return
-    tell("rebuilt", {"report": result.report})
+    emit("rebuilt", {"report": result.report})
+
+
+class _PageState(TypedDict, total=False):
+    """What says whether a `fleet.json` is up to date."""
+
+    mark: str
+    version: str
+    axis: str
+    baseline: object
 
 
 @dataclass
-class _Page:
+class _FleetPage:
     """The fleet page, written anew every now and then while missions end."""
 
     output: Path
     baseline: Path | None
     axis: Axis
-    tell: Tell
+    emit: Emit
     due: float = field(default_factory=lambda: time.monotonic() + PAGE_S)
 
-    def telling(self, event: str, facts: dict[str, Any]) -> None:
+    def emit_and_update(self, event: str, facts: EventFacts) -> None:
         """Pass an event on, and write the page when it is due."""
-        self.tell(event, facts)
+        self.emit(event, facts)
         if event == "tick" and time.monotonic() > self.due:
             self.update(always=True)
 
@@ -198,23 +226,23 @@ class _Page:
             raise
         except Exception as error:
             self.due = time.monotonic() + PAGE_S
-            self.tell("page_failed", {"reason": f"{type(error).__name__}: {error}"})
+            self.emit("page_failed", {"reason": f"{type(error).__name__}: {error}"})
 
     def write(self, *, always: bool) -> None:
-        """Write the page, unless the one that is there is still right."""
+        """Write the page, unless the one that is there is up to date."""
         from diagnosis.audit.fleet_files import write_fleet
 
-        if not always and self._stands():
+        if not always and self._is_as_asked():
             return
         start = time.monotonic()
         with alone(self.output, _PAGE_NAME, PAGE_S):  # its three files belong together
             files = write_fleet(self.output / FILE_NAME, self.output, baseline=self.baseline, axis=self.axis)
         took = time.monotonic() - start
         self.due = time.monotonic() + max(PAGE_S, _PAGE_SHARE * took)
-        self.tell("page", {"path": str(files.html), "wall_s": round(took, 3)})
+        self.emit("page", {"path": str(files.html), "wall_s": round(took, 3)})
 
     @contextmanager
-    def kept_true(self) -> Iterator[None]:
+    def written_on_failure(self) -> Iterator[None]:
         """Write the page also where the audit is interrupted, with what was found until then."""
         try:
             yield
@@ -232,21 +260,22 @@ class _Page:
 
     def is_current(self) -> bool:
         """Whether there is a page of what the store holds now."""
-        return self._current(self._document())
+        return self._shows_the_store(self._state())
 
-    def _stands(self) -> bool:
+    def _is_as_asked(self) -> bool:
         """Whether the page is current, and as it is asked for."""
-        told = self._document()
-        asked = self.baseline is None and told.get("baseline") is None and told.get("axis") == self.axis
-        return asked and self._current(told)
+        state = self._state()
+        asked = self.baseline is None and state.get("baseline") is None and state.get("axis") == self.axis
+        return asked and self._shows_the_store(state)
 
-    def _current(self, told: Mapping[str, Any]) -> bool:
+    def _shows_the_store(self, state: _PageState) -> bool:
         page, mark = self.output / "fleet.html", content_mark(self.output / FILE_NAME)
-        return (told.get("mark"), told.get("version")) == (mark, __version__) and page.is_file()
+        return (state.get("mark"), state.get("version")) == (mark, __version__) and page.is_file()
 
-    def _document(self) -> Mapping[str, Any]:
+    def _state(self) -> _PageState:
+        """State of the `fleet.json` that is there; empty where there is none."""
         try:
-            document = orjson.loads((self.output / "fleet.json").read_bytes())
+            document: object = orjson.loads((self.output / "fleet.json").read_bytes())
         except (OSError, ValueError):
             return {}
-        return document if isinstance(document, dict) else {}
+        return cast(_PageState, document) if isinstance(document, dict) else {}

@@ -7,11 +7,9 @@ import secrets
 import shutil
 import tempfile
 import time
-from collections.abc import Mapping
 from contextlib import suppress
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
 
 from diagnosis.audit.discovery.discover import MissionSource
 from diagnosis.audit.discovery.identity import fallback_id
@@ -24,7 +22,8 @@ from diagnosis.audit.store.claims import cannot_write
 from diagnosis.audit.store.folders import MISSIONS, publish
 from diagnosis.audit.store.keys import Key, file_roles, log_hash, unhashed_log
 from diagnosis.audit.store.objects import Objects
-from diagnosis.audit.store.outcome import READ, Outcome
+from diagnosis.audit.store.outcome import READ, MissionState, Outcome
+from diagnosis.audit.store.records import FileRecord, ResultObject, attempt_record
 from replay.errors import ConfigError, LogError, OutputError
 from replay.machine.config import Machine
 from replay.version import __version__
@@ -158,11 +157,11 @@ def _audit(task: Task, folder: Path, temporary: Path) -> Attempt:
     try:
         staged = stage(task.mission, temporary / "files", task.known, start + task.limits.wall_s)
     except Late:
-        outcome = Outcome("timeout", over_time(task.limits), time.monotonic() - start)
+        outcome = Outcome(MissionState.TIMEOUT, over_time(task.limits), time.monotonic() - start)
         return _unhashed(task, outcome)
     except (LogError, ConfigError) as error:
         full = isinstance(error.__cause__, OSError) and error.__cause__.errno in child.FULL
-        return _unhashed(task, Outcome("crashed" if full else "unreadable", str(error)))
+        return _unhashed(task, Outcome(MissionState.CRASHED if full else MissionState.UNREADABLE, str(error)))
     hashes = staged.hashes
     key = key_of(task.mission, hashes, task.machine, task.config_hash)
     work = Work(
@@ -185,7 +184,7 @@ def _audit(task: Task, folder: Path, temporary: Path) -> Attempt:
         ) from error
     if _signature(files) != before:
         gone = "was changed or removed while it was read; audit again once it is complete"
-        outcome = Outcome("unreadable", gone, outcome.wall_s, outcome.cpu_s, outcome.peak_mb, passing=True)
+        outcome = Outcome(MissionState.UNREADABLE, gone, outcome.wall_s, outcome.cpu_s, outcome.peak_mb, passing=True)
     outcome = replace(outcome, reason=named(outcome.reason, staged, task.mission, temporary))
     if outcome.passing:
         return _unhashed(task, outcome)
@@ -214,19 +213,17 @@ def named(reason: str, staged: Staged, mission: MissionSource, temporary: Path) 
 
 def _put(task: Task, attempt: Attempt) -> None:
     """Leave the attempt's result object, as `Store.record` would."""
-    mission, outcome = attempt.mission, asdict(attempt.outcome)
-    del outcome["passing"]
+    mission = attempt.mission
     hashes = attempt.hashes or (None,) * len(mission.files)
-    files = zip(task.described, sizes_of(mission), mission.stamps, hashes, strict=True)
-    document = {
-        "mission": {
-            "name": mission.name,
-            "files": [dict(zip(("path", "size", "stamp", "sha256"), file, strict=True)) for file in files],
-            "bytes": mission.bytes,
-        },
-        "key": asdict(attempt.key),
-        "summary": outcome.pop("summary"),
-        "attempt": outcome,
+    files: list[FileRecord] = [
+        {"path": path, "size": size, "stamp": stamp, "sha256": sha256}
+        for path, size, stamp, sha256 in zip(task.described, sizes_of(mission), mission.stamps, hashes, strict=True)
+    ]
+    document: ResultObject = {
+        "mission": {"name": mission.name, "files": files, "bytes": mission.bytes},
+        "key": attempt.key.record,
+        "summary": attempt.outcome.summary,
+        "attempt": attempt_record(attempt.outcome),
         "report": attempt.report,
         "machine_id": task.machine_id or task.machine.id or fallback_id(mission),
         "made_ns": time.time_ns(),
@@ -239,9 +236,9 @@ def sizes_of(mission: MissionSource) -> tuple[int, ...]:
     return mission.sizes or (mission.bytes,) * len(mission.files)
 
 
-def _signature(files: tuple[Path, ...]) -> Mapping[str, tuple[int, ...]]:
+def _signature(files: tuple[Path, ...]) -> dict[str, tuple[int, ...]]:
     """What changes with the files' content or place."""
-    found: dict[str, Any] = {}
+    found: dict[str, tuple[int, ...]] = {}
     for path in files:
         for file in sorted(path.rglob("*")) if path.is_dir() else [path]:
             with suppress(OSError):

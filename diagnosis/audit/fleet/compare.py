@@ -4,31 +4,25 @@ Faults are matched by machine, component, side and row; a fault "of sensor or ac
 counts what stands there: what was found in one of the last three missions that assessed the part. A fault that does not
 stand any more is ``resolved`` only where a mission assessed the part after the last one with the fault; else it is
 ``not_seen_again``: nothing shows that it was repaired.
-
-The document has ``counts`` by outcome, ``faults``, ``coverage`` (parts that were assessed in the last mission of one audit
-alone: ``lost`` or ``gained``), ``machines`` (``new``, ``missing``, ``changed`` verdicts), ``missions`` (``older``, ``newer``, ``new``,
-and ``missing``: names that the later audit lacks, where both hold some of the same missions), and ``worse``: whether a fault is
-new or worse, or machines or missions are missing.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any
-
 from diagnosis.audit.fleet.document import Fleet
-from diagnosis.audit.fleet.document_rows import bounds_json
-from diagnosis.audit.fleet.machines import EITHER, FleetFault, Machine, is_assessed
-from diagnosis.results.result import SEVERITIES
+from diagnosis.audit.fleet.document_rows import bounds_row
+from diagnosis.audit.fleet.fault_types import FaultChange, FaultChangeRow, FaultStandingRow
+from diagnosis.audit.fleet.fleet_types import BaselineRow, CoverageChangeRow
+from diagnosis.audit.fleet.machines import FleetFault, Machine, is_assessed
+from replay.faults import Side
 
-OUTCOMES = ("new", "worse", "better", "not_seen_again", "resolved", "unchanged")
+OUTCOMES: tuple[FaultChange, ...] = ("new", "worse", "better", "not_seen_again", "resolved", "unchanged")
 _LEAST_EPSILON = 0.05
 _MORE_OFTEN = 2.0
 
 Identity = tuple[str, str]
 
 
-def compare_fleets(older: Fleet, newer: Fleet) -> dict[str, Any]:
+def compare_fleets(older: Fleet, newer: Fleet) -> BaselineRow:
     """Compare two fleets; see the module.
 
     Parameters
@@ -37,15 +31,15 @@ def compare_fleets(older: Fleet, newer: Fleet) -> dict[str, Any]:
         The earlier and the later audit.
     """
     before, now = _by_identity(older), _by_identity(newer)
-    faults: list[dict[str, Any]] = []
-    coverage: list[dict[str, Any]] = []
+    faults: list[FaultChangeRow] = []
+    coverage: list[CoverageChangeRow] = []
     for key in dict.fromkeys([*now, *before]):
         a, b = before.get(key), now.get(key)
         faults += _faults(a, b)
         if a is not None and b is not None:
             coverage += _coverage(a, b)
     rank = {name: k for k, name in enumerate(OUTCOMES)}
-    faults.sort(key=lambda f: (rank[f["outcome"]], -SEVERITIES.index(f["severity"])))
+    faults.sort(key=lambda f: (rank[f["outcome"]], -f["severity"].rank))
     names = [{m.name for m in fleet.missions} for fleet in (older, newer)]
     lost = sorted(names[0] - names[1]) if names[0] & names[1] else []  # of another period all are others
     missing = [before[k].label for k in before if k not in now]
@@ -63,7 +57,7 @@ def compare_fleets(older: Fleet, newer: Fleet) -> dict[str, Any]:
             ],
         },
         "faults": faults,
-        "coverage": sorted(coverage, key=lambda c: str(c["change"]), reverse=True),
+        "coverage": sorted(coverage, key=lambda c: c["change"], reverse=True),
     }
 
 
@@ -71,7 +65,7 @@ def _by_identity(fleet: Fleet) -> dict[Identity, Machine]:
     return {(m.id, "" if m.id else m.name): m for m in fleet.machines}
 
 
-def _faults(a: Machine | None, b: Machine | None) -> list[dict[str, Any]]:
+def _faults(a: Machine | None, b: Machine | None) -> list[FaultChangeRow]:
     """What became of the faults of one machine."""
     left = [f for f in a.faults if f.standing] if a else []
     out = []
@@ -83,17 +77,19 @@ def _faults(a: Machine | None, b: Machine | None) -> list[dict[str, Any]]:
             continue
         left.remove(same)
         changes, up = _differences(same, found)
-        outcome = "unchanged" if not changes or not up else "worse" if up > 0 else "better"
+        outcome: FaultChange = "unchanged" if not changes or not up else "worse" if up > 0 else "better"
         out.append(_change(b or a, outcome, same, found, "", changes))
     out += [_change(b or a, *_gone(f, b)) for f in left]
     return out
 
 
 def _same(f: FleetFault, g: FleetFault) -> bool:
-    return (f.component, f.mode) == (g.component, g.mode) and (f.side == g.side or EITHER in (f.side, g.side))
+    return (f.component, f.mode) == (g.component, g.mode) and (
+        f.side == g.side or Side.SENSOR_OR_ACTUATOR in (f.side, g.side)
+    )
 
 
-def _gone(f: FleetFault, b: Machine | None) -> tuple[str, FleetFault, None, str]:
+def _gone(f: FleetFault, b: Machine | None) -> tuple[FaultChange, FleetFault, None, str]:
     """A fault that stands no more: resolved, or only not seen again."""
     if b is None or not b.runs:
         return "not_seen_again", f, None, "this audit holds no judged mission of the machine"
@@ -123,7 +119,7 @@ def _unseen(a: Machine | None, f: FleetFault) -> str:
 
 def _differences(f: FleetFault, g: FleetFault) -> tuple[list[str], int]:
     """Names of what changed, and whether it is worse (1) or better (−1); the severity decides, then ε̂, then how often."""
-    ups = {"severity": _sign(SEVERITIES.index(f.severity), SEVERITIES.index(g.severity)), "epsilon": 0, "frequency": 0}
+    ups = {"severity": _sign(f.severity.rank, g.severity.rank), "epsilon": 0, "frequency": 0}
     x, y = f.epsilon, g.epsilon
     if x and y and abs(x.value - y.value) >= _LEAST_EPSILON:
         apart = not x.low <= y.value <= x.high and not y.low <= x.value <= y.high
@@ -141,40 +137,47 @@ def _sign(a: float, b: float) -> int:
 
 def _change(
     m: Machine | None,
-    outcome: str,
+    outcome: FaultChange,
     a: FleetFault | None,
     b: FleetFault | None,
     note: str,
     changes: list[str] | None = None,
-) -> dict[str, Any]:
+) -> FaultChangeRow:
     f = b or a
     assert f is not None
     assert m is not None
     return {
         "outcome": outcome,
         "machine": m.label,
-        **{k: getattr(f, k) for k in ("component", "kind", "side", "mode", "severity")},
-        "older": _told(a),
-        "newer": _told(b),
+        "component": f.component,
+        "kind": f.kind,
+        "side": f.side,
+        "mode": f.mode,
+        "severity": f.severity,
+        "older": _standing(a),
+        "newer": _standing(b),
         "changes": changes or [],
         "note": note,
     }
 
 
-def _told(f: FleetFault | None) -> Mapping[str, Any] | None:
+def _standing(f: FleetFault | None) -> FaultStandingRow | None:
     if f is None:
         return None
-    told = {k: getattr(f, k) for k in ("side", "severity", "status", "missions", "assessed")}
     return {
-        **told,
-        "epsilon": bounds_json(f.epsilon),
+        "side": f.side,
+        "severity": f.severity,
+        "status": f.status,
+        "missions": f.missions,
+        "assessed": f.assessed,
+        "epsilon": bounds_row(f.epsilon),
         "last": f.last.name,
         "report": f.last.result.report,
         "id": f.last_id,
     }
 
 
-def _coverage(a: Machine, b: Machine) -> list[dict[str, Any]]:
+def _coverage(a: Machine, b: Machine) -> list[CoverageChangeRow]:
     """Parts that were assessed in the last mission of one audit alone."""
     had, has = (
         {k for k, p in (m.runs[len(m.dated) - 1].parts.items() if m.dated else ()) if is_assessed(p, m.limits)}

@@ -3,31 +3,34 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
 
 import numpy as np
 
+from diagnosis.audit.fleet.fault_types import BoundsRow, MissionFaultRow
+from diagnosis.audit.fleet.fleet_types import MissionRow
 from diagnosis.audit.fleet.read import Bounds, FoundFault, Mission
-from diagnosis.audit.fleet.trends import Axis, PartTrend
+from diagnosis.audit.fleet.trend_types import Axis, LineRow, TrendRow
+from diagnosis.audit.fleet.trends import PartTrend
 from diagnosis.audit.fleet.words import forecast_words
+from diagnosis.audit.store.outcome import MissionState
 from diagnosis.audit.trends.line import Line
-from diagnosis.results.result import SEVERITIES
+from diagnosis.results.vocabulary import Severity
 
 
-def trend_json(k: int, t: PartTrend, at: Mapping[str, int], axis: Axis) -> dict[str, Any]:
+def trend_row(k: int, t: PartTrend, at: Mapping[str, int], axis: Axis) -> TrendRow:
     """One trend of the machine at place `k`; `at` holds each mission's place."""
     s, f = t.series, t.trend.forecast
-    columns = [[rounded(float(v)) for v in c] for c in (s.x, s.value, s.low, s.high)]
+    columns = [[six_digits(float(v)) for v in c] for c in (s.x, s.value, s.low, s.high)]
     return {
         "machine": k,
         "component": t.component,
         "kind": t.kind,
         "side": t.side,
         "limit": t.limit,
-        "now": rounded(s.now),
-        "points": [list(p) for p in zip([at[r.name] for r in t.runs], *columns, strict=True)],
+        "now": six_digits(s.now),
+        "points": list(zip([at[r.name] for r in t.runs], *columns, strict=True)),
         "outliers": list(t.trend.outliers),
-        "changes": [{"index": c.index, "kind": c.kind, "size": rounded(c.size)} for c in t.trend.changes],
+        "changes": [{"index": c.index, "kind": c.kind, "size": six_digits(c.size)} for c in t.trend.changes],
         "first": t.trend.first,
         "direction": t.trend.direction,
         "approaching": t.approaching,
@@ -37,48 +40,53 @@ def trend_json(k: int, t: PartTrend, at: Mapping[str, int], axis: Axis) -> dict[
             "soonest": rounded(f.soonest),
             "likely": rounded(f.likely),
             "latest": rounded(f.latest),
-            "horizon": rounded(f.horizon),
+            "horizon": six_digits(f.horizon),
             "words": forecast_words(f, t.limit, axis),
         },
     }
 
 
-def _line(line: Line | None, now: float) -> dict[str, Any] | None:
+def _line(line: Line | None, now: float) -> LineRow | None:
     if line is None:
         return None
     level, half = line.at(now), line.half(now, 0.95)
     spread = line.quantile(0.95) * line.slope_var**0.5
     return {
-        "level": {"value": rounded(level), "low": rounded(level - half), "high": rounded(level + half)},
+        "level": {"value": six_digits(level), "low": six_digits(level - half), "high": six_digits(level + half)},
         "slope": {
-            "value": rounded(line.slope),
-            "low": rounded(line.slope - spread),
-            "high": rounded(line.slope + spread),
+            "value": six_digits(line.slope),
+            "low": six_digits(line.slope - spread),
+            "high": six_digits(line.slope + spread),
         },
-        "tau": rounded(line.tau),
-        "centre": rounded(line.centre),
+        "tau": six_digits(line.tau),
+        "centre": six_digits(line.centre),
         "dof": line.dof,
     }
 
 
-def mission_json(m: Mission, owner: int | None, first: Mapping[int, str], first_run: int | None) -> dict[str, Any]:
+def mission_row(m: Mission, owner: int | None, first: Mapping[int, str], first_run: int | None) -> MissionRow:
     """One mission of the machine at place `owner`; `first` names the first of each result's copies."""
     r = m.result
-    head: dict[str, Any] = {"name": m.name, "files": list(m.files), "bytes": m.bytes, "gone": m.gone}
     if r is None:
         return {
-            **head,
+            "name": m.name,
+            "files": list(m.files),
+            "bytes": m.bytes,
+            "gone": m.gone,
             "machine": owner,
-            "state": "pending",
+            "state": MissionState.PENDING,
             "reason": "not audited yet",
             "verdict": None,
             "faults": [],
         }
     faults = sorted(
-        (f for f in r.faults if f.severity != "info"), key=lambda f: (-SEVERITIES.index(f.severity), -f.seconds)
+        (f for f in r.faults if f.severity is not Severity.INFO), key=lambda f: (-f.severity.rank, -f.seconds)
     )
     return {
-        **head,
+        "name": m.name,
+        "files": list(m.files),
+        "bytes": m.bytes,
+        "gone": m.gone,
         "machine": owner,
         "state": r.state,
         "reason": r.reason,
@@ -94,27 +102,36 @@ def mission_json(m: Mission, owner: int | None, first: Mapping[int, str], first_
         "report": r.report,
         "first_run": first_run,
         "copy_of": None if first[r.id] == m.name else first[r.id],
-        "faults": [_found(f) for f in faults],
+        "faults": [_fault(f) for f in faults],
     }
 
 
-def _found(f: FoundFault) -> dict[str, Any]:
-    told = {k: getattr(f, k) for k in ("id", "component", "kind", "side", "mode", "severity")}
+def _fault(f: FoundFault) -> MissionFaultRow:
     return {
-        **told,
-        "seconds": rounded(f.seconds),
-        "epsilon": bounds_json(f.epsilon),
-        "probability": rounded(f.probability),
+        "id": f.id,
+        "component": f.component,
+        "kind": f.kind,
+        "side": f.side,
+        "mode": f.mode,
+        "severity": f.severity,
+        "seconds": six_digits(f.seconds),
+        "epsilon": bounds_row(f.epsilon),
+        "probability": six_digits(f.probability),
     }
 
 
-def bounds_json(b: Bounds | None) -> dict[str, float | None] | None:
+def bounds_row(b: Bounds | None) -> BoundsRow | None:
     """ε̂ with its bounds, rounded."""
-    return None if b is None else {"value": rounded(b.value), "low": rounded(b.low), "high": rounded(b.high)}
+    if b is None:
+        return None
+    return {"value": six_digits(b.value), "low": six_digits(b.low), "high": six_digits(b.high)}
 
 
 def rounded(value: float | None) -> float | None:
+    """Six significant digits, None where there is no finite number."""
+    return None if value is None or not np.isfinite(value) else six_digits(value)
+
+
+def six_digits(value: float) -> float:
     """Six significant digits; the same on every computer."""
-    if value is None or not np.isfinite(value):
-        return None
     return float(f"{value:.6g}") + 0.0

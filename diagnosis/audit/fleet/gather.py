@@ -7,10 +7,11 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from functools import cache
 
-from diagnosis.audit.fleet.machines import STANDING, FleetFault, Limits, Machine, Run, Status
+from diagnosis.audit.fleet.fault_types import Status
+from diagnosis.audit.fleet.machines import STANDING, FleetFault, Limits, Machine, Run
 from diagnosis.audit.fleet.owners import Owner, Owners
 from diagnosis.audit.fleet.read import FoundFault, Mission
-from diagnosis.results.result import SEVERITIES
+from diagnosis.results.vocabulary import Verdict
 
 Key = tuple[str, str, str]
 
@@ -59,7 +60,7 @@ def machines_of(
             failed[key].append(m)
     came = came or (lambda _: None)
     out = [_machine(key, runs[key].values(), failed[key], limits, came) for key in sorted({*runs, *failed})]
-    ready = [_began(m, came) for m in out if m.verdict == "ready"]
+    ready = [_began(m, came) for m in out if m.verdict is Verdict.READY]
     later = [m for m in nowhere if not m.gone and any(_may_be_later(m.name, began, came) for began in ready)]
     return out, later
 
@@ -93,7 +94,7 @@ def _unjudged(m: Machine, came: Callable[[str], int | None]) -> int:
     """Missions that were not judged and may be later than the last judged one."""
     last, began = m.last_judged, _began(m, came)
     after = len(m.dated) - (m.dated.index(last) + 1 if last else 0)
-    others = [r.name for r in m.undated if r.result.verdict == "not_assessed"] + [f.name for f in m.failed]
+    others = [r.name for r in m.undated if r.result.verdict is Verdict.NOT_ASSESSED] + [f.name for f in m.failed]
     return after + sum(_may_be_later(name, began, came) for name in others)
 
 
@@ -115,7 +116,7 @@ def _with_faults(m: Machine) -> Machine:
         for f in run.faults:
             groups[f.component, f.side, f.mode].append((run, f))
     faults = [_fleet_fault(m, found) for found in groups.values()]
-    faults.sort(key=lambda f: (not f.standing, -SEVERITIES.index(f.severity), -f.missions, f.component, f.side, f.mode))
+    faults.sort(key=lambda f: (not f.standing, -f.severity.rank, -f.missions, f.component, f.side, f.mode))
     return replace(m, faults=tuple(faults))
 
 
@@ -127,7 +128,7 @@ def _fleet_fault(m: Machine, found: Sequence[tuple[Run, FoundFault]]) -> FleetFa
     if dated:
         last_run = m.dated[dated[-1]]
     in_last = [g for r, g in found if r.result.id == last_run.result.id]
-    worst = max(in_last, key=lambda g: (SEVERITIES.index(g.severity), g.seconds))
+    worst = max(in_last, key=lambda g: (g.severity.rank, g.seconds))
     assessed = [r.assessed(f.component, f.side, m.limits) for r in m.dated]
     since = sum(assessed[dated[-1] + 1 :]) if dated and len(dated) == len(ids) else 0
     before = sum(assessed[: dated[0]]) if dated else 0
@@ -142,7 +143,7 @@ def _fleet_fault(m: Machine, found: Sequence[tuple[Run, FoundFault]]) -> FleetFa
         kind=f.kind,
         side=f.side,
         mode=f.mode,
-        severity=max((g.severity for r, g in found if r.result.id not in past), key=SEVERITIES.index),
+        severity=max((g.severity for r, g in found if r.result.id not in past), key=lambda severity: severity.rank),
         status=status,
         missions=len(ids),
         assessed=max(len(ids), sum(assessed) + undated),

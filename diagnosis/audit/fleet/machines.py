@@ -12,17 +12,14 @@ from __future__ import annotations
 import itertools
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Literal
 
+from diagnosis.audit.fleet.fault_types import Status
 from diagnosis.audit.fleet.read import Bounds, FoundFault, Mission, Part, Result
-from diagnosis.results.result import SEVERITIES
+from diagnosis.results.vocabulary import Kind, Severity, Verdict
+from replay.faults import Side
 
-VERDICTS = ("stop", "watch", "not_assessed", "ready")  # worst first
-EITHER = "sensor_or_actuator"
 STANDING = 3
 _LEAST_SHARE = 0.8
-
-Status = Literal["new", "recurring", "once", "past"]
 
 
 @dataclass(frozen=True)
@@ -50,12 +47,12 @@ class Run:
     @cached_property
     def faults(self) -> tuple[FoundFault, ...]:
         """Faults that count: those of at least low severity."""
-        return tuple(f for f in self.result.faults if f.severity != "info")
+        return tuple(f for f in self.result.faults if f.severity != Severity.INFO)
 
     @property
     def worst(self) -> FoundFault | None:
         """The most severe and longest of them."""
-        return max(self.faults, key=lambda f: (SEVERITIES.index(f.severity), f.seconds), default=None)
+        return max(self.faults, key=lambda f: (f.severity.rank, f.seconds), default=None)
 
     @cached_property
     def parts(self) -> dict[tuple[str, str], Part]:
@@ -70,7 +67,7 @@ class Run:
 
 def sides_of(side: str) -> tuple[str, ...]:
     """The two sides of a fault that may be of either."""
-    return ("sensor", "actuator") if side == EITHER else (side,)
+    return (Side.SENSOR, Side.ACTUATOR) if side == Side.SENSOR_OR_ACTUATOR else (side,)
 
 
 def is_assessed(part: Part, limits: Limits) -> bool:
@@ -107,7 +104,7 @@ class FleetFault:
     kind: str
     side: str
     mode: str
-    severity: str
+    severity: Severity
     status: Status
     missions: int
     assessed: int
@@ -171,36 +168,36 @@ class Machine:
     @property
     def last_judged(self) -> Run | None:
         """The last dated mission that assessed anything."""
-        return next((r for r in reversed(self.dated) if r.result.verdict not in (None, "not_assessed")), None)
+        return next((r for r in reversed(self.dated) if r.result.verdict not in (None, Verdict.NOT_ASSESSED)), None)
 
     @property
     def newest(self) -> tuple[Run, ...]:
         """Missions that assessed anything and of which each may be the last: the last dated one, and those without order."""
-        undated = tuple(r for r in self.undated if r.result.verdict not in (None, "not_assessed"))
+        undated = tuple(r for r in self.undated if r.result.verdict not in (None, Verdict.NOT_ASSESSED))
         return ((self.last_judged,) if self.last_judged else ()) + undated
 
     @cached_property
-    def last_verdict(self) -> str:
+    def last_verdict(self) -> Verdict:
         """Where it stood when it was judged last.
 
         Worse where a mission of unknown date says so, or where no later mission assessed the part of an earlier fault.
         """
         found = [r.result.verdict for r in self.newest]
-        found += ["stop" if f.severity == "high" else "watch" for f in self.faults if not f.since]
+        found += [Verdict.STOP if f.severity is Severity.HIGH else Verdict.WATCH for f in self.faults if not f.since]
         known = [v for v in found if v is not None]
-        return min(known, key=VERDICTS.index, default="not_assessed")
+        return max(known, key=lambda verdict: verdict.rank, default=Verdict.NOT_ASSESSED)
 
     @property
-    def verdict(self) -> str:
+    def verdict(self) -> Verdict:
         """Where it stands: as it was judged last, but ready only where that is known of its newest mission too."""
         held = self.unjudged > 0 or self.cleared is False
-        return "not_assessed" if self.last_verdict == "ready" and held else self.last_verdict
+        return Verdict.NOT_ASSESSED if self.last_verdict is Verdict.READY and held else self.last_verdict
 
     @property
     def note(self) -> str:
         """What limits that; may be empty."""
         out = []
-        trailing = list(itertools.takewhile(lambda r: r.result.verdict == "not_assessed", reversed(self.dated)))
+        trailing = list(itertools.takewhile(lambda r: r.result.verdict is Verdict.NOT_ASSESSED, reversed(self.dated)))
         if trailing and len(trailing) < len(self.dated):
             out.append(f"its last {_count(len(trailing), 'mission')} could not be assessed")
         if self.undated:
@@ -233,8 +230,8 @@ class Machine:
     def kind(self, component: str) -> str:
         """Whether a component is a ``wheel`` or steers."""
         if component in self.limits.axles:
-            return "steer"
-        return next((f.kind for r in self.runs for f in r.result.faults if f.component == component), "wheel")
+            return Kind.STEER
+        return next((f.kind for r in self.runs for f in r.result.faults if f.component == component), Kind.WHEEL)
 
     @property
     def decided(self) -> float | None:

@@ -8,12 +8,13 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import Any
 
 import orjson
 
+from diagnosis.audit.fleet.fleet_types import FleetDocument
 from diagnosis.audit.fleet.machines import FleetFault, Machine
 from diagnosis.audit.fleet.read import Mission
+from diagnosis.results.vocabulary import Severity
 
 _MOST_BYTES = 500_000_000
 
@@ -46,13 +47,13 @@ def first_runs(path: Path, missions: Iterable[Mission], run: int) -> dict[str, i
     return out
 
 
-def _known(path: Path, run: int) -> dict[str, tuple[Any, Any]] | None:
+def _known(path: Path, run: int) -> dict[str, tuple[int | None, int | None]] | None:
     """Start and first run of the missions that an earlier document shows as judged; None where there is none."""
     try:
         if path.stat().st_size > _MOST_BYTES:
             return None
-        document = orjson.loads(path.read_bytes())
-        if int((document.get("audit") or {}).get("run") or 0) > run:
+        document: FleetDocument = orjson.loads(path.read_bytes())
+        if (document["audit"]["run"] or 0) > run:
             return None
         return {
             m["name"]: (m.get("start_ns"), m.get("first_run")) for m in document["missions"] if m["verdict"] is not None
@@ -82,5 +83,4 @@ def news(
     if not new or new == sum(len(m.runs) for m in machines):
         return 0, []
     found = [(m, f) for m in machines for f in m.faults if f.standing and since_run(m, f, runs) == run]
-    rank = {"high": 0, "medium": 1}
-    return new, sorted(found, key=lambda p: rank.get(p[1].severity, 2))
+    return new, sorted(found, key=lambda p: -max(p[1].severity.rank, Severity.LOW.rank))

@@ -11,6 +11,7 @@ from collections.abc import Iterable, Iterator
 
 from diagnosis.audit.fleet.read import Mission, Result
 from diagnosis.audit.store.shared_reason import whole_path
+from diagnosis.results.vocabulary import Verdict
 
 Owner = tuple[str, str]
 
@@ -64,7 +65,7 @@ class Owners:
 
     def _doubtful(self, m: Mission) -> bool:
         """Whether a result's machine is no more than the name of the folder of a log that was not judged."""
-        return m.result is not None and m.result.verdict in (None, "not_assessed") and self._by_folder(m)
+        return m.result is not None and m.result.verdict in (None, Verdict.NOT_ASSESSED) and self._by_folder(m)
 
     def _enter(self, m: Mission) -> None:
         """Let a judged mission of a known machine tell of the folders around it."""

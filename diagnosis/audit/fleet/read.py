@@ -6,16 +6,18 @@ import hashlib
 import json
 import math
 import os
+import sqlite3
 from collections import defaultdict
 from collections.abc import Sequence
 from contextlib import closing
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
 
 from diagnosis.audit.store.database import Database
+from diagnosis.audit.store.outcome import MissionState
 from diagnosis.audit.store.shared_reason import SharedReason, shared_reason, whole_path
 from diagnosis.audit.store.store import FILE_NAME
+from diagnosis.results.vocabulary import Severity, Verdict
 
 CALENDAR_NS = 946_684_800 * 10**9  # a clock that says a time before 2000 does not know the date
 
@@ -38,7 +40,7 @@ class FoundFault:
     kind: str
     side: str
     mode: str
-    severity: str
+    severity: Severity
     seconds: float
     epsilon: Bounds | None
     probability: float
@@ -63,12 +65,12 @@ class Result:
     """
 
     id: int
-    state: str
+    state: MissionState
     reason: str
     attempts: int
     machine_id: str
     machine_name: str
-    verdict: str | None
+    verdict: Verdict | None
     title: str
     start_ns: int | None
     duration_s: float | None
@@ -132,7 +134,7 @@ def read_missions(store: Path) -> list[Mission]:
         faults: dict[int, list[FoundFault]] = defaultdict(list)
         for row in db.rows(_FAULTS):
             r, name, component, kind, side, mode, severity, seconds, e, low, high, p = row
-            found = FoundFault(name, component, kind, side, mode, severity, seconds, _bounds(e, low, high), p)
+            found = FoundFault(name, component, kind, side, mode, Severity(severity), seconds, _bounds(e, low, high), p)
             faults[r].append(found)
         parts: dict[int, list[Part]] = defaultdict(list)
         for r, component, side, driving, decided, e, low, high in db.rows(_PARTS):
@@ -196,12 +198,14 @@ def _opened(store: Path) -> Database:
     return Database(store / FILE_NAME if store.is_dir() else store, read_only=True)
 
 
-def _result(row: Any, faults: tuple[FoundFault, ...], parts: tuple[Part, ...]) -> Result:
-    told = {k: row[k] for k in row.keys()}  # noqa: SIM118 - a row is no mapping
-    start = told["start_ns"]
-    told["start_ns"] = start if start is not None and start >= CALENDAR_NS else None
-    told["open_loop"] = bool(told["open_loop"])
-    return Result(**told, faults=faults, parts=parts)
+def _result(row: sqlite3.Row, faults: tuple[FoundFault, ...], parts: tuple[Part, ...]) -> Result:
+    values = {k: row[k] for k in row.keys()}  # noqa: SIM118 - a row is no mapping
+    start, verdict = values["start_ns"], values["verdict"]
+    values["start_ns"] = start if start is not None and start >= CALENDAR_NS else None
+    values["state"] = MissionState(values["state"])
+    values["verdict"] = Verdict(verdict) if verdict is not None else None
+    values["open_loop"] = bool(values["open_loop"])
+    return Result(**values, faults=faults, parts=parts)
 
 
 def _bounds(value: float | None, low: float | None, high: float | None) -> Bounds | None:

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import csv
 import io
-from collections.abc import Mapping
-from typing import Any
 
+from diagnosis.audit.fleet.fleet_types import FleetDocument, MissionRow
 from diagnosis.pages.labels import utc, visible
 
 COLUMNS = (
@@ -16,7 +15,11 @@ COLUMNS = (
 )  # fmt: skip
 
 
-def fleet_csv(document: Mapping[str, Any]) -> str:
+#: A cell before it is written.
+Value = str | float | None
+
+
+def fleet_csv(document: FleetDocument) -> str:
     """Missions of a fleet's document as comma-separated values with a line of headings."""
     labels = [m["label"] for m in document["machines"]]
     out = io.StringIO()
@@ -27,9 +30,9 @@ def fleet_csv(document: Mapping[str, Any]) -> str:
     return out.getvalue()
 
 
-def _row(m: Mapping[str, Any], labels: list[str]) -> list[Any]:
-    worst: Mapping[str, Any] = m["faults"][0] if m["faults"] else {}
-    epsilon = worst.get("epsilon") or {}
+def _row(m: MissionRow, labels: list[str]) -> list[Value]:
+    worst = m["faults"][0] if m["faults"] else None
+    epsilon = worst["epsilon"] if worst is not None else None
     start = m.get("start_ns")
     return [
         "" if m["machine"] is None else labels[m["machine"]],
@@ -40,18 +43,20 @@ def _row(m: Mapping[str, Any], labels: list[str]) -> list[Any]:
         m.get("title"),
         "" if start is None else utc(start),
         start,
-        *(m.get(k) for k in ("duration_s", "driving_s", "distance_m")),
+        m.get("duration_s"),
+        m.get("driving_s"),
+        m.get("distance_m"),
         len(m["faults"]) if m["verdict"] is not None else None,
-        *(worst.get(k) for k in ("component", "side", "mode", "severity")),
-        *(epsilon.get(k) for k in ("value", "low", "high")),
-        {True: "yes", False: "no"}.get(m.get("open_loop", None), ""),
+        *(("", "", "", "") if worst is None else (worst["component"], worst["side"], worst["mode"], worst["severity"])),
+        *(("", "", "") if epsilon is None else (epsilon["value"], epsilon["low"], epsilon["high"])),
+        "" if "open_loop" not in m else "yes" if m["open_loop"] else "no",
         m.get("copy_of"),
         m.get("report"),
         " ".join(m["files"]),
     ]
 
 
-def _cell(value: Any) -> Any:
+def _cell(value: Value) -> Value:
     """Text made visible, and quoted by an apostrophe where a spreadsheet would run it; numbers as they are."""
     if not isinstance(value, str):
         return value

@@ -4,14 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 
 from diagnosis.audit.fleet.machines import Machine, Run
+from diagnosis.audit.fleet.trend_types import Axis
 from diagnosis.audit.trends.trend import REACH, Forecast, Series, Trend, trend_of
-
-Axis = Literal["hours", "days"]
 
 _DAY_NS = 86_400 * 10**9
 

@@ -4,21 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from diagnosis.audit.fleet.machines import VERDICTS, FleetFault, Machine
-from diagnosis.audit.fleet.trends import Axis, PartTrend
+from diagnosis.audit.fleet.machines import FleetFault, Machine
+from diagnosis.audit.fleet.trend_types import Axis
+from diagnosis.audit.fleet.trends import PartTrend
 from diagnosis.audit.trends.trend import Forecast
-from diagnosis.decision.wording import MODE_WORDS, join_words, part_words
+from diagnosis.decision.wording import join_words
 from diagnosis.pages.labels import utc
+from diagnosis.results.fault_rows import mode_words
+from diagnosis.results.vocabulary import Verdict, part_words
 
 _SHOWN = 3
 _NAMED = 12
+_WORK = (Verdict.STOP, Verdict.WATCH)  # verdicts that ask for work
 _UNITS = {"hours": "h of driving", "days": "days"}
-_TAGS = {
-    "stop": "stop and repair",
-    "watch": "faults to watch",
-    "not_assessed": "not assessed",
-    "ready": "ready",
-}
 
 
 def count(n: int, word: str) -> str:
@@ -32,10 +30,14 @@ def round_to(value: float, digits: int = 2) -> str:
     return text.rstrip("0").rstrip(".") if "." in text else text
 
 
+def verdict_label(verdict: Verdict) -> str:
+    """Heading of a verdict where many stand beside each other: that of a report, ``Ready`` in short."""
+    return "Ready" if verdict is Verdict.READY else verdict.label
+
+
 def fault_words(f: FleetFault) -> str:
     """Part and row: ``RL drive valve inefficient``."""
-    words = MODE_WORDS["actuator" if f.side == "actuator" else "sensor"].get(f.mode, f.mode)
-    return f"{part_words(f.kind, f.component, f.side)} {words}"
+    return f"{part_words(f.kind, f.component, f.side)} {mode_words(f.side, f.mode)}"
 
 
 def forecast_words(f: Forecast, limit: float, axis: Axis = "hours") -> str:
@@ -56,22 +58,21 @@ def forecast_words(f: Forecast, limit: float, axis: Axis = "hours") -> str:
 
 def standing(m: Machine) -> str:
     """Where a machine stands: ``Stop and repair, and later missions not judged``."""
-    if m.verdict == "ready":
-        return "Ready"
-    if m.verdict == "not_assessed":
-        if m.last_verdict == "not_assessed":
-            return "Not assessed"
+    words = verdict_label(m.verdict)
+    if m.verdict is Verdict.READY:
+        return words
+    if m.verdict is Verdict.NOT_ASSESSED:
+        if m.last_verdict is Verdict.NOT_ASSESSED:
+            return words
         last = m.last_judged
         since = f" since {utc(last.result.start_ns)[:10]}" if last and last.result.start_ns is not None else ""
-        return f"Not assessed{since}: last judged ready" + (", but not cleared" if m.cleared is False else "")
-    words = "Stop and repair"
+        return f"{words}{since}: last judged ready" + (", but not cleared" if m.cleared is False else "")
     if is_damaged(m):
         words = "No fault found, but its last log is damaged"
-    elif m.verdict == "watch":
-        lasting = m.last_judged is not None and m.last_judged.result.verdict == "watch"
-        words = "Faults to watch"
+    elif m.verdict is Verdict.WATCH:
+        lasting = m.last_judged is not None and m.last_judged.result.verdict is Verdict.WATCH
         if lasting and m.cleared is False:
-            words = "Faults to watch, not cleared"
+            words += ", not cleared"
         elif lasting and m.cleared and not m.unjudged:
             words = "Ready, with faults to watch"
     return words + (", and later missions not judged" if m.unjudged else "")
@@ -79,11 +80,11 @@ def standing(m: Machine) -> str:
 
 def is_damaged(m: Machine) -> bool:
     """Whether nothing but damage to a log keeps a machine from being ready."""
-    watched = [r.result for r in m.newest if r.result.verdict == "watch"]
-    return m.verdict == "watch" and not any(f.standing for f in m.faults) and not any(r.faults for r in watched)
+    watched = [r.result for r in m.newest if r.result.verdict is Verdict.WATCH]
+    return m.verdict is Verdict.WATCH and not any(f.standing for f in m.faults) and not any(r.faults for r in watched)
 
 
-def headline(machines: Sequence[Machine], unknown: int = 0) -> tuple[str, str, str]:
+def headline(machines: Sequence[Machine], unknown: int = 0) -> tuple[Verdict, str, str]:
     """Status of the fleet, a few words above its sentence, and the sentence.
 
     Parameters
@@ -94,14 +95,14 @@ def headline(machines: Sequence[Machine], unknown: int = 0) -> tuple[str, str, s
         Logs that were not judged, whose machine is not known: none is ready for certain then.
     """
     verdicts = [m.verdict for m in machines]
-    status = min(verdicts, key=VERDICTS.index, default="not_assessed")
+    status = max(verdicts, key=lambda verdict: verdict.rank, default=Verdict.NOT_ASSESSED)
     n, damaged = len(machines), sum(map(is_damaged, machines))
-    work = sum(v in ("stop", "watch") for v in verdicts) - damaged
-    open_ = verdicts.count("not_assessed")
+    work = sum(v in _WORK for v in verdicts) - damaged
+    open_ = verdicts.count(Verdict.NOT_ASSESSED)
     if not n:
-        return "not_assessed", "nothing judged", "No mission could be judged"
-    tag = f"{count(verdicts.count(status), 'machine')}: {_TAGS[status]}"
-    if status == "watch" and not work:
+        return Verdict.NOT_ASSESSED, "nothing judged", "No mission could be judged"
+    tag = f"{count(verdicts.count(status), 'machine')}: {_small(verdict_label(status))}"
+    if status is Verdict.WATCH and not work:
         tag = f"{count(damaged, 'machine')}: damaged logs"
     if work and n == 1:
         title = "The machine needs work"
@@ -113,7 +114,7 @@ def headline(machines: Sequence[Machine], unknown: int = 0) -> tuple[str, str, s
         fine = n - open_ - damaged
         title = f"{fine} of {count(n, 'machine')} {'is' if fine == 1 else 'are'} ready"
     elif unknown:
-        status, tag = "not_assessed", "not all assessed"
+        status, tag = Verdict.NOT_ASSESSED, "not all assessed"
         known = "The machine is" if n == 1 else f"{n} machines are"
         title = f"{known} ready, but {count(unknown, 'log')} of no known machine {_was(unknown)} not judged"
     else:
@@ -127,9 +128,14 @@ def headline(machines: Sequence[Machine], unknown: int = 0) -> tuple[str, str, s
 
 def _none_ready(machines: Sequence[Machine]) -> str:
     n = len(machines)
-    if any(m.last_verdict != "not_assessed" for m in machines):
+    if any(m.last_verdict is not Verdict.NOT_ASSESSED for m in machines):
         return "The machine is not known to be ready" if n == 1 else f"None of {n} machines is known to be ready"
     return "The machine could not be assessed" if n == 1 else f"None of {n} machines could be assessed"
+
+
+def _small(text: str) -> str:
+    """Text that begins with a small letter."""
+    return text[0].lower() + text[1:]
 
 
 def _was(n: int) -> str:
@@ -156,10 +162,10 @@ def sentences(
     unknown : int
         As for `headline`.
     """
-    bad = [m for m in machines if m.verdict in ("stop", "watch")]
+    bad = [m for m in machines if m.verdict in _WORK]
     out = []
-    for verdict, words in (("stop", "Must not go out"), ("watch", "Faults to watch")):
-        found = [m for m in machines if m.verdict == verdict and not is_damaged(m)]
+    for verdict, words in ((Verdict.STOP, "Must not go out"), (Verdict.WATCH, Verdict.WATCH.label)):
+        found = [m for m in machines if m.verdict is verdict and not is_damaged(m)]
         if found and len(bad) > _SHOWN:
             out.append(f"{words} ({len(found)}): {_named(found)}.")
     for m in bad[:_SHOWN]:
@@ -167,10 +173,10 @@ def sentences(
         note = f" ({m.note})" if m.note else ""
         words = standing(m)
         what = f": {join_words(told)}" if told else ""
-        out.append(f"{m.label} – {words[0].lower() + words[1:]}{what}{note}.")
-    open_machines = [m for m in machines if m.verdict == "not_assessed"]
+        out.append(f"{m.label} – {_small(words)}{what}{note}.")
+    open_machines = [m for m in machines if m.verdict is Verdict.NOT_ASSESSED]
     if open_machines:
-        out.append(f"Not assessed ({len(open_machines)}): {_named(open_machines)}.")
+        out.append(f"{Verdict.NOT_ASSESSED.label} ({len(open_machines)}): {_named(open_machines)}.")
     near = [(m, t) for m, own in zip(machines, trends, strict=True) for t in own if t.approaching]
     near.sort(key=lambda p: p[1].trend.forecast.likely or 0.0)
     for m, t in near[:2]:
@@ -180,7 +186,7 @@ def sentences(
     if unread or open_:
         both = f": {unread} not read, {open_} read but not assessed" if unread and open_ else ""
         out.append(f"{count(unread + open_, 'log')} could not be read or judged{both}.")
-    if unknown and any(m.verdict != "ready" for m in machines):  # else the headline says so
+    if unknown and any(m.verdict is not Verdict.READY for m in machines):  # else the headline says so
         out.append(f"{count(unknown, 'log')} {_was(unknown)} not judged and may be of a machine that stands as ready.")
     if pending:
         out.append(f"{count(pending, 'mission')} {'is' if pending == 1 else 'are'} not audited yet.")
@@ -201,9 +207,9 @@ def new_words(missions: int, faults: Sequence[tuple[Machine, FleetFault]]) -> li
 def _named(machines: Sequence[Machine]) -> str:
     """Names of machines, where one is not ready any more with the reason."""
     told = [m.label for m in machines[:_NAMED]]
-    if machines[0].verdict == "not_assessed":
+    if machines[0].verdict is Verdict.NOT_ASSESSED:
         told = [
-            m.label + (f" ({words.partition(' ')[2]})" if (words := standing(m)) != "Not assessed" else "")
+            m.label + (f" ({words.partition(' ')[2]})" if (words := standing(m)) != Verdict.NOT_ASSESSED.label else "")
             for m in machines[:_NAMED]
         ]
         told = [t.replace("(assessed since", "(since").replace("(assessed: ", "(") for t in told]

@@ -13,15 +13,17 @@ import signal
 import sys
 import tempfile
 import traceback
-from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, NotRequired, TypedDict
 
 from diagnosis.audit.isolation.limits import Limits, die_with, hold
+from diagnosis.audit.store.outcome import MissionState
+from diagnosis.audit.store.summary import MissionSummary, ResultFacts, summarise
 from diagnosis.results.json_text import dump_json
+from diagnosis.results.vocabulary import Verdict
 from replay.errors import ConfigError, LogError, NotJudged, OutputError
 from replay.machine.config import Machine
 
@@ -38,6 +40,19 @@ _PASSING = (
 )  # fmt: skip
 PASSING = {getattr(errno, name) for name in _PASSING if hasattr(errno, name)}
 """Errors of disks, networks and rights: they say nothing of a file's content."""
+
+
+#: State of a child whose report has no place to be written: no end of the mission, but of the audit.
+NOT_KEPT = "not_written"
+
+
+class ChildOutcome(TypedDict):
+    """What a child leaves in ``outcome.json``: a state of `MissionState` or `NOT_KEPT`, the rest as in `Outcome`."""
+
+    state: str
+    reason: str
+    summary: MissionSummary | None
+    passing: NotRequired[bool]
 
 
 @dataclass(frozen=True)
@@ -77,15 +92,8 @@ class Work:
     judge: str = "diagnosis.audit.isolation.child:judge"
 
 
-def judge(work: Work) -> dict[str, Any]:
-    """Diagnose the mission and write its report.
-
-    Returns
-    -------
-    dict
-        ``state``, ``reason``, ``summary``, and ``passing`` where it is true, as in `Outcome`.
-    """
-    from diagnosis.audit.store.summary import summarise
+def judge(work: Work) -> ChildOutcome:
+    """Diagnose the mission and write its report."""
     from diagnosis.output import write_result
 
     result = _diagnosed(work)
@@ -95,7 +103,7 @@ def judge(work: Work) -> dict[str, Any]:
     write_result(result, Path(work.folder) / REPORT, max_size_mb=work.max_size_mb)
     damage = [text for file in result.report["log"]["files"] for text in file["damage"]]
     return {
-        "state": "degraded" if damage else "ok",
+        "state": MissionState.DEGRADED if damage else MissionState.OK,
         "reason": _first_of(damage),
         "summary": summarise(result.report),
     }
@@ -146,22 +154,27 @@ def _first_of(damage: list[str]) -> str:
     return f"{damage[0]}{more}" if damage else ""
 
 
-def attempt(work: Work) -> dict[str, Any]:
+def attempt(work: Work) -> ChildOutcome:
     """Do the work; every error becomes a state with its reason. ``not_written`` where the report has no place."""
     module, _, function = work.judge.partition(":")
     try:
-        found: dict[str, Any] = getattr(import_module(module), function)(work)
+        found: ChildOutcome = getattr(import_module(module), function)(work)
     except NotJudged as error:
-        facts = {"verdict": "not_assessed", "title": "Not assessed", "machine_name": work.machine.name}
-        facts["machine_id"] = work.machine_id or work.machine.id or work.fallback_id
-        return {"state": "degraded", "reason": str(error), "summary": {"result": facts, "faults": [], "components": []}}
+        facts: ResultFacts = {
+            "verdict": Verdict.NOT_ASSESSED,
+            "title": Verdict.NOT_ASSESSED.label,
+            "machine_name": work.machine.name,
+            "machine_id": work.machine_id or work.machine.id or work.fallback_id,
+        }
+        summary: MissionSummary = {"result": facts, "faults": [], "components": []}
+        return {"state": MissionState.DEGRADED, "reason": str(error), "summary": summary}
     except OutputError as error:
-        return {"state": "not_written", "reason": _system_reason(error), "summary": None}
+        return {"state": NOT_KEPT, "reason": _system_reason(error), "summary": None}
     except (LogError, ConfigError) as error:
         number = error.__cause__.errno if isinstance(error.__cause__, OSError) else None
         return _unread(number, str(error))
     except MemoryError as error:
-        return {"state": "out_of_memory", "reason": _where(error), "summary": None}
+        return {"state": MissionState.OUT_OF_MEMORY, "reason": _where(error), "summary": None}
     except OSError as error:
         full, what = error.errno in FULL, error.strerror or error
         name = f"{error.filename}: " if error.filename else ""
@@ -170,13 +183,13 @@ def attempt(work: Work) -> dict[str, Any]:
     except Exception as error:
         traceback.print_exc()
         text = f"internal error: {type(error).__name__}: {error} ({_where(error)})"
-        return {"state": "crashed", "reason": text, "summary": None}
+        return {"state": MissionState.CRASHED, "reason": text, "summary": None}
     return found
 
 
-def _unread(number: int | None, reason: str) -> dict[str, Any]:
+def _unread(number: int | None, reason: str) -> ChildOutcome:
     """End of a mission that cannot be read, by the number of the system's error where there is one."""
-    state = "crashed" if number in FULL else "unreadable"
+    state = MissionState.CRASHED if number in FULL else MissionState.UNREADABLE
     return {"state": state, "reason": reason, "summary": None, "passing": number in PASSING}
 
 
@@ -222,9 +235,9 @@ OUT_OF_MEMORY, NOT_WRITTEN = 97, 98
 """Exit codes of a child that had no memory left to say so, or no room on the disk."""
 
 
-def leave(work: Work, found: Mapping[str, Any]) -> None:
+def leave(work: Work, found: ChildOutcome) -> None:
     """Leave the outcome for who started the child, whole or not at all."""
     path = Path(work.folder) / OUTCOME
     part = path.with_suffix(".part")
-    part.write_bytes(dump_json(dict(found)))
+    part.write_bytes(dump_json(found))
     part.replace(path)

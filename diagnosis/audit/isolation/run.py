@@ -19,15 +19,15 @@ from contextlib import suppress
 from dataclasses import replace
 from multiprocessing.connection import Connection
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Protocol
 
 import orjson
 
 from diagnosis.audit.isolation import child
-from diagnosis.audit.isolation.child import Work
+from diagnosis.audit.isolation.child import ChildOutcome, Work
 from diagnosis.audit.isolation.fork_server import Ended, Stopped
 from diagnosis.audit.isolation.limits import LINUX, Limits, memory_kills
-from diagnosis.audit.store.outcome import Outcome
+from diagnosis.audit.store.outcome import MissionState, Outcome
 from replay.errors import OutputError
 
 _GRACE_S = 30.0
@@ -71,43 +71,63 @@ def run_isolated(work: Work, limits: Limits, isolation: Isolation, spent_s: floa
     kills = memory_kills()
     ended = isolation.run(work, replace(limits, wall_s=max(limits.wall_s - spent_s, _LEAST_S)))
     if isinstance(ended, str):
-        return Outcome("crashed", ended)
-    took = {"wall_s": ended.wall_s + spent_s, "cpu_s": ended.cpu_s, "peak_mb": ended.peak_mb}
-    try:
-        found: dict[str, Any] = orjson.loads((Path(work.folder) / child.OUTCOME).read_bytes()) if not ended.code else {}
-    except (OSError, orjson.JSONDecodeError):
-        found = {}
-    state, reason, summary = found.get("state", ""), str(found.get("reason", "")), found.get("summary")
-    if state == "not_written" or ended.code == child.NOT_WRITTEN:
-        raise OutputError(reason or os.strerror(errno.ENOSPC))
-    if state == "out_of_memory":
-        reason = _over_memory(limits, reason)
-    elif not state:
+        return Outcome(MissionState.CRASHED, ended)
+    found = _left_by(work) if not ended.code else None
+    if ended.code == child.NOT_WRITTEN or (found is not None and found["state"] == child.NOT_KEPT):
+        raise OutputError((found["reason"] if found is not None else "") or os.strerror(errno.ENOSPC))
+    if found is None:
         state, reason = _why(ended, _messages(work), limits, killed=memory_kills() > kills)
-    return Outcome(state, reason, **took, summary=summary, passing=found.get("passing", False))
+        return Outcome(state, reason, ended.wall_s + spent_s, ended.cpu_s, ended.peak_mb)
+    state, reason = MissionState(found["state"]), found["reason"]
+    if state is MissionState.OUT_OF_MEMORY:
+        reason = _over_memory(limits, reason)
+    return Outcome(
+        state,
+        reason,
+        ended.wall_s + spent_s,
+        ended.cpu_s,
+        ended.peak_mb,
+        summary=found["summary"],
+        passing=found.get("passing", False),
+    )
 
 
-def _why(ended: Ended, messages: str, limits: Limits, *, killed: bool) -> tuple[Any, str]:
+def _left_by(work: Work) -> ChildOutcome | None:
+    """Outcome that a child has left; None where it left none."""
+    try:
+        found: ChildOutcome = orjson.loads((Path(work.folder) / child.OUTCOME).read_bytes())
+    except (OSError, orjson.JSONDecodeError):
+        return None
+    return found
+
+
+def _why(ended: Ended, messages: str, limits: Limits, *, killed: bool) -> tuple[MissionState, str]:
     """State and reason of a child that left no outcome."""
     over_cpu = limits.cpu_s is not None and ended.cpu_s >= limits.cpu_s
     if ended.stopped == "wall":
-        return "timeout", over_time(limits)
+        return MissionState.TIMEOUT, over_time(limits)
     if ended.stopped == "memory" or ended.code == child.OUT_OF_MEMORY:
-        return "out_of_memory", _over_memory(limits)
+        return MissionState.OUT_OF_MEMORY, _over_memory(limits)
     if ended.code >= 0:
-        return "crashed", f"its process ended with code {ended.code} and left no result{_place(messages)}"
+        return MissionState.CRASHED, f"its process ended with code {ended.code} and left no result{_place(messages)}"
     name = _signal_name(-ended.code)
     if name == "SIGXCPU" or (name == "SIGKILL" and over_cpu):
-        return "timeout", f"took more than {limits.cpu_s:g} s of a processor; allow more with --cpu"
+        return MissionState.TIMEOUT, f"took more than {limits.cpu_s:g} s of a processor; allow more with --cpu"
     if name == "SIGKILL":
         if killed:
-            return "out_of_memory", "the system had no memory left and ended its process; run fewer at once with -j"
-        return "crashed", "its process was ended from outside by SIGKILL"
+            return (
+                MissionState.OUT_OF_MEMORY,
+                "the system had no memory left and ended its process; run fewer at once with -j",
+            )
+        return MissionState.CRASHED, "its process was ended from outside by SIGKILL"
     if _NO_MEMORY.search(messages):
-        return "out_of_memory", _over_memory(limits)
+        return MissionState.OUT_OF_MEMORY, _over_memory(limits)
     if name == "SIGBUS":
-        return "crashed", f"its process ended with SIGBUS: a file became shorter while it was read{_place(messages)}"
-    return "crashed", f"its process ended with {name}{_place(messages)}"
+        return (
+            MissionState.CRASHED,
+            f"its process ended with SIGBUS: a file became shorter while it was read{_place(messages)}",
+        )
+    return MissionState.CRASHED, f"its process ended with {name}{_place(messages)}"
 
 
 def over_time(limits: Limits) -> str:

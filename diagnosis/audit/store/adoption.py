@@ -6,13 +6,12 @@ import hashlib
 import json
 import os
 import sqlite3
-from collections.abc import Mapping, Sequence
-from typing import Any
+from collections.abc import Sequence
 
 from diagnosis.audit.discovery.discover import MissionSource
-from diagnosis.audit.store.records import names_of, point
+from diagnosis.audit.store.records import FileRecord, names_of, point
 
-Given = Sequence[tuple[MissionSource, Sequence[Mapping[str, Any]]]]
+Given = Sequence[tuple[MissionSource, list[FileRecord]]]
 
 
 def adopt(connection: sqlite3.Connection, given: Given, roots: Sequence[str], run: int, folder: str) -> list[str]:

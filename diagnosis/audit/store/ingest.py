@@ -5,23 +5,22 @@ from __future__ import annotations
 import re
 import sqlite3
 from dataclasses import dataclass
-from typing import Any
 
 import orjson
 
 from diagnosis.audit.discovery.mission_names import is_safe
 from diagnosis.audit.store.keys import Key
 from diagnosis.audit.store.objects import Objects
-from diagnosis.audit.store.outcome import STATES
-from diagnosis.audit.store.records import SCHEMA, write_document
+from diagnosis.audit.store.outcome import ENDS
+from diagnosis.audit.store.records import SCHEMA, ResultObject, write_document
 from diagnosis.audit.store.store import RESULTS, Store
-from diagnosis.results.result import SEVERITIES
+from diagnosis.results.vocabulary import Severity, Verdict
 
 _MOST_BYTES = 64 << 20
 _AT_ONCE = 200
 _LINK = re.compile(r"-m[0-9a-f]{8}\.json$")
 _MISSIONS = "missions/"
-_VERDICTS = ("ready", "watch", "stop", "not_assessed")
+_VERDICTS, _SEVERITIES = {v.value for v in Verdict}, {s.value for s in Severity}
 
 
 @dataclass(frozen=True)
@@ -60,7 +59,7 @@ def ingest(store: Store, place: str | None = None) -> Ingested:
     known = store.object_names()
     placed = {m.name for m in store.missions() if m.result is not None}
     problems: list[str] = []
-    found: list[tuple[int, str, dict[str, Any]]] = []
+    found: list[tuple[int, str, ResultObject]] = []
     for name in objects.names():
         if name in known:
             continue
@@ -87,7 +86,7 @@ def ingest(store: Store, place: str | None = None) -> Ingested:
     return Ingested(taken[True], taken[False], tuple(problems))
 
 
-def _checked(name: str, content: bytes) -> dict[str, Any]:
+def _checked(name: str, content: bytes) -> ResultObject:
     """Document of an object; raises where it is none, or would lead out of the audit's folder."""
     if len(content) > _MOST_BYTES:
         raise ValueError(f"{len(content)} bytes")
@@ -99,7 +98,7 @@ def _checked(name: str, content: bytes) -> dict[str, Any]:
         raise ValueError("its name is not that of its key")
     if attempt is not None and name != f"{key.stem}-{attempt['number']}.json":
         raise ValueError("its name is not that of its attempt")
-    if attempt is not None and attempt["state"] not in STATES:
+    if attempt is not None and attempt["state"] not in ENDS:
         raise ValueError(f"state {str(attempt['state'])[:40]!r}")
     if not is_safe(mission["name"]):
         raise ValueError("the mission's name is not safe")
@@ -110,11 +109,12 @@ def _checked(name: str, content: bytes) -> dict[str, Any]:
     verdict = (summary.get("result") or {}).get("verdict")
     if verdict is not None and verdict not in _VERDICTS:
         raise ValueError(f"verdict {str(verdict)[:40]!r}")
-    if any(fault["severity"] not in SEVERITIES for fault in summary.get("faults") or ()):
+    if any(fault["severity"] not in _SEVERITIES for fault in summary.get("faults") or ()):
         raise ValueError("a fault's severity is none of this tool's")
     if not isinstance(document["made_ns"], int) or not isinstance(mission["files"], list) or not mission["files"]:
         raise ValueError("files or time of making are missing")
-    return dict(document)
+    checked: ResultObject = document
+    return checked
 
 
 def _short(error: Exception) -> str:

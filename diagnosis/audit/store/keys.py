@@ -6,10 +6,11 @@ import hashlib
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from diagnosis.audit.discovery.discover import MissionSource
+    from diagnosis.audit.store.records import KeyRecord
     from replay.machine.config import Machine
 
 _SHORT = 8
@@ -32,6 +33,11 @@ class Key:
     log_hash: str
     config_hash: str
     version: str
+
+    @property
+    def record(self) -> KeyRecord:
+        """The key as JSON."""
+        return {"log_hash": self.log_hash, "config_hash": self.config_hash, "version": self.version}
 
     @property
     def stem(self) -> str:
@@ -71,7 +77,7 @@ def file_roles(names: Sequence[str], machine: Machine) -> tuple[str, ...]:
     return tuple(name if named else "" for name in names)
 
 
-def config_hash(machine_document: bytes | Mapping[str, Any], options: Mapping[str, Any], machine_id: str) -> str:
+def config_hash(machine_document: bytes | Mapping[str, object], options: Mapping[str, object], machine_id: str) -> str:
     """Hash of everything but the log that a result depends on.
 
     Parameters
@@ -79,7 +85,7 @@ def config_hash(machine_document: bytes | Mapping[str, Any], options: Mapping[st
     machine_document : bytes or Mapping
         The machine in canonical form: `replay.machine.toml_file.dump_machine` of the loaded machine, so that comments and
         the order of keys do not count.
-    options : Mapping[str, Any]
+    options : Mapping[str, object]
         Options that change the result, as JSON values.
     machine_id : str
         Identity given by hand, in ``mission.toml`` or by the folder (`diagnosis.audit.discovery.identity.stated_id`).

@@ -5,14 +5,12 @@ from __future__ import annotations
 import os
 import re
 import secrets
-from collections.abc import Mapping
 from contextlib import suppress
 from pathlib import Path
-from typing import Any
 
 import orjson
 
-from diagnosis.audit.store.records import SCHEMA
+from diagnosis.audit.store.records import SCHEMA, ResultObject, with_number
 from diagnosis.results.json_text import dump_json
 from replay.errors import OutputError
 
@@ -86,15 +84,15 @@ class Objects:
                 "make room or give another output folder, then audit again to go on"
             ) from error
 
-    def put_attempt(self, stem: str, document: Mapping[str, Any], first: int) -> int:
+    def put_attempt(self, stem: str, document: ResultObject, first: int) -> int:
         """Write an attempt under the first free number.
 
         Parameters
         ----------
         stem : str
             From `diagnosis.audit.store.keys.Key.stem`.
-        document : Mapping[str, Any]
-            See `diagnosis.audit.store.records.write_document`; its attempt's number is set here.
+        document : ResultObject
+            Of an attempt, whose number is set here.
         first : int
             Lowest number.
 
@@ -109,7 +107,7 @@ class Objects:
             Where it cannot be written.
         """
         for number in range(first, first + _TRIES):
-            full = {**document, "schema": SCHEMA, "attempt": {**document["attempt"], "number": number}}
+            full: ResultObject = {**with_number(document, number), "schema": SCHEMA}
             if self.put(attempt_name(stem, number), encode(full)):
                 return number
         raise OutputError(f"{self.place}: holds {_TRIES} attempts at {stem}; move them away")
@@ -120,7 +118,7 @@ def attempt_name(stem: str, number: int) -> str:
     return f"{stem}-{number}.json"
 
 
-def encode(document: Mapping[str, Any]) -> bytes:
+def encode(document: ResultObject) -> bytes:
     """Bytes of a document; the same document gives the same bytes."""
     return dump_json(document, option=orjson.OPT_SORT_KEYS | orjson.OPT_INDENT_2)
 

@@ -3,22 +3,58 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, Literal, get_args
+from enum import StrEnum
 
-State = Literal["ok", "degraded", "unreadable", "timeout", "out_of_memory", "crashed"]
+from diagnosis.audit.store.summary import MissionSummary
 
-STATES: tuple[State, ...] = get_args(State)
-READ: frozenset[State] = frozenset({"ok", "degraded"})
-TRANSIENT: frozenset[State] = frozenset({"timeout", "out_of_memory", "crashed"})
-"""Ends that may be the machine's fault rather than the log's: worth another attempt."""
+
+class MissionState(StrEnum):
+    """How a mission stands in an audit: one of six ends, or not audited yet."""
+
+    OK = "ok"
+    DEGRADED = "degraded"
+    UNREADABLE = "unreadable"
+    TIMEOUT = "timeout"
+    OUT_OF_MEMORY = "out_of_memory"
+    CRASHED = "crashed"
+    PENDING = "pending"
+
+    @property
+    def words(self) -> str:
+        """Words for lists and headings; empty for what was read whole."""
+        return _WORDS[self]
+
+
+_WORDS = {
+    MissionState.OK: "",
+    MissionState.DEGRADED: "degraded",
+    MissionState.UNREADABLE: "unreadable",
+    MissionState.TIMEOUT: "took too long",
+    MissionState.OUT_OF_MEMORY: "out of memory",
+    MissionState.CRASHED: "crashed",
+    MissionState.PENDING: "not audited yet",
+}
+#: States in which an attempt can end.
+ENDS: tuple[MissionState, ...] = tuple(state for state in MissionState if state is not MissionState.PENDING)
+#: Ends of missions whose log was read, and which may have a report.
+READ: frozenset[MissionState] = frozenset({MissionState.OK, MissionState.DEGRADED})
+#: Ends that may be the machine's fault rather than the log's: worth another attempt.
+TRANSIENT: frozenset[MissionState] = frozenset({MissionState.TIMEOUT, MissionState.OUT_OF_MEMORY, MissionState.CRASHED})
 
 _LIMITS = (
-    ("timeout", "--timeout", re.compile(r"took longer than ([\d.e+-]+) s; allow more with --timeout$")),
-    ("timeout", "--cpu", re.compile(r"took more than ([\d.e+-]+) s of a processor; allow more with --cpu$")),
     (
-        "out_of_memory",
+        MissionState.TIMEOUT,
+        "--timeout",
+        re.compile(r"took longer than ([\d.e+-]+) s; allow more with --timeout$"),
+    ),
+    (
+        MissionState.TIMEOUT,
+        "--cpu",
+        re.compile(r"took more than ([\d.e+-]+) s of a processor; allow more with --cpu$"),
+    ),
+    (
+        MissionState.OUT_OF_MEMORY,
         "--memory",
         re.compile(r"needed more than (\d+) MB of memory.*; allow more with --memory$", re.DOTALL),
     ),
@@ -26,7 +62,7 @@ _LIMITS = (
 
 
 def limit_met(state: str, reason: str) -> tuple[str, float] | None:
-    """Option and value of the limit at which a mission was stopped, as its reason tells; None where it was at none."""
+    """Option and value of the limit at which a mission was stopped, as its reason says; None where it was at none."""
     for of, option, pattern in _LIMITS:
         found = pattern.match(reason) if state == of else None
         if found:
@@ -40,7 +76,7 @@ class Outcome:
 
     Attributes
     ----------
-    state : State
+    state : MissionState
         ``ok``: read whole. ``degraded``: read, but parts are damaged or left out, or nothing in it can be judged.
         ``unreadable``: no log that can be read. ``timeout``, ``out_of_memory``: stopped at a limit. ``crashed``: the
         process ended otherwise.
@@ -50,24 +86,24 @@ class Outcome:
         Time that it took, and time of a processor [s].
     peak_mb : float
         Most memory held at once [MB].
-    summary : Mapping or None
+    summary : MissionSummary or None
         From `diagnosis.audit.store.summary.summarise`; None where there is no report.
     passing : bool
         Whether the files could not be read for a reason outside of them, which may pass: no result of their content.
     """
 
-    state: State
+    state: MissionState
     reason: str = ""
     wall_s: float = 0.0
     cpu_s: float = 0.0
     peak_mb: float = 0.0
-    summary: Mapping[str, Any] | None = None
+    summary: MissionSummary | None = None
     passing: bool = False
 
     def __post_init__(self) -> None:
-        if self.state not in STATES:
-            raise ValueError(f"state {self.state!r}: expected one of {', '.join(STATES)}")
-        if (self.state == "ok") != (not self.reason):
+        if self.state not in ENDS:
+            raise ValueError(f"state {self.state!r}: expected one of {', '.join(ENDS)}")
+        if (self.state == MissionState.OK) != (not self.reason):
             raise ValueError(
                 f"{self.state} with the reason {self.reason!r}: every state but ok has a reason, ok has none"
             )

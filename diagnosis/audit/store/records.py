@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import sqlite3
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import NotRequired, TypedDict
+
+from diagnosis.audit.store.outcome import READ, Outcome
+from diagnosis.audit.store.summary import MissionSummary, ResultFacts
+from diagnosis.results.json_text import dump_json
 
 SCHEMA = "mfhca-audit-result/1"
-READ = ("ok", "degraded")
 _KEY = ("log_hash", "config_hash", "version")
 _FROM_REPORT = (
     "machine_name", "verdict", "title", "start_ns", "duration_s", "driving_s", "decided_s", "distance_m", "open_loop",
@@ -22,10 +25,78 @@ _COMPONENT = (
     "component", "side", "driving_s", "decided_s", "healthy_s", "faulty_s", "worst",
     "epsilon", "epsilon_low", "epsilon_high", "epsilon_s",
 )  # fmt: skip
-_EMPTY = {"machine_name": "", "title": "", "open_loop": 0}
+_NO_REPORT: ResultFacts = {"machine_name": "", "title": "", "open_loop": 0}
 
 
-def write_document(connection: sqlite3.Connection, document: Mapping[str, Any], run: int) -> None:
+class FileRecord(TypedDict):
+    """What is known of a file; its SHA-256 where it was read."""
+
+    path: str
+    size: int
+    stamp: str
+    sha256: NotRequired[str | None]
+
+
+class MissionRecord(TypedDict):
+    """A mission and its files, by paths relative to the store's folder."""
+
+    name: str
+    files: list[FileRecord]
+    bytes: int
+
+
+class KeyRecord(TypedDict):
+    """Fields of `diagnosis.audit.store.keys.Key`."""
+
+    log_hash: str
+    config_hash: str
+    version: str
+
+
+class AttemptRecord(TypedDict):
+    """End of an attempt: fields of `diagnosis.audit.store.outcome.Outcome`, and its number."""
+
+    number: int
+    state: str
+    reason: str
+    wall_s: float
+    cpu_s: float
+    peak_mb: float
+
+
+class ResultObject(TypedDict):
+    """One object of the folder ``results``: an attempt at a mission, or without ``attempt`` a mission that shares a result."""
+
+    schema: NotRequired[str]
+    mission: MissionRecord
+    key: KeyRecord
+    made_ns: NotRequired[int]
+    attempt: NotRequired[AttemptRecord | None]
+    report: NotRequired[str | None]
+    machine_id: NotRequired[str]
+    summary: NotRequired[MissionSummary | None]
+
+
+def attempt_record(outcome: Outcome, number: int = 0) -> AttemptRecord:
+    """Record of an attempt's end; texts that JSON cannot hold are made writable."""
+    return {
+        "number": number,
+        "state": outcome.state,
+        "reason": outcome.reason.encode("utf-8", "backslashreplace").decode(),
+        "wall_s": outcome.wall_s,
+        "cpu_s": outcome.cpu_s,
+        "peak_mb": outcome.peak_mb,
+    }
+
+
+def with_number(document: ResultObject, number: int) -> ResultObject:
+    """An attempt's document with the attempt's number."""
+    attempt = document["attempt"]
+    assert attempt is not None
+    return {**document, "attempt": {**attempt, "number": number}}
+
+
+def write_document(connection: sqlite3.Connection, document: ResultObject, run: int) -> None:
     """Write a document's rows, within a transaction.
 
     A mission points to the document's key afterwards. Where the document holds an attempt, it becomes the result of its
@@ -35,12 +106,12 @@ def write_document(connection: sqlite3.Connection, document: Mapping[str, Any], 
     ----------
     connection : sqlite3.Connection
         With a transaction begun.
-    document : Mapping[str, Any]
-        From `diagnosis.audit.store.objects`: ``mission``, ``key``, and for an attempt ``attempt``, ``report``, ``summary``.
+    document : ResultObject
+        As `diagnosis.audit.store.objects` keeps it.
     run : int
         Number of the audit run.
     """
-    mission, key = document["mission"], tuple(document["key"][k] for k in _KEY)
+    mission, key = document["mission"], tuple(document["key"][k] for k in ("log_hash", "config_hash", "version"))
     attempt = document.get("attempt")
     known = connection.execute(
         f"SELECT id, state FROM result WHERE {' AND '.join(f'{k} = ?' for k in _KEY)}", key
@@ -48,7 +119,7 @@ def write_document(connection: sqlite3.Connection, document: Mapping[str, Any], 
     identity: int | None = known["id"] if known else None
     if attempt is not None:
         if known is None or attempt["state"] in READ or known["state"] not in READ:
-            identity = _write_result(connection, key, document, identity)
+            identity = _write_result(connection, document, attempt, identity)
         _insert(connection, "attempt", ("result", *_ATTEMPT), [{**attempt, "result": identity}], "OR REPLACE")
         connection.execute(
             "UPDATE result SET attempts = (SELECT count(*) FROM attempt WHERE result = id) WHERE id = ?", (identity,)
@@ -60,13 +131,13 @@ def write_document(connection: sqlite3.Connection, document: Mapping[str, Any], 
 
 
 def _write_result(
-    connection: sqlite3.Connection, key: tuple[str, ...], document: Mapping[str, Any], identity: int | None
+    connection: sqlite3.Connection, document: ResultObject, attempt: AttemptRecord, identity: int | None
 ) -> int:
-    summary = document.get("summary") or {"result": {}, "faults": [], "components": []}
-    facts, attempt = summary["result"], document["attempt"]
-    row = {
-        **dict(zip(_KEY, key, strict=True)),
-        **{name: facts.get(name, _EMPTY.get(name)) for name in _FROM_REPORT},
+    summary = document.get("summary") or MissionSummary(result={}, faults=[], components=[])
+    facts: ResultFacts = {**_NO_REPORT, **summary["result"]}
+    row: dict[str, object] = {
+        **document["key"],
+        **{name: facts.get(name) for name in _FROM_REPORT},
         "state": attempt["state"],
         "reason": attempt["reason"],
         "attempts": 1,
@@ -93,13 +164,13 @@ def _write_result(
     return identity
 
 
-def write_files(connection: sqlite3.Connection, files: Sequence[Mapping[str, Any]]) -> None:
+def write_files(connection: sqlite3.Connection, files: Sequence[FileRecord]) -> None:
     """Write what is known of files' contents: ``path``, ``size``, ``stamp``, ``sha256``."""
     columns = ("path", "size", "stamp", "sha256")
     _insert(connection, "file", columns, [f for f in files if f.get("sha256")], "OR REPLACE")
 
 
-def point(connection: sqlite3.Connection, mission: Mapping[str, Any], result: int | None, run: int) -> None:
+def point(connection: sqlite3.Connection, mission: MissionRecord, result: int | None, run: int) -> None:
     """Enter a mission, or let it point to a result."""
     connection.execute(
         "INSERT INTO mission (name, files, bytes, result, seen) VALUES (?, ?, ?, ?, ?) ON CONFLICT (name) DO UPDATE SET "
@@ -109,10 +180,8 @@ def point(connection: sqlite3.Connection, mission: Mapping[str, Any], result: in
     )
 
 
-def names_of(files: Sequence[Mapping[str, Any]]) -> str:
+def names_of(files: Sequence[FileRecord]) -> str:
     """JSON list of files' paths, as the store holds it."""
-    from diagnosis.results.json_text import dump_json
-
     return dump_json([f["path"] for f in files]).decode()
 
 
@@ -120,7 +189,7 @@ def _insert(
     connection: sqlite3.Connection,
     table: str,
     columns: Sequence[str],
-    rows: Sequence[Mapping[str, Any]],
+    rows: Sequence[Mapping[str, object]],
     how: str = "",
 ) -> None:
     connection.executemany(

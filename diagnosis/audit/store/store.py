@@ -5,20 +5,23 @@ from __future__ import annotations
 import hashlib
 import json
 import os
+import sqlite3
 import time
 from collections.abc import Iterable, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from types import TracebackType
-from typing import Any, Self
+from typing import Self
 
 from diagnosis.audit.discovery.discover import MissionSource
 from diagnosis.audit.store import records
 from diagnosis.audit.store.database import Database
 from diagnosis.audit.store.keys import Key
 from diagnosis.audit.store.objects import Objects, attempt_name, encode
-from diagnosis.audit.store.outcome import Outcome, State
+from diagnosis.audit.store.outcome import MissionState, Outcome
+from diagnosis.audit.store.records import FileRecord, MissionRecord, ResultObject
 from diagnosis.audit.store.shared_reason import SharedReason, shared_reason
+from diagnosis.results.vocabulary import Verdict
 
 FILE_NAME = "fleet.sqlite"
 RESULTS = "results"
@@ -32,11 +35,11 @@ class StoredResult:
 
     id: int
     key: Key
-    state: State
+    state: MissionState
     reason: str
     attempts: int
     machine_id: str
-    verdict: str | None
+    verdict: Verdict | None
     start_ns: int | None
     report: str | None
 
@@ -156,7 +159,7 @@ class Store:
     def remember_hash(self, path: str, size: int, stamp: str, sha256: str) -> None:
         """Keep a file's SHA-256, so that it need not be read again."""
         with self.database.transaction() as connection:
-            row = {"path": self.relative(path), "size": size, "stamp": stamp, "sha256": sha256}
+            row = FileRecord(path=self.relative(path), size=size, stamp=stamp, sha256=sha256)
             records.write_files(connection, [row])
 
     def lookup(self, key: Key) -> StoredResult | None:
@@ -201,14 +204,12 @@ class Store:
             Where it cannot be written; nothing of it counts then.
         """
         for attempt in (*attempts, outcome):
-            told = {name: getattr(attempt, name) for name in ("state", "wall_s", "cpu_s", "peak_mb")}
-            told["reason"] = attempt.reason.encode("utf-8", "backslashreplace").decode()
             self._record(
                 {
                     "mission": self._described(mission, hashes),
-                    "key": asdict(key),
+                    "key": key.record,
                     "made_ns": time.time_ns(),
-                    "attempt": {**told, "number": 0},
+                    "attempt": records.attempt_record(attempt),
                     "report": report if attempt is outcome else None,
                     "machine_id": machine_id,
                     "summary": attempt.summary,
@@ -216,7 +217,7 @@ class Store:
                 key,
             )
 
-    def _record(self, document: dict[str, Any], key: Key) -> None:
+    def _record(self, document: ResultObject, key: Key) -> None:
         query = f"SELECT coalesce(max(number), 0) FROM attempt WHERE result IN (SELECT id FROM result WHERE {_BY_KEY})"
         values = (key.log_hash, key.config_hash, key.version)
         number = int(self.database.rows(query, values)[0][0]) + 1
@@ -225,8 +226,8 @@ class Store:
         with self.database.transaction() as connection:
             if self._objects is None:
                 number = int(connection.execute(query, values).fetchone()[0]) + 1
-            document["attempt"]["number"] = number
-            records.write_document(connection, document, self.run)
+            numbered = records.with_number(document, number)
+            records.write_document(connection, numbered, self.run)
 
     def reuse(self, mission: MissionSource, result: StoredResult) -> None:
         """Let a mission point to a result that is there already: of an earlier run, or of a copy.
@@ -241,7 +242,7 @@ class Store:
         same = "SELECT 1 FROM mission WHERE name = ? AND result = ? AND files = ? AND gone IS NULL"
         if self.database.rows(same, row):
             return
-        document: dict[str, Any] = {"schema": records.SCHEMA, "mission": described, "key": asdict(result.key)}
+        document: ResultObject = {"schema": records.SCHEMA, "mission": described, "key": result.key.record}
         mark = hashlib.sha256(encode(document)).hexdigest()[:8]
         document["made_ns"] = time.time_ns()
         if self._objects is not None:
@@ -273,13 +274,13 @@ class Store:
         )
         return [_mission(row) for row in self.database.rows(query, (machine_id,))]
 
-    def counts(self, run: int | None = None) -> dict[State, int]:
+    def counts(self, run: int | None = None) -> dict[MissionState, int]:
         """Number of missions per state, of those that are there and were seen in or after a run (None: in any)."""
         query = (
             "SELECT r.state, count(*) FROM mission m JOIN result r ON r.id = m.result "
             "WHERE m.gone IS NULL AND m.seen >= ? GROUP BY 1 ORDER BY 1"
         )
-        return {row[0]: row[1] for row in self.database.rows(query, (run or 0,))}
+        return {MissionState(row[0]): row[1] for row in self.database.rows(query, (run or 0,))}
 
     def object_names(self) -> set[str]:
         """Names of the result objects of all recorded attempts."""
@@ -297,31 +298,38 @@ class Store:
             shown = Path(real).as_posix()
         return shown.encode("utf-8", "surrogateescape").decode("utf-8", "backslashreplace")
 
-    def _files(self, mission: MissionSource) -> list[dict[str, Any]]:
+    def _files(self, mission: MissionSource) -> list[FileRecord]:
         sizes = mission.sizes or (mission.bytes,) * len(mission.files)
         return [
             {"path": self.relative(path), "size": size, "stamp": stamp}
             for path, size, stamp in zip(mission.files, sizes, mission.stamps, strict=True)
         ]
 
-    def _described(self, mission: MissionSource, hashes: Sequence[str] = ()) -> dict[str, Any]:
+    def _described(self, mission: MissionSource, hashes: Sequence[str] = ()) -> MissionRecord:
         files = self._files(mission)
         known: Sequence[str | None] = hashes or [
             self.known_hash(f, t["size"], t["stamp"]) for f, t in zip(mission.files, files, strict=True)
         ]
-        for told, sha256 in zip(files, known, strict=True):
-            told["sha256"] = sha256
+        for file, sha256 in zip(files, known, strict=True):
+            file["sha256"] = sha256
         return {"name": mission.name, "files": files, "bytes": mission.bytes}
 
 
-def _stored(row: Any) -> StoredResult:
-    names = ("state", "reason", "attempts", "machine_id", "verdict", "start_ns", "report")
+def _stored(row: sqlite3.Row) -> StoredResult:
     return StoredResult(
-        row["id"], Key(row["log_hash"], row["config_hash"], row["version"]), *(row[name] for name in names)
+        id=row["id"],
+        key=Key(row["log_hash"], row["config_hash"], row["version"]),
+        state=MissionState(row["state"]),
+        reason=row["reason"],
+        attempts=row["attempts"],
+        machine_id=row["machine_id"],
+        verdict=Verdict(row["verdict"]) if row["verdict"] is not None else None,
+        start_ns=row["start_ns"],
+        report=row["report"],
     )
 
 
-def _mission(row: Any) -> StoredMission:
+def _mission(row: sqlite3.Row) -> StoredMission:
     result = _stored(row) if row["id"] is not None else None
     files = tuple(json.loads(row["files"]))
     return StoredMission(row["name"], files, row["bytes"], row["seen"], row["gone"] is not None, result)

@@ -1,30 +1,81 @@
-"""A report as rows of the store: what trends and the fleet page need of a mission."""
+"""A report as rows of the store: what trends and the fleet page need of a mission.
+
+The keys of the rows are the columns' names in ``schema.sql``, the values plain JSON.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import Any
+from collections.abc import Sequence
+from typing import TypedDict
 
-from diagnosis.results.result import SEVERITIES
-from replay.faults import FAULT_STATES, State
+from diagnosis.results.document import CoverageRow, EpsilonRow, IntervalRow, LossRow, ReportDocument
+from diagnosis.results.vocabulary import Severity
+from replay.faults import FAULT_STATES, Side, State
 
-_EPSILON = ("value", "low", "high")
+
+class ResultFacts(TypedDict, total=False):
+    """Columns of the table ``result`` that come from a report; without one, what is known all the same."""
+
+    machine_id: str
+    machine_name: str
+    verdict: str
+    title: str
+    start_ns: int
+    duration_s: float
+    driving_s: float
+    decided_s: float | None
+    distance_m: float | None
+    open_loop: int
 
 
-def summarise(report: Mapping[str, Any]) -> dict[str, Any]:
-    """Rows of tables ``result``, ``fault`` and ``component`` for a report.
+class BoundsColumns(TypedDict):
+    """ε̂ with its 95 % bounds in three columns."""
 
-    Parameters
-    ----------
-    report : Mapping[str, Any]
-        Document of ``report.json``.
+    epsilon: float | None
+    epsilon_low: float | None
+    epsilon_high: float | None
 
-    Returns
-    -------
-    dict[str, Any]
-        ``result``: columns that come from the report; ``faults`` and ``components``: one mapping per row. The keys are
-        the columns' names, the values plain JSON.
-    """
+
+class FaultColumns(BoundsColumns):
+    """Row of the table ``fault``."""
+
+    id: str
+    component: str
+    kind: str
+    side: str
+    mode: str
+    severity: str
+    start_s: float
+    stop_s: float
+    start_ns: int
+    sat: float | None
+    sat_unit: str | None
+    probability: float
+
+
+class ComponentColumns(BoundsColumns):
+    """Row of the table ``component``."""
+
+    component: str
+    side: str
+    driving_s: float
+    decided_s: float
+    healthy_s: float
+    faulty_s: float
+    worst: str
+    epsilon_s: float | None
+
+
+class MissionSummary(TypedDict):
+    """What the store keeps of a report."""
+
+    result: ResultFacts
+    faults: list[FaultColumns]
+    components: list[ComponentColumns]
+
+
+def summarise(report: ReportDocument) -> MissionSummary:
+    """Rows of tables ``result``, ``fault`` and ``component`` for a report."""
     log, machine, verdict = report["log"], report["machine"], report["verdict"]
     coverage = report["coverage"]
     decided = [row["decided_driving_s"] for row in coverage]
@@ -39,31 +90,36 @@ def summarise(report: Mapping[str, Any]) -> dict[str, Any]:
             "driving_s": log["driving_s"],
             "decided_s": sum(decided) / len(decided) if decided else None,
             "distance_m": log["distance_m"],
-            "open_loop": int(bool(log.get("open_loop", False))),
+            "open_loop": int(log["open_loop"]),
         },
         "faults": [_fault(row) for row in report["intervals"]],
-        "components": [_component(row, report["intervals"], report.get("loss") or ()) for row in coverage],
+        "components": [_component(row, report["intervals"], report["loss"]) for row in coverage],
     }
 
 
-def _fault(row: Mapping[str, Any]) -> dict[str, Any]:
-    sat = row.get("sat") or {}
+def _fault(row: IntervalRow) -> FaultColumns:
+    sat = row["sat"]
     return {
-        **{k: row[k] for k in ("id", "component", "kind", "side", "mode", "severity")},
-        **{k: row[k] for k in ("start_s", "stop_s", "start_ns")},
-        **_bounds(row.get("epsilon")),
-        "sat": sat.get("mean"),
-        "sat_unit": sat.get("unit"),
+        "id": row["id"],
+        "component": row["component"],
+        "kind": row["kind"],
+        "side": row["side"],
+        "mode": row["mode"],
+        "severity": row["severity"],
+        "start_s": row["start_s"],
+        "stop_s": row["stop_s"],
+        "start_ns": row["start_ns"],
+        **_bounds(row["epsilon"]),
+        "sat": None if sat is None else sat["mean"],
+        "sat_unit": None if sat is None else sat["unit"],
         "probability": row["probability"],
     }
 
 
-def _component(
-    row: Mapping[str, Any], intervals: Sequence[Mapping[str, Any]], loss: Sequence[Mapping[str, Any]]
-) -> dict[str, Any]:
+def _component(row: CoverageRow, intervals: Sequence[IntervalRow], loss: Sequence[LossRow]) -> ComponentColumns:
     component, side, seconds = row["component"], row["side"], row["seconds"]
-    mine = [i for i in intervals if i["component"] == component and i["side"] in (side, "sensor_or_actuator")]
-    worst = max(mine, key=lambda i: (SEVERITIES.index(i["severity"]), i["stop_s"] - i["start_s"]), default=None)
+    mine = [i for i in intervals if i["component"] == component and i["side"] in (side, Side.SENSOR_OR_ACTUATOR)]
+    worst = max(mine, key=lambda i: (Severity(i["severity"]).rank, i["stop_s"] - i["start_s"]), default=None)
     found = next((e for e in loss if (e["component"], e["side"]) == (component, side)), None)
     return {
         "component": component,
@@ -73,11 +129,12 @@ def _component(
         "healthy_s": seconds.get(State.HEALTHY.value, 0.0),
         "faulty_s": sum(seconds.get(s.value, 0.0) for s in FAULT_STATES),
         "worst": worst["mode"] if worst else "",
-        **_bounds(found and found["epsilon"]),
+        **_bounds(None if found is None else found["epsilon"]),
         "epsilon_s": found["seconds"] if found else None,
     }
 
 
-def _bounds(epsilon: Mapping[str, Any] | None) -> dict[str, Any]:
-    values = [(epsilon or {}).get(k) for k in _EPSILON]
-    return dict(zip(("epsilon", "epsilon_low", "epsilon_high"), values, strict=True))
+def _bounds(epsilon: EpsilonRow | None) -> BoundsColumns:
+    if epsilon is None:
+        return {"epsilon": None, "epsilon_low": None, "epsilon_high": None}
+    return {"epsilon": epsilon["value"], "epsilon_low": epsilon["low"], "epsilon_high": epsilon["high"]}

@@ -17,7 +17,7 @@ from scipy.special import fdtrc
 
 from diagnosis.audit.trends.line import Array, between, sums
 
-Kind = Literal["drop", "rise", "bend"]
+ChangeKind = Literal["drop", "rise", "bend"]
 
 _ALPHA = 0.01
 _LEAST = 5  # missions in a stretch that is searched
@@ -42,7 +42,7 @@ class Change:
     """
 
     index: int
-    kind: Kind
+    kind: ChangeKind
     size: float
 
 
@@ -98,7 +98,7 @@ def possible_bend(x: Array, y: Array, sigma: Array) -> int | None:
     return None if best is None else best.place
 
 
-def _kind(best: _Best) -> Kind:
+def _kind(best: _Best) -> ChangeKind:
     if abs(best.size) < _JUMP:
         return "bend"
     return "drop" if best.size < 0 else "rise"

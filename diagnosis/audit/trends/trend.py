@@ -2,7 +2,7 @@
 
 The missions' estimates are laid over the driving hours before them (or days), outliers are set aside and the series is
 cut at steps and bends (`diagnosis.audit.trends.changes`): the trend is that of the last stretch alone, so that a repair
-starts it anew. Through the stretch goes a weighted line (`diagnosis.audit.trends.line`); where it meets the limit is told
+starts it anew. Through the stretch goes a weighted line (`diagnosis.audit.trends.line`); where it meets the limit is given
 with Fieller's 90 % interval. Wear may have begun to grow faster without showing for certain, so the interval begins where
 a line after the likeliest bend would begin it. The line stands for the mean of missions; single ones scatter by `tau`.
 
@@ -26,7 +26,8 @@ CONFIDENCE = 0.9
 LEAST_MISSIONS = 5
 REACH = 3.0
 
-State = Literal["crossing", "above", "not_within", "not_known"]
+ForecastState = Literal["crossing", "above", "not_within", "not_known"]
+Direction = Literal["rising", "falling", "steady", "not_known"]
 
 
 @dataclass(frozen=True)
@@ -67,7 +68,7 @@ class Forecast:
         Why nothing is known; empty otherwise.
     """
 
-    state: State
+    state: ForecastState
     soonest: float | None = None
     likely: float | None = None
     latest: float | None = None
@@ -99,7 +100,7 @@ class Trend:
     first: int
     outliers: tuple[int, ...]
     changes: tuple[Change, ...]
-    direction: Literal["rising", "falling", "steady", "not_known"]
+    direction: Direction
     forecast: Forecast
 
 
@@ -147,7 +148,7 @@ def _why_not(kept: NDArray[np.intp], outliers: tuple[int, ...], changes: tuple[C
     return ""
 
 
-def _direction(line: Line | None) -> Literal["rising", "falling", "steady", "not_known"]:
+def _direction(line: Line | None) -> Direction:
     if line is None:
         return "not_known"
     if abs(line.slope) <= line.quantile(0.95) * math.sqrt(line.slope_var):

@@ -2,20 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any
-
 from diagnosis.audit.fleet.compare import OUTCOMES
-from diagnosis.audit.fleet.words import count
+from diagnosis.audit.fleet.fault_types import FaultChange, FaultStandingRow
+from diagnosis.audit.fleet.page.shown import Context, ShownBaseline, ShownFaultChange
+from diagnosis.audit.fleet.words import count, verdict_label
 from diagnosis.pages import labels
+from diagnosis.results.fault_rows import state_label
+from diagnosis.results.vocabulary import part_words
 
-VERDICTS = {
-    "stop": "Stop and repair",
-    "watch": "Faults to watch",
-    "ready": "Ready",
-    "not_assessed": "Not assessed",
-}
-_CHANGES = {
+_CHANGES: dict[FaultChange, tuple[str, str]] = {
     "new": ("+", "new"),
     "worse": ("▲", "worse"),
     "better": ("▼", "better"),
@@ -26,7 +21,7 @@ _CHANGES = {
 _CHANGED = {"severity": "severity", "epsilon": "ε̂", "frequency": "how often"}
 
 
-def changes_of(b: Mapping[str, Any] | None) -> dict[str, Any] | None:
+def changes_of(b: ShownBaseline | None) -> Context | None:
     """What changed against another audit, in words."""
     if b is None:
         return None
@@ -35,18 +30,19 @@ def changes_of(b: Mapping[str, Any] | None) -> dict[str, Any] | None:
         found = [_changed(f) for f in b["faults"] if f["outcome"] == outcome]
         sign, words = _CHANGES[outcome]
         groups.append({"outcome": outcome, "sign": sign, "words": words[0].upper() + words[1:], "rows": found})
-    notes = [f"{c['machine']}: {VERDICTS[c['older']]} → {VERDICTS[c['newer']]}" for c in b["machines"]["changed"]]
-    for key, words in (("new", "not in the earlier audit"), ("missing", "no longer in the audit")):
-        if b["machines"][key]:
-            notes.append(
-                f"Machines {words}: {', '.join(b['machines'][key][:20])}"
-                + (" …" if len(b["machines"][key]) > 20 else "")
-            )
+    notes = [f"{c['machine']}: {verdict_label(c['older'])} → {verdict_label(c['newer'])}" for c in b["machines"]["changed"]]
+    machines = b["machines"]
+    for labels_of, words in (
+        (machines["new"], "not in the earlier audit"),
+        (machines["missing"], "no longer in the audit"),
+    ):
+        if labels_of:
+            notes.append(f"Machines {words}: {', '.join(labels_of[:20])}" + (" …" if len(labels_of) > 20 else ""))
     coverage = [
         {
             "change": c["change"],
             "words": {"lost": "no longer assessed", "gained": "assessed now"}[c["change"]],
-            "part": f"{c['machine']}: {c['component']} {labels.part(c['kind'], c['side'])}",
+            "part": f"{c['machine']}: {part_words(c['kind'], c['component'], c['side'])}",
         }
         for c in b["coverage"]
     ]
@@ -56,11 +52,11 @@ def changes_of(b: Mapping[str, Any] | None) -> dict[str, Any] | None:
     lost = " and ".join(count(len(x), w) for x, w in ((gone, "machine"), (m["missing"], "mission")) if x)
     one = len(gone) + len(m["missing"]) == 1
     lost = f"{lost} of the earlier audit {'is' if one else 'are'} missing. " if lost else ""
-    told = [f"{n} {_CHANGES[k][1]}" for k, n in b["counts"].items() if n]
+    counted = [f"{b['counts'][k]} {_CHANGES[k][1]}" for k in OUTCOMES if b["counts"][k]]
     return {
         "worse": b["worse"],
         "missing": bool(lost),
-        "headline": lost + ("Faults: " + ", ".join(told) if told else "No fault in either audit"),
+        "headline": lost + ("Faults: " + ", ".join(counted) if counted else "No fault in either audit"),
         "missions": f"{count(m['newer'], 'mission')} now, {count(m['older'], 'mission')} then; {count(m['new'], 'mission')} new",
         "groups": groups,
         "notes": notes,
@@ -68,20 +64,21 @@ def changes_of(b: Mapping[str, Any] | None) -> dict[str, Any] | None:
     }
 
 
-def _changed(f: Mapping[str, Any]) -> dict[str, Any]:
-    told = [f[k] and _told(f[k]) for k in ("older", "newer")]
+def _changed(f: ShownFaultChange) -> Context:
     return {
         "machine": f["machine"],
         "symbol": labels.known(f["mode"]),
-        "words": f"{f['component']} {labels.part(f['kind'], f['side'])} {labels.state_label(f['mode'], f['side']).lower()}",
-        "older": told[0] or "–",
-        "newer": told[1] or "–",
+        "words": f"{part_words(f['kind'], f['component'], f['side'])} {state_label(f['mode'], f['side']).lower()}",
+        "older": _standing(f["older"]),
+        "newer": _standing(f["newer"]),
         "address": f["address"],
         "more": f["note"] or ", ".join(_CHANGED[c] for c in f["changes"]),
     }
 
 
-def _told(side: Mapping[str, Any]) -> str:
+def _standing(side: FaultStandingRow | None) -> str:
+    if side is None:
+        return "–"
     e = side["epsilon"]
     return f"{side['missions']} of {side['assessed']} missions, {side['severity']}" + (
         f", ε̂ {e['value']:.2f}" if e else ""

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 from markupsafe import Markup
 
+from diagnosis.audit.fleet.fleet_types import MachineRow, PartRow
 from diagnosis.audit.fleet.page.svg import mark
 from diagnosis.pages import labels
+from diagnosis.results.fault_rows import state_label
+from replay.faults import Side
 
-_SIDES = {"sensor": "sensor", "actuator": "valve"}
+_SIDES: dict[str, str] = {Side.SENSOR: "sensor", Side.ACTUATOR: "valve"}
 _LEVELS = 4
 
 
@@ -27,7 +29,7 @@ class Matrix:
     total: int
 
 
-def matrix(machines: Sequence[Mapping[str, Any]]) -> Matrix:
+def matrix(machines: Sequence[MachineRow]) -> Matrix:
     """Machines in their order; those without a fault whose parts were all assessed are only counted."""
     columns = list(dict.fromkeys((p["component"], p["side"]) for m in machines for p in m["parts"]))
     place = {component: k for k, component in reversed(list(enumerate(c[0] for c in columns)))}
@@ -54,11 +56,11 @@ def matrix(machines: Sequence[Mapping[str, Any]]) -> Matrix:
     return Matrix(heads, sides, rows, sums, quiet, sum(sums))
 
 
-def _count(part: Mapping[str, Any]) -> int:
+def _count(part: PartRow) -> int:
     return sum(part["modes"].values())
 
 
-def _cell(part: Mapping[str, Any] | None, count: int, most: int, judged: bool) -> Markup:
+def _cell(part: PartRow | None, count: int, most: int, judged: bool) -> Markup:
     if part is None and judged:
         return Markup('<td class="nil"><span class="sr">no such part</span></td>')
     if part is None or not count:
@@ -66,12 +68,12 @@ def _cell(part: Mapping[str, Any] | None, count: int, most: int, judged: bool) -
             return Markup('<td class="nil"><span class="sr">0</span></td>')
         return Markup('<td class="blind" title="never assessed">–<span class="sr"> never assessed</span></td>')
     level = 1 + (_LEVELS - 1) * (count - 1) // max(1, most - 1)
-    told = Markup("").join(
+    modes = Markup("").join(
         Markup('<span class="m">{}<b>{}</b><span class="sr"> {}</span></span>').format(
-            mark(labels.known(mode)), n, labels.state_label(mode, part["side"])
+            mark(labels.known(mode)), n, state_label(mode, part["side"])
         )
         for mode, n in sorted(part["modes"].items(), key=lambda p: -p[1])
     )
     return Markup('<td class="h{}" title="{}">{}</td>').format(
-        level, ", ".join(f"{labels.state_label(k, part['side'])} in {n}" for k, n in part["modes"].items()), told
+        level, ", ".join(f"{state_label(k, part['side'])} in {n}" for k, n in part["modes"].items()), modes
     )

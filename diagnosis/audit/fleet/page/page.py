@@ -13,23 +13,31 @@ from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from functools import lru_cache
 from pathlib import Path
-from typing import Any
 
 import jinja2
 from markupsafe import Markup
 
+from diagnosis.audit.fleet.fault_types import FleetFaultRow
+from diagnosis.audit.fleet.fleet_types import AuditRow, CountsRow, FleetDocument, MachineRow
 from diagnosis.audit.fleet.page import rows
 from diagnosis.audit.fleet.page.changes import changes_of
 from diagnosis.audit.fleet.page.matrix import matrix
+from diagnosis.audit.fleet.page.shown import Context, ShownDocument, fault_address, shown
 from diagnosis.audit.fleet.page.svg import mark, sparkline, sprite
 from diagnosis.audit.fleet.page.trends import MOST, chosen, course, interest, level_words
-from diagnosis.audit.fleet.words import count
+from diagnosis.audit.fleet.trend_types import TrendRow
+from diagnosis.audit.fleet.words import count, verdict_label
+from diagnosis.audit.store.outcome import MissionState
 from diagnosis.pages import labels
 from diagnosis.pages.environment import SHARED, asset, environment
+from diagnosis.results.fault_rows import state_label
+from diagnosis.results.vocabulary import Verdict, part_words
+from replay.faults import FaultMode
 
 _HERE = Path(__file__).parent
 _FAULTS = 400
 _OPEN_ROWS = 40
+_FILTER = (Verdict.STOP, Verdict.WATCH, Verdict.READY, Verdict.NOT_ASSESSED)
 _UNITS = {"hours": "h", "days": "d"}
 _STATUS = {"new": "New", "recurring": "Recurring", "once": "Once", "past": "Past"}
 _DEFINITIONS = (
@@ -50,31 +58,32 @@ _DEFINITIONS = (
 )
 
 
-def build_fleet_page(document: Mapping[str, Any]) -> str:
+def build_fleet_page(found: FleetDocument) -> str:
     """Page of a fleet; the same document gives the same text.
 
     Parameters
     ----------
-    document : Mapping[str, Any]
+    found : FleetDocument
         From `diagnosis.audit.fleet.document.fleet_document`.
     """
-    trends = document["trends"]
-    document = labels.made_visible(_addressed(document))
-    trends = [{**t, "component": labels.visible(t["component"])} for t in trends]
+    document = shown(found)
+    trends: list[TrendRow] = [{**t, "component": labels.visible(t["component"])} for t in found["trends"]]
     axis = document["axis"]
     scripts = [asset(SHARED / "theme.js"), asset(_HERE / "fleet.js")]
-    told = [f for f in document["faults"] if f["status"] != "past"]
+    present = [f for f in document["faults"] if f["status"] != "past"]
     past = [f for f in document["faults"] if f["status"] == "past"]
-    shown = chosen(trends)
-    standing, own = _by_machine(told), _by_machine(trends)
+    drawn, standing = chosen(trends), _by_machine(present)
+    own: dict[int, list[TrendRow]] = defaultdict(list)
+    for t in trends:
+        own[t["machine"]].append(t)
     directions = {(t["machine"], t["component"], t["side"]): t["direction"] for t in trends}
-    context = {
+    context: Context = {
         "css": Markup(_css()),
         "csp": _policy(scripts),
         "head": Markup(scripts[0]),
         "script": Markup(scripts[1]),
         "sprite": sprite(),
-        "verdict": {**document["verdict"], "icon": rows.verdict_symbol(document["verdict"]["status"])},
+        "verdict": {**document["verdict"], "icon": document["verdict"]["status"].symbol},
         "counts": document["counts"],
         "span": _span(document["counts"]),
         "audit": _audit(document["audit"]),
@@ -82,17 +91,16 @@ def build_fleet_page(document: Mapping[str, Any]) -> str:
         "baseline": changes_of(document["baseline"]),
         "strip": rows.STRIP,
         "machines": [_machine(k, m, document, standing[k], own[k]) for k, m in enumerate(document["machines"])],
-        "faults": [_fault(f, document, directions) for f in told[:_FAULTS]],
-        "unlisted": max(0, len(told) - _FAULTS),
+        "faults": [_fault(f, document, directions) for f in present[:_FAULTS]],
+        "unlisted": max(0, len(present) - _FAULTS),
         "past": [_fault(f, document, directions) for f in past[:_FAULTS]],
         "past_count": len(past),
-        "trends": [course(t, document["machines"], _UNITS[axis]) for t in shown],
-        "quiet": len(trends) - len(shown),
-        "crowded": len(shown) == MOST,
+        "trends": [course(t, document["machines"], _UNITS[axis]) for t in drawn],
+        "quiet": len(trends) - len(drawn),
+        "crowded": len(drawn) == MOST,
         "matrix": matrix(document["machines"]),
         "groups": [(*g, len(document["missions"]) <= _OPEN_ROWS) for g in rows.groups(document)],
         "failures": [m for m in document["missions"] if m["verdict"] is None],
-        "states": rows.STATES,
         "definitions": _DEFINITIONS,
         "version": document["version"],
         "axis": {"hours": "driving hours of the audited missions", "days": "days"}[axis],
@@ -100,23 +108,10 @@ def build_fleet_page(document: Mapping[str, Any]) -> str:
     return _environment().get_template("fleet.html.j2").render(context)
 
 
-def _by_machine(found: Sequence[Mapping[str, Any]]) -> dict[int, list[Mapping[str, Any]]]:
-    out: dict[int, list[Mapping[str, Any]]] = defaultdict(list)
-    for f in found:
+def _by_machine(faults: Sequence[FleetFaultRow]) -> dict[int, list[FleetFaultRow]]:
+    out: dict[int, list[FleetFaultRow]] = defaultdict(list)
+    for f in faults:
         out[f["machine"]].append(f)
-    return out
-
-
-def _addressed(document: Mapping[str, Any]) -> dict[str, Any]:
-    """Document without its trends whose missions know their pages; names are made visible later, addresses stay."""
-    missions = [{**m, "address": rows.link(m.get("report"))} for m in document["missions"]]
-    out = {k: v for k, v in document.items() if k != "trends"} | {"missions": missions}
-    if out["baseline"] is not None:
-        changed = [
-            {**f, "address": rows.to_fault(rows.link(f["newer"]["report"]), f["newer"]["id"]) if f["newer"] else ""}
-            for f in out["baseline"]["faults"]
-        ]
-        out["baseline"] = {**out["baseline"], "faults": changed}
     return out
 
 
@@ -145,21 +140,21 @@ def _css() -> str:
 
 @lru_cache
 def _environment() -> jinja2.Environment:
-    found = environment(_HERE)
-    found.filters |= {"state": labels.state_label, "grouped": labels.grouped}
-    found.globals |= {"mark": mark}
-    return found
+    made = environment(_HERE)
+    made.filters |= {"state": state_label, "grouped": labels.grouped}
+    made.globals |= {"mark": mark, "verdicts": [(v, verdict_label(v)) for v in _FILTER]}
+    return made
 
 
-def _span(counts: Mapping[str, Any]) -> str:
-    days = [rows.day(counts[k]) for k in ("first_ns", "last_ns") if counts[k] is not None]
+def _span(counts: CountsRow) -> str:
+    days = [rows.day(start) for start in (counts["first_ns"], counts["last_ns"]) if start is not None]
     return "logs from " + " to ".join(dict.fromkeys(days)) if days else ""
 
 
-def _audit(audit: Mapping[str, Any]) -> str:
+def _audit(audit: AuditRow) -> str:
     run, made = audit["run"], audit["made_ns"]
-    told = [f"audit run {run}"] if run else []
-    return ", ".join([*told, f"newest result made {labels.utc(made)[:16]} UTC"] if made else told)
+    words = [f"audit run {run}"] if run else []
+    return ", ".join([*words, f"newest result made {labels.utc(made)[:16]} UTC"] if made else words)
 
 
 def _hours(seconds: float) -> str:
@@ -168,21 +163,19 @@ def _hours(seconds: float) -> str:
     return f"{seconds / 3600:.1f} h" if seconds >= 1800 else labels.span(seconds)
 
 
-def _kpis(document: Mapping[str, Any]) -> list[tuple[str, str, str]]:
+def _kpis(document: ShownDocument) -> list[tuple[str, str, str]]:
     """Value, what it is, and what belongs to it."""
     c = document["counts"]
-    unread = [
-        f"{labels.grouped(c['states'][s])} {w}" for s, w in rows.STATES.items() if s != "ok" and c["states"].get(s)
-    ]
+    unread = [f"{labels.grouped(c['states'][s])} {s.words}" for s in MissionState if s.words and c["states"].get(s)]
     rest = [
-        f"{labels.grouped(c[k])} {w}"
-        for k, w in (
-            ("not_assessed", "not assessed"),
-            ("pending", "not audited yet"),
-            ("copies", "copies"),
-            ("gone", "logs no longer there"),
+        f"{labels.grouped(n)} {words}"
+        for n, words in (
+            (c["not_assessed"], "not assessed"),
+            (c["pending"], MissionState.PENDING.words),
+            (c["copies"], "copies"),
+            (c["gone"], "logs no longer there"),
         )
-        if c[k]
+        if n
     ]
     judged = sum(len(m["missions"]) + len(m["undated"]) for m in document["machines"])
     share = f"{100 * c['with_faults'] / judged:.0f} % of those judged" if judged else "none judged"
@@ -208,33 +201,34 @@ def _kpis(document: Mapping[str, Any]) -> list[tuple[str, str, str]]:
     ]
 
 
-def _coverage(machines: Sequence[Mapping[str, Any]]) -> str:
+def _coverage(machines: Sequence[MachineRow]) -> str:
     """What the machines' last missions assessed; not known where the last one may be one without a date or a report."""
     blind = sum(p["assessed_last"] is False for m in machines for p in m["parts"])
     dark = sum(
         not m["parts"] or m["unjudged"] > 0 or any(p["assessed_last"] is None for p in m["parts"]) for m in machines
     )
-    told = [f"{count(blind, 'part')} not assessed in the last mission"] if blind else []
-    told += [f"{'' if blind else 'last mission '}not known of {count(dark, 'machine')}"] if dark else []
-    return ", ".join(told) or "every part assessed in the last mission"
+    words = [f"{count(blind, 'part')} not assessed in the last mission"] if blind else []
+    words += [f"{'' if blind else 'last mission '}not known of {count(dark, 'machine')}"] if dark else []
+    return ", ".join(words) or "every part assessed in the last mission"
 
 
 def _machine(
     k: int,
-    m: Mapping[str, Any],
-    document: Mapping[str, Any],
-    standing: Sequence[Mapping[str, Any]],
-    trends: Sequence[Mapping[str, Any]],
-) -> dict[str, Any]:
+    m: MachineRow,
+    document: ShownDocument,
+    standing: Sequence[FleetFaultRow],
+    trends: Sequence[TrendRow],
+) -> Context:
     leading = max((t for t in trends if t["line"] is not None), key=interest, default=None)
+    line = leading["line"] if leading else None
     judged = len(m["missions"]) + len(m["undated"])
-    words, symbol = m["standing"], rows.verdict_symbol(m["verdict"])
-    if m["verdict"] == "watch" and not standing:
+    words, symbol = m["standing"], m["verdict"].symbol
+    if m["verdict"] is Verdict.WATCH and not standing:
         symbol = "warning"  # a damaged log
-    if m["verdict"] == "ready" and standing:
+    if m["verdict"] is Verdict.READY and standing:
         often = any(f["status"] == "recurring" for f in standing)
         words, symbol = f"Ready, fault {'comes and goes' if often else 'seen lately'}", "warning"
-    elif m["verdict"] == "ready" and any(t["approaching"] for t in trends):
+    elif m["verdict"] is Verdict.READY and any(t["approaching"] for t in trends):
         words, symbol = "Ready, limit comes near", "warning"
     return {
         "label": m["label"],
@@ -250,10 +244,10 @@ def _machine(
         "with_faults": m["with_faults"],
         "judged": judged,
         "trend": sparkline(leading) if leading else "",
-        "trend_words": f"{leading['component']} {labels.part(leading['kind'], leading['side'])}: {level_words(leading)}"
-        if leading
+        "trend_words": f"{part_words(leading['kind'], leading['component'], leading['side'])}: {level_words(leading, line)}"
+        if leading and line
         else "",
-        "level": leading["line"]["level"]["value"] if leading else -1.0,
+        "level": line["level"]["value"] if line else -1.0,
         "driven": _hours(m["driving_s"]),
         "driving_s": m["driving_s"],
         "decided": "–" if m["decided"] is None else f"{100 * m['decided']:.0f} %",
@@ -262,30 +256,28 @@ def _machine(
     }
 
 
-def _fault(
-    f: Mapping[str, Any], document: Mapping[str, Any], directions: Mapping[tuple[int, str, str], str]
-) -> dict[str, Any]:
-    first, last = (document["missions"][f[k]] for k in ("first", "last"))
+def _fault(f: FleetFaultRow, document: ShownDocument, directions: Mapping[tuple[int, str, str], str]) -> Context:
+    first, last = (document["missions"][place] for place in (f["first"], f["last"]))
     e = f["epsilon"]
-    told = []
-    if e and f["mode"] == "inefficient":
-        told.append(f"ε̂ {e['value']:.2f} ({e['low']:.2f} to {e['high']:.2f})".replace("-", "−"))
+    notes = []
+    if e and f["mode"] == FaultMode.INEFFICIENT:
+        notes.append(f"ε̂ {e['value']:.2f} ({e['low']:.2f} to {e['high']:.2f})".replace("-", "−"))
         direction = directions.get((f["machine"], f["component"], f["side"]), "not_known")
-        told += [direction] if direction != "not_known" else []
+        notes += [direction] if direction != "not_known" else []
     if f["since"]:
         last_ones = f"last {count(f['since'], 'mission')}" if f["since"] > 1 else "last mission"
-        told.append(f"not in the {last_ones} that assessed it")
+        notes.append(f"not in the {last_ones} that assessed it")
     return {
         "machine": document["machines"][f["machine"]]["label"],
         "symbol": labels.known(f["mode"]),
-        "words": labels.state_label(f["mode"], f["side"]),
-        "part": f"{f['component']} {labels.part(f['kind'], f['side'])}",
+        "words": state_label(f["mode"], f["side"]),
+        "part": part_words(f["kind"], f["component"], f["side"]),
         "severity": f["severity"],
         "status": _STATUS[f["status"]],
         "kind": f["status"],
         "count": f"{f['missions']} of {f['assessed']}",
         "first": rows.day(first.get("start_ns")),
         "last": rows.day(last.get("start_ns")),
-        "address": rows.to_fault(last["address"], f["last_id"]),
-        "told": ", ".join(told) or "–",
+        "address": fault_address(last["address"], f["last_id"]),
+        "course": ", ".join(notes) or "–",
     }

@@ -3,65 +3,44 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Iterator, Mapping, Sequence
-from pathlib import PurePosixPath
-from typing import Any
-from urllib.parse import quote
+from collections.abc import Iterator, Sequence
 
 from markupsafe import Markup, escape
 
+from diagnosis.audit.fleet.fault_types import FleetFaultRow, MissionFaultRow
+from diagnosis.audit.fleet.fleet_types import MachineRow
+from diagnosis.audit.fleet.page.shown import ShownDocument, ShownMission
 from diagnosis.audit.fleet.page.svg import mark
+from diagnosis.audit.fleet.words import verdict_label
+from diagnosis.audit.store.outcome import MissionState
 from diagnosis.pages import labels
+from diagnosis.results.fault_rows import state_label
+from diagnosis.results.vocabulary import Verdict, part_words
+from replay.faults import FaultMode
 
 STRIP = 14
-STATES = {
-    "ok": "",
-    "degraded": "degraded",
-    "unreadable": "unreadable",
-    "timeout": "took too long",
-    "out_of_memory": "out of memory",
-    "crashed": "crashed",
-    "pending": "not audited yet",
-}
-VERDICTS = {"stop": "Stop and repair", "watch": "Watch", "ready": "Ready", "not_assessed": "Not assessed"}
-_ICONS = {"stop": "stuck", "watch": "inefficient", "ready": "healthy", "not_assessed": "not_assessed"}
 
 
-def link(report: str | None) -> str:
-    """Address of a mission's page below this one; empty where the folder is none below this one."""
-    if not report:
-        return ""
-    path = PurePosixPath(report)
-    if path.is_absolute() or ".." in path.parts:
-        return ""
-    return quote(f"{report}/report.html", safe="/", errors="backslashreplace")
-
-
-def to_fault(address: str, fault: str) -> str:
-    """Address of a fault in a mission's page."""
-    return f"{address}#fault={quote(fault, safe='')}" if address else ""
-
-
-def symbol(mission: Mapping[str, Any]) -> str:
+def symbol(mission: ShownMission) -> str:
     """Symbol of a mission: its worst fault, healthy, not assessed, or a warning where there is no report."""
-    if mission["verdict"] is None:
+    verdict = mission["verdict"]
+    if verdict is None:
         return "warning"
     if mission["faults"]:
         return labels.known(mission["faults"][0]["mode"])
-    return _ICONS.get(mission["verdict"], "not_assessed") if mission["verdict"] != "watch" else "warning"
+    return "warning" if verdict == Verdict.WATCH else Verdict(verdict).symbol
 
 
-def verdict_symbol(verdict: str) -> str:
-    """Symbol of a verdict."""
-    return _ICONS.get(verdict, "not_assessed")
-
-
-def fault_words(fault: Mapping[str, Any]) -> str:
+def fault_words(fault: FleetFaultRow | MissionFaultRow) -> str:
     """Part, mode and size in few words: ``RL drive valve inefficient 12 %``."""
-    words = f"{fault['component']} {labels.part(fault['kind'], fault['side'])} "
-    words += labels.state_label(fault["mode"], fault["side"]).lower()
-    e = fault.get("epsilon")
-    return words + (f" {100 * e['value']:.0f} %" if e and fault["mode"] == "inefficient" else "")
+    words = part_words(fault["kind"], fault["component"], fault["side"])
+    words += f" {state_label(fault['mode'], fault['side']).lower()}"
+    e = fault["epsilon"]
+    return words + (f" {100 * e['value']:.0f} %" if e and fault["mode"] == FaultMode.INEFFICIENT else "")
+
+
+def _verdict_words(verdict: Verdict | None) -> str:
+    return "" if verdict is None else verdict_label(verdict)
 
 
 def day(start_ns: int | None) -> str:
@@ -69,7 +48,7 @@ def day(start_ns: int | None) -> str:
     return labels.utc(start_ns)[:10] if start_ns is not None else "no date"
 
 
-def strip(missions: Sequence[Mapping[str, Any]], machine: Mapping[str, Any]) -> Markup:
+def strip(missions: Sequence[ShownMission], machine: MachineRow) -> Markup:
     """The last missions, oldest first, then apart those of unknown order and those that were not read."""
     dated = [missions[k] for k in machine["missions"]]
     shown = Markup("").join(_cell(m) for m in dated[-STRIP:])
@@ -83,12 +62,12 @@ def strip(missions: Sequence[Mapping[str, Any]], machine: Mapping[str, Any]) -> 
     return Markup('<div class="cells">{}{}</div>').format(shown, extra)
 
 
-def _cell(m: Mapping[str, Any]) -> Markup:
+def _cell(m: ShownMission) -> Markup:
     state, address = symbol(m), m["address"]
     faults = m["faults"]
-    told = fault_words(faults[0]) if faults else STATES.get(m["state"]) or VERDICTS.get(m["verdict"] or "", "")
+    found = fault_words(faults[0]) if faults else m["state"].words or _verdict_words(m["verdict"])
     more = f" and {len(faults) - 1} more" if len(faults) > 1 else ""
-    words = f"{day(m.get('start_ns'))}: {told}{more}"
+    words = f"{day(m.get('start_ns'))}: {found}{more}"
     inner = Markup('<svg><use href="#g-{}"/></svg>').format(state)
     if not address:
         return Markup('<span class="c {}" role="img" aria-label="{}" title="{}">{}</span>').format(
@@ -97,12 +76,12 @@ def _cell(m: Mapping[str, Any]) -> Markup:
     return Markup('<a class="c {}" href="{}" title="{}">{}</a>').format(state, address, words, inner)
 
 
-def groups(document: Mapping[str, Any]) -> Iterator[tuple[str, str, int, Markup]]:
+def groups(document: ShownDocument) -> Iterator[tuple[str, str, int, Markup]]:
     """Name of a machine, what its missions add up to, their number, and their rows, newest first."""
     missions = document["missions"]
-    copies: dict[int, list[Mapping[str, Any]]] = defaultdict(list)
+    copies: dict[int, list[ShownMission]] = defaultdict(list)
     for c in missions:
-        if c.get("copy_of") and c["verdict"] is not None:
+        if c.get("copy_of") and c["verdict"] is not None and c["machine"] is not None:
             copies[c["machine"]].append(c)
     for k, m in enumerate(document["machines"]):
         rows = [missions[i] for i in (*reversed(m["missions"]), *m["undated"], *m["failed"])] + copies[k]
@@ -118,7 +97,7 @@ def groups(document: Mapping[str, Any]) -> Iterator[tuple[str, str, int, Markup]
         )
 
 
-def _row(m: Mapping[str, Any]) -> str:
+def _row(m: ShownMission) -> str:
     """One mission; its class is what the selection above the list asks for."""
     verdict, faults, address = m["verdict"], m["faults"], m["address"]
     name = escape(m["name"])
@@ -130,20 +109,20 @@ def _row(m: Mapping[str, Any]) -> str:
     ]
     if m.get("open_loop"):
         notes.append("faults injected")
-    if m["state"] == "degraded":
+    if m["state"] is MissionState.DEGRADED:
         notes.append(m["reason"])
     note = f'<div class="small muted">{escape("; ".join(notes))}</div>' if notes else ""
     start, driving = m.get("start_ns"), m.get("driving_s")
-    told = "; ".join(fault_words(f) for f in faults[:2]) + (f" +{len(faults) - 2}" if len(faults) > 2 else "")
+    words = "; ".join(fault_words(f) for f in faults[:2]) + (f" +{len(faults) - 2}" if len(faults) > 2 else "")
     if verdict is None:
-        kind, told = ("pending" if m["state"] == "pending" else "failed"), m["reason"]
-        status = f"{mark('warning')}{STATES.get(m['state'], m['state']).capitalize()}"
+        kind, words = ("pending" if m["state"] is MissionState.PENDING else "failed"), m["reason"]
+        status = f"{mark('warning')}{m['state'].words.capitalize()}"
     else:
-        kind = verdict
-        status = f"{mark(symbol(m))}{VERDICTS.get(verdict, verdict)}"
-    kind += " degraded" if m["state"] == "degraded" else ""
+        kind = verdict.value
+        status = f"{mark(symbol(m))}{verdict_label(verdict)}"
+    kind += " degraded" if m["state"] is MissionState.DEGRADED else ""
     return (
         f'<tr class="{kind}"><td>{head}{note}</td><td>{labels.utc(start)[:16] if start is not None else "no date"}</td>'
         f'<td class="num">{labels.span(driving) if driving is not None else "–"}</td>'
-        f'<td><span class="st">{status}</span></td><td>{escape(told)}</td></tr>\n'
+        f'<td><span class="st">{status}</span></td><td>{escape(words)}</td></tr>\n'
     )

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
-from typing import Any
+from collections.abc import Sequence
 
 import numpy as np
 from markupsafe import Markup
 from numpy.typing import NDArray
 from scipy.special import stdtrit
 
+from diagnosis.audit.fleet.trend_types import ChangePointRow, ForecastRow, LineRow, TrendRow
 from diagnosis.pages.axes import Frame, label
 from diagnosis.pages.labels import number
 from diagnosis.pages.svg import icon
@@ -37,7 +37,7 @@ def mark(state: str) -> Markup:
     return Markup('<span class="ic {0}" aria-hidden="true"><svg><use href="#g-{0}"/></svg></span>').format(state)
 
 
-def sparkline(trend: Mapping[str, Any]) -> Markup:
+def sparkline(trend: TrendRow) -> Markup:
     """Values of a trend and its limit in little room."""
     values = np.array([p[2] for p in trend["points"]], dtype=np.float64)
     values = values[::-1][:: max(1, math.ceil(values.size / _SPARK))][::-1]
@@ -54,12 +54,12 @@ def sparkline(trend: Mapping[str, Any]) -> Markup:
     ).format(limit, d, float(x[-1]), float(y[-1]))
 
 
-def trend_picture(trend: Mapping[str, Any], title: str, unit: str) -> Markup:
+def trend_picture(trend: TrendRow, title: str, unit: str) -> Markup:
     """Estimates with 95 % bounds, the last stretch's line with its 90 % band, and where that meets the limit.
 
     Parameters
     ----------
-    trend : Mapping[str, Any]
+    trend : TrendRow
         One of the document's trends.
     title : str
         What it is, for those who do not see it.
@@ -69,7 +69,7 @@ def trend_picture(trend: Mapping[str, Any], title: str, unit: str) -> Markup:
     every = max(1, math.ceil(len(trend["points"]) / _MOST_POINTS))
     points = np.array([p[1:] for p in trend["points"]], dtype=np.float64)
     now, limit, f = trend["now"], trend["limit"], trend["forecast"]
-    ahead = next((f[k] for k in ("latest", "likely", "soonest") if f[k] is not None), 0.0)
+    ahead = next((v for v in (f["latest"], f["likely"], f["soonest"]) if v is not None), 0.0)
     end = max(now + min(1.15 * ahead, f["horizon"]), 1.06 * now, 1e-9)
     values = points[:, 1]
     high = max(limit, float(values.max()), min(1.0, float(np.percentile(points[:, 3], 90))))
@@ -83,7 +83,7 @@ def trend_picture(trend: Mapping[str, Any], title: str, unit: str) -> Markup:
         parts.append(frame.line(now, "now"))
     parts += [_change(frame, points, c) for c in trend["changes"]]
     if trend["line"] is not None:
-        parts += _line(frame, trend, points, end)
+        parts += _line(frame, trend, trend["line"], points, end)
     parts += _points(frame, points, trend["outliers"], every)
     if f["state"] == "crossing":
         parts.append(_crossing(frame, limit, now, f, end))
@@ -93,7 +93,7 @@ def trend_picture(trend: Mapping[str, Any], title: str, unit: str) -> Markup:
     )
 
 
-def _change(frame: Frame, points: Array, change: Mapping[str, Any]) -> Markup:
+def _change(frame: Frame, points: Array, change: ChangePointRow) -> Markup:
     k = change["index"]
     place = 0.5 * (points[k - 1, 0] + points[k, 0]) if k else points[0, 0]
     sign = {"drop": "↓", "rise": "↑"}.get(change["kind"], "∠")
@@ -111,9 +111,9 @@ def _points(frame: Frame, points: Array, outliers: Sequence[int], every: int) ->
     return [*out, Markup('<path class="odd" d="{}"/>').format(odd)] if odd else out
 
 
-def _line(frame: Frame, trend: Mapping[str, Any], points: Array, end: float) -> list[Markup]:
+def _line(frame: Frame, trend: TrendRow, line: LineRow, points: Array, end: float) -> list[Markup]:
     """Line and band of the last stretch; dashed from now on."""
-    line, now, first = trend["line"], trend["now"], trend["first"]
+    now, first = trend["now"], trend["first"]
     begin = float(points[first, 0])
     stop = now if trend["forecast"]["state"] == "not_known" else end
     x = np.linspace(begin, stop, 40)
@@ -139,9 +139,9 @@ def _line(frame: Frame, trend: Mapping[str, Any], points: Array, end: float) -> 
     return out
 
 
-def _crossing(frame: Frame, limit: float, now: float, f: Mapping[str, Any], end: float) -> Markup:
+def _crossing(frame: Frame, limit: float, now: float, f: ForecastRow, end: float) -> Markup:
     """Bar on the limit from the soonest to the latest crossing, open where that is not known, with the likely one."""
-    y, a = float(frame.py(limit)), float(frame.px(now + f["soonest"]))
+    y, a = float(frame.py(limit)), float(frame.px(now + (f["soonest"] or 0.0)))
     b = float(frame.px(min(end, now + f["latest"]))) if f["latest"] is not None else frame.right
     out = Markup('<path class="when{}" d="M{:.1f} {:.1f}H{:.1f}"/>').format(
         "" if f["latest"] is not None else " open", a, y, b

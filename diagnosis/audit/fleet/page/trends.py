@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import Any
+from collections.abc import Sequence
 
+from diagnosis.audit.fleet.fleet_types import MachineRow
+from diagnosis.audit.fleet.page.shown import Context
 from diagnosis.audit.fleet.page.svg import trend_picture
+from diagnosis.audit.fleet.trend_types import LineRow, TrendRow
 from diagnosis.audit.fleet.words import count
-from diagnosis.pages import labels
+from diagnosis.results.vocabulary import part_words
 
 MOST = 48
 
 
-def interest(t: Mapping[str, Any]) -> tuple[bool, float, float]:
+def interest(t: TrendRow) -> tuple[bool, float, float]:
     """What should be seen first: limits that come near, soonest first, then large losses."""
     likely = t["forecast"]["likely"]
     level = t["line"]["level"]["value"] if t["line"] else t["points"][-1][2]
@@ -20,17 +22,17 @@ def interest(t: Mapping[str, Any]) -> tuple[bool, float, float]:
     return above or t["approaching"], level if above else -(likely or 0.0) if t["approaching"] else 0.0, level
 
 
-def level_words(t: Mapping[str, Any]) -> str:
-    """Loss that the trend gives for now, and where it goes."""
-    level = t["line"]["level"]
+def level_words(t: TrendRow, line: LineRow) -> str:
+    """Loss that the line of a trend gives for now, and where it goes."""
+    level = line["level"]
     return f"ε̂ {level['value']:.2f}".replace("-", "−") + (
         f", {t['direction']}" if t["direction"] != "not_known" else ""
     )
 
 
-def chosen(trends: Sequence[Mapping[str, Any]]) -> list[Mapping[str, Any]]:
-    """Trends with something to tell, the most urgent first."""
-    told = [
+def chosen(trends: Sequence[TrendRow]) -> list[TrendRow]:
+    """Trends that rise, change or come near their limit, the most urgent first."""
+    found = [
         t
         for t in trends
         if t["approaching"]
@@ -39,31 +41,31 @@ def chosen(trends: Sequence[Mapping[str, Any]]) -> list[Mapping[str, Any]]:
         or t["outliers"]
         or (t["direction"] == "rising" and t["forecast"]["likely"] is not None)
     ]
-    return sorted(told, key=interest, reverse=True)[:MOST]
+    return sorted(found, key=interest, reverse=True)[:MOST]
 
 
-def course(t: Mapping[str, Any], machines: Sequence[Mapping[str, Any]], unit: str) -> dict[str, Any]:
+def course(t: TrendRow, machines: Sequence[MachineRow], unit: str) -> Context:
     """Title, picture and words of one course."""
-    title = f"{machines[t['machine']]['label']} · {t['component']} {labels.part(t['kind'], t['side'])}"
+    title = f"{machines[t['machine']]['label']} · {part_words(t['kind'], t['component'], t['side'])}"
     line = t["line"]
-    told = []
+    notes = []
     if line is not None:
         per = 10 if unit == "h" else 30
-        low, high = (f"{per * line['slope'][k]:+.3f}".replace("-", "−") for k in ("low", "high"))
+        low, high = (f"{per * v:+.3f}".replace("-", "−") for v in (line["slope"]["low"], line["slope"]["high"]))
         level = line["level"]
-        told.append(
+        notes.append(
             f"ε̂ now {level['value']:.3f} ({level['low']:.3f} to {level['high']:.3f}), {low} to {high} per {per} {unit} (95 %)".replace(
                 "-", "−"
             )
         )
-    told += [
+    notes += [
         {"drop": "falls by {:.2f}: repaired?", "rise": "rises by {:.2f} at once", "bend": "the slope changes"}[
             c["kind"]
         ].format(abs(c["size"]))
         for c in t["changes"]
     ]
     if t["outliers"]:
-        told.append(f"{count(len(t['outliers']), 'mission')} set aside")
+        notes.append(f"{count(len(t['outliers']), 'mission')} set aside")
     words = t["forecast"]["words"]
     state = "above" if t["forecast"]["state"] == "above" else "near" if t["approaching"] else "calm"
     return {
@@ -71,5 +73,5 @@ def course(t: Mapping[str, Any], machines: Sequence[Mapping[str, Any]], unit: st
         "state": state,
         "picture": trend_picture(t, title, unit),
         "words": words[:1].upper() + words[1:],
-        "more": "; ".join(told),
+        "more": "; ".join(notes),
     }

@@ -1,0 +1,312 @@
+"""`fleet.json` as types, schema ``mfhca-fleet/1``: the document that fleet page, table, comparison and scripts read.
+
+Fields may be added within the schema, none renamed or removed, nor change their meaning. Lengths are in seconds and
+metres, ε and shares plain numbers, times nanoseconds since 1970; what is not known is null. A *place* is an index into the
+document's list ``machines`` or ``missions``. Kinds, sides and modes are the words of the missions' reports, which may be
+of other versions of the tool.
+"""
+
+from __future__ import annotations
+
+from typing import Literal, NotRequired, TypedDict
+
+from diagnosis.audit.fleet.fault_types import FaultChangeRow, FleetFaultRow, MissionFaultRow
+from diagnosis.audit.fleet.trend_types import Axis, TrendRow
+from diagnosis.audit.store.outcome import MissionState
+from diagnosis.results.vocabulary import Verdict
+
+SCHEMA = "mfhca-fleet/1"
+
+
+class AuditRow(TypedDict):
+    """The audit run: its number in this store, and when its newest result was made."""
+
+    run: int | None
+    made_ns: int | None
+
+
+class FleetVerdictRow(TypedDict):
+    """Verdict on the fleet: the worst machine's, a few words, a sentence, and the sentences behind it."""
+
+    status: Verdict
+    tag: str
+    title: str
+    text: list[str]
+
+
+class CountsRow(TypedDict):
+    """Numbers of machines, missions and faults.
+
+    Attributes
+    ----------
+    machines, missions : int
+        All of them.
+    states : dict[str, int]
+        How missions ended.
+    not_assessed : int
+        Missions that were read, but in which nothing could be assessed.
+    unknown : int
+        Missions that were not judged, are perhaps newer than what was, and of no known machine.
+    pending : int
+        Missions that are not audited yet.
+    copies : int
+        Missions whose log stands under another name too.
+    gone : int
+        Missions whose log is no longer there.
+    undated : int
+        Missions whose clock does not know the date or is more than a day ahead, or with another one of the machine that
+        starts at the same moment.
+    with_faults : int
+        Missions with a fault.
+    driving_s, distance_m : float
+        Of all judged missions.
+    decided : float or None
+        Share of the driving time that was judged.
+    faults : dict[str, int]
+        Number of faults by `Status`.
+    first_ns, last_ns : int or None
+        Start of the first and last dated mission.
+    """
+
+    machines: int
+    missions: int
+    states: dict[str, int]
+    not_assessed: int
+    unknown: int
+    pending: int
+    copies: int
+    gone: int
+    undated: int
+    with_faults: int
+    driving_s: float
+    distance_m: float
+    decided: float | None
+    faults: dict[str, int]
+    first_ns: int | None
+    last_ns: int | None
+
+
+class PartRow(TypedDict):
+    """One component and side of a machine: missions that assessed it, the last one among them, and missions by mode."""
+
+    component: str
+    side: str
+    kind: str
+    assessed: int
+    assessed_last: bool | None
+    modes: dict[str, int]
+
+
+class MachineRow(TypedDict):
+    """One machine.
+
+    Attributes
+    ----------
+    id, name, label : str
+        Identity and name, either may be empty, and what to call it.
+    verdict : Verdict
+        Where it stands.
+    standing : str
+        The same in words.
+    last_verdict : Verdict
+        Of its last judged mission.
+    last_judged_ns : int or None
+        Start of that mission.
+    cleared : bool or None
+        Whether that mission's report lets it go out, and that of each which may be later; null: not said.
+    unjudged : int
+        Missions that were not judged and may be later: such a machine is not ``ready``.
+    note : str
+        What limits that; may be empty.
+    missions, undated, failed : list[int]
+        Places of its missions: those with a date in its order, those without, and those without a report.
+    with_faults : int
+        Missions with a fault.
+    driving_s : float
+        Of all judged missions.
+    decided : float or None
+        Share of the driving time that was judged.
+    min_epsilon : float
+        Limit of ε.
+    parts : list[PartRow]
+        Its components and sides.
+    """
+
+    id: str
+    name: str
+    label: str
+    verdict: Verdict
+    standing: str
+    last_verdict: Verdict
+    last_judged_ns: int | None
+    cleared: bool | None
+    unjudged: int
+    note: str
+    missions: list[int]
+    undated: list[int]
+    failed: list[int]
+    with_faults: int
+    driving_s: float
+    decided: float | None
+    min_epsilon: float
+    parts: list[PartRow]
+
+
+class MissionRow(TypedDict):
+    """One mission; what comes from its result is not there where it is not audited yet.
+
+    Attributes
+    ----------
+    name : str
+        Of the mission.
+    files : list[str]
+        Its files, relative to the store's folder, or URLs.
+    bytes : int
+        Their size.
+    gone : bool
+        Whether the log is no longer there.
+    machine : int or None
+        Place of the machine.
+    state, reason
+        How its audit ended, or ``pending``.
+    verdict : Verdict or None
+        Null where there is no report.
+    faults : list[MissionFaultRow]
+        Those of at least low severity, worst first.
+    title : str
+        The verdict in words.
+    start_ns, duration_s, driving_s, distance_m
+        From its report.
+    open_loop : bool
+        Whether faults were injected into the log.
+    attempts : int
+        Attempts at it.
+    version : str
+        Of the tool that judged it.
+    report : str or None
+        Folder of the report.
+    first_run : int or None
+        Audit run that judged it first; null: not known.
+    copy_of : str or None
+        Name of the mission that this one is a copy of.
+    """
+
+    name: str
+    files: list[str]
+    bytes: int
+    gone: bool
+    machine: int | None
+    state: MissionState
+    reason: str
+    verdict: Verdict | None
+    faults: list[MissionFaultRow]
+    title: NotRequired[str]
+    start_ns: NotRequired[int | None]
+    duration_s: NotRequired[float | None]
+    driving_s: NotRequired[float | None]
+    distance_m: NotRequired[float | None]
+    open_loop: NotRequired[bool]
+    attempts: NotRequired[int]
+    version: NotRequired[str]
+    report: NotRequired[str | None]
+    first_run: NotRequired[int | None]
+    copy_of: NotRequired[str | None]
+
+
+class CoverageChangeRow(TypedDict):
+    """A part that was assessed in the last mission of one of two audits alone."""
+
+    machine: str
+    component: str
+    kind: str
+    side: str
+    change: Literal["lost", "gained"]
+
+
+class VerdictChangeRow(TypedDict):
+    """A machine with another verdict than in the earlier audit."""
+
+    machine: str
+    older: Verdict
+    newer: Verdict
+
+
+class MachineChangesRow(TypedDict):
+    """Labels of machines that are new and missing, and changed verdicts."""
+
+    new: list[str]
+    missing: list[str]
+    changed: list[VerdictChangeRow]
+
+
+class MissionChangesRow(TypedDict):
+    """Numbers of missions, and names that the later audit lacks where both hold some of the same missions."""
+
+    older: int
+    newer: int
+    new: int
+    missing: list[str]
+
+
+class BaselineRow(TypedDict):
+    """An audit against an earlier one; see `diagnosis.audit.fleet.compare`.
+
+    Attributes
+    ----------
+    worse : bool
+        Whether a fault is new or worse, or machines or missions are missing.
+    counts : dict[str, int]
+        Number of faults by `FaultChange`.
+    missions, machines
+        Which are new, missing or changed.
+    faults : list[FaultChangeRow]
+        Faults of either audit.
+    coverage : list[CoverageChangeRow]
+        Parts that are assessed no longer, or now.
+    """
+
+    worse: bool
+    counts: dict[str, int]
+    missions: MissionChangesRow
+    machines: MachineChangesRow
+    faults: list[FaultChangeRow]
+    coverage: list[CoverageChangeRow]
+
+
+class FleetDocument(TypedDict):
+    """`fleet.json`.
+
+    Attributes
+    ----------
+    schema, version : str
+        Of the document and of the tool.
+    axis : Axis
+        Of the trends.
+    audit, verdict, counts
+        Of the whole fleet.
+    machines : list[MachineRow]
+        Worst first.
+    faults : list[FleetFaultRow]
+        Of all machines, in their order.
+    trends : list[TrendRow]
+        Of all machines, in their order.
+    missions : list[MissionRow]
+        By machine and time.
+    baseline : BaselineRow or None
+        What changed against another audit.
+    mark : str
+        Of the store's content when the document was begun; another mark there means that it is out of date.
+    """
+
+    schema: str
+    version: str
+    axis: Axis
+    audit: AuditRow
+    verdict: FleetVerdictRow
+    counts: CountsRow
+    machines: list[MachineRow]
+    faults: list[FleetFaultRow]
+    trends: list[TrendRow]
+    missions: list[MissionRow]
+    baseline: BaselineRow | None
+    mark: NotRequired[str]
