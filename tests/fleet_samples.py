@@ -120,7 +120,11 @@ def write_report(folder: Path, name: str, cleared: bool | None = None, **limits:
     place = folder / "missions" / name
     place.mkdir(parents=True, exist_ok=True)
     machine = {"wheels": WHEELS, "axles": AXLES}
-    said = {"limits": {"min_epsilon": 0.1, "min_assessed": 10.0, **limits}, "machine": machine, "verdict": {"cleared": cleared}}
+    said = {
+        "limits": {"min_epsilon": 0.1, "min_assessed": 10.0, **limits},
+        "machine": machine,
+        "verdict": {"cleared": cleared},
+    }
     (place / "report.json").write_text(json.dumps(said), encoding="utf-8")
     (place / "report.html").write_text(f"<title>{len(name)}</title>", encoding="utf-8")
 

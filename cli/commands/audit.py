@@ -8,7 +8,7 @@ from contextlib import suppress
 from dataclasses import replace
 from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -214,7 +214,7 @@ def _run(
     from cli.terminal.audit_progress import shown_progress
     from diagnosis.audit import engines
     from diagnosis.audit.endings import NOT_READ, exit_code
-    from diagnosis.audit.events import EventLog
+    from diagnosis.audit.events import EventFacts, EventLog
     from diagnosis.audit.session import Audited, audit
 
     log = EventLog(None if events == "-" else Path(events)) if events else None
@@ -222,10 +222,10 @@ def _run(
     try:
         with shown_progress(terminal) as show:
 
-            def tell(event: str, facts: dict[str, Any]) -> None:
+            def tell(event: str, facts: EventFacts) -> None:
                 show(event, facts)
                 if log is not None and event != "tick":
-                    log.tell(event, facts)
+                    log.write(event, facts)
 
             for text in (*found.problems, *found.notes):
                 tell("problem", {"reason": text})
@@ -249,7 +249,7 @@ def _run(
             terminal.note("what is finished is kept; the same command again does the rest")
         if log is not None:
             with suppress(OutputError):
-                log.tell("stopped", {"reason": str(error) or "interrupted"})
+                log.write("stopped", {"reason": str(error) or "interrupted"})
         raise
     finally:
         if log is not None:

@@ -60,8 +60,8 @@ def summary_parts(audited: Audited, found: Discovery, output: Path) -> list[Rend
         worst = sorted(machines.items(), key=lambda m: (-m[1]["stop"], -m[1]["watch"], m[0]))
         rows_ = [(name, str(c["stop"] or "–"), str(c["watch"] or "–")) for name, c in worst[:_MACHINES]]
         parts += [section("Worst machines"), table(("machine", "stop", "watch"), rows_, right=(1, 2))]
-    verdicts = Counter(end.verdict for end in ends)
-    states = Counter(end.state for end in ends)
+    verdicts: Counter[str | None] = Counter(end.verdict for end in ends)
+    states: Counter[str] = Counter(end.state for end in ends)
     counted = [Text.assemble((str(verdicts[v]), s), f" {_VERDICTS[v]}") for v, s in _verdict_styles() if verdicts[v]]
     counted += [text(f"{n} {s.replace('_', ' ')}") for s, n in sorted(states.items()) if s not in _READ]
     parts += [section("Missions"), Text(" · ").join(counted)]

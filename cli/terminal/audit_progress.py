@@ -7,13 +7,12 @@ import time
 from collections import Counter
 from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import Any
 
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
 
 from cli.terminal.console import Terminal
 from cli.terminal.streams import clean, console_of
-from diagnosis.audit.events import Tell
+from diagnosis.audit.events import Emit, EventFacts
 
 _LINE_S = 10.0
 _SIGNS = {"ok": "ok", "degraded": "degraded", "out_of_memory": "out of memory"}
@@ -27,7 +26,7 @@ class Counted:
         self.states: Counter[str] = Counter()
         self.start = time.monotonic()
 
-    def take(self, event: str, facts: dict[str, Any]) -> None:
+    def take(self, event: str, facts: EventFacts) -> None:
         """Count an event."""
         if event == "start":
             self.total = facts["missions"]
@@ -50,7 +49,7 @@ class Counted:
 
 
 @contextmanager
-def shown_progress(terminal: Terminal) -> Iterator[Tell]:
+def shown_progress(terminal: Terminal) -> Iterator[Emit]:
     """Give a function that shows events."""
     counted = Counted()
     if terminal.quiet or not sys.stderr.isatty():
@@ -60,17 +59,17 @@ def shown_progress(terminal: Terminal) -> Iterator[Tell]:
     with Progress(*columns, console=console_of(sys.stderr), transient=True) as bar:
         line = bar.add_task("", total=None)
 
-        def show(event: str, facts: dict[str, Any]) -> None:
+        def show(event: str, facts: EventFacts) -> None:
             counted.take(event, facts)
             bar.update(line, total=counted.total, completed=sum(counted.states.values()), description=counted.text())
 
         yield show
 
 
-def _lines(terminal: Terminal, counted: Counted) -> Tell:
+def _lines(terminal: Terminal, counted: Counted) -> Emit:
     last = time.monotonic()
 
-    def show(event: str, facts: dict[str, Any]) -> None:
+    def show(event: str, facts: EventFacts) -> None:
         nonlocal last
         counted.take(event, facts)
         if event == "ingested":

@@ -8,7 +8,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TypedDict
 
-from diagnosis.results.document import CoverageRow, EpsilonRow, IntervalRow, LossRow, ReportDocument
+from diagnosis.results.document import CoverageRow, IntervalRow, LossRow, ReportDocument
+from diagnosis.results.size_rows import EpsilonRow
 from diagnosis.results.vocabulary import Severity
 from replay.faults import FAULT_STATES, Side, State
 

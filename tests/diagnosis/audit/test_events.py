@@ -14,7 +14,7 @@ from replay.errors import OutputError
 def test_events_are_lines_that_are_added(tmp_path: Path) -> None:
     for name in ("a", "b\nc", "\udcff"):
         log = EventLog(tmp_path / "events.jsonl")
-        log.tell("mission", {"name": name})
+        log.write("mission", {"name": name})
         log.close()
     lines = [json.loads(line) for line in (tmp_path / "events.jsonl").read_text(encoding="utf-8").splitlines()]
     assert [line["name"] for line in lines] == ["a", "b\nc", "\\udcff"]
@@ -31,8 +31,8 @@ def test_a_reader_that_has_gone_is_no_error() -> None:
         os.dup2(kept, 1)
         for end in (kept, writing, reading):
             os.close(end)
-    log.tell("start", {})
-    log.tell("end", {})
+    log.write("start", {})
+    log.write("end", {})
     log.close()
 
 
@@ -45,7 +45,7 @@ def test_a_file_that_cannot_be_written_is_one_sentence(tmp_path: Path) -> None:
 def test_a_full_disk_is_one_sentence() -> None:
     log = EventLog(Path("/dev/full"))
     with pytest.raises(OutputError, match="No space left on device"):
-        log.tell("start", {})
+        log.write("start", {})
     log.close()
 
 

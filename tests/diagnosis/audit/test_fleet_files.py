@@ -22,6 +22,7 @@ from diagnosis.audit.store.keys import Key
 from diagnosis.audit.store.store import Store
 from replay.errors import OutputError
 from tests import fleet_samples as samples
+from tests import report_samples
 from tests.fleet_samples import Fault, Sample, bounds
 
 VALVE = ("RL", "actuator")
@@ -269,7 +270,9 @@ def test_the_previous_mission_is_the_last_before_by_the_logs_clock(tmp_path: Pat
         assert [p and p.name for p in found] == ["also", None, "first", None, None, None, None, None]
         assert previous_report(store, 1) is None
         folder = tmp_path / "missions/second"
-        (folder / "report.json").write_text('{"schema": "mfhca-report/1"}', encoding="utf-8")
+        report = report_samples.no_faults()[0]
+        report["limits"].setdefault("driving_speed", 0.1)
+        (folder / "report.json").write_text(json.dumps(report), encoding="utf-8")
         previous = previous_report(store, 1)
         assert previous is not None
         assert previous[1]["schema"] == "mfhca-report/1"

@@ -30,7 +30,9 @@ def changes_of(b: ShownBaseline | None) -> Context | None:
         found = [_changed(f) for f in b["faults"] if f["outcome"] == outcome]
         sign, words = _CHANGES[outcome]
         groups.append({"outcome": outcome, "sign": sign, "words": words[0].upper() + words[1:], "rows": found})
-    notes = [f"{c['machine']}: {verdict_label(c['older'])} → {verdict_label(c['newer'])}" for c in b["machines"]["changed"]]
+    notes = [
+        f"{c['machine']}: {verdict_label(c['older'])} → {verdict_label(c['newer'])}" for c in b["machines"]["changed"]
+    ]
     machines = b["machines"]
     for labels_of, words in (
         (machines["new"], "not in the earlier audit"),

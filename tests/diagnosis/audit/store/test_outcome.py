@@ -2,11 +2,11 @@ from __future__ import annotations
 
 import pytest
 
-from diagnosis.audit.store.outcome import STATES, Outcome
+from diagnosis.audit.store.outcome import ENDS, Outcome
 
 
 def test_there_are_six_states() -> None:
-    assert STATES == ("ok", "degraded", "unreadable", "timeout", "out_of_memory", "crashed")
+    assert ENDS == ("ok", "degraded", "unreadable", "timeout", "out_of_memory", "crashed")
 
 
 @pytest.mark.parametrize(("state", "reason"), [("ok", "but"), ("crashed", ""), ("fine", "")])

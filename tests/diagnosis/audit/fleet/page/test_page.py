@@ -13,7 +13,8 @@ import pytest
 
 from diagnosis.audit.fleet.page.matrix import matrix
 from diagnosis.audit.fleet.page.page import build_fleet_page
-from diagnosis.audit.fleet.page.rows import link, symbol
+from diagnosis.audit.fleet.page.rows import symbol
+from diagnosis.audit.fleet.page.shown import address as address_of
 from diagnosis.audit.fleet.page.svg import sprite, trend_picture
 from diagnosis.audit.fleet_files import fleet_json, load_fleet
 from tests import fleet_samples as samples
@@ -54,7 +55,7 @@ def test_the_policy_admits_the_two_scripts_of_the_page_alone(tmp_path: Path) -> 
     ],
 )
 def test_addresses_are_escaped_and_stay_below_the_page(report: str | None, address: str) -> None:
-    assert link(report) == address
+    assert address_of(report) == address
 
 
 @pytest.mark.parametrize(
