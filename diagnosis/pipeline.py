@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,13 +12,10 @@ from numpy.typing import NDArray
 from diagnosis.assess import ComponentResult, assess_components
 from diagnosis.channels.recording_gaps import holes_of, without_holes
 from diagnosis.decision import metrics, quality
-from diagnosis.decision.caveats import more_caveats
-from diagnosis.decision.decide import Decision, decide, intervals_of, spans_of
+from diagnosis.report_document import Judged, machine_row, report_of_mission
 from diagnosis.results.assessment import Assessment
 from diagnosis.results.closeups import closeups_of
-from diagnosis.results.document import SCHEMA
-from diagnosis.results.loss import loss_rows
-from diagnosis.results.result import MissionResult, to_json
+from diagnosis.results.result import MissionResult
 from replay.arrays import spill
 from replay.arrays.column_store import ColumnStore
 from replay.arrays.envelope import bucket_of
@@ -29,10 +25,8 @@ from replay.errors import ConfigError, NotJudged
 from replay.machine.config import Machine
 from replay.mission import Mission, load_mission
 from replay.progress import Progress, Stage, Subscriber, silent
-from replay.readers.machine_identity import stated_machine
 from replay.signals.signal import Signals
 from replay.signals.timeline import align
-from replay.version import __version__
 
 Array = NDArray[np.float64] | NDArray[np.float32]
 
@@ -167,127 +161,21 @@ def _require_something(assessments: Mapping[tuple[str, str], Assessment], missio
 
 def _result(
     mission: Mission,
-    told: quality.Recorded,
+    recorded: quality.Recorded,
     machine: Machine,
     replay: Replay,
     found: ComponentResult,
     machine_source: str,
     machine_id: str | None,
 ) -> MissionResult:
+    judged = Judged(mission, recorded, machine, replay, found)
+    report = report_of_mission(judged, machine_row(machine, mission, machine_source, machine_id))
     timeline = mission.timeline
-    moving = metrics.driving(replay, timeline, machine)
-    rows, decided = metrics.coverage(found.assessments, moving, machine, timeline.dt)
-    intervals = intervals_of(found.assessments, machine.axles, timeline.start_ns, timeline.step_ns, machine.limits)
-    damage = [text for f in mission.files for text in f.summary.damage]
-    notes = [text for f in mission.files for text in f.summary.notes]
-    decision = decide(
-        intervals,
-        found.assessments,
-        decided,
-        machine.axles,
-        machine.limits,
-        damage,
-        driving_s={(row["component"], row["side"]): row["driving_s"] for row in rows},
-        model=found.wheel_model,
-    )
-    report: dict[str, Any] = {
-        "schema": SCHEMA,
-        "tool": {"name": "mfhca-replay", "version": __version__},
-        "log": _log(mission, moving, machine),
-        "machine": _machine(
-            machine, machine_source, machine_id or stated_machine(f.summary.metadata for f in mission.files)
-        ),
-        "readings": list(replay.readings),
-        "verdict": decision,
-        "caveats": more_caveats(mission, told.first_ns, machine),
-        "intervals": list(intervals),
-        "states": list(spans_of(found.assessments, timeline.step_ns)),
-        "phases": metrics.phases(timeline, replay, machine),
-        "coverage": rows,
-        "loss": loss_rows({key: a.loss for key, a in found.assessments.items()}),
-        "metrics": metrics.loop_metrics(timeline, replay, machine, moving),
-        "signals": told.rows,
-        "missing": quality.missing_rows(mission.signals, machine),
-        "quality": quality.checks(
-            mission.signals,
-            told,
-            timeline,
-            damage,
-            notes,
-            found.assessments,
-            found.wheel_model,
-            [f.clock for f in mission.files if f.clock is not None],
-        ),
-        "limits": machine.limits,
-    }
     timeline.store.release()
     spill.STORE.release()
     columns: dict[str, Array] = dict(replay_columns(timeline, replay, machine))
     for (component, side), assessment in found.assessments.items():
         columns.update({f"evidence.{component}.{side}.{leaf}": x for leaf, x in assessment.columns.items()})
     columns.update(metrics.path_of(timeline))
-    windows = closeups_of(timeline, replay, machine, found.assessments, intervals)
-    return MissionResult(to_json(_named_status(report)), columns, windows)
-
-
-def _named_status(report: dict[str, Any]) -> dict[str, Any]:
-    """Give the verdict's fields plain names."""
-    verdict: Decision = report["verdict"]
-    report["verdict"] = {
-        "status": verdict.status,
-        "cleared": verdict.cleared,
-        "not_cleared": verdict.not_cleared,
-        "title": verdict.title,
-        "text": verdict.text,
-        "caveats": [*verdict.caveats, *report.pop("caveats")],
-        "actions": list(verdict.actions),
-    }
-    return report
-
-
-def _log(mission: Mission, moving: NDArray[np.bool_], machine: Machine) -> dict[str, Any]:
-    timeline = mission.timeline
-    speeds = [timeline.signals[n] for w in machine.wheels if (n := f"wheel.{w}.v") in timeline.signals]
-    distance = 0.0 if speeds else float("nan")
-    for part in timeline.blocks():
-        near = [v[part] for v in speeds]
-        if near:
-            mean = np.nansum(np.abs(near), axis=0) / np.maximum(np.isfinite(near).sum(axis=0), 1)
-            distance += float(mean.sum()) * timeline.dt
-    return {
-        "files": [
-            {
-                "path": f.path.name,
-                "sha256": f.sha256,
-                "bytes": f.bytes,
-                "format": f.format,
-                "damage": list(f.summary.damage),
-                "notes": list(f.summary.notes),
-                "clock": quality.clock_row(f.clock),
-            }
-            for f in mission.files
-        ],
-        "start_ns": timeline.start_ns,
-        "open_loop": mission.open_loop,
-        "duration_s": timeline.size * timeline.dt,
-        "rate_hz": 1e9 / timeline.step_ns,
-        **({"samples_per_bucket": bucket} if (bucket := bucket_of(timeline.size)) > 1 else {}),
-        "distance_m": distance,
-        "driving_s": float(np.count_nonzero(moving.any(axis=1))) * timeline.dt,
-    }
-
-
-def _machine(machine: Machine, source: str, machine_id: str | None) -> dict[str, Any]:
-    geometry = None
-    if machine.geometry is not None:
-        geometry = {
-            w: {"x": g.x, "y": g.y, "offset": g.offset, "axle": g.axle} for w, g in machine.geometry.wheels.items()
-        }
-    return {
-        "name": machine.name,
-        "id": machine_id or machine.id,
-        "wheels": list(machine.wheels),
-        "axles": list(machine.axles),
-        "geometry": geometry,
-        "source": source,
-    }
+    windows = closeups_of(timeline, replay, machine, found.assessments, judged.intervals)
+    return MissionResult(report, columns, windows)

@@ -18,10 +18,9 @@ from cli.tables.layout import (
     table,
     text,
 )
-from diagnosis.comparison.faults import GONE
 from diagnosis.comparison.words import CHANGES, OUTCOMES, headline, times
-from diagnosis.decision.wording import part_words
 from diagnosis.pages.labels import utc
+from diagnosis.results.vocabulary import part_words
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
@@ -113,7 +112,7 @@ def _found(f: FoundFault | None, bounds: bool) -> Text:
     if f is None:
         return text("–")
     words = f" {times(len(f.ids), f.seconds)}"
-    if f.epsilon is not None and f.mode not in GONE:
+    if f.epsilon is not None and not f.mode.total:
         words += f", ε {f.epsilon['value']:.2f}"
         words += f" ({f.epsilon['low']:.2f}–{f.epsilon['high']:.2f})" if bounds else ""
     return Text.assemble(text(f.severity, SEVERITY_STYLES.get(f.severity, "")), text(words))

@@ -12,11 +12,12 @@ from rich.text import Text
 
 from cli.tables.layout import MODE_SIGNS, MODE_STYLES, SEVERITY_STYLES, bullets, section, table, text
 from diagnosis.comparison.words import OUTCOMES, headline
-from diagnosis.decision.wording import mode_words, part_words
 from diagnosis.pages.labels import state_label
 from diagnosis.report.confidence import headline as verdict_words
 from diagnosis.report.confidence import sure_of
 from diagnosis.report.tables import merged_caveats
+from diagnosis.results.fault_rows import mode_words
+from diagnosis.results.vocabulary import part_words
 
 _STYLES = {
     "ready": "bold white on #1d7a63",

@@ -7,13 +7,13 @@ from dataclasses import dataclass
 
 from diagnosis.comparison.coverage import CoverageChange, coverage_changes, sides_of
 from diagnosis.comparison.faults import FaultChange, found_faults, is_worse, match_faults
-from diagnosis.results.comparison_document import SCHEMA, ComparisonDocument
+from diagnosis.results.comparison_document import SCHEMA, ComparisonDocument, Outcome
 from diagnosis.results.document import LimitsRow, MachineIdentity, ReportDocument
 from diagnosis.results.result import to_json
 from diagnosis.results.vocabulary import Verdict
 from replay.errors import ConfigError
 
-COUNTED = ("new", "worse", "other", "better", "not_seen_again", "resolved", "unchanged")
+COUNTED: tuple[Outcome, ...] = ("new", "worse", "other", "better", "not_seen_again", "resolved", "unchanged")
 
 
 @dataclass(frozen=True)
@@ -128,7 +128,7 @@ def compare_reports(
     had, has = sides_of(older), sides_of(newer)
     faults = tuple(match_faults(found_faults(older["intervals"], had), found_faults(newer["intervals"], has), had, has))
     axles = {*older["machine"]["axles"], *newer["machine"]["axles"]}
-    outcomes = [c.trend or c.status for c in faults]
+    outcomes: list[str] = [c.trend or c.status for c in faults]
     return Comparison(
         schema=SCHEMA,
         worse=any(is_worse(c) for c in faults),

@@ -6,17 +6,18 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from diagnosis.comparison.coverage import SideCoverage
-from diagnosis.decision.wording import join_words, mode_words
+from diagnosis.decision.wording import join_words
+from diagnosis.results.comparison_document import Change, Status, Trend
 from diagnosis.results.document import IntervalRow
-from diagnosis.results.result import SEVERITIES
+from diagnosis.results.fault_rows import mode_words
 from diagnosis.results.size_rows import EpsilonRow
+from diagnosis.results.vocabulary import Kind, Severity, Tier
+from replay.faults import FaultMode, Side
 
-GONE = ("stuck", "no_signal")
-EITHER = "sensor_or_actuator"
 _LONGER, _LEAST_S = 2.0, 1.0
 _LEAST_EPSILON = 0.05  # bounds are those of one mission; the same fault differs more from mission to mission
 _MODEL_RESOLUTION = 0.25
-_STRENGTH = {"direct": 3, "model": 2, "drive": 2, "signal": 1, "tracking": 1}
+_STRENGTH = {Tier.DIRECT: 3, Tier.MODEL: 2, Tier.DRIVE: 2, Tier.SIGNAL: 1, Tier.TRACKING: 1, Tier.NONE: 0}
 
 Sides = Mapping[tuple[str, str], SideCoverage]
 
@@ -27,7 +28,7 @@ class FoundFault:
 
     Attributes
     ----------
-    component, kind, side, mode : str
+    component, kind, side, mode : str, Kind, Side, FaultMode
         As in `diagnosis.results.result.FaultInterval`.
     ids : tuple[str, ...]
         Their numbers in the report.
@@ -35,27 +36,27 @@ class FoundFault:
         Time of all of them [s].
     share : float or None
         The same as a share of the time in which the side was judged; None where that is not known.
-    severity : str
+    severity : Severity
         The worst.
     epsilon : EpsilonRow or None
         ``value``, ``low``, ``high`` of the longest of the worst ones.
     probability : float
         Of the same one.
-    tier : str
+    tier : Tier
         Strongest evidence.
     """
 
     component: str
-    kind: str
-    side: str
-    mode: str
+    kind: Kind
+    side: Side
+    mode: FaultMode
     ids: tuple[str, ...]
     seconds: float
     share: float | None
-    severity: str
+    severity: Severity
     epsilon: EpsilonRow | None
     probability: float
-    tier: str
+    tier: Tier
 
 
 @dataclass(frozen=True)
@@ -64,51 +65,55 @@ class FaultChange:
 
     Attributes
     ----------
-    status : str
+    status : Status
         ``new``, ``changed``, ``unchanged``, ``resolved``, or ``not_seen_again``: gone while nothing shows that it is
         repaired, because the side was not assessed.
-    trend : str
+    trend : Trend
         Of a changed fault: ``worse``, ``better``, or ``other``; else empty.
-    component, kind, side, mode : str
+    component, kind, side, mode : str, Kind, Side, FaultMode
         Of the newer fault, else of the older one.
     older, newer : FoundFault or None
         The fault in either mission.
-    changes : tuple[str, ...]
+    changes : tuple[Change, ...]
         ``row``, ``side``, ``severity``, ``epsilon``, ``duration``: what changed.
     note : str
         Sentence about what limits the statement; may be empty.
     """
 
-    status: str
-    trend: str
+    status: Status
+    trend: Trend
     component: str
-    kind: str
-    side: str
-    mode: str
+    kind: Kind
+    side: Side
+    mode: FaultMode
     older: FoundFault | None
     newer: FoundFault | None
-    changes: tuple[str, ...] = ()
+    changes: tuple[Change, ...] = ()
     note: str = ""
 
 
 def is_worse(change: FaultChange) -> bool:
     """Whether a fault is new or worse and of at least low severity."""
     found = change.newer
-    return found is not None and found.severity != "info" and (change.status == "new" or change.trend == "worse")
+    return (
+        found is not None
+        and found.severity is not Severity.INFO
+        and (change.status == "new" or change.trend == "worse")
+    )
 
 
 def found_faults(intervals: Sequence[IntervalRow], sides: Sides) -> list[FoundFault]:
     """Gather a report's faults by component, side and row, worst first."""
-    groups: dict[tuple[str, str, str], list[IntervalRow]] = {}
+    groups: dict[tuple[str, Side, FaultMode], list[IntervalRow]] = {}
     for i in intervals:
         groups.setdefault((i["component"], i["side"], i["mode"]), []).append(i)
     out = [_found(key, faults, sides) for key, faults in groups.items()]
-    return sorted(out, key=lambda f: (-SEVERITIES.index(f.severity), -f.seconds, f.component, f.side, f.mode))
+    return sorted(out, key=lambda f: (-f.severity.rank, -f.seconds, f.component, f.side, f.mode))
 
 
-def _found(key: tuple[str, str, str], faults: Sequence[IntervalRow], sides: Sides) -> FoundFault:
+def _found(key: tuple[str, Side, FaultMode], faults: Sequence[IntervalRow], sides: Sides) -> FoundFault:
     component, side, mode = key
-    first = max(faults, key=lambda f: (SEVERITIES.index(f["severity"]), f["stop_s"] - f["start_s"]))
+    first = max(faults, key=lambda f: (f["severity"].rank, f["stop_s"] - f["start_s"]))
     seconds = float(sum(f["stop_s"] - f["start_s"] for f in faults))
     judged = [sides[k].judged_s for k in _keys(component, side) if k in sides]
     epsilon = first["epsilon"]
@@ -123,12 +128,14 @@ def _found(key: tuple[str, str, str], faults: Sequence[IntervalRow], sides: Side
         severity=first["severity"],
         epsilon=epsilon,
         probability=first["probability"],
-        tier=max((f["tier"] for f in faults), key=lambda t: _STRENGTH.get(t, 0)),
+        tier=max((f["tier"] for f in faults), key=lambda t: _STRENGTH[t]),
     )
 
 
-def _keys(component: str, side: str) -> list[tuple[str, str]]:
-    return [(component, s) for s in (("sensor", "actuator") if side == EITHER else (side,))]
+def _keys(component: str, side: Side) -> list[tuple[str, str]]:
+    """Component and side of the parts that a fault may sit in."""
+    sides = (Side.SENSOR, Side.ACTUATOR) if side is Side.SENSOR_OR_ACTUATOR else (side,)
+    return [(component, s) for s in sides]
 
 
 def match_faults(
@@ -170,7 +177,7 @@ def match_faults(
 def _order(c: FaultChange) -> tuple[int, int, str, str, str]:
     rank = ("new", "worse", "other", "better", "not_seen_again", "resolved", "unchanged").index(c.trend or c.status)
     fault = c.newer or c.older
-    severity = _rank(fault) if fault else 0
+    severity = fault.severity.rank if fault else 0
     return rank, -severity, c.component, c.side, c.mode
 
 
@@ -179,7 +186,7 @@ def _same(a: FoundFault, b: FoundFault) -> bool:
 
 
 def _same_row(a: FoundFault, b: FoundFault) -> bool:
-    return a.mode == b.mode and EITHER in (a.side, b.side)
+    return a.mode == b.mode and Side.SENSOR_OR_ACTUATOR in (a.side, b.side)
 
 
 def _same_side(a: FoundFault, b: FoundFault) -> bool:
@@ -187,11 +194,11 @@ def _same_side(a: FoundFault, b: FoundFault) -> bool:
 
 
 def _change(
-    status: str,
+    status: Status,
     a: FoundFault | None,
     b: FoundFault | None,
-    trend: str = "",
-    changes: tuple[str, ...] = (),
+    trend: Trend = "",
+    changes: tuple[Change, ...] = (),
     note: str = "",
 ) -> FaultChange:
     fault = b or a
@@ -201,18 +208,19 @@ def _change(
 
 def _both(a: FoundFault, b: FoundFault) -> FaultChange:
     """A fault of both missions."""
-    ups = {"severity": _sign(_rank(a), _rank(b)), "epsilon": _epsilon(a, b), "duration": _duration(a, b)}
-    changes = [name for name, differs in (("row", a.mode != b.mode), ("side", a.side != b.side)) if differs]
-    changes += [name for name, up in ups.items() if up]
+    severity, epsilon, duration = _sign(a.severity.rank, b.severity.rank), _epsilon(a, b), _duration(a, b)
+    differs: dict[Change, bool] = {
+        "row": a.mode != b.mode,
+        "side": a.side != b.side,
+        "severity": bool(severity),
+        "epsilon": bool(epsilon),
+        "duration": bool(duration),
+    }
+    changes = tuple(name for name, is_so in differs.items() if is_so)
     if not changes:
         return _change("unchanged", a, b)
-    signs = [ups["severity"]] if ups["severity"] else [ups["epsilon"], ups["duration"]]
-    trend = "worse" if 1 in signs else "better" if -1 in signs else "other"
-    return _change("changed", a, b, trend, tuple(changes))
-
-
-def _rank(f: FoundFault) -> int:
-    return SEVERITIES.index(f.severity)
+    signs = [severity] if severity else [epsilon, duration]
+    return _change("changed", a, b, "worse" if 1 in signs else "better" if -1 in signs else "other", changes)
 
 
 def _sign(a: float, b: float) -> int:
@@ -254,12 +262,12 @@ def _unseen_before(b: FoundFault, sides: Sides) -> str:
 def _other_faults(a: FoundFault, newer: Sequence[FoundFault]) -> str:
     """Say that a part whose fault is gone has another one, or that its fault may be told as one of the other side."""
     keys = set(_keys(a.component, a.side))
-    near = [b for b in newer if b.component == a.component and b.severity != "info"]
+    near = [b for b in newer if b.component == a.component and b.severity is not Severity.INFO]
     own = [b for b in near if keys & set(_keys(b.component, b.side))]
     if own:
         words = join_words(list(dict.fromkeys(mode_words(b.side, b.mode) for b in own)))
         return f"The part is not sound: in the newer mission it is {words}."
-    other = next((b for b in near if "direct" not in (a.tier, b.tier)), None)
+    other = next((b for b in near if Tier.DIRECT not in (a.tier, b.tier)), None)
     if other is None:
         return ""
     return (
@@ -277,9 +285,9 @@ def _why_not_assessed(a: FoundFault, sides: Sides) -> str:
         if not side.assessed:
             return f"In the newer mission the {key[1]} was {side.words}."
         small = a.epsilon is not None and a.epsilon["low"] < _MODEL_RESOLUTION
-        if side.tier == "tracking" and a.mode not in GONE:
+        if side.tier is Tier.TRACKING and not a.mode.total:
             return f"In the newer mission the {key[1]} was judged by its tracking alone, which does not show this row."
-        if _STRENGTH.get(side.tier, 0) < _STRENGTH.get(a.tier, 0) and a.mode not in GONE and small:
+        if _STRENGTH[side.tier] < _STRENGTH[a.tier] and not a.mode.total and small:
             return (
                 f"In the newer mission the {key[1]} was judged by weaker evidence ({side.tier}, not {a.tier}), which does "
                 f"not show a loss below about {100 * _MODEL_RESOLUTION:.0f} %."

@@ -9,11 +9,11 @@ from typing import Any
 
 import jinja2
 
-from diagnosis.comparison.faults import GONE
 from diagnosis.comparison.words import CHANGES, OUTCOMES, SIGNS, coverage_words, headline, times
 from diagnosis.pages import labels
 from diagnosis.pages.environment import POLICY, environment, plain_style
 from diagnosis.pages.svg import icon
+from replay.faults import TOTAL
 
 _HERE = Path(__file__).parent
 
@@ -104,7 +104,7 @@ def _found(f: Mapping[str, Any] | None) -> dict[str, str] | None:
     if f is None:
         return None
     e = f["epsilon"]
-    epsilon = "" if e is None or f["mode"] in GONE else f"ε̂ {e['value']:.2f} ({e['low']:.2f}–{e['high']:.2f})"
+    epsilon = "" if e is None or f["mode"] in TOTAL else f"ε̂ {e['value']:.2f} ({e['low']:.2f}–{e['high']:.2f})"
     return {
         "severity": f["severity"],
         "times": times(len(f["ids"]), f["seconds"]),

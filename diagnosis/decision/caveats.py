@@ -3,86 +3,123 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
-from diagnosis.decision.wording import count_words, join_words, part_words, unanswered
+from diagnosis.decision.wording import count_words, join_words, unanswered
 from diagnosis.results.assessed import needed_s
 from diagnosis.results.assessment import STATES, Assessment
 from diagnosis.results.result import FaultInterval
+from diagnosis.results.vocabulary import Kind, Tier, part_words
 from replay.arrays.spill import blocks
-from replay.faults import FAULT_STATES, State
+from replay.faults import DECIDED, State
 from replay.machine.config import Limits, Machine
 from replay.mission import Mission
 from replay.signals.timeline import Timeline
 
-Key = tuple[str, str]
+#: A component and its side.
+Part = tuple[str, str]
 
 _OPEN_S, _OPEN_SHARE = 1.0, 0.02  # driving that was not judged and is worth a word
 _EMPTY_S = 1.0  # without any wheel speed
 _LEFT_OUT = " was left out: its clock "
 
 
-def doubt_of(watch: Sequence[FaultInterval], short: int, odd: Sequence[Key], alone: bool, damage: Sequence[str]) -> str:
+@dataclass(frozen=True)
+class Reservations:
+    """What stands against ``ready`` beside the faults.
+
+    Attributes
+    ----------
+    short : tuple[Part, ...]
+        Parts of wheels that were not judged long enough.
+    unexplained : tuple[Part, ...]
+        Parts of wheels at which something deviates that no single fault explains.
+    not_compared : bool
+        Whether the wheel model comes from this mission alone and from too few wheels to be compared.
+    damage : tuple[str, ...]
+        What the log lost.
+    """
+
+    short: tuple[Part, ...] = ()
+    unexplained: tuple[Part, ...] = ()
+    not_compared: bool = False
+    damage: tuple[str, ...] = ()
+
+
+def doubt_of(watch: Sequence[FaultInterval], against: Reservations) -> str:
     """Why a mission with faults to watch is not cleared; empty where it is."""
-    out = [f"the {part_words(f.kind, f.component, f.side.value)} may not answer" for f in watch if unanswered(f)]
+    out = [f"the {part_words(f.kind, f.component, f.side)} may not answer" for f in watch if unanswered(f)]
     out = list(dict.fromkeys(out))
-    if damage:
-        out.append("part of the log was left out" if _LEFT_OUT in damage[0] else "the log is damaged")
-    if short:
+    if against.damage:
+        out.append("part of the log was left out" if _LEFT_OUT in against.damage[0] else "the log is damaged")
+    if short := len(against.short):
         out.append(f"{count_words(short, 'part')} {'was' if short == 1 else 'were'} not judged long enough")
-    if odd:
+    if against.unexplained:
         out.append("something deviates that no fault explains")
-    if alone:
+    if against.not_compared:
         out.append("a loss that lasted the whole mission would not show")
     return join_words(out)
 
 
 def caveats_of(
-    short: Sequence[Key],
-    assessments: Mapping[Key, Assessment],
-    decided_s: Mapping[Key, float],
-    driven: Mapping[Key, float],
+    against: Reservations,
+    assessments: Mapping[Part, Assessment],
+    decided_s: Mapping[Part, float],
+    driven: Mapping[Part, float],
     axles: Sequence[str],
     limits: Limits,
-    damage: Sequence[str],
 ) -> tuple[str, ...]:
     """Sentences on damage, parts that were not judged long enough, the most driving left open, and unjudged steering."""
-    out = []
+    out, damage = [], against.damage
     if damage:
         said = "" if _LEFT_OUT in damage[0] else "The log is damaged: "
         out.append(f"{said}{damage[0]}" + (f" (and {len(damage) - 1} more)" if len(damage) > 1 else ""))
-    for key in short:
+    for key in against.short:
         reason = _why_short(assessments[key], driven.get(key), limits)
         out.append(
-            f"{part_words('wheel', *key)}: judged for {decided_s.get(key, 0.0):.1f} s of driving, of "
+            f"{part_words(Kind.WHEEL, *key)}: judged for {decided_s.get(key, 0.0):.1f} s of driving, of "
             f"{needed_s(driven.get(key, 0.0), limits.min_assessed):.3g} s needed"
             + (f" ({reason})" if reason else "")
             + "."
         )
+    out += _most_open(against.short, assessments, decided_s, driven, axles)
+    unjudged = [k for k in assessments if k[0] in axles and assessments[k].tier == Tier.NONE]
+    if unjudged:
+        who = join_words([part_words(Kind.STEER, *k) for k in unjudged])
+        out.append(f"Not assessed: {who} ({_main_reason(assessments[unjudged[0]])}).")
+    return tuple(out)
+
+
+def _most_open(
+    short: Sequence[Part],
+    assessments: Mapping[Part, Assessment],
+    decided_s: Mapping[Part, float],
+    driven: Mapping[Part, float],
+    axles: Sequence[str],
+) -> list[str]:
+    """Sentence on the part with the most driving left open, of those judged long enough; none where that is little."""
     open_s = {
         k: driven[k] - decided_s.get(k, 0.0)
         for k in assessments
         if k in driven and k not in short and k[0] not in axles
     }
-    worst = "no other part has more" if not short else "none of the parts judged long enough has more"
     most = max(open_s, key=lambda k: open_s[k], default=None)
-    if most is not None and open_s[most] > max(_OPEN_S, _OPEN_SHARE * driven[most]):
-        out.append(
-            f"{part_words('wheel', *most)}: {open_s[most]:.1f} s of {driven[most]:.1f} s of driving could not be judged"
-            + (f" ({reason})" if (reason := _main_reason(assessments[most])) else "")
-            + f"; {worst}. The timeline shows when."
-        )
-    unjudged = [k for k in assessments if k[0] in axles and assessments[k].tier == "none"]
-    if unjudged:
-        who = join_words([part_words("steer", *k) for k in unjudged])
-        out.append(f"Not assessed: {who} ({_main_reason(assessments[unjudged[0]])}).")
-    return tuple(out)
+    if most is None or open_s[most] <= max(_OPEN_S, _OPEN_SHARE * driven[most]):
+        return []
+    reason = _main_reason(assessments[most])
+    return [
+        f"{part_words(Kind.WHEEL, *most)}: {open_s[most]:.1f} s of {driven[most]:.1f} s of driving could not be judged"
+        + (f" ({reason})" if reason else "")
+        + f"; {'none of the parts judged long enough has more' if short else 'no other part has more'}."
+        " The timeline shows when."
+    ]
 
 
 def _why_short(assessment: Assessment, driven: float | None, limits: Limits) -> str:
     """Why a part was not judged long enough; a machine at rest is no reason while it drives."""
-    if driven is not None and driven < limits.min_assessed and assessment.tier != "none":
+    if driven is not None and driven < limits.min_assessed and assessment.tier != Tier.NONE:
         return f"only {driven:.1f} s were driven"
     return _main_reason(assessment)
 
@@ -91,7 +128,7 @@ def _main_reason(assessment: Assessment) -> str:
     """Reason of the commonest state that is no judgement; a machine at rest is one only where nothing else is."""
     best, most = "", 0.0
     for state, reason in assessment.reasons.items():
-        if state is State.HEALTHY or state in FAULT_STATES:
+        if state in DECIDED:
             continue
         count = float(np.count_nonzero(assessment.states == STATES.index(state)))
         if state is State.NOT_EXCITED:

@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any
+from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
 from diagnosis.results.assessment import STATES, Assessment
+from diagnosis.results.document import CoverageRow, LoopRow, MeanRow, MetricsRow, PaperRow, PhaseRow
+from diagnosis.results.vocabulary import Tier
 from replay.arrays.envelope import shown
 from replay.arrays.numeric import without_nan
 from replay.arrays.spill import blocks, in_blocks
 from replay.control.loop import Replay, any_finite, stack
-from replay.faults import FAULT_STATES, State
+from replay.faults import DECIDED, Side
 from replay.machine.config import Machine
 from replay.signals.timeline import Timeline
 
@@ -26,7 +27,7 @@ PAPER_TABLE = (
     ("Yu", 0.024, 0.125, 6),
     ("Sun", 0.035, 0.135, 12),
 )
-_DECIDED = np.array([s is State.HEALTHY or s in FAULT_STATES for s in STATES])
+_DECIDED = np.array([s in DECIDED for s in STATES])
 _EARTH_RADIUS = 6_371_008.8
 
 
@@ -39,13 +40,13 @@ def driving(replay: Replay, timeline: Timeline, machine: Machine) -> NDArray[np.
         return in_blocks(lambda ref, y: np.abs(np.where(commanded, ref, y)) > limit, replay.v_ref, v)
 
 
-def loop_metrics(timeline: Timeline, replay: Replay, machine: Machine, moving: NDArray[np.bool_]) -> dict[str, Any]:
+def loop_metrics(timeline: Timeline, replay: Replay, machine: Machine, moving: NDArray[np.bool_]) -> MetricsRow:
     """Mean |e_i| [m/s] and mean |u_a,i| [fraction] per wheel and on average, for the mission and for driving.
 
     e is taken with v_true where that is logged, and not with a speed into which faults were injected.
     """
     nothing = np.broadcast_to(np.nan, (timeline.size,))
-    per_wheel = {}
+    per_wheel: dict[str, LoopRow] = {}
     for i, wheel in enumerate(machine.wheels):
         v, true, u = (timeline.signals.get(f"wheel.{wheel}.{x}", nothing) for x in ("v", "v_true", "u"))
         if any(np.isfinite(true[part]).any() for part in blocks(timeline.size)):
@@ -56,22 +57,31 @@ def loop_metrics(timeline: Timeline, replay: Replay, machine: Machine, moving: N
             "tracking_error": _mean_size(moving[:, i], v, replay.v_ref[:, i]),
             "control_effort": _mean_size(moving[:, i], u),
         }
-    average = {
-        name: {part: _mean([per_wheel[w][name][part] for w in machine.wheels]) for part in ("mission", "driving")}
-        for name in ("tracking_error", "control_effort")
+    loops = [per_wheel[w] for w in machine.wheels]
+    average: LoopRow = {
+        "tracking_error": _mean([loop["tracking_error"] for loop in loops]),
+        "control_effort": _mean([loop["control_effort"] for loop in loops]),
     }
-    paper = [
+    paper: list[PaperRow] = [
         {"controller": c, "tracking_error": e_, "control_effort": u_, "parameters": n} for c, e_, u_, n in PAPER_TABLE
     ]
     return {"wheels": per_wheel, "average": average, "paper": paper}
 
 
-def _mean(x: list[float]) -> float:
-    known = [value for value in x if np.isfinite(value)]
-    return float(np.mean(known)) if known else float("nan")
+def _mean(rows: Sequence[MeanRow]) -> MeanRow:
+    """Mean over the wheels for which it is known."""
+    return {
+        "mission": _mean_of_known(r["mission"] for r in rows),
+        "driving": _mean_of_known(r["driving"] for r in rows),
+    }
 
 
-def _mean_size(moving: NDArray[np.bool_], x: Array, less: Array | None = None) -> dict[str, float]:
+def _mean_of_known(values: Iterable[float | None]) -> float | None:
+    known = [x for x in values if x is not None]
+    return float(np.mean(known)) if known else None
+
+
+def _mean_size(moving: NDArray[np.bool_], x: Array, less: Array | None = None) -> MeanRow:
     """Mean |x − less| of the mission and of driving."""
     total, count = np.zeros(2), np.zeros(2)
     for part in blocks(x.size):
@@ -79,15 +89,16 @@ def _mean_size(moving: NDArray[np.bool_], x: Array, less: Array | None = None) -
         for j, known in enumerate((np.isfinite(size), np.isfinite(size) & moving[part])):
             total[j] += size[known].sum()
             count[j] += np.count_nonzero(known)
-    mission, driving_ = (float(t / c) if c else float("nan") for t, c in zip(total, count, strict=True))
+    mission, driving_ = (float(t / c) if c else None for t, c in zip(total, count, strict=True))
     return {"mission": mission, "driving": driving_}
 
 
 def coverage(
     assessments: Mapping[tuple[str, str], Assessment], moving: NDArray[np.bool_], machine: Machine, dt: float
-) -> tuple[list[dict[str, Any]], dict[tuple[str, str], float]]:
+) -> tuple[list[CoverageRow], dict[tuple[str, str], float]]:
     """Seconds of each state per component and side, and seconds of driving that were decided."""
-    rows, decided = [], {}
+    rows: list[CoverageRow] = []
+    decided: dict[tuple[str, str], float] = {}
     anything = moving.any(axis=1)
     for (component, side), assessment in assessments.items():
         counts = np.bincount(assessment.states, minlength=len(STATES))
@@ -97,8 +108,8 @@ def coverage(
         rows.append(
             {
                 "component": component,
-                "side": side,
-                "tier": assessment.tier,
+                "side": "sensor" if side == Side.SENSOR else "actuator",
+                "tier": Tier(assessment.tier),
                 "seconds": {s.value: float(c) * dt for s, c in zip(STATES, counts, strict=True) if c},
                 "driving_s": float(np.count_nonzero(drives)) * dt,
                 "decided_driving_s": seconds,
@@ -122,7 +133,7 @@ def _mean_speed(v_ref: Array, v: Array) -> Array:
     return np.where(count > 0, np.nansum(speeds, axis=1) / np.maximum(count, 1), np.nan)
 
 
-def phases(timeline: Timeline, replay: Replay, machine: Machine) -> list[dict[str, Any]]:
+def phases(timeline: Timeline, replay: Replay, machine: Machine) -> list[PhaseRow]:
     """Forward, reverse, standstill and turning by the command, or unknown; pieces below 0.5 s join the one before."""
     v, omega = body_motion(timeline, replay, machine)
     limit = machine.limits.driving_speed / 2
@@ -137,7 +148,7 @@ def phases(timeline: Timeline, replay: Replay, machine: Machine) -> list[dict[st
     code = in_blocks(coded, v, omega)
     names = ("standstill", "forward", "reverse", "turning", "unknown")
     cut = np.flatnonzero(np.r_[True, code[1:] != code[:-1]])
-    out: list[dict[str, Any]] = []
+    out: list[PhaseRow] = []
     for a, b in zip(cut, np.r_[cut[1:], code.size], strict=True):
         name = names[int(code[a])]
         if out and ((b - a) * timeline.dt < 0.5 or out[-1]["name"] == name):

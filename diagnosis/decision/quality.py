@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import PurePath
-from typing import Any
 
 import numpy as np
 
 from diagnosis.channels.noise import rounding_step
 from diagnosis.decision.missing import cost_of_missing
 from diagnosis.results.assessment import Assessment
+from diagnosis.results.document import ClockRow, MissingRow, QualityRow, SignalRow
 from diagnosis.wheels.identification import WheelModelFit
 from replay.arrays.spill import blocks, release
 from replay.clocks.source_clock import SourceClock
@@ -43,7 +43,7 @@ class Recorded:
 
     Attributes
     ----------
-    rows : Sequence[Mapping[str, Any]]
+    rows : Sequence[SignalRow]
         `signal_rows`.
     jitter_ms : float
         99 % quantile of the distance of wheel stamps from their period [ms].
@@ -51,7 +51,7 @@ class Recorded:
         First stamp of a wheel signal; 0 where there is none.
     """
 
-    rows: Sequence[Mapping[str, Any]]
+    rows: Sequence[SignalRow]
     jitter_ms: float
     first_ns: int
 
@@ -62,9 +62,9 @@ def recorded(signals: Signals, timeline: Timeline) -> Recorded:
     return Recorded(signal_rows(signals, timeline), _jitter_ms(signals, timeline), first)
 
 
-def signal_rows(signals: Signals, timeline: Timeline) -> list[dict[str, Any]]:
+def signal_rows(signals: Signals, timeline: Timeline) -> list[SignalRow]:
     """One row per mapped signal: origin, rate, gaps, missing share, rounding step."""
-    rows = []
+    rows: list[SignalRow] = []
     for name, signal in signals.items.items():
         period = timeline.periods_ns[name]
         gaps, longest = _gaps(signal, period)
@@ -103,9 +103,9 @@ def _gaps(signal: Signal, period: int) -> tuple[int, float]:
     return count, longest * 1e-9
 
 
-def missing_rows(signals: Signals, machine: Machine) -> list[dict[str, str]]:
+def missing_rows(signals: Signals, machine: Machine) -> list[MissingRow]:
     """Signals that would sharpen the diagnosis and are not in the log, with what that costs."""
-    rows = []
+    rows: list[MissingRow] = []
     for name in machine.canonical_signals():
         if name in signals.items:
             continue
@@ -124,63 +124,89 @@ def checks(
     assessments: Mapping[tuple[str, str], Assessment],
     model: WheelModelFit | None,
     clocks: Sequence[SourceClock] = (),
-) -> list[dict[str, Any]]:
+) -> list[QualityRow]:
     """Checks of the data with their effect on the verdict."""
-    rows: list[dict[str, Any]] = []
+    return [
+        _sample_rate(found.jitter_ms, timeline.step_ns),
+        *_injected(signals),
+        *(
+            _row("Damage", text, "what is lost is not assessed; no “ready” from a damaged log", False)
+            for text in damage
+        ),
+        _gap_check(found.rows),
+        *_guessed(signals),
+        *_wheel_model(model),
+        *(_row("Clock", clock.sentence, *_effect_of(clock)) for clock in clocks if clock.sentence),
+        *_notes((*signals.notes, *timeline.notes, *notes), clocks),
+        *(_row("Evidence", text) for text in dict.fromkeys(note for a in assessments.values() for note in a.notes)),
+    ]
 
-    def row(check: str, result: str, effect: str = "none", ok: bool = True) -> None:
-        rows.append({"check": check, "result": result, "effect": effect, "ok": ok})
 
-    jitter = found.jitter_ms
-    row(
+def _row(check: str, result: str, effect: str = "none", ok: bool = True) -> QualityRow:
+    return {"check": check, "result": result, "effect": effect, "ok": ok}
+
+
+def _sample_rate(jitter_ms: float, step_ns: int) -> QualityRow:
+    sharp = jitter_ms < step_ns * 2.5e-6
+    return _row(
         "Sample rate",
-        f"{1e9 / timeline.step_ns:.4g} Hz, jitter {jitter:.3g} ms (99 %)",
-        "none" if jitter < timeline.step_ns * 2.5e-6 else "onsets are only as sharp as the jitter",
-        jitter < timeline.step_ns * 2.5e-6,
+        f"{1e9 / step_ns:.4g} Hz, jitter {jitter_ms:.3g} ms (99 %)",
+        "none" if sharp else "onsets are only as sharp as the jitter",
+        sharp,
     )
-    if signals.open_loop:
-        row(
+
+
+def _injected(signals: Signals) -> list[QualityRow]:
+    if not signals.open_loop:
+        return []
+    return [
+        _row(
             "Injected faults",
             "faults were written into this recording; its controller never met them",
             "the recorded commands are not compared with the law; no tracking error without a second speed",
             False,
         )
-    for text in damage:
-        row("Damage", text, "what is lost is not assessed; no “ready” from a damaged log", False)
-    gaps = {s["name"]: s["longest_gap_s"] for s in found.rows if s["gaps"] and not s["name"].startswith("cmd.")}
-    worst = list(gaps)
-    if worst:
-        longest = max(gaps.values())
-        shown = ", ".join(worst[:4]) + (f" and {len(worst) - 4} more" if len(worst) > 4 else "")
-        row(
-            "Gaps",
-            f"{shown}: longest {longest:.3g} s",
-            "no samples there: no data, or no signal where only one channel is silent",
-            False,
-        )
-    else:
-        row("Gaps", "none longer than five sample periods")
-    guessed = [n for n, s in signals.items.items() if s.guessed]
-    if guessed:
-        row(
+    ]
+
+
+def _gap_check(rows: Sequence[SignalRow]) -> QualityRow:
+    gaps = {s["name"]: s["longest_gap_s"] or 0.0 for s in rows if s["gaps"] and not s["name"].startswith("cmd.")}
+    if not gaps:
+        return _row("Gaps", "none longer than five sample periods")
+    names = list(gaps)
+    shown = ", ".join(names[:4]) + (f" and {len(names) - 4} more" if len(names) > 4 else "")
+    return _row(
+        "Gaps",
+        f"{shown}: longest {max(gaps.values()):.3g} s",
+        "no samples there: no data, or no signal where only one channel is silent",
+        False,
+    )
+
+
+def _guessed(signals: Signals) -> list[QualityRow]:
+    guessed = [name for name, s in signals.items.items() if s.guessed]
+    if not guessed:
+        return []
+    return [
+        _row(
             "Mapping",
             f"{len(guessed)} of {len(signals.items)} signals were found by name",
             "a wrong guess would mislead the diagnosis: check with `mfhca channels`, fix in [signals]",
         )
-    if model is not None:
-        row(
-            "Wheel model", model.note, "none" if model.reliable else "gains and valves are not assessed", model.reliable
-        )
-    for clock in clocks:
-        if clock.sentence:
-            row("Clock", clock.sentence, *_effect_of(clock))
-    told = {clock.sentence for clock in clocks}
-    for text in dict.fromkeys((*signals.notes, *timeline.notes, *notes)):
-        if text not in told:
-            row("Note", text, "see text")
-    for text in dict.fromkeys(note for a in assessments.values() for note in a.notes):
-        row("Evidence", text)
-    return rows
+    ]
+
+
+def _wheel_model(model: WheelModelFit | None) -> list[QualityRow]:
+    if model is None:
+        return []
+    effect = "none" if model.reliable else "gains and valves are not assessed"
+    return [_row("Wheel model", model.note, effect, model.reliable)]
+
+
+def _notes(texts: Iterable[str], clocks: Sequence[SourceClock]) -> list[QualityRow]:
+    """Notes of readers and timeline, each once, without those on clocks, which have rows of their own."""
+    on_clocks = {clock.sentence for clock in clocks}
+    return [_row("Note", text, "see text") for text in dict.fromkeys(texts) if text not in on_clocks]
 
 
 def _effect_of(clock: SourceClock) -> tuple[str, bool]:
@@ -192,7 +218,7 @@ def _effect_of(clock: SourceClock) -> tuple[str, bool]:
     return f"times of one file on the other's axis are right within ±{1e3 * clock.uncertainty_s:.2g} ms (95 %)", True
 
 
-def clock_row(clock: SourceClock | None) -> dict[str, Any] | None:
+def clock_row(clock: SourceClock | None) -> ClockRow | None:
     """How a file's clock was put onto the mission's, for ``report.json``; None for a mission of one file."""
     if clock is None or (clock.method == "reference" and not clock.reference):
         return None

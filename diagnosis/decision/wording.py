@@ -1,88 +1,64 @@
-"""Faults in words: parts and modes, what to do about each part, and the verdict's sentence."""
+"""Faults in words: what to do about each part, and the verdict's sentence."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 
+from diagnosis.results.document import ActionRow
+from diagnosis.results.fault_rows import mode_words
 from diagnosis.results.result import FaultInterval
+from diagnosis.results.vocabulary import Severity, part_words
 from replay.faults import FaultMode, Side
 
-GONE = (FaultMode.STUCK, FaultMode.NO_SIGNAL)
 
-MODE_WORDS = {
-    "sensor": {
-        "stuck": "stuck",
-        "no_signal": "without signal",
-        "inefficient": "inefficient",
-        "noisy": "noisy",
-        "outside_table": "outside the tables",
-    },
-    "actuator": {
-        "stuck": "stuck",
-        "no_signal": "without control signal",
-        "inefficient": "inefficient",
-        "noisy": "disturbed",
-        "outside_table": "outside the tables",
-    },
-}
-
-
-def mode_words(side: str, mode: str) -> str:
-    """A fault mode in words for its side, to follow *was*."""
-    return MODE_WORDS["actuator" if side == "actuator" else "sensor"][mode]
-
-
-def part_words(kind: str, component: str, side: str) -> str:
-    """A component and side in words: ``FR speed sensor``, ``front steering valve``."""
-    if kind == "steer":
-        return {
-            "sensor": f"{component} steering sensor",
-            "actuator": f"{component} steering valve",
-        }.get(side, f"{component} steering sensor or valve")
-    return {"sensor": f"{component} speed sensor", "actuator": f"{component} drive valve"}.get(
-        side, f"{component} speed sensor or drive valve"
-    )
-
-
-def actions_of(intervals: Sequence[FaultInterval]) -> tuple[dict[str, object], ...]:
+def actions_of(intervals: Sequence[FaultInterval]) -> tuple[ActionRow, ...]:
     """One action per component and side: valves to stop at once for, then other stops, then the rest, worst first."""
-    parts: dict[tuple[str, str, str], list[FaultInterval]] = {}
+    parts: dict[tuple[str, str], list[FaultInterval]] = {}
     for f in intervals:
-        if f.severity != "info":
-            parts.setdefault((f.kind, f.component, f.side.value), []).append(f)
-    out: list[dict[str, object]] = []
-    for (kind, component, side), faults in sorted(parts.items(), key=lambda part: _urgency(part[1][0])):
-        modes: dict[str, list[FaultInterval]] = {}
-        for f in faults:
-            modes.setdefault(f.mode.value, []).append(f)
-        found = join_words([_spells(side, mode, spells) for mode, spells in modes.items()])
-        text = f"{_order(faults[0])} the {part_words(kind, component, side)}: {found}."
-        out.append({"n": len(out) + 1, "text": text, "faults": [f.id for f in faults], "severity": faults[0].severity})
-    return tuple(out)
+        if f.severity is not Severity.INFO:
+            parts.setdefault((f.component, f.side), []).append(f)
+    ordered = sorted(parts.values(), key=lambda faults: _urgency(faults[0]))
+    return tuple(_action(n, faults) for n, faults in enumerate(ordered, 1))
+
+
+def _action(n: int, faults: Sequence[FaultInterval]) -> ActionRow:
+    """What to do about one part, with its faults worst first."""
+    worst = faults[0]
+    modes: dict[FaultMode, list[FaultInterval]] = {}
+    for f in faults:
+        modes.setdefault(f.mode, []).append(f)
+    found = join_words([_how_long(worst.side, mode, same) for mode, same in modes.items()])
+    return {
+        "n": n,
+        "text": f"{_order(worst)} the {part_words(worst.kind, worst.component, worst.side)}: {found}.",
+        "faults": [f.id for f in faults],
+        "severity": worst.severity,
+    }
 
 
 def _order(worst: FaultInterval) -> str:
     """What to do with a part, by its worst fault."""
-    if worst.severity == "high":
+    if worst.severity is Severity.HIGH:
         return "Stop at once and repair" if worst.side is Side.ACTUATOR else "Stop and repair"
     if unanswered(worst):
         return "Before the machine goes out, check"
-    return "Check at the next service" if worst.mode in GONE else "Check"
+    return "Check at the next service" if worst.mode.total else "Check"
 
 
 def unanswered(fault: FaultInterval) -> bool:
     """Whether a valve probably does not answer, though that is not certain enough to stop for."""
-    return fault.severity == "medium" and fault.mode in GONE and fault.side is not Side.SENSOR
+    return fault.severity is Severity.MEDIUM and fault.mode.total and fault.side is not Side.SENSOR
 
 
 def _urgency(worst: FaultInterval) -> int:
     """Place of a part among the actions, by its worst fault; equal ones keep their order."""
-    if worst.severity == "high":
+    if worst.severity is Severity.HIGH:
         return {Side.ACTUATOR: 0, Side.SENSOR_OR_ACTUATOR: 1}.get(worst.side, 2)
-    return {"medium": 3, "low": 4}.get(worst.severity, 5)
+    return {Severity.MEDIUM: 3, Severity.LOW: 4}.get(worst.severity, 5)
 
 
-def _spells(side: str, mode: str, faults: Sequence[FaultInterval]) -> str:
+def _how_long(side: Side, mode: FaultMode, faults: Sequence[FaultInterval]) -> str:
+    """A mode with the whole time of its faults on one part, and how many they are."""
     total = seconds_words(sum(f.stop_s - f.start_s for f in faults))
     return f"{mode_words(side, mode)} for {total}" + ("" if len(faults) == 1 else f" in {len(faults)} spells")
 
@@ -90,7 +66,7 @@ def _spells(side: str, mode: str, faults: Sequence[FaultInterval]) -> str:
 def sentence_of(faults: Sequence[FaultInterval]) -> str:
     """The worst three faults in one sentence."""
     shown = [
-        f"the {part_words(f.kind, f.component, f.side.value)} was {mode_words(f.side.value, f.mode.value)} for "
+        f"the {part_words(f.kind, f.component, f.side)} was {mode_words(f.side, f.mode)} for "
         f"{seconds_words(f.stop_s - f.start_s)}"
         for f in faults[:3]
     ]

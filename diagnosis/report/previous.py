@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from diagnosis.comparison.faults import GONE
 from diagnosis.comparison.words import CHANGES, OUTCOMES, SIGNS, coverage_words, times
 from diagnosis.pages import labels
+from replay.faults import TOTAL
 
 _BAD = ("new", "worse")
 
@@ -79,7 +79,7 @@ def _found(f: Mapping[str, Any] | None) -> str:
     if f is None:
         return "–"
     e = f.get("epsilon")
-    size = "" if e is None or f["mode"] in GONE else f", ε̂ {_epsilon(e)}"
+    size = "" if e is None or f["mode"] in TOTAL else f", ε̂ {_epsilon(e)}"
     return f"{f['severity']}, {times(len(f['ids']), f['seconds'])}{size}"
 
 

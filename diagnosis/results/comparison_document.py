@@ -17,6 +17,8 @@ SCHEMA: Final = "mfhca-compare/1"
 Status = Literal["new", "changed", "unchanged", "resolved", "not_seen_again"]
 #: Way in which a fault changed; empty where it did not.
 Trend = Literal["worse", "better", "other", ""]
+#: What is counted: the status, of a changed fault its trend.
+Outcome = Literal["new", "worse", "other", "better", "not_seen_again", "resolved", "unchanged"]
 #: Part of a fault that changed; ``row`` is its mode.
 Change = Literal["row", "side", "severity", "epsilon", "duration"]
 #: Whether a part was assessed in one of the missions alone; empty where in both or in neither.

@@ -7,11 +7,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from diagnosis.results.document import LossRow
 from diagnosis.results.result import Epsilon
 from replay.arrays.spill import blocks
 
@@ -68,10 +68,10 @@ def loss_of(y: Array, x: Array, use: NDArray[np.bool_], dt: float) -> Loss | Non
     return Loss(Epsilon(1.0 - gain, 1.0 - gain - spread, 1.0 - gain + spread), float(count[kept].sum()) * dt)
 
 
-def loss_rows(losses: Mapping[tuple[str, str], Loss | None]) -> list[dict[str, Any]]:
+def loss_rows(losses: Mapping[tuple[str, str], Loss | None]) -> list[LossRow]:
     """Rows of ``loss`` in ``report.json``: one for each component and side that has one."""
     return [
-        {"component": component, "side": side, "epsilon": loss.epsilon, "seconds": loss.seconds}
+        {"component": component, "side": side, "epsilon": loss.epsilon.row(), "seconds": loss.seconds}
         for (component, side), loss in losses.items()
         if loss is not None
     ]

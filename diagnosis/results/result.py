@@ -11,11 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from diagnosis.results.document import ReportDocument
+from diagnosis.results.size_rows import EpsilonRow
+from diagnosis.results.vocabulary import Kind, Severity, Tier
 from replay.faults import FaultMode, Side, State
 
-Severity = Literal["info", "low", "medium", "high"]
-Verdict = Literal["ready", "watch", "stop", "not_assessed"]
-SEVERITIES: tuple[Severity, ...] = ("info", "low", "medium", "high")
+SEVERITIES = tuple(Severity)
 
 
 @dataclass(frozen=True)
@@ -29,6 +29,10 @@ class Epsilon:
     def as_share(self) -> Epsilon:
         """The same within [0, 1], where every fault of the table has its ε."""
         return Epsilon(*(min(1.0, max(0.0, x)) for x in (self.value, self.low, self.high)))
+
+    def row(self) -> EpsilonRow:
+        """The same for ``report.json``."""
+        return {"value": self.value, "low": self.low, "high": self.high}
 
 
 @dataclass(frozen=True)
@@ -61,8 +65,8 @@ class FaultInterval:
         ``F1``, ``F2``, … in order of severity, then time.
     component : str
         Wheel or steering axle.
-    kind : str
-        ``wheel`` or ``steer``.
+    kind : Kind
+        Of the component.
     start_s, stop_s : float
         Mission time [s], half open.
     start_ns, stop_ns : int
@@ -73,13 +77,14 @@ class FaultInterval:
         Probability of side and mode.
     hypotheses : tuple[Hypothesis, ...]
         Alternatives with theirs, most probable first.
-    severity, advice : str
+    severity : Severity
         By Assumptions 1 and 2.
+    advice : str
+        What to do.
     evidence : tuple[str, ...]
         What decided, one sentence each with its figures.
-    tier : str
-        ``direct`` (a second measurement), ``model`` (model of the wheels or of the steering), ``drive`` (model of a
-        single drive), ``signal`` (the channel alone), ``tracking`` (the command that is not followed).
+    tier : Tier
+        Evidence behind it.
     detected_s : float or None
         Mission time [s] at which the same evidence, read without anything later, would have raised the fault; None
         where that is not known.
@@ -87,7 +92,7 @@ class FaultInterval:
 
     id: str
     component: str
-    kind: Literal["wheel", "steer"]
+    kind: Kind
     side: Side
     mode: FaultMode
     start_s: float
@@ -101,7 +106,7 @@ class FaultInterval:
     severity: Severity
     advice: str
     evidence: tuple[str, ...]
-    tier: str
+    tier: Tier
     detected_s: float | None = None
 
 

@@ -8,10 +8,13 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from diagnosis.decision.decide import Decision, decide, intervals_of, severity_of, spans_of
-from diagnosis.decision.wording import mode_words, part_words
+from diagnosis.decision.decide import Decision, decide
+from diagnosis.decision.intervals import intervals_of, spans_of
+from diagnosis.decision.severity import severity_of
 from diagnosis.results.assessment import CODE, Assessment, Finding, unassessed
+from diagnosis.results.fault_rows import mode_words
 from diagnosis.results.result import Epsilon, Hypothesis
+from diagnosis.results.vocabulary import part_words
 from replay.faults import FaultMode, Side, State
 from replay.machine.config import Limits
 
@@ -61,10 +64,10 @@ def verdict(
     return decide(intervals_of(assessments, AXLES, 0, STEP, limits), assessments, seconds, AXLES, limits, damage)
 
 
-GONE = pytest.mark.parametrize("mode", [FaultMode.STUCK, FaultMode.NO_SIGNAL])
+TOTAL = pytest.mark.parametrize("mode", [FaultMode.STUCK, FaultMode.NO_SIGNAL])
 
 
-@GONE
+@TOTAL
 def test_assumption_1_brief_sensor_fault_is_tolerable(mode: FaultMode) -> None:
     severity, advice = severity_of(finding(Side.SENSOR, mode), 1.0, LIMITS)
     assert severity == "low"
@@ -72,7 +75,7 @@ def test_assumption_1_brief_sensor_fault_is_tolerable(mode: FaultMode) -> None:
     assert "Assumption 1" in advice
 
 
-@GONE
+@TOTAL
 def test_assumption_1_persistent_sensor_fault_means_stop(mode: FaultMode) -> None:
     severity, advice = severity_of(finding(Side.SENSOR, mode), 1.001, LIMITS)
     assert severity == "high"
@@ -80,7 +83,7 @@ def test_assumption_1_persistent_sensor_fault_means_stop(mode: FaultMode) -> Non
     assert severity_of(finding(Side.SENSOR, mode), 1.5, Limits(brief=2.0))[0] == "low"
 
 
-@GONE
+@TOTAL
 @pytest.mark.parametrize("seconds", [0.05, 100.0])
 def test_assumption_2_actuator_fault_means_stop_at_once(mode: FaultMode, seconds: float) -> None:
     severity, advice = severity_of(finding(Side.ACTUATOR, mode), seconds, LIMITS)
@@ -89,7 +92,7 @@ def test_assumption_2_actuator_fault_means_stop_at_once(mode: FaultMode, seconds
     assert "Assumption 2" in advice
 
 
-@GONE
+@TOTAL
 def test_drive_that_may_be_either_is_treated_as_the_actuator(mode: FaultMode) -> None:
     assert severity_of(finding(Side.SENSOR_OR_ACTUATOR, mode), 0.5, LIMITS)[0] == "high"
 
@@ -247,7 +250,7 @@ def test_every_fault_above_info_has_an_action() -> None:
     )
     got = verdict(parts)
     intervals = intervals_of(parts, AXLES, 0, STEP, LIMITS)
-    named = {i for action in got.actions for i in action["faults"]}  # type: ignore[attr-defined]
+    named = {i for action in got.actions for i in action["faults"]}
     assert named == {f.id for f in intervals if f.severity != "info"}
     assert [a["n"] for a in got.actions] == list(range(1, len(got.actions) + 1))
     assert got.actions[0]["severity"] == "high"

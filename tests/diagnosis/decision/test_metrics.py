@@ -80,7 +80,7 @@ def test_the_papers_table_stands_beside() -> None:
         ("Yu", 0.024, 0.125, 6),
         ("Sun", 0.035, 0.135, 12),
     ]
-    assert np.isnan(got["average"]["tracking_error"]["mission"])
+    assert got["average"]["tracking_error"]["mission"] is None
 
 
 def test_coverage_counts_every_sample() -> None:

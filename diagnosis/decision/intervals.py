@@ -1,0 +1,72 @@
+"""From findings and states of single parts to the mission's faults and spans."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from diagnosis.decision.severity import severity_of
+from diagnosis.results.assessment import STATES, Assessment
+from diagnosis.results.result import FaultInterval, StateSpan
+from diagnosis.results.vocabulary import Kind, Tier
+from replay.machine.config import Limits
+
+#: A component and its side.
+Part = tuple[str, str]
+
+
+def intervals_of(
+    assessments: Mapping[Part, Assessment], axles: Sequence[str], start_ns: int, step_ns: int, limits: Limits
+) -> tuple[FaultInterval, ...]:
+    """Number the findings of all components: worst first, then by time; a shared finding counts once."""
+    found: dict[tuple[str, str, int, int], FaultInterval] = {}
+    for (component, _), assessment in assessments.items():
+        kind = Kind.STEER if component in axles else Kind.WHEEL
+        for f in assessment.findings:
+            seconds = (f.stop - f.start) * step_ns * 1e-9
+            severity, advice = severity_of(f, seconds, limits, kind)
+            found[component, f.side, f.start, f.stop] = FaultInterval(
+                id="",
+                component=component,
+                kind=kind,
+                side=f.side,
+                mode=f.mode,
+                start_s=f.start * step_ns * 1e-9,
+                stop_s=f.stop * step_ns * 1e-9,
+                start_ns=start_ns + f.start * step_ns,
+                stop_ns=start_ns + f.stop * step_ns,
+                epsilon=f.epsilon,
+                sat=f.sat,
+                probability=f.probability,
+                hypotheses=f.hypotheses,
+                severity=severity,
+                advice=advice,
+                evidence=f.evidence,
+                tier=Tier(f.tier),
+                detected_s=None if f.detected is None else f.detected * step_ns * 1e-9,
+            )
+    ordered = sorted(found.values(), key=lambda x: (-x.severity.rank, x.start_s, x.component, x.side))
+    return tuple(replace(f, id=f"F{i + 1}") for i, f in enumerate(ordered))
+
+
+def spans_of(assessments: Mapping[Part, Assessment], step_ns: int) -> tuple[StateSpan, ...]:
+    """States of every component and side as spans without gaps."""
+    out = []
+    for (component, side), assessment in assessments.items():
+        codes = assessment.states
+        cut = np.flatnonzero(np.r_[True, codes[1:] != codes[:-1]])
+        for a, b in zip(cut, np.r_[cut[1:], codes.size], strict=True):
+            state = STATES[int(codes[a])]
+            out.append(
+                StateSpan(
+                    component=component,
+                    side="sensor" if side == "sensor" else "actuator",
+                    state=state,
+                    start_s=float(a) * step_ns * 1e-9,
+                    stop_s=float(b) * step_ns * 1e-9,
+                    reason=assessment.reasons.get(state, ""),
+                )
+            )
+    return tuple(out)

@@ -1,0 +1,76 @@
+"""How urgent a fault is, by Assumptions 1 and 2 of the paper.
+
+Assumption 1: a sensor that is stuck or silent is tolerable when brief, else stop and repair. Assumption 2: a stuck
+actuator, or one without control signal, means stop at once. Everything else is watched.
+"""
+
+from __future__ import annotations
+
+from diagnosis.results.assessment import Finding
+from diagnosis.results.vocabulary import Kind, Severity, Tier
+from replay.faults import TOTAL, FaultMode, Side
+from replay.machine.config import Limits
+
+_LIKELY = 0.6  # probability of any fault from which on one is worth a check
+_MARKED_EPSILON = 0.3
+_SHORT_NOISE_S = 1.0
+_PROBABLY_TOTAL = 0.5
+
+
+def severity_of(finding: Finding, seconds: float, limits: Limits, kind: Kind = Kind.WHEEL) -> tuple[Severity, str]:
+    """Severity and advice of one fault that lasts `seconds`; see the module's docstring."""
+    faulty = 1.0 - sum(h.p for h in finding.hypotheses if h.mode == "healthy")
+    if faulty < _LIKELY:
+        return Severity.INFO, "Not certain enough to act on. Compare with the next mission."
+    if faulty < limits.min_probability:
+        if finding.mode.total and finding.side is not Side.SENSOR:
+            return Severity.MEDIUM, "Probably a valve that does not answer: check it before the machine goes out again."
+        return Severity.LOW, "Probable, not certain: check it at the next service, and compare with the next mission."
+    if finding.mode is FaultMode.NOISY and finding.tier == Tier.MODEL and seconds < _SHORT_NOISE_S:
+        return Severity.INFO, "Too short to act on: a model alone shows it. Compare with the next mission."
+    if finding.mode.total:
+        return _severity_of_total(finding, seconds, limits, kind)
+    marked = finding.epsilon is not None and finding.epsilon.value >= _MARKED_EPSILON
+    if finding.mode is FaultMode.OUTSIDE_TABLE:
+        return (
+            Severity.MEDIUM,
+            "Check scaling and sign of the channel: its gain lies outside what a fault of the table can give.",
+        )
+    return Severity.MEDIUM if marked else Severity.LOW, f"By itself no reason to stop; {_check_of(finding, kind)}."
+
+
+def _severity_of_total(finding: Finding, seconds: float, limits: Limits, kind: Kind) -> tuple[Severity, str]:
+    """Severity and advice of a part that is stuck or without signal, with enough probability of a fault."""
+    if sum(h.p for h in finding.hypotheses if h.mode in TOTAL) < _PROBABLY_TOTAL:
+        return (
+            Severity.MEDIUM,
+            "Faulty, but more probably in another way than dead: check it before the next mission.",
+        )
+    if finding.side is Side.ACTUATOR:
+        return Severity.HIGH, "Stop at once and repair: the valve does not answer its command (Assumption 2)."
+    if finding.side is Side.SENSOR_OR_ACTUATOR:
+        part = "steering valve" if kind is Kind.STEER else "drive"
+        return (
+            Severity.HIGH,
+            f"Stop and find out whether the {part} or its sensor fails; treat it as the {part} until then.",
+        )
+    if seconds <= limits.brief:
+        return Severity.LOW, (
+            f"Tolerable: no longer than {limits.brief:g} s (Assumption 1). Check plug and cable at the next service."
+        )
+    return Severity.HIGH, (
+        f"Stop and repair the sensor: it gave nothing usable for more than {limits.brief:g} s (Assumption 1)."
+    )
+
+
+def _check_of(finding: Finding, kind: Kind) -> str:
+    """What to check at a part that is inefficient or noisy."""
+    inefficient = finding.mode is FaultMode.INEFFICIENT
+    if finding.side is Side.SENSOR:
+        scaling = "wire, mount and scaling" if kind is Kind.STEER else "gap, magnet and scaling"
+        return f"check the sensor's {scaling if inefficient else 'shield, ground and supply'}"
+    if finding.side is Side.ACTUATOR:
+        return (
+            f"check the valve's {'pressure, leakage and spool travel' if inefficient else 'command wiring and pilot'}"
+        )
+    return f"measure {'angle' if kind is Kind.STEER else 'speed'} and valve travel to tell sensor from valve"

@@ -1,0 +1,191 @@
+"""The document of a judged mission: everything of ``report.json`` but the comparison with another mission."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from diagnosis.assess import ComponentResult
+from diagnosis.decision import metrics, quality
+from diagnosis.decision.caveats import more_caveats
+from diagnosis.decision.decide import Decision, decide
+from diagnosis.decision.intervals import intervals_of, spans_of
+from diagnosis.results.document import SCHEMA, CoverageRow, FileRow, LogRow, MachineRow, ReportDocument, WheelPlace
+from diagnosis.results.loss import loss_rows
+from diagnosis.results.result import FaultInterval, to_json
+from replay.arrays.envelope import bucket_of
+from replay.control.loop import Replay
+from replay.machine.config import Machine
+from replay.mission import Mission, MissionFile
+from replay.readers.machine_identity import stated_machine
+from replay.signals.timeline import Timeline
+from replay.version import __version__
+
+
+@dataclass(frozen=True)
+class Judged:
+    """A mission with all that was found in it.
+
+    Attributes
+    ----------
+    mission : Mission
+        Files, signals, timeline.
+    recorded : quality.Recorded
+        What is said of signals as they were recorded.
+    machine : Machine
+        The machine.
+    replay : Replay
+        The replayed loop.
+    found : ComponentResult
+        Assessments of all parts.
+    """
+
+    mission: Mission
+    recorded: quality.Recorded
+    machine: Machine
+    replay: Replay
+    found: ComponentResult
+
+    @cached_property
+    def intervals(self) -> tuple[FaultInterval, ...]:
+        """Faults, worst first."""
+        line = self.mission.timeline
+        return intervals_of(
+            self.found.assessments, self.machine.axles, line.start_ns, line.step_ns, self.machine.limits
+        )
+
+    @property
+    def damage(self) -> list[str]:
+        """What the files lost."""
+        return [text for f in self.mission.files for text in f.summary.damage]
+
+
+def report_of_mission(judged: Judged, identity: MachineRow) -> ReportDocument:
+    """The report of a mission, rounded to nine digits and without NaN.
+
+    Parameters
+    ----------
+    judged : Judged
+        The mission and what was found in it.
+    identity : MachineRow
+        From `machine_row`.
+    """
+    mission, machine, replay, found = judged.mission, judged.machine, judged.replay, judged.found
+    timeline = mission.timeline
+    moving = metrics.driving(replay, timeline, machine)
+    coverage, decided_s = metrics.coverage(found.assessments, moving, machine, timeline.dt)
+    report: ReportDocument = {
+        "schema": SCHEMA,
+        "tool": {"name": "mfhca-replay", "version": __version__},
+        "log": _log(mission, moving, machine),
+        "machine": identity,
+        "readings": to_json(replay.readings),
+        "verdict": _decision(judged, coverage, decided_s).row(more_caveats(mission, judged.recorded.first_ns, machine)),
+        "intervals": to_json(judged.intervals),
+        "states": to_json(spans_of(found.assessments, timeline.step_ns)),
+        "phases": metrics.phases(timeline, replay, machine),
+        "coverage": coverage,
+        "loss": loss_rows({key: a.loss for key, a in found.assessments.items()}),
+        "metrics": metrics.loop_metrics(timeline, replay, machine, moving),
+        "signals": list(judged.recorded.rows),
+        "missing": quality.missing_rows(mission.signals, machine),
+        "quality": quality.checks(
+            mission.signals,
+            judged.recorded,
+            timeline,
+            judged.damage,
+            [text for f in mission.files for text in f.summary.notes],
+            found.assessments,
+            found.wheel_model,
+            [f.clock for f in mission.files if f.clock is not None],
+        ),
+        "limits": to_json(machine.limits),
+    }
+    plain: ReportDocument = to_json(report)
+    return plain
+
+
+def _decision(judged: Judged, coverage: list[CoverageRow], decided_s: dict[tuple[str, str], float]) -> Decision:
+    return decide(
+        judged.intervals,
+        judged.found.assessments,
+        decided_s,
+        judged.machine.axles,
+        judged.machine.limits,
+        judged.damage,
+        driving_s={(row["component"], row["side"]): row["driving_s"] for row in coverage},
+        model=judged.found.wheel_model,
+    )
+
+
+def _log(mission: Mission, moving: NDArray[np.bool_], machine: Machine) -> LogRow:
+    timeline = mission.timeline
+    row: LogRow = {
+        "files": [_file(f) for f in mission.files],
+        "start_ns": timeline.start_ns,
+        "open_loop": mission.open_loop,
+        "duration_s": timeline.size * timeline.dt,
+        "rate_hz": 1e9 / timeline.step_ns,
+        "distance_m": _distance(timeline, machine),
+        "driving_s": float(np.count_nonzero(moving.any(axis=1))) * timeline.dt,
+    }
+    if (bucket := bucket_of(timeline.size)) > 1:
+        row["samples_per_bucket"] = bucket
+    return row
+
+
+def _file(file: MissionFile) -> FileRow:
+    return {
+        "path": file.path.name,
+        "sha256": file.sha256,
+        "bytes": file.bytes,
+        "format": file.format,
+        "damage": list(file.summary.damage),
+        "notes": list(file.summary.notes),
+        "clock": quality.clock_row(file.clock),
+    }
+
+
+def _distance(timeline: Timeline, machine: Machine) -> float | None:
+    """Distance by the mean of the wheels' speeds [m]; None where no wheel speed is logged."""
+    speeds = [timeline.signals[n] for w in machine.wheels if (n := f"wheel.{w}.v") in timeline.signals]
+    if not speeds:
+        return None
+    distance = 0.0
+    for part in timeline.blocks():
+        near = [v[part] for v in speeds]
+        mean = np.nansum(np.abs(near), axis=0) / np.maximum(np.isfinite(near).sum(axis=0), 1)
+        distance += float(mean.sum()) * timeline.dt
+    return distance
+
+
+def machine_row(machine: Machine, mission: Mission, source: str, machine_id: str | None) -> MachineRow:
+    """The machine, with the identity that was given, else the one that the logs state, else the machine file's.
+
+    Parameters
+    ----------
+    machine : Machine
+        The machine.
+    mission : Mission
+        Its mission.
+    source : str
+        Where the machine's settings come from.
+    machine_id : str or None
+        Identity that was given.
+    """
+    geometry: dict[str, WheelPlace] | None = None
+    if machine.geometry is not None:
+        geometry = {
+            w: {"x": g.x, "y": g.y, "offset": g.offset, "axle": g.axle} for w, g in machine.geometry.wheels.items()
+        }
+    return {
+        "name": machine.name,
+        "id": machine_id or stated_machine(f.summary.metadata for f in mission.files) or machine.id,
+        "wheels": list(machine.wheels),
+        "axles": list(machine.axles),
+        "geometry": geometry,
+        "source": source,
+    }
