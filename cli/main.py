@@ -16,22 +16,32 @@ from typing import Annotated
 
 import typer
 
-from cli.commands import audit, compare, config, diagnose, evaluate, fit, inject, inspect, replay, schema, simulate
-from cli.terminal.command import App, Quiet, Verbose, terminal_of
+from cli.commands import (
+    audit,
+    channels,
+    compare,
+    config,
+    diagnose,
+    evaluate,
+    fit,
+    inject,
+    inspect,
+    report,
+    schema,
+    simulate,
+)
+from cli.commands import replay as replay_command  # the package of that name is another thing
+from cli.terminal.command import USAGE, App, Quiet, Verbose
 from cli.terminal.console import Terminal, discard
 from cli.terminal.interrupts import asked, check, forget, listen
 from replay.errors import MfhcaError
 from replay.version import __version__
-
-# Click's base of usage errors; typer carries its own copy of click in newer versions.
-_UsageError = next(c for c in typer.BadParameter.__mro__ if c.__name__ == "ClickException")
 
 INTERNAL, INTERRUPTED = 70, 130
 
 app = typer.Typer(
     name="mfhca",
     cls=App,
-    no_args_is_help=True,
     rich_markup_mode=None,
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
@@ -48,7 +58,6 @@ def _version(wanted: bool) -> None:
 
 @app.callback()
 def root(
-    context: typer.Context,
     version: Annotated[
         bool, typer.Option("--version", "-V", callback=_version, is_eager=True, help="Show the version and exit.")
     ] = False,
@@ -56,19 +65,18 @@ def root(
     verbose: Verbose = False,
 ) -> None:
     """Replay the logs of a heavy-duty wheeled machine and find its sensor and actuator faults."""
-    terminal_of(context, quiet=quiet, verbose=verbose)
 
 
 _DIAGNOSE, _LOOK, _MAKE = "Diagnose", "Look into a log", "Set up and try"
 for _panel, _function, _name, _epilog in (
-    (_DIAGNOSE, diagnose.diagnose, "diagnose", diagnose.DIAGNOSE_EXAMPLES),
-    (_DIAGNOSE, diagnose.report, "report", diagnose.REPORT_EXAMPLES),
+    (_DIAGNOSE, diagnose.diagnose, "diagnose", diagnose.EXAMPLES),
+    (_DIAGNOSE, report.report, "report", report.EXAMPLES),
     (_DIAGNOSE, audit.audit, "audit", audit.EXAMPLES),
     (_DIAGNOSE, compare.compare, "compare", compare.EXAMPLES),
     (_DIAGNOSE, evaluate.evaluate, "evaluate", evaluate.EXAMPLES),
-    (_LOOK, inspect.inspect, "inspect", inspect.INSPECT_EXAMPLES),
-    (_LOOK, inspect.channels, "channels", inspect.CHANNELS_EXAMPLES),
-    (_LOOK, replay.replay, "replay", replay.EXAMPLES),
+    (_LOOK, inspect.inspect, "inspect", inspect.EXAMPLES),
+    (_LOOK, channels.channels, "channels", channels.EXAMPLES),
+    (_LOOK, replay_command.replay_log, "replay", replay_command.EXAMPLES),
     (_MAKE, fit.fit, "fit", fit.EXAMPLES),
     (_MAKE, simulate.simulate, "simulate", simulate.EXAMPLES),
     (_MAKE, inject.inject, "inject", inject.EXAMPLES),
@@ -101,7 +109,7 @@ def run(arguments: Sequence[str] | None = None) -> int:
     except Exception as error:
         if asked():  # what compiled code makes of it
             return _interrupted(terminal)
-        if isinstance(error, _UsageError):
+        if isinstance(error, typer.TyperException):
             return _usage_error(terminal, error)
         return _internal_error(terminal, error)
 
@@ -111,16 +119,13 @@ def _interrupted(terminal: Terminal) -> int:
     return INTERRUPTED
 
 
-def _usage_error(terminal: Terminal, error: Exception) -> int:
-    """Print help where no command was given, else what is off and where to read on."""
-    context = getattr(error, "ctx", None)
-    message = str(error.format_message()).replace("Value error, ", "")  # type: ignore[attr-defined]
-    if type(error).__name__ == "NoArgsIsHelpError":
-        typer.echo(message, err=True)
-    else:
-        path = getattr(context, "command_path", "mfhca")
-        terminal.error(f"{message.rstrip('.')}; see `{path} --help`")
-    return 2
+def _usage_error(terminal: Terminal, error: typer.TyperException) -> int:
+    """Print what is wrong and where to read on."""
+    context = getattr(error, "ctx", None)  # of errors that know their command
+    path = getattr(context, "command_path", "mfhca")
+    message = error.format_message().replace("Value error, ", "")
+    terminal.error(f"{message.rstrip('.')}; see `{path} --help`")
+    return USAGE
 
 
 def _system_error(terminal: Terminal, error: OSError) -> int:

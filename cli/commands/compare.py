@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from cli.commands.saved_results import result_file
-from cli.terminal.command import command
-from cli.terminal.console import Terminal
+from cli.terminal.command import Quiet, Verbose, terminal_of
 from cli.terminal.inputs import check_output
 from cli.terminal.options import Json
 
@@ -28,23 +27,29 @@ Exit codes: 0 nothing new or worse · 1 a fault of at least low severity is new 
 
 _WORSE = 1
 
+Older = Annotated[
+    Path, typer.Argument(metavar="A", help="Older result: folder of a report, or its report.json.", show_default=False)
+]
+Newer = Annotated[Path, typer.Argument(metavar="B", help="Newer result of the same machine.", show_default=False)]
+Page = Annotated[
+    Path | None,
+    typer.Option("--html", "-o", metavar="FILE", help="Write the comparison as one page.", show_default=False),
+]
+Force = Annotated[bool, typer.Option("--force", help="Compare even results of different machines.")]
 
-@command
+
 def compare(
-    terminal: Terminal,
-    older: Annotated[
-        Path,
-        typer.Argument(metavar="A", help="Older result: folder of a report, or its report.json.", show_default=False),
-    ],
-    newer: Annotated[Path, typer.Argument(metavar="B", help="Newer result of the same machine.", show_default=False)],
-    html: Annotated[
-        Path | None,
-        typer.Option("--html", "-o", metavar="FILE", help="Write the comparison as one page.", show_default=False),
-    ] = None,
-    force: Annotated[bool, typer.Option("--force", help="Compare even results of different machines.")] = False,
+    context: typer.Context,
+    older: Older,
+    newer: Newer,
+    html: Page = None,
+    force: Force = False,
     json: Json = False,
+    quiet: Quiet = False,
+    verbose: Verbose = False,
 ) -> None:
     """Compare two missions: faults that are new, worse, changed, gone; and what was not assessed."""
+    terminal = terminal_of(context, json=json)
     files = [result_file(path) for path in (older, newer)]
     if html is not None:
         check_output([html], files)

@@ -8,8 +8,7 @@ from typing import Annotated
 
 import typer
 
-from cli.terminal.command import App, command
-from cli.terminal.console import Terminal
+from cli.terminal.command import App, Quiet, Verbose, terminal_of
 from cli.terminal.inputs import machine_of, mission_paths
 from cli.terminal.options import Json, MachineFile
 from replay.errors import ConfigError
@@ -17,7 +16,6 @@ from replay.progress import Stage
 
 app = typer.Typer(
     cls=App,
-    no_args_is_help=True,
     rich_markup_mode=None,
     help="Write, check and show machine files.",
     context_settings={"help_option_names": ["-h", "--help"]},
@@ -34,17 +32,19 @@ def starter() -> str:
     return resources.files("cli.commands").joinpath("starter.toml").read_text(encoding="utf-8")
 
 
-@command
 def init(
-    terminal: Terminal,
+    context: typer.Context,
     output: Annotated[
         Path | None,
         typer.Option("--output", "-o", metavar="FILE", help="File to write.", show_default="printed instead"),
     ] = None,
+    quiet: Quiet = False,
+    verbose: Verbose = False,
 ) -> None:
     """Write a commented starter: every key, its unit and default."""
     from replay.atomic_write import atomic_path
 
+    terminal = terminal_of(context)
     if output is None:
         terminal.show_text(starter())
         return
@@ -55,17 +55,19 @@ def init(
     terminal.show(f"Wrote {output}; edit it, then run: mfhca config check {output} --log LOG")
 
 
-@command
 def check(
-    terminal: Terminal,
+    context: typer.Context,
     file: Annotated[Path, typer.Argument(metavar="FILE", help="Machine file.", show_default=False)],
     log: Annotated[
         list[Path] | None,
         typer.Option("--log", metavar="LOG", help="Also find its signals in this log.", show_default=False),
     ] = None,
     json: Json = False,
+    quiet: Quiet = False,
+    verbose: Verbose = False,
 ) -> None:
     """Check a machine file; with --log also that every signal it names is there."""
+    terminal = terminal_of(context, json=json)
     machine, source = machine_of(file)
     lost: list[str] = []
     document: dict[str, object] = {"file": str(file), "ok": True, "given_signals": sorted(machine.signals)}
@@ -87,13 +89,12 @@ def check(
     terminal.show(f"{file}: fine. {machine.name}, wheels {', '.join(machine.wheels)}, {count} signals given.")
 
 
-@command
-def show(terminal: Terminal, machine: MachineFile = None) -> None:
+def show(context: typer.Context, machine: MachineFile = None, quiet: Quiet = False, verbose: Verbose = False) -> None:
     """Show all settings in use, as a machine file."""
     from replay.machine.toml_file import dump_machine
 
     the_machine, source = machine_of(machine)
-    terminal.show_text(f"# {source}\n{dump_machine(the_machine)}")
+    terminal_of(context).show_text(f"# {source}\n{dump_machine(the_machine)}")
 
 
 for _function, _example in (

@@ -10,8 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from cli.commands.saved_results import results_and_truths, saved_report
-from cli.terminal.command import command
-from cli.terminal.console import Terminal
+from cli.terminal.command import Quiet, Verbose, terminal_of
 from cli.terminal.inputs import check_output, machine_of
 from cli.terminal.options import Json, MachineFile
 from replay.progress import Stage, Subscriber
@@ -29,33 +28,39 @@ Examples:
 
 SCHEMA = "mfhca-evaluation/1"
 
+Results = Annotated[
+    list[Path],
+    typer.Argument(
+        metavar="RESULT",
+        help="Report folders, report.json files, logs to diagnose first, or folders of them; the truth may follow "
+        "a single one.",
+        show_default=False,
+    ),
+]
+TruthFile = Annotated[
+    Path | None,
+    typer.Option(
+        "--truth", metavar="FILE", help="Truth of the one RESULT. Default: <log>.truth.json.", show_default=False
+    ),
+]
+Page = Annotated[
+    Path | None,
+    typer.Option("--html", "-o", metavar="FILE", help="Write all figures as one page.", show_default=False),
+]
 
-@command
+
 def evaluate(
-    terminal: Terminal,
-    results: Annotated[
-        list[Path],
-        typer.Argument(
-            metavar="RESULT",
-            help="Report folders, report.json files, logs to diagnose first, or folders of them; the truth may follow "
-            "a single one.",
-            show_default=False,
-        ),
-    ],
-    truth: Annotated[
-        Path | None,
-        typer.Option(
-            "--truth", metavar="FILE", help="Truth of the one RESULT. Default: <log>.truth.json.", show_default=False
-        ),
-    ] = None,
-    html: Annotated[
-        Path | None,
-        typer.Option("--html", "-o", metavar="FILE", help="Write all figures as one page.", show_default=False),
-    ] = None,
+    context: typer.Context,
+    results: Results,
+    truth: TruthFile = None,
+    html: Page = None,
     machine: MachineFile = None,
     json: Json = False,
+    quiet: Quiet = False,
+    verbose: Verbose = False,
 ) -> None:
     """Score results against the truth: confusion, faults found, delays, ε errors, false alarms, reliability."""
+    terminal = terminal_of(context, json=json)
     pairs = results_and_truths(results, truth)
     if html is not None:
         check_output([html], [path for pair in pairs for path in pair if not path.is_dir()])

@@ -3,21 +3,15 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
-from cli.terminal.command import command
-from cli.terminal.console import Terminal
+from cli.terminal.command import Quiet, Verbose, terminal_of
 from cli.terminal.inputs import check_output, find_logs, machine_of
 from cli.terminal.options import Json, MachineFile
 from replay.errors import ConfigError, LogError, NotJudged
 from replay.progress import Stage
-
-if TYPE_CHECKING:
-    from rich.console import RenderableType
-
-    from diagnosis.fitting.missions import FitResult
 
 EXAMPLES = """\b
 Examples:
@@ -26,26 +20,31 @@ Examples:
   mfhca fit logs/healthy -m base.toml -o machine.toml --force --json"""
 
 
-@command
+Missions = Annotated[
+    list[str],
+    typer.Argument(
+        metavar="LOG...", help="Healthy missions of one machine: one log each; folders, globs.", show_default=False
+    ),
+]
+Output = Annotated[
+    Path | None,
+    typer.Option("--output", "-o", metavar="FILE", help="Machine file to write.", show_default="none: the table only"),
+]
+Force = Annotated[bool, typer.Option("--force", help="Replace the file where it exists.")]
+
+
 def fit(
-    terminal: Terminal,
-    logs: Annotated[
-        list[str],
-        typer.Argument(
-            metavar="LOG...", help="Healthy missions of one machine: one log each; folders, globs.", show_default=False
-        ),
-    ],
+    context: typer.Context,
+    logs: Missions,
     machine: MachineFile = None,
-    output: Annotated[
-        Path | None,
-        typer.Option(
-            "--output", "-o", metavar="FILE", help="Machine file to write.", show_default="none: the table only"
-        ),
-    ] = None,
-    force: Annotated[bool, typer.Option("--force", help="Replace the file where it exists.")] = False,
+    output: Output = None,
+    force: Force = False,
     json: Json = False,
+    quiet: Quiet = False,
+    verbose: Verbose = False,
 ) -> None:
     """Measure a machine's constants, with their uncertainty, from missions in which it was healthy."""
+    terminal = terminal_of(context, json=json)
     found = find_logs(logs)
     if found.missing:
         raise LogError("; ".join(found.missing))
@@ -67,6 +66,8 @@ def fit(
     for error in result.unit_errors:
         terminal.note(f"unit error: {error.text}")
     if not json:
+        from cli.tables.fit import fit_parts
+
         terminal.show(*fit_parts(result))
     written = any(c.written for c in result.constants)
     if output is not None and written:
@@ -79,49 +80,3 @@ def fit(
         raise NotJudged("no constant of the machine can be told from these missions, and nothing is written")
     if output is not None:
         terminal.show(f"Wrote {output}; use it with: mfhca diagnose LOG --machine {output}")
-
-
-def fit_parts(result: FitResult) -> list[RenderableType]:
-    """Tables and lists for the terminal."""
-    from cli.tables.layout import bullets, section, table, text
-    from diagnosis.fitting.document import number, remark, stated
-
-    rows = [
-        (
-            c.key,
-            text(stated(c), "" if c.written else "dim"),
-            c.unit,
-            number(c.before),
-            c.windows or "–",
-            c.missions,
-            text(remark(c), "dim"),
-        )
-        for c in result.constants
-        if not c.key.startswith("noise.")
-    ]
-    pairs = zip(
-        (c for c in result.constants if c.key.endswith(".std")),
-        (c for c in result.constants if c.key.endswith(".lsb")),
-        strict=True,
-    )
-    noise = [
-        (std.key.removesuffix(".std"), stated(std), number(lsb.value), std.missions, text(remark(std), "dim"))
-        for std, lsb in pairs
-    ]
-    count = len(result.missions)
-    title = (
-        f"{count} mission{'' if count == 1 else 's'}, {result.seconds:.0f} s, {result.driving:.0f} s of them driving"
-    )
-    parts: list[RenderableType] = [
-        section(title),
-        table(("constant", "value", "unit", "was", "windows", "missions", ""), rows, right=(3, 4, 5)),
-        "",
-        table(("channel, SI units", "std", "lsb", "missions", ""), noise, right=(3,)),
-    ]
-    if result.unit_errors:
-        parts += [section("Wrong units: these constants are not written"), bullets(e.text for e in result.unit_errors)]
-    if result.left_out:
-        parts += [section("Left out"), bullets(result.left_out)]
-    if result.notes:
-        parts += [section("Notes"), bullets(result.notes)]
-    return parts

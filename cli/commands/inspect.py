@@ -10,32 +10,25 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from cli.terminal.command import command
 from cli.terminal.console import Terminal
-from cli.terminal.inputs import FoundLogs, find_logs, machine_of, mission_paths
-from cli.terminal.options import Json, Logs, MachineFile
+from cli.terminal.inputs import FoundLogs, find_logs, machine_of
+from cli.terminal.options import Json, MachineFile
 from replay.progress import Stage
 
 if TYPE_CHECKING:
     from replay.inspection.report import InspectReport
     from replay.machine.config import Machine
 
-INSPECT_EXAMPLES = """\b
+EXAMPLES = """\b
 Examples:
   mfhca inspect mission.mcap                  # from the index, at once
   mfhca inspect mission.mcap --full           # reads everything
   mfhca inspect logs/ "archive/**/*.bag" --json
   mfhca inspect s3://fleet/2026/              # of MCAP files by a few small requests
   find . -name "*.mcap" | mfhca inspect -"""
-CHANNELS_EXAMPLES = """\b
-Examples:
-  mfhca channels mission.mcap
-  mfhca channels drive.bag plc-export.csv -m machine.toml"""
-
 _UNREADABLE, _INTERNAL = 3, 70
 
 
-@command
 def inspect(
     terminal: Terminal,
     paths: Annotated[
@@ -138,24 +131,3 @@ def _looker(full: bool, machine: Path | None) -> Callable[[Path], InspectReport]
         return inspect_log.inspect_log(path, options) if full else inspect_log.inspect_index(path, options)
 
     return look
-
-
-@command
-def channels(terminal: Terminal, logs: Logs, machine: MachineFile = None, json: Json = False) -> None:
-    """Show where each signal was found, what is missing, and what that costs the diagnosis."""
-    paths = mission_paths(logs)
-    the_machine, source = machine_of(machine)
-    with terminal.progress(Stage.STARTING) as progress:
-        from cli.tables.signals import signals_document, signals_parts
-        from replay.mission import read_signals
-
-        files, signals = read_signals(paths, the_machine, progress=progress)
-    if json:
-        terminal.show_json(signals_document(files, signals, the_machine, source))
-        return
-    from cli.tables.layout import bullets, section
-
-    terminal.show(*signals_parts(signals, the_machine))
-    damage = [line for file in files for line in file.summary.damage]
-    if damage:
-        terminal.show(section("Damage"), bullets(damage))

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from cli.terminal.command import command
+from cli.terminal.command import Quiet, Verbose, terminal_of
 from cli.terminal.console import Terminal
 from cli.terminal.inputs import check_output, check_times, machine_of, mission_paths
 from cli.terminal.options import End, Json, Logs, MachineFile, Start
@@ -22,53 +23,79 @@ Examples:
   mfhca replay mission.mcap --raw -o recorded   # every topic as Parquet"""
 
 
-@command
-def replay(
-    terminal: Terminal,
+Output = Annotated[
+    Path,
+    typer.Option(
+        "--output", "-o", metavar="FILE", help=".parquet, .csv or .mcap; with --raw a folder.", show_default=False
+    ),
+]
+Raw = Annotated[
+    bool, typer.Option("--raw", help="Convert the log itself: all its numbers at their own stamps, no replay.")
+]
+Force = Annotated[bool, typer.Option("--force", help="Replace files that something else wrote.")]
+
+
+@dataclass(frozen=True)
+class ReplayRequest:
+    """What the command line asks for, once checked; names and defaults as there."""
+
+    paths: list[Path]
+    output: Path
+    machine: Path | None
+    start_s: float | None
+    end_s: float | None
+    force: bool
+    json: bool
+
+
+def replay_log(
+    context: typer.Context,
     logs: Logs,
-    output: Annotated[
-        Path,
-        typer.Option(
-            "--output", "-o", metavar="FILE", help=".parquet, .csv or .mcap; with --raw a folder.", show_default=False
-        ),
-    ],
-    raw: Annotated[
-        bool, typer.Option("--raw", help="Convert the log itself: all its numbers at their own stamps, no replay.")
-    ] = False,
+    output: Output,
+    raw: Raw = False,
     machine: MachineFile = None,
     start: Start = None,
     end: End = None,
-    force: Annotated[bool, typer.Option("--force", help="Replace files that something else wrote.")] = False,
+    force: Force = False,
     json: Json = False,
+    quiet: Quiet = False,
+    verbose: Verbose = False,
 ) -> None:
     """Replay the control loop: v_c, e, ρ, Ψ̂ printed and implied, u_a and u_s, to Parquet, CSV or MCAP; or the log as recorded."""
-    paths = mission_paths(logs)
+    terminal = terminal_of(context, json=json)
+    request = ReplayRequest(mission_paths(logs), output, machine, start, end, force, json)
     check_times(start, end)
-    check_output([output], paths)
+    check_output([output], request.paths)
     if raw:
-        _convert(terminal, paths, output, machine, (start, end), force, json)
-        return
-    the_machine, source = machine_of(machine)
+        _convert(terminal, request)
+    else:
+        _replay(terminal, request)
+
+
+def _replay(terminal: Terminal, request: ReplayRequest) -> None:
+    """Write the replayed loop, and say how the paper's equations were read."""
+    output = request.output
+    machine, source = machine_of(request.machine)
     with terminal.progress(Stage.STARTING) as progress:
         from replay.control.loop import replay_loop
         from replay.export.replay_log import format_of, refuse_foreign_file, write_replay
         from replay.mission import load_mission
 
         kind = format_of(output)
-        if not force:
+        if not request.force:
             refuse_foreign_file(output)
-        mission = load_mission(paths, the_machine, start_s=start, stop_s=end, progress=progress)
+        mission = load_mission(request.paths, machine, start_s=request.start_s, stop_s=request.end_s, progress=progress)
         progress(Progress(Stage.REPLAYING_LOOP))
-        replayed = replay_loop(mission.timeline, the_machine)
+        replayed = replay_loop(mission.timeline, machine)
         progress(Progress(Stage.WRITING, output.name))
-        written = write_replay(output, mission.timeline, replayed, the_machine, kind)
+        written = write_replay(output, mission.timeline, replayed, machine, kind)
     timeline = mission.timeline
-    if json:
+    if request.json:
         terminal.show_json(
             {
                 "output": str(output),
                 "format": kind,
-                "machine": {"name": the_machine.name, "source": source},
+                "machine": {"name": machine.name, "source": source},
                 "start_ns": timeline.start_ns,
                 "step_ns": timeline.step_ns,
                 "steps": timeline.size,
@@ -91,27 +118,26 @@ def replay(
     )
 
 
-def _convert(
-    terminal: Terminal,
-    paths: list[Path],
-    folder: Path,
-    machine: Path | None,
-    part: tuple[float | None, float | None],
-    force: bool,
-    json: bool,
-) -> None:
+def _convert(terminal: Terminal, request: ReplayRequest) -> None:
     """Write a log as recorded, and say what stands where."""
+    paths, folder = request.paths, request.output
     if len(paths) > 1:
         raise ConfigError(f"--raw converts one log at a time; {len(paths)} were given")
-    the_machine, _ = machine_of(machine)
+    machine, _ = machine_of(request.machine)
     with terminal.progress(Stage.STARTING) as progress:
         from replay.export.raw_log import write_raw
         from replay.mission import source_options
 
-        options = source_options(paths[0], the_machine)
-        start, stop = part
-        index = write_raw(paths[0], folder, options, start_s=start, stop_s=stop, force=force, progress=progress)
-    if json:
+        index = write_raw(
+            paths[0],
+            folder,
+            source_options(paths[0], machine),
+            start_s=request.start_s,
+            stop_s=request.end_s,
+            force=request.force,
+            progress=progress,
+        )
+    if request.json:
         terminal.show_json({"output": str(folder), "format": "raw", **index})
         return
     from cli.tables.layout import bullets, section, table, text

@@ -5,10 +5,14 @@ from __future__ import annotations
 import json
 from collections.abc import Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from cli.terminal.inputs import mission_paths
 from replay.errors import ConfigError, LogError
 from replay.log.file_types import LOG_ENDINGS
+
+if TYPE_CHECKING:
+    from diagnosis.results.document import ReportDocument
 
 
 def results_and_truths(words: Sequence[Path], truth: Path | None) -> list[tuple[Path, Path]]:
@@ -72,6 +76,21 @@ def result_file(path: Path) -> Path:
         what = "holds no report.json" if path.is_dir() else "is no report.json"
         raise LogError(f"{path}: {what}; run `mfhca diagnose` on the log first, and give the folder that it writes")
     return saved
+
+
+def previous_result(path: Path | None) -> ReportDocument | None:
+    """Document of the result to compare with.
+
+    Raises
+    ------
+    LogError
+        Where it is no result.
+    """
+    if path is None:
+        return None
+    from diagnosis.output import load_report
+
+    return load_report(result_file(path))
 
 
 def _missions_at(path: Path) -> list[Path]:

@@ -6,8 +6,7 @@ from typing import Annotated
 
 import typer
 
-from cli.terminal.command import command
-from cli.terminal.console import Terminal
+from cli.terminal.command import Quiet, Verbose, terminal_of
 
 EXAMPLES = """\b
 Examples:
@@ -16,12 +15,13 @@ Examples:
   mfhca schema report | jq '."$defs" | keys'"""
 
 
-@command
 def schema(
-    terminal: Terminal,
+    context: typer.Context,
     name: Annotated[str, typer.Argument(metavar="NAME", help="Document: report, comparison, …", show_default=False)],
+    quiet: Quiet = False,
+    verbose: Verbose = False,
 ) -> None:
     """Print the JSON schema of a document, for scripts that read it."""
     from diagnosis.documents import schema_of
 
-    terminal.show_json(schema_of(name))
+    terminal_of(context).show_json(schema_of(name))

@@ -9,7 +9,7 @@ from pathlib import Path
 from cli.terminal.console import Terminal
 
 
-def open_page(terminal: Terminal, page: Path) -> None:
+def show_page(terminal: Terminal, page: Path) -> None:
     """Open a page in the default browser; never an error, because the page stands either way."""
     import webbrowser
 

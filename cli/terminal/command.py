@@ -1,9 +1,7 @@
-"""How commands look in help, and the options that each of them has."""
+"""What all commands share: how groups look in help, the terminal of a run, and -q and -v."""
 
 from __future__ import annotations
 
-import inspect
-from collections.abc import Callable
 from typing import Annotated, Any
 
 import typer
@@ -11,51 +9,65 @@ from typer.core import TyperGroup
 
 from cli.terminal.console import Terminal
 
-Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Errors only.", show_default=False)]
-Verbose = Annotated[
-    bool, typer.Option("--verbose", "-v", help="More detail; tracebacks of internal errors.", show_default=False)
-]
+USAGE = 2
 
 
-def terminal_of(context: typer.Context, *, quiet: bool = False, verbose: bool = False) -> Terminal:
-    """Terminal of this run, with what the options add."""
-    root = context.find_root()
-    if not isinstance(root.obj, Terminal):
-        root.obj = Terminal()
-    root.obj.quiet |= quiet
-    root.obj.verbose |= verbose
-    return root.obj
-
-
-def command(function: Callable[..., None]) -> Callable[..., None]:
-    """Give a command -q and -v of its own, and the run's `Terminal` as its first argument.
+def terminal_of(context: typer.Context, *, json: bool = False) -> Terminal:
+    """Terminal of this run.
 
     Parameters
     ----------
-    function : callable
-        ``function(terminal, …)``; the other parameters are annotated for typer.
+    context : typer.Context
+        Of a command, or of the group above it.
+    json : bool
+        Whether the command writes one JSON document to stdout.
     """
+    root = context.find_root()
+    if not isinstance(root.obj, Terminal):
+        root.obj = Terminal()
+    root.obj.json |= json
+    return root.obj
 
-    def run(**values: Any) -> None:
-        terminal = terminal_of(values.pop("context"), quiet=values.pop("quiet"), verbose=values.pop("verbose"))
-        terminal.json = bool(values.get("json", False))
-        function(terminal, **values)
 
-    plain = inspect.Parameter.KEYWORD_ONLY
-    own = [p.replace(kind=plain) for p in list(inspect.signature(function, eval_str=True).parameters.values())[1:]]
-    added = [inspect.Parameter("context", plain, annotation=typer.Context)]
-    added += [
-        inspect.Parameter(name, plain, default=False, annotation=kind)
-        for name, kind in (("quiet", Quiet), ("verbose", Verbose))
-    ]
-    run.__signature__ = inspect.Signature([*own, *added])  # type: ignore[attr-defined]
-    run.__annotations__ = {p.name: p.annotation for p in (*own, *added)}
-    run.__name__, run.__doc__ = function.__name__, function.__doc__
-    return run
+def _be_quiet(context: typer.Context, asked: bool) -> bool:
+    terminal_of(context).quiet |= asked
+    return asked
+
+
+def _be_verbose(context: typer.Context, asked: bool) -> bool:
+    terminal_of(context).verbose |= asked
+    return asked
+
+
+#: Each command and the program have these two; their values go to the terminal, before the command runs.
+Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Errors only.", show_default=False, callback=_be_quiet)]
+Verbose = Annotated[
+    bool,
+    typer.Option(
+        "--verbose",
+        "-v",
+        help="More detail; tracebacks of internal errors.",
+        show_default=False,
+        callback=_be_verbose,
+    ),
+]
 
 
 class App(TyperGroup):
-    """A group whose help lists commands by topic."""
+    """A group whose help lists commands by topic, and is shown where no command is given."""
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """Take the words of the command line.
+
+        Raises
+        ------
+        typer.Exit
+            Where there are none: with the code of a usage error, behind the help.
+        """
+        if not args and not ctx.resilient_parsing:
+            typer.echo(ctx.get_help(), err=True)
+            raise typer.Exit(USAGE)
+        return super().parse_args(ctx, args)
 
     def format_commands(self, ctx: Any, formatter: Any) -> None:
         """List the commands under the names of their panels."""

@@ -31,6 +31,16 @@ MaxSize = Annotated[
     float,
     typer.Option("--max-size", metavar="MB", min=0.5, help="Size that the page's data may take; faults come first."),
 ]
+Previous = Annotated[
+    Path | None,
+    typer.Option(
+        "--previous",
+        metavar="RESULT",
+        help="Earlier result of the same machine (folder or report.json) to compare with.",
+        show_default=False,
+    ),
+]
+OpenPage = Annotated[bool, typer.Option("--open", help="Open the report in the browser.")]
 
 
 class FailOn(StrEnum):

@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from cli.terminal.browser import open_page
+from cli.terminal.browser import show_page
 from cli.terminal.console import Terminal
 
 VARIABLES = ("DISPLAY", "WAYLAND_DISPLAY", "BROWSER")
@@ -30,7 +30,7 @@ def test_a_display_gets_the_page(
     name: str, opened: list[str], monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setenv(name, "x")
-    open_page(Terminal(), Path("a b.html"))
+    show_page(Terminal(), Path("a b.html"))
     assert opened == [Path("a b.html").absolute().as_uri()]
     assert capsys.readouterr() == ("", "")
 
@@ -38,12 +38,12 @@ def test_a_display_gets_the_page(
 @pytest.mark.parametrize("system", ["win32", "darwin"])
 def test_desktops_always_have_one(system: str, opened: list[str], monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("sys.platform", system)
-    open_page(Terminal(), Path("page.html"))
+    show_page(Terminal(), Path("page.html"))
     assert len(opened) == 1
 
 
 def test_without_a_display_the_path_is_said(opened: list[str], capsys: pytest.CaptureFixture[str]) -> None:
-    open_page(Terminal(), Path("page.html"))
+    show_page(Terminal(), Path("page.html"))
     assert opened == []
     assert capsys.readouterr().err == f"note: there is no display; open {Path('page.html').absolute()} yourself\n"
 
@@ -66,5 +66,5 @@ def test_a_browser_that_does_not_start_is_no_error(
 
     monkeypatch.setenv("DISPLAY", ":0")
     monkeypatch.setattr(webbrowser, "open", attempt)
-    open_page(Terminal(), Path("page.html"))
+    show_page(Terminal(), Path("page.html"))
     assert words in capsys.readouterr().err

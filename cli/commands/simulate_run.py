@@ -1,0 +1,188 @@
+"""A run of `mfhca simulate`: options, mission, log and truth."""
+
+from __future__ import annotations
+
+import shlex
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
+
+from cli.terminal.console import Terminal
+from cli.terminal.log_format import ENDINGS, LogFormat, format_of
+from replay.errors import ConfigError
+from replay.progress import Progress, Stage
+
+if TYPE_CHECKING:
+    from replay.faults import FaultSpec
+    from replay.simulation.options import EvidenceLevel, Scenario, SimulatedLaw, SimulatedMission, SimulationOptions
+    from replay.truth import MissionTruth
+
+_PLANT = [
+    "K",
+    "tau",
+    "wheel_spread",
+    "tau_spread",
+    "dead_zone",
+    "valve_lag",
+    "droop",
+    "leakage",
+    "pump_flow",
+    "mass",
+    "friction",
+    "ice_friction",
+    "slip_stiffness",
+    "rolling_resistance",
+    "v_std",
+    "v_lsb",
+    "phi_std",
+    "phi_lsb",
+]
+_CONTROL = {"lambda": "lambda_", "k_ps": "k_ps"}
+_MISSION = [
+    "zeta",
+    "psi0",
+    "steepness",
+    "ramp_share",
+    "ramp_max_s",
+    "early_share",
+    "jitter",
+    "drop_share",
+    "drop_burst_s",
+]
+
+
+@dataclass(frozen=True)
+class SimulateRequest:
+    """What the command line asks for; names and defaults as there, None for what is left to the scenario."""
+
+    output: Path | None
+    scenario: Scenario
+    seed: int
+    duration_s: float
+    rate_hz: float | None
+    evidence: EvidenceLevel
+    coupling: Literal["ground", "free"] | None
+    law: SimulatedLaw | None
+    ice: float | None
+    format: LogFormat | None
+    faults: list[str]
+    settings: list[str]
+    vary: bool
+    force: bool
+    json: bool
+
+
+def run_simulation(terminal: Terminal, request: SimulateRequest) -> None:
+    """Simulate a mission, and write its log and its truth."""
+    from cli.commands.fault_spec import parse_fault
+    from replay.truth import truth_path
+
+    kind = request.format or (LogFormat.MCAP if request.output is None else format_of(request.output))
+    log = request.output or Path(f"mission{ENDINGS[kind]}")
+    truth = truth_path(log, folder=kind is LogFormat.ROSBAG2)
+    _check_absent(log, truth, request.force)
+    faults = tuple(parse_fault(words) for words in request.faults) or None
+    with terminal.progress(Stage.SIMULATING) as progress:
+        from replay.export.mission import write_mission
+        from replay.simulation.run import simulate_mission
+        from replay.truth import write_truth
+
+        mission = simulate_mission(_changed(_options(request, faults), request.settings))
+        if not request.force:
+            _keep_other_truth(truth, mission.truth)
+        progress(Progress(Stage.WRITING, log.name))
+        write_mission(mission, log, "ros1" if kind is LogFormat.BAG else kind.value)
+        write_truth(mission.truth, truth)
+    _show(terminal, mission, log, truth, kind, request.json)
+
+
+def _check_absent(log: Path, truth: Path, force: bool) -> None:
+    """Raise a `ConfigError` where a log would be replaced that is not simulated, or that was not asked to be."""
+    if log.exists() and not truth.exists():
+        raise ConfigError(f"{log}: exists and was not simulated, so it is left as it is; give another name with -o")
+    if log.exists() and not force:
+        raise ConfigError(f"{log}: exists already; give another name with -o, or --force to replace it and its truth")
+
+
+def _options(request: SimulateRequest, faults: tuple[FaultSpec, ...] | None) -> SimulationOptions:
+    """Options of the scenario, with what the request gives instead."""
+    from replay.simulation.options import SimulationOptions
+    from replay.simulation.variation import varied_options
+
+    scenario, seed, duration = request.scenario, request.seed, request.duration_s
+    if request.vary:
+        kind: Literal["tuning", "reporting"] = "tuning" if seed < 1000 else "reporting"
+        options = varied_options(seed, kind=kind, scenario=scenario, duration_s=duration)
+    else:
+        options = SimulationOptions(scenario=scenario, seed=seed, duration_s=duration)
+    return replace(
+        options,
+        evidence=request.evidence,
+        faults=faults,
+        rate_hz=options.rate_hz if request.rate_hz is None else request.rate_hz,
+        coupling=options.coupling if request.coupling is None else request.coupling,
+        law=options.law if request.law is None else request.law,
+        ice=options.ice if request.ice is None else request.ice,
+    )
+
+
+def _show(terminal: Terminal, mission: SimulatedMission, log: Path, truth: Path, kind: LogFormat, json: bool) -> None:
+    words = ["mfhca", "diagnose", str(log)]
+    count, duration = len(mission.truth.intervals), mission.truth.duration_s
+    if json:
+        terminal.show_json(
+            {"log": str(log), "truth": str(truth), "faults": count, "duration_s": duration, "diagnose": words}
+        )
+        return
+    from cli.tables.layout import key_values
+
+    rows = [
+        ("log", f"{log}  ({kind.value}, {duration:g} s at {mission.options.rate_hz:g} Hz)"),
+        ("truth", f"{truth}  ({count} fault{'' if count == 1 else 's'})"),
+    ]
+    terminal.show(key_values([*rows, ("next", shlex.join(words))]))
+
+
+def _keep_other_truth(path: Path, truth: MissionTruth) -> None:
+    """Raise a `ConfigError` where a truth file of another mission stands where this one's belongs."""
+    from replay.errors import MfhcaError
+    from replay.truth import read_truth
+
+    try:
+        same = not path.exists() or read_truth(path) == truth
+    except MfhcaError:
+        same = False
+    if not same:
+        raise ConfigError(
+            f"{path}: belongs to another mission, whose truth would be lost; give another name with -o, or --force to replace it"
+        )
+
+
+def _changed(options: SimulationOptions, settings: list[str]) -> SimulationOptions:
+    """Options with constants changed as ``KEY=VALUE``.
+
+    Raises
+    ------
+    ConfigError
+        Where a key is not known or a value is no number in its range.
+    """
+    values: dict[str, float] = {}
+    for words in settings:
+        key, _, text = words.partition("=")
+        if key not in (*_PLANT, *_CONTROL, *_MISSION):
+            known = ", ".join((*_PLANT, *_CONTROL, *_MISSION))
+            raise ConfigError(f"--set {words}: {key!r} is not known; expected KEY=VALUE with KEY one of {known}")
+        try:
+            values[key] = float(text)
+        except ValueError as error:
+            raise ConfigError(f"--set {words}: {text!r} is no number") from error
+    plant: dict[str, Any] = {key: values[key] for key in _PLANT if key in values}
+    control: dict[str, Any] = {_CONTROL[key]: values[key] for key in _CONTROL if key in values}
+    mission: dict[str, Any] = {key: values[key] for key in _MISSION if key in values}
+    machine = options.machine
+    return replace(
+        options,
+        plant=replace(options.plant, **plant),
+        machine=replace(machine, control=replace(machine.control, **control)),
+        **mission,
+    )
