@@ -1,18 +1,21 @@
-"""`mfhca inspect` and `mfhca channels`."""
+"""`mfhca inspect`: what logs hold."""
 
 from __future__ import annotations
 
 import traceback
 from collections.abc import Callable
+from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from cli.terminal.command import Quiet, Verbose, terminal_of
 from cli.terminal.console import Terminal
 from cli.terminal.inputs import FoundLogs, find_logs, machine_of
 from cli.terminal.options import Json, MachineFile
+from replay.errors import MfhcaError
 from replay.progress import Stage
 
 if TYPE_CHECKING:
@@ -26,64 +29,98 @@ Examples:
   mfhca inspect logs/ "archive/**/*.bag" --json
   mfhca inspect s3://fleet/2026/              # of MCAP files by a few small requests
   find . -name "*.mcap" | mfhca inspect -"""
+
 _UNREADABLE, _INTERNAL = 3, 70
+
+Paths = Annotated[
+    list[str],
+    typer.Argument(metavar="PATH...", help="Files, folders, globs, URLs; - reads them from stdin.", show_default=False),
+]
+Full = Annotated[
+    bool, typer.Option("--full", "-f", help="Read everything: gaps, jitter, clocks, checksums, channels, losses.")
+]
+
+
+@dataclass(frozen=True)
+class _Log:
+    """One log to inspect: its name, and the function that does it."""
+
+    name: str
+    inspected: Callable[[], InspectReport]
+
+
+@dataclass
+class _Outcome:
+    """Reports of the logs that could be read, why others could not, and the exit code."""
+
+    reports: list[InspectReport] = field(default_factory=list)
+    failures: list[str] = field(default_factory=list)
+    code: int = 0
 
 
 def inspect(
-    terminal: Terminal,
-    paths: Annotated[
-        list[str],
-        typer.Argument(
-            metavar="PATH...", help="Files, folders, globs, URLs; - reads them from stdin.", show_default=False
-        ),
-    ],
-    full: Annotated[
-        bool, typer.Option("--full", "-f", help="Read everything: gaps, jitter, clocks, checksums, channels, losses.")
-    ] = False,
+    context: typer.Context,
+    paths: Paths,
+    full: Full = False,
     machine: MachineFile = None,
     json: Json = False,
+    quiet: Quiet = False,
+    verbose: Verbose = False,
 ) -> None:
     """Show what logs hold: topics, types, counts, rates, damage; with --full gaps, jitter, clocks."""
-    from cli.tables.inspection import damage_parts, inspect_document, inspect_parts, list_parts
-    from replay.errors import MfhcaError
+    from cli.tables.inspection import inspect_document
 
+    terminal = terminal_of(context, json=json)
     found = find_logs(paths, urls=True)
-    failures = list(found.missing)
+    outcome = _Outcome(failures=list(found.missing))
     look = _looker(full, machine)
-    logs: list[tuple[str, Callable[[], InspectReport]]] = [(str(path), partial(look, path)) for path in found.paths]
+    logs = [_Log(str(path), partial(look, path)) for path in found.paths]
     if found.urls:
-        failures += _remote_logs(terminal, found, full, machine, look, logs)
-    code = _UNREADABLE if failures else 0
-    seen: list[InspectReport] = []
-    for line in failures:
+        outcome.failures += _remote_logs(terminal, found, full, machine, look, logs)
+    outcome.code = _UNREADABLE if outcome.failures else 0
+    for line in outcome.failures:
         terminal.error(line)
-    for path, looked in logs:
-        try:
-            with terminal.progress(Stage.READING, path):
-                seen.append(looked())
-        except Exception as error:
-            known = isinstance(error, MfhcaError)
-            code = max(code, _UNREADABLE if known or isinstance(error, OSError) else _INTERNAL)
-            failures.append(str(error) if known else f"{path}: {type(error).__name__}: {error}")
-            if terminal.verbose and not known:
-                traceback.print_exc()
-            terminal.error(failures[-1])
-            continue
-        if json and seen[-1].damage:
-            terminal.note(f"{path} is degraded: {seen[-1].damage[0]}")
-        if not json and (terminal.verbose or len(logs) == 1):
-            terminal.show(*inspect_parts(seen[-1]), "")
+    for log in logs:
+        _inspect_one(terminal, log, outcome, alone=len(logs) == 1)
     if found.left_aside:
         terminal.note(f"files in the folders that are no logs by their names: {found.left_aside}")
     if json:
-        terminal.show_json({"logs": [inspect_document(s) for s in seen], "errors": failures})
+        terminal.show_json({"logs": [inspect_document(r) for r in outcome.reports], "errors": outcome.failures})
     elif len(logs) > 1:
-        terminal.show(*list_parts(seen, failures))
-        if not terminal.verbose:
-            terminal.show(*(part for s in seen for part in damage_parts(s)))
-            terminal.note("-v shows each log's topics" + ("" if full else ", --full reads everything"))
-    if code:
-        raise typer.Exit(code)
+        _show_list(terminal, outcome, full)
+    if outcome.code:
+        raise typer.Exit(outcome.code)
+
+
+def _inspect_one(terminal: Terminal, log: _Log, outcome: _Outcome, *, alone: bool) -> None:
+    """Inspect a log, and show it where it is the only one or all are asked for; an unreadable one costs no other."""
+    from cli.tables.inspection import inspect_parts
+
+    try:
+        with terminal.progress(Stage.READING, log.name):
+            report = log.inspected()
+    except Exception as error:
+        known = isinstance(error, MfhcaError)
+        outcome.code = max(outcome.code, _UNREADABLE if known or isinstance(error, OSError) else _INTERNAL)
+        outcome.failures.append(str(error) if known else f"{log.name}: {type(error).__name__}: {error}")
+        if terminal.verbose and not known:
+            traceback.print_exc()
+        terminal.error(outcome.failures[-1])
+        return
+    outcome.reports.append(report)
+    if terminal.json and report.damage:
+        terminal.note(f"{log.name} is degraded: {report.damage[0]}")
+    if not terminal.json and (terminal.verbose or alone):
+        terminal.show(*inspect_parts(report), "")
+
+
+def _show_list(terminal: Terminal, outcome: _Outcome, full: bool) -> None:
+    from cli.tables.inspection import damage_parts, list_parts
+
+    terminal.show(*list_parts(outcome.reports, outcome.failures))
+    if not terminal.verbose:
+        terminal.show(*(part for report in outcome.reports for part in damage_parts(report)))
+        terminal.note("-v shows each log's topics" + ("" if full else ", --full reads everything"))
 
 
 def _remote_logs(
@@ -92,7 +129,7 @@ def _remote_logs(
     full: bool,
     machine: Path | None,
     look: Callable[[Path], InspectReport],
-    logs: list[tuple[str, Callable[[], InspectReport]]],
+    logs: list[_Log],
 ) -> list[str]:
     """Add the logs behind URLs, and give why there is none behind some."""
     with terminal.progress(Stage.LOOKING_FOR_LOGS):
@@ -102,7 +139,7 @@ def _remote_logs(
     found.left_aside += left_aside
     for log in remote:
         clock = None if full else _clock(Path(log.files[0]), machine_of(machine)[0] if machine is not None else None)
-        logs.append((log.files[0], partial(inspect_remotely, log, look, clock)))
+        logs.append(_Log(log.files[0], partial(inspect_remotely, log, look, clock)))
     return problems
 
 
