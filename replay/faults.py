@@ -37,6 +37,11 @@ class Side(StrEnum):
     ACTUATOR = "actuator"
     SENSOR_OR_ACTUATOR = "sensor_or_actuator"
 
+    @property
+    def sides(self) -> tuple[Side, ...]:
+        """The side itself; of the union both."""
+        return (Side.SENSOR, Side.ACTUATOR) if self is Side.SENSOR_OR_ACTUATOR else (self,)
+
 
 class State(StrEnum):
     """Condition of one component and side at one moment; the fault modes are states too."""

@@ -158,6 +158,7 @@ def _interval(f: Fault, axles: list[str]) -> dict[str, Any]:
             "The other wheels followed the same command within 0.01 m/s.",
         ],
         "tier": "direct" if f[2] == "sensor" else "model",
+        "detected_s": None,
     }
 
 
@@ -194,7 +195,14 @@ def _coverage(states: list[dict[str, Any]]) -> list[dict[str, Any]]:
         seconds = sums.setdefault((s["component"], s["side"]), {})
         seconds[s["state"]] = seconds.get(s["state"], 0.0) + s["stop_s"] - s["start_s"]
     return [
-        {"component": c, "side": side, "seconds": v, "decided_driving_s": 0.8 * v.get("healthy", 0.0)}
+        {
+            "component": c,
+            "side": side,
+            "tier": "model" if "healthy" in v else "none",
+            "seconds": v,
+            "driving_s": 0.8 * v.get("healthy", 0.0),
+            "decided_driving_s": 0.8 * v.get("healthy", 0.0),
+        }
         for (c, side), v in sums.items()
     ]
 
@@ -227,9 +235,11 @@ def _report(
                     "format": "mcap",
                     "damage": [],
                     "notes": ["2 chunks without CRC"],
+                    "clock": None,
                 },
             ],
             "start_ns": 1_760_000_000_000_000_000,
+            "open_loop": False,
             "duration_s": duration,
             "rate_hz": rate,
             "distance_m": 0.29 * duration,
@@ -258,6 +268,8 @@ def _report(
         ],
         "verdict": {
             "status": status,
+            "cleared": status in {"ready", "watch"},
+            "not_cleared": "",
             "title": f"{len(worst)} faults to repair, {len(faults) - len(worst)} to watch"
             if faults
             else "No fault found",
@@ -286,6 +298,7 @@ def _report(
             for w, a, b in zip(words, times[:-1], times[1:], strict=True)
         ],
         "coverage": _coverage(states),
+        "loss": [],
         "metrics": {
             "wheels": {w: {"tracking_error": error, "control_effort": effort} for w in wheels},
             "average": {"tracking_error": error, "control_effort": effort},
@@ -324,7 +337,14 @@ def _report(
             },
             {"check": "Clock", "result": "one clock, no jump", "effect": "none", "ok": True},
         ],
-        "limits": {"brief": 1.0, "min_probability": 0.9, "min_epsilon": 0.1, "min_sat": 0.02, "min_assessed": 10.0},
+        "limits": {
+            "brief": 1.0,
+            "min_probability": 0.9,
+            "min_epsilon": 0.1,
+            "min_sat": 0.02,
+            "min_assessed": 10.0,
+            "driving_speed": 0.02,
+        },
     }
 
 
@@ -360,20 +380,19 @@ def six_wheels() -> tuple[dict[str, Any], Columns]:
 
 
 def not_assessed() -> tuple[dict[str, Any], Columns]:
-    """A mission in which nothing could be judged, with the fewest fields and no columns."""
-    report = {
-        "schema": "mfhca-report/1",
-        "machine": {"wheels": ["FR", "FL"], "axles": [], "geometry": None},
-        "log": {"duration_s": 12.0},
-        "verdict": {
-            "status": "not_assessed",
-            "title": "Not assessed",
-            "text": "The machine never moved.",
-            "caveats": [],
-        },
-        "states": [_span(w, s, "not_excited", 0.0, 12.0) for w in ("FR", "FL") for s in ("sensor", "actuator")],
+    """A mission in which nothing could be judged: every list that may be empty is, and there are no columns."""
+    report, _ = mission(["FR", "FL"], [], [], duration=12.0, status="not_assessed")
+    nothing = {"mission": None, "driving": None}
+    report["log"] |= {"files": [], "distance_m": None, "driving_s": 0.0}
+    report["verdict"] |= {"title": "Not assessed", "text": "The machine never moved.", "caveats": [], "cleared": False}
+    report["states"] = [_span(w, s, "not_excited", 0.0, 12.0) for w in ("FR", "FL") for s in ("sensor", "actuator")]
+    report["coverage"] = _coverage(report["states"])
+    report["metrics"] = {
+        "wheels": {},
+        "average": {"tracking_error": nothing, "control_effort": nothing},
+        "paper": [],
     }
-    return report, {}
+    return report | {k: [] for k in ("readings", "phases", "signals", "missing", "quality")}, {}
 
 
 HOSTILE = [

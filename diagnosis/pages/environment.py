@@ -11,6 +11,10 @@ from pathlib import Path
 import jinja2
 from markupsafe import Markup
 
+from diagnosis.pages.mode_style import mode_style
+
+#: Blocks of variables of the dark theme in `shared_style`.
+DARK = re.compile(r"\[data-theme=dark\] \{([^}]*)\}")
 #: Style, scripts and templates that several pages share.
 SHARED = Path(__file__).parent
 POLICY = "default-src 'none'; style-src 'unsafe-inline'; img-src data:; base-uri 'none'; form-action 'none'"
@@ -23,10 +27,15 @@ def asset(path: Path) -> str:
 
 
 @lru_cache
+def shared_style() -> str:
+    """Style of all pages: the rules of every fault mode, and ``style.css``, which may override them."""
+    return mode_style() + asset(SHARED / "style.css")
+
+
+@lru_cache
 def plain_style(own: Path) -> Markup:
     """Style of a page without scripts: the shared one, dark by the system's choice alone, and the page's own."""
-    shared = asset(SHARED / "style.css")
-    dark = re.sub(r"\[data-theme=dark\] \{([^}]*)\}", r"@media (prefers-color-scheme: dark) { :root {\1} }", shared)
+    dark = DARK.sub(r"@media (prefers-color-scheme: dark) { :root {\1} }", shared_style())
     return Markup(dark + asset(own))
 
 

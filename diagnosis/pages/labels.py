@@ -3,92 +3,58 @@
 from __future__ import annotations
 
 import datetime
+import math
 import unicodedata
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, TypeVar, cast
 
-from replay.faults import FaultMode, State
+from diagnosis.results.document import EpsilonRow, IntervalRow
+from diagnosis.results.fault_rows import LOOKS, state_label
+from diagnosis.results.vocabulary import part_words
+from replay.faults import FaultMode, Side
 
-#: Modes and states with a symbol of their own; anything else is drawn as `outside_table`.
-FAULT_MODES = tuple(m.value for m in FaultMode)
-UNDECIDED = (
-    State.NOT_EXCITED.value,
-    State.MASKED.value,
-    State.SLIP.value,
-    State.NO_DATA.value,
-    State.NOT_ASSESSED.value,
-)
-
-_STATE_LABELS = {
-    "healthy": "Healthy",
-    "stuck": "Stuck",
-    "no_signal": "No signal",
-    "inefficient": "Inefficient",
-    "noisy": "Noisy",
-    "outside_table": "Outside the tables",
-    "not_excited": "Not excited",
-    "masked": "Masked by another fault",
-    "slip": "Wheel slip",
-    "no_data": "No data",
-    "not_assessed": "Not assessed",
-}
-_PARTS = {
-    ("wheel", "sensor"): "speed sensor",
-    ("wheel", "actuator"): "drive valve",
-    ("wheel", "sensor_or_actuator"): "speed sensor or drive valve",
-    ("steer", "sensor"): "steering-angle sensor",
-    ("steer", "actuator"): "steering valve",
-    ("steer", "sensor_or_actuator"): "steering-angle sensor or valve",
-}
-VERDICTS = {
-    "ready": ("healthy", "Ready for the next mission"),
-    "watch": ("inefficient", "Watch"),
-    "stop": ("stuck", "Stop and repair"),
-    "not_assessed": ("not_assessed", "Not assessed"),
-}
+T = TypeVar("T")
 
 
 def visible(text: str) -> str:
-    r"""Text with control, bidirectional and other invisible characters spelt out (``\u202e``), all else verbatim."""
+    r"""Text with control, bidirectional and other invisible characters escaped (``\u202e``), all else verbatim."""
     if text.isascii() and text.isprintable():
         return text
     return "".join(
-        c if c == " " or unicodedata.category(c) not in {"Cc", "Cf", "Cs", "Co", "Cn", "Zl", "Zp"} else _spelt(c)
+        c if c == " " or unicodedata.category(c) not in {"Cc", "Cf", "Cs", "Co", "Cn", "Zl", "Zp"} else _escaped(c)
         for c in text
     )
 
 
-def _spelt(char: str) -> str:
+def _escaped(char: str) -> str:
     code = ord(char)
     return f"\\x{code:02x}" if code < 0x100 else f"\\u{code:04x}" if code < 0x10000 else f"\\U{code:08x}"
 
 
-def made_visible(value: Any) -> Any:
+def made_visible(value: T) -> T:
     """Copy of a JSON value with `visible` applied to every string and key."""
+    return cast(T, _made_visible(value))
+
+
+def _made_visible(value: object) -> object:
     if isinstance(value, str):
         return visible(value)
     if isinstance(value, Mapping):
-        return {visible(str(k)): made_visible(v) for k, v in value.items()}
+        return {visible(str(k)): _made_visible(v) for k, v in value.items()}
     if isinstance(value, list | tuple):
-        return [made_visible(v) for v in value]
+        return [_made_visible(v) for v in value]
     return value
 
 
 def known(state: str) -> str:
-    """Class name of a mode or state; unknown words become ``outside_table``."""
-    return state if state in _STATE_LABELS else "outside_table"
+    """Class name of a mode or state; words of other tools' documents become ``outside_table``."""
+    return state if state in LOOKS else "outside_table"
 
 
-def state_label(state: str, side: str = "") -> str:
-    """Words for a mode or state; a noisy actuator is disturbed."""
-    if state == "noisy" and side == "actuator":
-        return "Disturbed"
-    return _STATE_LABELS.get(state, state)
-
-
-def part(kind: str, side: str) -> str:
-    """Words for the part of a component on one side, such as *speed sensor*."""
-    return _PARTS.get((kind, side), side.replace("_", " "))
+def mode_legend(mode: FaultMode) -> str:
+    """Heading of a mode for both sides: ``Noisy / disturbed``."""
+    sensor, actuator = (state_label(mode, side) for side in (Side.SENSOR, Side.ACTUATOR))
+    return sensor if actuator == sensor else f"{sensor} / {actuator.lower()}"
 
 
 def clock(seconds: float, digits: int = 0) -> str:
@@ -112,9 +78,9 @@ def span(seconds: float) -> str:
     return f"{seconds / 3600:.1f} h"
 
 
-def number(value: Any, digits: int = 3) -> str:
+def number(value: object, digits: int = 3) -> str:
     """Value in significant digits without an exponent where it can be avoided; an en dash where there is none."""
-    if not isinstance(value, int | float) or isinstance(value, bool) or value != value:
+    if not isinstance(value, int | float) or isinstance(value, bool) or math.isnan(value):
         return "–"
     if isinstance(value, int):
         return grouped(value)
@@ -124,10 +90,11 @@ def number(value: Any, digits: int = 3) -> str:
     return text.replace("-", "−")
 
 
-def bounded(epsilon: Mapping[str, Any], digits: int = 3) -> str:
+def bounded(epsilon: EpsilonRow, digits: int = 3) -> str:
     """An estimate with its 95 % bounds."""
     value, low, high = (
-        f"{round(epsilon[k], digits) + 0.0:.{digits}f}".replace("-", "−") for k in ("value", "low", "high")
+        f"{round(v, digits) + 0.0:.{digits}f}".replace("-", "−")
+        for v in (epsilon["value"], epsilon["low"], epsilon["high"])
     )
     return f"{value} ({low} to {high})"
 
@@ -153,18 +120,17 @@ def sat_text(mean: float, unit: str) -> str:
     return f"{number(mean)}{'' if unit in {'', '1', 'fraction'} else ' ' + unit}"
 
 
-def fault_title(fault: Mapping[str, Any]) -> str:
+def fault_title(fault: IntervalRow) -> str:
     """One line that names component, part, mode and size of a fault."""
-    kind, side, mode = fault["kind"], fault["side"], fault["mode"]
-    what = f"{fault['component']} {part(kind, side)}"
-    sat, epsilon = fault.get("sat"), fault.get("epsilon")
+    side, mode, sat, epsilon = fault["side"], fault["mode"], fault["sat"], fault["epsilon"]
+    what = part_words(fault["kind"], fault["component"], side)
     words = state_label(mode, side).lower()
-    if mode == "stuck" and sat:
-        return f"{what} stuck at {sat_text(sat['mean'], sat.get('unit', ''))}"
-    if mode == "no_signal":
-        return f"{what}: no {'control ' if side == 'actuator' else ''}signal"
-    if mode == "inefficient" and epsilon:
+    if mode == FaultMode.STUCK and sat:
+        return f"{what} stuck at {sat_text(sat['mean'], sat['unit'])}"
+    if mode == FaultMode.NO_SIGNAL:
+        return f"{what}: no {'control ' if side == Side.ACTUATOR else ''}signal"
+    if mode == FaultMode.INEFFICIENT and epsilon:
         return f"{what} inefficient, {100 * epsilon['value']:.0f} % lost"
-    if mode == "noisy" and sat:
-        return f"{what} {words}, {sat_text(sat['rms'], sat.get('unit', ''))} r.m.s."
+    if mode == FaultMode.NOISY and sat:
+        return f"{what} {words}, {sat_text(sat['rms'], sat['unit'])} r.m.s."
     return f"{what} {words}"

@@ -3,24 +3,26 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
-from typing import Any
+from collections.abc import Sequence
 
 import numpy as np
 from markupsafe import Markup, escape
 from numpy.typing import NDArray
 
-from diagnosis.pages.labels import known, number
+from diagnosis.pages.labels import number
+from diagnosis.results.document import IntervalRow
+from replay.faults import FaultMode, State
 
 _SOLID = 'fill="currentColor"'
 _LINE = 'fill="none" stroke="currentColor" stroke-width="2" stroke-linecap="round" stroke-linejoin="round"'
-_GLYPHS = {
-    "stuck": f'<rect x="2" y="2" width="8" height="8" rx="1" {_SOLID}/>',
-    "no_signal": f'<path d="M2 2l8 8M10 2l-8 8" {_LINE}/>',
-    "inefficient": f'<path d="M6 10.4 1.4 2.6h9.2z" {_SOLID}/>',
-    "noisy": f'<path d="M1 6.4l1.8-3.6 2.6 6.6L7.8 2.6l1.8 6L11 6" {_LINE}/>',
-    "outside_table": f'<path d="M6 1l5 5-5 5-5-5z" {_SOLID}/>',
-    "healthy": f'<path d="M2.2 6.3l2.6 2.7 5-5.6" {_LINE}/>',
+#: Symbol of each mode and state in a square of 12 by 12; what is not in it is drawn as `_UNKNOWN`.
+_GLYPHS: dict[str, str] = {
+    FaultMode.STUCK: f'<rect x="2" y="2" width="8" height="8" rx="1" {_SOLID}/>',
+    FaultMode.NO_SIGNAL: f'<path d="M2 2l8 8M10 2l-8 8" {_LINE}/>',
+    FaultMode.INEFFICIENT: f'<path d="M6 10.4 1.4 2.6h9.2z" {_SOLID}/>',
+    FaultMode.NOISY: f'<path d="M1 6.4l1.8-3.6 2.6 6.6L7.8 2.6l1.8 6L11 6" {_LINE}/>',
+    FaultMode.OUTSIDE_TABLE: f'<path d="M6 1l5 5-5 5-5-5z" {_SOLID}/>',
+    State.HEALTHY: f'<path d="M2.2 6.3l2.6 2.7 5-5.6" {_LINE}/>',
     "warning": f'<path d="M6 2v4.6M6 9.6v.2" {_LINE}/>',
 }
 _MARKS = 24
@@ -72,7 +74,7 @@ def _polyline(low: NDArray[np.float64], high: NDArray[np.float64], height: float
 
 
 def thumbnail(
-    fault: Mapping[str, Any],
+    fault: IntervalRow,
     measured: NDArray[np.floating],
     commanded: NDArray[np.floating] | None,
     start: float,
@@ -82,7 +84,7 @@ def thumbnail(
 
     Parameters
     ----------
-    fault : Mapping[str, Any]
+    fault : IntervalRow
         One of the report's intervals.
     measured, commanded : NDArray[np.floating], shape (n,)
         Whole columns.
@@ -111,7 +113,7 @@ def thumbnail(
         '<rect class="f {m}" x="{x:.1f}" y="0" width="{d:.1f}" height="{h}"/>'
         '<rect class="e {m}" x="{x:.1f}" y="0" width="{d:.1f}" height="2.5"/>{extra}<path class="sig" d="{p}"/></svg>'
     ).format(
-        w=width, h=height, id=fault["id"], m=known(fault["mode"]), x=x0, d=max(1.5, x1 - x0), extra=extra, p=paths[-1]
+        w=width, h=height, id=fault["id"], m=fault["mode"], x=x0, d=max(1.5, x1 - x0), extra=extra, p=paths[-1]
     )
 
 
@@ -127,7 +129,7 @@ def _path_d(x: NDArray[np.floating], y: NDArray[np.floating]) -> str:
 
 
 def path_picture(
-    x: NDArray[np.floating], y: NDArray[np.floating], start: float, step: float, faults: Sequence[Mapping[str, Any]]
+    x: NDArray[np.floating], y: NDArray[np.floating], start: float, step: float, faults: Sequence[IntervalRow]
 ) -> Markup:
     """Driven path coloured by fault, equal axes, with a scale bar; empty where no position is known.
 
@@ -139,7 +141,7 @@ def path_picture(
         Position [m], x to the right and y up in the picture.
     start, step : float
         Time of the first sample and sample time [s].
-    faults : Sequence[Mapping[str, Any]]
+    faults : Sequence[IntervalRow]
         The report's intervals.
     """
     width, height, margin = 420.0, 300.0, 26.0
@@ -153,7 +155,7 @@ def path_picture(
     py = (height - 14 + (high - low) * scale) / 2 - (y - low) * scale
     every = max(1, len(x) // 1500)
     parts = [Markup('<path class="track" d="{}"/>').format(_path_d(px[::every], py[::every]))]
-    marks: list[tuple[Mapping[str, Any], list[float]]] = []
+    marks: list[tuple[IntervalRow, list[float]]] = []
     for fault in faults:
         a = max(0, int((fault["start_s"] - start) / step))
         b = min(len(x), max(a + 2, int((fault["stop_s"] - start) / step) + 1))
@@ -161,7 +163,7 @@ def path_picture(
         d = _path_d(px[a:b:every], py[a:b:every])
         if not d:
             continue
-        parts.append(Markup('<path class="leg {}" d="{}"/>').format(known(fault["mode"]), d))
+        parts.append(Markup('<path class="leg {}" d="{}"/>').format(fault["mode"], d))
         if len(marks) >= _MARKS:
             continue
         here = np.flatnonzero(good[a:b]) + a
@@ -173,7 +175,7 @@ def path_picture(
             Markup(
                 '<g class="mark {m}" data-f="{id}" data-scroll role="button" tabindex="0" aria-label="{id} on the path"'
                 ' transform="translate({x:.1f},{y:.1f})"><circle class="area" r="20"/><circle class="ring" r="12"/><text y="3.6">{id}</text>{b}</g>'
-            ).format(m=known(fault["mode"]), id=fault["id"], x=cx, y=cy, b=badge(known(fault["mode"]), 10, -9, 11))
+            ).format(m=fault["mode"], id=fault["id"], x=cx, y=cy, b=badge(fault["mode"], 10, -9, 11))
         )
     first, last = np.flatnonzero(good)[[0, -1]].tolist()
     ends = [(float(px[k]), float(py[k])) for k in (first, last)]

@@ -3,21 +3,41 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable
 from dataclasses import dataclass
-from typing import Any
 
+from diagnosis.pages.evidence_words import tier_name
 from diagnosis.pages.labels import number
+from diagnosis.results.document import IntervalRow
+from diagnosis.results.vocabulary import Kind, Tier
+from replay.faults import Side
 
 DEGREES = 180.0 / math.pi
 VALVE_UNIT = "of full opening"
-_TIERS = {
-    "direct": "second measurement",
-    "signal": "channel alone",
-    "tracking": "command tracking",
-    "drive": "drive model",
-    "steering": "steering model",
-}
+
+
+@dataclass(frozen=True)
+class Motion:
+    """What a component does: wheel speed or steering angle.
+
+    Attributes
+    ----------
+    title : str
+        Its name.
+    unit : str
+        Unit of the values shown.
+    scale : float
+        Factor from a column's unit to `unit`.
+    measured, commanded, second : str
+        Columns of the channel, of its command and of a second measurement, whether or not they are there.
+    """
+
+    title: str
+    unit: str
+    scale: float
+    measured: str
+    commanded: str
+    second: str
 
 
 @dataclass(frozen=True)
@@ -56,72 +76,63 @@ class Pair:
         return f"{number(value)}{'' if self.unit == '°' else ' '}{self.unit}"
 
 
-def sides_of(side: str) -> tuple[str, ...]:
-    """Sides whose evidence a fault shows."""
-    return ("sensor", "actuator") if side == "sensor_or_actuator" else (side,)
+def motion_of(component: str, kind: Kind, columns: Collection[str]) -> Motion:
+    """Columns and unit of a component's motion; of two commands the replayed one, where it is there."""
+    steer = kind == Kind.STEER
+    leaf = "phi" if steer else "v"
+    own = f"{kind}.{component}.{leaf}"
+    replayed = f"replay.{component}.{leaf}_ref"
+    commanded = own + "_ref" if own + "_ref" in columns and replayed not in columns else replayed
+    title, unit, scale = ("Steering angle", "°", DEGREES) if steer else ("Wheel speed", "m/s", 1.0)
+    return Motion(title, unit, scale, own, commanded, own + "_true")
 
 
-def by_valve(fault: Mapping[str, Any], columns: Iterable[str]) -> bool:
+def by_valve(fault: IntervalRow, columns: Collection[str]) -> bool:
     """Whether a fault was decided by the measured position of its valve."""
-    group = "steer" if fault["kind"] == "steer" else "wheel"
-    applied = f"{group}.{fault['component']}.u_applied"
-    return fault["side"] == "actuator" and fault.get("tier") == "direct" and applied in columns
+    applied = f"{fault['kind']}.{fault['component']}.u_applied"
+    return fault["side"] == Side.ACTUATOR and fault["tier"] == Tier.DIRECT and applied in columns
 
 
-def pair_of(fault: Mapping[str, Any], columns: Mapping[str, Any]) -> Pair | None:
+def pair_of(fault: IntervalRow, columns: Collection[str]) -> Pair | None:
     """Channel of a fault and what it was compared with; None where the channel is not there.
 
     Parameters
     ----------
-    fault : Mapping[str, Any]
+    fault : IntervalRow
         One of the report's intervals.
-    columns : Mapping[str, Any]
-        Columns by name.
+    columns : Collection[str]
+        Names of the columns.
     """
-    c, direct = fault["component"], fault.get("tier") == "direct"
-    bases = [f"evidence.{c}.{side}." for side in sides_of(fault["side"])]
+    component, kind = fault["component"], fault["kind"]
+    bases = [f"evidence.{component}.{side}." for side in Side(fault["side"]).sides]
     base = next((b for b in bases if any(name.startswith(b) for name in columns)), bases[0])
-    steer = fault["kind"] == "steer"
-    group, leaf = ("steer", "phi") if steer else ("wheel", "v")
-    own = f"{group}.{c}."
     if by_valve(fault, columns):
-        reference = own + "u" if own + "u" in columns else None
+        command = f"{kind}.{component}.u"
+        reference = command if command in columns else None
         return Pair(
-            "Valve position", own + "u_applied", reference, "command", reference is not None, VALVE_UNIT, 1.0, base
+            "Valve position", command + "_applied", reference, "command", reference is not None, VALVE_UNIT, 1.0, base
         )
-    if own + leaf not in columns:
+    motion = motion_of(component, kind, columns)
+    if motion.measured not in columns:
         return None
-    choices = [
-        (base + "expected", "expected value"),
-        (f"replay.{c}.{leaf}_ref", "commanded"),
-        (f"{own}{leaf}_ref", "commanded"),
-    ]
-    if direct:
-        choices.insert(0, (f"{own}{leaf}_true", "second measurement"))
+    choices = [(base + "expected", "expected value"), (motion.commanded, "commanded")]
+    if fault["tier"] == Tier.DIRECT:
+        choices.insert(0, (motion.second, "second measurement"))
     reference, words = next(((name, words) for name, words in choices if name in columns), (None, ""))
-    unit, scale = ("°", DEGREES) if steer else ("m/s", 1.0)
-    title, apart = "Steering angle" if steer else "Wheel speed", reference == f"{own}{leaf}_true"
-    return Pair(title, own + leaf, reference, words, apart, unit, scale, base)
+    apart = reference == motion.second
+    return Pair(motion.title, motion.measured, reference, words, apart, motion.unit, motion.scale, base)
 
 
-def tier_words(fault: Mapping[str, Any]) -> str:
-    """Name of the kind of evidence that a fault rests on."""
-    tier = str(fault.get("tier") or "")
-    if tier == "model":
-        return "steering model" if fault["kind"] == "steer" else "wheel model"
-    return _TIERS.get(tier, tier)
-
-
-def rests_on(fault: Mapping[str, Any], columns: Iterable[str]) -> str:
+def rests_on(fault: IntervalRow, columns: Iterable[str]) -> str:
     """Kind of evidence of a fault, and the channels that its sentences name in their order."""
-    text = " ".join(str(e) for e in fault.get("evidence") or ())
+    text = " ".join(fault["evidence"])
     places = {}
     for name in columns:
         if "." in name and not name.startswith(("evidence.", "replay.")) and (at := _place(name, text)) >= 0:
             places[name] = at
     channels = sorted(places, key=lambda n: places[n])
-    kind = tier_words(fault)
-    return f"{kind}: {', '.join(channels)}" if kind and channels else kind or ", ".join(channels)
+    tier = tier_name(fault["kind"], fault["tier"])
+    return f"{tier}: {', '.join(channels)}" if tier and channels else tier or ", ".join(channels)
 
 
 def _place(name: str, text: str) -> int:
@@ -135,7 +146,7 @@ def _place(name: str, text: str) -> int:
     return -1
 
 
-def shape_sentence(fault: Mapping[str, Any]) -> str:
-    """The evidence sentence that tells what the onset's shape says; empty where none does."""
+def shape_sentence(fault: IntervalRow) -> str:
+    """The evidence sentence that states what follows from the shape of the onset; empty where none does."""
     signs = ("at once", "jump", "bends", "with its lag", "within one sample")
-    return next((str(e) for e in fault.get("evidence") or () if any(s in str(e) for s in signs)), "")
+    return next((e for e in fault["evidence"] if any(s in e for s in signs)), "")

@@ -2,19 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from diagnosis.report.plot_rows import Columns
+from diagnosis.report.rows import Columns
+from diagnosis.results.document import IntervalRow, MachineRow, ReportDocument
+from replay.faults import FaultMode, Side
 
 _AXLE_GAP_M = 0.1
 _POINTS = 200_000  # enough for a picture
 _SKIPPED = ("replay.", "evidence.")
-_GONE = ("stuck", "no_signal")
 Array = NDArray[np.float64]
 
 
@@ -27,13 +27,13 @@ class Path:
     words: str
 
 
-def driven_path(report: Mapping[str, Any], columns: Columns, step: float) -> Path:
+def driven_path(report: ReportDocument, columns: Columns, step: float) -> Path:
     """Find the machine's path.
 
     Parameters
     ----------
-    report : Mapping[str, Any]
-        The parsed ``report.json``.
+    report : ReportDocument
+        The document.
     columns : Columns
         Filled columns of the result.
     step : float
@@ -49,11 +49,11 @@ def driven_path(report: Mapping[str, Any], columns: Columns, step: float) -> Pat
         logged = "odom.x" in columns
         source = "odometry" if logged else "GNSS" if "gnss.lat" in columns else "logged positions"
         return Path(columns["path.x"], columns["path.y"], f"from {source}, in metres")
-    machine = report.get("machine") or {}
+    machine = report["machine"]
     rows = max((len(v) for v in columns.values()), default=0)
     every = max(1, rows // _POINTS)
     columns, step = {k: v[::every] for k, v in columns.items() if not k.startswith(_SKIPPED)}, step * every
-    speed = _speed(machine, report.get("intervals") or (), columns, step)
+    speed = _speed(machine, report["intervals"], columns, step)
     if speed is None:
         return Path(None, None, "Not shown: neither odometry nor GNSS nor a wheel's speed was logged.")
     turning = _turning(machine, columns, speed)
@@ -72,18 +72,16 @@ def driven_path(report: Mapping[str, Any], columns: Columns, step: float) -> Pat
     return Path(x, y, f"integrated from wheel speeds and {source}: its shape drifts, no position was logged")
 
 
-def _speed(
-    machine: Mapping[str, Any], faults: Sequence[Mapping[str, Any]], columns: Columns, step: float
-) -> Array | None:
+def _speed(machine: MachineRow, faults: Sequence[IntervalRow], columns: Columns, step: float) -> Array | None:
     """Median of the wheels' speeds, without those of sensors that were stuck or silent at the time."""
     found = []
-    for wheel in machine.get("wheels") or ():
+    for wheel in machine["wheels"]:
         name = next((n for leaf in ("v_true", "v") if (n := f"wheel.{wheel}.{leaf}") in columns), "")
         if not name:
             continue
         v = columns[name].astype(np.float64)
         for f in faults if name.endswith(".v") else ():
-            if f["component"] == wheel and f["mode"] in _GONE and f["side"] != "actuator":
+            if f["component"] == wheel and FaultMode(f["mode"]).total and f["side"] != Side.ACTUATOR:
                 v[max(0, int(f["start_s"] / step)) : int(f["stop_s"] / step) + 1] = np.nan
         found.append(v)
     if not found:
@@ -94,7 +92,7 @@ def _speed(
     return np.where(count > 0, 0.5 * (middle[0] + middle[1]), np.nan)
 
 
-def _turning(machine: Mapping[str, Any], columns: Columns, speed: Array) -> tuple[Array, Array, str] | None:
+def _turning(machine: MachineRow, columns: Columns, speed: Array) -> tuple[Array, Array, str] | None:
     """Yaw rate [rad/s], direction of travel against the body's axis [rad], and where the rate comes from."""
     curvature, slip = _steered(machine, columns)
     if "imu.yaw_rate" in columns:
@@ -107,12 +105,12 @@ def _turning(machine: Mapping[str, Any], columns: Columns, speed: Array) -> tupl
     return None
 
 
-def _steered(machine: Mapping[str, Any], columns: Columns) -> tuple[Array | None, Array | None]:
+def _steered(machine: MachineRow, columns: Columns) -> tuple[Array | None, Array | None]:
     """Curvature [1/m] and direction of travel at the body's origin [rad] by two axles, one of which may be fixed."""
-    geometry = machine.get("geometry") or {}
+    geometry = machine["geometry"] or {}
     places: dict[str, list[float]] = {}
     for w in geometry.values():
-        places.setdefault(str(w.get("axle", "")), []).append(float(w["x"]))
+        places.setdefault(w["axle"], []).append(w["x"])
     tangents = []
     for axle, xs in places.items():
         name = f"steer.{axle}.phi_true" if f"steer.{axle}.phi_true" in columns else f"steer.{axle}.phi"

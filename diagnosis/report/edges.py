@@ -5,13 +5,14 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from diagnosis.pages.labels import number
-from diagnosis.report.compared_channels import Pair, sides_of
+from diagnosis.report.compared_channels import Pair
+from diagnosis.results.document import IntervalRow
+from replay.faults import Side
 
 Array = NDArray[np.float64]
 
@@ -66,8 +67,8 @@ class Edge:
 
 def edge_of(
     name: str,
-    fault: Mapping[str, Any],
-    others: Sequence[Mapping[str, Any]],
+    fault: IntervalRow,
+    others: Sequence[IntervalRow],
     pair: Pair,
     columns: Mapping[str, NDArray[np.floating]],
     axis: tuple[float, float],
@@ -78,9 +79,9 @@ def edge_of(
     ----------
     name : str
         ``onset`` or ``end``.
-    fault : Mapping[str, Any]
+    fault : IntervalRow
         The fault.
-    others : Sequence[Mapping[str, Any]]
+    others : Sequence[IntervalRow]
         All faults of the mission, whose samples do not count as healthy.
     pair : Pair
         The fault's channel and reference.
@@ -91,36 +92,22 @@ def edge_of(
     """
     start, step = axis
     onset = name == "onset"
-    at = float(fault["start_s" if onset else "stop_s"])
+    at, other_end = (fault["start_s"], fault["stop_s"]) if onset else (fault["stop_s"], fault["start_s"])
     size = len(columns[pair.measured])
-    place = round((at - start) / step)
+    place, far = round((at - start) / step), round((other_end - start) / step)
     half = min(_MOST, max(_SAMPLES, math.ceil(_SECONDS / step)))
     first, last = max(0, place - half), min(size, place + half + 1)
     if not first < place < last:
         return None
-    wide = (max(0, place - _HEALTHY), place) if onset else (place, min(size, place + _HEALTHY))
-
-    def cut(column: str | None, a: int, b: int) -> Array:
-        return np.full(b - a, np.nan) if column is None else columns[column][a:b].astype(np.float64) * pair.scale
-
-    y, reference = cut(pair.measured, first, last), cut(pair.reference, first, last)
-    other_end = round((float(fault["stop_s" if onset else "start_s"]) - start) / step)
-    inside = (
-        slice(place - first, max(place, other_end) - first)
-        if onset
-        else slice(max(other_end - first, 0), place - first)
-    )
+    y, reference = _cut(columns, pair, first, last)
     if not (np.isfinite(y[: place - first]).any() or np.isfinite(y[place - first :]).any()):
         return None
     t = (np.arange(first, last, dtype=np.float64) - place) * step
-    wide_t = (np.arange(*wide, dtype=np.float64) - place) * step
-    beyond = cut(pair.measured, *wide) - (cut(pair.reference, *wide) if pair.apart else 0.0)
-    use = np.isfinite(beyond)
-    if pair.apart:  # the distance from a reference is the usual one only where nothing is faulty
-        use &= ~_faulty(wide, fault, others, axis)
+    inside = slice(place - first, max(place, far) - first) if onset else slice(max(far - first, 0), place - first)
     gap, most, noise = None, math.nan, None
-    if np.count_nonzero(use) >= _LEAST_HEALTHY:
-        course, noise = _course(wide_t[use], beyond[use], t[inside], onset, pair.apart)
+    times, values = _healthy(place, fault, others, pair, columns, axis, onset)
+    if values.size >= _LEAST_HEALTHY:
+        course, noise = _course(times, values, t[inside], onset, pair.apart)
         right = course + (reference[inside] if pair.apart else 0.0)
         off = y[inside] - right
         seen = np.flatnonzero(np.isfinite(off))
@@ -130,15 +117,44 @@ def edge_of(
     return Edge(name, t, y, reference, at, step, gap, most, noise)
 
 
+def _cut(columns: Mapping[str, NDArray[np.floating]], pair: Pair, first: int, last: int) -> tuple[Array, Array]:
+    """Channel and reference of some steps, in the pair's unit; NaN where there is no reference."""
+    measured = columns[pair.measured][first:last].astype(np.float64) * pair.scale
+    if pair.reference is None:
+        return measured, np.full(last - first, np.nan)
+    return measured, columns[pair.reference][first:last].astype(np.float64) * pair.scale
+
+
+def _healthy(
+    place: int,
+    fault: IntervalRow,
+    others: Sequence[IntervalRow],
+    pair: Pair,
+    columns: Mapping[str, NDArray[np.floating]],
+    axis: tuple[float, float],
+    onset: bool,
+) -> tuple[Array, Array]:
+    """Samples beyond an edge that are not faulty: times from it [s], and values less the reference that is apart."""
+    size = len(columns[pair.measured])
+    span = (max(0, place - _HEALTHY), place) if onset else (place, min(size, place + _HEALTHY))
+    measured, reference = _cut(columns, pair, *span)
+    values = measured - (reference if pair.apart else 0.0)
+    use = np.isfinite(values)
+    if pair.apart:  # the distance from a reference is the usual one only where nothing is faulty
+        use &= ~_faulty(span, fault, others, axis)
+    times = (np.arange(*span, dtype=np.float64) - place) * axis[1]
+    return times[use], values[use]
+
+
 def _faulty(
-    span: tuple[int, int], fault: Mapping[str, Any], others: Sequence[Mapping[str, Any]], axis: tuple[float, float]
+    span: tuple[int, int], fault: IntervalRow, others: Sequence[IntervalRow], axis: tuple[float, float]
 ) -> NDArray[np.bool_]:
     """Samples of a span that lie in any fault of the same part."""
     start, step = axis
     out = np.zeros(span[1] - span[0], dtype=np.bool_)
     for other in others:
-        if other["component"] == fault["component"] and set(sides_of(other["side"])) & set(sides_of(fault["side"])):
-            a, b = (round((other[k] - start) / step) - span[0] for k in ("start_s", "stop_s"))
+        if other["component"] == fault["component"] and set(Side(other["side"]).sides) & set(Side(fault["side"]).sides):
+            a, b = (round((v - start) / step) - span[0] for v in (other["start_s"], other["stop_s"]))
             out[max(0, a) : max(0, b)] = True
     return out
 

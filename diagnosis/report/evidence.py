@@ -4,19 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
 
-import numpy as np
 from markupsafe import Markup
-from numpy.typing import NDArray
 
 from diagnosis.pages.labels import clock, grouped, number
 from diagnosis.report.compared_channels import Pair, pair_of, rests_on, shape_sentence
 from diagnosis.report.edges import edge_of, edge_words, time_words
 from diagnosis.report.panels import course_picture, edge_picture
+from diagnosis.report.plot_rows import course_rows
+from diagnosis.report.rows import Columns, Row
+from diagnosis.results.document import IntervalRow, ReportDocument
 from diagnosis.results.result import Closeups
 
-Columns = Mapping[str, NDArray[np.floating]]
 Stretch = tuple[Columns, tuple[float, float]]
 
 _COURSES = 40
@@ -62,34 +61,33 @@ class Evidence:
 
 
 def evidence_of(
-    report: Mapping[str, Any],
+    report: ReportDocument,
     columns: Columns,
     axis: tuple[float, float],
     per: int = 1,
-    faults: Sequence[Mapping[str, Any]] | None = None,
+    faults: Sequence[IntervalRow] | None = None,
     closeups: Closeups | None = None,
 ) -> dict[str, Evidence]:
     """Evidence of faults by their names; the course is drawn for the first ones only.
 
     Parameters
     ----------
-    report : Mapping[str, Any]
-        The parsed ``report.json``.
-    columns : Mapping[str, NDArray[np.floating]], each of shape (n,)
+    report : ReportDocument
+        The document.
+    columns : Columns
         Columns that hold samples.
     axis : tuple[float, float]
         Time of the first row and between rows [s].
     per : int
         Samples whose extremes two rows hold, 1 where each row is a sample.
-    faults : Sequence[Mapping[str, Any]] or None
+    faults : Sequence[IntervalRow] or None
         Those of the report's intervals that are wanted; None: all.
     closeups : Closeups or None
         Where rows are extremes: the samples from which onset and end can be drawn.
     """
-    limit = (report.get("limits") or {}).get("min_probability")
-    rates = {s["name"]: s.get("rate_hz") for s in report.get("signals") or ()}
-    every: Sequence[Mapping[str, Any]] = report.get("intervals") or ()
-    peers: dict[str, list[Mapping[str, Any]]] = {}
+    limit, every = report["limits"]["min_probability"], report["intervals"]
+    rates = {s["name"]: s["rate_hz"] for s in report["signals"]}
+    peers: dict[str, list[IntervalRow]] = {}
     for fault in every:
         peers.setdefault(fault["component"], []).append(fault)
     step = axis[1] if per == 1 else 2 * axis[1] / per
@@ -108,9 +106,9 @@ def evidence_of(
     return out
 
 
-def delay_words(fault: Mapping[str, Any]) -> str:
+def delay_words(fault: IntervalRow) -> str:
     """When a causal reading of the same evidence would have raised a fault."""
-    detected = fault.get("detected_s")
+    detected = fault["detected_s"]
     if detected is None:
         return "detection time not known"
     delay = detected - fault["start_s"]
@@ -122,7 +120,7 @@ def _keys(pair: Pair) -> tuple[tuple[str, str], ...]:
     return (*keys, ("ref", f"{pair.reference} ({pair.words})")) if pair.reference else tuple(keys)
 
 
-def _note(pair: Pair, rates: Mapping[str, Any], step: float) -> str:
+def _note(pair: Pair, rates: Mapping[str, float | None], step: float) -> str:
     """Channels that are slower than the time axis: between their samples the last one stands."""
     rate = 1.0 / step
     slow = [n for n in (pair.measured, pair.reference) if n and (rates.get(n) or rate) < 0.75 * rate]
@@ -160,19 +158,19 @@ def _holds(part: Stretch, pair: Pair, at: float) -> bool:
 
 
 def _edges(
-    fault: Mapping[str, Any],
-    faults: Sequence[Mapping[str, Any]],
+    fault: IntervalRow,
+    faults: Sequence[IntervalRow],
     pair: Pair,
     whole: Stretch | None,
     parts: Sequence[Stretch],
 ) -> tuple[Panel, ...]:
     out = []
-    for name, key in (("onset", "start_s"), ("end", "stop_s")):
-        part = whole or next((p for p in parts if _holds(p, pair, fault[key])), None)
+    for name, at in (("onset", fault["start_s"]), ("end", fault["stop_s"])):
+        part = whole or next((p for p in parts if _holds(p, pair, at)), None)
         if part is None:
             continue
         edge = edge_of(name, fault, faults, pair, *part)
-        title = f"{name.capitalize()} at {clock(fault[key], 3)}"
+        title = f"{name.capitalize()} at {clock(at, 3)}"
         if edge is None:
             where = "begins with" if name == "onset" else "lasts to the end of"
             out.append(Panel(title, "", Markup(""), f"The fault {where} the samples of {pair.measured}."))
@@ -182,19 +180,15 @@ def _edges(
 
 
 def _course(
-    fault: Mapping[str, Any], pair: Pair, columns: Columns, axis: tuple[float, float], limit: float | None
+    fault: IntervalRow, pair: Pair, columns: Columns, axis: tuple[float, float], limit: float
 ) -> tuple[Panel, ...]:
     """Channel against reference, residual against threshold, probability against its limit: those that exist."""
-    curves = {"r": columns[pair.reference]} if pair.reference else {}
-    curves["m"] = columns[pair.measured]
-    against = f", dashed the {pair.words}" if pair.reference else ""
-    out = [Panel(pair.title, pair.unit, course_picture(pair.title, fault, curves, axis, scale=pair.scale), against)]
-    if (residual := columns.get(pair.evidence + "residual")) is not None:
-        threshold = columns.get(pair.evidence + "threshold")
-        picture = course_picture("Residual", fault, {"m": residual}, axis, scale=pair.scale, threshold=threshold)
-        out.append(Panel("Residual", pair.unit, picture, ", band: ± threshold" if threshold is not None else ""))
-    if (probability := columns.get(pair.evidence + "probability")) is not None:
-        title = "Probability that it is not healthy"
-        picture = course_picture(title, fault, {"m": probability}, axis, level=limit, span=(-0.04, 1.04))
-        out.append(Panel(title, "", picture))
-    return tuple(p for p in out if p.picture)
+    rows = course_rows(fault, pair, columns, limit)
+    panels = (Panel(r.title, "" if r.unit == "1" else r.unit, course_picture(r, fault, columns, axis), _marks(r)) for r in rows)
+    return tuple(p for p in panels if p.picture)
+
+
+def _marks(row: Row) -> str:
+    """What a row shows beside the measured curve, to follow its title and unit."""
+    dashed = "".join(f", dashed the {t.label}" for t in row.traces if t.role == "reference")
+    return dashed + (", band: ± threshold" if row.threshold else "")

@@ -5,15 +5,18 @@ from __future__ import annotations
 import textwrap
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 from markupsafe import Markup
 
-from diagnosis.pages.labels import FAULT_MODES, known, part, span, state_label
+from diagnosis.comparison.coverage import sides_of
+from diagnosis.pages.labels import span
 from diagnosis.pages.svg import badge, text
-from diagnosis.report.confidence import known_sides
+from diagnosis.report.judged_parts import judged_sides
+from diagnosis.results.document import IntervalRow, ReportDocument, WheelPlace
+from diagnosis.results.fault_rows import state_label
+from diagnosis.results.vocabulary import Kind, Severity, part_name
+from replay.faults import State
 
-_SEVERITY = {"high": 3, "medium": 2, "low": 1, "info": 0}
 _MARGIN, _LINE = 26.0, 15  # room for text on either side, and characters that fit in a line of it
 _W, _TYRE_W, _TYRE_H, _PITCH = 372.0, 50.0, 96.0, 132.0
 
@@ -30,8 +33,8 @@ class Condition:
 
 def condition(
     component: str,
-    kind: str,
-    faults: Sequence[Mapping[str, Any]],
+    kind: Kind,
+    faults: Sequence[IntervalRow],
     judged: Mapping[tuple[str, str], bool],
     enough: Mapping[tuple[str, str], bool] | None = None,
 ) -> Condition:
@@ -39,9 +42,11 @@ def condition(
 
     Parameters
     ----------
-    component, kind : str
-        Wheel or axle, ``wheel`` or ``steer``.
-    faults : Sequence[Mapping[str, Any]]
+    component : str
+        Wheel or axle.
+    kind : Kind
+        Which of the two.
+    faults : Sequence[IntervalRow]
         The report's intervals.
     judged : Mapping[tuple[str, str], bool]
         Whether any time of a component and side was decided.
@@ -50,44 +55,30 @@ def condition(
     """
     mine = [f for f in faults if f["component"] == component and f["kind"] == kind]
     if mine:
-        worst = min(mine, key=lambda f: (-_SEVERITY.get(f["severity"], 0), f["start_s"]))
-        name = part(kind, worst["side"])
+        worst = min(mine, key=lambda f: (-Severity(f["severity"]).rank, f["start_s"]))
+        name = part_name(kind, worst["side"])
         label = state_label(worst["mode"], worst["side"]).lower()
         length = span(worst["stop_s"] - worst["start_s"])
         more = (f"and {len(mine) - 1} more",) if len(mine) > 1 else ()
         words = name[0].upper() + name[1:]
         title = f"{component}: {name} {label}, {length}{', ' + more[0] if more else ''}"
-        return Condition(known(worst["mode"]), (words, label, length, *more), worst["id"], title)
+        return Condition(worst["mode"], (words, label, length, *more), worst["id"], title)
     sides = {side: done for (c, side), done in judged.items() if c == component}
-    open_sides = [part(kind, side) for side, done in sides.items() if not done]
-    brief = [part(kind, side) for (c, side), done in (enough or {}).items() if c == component and not done]
+    open_sides = [part_name(kind, side) for side, done in sides.items() if not done]
+    brief = [part_name(kind, side) for (c, side), done in (enough or {}).items() if c == component and not done]
     if not sides or len(open_sides) == len(sides):
-        return Condition("not_assessed", ("Not assessed",), "", f"{component}: not assessed")
+        return Condition(State.NOT_ASSESSED, ("Not assessed",), "", f"{component}: not assessed")
     if brief and not open_sides:
         who = brief[0] if len(brief) < len(sides) else ""
         lines = ("No fault found", *((who,) if who else ()), "judged too briefly")
-        return Condition("not_assessed", lines, "", f"{component}: {', '.join(x.lower() for x in lines)}")
+        return Condition(State.NOT_ASSESSED, lines, "", f"{component}: {', '.join(x.lower() for x in lines)}")
     if open_sides:
         lines = ("No fault found", f"{open_sides[0]}", "not assessed")
-        return Condition("not_assessed", lines, "", f"{component}: no fault found, {open_sides[0]} not assessed")
-    return Condition("healthy", ("Healthy",), "", f"{component}: no fault found")
+        return Condition(State.NOT_ASSESSED, lines, "", f"{component}: no fault found, {open_sides[0]} not assessed")
+    return Condition(State.HEALTHY, ("Healthy",), "", f"{component}: no fault found")
 
 
-def judged_sides(report: Mapping[str, Any]) -> dict[tuple[str, str], bool]:
-    """Whether any time of each component and side was decided, from the coverage, else from the states."""
-    decided: dict[tuple[str, str], bool] = {}
-    positive = {"healthy", *FAULT_MODES}
-    for row in report.get("coverage") or ():
-        seconds = row.get("seconds") or {}
-        decided[row["component"], row["side"]] = any(seconds.get(s, 0) > 0 for s in positive)
-    if not decided:
-        for row in report.get("states") or ():
-            key = (row["component"], row["side"])
-            decided[key] = decided.get(key, False) or row["state"] in positive
-    return decided
-
-
-def _rows(wheels: Sequence[str], geometry: Mapping[str, Any]) -> list[list[str]]:
+def _rows(wheels: Sequence[str], geometry: Mapping[str, WheelPlace]) -> list[list[str]]:
     """Wheels in rows from the front, each from left to right; a grid of two columns without geometry."""
     if not all(w in geometry for w in wheels):
         columns = 1 if len(wheels) == 1 else 2 if len(wheels) <= 8 else 4
@@ -114,15 +105,11 @@ def _short(words: str, length: int) -> str:
     return words if len(words) <= length else words[: length - 1] + "…"
 
 
-def machine_picture(report: Mapping[str, Any]) -> Markup:
+def machine_picture(report: ReportDocument) -> Markup:
     """Picture of the machine for a report; wheels stand in a grid where the geometry is not known."""
-    machine = report.get("machine") or {}
-    wheels: Sequence[str] = machine.get("wheels") or ()
-    axles: Sequence[str] = machine.get("axles") or ()
-    geometry: Mapping[str, Any] = machine.get("geometry") or {}
-    faults = report.get("intervals") or ()
-    judged = judged_sides(report)
-    enough = {key: side.assessed for key, side in known_sides(report).items()}
+    machine, faults, judged = report["machine"], report["intervals"], judged_sides(report)
+    wheels, axles, geometry = machine["wheels"], machine["axles"], machine["geometry"] or {}
+    enough = {key: side.assessed for key, side in sides_of(report).items()}
     rows = _rows(wheels, geometry)
     placed = bool(wheels) and all(w in geometry for w in wheels)
     top = 40.0 if placed else 26.0
@@ -140,12 +127,12 @@ def machine_picture(report: Mapping[str, Any]) -> Markup:
         y = top + i * _PITCH
         for j, w in enumerate(row):
             centre, outward = _column(j, len(row), wide)
-            parts.append(_wheel(w, centre, y, outward, condition(w, "wheel", faults, judged, enough)))
+            parts.append(_wheel(w, centre, y, outward, condition(w, Kind.WHEEL, faults, judged, enough)))
             if placed:
-                axle_rows.setdefault(str(geometry[w].get("axle", "")), y + _TYRE_H / 2)
+                axle_rows.setdefault(geometry[w]["axle"], y + _TYRE_H / 2)
     extra = 0
     for a in axles:
-        c = condition(a, "steer", faults, judged, enough)
+        c = condition(a, Kind.STEER, faults, judged, enough)
         if a in axle_rows and a not in wheels:
             parts.append(_axle(a, 186, axle_rows[a], c))
         else:

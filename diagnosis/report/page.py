@@ -13,9 +13,9 @@ import hashlib
 import re
 import zlib
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
-from typing import Any
 
 import jinja2
 import numpy as np
@@ -24,7 +24,7 @@ from markupsafe import Markup, escape
 from numpy.typing import NDArray
 
 from diagnosis.pages import labels
-from diagnosis.pages.environment import SHARED, asset, environment
+from diagnosis.pages.environment import SHARED, asset, environment, shared_style
 from diagnosis.pages.svg import icon, path_picture, thumbnail
 from diagnosis.report import tables
 from diagnosis.report.compared_channels import pair_of
@@ -32,20 +32,41 @@ from diagnosis.report.driven_path import driven_path
 from diagnosis.report.evidence import evidence_of
 from diagnosis.report.machine_picture import machine_picture
 from diagnosis.report.plot_data import Axis, axis_of, blocks_of, channels_of, figures_of, packed_intervals, view, worst
-from diagnosis.report.plot_rows import Columns, derived, loop_groups
+from diagnosis.report.plot_rows import loop_groups
 from diagnosis.report.previous import previous_section
+from diagnosis.report.rows import Columns, derived
 from diagnosis.report.timeline import timeline
+from diagnosis.results.document import IntervalRow, ReportDocument
+from diagnosis.results.fault_rows import state_label
 from diagnosis.results.result import Closeups
+from diagnosis.results.vocabulary import part_name
 from replay.errors import ConfigError
+from replay.faults import FaultMode
 
 _ASSETS = Path(__file__).parent / "assets"
-_STYLES = (SHARED / "style.css", _ASSETS / "evidence.css", _ASSETS / "explorer.css", _ASSETS / "print.css")
+_STYLES = (_ASSETS / "evidence.css", _ASSETS / "explorer.css", _ASSETS / "print.css")
 _SCRIPTS = tuple(_ASSETS / name for name in ("data.js", "plot.js", "export.js", "explorer.js", "page.js"))
 _LISTED, _THUMBNAILS, _DETAILED = 5000, 300, 120
 
 
+@dataclass(frozen=True)
+class _Series:
+    """Time series of a page: all with their axis, those that hold samples, and these with what is derived from them."""
+
+    all: Columns
+    filled: Columns
+    shown: Columns
+    closeups: Closeups | None
+    axis: Axis
+
+    @property
+    def place(self) -> tuple[float, float]:
+        """Time of the first row and between rows [s]."""
+        return self.axis.start, self.axis.step
+
+
 def build_page(
-    report: Mapping[str, Any],
+    report: ReportDocument,
     columns: Mapping[str, NDArray[np.floating]],
     *,
     closeups: Closeups | None = None,
@@ -56,8 +77,8 @@ def build_page(
 
     Parameters
     ----------
-    report : Mapping[str, Any]
-        The parsed ``report.json``.
+    report : ReportDocument
+        The document.
     columns : Mapping[str, NDArray[np.floating]], each of shape (n,)
         Time series on the uniform axis ``t`` [s]; NaN where there is no sample. May be empty.
     closeups : Closeups or None
@@ -75,66 +96,97 @@ def build_page(
         Where the columns differ in length or ``t`` is not uniform.
     """
     whole = labels.made_visible(report)
-    every: Sequence[Mapping[str, Any]] = whole.get("intervals") or ()
-    report = tables.repaired({**whole, "intervals": worst(every, _LISTED)})
-    cols = {labels.visible(k): np.asarray(v) for k, v in columns.items()}
-    axis = axis_of(cols, (report.get("log") or {}).get("rate_hz"))
-    faults: Sequence[Mapping[str, Any]] = report["intervals"]
-    detailed = worst(faults, _DETAILED)
-    machine = report.get("machine") or {}
-    filled = {k: v for k, v in cols.items() if np.isfinite(v).any()} if axis.rows else {}
-    shown = derived(filled, faults)
-    limit = (report.get("limits") or {}).get("min_probability")
-    figures = figures_of(faults, machine, shown, limit)
-    groups = loop_groups(machine.get("wheels") or (), machine.get("axles") or (), shown)
-    near = None
-    if closeups is not None:
-        samples = {labels.visible(k): v for k, v in closeups.columns.items()}
-        near = Closeups(closeups.step, derived(samples, faults))
-    plots = len(filled) > 1
+    intervals = packed_intervals(worst(whole["intervals"], _LISTED))
+    report = {**whole, "intervals": worst(whole["intervals"], _LISTED)}
+    detailed = worst(report["intervals"], _DETAILED)
+    series = _series(report, columns, closeups)
+    duration = _duration(report, series.axis)
+    plots = len(series.filled) > 1
     plotly, packed, version = _plotly(plotlyjs) if plots else ("", "", "none, no plots")
-    duration = _duration(report, axis)
-    place = (axis.start, axis.step)
-    path = driven_path(report, filled, axis.step)
+    evidence = evidence_of(report, series.shown, series.place, series.axis.per, detailed, series.closeups)
+    drawn = sum(len(p.picture) for e in evidence.values() for p in (*e.edges, *e.course))
+    words = 400_000 + 6_000 * len(detailed) + 1_500 * len(report["intervals"]) + len(intervals)
+    budget = max(int(max_size_mb * 1e6) - len(packed) - words - drawn, 200_000)
     context = {
         **tables.context(report, duration),
-        "css": Markup("".join(asset(path) for path in _STYLES)),
-        "timeline": timeline(report, duration, {f["id"] for f in detailed}),
-        "picture": machine_picture(report),
-        "path": Markup("") if path.x is None or path.y is None else path_picture(path.x, path.y, *place, detailed),
-        "path_words": path.words,
-        "path_modes": [m for m in labels.FAULT_MODES if any(f["mode"] == m for f in detailed)],
+        **_pictures(report, detailed, series, duration),
+        **_plots(report, detailed, series, duration, budget),
+        **_scripts([plotly] if plots else []),
         "previous": previous_section(report),
-        "thumbs": {f["id"]: _thumbnail(f, shown, *place) for f in worst(faults, _THUMBNAILS)} if axis.rows else {},
-        "evidence": evidence_of(report, shown, place, axis.per, detailed, near),
-        "unlisted": len(every) - len(faults),
-        "groups": groups,
+        "evidence": evidence,
+        "unlisted": len(whole["intervals"]) - len(report["intervals"]),
         "has_plots": plots,
-        "empty": [k for k in cols if k not in filled],
+        "empty": [k for k in series.all if k not in series.filled],
+        "plotly": packed,
         "plotly_version": version,
     }
-    head, scripts = asset(SHARED / "theme.js"), [asset(path) for path in _SCRIPTS]
-    context |= {"head": Markup(head), "scripts": [Markup(s) for s in scripts], "plotly": packed}
-    context["csp"] = _policy([head, *scripts, *([plotly] if plots else [])])
-    intervals = packed_intervals(worst(every, _LISTED))
-    drawn = sum(len(p.picture) for e in context["evidence"].values() for p in (*e.edges, *e.course))
-    words = 400_000 + 6_000 * len(detailed) + 1_500 * len(faults) + len(intervals)
-    budget = int(max_size_mb * 1e6) - len(packed) - words - drawn
-    worst_first = {**report, "intervals": detailed}
-    channels = channels_of(worst_first, shown, figures, groups, axis, max(budget, 200_000), near)
-    context["blocks"] = [(f"b{i}", s.text) for i, s in enumerate(blocks_of(channels))]
     context["blocks"].append(("intervals", intervals))
-    context["view"] = htmlsafe_json_dumps(view(report, channels, figures, groups, axis, duration), sort_keys=True)
     return _environment().get_template("template.html.j2").render(context)
 
 
-def _duration(report: Mapping[str, Any], axis: Axis) -> float:
-    ends = [s["stop_s"] for key in ("states", "phases", "intervals") for s in report.get(key) or ()]
-    known = (report.get("log") or {}).get("duration_s") or 0.0
-    return float(max([known, axis.start + axis.step * axis.rows if axis.rows else 0.0, *ends]))
+def _series(report: ReportDocument, columns: Columns, closeups: Closeups | None) -> _Series:
+    """Columns with visible names, and what the plots derive from them."""
+    every = {labels.visible(k): np.asarray(v) for k, v in columns.items()}
+    axis = axis_of(every, report["log"]["rate_hz"])
+    filled = {k: v for k, v in every.items() if np.isfinite(v).any()} if axis.rows else {}
+    near = None
+    if closeups is not None:
+        samples = {labels.visible(k): v for k, v in closeups.columns.items()}
+        near = Closeups(closeups.step, derived(samples, report["intervals"]))
+    return _Series(every, filled, derived(filled, report["intervals"]), near, axis)
 
 
-def _thumbnail(fault: Mapping[str, Any], columns: Columns, start: float, step: float) -> Markup:
+def _pictures(
+    report: ReportDocument, detailed: Sequence[IntervalRow], series: _Series, duration: float
+) -> tables.Context:
+    """Timeline, machine, driven path and thumbnails."""
+    path = driven_path(report, series.filled, series.axis.step)
+    drawn = path.x is not None and path.y is not None
+    thumbs = worst(report["intervals"], _THUMBNAILS) if series.axis.rows else []
+    return {
+        "timeline": timeline(report, duration, {f["id"] for f in detailed}),
+        "picture": machine_picture(report),
+        "path": path_picture(path.x, path.y, *series.place, detailed) if drawn else Markup(""),
+        "path_words": path.words,
+        "path_modes": [m for m in FaultMode if any(f["mode"] == m for f in detailed)],
+        "thumbs": {f["id"]: _thumbnail(f, series.shown, *series.place) for f in thumbs},
+    }
+
+
+def _plots(
+    report: ReportDocument, detailed: Sequence[IntervalRow], series: _Series, duration: float, budget: int
+) -> tables.Context:
+    """Rows of the linked plots and the encoded columns behind them, within a budget [bytes]."""
+    machine, shown, axis = report["machine"], series.shown, series.axis
+    figures = figures_of(report["intervals"], machine, shown, report["limits"]["min_probability"])
+    groups = loop_groups(machine["wheels"], machine["axles"], shown)
+    worst_alone: ReportDocument = {**report, "intervals": list(detailed)}
+    channels = channels_of(worst_alone, shown, figures, groups, axis, budget, series.closeups)
+    return {
+        "groups": groups,
+        "blocks": [(f"b{i}", s.text) for i, s in enumerate(blocks_of(channels))],
+        "view": htmlsafe_json_dumps(view(report, channels, figures, groups, axis, duration), sort_keys=True),
+    }
+
+
+def _scripts(plotly: Sequence[str]) -> tables.Context:
+    """Style, scripts, and the policy that admits these scripts and the bundle of plotly.js."""
+    head, scripts = asset(SHARED / "theme.js"), [asset(path) for path in _SCRIPTS]
+    return {
+        "css": Markup(shared_style() + "".join(asset(path) for path in _STYLES)),
+        "head": Markup(head),
+        "scripts": [Markup(s) for s in scripts],
+        "csp": _policy([head, *scripts, *plotly]),
+    }
+
+
+def _duration(report: ReportDocument, axis: Axis) -> float:
+    rows = (*report["states"], *report["phases"], *report["intervals"])
+    columns_end = axis.start + axis.step * axis.rows if axis.rows else 0.0
+    return max(report["log"]["duration_s"], columns_end, *(row["stop_s"] for row in rows), 0.0)
+
+
+def _thumbnail(fault: IntervalRow, columns: Columns, start: float, step: float) -> Markup:
     pair = pair_of(fault, columns)
     if pair is None:
         return Markup("")
@@ -180,7 +232,7 @@ def _headed(rows: Markup, heads: Sequence[str]) -> Markup:
 @lru_cache
 def _environment() -> jinja2.Environment:
     found = environment(_ASSETS)
-    found.filters |= {"clock": labels.clock, "span": labels.span, "num": labels.number, "state": labels.state_label}
+    found.filters |= {"clock": labels.clock, "span": labels.span, "num": labels.number, "state": state_label}
     found.filters["headed"] = _headed
-    found.globals |= {"icon": icon, "known": labels.known, "part": labels.part, "title": labels.fault_title}
+    found.globals |= {"icon": icon, "part": part_name, "title": labels.fault_title}
     return found

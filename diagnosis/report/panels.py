@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any
-
 import numpy as np
 from markupsafe import Markup
 from numpy.typing import NDArray
 
 from diagnosis.pages.axes import Frame, label, limits
-from diagnosis.pages.labels import known, number
+from diagnosis.pages.labels import number
 from diagnosis.pages.svg import extremes
 from diagnosis.report.edges import Edge, time_words
+from diagnosis.report.plot_rows import Columns, Row
+from diagnosis.results.document import IntervalRow
 
 Array = NDArray[np.float64]
 
@@ -21,16 +20,18 @@ _EDGE_HEIGHT, _COURSE_HEIGHT = 176.0, 98.0
 _HEAD = 17.0
 _SCALES = 44.0
 _STRETCHES = 150
+#: Class of the line by the part that a curve plays; see `Trace`.
+_STYLES = {"measured": "m", "reference": "r"}
 
 
-def edge_picture(edge: Edge, fault: Mapping[str, Any]) -> Markup:
+def edge_picture(edge: Edge, fault: IntervalRow) -> Markup:
     """Samples around one edge as dots, those of the reference as ticks, with the gap beside the noise at the right.
 
     Parameters
     ----------
     edge : Edge
         The samples.
-    fault : Mapping[str, Any]
+    fault : IntervalRow
         One of the report's intervals.
     """
     span = limits(edge.y, edge.reference, np.array(edge.gap or ()), least=8 * (edge.noise or 0.0))
@@ -38,7 +39,7 @@ def edge_picture(edge: Edge, fault: Mapping[str, Any]) -> Markup:
         return Markup("")
     room = _SCALES if edge.gap else 8.0
     frame = Frame(_WIDTH, _EDGE_HEIGHT, (float(edge.t[0]), float(edge.t[-1])), span, room, _HEAD)
-    mode, onset = known(fault["mode"]), edge.name == "onset"
+    mode, onset = fault["mode"], edge.name == "onset"
     in_seconds = edge.reach >= 2.0
     parts = [
         frame.axes(*(("s", 1.0) if in_seconds else ("ms", 1e3))),
@@ -63,9 +64,9 @@ def _marks(t: Array, y: Array, frame: Frame, style: str, shape: str, down: float
     return Markup(f'<path class="{style}" d="{d}"/>')
 
 
-def _detected(edge: Edge, fault: Mapping[str, Any], frame: Frame) -> Markup:
+def _detected(edge: Edge, fault: IntervalRow, frame: Frame) -> Markup:
     """Line at the causal detection, or at the border a word that it came later."""
-    detected = fault.get("detected_s")
+    detected = fault["detected_s"]
     if detected is None:
         return Markup("")
     at, delay = detected - edge.at, detected - fault["start_s"]
@@ -102,62 +103,48 @@ def _scales(edge: Edge, frame: Frame) -> Markup:
 
 
 def course_picture(
-    name: str,
-    fault: Mapping[str, Any],
-    curves: Mapping[str, NDArray[np.floating]],
-    axis: tuple[float, float],
-    *,
-    scale: float = 1.0,
-    threshold: NDArray[np.floating] | None = None,
-    level: float | None = None,
-    span: tuple[float, float] | None = None,
+    row: Row, fault: IntervalRow, columns: Columns, axis: tuple[float, float]
 ) -> Markup:
-    """Some curves around one fault, as extremes per stretch.
+    """One row of a figure around its fault, as extremes per stretch; empty where it holds no sample there.
 
     Parameters
     ----------
-    name : str
-        What is shown, for readers that do not see it.
-    fault : Mapping[str, Any]
+    row : Row
+        From `diagnosis.report.plot_rows.course_rows`.
+    fault : IntervalRow
         One of the report's intervals.
-    curves : Mapping[str, NDArray[np.floating]], each of shape (n,)
-        Whole columns by the style of their line.
+    columns : Columns
+        Whole columns, those of the row among them.
     axis : tuple[float, float]
         Time of the first sample and sample time [s].
-    scale : float
-        Factor from the columns' unit to the one shown.
-    threshold : NDArray[np.floating] or None, shape (n,)
-        Half the height of a band about zero.
-    level : float or None
-        Value of a dashed line.
-    span : tuple[float, float] or None
-        Range of values; None: all that occur.
     """
     start, step = axis
-    size = len(next(iter(curves.values())))
+    size = len(columns[row.traces[0].column])
     pad = max(0.5, 0.35 * (fault["stop_s"] - fault["start_s"]))
     first = max(0, int((fault["start_s"] - pad - start) / step))
     last = min(size, int((fault["stop_s"] + pad - start) / step) + 2)
     if last - first < 2:
         return Markup("")
     count = min(_STRETCHES, last - first)
-    pairs = {k: tuple(v * scale for v in extremes(c[first:last], count)) for k, c in curves.items()}
-    band = None if threshold is None else extremes(threshold[first:last], count)[1] * scale
-    values = [v for pair in pairs.values() for v in pair] + ([] if band is None else [band, -band])
-    found = span or limits(*values)
-    if found is None:
+    curves = [
+        (_STYLES[t.role], *(v * t.scale for v in extremes(columns[t.column][first:last], count))) for t in row.traces
+    ]
+    band = None if row.threshold is None else extremes(columns[row.threshold][first:last], count)[1] * row.band_scale
+    values = [v for _, low, high in curves for v in (low, high)] + ([] if band is None else [band, -band])
+    span = row.limits or limits(*values)
+    if span is None:
         return Markup("")
-    frame = Frame(_WIDTH, _COURSE_HEIGHT, (start + first * step, start + last * step), found)
+    frame = Frame(_WIDTH, _COURSE_HEIGHT, (start + first * step, start + last * step), span)
     t = start + (first + (np.arange(count) + 0.5) * (last - first) / count) * step
-    parts = [frame.axes("s"), frame.shade(fault["start_s"], fault["stop_s"], known(fault["mode"]))]
+    parts = [frame.axes("s"), frame.shade(fault["start_s"], fault["stop_s"], fault["mode"])]
     if band is not None:
         parts.append(_band(t, band, frame))
-    parts += [_curve(t, low, high, frame, style) for style, (low, high) in pairs.items()]
-    if level is not None:
-        y = float(frame.py(level))
+    parts += [_curve(t, low, high, frame, style) for style, low, high in curves]
+    if row.level is not None:
+        y = float(frame.py(row.level))
         parts.append(Markup('<path class="lim" d="M{:.1f} {:.1f}H{:.1f}"/>').format(frame.left, y, frame.right))
-        parts.append(label(frame.right, y + 11, f"limit {number(level)}", "fin"))
-    return _picture(_COURSE_HEIGHT, f"{name} around {fault['id']}", parts)
+        parts.append(label(frame.right, y + 11, f"limit {number(row.level)}", "fin"))
+    return _picture(_COURSE_HEIGHT, f"{row.title} around {fault['id']}", parts)
 
 
 def _curve(t: Array, low: Array, high: Array, frame: Frame, style: str) -> Markup:

@@ -1,292 +1,214 @@
-"""Which curves each figure of the report shows: rows of the evidence of a fault and of the loop replay.
+"""Every plot of the report: which curves it shows, with title, unit, band, threshold and limits.
 
-A row is plain JSON: the page draws it, the server only chooses. Angles are shown in degrees.
+`fault_rows` are the linked plots of a fault, `course_rows` its small pictures that need no JavaScript, `loop_groups` the plots of
+the loop replay. A plot is changed here and in ``tests/diagnosis/report/test_plot_rows.py`` alone: the page draws rows, whatever
+they hold. Angles are shown in degrees.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from typing import Any
+from collections.abc import Sequence
 
-import numpy as np
-from numpy.typing import NDArray
+from diagnosis.report.compared_channels import DEGREES, VALVE_UNIT, Pair, by_valve, motion_of
+from diagnosis.report.rows import Columns, Group, Row, Trace
+from diagnosis.results.document import IntervalRow
+from diagnosis.results.fault_rows import state_label
+from diagnosis.results.vocabulary import Kind
+from replay.faults import FaultMode, Side, State
 
-from diagnosis.pages.labels import FAULT_MODES, state_label
-from diagnosis.report.compared_channels import DEGREES, VALVE_UNIT, by_valve, sides_of
-
-Columns = Mapping[str, NDArray[np.floating]]
-
-_Z95 = 1.959964
-
-
-@dataclass(frozen=True)
-class Trace:
-    """One curve: column, what it is called, the part it plays (its colour and dash), and a factor for its unit."""
-
-    column: str
-    label: str
-    role: str
-    scale: float = 1.0
-    right: bool = False
-
-
-@dataclass(frozen=True)
-class Row:
-    """One panel of a figure; panels share the time axis."""
-
-    key: str
-    title: str
-    unit: str
-    traces: tuple[Trace, ...]
-    band: tuple[str, str] | None = None
-    band_scale: float = 1.0
-    threshold: str | None = None
-    level: float | None = None
-    limits: tuple[float, float] | None = None
-    clip: tuple[float, float] | None = None
-    right: tuple[str, str] | None = None
-    component: str = ""
-
-    def columns(self) -> tuple[str, ...]:
-        """Columns that the row needs."""
-        extra = (*(self.band or ()), *((self.threshold,) if self.threshold else ()))
-        return (*(t.column for t in self.traces), *extra)
-
-
-@dataclass(frozen=True)
-class Group:
-    """Rows of the loop replay under one button."""
-
-    key: str
-    title: str
-    rows: tuple[Row, ...]
-
-
-def derived(columns: Columns, faults: Sequence[Mapping[str, Any]]) -> dict[str, NDArray[np.floating]]:
-    """Columns with ε̂ = 1 − δ̂ and the 95 % bounds of ε̂ and of the saturation term added for the faults shown."""
-    result = dict(columns)
-    for fault in faults:
-        for side in sides_of(fault["side"]):
-            base = f"evidence.{fault['component']}.{side}."
-            delta, bar = columns.get(base + "delta"), columns.get(base + "delta_bar")
-            if delta is not None and base + "epsilon" not in result:
-                result[base + "epsilon"] = 1.0 - delta
-                if (std := columns.get(base + "delta_std")) is not None:
-                    result[base + "epsilon_low"] = 1.0 - delta - _Z95 * std
-                    result[base + "epsilon_high"] = 1.0 - delta + _Z95 * std
-            if bar is not None and base + "delta_bar_low" not in result:
-                if (std := columns.get(base + "delta_bar_std")) is None:
-                    continue
-                result[base + "delta_bar_low"] = bar - _Z95 * std
-                result[base + "delta_bar_high"] = bar + _Z95 * std
-    return result
-
-
-def _row(columns: Columns, key: str, title: str, unit: str, traces: Sequence[Trace], **extra: Any) -> list[Row]:
-    """Row with the curves that exist, or nothing; a band or threshold without its column is left out."""
-    there = tuple(t for t in traces if t.column in columns)
-    if not there:
-        return []
-    if (band := extra.get("band")) and not set(band) <= set(columns):
-        extra["band"] = None
-    if (threshold := extra.get("threshold")) and threshold not in columns:
-        extra["threshold"] = None
-    return [Row(key, title, unit, there, **extra)]
-
-
-def _first(columns: Columns, *names: str) -> str:
-    return next((n for n in names if n in columns), names[0])
-
-
-def _motion(c: str, kind: str, columns: Columns) -> tuple[str, str, float, str, str, str]:
-    """Measured, commanded and second measurement of a component: names, unit and factor."""
-    if kind == "steer":
-        ref = _first(columns, f"replay.{c}.phi_ref", f"steer.{c}.phi_ref")
-        return "Steering angle", "°", DEGREES, f"steer.{c}.phi", ref, f"steer.{c}.phi_true"
-    ref = _first(columns, f"replay.{c}.v_ref", f"wheel.{c}.v_ref")
-    return "Wheel speed", "m/s", 1.0, f"wheel.{c}.v", ref, f"wheel.{c}.v_true"
+_MODES: tuple[str, ...] = (State.HEALTHY, *FaultMode)
 
 
 def fault_rows(
-    fault: Mapping[str, Any], peers: Sequence[str], columns: Columns, limit: float | None = None
+    fault: IntervalRow, peers: Sequence[str], columns: Columns, limit: float | None = None
 ) -> tuple[Row, ...]:
-    """Rows of evidence for one fault.
+    """Rows of the linked plots of one fault.
 
     Parameters
     ----------
-    fault : Mapping[str, Any]
+    fault : IntervalRow
         One of the report's intervals.
     peers : Sequence[str]
         Components of the same kind, the faulty one included.
-    columns : Mapping[str, NDArray[np.floating]]
-        Columns with those of `derived`.
+    columns : Columns
+        Columns with those of `diagnosis.report.rows.derived`.
     limit : float or None
         Probability from which a fault is stated.
     """
-    c, kind, side = fault["component"], fault["kind"], fault["side"]
-    group = "steer" if kind == "steer" else "wheel"
-    title, unit, scale, measured, commanded, second = _motion(c, kind, columns)
-    applied = f"{group}.{c}.u_applied"
+    c, kind, side = fault["component"], fault["kind"], Side(fault["side"])
+    motion = motion_of(c, kind, columns)
     valve_read = by_valve(fault, columns)
-    expected = f"evidence.{c}.{sides_of(side)[0]}.expected"
-    motion = [
-        Trace(commanded, "commanded", "commanded", scale),
-        Trace(second, "second measurement", "reference", scale),
-        *([] if valve_read else [Trace(expected, "expected", "expected", scale)]),
-        Trace(measured, "measured", "measured", scale),
-    ]
-    valve = [
-        Trace(f"{group}.{c}.u", "recorded", "measured"),
-        Trace(f"replay.{c}.u", "replayed", "replayed"),
-        Trace(applied, "applied", "applied"),
-        *([Trace(expected, "expected", "expected")] if valve_read else []),
-    ]
-    valve_row = _row(columns, "u", "Valve command", "of full opening", valve)
-    rows = _row(columns, "v", title, unit, motion)
-    if side == "actuator":
-        rows += valve_row
-    for s in sides_of(side):
-        rows += _side_rows(fault, s, (VALVE_UNIT, 1.0) if valve_read else (unit, scale), columns, limit)
-    if kind == "wheel":
-        rows += _psi_row(c, columns)
-    if side != "actuator":
-        rows += valve_row
-    others = [Trace(f"{group}.{p}.{'phi' if kind == 'steer' else 'v'}", p, "peer", scale) for p in peers if p != c]
-    if any(t.column in columns for t in others):
-        name = "Other axles" if kind == "steer" else "Peer wheels"
-        rows += _row(columns, "peers", name, unit, [*others, Trace(measured, c, "measured", scale)])
-    return tuple(rows)
+    expected = f"evidence.{c}.{side.sides[0]}.expected"
+    speed_or_angle = Row(
+        "v",
+        motion.title,
+        motion.unit,
+        (
+            Trace(motion.commanded, "commanded", "commanded", motion.scale),
+            Trace(motion.second, "second measurement", "reference", motion.scale),
+            *(() if valve_read else (Trace(expected, "expected", "expected", motion.scale),)),
+            Trace(motion.measured, "measured", "measured", motion.scale),
+        ),
+    )
+    valve = Row(
+        "u",
+        "Valve command",
+        VALVE_UNIT,
+        (
+            Trace(f"{kind}.{c}.u", "recorded", "measured"),
+            Trace(f"replay.{c}.u", "replayed", "replayed"),
+            Trace(f"{kind}.{c}.u_applied", "applied", "applied"),
+            *((Trace(expected, "expected", "expected"),) if valve_read else ()),
+        ),
+    )
+    residual_unit = (VALVE_UNIT, 1.0) if valve_read else (motion.unit, motion.scale)
+    rows = [speed_or_angle]
+    rows += [valve] if side == Side.ACTUATOR else []
+    rows += [row for s in side.sides for row in _side_rows(fault, s, residual_unit, limit)]
+    rows += [psi_row(c, columns)] if kind == Kind.WHEEL else []
+    rows += [valve] if side != Side.ACTUATOR else []
+    rows += _peer_row(c, kind, peers, columns)
+    return tuple(r for row in rows for r in row.shown(columns))
 
 
-def _side_rows(
-    fault: Mapping[str, Any], side: str, residual_unit: tuple[str, float], columns: Columns, limit: float | None
-) -> list[Row]:
-    """Residual, probability that the side is not healthy, ε̂, saturation term and mode probabilities of one side."""
-    base = f"evidence.{fault['component']}.{side}."
-    of = f" ({side})" if fault["side"] == "sensor_or_actuator" else ""
-    unit, scale = residual_unit
-    natural = "rad" if fault["kind"] == "steer" else "m/s"
-    sat_unit = (fault.get("sat") or {}).get("unit") or (natural if side == "sensor" else "of full opening")
-    sat_scale = DEGREES if sat_unit == "rad" else 1.0
-    rows = _row(
-        columns,
+def course_rows(fault: IntervalRow, pair: Pair, columns: Columns, limit: float | None) -> tuple[Row, ...]:
+    """Rows of the small pictures of one fault: channel and reference, residual, probability that it is not healthy.
+
+    Parameters
+    ----------
+    fault : IntervalRow
+        One of the report's intervals.
+    pair : Pair
+        Its channel and reference.
+    columns : Columns
+        Columns by name.
+    limit : float or None
+        Probability from which a fault is stated.
+    """
+    reference = () if pair.reference is None else (Trace(pair.reference, pair.words, "reference", pair.scale),)
+    rows = (
+        Row("v", pair.title, pair.unit, (*reference, Trace(pair.measured, "measured", "measured", pair.scale))),
+        residual_row(pair.evidence, pair.unit, pair.scale),
+        probability_row(pair.evidence, limit, limits=(-0.04, 1.04)),
+    )
+    return tuple(r for row in rows for r in row.shown(columns))
+
+
+def residual_row(base: str, unit: str, scale: float, of: str = "") -> Row:
+    """Residual within ± its threshold, of the evidence columns that begin with `base`."""
+    return Row(
         f"residual{of}",
         f"Residual{of}",
         unit,
-        [Trace(base + "residual", "residual", "measured", scale)],
+        (Trace(base + "residual", "residual", "measured", scale),),
         threshold=base + "threshold",
         band_scale=scale,
     )
-    rows += _row(
-        columns,
+
+
+def probability_row(
+    base: str, limit: float | None, of: str = "", limits: tuple[float, float] = (-0.03, 1.03)
+) -> Row:
+    """Probability that a side is not healthy, and the limit from which a fault is stated."""
+    return Row(
         f"probability{of}",
         f"Probability that it is not healthy{of}",
         "1",
-        [Trace(base + "probability", "not healthy", "measured")],
+        (Trace(base + "probability", "not healthy", "measured"),),
         level=limit,
-        limits=(-0.03, 1.03),
+        limits=limits,
     )
-    rows += _row(
-        columns,
-        f"epsilon{of}",
-        f"Loss ε̂{of}",
-        "1",
-        [Trace(base + "epsilon", "estimate, 95 % band", "measured")],
-        band=(base + "epsilon_low", base + "epsilon_high"),
-        clip=(-1.0, 2.0),
-    )
-    rows += _row(
-        columns,
-        f"sat{of}",
-        f"Saturation term ε̂·sat{of}",
-        "°" if sat_unit == "rad" else sat_unit,
-        [Trace(base + "delta_bar", "estimate, 95 % band", "measured", sat_scale)],
-        band=(base + "delta_bar_low", base + "delta_bar_high"),
-        band_scale=sat_scale,
-    )
-    modes = ["healthy", *FAULT_MODES]
-    rows += _row(
-        columns,
-        f"modes{of}",
-        f"Mode probability{of}",
-        "1",
-        [Trace(f"{base}p_{m}", state_label(m, side).lower(), f"mode-{m}") for m in modes],
-        limits=(-0.03, 1.03),
-    )
-    return rows
 
 
-def _psi_row(c: str, columns: Columns, component: str = "") -> list[Row]:
-    traces = [
-        Trace(f"replay.{c}.psi_printed", "printed law", "replayed"),
-        Trace(f"replay.{c}.psi_implied", "implied by the recorded command", "measured"),
-        Trace(f"wheel.{c}.psi", "recorded", "reference"),
-        Trace(f"replay.{c}.rho", "ρ (right axis)", "right", right=True),
+def _side_rows(fault: IntervalRow, side: Side, residual_unit: tuple[str, float], limit: float | None) -> list[Row]:
+    """Residual, probability that the side is not healthy, ε̂, saturation term and mode probabilities of one side."""
+    base = f"evidence.{fault['component']}.{side}."
+    of = f" ({side})" if fault["side"] == Side.SENSOR_OR_ACTUATOR else ""
+    natural = "rad" if fault["kind"] == Kind.STEER else "m/s"
+    sat_unit = (fault["sat"]["unit"] if fault["sat"] else "") or (natural if side == Side.SENSOR else VALVE_UNIT)
+    sat_scale = DEGREES if sat_unit == "rad" else 1.0
+    return [
+        residual_row(base, *residual_unit, of),
+        probability_row(base, limit, of),
+        Row(
+            f"epsilon{of}",
+            f"Loss ε̂{of}",
+            "1",
+            (Trace(base + "epsilon", "estimate, 95 % band", "measured"),),
+            band=(base + "epsilon_low", base + "epsilon_high"),
+            clip=(-1.0, 2.0),
+        ),
+        Row(
+            f"sat{of}",
+            f"Saturation term ε̂·sat{of}",
+            "°" if sat_unit == "rad" else sat_unit,
+            (Trace(base + "delta_bar", "estimate, 95 % band", "measured", sat_scale),),
+            band=(base + "delta_bar_low", base + "delta_bar_high"),
+            band_scale=sat_scale,
+        ),
+        Row(
+            f"modes{of}",
+            f"Mode probability{of}",
+            "1",
+            tuple(Trace(f"{base}p_{m}", state_label(m, side).lower(), f"mode-{m}") for m in _MODES),
+            limits=(-0.03, 1.03),
+        ),
     ]
-    return _row(
-        columns,
+
+
+def psi_row(c: str, columns: Columns, component: str = "") -> Row:
+    """Ψ̂ of the printed law, as the recorded command implies it and as recorded, with ρ on the right."""
+    return Row(
         "psi",
         f"Ψ̂ {c}",
         "1",
-        traces,
+        (
+            Trace(f"replay.{c}.psi_printed", "printed law", "replayed"),
+            Trace(f"replay.{c}.psi_implied", "implied by the recorded command", "measured"),
+            Trace(f"wheel.{c}.psi", "recorded", "reference"),
+            Trace(f"replay.{c}.rho", "ρ (right axis)", "right", right=True),
+        ),
         right=("ρ", "1/s") if f"replay.{c}.rho" in columns else None,
         component=component,
     )
 
 
+def _peer_row(c: str, kind: Kind, peers: Sequence[str], columns: Columns) -> list[Row]:
+    """The same channel of the other components, where one of them has it."""
+    motion = motion_of(c, kind, columns)
+    channels = [(p, motion_of(p, kind, columns).measured) for p in peers if p != c]
+    if not any(name in columns for _, name in channels):
+        return []
+    traces = [Trace(name, p, "peer", motion.scale) for p, name in channels]
+    title = "Other axles" if kind == Kind.STEER else "Peer wheels"
+    own = Trace(motion.measured, c, "measured", motion.scale)
+    return [Row("peers", title, motion.unit, (*traces, own))]
+
+
 def loop_groups(wheels: Sequence[str], axles: Sequence[str], columns: Columns) -> tuple[Group, ...]:
     """Rows of the loop replay over the whole mission, as in the paper's figures; groups without data are left out."""
-    speed: list[Row] = []
-    drive: list[Row] = []
-    steering: list[Row] = []
-    psi: list[Row] = []
-    for w in wheels:
-        _, unit, scale, measured, commanded, _ = _motion(w, "wheel", columns)
-        traces = [Trace(measured, "v measured", "measured", scale), Trace(commanded, "v_ref", "commanded", scale)]
-        speed += _row(columns, "v", f"Speed {w}", unit, traces, component=w)
-        valve = [Trace(f"wheel.{w}.u", "recorded", "measured"), Trace(f"replay.{w}.u", "replayed", "replayed")]
-        drive += _row(columns, "u", f"u_a {w}", "of full opening", valve, component=w)
-        psi += _psi_row(w, columns, component=w)
-    for a in axles:
-        _, unit, scale, measured, commanded, _ = _motion(a, "steer", columns)
-        traces = [Trace(measured, "φ measured", "measured", scale), Trace(commanded, "φ_c", "commanded", scale)]
-        steering += _row(columns, "phi", f"φ {a}", unit, traces, component=a)
-        valve = [Trace(f"steer.{a}.u", "recorded", "measured"), Trace(f"replay.{a}.u", "replayed", "replayed")]
-        steering += _row(columns, "u", f"u_s {a}", "of full opening", valve, component=a)
-    groups = (
-        Group("speed", "Wheel speeds", tuple(speed)),
-        Group("drive", "Drive valves u_a", tuple(drive)),
-        Group("steering", "Steering φ and u_s", tuple(steering)),
-        Group("psi", "Ψ̂ printed and implied", tuple(psi)),
-    )
-    return tuple(g for g in groups if g.rows)
-
-
-def row_json(row: Row, index: Mapping[str, int]) -> dict[str, Any]:
-    """Row as the page reads it; columns become indices of channels."""
-    data: dict[str, Any] = {
-        "key": row.key,
-        "title": row.title,
-        "unit": row.unit,
-        "traces": [
-            {"c": index[t.column], "name": t.label, "role": t.role, "k": t.scale, "right": t.right} for t in row.traces
+    groups = {
+        ("speed", "Wheel speeds"): [_loop_motion(w, Kind.WHEEL, columns) for w in wheels],
+        ("drive", "Drive valves u_a"): [_loop_valve(w, Kind.WHEEL) for w in wheels],
+        ("steering", "Steering φ and u_s"): [
+            row for a in axles for row in (_loop_motion(a, Kind.STEER, columns), _loop_valve(a, Kind.STEER))
         ],
+        ("psi", "Ψ̂ printed and implied"): [psi_row(w, columns, component=w) for w in wheels],
     }
-    if row.band:
-        data["band"] = [index[c] for c in row.band]
-    if row.threshold:
-        data["threshold"] = index[row.threshold]
-    if row.band or row.threshold:
-        data["bandScale"] = row.band_scale
-    if row.level is not None:
-        data["level"] = row.level
-    if row.limits:
-        data["limits"] = list(row.limits)
-    if row.clip:
-        data["clip"] = list(row.clip)
-    if row.component:
-        data["component"] = row.component
-    if row.right:
-        data["rightUnit"] = {"title": row.right[0], "unit": row.right[1]}
-    return data
+    found = [(key, tuple(r for row in rows for r in row.shown(columns))) for key, rows in groups.items()]
+    return tuple(Group(*key, rows) for key, rows in found if rows)
+
+
+def _loop_motion(c: str, kind: Kind, columns: Columns) -> Row:
+    motion = motion_of(c, kind, columns)
+    key, title, measured, commanded = ("phi", "φ", "φ", "φ_c") if kind == Kind.STEER else ("v", "Speed", "v", "v_ref")
+    traces = (
+        Trace(motion.measured, f"{measured} measured", "measured", motion.scale),
+        Trace(motion.commanded, commanded, "commanded", motion.scale),
+    )
+    return Row(key, f"{title} {c}", motion.unit, traces, component=c)
+
+
+def _loop_valve(c: str, kind: Kind) -> Row:
+    traces = (Trace(f"{kind}.{c}.u", "recorded", "measured"), Trace(f"replay.{c}.u", "replayed", "replayed"))
+    return Row("u", f"{'u_s' if kind == Kind.STEER else 'u_a'} {c}", VALVE_UNIT, traces, component=c)

@@ -22,7 +22,7 @@ class Figure {
     "free-1": { colour: "stuck", width: 1.4, dash: "dash", sign: "╌╌" },
     "free-2": { colour: "teal", width: 1.6, sign: "━━" },
     "free-3": { colour: "alt", width: 1.4, dash: "dash", sign: "╌╌" },
-    "free-4": { colour: "ineff-line", width: 1.6, dash: "dot", sign: "···" },
+    "free-4": { colour: "inefficient-line", width: 1.6, dash: "dot", sign: "···" },
     "free-5": { colour: "text", width: 1.1, sign: "──" },
     band: { colour: "accent", width: 0 },
     threshold: { colour: "stuck", width: 1.3, dash: "dash", sign: "╌╌" },
@@ -31,7 +31,7 @@ class Figure {
   static style(role) {
     if (role.startsWith("mode-")) {
       const mode = role.slice(5), dash = { stuck: "solid", no_signal: "dash", inefficient: "solid", noisy: "dot" }[mode];
-      return { colour: mode === "inefficient" ? "ineff-line" : mode, width: 1.6, dash, sign: dash === "dash" ? "╌╌" : dash === "dot" ? "···" : "━━" };
+      return { colour: `${mode}-line`, width: 1.6, dash, sign: dash === "dash" ? "╌╌" : dash === "dot" ? "···" : "━━" };
     }
     return Figure.styles[role];
   }

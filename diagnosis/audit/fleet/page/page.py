@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import base64
 import hashlib
-import re
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from functools import lru_cache
@@ -29,7 +28,7 @@ from diagnosis.audit.fleet.trend_types import TrendRow
 from diagnosis.audit.fleet.words import count, verdict_label
 from diagnosis.audit.store.outcome import MissionState
 from diagnosis.pages import labels
-from diagnosis.pages.environment import SHARED, asset, environment
+from diagnosis.pages.environment import DARK, SHARED, asset, environment, shared_style
 from diagnosis.results.fault_rows import state_label
 from diagnosis.results.vocabulary import Verdict, part_words
 from replay.faults import FaultMode
@@ -129,13 +128,9 @@ def _css() -> str:
 
     Dark is for screens, and without scripts by the system's choice; paper stays light.
     """
-    shared = asset(SHARED / "style.css")
-    dark = re.search(r"\[data-theme=dark\] \{([^}]*)\}", shared)
-    if dark:
-        chosen_dark = f"@media screen {{ {dark[0]} }}\n"
-        system_dark = f"@media screen and (prefers-color-scheme: dark) {{ :root:not(.js) {{{dark[1]}}} }}\n"
-        shared = shared.replace(dark[0], chosen_dark + system_dark)
-    return shared + asset(_HERE / "fleet.css")
+    chosen_dark = r"@media screen { \g<0> }\n"
+    system_dark = r"@media screen and (prefers-color-scheme: dark) { :root:not(.js) {\1} }\n"
+    return DARK.sub(chosen_dark + system_dark, shared_style()) + asset(_HERE / "fleet.css")
 
 
 @lru_cache

@@ -1,0 +1,160 @@
+"""What a plot of the report is: rows of curves over one time axis, the columns that they need, and their JSON.
+
+Which plots there are says `diagnosis.report.plot_rows`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from diagnosis.results.document import IntervalRow
+from replay.faults import Side
+
+Columns = Mapping[str, NDArray[np.floating]]
+
+_Z95 = 1.959964
+
+
+@dataclass(frozen=True)
+class Trace:
+    """One curve.
+
+    Attributes
+    ----------
+    column : str
+        Column that it shows.
+    label : str
+        What it is called.
+    role : str
+        Part it plays, which gives its colour and dash: ``measured``, ``reference``, ``commanded``, ``expected``, ``replayed``,
+        ``applied``, ``peer``, ``right``, or ``mode-`` and a mode; see ``assets/plot.js``.
+    scale : float
+        Factor from the column's unit to the row's.
+    right : bool
+        Whether it belongs to the axis on the right.
+    """
+
+    column: str
+    label: str
+    role: str
+    scale: float = 1.0
+    right: bool = False
+
+
+@dataclass(frozen=True)
+class Row:
+    """One panel of a figure; panels share the time axis.
+
+    Attributes
+    ----------
+    key : str
+        Name of the row within its figure.
+    title, unit : str
+        Heading and unit of the axis.
+    traces : tuple[Trace, ...]
+        Curves.
+    band : tuple[str, str] or None
+        Columns of the lower and upper bound about a curve.
+    threshold : str or None
+        Column of half the height of a band about zero.
+    band_scale : float
+        Factor of `band` and `threshold` to the row's unit.
+    level : float or None
+        Value of a dashed line.
+    limits : tuple[float, float] or None
+        Range of the axis; None: all values.
+    clip : tuple[float, float] or None
+        Range beyond which the axis does not grow.
+    right : tuple[str, str] or None
+        Title and unit of the axis on the right.
+    component : str
+        Component that the row is of, where a figure has several.
+    """
+
+    key: str
+    title: str
+    unit: str
+    traces: tuple[Trace, ...]
+    band: tuple[str, str] | None = None
+    threshold: str | None = None
+    band_scale: float = 1.0
+    level: float | None = None
+    limits: tuple[float, float] | None = None
+    clip: tuple[float, float] | None = None
+    right: tuple[str, str] | None = None
+    component: str = ""
+
+    def shown(self, columns: Columns) -> list[Row]:
+        """The row with the curves that exist, or nothing; a band or threshold without its column is left out."""
+        traces = tuple(t for t in self.traces if t.column in columns)
+        if not traces:
+            return []
+        band = self.band if self.band and all(b in columns for b in self.band) else None
+        return [replace(self, traces=traces, band=band, threshold=self.threshold if self.threshold in columns else None)]
+
+    def columns(self) -> tuple[str, ...]:
+        """Columns that the row needs."""
+        extra = (*(self.band or ()), *((self.threshold,) if self.threshold else ()))
+        return (*(t.column for t in self.traces), *extra)
+
+
+@dataclass(frozen=True)
+class Group:
+    """Rows of the loop replay under one button."""
+
+    key: str
+    title: str
+    rows: tuple[Row, ...]
+
+
+def derived(columns: Columns, faults: Sequence[IntervalRow]) -> dict[str, NDArray[np.floating]]:
+    """Columns with ε̂ = 1 − δ̂ and the 95 % bounds of ε̂ and of the saturation term added for the faults shown."""
+    result = dict(columns)
+    for fault in faults:
+        for side in Side(fault["side"]).sides:
+            base = f"evidence.{fault['component']}.{side}."
+            delta, bar = columns.get(base + "delta"), columns.get(base + "delta_bar")
+            if delta is not None and base + "epsilon" not in result:
+                result[base + "epsilon"] = 1.0 - delta
+                if (std := columns.get(base + "delta_std")) is not None:
+                    result[base + "epsilon_low"] = 1.0 - delta - _Z95 * std
+                    result[base + "epsilon_high"] = 1.0 - delta + _Z95 * std
+            if bar is not None and base + "delta_bar_low" not in result:
+                if (std := columns.get(base + "delta_bar_std")) is None:
+                    continue
+                result[base + "delta_bar_low"] = bar - _Z95 * std
+                result[base + "delta_bar_high"] = bar + _Z95 * std
+    return result
+
+
+def row_json(row: Row, index: Mapping[str, int]) -> dict[str, object]:
+    """Row as the page reads it; columns become indices of channels."""
+    data: dict[str, object] = {
+        "key": row.key,
+        "title": row.title,
+        "unit": row.unit,
+        "traces": [
+            {"c": index[t.column], "name": t.label, "role": t.role, "k": t.scale, "right": t.right} for t in row.traces
+        ],
+    }
+    if row.band:
+        data["band"] = [index[c] for c in row.band]
+    if row.threshold:
+        data["threshold"] = index[row.threshold]
+    if row.band or row.threshold:
+        data["bandScale"] = row.band_scale
+    if row.level is not None:
+        data["level"] = row.level
+    if row.limits:
+        data["limits"] = list(row.limits)
+    if row.clip:
+        data["clip"] = list(row.clip)
+    if row.component:
+        data["component"] = row.component
+    if row.right:
+        data["rightUnit"] = {"title": row.right[0], "unit": row.right[1]}
+    return data
