@@ -1,4 +1,4 @@
-"""Made-up reports and columns for the tests of the report page: every figure below is visible here."""
+"""Reports and columns for the tests of the report page: every figure below is visible here."""
 
 from __future__ import annotations
 
@@ -6,6 +6,9 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+
+from diagnosis.results.document import IntervalRow, ReportDocument
+from diagnosis.results.validation import report_of, validated
 
 Columns = dict[str, NDArray[np.float64]]
 Fault = tuple[
@@ -37,7 +40,7 @@ def mission(
     rate: float = 100.0,
     geometry: dict[str, Any] | None = None,
     status: str = "stop",
-) -> tuple[dict[str, Any], Columns]:
+) -> tuple[ReportDocument, Columns]:
     """Report and columns of a mission that drives forward, turns, stands and drives back."""
     rng = np.random.default_rng(7)
     n = int(duration * rate)
@@ -56,7 +59,7 @@ def mission(
     heading = np.cumsum(speed * np.tan(angle)) / rate
     columns["path.x"] = np.cumsum(speed * np.cos(heading)) / rate
     columns["path.y"] = np.cumsum(speed * np.sin(heading)) / rate
-    return _report(wheels, axles, faults, duration, rate, geometry, status), columns
+    return report_of(_report(wheels, axles, faults, duration, rate, geometry, status), "sample"), columns
 
 
 def _hit(f: Fault, component: str, side: str, t: NDArray[np.float64]) -> NDArray[np.bool_]:
@@ -348,23 +351,23 @@ def _report(
     }
 
 
-def five_faults(duration: float = 120.0, rate: float = 100.0) -> tuple[dict[str, Any], Columns]:
+def five_faults(duration: float = 120.0, rate: float = 100.0) -> tuple[ReportDocument, Columns]:
     """Four wheels, two steering axles, five faults."""
     return mission(["FR", "FL", "RR", "RL"], ["front", "rear"], FAULTS, duration=duration, rate=rate, geometry=PLACES)
 
 
-def one_wheel() -> tuple[dict[str, Any], Columns]:
+def one_wheel() -> tuple[ReportDocument, Columns]:
     """One drive on a rig: no geometry, no steering, no path."""
     report, columns = mission(["drive"], [], [("F1", "drive", "sensor", "stuck", 30.0, 32.0, 1.0, 0.2, "high")])
     return report, {k: v for k, v in columns.items() if not k.startswith("path.")}
 
 
-def no_faults() -> tuple[dict[str, Any], Columns]:
+def no_faults() -> tuple[ReportDocument, Columns]:
     """Four healthy wheels."""
     return mission(["FR", "FL", "RR", "RL"], ["front", "rear"], [], geometry=PLACES, status="ready")
 
 
-def six_wheels() -> tuple[dict[str, Any], Columns]:
+def six_wheels() -> tuple[ReportDocument, Columns]:
     """Six wheels on three axles, the middle one fixed."""
     wheels = ["R1", "L1", "R2", "L2", "R3", "L3"]
     axles = ["front", "fixed", "rear"]
@@ -379,7 +382,7 @@ def six_wheels() -> tuple[dict[str, Any], Columns]:
     return mission(wheels, ["front", "rear"], faults, geometry=places)
 
 
-def not_assessed() -> tuple[dict[str, Any], Columns]:
+def not_assessed() -> tuple[ReportDocument, Columns]:
     """A mission in which nothing could be judged: every list that may be empty is, and there are no columns."""
     report, _ = mission(["FR", "FL"], [], [], duration=12.0, status="not_assessed")
     nothing = {"mission": None, "driving": None}
@@ -395,6 +398,18 @@ def not_assessed() -> tuple[dict[str, Any], Columns]:
     return report | {k: [] for k in ("readings", "phases", "signals", "missing", "quality")}, {}
 
 
+def fault(**changes: Any) -> IntervalRow:
+    """One interval of a report: wheel FR's speed sensor stuck from 30 s to 36 s, but for what is given."""
+    return validated(_interval(FAULTS[0], []) | changes, IntervalRow, "sample", "")
+
+
+def report_with(**changes: Any) -> ReportDocument:
+    """A report in which nothing is known but what is given; of its objects the keys that are given."""
+    report, _ = not_assessed()
+    whole: dict[str, Any] = {k: {**v, **changes.get(k, {})} if isinstance(v, dict) else v for k, v in report.items()}
+    return report_of(whole | {k: v for k, v in changes.items() if not isinstance(v, dict)}, "sample")
+
+
 HOSTILE = [
     "<script>alert(1)</script>",
     "</style><img src=x onerror=alert(2)>",
@@ -406,7 +421,7 @@ HOSTILE = [
 ]
 
 
-def hostile() -> tuple[dict[str, Any], Columns]:
+def hostile() -> tuple[ReportDocument, Columns]:
     """Names, sentences and channels that try to be markup, code or terminal control."""
     wheels = HOSTILE[:4]
     faults: list[Fault] = [

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from rich.console import Console, ConsoleOptions, RenderableType, RenderResult
@@ -12,11 +12,11 @@ from rich.text import Text
 
 from cli.tables.layout import MODE_SIGNS, MODE_STYLES, SEVERITY_STYLES, bullets, section, table, text
 from diagnosis.comparison.words import OUTCOMES, headline
-from diagnosis.pages.labels import state_label
 from diagnosis.report.confidence import headline as verdict_words
 from diagnosis.report.confidence import sure_of
 from diagnosis.report.tables import merged_caveats
-from diagnosis.results.fault_rows import mode_words
+from diagnosis.results.document import ActionRow, ReportDocument
+from diagnosis.results.fault_rows import mode_words, state_label
 from diagnosis.results.vocabulary import part_words
 
 _STYLES = {
@@ -29,7 +29,7 @@ _SHOWN, _ENDLESS = 40, 10_000
 _WORDS, _SATURATION = (1, 2), 5  # columns of words, which may wrap between them, and the one that is needed least
 
 
-def verdict_parts(report: Mapping[str, Any]) -> list[RenderableType]:
+def verdict_parts(report: ReportDocument) -> list[RenderableType]:
     """Verdict, what to do, faults and caveats of a report document."""
     verdict = report["verdict"]
     label, answer = verdict_words(report)
@@ -72,7 +72,7 @@ def _became(c: Mapping[str, Any]) -> str:
     return f"{words}: {part_words(c['kind'], c['component'], c['side'])} {mode_words(c['side'], c['mode'])}"
 
 
-def _actions(actions: list[Mapping[str, Any]], report: Mapping[str, Any]) -> Table:
+def _actions(actions: list[ActionRow], report: ReportDocument) -> Table:
     """Each action with its faults, and how sure the tool is of the worst of them."""
     intervals = {i["id"]: i for i in report["intervals"]}
     out = Table.grid(padding=(0, 2, 0, 0))
@@ -99,7 +99,7 @@ class _Fitting:
         yield next(fitting, self._tables[-1])
 
 
-def _faults(intervals: list[Mapping[str, Any]]) -> _Fitting:
+def _faults(intervals: Sequence[Mapping[str, Any]]) -> _Fitting:
     """Table of faults; on a narrow terminal without the saturation, on a narrower one without the bounds of ε."""
     heads = ("", "part", "fault", "time [s]", "ε", "saturation", "p", "severity")
     forms = []

@@ -13,6 +13,8 @@ from diagnosis.comparison.words import CHANGES, OUTCOMES, SIGNS, coverage_words,
 from diagnosis.pages import labels
 from diagnosis.pages.environment import POLICY, environment, plain_style
 from diagnosis.pages.svg import icon
+from diagnosis.results.fault_rows import state_label
+from diagnosis.results.vocabulary import Verdict, part_name
 from replay.faults import TOTAL
 
 _HERE = Path(__file__).parent
@@ -68,7 +70,7 @@ def _environment() -> jinja2.Environment:
 
 
 def _mission(word: str, m: Mapping[str, Any]) -> dict[str, Any]:
-    state, words = labels.VERDICTS.get(m["verdict"], ("not_assessed", m["verdict"]))
+    verdict = Verdict(m["verdict"])
     machine = " ".join(x for x in (m["machine"], f"({m['machine_id']})" if m["machine_id"] else "") if x)
     return {
         "word": word,
@@ -77,19 +79,19 @@ def _mission(word: str, m: Mapping[str, Any]) -> dict[str, Any]:
         "when": labels.utc(m["start_ns"]) + " UTC",
         "length": f"{labels.span(m['duration_s'])}, {labels.span(m['driving_s'])} driving",
         "machine": machine,
-        "state": state,
-        "verdict": words,
-        "title": m["title"] if m["title"].casefold() != words.casefold() else "",
+        "state": verdict.symbol,
+        "verdict": verdict.label,
+        "title": m["title"] if m["title"].casefold() != verdict.label.casefold() else "",
     }
 
 
 def _part(c: Mapping[str, Any]) -> str:
-    return f"{c['component']} {labels.part(c['kind'], c['side'])}"
+    return f"{c['component']} {part_name(c['kind'], c['side'])}"
 
 
 def _row(c: Mapping[str, Any]) -> dict[str, Any]:
     found = [f for f in (c["older"], c["newer"]) if f is not None]
-    rows = {f["mode"]: (labels.known(f["mode"]), labels.state_label(f["mode"], f["side"])) for f in found}
+    rows = {f["mode"]: (labels.known(f["mode"]), state_label(f["mode"], f["side"])) for f in found}
     return {
         "part": _part(c),
         "rows": list(rows.values()),

@@ -14,6 +14,8 @@ from diagnosis.evaluation.plots import distribution, reliability_diagram
 from diagnosis.pages import labels
 from diagnosis.pages.environment import POLICY, environment, plain_style
 from diagnosis.pages.svg import icon
+from diagnosis.results.fault_rows import state_label
+from diagnosis.results.vocabulary import part_name
 
 _HERE = Path(__file__).parent
 
@@ -83,7 +85,7 @@ def build_scores_page(document: Mapping[str, Any]) -> str:
 @lru_cache
 def _environment() -> jinja2.Environment:
     found = environment(_HERE)
-    found.filters |= {"num": labels.number, "share": _share, "both": _both, "state": labels.state_label}
+    found.filters |= {"num": labels.number, "share": _share, "both": _both, "state": state_label}
     found.globals |= {"icon": icon, "known": labels.known}
     return found
 
@@ -167,9 +169,9 @@ def _confusion(side_figures: Mapping[str, Any], side: str) -> dict[str, Any]:
             cells = [
                 _cell(name, other, s, s / total) for other, s in zip(side_figures["reported"], seconds, strict=True)
             ]
-            rows.append({"state": name, "words": labels.state_label(name, side), "cells": cells})
+            rows.append({"state": name, "words": state_label(name, side), "cells": cells})
     short = {"outside_table": "Outside", "undecided": "Undecided"}
-    columns = [short.get(c) or labels.state_label(c, side) for c in side_figures["reported"]]
+    columns = [short.get(c) or state_label(c, side) for c in side_figures["reported"]]
     return {"columns": columns, "rows": rows}
 
 
@@ -259,4 +261,4 @@ def _row(kind: str, x: Mapping[str, Any], outcome: str, report: str, more: str) 
 
 
 def _part(kind: str, x: Mapping[str, Any]) -> str:
-    return f"{x['component']} {labels.part(kind, x['side'])} {labels.state_label(x['mode'], x['side']).lower()}"
+    return f"{x['component']} {part_name(kind, x['side'])} {state_label(x['mode'], x['side']).lower()}"

@@ -8,8 +8,9 @@ import unicodedata
 from collections.abc import Mapping
 from typing import Any, TypeVar, cast
 
-from diagnosis.results.document import EpsilonRow, IntervalRow
+from diagnosis.results.document import IntervalRow
 from diagnosis.results.fault_rows import LOOKS, state_label
+from diagnosis.results.size_rows import EpsilonRow
 from diagnosis.results.vocabulary import part_words
 from replay.faults import FaultMode, Side
 

@@ -29,11 +29,7 @@ def mode_style() -> str:
     """CSS of all modes: ``--stuck`` is a mode's colour, ``--stuck-line`` of thin lines, ``--on-stuck`` of letters on it."""
     light = " ".join(_variables(state, look.light, _BLACK) for state, look in LOOKS.items() if look.light)
     dark = " ".join(_variables(state, look.dark, _DARK_PAGE) for state, look in LOOKS.items() if look.dark)
-    rules = [
-        f"{selector} {{ {body} }}".replace("{m}", mode)
-        for mode in FaultMode
-        for selector, body in _RULES
-    ]
+    rules = [f"{selector} {{ {body} }}".replace("{m}", mode) for mode in FaultMode for selector, body in _RULES]
     return "\n".join([f":root {{ {light} }}", f"[data-theme=dark] {{ {dark} }}", *rules]) + "\n"
 
 

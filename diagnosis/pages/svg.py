@@ -112,9 +112,7 @@ def thumbnail(
         '<svg class="spark" viewBox="0 0 {w} {h}" role="img" aria-label="Signal around {id}">'
         '<rect class="f {m}" x="{x:.1f}" y="0" width="{d:.1f}" height="{h}"/>'
         '<rect class="e {m}" x="{x:.1f}" y="0" width="{d:.1f}" height="2.5"/>{extra}<path class="sig" d="{p}"/></svg>'
-    ).format(
-        w=width, h=height, id=fault["id"], m=fault["mode"], x=x0, d=max(1.5, x1 - x0), extra=extra, p=paths[-1]
-    )
+    ).format(w=width, h=height, id=fault["id"], m=fault["mode"], x=x0, d=max(1.5, x1 - x0), extra=extra, p=paths[-1])
 
 
 def _path_d(x: NDArray[np.floating], y: NDArray[np.floating]) -> str:

@@ -184,7 +184,10 @@ def _course(
 ) -> tuple[Panel, ...]:
     """Channel against reference, residual against threshold, probability against its limit: those that exist."""
     rows = course_rows(fault, pair, columns, limit)
-    panels = (Panel(r.title, "" if r.unit == "1" else r.unit, course_picture(r, fault, columns, axis), _marks(r)) for r in rows)
+    panels = (
+        Panel(r.title, "" if r.unit == "1" else r.unit, course_picture(r, fault, columns, axis), _marks(r))
+        for r in rows
+    )
     return tuple(p for p in panels if p.picture)
 
 

@@ -15,5 +15,6 @@ def kind_of(component: str, machine: MachineRow) -> Kind:
 def judged_sides(report: ReportDocument) -> dict[tuple[str, str], bool]:
     """Whether any time of each component and side was decided."""
     return {
-        (row["component"], row["side"]): any(row["seconds"].get(s, 0.0) > 0 for s in DECIDED) for row in report["coverage"]
+        (row["component"], row["side"]): any(row["seconds"].get(s, 0.0) > 0 for s in DECIDED)
+        for row in report["coverage"]
     }

@@ -141,12 +141,13 @@ def _pictures(
 ) -> tables.Context:
     """Timeline, machine, driven path and thumbnails."""
     path = driven_path(report, series.filled, series.axis.step)
-    drawn = path.x is not None and path.y is not None
     thumbs = worst(report["intervals"], _THUMBNAILS) if series.axis.rows else []
     return {
         "timeline": timeline(report, duration, {f["id"] for f in detailed}),
         "picture": machine_picture(report),
-        "path": path_picture(path.x, path.y, *series.place, detailed) if drawn else Markup(""),
+        "path": Markup("")
+        if path.x is None or path.y is None
+        else path_picture(path.x, path.y, *series.place, detailed),
         "path_words": path.words,
         "path_modes": [m for m in FaultMode if any(f["mode"] == m for f in detailed)],
         "thumbs": {f["id"]: _thumbnail(f, series.shown, *series.place) for f in thumbs},

@@ -10,7 +10,7 @@ from diagnosis.pages.axes import Frame, label, limits
 from diagnosis.pages.labels import number
 from diagnosis.pages.svg import extremes
 from diagnosis.report.edges import Edge, time_words
-from diagnosis.report.plot_rows import Columns, Row
+from diagnosis.report.rows import Columns, Row
 from diagnosis.results.document import IntervalRow
 
 Array = NDArray[np.float64]
@@ -102,9 +102,7 @@ def _scales(edge: Edge, frame: Frame) -> Markup:
     return Markup("").join(parts)
 
 
-def course_picture(
-    row: Row, fault: IntervalRow, columns: Columns, axis: tuple[float, float]
-) -> Markup:
+def course_picture(row: Row, fault: IntervalRow, columns: Columns, axis: tuple[float, float]) -> Markup:
     """One row of a figure around its fault, as extremes per stretch; empty where it holds no sample there.
 
     Parameters
@@ -126,9 +124,7 @@ def course_picture(
     if last - first < 2:
         return Markup("")
     count = min(_STRETCHES, last - first)
-    curves = [
-        (_STYLES[t.role], *(v * t.scale for v in extremes(columns[t.column][first:last], count))) for t in row.traces
-    ]
+    curves = [(_STYLES[t.role], *_scaled(extremes(columns[t.column][first:last], count), t.scale)) for t in row.traces]
     band = None if row.threshold is None else extremes(columns[row.threshold][first:last], count)[1] * row.band_scale
     values = [v for _, low, high in curves for v in (low, high)] + ([] if band is None else [band, -band])
     span = row.limits or limits(*values)
@@ -145,6 +141,10 @@ def course_picture(
         parts.append(Markup('<path class="lim" d="M{:.1f} {:.1f}H{:.1f}"/>').format(frame.left, y, frame.right))
         parts.append(label(frame.right, y + 11, f"limit {number(row.level)}", "fin"))
     return _picture(_COURSE_HEIGHT, f"{row.title} around {fault['id']}", parts)
+
+
+def _scaled(both: tuple[Array, Array], scale: float) -> tuple[Array, Array]:
+    return both[0] * scale, both[1] * scale
 
 
 def _curve(t: Array, low: Array, high: Array, frame: Frame, style: str) -> Markup:

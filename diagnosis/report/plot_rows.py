@@ -106,9 +106,7 @@ def residual_row(base: str, unit: str, scale: float, of: str = "") -> Row:
     )
 
 
-def probability_row(
-    base: str, limit: float | None, of: str = "", limits: tuple[float, float] = (-0.03, 1.03)
-) -> Row:
+def probability_row(base: str, limit: float | None, of: str = "", limits: tuple[float, float] = (-0.03, 1.03)) -> Row:
     """Probability that a side is not healthy, and the limit from which a fault is stated."""
     return Row(
         f"probability{of}",

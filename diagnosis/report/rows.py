@@ -94,7 +94,9 @@ class Row:
         if not traces:
             return []
         band = self.band if self.band and all(b in columns for b in self.band) else None
-        return [replace(self, traces=traces, band=band, threshold=self.threshold if self.threshold in columns else None)]
+        return [
+            replace(self, traces=traces, band=band, threshold=self.threshold if self.threshold in columns else None)
+        ]
 
     def columns(self) -> tuple[str, ...]:
         """Columns that the row needs."""

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import astuple, dataclass, field
+from math import isfinite
 from typing import Any
 
 import numpy as np
@@ -21,7 +22,7 @@ CODE = {state: np.int8(i) for i, state in enumerate(STATES)}
 class Finding:
     """One fault of one component on samples [start, stop); see `FaultInterval` for the other fields.
 
-    `epsilon` keeps within [0, 1] unless the fault lies outside the table. `detected` is the sample at which a causal reading of the same evidence, without anything later, would have raised
+    `epsilon` keeps within [0, 1] unless the fault lies outside the table; a size that is not finite is not known. `detected` is the sample at which a causal reading of the same evidence, without anything later, would have raised
     it; None where that is not known.
     """
 
@@ -40,6 +41,10 @@ class Finding:
     def __post_init__(self) -> None:
         if self.epsilon is not None and self.mode is not FaultMode.OUTSIDE_TABLE:
             object.__setattr__(self, "epsilon", self.epsilon.as_share())
+        for name in ("epsilon", "sat"):
+            size = getattr(self, name)
+            if size is not None and not all(isfinite(x) for x in astuple(size) if isinstance(x, float)):
+                object.__setattr__(self, name, None)
 
 
 @dataclass(frozen=True)

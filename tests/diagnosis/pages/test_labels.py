@@ -3,6 +3,8 @@ from __future__ import annotations
 import pytest
 
 from diagnosis.pages import labels
+from replay.faults import FaultMode
+from tests.report_samples import fault
 
 
 @pytest.mark.parametrize(
@@ -18,7 +20,7 @@ from diagnosis.pages import labels
         ("a\u00a0b", "a\u00a0b"),
     ],
 )
-def test_invisible_characters_are_spelt_out_and_the_rest_is_verbatim(raw: str, shown: str) -> None:
+def test_invisible_characters_are_escaped_and_the_rest_is_verbatim(raw: str, shown: str) -> None:
     assert labels.visible(raw) == shown
 
 
@@ -68,21 +70,13 @@ def test_start_in_utc() -> None:
 
 
 def test_titles_name_part_mode_and_size() -> None:
-    fault = {
-        "component": "FR",
-        "kind": "wheel",
-        "side": "sensor",
-        "mode": "stuck",
-        "sat": {"mean": 0.21, "unit": "m/s"},
-    }
-    assert labels.fault_title(fault) == "FR speed sensor stuck at 0.21 m/s"
-    steer = {
-        "component": "front",
-        "kind": "steer",
-        "side": "sensor",
-        "mode": "stuck",
-        "sat": {"mean": 0.1, "unit": "rad"},
-    }
-    assert labels.fault_title(steer) == "front steering-angle sensor stuck at 5.73°"
-    assert labels.fault_title({**fault, "side": "actuator", "mode": "noisy", "sat": None}) == "FR drive valve disturbed"
-    assert labels.fault_title({**fault, "mode": "something new"}) == "FR speed sensor something new"
+    assert labels.fault_title(fault()) == "FR speed sensor stuck at 0.21 m/s"
+    sat = {"mean": 0.1, "rms": 0.1, "low": 0.0, "high": 0.2, "unit": "rad"}
+    assert labels.fault_title(fault(component="front", kind="steer", sat=sat)) == "front steering sensor stuck at 5.73°"
+    assert labels.fault_title(fault(side="actuator", mode="noisy", sat=None)) == "FR drive valve disturbed"
+    assert labels.fault_title(fault(mode="outside_table")) == "FR speed sensor outside the tables"
+
+
+def test_legend_names_both_sides_where_they_differ() -> None:
+    assert labels.mode_legend(FaultMode.STUCK) == "Stuck"
+    assert labels.mode_legend(FaultMode.NOISY) == "Noisy / disturbed"

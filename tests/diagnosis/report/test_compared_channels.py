@@ -3,18 +3,19 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-import pytest
 
-from diagnosis.report.compared_channels import DEGREES, Pair, pair_of, rests_on, shape_sentence, tier_words
+from diagnosis.report.compared_channels import DEGREES, Pair, pair_of, rests_on, shape_sentence
+from diagnosis.results.document import IntervalRow
+from tests import report_samples as samples
 
 ONE = np.zeros(1)
 
 
-def fault(**changes: Any) -> dict[str, Any]:
-    return {"component": "FR", "kind": "wheel", "side": "sensor", "tier": "direct", "evidence": [], **changes}
+def fault(**changes: Any) -> IntervalRow:
+    return samples.fault(**{"tier": "direct", "evidence": []} | changes)
 
 
-def pair(found: dict[str, Any], *names: str) -> Pair:
+def pair(found: IntervalRow, *names: str) -> Pair:
     result = pair_of(found, dict.fromkeys(names, ONE))
     assert result is not None
     return result
@@ -34,7 +35,7 @@ def test_valve_position_is_compared_with_its_command_where_it_decided() -> None:
     valve = fault(side="actuator")
     names = ("wheel.FR.v", "wheel.FR.u", "wheel.FR.u_applied")
     assert (pair(valve, *names).measured, pair(valve, *names).reference) == ("wheel.FR.u_applied", "wheel.FR.u")
-    assert pair({**valve, "tier": "model"}, *names).measured == "wheel.FR.v"
+    assert pair(fault(side="actuator", tier="model"), *names).measured == "wheel.FR.v"
 
 
 def test_steering_angles_are_in_degrees() -> None:
@@ -47,28 +48,12 @@ def test_a_loss_on_either_side_takes_the_side_that_has_evidence() -> None:
     assert found.evidence == "evidence.FR.actuator."
 
 
-@pytest.mark.parametrize(
-    ("kind", "tier", "words"),
-    [
-        ("wheel", "direct", "second measurement"),
-        ("wheel", "model", "wheel model"),
-        ("steer", "model", "steering model"),
-        ("wheel", "signal", "channel alone"),
-        ("wheel", "tracking", "command tracking"),
-        ("wheel", "drive", "drive model"),
-        ("wheel", "something new", "something new"),
-    ],
-)
-def test_plain_words_for_the_kind_of_evidence(kind: str, tier: str, words: str) -> None:
-    assert tier_words(fault(kind=kind, tier=tier)) == words
-
-
 def test_channels_that_the_sentences_name() -> None:
     found = fault(evidence=["wheel.FR.v_true moved on.", "Noise of wheel.FR.v."])
     columns = ["t", "wheel.FR.v", "wheel.FR.v_true", "wheel.FR.u", "evidence.FR.sensor.residual"]
     assert rests_on(found, columns) == "second measurement: wheel.FR.v_true, wheel.FR.v"
     assert rests_on(fault(evidence=["wheel.FR.v2 moved."]), columns) == "second measurement"
-    assert rests_on(fault(tier="", evidence=None), columns) == ""
+    assert rests_on(fault(tier="none"), columns) == ""
 
 
 def test_sentence_about_the_onset() -> None:

@@ -7,17 +7,10 @@ import pytest
 
 from diagnosis.pages.svg import path_picture, thumbnail
 from diagnosis.report.machine_picture import condition, machine_picture
+from diagnosis.results.vocabulary import Kind
 from tests import report_samples as samples
 
-FAULT = {
-    "id": "F1",
-    "component": "FR",
-    "kind": "wheel",
-    "side": "sensor",
-    "mode": "stuck",
-    "start_s": 3.0,
-    "stop_s": 4.0,
-}
+FAULT = samples.fault(start_s=3.0, stop_s=4.0)
 
 
 def test_front_left_stands_at_the_top_left() -> None:
@@ -34,16 +27,16 @@ def test_front_left_stands_at_the_top_left() -> None:
 
 @pytest.mark.parametrize("count", [0, 1, 3, 12])
 def test_any_number_of_wheels_without_geometry(count: int) -> None:
-    picture = machine_picture({"machine": {"wheels": [f"w{i}" for i in range(count)]}})
+    picture = machine_picture(samples.report_with(machine={"wheels": [f"w{i}" for i in range(count)]}))
     assert picture.count('class="tyre not_assessed"') == count
 
 
 def test_part_that_was_never_judged_is_not_called_healthy() -> None:
     judged = {("FR", "sensor"): True, ("FR", "actuator"): False}
-    half = condition("FR", "wheel", [], judged)
+    half = condition("FR", Kind.WHEEL, [], judged)
     assert (half.state, half.lines) == ("not_assessed", ("No fault found", "drive valve", "not assessed"))
-    assert condition("FR", "wheel", [], {}).state == "not_assessed"
-    assert condition("FR", "wheel", [], {("FR", "sensor"): True}).state == "healthy"
+    assert condition("FR", Kind.WHEEL, [], {}).state == "not_assessed"
+    assert condition("FR", Kind.WHEEL, [], {("FR", "sensor"): True}).state == "healthy"
 
 
 def test_thumbnail_keeps_gaps_and_clips_to_the_mission() -> None:
@@ -69,21 +62,28 @@ def test_path_breaks_at_gaps_and_survives_standing_still() -> None:
 
 def test_a_part_that_was_judged_too_briefly_is_not_called_healthy() -> None:
     judged = {("FR", "sensor"): True, ("FR", "actuator"): True}
-    short = condition("FR", "wheel", [], judged, {("FR", "sensor"): True, ("FR", "actuator"): False})
+    short = condition("FR", Kind.WHEEL, [], judged, {("FR", "sensor"): True, ("FR", "actuator"): False})
     assert short.state == "not_assessed"
     assert short.lines == ("No fault found", "drive valve", "judged too briefly")
-    assert condition("FR", "wheel", [], judged, dict.fromkeys(judged, True)).lines == ("Healthy",)
+    assert condition("FR", Kind.WHEEL, [], judged, dict.fromkeys(judged, True)).lines == ("Healthy",)
 
 
 def test_long_words_stand_in_several_lines() -> None:
     wheels = ["FL", "FR"]
     geometry = {w: {"x": 1.0, "y": y, "offset": 0.0, "axle": ""} for w, y in zip(wheels, (1.0, -1.0), strict=True)}
-    fault = {**FAULT, "side": "sensor_or_actuator", "mode": "outside_table", "severity": "medium"}
+    fault = samples.fault(side="sensor_or_actuator", mode="outside_table", severity="medium", start_s=3.0, stop_s=4.0)
     rows = [
-        {"component": "FL", "side": s, "tier": "model", "seconds": {"healthy": 5.0}, "decided_driving_s": 5.0}
+        {
+            "component": "FL",
+            "side": s,
+            "tier": "model",
+            "seconds": {"healthy": 5.0},
+            "driving_s": 5.0,
+            "decided_driving_s": 5.0,
+        }
         for s in ("sensor", "actuator")
     ]
-    report = {"machine": {"wheels": wheels, "geometry": geometry}, "intervals": [fault], "coverage": rows}
+    report = samples.report_with(machine={"wheels": wheels, "geometry": geometry}, intervals=[fault], coverage=rows)
     words = re.findall(r'class="side[^"]*">([^<]*)<', machine_picture(report))
     assert words == [
         "No fault found",

@@ -14,6 +14,7 @@ import pytest
 
 from diagnosis.report.page import build_page
 from diagnosis.report.tables import merged_caveats
+from diagnosis.results.vocabulary import Verdict
 from replay.errors import ConfigError
 from tests import report_samples as samples
 from tests.browser import evidence_samples
@@ -123,31 +124,27 @@ def test_hostile_names_are_shown_verbatim_and_inert() -> None:
     assert any("<script>alert(1)</script>" in c["name"] for c in view["channels"])
 
 
-def test_empty_report_is_still_a_page() -> None:
-    tree = Tree(build_page({}, {}))
+def test_report_without_anything_is_still_a_page() -> None:
+    tree = Tree(build_page(*samples.not_assessed()))
     assert "Not assessed" in tree.text
     assert "Nothing could be judged" in tree.text
 
 
-@pytest.mark.parametrize("key", list(samples.five_faults()[0]))
-def test_every_part_of_the_report_may_be_absent(key: str) -> None:
+LISTS = ("readings", "intervals", "states", "phases", "coverage", "loss", "signals", "missing", "quality")
+
+
+@pytest.mark.parametrize("key", LISTS)
+def test_every_list_of_the_report_may_be_empty(key: str) -> None:
     report, columns = samples.five_faults(60.0, 20.0)
-    del report[key]
-    assert "</html>" in build_page(report, columns)
+    assert "</html>" in build_page({**report, key: []}, columns)
 
 
-@pytest.mark.parametrize("key", ["epsilon", "sat", "hypotheses", "evidence", "advice", "probability"])
-def test_parts_of_a_fault_may_be_null(key: str) -> None:
+@pytest.mark.parametrize(
+    ("key", "nothing"), [("epsilon", None), ("sat", None), ("hypotheses", []), ("evidence", []), ("advice", "")]
+)
+def test_parts_of_a_fault_may_be_unknown(key: str, nothing: object) -> None:
     report, columns = samples.one_wheel()
-    report["intervals"][0][key] = None
-    assert "</html>" in build_page(report, columns)
-
-
-def test_estimates_without_a_value_are_left_out() -> None:
-    report, columns = samples.one_wheel()
-    report["intervals"][0]["epsilon"]["low"] = None
-    report["intervals"][0]["sat"]["mean"] = None
-    report["intervals"][0]["hypotheses"][0]["p"] = None
+    report["intervals"] = [samples.fault(component="drive", **{key: nothing})]
     assert "drive speed sensor stuck" in Tree(build_page(report, columns)).text
 
 
@@ -180,9 +177,10 @@ def test_caveats_stand_in_the_verdict() -> None:
     assert all(c in verdict for c in report["verdict"]["caveats"])
 
 
-@pytest.mark.parametrize(("status", "words"), [("ready", "Ready for the next mission"), ("unheard of", "Not assessed")])
-def test_verdict_words(status: str, words: str) -> None:
-    assert words in Tree(build_page({"verdict": {"status": status, "title": "x"}}, {})).text
+@pytest.mark.parametrize("status", Verdict)
+def test_verdict_words(status: Verdict) -> None:
+    report = samples.report_with(verdict={"status": status, "title": "x"})
+    assert status.label in Tree(build_page(report, {})).text
 
 
 def test_large_mission_keeps_to_the_size() -> None:
@@ -193,9 +191,9 @@ def test_large_mission_keeps_to_the_size() -> None:
 
 def test_columns_must_fit_the_time_axis() -> None:
     with pytest.raises(ValueError, match="has shape"):
-        build_page({}, {"t": np.arange(5.0), "wheel.FR.v": np.zeros(4)})
+        build_page(samples.report_with(), {"t": np.arange(5.0), "wheel.FR.v": np.zeros(4)})
     with pytest.raises(ValueError, match="not uniform"):
-        build_page({}, {"t": np.array([0.0, 1.0, 9.0]), "wheel.FR.v": np.zeros(3)})
+        build_page(samples.report_with(), {"t": np.array([0.0, 1.0, 9.0]), "wheel.FR.v": np.zeros(3)})
 
 
 def test_own_bundle_of_plotly(tmp_path: Path) -> None:

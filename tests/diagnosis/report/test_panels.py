@@ -7,8 +7,13 @@ import numpy as np
 from diagnosis.pages.axes import Frame, limits, ticks
 from diagnosis.report.edges import Edge
 from diagnosis.report.panels import course_picture, edge_picture
+from diagnosis.report.rows import Row, Trace
+from tests import report_samples as samples
 
-FAULT = {"id": "F1", "mode": "stuck", "start_s": 5.0, "stop_s": 6.0, "detected_s": 5.02}
+FAULT = samples.fault(start_s=5.0, stop_s=6.0, detected_s=5.02)
+RESIDUAL = Row(
+    "residual", "Residual", "m/s", (Trace("residual", "residual", "measured"),), threshold="threshold", level=0.05
+)
 T = np.arange(-30, 31) * 0.005
 
 
@@ -35,7 +40,8 @@ def test_detection_outside_the_window_and_at_once() -> None:
 
 def test_no_samples_no_picture() -> None:
     assert edge_picture(Edge("onset", T, T * np.nan, T * np.nan, 5.0, 0.005, None, np.nan, None), FAULT) == ""
-    assert course_picture("Residual", FAULT, {"m": np.full(2000, np.nan)}, (0.0, 0.005)) == ""
+    nothing = {name: np.full(2000, np.nan) for name in ("residual", "threshold")}
+    assert course_picture(RESIDUAL, FAULT, nothing, (0.0, 0.005)) == ""
 
 
 def test_course_breaks_at_gaps_and_shows_band_and_limit() -> None:
@@ -43,7 +49,7 @@ def test_course_breaks_at_gaps_and_shows_band_and_limit() -> None:
     residual[1050:1100] = np.nan
     threshold = np.full(2000, 0.1)
     threshold[1150:1250] = np.nan
-    text = course_picture("Residual", FAULT, {"m": residual}, (0.0, 0.005), threshold=threshold, level=0.05)
+    text = course_picture(RESIDUAL, FAULT, {"residual": residual, "threshold": threshold}, (0.0, 0.005))
     (line,) = re.findall(r'class="m" d="([^"]*)"', text)
     (band,) = re.findall(r'class="band" d="([^"]*)"', text)
     assert line.count("M") == 2

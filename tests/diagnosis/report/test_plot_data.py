@@ -1,20 +1,20 @@
 from __future__ import annotations
 
 import json
-import math
 import zlib
 from base64 import b64decode
 
 import numpy as np
 import pytest
 
-from diagnosis.report.plot_data import axis_of, channels_of, figures_of, packed_intervals, units_of, worst
-from diagnosis.report.plot_rows import derived, loop_groups
+from diagnosis.report.plot_data import axis_of, channels_of, figures_of, packed_intervals, worst
+from diagnosis.report.plot_rows import loop_groups
+from diagnosis.report.rows import derived
 from tests import report_samples as samples
 
 
-@pytest.mark.parametrize(("rate", "per"), [(100.0, 1), (None, 1), (130.0, 1), (200.0, 4), (3200.0, 64)])
-def test_rows_farther_apart_than_samples_are_extremes(rate: float | None, per: int) -> None:
+@pytest.mark.parametrize(("rate", "per"), [(100.0, 1), (130.0, 1), (200.0, 4), (3200.0, 64)])
+def test_rows_farther_apart_than_samples_are_extremes(rate: float, per: int) -> None:
     assert axis_of({"t": np.arange(50) / 100.0}, rate).per == per
 
 
@@ -23,9 +23,9 @@ def test_no_axis_without_time() -> None:
 
 
 def test_the_most_severe_faults_in_the_order_given() -> None:
-    severities = ["low", "high", "info", "medium", "high", None]
-    faults = [{"id": i, "severity": s} for i, s in enumerate(severities)]
-    assert [f["id"] for f in worst(faults, 3)] == [1, 3, 4]
+    severities = ["low", "high", "info", "medium", "high"]
+    faults = [samples.fault(id=f"F{i}", severity=s) for i, s in enumerate(severities)]
+    assert [f["id"] for f in worst(faults, 3)] == ["F1", "F3", "F4"]
     assert worst(faults, 9) == faults
 
 
@@ -37,27 +37,10 @@ def test_faults_of_one_part_share_their_rows() -> None:
     assert figures["F1"] is not figures["F2"]
 
 
-def test_units_of_columns_with_and_without_a_figure() -> None:
-    report, columns = samples.five_faults()
-    shown = derived(columns, report["intervals"])
-    figures = figures_of(report["intervals"], report["machine"], shown, None)
-    groups = loop_groups(report["machine"]["wheels"], report["machine"]["axles"], shown)
-    names = [
-        "wheel.FR.v",
-        "steer.front.phi",
-        "imu.yaw_rate",
-        "replay.FR.u_difference",
-        "evidence.front.sensor.residual",
-    ]
-    units = units_of([*names, "evidence.FR.actuator.expected", "path.x", "made.up"], report, figures, groups)
-    assert [u for u, _ in units] == ["m/s", "°", "°/s", "of full opening", "°", "of full opening", "m", "1"]
-    np.testing.assert_allclose([units[1][1], units[2][1], units[0][1]], [180 / math.pi, 180 / math.pi, 1.0])
-
-
 def test_columns_without_a_figure_get_what_is_left_of_the_budget() -> None:
     rng = np.random.default_rng(0)
     columns = {name: rng.standard_normal(60_000) for name in ("wheel.A.v", "gnss.speed")}
-    report = {"intervals": []}
+    report = samples.report_with()
     axis = axis_of({"t": np.arange(60_000) / 1000.0}, 1000.0)
     groups = loop_groups(["A"], [], columns)
     shown, other = channels_of(report, columns, {}, groups, axis, 150_000)
@@ -67,5 +50,5 @@ def test_columns_without_a_figure_get_what_is_left_of_the_budget() -> None:
 
 
 def test_intervals_come_back_as_they_were() -> None:
-    faults = [{"id": "F1", "evidence": ["</script>"], "sat": None}]
-    assert json.loads(zlib.decompress(b64decode(packed_intervals(faults)))) == {"F1": faults[0]}
+    fault = samples.fault(evidence=["</script>"], sat=None)
+    assert json.loads(zlib.decompress(b64decode(packed_intervals([fault])))) == {"F1": fault}

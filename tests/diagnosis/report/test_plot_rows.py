@@ -2,7 +2,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from diagnosis.report.plot_rows import derived, fault_rows, loop_groups
+from diagnosis.report.compared_channels import pair_of
+from diagnosis.report.plot_rows import course_rows, fault_rows, loop_groups
+from diagnosis.report.rows import derived
 from tests import report_samples as samples
 
 WHEELS = ["FR", "FL", "RR", "RL"]
@@ -34,17 +36,28 @@ def test_directly_measured_valve_is_compared_with_its_command() -> None:
     assert rows["residual"].unit == "of full opening"
 
 
-def test_loss_and_its_bounds() -> None:
-    fault = {"component": "FR", "side": "sensor"}
-    columns = {"evidence.FR.sensor.delta": np.array([0.7]), "evidence.FR.sensor.delta_std": np.array([0.1])}
-    result = derived(columns, [fault])
-    np.testing.assert_allclose(result["evidence.FR.sensor.epsilon"], 0.3)
-    np.testing.assert_allclose(result["evidence.FR.sensor.epsilon_low"], 0.3 - 0.1959964)
-    np.testing.assert_allclose(result["evidence.FR.sensor.epsilon_high"], 0.3 + 0.1959964)
-    assert set(columns) == {"evidence.FR.sensor.delta", "evidence.FR.sensor.delta_std"}
-
-
 def test_only_existing_columns_make_rows() -> None:
-    assert fault_rows({"component": "FR", "kind": "wheel", "side": "sensor", "tier": "signal"}, ["FR"], {}) == ()
+    assert fault_rows(samples.fault(), ["FR"], {}) == ()
     (group,) = loop_groups(["FR"], [], {"wheel.FR.u": np.zeros(3)})
     assert (group.key, [r.title for r in group.rows]) == ("drive", ["u_a FR"])
+
+
+def test_small_pictures_show_what_the_evidence_compares() -> None:
+    report, columns = samples.five_faults()
+    fault = report["intervals"][0]
+    columns["evidence.FR.sensor.probability"] = 1.0 - columns["evidence.FR.sensor.p_healthy"]
+    pair = pair_of(fault, columns)
+    assert pair is not None
+    motion, residual, probability = course_rows(fault, pair, columns, 0.9)
+    assert [(t.column, t.role) for t in motion.traces] == [(pair.reference, "reference"), (pair.measured, "measured")]
+    assert (residual.threshold, residual.unit) == ("evidence.FR.sensor.threshold", "m/s")
+    assert (probability.level, probability.unit) == (0.9, "1")
+
+
+def test_both_figures_draw_the_same_residual() -> None:
+    report, columns = samples.five_faults()
+    fault = report["intervals"][3]
+    pair = pair_of(fault, columns)
+    assert pair is not None
+    linked = {r.key: r for r in fault_rows(fault, ["front", "rear"], derived(columns, [fault]))}
+    assert course_rows(fault, pair, columns, None)[1] == linked["residual"]

@@ -1,22 +1,22 @@
 from __future__ import annotations
 
+from typing import Any
+
 from diagnosis.report.timeline import causes, merged, ticks, timeline
+from diagnosis.results.document import IntervalRow
 from tests import report_samples as samples
 
 
 def test_thousands_of_spans_merge_and_no_fault_is_lost() -> None:
-    spans = [
-        {"state": ("healthy", "not_excited")[i % 2], "start_s": i * 0.01, "stop_s": (i + 1) * 0.01}
-        for i in range(20_000)
-    ]
-    spans.append({"state": "stuck", "start_s": 77.0001, "stop_s": 77.0002})
-    runs = merged(spans, "state", 200.0)
+    spans = [(("healthy", "not_excited")[i % 2], i * 0.01, (i + 1) * 0.01) for i in range(20_000)]
+    spans.append(("stuck", 77.0001, 77.0002))
+    runs = merged(spans, 200.0)
     assert len(runs) <= 2000
     assert [r for r in runs if r[0] == "stuck"] == [("stuck", 770, 771)]
 
 
 def test_fault_at_the_very_end_is_drawn() -> None:
-    assert merged([{"state": "noisy", "start_s": 10.0, "stop_s": 10.0}], "state", 10.0) == [("noisy", 1999, 2000)]
+    assert merged([("noisy", 10.0, 10.0)], 10.0) == [("noisy", 1999, 2000)]
 
 
 def test_lanes_with_and_without_faults() -> None:
@@ -27,7 +27,7 @@ def test_lanes_with_and_without_faults() -> None:
         ("FL", "speed sensor"),
         ("RR", "drive valve"),
         ("RL", "drive valve"),
-        ("front", "steering-angle sensor"),
+        ("front", "steering sensor"),
     ]
     assert len(t.quiet) == 7
     assert t.summary == "7 lanes without a fault: 6 healthy, 1 not assessed throughout"
@@ -46,23 +46,26 @@ def test_ticks() -> None:
 
 
 def test_faults_that_may_follow_from_another_are_faded() -> None:
-    stuck = {"id": "F1", "component": "FR", "kind": "wheel", "side": "sensor", "mode": "stuck", "tier": "model"}
-    loss = {**stuck, "id": "F2", "side": "actuator", "mode": "inefficient", "start_s": 11.0, "stop_s": 16.0}
-    stuck |= {"start_s": 10.0, "stop_s": 20.0}
-    assert causes([stuck, loss]) == {"F2": "F1"}
-    assert causes([stuck, {**loss, "tier": "direct"}]) == {}, "measured by itself"
-    assert causes([stuck, {**loss, "start_s": 19.0, "stop_s": 30.0}]) == {}, "mostly outside"
-    assert causes([stuck, {**loss, "component": "FL"}]) == {}
+    def loss(**changes: Any) -> IntervalRow:
+        own = {"id": "F2", "side": "actuator", "mode": "inefficient", "tier": "model", "start_s": 11.0, "stop_s": 16.0}
+        return samples.fault(**(own | changes))
+
+    stuck = samples.fault(tier="model", start_s=10.0, stop_s=20.0)
+    assert causes([stuck, loss()]) == {"F2": "F1"}
+    assert causes([stuck, loss(tier="direct")]) == {}, "measured by itself"
+    assert causes([stuck, loss(start_s=19.0, stop_s=30.0)]) == {}, "mostly outside"
+    assert causes([stuck, loss(component="FL")]) == {}
 
 
 def test_a_part_that_was_judged_too_briefly_does_not_count_as_healthy() -> None:
     rows = [("sensor", 60.0), ("actuator", 18.0)]
-    report = {
-        "machine": {"wheels": ["FR"]},
-        "states": [
-            {"component": "FR", "side": side, "state": "healthy", "start_s": 0.0, "stop_s": s} for side, s in rows
+    report = samples.report_with(
+        machine={"wheels": ["FR"]},
+        states=[
+            {"component": "FR", "side": side, "state": "healthy", "start_s": 0.0, "stop_s": s, "reason": ""}
+            for side, s in rows
         ],
-        "coverage": [
+        coverage=[
             {
                 "component": "FR",
                 "side": side,
@@ -73,7 +76,7 @@ def test_a_part_that_was_judged_too_briefly_does_not_count_as_healthy() -> None:
             }
             for side, s in rows
         ],
-    }
+    )
     t = timeline(report, 66.0)
     assert [lane.state for lane in t.quiet] == ["healthy", "not_assessed"]
     assert t.summary == "2 lanes without a fault: 1 healthy, 1 not judged long enough"
