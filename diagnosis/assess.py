@@ -70,8 +70,8 @@ def assess_components(
     if fit is not None:
         progress(Progress(Stage.JUDGING_WHEELS))
         slip = slip_of(timeline, replay, machine, channels.v, steering.angle, steering.doubtful)
-        data, residuals = wheels_data(timeline, replay, machine, channels, fit, counts, steering.angle, slip)
-        models = assess_wheels(data, residuals, machine.limits, gains=fit.reliable)
+        data = wheels_data(timeline, replay, machine, channels, fit, counts, steering.angle, slip)
+        models = assess_wheels(data, machine.limits, gains=fit.reliable)
     out: dict[Key, Assessment] = {}
     for i, wheel in enumerate(machine.wheels):
         if wheel not in wheels:

@@ -6,7 +6,8 @@ jumps) stays in the mean square of the steps, and onsets are refined at the raw 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -136,65 +137,62 @@ def blocks_of(
         Step [s].
     """
     width, (size, wheels) = block_width(dt), y.shape
-    fill = -size % width
-    edge = ((0, fill), (0, 0))
     opening, parts = Column(np.float64, (wheels,)), []
-    ends = [_Ends() for _ in range(wheels)]
-    usual = [_usual_gap(status[:, i]) for i in range(wheels)]
+    ends = [_Ends(_usual_gap(status[:, i])) for i in range(wheels)]
     for cut in blocks(size, width):
-        last = edge if cut.stop == size else ((0, 0), (0, 0))
-        unknown = np.pad(~np.isfinite(u[cut]), last, mode="edge")
+        fill = -size % width if cut.stop == size else 0
+        edge = ((0, fill), (0, 0))
         beyond = without_nan(u[cut])
-        beyond = np.pad(np.sign(beyond) * np.maximum(np.abs(beyond) - dead, 0.0), last, mode="edge")
-        n = len(beyond) // width
-        state = np.full((n, wheels), SKIP, dtype=np.int8)
-        sums = np.zeros((3, n, wheels))
-        for i in range(wheels):
-            sums[:, :, i] = _samples(y[cut, i], status[cut, i], n, width, usual[i], ends[i])
-            silent = np.bincount(np.flatnonzero(status[cut, i] == SILENT) // width, minlength=n) > 0.5 * width
-            state[silent, i] = SILENT
-            state[sums[1, :, i] > 0, i] = PAIR
+        beyond = np.pad(np.sign(beyond) * np.maximum(np.abs(beyond) - dead, 0.0), edge, mode="edge")
         opening.append(beyond)
-        shape = (n, width, wheels)
+        shape = (len(beyond) // width, width, wheels)
+
+        def framed(values: NDArray[Any], edge: Any = edge, shape: tuple[int, ...] = shape) -> NDArray[Any]:
+            return np.pad(values, edge, mode="edge").reshape(shape)
+
+        mean, count, jitter, state = _samples(y[cut], status[cut], width, shape[0], ends)
         parts.append(
-            (
-                *sums,
-                beyond.reshape(shape).std(axis=1),
-                state,
-                np.pad(quiet[cut], last, mode="edge").reshape(shape).all(axis=1),
-                np.pad(ratio[cut], last, mode="edge").reshape(shape).mean(axis=1),
-                np.pad(turn[cut], last, mode="edge").reshape(shape).mean(axis=1),
-                unknown.reshape(shape).mean(axis=1) > 0.5,
+            _Part(
+                y=mean,
+                count=count,
+                jitter=jitter,
+                unsteady=beyond.reshape(shape).std(axis=1),
+                status=state,
+                quiet=np.asarray(framed(quiet[cut]).all(axis=1)),
+                ratio=framed(ratio[cut]).mean(axis=1),
+                turn=framed(turn[cut]).mean(axis=1),
+                blind=framed(~np.isfinite(u[cut])).mean(axis=1) > 0.5,
             )
         )
         release(y, u, ratio, turn)
-    mean, count, jitter, unsteady, state, still, ratios, turns, blind = (
-        np.concatenate(x) for x in zip(*parts, strict=True)
-    )
+    whole = {f.name: np.concatenate([getattr(part, f.name) for part in parts]) for f in fields(_Part)}
     driven = opening.finish()
     if width < 4:  # too few samples to see by themselves what changes within a block
         quick = np.stack([np.abs(white_part(driven[:, i])) for i in range(wheels)], axis=1)
-        unsteady = np.maximum(unsteady, quick.reshape(-1, width, wheels).mean(axis=1))
-    return WheelBlocks(
-        width=width,
-        raw_dt=dt,
-        y=mean,
-        count=count,
-        jitter=jitter,
-        u=driven,
-        unsteady=unsteady,
-        status=state,
-        quiet=still,
-        ratio=ratios,
-        turn=turns,
-        blind=blind,
-    )
+        whole["unsteady"] = np.maximum(whole["unsteady"], quick.reshape(-1, width, wheels).mean(axis=1))
+    return WheelBlocks(width=width, raw_dt=dt, u=driven, **whole)
+
+
+@dataclass(frozen=True)
+class _Part:
+    """Columns of `WheelBlocks` that have a row per block."""
+
+    y: Array
+    count: Array
+    jitter: Array
+    unsteady: Array
+    status: NDArray[np.int8]
+    quiet: NDArray[np.bool_]
+    ratio: Array
+    turn: Array
+    blind: NDArray[np.bool_]
 
 
 @dataclass
 class _Ends:
-    """Last new sample of the cut before: its place from the next cut's first sample, and its value."""
+    """Usual distance of new samples in steps, and the last one of the cut before: its place from the next, its value."""
 
+    usual: float
     place: int | None = None
     value: float = 0.0
 
@@ -205,7 +203,21 @@ def _usual_gap(status: NDArray[np.int8]) -> float:
     return float(np.median(np.diff(new))) if new.size > 1 else 0.0
 
 
-def _samples(y: Array, status: NDArray[np.int8], n: int, width: int, usual: float, ends: _Ends) -> Array:
+def _samples(
+    y: Array, status: NDArray[np.int8], width: int, n: int, ends: list[_Ends]
+) -> tuple[Array, Array, Array, NDArray[np.int8]]:
+    """Mean, number and mean squared step of the new samples of n blocks of all wheels, and the blocks' status."""
+    state = np.full((n, y.shape[1]), SKIP, dtype=np.int8)
+    sums = np.zeros((3, n, y.shape[1]))
+    for i, end in enumerate(ends):
+        sums[:, :, i] = _samples_of_one(y[:, i], status[:, i], n, width, end)
+        silent = np.bincount(np.flatnonzero(status[:, i] == SILENT) // width, minlength=n) > 0.5 * width
+        state[silent, i] = SILENT
+        state[sums[1, :, i] > 0, i] = PAIR
+    return sums[0], sums[1], sums[2], state
+
+
+def _samples_of_one(y: Array, status: NDArray[np.int8], n: int, width: int, ends: _Ends) -> Array:
     """Mean, number and mean squared step of the new samples of n blocks, shape (3, n)."""
     new = np.flatnonzero(status == PAIR)
     place, values = new // width, y[new]
@@ -213,7 +225,7 @@ def _samples(y: Array, status: NDArray[np.int8], n: int, width: int, usual: floa
     mean = np.bincount(place, weights=values, minlength=n) / np.maximum(count, 1)
     if ends.place is not None:
         new, values, place = np.r_[ends.place, new], np.r_[ends.value, values], np.r_[0, place]
-    near = np.diff(new) <= 1.5 * usual
+    near = np.diff(new) <= 1.5 * ends.usual
     steps = np.where(near, np.diff(values) ** 2, 0.0)
     known = np.bincount(place[1:], weights=near, minlength=n)
     jitter = np.bincount(place[1:], weights=steps, minlength=n) / np.maximum(known, 1)

@@ -3,27 +3,71 @@
 Wheel: τ·v̇ = −v + K(δ_a·u + b_a)·share + load; sensor: y = δ_s·v + b_s + n. Every row of the two tables is a Kalman
 model, and Viterbi's recursion keeps the most probable entry of each. A sensor's loss of gain scales ν at once when its
 model is entered; an actuator's only bends it, so the shape of an onset tells the two apart without a test of its own.
-The wheels share one pump and, on the ground, one body: `wheel_joint` runs them side by side.
+The wheels share one pump and, on the ground, one body: `diagnosis.wheels.joint_kernel` runs them side by side.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from diagnosis.estimation.fault_models import STAY, trace
-from diagnosis.wheels import joint_kernel
 from diagnosis.wheels.blocks import WheelBlocks
-from diagnosis.wheels.models import JointModel, JointPass, JointState, WheelFilterModel
-from diagnosis.wheels.runs import Runs
-from diagnosis.wheels.step_kernel import A_GAIN, HEALTHY, MODELS, enter
+from diagnosis.wheels.joint_kernel import (
+    GAIN,
+    LAGGED_DRIVE,
+    JointConstants,
+    JointInput,
+    JointOutput,
+    JointState,
+    JointWork,
+    scan_wheels,
+)
+from diagnosis.wheels.models import HEALTHY, MODELS, JointModel, WheelFilterModel
+from diagnosis.wheels.step_kernel import enter
 from replay.arrays import spill
 from replay.arrays.spill import Column, release
 
 Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class JointPass:
+    """One run of the recursion over n blocks.
+
+    Attributes
+    ----------
+    back : tuple of NDArray[np.uint8], one per wheel, shape (n, models)
+        Back-pointers.
+    best : NDArray[np.uint8], shape (n, wheels)
+        Most probable model by what came before: a causal reading.
+    fault : Array, shape (n, wheels)
+        Probability by the same that the wheel is not healthy.
+    inputs : Array, shape (n, wheels, 8)
+        Openings as fed, shares, speed and uncertainty of the body, log-likelihood; see `JointOutput`.
+    state : JointState
+        For the next blocks.
+    """
+
+    back: tuple[NDArray[np.uint8], ...]
+    best: NDArray[np.uint8]
+    fault: Array
+    inputs: Array
+    state: JointState
+
+    @property
+    def evidence(self) -> float:
+        """Log-likelihood of the most probable paths."""
+        return float(self.gains.sum())
+
+    @cached_property
+    def gains(self) -> Array:
+        """Log-likelihood of each block of each wheel, shape (n, wheels)."""
+        return np.ascontiguousarray(self.inputs[:, :, GAIN])
 
 
 def initial_state(first: Array, model: JointModel, dt: float, raw_dt: float) -> JointState:
@@ -40,9 +84,9 @@ def initial_state(first: Array, model: JointModel, dt: float, raw_dt: float) -> 
         cov[i, HEALTHY, 0, 0], cov[i, HEALTHY, 2, 2] = (0.2 * wheel.span) ** 2, 1.0
         for m in range(1, MODELS):
             enter(m, HEALTHY, k, mean[i], cov[i])
-    spill = np.zeros((count, 4))
-    spill[:, 3] = first
-    return JointState(score, mean, cov, spill)
+    carried = np.zeros((count, 4))
+    carried[:, LAGGED_DRIVE] = first
+    return JointState(score, mean, cov, carried)
 
 
 def first_speeds(blocks: WheelBlocks) -> Array:
@@ -100,114 +144,53 @@ def cuts(size: int, width: int) -> Iterator[slice]:
 def _forward(blocks: WheelBlocks, model: JointModel, state: JointState, given: NDArray[np.uint8]) -> JointPass:
     """Run the recursion over blocks that are in memory at once."""
     n, wheels = blocks.y.shape
-    dt, raw_dt = blocks.dt, blocks.raw_dt
-    dummy = WheelFilterModel(1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0)
-    used = [dummy if w is None else w for w in model.wheels]
-    per_opening = np.array([w.K * raw_dt / w.tau for w in used])
-    back = np.full((n, wheels, MODELS), STAY, dtype=np.uint8)
-    best, fault = np.zeros((n, wheels), dtype=np.uint8), np.zeros((n, wheels))
-    inputs = np.zeros((n, wheels, 8))
-    score, mean, cov, rest = (x.copy() for x in (state.score, state.mean, state.cov, state.spill))
-    joint_kernel.forward(
-        blocks.u,
-        blocks.y,
-        blocks.count,
-        blocks.jitter,
-        blocks.unsteady * per_opening,
-        blocks.wander(per_opening),
-        blocks.ratio,
-        blocks.turn,
-        blocks.status,
-        blocks.quiet,
-        np.array([w is not None for w in model.wheels]),
-        given,
-        np.array([A_GAIN if w.measured else MODELS for w in used]),
-        model.flow,
-        model.switch_cost,
-        tuple(w.constants(dt, raw_dt) for w in used),
-        score,
-        mean,
-        cov,
-        rest,
-        back,
-        best,
-        fault,
-        inputs,
+    constants = _joint_constants(model, blocks.dt, blocks.raw_dt)
+    per_opening = np.array([w.K * blocks.raw_dt / w.tau for w in _filled(model)])
+    seen = JointInput(
+        u=blocks.u,
+        y=blocks.y,
+        samples=blocks.count,
+        jitter=blocks.jitter,
+        chatter=blocks.unsteady * per_opening,
+        wander=blocks.wander(per_opening),
+        ratio=blocks.ratio,
+        turn=blocks.turn,
+        status=blocks.status,
+        quiet=blocks.quiet,
+        given=given,
     )
-    pointers = tuple(np.ascontiguousarray(back[:, i]) for i in range(wheels))
-    return JointPass(pointers, best, fault, inputs, JointState(score, mean, cov, rest))
+    out = JointOutput(
+        back=np.full((n, wheels, MODELS), STAY, dtype=np.uint8),
+        best=np.zeros((n, wheels), dtype=np.uint8),
+        fault=np.zeros((n, wheels)),
+        inputs=np.zeros((n, wheels, 8)),
+    )
+    after = JointState(*(x.copy() for x in state))
+    scan_wheels(seen, constants, after, out, JointWork.of(wheels, blocks.width))
+    pointers = tuple(np.ascontiguousarray(out.back[:, i]) for i in range(wheels))
+    return JointPass(pointers, out.best, out.fault, out.inputs, after)
+
+
+def _filled(model: JointModel) -> list[WheelFilterModel]:
+    """Models of all wheels, with a placeholder that nothing reads where one is not modelled."""
+    none = WheelFilterModel(1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0)
+    return [none if w is None else w for w in model.wheels]
+
+
+def _joint_constants(model: JointModel, dt: float, raw_dt: float) -> JointConstants:
+    """Constants of the recursion for blocks of dt of samples of raw_dt [s]."""
+    wheels = _filled(model)
+    return JointConstants(
+        wheels=tuple(w.constants(dt, raw_dt) for w in wheels),
+        K=np.array([w.K for w in wheels]),
+        known=np.array([w is not None for w in model.wheels]),
+        models=np.array([w.models for w in wheels]),
+        flow=model.flow,
+        cost=model.switch_cost,
+    )
 
 
 def most_probable(done: JointPass, wheel: int) -> tuple[NDArray[np.uint8], NDArray[np.bool_]]:
     """Most probable models of one wheel, shape (n,), and the blocks at which one was entered."""
     models, entered = trace(done.back[wheel], int(np.argmax(done.state.score[wheel])))
     return models, entered
-
-
-@dataclass(frozen=True)
-class RunEvidence:
-    """Every model entered at every run's start and followed to its end.
-
-    Attributes
-    ----------
-    evidence : Array, shape (runs, models)
-        Log-likelihoods over the run.
-    mean, cov : Array, shape (runs, models, 4) and (runs, models, 4, 4)
-        States at its end.
-    expected, spread : Array, shape (n,)
-        Speed that a healthy wheel would have [m/s], carried on by the model alone during faults, and its variance.
-    """
-
-    evidence: Array
-    mean: Array
-    cov: Array
-    expected: Array
-    spread: Array
-
-
-def evidence_of_runs(blocks: WheelBlocks, model: JointModel, done: JointPass, wheel: int, runs: Runs) -> RunEvidence:
-    """Weigh all models over the runs of one wheel's path.
-
-    Parameters
-    ----------
-    blocks, model, done
-        As in `forward`, and what it gave.
-    wheel : int
-        Which.
-    runs : Runs
-        Of its path.
-    """
-    own = model.wheels[wheel]
-    assert own is not None
-    k = own.constants(blocks.dt, blocks.raw_dt)
-    per_opening = np.array([own.K * blocks.raw_dt / own.tau])
-    n, size = blocks.y.shape[0], runs.model.size
-    evidence, mean, cov = np.zeros((size, MODELS)), np.zeros((size, MODELS, 4)), np.zeros((size, MODELS, 4, 4))
-    expected, spread = np.zeros(n), np.zeros(n)
-    count = A_GAIN if own.measured else MODELS
-    joint_kernel.along_runs(
-        np.ascontiguousarray(blocks.y[:, wheel]),
-        np.ascontiguousarray(blocks.count[:, wheel]),
-        np.ascontiguousarray(blocks.jitter[:, wheel]),
-        blocks.unsteady[:, wheel] * per_opening[0],
-        np.ascontiguousarray(blocks.wander(per_opening)[:, wheel]),
-        np.ascontiguousarray(done.inputs[:, wheel]),
-        np.ascontiguousarray(blocks.status[:, wheel]),
-        np.ascontiguousarray(blocks.quiet[:, wheel]),
-        count,
-        k,
-        runs.entry,
-        runs.stop,
-        runs.model,
-        float(first_speeds(blocks)[wheel]),
-        (0.2 * own.span) ** 2,
-        np.zeros((MODELS, 4)),
-        np.zeros((MODELS, 4, 4)),
-        evidence,
-        mean,
-        cov,
-        expected,
-        spread,
-    )
-    evidence[:, count:] = -np.inf
-    return RunEvidence(evidence, mean, cov, expected, spread)

@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 
 from diagnosis.channels.liveness import alive
 from diagnosis.channels.sample_status import sample_status
-from diagnosis.wheels.assess import WheelsData
 from diagnosis.wheels.blocks import block_width
 from diagnosis.wheels.identification import WheelModelFit, demand, identify, low_passed_on
 from diagnosis.wheels.parity import slipping
@@ -54,6 +53,13 @@ class WheelChannels:
         """Wheels whose opening is measured."""
         return any_finite(self.applied)
 
+    def names(self, wheels: Sequence[str]) -> list[tuple[str, str]]:
+        """Names of the better speed and opening of each wheel."""
+        return [
+            (f"wheel.{w}.{'v_true' if true else 'v'}", f"wheel.{w}.{'u_applied' if applied else 'u'}")
+            for w, true, applied in zip(wheels, self.has_true, self.has_applied, strict=True)
+        ]
+
     @cached_property
     def speed(self) -> Array:
         """The better speed of each wheel [m/s]."""
@@ -67,6 +73,61 @@ class WheelChannels:
         if not self.has_applied.any():
             return self.u
         return in_blocks(lambda applied, u: np.asarray(np.where(self.has_applied, applied, u)), self.applied, self.u)
+
+
+@dataclass(frozen=True)
+class WheelsData:
+    """All wheels of a machine; arrays are (n, wheels).
+
+    Attributes
+    ----------
+    y, u : Array
+        Measured speed [m/s] and valve opening [fraction], the second measurement where there is one.
+    residual : Sequence[Array], each of shape (n,)
+        y − K·lowpass(u) of each wheel [m/s], NaN where the pump cannot feed it.
+    status : NDArray[np.int8]
+        As in `diagnosis.estimation.fault_models`.
+    quiet, slip : NDArray[np.bool_]
+        Where a wheel is neither commanded nor moving, and where it breaks the parity of the body.
+    ratio, turn : Array
+        As in `WheelBlocks`; NaN without geometry.
+    measured : Sequence[bool]
+        Whether a wheel's opening is the measured one, so that its valve is judged elsewhere.
+    plants : Sequence[WheelPlant | None]
+        Wheel models; None where a wheel cannot be judged.
+    noise : Sequence[Noise]
+        Known noise of the speeds.
+    names : Sequence[tuple[str, str]]
+        Names of speed and opening.
+    span, flow : float
+        Largest plausible speed and what the pump feeds, as a sum of speeds [m/s].
+    coupling : str
+        ``auto``, ``free`` or ``ground``.
+    dt : float
+        Step [s].
+    """
+
+    y: Array
+    u: Array
+    residual: Sequence[Array]
+    status: NDArray[np.int8]
+    quiet: NDArray[np.bool_]
+    slip: NDArray[np.bool_]
+    ratio: Array
+    turn: Array
+    measured: Sequence[bool]
+    plants: Sequence[WheelPlant | None]
+    noise: Sequence[Noise]
+    names: Sequence[tuple[str, str]]
+    span: float
+    flow: float
+    coupling: str
+    dt: float
+
+    @property
+    def dead(self) -> Array:
+        """Dead zone of each valve [fraction], shape (wheels,)."""
+        return np.array([0.0 if p is None else p.dead for p in self.plants])
 
 
 def wheel_channels(timeline: Timeline, machine: Machine) -> WheelChannels:
@@ -126,59 +187,57 @@ def wheels_data(
     counts: dict[str, NDArray[np.int16]],
     angle: Array,
     slip: NDArray[np.bool_],
-) -> tuple[WheelsData, list[Array]]:
-    """Channels for the wheel models, and y − K·lowpass(u) [m/s] of each wheel where the pump feeds it, shape (n,).
+) -> WheelsData:
+    """Channels for the wheel models.
 
     Parameters
     ----------
+    timeline, replay, machine
+        The aligned mission, the replayed loop and the machine.
+    channels : WheelChannels
+        Speeds and openings of all wheels.
+    fit : WheelModelFit
+        Their models.
+    counts : dict[str, NDArray[np.int16]]
+        From `diagnosis.channels.liveness.alive_sources`.
     angle : Array, shape (n, axles)
         Best estimate of the axles' angles [rad].
     slip : NDArray[np.bool_], shape (n, wheels)
         Where a wheel breaks the parity of the body.
     """
-    size, wheels, dt = timeline.size, len(machine.wheels), timeline.dt
-    y, u = channels.speed, channels.opening
-    status = np.zeros((size, wheels), dtype=np.int8)
-    quiet = np.ones((size, wheels), dtype=np.bool_)
-    nothing = np.broadcast_to(np.nan, (size,))
-    residuals: list[Array] = [nothing] * wheels
+    y, u, dt = channels.speed, channels.opening, timeline.dt
+    names = channels.names(machine.wheels)
+    status = np.zeros(y.shape, dtype=np.int8)
+    quiet = np.ones(y.shape, dtype=np.bool_)
+    residual: list[Array] = [np.broadcast_to(np.nan, (timeline.size,))] * len(names)
     has = any_finite(y) & any_finite(u)
-    names: list[tuple[str, str]] = []
-    plants: list[WheelPlant | None] = []
-    limit = _QUIET * machine.limits.driving_speed
-    for i, wheel in enumerate(machine.wheels):
-        speed = f"wheel.{wheel}.{'v_true' if channels.has_true[i] else 'v'}"
-        opening = f"wheel.{wheel}.{'u_applied' if channels.has_applied[i] else 'u'}"
-        names.append((speed, opening))
-        plant = fit.plants[i]
-        if plant is None or not has[i]:
-            plants.append(None)
-            continue
-        plants.append(plant)
-        status[:, i] = sample_status(y[:, i], u[:, i], timeline.fresh[speed], alive(timeline, counts, speed), dt)
-        residuals[i], quiet[:, i] = _apart(y[:, i], u[:, i], replay.v_ref[:, i], plant, limit, dt)
+    plants = [plant if has[i] else None for i, plant in enumerate(fit.plants)]
     starved = _starved(fit, u, machine.plant.flow, dt)
-    residuals = [x if x is nothing else in_blocks(lambda s, r: np.where(s, np.nan, r), starved, x) for x in residuals]
-    ratio, turn = _in_motion(angle, machine, size, dt)
-    return (
-        WheelsData(
-            y=y,
-            u=u,
-            status=status,
-            quiet=quiet,
-            slip=slip,
-            ratio=ratio,
-            turn=turn,
-            measured=[bool(x) for x in channels.has_applied],
-            plants=plants,
-            noise=[machine.noise.get(speed, Noise()) for speed, _ in names],
-            names=names,
-            span=2.2 * machine.max_speed,
-            flow=machine.plant.flow or 1e9,
-            coupling=machine.plant.coupling,
-            dt=dt,
-        ),
-        residuals,
+    limit = _QUIET * machine.limits.driving_speed
+    for i, (plant, (speed, _)) in enumerate(zip(plants, names, strict=True)):
+        if plant is None:
+            continue
+        status[:, i] = sample_status(y[:, i], u[:, i], timeline.fresh[speed], alive(timeline, counts, speed), dt)
+        apart, quiet[:, i] = _apart(y[:, i], u[:, i], replay.v_ref[:, i], plant, limit, dt)
+        residual[i] = in_blocks(lambda s, r: np.where(s, np.nan, r), starved, apart)
+    ratio, turn = _in_motion(angle, machine, timeline.size, dt)
+    return WheelsData(
+        y=y,
+        u=u,
+        residual=residual,
+        status=status,
+        quiet=quiet,
+        slip=slip,
+        ratio=ratio,
+        turn=turn,
+        measured=[bool(x) for x in channels.has_applied],
+        plants=plants,
+        noise=[machine.noise.get(speed, Noise()) for speed, _ in names],
+        names=names,
+        span=2.2 * machine.max_speed,
+        flow=machine.plant.flow or 1e9,
+        coupling=machine.plant.coupling,
+        dt=dt,
     )
 
 

@@ -1,16 +1,72 @@
-"""What the wheel filters work with: constants, the state that they carry, and what one pass gives."""
+"""Models of a wheel: the row of the tables that each stands for, and the constants of their filters.
+
+A row may have several models: noise of several strengths is one row. A new model is a code here, its entry in `ROWS`,
+and what `diagnosis.wheels.step_kernel` makes of its code.
+"""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from diagnosis.wheels.step_kernel import COLOURED_S, DISTURBED_S, WheelConstants
+from replay.faults import FaultMode, Side
 
-Array = NDArray[np.float64]
+#: A row of the paper's tables; None stands for a healthy wheel.
+Row = tuple[Side, FaultMode]
+
+HEALTHY, S_STUCK, S_NONE, S_GAIN, S_WHITE_3, S_WHITE_8, S_WHITE_24, S_OU_SMALL, S_OU_LARGE = range(9)
+A_GAIN, A_STUCK, A_NONE, A_BIAS = range(9, 13)
+MODELS = 13
+
+#: Row of each model, by the model's code.
+ROWS: tuple[Row | None, ...] = (
+    None,
+    (Side.SENSOR, FaultMode.STUCK),
+    (Side.SENSOR, FaultMode.NO_SIGNAL),
+    (Side.SENSOR, FaultMode.INEFFICIENT),
+    (Side.SENSOR, FaultMode.NOISY),
+    (Side.SENSOR, FaultMode.NOISY),
+    (Side.SENSOR, FaultMode.NOISY),
+    (Side.SENSOR, FaultMode.NOISY),
+    (Side.SENSOR, FaultMode.NOISY),
+    (Side.ACTUATOR, FaultMode.INEFFICIENT),
+    (Side.ACTUATOR, FaultMode.STUCK),
+    (Side.ACTUATOR, FaultMode.NO_SIGNAL),
+    (Side.ACTUATOR, FaultMode.NOISY),
+)
+#: Models of a sensor that shows nothing of the speed.
+TOTAL_SENSOR = (S_STUCK, S_NONE)
+#: Models of a sensor with noise, the weakest white one first.
+NOISY_SENSOR = tuple(range(S_WHITE_3, S_OU_LARGE + 1))
+
+DISTURBED_S = 0.8  # correlation time of a valve's disturbance [s]
+COLOURED_S = 0.05  # correlation time of a coloured sensor noise [s]
+
+
+class WheelConstants(NamedTuple):
+    """Constants of one wheel for the kernels; see `WheelFilterModel` for their meaning. SI units."""
+
+    K: float
+    lag: float  # dt / τ of one block
+    noise: float
+    constant_noise: float
+    rounding: float
+    load: float
+    load_keep: float  # share of the load's deviation that is left after one block
+    drift: float  # process noise of the speed [m/s/√s]
+    span: float
+    valve_span: float  # standard deviation of a stuck valve's speed [m/s]
+    grip: float  # load per slip of a tyre that holds [1]
+    grip_most: float  # largest load that a tyre transmits, as a speed [m/s]
+    offset: float  # constant load, as a speed [m/s]
+    dt: float  # block [s]
+    raw_dt: float
+    fade: float  # e^(−lag)
+    fade_held: float  # e^(−lag·(1 + grip))
+    keep_bias: float  # share of a valve's disturbance that is left after one block
+    keep_noise: float  # and of a coloured sensor noise
 
 
 @dataclass(frozen=True)
@@ -61,28 +117,33 @@ class WheelFilterModel:
     load_s = 6.0  # correlation time of the load [s]
     drift = 0.008  # process noise of the speed [m/s/√s]
 
+    @property
+    def models(self) -> int:
+        """How many models are considered: without the valve's where that is judged elsewhere."""
+        return A_GAIN if self.measured else MODELS
+
     def constants(self, dt: float, raw_dt: float) -> WheelConstants:
         """Constants for blocks of dt of samples of raw_dt [s]."""
         return WheelConstants(
-            self.K,
-            dt / self.tau,
-            self.noise,
-            self.constant_noise,
-            self.rounding,
-            self.load,
-            float(np.exp(-dt / self.load_s)),
-            self.drift,
-            self.span,
-            self.valve_span * self.K,
-            self.grip,
-            self.grip_most,
-            self.offset,
-            dt,
-            raw_dt,
-            float(np.exp(-dt / self.tau)),
-            float(np.exp(-dt / self.tau * (1 + self.grip))),
-            float(np.exp(-dt / DISTURBED_S)),
-            float(np.exp(-dt / COLOURED_S)),
+            K=self.K,
+            lag=dt / self.tau,
+            noise=self.noise,
+            constant_noise=self.constant_noise,
+            rounding=self.rounding,
+            load=self.load,
+            load_keep=float(np.exp(-dt / self.load_s)),
+            drift=self.drift,
+            span=self.span,
+            valve_span=self.valve_span * self.K,
+            grip=self.grip,
+            grip_most=self.grip_most,
+            offset=self.offset,
+            dt=dt,
+            raw_dt=raw_dt,
+            fade=float(np.exp(-dt / self.tau)),
+            fade_held=float(np.exp(-dt / self.tau * (1 + self.grip))),
+            keep_bias=float(np.exp(-dt / DISTURBED_S)),
+            keep_noise=float(np.exp(-dt / COLOURED_S)),
         )
 
 
@@ -107,57 +168,3 @@ class JointModel:
     def on_ground(self, grip_most: float) -> JointModel:
         """The same with tyres that transmit `grip_most` [m/s]."""
         return replace(self, wheels=tuple(None if w is None else replace(w, grip_most=grip_most) for w in self.wheels))
-
-
-@dataclass(frozen=True)
-class JointState:
-    """What the recursion carries from blocks to blocks.
-
-    Attributes
-    ----------
-    score : Array, shape (wheels, models)
-    mean : Array, shape (wheels, models, 4)
-    cov : Array, shape (wheels, models, 4, 4)
-    spill : Array, shape (wheels, 4)
-        What the last samples' openings still drive in the next block, and the lagged drive.
-    """
-
-    score: Array
-    mean: Array
-    cov: Array
-    spill: Array
-
-
-@dataclass(frozen=True)
-class JointPass:
-    """One run of the recursion over n blocks.
-
-    Attributes
-    ----------
-    back : tuple of NDArray[np.uint8], one per wheel, shape (n, models)
-        Back-pointers.
-    best : NDArray[np.uint8], shape (n, wheels)
-        Most probable model by what came before: a causal reading.
-    fault : Array, shape (n, wheels)
-        Probability by the same that the wheel is not healthy.
-    inputs : Array, shape (n, wheels, 8)
-        Openings as fed, shares, speed and uncertainty of the body (see `wheel_scan.WheelInput`), log-likelihood.
-    state : JointState
-        For the next blocks.
-    """
-
-    back: tuple[NDArray[np.uint8], ...]
-    best: NDArray[np.uint8]
-    fault: Array
-    inputs: Array
-    state: JointState
-
-    @property
-    def evidence(self) -> float:
-        """Log-likelihood of the most probable paths."""
-        return float(self.gains.sum())
-
-    @cached_property
-    def gains(self) -> Array:
-        """Log-likelihood of each block of each wheel, shape (n, wheels)."""
-        return np.ascontiguousarray(self.inputs[:, :, 7])

@@ -10,10 +10,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from diagnosis.wheels import filter as wf
-from diagnosis.wheels import models as wt
-from diagnosis.wheels import step_kernel as ws
 from diagnosis.wheels.blocks import WheelBlocks
+from diagnosis.wheels.filter import JointPass, forward, most_probable
+from diagnosis.wheels.models import HEALTHY, TOTAL_SENSOR, JointModel
 from diagnosis.wheels.runs import Runs, runs_of
 
 _NEAR_S = 0.3
@@ -21,7 +20,7 @@ _MARGIN_S = 0.05
 _ROUNDS = 1
 
 
-def settled(blocks: WheelBlocks, model: wt.JointModel, done: wt.JointPass) -> wt.JointPass:
+def settled(blocks: WheelBlocks, model: JointModel, done: JointPass) -> JointPass:
     """The pass with faults taken back that another wheel's change explains better.
 
     Parameters
@@ -38,33 +37,33 @@ def settled(blocks: WheelBlocks, model: wt.JointModel, done: wt.JointPass) -> wt
             return done
         without = paths.copy()
         for i, a, b in doubted:
-            without[a:b, i] = ws.HEALTHY
-        trial = wf.forward(blocks, model, given=without)
+            without[a:b, i] = HEALTHY
+        trial = forward(blocks, model, given=without)
         gain = np.cumsum((trial.gains - done.gains).sum(axis=1))
         margin = round(_MARGIN_S / blocks.dt)
         taken_back = 0
         for i, a, b in doubted:
             first, last = max(0, a - margin), min(gain.size - 1, b + margin)
             if gain[last] - gain[first] > 0:
-                paths[a:b, i] = ws.HEALTHY
+                paths[a:b, i] = HEALTHY
                 taken_back += 1
         if not taken_back:
             return done
-        better = wf.forward(blocks, model, given=paths)
+        better = forward(blocks, model, given=paths)
         if better.evidence <= done.evidence:
             return done
         done = better
     return done
 
 
-def _paths(blocks: WheelBlocks, model: wt.JointModel, done: wt.JointPass) -> tuple[dict[int, Runs], NDArray[np.uint8]]:
+def _paths(blocks: WheelBlocks, model: JointModel, done: JointPass) -> tuple[dict[int, Runs], NDArray[np.uint8]]:
     """Runs of every wheel, and its models by block, shape (n, wheels)."""
     paths = np.zeros(blocks.y.shape, dtype=np.uint8)
     runs = {}
     for i, wheel in enumerate(model.wheels):
         if wheel is None:
             continue
-        path, entered = wf.most_probable(done, i)
+        path, entered = most_probable(done, i)
         paths[:, i] = path
         runs[i] = runs_of(path, entered, blocks.quiet[:, i], blocks.status[:, i], blocks.dt)
     return runs, paths
@@ -75,14 +74,14 @@ def _doubted(runs: dict[int, Runs], near: int) -> list[tuple[int, int, int]]:
     changes = []
     for i, r in runs.items():
         for a, b, m in zip(r.start, r.stop, r.model, strict=True):
-            if m != ws.HEALTHY:
+            if m != HEALTHY:
                 changes += [(int(a), i, int(a)), (int(b), i, int(a))]
     changes.sort()
     times = np.array([t for t, _, _ in changes], dtype=np.int64)
     out = []
     for i, r in runs.items():
         for a, b, m in zip(r.start, r.stop, r.model, strict=True):
-            if m == ws.HEALTHY or m in (ws.S_STUCK, ws.S_NONE):
+            if m == HEALTHY or m in TOTAL_SENSOR:
                 continue
             low, high = np.searchsorted(times, (a - near, a + near + 1))
             if any((wheel, start) != (i, int(a)) for _, wheel, start in changes[low:high]):

@@ -1,4 +1,4 @@
-"""Compiled Kalman step of one wheel's models: entry, prediction and correction on means over a block of samples.
+"""Compiled Kalman step of one wheel's models: entry, prediction and correction on the means of one block of samples.
 
 A model's state is z = [ν, g, x, c] with covariance P: ν the speed as its sensor scales it, g the unknown gain of the
 faulty side, x the load in units of its present standard deviation, c the stuck value or bias of the faulty side.
@@ -11,52 +11,34 @@ from typing import NamedTuple
 
 import numpy as np
 from numba import njit
+from numpy.typing import NDArray
 
-HEALTHY, S_STUCK, S_NONE, S_GAIN, S_WHITE_3, S_WHITE_8, S_WHITE_24, S_OU_SMALL, S_OU_LARGE = range(9)
-A_GAIN, A_STUCK, A_NONE, A_BIAS = range(9, 13)
-MODELS = 13
-NAMES = (
-    ("none", "healthy"),
-    ("sensor", "stuck"),
-    ("sensor", "no_signal"),
-    ("sensor", "inefficient"),
-    ("sensor", "noisy"),
-    ("sensor", "noisy"),
-    ("sensor", "noisy"),
-    ("sensor", "noisy"),
-    ("sensor", "noisy"),
-    ("actuator", "inefficient"),
-    ("actuator", "stuck"),
-    ("actuator", "no_signal"),
-    ("actuator", "noisy"),
+from diagnosis.estimation.fault_models import PAIR, SILENT
+from diagnosis.wheels.models import (
+    A_BIAS,
+    A_GAIN,
+    A_NONE,
+    A_STUCK,
+    COLOURED_S,
+    HEALTHY,
+    S_GAIN,
+    S_NONE,
+    S_OU_LARGE,
+    S_OU_SMALL,
+    S_STUCK,
+    S_WHITE_3,
+    S_WHITE_8,
+    S_WHITE_24,
+    WheelConstants,
 )
-ROW = np.array([0, 1, 2, 3, 4, 4, 4, 4, 4, 5, 6, 7, 8])
-DISTURBED_S = 0.8  # correlation time of a valve's disturbance [s]
-COLOURED_S = 0.05  # correlation time of a coloured sensor noise [s]
 
+Array = NDArray[np.float64]
 
-class WheelConstants(NamedTuple):
-    """Constants of one wheel; see `wheel_filter.WheelFilterModel` for their meaning. SI units."""
-
-    K: float
-    lag: float  # dt / τ of one block
-    noise: float
-    constant_noise: float
-    rounding: float
-    load: float
-    load_keep: float  # share of the load's deviation that is left after one block
-    drift: float  # process noise of the speed [m/s/√s]
-    span: float
-    valve_span: float  # standard deviation of a stuck valve's speed [m/s]
-    grip: float  # load per slip of a tyre that holds [1]
-    grip_most: float  # largest load that a tyre transmits, as a speed [m/s]
-    offset: float  # constant load, as a speed [m/s]
-    dt: float  # block [s]
-    raw_dt: float
-    fade: float  # e^(−lag)
-    fade_held: float  # e^(−lag·(1 + grip))
-    keep_bias: float  # share of a valve's disturbance that is left after one block
-    keep_noise: float  # and of a coloured sensor noise
+_OCCAM = 0.5  # what a row with unknowns must gain on healthy per second
+_WORST = 30.0  # by which a block can speak against a model at most
+_SILENT = -6.0
+_REVERSED = 1.0  # what a block costs a gain below zero
+_NO_LOSS = 0.9  # a gain above this is none
 
 
 class WheelInput(NamedTuple):
@@ -77,13 +59,13 @@ class WheelInput(NamedTuple):
 
 
 @njit(cache=True, error_model="numpy")
-def is_scaled(m):  # type: ignore[no-untyped-def]
+def is_scaled(m: int) -> bool:
     """Whether ν of model m is in the scale of a faulty sensor."""
     return m >= S_GAIN and m <= S_OU_LARGE
 
 
 @njit(cache=True, error_model="numpy")
-def enter(m, old, k, z, P):  # type: ignore[no-untyped-def]
+def enter(m: int, old: int, k: WheelConstants, z: Array, P: Array) -> None:
     """Start model m from the state of model `old`: speed and load are carried over, the unknowns get their priors."""
     v, var = z[old, 0], P[old, 0, 0]
     x, x_var = z[old, 2], min(P[old, 2, 2], 1.0)
@@ -125,7 +107,7 @@ def enter(m, old, k, z, P):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, error_model="numpy")
-def fed(m, q, k, z):  # type: ignore[no-untyped-def]
+def _fed(m: int, q: WheelInput, k: WheelConstants, z: Array) -> tuple[float, float]:
     """Opening as the pump feeds it, and the share that it feeds, while model m takes its part of the flow."""
     if m == A_GAIN or m == A_BIAS:
         g = min(max(z[m, 1], 0.0), 1.0)
@@ -141,18 +123,12 @@ def fed(m, q, k, z):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, error_model="numpy")
-def predict(m, q, k, z, P):  # type: ignore[no-untyped-def]
-    """z = F z + G, P = F P Fᵀ + Q of model m over one block.
-
-    τ ν̇ = −ν + K·opening + load, and the load is a tyre's: grip·(body − ν) up to `grip_most`, plus what x makes of it.
-    """
-    drive, share = fed(m, q, k, z)
-    drive *= k.K
-    scaled = is_scaled(m)
+def _tyre(m: int, q: WheelInput, k: WheelConstants, z: Array) -> tuple[float, float, float, float]:
+    """Of ν' = a·ν + b·(drive + add + s·x): a, b, add and s, by whether the wheel runs free or its tyre holds or slides."""
     a = k.fade
     b, add, held = 1.0 - a, 0.0, 0.0
     if q.body == q.body and k.grip_most > 0.0:
-        nu = z[m, 0] / max(z[m, 1], 0.1) if scaled else z[m, 0]
+        nu = z[m, 0] / max(z[m, 1], 0.1) if is_scaled(m) else z[m, 0]
         held = k.grip * (q.body - nu)
         if held > k.grip_most:
             held = k.grip_most
@@ -169,15 +145,13 @@ def predict(m, q, k, z, P):  # type: ignore[no-untyped-def]
     s = np.sqrt(k.load**2 + (0.3 * held) ** 2 + doubt**2)
     if held < 0.0:
         s = -s
-    f0, f1, f2, f3, g = a, 0.0, b * s, 0.0, 0.0
-    if scaled:
-        f1 = b * (drive + add)
-        f2 *= max(z[m, 1], 0.1)
-    elif m >= A_GAIN:
-        f1, f3, g = b * drive, b * share, b * add
-    else:
-        g = b * (drive + add)
-    keep, noise = 1.0, 0.0  # of c
+    return a, b, add, s
+
+
+@njit(cache=True, error_model="numpy")
+def _walk(m: int, k: WheelConstants) -> tuple[float, float]:
+    """Share of c that is left after one block, and variance of what comes to it."""
+    keep, noise = 1.0, 0.0
     if m == A_BIAS:
         keep = k.keep_bias
         noise = (1.0 - keep * keep) * (0.5 * k.valve_span) ** 2
@@ -188,6 +162,27 @@ def predict(m, q, k, z, P):  # type: ignore[no-untyped-def]
         noise = (1.0 - keep * keep) * ((0.05 if m == S_OU_SMALL else 0.12) * k.span) ** 2
     elif m >= S_WHITE_3 and m <= S_WHITE_24:
         noise = (0.05 * k.span) ** 2 * k.dt
+    return keep, noise
+
+
+@njit(cache=True, error_model="numpy")
+def predict(m: int, q: WheelInput, k: WheelConstants, z: Array, P: Array) -> float:
+    """z = F z + G, P = F P Fᵀ + Q of model m over one block; the share of a demand that the pump feeds.
+
+    τ ν̇ = −ν + K·opening + load, and the load is a tyre's: grip·(body − ν) up to `grip_most`, plus what x makes of it.
+    """
+    drive, share = _fed(m, q, k, z)
+    drive *= k.K
+    a, b, add, s = _tyre(m, q, k, z)
+    f0, f1, f2, f3, g = a, 0.0, b * s, 0.0, 0.0
+    if is_scaled(m):
+        f1 = b * (drive + add)
+        f2 *= max(z[m, 1], 0.1)
+    elif m >= A_GAIN:
+        f1, f3, g = b * drive, b * share, b * add
+    else:
+        g = b * (drive + add)
+    keep, noise = _walk(m, k)
     p0 = f0 * P[m, 0, 0] + f1 * P[m, 1, 0] + f2 * P[m, 2, 0] + f3 * P[m, 3, 0]
     p1 = f0 * P[m, 0, 1] + f1 * P[m, 1, 1] + f2 * P[m, 2, 1] + f3 * P[m, 3, 1]
     p2 = f0 * P[m, 0, 2] + f1 * P[m, 1, 2] + f2 * P[m, 2, 2] + f3 * P[m, 3, 2]
@@ -204,11 +199,11 @@ def predict(m, q, k, z, P):  # type: ignore[no-untyped-def]
     P[m, 2, 2] = k.load_keep**2 * P[m, 2, 2] + 1.0 - k.load_keep**2
     P[m, 2, 3] = P[m, 3, 2] = k.load_keep * keep * P[m, 2, 3]
     P[m, 3, 3] = keep * keep * P[m, 3, 3] + noise
-    return share
+    return float(share)
 
 
 @njit(cache=True, error_model="numpy")
-def readout(m, k, z):  # type: ignore[no-untyped-def]
+def _readout(m: int, k: WheelConstants, z: Array) -> tuple[float, float, float, float]:
     """Row H = [h0, 0, 0, h3] of model m, variance of one sample's noise, and of its steps from sample to sample."""
     own = k.noise**2
     if m == S_STUCK:
@@ -232,13 +227,13 @@ def readout(m, k, z):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, error_model="numpy")
-def correct(m, q, share, k, z, P):  # type: ignore[no-untyped-def]
+def correct(m: int, q: WheelInput, share: float, k: WheelConstants, z: Array, P: Array) -> float:
     """Kalman update of model m with the block's mean; log-likelihood of mean and steps.
 
     The steps from sample to sample tell noise, and constancy, without any model of the wheel: their mean square is
     distributed as χ² with two thirds of a degree of freedom each.
     """
-    h0, h3, white, steps = readout(m, k, z)
+    h0, h3, white, steps = _readout(m, k, z)
     r = white / max(q.samples, 1.0) + 1e-12
     if h0 > 0.0:
         r += (q.chatter * share) ** 2
@@ -264,12 +259,46 @@ def correct(m, q, share, k, z, P):  # type: ignore[no-untyped-def]
     P[m, 2, 3] -= k2 * g3
     P[m, 1, 0], P[m, 2, 0], P[m, 3, 0] = P[m, 0, 1], P[m, 0, 2], P[m, 0, 3]
     P[m, 2, 1], P[m, 3, 1], P[m, 3, 2] = P[m, 1, 2], P[m, 1, 3], P[m, 2, 3]
+    by_mean = innovation * innovation * part + np.log(2.0 * np.pi * s)
     if q.samples <= 1.5:
-        return -0.5 * (innovation * innovation * part + np.log(2.0 * np.pi * s))
+        return float(-0.5 * by_mean)
     freedom = 2.0 * q.samples / 3.0
     least = max(0.5 * q.jitter, k.constant_noise**2)
     # −½·freedom·(jitter/2/steps + log steps), but not below what noise of just this power gives, less 25
     spoken = freedom * (0.5 * q.jitter / steps + np.log(steps / least))
-    return -0.5 * (
-        innovation * innovation * part + np.log(2.0 * np.pi * s) + freedom * np.log(least) + min(spoken, freedom + 50.0)
-    )
+    return float(-0.5 * (by_mean + freedom * np.log(least) + min(spoken, freedom + 50.0)))
+
+
+@njit(cache=True, error_model="numpy")
+def advance(
+    models: int, q: WheelInput, status: int, quiet: bool, k: WheelConstants, z: Array, P: Array, gain: Array
+) -> None:
+    """One block of all models of one wheel; writes the log-likelihood of each into `gain`."""
+    top = -1e300
+    for m in range(models):
+        share = predict(m, q, k, z, P)
+        gain[m] = 0.0
+        if status == SILENT:
+            gain[m] = 0.0 if m == S_NONE else _SILENT
+        elif status == PAIR:
+            gain[m] = correct(m, q, share, k, z, P)
+        top = max(top, gain[m])
+    if status != PAIR:
+        return
+    for m in range(models):
+        gain[m] = max(gain[m], top - _WORST)
+        if m >= S_GAIN and m != A_NONE:
+            gain[m] -= _OCCAM * k.dt
+    if quiet:
+        if abs(z[S_STUCK, 3]) < 3.0 * k.noise:
+            gain[S_STUCK] = min(gain[S_STUCK], gain[HEALTHY])
+        gain[S_NONE] = min(gain[S_NONE], gain[HEALTHY])
+        gain[S_GAIN] = min(gain[S_GAIN], gain[HEALTHY])
+        for m in range(A_GAIN, models):
+            if m != A_STUCK:
+                gain[m] = min(gain[m], gain[HEALTHY])
+    for m in (S_GAIN, A_GAIN):
+        if m < models and z[m, 1] > _NO_LOSS:
+            gain[m] = min(gain[m], gain[HEALTHY] - k.dt)
+        elif m < models and z[m, 1] < 0.0:
+            gain[m] -= _REVERSED

@@ -10,12 +10,25 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from diagnosis.estimation.fault_models import PAIR, SILENT, SKIP
-from diagnosis.wheels import joint_kernel as wj
-from diagnosis.wheels import step_kernel as ws
 from diagnosis.wheels.blocks import WheelBlocks, blocks_of
-from diagnosis.wheels.filter import evidence_of_runs, first_speeds, forward, initial_state, most_probable
-from diagnosis.wheels.models import JointModel, WheelFilterModel
+from diagnosis.wheels.filter import first_speeds, forward, initial_state, most_probable
+from diagnosis.wheels.models import (
+    A_GAIN,
+    A_NONE,
+    A_STUCK,
+    HEALTHY,
+    MODELS,
+    ROWS,
+    S_GAIN,
+    S_NONE,
+    S_STUCK,
+    S_WHITE_24,
+    JointModel,
+    WheelFilterModel,
+)
+from diagnosis.wheels.run_kernel import evidence_of_runs
 from diagnosis.wheels.runs import Runs
+from diagnosis.wheels.step_kernel import WheelInput, advance, enter, predict
 
 RAW, WIDTH, DT = 0.001, 10, 0.01
 WHEEL = WheelFilterModel(
@@ -29,6 +42,7 @@ WHEEL = WheelFilterModel(
     valve_span=0.15,
 )
 N, ONSET = 12_000, 6000
+ROW = np.array([ROWS.index(row) for row in ROWS])  # first model of each model's row
 Array = np.ndarray
 Fault = Callable[[Array], Array]
 
@@ -84,7 +98,7 @@ def test_two_parts_give_the_numbers_of_one(grip_most: float) -> None:
         assert_array_equal(np.concatenate([first.best, second.best]), once.best)
         assert_array_equal(np.concatenate([first.inputs, second.inputs]), once.inputs)
         assert_array_equal(np.concatenate([first.fault, second.fault]), once.fault)
-        for name in ("score", "mean", "cov", "spill"):
+        for name in ("score", "mean", "cov", "carried"):
             assert_array_equal(getattr(second.state, name), getattr(once.state, name), err_msg=name)
         assert first.evidence + second.evidence == pytest.approx(once.evidence)
 
@@ -92,17 +106,17 @@ def test_two_parts_give_the_numbers_of_one(grip_most: float) -> None:
 def test_a_mission_may_begin_with_a_fault() -> None:
     speeds = np.array([0.2, -0.1, 0.0, 0.3])
     start = initial_state(speeds, machine(), DT, RAW)
-    assert_array_equal(start.score[:, ws.HEALTHY], 0.0)
+    assert_array_equal(start.score[:, HEALTHY], 0.0)
     assert_allclose(start.score[:, 1:], -0.5 * machine().switch_cost)
-    assert_array_equal(start.spill, np.column_stack([np.zeros((4, 3)), speeds]))
-    assert_allclose(start.mean[:, ws.A_NONE, 0], speeds)
-    assert_allclose(start.mean[:, ws.S_GAIN, 0], 0.5 * speeds)
+    assert_array_equal(start.carried, np.column_stack([np.zeros((4, 3)), speeds]))
+    assert_allclose(start.mean[:, A_NONE, 0], speeds)
+    assert_allclose(start.mean[:, S_GAIN, 0], 0.5 * speeds)
     u = openings(3000)
     y = noisy(rolled(u))
     y[:2000, 0] = 0.15
     path, _ = most_probable(forward(blocks(y, u), machine()), 0)
-    assert (path[:200] == ws.S_STUCK).all()
-    assert (path[210:] == ws.HEALTHY).all()
+    assert (path[:200] == S_STUCK).all()
+    assert (path[210:] == HEALTHY).all()
 
 
 def test_first_known_speed() -> None:
@@ -121,37 +135,35 @@ def test_evidence_is_what_a_loop_sums_up() -> None:
     status[300:340] = SKIP
     cut, model = blocks(y, u, status), machine()
     done = forward(cut, model)
-    runs = Runs(
-        *(np.array(x) for x in ([0, 100, 160], [100, 160, 240], [ws.HEALTHY, ws.S_GAIN, ws.HEALTHY], [0, 102, 160]))
-    )
+    runs = Runs(*(np.array(x) for x in ([0, 100, 160], [100, 160, 240], [HEALTHY, S_GAIN, HEALTHY], [0, 102, 160])))
     got = evidence_of_runs(cut, model, done, 0, runs)
 
     k = WHEEL.constants(DT, RAW)
     start = initial_state(first_speeds(cut), model, DT, RAW)
-    z, P, gain = start.mean[0].copy(), start.cov[0].copy(), np.zeros(ws.MODELS)
+    z, P, gain = start.mean[0].copy(), start.cov[0].copy(), np.zeros(MODELS)
     free, free_P = z.copy(), P.copy()
     expected, spread = np.empty(240), np.empty(240)
-    for r, (first, stop, last, m) in enumerate([(0, 100, 102, 0), (102, 160, 160, ws.S_GAIN), (160, 240, 240, 0)]):
+    for r, (first, stop, last, m) in enumerate([(0, 100, 102, 0), (102, 160, 160, S_GAIN), (160, 240, 240, 0)]):
         if r:
-            before = ([0, ws.S_GAIN][r - 1], z.copy(), P.copy())
-            for j in range(ws.MODELS):
+            before = ([0, S_GAIN][r - 1], z.copy(), P.copy())
+            for j in range(MODELS):
                 z_j, P_j = before[1].copy(), before[2].copy()
-                ws.enter(j, before[0], k, z_j, P_j)
+                enter(j, before[0], k, z_j, P_j)
                 z[j], P[j] = z_j[j], P_j[j]
-        total = np.zeros(ws.MODELS)
+        total = np.zeros(MODELS)
         for n in range(first, last):
             x, chatter = done.inputs[n, 0], cut.unsteady[n, 0] * WHEEL.K * RAW / WHEEL.tau
             seen = (cut.y[n, 0], cut.count[n, 0], cut.jitter[n, 0])
-            q = ws.WheelInput(*seen, x[0], x[1], x[2], x[3], x[4], chatter, 0.0, x[5], x[6])
-            ws.predict(ws.HEALTHY, q, k, free, free_P)
+            q = WheelInput(*seen, x[0], x[1], x[2], x[3], x[4], chatter, 0.0, x[5], x[6])
+            predict(HEALTHY, q, k, free, free_P)
             expected[n], spread[n] = free[0, 0], free_P[0, 0, 0]
-            wj.advance(ws.MODELS, q, cut.status[n, 0], False, k, z, P, gain)
+            advance(MODELS, q, cut.status[n, 0], False, k, z, P, gain)
             if n < stop:
                 total += gain
             if n == stop - 1:
                 assert_allclose(got.mean[r], z, rtol=1e-9, atol=1e-12)
                 assert_allclose(got.cov[r], P, rtol=1e-9, atol=1e-14)
-            if m == ws.HEALTHY and n < stop:
+            if m == HEALTHY and n < stop:
                 free[0], free_P[0] = z[0], P[0]
         assert_allclose(got.evidence[r], total, rtol=1e-9)
         assert np.argmax(total) == m
@@ -166,7 +178,7 @@ def test_expectation_goes_on_through_a_fault() -> None:
     y[1000:1600, 0] = 0.3
     cut, model = blocks(y, u), machine()
     edges = np.array([0, 100, 160, 240])
-    runs = Runs(edges[:-1], edges[1:], np.array([ws.HEALTHY, ws.S_STUCK, ws.HEALTHY]), np.array([0, 110, 160]))
+    runs = Runs(edges[:-1], edges[1:], np.array([HEALTHY, S_STUCK, HEALTHY]), np.array([0, 110, 160]))
     got = evidence_of_runs(cut, model, forward(cut, model), 0, runs)
     off = got.expected - v[:, 0].reshape(-1, WIDTH).mean(axis=1)
     assert np.abs(off[100:160]).max() < 0.01
@@ -178,27 +190,27 @@ def test_expectation_goes_on_through_a_fault() -> None:
 def rows(y: Array, u: Array, model: JointModel, status: Array | None = None) -> Array:
     """Row of every block and wheel."""
     done = forward(blocks(y, u, status), model)
-    return ws.ROW[np.column_stack([most_probable(done, i)[0] for i in range(4)])]
+    return ROW[np.column_stack([most_probable(done, i)[0] for i in range(4)])]
 
 
 @pytest.mark.parametrize("flow", [1e9, 0.7], ids=["own supply", "pump at its limit"])
 @pytest.mark.parametrize("seed", range(2))
 def test_healthy_wheels_are_healthy(seed: int, flow: float) -> None:
     u = openings()
-    assert_array_equal(rows(noisy(rolled(u, flow), seed), u, machine(flow)), ws.ROW[ws.HEALTHY])
+    assert_array_equal(rows(noisy(rolled(u, flow), seed), u, machine(flow)), ROW[HEALTHY])
 
 
 RNG_NOISE = 0.08 * np.random.default_rng(9).normal(size=N)
 SENSOR: dict[str, tuple[int, Fault]] = {
-    "stuck": (ws.S_STUCK, lambda v: np.full(v.size, 0.2)),
-    "no signal": (ws.S_NONE, lambda v: np.zeros(v.size)),
-    "inefficient": (ws.S_GAIN, lambda v: 0.5 * v),
-    "noise-affected": (ws.S_WHITE_24, lambda v: 0.7 * v + RNG_NOISE[: v.size]),
+    "stuck": (S_STUCK, lambda v: np.full(v.size, 0.2)),
+    "no signal": (S_NONE, lambda v: np.zeros(v.size)),
+    "inefficient": (S_GAIN, lambda v: 0.5 * v),
+    "noise-affected": (S_WHITE_24, lambda v: 0.7 * v + RNG_NOISE[: v.size]),
 }
 VALVE: dict[str, tuple[int, Fault]] = {
-    "inefficient": (ws.A_GAIN, lambda u: 0.5 * u),
-    "stuck": (ws.A_STUCK, lambda u: np.full(u.size, 0.09)),
-    "no control signal": (ws.A_NONE, lambda u: np.zeros(u.size)),
+    "inefficient": (A_GAIN, lambda u: 0.5 * u),
+    "stuck": (A_STUCK, lambda u: np.full(u.size, 0.09)),
+    "no control signal": (A_NONE, lambda u: np.zeros(u.size)),
 }
 
 
@@ -210,9 +222,9 @@ def test_sensor_fault_is_the_sensors(name: str) -> None:
     y[ONSET:, 2] = fault(y[ONSET:, 2])
     row = rows(y, u, machine())
     edge = ONSET // WIDTH
-    assert_array_equal(row[:, [0, 1, 3]], ws.ROW[ws.HEALTHY])
-    assert_array_equal(row[: edge - 1, 2], ws.ROW[ws.HEALTHY])
-    assert np.mean(row[edge + 10 :, 2] == ws.ROW[model]) > 0.98
+    assert_array_equal(row[:, [0, 1, 3]], ROW[HEALTHY])
+    assert_array_equal(row[: edge - 1, 2], ROW[HEALTHY])
+    assert np.mean(row[edge + 10 :, 2] == ROW[model]) > 0.98
 
 
 @pytest.mark.parametrize("flow", [1e9, 0.7], ids=["own supply", "pump at its limit"])
@@ -225,9 +237,9 @@ def test_valve_fault_is_the_valves(name: str, flow: float) -> None:
     applied[ONSET:, 2] = fault(u[ONSET:, 2])
     row = rows(noisy(rolled(applied, flow)), u, machine(flow))
     edge, lag = ONSET // WIDTH, round(WHEEL.tau / DT)
-    assert np.mean(row[:, [0, 1, 3]] == ws.ROW[ws.HEALTHY]) > 0.99
-    assert_array_equal(row[: edge - lag, 2], ws.ROW[ws.HEALTHY])
-    assert np.mean(row[edge + 2 * lag :, 2] == ws.ROW[model]) > 0.95
+    assert np.mean(row[:, [0, 1, 3]] == ROW[HEALTHY]) > 0.99
+    assert_array_equal(row[: edge - lag, 2], ROW[HEALTHY])
+    assert np.mean(row[edge + 2 * lag :, 2] == ROW[model]) > 0.95
 
 
 def test_silence_beside_living_siblings_is_no_signal() -> None:
@@ -235,9 +247,9 @@ def test_silence_beside_living_siblings_is_no_signal() -> None:
     y, status = noisy(rolled(u)), np.full((6000, 4), PAIR, dtype=np.int8)
     y[2000:4000, 1], status[2000:4000, 1] = np.nan, SILENT
     row = rows(y, u, machine(), status)
-    assert (row[200:400, 1] == ws.ROW[ws.S_NONE]).all()
-    assert (row[:200, 1] == ws.ROW[ws.HEALTHY]).all()
-    assert (row[405:, 1] == ws.ROW[ws.HEALTHY]).all()
+    assert (row[200:400, 1] == ROW[S_NONE]).all()
+    assert (row[:200, 1] == ROW[HEALTHY]).all()
+    assert (row[405:, 1] == ROW[HEALTHY]).all()
 
 
 def test_measured_valves_are_judged_elsewhere() -> None:
@@ -247,9 +259,9 @@ def test_measured_valves_are_judged_elsewhere() -> None:
     cut = blocks(noisy(rolled(applied)), u)
     model = JointModel((replace(WHEEL, measured=True), WHEEL, WHEEL, None), 1e9, 12.0)
     done = forward(cut, model)
-    assert done.best[:, 0].max() < ws.A_GAIN
-    assert_array_equal(done.best[:, 3], ws.HEALTHY)
+    assert done.best[:, 0].max() < A_GAIN
+    assert_array_equal(done.best[:, 3], HEALTHY)
     one = np.array([0])
     got = evidence_of_runs(cut, model, done, 0, Runs(one, np.array([300]), one, one))
-    assert_array_equal(got.evidence[0, ws.A_GAIN :], -np.inf)
-    assert np.isfinite(got.evidence[0, : ws.A_GAIN]).all()
+    assert_array_equal(got.evidence[0, A_GAIN:], -np.inf)
+    assert np.isfinite(got.evidence[0, :A_GAIN]).all()

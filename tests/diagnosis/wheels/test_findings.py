@@ -5,9 +5,24 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from diagnosis.wheels import step_kernel as ws
-from diagnosis.wheels.findings import Run, Verdict, judge, onset_sentence, probabilities, refined
-from diagnosis.wheels.models import WheelFilterModel
+from diagnosis.wheels.isolation import Run, RunVerdict, judge, probabilities
+from diagnosis.wheels.models import (
+    A_BIAS,
+    A_GAIN,
+    A_NONE,
+    A_STUCK,
+    HEALTHY,
+    MODELS,
+    ROWS,
+    S_GAIN,
+    S_NONE,
+    S_OU_LARGE,
+    S_OU_SMALL,
+    S_STUCK,
+    S_WHITE_8,
+    WheelFilterModel,
+)
+from diagnosis.wheels.onset import onset_sentence, refined
 from replay.faults import FaultMode, Side
 from replay.machine.config import Limits
 
@@ -28,11 +43,11 @@ Array = np.ndarray
 
 def run(model: int, evidence: dict[int, float], gain: float = 0.5, level: float = 0.2, gain_std: float = 0.01) -> Run:
     """A run whose models have this log-evidence, healthy 0 and the others far below."""
-    told = np.full(ws.MODELS, -1e4)
-    told[ws.HEALTHY] = 0.0
+    told = np.full(MODELS, -1e4)
+    told[HEALTHY] = 0.0
     for m, value in evidence.items():
         told[m] = value
-    mean, cov = np.zeros((ws.MODELS, 4)), np.zeros((ws.MODELS, 4, 4))
+    mean, cov = np.zeros((MODELS, 4)), np.zeros((MODELS, 4, 4))
     mean[:, 1], mean[:, 3] = gain, level
     cov[:, 1, 1], cov[:, 3, 3] = gain_std**2, 0.01**2
     return Run(1000, 1000 + SIZE, model, told, mean, cov)
@@ -42,34 +57,36 @@ def moving(level: float = 0.2) -> Array:
     return level + 0.05 * np.sin(np.arange(SIZE) / 300) + 0.004 * np.random.default_rng(1).normal(size=SIZE)
 
 
-def judged(of: Run, y: Array | None = None, gains: bool = True, limits: Limits = LIMITS) -> Verdict:
+def judged(of: Run, y: Array | None = None, gains: bool = True, limits: Limits = LIMITS) -> RunVerdict:
     return judge(of, moving() if y is None else y, MODEL, limits, NAMES, DT, gains=gains)
 
 
 def test_probabilities_add_up_by_row() -> None:
-    p = probabilities(run(ws.S_GAIN, {ws.S_GAIN: 300.0, ws.A_GAIN: 290.0, ws.S_OU_SMALL: 295.0, ws.S_OU_LARGE: 295.0}))
-    assert set(p) == set(ws.NAMES)
+    p = probabilities(run(S_GAIN, {S_GAIN: 300.0, A_GAIN: 290.0, S_OU_SMALL: 295.0, S_OU_LARGE: 295.0}))
+    assert set(p) == set(ROWS)
     assert sum(p.values()) == pytest.approx(1.0)
     # a tenth of the log-evidence counts, and two models of one row are twice as probable as one of them
-    assert p["sensor", "inefficient"] / p["actuator", "inefficient"] == pytest.approx(np.exp(1.0))
-    assert p["sensor", "noisy"] / p["sensor", "inefficient"] == pytest.approx(2 * np.exp(-0.5), rel=1e-6)
-    left_out = np.where(np.arange(ws.MODELS) < ws.A_GAIN, 0.0, -np.inf)
+    assert p[Side.SENSOR, FaultMode.INEFFICIENT] / p[Side.ACTUATOR, FaultMode.INEFFICIENT] == pytest.approx(np.exp(1.0))
+    assert p[Side.SENSOR, FaultMode.NOISY] / p[Side.SENSOR, FaultMode.INEFFICIENT] == pytest.approx(
+        2 * np.exp(-0.5), rel=1e-6
+    )
+    left_out = np.where(np.arange(MODELS) < A_GAIN, 0.0, -np.inf)
     measured = probabilities(Run(0, 9, 0, left_out, np.zeros((13, 4)), np.zeros((13, 4, 4))))
-    assert all(q == pytest.approx(0.0, abs=1e-12) for (side, _), q in measured.items() if side == "actuator")
-    assert measured["none", "healthy"] > measured["sensor", "stuck"]
+    assert all(q == pytest.approx(0.0, abs=1e-12) for row, q in measured.items() if row and row[0] is Side.ACTUATOR)
+    assert measured[None] > measured[Side.SENSOR, FaultMode.STUCK]
 
 
 @pytest.mark.parametrize(
     ("m", "side", "mode", "tier"),
     [
-        (ws.S_STUCK, Side.SENSOR, FaultMode.STUCK, "signal"),
-        (ws.S_GAIN, Side.SENSOR, FaultMode.INEFFICIENT, "model"),
-        (ws.S_WHITE_8, Side.SENSOR, FaultMode.NOISY, "model"),
-        (ws.S_OU_LARGE, Side.SENSOR, FaultMode.NOISY, "model"),
-        (ws.A_GAIN, Side.ACTUATOR, FaultMode.INEFFICIENT, "model"),
-        (ws.A_STUCK, Side.ACTUATOR, FaultMode.STUCK, "model"),
-        (ws.A_NONE, Side.ACTUATOR, FaultMode.NO_SIGNAL, "model"),
-        (ws.A_BIAS, Side.ACTUATOR, FaultMode.NOISY, "model"),
+        (S_STUCK, Side.SENSOR, FaultMode.STUCK, "signal"),
+        (S_GAIN, Side.SENSOR, FaultMode.INEFFICIENT, "model"),
+        (S_WHITE_8, Side.SENSOR, FaultMode.NOISY, "model"),
+        (S_OU_LARGE, Side.SENSOR, FaultMode.NOISY, "model"),
+        (A_GAIN, Side.ACTUATOR, FaultMode.INEFFICIENT, "model"),
+        (A_STUCK, Side.ACTUATOR, FaultMode.STUCK, "model"),
+        (A_NONE, Side.ACTUATOR, FaultMode.NO_SIGNAL, "model"),
+        (A_BIAS, Side.ACTUATOR, FaultMode.NOISY, "model"),
     ],
 )
 def test_each_model_gives_its_row(m: int, side: Side, mode: FaultMode, tier: str) -> None:
@@ -90,7 +107,7 @@ def test_each_model_gives_its_row(m: int, side: Side, mode: FaultMode, tier: str
 
 
 def test_alternatives_add_up_and_the_next_best_is_said() -> None:
-    got = judged(run(ws.A_STUCK, {ws.A_STUCK: 5000.0, ws.A_BIAS: 4985.0})).finding
+    got = judged(run(A_STUCK, {A_STUCK: 5000.0, A_BIAS: 4985.0})).finding
     assert got is not None
     assert sum(h.p for h in got.hypotheses) == pytest.approx(1.0, abs=0.01)
     assert any(line.startswith("Next best: actuator noisy with 1") for line in got.evidence)
@@ -98,8 +115,8 @@ def test_alternatives_add_up_and_the_next_best_is_said() -> None:
 
 def test_stuck_at_zero_is_no_signal() -> None:
     still = 0.0003 * np.sin(np.arange(SIZE))
-    for m in (ws.S_STUCK, ws.S_NONE):
-        got = judged(run(m, {ws.S_STUCK: 1000.0, ws.S_NONE: 1001.0}, level=0.0), still).finding
+    for m in (S_STUCK, S_NONE):
+        got = judged(run(m, {S_STUCK: 1000.0, S_NONE: 1001.0}, level=0.0), still).finding
         assert got is not None
         assert (got.side, got.mode) == (Side.SENSOR, FaultMode.NO_SIGNAL)
         assert got.probability > 0.99
@@ -108,16 +125,16 @@ def test_stuck_at_zero_is_no_signal() -> None:
 
 
 def test_a_channel_without_a_sample_is_no_signal() -> None:
-    got = judged(run(ws.S_NONE, {ws.S_NONE: 1000.0}), np.full(SIZE, np.nan)).finding
+    got = judged(run(S_NONE, {S_NONE: 1000.0}), np.full(SIZE, np.nan)).finding
     assert got is not None
     assert (got.mode, got.sat) == (FaultMode.NO_SIGNAL, None)
 
 
 def test_a_valve_stuck_nearly_shut_is_no_control_signal() -> None:
-    shut = judged(run(ws.A_STUCK, {ws.A_STUCK: 5000.0, ws.A_NONE: 4900.0}, level=0.01 * MODEL.K)).finding
+    shut = judged(run(A_STUCK, {A_STUCK: 5000.0, A_NONE: 4900.0}, level=0.01 * MODEL.K)).finding
     assert shut is not None
     assert (shut.side, shut.mode) == (Side.ACTUATOR, FaultMode.NO_SIGNAL)
-    open_ = judged(run(ws.A_STUCK, {ws.A_STUCK: 5000.0}, level=0.08 * MODEL.K)).finding
+    open_ = judged(run(A_STUCK, {A_STUCK: 5000.0}, level=0.08 * MODEL.K)).finding
     assert open_ is not None
     assert open_.mode is FaultMode.STUCK
     assert open_.sat is not None
@@ -125,20 +142,20 @@ def test_a_valve_stuck_nearly_shut_is_no_control_signal() -> None:
 
 
 def test_gain_that_may_be_either_sides_is_the_unions() -> None:
-    got = judged(run(ws.S_GAIN, {ws.S_GAIN: 5000.0, ws.A_GAIN: 4999.0}))
+    got = judged(run(S_GAIN, {S_GAIN: 5000.0, A_GAIN: 4999.0}))
     assert got.finding is not None
     assert got.finding.side is Side.SENSOR_OR_ACTUATOR
     assert got.finding.mode is FaultMode.INEFFICIENT
     assert got.finding.probability > 0.99
     assert any("look alike" in line for line in got.finding.evidence)
     # other rows of the two sides have no union: both sides stay open
-    other = judged(run(ws.S_WHITE_8, {ws.S_WHITE_8: 5000.0, ws.A_STUCK: 5000.0}))
+    other = judged(run(S_WHITE_8, {S_WHITE_8: 5000.0, A_STUCK: 5000.0}))
     assert other.finding is None
     assert set(other.open_sides) == {Side.SENSOR, Side.ACTUATOR}
 
 
 def test_small_losses_are_not_reported() -> None:
-    for m in (ws.S_GAIN, ws.A_GAIN):
+    for m in (S_GAIN, A_GAIN):
         assert judged(run(m, {m: 5000.0}, gain=0.93)).finding is None
         found = judged(run(m, {m: 5000.0}, gain=0.93), limits=Limits(min_epsilon=0.05)).finding
         assert found is not None
@@ -148,56 +165,56 @@ def test_small_losses_are_not_reported() -> None:
 
 
 def test_a_disturbance_that_loses_nothing_leaves_its_valve_open() -> None:
-    got = judged(run(ws.A_BIAS, {ws.A_BIAS: 5000.0}, gain=1.5))
+    got = judged(run(A_BIAS, {A_BIAS: 5000.0}, gain=1.5))
     assert got.finding is None
     assert Side.ACTUATOR in got.open_sides
 
 
 def test_valve_findings_need_more_evidence_than_a_sensors() -> None:
     """What the wheel model gets wrong may speak for a valve's fault too, and by more than a little."""
-    for m, least in ((ws.A_STUCK, 100.0), (ws.S_STUCK, 0.0)):
+    for m, least in ((A_STUCK, 100.0), (S_STUCK, 0.0)):
         got = [judged(run(m, {m: e})) for e in (60.0, 90.0, 1e5)]
         assert [v.finding is not None for v in got] == [least < 60.0, least < 90.0, True]
-    assert set(judged(run(ws.A_STUCK, {ws.A_STUCK: 60.0})).open_sides) == {Side.ACTUATOR}
-    probable = [v.finding.probability for e in (1e3, 1e4) if (v := judged(run(ws.A_STUCK, {ws.A_STUCK: e}))).finding]
+    assert set(judged(run(A_STUCK, {A_STUCK: 60.0})).open_sides) == {Side.ACTUATOR}
+    probable = [v.finding.probability for e in (1e3, 1e4) if (v := judged(run(A_STUCK, {A_STUCK: e}))).finding]
     assert probable == sorted(probable)
 
 
 def test_healthy_runs_give_nothing() -> None:
-    got = judged(run(ws.S_GAIN, {ws.S_GAIN: -500.0}))
-    assert got == Verdict(None)
+    got = judged(run(S_GAIN, {S_GAIN: -500.0}))
+    assert got == RunVerdict(None)
 
 
 def test_an_improbable_fault_leaves_its_side_open() -> None:
-    got = judged(run(ws.S_GAIN, {ws.S_GAIN: 35.0}))
+    got = judged(run(S_GAIN, {S_GAIN: 35.0}))
     assert got.finding is None
     assert got.open_sides == (Side.SENSOR,)
 
 
 def test_without_a_model_of_the_wheel_only_what_needs_none_is_stated() -> None:
-    for m in (ws.S_GAIN, ws.A_GAIN, ws.A_STUCK, ws.A_NONE, ws.A_BIAS):
+    for m in (S_GAIN, A_GAIN, A_STUCK, A_NONE, A_BIAS):
         got = judged(run(m, {m: 1e5}), gains=False)
         assert got.finding is None
         assert set(got.open_sides) == {Side.SENSOR, Side.ACTUATOR}
-    for m in (ws.S_STUCK, ws.S_WHITE_8):
+    for m in (S_STUCK, S_WHITE_8):
         assert judged(run(m, {m: 1e5}), gains=False).finding is not None
 
 
 def test_saturation_terms() -> None:
     level = np.full(SIZE, 0.2)
-    stuck = judged(run(ws.S_STUCK, {ws.S_STUCK: 1e5}), level).finding
+    stuck = judged(run(S_STUCK, {S_STUCK: 1e5}), level).finding
     assert stuck is not None
     assert stuck.sat is not None
     assert (stuck.sat.mean, stuck.sat.rms) == pytest.approx((0.2, 0.2))
     # y = δ v + ε·sat: the part that is added, over the part that is lost
-    white = judged(run(ws.S_WHITE_8, {ws.S_WHITE_8: 1e5}, gain=0.6, level=0.1)).finding
+    white = judged(run(S_WHITE_8, {S_WHITE_8: 1e5}, gain=0.6, level=0.1)).finding
     assert white is not None
     assert white.epsilon is not None
     assert white.sat is not None
     assert white.epsilon.value == pytest.approx(0.4)
     assert white.sat.mean == pytest.approx(0.25)
     assert white.sat.rms > 0.25
-    valve = judged(run(ws.A_BIAS, {ws.A_BIAS: 1e5}, gain=0.5, level=0.12)).finding
+    valve = judged(run(A_BIAS, {A_BIAS: 1e5}, gain=0.5, level=0.12)).finding
     assert valve is not None
     assert valve.sat is not None
     assert valve.sat.mean == pytest.approx(0.12 / MODEL.K / 0.5)
@@ -212,18 +229,18 @@ def jumping(size: int = 200, at: int = 100) -> Array:
 def test_a_sensors_fault_begins_where_it_jumps() -> None:
     y = jumping()
     for start in (92, 100, 113):
-        assert refined(start, y, 20, ws.S_GAIN, 0.004) == 100
-    assert refined(150, y, 20, ws.S_GAIN, 0.004) == 150
-    assert refined(92, y, 20, ws.A_GAIN, 0.004) == 92  # a valve's bends
-    assert refined(0, y[:1], 20, ws.S_GAIN, 0.004) == 0
+        assert refined(start, y, 20, S_GAIN, 0.004) == 100
+    assert refined(150, y, 20, S_GAIN, 0.004) == 150
+    assert refined(92, y, 20, A_GAIN, 0.004) == 92  # a valve's bends
+    assert refined(0, y[:1], 20, S_GAIN, 0.004) == 0
 
 
 def test_a_stuck_sensor_begins_with_the_last_change() -> None:
     y = 0.2 + 0.002 * np.sin(np.arange(200) / 3)
     y[103:] = y[103]
-    assert refined(110, y, 20, ws.S_STUCK, 0.004) == 103
-    assert refined(150, y, 20, ws.S_STUCK, 0.004) == 129
-    assert refined(0, y[103:], 20, ws.S_STUCK, 0.004) == 0
+    assert refined(110, y, 20, S_STUCK, 0.004) == 103
+    assert refined(150, y, 20, S_STUCK, 0.004) == 129
+    assert refined(0, y[103:], 20, S_STUCK, 0.004) == 0
 
 
 def test_onsets_in_words() -> None:

@@ -9,11 +9,52 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from diagnosis.estimation.fault_models import PAIR, SILENT, SKIP, STAY
-from diagnosis.wheels import joint_kernel as wj
-from diagnosis.wheels import step_kernel as ws
 from diagnosis.wheels.blocks import WheelBlocks, blocks_of
-from diagnosis.wheels.filter import forward, initial_state
-from diagnosis.wheels.models import JointModel, JointPass, JointState, WheelFilterModel
+from diagnosis.wheels.filter import JointPass, forward, initial_state
+from diagnosis.wheels.joint_kernel import (
+    _LEARNING,
+    _OTHER_NOISE,
+    _RECOVERY,
+    BODY,
+    DOUBT,
+    DRIVE,
+    DRIVE_HALF,
+    DRIVE_NONE,
+    LAGGED_DRIVE,
+    SHARE_NONE,
+    SHARE_SOME,
+    JointState,
+    taken,
+    weights,
+)
+from diagnosis.wheels.models import (
+    A_BIAS,
+    A_GAIN,
+    A_NONE,
+    A_STUCK,
+    HEALTHY,
+    MODELS,
+    S_GAIN,
+    S_NONE,
+    S_OU_LARGE,
+    S_STUCK,
+    S_WHITE_3,
+    S_WHITE_8,
+    JointModel,
+    WheelFilterModel,
+)
+from diagnosis.wheels.step_kernel import (
+    _NO_LOSS,
+    _OCCAM,
+    _REVERSED,
+    _SILENT,
+    _WORST,
+    WheelInput,
+    advance,
+    correct,
+    is_scaled,
+    predict,
+)
 
 RAW, WIDTH, DT = 0.001, 10, 0.01
 GAINS, LAGS = (2.4, 2.3, 2.5, 2.45), (0.25, 0.24, 0.26, 0.25)
@@ -87,12 +128,12 @@ def test_means_of_blocks_are_those_of_the_samples(kind: str, flow: float) -> Non
     if flow < 1.0:
         assert np.mean(shares < 0.95) > 0.05
     done = forward(blocks(noisy(v), u), machine(flow))
-    assert_array_equal(done.best, ws.HEALTHY)
+    assert_array_equal(done.best, HEALTHY)
     mean = v.reshape(-1, WIDTH, 4).mean(axis=1)
     for i in range(4):
         a, speed = np.exp(-DT / LAGS[i]), 0.0
         for b in range(n // WIDTH):
-            speed = a * speed + (1 - a) * GAINS[i] * done.inputs[b, i, 0]
+            speed = a * speed + (1 - a) * GAINS[i] * done.inputs[b, i, DRIVE]
             assert speed == pytest.approx(mean[b, i], abs=1e-9)
 
 
@@ -102,12 +143,12 @@ def test_a_valve_that_took_less_would_be_fed_more() -> None:
     u = openings(n)["chattering"]
     v, _ = simulated(u, flow)
     done = forward(blocks(noisy(v), u), machine(flow))
-    assert_array_equal(done.best, ws.HEALTHY)
+    assert_array_equal(done.best, HEALTHY)
     asked = np.abs(u * GAINS)
     for i in range(4):
         others = asked.sum(axis=1) - asked[:, i]
         a = np.exp(-RAW / LAGS[i])
-        for column, part in ((1, 0.5), (2, 0.0)):
+        for column, part in ((DRIVE_HALF, 0.5), (DRIVE_NONE, 0.0)):
             x = u[:, i] * np.minimum(1.0, flow / (others + part * asked[:, i]))
             speed, twin, block = 0.0, np.empty(n), 0.0
             for k in range(n):
@@ -115,7 +156,7 @@ def test_a_valve_that_took_less_would_be_fed_more() -> None:
             for b, mean in enumerate(twin.reshape(-1, WIDTH).mean(axis=1)):
                 block += (1 - np.exp(-DT / LAGS[i])) * (done.inputs[b, i, column] - block)
                 assert block == pytest.approx(mean, abs=1e-9)
-        for column, own in ((3, 0.0), (4, 0.15 * GAINS[i])):
+        for column, own in ((SHARE_NONE, 0.0), (SHARE_SOME, 0.15 * GAINS[i])):
             share = np.minimum(1.0, flow / (others + own)).reshape(-1, WIDTH).mean(axis=1)
             assert_allclose(done.inputs[:, i, column], share, rtol=1e-9)
 
@@ -123,7 +164,7 @@ def test_a_valve_that_took_less_would_be_fed_more() -> None:
 @pytest.mark.parametrize("lag", [0.001, 0.04, 3.0])
 @pytest.mark.parametrize("width", [1, 4, 10])
 def test_weights_share_an_opening_between_two_blocks(width: int, lag: float) -> None:
-    here, after = wj.weights(width, lag)
+    here, after = weights(width, lag)
     assert (here >= 0).all()
     assert (after > 0).all()
     assert here[-1] == 0.0  # what comes last shows in the next block alone
@@ -133,12 +174,12 @@ def test_weights_share_an_opening_between_two_blocks(width: int, lag: float) -> 
 
 def test_what_a_valve_takes() -> None:
     K, x = 2.4, -0.1
-    for m in (*range(ws.A_GAIN),):
-        assert wj.taken(m, 0.3, 0.2, K, x) == pytest.approx(0.24)
-    assert wj.taken(ws.A_GAIN, 0.5, 0.0, K, x) == pytest.approx(0.12)
-    assert wj.taken(ws.A_STUCK, 0.0, -0.2, K, x) == pytest.approx(0.2)
-    assert wj.taken(ws.A_NONE, 0.0, 0.0, K, x) == 0.0
-    assert wj.taken(ws.A_BIAS, 0.5, 0.3, K, x) == pytest.approx(abs(-0.12 + 0.3))
+    for m in (*range(A_GAIN),):
+        assert taken(m, 0.3, 0.2, K, x) == pytest.approx(0.24)
+    assert taken(A_GAIN, 0.5, 0.0, K, x) == pytest.approx(0.12)
+    assert taken(A_STUCK, 0.0, -0.2, K, x) == pytest.approx(0.2)
+    assert taken(A_NONE, 0.0, 0.0, K, x) == 0.0
+    assert taken(A_BIAS, 0.5, 0.3, K, x) == pytest.approx(abs(-0.12 + 0.3))
 
 
 def state(tops: list[int], speeds: list[float], model: JointModel) -> JointState:
@@ -147,8 +188,8 @@ def state(tops: list[int], speeds: list[float], model: JointModel) -> JointState
     score, mean = np.full_like(start.score, -3.0), start.mean.copy()
     for i, m in enumerate(tops):
         score[i, m] = 0.0
-        mean[i, m, 0] = speeds[i] * (mean[i, m, 1] if ws.is_scaled(m) else 1.0)
-    return JointState(score, mean, start.cov, start.spill)
+        mean[i, m, 0] = speeds[i] * (mean[i, m, 1] if is_scaled(m) else 1.0)
+    return JointState(score, mean, start.cov, start.carried)
 
 
 def one_block(at: JointState, model: JointModel, y: Array, status: int = PAIR, body: bool = True) -> JointPass:
@@ -158,9 +199,9 @@ def one_block(at: JointState, model: JointModel, y: Array, status: int = PAIR, b
 @pytest.mark.parametrize(
     "tops",
     [
-        [ws.HEALTHY] * 4,
-        [ws.S_GAIN, ws.HEALTHY, ws.HEALTHY, ws.HEALTHY],
-        [ws.HEALTHY, ws.S_STUCK, ws.A_GAIN, ws.S_WHITE_8],
+        [HEALTHY] * 4,
+        [S_GAIN, HEALTHY, HEALTHY, HEALTHY],
+        [HEALTHY, S_STUCK, A_GAIN, S_WHITE_8],
     ],
 )
 def test_body_is_the_weighted_median_of_the_other_wheels(tops: list[int]) -> None:
@@ -171,98 +212,96 @@ def test_body_is_the_weighted_median_of_the_other_wheels(tops: list[int]) -> Non
     ratio, turn = np.array([1.05, 0.95, 1.0, 0.9]), np.array([0.0, 0.01, -0.01, 0.0])
     # the lagged drive is the first speed, so that no wheel is held back and each rolls as it turns
     roll = (np.array(speeds) + turn) / ratio
-    trusts = {ws.HEALTHY: 1.0, ws.S_GAIN: 0.4, ws.A_GAIN: 0.7}
+    trusts = {HEALTHY: 1.0, S_GAIN: 0.4, A_GAIN: 0.7}
     trust = np.array([trusts.get(m, 0.15) for m in tops])
     for i in range(4):
         others = [j for j in range(4) if j != i]
         far = {j: sum(trust[h] * abs(roll[h] - roll[j]) for h in others) for j in others}
         j = min(far, key=lambda h: far[h])
-        assert got[i, 5] == pytest.approx(roll[j] * ratio[i] - turn[i])
-        assert got[i, 6] == pytest.approx(far[j] / trust[others].sum())
+        assert got[i, BODY] == pytest.approx(roll[j] * ratio[i] - turn[i])
+        assert got[i, DOUBT] == pytest.approx(far[j] / trust[others].sum())
 
 
 def test_a_driven_wheel_runs_off_the_body_that_holds_it_back() -> None:
     model = machine(grip_most=0.1)
-    at = state([ws.HEALTHY] * 4, [0.2] * 4, model)
-    spill = at.spill.copy()
-    spill[:, 3] = [0.2, 0.266, 0.134, 2.0]  # what each valve asks for
-    got = one_block(replace(at, spill=spill), model, np.full(4, 0.2)).inputs[0, 0, 5]
+    at = state([HEALTHY] * 4, [0.2] * 4, model)
+    carried = at.carried.copy()
+    carried[:, LAGGED_DRIVE] = [0.2, 0.266, 0.134, 2.0]  # what each valve asks for
+    got = one_block(at._replace(carried=carried), model, np.full(4, 0.2)).inputs[0, 0, BODY]
     roll = [(0.2 + x + turn) / ratio for x, turn, ratio in ((-0.03, 0.01, 0.95), (0.03, -0.01, 1.0), (-0.05, 0.0, 0.9))]
     assert got == pytest.approx(np.median(roll) * 1.05)
 
 
 def test_wheels_without_model_or_geometry_give_no_body() -> None:
     model = machine(grip_most=0.1)
-    at = state([ws.HEALTHY] * 4, [0.2] * 4, model)
-    assert np.isnan(one_block(at, model, np.full(4, 0.2), body=False).inputs[0, :, 5]).all()
+    at = state([HEALTHY] * 4, [0.2] * 4, model)
+    assert np.isnan(one_block(at, model, np.full(4, 0.2), body=False).inputs[0, :, BODY]).all()
     alone = replace(model, wheels=(model.wheels[0], None, None, None))
     done = forward(blocks(np.full((50, 4), 0.2), np.zeros((50, 4)), body=True), alone)
-    assert np.isnan(done.inputs[:, 0, 5]).all()
-    assert np.isfinite(done.inputs[:, 0, :5]).all()
+    assert np.isnan(done.inputs[:, 0, BODY]).all()
+    assert np.isfinite(done.inputs[:, 0, :BODY]).all()
     assert_array_equal(done.inputs[:, 1:], 0.0)
-    assert_array_equal(done.best[:, 1:], ws.HEALTHY)
+    assert_array_equal(done.best[:, 1:], HEALTHY)
 
 
-@pytest.mark.parametrize("top", [ws.HEALTHY, ws.S_WHITE_3, ws.A_GAIN])
+@pytest.mark.parametrize("top", [HEALTHY, S_WHITE_3, A_GAIN])
 @pytest.mark.parametrize("status", [PAIR, SILENT, SKIP])
 def test_models_are_entered_where_that_pays(top: int, status: int) -> None:
     model = machine()
     at = state([top] * 4, [0.2] * 4, model)
-    at.score[1] -= 3.0 * np.arange(ws.MODELS)
+    at.score[1] -= 3.0 * np.arange(MODELS)
     at.score[1, top] = 0.0
     done = one_block(at, model, np.full(4, 0.2), status)
-    for m in range(ws.MODELS):
-        price = wj._RECOVERY if m == ws.HEALTHY else COST
-        if ws.S_WHITE_3 <= m <= ws.S_OU_LARGE and ws.S_WHITE_3 <= top <= ws.S_OU_LARGE:
-            price = 4.0  # one row: what changes is how strong its noise is
-        price += 0.0 if m in (ws.HEALTHY, ws.S_NONE, ws.A_NONE) else wj._LEARNING
+    for m in range(MODELS):
+        price = _RECOVERY if m == HEALTHY else COST
+        if S_WHITE_3 <= m <= S_OU_LARGE and S_WHITE_3 <= top <= S_OU_LARGE:
+            price = _OTHER_NOISE  # one row: what changes is how strong its noise is
+        price += 0.0 if m in (HEALTHY, S_NONE, A_NONE) else _LEARNING
         enters = m != top and status != SKIP and at.score[1, m] < -price
         assert done.back[1][0, m] == (top if enters else STAY)
 
 
-def advanced(q: ws.WheelInput, status: int, quiet: bool = False, speed: float = 0.2) -> tuple[Array, Array, Array]:
+def advanced(q: WheelInput, status: int, quiet: bool = False, speed: float = 0.2) -> tuple[Array, Array, Array]:
     """Gains of one block, what predict and correct alone say, and states."""
     k = wheel().constants(DT, RAW)
     start = initial_state(np.full(4, speed), machine(), DT, RAW)
-    z, P, gain = start.mean[0].copy(), start.cov[0].copy(), np.zeros(ws.MODELS)
-    wj.advance(ws.MODELS, q, status, quiet, k, z, P, gain)
-    plain = np.zeros(ws.MODELS)
+    z, P, gain = start.mean[0].copy(), start.cov[0].copy(), np.zeros(MODELS)
+    advance(MODELS, q, status, quiet, k, z, P, gain)
+    plain = np.zeros(MODELS)
     other, cov = start.mean[0].copy(), start.cov[0].copy()
-    for m in range(ws.MODELS):
-        share = ws.predict(m, q, k, other, cov)
+    for m in range(MODELS):
+        share = predict(m, q, k, other, cov)
         if status == PAIR:
-            plain[m] = ws.correct(m, q, share, k, other, cov)
+            plain[m] = correct(m, q, share, k, other, cov)
     assert_array_equal(z, other)
     assert_array_equal(P, cov)
     return gain, plain, z
 
 
-def shown(y: float, jitter: float = 3e-5) -> ws.WheelInput:
-    return ws.WheelInput(y, 10.0, jitter, 0.08, 0.08, 0.08, 1.0, 1.0, 0.0, 0.0, np.nan, 0.0)
+def shown(y: float, jitter: float = 3e-5) -> WheelInput:
+    return WheelInput(y, 10.0, jitter, 0.08, 0.08, 0.08, 1.0, 1.0, 0.0, 0.0, np.nan, 0.0)
 
 
 def test_a_block_speaks_within_limits() -> None:
     gain, plain, _ = advanced(shown(0.2), PAIR)
-    free = [m for m in range(ws.S_GAIN, ws.MODELS) if m != ws.A_NONE]
-    expected = np.maximum(plain, plain.max() - wj._WORST)
-    expected[free] -= wj._OCCAM * DT
-    assert plain.min() < plain.max() - wj._WORST  # no signal
+    free = [m for m in range(S_GAIN, MODELS) if m != A_NONE]
+    expected = np.maximum(plain, plain.max() - _WORST)
+    expected[free] -= _OCCAM * DT
+    assert plain.min() < plain.max() - _WORST  # no signal
     assert_allclose(gain, expected, atol=1e-12)
     # a gain of nearly 1 is no loss, and one below 0 is no valve
     gain, plain, z = advanced(shown(0.6), PAIR)
-    assert z[ws.S_GAIN, 1] > wj._NO_LOSS
-    assert gain[ws.S_GAIN] <= gain[ws.HEALTHY] - DT
+    assert z[S_GAIN, 1] > _NO_LOSS
+    assert gain[S_GAIN] <= gain[HEALTHY] - DT
     gain, plain, z = advanced(shown(-0.3), PAIR)
-    assert z[ws.S_GAIN, 1] < 0.0
-    assert gain[ws.S_GAIN] == pytest.approx(
-        max(plain[ws.S_GAIN], plain.max() - wj._WORST) - wj._OCCAM * DT - wj._REVERSED
-    )
+    assert z[S_GAIN, 1] < 0.0
+    assert gain[S_GAIN] == pytest.approx(max(plain[S_GAIN], plain.max() - _WORST) - _OCCAM * DT - _REVERSED)
 
 
 def test_silence_speaks_for_no_signal_and_gaps_for_nothing() -> None:
     gain, _, _ = advanced(shown(0.0), SILENT)
-    assert gain[ws.S_NONE] == 0.0
-    assert_array_equal(np.delete(gain, ws.S_NONE), wj._SILENT)
+    assert gain[S_NONE] == 0.0
+    assert_array_equal(np.delete(gain, S_NONE), _SILENT)
     gain, _, _ = advanced(shown(0.0), SKIP)
     assert_array_equal(gain, 0.0)
 
@@ -270,9 +309,9 @@ def test_silence_speaks_for_no_signal_and_gaps_for_nothing() -> None:
 def test_standstill_speaks_for_no_loss() -> None:
     q = shown(0.0, 0.0)._replace(drive=0.0, drive_half=0.0, drive_none=0.0)
     gain, plain, _ = advanced(q, PAIR, quiet=True, speed=0.0)
-    assert plain[ws.S_NONE] > plain[ws.HEALTHY]
-    for m in (ws.S_STUCK, ws.S_NONE, ws.S_GAIN, ws.A_GAIN, ws.A_NONE, ws.A_BIAS):
-        assert gain[m] <= gain[ws.HEALTHY]
+    assert plain[S_NONE] > plain[HEALTHY]
+    for m in (S_STUCK, S_NONE, S_GAIN, A_GAIN, A_NONE, A_BIAS):
+        assert gain[m] <= gain[HEALTHY]
     # a sensor that is stuck off zero shows at rest too
     gain, _, _ = advanced(shown(0.3, 0.0)._replace(drive=0.0), PAIR, quiet=True, speed=0.0)
-    assert gain[ws.S_STUCK] > gain[ws.HEALTHY]
+    assert gain[S_STUCK] > gain[HEALTHY]

@@ -9,8 +9,7 @@ from hypothesis import strategies as st
 from numpy.testing import assert_array_equal
 
 from diagnosis.estimation.fault_models import PAIR, SILENT
-from diagnosis.wheels.runs import Runs, runs_of
-from diagnosis.wheels.step_kernel import (
+from diagnosis.wheels.models import (
     A_BIAS,
     A_GAIN,
     A_NONE,
@@ -23,6 +22,7 @@ from diagnosis.wheels.step_kernel import (
     S_STUCK,
     S_WHITE_8,
 )
+from diagnosis.wheels.runs import Runs, runs_of
 
 DT = 0.01
 Array = np.ndarray

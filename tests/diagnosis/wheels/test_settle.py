@@ -7,10 +7,10 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from diagnosis.estimation.fault_models import PAIR, STAY
-from diagnosis.wheels import step_kernel as ws
 from diagnosis.wheels.blocks import WheelBlocks, blocks_of
 from diagnosis.wheels.filter import forward, most_probable
-from diagnosis.wheels.models import JointModel, WheelFilterModel
+from diagnosis.wheels.joint_kernel import SHARE_NONE
+from diagnosis.wheels.models import A_GAIN, A_NONE, HEALTHY, JointModel, WheelFilterModel
 from diagnosis.wheels.settle import settled
 
 RAW, WIDTH, N, ONSET, STOP = 0.001, 10, 9000, 4000, 7000
@@ -54,13 +54,13 @@ def test_others_may_be_told_in_which_model_a_wheel_is() -> None:
     given = np.full(cut.y.shape, STAY, dtype=np.uint8)
     own = forward(cut, MODEL)
     assert_array_equal(forward(cut, MODEL, given=given).inputs, own.inputs)
-    given[:, 2] = ws.A_NONE
+    given[:, 2] = A_NONE
     told = forward(cut, MODEL, given=given)
     asked = WHEEL.K * np.abs(u)
     others = asked[:, 1] + asked[:, 3]
     for done, rest in ((own, others + asked[:, 2]), (told, others)):
         share = np.minimum(1.0, FLOW / np.maximum(rest, 1e-9)).reshape(-1, WIDTH).mean(axis=1)
-        assert_allclose(done.inputs[:, 0, 3], share, rtol=1e-9)
+        assert_allclose(done.inputs[:, 0, SHARE_NONE], share, rtol=1e-9)
 
 
 def test_nothing_is_taken_back_from_healthy_wheels() -> None:
@@ -80,7 +80,7 @@ def test_one_valve_explains_what_all_wheels_suffer(fault: float) -> None:
     got = settled(cut, MODEL, done)
     assert got.evidence >= done.evidence
     paths = np.column_stack([most_probable(got, i)[0] for i in range(4)])
-    assert np.mean(paths[:, [0, 1, 3]] == ws.HEALTHY) > 0.99
+    assert np.mean(paths[:, [0, 1, 3]] == HEALTHY) > 0.99
     middle = paths[ONSET // WIDTH + 50 : STOP // WIDTH - 10, 2]
-    assert np.isin(middle, (ws.A_GAIN, ws.A_NONE)).mean() > 0.95
-    assert (paths[: ONSET // WIDTH - 30, 2] == ws.HEALTHY).all()
+    assert np.isin(middle, (A_GAIN, A_NONE)).mean() > 0.95
+    assert (paths[: ONSET // WIDTH - 30, 2] == HEALTHY).all()

@@ -12,8 +12,30 @@ from numpy.testing import assert_allclose
 from scipy.linalg import expm
 from scipy.stats import gamma
 
-from diagnosis.wheels import step_kernel as ws
-from diagnosis.wheels.models import WheelFilterModel
+from diagnosis.results.fault_rows import FAULT_ROWS
+from diagnosis.wheels.models import (
+    A_BIAS,
+    A_GAIN,
+    A_NONE,
+    A_STUCK,
+    HEALTHY,
+    MODELS,
+    NOISY_SENSOR,
+    ROWS,
+    S_GAIN,
+    S_NONE,
+    S_OU_LARGE,
+    S_OU_SMALL,
+    S_STUCK,
+    S_WHITE_3,
+    S_WHITE_8,
+    S_WHITE_24,
+    TOTAL_SENSOR,
+    WheelConstants,
+    WheelFilterModel,
+)
+from diagnosis.wheels.step_kernel import WheelInput, correct, enter, predict
+from replay.faults import FaultMode, Side
 
 MODEL = WheelFilterModel(
     K=2.4,
@@ -29,9 +51,9 @@ MODEL = WheelFilterModel(
 )
 DT, RAW, BLOCKS = 0.01, 0.001, 45
 LIFT = MODEL.valve_span * MODEL.K
-WHITE = {ws.S_WHITE_3: 3.0, ws.S_WHITE_8: 8.0, ws.S_WHITE_24: 24.0}
-COLOURED = {ws.S_OU_SMALL: 0.05 * MODEL.span, ws.S_OU_LARGE: 0.12 * MODEL.span}
-SCALED = (ws.S_GAIN, *WHITE, *COLOURED)
+WHITE = {S_WHITE_3: 3.0, S_WHITE_8: 8.0, S_WHITE_24: 24.0}
+COLOURED = {S_OU_SMALL: 0.05 * MODEL.span, S_OU_LARGE: 0.12 * MODEL.span}
+SCALED = (S_GAIN, *WHITE, *COLOURED)
 Array = np.ndarray
 
 
@@ -42,16 +64,16 @@ def lag(rate: float) -> tuple[float, float]:
     return step[0, 0], step[0, 1]
 
 
-def fed(m: int, x: Array, q: ws.WheelInput) -> tuple[float, float]:
+def fed(m: int, x: Array, q: WheelInput) -> tuple[float, float]:
     """Opening as fed, and what the pump feeds of the fault's own flow."""
-    if m in (ws.A_GAIN, ws.A_BIAS):
+    if m in (A_GAIN, A_BIAS):
         drive = np.interp(x[1], [0.0, 0.5, 1.0], [q.drive_none, q.drive_half, q.drive])
-        return drive, q.share_some if m == ws.A_BIAS else q.share_none
-    taken = min(abs(x[3]) / (0.15 * MODEL.K), 2.0) if m == ws.A_STUCK else 0.0
+        return drive, q.share_some if m == A_BIAS else q.share_none
+    taken = min(abs(x[3]) / (0.15 * MODEL.K), 2.0) if m == A_STUCK else 0.0
     return q.drive, q.share_none + (q.share_some - q.share_none) * taken
 
 
-def tyre(speed: float, q: ws.WheelInput, most: float) -> tuple[float, float, float, float, float]:
+def tyre(speed: float, q: WheelInput, most: float) -> tuple[float, float, float, float, float]:
     """Factors of ν and of what drives it, constant load, slope of the load in x, and whether the tyre holds."""
     if np.isnan(q.body) or most == 0.0:
         a, b = lag(1 / MODEL.tau)
@@ -76,7 +98,7 @@ class Oracle:
         self.kf = KalmanFilter(dim_x=4, dim_z=1, dim_u=1)
         self.kf.x, self.kf.P = z.reshape(4, 1).copy(), P.copy()
 
-    def predict(self, q: ws.WheelInput) -> None:
+    def predict(self, q: WheelInput) -> None:
         m, x = self.m, self.kf.x[:, 0]
         scale = max(x[1], 0.1) if m in SCALED else 1.0
         drive, self.share = fed(m, x, q)
@@ -85,15 +107,15 @@ class Oracle:
         F[0, 2] = b * slope * scale
         if m in SCALED:
             F[0, 1] = b * (MODEL.K * drive + load)
-        elif m >= ws.A_GAIN:
+        elif m >= A_GAIN:
             F[0, 1], F[0, 3], G = b * MODEL.K * drive, b * self.share, b * load
         else:
             G = b * (MODEL.K * drive + load)
         keep, walk = 1.0, 0.0
-        if m == ws.A_BIAS:
+        if m == A_BIAS:
             keep = np.exp(-DT / 0.8)
             walk = (1 - keep**2) * (0.5 * LIFT) ** 2
-        elif m == ws.A_STUCK:
+        elif m == A_STUCK:
             walk = (0.02 * LIFT) ** 2 * DT
         elif m in COLOURED:
             keep = np.exp(-DT / 0.05)
@@ -107,10 +129,10 @@ class Oracle:
     def white(self) -> tuple[list[float], float, float]:
         """H, variance of one sample's noise, and of its steps."""
         m, own = self.m, MODEL.noise**2
-        if m in (ws.S_STUCK, ws.S_NONE):
+        if m in (S_STUCK, S_NONE):
             constant = MODEL.constant_noise**2
-            return [0.0, 0.0, 0.0, float(m == ws.S_STUCK)], constant, constant
-        if m == ws.S_GAIN:
+            return [0.0, 0.0, 0.0, float(m == S_STUCK)], constant, constant
+        if m == S_GAIN:
             scaled = own * float(np.clip(self.kf.x[1, 0], 0.1, 1.0)) ** 2 + MODEL.rounding**2
             return [1.0, 0.0, 0.0, 0.0], scaled, scaled
         if m in WHITE:
@@ -119,28 +141,28 @@ class Oracle:
             return [1.0, 0.0, 0.0, 1.0], own, own + COLOURED[m] ** 2 * RAW / 0.05
         return [1.0, 0.0, 0.0, 0.0], own, own
 
-    def correct(self, q: ws.WheelInput) -> float:
+    def correct(self, q: WheelInput) -> float:
         h, one, _ = self.white()
         R = one / q.samples + 1e-12 + (q.chatter * self.share) ** 2 * (h[0] > 0)
         self.kf.update(q.y, R=np.array([[R]]), H=np.array([h]))
         return float(self.kf.log_likelihood)
 
 
-def entered(m: int, most: float) -> tuple[Array, Array, ws.WheelConstants]:
+def entered(m: int, most: float) -> tuple[Array, Array, WheelConstants]:
     """All models entered from a healthy wheel at 0.2 m/s."""
     k = replace(MODEL, grip_most=most).constants(DT, RAW)
-    z, P = np.zeros((ws.MODELS, 4)), np.zeros((ws.MODELS, 4, 4))
+    z, P = np.zeros((MODELS, 4)), np.zeros((MODELS, 4, 4))
     z[0], P[0, 0, 0], P[0, 2, 2] = [0.2, 1.0, 0.1, 0.0], 1e-4, 0.8
     if m:
-        ws.enter(m, ws.HEALTHY, k, z, P)
+        enter(m, HEALTHY, k, z, P)
     return z, P, k
 
 
-def block(n: int, body: float, samples: float = 1.0) -> ws.WheelInput:
+def block(n: int, body: float, samples: float = 1.0) -> WheelInput:
     """A wheel under a moving valve, at a pump that feeds four fifths."""
     rng = np.random.default_rng(n)
     x = 0.09 * np.sin(n / 7) + 0.05
-    return ws.WheelInput(
+    return WheelInput(
         y=0.2 + 0.08 * np.sin(n / 9) + 0.01 * rng.normal(),
         samples=samples,
         jitter=3.1e-5,
@@ -161,7 +183,7 @@ REGIMES = {"air": (np.nan, 0.1), "free": (0.2, 0.0), "held": (0.22, 50.0), "slid
 
 
 @pytest.mark.parametrize("regime", REGIMES)
-@pytest.mark.parametrize("m", range(ws.MODELS))
+@pytest.mark.parametrize("m", range(MODELS))
 def test_every_model_is_filterpys(m: int, regime: str) -> None:
     body, most = REGIMES[regime]
     z, P, k = entered(m, most)
@@ -169,10 +191,10 @@ def test_every_model_is_filterpys(m: int, regime: str) -> None:
     for n in range(BLOCKS):
         q = block(n, body)
         oracle.predict(q)
-        share = ws.predict(m, q, k, z, P)
+        share = predict(m, q, k, z, P)
         assert_allclose(share, oracle.share, rtol=1e-12)
         if n % 7 != 3 and not 20 <= n < 30:  # the others have no new sample
-            assert_allclose(ws.correct(m, q, share, k, z, P), oracle.correct(q), rtol=1e-9, atol=1e-9)
+            assert_allclose(correct(m, q, share, k, z, P), oracle.correct(q), rtol=1e-9, atol=1e-9)
         assert_allclose(z[m], oracle.kf.x[:, 0], rtol=1e-9, atol=1e-11)
         assert_allclose(P[m], oracle.kf.P, rtol=1e-9, atol=1e-13)
 
@@ -189,7 +211,7 @@ def test_regimes_are_what_they_say() -> None:
     assert 0.2 < np.mean(np.array(held["both"]) == 0.1) < 0.8
 
 
-@pytest.mark.parametrize("m", range(ws.MODELS))
+@pytest.mark.parametrize("m", range(MODELS))
 def test_steps_speak_by_their_distribution(m: int) -> None:
     """Between two models: −½f(J/σ² + ln σ²), as the mean square of f steps is distributed."""
     samples = 9.0
@@ -202,9 +224,9 @@ def test_steps_speak_by_their_distribution(m: int) -> None:
         steps = oracle.white()[2]
         mean = oracle.correct(q)
         density = gamma.logpdf(0.5 * q.jitter, freedom / 2, scale=2 * steps / freedom)
-        return ws.correct(model, q, 0.0, k, z, P) - mean, float(density)
+        return correct(model, q, 0.0, k, z, P) - mean, float(density)
 
-    (got, density), (healthy, reference) = told(m), told(ws.HEALTHY)
+    (got, density), (healthy, reference) = told(m), told(HEALTHY)
     most = -0.5 * freedom * (1 + np.log(0.5 * q.jitter))
     assert got == pytest.approx(max(healthy + density - reference, most - 25.0), abs=1e-9)
 
@@ -214,43 +236,43 @@ def test_steps_of_a_single_sample_say_nothing() -> None:
         z, P, k = entered(0, 0.0)
         oracle = Oracle(0, z[0], P[0], 0.0)
         q = block(3, np.nan)._replace(jitter=jitter, chatter=0.0)
-        assert ws.correct(0, q, 1.0, k, z, P) == pytest.approx(oracle.correct(q), abs=1e-9)
+        assert correct(0, q, 1.0, k, z, P) == pytest.approx(oracle.correct(q), abs=1e-9)
 
 
 def test_steps_of_a_constant_channel_are_no_surer_than_its_rounding() -> None:
     """A stuck sensor's steps are 0: what its own model gains by that is limited by what rounding leaves."""
     got = {}
-    for m in (ws.HEALTHY, ws.S_STUCK):
+    for m in (HEALTHY, S_STUCK):
         z, P, k = entered(m, 0.0)
         oracle = Oracle(m, z[m], P[m], 0.0)
         q = block(3, np.nan, 10.0)._replace(jitter=0.0, chatter=0.0)
-        got[m] = ws.correct(m, q, 1.0, k, z, P) - oracle.correct(q)
+        got[m] = correct(m, q, 1.0, k, z, P) - oracle.correct(q)
     most = -0.5 * (20 / 3) * (1 + np.log(MODEL.constant_noise**2))
-    assert got[ws.S_STUCK] == pytest.approx(-0.5 * (20 / 3) * np.log(MODEL.constant_noise**2))
-    assert got[ws.HEALTHY] == pytest.approx(max(-0.5 * (20 / 3) * np.log(MODEL.noise**2), most - 25.0))
+    assert got[S_STUCK] == pytest.approx(-0.5 * (20 / 3) * np.log(MODEL.constant_noise**2))
+    assert got[HEALTHY] == pytest.approx(max(-0.5 * (20 / 3) * np.log(MODEL.noise**2), most - 25.0))
 
 
-@pytest.mark.parametrize("old", [ws.HEALTHY, ws.S_GAIN, ws.S_STUCK, ws.A_GAIN])
-@pytest.mark.parametrize("m", range(ws.MODELS))
+@pytest.mark.parametrize("old", [HEALTHY, S_GAIN, S_STUCK, A_GAIN])
+@pytest.mark.parametrize("m", range(MODELS))
 def test_entry_carries_speed_and_load_over(m: int, old: int) -> None:
     if m == old:
         return
     k = MODEL.constants(DT, RAW)
-    z, P = np.full((ws.MODELS, 4), 9.0), np.full((ws.MODELS, 4, 4), 9.0)
-    gain, gain_var = (0.5, 0.01) if old == ws.S_GAIN else (1.0, 0.0)
+    z, P = np.full((MODELS, 4), 9.0), np.full((MODELS, 4, 4), 9.0)
+    gain, gain_var = (0.5, 0.01) if old == S_GAIN else (1.0, 0.0)
     z[old], P[old] = [0.3 * gain, gain, 0.4, 0.0], np.diag([1e-4, gain_var, 0.2, 0.0])
-    ws.enter(m, old, k, z, P)
+    enter(m, old, k, z, P)
     # ν = g·v of a sensor that scales it; a stuck one leaves the speed to the model alone
-    var = 1e-4 / gain**2 + 0.3**2 * gain_var / gain**2 + (0.05 * MODEL.span) ** 2 * (old == ws.S_STUCK)
+    var = 1e-4 / gain**2 + 0.3**2 * gain_var / gain**2 + (0.05 * MODEL.span) ** 2 * (old == S_STUCK)
     assert_allclose(P[m], P[m].T)
     assert np.linalg.eigvalsh(P[m]).min() > -1e-15
-    assert (z[m, 2], P[m, 2, 2]) == pytest.approx((0.4, 0.2 if old == ws.HEALTHY else 0.5))
+    assert (z[m, 2], P[m, 2, 2]) == pytest.approx((0.4, 0.2 if old == HEALTHY else 0.5))
     if m not in SCALED:
         assert (z[m, 0], P[m, 0, 0]) == pytest.approx((0.3, var))
         return
     # a gain of its own scales what the sensor shows: mean, variance and covariance of g·v
     rng = np.random.default_rng(1)
-    g_mean, g_std = (0.5, 0.3) if m == ws.S_GAIN else (0.65, 0.2)
+    g_mean, g_std = (0.5, 0.3) if m == S_GAIN else (0.65, 0.2)
     g, v = g_mean + g_std * rng.normal(size=200_000), 0.3 + np.sqrt(var) * rng.normal(size=200_000)
     assert (z[m, 0], z[m, 1]) == pytest.approx((g_mean * 0.3, g_mean))
     assert P[m, 1, 1] == pytest.approx(g_std**2)
@@ -260,16 +282,18 @@ def test_entry_carries_speed_and_load_over(m: int, old: int) -> None:
 
 def test_entry_gives_each_row_its_unknowns() -> None:
     k = MODEL.constants(DT, RAW)
-    z, P = np.zeros((ws.MODELS, 4)), np.zeros((ws.MODELS, 4, 4))
+    z, P = np.zeros((MODELS, 4)), np.zeros((MODELS, 4, 4))
     z[0], P[0, 0, 0], P[0, 2, 2] = [0.3, 1.0, 0.0, 0.0], 1e-4, 1.0
-    for m in range(1, ws.MODELS):
-        ws.enter(m, ws.HEALTHY, k, z, P)
-    assert_allclose(z[[ws.S_STUCK, ws.S_NONE, ws.A_GAIN, ws.A_STUCK, ws.A_NONE], 1], [1.0, 1.0, 0.5, 0.0, 0.0])
+    for m in range(1, MODELS):
+        enter(m, HEALTHY, k, z, P)
+    assert_allclose(z[[S_STUCK, S_NONE, A_GAIN, A_STUCK, A_NONE], 1], [1.0, 1.0, 0.5, 0.0, 0.0])
     assert_allclose(z[:, 3], 0.0)
     stuck = np.sqrt(P[:, 3, 3])
-    assert_allclose(stuck[[ws.S_STUCK, ws.A_STUCK, ws.A_BIAS]], [MODEL.span, LIFT, 0.5 * LIFT])
+    assert_allclose(stuck[[S_STUCK, A_STUCK, A_BIAS]], [MODEL.span, LIFT, 0.5 * LIFT])
     assert_allclose(stuck[list(COLOURED)], [0.08 * MODEL.span, 0.15 * MODEL.span])
-    assert_allclose(stuck[[ws.HEALTHY, ws.S_NONE, ws.S_GAIN, ws.A_GAIN, ws.A_NONE]], 0.0)
-    assert [ws.NAMES[m] for m in (ws.S_STUCK, ws.A_BIAS)] == [("sensor", "stuck"), ("actuator", "noisy")]
-    names = list(dict.fromkeys(ws.NAMES))
-    assert [names[r] for r in ws.ROW] == list(ws.NAMES)
+    assert_allclose(stuck[[HEALTHY, S_NONE, S_GAIN, A_GAIN, A_NONE]], 0.0)
+    assert [ROWS[m] for m in (S_STUCK, A_BIAS)] == [(Side.SENSOR, FaultMode.STUCK), (Side.ACTUATOR, FaultMode.NOISY)]
+    assert set(ROWS) == {None, *((row.side, row.mode) for row in FAULT_ROWS)}
+    assert len(ROWS) == MODELS
+    assert {ROWS[m] for m in NOISY_SENSOR} == {(Side.SENSOR, FaultMode.NOISY)}
+    assert all(row is not None and row[0] is Side.SENSOR and row[1].total for row in (ROWS[m] for m in TOTAL_SENSOR))

@@ -1,0 +1,59 @@
+"""ε̂ and the saturation term of a run, from the state of its model at the end."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from diagnosis.results.result import Epsilon, Sat
+from diagnosis.wheels.models import A_BIAS, A_GAIN, A_NONE, A_STUCK, S_GAIN, TOTAL_SENSOR, WheelFilterModel
+
+Array = NDArray[np.float64]
+
+_NOISY_LOSS = 0.35  # 95 % of the errors of a noisy sensor's ε̂ on tuning seeds
+
+
+def estimate(m: int, y: Array, z: Array, P: Array, model: WheelFilterModel) -> tuple[Epsilon | None, Sat | None]:
+    """ε̂ and the saturation term of a run.
+
+    Parameters
+    ----------
+    m : int
+        Model of the run.
+    y : Array, shape (n,)
+        Measured speed [m/s] where there is one.
+    z, P : Array, shape (4,) and (4, 4)
+        State of the model at the end of the run and its covariance.
+    model : WheelFilterModel
+        The wheel.
+
+    Returns
+    -------
+    tuple[Epsilon | None, Sat | None]
+        Saturation in [m/s] of a sensor, [fraction of full opening] of a valve; None where the row has none.
+    """
+    g, g_std = float(z[1]), float(np.sqrt(max(P[1, 1], 0.0)))
+    loss = Epsilon(1 - g, 1 - g - 1.96 * g_std, 1 - g + 1.96 * g_std)
+    if m in TOTAL_SENSOR:
+        if not y.size:
+            return Epsilon(1.0, 1.0, 1.0), None
+        level, rms = float(np.mean(y)), float(np.sqrt(np.mean(y**2)))
+        half = 1.96 * model.rounding
+        return Epsilon(1.0, 1.0, 1.0), Sat(level, rms, level - half, level + half, "m/s")
+    if m in (S_GAIN, A_GAIN):
+        return loss, None
+    half = 1.96 * float(np.sqrt(max(P[3, 3], 0.0)))
+    if m in (A_STUCK, A_NONE):
+        level = float(z[3]) / model.K if m == A_STUCK else 0.0
+        half /= model.K
+        return Epsilon(1.0, 0.0, 1.0), Sat(level, abs(level), level - half, level + half, "of full opening")
+    eps = max(1 - g, 0.05)
+    if m == A_BIAS:
+        level, half = float(z[3]) / model.K, half / model.K
+        return loss, Sat(level / eps, abs(level) / eps, (level - half) / eps, (level + half) / eps, "of full opening")
+    # gain and bias of a noisy sensor trade off against each other while the speed hardly changes
+    half_loss = max(1.96 * g_std, _NOISY_LOSS)
+    loss = Epsilon(1 - g, max(0.0, 1 - g - half_loss), min(1.0, max(1 - g + half_loss, 1 - g)))
+    noise = float(np.sqrt(np.mean((y - np.mean(y)) ** 2))) if y.size else 0.0
+    level = float(z[3]) / eps
+    return loss, Sat(level, float(np.hypot(level, noise / eps)), level - half / eps, level + half / eps, "m/s")

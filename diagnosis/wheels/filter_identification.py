@@ -1,0 +1,81 @@
+"""Constants of the wheel filters that are found in the mission itself: noise, load, and how the tyres hold the ground."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from diagnosis.channels.noise import moving_sum, quick_noise, rounding_step, slow_mismatch, usual_distance, white_noise
+from diagnosis.estimation.fault_models import PAIR
+from diagnosis.wheels.blocks import WheelBlocks
+from diagnosis.wheels.filter import forward
+from diagnosis.wheels.inputs import WheelsData
+from diagnosis.wheels.models import JointModel, WheelFilterModel
+
+Array = NDArray[np.float64]
+
+_MEAN_HEALTHY_S = 60.0
+_LEAST_LOAD, _MOST_LOAD = 0.0175, 0.1  # of the span
+_TYRES = (0.06, 0.125, 0.25)  # largest load of a tyre, of the span
+_TRIAL_S = 60.0
+
+
+def joint_model(data: WheelsData, blocks: WheelBlocks) -> JointModel:
+    """Constants of all wheels' filters, on the ground or in the air by what explains the mission best."""
+    model = JointModel(
+        wheels=tuple(None if p is None else filter_model(data, i) for i, p in enumerate(data.plants)),
+        flow=data.flow,
+        switch_cost=float(np.log(_MEAN_HEALTHY_S / blocks.dt * 12)),
+    )
+    return _coupled(blocks, model, data)
+
+
+def filter_model(data: WheelsData, i: int) -> WheelFilterModel:
+    """Constants of one wheel's filter: noise and load are found from the mission where the machine file has none."""
+    plant, residual = data.plants[i], data.residual[i]
+    assert plant is not None
+    pair, y = data.status[:, i] == PAIR, data.y[:, i]
+    fresh = y[pair]
+    period = data.dt * (usual_distance(pair) if fresh.size > 1 else 1.0)
+    known = data.noise[i]
+    lsb = known.lsb if known.lsb is not None else rounding_step(fresh)
+    white = known.std or float(np.nan_to_num(white_noise(fresh, period)))
+    rounding = lsb / np.sqrt(12)
+    noise = max(float(np.hypot(white, rounding)) if known.std else white, rounding, 1e-4 * data.span)
+    if period > 0.005:  # too slow to tell noise from motion by steps alone
+        width = max(3, round(0.5 / data.dt))
+        changing = moving_sum(np.diff(y, prepend=y[:1]) != 0, width) > 0.1 * width
+        quick = quick_noise(np.where(pair & ~data.quiet[:, i] & changing, residual, np.nan), data.dt)
+        noise = max(noise, float(np.nan_to_num(quick)))
+    load = plant.load
+    if load is None:
+        load = float(np.nan_to_num(slow_mismatch(residual, pair & ~data.quiet[:, i], data.dt)))
+    return WheelFilterModel(
+        K=plant.K,
+        tau=plant.tau,
+        noise=noise,
+        # noise within one rounding step leaves readings constant for a while: that proves nothing then
+        constant_noise=max(rounding / 3, noise / 50) if noise > lsb else noise,
+        rounding=max(rounding, 1e-5 * data.span),
+        load=max(min(load, _MOST_LOAD * data.span), _LEAST_LOAD * data.span, 0.5 * noise),
+        span=data.span,
+        valve_span=0.15 if data.span < 1.5 * plant.K else 0.5 * data.span / plant.K,
+        offset=plant.offset,
+        measured=data.measured[i],
+    )
+
+
+def _coupled(blocks: WheelBlocks, model: JointModel, data: WheelsData) -> JointModel:
+    """Tyres on the ground or wheels in the air: whichever explains a minute of driving best."""
+    if data.coupling == "free" or not np.isfinite(blocks.ratio).any():
+        return model
+    trials = [model.on_ground(share * data.span) for share in _TYRES]
+    if data.coupling != "ground":
+        trials.insert(0, model)
+    driven = np.flatnonzero(~blocks.quiet.all(axis=1))
+    if not driven.size:
+        return trials[0]
+    length = round(_TRIAL_S / blocks.dt)
+    middle = int(np.clip(driven[driven.size // 2] - length // 2, 0, max(0, blocks.y.shape[0] - length)))
+    part = blocks.part(middle, middle + length)
+    return max(trials, key=lambda trial: forward(part, trial).evidence)

@@ -1,0 +1,158 @@
+"""All models over the runs of one wheel's path: each entered at a run's start, and its log-likelihoods summed."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from diagnosis.wheels.blocks import WheelBlocks
+from diagnosis.wheels.filter import JointPass, first_speeds
+from diagnosis.wheels.joint_kernel import (
+    BODY,
+    DOUBT,
+    DRIVE,
+    DRIVE_HALF,
+    DRIVE_NONE,
+    SHARE_NONE,
+    SHARE_SOME,
+)
+from diagnosis.wheels.models import HEALTHY, MODELS, JointModel, WheelConstants
+from diagnosis.wheels.runs import Runs
+from diagnosis.wheels.step_kernel import WheelInput, advance, enter, predict
+from replay.arrays.numeric import uncounted
+
+Array = NDArray[np.float64]
+
+
+class RunInput(NamedTuple):
+    """Blocks of one wheel, shape (n,)."""
+
+    y: Array
+    samples: Array
+    jitter: Array
+    chatter: Array
+    wander: Array
+    inputs: Array  # (n, 8) as in `JointOutput`
+    status: NDArray[np.int8]
+    quiet: NDArray[np.bool_]
+
+
+class RunEvidence(NamedTuple):
+    """Every model entered at every run's start and followed to its end.
+
+    Attributes
+    ----------
+    evidence : Array, shape (runs, models)
+        Log-likelihoods over the run.
+    mean, cov : Array, shape (runs, models, 4) and (runs, models, 4, 4)
+        States at its end.
+    expected, spread : Array, shape (n,)
+        Speed that a healthy wheel would have [m/s], carried on by the model alone during faults, and its variance.
+    """
+
+    evidence: Array
+    mean: Array
+    cov: Array
+    expected: Array
+    spread: Array
+
+
+@njit(cache=True, error_model="numpy")
+def _enter_all(models: int, old: int, k: WheelConstants, z: Array, P: Array) -> None:
+    """Enter every model from model `old`, as that one ended."""
+    fresh_z, fresh_P, hold_z, hold_P = z.copy(), P.copy(), z[old].copy(), P[old].copy()
+    for m in range(models):
+        enter(m, old, k, fresh_z, fresh_P)
+        z[m], P[m] = fresh_z[m], fresh_P[m]
+        fresh_z[old], fresh_P[old] = hold_z, hold_P
+
+
+@njit(cache=True, error_model="numpy")
+def _scan_runs(
+    blocks: RunInput, runs: Runs, models: int, k: WheelConstants, z: Array, P: Array, out: RunEvidence
+) -> None:
+    """Follow one wheel's path run by run.
+
+    z (models, 4) and P (models, 4, 4) hold the state of a healthy wheel before the first block, and change. `expected`
+    is carried on by the model alone during faults.
+    """
+    blocks, runs, out = uncounted(blocks), uncounted(runs), uncounted(out)
+    z, P, gain = uncounted(z), uncounted(P), np.zeros(MODELS)
+    old = HEALTHY
+    for m in range(1, models):
+        enter(m, HEALTHY, k, z, P)
+    free_z, free_P = z[:1].copy(), P[:1].copy()
+    for r in range(runs.model.size):
+        if r > 0:
+            _enter_all(models, old, k, z, P)
+        last = runs.entry[r + 1] if r + 1 < runs.model.size else blocks.y.size
+        for n in range(runs.entry[r] if r > 0 else 0, last):
+            x = blocks.inputs[n]
+            block = WheelInput(
+                y=blocks.y[n],
+                samples=blocks.samples[n],
+                jitter=blocks.jitter[n],
+                drive=x[DRIVE],
+                drive_half=x[DRIVE_HALF],
+                drive_none=x[DRIVE_NONE],
+                share_none=x[SHARE_NONE],
+                share_some=x[SHARE_SOME],
+                chatter=blocks.chatter[n],
+                wander=blocks.wander[n],
+                body=x[BODY],
+                doubt=x[DOUBT],
+            )
+            predict(HEALTHY, block, k, free_z, free_P)
+            out.expected[n], out.spread[n] = free_z[HEALTHY, 0], free_P[HEALTHY, 0, 0]
+            advance(models, block, blocks.status[n], blocks.quiet[n], k, z, P, gain)
+            if n < runs.stop[r]:
+                for m in range(models):
+                    out.evidence[r, m] += gain[m]
+                out.mean[r], out.cov[r] = z, P
+            if runs.model[r] == HEALTHY and n < runs.stop[r]:  # a fault leaves the expectation alone
+                free_z[0], free_P[0] = z[HEALTHY], P[HEALTHY]
+        old = runs.model[r]
+
+
+def evidence_of_runs(blocks: WheelBlocks, model: JointModel, done: JointPass, wheel: int, runs: Runs) -> RunEvidence:
+    """Weigh all models over the runs of one wheel's path.
+
+    Parameters
+    ----------
+    blocks, model, done
+        As in `diagnosis.wheels.filter.forward`, and what it gave.
+    wheel : int
+        Which.
+    runs : Runs
+        Of its path.
+    """
+    own = model.wheels[wheel]
+    assert own is not None
+    per_opening = np.array([own.K * blocks.raw_dt / own.tau])
+    n, size = blocks.y.shape[0], runs.model.size
+    z, P = np.zeros((MODELS, 4)), np.zeros((MODELS, 4, 4))
+    z[HEALTHY, 0], z[HEALTHY, 1] = first_speeds(blocks)[wheel], 1.0
+    P[HEALTHY, 0, 0], P[HEALTHY, 2, 2] = (0.2 * own.span) ** 2, 1.0
+    out = RunEvidence(
+        evidence=np.zeros((size, MODELS)),
+        mean=np.zeros((size, MODELS, 4)),
+        cov=np.zeros((size, MODELS, 4, 4)),
+        expected=np.zeros(n),
+        spread=np.zeros(n),
+    )
+    seen = RunInput(
+        y=np.ascontiguousarray(blocks.y[:, wheel]),
+        samples=np.ascontiguousarray(blocks.count[:, wheel]),
+        jitter=np.ascontiguousarray(blocks.jitter[:, wheel]),
+        chatter=blocks.unsteady[:, wheel] * per_opening[0],
+        wander=np.ascontiguousarray(blocks.wander(per_opening)[:, wheel]),
+        inputs=np.ascontiguousarray(done.inputs[:, wheel]),
+        status=np.ascontiguousarray(blocks.status[:, wheel]),
+        quiet=np.ascontiguousarray(blocks.quiet[:, wheel]),
+    )
+    _scan_runs(seen, runs, own.models, own.constants(blocks.dt, blocks.raw_dt), z, P, out)
+    out.evidence[:, own.models :] = -np.inf
+    return out

@@ -1,0 +1,85 @@
+"""Condition of a wheel's sensor and valve at every sample: findings, and why there is no judgement elsewhere."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from diagnosis.channels.debounce import FLICKER_S, steadied
+from diagnosis.estimation.fault_models import SILENT
+from diagnosis.results.assessment import CODE
+from diagnosis.wheels.blocks import per_sample
+from diagnosis.wheels.findings import WheelFindings, WheelPath
+from diagnosis.wheels.inputs import WheelsData
+from replay.faults import Side, State
+
+_DOUBTED = 0.02  # probability of a fault from which on slip and a sensor's loss are not told apart
+_REASONS = {
+    State.NOT_EXCITED: "the wheel is neither commanded nor moving",
+    State.MASKED: "the speed sensor that would show it delivers nothing usable",
+    State.NO_DATA: "no samples",
+    State.SLIP: "the wheel breaks the parity of the body while it obeys its valve: it slips, or its sensor is off",
+}
+_NO_COMMAND = "no valve command to compare with"
+_UNCERTAIN = "the wheel model is too uncertain in this mission"
+_UNEXPLAINED = "what deviates here is not explained well enough by any one fault"
+
+
+@dataclass(frozen=True)
+class WheelStates:
+    """Codes of states by side, shape (n,), and where the wheel is quiet."""
+
+    codes: dict[Side, NDArray[np.int8]]
+    quiet: NDArray[np.bool_]
+
+
+def states_of(data: WheelsData, i: int, path: WheelPath, found: WheelFindings, *, gains: bool) -> WheelStates:
+    """States of sensor and actuator of wheel i; `gains` as in `diagnosis.wheels.findings.findings_of`."""
+    gap, least = (round(s / data.dt) for s in (FLICKER_S, FLICKER_S / 2))
+    quiet = steadied(np.ascontiguousarray(data.quiet[:, i]), gap, 1)
+    no_opening, healthy = ~np.isfinite(data.u[:, i]), CODE[State.HEALTHY]
+    sensor = np.where(quiet, CODE[State.NOT_EXCITED], healthy).astype(np.int8)
+    sensor[~np.isfinite(path.y) & (data.status[:, i] != SILENT)] = CODE[State.NO_DATA]
+    actuator = sensor.copy()
+    actuator[no_opening] = CODE[State.NO_DATA]
+    unseen = found.opened[Side.SENSOR] | (not gains) | no_opening
+    sensor[unseen & (sensor == healthy)] = CODE[State.NOT_ASSESSED]
+    if path.model.grip_most > 0:  # wheels in the air obey their own valves, not the body
+        doubted = np.asarray(per_sample(path.fault > _DOUBTED, path.width, path.y.size))
+        sensor[steadied(data.slip[:, i] & doubted, gap, least) & (sensor == healthy)] = CODE[State.SLIP]
+    actuator[(found.opened[Side.ACTUATOR] | (not gains)) & (actuator == healthy)] = CODE[State.NOT_ASSESSED]
+    for f in found.of(Side.SENSOR):
+        sensor[f.start : f.stop] = CODE[State(f.mode.value)]
+        if f.side is Side.SENSOR and f.mode.total:
+            actuator[f.start : f.stop] = CODE[State.MASKED]
+    for f in found.of(Side.ACTUATOR):
+        actuator[f.start : f.stop] = CODE[State(f.mode.value)]
+    return WheelStates({Side.SENSOR: sensor, Side.ACTUATOR: actuator}, quiet)
+
+
+def reasons_of(codes: NDArray[np.int8], no_opening: NDArray[np.bool_], *, gains: bool) -> dict[State, str]:
+    """Why states that are no judgement were given.
+
+    Parameters
+    ----------
+    codes : NDArray[np.int8], shape (n,)
+        States of one side.
+    no_opening : NDArray[np.bool_], shape (n,)
+        Where nobody knows the valve's opening.
+    gains : bool
+        Whether the wheel model is good enough to judge gains and the valve by.
+    """
+    open_ = codes == CODE[State.NOT_ASSESSED]
+    commanded = _UNEXPLAINED if gains else _UNCERTAIN
+    reason = _NO_COMMAND if 2 * np.count_nonzero(open_ & no_opening) > np.count_nonzero(open_) else commanded
+    return _REASONS | {State.NOT_ASSESSED: reason}
+
+
+def unexplained_s(states: WheelStates, side: Side, found: WheelFindings, dt: float) -> float:
+    """Time [s] in which a side deviates by more than the model's own errors do, outside of findings."""
+    covered = np.zeros(states.quiet.size, dtype=np.bool_)
+    for f in found.findings:
+        covered[f.start : f.stop] = True
+    return float(np.count_nonzero(found.unexplained[side] & ~covered & ~states.quiet)) * dt
