@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import asdict, replace
+from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -16,8 +15,9 @@ from cli.terminal.options import Json, MachineFile
 from replay.progress import Stage, Subscriber
 
 if TYPE_CHECKING:
-    from diagnosis.evaluation.evaluate import MissionScores
+    from diagnosis.evaluation.document import ScoresDocument
     from diagnosis.evaluation.excitation import Speeds
+    from diagnosis.results.document import ReportDocument
 
 EXAMPLES = """\b
 Examples:
@@ -25,8 +25,6 @@ Examples:
   mfhca evaluate mission-report mission.truth.json
   mfhca evaluate missions/ -o scores.html     # all in a folder: its reports, else its logs with a truth
   mfhca evaluate missions/*.mcap --json | jq .all.wheel.sides.sensor.macro_f1"""
-
-SCHEMA = "mfhca-evaluation/1"
 
 Results = Annotated[
     list[Path],
@@ -67,7 +65,7 @@ def evaluate(
     with terminal.progress(Stage.STARTING) as progress:
         from diagnosis.evaluation.counts import add
         from diagnosis.evaluation.evaluate import evaluate_report
-        from diagnosis.evaluation.scores import figures
+        from diagnosis.evaluation.scores import figures, scores_document
         from replay.truth import read_truth
 
         scores = []
@@ -82,8 +80,7 @@ def evaluate(
             verb = "is" if len(score.left_out) == 1 else "are"
             terminal.note(f"{path}: {', '.join(score.left_out)} {verb} not in the result and not scored")
     if json or html is not None:
-        rows = [_row(*pair, score) for pair, score in zip(pairs, scores, strict=True)]
-        document = {"schema": SCHEMA, "results": rows, "all": pooled}
+        document = scores_document([(str(a), str(b)) for a, b in pairs], scores, pooled)
     if html is not None:
         _write_page(document, html)
     if json:
@@ -97,23 +94,7 @@ def evaluate(
         terminal.show(text(f"Wrote {html}"))
 
 
-def _row(path: Path, truth: Path, score: MissionScores) -> dict[str, Any]:
-    """One result of the JSON document."""
-    from diagnosis.evaluation.scores import figures
-    from diagnosis.results.result import to_json
-
-    groups = {
-        name: figures(counts)
-        | {
-            "faults": [to_json(asdict(f)) for f in counts.faults],
-            "reported": [to_json(asdict(r)) for r in counts.reports],
-        }
-        for name, counts in score.groups.items()
-    }
-    return {"result": str(path), "truth": str(truth), "left_out": list(score.left_out)} | groups
-
-
-def _write_page(document: Mapping[str, Any], path: Path) -> None:
+def _write_page(document: ScoresDocument, path: Path) -> None:
     from diagnosis.evaluation.page import build_scores_page
     from replay.atomic_write import atomic_path
 
@@ -124,7 +105,7 @@ def _write_page(document: Mapping[str, Any], path: Path) -> None:
 
 def _result_of(
     path: Path, machine: Path | None, wheels: tuple[str, ...], progress: Subscriber
-) -> tuple[Mapping[str, Any], Speeds | None]:
+) -> tuple[ReportDocument, Speeds | None]:
     """A saved report, or the one of a log, and the commanded speeds beside it."""
     from diagnosis.evaluation.excitation import read_speeds, speeds_of
     from diagnosis.output import PARQUET, load_report

@@ -5,13 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from diagnosis.evaluation.excitation import Speeds
 from diagnosis.evaluation.spans import Span, length, merged, within
+from diagnosis.results.document import IntervalRow
 from replay.truth import MissionTruth, TruthInterval, TruthSpan
 
 Array = NDArray[np.float64]
@@ -32,7 +32,7 @@ class Compared:
 
     Parameters
     ----------
-    intervals : Sequence[Mapping[str, Any]]
+    intervals : Sequence[IntervalRow]
         Faults of the report.
     states : Mapping[str, States]
         Reported states by component and side; shifted already.
@@ -48,7 +48,7 @@ class Compared:
 
     def __init__(
         self,
-        intervals: Sequence[Mapping[str, Any]],
+        intervals: Sequence[IntervalRow],
         states: Mapping[str, States],
         truth: MissionTruth,
         window: Span,

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from diagnosis.evaluation.counts import COLUMNS, ROWS
+from diagnosis.evaluation.document import DamadicsRates, RowFigures, SideFigures
 
 Array = NDArray[np.float64]
 
@@ -24,7 +24,7 @@ def mean(values: Sequence[float | None]) -> float | None:
     return float(np.mean(known)) if known else None
 
 
-def confusion_figures(seconds: Array) -> dict[str, Any]:
+def confusion_figures(seconds: Array) -> SideFigures:
     """Figures of one side; means run over the rows that occur in the truth.
 
     Parameters
@@ -34,7 +34,7 @@ def confusion_figures(seconds: Array) -> dict[str, Any]:
 
     Returns
     -------
-    dict[str, Any]
+    SideFigures
         ``macro_f1`` and ``balanced_accuracy`` with undecided time counted as wrong, ``balanced_accuracy_decided``
         over decided time alone, ``decided_share`` and ``undecided_share`` [1], ``driving_s``, figures per row, and
         the confusion itself.
@@ -43,7 +43,7 @@ def confusion_figures(seconds: Array) -> dict[str, Any]:
     decided = seconds[:, :-1].sum(axis=1)
     hit = np.diag(seconds)
     named = seconds[:, : len(ROWS)].sum(axis=0)
-    rows: dict[str, dict[str, float | None]] = {}
+    rows: dict[str, RowFigures] = {}
     for i, row in enumerate(ROWS):
         occurs = true[i] > 0
         rows[row] = {
@@ -68,7 +68,7 @@ def confusion_figures(seconds: Array) -> dict[str, Any]:
     }
 
 
-def damadics_rates(seconds: Array) -> dict[str, float | None]:
+def damadics_rates(seconds: Array) -> DamadicsRates:
     """Time-based indices of the DAMADICS actuator benchmark (Bartyś, Patton, Syfert, de las Heras, Quevedo 2006).
 
     A side's detection decision is high where it is reported in any fault row, its isolation decision of a row where
@@ -82,7 +82,7 @@ def damadics_rates(seconds: Array) -> dict[str, float | None]:
 
     Returns
     -------
-    dict[str, float or None]
+    DamadicsRates
         ``r_fd``, false detection rate: Σ time with a high detection decision without a fault / fault-free time.
         ``r_td``, true detection rate: Σ time with a high detection decision during a fault / faulty time.
         ``r_fi``, false isolation rate: Σ time during a fault with the decision of another row / faulty time.
@@ -92,11 +92,11 @@ def damadics_rates(seconds: Array) -> dict[str, float | None]:
         decisions per row, which a report does not hold.
     """
     faulty, healthy = seconds[1:].sum(), seconds[0].sum()
-    told = seconds[:, 1:-1].sum(axis=1)
+    high = seconds[:, 1:-1].sum(axis=1)
     isolated = np.diag(seconds)[1:].sum()
     return {
-        "r_fd": ratio(told[0], healthy),
-        "r_td": ratio(told[1:].sum(), faulty),
-        "r_fi": ratio(told[1:].sum() - isolated, faulty),
+        "r_fd": ratio(high[0], healthy),
+        "r_td": ratio(high[1:].sum(), faulty),
+        "r_fi": ratio(high[1:].sum() - isolated, faulty),
         "r_ti": ratio(isolated, faulty),
     }

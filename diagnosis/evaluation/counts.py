@@ -9,11 +9,14 @@ from math import inf
 import numpy as np
 from numpy.typing import NDArray
 
+from diagnosis.results import fault_rows
+from replay.faults import Side, State
+
 Array = NDArray[np.float64]
 
-SIDES = ("sensor", "actuator")
-ROWS = ("healthy", "stuck", "no_signal", "inefficient", "noisy")
-COLUMNS = (*ROWS, "outside_table", "undecided")
+SIDES: tuple[str, ...] = (Side.SENSOR.value, Side.ACTUATOR.value)
+ROWS: tuple[str, ...] = tuple(row.value for row in fault_rows.ROWS)
+COLUMNS = (*ROWS, State.OUTSIDE_TABLE.value, "undecided")
 FAULT_OUTCOMES = ("right", "wrong_mode", "wrong_side", "wrong_part", "missed")
 REPORT_OUTCOMES = ("right", "wrong_mode", "wrong_side", "wrong_part", "surplus")
 

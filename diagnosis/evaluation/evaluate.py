@@ -9,13 +9,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Any
 
 from diagnosis.evaluation.aligned import Compared
 from diagnosis.evaluation.counts import SIDES, Counts
 from diagnosis.evaluation.events import match_events
 from diagnosis.evaluation.excitation import Speeds
 from diagnosis.evaluation.state_time import state_time
+from diagnosis.results.document import ReportDocument
+from diagnosis.results.vocabulary import Kind
 from replay.errors import ConfigError, LogError
 from replay.truth import MissionTruth
 
@@ -37,13 +38,13 @@ class MissionScores:
 
 
 def evaluate_report(
-    report: Mapping[str, Any], truth: MissionTruth, name: str = "report.json", *, speeds: Speeds | None = None
+    report: ReportDocument, truth: MissionTruth, name: str = "report.json", *, speeds: Speeds | None = None
 ) -> MissionScores:
     """Count what a report got right and wrong.
 
     Parameters
     ----------
-    report : Mapping[str, Any]
+    report : ReportDocument
         Contents of a ``report.json``.
     truth : MissionTruth
         What was injected.
@@ -65,7 +66,7 @@ def evaluate_report(
         raise LogError(f"{name}: is no complete report ({error!r}); run `mfhca diagnose` on the log again") from error
 
 
-def _evaluate(report: Mapping[str, Any], truth: MissionTruth, name: str, speeds: Speeds | None) -> MissionScores:
+def _evaluate(report: ReportDocument, truth: MissionTruth, name: str, speeds: Speeds | None) -> MissionScores:
     if not truth.rate_hz > 0:
         raise ConfigError(f"the truth file's rate_hz is {truth.rate_hz:g}; expected the recorded rate, above 0 Hz")
     shift = (int(report["log"]["start_ns"]) - truth.start_ns) * 1e-9
@@ -85,12 +86,12 @@ def _evaluate(report: Mapping[str, Any], truth: MissionTruth, name: str, speeds:
             "give the truth file of this log with --truth"
         )
     groups: dict[str, Counts] = {}
-    for group in ("wheel", "steer"):
-        parts = [c for c in states if (c in truth.wheels) == (group == "wheel")]
+    for group in Kind:
+        parts = [c for c in states if (c in truth.wheels) == (group is Kind.WHEEL)]
         if parts:
             part_states = {c: states[c] for c in parts}
             compared = Compared(report["intervals"], part_states, truth, window, shift, speeds)
             faults, reports = match_events(compared)
-            groups[group] = replace(state_time(compared), faults=faults, reports=reports)
+            groups[group.value] = replace(state_time(compared), faults=faults, reports=reports)
     left_out = tuple(dict.fromkeys(f.component for f in truth.intervals if f.component not in states))
     return MissionScores(groups, left_out)

@@ -3,16 +3,26 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from typing import Any
 
 import numpy as np
 from scipy.special import gammaincinv
 
 from diagnosis.evaluation.confusion import mean, ratio
 from diagnosis.evaluation.counts import FAULT_OUTCOMES, FaultOutcome, ReportOutcome
+from diagnosis.evaluation.document import (
+    EpsilonErrors,
+    EventCounts,
+    EventFigures,
+    FalseAlarms,
+    Precision,
+    Recall,
+    Spread,
+)
+from diagnosis.results.vocabulary import Severity
+from replay.faults import TOTAL
 
 
-def event_figures(faults: Sequence[FaultOutcome], judged: Sequence[ReportOutcome], healthy_s: float) -> dict[str, Any]:
+def event_figures(faults: Sequence[FaultOutcome], judged: Sequence[ReportOutcome], healthy_s: float) -> EventFigures:
     """All figures of a set of faults and of the reports that belong to it.
 
     Parameters
@@ -30,27 +40,27 @@ def event_figures(faults: Sequence[FaultOutcome], judged: Sequence[ReportOutcome
     return {
         "events": _events(faults, judged),
         "onset_error_s": spread(f.onset_error_s for f in right),
-        "detection_delay_s": delay | {"without": len(found) - delay["n"]},
+        "detection_delay_s": {**delay, "without": len(found) - delay["n"]},
         "end_error_s": spread(f.end_error_s for f in right),
         "epsilon": _epsilon(right),
         "false_alarms": _false_alarms(judged, healthy_s / 3600.0),
     }
 
 
-def recall_of(faults: Sequence[FaultOutcome]) -> dict[str, Any]:
+def recall_of(faults: Sequence[FaultOutcome]) -> Recall:
     """Faults that count, those of them that are right, and their share."""
     counted = [f for f in faults if f.outcome in FAULT_OUTCOMES]
     right = sum(f.outcome == "right" for f in counted)
     return {"faults": len(counted), "right": right, "recall": ratio(right, len(counted))}
 
 
-def precision_of(reports: Sequence[ReportOutcome]) -> dict[str, Any]:
+def precision_of(reports: Sequence[ReportOutcome]) -> Precision:
     """Reports, those of them that are right, and their share."""
     right = sum(r.outcome == "right" for r in reports)
     return {"reported": len(reports), "right": right, "precision": ratio(right, len(reports))}
 
 
-def spread(errors: Iterable[float | None], *, signed: bool = False) -> dict[str, Any]:
+def spread(errors: Iterable[float | None], *, signed: bool = False) -> Spread:
     """Median and 95 % quantile of the size of an error (of the value itself where `signed`), and its signed median."""
     known = np.array([e for e in errors if e is not None], dtype=np.float64)
     if not known.size:
@@ -64,12 +74,7 @@ def spread(errors: Iterable[float | None], *, signed: bool = False) -> dict[str,
     }
 
 
-def _events(faults: Sequence[FaultOutcome], judged: Sequence[ReportOutcome]) -> dict[str, Any]:
-    """One-to-one events.
-
-    Isolation, identification and wrong-wheel rate refer to the faults that something was reported for: the share with
-    the right component and side, with the right row too, and on another component.
-    """
+def _events(faults: Sequence[FaultOutcome], judged: Sequence[ReportOutcome]) -> EventCounts:
     found = [f.outcome for f in faults]
     outcomes = {name: found.count(name) for name in FAULT_OUTCOMES}
     total, right = sum(outcomes.values()), outcomes["right"]
@@ -79,7 +84,11 @@ def _events(faults: Sequence[FaultOutcome], judged: Sequence[ReportOutcome]) -> 
     return {
         "faults": total,
         "reported": len(judged),
-        **outcomes,
+        "right": right,
+        "wrong_mode": outcomes["wrong_mode"],
+        "wrong_side": outcomes["wrong_side"],
+        "wrong_part": outcomes["wrong_part"],
+        "missed": outcomes["missed"],
         "surplus": sum(r.outcome == "surplus" for r in judged),
         "precision": precision,
         "recall": recall,
@@ -93,10 +102,10 @@ def _events(faults: Sequence[FaultOutcome], judged: Sequence[ReportOutcome]) -> 
     }
 
 
-def _epsilon(right: Sequence[FaultOutcome]) -> dict[str, Any]:
+def _epsilon(right: Sequence[FaultOutcome]) -> EpsilonErrors:
     """Mean absolute error of ε̂ over right faults, and over those whose ε is not fixed by the row."""
     known = [f for f in right if f.epsilon_error is not None]
-    partial = [f.epsilon_error for f in known if f.mode in ("inefficient", "noisy")]
+    partial = [f.epsilon_error for f in known if f.mode not in TOTAL]
     return {
         "n": len(known),
         "without": len(right) - len(known),
@@ -106,10 +115,10 @@ def _epsilon(right: Sequence[FaultOutcome]) -> dict[str, Any]:
     }
 
 
-def _false_alarms(judged: Sequence[ReportOutcome], hours: float) -> dict[str, Any]:
+def _false_alarms(judged: Sequence[ReportOutcome], hours: float) -> FalseAlarms:
     """Alarms per healthy hour with the upper 95 % bound of a Poisson count; those of severity info apart."""
     alarms = [r for r in judged if r.false_alarm]
-    count = sum(r.severity != "info" for r in alarms)
+    count = sum(r.severity != Severity.INFO for r in alarms)
     bound = float(gammaincinv(count + 1, 0.95))
     return {
         "count": count,

@@ -47,8 +47,8 @@ def _fault(group: Compared, fault: Fault, j: int | None, overlap: float) -> Faul
     if row is not None and first_seen is not None and outcome == "right":
         onset = float(group.start[j]) - first_seen if onset_seen else None
         end = None if within(hidden, fault.stop - 1e-9, fault.stop) else float(group.stop[j]) - fault.stop
-        estimate = (row.get("epsilon") or {}).get("value")
-        error = None if estimate is None else abs(float(estimate) - truth.epsilon)
+        estimate = row.get("epsilon")
+        error = None if estimate is None else abs(estimate["value"] - truth.epsilon)
     speed, slip = group.excitation(truth.component, fault.start, fault.stop)
     return FaultOutcome(
         component=truth.component,
@@ -77,7 +77,7 @@ def _report(group: Compared, j: int, outcome: str) -> ReportOutcome:
     if outcome == "surplus" and not without([(start, stop)], group.hidden(component, side)):
         outcome = "ignored"
     faulty = length(within(group.faulty[component], start, stop))
-    estimate = (row.get("epsilon") or {}).get("value")
+    estimate = row.get("epsilon")
     speed, slip = group.excitation(component, start, stop)
     return ReportOutcome(
         id=str(row["id"]),
@@ -91,7 +91,7 @@ def _report(group: Compared, j: int, outcome: str) -> ReportOutcome:
         outcome=outcome,
         false_alarm=outcome not in ("right", "ignored") and faulty < 0.5 * (stop - start),
         tier=str(row.get("tier", "")),
-        epsilon=None if estimate is None else float(estimate),
+        epsilon=None if estimate is None else float(estimate["value"]),
         speed=speed,
         slip_share=slip,
     )

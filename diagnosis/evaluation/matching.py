@@ -2,33 +2,31 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any
-
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 
+from diagnosis.results.document import IntervalRow
+from replay.faults import FaultMode, Side
 from replay.truth import TruthInterval
 
-UNION = "sensor_or_actuator"
 MIN_OVERLAP = 0.3
 _GRADES = {"right": 3, "wrong_mode": 2, "wrong_side": 2, "wrong_part": 1}
 
 
-def difference(truth: TruthInterval, row: Mapping[str, Any]) -> str:
+def difference(truth: TruthInterval, row: IntervalRow) -> str:
     """How a reported fault differs from an injected one: ``right``, ``wrong_mode``, ``wrong_side`` or ``wrong_part``.
 
     ``sensor_or_actuator`` is right for an inefficient sensor or actuator, the one pair that cannot be told apart.
     """
     if row["component"] != truth.component:
         return "wrong_part"
-    same_mode = row["mode"] == truth.mode.value
-    if row["side"] == UNION:
+    same_mode = row["mode"] == truth.mode
+    if row["side"] == Side.SENSOR_OR_ACTUATOR:
         if same_mode:
-            return "right" if truth.mode.value == "inefficient" else "wrong_side"
+            return "right" if truth.mode is FaultMode.INEFFICIENT else "wrong_side"
         return "wrong_mode"
-    if row["side"] != truth.side.value:
+    if row["side"] != truth.side:
         return "wrong_side"
     return "right" if same_mode else "wrong_mode"
 

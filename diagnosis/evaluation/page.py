@@ -2,14 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from functools import lru_cache
 from pathlib import Path
-from typing import Any
+from typing import Literal, TypedDict, cast
 
 import jinja2
 from markupsafe import Markup
 
+from diagnosis.evaluation.document import (
+    BandFigures,
+    EventFigures,
+    FaultRow,
+    Figures,
+    MissionFigures,
+    Reliability,
+    ReportRow,
+    ResultRow,
+    ScoresDocument,
+    SideFigures,
+    Spread,
+)
 from diagnosis.evaluation.plots import distribution, reliability_diagram
 from diagnosis.pages import labels
 from diagnosis.pages.environment import POLICY, environment, plain_style
@@ -19,8 +32,10 @@ from diagnosis.results.vocabulary import part_name
 
 _HERE = Path(__file__).parent
 
-_TITLES = {"wheel": "Wheels", "steer": "Steering"}
-_TIMES = {
+_Group = Literal["wheel", "steer"]
+_Time = Literal["detection_delay_s", "onset_error_s", "end_error_s"]
+_TITLES: dict[_Group, str] = {"wheel": "Wheels", "steer": "Steering"}
+_TIMES: dict[_Time, str] = {
     "detection_delay_s": "Detection delay",
     "onset_error_s": "Onset error",
     "end_error_s": "End error",
@@ -55,18 +70,31 @@ _DEFINITIONS = (
 )
 
 
-def build_scores_page(document: Mapping[str, Any]) -> str:
+class _WrongRow(TypedDict):
+    """A line of the list of what was not right."""
+
+    start: float
+    time: str
+    state: str
+    part: str
+    sign: str
+    outcome: str
+    report: str
+    more: str
+
+
+def build_scores_page(document: ScoresDocument) -> str:
     """Page of an evaluation; the same input gives the same text.
 
     Parameters
     ----------
-    document : Mapping[str, Any]
+    document : ScoresDocument
         What `mfhca evaluate --json` prints: ``results`` with the faults and reports of each, and the figures of
         ``all``.
     """
-    document = labels.made_visible(document)
+    document = cast(ScoresDocument, labels.made_visible(document))
     results = document["results"]
-    groups = [_group(key, figures, results) for key, figures in document["all"].items()]
+    groups = [_group(key, document["all"][key], results) for key in _TITLES if key in document["all"]]
     left_out = [f"{r['result']}: {', '.join(r['left_out'])}" for r in results if r["left_out"]]
     count = f"{labels.grouped(len(results))} mission{'s' if len(results) != 1 else ''}"
     context = {
@@ -102,21 +130,21 @@ def _faults(count: int) -> str:
     return f"{count} fault{'s' if count != 1 else ''}"
 
 
-def _both(e: Mapping[str, Any]) -> str:
+def _both(e: Spread) -> str:
     """Median and 95 % quantile of a time in one unit."""
-    if not e["n"]:
+    if e["median"] is None or e["p95"] is None:
         return "–"
     scale, unit = (1e3, "ms") if max(abs(e["median"]), abs(e["p95"])) < 1 else (1.0, "s")
-    return " / ".join(f"{labels.number(round(scale * e[k], 2))}" for k in ("median", "p95")) + f" {unit}"
+    return " / ".join(labels.number(round(scale * x, 2)) for x in (e["median"], e["p95"])) + f" {unit}"
 
 
-def _group(key: str, figures: Mapping[str, Any], results: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+def _group(key: _Group, figures: Figures, results: Sequence[ResultRow]) -> dict[str, object]:
     """What the page shows of wheels or of steering."""
     title = _TITLES[key]
     return {
         "title": title,
         "figures": figures,
-        "told": bool(figures["events"]["faults"] or figures["events"]["masked"] or figures["events"]["reported"]),
+        "shown": bool(figures["events"]["faults"] or figures["events"]["masked"] or figures["events"]["reported"]),
         "kpis": list(_kpis(figures)),
         "confusions": [(side, _confusion(values, side)) for side, values in figures["sides"].items()],
         "by_epsilon": [(f"ε {_band(b)}", b) for b in figures["by_epsilon"]],
@@ -127,7 +155,7 @@ def _group(key: str, figures: Mapping[str, Any], results: Sequence[Mapping[str, 
     }
 
 
-def _kpis(figures: Mapping[str, Any]) -> Iterator[tuple[str, str, str]]:
+def _kpis(figures: Figures) -> Iterator[tuple[str, str, str]]:
     """Name, value and what belongs to it of the leading figures."""
     for side, s in figures["sides"].items():
         rates = s["damadics"]
@@ -156,11 +184,11 @@ def _kpis(figures: Mapping[str, Any]) -> Iterator[tuple[str, str, str]]:
     yield "error of ε̂, mean", _share(epsilon["mae"]), more
 
 
-def _band(b: Mapping[str, Any]) -> str:
+def _band(b: BandFigures) -> str:
     return f"from {b['low']:g}" if b["high"] is None else f"{b['low']:g}–{b['high']:g}"
 
 
-def _confusion(side_figures: Mapping[str, Any], side: str) -> dict[str, Any]:
+def _confusion(side_figures: SideFigures, side: str) -> dict[str, object]:
     """Rows that occur, each cell with its share of the row, its seconds and its colour."""
     rows = []
     for name, seconds in zip(side_figures["true"], side_figures["seconds"], strict=True):
@@ -175,7 +203,7 @@ def _confusion(side_figures: Mapping[str, Any], side: str) -> dict[str, Any]:
     return {"columns": columns, "rows": rows}
 
 
-def _cell(true: str, reported: str, seconds: float, share: float) -> dict[str, Any]:
+def _cell(true: str, reported: str, seconds: float, share: float) -> dict[str, object]:
     if seconds <= 0:
         return {"kind": "none", "colour": ""}
     kind, sign, colour = ("right", "✓", "--accent") if true == reported else ("wrong", "✗", "--stuck")
@@ -193,37 +221,35 @@ def _cell(true: str, reported: str, seconds: float, share: float) -> dict[str, A
     }
 
 
-def _plots(
-    title: str, faults: Sequence[Mapping[str, Any]], figures: Mapping[str, Any]
-) -> Iterator[tuple[str, Markup, str]]:
+def _plots(title: str, faults: Sequence[FaultRow], figures: EventFigures) -> Iterator[tuple[str, Markup, str]]:
     """Title, picture and words of each distribution of times."""
     for key, name in _TIMES.items():
         values = {
-            side: [f[key] for f in faults if f["side"] == side and f[key] is not None]
+            side: [seconds for f in faults if f["side"] == side and (seconds := f[key]) is not None]
             for side in ("sensor", "actuator")
         }
         plot = distribution(f"{title}: {name.lower()}", values)
         if plot:
             e = figures[key]
             words = f"Median {_time(e['median'])}, 95 % {_time(e['p95'])}, over {_faults(e['n'])}"
-            missing = e.get("without", 0)
+            missing = figures["detection_delay_s"]["without"] if key == "detection_delay_s" else 0
             yield name, plot, words + (f"; {missing} more without a known moment." if missing else ".")
 
 
-def _reliability(r: Mapping[str, Any]) -> dict[str, Any]:
+def _reliability(r: Reliability) -> dict[str, object]:
     title = "all reports" if r["tier"] == "all" else f"{r['tier']}, {r['side'].replace('_', ' ')}"
     words = f"{r['right']} of {r['reported']} right; Brier {_share(r['brier'])}, ECE {_share(r['ece'])}"
     return {"title": title, "words": words, "plot": reliability_diagram(title, r["bins"])}
 
 
-def _missions(results: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
+def _missions(results: Sequence[ResultRow]) -> list[dict[str, object]]:
     """Faults that were not found as they are and reports without a fault of their own, by mission and time."""
     out = []
     for result in results:
         rows = [row for key in _TITLES if key in result for row in _wrong(key, result[key])]
         rows.sort(key=lambda r: (r["start"], r["part"]))
         events = [result[key]["events"] for key in _TITLES if key in result]
-        faults, right = (sum(e[k] for e in events) for k in ("faults", "right"))
+        faults, right = sum(e["faults"] for e in events), sum(e["right"] for e in events)
         false = sum(r["sign"] == "!" for r in rows)
         words = f"{right} of {faults} right, {false} false alarm{'s' if false != 1 else ''}"
         out.append(
@@ -232,13 +258,15 @@ def _missions(results: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
     return out
 
 
-def _wrong(kind: str, group: Mapping[str, Any]) -> Iterator[dict[str, Any]]:
+def _wrong(kind: str, group: MissionFigures) -> Iterator[_WrongRow]:
     reports = {r["id"]: r for r in group["reported"]}
     for f in group["faults"]:
         if f["outcome"] in ("missed", "wrong_mode", "wrong_side", "wrong_part"):
             r = reports.get(f["report"])
-            told = f"reported as {_part(kind, r)}, {r['start_s']:.2f}–{r['stop_s']:.2f} s" if r else ""
-            yield _row(kind, f, f["outcome"], f["report"], f"ε {f['epsilon']:.2f}" + (f"; {told}" if told else ""))
+            reported = f"reported as {_part(kind, r)}, {r['start_s']:.2f}–{r['stop_s']:.2f} s" if r else ""
+            yield _row(
+                kind, f, f["outcome"], f["report"], f"ε {f['epsilon']:.2f}" + (f"; {reported}" if reported else "")
+            )
     for r in group["reported"]:
         if r["false_alarm"] or r["outcome"] == "surplus":
             outcome = "false_alarm" if r["false_alarm"] else "surplus"
@@ -246,7 +274,7 @@ def _wrong(kind: str, group: Mapping[str, Any]) -> Iterator[dict[str, Any]]:
             yield _row(kind, r, outcome, r["id"], more)
 
 
-def _row(kind: str, x: Mapping[str, Any], outcome: str, report: str, more: str) -> dict[str, Any]:
+def _row(kind: str, x: FaultRow | ReportRow, outcome: str, report: str, more: str) -> _WrongRow:
     sign, words = _OUTCOMES[outcome]
     return {
         "start": x["start_s"],
@@ -260,5 +288,5 @@ def _row(kind: str, x: Mapping[str, Any], outcome: str, report: str, more: str) 
     }
 
 
-def _part(kind: str, x: Mapping[str, Any]) -> str:
+def _part(kind: str, x: FaultRow | ReportRow) -> str:
     return f"{x['component']} {part_name(kind, x['side'])} {state_label(x['mode'], x['side']).lower()}"

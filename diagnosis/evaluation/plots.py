@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import Any
 
 from markupsafe import Markup
 
+from diagnosis.evaluation.document import ProbabilityBin
 from diagnosis.pages.labels import span
 from diagnosis.pages.svg import text
 
@@ -65,14 +65,14 @@ def distribution(title: str, values: Mapping[str, Sequence[float]]) -> Markup:
     )
 
 
-def reliability_diagram(title: str, bins: Sequence[Mapping[str, Any]]) -> Markup:
+def reliability_diagram(title: str, bins: Sequence[ProbabilityBin]) -> Markup:
     """Share that was right over the stated probability, with the diagonal; areas grow with the number of faults.
 
     Parameters
     ----------
     title : str
         Whose probabilities.
-    bins : Sequence[Mapping[str, Any]]
+    bins : Sequence[ProbabilityBin]
         From `diagnosis.evaluation.reliability`.
     """
     size, left, top = 132.0, 30.0, 11.0
@@ -87,16 +87,20 @@ def reliability_diagram(title: str, bins: Sequence[Mapping[str, Any]]) -> Markup
     for p in (0.0, 0.5, 1.0):
         parts.append(text(at(p, 0)[0], top + size + 15, f"{p:g}", "tick mid"))
         parts.append(text(left - 5, at(0, p)[1] + 4, f"{p:g}", "tick end"))
-    used = [b for b in bins if b["reported"]]
-    most = max((b["reported"] for b in used), default=1)
-    for b in used:
-        x, y = at(b["probability"], b["right"])
-        words = f"{b['reported']} stated {b['probability']:.2f}, {b['right']:.2f} of them right"
+    used = [
+        (b["reported"], b["probability"], b["right"])
+        for b in bins
+        if b["probability"] is not None and b["right"] is not None
+    ]
+    most = max((count for count, _, _ in used), default=1)
+    for count, stated, right in used:
+        x, y = at(stated, right)
+        words = f"{count} stated {stated:.2f}, {right:.2f} of them right"
         parts.append(
             Markup(
                 '<path class="miss" d="M{x:.1f},{y:.1f}V{d:.1f}"/><circle class="dot" cx="{x:.1f}" cy="{y:.1f}" r="{r:.1f}">'
                 "<title>{words}</title></circle>"
-            ).format(x=x, y=y, d=at(0, b["probability"])[1], r=2.5 + 6 * math.sqrt(b["reported"] / most), words=words)
+            ).format(x=x, y=y, d=at(0, stated)[1], r=2.5 + 6 * math.sqrt(count / most), words=words)
         )
     return Markup('<svg class="plot rel" viewBox="0 0 176 164" role="img" aria-label="{}">{}</svg>').format(
         f"Reliability of {title}", Markup("").join(parts)

@@ -3,19 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 
 from diagnosis.evaluation.counts import REPORT_OUTCOMES, ReportOutcome
+from diagnosis.evaluation.document import ProbabilityBin, Reliability, ReliabilityFigures
 
 BINS = 10
 
 
-def probability_bins(reports: Sequence[ReportOutcome]) -> list[dict[str, Any]]:
+def probability_bins(reports: Sequence[ReportOutcome]) -> list[ProbabilityBin]:
     """Stated probability against the share that was right, in `BINS` equal bins; None in empty ones."""
     place = [min(int(r.probability * BINS), BINS - 1) for r in reports]
-    out = []
+    out: list[ProbabilityBin] = []
     for k in range(BINS):
         mine = [r for r, b in zip(reports, place, strict=True) if b == k]
         out.append(
@@ -30,7 +30,7 @@ def probability_bins(reports: Sequence[ReportOutcome]) -> list[dict[str, Any]]:
     return out
 
 
-def reliability(reports: Sequence[ReportOutcome]) -> list[dict[str, Any]]:
+def reliability(reports: Sequence[ReportOutcome]) -> list[Reliability]:
     """Reliability of the probability of side and mode, over all judged reports and per tier and side.
 
     Parameters
@@ -40,7 +40,7 @@ def reliability(reports: Sequence[ReportOutcome]) -> list[dict[str, Any]]:
 
     Returns
     -------
-    list[dict[str, Any]]
+    list[Reliability]
         ``tier`` and ``side`` (``all`` first), ``reported``, ``right``, ``brier`` = mean (p − right)² (Brier 1950),
         ``ece`` = Σ n_k/n·|mean p_k − share right_k| over the bins (expected calibration error), and ``bins``.
     """
@@ -51,15 +51,19 @@ def reliability(reports: Sequence[ReportOutcome]) -> list[dict[str, Any]]:
     return [{"tier": tier or "unknown", "side": side, **_figures(mine)} for tier, side, mine in groups]
 
 
-def _figures(reports: Sequence[ReportOutcome]) -> dict[str, Any]:
+def _figures(reports: Sequence[ReportOutcome]) -> ReliabilityFigures:
     stated = np.array([r.probability for r in reports])
     right = np.array([r.outcome == "right" for r in reports], dtype=np.float64)
     bins = probability_bins(reports)
-    off = [b["reported"] * abs(b["probability"] - b["right"]) for b in bins if b["reported"]]
+    gaps = [
+        b["reported"] * abs(b["probability"] - b["right"])
+        for b in bins
+        if b["probability"] is not None and b["right"] is not None
+    ]
     return {
         "reported": len(reports),
         "right": int(right.sum()),
         "brier": float(np.mean((stated - right) ** 2)) if reports else None,
-        "ece": sum(off) / len(reports) if reports else None,
+        "ece": sum(gaps) / len(reports) if reports else None,
         "bins": bins,
     }

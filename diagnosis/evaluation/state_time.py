@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from diagnosis.evaluation.aligned import Compared
 from diagnosis.evaluation.counts import BANDS, COLUMNS, CONTACT, EPSILON_BANDS, ROWS, SIDES, Counts, band_of
-from diagnosis.evaluation.matching import UNION
 from diagnosis.evaluation.spans import Span, codes_at, covered, length
+from replay.faults import Side
 
 Array = NDArray[np.float64]
 Codes = NDArray[np.int64]
@@ -84,7 +84,7 @@ def _add_component(group: Compared, component: str, total: Counts) -> None:
     either = [
         (float(a), float(b), _index(r["mode"], COLUMNS, _UNDECIDED))
         for a, b, r in zip(group.start, group.stop, group.rows, strict=True)
-        if r["component"] == component and r["side"] == UNION
+        if r["component"] == component and r["side"] == Side.SENSOR_OR_ACTUATOR
     ]
     coded = [*either, *(f[:3] for s in SIDES for f in true[s]), *(span for s in SIDES for span in told[s])]
     start, stop, t, speed, slips = _pieces(group, component, coded)
