@@ -68,23 +68,10 @@ def fit_offset(timelines: Sequence[Timeline], machine: Machine, bad: set[str]) -
         return _nothing(f"{sorted(bad & set(used))[0]} has a wrong unit")
     if not axles or len(wheels) < 3:
         return _nothing("it takes three wheels and a steered axle")
-    levers: list[Array] = []
-    speeds: list[Array] = []
-    missions: list[NDArray[np.int64]] = []
-    parts: list[NDArray[np.int64]] = []
-    for m, timeline in enumerate(timelines):
-        v, phi = stack(timeline, used[: len(wheels)]), stack(timeline, used[len(wheels) :])
-        if not (np.isfinite(v).any(axis=0).all() and np.isfinite(phi).any(axis=0).all()):
-            continue
-        lever, speed = _equations(v, phi, machine.geometry, offset_pattern(machine), timeline.dt)
-        levers.append(lever)
-        speeds.append(speed)
-        missions.append(np.full(len(lever), m, dtype=np.int64))
-        parts.append(len(parts) * 10 + np.arange(len(lever)) * 10 // max(1, len(lever)))
-    if not levers:
+    stacked = _stacked(timelines, machine, used, machine.geometry)
+    if stacked is None:
         return _nothing("speeds of all wheels and all steering angles are not logged together")
-    x, y = np.concatenate(levers), np.concatenate(speeds)  # (blocks, wheels, 2), (blocks, wheels)
-    mission, part = np.concatenate(missions), np.concatenate(parts)
+    x, y, mission, part = stacked  # (blocks, wheels, 2), (blocks, wheels), (blocks,), (blocks,)
     turning = np.abs(x[..., 1]).max(axis=1, initial=0.0) > _LEAST_LEVER
     if np.count_nonzero(turning) < _LEAST:
         return _nothing("not excited: the missions hold no steering while driving")
@@ -104,6 +91,29 @@ def fit_offset(timelines: Sequence[Timeline], machine: Machine, bad: set[str]) -
         return _nothing(f"too uncertain: {d[1]:.2g} ± {std[1]:.2g} m")
     spread = float(np.hypot(std[1], _SLIP * d[1]))
     return Estimate(float(d[1]), spread, why), int(np.count_nonzero(turning)), found
+
+
+def _stacked(
+    timelines: Sequence[Timeline], machine: Machine, used: list[str], geometry: Geometry
+) -> tuple[Array, Array, NDArray[np.int64], NDArray[np.int64]] | None:
+    """Levers and speeds of all missions' blocks, the mission of each and its tenth of that; None without any."""
+    count = len(machine.wheels)
+    levers: list[Array] = []
+    speeds: list[Array] = []
+    missions: list[NDArray[np.int64]] = []
+    parts: list[NDArray[np.int64]] = []
+    for m, timeline in enumerate(timelines):
+        v, phi = stack(timeline, used[:count]), stack(timeline, used[count:])
+        if not (np.isfinite(v).any(axis=0).all() and np.isfinite(phi).any(axis=0).all()):
+            continue
+        lever, speed = _equations(v, phi, geometry, offset_pattern(machine), timeline.dt)
+        levers.append(lever)
+        speeds.append(speed)
+        missions.append(np.full(len(lever), m, dtype=np.int64))
+        parts.append(len(parts) * 10 + np.arange(len(lever)) * 10 // max(1, len(lever)))
+    if not levers:
+        return None
+    return np.concatenate(levers), np.concatenate(speeds), np.concatenate(missions), np.concatenate(parts)
 
 
 def _nothing(why: str) -> tuple[Estimate, int, tuple[int, ...]]:

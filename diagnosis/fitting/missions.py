@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from diagnosis.fitting.control import fit_control, lambda_doubt
+from diagnosis.fitting.control import ControlFit, fit_control, lambda_doubt
 from diagnosis.fitting.drives import drive_data, fit_drives
 from diagnosis.fitting.geometry import fit_offset
 from diagnosis.fitting.machine import Constant, with_control, with_drives, with_noise, with_offset, with_plants
@@ -82,7 +82,7 @@ def fit_missions(missions: Sequence[Mission], machine: Machine, *, progress: Sub
     """
     names = tuple(m.files[0].path.name if m.files else f"mission {k}" for k, m in enumerate(missions, 1))
     timelines = [m.timeline for m in missions]
-    replays = []
+    replays: list[Replay] = []
     for name, timeline in zip(names, timelines, strict=True):
         progress(Progress(Stage.REPLAYING_MISSION, name))
         replays.append(_slim(replay_loop(timeline, machine)))
@@ -91,14 +91,9 @@ def fit_missions(missions: Sequence[Mission], machine: Machine, *, progress: Sub
     driving = sum(_driving(wheels) for wheels in records)
     progress(Progress(Stage.CHECKING_UNITS))
     errors = list(find_unit_errors(timelines, replays, machine))
-    bad = {s for e in errors for s in e.signals}
     progress(Progress(Stage.FITTING_LAW))
-    control = fit_control(timelines, replays, machine, bad)
-    doubt, leaves = lambda_doubt(control, machine, speed_mistakes(machine))
-    if doubt:
-        suspects = tuple(f"wheel.{w}.{leaf}" for leaf in leaves for w in machine.wheels)
-        errors.append(UnitError(suspects, control.lambda_.value / machine.control.lambda_, doubt))
-        bad |= set(suspects)
+    control, doubt = _law(timelines, replays, machine, errors)
+    bad = {s for e in errors for s in e.signals}
     if driving < _LEAST_SECONDS and not errors:
         raise NotJudged(
             f"{', '.join(names) or 'no mission'}: {driving:.1f} s in which a wheel is commanded to move, {_LEAST_SECONDS:g} s "
@@ -110,41 +105,66 @@ def fit_missions(missions: Sequence[Mission], machine: Machine, *, progress: Sub
     plants = fit_plants(usable, machine.plant.flow) if usable else []
     progress(Progress(Stage.FITTING_GEOMETRY))
     offset, blocks, turned = fit_offset(timelines, machine, bad)
-    noise = fit_noise(timelines, machine)
     constants: list[Constant] = []
-    left_out: list[str] = []
     out = with_offset(machine, offset, blocks, len(turned), constants)
     out = with_control(out, machine, control, bool(doubt), constants)
     out = with_plants(out, machine, plants, spoiled, constants)
     if len(machine.wheels) == 1 or machine.geometry is None:
         progress(Progress(Stage.FITTING_DRIVES))
-        logged = {
-            w: sum(
-                drive_data(t, r.v_ref[:, i], machine, w) is not None for t, r in zip(timelines, replays, strict=True)
-            )
-            for i, w in enumerate(machine.wheels)
-        }
-        drives = fit_drives(list(zip(timelines, replays, strict=True)), machine)
-        out = with_drives(out, drives, dict(zip(machine.wheels, spoiled, strict=True)), logged, constants)
-    out = with_noise(out, noise, bad, constants)
-    left_out += _left_plants(plants, machine, names)
-    left_out += [f"{names[m]}: the control law fits it badly or unlike the others" for m in control.left_missions]
-    notes = []
-    if control.law:
-        notes.append(
-            f"Control law {control.law}, Ψ̂ {control.psi}, explains at least {100 * control.explained:.1f} % of the command "
-            f"of {len(control.missions)} missions; λ̂ from increments {control.increments.value:.4g} ± "
-            f"{control.increments.std:.2g} s/m ({control.increments.why})."
-        )
+        out = _with_drives(out, machine, list(zip(timelines, replays, strict=True)), spoiled, constants)
+    out = with_noise(out, fit_noise(timelines, machine), bad, constants)
     return FitResult(
         machine=out,
         constants=tuple(constants),
         unit_errors=tuple(errors),
-        left_out=tuple(left_out),
-        notes=tuple(notes),
+        left_out=(*_left_plants(plants, machine, names), *_left_laws(control, names)),
+        notes=_law_notes(control),
         missions=names,
         seconds=seconds,
         driving=driving,
+    )
+
+
+def _law(
+    timelines: Sequence[Timeline], replays: Sequence[Replay], machine: Machine, errors: list[UnitError]
+) -> tuple[ControlFit, str]:
+    """The control law and why its λ̂ is in doubt (empty where not); a doubted one adds the unit error behind it."""
+    control = fit_control(timelines, replays, machine, {s for e in errors for s in e.signals})
+    doubt, leaves = lambda_doubt(control, machine, speed_mistakes(machine))
+    if doubt:
+        suspects = tuple(f"wheel.{w}.{leaf}" for leaf in leaves for w in machine.wheels)
+        errors.append(UnitError(suspects, control.lambda_.value / machine.control.lambda_, doubt))
+    return control, doubt
+
+
+def _with_drives(
+    out: Machine,
+    machine: Machine,
+    missions: Sequence[tuple[Timeline, Replay]],
+    spoiled: Sequence[str],
+    constants: list[Constant],
+) -> Machine:
+    """The machine with the models of its single drives."""
+    logged = {
+        w: sum(drive_data(t, r.v_ref[:, i], machine, w) is not None for t, r in missions)
+        for i, w in enumerate(machine.wheels)
+    }
+    spoiled_by = dict(zip(machine.wheels, spoiled, strict=True))
+    return with_drives(out, fit_drives(missions, machine), spoiled_by, logged, constants)
+
+
+def _left_laws(control: ControlFit, names: tuple[str, ...]) -> list[str]:
+    return [f"{names[m]}: the control law fits it badly or unlike the others" for m in control.left_missions]
+
+
+def _law_notes(control: ControlFit) -> tuple[str, ...]:
+    """What the control law explains, where one was found."""
+    if not control.law:
+        return ()
+    return (
+        f"Control law {control.law}, Ψ̂ {control.psi}, explains at least {100 * control.explained:.1f} % of the command "
+        f"of {len(control.missions)} missions; λ̂ from increments {control.increments.value:.4g} ± "
+        f"{control.increments.std:.2g} s/m ({control.increments.why}).",
     )
 
 
