@@ -6,12 +6,13 @@ from typing import Any
 
 import msgspec
 
+from diagnosis.evaluation.document import ScoresDocument
 from diagnosis.results.comparison_document import ComparisonDocument
 from diagnosis.results.document import ReportDocument
 from replay.errors import ConfigError
 
 #: Type of each document; its docstrings are the schema's descriptions.
-DOCUMENTS: dict[str, type] = {"report": ReportDocument, "comparison": ComparisonDocument}
+DOCUMENTS: dict[str, type] = {"report": ReportDocument, "comparison": ComparisonDocument, "scores": ScoresDocument}
 
 
 def schema_of(name: str) -> dict[str, Any]:
