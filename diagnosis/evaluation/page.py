@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from functools import lru_cache
 from pathlib import Path
-from typing import Literal, TypedDict, cast
+from typing import Literal, TypedDict
 
 import jinja2
 from markupsafe import Markup
@@ -92,7 +92,7 @@ def build_scores_page(document: ScoresDocument) -> str:
         What `mfhca evaluate --json` prints: ``results`` with the faults and reports of each, and the figures of
         ``all``.
     """
-    document = cast(ScoresDocument, labels.made_visible(document))
+    document = labels.made_visible(document)
     results = document["results"]
     groups = [_group(key, document["all"][key], results) for key in _TITLES if key in document["all"]]
     left_out = [f"{r['result']}: {', '.join(r['left_out'])}" for r in results if r["left_out"]]
