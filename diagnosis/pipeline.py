@@ -78,9 +78,9 @@ def diagnose(
         if wheel not in machine.wheels:
             raise ConfigError(f"--wheel {wheel}: no such wheel; the machine has {', '.join(machine.wheels)}")
     mission = load_mission(paths, machine, start_s=start_s, stop_s=stop_s, progress=progress, store=store)
-    told = quality.recorded(mission.signals, mission.timeline)
+    recorded = quality.recorded(mission.signals, mission.timeline)
     mission = replace(mission, signals=mission.signals.without_samples())  # which leaves their memory to the diagnosis
-    return _diagnosed(mission, told, machine, machine_source, chosen, machine_id, progress)
+    return _diagnosed(mission, recorded, machine, machine_source, chosen, machine_id, progress)
 
 
 def diagnose_signals(signals: Signals, machine: Machine) -> MissionResult:
@@ -113,13 +113,13 @@ def diagnose_mission(
         Where nothing in the mission can be judged.
     """
     chosen = tuple(machine.wheels if wheels is None else wheels)
-    told = quality.recorded(mission.signals, mission.timeline)
-    return _diagnosed(mission, told, machine, machine_source, chosen, machine_id, progress)
+    recorded = quality.recorded(mission.signals, mission.timeline)
+    return _diagnosed(mission, recorded, machine, machine_source, chosen, machine_id, progress)
 
 
 def _diagnosed(
     mission: Mission,
-    told: quality.Recorded,
+    recorded: quality.Recorded,
     machine: Machine,
     machine_source: str,
     chosen: tuple[str, ...],
@@ -139,7 +139,7 @@ def _diagnosed(
     found = replace(found, assessments=judged)
     _require_something(found.assessments, mission, machine)
     publish(Progress(Stage.DECIDING))
-    return _result(mission, told, machine, replay, found, machine_source, machine_id)
+    return _result(mission, recorded, machine, replay, found, machine_source, machine_id)
 
 
 def _require_something(assessments: Mapping[tuple[str, str], Assessment], mission: Mission, machine: Machine) -> None:

@@ -260,7 +260,7 @@ def _unseen_before(b: FoundFault, sides: Sides) -> str:
 
 
 def _other_faults(a: FoundFault, newer: Sequence[FoundFault]) -> str:
-    """Say that a part whose fault is gone has another one, or that its fault may be told as one of the other side."""
+    """Say that a part whose fault is gone has another one, or that its fault may be taken for one of the other side."""
     keys = set(_keys(a.component, a.side))
     near = [b for b in newer if b.component == a.component and b.severity is not Severity.INFO]
     own = [b for b in near if keys & set(_keys(b.component, b.side))]

@@ -28,8 +28,8 @@ CHANGES = {"row": "row", "side": "side", "severity": "severity", "epsilon": "ÎµÌ
 
 def headline(counts: Mapping[str, int]) -> str:
     """How many faults became what, in words."""
-    told = [f"{n} {OUTCOMES[name]}" for name, n in counts.items() if n]
-    return "Faults: " + ", ".join(told) if told else "No fault in either mission"
+    found = [f"{n} {OUTCOMES[name]}" for name, n in counts.items() if n]
+    return "Faults: " + ", ".join(found) if found else "No fault in either mission"
 
 
 def times(count: int, seconds: float) -> str:

@@ -15,13 +15,11 @@ from numpy.typing import NDArray
 from diagnosis.results.assessment import Finding
 from diagnosis.results.result import Closeups
 from replay.arrays.envelope import bucket_of, shown
-from replay.faults import FaultMode
 
 Steps = NDArray[np.int64]
 
 _AROUND_S, _WHOLE_S, _MARGIN_S = 2.0, 10.0, 0.2
 _MISSION_STEPS, _COMPONENT_STEPS = 1 << 18, 1 << 17
-_WORST = (FaultMode.STUCK, FaultMode.NO_SIGNAL)
 
 
 def steps_around(spans: Iterable[tuple[int, int]], size: int, dt: float, most: int = _MISSION_STEPS) -> Steps:
@@ -75,7 +73,7 @@ def steps_of(findings: Sequence[Finding], size: int, dt: float) -> Steps:
     """
     if bucket_of(size) == 1:
         return np.empty(0, np.int64)
-    order = sorted(findings, key=lambda f: (f.mode not in _WORST, f.start - f.stop, f.start))
+    order = sorted(findings, key=lambda f: (not f.mode.total, f.start - f.stop, f.start))
     return steps_around([(f.start, f.stop) for f in order], size, dt, _COMPONENT_STEPS)
 
 

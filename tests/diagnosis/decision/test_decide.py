@@ -1,57 +1,19 @@
-"""Severity by Assumptions 1 and 2, and a verdict that is never better than what was judged."""
+"""A verdict that is never better than what was judged."""
 
 from __future__ import annotations
 
 from dataclasses import replace
-from itertools import pairwise
 
 import numpy as np
 import pytest
 
 from diagnosis.decision.decide import Decision, decide
-from diagnosis.decision.intervals import intervals_of, spans_of
-from diagnosis.decision.severity import severity_of
+from diagnosis.decision.intervals import intervals_of
 from diagnosis.results.assessment import CODE, Assessment, Finding, unassessed
-from diagnosis.results.fault_rows import mode_words
-from diagnosis.results.result import Epsilon, Hypothesis
 from diagnosis.results.vocabulary import part_words
 from replay.faults import FaultMode, Side, State
 from replay.machine.config import Limits
-
-N, STEP = 30_000, 1_000_000  # 30 s at 1 kHz
-LIMITS = Limits()
-WHEELS, AXLES = ("FR", "FL"), ("front",)
-SIDES = ("sensor", "actuator")
-
-
-def finding(
-    side: Side, mode: FaultMode, start: int = 1000, stop: int = 9000, p: float = 0.99, epsilon: float | None = 1.0
-) -> Finding:
-    return Finding(
-        start=start,
-        stop=stop,
-        side=side,
-        mode=mode,
-        probability=p,
-        hypotheses=(Hypothesis(side.value, mode.value, p), Hypothesis(side.value, "healthy", 1 - p)),
-        epsilon=None if epsilon is None else Epsilon(epsilon, epsilon - 0.01, epsilon + 0.01),
-        sat=None,
-        evidence=("what decided",),
-        tier="direct",
-    )
-
-
-def assessed(*findings: Finding) -> Assessment:
-    states = np.full(N, CODE[State.HEALTHY])
-    for f in findings:
-        states[f.start : f.stop] = CODE[State(f.mode.value)]
-    return Assessment(states=states, findings=findings, tier="direct")
-
-
-def machine(**parts: Assessment) -> dict[tuple[str, str], Assessment]:
-    """Assessments of two wheels and an axle, healthy but for `parts` (``FR_sensor=…``)."""
-    keys = [(c, s) for c in (*WHEELS, *AXLES) for s in SIDES]
-    return {(c, s): parts.get(f"{c}_{s}", assessed()) for c, s in keys}
+from tests.diagnosis.decision.findings import AXLES, LIMITS, SIDES, STEP, N, assessed, finding, machine
 
 
 def verdict(
@@ -62,73 +24,6 @@ def verdict(
 ) -> Decision:
     seconds = decided if isinstance(decided, dict) else dict.fromkeys(assessments, decided)
     return decide(intervals_of(assessments, AXLES, 0, STEP, limits), assessments, seconds, AXLES, limits, damage)
-
-
-TOTAL = pytest.mark.parametrize("mode", [FaultMode.STUCK, FaultMode.NO_SIGNAL])
-
-
-@TOTAL
-def test_assumption_1_brief_sensor_fault_is_tolerable(mode: FaultMode) -> None:
-    severity, advice = severity_of(finding(Side.SENSOR, mode), 1.0, LIMITS)
-    assert severity == "low"
-    assert "Tolerable" in advice
-    assert "Assumption 1" in advice
-
-
-@TOTAL
-def test_assumption_1_persistent_sensor_fault_means_stop(mode: FaultMode) -> None:
-    severity, advice = severity_of(finding(Side.SENSOR, mode), 1.001, LIMITS)
-    assert severity == "high"
-    assert "Stop and repair" in advice
-    assert severity_of(finding(Side.SENSOR, mode), 1.5, Limits(brief=2.0))[0] == "low"
-
-
-@TOTAL
-@pytest.mark.parametrize("seconds", [0.05, 100.0])
-def test_assumption_2_actuator_fault_means_stop_at_once(mode: FaultMode, seconds: float) -> None:
-    severity, advice = severity_of(finding(Side.ACTUATOR, mode), seconds, LIMITS)
-    assert severity == "high"
-    assert "Stop at once" in advice
-    assert "Assumption 2" in advice
-
-
-@TOTAL
-def test_drive_that_may_be_either_is_treated_as_the_actuator(mode: FaultMode) -> None:
-    assert severity_of(finding(Side.SENSOR_OR_ACTUATOR, mode), 0.5, LIMITS)[0] == "high"
-
-
-@pytest.mark.parametrize("side", list(Side))
-@pytest.mark.parametrize("mode", [FaultMode.INEFFICIENT, FaultMode.NOISY])
-def test_other_rows_are_watched(side: Side, mode: FaultMode) -> None:
-    marked, advice = severity_of(finding(side, mode, epsilon=0.5), 60.0, LIMITS)
-    slight, _ = severity_of(finding(side, mode, epsilon=0.15), 60.0, LIMITS)
-    assert (marked, slight) == ("medium", "low")
-    assert "no reason to stop" in advice
-
-
-def test_gain_outside_the_table_is_checked() -> None:
-    severity, advice = severity_of(finding(Side.SENSOR, FaultMode.OUTSIDE_TABLE, epsilon=-0.4), 60.0, LIMITS)
-    assert severity == "medium"
-    assert "scaling" in advice
-
-
-@pytest.mark.parametrize("side", list(Side))
-@pytest.mark.parametrize("mode", list(FaultMode))
-def test_improbable_faults_are_no_ground_to_act(side: Side, mode: FaultMode) -> None:
-    assert severity_of(finding(side, mode, p=0.59), 60.0, LIMITS)[0] == "info"
-
-
-@pytest.mark.parametrize("side", list(Side))
-@pytest.mark.parametrize("mode", list(FaultMode))
-def test_probable_faults_are_worth_a_check(side: Side, mode: FaultMode) -> None:
-    dead_valve = side is not Side.SENSOR and mode in (FaultMode.STUCK, FaultMode.NO_SIGNAL)
-    assert severity_of(finding(side, mode, p=0.89), 60.0, LIMITS)[0] == ("medium" if dead_valve else "low")
-
-
-def test_what_is_more_probably_alive_does_not_stop_the_machine() -> None:
-    found = finding(Side.ACTUATOR, FaultMode.STUCK, p=0.3)
-    found = replace(found, hypotheses=(Hypothesis("actuator", "stuck", 0.3), Hypothesis("actuator", "noisy", 0.69)))
-    assert severity_of(found, 8.0, LIMITS)[0] == "medium"
 
 
 def test_healthy_machine_is_ready() -> None:
@@ -204,41 +99,6 @@ def test_damaged_log_is_never_ready(decided: float) -> None:
     assert verdict(fault, damage=("chunk 7 is cut off",)).status == "stop"
 
 
-def test_intervals_are_numbered_worst_first_then_by_time() -> None:
-    parts = machine(
-        FL_sensor=assessed(finding(Side.SENSOR, FaultMode.NOISY, 500, 900, epsilon=0.1)),
-        FR_actuator=assessed(
-            finding(Side.ACTUATOR, FaultMode.STUCK, 8000, 9000),
-            finding(Side.ACTUATOR, FaultMode.NO_SIGNAL, 3000, 4000),
-            finding(Side.ACTUATOR, FaultMode.NOISY, 100, 200, p=0.5),
-        ),
-        front_sensor=assessed(finding(Side.SENSOR, FaultMode.INEFFICIENT, 6000, 7000, epsilon=0.5)),
-    )
-    got = intervals_of(parts, AXLES, 5_000_000_000, STEP, LIMITS)
-    assert [(f.id, f.component, f.severity, f.start_s) for f in got] == [
-        ("F1", "FR", "high", 3.0),
-        ("F2", "FR", "high", 8.0),
-        ("F3", "front", "medium", 6.0),
-        ("F4", "FL", "low", 0.5),
-        ("F5", "FR", "info", 0.1),
-    ]
-    assert [f.kind for f in got] == ["wheel", "wheel", "steer", "wheel", "wheel"]
-    assert (got[0].start_ns, got[0].stop_ns) == (8_000_000_000, 9_000_000_000)
-
-
-def test_time_of_detection_is_the_samples() -> None:
-    causal = replace(finding(Side.SENSOR, FaultMode.STUCK, 1000, 9000), detected=1004)
-    parts = machine(FR_sensor=assessed(causal), FL_sensor=assessed(finding(Side.SENSOR, FaultMode.STUCK)))
-    got = {f.component: f.detected_s for f in intervals_of(parts, AXLES, 5_000_000_000, STEP, LIMITS)}
-    assert got == {"FR": pytest.approx(1.004), "FL": None}
-
-
-def test_shared_finding_counts_once() -> None:
-    shared = finding(Side.SENSOR_OR_ACTUATOR, FaultMode.INEFFICIENT, epsilon=0.5)
-    got = intervals_of(machine(FR_sensor=assessed(shared), FR_actuator=assessed(shared)), AXLES, 0, STEP, LIMITS)
-    assert [f.id for f in got] == ["F1"]
-
-
 def test_every_fault_above_info_has_an_action() -> None:
     parts = machine(
         FR_sensor=assessed(
@@ -257,31 +117,6 @@ def test_every_fault_above_info_has_an_action() -> None:
     assert "FR speed sensor" in str(got.actions[0]["text"])
     assert "without signal" in str(got.actions[0]["text"])
     assert got.title == "1 fault to repair, 2 to watch"
-
-
-def test_spans_leave_no_gap() -> None:
-    parts = machine(FR_sensor=assessed(finding(Side.SENSOR, FaultMode.STUCK, 0, 100)))
-    parts["front", "actuator"] = unassessed(N, State.NO_DATA, "the valve is not in the log")
-    spans = spans_of(parts, STEP)
-    for component, side in parts:
-        mine = [s for s in spans if (s.component, s.side) == (component, side)]
-        assert mine[0].start_s == 0.0
-        assert mine[-1].stop_s == pytest.approx(30.0)
-        assert all(a.stop_s == b.start_s for a, b in pairwise(mine))
-    first, second = (s for s in spans if (s.component, s.side) == ("FR", "sensor"))
-    assert (first.state, first.stop_s, second.state) == (State.STUCK, 0.1, State.HEALTHY)
-    assert spans[-1].reason == "the valve is not in the log"
-
-
-def test_words_of_the_paper() -> None:
-    assert mode_words("actuator", "noisy") == "disturbed"
-    assert mode_words("sensor", "noisy") == "noisy"
-    assert mode_words("actuator", "no_signal") == "without control signal"
-    for side in Side:
-        for mode in FaultMode:
-            assert mode_words(side.value, mode.value)
-        assert part_words("wheel", "FR", side.value).startswith("FR ")
-        assert "steering" in part_words("steer", "front", side.value)
 
 
 def test_deviations_that_nothing_explains_give_no_all_clear() -> None:

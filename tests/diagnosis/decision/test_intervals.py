@@ -1,0 +1,62 @@
+"""Faults are numbered by urgency, and states leave no gap."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from itertools import pairwise
+
+import pytest
+
+from diagnosis.decision.intervals import intervals_of, spans_of
+from diagnosis.results.assessment import unassessed
+from replay.faults import FaultMode, Side, State
+from tests.diagnosis.decision.findings import AXLES, LIMITS, STEP, N, assessed, finding, machine
+
+
+def test_intervals_are_numbered_worst_first_then_by_time() -> None:
+    parts = machine(
+        FL_sensor=assessed(finding(Side.SENSOR, FaultMode.NOISY, 500, 900, epsilon=0.1)),
+        FR_actuator=assessed(
+            finding(Side.ACTUATOR, FaultMode.STUCK, 8000, 9000),
+            finding(Side.ACTUATOR, FaultMode.NO_SIGNAL, 3000, 4000),
+            finding(Side.ACTUATOR, FaultMode.NOISY, 100, 200, p=0.5),
+        ),
+        front_sensor=assessed(finding(Side.SENSOR, FaultMode.INEFFICIENT, 6000, 7000, epsilon=0.5)),
+    )
+    got = intervals_of(parts, AXLES, 5_000_000_000, STEP, LIMITS)
+    assert [(f.id, f.component, f.severity, f.start_s) for f in got] == [
+        ("F1", "FR", "high", 3.0),
+        ("F2", "FR", "high", 8.0),
+        ("F3", "front", "medium", 6.0),
+        ("F4", "FL", "low", 0.5),
+        ("F5", "FR", "info", 0.1),
+    ]
+    assert [f.kind for f in got] == ["wheel", "wheel", "steer", "wheel", "wheel"]
+    assert (got[0].start_ns, got[0].stop_ns) == (8_000_000_000, 9_000_000_000)
+
+
+def test_time_of_detection_is_the_samples() -> None:
+    causal = replace(finding(Side.SENSOR, FaultMode.STUCK, 1000, 9000), detected=1004)
+    parts = machine(FR_sensor=assessed(causal), FL_sensor=assessed(finding(Side.SENSOR, FaultMode.STUCK)))
+    got = {f.component: f.detected_s for f in intervals_of(parts, AXLES, 5_000_000_000, STEP, LIMITS)}
+    assert got == {"FR": pytest.approx(1.004), "FL": None}
+
+
+def test_shared_finding_counts_once() -> None:
+    shared = finding(Side.SENSOR_OR_ACTUATOR, FaultMode.INEFFICIENT, epsilon=0.5)
+    got = intervals_of(machine(FR_sensor=assessed(shared), FR_actuator=assessed(shared)), AXLES, 0, STEP, LIMITS)
+    assert [f.id for f in got] == ["F1"]
+
+
+def test_spans_leave_no_gap() -> None:
+    parts = machine(FR_sensor=assessed(finding(Side.SENSOR, FaultMode.STUCK, 0, 100)))
+    parts["front", "actuator"] = unassessed(N, State.NO_DATA, "the valve is not in the log")
+    spans = spans_of(parts, STEP)
+    for component, side in parts:
+        mine = [s for s in spans if (s.component, s.side) == (component, side)]
+        assert mine[0].start_s == 0.0
+        assert mine[-1].stop_s == pytest.approx(30.0)
+        assert all(a.stop_s == b.start_s for a, b in pairwise(mine))
+    first, second = (s for s in spans if (s.component, s.side) == ("FR", "sensor"))
+    assert (first.state, first.stop_s, second.state) == (State.STUCK, 0.1, State.HEALTHY)
+    assert spans[-1].reason == "the valve is not in the log"

@@ -1,0 +1,79 @@
+"""Severity and advice by Assumptions 1 and 2."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+from diagnosis.decision.severity import severity_of
+from diagnosis.results.result import Hypothesis
+from replay.faults import FaultMode, Side
+from replay.machine.config import Limits
+from tests.diagnosis.decision.findings import LIMITS, finding
+
+TOTAL = pytest.mark.parametrize("mode", [FaultMode.STUCK, FaultMode.NO_SIGNAL])
+
+
+@TOTAL
+def test_assumption_1_brief_sensor_fault_is_tolerable(mode: FaultMode) -> None:
+    severity, advice = severity_of(finding(Side.SENSOR, mode), 1.0, LIMITS)
+    assert severity == "low"
+    assert "Tolerable" in advice
+    assert "Assumption 1" in advice
+
+
+@TOTAL
+def test_assumption_1_persistent_sensor_fault_means_stop(mode: FaultMode) -> None:
+    severity, advice = severity_of(finding(Side.SENSOR, mode), 1.001, LIMITS)
+    assert severity == "high"
+    assert "Stop and repair" in advice
+    assert severity_of(finding(Side.SENSOR, mode), 1.5, Limits(brief=2.0))[0] == "low"
+
+
+@TOTAL
+@pytest.mark.parametrize("seconds", [0.05, 100.0])
+def test_assumption_2_actuator_fault_means_stop_at_once(mode: FaultMode, seconds: float) -> None:
+    severity, advice = severity_of(finding(Side.ACTUATOR, mode), seconds, LIMITS)
+    assert severity == "high"
+    assert "Stop at once" in advice
+    assert "Assumption 2" in advice
+
+
+@TOTAL
+def test_drive_that_may_be_either_is_treated_as_the_actuator(mode: FaultMode) -> None:
+    assert severity_of(finding(Side.SENSOR_OR_ACTUATOR, mode), 0.5, LIMITS)[0] == "high"
+
+
+@pytest.mark.parametrize("side", list(Side))
+@pytest.mark.parametrize("mode", [FaultMode.INEFFICIENT, FaultMode.NOISY])
+def test_other_rows_are_watched(side: Side, mode: FaultMode) -> None:
+    marked, advice = severity_of(finding(side, mode, epsilon=0.5), 60.0, LIMITS)
+    slight, _ = severity_of(finding(side, mode, epsilon=0.15), 60.0, LIMITS)
+    assert (marked, slight) == ("medium", "low")
+    assert "no reason to stop" in advice
+
+
+def test_gain_outside_the_table_is_checked() -> None:
+    severity, advice = severity_of(finding(Side.SENSOR, FaultMode.OUTSIDE_TABLE, epsilon=-0.4), 60.0, LIMITS)
+    assert severity == "medium"
+    assert "scaling" in advice
+
+
+@pytest.mark.parametrize("side", list(Side))
+@pytest.mark.parametrize("mode", list(FaultMode))
+def test_improbable_faults_are_no_ground_to_act(side: Side, mode: FaultMode) -> None:
+    assert severity_of(finding(side, mode, p=0.59), 60.0, LIMITS)[0] == "info"
+
+
+@pytest.mark.parametrize("side", list(Side))
+@pytest.mark.parametrize("mode", list(FaultMode))
+def test_probable_faults_are_worth_a_check(side: Side, mode: FaultMode) -> None:
+    dead_valve = side is not Side.SENSOR and mode in (FaultMode.STUCK, FaultMode.NO_SIGNAL)
+    assert severity_of(finding(side, mode, p=0.89), 60.0, LIMITS)[0] == ("medium" if dead_valve else "low")
+
+
+def test_what_is_more_probably_alive_does_not_stop_the_machine() -> None:
+    found = finding(Side.ACTUATOR, FaultMode.STUCK, p=0.3)
+    found = replace(found, hypotheses=(Hypothesis("actuator", "stuck", 0.3), Hypothesis("actuator", "noisy", 0.69)))
+    assert severity_of(found, 8.0, LIMITS)[0] == "medium"
