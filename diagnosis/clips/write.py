@@ -14,7 +14,8 @@ import numpy as np
 
 from diagnosis.clips.plots import plots_of
 from diagnosis.clips.sources import APART_S, Source, open_sources
-from diagnosis.results.result import SEVERITIES, MissionResult
+from diagnosis.results.result import MissionResult
+from diagnosis.results.vocabulary import Severity
 from replay.atomic_write import atomic_path
 from replay.control.loop import Replay, replay_loop
 from replay.errors import OutputError
@@ -62,7 +63,7 @@ def clip_name(fault: Mapping[str, Any]) -> str:
 def chosen_faults(intervals: Sequence[Mapping[str, Any]], most: int = MOST) -> tuple[list[Mapping[str, Any]], int]:
     """Give the faults of at least low severity, most severe first, and how many more there are than `most`."""
     faults = [f for f in intervals if f["severity"] != "info"]
-    faults.sort(key=lambda f: (-SEVERITIES.index(f["severity"]), f["start_s"]))
+    faults.sort(key=lambda f: (-Severity(f["severity"]).rank, f["start_s"]))
     return faults[:most], max(len(faults) - most, 0)
 
 

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from functools import lru_cache
 from pathlib import Path
-from typing import Any
 
 import jinja2
 
@@ -13,9 +12,20 @@ from diagnosis.comparison.words import CHANGES, OUTCOMES, SIGNS, coverage_words,
 from diagnosis.pages import labels
 from diagnosis.pages.environment import POLICY, environment, plain_style
 from diagnosis.pages.svg import icon
+from diagnosis.results.comparison_document import (
+    ComparedMissionRow,
+    ComparisonDocument,
+    CoverageChangeRow,
+    FaultChangeRow,
+    FoundFaultRow,
+    MetricChangeRow,
+    SideCoverageRow,
+)
 from diagnosis.results.fault_rows import state_label
-from diagnosis.results.vocabulary import Verdict, part_name
-from replay.faults import TOTAL
+from diagnosis.results.vocabulary import Tier, part_words
+
+#: What a template is filled with.
+Context = dict[str, object]
 
 _HERE = Path(__file__).parent
 
@@ -32,12 +42,12 @@ _DEFINITIONS = (
 )
 
 
-def build_compare_page(document: Mapping[str, Any]) -> str:
+def build_compare_page(document: ComparisonDocument) -> str:
     """Page of a comparison; the same input gives the same text.
 
     Parameters
     ----------
-    document : Mapping[str, Any]
+    document : ComparisonDocument
         From `diagnosis.comparison.compare.comparison_json`.
     """
     document = labels.made_visible(document)
@@ -45,14 +55,13 @@ def build_compare_page(document: Mapping[str, Any]) -> str:
     for outcome, words in OUTCOMES.items():
         rows = [_row(c) for c in document["faults"] if (c["trend"] or c["status"]) == outcome]
         groups.append({"outcome": outcome, "words": words[0].upper() + words[1:], "sign": SIGNS[outcome], "rows": rows})
-    missions = [_mission(word, document[word]) for word in ("older", "newer")]
-    context = {
-        "title": f"{missions[0]['name']} and {missions[1]['name']}",
+    context: Context = {
+        "title": f"{document['older']['name']} and {document['newer']['name']}",
         "css": plain_style(_HERE / "compare.css"),
         "csp": POLICY,
         "worse": document["worse"],
         "headline": headline(document["counts"]),
-        "missions": missions,
+        "missions": [_mission("older", document["older"]), _mission("newer", document["newer"])],
         "groups": groups,
         "coverage": [_coverage(c) for c in document["coverage"]],
         "metrics": [_metric(m) for m in document["metrics"]],
@@ -69,8 +78,8 @@ def _environment() -> jinja2.Environment:
     return found
 
 
-def _mission(word: str, m: Mapping[str, Any]) -> dict[str, Any]:
-    verdict = Verdict(m["verdict"])
+def _mission(word: str, m: ComparedMissionRow) -> Context:
+    verdict = m["verdict"]
     machine = " ".join(x for x in (m["machine"], f"({m['machine_id']})" if m["machine_id"] else "") if x)
     return {
         "word": word,
@@ -85,33 +94,29 @@ def _mission(word: str, m: Mapping[str, Any]) -> dict[str, Any]:
     }
 
 
-def _part(c: Mapping[str, Any]) -> str:
-    return f"{c['component']} {part_name(c['kind'], c['side'])}"
-
-
-def _row(c: Mapping[str, Any]) -> dict[str, Any]:
+def _row(c: FaultChangeRow) -> Context:
     found = [f for f in (c["older"], c["newer"]) if f is not None]
-    rows = {f["mode"]: (labels.known(f["mode"]), state_label(f["mode"], f["side"])) for f in found}
+    rows = {f["mode"]: (f["mode"], state_label(f["mode"], f["side"])) for f in found}
     return {
-        "part": _part(c),
+        "part": part_words(c["kind"], c["component"], c["side"]),
         "rows": list(rows.values()),
         "older": _found(c["older"]),
         "newer": _found(c["newer"]),
-        "changed": ", ".join(CHANGES.get(name, name) for name in c["changes"]),
+        "changed": ", ".join(CHANGES[name] for name in c["changes"]),
         "note": c["note"],
     }
 
 
-def _found(f: Mapping[str, Any] | None) -> dict[str, str] | None:
+def _found(f: FoundFaultRow | None) -> dict[str, str] | None:
     if f is None:
         return None
     e = f["epsilon"]
-    epsilon = "" if e is None or f["mode"] in TOTAL else f"ε̂ {e['value']:.2f} ({e['low']:.2f}–{e['high']:.2f})"
+    epsilon = "" if e is None or f["mode"].total else f"ε̂ {e['value']:.2f} ({e['low']:.2f}–{e['high']:.2f})"
     return {
         "severity": f["severity"],
         "times": times(len(f["ids"]), f["seconds"]),
         "epsilon": epsilon,
-        "more": f"{', '.join(_few(f['ids']))}; p {f['probability']:.3f}" + (f"; {f['tier']}" if f["tier"] else ""),
+        "more": f"{', '.join(_few(f['ids']))}; p {f['probability']:.3f}; {f['tier']}",
     }
 
 
@@ -119,29 +124,31 @@ def _few(ids: Sequence[str]) -> list[str]:
     return [*ids[:4], "…"] if len(ids) > 4 else list(ids)
 
 
-def _coverage(c: Mapping[str, Any]) -> dict[str, Any]:
-    sides = [c["older"], c["newer"]]
+def _coverage(c: CoverageChangeRow) -> Context:
     return {
-        "part": _part(c),
+        "part": part_words(c["kind"], c["component"], c["side"]),
         "change": c["change"],
         "words": coverage_words(c),
-        "older": _judged(sides[0]),
-        "newer": _judged(sides[1]),
+        "older": _judged(c["older"]),
+        "newer": _judged(c["newer"]),
     }
 
 
-def _judged(side: Mapping[str, Any] | None) -> str:
+def _judged(side: SideCoverageRow | None) -> str:
     if side is None:
         return "not in the result"
-    if side["tier"] == "none":
+    if side["tier"] is Tier.NONE:
         return "no evidence"
     return f"{side['decided_s']:.1f} of {side['driving_s']:.1f} s ({side['tier']})"
 
 
-def _metric(m: Mapping[str, Any]) -> dict[str, Any]:
+def _metric(m: MetricChangeRow) -> Context:
+    pairs = (
+        (m["tracking_error_older"], m["tracking_error_newer"]),
+        (m["control_effort_older"], m["control_effort_newer"]),
+    )
     cells: list[str] = []
-    for quantity in ("tracking_error", "control_effort"):
-        a, b = m[f"{quantity}_older"], m[f"{quantity}_newer"]
+    for a, b in pairs:
         change = f"{round(100 * (b / a - 1)):+d} %".replace("-", "−") if a and b is not None else ""
         cells += ["–" if a is None else f"{a:.3f}", "–" if b is None else f"{b:.3f}", change]
     return {"wheel": m["wheel"], "cells": cells}

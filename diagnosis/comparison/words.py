@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
 
-OUTCOMES = {
+from diagnosis.results.comparison_document import Change, CoverageChangeRow
+from diagnosis.results.vocabulary import Tier
+
+OUTCOMES: dict[str, str] = {
     "new": "new",
     "worse": "worse",
     "other": "changed",
@@ -14,7 +16,7 @@ OUTCOMES = {
     "resolved": "resolved",
     "unchanged": "unchanged",
 }
-SIGNS = {
+SIGNS: dict[str, str] = {
     "new": "+",
     "worse": "▲",
     "other": "≠",
@@ -23,12 +25,18 @@ SIGNS = {
     "resolved": "✓",
     "unchanged": "=",
 }
-CHANGES = {"row": "row", "side": "side", "severity": "severity", "epsilon": "ε̂", "duration": "duration"}
+CHANGES: dict[Change, str] = {
+    "row": "row",
+    "side": "side",
+    "severity": "severity",
+    "epsilon": "ε̂",
+    "duration": "duration",
+}
 
 
 def headline(counts: Mapping[str, int]) -> str:
     """How many faults became what, in words."""
-    found = [f"{n} {OUTCOMES[name]}" for name, n in counts.items() if n]
+    found = [f"{counts[name]} {words}" for name, words in OUTCOMES.items() if counts.get(name)]
     return "Faults: " + ", ".join(found) if found else "No fault in either mission"
 
 
@@ -37,14 +45,16 @@ def times(count: int, seconds: float) -> str:
     return (f"{count}×, " if count > 1 else "") + (f"{seconds * 1e3:.0f} ms" if seconds < 1 else f"{seconds:.1f} s")
 
 
-def coverage_words(change: Mapping[str, Any]) -> str:
-    """What became of how long a part was judged, of a `CoverageChange` as JSON; empty where it stayed long enough."""
-    sides = change.get("older"), change.get("newer")
-    some = [bool(s and s.get("tier") != "none" and s.get("decided_s")) for s in sides]
-    if change.get("change") == "lost":
-        return "no longer long enough" if some[1] else "no longer assessed"
-    if change.get("change") == "gained":
-        return "long enough now" if some[0] else "assessed now"
-    if any(s and s.get("assessed") for s in sides):
+def coverage_words(change: CoverageChangeRow) -> str:
+    """What became of how long a part was judged; empty where it stayed long enough."""
+    before, now = (
+        side is not None and side["tier"] is not Tier.NONE and side["decided_s"] > 0
+        for side in (change["older"], change["newer"])
+    )
+    if change["change"] == "lost":
+        return "no longer long enough" if now else "no longer assessed"
+    if change["change"] == "gained":
+        return "long enough now" if before else "assessed now"
+    if any(side is not None and side["assessed"] for side in (change["older"], change["newer"])):
         return ""
-    return "long enough in neither" if any(some) else "assessed in neither"
+    return "long enough in neither" if before or now else "assessed in neither"

@@ -6,6 +6,7 @@ import datetime
 import math
 import unicodedata
 from collections.abc import Mapping
+from enum import Enum
 from typing import Any, TypeVar, cast
 
 from diagnosis.results.document import IntervalRow
@@ -33,11 +34,13 @@ def _escaped(char: str) -> str:
 
 
 def made_visible(value: T) -> T:
-    """Copy of a JSON value with `visible` applied to every string and key."""
+    """Copy of a JSON value with `visible` applied to every string and key; members of enumerations stay what they are."""
     return cast(T, _made_visible(value))
 
 
 def _made_visible(value: object) -> object:
+    if isinstance(value, Enum):
+        return value
     if isinstance(value, str):
         return visible(value)
     if isinstance(value, Mapping):
