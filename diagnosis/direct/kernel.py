@@ -14,7 +14,7 @@ _SAME = 0.6
 @njit(cache=True)
 def consistent_blocks(samples, noise, block, out):  # type: ignore[no-untyped-def]
     """Whether each block's residual is as white noise is: mean, share of x, power, and values that change."""
-    y, x, status = samples.y, samples.x, samples.status
+    y, x, status, _ = samples
     for i in range(out.size):
         n, same = 0, 0
         sd = sdd = sdx = sxx = 0.0
@@ -46,14 +46,15 @@ def consistent_blocks(samples, noise, block, out):  # type: ignore[no-untyped-de
 def healthy_likelihoods(samples, bank, decay, out):  # type: ignore[no-untyped-def]
     """Log-likelihood of each sample under y = x + b + n, b an AR(1) of the tolerance's power; none where decay is 0."""
     b, c = 0.0, bank.mismatch_r if decay > 0.0 else 0.0
-    for k in range(samples.y.size):
+    y, x, status, _ = samples
+    for k in range(y.size):
         out[k] = 0.0
-        if samples.status[k] != PAIR and samples.status[k] != CLEAR:
+        if status[k] != PAIR and status[k] != CLEAR:
             continue
         c = decay * decay * c + (1 - decay * decay) * bank.mismatch_r if decay > 0.0 else 0.0
         b *= decay
         s = c + bank.r
-        e = samples.y[k] - samples.x[k] - b
+        e = y[k] - x[k] - b
         b += c / s * e
         c -= c * c / s
         out[k] = max(-0.5 * (e * e / s + np.log(2 * np.pi * s)), bank.floor)
@@ -63,13 +64,14 @@ def healthy_likelihoods(samples, bank, decay, out):  # type: ignore[no-untyped-d
 def drifting_likelihoods(samples, bank, delta, walk, power, out):  # type: ignore[no-untyped-def]
     """Log-likelihood of each sample under y = δ·x + δ̄ + n with δ known and δ̄ a random walk."""
     b, c = 0.0, (0.3 * bank.span) ** 2
-    for k in range(samples.y.size):
+    y, x, status, _ = samples
+    for k in range(y.size):
         out[k] = 0.0
-        if samples.status[k] != PAIR and samples.status[k] != CLEAR:
+        if status[k] != PAIR and status[k] != CLEAR:
             continue
         c += (walk * bank.span) ** 2 * bank.dt
         s = c + bank.r * power * power
-        e = samples.y[k] - delta * samples.x[k] - b
+        e = y[k] - delta * x[k] - b
         b += c / s * e
         c -= c * c / s
         out[k] = max(-0.5 * (e * e / s + np.log(2 * np.pi * s)), bank.floor) - bank.drift_cost

@@ -71,10 +71,6 @@ class FilterBank(NamedTuple):
         What is left of b after a step [1].
     drift_cost : float
         What the noisy row must gain per sample.
-    noisy : Array, shape (noisy models, 2)
-        `NOISY_MODELS`.
-    row : NDArray[np.int64], shape (models,)
-        `ROW_OF_MODEL`.
     """
 
     r: float
@@ -88,8 +84,6 @@ class FilterBank(NamedTuple):
     floor: float
     decay: float
     drift_cost: float
-    noisy: Array
-    row: NDArray[np.int64]
 
 
 @dataclass(frozen=True)
@@ -140,6 +134,4 @@ class ModeModel:
             floor=_OUTLIER - float(np.log(self.span)),
             decay=float(np.exp(-self.dt / _MISMATCH_S)),
             drift_cost=float(self.drift_cost + self.own_cost),
-            noisy=NOISY_MODELS,
-            row=ROW_OF_MODEL,
         )

@@ -22,6 +22,7 @@ from diagnosis.estimation.fault_models import (
     MISMATCH,
     MODELS,
     NOISY,
+    NOISY_MODELS,
     ROW_OF_MODEL,
     ZERO,
     ModeModel,
@@ -114,10 +115,10 @@ def _update(y, x, bank, mean, cov, out):  # type: ignore[no-untyped-def]
     for m in range(FIRST_NOISY, out.size):
         j = m - FIRST_NOISY
         a, b = cov[m, 0], cov[m, 1]
-        c = cov[m, 2] + (bank.noisy[j, 0] * bank.span) ** 2 * bank.dt
+        c = cov[m, 2] + (NOISY_MODELS[j, 0] * bank.span) ** 2 * bank.dt
         # S = H P Hᵀ + R
         g0, g1 = a * x + b, b * x + c
-        s = x * g0 + g1 + bank.r * bank.noisy[j, 1] ** 2
+        s = x * g0 + g1 + bank.r * NOISY_MODELS[j, 1] ** 2
         i = 1.0 / s
         e = y - x * mean[m, 0] - mean[m, 1]
         k0, k1 = g0 * i, g1 * i
@@ -159,9 +160,9 @@ def likelihoods(y, x, status, quiet, bank, mean, cov, out):  # type: ignore[no-u
     _update(y, x, bank, mean, cov, out)
     for m in range(out.size):
         out[m] = max(out[m], bank.floor)
-        if bank.row[m] == NOISY:
+        if ROW_OF_MODEL[m] == NOISY:
             out[m] -= bank.drift_cost
-        elif bank.row[m] != HEALTHY:
+        elif ROW_OF_MODEL[m] != HEALTHY:
             out[m] -= _FAULT_COST
     if quiet:
         # a reading of zero says as much for no signal as for none wanted
@@ -171,20 +172,20 @@ def likelihoods(y, x, status, quiet, bank, mean, cov, out):  # type: ignore[no-u
             out[CONSTANT] = most if zero else min(out[CONSTANT], most)
         out[ZERO] = most if zero else min(out[ZERO], most)
         for m in range(GAIN, out.size):
-            if bank.row[m] != HEALTHY and abs(mean[m, 0]) < 0.1:
+            if ROW_OF_MODEL[m] != HEALTHY and abs(mean[m, 0]) < 0.1:
                 out[m] = min(out[m], most)
 
 
 @njit(cache=True)
 def _scan_evidence(samples, bank, state):  # type: ignore[no-untyped-def]
     """Add up the log-likelihoods of all samples in `state.score`."""
-    gain = np.zeros(state.score.size)
-    for k in range(samples.y.size):
-        if samples.status[k] != SKIP:
-            likelihoods(
-                samples.y[k], samples.x[k], samples.status[k], samples.quiet[k], bank, state.mean, state.cov, gain
-            )
-            state.score[:] += gain
+    y, x, status, quiet = samples
+    score, mean, cov = state
+    gain = np.zeros(score.size)
+    for k in range(y.size):
+        if status[k] != SKIP:
+            likelihoods(y[k], x[k], status[k], quiet[k], bank, mean, cov, gain)
+            score += gain
 
 
 def segment_evidence(samples: Samples, model: ModeModel) -> Array:

@@ -57,7 +57,7 @@ def _enter_from_best(k, best, bank, state, back):  # type: ignore[no-untyped-def
     top = state.score[best]
     for m in range(state.score.size):
         cost = bank.switch_cost
-        if bank.row[m] == bank.row[best] and m != best:
+        if ROW_OF_MODEL[m] == ROW_OF_MODEL[best] and m != best:
             cost = _SIBLING_COST
         learning = 0.0 if m in (EXACT, ZERO) else _LEARNING_COST
         if top - cost - learning > state.score[m]:
@@ -69,25 +69,26 @@ def _enter_from_best(k, best, bank, state, back):  # type: ignore[no-untyped-def
 @njit(cache=True)
 def _scan_modes(samples, bank, state, out):  # type: ignore[no-untyped-def]
     """Viterbi over the models; writes back-pointers (n, models) and softmax of scores by row (n, rows)."""
-    score, back, filtered = state.score, out.back, out.filtered
+    y, x, status, quiet = samples
+    score, mean, cov = state
+    back, filtered = out
     models = score.size
     gain = np.zeros(models)
-    for k in range(samples.y.size):
-        status = samples.status[k]
+    for k in range(y.size):
         best = 0
         for m in range(1, models):
             if score[m] > score[best]:
                 best = m
-        if status == CLEAR and bank.row[best] == HEALTHY:
+        if status[k] == CLEAR and ROW_OF_MODEL[best] == HEALTHY:
             if best != EXACT:
                 back[k, EXACT] = best
             score[:] = -np.inf
             score[EXACT] = 0.0
             filtered[k, HEALTHY] = 1.0
             continue
-        if status != SKIP:
+        if status[k] != SKIP:
             _enter_from_best(k, best, bank, state, back)
-            likelihoods(samples.y[k], samples.x[k], status, samples.quiet[k], bank, state.mean, state.cov, gain)
+            likelihoods(y[k], x[k], status[k], quiet[k], bank, mean, cov, gain)
             top = -np.inf
             for m in range(models):
                 score[m] += gain[m]
@@ -98,7 +99,7 @@ def _scan_modes(samples, bank, state, out):  # type: ignore[no-untyped-def]
         for m in range(models):
             if score[m] > -50.0:
                 w = np.exp(score[m])
-                filtered[k, bank.row[m]] += w
+                filtered[k, ROW_OF_MODEL[m]] += w
                 total += w
         for i in range(filtered.shape[1]):
             filtered[k, i] /= total
