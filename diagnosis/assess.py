@@ -11,7 +11,8 @@ from diagnosis.channels.frozen import frozen_sensor, frozen_speeds
 from diagnosis.channels.liveness import alive, alive_sources
 from diagnosis.direct.assess import assess_pair
 from diagnosis.direct.inputs import Pair, make_pair
-from diagnosis.drives.assess import DriveData, assess_drive
+from diagnosis.drives.assess import assess_drive
+from diagnosis.drives.inputs import DriveData
 from diagnosis.drives.tracking import assess_tracking
 from diagnosis.results.assessment import Assessment, unassessed
 from diagnosis.steering.assess import assess_steering
@@ -172,7 +173,7 @@ class _Wheel:
         return unassessed(self.timeline.size, State.MASKED, "the speed sensor is dead for the whole mission")
 
     def alone(self) -> tuple[Assessment, Assessment] | None:
-        """Judge a drive without a body: by its controller's echo and effort, or by whether it follows its command."""
+        """Judge a drive without a body: by its effort, or by whether it follows its command."""
         wheel, command = self.machine.wheels[self.index], self.replay.v_ref[:, self.index]
         if not np.isfinite(command).any():
             return None

@@ -9,7 +9,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from diagnosis.drives.assess import DriveData, assess_drive
+from diagnosis.drives.assess import assess_drive
+from diagnosis.drives.inputs import DriveData
 from diagnosis.fitting.drives import drive_data, fit_drives
 from diagnosis.pipeline import diagnose, diagnose_signals
 from diagnosis.results.result import MissionResult

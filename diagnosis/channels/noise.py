@@ -20,6 +20,7 @@ COARSE_STEP_S = 0.005  # slower logs do not fix the delay between a command and 
 _COARSE_SHARE = 0.3
 _PLACES = 8000
 _SOUND_SHARE = 0.25  # quantile of windows that stands for healthy ones
+_QUIET_WINDOW_S, _QUIET_SHARE = 0.5, 0.4  # quantile of windows that stands for healthy ones
 _HEALTHY_SHARE, _SOUND = 0.3, 10.0  # of the places; times their misfit
 
 
@@ -79,6 +80,19 @@ def slow_mismatch(residual: Array, use: NDArray[np.bool_], dt: float, quantile: 
     return float(np.quantile(np.sqrt(squares[good] / counts[good]), quantile)) if good.any() else float("nan")
 
 
+def quiet_rms(x: Array, dt: float) -> float:
+    """Root mean square of x in its quieter windows of half a second: healthy ones where less than half are faulty.
+
+    NaN are left out; the result is NaN where no window is half full.
+    """
+    length = max(5, round(_QUIET_WINDOW_S / dt))
+    windows = x[: x.size // length * length].reshape(-1, length)
+    number = np.isfinite(windows).sum(axis=1)
+    power = np.nansum(windows**2, axis=1) / np.maximum(number, 1)
+    used = power[number >= length / 2]
+    return float(np.sqrt(np.quantile(used, _QUIET_SHARE))) if used.size else float("nan")
+
+
 def shifted(x: Array, lag: float) -> Array:
     """x delayed by `lag` steps (advanced where negative), interpolated between steps; NaN where nothing is known."""
     whole = int(np.floor(lag))
@@ -118,17 +132,17 @@ def relative_lag(y: Array, x: Array, use: NDArray[np.bool_], least_lag: int, max
         return 0.0
     there = y[places]
 
-    def off(lag: float) -> Array:
+    def misfit(lag: float) -> Array:
         return np.abs(there - x[places - int(lag)])
 
     def lower(lag: float) -> float:
-        found = off(lag)
+        found = misfit(lag)
         rank = round(_HEALTHY_SHARE * np.count_nonzero(found == found))  # NaN are sorted last
         return float(np.partition(found, rank)[rank])
 
     steps = np.arange(max(least_lag, -max_lag), max_lag + 1, dtype=np.float64)
     most = _SOUND * min(lower(c) for c in steps) or np.inf
-    misfits = np.array([float(np.nanmean(np.minimum(off(c), most) ** 2)) for c in steps])
+    misfits = np.array([float(np.nanmean(np.minimum(misfit(c), most) ** 2)) for c in steps])
     k, none = int(np.argmin(misfits)), int(np.flatnonzero(steps == max(0, least_lag))[0])
     if misfits[k] >= 0.98 * misfits[none]:
         k = none

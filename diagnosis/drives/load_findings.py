@@ -11,10 +11,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from diagnosis.drives.inputs import DriveData
 from diagnosis.drives.load import LoadTrack
 from diagnosis.results.assessment import Finding
 from diagnosis.results.result import Epsilon, Hypothesis, Sat
-from replay.faults import FaultMode, Side
+from diagnosis.results.vocabulary import Tier
+from replay.faults import FaultMode, Side, State
 from replay.machine.config import Limits
 
 Array = NDArray[np.float64]
@@ -52,6 +54,57 @@ class Onset:
         return Side.SENSOR if self.seen > 0.6 * self.wanted else Side.ACTUATOR
 
 
+@dataclass(frozen=True)
+class LoadStretch:
+    """One stretch of probable extra load.
+
+    Attributes
+    ----------
+    start, stop : int
+        Samples, half open.
+    seconds : float
+        Length [s].
+    probability : float
+        Mean over its steps.
+    mean_load, mean_expected : float
+        Mean extra and healthy effort [unit of effort].
+    epsilon : Epsilon
+        Share of the load in the effort, with its smallest and largest value.
+    spread : float
+        Largest minus smallest share [1].
+    sat : Sat
+        The load as a saturation term.
+    """
+
+    start: int
+    stop: int
+    seconds: float
+    probability: float
+    mean_load: float
+    mean_expected: float
+    epsilon: Epsilon
+    spread: float
+    sat: Sat
+
+    @classmethod
+    def of(cls, load: LoadTrack, first: int, last: int, dt: float) -> LoadStretch:
+        """Steps [first, last) of a track."""
+        level, expected = load.level[first:last], np.maximum(np.abs(load.expected[first:last]), 1e-9)
+        share = level / (expected + level)
+        mean, rms = -float(np.mean(level)), float(np.sqrt(np.mean(level**2)))
+        return cls(
+            start=first * load.length,
+            stop=last * load.length,
+            seconds=float(last - first) * load.length * dt,
+            probability=float(np.mean(load.probability[first:last])),
+            mean_load=float(np.mean(level)),
+            mean_expected=float(np.mean(expected)),
+            epsilon=Epsilon(float(np.mean(share)), float(np.min(share)), float(np.max(share))),
+            spread=float(np.ptp(share)),
+            sat=Sat(mean, rms, -float(np.max(level)), -float(np.min(level)), "of full opening"),
+        )
+
+
 def onset_of(y: Array, start: int, wanted: float, dt: float) -> Onset:
     """Look for a jump of y around sample `start`; see `Onset`."""
     n = _SIDE_BY_SIDE
@@ -72,79 +125,69 @@ def onset_of(y: Array, start: int, wanted: float, dt: float) -> Onset:
     return Onset(-float(np.min(near[inside])), wanted, noise)
 
 
-def load_findings(
-    load: LoadTrack, between: float, y: Array, dt: float, limits: Limits, name: str, *, open_loop: bool
-) -> list[Finding]:
+def load_findings(data: DriveData, load: LoadTrack, between: float, limits: Limits) -> list[Finding]:
     """Stretches of probable extra load as loss of effectiveness: ε = load / (expected + load).
 
     Parameters
     ----------
+    data : DriveData
+        The drive.
     load : LoadTrack
         Extra load over the mission.
     between : float
         Standard deviation of a healthy mission's own offset [unit of effort].
-    y : Array, shape (n,)
-        Measured speed [m/s].
-    dt : float
-        Step [s].
     limits : Limits
         What counts.
-    name : str
-        Channel of the effort, for the text.
-    open_loop : bool
-        Whether the controller cannot have met a fault of the sensor, so that its effort tells about the drive alone.
     """
     sure = np.nan_to_num(load.probability) >= limits.min_probability
     edge = np.flatnonzero(np.diff(np.r_[False, sure, False].astype(np.int8)))
     out = []
     for a, b in zip(edge[::2], edge[1::2], strict=True):
-        level, expected = load.level[a:b], np.maximum(np.abs(load.expected[a:b]), 1e-9)
-        share = level / (expected + level)
-        epsilon, p = float(np.mean(share)), float(np.mean(load.probability[a:b]))
-        seconds = float(b - a) * load.length * dt
-        if epsilon < limits.min_epsilon or seconds < _LEAST_S or float(np.mean(level)) < _LEAST_LOAD * between:
-            continue
-        start, stop = int(a) * load.length, int(b) * load.length
-        speed = float(np.nanmean(np.abs(y[start:stop])))
-        onset = onset_of(y, start, epsilon * speed, dt)
-        side = Side.ACTUATOR if open_loop else onset.side
-        varying = float(np.ptp(share)) > 0.5 * epsilon and side is Side.ACTUATOR
-        mode = FaultMode.NOISY if varying else FaultMode.INEFFICIENT
-        sat = None
-        if varying:
-            mean, rms = -float(np.mean(level)), float(np.sqrt(np.mean(level**2)))
-            sat = Sat(mean, rms, -float(np.max(level)), -float(np.min(level)), "of full opening")
-        shares: tuple[Hypothesis, ...]
-        if side is Side.SENSOR_OR_ACTUATOR:
-            shares = (Hypothesis("actuator", mode.value, p / 2), Hypothesis("sensor", mode.value, p / 2))
-        else:
-            shares = (Hypothesis(side.value, mode.value, p),)
-        out.append(
-            Finding(
-                start=start,
-                stop=stop,
-                side=side,
-                mode=mode,
-                probability=p,
-                hypotheses=(*shares, Hypothesis("none", "healthy", 1 - p)),
-                epsilon=Epsilon(epsilon, float(np.min(share)), float(np.max(share))),
-                sat=sat,
-                evidence=_sentences(
-                    name, float(np.mean(level)), float(np.mean(expected)), seconds, side, onset, open_loop
-                ),
-                tier="drive",
-            )
-        )
+        stretch = LoadStretch.of(load, int(a), int(b), data.dt)
+        if (
+            stretch.epsilon.value >= limits.min_epsilon
+            and stretch.seconds >= _LEAST_S
+            and stretch.mean_load >= _LEAST_LOAD * between
+        ):
+            out.append(_finding(stretch, data))
     return out
 
 
-def _sentences(
-    name: str, level: float, expected: float, seconds: float, side: Side, onset: Onset, open_loop: bool
-) -> tuple[str, ...]:
+def _finding(stretch: LoadStretch, data: DriveData) -> Finding:
+    """One stretch as a fault, on the side that its onset tells."""
+    speed = float(np.nanmean(np.abs(data.y[stretch.start : stretch.stop])))
+    epsilon, p = stretch.epsilon, stretch.probability
+    onset = onset_of(data.y, stretch.start, epsilon.value * speed, data.dt)
+    # the effort of a controller that cannot have met a sensor's fault tells about the drive alone
+    side = Side.ACTUATOR if data.open_loop else onset.side
+    varying = stretch.spread > 0.5 * epsilon.value and side is Side.ACTUATOR
+    mode = FaultMode.NOISY if varying else FaultMode.INEFFICIENT
+    shares: tuple[Hypothesis, ...]
+    if side is Side.SENSOR_OR_ACTUATOR:
+        shares = tuple(Hypothesis(part.value, mode.value, p / 2) for part in (Side.ACTUATOR, Side.SENSOR))
+    else:
+        shares = (Hypothesis(side.value, mode.value, p),)
+    return Finding(
+        start=stretch.start,
+        stop=stretch.stop,
+        side=side,
+        mode=mode,
+        probability=p,
+        hypotheses=(*shares, Hypothesis("none", State.HEALTHY.value, 1 - p)),
+        epsilon=epsilon,
+        sat=stretch.sat if varying else None,
+        evidence=_sentences(stretch, onset, side, data),
+        tier=Tier.DRIVE,
+    )
+
+
+def _sentences(stretch: LoadStretch, onset: Onset, side: Side, data: DriveData) -> tuple[str, ...]:
+    """What decided, in figures."""
     lines = [
-        f"{name} was {level:.3g} above the {expected:.3g} that healthy missions needed for the same speed, over {seconds:.0f} s."
+        f"{data.names[2]} was {stretch.mean_load:.3g} above the {stretch.mean_expected:.3g} that healthy missions needed for "
+        f"the same speed, over {stretch.seconds:.0f} s."
     ]
-    if open_loop:
+    if data.open_loop:
         lines.append("The recorded controller met no fault of the sensor, so the drive itself took more.")
     elif side is Side.SENSOR:
         lines.append(

@@ -6,6 +6,8 @@ while its command goes on. Whether the motor or its sensor stopped cannot be tol
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -13,6 +15,7 @@ from diagnosis.channels.noise import moving_sum, shifted
 from diagnosis.results.assessment import CODE, Assessment, Finding
 from diagnosis.results.evidence_columns import Pictured, steps_of
 from diagnosis.results.result import Epsilon, Hypothesis, Sat
+from diagnosis.results.vocabulary import Tier
 from replay.faults import FaultMode, Side, State
 from replay.machine.config import Limits
 
@@ -22,6 +25,27 @@ _MAX_LAG_S = 2.5
 _MIN_STILL_S = 0.5
 _MIN_REMAINING = 0.25
 _MOVING = 0.1
+
+
+class _Tracking(NamedTuple):
+    """How a drive was commanded.
+
+    Attributes
+    ----------
+    asked : Array, shape (n,)
+        Commanded speed's magnitude, smoothed, delayed as the response is [m/s].
+    driven : NDArray[np.bool_], shape (n,)
+        Where it is commanded to move.
+    last : int
+        Sample after the last one at which it moved.
+    lag : int
+        Delay of the response [steps].
+    """
+
+    asked: Array
+    driven: NDArray[np.bool_]
+    last: int
+    lag: int
 
 
 def estimate_lag(response: Array, command: Array, dt: float) -> int:
@@ -69,39 +93,10 @@ def assess_tracking(
     states[~np.isfinite(v) | ~np.isfinite(v_ref)] = CODE[State.NO_DATA]
     moving = np.flatnonzero(~still)
     last = int(moving[-1]) + 1 if moving.size else 0
-    findings: list[Finding] = []
-    remaining = driven[last:]
-    travel = float(asked[last:][remaining].sum()) * dt
-    whole = float(asked[driven].sum()) * dt
-    if remaining.sum() * dt >= _MIN_STILL_S and whole > 0 and travel >= _MIN_REMAINING * whole:
-        start = last + int(np.flatnonzero(remaining)[0])
-        level = float(np.nanmean(v[start:])) if np.isfinite(v[start:]).any() else 0.0
-        share = travel / whole
-        p = min(0.99, 0.8 + 0.25 * share)
-        hypotheses = (
-            Hypothesis("sensor_or_actuator", "no_signal", p),
-            Hypothesis("none", "healthy", 1 - p),
-        )
-        findings.append(
-            Finding(
-                start=start,
-                stop=v.size,
-                side=Side.SENSOR_OR_ACTUATOR,
-                mode=FaultMode.NO_SIGNAL,
-                probability=p,
-                hypotheses=hypotheses,
-                epsilon=Epsilon(1.0, 0.0, 1.0),
-                sat=Sat(level, abs(level), level, level, "m/s"),
-                evidence=(
-                    f"{names[0]} stopped and never moved again while {names[1]} went on for {remaining.sum() * dt:.2f} s: "
-                    f"{100 * share:.0f} % of all commanded travel was still to come.",
-                    f"The response lags its command by {lag * dt:.2f} s (estimated and taken out).",
-                    "Whether the drive stands still or its sensor is dead cannot be told without a second measurement.",
-                ),
-                tier="tracking",
-            )
-        )
-        states[start:] = CODE[State.NO_SIGNAL]
+    found = _standstill(v, _Tracking(asked, driven, last, lag), dt, names)
+    findings = () if found is None else (found,)
+    for finding in findings:
+        states[finding.start :] = CODE[State.NO_SIGNAL]
     series = (("residual", np.where(np.isfinite(v), v - reference, np.nan)), ("expected", reference))
     pictured = Pictured.of(steps_of(findings, v.size, dt), series)
     reasons = {
@@ -110,7 +105,37 @@ def assess_tracking(
         State.NO_DATA: "no samples",
     }
     note = f"{names[0]} against {names[1]}: lag {lag * dt:.3g} s."
-    one = Assessment(
-        states, reasons, tuple(findings), pictured.columns, "tracking", (note,), closeups=pictured.closeups
+    one = Assessment(states, reasons, findings, pictured.columns, Tier.TRACKING, (note,), closeups=pictured.closeups)
+    return one, Assessment(states.copy(), reasons, findings, {}, Tier.TRACKING, (note,))
+
+
+def _standstill(v: Array, tracking: _Tracking, dt: float, names: tuple[str, str]) -> Finding | None:
+    """The drive that stopped for good while its command went on; None where it did not."""
+    asked, driven, last, lag = tracking
+    remaining = driven[last:]
+    travel = float(asked[last:][remaining].sum()) * dt
+    whole = float(asked[driven].sum()) * dt
+    if remaining.sum() * dt < _MIN_STILL_S or whole <= 0 or travel < _MIN_REMAINING * whole:
+        return None
+    start = last + int(np.flatnonzero(remaining)[0])
+    level = float(np.nanmean(v[start:])) if np.isfinite(v[start:]).any() else 0.0
+    share = travel / whole
+    p = min(0.99, 0.8 + 0.25 * share)
+    mode, side = FaultMode.NO_SIGNAL, Side.SENSOR_OR_ACTUATOR
+    return Finding(
+        start=start,
+        stop=v.size,
+        side=side,
+        mode=mode,
+        probability=p,
+        hypotheses=(Hypothesis(side.value, mode.value, p), Hypothesis("none", State.HEALTHY.value, 1 - p)),
+        epsilon=Epsilon(1.0, 0.0, 1.0),
+        sat=Sat(level, abs(level), level, level, "m/s"),
+        evidence=(
+            f"{names[0]} stopped and never moved again while {names[1]} went on for {remaining.sum() * dt:.2f} s: "
+            f"{100 * share:.0f} % of all commanded travel was still to come.",
+            f"The response lags its command by {lag * dt:.2f} s (estimated and taken out).",
+            "Whether the drive stands still or its sensor is dead cannot be told without a second measurement.",
+        ),
+        tier=Tier.TRACKING,
     )
-    return one, Assessment(states.copy(), reasons, tuple(findings), {}, "tracking", (note,))

@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from diagnosis.channels.liveness import alive, alive_sources
-from diagnosis.drives.assess import DriveData
-from diagnosis.drives.echo import identify_echo
-from diagnosis.drives.load import identify_effort
+from diagnosis.drives.effort_map import identify_effort
+from diagnosis.drives.identification import identify_controller
+from diagnosis.drives.inputs import DriveData
 from replay.control.loop import Replay
 from replay.machine.config import Machine, Noise
 from replay.machine.drive_model import DriveModel
@@ -56,7 +56,7 @@ def drive_data(timeline: Timeline, command: Array, machine: Machine, wheel: str)
 
 
 def identify_drive(missions: Sequence[DriveData], least_speed: float) -> DriveModel:
-    """Find echo and effort map of a drive from several healthy missions.
+    """Find controller and effort map of a drive from several healthy missions.
 
     Parameters
     ----------
@@ -66,7 +66,7 @@ def identify_drive(missions: Sequence[DriveData], least_speed: float) -> DriveMo
         Commanded speed from which the drive is driven [m/s].
     """
     records = [m.record for m in missions]
-    return DriveModel(echo=identify_echo(records), effort=identify_effort(records, least_speed))
+    return DriveModel(echo=identify_controller(records), effort=identify_effort(records, least_speed))
 
 
 def fit_drives(missions: Sequence[tuple[Timeline, Replay]], machine: Machine) -> dict[str, DriveModel]:

@@ -29,8 +29,8 @@ from scipy.stats import chi2, rankdata
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
-from diagnosis.drives.assess import DriveData, assess_drive
-from diagnosis.drives.echo import stretches
+from diagnosis.drives.assess import assess_drive
+from diagnosis.drives.inputs import DriveData, stretches
 from diagnosis.drives.load import track_load
 from diagnosis.fitting.drives import drive_data, identify_drive
 from diagnosis.results.assessment import CODE, STATES, Assessment
@@ -322,7 +322,9 @@ def main() -> None:
     """Print both tables."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--part", choices=("tuning", "reporting"), default="reporting")
-    parser.add_argument("--without-model", action="store_true", help="find the echo in each run instead of by fit")
+    parser.add_argument(
+        "--without-model", action="store_true", help="identify the controller in each run instead of by fit"
+    )
     parser.add_argument(
         "--sat",
         type=float,

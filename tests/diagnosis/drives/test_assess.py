@@ -1,4 +1,4 @@
-"""A single drive judged by its controller's echo and its effort: faults in the loop and written into the log."""
+"""A single drive judged by the speed that its effort implies and by its effort: faults in the loop and written into the log."""
 
 from __future__ import annotations
 
@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from diagnosis.drives.assess import DriveData, assess_drive
+from diagnosis.drives.assess import assess_drive
+from diagnosis.drives.inputs import DriveData
 from diagnosis.drives.load_findings import onset_of
 from diagnosis.fitting.drives import identify_drive
 from diagnosis.results.assessment import STATES, Assessment
@@ -132,7 +133,7 @@ def test_without_healthy_missions_agreement_alone_proves_nothing() -> None:
     assert "healthy missions" in sensor.reasons[State.NOT_ASSESSED]
 
 
-def test_an_effort_that_echoes_nothing_is_said_to() -> None:
+def test_an_effort_that_answers_to_nothing_is_named_as_the_reason() -> None:
     rng = np.random.default_rng(0)
     data = mission(60)
     sensor, actuator = assess_drive(drive(data.y, data.command, rng.normal(size=SIZE), None), LIMITS)

@@ -8,8 +8,9 @@ from filterpy.kalman import KalmanFilter
 from numpy.typing import NDArray
 
 from diagnosis.drives import load as load_module
-from diagnosis.drives.echo import DriveRecord
-from diagnosis.drives.load import identify_effort, step_means, track_load
+from diagnosis.drives.effort_map import identify_effort, step_means
+from diagnosis.drives.inputs import DriveRecord
+from diagnosis.drives.load import track_load
 from replay.machine.drive_model import EffortMap
 
 Array = NDArray[np.float64]

@@ -1,18 +1,15 @@
-"""Speed read back from a controller's effort: a second measurement of the speed that the controller saw.
-
-A proportional-integral controller answers to every change of speed, so that command and effort alone tell which speed
-it saw (`replay.machine.drive_model.EchoModel`). A logged speed that differs from it is not what the controller acted on: its
-channel is at fault. A fault that the controller saw too leaves no difference; other evidence must show that one.
-"""
+"""The controller of a drive, identified from missions that may hold faults."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from diagnosis.channels.noise import quiet_rms
+from diagnosis.drives.inputs import DriveRecord, stretches
+from diagnosis.drives.inverse_controller import fading, high_passed, led
 from replay.machine.drive_model import EchoModel
 
 Array = NDArray[np.float64]
@@ -20,7 +17,6 @@ Array = NDArray[np.float64]
 _MEMORIES = np.geomspace(0.1, 12.0, 19)  # integral times that are tried [s]
 _MOST_LEAD_S = 0.1
 _TAPS = 3
-_SETTLE_S = 0.6  # from this much of a stretch the controller's state before it is found
 _LEAST_S = 4.0
 _MOST_SAMPLES = 20_000
 _USUAL_S = 1.0  # integral time with which the delay is found
@@ -29,74 +25,10 @@ _LEAST_EXPLAINED = 0.5
 _DRIFT_S = 1.0
 _LEAST_STRETCHES = 3
 _UNSURE = 0.1  # of Ti where one mission alone gives it
-_WINDOW_S = 0.5
-_QUANTILE = 0.4
 
 
-@dataclass(frozen=True)
-class DriveRecord:
-    """Speed, command and effort of one mission on a uniform axis, shapes (n,); NaN where not valid."""
-
-    y: Array
-    command: Array
-    u: Array
-    dt: float
-
-
-def stretches(valid: NDArray[np.bool_], least: int) -> list[slice]:
-    """Stretches of valid samples that are at least `least` long."""
-    edge = np.flatnonzero(np.diff(np.r_[False, valid, False].astype(np.int8)))
-    return [slice(int(a), int(b)) for a, b in zip(edge[::2], edge[1::2], strict=True) if b - a >= least]
-
-
-def high_passed(x: Array, memory_s: float, dt: float) -> Array:
-    """First-order high-pass of x with its first value as the level before it, shape (n,)."""
-    from scipy.signal import lfilter
-
-    a = memory_s / (memory_s + dt)
-    return np.asarray(lfilter([a, -a], [1.0, -a], x - x[0]), dtype=np.float64)
-
-
-def _led(x: Array, lead: int) -> Array:
-    """x earlier by `lead` steps; the ends are held."""
-    return x[np.clip(np.arange(x.size) + lead, 0, x.size - 1)]
-
-
-def _fading(size: int, memory_s: float, dt: float) -> Array:
-    return np.asarray(np.exp(-np.arange(size) * dt / memory_s), dtype=np.float64)
-
-
-def echoed_speed(model: EchoModel, record: DriveRecord) -> Array:
-    """Speed that the controller saw, from command and effort; NaN where they are not logged. Shape (n,).
-
-    The state of the controller before a stretch is unknown: it is found from the measured speed of the stretch's first
-    0.6 s and fades with the integral time.
-
-    Parameters
-    ----------
-    model : EchoModel
-        Of this drive.
-    record : DriveRecord
-        The mission.
-    """
-    out = np.full(record.y.size, np.nan)
-    for part in stretches(np.isfinite(record.command) & np.isfinite(record.u), len(model.gains) + 2):
-        u = high_passed(record.u[part], model.memory_s, record.dt)
-        x = record.command[part] + model.setpoint * high_passed(record.command[part], model.memory_s, record.dt)
-        for i, gain in enumerate(model.gains):
-            x = x + gain * _led(u, model.first + i)
-        fade = _fading(x.size, model.memory_s, record.dt)
-        head = slice(0, max(3, round(_SETTLE_S / record.dt)))
-        off, w = (record.y[part] - x)[head], fade[head]
-        known = np.isfinite(off)
-        if known.any():
-            x = x + fade * float(np.median(off[known] / w[known]))
-        out[part] = x
-    return out
-
-
-def identify_echo(records: Sequence[DriveRecord]) -> EchoModel | None:
-    """Find the echo of a drive from missions that may hold faults in less than half of their time.
+def identify_controller(records: Sequence[DriveRecord]) -> EchoModel | None:
+    """Identify the controller of a drive, as its inverse model, from missions that may hold faults in less than half of their time.
 
     Parameters
     ----------
@@ -136,8 +68,8 @@ def identify_echo(records: Sequence[DriveRecord]) -> EchoModel | None:
     _, theta = fitted(memory, first)
     design, error = _regression(parts, memory, dt, range(first, first + _TAPS), 1)
     rest = error - design @ theta
-    noise = window_size(rest, dt)
-    if not 0 < noise**2 < (1 - _LEAST_EXPLAINED) * window_size(target, dt) ** 2:
+    noise = quiet_rms(rest, dt)
+    if not 0 < noise**2 < (1 - _LEAST_EXPLAINED) * quiet_rms(target, dt) ** 2:
         return None
     exact, core = _exact_share(rest[:: max(1, rest.size // _MOST_SAMPLES)], noise)
     return EchoModel(
@@ -158,7 +90,7 @@ def _integral_time(
 ) -> tuple[float, float] | None:
     """Ti and its standard deviation from how the integral part u + Kp·e follows ∫e; None where fewer than three stretches show it.
 
-    The high-passed effort fixes Ti only loosely, while a drive that is long off its command needs it well. The median
+    The high-passed effort fixes Ti only loosely, while a drive that is long away from its command needs it well. The median
     over stretches bears faults in some of them; with a single mission they could not be told from another Ti.
     """
     total = float(np.sum(gains))
@@ -174,7 +106,7 @@ def _integral_time(
             continue
         middle = [
             np.median(x[: count * length].reshape(count, length), axis=1)
-            for x in (_led(u, lead) - e / total, -np.cumsum(e) * dt)
+            for x in (led(u, lead) - e / total, -np.cumsum(e) * dt)
         ]
         moved, pushed = (x - np.mean(x) for x in middle)
         weight = float(pushed @ pushed)
@@ -215,7 +147,7 @@ def _lead(parts: Sequence[tuple[Array, Array, Array]], memory: float, dt: float,
     for y, r, u in parts:
         h, e = high_passed(u, memory, dt), (y - r)[::every]
         e = np.clip(e - np.median(e), -3 * _spread(e), 3 * _spread(e))
-        total += [float(_led(h, k)[::every] @ e) for k in leads]
+        total += [float(led(h, k)[::every] @ e) for k in leads]
     return leads[int(np.argmin(total))]
 
 
@@ -226,9 +158,9 @@ def _regression(
     designs, targets = [], []
     for y, r, u in parts:
         h = high_passed(u, memory, dt)
-        columns = [*(_led(h, k) for k in leads), high_passed(r, memory, dt), y - r]
+        columns = [*(led(h, k) for k in leads), high_passed(r, memory, dt), y - r]
         design = np.column_stack([c[::every] for c in columns])
-        fade = _fading(y.size, memory, dt)[::every]
+        fade = fading(y.size, memory, dt)[::every]
         fade /= np.sqrt(float(fade @ fade))
         design -= np.outer(fade, fade @ design)
         designs.append(design[:, :-1])
@@ -239,19 +171,6 @@ def _regression(
 def _spread(x: Array) -> float:
     """Standard deviation by the median absolute deviation."""
     return 1.4826 * float(np.median(np.abs(x - np.median(x))))
-
-
-def window_size(x: Array, dt: float) -> float:
-    """Root mean square of x in its quieter windows of half a second: healthy ones where less than half are faulty.
-
-    NaN are left out; the result is NaN where no window is half full.
-    """
-    length = max(5, round(_WINDOW_S / dt))
-    windows = x[: x.size // length * length].reshape(-1, length)
-    number = np.isfinite(windows).sum(axis=1)
-    power = np.nansum(windows**2, axis=1) / np.maximum(number, 1)
-    used = power[number >= length / 2]
-    return float(np.sqrt(np.quantile(used, _QUANTILE))) if used.size else float("nan")
 
 
 def _robust(design: Array, target: Array) -> Array:

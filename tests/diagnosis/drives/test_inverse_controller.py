@@ -1,4 +1,4 @@
-"""The speed read back from a controller's effort, against a loop whose controller is written down."""
+"""The speed implied by a controller's effort, against a loop whose controller is written down."""
 
 from __future__ import annotations
 
@@ -6,7 +6,10 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from diagnosis.drives.echo import DriveRecord, echoed_speed, high_passed, identify_echo, stretches, window_size
+from diagnosis.channels.noise import quiet_rms
+from diagnosis.drives.identification import identify_controller
+from diagnosis.drives.inputs import DriveRecord, stretches
+from diagnosis.drives.inverse_controller import high_passed, implied_speed
 from replay.errors import ConfigError
 from replay.machine.drive_model import EchoModel
 
@@ -32,7 +35,7 @@ def loop(seed: int, size: int = 1500, noise: float = 0.05) -> DriveRecord:
 
 
 def test_a_controllers_gain_integral_time_and_delay_are_found() -> None:
-    model = identify_echo([loop(1), loop(2)])
+    model = identify_controller([loop(1), loop(2)])
     assert model is not None
     best = int(np.argmin(model.gains))
     assert model.first + best == 1
@@ -41,21 +44,21 @@ def test_a_controllers_gain_integral_time_and_delay_are_found() -> None:
     assert model.setpoint == pytest.approx(0.0, abs=0.1)
 
 
-def test_the_echo_is_the_speed_that_the_controller_saw() -> None:
+def test_the_implied_speed_is_the_speed_that_the_controller_saw() -> None:
     model = EchoModel((-1 / KP,), 1, TI, 0.0, 0.0, 0.01, 0.5, 0.01, DT)
     record = loop(3)
-    assert np.nanmax(np.abs(echoed_speed(model, record) - record.y)[50:-2]) < 0.03
+    assert np.nanmax(np.abs(implied_speed(model, record) - record.y)[50:-2]) < 0.03
 
 
 def test_faults_in_a_part_of_the_mission_leave_the_model_alone() -> None:
     record = loop(4)
     y = record.y.copy()
     y[500:1000] = 0.7 * y[500:1000]
-    clean, faulty = identify_echo([record]), identify_echo([DriveRecord(y, record.command, record.u, DT)])
+    clean, faulty = identify_controller([record]), identify_controller([DriveRecord(y, record.command, record.u, DT)])
     assert clean is not None
     assert faulty is not None
     assert min(faulty.gains) == pytest.approx(min(clean.gains), rel=0.05)
-    rest = y - echoed_speed(faulty, DriveRecord(y, record.command, record.u, DT))
+    rest = y - implied_speed(faulty, DriveRecord(y, record.command, record.u, DT))
     assert abs(np.mean(rest[100:480])) < 0.05
     assert np.mean(rest[520:980] / record.y[520:980]) == pytest.approx(-0.3, abs=0.02)
 
@@ -63,18 +66,18 @@ def test_faults_in_a_part_of_the_mission_leave_the_model_alone() -> None:
 def test_an_effort_that_answers_to_nothing_gives_no_model() -> None:
     record = loop(5)
     rng = np.random.default_rng(0)
-    assert identify_echo([DriveRecord(record.y, record.command, rng.normal(size=record.u.size), DT)]) is None
-    assert identify_echo([DriveRecord(record.y, record.command, np.ones(record.u.size), DT)]) is None
-    assert identify_echo([DriveRecord(record.y, record.command, np.full(record.u.size, np.nan), DT)]) is None
-    assert identify_echo([]) is None
+    assert identify_controller([DriveRecord(record.y, record.command, rng.normal(size=record.u.size), DT)]) is None
+    assert identify_controller([DriveRecord(record.y, record.command, np.ones(record.u.size), DT)]) is None
+    assert identify_controller([DriveRecord(record.y, record.command, np.full(record.u.size, np.nan), DT)]) is None
+    assert identify_controller([]) is None
 
 
-def test_a_gap_starts_the_echo_anew() -> None:
+def test_a_gap_starts_the_controller_anew() -> None:
     model = EchoModel((-1 / KP,), 1, TI, 0.0, 0.0, 0.01, 0.5, 0.01, DT)
     record = loop(6)
     u = record.u.copy()
     u[600:700] = np.nan
-    x = echoed_speed(model, DriveRecord(record.y, record.command, u, DT))
+    x = implied_speed(model, DriveRecord(record.y, record.command, u, DT))
     assert np.isnan(x[600:700]).all()
     assert np.nanmax(np.abs(x - record.y)[760:-2]) < 0.1
 
@@ -91,11 +94,11 @@ def test_stretches_leave_out_what_is_too_short() -> None:
     assert stretches(valid, 2) == [slice(0, 2), slice(3, 6)]
 
 
-def test_window_size_ignores_loud_windows() -> None:
+def test_quiet_rms_ignores_loud_windows() -> None:
     x = np.ones(1000)
     x[600:] = 50.0
-    assert window_size(x, DT) == pytest.approx(1.0)
-    assert np.isnan(window_size(np.full(1000, np.nan), DT))
+    assert quiet_rms(x, DT) == pytest.approx(1.0)
+    assert np.isnan(quiet_rms(np.full(1000, np.nan), DT))
 
 
 def test_a_model_without_gains_is_refused() -> None:
