@@ -12,6 +12,9 @@ from rich.console import RenderableType
 from rich.text import Text
 
 from cli.tables.layout import bullets, key_values, section, table, text
+from cli.tables.looks import verdict_style
+from diagnosis.audit.store.outcome import READ, MissionState
+from diagnosis.results.vocabulary import Verdict
 
 if TYPE_CHECKING:
     from diagnosis.audit.discovery.discover import Discovery
@@ -19,10 +22,8 @@ if TYPE_CHECKING:
     from diagnosis.audit.session import Audited
 
 SCHEMA = "mfhca-audit/1"
-_VERDICTS = {"stop": "stop and repair", "watch": "watch", "ready": "ready", "not_assessed": "not assessed"}
-_STYLES = {"stop": "bold #e4571e", "watch": "#d99a00", "ready": "#2fa98c"}
-_READ = ("ok", "degraded")
-_WORST_FIRST = ("crashed", "out_of_memory", "timeout", "unreadable")
+_VERDICTS = (Verdict.STOP, Verdict.WATCH, Verdict.READY, Verdict.NOT_ASSESSED)
+_WORST_FIRST = (MissionState.CRASHED, MissionState.OUT_OF_MEMORY, MissionState.TIMEOUT, MissionState.UNREADABLE)
 _SHOWN, _MACHINES = 10, 5
 
 
@@ -43,7 +44,7 @@ def summary_parts(audited: Audited, found: Discovery, output: Path) -> list[Rend
     """What failed, the worst machines, counts, and where the page is."""
     ends = audited.ends
     parts: list[RenderableType] = []
-    failed = sorted((end for end in ends if end.state not in _READ), key=lambda end: _WORST_FIRST.index(end.state))
+    failed = sorted((end for end in ends if end.state not in READ), key=lambda end: _WORST_FIRST.index(end.state))
     if failed:
         rows = [
             Text.assemble(text(e.state.replace("_", " "), "bold red"), f"  {e.name}  ", text(e.reason, "dim"))
@@ -54,19 +55,21 @@ def summary_parts(audited: Audited, found: Discovery, output: Path) -> list[Rend
             parts.append(text(f"… and {len(failed) - _SHOWN} more", "dim"))
     machines: dict[str, Counter[str]] = {}
     for end in ends:
-        if end.verdict in ("stop", "watch"):
+        if end.verdict in (Verdict.STOP, Verdict.WATCH):
             machines.setdefault(end.machine_id or end.machine_name, Counter())[end.verdict] += 1
     if machines:
-        worst = sorted(machines.items(), key=lambda m: (-m[1]["stop"], -m[1]["watch"], m[0]))
-        rows_ = [(name, str(c["stop"] or "–"), str(c["watch"] or "–")) for name, c in worst[:_MACHINES]]
+        worst = sorted(machines.items(), key=lambda m: (-m[1][Verdict.STOP], -m[1][Verdict.WATCH], m[0]))
+        rows_ = [(name, str(c[Verdict.STOP] or "–"), str(c[Verdict.WATCH] or "–")) for name, c in worst[:_MACHINES]]
         parts += [section("Worst machines"), table(("machine", "stop", "watch"), rows_, right=(1, 2))]
     verdicts: Counter[str | None] = Counter(end.verdict for end in ends)
     states: Counter[str] = Counter(end.state for end in ends)
-    counted = [Text.assemble((str(verdicts[v]), s), f" {_VERDICTS[v]}") for v, s in _verdict_styles() if verdicts[v]]
-    counted += [text(f"{n} {s.replace('_', ' ')}") for s, n in sorted(states.items()) if s not in _READ]
+    counted = [Text.assemble((str(verdicts[v]), verdict_style(v)), f" {v.short}") for v in _VERDICTS if verdicts[v]]
+    counted += [text(f"{n} {s.replace('_', ' ')}") for s, n in sorted(states.items()) if s not in READ]
     parts += [section("Missions"), Text(" · ").join(counted)]
     notes = [f"{len(ends)} in all, {audited.skipped} of them done before"]
-    notes += [f"{states['degraded']} with damage or parts that cannot be judged"] if states["degraded"] else []
+    notes += (
+        [f"{states['degraded']} with damage or parts that cannot be judged"] if states[MissionState.DEGRADED] else []
+    )
     parts.append(text(", ".join(notes), "dim"))
     if audited.gone:
         was = "mission that is" if audited.gone == 1 else "missions that are"
@@ -75,10 +78,6 @@ def summary_parts(audited: Audited, found: Discovery, output: Path) -> list[Rend
     if audited.failed:
         files.append(("failures", output / "failures.txt"))
     return [*parts, "", key_values(files)]
-
-
-def _verdict_styles() -> list[tuple[str, str]]:
-    return [(v, _STYLES.get(v, "")) for v in _VERDICTS]
 
 
 def document(audited: Audited, found: Discovery, output: Path, code: int) -> dict[str, Any]:

@@ -7,17 +7,8 @@ from typing import TYPE_CHECKING
 
 from rich.text import Text
 
-from cli.tables.layout import (
-    MODE_SIGNS,
-    MODE_STYLES,
-    SEVERITY_STYLES,
-    ByWidth,
-    bullets,
-    key_values,
-    section,
-    table,
-    text,
-)
+from cli.tables.layout import ByWidth, bullets, key_values, section, table, text
+from cli.tables.looks import mode_text, severity_text, verdict_style
 from diagnosis.comparison.words import CHANGES, OUTCOMES, headline, times
 from diagnosis.pages.labels import utc
 from diagnosis.results.vocabulary import part_words
@@ -30,12 +21,6 @@ if TYPE_CHECKING:
     from diagnosis.comparison.faults import FaultChange, FoundFault
 
 _STYLES = {"new": "bold red", "worse": "bold red", "resolved": "#2fa98c", "better": "#2fa98c", "unchanged": "dim"}
-_VERDICTS = {
-    "ready": ("READY", "bold #2fa98c"),
-    "watch": ("WATCH", "bold #d99a00"),
-    "stop": ("STOP AND REPAIR", "bold red"),
-    "not_assessed": ("NOT ASSESSED", "bold"),
-}
 _SHOWN = 40
 _HEADINGS = ("part", "fault", "older", "newer", "changed")
 _COLUMNS = {"new": (0, 1, 3), "not_seen_again": (0, 1, 2), "resolved": (0, 1, 2), "unchanged": (0, 1, 2, 3)}
@@ -59,10 +44,12 @@ def comparison_parts(found: Comparison) -> list[RenderableType]:
 
 
 def _mission(m: ComparedMission) -> Text:
-    label, style = _VERDICTS.get(m.verdict, (m.verdict, "bold"))
+    label = m.verdict.short.upper()
     when = f"{utc(m.start_ns)} UTC, {m.duration_s:.0f} s, {m.driving_s:.0f} s driving"
     title = "" if m.title.upper() == label else m.title
-    return Text.assemble(text(m.name), "  ", text(when, "dim"), "\n", text(label, style), "  ", text(title))
+    return Text.assemble(
+        text(m.name), "  ", text(when, "dim"), "\n", text(label, f"bold {verdict_style(m.verdict)}"), "  ", text(title)
+    )
 
 
 def _part(c: FaultChange) -> str:
@@ -99,7 +86,7 @@ def _faults(faults: Sequence[FaultChange]) -> list[RenderableType]:
 
 def _rows(c: FaultChange) -> Text:
     modes = list(dict.fromkeys(f.mode for f in (c.older, c.newer) if f is not None))
-    words = [text(f"{MODE_SIGNS.get(m, '·')} {m.replace('_', ' ')}", MODE_STYLES.get(m, "")) for m in modes]
+    words = [mode_text(m, m.replace("_", " ")) for m in modes]
     return Text(" → ").join(words)
 
 
@@ -115,7 +102,7 @@ def _found(f: FoundFault | None, bounds: bool) -> Text:
     if f.epsilon is not None and not f.mode.total:
         words += f", ε {f.epsilon['value']:.2f}"
         words += f" ({f.epsilon['low']:.2f}–{f.epsilon['high']:.2f})" if bounds else ""
-    return Text.assemble(text(f.severity, SEVERITY_STYLES.get(f.severity, "")), text(words))
+    return Text.assemble(severity_text(f.severity), text(words))
 
 
 def _changed(c: FaultChange) -> str:

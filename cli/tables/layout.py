@@ -11,17 +11,6 @@ from rich.text import Text
 
 from cli.terminal.streams import clean
 
-MODE_STYLES = {
-    "stuck": "bold #e4571e",
-    "no_signal": "bold reverse",
-    "inefficient": "#d99a00",
-    "noisy": "#8c80f2",
-    "outside_table": "bold",
-    "healthy": "#2fa98c",
-}
-MODE_SIGNS = {"stuck": "■", "no_signal": "✕", "inefficient": "▼", "noisy": "∿", "outside_table": "?", "healthy": "✓"}
-SEVERITY_STYLES = {"high": "bold red", "medium": "#d99a00", "low": "", "info": "dim"}
-
 
 def text(value: object, style: str = "") -> Text:
     """Text without control characters, styled as a whole."""

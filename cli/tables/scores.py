@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 from rich.text import Text
 
-from cli.tables.layout import MODE_SIGNS, MODE_STYLES, key_values, section, table, text
+from cli.tables.layout import key_values, section, table, text
+from cli.tables.looks import mode_text
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
@@ -68,7 +69,7 @@ def _words(name: str) -> str:
 
 
 def _mode(name: str) -> Text:
-    return text(f"{MODE_SIGNS.get(name, '·')} {_words(name)}", MODE_STYLES.get(name, ""))
+    return mode_text(name, _words(name))
 
 
 def _missions(names: Sequence[str], scores: Sequence[MissionScores]) -> Table:

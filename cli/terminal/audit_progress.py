@@ -15,7 +15,6 @@ from cli.terminal.streams import clean, console_of
 from diagnosis.audit.events import Emit, EventFacts
 
 _LINE_S = 10.0
-_SIGNS = {"ok": "ok", "degraded": "degraded", "out_of_memory": "out of memory"}
 
 
 class Counted:
@@ -44,7 +43,7 @@ class Counted:
             rate = self.done / spent
             parts.append(f"{rate * 60:.0f}/min" if rate < 10 else f"{rate:.0f}/s")
             parts.append(f"{_clock((self.rest - self.done) / rate)} left")
-        parts += [f"{n} {_SIGNS.get(s, s)}" for s, n in sorted(self.states.items(), key=lambda x: -x[1])]
+        parts += [f"{n} {s.replace('_', ' ')}" for s, n in sorted(self.states.items(), key=lambda x: -x[1])]
         return " · ".join(parts)
 
 

@@ -51,13 +51,18 @@ class Verdict(StrEnum):
         """Mode or state whose symbol and colour it takes."""
         return _VERDICT_WORDS[self][1]
 
+    @property
+    def short(self) -> str:
+        """Words for counts and narrow places: ``stop and repair``, ``watch``."""
+        return _VERDICT_WORDS[self][2]
+
 
 _VERDICT_RANK = {member: i for i, member in enumerate(Verdict)}
 _VERDICT_WORDS = {
-    Verdict.READY: ("Ready for the next mission", "healthy"),
-    Verdict.NOT_ASSESSED: ("Not assessed", "not_assessed"),
-    Verdict.WATCH: ("Faults to watch", "inefficient"),
-    Verdict.STOP: ("Stop and repair", "stuck"),
+    Verdict.READY: ("Ready for the next mission", "healthy", "ready"),
+    Verdict.NOT_ASSESSED: ("Not assessed", "not_assessed", "not assessed"),
+    Verdict.WATCH: ("Faults to watch", "inefficient", "watch"),
+    Verdict.STOP: ("Stop and repair", "stuck", "stop and repair"),
 }
 
 
