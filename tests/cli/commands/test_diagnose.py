@@ -299,7 +299,8 @@ def test_the_fault_table_breaks_no_number(width: int) -> None:
         "probability": 0.998,
         "severity": "medium",
     }
-    report = {"verdict": {"status": "not_assessed", "title": "Not assessed"}, "intervals": [{**fault, "id": "F10"}]}
+    verdict = {"status": "not_assessed", "title": "Not assessed", "text": "", "caveats": [], "actions": []}
+    report: Any = {"verdict": verdict, "intervals": [{**fault, "id": "F10"}]}
     console = Console(width=width, color_system=None)
     with console.capture() as seen:
         console.print(*verdict_parts(report))
