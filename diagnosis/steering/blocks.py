@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from diagnosis.channels.noise import rounding_step
 from diagnosis.estimation.fault_models import PAIR, SILENT, SKIP
+from diagnosis.steering.filter_state import BlockSeries, Redundancy
 from replay.arrays.numeric import without_nan
 from replay.arrays.spill import Column, release
 from replay.arrays.spill import blocks as cut
@@ -46,9 +47,8 @@ class SteeringBlocks:
         Valve opening of every sample, 0 where unknown.
     blind : NDArray[np.bool_], shape (m,)
         Blocks in most of which nobody knows the opening.
-    second : Array, shape (m, 7)
-        What is measured twice, each with its variance: angle [rad], opening [fraction], share of the command's changes
-        in the opening [1]; then the command that belongs to the opening [fraction]. NaN where it is not.
+    redundancy : Redundancy
+        What is measured redundantly.
     """
 
     length: int
@@ -60,12 +60,16 @@ class SteeringBlocks:
     status: NDArray[np.int8]
     raw_u: Array
     blind: NDArray[np.bool_]
-    second: Array
+    redundancy: Redundancy
 
     def driven(self, gain: float, rate: float) -> Array:
         """Mean of sat(gain·u) between the middles of blocks [rad/s], shape (m,); NaN in blind blocks."""
         driven = _between(self.raw_u, self.length, self.mean.size, lambda u: np.clip(gain * u, -rate, rate))
         return np.where(self.blind, np.nan, driven)
+
+    def series(self, driven: Array) -> BlockSeries:
+        """The blocks as the compiled filters take them, with `driven` of a plant."""
+        return BlockSeries(self.mean, self.power, self.count, driven, self.u, self.status, self.redundancy)
 
 
 def _between(x: Array, length: int, blocks: int, function: Callable[[Array], Array] = np.asarray) -> Array:
@@ -105,11 +109,11 @@ def blocks_of(y: Array, u: Array, fresh: NDArray[np.bool_], alive: NDArray[np.bo
     """
     length = max(1, round(_BLOCK_S / dt))
     opening, parts = Column(np.float64), []
-    before = np.zeros(0)  # the last two new samples of the cut before
+    before = np.zeros(0)  # the last two new samples of the part before
     for part in cut(y.size, length):
-        near, alone = y[part], ~np.isfinite(y[part])
+        near, missing = y[part], ~np.isfinite(y[part])
         starts = np.arange(0, near.size, length)
-        new = fresh[part] & ~alone
+        new = fresh[part] & ~missing
         power = np.zeros(near.size)
         values = np.concatenate([before, near[new]])
         power[new] = second_differences(values)[before.size :]
@@ -117,7 +121,7 @@ def blocks_of(y: Array, u: Array, fresh: NDArray[np.bool_], alive: NDArray[np.bo
         count = np.add.reduceat(new.astype(np.float64), starts)
         mean = np.add.reduceat(np.where(new, near, 0.0), starts) / np.maximum(count, 1.0)
         status = np.where(count > 0, PAIR, SKIP).astype(np.int8)
-        silent = np.add.reduceat((alone & alive[part]).astype(np.float64), starts) > 0.5 * length
+        silent = np.add.reduceat((missing & alive[part]).astype(np.float64), starts) > 0.5 * length
         status[silent & (count == 0)] = SILENT
         unknown = np.add.reduceat((~np.isfinite(u[part])).astype(np.float64), starts)
         blind = unknown > 0.5 * np.diff(np.append(starts, near.size))
@@ -125,19 +129,9 @@ def blocks_of(y: Array, u: Array, fresh: NDArray[np.bool_], alive: NDArray[np.bo
         opening.append(without_nan(u[part]))
         release(y, u)
     mean, power, count, status, blind = (np.concatenate(x) for x in zip(*parts, strict=True))
-    raw_u = opening.finish()
-    return SteeringBlocks(
-        length=length,
-        dt=length * dt,
-        mean=mean,
-        power=power,
-        count=count,
-        u=_between(raw_u, length, mean.size),
-        status=status,
-        raw_u=raw_u,
-        blind=blind,
-        second=np.full((mean.size, 7), np.nan),
-    )
+    raw_u, redundancy = opening.finish(), Redundancy.nothing(mean.size)
+    u_mean = _between(raw_u, length, mean.size)
+    return SteeringBlocks(length, length * dt, mean, power, count, u_mean, status, raw_u, blind, redundancy)
 
 
 def window_means(x: Array, length: int) -> Array:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,6 +10,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from diagnosis.steering.blocks import WHITE_DOF, SensorNoise, SteeringBlocks, window_means
+from diagnosis.steering.simplex import minimize
 
 Array = NDArray[np.float64]
 
@@ -103,13 +104,13 @@ def windows_of(blocks: SteeringBlocks, noise: SensorNoise, stop: float, window_s
 
 
 def _loss(parts: Sequence[Windows], gain: float, limit: float, lag: float, scale: float, tolerance: float) -> float:
-    """Mean of capped deviations over windows in which the axle is steered or turns."""
+    """Mean of capped residuals over windows in which the axle is steered or turns."""
     total, count = 0.0, 0
     for w in parts:
         predicted = w.predicted(gain, limit, lag)
         use = w.good & (np.maximum(np.abs(predicted), np.abs(w.rate)) > 0.1 * scale)
-        off = np.abs(w.rate[use] - predicted[use]) / (tolerance * (scale + np.abs(w.rate[use])) + 2 * w.noise)
-        total += float(np.minimum(off, 3.0).sum())
+        residual = np.abs(w.rate[use] - predicted[use]) / (tolerance * (scale + np.abs(w.rate[use])) + 2 * w.noise)
+        total += float(np.minimum(residual, 3.0).sum())
         count += int(np.count_nonzero(use))
     return total / count if count else np.inf
 
@@ -117,7 +118,7 @@ def _loss(parts: Sequence[Windows], gain: float, limit: float, lag: float, scale
 def _fit(
     parts: Sequence[Windows], short: Sequence[Windows], start: SteeringPlant | None = None
 ) -> SteeringPlant | None:
-    """Gain, rate limit and lag with the smallest loss: a coarse grid, then one after the other.
+    """Gain, rate limit and lag with the smallest loss, from `start` or a coarse grid on.
 
     `parts` are long windows for the grid, `short` ones show the lag.
     """
@@ -135,22 +136,39 @@ def _fit(
         return None
     typical = scale / float(np.median(openings))
     top = float(np.quantile(moving, 0.98))
-    grid = (
-        [(0.0, start.gain, start.rate, start.lag)]
-        if start is not None
-        else [
-            (_loss(parts, gain, limit, lag, scale, 0.1), gain, limit, lag)
-            for gain in typical * np.geomspace(0.3, 5.0, 14)
-            for limit in top * np.array([0.6, 0.8, 1.0, 1.25])
-            for lag in (0.02, 0.06, 0.18)
-        ]
-    )
-    best = min(grid)[1:]
+    best = _best_of_grid(parts, typical, top, scale) if start is None else (start.gain, start.rate, start.lag)
+    gain, limit, lag = _refined_fit(short, best, scale)
+    residuals = []
+    for w in parts:
+        predicted = w.predicted(gain, limit, lag)
+        use = w.good & (np.abs(predicted) > 0.3 * scale)
+        residuals.append(np.abs(w.rate[use] - predicted[use]) / np.abs(predicted[use]))
+    shares = np.concatenate(residuals)
+    if not shares.size:
+        return None
+    return SteeringPlant(float(gain), float(limit), float(lag), float(np.quantile(shares, 0.3)), shares.size)
+
+
+def _best_of_grid(parts: Sequence[Windows], gain: float, rate: float, scale: float) -> tuple[float, float, float]:
+    """Gain, rate limit and lag of the smallest loss on a grid around a typical gain and the largest rate."""
+    return min(
+        (_loss(parts, g, limit, lag, scale, 0.1), g, limit, lag)
+        for g in gain * np.geomspace(0.3, 5.0, 14)
+        for limit in rate * np.array([0.6, 0.8, 1.0, 1.25])
+        for lag in (0.02, 0.06, 0.18)
+    )[1:]
+
+
+def _refined_fit(
+    parts: Sequence[Windows], start: tuple[float, float, float], scale: float
+) -> tuple[float, float, float]:
+    """Gain, rate limit and lag from a start on, with a loss that tolerates less and less."""
+    best = start
     for tolerance in (0.05, 0.02, 0.006):
         # gain and lag trade off against each other: a simplex in their logarithms follows the valley
 
         def misfit(x: Array, tolerance: float = tolerance) -> float:
-            return _loss(short, np.exp(x[0]), np.exp(x[1]), np.exp(x[2]), scale, tolerance)
+            return _loss(parts, np.exp(x[0]), np.exp(x[1]), np.exp(x[2]), scale, tolerance)
 
         found = minimize(
             misfit,
@@ -159,17 +177,9 @@ def _fit(
             x_tol=1e-3,
             f_tol=1e-4,
         )
-        best = tuple(np.exp(found))
-    gain, limit, lag = best
-    off = []
-    for w in parts:
-        predicted = w.predicted(gain, limit, lag)
-        use = w.good & (np.abs(predicted) > 0.3 * scale)
-        off.append(np.abs(w.rate[use] - predicted[use]) / np.abs(predicted[use]))
-    shares = np.concatenate(off)
-    if not shares.size:
-        return None
-    return SteeringPlant(float(gain), float(limit), float(lag), float(np.quantile(shares, 0.3)), shares.size)
+        gain, limit, lag = np.exp(found)
+        best = gain, limit, lag
+    return best
 
 
 def identify_plants(
@@ -208,77 +218,3 @@ def identify_plants(
             else pooled
         )
     return out
-
-
-class _Spent(Exception):
-    """All calls have been made."""
-
-
-def minimize(function: Callable[[Array], float], simplex: Array, *, calls: int, x_tol: float, f_tol: float) -> Array:
-    """Search for the least value of a function.
-
-    Parameters
-    ----------
-    function : Callable
-        Of a point, shape (k,).
-    simplex : Array, shape (k + 1, k)
-        Where to begin.
-    calls : int
-        Calls of the function at most.
-    x_tol, f_tol : float
-        Spread of the simplex and of its values at which to stop.
-
-    Returns
-    -------
-    Array, shape (k,)
-        The best point that was found.
-    """
-    left = calls
-
-    def value(x: Array) -> float:
-        nonlocal left
-        if left <= 0:
-            raise _Spent
-        left -= 1
-        return float(function(x))
-
-    points, values = simplex.copy(), np.full(len(simplex), np.inf)
-    try:
-        for i, point in enumerate(points):
-            values[i] = value(point)
-        while left > 0:
-            order = np.argsort(values, kind="stable")
-            points, values = points[order], values[order]
-            if np.abs(points[1:] - points[0]).max() <= x_tol and np.abs(values[1:] - values[0]).max() <= f_tol:
-                break
-            _step(points, values, value)
-    except _Spent:
-        pass
-    return np.asarray(points[np.argmin(values)])
-
-
-def _step(points: Array, values: Array, value: Callable[[Array], float]) -> None:
-    """Reflect the worst point, then expand, contract or shrink; the points are in order, the best first."""
-    middle, worst = points[:-1].sum(axis=0) / (len(points) - 1), points[-1].copy()
-
-    def take(point: Array, found: float) -> None:
-        points[-1], values[-1] = point, found
-
-    mirrored = 2 * middle - worst
-    reflected = value(mirrored)
-    if reflected < values[0]:
-        far = 3 * middle - 2 * worst
-        expanded = value(far)
-        take(*((far, expanded) if expanded < reflected else (mirrored, reflected)))
-    elif reflected < values[-2]:
-        take(mirrored, reflected)
-    else:
-        outside = reflected < values[-1]
-        near = 1.5 * middle - 0.5 * worst if outside else 0.5 * middle + 0.5 * worst
-        contracted = value(near)
-        if contracted <= reflected if outside else contracted < values[-1]:
-            take(near, contracted)
-            return
-        for i in range(1, len(points)):
-            points[i] = points[0] + 0.5 * (points[i] - points[0])
-            values[i] = value(points[i])

@@ -4,18 +4,48 @@ from __future__ import annotations
 
 import numpy as np
 
-OK, STUCK, NONE, GAIN, NOISY, DRIFT = range(6)
-# rows of sensor and actuator that a model combines; from `SECOND` on only where a second measurement tells them apart
-SENSOR = np.array([0, 1, 2, 3, 4, 5, 0, 0, 0, 0, 3, 3, 3, 3, 4, 4, 4, 4, 1, 1, 1, 1, 2, 2, 2, 2, 5, 5, 5, 5])
-ACTUATOR = np.array([0, 0, 0, 0, 0, 0, 3, 1, 2, 4, 3, 1, 2, 4, 3, 1, 2, 4, 3, 1, 2, 4, 3, 1, 2, 4, 3, 1, 2, 4])
-SECOND = 18
-MODELS = SENSOR.size
+from replay.faults import FaultMode, Side
+
+# codes of rows as in `diagnosis.results.fault_rows`; `COLOURED` is the noisy sensor with noise that changes fast
+HEALTHY, STUCK, NO_SIGNAL, INEFFICIENT, NOISY, COLOURED = range(6)
+
+#: Fault mode of each filter's row, by side; a row that is not here is healthy.
+MODES: dict[tuple[Side, int], FaultMode] = {
+    (Side.SENSOR, STUCK): FaultMode.STUCK,
+    (Side.SENSOR, NO_SIGNAL): FaultMode.NO_SIGNAL,
+    (Side.SENSOR, INEFFICIENT): FaultMode.INEFFICIENT,
+    (Side.SENSOR, NOISY): FaultMode.NOISY,
+    (Side.SENSOR, COLOURED): FaultMode.NOISY,
+    (Side.ACTUATOR, STUCK): FaultMode.STUCK,
+    (Side.ACTUATOR, NO_SIGNAL): FaultMode.NO_SIGNAL,
+    (Side.ACTUATOR, INEFFICIENT): FaultMode.INEFFICIENT,
+    (Side.ACTUATOR, NOISY): FaultMode.NOISY,
+}
+
+_SENSOR_FAULTS = (STUCK, NO_SIGNAL, INEFFICIENT, NOISY, COLOURED)
+_VALVE_FAULTS = (INEFFICIENT, STUCK, NO_SIGNAL, NOISY)
+_SINGLE = [(HEALTHY, HEALTHY), *((s, HEALTHY) for s in _SENSOR_FAULTS), *((HEALTHY, a) for a in _VALVE_FAULTS)]
+_DOUBLE = [(s, a) for s in (INEFFICIENT, NOISY) for a in _VALVE_FAULTS]
+_HIDDEN = [(s, a) for s in (STUCK, NO_SIGNAL, COLOURED) for a in _VALVE_FAULTS]
+_MODELS = [*_SINGLE, *_DOUBLE, *_HIDDEN]
+
+#: Row of the sensor and of the valve that each model combines.
+SENSOR = np.array([sensor for sensor, _ in _MODELS])
+ACTUATOR = np.array([actuator for _, actuator in _MODELS])
+MODELS = len(_MODELS)
+#: From this model on only a redundant measurement tells the two faults apart.
+FIRST_HIDDEN = len(_SINGLE) + len(_DOUBLE)
 STATES = 6
-# states that a model frees, φ, r and b first; the others have no variance
-ACTIVE = np.array([[0, 1, 3, 2, 2, 2]] * MODELS)
-FREE = np.full(MODELS, 3)
-for _m in range(MODELS):
-    for _i, _on in ((2, ACTUATOR[_m] in (GAIN, NOISY)), (4, SENSOR[_m] >= GAIN), (5, SENSOR[_m] in (1, 4, 5))):
-        if _on:
-            ACTIVE[_m, FREE[_m]] = _i
-            FREE[_m] += 1
+
+
+def _active_states(sensor: int, actuator: int) -> list[int]:
+    """States that a model frees, φ, r and b first; the others have no variance."""
+    gain, scale = actuator in (INEFFICIENT, NOISY), sensor in (INEFFICIENT, NOISY, COLOURED)
+    offset = sensor in (STUCK, NOISY, COLOURED)
+    return [0, 1, 3] + [state for state, free in ((2, gain), (4, scale), (5, offset)) if free]
+
+
+_ACTIVE = [_active_states(sensor, actuator) for sensor, actuator in _MODELS]
+#: States that each model frees, the first `FREE` of each line.
+ACTIVE = np.array([free + [2] * (STATES - len(free)) for free in _ACTIVE])
+FREE = np.array([len(free) for free in _ACTIVE])

@@ -3,23 +3,118 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from diagnosis.steering.blocks import WHITE_DOF, SensorNoise, SteeringBlocks
 from diagnosis.steering.identification import SteeringPlant, windows_of
-from diagnosis.steering.step_kernel import DISTURBANCE_S, SENSOR_DRIFT_S
-
-Array = NDArray[np.float64]
 
 _MEAN_HEALTHY_S = 60.0
-_LOAD_S = 1.0
+_RATE_ERROR_S = 1.0
+_DISTURBANCE_S = 0.8  # how fast a valve's disturbance and a sensor's slow noise change
+_COLOURED_S = 0.08  # how fast a sensor's coloured noise changes
+_HIDDEN_DOF = 0.02  # degrees of freedom per sample of a white part that rounding hides
+
+
+class AxleConstants(NamedTuple):
+    """Valve, cylinder and axle.
+
+    Attributes
+    ----------
+    dt : float
+        Length of a block [s].
+    gain, rate_limit : float
+        Rate per full opening and its limit [rad/s].
+    lag, rate_decay : float
+        Lag of the rate [s], and what is left of a rate after a block, exp(−dt/lag) [1].
+    stop : float
+        Angle of the end stops [rad].
+    rate_error, rate_error_decay : float
+        Standard deviation of the rate's error [rad/s], and what is left of it after a block [1].
+    gain_variance : float
+        Variance of the valve's characteristic, relative to it [1].
+    angle_variance : float
+        Variance that a block adds to the angle [rad²].
+    stop_variance : float
+        Variance of the angle at an end stop [rad²].
+    disturbance_decay : float
+        What is left of a valve's disturbance after a block [1].
+    """
+
+    dt: float
+    gain: float
+    rate_limit: float
+    lag: float
+    rate_decay: float
+    stop: float
+    rate_error: float
+    rate_error_decay: float
+    gain_variance: float
+    angle_variance: float
+    stop_variance: float
+    disturbance_decay: float
+
+
+class SensorConstants(NamedTuple):
+    """The angle sensor's noise.
+
+    Attributes
+    ----------
+    white, white_spread : float
+        Power of the white noise, its rounding included [rad²], and the variance of its logarithm [1].
+    white_dof : float
+        Degrees of freedom of a sample in the power of the white part [1].
+    constant : float
+        The least power that a constant reading is given [rad²].
+    rounding : float
+        Power of the rounding in a sample [rad²].
+    mean_rounding : float
+        What rounding leaves in the mean of a block [rad²].
+    resolved : bool
+        Whether the noise is larger than the rounding step.
+    rest_cost : float
+        What a constant reading must gain per block where rounding hides the noise [log-likelihood].
+    coloured_decay : float
+        What is left of coloured noise after a block [1].
+    """
+
+    white: float
+    white_spread: float
+    white_dof: float
+    constant: float
+    rounding: float
+    mean_rounding: float
+    resolved: bool
+    rest_cost: float
+    coloured_decay: float
+
+
+class FilterConstants(NamedTuple):
+    """Constants of all filters of an axle.
+
+    Attributes
+    ----------
+    axle : AxleConstants
+    sensor : SensorConstants
+    switch_cost : float
+        Minus the log-probability that a row is entered in a block.
+    freedom_cost : float
+        What a model with a free gain must gain per block [log-likelihood].
+    redundant : bool
+        Whether anything is measured redundantly.
+    """
+
+    axle: AxleConstants
+    sensor: SensorConstants
+    switch_cost: float
+    freedom_cost: float
+    redundant: bool
 
 
 @dataclass(frozen=True)
 class SteeringModel:
-    """Constants of the filters of one axle.
+    """What is known of one axle, from which the constants of its filters follow.
 
     Attributes
     ----------
@@ -29,78 +124,95 @@ class SteeringModel:
         Of the angle.
     stop : float
         Angle of the end stops [rad].
-    load : float
+    rate_error : float
         Standard deviation of the rate's error [rad/s].
     count : float
         Samples in a usual block.
     dt : float
         Length of a block [s].
-    twice : bool
-        Whether something is measured twice.
+    redundant : bool
+        Whether anything is measured redundantly.
     """
 
     plant: SteeringPlant
     noise: SensorNoise
     stop: float
-    load: float
+    rate_error: float
     count: float
     dt: float
-    twice: bool
+    redundant: bool
 
     @property
     def switch_cost(self) -> float:
         """Minus the log-probability that a row is entered in a block."""
         return float(np.log(_MEAN_HEALTHY_S / self.dt * 8))
 
-    def _freedom(self, r: float) -> float:
+    @property
+    def mean_rounding(self) -> float:
+        """What rounding leaves in the mean of a block: (q²/2π²)·exp(−4π²σ²/q²) where noise evens it out [rad²]."""
+        noise = self.noise
+        even = np.exp(-4 * np.pi**2 * (noise.std / noise.lsb) ** 2) if noise.lsb > 0 else 0.0
+        rounding = noise.lsb**2 / (2 * np.pi**2) * even if noise.resolved else noise.step
+        return float(rounding + (1e-7 * self.stop) ** 2)
+
+    @property
+    def rest_cost(self) -> float:
         """What a healthy axle at rest loses per block, by its freedom, on a constant reading; and a little more.
 
         A constant reading must gain as much to be taken for a stuck sensor where rounding hides the noise.
         """
-        f = np.array([[1.0, self.dt], [0.0, np.exp(-self.dt / _LOAD_S)]])
-        q = np.diag([0.0, (1 - f[1, 1] ** 2) * self.load**2])
-        p = np.diag([r, self.load**2])
+        r = self.noise.white / self.count + self.mean_rounding
+        f = np.array([[1.0, self.dt], [0.0, np.exp(-self.dt / _RATE_ERROR_S)]])
+        q = np.diag([0.0, (1 - f[1, 1] ** 2) * self.rate_error**2])
+        p = np.diag([r, self.rate_error**2])
         for _ in range(200):  # Riccati recursion to its steady state
             p = f @ p @ f.T + q
             p -= np.outer(p[:, 0], p[0]) / (p[0, 0] + r)
         p = f @ p @ f.T + q
         return float(0.5 * np.log(1 + p[0, 0] / r) + 0.03)
 
-    def packed(self) -> Array:
-        """Parameters in the order of the compiled scan."""
+    def constants(self) -> FilterConstants:
+        """Constants of the compiled filters."""
+        resolved = bool(self.noise.resolved)
+        return FilterConstants(
+            axle=self._axle(),
+            sensor=self._sensor(),
+            switch_cost=self.switch_cost,
+            freedom_cost=0.5 * self.dt if resolved else 0.03,
+            redundant=self.redundant,
+        )
+
+    def _axle(self) -> AxleConstants:
+        plant, noise = self.plant, self.noise
+        lag = max(plant.lag, 1e-4)
+        return AxleConstants(
+            dt=self.dt,
+            gain=plant.gain,
+            rate_limit=plant.rate,
+            lag=lag,
+            rate_decay=float(np.exp(-self.dt / lag)),
+            stop=self.stop,
+            rate_error=self.rate_error,
+            rate_error_decay=float(np.exp(-self.dt / _RATE_ERROR_S)),
+            gain_variance=max(0.02, plant.misfit) ** 2,
+            angle_variance=(0.1 * self.rate_error * self.dt) ** 2,
+            stop_variance=self.mean_rounding + 0.01 * noise.white,
+            disturbance_decay=float(np.exp(-self.dt / _DISTURBANCE_S)),
+        )
+
+    def _sensor(self) -> SensorConstants:
         noise = self.noise
-        lag = max(self.plant.lag, 1e-4)
-        # what rounding leaves in a mean that noise does not even out: (q²/2π²)·exp(−4π²σ²/q²)
-        even = np.exp(-4 * np.pi**2 * (noise.std / noise.lsb) ** 2) if noise.lsb > 0 else 0.0
-        rounding = noise.lsb**2 / (2 * np.pi**2) * even if noise.resolved else noise.step
-        rounding += (1e-7 * self.stop) ** 2
-        constant = max(noise.step / 4, noise.white / 2500)
-        return np.array(
-            [
-                self.dt,
-                np.exp(-self.dt / lag),
-                self.plant.gain,
-                self.plant.rate,
-                self.stop,
-                self.load,
-                np.exp(-self.dt / _LOAD_S),
-                noise.white,
-                constant,
-                WHITE_DOF if noise.resolved else 0.02,
-                noise.spread,
-                lag,
-                (0.1 * self.load * self.dt) ** 2,
-                rounding + 0.01 * noise.white,
-                rounding,
-                self.switch_cost,
-                0.5 * self.dt if noise.resolved else 0.03,
-                max(0.02, self.plant.misfit) ** 2,
-                noise.step,
-                self._freedom(noise.white / self.count + rounding),
-                float(self.twice),
-                np.exp(-self.dt / DISTURBANCE_S),
-                np.exp(-self.dt / SENSOR_DRIFT_S),
-            ]
+        resolved = bool(noise.resolved)
+        return SensorConstants(
+            white=noise.white,
+            white_spread=noise.spread,
+            white_dof=WHITE_DOF if resolved else _HIDDEN_DOF,
+            constant=max(noise.step / 4, noise.white / 2500),
+            rounding=noise.step,
+            mean_rounding=self.mean_rounding,
+            resolved=resolved,
+            rest_cost=self.rest_cost,
+            coloured_decay=float(np.exp(-self.dt / _COLOURED_S)),
         )
 
 
@@ -120,11 +232,11 @@ def model_of(blocks: SteeringBlocks, plant: SteeringPlant, noise: SensorNoise, s
     """
     windows = windows_of(blocks, noise, stop, 0.5)
     predicted = windows.predicted(plant.gain, plant.rate, plant.lag)
-    off = np.abs(windows.rate - predicted)[windows.good & (np.abs(predicted) < 0.05 * plant.rate)]
-    load = 0.0
-    if off.size >= 8:
-        load = float(np.sqrt(max((np.quantile(off, 0.4) / 0.524) ** 2 - windows.noise**2, 0.0)))
+    residual = np.abs(windows.rate - predicted)[windows.good & (np.abs(predicted) < 0.05 * plant.rate)]
+    error = 0.0
+    if residual.size >= 8:
+        error = float(np.sqrt(max((np.quantile(residual, 0.4) / 0.524) ** 2 - windows.noise**2, 0.0)))
     known = blocks.count[blocks.count > 0]
     count = float(np.median(known)) if known.size else 1.0
-    twice = bool(np.isfinite(blocks.second).any())
-    return SteeringModel(plant, noise, stop, max(load, 5e-4 * plant.rate), count, blocks.dt, twice)
+    redundant = bool(blocks.redundancy.known.any())
+    return SteeringModel(plant, noise, stop, max(error, 5e-4 * plant.rate), count, blocks.dt, redundant)

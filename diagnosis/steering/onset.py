@@ -1,4 +1,4 @@
-"""Ends of a steering sensor's fault at the log's own rate: where a constant begins, where the angle jumps."""
+"""Ends of a steering fault at the log's own rate: where a constant begins, the angle jumps, the valve leaves its command."""
 
 from __future__ import annotations
 
@@ -9,65 +9,64 @@ from numpy.typing import NDArray
 
 from diagnosis.results.assessment import Finding
 from diagnosis.steering.blocks import SensorNoise
-from replay.faults import FaultMode, Side
+from diagnosis.steering.inputs import AxleInputs
+from replay.faults import Side
 
 Array = NDArray[np.float64]
 
 _JUMP = 6.0
-_OFF, _FOLLOWING = 4.0, 10
+_DEVIATION, _FOLLOWING = 4.0, 10
 
 
-def refined_valve(finding: Finding, off: Array, length: int) -> Finding:
+def refined_valve(finding: Finding, deviation: Array | None, length: int) -> Finding:
     """Move a valve fault's ends, known to a block, to the samples in which its position leaves and meets its command.
 
     Parameters
     ----------
     finding : Finding
         With ends on blocks.
-    off : Array, shape (n,)
-        Position less command as multiples of its noise; see `diagnosis.steering.second_measurement.with_position`.
+    deviation : Array, shape (n,), or None
+        Position less command as multiples of its noise; see `diagnosis.steering.redundancy.with_valve_opening`.
     length : int
         Samples per block.
     """
-    if finding.side is not Side.ACTUATOR:
+    if deviation is None or finding.side is not Side.ACTUATOR:
         return finding
     reach = 5 * length + 2
-    start = _first_off(off, finding.start, reach)
-    stop = off.size - _first_off(off[::-1], off.size - finding.stop, reach) if finding.stop < off.size else off.size
+    start, size = _first_deviation(deviation, finding.start, reach), deviation.size
+    stop = size - _first_deviation(deviation[::-1], size - finding.stop, reach) if finding.stop < size else size
     return replace(finding, start=start, stop=stop) if start < stop else finding
 
 
-def _first_off(off: Array, place: int, reach: int) -> int:
-    """First sample near `place` that is off and is followed by more of them; `place` where there is none."""
-    a, b = max(0, place - reach), min(off.size, place + reach)
-    large = np.abs(np.nan_to_num(off[a : b + _FOLLOWING])) > _OFF
-    ahead = np.convolve(np.abs(np.nan_to_num(off[a : b + _FOLLOWING])) > _OFF / 2, np.ones(_FOLLOWING), mode="full")
+def _first_deviation(deviation: Array, place: int, reach: int) -> int:
+    """First sample near `place` that deviates and is followed by more of them; `place` where there is none."""
+    a, b = max(0, place - reach), min(deviation.size, place + reach)
+    size = np.abs(np.nan_to_num(deviation[a : b + _FOLLOWING]))
+    large = size > _DEVIATION
+    ahead = np.convolve(size > _DEVIATION / 2, np.ones(_FOLLOWING), mode="full")
     lasting = ahead[_FOLLOWING - 1 :][: large.size] >= 0.6 * _FOLLOWING
     found = np.flatnonzero((large & lasting)[: b - a])
     return a + int(found[0]) if found.size else place
 
 
-def refined(finding: Finding, y: Array, fresh: NDArray[np.bool_], noise: SensorNoise, length: int) -> Finding:
+def refined_sensor(finding: Finding, inputs: AxleInputs, length: int) -> Finding:
     """Move a sensor fault's ends, known to a block, to the samples that show them.
 
     Parameters
     ----------
     finding : Finding
         With ends on blocks.
-    y : Array, shape (n,)
-        Angle [rad].
-    fresh : NDArray[np.bool_], shape (n,)
-        Steps with a new sample.
-    noise : SensorNoise
-        Of the angle.
+    inputs : AxleInputs
+        The axle's channels.
     length : int
         Samples per block.
     """
     if finding.side is not Side.SENSOR:
         return finding
+    y, noise = inputs.angle, inputs.noise
     reach = 3 * length + 2
-    if finding.mode in (FaultMode.STUCK, FaultMode.NO_SIGNAL):
-        start, stop = _constant(finding, y, fresh, noise, reach)
+    if finding.mode.total:
+        start, stop = _constant(finding, y, inputs.fresh, noise, reach)
     else:
         start = _jump(finding.start, y, noise, reach, first=True)
         stop = finding.stop if finding.stop >= y.size else _jump(finding.stop, y, noise, reach, first=False)

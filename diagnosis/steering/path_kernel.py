@@ -4,9 +4,20 @@ from __future__ import annotations
 
 import numpy as np
 from numba import njit
+from numpy.typing import NDArray
 
 from diagnosis.estimation.fault_models import SKIP
-from diagnosis.steering.model_bank import ACTUATOR, MODELS, NOISY, NONE, SENSOR, STATES, STUCK
+from diagnosis.steering.filter_state import (
+    Array,
+    Block,
+    BlockSeries,
+    FilterBank,
+    Redundancy,
+    RedundantBlock,
+    SteeringPath,
+)
+from diagnosis.steering.model_bank import ACTUATOR, MODELS, NO_SIGNAL, NOISY, SENSOR, STATES, STUCK
+from diagnosis.steering.models import FilterConstants
 from diagnosis.steering.step_kernel import advance, enter
 from replay.arrays.numeric import uncounted
 
@@ -14,107 +25,134 @@ _LEARNING_COST = 8.0
 
 
 @njit(cache=True, error_model="numpy")
-def switch_cost(m, old, cost, second):  # type: ignore[no-untyped-def]
+def switch_cost(m: int, old: int, constants: FilterConstants) -> float:
     """Minus the log-probability of going from model `old` to m within one block."""
     s, s0 = SENSOR[m], SENSOR[old]
+    cost = constants.switch_cost
     out = 0.0
     if s != s0:
         out += 3.0 if s >= NOISY and s0 >= NOISY else cost
     if ACTUATOR[m] != ACTUATOR[old]:
-        out += 0.0 if s in (STUCK, NONE) and second == 0 else cost
+        out += 0.0 if s in (STUCK, NO_SIGNAL) and not constants.redundant else cost
     return out
 
 
-@njit(cache=True, error_model="numpy")
-def scan(y, power, count, driven, u, status, second, allowed, p, score, z, P, ig, row, back):  # type: ignore[no-untyped-def]
-    """Viterbi over the models; writes back-pointers (n, models); `row` (3, states) is room to work in."""
-    second, p, z, P, ig, row = (
-        uncounted(second),
-        uncounted(p),
-        uncounted(z),
-        uncounted(P),
-        uncounted(ig),
-        uncounted(row),
+@njit(cache=True, error_model="numpy", inline="always")
+def _block(k: int, series: BlockSeries) -> Block:
+    """Block k of an axle."""
+    return Block(series.mean[k], series.power[k], series.samples[k], series.driven[k], series.u[k], series.status[k])
+
+
+@njit(cache=True, error_model="numpy", inline="always")
+def _redundant_block(k: int, seen: Redundancy) -> RedundantBlock:
+    """What is measured redundantly in block k."""
+    return RedundantBlock(
+        seen.angle[k],
+        seen.angle_variance[k],
+        seen.opening[k],
+        seen.opening_variance[k],
+        seen.share[k],
+        seen.share_variance[k],
+        seen.command[k],
     )
-    for k in range(y.size):
+
+
+@njit(cache=True, error_model="numpy")
+def scan(
+    series: BlockSeries,
+    allowed: NDArray[np.bool_],
+    constants: FilterConstants,
+    score: Array,
+    states: FilterBank,
+    back: NDArray[np.uint8],
+) -> None:
+    """Viterbi over the models; changes `score` and `states`, writes back-pointers (n, models)."""
+    bank = FilterBank(uncounted(states.mean), uncounted(states.cov), uncounted(states.noise), uncounted(states.room))
+    for k in range(series.mean.size):
         best = 0
         for m in range(1, MODELS):
             if score[m] > score[best]:
                 best = m
         top = score[best]
-        if status[k] != SKIP:
+        if series.status[k] != SKIP:
             for m in range(MODELS):
                 if m == best or not allowed[m]:
                     continue
-                cost = switch_cost(m, best, p[15], p[20])
+                cost = switch_cost(m, best, constants)
                 learning = 0.0 if m == 0 or m == 2 else _LEARNING_COST
                 if top - cost - learning > score[m]:
                     score[m] = top - cost
                     back[k, m] = best
-                    enter(m, best, p, z, P, ig)
+                    enter(m, best, constants, bank)
         top = -1e300
+        block, seen = _block(k, series), _redundant_block(k, series.redundancy)
         for m in range(MODELS):
             if allowed[m]:
-                score[m] += advance(
-                    m, y[k], power[k], count[k], driven[k], u[k], status[k], second[k], p, z, P, ig, row
-                )
+                score[m] += advance(m, block, seen, constants, bank)
                 top = max(top, score[m])
         for m in range(MODELS):
             score[m] -= top
 
 
 @njit(cache=True, error_model="numpy")
-def follow(y, power, count, driven, u, status, second, path, p, z, P, ig, row, Z, C, G):  # type: ignore[no-untyped-def]
+def follow(series: BlockSeries, constants: FilterConstants, states: FilterBank, path: SteeringPath) -> None:
     """Run only the model that `path` names in each block; writes its mean, covariance and noise after each block.
 
-    z, P and `ig` hold the first model as `started` gives it; `row` (3, states) is room to work in.
+    `states` hold the first model as `start` leaves it.
     """
-    second, p, z, P, ig, row = (
-        uncounted(second),
-        uncounted(p),
-        uncounted(z),
-        uncounted(P),
-        uncounted(ig),
-        uncounted(row),
+    bank = FilterBank(uncounted(states.mean), uncounted(states.cov), uncounted(states.noise), uncounted(states.room))
+    for k in range(series.mean.size):
+        m = np.int64(path.model[k])
+        if k > 0 and m != path.model[k - 1]:
+            enter(m, np.int64(path.model[k - 1]), constants, bank)
+        advance(m, _block(k, series), _redundant_block(k, series.redundancy), constants, bank)
+        path.mean[k], path.cov[k], path.noise[k] = bank.mean[m], bank.cov[m], bank.noise[m]
+
+
+@njit(cache=True, error_model="numpy")
+def empty_bank() -> FilterBank:
+    """States of all models, before any has begun."""
+    return FilterBank(
+        np.zeros((MODELS, STATES)), np.zeros((MODELS, STATES, STATES)), np.ones((MODELS, 2)), np.zeros((3, STATES))
     )
-    for k in range(y.size):
-        m = path[k]
-        if k > 0 and m != path[k - 1]:
-            enter(m, path[k - 1], p, z, P, ig)
-        advance(m, y[k], power[k], count[k], driven[k], u[k], status[k], second[k], p, z, P, ig, row)
-        Z[k], C[k], G[k] = z[m], P[m], ig[m]
 
 
 @njit(cache=True, error_model="numpy")
-def started(m, first, p):  # type: ignore[no-untyped-def]
-    """States in which model m has just begun at the measured angle `first`."""
-    z, P, ig = np.zeros((MODELS, STATES)), np.zeros((MODELS, STATES, STATES)), np.ones((MODELS, 2))
-    z[m, 0] = min(max(first, -p[4]), p[4])
-    P[m, 0, 0], P[m, 1, 1] = p[4] ** 2, (0.2 * p[3]) ** 2
-    enter(m, m, p, z, P, ig)
-    return z, P, ig
+def start(m: int, first: float, constants: FilterConstants, bank: FilterBank) -> None:
+    """Begin model m of a mission at the measured angle `first`."""
+    stop = constants.axle.stop
+    bank.mean[m, 0] = min(max(first, -stop), stop)
+    bank.cov[m, 0, 0], bank.cov[m, 1, 1] = stop**2, (0.2 * constants.axle.rate_limit) ** 2
+    enter(m, m, constants, bank)
 
 
 @njit(cache=True, error_model="numpy")
-def path_evidence(y, power, count, driven, u, status, second, path, a, b, known, p, Z, C, G):  # type: ignore[no-untyped-def]
-    """Log-evidence of blocks a…b of a path, less the price of its switches, and [φ, r, a, b, d, c] at the end.
+def path_evidence(
+    series: BlockSeries,
+    models: NDArray[np.uint8],
+    begin: int,
+    end: int,
+    known: SteeringPath,
+    constants: FilterConstants,
+) -> tuple[float, Array]:
+    """Log-evidence of blocks begin…end of a path, less the price of its switches, and [φ, r, a, b, d, c] at the end.
 
-    The states before block a are those of `follow` on the path `known`.
+    The states before block `begin` are those of the path `known`.
     """
-    if a > 0:
-        z, P, ig = np.zeros((MODELS, STATES)), np.zeros((MODELS, STATES, STATES)), np.ones((MODELS, 2))
-        before = known[a - 1]
-        z[before], P[before], ig[before] = Z[a - 1], C[a - 1], G[a - 1]
+    bank = empty_bank()
+    if begin > 0:
+        before = np.int64(known.model[begin - 1])
+        bank.mean[before], bank.cov[before] = known.mean[begin - 1], known.cov[begin - 1]
+        bank.noise[before] = known.noise[begin - 1]
     else:
-        before = path[0]
-        z, P, ig = started(before, y[0], p)
-    row = np.zeros((3, STATES))
+        before = np.int64(models[0])
+        start(before, series.mean[0], constants, bank)
     total = 0.0
-    for k in range(a, b):
-        m = path[k]
+    for k in range(begin, end):
+        m = np.int64(models[k])
         if m != before:
-            enter(m, before, p, z, P, ig)
-            total -= switch_cost(m, before, p[15], p[20])
+            enter(m, before, constants, bank)
+            total -= switch_cost(m, before, constants)
             before = m
-        total += advance(m, y[k], power[k], count[k], driven[k], u[k], status[k], second[k], p, z, P, ig, row)
-    return total, z[before].copy()
+        total += advance(m, _block(k, series), _redundant_block(k, series.redundancy), constants, bank)
+    return total, bank.mean[before].copy()

@@ -9,16 +9,14 @@ from numpy.typing import NDArray
 
 from diagnosis.channels.noise import moving_sum
 from diagnosis.estimation.fault_models import PAIR
-from diagnosis.results.assessment import CODE, Finding
-from diagnosis.steering import model_bank as sr
-from diagnosis.steering.filter import SteeringPath
-from diagnosis.steering.path_refinement import SteeringData
+from diagnosis.results.assessment import CODE
+from diagnosis.steering.filter_state import SteeringPath
+from diagnosis.steering.findings import SideFindings, Span
+from diagnosis.steering.inputs import AxleInputs
+from diagnosis.steering.model_bank import HEALTHY
+from diagnosis.steering.path import AxleFilter
 from replay.faults import Side, State
 
-Array = NDArray[np.float64]
-Span = tuple[int, int]
-
-BLIND_ROWS = (CODE[State.STUCK], CODE[State.NO_SIGNAL])
 _ALONE_S, _BETWEEN_S = 6.0, 30.0
 REASONS: dict[Side, Mapping[State, str]] = {
     Side.SENSOR: {
@@ -35,13 +33,13 @@ REASONS: dict[Side, Mapping[State, str]] = {
 }
 
 
-def exercised(data: SteeringData) -> NDArray[np.bool_]:
+def exercised(axle: AxleFilter) -> NDArray[np.bool_]:
     """Blocks in which the command moves the axle by much more than the sensor's noise. Shape (m,)."""
-    width = max(1, round(0.5 / data.blocks.dt))
-    travel = np.abs(moving_sum(np.nan_to_num(data.driven), width)) * data.blocks.dt
-    noise = data.model.noise
-    least = 10 * np.sqrt(noise.white / max(1.0, width * float(np.median(data.blocks.count)))) + noise.lsb
-    return np.asarray(travel > max(least, 0.5 * data.model.load, 1e-3 * data.model.stop))
+    width = max(1, round(0.5 / axle.blocks.dt))
+    travel = np.abs(moving_sum(np.nan_to_num(axle.driven), width)) * axle.blocks.dt
+    model, noise = axle.model, axle.model.noise
+    least = 10 * np.sqrt(noise.white / max(1.0, width * float(np.median(axle.blocks.count)))) + noise.lsb
+    return np.asarray(travel > max(least, 0.5 * model.rate_error, 1e-3 * model.stop))
 
 
 def vouched(healthy: NDArray[np.bool_], shown: NDArray[np.bool_], dt: float) -> NDArray[np.bool_]:
@@ -68,58 +66,62 @@ def vouched(healthy: NDArray[np.bool_], shown: NDArray[np.bool_], dt: float) -> 
 
 def states_of(
     side: Side,
-    data: SteeringData,
+    inputs: AxleInputs,
+    axle: AxleFilter,
     path: SteeringPath,
-    findings: Sequence[Finding],
-    open_runs: Sequence[Span],
+    found: SideFindings,
     masked: Sequence[Span],
-    y: Array,
-    u: Array,
-    reliable: bool,
-) -> tuple[NDArray[np.int8], int]:
-    """States of one side, and the number of samples that deviate without an explanation.
+    *,
+    judged: bool,
+) -> NDArray[np.int8]:
+    """States of one side, shape (n,).
 
     Parameters
     ----------
     side : Side
         `SENSOR` or `ACTUATOR`.
-    data : SteeringData
-        The axle.
+    inputs : AxleInputs
+        The axle's channels.
+    axle : AxleFilter
+        Its filters.
     path : SteeringPath
         Most probable models.
-    findings : Sequence[Finding]
+    found : SideFindings
         Faults of this side.
-    open_runs : Sequence[tuple[int, int]]
-        Blocks whose fault may not be stated.
     masked : Sequence[tuple[int, int]]
         Samples in which the sensor gives nothing usable.
-    y, u : Array, shape (n,)
-        Angle and valve command.
-    reliable : bool
-        Whether valves can be judged by the plant.
+    judged : bool
+        Whether this side can be judged by the plant.
     """
-    blocks = data.blocks
-    rows = path.sensor if side is Side.SENSOR else path.actuator
-    shown = exercised(data)
-    if side is Side.SENSOR and data.model.noise.resolved:
-        shown[:] = True
-    well = vouched(rows == sr.OK, shown, blocks.dt)
-    by_block = np.where(well, CODE[State.HEALTHY], CODE[State.NOT_EXCITED]).astype(np.int8)
-    if side is Side.ACTUATOR and not reliable:
-        by_block[:] = CODE[State.NOT_ASSESSED]
-    if side is Side.SENSOR:
-        unseen = blocks.blind & (blocks.status == PAIR) & ~np.isfinite(blocks.second).any(axis=1)
-        by_block[unseen & (by_block == CODE[State.HEALTHY])] = CODE[State.NOT_ASSESSED]
-    doubt = 0
-    for a, b in open_runs:
-        by_block[a:b] = CODE[State.NOT_ASSESSED]
-        doubt += (b - a) * blocks.length
-    states = np.repeat(by_block, blocks.length)[: y.size].astype(np.int8)
+    y = inputs.angle
+    states = _of_blocks(side, axle, path, found.unexplained, judged)
+    states = np.repeat(states, axle.blocks.length)[: y.size].astype(np.int8)
     if side is Side.ACTUATOR:
         for a, b in masked:
             states[a:b] = CODE[State.MASKED]
-        states[~np.isfinite(u) & (states == CODE[State.HEALTHY])] = CODE[State.NO_DATA]
+        states[~np.isfinite(inputs.command) & (states == CODE[State.HEALTHY])] = CODE[State.NO_DATA]
     states[~np.isfinite(y) & (states == CODE[State.HEALTHY])] = CODE[State.NO_DATA]
-    for f in findings:
+    for f in found.findings:
         states[f.start : f.stop] = CODE[State(f.mode.value)]
-    return states, doubt
+    return states
+
+
+def _of_blocks(
+    side: Side, axle: AxleFilter, path: SteeringPath, unexplained: Sequence[Span], judged: bool
+) -> NDArray[np.int8]:
+    """States of blocks without faults, shape (m,)."""
+    blocks = axle.blocks
+    rows = path.sensor if side is Side.SENSOR else path.actuator
+    shown = exercised(axle)
+    if side is Side.SENSOR and axle.model.noise.resolved:
+        shown[:] = True
+    healthy = vouched(rows == HEALTHY, shown, blocks.dt)
+    states = np.where(healthy, CODE[State.HEALTHY], CODE[State.NOT_EXCITED]).astype(np.int8)
+    if not judged:
+        states[:] = CODE[State.NOT_ASSESSED]
+    if side is Side.SENSOR:
+        unseen = blocks.blind & (blocks.status == PAIR) & ~blocks.redundancy.known
+        states[unseen & (states == CODE[State.HEALTHY])] = CODE[State.NOT_ASSESSED]
+    for a, b in unexplained:
+        states[a:b] = CODE[State.NOT_ASSESSED]
+    return states

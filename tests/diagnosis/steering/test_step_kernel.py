@@ -8,32 +8,44 @@ from filterpy.kalman import ExtendedKalmanFilter
 from numpy.testing import assert_allclose
 
 from diagnosis.estimation.fault_models import PAIR
-from diagnosis.steering import model_bank as sr
-from diagnosis.steering import step_kernel as ss
 from diagnosis.steering.blocks import SensorNoise
-from diagnosis.steering.filter import start_state
+from diagnosis.steering.filter_state import Block, RedundantBlock
 from diagnosis.steering.identification import SteeringPlant
+from diagnosis.steering.measurement_kernel import update
+from diagnosis.steering.model_bank import (
+    ACTUATOR,
+    COLOURED,
+    HEALTHY,
+    INEFFICIENT,
+    MODELS,
+    NO_SIGNAL,
+    NOISY,
+    SENSOR,
+    STUCK,
+)
 from diagnosis.steering.models import SteeringModel
+from diagnosis.steering.path import start_states
+from diagnosis.steering.step_kernel import advance, predict
 
 MODEL = SteeringModel(
     plant=SteeringPlant(gain=4.0, rate=0.25, lag=0.05, misfit=0.01, windows=50),
     noise=SensorNoise(white=2.6e-7, spread=0.01, step=1.33e-8, lsb=4e-4),
     stop=0.785,
-    load=2e-3,
+    rate_error=2e-3,
     count=10.0,
     dt=0.01,
-    twice=False,
+    redundant=False,
 )
 DT, LAG, GAIN, RATE, STOP = 0.01, 0.05, 4.0, 0.25, 0.785
 FADE = np.exp(-DT / LAG)
 K_R = LAG * (1 - FADE)
 K_F = DT - K_R
-NOTHING = np.full(7, np.nan)
+NOTHING = RedundantBlock(*[np.nan] * 7)
 
 
 def force(m: int, x: np.ndarray, u: float, driven: float) -> tuple[float, float, float]:
     """What drives the rate, and its derivatives by a and b."""
-    if sr.ACTUATOR[m] == sr.OK:
+    if ACTUATOR[m] == HEALTHY:
         return driven + x[3], 0.0, 1.0
     f = GAIN * x[2] * u + x[3]
     return (f, GAIN * u, 1.0) if abs(f) <= RATE else (np.sign(f) * RATE, 0.0, 0.0)
@@ -42,37 +54,38 @@ def force(m: int, x: np.ndarray, u: float, driven: float) -> tuple[float, float,
 def process_noise(m: int, driven: float) -> tuple[np.ndarray, np.ndarray]:
     """Decay of each state over a block, and Q."""
     decay, q = np.ones(6), np.zeros(6)
-    q[0] = (0.1 * MODEL.load * DT) ** 2
-    a, s = sr.ACTUATOR[m], sr.SENSOR[m]
-    if a in (sr.OK, sr.GAIN, sr.NONE):
-        share = 0.0 if a == sr.NONE else 0.02 * driven
+    q[0] = (0.1 * MODEL.rate_error * DT) ** 2
+    a, s = ACTUATOR[m], SENSOR[m]
+    if a in (HEALTHY, INEFFICIENT, NO_SIGNAL):
+        share = 0.0 if a == NO_SIGNAL else 0.02 * driven
         decay[3] = np.exp(-DT)
-        q[3] = (1 - decay[3] ** 2) * (MODEL.load**2 + share**2)
-    elif a == sr.STUCK:
+        q[3] = (1 - decay[3] ** 2) * (MODEL.rate_error**2 + share**2)
+    elif a == STUCK:
         q[3] = (0.02 * RATE) ** 2 * DT
     else:
         decay[3] = np.exp(-DT / 0.8)
         q[3] = (1 - decay[3] ** 2) * (0.6 * RATE) ** 2
-    if s == sr.NOISY:
+    if s == NOISY:
         q[5] = (0.02 * STOP) ** 2 * DT
-    elif s == sr.DRIFT:
+    elif s == COLOURED:
         decay[5] = np.exp(-DT / 0.08)
         q[5] = (1 - decay[5] ** 2) * (0.1 * STOP) ** 2
     return decay, np.diag(q)
 
 
-@pytest.mark.parametrize("m", [m for m in range(sr.MODELS) if sr.SENSOR[m] in (sr.OK, sr.STUCK, sr.NONE)])
+@pytest.mark.parametrize("m", [m for m in range(MODELS) if SENSOR[m] in (HEALTHY, STUCK, NO_SIGNAL)])
 def test_model_is_filterpys_extended_kalman_filter(m: int) -> None:
     rng = np.random.default_rng(m)
-    p = MODEL.packed()
-    _, z, P, ig = start_state(0.1, p)
+    constants = MODEL.constants()
+    _, bank = start_states(0.1, constants)
+    z, P = bank.mean, bank.cov
     P[m, 0, 0] = 1e-4
     kf = ExtendedKalmanFilter(dim_x=6, dim_z=1)
     kf.x, kf.P = z[m].reshape(6, 1).copy(), P[m].copy()
-    dead = sr.SENSOR[m] in (sr.STUCK, sr.NONE)
-    r = p[8] if dead else MODEL.noise.white / 10 + p[14]
+    dead = SENSOR[m] in (STUCK, NO_SIGNAL)
+    sensor = constants.sensor
+    r = sensor.constant if dead else MODEL.noise.white / 10 + sensor.mean_rounding
     kf.R = np.array([[r]])
-    row = np.zeros((3, 6))
     for k in range(60):
         u = 0.04 * np.sin(k / 9.0)
         driven = GAIN * u
@@ -85,7 +98,7 @@ def test_model_is_filterpys_extended_kalman_filter(m: int) -> None:
         after = decay * x
         after[0] = x[0] + K_R * x[1] + K_F * f
         after[1] = FADE * x[1] + (1 - FADE) * f
-        y = after[0] + 1e-4 * rng.normal() if not dead else 0.05 * (sr.SENSOR[m] == sr.STUCK)
+        y = after[0] + 1e-4 * rng.normal() if not dead else 0.05 * (SENSOR[m] == STUCK)
         kf.x = after.reshape(6, 1)
         kf.P = F @ kf.P @ F.T + q
         kf.update(
@@ -93,28 +106,34 @@ def test_model_is_filterpys_extended_kalman_filter(m: int) -> None:
             HJacobian=lambda x: np.array([[x[4, 0], 0, 0, 0, x[0, 0], 1.0]]),
             Hx=lambda x: np.array([[x[4, 0] * x[0, 0] + x[5, 0]]]),
         )
-        if sr.ACTUATOR[m] in (sr.GAIN, sr.NOISY):
+        if ACTUATOR[m] in (INEFFICIENT, NOISY):
             kf.x[2, 0] = min(max(kf.x[2, 0], 0.1), 0.92)
-        ss.advance(m, y, 2.6e-7 if not dead else 0.0, 10.0, driven, u, PAIR, NOTHING, p, z, P, ig, row)
+        block = Block(y, 2.6e-7 if not dead else 0.0, 10.0, driven, u, PAIR)
+        advance(m, block, NOTHING, constants, bank)
         assert_allclose(z[m], kf.x[:, 0], atol=1e-9, rtol=1e-9)
         assert_allclose(P[m], kf.P, atol=1e-9, rtol=1e-7)
 
 
 def test_an_end_stop_holds_the_axle() -> None:
-    p = MODEL.packed()
-    _, z, P, _ = start_state(0.7, p)
-    m = int(np.flatnonzero((sr.ACTUATOR == sr.STUCK) & (sr.SENSOR == sr.OK))[0])
-    z[m, 3], row = RATE, np.zeros((3, 6))
+    constants = MODEL.constants()
+    _, bank = start_states(0.7, constants)
+    m = int(np.flatnonzero((ACTUATOR == STUCK) & (SENSOR == HEALTHY))[0])
+    bank.mean[m, 3] = RATE
     for _ in range(100):
-        ss.predict(m, 0.0, 0.0, p, z, P, row)
-    assert z[m, 0] == pytest.approx(STOP)
-    assert z[m, 1] == 0.0
+        predict(m, 0.0, 0.0, constants.axle, constants.sensor.coloured_decay, bank)
+    assert bank.mean[m, 0] == pytest.approx(STOP)
+    assert bank.mean[m, 1] == 0.0
 
 
 def test_a_block_that_no_model_explains_teaches_nothing() -> None:
-    p = MODEL.packed()
-    _, z, P, ig = start_state(0.1, p)
-    P[0, 0, 0], before = 1e-8, z[0].copy()
-    told = ss.update(0, 0.6, 2.6e-7, 10.0, p, z, P, ig, np.zeros(6))
-    assert_allclose(z[0], before)
-    assert told < ss.update(0, 0.1, 2.6e-7, 10.0, p, z, P, ig, np.zeros(6)) - 18
+    constants = MODEL.constants()
+    _, bank = start_states(0.1, constants)
+    bank.cov[0, 0, 0], before = 1e-8, bank.mean[0].copy()
+
+    def likelihood(angle: float) -> float:
+        block = Block(angle, 2.6e-7, 10.0, 0.0, 0.0, PAIR)
+        return float(update(0, block, STOP, constants.sensor, bank))
+
+    far = likelihood(0.6)
+    assert_allclose(bank.mean[0], before)
+    assert far < likelihood(0.1) - 18

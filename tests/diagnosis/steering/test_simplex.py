@@ -7,7 +7,7 @@ import pytest
 from numpy.testing import assert_array_equal
 from scipy.optimize import minimize as oracle
 
-from diagnosis.steering.identification import minimize
+from diagnosis.steering.simplex import minimize
 
 
 def rosenbrock(x: np.ndarray) -> float:

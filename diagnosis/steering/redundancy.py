@@ -1,4 +1,4 @@
-"""What is measured twice on a steering axle, in blocks: a second angle, and the valve's position beside its command."""
+"""What is measured redundantly on a steering axle, in blocks: a second angle, and the valve's opening beside its command."""
 
 from __future__ import annotations
 
@@ -41,24 +41,25 @@ def with_second_angle(
         What two healthy instruments may differ by [rad].
     """
     use = fresh & np.isfinite(y) & np.isfinite(true)
-    most = max(1, round(_MAX_LAG_S / dt)) if dt <= _MAX_LAG_S else 0
+    most = _most_lag(dt)
     moved = shifted(true, -relative_lag(true, y, use, -most, most))
     known = np.isfinite(moved)
     mean, count = _means(moved, known, blocks)
     power = _white(moved[known])
     slow = np.nan_to_num(slow_mismatch(moved - y, use & np.isfinite(moved), dt))
-    second = blocks.second.copy()
-    second[:, 0] = np.where(count > 0, mean, np.nan)
-    second[:, 1] = power / np.maximum(count, 1) + max(slow**2 - power, 0.0) + tolerance**2
-    return replace(blocks, second=second)
+    redundancy = blocks.redundancy._replace(
+        angle=np.where(count > 0, mean, np.nan),
+        angle_variance=power / np.maximum(count, 1) + max(slow**2 - power, 0.0) + tolerance**2,
+    )
+    return replace(blocks, redundancy=redundancy)
 
 
-def with_position(
+def with_valve_opening(
     blocks: SteeringBlocks, u: Array, position: Array, fresh: Flags, dt: float
 ) -> tuple[SteeringBlocks, Array]:
-    """Add the valve's position: its mean beside the command's, and how much of the command's changes it follows.
+    """Add the valve's opening: its mean beside the command's, and how much of the command's changes it follows.
 
-    The second says whether a valve obeys even where only the sensor's noise moves its command.
+    The share of changes says whether a valve obeys even where only the sensor's noise moves its command.
 
     Parameters
     ----------
@@ -74,46 +75,83 @@ def with_position(
     Returns
     -------
     SteeringBlocks
-        With the position.
+        With the opening.
     Array, shape (n,)
         Position less command, at the command's time, as multiples of its healthy noise; NaN where unknown.
     """
     use = fresh & np.isfinite(u) & np.isfinite(position)
-    most = max(1, round(_MAX_LAG_S / dt)) if dt <= _MAX_LAG_S else 0
+    most = _most_lag(dt)
     linked = _jitter_lag(position, u, use, most)
     lag = relative_lag(position, u, use, 0, most) if linked is None else linked
     command = shifted(u, lag)
     known = use & np.isfinite(command)
-    off = np.where(known, position - command, 0.0)
-    power = max(_white(off[known]), 1e-8)
-    u_mean, count = _means(command, known, blocks)
-    p_mean, _ = _means(position, known, blocks)
-    width = blocks.length
-    places = np.minimum(np.arange(u.size) // width, count.size - 1)
-    du = np.where(known, command - u_mean[places], 0.0)
-    dp = np.where(known, position - p_mean[places], 0.0)
-    starts = np.arange(0, u.size, width)
-    changes = np.add.reduceat(du * du, starts)
-    together = np.add.reduceat(du * dp, starts)
-    slow = np.nan_to_num(slow_mismatch(np.where(known, off, np.nan), known, dt))
-    second = blocks.second.copy()
-    some = count > 0
-    second[:, 2] = np.where(some, p_mean, np.nan)
-    second[:, 3] = power / np.maximum(count, 1) + max(slow**2 - power, 0.0) / 4 + 0.05 * power
+    deviation = np.where(known, position - command, 0.0)
+    power = max(_white(deviation[known]), 1e-8)
+    slow = np.nan_to_num(slow_mismatch(np.where(known, deviation, np.nan), known, dt))
+    command_mean, count = _means(command, known, blocks)
+    opening, _ = _means(position, known, blocks)
+    share, share_variance = _followed_share(
+        np.where(known, command - _held(command_mean, u.size, blocks.length), 0.0),
+        np.where(known, position - _held(opening, u.size, blocks.length), 0.0),
+        count,
+        power,
+        blocks.length,
+    )
+    variance = power / np.maximum(count, 1) + max(slow**2 - power, 0.0) / 4 + 0.05 * power
     if linked is None:
         even, jitter = _without_jitter(command, known, dt)
-        u_mean = _means(even, known, blocks)[0]
-        second[:, 3] += _means(jitter, known, blocks)[0] / np.maximum(count, 1)
-    second[:, 6] = np.where(some, u_mean, np.nan)
+        command_mean = _means(even, known, blocks)[0]
+        variance += _means(jitter, known, blocks)[0] / np.maximum(count, 1)
+    some = count > 0
+    redundancy = blocks.redundancy._replace(
+        opening=np.where(some, opening, np.nan),
+        opening_variance=variance,
+        share=share,
+        share_variance=share_variance,
+        command=np.where(some, command_mean, np.nan),
+    )
+    deviation = shifted(np.where(known, deviation / np.sqrt(power), np.nan), -round(lag))
+    return replace(blocks, redundancy=redundancy), deviation
+
+
+def _most_lag(dt: float) -> int:
+    """Largest delay between two instruments [steps]."""
+    return max(1, round(_MAX_LAG_S / dt)) if dt <= _MAX_LAG_S else 0
+
+
+def _held(means: Array, size: int, length: int) -> Array:
+    """Means of blocks at every one of `size` samples."""
+    return np.asarray(means[np.minimum(np.arange(size) // length, means.size - 1)])
+
+
+def _followed_share(
+    command_changes: Array, opening_changes: Array, count: Array, power: float, length: int
+) -> tuple[Array, Array]:
+    """Share of the command's changes within a block that the opening follows, and its variance; NaN where unknown.
+
+    Parameters
+    ----------
+    command_changes, opening_changes : Array, shape (n,)
+        Command and opening less their means over the block [fraction].
+    count : Array, shape (m,)
+        Known samples of each block.
+    power : float
+        Power of the opening's noise [fraction²].
+    length : int
+        Samples per block.
+    """
+    starts = np.arange(0, command_changes.size, length)
+    changes = np.add.reduceat(command_changes * command_changes, starts)
+    together = np.add.reduceat(command_changes * opening_changes, starts)
+    share, variance = np.full(starts.size, np.nan), np.full(starts.size, np.nan)
     lively = (changes > 1e-3 * power) & (count >= _LEAST_CHANGES)
     if lively.any():
         windows = np.add.reduceat(np.stack([together, changes]) * lively, np.arange(0, starts.size, 100), axis=1)
-        share = windows[0] / np.maximum(windows[1], 1e-30)
-        if _SHARE_RANGE[0] < float(np.median(share[windows[1] > 0])) < _SHARE_RANGE[1]:
-            second[lively, 4] = together[lively] / changes[lively]
-            second[lively, 5] = power / changes[lively]
-    off = shifted(np.where(known, off / np.sqrt(power), np.nan), -round(lag))
-    return replace(blocks, second=second), off
+        by_window = windows[0] / np.maximum(windows[1], 1e-30)
+        if _SHARE_RANGE[0] < float(np.median(by_window[windows[1] > 0])) < _SHARE_RANGE[1]:
+            share[lively] = together[lively] / changes[lively]
+            variance[lively] = power / changes[lively]
+    return share, variance
 
 
 def _jitter_lag(position: Array, u: Array, use: Flags, most: int) -> float | None:

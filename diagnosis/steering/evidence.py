@@ -1,0 +1,60 @@
+"""Evidence columns of a steering axle and the angle that its model gives, each value of a block held or interpolated."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from diagnosis.results.assessment import Finding
+from diagnosis.results.evidence_columns import Pictured, steps_of
+from diagnosis.steering.filter_state import SteeringPath
+from diagnosis.steering.inputs import AxleInputs
+from diagnosis.steering.path import AxleFilter
+from replay.arrays.spill import Column, blocks
+from replay.faults import Side
+
+Array = NDArray[np.float64]
+
+
+def evidence_columns(
+    inputs: AxleInputs, axle: AxleFilter, path: SteeringPath, findings: Sequence[Finding]
+) -> dict[Side, Pictured]:
+    """Residual, threshold, expected angle, δ̂ and δ̄ of both sides, and every sample of them around the findings."""
+    y, gain = inputs.angle, axle.model.plant.gain
+    mean, std = path.mean, np.sqrt(np.maximum(path.variance, 0.0))
+    step = steps_of(findings, y.size, inputs.timeline.dt)
+
+    def held(x: Array) -> Array:
+        return np.repeat(x, axle.blocks.length)[: y.size]
+
+    def shared() -> Iterator[tuple[str, Array]]:
+        residual = held(mean[:, 0])
+        np.subtract(y, residual, out=residual)
+        yield "residual", residual
+        del residual
+        yield "threshold", held(3 * std[:, 0])
+        yield "expected", held(mean[:, 0])
+
+    def gains(i: int, scale: float) -> Iterator[tuple[str, Array]]:
+        yield "delta", held(mean[:, i])
+        yield "delta_std", held(std[:, i])
+        yield "delta_bar", held(mean[:, i + 1] / scale)
+        yield "delta_bar_std", held(std[:, i + 1] / scale)
+
+    both = Pictured.of(step, shared())
+    return {
+        Side.SENSOR: both | Pictured.of(step, gains(4, 1.0)),
+        Side.ACTUATOR: both | Pictured.of(step, gains(2, gain)),
+    }
+
+
+def path_angle(axle: AxleFilter, path: SteeringPath, size: int) -> Array:
+    """Angle along a path at every one of `size` samples [rad]."""
+    length = axle.blocks.length
+    middles = np.arange(path.model.size) * length + (length - 1) / 2
+    angle = Column(np.float64)
+    for part in blocks(size):
+        angle.append(np.interp(np.arange(part.start, part.stop), middles, path.mean[:, 0]))
+    return angle.finish()

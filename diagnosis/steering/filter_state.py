@@ -1,0 +1,150 @@
+"""What the compiled steering filters take and leave: blocks of an axle, states of all models, states along a path."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from diagnosis.steering.model_bank import ACTUATOR, SENSOR
+
+Array = NDArray[np.float64]
+
+
+class Redundancy(NamedTuple):
+    """What is measured redundantly in m blocks, each with its variance; NaN where it is not.
+
+    Attributes
+    ----------
+    angle, angle_variance : Array, shape (m,)
+        Second angle [rad].
+    opening, opening_variance : Array, shape (m,)
+        Opening of the valve [fraction].
+    share, share_variance : Array, shape (m,)
+        Share of the command's changes that the opening follows [1].
+    command : Array, shape (m,)
+        The command that belongs to the opening [fraction].
+    """
+
+    angle: Array
+    angle_variance: Array
+    opening: Array
+    opening_variance: Array
+    share: Array
+    share_variance: Array
+    command: Array
+
+    @classmethod
+    def nothing(cls, size: int) -> Redundancy:
+        """`size` blocks without any."""
+        return cls(*(np.full(size, np.nan) for _ in cls._fields))
+
+    @property
+    def known(self) -> NDArray[np.bool_]:
+        """Blocks with any, shape (m,)."""
+        return np.asarray(np.logical_or.reduce([np.isfinite(x) for x in self]))
+
+
+class BlockSeries(NamedTuple):
+    """An axle's m blocks for the compiled filters; see `diagnosis.steering.blocks.SteeringBlocks`."""
+
+    mean: Array
+    power: Array
+    samples: Array
+    driven: Array
+    u: Array
+    status: NDArray[np.int8]
+    redundancy: Redundancy
+
+
+class Block(NamedTuple):
+    """One block of `BlockSeries`, without its redundancy.
+
+    Attributes
+    ----------
+    mean : float
+        Mean of the new samples of the angle [rad].
+    power : float
+        Power of their white part [rad²].
+    samples : float
+        New samples.
+    driven : float
+        Mean of sat(gain·u) [rad/s]; NaN where nobody knows the opening.
+    u : float
+        Mean opening [fraction].
+    status : int
+        `PAIR`, `SILENT` or `SKIP` of `diagnosis.estimation.fault_models`.
+    """
+
+    mean: float
+    power: float
+    samples: float
+    driven: float
+    u: float
+    status: int
+
+
+class RedundantBlock(NamedTuple):
+    """One block of `Redundancy`."""
+
+    angle: float
+    angle_variance: float
+    opening: float
+    opening_variance: float
+    share: float
+    share_variance: float
+    command: float
+
+
+class FilterBank(NamedTuple):
+    """States of all models at one block.
+
+    Attributes
+    ----------
+    mean, cov : Array, shape (models, 6) and (models, 6, 6)
+        Of x = [φ, r, a, b, d, c].
+    noise : Array, shape (models, 2)
+        α and β of the inverse gamma distribution of the sensor's noise, where it is learned.
+    room : Array, shape (3, 6)
+        Room to work in.
+    """
+
+    mean: Array
+    cov: Array
+    noise: Array
+    room: Array
+
+
+class SteeringPath(NamedTuple):
+    """A sequence of models, one for each of m blocks, and the states along it.
+
+    Attributes
+    ----------
+    model : NDArray[np.uint8], shape (m,)
+        Model of each block, an index into `diagnosis.steering.model_bank.SENSOR` and `ACTUATOR`.
+    mean, cov : Array, shape (m, 6) and (m, 6, 6)
+        Of [φ, r, a, b, d, c] along that path.
+    noise : Array, shape (m, 2)
+        α and β of the sensor's noise where it is learned.
+    """
+
+    model: NDArray[np.uint8]
+    mean: Array
+    cov: Array
+    noise: Array
+
+    @property
+    def variance(self) -> Array:
+        """Variances of [φ, r, a, b, d, c], shape (m, 6)."""
+        return np.asarray(np.diagonal(self.cov, axis1=1, axis2=2))
+
+    @property
+    def sensor(self) -> NDArray[np.int64]:
+        """Row of the sensor."""
+        return np.asarray(SENSOR[self.model])
+
+    @property
+    def actuator(self) -> NDArray[np.int64]:
+        """Row of the valve."""
+        return np.asarray(ACTUATOR[self.model])

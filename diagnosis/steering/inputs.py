@@ -1,0 +1,146 @@
+"""The channels of one steering axle: angle and valve command, what is measured redundantly, and its blocks."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from diagnosis.channels.liveness import alive
+from diagnosis.steering.blocks import SensorNoise, SteeringBlocks, blocks_of, sensor_noise
+from diagnosis.steering.redundancy import with_second_angle, with_valve_opening
+from replay.control.loop import Replay
+from replay.machine.config import Machine, Noise
+from replay.signals.timeline import Timeline
+
+Array = NDArray[np.float64]
+Counts = Mapping[str, NDArray[np.int16]]
+
+_LEAVES = ("phi", "phi_true", "u", "u_applied")
+_NO_NOISE = SensorNoise(1.0, 1.0, 0.0, 0.0)
+_TOLERANCE = 0.15  # of the smallest saturation term: what two healthy angle sensors may differ by
+
+
+@dataclass(frozen=True)
+class AxleInputs:
+    """One axle's channels and, where a model must judge a side, their blocks.
+
+    Attributes
+    ----------
+    name : str
+        The axle.
+    timeline : Timeline
+        The aligned mission.
+    have : frozenset[str]
+        Leaves that are logged: ``phi``, ``phi_true``, ``u``, ``u_applied``.
+    command : Array, shape (n,)
+        Valve opening [fraction]: the command, else the opening itself, else what the replayed loop commands.
+    blocks : SteeringBlocks or None
+        None where angle or command are missing.
+    noise : SensorNoise
+        Of the angle.
+    valve_deviation : Array, shape (n,), or None
+        Opening less command as multiples of its noise; None unless both are logged.
+    """
+
+    name: str
+    timeline: Timeline
+    have: frozenset[str]
+    command: Array
+    blocks: SteeringBlocks | None = None
+    noise: SensorNoise = _NO_NOISE
+    valve_deviation: Array | None = None
+
+    @property
+    def measured(self) -> str:
+        """Leaf of the angle that is judged: the sensor's, else the second one's."""
+        return "phi" if "phi" in self.have else "phi_true"
+
+    @property
+    def angle(self) -> Array:
+        """That angle [rad], shape (n,)."""
+        return self.values(self.measured)
+
+    @property
+    def fresh(self) -> NDArray[np.bool_]:
+        """Steps with a new sample of it, shape (n,)."""
+        return self.timeline.fresh[self.channel(self.measured)]
+
+    @property
+    def angle_redundant(self) -> bool:
+        """Whether a second angle is logged."""
+        return {"phi", "phi_true"} <= self.have
+
+    @property
+    def valve_redundant(self) -> bool:
+        """Whether the valve's opening is logged beside its command."""
+        return {"u", "u_applied"} <= self.have
+
+    @property
+    def command_missing(self) -> bool:
+        """Whether the valve's opening is logged but not its command."""
+        return "u_applied" in self.have and "u" not in self.have
+
+    @property
+    def redundant(self) -> bool:
+        """Whether anything is measured redundantly."""
+        return self.angle_redundant or self.valve_redundant
+
+    @property
+    def names(self) -> tuple[str, str]:
+        """Channels of angle and command."""
+        return self.channel(self.measured), self.channel("u" if "u" in self.have else "u_applied")
+
+    def channel(self, leaf: str) -> str:
+        """Canonical name."""
+        return f"steer.{self.name}.{leaf}"
+
+    def values(self, leaf: str) -> Array:
+        """Values on the timeline; NaN where it is not logged."""
+        if leaf in self.have:
+            return self.timeline.signals[self.channel(leaf)]
+        return np.broadcast_to(np.nan, (self.timeline.size,))
+
+
+def axle_inputs(timeline: Timeline, replay: Replay, machine: Machine, axle: int, counts: Counts) -> AxleInputs:
+    """Take an axle's channels from a mission.
+
+    Parameters
+    ----------
+    timeline, replay, machine
+        The aligned mission, the replayed loop and the machine.
+    axle : int
+        Place in `machine.axles`.
+    counts : Mapping[str, NDArray[np.int16]]
+        From `diagnosis.channels.liveness.alive_sources`.
+    """
+    name = machine.axles[axle]
+    found = {leaf: timeline.get(f"steer.{name}.{leaf}") for leaf in _LEAVES}
+    have = frozenset(leaf for leaf, x in found.items() if x is not None and bool(np.isfinite(x).any()))
+    u = found["u"] if "u" in have else found["u_applied"]
+    if u is None or not np.isfinite(u).any():
+        u = replay.steer_u[:, axle]
+    inputs = AxleInputs(name, timeline, have, u)
+    if inputs.measured not in have or not np.isfinite(u).any():
+        return inputs
+    return _with_blocks(inputs, machine, counts)
+
+
+def _with_blocks(inputs: AxleInputs, machine: Machine, counts: Counts) -> AxleInputs:
+    """Add the blocks, the sensor's noise and what is measured redundantly."""
+    timeline, channel, y, fresh = inputs.timeline, inputs.names[0], inputs.angle, inputs.fresh
+    blocks = blocks_of(y, inputs.command, fresh, alive(timeline, dict(counts), channel), timeline.dt)
+    noise = sensor_noise(blocks, y[fresh & np.isfinite(y)], machine.noise.get(channel, Noise()), machine.max_steer)
+    deviation = None
+    if inputs.angle_redundant:
+        # a coarse rounding is no disagreement
+        tolerance = _TOLERANCE * machine.limits.min_sat + (0.0 if noise.resolved else noise.lsb)
+        new = timeline.fresh[inputs.channel("phi_true")]
+        blocks = with_second_angle(blocks, y, inputs.values("phi_true"), new, timeline.dt, tolerance)
+    if inputs.valve_redundant:
+        new = timeline.fresh[inputs.channel("u_applied")]
+        position = inputs.values("u_applied")
+        blocks, deviation = with_valve_opening(blocks, inputs.command, position, new, timeline.dt)
+    return replace(inputs, blocks=blocks, noise=noise, valve_deviation=deviation)

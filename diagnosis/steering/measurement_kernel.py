@@ -1,0 +1,192 @@
+"""Measurements of one block for every steering model (compiled): the angle with its noise, and what is redundant.
+
+The models are those of `diagnosis.steering.step_kernel`: x = [φ, r, a, b, d, c], y = d·φ + c + n.
+"""
+
+from __future__ import annotations
+
+from math import lgamma, log, pi
+
+import numpy as np
+from numba import njit
+
+from diagnosis.steering.filter_state import Array, Block, FilterBank, RedundantBlock
+from diagnosis.steering.model_bank import (
+    ACTIVE,
+    ACTUATOR,
+    FREE,
+    HEALTHY,
+    INEFFICIENT,
+    NO_SIGNAL,
+    NOISY,
+    SENSOR,
+    STATES,
+    STUCK,
+)
+from diagnosis.steering.models import SensorConstants
+
+_OUTLIER = -18.0
+_LEAST_GAIN, _MOST_GAIN = 0.1, 0.92  # of an inefficient part
+
+
+@njit(cache=True, error_model="numpy", inline="always")
+def _known_noise(
+    s: int, d: float, sensor: SensorConstants, nu: float, power: float, count: float
+) -> tuple[float, float]:
+    """Log-likelihood of the white power where the row says what it is, and the variance of the block's mean."""
+    white, constant = sensor.white, sensor.constant
+    if s in (STUCK, NO_SIGNAL):
+        if not sensor.resolved:  # rounding hides the noise: an axle at rest reads as constant as a stuck sensor
+            return -0.5 * nu * (log(white) + power / white) - sensor.rest_cost, white / count + sensor.mean_rounding
+        return -0.5 * nu * (log(constant) + power / constant), constant
+    if s == HEALTHY:
+        return -0.5 * nu * (log(white) + power / white), white / count + sensor.mean_rounding
+    # the sensor scales its noise before it rounds
+    v = d * d * max(white - sensor.rounding, 0.0) + sensor.rounding
+    v = max(v, constant)
+    if not sensor.resolved:
+        v = white
+    return -0.5 * nu * (log(v) + power / v), v / count + sensor.mean_rounding
+
+
+@njit(cache=True, error_model="numpy", inline="always")
+def _learned_noise(alpha: float, beta: float, nu: float, power: float) -> float:
+    """Log-likelihood of the white power with V ~ inverse gamma (α, β).
+
+    p(power) = Γ(α+ν/2)/Γ(α) · β^α/(β+ν·power/2)^(α+ν/2)
+    """
+    after, scaled = alpha + 0.5 * nu, beta + 0.5 * nu * power
+    if alpha > 10.0:  # Γ(α+h)/Γ(α) ≈ (α + (h−1)/2)^h
+        return 0.5 * nu * log((alpha + 0.25 * nu - 0.5) / scaled) + alpha * log(beta / scaled)
+    return lgamma(after) - lgamma(alpha) + alpha * log(beta) - after * log(scaled)
+
+
+@njit(cache=True, error_model="numpy")
+def update(m: int, block: Block, stop: float, sensor: SensorConstants, bank: FilterBank) -> float:
+    """Kalman update with a block's mean, and the evidence of mean and white power; returns the log-likelihood.
+
+    A block that the model cannot explain costs it a fixed amount and teaches it nothing but that its constant was wrong.
+    """
+    z, P, noise, gain = bank.mean, bank.cov, bank.noise, bank.room[2]
+    s, power = SENSOR[m], block.power
+    nu = sensor.white_dof * block.samples
+    nu = nu / (1 + 0.5 * nu * sensor.white_spread)
+    alpha, beta = noise[m, 0], noise[m, 1]
+    after, scaled = alpha + 0.5 * nu, beta + 0.5 * nu * power
+    if s >= NOISY:
+        likelihood = _learned_noise(alpha, beta, nu, power)
+        r = max(scaled / after, sensor.constant) / block.samples + sensor.mean_rounding
+    else:
+        likelihood, r = _known_noise(s, z[m, 4], sensor, nu, power, block.samples)
+    d, phi = z[m, 4], z[m, 0]
+    # S = H P Hᵀ + R with H = [d, 0, 0, 0, φ, 1]
+    total = r
+    gain[:] = 0.0
+    for n in range(FREE[m]):
+        i = ACTIVE[m, n]
+        gain[i] = P[m, i, 0] * d + P[m, i, 4] * phi + P[m, i, 5]
+    total += gain[0] * d + gain[4] * phi + gain[5]
+    innovation = block.mean - d * phi - z[m, 5]
+    likelihood -= 0.5 * (innovation * innovation / total + log(2 * pi * total))
+    floor = _OUTLIER - log(stop) - 0.5 * nu * (1 + log(max(power, sensor.constant)))
+    if likelihood < floor:
+        if s == STUCK:
+            _forget(m, 5, stop, z, P)
+        return float(floor)
+    noise[m, 0], noise[m, 1] = after, scaled
+    for n in range(FREE[m]):
+        i = ACTIVE[m, n]
+        share = gain[i] / total
+        z[m, i] += share * innovation
+        for k in range(FREE[m]):
+            P[m, i, ACTIVE[m, k]] -= share * gain[ACTIVE[m, k]]
+    if s == INEFFICIENT:
+        _learn_sensor_gain(m, nu, power, sensor, z, P, gain)
+        z[m, 4] = min(max(z[m, 4], _LEAST_GAIN), _MOST_GAIN)
+    if ACTUATOR[m] == INEFFICIENT or ACTUATOR[m] == NOISY:
+        z[m, 2] = min(max(z[m, 2], _LEAST_GAIN), _MOST_GAIN)
+    return float(likelihood)
+
+
+@njit(cache=True, error_model="numpy")
+def _learn_sensor_gain(
+    m: int, nu: float, power: float, sensor: SensorConstants, z: Array, P: Array, gain: Array
+) -> None:
+    """Kalman update of the sensor's gain d: it scales the noise too, so that √((power − rounding)/σ²) measures d."""
+    if not sensor.resolved:
+        return
+    seen = (max(power - sensor.rounding, 0.0) / max(sensor.white - sensor.rounding, 1e-30)) ** 0.5
+    var = (0.5 / nu + 0.25 * sensor.white_spread) * (seen * seen + 0.05)
+    for i in range(STATES):
+        gain[i] = P[m, i, 4]
+    total = gain[4] + var
+    innovation = seen - z[m, 4]
+    for i in range(STATES):
+        z[m, i] += gain[i] * innovation / total
+        for j in range(STATES):
+            P[m, i, j] -= gain[i] * gain[j] / total
+
+
+@njit(cache=True, error_model="numpy")
+def _forget(m: int, i: int, std: float, z: Array, P: Array) -> None:
+    """Give the constant x_i its prior again: it was learned from a block that a fault entered halfway."""
+    for j in range(STATES):
+        P[m, i, j] = P[m, j, i] = 0.0
+    P[m, i, i] = std * std
+
+
+@njit(cache=True, error_model="numpy")
+def measure_redundant(m: int, seen: RedundantBlock, g: float, rate_limit: float, bank: FilterBank) -> float:
+    """Update with the second angle, the valve's opening and its share of the command; returns the log-likelihood."""
+    z, h = bank.mean, bank.room[0]
+    a = ACTUATOR[m]
+    likelihood = 0.0
+    if not np.isnan(seen.angle):
+        h[:] = 0.0
+        h[0] = 1.0
+        likelihood += _linear(m, seen.angle - z[m, 0], seen.angle_variance, bank)
+    if not np.isnan(seen.opening):
+        expected = seen.command if a == HEALTHY else 0.0
+        h[:] = 0.0
+        if a != HEALTHY and a != NO_SIGNAL:
+            if a != STUCK:
+                h[2] = seen.command
+                expected += z[m, 2] * seen.command
+            if a != INEFFICIENT:
+                h[3] = 1 / g
+                expected += z[m, 3] / g
+        one = _linear(m, seen.opening - expected, seen.opening_variance, bank)
+        if one == _OUTLIER and a == STUCK:
+            _forget(m, 3, rate_limit, z, bank.cov)
+        likelihood += one
+    if not np.isnan(seen.share):
+        expected = 1.0 if a == HEALTHY else 0.0
+        h[:] = 0.0
+        if a in (INEFFICIENT, NOISY):
+            h[2], expected = 1.0, z[m, 2]
+        likelihood += _linear(m, seen.share - expected, seen.share_variance, bank)
+    if a in (INEFFICIENT, NOISY):
+        z[m, 2] = min(max(z[m, 2], _LEAST_GAIN), _MOST_GAIN)
+    return float(likelihood)
+
+
+@njit(cache=True, error_model="numpy")
+def _linear(m: int, innovation: float, r: float, bank: FilterBank) -> float:
+    """Kalman update with one linear measurement H = `bank.room[0]`; an outlier teaches nothing. Returns the log-likelihood."""
+    z, P, h, gain = bank.mean, bank.cov, bank.room[0], bank.room[1]
+    total = r
+    for i in range(STATES):
+        gain[i] = 0.0
+        for j in range(STATES):
+            gain[i] += P[m, i, j] * h[j]
+    for i in range(STATES):
+        total += h[i] * gain[i]
+    # relative to what the measurement's own noise gives
+    likelihood = -0.5 * (innovation * innovation / total + log(total / r))
+    if likelihood < _OUTLIER:
+        return _OUTLIER
+    for i in range(STATES):
+        z[m, i] += gain[i] * innovation / total
+        for j in range(STATES):
+            P[m, i, j] -= gain[i] * gain[j] / total
+    return float(likelihood)
