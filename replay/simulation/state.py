@@ -91,20 +91,6 @@ class PlantState(NamedTuple):
     line: F  # delay line: v (n), u (n), φ (2), u_s (2)
 
 
-class StepSignals(NamedTuple):
-    """What the controller and the valves see in one control step; filled anew in every step."""
-
-    v: F  # measured wheel speeds
-    v_ref: F
-    u: F  # commands of the wheel valves, and as they are applied
-    u_applied: F
-    slip: F
-    phi: F  # measured axle angles
-    steer_u: F  # commands of the steering valves, and as they are applied
-    steer_u_applied: F
-    body: F  # before the step
-
-
 class Recording(NamedTuple):
     """Recorded samples, each of shape (m, wheels), (m, axles) or (m, 5) for the body."""
 
