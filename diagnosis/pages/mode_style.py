@@ -16,7 +16,7 @@ _RULES = (
     (".bg.{m} > rect", "fill: var(--{m}); stroke: none;"),
     (".bg.{m} .gl", "color: var(--on-{m});"),
     (".ln.{m}", "stroke: var(--{m}); stroke-width: 7;"),
-    (".fb.{m}, .fb.{m} span", "background: var(--{m}); color: var(--on-{m});"),
+    (".fb.{m}", "background: var(--{m}); color: var(--on-{m});"),
     (".spark rect.{m}, .panel .f.{m}", "fill: var(--{m});"),
     (".conf .{m}, .stack .{m}", "background: var(--{m});"),
     (".c.{m}", "border: 0; background: var(--{m}); color: var(--on-{m});"),
