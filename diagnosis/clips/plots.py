@@ -3,83 +3,107 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any
+from dataclasses import dataclass
 
+from diagnosis.results.document import IntervalRow
+from diagnosis.results.vocabulary import Kind
 from replay.export.clips.topics import EVIDENCE, MAPPED
 from replay.export.clips.viewer_layouts import Curve, Plot
-from replay.faults import FaultMode
+from replay.faults import FaultMode, Side, State
 
 _NAMED = (MAPPED, EVIDENCE)
-_PROBABILITIES = ("healthy", *(m.value for m in FaultMode))
+_PROBABILITIES: tuple[str, ...] = (State.HEALTHY, *FaultMode)
 
 
-def plots_of(fault: Mapping[str, Any], topics: Sequence[tuple[str, Sequence[str]]]) -> list[Plot]:
+@dataclass(frozen=True)
+class _Clip:
+    """Curves of one component that a clip holds; each method gives one, or nothing.
+
+    Attributes
+    ----------
+    component, kind : str, Kind
+        Component, and what it is.
+    named : Mapping[str, tuple[str, int]]
+        Topic and place of each mapped signal and each evidence series.
+    loop : Mapping[str, Sequence[str]]
+        Components by topic of the replayed loop.
+    """
+
+    component: str
+    kind: Kind
+    named: Mapping[str, tuple[str, int]]
+    loop: Mapping[str, Sequence[str]]
+
+    def signal(self, leaf: str, label: str) -> list[Curve]:
+        """A mapped signal of the component."""
+        return self._curve(f"{self.kind}.{self.component}.{leaf}", label)
+
+    def evidence(self, side: Side, leaf: str, label: str) -> list[Curve]:
+        """An evidence series of one of its sides."""
+        return self._curve(f"{self.component}.{side}.{leaf}", label)
+
+    def replayed(self, quantity: str, label: str) -> list[Curve]:
+        """A quantity of the replayed loop."""
+        topic = f"/mfhca/{'steer_' if self.kind == Kind.STEER else ''}{quantity}"
+        names = list(self.loop.get(topic, ()))
+        return [Curve(topic, names.index(self.component), self.component, label)] if self.component in names else []
+
+    def _curve(self, name: str, label: str) -> list[Curve]:
+        return [Curve(*self.named[name], name, label)] if name in self.named else []
+
+
+def plots_of(fault: IntervalRow, topics: Sequence[tuple[str, Sequence[str]]]) -> list[Plot]:
     """Plots of a fault; what the clip does not hold is left out.
 
     Parameters
     ----------
-    fault : Mapping[str, Any]
+    fault : IntervalRow
         Interval of a report.
     topics : Sequence[tuple[str, Sequence[str]]]
         JointState topics of the clip with their joint names.
     """
-    component = str(fault["component"])
-    steer = fault["kind"] == "steer"
-    sides = ("sensor", "actuator") if fault["side"] == "sensor_or_actuator" else (str(fault["side"]),)
-    known = {name: (topic, i) for topic, names in topics if topic.startswith(_NAMED) for i, name in enumerate(names)}
-    loop = {topic: list(names) for topic, names in topics}
-
-    def signal(leaf: str, label: str) -> list[Curve]:
-        name = f"{'steer' if steer else 'wheel'}.{component}.{leaf}"
-        return [Curve(*known[name], name, label)] if name in known else []
-
-    def evidence(side: str, leaf: str, label: str) -> list[Curve]:
-        name = f"{component}.{side}.{leaf}"
-        return [Curve(*known[name], name, label)] if name in known else []
-
-    def replayed(quantity: str, label: str) -> list[Curve]:
-        topic = f"/mfhca/{'steer_' if steer else ''}{quantity}"
-        names = loop.get(topic, [])
-        return [Curve(topic, names.index(component), component, label)] if component in names else []
-
-    what, second, commanded = ("angle", "phi", "phi_ref") if steer else ("speed", "v", "v_ref")
+    component, sides = fault["component"], Side(fault["side"]).sides
+    named = {name: (topic, i) for topic, names in topics if topic.startswith(_NAMED) for i, name in enumerate(names)}
+    clip = _Clip(component, fault["kind"], named, dict(topics))
     plots = [
-        Plot(
-            f"{component} {what}",
-            (
-                *signal(second, "measured"),
-                *signal(f"{second}_true", "second measurement"),
-                *replayed(commanded, "commanded"),
-                *(evidence("sensor", "expected", "expected") if "sensor" in sides else ()),
-            ),
-        ),
-        *(
-            Plot(
-                f"{component} {side}: residual",
-                (
-                    *evidence(side, "residual", "residual"),
-                    *evidence(side, "threshold", "threshold"),
-                    *evidence(side, "minus_threshold", "−threshold"),
-                ),
-            )
-            for side in sides
-        ),
-        Plot(
-            f"{component} valve",
-            (
-                *signal("u", "command recorded"),
-                *replayed("u_replayed", "command replayed"),
-                *signal("u_applied", "position measured"),
-                *(evidence("actuator", "expected", "position expected") if "actuator" in sides else ()),
-            ),
-        ),
-        *(
-            Plot(
-                f"{component} {side}: probability",
-                tuple(c for m in _PROBABILITIES for c in evidence(side, f"p_{m}", m.replace("_", " "))),
-            )
-            for side in sides
-        ),
+        _motion(clip, sides),
+        *(_residual(clip, side) for side in sides),
+        _valve(clip, sides),
+        *(_probability(clip, side) for side in sides),
     ]
-    shown = [p for p in plots if p.curves]
-    return shown or [Plot(component, ())]
+    return [p for p in plots if p.curves] or [Plot(component, ())]
+
+
+def _motion(clip: _Clip, sides: Sequence[Side]) -> Plot:
+    name, leaf, commanded = ("angle", "phi", "phi_ref") if clip.kind == Kind.STEER else ("speed", "v", "v_ref")
+    curves = (
+        *clip.signal(leaf, "measured"),
+        *clip.signal(f"{leaf}_true", "second measurement"),
+        *clip.replayed(commanded, "commanded"),
+        *(clip.evidence(Side.SENSOR, "expected", "expected") if Side.SENSOR in sides else ()),
+    )
+    return Plot(f"{clip.component} {name}", curves)
+
+
+def _residual(clip: _Clip, side: Side) -> Plot:
+    curves = (
+        *clip.evidence(side, "residual", "residual"),
+        *clip.evidence(side, "threshold", "threshold"),
+        *clip.evidence(side, "minus_threshold", "−threshold"),
+    )
+    return Plot(f"{clip.component} {side}: residual", curves)
+
+
+def _valve(clip: _Clip, sides: Sequence[Side]) -> Plot:
+    curves = (
+        *clip.signal("u", "command recorded"),
+        *clip.replayed("u_replayed", "command replayed"),
+        *clip.signal("u_applied", "position measured"),
+        *(clip.evidence(Side.ACTUATOR, "expected", "position expected") if Side.ACTUATOR in sides else ()),
+    )
+    return Plot(f"{clip.component} valve", curves)
+
+
+def _probability(clip: _Clip, side: Side) -> Plot:
+    curves = tuple(c for m in _PROBABILITIES for c in clip.evidence(side, f"p_{m}", m.replace("_", " ")))
+    return Plot(f"{clip.component} {side}: probability", curves)

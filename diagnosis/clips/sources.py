@@ -62,7 +62,7 @@ def open_sources(mission: Mission, scratch: Path, notes: list[str]) -> Iterator[
     scratch : Path
         Folder for expanded files; must stay as long as the sources are used.
     notes : list[str]
-        Takes one sentence per log that is left out or whose clock is off.
+        Takes one sentence per log that is left out or whose clock differs from the mission's.
     """
     for file in mission.files:
         try:

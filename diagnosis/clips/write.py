@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import chain
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any
 
 import numpy as np
 
 from diagnosis.clips.plots import plots_of
 from diagnosis.clips.sources import APART_S, Source, open_sources
+from diagnosis.results.document import IntervalRow
 from diagnosis.results.result import MissionResult
 from diagnosis.results.vocabulary import Severity
 from replay.atomic_write import atomic_path
@@ -53,16 +53,26 @@ class Clips:
     notes: tuple[str, ...]
 
 
-def clip_name(fault: Mapping[str, Any]) -> str:
+@dataclass(frozen=True)
+class _Diagnosed:
+    """A mission with its replayed loop and its diagnosis."""
+
+    mission: Mission
+    replay: Replay
+    machine: Machine
+    result: MissionResult
+
+
+def clip_name(fault: IntervalRow) -> str:
     """File name of a fault's clip without ending, of characters that every file system takes: ``F1 FR sensor stuck``."""
     words = (fault["id"], fault["component"], fault["side"], fault["mode"])
-    safe = " ".join(_UNSAFE.sub("_", str(w)) for w in words)
+    safe = " ".join(_UNSAFE.sub("_", w) for w in words)
     return safe[:_LONGEST_NAME].rstrip(" .").lstrip(".") or "fault"
 
 
-def chosen_faults(intervals: Sequence[Mapping[str, Any]], most: int = MOST) -> tuple[list[Mapping[str, Any]], int]:
+def chosen_faults(intervals: Sequence[IntervalRow], most: int = MOST) -> tuple[list[IntervalRow], int]:
     """Give the faults of at least low severity, most severe first, and how many more there are than `most`."""
-    faults = [f for f in intervals if f["severity"] != "info"]
+    faults = [f for f in intervals if f["severity"] != Severity.INFO]
     faults.sort(key=lambda f: (-Severity(f["severity"]).rank, f["start_s"]))
     return faults[:most], max(len(faults) - most, 0)
 
@@ -106,10 +116,7 @@ def write_clips(
     names = [clip_name(f) for f in faults]
     targets = {folder / (name + ending) for name in names for ending in ENDINGS}
     _check(mission, targets)
-    if folder.is_dir():
-        for path in folder.iterdir():
-            if path not in targets and path.name.endswith(ENDINGS) and _is_own(path):
-                path.unlink()
+    _remove_earlier(folder, targets)
     if not faults:
         return Clips((), 0, ())
     try:
@@ -117,7 +124,7 @@ def write_clips(
     except OSError as error:
         raise OutputError(f"{folder}: cannot make the folder ({error.strerror or error})") from error
     progress(Progress(Stage.REPLAYING_FOR_CLIPS))
-    replay = replay_loop(mission.timeline, machine)
+    diagnosed = _Diagnosed(mission, replay_loop(mission.timeline, machine), machine, result)
     progress(Progress(Stage.READING_FOR_CLIPS))
     notes = [
         f"{f['id']}: lasts {f['stop_s'] - f['start_s']:.0f} s; its clip holds the first {_LONGEST_NS * 1e-9:.0f} s."
@@ -129,8 +136,7 @@ def write_clips(
         sources = list(open_sources(mission, Path(scratch), notes))
         for fault, name in zip(faults, names, strict=True):
             progress(Progress(Stage.WRITING, name))
-            judged = mission, replay, machine, result
-            written.append(_write(fault, folder / name, judged, sources, round(margin_s * 1e9)))
+            written.append(_write(fault, folder / name, diagnosed, sources, round(margin_s * 1e9)))
     return Clips(tuple(written), left_out, tuple(notes))
 
 
@@ -149,6 +155,14 @@ def _check(mission: Mission, targets: Iterable[Path]) -> None:
             )
 
 
+def _remove_earlier(folder: Path, targets: Collection[Path]) -> None:
+    """Remove the clips and layouts of an earlier run that are not written again."""
+    if folder.is_dir():
+        for path in folder.iterdir():
+            if path not in targets and path.name.endswith(ENDINGS) and _is_own(path):
+                path.unlink()
+
+
 def _is_own(path: Path) -> bool:
     """Whether a file is a clip or a layout that this tool wrote."""
     if not path.is_file():
@@ -157,29 +171,29 @@ def _is_own(path: Path) -> bool:
         return MARK.encode() in file.read(4096)
 
 
-def _end(fault: Mapping[str, Any]) -> int:
+def _end(fault: IntervalRow) -> int:
     """Stamp up to which a fault is cut out: of a long one the beginning."""
-    return min(int(fault["stop_ns"]), int(fault["start_ns"]) + _LONGEST_NS)
+    return min(fault["stop_ns"], fault["start_ns"] + _LONGEST_NS)
 
 
 def _write(
-    fault: Mapping[str, Any],
+    fault: IntervalRow,
     stem: Path,
-    judged: tuple[Mission, Replay, Machine, MissionResult],
+    diagnosed: _Diagnosed,
     sources: Sequence[Source],
     margin_ns: int,
 ) -> Path:
     """Write one clip and its layouts."""
-    mission, replay, machine, result = judged
-    start, stop = int(fault["start_ns"]) - margin_ns, _end(fault) + margin_ns
+    mission, machine = diagnosed.mission, diagnosed.machine
+    start, stop = fault["start_ns"] - margin_ns, _end(fault) + margin_ns
     definitions = Definitions()
     copied: list[Iterator[Records]] = []
     for source in sources:
         first, last = source.places(np.array([start, stop])).tolist()
         copied += [part.messages(first, last, part.define(definitions)) for part in source.parts]
     signals = signal_topics(mission.signals, start, stop)
-    loop = loop_topics(mission.timeline, replay, machine, start, stop)
-    evidence = evidence_topic(result.columns, str(fault["component"]), mission.timeline.start_ns, start, stop)
+    loop = loop_topics(mission.timeline, diagnosed.replay, machine, start, stop)
+    evidence = evidence_topic(diagnosed.result.columns, fault["component"], mission.timeline.start_ns, start, stop)
     named = [*signals, *([evidence] if evidence else [])]
     batches = [*(b for b, _ in named), *loop]
     if mission.open_loop:
@@ -188,7 +202,7 @@ def _write(
         batches = [replace(b, log_stamps=sources[0].places(b.log_stamps)) for b in batches]
     own = [batch_records(batch, definitions) for batch in batches]
     about = {
-        "fault": " ".join(str(fault[k]) for k in ("id", "component", "side", "mode", "severity")),
+        "fault": " ".join((fault["id"], fault["component"], fault["side"], fault["mode"], fault["severity"])),
         "start_ns": str(fault["start_ns"]),
         "stop_ns": str(fault["stop_ns"]),
         "margin_s": f"{margin_ns * 1e-9:g}",
