@@ -52,8 +52,8 @@ class Pair:
         Columns.
     words : str
         What the reference is.
-    apart : bool
-        Whether the reference is recorded apart from the channel, so that a fault leaves it as it is.
+    independent : bool
+        Whether the reference is recorded independently of the channel, so that a fault leaves it as it is.
     unit : str
         Unit of the values shown.
     scale : float
@@ -66,7 +66,7 @@ class Pair:
     measured: str
     reference: str | None
     words: str
-    apart: bool
+    independent: bool
     unit: str
     scale: float
     evidence: str
@@ -119,8 +119,8 @@ def pair_of(fault: IntervalRow, columns: Collection[str]) -> Pair | None:
     if fault["tier"] == Tier.DIRECT:
         choices.insert(0, (motion.second, "second measurement"))
     reference, words = next(((name, words) for name, words in choices if name in columns), (None, ""))
-    apart = reference == motion.second
-    return Pair(motion.title, motion.measured, reference, words, apart, motion.unit, motion.scale, base)
+    independent = reference == motion.second
+    return Pair(motion.title, motion.measured, reference, words, independent, motion.unit, motion.scale, base)
 
 
 def rests_on(fault: IntervalRow, columns: Iterable[str]) -> str:

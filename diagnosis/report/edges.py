@@ -1,4 +1,4 @@
-"""The samples around a fault's onset and end, and how far they lie off against the noise beyond the edge."""
+"""The samples around a fault's onset and end, and how far they deviate against the noise beyond the edge."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ class Edge:
         Mission time of the edge [s].
     step : float
         Sample time [s].
-    gap : tuple[float, float] or None
+    shift : tuple[float, float] or None
         Where the faulty sample next to the edge should have been and where it is.
     most : float
         Largest distance of a faulty sample of the window from where it should have been.
@@ -55,7 +55,7 @@ class Edge:
     reference: Array
     at: float
     step: float
-    gap: tuple[float, float] | None
+    shift: tuple[float, float] | None
     most: float
     noise: float | None
 
@@ -104,17 +104,18 @@ def edge_of(
         return None
     t = (np.arange(first, last, dtype=np.float64) - place) * step
     inside = slice(place - first, max(place, far) - first) if onset else slice(max(far - first, 0), place - first)
-    gap, most, noise = None, math.nan, None
+    shift, most, noise = None, math.nan, None
     times, values = _healthy(place, fault, others, pair, columns, axis, onset)
     if values.size >= _LEAST_HEALTHY:
-        course, noise = _course(times, values, t[inside], onset, pair.apart)
-        right = course + (reference[inside] if pair.apart else 0.0)
-        off = y[inside] - right
-        seen = np.flatnonzero(np.isfinite(off))
-        if seen.size:
-            near = seen[0] if onset else seen[-1]
-            gap, most = (float(right[near]), float(y[inside][near])), float(np.abs(off[seen]).max())
-    return Edge(name, t, y, reference, at, step, gap, most, noise)
+        course, noise = _course(times, values, t[inside], onset, pair.independent)
+        expected = course + (reference[inside] if pair.independent else 0.0)
+        deviation = y[inside] - expected
+        finite = np.flatnonzero(np.isfinite(deviation))
+        if finite.size:
+            near = finite[0] if onset else finite[-1]
+            shift = (float(expected[near]), float(y[inside][near]))
+            most = float(np.abs(deviation[finite]).max())
+    return Edge(name, t, y, reference, at, step, shift, most, noise)
 
 
 def _cut(columns: Mapping[str, NDArray[np.floating]], pair: Pair, first: int, last: int) -> tuple[Array, Array]:
@@ -134,13 +135,13 @@ def _healthy(
     axis: tuple[float, float],
     onset: bool,
 ) -> tuple[Array, Array]:
-    """Samples beyond an edge that are not faulty: times from it [s], and values less the reference that is apart."""
+    """Samples beyond an edge that are not faulty: times from it [s], and values less an independent reference."""
     size = len(columns[pair.measured])
     span = (max(0, place - _HEALTHY), place) if onset else (place, min(size, place + _HEALTHY))
     measured, reference = _cut(columns, pair, *span)
-    values = measured - (reference if pair.apart else 0.0)
+    values = measured - (reference if pair.independent else 0.0)
     use = np.isfinite(values)
-    if pair.apart:  # the distance from a reference is the usual one only where nothing is faulty
+    if pair.independent:  # the distance from a reference is the usual one only where nothing is faulty
         use &= ~_faulty(span, fault, others, axis)
     times = (np.arange(*span, dtype=np.float64) - place) * axis[1]
     return times[use], values[use]
@@ -159,13 +160,13 @@ def _faulty(
     return out
 
 
-def _course(t: Array, y: Array, at: Array, onset: bool, apart: bool) -> tuple[Array, float | None]:
+def _course(t: Array, y: Array, at: Array, onset: bool, independent: bool) -> tuple[Array, float | None]:
     """Where samples y at times t would go on at other times, and their standard deviation about that.
 
     Against a reference that the fault leaves as it is: at their usual distance; else along the line through the
     nearest ones.
     """
-    if apart:
+    if independent:
         level = float(np.median(y))
         course, rest = np.full(at.size, level), y - level
     else:
@@ -177,20 +178,26 @@ def _course(t: Array, y: Array, at: Array, onset: bool, apart: bool) -> tuple[Ar
 
 
 def edge_words(edge: Edge, pair: Pair) -> str:
-    """How far the samples at an edge lie off, against the noise."""
+    """How far the samples at an edge deviate, against the noise."""
     onset = edge.name == "onset"
-    if edge.gap is None:
+    if edge.shift is None:
         where = "before" if onset else "after"
-        return f"Too few {'healthy ' if pair.apart else ''}samples {where} it to tell the noise."
+        return f"Too few {'healthy ' if pair.independent else ''}samples {where} it to tell the noise."
     which, window = ("First", "after") if onset else ("Last", "before")
-    gap = abs(edge.gap[1] - edge.gap[0])
-    off = f"off the {pair.words}" if pair.apart else "off the course before it" if onset else "off the course after it"
+    size = abs(edge.shift[1] - edge.shift[0])
+    off = (
+        f"off the {pair.words}"
+        if pair.independent
+        else "off the course before it"
+        if onset
+        else "off the course after it"
+    )
     if edge.noise is not None and edge.most < _APART * edge.noise:
         text = f"No sample of the {time_words(edge.reach)} {window} stands out: at most {pair.text(edge.most)} {off}"
         text += _times(edge.most, edge)
     else:
-        text = f"{which} faulty sample {off} by {pair.text(gap)}{_times(gap, edge)}"
-        if edge.most > 1.5 * gap:
+        text = f"{which} faulty sample {off} by {pair.text(size)}{_times(size, edge)}"
+        if edge.most > 1.5 * size:
             text += f", {time_words(edge.reach)} {window} by up to {number(edge.most)}{_times(edge.most, edge)}"
     if edge.noise is not None:
         text += f"; σ {'before' if onset else 'after'} it: {number(edge.noise)}"

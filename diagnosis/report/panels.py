@@ -25,7 +25,7 @@ _STYLES = {"measured": "m", "reference": "r"}
 
 
 def edge_picture(edge: Edge, fault: IntervalRow) -> Markup:
-    """Samples around one edge as dots, those of the reference as ticks, with the gap beside the noise at the right.
+    """Samples around one edge as dots, those of the reference as ticks, with the shift beside the noise at the right.
 
     Parameters
     ----------
@@ -34,10 +34,10 @@ def edge_picture(edge: Edge, fault: IntervalRow) -> Markup:
     fault : IntervalRow
         One of the report's intervals.
     """
-    span = limits(edge.y, edge.reference, np.array(edge.gap or ()), least=8 * (edge.noise or 0.0))
+    span = limits(edge.y, edge.reference, np.array(edge.shift or ()), least=8 * (edge.noise or 0.0))
     if span is None:
         return Markup("")
-    room = _SCALES if edge.gap else 8.0
+    room = _SCALES if edge.shift else 8.0
     frame = Frame(_WIDTH, _EDGE_HEIGHT, (float(edge.t[0]), float(edge.t[-1])), span, room, _HEAD)
     mode, onset = fault["mode"], edge.name == "onset"
     in_seconds = edge.reach >= 2.0
@@ -81,16 +81,16 @@ def _detected(edge: Edge, fault: IntervalRow, frame: Frame) -> Markup:
 
 def _scales(edge: Edge, frame: Frame) -> Markup:
     """Two rulers beside the samples: from where the faulty sample should have been to where it is, and ±σ there."""
-    if edge.gap is None:
+    if edge.shift is None:
         return Markup("")
-    a, b = (float(v) for v in frame.py(np.array(edge.gap)))
+    a, b = (float(v) for v in frame.py(np.array(edge.shift)))
     x = frame.right + 11
     parts = [
         Markup('<path class="gap" d="M{:.1f} {:.1f}h-6m3 0V{:.1f}m-3 0h6"/>').format(x + 3, a, b),
         label(x, frame.bottom + 14, "gap", "mid"),
     ]
     if edge.noise is not None:
-        low, high = (float(frame.py(edge.gap[0] + k * edge.noise)) for k in (-1, 1))
+        low, high = (float(frame.py(edge.shift[0] + k * edge.noise)) for k in (-1, 1))
         middle = (low + high) / 2
         low, high = max(low, middle + 0.75), min(high, middle - 0.75)
         parts += [

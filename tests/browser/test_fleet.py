@@ -114,7 +114,7 @@ def test_strips_show_the_worst_fault_of_each_mission(open_page: OPEN) -> None:
         "inefficient",
         "stuck",
     ]
-    assert cells.last.get_attribute("title").endswith("front steering-angle sensor stuck and 1 more")
+    assert cells.last.get_attribute("title").endswith("front steering sensor stuck and 1 more")
     assert cells.last.get_attribute("href") == "missions/HX4-07/2026-11-14/report.html"
 
 

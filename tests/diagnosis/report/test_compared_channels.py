@@ -24,8 +24,8 @@ def pair(found: IntervalRow, *names: str) -> Pair:
 def test_second_measurement_is_the_reference_of_direct_evidence_alone() -> None:
     names = ("wheel.FR.v", "wheel.FR.v_true", "evidence.FR.sensor.expected", "replay.FR.v_ref")
     direct, model = pair(fault(), *names), pair(fault(tier="model"), *names)
-    assert (direct.reference, direct.words, direct.apart) == ("wheel.FR.v_true", "second measurement", True)
-    assert (model.reference, model.words, model.apart) == ("evidence.FR.sensor.expected", "expected value", False)
+    assert (direct.reference, direct.words, direct.independent) == ("wheel.FR.v_true", "second measurement", True)
+    assert (model.reference, model.words, model.independent) == ("evidence.FR.sensor.expected", "expected value", False)
     assert pair(fault(tier="tracking"), "wheel.FR.v", "replay.FR.v_ref").words == "commanded"
     assert pair(fault(), "wheel.FR.v").reference is None
     assert pair_of(fault(), {}) is None

@@ -33,8 +33,8 @@ def edge(name: str, columns: dict[str, Any], *others: dict[str, Any], **changes:
 def test_a_jump_is_measured_against_the_noise(second: bool, name: str, words: str) -> None:
     found, pair = edge(name, log(second=second))
     assert found is not None
-    assert found.gap is not None
-    assert found.gap[0] - found.gap[1] == pytest.approx(0.5, abs=0.04)
+    assert found.shift is not None
+    assert found.shift[0] - found.shift[1] == pytest.approx(0.5, abs=0.04)
     assert found.noise == pytest.approx(0.01, rel=0.4)
     assert edge_words(found, pair).startswith(words)
     assert "m/s (" in edge_words(found, pair)
@@ -84,14 +84,14 @@ def test_lost_samples_stay_lost() -> None:
     found, _ = edge("onset", columns)
     assert found is not None
     assert np.isnan(found.y[30:33]).all()
-    assert found.gap is not None
+    assert found.shift is not None
 
 
 def test_samples_of_another_fault_do_not_count_as_healthy() -> None:
     before = {**FAULT, "start_s": 4.0, "stop_s": 5.0}
     found, pair = edge("onset", log(second=True), before)
     assert found is not None
-    assert (found.gap, found.noise) == (None, None)
+    assert (found.shift, found.noise) == (None, None)
     assert edge_words(found, pair) == "Too few healthy samples before it to tell the noise."
     other_wheel, _ = edge("onset", log(second=True), {**before, "component": "RL"})
     assert other_wheel is not None
