@@ -16,6 +16,7 @@ from diagnosis.report_document import Judged, machine_row, report_of_mission
 from diagnosis.results.assessment import Assessment
 from diagnosis.results.closeups import closeups_of
 from diagnosis.results.result import MissionResult
+from diagnosis.results.vocabulary import Tier
 from replay.arrays import spill
 from replay.arrays.column_store import ColumnStore
 from replay.arrays.envelope import bucket_of
@@ -144,7 +145,7 @@ def _diagnosed(
 
 def _require_something(assessments: Mapping[tuple[str, str], Assessment], mission: Mission, machine: Machine) -> None:
     """Raise where no side of any component has any evidence."""
-    if any(a.tier != "none" for a in assessments.values()):
+    if any(a.tier is not Tier.NONE for a in assessments.values()):
         return
     speeds = [w for w in machine.wheels if f"wheel.{w}.v" in mission.signals.items]
     names = ", ".join(str(f.path) for f in mission.files) or "the mission"

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from diagnosis.results.assessment import CODE, Assessment, Finding
 from diagnosis.results.result import Epsilon, Hypothesis, Sat
+from diagnosis.results.vocabulary import Tier
 from replay.arrays.spill import blocks
 from replay.faults import FaultMode, Side, State
 from replay.signals.resolution import rounding_step, white_noise
@@ -89,10 +90,10 @@ def frozen_sensor(y: Array, value: float, others: Array, name: str, dt: float) -
         epsilon=Epsilon(1.0, 1.0, 1.0),
         sat=Sat(value, abs(value), value, value, "m/s"),
         evidence=said,
-        tier="signal",
+        tier=Tier.SIGNAL,
         detected=min(stop - 1, start + round(_LEAST_S / dt)),
     )
-    return Assessment(states, {State.NO_DATA: "no samples"}, (finding,), tier="signal")
+    return Assessment(states, {State.NO_DATA: "no samples"}, (finding,), tier=Tier.SIGNAL)
 
 
 def _noisy(others: Array, dt: float) -> bool:

@@ -85,7 +85,7 @@ def caveats_of(
             + "."
         )
     out += _most_open(against.short, assessments, decided_s, driven, axles)
-    unjudged = [k for k in assessments if k[0] in axles and assessments[k].tier == Tier.NONE]
+    unjudged = [k for k in assessments if k[0] in axles and assessments[k].tier is Tier.NONE]
     if unjudged:
         who = join_words([part_words(Kind.STEER, *k) for k in unjudged])
         out.append(f"Not assessed: {who} ({_main_reason(assessments[unjudged[0]])}).")
@@ -119,7 +119,7 @@ def _most_open(
 
 def _why_short(assessment: Assessment, driven: float | None, limits: Limits) -> str:
     """Why a part was not judged long enough; a machine at rest is no reason while it drives."""
-    if driven is not None and driven < limits.min_assessed and assessment.tier != Tier.NONE:
+    if driven is not None and driven < limits.min_assessed and assessment.tier is not Tier.NONE:
         return f"only {driven:.1f} s were driven"
     return _main_reason(assessment)
 

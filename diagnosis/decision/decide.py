@@ -137,7 +137,7 @@ def _reservations(
 
 
 def _modelled(assessments: Mapping[Part, Assessment]) -> bool:
-    return any(a.tier == Tier.MODEL for a in assessments.values())
+    return any(a.tier is Tier.MODEL for a in assessments.values())
 
 
 def _with_faults(intervals: Sequence[FaultInterval], against: Reservations) -> Decision | None:

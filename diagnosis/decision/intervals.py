@@ -10,7 +10,7 @@ import numpy as np
 from diagnosis.decision.severity import severity_of
 from diagnosis.results.assessment import STATES, Assessment
 from diagnosis.results.result import FaultInterval, StateSpan
-from diagnosis.results.vocabulary import Kind, Tier
+from diagnosis.results.vocabulary import Kind
 from replay.machine.config import Limits
 
 #: A component and its side.
@@ -44,7 +44,7 @@ def intervals_of(
                 severity=severity,
                 advice=advice,
                 evidence=f.evidence,
-                tier=Tier(f.tier),
+                tier=f.tier,
                 detected_s=None if f.detected is None else f.detected * step_ns * 1e-9,
             )
     ordered = sorted(found.values(), key=lambda x: (-x.severity.rank, x.start_s, x.component, x.side))

@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 
 from diagnosis.results.assessment import STATES, Assessment
 from diagnosis.results.document import CoverageRow, LoopRow, MeanRow, MetricsRow, PaperRow, PhaseRow
-from diagnosis.results.vocabulary import Tier
 from replay.arrays.envelope import shown
 from replay.arrays.numeric import without_nan
 from replay.arrays.spill import blocks, in_blocks
@@ -109,7 +108,7 @@ def coverage(
             {
                 "component": component,
                 "side": "sensor" if side == Side.SENSOR else "actuator",
-                "tier": Tier(assessment.tier),
+                "tier": assessment.tier,
                 "seconds": {s.value: float(c) * dt for s, c in zip(STATES, counts, strict=True) if c},
                 "driving_s": float(np.count_nonzero(drives)) * dt,
                 "decided_driving_s": seconds,

@@ -26,7 +26,7 @@ def severity_of(finding: Finding, seconds: float, limits: Limits, kind: Kind = K
         if finding.mode.total and finding.side is not Side.SENSOR:
             return Severity.MEDIUM, "Probably a valve that does not answer: check it before the machine goes out again."
         return Severity.LOW, "Probable, not certain: check it at the next service, and compare with the next mission."
-    if finding.mode is FaultMode.NOISY and finding.tier == Tier.MODEL and seconds < _SHORT_NOISE_S:
+    if finding.mode is FaultMode.NOISY and finding.tier is Tier.MODEL and seconds < _SHORT_NOISE_S:
         return Severity.INFO, "Too short to act on: a model alone shows it. Compare with the next mission."
     if finding.mode.total:
         return _severity_of_total(finding, seconds, limits, kind)

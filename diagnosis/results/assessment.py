@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from diagnosis.results.loss import Loss
 from diagnosis.results.result import Closeups, Epsilon, Hypothesis, Sat
+from diagnosis.results.vocabulary import Tier
 from replay.faults import FaultMode, Side, State
 
 STATES: tuple[State, ...] = tuple(State)
@@ -35,7 +36,7 @@ class Finding:
     epsilon: Epsilon | None
     sat: Sat | None
     evidence: tuple[str, ...]
-    tier: str
+    tier: Tier
     detected: int | None = None
 
     def __post_init__(self) -> None:
@@ -61,8 +62,8 @@ class Assessment:
         Faults in order of time.
     columns : Mapping[str, NDArray[np.float32 | np.float64]], each of the rows of `replay.arrays.envelope` for n steps
         Evidence series by leaf name (``residual``, ``threshold``, ``delta``, …).
-    tier : str
-        ``direct``, ``model``, ``drive``, ``tracking`` or ``none``; see `diagnosis.results.result.FaultInterval`.
+    tier : Tier
+        Evidence behind it; `Tier.NONE` where nothing is judged.
     notes : tuple[str, ...]
         Figures that the judgement used, one sentence each.
     unexplained_s : float
@@ -77,7 +78,7 @@ class Assessment:
     reasons: Mapping[State, str] = field(default_factory=dict)
     findings: tuple[Finding, ...] = ()
     columns: Mapping[str, NDArray[Any]] = field(default_factory=dict)
-    tier: str = "none"
+    tier: Tier = Tier.NONE
     notes: tuple[str, ...] = ()
     unexplained_s: float = 0.0
     closeups: Closeups | None = None

@@ -22,12 +22,14 @@ def completed(document: Row) -> Row:
 
     Whether the machine may go out is added by `with_leave`, which needs sound figures.
     """
-    out = _with(document, loss=[])
-    out["log"] = _log(out.get("log"))
-    out["verdict"] = _with(out.get("verdict"), cleared=False, not_cleared="")
-    out["coverage"] = _rows(out.get("coverage"), _coverage)
-    out["intervals"] = _rows(out.get("intervals"), lambda row: _with(row, detected_s=None))
-    return {key: value for key, value in out.items() if value is not None}
+    out: Row = _with(document, loss=[])
+    complete: dict[str, Callable[[Json], Json]] = {
+        "log": _log,
+        "verdict": lambda row: _with(row, cleared=False, not_cleared=""),
+        "coverage": lambda rows: _rows(rows, _coverage),
+        "intervals": lambda rows: _rows(rows, lambda row: _with(row, detected_s=None)),
+    }
+    return {key: complete[key](value) if key in complete else value for key, value in out.items()}
 
 
 def says_leave(document: Row) -> bool:

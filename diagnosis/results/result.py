@@ -15,8 +15,6 @@ from diagnosis.results.size_rows import EpsilonRow
 from diagnosis.results.vocabulary import Kind, Severity, Tier
 from replay.faults import FaultMode, Side, State
 
-SEVERITIES = tuple(Severity)
-
 
 @dataclass(frozen=True)
 class Epsilon:

@@ -10,6 +10,7 @@ import pytest
 from diagnosis.channels.recording_gaps import holes_of, without_holes
 from diagnosis.pipeline import diagnose
 from diagnosis.results.assessment import CODE, Assessment, Finding
+from diagnosis.results.vocabulary import Tier
 from replay.arrays import spill
 from replay.faults import FaultMode, Side, State
 from replay.machine.config import haulotte
@@ -55,7 +56,7 @@ def judged(*findings: Finding) -> Assessment:
     states = np.full(1000, CODE[State.HEALTHY], np.int8)
     for f in findings:
         states[f.start : f.stop] = CODE[State.NOISY]
-    return Assessment(states, findings=findings, columns={"residual": np.ones(1000)}, tier="direct")
+    return Assessment(states, findings=findings, columns={"residual": np.ones(1000)}, tier=Tier.DIRECT)
 
 
 def test_faults_end_where_a_hole_begins_and_say_so() -> None:

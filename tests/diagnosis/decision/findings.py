@@ -6,6 +6,7 @@ import numpy as np
 
 from diagnosis.results.assessment import CODE, Assessment, Finding
 from diagnosis.results.result import Epsilon, Hypothesis
+from diagnosis.results.vocabulary import Tier
 from replay.faults import FaultMode, Side, State
 from replay.machine.config import Limits
 
@@ -28,7 +29,7 @@ def finding(
         epsilon=None if epsilon is None else Epsilon(epsilon, epsilon - 0.01, epsilon + 0.01),
         sat=None,
         evidence=("what decided",),
-        tier="direct",
+        tier=Tier.DIRECT,
     )
 
 
@@ -36,7 +37,7 @@ def assessed(*findings: Finding) -> Assessment:
     states = np.full(N, CODE[State.HEALTHY])
     for f in findings:
         states[f.start : f.stop] = CODE[State(f.mode.value)]
-    return Assessment(states=states, findings=findings, tier="direct")
+    return Assessment(states=states, findings=findings, tier=Tier.DIRECT)
 
 
 def machine(**parts: Assessment) -> dict[tuple[str, str], Assessment]:

@@ -10,6 +10,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from diagnosis.decision.metrics import body_motion, coverage, driving, loop_metrics, path_of, phases
 from diagnosis.results.assessment import CODE, Assessment
+from diagnosis.results.vocabulary import Tier
 from replay.control.loop import Replay, replay_loop
 from replay.faults import State
 from replay.machine.config import Machine
@@ -90,7 +91,7 @@ def test_coverage_counts_every_sample() -> None:
     moving = np.zeros((100, 2), dtype=bool)
     moving[20:60, 0] = True
     moving[60:95, 1] = True
-    one = Assessment(states.astype(np.int8), tier="direct")
+    one = Assessment(states.astype(np.int8), tier=Tier.DIRECT)
     rows, decided = coverage({("A", "sensor"): one, ("front", "sensor"): one}, moving, MACHINE, 0.01)
     assert rows[0]["seconds"] == pytest.approx({"healthy": 0.4, "stuck": 0.3, "not_excited": 0.2, "masked": 0.1})
     assert sum(rows[0]["seconds"].values()) == pytest.approx(1.0)

@@ -48,6 +48,7 @@ def test_words_become_members_and_keys_of_later_versions_stay() -> None:
         (("log", "duration_s"), None, "log.duration_s: null found, float expected"),
         (("coverage", 0, "seconds", "healthy"), "long", "coverage[0].seconds[...]: text found, float expected"),
         (("verdict",), [], "verdict: array found, object expected"),
+        (("log",), None, "log: null found, object expected"),
     ],
 )
 def test_wrong_types_are_refused_with_their_place(place: tuple[Any, ...], value: Any, words: str) -> None:
