@@ -6,13 +6,19 @@ from typing import Any
 
 import msgspec
 
+from diagnosis.audit.fleet.fleet_types import FleetDocument
 from diagnosis.evaluation.document import ScoresDocument
 from diagnosis.results.comparison_document import ComparisonDocument
 from diagnosis.results.document import ReportDocument
 from replay.errors import ConfigError
 
 #: Type of each document; its docstrings are the schema's descriptions.
-DOCUMENTS: dict[str, type] = {"report": ReportDocument, "comparison": ComparisonDocument, "scores": ScoresDocument}
+DOCUMENTS: dict[str, type] = {
+    "report": ReportDocument,
+    "comparison": ComparisonDocument,
+    "scores": ScoresDocument,
+    "fleet": FleetDocument,
+}
 
 
 def schema_of(name: str) -> dict[str, Any]:

@@ -5,8 +5,7 @@ from __future__ import annotations
 from typing import Literal, TypedDict
 
 from diagnosis.audit.fleet.fault_types import BoundsRow
-from diagnosis.audit.trends.changes import ChangeKind
-from diagnosis.audit.trends.trend import Direction, ForecastState
+from diagnosis.audit.trends.kinds import ChangeKind, Direction, ForecastState
 
 #: What trends are drawn over: hours of driving in the audited missions, or days.
 Axis = Literal["hours", "days"]

@@ -15,9 +15,8 @@ from typing import Literal
 import numpy as np
 from scipy.special import fdtrc
 
+from diagnosis.audit.trends.kinds import ChangeKind
 from diagnosis.audit.trends.line import Array, between, sums
-
-ChangeKind = Literal["drop", "rise", "bend"]
 
 _ALPHA = 0.01
 _LEAST = 5  # missions in a stretch that is searched

@@ -14,20 +14,17 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from diagnosis.audit.trends.changes import Change, find_changes, possible_bend
+from diagnosis.audit.trends.kinds import Direction, ForecastState
 from diagnosis.audit.trends.line import Array, Line, fit_line, sigmas
 
 CONFIDENCE = 0.9
 LEAST_MISSIONS = 5
 REACH = 3.0
-
-ForecastState = Literal["crossing", "above", "not_within", "not_known"]
-Direction = Literal["rising", "falling", "steady", "not_known"]
 
 
 @dataclass(frozen=True)
