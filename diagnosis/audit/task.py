@@ -11,8 +11,8 @@ from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-from diagnosis.audit.discovery.discover import MissionSource
 from diagnosis.audit.discovery.identity import fallback_id
+from diagnosis.audit.discovery.missions import MissionSource
 from diagnosis.audit.discovery.staging import Late, Staged, stage
 from diagnosis.audit.isolation import child
 from diagnosis.audit.isolation.child import Work

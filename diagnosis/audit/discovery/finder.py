@@ -1,55 +1,16 @@
-"""Look through folders for missions; see `diagnosis.audit.discovery.discover`."""
+"""Walk through folders and collect their missions, by the rule of `diagnosis.audit.discovery.missions`."""
 
 from __future__ import annotations
 
 import glob
 import os
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
-from diagnosis.audit.discovery.grouping import Group, group, holes
+from diagnosis.audit.discovery.folder_contents import Unnamed
 from diagnosis.audit.discovery.listing import Entry, LocalPlace, Place
-from diagnosis.audit.discovery.mission_file import NAME as MISSION_FILE
-from diagnosis.audit.discovery.mission_file import MissionFile, read_mission_file, stated_machine
-from replay.errors import ConfigError
-from replay.log.file_types import LOG_ENDINGS, split_ending
-
-_METADATA = "metadata.yaml"
-_AUDIT = "fleet.sqlite"
-_AUDIT_FOLDERS = ("missions", "results")
-_AUDIT_FILES = ("fleet.csv", "failures.txt")
-_REPORT = {"report.json", "report.parquet"}
-_TABLES = ("report.parquet", "report.windows.parquet")
-_CLIPS = "clips"
-
-
-@dataclass(frozen=True)
-class Found:
-    """A mission before it has its name.
-
-    Attributes
-    ----------
-    folder, stem : str
-        The folder its name is made of, and its stem there.
-    files : tuple[Entry, ...]
-        Its files.
-    told : MissionFile
-        What ``mission.toml`` says.
-    home : str
-        Name of the folder with the ``mission.toml``.
-    problem : str
-        What is wrong with that; empty where nothing is.
-    linked : str
-        Name of the folder its files are in, where a link to a folder leads to them.
-    """
-
-    folder: str
-    stem: str
-    files: tuple[Entry, ...]
-    told: MissionFile
-    home: str = ""
-    problem: str = ""
-    linked: str = ""
+from diagnosis.audit.discovery.missions import is_log, is_mission, missions_in, missions_of
+from replay.log.file_types import LOG_ENDINGS
 
 
 class Finder:
@@ -77,13 +38,13 @@ class Finder:
         self.bases: list[str] = []
         self.left_aside = 0
         self._exclude = exclude
-        self._found: list[Found] = []
+        self._found: list[Unnamed] = []
         self._links: list[Entry] = []
         self._seen: set[str] = set()
         self._unlisted: list[str] = []
         self._linked = False
 
-    def missions(self) -> list[Found]:
+    def missions(self) -> list[Unnamed]:
         """Missions found so far: each file in the first of them, where links stand behind what they lead to."""
         taken: set[str] = set()
         out = []
@@ -106,7 +67,7 @@ class Finder:
                 self.problems.append(f"{word}: matches no file")
             for hit in hits:
                 self._sort_out(place, hit, typed, files, folders)
-        self.look(place, files, folders)
+        self.search(place, files, folders)
 
     def _sort_out(self, place: LocalPlace, path: str, typed: bool, files: list[Entry], folders: list[Entry]) -> None:
         """Put a path to the files or folders to look at; a file of a recording's folder stands for the folder."""
@@ -122,15 +83,15 @@ class Finder:
                 folders.append(entry)
             elif not place.is_file(entry):
                 self.problems.append(f"{path}: is not a regular file; save it as a file and give that")
-            elif self._has(place, parent, _METADATA) or self._has(place, parent, MISSION_FILE):
+            elif is_mission(place, parent):
                 folders.append(parent)
-            elif typed or self._is_log(place, entry):
+            elif typed or is_log(place, entry):
                 files.append(entry)
             else:
                 self.left_aside += 1
 
-    def look(self, place: Place, files: Sequence[Entry], folders: Sequence[Entry]) -> None:
-        """Look through folders, then at single files."""
+    def search(self, place: Place, files: Sequence[Entry], folders: Sequence[Entry]) -> None:
+        """Search folders, then take single files."""
         empty = set()
         for folder in dict.fromkeys(folders):
             before = len(self._found), len(self.problems)
@@ -151,7 +112,7 @@ class Finder:
         for home, held in together.items():
             self.roots += [file.path for file in held.values()]
             self.bases.append(home)
-            self._add(home, group(place, list(held.values())))
+            self._add(missions_of(place, home, list(held.values())))
 
     def _follow(self, place: Place, roots: Sequence[str]) -> None:
         """Look through what links to folders lead to, within the given folders, and only what was not looked through."""
@@ -187,97 +148,23 @@ class Finder:
 
     def _enter(self, place: Place, folder: Entry, waiting: list[Entry]) -> bool:
         """Take the missions of one folder; whether it is itself one."""
-        files, found = place.listed(folder)
-        folders = [child for child in found if not child.link]
+        files, folders = place.listed(folder)
         self.problems += place.lost(folder)
-        names = {f.name: f for f in files}
-        if MISSION_FILE in names:
-            self._stated(place, folder, names[MISSION_FILE], files, folders)
-            return True
-        if _METADATA in names:
-            self._add(place.parent(folder.real), [Group(folder.name, (place.whole(folder),))])
-            return True
-        recordings = []
-        for child in found:
-            if child.name.startswith(".") or self._own(folder, names, child):
-                continue
-            if child.link:
-                self._links.append(child)
-            elif self._has(place, child, _METADATA) and not self._has(place, child, MISSION_FILE):
-                recordings += self._whole(place, child)
-            else:
-                waiting.append(child)
-        logs = self._logs(place, folder, files)
-        self.notes += holes(logs)
-        self._add(folder.real, group(place, logs, recordings))
-        return False
+        found = missions_in(place, folder, files, folders, self._exclude)
+        self.problems += found.problems
+        self.notes += found.notes
+        self.left_aside += found.left_aside
+        self._unlisted += found.unread
+        self._links += found.links
+        waiting += found.below
+        self._add(found.missions)
+        return found.is_mission
 
-    def _own(self, folder: Entry, names: dict[str, Entry], child: Entry) -> bool:
-        """Whether a folder holds results: of this audit, of another one, or clips of a report."""
-        if _AUDIT in names or folder.real == self._exclude:
-            return child.name in _AUDIT_FOLDERS
-        return child.real == self._exclude or (child.name == _CLIPS and names.keys() >= _REPORT)
-
-    def _logs(self, place: Place, folder: Entry, files: Sequence[Entry]) -> list[Entry]:
-        """Logs among the files of a folder; counts the others."""
-        names = {f.name for f in files}
-        own = _AUDIT_FILES if _AUDIT in names or folder.real == self._exclude else ()
-        logs = []
-        for file in files:
-            result = file.name in own or (file.name in _TABLES and names >= _REPORT)
-            if not result and self._is_log(place, file):
-                logs.append(file)
-            else:
-                self.left_aside += 1
-        return logs
-
-    def _is_log(self, place: Place, file: Entry) -> bool:
-        ending = split_ending(file.name)[1]
-        return bool(ending) and not file.name.startswith(".") and (ending != ".txt" or place.is_log(file))
-
-    def _has(self, place: Place, folder: Entry, name: str) -> bool:
-        found = place.inside(folder, name)
-        return found is not None and not place.is_folder(found)
-
-    def _stated(
-        self, place: Place, folder: Entry, file: Entry, files: Sequence[Entry], folders: Sequence[Entry]
-    ) -> None:
-        """Take the mission that a ``mission.toml`` describes; one that is off makes a mission with a problem."""
-        told, problem = MissionFile(), ""
-        try:
-            told = read_mission_file(place, folder, file)
-        except ConfigError as error:
-            told, problem = MissionFile(machine_id=stated_machine(place, file)), str(error)
-        logs = list(told.files)
-        if not logs and self._has(place, folder, _METADATA):
-            logs = self._whole(place, folder)
-        elif not logs:
-            recordings = [e for c in folders if self._has(place, c, _METADATA) for e in self._whole(place, c)]
-            logs = [e for g in group(place, self._logs(place, folder, files), recordings) for e in g.files]
-        if not logs:
-            problem = problem or f"{file.path}: there is no log beside it; name the mission's files in it"
-        if problem:
-            logs.append(file)
-        found = Found(place.parent(folder.real), told.name or folder.name, tuple(logs), told, folder.name, problem)
-        self._found.append(replace(found, linked=self._folder_of(found.files)))
-
-    def _whole(self, place: Place, folder: Entry) -> list[Entry]:
-        """A recording's folder as one log, if all that is in it can be looked at."""
-        try:
-            return [place.whole(folder)]
-        except OSError as error:
-            self.problems.append(f"{folder.path}: the recording cannot be looked through ({error.strerror or error})")
-            self._unlisted.append(folder.real)
-            return []
-
-    def _folder_of(self, files: Sequence[Entry]) -> str:
-        return os.path.basename(os.path.dirname(files[0].path)) if self._linked else ""  # noqa: PTH119, PTH120
-
-    def _add(self, folder: str, groups: Sequence[Group]) -> None:
-        self._found += [
-            Found(folder, found.stem, found.files, MissionFile(), linked=self._folder_of(found.files))
-            for found in groups
-        ]
+    def _add(self, missions: Sequence[Unnamed]) -> None:
+        """Take missions; of those behind a link to a folder, with the name of the folder that their files are in."""
+        for one in missions:
+            home = os.path.basename(os.path.dirname(one.files[0].path)) if self._linked else ""  # noqa: PTH119, PTH120
+            self._found.append(replace(one, linked=home))
 
 
 def _below(path: str, folder: str) -> bool:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path, PurePosixPath
 from typing import TYPE_CHECKING
 
-from diagnosis.audit.discovery.discover import MissionSource
+from diagnosis.audit.discovery.missions import MissionSource
 
 if TYPE_CHECKING:
     from replay.machine.config import Machine

@@ -1,4 +1,4 @@
-"""``mission.toml``: which files of a folder are one mission, and of which machine."""
+"""Reader of ``mission.toml``; what it means for a mission says `diagnosis.audit.discovery.missions`."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from diagnosis.audit.discovery.listing import Entry, Place
 from replay.errors import ConfigError
 
-NAME = "mission.toml"
+MISSION_FILE = "mission.toml"
 _KEYS = ("files", "machine_id", "machine", "name")
 _MOST_BYTES = 1 << 20
 _LONGEST = 200
@@ -71,7 +71,7 @@ def read_mission_file(place: Place, folder: Entry, file: Entry) -> MissionFile:
 
 
 def stated_machine(place: Place, file: Entry) -> str:
-    """The machine that a ``mission.toml`` names which is off otherwise; empty where it names none."""
+    """The machine that a ``mission.toml`` names which is wrong otherwise; empty where it names none."""
     try:
         text = place.text(file) if file.size <= _MOST_BYTES else ""
     except (OSError, UnicodeDecodeError):

@@ -43,7 +43,7 @@ def file_system(url: str) -> tuple[Any, str]:
     return system, path
 
 
-def look_remotely(finder: Finder, urls: Sequence[str]) -> None:
+def find_remotely(finder: Finder, urls: Sequence[str]) -> None:
     """Find what URLs stand for: objects, all objects below one, or globs.
 
     Raises
@@ -75,7 +75,7 @@ def look_remotely(finder: Finder, urls: Sequence[str]) -> None:
             else:
                 finder.left_aside += 1
     for place, files, folders in places.values():
-        finder.look(place, files, folders)
+        finder.search(place, files, folders)
 
 
 class RemotePlace:

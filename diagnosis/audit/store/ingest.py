@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import orjson
 
-from diagnosis.audit.discovery.mission_names import is_safe
+from diagnosis.audit.discovery.safe_names import is_safe
 from diagnosis.audit.store.keys import Key
 from diagnosis.audit.store.objects import Objects
 from diagnosis.audit.store.outcome import ENDS

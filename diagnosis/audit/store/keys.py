@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from diagnosis.audit.discovery.discover import MissionSource
+    from diagnosis.audit.discovery.missions import MissionSource
     from diagnosis.audit.store.records import KeyRecord
     from replay.machine.config import Machine
 

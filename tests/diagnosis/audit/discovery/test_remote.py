@@ -11,9 +11,10 @@ from typing import Any
 import fsspec
 import pytest
 
-from diagnosis.audit.discovery.discover import MissionSource, discover
+from diagnosis.audit.discovery.discover import discover
 from diagnosis.audit.discovery.inspect_remote import inspect_remotely, logs_at
 from diagnosis.audit.discovery.listing import Entry
+from diagnosis.audit.discovery.missions import MissionSource
 from diagnosis.audit.discovery.remote import RemotePlace, file_system
 from diagnosis.audit.discovery.remote_mcap import outlined
 from diagnosis.audit.discovery.staging import machine_at, stage

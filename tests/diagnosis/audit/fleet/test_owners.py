@@ -8,8 +8,8 @@ from typing import Any
 
 import pytest
 
-from diagnosis.audit.discovery.discover import MissionSource
 from diagnosis.audit.discovery.identity import fallback_id
+from diagnosis.audit.discovery.missions import MissionSource
 from diagnosis.audit.fleet_files import fleet_json, load_fleet
 from diagnosis.audit.store.keys import Key
 from diagnosis.audit.store.outcome import Outcome
