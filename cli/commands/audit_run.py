@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from diagnosis.audit.discovery.discover import Discovery
     from diagnosis.audit.engines import Engine
     from diagnosis.audit.events import Emit, EventFacts
-    from diagnosis.audit.plan import Asked
+    from diagnosis.audit.plan import AuditOptions
 
 
 @dataclass(frozen=True)
@@ -100,16 +100,16 @@ def run_audit(terminal: Terminal, request: AuditRequest) -> int:
     return _audit(terminal, request, found, asked)
 
 
-def _found(request: AuditRequest) -> tuple[Discovery, Asked]:
+def _found(request: AuditRequest) -> tuple[Discovery, AuditOptions]:
     """Missions, and how each is to be diagnosed."""
     from diagnosis.audit.discovery.discover import discover
     from diagnosis.audit.isolation.limits import Limits, usual_memory_mb
-    from diagnosis.audit.plan import Asked, merged_machines
+    from diagnosis.audit.plan import AuditOptions, merged_machines
 
     found = discover(request.paths, exclude=request.output)
     memory = request.memory_mb or (usual_memory_mb(request.at_once) if request.dask is None else Limits.memory_mb)
     limits = Limits(memory, request.timeout_s, request.cpu_s)
-    asked = Asked(
+    asked = AuditOptions(
         request.output,
         request.machine,
         request.machine_id or "",
@@ -133,7 +133,7 @@ def _processors() -> int:
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
-def _list(terminal: Terminal, found: Discovery, asked: Asked, json: bool) -> None:
+def _list(terminal: Terminal, found: Discovery, asked: AuditOptions, json: bool) -> None:
     from diagnosis.audit.session import overview
 
     rows = overview(found, asked)
@@ -150,7 +150,7 @@ def _list(terminal: Terminal, found: Discovery, asked: Asked, json: bool) -> Non
     terminal.show(*plan_parts(rows, found))
 
 
-def _audit(terminal: Terminal, request: AuditRequest, found: Discovery, asked: Asked) -> int:
+def _audit(terminal: Terminal, request: AuditRequest, found: Discovery, asked: AuditOptions) -> int:
     from cli.tables.audit import document, summary_parts
     from diagnosis.audit.endings import NOT_READ, exit_code
     from diagnosis.audit.session import Audited, audit

@@ -14,7 +14,7 @@ from diagnosis.audit.task import key_of
 from replay.errors import LogError
 from replay.mission import content_hash
 
-_LOOK = 1 << 16
+_END_BYTES = 1 << 16
 
 
 def without_copies(planned: Sequence[Planned], store: Store) -> tuple[list[Planned], list[Planned]]:
@@ -42,8 +42,8 @@ def without_copies(planned: Sequence[Planned], store: Store) -> tuple[list[Plann
     for group in list(alike.values()):
         held = all(size in sizes for size in group[0].mission.sizes)
         if held or len(group) > 1:
-            for looks in _by_looks(group).values():
-                for one in looks if held or len(looks) > 1 else ():
+            for same in _by_fingerprint(group).values():
+                for one in same if held or len(same) > 1 else ():
                     _hash(one, store)
     first: dict[tuple[object, ...], Planned] = {}
     copies = []
@@ -55,26 +55,26 @@ def without_copies(planned: Sequence[Planned], store: Store) -> tuple[list[Plann
     return list(first.values()), copies
 
 
-def _by_looks(group: Sequence[Planned]) -> dict[object, list[Planned]]:
-    """Missions by the first and last bytes of their files; those that cannot be looked at each by itself."""
+def _by_fingerprint(group: Sequence[Planned]) -> dict[object, list[Planned]]:
+    """Missions by the first and last bytes of their files; those that cannot be read each by itself."""
     out: dict[object, list[Planned]] = defaultdict(list)
     for one in group:
         try:
-            out[tuple(_look(Path(name)) for name in one.mission.files)].append(one)
+            out[tuple(_fingerprint(Path(name)) for name in one.mission.files)].append(one)
         except OSError:
             out[one.mission.name].append(one)
     return out
 
 
-def _look(path: Path) -> str:
+def _fingerprint(path: Path) -> str:
     if path.is_dir():
         names = sorted((p.relative_to(path).as_posix(), p.stat().st_size) for p in path.rglob("*") if p.is_file())
         return repr(names)
     digest = hashlib.sha256()
     with path.open("rb") as file:
-        digest.update(file.read(_LOOK))
-        file.seek(max(0, file.seek(0, os.SEEK_END) - _LOOK))
-        digest.update(file.read(_LOOK))
+        digest.update(file.read(_END_BYTES))
+        file.seek(max(0, file.seek(0, os.SEEK_END) - _END_BYTES))
+        digest.update(file.read(_END_BYTES))
     return digest.hexdigest()
 
 

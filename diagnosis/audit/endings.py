@@ -85,7 +85,7 @@ def endings(store: Store, missions: Iterable[MissionSource]) -> list[Ending]:
             if report and not holds_report(store.folder / report, Key(*row[2:5])):
                 report = None  # another result's is there
             if reason:
-                reason = store.own_reason(row["id"], reason, wanted[row["name"]])
+                reason = store.reason_for(row["id"], reason, wanted[row["name"]])
             out.append(
                 Ending(
                     name=row["name"],

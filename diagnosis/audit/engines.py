@@ -92,7 +92,7 @@ def dask(address: str, wait_s: float = 20.0) -> Iterator[Engine]:
     except (OSError, ValueError, TimeoutError) as error:
         raise ConfigError(f"--dask {address}: the scheduler does not answer ({error}); see `dask scheduler`") from error
     try:
-        client.run_on_scheduler(_careful)
+        client.run_on_scheduler(_one_task_per_worker)
         executor = client.get_executor(pure=False, retries=0)
 
         def capacity() -> int:
@@ -112,7 +112,7 @@ def dask(address: str, wait_s: float = 20.0) -> Iterator[Engine]:
         client.close(timeout=10)
 
 
-def _careful(dask_scheduler: Any) -> None:
+def _one_task_per_worker(dask_scheduler: Any) -> None:
     """Hand each worker what it can do at once, and take a task from a lost worker to no second one by itself."""
     dask_scheduler.allowed_failures = 0
     if dask_scheduler.WORKER_SATURATION < 100:  # not infinite: queues are on

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import orjson
 
-from diagnosis.audit.fleet.arrivals import arrivals, last_made, without_false_dates
 from diagnosis.audit.fleet.document import Fleet, fleet_document, fleet_of
+from diagnosis.audit.fleet.first_seen import first_seen_times, newest_result_ns, without_false_dates
 from diagnosis.audit.fleet.fleet_types import FleetDocument
 from diagnosis.audit.fleet.gather import machines_of
 from diagnosis.audit.fleet.machines import Limits
@@ -115,11 +115,13 @@ def load_fleet(store_path: Path, out: Path | None = None, axis: Axis = "hours") 
     place = _store(store_path).parent
     folder = out if out is not None else place
     missions = [_with_own_report(mission, folder) for mission in read_missions(store_path)]
-    came = arrivals(place, missions)
-    missions = without_false_dates(missions, came)
-    machines, unknown = machines_of(missions, lambda report: _limits(folder / report / "report.json"), came, str(place))
+    first_seen = first_seen_times(place, missions)
+    missions = without_false_dates(missions, first_seen)
+    machines, unknown = machines_of(
+        missions, lambda report: _limits(folder / report / "report.json"), first_seen, str(place)
+    )
     fleet = fleet_of(machines, missions, axis, unknown)
-    return replace(fleet, run=read_run(store_path), made_ns=last_made(place, missions))
+    return replace(fleet, run=read_run(store_path), made_ns=newest_result_ns(place, missions))
 
 
 def fleet_json(fleet: Fleet, baseline: Path | None = None) -> FleetDocument:

@@ -1,4 +1,4 @@
-"""What an audit is asked to do, and each mission with its machine and configuration."""
+"""Options of an audit, and each mission with its machine and configuration."""
 
 from __future__ import annotations
 
@@ -26,8 +26,8 @@ _CLEARLY = 1.05  # what is free varies from one night to the next
 
 
 @dataclass(frozen=True)
-class Asked:
-    """What an audit is asked to do.
+class AuditOptions:
+    """What is asked of an audit.
 
     Attributes
     ----------
@@ -90,13 +90,13 @@ class Planned:
     problem: str = ""
 
 
-def plan(missions: Iterable[MissionSource], asked: Asked) -> list[Planned]:
+def plan(missions: Iterable[MissionSource], options: AuditOptions) -> list[Planned]:
     """Give each mission its machine and configuration.
 
     Raises
     ------
     ConfigError
-        Where the given machine file is off; one that a mission names costs that mission alone.
+        Where the given machine file is wrong; one that a mission names costs that mission alone.
     """
 
     @cache
@@ -104,9 +104,9 @@ def plan(missions: Iterable[MissionSource], asked: Asked) -> list[Planned]:
         machine = haulotte() if name is None else machine_at(name)
         return machine, dump_machine(machine).encode()
 
-    usual = str(asked.machine) if asked.machine is not None else None
+    usual = str(options.machine) if options.machine is not None else None
     loaded(usual)
-    options = {"max_size_mb": asked.max_size_mb}
+    hashed = {"max_size_mb": options.max_size_mb}
     planned = []
     for mission in missions:
         name, problem = mission.machine_file or usual, mission.problem
@@ -118,30 +118,30 @@ def plan(missions: Iterable[MissionSource], asked: Asked) -> list[Planned]:
         if problem:
             document = problem.encode("utf-8", "backslashreplace")
         source = PAPER if name is None else Path(name).name
-        stated = stated_id(asked.machine_id, mission, machine)
-        given = given_id(asked.machine_id, mission) or ""
-        planned.append(Planned(mission, machine, source, given, config_hash(document, options, stated), problem))
+        stated = stated_id(options.machine_id, mission, machine)
+        given = given_id(options.machine_id, mission) or ""
+        planned.append(Planned(mission, machine, source, given, config_hash(document, hashed, stated), problem))
     return planned
 
 
-def merged_machines(missions: Iterable[MissionSource], asked: Asked) -> tuple[str, ...]:
+def merged_machines(missions: Iterable[MissionSource], options: AuditOptions) -> tuple[str, ...]:
     """Say so where the machine file's identity makes one machine of what folders would tell apart; else nothing.
 
     Raises
     ------
     ConfigError
-        Where the machine file is off.
+        Where the machine file is wrong.
     """
-    if asked.machine is None or asked.machine_id:
+    if options.machine is None or options.machine_id:
         return ()
-    name = machine_at(str(asked.machine)).id
+    name = machine_at(str(options.machine)).id
     usual = [m for m in missions if not m.machine_id and m.machine_file is None]
     folders = list(dict.fromkeys(fallback_id(m) for m in usual)) if name else []
     if len(folders) < 2:
         return ()
     shown = ", ".join(folders[:3]) + (", …" if len(folders) > 3 else "")
     return (
-        f"{asked.machine}: its id {name!r} makes one machine of the logs of {len(folders)} folders ({shown}), unless the "
+        f"{options.machine}: its id {name!r} makes one machine of the logs of {len(folders)} folders ({shown}), unless the "
         "logs name their own; leave the id out where each folder is a machine",
     )
 
@@ -171,13 +171,13 @@ def allows_more(limits: Limits, result: StoredResult) -> bool:
     return now is None or now > met[1] * (_CLEARLY if met[0] == "--memory" else 1.00001)
 
 
-def is_done(result: StoredResult | None, asked: Asked) -> bool:
+def is_done(result: StoredResult | None, options: AuditOptions) -> bool:
     """Whether a result is final: its report is there; where it failed, no attempts are left and its limit is no larger now."""
     if result is None:
         return False
-    if result.state in TRANSIENT and (result.attempts <= asked.retries or allows_more(asked.limits, result)):
+    if result.state in TRANSIENT and (result.attempts <= options.retries or allows_more(options.limits, result)):
         return False
     if result.report is None:
         return True
-    folder = asked.output / result.report
+    folder = options.output / result.report
     return holds_report(folder, result.key) and all((folder / name).is_file() for name in _REPORT)

@@ -12,10 +12,10 @@ from dataclasses import dataclass, replace
 from diagnosis.audit.discovery.identity import fallback_id
 from diagnosis.audit.engines import Engine, is_lost
 from diagnosis.audit.events import Emit, EventFacts
-from diagnosis.audit.plan import Asked, Planned, allows_more, is_done, known_hashes, stored_result
-from diagnosis.audit.store.claims import Claim, claim_mission
-from diagnosis.audit.store.folders import RESULTS, Working
+from diagnosis.audit.plan import AuditOptions, Planned, allows_more, is_done, known_hashes, stored_result
+from diagnosis.audit.store.folders import RESULTS, RunFolders
 from diagnosis.audit.store.ingest import ingest
+from diagnosis.audit.store.locks import FileLock, lock_mission
 from diagnosis.audit.store.outcome import TRANSIENT, MissionState, Outcome
 from diagnosis.audit.store.store import Store, StoredResult
 from diagnosis.audit.store.summary import MissionSummary
@@ -29,7 +29,7 @@ _LOST_TRIES = 5
 @dataclass
 class _Running:
     planned: Planned
-    claim: Claim
+    lock: FileLock
     number: int
     tries: int = 1
     lost: int = 0
@@ -40,24 +40,24 @@ class Runner:
 
     Parameters
     ----------
-    asked : Asked
+    options : AuditOptions
         What is wanted.
     store : Store
         Where ends are kept; a run has begun in it.
     engine : Engine
         Where tasks run.
-    place : Working
+    place : RunFolders
         The run's own folders.
     emit : Emit
         Takes every event: ``skipped``, ``mission``, ``retry``, ``waiting``, ``tick``.
     """
 
-    def __init__(self, asked: Asked, store: Store, engine: Engine, place: Working, emit: Emit) -> None:
-        self._asked, self._store, self._engine, self._place, self._emit = asked, store, engine, place, emit
+    def __init__(self, options: AuditOptions, store: Store, engine: Engine, place: RunFolders, emit: Emit) -> None:
+        self._options, self._store, self._engine, self._place, self._emit = options, store, engine, place, emit
         self._queue: deque[Planned] = deque()
         self._elsewhere: deque[Planned] = deque()
         self._running: dict[Future[Attempt], _Running] = {}
-        self._claims: set[Claim] = set()
+        self._locks: set[FileLock] = set()
         self._waited: set[str] = set()
 
     def run(self, planned: Sequence[Planned]) -> None:
@@ -69,7 +69,7 @@ class Runner:
             Where the output cannot be written; what was kept before stays.
         """
         self._queue.extend(planned)
-        looked = time.monotonic()
+        checked = time.monotonic()
         try:
             while self._queue or self._running or self._elsewhere:
                 self._fill()
@@ -79,15 +79,15 @@ class Runner:
                 elif not self._queue:
                     time.sleep(TICK_S)
                 self._emit("tick", {})
-                if not self._queue and self._elsewhere and time.monotonic() - looked > 2 * TICK_S:
-                    looked = time.monotonic()
+                if not self._queue and self._elsewhere and time.monotonic() - checked > 2 * TICK_S:
+                    checked = time.monotonic()
                     self._queue, self._elsewhere = self._elsewhere, deque()
         except BaseException:
             self._engine.stop()
             raise
         finally:
-            for claim in self._claims:
-                claim.drop()
+            for lock in self._locks:
+                lock.release()
 
     def _fill(self) -> None:
         """Hand out as much as can run, and a little more, so that nobody waits."""
@@ -97,33 +97,35 @@ class Runner:
             if planned.problem:
                 self._refuse(planned)
                 continue
-            claim = claim_mission(self._asked.output, planned.mission.name)
-            if claim is None:
+            lock = lock_mission(self._options.output, planned.mission.name)
+            if lock is None:
                 self._elsewhere.append(planned)
                 if planned.mission.name not in self._waited:
                     self._waited.add(planned.mission.name)
                     self._emit("waiting", {"name": planned.mission.name})
                 continue
-            self._claims.add(claim)
+            self._locks.add(lock)
             result = stored_result(planned, self._store)
-            if self._asked.resume and result is not None and is_done(result, self._asked):  # by another run meanwhile
-                self._drop(claim)
+            if (
+                self._options.resume and result is not None and is_done(result, self._options)
+            ):  # by another run meanwhile
+                self._release(lock)
                 skip(planned, result, self._store, self._emit)
                 continue
             number = result.attempts + 1 if result is not None else 1
-            again = self._asked.resume and result is not None and result.state in TRANSIENT
-            more = again and result is not None and allows_more(self._asked.limits, result)
-            self._submit(_Running(planned, claim, number, tries=number if again and not more else 1))
+            again = self._options.resume and result is not None and result.state in TRANSIENT
+            more = again and result is not None and allows_more(self._options.limits, result)
+            self._submit(_Running(planned, lock, number, tries=number if again and not more else 1))
             room -= 1
 
     def _submit(self, one: _Running) -> None:
-        planned, asked = one.planned, self._asked
+        planned, options = one.planned, self._options
         mission = planned.mission
         if self._engine.shared:  # workers have folders of their own to start from
             mission = replace(mission, files=tuple(absolute(name) for name in mission.files))
         task = Task(
             mission=mission,
-            output=absolute(str(asked.output)),
+            output=absolute(str(options.output)),
             machine=planned.machine,
             machine_source=planned.source,
             machine_id=planned.machine_id,
@@ -132,12 +134,12 @@ class Runner:
             temporary="" if self._engine.shared else str(self._place.temporary),
             attempt=one.number,
             known=known_hashes(planned, self._store),
-            limits=asked.limits,
-            max_size_mb=asked.max_size_mb,
-            objects=absolute(str(asked.output / RESULTS)) if self._engine.shared else "",
+            limits=options.limits,
+            max_size_mb=options.max_size_mb,
+            objects=absolute(str(options.output / RESULTS)) if self._engine.shared else "",
             described=tuple(self._store.relative(file) for file in planned.mission.files),
-            isolation=asked.isolation,
-            judge=asked.judge,
+            isolation=options.isolation,
+            judge=options.judge,
         )
         self._running[self._engine.executor.submit(audit_one, task)] = one
 
@@ -149,17 +151,17 @@ class Runner:
         for one, attempt in ended:
             if not attempt.kept:
                 keep(attempt, one.planned, self._store)
-            if attempt.outcome.state in TRANSIENT and one.tries <= self._asked.retries:
+            if attempt.outcome.state in TRANSIENT and one.tries <= self._options.retries:
                 outcome = attempt.outcome
                 self._emit("retry", {"name": attempt.mission.name, "state": outcome.state, "reason": outcome.reason})
                 self._submit(replace(one, number=one.number + 1, tries=one.tries + 1))
             else:
-                self._drop(one.claim)
+                self._release(one.lock)
                 self._emit("mission", facts_of(attempt))
 
-    def _drop(self, claim: Claim) -> None:
-        claim.drop()
-        self._claims.discard(claim)
+    def _release(self, lock: FileLock) -> None:
+        lock.release()
+        self._locks.discard(lock)
 
     def _attempt_of(self, one: _Running, future: Future[Attempt]) -> Attempt | None:
         """What came of a task; None where its worker was lost and another one is at it now."""
@@ -204,7 +206,7 @@ def absolute(name: str) -> str:
 def skip(planned: Planned, result: StoredResult, store: Store, emit: Emit) -> None:
     """Let a mission have the result that is there."""
     store.reuse(planned.mission, result)
-    reason = store.own_reason(result.id, result.reason, planned.mission.files)
+    reason = store.reason_for(result.id, result.reason, planned.mission.files)
     emit(
         "skipped",
         {

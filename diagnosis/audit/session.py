@@ -17,12 +17,12 @@ from diagnosis.audit.endings import Ending, endings, write_failures
 from diagnosis.audit.engines import Engine
 from diagnosis.audit.events import Emit, EventFacts
 from diagnosis.audit.fleet.read import content_mark
-from diagnosis.audit.plan import Asked, Planned, is_done, plan, stored_result
+from diagnosis.audit.plan import AuditOptions, Planned, is_done, plan, stored_result
 from diagnosis.audit.previous_pages import compare_newest
 from diagnosis.audit.runner import Runner, skip
-from diagnosis.audit.store.claims import alone
-from diagnosis.audit.store.folders import own_report, sweep, working
+from diagnosis.audit.store.folders import own_report, run_folders, sweep
 from diagnosis.audit.store.ingest import ingest
+from diagnosis.audit.store.locks import exclusively
 from diagnosis.audit.store.store import FILE_NAME, Store, StoredResult
 from replay.errors import LogError, OutputError
 from replay.version import __version__
@@ -58,23 +58,23 @@ class Audited:
     gone: int = 0
 
 
-def overview(discovery: Discovery, asked: Asked) -> list[tuple[Planned, str]]:
+def overview(discovery: Discovery, options: AuditOptions) -> list[tuple[Planned, str]]:
     """Each mission with its state: that of its result, or ``to do``; nothing is written."""
-    path = asked.output / FILE_NAME
-    planned = plan(discovery.missions, asked)
+    path = options.output / FILE_NAME
+    planned = plan(discovery.missions, options)
     if not path.is_file():
         return [(one, "to do") for one in planned]
     out: list[tuple[Planned, str]] = []
     with Store.open(path, read_only=True) as store:
         for one in planned:
-            result = stored_result(one, store) if asked.resume else None
-            out.append((one, result.state if result is not None and is_done(result, asked) else "to do"))
+            result = stored_result(one, store) if options.resume else None
+            out.append((one, result.state if result is not None and is_done(result, options) else "to do"))
     return out
 
 
 def audit(
     discovery: Discovery,
-    asked: Asked,
+    options: AuditOptions,
     engine: Callable[[], AbstractContextManager[Engine]],
     emit: Emit,
     *,
@@ -87,7 +87,7 @@ def audit(
     ----------
     discovery : Discovery
         From `diagnosis.audit.discovery.discover.discover`.
-    asked : Asked
+    options : AuditOptions
         What is wanted.
     engine : Callable
         Makes the engine, where there is something to do.
@@ -101,50 +101,50 @@ def audit(
     Raises
     ------
     ConfigError
-        Where the machine file is off or the engine is not there.
+        Where the machine file is wrong or the engine is not there.
     OutputError
         Where the output cannot be written; what was kept before stays.
     """
     if baseline is not None:
         from diagnosis.audit.fleet_files import check_baseline
 
-        check_baseline(baseline, asked.output / FILE_NAME)
-    with Store.open(asked.output / FILE_NAME) as store:
-        page = _FleetPage(asked.output, baseline, axis, emit)
+        check_baseline(baseline, options.output / FILE_NAME)
+    with Store.open(options.output / FILE_NAME) as store:
+        page = _FleetPage(options.output, baseline, axis, emit)
         complete = page.is_current()  # else an earlier run was ended before its last steps
-        planned, done, rest = _begin(discovery, asked, store, emit)
+        planned, done, rest = _begin(discovery, options, store, emit)
         if rest:
             page.update(always=False)  # what is still to do may contradict what it says
-            with page.written_on_failure(), working(asked.output) as place, engine() as made:
-                runner = Runner(asked, store, made, place, page.emit_and_update)
-                rest = _run_all(runner, done, rest, asked, store)
+            with page.written_on_failure(), run_folders(options.output) as place, engine() as made:
+                runner = Runner(options, store, made, place, page.emit_and_update)
+                rest = _run_all(runner, done, rest, options, store)
         names = [one.mission.name for one in (rest if complete else planned)]
-        compare_newest(store, names, asked.max_size_mb, emit)
+        compare_newest(store, names, options.max_size_mb, emit)
         ends = endings(store, [one.mission for one in planned])
-        failed = write_failures(asked.output, planned, ends, asked.machine)
+        failed = write_failures(options.output, planned, ends, options.machine)
         page.finish()
         gone = store.database.rows("SELECT count(*) FROM mission WHERE gone IS NOT NULL")[0][0]
     return Audited(tuple(ends), len(planned) - len(rest), failed, gone)
 
 
 def _begin(
-    discovery: Discovery, asked: Asked, store: Store, emit: Emit
+    discovery: Discovery, options: AuditOptions, store: Store, emit: Emit
 ) -> tuple[list[Planned], list[Planned], list[Planned]]:
     """Begin a run of the store: all missions, those that are done, and the rest."""
-    sweep(asked.output)
+    sweep(options.output)
     store.begin_run()
     taken = ingest(store)
     if taken.attempts or taken.links or taken.problems:
         emit("ingested", {"attempts": taken.attempts, "links": taken.links, "problems": list(taken.problems)})
     missions = store.adopt(discovery.missions, discovery.roots)
-    planned = plan(missions, asked)
+    planned = plan(missions, options)
     done, rest = list[Planned](), list[Planned]()
     emit("start", {"missions": len(planned), "bytes": sum(m.bytes for m in missions)})
     for one in planned:
-        result = stored_result(one, store) if asked.resume else None
+        result = stored_result(one, store) if options.resume else None
         if result is not None:
-            _remake_page(result, asked, emit)
-        if result is not None and is_done(result, asked):
+            _remake_page(result, options, emit)
+        if result is not None and is_done(result, options):
             skip(one, result, store, emit)
             done.append(one)
         else:
@@ -154,7 +154,7 @@ def _begin(
 
 
 def _run_all(
-    runner: Runner, done: Sequence[Planned], rest: Sequence[Planned], asked: Asked, store: Store
+    runner: Runner, done: Sequence[Planned], rest: Sequence[Planned], options: AuditOptions, store: Store
 ) -> list[Planned]:
     """Run what is not done; all missions that were run.
 
@@ -164,30 +164,30 @@ def _run_all(
     while now:
         for part in without_copies(now, store):
             runner.run(part)
-        done, now = _parted(done, asked, store)
+        done, now = _parted(done, options, store)
         ran += now
     return ran
 
 
-def _parted(done: Sequence[Planned], asked: Asked, store: Store) -> tuple[list[Planned], list[Planned]]:
+def _parted(done: Sequence[Planned], options: AuditOptions, store: Store) -> tuple[list[Planned], list[Planned]]:
     """Missions that are done still, and those that are not any more."""
     parts: tuple[list[Planned], list[Planned]] = [], []
     for one in done:
-        parts[not is_done(stored_result(one, store), asked)].append(one)
+        parts[not is_done(stored_result(one, store), options)].append(one)
     return parts
 
 
-def _remake_page(result: StoredResult, asked: Asked, emit: Emit) -> None:
+def _remake_page(result: StoredResult, options: AuditOptions, emit: Emit) -> None:
     """Make a result's page again where it was removed and the rest of the report is there."""
-    if result.report is None or (asked.output / result.report / "report.html").is_file():
+    if result.report is None or (options.output / result.report / "report.html").is_file():
         return
     from diagnosis.output import rebuild
 
-    with own_report(asked.output, result.report, result.key) as folder:
+    with own_report(options.output, result.report, result.key) as folder:
         if folder is None or not (folder / "report.json").is_file():
             return
         try:
-            rebuild(folder, max_size_mb=asked.max_size_mb)
+            rebuild(folder, max_size_mb=options.max_size_mb)
         except (LogError, KeyError, TypeError, ValueError):  # the mission is diagnosed again
             return
     emit("rebuilt", {"report": result.report})
@@ -235,7 +235,7 @@ class _FleetPage:
         if not always and self._is_as_asked():
             return
         start = time.monotonic()
-        with alone(self.output, _PAGE_NAME, PAGE_S):  # its three files belong together
+        with exclusively(self.output, _PAGE_NAME, PAGE_S):  # its three files belong together
             files = write_fleet(self.output / FILE_NAME, self.output, baseline=self.baseline, axis=self.axis)
         took = time.monotonic() - start
         self.due = time.monotonic() + max(PAGE_S, _PAGE_SHARE * took)
@@ -265,8 +265,8 @@ class _FleetPage:
     def _is_as_asked(self) -> bool:
         """Whether the page is current, and as it is asked for."""
         state = self._state()
-        asked = self.baseline is None and state.get("baseline") is None and state.get("axis") == self.axis
-        return asked and self._shows_the_store(state)
+        as_asked = self.baseline is None and state.get("baseline") is None and state.get("axis") == self.axis
+        return as_asked and self._shows_the_store(state)
 
     def _shows_the_store(self, state: _PageState) -> bool:
         page, mark = self.output / "fleet.html", content_mark(self.output / FILE_NAME)

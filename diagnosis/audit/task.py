@@ -18,9 +18,9 @@ from diagnosis.audit.isolation import child
 from diagnosis.audit.isolation.child import Work
 from diagnosis.audit.isolation.limits import Limits
 from diagnosis.audit.isolation.run import isolation, over_time, run_isolated
-from diagnosis.audit.store.claims import cannot_write
 from diagnosis.audit.store.folders import MISSIONS, publish
 from diagnosis.audit.store.keys import Key, file_roles, log_hash, unhashed_log
+from diagnosis.audit.store.locks import cannot_write
 from diagnosis.audit.store.objects import Objects
 from diagnosis.audit.store.outcome import READ, MissionState, Outcome
 from diagnosis.audit.store.records import FileRecord, ResultObject, attempt_record

@@ -35,14 +35,14 @@ def logs_at(urls: Sequence[str]) -> tuple[list[MissionSource], list[str], int]:
     return logs, list(found.problems), found.left_aside
 
 
-def inspect_remotely(log: MissionSource, look: Callable[[Path], InspectReport], clock: str | None) -> InspectReport:
+def inspect_remotely(log: MissionSource, inspect: Callable[[Path], InspectReport], clock: str | None) -> InspectReport:
     """Inspect a log behind a URL.
 
     Parameters
     ----------
     log : MissionSource
         From `logs_at`.
-    look : Callable[[Path], InspectReport]
+    inspect : Callable[[Path], InspectReport]
         Inspects a local log.
     clock : str or None
         Clock that a full reading would use, where the index suffices; None: read the log whole.
@@ -58,7 +58,7 @@ def inspect_remotely(log: MissionSource, look: Callable[[Path], InspectReport], 
         with tempfile.TemporaryDirectory(prefix="mfhca-") as folder:
             (local,) = stage(log, Path(folder)).paths
             try:
-                seen = look(local)
+                seen = inspect(local)
             except LogError as error:
                 raise LogError(str(error).replace(str(local), url)) from error
     return replace(seen, source=url)

@@ -10,7 +10,7 @@ from typing import Any
 
 from diagnosis.audit.discovery.finder import Finder
 from diagnosis.audit.discovery.listing import Entry, continues, joined
-from diagnosis.audit.discovery.remote_mcap import outlined, why
+from diagnosis.audit.discovery.remote_mcap import summarised, why
 from replay.errors import ConfigError, LogError
 from replay.log.file_types import split_ending
 
@@ -103,8 +103,8 @@ class RemotePlace:
         for name, info in sorted(found.items()):
             if info["type"] == "directory":
                 below: Mapping[str, Any] = self._system.find(name, detail=True)
-                for other, told in below.items():
-                    self._enter(name, other, told)
+                for other, info_of in below.items():
+                    self._enter(name, other, info_of)
                 self._folders.setdefault(self._url(name), {})
                 out.append(self._folder(self._url(name)))
             else:
@@ -189,20 +189,20 @@ class RemotePlace:
         return joined(folder, rows)
 
     def continuous(self, parts: Sequence[Entry]) -> bool:
-        """Whether MCAP files go on from one to the next, by their summaries; of other formats that is not looked at."""
+        """Whether MCAP files go on from one to the next, by their summaries; of other formats that is not known."""
         if any(split_ending(part.name)[1] != ".mcap" for part in parts):
             return False
         try:
-            return continues(outlined(self._system, self._path(part), part.size) for part in parts)
+            return continues(summarised(self._system, self._path(part), part.size) for part in parts)
         except LogError:
             return False
 
     def is_log(self, file: Entry) -> bool:
-        """Whether it may be a log; the content is not looked at."""
+        """Whether it may be a log; the content is not read."""
         return True
 
 
 def stamp_of(info: Mapping[str, Any]) -> str:
-    """What changes when an object is replaced: its ETag, version or time; empty where nothing is told."""
+    """What changes when an object is replaced: its ETag, version or time; empty where nothing says so."""
     value = next((info[name] for name in _STAMPS if info.get(name)), "")
     return str(value.timestamp() if isinstance(value, datetime) else value)

@@ -60,7 +60,7 @@ def fetched_index(system: Any, path: str, size: int) -> Iterator[Path]:
                 if 0 < start < size - _AHEAD + _BEFORE_SUMMARY:
                     take(start - _BEFORE_SUMMARY, size - _AHEAD)
                 file.flush()
-                for offset, length in _told_elsewhere(local)[:_MOST_RECORDS]:
+                for offset, length in _metadata_places(local)[:_MOST_RECORDS]:
                     take(offset, offset + length)
         except LogError:
             raise
@@ -69,7 +69,7 @@ def fetched_index(system: Any, path: str, size: int) -> Iterator[Path]:
         yield local
 
 
-def outlined(system: Any, path: str, size: int) -> LogSummary:
+def summarised(system: Any, path: str, size: int) -> LogSummary:
     """List an MCAP file's contents from its index; see `fetched_index`.
 
     Raises
@@ -84,8 +84,8 @@ def outlined(system: Any, path: str, size: int) -> LogSummary:
     return summary
 
 
-def _told_elsewhere(local: Path) -> list[tuple[int, int]]:
-    """Where the metadata records lie of which the summary tells."""
+def _metadata_places(local: Path) -> list[tuple[int, int]]:
+    """Offset and length of the metadata records that the summary lists."""
     from replay.readers.mcap.file import mapped_bytes
     from replay.readers.mcap.summary import read_summary
 

@@ -57,7 +57,7 @@ def stage(mission: MissionSource, folder: Path, known: Sequence[str] = (), until
     known : Sequence[str]
         SHA-256 of each file where they are known, so that local files need not be read for them.
     until : float
-        Time of `time.monotonic` at which they must be ready [s]; looked at with each piece that comes from a server, and
+        Time of `time.monotonic` at which they must be ready [s]; checked with each piece that comes from a server, and
         after each file.
 
     Raises
@@ -88,7 +88,7 @@ def machine_at(name: str) -> Machine:
     Raises
     ------
     ConfigError
-        Where it cannot be read or is off.
+        Where it cannot be read or is wrong.
     """
     if "://" not in name:
         return load_machine(Path(name))
@@ -196,7 +196,7 @@ def _linked(parts: Sequence[Path], folder: Path) -> Path:
 
 
 def _link(source: Path, target: Path) -> None:
-    ways: tuple[Callable[[Path, Path], Any], ...] = (os.symlink, os.link, shutil.copyfile)
+    ways: tuple[Callable[[Path, Path], object], ...] = (os.symlink, os.link, shutil.copyfile)
     for i, way in enumerate(ways):
         try:
             way(source, target)

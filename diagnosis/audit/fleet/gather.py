@@ -19,7 +19,7 @@ Key = tuple[str, str, str]
 def machines_of(
     missions: Iterable[Mission],
     limits: Callable[[str], Limits] | None = None,
-    came: Callable[[str], int | None] | None = None,
+    first_seen: Callable[[str], int | None] | None = None,
     folder: str = ".",
 ) -> tuple[list[Machine], list[Mission]]:
     """Gather missions by machine.
@@ -30,8 +30,8 @@ def machines_of(
         From `read_missions`.
     limits : Callable[[str], Limits] or None
         Gives the limits by the folder of a report, asked for the last one of each machine; None for the defaults.
-    came : Callable[[str], int or None] or None
-        Gives when a mission was first looked at by its name, from `diagnosis.audit.fleet.arrivals`; None: not known.
+    first_seen : Callable[[str], int or None] or None
+        Gives when a mission was first seen by its name, from `diagnosis.audit.fleet.first_seen`; None: not known.
     folder : str
         Folder of the store.
 
@@ -58,10 +58,10 @@ def machines_of(
             runs[key][m.result.id] = Run(known.name if known else m.name, m.result, known.copies + 1 if known else 0)
         else:
             failed[key].append(m)
-    came = came or (lambda _: None)
-    out = [_machine(key, runs[key].values(), failed[key], limits, came) for key in sorted({*runs, *failed})]
-    ready = [_began(m, came) for m in out if m.verdict is Verdict.READY]
-    later = [m for m in nowhere if not m.gone and any(_may_be_later(m.name, began, came) for began in ready)]
+    first_seen = first_seen or (lambda _: None)
+    out = [_machine(key, runs[key].values(), failed[key], limits, first_seen) for key in sorted({*runs, *failed})]
+    ready = [_began(m, first_seen) for m in out if m.verdict is Verdict.READY]
+    later = [m for m in nowhere if not m.gone and any(_may_be_later(m.name, began, first_seen) for began in ready)]
     return out, later
 
 
@@ -70,7 +70,7 @@ def _machine(
     runs: Iterable[Run],
     failed: Sequence[Mission],
     limits: Callable[[str], Limits] | None,
-    came: Callable[[str], int | None],
+    first_seen: Callable[[str], int | None],
 ) -> Machine:
     found = list(runs)
     starts = Counter(r.result.start_ns for r in found if r.result.start_ns is not None)
@@ -81,33 +81,33 @@ def _machine(
     own = limits(last.result.report or "") if limits and last else Limits()
     name = key[1] or (last.result.machine_name if last else "")
     m = Machine(key[0], name, tuple(dated), tuple(undated), tuple(failed), own)
-    return _with_faults(replace(m, cleared=_cleared(m, limits), unjudged=_unjudged(m, came)))
+    return _with_faults(replace(m, cleared=_cleared(m, limits), unjudged=_unjudged(m, first_seen)))
 
 
 def _cleared(m: Machine, limits: Callable[[str], Limits] | None) -> bool | None:
     """Whether its last judged mission lets it go out, and every judged one that may be later."""
-    said = {limits(r.result.report).cleared if limits and r.result.report else None for r in m.newest}
-    return False if False in said else None if None in said or not said else True
+    cleared = {limits(r.result.report).cleared if limits and r.result.report else None for r in m.newest}
+    return False if False in cleared else None if None in cleared or not cleared else True
 
 
-def _unjudged(m: Machine, came: Callable[[str], int | None]) -> int:
+def _unjudged(m: Machine, first_seen: Callable[[str], int | None]) -> int:
     """Missions that were not judged and may be later than the last judged one."""
-    last, began = m.last_judged, _began(m, came)
+    last, began = m.last_judged, _began(m, first_seen)
     after = len(m.dated) - (m.dated.index(last) + 1 if last else 0)
     others = [r.name for r in m.undated if r.result.verdict is Verdict.NOT_ASSESSED] + [f.name for f in m.failed]
-    return after + sum(_may_be_later(name, began, came) for name in others)
+    return after + sum(_may_be_later(name, began, first_seen) for name in others)
 
 
-def _began(m: Machine, came: Callable[[str], int | None]) -> int | None:
+def _began(m: Machine, first_seen: Callable[[str], int | None]) -> int | None:
     """When the last judged mission began; a clock of the log that runs ahead of the audit's does not count."""
     last = m.last_judged
-    looked = came(last.name) if last else None
-    return None if last is None or looked is None else min(last.result.start_ns or 0, looked)
+    seen = first_seen(last.name) if last else None
+    return None if last is None or seen is None else min(last.result.start_ns or 0, seen)
 
 
-def _may_be_later(name: str, began: int | None, came: Callable[[str], int | None]) -> bool:
-    looked = came(name) if began is not None else None
-    return began is None or looked is None or looked >= began
+def _may_be_later(name: str, began: int | None, first_seen: Callable[[str], int | None]) -> bool:
+    seen = first_seen(name) if began is not None else None
+    return began is None or seen is None or seen >= began
 
 
 def _with_faults(m: Machine) -> Machine:

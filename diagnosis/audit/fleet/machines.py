@@ -1,10 +1,10 @@
 """Machines of a fleet: their missions in order of the log's clock, where each stands, and the faults that return.
 
-Copies of a log count once. Missions whose log does not know the date (or says one after an audit had looked at it), or which
+Copies of a log count once. Missions whose log does not know the date (or says one after an audit had seen it), or which
 start at the same moment as another one of the machine, cannot be ordered: they count, but they take no part in trends or what is new. Where one of them is worse than the last dated one, the machine stands as the worse.
 
 A machine is ``ready`` only where no mission that was not judged may be later than its last judged one. A log that was not
-read, or does not know the date, may be later unless an audit looked at it before that mission began.
+read, or does not know the date, may be later unless an audit saw it before that mission began.
 """
 
 from __future__ import annotations

@@ -10,7 +10,7 @@ import os
 from collections.abc import Iterable, Iterator
 
 from diagnosis.audit.fleet.read import Mission, Result
-from diagnosis.audit.store.shared_reason import whole_path
+from diagnosis.audit.store.reason_template import whole_path
 from diagnosis.results.vocabulary import Verdict
 
 Owner = tuple[str, str]

@@ -15,7 +15,7 @@ from pathlib import Path
 
 from diagnosis.audit.store.database import Database
 from diagnosis.audit.store.outcome import MissionState
-from diagnosis.audit.store.shared_reason import SharedReason, shared_reason, whole_path
+from diagnosis.audit.store.reason_template import ReasonTemplate, reason_template, whole_path
 from diagnosis.audit.store.store import FILE_NAME
 from diagnosis.results.vocabulary import Severity, Verdict
 
@@ -153,13 +153,13 @@ def _with_own_reasons(missions: Sequence[Mission], folder: str) -> list[Mission]
     for one in missions:
         if one.result is not None and one.result.reason:
             sharing[one.result.id].append(one.files)
-    reasons: dict[int, SharedReason] = {}
+    reasons: dict[int, ReasonTemplate] = {}
     out = []
     for one in missions:
         if one.result is not None and len(theirs := sharing[one.result.id]) > 1:
             if one.result.id not in reasons:
-                reasons[one.result.id] = shared_reason(one.result.reason, theirs, folder)
-            reason = reasons[one.result.id].of([whole_path(folder, file) for file in one.files])
+                reasons[one.result.id] = reason_template(one.result.reason, theirs, folder)
+            reason = reasons[one.result.id].for_files([whole_path(folder, file) for file in one.files])
             one = replace(one, result=replace(one.result, reason=reason))
         out.append(one)
     return out

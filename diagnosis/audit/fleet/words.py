@@ -169,10 +169,10 @@ def sentences(
         if found and len(bad) > _SHOWN:
             out.append(f"{words} ({len(found)}): {_named(found)}.")
     for m in bad[:_SHOWN]:
-        told = [_found(m, f) for f in m.faults if f.standing][:2]
+        faults = [_found(m, f) for f in m.faults if f.standing][:2]
         note = f" ({m.note})" if m.note else ""
         words = standing(m)
-        what = f": {join_words(told)}" if told else ""
+        what = f": {join_words(faults)}" if faults else ""
         out.append(f"{m.label} – {_small(words)}{what}{note}.")
     open_machines = [m for m in machines if m.verdict is Verdict.NOT_ASSESSED]
     if open_machines:
@@ -197,24 +197,24 @@ def new_words(missions: int, faults: Sequence[tuple[Machine, FleetFault]]) -> li
     """What the last audit run brought, in no or one sentence; see `diagnosis.audit.fleet.news.news`."""
     if not missions:
         return []
-    told = [f"{m.label} {fault_words(f)} ({f.severity})" for m, f in faults[:_NAMED]]
-    more = f" and {len(faults) - len(told)} more" if len(faults) > len(told) else ""
+    named = [f"{m.label} {fault_words(f)} ({f.severity})" for m, f in faults[:_NAMED]]
+    more = f" and {len(faults) - len(named)} more" if len(faults) > len(named) else ""
     return [
-        f"New since the run before, in {count(missions, 'mission')}: {'; '.join(told) + more if told else 'no new fault'}."
+        f"New since the run before, in {count(missions, 'mission')}: {'; '.join(named) + more if named else 'no new fault'}."
     ]
 
 
 def _named(machines: Sequence[Machine]) -> str:
     """Names of machines, where one is not ready any more with the reason."""
-    told = [m.label for m in machines[:_NAMED]]
+    names = [m.label for m in machines[:_NAMED]]
     if machines[0].verdict is Verdict.NOT_ASSESSED:
-        told = [
+        names = [
             m.label + (f" ({words.partition(' ')[2]})" if (words := standing(m)) != Verdict.NOT_ASSESSED.label else "")
             for m in machines[:_NAMED]
         ]
-        told = [t.replace("(assessed since", "(since").replace("(assessed: ", "(") for t in told]
-    more = len(machines) - len(told)
-    return ", ".join(told) + (f" and {more} more: listed below" if more else "")
+        names = [t.replace("(assessed since", "(since").replace("(assessed: ", "(") for t in names]
+    more = len(machines) - len(names)
+    return ", ".join(names) + (f" and {more} more: listed below" if more else "")
 
 
 def _found(m: Machine, f: FleetFault) -> str:

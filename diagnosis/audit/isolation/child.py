@@ -1,6 +1,6 @@
 """The work on one mission, in a process of its own.
 
-It reads the log, writes the report into a folder that nobody else looks at yet, and leaves ``outcome.json`` beside it.
+It reads the log, writes the report into a folder that nobody else reads yet, and leaves ``outcome.json`` beside it.
 Whatever ends it earlier leaves no ``outcome.json``, and who started it says what the reason was.
 """
 
@@ -137,16 +137,16 @@ def _diagnosed(work: Work) -> MissionResult:
                     raise
                 raise first  # noqa: B904 - what the side file lacks, not what this one lacks without it
             first, text = first or error, str(error)
-            off = [path for path in paths[1:] if str(path) in text] or paths[1:]
+            unusable = [path for path in paths[1:] if str(path) in text] or paths[1:]
             for path in paths:
                 text = text.replace(str(path), path.name)
             left += [
                 f"{path.name} was left out: {text}"
                 if path.name in text
                 else f"{path.name} was left out, as nothing could be judged with it beside the recording ({text})"
-                for path in off
+                for path in unusable
             ]
-            paths = [path for path in paths if path not in off]
+            paths = [path for path in paths if path not in unusable]
 
 
 def _first_of(damage: list[str]) -> str:

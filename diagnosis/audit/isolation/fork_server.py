@@ -1,6 +1,6 @@
 """Fork server: a process that has imported and compiled everything once, and forks a child per mission.
 
-It has one thread, so that forking it is safe. It is told what to do over a socket, watches its children's time and
+It has one thread, so that forking it is safe. It gets its work over a socket, watches its children's time and
 memory, and when the socket closes, because the audit has ended in whichever way, it ends the children, removes their
 folders and ends itself.
 """
@@ -22,13 +22,12 @@ from contextlib import suppress
 from dataclasses import dataclass, field
 from multiprocessing.connection import Connection
 from pathlib import Path
-from typing import Any
 
 from diagnosis.audit.isolation import child
 from diagnosis.audit.isolation.child import Work
 from diagnosis.audit.isolation.limits import Limits, follow, held_mb
 
-LOOK_S = 0.05
+POLL_S = 0.05
 _STUCK_S = 10.0
 
 
@@ -70,7 +69,7 @@ class _Child:
     peak_mb: float = 0.0
 
 
-class Zygote:
+class ServerLoop:
     """The server's loop over requests and children."""
 
     def __init__(self, connection: Connection) -> None:
@@ -82,7 +81,7 @@ class Zygote:
         signal.signal(signal.SIGCHLD, lambda *_: None)
         signal.set_wakeup_fd(woken.fileno(), warn_on_full_buffer=False)
         self._woken = woken
-        self._ends: list[Any] = [connection, self._wake]
+        self._ends: list[Connection | socket.socket] = [connection, self._wake]
 
     def serve(self) -> None:
         """Serve until the other end closes."""
@@ -95,7 +94,7 @@ class Zygote:
             self._end_children()
 
     def _step(self) -> bool:
-        wait = LOOK_S if self._children else None
+        wait = POLL_S if self._children else None
         ready, _, _ = select.select(self._ends, [], [], wait)
         if self._wake in ready:
             with suppress(BlockingIOError):
@@ -199,5 +198,5 @@ def main(descriptor: int, parent: int, *, warmed: bool) -> None:
     follow(0)
     gc.collect()
     gc.freeze()
-    Zygote(Connection(descriptor)).serve()
+    ServerLoop(Connection(descriptor)).serve()
     os._exit(0)

@@ -14,7 +14,7 @@ from pathlib import Path
 
 from diagnosis.audit.isolation import child
 from diagnosis.audit.isolation.child import Work
-from diagnosis.audit.isolation.fork_server import LOOK_S, Ended, Stopped
+from diagnosis.audit.isolation.fork_server import POLL_S, Ended, Stopped
 from diagnosis.audit.isolation.limits import Limits, held_mb
 
 _TASK = "task.pickle"
@@ -59,7 +59,7 @@ class Spawner:
             if stopped or self.closed:
                 process.kill()
             with suppress(subprocess.TimeoutExpired):
-                process.wait(LOOK_S)
+                process.wait(POLL_S)
         self._running.discard(process)
         assert process.stdin is not None
         process.stdin.close()
@@ -98,5 +98,5 @@ def _watch_memory(most_mb: float) -> None:
         return
     unit = 1 << 20 if sys.platform == "darwin" else 1 << 10
     while resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / unit < most_mb or sys.platform == "linux":
-        time.sleep(LOOK_S)
+        time.sleep(POLL_S)
     os._exit(child.OUT_OF_MEMORY)

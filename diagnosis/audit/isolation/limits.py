@@ -1,7 +1,7 @@
 """What one mission may take of the machine, and how much a process has taken.
 
 On Linux the memory limit is held twice: the system refuses private memory past it (``RLIMIT_DATA``; ``RLIMIT_AS`` would
-count mapped logs too), which ends in a `MemoryError`, and who started the process looks at what it holds, shared memory
+count mapped logs too), which ends in a `MemoryError`, and who started the process watches what it holds, shared memory
 included, because not every library survives a refusal and not all memory is private.
 """
 

@@ -161,12 +161,12 @@ def _place(messages: str) -> str:
 
 
 class ForkServer:
-    """Children forked from a `zygote`; it is started with the first mission, and again if it was lost.
+    """Children forked from a process that has imported and compiled everything, `fork_server`; it is started with the first mission, and again if it was lost.
 
     Parameters
     ----------
     warmed : bool
-        Whether it runs a made-up mission first; without, it starts sooner and each child takes longer.
+        Whether it runs a short simulated mission first; without, it starts sooner and each child takes longer.
     """
 
     def __init__(self, *, warmed: bool = True) -> None:

@@ -1,4 +1,4 @@
-"""Places in an audit's folder: a run's own working folder, claims on missions, and reports that appear whole."""
+"""Places in an audit's folder: a run's own working folder, locks on missions, and reports that appear whole."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 
-from diagnosis.audit.store.claims import WORKING, Claim, cannot_write, claim_mission
 from diagnosis.audit.store.keys import Key
+from diagnosis.audit.store.locks import WORKING, FileLock, cannot_write, lock_mission
 
 MISSIONS, RESULTS = "missions", "results"
 _TEMPORARY = "mfhca-audit-"
@@ -24,7 +24,7 @@ _AT_FDCWD, _RENAME_EXCHANGE = -100, 2
 
 
 @dataclass(frozen=True)
-class Working:
+class RunFolders:
     """A run's own folders, gone after it.
 
     Attributes
@@ -40,7 +40,7 @@ class Working:
 
 
 @contextmanager
-def working(output: Path) -> Iterator[Working]:
+def run_folders(output: Path) -> Iterator[RunFolders]:
     """Make the run's own folders; remove them at the end, and those that runs ended by force have left.
 
     Raises
@@ -54,37 +54,37 @@ def working(output: Path) -> Iterator[Working]:
             for name in (MISSIONS, RESULTS, WORKING):
                 (output / name).mkdir(parents=True, exist_ok=True)
             sweep(output)
-            folder, claim = _own_folder(base, ending)
-            temporary = _own_temporary(claim.path, ending)
+            folder, lock = _own_folder(base, ending)
+            temporary = _own_temporary(lock.path, ending)
         except OSError as error:
             raise cannot_write(error, output) from error
-        yield Working(folder, temporary)
+        yield RunFolders(folder, temporary)
 
 
-def _own_folder(base: Path, ending: ExitStack) -> tuple[Path, Claim]:
+def _own_folder(base: Path, ending: ExitStack) -> tuple[Path, FileLock]:
     while True:
         folder = base / f"{os.getpid()}-{secrets.token_hex(4)}"
-        claim = Claim(base / f"{folder.name}.lock")
-        if claim.take():
-            ending.callback(claim.drop)
-            ending.callback(_unlink, claim.path)
+        lock = FileLock(base / f"{folder.name}.lock")
+        if lock.acquire():
+            ending.callback(lock.release)
+            ending.callback(_unlink, lock.path)
             ending.callback(shutil.rmtree, folder, ignore_errors=True)
             folder.mkdir()
-            return folder, claim
-        claim.drop()  # another run that sweeps was faster
+            return folder, lock
+        lock.release()  # another run that sweeps was faster
 
 
-def _own_temporary(told: Path, ending: ExitStack) -> Path:
+def _own_temporary(note: Path, ending: ExitStack) -> Path:
     while True:
         temporary = Path(tempfile.gettempdir()) / f"{_TEMPORARY}{secrets.token_hex(8)}"
-        told.write_bytes(os.fsencode(temporary))  # first, so that the next run finds it in any case
+        note.write_bytes(os.fsencode(temporary))  # first, so that the next run finds it in any case
         temporary.mkdir(0o700)
         ending.callback(shutil.rmtree, temporary, ignore_errors=True)
-        held = Claim(temporary / _HELD)
-        ending.callback(held.drop)
-        if held.take():
+        held = FileLock(temporary / _HELD)
+        ending.callback(held.release)
+        if held.acquire():
             return temporary
-        held.drop()  # another run that sweeps was faster
+        held.release()  # another run that sweeps was faster
 
 
 def _unlink(path: Path) -> None:
@@ -95,30 +95,30 @@ def _unlink(path: Path) -> None:
 def sweep(output: Path) -> None:
     """Remove what runs that were ended by force have left, of this output and of others: their locks are free."""
     base = output / WORKING
-    for lock in base.glob("*.lock"):
+    for path in base.glob("*.lock"):
         try:
-            claim = Claim(lock)
+            lock = FileLock(path)
         except OSError:
             continue
-        if claim.take():
+        if lock.acquire():
             with suppress(OSError):
-                temporary = Path(os.fsdecode(lock.read_bytes()).strip() or ".")
+                temporary = Path(os.fsdecode(path.read_bytes()).strip() or ".")
                 if temporary.name.startswith(_TEMPORARY):
                     shutil.rmtree(temporary, ignore_errors=True)
-                shutil.rmtree(lock.with_suffix(""), ignore_errors=True)
-                lock.unlink()
-        claim.drop()
+                shutil.rmtree(path.with_suffix(""), ignore_errors=True)
+                path.unlink()
+        lock.release()
     for folder in base.glob("[0-9]*-*"):  # a run makes its lock before its folder
         if folder.is_dir() and not folder.with_name(f"{folder.name}.lock").exists():
             shutil.rmtree(folder, ignore_errors=True)
     for held in Path(tempfile.gettempdir()).glob(f"{_TEMPORARY}*/{_HELD}"):
         try:
-            claim = Claim(held)
+            lock = FileLock(held)
         except OSError:  # another user's
             continue
-        if claim.take():
+        if lock.acquire():
             shutil.rmtree(held.parent, ignore_errors=True)
-        claim.drop()
+        lock.release()
 
 
 def publish(made: Path, place: Path, key: Key) -> None:
@@ -164,20 +164,20 @@ def holds_report(folder: Path, key: Key) -> bool:
 
 @contextmanager
 def own_report(output: Path, report: str, key: Key) -> Iterator[Path | None]:
-    """Claim a result's report to change it; None where another run is at its mission, or it is not there any more.
+    """Lock a result's report to change it; None where another run is at its mission, or it is not there any more.
 
     Raises
     ------
     OutputError
         Where the output cannot be written.
     """
-    claim = claim_mission(output, report.removeprefix(f"{MISSIONS}/"))
+    lock = lock_mission(output, report.removeprefix(f"{MISSIONS}/"))
     try:
         folder = output / report
-        yield folder if claim is not None and holds_report(folder, key) else None
+        yield folder if lock is not None and holds_report(folder, key) else None
     finally:
-        if claim is not None:
-            claim.drop()
+        if lock is not None:
+            lock.release()
 
 
 def _marked(key: Key) -> bytes:

@@ -19,8 +19,8 @@ from diagnosis.audit.store.database import Database
 from diagnosis.audit.store.keys import Key
 from diagnosis.audit.store.objects import Objects, attempt_name, encode
 from diagnosis.audit.store.outcome import MissionState, Outcome
+from diagnosis.audit.store.reason_template import ReasonTemplate, reason_template
 from diagnosis.audit.store.records import FileRecord, MissionRecord, ResultObject
-from diagnosis.audit.store.shared_reason import SharedReason, shared_reason
 from diagnosis.results.vocabulary import Verdict
 
 FILE_NAME = "fleet.sqlite"
@@ -96,7 +96,7 @@ class Store:
         self._real = os.path.realpath(self.folder)
         self.database = Database(path, read_only=read_only)
         self._objects = Objects(str(self.folder / RESULTS)) if objects and not read_only else None
-        self._reasons: dict[tuple[int, str], SharedReason] = {}
+        self._reasons: dict[tuple[int, str], ReasonTemplate] = {}
         self.run = int(self.database.rows("SELECT value FROM meta WHERE name = 'run'")[0][0])
 
     @classmethod
@@ -250,12 +250,12 @@ class Store:
         with self.database.transaction() as connection:
             records.write_document(connection, document, self.run)
 
-    def own_reason(self, result: int, reason: str, files: Sequence[str]) -> str:
+    def reason_for(self, result: int, reason: str, files: Sequence[str]) -> str:
         """Reason of a result for one of the missions that share it: it names that mission's files, not its copies'."""
         if (result, reason) not in self._reasons:
             rows = self.database.rows("SELECT files FROM mission WHERE result = ?", (result,))
-            self._reasons[result, reason] = shared_reason(reason, (json.loads(row[0]) for row in rows), self._real)
-        return self._reasons[result, reason].of(files)
+            self._reasons[result, reason] = reason_template(reason, (json.loads(row[0]) for row in rows), self._real)
+        return self._reasons[result, reason].for_files(files)
 
     def missions(self) -> list[StoredMission]:
         """All missions in the order of their names, those that are gone too."""

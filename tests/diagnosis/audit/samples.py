@@ -12,7 +12,7 @@ from diagnosis.audit.discovery.missions import MissionSource
 from diagnosis.audit.endings import Ending
 from diagnosis.audit.engines import Engine
 from diagnosis.audit.isolation.limits import Limits
-from diagnosis.audit.plan import Asked
+from diagnosis.audit.plan import AuditOptions
 from diagnosis.audit.session import audit
 
 JUDGE = "poison:judge"
@@ -37,12 +37,12 @@ def missions(folder: Path, *works: str) -> Discovery:
 Made = Callable[[], AbstractContextManager[Engine]]
 
 
-def asked_for(output: Path, **changes: object) -> Asked:
-    return Asked(output, **{"limits": LIMITS, "isolation": COLD, "judge": JUDGE, "retries": 0, **changes})  # type: ignore[arg-type]
+def asked_for(output: Path, **changes: object) -> AuditOptions:
+    return AuditOptions(output, **{"limits": LIMITS, "isolation": COLD, "judge": JUDGE, "retries": 0, **changes})  # type: ignore[arg-type]
 
 
 def run(
-    found: Discovery, asked: Asked, engine: Made | None = None, jobs: int = 2
+    found: Discovery, asked: AuditOptions, engine: Made | None = None, jobs: int = 2
 ) -> tuple[dict[str, Ending], list[tuple[str, str]]]:
     """Audit; give the missions' ends by name, and the events about missions."""
     events: list[tuple[str, str]] = []

@@ -9,9 +9,9 @@ from typing import Any
 import pytest
 
 from diagnosis.audit.previous_pages import compare_newest
-from diagnosis.audit.store.claims import claim_mission
 from diagnosis.audit.store.folders import mark_report
 from diagnosis.audit.store.keys import Key
+from diagnosis.audit.store.locks import lock_mission
 from diagnosis.audit.store.store import Store
 from diagnosis.output import write_result
 from diagnosis.results.result import MissionResult
@@ -78,7 +78,7 @@ def test_a_report_of_another_result_is_not_compared(store: Path, name: str) -> N
 
 
 def test_a_report_that_another_audit_makes_anew_is_left_to_it(store: Path) -> None:
-    claim = claim_mission(store.parent, "new")
+    claim = lock_mission(store.parent, "new")
     assert claim is not None
     assert compare(store, "new") == []
     assert "previous" not in document(store, "new")

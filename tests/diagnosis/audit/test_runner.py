@@ -16,9 +16,9 @@ from diagnosis.audit.endings import Ending, command, exit_code, quoted
 from diagnosis.audit.isolation.limits import Limits
 from diagnosis.audit.plan import Planned
 from diagnosis.audit.session import audit, overview
-from diagnosis.audit.store.claims import claim_mission
 from diagnosis.audit.store.folders import publish, working
 from diagnosis.audit.store.keys import Key
+from diagnosis.audit.store.locks import lock_mission
 from diagnosis.audit.store.store import Store
 from diagnosis.audit.task import named
 from replay.errors import OutputError
@@ -141,13 +141,13 @@ def test_two_audits_of_one_folder_share_the_work(tmp_path: Path) -> None:
 
 
 def test_a_claim_is_for_one(tmp_path: Path) -> None:
-    first = claim_mission(tmp_path, "a")
+    first = lock_mission(tmp_path, "a")
     assert first is not None
-    assert claim_mission(tmp_path, "a") is None
-    other = claim_mission(tmp_path, "b")
+    assert lock_mission(tmp_path, "a") is None
+    other = lock_mission(tmp_path, "b")
     assert other is not None
     first.drop()
-    again = claim_mission(tmp_path, "a")
+    again = lock_mission(tmp_path, "a")
     assert again is not None
     other.drop()
     again.drop()

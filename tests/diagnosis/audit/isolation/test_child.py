@@ -16,7 +16,7 @@ import pytest
 
 from diagnosis.audit.isolation import fork_server
 from diagnosis.audit.isolation.child import Work
-from diagnosis.audit.isolation.fork_server import Ended, Stopped, Zygote, _Child
+from diagnosis.audit.isolation.fork_server import Ended, ServerLoop, Stopped, _Child
 from diagnosis.audit.isolation.fresh_process import Spawner
 from diagnosis.audit.isolation.limits import Limits
 from diagnosis.audit.isolation.run import ForkServer, Isolation, run_isolated
@@ -152,7 +152,7 @@ def _made(folder: Path) -> Path:
 
 def test_a_child_that_does_not_die_is_answered_for_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     told: list[tuple[int, Ended]] = []
-    server = Zygote.__new__(Zygote)
+    server = ServerLoop.__new__(ServerLoop)
     server._connection = SimpleNamespace(send=told.append)  # type: ignore[assignment]
     one = _Child(7, work_of("hang", tmp_path), Limits(wall_s=1.0), 0.0, start=time.monotonic() - 2.0)
     server._children = {os.getpid(): one}

@@ -1,4 +1,4 @@
-"""Reasons of results that several missions share, in terms of each one's own files."""
+"""Reasons of results that copies of a mission share: the files that a reason names are replaced by each copy's own."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 
 @dataclass(frozen=True)
-class SharedReason:
+class ReasonTemplate:
     """A reason, and the files that it names.
 
     Attributes
@@ -23,16 +23,16 @@ class SharedReason:
     text: str
     named: tuple[tuple[str, int], ...]
 
-    def of(self, shown: Sequence[str]) -> str:
+    def for_files(self, shown: Sequence[str]) -> str:
         """The reason for a mission whose files are shown like this."""
         text = self.text
-        for said, place in self.named:
+        for path, place in self.named:
             if place < len(shown):
-                text = _as_word(said).sub(lambda _, own=shown[place]: own, text)  # type: ignore[misc]
+                text = _as_word(path).sub(lambda _, own=shown[place]: own, text)  # type: ignore[misc]
         return text
 
 
-def shared_reason(reason: str, theirs: Iterable[Sequence[str]], folder: str) -> SharedReason:
+def reason_template(reason: str, theirs: Iterable[Sequence[str]], folder: str) -> ReasonTemplate:
     """Find which of the missions' files a reason names.
 
     Parameters
@@ -50,10 +50,10 @@ def shared_reason(reason: str, theirs: Iterable[Sequence[str]], folder: str) -> 
             if "://" in path or os.path.basename(path) not in reason:  # noqa: PTH119
                 continue
             whole = whole_path(folder, path)
-            for said in (whole, os.path.relpath(whole)):
-                if said in reason and _as_word(said).search(reason):
-                    named.setdefault(said, place)
-    return SharedReason(reason, tuple(named.items()))
+            for name in (whole, os.path.relpath(whole)):
+                if name in reason and _as_word(name).search(reason):
+                    named.setdefault(name, place)
+    return ReasonTemplate(reason, tuple(named.items()))
 
 
 def whole_path(folder: str, path: str) -> str:

@@ -1,4 +1,4 @@
-"""Claims on what only one audit of an output may do at a time: file locks that end with their holder."""
+"""Locks on what only one audit of an output may do at a time; they end with their holder."""
 
 from __future__ import annotations
 
@@ -14,18 +14,18 @@ from typing import IO
 from replay.errors import OutputError
 
 WORKING = ".work"
-_LOOK_S = 0.05
+_POLL_S = 0.05
 
 
-class Claim:
+class FileLock:
     """A file lock that the system lets go of when its holder ends, however that happens."""
 
     def __init__(self, path: Path) -> None:
         self._file: IO[bytes] = path.open("ab")
         self.path = path
 
-    def take(self) -> bool:
-        """Take it unless another process holds it."""
+    def acquire(self) -> bool:
+        """Acquire it unless another process holds it."""
         try:
             if sys.platform == "win32":
                 import msvcrt
@@ -42,13 +42,13 @@ class Claim:
             return False
         return True
 
-    def drop(self) -> None:
-        """Let go of it."""
+    def release(self) -> None:
+        """Release it."""
         self._file.close()
 
 
-def claim_mission(output: Path, name: str) -> Claim | None:
-    """Claim a mission for this run; None where another run on the same output is at it.
+def lock_mission(output: Path, name: str) -> FileLock | None:
+    """FileLock a mission for this run; None where another run on the same output is at it.
 
     Raises
     ------
@@ -58,17 +58,17 @@ def claim_mission(output: Path, name: str) -> Claim | None:
     folder = output / WORKING / "claims"
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        claim = Claim(folder / hashlib.sha256(name.encode("utf-8", "surrogateescape")).hexdigest()[:24])
+        lock = FileLock(folder / hashlib.sha256(name.encode("utf-8", "surrogateescape")).hexdigest()[:24])
     except OSError as error:
         raise cannot_write(error, output) from error
-    if claim.take():
-        return claim
-    claim.drop()
+    if lock.acquire():
+        return lock
+    lock.release()
     return None
 
 
 @contextmanager
-def alone(output: Path, name: str, patience_s: float) -> Iterator[None]:
+def exclusively(output: Path, name: str, patience_s: float) -> Iterator[None]:
     """Do something that only one audit of an output may do at a time; after `patience_s` it is done all the same.
 
     Raises
@@ -77,15 +77,15 @@ def alone(output: Path, name: str, patience_s: float) -> Iterator[None]:
         Where the output cannot be written.
     """
     end = time.monotonic() + patience_s
-    claim = claim_mission(output, name)
-    while claim is None and time.monotonic() < end:
-        time.sleep(_LOOK_S)
-        claim = claim_mission(output, name)
+    lock = lock_mission(output, name)
+    while lock is None and time.monotonic() < end:
+        time.sleep(_POLL_S)
+        lock = lock_mission(output, name)
     try:
         yield
     finally:
-        if claim is not None:
-            claim.drop()
+        if lock is not None:
+            lock.release()
 
 
 def cannot_write(error: OSError, path: Path) -> OutputError:
