@@ -82,7 +82,7 @@ def test_a_report_that_another_audit_makes_anew_is_left_to_it(store: Path) -> No
     assert claim is not None
     assert compare(store, "new") == []
     assert "previous" not in document(store, "new")
-    claim.drop()
+    claim.release()
     compare(store, "new")
     assert "previous" in document(store, "new")
 

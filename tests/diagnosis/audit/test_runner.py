@@ -16,7 +16,7 @@ from diagnosis.audit.endings import Ending, command, exit_code, quoted
 from diagnosis.audit.isolation.limits import Limits
 from diagnosis.audit.plan import Planned
 from diagnosis.audit.session import audit, overview
-from diagnosis.audit.store.folders import publish, working
+from diagnosis.audit.store.folders import publish, run_folders
 from diagnosis.audit.store.keys import Key
 from diagnosis.audit.store.locks import lock_mission
 from diagnosis.audit.store.store import Store
@@ -146,11 +146,11 @@ def test_a_claim_is_for_one(tmp_path: Path) -> None:
     assert lock_mission(tmp_path, "a") is None
     other = lock_mission(tmp_path, "b")
     assert other is not None
-    first.drop()
+    first.release()
     again = lock_mission(tmp_path, "a")
     assert again is not None
-    other.drop()
-    again.drop()
+    other.release()
+    again.release()
 
 
 def test_a_report_takes_the_place_of_an_earlier_one(tmp_path: Path) -> None:
@@ -166,9 +166,9 @@ def test_what_a_killed_run_left_is_removed_by_the_next(tmp_path: Path) -> None:
     left = tmp_path / ".work" / "1-abc"
     left.mkdir(parents=True)
     (tmp_path / ".work" / "1-abc.lock").touch()
-    with working(tmp_path) as place:
+    with run_folders(tmp_path) as place:
         assert not left.exists()
-        with working(tmp_path) as beside:  # one at work is left alone
+        with run_folders(tmp_path) as beside:  # one at work is left alone
             assert place.folder.is_dir()
             assert beside.folder != place.folder
     assert not place.temporary.exists()
@@ -293,7 +293,7 @@ def test_what_killed_runs_left_is_removed_also_where_nothing_is_to_do(
         (folder / "data").write_bytes(b"1")
     (work / "7-ab.lock").write_text(str(tmp_path / "mfhca-audit-1"), encoding="utf-8")
     (tmp_path / "mfhca-audit-2" / ".held").touch()
-    with working(tmp_path / "other") as live:
+    with run_folders(tmp_path / "other") as live:
         _, events = run(found, asked_for(tmp_path / "out"))
         assert live.folder.is_dir()
         assert [p.name for p in tmp_path.glob("mfhca-audit-*")] == [live.temporary.name]

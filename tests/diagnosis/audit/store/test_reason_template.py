@@ -12,8 +12,8 @@ FILES = [[f"logs/m{i}.mcap", f"logs/m{i}.csv"] for i in range(1000)]
 def test_each_mission_is_told_of_its_own_files() -> None:
     reason = "/data/logs/m10.csv: 3 columns, 4 expected; /data/logs/m10.mcap is whole"
     shared = reason_template(reason, FILES, "/data")
-    assert shared.of(["a.mcap", "b.csv"]) == "b.csv: 3 columns, 4 expected; a.mcap is whole"
-    assert shared.of(["a.mcap"]) == "/data/logs/m10.csv: 3 columns, 4 expected; a.mcap is whole"
+    assert shared.for_files(["a.mcap", "b.csv"]) == "b.csv: 3 columns, 4 expected; a.mcap is whole"
+    assert shared.for_files(["a.mcap"]) == "/data/logs/m10.csv: 3 columns, 4 expected; a.mcap is whole"
 
 
 def test_paths_from_where_the_audit_runs_are_known_too() -> None:
