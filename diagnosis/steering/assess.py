@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from diagnosis.evidence import Part
 from diagnosis.results.assessment import CODE, Assessment, unassessed
 from diagnosis.results.vocabulary import Tier
 from diagnosis.steering.blocks import SteeringBlocks
@@ -28,7 +29,6 @@ from replay.signals.timeline import Timeline
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
-Key = tuple[str, str]
 
 _SIDES = (Side.SENSOR, Side.ACTUATOR)
 
@@ -48,7 +48,7 @@ class SteeringResult:
         Where that estimate rests on a model or on a sensor that was not judged healthy.
     """
 
-    assessments: dict[Key, Assessment]
+    assessments: dict[Part, Assessment]
     angle: Array
     doubtful: Flags
 
@@ -77,7 +77,7 @@ def assess_steering(
     """
     axles = [axle_inputs(timeline, replay, machine, j, counts) for j in range(len(machine.axles))]
     plants = _plants(axles, machine, progress)
-    assessments: dict[Key, Assessment] = {}
+    assessments: dict[Part, Assessment] = {}
     angles: list[Array] = []
     doubts: list[Flags] = []
     for inputs in axles:
@@ -146,10 +146,10 @@ def _note(axle: AxleFilter) -> str:
 def _assessment(side: Side, inputs: AxleInputs, judged: _Judged | None) -> Assessment:
     """One side by the model, or why it is not judged."""
     size = inputs.timeline.size
-    if side is Side.SENSOR and "phi" not in inputs.have:
+    if side is Side.SENSOR and "phi" not in inputs.logged:
         return unassessed(size, State.NO_DATA, "the steering angle is not in the log")
     if side is Side.ACTUATOR:
-        if not {"u", "u_applied", "phi"} & inputs.have:
+        if not {"u", "u_applied", "phi"} & inputs.logged:
             return unassessed(size, State.NO_DATA, "the steering valve's command is not in the log")
         if inputs.command_missing:
             return unassessed(size, State.NOT_ASSESSED, "the valve's position is logged but not its command")

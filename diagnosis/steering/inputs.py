@@ -33,8 +33,8 @@ class AxleInputs:
         The axle.
     timeline : Timeline
         The aligned mission.
-    have : frozenset[str]
-        Leaves that are logged: ``phi``, ``phi_true``, ``u``, ``u_applied``.
+    logged : frozenset[str]
+        Leaves in the log: ``phi``, ``phi_true``, ``u``, ``u_applied``.
     command : Array, shape (n,)
         Valve opening [fraction]: the command, else the opening itself, else what the replayed loop commands.
     blocks : SteeringBlocks or None
@@ -47,7 +47,7 @@ class AxleInputs:
 
     name: str
     timeline: Timeline
-    have: frozenset[str]
+    logged: frozenset[str]
     command: Array
     blocks: SteeringBlocks | None = None
     noise: SensorNoise = _NO_NOISE
@@ -56,7 +56,7 @@ class AxleInputs:
     @property
     def measured(self) -> str:
         """Leaf of the angle that is judged: the sensor's, else the second one's."""
-        return "phi" if "phi" in self.have else "phi_true"
+        return "phi" if "phi" in self.logged else "phi_true"
 
     @property
     def angle(self) -> Array:
@@ -71,17 +71,17 @@ class AxleInputs:
     @property
     def angle_redundant(self) -> bool:
         """Whether a second angle is logged."""
-        return {"phi", "phi_true"} <= self.have
+        return {"phi", "phi_true"} <= self.logged
 
     @property
     def valve_redundant(self) -> bool:
         """Whether the valve's opening is logged beside its command."""
-        return {"u", "u_applied"} <= self.have
+        return {"u", "u_applied"} <= self.logged
 
     @property
     def command_missing(self) -> bool:
         """Whether the valve's opening is logged but not its command."""
-        return "u_applied" in self.have and "u" not in self.have
+        return "u_applied" in self.logged and "u" not in self.logged
 
     @property
     def redundant(self) -> bool:
@@ -91,7 +91,7 @@ class AxleInputs:
     @property
     def names(self) -> tuple[str, str]:
         """Channels of angle and command."""
-        return self.channel(self.measured), self.channel("u" if "u" in self.have else "u_applied")
+        return self.channel(self.measured), self.channel("u" if "u" in self.logged else "u_applied")
 
     def channel(self, leaf: str) -> str:
         """Canonical name."""
@@ -99,7 +99,7 @@ class AxleInputs:
 
     def values(self, leaf: str) -> Array:
         """Values on the timeline; NaN where it is not logged."""
-        if leaf in self.have:
+        if leaf in self.logged:
             return self.timeline.signals[self.channel(leaf)]
         return np.broadcast_to(np.nan, (self.timeline.size,))
 
@@ -118,12 +118,12 @@ def axle_inputs(timeline: Timeline, replay: Replay, machine: Machine, axle: int,
     """
     name = machine.axles[axle]
     found = {leaf: timeline.get(f"steer.{name}.{leaf}") for leaf in _LEAVES}
-    have = frozenset(leaf for leaf, x in found.items() if x is not None and bool(np.isfinite(x).any()))
-    u = found["u"] if "u" in have else found["u_applied"]
+    logged = frozenset(leaf for leaf, x in found.items() if x is not None and bool(np.isfinite(x).any()))
+    u = found["u"] if "u" in logged else found["u_applied"]
     if u is None or not np.isfinite(u).any():
         u = replay.steer_u[:, axle]
-    inputs = AxleInputs(name, timeline, have, u)
-    if inputs.measured not in have or not np.isfinite(u).any():
+    inputs = AxleInputs(name, timeline, logged, u)
+    if inputs.measured not in logged or not np.isfinite(u).any():
         return inputs
     return _with_blocks(inputs, machine, counts)
 

@@ -12,6 +12,7 @@ from diagnosis.steering.model_bank import (
     ACTUATOR,
     COLOURED,
     HEALTHY,
+    HEALTHY_MODEL,
     INEFFICIENT,
     MODES,
     NO_SIGNAL,
@@ -81,7 +82,7 @@ def evidence_of_explanations(
                 found = Explanation(Side.ACTUATOR, NO_SIGNAL)
             out[found] = max(evidence, out.get(found, -np.inf))
     if NO_FAULT not in out:
-        trial[a:b] = 0
+        trial[a:b] = HEALTHY_MODEL
         out[NO_FAULT] = run_out_evidence(axle, known, trial, a, b)
     return out
 

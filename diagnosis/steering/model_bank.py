@@ -33,6 +33,9 @@ _MODELS = [*_SINGLE, *_DOUBLE, *_HIDDEN]
 SENSOR = np.array([sensor for sensor, _ in _MODELS])
 ACTUATOR = np.array([actuator for _, actuator in _MODELS])
 MODELS = len(_MODELS)
+#: Models that have nothing to learn: of the healthy axle, and of the sensor without signal.
+HEALTHY_MODEL = _MODELS.index((HEALTHY, HEALTHY))
+NO_SIGNAL_MODEL = _MODELS.index((NO_SIGNAL, HEALTHY))
 #: From this model on only a redundant measurement tells the two faults apart.
 FIRST_HIDDEN = len(_SINGLE) + len(_DOUBLE)
 STATES = 6

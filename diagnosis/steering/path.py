@@ -12,7 +12,7 @@ from diagnosis.estimation.fault_models import PAIR, STAY, trace
 from diagnosis.steering import path_kernel
 from diagnosis.steering.blocks import SteeringBlocks
 from diagnosis.steering.filter_state import Array, BlockSeries, FilterBank, SteeringPath
-from diagnosis.steering.model_bank import ACTUATOR, FIRST_HIDDEN, HEALTHY, MODELS, SENSOR, STATES
+from diagnosis.steering.model_bank import ACTUATOR, FIRST_HIDDEN, HEALTHY, HEALTHY_MODEL, MODELS, SENSOR, STATES
 from diagnosis.steering.models import FilterConstants, SteeringModel
 from replay.arrays.spill import scratch
 
@@ -69,7 +69,7 @@ def allowed_models(*, sensor: bool, actuator: bool, redundant: bool) -> NDArray[
 def start_states(first: float, constants: FilterConstants) -> tuple[Array, FilterBank]:
     """Scores and states of all models before the first block of a mission that may begin with a fault."""
     score = np.full(MODELS, -0.5 * constants.switch_cost)
-    score[0] = 0.0
+    score[HEALTHY_MODEL] = 0.0
     bank = path_kernel.empty_bank()
     for m in range(MODELS):
         path_kernel.start(m, first, constants, bank)

@@ -16,12 +16,23 @@ from diagnosis.steering.filter_state import (
     RedundantBlock,
     SteeringPath,
 )
-from diagnosis.steering.model_bank import ACTUATOR, MODELS, NO_SIGNAL, NOISY, SENSOR, STATES, STUCK
+from diagnosis.steering.model_bank import (
+    ACTUATOR,
+    HEALTHY_MODEL,
+    MODELS,
+    NO_SIGNAL,
+    NO_SIGNAL_MODEL,
+    NOISY,
+    SENSOR,
+    STATES,
+    STUCK,
+)
 from diagnosis.steering.models import FilterConstants
 from diagnosis.steering.step_kernel import advance, enter
 from replay.arrays.numeric import uncounted
 
-_LEARNING_COST = 8.0
+_LEARNING_COST = 8.0  # what a model whose states are yet to be learnt must gain to be entered [log-likelihood]
+_NOISE_COST = 3.0  # of one kind of noise after the other [log-likelihood]
 
 
 @njit(cache=True, error_model="numpy")
@@ -31,7 +42,7 @@ def switch_cost(m: int, old: int, constants: FilterConstants) -> float:
     cost = constants.switch_cost
     out = 0.0
     if s != s0:
-        out += 3.0 if s >= NOISY and s0 >= NOISY else cost
+        out += _NOISE_COST if s >= NOISY and s0 >= NOISY else cost
     if ACTUATOR[m] != ACTUATOR[old]:
         out += 0.0 if s in (STUCK, NO_SIGNAL) and not constants.redundant else cost
     return out
@@ -79,7 +90,7 @@ def scan(
                 if m == best or not allowed[m]:
                     continue
                 cost = switch_cost(m, best, constants)
-                learning = 0.0 if m == 0 or m == 2 else _LEARNING_COST
+                learning = 0.0 if m in (HEALTHY_MODEL, NO_SIGNAL_MODEL) else _LEARNING_COST
                 if top - cost - learning > score[m]:
                     score[m] = top - cost
                     back[k, m] = best

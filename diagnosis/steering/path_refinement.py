@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from diagnosis.steering.filter_state import SteeringPath
+from diagnosis.steering.model_bank import HEALTHY_MODEL
 from diagnosis.steering.path import AxleFilter, Models, evidence_of, follow_path
 
 _RUN_OUT_S = 0.7
@@ -38,11 +39,11 @@ def refine_path(axle: AxleFilter, models: Models) -> SteeringPath:
     """Refine a path and follow it; see the module's docstring."""
     models = models.copy()
     dt = axle.blocks.dt
-    for a, b, faulty in list(runs_of((models != 0).astype(np.int64))):
+    for a, b, faulty in list(runs_of((models != HEALTHY_MODEL).astype(np.int64))):
         if faulty == 0 and a > 0 and b < models.size and (b - a) * dt < _GAP_S:
             models[a:b] = models[a - 1]
     known = follow_path(axle, models)
-    for a, b, faulty in list(runs_of((models != 0).astype(np.int64))):
+    for a, b, faulty in list(runs_of((models != HEALTHY_MODEL).astype(np.int64))):
         if faulty:
             _unify(axle, known, models, a, b)
             _merge(axle, known, models, a, b)

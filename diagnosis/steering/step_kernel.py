@@ -65,7 +65,7 @@ def enter(m: int, old: int, constants: FilterConstants, bank: FilterBank) -> Non
 
 @njit(cache=True, error_model="numpy")
 def _enter_actuator(m: int, constants: FilterConstants, z: Array, P: Array) -> None:
-    """Prior of a valve's gain a and rate b."""
+    """Prior of a valve's gain a and rate b: 0.5 ± 0.25 of an inefficient one, 0.6 ± 0.15 of a disturbed one."""
     a, rate_limit, rate_error = ACTUATOR[m], constants.axle.rate_limit, constants.axle.rate_error
     z[m, 2] = 1.0
     P[m, 3, 3] = rate_error * rate_error
@@ -81,7 +81,7 @@ def _enter_actuator(m: int, constants: FilterConstants, z: Array, P: Array) -> N
 
 @njit(cache=True, error_model="numpy")
 def _enter_sensor(m: int, constants: FilterConstants, bank: FilterBank) -> None:
-    """Prior of a sensor's gain d, offset c and noise."""
+    """Prior of a sensor's gain d, offset c and noise: d is 0.5 ± 0.25 if inefficient, 0.65 ± 0.15 if noisy."""
     z, P, noise = bank.mean, bank.cov, bank.noise
     s, stop, white = SENSOR[m], constants.axle.stop, constants.sensor.white
     z[m, 4] = 1.0
