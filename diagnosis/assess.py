@@ -8,11 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from diagnosis.channels.frozen import frozen_sensor, frozen_speeds
-from diagnosis.channels.liveness import alive, alive_sources
+from diagnosis.channels.liveness import alive_sources
 from diagnosis.direct.assess import assess_pair
 from diagnosis.direct.inputs import Pair, make_pair
 from diagnosis.drives.assess import assess_drive
-from diagnosis.drives.inputs import DriveData
+from diagnosis.drives.inputs import drive_data
 from diagnosis.drives.tracking import assess_tracking
 from diagnosis.results.assessment import Assessment, unassessed
 from diagnosis.steering.assess import assess_steering
@@ -23,7 +23,7 @@ from replay.arrays.numeric import without_nan
 from replay.arrays.spill import beside, in_blocks, keep
 from replay.control.loop import Replay
 from replay.faults import Side, State
-from replay.machine.config import Machine, Noise
+from replay.machine.config import Machine
 from replay.progress import Progress, Stage, Subscriber
 from replay.signals.timeline import Timeline
 
@@ -177,30 +177,13 @@ class _Wheel:
         wheel, command = self.machine.wheels[self.index], self.replay.v_ref[:, self.index]
         if not np.isfinite(command).any():
             return None
-        names = (self.name("v"), self.name("v_ref"), self.name("u"))
-        if np.isfinite(self.values("u")).any():
+        drive = drive_data(self.timeline, command, self.machine, wheel, self.counts)
+        if drive is not None:
             if self.machine.geometry is not None and wheel not in self.machine.drives:
                 # wheels of one body under one pump push each other: alone, none of them can be told from the others
                 why = "no model of the wheels could be found in this mission"
                 found = unassessed(self.timeline.size, State.NOT_ASSESSED, why)
                 return found, found
-            return assess_drive(
-                DriveData(
-                    y=self.values("v"),
-                    y_fresh=self.timeline.fresh[names[0]],
-                    alive=alive(self.timeline, self.counts, names[0]),
-                    command=command,
-                    u=self.values("u"),
-                    dt=self.timeline.dt,
-                    model=self.machine.drives.get(wheel),
-                    span=self.span("v"),
-                    u_max=self.machine.control.u_max,
-                    lsb=self.machine.noise.get(names[0], Noise()).lsb,
-                    names=names,
-                    open_loop=self.timeline.open_loop,
-                ),
-                self.machine.limits,
-            )
-        return assess_tracking(
-            self.values("v"), command, self.timeline.dt, self.machine.limits, (names[0], "its command")
-        )
+            return assess_drive(drive, self.machine.limits)
+        names = (self.name("v"), "its command")
+        return assess_tracking(self.values("v"), command, self.timeline.dt, self.machine.limits, names)

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from diagnosis.assess import ComponentResult, assess_components
-from diagnosis.channels.recording_gaps import holes_of, without_holes
+from diagnosis.channels.recording_gaps import recording_gaps, without_gaps
 from diagnosis.decision import metrics, quality
 from diagnosis.report_document import Judged, machine_row, report_of_mission
 from diagnosis.results.assessment import Assessment
@@ -135,8 +135,8 @@ def _diagnosed(
     publish(Progress(Stage.REPLAYING_LOOP))
     replay = replay_loop(mission.timeline, machine, bucket_of(mission.timeline.size))
     found = assess_components(mission.timeline, replay, machine, chosen, publish)
-    holes = holes_of(mission.timeline)
-    judged = {key: without_holes(a, holes, mission.timeline) for key, a in found.assessments.items()}
+    gaps = recording_gaps(mission.timeline)
+    judged = {key: without_gaps(a, gaps, mission.timeline) for key, a in found.assessments.items()}
     found = replace(found, assessments=judged)
     _require_something(found.assessments, mission, machine)
     publish(Progress(Stage.DECIDING))

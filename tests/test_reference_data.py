@@ -10,8 +10,8 @@ import pandas as pd
 import pytest
 
 from diagnosis.drives.assess import assess_drive
-from diagnosis.drives.inputs import DriveData
-from diagnosis.fitting.drives import drive_data, fit_drives
+from diagnosis.drives.inputs import DriveData, drive_data
+from diagnosis.fitting.drives import fit_drives
 from diagnosis.pipeline import diagnose, diagnose_signals
 from diagnosis.results.result import MissionResult
 from replay.control.loop import replay_loop

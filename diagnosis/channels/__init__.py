@@ -1,1 +1,1 @@
-"""What one channel tells alone: liveness, noise, repeats, gaps."""
+"""What one channel shows alone: liveness, status of samples, noise, gaps."""

@@ -1,4 +1,4 @@
-"""Flags that noise makes flicker, made steady."""
+"""Debouncing of flags that noise makes flicker."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ Flags = NDArray[np.bool_]
 FLICKER_S = 0.1  # neither standstill nor slip is a state of milliseconds
 
 
-def steadied(flags: Flags, gap: int, least: int) -> Flags:
+def debounced(flags: Flags, gap: int, least: int) -> Flags:
     """Flags without short gaps and, after that, without short runs.
 
     Parameters
     ----------
     flags : NDArray[np.bool_], shape (n,)
-        What flickers.
+        What flickers with the noise.
     gap : int
         Gaps between two runs that are shorter [samples] are filled.
     least : int

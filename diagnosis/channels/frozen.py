@@ -1,4 +1,4 @@
-"""Speed sensors that say the same number through a whole mission while the machine drives: no filter is needed for them.
+"""Speed sensors that give one value through a whole mission while the machine drives: no filter is needed for them.
 
 Left to the wheel model such a sensor would have no healthy time to be identified in, and would pull the other wheels along.
 """
@@ -24,7 +24,7 @@ _SAMPLES = 1 << 16
 
 
 def frozen_speeds(v: Array, v_ref: Array, driving_speed: float, dt: float) -> dict[int, float]:
-    """Wheels whose speed never changed although they were commanded to move and others did, with the number they say.
+    """Wheels whose speed never changed although they were commanded to move and others did, with the value that they give.
 
     Parameters
     ----------
@@ -51,16 +51,16 @@ def frozen_speeds(v: Array, v_ref: Array, driving_speed: float, dt: float) -> di
 
 
 def frozen_sensor(y: Array, value: float, others: Array, name: str, dt: float) -> Assessment:
-    """Judge such a sensor: stuck, or without signal where it says nothing but zero.
+    """Judge such a sensor: stuck, or without signal where that value is zero.
 
     Zero is also what a wheel reads that stands still, unless the other sensors' noise shows even then.
 
     Parameters
     ----------
     y : Array, shape (n,)
-        What it says [m/s]; NaN where there is no sample.
+        Its readings [m/s]; NaN where there is no sample.
     value : float
-        The number [m/s].
+        The value [m/s].
     others : Array, shape (n, k)
         Speeds of the other wheels [m/s].
     name : str
@@ -74,8 +74,8 @@ def frozen_sensor(y: Array, value: float, others: Array, name: str, dt: float) -
     mode = FaultMode.STUCK if value else FaultMode.NO_SIGNAL
     states[start:stop] = CODE[State(mode.value)]
     p = _SURE if value or _noisy(others, dt) else _LIKELY
-    silent = Hypothesis("actuator", "no_signal", 1.0 - p)
-    said = (
+    silent = Hypothesis(Side.ACTUATOR.value, FaultMode.NO_SIGNAL.value, 1.0 - p)
+    sentences = (
         f"{name} said {value:.4g} m/s in all {known.size} samples of the mission, while the wheel was commanded to drive and "
         "other wheels moved.",
         *(() if p == _SURE else ("A wheel that stands still reads the same: its drive may be dead instead.",)),
@@ -86,10 +86,10 @@ def frozen_sensor(y: Array, value: float, others: Array, name: str, dt: float) -
         side=Side.SENSOR,
         mode=mode,
         probability=p,
-        hypotheses=(Hypothesis("sensor", mode.value, p), silent),
+        hypotheses=(Hypothesis(Side.SENSOR.value, mode.value, p), silent),
         epsilon=Epsilon(1.0, 1.0, 1.0),
         sat=Sat(value, abs(value), value, value, "m/s"),
-        evidence=said,
+        evidence=sentences,
         tier=Tier.SIGNAL,
         detected=min(stop - 1, start + round(_LEAST_S / dt)),
     )

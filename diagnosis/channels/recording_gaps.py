@@ -15,12 +15,12 @@ from replay.faults import State
 from replay.signals.timeline import Timeline
 
 _LEAST_S = 0.25
-_PERIODS = 10  # a hole lasts for more than so many periods of the slowest wheel or steering signal
+_PERIODS = 10  # a gap lasts for more than so many periods of the slowest wheel or steering signal
 _LEAST_SEEN = 0.5  # share of a fault's time of which something must have been recorded
-Hole = tuple[int, int]
+Gap = tuple[int, int]
 
 
-def holes_of(timeline: Timeline) -> list[Hole]:
+def recording_gaps(timeline: Timeline) -> list[Gap]:
     """Steps [start, stop) between two samples of any signal that are too far apart to be its rhythm."""
     slow = [p for n, p in timeline.periods_ns.items() if n.startswith(("wheel.", "steer.")) and p > 0]
     least = max(round(_LEAST_S / timeline.dt), _PERIODS * max(slow, default=0) // timeline.step_ns, 2)
@@ -39,19 +39,19 @@ def holes_of(timeline: Timeline) -> list[Hole]:
     return found
 
 
-def without_holes(assessment: Assessment, holes: Sequence[Hole], timeline: Timeline) -> Assessment:
-    """Leave nothing judged in the holes: their state is `no_data`, faults end where they begin.
+def without_gaps(assessment: Assessment, gaps: Sequence[Gap], timeline: Timeline) -> Assessment:
+    """Leave nothing judged in the gaps: their state is `no_data`, faults end where they begin.
 
-    A fault that reached into a hole ends at its edge and says so; one that was hardly seen outside is dropped.
+    A fault that reached into a gap ends at its edge and says so; one that was hardly seen outside is dropped.
     """
-    if not holes:
+    if not gaps:
         return assessment
     states = assessment.states.copy()
-    for start, stop in holes:
+    for start, stop in gaps:
         states[start:stop] = CODE[State.NO_DATA]
     kept = []
     for finding in assessment.findings:
-        cut = _cut(finding, holes, timeline.dt)
+        cut = _cut(finding, gaps, timeline.dt)
         if cut is None:
             mine = states[finding.start : finding.stop]
             mine[mine == CODE[State(finding.mode.value)]] = CODE[State.NOT_ASSESSED]
@@ -63,39 +63,41 @@ def without_holes(assessment: Assessment, holes: Sequence[Hole], timeline: Timel
         states=states,
         findings=tuple(kept),
         reasons=reasons,
-        columns={name: _blank(column, holes, timeline.size) for name, column in assessment.columns.items()},
+        columns={name: _blank(column, gaps, timeline.size) for name, column in assessment.columns.items()},
     )
 
 
-def _cut(finding: Finding, holes: Sequence[Hole], dt: float) -> Finding | None:
+def _cut(finding: Finding, gaps: Sequence[Gap], dt: float) -> Finding | None:
     start, stop = finding.start, finding.stop
-    inside = [(a, b) for a, b in holes if a < stop and b > start]
+    inside = [(a, b) for a, b in gaps if a < stop and b > start]
     if not inside:
         return finding
     gone = sum(min(b, stop) - max(a, start) for a, b in inside)
     if stop - start - gone < _LEAST_SEEN * (stop - start):
         return None
-    said = []
+    sentences = []
     if inside[0][0] <= start:
         start = inside[0][1]
-        said.append(
+        sentences.append(
             f"Nothing was recorded for {(inside[0][1] - inside[0][0]) * dt:.2f} s before it: it may have begun then."
         )
     if inside[-1][1] >= stop:
         stop = inside[-1][0]
-        said.append(f"Nothing was recorded for {(inside[-1][1] - stop) * dt:.2f} s after it: it may have lasted on.")
+        sentences.append(
+            f"Nothing was recorded for {(inside[-1][1] - stop) * dt:.2f} s after it: it may have lasted on."
+        )
     if stop <= start:
         return None
     seen = finding.detected
     detected = None if seen is None else min(max(seen, start), stop - 1)
-    return replace(finding, start=start, stop=stop, detected=detected, evidence=(*finding.evidence, *said))
+    return replace(finding, start=start, stop=stop, detected=detected, evidence=(*finding.evidence, *sentences))
 
 
-def _blank(column: NDArray[np.floating], holes: Sequence[Hole], size: int) -> NDArray[np.floating]:
-    """A column of evidence with nothing in the holes."""
+def _blank(column: NDArray[np.floating], gaps: Sequence[Gap], size: int) -> NDArray[np.floating]:
+    """A column of evidence with nothing in the gaps."""
     bucket = bucket_of(size)
     out = np.array(column)
-    for start, stop in holes:
+    for start, stop in gaps:
         rows = slice(start, stop) if bucket == 1 else slice(2 * -(-start // bucket), 2 * (stop // bucket))
         out[rows] = np.nan
     return out

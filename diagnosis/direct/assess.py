@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from diagnosis.channels.debounce import FLICKER_S, steadied
+from diagnosis.channels.debounce import FLICKER_S, debounced
 from diagnosis.channels.sample_status import PAIR, SILENT
 from diagnosis.direct.columns import evidence_columns
 from diagnosis.direct.consistency import with_consistent
@@ -60,7 +60,7 @@ def _states(found: IdentifiedPair, faults: FaultsFound) -> NDArray[np.int8]:
     for run in faults.timing:
         unresolved[run.start : run.stop] = True
     brief = round(FLICKER_S / pair.dt)
-    quiet = ~steadied(~pair.quiet, brief, brief)
+    quiet = ~debounced(~pair.quiet, brief, brief)
     states = np.where(quiet, CODE[State.NOT_EXCITED], CODE[State.HEALTHY]).astype(np.int8)
     known = np.isfinite(pair.y) & np.isfinite(pair.x)
     states[~known & (found.samples.status != SILENT)] = CODE[State.NO_DATA]

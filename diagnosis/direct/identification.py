@@ -1,4 +1,4 @@
-"""What the mission itself tells of a pair: delay, noise, rounding step, and where the log is too slow for its command."""
+"""What is identified of a pair in the mission itself: delay, noise, rounding step, and where the log is too slow for its command."""
 
 from __future__ import annotations
 

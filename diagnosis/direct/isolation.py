@@ -1,4 +1,4 @@
-"""Which row of the table a faulty run is: the path's, or another one where its evidence and its samples say so."""
+"""Isolation: which row of the table a faulty run is, the path's or another one by its evidence and its samples."""
 
 from __future__ import annotations
 

@@ -53,7 +53,7 @@ def alike_sentence(found: IdentifiedPair) -> str:
 
 
 def _values(isolated: Isolated, found: IdentifiedPair, epsilon: Epsilon | None, seconds: float) -> list[str]:
-    """What the channel said beside its reference."""
+    """What the channel gave beside its reference."""
     pair, seen = found.pair, isolated.seen
     y, x = seen.y[seen.use], seen.x[seen.use]
     if isolated.run.row in (STUCK, NO_SIGNAL):

@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from diagnosis.channels.noise import white_part
-from diagnosis.channels.repeats import FALSE_SPELLS
 from diagnosis.direct.identification import IdentifiedPair
 from diagnosis.estimation.segments import Run
 from replay.faults import FaultMode, Side
@@ -18,6 +17,7 @@ Array = NDArray[np.float64]
 _SPOOL_DELAY_S = 0.005
 _SENSOR_DELAY_S = 0.01
 _JUMPY = 0.6  # share of a command's size that jumps between samples, where there is nothing else to it
+_FALSE_RESTS = 1e-6  # expected number of such runs in a healthy mission, at most
 _FLIPS = 25  # samples in a row on one side of a command that switches to and fro between samples
 
 
@@ -67,7 +67,9 @@ def _sudden(x: Array, run: Run) -> float:
 def _rests_by_chance(found: IdentifiedPair, run: Run, deviation: float) -> bool:
     """Whether a healthy sensor's noise may keep its readings as close as they are, beside a reference that explains them.
 
-    Within w = ptp(y) + lsb one reading is with probability erf(w / (√8·noise)) at most; see `diagnosis.channels.repeats`.
+    A reading of a living sensor is its value plus noise, rounded. Within w = ptp(y) + lsb one is with probability
+    p = erf(w / (√8·noise)) at most, and m readings in a row are with p^(m−1). The run is a fault where that is below
+    `_FALSE_RESTS` for all readings of the mission together.
     """
     pair = found.pair
     if not np.isfinite(pair.y[run.start : run.stop]).all():
@@ -78,4 +80,4 @@ def _rests_by_chance(found: IdentifiedPair, run: Run, deviation: float) -> bool:
         return False
     noise = math.sqrt(max(texture.white**2 - texture.lsb**2 / 12, 0.0))
     close = math.erf((float(np.ptp(y)) + texture.lsb) / (math.sqrt(8.0) * noise)) if noise else 1.0
-    return bool(texture.readings * close ** (y.size - 1) > FALSE_SPELLS)
+    return bool(texture.readings * close ** (y.size - 1) > _FALSE_RESTS)

@@ -1,1 +1,1 @@
-"""Evidence of single drives: the controller's effort, command tracking."""
+"""Evidence of single drives: the speed that an effort implies, extra effort, command tracking."""

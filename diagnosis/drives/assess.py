@@ -27,7 +27,7 @@ from diagnosis.results.evidence_columns import Pictured, steps_of
 from diagnosis.results.vocabulary import Tier
 from replay.faults import Side, State
 from replay.machine.config import Limits
-from replay.machine.drive_model import EchoModel, EffortMap
+from replay.machine.drive_model import EffortMap, InverseController
 
 Array = NDArray[np.float64]
 
@@ -96,7 +96,7 @@ def assess_drive(data: DriveData, limits: Limits) -> tuple[Assessment, Assessmen
     return _assessments(data, evidence, _notes(data, pair, controller, below))
 
 
-def _controller(data: DriveData) -> EchoModel | None:
+def _controller(data: DriveData) -> InverseController | None:
     """Inverse model of the controller: the known one where it holds for this log's step, else this mission's own."""
     known = None if data.model is None else data.model.echo
     if known is not None and abs(known.step_s - data.dt) <= _STEP_RANGE * data.dt:
@@ -184,7 +184,7 @@ def _reasons(load: LoadTrack | None) -> dict[State, str]:
     }
 
 
-def _notes(data: DriveData, pair: SpeedPair, controller: EchoModel, below: int) -> tuple[str, ...]:
+def _notes(data: DriveData, pair: SpeedPair, controller: InverseController, below: int) -> tuple[str, ...]:
     """Figures that the judgement used."""
     figures = (
         f"{data.names[0]} against the speed to which {data.names[2]} answered: noise {pair.noise:.3g} m/s "

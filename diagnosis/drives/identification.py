@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from diagnosis.channels.noise import quiet_rms
 from diagnosis.drives.inputs import DriveRecord, stretches
 from diagnosis.drives.inverse_controller import fading, high_passed, led
-from replay.machine.drive_model import EchoModel
+from replay.machine.drive_model import InverseController
 
 Array = NDArray[np.float64]
 
@@ -27,7 +27,7 @@ _LEAST_STRETCHES = 3
 _UNSURE = 0.1  # of Ti where one mission alone gives it
 
 
-def identify_controller(records: Sequence[DriveRecord]) -> EchoModel | None:
+def identify_controller(records: Sequence[DriveRecord]) -> InverseController | None:
     """Identify the controller of a drive, as its inverse model, from missions that may hold faults in less than half of their time.
 
     Parameters
@@ -37,7 +37,7 @@ def identify_controller(records: Sequence[DriveRecord]) -> EchoModel | None:
 
     Returns
     -------
-    EchoModel or None
+    InverseController or None
         None where effort and command do not explain at least half of the variance of the tracking error.
     """
     if not records:
@@ -72,7 +72,7 @@ def identify_controller(records: Sequence[DriveRecord]) -> EchoModel | None:
     if not 0 < noise**2 < (1 - _LEAST_EXPLAINED) * quiet_rms(target, dt) ** 2:
         return None
     exact, core = _exact_share(rest[:: max(1, rest.size // _MOST_SAMPLES)], noise)
-    return EchoModel(
+    return InverseController(
         gains=tuple(float(g) for g in theta[:_TAPS]),
         first=first,
         memory_s=memory,

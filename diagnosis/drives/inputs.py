@@ -7,11 +7,15 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from diagnosis.channels.liveness import alive, alive_sources
+from replay.machine.config import Machine, Noise
 from replay.machine.drive_model import DriveModel
+from replay.signals.timeline import Timeline
 
 Array = NDArray[np.float64]
 
 _NOTHING = 1e-9
+_SPAN = 2.2  # largest plausible speed [top speed]
 
 
 @dataclass(frozen=True)
@@ -79,6 +83,44 @@ class DriveData:
         idle = (np.abs(self.u) <= _NOTHING * self.u_max) & (np.abs(self.command) <= _NOTHING * self.span)
         free = (np.abs(np.nan_to_num(self.u)) < 0.99 * self.u_max) & ~idle
         return DriveRecord(self.y, self.command, np.where(free, self.u, np.nan), self.dt)
+
+
+def drive_data(
+    timeline: Timeline, command: Array, machine: Machine, wheel: str, counts: dict[str, NDArray[np.int16]] | None = None
+) -> DriveData | None:
+    """Channels of a drive, or None where its speed, command or effort is not in the log.
+
+    Parameters
+    ----------
+    timeline : Timeline
+        The aligned mission.
+    command : Array, shape (n,)
+        Commanded speed [m/s].
+    machine : Machine
+        The machine.
+    wheel : str
+        Which of its drives.
+    counts : dict[str, NDArray[np.int16]] or None
+        From `diagnosis.channels.liveness.alive_sources`; None: counted here.
+    """
+    names = (f"wheel.{wheel}.v", f"wheel.{wheel}.v_ref", f"wheel.{wheel}.u")
+    y, u = timeline.get(names[0]), timeline.get(names[2])
+    if y is None or u is None or not all(np.isfinite(x).any() for x in (y, u, command)):
+        return None
+    return DriveData(
+        y=y,
+        y_fresh=timeline.fresh[names[0]],
+        alive=alive(timeline, alive_sources(timeline) if counts is None else counts, names[0]),
+        command=command,
+        u=u,
+        dt=timeline.dt,
+        model=machine.drives.get(wheel),
+        span=_SPAN * machine.max_speed,
+        u_max=max(machine.control.u_max, 1e-6),
+        lsb=machine.noise.get(names[0], Noise()).lsb,
+        names=names,
+        open_loop=timeline.open_loop,
+    )
 
 
 def stretches(valid: NDArray[np.bool_], least: int) -> list[slice]:

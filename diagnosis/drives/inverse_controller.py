@@ -1,7 +1,7 @@
 """Inverse controller model: the speed that the controller saw, from its command and effort.
 
 A proportional-integral controller answers to every change of speed, so that command and effort alone imply which speed
-it saw (`replay.machine.drive_model.EchoModel`). A logged speed that differs from it is not what the controller acted on: its
+it saw (`replay.machine.drive_model.InverseController`). A logged speed that differs from it is not what the controller acted on: its
 channel is at fault. A fault that the controller saw too leaves no difference; other evidence must show that one.
 """
 
@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from diagnosis.drives.inputs import DriveRecord, stretches
-from replay.machine.drive_model import EchoModel
+from replay.machine.drive_model import InverseController
 
 Array = NDArray[np.float64]
 
@@ -36,7 +36,7 @@ def fading(size: int, memory_s: float, dt: float) -> Array:
     return np.asarray(np.exp(-np.arange(size) * dt / memory_s), dtype=np.float64)
 
 
-def implied_speed(model: EchoModel, record: DriveRecord) -> Array:
+def implied_speed(model: InverseController, record: DriveRecord) -> Array:
     """Speed that the effort implies: the one that the controller saw. NaN where it is not logged; shape (n,).
 
     The state of the controller before a stretch is unknown: it is found from the measured speed of the stretch's first
@@ -44,7 +44,7 @@ def implied_speed(model: EchoModel, record: DriveRecord) -> Array:
 
     Parameters
     ----------
-    model : EchoModel
+    model : InverseController
         Of this drive.
     record : DriveRecord
         The mission.

@@ -13,7 +13,7 @@ from diagnosis.drives.inputs import DriveData
 from diagnosis.drives.models import RowModel
 from diagnosis.drives.path import SpeedSamples
 from replay.machine.config import Limits
-from replay.machine.drive_model import EchoModel
+from replay.machine.drive_model import InverseController
 
 Array = NDArray[np.float64]
 
@@ -69,14 +69,14 @@ class SpeedPair:
         )
 
 
-def speed_pair(data: DriveData, controller: EchoModel, x: Array, limits: Limits) -> SpeedPair:
+def speed_pair(data: DriveData, controller: InverseController, x: Array, limits: Limits) -> SpeedPair:
     """Put the measured speed beside the implied one.
 
     Parameters
     ----------
     data : DriveData
         Channels.
-    controller : EchoModel
+    controller : InverseController
         Inverse model of the drive's controller.
     x : Array, shape (n,)
         Implied speed [m/s]; NaN where the effort implies none.

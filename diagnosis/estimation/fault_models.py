@@ -21,13 +21,6 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from diagnosis.channels.sample_status import BLIND as BLIND
-from diagnosis.channels.sample_status import CLEAR as CLEAR
-from diagnosis.channels.sample_status import PAIR as PAIR
-from diagnosis.channels.sample_status import SILENT as SILENT
-from diagnosis.channels.sample_status import SKIP as SKIP
-from diagnosis.estimation.back_pointers import STAY as STAY
-from diagnosis.estimation.back_pointers import trace as trace
 from diagnosis.results.fault_rows import ROWS
 from replay.faults import State
 

@@ -1,4 +1,4 @@
-"""Channels of a single drive on a mission's time axis, and its model from several healthy missions."""
+"""Model of a single drive from several healthy missions."""
 
 from __future__ import annotations
 
@@ -7,52 +7,15 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from diagnosis.channels.liveness import alive, alive_sources
 from diagnosis.drives.effort_map import identify_effort
 from diagnosis.drives.identification import identify_controller
-from diagnosis.drives.inputs import DriveData
+from diagnosis.drives.inputs import DriveData, drive_data
 from replay.control.loop import Replay
-from replay.machine.config import Machine, Noise
+from replay.machine.config import Machine
 from replay.machine.drive_model import DriveModel
 from replay.signals.timeline import Timeline
 
 Array = NDArray[np.float64]
-
-_SPAN = 2.2  # largest plausible speed [top speed]
-
-
-def drive_data(timeline: Timeline, command: Array, machine: Machine, wheel: str) -> DriveData | None:
-    """Channels of a drive, or None where its speed, command or effort is not in the log.
-
-    Parameters
-    ----------
-    timeline : Timeline
-        The aligned mission.
-    command : Array, shape (n,)
-        Commanded speed [m/s].
-    machine : Machine
-        The machine.
-    wheel : str
-        Which of its drives.
-    """
-    names = (f"wheel.{wheel}.v", f"wheel.{wheel}.v_ref", f"wheel.{wheel}.u")
-    y, u = timeline.get(names[0]), timeline.get(names[2])
-    if y is None or u is None or not all(np.isfinite(x).any() for x in (y, u, command)):
-        return None
-    return DriveData(
-        y=y,
-        y_fresh=timeline.fresh[names[0]],
-        alive=alive(timeline, alive_sources(timeline), names[0]),
-        command=command,
-        u=u,
-        dt=timeline.dt,
-        model=machine.drives.get(wheel),
-        span=_SPAN * machine.max_speed,
-        u_max=max(machine.control.u_max, 1e-6),
-        lsb=machine.noise.get(names[0], Noise()).lsb,
-        names=names,
-        open_loop=timeline.open_loop,
-    )
 
 
 def identify_drive(missions: Sequence[DriveData], least_speed: float) -> DriveModel:

@@ -7,8 +7,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from diagnosis.drives.inputs import drive_data
 from diagnosis.fitting.control import ControlFit, fit_control, lambda_doubt
-from diagnosis.fitting.drives import drive_data, fit_drives
+from diagnosis.fitting.drives import fit_drives
 from diagnosis.fitting.geometry import fit_offset
 from diagnosis.fitting.machine import Constant, with_control, with_drives, with_noise, with_offset, with_plants
 from diagnosis.fitting.noise import fit_noise

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from diagnosis.channels.noise import rounding_step
-from diagnosis.estimation.fault_models import PAIR, SILENT, SKIP
+from diagnosis.channels.sample_status import PAIR, SILENT, SKIP
 from diagnosis.steering.filter_state import BlockSeries, Redundancy
 from replay.arrays.numeric import without_nan
 from replay.arrays.spill import Column, release
@@ -42,7 +42,7 @@ class SteeringBlocks:
     u : Array, shape (m,)
         Mean valve opening between the middles of the block before and this one [fraction].
     status : NDArray[np.int8], shape (m,)
-        `PAIR`, `SILENT` or `SKIP` of `diagnosis.estimation.fault_models`.
+        `PAIR`, `SILENT` or `SKIP` of `diagnosis.channels.sample_status`.
     raw_u : Array, shape (n,)
         Valve opening of every sample, 0 where unknown.
     blind : NDArray[np.bool_], shape (m,)

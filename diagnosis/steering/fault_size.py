@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from diagnosis.estimation.fault_models import PAIR
+from diagnosis.channels.sample_status import PAIR
 from diagnosis.results.result import Epsilon, Sat
 from diagnosis.steering.filter_state import Array, SteeringPath
 from diagnosis.steering.model_bank import INEFFICIENT, NO_SIGNAL, STUCK

@@ -74,7 +74,7 @@ class Block(NamedTuple):
     u : float
         Mean opening [fraction].
     status : int
-        `PAIR`, `SILENT` or `SKIP` of `diagnosis.estimation.fault_models`.
+        `PAIR`, `SILENT` or `SKIP` of `diagnosis.channels.sample_status`.
     """
 
     mean: float

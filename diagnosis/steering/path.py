@@ -8,7 +8,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from diagnosis.estimation.fault_models import PAIR, STAY, trace
+from diagnosis.channels.sample_status import PAIR
+from diagnosis.estimation.back_pointers import STAY, trace
 from diagnosis.steering import path_kernel
 from diagnosis.steering.blocks import SteeringBlocks
 from diagnosis.steering.filter_state import Array, BlockSeries, FilterBank, SteeringPath

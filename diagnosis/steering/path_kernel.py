@@ -6,7 +6,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from diagnosis.estimation.fault_models import SKIP
+from diagnosis.channels.sample_status import SKIP
 from diagnosis.steering.filter_state import (
     Array,
     Block,

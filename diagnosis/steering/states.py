@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from diagnosis.channels.noise import moving_sum
-from diagnosis.estimation.fault_models import PAIR
+from diagnosis.channels.sample_status import PAIR
 from diagnosis.results.assessment import CODE
 from diagnosis.steering.filter_state import SteeringPath
 from diagnosis.steering.findings import SideFindings, Span

@@ -14,7 +14,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from diagnosis.estimation.fault_models import PAIR, SILENT
+from diagnosis.channels.sample_status import PAIR, SILENT
 from diagnosis.steering.filter_state import Array, Block, FilterBank, RedundantBlock
 from diagnosis.steering.measurement_kernel import measure_redundant, update
 from diagnosis.steering.model_bank import (

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from diagnosis.channels.noise import white_part
-from diagnosis.estimation.fault_models import PAIR, SILENT, SKIP
+from diagnosis.channels.sample_status import PAIR, SILENT, SKIP
 from replay.arrays.numeric import without_nan
 from replay.arrays.spill import Column, blocks, release
 
@@ -44,7 +44,7 @@ class WheelBlocks:
     unsteady : Array, shape (n, wheels)
         Root mean square of what changes within a block in u [fraction].
     status : NDArray[np.int8], shape (n, wheels)
-        `PAIR`, `SILENT` or `SKIP` of `diagnosis.estimation.fault_models`.
+        `PAIR`, `SILENT` or `SKIP` of `diagnosis.channels.sample_status`.
     quiet : NDArray[np.bool_], shape (n, wheels)
         Where a wheel is neither commanded nor expected to move.
     ratio, turn : Array, shape (n, wheels)
@@ -126,7 +126,7 @@ def blocks_of(
     y, u : Array, shape (m, wheels)
         Measured speed [m/s] and opening [fraction].
     status : NDArray[np.int8], shape (m, wheels)
-        As in `diagnosis.estimation.fault_models`.
+        As in `diagnosis.channels.sample_status`.
     quiet : NDArray[np.bool_], shape (m, wheels)
         Where a wheel is neither commanded nor expected to move.
     ratio, turn : Array, shape (m, wheels)

@@ -15,7 +15,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from diagnosis.estimation.fault_models import STAY, trace
+from diagnosis.estimation.back_pointers import STAY, trace
 from diagnosis.wheels.blocks import WheelBlocks
 from diagnosis.wheels.joint_kernel import (
     GAIN,

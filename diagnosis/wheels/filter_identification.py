@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from diagnosis.channels.noise import moving_sum, quick_noise, rounding_step, slow_mismatch, usual_distance, white_noise
-from diagnosis.estimation.fault_models import PAIR
+from diagnosis.channels.sample_status import PAIR
 from diagnosis.wheels.blocks import WheelBlocks
 from diagnosis.wheels.filter import forward
 from diagnosis.wheels.inputs import WheelsData

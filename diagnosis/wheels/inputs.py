@@ -86,7 +86,7 @@ class WheelsData:
     residual : Sequence[Array], each of shape (n,)
         y − K·lowpass(u) of each wheel [m/s], NaN where the pump cannot feed it.
     status : NDArray[np.int8]
-        As in `diagnosis.estimation.fault_models`.
+        As in `diagnosis.channels.sample_status`.
     quiet, slip : NDArray[np.bool_]
         Where a wheel is neither commanded nor moving, and where it breaks the parity of the body.
     ratio, turn : Array

@@ -14,7 +14,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from diagnosis.estimation.fault_models import SKIP, STAY
+from diagnosis.channels.sample_status import SKIP
+from diagnosis.estimation.back_pointers import STAY
 from diagnosis.wheels.models import (
     A_BIAS,
     A_GAIN,

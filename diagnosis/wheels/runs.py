@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from diagnosis.estimation.fault_models import SILENT
+from diagnosis.channels.sample_status import SILENT
 from diagnosis.wheels.models import (
     A_GAIN,
     A_STUCK,
@@ -62,7 +62,7 @@ def runs_of(
     quiet : NDArray[np.bool_], shape (n,)
         Where the wheel is neither commanded nor moving.
     status : NDArray[np.int8], shape (n,)
-        As in `diagnosis.estimation.fault_models`.
+        As in `diagnosis.channels.sample_status`.
     dt : float
         Block [s].
 

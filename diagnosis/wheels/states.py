@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from diagnosis.channels.debounce import FLICKER_S, steadied
-from diagnosis.estimation.fault_models import SILENT
+from diagnosis.channels.debounce import FLICKER_S, debounced
+from diagnosis.channels.sample_status import SILENT
 from diagnosis.results.assessment import CODE
 from diagnosis.wheels.blocks import per_sample
 from diagnosis.wheels.findings import WheelFindings, WheelPath
@@ -38,7 +38,7 @@ class WheelStates:
 def states_of(data: WheelsData, i: int, path: WheelPath, found: WheelFindings, *, gains: bool) -> WheelStates:
     """States of sensor and actuator of wheel i; `gains` as in `diagnosis.wheels.findings.findings_of`."""
     gap, least = (round(s / data.dt) for s in (FLICKER_S, FLICKER_S / 2))
-    quiet = steadied(np.ascontiguousarray(data.quiet[:, i]), gap, 1)
+    quiet = debounced(np.ascontiguousarray(data.quiet[:, i]), gap, 1)
     no_opening, healthy = ~np.isfinite(data.u[:, i]), CODE[State.HEALTHY]
     sensor = np.where(quiet, CODE[State.NOT_EXCITED], healthy).astype(np.int8)
     sensor[~np.isfinite(path.y) & (data.status[:, i] != SILENT)] = CODE[State.NO_DATA]
@@ -48,7 +48,7 @@ def states_of(data: WheelsData, i: int, path: WheelPath, found: WheelFindings, *
     sensor[unseen & (sensor == healthy)] = CODE[State.NOT_ASSESSED]
     if path.model.grip_most > 0:  # wheels in the air obey their own valves, not the body
         doubted = np.asarray(per_sample(path.fault > _DOUBTED, path.width, path.y.size))
-        sensor[steadied(data.slip[:, i] & doubted, gap, least) & (sensor == healthy)] = CODE[State.SLIP]
+        sensor[debounced(data.slip[:, i] & doubted, gap, least) & (sensor == healthy)] = CODE[State.SLIP]
     actuator[(found.opened[Side.ACTUATOR] | (not gains)) & (actuator == healthy)] = CODE[State.NOT_ASSESSED]
     for f in found.of(Side.SENSOR):
         sensor[f.start : f.stop] = CODE[State(f.mode.value)]

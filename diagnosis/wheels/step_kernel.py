@@ -13,7 +13,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from diagnosis.estimation.fault_models import PAIR, SILENT
+from diagnosis.channels.sample_status import PAIR, SILENT
 from diagnosis.wheels.models import (
     A_BIAS,
     A_GAIN,

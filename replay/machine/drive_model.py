@@ -10,8 +10,8 @@ from replay.errors import ConfigError, check_range
 
 
 @dataclass(frozen=True)
-class EchoModel:
-    """How the effort of a proportional-integral speed controller echoes the speed that the controller saw.
+class InverseController:
+    """Inverse model of a proportional-integral speed controller: its effort implies the speed that it saw.
 
     u = Kp·[w·r − v + ∫(r − v)/Ti]: high-passed with Ti, the effort is −Kp times the tracking error, so that the speed
     can be read back from command and effort alone: v̂ = r + Σ gᵢ·HP(u)(t + (first + i)·step) + (w − 1)·HP(r).
@@ -27,7 +27,7 @@ class EchoModel:
     setpoint : float
         w − 1: what the proportional part leaves out of the command [1].
     noise : float
-        Root mean square of measured minus echoed speed [m/s].
+        Root mean square of measured minus implied speed [m/s].
     exact, core : float
         Share of samples for which the log holds just the speed that the controller used [1], and their noise [m/s];
         the others are a step late.
@@ -89,7 +89,7 @@ class EffortMap:
 class DriveModel:
     """Both models of a drive; None where its missions did not show them."""
 
-    echo: EchoModel | None = None
+    echo: InverseController | None = None
     effort: EffortMap | None = None
 
 
@@ -122,7 +122,7 @@ def drive_from_table(key: str, table: Mapping[str, Any]) -> DriveModel:
         raise ConfigError(f"{key}.{unknown[0]} is not known; expected echo or effort")
     echo, effort = table.get("echo"), table.get("effort")
     return DriveModel(
-        echo=None if echo is None else EchoModel(**_numbers(f"{key}.echo", echo, EchoModel)),
+        echo=None if echo is None else InverseController(**_numbers(f"{key}.echo", echo, InverseController)),
         effort=None if effort is None else EffortMap(**_numbers(f"{key}.effort", effort, EffortMap)),
     )
 

@@ -30,9 +30,9 @@ from scipy.stats import chi2, rankdata
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
 from diagnosis.drives.assess import assess_drive
-from diagnosis.drives.inputs import DriveData, stretches
+from diagnosis.drives.inputs import DriveData, drive_data, stretches
 from diagnosis.drives.load import track_load
-from diagnosis.fitting.drives import drive_data, identify_drive
+from diagnosis.fitting.drives import identify_drive
 from diagnosis.results.assessment import CODE, STATES, Assessment
 from replay.faults import FaultMode, FaultSpec, Side, State
 from replay.injection.inject import inject_signals

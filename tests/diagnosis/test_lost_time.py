@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from diagnosis.channels.recording_gaps import holes_of, without_holes
+from diagnosis.channels.recording_gaps import recording_gaps, without_gaps
 from diagnosis.pipeline import diagnose
 from diagnosis.results.assessment import CODE, Assessment, Finding
 from diagnosis.results.vocabulary import Tier
@@ -35,17 +35,17 @@ def seen(size: int, *lost: tuple[int, int]) -> np.ndarray:
 
 
 @pytest.mark.parametrize("block", [1 << 19, 64, 7])
-def test_holes_are_where_every_signal_is_silent(monkeypatch: pytest.MonkeyPatch, block: int) -> None:
+def test_gaps_are_where_every_signal_is_silent(monkeypatch: pytest.MonkeyPatch, block: int) -> None:
     monkeypatch.setattr(spill.STORE, "block", block)
     a, b = seen(1000, (100, 200), (400, 420), (900, 1000)), seen(1000, (120, 260), (400, 420), (880, 1000))
-    assert holes_of(timeline(a, b)) == [(120, 200), (900, 1000)]  # a fifth of a second is no hole
-    assert holes_of(timeline(seen(1000, (0, 60)))) == [(0, 60)]
+    assert recording_gaps(timeline(a, b)) == [(120, 200), (900, 1000)]  # a fifth of a second is no gap
+    assert recording_gaps(timeline(seen(1000, (0, 60)))) == [(0, 60)]
 
 
-def test_slow_signals_leave_no_holes() -> None:
+def test_slow_signals_leave_no_gaps() -> None:
     slow = np.zeros(1000, np.bool_)
     slow[::40] = True  # a sample every 0.4 s
-    assert holes_of(timeline(slow, period_ms=400)) == []
+    assert recording_gaps(timeline(slow, period_ms=400)) == []
 
 
 def finding(start: int, stop: int) -> Finding:
@@ -61,7 +61,7 @@ def judged(*findings: Finding) -> Assessment:
 
 def test_faults_end_where_a_hole_begins_and_say_so() -> None:
     line = timeline(seen(1000, (300, 500)))
-    out = without_holes(judged(finding(200, 320), finding(490, 700), finding(800, 900)), [(300, 500)], line)
+    out = without_gaps(judged(finding(200, 320), finding(490, 700), finding(800, 900)), [(300, 500)], line)
     assert [(f.start, f.stop) for f in out.findings] == [(200, 300), (500, 700), (800, 900)]
     assert "after it" in out.findings[0].evidence[-1]
     assert "before it" in out.findings[1].evidence[-1]
@@ -74,7 +74,7 @@ def test_faults_end_where_a_hole_begins_and_say_so() -> None:
 
 def test_a_fault_that_was_hardly_seen_is_none() -> None:
     line = timeline(seen(1000, (300, 500)))
-    out = without_holes(judged(finding(300, 500), finding(295, 400)), [(300, 500)], line)
+    out = without_gaps(judged(finding(300, 500), finding(295, 400)), [(300, 500)], line)
     assert out.findings == ()
     assert CODE[State.NOISY] not in out.states
     assert out.states[297] == CODE[State.NOT_ASSESSED]

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_array_equal
 
-from diagnosis.channels.debounce import steadied
+from diagnosis.channels.debounce import debounced
 
 
 def flags(text: str) -> np.ndarray:
@@ -30,7 +30,7 @@ def flags(text: str) -> np.ndarray:
     ],
 )
 def test_gaps_then_runs(before: str, gap: int, least: int, after: str) -> None:
-    assert_array_equal(steadied(flags(before), gap, least), flags(after))
+    assert_array_equal(debounced(flags(before), gap, least), flags(after))
 
 
 @given(st.lists(st.booleans(), min_size=1, max_size=60), st.integers(1, 8))
@@ -40,4 +40,4 @@ def test_against_a_plain_loop(given_flags: list[bool], gap: int) -> None:
     for a, b in pairwise(places):
         if b - a - 1 < gap:
             expected[a:b] = [True] * (b - a)
-    assert steadied(np.array(given_flags), gap, 1).tolist() == expected
+    assert debounced(np.array(given_flags), gap, 1).tolist() == expected

@@ -11,7 +11,7 @@ from diagnosis.drives.identification import identify_controller
 from diagnosis.drives.inputs import DriveRecord, stretches
 from diagnosis.drives.inverse_controller import high_passed, implied_speed
 from replay.errors import ConfigError
-from replay.machine.drive_model import EchoModel
+from replay.machine.drive_model import InverseController
 
 Array = NDArray[np.float64]
 
@@ -45,7 +45,7 @@ def test_a_controllers_gain_integral_time_and_delay_are_found() -> None:
 
 
 def test_the_implied_speed_is_the_speed_that_the_controller_saw() -> None:
-    model = EchoModel((-1 / KP,), 1, TI, 0.0, 0.0, 0.01, 0.5, 0.01, DT)
+    model = InverseController((-1 / KP,), 1, TI, 0.0, 0.0, 0.01, 0.5, 0.01, DT)
     record = loop(3)
     assert np.nanmax(np.abs(implied_speed(model, record) - record.y)[50:-2]) < 0.03
 
@@ -73,7 +73,7 @@ def test_an_effort_that_answers_to_nothing_gives_no_model() -> None:
 
 
 def test_a_gap_starts_the_controller_anew() -> None:
-    model = EchoModel((-1 / KP,), 1, TI, 0.0, 0.0, 0.01, 0.5, 0.01, DT)
+    model = InverseController((-1 / KP,), 1, TI, 0.0, 0.0, 0.01, 0.5, 0.01, DT)
     record = loop(6)
     u = record.u.copy()
     u[600:700] = np.nan
@@ -103,4 +103,4 @@ def test_quiet_rms_ignores_loud_windows() -> None:
 
 def test_a_model_without_gains_is_refused() -> None:
     with pytest.raises(ConfigError, match=r"drive\.gains is empty"):
-        EchoModel((), 1, TI, 0.0, 0.0, 0.01, 0.5, 0.01, DT)
+        InverseController((), 1, TI, 0.0, 0.0, 0.01, 0.5, 0.01, DT)

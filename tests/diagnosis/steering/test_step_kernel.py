@@ -7,7 +7,7 @@ import pytest
 from filterpy.kalman import ExtendedKalmanFilter
 from numpy.testing import assert_allclose
 
-from diagnosis.estimation.fault_models import PAIR
+from diagnosis.channels.sample_status import PAIR
 from diagnosis.steering.blocks import SensorNoise
 from diagnosis.steering.filter_state import Block, RedundantBlock
 from diagnosis.steering.identification import SteeringPlant

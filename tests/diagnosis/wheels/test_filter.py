@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from diagnosis.estimation.fault_models import PAIR, SILENT, SKIP
+from diagnosis.channels.sample_status import PAIR, SILENT, SKIP
 from diagnosis.wheels.blocks import WheelBlocks, blocks_of
 from diagnosis.wheels.filter import first_speeds, forward, initial_state, most_probable
 from diagnosis.wheels.models import (

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from diagnosis.estimation.fault_models import PAIR, SILENT, SKIP, STAY
+from diagnosis.channels.sample_status import PAIR, SILENT, SKIP
+from diagnosis.estimation.back_pointers import STAY
 from diagnosis.wheels.blocks import WheelBlocks, blocks_of
 from diagnosis.wheels.filter import JointPass, forward, initial_state
 from diagnosis.wheels.joint_kernel import (

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_array_equal
 
-from diagnosis.estimation.fault_models import PAIR, SILENT
+from diagnosis.channels.sample_status import PAIR, SILENT
 from diagnosis.wheels.models import (
     A_BIAS,
     A_GAIN,

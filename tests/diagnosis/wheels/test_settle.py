@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from diagnosis.estimation.fault_models import PAIR, STAY
+from diagnosis.channels.sample_status import PAIR
+from diagnosis.estimation.back_pointers import STAY
 from diagnosis.wheels.blocks import WheelBlocks, blocks_of
 from diagnosis.wheels.filter import forward, most_probable
 from diagnosis.wheels.joint_kernel import SHARE_NONE
