@@ -6,6 +6,8 @@ of lines or letters that the contrast asks for, stand in ``style.css``, which fo
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 from diagnosis.results.fault_rows import LOOKS
 from replay.faults import FaultMode
 
@@ -19,7 +21,6 @@ _RULES = (
     (".fb.{m}", "background: var(--{m}); color: var(--on-{m});"),
     (".spark rect.{m}, .panel .f.{m}", "fill: var(--{m});"),
     (".conf .{m}, .stack .{m}", "background: var(--{m});"),
-    (".c.{m}", "border: 0; background: var(--{m}); color: var(--on-{m});"),
     (".leg.{m}", "stroke: var(--{m});"),
     (".mark.{m} .ring, .panel .mk.{m}", "stroke: var(--{m}-line);"),
 )
@@ -29,8 +30,13 @@ def mode_style() -> str:
     """CSS of all modes: ``--stuck`` is a mode's colour, ``--stuck-line`` of thin lines, ``--on-stuck`` of letters on it."""
     light = " ".join(_variables(state, look.light, _BLACK) for state, look in LOOKS.items() if look.light)
     dark = " ".join(_variables(state, look.dark, _DARK_PAGE) for state, look in LOOKS.items() if look.dark)
-    rules = [f"{selector} {{ {body} }}".replace("{m}", mode) for mode in FaultMode for selector, body in _RULES]
-    return "\n".join([f":root {{ {light} }}", f"[data-theme=dark] {{ {dark} }}", *rules]) + "\n"
+    return f":root {{ {light} }}\n[data-theme=dark] {{ {dark} }}\n" + mode_rules(_RULES)
+
+
+def mode_rules(rules: Iterable[tuple[str, str]]) -> str:
+    """CSS rules, selector and body, for every mode: ``{m}`` stands for its name."""
+    lines = [f"{selector} {{ {body} }}\n".replace("{m}", m) for m in FaultMode for selector, body in rules]
+    return "".join(lines)
 
 
 def _variables(state: str, colour: str, dark_letters: str) -> str:

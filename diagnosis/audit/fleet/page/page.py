@@ -29,6 +29,7 @@ from diagnosis.audit.fleet.words import count, verdict_label
 from diagnosis.audit.store.outcome import MissionState
 from diagnosis.pages import labels
 from diagnosis.pages.environment import DARK, SHARED, asset, environment, shared_style
+from diagnosis.pages.mode_style import mode_rules
 from diagnosis.results.fault_rows import state_label
 from diagnosis.results.vocabulary import Verdict, part_words
 from replay.faults import FaultMode
@@ -130,7 +131,8 @@ def _css() -> str:
     """
     chosen_dark = r"@media screen { \g<0> }\n"
     system_dark = r"@media screen and (prefers-color-scheme: dark) { :root:not(.js) {\1} }\n"
-    return DARK.sub(chosen_dark + system_dark, shared_style()) + asset(_HERE / "fleet.css")
+    cells = mode_rules([(".c.{m}", "border: 0; background: var(--{m}); color: var(--on-{m});")])
+    return DARK.sub(chosen_dark + system_dark, shared_style()) + cells + asset(_HERE / "fleet.css")
 
 
 @lru_cache
