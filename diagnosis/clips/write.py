@@ -119,10 +119,7 @@ def write_clips(
     _remove_earlier(folder, targets)
     if not faults:
         return Clips((), 0, ())
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise OutputError(f"{folder}: cannot make the folder ({error.strerror or error})") from error
+    _make(folder)
     progress(Progress(Stage.REPLAYING_FOR_CLIPS))
     diagnosed = _Diagnosed(mission, replay_loop(mission.timeline, machine), machine, result)
     progress(Progress(Stage.READING_FOR_CLIPS))
@@ -161,6 +158,13 @@ def _remove_earlier(folder: Path, targets: Collection[Path]) -> None:
         for path in folder.iterdir():
             if path not in targets and path.name.endswith(ENDINGS) and _is_own(path):
                 path.unlink()
+
+
+def _make(folder: Path) -> None:
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise OutputError(f"{folder}: cannot make the folder ({error.strerror or error})") from error
 
 
 def _is_own(path: Path) -> bool:

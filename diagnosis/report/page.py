@@ -96,8 +96,8 @@ def build_page(
         Where the columns differ in length or ``t`` is not uniform.
     """
     whole = labels.made_visible(report)
-    intervals = packed_intervals(worst(whole["intervals"], _LISTED))
     report = {**whole, "intervals": worst(whole["intervals"], _LISTED)}
+    intervals = packed_intervals(report["intervals"])
     detailed = worst(report["intervals"], _DETAILED)
     series = _series(report, columns, closeups)
     duration = _duration(report, series.axis)

@@ -55,7 +55,11 @@ def luminance(colour: str) -> float:
 
 LEAST = (
     (4.5, ("text", "muted", "accent"), ("surface", "surface2", "bg", "accent-bg")),
-    (3.0, ("stuck", "no_signal", "ineff-line", "noisy", "healthy-text", "teal", "alt"), ("surface",)),
+    (
+        3.0,
+        ("stuck", "no_signal", "inefficient-line", "noisy", "outside_table", "healthy-text", "teal", "alt"),
+        ("surface",),
+    ),
 )
 
 
