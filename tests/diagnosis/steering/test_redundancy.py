@@ -1,0 +1,54 @@
+"""What is measured redundantly, block by block: a second angle, and a valve that follows its command or does not."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from diagnosis.steering.blocks import SteeringBlocks, blocks_of
+from diagnosis.steering.redundancy import with_second_angle, with_valve_opening
+
+DT, SIZE, STUCK_AT, DELAY = 0.001, 20_000, 15_000, 2
+ALWAYS = np.ones(SIZE, np.bool_)
+
+
+def command_of(rng: np.random.Generator) -> np.ndarray:
+    t = np.arange(SIZE) * DT
+    return 0.05 * np.sin(2 * t) + rng.normal(0.0, 2e-3, SIZE)
+
+
+def blocks(u: np.ndarray) -> SteeringBlocks:
+    return blocks_of(np.zeros(SIZE), u, ALWAYS, ALWAYS, DT)
+
+
+def test_nothing_is_redundant_before_it_is_added() -> None:
+    assert not blocks(np.zeros(SIZE)).redundancy.known.any()
+
+
+def test_a_valve_follows_its_command_until_it_sticks() -> None:
+    rng = np.random.default_rng(3)
+    u = command_of(rng)
+    opening = np.r_[np.zeros(DELAY), u[:-DELAY]] + rng.normal(0.0, 2e-4, SIZE)
+    opening[STUCK_AT:] = 0.01
+    found, deviation = with_valve_opening(blocks(u), u, opening, ALWAYS, DT)
+    redundancy, edge = found.redundancy, STUCK_AT // found.length
+    healthy, stuck = slice(1, edge - 1), slice(edge + 1, -1)
+    assert np.nanmedian(redundancy.share[healthy]) == pytest.approx(1.0, abs=0.02)
+    assert np.nanmedian(redundancy.share[stuck]) == pytest.approx(0.0, abs=0.02)
+    assert np.nanmax(np.abs(redundancy.opening - redundancy.command)[healthy]) < 1e-3
+    assert redundancy.opening[stuck] == pytest.approx(0.01)
+    assert np.isnan(redundancy.angle).all()
+    assert np.nanmedian(np.abs(deviation[: STUCK_AT - 10])) < 2.0
+    assert np.nanmedian(np.abs(deviation[STUCK_AT:])) > 10.0
+
+
+def test_a_second_angle_has_at_least_the_variance_of_the_tolerance() -> None:
+    rng = np.random.default_rng(4)
+    t = np.arange(SIZE) * DT
+    true = 0.2 * np.sin(t)
+    y = true + rng.normal(0.0, 3e-4, SIZE)
+    found = with_second_angle(blocks(np.zeros(SIZE)), y, true, ALWAYS, DT, tolerance=0.01).redundancy
+    assert found.known.all()
+    assert found.angle == pytest.approx(true.reshape(-1, 10).mean(axis=1), abs=2e-3)
+    assert (found.angle_variance >= 1e-4).all()
+    assert np.isnan(found.opening).all()
