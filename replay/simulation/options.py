@@ -13,6 +13,7 @@ from replay.errors import ConfigError, check_range
 from replay.faults import FaultSpec, Side
 from replay.machine.config import Machine, haulotte
 from replay.simulation.plant_options import PlantOptions
+from replay.simulation.structures import StructureOptions
 from replay.truth import MissionTruth
 
 Scenario = Literal["paper", "random", "healthy"]
@@ -77,6 +78,8 @@ class SimulationOptions:
         Geometry, limits and control parameters.
     plant : PlantOptions
         Physics and sensors.
+    structure : StructureOptions or None
+        Another structure of valves, pump, drive, sensors and law; None: the default one.
     """
 
     scenario: Scenario = "random"
@@ -105,6 +108,7 @@ class SimulationOptions:
     start_ns: int = 1_760_000_000_000_000_000
     machine: Machine = field(default_factory=haulotte)
     plant: PlantOptions = field(default_factory=PlantOptions)
+    structure: StructureOptions | None = None
 
     def __post_init__(self) -> None:
         """Check values."""

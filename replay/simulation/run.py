@@ -16,6 +16,9 @@ from replay.simulation.plant import scan
 from replay.simulation.recorder import kept_rows, recorded_stamps, thinned
 from replay.simulation.schedule import faults_of, varied_onsets
 from replay.simulation.state import DELAY_LINE, FaultTable, PlantModel, PlantState, Recording
+from replay.simulation.structure_draw import draw_machine
+from replay.simulation.structured_plant import scan as structured_scan
+from replay.simulation.structured_plant import structure_state
 from replay.simulation.truths import actual_signals, mission_truth
 
 _BLOCK = 60_000  # control steps
@@ -88,11 +91,23 @@ def _run(
     out = Recording(*(np.zeros((rows, w)) for w in widths))
     state = _initial_state(wheels, options.psi0, table)
     steps = rows * every
+    drawn = None
+    if options.structure is not None:
+        geometry = options.machine.geometry
+        assert geometry is not None  # checked by SimulationOptions
+        per_turn = np.pi * geometry.wheel_diameter / options.machine.gear_ratio
+        chosen, machine_rng = options.structure.structure, options.structure.generator(options.seed)
+        drawn = draw_machine(chosen, model, machine_rng, per_turn, options.duration_s), structure_state(wheels)
     for k0 in range(0, steps, block):
         k = np.arange(k0, min(k0 + block, steps))
         t = np.asarray(k * model.dt, np.float64)
         normal = rng.standard_normal((k.size, wheels + 2 + state.last.size))
-        scan(k0, every, duty.command(t), duty.slope.at(t), normal, model, table, state, out, -(-k0 // every))
+        command, slope, row = duty.command(t), duty.slope.at(t), -(-k0 // every)
+        if drawn is None:
+            scan(k0, every, command, slope, normal, model, table, state, out, row)
+        else:
+            (plant, structure), more = drawn
+            structured_scan(k0, every, command, slope, normal, plant, structure, table, state, more, out, row)
     return out
 
 

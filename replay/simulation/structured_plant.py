@@ -1,0 +1,362 @@
+"""The loop of a machine of another structure, one control step after the other (compiled); see `structures`."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+
+from replay.simulation.plant import _faulted, _friction, _law, _quantised, _references, _reset_at_jumps
+from replay.simulation.state import (
+    DELAY_LINE,
+    PHI_DELAY,
+    U_DELAY,
+    V_DELAY,
+    F,
+    FaultTable,
+    I,
+    PlantModel,
+    PlantState,
+    Recording,
+)
+
+FIRST_ORDER, RESONANT, TORQUE = range(3)
+NO_LIMIT, PROPORTIONAL, LEAST_LOADED = range(3)
+SAMPLED, COUNTING, TACHO, HALL = range(4)
+
+_STILL = 0.005  # speed within which dry friction changes sign [m/s]
+_STRIBECK = 0.03  # speed over which the friction of standstill fades [m/s]
+_FULL_LOAD = 0.3  # of a wheel's share of the weight: force at which `pressure` of the gain is lost
+_HALL_TIMEOUT = 250  # control steps without a pole after which the sensor reads 0
+
+
+class StructureModel(NamedTuple):
+    """Constants of the structure; n wheels, axle 0 front and 1 rear, SI units (see `Structure`)."""
+
+    drive: int
+    gain_forward: F
+    gain_reverse: F
+    dead_forward: F
+    dead_reverse: F
+    play: F  # half the width of the spool's hysteresis
+    omega: float  # resonance [rad/s]
+    damping: float
+    wheel_limit: F
+    sharing: int
+    pump: float
+    pressure: float
+    force: F  # of the torque drive at full opening [N]
+    inertia: float  # of the torque drive, as mass at the rim [kg]
+    coulomb: float  # [N]
+    stribeck: float  # [N]
+    viscous: float  # [N s/m]
+    warming: float  # share of the gain lost per control step
+    sensor: int
+    scale: F
+    step: float  # travel per encoder step [m]
+    window: int  # control steps per counting window
+    tacho_gain: float
+    tacho_noise: float  # per speed [1]
+    pole: F  # travel between two poles, shape (poles per turn,) [m]
+    steer_forward: F
+    steer_reverse: F
+    steer_dead: F
+    backlash: F  # half the play of the encoder [rad]
+    pi: bool
+    feed_forward: float  # [opening per m/s]
+    kp: float
+    ki: float  # [1/s]
+    steer_ki: float  # [1/s]
+
+
+class StructureState(NamedTuple):
+    """What the structure carries from one step to the next, beside `PlantState`."""
+
+    held: F  # spool position behind its play
+    rate: F  # v̇ of the resonant drive
+    integral: F  # of the wheels' controllers
+    steer_integral: F
+    load: F  # force at the rim in the last step [N]
+    travel: F
+    counted: F  # travel at the last end of a window
+    speed: F  # what the sensor reads, before noise
+    pole: I  # poles passed
+    since: I  # control steps since the last pole
+    edge: F  # travel of the last pole
+    angle: F  # what the steering encoder follows
+
+
+def structure_state(wheels: int) -> StructureState:
+    """Everything at rest."""
+    f = [np.zeros(wheels) for _ in range(8)]
+    integers = [np.zeros(wheels, np.int64) for _ in range(2)]
+    return StructureState(
+        held=f[0],
+        rate=f[1],
+        integral=f[2],
+        steer_integral=np.zeros(2),
+        load=f[3],
+        travel=f[4],
+        counted=f[5],
+        speed=f[6],
+        pole=integers[0],
+        since=integers[1],
+        edge=f[7],
+        angle=np.zeros(2),
+    )
+
+
+@njit(cache=True)
+def _play(value: float, held: float, half: float) -> float:
+    """Backlash: the output follows once the input has crossed the play."""
+    return float(min(max(held, value - half), value + half))
+
+
+@njit(cache=True)
+def _opened(u: float, forward: float, reverse: float) -> float:
+    """Opening behind a dead band."""
+    if u > forward:
+        return float((u - forward) / (1.0 - forward))
+    if u < -reverse:
+        return float((u + reverse) / (1.0 - reverse))
+    return 0.0
+
+
+@njit(cache=True)
+def _read(i: int, k: int, v: float, normal: float, p: PlantModel, m: StructureModel, s: StructureState) -> float:
+    """What a wheel's healthy speed sensor reads."""
+    v = v * (1.0 + m.scale[i])
+    s.travel[i] += v * p.dt
+    if m.sensor == SAMPLED:
+        return float(v + p.v_std * normal)
+    if m.sensor == TACHO:
+        s.speed[i] += m.tacho_gain * (v - s.speed[i])
+        return float(s.speed[i] + (0.25 * p.v_std + m.tacho_noise * abs(s.speed[i])) * normal)
+    if m.sensor == COUNTING:
+        if k % m.window == 0:
+            steps = np.floor(s.travel[i] / m.step) - np.floor(s.counted[i] / m.step)
+            s.speed[i] = steps * m.step / (m.window * p.dt)
+            s.counted[i] = s.travel[i]
+        return float(s.speed[i])
+    s.since[i] += 1
+    ahead = s.travel[i] - s.edge[i]
+    poles = m.pole.size
+    width = m.pole[s.pole[i] % poles] if ahead >= 0.0 else m.pole[(s.pole[i] - 1) % poles]
+    if abs(ahead) >= width:
+        direction = 1.0 if ahead > 0.0 else -1.0
+        s.speed[i] = direction * m.pole.mean() / (s.since[i] * p.dt)
+        s.edge[i] += direction * width
+        s.pole[i] += int(direction)
+        s.since[i] = 0
+    elif s.since[i] > _HALL_TIMEOUT:
+        s.speed[i] = 0.0
+    else:  # no pole for longer than the last interval: it can be no faster than one pole in this time
+        most = m.pole.mean() / (s.since[i] * p.dt)
+        s.speed[i] = min(max(s.speed[i], -most), most)
+    return float(s.speed[i])
+
+
+@njit(cache=True)
+def _flows(k: int, u: F, p: PlantModel, m: StructureModel, state: PlantState, s: StructureState, flow: F) -> None:
+    """Speeds that valves and pump would give the wheels without load, into `flow`; spools follow their commands."""
+    n = u.size
+    warm = 1.0 - m.warming * k
+    weight = p.mass * 9.81 / n
+    for i in range(n):
+        s.held[i] = _play(u[i], s.held[i], m.play[i])
+        state.spool[i] += p.valve_gain * (s.held[i] - state.spool[i])
+        opening = _opened(state.spool[i], m.dead_forward[i], m.dead_reverse[i])
+        flow[i] = opening * (m.gain_forward[i] if opening > 0.0 else m.gain_reverse[i]) * warm
+        if m.pressure > 0.0:
+            load = min(max(s.load[i] * np.sign(flow[i]) / (_FULL_LOAD * weight), -1.0), 1.0)
+            flow[i] *= np.sqrt(max(1.0 - m.pressure * load, 0.05))
+        if m.wheel_limit[i] > 0.0:
+            flow[i] = min(max(flow[i], -m.wheel_limit[i]), m.wheel_limit[i])
+    demand = np.abs(flow).sum()
+    if m.sharing == NO_LIMIT or demand <= m.pump:
+        return
+    if m.sharing == PROPORTIONAL:
+        flow *= m.pump / demand
+        return
+    left = m.pump
+    for i in np.argsort(s.load * np.sign(flow)):
+        given = min(abs(flow[i]), left)
+        left -= given
+        flow[i] = given * np.sign(flow[i])
+
+
+@njit(cache=True)
+def _accelerate(
+    i: int,
+    flow: float,
+    opening: float,
+    force: float,
+    p: PlantModel,
+    m: StructureModel,
+    state: PlantState,
+    s: StructureState,
+) -> None:
+    """One step of a wheel's speed under its flow, or its torque, and the force at its rim."""
+    v = state.v[i]
+    if m.drive == TORQUE:
+        dry = m.coulomb + m.stribeck * np.exp(-((v / _STRIBECK) ** 2))
+        push = m.force[i] * opening - dry * np.tanh(v / _STILL) - m.viscous * v - force
+        state.v[i] = v + p.dt * push / m.inertia
+        return
+    target = flow - p.droop * force
+    if m.drive == RESONANT:
+        s.rate[i] += p.dt * (m.omega**2 * (target - v) - 2.0 * m.damping * m.omega * s.rate[i])
+        state.v[i] = v + p.dt * s.rate[i]
+    else:
+        state.v[i] = v + p.dt / p.tau[i] * (target - v)
+
+
+@njit(cache=True)
+def _move(
+    k: int, slope: float, u: F, p: PlantModel, m: StructureModel, state: PlantState, s: StructureState, slip: F, flow: F
+) -> None:
+    """One step of wheels, tyres and body; fills `slip`."""
+    n = p.x.size
+    tan_f, tan_r = np.tan(state.phi[0]), np.tan(state.phi[1])
+    kappa = (tan_f - tan_r) / (p.axle_x[0] - p.axle_x[1])
+    b = tan_f - kappa * p.axle_x[0]
+    _flows(k, u, p, m, state, s, flow)
+    weight = p.mass * 9.81
+    push, speed, norm = 0.0, 0.0, 0.0
+    for i in range(n):
+        k_x, k_y = 1.0 - kappa * p.y[i], b + kappa * p.x[i]
+        angle = np.arctan(k_y / k_x)
+        turn = (angle - state.wheel_phi[i]) / p.dt * p.d[i]
+        state.wheel_phi[i] = angle
+        c = np.sign(k_x) * np.hypot(k_x, k_y) - kappa * p.d[i]
+        speed += c * (state.v[i] + turn)
+        norm += c * c
+        if p.ground:
+            slip[i] = state.v[i] - (c * state.body[0] - turn)
+            most = _friction(i, p, state) * weight / n
+            force = most * np.tanh(p.slip_stiffness * slip[i] / (abs(state.body[0]) + 0.05) / most)
+            push += force * c
+        else:
+            slip[i] = 0.0
+            force = weight * slope / n
+        s.load[i] = force
+        gain = m.gain_forward[i] if flow[i] > 0.0 else m.gain_reverse[i]
+        _accelerate(i, flow[i], flow[i] / gain, force, p, m, state, s)
+    if p.ground:
+        drag = weight * (p.rolling * np.tanh(state.body[0] / 0.02) + slope)
+        state.body[0] += p.dt * (push - drag) / p.mass
+    else:
+        state.body[0] = speed / norm
+    v_x, yaw = state.body[0], state.body[3]
+    state.body[1] += p.dt * v_x * (np.cos(yaw) - b * np.sin(yaw))
+    state.body[2] += p.dt * v_x * (np.sin(yaw) + b * np.cos(yaw))
+    state.body[4] = kappa * v_x
+    state.body[3] += p.dt * state.body[4]
+
+
+@njit(cache=True)
+def _steer(u: F, p: PlantModel, m: StructureModel, state: PlantState) -> None:
+    """One step of the axle cylinders behind valves with a dead band and a gain of each direction."""
+    for a in range(2):
+        opening = _opened(u[a], m.steer_dead[a], m.steer_dead[a])
+        gain = m.steer_forward[a] if opening > 0.0 else m.steer_reverse[a]
+        rate = min(max(gain * opening, -p.steer_rate), p.steer_rate)
+        state.phi_rate[a] += p.steer_lag_gain * (rate - state.phi_rate[a])
+        state.phi[a] += p.dt * state.phi_rate[a]
+        if abs(state.phi[a]) > p.max_steer:
+            state.phi[a] = np.sign(state.phi[a]) * p.max_steer
+            state.phi_rate[a] = 0.0
+
+
+@njit(cache=True)
+def _command(
+    i: int, v_ref: float, v: float, p: PlantModel, m: StructureModel, state: PlantState, s: StructureState
+) -> float:
+    """Valve command of a wheel: the mission's law, or proportional, integral and feed-forward."""
+    e = v - v_ref
+    rho = p.beta + abs(v_ref) + abs(v) + p.xi
+    state.psi[i] = state.psi[i] * np.exp(-rho * p.dt) + 0.5 * p.zeta * e * e * p.dt
+    if not m.pi:
+        if p.law == 5:
+            _reset_at_jumps(i, e, p, state)
+        return float(_law(v_ref, v, state.psi[i], p))
+    u = m.feed_forward * v_ref - m.kp * e + s.integral[i]
+    if abs(u) < p.u_max or u * e > 0.0:  # the integral waits while the valve is fully open
+        s.integral[i] -= m.ki * e * p.dt
+    if abs(v_ref) < 1e-3 and abs(v) < 0.01:  # held at standstill
+        s.integral[i] *= 1.0 - p.dt / 0.2
+    return float(min(max(u, -p.u_max), p.u_max))
+
+
+@njit(cache=True)
+def _steer_command(a: int, phi: float, p: PlantModel, m: StructureModel, state: PlantState, s: StructureState) -> float:
+    e = state.axle_ref[a] - phi
+    u = p.k_ps * e + s.steer_integral[a]
+    if m.pi and abs(u) < p.u_max:
+        s.steer_integral[a] += m.steer_ki * e * p.dt - s.steer_integral[a] * p.dt / 2.0
+    return float(min(max(u, -p.u_max), p.u_max))
+
+
+@njit(cache=True)
+def scan(
+    k0: int,
+    every: int,
+    command: F,
+    slope: F,
+    normal: F,
+    p: PlantModel,
+    m: StructureModel,
+    faults: FaultTable,
+    state: PlantState,
+    s: StructureState,
+    out: Recording,
+    row0: int,
+) -> None:
+    """Run the loop over one block, as `replay.simulation.plant.scan` does."""
+    n = p.x.size
+    v, v_ref, u, u_v, slip, flow = np.zeros(n), np.zeros(n), np.zeros(n), np.zeros(n), np.zeros(n), np.zeros(n)
+    phi, u_s, u_sv, body = np.zeros(2), np.zeros(2), np.zeros(2), np.zeros(5)
+    row = row0
+    for j in range(slope.size):
+        k = k0 + j
+        fault_normal = normal[j, n + 2 :]
+        _references(k, command[j, 0], command[j, 1], p, state, v_ref)
+        for i in range(n):
+            clean = _read(i, k, state.v[i], normal[j, i], p, m, s)
+            v[i] = _quantised(_faulted(i, k, clean, fault_normal[i], faults, state), p.v_lsb)
+            state.last[i] = v[i]
+            u[i] = _command(i, v_ref[i], v[i], p, m, state, s)
+            c = n + 2 + i
+            u_v[i] = _faulted(c, k, u[i], fault_normal[c], faults, state)
+            state.last[c] = u_v[i]
+        for a in range(2):
+            s.angle[a] = _play(state.phi[a], s.angle[a], m.backlash[a])
+            clean = s.angle[a] + p.phi_std * normal[j, n + a]
+            c = n + a
+            phi[a] = _quantised(_faulted(c, k, clean, fault_normal[c], faults, state), p.phi_lsb)
+            state.last[c] = phi[a]
+            u_s[a] = _steer_command(a, phi[a], p, m, state, s)
+            c = 2 * n + 2 + a
+            u_sv[a] = _faulted(c, k, u_s[a], fault_normal[c], faults, state)
+            state.last[c] = u_sv[a]
+        line = state.line[k % DELAY_LINE]
+        line[:n], line[n : 2 * n], line[2 * n : 2 * n + 2], line[2 * n + 2 :] = state.v, u_v, state.phi, u_sv
+        if k == 0:
+            state.line[:] = line
+        recorded = k % every == 0
+        if recorded:
+            out.v[row], out.u[row], out.v_ref[row] = v, u, v_ref
+            out.v_actual[row], out.u_actual[row], out.psi[row] = state.v, u_v, state.psi
+            out.phi[row], out.phi_ref[row], out.phi_actual[row] = phi, state.axle_ref, state.phi
+            out.steer_u[row], out.steer_u_actual[row] = u_s, u_sv
+            out.v_late[row] = state.line[(k - V_DELAY) % DELAY_LINE, :n]
+            out.u_late[row] = state.line[(k - U_DELAY) % DELAY_LINE, n : 2 * n]
+            out.phi_late[row] = state.line[(k - PHI_DELAY) % DELAY_LINE, 2 * n : 2 * n + 2]
+            out.steer_u_late[row] = state.line[(k - U_DELAY) % DELAY_LINE, 2 * n + 2 :]
+            body[:] = state.body
+        _move(k, slope[j], u_v, p, m, state, s, slip, flow)
+        if recorded:
+            out.slip[row], out.body[row] = slip, body
+            row += 1
+        _steer(u_sv, p, m, state)
