@@ -22,6 +22,7 @@ Examples:
   mfhca simulate -o worn.mcap --set K=1.6 --set dead_zone=0.03 --set leakage=0.01
   mfhca simulate -o lossy.mcap --rate 200 --set jitter=0.5 --set drop_share=0.02
   mfhca simulate -o other.mcap --vary --seed 7
+  mfhca simulate -o foreign.mcap --set structure=valves --rate 500 --evidence base
 
 \b
 A fault is PART SIDE MODE START STOP [eps=] [sat=] [std=] [tau=] [ramp=]: part FR FL RR RL front
@@ -33,7 +34,10 @@ the time over which eps grows from 0.
 Keys of --set, SI units. Machine: K tau wheel_spread tau_spread dead_zone valve_lag droop leakage
 pump_flow mass friction ice_friction slip_stiffness rolling_resistance v_std v_lsb phi_std phi_lsb.
 Controller: lambda k_ps zeta psi0. Ground: steepness. Scenario: ramp_share ramp_max_s early_share
-(growing faults, faults from the first sample). Recorder: jitter drop_share drop_burst_s."""
+(growing faults, faults from the first sample). Recorder: jitter drop_share drop_burst_s.
+structure=NAME: a machine of another structure, its sizes drawn by the seed: valves (dead band,
+hysteresis, resonance), pump (shared, load-dependent, warming), torque (drives that accelerate),
+resonant_pump, sticky_valves, electric."""
 
 
 class Scenario(StrEnum):

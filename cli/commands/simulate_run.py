@@ -37,6 +37,7 @@ _PLANT = [
     "phi_std",
     "phi_lsb",
 ]
+_DRAWN = ("K", "tau", "wheel_spread", "tau_spread", "dead_zone", "valve_lag", "droop", "leakage", "pump_flow")
 _CONTROL = {"lambda": "lambda_", "k_ps": "k_ps"}
 _MISSION = [
     "zeta",
@@ -167,15 +168,24 @@ def _changed(options: SimulationOptions, settings: list[str]) -> SimulationOptio
         Where a key is not known or a value is no number in its range.
     """
     values: dict[str, float] = {}
+    structure = options.structure
     for words in settings:
         key, _, text = words.partition("=")
+        if key == "structure":
+            from replay.simulation.structures import StructureOptions
+
+            structure = StructureOptions(text)
+            continue
         if key not in (*_PLANT, *_CONTROL, *_MISSION):
-            known = ", ".join((*_PLANT, *_CONTROL, *_MISSION))
+            known = ", ".join((*_PLANT, *_CONTROL, *_MISSION, "structure"))
             raise ConfigError(f"--set {words}: {key!r} is not known; expected KEY=VALUE with KEY one of {known}")
         try:
             values[key] = float(text)
         except ValueError as error:
             raise ConfigError(f"--set {words}: {text!r} is no number") from error
+    given = [key for key in _DRAWN if key in values]
+    if structure is not None and given:
+        raise ConfigError(f"--set {given[0]}: a machine of another structure draws its own; leave it out, or structure")
     plant: dict[str, Any] = {key: values[key] for key in _PLANT if key in values}
     control: dict[str, Any] = {_CONTROL[key]: values[key] for key in _CONTROL if key in values}
     mission: dict[str, Any] = {key: values[key] for key in _MISSION if key in values}
@@ -184,5 +194,6 @@ def _changed(options: SimulationOptions, settings: list[str]) -> SimulationOptio
         options,
         plant=replace(options.plant, **plant),
         machine=replace(machine, control=replace(machine.control, **control)),
+        structure=structure,
         **mission,
     )
