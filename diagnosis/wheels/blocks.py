@@ -140,28 +140,21 @@ def blocks_of(
     opening, parts = Column(np.float64, (wheels,)), []
     ends = [_Ends(_usual_gap(status[:, i])) for i in range(wheels)]
     for cut in blocks(size, width):
-        fill = -size % width if cut.stop == size else 0
-        edge = ((0, fill), (0, 0))
         beyond = without_nan(u[cut])
-        beyond = np.pad(np.sign(beyond) * np.maximum(np.abs(beyond) - dead, 0.0), edge, mode="edge")
-        opening.append(beyond)
-        shape = (len(beyond) // width, width, wheels)
-
-        def framed(values: NDArray[Any], edge: Any = edge, shape: tuple[int, ...] = shape) -> NDArray[Any]:
-            return np.pad(values, edge, mode="edge").reshape(shape)
-
-        mean, count, jitter, state = _samples(y[cut], status[cut], width, shape[0], ends)
+        beyond = _framed(np.sign(beyond) * np.maximum(np.abs(beyond) - dead, 0.0), width)
+        opening.append(beyond.reshape(-1, wheels))
+        mean, count, jitter, state = _samples(y[cut], status[cut], width, len(beyond), ends)
         parts.append(
             _Part(
                 y=mean,
                 count=count,
                 jitter=jitter,
-                unsteady=beyond.reshape(shape).std(axis=1),
+                unsteady=beyond.std(axis=1),
                 status=state,
-                quiet=np.asarray(framed(quiet[cut]).all(axis=1)),
-                ratio=framed(ratio[cut]).mean(axis=1),
-                turn=framed(turn[cut]).mean(axis=1),
-                blind=framed(~np.isfinite(u[cut])).mean(axis=1) > 0.5,
+                quiet=np.asarray(_framed(quiet[cut], width).all(axis=1)),
+                ratio=_framed(ratio[cut], width).mean(axis=1),
+                turn=_framed(turn[cut], width).mean(axis=1),
+                blind=_framed(~np.isfinite(u[cut]), width).mean(axis=1) > 0.5,
             )
         )
         release(y, u, ratio, turn)
@@ -171,6 +164,12 @@ def blocks_of(
         quick = np.stack([np.abs(white_part(driven[:, i])) for i in range(wheels)], axis=1)
         whole["unsteady"] = np.maximum(whole["unsteady"], quick.reshape(-1, width, wheels).mean(axis=1))
     return WheelBlocks(width=width, raw_dt=dt, u=driven, **whole)
+
+
+def _framed(values: NDArray[Any], width: int) -> NDArray[Any]:
+    """Samples of all wheels by block, shape (n, width, wheels); the last block is filled up with the last sample."""
+    filled = np.pad(values, ((0, -len(values) % width), (0, 0)), mode="edge")
+    return filled.reshape(-1, width, values.shape[1])
 
 
 @dataclass(frozen=True)

@@ -30,7 +30,7 @@ _STEER_HZ = 3.0
 
 @dataclass(frozen=True)
 class WheelChannels:
-    """Speeds and openings of all wheels, shape (n, wheels), and which of them are measured twice (wheels,)."""
+    """Speeds and openings of all wheels, shape (n, wheels), and which of them are measured by two instruments (wheels,)."""
 
     v: Array
     u: Array
@@ -194,10 +194,8 @@ def wheels_data(
     ----------
     timeline, replay, machine
         The aligned mission, the replayed loop and the machine.
-    channels : WheelChannels
-        Speeds and openings of all wheels.
-    fit : WheelModelFit
-        Their models.
+    channels, fit
+        Speeds and openings of all wheels, and their models.
     counts : dict[str, NDArray[np.int16]]
         From `diagnosis.channels.liveness.alive_sources`.
     angle : Array, shape (n, axles)

@@ -134,14 +134,10 @@ def judge(
 
     Parameters
     ----------
-    run : Run
-        The run.
+    run, model, limits
+        The run, its wheel, and what counts.
     y : Array, shape (stop − start,)
         Measured speed [m/s]; NaN where there is none.
-    model : WheelFilterModel
-        The wheel.
-    limits : Limits
-        What counts.
     names : tuple[str, str]
         Speed and opening, for the text.
     dt : float

@@ -1,7 +1,7 @@
 """Rigid-body parity: four wheel speeds and the steering angles agree on one motion of the body, unless a wheel slips.
 
 A wheel whose speed breaks the parity while it obeys its own valve slips, as on ice; whether its sensor has lost gain
-cannot be told at that moment.
+cannot be distinguished at that moment.
 """
 
 from __future__ import annotations

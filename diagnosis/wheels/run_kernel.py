@@ -111,7 +111,8 @@ def _scan_runs(
             if n < runs.stop[r]:
                 for m in range(models):
                     out.evidence[r, m] += gain[m]
-                out.mean[r], out.cov[r] = z, P
+                if n + 1 == runs.stop[r]:
+                    out.mean[r], out.cov[r] = z, P
             if runs.model[r] == HEALTHY and n < runs.stop[r]:  # a fault leaves the expectation alone
                 free_z[0], free_P[0] = z[HEALTHY], P[HEALTHY]
         old = runs.model[r]

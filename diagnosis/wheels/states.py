@@ -15,7 +15,7 @@ from diagnosis.wheels.findings import WheelFindings, WheelPath
 from diagnosis.wheels.inputs import WheelsData
 from replay.faults import Side, State
 
-_DOUBTED = 0.02  # probability of a fault from which on slip and a sensor's loss are not told apart
+_DOUBTED = 0.02  # probability of a fault from which on slip and a sensor's loss are not distinguished
 _REASONS = {
     State.NOT_EXCITED: "the wheel is neither commanded nor moving",
     State.MASKED: "the speed sensor that would show it delivers nothing usable",

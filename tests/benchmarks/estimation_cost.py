@@ -22,7 +22,7 @@ from accuracy import EVIDENCE, signals_of
 
 from diagnosis import assess
 from diagnosis.channels.liveness import alive_sources
-from diagnosis.decision.decide import intervals_of
+from diagnosis.decision.intervals import intervals_of
 from diagnosis.steering.assess import assess_steering
 from replay.control.loop import replay_loop
 from replay.machine.config import haulotte

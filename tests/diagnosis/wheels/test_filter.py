@@ -1,4 +1,4 @@
-"""All wheels filtered together: parts of a mission, evidence over runs against a loop, faults told apart by their rows."""
+"""All wheels filtered together: parts of a mission, evidence over runs against a loop, faults isolated by their rows."""
 
 from __future__ import annotations
 

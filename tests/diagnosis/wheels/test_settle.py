@@ -49,17 +49,17 @@ def blocks(applied: Array, u: Array) -> WheelBlocks:
     return blocks_of(y, u, status, np.zeros(u.shape, dtype=np.bool_), unknown, unknown, np.zeros(4), RAW)
 
 
-def test_others_may_be_told_in_which_model_a_wheel_is() -> None:
+def test_the_others_may_be_given_the_model_of_a_wheel() -> None:
     u = openings()
     cut = blocks(u, u)
     given = np.full(cut.y.shape, STAY, dtype=np.uint8)
     own = forward(cut, MODEL)
     assert_array_equal(forward(cut, MODEL, given=given).inputs, own.inputs)
     given[:, 2] = A_NONE
-    told = forward(cut, MODEL, given=given)
+    silent = forward(cut, MODEL, given=given)
     asked = WHEEL.K * np.abs(u)
     others = asked[:, 1] + asked[:, 3]
-    for done, rest in ((own, others + asked[:, 2]), (told, others)):
+    for done, rest in ((own, others + asked[:, 2]), (silent, others)):
         share = np.minimum(1.0, FLOW / np.maximum(rest, 1e-9)).reshape(-1, WIDTH).mean(axis=1)
         assert_allclose(done.inputs[:, 0, SHARE_NONE], share, rtol=1e-9)
 

@@ -218,7 +218,7 @@ def test_steps_speak_by_their_distribution(m: int) -> None:
     q = block(3, np.nan, samples)
     freedom = 2 * samples / 3
 
-    def told(model: int) -> tuple[float, float]:
+    def spoken(model: int) -> tuple[float, float]:
         z, P, k = entered(model, 0.0)
         oracle = Oracle(model, z[model], P[model], 0.0)
         steps = oracle.white()[2]
@@ -226,7 +226,7 @@ def test_steps_speak_by_their_distribution(m: int) -> None:
         density = gamma.logpdf(0.5 * q.jitter, freedom / 2, scale=2 * steps / freedom)
         return correct(model, q, 0.0, k, z, P) - mean, float(density)
 
-    (got, density), (healthy, reference) = told(m), told(HEALTHY)
+    (got, density), (healthy, reference) = spoken(m), spoken(HEALTHY)
     most = -0.5 * freedom * (1 + np.log(0.5 * q.jitter))
     assert got == pytest.approx(max(healthy + density - reference, most - 25.0), abs=1e-9)
 

@@ -1,4 +1,4 @@
-"""From a run to a finding: probabilities, rows that standing still cannot tell apart, limits, ε̂, onsets."""
+"""From a run to a finding: probabilities, rows that look alike at standstill, limits, ε̂."""
 
 from __future__ import annotations
 
@@ -22,7 +22,6 @@ from diagnosis.wheels.models import (
     S_WHITE_8,
     WheelFilterModel,
 )
-from diagnosis.wheels.onset import onset_sentence, refined
 from replay.faults import FaultMode, Side
 from replay.machine.config import Limits
 
@@ -43,14 +42,14 @@ Array = np.ndarray
 
 def run(model: int, evidence: dict[int, float], gain: float = 0.5, level: float = 0.2, gain_std: float = 0.01) -> Run:
     """A run whose models have this log-evidence, healthy 0 and the others far below."""
-    told = np.full(MODELS, -1e4)
-    told[HEALTHY] = 0.0
+    log_evidence = np.full(MODELS, -1e4)
+    log_evidence[HEALTHY] = 0.0
     for m, value in evidence.items():
-        told[m] = value
+        log_evidence[m] = value
     mean, cov = np.zeros((MODELS, 4)), np.zeros((MODELS, 4, 4))
     mean[:, 1], mean[:, 3] = gain, level
     cov[:, 1, 1], cov[:, 3, 3] = gain_std**2, 0.01**2
-    return Run(1000, 1000 + SIZE, model, told, mean, cov)
+    return Run(1000, 1000 + SIZE, model, log_evidence, mean, cov)
 
 
 def moving(level: float = 0.2) -> Array:
@@ -218,43 +217,3 @@ def test_saturation_terms() -> None:
     assert valve is not None
     assert valve.sat is not None
     assert valve.sat.mean == pytest.approx(0.12 / MODEL.K / 0.5)
-
-
-def jumping(size: int = 200, at: int = 100) -> Array:
-    y = 0.2 + 0.002 * np.sin(np.arange(size) / 3)
-    y[at:] -= 0.15
-    return y
-
-
-def test_a_sensors_fault_begins_where_it_jumps() -> None:
-    y = jumping()
-    for start in (92, 100, 113):
-        assert refined(start, y, 20, S_GAIN, 0.004) == 100
-    assert refined(150, y, 20, S_GAIN, 0.004) == 150
-    assert refined(92, y, 20, A_GAIN, 0.004) == 92  # a valve's bends
-    assert refined(0, y[:1], 20, S_GAIN, 0.004) == 0
-
-
-def test_a_stuck_sensor_begins_with_the_last_change() -> None:
-    y = 0.2 + 0.002 * np.sin(np.arange(200) / 3)
-    y[103:] = y[103]
-    assert refined(110, y, 20, S_STUCK, 0.004) == 103
-    assert refined(150, y, 20, S_STUCK, 0.004) == 129
-    assert refined(0, y[103:], 20, S_STUCK, 0.004) == 0
-
-
-def test_onsets_in_words() -> None:
-    y = jumping()
-
-    def words(start: int, side: Side, y: Array = y, dt: float = DT) -> str:
-        return onset_sentence(start, y, MODEL, dt, "v", side)
-
-    assert "jumps by 0.15 m/s" in words(100, Side.SENSOR)
-    assert words(100, Side.SENSOR).endswith("(38 times its noise): a sensor can, a wheel cannot.")
-    assert words(100, Side.SENSOR, dt=0.02).endswith("(38 times its noise).")  # in 20 ms a wheel can
-    assert words(100, Side.ACTUATOR).endswith("a valve's fault alone does not explain that.")
-    assert "bends with its lag" in words(100, Side.ACTUATOR, dt=0.02)
-    assert "bends with its lag" in words(50, Side.ACTUATOR)
-    assert "no step of v exceeds" in words(50, Side.SENSOR)
-    assert "from the first sample" in words(0, Side.SENSOR)
-    assert "exceeds 0 m/s" in words(5, Side.SENSOR, np.full(9, np.nan))
