@@ -72,7 +72,27 @@ def make_pair(
     span: float,
     machine: Machine,
 ) -> Pair:
-    """Channel and reference of one component and side."""
+    """Channel and reference of one component and side.
+
+    Parameters
+    ----------
+    timeline : Timeline
+        The aligned mission.
+    counts : dict[str, NDArray[np.int16]]
+        From `diagnosis.channels.liveness.alive_sources`.
+    side : Side
+        `SENSOR` or `ACTUATOR`.
+    y_name, x_name : str
+        Canonical names of the channel and of its reference.
+    quiet : NDArray[np.bool_], shape (n,)
+        Where the component is neither commanded nor moving.
+    unit : str
+        Unit of both.
+    span : float
+        Largest plausible magnitude [unit]; larger where the log has larger values.
+    machine : Machine
+        Its file may give the channel's noise.
+    """
     y, x = timeline.signals[y_name], timeline.signals[x_name]
     largest = 0.0
     if np.isfinite(y).any():

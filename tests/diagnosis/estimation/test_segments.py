@@ -1,4 +1,4 @@
-"""Cutting a path of rows into runs, and tidying them."""
+"""Cutting a path of rows into runs, merging and trimming them."""
 
 from __future__ import annotations
 
@@ -47,10 +47,10 @@ def test_runs_cover_the_path_without_gaps(models: list[int]) -> None:
     assert got[0].start == 0
     assert got[-1].stop == len(models)
     assert all(a.stop == b.start for a, b in itertools.pairwise(got))
-    tidy = absorb_short(got, 4)
-    assert tidy[0].start == 0
-    assert tidy[-1].stop == len(models)
-    assert all(a.stop == b.start for a, b in itertools.pairwise(tidy))
+    merged = absorb_short(got, 4)
+    assert merged[0].start == 0
+    assert merged[-1].stop == len(models)
+    assert all(a.stop == b.start for a, b in itertools.pairwise(merged))
 
 
 def test_short_faulty_runs_join_the_longer_faulty_neighbour() -> None:
