@@ -20,7 +20,6 @@ from diagnosis.wheels.assess import assess_wheels
 from diagnosis.wheels.identification import WheelModelFit, low_passed
 from diagnosis.wheels.inputs import slip_of, wheel_channels, wheel_fit, wheels_data
 from replay.arrays.numeric import without_nan
-from replay.arrays.spill import beside, in_blocks, keep
 from replay.control.loop import Replay
 from replay.faults import Side, State
 from replay.machine.config import Machine
@@ -120,7 +119,7 @@ class _Wheel:
         def low(command: Array, speed: Array) -> NDArray[np.bool_]:
             return np.asarray((np.abs(without_nan(command)) < limit) & (np.abs(without_nan(speed)) < limit))
 
-        return in_blocks(low, self.replay.v_ref[:, self.index], expected)
+        return self.timeline.map(low, self.replay.v_ref[:, self.index], expected)
 
     def span(self, leaf: str) -> float:
         if leaf in ("u", "u_applied"):
@@ -137,7 +136,8 @@ class _Wheel:
         command = self.replay.v_ref[:, self.index]
         if not np.isfinite(command).any():
             return None
-        return beside([command, *(keep(low_passed(command, lag, self.timeline.dt)) for lag in (0.1, 0.3))])
+        store, dt = self.timeline.store, self.timeline.dt
+        return store.beside([command, *(store.keep(low_passed(command, lag, dt)) for lag in (0.1, 0.3))])
 
     def sensor(self, direct: bool, model: tuple[Assessment, Assessment] | None) -> Assessment:
         size = self.timeline.size
@@ -156,7 +156,7 @@ class _Wheel:
         size = self.timeline.size
         if direct and np.isfinite(self.values("u")).any():
             least = 0.02 * self.span("u")
-            idle = in_blocks(lambda u: np.abs(without_nan(u)) < least, self.values("u"))
+            idle = self.timeline.map(lambda u: np.abs(without_nan(u)) < least, self.values("u"))
             return assess_pair(self.pair(Side.ACTUATOR, "u_applied", "u", idle, "of full opening"), self.machine.limits)
         if direct:
             return unassessed(size, State.NOT_ASSESSED, "the valve's position is logged but not its command")

@@ -17,7 +17,6 @@ from diagnosis.results.assessment import Assessment
 from diagnosis.results.closeups import closeups_of
 from diagnosis.results.result import MissionResult
 from diagnosis.results.vocabulary import Tier
-from replay.arrays import spill
 from replay.arrays.column_store import ColumnStore
 from replay.arrays.envelope import bucket_of
 from replay.control.loop import Replay, replay_loop
@@ -129,7 +128,6 @@ def _diagnosed(
 ) -> MissionResult:
     def publish(stage: Progress) -> None:
         mission.timeline.store.release()
-        spill.STORE.release()
         progress(stage)
 
     publish(Progress(Stage.REPLAYING_LOOP))
@@ -173,7 +171,6 @@ def _result(
     report = report_of_mission(judged, machine_row(machine, mission, machine_source, machine_id))
     timeline = mission.timeline
     timeline.store.release()
-    spill.STORE.release()
     columns: dict[str, Array] = dict(replay_columns(timeline, replay, machine))
     for (component, side), assessment in found.assessments.items():
         columns.update({f"evidence.{component}.{side}.{leaf}": x for leaf, x in assessment.columns.items()})

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from diagnosis.results.assessment import CODE, Assessment, Finding
 from diagnosis.results.result import Epsilon, Hypothesis, Sat
 from diagnosis.results.vocabulary import Tier
-from replay.arrays.spill import blocks
+from replay.arrays.blocks import blocks
 from replay.faults import FaultMode, Side, State
 from replay.signals.resolution import rounding_step, white_noise
 

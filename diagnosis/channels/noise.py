@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from replay.arrays.spill import blocks
+from replay.arrays.blocks import blocks
 from replay.signals.resolution import rounding_step as rounding_step
 from replay.signals.resolution import white_noise as white_noise
 from replay.signals.resolution import windows as _windows

@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 
 from diagnosis.results.assessment import CODE, Assessment, Finding
 from replay.arrays.envelope import bucket_of
-from replay.arrays.spill import blocks
 from replay.faults import State
 from replay.signals.timeline import Timeline
 
@@ -28,7 +27,7 @@ def recording_gaps(timeline: Timeline) -> list[Gap]:
     if not fresh:
         return []
     found, last = [], -1
-    for part in blocks(timeline.size):
+    for part in timeline.blocks():
         seen = np.flatnonzero(np.logical_or.reduce([f[part] for f in fresh])) + part.start
         seen = np.r_[last, seen]
         wide = np.flatnonzero(np.diff(seen) > least)

@@ -12,7 +12,6 @@ from diagnosis.results.assessed import needed_s
 from diagnosis.results.assessment import STATES, Assessment
 from diagnosis.results.result import FaultInterval
 from diagnosis.results.vocabulary import Kind, Tier, part_words
-from replay.arrays.spill import blocks
 from replay.faults import DECIDED, State
 from replay.machine.config import Limits, Machine
 from replay.mission import Mission
@@ -168,6 +167,6 @@ def _without_speed(timeline: Timeline, machine: Machine) -> float:
     names = [f"wheel.{w}.{x}" for w in machine.wheels for x in ("v", "v_true")]
     speeds = [timeline.signals[n] for n in names if n in timeline.signals]
     steps = sum(
-        int(np.count_nonzero(~np.isfinite([v[part] for v in speeds]).any(axis=0))) for part in blocks(timeline.size)
+        int(np.count_nonzero(~np.isfinite([v[part] for v in speeds]).any(axis=0))) for part in timeline.blocks()
     )
     return steps * timeline.dt if speeds else 0.0

@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 
 from diagnosis.results.assessment import STATES, Assessment
 from diagnosis.results.document import CoverageRow, LoopRow, MeanRow, MetricsRow, PaperRow, PhaseRow
+from replay.arrays.blocks import blocks
 from replay.arrays.envelope import shown
 from replay.arrays.numeric import without_nan
-from replay.arrays.spill import blocks, in_blocks
 from replay.control.loop import Replay, any_finite, stack
 from replay.faults import DECIDED, Side
 from replay.machine.config import Machine
@@ -36,7 +36,7 @@ def driving(replay: Replay, timeline: Timeline, machine: Machine) -> NDArray[np.
     limit = machine.limits.driving_speed
     v = replay.v_ref if commanded.all() else stack(timeline, [f"wheel.{w}.v" for w in machine.wheels])
     with np.errstate(invalid="ignore"):
-        return in_blocks(lambda ref, y: np.abs(np.where(commanded, ref, y)) > limit, replay.v_ref, v)
+        return timeline.map(lambda ref, y: np.abs(np.where(commanded, ref, y)) > limit, replay.v_ref, v)
 
 
 def loop_metrics(timeline: Timeline, replay: Replay, machine: Machine, moving: NDArray[np.bool_]) -> MetricsRow:
@@ -48,7 +48,7 @@ def loop_metrics(timeline: Timeline, replay: Replay, machine: Machine, moving: N
     per_wheel: dict[str, LoopRow] = {}
     for i, wheel in enumerate(machine.wheels):
         v, true, u = (timeline.signals.get(f"wheel.{wheel}.{x}", nothing) for x in ("v", "v_true", "u"))
-        if any(np.isfinite(true[part]).any() for part in blocks(timeline.size)):
+        if any(np.isfinite(true[part]).any() for part in timeline.blocks()):
             v = true
         elif timeline.open_loop:
             v = nothing
@@ -121,7 +121,7 @@ def body_motion(timeline: Timeline, replay: Replay, machine: Machine) -> tuple[A
     """Commanded or mean measured speed of the body [m/s], and its yaw rate where known [rad/s]."""
     v = timeline.get("cmd.v")
     if v is None or not np.isfinite(v).any():
-        v = in_blocks(_mean_speed, replay.v_ref, stack(timeline, [f"wheel.{w}.v" for w in machine.wheels]))
+        v = timeline.map(_mean_speed, replay.v_ref, stack(timeline, [f"wheel.{w}.v" for w in machine.wheels]))
     omega = timeline.get("cmd.omega")
     return v, np.broadcast_to(0.0, v.shape) if omega is None else omega
 
@@ -144,7 +144,7 @@ def phases(timeline: Timeline, replay: Replay, machine: Machine) -> list[PhaseRo
         code = np.where(speed > limit, 1, np.where(speed < -limit, 2, 0))
         return np.where(unknown, 4, np.where((code > 0) & turning, 3, code)).astype(np.int8)
 
-    code = in_blocks(coded, v, omega)
+    code = timeline.map(coded, v, omega)
     names = ("standstill", "forward", "reverse", "turning", "unknown")
     cut = np.flatnonzero(np.r_[True, code[1:] != code[:-1]])
     out: list[PhaseRow] = []

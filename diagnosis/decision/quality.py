@@ -13,7 +13,7 @@ from diagnosis.decision.missing import cost_of_missing
 from diagnosis.results.assessment import Assessment
 from diagnosis.results.document import ClockRow, MissingRow, QualityRow, SignalRow
 from diagnosis.wheels.identification import WheelModelFit
-from replay.arrays.spill import blocks, release
+from replay.arrays.blocks import blocks, release
 from replay.clocks.source_clock import SourceClock
 from replay.machine.config import Machine
 from replay.signals.signal import Signal, Signals

@@ -37,7 +37,7 @@ def assess_pair(pair: Pair, limits: Limits) -> Assessment:
         Smallest ε and saturation term that count.
     """
     found = identify(pair, limits)
-    path = most_probable(with_consistent(found.samples, found.model.noise), found.model)
+    path = most_probable(with_consistent(found.samples, found.model.noise), found.model, pair.store)
     faults = find_faults(path, found, limits)
     states = _states(found, faults)
     y, x, status, _ = found.samples

@@ -14,8 +14,8 @@ from diagnosis.estimation.gain_bias import GainBiasModel, track_gain_bias
 from diagnosis.estimation.viterbi import ModePath
 from diagnosis.results.evidence_columns import Pictured
 from diagnosis.results.fault_rows import ROWS
+from replay.arrays.blocks import release
 from replay.arrays.envelope import bucket_of, envelope, in_buckets
-from replay.arrays.spill import Column, blocks, in_blocks, release
 
 _SERIES = ("residual", "threshold", "expected", "delta", "delta_std", "delta_bar", "delta_bar_std")
 
@@ -33,7 +33,7 @@ def evidence_columns(found: IdentifiedPair, path: ModePath, step: NDArray[np.int
         Steps of which every sample is wanted.
     """
     pair, noise, (y_all, x, status, _) = found.pair, found.model.noise, found.samples
-    bucket = bucket_of(x.size)
+    bucket, store = bucket_of(x.size), pair.store
     tracked = GainBiasModel(
         noise=noise,
         gain_walk=0.3,
@@ -43,10 +43,10 @@ def evidence_columns(found: IdentifiedPair, path: ModePath, step: NDArray[np.int
         relax_s=5.0,
         dt=pair.dt,
     )
-    columns = {name: Column(np.float64 if bucket == 1 else np.float32) for name in _SERIES}
+    columns = {name: store.column(np.float64 if bucket == 1 else np.float32) for name in _SERIES}
     near: dict[str, list[NDArray[Any]]] = {name: [] for name in _SERIES}
     state = None
-    for part in blocks(x.size):
+    for part in store.blocks(x.size, bucket):
         at = step[np.searchsorted(step, part.start) : np.searchsorted(step, part.stop)] - part.start
         use, y, ref = status[part] == PAIR, y_all[part], x[part]
         track = track_gain_bias(y, ref, use, tracked, state)
@@ -58,8 +58,8 @@ def evidence_columns(found: IdentifiedPair, path: ModePath, step: NDArray[np.int
             near[name].append(values[at].astype(np.float32))
         release(y_all, x)
     out = {name: column.finish() for name, column in columns.items()}
-    rows = in_buckets(np.asarray, bucket, path.filtered)
-    out["probability"] = in_blocks(lambda p: np.float32(1.0) - p[:, HEALTHY], rows)
+    rows = in_buckets(np.asarray, bucket, store, path.filtered)
+    out["probability"] = store.map(lambda p: np.float32(1.0) - p[:, HEALTHY], rows)
     out.update({f"p_{name}": rows[:, i] for i, name in enumerate(ROWS)})
     samples = {name: np.concatenate(parts) for name, parts in near.items()}
     exact = path.filtered[step]

@@ -23,7 +23,6 @@ from diagnosis.channels.sample_status import BLIND, PAIR, sample_status
 from diagnosis.direct.inputs import Pair
 from diagnosis.estimation.fault_models import ModeModel
 from diagnosis.estimation.samples import Samples
-from replay.arrays.spill import keep
 from replay.faults import Side
 from replay.machine.config import Limits
 
@@ -120,7 +119,7 @@ def identify(pair: Pair, limits: Limits) -> IdentifiedPair:
     max_lag = max(1, round(_MAX_LAG_S / pair.dt)) if pair.dt <= _MAX_LAG_S else 0
     least_lag = 0 if pair.side is Side.ACTUATOR else -max_lag
     lag = relative_lag(pair.y, pair.x, usable & ~pair.quiet, least_lag, max_lag)
-    x = keep(shifted(pair.x, lag))
+    x = pair.store.keep(shifted(pair.x, lag))
     status = sample_status(pair.y, x, pair.fresh, pair.alive, pair.dt)
     model, lsb = mode_model(pair, x, status, 0.25 * limits.min_sat)
     blind, share = np.zeros(x.size, dtype=np.bool_), 0.0

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
 from diagnosis.channels.liveness import alive
-from replay.arrays.spill import blocks
+from replay.arrays.column_store import ColumnStore
 from replay.faults import Side
 from replay.machine.config import Machine, Noise
 from replay.signals.timeline import Timeline
@@ -44,6 +44,8 @@ class Pair:
         From the machine file.
     instruments : Array, shape (n, k), or None
         Signals that drive x but know nothing of the fault; see `diagnosis.estimation.fault_size`.
+    store : ColumnStore
+        Where long columns stand.
     """
 
     side: Side
@@ -59,6 +61,7 @@ class Pair:
     x_name: str
     known_noise: Noise
     instruments: Array | None = None
+    store: ColumnStore = field(default_factory=ColumnStore, repr=False)
 
 
 def make_pair(
@@ -96,7 +99,7 @@ def make_pair(
     y, x = timeline.signals[y_name], timeline.signals[x_name]
     largest = 0.0
     if np.isfinite(y).any():
-        largest = max(float(np.nanmax(np.abs(z[part]), initial=0.0)) for z in (y, x) for part in blocks(timeline.size))
+        largest = max(float(np.nanmax(np.abs(z[part]), initial=0.0)) for z in (y, x) for part in timeline.blocks())
     return Pair(
         side=side,
         y=y,
@@ -110,4 +113,5 @@ def make_pair(
         y_name=y_name,
         x_name=x_name,
         known_noise=machine.noise.get(y_name, Noise()),
+        store=timeline.store,
     )

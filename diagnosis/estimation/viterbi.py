@@ -20,7 +20,8 @@ from diagnosis.estimation.fault_models import EXACT, HEALTHY, MODELS, ROW_OF_MOD
 from diagnosis.estimation.filter_kernel import FilterState, enter, entered_state, likelihoods
 from diagnosis.estimation.samples import Samples
 from diagnosis.results.fault_rows import ROWS
-from replay.arrays.spill import Column, blocks, release
+from replay.arrays.blocks import release
+from replay.arrays.column_store import ColumnStore
 
 Array = NDArray[np.float64]
 
@@ -193,11 +194,12 @@ def forward(samples: Samples, model: ModeModel, state: FilterState) -> tuple[Pat
     return out, state
 
 
-def most_probable(samples: Samples, model: ModeModel) -> ModePath:
-    """Most probable rows of a whole channel."""
+def most_probable(samples: Samples, model: ModeModel, store: ColumnStore | None = None) -> ModePath:
+    """Most probable rows of a whole channel; its long columns stand in `store` (None: one of their own)."""
+    store = store or ColumnStore()
     state = initial_state(model)
-    pointers, probabilities = Column(np.uint8, (MODELS,)), Column(np.float32, (len(ROWS),))
-    for part in blocks(samples.y.size):
+    pointers, probabilities = store.column(np.uint8, (MODELS,)), store.column(np.float32, (len(ROWS),))
+    for part in store.blocks(samples.y.size):
         found, state = forward(samples.at(part), model, state)
         pointers.append(found.back)
         probabilities.append(found.filtered)

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from diagnosis.results.assessment import Assessment
 from diagnosis.results.evidence_columns import Steps, steps_around
 from diagnosis.results.result import Closeups, FaultInterval
+from replay.arrays.blocks import blocks
 from replay.arrays.envelope import bucket_of
-from replay.arrays.spill import blocks
 from replay.control import mfhca
 from replay.control.loop import Replay
 from replay.control.loop_kernel import scan_wheel

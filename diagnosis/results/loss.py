@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from diagnosis.results.document import LossRow
 from diagnosis.results.result import Epsilon
-from replay.arrays.spill import blocks
+from replay.arrays.blocks import blocks
 
 Array = NDArray[np.float64]
 

@@ -20,7 +20,6 @@ from diagnosis.steering.models import model_of
 from diagnosis.steering.path import AxleFilter, allowed_models, most_probable
 from diagnosis.steering.path_refinement import refine_path
 from diagnosis.steering.states import REASONS, states_of
-from replay.arrays.spill import beside, in_blocks
 from replay.control.loop import Replay
 from replay.faults import Side, State
 from replay.machine.config import Machine
@@ -92,7 +91,7 @@ def assess_steering(
         doubts.append(doubt)
     if not axles:
         return SteeringResult({}, np.empty((timeline.size, 0)), np.empty((timeline.size, 0), np.bool_))
-    return SteeringResult(assessments, beside(angles), beside(doubts))
+    return SteeringResult(assessments, timeline.store.beside(angles), timeline.store.beside(doubts))
 
 
 def _plants(axles: Sequence[AxleInputs], machine: Machine, progress: Subscriber) -> dict[str, SteeringPlant | None]:
@@ -130,7 +129,7 @@ def _judged_by_model(inputs: AxleInputs, blocks: SteeringBlocks, plant: Steering
             notes=(_note(axle),),
             unexplained_s=unexplained * inputs.timeline.dt,
         )
-    return _Judged(sides, path_angle(axle, path, inputs.timeline.size))
+    return _Judged(sides, path_angle(axle, path, inputs.timeline))
 
 
 def _note(axle: AxleFilter) -> str:
@@ -176,4 +175,5 @@ def _best_angle(inputs: AxleInputs, sensor: Assessment, judged: _Judged | None) 
     def doubted(fine: Flags, usable: Flags, phi: Array, model: Array, true: Array) -> Flags:
         return (~fine | ~np.isfinite(np.where(usable, phi, model))) & ~np.isfinite(true)
 
-    return in_blocks(chosen, usable, phi, model, true), in_blocks(doubted, fine, usable, phi, model, true)
+    both = inputs.timeline.map
+    return both(chosen, usable, phi, model, true), both(doubted, fine, usable, phi, model, true)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,9 +11,10 @@ from numpy.typing import NDArray
 from diagnosis.channels.noise import rounding_step
 from diagnosis.channels.sample_status import PAIR, SILENT, SKIP
 from diagnosis.steering.filter_state import BlockSeries, Redundancy
+from replay.arrays.blocks import blocks as cut
+from replay.arrays.blocks import release
+from replay.arrays.column_store import ColumnStore
 from replay.arrays.numeric import without_nan
-from replay.arrays.spill import Column, release
-from replay.arrays.spill import blocks as cut
 from replay.machine.config import Noise
 
 Array = NDArray[np.float64]
@@ -49,6 +50,8 @@ class SteeringBlocks:
         Blocks in most of which nobody knows the opening.
     redundancy : Redundancy
         What is measured redundantly.
+    store : ColumnStore
+        Where long columns stand.
     """
 
     length: int
@@ -61,6 +64,7 @@ class SteeringBlocks:
     raw_u: Array
     blind: NDArray[np.bool_]
     redundancy: Redundancy
+    store: ColumnStore = field(default_factory=ColumnStore, repr=False)
 
     def driven(self, gain: float, rate: float) -> Array:
         """Mean of sat(gain·u) between the middles of blocks [rad/s], shape (m,); NaN in blind blocks."""
@@ -93,7 +97,14 @@ def second_differences(values: Array) -> Array:
     return out
 
 
-def blocks_of(y: Array, u: Array, fresh: NDArray[np.bool_], alive: NDArray[np.bool_], dt: float) -> SteeringBlocks:
+def blocks_of(
+    y: Array,
+    u: Array,
+    fresh: NDArray[np.bool_],
+    alive: NDArray[np.bool_],
+    dt: float,
+    store: ColumnStore | None = None,
+) -> SteeringBlocks:
     """Cut an axle's channels into blocks.
 
     Parameters
@@ -106,11 +117,14 @@ def blocks_of(y: Array, u: Array, fresh: NDArray[np.bool_], alive: NDArray[np.bo
         Whether another channel of y's source delivers.
     dt : float
         Step [s].
+    store : ColumnStore or None
+        Where long columns stand; None: one of their own.
     """
+    store = store or ColumnStore()
     length = max(1, round(_BLOCK_S / dt))
-    opening, parts = Column(np.float64), []
+    opening, parts = store.column(np.float64), []
     before = np.zeros(0)  # the last two new samples of the part before
-    for part in cut(y.size, length):
+    for part in store.blocks(y.size, length):
         near, missing = y[part], ~np.isfinite(y[part])
         starts = np.arange(0, near.size, length)
         new = fresh[part] & ~missing
@@ -131,7 +145,7 @@ def blocks_of(y: Array, u: Array, fresh: NDArray[np.bool_], alive: NDArray[np.bo
     mean, power, count, status, blind = (np.concatenate(x) for x in zip(*parts, strict=True))
     raw_u, redundancy = opening.finish(), Redundancy.nothing(mean.size)
     u_mean = _between(raw_u, length, mean.size)
-    return SteeringBlocks(length, length * dt, mean, power, count, u_mean, status, raw_u, blind, redundancy)
+    return SteeringBlocks(length, length * dt, mean, power, count, u_mean, status, raw_u, blind, redundancy, store)
 
 
 def window_means(x: Array, length: int) -> Array:

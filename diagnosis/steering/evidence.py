@@ -12,8 +12,8 @@ from diagnosis.results.evidence_columns import Pictured, steps_of
 from diagnosis.steering.filter_state import SteeringPath
 from diagnosis.steering.inputs import AxleInputs
 from diagnosis.steering.path import AxleFilter
-from replay.arrays.spill import Column, blocks
 from replay.faults import Side
+from replay.signals.timeline import Timeline
 
 Array = NDArray[np.float64]
 
@@ -50,11 +50,11 @@ def evidence_columns(
     }
 
 
-def path_angle(axle: AxleFilter, path: SteeringPath, size: int) -> Array:
-    """Angle along a path at every one of `size` samples [rad]."""
+def path_angle(axle: AxleFilter, path: SteeringPath, timeline: Timeline) -> Array:
+    """Angle along a path at every step [rad]."""
     length = axle.blocks.length
     middles = np.arange(path.model.size) * length + (length - 1) / 2
-    angle = Column(np.float64)
-    for part in blocks(size):
+    angle = timeline.store.column(np.float64, rows=timeline.size)
+    for part in timeline.blocks():
         angle.append(np.interp(np.arange(part.start, part.stop), middles, path.mean[:, 0]))
     return angle.finish()

@@ -131,7 +131,7 @@ def axle_inputs(timeline: Timeline, replay: Replay, machine: Machine, axle: int,
 def _with_blocks(inputs: AxleInputs, machine: Machine, counts: Counts) -> AxleInputs:
     """Add the blocks, the sensor's noise and what is measured redundantly."""
     timeline, channel, y, fresh = inputs.timeline, inputs.names[0], inputs.angle, inputs.fresh
-    blocks = blocks_of(y, inputs.command, fresh, alive(timeline, dict(counts), channel), timeline.dt)
+    blocks = blocks_of(y, inputs.command, fresh, alive(timeline, dict(counts), channel), timeline.dt, timeline.store)
     noise = sensor_noise(blocks, y[fresh & np.isfinite(y)], machine.noise.get(channel, Noise()), machine.max_steer)
     deviation = None
     if inputs.angle_redundant:

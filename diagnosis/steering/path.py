@@ -15,7 +15,6 @@ from diagnosis.steering.blocks import SteeringBlocks
 from diagnosis.steering.filter_state import Array, BlockSeries, FilterBank, SteeringPath
 from diagnosis.steering.model_bank import ACTUATOR, FIRST_HIDDEN, HEALTHY, HEALTHY_MODEL, MODELS, SENSOR, STATES
 from diagnosis.steering.models import FilterConstants, SteeringModel
-from replay.arrays.spill import scratch
 
 Models = NDArray[np.uint8]
 
@@ -92,8 +91,8 @@ def follow_path(axle: AxleFilter, models: Models) -> SteeringPath:
     size = models.size
     path = SteeringPath(
         model=models.copy(),
-        mean=scratch((size, STATES), np.float64),
-        cov=scratch((size, STATES, STATES), np.float64),
+        mean=axle.blocks.store.zeros((size, STATES), np.float64),
+        cov=axle.blocks.store.zeros((size, STATES, STATES), np.float64),
         noise=np.ones((size, 2)),
     )
     bank = path_kernel.empty_bank()

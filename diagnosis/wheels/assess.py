@@ -44,7 +44,7 @@ def assess_wheels(data: WheelsData, limits: Limits, *, gains: bool) -> dict[int,
     dict[int, tuple[Assessment, Assessment]]
         Sensor and actuator by wheel.
     """
-    blocks = blocks_of(data.y, data.u, data.status, data.quiet, data.ratio, data.turn, data.dead, data.dt)
+    blocks = blocks_of(data.y, data.u, data.status, data.quiet, data.ratio, data.turn, data.dead, data.dt, data.store)
     model = joint_model(data, blocks)
     done = settled(blocks, model, forward(blocks, model))
     out = {}

@@ -6,7 +6,7 @@ jumps) stays in the mean square of the steps, and onsets are refined at the raw 
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields
 from typing import Any
 
 import numpy as np
@@ -14,8 +14,9 @@ from numpy.typing import NDArray
 
 from diagnosis.channels.noise import white_part
 from diagnosis.channels.sample_status import PAIR, SILENT, SKIP
+from replay.arrays.blocks import release
+from replay.arrays.column_store import ColumnStore
 from replay.arrays.numeric import without_nan
-from replay.arrays.spill import Column, blocks, release
 
 Array = NDArray[np.float64]
 
@@ -66,6 +67,7 @@ class WheelBlocks:
     ratio: Array
     turn: Array
     blind: NDArray[np.bool_]
+    store: ColumnStore = field(default_factory=ColumnStore, repr=False)
 
     @property
     def dt(self) -> float:
@@ -88,6 +90,7 @@ class WheelBlocks:
             ratio=self.ratio[cut],
             turn=self.turn[cut],
             blind=self.blind[cut],
+            store=self.store,
         )
 
     def wander(self, speed_per_opening: Array) -> Array:
@@ -118,6 +121,7 @@ def blocks_of(
     turn: Array,
     dead: Array,
     dt: float,
+    store: ColumnStore | None = None,
 ) -> WheelBlocks:
     """Cut the wheels' channels into blocks.
 
@@ -135,11 +139,14 @@ def blocks_of(
         Dead zone of each valve [fraction].
     dt : float
         Step [s].
+    store : ColumnStore or None
+        Where long columns stand; None: one of their own.
     """
+    store = store or ColumnStore()
     width, (size, wheels) = block_width(dt), y.shape
-    opening, parts = Column(np.float64, (wheels,)), []
+    opening, parts = store.column(np.float64, (wheels,)), []
     ends = [_Ends(_usual_gap(status[:, i])) for i in range(wheels)]
-    for cut in blocks(size, width):
+    for cut in store.blocks(size, width):
         beyond = without_nan(u[cut])
         beyond = _framed(np.sign(beyond) * np.maximum(np.abs(beyond) - dead, 0.0), width)
         opening.append(beyond.reshape(-1, wheels))
@@ -163,7 +170,7 @@ def blocks_of(
     if width < 4:  # too few samples to see by themselves what changes within a block
         quick = np.stack([np.abs(white_part(driven[:, i])) for i in range(wheels)], axis=1)
         whole["unsteady"] = np.maximum(whole["unsteady"], quick.reshape(-1, width, wheels).mean(axis=1))
-    return WheelBlocks(width=width, raw_dt=dt, u=driven, **whole)
+    return WheelBlocks(width=width, raw_dt=dt, u=driven, store=store, **whole)
 
 
 def _framed(values: NDArray[Any], width: int) -> NDArray[Any]:

@@ -8,7 +8,6 @@ The wheels share one pump and, on the ground, one body: `diagnosis.wheels.joint_
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -29,8 +28,8 @@ from diagnosis.wheels.joint_kernel import (
 )
 from diagnosis.wheels.models import HEALTHY, MODELS, JointModel, WheelFilterModel
 from diagnosis.wheels.step_kernel import enter
-from replay.arrays import spill
-from replay.arrays.spill import Column, release
+from replay.arrays.blocks import blocks as cut_in
+from replay.arrays.blocks import release
 
 Array = NDArray[np.float64]
 
@@ -119,9 +118,10 @@ def forward(
     n, wheels = blocks.y.shape
     if state is None:
         state = initial_state(first_speeds(blocks), model, blocks.dt, blocks.raw_dt)
-    back = [Column(np.uint8, (MODELS,)) for _ in range(wheels)]
-    best, fault, inputs = Column(np.uint8, (wheels,)), Column(np.float64, (wheels,)), Column(np.float64, (wheels, 8))
-    for cut in cuts(n, width=blocks.width):
+    column = blocks.store.column
+    back = [column(np.uint8, (MODELS,)) for _ in range(wheels)]
+    best, fault, inputs = column(np.uint8, (wheels,)), column(np.float64, (wheels,)), column(np.float64, (wheels, 8))
+    for cut in cut_in(n, rows=max(1, blocks.store.block // blocks.width)):
         part = blocks if cut.stop - cut.start == n else blocks.part(cut.start, cut.stop)
         taken = np.full(part.y.shape, STAY, dtype=np.uint8) if given is None else given[cut]
         done = _forward(part, model, state, taken)
@@ -129,16 +129,10 @@ def forward(
         best.append(done.best)
         fault.append(done.fault)
         inputs.append(done.inputs)
-        for column, pointers in zip(back, done.back, strict=True):
-            column.append(pointers)
+        for kept, pointers in zip(back, done.back, strict=True):
+            kept.append(pointers)
         release(blocks.u)
-    return JointPass(tuple(column.finish() for column in back), best.finish(), fault.finish(), inputs.finish(), state)
-
-
-def cuts(size: int, width: int) -> Iterator[slice]:
-    """Parts of `size` blocks of `width` samples that hold about `ColumnStore.block` samples each."""
-    step = max(1, spill.STORE.block // width)
-    return (slice(at, min(at + step, size)) for at in range(0, size, step))
+    return JointPass(tuple(kept.finish() for kept in back), best.finish(), fault.finish(), inputs.finish(), state)
 
 
 def _forward(blocks: WheelBlocks, model: JointModel, state: JointState, given: NDArray[np.uint8]) -> JointPass:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
@@ -15,8 +15,9 @@ from diagnosis.channels.sample_status import sample_status
 from diagnosis.wheels.blocks import block_width
 from diagnosis.wheels.identification import WheelModelFit, demand, identify, low_passed_on
 from diagnosis.wheels.parity import slipping
+from replay.arrays.blocks import release
+from replay.arrays.column_store import ColumnStore
 from replay.arrays.numeric import without_nan
-from replay.arrays.spill import Column, blocks, in_blocks, release
 from replay.control.kinematics import low_pass, speed_ratios, wheel_angles
 from replay.control.loop import Replay, any_finite, stack
 from replay.machine.config import Machine, Noise, WheelPlant
@@ -36,6 +37,7 @@ class WheelChannels:
     u: Array
     true: Array
     applied: Array
+    store: ColumnStore = field(default_factory=ColumnStore, repr=False)
 
     def without_speed(self, wheels: Sequence[int]) -> WheelChannels:
         """The same with the measured speeds of some wheels left out."""
@@ -65,14 +67,16 @@ class WheelChannels:
         """The better speed of each wheel [m/s]."""
         if not self.has_true.any():
             return self.v
-        return in_blocks(lambda true, v: np.asarray(np.where(self.has_true, true, v)), self.true, self.v)
+        return self.store.map(lambda true, v: np.asarray(np.where(self.has_true, true, v)), self.true, self.v)
 
     @cached_property
     def opening(self) -> Array:
         """The better opening of each wheel [fraction]."""
         if not self.has_applied.any():
             return self.u
-        return in_blocks(lambda applied, u: np.asarray(np.where(self.has_applied, applied, u)), self.applied, self.u)
+        return self.store.map(
+            lambda applied, u: np.asarray(np.where(self.has_applied, applied, u)), self.applied, self.u
+        )
 
 
 @dataclass(frozen=True)
@@ -105,6 +109,8 @@ class WheelsData:
         ``auto``, ``free`` or ``ground``.
     dt : float
         Step [s].
+    store : ColumnStore
+        Where long columns stand.
     """
 
     y: Array
@@ -123,6 +129,7 @@ class WheelsData:
     flow: float
     coupling: str
     dt: float
+    store: ColumnStore = field(default_factory=ColumnStore, repr=False)
 
     @property
     def dead(self) -> Array:
@@ -132,9 +139,10 @@ class WheelsData:
 
 def wheel_channels(timeline: Timeline, machine: Machine) -> WheelChannels:
     """Channels of all wheels; NaN where a wheel lacks one."""
-    return WheelChannels(
-        *(stack(timeline, [f"wheel.{w}.{x}" for w in machine.wheels]) for x in ("v", "u", "v_true", "u_applied"))
+    v, u, true, applied = (
+        stack(timeline, [f"wheel.{w}.{x}" for w in machine.wheels]) for x in ("v", "u", "v_true", "u_applied")
     )
+    return WheelChannels(v, u, true, applied, timeline.store)
 
 
 def wheel_fit(channels: WheelChannels, replay: Replay, timeline: Timeline, machine: Machine) -> WheelModelFit | None:
@@ -147,7 +155,7 @@ def wheel_fit(channels: WheelChannels, replay: Replay, timeline: Timeline, machi
 
     def mean(function: Callable[..., NDArray[Any]], *columns: Array) -> Array:
         out = []
-        for part in blocks(timeline.size // width * width, width):
+        for part in timeline.store.blocks(timeline.size // width * width, width):
             x = np.asarray(function(*(c[part] for c in columns)), np.float64)
             out.append(x.reshape(-1, width, x.shape[1]).mean(axis=1))
             release(*columns)
@@ -173,9 +181,9 @@ def slip_of(
     if geometry is None or v.shape[1] < 4 or not any_finite(v).all() or not any_finite(angle).all():
         return np.zeros(v.shape, dtype=np.bool_)
     least = 2.5 * machine.limits.min_sat
-    turned = in_blocks(lambda a: wheel_angles(a, geometry), angle)
-    slip = slipping(v, angle, replay.phi_ref, turned, geometry, timeline.dt, least)
-    return in_blocks(lambda s, d: s & ~d.any(axis=1)[:, None], slip, doubtful)
+    turned = timeline.map(lambda a: wheel_angles(a, geometry), angle)
+    slip = slipping(v, angle, replay.phi_ref, turned, geometry, timeline.dt, least, timeline.store)
+    return timeline.map(lambda s, d: s & ~d.any(axis=1)[:, None], slip, doubtful)
 
 
 def wheels_data(
@@ -210,15 +218,15 @@ def wheels_data(
     residual: list[Array] = [np.broadcast_to(np.nan, (timeline.size,))] * len(names)
     has = any_finite(y) & any_finite(u)
     plants = [plant if has[i] else None for i, plant in enumerate(fit.plants)]
-    starved = _starved(fit, u, machine.plant.flow, dt)
+    starved = _starved(fit, u, machine.plant.flow, timeline)
     limit = _QUIET * machine.limits.driving_speed
     for i, (plant, (speed, _)) in enumerate(zip(plants, names, strict=True)):
         if plant is None:
             continue
         status[:, i] = sample_status(y[:, i], u[:, i], timeline.fresh[speed], alive(timeline, counts, speed), dt)
-        apart, quiet[:, i] = _apart(y[:, i], u[:, i], replay.v_ref[:, i], plant, limit, dt)
-        residual[i] = in_blocks(lambda s, r: np.where(s, np.nan, r), starved, apart)
-    ratio, turn = _in_motion(angle, machine, timeline.size, dt)
+        apart, quiet[:, i] = _apart(y[:, i], u[:, i], replay.v_ref[:, i], plant, limit, timeline)
+        residual[i] = timeline.map(lambda s, r: np.where(s, np.nan, r), starved, apart)
+    ratio, turn = _in_motion(angle, machine, timeline)
     return WheelsData(
         y=y,
         u=u,
@@ -236,55 +244,60 @@ def wheels_data(
         flow=machine.plant.flow or 1e9,
         coupling=machine.plant.coupling,
         dt=dt,
+        store=timeline.store,
     )
 
 
 def _apart(
-    y: Array, u: Array, v_ref: Array, plant: WheelPlant, limit: float, dt: float
+    y: Array, u: Array, v_ref: Array, plant: WheelPlant, limit: float, timeline: Timeline
 ) -> tuple[Array, NDArray[np.bool_]]:
     """Speed beyond what the opening drives [m/s], and where the wheel is neither commanded nor driven."""
-    residual, quiet = Column(np.float64, rows=y.size), Column(np.bool_, rows=y.size)
-    state: float | None = None
-    for part in blocks(y.size):
-        beyond = np.sign(u[part]) * np.maximum(np.abs(u[part]) - plant.dead, 0.0)
+
+    def apart(
+        state: float | None, y: Array, u: Array, v_ref: Array
+    ) -> tuple[tuple[Array, NDArray[np.bool_]], float | None]:
+        beyond = np.sign(u) * np.maximum(np.abs(u) - plant.dead, 0.0)
         asked = np.abs(plant.K * without_nan(beyond))
-        quiet.append((np.abs(without_nan(v_ref[part])) < limit) & (asked < limit))
-        driven, state = low_passed_on(beyond, plant.tau, dt, state)
-        residual.append(y[part] - plant.K * driven - plant.offset)
-        release(y, u, v_ref)
-    return residual.finish(), quiet.finish()
+        quiet = (np.abs(without_nan(v_ref)) < limit) & (asked < limit)
+        driven, state = low_passed_on(beyond, plant.tau, timeline.dt, state)
+        return (y - plant.K * driven - plant.offset, quiet), state
+
+    (residual, quiet), _ = timeline.scan(apart, None, y, u, v_ref)
+    return residual, quiet
 
 
-def _starved(fit: WheelModelFit, u: Array, flow: float | None, dt: float) -> NDArray[np.bool_]:
+def _starved(fit: WheelModelFit, u: Array, flow: float | None, timeline: Timeline) -> NDArray[np.bool_]:
     """Where the pump cannot feed what the valves ask for, or could not within the last three lags; shape (n,)."""
     if flow is None or not any(fit.plants):
         return np.zeros(u.shape[0], dtype=np.bool_)
-    lag = max(p.tau for p in fit.plants if p is not None)
-    out, last = Column(np.bool_, rows=len(u)), -(10**9)
-    for part in blocks(len(u)):
-        steps = np.arange(part.start, part.stop)
-        asked = demand(np.abs(without_nan(u[part])), fit) > flow
+    longest = 3 * max(p.tau for p in fit.plants if p is not None) / timeline.dt
+
+    def starved(last: int, u: Array) -> tuple[tuple[NDArray[np.bool_]], int]:
+        """`last` is the last step that asked for too much, counted from the first of these."""
+        steps = np.arange(len(u))
+        asked = demand(np.abs(without_nan(u)), fit) > flow
         near = np.maximum.accumulate(np.where(asked, steps, last))
-        out.append(steps - near <= 3 * lag / dt)
-        last = int(near[-1])
-        release(u)
-    return out.finish()
+        return (steps - near <= longest,), int(near[-1]) - len(u)
+
+    (out,), _ = timeline.scan(starved, -(10**9), u)
+    return out
 
 
-def _in_motion(angle: Array, machine: Machine, size: int, dt: float) -> tuple[Array, Array]:
+def _in_motion(angle: Array, machine: Machine, timeline: Timeline) -> tuple[Array, Array]:
     """Wheel speed per speed of the body [1], and what each wheel rolls less because it steers [m/s]."""
     wheels = len(machine.wheels)
     geometry = machine.geometry
     if geometry is None or not any_finite(angle).all():
-        return np.broadcast_to(np.nan, (size, wheels)), np.broadcast_to(0.0, (size, wheels))
-    ratio = in_blocks(lambda a: speed_ratios(a, geometry), angle)
-    turn = Column(np.float64, (wheels,), size)
-    before, state = wheel_angles(angle[:1], geometry), [np.nan] * wheels
-    for part in blocks(size):
-        turned = wheel_angles(angle[part], geometry)
+        return np.broadcast_to(np.nan, (timeline.size, wheels)), np.broadcast_to(0.0, (timeline.size, wheels))
+    offset, dt = np.array([w.offset for w in geometry.wheels.values()]), timeline.dt
+
+    def turning(state: tuple[Array, list[float]], angle: Array) -> tuple[tuple[Array], tuple[Array, list[float]]]:
+        """The state is the wheels' last angles [rad] and their low-passed rates [rad/s]."""
+        before, rates = state
+        turned = wheel_angles(angle, geometry)
         rate = np.diff(turned, axis=0, prepend=before) / dt
-        smooth = np.stack([low_pass(rate[:, i], dt, _STEER_HZ, state[i]) for i in range(wheels)], axis=1)
-        turn.append(smooth * np.array([w.offset for w in geometry.wheels.values()]))
-        before, state = turned[-1:], [float(x) for x in smooth[-1]]
-        release(angle)
-    return ratio, turn.finish()
+        smooth = np.stack([low_pass(rate[:, i], dt, _STEER_HZ, rates[i]) for i in range(wheels)], axis=1)
+        return (smooth * offset,), (turned[-1:], [float(x) for x in smooth[-1]])
+
+    (turn,), _ = timeline.scan(turning, (wheel_angles(angle[:1], geometry), [np.nan] * wheels), angle)
+    return timeline.map(lambda a: speed_ratios(a, geometry), angle), turn

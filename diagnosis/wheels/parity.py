@@ -11,8 +11,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from replay.arrays.blocks import release
+from replay.arrays.column_store import ColumnStore
 from replay.arrays.numeric import without_nan
-from replay.arrays.spill import Column, blocks, release
 from replay.control.kinematics import low_pass, speed_ratios
 from replay.machine.geometry import Geometry
 
@@ -95,6 +96,7 @@ def slipping(
     geometry: Geometry,
     dt: float,
     least: float,
+    store: ColumnStore | None = None,
 ) -> NDArray[np.bool_]:
     """Where a wheel breaks the parity; nowhere while a steering angle is in doubt.
 
@@ -110,6 +112,8 @@ def slipping(
         Step [s].
     least : float
         Smallest residual that counts [m/s].
+    store : ColumnStore or None
+        Where long columns stand; None: one of their own.
 
     Returns
     -------
@@ -118,8 +122,9 @@ def slipping(
     """
     unknown = [np.nan] * v.shape[1]
     state = ParityState(list(unknown), [float(a) for a in wheel_angle[0]], list(unknown))
-    out = Column(np.bool_, v.shape[1:])
-    for part in blocks(len(v)):
+    store = store or ColumnStore()
+    out = store.column(np.bool_, v.shape[1:])
+    for part in store.blocks(len(v)):
         angle = axle_angle[part]
         residual = parity_residuals(v[part], angle, wheel_angle[part], geometry, dt, state)
         limit = np.maximum(least, _SHARE * np.abs(without_nan(v[part])))

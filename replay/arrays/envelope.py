@@ -13,7 +13,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from replay.arrays.blocks import release
+from replay.arrays.blocks import blocks, release
 from replay.arrays.column_store import ColumnStore
 
 FULL_STEPS = 1 << 20
@@ -38,7 +38,7 @@ def step_of(bucket: int) -> float:
     return 1.0 if bucket == 1 else bucket / 2
 
 
-def envelope(values: NDArray[Any], bucket: int, store: ColumnStore | None = None) -> NDArray[Any]:
+def envelope(values: NDArray[Any], bucket: int) -> NDArray[Any]:
     """Reduce steps to rows.
 
     Parameters
@@ -47,8 +47,6 @@ def envelope(values: NDArray[Any], bucket: int, store: ColumnStore | None = None
         Steps; the last bucket may be short.
     bucket : int
         From `bucket_of`.
-    store : ColumnStore or None
-        Where the rows stand if they are many; None: in memory.
 
     Returns
     -------
@@ -57,18 +55,19 @@ def envelope(values: NDArray[Any], bucket: int, store: ColumnStore | None = None
     """
     if bucket == 1:
         return values
-    store = store or ColumnStore()
-    out = store.column(values.dtype, values.shape[1:], rows_of(len(values), bucket))
-    for part in store.blocks(len(values), bucket):
-        out.append(_reduced(values[part], bucket))
+    out = np.empty((rows_of(len(values), bucket), *values.shape[1:]), values.dtype)
+    for part in blocks(len(values), bucket):
+        first = 2 * (part.start // bucket)
+        rows = _reduced(values[part], bucket)
+        out[first : first + len(rows)] = rows
         release(values)
-    return out.finish()
+    return out
 
 
-def shown(values: NDArray[Any], store: ColumnStore | None = None) -> NDArray[Any]:
+def shown(values: NDArray[Any]) -> NDArray[Any]:
     """A column of n steps for pictures; the envelope of long ones, as 32-bit numbers."""
     bucket = bucket_of(len(values))
-    return values if bucket == 1 else envelope(values, bucket, store).astype(np.float32)
+    return values if bucket == 1 else envelope(values, bucket).astype(np.float32)
 
 
 def _reduced(values: NDArray[Any], bucket: int) -> NDArray[Any]:
@@ -99,12 +98,11 @@ def _scan_extremes(rows, out, bucket):  # type: ignore[no-untyped-def]
 
 
 def in_buckets(
-    function: Callable[..., NDArray[Any]], bucket: int, *columns: NDArray[Any], store: ColumnStore | None = None
+    function: Callable[..., NDArray[Any]], bucket: int, store: ColumnStore, *columns: NDArray[Any]
 ) -> NDArray[Any]:
     """Envelope of a function of whole rows, one block after another; see `ColumnStore.map`."""
-    store = store or ColumnStore()
 
     def rows(_: None, *parts: NDArray[Any]) -> tuple[tuple[NDArray[Any]], None]:
-        return (envelope(np.asarray(function(*parts)), bucket, store),), None
+        return (envelope(np.asarray(function(*parts)), bucket),), None
 
     return store.scan(rows, None, *columns, multiple=bucket)[0][0]

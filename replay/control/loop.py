@@ -132,7 +132,7 @@ def replay_loop(timeline: Timeline, machine: Machine, bucket: int = 1) -> Replay
     steer_u = timeline.map(lambda a, b: mfhca.steering_command(a, b, control.k_ps, control.u_max), phi_ref, phi)
 
     def shown(function: Callable[..., Array], *arrays: Array) -> Array:
-        return in_buckets(function, bucket, *arrays, store=timeline.store)
+        return in_buckets(function, bucket, timeline.store, *arrays)
 
     return Replay(
         v_ref=v_ref,
@@ -252,7 +252,7 @@ def _scan(
                 found[name][:, i] = getattr(block, name)
             found["u_difference"][:, i] = u[part, i] - block.u
         for name, values in found.items():
-            columns[name].append(envelope(values, bucket, store))
+            columns[name].append(envelope(values, bucket))
     return {name: column.finish() for name, column in columns.items()}
 
 

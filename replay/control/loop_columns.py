@@ -55,15 +55,13 @@ def replay_columns(timeline: Timeline, replay: Replay, machine: Machine, *, deta
     bucket = replay.bucket
     columns = {"t": np.arange(rows_of(timeline.size, bucket)) * (timeline.dt * step_of(bucket))}
     names = (*machine.canonical_signals(), *timeline.signals)
-    columns |= {
-        n: envelope(timeline.signals[n], bucket, timeline.store) for n in dict.fromkeys(names) if n in timeline.signals
-    }
+    columns |= {n: envelope(timeline.signals[n], bucket) for n in dict.fromkeys(names) if n in timeline.signals}
     for parts, leaves in ((machine.wheels, _WHEEL + (_WHEEL_DETAIL if detail else ())), (machine.axles, _AXLE)):
         for i, part in enumerate(parts):
             for leaf, field in leaves:
                 values = getattr(replay, field)[:, i]
                 if field in _AT_FULL_RATE:
-                    values = envelope(values, bucket, timeline.store)
+                    values = envelope(values, bucket)
                 if np.isfinite(values).any():
                     columns[f"replay.{part}.{leaf}"] = values
     return columns

@@ -10,7 +10,7 @@ from numpy.testing import assert_allclose
 
 from diagnosis.pipeline import diagnose
 from diagnosis.results.result import MissionResult
-from replay.arrays import blocks, envelope, spill
+from replay.arrays import blocks, envelope
 from replay.arrays.column_store import ColumnStore
 from replay.export.mission import write_mission
 from replay.machine.config import haulotte
@@ -44,7 +44,6 @@ def in_blocks_of(steps: int, log: Path, monkeypatch: pytest.MonkeyPatch) -> Miss
     store = ColumnStore(block=steps, always=10_000, room=0, flush=5_000)
     with monkeypatch.context() as patch:
         patch.setattr(blocks, "BLOCK", steps)
-        patch.setattr(spill, "STORE", store)
         return diagnose([log], haulotte(), store=store)
 
 

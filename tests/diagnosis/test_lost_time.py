@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -11,7 +12,7 @@ from diagnosis.channels.recording_gaps import recording_gaps, without_gaps
 from diagnosis.pipeline import diagnose
 from diagnosis.results.assessment import CODE, Assessment, Finding
 from diagnosis.results.vocabulary import Tier
-from replay.arrays import spill
+from replay.arrays.column_store import ColumnStore
 from replay.faults import FaultMode, Side, State
 from replay.machine.config import haulotte
 from replay.signals.timeline import Timeline
@@ -35,10 +36,10 @@ def seen(size: int, *lost: tuple[int, int]) -> np.ndarray:
 
 
 @pytest.mark.parametrize("block", [1 << 19, 64, 7])
-def test_gaps_are_where_every_signal_is_silent(monkeypatch: pytest.MonkeyPatch, block: int) -> None:
-    monkeypatch.setattr(spill.STORE, "block", block)
+def test_gaps_are_where_every_signal_is_silent(block: int) -> None:
     a, b = seen(1000, (100, 200), (400, 420), (900, 1000)), seen(1000, (120, 260), (400, 420), (880, 1000))
-    assert recording_gaps(timeline(a, b)) == [(120, 200), (900, 1000)]  # a fifth of a second is no gap
+    mission = replace(timeline(a, b), store=ColumnStore(block=block))
+    assert recording_gaps(mission) == [(120, 200), (900, 1000)]  # a fifth of a second is no gap
     assert recording_gaps(timeline(seen(1000, (0, 60)))) == [(0, 60)]
 
 

@@ -8,7 +8,6 @@ import pytest
 from diagnosis.channels.frozen import frozen_sensor, frozen_speeds
 from diagnosis.pipeline import diagnose_signals
 from diagnosis.results.assessment import CODE
-from replay.arrays import spill
 from replay.faults import FaultMode, FaultSpec, Side, State
 from replay.log.source_options import SignalSource
 from replay.machine.config import haulotte
@@ -28,7 +27,7 @@ def speeds() -> tuple[np.ndarray, np.ndarray]:
 @pytest.mark.parametrize("block", [1 << 19, 100])
 @pytest.mark.parametrize("value", [0.0, 0.21])
 def test_a_number_that_never_changes(monkeypatch: pytest.MonkeyPatch, block: int, value: float) -> None:
-    monkeypatch.setattr(spill.STORE, "block", block)
+    monkeypatch.setattr("replay.arrays.blocks.BLOCK", block)
     v, command = speeds()
     v[:, 2] = value
     v[:50, 2] = np.nan

@@ -13,6 +13,7 @@ from diagnosis.pipeline import diagnose
 from diagnosis.results.evidence_columns import steps_around
 from diagnosis.results.result import MissionResult
 from replay.arrays import envelope
+from replay.arrays.column_store import ColumnStore
 from replay.errors import LogError
 from replay.export.mission import write_mission
 from replay.machine.config import haulotte
@@ -30,8 +31,8 @@ def results(tmp_path_factory: pytest.TempPathFactory) -> tuple[MissionResult, Mi
         full = diagnose([log], haulotte())
         patch.setattr(envelope, "FULL_STEPS", 10_000)
         patch.setattr(envelope, "_BUCKETS", 6_000)
-        patch.setattr("replay.arrays.spill.STORE.block", 3_304)
-        return full, diagnose([log], haulotte())
+        patch.setattr("replay.arrays.blocks.BLOCK", 3_304)
+        return full, diagnose([log], haulotte(), store=ColumnStore(block=3_304))
 
 
 def test_both_edges_of_long_faults_and_the_whole_of_short_ones() -> None:

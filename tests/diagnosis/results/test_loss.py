@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from diagnosis.results.loss import loss_of, loss_rows
-from replay.arrays import spill
 
 DT = 0.01
 
@@ -60,7 +59,7 @@ def test_blocks_change_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
     x, y = drive(3, 0.05)
     use = np.ones(x.size, np.bool_)
     whole = loss_of(y, x, use, DT)
-    monkeypatch.setattr(spill.STORE, "block", 700)
+    monkeypatch.setattr("replay.arrays.blocks.BLOCK", 700)
     assert loss_of(y, x, use, DT) == whole
 
 

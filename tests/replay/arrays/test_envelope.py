@@ -51,13 +51,15 @@ def test_extremes_of_every_bucket(values: np.ndarray, bucket: int) -> None:
             assert np.isnan(pair).all()
 
 
-def test_columns_side_by_side_and_blocks() -> None:
+def test_columns_side_by_side_and_blocks(monkeypatch: pytest.MonkeyPatch) -> None:
     rng = np.random.default_rng(0)
     values = rng.normal(size=(100, 3))
     whole = envelope(values, 4)
-    store = ColumnStore(block=8)
-    assert_array_equal(envelope(values, 4, store), whole)
-    assert_array_equal(in_buckets(lambda a, b: a - b, 4, values, values * 2, store=store), envelope(-values, 4))
+    monkeypatch.setattr("replay.arrays.blocks.BLOCK", 8)
+    assert_array_equal(envelope(values, 4), whole)
+    assert_array_equal(
+        in_buckets(lambda a, b: a - b, 4, ColumnStore(block=8), values, values * 2), envelope(-values, 4)
+    )
     for j in range(3):
         assert_array_equal(whole[:, j], envelope(values[:, j], 4))
 
