@@ -14,7 +14,8 @@ from diagnosis.audit.isolation.limits import Limits
 from diagnosis.audit.store.folders import holds_report
 from diagnosis.audit.store.keys import config_hash
 from diagnosis.audit.store.outcome import TRANSIENT, limit_met
-from diagnosis.audit.store.store import Store, StoredResult
+from diagnosis.audit.store.store import Store
+from diagnosis.audit.store.stored import StoredResult
 from diagnosis.audit.task import key_of, sizes_of
 from replay.errors import ConfigError
 from replay.machine.config import Machine, haulotte

@@ -17,7 +17,8 @@ from diagnosis.audit.store.folders import RESULTS, RunFolders
 from diagnosis.audit.store.ingest import ingest
 from diagnosis.audit.store.locks import FileLock, lock_mission
 from diagnosis.audit.store.outcome import TRANSIENT, MissionState, Outcome
-from diagnosis.audit.store.store import Store, StoredResult
+from diagnosis.audit.store.store import Store
+from diagnosis.audit.store.stored import StoredResult
 from diagnosis.audit.store.summary import MissionSummary
 from diagnosis.audit.task import Attempt, Task, audit_one, key_of
 

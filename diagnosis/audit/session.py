@@ -23,7 +23,8 @@ from diagnosis.audit.runner import Runner, skip
 from diagnosis.audit.store.folders import own_report, run_folders, sweep
 from diagnosis.audit.store.ingest import ingest
 from diagnosis.audit.store.locks import exclusively
-from diagnosis.audit.store.store import FILE_NAME, Store, StoredResult
+from diagnosis.audit.store.store import FILE_NAME, Store
+from diagnosis.audit.store.stored import StoredResult
 from replay.errors import LogError, OutputError
 from replay.version import __version__
 

@@ -5,10 +5,9 @@ from __future__ import annotations
 import hashlib
 import json
 import os
-import sqlite3
 import time
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from types import TracebackType
 from typing import Self
@@ -21,55 +20,12 @@ from diagnosis.audit.store.objects import Objects, attempt_name, encode
 from diagnosis.audit.store.outcome import MissionState, Outcome
 from diagnosis.audit.store.reason_template import ReasonTemplate, reason_template
 from diagnosis.audit.store.records import FileRecord, MissionRecord, ResultObject
-from diagnosis.results.vocabulary import Verdict
+from diagnosis.audit.store.stored import StoredMission, StoredResult, mission_of_row, result_of_row
 
 FILE_NAME = "fleet.sqlite"
 RESULTS = "results"
 _STORED = "id, log_hash, config_hash, version, state, reason, attempts, machine_id, verdict, start_ns, report"
 _BY_KEY = "log_hash = ? AND config_hash = ? AND version = ?"
-
-
-@dataclass(frozen=True)
-class StoredResult:
-    """A row of ``result``; see ``schema.sql`` for its columns."""
-
-    id: int
-    key: Key
-    state: MissionState
-    reason: str
-    attempts: int
-    machine_id: str
-    verdict: Verdict | None
-    start_ns: int | None
-    report: str | None
-
-
-@dataclass(frozen=True)
-class StoredMission:
-    """A mission and its result, if it has one.
-
-    Attributes
-    ----------
-    name : str
-        As in `MissionSource`.
-    files : tuple[str, ...]
-        Relative to the store's folder, or URLs.
-    bytes : int
-        Size of all files.
-    seen : int
-        Number of the run that saw it last.
-    gone : bool
-        Whether the last run that looked where it was did not find it.
-    result : StoredResult or None
-        None: not audited yet, or changed since.
-    """
-
-    name: str
-    files: tuple[str, ...]
-    bytes: int
-    seen: int
-    gone: bool
-    result: StoredResult | None
 
 
 class Store:
@@ -166,7 +122,7 @@ class Store:
         """Result of a key, whatever its state."""
         query = f"SELECT {_STORED} FROM result WHERE {_BY_KEY}"
         found = self.database.rows(query, (key.log_hash, key.config_hash, key.version))
-        return _stored(found[0]) if found else None
+        return result_of_row(found[0]) if found else None
 
     def record(
         self,
@@ -263,7 +219,7 @@ class Store:
             "SELECT m.name, m.files, m.bytes, m.seen, m.gone, r.* FROM mission m LEFT JOIN result r ON r.id = m.result "
             "ORDER BY m.name"
         )
-        return [_mission(row) for row in self.database.rows(query)]
+        return [mission_of_row(row) for row in self.database.rows(query)]
 
     def missions_of(self, machine_id: str) -> list[StoredMission]:
         """Missions of one machine in the order of the log's clock; copies once, under their first name."""
@@ -272,7 +228,7 @@ class Store:
             "ON m.result = r.id AND m.gone IS NULL WHERE r.machine_id = ? GROUP BY r.id "
             "ORDER BY r.start_ns IS NULL, r.start_ns, 1"
         )
-        return [_mission(row) for row in self.database.rows(query, (machine_id,))]
+        return [mission_of_row(row) for row in self.database.rows(query, (machine_id,))]
 
     def counts(self, run: int | None = None) -> dict[MissionState, int]:
         """Number of missions per state, of those that are there and were seen in or after a run (None: in any)."""
@@ -313,23 +269,3 @@ class Store:
         for file, sha256 in zip(files, known, strict=True):
             file["sha256"] = sha256
         return {"name": mission.name, "files": files, "bytes": mission.bytes}
-
-
-def _stored(row: sqlite3.Row) -> StoredResult:
-    return StoredResult(
-        id=row["id"],
-        key=Key(row["log_hash"], row["config_hash"], row["version"]),
-        state=MissionState(row["state"]),
-        reason=row["reason"],
-        attempts=row["attempts"],
-        machine_id=row["machine_id"],
-        verdict=Verdict(row["verdict"]) if row["verdict"] is not None else None,
-        start_ns=row["start_ns"],
-        report=row["report"],
-    )
-
-
-def _mission(row: sqlite3.Row) -> StoredMission:
-    result = _stored(row) if row["id"] is not None else None
-    files = tuple(json.loads(row["files"]))
-    return StoredMission(row["name"], files, row["bytes"], row["seen"], row["gone"] is not None, result)
