@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from rich.text import Text
 
@@ -15,6 +15,16 @@ if TYPE_CHECKING:
     from rich.table import Table
 
     from diagnosis.evaluation.counts import Counts
+    from diagnosis.evaluation.document import (
+        AllFigures,
+        BandFigures,
+        Figures,
+        ModeFigures,
+        ProbabilityBin,
+        Reliability,
+        SideFigures,
+        Spread,
+    )
     from diagnosis.evaluation.evaluate import MissionScores
 
 _GROUPS = {"wheel": "Wheels", "steer": "Steering"}
@@ -22,7 +32,7 @@ _SHOWN = 20
 
 
 def score_parts(
-    names: Sequence[str], scores: Sequence[MissionScores], pooled: Mapping[str, Mapping[str, Any]]
+    names: Sequence[str], scores: Sequence[MissionScores], pooled: Mapping[str, Figures]
 ) -> list[RenderableType]:
     """Tables of all missions together; before them a line per mission, or what was not right in the only one."""
     parts: list[RenderableType] = []
@@ -50,7 +60,7 @@ def score_parts(
     return [*parts, ""]
 
 
-def _empty(figures: Mapping[str, Any]) -> bool:
+def _empty(figures: Figures) -> bool:
     events = figures["events"]
     decided = any(side["decided_share"] for side in figures["sides"].values())
     return not decided and not events["faults"] and not events["reported"]
@@ -103,7 +113,7 @@ def _missions(names: Sequence[str], scores: Sequence[MissionScores]) -> Table:
     return table(headings, rows, right=range(1, 9))
 
 
-def _states(sides: Mapping[str, Mapping[str, Any]]) -> Table:
+def _states(sides: Mapping[str, SideFigures]) -> Table:
     rows = [
         (
             side,
@@ -120,7 +130,7 @@ def _states(sides: Mapping[str, Mapping[str, Any]]) -> Table:
     return table((*headings, "r_td", "r_fd", "r_ti", "r_fi"), rows, right=range(1, 10))
 
 
-def _confusion(side: Mapping[str, Any]) -> Table:
+def _confusion(side: SideFigures) -> Table:
     rows = []
     for name, seconds in zip(side["true"], side["seconds"], strict=True):
         if not sum(seconds):
@@ -140,19 +150,20 @@ def _cell(true: str, reported: str, seconds: float) -> str:
     return "bold" if true == reported else "bold red"
 
 
-def _events(figures: Mapping[str, Any]) -> Table:
+def _events(figures: Figures) -> Table:
     events, alarms, epsilon = figures["events"], figures["false_alarms"], figures["epsilon"]
     counts = ", ".join(
-        f"{events[name]} {words}"
-        for name, words in (
-            ("right", "right"),
-            ("wrong_mode", "wrong row"),
-            ("wrong_side", "wrong side"),
-            ("wrong_part", "wrong part"),
-            ("missed", "missed"),
+        f"{number} {words}"
+        for number, words in (
+            (events["right"], "right"),
+            (events["wrong_mode"], "wrong row"),
+            (events["wrong_side"], "wrong side"),
+            (events["wrong_part"], "wrong part"),
+            (events["missed"], "missed"),
         )
     )
-    apart = ", ".join(f"{events[k]} {_words(k)}" for k in ("not_excited", "masked") if events[k])
+    uncounted = ((events["not_excited"], "not excited"), (events["masked"], "masked"))
+    apart = ", ".join(f"{number} {words}" for number, words in uncounted if number)
     rows: list[tuple[str, object]] = [
         ("injected", f"{events['faults']}: {counts}" + (f" (not counted: {apart})" if apart else "")),
         ("reported", f"{events['reported']}, of them {events['surplus']} without a fault of their own"),
@@ -166,9 +177,14 @@ def _events(figures: Mapping[str, Any]) -> Table:
             f"{_share(events['identification_rate'])}, wrong part {_share(events['wrong_wheel_rate'])}",
         ),
     ]
-    for name, key in (("onset error", "onset_error_s"), ("delay", "detection_delay_s"), ("end error", "end_error_s")):
-        e = figures[key]
-        more = f"; {e['without']} without a known moment" if e.get("without") else ""
+    delay = figures["detection_delay_s"]
+    unknown = f"; {delay['without']} without a known moment" if delay["without"] else ""
+    spreads: tuple[tuple[str, Spread, str], ...] = (
+        ("onset error", figures["onset_error_s"], ""),
+        ("delay", delay, unknown),
+        ("end error", figures["end_error_s"], ""),
+    )
+    for name, e, more in spreads:
         rows.append((name, f"median {_ms(e['median'])}, p95 {_ms(e['p95'])} over {e['n']} faults{more}"))
     rows.append(
         (
@@ -188,7 +204,7 @@ def _events(figures: Mapping[str, Any]) -> Table:
     return key_values(rows)
 
 
-def _modes(modes: Sequence[Mapping[str, Any]]) -> Table:
+def _modes(modes: Sequence[ModeFigures]) -> Table:
     rows = [
         (
             m["side"],
@@ -208,29 +224,37 @@ def _modes(modes: Sequence[Mapping[str, Any]]) -> Table:
     return table(headings, rows, right=range(2, 10))
 
 
-def _divided(figures: Mapping[str, Any]) -> Table:
+def _divided(figures: Figures) -> Table:
     """One line per band of ε, of commanded speed and of tyre contact."""
-    rows = []
-    for key, form in (("by_epsilon", "ε {}"), ("by_speed", "{} m/s"), ("by_contact", "{}")):
-        for b in figures[key]:
-            events, sides = b["events"], b["sides"]
-            if key == "by_epsilon" and not events["faults"]:
-                continue
-            band = "" if "low" not in b else f"≥ {b['low']:g}" if b["high"] is None else f"{b['low']:g}–{b['high']:g}"
-            name = form.format(b.get("contact", band))
-            rows.append(
-                (
-                    name,
-                    events["masked"] if name == "masked" else events["faults"],
-                    *(_share(events[k]) for k in ("recall", "precision", "isolation_rate", "wrong_wheel_rate")),
-                    _ms(b["detection_delay_s"]["p95"]),
-                    _share(b["epsilon"]["mae"]),
-                    b["false_alarms"]["count"],
-                    *(_share(sides[s][k]) for s in ("sensor", "actuator") for k in ("macro_f1", "undecided_share")),
-                )
-            )
+    bands = [(f"ε {_band(b)}", b) for b in figures["by_epsilon"] if b["events"]["faults"]]
+    bands += [(f"{_band(b)} m/s", b) for b in figures["by_speed"]]
+    rows = [_divided_row(name, b) for name, b in bands]
+    rows += [_divided_row(b["contact"], b) for b in figures["by_contact"]]
     headings = ("", "faults", "recall", "prec.", "isolated", "wrong", "delay p95", "ε error", "alarms")
     return table((*headings, "sensor F1", "undec.", "act. F1", "undec."), rows, right=range(1, 13))
+
+
+def _band(band: BandFigures) -> str:
+    return f"≥ {band['low']:g}" if band["high"] is None else f"{band['low']:g}–{band['high']:g}"
+
+
+def _divided_row(name: str, band: AllFigures) -> tuple[object, ...]:
+    events, sensor, actuator = band["events"], band["sides"]["sensor"], band["sides"]["actuator"]
+    return (
+        name,
+        events["masked"] if name == "masked" else events["faults"],
+        _share(events["recall"]),
+        _share(events["precision"]),
+        _share(events["isolation_rate"]),
+        _share(events["wrong_wheel_rate"]),
+        _ms(band["detection_delay_s"]["p95"]),
+        _share(band["epsilon"]["mae"]),
+        band["false_alarms"]["count"],
+        _share(sensor["macro_f1"]),
+        _share(sensor["undecided_share"]),
+        _share(actuator["macro_f1"]),
+        _share(actuator["undecided_share"]),
+    )
 
 
 def _wrong(counts: Counts) -> Table | None:
@@ -256,7 +280,7 @@ def _wrong(counts: Counts) -> Table | None:
     return table(("time [s]", "part", "row", "what", "report"), rows)
 
 
-def _calibration(bins: Sequence[Mapping[str, Any]]) -> Table:
+def _calibration(bins: Sequence[ProbabilityBin]) -> Table:
     rows = [
         (f"{b['low']:.1f}–{b['high']:.1f}", b["reported"], _share(b["probability"]), _share(b["right"]))
         for b in bins
@@ -265,7 +289,7 @@ def _calibration(bins: Sequence[Mapping[str, Any]]) -> Table:
     return table(("bin", "reported", "stated", "right"), rows, right=range(4))
 
 
-def _reliability(groups: Sequence[Mapping[str, Any]]) -> Table:
+def _reliability(groups: Sequence[Reliability]) -> Table:
     rows = [
         (g["tier"], _words(g["side"]), g["reported"], g["right"], _share(g["brier"]), _share(g["ece"])) for g in groups
     ]
