@@ -6,7 +6,7 @@ from collections import Counter
 from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from rich.console import RenderableType
 from rich.text import Text
@@ -80,7 +80,7 @@ def summary_parts(audited: Audited, found: Discovery, output: Path) -> list[Rend
     return [*parts, "", key_values(files)]
 
 
-def document(audited: Audited, found: Discovery, output: Path, code: int) -> dict[str, Any]:
+def document(audited: Audited, found: Discovery, output: Path, code: int) -> dict[str, object]:
     """The audit as a JSON document."""
     return {
         "schema": SCHEMA,

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import asdict
 from datetime import UTC, datetime, timedelta
 from pathlib import PurePath
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from rich.text import Text
 
@@ -28,7 +28,7 @@ _SHOWN_ODD, _SHOWN_NAMES = 8, 6
 _WIDE, _WIDE_LIST = 100, 110
 
 
-def inspect_document(report: InspectReport) -> dict[str, Any]:
+def inspect_document(report: InspectReport) -> dict[str, object]:
     """Everything as JSON values."""
     document = asdict(report)
     return document | {"duration_s": report.duration_s, "messages": report.messages, "status": report.status}
@@ -124,7 +124,7 @@ def _topics(report: InspectReport) -> RenderableType:
     return ByWidth(wide, narrow, max(_WIDE, max(len(t.name) + len(_short(t)) for t in report.topics) + 60))
 
 
-def _row(topic: TopicTiming) -> tuple[Any, ...]:
+def _row(topic: TopicTiming) -> tuple[str, Text, int, str, str, int | str, str, int | str]:
     return (
         topic.name,
         text(_short(topic), "dim"),
@@ -204,7 +204,8 @@ def _stored(report: InspectReport) -> list[str]:
     if report.integrity:
         lines.append(f"checksums: {report.integrity.removeprefix('checksums; ').removeprefix('checksums, ')}")
     lines += [
-        f"attachment {a['name']}, {a['media_type'] or 'of no type'}, {_bytes(a['size'])}" for a in report.attachments
+        f"attachment {a['name']}, {a['media_type'] or 'of no type'}, {_bytes(float(str(a['size'])))}"
+        for a in report.attachments
     ]
     shown = {k: v for k, v in report.metadata.items() if k != "integrity" and v}
     for key, value in list(shown.items())[:_SHOWN_METADATA]:
@@ -230,8 +231,8 @@ def _start(ns: int, digits: int = 0) -> str:
     return moment.strftime("%Y-%m-%d %H:%M:%S") + (f".{moment.microsecond // 1000:03d}" if digits else "")
 
 
-def _bytes(size: Any) -> str:
-    size = float(size)
+def _bytes(count: float) -> str:
+    size = float(count)
     for unit in ("B", "kB", "MB"):
         if size < 1000:
             return f"{size:.3g} {unit}"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import PurePath
-from typing import Any
+from typing import TypedDict
 
 import numpy as np
 from rich.console import RenderableType
@@ -19,10 +19,64 @@ from replay.signals.rules import SI_UNITS
 from replay.signals.signal import Signal, Signals
 from replay.signals.timeline import median_period
 
+
+class MachinePart(TypedDict):
+    """The machine, and where its settings come from."""
+
+    name: str
+    source: str
+    wheels: list[str]
+
+
+class FilePart(TypedDict):
+    """One file of the mission."""
+
+    path: str
+    sha256: str
+    bytes: int
+    format: str
+    notes: list[str]
+    damage: list[str]
+
+
+class MappedSignal(TypedDict):
+    """A signal of the machine, the channel where it was found, and what it holds."""
+
+    name: str
+    channel: str
+    recorded_unit: str | None
+    unit: str
+    guessed: bool
+    source: str
+    samples: int
+    without_value: int
+    rate_hz: float | None
+    min: float | None
+    max: float | None
+
+
+class MissingSignal(TypedDict):
+    """A signal that was not found, why, and what that costs the diagnosis."""
+
+    name: str
+    reason: str
+    cost: str
+
+
+class SignalsDocument(TypedDict):
+    """What `mfhca channels --json` prints."""
+
+    machine: MachinePart
+    files: list[FilePart]
+    signals: list[MappedSignal]
+    missing: list[MissingSignal]
+    notes: list[str]
+
+
 _NOT_FOUND = "no channel fits by its name or message type"
 
 
-def signals_document(files: Sequence[MissionFile], signals: Signals, machine: Machine, source: str) -> dict[str, Any]:
+def signals_document(files: Sequence[MissionFile], signals: Signals, machine: Machine, source: str) -> SignalsDocument:
     """Mapped and missing signals as JSON values."""
     return {
         "machine": {"name": machine.name, "source": source, "wheels": list(machine.wheels)},
@@ -45,7 +99,7 @@ def signals_document(files: Sequence[MissionFile], signals: Signals, machine: Ma
     }
 
 
-def _signal(signal: Signal) -> dict[str, Any]:
+def _signal(signal: Signal) -> MappedSignal:
     finite = signal.values[np.isfinite(signal.values)]
     period = median_period(signal.stamps)
     return {

@@ -84,7 +84,7 @@ def _lines(terminal: Terminal, counted: Counted) -> Emit:
         if now - last > _LINE_S or event in ("planned", "page"):
             last = now
             parts = (f"{sum(counted.states.values())} of {counted.total}", clean(counted.text()))
-            terminal.tell(" · ".join(part for part in parts if part))
+            terminal.plain(" · ".join(part for part in parts if part))
 
     return show
 

@@ -9,7 +9,7 @@ import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import IO, TYPE_CHECKING, Any
+from typing import IO, TYPE_CHECKING
 
 from cli.terminal.interrupts import check
 from cli.terminal.streams import clean, console_of
@@ -52,7 +52,7 @@ class Terminal:
         if not self.quiet:
             _write(sys.stdout, text)
 
-    def show_json(self, document: Any) -> None:
+    def show_json(self, document: object) -> None:
         """Print the one JSON document of a run, as UTF-8."""
         # A lone surrogate of a file name becomes its JSON escape.
         data = json.dumps(document, indent=2, ensure_ascii=False, allow_nan=False).encode("utf-8", "backslashreplace")
@@ -67,7 +67,7 @@ class Terminal:
         """One line on stderr, also when quiet."""
         self._line("error", "bold red", text)
 
-    def tell(self, text: str) -> None:
+    def plain(self, text: str) -> None:
         """One plain line on stderr."""
         _write(sys.stderr, clean(text) + "\n")
 
@@ -99,7 +99,7 @@ class Terminal:
             yield _begun(subscriber, Progress(first, detail))
 
     def _as_line(self, progress: Progress) -> None:
-        self.tell(str(progress))
+        self.plain(str(progress))
 
 
 def _begun(subscriber: Subscriber, first: Progress) -> Subscriber:
