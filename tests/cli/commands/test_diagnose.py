@@ -13,12 +13,14 @@ from rich.console import Console
 
 from cli.main import run
 from cli.tables.verdict import verdict_parts
+from diagnosis.results.document import ReportDocument
 from diagnosis.results.result import MissionResult
 from replay.errors import NotJudged
 from replay.export.mission import write_mission
 from replay.progress import Progress, Stage
 from replay.simulation.options import SimulationOptions
 from replay.simulation.run import simulate_mission
+from tests.whole_documents import whole_report
 
 
 def interval(severity: str, number: int = 1) -> dict[str, Any]:
@@ -46,7 +48,13 @@ def result(*severities: str) -> MissionResult:
         "actions": [{"n": 1, "text": "Repair it.", "faults": ["F1"], "severity": "high"}] if severities else [],
     }
     intervals = [interval(s, i) for i, s in enumerate(severities, 1)]
-    return MissionResult({"verdict": verdict, "intervals": intervals}, {"t": np.arange(2.0)})
+    return MissionResult(report_of(verdict, intervals), {"t": np.arange(2.0)})
+
+
+def report_of(verdict: dict[str, Any], intervals: list[dict[str, Any]]) -> ReportDocument:
+    machine = {"wheels": ["FR"]}
+    log = {"files": [{"path": "drive.mcap"}], "duration_s": 12.0, "open_loop": False}
+    return whole_report({"log": log, "machine": machine, "verdict": verdict, "intervals": intervals})
 
 
 @pytest.fixture
@@ -295,12 +303,11 @@ def test_the_fault_table_breaks_no_number(width: int) -> None:
         "start_s": 1000.0,
         "stop_s": 1105.18,
         "epsilon": {"value": 0.94, "low": 0.87, "high": 1.01},
-        "sat": {"mean": 0.3, "unit": "m/s"},
+        "sat": {"mean": 0.3, "rms": 0.3, "low": 0.2, "high": 0.4, "unit": "m/s"},
         "probability": 0.998,
         "severity": "medium",
     }
-    verdict = {"status": "not_assessed", "title": "Not assessed", "text": "", "caveats": [], "actions": []}
-    report: Any = {"verdict": verdict, "intervals": [{**fault, "id": "F10"}]}
+    report = report_of({"status": "not_assessed", "title": "Not assessed"}, [{**fault, "id": "F10"}])
     console = Console(width=width, color_system=None)
     with console.capture() as seen:
         console.print(*verdict_parts(report))
