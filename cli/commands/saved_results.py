@@ -125,8 +125,8 @@ def _truth_of(path: Path) -> Path:
     for place in places:
         if place.is_file():
             return place
-    names = ", ".join(str(p) for p in places)
-    raise ConfigError(f"{path}: no truth file; looked for {names}; name it with --truth")
+    listed = ", ".join(str(p) for p in places)
+    raise ConfigError(f"{path}: no truth file; looked for {listed}; name it with --truth")
 
 
 def _beside(log: Path) -> Path:
