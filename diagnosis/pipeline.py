@@ -15,18 +15,19 @@ from diagnosis.decision import metrics, quality
 from diagnosis.report_document import Judged, machine_row, report_of_mission
 from diagnosis.results.assessment import Assessment
 from diagnosis.results.closeups import closeups_of
+from diagnosis.results.document import MachineRow
 from diagnosis.results.result import MissionResult
 from diagnosis.results.vocabulary import Tier
 from replay.arrays.column_store import ColumnStore
 from replay.arrays.envelope import bucket_of
-from replay.control.loop import Replay, replay_loop
+from replay.control.loop import replay_loop
 from replay.control.loop_columns import replay_columns
 from replay.errors import ConfigError, NotJudged
 from replay.machine.config import Machine
 from replay.mission import Mission, load_mission
 from replay.progress import Progress, Stage, Subscriber, silent
 from replay.signals.signal import Signals
-from replay.signals.timeline import align
+from replay.signals.timeline import Timeline, align
 
 Array = NDArray[np.float64] | NDArray[np.float32]
 
@@ -73,14 +74,13 @@ def diagnose(
     ConfigError
         Where `wheels` names no wheel of the machine.
     """
-    chosen = tuple(machine.wheels if wheels is None else wheels)
-    for wheel in chosen:
-        if wheel not in machine.wheels:
-            raise ConfigError(f"--wheel {wheel}: no such wheel; the machine has {', '.join(machine.wheels)}")
+    chosen = _chosen(wheels, machine)
     mission = load_mission(paths, machine, start_s=start_s, stop_s=stop_s, progress=progress, store=store)
     recorded = quality.recorded(mission.signals, mission.timeline)
     mission = replace(mission, signals=mission.signals.without_samples())  # which leaves their memory to the diagnosis
-    return _diagnosed(mission, recorded, machine, machine_source, chosen, machine_id, progress)
+    return _walk(
+        mission, recorded, machine, chosen, machine_row(machine, mission, machine_source, machine_id), progress
+    )
 
 
 def diagnose_signals(signals: Signals, machine: Machine) -> MissionResult:
@@ -111,34 +111,55 @@ def diagnose_mission(
     ------
     NotJudged
         Where nothing in the mission can be judged.
+    ConfigError
+        Where `wheels` names no wheel of the machine.
     """
-    chosen = tuple(machine.wheels if wheels is None else wheels)
+    chosen = _chosen(wheels, machine)
     recorded = quality.recorded(mission.signals, mission.timeline)
-    return _diagnosed(mission, recorded, machine, machine_source, chosen, machine_id, progress)
+    return _walk(
+        mission, recorded, machine, chosen, machine_row(machine, mission, machine_source, machine_id), progress
+    )
 
 
-def _diagnosed(
+def _chosen(wheels: Sequence[str] | None, machine: Machine) -> tuple[str, ...]:
+    chosen = tuple(machine.wheels if wheels is None else wheels)
+    for wheel in chosen:
+        if wheel not in machine.wheels:
+            raise ConfigError(f"--wheel {wheel}: no such wheel; the machine has {', '.join(machine.wheels)}")
+    return chosen
+
+
+def _walk(
     mission: Mission,
     recorded: quality.Recorded,
     machine: Machine,
-    machine_source: str,
     chosen: tuple[str, ...],
-    machine_id: str | None,
+    identity: MachineRow,
     progress: Subscriber,
 ) -> MissionResult:
+    """Replay → assess → decide → document; long columns leave memory at every stage until they are read again."""
+    timeline = mission.timeline
+
     def publish(stage: Progress) -> None:
-        mission.timeline.store.release()
+        timeline.store.release()
         progress(stage)
 
     publish(Progress(Stage.REPLAYING_LOOP))
-    replay = replay_loop(mission.timeline, machine, bucket_of(mission.timeline.size))
-    found = assess_components(mission.timeline, replay, machine, chosen, publish)
-    gaps = recording_gaps(mission.timeline)
-    judged = {key: without_gaps(a, gaps, mission.timeline) for key, a in found.assessments.items()}
-    found = replace(found, assessments=judged)
+    replay = replay_loop(timeline, machine, bucket_of(timeline.size))
+    found = _outside_gaps(assess_components(timeline, replay, machine, chosen, publish), timeline)
     _require_something(found.assessments, mission, machine)
     publish(Progress(Stage.DECIDING))
-    return _result(mission, recorded, machine, replay, found, machine_source, machine_id)
+    judged = Judged(mission, recorded, machine, replay, found)
+    report = report_of_mission(judged, identity)
+    timeline.store.release()
+    windows = closeups_of(timeline, replay, machine, found.assessments, judged.intervals)
+    return MissionResult(report, _columns(judged), windows)
+
+
+def _outside_gaps(found: ComponentResult, timeline: Timeline) -> ComponentResult:
+    """Nothing is judged where nothing was recorded."""
+    gaps = recording_gaps(timeline)
+    return replace(found, assessments={key: without_gaps(a, gaps, timeline) for key, a in found.assessments.items()})
 
 
 def _require_something(assessments: Mapping[tuple[str, str], Assessment], mission: Mission, machine: Machine) -> None:
@@ -158,22 +179,11 @@ def _require_something(assessments: Mapping[tuple[str, str], Assessment], missio
     )
 
 
-def _result(
-    mission: Mission,
-    recorded: quality.Recorded,
-    machine: Machine,
-    replay: Replay,
-    found: ComponentResult,
-    machine_source: str,
-    machine_id: str | None,
-) -> MissionResult:
-    judged = Judged(mission, recorded, machine, replay, found)
-    report = report_of_mission(judged, machine_row(machine, mission, machine_source, machine_id))
-    timeline = mission.timeline
-    timeline.store.release()
-    columns: dict[str, Array] = dict(replay_columns(timeline, replay, machine))
-    for (component, side), assessment in found.assessments.items():
+def _columns(judged: Judged) -> dict[str, Array]:
+    """Signals, replayed loop, evidence and path under their names."""
+    timeline = judged.mission.timeline
+    columns: dict[str, Array] = dict(replay_columns(timeline, judged.replay, judged.machine))
+    for (component, side), assessment in judged.found.assessments.items():
         columns.update({f"evidence.{component}.{side}.{leaf}": x for leaf, x in assessment.columns.items()})
     columns.update(metrics.path_of(timeline))
-    windows = closeups_of(timeline, replay, machine, found.assessments, judged.intervals)
-    return MissionResult(report, columns, windows)
+    return columns

@@ -144,8 +144,23 @@ def read_signals(
     ConfigError
         Where a given unit does not fit its signal.
     """
-    store = store or ColumnStore()
     options = [SourceOptions() if is_open_loop_table(path) else source_options(path, machine) for path in paths]
+    files, logs = _read(paths, options, machine, store or ColumnStore(), progress)
+    if len(logs) > 1:
+        progress(Progress(Stage.COMPARING_CLOCKS))
+    logs, clocks = align_clocks(logs, machine, options)
+    progress(Progress(Stage.MAPPING_SIGNALS))
+    marked = [log for log in logs if is_open_loop(log.summary)]
+    signals = map_signals(logs, _without_given(machine, marked))
+    notes = (*signals.notes, *(clock.sentence for clock in clocks if clock.sentence))
+    dated = tuple(replace(file, clock=clock) for file, clock in zip(files, clocks, strict=True))
+    return dated, replace(signals, notes=notes, open_loop=bool(marked))
+
+
+def _read(
+    paths: Sequence[Path], options: Sequence[SourceOptions], machine: Machine, store: ColumnStore, progress: Subscriber
+) -> tuple[list[MissionFile], list[RawLog]]:
+    """Decode of each file the topics that may hold the machine's signals."""
     summaries = []
     for path, option in zip(paths, options, strict=True):
         progress(Progress(Stage.OPENING, path.name))
@@ -160,15 +175,7 @@ def read_signals(
         sha256, size = content_hash(path)
         logs.append(log)
         files.append(MissionFile(path, sha256, size, log.format, _complete(summary, log.summary)))
-    if len(logs) > 1:
-        progress(Progress(Stage.COMPARING_CLOCKS))
-    logs, clocks = align_clocks(logs, machine, options)
-    progress(Progress(Stage.MAPPING_SIGNALS))
-    marked = [log for log in logs if is_open_loop(log.summary)]
-    signals = map_signals(logs, _without_given(machine, marked))
-    notes = (*signals.notes, *(clock.sentence for clock in clocks if clock.sentence))
-    dated = tuple(replace(file, clock=clock) for file, clock in zip(files, clocks, strict=True))
-    return dated, replace(signals, notes=notes, open_loop=bool(marked))
+    return files, logs
 
 
 def _on_one_clock(files: tuple[MissionFile, ...], signals: Signals) -> tuple[tuple[MissionFile, ...], Signals]:
@@ -180,8 +187,8 @@ def _on_one_clock(files: tuple[MissionFile, ...], signals: Signals) -> tuple[tup
     check_overlap(signals)
     kept = {name: s for name, s in signals.items.items() if s.source not in apart}
     gone = {name: f"{Path(s.source).name} was left out" for name, s in signals.items.items() if s.source in apart}
-    told = replace(signals, items=kept, missing={**signals.missing, **gone})
-    return tuple(_left_out(f) if str(f.path) in apart else f for f in files), told
+    rest = replace(signals, items=kept, missing={**signals.missing, **gone})
+    return tuple(_left_out(f) if str(f.path) in apart else f for f in files), rest
 
 
 def _left_out(file: MissionFile) -> MissionFile:
@@ -238,6 +245,17 @@ def load_mission(
     """
     files, signals = read_signals(paths, machine, progress=progress, store=store)
     progress(Progress(Stage.ALIGNING_SIGNALS))
+    _require_use(files, signals)
+    try:
+        files, signals = _on_one_clock(files, signals)
+        timeline = align(signals, start_s, stop_s)
+    except LogError as error:
+        raise LogError(f"{', '.join(str(p) for p in paths)}: {error}{_cause(files)}") from error
+    return Mission(files, signals, timeline)
+
+
+def _require_use(files: Sequence[MissionFile], signals: Signals) -> None:
+    """Raise where one of several files adds nothing."""
     used = {signal.source for signal in signals.items.values()}
     idle = [file.path for file in files if str(file.path) not in used]
     if len(files) > 1 and idle and used:
@@ -245,12 +263,10 @@ def load_mission(
             f"{idle[0]}: none of its channels is used, all signals were found in the other files; diagnose it by itself, "
             "or name its signals with source = in the machine file's [signals]"
         )
-    try:
-        files, signals = _on_one_clock(files, signals)
-        timeline = align(signals, start_s, stop_s)
-    except LogError as error:
-        damage = [text for file in files for text in file.summary.damage]
-        clocks = [f.clock.sentence for f in files if f.clock is not None and f.clock.reason]
-        also = f"; the log is damaged: {damage[0]}" if damage else f"; {clocks[0]}" if clocks else ""
-        raise LogError(f"{', '.join(str(p) for p in paths)}: {error}{also}") from error
-    return Mission(files, signals, timeline)
+
+
+def _cause(files: Sequence[MissionFile]) -> str:
+    """Why files may not make a mission: damage, else clocks that could not be compared."""
+    damage = [text for file in files for text in file.summary.damage]
+    clocks = [f.clock.sentence for f in files if f.clock is not None and f.clock.reason]
+    return f"; the log is damaged: {damage[0]}" if damage else f"; {clocks[0]}" if clocks else ""
