@@ -104,7 +104,7 @@ def _fit_one(
     wheels: list[int],
     shapes: dict[tuple[int, str], Array],
 ) -> LawFit:
-    gains, seconds, weights, squares, total, count = [], [], [], 0.0, 0.0, 0
+    gains, adaptive_gains, weights, squares, total, count = [], [], [], 0.0, 0.0, 0
     for i in wheels:
         k = usable[:, i]
         part = proportional_part(law, v[k, i], v_c[k, i])
@@ -113,19 +113,19 @@ def _fit_one(
         scale = np.sqrt((a**2).mean(axis=0))
         scale[scale == 0] = 1.0
         x, _, rank, _ = np.linalg.lstsq(a / scale, u[k, i], rcond=None)
-        lam, second = x / scale
-        if second < 0 or rank < 2:  # Ψ̂² cannot be negative
-            lam, second = float(part @ u[k, i]) / max(float(part @ part), 1e-300), 0.0
-        residual = u[k, i] - lam * part - second * basis
+        lam, adaptive = x / scale
+        if adaptive < 0 or rank < 2:  # Ψ̂² cannot be negative
+            lam, adaptive = float(part @ u[k, i]) / max(float(part @ part), 1e-300), 0.0
+        residual = u[k, i] - lam * part - adaptive * basis
         squares += float(residual @ residual)
         total += float(np.sum((u[k, i] - u[k, i].mean()) ** 2))
         count += residual.size
         gains.append(lam)
-        seconds.append(second)
+        adaptive_gains.append(adaptive)
         weights.append(float(part @ part))
     lam = float(np.average(gains, weights=weights)) if sum(weights) > 0 else float("nan")
     spread = float(np.std(gains)) if len(gains) > 1 else 0.0
-    root = np.sqrt(np.maximum(seconds, 0.0))
+    root = np.sqrt(np.maximum(adaptive_gains, 0.0))
     per_wheel = np.zeros(u.shape[1])
     if psi == "printed":
         per_wheel[wheels] = root

@@ -1,4 +1,4 @@
-"""Faults for a whole recorded mission: drawn by the rows of the tables, injected, and told in a truth file."""
+"""Faults for a whole recorded mission: drawn by the rows of the tables, injected, and written to a truth file."""
 
 from __future__ import annotations
 

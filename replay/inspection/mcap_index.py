@@ -1,7 +1,7 @@
 """The index of a complete MCAP file, read with nothing that takes time to load.
 
 Any doubt about the index (none, a wrong checksum, counts or places that do not agree) gives None: then the reader,
-which walks the whole file, has to tell what is there.
+which walks the whole file, has to find what is there.
 """
 
 from __future__ import annotations

@@ -21,8 +21,8 @@ GAP_PERIODS = 5.0
 def odd_values(channels: Iterable[Channel]) -> tuple[OddValues, ...]:
     """Find channels of one topic whose samples hold no usable number; alike ones together.
 
-    Values beyond `ABSURD` are told where most of the channel lies below it (stamps and counters do not), or where they
-    are beyond what 64 bits count. A column that is filled in every n-th row only is not told.
+    Values beyond `ABSURD` are reported where most of the channel lies below it (stamps and counters do not), or where they
+    are beyond what 64 bits count. A column that is filled in every n-th row only is not reported.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""From recorded stamps and values to SI, with doubts about units told in figures."""
+"""From recorded stamps and values to SI, with doubts about units stated in figures."""
 
 from __future__ import annotations
 
