@@ -2,12 +2,13 @@
 
 A family is one folder (`direct`, `wheels`, `steering`, `drives`) with the same parts under the same names:
 
-    inputs          the channels that the family needs, taken from the mission; None where the log lacks them
+    inputs          the channels that the family needs, taken from the mission
     models          its models of the fault rows, and their constants as named tuples
     identification  constants that are found in the mission itself
     kernel          compiled recursions over samples or blocks (one module, or several that end in ``_kernel``)
     findings        from the path of models to findings with ε̂, saturation, probability and evidence
-    assess          the family itself: an object that is an `EvidenceFamily`
+    assess          the walk through these parts, for one component or all of them together
+    family          the family itself: an object that is an `EvidenceFamily`
 
 `diagnosis.families` has the table of them, in the order in which they are asked.
 """
@@ -15,7 +16,7 @@ A family is one folder (`direct`, `wheels`, `steering`, `drives`) with the same 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Protocol
 
 import numpy as np
@@ -23,14 +24,39 @@ from numpy.typing import NDArray
 
 from diagnosis.results.assessment import Assessment
 from diagnosis.results.vocabulary import Tier
+from diagnosis.results.wheel_model import WheelModelFit
 from replay.control.loop import Replay
+from replay.faults import Side
 from replay.machine.config import Machine
 from replay.progress import Subscriber
 from replay.signals.timeline import Timeline
 
 Array = NDArray[np.float64]
+Flags = NDArray[np.bool_]
 #: A component and its side.
 Part = tuple[str, str]
+
+SENSOR, ACTUATOR = Side.SENSOR.value, Side.ACTUATOR.value
+
+
+@dataclass(frozen=True)
+class Contribution:
+    """What a family found, and what it hands on to those after it.
+
+    Attributes
+    ----------
+    parts : Mapping[Part, Assessment]
+        Parts for which the log offers this evidence.
+    angle, doubtful : Array or None, NDArray[np.bool_] or None, shape (n, axles)
+        Best estimate of the true steering angles [rad], and where it rests on a model or on a sensor in doubt.
+    model : WheelModelFit or None
+        Wheel models behind the judgement.
+    """
+
+    parts: Mapping[Part, Assessment]
+    angle: Array | None = None
+    doubtful: Flags | None = None
+    model: WheelModelFit | None = None
 
 
 @dataclass(frozen=True)
@@ -45,8 +71,12 @@ class MissionView:
         Wheels to judge; the others only help.
     alive : dict[str, NDArray[np.int16]]
         From `diagnosis.channels.liveness.alive_sources`.
-    known : dict[Part, Assessment]
-        What families before this one have found; a family adds nothing here itself.
+    progress : Subscriber
+        Called at the beginning of each stage.
+    known : Mapping[Part, Assessment]
+        What families before this one have judged: a family leaves these parts out.
+    angle, doubtful, model
+        As in `Contribution`, from families before this one.
     """
 
     timeline: Timeline
@@ -55,7 +85,33 @@ class MissionView:
     wheels: tuple[str, ...]
     alive: dict[str, NDArray[np.int16]]
     progress: Subscriber
-    known: dict[Part, Assessment] = field(default_factory=dict)
+    known: Mapping[Part, Assessment] = field(default_factory=dict)
+    angle: Array | None = None
+    doubtful: Flags | None = None
+    model: WheelModelFit | None = None
+
+    def values(self, name: str) -> Array:
+        """A signal on the timeline, shape (n,); NaN where it is not logged."""
+        found = self.timeline.get(name)
+        return np.broadcast_to(np.nan, (self.timeline.size,)) if found is None else found
+
+    def logged(self, name: str) -> bool:
+        """Whether a signal has any value."""
+        return bool(np.isfinite(self.values(name)).any())
+
+    def command(self, wheel: str) -> Array:
+        """Commanded speed of a wheel [m/s], shape (n,)."""
+        return self.replay.v_ref[:, self.machine.wheels.index(wheel)]
+
+    def after(self, found: Contribution) -> MissionView:
+        """The same for the families after one that found this; what was judged before stays."""
+        return replace(
+            self,
+            known={**found.parts, **self.known},
+            angle=self.angle if found.angle is None else found.angle,
+            doubtful=self.doubtful if found.doubtful is None else found.doubtful,
+            model=self.model if found.model is None else found.model,
+        )
 
 
 class EvidenceFamily(Protocol):
@@ -63,9 +119,9 @@ class EvidenceFamily(Protocol):
 
     @property
     def tier(self) -> Tier:
-        """How strong it is: a stronger one is asked first, and what it judged stays."""
+        """How strong it is."""
         ...
 
-    def assess(self, mission: MissionView) -> Mapping[Part, Assessment]:
-        """Judge the parts for which the log offers this evidence; parts without it are left out."""
+    def assess(self, mission: MissionView) -> Contribution:
+        """Judge the parts that are not known yet and for which the log offers this evidence."""
         ...

@@ -12,7 +12,7 @@ from diagnosis.results.assessment import Assessment
 from diagnosis.results.document import ActionRow, VerdictRow
 from diagnosis.results.result import FaultInterval
 from diagnosis.results.vocabulary import Kind, Severity, Tier, Verdict, part_words
-from diagnosis.wheels.identification import WheelModelFit
+from diagnosis.results.wheel_model import WheelModelFit
 from replay.faults import Side
 from replay.machine.config import Limits
 

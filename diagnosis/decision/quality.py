@@ -12,7 +12,7 @@ from diagnosis.channels.noise import rounding_step
 from diagnosis.decision.missing import cost_of_missing
 from diagnosis.results.assessment import Assessment
 from diagnosis.results.document import ClockRow, MissingRow, QualityRow, SignalRow
-from diagnosis.wheels.identification import WheelModelFit
+from diagnosis.results.wheel_model import WheelModelFit
 from replay.arrays.blocks import blocks, release
 from replay.clocks.source_clock import SourceClock
 from replay.machine.config import Machine

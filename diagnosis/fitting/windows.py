@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from diagnosis.wheels.identification import low_passed
+from diagnosis.estimation.lag import low_passed
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]

@@ -7,12 +7,11 @@ mode is believed only near the machine's.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from diagnosis.estimation.lag import low_passed
+from diagnosis.results.wheel_model import WheelModelFit
 from replay.arrays.numeric import without_nan
 from replay.machine.config import WheelPlant
 
@@ -23,57 +22,6 @@ _WINDOW_S = 2.0
 _MAX_SPREAD = 0.25
 _OWN_RANGE = 0.2
 _LEAST_OWN = 6  # windows near the machine's gain that a wheel needs for its own
-
-
-@dataclass(frozen=True)
-class WheelModelFit:
-    """Wheel models of one mission.
-
-    Attributes
-    ----------
-    plants : tuple[WheelPlant or None, ...]
-        Per wheel; None where nothing can be identified.
-    spread : float
-        Relative spread of the windows' gains (robust standard deviation over median).
-    windows : int
-        Windows used.
-    reliable : bool
-        Whether gains may be judged by it.
-    note : str
-        The figures in words.
-    identified : bool
-        Whether a wheel's model comes from this mission rather than from the machine file.
-    """
-
-    plants: tuple[WheelPlant | None, ...]
-    spread: float
-    windows: int
-    reliable: bool
-    note: str
-    identified: bool = True
-
-
-def low_passed(u: Array, tau: float, dt: float) -> Array:
-    """Response of a first-order lag to u held over each step; NaN counts as 0."""
-    return low_passed_on(u, tau, dt, None)[0] if u.size else u
-
-
-def low_passed_on(u: Array, tau: float, dt: float, state: float | None) -> tuple[Array, float]:
-    """`low_passed` of a block, with the state from the block before and for the next; None before the first."""
-    a = np.exp(-dt / tau)
-    filled = without_nan(u)
-    out = np.empty(u.size)
-    last = _scan_lag(filled, a, float(filled[0]) if state is None else state, out)
-    return out, float(last)
-
-
-@njit(cache=True)
-def _scan_lag(u, a, x, out):  # type: ignore[no-untyped-def]
-    """Write x and carry on with x ← a·x + (1 − a)·u."""
-    for k in range(u.size):
-        out[k] = x
-        x = a * x + (1.0 - a) * u[k]
-    return x
 
 
 def identify(

@@ -12,8 +12,10 @@ from numpy.typing import NDArray
 
 from diagnosis.channels.liveness import alive
 from diagnosis.channels.sample_status import sample_status
+from diagnosis.estimation.lag import low_passed_on
+from diagnosis.results.wheel_model import WheelModelFit
 from diagnosis.wheels.blocks import block_width
-from diagnosis.wheels.identification import WheelModelFit, demand, identify, low_passed_on
+from diagnosis.wheels.identification import demand, identify
 from diagnosis.wheels.parity import slipping
 from replay.arrays.blocks import release
 from replay.arrays.column_store import ColumnStore

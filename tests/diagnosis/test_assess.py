@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 from numpy.testing import assert_array_equal
 
-from diagnosis.assess import ComponentResult, alive_sources, assess_components
+from diagnosis.assess import ComponentResult, assess_components
+from diagnosis.channels.liveness import alive_sources
 from diagnosis.results.assessment import CODE, Assessment
 from replay.control.loop import replay_loop
 from replay.faults import FaultMode, FaultSpec, Side, State

@@ -9,7 +9,9 @@ import pytest
 from numpy.testing import assert_allclose
 from scipy.integrate import solve_ivp
 
-from diagnosis.wheels.identification import WheelModelFit, demand, identify, low_passed, mode
+from diagnosis.estimation.lag import low_passed
+from diagnosis.results.wheel_model import WheelModelFit
+from diagnosis.wheels.identification import demand, identify, mode
 from replay.machine.config import WheelPlant
 
 DT, N = 0.01, 6000

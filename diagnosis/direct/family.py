@@ -1,0 +1,93 @@
+"""Second measurements of wheels as a family of evidence."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from diagnosis.direct.assess import assess_pair
+from diagnosis.direct.inputs import Pair, make_pair
+from diagnosis.estimation.lag import low_passed
+from diagnosis.evidence import ACTUATOR, SENSOR, Array, Contribution, Flags, MissionView, Part
+from diagnosis.results.assessment import Assessment, unassessed
+from diagnosis.results.vocabulary import Tier
+from replay.arrays.numeric import without_nan
+from replay.faults import Side, State
+from replay.progress import Progress, Stage
+
+_QUIET = 0.4  # of the driving speed
+_IDLE = 0.02  # of full opening
+_LAGS_S = (0.1, 0.3)
+
+
+class DirectEvidence:
+    """A wheel's speed against a second sensor's, its valve's command against the measured position."""
+
+    tier = Tier.DIRECT
+
+    def assess(self, mission: MissionView) -> Contribution:
+        """Judge what is measured twice."""
+        parts: dict[Part, Assessment] = {}
+        for wheel in mission.wheels:
+            mission.progress(Progress(Stage.JUDGING_WHEEL, wheel))
+            one = _WheelPairs(mission, wheel)
+            if (wheel, SENSOR) not in mission.known and one.logged("v_true") and one.logged("v"):
+                parts[wheel, SENSOR] = assess_pair(one.speeds(), mission.machine.limits)
+            if (wheel, ACTUATOR) not in mission.known and one.logged("u_applied"):
+                if one.logged("u"):
+                    parts[wheel, ACTUATOR] = assess_pair(one.openings(), mission.machine.limits)
+                else:
+                    why = "the valve's position is logged but not its command"
+                    parts[wheel, ACTUATOR] = unassessed(mission.timeline.size, State.NOT_ASSESSED, why)
+        return Contribution(parts)
+
+
+@dataclass(frozen=True)
+class _WheelPairs:
+    """Channels of one wheel beside their references."""
+
+    mission: MissionView
+    wheel: str
+
+    def name(self, leaf: str) -> str:
+        return f"wheel.{self.wheel}.{leaf}"
+
+    def logged(self, leaf: str) -> bool:
+        return self.mission.logged(self.name(leaf))
+
+    def speeds(self) -> Pair:
+        """The speed sensor against the second one."""
+        pair = self._pair(Side.SENSOR, "v", "v_true", self._quiet(), "m/s", 2.2 * self.mission.machine.max_speed)
+        return replace(pair, instruments=self._instruments())
+
+    def openings(self) -> Pair:
+        """The valve's position against its command."""
+        span = max(self.mission.machine.control.u_max, 1e-6)
+        u = self.mission.values(self.name("u"))
+        idle = self.mission.timeline.map(lambda u: np.abs(without_nan(u)) < _IDLE * span, u)
+        return self._pair(Side.ACTUATOR, "u_applied", "u", idle, "of full opening", span)
+
+    def _pair(self, side: Side, y: str, x: str, quiet: Flags, unit: str, span: float) -> Pair:
+        mission = self.mission
+        return make_pair(
+            mission.timeline, mission.alive, side, self.name(y), self.name(x), quiet, unit, span, mission.machine
+        )
+
+    def _quiet(self) -> Flags:
+        """Neither commanded nor moving by the second sensor."""
+        limit = _QUIET * self.mission.machine.limits.driving_speed
+
+        def low(command: Array, speed: Array) -> Flags:
+            return np.asarray((np.abs(without_nan(command)) < limit) & (np.abs(without_nan(speed)) < limit))
+
+        true = self.mission.values(self.name("v_true"))
+        return self.mission.timeline.map(low, self.mission.command(self.wheel), true)
+
+    def _instruments(self) -> Array | None:
+        """The commanded speed and two lags of it: what moves the wheel and knows nothing of its sensor."""
+        command = self.mission.command(self.wheel)
+        if not np.isfinite(command).any():
+            return None
+        store, dt = self.mission.timeline.store, self.mission.timeline.dt
+        return store.beside([command, *(store.keep(low_passed(command, lag, dt)) for lag in _LAGS_S)])

@@ -1,0 +1,34 @@
+"""Response of a first-order lag, over whole arrays or block by block."""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from replay.arrays.numeric import without_nan
+
+Array = NDArray[np.float64]
+
+
+def low_passed(u: Array, tau: float, dt: float) -> Array:
+    """Response of a first-order lag to u held over each step; NaN counts as 0."""
+    return low_passed_on(u, tau, dt, None)[0] if u.size else u
+
+
+def low_passed_on(u: Array, tau: float, dt: float, state: float | None) -> tuple[Array, float]:
+    """`low_passed` of a block, with the state from the block before and for the next; None before the first."""
+    a = np.exp(-dt / tau)
+    filled = without_nan(u)
+    out = np.empty(u.size)
+    last = _scan_lag(filled, a, float(filled[0]) if state is None else state, out)
+    return out, float(last)
+
+
+@njit(cache=True)
+def _scan_lag(u, a, x, out):  # type: ignore[no-untyped-def]
+    """Write x and carry on with x ← a·x + (1 − a)·u."""
+    for k in range(u.size):
+        out[k] = x
+        x = a * x + (1.0 - a) * u[k]
+    return x

@@ -1,0 +1,35 @@
+"""The wheel models of a mission, as they were identified or given."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from replay.machine.config import WheelPlant
+
+
+@dataclass(frozen=True)
+class WheelModelFit:
+    """Wheel models of one mission.
+
+    Attributes
+    ----------
+    plants : tuple[WheelPlant or None, ...]
+        Per wheel; None where nothing can be identified.
+    spread : float
+        Relative spread of the windows' gains (robust standard deviation over median).
+    windows : int
+        Windows used.
+    reliable : bool
+        Whether gains may be judged by it.
+    note : str
+        The figures in words.
+    identified : bool
+        Whether a wheel's model comes from this mission rather than from the machine file.
+    """
+
+    plants: tuple[WheelPlant | None, ...]
+    spread: float
+    windows: int
+    reliable: bool
+    note: str
+    identified: bool = True

@@ -1,0 +1,46 @@
+"""The wheel model as a family of evidence."""
+
+from __future__ import annotations
+
+from diagnosis.evidence import ACTUATOR, SENSOR, Contribution, MissionView, Part
+from diagnosis.results.assessment import Assessment
+from diagnosis.results.vocabulary import Tier
+from diagnosis.wheels.assess import assess_wheels
+from diagnosis.wheels.inputs import WheelChannels, slip_of, wheel_channels, wheel_fit, wheels_data
+from replay.progress import Progress, Stage
+
+
+class WheelEvidence:
+    """All wheels together, by valve openings and speeds; what is measured twice helps and is judged elsewhere."""
+
+    tier = Tier.MODEL
+
+    def assess(self, mission: MissionView) -> Contribution:
+        """Judge the wheels of a machine that has several."""
+        timeline, replay, machine = mission.timeline, mission.replay, mission.machine
+        channels = _channels(mission)
+        if len(machine.wheels) < 2 or (channels.has_true & channels.has_applied).all():
+            return Contribution({})
+        mission.progress(Progress(Stage.IDENTIFYING_WHEELS))
+        fit = wheel_fit(channels, replay, timeline, machine)
+        if fit is None or mission.angle is None or mission.doubtful is None:
+            return Contribution({})
+        mission.progress(Progress(Stage.JUDGING_WHEELS))
+        slip = slip_of(timeline, replay, machine, channels.v, mission.angle, mission.doubtful)
+        data = wheels_data(timeline, replay, machine, channels, fit, mission.alive, mission.angle, slip)
+        parts: dict[Part, Assessment] = {}
+        for i, (sensor, actuator) in assess_wheels(data, machine.limits, gains=fit.reliable).items():
+            wheel = machine.wheels[i]
+            if wheel in mission.wheels and not channels.has_true[i]:
+                parts[wheel, SENSOR] = sensor
+            if wheel in mission.wheels and not channels.has_applied[i]:
+                parts[wheel, ACTUATOR] = actuator
+        return Contribution(parts, model=fit)
+
+
+def _channels(mission: MissionView) -> WheelChannels:
+    """Channels of all wheels, without the speeds of sensors that are dead."""
+    channels, machine = wheel_channels(mission.timeline, mission.machine), mission.machine
+    known = {w: mission.known.get((w, SENSOR)) for w in machine.wheels}
+    dead = [i for i, w in enumerate(machine.wheels) if (a := known[w]) is not None and a.tier is Tier.SIGNAL]
+    return channels.without_speed(dead) if dead else channels
