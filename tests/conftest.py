@@ -7,7 +7,14 @@ from pathlib import Path
 
 import pytest
 
+from replay.arrays.kernel_cache import drop_stale_kernels
+
 ROOT = Path(__file__).resolve().parent.parent
+
+
+def pytest_configure() -> None:
+    """Let no test run what was compiled from former sources."""
+    drop_stale_kernels([ROOT / "replay", ROOT / "diagnosis"], ROOT / "replay" / "__pycache__" / "kernels.json")
 
 
 @pytest.fixture(scope="session")

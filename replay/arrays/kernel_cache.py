@@ -1,0 +1,72 @@
+"""Compiled kernels on disk: those that the sources beside them no longer stand for are removed.
+
+numba keeps what it compiled beside the source and looks at that one file's time only. A kernel calls others and takes
+named tuples of other modules of its folder; after an update, what was compiled from the former ones would be run, or
+could not be loaded at all.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Iterable, Iterator
+from contextlib import suppress
+from hashlib import sha256
+from pathlib import Path
+
+_KERNELS = (".nbi", ".nbc")
+
+
+def drop_stale_kernels(packages: Iterable[Path], stamp: Path) -> list[str]:
+    """Remove compiled kernels of folders whose modules have changed since they were compiled.
+
+    Parameters
+    ----------
+    packages : Iterable[Path]
+        Folders to look through, with all below them.
+    stamp : Path
+        Small file that remembers the modules; it is written where it is missing or anything has changed.
+
+    Returns
+    -------
+    list[str]
+        Folders whose kernels were removed. Where nothing can be written, everything stays as it is.
+    """
+    try:
+        known = json.loads(stamp.read_bytes())
+    except (OSError, ValueError):
+        known = {}
+    now = {folder: _digest(folder) for package in packages for folder in _folders(str(package))}
+    if known == now:
+        return []
+    with suppress(OSError):
+        dropped = [folder for folder, digest in now.items() if known.get(folder) != digest and _removed(folder)]
+        stamp.write_text(json.dumps(now), "utf-8")
+        return dropped
+    return []
+
+
+def _folders(top: str) -> Iterator[str]:
+    yield top
+    for entry in os.scandir(top):
+        if entry.is_dir() and entry.name != "__pycache__":
+            yield from _folders(entry.path)
+
+
+def _digest(folder: str) -> str:
+    """Digest of names, sizes and times of a folder's modules."""
+    digest = sha256()
+    for entry in sorted(os.scandir(folder), key=lambda e: e.name):
+        if entry.name.endswith(".py"):
+            found = entry.stat()
+            digest.update(f"{entry.name} {found.st_size} {found.st_mtime_ns}\n".encode("utf-8", "surrogateescape"))
+    return digest.hexdigest()
+
+
+def _removed(folder: str) -> bool:
+    """Whether a folder had compiled kernels, which are gone now."""
+    cache = Path(folder, "__pycache__")
+    kernels = [path for path in cache.iterdir() if path.suffix in _KERNELS] if cache.is_dir() else []
+    for path in kernels:
+        path.unlink(missing_ok=True)
+    return bool(kernels)
