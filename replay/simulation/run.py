@@ -18,7 +18,7 @@ from replay.simulation.schedule import faults_of, varied_onsets
 from replay.simulation.state import DELAY_LINE, FaultTable, PlantModel, PlantState, Recording
 from replay.simulation.structure_draw import draw_machine
 from replay.simulation.structured_plant import scan as structured_scan
-from replay.simulation.structured_plant import structure_state
+from replay.simulation.structured_state import structure_state
 from replay.simulation.truths import actual_signals, mission_truth
 
 _BLOCK = 60_000  # control steps

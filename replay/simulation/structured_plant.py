@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 from numba import njit
 
@@ -15,102 +13,16 @@ from replay.simulation.state import (
     V_DELAY,
     F,
     FaultTable,
-    I,
     PlantModel,
     PlantState,
     Recording,
 )
-
-FIRST_ORDER, RESONANT, TORQUE = range(3)
-NO_LIMIT, PROPORTIONAL, LEAST_LOADED = range(3)
-SAMPLED, COUNTING, TACHO, HALL = range(4)
+from replay.simulation.structured_sensors import play, read_speed
+from replay.simulation.structured_state import NO_LIMIT, PROPORTIONAL, RESONANT, TORQUE, StructureModel, StructureState
 
 _STILL = 0.005  # speed within which dry friction changes sign [m/s]
 _STRIBECK = 0.03  # speed over which the friction of standstill fades [m/s]
 _FULL_LOAD = 0.3  # of a wheel's share of the weight: force at which `pressure` of the gain is lost
-_HALL_TIMEOUT = 250  # control steps without a pole after which the sensor reads 0
-
-
-class StructureModel(NamedTuple):
-    """Constants of the structure; n wheels, axle 0 front and 1 rear, SI units (see `Structure`)."""
-
-    drive: int
-    gain_forward: F
-    gain_reverse: F
-    dead_forward: F
-    dead_reverse: F
-    play: F  # half the width of the spool's hysteresis
-    omega: float  # resonance [rad/s]
-    damping: float
-    wheel_limit: F
-    sharing: int
-    pump: float
-    pressure: float
-    force: F  # of the torque drive at full opening [N]
-    inertia: float  # of the torque drive, as mass at the rim [kg]
-    coulomb: float  # [N]
-    stribeck: float  # [N]
-    viscous: float  # [N s/m]
-    warming: float  # share of the gain lost per control step
-    sensor: int
-    scale: F
-    step: float  # travel per encoder step [m]
-    window: int  # control steps per counting window
-    tacho_gain: float
-    tacho_noise: float  # per speed [1]
-    pole: F  # travel between two poles, shape (poles per turn,) [m]
-    steer_forward: F
-    steer_reverse: F
-    steer_dead: F
-    backlash: F  # half the play of the encoder [rad]
-    pi: bool
-    feed_forward: float  # [opening per m/s]
-    kp: float
-    ki: float  # [1/s]
-    steer_ki: float  # [1/s]
-
-
-class StructureState(NamedTuple):
-    """What the structure carries from one step to the next, beside `PlantState`."""
-
-    held: F  # spool position behind its play
-    rate: F  # v̇ of the resonant drive
-    integral: F  # of the wheels' controllers
-    steer_integral: F
-    load: F  # force at the rim in the last step [N]
-    travel: F
-    counted: F  # travel at the last end of a window
-    speed: F  # what the sensor reads, before noise
-    pole: I  # poles passed
-    since: I  # control steps since the last pole
-    edge: F  # travel of the last pole
-    angle: F  # what the steering encoder follows
-
-
-def structure_state(wheels: int) -> StructureState:
-    """Everything at rest."""
-    f = [np.zeros(wheels) for _ in range(8)]
-    integers = [np.zeros(wheels, np.int64) for _ in range(2)]
-    return StructureState(
-        held=f[0],
-        rate=f[1],
-        integral=f[2],
-        steer_integral=np.zeros(2),
-        load=f[3],
-        travel=f[4],
-        counted=f[5],
-        speed=f[6],
-        pole=integers[0],
-        since=integers[1],
-        edge=f[7],
-        angle=np.zeros(2),
-    )
-
-
-@njit(cache=True)
-def _play(value: float, held: float, half: float) -> float:
-    """Backlash: the output follows once the input has crossed the play."""
-    return float(min(max(held, value - half), value + half))
 
 
 @njit(cache=True)
@@ -124,47 +36,13 @@ def _opened(u: float, forward: float, reverse: float) -> float:
 
 
 @njit(cache=True)
-def _read(i: int, k: int, v: float, normal: float, p: PlantModel, m: StructureModel, s: StructureState) -> float:
-    """What a wheel's healthy speed sensor reads."""
-    v = v * (1.0 + m.scale[i])
-    s.travel[i] += v * p.dt
-    if m.sensor == SAMPLED:
-        return float(v + p.v_std * normal)
-    if m.sensor == TACHO:
-        s.speed[i] += m.tacho_gain * (v - s.speed[i])
-        return float(s.speed[i] + (0.25 * p.v_std + m.tacho_noise * abs(s.speed[i])) * normal)
-    if m.sensor == COUNTING:
-        if k % m.window == 0:
-            steps = np.floor(s.travel[i] / m.step) - np.floor(s.counted[i] / m.step)
-            s.speed[i] = steps * m.step / (m.window * p.dt)
-            s.counted[i] = s.travel[i]
-        return float(s.speed[i])
-    s.since[i] += 1
-    ahead = s.travel[i] - s.edge[i]
-    poles = m.pole.size
-    width = m.pole[s.pole[i] % poles] if ahead >= 0.0 else m.pole[(s.pole[i] - 1) % poles]
-    if abs(ahead) >= width:
-        direction = 1.0 if ahead > 0.0 else -1.0
-        s.speed[i] = direction * m.pole.mean() / (s.since[i] * p.dt)
-        s.edge[i] += direction * width
-        s.pole[i] += int(direction)
-        s.since[i] = 0
-    elif s.since[i] > _HALL_TIMEOUT:
-        s.speed[i] = 0.0
-    else:  # no pole for longer than the last interval: it can be no faster than one pole in this time
-        most = m.pole.mean() / (s.since[i] * p.dt)
-        s.speed[i] = min(max(s.speed[i], -most), most)
-    return float(s.speed[i])
-
-
-@njit(cache=True)
 def _flows(k: int, u: F, p: PlantModel, m: StructureModel, state: PlantState, s: StructureState, flow: F) -> None:
     """Speeds that valves and pump would give the wheels without load, into `flow`; spools follow their commands."""
     n = u.size
     warm = 1.0 - m.warming * k
     weight = p.mass * 9.81 / n
     for i in range(n):
-        s.held[i] = _play(u[i], s.held[i], m.play[i])
+        s.held[i] = play(u[i], s.held[i], m.play[i])
         state.spool[i] += p.valve_gain * (s.held[i] - state.spool[i])
         opening = _opened(state.spool[i], m.dead_forward[i], m.dead_reverse[i])
         flow[i] = opening * (m.gain_forward[i] if opening > 0.0 else m.gain_reverse[i]) * warm
@@ -190,18 +68,17 @@ def _flows(k: int, u: F, p: PlantModel, m: StructureModel, state: PlantState, s:
 def _accelerate(
     i: int,
     flow: float,
-    opening: float,
     force: float,
     p: PlantModel,
     m: StructureModel,
     state: PlantState,
     s: StructureState,
 ) -> None:
-    """One step of a wheel's speed under its flow, or its torque, and the force at its rim."""
+    """One step of a wheel's speed under its flow (of the torque drive: its opening) and the force at its rim."""
     v = state.v[i]
     if m.drive == TORQUE:
         dry = m.coulomb + m.stribeck * np.exp(-((v / _STRIBECK) ** 2))
-        push = m.force[i] * opening - dry * np.tanh(v / _STILL) - m.viscous * v - force
+        push = m.force[i] * flow - dry * np.tanh(v / _STILL) - m.viscous * v - force
         state.v[i] = v + p.dt * push / m.inertia
         return
     target = flow - p.droop * force
@@ -241,8 +118,7 @@ def _move(
             slip[i] = 0.0
             force = weight * slope / n
         s.load[i] = force
-        gain = m.gain_forward[i] if flow[i] > 0.0 else m.gain_reverse[i]
-        _accelerate(i, flow[i], flow[i] / gain, force, p, m, state, s)
+        _accelerate(i, flow[i], force, p, m, state, s)
     if p.ground:
         drag = weight * (p.rolling * np.tanh(state.body[0] / 0.02) + slope)
         state.body[0] += p.dt * (push - drag) / p.mass
@@ -323,7 +199,7 @@ def scan(
         fault_normal = normal[j, n + 2 :]
         _references(k, command[j, 0], command[j, 1], p, state, v_ref)
         for i in range(n):
-            clean = _read(i, k, state.v[i], normal[j, i], p, m, s)
+            clean = read_speed(i, k, state.v[i], normal[j, i], p, m, s)
             v[i] = _quantised(_faulted(i, k, clean, fault_normal[i], faults, state), p.v_lsb)
             state.last[i] = v[i]
             u[i] = _command(i, v_ref[i], v[i], p, m, state, s)
@@ -331,7 +207,7 @@ def scan(
             u_v[i] = _faulted(c, k, u[i], fault_normal[c], faults, state)
             state.last[c] = u_v[i]
         for a in range(2):
-            s.angle[a] = _play(state.phi[a], s.angle[a], m.backlash[a])
+            s.angle[a] = play(state.phi[a], s.angle[a], m.backlash[a])
             clean = s.angle[a] + p.phi_std * normal[j, n + a]
             c = n + a
             phi[a] = _quantised(_faulted(c, k, clean, fault_normal[c], faults, state), p.phi_lsb)

@@ -153,6 +153,7 @@ STRUCTURES: Mapping[str, Structure] = {
     "resonant_pump": Structure(
         kind="reporting",
         drive="resonant",
+        gain=(1.0, 2.0),
         resonance=(5.0, 9.0),
         sharing="least_loaded",
         pump=(1.2, 1.6),
@@ -165,6 +166,7 @@ STRUCTURES: Mapping[str, Structure] = {
         scale=0.004,
         steer_dead_band=(0.02, 0.05),
         steer_backlash=(0.002, 0.005),
+        law="pi",
         rate_hz=(200.0, 500.0, 1000.0),
     ),
     "sticky_valves": Structure(

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from replay.errors import ConfigError
-from replay.simulation import run, structured_plant
+from replay.simulation import run, structured_plant, structured_sensors, structured_state
 from replay.simulation.options import SimulatedMission, SimulationOptions
 from replay.simulation.plant import scan
-from replay.simulation.state import PlantModel, Recording
+from replay.simulation.state import Recording
 from replay.simulation.structure_draw import draw_machine
 from replay.simulation.structures import STRUCTURES, StructureOptions
 
@@ -40,7 +40,7 @@ def test_blocks_change_no_number() -> None:
         np.testing.assert_array_equal(values, many.columns[name], err_msg=name)
 
 
-def drawn(name: str, options: SimulationOptions) -> structured_plant.StructureModel:
+def drawn(name: str, options: SimulationOptions) -> structured_state.StructureModel:
     model = run.mission_parts(options)[2]
     choice = StructureOptions(name, machine_seed=options.structure.machine_seed if options.structure else None)
     return draw_machine(choice.structure, model, choice.generator(options.seed), 0.15, options.duration_s)[1]
@@ -61,47 +61,6 @@ def test_an_unknown_structure_is_named() -> None:
         StructureOptions("steam")
 
 
-def neutral(model: PlantModel) -> structured_plant.StructureModel:
-    """A structure without any effect of its own."""
-    n, zero, two = model.x.size, np.zeros(model.x.size), np.zeros(2)
-    return structured_plant.StructureModel(
-        drive=structured_plant.FIRST_ORDER,
-        gain_forward=model.K,
-        gain_reverse=model.K,
-        dead_forward=zero,
-        dead_reverse=zero,
-        play=zero,
-        omega=1.0,
-        damping=1.0,
-        wheel_limit=zero,
-        sharing=structured_plant.NO_LIMIT,
-        pump=1e9,
-        pressure=0.0,
-        force=zero,
-        inertia=1.0,
-        coulomb=0.0,
-        stribeck=0.0,
-        viscous=0.0,
-        warming=0.0,
-        sensor=structured_plant.SAMPLED,
-        scale=zero,
-        step=1.0,
-        window=1,
-        tacho_gain=1.0,
-        tacho_noise=0.0,
-        pole=np.ones(n),
-        steer_forward=np.full(2, model.steer_gain),
-        steer_reverse=np.full(2, model.steer_gain),
-        steer_dead=two,
-        backlash=two,
-        pi=False,
-        feed_forward=0.0,
-        kp=0.0,
-        ki=0.0,
-        steer_ki=0.0,
-    )
-
-
 def test_without_effects_it_is_the_default_machine() -> None:
     """Both compiled loops give the same numbers where no effect is switched on."""
     options = SimulationOptions(scenario="random", seed=5, duration_s=30.0, rate_hz=200.0, evidence="base")
@@ -117,8 +76,8 @@ def test_without_effects_it_is_the_default_machine() -> None:
         normal = np.random.default_rng(1).standard_normal((steps, 6 + state.last.size))
         first = (0, options.substeps, duty.command(t), duty.slope.at(t), normal, model)
         if structured:
-            more = structured_plant.structure_state(4)
-            structured_plant.scan(*first, neutral(model), table, state, more, out, 0)
+            more = structured_state.structure_state(4)
+            structured_plant.scan(*first, structured_state.neutral(model), table, state, more, out, 0)
         else:
             scan(*first, table, state, out, 0)
         found.append(out)
@@ -145,6 +104,6 @@ def test_an_opening_within_the_dead_band_moves_nothing(u: float, opened: float) 
 def test_play_holds_until_it_is_crossed() -> None:
     held, seen = 0.0, []
     for value in (0.0, 0.05, 0.2, 0.15, 0.05, -0.1):
-        held = structured_plant._play(value, held, 0.1)
+        held = structured_sensors.play(value, held, 0.1)
         seen.append(held)
     assert seen == pytest.approx([0.0, 0.0, 0.1, 0.1, 0.1, 0.0])
