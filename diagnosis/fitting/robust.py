@@ -14,6 +14,7 @@ _SUBSETS = 400
 _ROUNDS = 20
 _TUKEY = 4.685
 _CUT = 4.0
+_TINY = 1e-12  # a scale of zero would leave nothing to divide by
 
 
 @dataclass(frozen=True)
@@ -74,7 +75,7 @@ def robust_solve(regressors: Array, instruments: Array, y: Array, weight: Array,
     starts = np.einsum("mij,mj->mi", np.linalg.pinv(regressors[rows], rcond=1e-6), y[rows])
     misfits = [weighted_median(np.abs(y - regressors @ b), weight) for b in starts]
     beta = starts[int(np.argmin(misfits))]
-    scale = max(1.4826 * min(misfits), floor)
+    scale = max(1.4826 * min(misfits), floor, _TINY)
     for _ in range(_ROUNDS):
         x = np.clip((y - regressors @ beta) / (_TUKEY * scale), -1, 1)
         w = weight * (1 - x**2) ** 2
@@ -83,7 +84,7 @@ def robust_solve(regressors: Array, instruments: Array, y: Array, weight: Array,
             return nothing
         before, beta = beta, np.linalg.solve(left, (instruments * w[:, None]).T @ y)
         residual = np.abs(y - regressors @ beta)
-        scale = max(1.4826 * weighted_median(residual, weight), floor)
+        scale = max(1.4826 * weighted_median(residual, weight), floor, _TINY)
         if np.allclose(before, beta, rtol=1e-6, atol=1e-12):
             break
     return beta, np.where(np.abs(y - regressors @ beta) <= _CUT * scale, weight, 0.0)
