@@ -8,17 +8,18 @@ program walks over each payload. What is left after many shapes is decoded messa
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from replay.readers.messages.cdr_layout import MAX_ELEMENTS, Layout, layout_of
 from replay.readers.messages.cdr_program import Compiler, Program, Spec, TooWide
+from replay.readers.messages.cdr_rows import BAD, FREE, FixedLayout, Payloads, Steps, views
 from replay.readers.messages.definitions import MessageType
 from replay.readers.messages.encodings import LayoutError, width_of
 from replay.readers.messages.fields import Place
-from replay.readers.messages.topic_store import FREE, Part, Store
+from replay.readers.messages.tables import SIZES
+from replay.readers.messages.topic_store import Part, Store
 
 __all__ = ["Decoder", "Outcome", "Part"]
 
@@ -27,8 +28,6 @@ MAX_PROGRAMS = 64
 GIVE_UP = 500
 PATIENCE = 2_000_000
 _WORTH = 0.25
-_SIZES = (1, 2, 4, 8)
-_BAD = -2
 
 
 @dataclass
@@ -40,25 +39,6 @@ class Outcome:
     slow: int = 0
 
 
-@dataclass(frozen=True)
-class Batch:
-    """Payloads of one connection: their bytes as numbers of every size, their places, and their rows in the batch."""
-
-    views: tuple[NDArray[Any], ...]
-    limit: int
-    starts: NDArray[np.int64]
-    lengths: NDArray[np.int64]
-    slots: NDArray[np.int64]
-
-    def payload(self, row: int) -> bytes:
-        """Copy one payload."""
-        start, size = int(self.starts[row]), int(self.lengths[row])
-        if start < 0 or size < 0 or start + size > self.limit:
-            return b""
-        raw: bytes = self.views[0][start : start + size].tobytes()
-        return raw
-
-
 class _Fixed:
     """The layout of payloads whose bytes lie alike."""
 
@@ -66,26 +46,20 @@ class _Fixed:
         self.layout, self.skipped = layout, layout.skipped
         specs = [Spec(s.path, s.dtype) for s in layout.slots]
         self.table = store.table(specs)
-        self.check_at, self.check_mask, self.check_word = layout.words()
-        self.swap = layout.dialect.order == ">"
-        self.columns: list[NDArray[np.int64]] = []
-        for size in _SIZES:
+        columns: list[NDArray[np.int64]] = []
+        for size in SIZES:
             mine = [(slot.offset, spec) for slot, spec in zip(layout.slots, specs, strict=True) if slot.size == size]
-            self.columns += [
+            columns += [
                 np.array([at for at, _ in mine], np.int64),
                 np.array([self.table.place[spec] for _, spec in mine], np.int64),
             ]
+        self.rows = FixedLayout(layout.size, layout.dialect.order == ">", *layout.words(), *columns)
 
-    def take(self, batch: Batch, store: Store) -> tuple[int, int]:
+    def take(self, payloads: Payloads, store: Store) -> tuple[int, int]:
         """Decode the rows that fit; return how many, and the first that nobody owns or −1."""
         from replay.readers.messages.cdr_kernel import take_fixed
 
-        first = store.room(self.table)
-        taken, left = take_fixed(
-            *batch.views, batch.limit, batch.starts, batch.lengths, batch.slots, store.owner, self.table.number,
-            self.layout.size, self.swap, self.check_at, self.check_mask, self.check_word, *self.columns,
-            *self.table.grid.cells, first,
-        )  # fmt: skip
+        taken, left = take_fixed(payloads, self.rows, store.open(self.table))
         return int(taken), int(left)
 
 
@@ -95,22 +69,23 @@ class _Walked:
     def __init__(self, program: Program, skipped: tuple[str, ...], store: Store) -> None:
         self.program, self.skipped = program, skipped
         self.table = store.table(program.specs)
-        self.swap = program.dialect.order == ">"
-        self.head = np.frombuffer(program.dialect.head, np.uint8)
-        self.places = np.array([self.table.place[s] for s in program.specs], np.int64)
-        self.hidden = np.array([i for i, s in enumerate(program.specs) if s.dtype == "#"], np.int64)
+        dialect = program.dialect
+        self.steps = Steps(
+            program.ops,
+            program.names,
+            np.frombuffer(dialect.head, np.uint8),
+            dialect.order == ">",
+            dialect.align,
+            dialect.slack,
+            np.array([self.table.place[s] for s in program.specs], np.int64),
+            np.array([i for i, s in enumerate(program.specs) if s.dtype == "#"], np.int64),
+        )
 
-    def take(self, batch: Batch, store: Store) -> tuple[int, int, int, int]:
+    def take(self, payloads: Payloads, store: Store) -> tuple[int, int, int, int]:
         """Decode the rows that fit; return how many fit, how many are damaged, the first left and the first damaged."""
-        from replay.readers.messages.cdr_kernel import take_program
+        from replay.readers.messages.cdr_program_kernel import take_program
 
-        first = store.room(self.table)
-        program = self.program
-        taken, bad, left, first_bad = take_program(
-            *batch.views, batch.limit, batch.starts, batch.lengths, batch.slots, store.owner, self.table.number,
-            self.head, self.swap, program.dialect.align, program.dialect.slack, program.ops, program.names,
-            self.places, self.hidden, *self.table.grid.cells, first,
-        )  # fmt: skip
+        taken, bad, left, first_bad = take_program(payloads, self.steps, store.open(self.table))
         return int(taken), int(bad), int(left), int(first_bad)
 
 
@@ -156,14 +131,12 @@ class Decoder:
         slots : NDArray[np.int64], shape (n,) or None
             Rows of the batch that they are; None: the first to the last.
         """
-        from replay.readers.messages.cdr_kernel import views
-
         if slots is None:
             if len(self.count) < len(starts):
                 self.count = np.arange(len(starts))
             slots = self.count[: len(starts)]
-        batch = Batch(
-            views(data), len(data), np.ascontiguousarray(starts, np.int64), np.ascontiguousarray(lengths, np.int64),
+        batch = Payloads(
+            *views(data), len(data), np.ascontiguousarray(starts, np.int64), np.ascontiguousarray(lengths, np.int64),
             np.ascontiguousarray(slots, np.int64),
         )  # fmt: skip
         left = 0 if len(starts) else -1
@@ -176,20 +149,20 @@ class Decoder:
         if left >= 0:
             rest = self.store.owner[batch.slots] == FREE
             self.outcome.bad += int(np.count_nonzero(rest))
-            self.store.owner[batch.slots[rest]] = _BAD
+            self.store.owner[batch.slots[rest]] = BAD
 
     def _hopeless(self) -> bool:
         """Whether so many payloads failed and none fitted that the definition is not theirs, or so many parts were read."""
         hopeless = self.outcome.bad >= GIVE_UP and not self.fixed and not self.walked
         return hopeless or self.spent > PATIENCE
 
-    def _fixed(self, plan: _Fixed, batch: Batch) -> tuple[int, int]:
+    def _fixed(self, plan: _Fixed, batch: Payloads) -> tuple[int, int]:
         taken, left = plan.take(batch, self.store)
         if taken:
             self.store.skipped.update(plan.skipped)
         return taken, left
 
-    def _walked(self, plan: _Walked, batch: Batch) -> tuple[int, int]:
+    def _walked(self, plan: _Walked, batch: Payloads) -> tuple[int, int]:
         taken, bad, left, first_bad = plan.take(batch, self.store)
         if taken:
             self.store.skipped.update(plan.skipped)
@@ -206,7 +179,7 @@ class Decoder:
             return str(error)
         return "a message has too many parts"
 
-    def _learn(self, batch: Batch, row: int) -> int:
+    def _learn(self, batch: Payloads, row: int) -> int:
         """Learn the layout of one payload and decode what is like it; return the first row left, or −1."""
         try:
             payload = batch.payload(row)
@@ -217,7 +190,7 @@ class Decoder:
             self.outcome.bad += 1
             self.outcome.reason = self.outcome.reason or str(error)
             self.spent += error.steps
-            self.store.owner[batch.slots[row]] = _BAD
+            self.store.owner[batch.slots[row]] = BAD
             return self._next(batch, row)
         for place, count in layout.counts.items():
             if count <= MAX_ELEMENTS:
@@ -248,14 +221,14 @@ class Decoder:
         self.walked = [plan, *(w for w in self.walked if w.program.shape != program.shape)]
         return plan
 
-    def _program(self, layout: Layout, payload: bytes, batch: Batch, row: int, left: int) -> int:
+    def _program(self, layout: Layout, payload: bytes, batch: Payloads, row: int, left: int) -> int:
         """Compile a program for a payload's shape and decode what follows it."""
         plan = self._compile(layout)
         if plan is not None:
             left = self._walked(plan, batch)[1]
         if self.store.owner[batch.slots[row]] == FREE:  # slow fallback: shapes that hardly repeat
             self._single(layout, payload, int(batch.slots[row]))
-            self.store.owner[batch.slots[row]] = _BAD
+            self.store.owner[batch.slots[row]] = BAD
             return self._next(batch, row)
         return left
 
@@ -270,7 +243,7 @@ class Decoder:
                 columns[s.path] = np.minimum(columns[s.path], 1)
         self.store.add(Part(np.array([slot]), columns, layout.skipped))
 
-    def _next(self, batch: Batch, row: int) -> int:
+    def _next(self, batch: Payloads, row: int) -> int:
         """Return the first row behind `row` that nobody owns, or −1."""
         rest = np.flatnonzero(self.store.owner[batch.slots[row + 1 :]] == FREE)
         return row + 1 + int(rest[0]) if len(rest) else -1

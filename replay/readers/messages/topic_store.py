@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 from replay.arrays.column_store import ColumnStore
 from replay.readers.messages.cdr_layout import MAX_ELEMENTS
 from replay.readers.messages.cdr_program import Spec
+from replay.readers.messages.cdr_rows import FREE, OpenTable
 from replay.readers.messages.tables import SIZES, Budget, Cells, Rows, Table
 
-FREE = -1
 _FEWEST_TAKEN, _MOST_SHAPES = 16, 8
 
 
@@ -84,6 +84,11 @@ class Store:
         if table.number not in self.opened:
             self.opened[table.number] = table, table.open(len(self.owner))
         return self.opened[table.number][1]
+
+    def open(self, table: Table) -> OpenTable:
+        """Return the table's room for the batch."""
+        first = self.room(table)
+        return OpenTable(self.owner, table.number, first, *table.grid.cells)
 
     def add(self, part: Part) -> None:
         """Add numbers of some rows; where they are all that many rows hold, these stand in a table of their own."""
