@@ -1,10 +1,27 @@
-"""How the parts of compiled kernels are compiled."""
+"""How the parts of compiled kernels are compiled.
+
+A part is kept with the kernel that calls it and is never called from Python. The kernel holds all arrays for longer
+than its parts do, so the counting of references, which can cost more than a walk over bytes, is left out of them; hence
+a part makes no arrays.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from typing import Any, TypeVar
+
 from numba import njit
 
-# A part of a kernel: compiled into its caller and kept with it, never called from Python. The caller holds all arrays
-# for longer than the part does, so the counting of references, which can cost more than a walk over bytes, is left
-# out; hence a part makes no arrays.
-part = njit(forceinline=True, no_cpython_wrapper=True, no_cfunc_wrapper=True, _nrt=False)
+_F = TypeVar("_F", bound=Callable[..., Any])
+
+
+def part(function: _F) -> _F:
+    """Compile a part of a kernel into its caller, as if it stood there."""
+    compiled: _F = njit(forceinline=True, no_cpython_wrapper=True, no_cfunc_wrapper=True, _nrt=False)(function)
+    return compiled
+
+
+def routine(function: _F) -> _F:
+    """Compile a part of a kernel that several places call, or that is seldom called."""
+    compiled: _F = njit(no_cpython_wrapper=True, no_cfunc_wrapper=True, _nrt=False)(function)
+    return compiled

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from replay.readers.common.compiled import part
+from replay.readers.common.compiled import part, routine
 from replay.readers.messages.cdr_kernel import turn2, turn4, turn8
 from replay.readers.messages.cdr_layout import MAX_ELEMENTS
 from replay.readers.messages.cdr_program import (
@@ -69,7 +69,7 @@ def _length(payloads: Payloads, steps: Steps, row: _Row, pos: int) -> tuple[int,
     return int(np.int64(word)), pos + 4
 
 
-@njit(cache=True, _nrt=False)
+@routine
 def _string(payloads: Payloads, steps: Steps, row: _Row, pos: int) -> int:
     """Walk over one string; return where it ends, or −1."""
     size, pos = _length(payloads, steps, row, pos)
