@@ -13,9 +13,8 @@ from rich.text import Text
 from cli.tables.layout import ByWidth, bullets, section, table, text
 from diagnosis.decision.missing import cost_of_missing
 from replay.machine.config import Machine
-from replay.machine.units import quantity_of
+from replay.machine.signal_table import signal_of
 from replay.mission import MissionFile
-from replay.signals.rules import SI_UNITS
 from replay.signals.signal import Signal, Signals
 from replay.signals.timeline import median_period
 
@@ -106,7 +105,7 @@ def _signal(signal: Signal) -> MappedSignal:
         "name": signal.name,
         "channel": signal.origin.label,
         "recorded_unit": signal.origin.unit or None,
-        "unit": SI_UNITS[quantity_of(signal.name)],
+        "unit": signal_of(signal.name).unit,
         "guessed": signal.guessed,
         "source": signal.source,
         "samples": int(signal.stamps.size),

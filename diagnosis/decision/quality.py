@@ -16,25 +16,11 @@ from diagnosis.results.wheel_model import WheelModelFit
 from replay.arrays.blocks import blocks, release
 from replay.clocks.source_clock import SourceClock
 from replay.machine.config import Machine
+from replay.machine.signal_table import signal_of
 from replay.signals.signal import Signal, Signals
 from replay.signals.timeline import Timeline
 
 _GAP_PERIODS = 5
-_UNITS = {"v": "m/s", "v_ref": "m/s", "v_true": "m/s", "omega": "rad/s", "yaw_rate": "rad/s", "speed": "m/s"}
-
-
-def unit_of(signal: str) -> str:
-    """SI unit of a canonical signal as shown."""
-    leaf = signal.rpartition(".")[2]
-    if leaf in _UNITS:
-        return _UNITS[leaf]
-    if leaf.startswith("pressure"):
-        return "Pa"
-    if leaf.startswith("phi") or signal == "odom.yaw":
-        return "rad"
-    if leaf in ("lat", "lon"):
-        return "deg"
-    return "m" if signal.startswith("odom.") else "of full opening"
 
 
 @dataclass(frozen=True)
@@ -75,7 +61,7 @@ def signal_rows(signals: Signals, timeline: Timeline) -> list[SignalRow]:
             {
                 "name": name,
                 "channel": signal.origin.label,
-                "unit": unit_of(name),
+                "unit": signal_of(name).shown_unit,
                 "recorded_unit": signal.origin.unit,
                 "rate_hz": 1e9 / period if period else None,
                 "samples": int(signal.stamps.size),

@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from replay.arrays.blocks import blocks
-from replay.signals.signal import Signal, quantity_kind
+from replay.machine.signal_table import signal_of
+from replay.signals.signal import Signal
 from replay.signals.to_si import slope
 
 Array = NDArray[np.float64]
@@ -20,12 +21,6 @@ _LONG = 1 << 20
 _BIN_S = 0.01
 _LARGEST = 1e9
 _FEWEST = 50
-# Quantities whose copies show the same moment, the surest first; a plant lies between commands and speeds.
-_KINDS = (
-    "cmd.v", "cmd.omega", "wheel.v", "wheel.v_true", "steer.phi", "steer.phi_true", "wheel.v_ref", "steer.phi_ref",
-    "wheel.u", "steer.u", "wheel.u_applied", "steer.u_applied", "imu.yaw_rate", "odom.yaw", "odom.x", "odom.y",
-    "wheel.psi", "wheel.pressure_a", "wheel.pressure_b",
-)  # fmt: skip
 # Two sensors of one motion: each may be late by its own filter [s].
 _SENSOR_DELAY_S = 0.02
 
@@ -103,10 +98,8 @@ def shared_series(
     origins : tuple[int, int]
         Zero of time of the two files [ns].
     """
-    names = sorted(
-        (n for n in reference.keys() & other.keys() if quantity_kind(n) in _KINDS),
-        key=lambda n: (_KINDS.index(quantity_kind(n)), n),
-    )
+    ranks = {n: signal_of(n).clock_rank for n in reference.keys() & other.keys()}
+    names = [n for _, n in sorted((rank, n) for n, rank in ranks.items() if rank is not None)]
     long = any(len(reference[n].stamps) > _LONG or len(other[n].stamps) > _LONG for n in names)
     pairs = [(n, reference[n], other[n], 0.0) for n in names] or [
         (f"{mine.name} with {theirs.name}", mine, theirs, _SENSOR_DELAY_S)

@@ -24,9 +24,8 @@ from replay.export.formats.rosbag1 import write_ros1_bag
 from replay.export.formats.rosbag2 import write_rosbag2
 from replay.export.formats.twincat import ScopeGroup, write_scope
 from replay.log.open_loop import COLUMN, TOPIC
-from replay.machine.units import quantity_of
+from replay.machine.signal_table import signal_of
 from replay.signals.mapping import sparse_rows
-from replay.signals.rules import SI_UNITS
 from replay.signals.signal import Signals
 
 RECORDING_FORMATS = ("mcap", "bag", "rosbag2", "twincat", "csv", "parquet")
@@ -168,6 +167,6 @@ def _write_twincat(path: Path, groups: list[_Group], open_loop: bool) -> None:
         if open_loop and i == 0:
             columns[COLUMN] = np.ones(group.stamps.size)
         period = float(np.median(np.diff(group.stamps))) / 1e6 if group.stamps.size > 1 else 1.0
-        units = ["1" if name == COLUMN else SI_UNITS[quantity_of(name)] for name in columns]
+        units = ["1" if name == COLUMN else signal_of(name).unit for name in columns]
         scope.append(ScopeGroup(period, list(columns), units, group.stamps, list(columns.values())))
     write_scope(path, scope)

@@ -13,7 +13,7 @@ from replay.errors import ConfigError, check_range
 from replay.log.source_options import SignalSource, SourceOptions
 from replay.machine.drive_model import DriveModel
 from replay.machine.geometry import Geometry, four_wheel_geometry
-from replay.machine.units import quantity_of
+from replay.machine.signal_table import names_of, signal_of
 
 Law = Literal["auto", "signed", "opposed", "printed", "sign_abs", "none"]
 PsiMode = Literal["auto", "printed", "implied", "event_reset", "forced"]
@@ -270,7 +270,7 @@ class Machine:
 
     def _check_name(self, section: str, name: str) -> None:
         """Raise where a signal is not known or names no part of this machine."""
-        quantity_of(name)
+        signal_of(name)
         group, _, rest = name.partition(".")
         part = rest.partition(".")[0]
         if group == "wheel" and part not in self.wheels:
@@ -290,13 +290,7 @@ class Machine:
 
     def canonical_signals(self) -> tuple[str, ...]:
         """Every signal name that this machine can have, in reading order."""
-        wheel = ("v_ref", "v", "v_true", "u", "u_applied", "psi", "pressure_a", "pressure_b")
-        steer = ("phi_ref", "phi", "phi_true", "u", "u_applied")
-        names = ["cmd.v", "cmd.omega"]
-        names += [f"wheel.{w}.{s}" for w in self.wheels for s in wheel]
-        names += [f"steer.{a}.{s}" for a in self.axles for s in steer]
-        names += ["imu.yaw_rate", "gnss.lat", "gnss.lon", "gnss.speed", "odom.x", "odom.y", "odom.yaw"]
-        return tuple(names)
+        return names_of(self.wheels, self.axles)
 
 
 def haulotte() -> Machine:

@@ -9,13 +9,9 @@ from dataclasses import dataclass
 from replay.log.raw_log import Channel
 from replay.log.source_options import SignalSource
 from replay.machine.config import Machine
-from replay.machine.units import quantity_of
+from replay.machine.signal_table import CANONICAL, Scope, signal_of
 from replay.signals.name_parts import axle_of, first_indices, index_of, is_drive, is_steering, tokens, wheel_of
 
-SI_UNITS = {
-    "speed": "m/s", "rotation": "rad/s", "angle": "rad", "length": "m", "fraction": "1", "pressure": "Pa",
-    "acceleration": "m/s^2", "position_deg": "deg",
-}  # fmt: skip
 MESSAGE_TYPES = (
     "JointState", "DynamicJointState", "Twist", "TwistStamped", "AckermannDrive", "AckermannDriveStamped", "Odometry",
     "Imu", "NavSatFix", "GPSFix", "Float64MultiArray", "Float32MultiArray", "Float64", "Float32",
@@ -29,22 +25,16 @@ _COMMON_PACKAGES = frozenset(
     )
 )
 _WORDS_REF = re.compile(r"ref|cmd|command|set|des|target|soll|demand")
-_LEAVES: tuple[tuple[str, str, str], ...] = (
-    # kind of part, leaf, pattern of the last word of a symbol
-    ("both", "u_applied", r"(valve|spool)_?(act|actual|fb|feedback|pos|position|ist)|spool|^u_?applied"),
-    ("both", "u", r"valve_?(cmd|command|out|set|ref|soll)|valve$|^u_?cmd|control_?(out|cmd)|^u$"),
-    ("wheel", "pressure_a", r"press(ure)?_?a$"),
-    ("wheel", "pressure_b", r"press(ure)?_?b$"),
-    ("wheel", "psi", r"^psi"),
-    ("wheel", "v_true", r"(velo(city)?|speed|vel)_?(redundant|true|second)"),
-    ("wheel", "v_ref", r"(velo(city)?|speed|vel|rpm)_?(ref|cmd|command|set|des|target|soll)|"
-                       r"(ref|cmd|set|des(ired)?|target|soll)_?(velo(city)?|speed|vel|rpm)"),
-    ("wheel", "v", r"velo(city)?|speed|^vel|rpm|drehzahl|^omega"),
-    ("steer", "phi_true", r"(angle|phi)_?(redundant|true|second)"),
-    ("steer", "phi_ref", r"(angle|phi|steer\w*)_?(ref|cmd|command|set|des|target|soll)|"
-                         r"(ref|cmd|set|des(ired)?|target|soll)_?(angle|phi|steer)"),
-    ("steer", "phi", r"angle|phi|winkel|act_?pos"),
-)  # fmt: skip
+
+
+def _named(scope: Scope) -> tuple[tuple[str, str], ...]:
+    """Signals of a scope with the patterns that name them, in the order in which these are tried."""
+    found = [(e.named, e.leaf if scope else e.kind) for e in CANONICAL if e.scope == scope and e.named is not None]
+    return tuple((signal, named.pattern) for named, signal in sorted(found, key=lambda pair: pair[0].order))
+
+
+_PART_PATTERNS = {scope: _named(scope) for scope in (Scope.WHEEL, Scope.AXLE)}
+_MACHINE_PATTERNS = _named(Scope.MACHINE)
 
 
 @dataclass(frozen=True)
@@ -103,13 +93,9 @@ def _by_canonical(channel: Channel, machine: Machine) -> Iterator[Candidate]:
         signal = known.get(text.lower())
         if signal is not None and not (text == path and channel.field != "data"):
             yield Candidate(
-                signal, _source(channel, channel.unit or _si(signal)), 0, "it carries the signal's own name"
+                signal, _source(channel, channel.unit or signal_of(signal).unit), 0, "it carries the signal's own name"
             )
             return
-
-
-def _si(signal: str) -> str:
-    return SI_UNITS[quantity_of(signal)]
 
 
 def _by_message(channel: Channel, machine: Machine, others: Mapping[str, Channel]) -> Iterator[Candidate]:
@@ -240,9 +226,8 @@ def _by_symbol(channel: Channel, machine: Machine, first: Mapping[str, int]) -> 
     text = "_".join(tokens(bare))
     yield from _by_word(channel, text)
     steering = is_steering(bare)
-    leaf = next(
-        (x for x in _LEAVES if x[0] in ("both", "steer" if steering else "wheel") and re.search(x[2], last)), None
-    )
+    patterns = _PART_PATTERNS[Scope.AXLE if steering else Scope.WHEEL]
+    leaf = next((leaf for leaf, pattern in patterns if re.search(pattern, last)), None)
     if leaf is None:
         return
     part = axle_of(bare, machine) if steering else wheel_of(bare, machine)
@@ -255,7 +240,7 @@ def _by_symbol(channel: Channel, machine: Machine, first: Mapping[str, int]) -> 
     if part is None and len(machine.wheels) == 1 and not steering and not re.search(r"gnss|gps|imu|odom", text):
         part, rank = machine.wheels[0], 10
     if part is not None:
-        signal = f"{'steer' if steering else 'wheel'}.{part}.{leaf[1]}"
+        signal = f"{'steer' if steering else 'wheel'}.{part}.{leaf}"
         how = {9: "by its number", 10: "as the only wheel"}.get(rank, "by its name")
         yield Candidate(signal, _source(channel, channel.unit or ""), rank, f"{channel.name} {how}")
 
@@ -269,15 +254,7 @@ def _by_word(channel: Channel, text: str) -> Iterator[Candidate]:
     """Yield signals of the whole machine by the words of their symbol or column."""
     if re.search(r"wheel|steer|valve|axle", text):
         return
-    rules = (
-        ("imu.yaw_rate", r"(imu|gyro).*(yaw_?rate|gyro_?z|omega_?z|angular_velocity_z)"),
-        ("gnss.lat", r"(gnss|gps).*lat"),
-        ("gnss.lon", r"(gnss|gps).*lon"),
-        ("gnss.speed", r"(gnss|gps).*(speed|velocity)"),
-        ("cmd.omega", r"(joystick|cmd|command|driver|desired|ref).*(yaw_?rate|omega|turn)"),
-        ("cmd.v", r"(joystick|cmd|command|driver|desired|ref).*(velocity|speed|_v$)"),
-    )
-    for signal, pattern in rules:
+    for signal, pattern in _MACHINE_PATTERNS:
         if re.search(pattern, text):
             yield Candidate(signal, _source(channel, channel.unit or ""), 9, f"{channel.name} by its name")
             return

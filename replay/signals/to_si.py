@@ -14,8 +14,9 @@ from replay.errors import ConfigError
 from replay.log.source_options import SignalSource
 from replay.log.stamp_order import spread_ticks
 from replay.machine.config import Machine
-from replay.machine.units import quantity_of, si_factor
-from replay.signals.rules import SI_UNITS
+from replay.machine.quantities import SI_UNITS
+from replay.machine.signal_table import quantity_of
+from replay.machine.units import si_factor
 
 _TOO_FAST = 3.0
 _WIDE = 1.5

@@ -14,8 +14,9 @@ from cli.commands.config import starter
 from cli.main import run
 from replay.log.source_options import SignalSource, SourceOptions
 from replay.machine.config import Control, Limits, Plant, WheelPlant, haulotte
+from replay.machine.quantities import UNITS
+from replay.machine.signal_table import CANONICAL
 from replay.machine.toml_file import dump_machine, load_machine
-from replay.machine.units import known_units
 
 
 def active(section: str) -> dict[str, object]:
@@ -56,7 +57,19 @@ def test_every_other_key_is_explained(kind: type) -> None:
 
 def test_every_unit_is_named() -> None:
     last = starter().partition("# Units: ")[2]
-    assert all(re.search(rf"(^|[ ,]){re.escape(u)}[ ,.]", last) for u in known_units())
+    assert all(re.search(rf"(^|[ ,]){re.escape(u)}[ ,.]", last) for u in UNITS)
+
+
+def test_every_signal_is_named() -> None:
+    text = starter().partition("# Names: ")[2].partition("# Units: ")[0].replace("#", " ")
+    text = re.sub(r"\(.*?\)", "", text).strip().removesuffix(".")
+    named = set()
+    for group in re.split(r"[;]", text):
+        prefix = ""
+        for word in group.split():
+            prefix, _, leaf = word.rpartition(".") if "." in word else (prefix, "", word)
+            named.add(f"{prefix.partition('.')[0]}.{leaf}")
+    assert named == {entry.kind for entry in CANONICAL}
 
 
 def test_init_writes_once(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -1,0 +1,38 @@
+"""Physical quantities and their units: the first unit of a quantity with factor 1 is its SI unit."""
+
+from __future__ import annotations
+
+import math
+from typing import Literal
+
+Quantity = Literal["speed", "rotation", "angle", "length", "fraction", "pressure", "acceleration", "position_deg"]
+
+#: Every unit that a machine file may name: its quantity and the factor to SI.
+UNITS: dict[str, tuple[Quantity, float]] = {
+    "m/s": ("speed", 1.0),
+    "mm/s": ("speed", 1e-3),
+    "cm/s": ("speed", 1e-2),
+    "km/h": ("speed", 1 / 3.6),
+    "rad/s": ("rotation", 1.0),
+    "deg/s": ("rotation", math.pi / 180),
+    "rpm": ("rotation", 2 * math.pi / 60),
+    "rev/s": ("rotation", 2 * math.pi),
+    "rad": ("angle", 1.0),
+    "deg": ("angle", math.pi / 180),
+    "m": ("length", 1.0),
+    "mm": ("length", 1e-3),
+    "1": ("fraction", 1.0),
+    "fraction": ("fraction", 1.0),
+    "%": ("fraction", 1e-2),
+    "Pa": ("pressure", 1.0),
+    "bar": ("pressure", 1e5),
+    "MPa": ("pressure", 1e6),
+    "m/s^2": ("acceleration", 1.0),
+}
+#: Unit in which every signal of a quantity is kept; a position on the globe stays in degrees.
+SI_UNITS: dict[Quantity, str] = {
+    **{quantity: unit for unit, (quantity, factor) in reversed(UNITS.items()) if factor == 1.0},
+    "position_deg": "deg",
+}
+#: What a fraction is a fraction of, to follow a number.
+OPENING = "of full opening"
