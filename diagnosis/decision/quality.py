@@ -91,14 +91,8 @@ def _gaps(signal: Signal, period: int) -> tuple[int, float]:
 
 def missing_rows(signals: Signals, machine: Machine) -> list[MissingRow]:
     """Signals that would sharpen the diagnosis and are not in the log, with what that costs."""
-    rows: list[MissingRow] = []
-    for name in machine.canonical_signals():
-        if name in signals.items:
-            continue
-        cost = cost_of_missing(name)
-        if cost:
-            rows.append({"name": name, "cost": cost})
-    return rows
+    names = (name for name in machine.canonical_signals() if name not in signals.items)
+    return [{"name": name, "cost": cost_of_missing(name)} for name in names]
 
 
 def checks(

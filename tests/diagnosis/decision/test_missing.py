@@ -2,16 +2,23 @@
 
 from __future__ import annotations
 
-from diagnosis.decision.missing import cost_of_missing
+import pytest
+
+from diagnosis.decision.missing import _COSTS, cost_of_missing
+from replay.errors import ConfigError
 from replay.machine.config import haulotte
+from replay.machine.signal_table import CANONICAL
 
 
 def test_every_canonical_signal_has_a_cost() -> None:
     assert [name for name in haulotte().canonical_signals() if not cost_of_missing(name)] == []
+    assert set(_COSTS) == {entry.kind for entry in CANONICAL}
 
 
-def test_an_unknown_name_has_none() -> None:
-    assert cost_of_missing("wheel.FR.colour") == cost_of_missing("moon.phase") == ""
+@pytest.mark.parametrize("name", ["wheel.FR.colour", "moon.phase"])
+def test_an_unknown_name_is_refused(name: str) -> None:
+    with pytest.raises(ConfigError, match="not a known signal"):
+        cost_of_missing(name)
 
 
 def test_sensor_and_actuator_differ() -> None:
