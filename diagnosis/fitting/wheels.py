@@ -114,8 +114,8 @@ def _effort_map(w: Windows, kept: Mask, dead: float) -> _Map | None:
     while True:
         x, inst = _columns(shape, y, s), _columns(shape, z, s)
         beta, agree = robust_solve(x, inst, p, weight, _FLOOR * float(np.median(np.abs(p))))
-        if not np.isfinite(beta).all():
-            return None
+        if not np.isfinite(beta).all() or beta[0] == 0.0:
+            return None  # not fixed, or no opening answers to speed
         good = np.flatnonzero(agree > 0)
         groups = w.group[use][good]
 

@@ -269,3 +269,16 @@ def test_what_a_single_drive_did_not_show_is_said_and_stays(tmp_path: Path) -> N
 def test_wheels_of_a_machine_with_geometry_are_no_single_drives(free: FitResult) -> None:
     assert [c.key for c in free.constants if c.key.startswith("drive.")] == []
     assert dict(free.machine.drives) == {}
+
+
+def test_a_short_faulty_mission_is_no_internal_error() -> None:
+    """Twenty seconds in which openings are zero: constants are left out with the reason."""
+    simulated = simulate_mission(SimulationOptions(scenario="random", seed=3, duration_s=20.0, rate_hz=100.0))
+    items = {
+        name: Signal(name, stamps, values, SignalSource(column=name), "sim", False)
+        for name, stamps, values in simulated.series()
+    }
+    signals = Signals(items, {})
+    found = fit_missions([Mission((), signals, align(signals))], haulotte())
+    assert found.machine.plant.wheels == haulotte().plant.wheels
+    assert any("fewer than 8 steady windows" in text for text in found.left_out)
