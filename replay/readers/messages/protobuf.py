@@ -13,10 +13,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from replay.readers.messages import protobuf_kernel as compiled
+from replay.readers.messages import protobuf_kernel as kernel
 from replay.readers.messages.cdr import Outcome, Part
 from replay.readers.messages.cdr_layout import MAX_ELEMENTS
+from replay.readers.messages.protobuf_places import Places, Rows, Slots, make_root
 from replay.readers.messages.protobuf_schema import NUMBERS, Schema
+from replay.readers.messages.protobuf_wire import Wire
 
 MAX_PLACES = 50_000
 _CELLS = 1 << 21
@@ -40,14 +42,12 @@ class Decoder:
     def __init__(self, schema: Schema, outcome: Outcome) -> None:
         self.schema, self.outcome = schema, outcome
         t = schema.tables
-        self.flags = np.stack([t.repeated, t.implicit, t.check, t.key, t.hidden])
-        self.used = np.zeros(2, np.int64)
         fields = int(t.first[1])
-        self.places = np.full((5, 64 + 2 * fields), -1, np.int64)
-        self.slots = np.full((8, 64 + fields), -1, np.int64)
+        self.places = Places(np.zeros(1, np.int64), *np.full((5, 64 + 2 * fields), -1, np.int64))
+        self.slots = Slots(np.zeros(1, np.int64), *np.full((8, 64 + fields), -1, np.int64))
         self.visit = 0
         self.paths: dict[tuple[int, bytes], dict[int, str]] = {}
-        compiled.new_message(-1, -1, 0, self.used, self.places, self.slots, t.first, self.flags)
+        make_root(self.places, self.slots, t)
 
     def decode(self, data: NDArray[np.uint8], starts: NDArray[np.int64], lengths: NDArray[np.int64]) -> Iterator[Part]:
         """Decode payloads into columns.
@@ -64,47 +64,40 @@ class Decoder:
         Part
             Numbers that stand in the same rows; rows of undecodable messages stand in none.
         """
-        t = self.schema.tables
-        words, halves = _numbers_at(data, 8), _numbers_at(data, 4)
+        wire = Wire(data, _numbers_at(data, 8), _numbers_at(data, 4))
         at = 0
         while at < len(starts):
-            size = self.places.shape[1]
+            size = len(self.places.slot)
             n = min(len(starts) - at, max(_CELLS // size, 16), _MAX_ROWS)
             room = n // 64 * 64 + 72  # so that places start in different cache sets
             values, present = np.zeros((size, room), np.uint64), np.zeros((size, room), np.uint8)
-            status = np.zeros(n, np.uint8)
-            done = compiled.walk(
-                data, words, halves, starts[at : at + n], lengths[at : at + n], self.visit, MAX_ELEMENTS, t.first, t.number, t.kind,
-                t.choice, t.target, self.flags, self.used, self.places, self.slots, values, present, status,
-            )  # fmt: skip
+            rows = Rows(starts[at : at + n], lengths[at : at + n], values, present, np.zeros(n, np.uint8))
+            done = kernel.walk(wire, rows, self.visit, MAX_ELEMENTS, self.schema.tables, self.places, self.slots)
             self.visit += n
             if done:
-                yield from self._parts(data, at, values[:, :done], present[:, :done], status[:done])
+                yield from self._parts(data, at, values[:, :done], present[:, :done], rows.status[:done])
             at += done
             if done < n and not self._grow():  # this message asks for more places than are allowed
-                self._refuse(np.array([compiled.TOO_MANY]))
+                self._refuse(np.array([kernel.TOO_MANY]))
                 at += 1
 
     def _grow(self) -> bool:
         """Double the room for places and slots; False where that is too much."""
-        if self.places.shape[1] >= MAX_PLACES:
+        if len(self.places.slot) >= MAX_PLACES:
             return False
-        for name in ("places", "slots"):
-            old = getattr(self, name)
-            new = np.full((len(old), 2 * old.shape[1]), -1, np.int64)
-            new[:, : old.shape[1]] = old
-            setattr(self, name, new)
+        self.places = Places(self.places.used, *map(_doubled, self.places[1:]))
+        self.slots = Slots(self.slots.used, *map(_doubled, self.slots[1:]))
         return True
 
     def _refuse(self, states: NDArray[Any]) -> None:
         self.outcome.bad += len(states)
         if len(states):
-            self.outcome.reason = self.outcome.reason or compiled.REASONS[int(states[0])]
+            self.outcome.reason = self.outcome.reason or kernel.REASONS[int(states[0])]
 
     def _parts(
         self, data: NDArray[np.uint8], first: int, values: NDArray[Any], present: NDArray[Any], status: NDArray[Any]
     ) -> Iterator[Part]:
-        good = status == compiled.OK
+        good = status == kernel.OK
         self._refuse(status[~good])
         if not good.all():
             values, present = values[:, good], present[:, good]
@@ -131,12 +124,12 @@ class Decoder:
 
     def _decisive(self) -> list[int]:
         """Places of the counts of arrays and of the hashes of names, where there are names at all."""
-        slots = self.slots[:, : self.used[1]]
+        slots, made = self.slots, int(self.slots.used[0])
         if not self.schema.tables.key.any():
             return []
-        heads = np.flatnonzero(slots[3] >= 0)
-        named = self.schema.tables.key[slots[1, heads]]
-        return [*slots[3, heads].tolist(), *(slots[3, heads[named]] + 1).tolist()]
+        heads = np.flatnonzero(slots.counter[:made] >= 0)
+        named = self.schema.tables.key[slots.field[heads]]
+        return [*slots.counter[heads].tolist(), *(slots.counter[heads[named]] + 1).tolist()]
 
     def _columns(
         self, data: NDArray[np.uint8], rows: NDArray[np.int64], values: NDArray[Any], present: NDArray[Any]
@@ -147,9 +140,9 @@ class Decoder:
         whole: dict[str, NDArray[Any]] = {}
         parts: dict[str, tuple[NDArray[np.bool_], NDArray[Any]]] = {}
         for place, path in paths.items():
-            slot = places[0, place]
-            field = slots[1, slot]
-            there = present[slots[0, slot] if t.implicit[field] else place].view(np.bool_)
+            slot = places.slot[place]
+            field = slots.field[slot]
+            there = present[slots.message[slot] if t.implicit[field] else place].view(np.bool_)
             count = np.count_nonzero(there)
             if count == len(rows):
                 whole[path] = _typed(values[place], int(t.kind[field]))
@@ -185,35 +178,35 @@ class Decoder:
             whole[f"{path}.{name}"] = column
 
     def _skipped(self) -> tuple[str, ...]:
-        long = np.flatnonzero(self.slots[7, : self.used[1]] == 1)
+        long = np.flatnonzero(self.slots.long[: self.slots.used[0]] == 1)
         return tuple(self._slot_path(int(s), lambda slot, i: f"[{i}]") for s in long)
 
     def _paths(self, data: NDArray[np.uint8], values: NDArray[Any], present: NDArray[Any]) -> dict[int, str]:
         """Path of each place of a number, elements named as in the first row."""
         slots, places, t = self.slots, self.places, self.schema.tables
         decisive = self._decisive()
-        key = int(self.used[0]), values[decisive, 0].tobytes()
+        key = int(places.used[0]), values[decisive, 0].tobytes()
         known = self.paths.get(key)
         if known is not None:
             return known
         names = self._names(data, values[:, 0], present[:, 0]) if decisive else {}
 
         def label(slot: int, index: int) -> str:
-            node, count = slots[0, slot], values[slots[3, slot], 0] if names else 0
+            node, count = slots.message[slot], values[slots.counter[slot], 0] if names else 0
             while names:
-                first = int(places[4, node])
-                for beside in range(first, first + int(t.first[places[3, node] + 1] - t.first[places[3, node]])):
+                first, kind = int(places.first[node]), places.kind[node]
+                for beside in range(first, first + int(t.first[kind + 1] - t.first[kind])):
                     if len(names.get(beside, ())) == count and count:
                         return f"[{names[beside][index]}]" if index < count else f"[{index}]"
-                if places[0, node] < 0:
+                if places.slot[node] < 0:
                     break
-                node = slots[0, places[0, node]]
+                node = slots.message[places.slot[node]]
             return f"[{index}]"
 
         found = {}
-        for place in range(1, int(self.used[0])):
-            slot, index = int(places[0, place]), int(places[1, place])
-            field = slots[1, slot]
+        for place in range(1, int(places.used[0])):
+            slot, index = int(places.slot[place]), int(places.element[place])
+            field = slots.field[slot]
             if t.kind[field] < len(NUMBERS) and (index >= 0 or not t.repeated[field]):
                 found[place] = self._slot_path(slot, label) + (label(slot, index) if index >= 0 else "")
         if len(self.paths) > _MAX_KNOWN:
@@ -225,24 +218,24 @@ class Decoder:
         """Path of a field, without an index of its own."""
         parts = []
         while True:
-            parts.append(self.schema.fields[self.slots[1, slot]].name)
-            node = self.slots[0, slot]
-            slot, index = int(self.places[0, node]), int(self.places[1, node])
+            parts.append(self.schema.fields[self.slots.field[slot]].name)
+            node = self.slots.message[slot]
+            slot, index = int(self.places.slot[node]), int(self.places.element[node])
             if slot < 0:
                 return "".join(reversed(parts))
             parts.append((label(slot, index) if index >= 0 else "") + ".")
 
     def _names(self, data: NDArray[np.uint8], values: NDArray[Any], present: NDArray[Any]) -> dict[int, list[str]]:
         """Arrays of distinct names in one row, by their slots."""
-        slots = self.slots[:, : self.used[1]]
+        slots, made = self.slots, int(self.slots.used[0])
         names = {}
-        for slot in np.flatnonzero(self.schema.tables.key[slots[1]]).tolist():
-            place, held = int(slots[2, slot]), []
+        for slot in np.flatnonzero(self.schema.tables.key[slots.field[:made]]).tolist():
+            place, held = int(slots.place[slot]), []
             while place >= 0 and present[place]:
                 start, size = int(values[place]) >> 20, int(values[place]) & 0xFFFFF
                 text = data[start : start + size].tobytes().rstrip(b"\0").decode("utf-8", "replace").strip()
                 held.append(text)
-                place = int(self.places[2, place])
+                place = int(self.places.following[place])
             if all(held) and len(set(held)) == len(held):
                 names[slot] = held
         return names
@@ -251,6 +244,11 @@ class Decoder:
 def _numbers_at(data: NDArray[np.uint8], size: int) -> NDArray[Any]:
     """Unsigned numbers of a size that start at each byte."""
     return np.ndarray((max(len(data) - size + 1, 0),), f"<u{size}", data, strides=(1,))
+
+
+def _doubled(numbers: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Room for twice as many numbers."""
+    return np.concatenate([numbers, np.full(len(numbers), -1, np.int64)])
 
 
 def _mark(columns: NDArray[np.uint64]) -> NDArray[np.uint64]:

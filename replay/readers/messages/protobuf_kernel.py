@@ -1,18 +1,32 @@
 """Compiled walk over serialised protobuf messages: every number to its place, every length checked.
 
-A *place* is where a value can stand: a message, a number, or an element of an array, in every message of one type the
-same one. Places are made when they are first met, so that types which hold themselves cost what the data hold. A
-*slot* is a field of a message's place; that of an array holds a chain of element places. Values and presence of all
-rows of a batch are matrices of shape (places, rows); see `replay.readers.messages.protobuf` for their owner.
+Values and presence of all rows of a batch are matrices of shape (places, rows); see
+`replay.readers.messages.protobuf_places` for the places and `replay.readers.messages.protobuf` for their owner.
 """
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numba import njit
 
-from replay.readers.messages.protobuf_schema import BYTES, DOUBLE, MESSAGE, STRING
-from replay.readers.messages.protobuf_wire import add_hash, find, is_text, number_at, varint, wire_of
+from replay.readers.common.compiled import part
+from replay.readers.messages.protobuf_places import (
+    BEYOND,
+    NO_ROOM,
+    Ints,
+    Places,
+    Rows,
+    Slots,
+    clear,
+    new_place,
+    next_element,
+    next_number,
+    only_message,
+)
+from replay.readers.messages.protobuf_schema import BYTES, DOUBLE, MESSAGE, STRING, Tables
+from replay.readers.messages.protobuf_wire import Wire, add_hash, find, is_text, number_at, varint, wire_of
 
 MAX_DEPTH = 64
 MAX_CLEARED = 64
@@ -30,286 +44,276 @@ REASONS = (
 )
 
 
-@njit(cache=True)
-def _new_place(slot, index, used, places):  # type: ignore[no-untyped-def]
-    place = used[0]
-    if place >= places.shape[1]:
-        return -1
-    used[0] += 1
-    places[0, place], places[1, place], places[2, place], places[3, place], places[4, place] = slot, index, -1, -1, -1
-    return place
+class _Stack(NamedTuple):
+    """Messages that are open, the outermost first: their end, place (−1: not kept), type and the field expected next."""
+
+    end: Ints
+    place: Ints
+    kind: Ints
+    hint: Ints
 
 
-@njit(cache=True)
-def new_message(slot, index, kind, used, places, slots, first, flags):  # type: ignore[no-untyped-def]
-    """Make the place of a message with its slots; −1 where there is no room."""
-    count = first[kind + 1] - first[kind]
-    if used[1] + count > slots.shape[1] or used[0] + 1 + 2 * count > places.shape[1]:
-        return -1
-    place = _new_place(slot, index, used, places)
-    places[3, place], places[4, place] = kind, used[1]
-    used[1] += count
-    for i in range(count):
-        s, f = places[4, place] + i, first[kind] + i
-        slots[0, s], slots[1, s], slots[2, s], slots[3, s] = place, f, -1, -1
-        slots[4, s], slots[5, s], slots[6, s] = -1, -1, 0
-        if flags[0, f]:  # repeated: a place for the count, for names one more for their hash
-            slots[3, s] = _new_place(s, -1, used, places)
-            if flags[3, f]:
-                _new_place(s, -1, used, places)
-        elif flags[1, f]:  # its absence means 0
-            slots[2, s] = _new_place(s, -1, used, places)
-    return place
+class _Field(NamedTuple):
+    """A field on the wire: wire type, number, and the size of what has a length."""
+
+    wire: int
+    code: int
+    size: int
 
 
-@njit(cache=True)
-def _clear(slot, row, used, places, slots, values, present):  # type: ignore[no-untyped-def]
-    """Take back everything below a slot in one row."""
-    for place in range(used[0]):
-        up = places[0, place]
-        while up >= 0 and up != slot:
-            up = places[0, slots[0, up]]
-        if up == slot:
-            values[place, row], present[place, row] = 0, 0
-    for other in range(used[1]):
-        up = other
-        while up >= 0 and up != slot:
-            up = places[0, slots[0, up]]
-        if up == slot:
-            slots[4, other] = -1
+class _Value(NamedTuple):
+    """What a known field holds: its number in the tables, its kind, its size, and whether it is a packed array."""
+
+    field: int
+    kind: int
+    size: int
+    packed: bool
 
 
-@njit(cache=True)
-def _element(slot, visit, limit, used, places, slots, first, flags, target):  # type: ignore[no-untyped-def]
-    """Place of the next message in an array; −1 beyond the limit, −2 where there is no room."""
-    if slots[4, slot] != visit:
-        slots[4, slot], slots[5, slot], slots[6, slot] = visit, -1, 0
-    index = slots[6, slot]
-    slots[6, slot] += 1
-    if index >= limit:
-        return -1
-    last = slots[5, slot]
-    place = slots[2, slot] if last < 0 else places[2, last]
-    if place < 0:
-        place = new_message(slot, index, target[slots[1, slot]], used, places, slots, first, flags)
-        if place < 0:
-            return -2
-        if last < 0:
-            slots[2, slot] = place
+@part
+def _head(wire: Wire, at: int, stop: int) -> tuple[_Field, int, int]:
+    """Tag and length of the next field, the place behind them, and what is wrong."""
+    tag = int(np.int64(wire.data[at]))
+    if tag < 128:
+        at += 1
+    else:
+        long, at = varint(wire.data, at, stop, 5)
+        tag = int(np.int64(long))
+        if at < 0:
+            return _Field(0, 0, 0), at, CUT
+    kind, code = tag & 7, tag >> 3
+    if code == 0 or code >= 1 << 29 or kind > 5:
+        return _Field(0, 0, 0), at, BAD_TAG
+    if kind == 3 or kind == 4:
+        return _Field(0, 0, 0), at, GROUP_FOUND
+    size = 0
+    if kind == 2:
+        if at < stop and wire.data[at] < 128:
+            size = int(np.int64(wire.data[at]))
+            at += 1
         else:
-            places[2, last] = place
-    slots[5, slot] = place
-    return place
+            long, at = varint(wire.data, at, stop, 5)
+            size = int(np.int64(long))
+        if at < 0 or size > stop - at:
+            return _Field(0, 0, 0), at, CUT
+    return _Field(kind, code, size), at, OK
+
+
+@part
+def _skip(wire: Wire, at: int, stop: int, field: _Field) -> int:
+    """Place behind a field that is not known; −1 where it is cut."""
+    if field.wire == 0:
+        return int(varint(wire.data, at, stop, 10)[1])
+    at += field.size if field.wire == 2 else 8 if field.wire == 1 else 4
+    return -1 if at > stop else at
+
+
+@part
+def _clear_others(
+    row: int, field: int, place: int, cleared: int, rows: Rows, places: Places, slots: Slots, types: Tables
+) -> int:
+    """Take back the other fields of a oneof, of which the last one counts; return how often that was done in the row."""
+    first = types.first[places.kind[place]]
+    for other in range(first, types.first[places.kind[place] + 1]):
+        beside = places.first[place] + other - first
+        if other == field or types.choice[other] != types.choice[field] or slots.place[beside] < 0:
+            continue
+        if rows.present[slots.place[beside], row]:
+            cleared += 1
+            if cleared <= MAX_CLEARED:
+                clear(beside, row, rows, places, slots)
+    return cleared
+
+
+@part
+def _enter(
+    row: int, slot: int, value: _Value, visit: int, limit: int, rows: Rows, places: Places, slots: Slots, types: Tables
+) -> tuple[int, int]:
+    """Place of the message that begins (−1: it is not kept, or `NO_ROOM`), and whether an array became too long."""
+    if slot < 0:
+        return -1, 0
+    if not types.repeated[value.field]:
+        return only_message(slot, value.field, places, slots, types), 0
+    inner = next_element(slot, visit, limit, places, slots, types)
+    if inner >= 0:
+        rows.values[slots.counter[slot], row] = slots.met[slot]
+    return inner, int(inner == BEYOND and slots.met[slot] == limit + 1)
+
+
+@part
+def _drop_array(row: int, slot: int, visit: int, rows: Rows, places: Places, slots: Slots) -> None:
+    """Take back an array of messages that is too long, and remember how far it was read."""
+    met, last = slots.met[slot], slots.last[slot]
+    clear(slot, row, rows, places, slots)
+    slots.visit[slot], slots.last[slot], slots.met[slot], slots.long[slot] = visit, last, met, 1
+
+
+@part
+def _single(
+    wire: Wire, at: int, stop: int, row: int, slot: int, kind: int, rows: Rows, places: Places, slots: Slots
+) -> tuple[int, int]:
+    """Take one number; return the place behind it and what is wrong."""
+    value, at = number_at(wire, at, stop, kind)
+    if at < 0:
+        return at, CUT
+    if slot >= 0:
+        place = slots.place[slot]
+        if place < 0:
+            place = new_place(slot, -1, places)
+            if place < 0:
+                return at, FULL
+            slots.place[slot] = place
+        rows.values[place, row], rows.present[place, row] = value, 1
+    return at, OK
+
+
+@part
+def _array(
+    wire: Wire, span: tuple[int, int], row: int, slot: int, value: _Value, seen: tuple[int, int], rows: Rows,
+    places: Places, slots: Slots,
+) -> tuple[int, int]:  # fmt: skip
+    """Take numbers or names of an array, one or all that are packed; return the place behind them and what is wrong.
+
+    `span` is where they begin and the message ends, `seen` the row's number and how many elements become places.
+    """
+    (at, stop), (visit, limit) = span, seen
+    index, last, state = 0, -1, OK
+    if slot >= 0 and slots.visit[slot] == visit:
+        index, last = slots.met[slot], slots.last[slot]
+    before = index
+    until = at + value.size if value.packed or value.kind == STRING else stop
+    while not (value.packed and at == until):
+        if value.kind == STRING:
+            cell, after = (np.uint64(at) << np.uint64(20)) | np.uint64(value.size if value.size < 1 << 20 else 0), until
+            if slot >= 0:
+                add_hash(wire.data, at, until, slots.counter[slot] + 1, row, rows.values)
+        elif value.kind == DOUBLE and at + 8 <= until:
+            cell, after = wire.words[at], at + 8
+        else:
+            cell, after = number_at(wire, at, until, value.kind)
+        if after < 0:
+            state = CUT
+            break
+        at = after
+        index += 1
+        if slot >= 0 and index <= limit:
+            place = next_number(slot, index - 1, last, places, slots)
+            if place < 0:
+                return at, FULL
+            last = place
+            rows.values[place, row], rows.present[place, row] = cell, 1
+        if not value.packed:
+            break
+    if slot >= 0 and index:
+        slots.visit[slot], slots.last[slot], slots.met[slot] = visit, last, index
+        rows.values[slots.counter[slot], row] = index if index <= limit else 0
+        if index > limit and before <= limit:
+            slots.long[slot], gone = 1, slots.place[slot]
+            while gone >= 0:
+                rows.present[gone, row] = 0
+                gone = places.following[gone]
+    return at, state
+
+
+@part
+def _walk_row(
+    wire: Wire, rows: Rows, row: int, visit: int, limit: int, types: Tables, places: Places, slots: Slots, stack: _Stack
+) -> int:
+    """Walk one payload; return what is wrong with it, or `FULL`. The loop over fields stands whole: its state is one."""
+    at, depth, cleared = rows.starts[row], 0, 0
+    stack.end[0], stack.place[0], stack.kind[0], stack.hint[0] = at + rows.lengths[row], 0, 0, types.first[0]
+    rows.present[0, row] = 1
+    if at < 0 or rows.lengths[row] < 0 or stack.end[0] > len(wire.data):
+        return CUT
+    while True:
+        stop = stack.end[depth]
+        if at == stop:
+            if depth == 0:
+                return OK
+            depth -= 1
+            continue
+        head, at, state = _head(wire, at, stop)
+        if state != OK:
+            return state
+        low, high = types.first[stack.kind[depth]], types.first[stack.kind[depth] + 1]
+        field = stack.hint[depth]
+        if field >= high or types.number[field] != head.code:
+            field = find(types.number, low, high, head.code)
+        kind = -1 if field < 0 else types.kind[field]
+        packed = field >= 0 and head.wire == 2 and kind < BYTES and types.repeated[field]
+        if field < 0 or (wire_of(kind) != head.wire and not packed):
+            at = _skip(wire, at, stop, head)
+            if at < 0:
+                return CUT
+            continue
+        value = _Value(field, kind, head.size, packed)
+        stack.hint[depth] = field if types.repeated[field] else field + 1
+        place = stack.place[depth]
+        slot = -1 if place < 0 or types.hidden[field] else places.first[place] + field - low
+        if kind == STRING and types.check[field] and not is_text(wire.data, at, at + head.size):
+            return BAD_TEXT
+        if slot >= 0 and types.choice[field] >= 0:
+            cleared = _clear_others(row, field, place, cleared, rows, places, slots, types)
+            if cleared > MAX_CLEARED:
+                return TOO_CHANGEABLE
+        if kind == MESSAGE:
+            inner, too_long = _enter(row, slot, value, visit, limit, rows, places, slots, types)
+            if too_long:
+                cleared += 1
+                if cleared > MAX_CLEARED:
+                    return TOO_CHANGEABLE
+                _drop_array(row, slot, visit, rows, places, slots)
+            if inner == NO_ROOM:
+                return FULL
+            if depth == MAX_DEPTH:
+                return TOO_DEEP
+            if inner >= 0:
+                rows.present[inner, row] = 1
+            depth += 1
+            stack.end[depth], stack.place[depth], stack.kind[depth] = at + head.size, inner, types.target[field]
+            stack.hint[depth] = types.first[types.target[field]]
+        elif kind >= BYTES and not types.key[field]:
+            at += head.size
+        else:
+            if types.repeated[field]:
+                at, state = _array(wire, (at, stop), row, slot, value, (visit, limit), rows, places, slots)
+            else:
+                at, state = _single(wire, at, stop, row, slot, kind, rows, places, slots)
+            if state != OK:
+                return state
+
+
+@part
+def _walk_rows(
+    wire: Wire, rows: Rows, visit: int, limit: int, types: Tables, places: Places, slots: Slots, stack: _Stack
+) -> int:
+    for row in range(len(rows.starts)):
+        state = _walk_row(wire, rows, row, visit + row + 1, limit, types, places, slots, stack)
+        if state == FULL:
+            return row
+        rows.status[row] = state
+    return len(rows.starts)
 
 
 @njit(cache=True)
-def walk(  # type: ignore[no-untyped-def]
-    data, words, halves, starts, lengths, visit, limit, first, number, kinds, choice, target, flags, used, places, slots, values,
-    present, status,
-):  # fmt: skip
+def walk(wire: Wire, rows: Rows, visit: int, limit: int, types: Tables, places: Places, slots: Slots) -> int:
     """Walk payloads row by row; return how many rows were done before room for places ran out.
 
     Parameters
     ----------
-    data, words, halves : arrays
-        Bytes, and the 8-byte and 4-byte numbers that start at each of them.
-    starts, lengths : arrays
-        Where the payloads lie.
+    wire : Wire
+        Bytes that hold all payloads.
+    rows : Rows
+        The payloads, and what is filled.
     visit : int
         Number that no row had before; rows count on from it.
     limit : int
         Elements of an array that become places.
-    first, number, kinds, choice, target : arrays
-        As in `replay.readers.messages.protobuf_schema.Tables`.
-    flags : array, shape (5, fields)
-        Repeated, implicit, checked, key and hidden fields.
-    used : array, shape (2,)
-        Places and slots in use.
-    places : array, shape (5, p)
-        Slot that holds it, index in an array, next element, type and first slot of a message.
-    slots : array, shape (8, s)
-        Place of its message, field, place (of the first element), place of the count; visit, last element and count of
-        the row at hand; whether it ever was too long.
-    values, present : arrays, shape (p, n)
-        Filled; zero before.
-    status : array, shape (n,)
-        What is wrong with each row.
+    types : Tables
+        Fields of all types.
+    places, slots : Places, Slots
+        Those that were met; added to.
     """
-    ends = np.empty(MAX_DEPTH + 1, np.int64)
-    nodes = np.empty(MAX_DEPTH + 1, np.int64)
-    types = np.empty(MAX_DEPTH + 1, np.int64)
-    hints = np.empty(MAX_DEPTH + 1, np.int64)
-    for row in range(len(starts)):
-        visit += 1
-        at, depth, cleared, state = starts[row], 0, 0, OK
-        ends[0], nodes[0], types[0], hints[0] = starts[row] + lengths[row], 0, 0, first[0]
-        present[0, row] = 1
-        if at < 0 or lengths[row] < 0 or ends[0] > len(data):
-            status[row] = CUT
-            continue
-        while True:
-            stop = ends[depth]
-            if at == stop:
-                if depth == 0:
-                    break
-                depth -= 1
-                continue
-            tag = np.int64(data[at])
-            if tag < 128:
-                at += 1
-            else:
-                long, at = varint(data, at, stop, 5)
-                tag = np.int64(long)
-                if at < 0:
-                    state = CUT
-                    break
-            wire, code = tag & 7, tag >> 3
-            if code == 0 or code >= 1 << 29 or wire > 5:
-                state = BAD_TAG
-                break
-            if wire in (3, 4):
-                state = GROUP_FOUND
-                break
-            low, high = first[types[depth]], first[types[depth] + 1]
-            field = hints[depth]
-            if field >= high or number[field] != code:
-                field = find(number, low, high, code)
-            size = np.int64(0)
-            if wire == 2:
-                if at < stop and data[at] < 128:
-                    size = np.int64(data[at])
-                    at += 1
-                else:
-                    long, at = varint(data, at, stop, 5)
-                    size = np.int64(long)
-                if at < 0 or size > stop - at:
-                    state = CUT
-                    break
-            kind = -1 if field < 0 else kinds[field]
-            packed = field >= 0 and wire == 2 and kind < BYTES and flags[0, field]
-            if field < 0 or (wire_of(kind) != wire and not packed):  # unknown: skipped
-                if wire == 0:
-                    at = varint(data, at, stop, 10)[1]
-                else:
-                    at += size if wire == 2 else 8 if wire == 1 else 4
-                if at < 0 or at > stop:
-                    state = CUT
-                    break
-                continue
-            hints[depth] = field if flags[0, field] else field + 1
-            node = nodes[depth]
-            slot = -1 if node < 0 or flags[4, field] else places[4, node] + field - low
-            if kind == STRING and flags[2, field] and not is_text(data, at, at + size):
-                state = BAD_TEXT
-                break
-            if slot >= 0 and choice[field] >= 0:  # the last one of a oneof counts
-                for other in range(low, high):
-                    beside = places[4, node] + other - low
-                    if other == field or choice[other] != choice[field] or slots[2, beside] < 0:
-                        continue
-                    if present[slots[2, beside], row]:
-                        cleared += 1
-                        if cleared <= MAX_CLEARED:
-                            _clear(beside, row, used, places, slots, values, present)
-                if cleared > MAX_CLEARED:
-                    state = TOO_CHANGEABLE
-                    break
-            if kind == MESSAGE:
-                inner = -1
-                if slot >= 0 and flags[0, field]:
-                    inner = _element(slot, visit, limit, used, places, slots, first, flags, target)
-                    if inner >= 0:
-                        values[slots[3, slot], row] = slots[6, slot]
-                    elif inner == -1 and slots[6, slot] == limit + 1:
-                        count, last = slots[6, slot], slots[5, slot]
-                        cleared += 1
-                        if cleared > MAX_CLEARED:
-                            state = TOO_CHANGEABLE
-                            break
-                        _clear(slot, row, used, places, slots, values, present)
-                        slots[4, slot], slots[5, slot], slots[6, slot], slots[7, slot] = visit, last, count, 1
-                elif slot >= 0:
-                    inner = slots[2, slot]
-                    if inner < 0:
-                        inner = new_message(slot, -1, target[field], used, places, slots, first, flags)
-                        inner = -2 if inner < 0 else inner
-                        slots[2, slot] = max(inner, -1)
-                if inner == -2:
-                    return row
-                if depth == MAX_DEPTH:
-                    state = TOO_DEEP
-                    break
-                if inner >= 0:
-                    present[inner, row] = 1
-                depth += 1
-                ends[depth], nodes[depth], types[depth], hints[depth] = (
-                    at + size,
-                    inner,
-                    target[field],
-                    first[target[field]],
-                )
-                continue
-            if kind >= BYTES and not flags[3, field]:
-                at += size
-                continue
-            if not flags[0, field]:
-                value, at = number_at(data, words, halves, at, stop, kind)
-                if at < 0:
-                    state = CUT
-                    break
-                if slot >= 0:
-                    place = slots[2, slot]
-                    if place < 0:
-                        place = _new_place(slot, -1, used, places)
-                        if place < 0:
-                            return row
-                        slots[2, slot] = place
-                    values[place, row], present[place, row] = value, 1
-                continue
-            index, last = 0, -1
-            if slot >= 0 and slots[4, slot] == visit:
-                index, last = slots[6, slot], slots[5, slot]
-            before = index
-            until = at + size if packed or kind == STRING else stop
-            while True:
-                if packed and at == until:
-                    break
-                if kind == STRING:
-                    value, after = (np.uint64(at) << np.uint64(20)) | np.uint64(size if size < 1 << 20 else 0), until
-                    if slot >= 0:
-                        add_hash(data, at, until, slots[3, slot] + 1, row, values)
-                elif kind == DOUBLE and at + 8 <= until:
-                    value, after = words[at], at + 8
-                else:
-                    value, after = number_at(data, words, halves, at, until, kind)
-                if after < 0:
-                    state = CUT
-                    break
-                at = after
-                index += 1
-                if slot >= 0 and index <= limit:
-                    place = slots[2, slot] if last < 0 else places[2, last]
-                    if place < 0:
-                        place = _new_place(slot, index - 1, used, places)
-                        if place < 0:
-                            return row
-                        if last < 0:
-                            slots[2, slot] = place
-                        else:
-                            places[2, last] = place
-                    last = place
-                    values[place, row], present[place, row] = value, 1
-                if not packed:
-                    break
-            if slot >= 0 and index:
-                slots[4, slot], slots[5, slot], slots[6, slot] = visit, last, index
-                values[slots[3, slot], row] = index if index <= limit else 0
-                if index > limit and before <= limit:
-                    slots[7, slot], gone = 1, slots[2, slot]
-                    while gone >= 0:
-                        present[gone, row] = 0
-                        gone = places[2, gone]
-            if state != OK:
-                break
-        status[row] = state
-    return len(starts)
+    end, place = np.empty(MAX_DEPTH + 1, np.int64), np.empty(MAX_DEPTH + 1, np.int64)
+    kind, hint = np.empty(MAX_DEPTH + 1, np.int64), np.empty(MAX_DEPTH + 1, np.int64)
+    return _walk_rows(wire, rows, visit, limit, types, places, slots, _Stack(end, place, kind, hint))

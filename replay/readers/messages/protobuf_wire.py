@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
-import numpy as np
-from numba import njit
+from typing import Any, NamedTuple
 
+import numpy as np
+from numpy.typing import NDArray
+
+from replay.readers.common.compiled import part, routine
 from replay.readers.messages.protobuf_schema import (  # fmt: skip
     BOOL,
     BYTES,
@@ -22,8 +25,16 @@ from replay.readers.messages.protobuf_schema import (  # fmt: skip
 )
 
 
-@njit(cache=True)
-def varint(data, at, stop, most):  # type: ignore[no-untyped-def]
+class Wire(NamedTuple):
+    """Bytes that hold payloads, and the 8-byte and 4-byte numbers that start at each of them."""
+
+    data: NDArray[np.uint8]
+    words: NDArray[np.uint64]
+    halves: NDArray[np.uint32]
+
+
+@routine
+def varint(data: NDArray[np.uint8], at: int, stop: int, most: int) -> tuple[Any, int]:
     """Value and the place behind it; place −1 where it is cut or longer than `most` bytes."""
     if at < stop and data[at] < 128:
         return np.uint64(data[at]), at + 1
@@ -38,8 +49,8 @@ def varint(data, at, stop, most):  # type: ignore[no-untyped-def]
     return value, -1
 
 
-@njit(cache=True)
-def is_text(data, at, stop):  # type: ignore[no-untyped-def]
+@routine
+def is_text(data: NDArray[np.uint8], at: int, stop: int) -> bool:
     """Whether bytes are UTF-8 without surrogates and overlong forms."""
     while at < stop:
         lead = data[at]
@@ -68,8 +79,8 @@ def is_text(data, at, stop):  # type: ignore[no-untyped-def]
     return True
 
 
-@njit(cache=True)
-def wire_of(kind):  # type: ignore[no-untyped-def]
+@part
+def wire_of(kind: int) -> int:
     """Wire type of a single value."""
     if kind in (DOUBLE, FIXED64, SFIXED64):
         return 1
@@ -82,8 +93,8 @@ def wire_of(kind):  # type: ignore[no-untyped-def]
     return 0
 
 
-@njit(cache=True)
-def find(number, low, high, code):  # type: ignore[no-untyped-def]
+@routine
+def find(number: NDArray[np.int64], low: int, high: int, code: int) -> int:
     """Field of a type by its number on the wire; −1 for none."""
     end = high
     while low < end:
@@ -95,16 +106,16 @@ def find(number, low, high, code):  # type: ignore[no-untyped-def]
     return low if low < high and number[low] == code else -1
 
 
-@njit(cache=True)
-def number_at(data, words, halves, at, stop, kind):  # type: ignore[no-untyped-def]
+@routine
+def number_at(wire: Wire, at: int, stop: int, kind: int) -> tuple[Any, int]:
     """One number as 64 bits, and the place behind it or −1."""
-    wire = wire_of(kind)
-    if wire != 0:
-        width = 8 if wire == 1 else 4
+    wire_type = wire_of(kind)
+    if wire_type != 0:
+        width = 8 if wire_type == 1 else 4
         if at + width > stop:
             return np.uint64(0), -1
-        return words[at] if wire == 1 else np.uint64(halves[at]), at + width
-    value, after = varint(data, at, stop, 10)
+        return wire.words[at] if wire_type == 1 else np.uint64(wire.halves[at]), at + width
+    value, after = varint(wire.data, at, stop, 10)
     if kind == BOOL:
         value = np.uint64(1) if value != 0 else np.uint64(0)
     elif kind == SINT32:
@@ -115,8 +126,8 @@ def number_at(data, words, halves, at, stop, kind):  # type: ignore[no-untyped-d
     return value, after
 
 
-@njit(cache=True)
-def add_hash(data, at, stop, place, row, values):  # type: ignore[no-untyped-def]
+@routine
+def add_hash(data: NDArray[np.uint8], at: int, stop: int, place: int, row: int, values: NDArray[np.uint64]) -> None:
     """Add one name to the hash of an array of names."""
     mark = values[place, row] ^ np.uint64(0xCBF29CE484222325)
     for i in range(at, stop):
