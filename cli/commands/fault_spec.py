@@ -7,11 +7,10 @@ from collections.abc import Callable, Mapping
 from dataclasses import replace
 
 from replay.errors import ConfigError
-from replay.faults import FaultMode, FaultSpec, Side
+from replay.faults import TABLE_ROWS, FaultSpec, Saturation, Side, TableRow
 
 _PAPER_SPEED = 0.36
 _SIDES = (Side.SENSOR, Side.ACTUATOR)
-_MODES = (FaultMode.STUCK, FaultMode.NO_SIGNAL, FaultMode.INEFFICIENT, FaultMode.NOISY)
 _KEYS: Mapping[str, Callable[[FaultSpec, float], FaultSpec]] = {
     "eps": lambda fault, x: replace(fault, epsilon=x),
     "sat": lambda fault, x: replace(fault, sat=x),
@@ -46,12 +45,12 @@ def parse_fault(words: str, *, epsilon: float | None = None, speeds: Mapping[str
     side = next((s for s in _SIDES if s.value == side_word.lower()), None)
     if side is None:
         raise ConfigError(f"--fault {words!r}: side {side_word!r} is not known; expected sensor or actuator")
-    mode = next((m for m in _MODES if m.value == mode_word.lower().replace("-", "_")), None)
-    if mode is None:
-        known = ", ".join(m.value for m in _MODES)
-        raise ConfigError(f"--fault {words!r}: mode {mode_word!r} is not known; expected one of {known}")
-    fault = _typical(part, side, mode, _number(words, "START", start), _number(words, "STOP", stop))
-    if epsilon is not None and mode in (FaultMode.INEFFICIENT, FaultMode.NOISY):
+    rows = {row.mode.value: row for row in TABLE_ROWS if row.side is side}
+    row = rows.get(mode_word.lower().replace("-", "_"))
+    if row is None:
+        raise ConfigError(f"--fault {words!r}: mode {mode_word!r} is not known; expected one of {', '.join(rows)}")
+    fault = _typical(part, row, _number(words, "START", start), _number(words, "STOP", stop))
+    if epsilon is not None and not row.total:
         fault = replace(fault, epsilon=epsilon)
     if speeds is not None and part in speeds and side is Side.SENSOR:
         scale = speeds[part] / _PAPER_SPEED
@@ -61,22 +60,13 @@ def parse_fault(words: str, *, epsilon: float | None = None, speeds: Mapping[str
         if key not in _KEYS:
             raise ConfigError(f"--fault {words!r}: {key!r} is not known; expected eps, sat, std, tau or ramp")
         fault = _KEYS[key](fault, _number(words, key, value))
-    _check_row(words, fault)
+    _check_row(words, fault, row)
     return fault
 
 
-def _typical(part: str, side: Side, mode: FaultMode, start: float, stop: float) -> FaultSpec:
+def _typical(part: str, row: TableRow, start: float, stop: float) -> FaultSpec:
     """Fault of a row with middling severity; a stuck part holds its value at onset."""
-    fault = FaultSpec(part, side, mode, start, stop)
-    if mode is FaultMode.STUCK:
-        return replace(fault, sat=math.nan)
-    if mode is FaultMode.INEFFICIENT:
-        return replace(fault, epsilon=0.5)
-    if mode is FaultMode.NOISY and side is Side.SENSOR:
-        return replace(fault, epsilon=0.4, sat=0.05, sat_std=0.12, sat_tau_s=0.05)
-    if mode is FaultMode.NOISY:
-        return replace(fault, epsilon=0.4, sat=0.08, sat_std=0.08, sat_tau_s=0.8)
-    return fault
+    return FaultSpec(part, row.side, row.mode, start, stop, row.epsilon, row.sat, row.sat_std, row.sat_tau_s)
 
 
 def _number(words: str, key: str, value: str) -> float:
@@ -89,17 +79,15 @@ def _number(words: str, key: str, value: str) -> float:
     return number
 
 
-def _check_row(words: str, fault: FaultSpec) -> None:
+def _check_row(words: str, fault: FaultSpec, row: TableRow) -> None:
     """Raise where ε and sat belong to another row of the table than the mode says."""
-    full = fault.mode in (FaultMode.STUCK, FaultMode.NO_SIGNAL)
-    if full and fault.epsilon != 1.0:
+    if row.total and fault.epsilon != 1.0:
         raise ConfigError(f"--fault {words!r}: {fault.mode} means eps = 1, not {fault.epsilon:g}")
-    if not full and not 0.0 < fault.epsilon < 1.0:
+    if not row.total and not 0.0 < fault.epsilon < 1.0:
         raise ConfigError(f"--fault {words!r}: {fault.mode} needs eps between 0 and 1, not {fault.epsilon:g}")
-    silent = fault.mode in (FaultMode.NO_SIGNAL, FaultMode.INEFFICIENT)
-    if silent and (fault.sat or fault.sat_std):
+    if row.saturation is Saturation.NONE and (fault.sat or fault.sat_std):
         raise ConfigError(f"--fault {words!r}: {fault.mode} means sat = 0; take stuck or noisy for another value")
-    if fault.mode is FaultMode.STUCK and (fault.sat == 0.0 or fault.sat_std):
-        raise ConfigError(f"--fault {words!r}: stuck means one value other than 0; take no_signal or noisy")
-    if fault.mode is FaultMode.NOISY and not (fault.sat or fault.sat_std):
-        raise ConfigError(f"--fault {words!r}: noisy needs sat or std other than 0; take inefficient")
+    if row.saturation is Saturation.VALUE and (fault.sat == 0.0 or fault.sat_std):
+        raise ConfigError(f"--fault {words!r}: {fault.mode} means one value other than 0; take no_signal or noisy")
+    if row.saturation is Saturation.VARYING and not (fault.sat or fault.sat_std):
+        raise ConfigError(f"--fault {words!r}: {fault.mode} needs sat or std other than 0; take inefficient")

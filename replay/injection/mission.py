@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from replay.control.loop import replay_loop, stack
 from replay.errors import ConfigError
-from replay.faults import TABLE_MODES, FaultMode, FaultSpec, Side
+from replay.faults import FaultMode, FaultSpec, Side, drawn_modes
 from replay.injection.inject import InjectionOptions, inject_signals
 from replay.machine.config import Machine
 from replay.signals.signal import Signals
@@ -23,7 +23,6 @@ Array = NDArray[np.float64]
 
 _PAPER_SPEED = 0.36  # top speed for which `draw_fault` draws [m/s]
 _PAPER_DRIVING = 0.05  # speed from which a machine drives for `free_place` [m/s]
-_ROWS = tuple((side, mode) for side in (Side.SENSOR, Side.ACTUATOR) for mode in TABLE_MODES)
 
 
 def inject_mission(
@@ -150,7 +149,7 @@ def draw_faults(
     parts = {
         side: _parts(signals, machine, side, options or InjectionOptions()) for side in (Side.SENSOR, Side.ACTUATOR)
     }
-    rows = [row for row in _ROWS if parts[row[0]]]
+    rows = [(side, mode) for side in parts if parts[side] for mode in drawn_modes(side)]
     faults: list[FaultSpec] = []
     while len(faults) < count:
         before = len(faults)

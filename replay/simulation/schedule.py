@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from replay.faults import TABLE_MODES, FaultMode, FaultSpec, Side
+from replay.faults import FaultMode, FaultSpec, Range, Side, drawn_modes, table_row
 from replay.simulation.duty import Duty
 from replay.simulation.options import SIMULATED_AXLES, SimulationOptions
 
@@ -44,7 +45,7 @@ def varied_onsets(
         if rng.random() >= options.early_share or first < 6.0:
             continue
         side = Side.SENSOR if rng.random() < 0.5 else Side.ACTUATOR
-        mode, stop = TABLE_MODES[int(rng.integers(4))], float(rng.uniform(4.0, min(first - 2.0, 20.0)))
+        mode, stop = _draw_mode(side, rng), float(rng.uniform(4.0, min(first - 2.0, 20.0)))
         early = draw_fault(wheel, side, mode, 0.0, stop, rng, steer=False)
         if not np.isnan(early.sat):  # a part that has not moved yet has no value to hold
             out.append(early)
@@ -54,30 +55,39 @@ def varied_onsets(
 def draw_fault(
     component: str, side: Side, mode: FaultMode, start_s: float, stop_s: float, rng: np.random.Generator, *, steer: bool
 ) -> FaultSpec:
-    """One fault of a table row with a random severity.
+    """One fault of a table row with a random severity, by the row's `Drawn`.
 
     Stuck sensors hold their value at onset or jump to another one; stuck valves stand open either way; noise and
     disturbances vary about a mean.
+
+    Raises
+    ------
+    ValueError
+        Where random faults are not of this row.
     """
-    epsilon, sat, std, tau = 1.0, 0.0, 0.0, 0.0
+    row = table_row(side, mode)
+    if row is None or row.drawn is None:
+        raise ValueError(f"no random faults are drawn of {side} {mode}")
+    drawn = row.drawn
     sign = float(rng.choice([-1.0, 1.0]))
-    if mode is FaultMode.STUCK:
-        if side is Side.SENSOR:
-            level = float(rng.uniform(0.08, 0.4) if steer else rng.uniform(0.05, 0.35))
-            sat = sign * level if rng.random() < 0.5 else float("nan")
-        else:
-            sat = sign * float(rng.uniform(0.04, 0.14))
-    elif mode is FaultMode.INEFFICIENT:
-        epsilon = float(rng.uniform(0.25, 0.75))
-    elif mode is FaultMode.NOISY and side is Side.SENSOR:
-        epsilon = float(rng.uniform(0.25, 0.5))
-        sat = sign * float(rng.uniform(0.0, 0.1))
-        std, tau = float(rng.uniform(0.06, 0.2)), float(rng.choice([0.0, 0.05]))
-    elif mode is FaultMode.NOISY:
-        epsilon = float(rng.uniform(0.3, 0.5))
-        sat = sign * float(rng.uniform(0.05, 0.12))
-        std, tau = float(rng.uniform(0.05, 0.12)), 0.8
+    epsilon = 1.0 if drawn.epsilon is None else _uniform(drawn.epsilon, rng)
+    sat_range = drawn.steer_sat if steer and drawn.steer_sat is not None else drawn.sat
+    sat = 0.0 if sat_range is None else sign * _uniform(sat_range, rng)
+    if drawn.held_share and rng.random() >= 1.0 - drawn.held_share:
+        sat = math.nan
+    std = 0.0 if drawn.sat_std is None else _uniform(drawn.sat_std, rng)
+    tau = drawn.sat_tau_s[0] if len(drawn.sat_tau_s) == 1 else float(rng.choice(drawn.sat_tau_s))
     return FaultSpec(component, side, mode, round(start_s, 3), round(stop_s, 3), epsilon, sat, std, tau)
+
+
+def _uniform(between: Range, rng: np.random.Generator) -> float:
+    return float(rng.uniform(*between))
+
+
+def _draw_mode(side: Side, rng: np.random.Generator) -> FaultMode:
+    """Mode of a random fault of one side, each as probable as the others."""
+    modes = drawn_modes(side)
+    return modes[int(rng.integers(len(modes)))]
 
 
 def _paper_faults(options: SimulationOptions, duty: Duty, rng: np.random.Generator) -> list[FaultSpec]:
@@ -91,7 +101,7 @@ def _paper_faults(options: SimulationOptions, duty: Duty, rng: np.random.Generat
     end = min(235.0, options.duration_s - 1.0)
     for wheel in options.machine.wheels:
         busy = [(f.start_s, f.stop_s, f.side) for f in faults if f.component == wheel]
-        wanted = [(s, m) for s in (Side.SENSOR, Side.ACTUATOR) for m in TABLE_MODES]
+        wanted = [(s, m) for s in (Side.SENSOR, Side.ACTUATOR) for m in drawn_modes(s)]
         wanted = [w for w in wanted if not (busy and w == (Side.SENSOR, FaultMode.STUCK))]
         for number, j in enumerate(rng.permutation(len(wanted))):
             side, mode = wanted[j]
@@ -156,7 +166,7 @@ def _random_faults(options: SimulationOptions, duty: Duty, rng: np.random.Genera
             both = rng.random() < 1 / 7
             sides = (Side.SENSOR, Side.ACTUATOR) if both else (Side.SENSOR if rng.random() < 0.5 else Side.ACTUATOR,)
             for side in sides:
-                mode = TABLE_MODES[int(rng.integers(4))]
+                mode = _draw_mode(side, rng)
                 late = float(rng.uniform(0.5, 2.0)) if both and side is Side.ACTUATOR else 0.0
                 faults.append(draw_fault(part, side, mode, t + late, stop, rng, steer=steer))
             t = stop + float(rng.uniform(4.0, 15.0))

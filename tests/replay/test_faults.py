@@ -8,7 +8,16 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 
-from replay.faults import FAULT_STATES, FaultMode, State, fault_affected
+from replay.faults import (
+    FAULT_STATES,
+    TABLE_MODES,
+    TABLE_ROWS,
+    FaultMode,
+    Side,
+    State,
+    fault_affected,
+    table_row,
+)
 
 ACCURATE = np.array([0.3, -0.2, 0.0, 0.36])
 
@@ -51,3 +60,19 @@ def test_every_fault_mode_is_a_state() -> None:
     assert {s.value for s in FAULT_STATES} == {m.value for m in FaultMode}
     assert State.HEALTHY not in FAULT_STATES
     assert State("no_signal") is State.NO_SIGNAL
+
+
+def test_a_mode_means_the_same_on_both_sides() -> None:
+    for row in TABLE_ROWS:
+        other = table_row(Side.SENSOR if row.side is Side.ACTUATOR else Side.ACTUATOR, row.mode)
+        assert other is None or (row.total, row.saturation) == (other.total, other.saturation)
+        assert row.total == (row.epsilon == 1.0)
+
+
+def test_modes_by_what_they_leave_of_the_signal() -> None:
+    assert TABLE_MODES == (FaultMode.STUCK, FaultMode.NO_SIGNAL, FaultMode.INEFFICIENT, FaultMode.NOISY)
+    assert [m for m in FaultMode if m.total] == [FaultMode.STUCK, FaultMode.NO_SIGNAL]
+    assert [m for m in FaultMode if m.varying] == [FaultMode.NOISY]
+    assert [m for m in FaultMode if m.scaled] == [FaultMode.INEFFICIENT]
+    assert table_row(Side.SENSOR, FaultMode.OUTSIDE_TABLE) is None
+    assert table_row(Side.SENSOR_OR_ACTUATOR, FaultMode.STUCK) is None
