@@ -210,8 +210,8 @@ class State(StrEnum):
 
 
 FAULT_STATES = frozenset(State(m.value) for m in FaultMode)
-#: States that are judgements.
-DECIDED = FAULT_STATES | {State.HEALTHY}
+#: States that are judgements: healthy and every mode, in the order of the enumerations.
+DECIDED: tuple[State, ...] = (State.HEALTHY, *(State(m.value) for m in FaultMode))
 #: States that say why there is no judgement, in the order of the enumeration.
 UNDECIDED = tuple(s for s in State if s not in DECIDED)
 

@@ -9,10 +9,9 @@ from diagnosis.results.document import IntervalRow
 from diagnosis.results.vocabulary import Kind
 from replay.export.clips.topics import EVIDENCE, MAPPED
 from replay.export.clips.viewer_layouts import Curve, Plot
-from replay.faults import FaultMode, Side, State
+from replay.faults import DECIDED, Side
 
 _NAMED = (MAPPED, EVIDENCE)
-_PROBABILITIES: tuple[str, ...] = (State.HEALTHY, *FaultMode)
 
 
 @dataclass(frozen=True)
@@ -105,5 +104,5 @@ def _valve(clip: _Clip, sides: Sequence[Side]) -> Plot:
 
 
 def _probability(clip: _Clip, side: Side) -> Plot:
-    curves = tuple(c for m in _PROBABILITIES for c in clip.evidence(side, f"p_{m}", m.replace("_", " ")))
+    curves = tuple(c for m in DECIDED for c in clip.evidence(side, f"p_{m}", m.replace("_", " ")))
     return Plot(f"{clip.component} {side}: probability", curves)

@@ -7,6 +7,7 @@ actuator, or one without control signal, means stop at once. Everything else is 
 from __future__ import annotations
 
 from diagnosis.results.assessment import Finding
+from diagnosis.results.fault_rows import row_of
 from diagnosis.results.vocabulary import Kind, Severity, Tier
 from replay.faults import TOTAL, FaultMode, Side
 from replay.machine.config import Limits
@@ -26,7 +27,7 @@ def severity_of(finding: Finding, seconds: float, limits: Limits, kind: Kind = K
         if finding.mode.total and finding.side is not Side.SENSOR:
             return Severity.MEDIUM, "Probably a valve that does not answer: check it before the machine goes out again."
         return Severity.LOW, "Probable, not certain: check it at the next service, and compare with the next mission."
-    if finding.mode is FaultMode.NOISY and finding.tier is Tier.MODEL and seconds < _SHORT_NOISE_S:
+    if finding.mode.varying and finding.tier is Tier.MODEL and seconds < _SHORT_NOISE_S:
         return Severity.INFO, "Too short to act on: a model alone shows it. Compare with the next mission."
     if finding.mode.total:
         return _severity_of_total(finding, seconds, limits, kind)
@@ -64,13 +65,9 @@ def _severity_of_total(finding: Finding, seconds: float, limits: Limits, kind: K
 
 
 def _check_of(finding: Finding, kind: Kind) -> str:
-    """What to check at a part that is inefficient or noisy."""
-    inefficient = finding.mode is FaultMode.INEFFICIENT
-    if finding.side is Side.SENSOR:
-        scaling = "wire, mount and scaling" if kind is Kind.STEER else "gap, magnet and scaling"
-        return f"check the sensor's {scaling if inefficient else 'shield, ground and supply'}"
-    if finding.side is Side.ACTUATOR:
-        return (
-            f"check the valve's {'pressure, leakage and spool travel' if inefficient else 'command wiring and pilot'}"
-        )
-    return f"measure {'angle' if kind is Kind.STEER else 'speed'} and valve travel to tell sensor from valve"
+    """What to check at a part that fails in a way that is no reason to stop."""
+    if finding.side is Side.SENSOR_OR_ACTUATOR:
+        return f"measure {'angle' if kind is Kind.STEER else 'speed'} and valve travel to tell sensor from valve"
+    row = row_of(finding.side, finding.mode)
+    found = "" if row is None else (kind is Kind.STEER and row.check_steer) or row.check
+    return f"check the {found or ('sensor' if finding.side is Side.SENSOR else 'valve')}"

@@ -7,10 +7,11 @@ import math
 import unicodedata
 from collections.abc import Mapping
 from enum import Enum
+from string import Formatter
 from typing import Any, TypeVar, cast
 
 from diagnosis.results.document import IntervalRow
-from diagnosis.results.fault_rows import LOOKS, state_label
+from diagnosis.results.fault_rows import LOOKS, row_of, state_label
 from diagnosis.results.size_rows import EpsilonRow
 from diagnosis.results.vocabulary import part_words
 from replay.faults import FaultMode, Side
@@ -127,14 +128,13 @@ def sat_text(mean: float, unit: str) -> str:
 def fault_title(fault: IntervalRow) -> str:
     """One line that names component, part, mode and size of a fault."""
     side, mode, sat, epsilon = fault["side"], fault["mode"], fault["sat"], fault["epsilon"]
-    what = part_words(fault["kind"], fault["component"], side)
-    words = state_label(mode, side).lower()
-    if mode == FaultMode.STUCK and sat:
-        return f"{what} stuck at {sat_text(sat['mean'], sat['unit'])}"
-    if mode == FaultMode.NO_SIGNAL:
-        return f"{what}: no {'control ' if side == Side.ACTUATOR else ''}signal"
-    if mode == FaultMode.INEFFICIENT and epsilon:
-        return f"{what} inefficient, {100 * epsilon['value']:.0f} % lost"
-    if mode == FaultMode.NOISY and sat:
-        return f"{what} {words}, {sat_text(sat['rms'], sat['unit'])} r.m.s."
-    return f"{what} {words}"
+    part = part_words(fault["kind"], fault["component"], side)
+    sizes = {"part": part}
+    if sat:
+        sizes |= {"mean": sat_text(sat["mean"], sat["unit"]), "rms": sat_text(sat["rms"], sat["unit"])}
+    if epsilon:
+        sizes["lost"] = f"{100 * epsilon['value']:.0f}"
+    row = row_of(side, mode)
+    if row is not None and row.title and {name for _, name, _, _ in Formatter().parse(row.title) if name} <= set(sizes):
+        return row.title.format_map(sizes)
+    return f"{part} {state_label(mode, side).lower()}"

@@ -11,26 +11,19 @@ from numpy.typing import NDArray
 
 from diagnosis.pages.labels import number
 from diagnosis.results.document import IntervalRow
-from replay.faults import FaultMode, State
+from diagnosis.results.fault_rows import LOOKS
 
-_SOLID = 'fill="currentColor"'
 _LINE = 'fill="none" stroke="currentColor" stroke-width="2" stroke-linecap="round" stroke-linejoin="round"'
-#: Symbol of each mode and state in a square of 12 by 12; what is not in it is drawn as `_UNKNOWN`.
-_GLYPHS: dict[str, str] = {
-    FaultMode.STUCK: f'<rect x="2" y="2" width="8" height="8" rx="1" {_SOLID}/>',
-    FaultMode.NO_SIGNAL: f'<path d="M2 2l8 8M10 2l-8 8" {_LINE}/>',
-    FaultMode.INEFFICIENT: f'<path d="M6 10.4 1.4 2.6h9.2z" {_SOLID}/>',
-    FaultMode.NOISY: f'<path d="M1 6.4l1.8-3.6 2.6 6.6L7.8 2.6l1.8 6L11 6" {_LINE}/>',
-    FaultMode.OUTSIDE_TABLE: f'<path d="M6 1l5 5-5 5-5-5z" {_SOLID}/>',
-    State.HEALTHY: f'<path d="M2.2 6.3l2.6 2.7 5-5.6" {_LINE}/>',
-    "warning": f'<path d="M6 2v4.6M6 9.6v.2" {_LINE}/>',
-}
+#: Symbol of what is no state.
+_WARNING = f'<path d="M6 2v4.6M6 9.6v.2" {_LINE}/>'
 _MARKS = 24
 _UNKNOWN = f'<path d="M3.6 4a2.4 2.2 0 1 1 3.4 2c-.8.4-1 .8-1 1.4M6 10v.1" {_LINE}/>'
 
 
 def _glyph(state: str) -> Markup:
-    return Markup(_GLYPHS.get(state, _UNKNOWN))
+    look = LOOKS.get(state)
+    shape = _WARNING if state == "warning" else "" if look is None else look.glyph
+    return Markup(shape or _UNKNOWN)
 
 
 def icon(state: str) -> Markup:

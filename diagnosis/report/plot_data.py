@@ -18,6 +18,7 @@ from diagnosis.report.rows import Columns, Group, Row, row_json
 from diagnosis.report.tables import machine_name
 from diagnosis.report.units import units_of
 from diagnosis.results.document import IntervalRow, MachineRow, ReportDocument
+from diagnosis.results.fault_rows import LOOKS
 from diagnosis.results.result import Closeups
 from diagnosis.results.vocabulary import Kind, Severity
 
@@ -181,6 +182,7 @@ def view(
         "duration": duration,
         "name": machine_name(report["machine"]),
         "faults": faults,
+        "dashes": {state: look.dash for state, look in LOOKS.items() if look.dash != "solid"},
         "figures": [[row_json(r, index) for r in rows] for rows in distinct.values()],
         "loop": [{"key": g.key, "title": g.title, "rows": [row_json(r, index) for r in g.rows]} for g in groups],
         "channels": [

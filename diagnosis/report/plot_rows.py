@@ -14,9 +14,7 @@ from diagnosis.report.rows import Columns, Group, Row, Trace
 from diagnosis.results.document import IntervalRow
 from diagnosis.results.fault_rows import state_label
 from diagnosis.results.vocabulary import Kind
-from replay.faults import FaultMode, Side, State
-
-_MODES: tuple[str, ...] = (State.HEALTHY, *FaultMode)
+from replay.faults import DECIDED, Side
 
 
 def fault_rows(
@@ -148,7 +146,7 @@ def _side_rows(fault: IntervalRow, side: Side, residual_unit: tuple[str, float],
             f"modes{of}",
             f"Mode probability{of}",
             "1",
-            tuple(Trace(f"{base}p_{m}", state_label(m, side).lower(), f"mode-{m}") for m in _MODES),
+            tuple(Trace(f"{base}p_{m}", state_label(m, side).lower(), f"mode-{m}") for m in DECIDED),
             limits=(-0.03, 1.03),
         ),
     ]

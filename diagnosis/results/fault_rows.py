@@ -1,12 +1,16 @@
-"""The table of fault rows: codes, models, priors, words and colours of the paper's two tables, and of all other states.
+"""The table of fault rows: priors, words, colours and signs of the paper's two tables, and of all other states.
 
-A row is a side and a mode. Everything that names a row, a mode or a state looks it up here: codes of the compiled
-recursions, JSON names, labels of pages and terminal, colours and signs. A new row is a member of
-`replay.faults.FaultMode` and one entry in `FAULT_ROWS`; which filters stand for it says each family's ``models`` module.
+A row is a side and a mode. Whatever names or shows a row looks it up here: codes of the compiled recursions, JSON names,
+labels of pages and terminal, titles, advice, colours, signs and curves. What a row makes of a signal says
+`replay.faults.TABLE_ROWS`; which filters stand for it says the family of evidence that sees it.
+
+A new row is a member of `replay.faults.FaultMode` and `State`, an entry in `replay.faults.TABLE_ROWS`, in `FAULT_ROWS` and
+in `LOOKS`, and a model with its filter in at least one family, such as `diagnosis.estimation.fault_models`.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 from replay.faults import FaultMode, Side, State
@@ -22,36 +26,75 @@ class FaultRow:
         `SENSOR` (L4) or `ACTUATOR` (L8).
     mode : FaultMode
         The row's mode, which is also its name in JSON.
-    code : int
-        Number of the mode in compiled recursions and in arrays of probabilities; 0 is healthy.
     prior : float
-        Probability of the row before any evidence, healthy having what the rows leave.
-    model : str
-        What the measured y is of its reference x.
+        Probability of the row before any evidence, healthy having what the rows of its side leave.
     label : str
         Heading: ``No signal``.
     words : str
         To follow *was*: ``without control signal``.
+    title : str
+        Title of a fault whose size is known, with any of ``{part}``, ``{mean}`` and ``{rms}`` of the saturation term and
+        ``{lost}`` [%]; without it, or with a size not known, part and label.
+    check : str
+        What to check where the fault is no reason to stop, to follow *check the*; empty: sensor or valve.
+    check_steer : str
+        The same of a steering axle; empty: as of a wheel.
     """
 
     side: Side
     mode: FaultMode
-    code: int
     prior: float
-    model: str
     label: str
     words: str
+    title: str = ""
+    check: str = ""
+    check_steer: str = ""
 
 
 FAULT_ROWS: tuple[FaultRow, ...] = (
-    FaultRow(Side.SENSOR, FaultMode.STUCK, 1, 0.05, "y = c", "Stuck", "stuck"),
-    FaultRow(Side.SENSOR, FaultMode.NO_SIGNAL, 2, 0.05, "y = 0", "No signal", "without signal"),
-    FaultRow(Side.SENSOR, FaultMode.INEFFICIENT, 3, 0.05, "y = δ·x", "Inefficient", "inefficient"),
-    FaultRow(Side.SENSOR, FaultMode.NOISY, 4, 0.05, "y = δ·x + δ̄(t)", "Noisy", "noisy"),
-    FaultRow(Side.ACTUATOR, FaultMode.STUCK, 1, 0.05, "y = c", "Stuck", "stuck"),
-    FaultRow(Side.ACTUATOR, FaultMode.NO_SIGNAL, 2, 0.05, "y = 0", "No signal", "without control signal"),
-    FaultRow(Side.ACTUATOR, FaultMode.INEFFICIENT, 3, 0.05, "y = δ·x", "Inefficient", "inefficient"),
-    FaultRow(Side.ACTUATOR, FaultMode.NOISY, 4, 0.05, "y = δ·x + δ̄(t)", "Disturbed", "disturbed"),
+    FaultRow(Side.SENSOR, FaultMode.STUCK, 0.05, "Stuck", "stuck", "{part} stuck at {mean}"),
+    FaultRow(Side.SENSOR, FaultMode.NO_SIGNAL, 0.05, "No signal", "without signal", "{part}: no signal"),
+    FaultRow(
+        Side.SENSOR,
+        FaultMode.INEFFICIENT,
+        0.05,
+        "Inefficient",
+        "inefficient",
+        "{part} inefficient, {lost} % lost",
+        "sensor's gap, magnet and scaling",
+        "sensor's wire, mount and scaling",
+    ),
+    FaultRow(
+        Side.SENSOR,
+        FaultMode.NOISY,
+        0.05,
+        "Noisy",
+        "noisy",
+        "{part} noisy, {rms} r.m.s.",
+        "sensor's shield, ground and supply",
+    ),
+    FaultRow(Side.ACTUATOR, FaultMode.STUCK, 0.05, "Stuck", "stuck", "{part} stuck at {mean}"),
+    FaultRow(
+        Side.ACTUATOR, FaultMode.NO_SIGNAL, 0.05, "No signal", "without control signal", "{part}: no control signal"
+    ),
+    FaultRow(
+        Side.ACTUATOR,
+        FaultMode.INEFFICIENT,
+        0.05,
+        "Inefficient",
+        "inefficient",
+        "{part} inefficient, {lost} % lost",
+        "valve's pressure, leakage and spool travel",
+    ),
+    FaultRow(
+        Side.ACTUATOR,
+        FaultMode.NOISY,
+        0.05,
+        "Disturbed",
+        "disturbed",
+        "{part} disturbed, {rms} r.m.s.",
+        "valve's command wiring and pilot",
+    ),
 )
 
 
@@ -69,6 +112,10 @@ class StateLook:
         Colour on light and dark pages; empty for states that have none of their own.
     terminal : str
         Style in the terminal.
+    glyph : str
+        Its symbol in a square of 12 by 12, as SVG; empty: a question mark.
+    dash : str
+        How its curve is drawn: ``solid``, ``dash`` or ``dot``.
     """
 
     label: str
@@ -76,15 +123,43 @@ class StateLook:
     light: str = ""
     dark: str = ""
     terminal: str = ""
+    glyph: str = ""
+    dash: str = "solid"
 
+
+_SOLID = 'fill="currentColor"'
+_LINE = 'fill="none" stroke="currentColor" stroke-width="2" stroke-linecap="round" stroke-linejoin="round"'
 
 LOOKS: dict[str, StateLook] = {
-    State.HEALTHY: StateLook("Healthy", "✓", "#3a9a82", "#2fa98c", "#2fa98c"),
-    State.STUCK: StateLook("Stuck", "■", "#b63a00", "#e4571e", "bold #e4571e"),
-    State.NO_SIGNAL: StateLook("No signal", "✕", "#1b2430", "#f4f7fa", "bold reverse"),
-    State.INEFFICIENT: StateLook("Inefficient", "▼", "#f2b11b", "#ffd45c", "#d99a00"),
-    State.NOISY: StateLook("Noisy", "∿", "#7d6fd0", "#8c80f2", "#8c80f2"),
-    State.OUTSIDE_TABLE: StateLook("Outside the tables", "?", "#a0522d", "#d49a78", "bold"),
+    State.HEALTHY: StateLook(
+        "Healthy", "✓", "#3a9a82", "#2fa98c", "#2fa98c", f'<path d="M2.2 6.3l2.6 2.7 5-5.6" {_LINE}/>'
+    ),
+    State.STUCK: StateLook(
+        "Stuck",
+        "■",
+        "#b63a00",
+        "#e4571e",
+        "bold #e4571e",
+        f'<rect x="2" y="2" width="8" height="8" rx="1" {_SOLID}/>',
+    ),
+    State.NO_SIGNAL: StateLook(
+        "No signal", "✕", "#1b2430", "#f4f7fa", "bold reverse", f'<path d="M2 2l8 8M10 2l-8 8" {_LINE}/>', "dash"
+    ),
+    State.INEFFICIENT: StateLook(
+        "Inefficient", "▼", "#f2b11b", "#ffd45c", "#d99a00", f'<path d="M6 10.4 1.4 2.6h9.2z" {_SOLID}/>'
+    ),
+    State.NOISY: StateLook(
+        "Noisy",
+        "∿",
+        "#7d6fd0",
+        "#8c80f2",
+        "#8c80f2",
+        f'<path d="M1 6.4l1.8-3.6 2.6 6.6L7.8 2.6l1.8 6L11 6" {_LINE}/>',
+        "dot",
+    ),
+    State.OUTSIDE_TABLE: StateLook(
+        "Outside the tables", "?", "#a0522d", "#d49a78", "bold", f'<path d="M6 1l5 5-5 5-5-5z" {_SOLID}/>'
+    ),
     State.NOT_EXCITED: StateLook("Not excited"),
     State.MASKED: StateLook("Masked by another fault"),
     State.SLIP: StateLook("Wheel slip"),
@@ -92,25 +167,36 @@ LOOKS: dict[str, StateLook] = {
     State.NOT_ASSESSED: StateLook("Not assessed"),
 }
 
-#: Modes of the tables by their code; 0 is healthy.
-ROWS: tuple[State, ...] = (State.HEALTHY, *(State(r.mode.value) for r in FAULT_ROWS if r.side is Side.SENSOR))
-_ROW: dict[tuple[str, str], FaultRow] = {(r.side, r.mode): r for r in FAULT_ROWS}
+#: Modes of both tables by their code in compiled recursions and arrays of probabilities; 0 is healthy.
+ROWS: tuple[State, ...] = (State.HEALTHY, *dict.fromkeys(State(row.mode.value) for row in FAULT_ROWS))
 
 
-def row_of(side: Side, mode: FaultMode) -> FaultRow | None:
-    """The row of a side and mode, None for `OUTSIDE_TABLE`; of the union of both sides the sensor's."""
-    return _ROW.get((Side.ACTUATOR if side is Side.ACTUATOR else Side.SENSOR, mode))
+def row_of(side: str, mode: str) -> FaultRow | None:
+    """The row of a side and mode, of the union of both sides the sensor's; None for what is no row of that side's table."""
+    own = Side.ACTUATOR if side == Side.ACTUATOR else Side.SENSOR
+    return next((row for row in FAULT_ROWS if row.side is own and row.mode == mode), None)
 
 
-def prior(code: int) -> float:
-    """Probability of a row before any evidence, by its code."""
-    rows = {r.code: r.prior for r in FAULT_ROWS if r.side is Side.SENSOR}
-    return rows.get(code, 1.0 - sum(rows.values()))
+def codes(holds: Callable[[FaultMode], bool], side: Side | None = None) -> tuple[int, ...]:
+    """Codes of the modes of which something holds, in order; of one side's rows alone where it is given."""
+    modes = dict.fromkeys(row.mode for row in FAULT_ROWS if side is None or row.side is side)
+    return tuple(sorted(ROWS.index(State(mode.value)) for mode in modes if holds(mode)))
+
+
+def codes_of(side: Side) -> tuple[int, ...]:
+    """Codes of the rows of one side, healthy before them."""
+    return (0, *codes(lambda _: True, side))
+
+
+def prior(code: int, side: Side = Side.SENSOR) -> float:
+    """Probability of a row of one side before any evidence, by its code; 0 for a row that its table lacks."""
+    rows = {ROWS.index(State(row.mode.value)): row.prior for row in FAULT_ROWS if row.side is side}
+    return rows.get(code, 0.0) if code else 1.0 - sum(rows.values())
 
 
 def state_label(state: str, side: str = "") -> str:
     """Heading of a mode or state, by its side where that is known; words of other tools' documents stay."""
-    found = _ROW.get((side, state))
+    found = row_of(side, state) if side in (Side.SENSOR, Side.ACTUATOR) else None
     if found is not None:
         return found.label
     look = LOOKS.get(state)
@@ -119,5 +205,5 @@ def state_label(state: str, side: str = "") -> str:
 
 def mode_words(side: str, mode: str) -> str:
     """A fault mode in words for its side, to follow *was*; words of other tools' documents stay."""
-    found = _ROW.get((Side.ACTUATOR if side == Side.ACTUATOR else Side.SENSOR, mode))
+    found = row_of(side, mode)
     return found.words if found is not None else state_label(mode).lower()

@@ -30,7 +30,7 @@ class Figure {
 
   static style(role) {
     if (role.startsWith("mode-")) {
-      const mode = role.slice(5), dash = { stuck: "solid", no_signal: "dash", inefficient: "solid", noisy: "dot" }[mode];
+      const mode = role.slice(5), dash = Data.view.dashes[mode] ?? "solid";
       return { colour: `${mode}-line`, width: 1.6, dash, sign: dash === "dash" ? "╌╌" : dash === "dot" ? "···" : "━━" };
     }
     return Figure.styles[role];

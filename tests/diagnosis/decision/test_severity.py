@@ -8,6 +8,7 @@ import pytest
 
 from diagnosis.decision.severity import severity_of
 from diagnosis.results.result import Hypothesis
+from diagnosis.results.vocabulary import Kind
 from replay.faults import FaultMode, Side
 from replay.machine.config import Limits
 from tests.diagnosis.decision.findings import LIMITS, finding
@@ -77,3 +78,25 @@ def test_what_is_more_probably_alive_does_not_stop_the_machine() -> None:
     found = finding(Side.ACTUATOR, FaultMode.STUCK, p=0.3)
     found = replace(found, hypotheses=(Hypothesis("actuator", "stuck", 0.3), Hypothesis("actuator", "noisy", 0.69)))
     assert severity_of(found, 8.0, LIMITS)[0] == "medium"
+
+
+@pytest.mark.parametrize(
+    ("side", "mode", "kind", "words"),
+    [
+        (Side.SENSOR, FaultMode.INEFFICIENT, Kind.WHEEL, "check the sensor's gap, magnet and scaling"),
+        (Side.SENSOR, FaultMode.INEFFICIENT, Kind.STEER, "check the sensor's wire, mount and scaling"),
+        (Side.SENSOR, FaultMode.NOISY, Kind.STEER, "check the sensor's shield, ground and supply"),
+        (Side.ACTUATOR, FaultMode.INEFFICIENT, Kind.STEER, "check the valve's pressure, leakage and spool travel"),
+        (Side.ACTUATOR, FaultMode.NOISY, Kind.WHEEL, "check the valve's command wiring and pilot"),
+        (
+            Side.SENSOR_OR_ACTUATOR,
+            FaultMode.NOISY,
+            Kind.STEER,
+            "measure angle and valve travel to tell sensor from valve",
+        ),
+    ],
+)
+def test_what_to_check_is_said_of_the_row(side: Side, mode: FaultMode, kind: Kind, words: str) -> None:
+    assert severity_of(finding(side, mode, epsilon=0.5), 60.0, LIMITS, kind)[1] == (
+        f"By itself no reason to stop; {words}."
+    )

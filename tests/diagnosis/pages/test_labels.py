@@ -80,3 +80,25 @@ def test_titles_name_part_mode_and_size() -> None:
 def test_legend_names_both_sides_where_they_differ() -> None:
     assert labels.mode_legend(FaultMode.STUCK) == "Stuck"
     assert labels.mode_legend(FaultMode.NOISY) == "Noisy / disturbed"
+
+
+def test_titles_of_all_rows_with_their_sizes() -> None:
+    sat = {"mean": 0.1, "rms": 0.25, "low": 0.0, "high": 0.2, "unit": "m/s"}
+    epsilon = {"value": 0.123, "low": 0.1, "high": 0.2}
+    titles = {
+        (side, mode): labels.fault_title(fault(side=side, mode=mode, sat=sat, epsilon=epsilon))
+        for side in ("sensor", "actuator", "sensor_or_actuator")
+        for mode in ("no_signal", "inefficient", "noisy")
+    }
+    assert list(titles.values()) == [
+        "FR speed sensor: no signal",
+        "FR speed sensor inefficient, 12 % lost",
+        "FR speed sensor noisy, 0.25 m/s r.m.s.",
+        "FR drive valve: no control signal",
+        "FR drive valve inefficient, 12 % lost",
+        "FR drive valve disturbed, 0.25 m/s r.m.s.",
+        "FR speed sensor or drive valve: no signal",
+        "FR speed sensor or drive valve inefficient, 12 % lost",
+        "FR speed sensor or drive valve noisy, 0.25 m/s r.m.s.",
+    ]
+    assert labels.fault_title(fault(mode="inefficient", epsilon=None)) == "FR speed sensor inefficient"

@@ -22,7 +22,7 @@ from diagnosis.audit.fleet.page import rows
 from diagnosis.audit.fleet.page.changes import changes_of
 from diagnosis.audit.fleet.page.matrix import matrix
 from diagnosis.audit.fleet.page.shown import Context, ShownDocument, fault_address, shown
-from diagnosis.audit.fleet.page.svg import mark, sparkline, sprite
+from diagnosis.audit.fleet.page.svg import LEGEND, mark, sparkline, sprite
 from diagnosis.audit.fleet.page.trends import MOST, chosen, course, interest, level_words
 from diagnosis.audit.fleet.trend_types import TrendRow
 from diagnosis.audit.fleet.words import count, verdict_label
@@ -32,7 +32,7 @@ from diagnosis.pages.environment import DARK, SHARED, asset, environment, shared
 from diagnosis.pages.mode_style import mode_rules
 from diagnosis.results.fault_rows import state_label
 from diagnosis.results.vocabulary import Verdict, part_words
-from replay.faults import FaultMode
+from replay.faults import SCALED
 
 _HERE = Path(__file__).parent
 _FAULTS = 400
@@ -139,7 +139,7 @@ def _css() -> str:
 def _environment() -> jinja2.Environment:
     made = environment(_HERE)
     made.filters |= {"state": state_label, "grouped": labels.grouped}
-    made.globals |= {"mark": mark, "verdicts": [(v, verdict_label(v)) for v in _FILTER]}
+    made.globals |= {"mark": mark, "legend": LEGEND, "verdicts": [(v, verdict_label(v)) for v in _FILTER]}
     return made
 
 
@@ -257,7 +257,7 @@ def _fault(f: FleetFaultRow, document: ShownDocument, directions: Mapping[tuple[
     first, last = (document["missions"][place] for place in (f["first"], f["last"]))
     e = f["epsilon"]
     notes = []
-    if e and f["mode"] == FaultMode.INEFFICIENT:
+    if e and f["mode"] in SCALED:
         notes.append(f"ε̂ {e['value']:.2f} ({e['low']:.2f} to {e['high']:.2f})".replace("-", "−"))
         direction = directions.get((f["machine"], f["component"], f["side"]), "not_known")
         notes += [direction] if direction != "not_known" else []

@@ -16,7 +16,7 @@ from diagnosis.audit.store.outcome import MissionState
 from diagnosis.pages import labels
 from diagnosis.results.fault_rows import state_label
 from diagnosis.results.vocabulary import Verdict, part_words
-from replay.faults import FaultMode
+from replay.faults import SCALED
 
 STRIP = 14
 
@@ -36,7 +36,7 @@ def fault_words(fault: FleetFaultRow | MissionFaultRow) -> str:
     words = part_words(fault["kind"], fault["component"], fault["side"])
     words += f" {state_label(fault['mode'], fault['side']).lower()}"
     e = fault["epsilon"]
-    return words + (f" {100 * e['value']:.0f} %" if e and fault["mode"] == FaultMode.INEFFICIENT else "")
+    return words + (f" {100 * e['value']:.0f} %" if e and fault["mode"] in SCALED else "")
 
 
 def _verdict_words(verdict: Verdict | None) -> str:

@@ -14,8 +14,11 @@ from diagnosis.audit.fleet.trend_types import ChangePointRow, ForecastRow, LineR
 from diagnosis.pages.axes import Frame, label
 from diagnosis.pages.labels import number
 from diagnosis.pages.svg import icon
+from replay.faults import FaultMode, State
 
-SYMBOLS = ("stuck", "no_signal", "inefficient", "noisy", "outside_table", "healthy", "warning", "not_assessed")
+#: Modes and states in the legend of the machines.
+LEGEND: tuple[str, ...] = (*FaultMode, State.HEALTHY, State.NOT_ASSESSED)
+_SYMBOLS = (*LEGEND[:-1], "warning", LEGEND[-1])
 _WIDTH, _HEIGHT = 420.0, 190.0
 _MOST_POINTS = 150
 _SPARK = 60
@@ -26,7 +29,7 @@ Array = NDArray[np.float64]
 def sprite() -> Markup:
     """Every symbol once; `mark` refers to them."""
     parts = []
-    for state in SYMBOLS:
+    for state in _SYMBOLS:
         glyph = str(icon(state)).partition('viewBox="0 0 12 12">')[2].partition("</svg>")[0]
         parts.append(Markup('<symbol id="g-{}" viewBox="0 0 12 12">{}</symbol>').format(state, Markup(glyph)))
     return Markup('<svg class="sprite" aria-hidden="true">{}</svg>').format(Markup("").join(parts))
