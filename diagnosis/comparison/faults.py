@@ -17,7 +17,6 @@ from replay.faults import FaultMode, Side
 _LONGER, _LEAST_S = 2.0, 1.0
 _LEAST_EPSILON = 0.05  # bounds are those of one mission; the same fault differs more from mission to mission
 _MODEL_RESOLUTION = 0.25
-_STRENGTH = {Tier.DIRECT: 3, Tier.MODEL: 2, Tier.DRIVE: 2, Tier.SIGNAL: 1, Tier.TRACKING: 1, Tier.NONE: 0}
 
 Sides = Mapping[tuple[str, str], SideCoverage]
 
@@ -128,7 +127,7 @@ def _found(key: tuple[str, Side, FaultMode], faults: Sequence[IntervalRow], side
         severity=first["severity"],
         epsilon=epsilon,
         probability=first["probability"],
-        tier=max((f["tier"] for f in faults), key=lambda t: _STRENGTH[t]),
+        tier=max((f["tier"] for f in faults), key=lambda tier: tier.strength),
     )
 
 
@@ -287,7 +286,7 @@ def _why_not_assessed(a: FoundFault, sides: Sides) -> str:
         small = a.epsilon is not None and a.epsilon["low"] < _MODEL_RESOLUTION
         if side.tier is Tier.TRACKING and not a.mode.total:
             return f"In the newer mission the {key[1]} was judged by its tracking alone, which does not show this row."
-        if _STRENGTH[side.tier] < _STRENGTH[a.tier] and not a.mode.total and small:
+        if side.tier.strength < a.tier.strength and not a.mode.total and small:
             return (
                 f"In the newer mission the {key[1]} was judged by weaker evidence ({side.tier}, not {a.tier}), which does "
                 f"not show a loss below about {100 * _MODEL_RESOLUTION:.0f} %."

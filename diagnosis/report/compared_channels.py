@@ -6,7 +6,6 @@ import math
 from collections.abc import Collection, Iterable
 from dataclasses import dataclass
 
-from diagnosis.pages.evidence_words import tier_name
 from diagnosis.pages.labels import number
 from diagnosis.results.document import IntervalRow
 from diagnosis.results.vocabulary import Kind, Tier
@@ -131,7 +130,7 @@ def rests_on(fault: IntervalRow, columns: Iterable[str]) -> str:
         if "." in name and not name.startswith(("evidence.", "replay.")) and (at := _place(name, text)) >= 0:
             places[name] = at
     channels = sorted(places, key=lambda n: places[n])
-    tier = tier_name(fault["kind"], fault["tier"])
+    tier = fault["tier"].name_of(fault["kind"])
     return f"{tier}: {', '.join(channels)}" if tier and channels else tier or ", ".join(channels)
 
 

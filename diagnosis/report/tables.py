@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from diagnosis.pages.evidence_words import tier_name
 from diagnosis.pages.labels import bounded, clock, grouped, mode_legend, number, sat_text, utc
 from diagnosis.report.confidence import headline, judged, sure_of, sure_of_verdict
 from diagnosis.report.edges import time_words
@@ -105,7 +104,7 @@ def _fault(fault: IntervalRow) -> Context:
     likely = max(1, sum(h["p"] >= _SHOWN for h in hypotheses))
     return {
         **fault,
-        "tier": tier_name(fault["kind"], fault["tier"]),
+        "tier": fault["tier"].name_of(fault["kind"]),
         "delay": _delay(fault),
         "likely": hypotheses[:likely],
         "unlikely": ", ".join(

@@ -7,6 +7,7 @@ Terminal, pages, JSON, comparison and fleet take rank and words from here; fault
 from __future__ import annotations
 
 from enum import StrEnum
+from typing import NamedTuple
 
 from replay.faults import Side
 
@@ -82,19 +83,52 @@ class Tier(StrEnum):
         return _TIER_RANK[self]
 
     @property
+    def strength(self) -> int:
+        """How much it can show; 0 where nothing is judged. Tiers of one strength show the same."""
+        return _TIERS[self].strength
+
+    @property
     def words(self) -> str:
         """What the evidence is, to follow *by*."""
-        return _TIER_WORDS[self]
+        return _TIERS[self].by
+
+    def name_of(self, kind: Kind) -> str:
+        """Name of the evidence: ``second measurement``, ``wheel model``; empty where there is none."""
+        return _TIERS[self].evidence.format(kind=_KIND_WORDS[kind])
+
+    def decided(self, kind: Kind, side: Side) -> str:
+        """How a fault of a component and side was decided; empty where nothing says so."""
+        second = _SECOND.get((kind, side), "")
+        how = _TIERS[self].decided
+        return how.format(kind=_KIND_WORDS[kind], second=second) if second or "{second}" not in how else ""
+
+
+class _TierRow(NamedTuple):
+    """What is said of a tier: strength; what judges, to follow *by*; name of the evidence; how a fault was decided."""
+
+    strength: int
+    by: str
+    evidence: str
+    decided: str
 
 
 _TIER_RANK = {member: i for i, member in enumerate(Tier)}
-_TIER_WORDS = {
-    Tier.DIRECT: "second measurements",
-    Tier.MODEL: "a model of the wheels",
-    Tier.DRIVE: "a model of the drive",
-    Tier.SIGNAL: "single channels",
-    Tier.TRACKING: "how the command is followed",
-    Tier.NONE: "nothing",
+_TIERS = {
+    Tier.DIRECT: _TierRow(3, "second measurements", "second measurement", "measured against {second}"),
+    Tier.MODEL: _TierRow(
+        2, "a model of the wheels", "{kind} model", "by the {kind} model, without a second measurement"
+    ),
+    Tier.DRIVE: _TierRow(
+        2, "a model of the drive", "drive model", "by the drive's own effort, without a second measurement"
+    ),
+    Tier.SIGNAL: _TierRow(1, "single channels", "channel alone", "from the channel alone"),
+    Tier.TRACKING: _TierRow(
+        1,
+        "how the command is followed",
+        "command tracking",
+        "because the command is not followed; sensor and drive cannot be told apart",
+    ),
+    Tier.NONE: _TierRow(0, "nothing", "", ""),
 }
 
 
@@ -105,6 +139,14 @@ class Kind(StrEnum):
     STEER = "steer"
 
 
+_KIND_WORDS = {Kind.WHEEL: "wheel", Kind.STEER: "steering"}
+# What a part's channel is measured against, where it is measured twice.
+_SECOND = {
+    (Kind.WHEEL, Side.SENSOR): "a second speed sensor",
+    (Kind.WHEEL, Side.ACTUATOR): "the valve's position",
+    (Kind.STEER, Side.SENSOR): "a second angle sensor",
+    (Kind.STEER, Side.ACTUATOR): "the valve's position",
+}
 _PARTS: dict[tuple[str, str], str] = {
     (Kind.WHEEL, Side.SENSOR): "speed sensor",
     (Kind.WHEEL, Side.ACTUATOR): "drive valve",

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import pytest
+
 from diagnosis.results.vocabulary import Kind, Severity, Tier, Verdict, part_words
 from replay.faults import Side, State
 
@@ -11,6 +13,12 @@ def test_ranks_follow_the_order_of_the_members() -> None:
         assert [member.rank for member in words] == list(range(len(words)))  # type: ignore[attr-defined]
     assert Severity.HIGH.rank > Severity.MEDIUM.rank > Severity.LOW.rank > Severity.INFO.rank
     assert Verdict.STOP.rank > Verdict.WATCH.rank > Verdict.READY.rank
+
+
+def test_a_stronger_tier_stands_before_a_weaker_one() -> None:
+    strengths = [tier.strength for tier in Tier]
+    assert strengths == sorted(strengths, reverse=True)
+    assert [tier for tier in Tier if tier.strength == 0] == [Tier.NONE]
 
 
 def test_every_member_has_words() -> None:
@@ -24,3 +32,32 @@ def test_parts_are_named_by_kind_and_side() -> None:
         assert "steering" in part_words(Kind.STEER, "front", side)
     assert part_words(Kind.WHEEL, "FR", "sensor_or_actuator") == "FR speed sensor or drive valve"
     assert part_words("crane", "boom", "hook_side") == "boom hook side"
+
+
+@pytest.mark.parametrize(
+    ("kind", "tier", "words"),
+    [
+        (Kind.WHEEL, Tier.DIRECT, "second measurement"),
+        (Kind.WHEEL, Tier.MODEL, "wheel model"),
+        (Kind.STEER, Tier.MODEL, "steering model"),
+        (Kind.WHEEL, Tier.SIGNAL, "channel alone"),
+        (Kind.WHEEL, Tier.TRACKING, "command tracking"),
+        (Kind.WHEEL, Tier.DRIVE, "drive model"),
+        (Kind.WHEEL, Tier.NONE, ""),
+    ],
+)
+def test_plain_words_for_the_kind_of_evidence(kind: Kind, tier: Tier, words: str) -> None:
+    assert tier.name_of(kind) == words
+
+
+def test_how_a_fault_was_decided() -> None:
+    assert Tier.DIRECT.decided(Kind.STEER, Side.SENSOR) == "measured against a second angle sensor"
+    assert Tier.MODEL.decided(Kind.STEER, Side.ACTUATOR) == "by the steering model, without a second measurement"
+    assert Tier.DIRECT.decided(Kind.WHEEL, Side.SENSOR_OR_ACTUATOR) == ""
+
+
+@pytest.mark.parametrize("tier", Tier)
+@pytest.mark.parametrize("kind", Kind)
+def test_every_tier_has_words(kind: Kind, tier: Tier) -> None:
+    assert bool(tier.name_of(kind)) == (tier is not Tier.NONE)
+    assert bool(tier.decided(kind, Side.SENSOR)) == (tier is not Tier.NONE)
