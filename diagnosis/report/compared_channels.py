@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Collection, Iterable
 from dataclasses import dataclass
 
 from diagnosis.pages.labels import number
+from diagnosis.report.units import MOTION, motion_unit, on_page
 from diagnosis.results.document import IntervalRow
 from diagnosis.results.vocabulary import Kind, Tier
 from replay.faults import Side
-
-DEGREES = 180.0 / math.pi
-VALVE_UNIT = "of full opening"
+from replay.machine.quantities import OPENING
 
 
 @dataclass(frozen=True)
@@ -77,13 +75,12 @@ class Pair:
 
 def motion_of(component: str, kind: Kind, columns: Collection[str]) -> Motion:
     """Columns and unit of a component's motion; of two commands the replayed one, where it is there."""
-    steer = kind == Kind.STEER
-    leaf = "phi" if steer else "v"
+    leaf = MOTION[kind]
     own = f"{kind}.{component}.{leaf}"
     replayed = f"replay.{component}.{leaf}_ref"
     commanded = own + "_ref" if own + "_ref" in columns and replayed not in columns else replayed
-    title, unit, scale = ("Steering angle", "°", DEGREES) if steer else ("Wheel speed", "m/s", 1.0)
-    return Motion(title, unit, scale, own, commanded, own + "_true")
+    title = "Steering angle" if kind == Kind.STEER else "Wheel speed"
+    return Motion(title, *on_page(motion_unit(kind)), own, commanded, own + "_true")
 
 
 def by_valve(fault: IntervalRow, columns: Collection[str]) -> bool:
@@ -109,7 +106,7 @@ def pair_of(fault: IntervalRow, columns: Collection[str]) -> Pair | None:
         command = f"{kind}.{component}.u"
         reference = command if command in columns else None
         return Pair(
-            "Valve position", command + "_applied", reference, "command", reference is not None, VALVE_UNIT, 1.0, base
+            "Valve position", command + "_applied", reference, "command", reference is not None, OPENING, 1.0, base
         )
     motion = motion_of(component, kind, columns)
     if motion.measured not in columns:
@@ -130,7 +127,7 @@ def rests_on(fault: IntervalRow, columns: Iterable[str]) -> str:
         if "." in name and not name.startswith(("evidence.", "replay.")) and (at := _place(name, text)) >= 0:
             places[name] = at
     channels = sorted(places, key=lambda n: places[n])
-    tier = fault["tier"].name_of(fault["kind"])
+    tier = Tier(fault["tier"]).name_of(Kind(fault["kind"]))
     return f"{tier}: {', '.join(channels)}" if tier and channels else tier or ", ".join(channels)
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from diagnosis.comparison.coverage import SideCoverage, sides_of
 from diagnosis.results.document import IntervalRow, ReportDocument
 from diagnosis.results.fault_rows import state_label
-from diagnosis.results.vocabulary import Tier, Verdict
+from diagnosis.results.vocabulary import Kind, Tier, Verdict
 from replay.faults import Side, State
 
 _WORDS = ((0.99, "Practically certain"), (0.9, "Very likely"), (0.7, "Likely"))
@@ -40,7 +40,7 @@ def sure_of(fault: IntervalRow, report: ReportDocument) -> str:
         first = max(h["p"] for h in hypotheses if h["mode"] != State.HEALTHY) <= p + _TIE
         row = f"{'most likely' if first else 'perhaps'} {state_label(fault['mode'], side).lower()}"
         words = [f"{_likely(faulty)} faulty ({percent(faulty)}), {row} ({percent(p)})"]
-    how = fault["tier"].decided(fault["kind"], side)
+    how = Tier(fault["tier"]).decided(Kind(fault["kind"]), side)
     words += [how] if how else []
     shares = [
         row["decided_driving_s"] / row["driving_s"]

@@ -9,12 +9,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from diagnosis.report.compared_channels import DEGREES, VALVE_UNIT, Pair, by_valve, motion_of
+from diagnosis.report.compared_channels import Pair, by_valve, motion_of
 from diagnosis.report.rows import Columns, Group, Row, Trace
+from diagnosis.report.units import natural_unit, on_page
 from diagnosis.results.document import IntervalRow
 from diagnosis.results.fault_rows import state_label
 from diagnosis.results.vocabulary import Kind
 from replay.faults import DECIDED, Side
+from replay.machine.quantities import OPENING
 
 
 def fault_rows(
@@ -51,7 +53,7 @@ def fault_rows(
     valve = Row(
         "u",
         "Valve command",
-        VALVE_UNIT,
+        OPENING,
         (
             Trace(f"{kind}.{c}.u", "recorded", "measured"),
             Trace(f"replay.{c}.u", "replayed", "replayed"),
@@ -59,7 +61,7 @@ def fault_rows(
             *((Trace(expected, "expected", "expected"),) if valve_read else ()),
         ),
     )
-    residual_unit = (VALVE_UNIT, 1.0) if valve_read else (motion.unit, motion.scale)
+    residual_unit = (OPENING, 1.0) if valve_read else (motion.unit, motion.scale)
     rows = [speed_or_angle]
     rows += [valve] if side == Side.ACTUATOR else []
     rows += [row for s in side.sides for row in _side_rows(fault, s, residual_unit, limit)]
@@ -120,9 +122,8 @@ def _side_rows(fault: IntervalRow, side: Side, residual_unit: tuple[str, float],
     """Residual, probability that the side is not healthy, ε̂, saturation term and mode probabilities of one side."""
     base = f"evidence.{fault['component']}.{side}."
     of = f" ({side})" if fault["side"] == Side.SENSOR_OR_ACTUATOR else ""
-    natural = "rad" if fault["kind"] == Kind.STEER else "m/s"
-    sat_unit = (fault["sat"]["unit"] if fault["sat"] else "") or (natural if side == Side.SENSOR else VALVE_UNIT)
-    sat_scale = DEGREES if sat_unit == "rad" else 1.0
+    recorded = fault["sat"]["unit"] if fault["sat"] else ""
+    sat_unit, sat_scale = on_page(recorded or natural_unit(Kind(fault["kind"]), side))
     return [
         residual_row(base, *residual_unit, of),
         probability_row(base, limit, of),
@@ -137,7 +138,7 @@ def _side_rows(fault: IntervalRow, side: Side, residual_unit: tuple[str, float],
         Row(
             f"sat{of}",
             f"Saturation term ε̂·sat{of}",
-            "°" if sat_unit == "rad" else sat_unit,
+            sat_unit,
             (Trace(base + "delta_bar", "estimate, 95 % band", "measured", sat_scale),),
             band=(base + "delta_bar_low", base + "delta_bar_high"),
             band_scale=sat_scale,
@@ -207,4 +208,4 @@ def _loop_motion(c: str, kind: Kind, columns: Columns) -> Row:
 
 def _loop_valve(c: str, kind: Kind) -> Row:
     traces = (Trace(f"{kind}.{c}.u", "recorded", "measured"), Trace(f"replay.{c}.u", "replayed", "replayed"))
-    return Row("u", f"{'u_s' if kind == Kind.STEER else 'u_a'} {c}", VALVE_UNIT, traces, component=c)
+    return Row("u", f"{'u_s' if kind == Kind.STEER else 'u_a'} {c}", OPENING, traces, component=c)

@@ -22,7 +22,7 @@ from diagnosis.results.document import (
     SignalRow,
 )
 from diagnosis.results.fault_rows import state_label
-from diagnosis.results.vocabulary import Verdict, part_name
+from diagnosis.results.vocabulary import Kind, Tier, Verdict, part_name
 from replay.faults import FAULT_STATES, UNDECIDED, FaultMode, State
 
 _SHOWN = 0.001
@@ -104,7 +104,7 @@ def _fault(fault: IntervalRow) -> Context:
     likely = max(1, sum(h["p"] >= _SHOWN for h in hypotheses))
     return {
         **fault,
-        "tier": fault["tier"].name_of(fault["kind"]),
+        "tier": Tier(fault["tier"]).name_of(Kind(fault["kind"])),
         "delay": _delay(fault),
         "likely": hypotheses[:likely],
         "unlikely": ", ".join(

@@ -2,22 +2,38 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 
-from diagnosis.report.compared_channels import DEGREES, VALVE_UNIT
 from diagnosis.report.judged_parts import kind_of
 from diagnosis.report.rows import Group, Row
 from diagnosis.results.document import MachineRow, ReportDocument
 from diagnosis.results.vocabulary import Kind
+from replay.control.loop_columns import replayed_unit
 from replay.faults import Side
+from replay.machine.quantities import OPENING
+from replay.machine.signal_table import BY_KIND, find_signal
 
-_LEAVES = {
-    "v": "m/s", "v_ref": "m/s", "v_true": "m/s", "e": "m/s", "phi": "rad", "phi_ref": "rad", "phi_true": "rad",
-    "u": VALVE_UNIT, "u_applied": VALVE_UNIT, "u_difference": VALVE_UNIT, "psi": "1", "psi_printed": "1",
-    "psi_implied": "1", "rho": "1/s", "omega": "rad/s", "yaw_rate": "rad/s", "speed": "m/s", "x": "m", "y": "m",
-    "lat": "°", "lon": "°",
-}  # fmt: skip
-_NATURAL = ("residual", "threshold", "expected", "delta_bar", "delta_bar_std")
+DEGREES = 180.0 / math.pi
+#: Leaf of the signal that tells what a component does.
+MOTION = {Kind.WHEEL: "v", Kind.STEER: "phi"}
+_OF_THE_SIGNAL = ("residual", "threshold", "expected", "delta_bar", "delta_bar_std")
+_UNKNOWN = "unknown unit"
+
+
+def motion_unit(kind: Kind) -> str:
+    """Unit of what a component does, as recorded."""
+    return BY_KIND[f"{kind}.{MOTION[kind]}"].shown_unit
+
+
+def natural_unit(kind: Kind, side: Side) -> str:
+    """Unit of the signal of a component's side: its motion, or the opening of its valve."""
+    return OPENING if side == Side.ACTUATOR else motion_unit(kind)
+
+
+def on_page(unit: str) -> tuple[str, float]:
+    """Unit in which the page shows a recorded one, and the factor to it: angles in degrees."""
+    return ("°", DEGREES) if unit == "rad" else ("°/s", DEGREES) if unit == "rad/s" else (unit, 1.0)
 
 
 def units_of(
@@ -34,19 +50,18 @@ def units_of(
         for c in (*(row.band or ()), *((row.threshold,) if row.threshold else ())):
             known.setdefault(c, (row.unit, row.band_scale))
     recorded = {s["name"]: s["unit"] for s in report["signals"]}
-    return [known.get(c) or _shown(recorded.get(c) or _unit(c, report["machine"])) for c in columns]
+    return [known.get(c) or on_page(recorded.get(c) or _unit(c, report["machine"])) for c in columns]
 
 
 def _unit(column: str, machine: MachineRow) -> str:
     head, _, rest = column.partition(".")
     component, _, leaf = rest.rpartition(".")
-    if head != "evidence":
-        return _LEAVES.get(leaf, "1")
-    part, _, side = component.rpartition(".")
-    if leaf not in _NATURAL:
-        return "1"
-    return VALVE_UNIT if side == Side.ACTUATOR else "rad" if kind_of(part, machine) == Kind.STEER else "m/s"
-
-
-def _shown(unit: str) -> tuple[str, float]:
-    return ("°", DEGREES) if unit == "rad" else ("°/s", DEGREES) if unit == "rad/s" else (unit, 1.0)
+    if head == "evidence":
+        part, _, side = component.rpartition(".")
+        return natural_unit(kind_of(part, machine), Side(side)) if leaf in _OF_THE_SIGNAL else "1"
+    if head == "replay":
+        return replayed_unit(leaf) or _UNKNOWN
+    if head == "path":
+        return "m"
+    signal = find_signal(column)
+    return _UNKNOWN if signal is None else signal.shown_unit

@@ -2,34 +2,66 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import NDArray
 
 from replay.arrays.envelope import envelope, rows_of, step_of
 from replay.control.loop import Replay
 from replay.machine.config import Machine
+from replay.machine.quantities import OPENING
 from replay.signals.timeline import Timeline
 
 Array = NDArray[np.float64] | NDArray[np.float32]
 
-# Leaf of the column name and field of `Replay`; shown in reports, and for the export alone.
+
+class Replayed(NamedTuple):
+    """A quantity of the replayed loop.
+
+    Attributes
+    ----------
+    leaf, field : str
+        Last word of its column's name, and field of `Replay`.
+    unit : str
+        To follow a number in a report.
+    full_rate : bool
+        Whether the field has one row per step, not one per bucket.
+    """
+
+    leaf: str
+    field: str
+    unit: str
+    full_rate: bool = False
+
+
+# Of a wheel: shown in reports, and for the export alone.
 _WHEEL = (
-    ("v_ref", "v_ref"),
-    ("e", "e"),
-    ("psi_printed", "psi_printed"),
-    ("psi_implied", "psi_implied"),
-    ("rho", "rho"),
-    ("u", "u"),
-    ("u_difference", "u_difference"),
+    Replayed("v_ref", "v_ref", "m/s", full_rate=True),
+    Replayed("e", "e", "m/s"),
+    Replayed("psi_printed", "psi_printed", "1"),
+    Replayed("psi_implied", "psi_implied", "1"),
+    Replayed("rho", "rho", "1/s"),
+    Replayed("u", "u", OPENING),
+    Replayed("u_difference", "u_difference", OPENING),
 )
 _WHEEL_DETAIL = (
-    ("phi", "wheel_phi"),
-    ("psi", "psi"),
-    ("psi_implied_squared", "implied_squared"),
-    ("psi_forcing", "forcing"),
+    Replayed("phi", "wheel_phi", "rad"),
+    Replayed("psi", "psi", "1"),
+    Replayed("psi_implied_squared", "implied_squared", "1"),
+    Replayed("psi_forcing", "forcing", "1"),
 )
-_AT_FULL_RATE = ("v_ref", "phi_ref", "steer_u")
-_AXLE = (("phi_ref", "phi_ref"), ("u", "steer_u"), ("u_difference", "steer_difference"))
+_AXLE = (
+    Replayed("phi_ref", "phi_ref", "rad", full_rate=True),
+    Replayed("u", "steer_u", OPENING, full_rate=True),
+    Replayed("u_difference", "steer_difference", OPENING),
+)
+_UNITS = {quantity.leaf: quantity.unit for quantity in (*_WHEEL, *_WHEEL_DETAIL, *_AXLE)}
+
+
+def replayed_unit(leaf: str) -> str | None:
+    """Unit of a column ``replay.<part>.<leaf>``; None where there is no such quantity."""
+    return _UNITS.get(leaf)
 
 
 def replay_columns(timeline: Timeline, replay: Replay, machine: Machine, *, detail: bool = False) -> dict[str, Array]:
@@ -56,12 +88,12 @@ def replay_columns(timeline: Timeline, replay: Replay, machine: Machine, *, deta
     columns = {"t": np.arange(rows_of(timeline.size, bucket)) * (timeline.dt * step_of(bucket))}
     names = (*machine.canonical_signals(), *timeline.signals)
     columns |= {n: envelope(timeline.signals[n], bucket) for n in dict.fromkeys(names) if n in timeline.signals}
-    for parts, leaves in ((machine.wheels, _WHEEL + (_WHEEL_DETAIL if detail else ())), (machine.axles, _AXLE)):
+    for parts, quantities in ((machine.wheels, _WHEEL + (_WHEEL_DETAIL if detail else ())), (machine.axles, _AXLE)):
         for i, part in enumerate(parts):
-            for leaf, field in leaves:
-                values = getattr(replay, field)[:, i]
-                if field in _AT_FULL_RATE:
+            for quantity in quantities:
+                values = getattr(replay, quantity.field)[:, i]
+                if quantity.full_rate:
                     values = envelope(values, bucket)
                 if np.isfinite(values).any():
-                    columns[f"replay.{part}.{leaf}"] = values
+                    columns[f"replay.{part}.{quantity.leaf}"] = values
     return columns

@@ -129,7 +129,8 @@ CANONICAL: tuple[CanonicalSignal, ...] = (
     _Entry("odom", "y", "length", "position to the left", 15),
     _Entry("odom", "yaw", "angle", "heading", 13),
 )
-_BY_KIND = {entry.kind: entry for entry in CANONICAL}
+#: By name without wheel or axle: ``wheel.v``.
+BY_KIND = {entry.kind: entry for entry in CANONICAL}
 
 
 def names_of(wheels: Sequence[str], axles: Sequence[str]) -> tuple[str, ...]:
@@ -146,7 +147,7 @@ def names_of(wheels: Sequence[str], axles: Sequence[str]) -> tuple[str, ...]:
 def find_signal(name: str) -> CanonicalSignal | None:
     """Entry of a name, None where it is not canonical."""
     words = name.split(".")
-    entry = _BY_KIND.get(f"{words[0]}.{words[-1]}")
+    entry = BY_KIND.get(f"{words[0]}.{words[-1]}")
     if entry is None or len(words) != (2 if entry.scope == Scope.MACHINE else 3) or not all(words):
         return None
     return entry

@@ -4,7 +4,8 @@ from typing import Any
 
 import numpy as np
 
-from diagnosis.report.compared_channels import DEGREES, Pair, pair_of, rests_on, shape_sentence
+from diagnosis.report.compared_channels import Pair, pair_of, rests_on, shape_sentence
+from diagnosis.report.units import DEGREES
 from diagnosis.results.document import IntervalRow
 from tests import report_samples as samples
 

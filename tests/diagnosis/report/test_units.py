@@ -24,5 +24,5 @@ def test_units_of_columns_with_and_without_a_figure() -> None:
         "evidence.front.sensor.residual",
     ]
     units = units_of([*names, "evidence.FR.actuator.expected", "path.x", "made.up"], report, figures, groups)
-    assert [u for u, _ in units] == ["m/s", "°", "°/s", "of full opening", "°", "of full opening", "m", "1"]
+    assert [u for u, _ in units] == ["m/s", "°", "°/s", "of full opening", "°", "of full opening", "m", "unknown unit"]
     np.testing.assert_allclose([units[1][1], units[2][1], units[0][1]], [180 / math.pi, 180 / math.pi, 1.0])
