@@ -8,9 +8,10 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 from replay.errors import LogError
+from replay.log.formats import LOG_FORMATS
 
-MESSAGE_ENDINGS = (".mcap", ".bag", ".db3", ".mcap.zstd", ".db3.zstd")
-TABLE_ENDINGS = (".csv", ".csv.gz", ".csv.zst", ".txt", ".parquet", ".svdx", ".tdms")
+MESSAGE_ENDINGS = tuple(e for row in LOG_FORMATS if row.kind == "messages" for e in row.endings)
+TABLE_ENDINGS = tuple(e for row in LOG_FORMATS if row.kind == "table" for e in row.endings)
 LOG_ENDINGS = (*MESSAGE_ENDINGS, *TABLE_ENDINGS)
 _PART = re.compile(r"(.+)_(\d{1,9})")
 

@@ -1,40 +1,38 @@
-"""One table of readers, and the pick among them by a log's content."""
+"""Readers of the table of formats (`replay.log.formats`), and the pick among them by a log's content."""
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Iterator
+from functools import cache
+from importlib import import_module
 from pathlib import Path
 
 from replay.arrays.column_store import ColumnStore
 from replay.errors import LogError
 from replay.log.file_types import check_regular
+from replay.log.formats import LOG_FORMATS, LogFormatRow
 from replay.log.raw_log import Clock, LogSummary, RawLog, Window
 from replay.log.source_options import SourceOptions
 from replay.readers.common.protocol import Reader
-from replay.readers.mcap.reader import McapReader
-from replay.readers.rosbag1.reader import Ros1BagReader
-from replay.readers.rosbag2.reader import Rosbag2Reader
-from replay.readers.tables.csv_reader import CsvReader
-from replay.readers.tables.parquet_reader import ParquetReader
-from replay.readers.tables.tdms_reader import TdmsReader
-from replay.readers.twincat.svdx_reader import SvdxReader
-from replay.readers.twincat.text_reader import TwincatCsvReader
 
-# In order of certainty: magic bytes first, text tables last.
-READERS: tuple[Reader, ...] = (
-    McapReader(),
-    Ros1BagReader(),
-    Rosbag2Reader(),
-    ParquetReader(),
-    TdmsReader(),
-    SvdxReader(),
-    TwincatCsvReader(),
-    CsvReader(),
-)
-FORMATS = (
-    "MCAP, ROS 1 bag, rosbag2 (folder, .db3), TwinCAT Scope export (CSV, TXT) and recording (.svdx), TDMS, CSV (also .gz, "
-    ".zst) and Parquet"
-)
+
+@cache
+def reader_of(row: LogFormatRow) -> Reader:
+    """Load the reader of a format."""
+    module, name = row.reader.split(":")
+    reader: Reader = getattr(import_module(module), name)()
+    return reader
+
+
+def readers() -> Iterator[Reader]:
+    """Readers in order of certainty, each loaded when its turn comes: first bytes first, text tables last."""
+    return map(reader_of, sorted(LOG_FORMATS, key=lambda row: -row.certainty))
+
+
+def load_readers() -> None:
+    """Load the readers of all formats, for processes that others are forked from."""
+    for row in LOG_FORMATS:
+        reader_of(row)
 
 
 def open_log(path: Path) -> Reader:
@@ -56,12 +54,17 @@ def open_log(path: Path) -> Reader:
         if path.is_file() and path.stat().st_size == 0:
             raise LogError(f"{path} is empty (0 bytes); the recording was not written, copy or record it again")
         check_regular(path)
-        for reader in READERS:
+        for reader in readers():
             if reader.matches(path):
                 return reader
-        raise LogError(f"{path} is not a log that can be read: found {_found(path)}; expected {FORMATS}")
+        raise LogError(f"{path} is not a log that can be read: found {_found(path)}; expected {_expected()}")
     except OSError as error:
         raise LogError(f"{path} cannot be read: {error.strerror or error}") from error
+
+
+def _expected() -> str:
+    *words, last = (row.words for row in LOG_FORMATS)
+    return f"{', '.join(words)} or {last}"
 
 
 def _found(path: Path) -> str:

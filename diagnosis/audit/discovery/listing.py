@@ -14,7 +14,7 @@ from typing import Protocol
 from replay.errors import LogError
 from replay.log.raw_log import LogSummary
 from replay.log.source_options import SourceOptions
-from replay.readers.registry import READERS, summarise_log
+from replay.readers.registry import readers, summarise_log
 
 _PAUSE_NS = 5_000_000_000
 _OVERLAP_NS = 2_000_000_000
@@ -177,7 +177,7 @@ class LocalPlace:
     def is_log(self, file: Entry) -> bool:
         """Whether a reader knows the content."""
         try:
-            return any(reader.matches(Path(file.path)) for reader in READERS)
+            return any(reader.matches(Path(file.path)) for reader in readers())
         except OSError:
             return True
 

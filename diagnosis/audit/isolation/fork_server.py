@@ -191,6 +191,7 @@ def main(descriptor: int, parent: int, *, warmed: bool) -> None:
         os._exit(1)
     importlib.import_module("diagnosis.pipeline")
     importlib.import_module("diagnosis.output")
+    importlib.import_module("replay.readers.registry").load_readers()
     if warmed:
         with suppress(Exception):  # each child then loads what it needs; what is wrong shows there
             warm()

@@ -1,13 +1,18 @@
 from __future__ import annotations
 
 import os
+import sys
 from pathlib import Path
+from types import ModuleType
 
 import pytest
 
 from replay.errors import LogError
+from replay.log.file_types import LOG_ENDINGS
+from replay.log.formats import LOG_FORMATS, LogFormatRow
 from replay.log.source_options import SourceOptions
-from replay.readers.registry import READERS, open_log, summarise_log
+from replay.readers.registry import open_log, reader_of, readers, summarise_log
+from replay.readers.tables.csv_reader import CsvReader
 
 
 @pytest.mark.parametrize(
@@ -51,5 +56,36 @@ def test_a_pipe_or_a_device_is_refused_and_not_waited_for(tmp_path: Path) -> Non
             open_log(path)
 
 
-def test_every_reader_has_a_name_of_its_own() -> None:
-    assert len({r.format for r in READERS}) == len(READERS)
+def test_every_format_has_a_row_and_a_reader_of_its_name() -> None:
+    assert all(reader_of(row).format == row.name for row in LOG_FORMATS)
+    assert len({row.name for row in LOG_FORMATS}) == len({*readers()}) == len(LOG_FORMATS)
+
+
+def test_an_ending_belongs_to_one_format() -> None:
+    endings = [ending for row in LOG_FORMATS for ending in row.endings]
+    assert len(set(endings)) == len(endings)
+    assert LOG_ENDINGS == (
+        ".mcap", ".bag", ".db3", ".mcap.zstd", ".db3.zstd", ".csv", ".csv.gz", ".csv.zst", ".txt", ".parquet", ".svdx",
+        ".tdms",
+    )  # fmt: skip
+
+
+def test_a_format_takes_a_row_and_a_reader(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """What `docs/developing.md` says about a new format, with one that reads what CSV does behind a first line."""
+    module = ModuleType("foo_reader")
+
+    class FooReader(CsvReader):
+        format = "foo"
+
+        def matches(self, path: Path) -> bool:
+            return path.read_bytes().startswith(b"#FOO")
+
+    module.FooReader = FooReader  # type: ignore[attr-defined]
+    monkeypatch.setitem(sys.modules, "foo_reader", module)
+    row = LogFormatRow("foo", "Foo", "foo_reader:FooReader", "table", (".foo",))
+    monkeypatch.setattr("replay.readers.registry.LOG_FORMATS", (*LOG_FORMATS, row))
+    (tmp_path / "a.foo").write_text("#FOO\ntime,v\n0,1\n1,2\n2,3\n")
+    assert summarise_log(tmp_path / "a.foo", SourceOptions()).format == "foo"
+    (tmp_path / "b.foo").write_bytes(b"\0\1\2")
+    with pytest.raises(LogError, match=r"TDMS or Foo$"):
+        open_log(tmp_path / "b.foo")
