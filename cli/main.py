@@ -68,7 +68,7 @@ def root(
     """Replay the logs of a heavy-duty wheeled machine and find its sensor and actuator faults."""
 
 
-_DIAGNOSE, _LOOK, _MAKE = "Diagnose", "Look into a log", "Set up and try"
+_DIAGNOSE, _LOOK, _MAKE = "Diagnose", "Inspect logs", "Set up and try"
 for _panel, _function, _name, _epilog in (
     (_DIAGNOSE, diagnose.diagnose, "diagnose", diagnose.EXAMPLES),
     (_DIAGNOSE, report.report, "report", report.EXAMPLES),

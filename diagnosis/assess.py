@@ -56,6 +56,6 @@ def _without_evidence(mission: MissionView, wheel: str, side: str) -> Assessment
         why = "neither a valve command, a second speed nor a commanded speed is in the log"
         return unassessed(size, State.NOT_ASSESSED, why)
     if mission.logged(f"wheel.{wheel}.u"):
-        why = "the valve's command is logged, but no speed that answers it"
+        why = "the valve command is logged, but no speed to compare with it"
         return unassessed(size, State.NOT_ASSESSED, why)
     return unassessed(size, State.NO_DATA, "the wheel's valve command is not in the log")

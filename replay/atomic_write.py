@@ -49,7 +49,7 @@ def atomic_path(path: Path, *, folder: bool = False) -> Iterator[Path]:
     """
     path = Path(path)
     if not path.name:
-        raise OutputError(f"{str(path)!r} is no file name; give a name to write to")
+        raise OutputError(f"{str(path)!r} is not a file name; give a name to write to")
     temporary = path.with_name(f".{path.name}.{os.getpid()}-{secrets.token_hex(4)}.part")
     _refuse_other_content(path, folder)
     try:

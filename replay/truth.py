@@ -137,7 +137,7 @@ def read_truth(path: Path) -> MissionTruth:
     except OSError as error:
         raise ConfigError(f"{path}: cannot be read ({error.strerror}); give the truth file of this mission") from error
     except ValueError as error:
-        raise ConfigError(f"{path}: is no JSON ({error}); expected a truth file with schema {SCHEMA}") from error
+        raise ConfigError(f"{path}: is not JSON ({error}); expected a truth file with schema {SCHEMA}") from error
     schema = document.get("schema") if isinstance(document, dict) else None
     if schema != SCHEMA:
         raise ConfigError(f"{path}: schema is {schema!r}; expected {SCHEMA!r}")
@@ -155,7 +155,9 @@ def read_truth(path: Path) -> MissionTruth:
             driving=_spans(document, "driving"),
         )
     except (KeyError, TypeError, ValueError, AttributeError) as error:
-        raise ConfigError(f"{path}: is no complete truth file ({error!r}); expected the fields of {SCHEMA}") from error
+        raise ConfigError(
+            f"{path}: is not a complete truth file ({error!r}); expected the fields of {SCHEMA}"
+        ) from error
 
 
 def _interval(row: Mapping[str, Any]) -> TruthInterval:

@@ -39,7 +39,9 @@ Output = Annotated[
 ]
 MachineId = Annotated[
     str | None,
-    typer.Option("--machine-id", metavar="ID", help="Machine that all missions belong to.", show_default=False),
+    typer.Option(
+        "--machine-id", metavar="ID", help="Id of the machine that all missions belong to.", show_default=False
+    ),
 ]
 Jobs = Annotated[
     int | None,
@@ -48,7 +50,7 @@ Jobs = Annotated[
         "-j",
         metavar="N",
         min=1,
-        help="Missions at once on this machine. Default: one per processor.",
+        help="Missions to diagnose at the same time. Default: one per processor.",
         show_default=False,
     ),
 ]
@@ -58,15 +60,19 @@ Memory = Annotated[
         "--memory",
         metavar="MB",
         min=16,
-        help="Memory of each mission. Default: 4096, or its part of what is free.",
+        help="Most memory for each mission. Default: 4096, or its share of the free memory.",
         show_default=False,
     ),
 ]
-Timeout = Annotated[float, typer.Option("--timeout", metavar="S", min=0.1, help="Time of each mission.")]
+Timeout = Annotated[float, typer.Option("--timeout", metavar="S", min=0.1, help="Longest time for each mission [s].")]
 Cpu = Annotated[
     float | None,
     typer.Option(
-        "--cpu", metavar="S", min=1, help="Processor time of each mission. Default: no limit.", show_default=False
+        "--cpu",
+        metavar="S",
+        min=1,
+        help="Longest processor time for each mission [s]. Default: no limit.",
+        show_default=False,
     ),
 ]
 Retries = Annotated[
@@ -81,7 +87,7 @@ FailOnOrUnjudged = Annotated[
     ),
 ]
 Resume = Annotated[
-    bool, typer.Option("--resume/--no-resume", help="Leave what is done and unchanged, or audit all again.")
+    bool, typer.Option("--resume/--no-resume", help="Skip missions that are done and unchanged, or audit all again.")
 ]
 DryRun = Annotated[bool, typer.Option("--dry-run", help="List the missions and their state, and stop.")]
 Events = Annotated[

@@ -161,7 +161,8 @@ def _audit(terminal: Terminal, request: AuditRequest, found: Discovery, asked: A
         if not found.missions:
             if request.json:
                 terminal.show_json(document(Audited((), 0, 0), found, asked.output, NOT_READ))
-            raise LogError(f"no mission was found ({found.left_aside} other files were left aside)")
+            skipped = f" ({found.left_aside} files are not logs)" if found.left_aside else ""
+            raise LogError(f"no mission was found{skipped}")
         baseline = request.baseline
         store = baseline / "fleet.sqlite" if baseline is not None and baseline.is_dir() else baseline
         audited = audit(found, asked, request.engine(), emit, baseline=store, axis=request.trends)
@@ -196,7 +197,7 @@ def _published(terminal: Terminal, request: AuditRequest) -> Iterator[Emit]:
             yield emit
     except BaseException as error:
         if isinstance(error, KeyboardInterrupt):
-            terminal.note("what is finished is kept; the same command again does the rest")
+            terminal.note("finished missions are kept; run the same command again to continue")
         if log is not None:
             with suppress(OutputError):
                 log.write("stopped", {"reason": str(error) or "interrupted"})

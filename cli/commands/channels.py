@@ -23,7 +23,7 @@ def channels(
     quiet: Quiet = False,
     verbose: Verbose = False,
 ) -> None:
-    """Show where each signal was found, what is missing, and what that costs the diagnosis."""
+    """Show where each signal was found, what is missing, and what the diagnosis cannot do without it."""
     terminal = terminal_of(context, json=json)
     paths = mission_paths(logs)
     the_machine, source = machine_of(machine)

@@ -48,7 +48,7 @@ def compare(
     quiet: Quiet = False,
     verbose: Verbose = False,
 ) -> None:
-    """Compare two missions: faults that are new, worse, changed, gone; and what was not assessed."""
+    """Compare two missions: faults that are new, worse, better or resolved, and parts that were not assessed."""
     terminal = terminal_of(context, json=json)
     files = [result_file(path) for path in (older, newer)]
     if html is not None:

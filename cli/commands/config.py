@@ -36,7 +36,7 @@ def init(
     context: typer.Context,
     output: Annotated[
         Path | None,
-        typer.Option("--output", "-o", metavar="FILE", help="File to write.", show_default="printed instead"),
+        typer.Option("--output", "-o", metavar="FILE", help="File to write.", show_default="standard output"),
     ] = None,
     quiet: Quiet = False,
     verbose: Verbose = False,
@@ -49,7 +49,7 @@ def init(
         terminal.show_text(starter())
         return
     if output.exists():
-        raise ConfigError(f"{output}: exists and is left as it is; give another name")
+        raise ConfigError(f"{output}: exists and was not changed; give another name")
     with atomic_path(output) as temporary:
         temporary.write_text(starter(), encoding="utf-8")
     terminal.show(f"Wrote {output}; edit it, then run: mfhca config check {output} --log LOG")
@@ -86,7 +86,7 @@ def check(
     if lost:
         raise ConfigError(f"{file}: {len(lost)} of its signals are not in the log: {'; '.join(lost)}")
     count = len(machine.signals)
-    terminal.show(f"{file}: fine. {machine.name}, wheels {', '.join(machine.wheels)}, {count} signals given.")
+    terminal.show(f"{file}: valid. {machine.name}, wheels {', '.join(machine.wheels)}, {count} signals given.")
 
 
 def show(context: typer.Context, machine: MachineFile = None, quiet: Quiet = False, verbose: Verbose = False) -> None:

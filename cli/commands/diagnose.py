@@ -36,15 +36,17 @@ FailOnOrUnjudged = Annotated[
 ]
 MachineId = Annotated[
     str | None,
-    typer.Option("--machine-id", metavar="ID", help="Machine that the mission belongs to.", show_default=False),
+    typer.Option(
+        "--machine-id", metavar="ID", help="Id of the machine that the mission belongs to.", show_default=False
+    ),
 ]
-DryRun = Annotated[bool, typer.Option("--dry-run", help="Say what would be read and written, and stop.")]
+DryRun = Annotated[bool, typer.Option("--dry-run", help="Show what would be read and written, and stop.")]
 Clips = Annotated[
     bool, typer.Option("--clips", help="Cut each fault of at least low severity into an MCAP file of its own.")
 ]
 ClipMargin = Annotated[
     float,
-    typer.Option("--clip-margin", metavar="S", min=0.0, max=3600.0, help="Time before and behind each clip [s]."),
+    typer.Option("--clip-margin", metavar="S", min=0.0, max=3600.0, help="Time before and after each clip [s]."),
 ]
 
 

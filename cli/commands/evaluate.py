@@ -57,7 +57,7 @@ def evaluate(
     quiet: Quiet = False,
     verbose: Verbose = False,
 ) -> None:
-    """Score results against the truth: confusion, faults found, delays, ε errors, false alarms, reliability."""
+    """Score results against the truth: confusion, delays, errors of ε, false alarms, reliability."""
     terminal = terminal_of(context, json=json)
     pairs = results_and_truths(results, truth)
     if html is not None:

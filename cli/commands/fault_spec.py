@@ -75,7 +75,7 @@ def _number(words: str, key: str, value: str) -> float:
     except ValueError:
         number = math.nan
     if not math.isfinite(number):
-        raise ConfigError(f"--fault {words!r}: {key} {value!r} is no number")
+        raise ConfigError(f"--fault {words!r}: {key} {value!r} is not a number")
     return number
 
 

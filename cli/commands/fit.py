@@ -15,7 +15,7 @@ from replay.progress import Stage
 
 EXAMPLES = """\b
 Examples:
-  mfhca fit healthy.mcap                                   # look only
+  mfhca fit healthy.mcap                                   # shows the constants only
   mfhca fit healthy/*.bag -m base.toml -o machine.toml
   mfhca fit logs/healthy -m base.toml -o machine.toml --force --json"""
 
@@ -28,7 +28,9 @@ Missions = Annotated[
 ]
 Output = Annotated[
     Path | None,
-    typer.Option("--output", "-o", metavar="FILE", help="Machine file to write.", show_default="none: the table only"),
+    typer.Option(
+        "--output", "-o", metavar="FILE", help="Machine file to write.", show_default="no file, only the table"
+    ),
 ]
 Force = Annotated[bool, typer.Option("--force", help="Replace the file where it exists.")]
 
@@ -54,7 +56,7 @@ def fit(
     if output is not None:
         check_output([output], found.paths)
         if output.exists() and not force:
-            raise ConfigError(f"{output}: exists and is left as it is; give another name, or --force to replace it")
+            raise ConfigError(f"{output}: exists and was not changed; give another name, or --force to replace it")
     with terminal.progress(Stage.STARTING) as progress:
         from diagnosis.fitting.document import fit_document, fit_toml
         from diagnosis.fitting.missions import fit_missions
@@ -77,6 +79,6 @@ def fit(
         shown = str(output) if output is not None and written else None
         terminal.show_json(fit_document(result) | {"source": source, "output": shown})
     if not written:
-        raise NotJudged("no constant of the machine can be told from these missions, and nothing is written")
+        raise NotJudged("no constant of the machine can be identified from these missions; nothing is written")
     if output is not None:
         terminal.show(f"Wrote {output}; use it with: mfhca diagnose LOG --machine {output}")

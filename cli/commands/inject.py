@@ -28,11 +28,11 @@ correlation time in s; ramp the time in s over which eps grows.
 
 \b
 OUT holds the mapped signals in SI under canonical names at their own stamps, and says that it is
-open-loop: the controller never met these faults. Other topics and columns are left out."""
+open-loop: the controller did not react to these faults. Other topics and columns are not written."""
 
 
 class Silent(StrEnum):
-    """What a sensor without signal logs."""
+    """What a sensor without signal writes."""
 
     ZERO = "zero"
     NAN = "nan"
@@ -51,12 +51,13 @@ Epsilon = Annotated[
     float | None,
     typer.Option(metavar="E", help="ε of inefficient and noisy faults that give none.", show_default=False),
 ]
-SilentAs = Annotated[Silent, typer.Option(help="What a sensor without signal logs.")]
+SilentAs = Annotated[Silent, typer.Option(help="What a sensor without signal writes.")]
 KeepTrue = Annotated[
     bool, typer.Option("--keep-true", help="Keep the original as a second sensor, v_true, with noise of its own.")
 ]
 SecondNoise = Annotated[
-    float | None, typer.Option(metavar="M/S", help="That noise.", show_default="0.6 % of the top speed")
+    float | None,
+    typer.Option(metavar="M/S", help="Noise of that second sensor.", show_default="0.6 % of the top speed"),
 ]
 Plant = Annotated[
     bool,

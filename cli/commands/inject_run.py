@@ -140,7 +140,7 @@ def _show(terminal: Terminal, output: Path, written: _Written, words: list[str])
         (i.component, i.side, i.mode, f"{i.start_s:g} to {i.stop_s:g} s", f"{i.epsilon:.3g}", f"{i.sat_mean:.3g}")
         for i in written.truth.intervals
     ]
-    what = f"{written.kind.value}, {len(written.signals.items)} signals, open-loop; other channels are left out"
+    what = f"{written.kind.value}, {len(written.signals.items)} signals, open-loop; other channels are not written"
     terminal.show(
         section("Injected faults"),
         table(["part", "side", "mode", "time", "ε", "sat"], rows, right=(4, 5)),
@@ -198,5 +198,7 @@ def _doubts(files: Sequence[MissionFile], paths: Sequence[Path], before: Signals
         own = truth_path(path, folder=path.is_dir())
         with suppress(ConfigError):  # a file of that name that is no truth
             if read_truth(own).intervals:
-                out.append(f"{path}: {own.name} names faults that it holds already; the new truth does not know them")
+                out.append(
+                    f"{path}: {own.name} names faults that the recording already has; the new truth does not contain them"
+                )
     return out

@@ -83,7 +83,7 @@ def inspect(
     for log in logs:
         _inspect_one(terminal, log, outcome, alone=len(logs) == 1)
     if found.left_aside:
-        terminal.note(f"files in the folders that are no logs by their names: {found.left_aside}")
+        terminal.note(f"{found.left_aside} files in the folders were skipped: their names are not those of logs")
     if json:
         terminal.show_json({"logs": [inspect_document(r) for r in outcome.reports], "errors": outcome.failures})
     elif len(logs) > 1:

@@ -61,7 +61,7 @@ def replay_log(
     quiet: Quiet = False,
     verbose: Verbose = False,
 ) -> None:
-    """Replay the control loop: v_c, e, ρ, Ψ̂ printed and implied, u_a and u_s, to Parquet, CSV or MCAP; or the log as recorded."""
+    """Replay the control loop: v_c, e, ρ, Ψ̂ printed and implied, u_a and u_s, or export the log as recorded."""
     terminal = terminal_of(context, json=json)
     request = ReplayRequest(mission_paths(logs), output, machine, start, end, force, json)
     check_times(start, end)

@@ -73,7 +73,7 @@ def result_file(path: Path) -> Path:
         raise LogError(f"{path}: no such file; give the folder of a report, or its report.json")
     saved = saved_report(path)
     if saved is None:
-        what = "holds no report.json" if path.is_dir() else "is no report.json"
+        what = "holds no report.json" if path.is_dir() else "is not a report.json"
         raise LogError(f"{path}: {what}; run `mfhca diagnose` on the log first, and give the folder that it writes")
     return saved
 

@@ -80,12 +80,17 @@ Output = Annotated[
 ]
 ScenarioName = Annotated[Scenario, typer.Option(help="Drive and faults.")]
 Seed = Annotated[int, typer.Option(help="The same seed gives the same mission.")]
-Duration = Annotated[float, typer.Option(metavar="S", help="Length [s].")]
+Duration = Annotated[float, typer.Option(metavar="S", help="Length of the mission [s].")]
 Rate = Annotated[float | None, typer.Option(metavar="HZ", help="Recorded rate [Hz], 50 to 1000.", show_default="1000")]
 Logged = Annotated[
-    Evidence, typer.Option(help="Logged besides commands and sensors: base nothing, spool, direct both.")
+    Evidence,
+    typer.Option(
+        help="Second measurements in the log: base none, spool valve positions, direct also speeds and angles."
+    ),
 ]
-CouplingName = Annotated[Coupling | None, typer.Option(help="Wheels on the ground, or free.", show_default="ground")]
+CouplingName = Annotated[
+    Coupling | None, typer.Option(help="Wheels coupled by the ground, or free.", show_default="ground")
+]
 LawName = Annotated[Law | None, typer.Option(help="Control law.", show_default="opposed")]
 Ice = Annotated[
     float | None, typer.Option(metavar="SHARE", help="Share of icy ground, 0 to 0.9.", show_default="by scenario")
@@ -95,7 +100,7 @@ Format = Annotated[
 ]
 Faults = Annotated[
     list[str] | None,
-    typer.Option("--fault", metavar="WORDS", help="Inject this instead; may be given again.", show_default=False),
+    typer.Option("--fault", metavar="WORDS", help="Fault to inject instead; may be given again.", show_default=False),
 ]
 Settings = Annotated[
     list[str] | None,

@@ -100,7 +100,7 @@ def run_simulation(terminal: Terminal, request: SimulateRequest) -> None:
 def _check_absent(log: Path, truth: Path, force: bool) -> None:
     """Raise a `ConfigError` where a log would be replaced that is not simulated, or that was not asked to be."""
     if log.exists() and not truth.exists():
-        raise ConfigError(f"{log}: exists and was not simulated, so it is left as it is; give another name with -o")
+        raise ConfigError(f"{log}: exists and is not a simulated log, so it was not changed; give another name with -o")
     if log.exists() and not force:
         raise ConfigError(f"{log}: exists already; give another name with -o, or --force to replace it and its truth")
 
@@ -182,7 +182,7 @@ def _changed(options: SimulationOptions, settings: list[str]) -> SimulationOptio
         try:
             values[key] = float(text)
         except ValueError as error:
-            raise ConfigError(f"--set {words}: {text!r} is no number") from error
+            raise ConfigError(f"--set {words}: {text!r} is not a number") from error
     given = [key for key in _DRAWN if key in values]
     if structure is not None and given:
         raise ConfigError(f"--set {given[0]}: a machine of another structure draws its own; leave it out, or structure")

@@ -13,7 +13,7 @@ from rich.text import Text
 
 from cli.tables.layout import bullets, key_values, section, table, text
 from cli.tables.looks import verdict_style
-from diagnosis.audit.store.outcome import READ, MissionState
+from diagnosis.audit.store.outcome import ENDS, READ, MissionState
 from diagnosis.results.vocabulary import Verdict
 
 if TYPE_CHECKING:
@@ -32,7 +32,8 @@ def plan_parts(rows: Sequence[tuple[Planned, str]], found: Discovery) -> list[Re
     cells = [(one.mission.name, _size(one.mission.bytes), one.problem or state) for one, state in rows]
     to_do = [one for one, state in rows if state == "to do"]
     total = _size(sum(one.mission.bytes for one in to_do))
-    aside = f"; {found.left_aside} other files left aside" if found.left_aside else ""
+    files = "file" if found.left_aside == 1 else "files"
+    aside = f"; {found.left_aside} other {files} skipped" if found.left_aside else ""
     return [
         table(("mission", "size", "state"), cells, right=(1,)),
         "",
@@ -47,7 +48,7 @@ def summary_parts(audited: Audited, found: Discovery, output: Path) -> list[Rend
     failed = sorted((end for end in ends if end.state not in READ), key=lambda end: _WORST_FIRST.index(end.state))
     if failed:
         rows = [
-            Text.assemble(text(e.state.replace("_", " "), "bold red"), f"  {e.name}  ", text(e.reason, "dim"))
+            Text.assemble(text(e.state.words, "bold red"), f"  {e.name}  ", text(e.reason, "dim"))
             for e in failed[:_SHOWN]
         ]
         parts += [section("Failed"), bullets(rows)]
@@ -60,20 +61,25 @@ def summary_parts(audited: Audited, found: Discovery, output: Path) -> list[Rend
     if machines:
         worst = sorted(machines.items(), key=lambda m: (-m[1][Verdict.STOP], -m[1][Verdict.WATCH], m[0]))
         rows_ = [(name, str(c[Verdict.STOP] or "–"), str(c[Verdict.WATCH] or "–")) for name, c in worst[:_MACHINES]]
-        parts += [section("Worst machines"), table(("machine", "stop", "watch"), rows_, right=(1, 2))]
+        parts += [
+            section("Worst machines"),
+            table(("machine", *(v.short.lower() for v in (Verdict.STOP, Verdict.WATCH))), rows_, right=(1, 2)),
+        ]
     verdicts: Counter[str | None] = Counter(end.verdict for end in ends)
     states: Counter[str] = Counter(end.state for end in ends)
-    counted = [Text.assemble((str(verdicts[v]), verdict_style(v)), f" {v.short}") for v in _VERDICTS if verdicts[v]]
-    counted += [text(f"{n} {s.replace('_', ' ')}") for s, n in sorted(states.items()) if s not in READ]
+    counted = [
+        Text.assemble(f"{v.short.lower()}: ", (str(verdicts[v]), verdict_style(v))) for v in _VERDICTS if verdicts[v]
+    ]
+    counted += [text(f"{s.words}: {states[s]}") for s in ENDS if s not in READ and states[s]]
     parts += [section("Missions"), Text(" · ").join(counted)]
-    notes = [f"{len(ends)} in all, {audited.skipped} of them done before"]
+    notes = [f"{len(ends)} in all, {audited.skipped} of them from an earlier run"]
     notes += (
         [f"{states['degraded']} with damage or parts that cannot be judged"] if states[MissionState.DEGRADED] else []
     )
     parts.append(text(", ".join(notes), "dim"))
     if audited.gone:
         was = "mission that is" if audited.gone == 1 else "missions that are"
-        parts.append(text(f"the fleet page also counts {audited.gone} {was} not there any more", "dim"))
+        parts.append(text(f"the fleet page also counts {audited.gone} {was} no longer there", "dim"))
     files: list[tuple[str, object]] = [("fleet page", output / "fleet.html")]
     if audited.failed:
         files.append(("failures", output / "failures.txt"))

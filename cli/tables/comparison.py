@@ -11,6 +11,7 @@ from cli.tables.layout import ByWidth, bullets, key_values, section, table, text
 from cli.tables.looks import mode_text, severity_text, verdict_style
 from diagnosis.comparison.words import CHANGES, OUTCOMES, headline, times
 from diagnosis.pages.labels import utc
+from diagnosis.results.fault_rows import state_label
 from diagnosis.results.vocabulary import part_words
 
 if TYPE_CHECKING:
@@ -39,7 +40,7 @@ def comparison_parts(found: Comparison) -> list[RenderableType]:
     if found.metrics:
         parts += [section("While driving"), _metrics(found.metrics)]
     if found.notes:
-        parts += [section("To bear in mind"), bullets(found.notes)]
+        parts += [section("Notes"), bullets(found.notes)]
     return [*parts, ""]
 
 
@@ -85,9 +86,9 @@ def _faults(faults: Sequence[FaultChange]) -> list[RenderableType]:
 
 
 def _rows(c: FaultChange) -> Text:
-    modes = list(dict.fromkeys(f.mode for f in (c.older, c.newer) if f is not None))
-    words = [mode_text(m, m.replace("_", " ")) for m in modes]
-    return Text(" → ").join(words)
+    found = dict.fromkeys((f.mode, f.side) for f in (c.older, c.newer) if f is not None)
+    words = dict.fromkeys((mode, state_label(mode, side).lower()) for mode, side in found)
+    return Text(" → ").join(mode_text(mode, label) for mode, label in words)
 
 
 def _both(c: FaultChange, bounds: bool) -> tuple[Text, Text]:

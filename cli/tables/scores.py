@@ -9,6 +9,8 @@ from rich.text import Text
 
 from cli.tables.layout import key_values, section, table, text
 from cli.tables.looks import mode_text
+from diagnosis.results.fault_rows import state_label
+from diagnosis.results.vocabulary import part_words
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
@@ -45,14 +47,14 @@ def score_parts(
             continue
         parts += [section(f"{title}: states over driving time"), _states(figures["sides"])]
         for side, values in figures["sides"].items():
-            parts += [section(f"{title}, {side}: true row against reported [s]"), _confusion(values)]
+            parts += [section(f"{title}, {side}: true row against reported [s]"), _confusion(side, values)]
         if figures["events"]["faults"] or figures["events"]["reported"]:
             parts += [section(f"{title}: faults"), _events(figures)]
         if figures["modes"]:
             parts += ["", _modes(figures["modes"])]
         if figures["events"]["faults"] or figures["events"]["masked"]:
             parts += [section(f"{title}: by severity and excitation"), _divided(figures)]
-        if len(scores) == 1 and (wrong := _wrong(scores[0].groups[group])) is not None:
+        if len(scores) == 1 and (wrong := _wrong(group, scores[0].groups[group])) is not None:
             parts += [section(f"{title}: not right"), wrong]
         if any(b["reported"] for b in figures["calibration"]):
             parts += [section(f"{title}: stated probability"), _calibration(figures["calibration"])]
@@ -78,8 +80,8 @@ def _words(name: str) -> str:
     return name.replace("_", " ")
 
 
-def _mode(name: str) -> Text:
-    return mode_text(name, _words(name))
+def _mode(name: str, side: str) -> Text:
+    return mode_text(name, state_label(name, side).lower())
 
 
 def _missions(names: Sequence[str], scores: Sequence[MissionScores]) -> Table:
@@ -130,17 +132,17 @@ def _states(sides: Mapping[str, SideFigures]) -> Table:
     return table((*headings, "r_td", "r_fd", "r_ti", "r_fi"), rows, right=range(1, 10))
 
 
-def _confusion(side: SideFigures) -> Table:
+def _confusion(side: str, found: SideFigures) -> Table:
     rows = []
-    for name, seconds in zip(side["true"], side["seconds"], strict=True):
+    for name, seconds in zip(found["true"], found["seconds"], strict=True):
         if not sum(seconds):
             continue
         cells = [
             text(f"{s:.1f}" if s >= 0.05 else "·", _cell(name, other, s))
-            for other, s in zip(side["reported"], seconds, strict=True)
+            for other, s in zip(found["reported"], seconds, strict=True)
         ]
-        rows.append((_mode(name), *cells, _share(side["rows"][name]["recall"])))
-    headings = ("true", *(_words(c) for c in side["reported"]), "recall")
+        rows.append((_mode(name, side), *cells, _share(found["rows"][name]["recall"])))
+    headings = ("true", *(state_label(c, side).lower() for c in found["reported"]), "recall")
     return table(headings, rows, right=range(1, len(headings)))
 
 
@@ -166,7 +168,7 @@ def _events(figures: Figures) -> Table:
     apart = ", ".join(f"{number} {words}" for number, words in uncounted if number)
     rows: list[tuple[str, object]] = [
         ("injected", f"{events['faults']}: {counts}" + (f" (not counted: {apart})" if apart else "")),
-        ("reported", f"{events['reported']}, of them {events['surplus']} without a fault of their own"),
+        ("reported", f"{events['reported']}, of them {events['surplus']} without a matching fault"),
         (
             "one to one",
             f"precision {_share(events['precision'])}, recall {_share(events['recall'])}, F1 {_share(events['f1'])}",
@@ -208,7 +210,7 @@ def _modes(modes: Sequence[ModeFigures]) -> Table:
     rows = [
         (
             m["side"],
-            _mode(m["mode"]),
+            _mode(m["mode"], m["side"]),
             m["faults"],
             m["right"],
             _share(m["recall"]),
@@ -257,7 +259,7 @@ def _divided_row(name: str, band: AllFigures) -> tuple[object, ...]:
     )
 
 
-def _wrong(counts: Counts) -> Table | None:
+def _wrong(kind: str, counts: Counts) -> Table | None:
     """Faults that were not found as they are, and reports without a fault of their own, by time."""
     wrong = [
         (f.start_s, f.stop_s, f.component, f.side, f.mode, _words(f.outcome), f.report)
@@ -272,7 +274,7 @@ def _wrong(counts: Counts) -> Table | None:
     if not wrong:
         return None
     rows = [
-        (f"{a:.2f}–{b:.2f}", f"{component} {_words(side)}", _mode(mode), what, report)
+        (f"{a:.2f}–{b:.2f}", part_words(kind, component, side), _mode(mode, side), what, report)
         for a, b, component, side, mode, what, report in sorted(wrong)[:_SHOWN]
     ]
     if len(wrong) > _SHOWN:

@@ -128,7 +128,7 @@ def signals_parts(signals: Signals, machine: Machine) -> list[RenderableType]:
         parts = [ByWidth(wide, narrow, 110)]
     if signals.missing:
         lines = [(name, _cost(cost, reason)) for name, cost, reason in _missing_groups(signals.missing, machine)]
-        parts += [section("Missing, and what it costs"), table(("signal", "cost"), lines)]
+        parts += [section("Missing signals and their effect"), table(("signal", "effect"), lines)]
     notes = [n for n in signals.notes if _is_doubt(n)]
     if notes:
         parts += [section("Notes"), bullets(notes)]

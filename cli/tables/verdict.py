@@ -46,9 +46,9 @@ def verdict_parts(report: ReportDocument) -> list[RenderableType]:
         if rest > 0:
             parts.append(text(f"… and {rest} more in the report", "dim"))
     if "previous" in report:
-        parts += [section("Against another mission of the machine"), *_previous(report["previous"])]
+        parts += [section("Compared with another mission of the machine"), *_previous(report["previous"])]
     if verdict["caveats"]:
-        parts += [section("To bear in mind"), bullets(merged_caveats(verdict["caveats"]))]
+        parts += [section("Limits of this verdict"), bullets(merged_caveats(verdict["caveats"]))]
     return [*parts, ""]
 
 
@@ -120,7 +120,7 @@ def _fault(fault: IntervalRow, bounds: bool) -> tuple[object, ...]:
     digits = 2 if fault["stop_s"] - fault["start_s"] >= 0.1 else 3
     return (
         text(fault["id"], "dim"),
-        f"{fault['component']} {fault['side'].replace('_', ' ')}",
+        part_words(fault["kind"], fault["component"], fault["side"]),
         mode_text(fault["mode"], state_label(fault["mode"], fault["side"]).lower()),
         f"{fault['start_s']:.{digits}f}–{fault['stop_s']:.{digits}f}",
         _epsilon(fault["epsilon"], bounds),

@@ -13,6 +13,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
 from cli.terminal.console import Terminal
 from cli.terminal.streams import clean, console_of
 from diagnosis.audit.events import Emit, EventFacts
+from diagnosis.audit.store.outcome import MissionState
 
 _LINE_S = 10.0
 
@@ -22,7 +23,7 @@ class Counted:
 
     def __init__(self) -> None:
         self.total = self.done = self.rest = 0
-        self.states: Counter[str] = Counter()
+        self.states: Counter[MissionState] = Counter()
         self.start = time.monotonic()
 
     def take(self, event: str, facts: EventFacts) -> None:
@@ -32,7 +33,7 @@ class Counted:
         elif event == "planned":
             self.rest, self.start = facts["rest"], time.monotonic()
         elif event in ("mission", "skipped"):
-            self.states[facts["state"]] += 1
+            self.states[MissionState(facts["state"])] += 1
             self.done += event == "mission"
 
     def text(self) -> str:
@@ -43,7 +44,7 @@ class Counted:
             rate = self.done / spent
             parts.append(f"{rate * 60:.0f}/min" if rate < 10 else f"{rate:.0f}/s")
             parts.append(f"{_clock((self.rest - self.done) / rate)} left")
-        parts += [f"{n} {s.replace('_', ' ')}" for s, n in sorted(self.states.items(), key=lambda x: -x[1])]
+        parts += [f"{s.words or 'ok'}: {n}" for s, n in sorted(self.states.items(), key=lambda x: -x[1])]
         return " · ".join(parts)
 
 
@@ -75,11 +76,11 @@ def _lines(terminal: Terminal, counted: Counted) -> Emit:
             for problem in facts["problems"]:
                 terminal.note(problem)
         if event == "waiting":
-            terminal.note(f"{facts['name']}: another audit of this output is at it")
+            terminal.note(f"{facts['name']}: another audit is working on it in this output folder")
         if event == "retry":
             terminal.note(f"{facts['name']}: {facts['reason']}; trying again")
         if event == "mission" and facts["reason"]:
-            terminal.note(f"{facts['name']}: {facts['state']}: {facts['reason']}")
+            terminal.note(f"{facts['name']}: {MissionState(facts['state']).words}: {facts['reason']}")
         now = time.monotonic()
         if now - last > _LINE_S or event in ("planned", "page"):
             last = now

@@ -23,13 +23,15 @@ MachineFile = Annotated[
     ),
 ]
 Start = Annotated[
-    float | None, typer.Option("--start", metavar="S", help="From this mission time [s].", show_default=False)
+    float | None, typer.Option("--start", metavar="S", help="Start at this mission time [s].", show_default=False)
 ]
-End = Annotated[float | None, typer.Option("--end", metavar="S", help="To this mission time [s].", show_default=False)]
+End = Annotated[
+    float | None, typer.Option("--end", metavar="S", help="End at this mission time [s].", show_default=False)
+]
 Json = Annotated[bool, typer.Option("--json", help="One JSON document on stdout, all else on stderr.")]
 MaxSize = Annotated[
     float,
-    typer.Option("--max-size", metavar="MB", min=0.5, help="Size that the page's data may take; faults come first."),
+    typer.Option("--max-size", metavar="MB", min=0.5, help="Largest size of the data in the page; faults come first."),
 ]
 Previous = Annotated[
     Path | None,

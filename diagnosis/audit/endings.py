@@ -149,7 +149,7 @@ def write_failures(output: Path, planned: Sequence[Planned], ends: Sequence[Endi
         if end.state not in READ and end.name in by_name:
             one = by_name[end.name]
             tried = "" if end.attempts == 1 else f", {end.attempts} attempts"
-            lines.append(f"{end.name}: {end.state}{tried}: {_HIDDEN.sub('?', end.reason)}\n")
+            lines.append(f"{end.name}: {end.state.words}{tried}: {_HIDDEN.sub('?', end.reason)}\n")
             lines.append(f"  {again(end, one, machine, output)}\n\n")
     path = output / FAILURES
     if lines:

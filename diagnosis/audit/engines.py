@@ -102,7 +102,7 @@ def dask(address: str, wait_s: float = 20.0) -> Iterator[Engine]:
                 threads: dict[str, int] = client.nthreads()
             except (OSError, ValueError, TimeoutError) as error:
                 raise ConfigError(
-                    f"--dask {address}: the scheduler was lost ({error}); what is finished stays, start it and run the same "
+                    f"--dask {address}: the scheduler was lost ({error}); finished missions are kept; start it and run the same "
                     "command again to continue"
                 ) from error
             return max(sum(threads.values()), 1)

@@ -182,7 +182,7 @@ class Runner:
     def _lost(self, one: _Running) -> Attempt:
         planned = one.planned
         key = key_of(planned.mission, (), planned.machine, planned.config_hash)
-        outcome = Outcome(MissionState.CRASHED, f"{_LOST_TRIES} workers were lost while they were at it")
+        outcome = Outcome(MissionState.CRASHED, f"{_LOST_TRIES} workers were lost while they diagnosed it")
         return Attempt(planned.mission, key, outcome, one.number, None, ())
 
     def _refuse(self, planned: Planned) -> None:

@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 PAGE_S = 60.0
 _PAGE_SHARE = 20.0
 _PAGE_TRIES = 3
-_PAGE_NAME = "the fleet's page"
+_PAGE_NAME = "the fleet page"
 
 
 @dataclass(frozen=True)

@@ -179,7 +179,7 @@ def _audit(task: Task, folder: Path, temporary: Path) -> Attempt:
         outcome = run_isolated(work, task.limits, isolation(task.isolation), time.monotonic() - start)
     except OutputError as error:
         raise OutputError(
-            f"{task.output}: the report of {task.mission.name} cannot be written ({error}); what is finished stays, run the "
+            f"{task.output}: the report of {task.mission.name} cannot be written ({error}); finished missions are kept; run the "
             "same command again to continue"
         ) from error
     if _signature(files) != before:

@@ -80,7 +80,7 @@ def open_sources(mission: Mission, scratch: Path, notes: list[str]) -> Iterator[
         source = Source(parts, *_paired(stamps, np.sort(np.concatenate([p.log_stamps for p in parts]))))
         if abs(source.apart_s) >= APART_S:
             notes.append(
-                f"{file.path.name}: its log stamps lie {source.apart_s:+.3f} s from the mission's clock; the clips keep them."
+                f"{file.path.name}: its log stamps are {source.apart_s:+.3f} s from the mission's clock; the clips keep them."
             )
         yield source
 

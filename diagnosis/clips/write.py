@@ -148,7 +148,7 @@ def _check(mission: Mission, targets: Iterable[Path]) -> None:
     for path in sorted(targets):
         if path.exists() and not _is_own(path):
             raise OutputError(
-                f"{path}: exists, and is no clip of this tool; move it away, or give another folder with -o"
+                f"{path}: exists, and is not a clip of this tool; move it away, or give another folder with -o"
             )
 
 

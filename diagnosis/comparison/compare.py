@@ -189,15 +189,15 @@ def _notes(
         out.append("Both results are of the same log.")
     elif b.start_ns < a.start_ns:
         out.append(
-            f"{b.name} was recorded before {a.name} by their logs' clocks: what is called new and resolved here is the "
-            "other way round unless a clock was wrong. The older one is given first."
+            f"By the clocks of their logs, {b.name} was recorded before {a.name}. Give the older one first: unless a clock was "
+            "wrong, new and resolved are swapped here."
         )
     elif b.start_ns < a.start_ns + a.duration_s * 1e9:
         same = "start at the same moment" if a.start_ns == b.start_ns else "overlap in time"
-        out.append(f"The two missions {same} by their logs' clocks, so that their order cannot be checked.")
+        out.append(f"By the clocks of their logs, the two missions {same}, so their order cannot be checked.")
     if not difference and not (a.machine_id and b.machine_id):
         out.append(
-            "That both are of one machine cannot be checked: "
+            "It cannot be checked whether both are of one machine: "
             + (
                 f"{(a if not a.machine_id else b).name} states no machine id."
                 if a.machine_id or b.machine_id

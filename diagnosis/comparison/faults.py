@@ -265,7 +265,7 @@ def _other_faults(a: FoundFault, newer: Sequence[FoundFault]) -> str:
     own = [b for b in near if keys & set(_keys(b.component, b.side))]
     if own:
         words = join_words(list(dict.fromkeys(mode_words(b.side, b.mode) for b in own)))
-        return f"The part is not sound: in the newer mission it is {words}."
+        return f"The part is not healthy: in the newer mission it is {words}."
     other = next((b for b in near if Tier.DIRECT not in (a.tier, b.tier)), None)
     if other is None:
         return ""

@@ -36,7 +36,7 @@ _DEFINITIONS = (
     "by more than a factor of two, both in seconds and as a share of the judged time, and by a second at least.",
     "Worse: a higher severity, else a larger ε̂ or more time.",
     "Resolved: not found again although the side was assessed in the newer mission: with evidence, for the seconds that the "
-    "verdict “ready” takes, and for four fifths of its driving. A fault that is gone without that is “not seen again, but "
+    "verdict “ready” takes, and for four fifths of its driving. Otherwise a missing fault is “not seen again, but "
     "not assessed”.",
     "Tracking error: mean |e| while driving. Control effort: mean |u_a| while driving. Both depend on what was driven.",
 )

@@ -56,9 +56,9 @@ def doubt_of(watch: Sequence[FaultInterval], against: Reservations) -> str:
     if short := len(against.short):
         out.append(f"{count_words(short, 'part')} {'was' if short == 1 else 'were'} not judged long enough")
     if against.unexplained:
-        out.append("something deviates that no fault explains")
+        out.append("a residual is not explained by any fault")
     if against.not_compared:
-        out.append("a loss that lasted the whole mission would not show")
+        out.append("a loss that lasts the whole mission would not show")
     return join_words(out)
 
 
@@ -111,7 +111,7 @@ def _most_open(
     return [
         f"{part_words(Kind.WHEEL, *most)}: {open_s[most]:.1f} s of {driven[most]:.1f} s of driving could not be judged"
         + (f" ({reason})" if reason else "")
-        + f"; {'none of the parts judged long enough has more' if short else 'no other part has more'}."
+        + f"; this is the most of all parts{' judged long enough' if short else ''}."
         " The timeline shows when."
     ]
 
@@ -142,12 +142,12 @@ def more_caveats(mission: Mission, first_ns: int, machine: Machine) -> list[str]
     out = []
     if mission.open_loop:
         out.append(
-            "Faults were injected into this recording; the controller did not react to them: evidence that rests on the "
-            "closed loop and on controller consistency is switched off."
+            "Faults were injected into this recording. Its controller did not react to them, so evidence from the closed "
+            "loop and from controller consistency is not used."
         )
     empty = _without_speed(mission.timeline, machine)
     if empty > _EMPTY_S:
-        out.append(f"For {empty:.1f} s no wheel speed was recorded: nothing is known of that time.")
+        out.append(f"No wheel speed was recorded for {empty:.1f} s. That time is not assessed.")
     absent = [name for name in machine.signals if name not in mission.signals.items]
     if absent:
         reason = mission.signals.missing.get(absent[0], "")

@@ -109,9 +109,9 @@ def decide(
     caveats = caveats_of(against, assessments, decided_s, driven, axles, limits)
     if _modelled(assessments) and model is not None and model.identified:
         caveats += (
-            "Speed sensors and valves that are not measured twice were judged by a wheel model found in this mission: a "
-            f"loss below about {100 * _MODEL_RESOLUTION:.0f} %, or one that lasts the whole mission on every wheel, does "
-            "not show. A machine file with [plant], or a second measurement, would.",
+            "Speed sensors and valves without a second measurement were judged by a wheel model identified from this "
+            f"mission. It does not show a loss below about {100 * _MODEL_RESOLUTION:.0f} %, nor a loss that lasts the "
+            "whole mission on every wheel. A machine file with [plant], or a second measurement, would show them.",
         )
     return replace(found, caveats=caveats, actions=actions_of(intervals))
 
@@ -162,20 +162,20 @@ def _without_faults(
     """The verdict where no fault is worth an action: the first reservation that there is, else ``ready``."""
     if against.short:
         who = join_words(sorted({part_words(Kind.WHEEL, c, s) for c, s in against.short}))
-        text = f"No fault was found, but {who} could not be judged long enough to say that they are healthy."
+        text = f"No fault was found, but {who} could not be judged long enough to be called healthy."
         return Decision(Verdict.NOT_ASSESSED, "Not judged long enough", text)
     if against.unexplained:
         who = join_words(sorted({part_words(Kind.WHEEL, c, Side.SENSOR_OR_ACTUATOR) for c, _ in against.unexplained}))
         most = max(assessments[part].unexplained_s for part in against.unexplained)
         text = (
-            f"No fault can be stated, but something deviates at the {who} for up to {seconds_words(most)} that no single fault "
-            "explains well enough. Measure speed or valve position a second time, or inspect."
+            f"No fault was identified, but no single fault explains the residual of the {who} for up to {seconds_words(most)}. "
+            "Inspect these parts, or add a second measurement of speed or valve position."
         )
-        return Decision(Verdict.NOT_ASSESSED, "Deviations that are not explained", text)
+        return Decision(Verdict.NOT_ASSESSED, "Unexplained residuals", text)
     if against.not_compared:
         text = (
-            "No fault was found, but the wheel model comes from this mission alone: a loss that lasted all of it would "
-            "not show. Give the wheels' K and tau in a machine file's [plant]."
+            "No fault was found, but the wheel model was identified from this mission alone. It does not show a loss that "
+            "lasts the whole mission. Give K and tau of the wheels in [plant] of a machine file."
         )
         return Decision(Verdict.NOT_ASSESSED, "No fault found, not fully assessed", text)
     if against.damage:

@@ -110,7 +110,7 @@ def checks(
         _sample_rate(found.jitter_ms, timeline.step_ns),
         *_injected(signals),
         *(
-            _row("Damage", text, "what is lost is not assessed; no “ready” from a damaged log", False)
+            _row("Damage", text, "lost data are not assessed; a damaged log does not get “ready”", False)
             for text in damage
         ),
         _gap_check(found.rows),
@@ -131,7 +131,7 @@ def _sample_rate(jitter_ms: float, step_ns: int) -> QualityRow:
     return _row(
         "Sample rate",
         f"{1e9 / step_ns:.4g} Hz, jitter {jitter_ms:.3g} ms (99 %)",
-        "none" if sharp else "onsets are only as sharp as the jitter",
+        "none" if sharp else "the jitter limits the accuracy of onsets",
         sharp,
     )
 
@@ -142,7 +142,7 @@ def _injected(signals: Signals) -> list[QualityRow]:
     return [
         _row(
             "Injected faults",
-            "faults were written into this recording; its controller never met them",
+            "faults were injected into this recording; its controller did not react to them",
             "the recorded commands are not compared with the law; no tracking error without a second speed",
             False,
         )
@@ -171,7 +171,7 @@ def _guessed(signals: Signals) -> list[QualityRow]:
         _row(
             "Mapping",
             f"{len(guessed)} of {len(signals.items)} signals were found by name",
-            "a wrong guess would mislead the diagnosis: check with `mfhca channels`, fix in [signals]",
+            "a wrong mapping would falsify the diagnosis: check with `mfhca channels`, fix in [signals]",
         )
     ]
 
@@ -194,8 +194,8 @@ def _effect_of(clock: SourceClock) -> tuple[str, bool]:
     if clock.reason:
         return "delays between the files are not known: its signals are not used", False
     if clock.uncertainty_s is None:
-        return "times are as good as what the machine file says", True
-    return f"times of one file on the other's axis are right within ±{1e3 * clock.uncertainty_s:.2g} ms (95 %)", True
+        return "times depend on the offset and drift in the machine file", True
+    return f"times of the files agree within ±{1e3 * clock.uncertainty_s:.2g} ms (95 %)", True
 
 
 def clock_row(clock: SourceClock | None) -> ClockRow | None:

@@ -28,16 +28,16 @@ def severity_of(finding: Finding, seconds: float, limits: Limits, kind: Kind = K
             return Severity.MEDIUM, "Probably a valve that does not answer: check it before the machine goes out again."
         return Severity.LOW, "Probable, not certain: check it at the next service, and compare with the next mission."
     if finding.mode.varying and finding.tier is Tier.MODEL and seconds < _SHORT_NOISE_S:
-        return Severity.INFO, "Too short to act on: a model alone shows it. Compare with the next mission."
+        return Severity.INFO, "Too short to act on, and shown by a model alone. Compare with the next mission."
     if finding.mode.total:
         return _severity_of_total(finding, seconds, limits, kind)
     marked = finding.epsilon is not None and finding.epsilon.value >= _MARKED_EPSILON
     if finding.mode is FaultMode.OUTSIDE_TABLE:
         return (
             Severity.MEDIUM,
-            "Check scaling and sign of the channel: its gain lies outside what a fault of the table can give.",
+            "Check scaling and sign of the channel: no fault of the tables gives such a gain.",
         )
-    return Severity.MEDIUM if marked else Severity.LOW, f"By itself no reason to stop; {_check_of(finding, kind)}."
+    return Severity.MEDIUM if marked else Severity.LOW, f"This alone is no reason to stop; {_check_of(finding, kind)}."
 
 
 def _severity_of_total(finding: Finding, seconds: float, limits: Limits, kind: Kind) -> tuple[Severity, str]:
@@ -45,7 +45,7 @@ def _severity_of_total(finding: Finding, seconds: float, limits: Limits, kind: K
     if sum(h.p for h in finding.hypotheses if h.mode in TOTAL) < _PROBABLY_TOTAL:
         return (
             Severity.MEDIUM,
-            "Faulty, but more probably in another way than dead: check it before the next mission.",
+            "Faulty, but probably neither stuck nor without signal: check it before the next mission.",
         )
     if finding.side is Side.ACTUATOR:
         return Severity.HIGH, "Stop at once and repair: the valve does not answer its command (Assumption 2)."
@@ -60,14 +60,14 @@ def _severity_of_total(finding: Finding, seconds: float, limits: Limits, kind: K
             f"Tolerable: no longer than {limits.brief:g} s (Assumption 1). Check plug and cable at the next service."
         )
     return Severity.HIGH, (
-        f"Stop and repair the sensor: it gave nothing usable for more than {limits.brief:g} s (Assumption 1)."
+        f"Stop and repair the sensor: it delivered nothing usable for more than {limits.brief:g} s (Assumption 1)."
     )
 
 
 def _check_of(finding: Finding, kind: Kind) -> str:
     """What to check at a part that fails in a way that is no reason to stop."""
     if finding.side is Side.SENSOR_OR_ACTUATOR:
-        return f"measure {'angle' if kind is Kind.STEER else 'speed'} and valve travel to tell sensor from valve"
+        return f"measure {'angle' if kind is Kind.STEER else 'speed'} and valve travel to distinguish sensor and valve"
     row = row_of(finding.side, finding.mode)
     found = "" if row is None else (kind is Kind.STEER and row.check_steer) or row.check
     return f"check the {found or ('sensor' if finding.side is Side.SENSOR else 'valve')}"

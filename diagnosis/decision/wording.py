@@ -60,7 +60,7 @@ def _urgency(worst: FaultInterval) -> int:
 def _how_long(side: Side, mode: FaultMode, faults: Sequence[FaultInterval]) -> str:
     """A mode with the whole time of its faults on one part, and how many they are."""
     total = seconds_words(sum(f.stop_s - f.start_s for f in faults))
-    return f"{mode_words(side, mode)} for {total}" + ("" if len(faults) == 1 else f" in {len(faults)} spells")
+    return f"{mode_words(side, mode)} for {total}" + ("" if len(faults) == 1 else f" in {len(faults)} intervals")
 
 
 def sentence_of(faults: Sequence[FaultInterval]) -> str:

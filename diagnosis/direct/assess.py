@@ -77,7 +77,7 @@ def _reasons(side: Side) -> dict[State, str]:
         State.NO_DATA: "no samples",
         State.NOT_ASSESSED: "the command changes faster than the log's rate or the valve's lag can resolve"
         if side is Side.ACTUATOR
-        else "what deviates may be a delay or the rounding of the channel",
+        else "the residual may come from a delay or from the rounding of the channel",
     }
 
 
@@ -90,4 +90,7 @@ def _notes(found: IdentifiedPair, below: int) -> tuple[str, ...]:
     )
     if not below:
         return (figures,)
-    return figures, f"{below} deviations of {pair.y_name} lie below the limits of the machine file."
+    return (
+        figures,
+        f"{below} deviations of {pair.y_name} are below the limits of the machine file and are not reported.",
+    )

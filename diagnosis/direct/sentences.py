@@ -40,7 +40,7 @@ def sentences(isolated: Isolated, found: IdentifiedPair, mode: FaultMode, epsilo
             f"Residual {seen.deviation:.3g} {pair.unit} root mean square; threshold {3 * model.noise:.2g} {pair.unit}."
         )
     if mode is FaultMode.OUTSIDE_TABLE:
-        out.append("The gain lies outside 0…1, which no row of the table describes.")
+        out.append("The gain is outside 0…1, which no row of the tables describes.")
     out.append(
         f"Log-evidence against healthy: {isolated.gain:.0f}; a fault is considered from {model.switch_cost:.0f}."
     )
@@ -49,7 +49,7 @@ def sentences(isolated: Isolated, found: IdentifiedPair, mode: FaultMode, epsilo
 
 def alike_sentence(found: IdentifiedPair) -> str:
     """Why a constant value and a constant share are equally probable."""
-    return f"{found.pair.x_name} hardly moved in this time, so that stuck and inefficient look alike."
+    return f"{found.pair.x_name} hardly moved in this time, so stuck and inefficient cannot be distinguished."
 
 
 def _values(isolated: Isolated, found: IdentifiedPair, epsilon: Epsilon | None, seconds: float) -> list[str]:

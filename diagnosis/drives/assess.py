@@ -82,11 +82,11 @@ def assess_drive(data: DriveData, limits: Limits) -> tuple[Assessment, Assessmen
     Returns
     -------
     tuple[Assessment, Assessment]
-        Sensor and actuator; not assessed where command and effort do not tell which speed the controller saw.
+        Sensor and actuator; not assessed where command and effort do not show which speed the controller received.
     """
     controller = _controller(data)
     if controller is None:
-        why = "command and effort do not tell which speed the controller saw"
+        why = "command and effort do not show which speed the controller received"
         missing = unassessed(data.y.size, State.NOT_ASSESSED, why)
         return missing, unassessed(data.y.size, State.NOT_ASSESSED, why)
     pair = speed_pair(data, controller, implied_speed(controller, data.record), limits)
@@ -176,11 +176,11 @@ def _reasons(load: LoadTrack | None) -> dict[State, str]:
     """Why a state that is no judgement was given."""
     return {
         State.NOT_EXCITED: "the drive is neither commanded nor moving",
-        State.MASKED: "the speed sensor that would show it delivers nothing usable",
+        State.MASKED: "the speed sensor, which is needed for it, delivers nothing usable",
         State.NO_DATA: "no samples",
         State.NOT_ASSESSED: "no effort of healthy missions to compare with"
         if load is None
-        else "the drive takes more effort than healthy missions did; a sensor that reads low would look the same",
+        else "the drive takes more effort than in healthy missions; a sensor that reads low has the same effect",
     }
 
 
@@ -192,4 +192,7 @@ def _notes(data: DriveData, pair: SpeedPair, controller: InverseController, belo
     )
     if not below:
         return (figures,)
-    return figures, f"{below} deviations of {data.names[0]} lie below the limits of the machine file."
+    return (
+        figures,
+        f"{below} deviations of {data.names[0]} are below the limits of the machine file and are not reported.",
+    )

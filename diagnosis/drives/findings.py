@@ -217,7 +217,7 @@ def _sentences(isolated: Isolated, pair: SpeedPair, delta: float) -> tuple[str, 
     if deviation > pair.noise:
         out.append(
             f"The logged speed is not the one that the controller acted on (difference {deviation:.3g} m/s root mean square), "
-            "so the drive obeys and the speed's channel is at fault."
+            "so the drive follows its command and the channel of the speed is faulty."
         )
     out.append(
         f"Log-evidence against healthy: {isolated.gain:.0f}; a fault is considered from {pair.model().switch_cost:.0f}."

@@ -188,7 +188,7 @@ def _sentences(stretch: LoadStretch, onset: Onset, side: Side, data: DriveData) 
         f"the same speed, over {stretch.seconds:.0f} s."
     ]
     if data.open_loop:
-        lines.append("The recorded controller met no fault of the sensor, so the drive itself took more.")
+        lines.append("The recorded controller met no fault of the sensor, so the drive itself took more effort.")
     elif side is Side.SENSOR:
         lines.append(
             f"The measured speed dropped by {onset.seen:.3g} m/s at once; a sensor that lost this much gain drops by "
@@ -200,7 +200,9 @@ def _sentences(stretch: LoadStretch, onset: Onset, side: Side, data: DriveData) 
             f"{onset.seen:.3g} m/s was seen."
         )
     else:
-        lines.append("Without a clear onset, a sensor that reads low and a loaded or less effective drive look alike.")
+        lines.append(
+            "Without a clear onset, a sensor that reads low and a loaded or less effective drive are not distinguished."
+        )
     if side is not Side.SENSOR:
-        lines.append("An extra load and a loss of effectiveness look alike here.")
+        lines.append("An extra load and a loss of effectiveness cannot be distinguished here.")
     return tuple(lines)

@@ -100,7 +100,7 @@ def assess_tracking(
     series = (("residual", np.where(np.isfinite(v), v - reference, np.nan)), ("expected", reference))
     pictured = Pictured.of(steps_of(findings, v.size, dt), series)
     reasons = {
-        State.NOT_ASSESSED: "without a valve command or a second measurement only a standstill under command would show",
+        State.NOT_ASSESSED: "without a valve command or a second measurement, only a standstill under command can be detected",
         State.NOT_EXCITED: "nothing is commanded",
         State.NO_DATA: "no samples",
     }
@@ -135,7 +135,7 @@ def _standstill(v: Array, tracking: _Tracking, dt: float, names: tuple[str, str]
             f"{names[0]} stopped and never moved again while {names[1]} went on for {remaining.sum() * dt:.2f} s: "
             f"{100 * share:.0f} % of all commanded travel was still to come.",
             f"The response lags its command by {lag * dt:.2f} s (estimated and taken out).",
-            "Whether the drive stands still or its sensor is dead cannot be told without a second measurement.",
+            "Without a second measurement, a drive at standstill and a dead sensor cannot be distinguished.",
         ),
         tier=Tier.TRACKING,
     )

@@ -63,7 +63,9 @@ def evaluate_report(
     try:
         return _evaluate(report, truth, name, speeds)
     except (KeyError, TypeError, ValueError, AttributeError) as error:
-        raise LogError(f"{name}: is no complete report ({error!r}); run `mfhca diagnose` on the log again") from error
+        raise LogError(
+            f"{name}: is not a complete report ({error!r}); run `mfhca diagnose` on the log again"
+        ) from error
 
 
 def _evaluate(report: ReportDocument, truth: MissionTruth, name: str, speeds: Speeds | None) -> MissionScores:

@@ -45,26 +45,26 @@ _OUTCOMES = {
     "wrong_mode": ("✗", "right part, wrong row"),
     "wrong_side": ("✗", "right component, wrong side"),
     "wrong_part": ("✗", "reported on another component"),
-    "surplus": ("+", "reported without a fault of its own"),
+    "surplus": ("+", "reported without a matching fault"),
     "false_alarm": ("!", "false alarm"),
 }
 _OPEN = 5
 _DEFINITIONS = (
     "Driving: the true commanded speed of the wheel exceeds the truth's driving speed. An actuator behind a sensor that is "
-    "stuck or silent is masked: that time and what is reported in it count nowhere but in their own row.",
+    "stuck or silent is masked: that time and its reports count in their own row only.",
     "Macro-F1 and balanced accuracy are means over the rows that occur, weighted with time; undecided time counts as wrong. "
     "The second balanced accuracy is over decided time alone.",
     "A reported fault and an injected one match one to one where their intervals overlap by at least 0.3 (intersection over "
-    "union); right means component, side and row. Nothing is adjusted once a part of a fault was found.",
-    "“Sensor or actuator” is right for inefficient ones alone, the pair that cannot be told apart in steady state.",
-    "Onset error: reported start − first excited sample of the fault. End error: reported − true end. Both looking back, over "
-    "right faults, by size.",
-    "Detection delay: moment at which the same evidence, read without anything later, would have raised the fault for "
-    "good or for 0.1 s at least − first excited sample; over faults reported on their own component. It is the detection time "
-    "t_dt of DAMADICS. Noise and delays of the channels are those of the whole mission.",
+    "union); right means component, side and row. There is no point adjustment: a part of a fault does not count as the whole fault.",
+    "“Sensor or actuator” is right for inefficient faults alone, which cannot be distinguished in steady state.",
+    "Onset error: reported start − first excited sample of the fault. End error: reported − true end. Both are "
+    "absolute values of the final report, over right faults.",
+    "Detection delay: moment of detection − first excited sample, over faults reported on their own component. The moment of "
+    "detection is the first at which the evidence up to then raises the fault, to its end or for at least 0.1 s. It is the "
+    "detection time t_dt of DAMADICS. Noise and delays of the channels are those of the whole mission.",
     "Isolated: share of the faults for which something was reported that named the right component and side.",
-    "False alarms: reports that are not right and lie for more than half of their time where their component has no fault; "
-    "without those of severity info; per hour without a fault, with the upper 95 % bound of a Poisson count.",
+    "False alarms: reports that are not right and whose component has no fault for more than half of their time, without "
+    "those of severity info; per hour without a fault, with the upper 95 % bound of a Poisson count.",
     "r_fd, r_td, r_fi, r_ti: false and true detection rate, false and true isolation rate of DAMADICS, over driving time.",
     "ε error: mean |ε̂ − ε| over right faults.",
 )

@@ -82,7 +82,7 @@ def fit_offset(timelines: Sequence[Timeline], machine: Machine, bad: set[str]) -
     d, agree = robust_solve(x, x, y, weight, 0.1 * float(np.median(np.abs(y))) + 1e-9)
     good = agree > 0
     if not np.isfinite(d).all() or np.mean(good) < 2 / 3:
-        return _nothing("wheels and angles contradict each other in too many blocks")
+        return _nothing("wheel speeds and angles contradict each other in too many blocks")
     groups = mission[good] if np.unique(mission).size >= 4 else part[good]
     std = jackknife(groups, lambda k: solve(x[good][k], x[good][k], y[good][k], weight[good][k]))
     found = tuple(sorted(set(mission[good].tolist())))

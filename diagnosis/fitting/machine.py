@@ -153,7 +153,7 @@ _EFFORT = (
     ("drift", "unit of effort per √s"),
     ("noise", "unit of effort"),
 )
-_NO_ECHO = "command and effort do not tell which speed the controller saw"
+_NO_ECHO = "command and effort do not show which speed the controller received"
 _NO_EFFORT = "three missions are needed in which the drive is driven for five seconds"
 
 

@@ -162,9 +162,10 @@ def _law_notes(control: ControlFit) -> tuple[str, ...]:
     """What the control law explains, where one was found."""
     if not control.law:
         return ()
+    n = len(control.missions)
     return (
         f"Control law {control.law}, Ψ̂ {control.psi}, explains at least {100 * control.explained:.1f} % of the command "
-        f"of {len(control.missions)} missions; λ̂ from increments {control.increments.value:.4g} ± "
+        f"of {n} mission{'' if n == 1 else 's'}; λ̂ from increments {control.increments.value:.4g} ± "
         f"{control.increments.std:.2g} s/m ({control.increments.why}).",
     )
 

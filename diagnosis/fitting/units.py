@@ -135,11 +135,11 @@ def _command_errors(x: Ratios, machine: Machine) -> list[UnitError]:
     body = x.top.get("cmd.v", 0.0) > 1.5 * machine.max_speed
     if wrong and body and len(wrong) > len(machine.wheels) / 2:
         q = 1.0 / float(np.median([x.command[n] for n in wrong]))
-        return [_said("cmd.v", q, "what the wheels' commands make of it", speeds, 1.0)]
+        return [_said("cmd.v", q, "the value from the wheels' commands", speeds, 1.0)]
     for name, q in x.command.items():
         if _off(q):
             known = speeds if name.startswith("wheel.") else _ANGLES
-            out.append(_said(name, q, "what the body's command makes of it by L1, L2", known, 1.0))
+            out.append(_said(name, q, "the value from the body's command by L1, L2", known, 1.0))
     return out
 
 
@@ -171,7 +171,7 @@ def _too_fast(
     """Speed and command alike beyond what the machine can drive; λ̂, which falls as they grow, tells the unit."""
     factor = machine.control.lambda_ / gain
     guess = _named(factor, known, 1.0) if np.isfinite(factor) and _off(factor) else None
-    told = "λ̂ is off by the same"
+    told = "λ̂ differs by the same factor"
     if guess is None:
         fits = [n for n, (f, _) in known.items() if 0.5 * machine.max_speed < top / f < 1.1 * machine.max_speed]
         guess = (" or ".join(fits), " or ".join(known[n][1] for n in fits)) if fits else None

@@ -220,7 +220,7 @@ def _finished(w: Windows, found: _Map, dead: float, tau: Estimate, left: list[in
     K = found.K
     out = w.steady & (found.weight == 0)
     K_std, kink_std, shift_std = (float(x) for x in found.std)
-    one_way = "driven one way only: an offset cannot be told from the dead zone and is contained in it"
+    one_way = "driven one way only: an offset cannot be distinguished from the dead zone, which contains it"
     offset, zone = Estimate(-found.shift * K, shift_std * K), Estimate(dead, kink_std)
     if found.shape == "one way" and dead == 0.0 and found.kink < 0:
         zone = Estimate(0.0, float("nan"), "driven one way only: the offset contains it")
@@ -231,7 +231,7 @@ def _finished(w: Windows, found: _Map, dead: float, tau: Estimate, left: list[in
         zone = Estimate(
             0.0,
             float("nan"),
-            "none that shows" if found.speeds else "driven at one speed only: the gain holds there and contains it",
+            "none found" if found.speeds else "driven at one speed only: the gain holds there and contains it",
         )
     return WheelFit(
         Estimate(K, K_std),

@@ -11,7 +11,7 @@ from replay.faults import Side, State
 _WORDS = ((0.99, "Practically certain"), (0.9, "Very likely"), (0.7, "Likely"))
 _OPEN, _TIE = 0.9, 1e-3
 _ANSWERS = {
-    Verdict.STOP: "must not go out as it is",
+    Verdict.STOP: "must not go out before repair",
     Verdict.READY: "",
     Verdict.NOT_ASSESSED: "whether it may go out is not known",
 }

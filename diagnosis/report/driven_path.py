@@ -62,7 +62,7 @@ def driven_path(report: ReportDocument, columns: Columns, step: float) -> Path:
             None,
             None,
             "Not shown: neither odometry nor GNSS was logged, and neither a yaw rate nor steering angles with the "
-            "machine's geometry tell how it turned.",
+            "machine's geometry show how it turned.",
         )
     rate, slip, source = turning
     yaw = np.cumsum(np.nan_to_num(rate)) * step

@@ -182,23 +182,25 @@ def edge_words(edge: Edge, pair: Pair) -> str:
     onset = edge.name == "onset"
     if edge.shift is None:
         where = "before" if onset else "after"
-        return f"Too few {'healthy ' if pair.independent else ''}samples {where} it to tell the noise."
+        return f"Too few {'healthy ' if pair.independent else ''}samples {where} it to estimate the noise."
     which, window = ("First", "after") if onset else ("Last", "before")
     size = abs(edge.shift[1] - edge.shift[0])
     off = (
-        f"off the {pair.words}"
+        f"from the {pair.words}"
         if pair.independent
-        else "off the course before it"
+        else "from the course before it"
         if onset
-        else "off the course after it"
+        else "from the course after it"
     )
     if edge.noise is not None and edge.most < _APART * edge.noise:
-        text = f"No sample of the {time_words(edge.reach)} {window} stands out: at most {pair.text(edge.most)} {off}"
+        text = f"No sample of the {time_words(edge.reach)} {window} exceeds the noise: at most {pair.text(edge.most)} {off}"
         text += _times(edge.most, edge)
     else:
-        text = f"{which} faulty sample {off} by {pair.text(size)}{_times(size, edge)}"
+        text = f"{which} faulty sample deviates by {pair.text(size)}{_times(size, edge)} {off}"
         if edge.most > 1.5 * size:
-            text += f", {time_words(edge.reach)} {window} by up to {number(edge.most)}{_times(edge.most, edge)}"
+            text += (
+                f", and by up to {number(edge.most)}{_times(edge.most, edge)} in the {time_words(edge.reach)} {window}"
+            )
     if edge.noise is not None:
         text += f"; σ {'before' if onset else 'after'} it: {number(edge.noise)}"
     return text + "."

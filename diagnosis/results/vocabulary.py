@@ -44,7 +44,7 @@ class Verdict(StrEnum):
 
     @property
     def label(self) -> str:
-        """Words for headings: ``Stop and repair``."""
+        """Words for the heading of one mission: ``Ready for the next mission``."""
         return _VERDICT_WORDS[self][0]
 
     @property
@@ -54,16 +54,16 @@ class Verdict(StrEnum):
 
     @property
     def short(self) -> str:
-        """Words for counts and narrow places: ``stop and repair``, ``watch``."""
+        """Words for lists, where many verdicts are beside each other: ``Ready``."""
         return _VERDICT_WORDS[self][2]
 
 
 _VERDICT_RANK = {member: i for i, member in enumerate(Verdict)}
 _VERDICT_WORDS = {
-    Verdict.READY: ("Ready for the next mission", "healthy", "ready"),
-    Verdict.NOT_ASSESSED: ("Not assessed", "not_assessed", "not assessed"),
-    Verdict.WATCH: ("Faults to watch", "inefficient", "watch"),
-    Verdict.STOP: ("Stop and repair", "stuck", "stop and repair"),
+    Verdict.READY: ("Ready for the next mission", "healthy", "Ready"),
+    Verdict.NOT_ASSESSED: ("Not assessed", "not_assessed", "Not assessed"),
+    Verdict.WATCH: ("Faults to watch", "inefficient", "Faults to watch"),
+    Verdict.STOP: ("Stop and repair", "stuck", "Stop and repair"),
 }
 
 
@@ -126,7 +126,7 @@ _TIERS = {
         1,
         "how the command is followed",
         "command tracking",
-        "because the command is not followed; sensor and drive cannot be told apart",
+        "because the command is not followed; sensor and drive cannot be distinguished",
     ),
     Tier.NONE: _TierRow(0, "nothing", "", ""),
 }

@@ -9,8 +9,9 @@ from typing import NamedTuple
 import numpy as np
 
 from diagnosis.results.assessment import Finding
+from diagnosis.results.fault_rows import mode_words
 from diagnosis.results.result import Epsilon, Hypothesis
-from diagnosis.results.vocabulary import Tier
+from diagnosis.results.vocabulary import Kind, Tier, part_name
 from diagnosis.steering.fault_size import estimate_size, level_of
 from diagnosis.steering.filter_state import SteeringPath
 from diagnosis.steering.inputs import AxleInputs
@@ -215,7 +216,9 @@ def _sentences(choice: _Choice, gain: float, ranked: Sequence[tuple[Fault, float
     if probability >= _LEAST_NAMED:
         lines.append(f"Next best: {_words(fault)} with {100 * probability:.1f} %.")
     if choice.stated is Side.SENSOR_OR_ACTUATOR:
-        lines.append("Without a second measurement a loss of gain of the sensor and of the valve look alike here.")
+        lines.append(
+            "Without a second measurement, a loss of gain of the sensor and one of the valve cannot be distinguished here."
+        )
     return tuple(lines)
 
 
@@ -227,6 +230,6 @@ def _hypothesis(fault: Fault, probability: float) -> Hypothesis:
 
 
 def _words(fault: Fault) -> str:
-    """Side and mode by their names."""
+    """Part and mode: ``steering valve stuck``."""
     hypothesis = _hypothesis(fault, 1.0)
-    return f"{hypothesis.side} {hypothesis.mode.replace('_', ' ')}"
+    return f"{part_name(Kind.STEER, hypothesis.side)} {mode_words(hypothesis.side, hypothesis.mode)}"

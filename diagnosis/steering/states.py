@@ -25,8 +25,8 @@ REASONS: dict[Side, Mapping[State, str]] = {
         State.NO_DATA: "no samples",
     },
     Side.ACTUATOR: {
-        State.NOT_EXCITED: "the axle was not steered: nothing shows whether its valve answers",
-        State.MASKED: "the steering sensor that would show it delivers nothing usable",
+        State.NOT_EXCITED: "the axle was not steered, so there is no evidence on its valve",
+        State.MASKED: "the steering sensor, which is needed for it, delivers nothing usable",
         State.NOT_ASSESSED: "the steering model does not hold here, or no single fault explains the angle",
         State.NO_DATA: "no samples",
     },

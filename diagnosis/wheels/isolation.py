@@ -8,8 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from diagnosis.results.assessment import Finding
+from diagnosis.results.fault_rows import mode_words
 from diagnosis.results.result import Hypothesis
-from diagnosis.results.vocabulary import Tier
+from diagnosis.results.vocabulary import Kind, Tier, part_name
 from diagnosis.wheels.estimates import estimate
 from diagnosis.wheels.models import (
     A_BIAS,
@@ -285,9 +286,12 @@ def _sentences(
                 lines.append(f"Next best: {_words(other)} with {100 * probability:.0f} %.")
             break
     if side is Side.SENSOR_OR_ACTUATOR:
-        lines.append("Without a second measurement a loss of gain of the sensor and of the valve look alike here.")
+        lines.append(
+            "Without a second measurement, a loss of gain of the sensor and one of the valve cannot be distinguished here."
+        )
     return tuple(lines)
 
 
 def _words(row: Row) -> str:
-    return f"{row[0].value} {row[1].value.replace('_', ' ')}"
+    side, mode = row
+    return f"{part_name(Kind.WHEEL, side)} {mode_words(side, mode)}"

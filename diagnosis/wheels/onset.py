@@ -15,7 +15,7 @@ def onset_sentence(start: int, y: Array, model: WheelFilterModel, dt: float, nam
     """What the shape of the onset says: a sensor's fault may jump by more than a wheel can, a valve's bends."""
     low, high = max(1, start - 2), min(y.size, start + 3)
     if high <= low or start == 0:
-        return "The fault was there from the first sample, so its onset says nothing."
+        return "The fault was present from the first sample, so its onset gives no evidence."
     steps = np.abs(np.nan_to_num(y[low:high] - y[low - 1 : high - 1]))
     largest = float(steps.max())
     fastest = float(np.nan_to_num(np.abs(y[low - 1 : high])).max())
@@ -24,10 +24,13 @@ def onset_sentence(start: int, y: Array, model: WheelFilterModel, dt: float, nam
     beyond = largest > max(8 * model.noise, able)
     if side is Side.ACTUATOR:
         if beyond:
-            return f"{jump}: a valve's fault alone does not explain that."
-        return f"At its onset {name} bends with its lag, no step exceeds {largest:.2g} m/s: as a wheel does that its valve leaves."
+            return f"{jump}: a fault of the valve alone does not explain this."
+        return (
+            f"At its onset {name} changes with the lag of the wheel, and no step exceeds {largest:.2g} m/s: this is how a wheel "
+            "reacts when its valve fails."
+        )
     if beyond:
-        return f"{jump}: a sensor can, a wheel cannot."
+        return f"{jump}. A sensor can do this, a wheel cannot."
     return f"{jump}." if largest > 8 * model.noise else f"At its onset no step of {name} exceeds {largest:.2g} m/s."
 
 

@@ -18,13 +18,13 @@ from replay.faults import Side, State
 _DOUBTED = 0.02  # probability of a fault from which on slip and a sensor's loss are not distinguished
 _REASONS = {
     State.NOT_EXCITED: "the wheel is neither commanded nor moving",
-    State.MASKED: "the speed sensor that would show it delivers nothing usable",
+    State.MASKED: "the speed sensor, which is needed for it, delivers nothing usable",
     State.NO_DATA: "no samples",
-    State.SLIP: "the wheel breaks the parity of the body while it obeys its valve: it slips, or its sensor is off",
+    State.SLIP: "the wheel's speed contradicts the other wheels while it follows its valve: it slips, or its sensor is faulty",
 }
 _NO_COMMAND = "no valve command to compare with"
 _UNCERTAIN = "the wheel model is too uncertain in this mission"
-_UNEXPLAINED = "what deviates here is not explained well enough by any one fault"
+_UNEXPLAINED = "no single fault explains the residual well enough"
 
 
 @dataclass(frozen=True)

@@ -67,7 +67,7 @@ def _estimate(
     origins = (spans[0][0], spans[1][0])
     shared = shared_series(reference, other, origins)
     if not shared:
-        return replace(unknown, reason="no signal that moves is recorded in both"), None, 0
+        return replace(unknown, reason="no moving signal is recorded in both"), None, 0
     between = origins[0] - origins[1]
     found = match(shared, -between * 1e-9)
     reason = f"{some(tuple(s.name for s in shared))}: {found.reason}" if found.reason else ""
@@ -107,7 +107,7 @@ def _too_far(offset: float, origins: tuple[int, int]) -> str:
     if abs(offset) < _ONE_DAY_S or min(origins) < _SET_NS:
         return ""
     return (
-        f"they agree under a shift of {offset:+.3f} s ({offset / 86400:+.1f} days), which may as well be another drive of the "
+        f"they agree under a shift of {offset:+.3f} s ({offset / 86400:+.1f} days), which may also be another drive of the "
         "same kind"
     )
 
@@ -136,7 +136,7 @@ def _steps(shared: Sequence[Shared], line: Line) -> str:
         if not place.reason and abs(step) > _STEP_S:
             found.append((first, step))
             if place.correlation > _SURE or any(abs(step - other) < _STEP_S for _, other in found[:-1]):
-                return f"its clock jumps: {first - start:.0f} s after its start signals agree under a shift by another {step:+.2f} s"
+                return f"its clock jumps: {first - start:.0f} s after its start, the signals need a further shift of {step:+.2f} s"
     return ""
 
 

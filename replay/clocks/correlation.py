@@ -98,7 +98,7 @@ def _match(shared: Sequence[Shared], wall_s: float, scaled: Callable[[Array], fl
         else:
             found = Match(lag - first * width + a0 - b0, b0 + middle, reason, r)
         if not reason and abs(found.lag_s - wall_s) > _NEAR_S and _events(part, width) < _FEWEST_EVENTS:
-            reason = "they change too seldom to tell that the files show the same drive"
+            reason = "they change too seldom to show that both files record the same drive"
         if not reason:
             return found
         best = Match(np.nan, np.nan, reason)
@@ -178,7 +178,7 @@ def _correlate(whole: Sequence[Array], part: Sequence[Array], width: float) -> t
     first = min(int(low[-1]) if len(low) else 0, peak - margin)
     last = max(peak + int(high[0]) if len(high) else len(score), peak + margin)
     if (last - first) * width > 20.0:
-        return np.nan, 0.0, "they change too slowly to tell a moment"
+        return np.nan, 0.0, "they change too slowly to determine the shift"
     rivals = np.concatenate([score[: max(first, 0)], np.zeros(1), score[last + 1 :]])
     rival = int(np.argmax(rivals))
     if rivals[rival] > _RIVAL * score[peak]:
@@ -186,6 +186,6 @@ def _correlate(whole: Sequence[Array], part: Sequence[Array], width: float) -> t
         return (
             np.nan,
             0.0,
-            f"they repeat themselves: a shift by another {(place - peak) * width:+.1f} s fits nearly as well",
+            f"they are periodic: a shift by another {(place - peak) * width:+.1f} s fits nearly as well",
         )
     return (peak - m) * width, float(r[peak]), ""

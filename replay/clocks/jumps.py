@@ -142,8 +142,8 @@ def jumps(shared: Sequence[Shared], line: Line, found: Sequence[Pause]) -> tuple
     open_s = sum(p.size_s for p in unknown)
     if open_s > _WIDENED_S:
         return (
-            f"no sample is recorded for {unknown[0].size_s:.3g} s, {unknown[0].at_s - start:.0f} s after its start, and no signal "
-            "that moves tells a pause of the recording from a clock that was set"
+            f"no sample is recorded for {unknown[0].size_s:.3g} s, {unknown[0].at_s - start:.0f} s after its start, and no moving "
+            "signal distinguishes a pause of the recording from a clock that was set"
         ), 0.0
     return _elsewhere(shared, line), open_s + doubted_s
 
@@ -221,7 +221,7 @@ def _elsewhere(shared: Sequence[Shared], line: Line) -> str:
         place = match(parts, lag)
         step = place.lag_s - lag
         if not place.reason and abs(step) > _STEP_S and place.correlation > _CORRELATION:
-            return f"its clock jumps: {first - start:.0f} s after its start signals agree under a shift by another {step:+.2f} s"
+            return f"its clock jumps: {first - start:.0f} s after its start, the signals need a further shift of {step:+.2f} s"
     return ""
 
 

@@ -143,7 +143,7 @@ def _uneven(u: Array, residual: Array, weight0: Array, weight: Array, scale: flo
         if not (weight[mine] > 0.1 * weight0[mine]).any():
             if abs(off) > max(3.0 * error, _STEP_S):
                 return (
-                    f"the clocks do not run evenly against each other: {last - first:.0f} s are off by {off * 1e3:+.0f} ms"
+                    f"the clocks do not run evenly against each other: {last - first:.0f} s deviate by {off * 1e3:+.0f} ms"
                 ), 0.0
         elif weight[mine].any():
             offs.append(float(np.average(residual[mine], weights=weight[mine])))

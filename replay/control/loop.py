@@ -126,7 +126,7 @@ def replay_loop(timeline: Timeline, machine: Machine, bucket: int = 1) -> Replay
     steer_recorded = stack(timeline, [f"steer.{a}.u" for a in machine.axles])
     if timeline.open_loop:  # the recorded commands answer to other measurements than these
         u, steer_recorded = (np.broadcast_to(np.nan, x.shape) for x in (u, steer_recorded))
-        unfit = "faults were injected into this recording, its controller never met them"
+        unfit = "faults were injected into this recording, its controller did not react to them"
     law, psi0, fits = _choose(machine, u, v, v_ref, timeline.dt, unfit, readings)
     scanned = _scan(law, u, v, v_ref, timeline.dt, psi0, bucket, timeline.store)
     steer_u = timeline.map(lambda a, b: mfhca.steering_command(a, b, control.k_ps, control.u_max), phi_ref, phi)

@@ -169,7 +169,7 @@ def _split_topics(files: list[RawFile]) -> list[str]:
     )
     more = f" and {len(several) - 6} more" if len(several) > 6 else ""
     return [
-        "topics stand in several files where only some of their messages hold a number (lists of changing length, empty "
+        "topics are written to several files where only some of their messages hold a number (lists of changing length, empty "
         f"fields), so that every number keeps its own stamp: {shown}{more}"
     ]
 

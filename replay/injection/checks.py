@@ -98,7 +98,9 @@ def _check(fault: FaultSpec, machine: Machine, signals: Signals, length: float, 
     if fault.mode is FaultMode.OUTSIDE_TABLE:
         raise ConfigError(f"{who}: mode must be a row of the tables")
     if not 0.0 <= fault.start_s < fault.stop_s:
-        raise ConfigError(f"{who}: {fault.start_s:g} to {fault.stop_s:g} s is no interval; start must be before stop")
+        raise ConfigError(
+            f"{who}: {fault.start_s:g} to {fault.stop_s:g} s is not an interval; start must be before stop"
+        )
     if fault.start_s >= length:
         raise ConfigError(f"{who}: starts at {fault.start_s:g} s, the log lasts {length:.3f} s")
     check_range(f"{who}: epsilon", fault.epsilon, 0.0, 1.0, "")

@@ -93,7 +93,7 @@ def saturation(draft: Draft, fault: FaultSpec, name: str, rng: np.random.Generat
     mean = held_value(fault, t, values)
     if fault.mode is FaultMode.STUCK and abs(mean) < draft.machine.limits.min_sat:
         draft.notes.append(
-            f"{name} is stuck at {mean:.3g} from {fault.start_s:g} s, which is as good as no signal (limits.min_sat = "
+            f"{name} is stuck at {mean:.3g} from {fault.start_s:g} s, which counts as no signal (limits.min_sat = "
             f"{draft.machine.limits.min_sat:g})"
         )
     sat = np.full(t.size, mean)

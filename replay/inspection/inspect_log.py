@@ -111,7 +111,7 @@ def _integrity(summary: LogSummary, depth: Depth) -> str:
     """What checksums there are and which of them were verified."""
     kind = summary.metadata.get("integrity", "")
     if kind == "unverifiable" or _is_table(summary) or not kind:
-        return "not every part has a checksum; damage there cannot be noticed"
+        return "not every part has a checksum; damage there cannot be detected"
     if summary.damage:
         return "checksums; not all of the log is there or right"
     return "checksums, all read and right" if depth == "full" else "checksums; the data were not read"

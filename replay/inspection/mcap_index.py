@@ -109,7 +109,7 @@ def _read(file: IO[bytes], path: Path, size: int, clock: str) -> InspectReport:
         clock=clock, container=container, attachments=tuple(index.attachments),
         integrity="checksums; that of the index is right, those of the data were not read"
         if checked
-        else "not every part has a checksum; damage there cannot be noticed",
+        else "not every part has a checksum; damage there cannot be detected",
     )  # fmt: skip
 
 

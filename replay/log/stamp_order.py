@@ -181,7 +181,7 @@ def _leave_out_strays(course: _Course, label: str, limit: int, rows_in_order: bo
     course.kept[rows] = False
     worst = np.datetime64(int(np.clip(course.stamps[rows[0]], -(2**62), 2**62)), "ns")
     course.damage.append(
-        f"{label}: {len(rows)} of {len(stamps)} stamps lie far from their neighbours' (row {rows[0] + 1}: {worst}); these "
+        f"{label}: {len(rows)} of {len(stamps)} stamps are far from their neighbours' (row {rows[0] + 1}: {worst}); these "
         "samples cannot be placed and were left out"
     )
 
@@ -223,7 +223,7 @@ def _part(course: _Course, label: str, limit: int, span: tuple[int, int] | None)
         return
     sizes = ", ".join(_seconds(float(steps[k - 1])) for k in ahead[:3])
     course.notes.append(
-        f"{label}: its stamps jump ahead ({sizes}): the recording paused or its clock was set, which cannot be told apart; "
+        f"{label}: its stamps jump ahead ({sizes}): the recording paused or its clock was set, which cannot be distinguished; "
         "they are kept"
     )
 

@@ -150,7 +150,7 @@ class SimulationOptions:
             raise ConfigError(f"fault of {fault.component}: side must be sensor or actuator")
         if not 0.0 <= fault.start_s < fault.stop_s:
             raise ConfigError(
-                f"fault of {fault.component}: {fault.start_s:g}…{fault.stop_s:g} s is no interval; start must be at "
+                f"fault of {fault.component}: {fault.start_s:g}…{fault.stop_s:g} s is not an interval; start must be at "
                 "least 0 and before stop"
             )
         check_range(f"fault of {fault.component}: epsilon", fault.epsilon, 0.0, 1.0, "")

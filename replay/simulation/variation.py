@@ -203,7 +203,7 @@ def _check_seed(seed: int, kind: Kind) -> None:
         raise ConfigError(f"kind = {kind!r} is not known; expected tuning or reporting")
     if seed not in POOLS[kind]:
         where = "0 to 999" if kind == "tuning" else "at least 2000"
-        raise ConfigError(f"seed = {seed} is no {kind} seed; expected {where}")
+        raise ConfigError(f"seed = {seed} is not a {kind} seed; expected {where}")
 
 
 def _tame(lambda_: float, plant: PlantOptions) -> float:

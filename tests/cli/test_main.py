@@ -125,7 +125,7 @@ def test_a_message_with_control_characters_stays_one_harmless_line(
 def test_help_lists_every_command_by_topic() -> None:
     seen = CliRunner().invoke(app, ["--help"])
     assert seen.exit_code == 0
-    for word in ("diagnose", "report", "inspect", "channels", "replay", "simulate", "config", "Look into a log:"):
+    for word in ("diagnose", "report", "inspect", "channels", "replay", "simulate", "config", "Inspect logs:"):
         assert word in seen.output
     assert "130 interrupted" in seen.output
 

@@ -125,7 +125,7 @@ class Finder:
                 self._walk(place, link)
             else:
                 self.notes.append(
-                    f"{link.path}: left aside, as the link leads to {link.real}, which is outside of what was given; give that too"
+                    f"{link.path}: skipped: the link leads to {link.real}, which is outside of the given folders; give that too"
                 )
         self._linked = False
 
@@ -140,7 +140,7 @@ class Finder:
             try:
                 one = self._enter(place, folder, waiting)
             except OSError as error:
-                self.problems.append(f"{folder.path}: cannot be looked through ({error.strerror or error})")
+                self.problems.append(f"{folder.path}: cannot be listed ({error.strerror or error})")
                 self._unlisted.append(folder.real)
                 continue
             alone = alone or (one and folder is top)

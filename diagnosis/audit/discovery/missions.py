@@ -193,7 +193,7 @@ def _whole(place: Place, folder: Entry, found: FolderContents) -> list[Entry]:
     try:
         return [place.whole(folder)]
     except OSError as error:
-        found.problems.append(f"{folder.path}: the recording cannot be looked through ({error.strerror or error})")
+        found.problems.append(f"{folder.path}: the recording cannot be listed ({error.strerror or error})")
         found.unread.append(folder.real)
         return []
 

@@ -31,8 +31,8 @@ def missing_parts(files: Sequence[Entry]) -> list[str]:
             missing = [n for n in range(max(there)) if n not in there]
             named = ", ".join(f"{stem}_{n}{ending}" for n in missing[:_SHOWN]) + (" …" if len(missing) > _SHOWN else "")
             out.append(
-                f"{numbered[0][1].path}: numbered like parts of one recording, of which {named} is not there; what is there is "
-                "judged part by part"
+                f"{numbered[0][1].path}: numbered like parts of one recording, of which {named} is not there; the parts that are there are "
+                "judged one by one"
             )
     return out
 

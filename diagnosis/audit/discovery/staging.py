@@ -148,7 +148,7 @@ def _fetch_folder(system: Any, path: str, url: str, local: Path, piece: Any) -> 
     for other in sorted(system.find(path)):
         relative = other[len(path) :].strip("/")
         if any(part in ("", ".", "..") for part in relative.replace("\\", "/").split("/")):
-            raise LogError(f"{url}: holds an object with the name {relative[:80]!r}, which is no file's name")
+            raise LogError(f"{url}: holds an object with the name {relative[:80]!r}, which is not a file name")
         target = local / relative
         target.parent.mkdir(parents=True, exist_ok=True)
         system.get_file(other, str(target), callback=piece)

@@ -92,7 +92,7 @@ def _same(f: FleetFault, g: FleetFault) -> bool:
 def _gone(f: FleetFault, b: Machine | None) -> tuple[FaultChange, FleetFault, None, str]:
     """A fault that stands no more: resolved, or only not seen again."""
     if b is None or not b.runs:
-        return "not_seen_again", f, None, "this audit holds no judged mission of the machine"
+        return "not_seen_again", f, None, "this audit has no judged mission of the machine"
     known = next((g for g in b.faults if _same(f, g) and not g.standing), None)
     last = f.last.result.start_ns
     later = [r for r in b.dated if last is not None and (r.result.start_ns or 0) > last]
@@ -103,7 +103,7 @@ def _gone(f: FleetFault, b: Machine | None) -> tuple[FaultChange, FleetFault, No
     if assessed:
         return "resolved", f, None, f"not in {assessed} later mission{'s' if assessed > 1 else ''} that assessed it"
     if again:
-        return "not_seen_again", f, None, "the same mission is judged otherwise, and none is later"
+        return "not_seen_again", f, None, "the same mission is judged differently, and no mission is later"
     if later:
         return "not_seen_again", f, None, "no longer assessed"
     return "not_seen_again", f, None, "no mission is later"
@@ -111,7 +111,7 @@ def _gone(f: FleetFault, b: Machine | None) -> tuple[FaultChange, FleetFault, No
 
 def _unseen(a: Machine | None, f: FleetFault) -> str:
     if a is None or not a.runs:
-        return "the earlier audit holds no judged mission of the machine"
+        return "the earlier audit has no judged mission of the machine"
     if not any(r.assessed(f.component, f.side, a.limits) for r in a.runs):
         return "the part was not assessed in the earlier audit: the fault may be older"
     return ""

@@ -30,11 +30,6 @@ def round_to(value: float, digits: int = 2) -> str:
     return text.rstrip("0").rstrip(".") if "." in text else text
 
 
-def verdict_label(verdict: Verdict) -> str:
-    """Heading of a verdict where many stand beside each other: that of a report, ``Ready`` in short."""
-    return "Ready" if verdict is Verdict.READY else verdict.label
-
-
 def fault_words(f: FleetFault) -> str:
     """Part and row: ``RL drive valve inefficient``."""
     return f"{part_words(f.kind, f.component, f.side)} {mode_words(f.side, f.mode)}"
@@ -58,7 +53,7 @@ def forecast_words(f: Forecast, limit: float, axis: Axis = "hours") -> str:
 
 def standing(m: Machine) -> str:
     """Where a machine stands: ``Stop and repair, and later missions not judged``."""
-    words = verdict_label(m.verdict)
+    words = m.verdict.short
     if m.verdict is Verdict.READY:
         return words
     if m.verdict is Verdict.NOT_ASSESSED:
@@ -101,7 +96,7 @@ def headline(machines: Sequence[Machine], unknown: int = 0) -> tuple[Verdict, st
     open_ = verdicts.count(Verdict.NOT_ASSESSED)
     if not n:
         return Verdict.NOT_ASSESSED, "nothing judged", "No mission could be judged"
-    tag = f"{count(verdicts.count(status), 'machine')}: {_small(verdict_label(status))}"
+    tag = f"{count(verdicts.count(status), 'machine')}: {_small(status.short)}"
     if status is Verdict.WATCH and not work:
         tag = f"{count(damaged, 'machine')}: damaged logs"
     if work and n == 1:
@@ -164,7 +159,7 @@ def sentences(
     """
     bad = [m for m in machines if m.verdict in _WORK]
     out = []
-    for verdict, words in ((Verdict.STOP, "Must not go out"), (Verdict.WATCH, Verdict.WATCH.label)):
+    for verdict, words in ((Verdict.STOP, "Must not go out"), (Verdict.WATCH, Verdict.WATCH.short)):
         found = [m for m in machines if m.verdict is verdict and not is_damaged(m)]
         if found and len(bad) > _SHOWN:
             out.append(f"{words} ({len(found)}): {_named(found)}.")
@@ -176,7 +171,7 @@ def sentences(
         out.append(f"{m.label} – {_small(words)}{what}{note}.")
     open_machines = [m for m in machines if m.verdict is Verdict.NOT_ASSESSED]
     if open_machines:
-        out.append(f"{Verdict.NOT_ASSESSED.label} ({len(open_machines)}): {_named(open_machines)}.")
+        out.append(f"{Verdict.NOT_ASSESSED.short} ({len(open_machines)}): {_named(open_machines)}.")
     near = [(m, t) for m, own in zip(machines, trends, strict=True) for t in own if t.approaching]
     near.sort(key=lambda p: p[1].trend.forecast.likely or 0.0)
     for m, t in near[:2]:
@@ -187,7 +182,9 @@ def sentences(
         both = f": {unread} not read, {open_} read but not assessed" if unread and open_ else ""
         out.append(f"{count(unread + open_, 'log')} could not be read or judged{both}.")
     if unknown and any(m.verdict is not Verdict.READY for m in machines):  # else the headline says so
-        out.append(f"{count(unknown, 'log')} {_was(unknown)} not judged and may be of a machine that stands as ready.")
+        out.append(
+            f"{count(unknown, 'log')} {_was(unknown)} not judged and may be of a machine that is shown as ready."
+        )
     if pending:
         out.append(f"{count(pending, 'mission')} {'is' if pending == 1 else 'are'} not audited yet.")
     return out
@@ -209,7 +206,7 @@ def _named(machines: Sequence[Machine]) -> str:
     names = [m.label for m in machines[:_NAMED]]
     if machines[0].verdict is Verdict.NOT_ASSESSED:
         names = [
-            m.label + (f" ({words.partition(' ')[2]})" if (words := standing(m)) != Verdict.NOT_ASSESSED.label else "")
+            m.label + (f" ({words.partition(' ')[2]})" if (words := standing(m)) != Verdict.NOT_ASSESSED.short else "")
             for m in machines[:_NAMED]
         ]
         names = [t.replace("(assessed since", "(since").replace("(assessed: ", "(") for t in names]

@@ -143,7 +143,7 @@ def _diagnosed(work: Work) -> MissionResult:
             left += [
                 f"{path.name} was left out: {text}"
                 if path.name in text
-                else f"{path.name} was left out, as nothing could be judged with it beside the recording ({text})"
+                else f"{path.name} was left out, because nothing could be judged together with it ({text})"
                 for path in unusable
             ]
             paths = [path for path in paths if path not in unusable]

@@ -155,11 +155,13 @@ class Database:
             what = f"was locked by another process for {self._patience_s:.0f} s; end it or wait, then audit again"
         elif isinstance(error, sqlite3.OperationalError) and text.startswith(_FULL):
             free = _free(self.path)
-            what = f"cannot be written ({text}{free}); what was recorded before is kept: make room, then audit again to go on"
+            what = (
+                f"cannot be written ({text}{free}); earlier results are kept: make room, then audit again to continue"
+            )
         elif isinstance(error, sqlite3.OperationalError) and "readonly" in text:
             what = "cannot be written (read-only); give another output folder"
         elif isinstance(error, sqlite3.DatabaseError) and not isinstance(error, sqlite3.IntegrityError):
-            what = f"is damaged or no store ({text}); move it away and audit again: results in results/ are taken over"
+            what = f"is damaged or is not a store ({text}); move it away and audit again: results in the folder results/ are kept"
         else:
             what = f"does not take the row ({text})"
         return OutputError(f"{self.path}: {what}")

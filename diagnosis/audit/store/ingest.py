@@ -66,7 +66,7 @@ def ingest(store: Store, place: str | None = None) -> Ingested:
         try:
             document = _checked(name, objects.read(name))
         except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
-            problems.append(f"{objects.place}/{name}: is no result object of this tool ({_short(error)}); left out")
+            problems.append(f"{objects.place}/{name}: is not a result object of this tool ({_short(error)}); left out")
             continue
         if document.get("attempt") is not None or document["mission"]["name"] not in placed:
             found.append((document["made_ns"], name, document))
@@ -110,7 +110,7 @@ def _checked(name: str, content: bytes) -> ResultObject:
     if verdict is not None and verdict not in _VERDICTS:
         raise ValueError(f"verdict {str(verdict)[:40]!r}")
     if any(fault["severity"] not in _SEVERITIES for fault in summary.get("faults") or ()):
-        raise ValueError("a fault's severity is none of this tool's")
+        raise ValueError("a fault's severity is not known")
     if not isinstance(document["made_ns"], int) or not isinstance(mission["files"], list) or not mission["files"]:
         raise ValueError("files or time of making are missing")
     checked: ResultObject = document

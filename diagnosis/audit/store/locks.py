@@ -91,6 +91,6 @@ def exclusively(output: Path, name: str, patience_s: float) -> Iterator[None]:
 def cannot_write(error: OSError, path: Path) -> OutputError:
     """One sentence for an output that cannot be written."""
     return OutputError(
-        f"{error.filename or path}: cannot be written ({error.strerror or error}); what is finished stays, "
+        f"{error.filename or path}: cannot be written ({error.strerror or error}); finished missions are kept; "
         "run the same command again to continue"
     )

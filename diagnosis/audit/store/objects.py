@@ -80,8 +80,8 @@ class Objects:
             return _put_file(Path(self._root), name, content)
         except OSError as error:
             raise OutputError(
-                f"{self.place}/{name}: cannot be written ({error.strerror or error}); what was recorded before is kept: "
-                "make room or give another output folder, then audit again to go on"
+                f"{self.place}/{name}: cannot be written ({error.strerror or error}); earlier results are kept: "
+                "make room or give another output folder, then audit again to continue"
             ) from error
 
     def put_attempt(self, stem: str, document: ResultObject, first: int) -> int:

@@ -139,9 +139,9 @@ def _why_not(kept: NDArray[np.intp], outliers: tuple[int, ...], changes: tuple[C
         since = {"drop": " since the drop", "rise": " since the rise", "bend": " since the bend"}
         return f"{len(kept)} missions{since[changes[-1].kind] if changes else ''}, {LEAST_MISSIONS} are needed"
     if outliers and outliers[-1] == n - 1:
-        return "the last mission is off the trend: the next one will tell"
+        return "the last mission deviates from the trend; the next one has to confirm it"
     if 4 * sum(o >= first for o in outliers) > n - first:
-        return "too many missions are off the trend"
+        return "too many missions deviate from the trend"
     return ""
 
 

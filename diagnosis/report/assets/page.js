@@ -190,7 +190,7 @@
     const lacking = explorer ? [...new Set(wanted.flat())].filter((n) => !explorer.names.has(n)) : [];
     tell([
       read("fault") && !faults.has(id) ? `There is no fault ${cut(id || read("fault"))} in this report${current ? `: ${current} is shown` : ""}.` : "",
-      read("t") && !range ? `“${cut(plain(read("t")) || read("t"))}” is no time: expected t=seconds or t=from,to.` : "",
+      read("t") && !range ? `“${cut(plain(read("t")) || read("t"))}” is not a time: expected t=seconds or t=from,to.` : "",
       lacking.length ? `There is no signal ${lacking.slice(0, 3).map(cut).join(", ")}${lacking.length > 3 ? ` and ${lacking.length - 3} more` : ""} in this report.` : "",
     ].filter(Boolean).join(" "));
   }

@@ -59,7 +59,7 @@ class Clocks:
         if self.clock == "publish":
             given = publish != 0
             if not given.any():
-                self.report.note(f"{label} has no publish stamps; it stands on the log clock")
+                self.report.note(f"{label} has no publish stamps; it uses the log clock")
                 return log
             return self._repaired(label, "publish", publish, given, log)
         given = np.zeros(len(log), np.bool_)
@@ -105,8 +105,8 @@ class Clocks:
         if stray.any():
             first = int(np.argmax(stray))
             say(
-                f"{label}: {stray.sum()} of {len(own)} {name} stamps leave the course of the others (the first by "
-                f"{_signed(int(own[first]) - int(expected[first]))}, {_since(beside, first)} after its start); log stamps stand in"
+                f"{label}: {stray.sum()} of {len(own)} {name} stamps deviate from the course of the others (the first by "
+                f"{_signed(int(own[first]) - int(expected[first]))}, {_since(beside, first)} after its start); log stamps are used instead"
             )
             own = np.where(stray, expected, own)
         out = stamps.copy()
@@ -116,7 +116,7 @@ class Clocks:
             lead = int(np.median(lead_of(own, beside)))
             shift = lead if abs(lead) > FAR_NS else 0
             if name == "header" or self.clock == name:
-                say(f"{label}: {zero.sum()} of {len(log)} {name} stamps are zero; log stamps stand in")
+                say(f"{label}: {zero.sum()} of {len(log)} {name} stamps are zero; log stamps are used instead")
             out[zero] = log[zero] + shift
         return out
 
@@ -159,7 +159,7 @@ class Clocks:
     def finish(self, channels: dict[str, Channel]) -> None:
         """Bring topics without header stamps to the header clock where that is another one, and write the notes."""
         for span, topics in self.far.items():
-            self.report.note(f"header stamps lie {span} the log's stamps (median): {_some(topics)}")
+            self.report.note(f"header stamps are {span} the log's stamps (median): {_some(topics)}")
         jumps = self._jumps_of_log()
         if self.clock != "header" or not self.no_header:
             if jumps and self.clock == "header":

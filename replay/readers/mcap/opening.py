@@ -67,7 +67,9 @@ def _take_summary(file: McapFile, summary: Summary) -> None:
     file.indexes[:, 2] = -1
     for entry in summary.metadata:
         if entry.offset >= summary.start or file.data[entry.offset] != fmt.METADATA:
-            file.lost("index", f"the index lists metadata {entry.name[:80]!r} at byte {entry.offset}, where none stand")
+            file.lost(
+                "index", f"the index lists metadata {entry.name[:80]!r} at byte {entry.offset}, where there is none"
+            )
             continue
         take_record(file, fmt.METADATA, entry.offset, entry.offset + entry.length)
     end = len(fmt.MAGIC) + 9 + int.from_bytes(file.data[len(fmt.MAGIC) + 1 : len(fmt.MAGIC) + 9].tobytes(), "little")

@@ -156,9 +156,7 @@ def check_data(file: McapFile, whole: bool) -> None:
             release(file.data)
         right = crc == stated
         if not right:
-            file.lost(
-                "data", f"the checksum of its data section (bytes 0 to {place}) differs; something in it was changed"
-            )
+            file.lost("data", f"the checksum of its data section (bytes 0 to {place}) differs; its content was changed")
     if right:
         file.bare = False
 

@@ -49,7 +49,7 @@ def _mend_summary(file: McapFile, behind: NDArray[np.int64], closed: bool) -> No
     start, stop = int(behind[0, 1]), int(behind[-1, 1] if closed else behind[-1, 2])
     moved = read_summary(file.data, stop, start) if closed else None
     if moved is not None and moved.checked and moved.sound:
-        file.lost("summary", f"its summary stands at byte {start}, not where its footer says; its index was not used")
+        file.lost("summary", f"its summary is at byte {start}, not where its footer says; its index was not used")
         file.summary = replace(moved, chunks=moved.chunks[:0], indexes=moved.indexes[:0])
     else:
         file.summary = summary_from(file.data, behind[behind[:, 3] == fmt.SOUND], (start, stop), False, False)
@@ -84,7 +84,10 @@ def _take_rows(file: McapFile, rows: NDArray[np.int64], closed: bool) -> None:
     chunk = rows[op == fmt.CHUNK]
     file.chunks = np.concatenate((chunk[:, 1:3], scan.chunk_times(file.data, chunk)), axis=1)
     for _, start, _, _ in chunk[chunk[:, 3] == fmt.MENDED].tolist():
-        file.lost("mended", f"the opcode or a length of the chunk at byte {start} was damaged; its content told it")
+        file.lost(
+            "mended",
+            f"the opcode or a length of the chunk at byte {start} was damaged; it was recovered from the content",
+        )
     plain = ~np.isin(op, (fmt.MESSAGE, fmt.CHUNK, fmt.MESSAGE_INDEX))
     few = rows[plain]
     if len(few) > _MOST_RECORDS:
@@ -186,7 +189,7 @@ def _index_chunks(file: McapFile, rows: NDArray[np.int64]) -> None:
             file.lost("index", f"the index and the chunk at byte {start} disagree about its length or stamps")
     places = np.sort(summary.indexes[:, 2])
     if len(places) and not np.array_equal(places, found[:, 1]):
-        file.lost("index", "the summary and the message indexes in the file disagree about where these lie")
+        file.lost("index", "the summary and the message indexes in the file disagree about their places")
 
 
 def _add_listed(file: McapFile, rows: NDArray[np.int64], listed: NDArray[np.int64]) -> None:
@@ -199,7 +202,7 @@ def _add_listed(file: McapFile, rows: NDArray[np.int64], listed: NDArray[np.int6
     inside = missing[(around[:, 0] <= missing[:, 0]) & (missing[:, 1] <= around[:, 1]) & (missing[:, 0] >= 0)]
     inside = inside[np.unique(inside[:, 0], return_index=True)[1]]
     for start in inside[:, 0].tolist():
-        file.lost("mended", f"the head of the chunk at byte {start} is damaged; the index told where it is")
+        file.lost("mended", f"the head of the chunk at byte {start} is damaged; it was found by the index")
     chunks = np.concatenate((file.chunks, inside))
     file.chunks = chunks[np.argsort(chunks[:, 0], kind="stable")]
 

@@ -104,7 +104,7 @@ def _join(data, starts, lengths, between, out):  # type: ignore[no-untyped-def]
 
 
 def _parse_together(data: NDArray[np.uint8], starts: NDArray[np.int64], lengths: NDArray[np.int64]) -> list[Any] | None:
-    """Values of all payloads, or None where one of them is no JSON value of its own.
+    """Values of all payloads, or None where one of them is not JSON value of its own.
 
     A word that no payload can know stands between them, so that two broken ones cannot make up a valid whole.
     """

@@ -155,14 +155,14 @@ def schema_of(type_name: str, definition: str) -> Schema:
     try:
         raw = definition.encode("latin-1")
     except UnicodeEncodeError as error:
-        raise DefinitionError("its schema is text, no serialised FileDescriptorSet") from error
+        raise DefinitionError("its schema is text, not a serialised FileDescriptorSet") from error
     if len(raw) > MAX_BYTES:
         raise DefinitionError(f"its schema has {len(raw)} bytes; at most {MAX_BYTES} are read")
     try:
         types = _types(raw)
         return _compile(type_name.removeprefix("."), types)
     except (ValueError, IndexError, struct.error, UnicodeDecodeError) as error:
-        raise DefinitionError(f"its schema is no FileDescriptorSet ({error})") from error
+        raise DefinitionError(f"its schema is not a FileDescriptorSet ({error})") from error
 
 
 def _types(raw: bytes) -> dict[str, _Type]:

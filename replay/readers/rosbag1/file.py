@@ -246,7 +246,7 @@ def _walk(bag: Bag) -> None:
         if chunk.start in infos:
             chunk.first_ns, chunk.last_ns, chunk.stated = infos.pop(chunk.start)
     for place, (_, _, counts) in sorted(infos.items()):
-        bag.lost(f"no chunk stands at byte {place}, where the index names one with {sum(counts.values())} messages")
+        bag.lost(f"there is no chunk at byte {place}, where the index names one with {sum(counts.values())} messages")
         for number, count in counts.items():
             bag.absent[number] = bag.absent.get(number, 0) + count
 
@@ -298,7 +298,7 @@ def _overlong(bag: Bag, at: int) -> Chunk | None:
         chunk = _chunk(bag, at + 4, at + 8 + size, 0)
     except _BAD:
         return None
-    bag.lost(f"the chunk at byte {at} reaches beyond the end of the file; what is there of it was read")
+    bag.lost(f"the chunk at byte {at} reaches beyond the end of the file; the part that is there was read")
     chunk.cut = True
     return chunk
 

@@ -124,7 +124,7 @@ class _Reading:
                 yield self._chunk(part)
                 continue
             count = int(np.count_nonzero(part.op == MESSAGE))
-            bag.lost(f"{count} messages stand outside of chunks (a chunk's header is damaged); they were read")
+            bag.lost(f"{count} messages are outside of chunks (a chunk's header is damaged); they were read")
             yield list(self._split(bag.data, part))
 
     def _chunk(self, chunk: Chunk) -> list[Block]:

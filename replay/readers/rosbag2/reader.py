@@ -116,7 +116,7 @@ def _complete(summary: LogSummary, meta: Metadata, compare: bool) -> LogSummary:
     if services:
         more = f" and {len(services) - _SHOWN} more" if len(services) > _SHOWN else ""
         notes = [n for n in notes if not any(n.startswith(f"{s} is not decoded") for s in services)]
-        notes.append(f"calls of services and actions are no signals and were left out: "
+        notes.append(f"calls of services and actions are not signals and were left out: "
                      f"{', '.join(services[:_SHOWN])}{more}")  # fmt: skip
     if compare and not damage and not sum(found.values()):
         notes.append("the recording holds no messages: it was started and stopped with nothing received")

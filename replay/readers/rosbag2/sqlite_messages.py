@@ -242,7 +242,7 @@ class Database:
             report.lost(f"{self.name}: {self.other} rows hold no message with a proper stamp")
         for number, count in sorted(self.broken.items()):
             topic = self.connections[number].topic[:80] if number in self.connections else f"topic {number}"
-            report.lost(f"{self.name}: {count} messages on {topic} lie on pages that are missing or damaged")
+            report.lost(f"{self.name}: {count} messages on {topic} are on pages that are missing or damaged")
             self.counts[number] -= count
         bad = [p for p in self.image.suspects if p]
         if self.image.suspects:

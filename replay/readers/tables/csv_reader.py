@@ -171,7 +171,7 @@ def _headers_again(table: TextTable, rows: Rows, texts: NDArray[Any], report: Re
             break
     what = "a second header" if count == 1 else f"{count} more headers, the first"
     report.lost(
-        f"{table.file.path.name}: {what} in line {line}: several exports stand in one file, one behind the other; the rows of "
+        f"{table.file.path.name}: {what} in line {line}: the file holds several exports, one after the other; the rows of "
         "all were read"
     )
     return count
@@ -188,7 +188,7 @@ def _log(table: TextTable, found: _Found, report: Report, clock: Clock) -> RawLo
     for i, label in enumerate(table.names):
         bad = int(rows.columns[i, TEXT]) - again
         if bad > 0 and not texts[i] and label in found.columns:
-            report.lost(f"{path.name}: {bad} cells of {label!r} are no numbers; they became empty ({rows.example(i)})")
+            report.lost(f"{path.name}: {bad} cells of {label!r} are not numbers; they became empty ({rows.example(i)})")
     found.times.report = found.times.base.report = report
     if rows.table[SHORT]:
         report.lost(

@@ -155,7 +155,7 @@ class Rows:
             if self.count * len(self.kinds) > 1_000_000 + self._sparse * self._bytes:
                 raise LogError(
                     f"{self.label}: {len(self.kinds)} columns, but {self.count} rows in {self._bytes} bytes; its rows "
-                    "are almost empty, so this is no table"
+                    "are almost empty, so this is not a table"
                 )
             for column, row, first, last in self._hard[:hards]:
                 cells[column, row] = self._by_python(text[first:last])

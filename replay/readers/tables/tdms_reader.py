@@ -151,7 +151,7 @@ class _Warnings(logging.Handler):
     def emit(self, record: logging.LogRecord) -> None:
         """Report a warning as a loss."""
         said = " ".join(record.getMessage().split())[:160]
-        self.report.lost(f"{self.path.name} is cut off or damaged; npTDMS says: {said}")
+        self.report.lost(f"{self.path.name} is cut off or damaged; npTDMS reports: {said}")
 
 
 @contextmanager
@@ -226,7 +226,7 @@ class _GroupTimes:
         key = zero, step, ahead, len(channel)
         if key[3] * step > 2.0**32 or abs(ahead) > 2.0**32:
             raise LogError(
-                f"{self.label}: wf_increment = {step} s over {len(channel)} samples is no time; record it again"
+                f"{self.label}: wf_increment = {step} s over {len(channel)} samples is not a time step; record it again"
             )
         if key not in self._waves:
             stamps = self.report.store.column(np.int64)

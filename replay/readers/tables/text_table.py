@@ -153,7 +153,7 @@ def open_text(path: Path, options: SourceOptions, report: Report) -> TextTable:
     if b"\n" not in head:
         head = file.head(_LONGEST_HEAD)
     if b"\n" not in head and len(head) >= _LONGEST_HEAD:
-        raise LogError(f"{path}: its first line is longer than {_LONGEST_HEAD >> 20} MiB, so it is no table")
+        raise LogError(f"{path}: its first line is longer than {_LONGEST_HEAD >> 20} MiB, so it is not a table")
     try:
         head.decode("utf-8")
     except UnicodeDecodeError as error:
@@ -187,8 +187,8 @@ def open_text(path: Path, options: SourceOptions, report: Report) -> TextTable:
     if all(_is_number(c) or not c for c in names):
         if file.tail(at).rstrip().endswith(b"EOF"):
             raise LogError(
-                f'{path} looks like a TwinCAT Scope export without its header (header "None"), so that its columns cannot be '
-                "told apart; export again with the full header"
+                f'{path} looks like a TwinCAT Scope export without its header (header "None"), so its columns cannot be '
+                "distinguished; export again with the full header"
             )
         named = [c.strip() for c in decoded(skipped).lstrip("# ").split(separator)]
         names = named if len(named) == len(names) else [f"column {i + 1}" for i in range(len(names))]
@@ -204,7 +204,7 @@ def open_text(path: Path, options: SourceOptions, report: Report) -> TextTable:
     if options.decimal is not None:
         decimal, sure = options.decimal, True
     if decimal not in (".", ","):
-        raise LogError(f"{path}: decimal = {decimal!r} is no decimal sign; give [sources] decimal = '.' or ','")
+        raise LogError(f"{path}: decimal = {decimal!r} is not a decimal sign; give [sources] decimal = '.' or ','")
     return TextTable(file, tuple(unique), Dialect(separator, decimal, True), skip, sure)
 
 

@@ -46,7 +46,7 @@ def epoch_ns(options: SourceOptions, source: str, unit: str = "") -> int:
         moment = datetime.fromisoformat(options.epoch)
     except ValueError as error:
         raise LogError(
-            f"{source}: epoch = {options.epoch!r} is no ISO date and time; write it like 2000-01-01T00:00:00Z"
+            f"{source}: epoch = {options.epoch!r} is not an ISO date and time; write it like 2000-01-01T00:00:00Z"
         ) from error
     moment = moment if moment.tzinfo else moment.replace(tzinfo=UTC)
     since = moment - datetime(1970, 1, 1, tzinfo=UTC)
@@ -162,13 +162,13 @@ class TimeBase:
             )
         if self.unit == "dc32" and self.rows > self.missing:
             self.report.note(
-                f"{self.label}: a 32-bit distributed clock starts again every 4.29 s; its turns were counted, its date is "
+                f"{self.label}: a 32-bit distributed clock starts again every 4.29 s; its wraps were counted, its date is "
                 "unknown"
             )
             if self._longest > _SECOND:
                 self.report.lost(
                     f"{self.label}: its longest step is {self._longest / 1e9:.2f} s; a gap may have lasted longer by any "
-                    "multiple of 4.29 s, which 32 bits cannot tell; record the 64-bit clock"
+                    "multiple of 4.29 s, which 32 bits cannot show; record the 64-bit clock"
                 )
 
 
@@ -200,7 +200,7 @@ def spread_seconds(stamps: NDArray[np.int64], label: str, report: Report) -> NDA
         few, most = int(inner.min(initial=usual)), int(inner.max(initial=usual))
         raise LogError(
             f"{label}: its stamps count whole seconds with {few} to {most} samples in each, so the time of a single sample "
-            "cannot be told; record FILETIME or the distributed clock instead of DT"
+            "is not known; record FILETIME or the distributed clock instead of DT"
         )
     within = np.arange(len(stamps)) - np.repeat(first, counts)
     share = np.where(np.abs(counts - usual) > max(1, usual // 10), usual, counts)

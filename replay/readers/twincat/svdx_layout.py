@@ -113,7 +113,7 @@ def read_frame(path: Path, file: IO[bytes], size: int) -> Frame:
         offset, size_of, handle = struct.unpack_from("<QQI", raw, i * ENTRY)
         if offset < HEAD + count * ENTRY or offset + size_of > xml:
             raise LogError(
-                f"{path}, byte {HEAD + i * ENTRY}: block {i + 1} of {size_of} bytes at byte {offset} does not lie between the "
+                f"{path}, byte {HEAD + i * ENTRY}: block {i + 1} of {size_of} bytes at byte {offset} is not between the "
                 f"index and the XML at byte {xml}; {HOW}"
             )
         blocks.append(Block(offset, size_of, handle))

@@ -150,7 +150,7 @@ def _channels(
             head = read_head(path, file, block)
             if not FILETIME_EPOCH < head.start < _LATEST:
                 raise LogError(
-                    f"{path}, byte {block.offset + 11}: {head.start} is no time (FILETIME since 1970 expected); {HOW}"
+                    f"{path}, byte {block.offset + 11}: {head.start} is not a time (FILETIME since 1970 expected); {HOW}"
                 )
             read += 1
             yield name, block, facts, head, np.dtype(code)
@@ -218,7 +218,9 @@ def _samples(
         part = data[first : first + run * (_SEGMENT + count * row.itemsize)].reshape(run, -1)
         zero = np.ascontiguousarray(part[:, :8]).view("<u8")
         if (zero < FILETIME_EPOCH).any() or (zero > _LATEST).any():
-            raise LogError(f"{path}, byte {first}: {int(zero[0, 0])} is no time (FILETIME since 1970 expected); {HOW}")
+            raise LogError(
+                f"{path}, byte {first}: {int(zero[0, 0])} is not a time (FILETIME since 1970 expected); {HOW}"
+            )
         for s in blocks(count, _ROWS):
             cells = part[:, _SEGMENT + s.start * row.itemsize : _SEGMENT + s.stop * row.itemsize]
             rows = np.ascontiguousarray(cells).view(row)
@@ -248,7 +250,7 @@ def _scaling(path: Path, facts: dict[str, str]) -> tuple[float, float]:
         return float(facts.get("ScaleFactor") or 1), float(facts.get("Offset") or 0)
     except ValueError as error:
         raise LogError(
-            f"{path}: ScaleFactor or Offset of {facts.get('SymbolName')} is no number; drop scale = true"
+            f"{path}: ScaleFactor or Offset of {facts.get('SymbolName')} is not a number; drop scale = true"
         ) from error
 
 

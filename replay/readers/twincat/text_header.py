@@ -103,7 +103,7 @@ def open_scope(path: Path, report: Report) -> Scope:
         text = decoded(head[:4096])
         separator = text[len("Name") : len("Name") + 1]
         if separator in (" ", "\n", "\r", "") or not separator.isascii():
-            raise LogError(f"{path}: a blank separates its columns, so that names cannot be told apart; {HOW}")
+            raise LogError(f"{path}: a blank separates its columns, so names cannot be distinguished; {HOW}")
         lines = head.split(b"\n", _LINES)[:_LINES]
         rows, metadata, last, start = _header(lines, separator)
         first = _data_line(lines, last)

@@ -179,7 +179,7 @@ def _log(
         stamps, remain = finished_stamps(scope, group, window, report)
         bad = int(rows.columns[group.first, TEXT])
         if bad:
-            report.lost(f"{group.base.label}: {bad} time cells are no numbers ({rows.example(group.first)})")
+            report.lost(f"{group.base.label}: {bad} time cells are not numbers ({rows.example(group.first)})")
         members = []
         for i, column in group.columns.items():
             label = names[i]
@@ -188,7 +188,7 @@ def _log(
                 continue
             if rows.columns[i, TEXT]:
                 report.lost(
-                    f"{path.name}: {rows.columns[i, TEXT]} cells of {label} are no numbers; they became empty "
+                    f"{path.name}: {rows.columns[i, TEXT]} cells of {label} are not numbers; they became empty "
                     f"({rows.example(i)})"
                 )
             values = column.finish() if remain is None else compressed(column.finish(), remain, report.store)
@@ -215,14 +215,14 @@ def _scaled(scope: Scope, values: NDArray[Any], index: int, options: SourceOptio
         return values
     if scope.torn("scalefactor") or scope.torn("offset"):
         raise LogError(
-            f"{scope.file.path}: the separator tore ScaleFactor or Offset apart, so scale = true cannot be applied; {HOW}"
+            f"{scope.file.path}: the separator splits ScaleFactor or Offset, so scale = true cannot be applied; {HOW}"
         )
     try:
         gain = float((scope.cell("scalefactor", index) or "1").replace(",", "."))
         offset = float((scope.cell("offset", index) or "0").replace(",", "."))
     except ValueError as error:
         raise LogError(
-            f"{scope.file.path}: ScaleFactor or Offset of {label} is no number; drop scale = true"
+            f"{scope.file.path}: ScaleFactor or Offset of {label} is not a number; drop scale = true"
         ) from error
     return values * gain + offset
 

@@ -315,7 +315,7 @@ def test_ended_at_any_moment_it_goes_on_where_it_was(
         if asked is not signal.SIGKILL:
             assert process.returncode == 130
             assert errors.splitlines() == [
-                "note: what is finished is kept; the same command again does the rest",
+                "note: finished missions are kept; run the same command again to continue",
                 "error: interrupted",
             ]
             assert [p.name for p in (out / ".work").iterdir()] == ["claims"]

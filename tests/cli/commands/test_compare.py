@@ -120,7 +120,7 @@ def test_another_machine_is_refused_unless_forced(results: Path, capsys: pytest.
     [
         (["nowhere", "noisy"], 3, "no such file"),
         (["empty", "noisy"], 3, "holds no report.json"),
-        (["drive.mcap", "noisy"], 3, "is no report.json"),
+        (["drive.mcap", "noisy"], 3, "is not a report.json"),
         (["broken.json", "noisy"], 3, "not JSON"),
         (["noisy"], 2, "see `mfhca compare --help`"),
     ],

@@ -77,7 +77,7 @@ def test_init_writes_once(tmp_path: Path, capsys: pytest.CaptureFixture[str]) ->
     assert run(["config", "init", "-o", str(file)]) == 0
     assert file.read_text(encoding="utf-8") == starter()
     assert run(["config", "init", "-o", str(file)]) == 2
-    assert "exists and is left as it is" in capsys.readouterr().err
+    assert "exists and was not changed" in capsys.readouterr().err
 
 
 def test_init_prints_without_a_name(capsys: pytest.CaptureFixture[str]) -> None:

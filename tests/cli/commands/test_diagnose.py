@@ -131,7 +131,7 @@ def test_the_verdict_is_printed(calls: dict[str, Any], capsys: pytest.CaptureFix
     calls["result"] = result("high")
     run(["diagnose", "drive.mcap"])
     seen = capsys.readouterr()
-    assert seen.out.startswith(" STOP AND REPAIR – must not go out as it is\n1 faults [/]\n")
+    assert seen.out.startswith(" STOP AND REPAIR – must not go out before repair\n1 faults [/]\n")
     for words in (
         "Repair it.  F1",
         "■ stuck",

@@ -45,7 +45,7 @@ def test_typical_values_lie_in_the_row_of_the_table() -> None:
         ("FR sensor stuck one 2", "START 'one'"),
         ("FR sensor stuck 1 inf", "STOP 'inf'"),
         ("FR sensor stuck 1 2 power=3", "'power' is not known"),
-        ("FR sensor stuck 1 2 sat=", "sat '' is no number"),
+        ("FR sensor stuck 1 2 sat=", "sat '' is not a number"),
         ("FR sensor stuck 1 2 eps=0.5", "stuck means eps = 1"),
         ("FR sensor stuck 1 2 sat=0", "other than 0"),
         ("FR sensor no_signal 1 2 sat=0.1", "means sat = 0"),

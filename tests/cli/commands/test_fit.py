@@ -46,7 +46,7 @@ def test_an_existing_file_is_replaced_with_force_only(
     file = tmp_path / "machine.toml"
     file.write_text("mine", encoding="utf-8")
     assert run(["fit", str(healthy_log), "-o", str(file)]) == 2
-    assert "exists and is left as it is" in capsys.readouterr().err
+    assert "exists and was not changed" in capsys.readouterr().err
     assert file.read_text(encoding="utf-8") == "mine"
     assert run(["fit", str(healthy_log), "-o", str(file), "--force"]) == 0
     assert load_machine(file).plant.wheels

@@ -85,7 +85,7 @@ def test_the_table_shows_what_was_injected(
     assert run(["inject", *drive, "-o", str(tmp_path / "f.mcap"), *words]) == 0
     shown = " ".join(capsys.readouterr().out.split())
     assert "A sensor inefficient 5 to 9 s 0.3 0 B sensor noisy 20 to 30 s 0.3 0.278" in shown
-    assert "(mcap, 6 signals, open-loop; other channels are left out)" in shown
+    assert "(mcap, 6 signals, open-loop; other channels are not written)" in shown
 
 
 def test_random_faults_are_the_same_for_the_same_seed(drive: list[str], tmp_path: Path) -> None:
@@ -178,7 +178,7 @@ def test_faults_of_a_simulated_original_are_told(tmp_path: Path, capsys: pytest.
     words = ["--scenario", "healthy", "--duration", "8", "--rate", "100", "--fault", "FR sensor stuck 2 3"]
     assert run(["simulate", "-q", "-o", str(log), *words]) == 0
     assert run(["inject", str(log), "-o", str(tmp_path / "f.mcap"), "--fault", "RL sensor no_signal 4 6"]) == 0
-    assert "drive.truth.json names faults that it holds already" in capsys.readouterr().err
+    assert "drive.truth.json names faults that the recording already has" in capsys.readouterr().err
     (tmp_path / "drive.truth.json").write_text("{}")
     assert run(["inject", str(log), "-o", str(tmp_path / "g.mcap"), "--fault", "RL sensor no_signal 4 6"]) == 0
     assert "names faults" not in capsys.readouterr().err

@@ -130,7 +130,7 @@ def test_channels_show_mapping_and_costs(mission_log: Path, capsys: pytest.Captu
     out = capsys.readouterr().out
     row = next(line for line in out.splitlines() if line.startswith("wheel.FR.v "))
     assert row.split()[1:4] == ["/joint_states.velocity[front_right_wheel]", "rad/s", "100"]
-    missing = out.partition("Missing, and what it costs")[2]
+    missing = out.partition("Missing signals and their effect")[2]
     assert "wheel.*.{pressure_a,pressure_b}" in missing
 
 

@@ -77,7 +77,7 @@ def test_a_recording_is_never_replaced(tmp_path: Path, capsys: pytest.CaptureFix
     log = tmp_path / "real.bag"
     log.write_text("recorded")
     assert run(["simulate", "-o", str(log), *SHORT]) == 2
-    assert "exists and was not simulated" in capsys.readouterr().err
+    assert "exists and is not a simulated log" in capsys.readouterr().err
     assert log.read_text() == "recorded"
 
 

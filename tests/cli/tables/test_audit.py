@@ -9,10 +9,13 @@ from cli.tables.audit import document, summary_parts
 from diagnosis.audit.discovery.discover import Discovery
 from diagnosis.audit.endings import Ending
 from diagnosis.audit.session import Audited
+from diagnosis.audit.store.outcome import MissionState
 
 
 def ending(name: str, state: str, verdict: str | None = None, machine: str = "M1") -> Ending:
-    return Ending(name, state, "[/] why" if state != "ok" else "", 1, machine, "Haulotte", verdict, "", None, 0, "")
+    return Ending(
+        name, MissionState(state), "[/] why" if state != "ok" else "", 1, machine, "Haulotte", verdict, "", None, 0, ""
+    )
 
 
 def printed(*ends: Ending) -> list[str]:
@@ -33,12 +36,12 @@ def test_failures_stand_first_then_machines_then_counts_and_the_page() -> None:
         "• crashed  b  [/] why",
         "• unreadable  a  [/] why",
         "Worst machines",
-        "machine  stop  watch",
-        "M2          1      –",
-        "M1          –      1",
+        "machine  stop and repair  faults to watch",
+        "M2                     1                –",
+        "M1                     –                1",
         "Missions",
-        "1 stop and repair · 1 watch · 1 ready · 1 not assessed · 1 crashed · 1 unreadable",
-        "6 in all, 2 of them done before, 1 with damage or parts that cannot be judged",
+        "stop and repair: 1 · faults to watch: 1 · ready: 1 · not assessed: 1 · unreadable: 1 · crashed: 1",
+        "6 in all, 2 of them from an earlier run, 1 with damage or parts that cannot be judged",
         "fleet page  out/fleet.html",
         "failures    out/failures.txt",
     ]
@@ -54,7 +57,7 @@ def test_missions_that_are_gone_are_told() -> None:
     for part in summary_parts(Audited((ending("a", "ok", "ready"),), 0, 0, 2), Discovery(()), Path("out")):
         console.print(part)
     assert isinstance(console.file, io.StringIO)
-    assert "the fleet page also counts 2 missions that are not there any more" in console.file.getvalue()
+    assert "the fleet page also counts 2 missions that are no longer there" in console.file.getvalue()
 
 
 def test_the_document_counts_states_and_verdicts() -> None:

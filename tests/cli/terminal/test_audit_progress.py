@@ -17,7 +17,7 @@ def test_states_are_counted_and_the_time_left_is_told(monkeypatch: pytest.Monkey
     for state in ("ok", "out_of_memory"):
         now[0] += 30.0
         counted.take("mission", {"state": state})
-    assert counted.text() == "2/min · 1:00 left · 2 ok · 1 out of memory"
+    assert counted.text() == "2/min · 1:00 left · ok: 2 · out of memory: 1"
 
 
 def test_lines_are_for_verbose_runs_alone(capsys: pytest.CaptureFixture[str]) -> None:

@@ -193,7 +193,7 @@ def test_a_row_that_is_gone_from_a_part_with_another_fault_says_so() -> None:
     older = report(fault("FR", "sensor", "stuck"), fault("FR", "sensor", "noisy"))
     found = compared(older, later(fault("FR", "sensor", "noisy")))
     gone = next(c for c in found.faults if c.status == "resolved")
-    assert gone.note == "The part is not sound: in the newer mission it is noisy."
+    assert gone.note == "The part is not healthy: in the newer mission it is noisy."
 
 
 @pytest.mark.parametrize(
@@ -271,7 +271,7 @@ def test_swapping_the_missions_swaps_new_and_resolved() -> None:
     there, back = compared(a, b), compared(b, a)
     assert [c.status for c in there.faults] == ["new", "resolved"]
     assert (back.faults[0].component, back.faults[1].component) == ("FR", "FL")
-    assert "other way round" in back.notes[0]
+    assert "swapped" in back.notes[0]
     assert not there.notes
 
 

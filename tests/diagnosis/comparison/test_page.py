@@ -62,7 +62,7 @@ def test_the_page_says_what_became_of_each_fault() -> None:
 
 
 def test_no_fault_is_said_with_what_it_does_not_mean() -> None:
-    assert "What was not assessed can hold faults" in words(page(report("FR", "M"), report("FR", "M")))
+    assert "Parts that were not assessed may have faults" in words(page(report("FR", "M"), report("FR", "M")))
 
 
 def test_names_are_text_and_the_page_runs_and_fetches_nothing() -> None:

@@ -92,11 +92,11 @@ def test_what_is_more_probably_alive_does_not_stop_the_machine() -> None:
             Side.SENSOR_OR_ACTUATOR,
             FaultMode.NOISY,
             Kind.STEER,
-            "measure angle and valve travel to tell sensor from valve",
+            "measure angle and valve travel to distinguish sensor and valve",
         ),
     ],
 )
 def test_what_to_check_is_said_of_the_row(side: Side, mode: FaultMode, kind: Kind, words: str) -> None:
     assert severity_of(finding(side, mode, epsilon=0.5), 60.0, LIMITS, kind)[1] == (
-        f"By itself no reason to stop; {words}."
+        f"This alone is no reason to stop; {words}."
     )

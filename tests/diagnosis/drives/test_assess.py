@@ -137,7 +137,7 @@ def test_an_effort_that_answers_to_nothing_is_named_as_the_reason() -> None:
     rng = np.random.default_rng(0)
     data = mission(60)
     sensor, actuator = assess_drive(drive(data.y, data.command, rng.normal(size=SIZE), None), LIMITS)
-    assert "which speed the controller saw" in sensor.reasons[State.NOT_ASSESSED]
+    assert "which speed the controller received" in sensor.reasons[State.NOT_ASSESSED]
     assert share(actuator, State.NOT_ASSESSED) == 1.0
 
 

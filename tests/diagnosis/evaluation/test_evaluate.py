@@ -396,9 +396,9 @@ def test_truth_of_another_mission_is_refused() -> None:
 def test_an_incomplete_report_is_refused(part: str) -> None:
     report = report_of()
     del report[part]
-    with pytest.raises(LogError, match=f"is no complete report .*{part}"):
+    with pytest.raises(LogError, match=f"is not a complete report .*{part}"):
         evaluate_report(report, truth_of())
-    with pytest.raises(LogError, match="is no complete report"):
+    with pytest.raises(LogError, match="is not a complete report"):
         evaluate_report(report_of() | {part: 5}, truth_of())
 
 

@@ -147,7 +147,7 @@ def test_missions_without_faults_or_driving() -> None:
     text = Tree(page).text
     assert "Wheels: no fault was injected or reported." in text
     assert "Nothing was reported." in text
-    assert "Every fault was found as it is" in text
+    assert "Every fault was identified correctly" in text
     assert "calm: FL" in text
     assert "nan" not in text.lower().split()
 

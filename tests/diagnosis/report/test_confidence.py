@@ -89,6 +89,6 @@ def test_leave_to_go_out_is_given_only_where_nothing_stands_against_it() -> None
         "Faults to watch",
         "not cleared: the log is damaged",
     )
-    assert headline(with_verdict("stop")) == ("Stop and repair", "must not go out as it is")
+    assert headline(with_verdict("stop")) == ("Stop and repair", "must not go out before repair")
     assert headline(with_verdict("ready")) == ("Ready for the next mission", "")
     assert headline(with_verdict("not_assessed")) == ("Not assessed", "whether it may go out is not known")

@@ -29,7 +29,7 @@ def edge(name: str, columns: dict[str, Any], *others: dict[str, Any], **changes:
 
 
 @pytest.mark.parametrize("second", [True, False])
-@pytest.mark.parametrize(("name", "words"), [("onset", "First faulty sample off the"), ("end", "Last faulty sample")])
+@pytest.mark.parametrize(("name", "words"), [("onset", "First faulty sample"), ("end", "Last faulty sample")])
 def test_a_jump_is_measured_against_the_noise(second: bool, name: str, words: str) -> None:
     found, pair = edge(name, log(second=second))
     assert found is not None
@@ -58,8 +58,8 @@ def test_a_bend_starts_within_the_noise() -> None:
     columns["wheel.FR.v"][1000:1200] += 0.5 * np.exp(-np.arange(200) / 100)
     found, pair = edge("onset", columns)
     assert found is not None
-    assert edge_words(found, pair).startswith("First faulty sample off the second measurement by 0.0")
-    assert ", 150 ms after by up to 0.15" in edge_words(found, pair)
+    assert edge_words(found, pair).startswith("First faulty sample deviates by 0.0")
+    assert ", and by up to 0.15" in edge_words(found, pair)
 
 
 def test_an_onset_that_does_not_show_is_said() -> None:
@@ -67,7 +67,7 @@ def test_an_onset_that_does_not_show_is_said() -> None:
     columns["wheel.FR.v"][1000:1200] += 0.5
     found, pair = edge("onset", columns)
     assert found is not None
-    assert edge_words(found, pair).startswith("No sample of the 150 ms after stands out: at most 0.0")
+    assert edge_words(found, pair).startswith("No sample of the 150 ms after exceeds the noise: at most 0.0")
 
 
 def test_a_brief_fault_is_measured_inside_it_alone() -> None:
@@ -92,7 +92,7 @@ def test_samples_of_another_fault_do_not_count_as_healthy() -> None:
     found, pair = edge("onset", log(second=True), before)
     assert found is not None
     assert (found.shift, found.noise) == (None, None)
-    assert edge_words(found, pair) == "Too few healthy samples before it to tell the noise."
+    assert edge_words(found, pair) == "Too few healthy samples before it to estimate the noise."
     other_wheel, _ = edge("onset", log(second=True), {**before, "component": "RL"})
     assert other_wheel is not None
     assert other_wheel.noise is not None
@@ -108,7 +108,7 @@ def test_a_constant_before_has_no_noise() -> None:
     found, pair = edge("onset", columns)
     assert found is not None
     assert found.noise is None
-    assert edge_words(found, pair) == "First faulty sample off the course before it by 1 m/s."
+    assert edge_words(found, pair) == "First faulty sample deviates by 1 m/s from the course before it."
 
 
 def test_times() -> None:

@@ -1,4 +1,4 @@
-"""From a run to a finding: probabilities, rows that look alike at standstill, limits, ε̂."""
+"""From a run to a finding: probabilities, rows that cannot be distinguished at standstill, limits, ε̂."""
 
 from __future__ import annotations
 
@@ -146,7 +146,7 @@ def test_gain_that_may_be_either_sides_is_the_unions() -> None:
     assert got.finding.side is Side.SENSOR_OR_ACTUATOR
     assert got.finding.mode is FaultMode.INEFFICIENT
     assert got.finding.probability > 0.99
-    assert any("look alike" in line for line in got.finding.evidence)
+    assert any("cannot be distinguished" in line for line in got.finding.evidence)
     # other rows of the two sides have no union: both sides stay open
     other = judged(run(S_WHITE_8, {S_WHITE_8: 5000.0, A_STUCK: 5000.0}))
     assert other.finding is None

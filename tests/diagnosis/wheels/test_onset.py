@@ -52,11 +52,11 @@ def test_onsets_in_words() -> None:
         return onset_sentence(start, y, MODEL, dt, "v", side)
 
     assert "jumps by 0.15 m/s" in words(100, Side.SENSOR)
-    assert words(100, Side.SENSOR).endswith("(38 times its noise): a sensor can, a wheel cannot.")
+    assert words(100, Side.SENSOR).endswith("(38 times its noise). A sensor can do this, a wheel cannot.")
     assert words(100, Side.SENSOR, dt=0.02).endswith("(38 times its noise).")  # in 20 ms a wheel can
-    assert words(100, Side.ACTUATOR).endswith("a valve's fault alone does not explain that.")
-    assert "bends with its lag" in words(100, Side.ACTUATOR, dt=0.02)
-    assert "bends with its lag" in words(50, Side.ACTUATOR)
+    assert words(100, Side.ACTUATOR).endswith("a fault of the valve alone does not explain this.")
+    assert "changes with the lag of the wheel" in words(100, Side.ACTUATOR, dt=0.02)
+    assert "changes with the lag of the wheel" in words(50, Side.ACTUATOR)
     assert "no step of v exceeds" in words(50, Side.SENSOR)
     assert "from the first sample" in words(0, Side.SENSOR)
     assert "exceeds 0 m/s" in words(5, Side.SENSOR, np.full(9, np.nan))

@@ -115,8 +115,8 @@ def test_a_common_clock_is_left_alone() -> None:
     ("shape", "words"),
     [
         (lambda t: 0 * t + 0.2, "no shift makes them agree"),
-        (lambda t: 0.2 * np.sin(2 * np.pi * t / 8.0), "repeat themselves"),
-        (lambda t: 0.2 * np.sign(np.sin(2 * np.pi * t / 20.0)), "repeat themselves"),
+        (lambda t: 0.2 * np.sin(2 * np.pi * t / 8.0), "periodic"),
+        (lambda t: 0.2 * np.sign(np.sin(2 * np.pi * t / 20.0)), "periodic"),
         (lambda t: 0.3 / (1 + np.exp(-(t - 60.0) * 4)), "no shift makes them agree"),
     ],
 )
@@ -272,7 +272,7 @@ def test_files_without_a_match_say_why_when_they_are_refused(mission: tuple[Path
     late = np.arange(0.0, 60.0, 0.01) + 86_400.0
     other = tmp_path / "other.csv"
     write_recording(as_signals({"wheel.RR.u": signal("wheel.RR.u", late, np.sin(late))}), other, "csv")
-    with pytest.raises(LogError, match=r"do not overlap in time.*no signal that moves is recorded in both"):
+    with pytest.raises(LogError, match=r"do not overlap in time.*no moving signal is recorded in both"):
         load_mission([mission[0], other], haulotte())
 
 

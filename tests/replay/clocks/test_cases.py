@@ -206,10 +206,10 @@ TABLES: dict[str, tuple[Stamps, list[str], int, float]] = {
     "an hour back from 5 s on": (GOOD + after(5, -HOUR), ["set back once", "-3600"], 0, 0.0),
     "5 s back from 8 s on": (GOOD + after(8, -5 * S), ["set back once", "-5.000 s"], 0, 0.0),
     "an hour ahead from 5 s on": (GOOD + after(5, HOUR), ["jump ahead", "3600.020 s", "kept"], 0, 3.6e6),
-    "zero now and then": (at([10, 300], [0, 0])(GOOD), ["2 of 600 stamps lie far", "left out"], 2, 0.0),
+    "zero now and then": (at([10, 300], [0, 0])(GOOD), ["2 of 600 stamps are far", "left out"], 2, 0.0),
     "2^62 and before 1970": (
         at([50, 51], [2**62, -2_000_000 * S])(GOOD),
-        ["left out", "1 of 599 stamps lie far"],
+        ["left out", "1 of 599 stamps are far"],
         2,
         0.0,
     ),

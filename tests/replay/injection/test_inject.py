@@ -175,7 +175,7 @@ FR_STUCK = FaultSpec("FR", SENSOR, STUCK, 20.0, 30.0, sat=0.1)
         (replace(FR_STUCK, component="front"), "steer.front.phi is not in the log"),
         (replace(FR_STUCK, side=ACTUATOR), "the valve's position wheel.FR.u_applied is not logged.* with --plant"),
         (replace(FR_STUCK, start_s=61.0, stop_s=70.0), "starts at 61 s, the log lasts 59.990 s"),
-        (replace(FR_STUCK, stop_s=10.0), "is no interval"),
+        (replace(FR_STUCK, stop_s=10.0), "is not an interval"),
         (replace(FR_STUCK, epsilon=1.5), "epsilon = 1.5"),
         (replace(FR_STUCK, ramp_s=11.0), "ramp_s = 11"),
         (replace(FR_STUCK, mode=FaultMode.OUTSIDE_TABLE), "must be a row of the tables"),
@@ -198,7 +198,7 @@ def test_overlapping_faults_and_unknown_wheel_models_are_refused() -> None:
 
 def test_stuck_at_zero_is_told() -> None:
     faulty, _ = inject_signals(recorded(), [replace(FR_STUCK, sat=0.001)], haulotte())
-    assert "as good as no signal" in faulty.notes[-1]
+    assert "counts as no signal" in faulty.notes[-1]
 
 
 def test_the_truth_of_a_mission() -> None:

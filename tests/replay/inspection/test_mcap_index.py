@@ -54,7 +54,7 @@ def test_the_index_agrees_with_the_reader(tmp_path: Path, compression: Compressi
 def test_a_file_without_checksums_says_so(tmp_path: Path) -> None:
     index = mcap_index(write(tmp_path / "a.mcap", enable_crcs=False), "log")
     assert index is not None
-    assert index.integrity == "not every part has a checksum; damage there cannot be noticed"
+    assert index.integrity == "not every part has a checksum; damage there cannot be detected"
 
 
 @pytest.mark.parametrize("options", [{"index_types": 0}, {"use_statistics": False}])

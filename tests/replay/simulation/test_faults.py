@@ -216,7 +216,7 @@ def test_truth_file_round_trip(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("text", "word"),
     [
-        ("{", "no JSON"),
+        ("{", "not JSON"),
         ("[]", "schema"),
         ('{"schema": "mfhca-truth/9"}', "mfhca-truth/1"),
         ('{"schema": "mfhca-truth/1", "wheels": []}', "complete"),

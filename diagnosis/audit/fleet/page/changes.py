@@ -5,7 +5,7 @@ from __future__ import annotations
 from diagnosis.audit.fleet.compare import OUTCOMES
 from diagnosis.audit.fleet.fault_types import FaultChange, FaultStandingRow
 from diagnosis.audit.fleet.page.shown import Context, ShownBaseline, ShownFaultChange
-from diagnosis.audit.fleet.words import count, verdict_label
+from diagnosis.audit.fleet.words import count
 from diagnosis.pages import labels
 from diagnosis.results.fault_rows import state_label
 from diagnosis.results.vocabulary import part_words
@@ -30,9 +30,7 @@ def changes_of(b: ShownBaseline | None) -> Context | None:
         found = [_changed(f) for f in b["faults"] if f["outcome"] == outcome]
         sign, words = _CHANGES[outcome]
         groups.append({"outcome": outcome, "sign": sign, "words": words[0].upper() + words[1:], "rows": found})
-    notes = [
-        f"{c['machine']}: {verdict_label(c['older'])} → {verdict_label(c['newer'])}" for c in b["machines"]["changed"]
-    ]
+    notes = [f"{c['machine']}: {c['older'].short} → {c['newer'].short}" for c in b["machines"]["changed"]]
     machines = b["machines"]
     for labels_of, words in (
         (machines["new"], "not in the earlier audit"),

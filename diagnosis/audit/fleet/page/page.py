@@ -25,7 +25,7 @@ from diagnosis.audit.fleet.page.shown import Context, ShownDocument, fault_addre
 from diagnosis.audit.fleet.page.svg import LEGEND, mark, sparkline, sprite
 from diagnosis.audit.fleet.page.trends import MOST, chosen, course, interest, level_words
 from diagnosis.audit.fleet.trend_types import TrendRow
-from diagnosis.audit.fleet.words import count, verdict_label
+from diagnosis.audit.fleet.words import count
 from diagnosis.audit.store.outcome import MissionState
 from diagnosis.pages import labels
 from diagnosis.pages.environment import DARK, SHARED, asset, environment, shared_style
@@ -41,19 +41,20 @@ _FILTER = (Verdict.STOP, Verdict.WATCH, Verdict.READY, Verdict.NOT_ASSESSED)
 _UNITS = {"hours": "h", "days": "d"}
 _STATUS = {"new": "New", "recurring": "Recurring", "once": "Once", "past": "Past"}
 _DEFINITIONS = (
-    "A machine stands as its last mission that could be assessed, or worse where no later mission assessed the part of an "
-    "earlier fault. It is ready only where no mission that was not judged may be later: a log that cannot be read or knows "
-    "no date may be, unless an earlier audit run looked at it before that mission began. A log that was not judged and "
-    "for which no machine is stated counts for the one that alone has judged missions in its folder. Missions whose log does not know the date "
-    "(or tells one more than a day after an audit looked at it), or which start at the same moment, count, but cannot be ordered.",
-    "New: in the machine's last mission and in none before, of which one assessed the part. Recurring: in several missions. "
+    "The verdict of a machine is that of its last mission that could be assessed. It is worse where no later mission assessed "
+    "the part of an earlier fault. A machine counts as ready only if no mission without a verdict may be later. A log that cannot "
+    "be read or has no date may be later, unless an earlier audit run read it before that mission began. A log without a "
+    "verdict and without a machine counts for the only machine with judged missions in its folder. Missions count but "
+    "cannot be ordered if their log has no date, if its date is more than a day after an audit read it, or if they start "
+    "at the same moment.",
+    "New: in the last mission of the machine and in no earlier one, of which at least one assessed the part. Recurring: in several missions. "
     "Past: not found in the last three missions that assessed the part. Faults of severity “info” are left out.",
     "Assessed: judged for the seconds that the verdict “ready” takes, and for four fifths of its driving.",
-    "Trend: weighted line through the missions' ε̂ over time, with a spread from mission to mission of its own; "
-    "missions off the line (×) are set aside, and a step or bend (↓ ↑ ∠) starts the line anew, so that a repair does. "
+    "Trend: weighted line through the missions' ε̂ over time; the spread from mission to mission is estimated with it. "
+    "Outliers (×) are excluded. A step or bend (↓ ↑ ∠), such as a repair, starts a new line. "
     "The band is its 90 % interval, the bar on the limit the 90 % interval of the crossing.",
-    "No forecast is made from fewer than five missions since the last change, nor further ahead than three times the time "
-    "that it rests on. It says when the mean of missions reaches the limit if wear goes on as it does.",
+    "A forecast needs five missions since the last change, and reaches at most three times as far ahead as the time that "
+    "they cover. It gives the time at which the mean of missions reaches the limit if wear continues at this rate.",
     "Copies of a log count once in machines, faults and trends.",
 )
 
@@ -139,7 +140,7 @@ def _css() -> str:
 def _environment() -> jinja2.Environment:
     made = environment(_HERE)
     made.filters |= {"state": state_label, "grouped": labels.grouped}
-    made.globals |= {"mark": mark, "legend": LEGEND, "verdicts": [(v, verdict_label(v)) for v in _FILTER]}
+    made.globals |= {"mark": mark, "legend": LEGEND, "verdicts": [(v, v.short) for v in _FILTER]}
     return made
 
 

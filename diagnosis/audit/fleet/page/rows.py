@@ -11,7 +11,6 @@ from diagnosis.audit.fleet.fault_types import FleetFaultRow, MissionFaultRow
 from diagnosis.audit.fleet.fleet_types import MachineRow
 from diagnosis.audit.fleet.page.shown import ShownDocument, ShownMission
 from diagnosis.audit.fleet.page.svg import mark
-from diagnosis.audit.fleet.words import verdict_label
 from diagnosis.audit.store.outcome import MissionState
 from diagnosis.pages import labels
 from diagnosis.results.fault_rows import state_label
@@ -40,7 +39,7 @@ def fault_words(fault: FleetFaultRow | MissionFaultRow) -> str:
 
 
 def _verdict_words(verdict: Verdict | None) -> str:
-    return "" if verdict is None else verdict_label(verdict)
+    return "" if verdict is None else verdict.short
 
 
 def day(start_ns: int | None) -> str:
@@ -119,7 +118,7 @@ def _row(m: ShownMission) -> str:
         status = f"{mark('warning')}{m['state'].words.capitalize()}"
     else:
         kind = verdict.value
-        status = f"{mark(symbol(m))}{verdict_label(verdict)}"
+        status = f"{mark(symbol(m))}{verdict.short}"
     kind += " degraded" if m["state"] is MissionState.DEGRADED else ""
     return (
         f'<tr class="{kind}"><td>{head}{note}</td><td>{labels.utc(start)[:16] if start is not None else "no date"}</td>'

@@ -65,7 +65,7 @@ def course(t: TrendRow, machines: Sequence[MachineRow], unit: str) -> Context:
         for c in t["changes"]
     ]
     if t["outliers"]:
-        notes.append(f"{count(len(t['outliers']), 'mission')} set aside")
+        notes.append(f"{count(len(t['outliers']), 'outlier')} excluded")
     words = t["forecast"]["words"]
     state = "above" if t["forecast"]["state"] == "above" else "near" if t["approaching"] else "calm"
     return {

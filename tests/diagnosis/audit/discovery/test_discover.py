@@ -272,7 +272,7 @@ def test_links_to_folders_are_followed_within_what_was_given(tmp_path: Path) -> 
     assert sorted(fallback_id(m) for m in found.missions) == ["AX-31", "logs", "z"]
     assert found.problems == ()
     (note,) = found.notes
-    assert note.startswith(f"{tmp_path}/logs/far: left aside, as the link leads to {tmp_path}/other")
+    assert note.startswith(f"{tmp_path}/logs/far: skipped: the link leads to {tmp_path}/other")
     both = discover([str(tmp_path / "logs"), str(tmp_path / "other")])
     assert (len(both.missions), both.notes) == (4, ())
 
@@ -315,7 +315,7 @@ def test_folder_that_may_not_be_read(tmp_path: Path, monkeypatch: pytest.MonkeyP
     monkeypatch.setattr("os.scandir", refused)
     found = discover([str(tmp_path)])
     assert [m.name for m in found.missions] == ["b__n"]
-    assert found.problems == (f"{tmp_path}/a: cannot be looked through (Permission denied)",)
+    assert found.problems == (f"{tmp_path}/a: cannot be listed (Permission denied)",)
     assert found.roots == ()  # what was there may still be
 
 

@@ -59,7 +59,7 @@ def test_a_growing_store(tmp_path: Path, later: list[Sample], outcome: str, word
         ([Sample("b", day=1.0, blind=[VALVE])], "not_seen_again", "no longer assessed"),
         ([Sample("b", day=1.0, parts=[("FR", "sensor")])], "not_seen_again", "no longer assessed"),
         ([Sample("b", day=-1.0)], "not_seen_again", "no mission is later"),
-        ([Sample("a")], "not_seen_again", "judged otherwise"),
+        ([Sample("a")], "not_seen_again", "judged differently"),
         ([Sample("b", "HX-2", day=1.0)], "not_seen_again", "no judged mission"),
         ([Sample("b", day=1.0, state="crashed")], "not_seen_again", "no judged mission"),
     ],

@@ -79,4 +79,4 @@ def test_a_log_among_those_of_two_machines_may_be_of_either(tmp_path: Path) -> N
     d = document(tmp_path, Sample("d0"), unnamed, EMPTY)
     assert {m["label"]: m["verdict"] for m in d["machines"]} == {"HX-1": "ready", "logs": "not_assessed"}
     assert d["counts"]["unknown"] == 1
-    assert "1 log was not judged and may be of a machine that stands as ready." in d["verdict"]["text"]
+    assert "1 log was not judged and may be of a machine that is shown as ready." in d["verdict"]["text"]

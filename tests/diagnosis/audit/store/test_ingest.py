@@ -113,12 +113,12 @@ def test_an_attempt_whose_row_was_not_written_is_found(audited: Path, make_key: 
         ({"attempt": None}, "its name is not that of its key"),
         ({"key": {"log_hash": "x", "config_hash": "y", "version": "1"}}, "its name is not that of its key"),
         ({"made_ns": None}, "time of making"),
-        ({"summary": {"result": {"start_ns": 2**70}, "faults": [], "components": []}}, "is no result object"),
-        ({"summary": {"result": {}, "faults": [{"id": "F1"}], "components": []}}, "is no result object"),
+        ({"summary": {"result": {"start_ns": 2**70}, "faults": [], "components": []}}, "is not a result object"),
+        ({"summary": {"result": {}, "faults": [{"id": "F1"}], "components": []}}, "is not a result object"),
         ({"summary": {"result": {}, "faults": [{"id": "F1", "severity": "low"}], "components": []}}, "does not fit"),
         ({"summary": {"result": {}, "faults": [{"severity": "dire"}], "components": []}}, "a fault's severity"),
         ({"summary": {"result": {"verdict": "fine"}, "faults": [], "components": []}}, "verdict 'fine'"),
-        ({"summary": [1]}, "is no result object"),
+        ({"summary": [1]}, "is not a result object"),
     ],
 )
 def test_objects_that_are_off_are_left_out(audited: Path, change: dict[str, Any], said: str) -> None:

@@ -248,7 +248,7 @@ def test_disk_full_costs_one_record_and_nothing_before(
         store.record(one, make_key("a"), Outcome("ok", summary=summary), None)
         pages = store.database.rows("PRAGMA page_count")[0][0]
         store.database.rows(f"PRAGMA max_page_count = {pages + 8}")
-        with pytest.raises(OutputError, match=r"fleet.sqlite: cannot be written \(database or disk is full.*is kept"):
+        with pytest.raises(OutputError, match=r"fleet.sqlite: cannot be written \(database or disk is full.*are kept"):
             store.record(two, make_key("b"), big, None)
         assert store.lookup(make_key("b")) is None
         assert store.counts() == {"ok": 1}
@@ -269,7 +269,7 @@ def test_no_room_for_files(path: Path, make_mission: Missions, make_key: Keys) -
     command = [sys.executable, "-c", script, "0", "1", "10000", str(path)]
     ended = subprocess.run(command, capture_output=True, cwd=ROOT, text=True, timeout=60, check=False)
     assert "OutputError" in ended.stderr
-    assert "what was recorded before is kept" in ended.stderr
+    assert "earlier results are kept" in ended.stderr
     told = {int(n) for n in ended.stdout.split()}
     assert told
     with Store.open(path) as store:
@@ -286,7 +286,7 @@ def test_a_result_object_without_room_leaves_nothing(
     with Store.open(path) as store:
         (mission,) = store.adopt([make_mission("m1")])
         monkeypatch.setattr("os.fsync", full)
-        with pytest.raises(OutputError, match=r"No space left on device.*is kept"):
+        with pytest.raises(OutputError, match=r"No space left on device.*are kept"):
             store.record(mission, make_key("a"), Outcome("crashed", "signal 9"), None)
         assert store.lookup(make_key("a")) is None
     assert list((path.parent / "results").iterdir()) == []
@@ -295,7 +295,7 @@ def test_a_result_object_without_room_leaves_nothing(
 def test_files_that_are_no_store(tmp_path: Path) -> None:
     path = tmp_path / "fleet.sqlite"
     path.write_bytes(b"no database at all, but long enough to look at" * 40)
-    with pytest.raises(OutputError, match="is damaged or no store"):
+    with pytest.raises(OutputError, match="is damaged or is not a store"):
         Store.open(path)
     path.unlink()
     other = sqlite3.connect(path)
@@ -323,7 +323,7 @@ def test_damaged_store(path: Path, make_mission: Missions) -> None:
     raw = bytearray(path.read_bytes())
     raw[4096:] = b"\xa5" * (len(raw) - 4096)
     path.write_bytes(raw)
-    with pytest.raises(OutputError, match=r"is damaged or no store .*move it away"), Store.open(path) as store:
+    with pytest.raises(OutputError, match=r"is damaged or is not a store .*move it away"), Store.open(path) as store:
         store.missions()
 
 

@@ -97,7 +97,7 @@ def test_a_flipped_opcode_of_a_chunk_costs_nothing_and_is_said(
     path.write_bytes(raw)
     log = read_log(path, OPTIONS)
     np.testing.assert_array_equal(log.channels[f"{FAST}.data"].values, np.arange(COUNT))
-    assert any(f"chunk at byte {start} was damaged; its content told it" in d for d in log.summary.damage)
+    assert any(f"chunk at byte {start} was damaged; it was recovered from the content" in d for d in log.summary.damage)
     assert summarise_log(path, OPTIONS).topics[0].count == COUNT
 
 
@@ -110,7 +110,7 @@ def test_a_chunk_whose_head_is_overwritten_is_found_by_the_index(tmp_path: Path)
     path.write_bytes(raw)
     log = read_log(path, OPTIONS)
     np.testing.assert_array_equal(log.channels[f"{FAST}.data"].values, np.arange(COUNT))
-    assert any(f"chunk at byte {start} is damaged; the index told" in d for d in log.summary.damage)
+    assert any(f"chunk at byte {start} is damaged; it was found by the index" in d for d in log.summary.damage)
 
 
 def test_a_lost_chunk_is_counted_by_the_index_that_follows_it(tmp_path: Path) -> None:

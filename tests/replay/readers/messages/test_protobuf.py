@@ -369,7 +369,7 @@ def test_a_log_has_channels_on_its_own_stamps(tmp_path: Path) -> None:
             "protobuf",
             "does not hold the message type 'robot.Tractor'",
         ),
-        ("robot.State", DESCRIPTORS.SerializeToString()[:-30], "protobuf", "is no FileDescriptorSet"),
+        ("robot.State", DESCRIPTORS.SerializeToString()[:-30], "protobuf", "is not a FileDescriptorSet"),
         ("robot.State", DESCRIPTORS.file[0].SerializeToString(), "protobuf", "schema"),
         ("robot.State", b"message State {}", "proto", "does not hold the message type"),
     ],

@@ -278,7 +278,7 @@ def test_a_chunk_that_the_index_alone_knows_is_told(read: Read) -> None:
     changed[bag.starts[3] : bag.starts[4]] = bytes(bag.starts[4] - bag.starts[3])
     log = read(bytes(changed))
     np.testing.assert_array_equal(speed(log), np.delete(EVERY, slice(30, 40)))
-    assert told(log, f"no chunk stands at byte {bag.starts[3]}")
+    assert told(log, f"there is no chunk at byte {bag.starts[3]}")
     assert told(log, "/speed: 10 of 60 messages that the index counts were not found")
 
 

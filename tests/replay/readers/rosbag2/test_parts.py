@@ -296,7 +296,7 @@ SENTENCES: dict[str, Check] = {
     ),
     "ros2bag/test/resources/empty_bag": lambda s: "holds no messages" in s,
     "rosbag2_tests/resources/sqlite3/bag_with_topics_and_service_events": lambda s: (
-        "calls of services and actions are no signals" in s and "is not decoded" not in s
+        "calls of services and actions are not signals" in s and "is not decoded" not in s
     ),
     "rosbag2_tests/resources/mcap/bag_with_topics_and_service_events": lambda s: "calls of services" in s,
 }

@@ -121,7 +121,7 @@ def test_booleans_text_and_odd_cells(target: Path) -> None:
     np.testing.assert_array_equal(log.channels["v"].values, [1, np.nan, 3])
     assert "label" not in log.channels
     assert any("columns of text were left out: label" in n for n in log.summary.notes)
-    assert any("1 cells of 'v' are no numbers" in d for d in log.summary.damage)
+    assert any("1 cells of 'v' are not numbers" in d for d in log.summary.damage)
 
 
 def test_without_a_header_and_with_comments(target: Path) -> None:
@@ -239,7 +239,7 @@ def test_columns_that_turn_from_text_to_numbers_are_not_dropped(target: Path) ->
     log = read(target)
     assert np.isfinite(log.channels["v"].values).sum() == 60_000
     assert any(
-        "30000 cells of 'v' are no numbers; they became empty (the first is 'ERR' at byte 6)" in d
+        "30000 cells of 'v' are not numbers; they became empty (the first is 'ERR' at byte 6)" in d
         for d in log.summary.damage
     )
 
@@ -341,7 +341,7 @@ def test_parquet_keeps_types(tmp_path: Path) -> None:
     [
         ("t,v\n0,1\n1,2\n", {"time": "zeit"}, "no column 'zeit' for time; its columns are t, v"),
         ("a,b\n5,1\n3,2\n4,0\n", {}, "no time column"),
-        ("t,v\n0,1\n1,2\n", {"time": "t", "epoch": "yesterday"}, "no ISO date"),
+        ("t,v\n0,1\n1,2\n", {"time": "t", "epoch": "yesterday"}, "not an ISO date"),
         ("t,v\nx,1\ny,2\n", {"time": "t"}, "holds no readable time"),
     ],
 )
@@ -463,4 +463,4 @@ def test_a_second_header_is_one_loss_and_its_line_is_named(target: Path) -> None
 def test_a_word_in_one_cell_is_no_second_header(target: Path) -> None:
     target.write_text("t,speed,pressure\n" + "".join(f"{i},{'speed' if i == 7 else i},{i}\n" for i in range(50)))
     (said,) = read(target).summary.damage
-    assert "1 cells of 'speed' are no numbers" in said
+    assert "1 cells of 'speed' are not numbers" in said

@@ -85,7 +85,7 @@ def test_a_file_that_was_cut_off_or_damaged(target: Path) -> None:
     target.write_bytes(raw + raw[:-30])
     log = read_log(target, SourceOptions())
     assert len(log.channels["Drive/speed"].values) >= 3
-    assert any("is cut off or damaged; npTDMS says" in d for d in log.summary.damage)
+    assert any("is cut off or damaged; npTDMS reports" in d for d in log.summary.damage)
     target.write_bytes(raw[:-30])
     with pytest.raises(LogError, match="holds no whole samples"):
         read_log(target, SourceOptions())

@@ -132,7 +132,7 @@ ENDS = FIRST + len(FAST) + len(SLOW)
     [
         (at(WHOLE, 8, struct.pack("<Q", 7)), "bytes of XML at byte"),
         (at(WHOLE, 16, struct.pack("<I", 2**31)), "blocks do not fit"),
-        (at(WHOLE, 20, struct.pack("<Q", 2**40)), "does not lie between the index and the XML"),
+        (at(WHOLE, 20, struct.pack("<Q", 2**40)), "is not between the index and the XML"),
         (at(WHOLE, FIRST, b"02"), "only version 01.00.00.40 is known"),
         (at(WHOLE, FIRST + 51, struct.pack("<Q", 17)), "byte 51 of its head holds 17, 16 was expected"),
         (at(WHOLE, FIRST + 83, struct.pack("<I", 2**20)), "its pyramid of 1048576 levels does not fit"),

@@ -196,7 +196,7 @@ def test_cells_that_are_no_numbers_are_counted(target: Path) -> None:
     lines = [x.replace("1\t1,75", "1\t###") for x in TOOL]
     log = read(write(target, lines))
     np.testing.assert_array_equal(log.channels["MAIN.fbWheel[1].fVelocity"].values, [1.5, np.nan, 2.0, 2.25])
-    assert any("1 cells of MAIN.fbWheel[1].fVelocity are no numbers" in d for d in log.summary.damage)
+    assert any("1 cells of MAIN.fbWheel[1].fVelocity are not numbers" in d for d in log.summary.damage)
 
 
 def changed(lines: list[str], **cells: str) -> list[str]:
@@ -232,7 +232,7 @@ def test_scaling_factors_that_the_separator_tore_apart_are_refused(target: Path)
         *("ScaleFactor,0,5,1", "", "0,1.5,1.5", "1,2.5,2.5"),
     ]
     assert read(write(target, lines)).channels["MAIN.a"].values.tolist() == [1.5, 2.5]
-    with pytest.raises(LogError, match="tore ScaleFactor or Offset apart"):
+    with pytest.raises(LogError, match="splits ScaleFactor or Offset"):
         read(target, scale=True)
 
 
