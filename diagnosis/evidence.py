@@ -1,6 +1,7 @@
 """What every family of evidence has in common: the mission that it sees, and what it hands on.
 
-A family is one folder (`direct`, `wheels`, `steering`, `drives`) with the same parts under the same names:
+A family is one folder (`direct`, `wheels`, `steering`, `drives`, `channels`) with the same parts under the same names; one that
+does without a part lacks it, as `channels`, which judges by single channels and has no model, has `family` alone of them:
 
     inputs          the channels that the family needs, taken from the mission
     models          its models of the fault rows, and their constants as named tuples

@@ -4,20 +4,18 @@ from __future__ import annotations
 
 import glob
 import math
-import re
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from replay.errors import ConfigError, LogError
-from replay.log.file_types import LOG_ENDINGS, check_regular, is_result, words_of
+from replay.log.file_types import LOG_ENDINGS, check_regular, is_result, part_of, words_of
 
 if TYPE_CHECKING:
     from replay.machine.config import Machine
 
 DEFAULT_MACHINE = "paper defaults"
-_PART = re.compile(r"_\d+\.(db3|mcap)$", re.IGNORECASE)
 
 
 def machine_of(path: Path | None) -> tuple[Machine, str]:
@@ -57,7 +55,7 @@ def _check_one_recording(folder: Path) -> None:
     if (folder / "metadata.yaml").is_file():
         return
     parts = [p.name for p in folder.iterdir() if p.name.lower().endswith((".db3", ".mcap"))]
-    stems = {_PART.sub("", name) if _PART.search(name) else name for name in parts}
+    stems = {part[0] if (part := part_of(name)) else name for name in parts}
     if len(stems) > 1:
         raise LogError(
             f"{folder}: is a folder of {len(parts)} logs, not one rosbag2 recording; give the files of one mission "

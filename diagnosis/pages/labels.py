@@ -1,4 +1,4 @@
-"""Words, symbols and number formats of the report page; names from logs are made visible and inert here."""
+"""Texts of the pages: numbers, times, names from logs made visible and inert, and titles of faults."""
 
 from __future__ import annotations
 

@@ -30,7 +30,7 @@ _MOST_WHOLE = 720_000
 
 
 @dataclass(frozen=True)
-class Mission:
+class Encodable:
     """Columns to encode.
 
     Attributes
@@ -121,30 +121,30 @@ def spans_of(faults: Iterable[tuple[float, float]], pad_s: float, whole_s: float
     return spans
 
 
-def encode(mission: Mission, budget: int) -> list[Channel]:
+def encode(given: Encodable, budget: int) -> list[Channel]:
     """Encode columns within a budget [bytes]: every sample where that fits, else extremes with samples around faults.
 
     Columns that hold the same numbers are encoded once and share their segments.
     """
-    if not mission.columns:
+    if not given.columns:
         return []
-    same = _same(mission)
-    distinct = {c: mission.columns[c] for c in dict.fromkeys(same.values())}
-    faults = [(a, b, frozenset(same[c] for c in columns if c in same)) for a, b, columns in mission.faults]
-    found = {c.name: c for c in _encoded(replace(mission, columns=distinct, faults=faults), budget)}
-    return [replace(found[same[c]], name=c) for c in mission.columns]
+    same = _same(given)
+    distinct = {c: given.columns[c] for c in dict.fromkeys(same.values())}
+    faults = [(a, b, frozenset(same[c] for c in columns if c in same)) for a, b, columns in given.faults]
+    found = {c.name: c for c in _encoded(replace(given, columns=distinct, faults=faults), budget)}
+    return [replace(found[same[c]], name=c) for c in given.columns]
 
 
-def _same(mission: Mission) -> dict[str, str]:
+def _same(given: Encodable) -> dict[str, str]:
     """For each column the first one that holds the same numbers."""
     seen: dict[tuple[object, ...], list[str]] = {}
     out = {}
-    closeups = mission.closeups.columns if mission.closeups else {}
-    for name, values in mission.columns.items():
+    closeups = given.closeups.columns if given.closeups else {}
+    for name, values in given.columns.items():
         few = values[:: max(1, len(values) // 1024)].tobytes()
-        alike = seen.setdefault((values.dtype.str, mission.lsb.get(name), few), [])
+        alike = seen.setdefault((values.dtype.str, given.lsb.get(name), few), [])
         for other in alike:
-            near = [c.get(x) for c in (mission.columns, closeups) for x in (name, other)]
+            near = [c.get(x) for c in (given.columns, closeups) for x in (name, other)]
             if _equal(near[0], near[1]) and _equal(near[2], near[3]):
                 out[name] = other
                 break
@@ -161,10 +161,10 @@ def _equal(a: Values | None, b: Values | None) -> bool:
     return a.dtype == b.dtype and bool(np.array_equal(a.view(bits), b.view(bits)))
 
 
-def _encoded(mission: Mission, budget: int) -> list[Channel]:
-    columns, samples, per = mission.columns, mission.samples, mission.per
+def _encoded(given: Encodable, budget: int) -> list[Channel]:
+    columns, samples, per = given.columns, given.samples, given.per
     with ThreadPoolExecutor(_WORKERS) as pool:
-        plans = dict(zip(columns, pool.map(lambda c: plan_of(columns[c], mission.lsb.get(c)), columns), strict=True))
+        plans = dict(zip(columns, pool.map(lambda c: plan_of(columns[c], given.lsb.get(c)), columns), strict=True))
         if per == 1 and sum(p.rate for p in plans.values()) * samples <= budget:
             channels = list(pool.map(lambda c: whole(c, columns[c], plans[c]), columns))
             if sum(c.size for c in channels) <= budget:
@@ -182,10 +182,10 @@ def _encoded(mission: Mission, budget: int) -> list[Channel]:
             if left >= 0 or samples // stride <= _FEWEST:
                 break
             stride *= 2
-        spans = _affordable(mission, plans, left * (_AROUND if per == 1 and samples <= _MOST_WHOLE else _MOST))
+        spans = _affordable(given, plans, left * (_AROUND if per == 1 and samples <= _MOST_WHOLE else _MOST))
 
         def near(channel: Channel) -> Channel:
-            return with_pieces(channel, mission.pieces(channel.name, spans[channel.name]), plans[channel.name])
+            return with_pieces(channel, given.pieces(channel.name, spans[channel.name]), plans[channel.name])
 
         channels = list(pool.map(near, channels))
         if per > 1 or samples > _MOST_WHOLE:
@@ -206,27 +206,27 @@ def _whole_columns(channels: Sequence[Channel], plans: Mapping[str, Plan], sampl
     return chosen
 
 
-def _affordable(mission: Mission, plans: Mapping[str, Plan], budget: float) -> dict[str, Spans]:
+def _affordable(given: Encodable, plans: Mapping[str, Plan], budget: float) -> dict[str, Spans]:
     """Widest stretches around as many faults, worst first, as the budget [bytes] pays for; by column."""
     shows: dict[tuple[int, ...], list[str]] = {}
-    for c in mission.columns:
-        shows.setdefault(tuple(i for i, f in enumerate(mission.faults) if c in f[2]), []).append(c)
+    for c in given.columns:
+        shows.setdefault(tuple(i for i, f in enumerate(given.faults) if c in f[2]), []).append(c)
     rates = {faults: sum(plans[c].rate for c in columns) for faults, columns in shows.items()}
 
     def spans(count: int, pad: tuple[float, float]) -> dict[tuple[int, ...], Spans]:
-        times = [(a, b) for a, b, _ in mission.faults[:count]]
+        times = [(a, b) for a, b, _ in given.faults[:count]]
         return {
-            faults: spans_of([times[i] for i in faults if i < count], *pad, mission.step_s, mission.samples)
+            faults: spans_of([times[i] for i in faults if i < count], *pad, given.step_s, given.samples)
             for faults in shows
         }
 
     def fits(count: int, pad: tuple[float, float]) -> bool:
         return sum(rates[f] * sum(b - a for a, b in found) for f, found in spans(count, pad).items()) <= budget
 
-    least, most = 0, len(mission.faults)
+    least, most = 0, len(given.faults)
     while least < most:
         middle = (least + most + 1) // 2
         least, most = (middle, most) if fits(middle, _PADS_S[-1]) else (least, middle - 1)
-    kept = _PADS_S if mission.per == 1 else _PADS_S[-3:]
+    kept = _PADS_S if given.per == 1 else _PADS_S[-3:]
     pad = next((p for p in kept if fits(least, p)), kept[-1])
     return {c: found for faults, found in spans(least, pad).items() for c in shows[faults]}

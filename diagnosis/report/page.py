@@ -25,16 +25,18 @@ from numpy.typing import NDArray
 
 from diagnosis.pages import labels
 from diagnosis.pages.environment import SHARED, asset, environment, shared_style
-from diagnosis.pages.svg import icon, path_picture, thumbnail
+from diagnosis.pages.svg import icon
 from diagnosis.report import tables
 from diagnosis.report.compared_channels import pair_of
 from diagnosis.report.driven_path import driven_path
 from diagnosis.report.evidence import evidence_of
 from diagnosis.report.machine_picture import machine_picture
+from diagnosis.report.path_picture import path_picture
 from diagnosis.report.plot_data import Axis, axis_of, blocks_of, channels_of, figures_of, packed_intervals, view, worst
 from diagnosis.report.plot_rows import loop_groups
 from diagnosis.report.previous import previous_section
 from diagnosis.report.rows import Columns, derived
+from diagnosis.report.thumbnail import thumbnail
 from diagnosis.report.timeline import timeline
 from diagnosis.results.document import IntervalRow, ReportDocument
 from diagnosis.results.fault_rows import state_label

@@ -8,9 +8,9 @@ from numpy.typing import NDArray
 
 from diagnosis.pages.axes import Frame, label, limits
 from diagnosis.pages.labels import number
-from diagnosis.pages.svg import extremes
 from diagnosis.report.edges import Edge, time_words
 from diagnosis.report.rows import Columns, Row
+from diagnosis.report.thumbnail import extremes
 from diagnosis.results.document import IntervalRow
 
 Array = NDArray[np.float64]

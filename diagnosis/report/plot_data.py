@@ -11,7 +11,7 @@ import numpy as np
 import orjson
 
 from diagnosis.pages import labels
-from diagnosis.report.budget import Mission, encode
+from diagnosis.report.budget import Encodable, encode
 from diagnosis.report.encode import Channel, Segment
 from diagnosis.report.plot_rows import fault_rows
 from diagnosis.report.rows import Columns, Group, Row, row_json
@@ -131,9 +131,9 @@ def channels_of(
     ]
     near = closeups if axis.per > 1 else None
     first = int((1 - _OTHERS) * budget) if others else budget
-    shown = encode(Mission({c: columns[c] for c in used}, lsb, faults, axis.sample_s, axis.per, near), first)
+    shown = encode(Encodable({c: columns[c] for c in used}, lsb, faults, axis.sample_s, axis.per, near), first)
     left = max(budget - sum({id(s): len(s.text) for c in shown for s in c.segments}.values()), _LEAST)
-    return shown + encode(Mission({c: columns[c] for c in others}, lsb, [], axis.sample_s, axis.per), left)
+    return shown + encode(Encodable({c: columns[c] for c in others}, lsb, [], axis.sample_s, axis.per), left)
 
 
 def packed_intervals(faults: Sequence[IntervalRow]) -> str:

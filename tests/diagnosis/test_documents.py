@@ -17,6 +17,7 @@ from diagnosis.pipeline import diagnose
 from diagnosis.results.document import ReportDocument
 from replay.errors import ConfigError
 from replay.machine.config import haulotte
+from tests.schemas import unknown_keys
 
 SAMPLES = Path(__file__).resolve().parents[2] / "sample_logs"
 
@@ -34,29 +35,6 @@ def plain(document: Any) -> Any:
 def places(document: Any, name: str) -> list[str]:
     """What the schema refuses in a document."""
     return [f"{e.json_path}: {e.message}" for e in Draft202012Validator(schema_of(name)).iter_errors(plain(document))]
-
-
-def unknown_keys(value: Any, schema: dict[str, Any], definitions: dict[str, Any], place: str = "$") -> list[str]:
-    """Keys that a document has and its schema does not."""
-    if "$ref" in schema:
-        schema = definitions[schema["$ref"].rpartition("/")[2]]
-    if "anyOf" in schema:
-        kind = {dict: "object", list: "array"}.get(type(value))
-        found = [
-            unknown_keys(value, s, definitions, place)
-            for s in schema["anyOf"]
-            if kind is not None and ("$ref" in s or s.get("type") == kind)
-        ]
-        return min(found, key=len, default=[])
-    if isinstance(value, list):
-        return [x for v in value for x in unknown_keys(v, schema["items"], definitions, f"{place}[]")]
-    if isinstance(value, dict) and "properties" in schema:
-        out = [f"{place}.{key}" for key in value if key not in schema["properties"]]
-        known = [(k, v) for k, v in value.items() if k in schema["properties"]]
-        return out + [
-            x for k, v in known for x in unknown_keys(v, schema["properties"][k], definitions, f"{place}.{k}")
-        ]
-    return []
 
 
 @pytest.mark.parametrize("name", DOCUMENTS)

@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from diagnosis.pages.svg import path_picture
 from diagnosis.report.driven_path import driven_path
+from diagnosis.report.path_picture import path_picture
 
 STEP = 0.01
 N = 1000  # 10 s

@@ -11,7 +11,7 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from diagnosis.report.budget import Mission, encode, spans_of
+from diagnosis.report.budget import Encodable, encode, spans_of
 from diagnosis.report.encode import Channel, Segment, levels_of, step_of
 from diagnosis.results.result import Closeups
 
@@ -33,19 +33,19 @@ def decoded(channel: Channel, segment: Segment) -> list[NDArray[np.float64]]:
 
 def test_values_on_the_sensors_grid_come_back_exactly() -> None:
     values = 0.0015 * np.array([0, 3, 3, -2, 240, 0, 1])
-    (channel,) = encode(Mission({"v": values}, {"v": 0.0015}, [], 0.001), 10**6)
+    (channel,) = encode(Encodable({"v": values}, {"v": 0.0015}, [], 0.001), 10**6)
     np.testing.assert_allclose(decoded(channel, channel.segments[0])[0], values, atol=1e-12)
 
 
 def test_gaps_stay_gaps() -> None:
     values = np.array([1.0, np.nan, np.inf, 2.0, np.nan])
-    (channel,) = encode(Mission({"v": values}, {}, [], 0.001), 10**6)
+    (channel,) = encode(Encodable({"v": values}, {}, [], 0.001), 10**6)
     back = decoded(channel, channel.segments[0])[0]
     assert np.isnan(back).tolist() == [False, True, True, False, True]
 
 
 def test_column_without_any_sample() -> None:
-    (channel,) = encode(Mission({"v": np.full(5, np.nan)}, {}, [], 0.001), 10**6)
+    (channel,) = encode(Encodable({"v": np.full(5, np.nan)}, {}, [], 0.001), 10**6)
     assert np.isnan(decoded(channel, channel.segments[0])[0]).all()
 
 
@@ -66,7 +66,7 @@ def test_outlier_coarsens_the_step_instead_of_overflowing() -> None:
 @example([1e29, -1e29, 0.0])
 def test_every_value_comes_back_within_half_a_step(values: list[float]) -> None:
     column = np.array(values)
-    (channel,) = encode(Mission({"v": column}, {}, [], 0.001), 10**7)
+    (channel,) = encode(Encodable({"v": column}, {}, [], 0.001), 10**7)
     back = decoded(channel, channel.segments[0])[0]
     assert (np.isnan(back) == np.isnan(column)).all()
     assert np.nanmax(np.append(np.abs(back - column), 0.0)) <= 0.501 * channel.step
@@ -75,7 +75,7 @@ def test_every_value_comes_back_within_half_a_step(values: list[float]) -> None:
 def test_beyond_the_budget_extremes_stand_everywhere_and_samples_around_faults() -> None:
     rng = np.random.default_rng(1)
     values = {"v": rng.normal(size=200_000), "w": rng.normal(size=200_000)}
-    channels = encode(Mission(values, {}, [(50.0, 51.0, frozenset({"v"}))], 0.001), 150_000)
+    channels = encode(Encodable(values, {}, [(50.0, 51.0, frozenset({"v"}))], 0.001), 150_000)
     v, w = channels
     assert sum(c.size for c in channels) <= 150_000
     assert [s.stride > 1 for s in v.segments] == [True, False]
@@ -97,7 +97,7 @@ def test_long_fault_has_stretches_at_onset_and_end_and_a_short_one_is_whole() ->
     assert spans_of([(0.0, 1.0)], 1.0, 4.0, 0.01, 150) == [(0, 150)]
 
 
-def long_mission() -> tuple[dict[str, NDArray[np.float64]], Mission]:
+def long_mission() -> tuple[dict[str, NDArray[np.float64]], Encodable]:
     """Samples of two columns, and the same as extremes of 16 samples with every sample of two stretches."""
     rng = np.random.default_rng(2)
     samples = {name: np.round(rng.normal(size=160_000), 3) for name in ("v", "w")}
@@ -107,7 +107,7 @@ def long_mission() -> tuple[dict[str, NDArray[np.float64]], Mission]:
     near = {k: v[step] for k, v in samples.items()}
     near["w"][:6_000] = np.nan
     faults = [(50.0, 51.0, frozenset({"v", "w"})), (90.0, 91.0, frozenset({"v", "w"}))]
-    return samples, Mission(rows, {"v": 0.001, "w": 0.001}, faults, 0.001, 16, Closeups(step, near))
+    return samples, Encodable(rows, {"v": 0.001, "w": 0.001}, faults, 0.001, 16, Closeups(step, near))
 
 
 def test_extremes_of_a_long_mission_keep_its_stretches_of_samples() -> None:
@@ -129,7 +129,7 @@ def test_extremes_of_a_long_mission_keep_its_stretches_of_samples() -> None:
 
 def test_columns_with_the_same_numbers_share_their_text() -> None:
     one = np.sin(np.arange(9000) / 100)
-    a, b, c = encode(Mission({"a": one, "b": one.copy(), "c": -one}, {}, [], 0.001), 10**6)
+    a, b, c = encode(Encodable({"a": one, "b": one.copy(), "c": -one}, {}, [], 0.001), 10**6)
     assert a.segments[0] is b.segments[0]
     assert (a.name, b.name) == ("a", "b")
     assert c.segments[0] is not a.segments[0]
@@ -138,10 +138,10 @@ def test_columns_with_the_same_numbers_share_their_text() -> None:
 def test_recorded_columns_keep_every_sample_where_only_some_can() -> None:
     rng = np.random.default_rng(3)
     columns = {f"{part}.{i}": rng.normal(size=200_000) for part in ("evidence.A", "wheel.A") for i in range(3)}
-    found = {c.name: c.segments[0].stride for c in encode(Mission(columns, {}, [], 0.001), 1_400_000)}
+    found = {c.name: c.segments[0].stride for c in encode(Encodable(columns, {}, [], 0.001), 1_400_000)}
     assert {k for k, stride in found.items() if stride == 1} == {"wheel.A.0", "wheel.A.1", "wheel.A.2"}
 
 
 def test_same_input_gives_the_same_text() -> None:
     values = {f"c{i}": np.sin(np.arange(5000) / (i + 1)) for i in range(6)}
-    assert encode(Mission(values, {}, [], 0.01), 10**6) == encode(Mission(values, {}, [], 0.01), 10**6)
+    assert encode(Encodable(values, {}, [], 0.01), 10**6) == encode(Encodable(values, {}, [], 0.01), 10**6)

@@ -5,8 +5,9 @@ import re
 import numpy as np
 import pytest
 
-from diagnosis.pages.svg import path_picture, thumbnail
 from diagnosis.report.machine_picture import condition, machine_picture
+from diagnosis.report.path_picture import path_picture
+from diagnosis.report.thumbnail import thumbnail
 from diagnosis.results.vocabulary import Kind
 from tests import report_samples as samples
 

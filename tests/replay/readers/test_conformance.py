@@ -13,9 +13,9 @@ from mcap.stream_reader import StreamReader
 from mcap.writer import CompressionType, IndexType, Writer
 
 from replay.log.source_options import SourceOptions
-from replay.readers.mcap.reader import records_of
 from replay.readers.mcap.records import Message, Record
 from replay.readers.registry import read_log, summarise_log
+from tests.replay.readers.mcap_records import records_of
 
 OPTIONS = SourceOptions()
 

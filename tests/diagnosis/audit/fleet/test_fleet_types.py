@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
 
 import orjson
 import pytest
@@ -13,22 +12,9 @@ from diagnosis.audit.fleet_files import write_fleet
 from diagnosis.documents import schema_of
 from tests import fleet_samples as samples
 from tests.fleet_samples import Sample
+from tests.schemas import unknown_keys
 
 EMPTY: list[Sample] = []
-
-
-def unknown_keys(value: Any, schema: dict[str, Any], known: dict[str, Any], place: str = "$") -> list[str]:
-    """Keys that a document has and its schema does not."""
-    schema = next((s for s in schema.get("anyOf", [schema]) if s.get("type") != "null"), schema)
-    schema = known[schema["$ref"].rpartition("/")[2]] if "$ref" in schema else schema
-    if isinstance(value, list):
-        return [p for v in value for p in unknown_keys(v, schema.get("items") or {}, known, f"{place}[]")]
-    if not isinstance(value, dict) or "properties" not in schema:
-        return []
-    own = schema["properties"]
-    return [f"{place}.{k}" for k in value if k not in own] + [
-        p for k, v in value.items() if k in own for p in unknown_keys(v, own[k], known, f"{place}.{k}")
-    ]
 
 
 @pytest.mark.parametrize(
