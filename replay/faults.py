@@ -179,6 +179,8 @@ TABLE_MODES: tuple[FaultMode, ...] = tuple(dict.fromkeys(row.mode for row in TAB
 TOTAL = frozenset(row.mode for row in TABLE_ROWS if row.total)
 #: Modes whose saturation term varies in time.
 VARYING = frozenset(row.mode for row in TABLE_ROWS if row.saturation is Saturation.VARYING)
+#: Modes that hold one value and nothing else.
+CONSTANT_VALUE = frozenset(row.mode for row in TABLE_ROWS if row.saturation is Saturation.VALUE)
 #: Modes that are a share of the signal and nothing else.
 SCALED = frozenset(row.mode for row in TABLE_ROWS if not row.total and row.saturation is Saturation.NONE)
 

@@ -13,7 +13,7 @@ from diagnosis.estimation.fault_models import HEALTHY
 from diagnosis.estimation.gain_bias import GainBiasModel, track_gain_bias
 from diagnosis.estimation.viterbi import ModePath
 from diagnosis.results.evidence_columns import Pictured
-from diagnosis.results.fault_rows import ROWS
+from diagnosis.results.fault_rows import ROWS, codes_of
 from replay.arrays.blocks import release
 from replay.arrays.envelope import bucket_of, envelope, in_buckets
 
@@ -60,9 +60,9 @@ def evidence_columns(found: IdentifiedPair, path: ModePath, step: NDArray[np.int
     out = {name: column.finish() for name, column in columns.items()}
     rows = in_buckets(np.asarray, bucket, store, path.filtered)
     out["probability"] = store.map(lambda p: np.float32(1.0) - p[:, HEALTHY], rows)
-    out.update({f"p_{name}": rows[:, i] for i, name in enumerate(ROWS)})
+    out.update({f"p_{ROWS[i]}": rows[:, i] for i in codes_of(pair.side)})
     samples = {name: np.concatenate(parts) for name, parts in near.items()}
     exact = path.filtered[step]
     samples["probability"] = np.float32(1.0) - exact[:, HEALTHY]
-    samples.update({f"p_{name}": exact[:, i] for i, name in enumerate(ROWS)})
+    samples.update({f"p_{ROWS[i]}": exact[:, i] for i in codes_of(pair.side)})
     return Pictured(step, out, samples)

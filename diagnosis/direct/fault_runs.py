@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from diagnosis.channels.sample_status import SILENT
-from diagnosis.estimation.fault_models import HEALTHY, INEFFICIENT, NO_SIGNAL, NOISY, ModeModel
+from diagnosis.estimation.fault_models import HEALTHY, UNSATURATED_ROWS, VARYING_ROWS, ModeModel
 from diagnosis.estimation.filter_kernel import segment_evidence
 from diagnosis.estimation.samples import Samples
 from diagnosis.estimation.segments import Run, absorb_short, join_noisy, merge_equal, runs_of, trim
@@ -17,11 +17,11 @@ def fault_runs(path: ModePath, samples: Samples, model: ModeModel, dt: float, sh
     """Faulty runs of a path, joined where they belong together, without the ends in which nothing moves."""
     runs = absorb_short(runs_of(path), shortest)
     runs = join_noisy(runs)
-    runs = merge_equal(runs, max(2, round(0.02 / dt)), (NOISY, INEFFICIENT, NO_SIGNAL))
+    runs = merge_equal(runs, max(2, round(0.02 / dt)), VARYING_ROWS + UNSATURATED_ROWS)
     runs = _bridged(_renamed([r for r in runs if r.row != HEALTHY], samples, model), samples, model)
     out = []
     for run in runs:
-        if run.row in (INEFFICIENT, NO_SIGNAL):
+        if run.row in UNSATURATED_ROWS:
             silent = samples.status[run.start : run.stop] == SILENT
             still = samples.quiet if not silent.any() else samples.quiet & (samples.status != SILENT)
             kept = trim(run, still)
@@ -41,11 +41,11 @@ def _renamed(runs: list[Run], samples: Samples, model: ModeModel) -> list[Run]:
             for r in out[max(0, i - 1) : i] + runs[i + 1 : i + 2]
             if min(abs(run.start - r.stop), abs(r.start - run.stop)) < 3
         ]
-        if run.row != NOISY or not near:
+        if run.row not in VARYING_ROWS or not near:
             continue
         evidence = segment_evidence(samples.part(*inner(run)), model)
         best = max((r.row for r in near), key=lambda row: evidence[row])
-        if evidence[best] > evidence[NOISY] + model.switch_cost:
+        if evidence[best] > evidence[run.row] + model.switch_cost:
             out[i] = Run(run.start, run.stop, best)
     return out
 

@@ -11,11 +11,11 @@ from diagnosis.direct.isolation import Isolated, estimate_run, isolate
 from diagnosis.direct.onset import refine
 from diagnosis.direct.sentences import alike_sentence, sentences
 from diagnosis.direct.timing import timing_explains
-from diagnosis.estimation.fault_models import INEFFICIENT, NOISY, STUCK
+from diagnosis.estimation.fault_models import INEFFICIENT, STUCK, VARYING_ROWS
 from diagnosis.estimation.segments import Run, with_leads
 from diagnosis.estimation.viterbi import ModePath
 from diagnosis.results.assessment import Finding
-from diagnosis.results.fault_rows import ROWS
+from diagnosis.results.fault_rows import ROWS, codes_of
 from diagnosis.results.result import Hypothesis
 from diagnosis.results.vocabulary import Tier
 from replay.faults import FaultMode, Side
@@ -100,7 +100,7 @@ def finding_of(run: Run, found: IdentifiedPair, limits: Limits) -> Finding | Non
         p[STUCK] = p[INEFFICIENT] = (p[STUCK] + p[INEFFICIENT]) / 2
         lines += (alike_sentence(found),)
     shift = max(0, round(found.lag)) if pair.side is Side.ACTUATOR else 0
-    hypotheses = [Hypothesis(pair.side.value, row.value, float(q)) for row, q in zip(ROWS, p, strict=True)]
+    hypotheses = [Hypothesis(pair.side.value, ROWS[row].value, float(p[row])) for row in codes_of(pair.side)]
     return Finding(
         start=max(0, run.start - shift),
         stop=max(1, run.stop - shift),
@@ -119,9 +119,9 @@ def _mode_of(isolated: Isolated, found: IdentifiedPair, limits: Limits) -> Fault
     """Mode of an isolated run; None where it lies below the limits or may be noise."""
     seen, noise = isolated.seen, found.model.noise
     mode = FaultMode(ROWS[isolated.run.row])
-    if mode is FaultMode.INEFFICIENT:
+    if mode.scaled:
         return _mode_of_gain(isolated, noise, limits)
-    if mode is FaultMode.NOISY:
+    if mode.varying:
         return None if seen.deviation < max(2.5 * noise, limits.min_sat / 2) else mode
     if found.pair.side is Side.ACTUATOR and seen.deviation < 2.5 * noise:
         return None  # the command hardly moved: a noisy reading of it looks constant too
@@ -142,7 +142,7 @@ def _mode_of_gain(isolated: Isolated, noise: float, limits: Limits) -> FaultMode
 
 def _refined(run: Run, found: IdentifiedPair, between: tuple[int, int]) -> Run:
     """A noisy run with its ends where its own gain puts them."""
-    estimate = estimate_run(run, found) if run.row == NOISY else None
+    estimate = estimate_run(run, found) if run.row in VARYING_ROWS else None
     return run if estimate is None else refine(run, found.samples, estimate[2], found.model, *between)
 
 

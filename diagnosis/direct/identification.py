@@ -23,6 +23,7 @@ from diagnosis.channels.sample_status import BLIND, PAIR, sample_status
 from diagnosis.direct.inputs import Pair
 from diagnosis.estimation.fault_models import ModeModel
 from diagnosis.estimation.samples import Samples
+from diagnosis.results.fault_rows import FAULT_ROWS
 from replay.faults import Side
 from replay.machine.config import Limits
 
@@ -155,9 +156,10 @@ def mode_model(pair: Pair, x: Array, status: NDArray[np.int8], tolerance: float)
         constant_noise=constant,
         tolerance=tolerance,
         span=pair.span,
-        switch_cost=float(np.log(_MEAN_HEALTHY_S * rate * 8)),
+        switch_cost=float(np.log(_MEAN_HEALTHY_S * rate * len(FAULT_ROWS))),
         dt=period,
         own_cost=-0.5 * float(np.log(1.0 - explained)),
+        side=pair.side,
     )
     return model, lsb
 

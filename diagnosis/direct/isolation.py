@@ -10,12 +10,22 @@ from numpy.typing import NDArray
 from diagnosis.channels.sample_status import BLIND, PAIR
 from diagnosis.direct.fault_runs import inner
 from diagnosis.direct.identification import IdentifiedPair
-from diagnosis.estimation.fault_models import HEALTHY, INEFFICIENT, NO_SIGNAL, STUCK
+from diagnosis.estimation.fault_models import (
+    HEALTHY,
+    INEFFICIENT,
+    NO_SIGNAL,
+    SCALED_ROWS,
+    STEADY_ROWS,
+    STUCK,
+    TOTAL_ROWS,
+)
 from diagnosis.estimation.fault_size import estimate_fault
 from diagnosis.estimation.filter_kernel import segment_evidence
 from diagnosis.estimation.row_probability import row_probabilities
 from diagnosis.estimation.segments import Run
+from diagnosis.results.fault_rows import codes_of
 from diagnosis.results.result import Epsilon, Sat
+from replay.faults import Side
 
 Array = NDArray[np.float64]
 #: ε̂, the saturation term and δ̂.
@@ -118,7 +128,7 @@ def isolate(run: Run, found: IdentifiedPair) -> Isolated | None:
     evidence = segment_evidence(found.samples.part(*inner(run)), model)
     if evidence[run.row] - evidence[HEALTHY] < model.switch_cost:
         return None
-    p = row_probabilities(evidence)
+    p = row_probabilities(evidence, model.side)
     seen = run_samples(run, found)
     row = stated_row(run.row, p, zero=seen.zero, still=seen.still)
     if row != run.row:  # the path came by this one from its neighbours or for want of time to change
@@ -126,8 +136,8 @@ def isolate(run: Run, found: IdentifiedPair) -> Isolated | None:
         if other is not None:
             run, estimate = replace(run, row=row), other
     gain = float(evidence[run.row] - evidence[HEALTHY])
-    p = _with_lapses(p, run.row, run.size * found.pair.dt if found.coarse else None)
-    if run.row in (STUCK, NO_SIGNAL) and seen.zero:
+    p = _with_lapses(p, run.row, model.side, run.size * found.pair.dt if found.coarse else None)
+    if run.row in TOTAL_ROWS and seen.zero:
         # stuck at zero, a gain of zero and no signal are one row of the table
         run = replace(run, row=NO_SIGNAL)
         p[NO_SIGNAL] += p[STUCK] + p[INEFFICIENT]
@@ -160,22 +170,22 @@ def stated_row(row: int, p: Array, *, zero: bool, still: bool) -> int:
     """
     faults = [r for r in range(p.size) if r != HEALTHY]
     best = max(faults, key=lambda r: float(p[r]))
-    constant = {STUCK, NO_SIGNAL, *([INEFFICIENT] if row != INEFFICIENT else [])}
-    alike = (zero and {row, best} <= constant) or (still and {row, best} <= {STUCK, INEFFICIENT})
+    constant = {*TOTAL_ROWS, *(SCALED_ROWS if row not in SCALED_ROWS else ())}
+    alike = (zero and {row, best} <= constant) or (still and {row, best} <= set(STEADY_ROWS))
     return best if p[best] > _CLEARLY * p[row] and not alike else row
 
 
-def _with_lapses(p: Array, row: int, seconds: float | None) -> Array:
+def _with_lapses(p: Array, row: int, side: Side, seconds: float | None) -> Array:
     """Probabilities of the rows, lessened by how often a finding is not the fault that it seems, shape (rows,).
 
     In a log too slow for its commands (`seconds` long; None elsewhere) most short findings are pieces of another fault,
-    so that what the row loses goes to the other faults.
+    so that what the row loses goes to the other faults of its side's table.
     """
     kept = 1.0 - _LAPSE
     if seconds is not None:
         kept *= seconds**2 / (seconds**2 + _COARSE_S**2)
     out = p.copy()
-    others = [r for r in range(p.size) if r not in (HEALTHY, row)]
+    others = [r for r in codes_of(side) if r not in (HEALTHY, row)]
     out[others] += p[row] * (1.0 - kept) / len(others)
     out[row] = p[row] * kept
     return out

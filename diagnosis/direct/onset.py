@@ -24,7 +24,7 @@ def refine(run: Run, samples: Samples, delta: float, model: ModeModel, before: i
     Parameters
     ----------
     run : Run
-        A run of the row `NOISY`.
+        A run of a row whose saturation term varies.
     samples : Samples
         All of the channel.
     delta : float

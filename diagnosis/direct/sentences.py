@@ -7,7 +7,7 @@ import numpy as np
 from diagnosis.channels.sample_status import SILENT
 from diagnosis.direct.identification import IdentifiedPair
 from diagnosis.direct.isolation import Isolated
-from diagnosis.estimation.fault_models import NO_SIGNAL, STUCK
+from diagnosis.estimation.fault_models import TOTAL_ROWS
 from diagnosis.results.result import Epsilon
 from replay.faults import FaultMode
 
@@ -56,7 +56,7 @@ def _values(isolated: Isolated, found: IdentifiedPair, epsilon: Epsilon | None, 
     """What the channel gave beside its reference."""
     pair, seen = found.pair, isolated.seen
     y, x = seen.y[seen.use], seen.x[seen.use]
-    if isolated.run.row in (STUCK, NO_SIGNAL):
+    if isolated.run.row in TOTAL_ROWS:
         return [
             f"{pair.y_name} stayed within {float(np.ptp(y)):.2g} {pair.unit} of {float(np.mean(y)):.4g} {pair.unit} "
             f"for {seconds:.3f} s while {pair.x_name} moved over {float(np.ptp(x)):.2g} {pair.unit}."

@@ -41,7 +41,7 @@ def timing_explains(found: IdentifiedPair, run: Run, mode: FaultMode) -> bool:
         moves = float(np.sqrt(np.mean(slope**2))) * _SENSOR_DELAY_S
         if mode.total:
             return _rests_by_chance(found, run, deviation)
-        return mode is FaultMode.NOISY and seconds < 0.5 and deviation < moves
+        return mode.varying and seconds < 0.5 and deviation < moves
     if seconds <= _SPOOL_DELAY_S:
         return True
     jumps = _sudden(pair.x, run)
@@ -51,7 +51,7 @@ def timing_explains(found: IdentifiedPair, run: Run, mode: FaultMode) -> bool:
         return False
     if mode.total:
         return run.size < _FLIPS or (np.isfinite(deviation) and float(np.nanmedian(size)) < 0.5 * deviation)
-    if mode is not FaultMode.NOISY:
+    if not mode.varying:
         return False
     sudden = max(_sudden(z, run) for z in (pair.x, pair.y))
     unsigned = np.sqrt(np.nanmean((np.abs(y) - np.abs(pair.x[part])) ** 2))

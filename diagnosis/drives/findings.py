@@ -12,12 +12,20 @@ from diagnosis.channels.sample_status import BLIND, PAIR
 from diagnosis.drives.models import ROW, RowModel
 from diagnosis.drives.path import most_probable, state_evidence
 from diagnosis.drives.speed_pair import SpeedPair
-from diagnosis.estimation.fault_models import HEALTHY, INEFFICIENT, NO_SIGNAL, NOISY, STUCK, ModeModel
+from diagnosis.estimation.fault_models import (
+    HEALTHY,
+    NO_SIGNAL,
+    SCALED_ROWS,
+    STUCK,
+    TOTAL_ROWS,
+    VARYING_ROWS,
+    ModeModel,
+)
 from diagnosis.estimation.fault_size import estimate_fault
 from diagnosis.estimation.row_probability import row_probabilities
 from diagnosis.estimation.segments import Run, merge_equal
 from diagnosis.results.assessment import Finding
-from diagnosis.results.fault_rows import ROWS
+from diagnosis.results.fault_rows import ROWS, codes
 from diagnosis.results.result import Hypothesis
 from diagnosis.results.vocabulary import Tier
 from replay.faults import FaultMode, Side
@@ -25,7 +33,9 @@ from replay.machine.config import Limits
 
 Array = NDArray[np.float64]
 
-_SOFT = (INEFFICIENT, NOISY)
+_SOFT = codes(lambda mode: not mode.total, Side.SENSOR)
+#: Rows that states on the grid stand for.
+_KNOWN = tuple(int(row) for row in np.unique(ROW))
 _BRIEF_S = 0.3  # a soft run this short beside a longer one is part of it
 _GAP_S = 0.15
 _SHORTEST_SOFT_S = 0.2
@@ -115,13 +125,13 @@ def _isolated(run: Run, pair: SpeedPair, model: RowModel, limits: Limits) -> Iso
     paired = samples.status == PAIR
     use = paired | (samples.status == BLIND)
     by_state = state_evidence(samples, model, _last_before(pair, run.start))
-    evidence = np.array([by_state[i == ROW].max() for i in range(len(ROWS))])
+    evidence = np.array([by_state[i == ROW].max(initial=-np.inf) for i in range(len(ROWS))])
     row = run.row
     if row in _SOFT:
         if np.count_nonzero(paired) < max(5, _SHORTEST_SOFT_S / pair.dt):
             return None  # too little of it has an implied speed beside it
         use = paired
-        row = NOISY if evidence[NOISY] > evidence[INEFFICIENT] else INEFFICIENT
+        row = max(_SOFT, key=lambda r: float(evidence[r]))
     elif use.any() and np.count_nonzero(use) < _SHORTEST_HARD:
         return None
     y, x = samples.y[use], samples.x[use]
@@ -152,14 +162,14 @@ def _finding(isolated: Isolated, pair: SpeedPair, model: RowModel, limits: Limit
         return None
     epsilon, sat, delta = estimate
     mode = FaultMode(ROWS[run.row])
-    if run.row == INEFFICIENT:
+    if run.row in SCALED_ROWS:
         if delta > 1.0 + limits.min_epsilon or delta < -limits.min_epsilon:
             mode = FaultMode.OUTSIDE_TABLE
         elif epsilon is not None and epsilon.value < limits.min_epsilon:
             return None
-    if run.row == NOISY and math.sqrt(max(isolated.deviation**2 - pair.noise**2, 0.0)) < limits.min_sat:
+    if run.row in VARYING_ROWS and math.sqrt(max(isolated.deviation**2 - pair.noise**2, 0.0)) < limits.min_sat:
         return None
-    hypotheses = [Hypothesis(Side.SENSOR.value, row.value, float(q)) for row, q in zip(ROWS, p, strict=True)]
+    hypotheses = [Hypothesis(Side.SENSOR.value, ROWS[row].value, float(p[row])) for row in _KNOWN]
     raised = _detected(lead, run, max(3, round(_EDGE_S / pair.dt)))
     last = pair.samples.y.size - 1
     return Finding(
@@ -202,12 +212,12 @@ def _sentences(isolated: Isolated, pair: SpeedPair, delta: float) -> tuple[str, 
     row, y, x, deviation = isolated.run.row, isolated.y, isolated.x, isolated.deviation
     seconds = isolated.run.size * pair.dt
     out = []
-    if row in (STUCK, NO_SIGNAL) and y.size:
+    if row in TOTAL_ROWS and y.size:
         out.append(
             f"{pair.name} stayed within {float(np.ptp(y)):.2g} m/s of {float(np.mean(y)):.4g} m/s for {seconds:.2f} s, while the "
             f"drive was commanded; healthy samples differ by {pair.noise:.2g} m/s."
         )
-    elif row in (STUCK, NO_SIGNAL):
+    elif row in TOTAL_ROWS:
         out.append(f"{pair.name} delivered nothing for {seconds:.2f} s while the controller went on.")
     else:
         out.append(

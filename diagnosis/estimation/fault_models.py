@@ -21,14 +21,26 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from diagnosis.results.fault_rows import ROWS
-from replay.faults import State
+from diagnosis.results.fault_rows import ROWS, codes, codes_of
+from replay.faults import CONSTANT_VALUE, Side, State
 
 Array = NDArray[np.float64]
 
 HEALTHY, STUCK, NO_SIGNAL, INEFFICIENT, NOISY = (
     ROWS.index(s) for s in (State.HEALTHY, State.STUCK, State.NO_SIGNAL, State.INEFFICIENT, State.NOISY)
 )
+#: Rows by what they leave of the signal; see `replay.faults.TABLE_ROWS`.
+TOTAL_ROWS, SCALED_ROWS, VARYING_ROWS = (
+    codes(lambda m: m.total),
+    codes(lambda m: m.scaled),
+    codes(lambda m: m.varying),
+)
+#: Rows that hold one value, and those with one constant unknown, value or gain: another one is another fault.
+VALUE_ROWS = codes(lambda m: m in CONSTANT_VALUE)
+STEADY_ROWS = tuple(sorted(VALUE_ROWS + SCALED_ROWS))
+#: Rows without a saturation term, which show only while the reference moves.
+UNSATURATED_ROWS = tuple(row for row in range(1, len(ROWS)) if row not in VALUE_ROWS + VARYING_ROWS)
+
 #: Models of the noisy row: random walk of δ̄ [span/√s] and white noise [healthy noise].
 NOISY_MODELS = np.array([[0.3, 1.0], [0.06, 1.0], [0.012, 1.0], [0.06, 3.0], [0.06, 8.0], [0.06, 25.0], [0.06, 80.0]])
 #: Places of the models: y = x, y = c, y = 0, y = δ·x, y = x + b; those of the noisy row follow.
@@ -64,6 +76,8 @@ class FilterBank(NamedTuple):
         What is left of b after a step [1].
     drift_cost : float
         What the noisy row must gain per sample.
+    admitted : NDArray[np.bool_], shape (models,)
+        Models of rows that the table of the channel's side has.
     """
 
     r: float
@@ -77,6 +91,7 @@ class FilterBank(NamedTuple):
     floor: float
     decay: float
     drift_cost: float
+    admitted: NDArray[np.bool_]
 
 
 @dataclass(frozen=True)
@@ -101,6 +116,8 @@ class ModeModel:
         What the noisy row must gain per sample to be preferred.
     own_cost : float
         What the noisy row gains per sample at most by explaining x's own noise away, which says nothing about y.
+    side : Side
+        `SENSOR` or `ACTUATOR`: whose table's rows the channel may follow.
     """
 
     noise: float
@@ -111,6 +128,11 @@ class ModeModel:
     dt: float
     drift_cost: float = _DRIFT_COST
     own_cost: float = 0.0
+    side: Side = Side.SENSOR
+
+    def admitted(self) -> NDArray[np.bool_]:
+        """Models of rows that the table of the channel's side has, shape (models,)."""
+        return np.isin(ROW_OF_MODEL, codes_of(self.side))
 
     def bank(self) -> FilterBank:
         """Constants of the compiled recursions."""
@@ -127,4 +149,5 @@ class ModeModel:
             floor=_OUTLIER - float(np.log(self.span)),
             decay=float(np.exp(-self.dt / _MISMATCH_S)),
             drift_cost=float(self.drift_cost + self.own_cost),
+            admitted=self.admitted(),
         )

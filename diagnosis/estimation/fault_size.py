@@ -34,14 +34,14 @@ def estimate_fault(
     """
     if y.size < 3:
         return (Epsilon(1.0, 0.0, 1.0), None, 0.0) if row == fault_models.NO_SIGNAL else None
-    if row in (fault_models.STUCK, fault_models.NO_SIGNAL):
+    if row in fault_models.TOTAL_ROWS:
         level = float(np.mean(y))
         spread = float(np.std(y))
         slack = min(1.0, 1.96 * (model.constant_noise + spread) / max(1e-300, float(np.std(x)) * np.sqrt(y.size)))
         se = 1.96 * max(model.constant_noise, spread) / np.sqrt(y.size)
         sat = Sat(level, float(np.sqrt(np.mean(y**2))), level - se, level + se, unit)
         return Epsilon(1.0, 1.0 - slack, 1.0), sat, 0.0
-    if row == fault_models.INEFFICIENT:
+    if row in fault_models.SCALED_ROWS:
         sxx = float(x @ x)
         if sxx <= 0:
             return None
@@ -49,7 +49,7 @@ def estimate_fault(
         residual = y - delta * x
         se = 1.96 * np.sqrt(_long_run_variance(residual) / sxx)
         return _epsilon(delta, se), None, delta
-    # noisy: δ̄ drifts
+    # a share and a saturation term, of which δ̄ drifts
     if instruments is None:
         delta, delta_se = _gain_with_drift(y, x, model)
     else:

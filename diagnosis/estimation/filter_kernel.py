@@ -59,11 +59,12 @@ class FilterState(NamedTuple):
 
 
 def entered_state(model: ModeModel) -> FilterState:
-    """Every model entered at the first sample, none more probable than another."""
+    """Every model of the channel's table entered at the first sample, none more probable than another."""
     state = FilterState(np.zeros(MODELS), np.zeros((MODELS, 2)), np.zeros((MODELS, 3)))
     bank = model.bank()
     for m in range(MODELS):
         enter(m, bank, state.mean, state.cov)
+    state.score[~bank.admitted] = -np.inf
     return state
 
 
@@ -191,6 +192,8 @@ def _scan_evidence(samples, bank, state):  # type: ignore[no-untyped-def]
 def segment_evidence(samples: Samples, model: ModeModel) -> Array:
     """Log-evidence of each row over one segment, its filter started at the segment's first sample.
 
+    A row that the channel's table lacks, or that no model stands for, has −∞.
+
     Returns
     -------
     Array, shape (rows,)
@@ -198,4 +201,4 @@ def segment_evidence(samples: Samples, model: ModeModel) -> Array:
     """
     state = entered_state(model)
     _scan_evidence(samples, model.bank(), state)
-    return np.array([state.score[i == ROW_OF_MODEL].max() for i in range(len(ROWS))])
+    return np.array([state.score[i == ROW_OF_MODEL].max(initial=-np.inf) for i in range(len(ROWS))])

@@ -9,7 +9,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from diagnosis.estimation.fault_models import HEALTHY, INEFFICIENT, NOISY, STUCK
+from diagnosis.estimation.fault_models import HEALTHY, SCALED_ROWS, STEADY_ROWS, VARYING_ROWS
 from diagnosis.estimation.viterbi import ModePath
 
 
@@ -28,9 +28,9 @@ class Run:
 
 
 def runs_of(path: ModePath) -> list[Run]:
-    """Cut a path where the row changes, or where stuck or inefficient was entered anew (another value or gain)."""
+    """Cut a path where the row changes, or where a steady row was entered anew (another value or gain)."""
     row = path.row
-    anew = path.entered & np.isin(row, (STUCK, INEFFICIENT))
+    anew = path.entered & np.isin(row, STEADY_ROWS)
     cut = np.flatnonzero(np.r_[True, (row[1:] != row[:-1]) | anew[1:]])
     stops = np.r_[cut[1:], row.size]
     return [Run(int(a), int(b), int(row[a])) for a, b in zip(cut, stops, strict=True)]
@@ -65,15 +65,15 @@ def join_noisy(runs: Iterable[Run]) -> list[Run]:
     k = 1
     while k < len(out) - 1:
         a, b, c = out[k - 1 : k + 2]
-        if b.row == INEFFICIENT and a.row == c.row == NOISY and b.size <= a.size + c.size:
-            out[k - 1 : k + 2] = [Run(a.start, c.stop, NOISY)]
+        if b.row in SCALED_ROWS and a.row == c.row and a.row in VARYING_ROWS and b.size <= a.size + c.size:
+            out[k - 1 : k + 2] = [Run(a.start, c.stop, a.row)]
             k = max(1, k - 1)
         else:
             k += 1
     return out
 
 
-def merge_equal(runs: Iterable[Run], gap: int, rows: tuple[int, ...] = (NOISY,)) -> list[Run]:
+def merge_equal(runs: Iterable[Run], gap: int, rows: tuple[int, ...] = VARYING_ROWS) -> list[Run]:
     """Join runs of one of `rows` that touch or are separated by less than `gap` healthy samples."""
     out: list[Run] = []
     for run in runs:
@@ -115,9 +115,9 @@ def with_leads(runs: list[Run], lead: int, tail: int, gap: int) -> list[tuple[Ru
         chain = open_chains.pop()
         if not chain:
             continue
-        main = max(range(len(chain)), key=lambda i: chain[i].size / (2 if chain[i].row == NOISY else 1))
+        main = max(range(len(chain)), key=lambda i: chain[i].size / (2 if chain[i].row in VARYING_ROWS else 1))
         first = last = main
-        while first and (chain[first - 1].row == NOISY or chain[first - 1].size < lead):
+        while first and (chain[first - 1].row in VARYING_ROWS or chain[first - 1].size < lead):
             first -= 1
         while last + 1 < len(chain) and chain[last + 1].size < tail:
             last += 1

@@ -47,7 +47,7 @@ class PathPointers(NamedTuple):
 def initial_state(model: ModeModel) -> FilterState:
     """State before the first sample: healthy is as probable as a fault that began long ago is not."""
     state = entered_state(model)
-    state.score[:] = -model.switch_cost / 2
+    state.score[model.admitted()] = -model.switch_cost / 2
     state.score[EXACT] = 0.0
     return state
 
@@ -57,6 +57,8 @@ def _enter_from_best(k, best, bank, state, back):  # type: ignore[no-untyped-def
     """Let every model be entered from the best one, where that is worth what it costs."""
     top = state.score[best]
     for m in range(state.score.size):
+        if not bank.admitted[m]:
+            continue
         cost = bank.switch_cost
         if ROW_OF_MODEL[m] == ROW_OF_MODEL[best] and m != best:
             cost = _SIBLING_COST
@@ -116,7 +118,7 @@ class ModePath:
         Model per sample.
     entered : NDArray[np.bool_], shape (n,)
         Samples at which a model was entered.
-    filtered : NDArray[np.float32], shape (n, 5)
+    filtered : NDArray[np.float32], shape (n, rows)
         Causal probability of each row (softmax of the survivors' scores).
     """
 

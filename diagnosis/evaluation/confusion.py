@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from diagnosis.evaluation.counts import COLUMNS, ROWS
+from diagnosis.evaluation.counts import COLUMNS, TRUE_STATES
 from diagnosis.evaluation.document import DamadicsRates, RowFigures, SideFigures
 
 Array = NDArray[np.float64]
@@ -42,9 +42,9 @@ def confusion_figures(seconds: Array) -> SideFigures:
     true = seconds.sum(axis=1)
     decided = seconds[:, :-1].sum(axis=1)
     hit = np.diag(seconds)
-    named = seconds[:, : len(ROWS)].sum(axis=0)
+    named = seconds[:, : len(TRUE_STATES)].sum(axis=0)
     rows: dict[str, RowFigures] = {}
-    for i, row in enumerate(ROWS):
+    for i, row in enumerate(TRUE_STATES):
         occurs = true[i] > 0
         rows[row] = {
             "seconds": float(true[i]),
@@ -62,7 +62,7 @@ def confusion_figures(seconds: Array) -> SideFigures:
         "undecided_share": ratio((true - decided).sum(), true.sum()),
         "damadics": damadics_rates(seconds),
         "rows": rows,
-        "true": list(ROWS),
+        "true": list(TRUE_STATES),
         "reported": list(COLUMNS),
         "seconds": seconds.tolist(),
     }

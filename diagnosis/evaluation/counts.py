@@ -15,8 +15,8 @@ from replay.faults import Side, State
 Array = NDArray[np.float64]
 
 SIDES: tuple[str, ...] = (Side.SENSOR.value, Side.ACTUATOR.value)
-ROWS: tuple[str, ...] = tuple(row.value for row in fault_rows.ROWS)
-COLUMNS = (*ROWS, State.OUTSIDE_TABLE.value, "undecided")
+TRUE_STATES: tuple[str, ...] = tuple(row.value for row in fault_rows.ROWS)
+COLUMNS = (*TRUE_STATES, State.OUTSIDE_TABLE.value, "undecided")
 FAULT_OUTCOMES = ("right", "wrong_mode", "wrong_side", "wrong_part", "missed")
 REPORT_OUTCOMES = ("right", "wrong_mode", "wrong_side", "wrong_part", "surplus")
 
@@ -118,7 +118,7 @@ class ReportOutcome:
 
 
 def _empty(bands: int = 0) -> dict[str, Array]:
-    shape = (len(ROWS), len(COLUMNS))
+    shape = (len(TRUE_STATES), len(COLUMNS))
     return {side: np.zeros((bands, *shape) if bands else shape) for side in SIDES}
 
 
@@ -137,7 +137,7 @@ class Counts:
     Attributes
     ----------
     seconds : Mapping[str, Array], each of shape (5, 7)
-        Per side: driving time by true row (`ROWS`) and reported column (`COLUMNS`) [s].
+        Per side: driving time by true row (`TRUE_STATES`) and reported column (`COLUMNS`) [s].
     faults, reports : tuple[FaultOutcome, ...], tuple[ReportOutcome, ...]
         Injected and reported faults.
     healthy_s : float

@@ -8,14 +8,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from diagnosis.evaluation.aligned import Compared
-from diagnosis.evaluation.counts import BANDS, COLUMNS, CONTACT, EPSILON_BANDS, ROWS, SIDES, Counts, band_of
+from diagnosis.evaluation.counts import BANDS, COLUMNS, CONTACT, EPSILON_BANDS, SIDES, TRUE_STATES, Counts, band_of
 from diagnosis.evaluation.spans import Span, codes_at, covered, length
 from replay.faults import Side
 
 Array = NDArray[np.float64]
 Codes = NDArray[np.int64]
 
-_HEALTHY, _INEFFICIENT = ROWS.index("healthy"), ROWS.index("inefficient")
+_HEALTHY, _INEFFICIENT = TRUE_STATES.index("healthy"), TRUE_STATES.index("inefficient")
 _UNDECIDED = COLUMNS.index("undecided")
 _FREE, _SLIP, _MASKED = range(len(CONTACT))
 
@@ -74,7 +74,7 @@ def _add_component(group: Compared, component: str, total: Counts) -> None:
     mine = [f for f in group.faults if f.truth.component == component]
     true = {
         s: [
-            (f.start, f.stop, _index(f.truth.mode, ROWS, -1), band_of(f.truth.epsilon, EPSILON_BANDS))
+            (f.start, f.stop, _index(f.truth.mode, TRUE_STATES, -1), band_of(f.truth.epsilon, EPSILON_BANDS))
             for f in mine
             if f.truth.side == s
         ]

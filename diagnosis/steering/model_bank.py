@@ -6,7 +6,7 @@ import numpy as np
 
 from replay.faults import FaultMode, Side
 
-# codes of rows as in `diagnosis.results.fault_rows`; `COLOURED` is the noisy sensor with noise that changes fast
+# codes of this bank alone; `COLOURED` is the noisy sensor with noise that changes fast
 HEALTHY, STUCK, NO_SIGNAL, INEFFICIENT, NOISY, COLOURED = range(6)
 
 #: Fault mode of each filter's row, by side; a row that is not here is healthy.

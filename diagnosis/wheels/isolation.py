@@ -19,7 +19,7 @@ from diagnosis.wheels.models import (
     A_STUCK,
     HEALTHY,
     MODELS,
-    ROWS,
+    ROW_OF_MODEL,
     S_GAIN,
     S_NONE,
     S_OU_LARGE,
@@ -116,7 +116,7 @@ def probabilities(run: Run) -> dict[Row | None, float]:
     p = np.exp(weight - weight.max())
     p /= p.sum()
     out: dict[Row | None, float] = {}
-    for row, q in zip(ROWS, p, strict=True):
+    for row, q in zip(ROW_OF_MODEL, p, strict=True):
         out[row] = out.get(row, 0.0) + float(q)
     return out
 
@@ -150,7 +150,7 @@ def judge(
     weighed = _weighed(run, known, model, limits)
     side = weighed.row[0]
     open_sides = tuple(s for s in _SIDES if weighed.faulty[s] > 1 - limits.min_probability)
-    chance = _chance(max(run.ahead(m) for m, row in enumerate(ROWS) if row is not None and row[0] is side))
+    chance = _chance(max(run.ahead(m) for m, row in enumerate(ROW_OF_MODEL) if row is not None and row[0] is side))
     if side is Side.ACTUATOR and chance < _NO_TRUST:
         return RunVerdict(None, tuple(s for s in open_sides if s is not side))
     usual = side is Side.ACTUATOR and chance < _USUAL
@@ -197,7 +197,7 @@ def _weighed(run: Run, y: Array, model: WheelFilterModel, limits: Limits) -> _We
     faulty = {side: sum(p for row, p in ranked if row is not None and row[0] is side) for side in _SIDES}
     side = max(_SIDES, key=lambda s: faulty[s])
     row = next(row for row, _ in ranked if row is not None and row[0] is side)
-    own = ROWS[run.model]
+    own = ROW_OF_MODEL[run.model]
     if own is not None and own[0] is side and pooled.get(own, 0.0) > _PATH_SHARE * pooled[row]:
         row = own  # the path knows what came before and after
     return _Weighed(pooled, ranked, faulty, row)
@@ -221,7 +221,7 @@ def _models_of(run: Run, row: Row) -> tuple[int, int]:
     if mode is FaultMode.NO_SIGNAL:  # also what is stuck at nothing
         m, stuck = (S_NONE, S_STUCK) if side is Side.SENSOR else (A_NONE, A_STUCK)
         return m, m if run.evidence[m] >= run.evidence[stuck] else stuck
-    m = int(np.argmax(np.where([r == row for r in ROWS], run.evidence, -np.inf)))
+    m = int(np.argmax(np.where([r == row for r in ROW_OF_MODEL], run.evidence, -np.inf)))
     return m, m
 
 

@@ -1,6 +1,6 @@
 """Models of a wheel: the row of the tables that each stands for, and the constants of their filters.
 
-A row may have several models: noise of several strengths is one row. A new model is a code here, its entry in `ROWS`,
+A row may have several models: noise of several strengths is one row. A new model is a code here, its entry in `ROW_OF_MODEL`,
 and what `diagnosis.wheels.step_kernel` makes of its code.
 """
 
@@ -21,7 +21,7 @@ A_GAIN, A_STUCK, A_NONE, A_BIAS = range(9, 13)
 MODELS = 13
 
 #: Row of each model, by the model's code.
-ROWS: tuple[Row | None, ...] = (
+ROW_OF_MODEL: tuple[Row | None, ...] = (
     None,
     (Side.SENSOR, FaultMode.STUCK),
     (Side.SENSOR, FaultMode.NO_SIGNAL),

@@ -21,7 +21,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
 from diagnosis.channels.liveness import alive_sources
 from diagnosis.decision.decide import intervals_of, spans_of
-from diagnosis.evaluation.counts import COLUMNS, ROWS, Counts, add
+from diagnosis.evaluation.counts import COLUMNS, TRUE_STATES, Counts, add
 from diagnosis.evaluation.evaluate import evaluate_report
 from diagnosis.evaluation.scores import figures
 from diagnosis.results.result import to_json
@@ -117,7 +117,7 @@ def show(name: str, found: dict[str, Any], total: Counts, detail: bool) -> Itera
             f"share {number(s['decided_share'], 2)})  macro-F1 {number(s['macro_f1'])}   recall {recall}"
         )
         if detail:
-            for row, seconds in zip(ROWS, total.seconds[side], strict=True):
+            for row, seconds in zip(TRUE_STATES, total.seconds[side], strict=True):
                 cells = "  ".join(f"{c} {x:.1f}" for c, x in zip(COLUMNS, seconds, strict=True) if x > 0)
                 yield f"      {row:12} {cells}"
     onset, alarms = found["onset_error_s"], found["false_alarms"]

@@ -10,7 +10,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from diagnosis.evaluation.confusion import confusion_figures
-from diagnosis.evaluation.counts import COLUMNS, ROWS, Counts, ReportOutcome, add
+from diagnosis.evaluation.counts import COLUMNS, TRUE_STATES, Counts, ReportOutcome, add
 from diagnosis.evaluation.evaluate import evaluate_report
 from diagnosis.evaluation.matching import assign
 from diagnosis.evaluation.scores import figures
@@ -83,7 +83,9 @@ def wheels(report: dict[str, Any], truth: MissionTruth) -> Counts:
 def seconds(counts: Counts, side: str) -> dict[tuple[str, str], float]:
     """Cells of a confusion that are not empty."""
     matrix = counts.seconds[side]
-    return {(ROWS[i], COLUMNS[j]): round(float(matrix[i, j]), 9) for i, j in zip(*np.nonzero(matrix), strict=True)}
+    return {
+        (TRUE_STATES[i], COLUMNS[j]): round(float(matrix[i, j]), 9) for i, j in zip(*np.nonzero(matrix), strict=True)
+    }
 
 
 def test_a_perfect_report() -> None:
@@ -128,14 +130,14 @@ def test_confusion_is_weighted_with_driving_time() -> None:
 @pytest.mark.parametrize("seed", range(5))
 def test_confusion_equals_counting_sample_by_sample(seed: int) -> None:
     rng = np.random.default_rng(seed)
-    names = [*ROWS[1:], "healthy", "slip", "not_excited", "outside_table"]
+    names = [*TRUE_STATES[1:], "healthy", "slip", "not_excited", "outside_table"]
 
     def spans(count: int, words: list[str]) -> list[tuple[float, float, str]]:
         """Spans that are apart, on the 100 Hz grid."""
         edges = np.sort(rng.choice(2000, 2 * count, replace=False)) / 100
         return [(edges[2 * i], edges[2 * i + 1], str(rng.choice(words))) for i in range(count)]
 
-    true = {(p, s): spans(4, list(ROWS[1:])) for p in "AB" for s in ("sensor", "actuator")}
+    true = {(p, s): spans(4, list(TRUE_STATES[1:])) for p in "AB" for s in ("sensor", "actuator")}
     told = {(p, s): spans(6, names) for p in "AB" for s in ("sensor", "actuator")}
     driving, masked = {p: spans(3, ["x"]) for p in "AB"}, {p: spans(2, ["x"]) for p in "AB"}
     truth = truth_of(
@@ -153,7 +155,7 @@ def test_confusion_equals_counting_sample_by_sample(seed: int) -> None:
             if at(t, driving[p], "") and not (s == "actuator" and at(t, masked[p], "")):
                 word = at(t, told[p, s], "healthy")
                 column = COLUMNS.index(word if word in COLUMNS else "undecided")
-                counted[s][ROWS.index(at(t, rows, "healthy")), column] += 0.01
+                counted[s][TRUE_STATES.index(at(t, rows, "healthy")), column] += 0.01
     scored = wheels(report_of(states=dict(told)), truth)
     for s, matrix in counted.items():
         assert_allclose(scored.seconds[s], matrix, atol=1e-9)

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from diagnosis.evaluation.counts import COLUMNS, ROWS, Counts, FaultOutcome, ReportOutcome, add
+from diagnosis.evaluation.counts import COLUMNS, TRUE_STATES, Counts, FaultOutcome, ReportOutcome, add
 from diagnosis.evaluation.page import build_scores_page
 from diagnosis.evaluation.plots import distribution, reliability_diagram
 from diagnosis.evaluation.scores import figures
@@ -49,7 +49,7 @@ def counted(wheel: str = "FR") -> Counts:
     seconds["sensor"][0, [0, 4]] = 88.0, 2.0
     seconds["sensor"][1, [1, COLUMNS.index("undecided")]] = 9.0, 1.0
     seconds["actuator"][0, 0] = 95.0
-    seconds["actuator"][ROWS.index("inefficient"), 0] = 5.0
+    seconds["actuator"][TRUE_STATES.index("inefficient"), 0] = 5.0
     right = FaultOutcome(
         wheel, "sensor", "stuck", 10.0, 20.0, 1.0, 1.0, "right", "F1", 0.99, 0.004, -0.03, 0.0, 0.02, 0.2, 0.0
     )

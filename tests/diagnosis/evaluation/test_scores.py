@@ -11,7 +11,16 @@ import pytest
 from numpy.testing import assert_allclose
 
 from diagnosis.evaluation.confusion import confusion_figures, damadics_rates
-from diagnosis.evaluation.counts import COLUMNS, EPSILON_BANDS, ROWS, Counts, FaultOutcome, ReportOutcome, add, band_of
+from diagnosis.evaluation.counts import (
+    COLUMNS,
+    EPSILON_BANDS,
+    TRUE_STATES,
+    Counts,
+    FaultOutcome,
+    ReportOutcome,
+    add,
+    band_of,
+)
 from diagnosis.evaluation.evaluate import evaluate_report
 from diagnosis.evaluation.excitation import Speeds, read_speeds, speeds_of
 from diagnosis.evaluation.scores import figures
@@ -146,8 +155,8 @@ def test_false_alarms_per_healthy_hour_and_their_poisson_bound() -> None:
 
 def test_damadics_rates_by_time() -> None:
     seconds = np.zeros((5, 7))
-    seconds[ROWS.index("healthy")] = [90.0, 4.0, 0.0, 0.0, 0.0, 1.0, 5.0]  # 5 of 100 s told faulty
-    seconds[ROWS.index("stuck")] = [2.0, 14.0, 0.0, 3.0, 0.0, 0.0, 1.0]  # 17 of 20 s, 14 of them as stuck
+    seconds[TRUE_STATES.index("healthy")] = [90.0, 4.0, 0.0, 0.0, 0.0, 1.0, 5.0]  # 5 of 100 s told faulty
+    seconds[TRUE_STATES.index("stuck")] = [2.0, 14.0, 0.0, 3.0, 0.0, 0.0, 1.0]  # 17 of 20 s, 14 of them as stuck
     rates = damadics_rates(seconds)
     assert rates == {
         "r_fd": pytest.approx(0.05),
@@ -237,7 +246,7 @@ def test_excitation_divides_free_slipping_and_masked() -> None:
         "recall": 0.0,
     }
     assert counts.seconds["actuator"].sum() == pytest.approx(18.0)
-    assert counts.seconds["actuator"][ROWS.index("stuck")].sum() == 0.0
+    assert counts.seconds["actuator"][TRUE_STATES.index("stuck")].sum() == 0.0
 
 
 def test_parts_of_the_time_are_the_whole() -> None:
@@ -310,5 +319,5 @@ def test_bands_hold_their_lower_end(value: float, expected: int) -> None:
 
 
 def test_names_of_the_columns() -> None:
-    assert COLUMNS[: len(ROWS)] == ROWS
+    assert COLUMNS[: len(TRUE_STATES)] == TRUE_STATES
     assert COLUMNS[-1] == "undecided"

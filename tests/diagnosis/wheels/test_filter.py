@@ -18,7 +18,7 @@ from diagnosis.wheels.models import (
     A_STUCK,
     HEALTHY,
     MODELS,
-    ROWS,
+    ROW_OF_MODEL,
     S_GAIN,
     S_NONE,
     S_STUCK,
@@ -42,7 +42,7 @@ WHEEL = WheelFilterModel(
     valve_span=0.15,
 )
 N, ONSET = 12_000, 6000
-ROW = np.array([ROWS.index(row) for row in ROWS])  # first model of each model's row
+ROW = np.array([ROW_OF_MODEL.index(row) for row in ROW_OF_MODEL])  # first model of each model's row
 Array = np.ndarray
 Fault = Callable[[Array], Array]
 

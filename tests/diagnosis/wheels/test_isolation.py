@@ -13,7 +13,7 @@ from diagnosis.wheels.models import (
     A_STUCK,
     HEALTHY,
     MODELS,
-    ROWS,
+    ROW_OF_MODEL,
     S_GAIN,
     S_NONE,
     S_OU_LARGE,
@@ -62,7 +62,7 @@ def judged(of: Run, y: Array | None = None, gains: bool = True, limits: Limits =
 
 def test_probabilities_add_up_by_row() -> None:
     p = probabilities(run(S_GAIN, {S_GAIN: 300.0, A_GAIN: 290.0, S_OU_SMALL: 295.0, S_OU_LARGE: 295.0}))
-    assert set(p) == set(ROWS)
+    assert set(p) == set(ROW_OF_MODEL)
     assert sum(p.values()) == pytest.approx(1.0)
     # a tenth of the log-evidence counts, and two models of one row are twice as probable as one of them
     assert p[Side.SENSOR, FaultMode.INEFFICIENT] / p[Side.ACTUATOR, FaultMode.INEFFICIENT] == pytest.approx(np.exp(1.0))
