@@ -109,7 +109,7 @@ def test_alternatives_add_up_and_the_next_best_is_said() -> None:
     got = judged(run(A_STUCK, {A_STUCK: 5000.0, A_BIAS: 4985.0})).finding
     assert got is not None
     assert sum(h.p for h in got.hypotheses) == pytest.approx(1.0, abs=0.01)
-    assert any(line.startswith("Next best: actuator noisy with 1") for line in got.evidence)
+    assert any(line.startswith("Next best: drive valve disturbed with 1") for line in got.evidence)
 
 
 def test_stuck_at_zero_is_no_signal() -> None:
