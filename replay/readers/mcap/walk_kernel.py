@@ -10,6 +10,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
+from replay.readers.common.compiled import part
 from replay.readers.mcap.format import (
     ATTACHMENT,
     ATTACHMENT_INDEX,
@@ -196,13 +197,39 @@ def _cut(data, at, stop):  # type: ignore[no-untyped-def]
     return at + 9 > stop or (0 < data[at] <= DATA_END and u64(data, at + 1) < np.uint64(1 << 40))
 
 
+@part
+def _count(data, at, counts, bounds):  # type: ignore[no-untyped-def]
+    """Count a message and widen the bounds of the stamps."""
+    counts[np.int64(u16(data, at + 9))] += 1
+    stamp = np.int64(u64(data, at + 15))
+    if stamp >= 0:
+        bounds[0], bounds[1] = min(bounds[0], stamp), max(bounds[1], stamp)
+
+
+@part
+def _add_hole(rows, n, at, end):  # type: ignore[no-untyped-def]
+    rows[n, 0], rows[n, 1], rows[n, 2], rows[n, 3] = HOLE, at, end, 0
+    return n + 1
+
+
+@part
+def _add_row(rows, n, op, at, end, flag):  # type: ignore[no-untyped-def]
+    """Add a record to the rows, to the last one where messages or unknown records follow one another; how many there are."""
+    many = op == MESSAGE or op > DATA_END
+    if many and n and rows[n - 1, 0] == op and rows[n - 1, 2] == at:
+        rows[n - 1, 2] = end
+        rows[n - 1, 3] += 1
+        return n
+    rows[n, 0], rows[n, 1], rows[n, 2], rows[n, 3] = op, at, end, 1 if many else flag
+    return n + 1
+
+
 @njit(cache=True)
 def scan_walk(data, at, stop, inside, named, rows, counts, bounds, state):  # type: ignore[no-untyped-def]
     """Fill rows until they are full or the bytes end.
 
     inside: whether these are the records of a chunk, so that names may stand among messages and nothing else is wanted.
     state: end and flag of the record ahead, whether chunks are compressed, and whether the walk has just resumed.
-
     counts, bounds: messages per channel outside chunks, and the lowest and highest log stamp of them.
     """
     n = 0
@@ -217,8 +244,7 @@ def scan_walk(data, at, stop, inside, named, rows, counts, bounds, state):  # ty
             again = _resume(data, at + 1, stop, named, packed)
             if again < 0:
                 again = stop
-            rows[n, 0], rows[n, 1], rows[n, 2], rows[n, 3] = HOLE, at, again, 0
-            n += 1
+            n = _add_hole(rows, n, at, again)
             at, resumed = again, True
             end, flag = (_fits(data, at, stop), SOUND) if at < stop else (np.int64(-1), SOUND)
             continue
@@ -237,8 +263,7 @@ def scan_walk(data, at, stop, inside, named, rows, counts, bounds, state):  # ty
                 if not wrong and op == MESSAGE and resumed and (again >= 0 or not _cut(data, end, stop)):
                     wrong, again = True, max(again, end)  # behind damage, and nothing confirms its length
                 if wrong:
-                    rows[n, 0], rows[n, 1], rows[n, 2], rows[n, 3] = HOLE, at, again, 0
-                    n += 1
+                    n = _add_hole(rows, n, at, again)
                     at, resumed = again, True
                     end, flag = _fits(data, at, stop), SOUND
                     continue
@@ -249,23 +274,12 @@ def scan_walk(data, at, stop, inside, named, rows, counts, bounds, state):  # ty
         if op != MESSAGE:
             resumed = False
         if op == MESSAGE and flag == SOUND:
-            channel = np.int64(u16(data, at + 9))
-            counts[channel] += 1
-            stamp = np.int64(u64(data, at + 15))
-            if stamp >= 0:
-                bounds[0], bounds[1] = min(bounds[0], stamp), max(bounds[1], stamp)
+            _count(data, at, counts, bounds)
         elif op == MESSAGE:
             op = np.int64(SHORT + MESSAGE)
         elif inside:
             op = np.int64(MESSAGE if op in (SCHEMA, CHANNEL) and flag == SOUND else SHORT)
-        many = op == MESSAGE or op > DATA_END
-        if many and n and rows[n - 1, 0] == op and rows[n - 1, 2] == at:
-            n -= 1
-            rows[n, 2] = end
-            rows[n, 3] += 1
-        else:
-            rows[n, 0], rows[n, 1], rows[n, 2], rows[n, 3] = op, at, end, 1 if many else flag
-        n += 1
+        n = _add_row(rows, n, op, at, end, flag)
         at, end, flag = end, after, after_flag
         if ended:
             break

@@ -9,6 +9,8 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
+from replay.readers.common.compiled import part
+
 INTERIOR, LEAF, INDEX_INTERIOR, INDEX_LEAF = 5, 13, 2, 10
 OK, DAMAGED, OTHER_TYPES, BEYOND = 0, 1, 2, 3
 
@@ -58,6 +60,25 @@ def _head(data, page, number):  # type: ignore[no-untyped-def]
     return start, start + (100 if number == 1 else 0), min(start + page, len(data))
 
 
+@part
+def _key(data, page, place, cell, otherwise):  # type: ignore[no-untyped-def]
+    """Last row below a cell of an interior page (start, head and end: `place`), `otherwise` where it is damaged."""
+    start, head, stop = place
+    at = start + (_u16(data, head + 12 + 2 * cell) & page - 1)
+    if head + 12 <= at and at + 5 <= stop:
+        key, end = varint(data, at + 4, stop)
+        if end > 0:
+            return key
+    return otherwise
+
+
+@njit(cache=True)
+def _is_wanted(wanted, bottom, top):  # type: ignore[no-untyped-def]
+    """Whether a row bottom < row ≤ top is wanted."""
+    place = np.searchsorted(wanted, bottom, "right")
+    return place < len(wanted) and wanted[place] <= top
+
+
 @njit(cache=True)
 def walk(data, page, root, seen, wanted, all_rows):  # type: ignore[no-untyped-def]
     """Leaves of a table in the order of its rows.
@@ -102,17 +123,8 @@ def walk(data, page, root, seen, wanted, all_rows):  # type: ignore[no-untyped-d
                 if at < head + 12 or at + 5 > stop:
                     continue
                 child, bottom_cell = unsigned(data, at), i - 1
-            bottom = first
-            if bottom_cell >= 0:
-                at = start + (_u16(data, head + 12 + 2 * bottom_cell) & page - 1)
-                if head + 12 <= at and at + 5 <= stop:
-                    key, end = varint(data, at + 4, stop)
-                    if end > 0:
-                        bottom = key
-            keep = all_rows
-            if not keep:  # rows bottom < row ≤ top
-                place = np.searchsorted(wanted, bottom, "right")
-                keep = place < len(wanted) and wanted[place] <= top
+            bottom = first if bottom_cell < 0 else _key(data, page, (start, head, stop), bottom_cell, first)
+            keep = all_rows or _is_wanted(wanted, bottom, top)
             if keep and 1 <= child <= pages and not seen[child]:
                 seen[child] = 1
                 stack[depth], low[depth], high[depth] = child, bottom, top
@@ -284,6 +296,29 @@ def gather(data, page, usable, place, local, start, length, out, into, status): 
             status[i] = DAMAGED
 
 
+@part
+def _entry(data, at, stop):  # type: ignore[no-untyped-def]
+    """Stamp and row number of an index entry, and whether it is sound."""
+    pair = (np.int64(0), np.int64(0))
+    size, at = varint(data, at, stop)
+    if at < 0 or size < 3 or size > 32 or at + size > stop or data[at] != 3:
+        return pair[0], pair[1], False
+    p = at + 3
+    for k in range(2):
+        code = np.int64(data[at + 1 + k])
+        if code > 9 or code == 7 or code == 0:
+            return pair[0], pair[1], False
+    for k in range(2):
+        code = np.int64(data[at + 1 + k])
+        width = code if code < 5 else 6 if code == 5 else 8 if code == 6 else 0
+        if p + width > at + size:
+            return pair[0], pair[1], False
+        value = big_endian(data, p, width) if width else code - 8
+        pair = (value, pair[1]) if k == 0 else (pair[0], value)
+        p += width
+    return pair[0], pair[1], True
+
+
 @njit(cache=True)
 def stamped_rows(data, page, root, seen, first, stop_stamp, rows):  # type: ignore[no-untyped-def]
     """Fill `rows` with the row numbers of index entries first ≤ stamp < stop; return how many, and all entries met.
@@ -314,21 +349,9 @@ def stamped_rows(data, page, root, seen, first, stop_stamp, rows):  # type: igno
             if at + inner >= stop:
                 return -1, -1
             child = unsigned(data, at) if inner and at + 4 < stop else 0
-            size, at = varint(data, at + inner, stop)
-            if at < 0 or size < 3 or size > 32 or at + size > stop or data[at] != 3:
+            stamp, row, sound = _entry(data, at + inner, stop)
+            if not sound:
                 return -1, -1
-            kinds = data[at + 1], data[at + 2]
-            if kinds[0] > 9 or kinds[1] > 9 or kinds[0] == 7 or kinds[1] == 7 or not kinds[0] or not kinds[1]:
-                return -1, -1
-            p, stamp, row = at + 3, np.int64(0), np.int64(0)
-            for k in range(2):
-                code = np.int64(kinds[k])
-                width = code if code < 5 else 6 if code == 5 else 8 if code == 6 else 0
-                if p + width > at + size:
-                    return -1, -1
-                value = big_endian(data, p, width) if width else code - 8
-                stamp, row = (value, row) if k == 0 else (stamp, value)
-                p += width
             if inner and below < stop_stamp and stamp >= first:
                 if depth >= pages:
                     return -1, -1

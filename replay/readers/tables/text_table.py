@@ -159,14 +159,9 @@ def open_text(path: Path, options: SourceOptions, report: Report) -> TextTable:
     except UnicodeDecodeError as error:
         if error.end < len(head) - 3:
             report.note(f"{path.name} is not UTF-8; it was read as Windows-1252, so some letters may be wrong")
-    skipped, at = b"", 0
-    while head.startswith((b"#", b"\n", b"\r\n", b" \n"), at) and (stop := head.find(b"\n", at)) >= 0:
-        skipped = head[at:stop] if head.startswith(b"#", at) else skipped
-        at = stop + 1
-    stated = re.match(rb"sep=([^\r\n])\r?\n", head[at : at + 8])  # Excel's
-    at += stated.end() if stated else 0
+    skipped, at, stated = _first_line(head)
     lines = [x for x in decoded(head[at : at + HEAD]).splitlines()[:50] if x.strip()]
-    separator = options.separator or (decoded(stated[1]) if stated else None)
+    separator = options.separator or stated
     if separator is None and len(lines) > 1:
         separator = separator_of(lines)
     if len(lines) < 2:
@@ -181,6 +176,29 @@ def open_text(path: Path, options: SourceOptions, report: Report) -> TextTable:
         raise LogError(
             f"{path}: separator = {separator!r} is not one plain character; give [sources] separator such as ';'"
         )
+    names, size = _names(file, head, at, separator, skipped)
+    skip = at + size
+    decimal, sure = _decimal(head[skip:] + file.tail(skip), separator)
+    if options.decimal is not None:
+        decimal, sure = options.decimal, True
+    if decimal not in (".", ","):
+        raise LogError(f"{path}: decimal = {decimal!r} is not a decimal sign; give [sources] decimal = '.' or ','")
+    return TextTable(file, names, Dialect(separator, decimal, True), skip, sure)
+
+
+def _first_line(head: bytes) -> tuple[bytes, int, str | None]:
+    """Last comment before the first line, where that begins, and the separator that Excel states."""
+    skipped, at = b"", 0
+    while head.startswith((b"#", b"\n", b"\r\n", b" \n"), at) and (stop := head.find(b"\n", at)) >= 0:
+        skipped = head[at:stop] if head.startswith(b"#", at) else skipped
+        at = stop + 1
+    stated = re.match(rb"sep=([^\r\n])\r?\n", head[at : at + 8])
+    return skipped, at + (stated.end() if stated else 0), decoded(stated[1]) if stated else None
+
+
+def _names(file: TextFile, head: bytes, at: int, separator: str, skipped: bytes) -> tuple[tuple[str, ...], int]:
+    """Unique names of the columns, and how many bytes their header takes; 0 where there is none."""
+    path, report = file.path, file.report
     names, size = _header(path, head[at:], separator)
     if len(names) > MAX_COLUMNS:
         raise LogError(f"{path} has {len(names)} columns; at most {MAX_COLUMNS} are read")
@@ -199,13 +217,7 @@ def open_text(path: Path, options: SourceOptions, report: Report) -> TextTable:
     unique, repeated = unique_names(names)
     if repeated:
         report.note(f"{path.name}: names occur more than once and got a number: {', '.join(sorted(repeated)[:5])}")
-    skip = at + size
-    decimal, sure = _decimal(head[skip:] + file.tail(skip), separator)
-    if options.decimal is not None:
-        decimal, sure = options.decimal, True
-    if decimal not in (".", ","):
-        raise LogError(f"{path}: decimal = {decimal!r} is not a decimal sign; give [sources] decimal = '.' or ','")
-    return TextTable(file, tuple(unique), Dialect(separator, decimal, True), skip, sure)
+    return tuple(unique), size
 
 
 def _header(path: Path, head: bytes, separator: str) -> tuple[list[str], int]:
