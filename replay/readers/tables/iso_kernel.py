@@ -8,6 +8,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from replay.readers.common.compiled import part
+
 _MISSING = -(2**63)
 
 
@@ -32,6 +34,68 @@ def _days(year: int, month: int, day: int) -> int:
     of_era = y - era * 400
     of_year = (153 * (month + (-3 if month > 2 else 9)) + 2) // 5 + day - 1
     return era * 146_097 + of_era * 365 + of_era // 4 - of_era // 100 + of_year - 719_468
+
+
+@part
+def _midnight(data: NDArray[np.uint8], at: int, stop: int, month_first: bool) -> Any:
+    """Seconds from 1970 to the day of a date of ten characters, `_MISSING` where it is none."""
+    if month_first:
+        month, day, year = _digits(data, at, 2, stop), _digits(data, at + 3, 2, stop), _digits(data, at + 6, 4, stop)
+    elif data[at + 2] == 46 and data[at + 5] == 46:
+        day, month, year = _digits(data, at, 2, stop), _digits(data, at + 3, 2, stop), _digits(data, at + 6, 4, stop)
+    else:
+        year, month, day = _digits(data, at, 4, stop), _digits(data, at + 5, 2, stop), _digits(data, at + 8, 2, stop)
+        if data[at + 4] != data[at + 7] or (data[at + 4] != 45 and data[at + 4] != 47):
+            return _MISSING
+    if year < 1678 or year > 2261 or month < 1 or month > 12 or day < 1 or day > 31:
+        return _MISSING
+    if day > 28 and _days(year, month, day) >= _days(year + month // 12, month % 12 + 1, 1):
+        return _MISSING
+    return _days(year, month, day) * 86_400
+
+
+@part
+def _of_day(data: NDArray[np.uint8], i: int, stop: int) -> tuple[int, Any, Any, Any]:
+    """Place behind a time of day (−1 where it is none), its hour, its seconds and its nanoseconds."""
+    seconds: Any = 0
+    nanoseconds: Any = 0
+    hour, minute = _digits(data, i + 1, 2, stop), _digits(data, i + 4, 2, stop)
+    if hour < 0 or hour > 23 or minute < 0 or minute > 59 or data[i + 3] != 58:
+        return -1, hour, seconds, nanoseconds
+    seconds += hour * 3600 + minute * 60
+    i += 6
+    if i < stop and data[i] == 58:
+        second = _digits(data, i + 1, 2, stop)
+        if second < 0 or second > 60:
+            return -1, hour, seconds, nanoseconds
+        seconds += second
+        i += 3
+    if i < stop and (data[i] == 46 or data[i] == 44):
+        i += 1
+        scale = 100_000_000
+        while i < stop and 48 <= data[i] <= 57:
+            nanoseconds += np.int64(data[i] - 48) * scale
+            scale //= 10
+            i += 1
+    while i < stop and data[i] == 32:
+        i += 1
+    return i, hour, seconds, nanoseconds
+
+
+@part
+def _zone(data: NDArray[np.uint8], i: int, stop: int) -> tuple[int, Any]:
+    """Place behind the zone that may stand at `i`, and its seconds ahead of UTC; −1 where it is damaged."""
+    if i < stop and (data[i] == 90 or data[i] == 122):
+        return i + 1, 0
+    if i < stop and (data[i] == 43 or data[i] == 45):
+        sign = 1 if data[i] == 43 else -1
+        hour = _digits(data, i + 1, 2, stop)
+        colon = i + 3 < stop and data[i + 3] == 58
+        minute = _digits(data, i + (4 if colon else 3), 2, stop)
+        if hour < 0:
+            return -1, 0
+        return i + (3 if minute < 0 else 6 if colon else 5), sign * (hour * 3600 + max(minute, 0) * 60)
+    return i, 0
 
 
 @njit(cache=True)
@@ -59,68 +123,33 @@ def iso_ns(data: NDArray[np.uint8], at: int, stop: int) -> Any:
     clock_alone = data[at + 2] == 58 and data[at + 5] == 58
     if stop - at < 10 and not clock_alone:
         return _MISSING
-    slashes = data[at + 2] == 47 and data[at + 5] == 47
-    if clock_alone:
-        day, month, year = 1, 1, 1970
-    elif slashes:
-        month, day, year = _digits(data, at, 2, stop), _digits(data, at + 3, 2, stop), _digits(data, at + 6, 4, stop)
-    elif data[at + 2] == 46 and data[at + 5] == 46:
-        day, month, year = _digits(data, at, 2, stop), _digits(data, at + 3, 2, stop), _digits(data, at + 6, 4, stop)
-    else:
-        year, month, day = _digits(data, at, 4, stop), _digits(data, at + 5, 2, stop), _digits(data, at + 8, 2, stop)
-        if data[at + 4] != data[at + 7] or (data[at + 4] != 45 and data[at + 4] != 47):
+    halves = data[at + 2] == 47 and data[at + 5] == 47  # months first, so AM or PM must follow
+    seconds: Any = 0
+    nanoseconds: Any = 0
+    if not clock_alone:
+        seconds = _midnight(data, at, stop, halves)
+        if seconds == _MISSING:
             return _MISSING
-    if year < 1678 or year > 2261 or month < 1 or month > 12 or day < 1 or day > 31:
-        return _MISSING
-    if day > 28 and _days(year, month, day) >= _days(year + month // 12, month % 12 + 1, 1):
-        return _MISSING
-    seconds: Any = _days(year, month, day) * 86_400
-    part: Any = 0
     i = at - 1 if clock_alone else at + 10
-    halves = False
     if clock_alone or (
         i < stop and (data[i] == 84 or data[i] == 32 or data[i] == 45 or data[i] == 116 or data[i] == 95)
     ):
-        hour, minute = _digits(data, i + 1, 2, stop), _digits(data, i + 4, 2, stop)
-        if hour < 0 or hour > 23 or minute < 0 or minute > 59 or data[i + 3] != 58:
+        i, hour, more, nanoseconds = _of_day(data, i, stop)
+        if i < 0:
             return _MISSING
-        seconds += hour * 3600 + minute * 60
-        i += 6
-        if i < stop and data[i] == 58:
-            second = _digits(data, i + 1, 2, stop)
-            if second < 0 or second > 60:
-                return _MISSING
-            seconds += second
-            i += 3
-        if i < stop and (data[i] == 46 or data[i] == 44):
-            i += 1
-            scale = 100_000_000
-            while i < stop and 48 <= data[i] <= 57:
-                part += np.int64(data[i] - 48) * scale
-                scale //= 10
-                i += 1
-        while i < stop and data[i] == 32:
-            i += 1
-        if slashes and i + 1 < stop and (data[i] == 65 or data[i] == 80) and data[i + 1] == 77:
+        seconds += more
+        if halves and i + 1 < stop and (data[i] == 65 or data[i] == 80) and data[i + 1] == 77:
             if hour < 1 or hour > 12:
                 return _MISSING
             seconds += 3600 * ((hour % 12 + (12 if data[i] == 80 else 0)) - hour)
-            halves = True
+            halves = False
             i += 2
-        elif i < stop and (data[i] == 90 or data[i] == 122):
-            i += 1
-        elif i < stop and (data[i] == 43 or data[i] == 45):
-            sign = 1 if data[i] == 43 else -1
-            hour = _digits(data, i + 1, 2, stop)
-            colon = i + 3 < stop and data[i + 3] == 58
-            minute = _digits(data, i + (4 if colon else 3), 2, stop)
-            if hour < 0:
-                return _MISSING
-            seconds -= sign * (hour * 3600 + max(minute, 0) * 60)
-            i += 3 if minute < 0 else 6 if colon else 5
-    if i != stop or slashes != halves:
+        else:
+            i, ahead = _zone(data, i, stop)
+            seconds -= ahead
+    if i != stop or halves:
         return _MISSING
-    return seconds * 1_000_000_000 + part
+    return seconds * 1_000_000_000 + nanoseconds
 
 
 @njit(cache=True)
