@@ -7,8 +7,11 @@ follow one another where it does not.
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numba import njit
+from numpy.typing import NDArray
 
 from replay.readers.common.compiled import part
 from replay.readers.mcap.format import (
@@ -198,7 +201,7 @@ def _cut(data, at, stop):  # type: ignore[no-untyped-def]
 
 
 @part
-def _count(data, at, counts, bounds):  # type: ignore[no-untyped-def]
+def _count(data: NDArray[np.uint8], at: int, counts: NDArray[np.int64], bounds: NDArray[np.int64]) -> None:
     """Count a message and widen the bounds of the stamps."""
     counts[np.int64(u16(data, at + 9))] += 1
     stamp = np.int64(u64(data, at + 15))
@@ -207,13 +210,13 @@ def _count(data, at, counts, bounds):  # type: ignore[no-untyped-def]
 
 
 @part
-def _add_hole(rows, n, at, end):  # type: ignore[no-untyped-def]
+def _add_hole(rows: NDArray[np.int64], n: int, at: int, end: int) -> int:
     rows[n, 0], rows[n, 1], rows[n, 2], rows[n, 3] = HOLE, at, end, 0
     return n + 1
 
 
 @part
-def _add_row(rows, n, op, at, end, flag):  # type: ignore[no-untyped-def]
+def _add_row(rows: NDArray[np.int64], n: int, op: Any, at: int, end: int, flag: int) -> int:
     """Add a record to the rows, to the last one where messages or unknown records follow one another; how many there are."""
     many = op == MESSAGE or op > DATA_END
     if many and n and rows[n - 1, 0] == op and rows[n - 1, 2] == at:

@@ -6,8 +6,11 @@ page and the file, pages are visited once.
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numba import njit
+from numpy.typing import NDArray
 
 from replay.readers.common.compiled import part
 
@@ -61,7 +64,7 @@ def _head(data, page, number):  # type: ignore[no-untyped-def]
 
 
 @part
-def _key(data, page, place, cell, otherwise):  # type: ignore[no-untyped-def]
+def _key(data: NDArray[np.uint8], page: int, place: tuple[int, int, int], cell: int, otherwise: int) -> Any:
     """Last row below a cell of an interior page (start, head and end: `place`), `otherwise` where it is damaged."""
     start, head, stop = place
     at = start + (_u16(data, head + 12 + 2 * cell) & page - 1)
@@ -297,15 +300,15 @@ def gather(data, page, usable, place, local, start, length, out, into, status): 
 
 
 @part
-def _entry(data, at, stop):  # type: ignore[no-untyped-def]
+def _entry(data: NDArray[np.uint8], at: int, stop: int) -> tuple[Any, Any, bool]:
     """Stamp and row number of an index entry, and whether it is sound."""
-    pair = (np.int64(0), np.int64(0))
+    pair: tuple[Any, Any] = (np.int64(0), np.int64(0))
     size, at = varint(data, at, stop)
     if at < 0 or size < 3 or size > 32 or at + size > stop or data[at] != 3:
         return pair[0], pair[1], False
     p = at + 3
     for k in range(2):
-        code = np.int64(data[at + 1 + k])
+        code: Any = np.int64(data[at + 1 + k])
         if code > 9 or code == 7 or code == 0:
             return pair[0], pair[1], False
     for k in range(2):
