@@ -10,7 +10,7 @@ from typing import Any
 
 from replay.atomic_write import atomic_path
 from replay.errors import ConfigError
-from replay.faults import FaultMode, Side
+from replay.faults import FaultMode, FaultSpec, Side
 
 SCHEMA = "mfhca-truth/1"
 
@@ -45,6 +45,22 @@ class TruthInterval:
     sat_mean: float
     sat_std: float
     ramp_s: float = 0.0
+
+    @classmethod
+    def of(cls, fault: FaultSpec, kind: str, sat_mean: float, length_s: float) -> TruthInterval:
+        """What was injected into a mission of some length for a fault, with the saturation term that was drawn."""
+        return cls(
+            fault.component,
+            kind,
+            fault.side,
+            fault.mode,
+            fault.start_s,
+            min(fault.stop_s, length_s),
+            fault.epsilon,
+            sat_mean,
+            fault.sat_std,
+            fault.ramp_s,
+        )
 
 
 @dataclass(frozen=True)

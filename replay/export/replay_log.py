@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -16,8 +15,9 @@ from replay.atomic_write import atomic_path
 from replay.control.loop import Replay
 from replay.control.loop_columns import replay_columns
 from replay.errors import ConfigError, OutputError
+from replay.export.formats.joint_states import joint_states
 from replay.export.formats.mcap import write_mcap
-from replay.export.formats.message_layout import Layout, TopicBatch
+from replay.export.formats.message_layout import TopicBatch
 from replay.inspection.mcap_index import mcap_index
 from replay.log.open_loop import COLUMN
 from replay.machine.config import Machine
@@ -158,27 +158,5 @@ def replay_topics(timeline: Timeline, replay: Replay, machine: Machine) -> list[
         for name, field in topics:
             values: NDArray[np.float64] = getattr(replay, field)
             if values.size and np.isfinite(values).any():
-                batches.append(_joint_state(f"/mfhca/{name}", parts, values, stamps))
+                batches.append(joint_states(f"/mfhca/{name}", parts, values, stamps, "base_link"))
     return batches
-
-
-def _joint_state(
-    topic: str, parts: Sequence[str], values: NDArray[np.float64], stamps: NDArray[np.int64]
-) -> TopicBatch:
-    """Messages with header stamp, the parts as joint names, and values (n, parts) as positions."""
-    layout = Layout("cdr")
-    layout.varying("sec", "u4")
-    layout.varying("nanosec", "u4")
-    layout.text("base_link")
-    layout.constant("I", len(parts))
-    for part in parts:
-        layout.text(part)
-    layout.doubles("position", len(parts))
-    layout.doubles(None)
-    layout.doubles(None)
-    fields: dict[str, NDArray[np.generic]] = {
-        "sec": (stamps // 1_000_000_000).astype(np.uint32),
-        "nanosec": (stamps % 1_000_000_000).astype(np.uint32),
-        "position": np.ascontiguousarray(values),
-    }
-    return TopicBatch(topic, "sensor_msgs/msg/JointState", layout, fields, stamps)

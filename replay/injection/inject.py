@@ -121,17 +121,4 @@ def _add_second_sensors(draft: Draft, rng: np.random.Generator) -> None:
 
 
 def _interval(fault: FaultSpec, machine: Machine, sat: float, length: float) -> TruthInterval:
-    kind = "wheel" if fault.component in machine.wheels else "steer"
-    stop = min(fault.stop_s, length)
-    return TruthInterval(
-        fault.component,
-        kind,
-        fault.side,
-        fault.mode,
-        fault.start_s,
-        stop,
-        fault.epsilon,
-        sat,
-        fault.sat_std,
-        fault.ramp_s,
-    )
+    return TruthInterval.of(fault, "wheel" if fault.component in machine.wheels else "steer", sat, length)

@@ -61,20 +61,7 @@ def mission_truth(
 
 
 def _interval(fault: FaultSpec, sat: float, duration: float) -> TruthInterval:
-    kind = "steer" if fault.component in SIMULATED_AXLES else "wheel"
-    stop = min(fault.stop_s, duration)
-    return TruthInterval(
-        fault.component,
-        kind,
-        fault.side,
-        fault.mode,
-        fault.start_s,
-        stop,
-        fault.epsilon,
-        sat,
-        fault.sat_std,
-        fault.ramp_s,
-    )
+    return TruthInterval.of(fault, "steer" if fault.component in SIMULATED_AXLES else "wheel", sat, duration)
 
 
 def spans_where(component: str, flag: NDArray[np.bool_], rate_hz: float) -> list[TruthSpan]:

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from replay.control.loop import Replay
+from replay.export.formats.joint_states import joint_states
 from replay.export.formats.message_layout import Layout, TopicBatch
 from replay.export.replay_log import replay_topics
 from replay.log.open_loop import TOPIC
@@ -33,7 +34,7 @@ def signal_topics(signals: Signals, start_ns: int, stop_ns: int) -> list[tuple[T
             groups.setdefault(stamps.tobytes(), (stamps, {}))[1][name] = signal.values[a:b]
     ordered = sorted(groups.values(), key=lambda g: -g[0].size)
     return [
-        (joint_states(f"{MAPPED}{i}", columns, stamps), tuple(columns))
+        (columns_topic(f"{MAPPED}{i}", columns, stamps), tuple(columns))
         for i, (stamps, columns) in enumerate(ordered, 1)
     ]
 
@@ -81,7 +82,7 @@ def evidence_topic(
     found = {n.removeprefix("evidence."): _single(c[a:b]) for n, c in columns.items() if n.startswith(prefix)}
     found |= {n.replace(".threshold", ".minus_threshold"): -c for n, c in found.items() if n.endswith(".threshold")}
     found = {n: c for n, c in found.items() if np.isfinite(c).any()}
-    return (joint_states(EVIDENCE, found, stamps[a:b]), tuple(found)) if found else None
+    return (columns_topic(EVIDENCE, found, stamps[a:b]), tuple(found)) if found else None
 
 
 def _single(values: NDArray[np.floating]) -> NDArray[np.float64]:
@@ -96,21 +97,6 @@ def open_loop_topic(stamp: int) -> TopicBatch:
     return TopicBatch(TOPIC, "std_msgs/msg/Bool", layout, {"data": np.ones(1, np.uint8)}, np.array([stamp], np.int64))
 
 
-def joint_states(topic: str, columns: Mapping[str, NDArray[np.float64]], stamps: NDArray[np.int64]) -> TopicBatch:
+def columns_topic(topic: str, columns: Mapping[str, NDArray[np.float64]], stamps: NDArray[np.int64]) -> TopicBatch:
     """JointState messages whose joints are the columns and whose positions are their values."""
-    layout = Layout("cdr")
-    layout.varying("sec", "u4")
-    layout.varying("nanosec", "u4")
-    layout.text("")
-    layout.constant("I", len(columns))
-    for name in columns:
-        layout.text(name)
-    layout.doubles("position", len(columns))
-    layout.doubles(None)
-    layout.doubles(None)
-    values: dict[str, NDArray[np.generic]] = {
-        "sec": (stamps // 1_000_000_000).astype(np.uint32),
-        "nanosec": (stamps % 1_000_000_000).astype(np.uint32),
-        "position": np.column_stack(list(columns.values())),
-    }
-    return TopicBatch(topic, "sensor_msgs/msg/JointState", layout, values, stamps)
+    return joint_states(topic, list(columns), np.column_stack(list(columns.values())), stamps)

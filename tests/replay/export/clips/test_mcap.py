@@ -14,7 +14,7 @@ from mcap.writer import CompressionType, Writer
 
 from replay.export.clips.mcap import Definitions, batch_records, write_clip
 from replay.export.clips.source import ClipSource
-from replay.export.clips.topics import joint_states
+from replay.export.clips.topics import columns_topic
 from replay.log.source_options import SourceOptions
 from replay.readers.registry import read_log
 
@@ -98,7 +98,7 @@ def test_two_logs_with_equal_channel_numbers_stand_side_by_side(tmp_path: Path) 
     for log in logs:
         source = ClipSource(log, "")
         parts += source.messages(START, START + SECOND, source.define(definitions))
-    batch = joint_states("/own", {"x": np.arange(3.0)}, START + np.arange(3))
+    batch = columns_topic("/own", {"x": np.arange(3.0)}, START + np.arange(3))
     own = batch_records(batch, definitions)
     write_clip(tmp_path / "clip.mcap", definitions, [own, *parts], {})
     kept = list(messages(tmp_path / "clip.mcap"))
