@@ -6,9 +6,14 @@ import numpy as np
 import pytest
 
 from diagnosis.channels.sample_status import PAIR
+from diagnosis.estimation import fault_models
 from diagnosis.estimation.fault_models import HEALTHY, NO_SIGNAL, NOISY, ModeModel
+from diagnosis.estimation.filter_kernel import segment_evidence
+from diagnosis.estimation.row_probability import row_probabilities
 from diagnosis.estimation.samples import Samples
 from diagnosis.estimation.viterbi import ModePath, most_probable
+from diagnosis.results.fault_rows import codes_of
+from replay.faults import Side
 
 
 def causal(healthy: str) -> ModePath:
@@ -57,3 +62,23 @@ def test_nothing_later_is_used() -> None:
     raised = whole.crossing(200, n, 3, 100)
     assert raised is not None
     assert 200 <= raised <= 201
+
+
+def test_rows_that_the_side_lacks_are_never_entered(monkeypatch: pytest.MonkeyPatch) -> None:
+    n = 400
+    rng = np.random.default_rng(2)
+    x = 0.2 + 0.1 * np.sin(np.arange(n) / 40)
+    y = x + 0.004 * rng.normal(size=n)
+    y[150:] = 0.6 * x[150:] + 0.1 * rng.normal(size=n - 150)
+    samples = Samples(y, x, np.full(n, PAIR, dtype=np.int8), np.zeros(n, dtype=np.bool_))
+    model = ModeModel(
+        noise=0.004, constant_noise=0.0005, tolerance=0.005, span=0.8, switch_cost=13.0, dt=0.001, side=Side.ACTUATOR
+    )
+    assert (most_probable(samples, model).row[200:] == NOISY).all()
+    table = [row for row in codes_of(Side.ACTUATOR) if row != NOISY]
+    monkeypatch.setattr(fault_models, "codes_of", lambda side: table)
+    assert NOISY not in most_probable(samples, model).row
+    evidence = segment_evidence(samples, model)
+    assert evidence[NOISY] == -np.inf
+    assert np.isfinite(evidence[table]).all()
+    assert row_probabilities(evidence, Side.ACTUATOR)[NOISY] == 0.0
