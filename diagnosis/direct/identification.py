@@ -23,7 +23,7 @@ from diagnosis.channels.sample_status import BLIND, PAIR, sample_status
 from diagnosis.direct.inputs import Pair
 from diagnosis.estimation.fault_models import ModeModel
 from diagnosis.estimation.samples import Samples
-from diagnosis.results.fault_rows import FAULT_ROWS
+from diagnosis.results.fault_rows import codes_of
 from replay.faults import Side
 from replay.machine.config import Limits
 
@@ -151,12 +151,13 @@ def mode_model(pair: Pair, x: Array, status: NDArray[np.int8], tolerance: float)
     # a command is known to the last digit, a second speed has noise of its own
     own = white_noise(pair.x[paired], period) if pair.side is Side.SENSOR else 0.0
     explained = min(0.5, np.nan_to_num(own) ** 2 / noise**2)
+    rows = len(codes_of(pair.side)) - 1  # every one of both sides is as probable as the others
     model = ModeModel(
         noise=noise,
         constant_noise=constant,
         tolerance=tolerance,
         span=pair.span,
-        switch_cost=float(np.log(_MEAN_HEALTHY_S * rate * len(FAULT_ROWS))),
+        switch_cost=float(np.log(_MEAN_HEALTHY_S * rate * 2 * rows)),
         dt=period,
         own_cost=-0.5 * float(np.log(1.0 - explained)),
         side=pair.side,
