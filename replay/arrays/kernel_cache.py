@@ -39,10 +39,11 @@ def drop_stale_kernels(packages: Iterable[Path], stamp: Path) -> list[str]:
     now = {folder: _digest(folder) for package in packages for folder in _folders(str(package))}
     if known == now:
         return []
+    changed = [folder for folder, digest in now.items() if known.get(folder) != digest]
     with suppress(OSError):
-        dropped = [folder for folder, digest in now.items() if known.get(folder) != digest and _removed(folder)]
-        stamp.write_text(json.dumps(now), "utf-8")
-        return dropped
+        stamp.parent.mkdir(exist_ok=True)  # Python may be told to write no bytecode
+        stamp.write_text(json.dumps(now), "utf-8")  # first: where nothing is remembered, nothing is removed each time
+        return [folder for folder in changed if _removed(folder)]
     return []
 
 

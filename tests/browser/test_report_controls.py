@@ -69,7 +69,7 @@ def test_back_and_forward_walk_through_the_faults(open_page: OPEN) -> None:
         ("fault=F99", "There is no fault F99 in this report: F1 is shown."),
         ("fault=F2&t=abc", "“abc” is not a time: expected t=seconds or t=from,to."),
         ("fault=F2&plots=wheel.FR.v,nope.v", "There is no signal nope.v in this report."),
-        ("fault=%3Cb%3E&t=3,1", "There is no fault <b> in this report: F1 is shown. “3,1” is no time"),
+        ("fault=%3Cb%3E&t=3,1", "There is no fault <b> in this report: F1 is shown. “3,1” is not a time"),
     ],
 )
 def test_what_the_address_asks_for_and_is_not_there_is_said(open_page: OPEN, asked: str, words: str) -> None:

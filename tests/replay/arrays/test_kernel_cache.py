@@ -43,5 +43,15 @@ def test_kernels_of_unknown_age_are_removed(package: Path, tmp_path: Path) -> No
     assert not old.exists()
 
 
-def test_where_nothing_can_be_written_nothing_is_lost(package: Path, tmp_path: Path) -> None:
-    assert drop_stale_kernels([package], tmp_path / "no folder" / "stamp.json") == []
+def test_where_nothing_can_be_remembered_nothing_is_removed(package: Path, tmp_path: Path) -> None:
+    kernel = compiled(package)
+    assert drop_stale_kernels([package], tmp_path / "no folder" / "below" / "stamp.json") == []
+    assert kernel.exists()
+
+
+def test_the_stamp_gets_its_folder(package: Path, tmp_path: Path) -> None:
+    stamp = tmp_path / "__pycache__" / "stamp.json"
+    drop_stale_kernels([package], stamp)
+    kernel = compiled(package)
+    assert drop_stale_kernels([package], stamp) == []
+    assert kernel.exists()
