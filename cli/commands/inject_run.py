@@ -163,7 +163,12 @@ def _format_for(output: Path, paths: Sequence[Path], machine: Machine) -> LogFor
     from replay.mission import source_options
     from replay.readers.registry import summarise_log
 
-    return LogFormat(summarise_log(paths[0], source_options(paths[0], machine)).format)
+    found = summarise_log(paths[0], source_options(paths[0], machine)).format
+    if found not in list(LogFormat):
+        raise ConfigError(
+            f"{output}: the input's format {found} is read, not written; give OUT an ending such as .mcap, or --format"
+        )
+    return LogFormat(found)
 
 
 def _check_absent(outputs: Sequence[Path], force: bool) -> None:

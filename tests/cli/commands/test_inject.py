@@ -182,3 +182,16 @@ def test_faults_of_a_simulated_original_are_told(tmp_path: Path, capsys: pytest.
     (tmp_path / "drive.truth.json").write_text("{}")
     assert run(["inject", str(log), "-o", str(tmp_path / "g.mcap"), "--fault", "RL sensor no_signal 4 6"]) == 0
     assert "names faults" not in capsys.readouterr().err
+
+
+def test_a_format_that_is_only_read_asks_for_another(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    class Summary:
+        format = "tdms"
+
+    log = tmp_path / "drive.tdms"
+    log.write_bytes(b"TDSm")
+    monkeypatch.setattr("replay.readers.registry.summarise_log", lambda path, options: Summary())
+    assert run(["inject", str(log), "-o", str(tmp_path / "out"), "--fault", "FR sensor stuck 1 2"]) == 2
+    assert "the input's format tdms is read, not written" in capsys.readouterr().err
