@@ -192,7 +192,7 @@ def _events(figures: Figures) -> Table:
         (
             "ε error",
             f"mean {_share(epsilon['mae'])} over {epsilon['n']} faults, {_share(epsilon['mae_partial'])} over the "
-            f"{epsilon['n_partial']} inefficient and noisy ones; {epsilon['without']} without ε̂",
+            f"{epsilon['n_partial']} partial ones (0 < ε < 1); {epsilon['without']} without ε̂",
         )
     )
     if alarms["per_hour"] is not None:

@@ -180,7 +180,7 @@ def _kpis(figures: Figures) -> Iterator[tuple[str, str, str]]:
     for key, title in _TIMES.items():
         e = figures[key]
         yield f"{title.lower()}, median", _time(e["median"]), f"95 %: {_time(e['p95'])}, over {_faults(e['n'])}"
-    more = f"over {_faults(epsilon['n'])}; inefficient and noisy {_share(epsilon['mae_partial'])}"
+    more = f"over {_faults(epsilon['n'])}; partial faults (0 < ε < 1) {_share(epsilon['mae_partial'])}"
     yield "error of ε̂, mean", _share(epsilon["mae"]), more
 
 

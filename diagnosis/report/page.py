@@ -23,6 +23,7 @@ from jinja2.utils import htmlsafe_json_dumps
 from markupsafe import Markup, escape
 from numpy.typing import NDArray
 
+from diagnosis.decision.wording import join_words
 from diagnosis.pages import labels
 from diagnosis.pages.environment import SHARED, asset, environment, shared_style
 from diagnosis.pages.svg import icon
@@ -39,7 +40,7 @@ from diagnosis.report.rows import Columns, derived
 from diagnosis.report.thumbnail import thumbnail
 from diagnosis.report.timeline import timeline
 from diagnosis.results.document import IntervalRow, ReportDocument
-from diagnosis.results.fault_rows import state_label
+from diagnosis.results.fault_rows import FAULT_ROWS, state_label
 from diagnosis.results.result import Closeups
 from diagnosis.results.vocabulary import part_name
 from replay.errors import ConfigError
@@ -151,6 +152,7 @@ def _pictures(
         if path.x is None or path.y is None
         else path_picture(path.x, path.y, *series.place, detailed),
         "path_words": path.words,
+        "tested": join_words(list(dict.fromkeys(row.words for row in FAULT_ROWS))),
         "path_modes": [m for m in FaultMode if any(f["mode"] == m for f in detailed)],
         "thumbs": {f["id"]: _thumbnail(f, series.shown, *series.place) for f in thumbs},
     }
