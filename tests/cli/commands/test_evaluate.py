@@ -138,8 +138,8 @@ def test_what_was_not_right_is_listed(made: Path, tmp_path: Path, capsys: pytest
     assert run(["evaluate", str(made / "monday"), "--truth", str(other)]) == 0
     shown = capsys.readouterr().out
     lines = shown[shown.index("Wheels: not right") :].splitlines()
-    assert any(line.startswith("3.00–4.00  RL sensor") and "missed" in line for line in lines)
-    assert any("FR sensor" in line and "false alarm" in line and "F1" in line for line in lines)
+    assert any(line.startswith("3.00–4.00  RL speed sensor") and "missed" in line for line in lines)
+    assert any("FR speed sensor" in line and "false alarm" in line and "F1" in line for line in lines)
 
 
 def test_parts_that_the_result_left_out_are_said(

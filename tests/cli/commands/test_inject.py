@@ -73,7 +73,7 @@ def test_from_a_recording_to_scores(drive: list[str], tmp_path: Path, capsys: py
     assert report["log"]["open_loop"] is True
     assert [(i["component"], i["side"], i["mode"]) for i in report["intervals"]] == [("A", "sensor", "stuck")]
     assert abs(report["intervals"][0]["start_s"] - 20.0) < 0.05
-    assert "the controller did not react to them" in (page / "report.html").read_text(encoding="utf-8")
+    assert "controller did not react to these faults" in (page / "report.html").read_text(encoding="utf-8")
     scores = document(["evaluate", str(out), *drive[1:]], capsys)
     assert [f["component"] for f in scores["results"][0]["wheel"]["faults"]] == ["A"]
 

@@ -74,4 +74,4 @@ def test_what_is_no_result_is_refused(mission_log: Path, tmp_path: Path, capsys:
     assert diagnose(mission_log, tmp_path, "--previous", str(tmp_path / "absent")) == 3
     assert "no such file" in capsys.readouterr().err
     assert diagnose(mission_log, tmp_path, "--previous", str(mission_log)) == 3
-    assert "no report.json" in capsys.readouterr().err
+    assert "is not a report.json" in capsys.readouterr().err

@@ -90,7 +90,7 @@ def test_constants_and_varied_machines(tmp_path: Path, capsys: pytest.CaptureFix
     assert plain.read_bytes() != slow.read_bytes()
     assert lossy.read_text().count(",,") > plain.read_text().count(",,") + 100
     assert read_truth(tmp_path / "varied.truth.json").duration_s == 4.0
-    for setting, word in (("k=1", "'k' is not known"), ("K=big", "no number"), ("K=1e9", "plant.K")):
+    for setting, word in (("k=1", "'k' is not known"), ("K=big", "is not a number"), ("K=1e9", "plant.K")):
         assert run(["simulate", "-o", str(tmp_path / "x.csv"), *SHORT, "--set", setting]) == 2
         assert word in capsys.readouterr().err
     assert run(["simulate", "-o", str(tmp_path / "x.csv"), "--vary", "--seed", "1500"]) == 2

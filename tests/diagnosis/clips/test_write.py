@@ -215,7 +215,7 @@ def test_own_clips_are_replaced_and_others_left_alone(mission: tuple[Mission, Mi
 def test_a_foreign_file_is_never_replaced(mission: tuple[Mission, MissionResult], tmp_path: Path) -> None:
     foreign = tmp_path / "F1 FR sensor stuck.foxglove.json"
     foreign.write_text("{}")
-    with pytest.raises(OutputError, match="is no clip of this tool"):
+    with pytest.raises(OutputError, match="is not a clip of this tool"):
         cut(mission, tmp_path)
     assert [p.name for p in tmp_path.iterdir()] == [foreign.name]
     assert foreign.read_text() == "{}"

@@ -17,7 +17,7 @@ SEEDS = {"tuning": range(60), "reporting": range(2000, 2060)}
 
 @pytest.mark.parametrize(("kind", "seed"), [("tuning", 1000), ("tuning", -1), ("reporting", 0), ("reporting", 1999)])
 def test_a_seed_of_the_other_pool_is_refused(kind: Any, seed: int) -> None:
-    with pytest.raises(ConfigError, match=r"is no \w+ seed"):
+    with pytest.raises(ConfigError, match=r"is not a \w+ seed"):
         varied_options(seed, kind=kind)
 
 

@@ -139,7 +139,7 @@ ENDS = FIRST + len(FAST) + len(SLOW)
         (at(WHOLE, FIRST + 83 + 56 * LEVELS + 4, struct.pack("<Q", 10**6)), "its samples should begin at its byte 1000000"),
         (at(WHOLE, FIRST + len(FAST) - 28, struct.pack("<I", 3)), "handle 1 that begins here does not fit the block"),
         (at(WHOLE, FIRST + len(FAST) - 28, struct.pack("<I", 1)), "does not fit the block"),
-        (at(WHOLE, FIRST + 11, bytes(8)), "0 is no time"),
+        (at(WHOLE, FIRST + 11, bytes(8)), "0 is not a time"),
         (at(WHOLE, ENDS + 3, b"<<"), "its XML is damaged"),
         (at(WHOLE, ENDS, b"???"), "does not begin with a byte-order mark"),
         (recording([(1, FAST)], CHANNELS, BOMB), "declares a document type or entities"),
