@@ -107,6 +107,8 @@ def run(arguments: Sequence[str] | None = None) -> int:
         return 0
     except OSError as error:
         return _interrupted(terminal) if asked() else _system_error(terminal, error)
+    except ModuleNotFoundError as error:
+        return _missing_package(terminal, error)
     except Exception as error:
         if asked():  # what compiled code makes of it
             return _interrupted(terminal)
@@ -139,6 +141,17 @@ def _system_error(terminal: Terminal, error: OSError) -> int:
         return 2
     terminal.error(f"{error.filename}: {reason}")
     return 3
+
+
+def _missing_package(terminal: Terminal, error: ModuleNotFoundError) -> int:
+    """Say which package an update asks for; what is missing of the tool itself is an internal error."""
+    if (error.name or "").partition(".")[0] in ("", "cli", "diagnosis", "replay"):
+        return _internal_error(terminal, error)
+    terminal.error(
+        f"the package {error.name} is not installed; install what this version needs: "
+        "`pip install --require-hashes -r requirements.lock` in its folder, or install mfhca-replay again"
+    )
+    return INTERNAL
 
 
 def _internal_error(terminal: Terminal, error: Exception) -> int:

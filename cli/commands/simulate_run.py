@@ -171,6 +171,8 @@ def _changed(options: SimulationOptions, settings: list[str]) -> SimulationOptio
     structure = options.structure
     for words in settings:
         key, _, text = words.partition("=")
+        if not text:
+            raise ConfigError(f"--set {words}: the value is missing; expected KEY=VALUE")
         if key == "structure":
             from replay.simulation.structures import StructureOptions
 

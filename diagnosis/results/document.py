@@ -6,7 +6,9 @@ name ends in ``_ns``; speeds are m/s, angles rad, shares and ε plain numbers; w
 
 from __future__ import annotations
 
-from typing import Final, Literal, NotRequired, TypedDict
+from typing import Annotated, Final, Literal, NotRequired, TypedDict
+
+from msgspec import Meta
 
 from diagnosis.results.comparison_document import PreviousRow
 from diagnosis.results.size_rows import EpsilonRow, SatRow
@@ -14,6 +16,11 @@ from diagnosis.results.vocabulary import Kind, Severity, Tier, Verdict
 from replay.faults import FaultMode, Side, State
 
 SCHEMA: Final = "mfhca-report/1"
+
+#: A probability, but for rounding.
+Probability = Annotated[float, Meta(ge=-1e-6, le=1.0 + 1e-6)]
+#: A time or a length of time that a recording can have [s].
+Seconds = Annotated[float, Meta(ge=-1e9, le=1e9)]
 
 
 class ToolRow(TypedDict):
@@ -54,11 +61,11 @@ class LogRow(TypedDict):
     files: list[FileRow]
     start_ns: int
     open_loop: bool
-    duration_s: float
+    duration_s: Seconds
     rate_hz: float
     samples_per_bucket: NotRequired[int]
     distance_m: float | None
-    driving_s: float
+    driving_s: Seconds
 
 
 class WheelPlace(TypedDict):
@@ -120,7 +127,7 @@ class HypothesisRow(TypedDict):
 
     side: str
     mode: str
-    p: float
+    p: Probability
 
 
 class IntervalRow(TypedDict):
@@ -131,19 +138,19 @@ class IntervalRow(TypedDict):
     kind: Kind
     side: Side
     mode: FaultMode
-    start_s: float
-    stop_s: float
+    start_s: Seconds
+    stop_s: Seconds
     start_ns: int
     stop_ns: int
     epsilon: EpsilonRow | None
     sat: SatRow | None
-    probability: float
+    probability: Probability
     hypotheses: list[HypothesisRow]
     severity: Severity
     advice: str
     evidence: list[str]
     tier: Tier
-    detected_s: float | None
+    detected_s: Seconds | None
 
 
 class StateRow(TypedDict):
@@ -152,8 +159,8 @@ class StateRow(TypedDict):
     component: str
     side: Literal["sensor", "actuator"]
     state: State
-    start_s: float
-    stop_s: float
+    start_s: Seconds
+    stop_s: Seconds
     reason: str
 
 
@@ -161,8 +168,8 @@ class PhaseRow(TypedDict):
     """What the machine was doing: ``standstill``, ``forward``, ``reverse``, ``turning``."""
 
     name: str
-    start_s: float
-    stop_s: float
+    start_s: Seconds
+    stop_s: Seconds
 
 
 class CoverageRow(TypedDict):
@@ -172,8 +179,8 @@ class CoverageRow(TypedDict):
     side: Literal["sensor", "actuator"]
     tier: Tier
     seconds: dict[str, float]
-    driving_s: float
-    decided_driving_s: float
+    driving_s: Seconds
+    decided_driving_s: Seconds
 
 
 class LossRow(TypedDict):

@@ -250,3 +250,16 @@ def test_no_colours_without_a_terminal_or_with_no_color() -> None:
     done = subprocess.run([*MFHCA, "nope"], cwd=ROOT, capture_output=True, text=True, check=False)
     assert done.returncode == 2
     assert "\x1b" not in done.stderr
+
+
+def test_a_package_that_an_update_asks_for_is_named(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def missing(*_: object) -> None:
+        raise ModuleNotFoundError("No module named 'newcomer'", name="newcomer.part")
+
+    monkeypatch.setattr("cli.commands.config.machine_of", missing)
+    assert run(["config", "show"]) == 70
+    shown = capsys.readouterr().err
+    assert "the package newcomer.part is not installed" in shown
+    assert "internal error" not in shown

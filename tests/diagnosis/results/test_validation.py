@@ -81,3 +81,13 @@ def test_other_documents_are_refused_by_their_schema(content: object) -> None:
 def test_remedy_of_another_document() -> None:
     with pytest.raises(LogError, match=r"^x: tool\.version: int found, text expected; write it again$"):
         validated({**document(), "tool": {"name": "", "version": 1}}, ReportDocument, "x", "write it again")
+
+
+@pytest.mark.parametrize(
+    ("key", "value"), [("start_s", 1e308), ("stop_s", -1e10), ("probability", 7.0), ("probability", -0.5)]
+)
+def test_values_that_cannot_be_are_refused_with_their_place(key: str, value: float) -> None:
+    wrong = document()
+    wrong["intervals"][0][key] = value
+    with pytest.raises(LogError, match=rf"r\.json: intervals\[0\]\.{key}"):
+        report_of(wrong, "r.json")
