@@ -23,6 +23,7 @@ Examples:
   mfhca simulate -o lossy.mcap --rate 200 --set jitter=0.5 --set drop_share=0.02
   mfhca simulate -o other.mcap --vary --seed 7
   mfhca simulate -o foreign.mcap --set structure=valves --rate 500 --evidence base
+  mfhca simulate -o any.mcap --vary --set structure=random --seed 12
 
 \b
 A fault is PART SIDE MODE START STOP [eps=] [sat=] [std=] [tau=] [ramp=]: part FR FL RR RL front
@@ -37,7 +38,8 @@ Controller: lambda k_ps zeta psi0. Ground: steepness. Scenario: ramp_share ramp_
 (growing faults, faults from the first sample). Recorder: jitter drop_share drop_burst_s.
 structure=NAME: a machine of another structure, its sizes drawn by the seed: valves (dead band,
 hysteresis, resonance), pump (shared, load-dependent, warming), torque (drives that accelerate),
-resonant_pump, sticky_valves, electric."""
+resonant_pump, sticky_valves, electric, random (any mixture of such effects, drawn by the seed; with
+--vary all else is drawn as well)."""
 
 
 class Scenario(StrEnum):

@@ -15,6 +15,7 @@ from replay.progress import Progress, Stage
 if TYPE_CHECKING:
     from replay.faults import FaultSpec
     from replay.simulation.options import EvidenceLevel, Scenario, SimulatedLaw, SimulatedMission, SimulationOptions
+    from replay.simulation.structures import StructureOptions
     from replay.truth import MissionTruth
 
 _PLANT = [
@@ -113,7 +114,8 @@ def _options(request: SimulateRequest, faults: tuple[FaultSpec, ...] | None) -> 
     scenario, seed, duration = request.scenario, request.seed, request.duration_s
     if request.vary:
         kind: Literal["tuning", "reporting"] = "tuning" if seed < 1000 else "reporting"
-        options = varied_options(seed, kind=kind, scenario=scenario, duration_s=duration)
+        structure = _structure(request.settings)
+        options = varied_options(seed, kind=kind, scenario=scenario, duration_s=duration, structure=structure)
     else:
         options = SimulationOptions(scenario=scenario, seed=seed, duration_s=duration)
     return replace(
@@ -159,6 +161,14 @@ def _keep_other_truth(path: Path, truth: MissionTruth) -> None:
         )
 
 
+def _structure(settings: list[str]) -> StructureOptions | None:
+    """Structure that the settings name; the last one counts."""
+    from replay.simulation.structures import StructureOptions
+
+    names = [text for key, _, text in (words.partition("=") for words in settings) if key == "structure" and text]
+    return StructureOptions(names[-1]) if names else None
+
+
 def _changed(options: SimulationOptions, settings: list[str]) -> SimulationOptions:
     """Options with constants changed as ``KEY=VALUE``.
 
@@ -168,15 +178,12 @@ def _changed(options: SimulationOptions, settings: list[str]) -> SimulationOptio
         Where a key is not known or a value is no number in its range.
     """
     values: dict[str, float] = {}
-    structure = options.structure
+    structure = _structure(settings)
     for words in settings:
         key, _, text = words.partition("=")
         if not text:
             raise ConfigError(f"--set {words}: the value is missing; expected KEY=VALUE")
         if key == "structure":
-            from replay.simulation.structures import StructureOptions
-
-            structure = StructureOptions(text)
             continue
         if key not in (*_PLANT, *_CONTROL, *_MISSION):
             known = ", ".join((*_PLANT, *_CONTROL, *_MISSION, "structure"))

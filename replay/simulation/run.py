@@ -96,7 +96,7 @@ def _run(
         geometry = options.machine.geometry
         assert geometry is not None  # checked by SimulationOptions
         per_turn = np.pi * geometry.wheel_diameter / options.machine.gear_ratio
-        chosen, machine_rng = options.structure.structure, options.structure.generator(options.seed)
+        chosen, machine_rng = options.structure.structure(options.seed), options.structure.generator(options.seed)
         drawn = draw_machine(chosen, model, machine_rng, per_turn, options.duration_s), structure_state(wheels)
     for k0 in range(0, steps, block):
         k = np.arange(k0, min(k0 + block, steps))

@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from replay.simulation.state import PlantModel
+from replay.simulation.structure import DRIVES, SHARINGS, SPEED_SENSORS, Span, Structure
 from replay.simulation.structured_state import StructureModel, neutral
-from replay.simulation.structures import DRIVES, SHARINGS, SPEED_SENSORS, Span, Structure
 
 _COUNTS, _POLES = 4096, 48  # encoder steps and hall poles per motor turn
 _POLE_SPREAD = 0.03  # uneven poles

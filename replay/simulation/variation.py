@@ -16,8 +16,13 @@ from replay.errors import ConfigError
 from replay.machine.config import haulotte
 from replay.simulation.options import Scenario, SimulatedLaw, SimulationOptions
 from replay.simulation.plant_options import PlantOptions
+from replay.simulation.random_structures import stiffest_loop
+from replay.simulation.structure import Structure
+from replay.simulation.structures import StructureOptions
 
 Kind = Literal["tuning", "reporting"]
+
+_DRY_ERROR = 0.15  # speed error at which the law overcomes dry friction [m/s]
 
 POOLS: Mapping[str, range] = {"tuning": range(1000), "reporting": range(2000, 2**63)}
 
@@ -136,9 +141,16 @@ _LAWS: tuple[tuple[SimulatedLaw, float], ...] = (
 
 
 def varied_options(
-    seed: int, *, kind: Kind, scenario: Scenario | None = None, duration_s: float = 120.0
+    seed: int,
+    *,
+    kind: Kind,
+    scenario: Scenario | None = None,
+    duration_s: float = 120.0,
+    structure: StructureOptions | None = None,
 ) -> SimulationOptions:
     """Options of one mission with plant, law, sensors, rate, ground, onsets and recorder drawn at random.
+
+    All else is drawn alike with and without a structure, so that figures of varied machines stay comparable.
 
     Parameters
     ----------
@@ -150,6 +162,9 @@ def varied_options(
         ``paper``, ``random`` or ``healthy``; None draws ``paper`` or ``random``.
     duration_s : float
         Length [s].
+    structure : StructureOptions or None
+        Another structure, whose drives, valves and sensors then replace those of the drawn plant; ``random`` draws it
+        by the seed. λ is lowered where the structure's loop would ring.
 
     Raises
     ------
@@ -170,7 +185,7 @@ def varied_options(
     fault_scenario: Scenario = "paper" if rng.random() < 0.5 else "random"
     control = replace(
         haulotte().control,
-        lambda_=_tame(draw(ranges.lambda_), plant),
+        lambda_=_tamed(draw(ranges.lambda_), plant, None if structure is None else structure.structure(seed)),
         k_ps=draw(ranges.k_ps),
         zeta=draw(ranges.zeta),
     )
@@ -194,6 +209,7 @@ def varied_options(
         drop_burst_s=draw(ranges.drop_burst_s),
         machine=replace(haulotte(), control=control),
         plant=plant,
+        structure=structure,
     )
 
 
@@ -206,8 +222,14 @@ def _check_seed(seed: int, kind: Kind) -> None:
         raise ConfigError(f"seed = {seed} is not a {kind} seed; expected {where}")
 
 
-def _tame(lambda_: float, plant: PlantOptions) -> float:
-    """λ that neither makes the loop ring (damping at least 0.5) nor leaves the machine behind its commands (Kλ ≥ 1.5)."""
+def _tamed(lambda_: float, plant: PlantOptions, structure: Structure | None) -> float:
+    """λ that neither makes the loop ring nor leaves the machine behind its commands (Kλ ≥ 1.5)."""
+    if structure is not None:
+        gain, least = float(np.mean(structure.gain)), 1.5
+        if structure.drive == "torque":
+            gain, dry = float(np.mean(structure.acceleration)), structure.coulomb[1] + structure.stribeck[1]
+            least = 1.5 * structure.viscous[1] + dry / _DRY_ERROR
+        return float(f"{min(max(lambda_, least / gain), stiffest_loop(structure) / gain):.4g}")
     tau, lag = plant.tau, plant.valve_lag
     if lag > 0.0:
         lambda_ = min(lambda_, ((tau + lag) ** 2 / (tau * lag) - 1.0) / plant.K)

@@ -3,7 +3,7 @@
 Each structure of `replay.simulation.structures` gives machines (one per seed) that drive missions with faults of wheels and
 axles, and healthy ones; all are diagnosed with default settings, or with ``--fit`` by a machine file fitted from three more
 healthy missions of the same machine. Tune on structures of kind ``tuning`` with seeds below 1000 alone; published figures
-come from kind ``reporting`` with seeds from 2000 on. Driving time; undecided time counts as wrong but in ``decided``.
+come from kind ``reporting`` with seeds from 2000 on. ``--structure random`` draws the effects of each machine too. Driving time; undecided time counts as wrong but in ``decided``.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ from replay.mission import Mission
 from replay.signals.timeline import align
 from replay.simulation.options import SimulationOptions
 from replay.simulation.run import simulate_mission
-from replay.simulation.structures import STRUCTURES, StructureOptions
+from replay.simulation.structures import STRUCTURE_NAMES, STRUCTURES, StructureOptions
 
 FIRST = {"tuning": 0, "reporting": 2000}
 
@@ -62,15 +62,16 @@ class Outcome:
 
 def options_of(task: Task, scenario: str, number_of: int) -> SimulationOptions:
     """A mission of the task's machine."""
-    structure = STRUCTURES[task.structure]
-    rate = float(np.random.default_rng([task.seed, 29]).choice(structure.rate_hz))
+    structure = StructureOptions(task.structure, machine_seed=task.seed)
+    rates = structure.structure(task.seed).rate_hz
+    rate = float(np.random.default_rng([task.seed, 29]).choice(rates))
     return SimulationOptions(
         scenario="healthy" if scenario == "healthy" else "random",
         seed=10 * task.seed + number_of,
         duration_s=task.duration,
         rate_hz=rate,
         steering_faults=True,
-        structure=StructureOptions(task.structure, machine_seed=task.seed),
+        structure=structure,
     )
 
 
@@ -164,7 +165,7 @@ def main() -> None:
     parser.add_argument("--first", type=int, default=0, help="added to the first seed")
     parser.add_argument("--duration", type=float, default=120.0, help="length of a mission [s]")
     parser.add_argument("--evidence", nargs="+", choices=EVIDENCE, default=list(EVIDENCE))
-    parser.add_argument("--structure", nargs="+", choices=list(STRUCTURES), default=None)
+    parser.add_argument("--structure", nargs="+", choices=STRUCTURE_NAMES, default=None)
     parser.add_argument("--fit", action="store_true", help="fit a machine file from three healthy missions")
     parser.add_argument("--jobs", type=int, default=1)
     choice = parser.parse_args()

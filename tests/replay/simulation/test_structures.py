@@ -10,6 +10,7 @@ from replay.simulation import run, structured_plant, structured_sensors, structu
 from replay.simulation.options import SimulatedMission, SimulationOptions
 from replay.simulation.plant import scan
 from replay.simulation.state import Recording
+from replay.simulation.structure import Structure
 from replay.simulation.structure_draw import draw_machine
 from replay.simulation.structures import STRUCTURES, StructureOptions
 
@@ -43,7 +44,9 @@ def test_blocks_change_no_number() -> None:
 def drawn(name: str, options: SimulationOptions) -> structured_state.StructureModel:
     model = run.mission_parts(options)[2]
     choice = StructureOptions(name, machine_seed=options.structure.machine_seed if options.structure else None)
-    return draw_machine(choice.structure, model, choice.generator(options.seed), 0.15, options.duration_s)[1]
+    return draw_machine(
+        choice.structure(options.seed), model, choice.generator(options.seed), 0.15, options.duration_s
+    )[1]
 
 
 def test_missions_of_one_machine_share_its_sizes() -> None:
@@ -107,3 +110,11 @@ def test_play_holds_until_it_is_crossed() -> None:
         held = structured_sensors.play(value, held, 0.1)
         seen.append(held)
     assert seen == pytest.approx([0.0, 0.0, 0.1, 0.1, 0.1, 0.0])
+
+
+def test_a_structure_of_ones_own_is_taken() -> None:
+    own = Structure(kind="tuning", dead_band=(0.04, 0.04))
+    options = StructureOptions(own, machine_seed=4)
+    assert options.structure(1) is own
+    mission = run.simulate_mission(replace(healthy("pump"), structure=options))
+    assert np.isfinite(mission.columns["wheel.FR.v"]).all()
