@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from diagnosis.fitting.robust import Estimate
 from replay.control.law_fit import MIN_EXPLAINED, LawFit
+from replay.control.local_fit import PiFit
 from replay.control.loop import Replay, stack
 from replay.control.mfhca import LAW_TEXT
 from replay.machine.config import Machine
@@ -20,8 +21,8 @@ Array = NDArray[np.float64]
 _FAR = 0.2
 _UNIT_NEAR = 0.08
 _VERY_FAR = 3.0
+_SURE = 2.0  # standard deviations
 _ROUGH = 0.7
-_MISFIT_DOUBT = 4.0  # error of λ̂ per share left unexplained, as seen on simulated missions
 
 
 @dataclass(frozen=True)
@@ -42,6 +43,8 @@ class ControlFit:
         Missions that agree, and those that do not.
     why : str
         Why nothing is given.
+    pi : PiFit or None
+        Proportional and integral law with feed-forward of most missions, where no reading explains them.
     """
 
     law: str
@@ -54,11 +57,26 @@ class ControlFit:
     missions: tuple[int, ...]
     left_missions: tuple[int, ...]
     why: str = ""
+    pi: PiFit | None = None
 
 
 def _nothing(why: str) -> ControlFit:
     none = Estimate(float("nan"), float("nan"), why)
     return ControlFit("", "", none, none, none, float("nan"), none, (), (), why)
+
+
+def _other_law(replays: Sequence[Replay]) -> ControlFit | None:
+    """The law of missions whose commands a PI controller with feed-forward explains; None where it is not most of them."""
+    found = {m: r.pi for m, r in enumerate(replays) if r.pi is not None}
+    if len(found) <= sum(bool(r.fits) for r in replays) / 2:
+        return None
+    gains = np.array([(p.feed_forward, p.kp, p.ki) for p in found.values()])
+    spreads = np.array([p.spread for p in found.values()])
+    ff, kp, ki = (float(x) for x in np.median(gains, axis=0))
+    spread = tuple(float(x) for x in np.maximum(gains.std(axis=0), np.median(spreads, axis=0)))
+    pi = PiFit(ff, kp, ki, spread, min(p.explained for p in found.values()))  # type: ignore[arg-type]
+    left = tuple(m for m, r in enumerate(replays) if r.fits and m not in found)
+    return replace(_nothing("a PI law with feed-forward has none"), missions=tuple(found), left_missions=left, pi=pi)
 
 
 def fit_control(
@@ -85,6 +103,9 @@ def fit_control(
         return _nothing("no recorded valve command with the speed and its command")
     good = {m: f[0] for m, f in fits.items() if f[0].explained >= MIN_EXPLAINED and f[0].lambda_ > 0}
     if len(good) <= len(fits) / 2:
+        other = _other_law(replays)
+        if other is not None:
+            return other
         best = float(np.median([f[0].explained for f in fits.values()]))
         return _nothing(
             f"no reading of the law explains the recorded commands (best {100 * best:.0f} %, needed "
@@ -103,7 +124,7 @@ def fit_control(
     return ControlFit(
         law,
         psi,
-        _doubted(_mean([f.lambda_ for f in chosen], [f.lambda_std for f in chosen]), chosen),
+        _mean([f.lambda_ for f in chosen], [f.lambda_std for f in chosen]),
         _mean([f.zeta for f in chosen], []) if psi == "forced" else none,
         _mean(psi0, []) if psi == "printed" and psi0 else none,
         min(f.explained for f in chosen),
@@ -119,12 +140,6 @@ def _mean(values: list[float], within: list[float]) -> Estimate:
     inner = float(np.median(within)) if within else float("nan")
     std = spread if not np.isfinite(inner) else inner if not np.isfinite(spread) else max(spread, inner)
     return Estimate(float(np.median(values)), std)
-
-
-def _doubted(e: Estimate, fits: Sequence[LawFit]) -> Estimate:
-    """Add what the reading leaves unexplained, as a share of the value: a step of delay more or less shows there."""
-    left = _MISFIT_DOUBT * float(np.sqrt(max(1.0 - f.explained for f in fits)))
-    return Estimate(e.value, float(np.hypot(np.nan_to_num(e.std), left * e.value)), e.why)
 
 
 def _increments(missions: Sequence[tuple[Timeline, Replay]], fit: LawFit, machine: Machine) -> Estimate:
@@ -155,16 +170,19 @@ def lambda_doubt(
 ) -> tuple[str, tuple[str, ...]]:
     """Sentence about a λ̂ far from the machine file's, and which signals of the wheels it puts in doubt.
 
-    Empty where λ̂ is near, or only unlike a λ that the file leaves open (law = auto) by less than a factor of three.
+    Empty where λ̂ is near, where its standard deviation leaves that open, or where it is only unlike a λ that the file leaves
+    open (law = auto) by less than a factor of three. What λ̂ could be within two standard deviations counts, never λ̂ alone.
     """
     if not fit.law:
         return "", ()
     ratio = fit.lambda_.value / machine.control.lambda_
-    if abs(ratio - 1) <= _FAR:
+    doubt = _SURE * float(np.nan_to_num(fit.lambda_.std)) / machine.control.lambda_
+    if abs(ratio - 1) <= max(_FAR, doubt):
         return "", ()
     condition = f"{LAW_TEXT[fit.law]}, Ψ̂ {fit.psi}, fitted jointly, {100 * fit.explained:.1f} % explained"
-    head = f"λ̂ = {fit.lambda_.value:.4g} s/m is {ratio:.3g} times control.lambda = {machine.control.lambda_:g} ({condition})"
-    very_far = not 1 / _VERY_FAR < ratio < _VERY_FAR
+    stated = f"{fit.lambda_.value:.4g} ± {np.nan_to_num(fit.lambda_.std):.2g}"
+    head = f"λ̂ = {stated} s/m is {ratio:.3g} times control.lambda = {machine.control.lambda_:g} ({condition})"
+    very_far = ratio - doubt > _VERY_FAR or ratio + doubt < 1 / _VERY_FAR
     # with a wrong unit ρ is wrong too, and λ̂ a little with it
     reach = _ROUGH if very_far else _UNIT_NEAR
     near = {n: abs(float(np.log(ratio * f))) for n, (f, _) in factors.items()}

@@ -70,15 +70,20 @@ def with_offset(machine: Machine, d: Estimate, blocks: int, missions: int, const
     return replace(machine, geometry=replace(geometry, wheels=places))
 
 
+_UNSURE_LAMBDA = 0.5  # standard deviation of λ̂, as a share, from which it is not written
+
 _LAWS: dict[str, Law] = {"signed": "signed", "opposed": "opposed", "printed": "printed", "sign_abs": "sign_abs"}
 _PSI: dict[str, PsiMode] = {"printed": "printed", "forced": "forced"}
 
 
 def with_control(out: Machine, machine: Machine, fit: ControlFit, doubt: bool, constants: list[Constant]) -> Machine:
-    """Put law, λ, ζ into the control section."""
+    """Put law, λ, ζ into the control section; a law that is none of MFHCA's as ``none``."""
     before, count = machine.control, len(fit.missions)
-    held = not doubt and bool(fit.law)
-    why = "far from the machine file's, see the unit errors" if doubt else ""
+    if fit.pi is not None:
+        out = replace(out, control=replace(before, law="none"))
+    sure = not fit.law or not fit.lambda_.std > _UNSURE_LAMBDA * abs(fit.lambda_.value)
+    held = not doubt and sure and bool(fit.law)
+    why = "far from the machine file's, see the unit errors" if doubt else "" if sure else "too uncertain"
     steady = isfinite(fit.psi0.value) and fit.psi0.std < 0.1 * fit.psi0.value
     psi0_why = (
         "" if steady or not isfinite(fit.psi0.value) else "differs between wheels and missions: left to be fitted"

@@ -160,9 +160,16 @@ def _left_laws(control: ControlFit, names: tuple[str, ...]) -> list[str]:
 
 def _law_notes(control: ControlFit) -> tuple[str, ...]:
     """What the control law explains, where one was found."""
+    n = len(control.missions)
+    if control.pi is not None:
+        pi, (ff, kp, ki) = control.pi, control.pi.spread
+        return (
+            f"The controller is none of MFHCA's: proportional and integral with feed-forward, {pi.text} (± {ff:.2g}, {kp:.2g}, "
+            f"{ki:.2g}), explains at least {100 * pi.explained:.1f} % of the command within a second of {n} "
+            f'mission{"" if n == 1 else "s"}. control.law = "none" is written: there is no Ψ̂ to replay.',
+        )
     if not control.law:
         return ()
-    n = len(control.missions)
     return (
         f"Control law {control.law}, Ψ̂ {control.psi}, explains at least {100 * control.explained:.1f} % of the command "
         f"of {n} mission{'' if n == 1 else 's'}; λ̂ from increments {control.increments.value:.4g} ± "

@@ -19,7 +19,10 @@ _FORCING_S = 0.25
 
 @dataclass(frozen=True)
 class LoopLaw:
-    """What a loop is replayed with: reading of the law, mode of Ψ̂, λ [s/m], ζ [s/m²], u_max, and ξ, β [1/s]."""
+    """What a loop is replayed with: reading of the law, mode of Ψ̂, λ [s/m], ζ [s/m²], u_max, ξ, β [1/s], and order.
+
+    `lead` is the share of a step by which the forced Ψ̂ is ahead of its sample; see `replay.control.mfhca.forced_psi`.
+    """
 
     law: str
     psi: str
@@ -28,6 +31,7 @@ class LoopLaw:
     u_max: float
     xi: float
     beta: float
+    lead: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -80,7 +84,7 @@ def scan_wheel(
             free = np.where(bound, np.nan, squared)
             psi, _, event = mfhca.event_reset_psi(rho, free, dt, threshold, state=event, before=before)
         elif law.psi == "forced":
-            psi, forced = mfhca.forced_psi(rho, v[part] - v_ref[part], dt, law.zeta, forced, before)
+            psi, forced = mfhca.forced_psi(rho, v[part] - v_ref[part], dt, law.zeta, forced, before, law.lead)
         before = float(mfhca.fill_forward(rho, before)[-1])
         near = slice(max(0, part.start - half), part.stop + half)
         forcing = _forcing(law, u[near], v[near], v_ref[near], dt)[part.start - near.start :][: rho.size]
@@ -94,10 +98,13 @@ def decimated(size: int) -> int:
     return max(1, size // FIT_SAMPLES)
 
 
-def decay_shapes(v: Array, v_ref: Array, dt: float, xi: float, beta: float) -> tuple[Array, Array]:
-    """Ψ̂²/Ψ̂(0)² of the printed law and Ψ̂²/ζ² of the forced one at every `decimated` step; state runs through all."""
+def decay_shapes(v: Array, v_ref: Array, dt: float, xi: float, beta: float) -> tuple[Array, Array, Array]:
+    """Ψ̂/Ψ̂(0) of the printed law, and Ψ̂/ζ of the forced one before and after each step, at every `decimated` step.
+
+    The state runs through all steps.
+    """
     stride = decimated(v.size)
-    printed, driven = [], []
+    printed, driven, ahead = [], [], []
     total = forced = before = 0.0
     for part in blocks(v.size):
         rho = mfhca.decay_rate(v[part], v_ref[part], xi, beta)
@@ -105,10 +112,11 @@ def decay_shapes(v: Array, v_ref: Array, dt: float, xi: float, beta: float) -> t
         psi, forced = mfhca.forced_psi(rho, v[part] - v_ref[part], dt, 1.0, forced, before)
         before = float(mfhca.fill_forward(rho, before)[-1])
         first = -part.start % stride
-        printed.append(decay[first::stride] ** 2)
-        driven.append(psi[first::stride] ** 2)
+        printed.append(decay[first::stride])
+        driven.append(psi[first::stride])
+        ahead.append(np.append(psi[1:], forced)[first::stride])
         release(v, v_ref)
-    return np.concatenate(printed), np.concatenate(driven)
+    return np.concatenate(printed), np.concatenate(driven), np.concatenate(ahead)
 
 
 def _implied(law: LoopLaw, u: Array, v: Array, v_ref: Array) -> tuple[Array, NDArray[np.bool_]]:
@@ -124,7 +132,7 @@ def _forcing(law: LoopLaw, u: Array, v: Array, v_ref: Array, dt: float) -> Array
 def _fitted_start(law: LoopLaw, u: Array, v: Array, v_ref: Array, dt: float) -> float:
     stride = decimated(v.size)
     squared, bound = _implied(law, u[::stride], v[::stride], v_ref[::stride])
-    decay = np.sqrt(decay_shapes(v, v_ref, dt, law.xi, law.beta)[0])
+    decay = decay_shapes(v, v_ref, dt, law.xi, law.beta)[0]
     return mfhca.fit_psi0(decay, squared, ~bound)
 
 

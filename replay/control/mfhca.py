@@ -136,25 +136,45 @@ def _scan_fill(x, last, out):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _scan_forced(rho, e, dt, gain, psi):  # type: ignore[no-untyped-def]
+def _scan_forced(rho, e, dt, gain, psi, lead):  # type: ignore[no-untyped-def]
     """Ψ̂ ← Ψ̂·exp(−ρ dt) + gain·e²·dt; NaN inputs leave the forcing out. Returns values and the state."""
     out = np.empty(rho.size)
     for k in range(rho.size):
-        out[k] = psi
+        before = psi
         psi = psi * np.exp(-rho[k] * dt)
         if not np.isnan(e[k]):
             psi += gain * e[k] * e[k] * dt
+        out[k] = before + lead * (psi - before)
     return out, psi
 
 
 def forced_psi(
-    rho: Array, e: Array, dt: float, zeta: float, start: float = 0.0, before: float = 0.0
+    rho: Array, e: Array, dt: float, zeta: float, start: float = 0.0, before: float = 0.0, lead: float = 0.0
 ) -> tuple[Array, float]:
-    """Ψ̂ of the forced mode, Ψ̂' = −ρΨ̂ + ½ζe²; returns Ψ̂, shape (n,), and the state to carry on with.
+    """Ψ̂ of the forced mode, Ψ̂' = −ρΨ̂ + ½ζe².
 
-    `start` and `before` are the state and the last known ρ of the block before.
+    Parameters
+    ----------
+    rho, e : Array, shape (n,)
+        Decay rate [1/s] and error [m/s] of every sample.
+    dt : float
+        Step [s].
+    zeta : float
+        ζ [s/m²].
+    start, before : float
+        State and last known ρ of the block before.
+    lead : float
+        Share of a sample's own step that its Ψ̂ already holds: 0 where the controller gives the command before it advances
+        Ψ̂, 1 where after; recorded more slowly than controlled, one of m control steps after is (m + 1)/2m.
+
+    Returns
+    -------
+    psi : Array, shape (n,)
+        Ψ̂ with which each command is given.
+    state : float
+        To carry on with.
     """
-    out, state = _scan_forced(fill_forward(rho, before), e, dt, 0.5 * zeta, start)
+    out, state = _scan_forced(fill_forward(rho, before), e, dt, 0.5 * zeta, start, lead)
     return np.asarray(out), float(state)
 
 

@@ -92,6 +92,17 @@ def test_forced_law_without_error_decays_as_printed() -> None:
         assert_allclose(got, 0.3 * mfhca.printed_decay(rho, 0.01)[0], rtol=1e-12)
 
 
+def test_a_lead_lies_between_this_step_and_the_next() -> None:
+    rng = np.random.default_rng(5)
+    rho, e = 1.0 + rng.random(50), 0.05 * rng.normal(size=50)
+    before, state = mfhca.forced_psi(rho, e, 0.01, 1000.0)
+    after, same = mfhca.forced_psi(rho, e, 0.01, 1000.0, lead=1.0)
+    half, _ = mfhca.forced_psi(rho, e, 0.01, 1000.0, lead=0.5)
+    assert same == state
+    assert_allclose(after, np.append(before[1:], state))
+    assert_allclose(half, (before + after) / 2)
+
+
 def test_forced_law_in_blocks_is_the_whole() -> None:
     rng = np.random.default_rng(4)
     rho, e = 1.0 + rng.random(400), 0.05 * rng.normal(size=400)
