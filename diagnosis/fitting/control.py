@@ -61,8 +61,8 @@ class ControlFit:
 
 
 def _nothing(why: str) -> ControlFit:
-    none = Estimate(float("nan"), float("nan"), why)
-    return ControlFit("", "", none, none, none, float("nan"), none, (), (), why)
+    none, same = (Estimate(float("nan"), float("nan"), text) for text in (why, "as control.lambda"))
+    return ControlFit("", "", none, same, same, float("nan"), none, (), (), why)
 
 
 def _other_law(replays: Sequence[Replay]) -> ControlFit | None:

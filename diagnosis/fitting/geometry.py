@@ -23,6 +23,8 @@ _SLIP = 0.04  # share of φ̇·d that slip and a lagging loop take or add
 _LEAST = 30
 _MOST, _MOST_STD = 1.5, 0.05  # m
 _LEAST_LEVER = 0.02
+_MOST_APART = 0.12  # what slip in held turns makes of the offset, seen up to 0.1 m, against that from steering [m]
+_SURE = 2.0
 _FULL = 20
 
 
@@ -89,6 +91,12 @@ def fit_offset(timelines: Sequence[Timeline], machine: Machine, bad: set[str]) -
     why = f"from steering movements; turning at held angles would give {d[0]:.3g} m, slip and tracking included"
     if abs(d[1]) > _MOST or not std[1] < _MOST_STD:
         return _nothing(f"too uncertain: {d[1]:.2g} ± {std[1]:.2g} m")
+    apart, doubt = abs(float(d[1] - d[0])), _SURE * float(np.hypot(std[0], std[1]))
+    if apart > max(_MOST_APART, 0.5 * float(np.abs(d).max()), doubt):
+        return _nothing(
+            f"steering movements give {d[1]:.3g} ± {std[1]:.2g} m, turning at held angles {d[0]:.3g} ± {std[0]:.2g} m: they "
+            "contradict each other"
+        )
     spread = float(np.hypot(std[1], _SLIP * d[1]))
     return Estimate(float(d[1]), spread, why), int(np.count_nonzero(turning)), found
 

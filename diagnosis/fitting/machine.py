@@ -103,6 +103,8 @@ def with_control(out: Machine, machine: Machine, fit: ControlFit, doubt: bool, c
     return replace(out, control=control)
 
 
+_LEFT_OUT = "the wheel is left out"  # which says why, once
+
 _PLANT = (("K", "m/s per full opening"), ("tau", "s"), ("dead", "of full opening"), ("offset", "m/s"), ("load", "m/s"))
 
 
@@ -116,7 +118,7 @@ def with_plants(
         for name, unit in _PLANT:
             e = Estimate(float("nan"), float("nan"), f"{error} has a wrong unit or sign" if error else "not logged")
             if fit is not None:
-                e = Estimate(float("nan"), float("nan"), fit.refused) if fit.refused else getattr(fit, name)
+                e = Estimate(float("nan"), float("nan"), _LEFT_OUT) if fit.refused else getattr(fit, name)
             old = None if before is None else getattr(before, name)
             if name == "tau" and isfinite(e.value) and not isfinite(e.std):
                 e = Estimate(float("nan"), e.std, f"{e.why}; {e.value if old is None else old:g} s is assumed")

@@ -16,6 +16,9 @@ Mask = NDArray[np.bool_]
 
 _LEAST_WHEELS = 3
 _ODD_WHEEL = 0.25
+_SURE = 3.0  # standard deviations by which a gain is odd
+_ALSO_LEFT = 0.1  # share of the other wheels' windows left out from which a wheel's own is no sign of a fault
+_UNSURE_GAIN = 0.5  # standard deviation of a gain, as a share, from which it is not written
 _START_TAU = 0.25
 _LOAD_S = 0.5
 _LEAST_PARTS = 10
@@ -43,10 +46,9 @@ def fit_plants(missions: list[list[WheelRecord | None]], flow: float | None) -> 
     fits = _each(missions)
     if flow is not None and any(f is not None and not f.refused for f in fits):
         fits = _each([_fed_by_pump(m, fits, flow) for m in missions])
-    fits = _without_odd_wheels(fits)
-    return [
-        None if f is None else _with_load(f, [m[i] for m in missions]) for i, f in enumerate(_shared(missions, fits))
-    ]
+    fits = _without_odd_wheels(_blamed_on_the_model(fits))
+    fits = _without_unsure_wheels(_shared(missions, fits))
+    return [None if f is None else _with_load(f, [m[i] for m in missions]) for i, f in enumerate(fits)]
 
 
 def _shared(missions: list[list[WheelRecord | None]], fits: list[WheelFit | None]) -> list[WheelFit | None]:
@@ -108,20 +110,63 @@ def _fed_by_pump(
     return [None if r is None else replace(r, use=r.use & free) for r in wheels]
 
 
+def _blamed_on_the_model(fits: list[WheelFit | None]) -> list[WheelFit | None]:
+    """Say of wheels whose windows contradict each other that no map holds, where those of the others do so too."""
+    known = [f for f in fits if f is not None]
+    left = [f.left_share for f in known]
+    out: list[WheelFit | None] = []
+    for f in fits:
+        if f is not None and f.refused and f.left_share > 0.0 and len(known) >= _LEAST_WHEELS:
+            others = float(np.median([x for x, g in zip(left, known, strict=True) if g is not f]))
+            if others > _ALSO_LEFT:
+                text = (
+                    f"{100 * f.left_share:.0f} % of its {f.considered} steady windows disagree with the rest, and {100 * others:.0f} % "
+                    "of the other wheels' with theirs: no map from opening to speed holds for these drives"
+                )
+                f = _refused_for(f, text)
+        out.append(f)
+    return out
+
+
+def _without_unsure_wheels(fits: list[WheelFit | None]) -> list[WheelFit | None]:
+    """Refuse gains whose standard deviation leaves them open."""
+    return [
+        f
+        if f is None or f.refused or f.K.std <= _UNSURE_GAIN * f.K.value
+        else _refused_for(f, f"too uncertain: a gain of {f.K.value:.3g} ± {f.K.std:.2g} m/s per full opening")
+        for f in fits
+    ]
+
+
+def _refused_for(fit: WheelFit, why: str) -> WheelFit:
+    return replace(fit, refused=why)
+
+
 def _without_odd_wheels(fits: list[WheelFit | None]) -> list[WheelFit | None]:
-    """Refuse wheels whose gain lies far from that of most others."""
+    """Refuse wheels whose gain lies surely far from that of most others.
+
+    Far is beyond what the standard deviations and the scatter of the others leave open: where no map holds, all gains
+    scatter, and none of the wheels is to blame. A wheel that alone is uncertain is.
+    """
     gains = [f.K.value for f in fits if f is not None and not f.refused]
     if len(gains) < _LEAST_WHEELS:
         return fits
     middle = float(np.median(gains))
     out: list[WheelFit | None] = []
     for f in fits:
-        if f is not None and not f.refused and abs(f.K.value / middle - 1) > _ODD_WHEEL:
+        if f is None or f.refused:
+            out.append(f)
+            continue
+        others = [g.K for g in fits if g is not None and not g.refused and g is not f]
+        apart = float(np.std([k.value for k in others], ddof=1))
+        usual = float(np.nanmedian([k.std for k in others]))
+        doubt = _SURE * float(np.sqrt(np.nansum(np.square([min(f.K.std, 2 * usual), apart, usual]))))
+        if abs(f.K.value - middle) > max(_ODD_WHEEL * middle, doubt):
             text = (
                 f"its gain of {f.K.value:.3g} m/s per full opening disagrees with the other wheels' {middle:.3g}: a "
                 "fault in all missions, or a wrong unit or gain of its signals"
             )
-            f = replace(f, refused=text)
+            f = _refused_for(f, text)
         out.append(f)
     return out
 

@@ -7,7 +7,7 @@ load makes effort and load go together. Windows in which the speed changes give 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -51,6 +51,8 @@ class WheelFit:
         See `replay.machine.config.WheelPlant`.
     odd : tuple[tuple[int, int], ...]
         Steady windows that disagree: mission, and the window's number in it.
+    left_share : float
+        Share of the steady windows that disagree.
     """
 
     K: Estimate
@@ -65,6 +67,7 @@ class WheelFit:
     refused: str = ""
     load: Estimate = UNKNOWN
     odd: tuple[tuple[int, int], ...] = ()
+    left_share: float = 0.0
 
     @property
     def used(self) -> int:
@@ -206,11 +209,12 @@ def fit_wheel(records: list[WheelRecord], start_tau: float) -> WheelFit:
     steady = int(np.count_nonzero(w.steady & np.isin(w.mission, allowed)))
     share = 1 - np.count_nonzero(found.weight) / max(1, steady)
     if share > _MAX_LEFT_OUT:
-        return _refused(
+        refused = _refused(
             f"{100 * share:.0f} % of its {steady} steady windows disagree with the rest (limit "
             f"{100 * _MAX_LEFT_OUT:.0f} %): it may have been faulty; use missions in which it was healthy",
             w,
         )
+        return replace(refused, left_share=float(share))
     if found.K <= 0:
         return _refused("speed falls with opening: the sign of its speed or of its opening is wrong", w)
     return _finished(w, found, dead, tau, left, steady)
@@ -244,6 +248,7 @@ def _finished(w: Windows, found: _Map, dead: float, tau: Estimate, left: list[in
         tuple(sorted(set(w.mission[found.weight > 0].tolist()))),
         tuple(sorted(left)),
         odd=tuple(zip(w.mission[out].tolist(), w.place[out].tolist(), strict=True)),
+        left_share=1.0 - np.count_nonzero(found.weight) / max(1, steady),
     )
 
 

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from replay.control.local_fit import local_lambda
+from replay.control.local_fit import LAMBDA_S, local_lambda
 from replay.control.loop_kernel import decay_shapes, decimated
 from replay.control.mfhca import LAW_TEXT, Array, adaptive_sign, proportional_part
 
@@ -23,7 +23,8 @@ MIN_EXPLAINED = 0.9
 _LEADS = (0.0, 0.5, 1.0)
 _ORDER_SHOWS = 0.98  # residual with another order, as a share, from which the order shows
 _MISFIT_DOUBT = 4.0  # error of λ̂ per share left unexplained, as seen on simulated missions
-_LOCAL_DOUBT = 0.005  # error of λ̂ from windows: Ψ̂² is no exact line there
+_LOCAL_DOUBT = 0.005  # least error of λ̂ from windows, as a share
+_LENGTH_DOUBT = 0.3  # share of what a window of twice the length changes
 
 
 @dataclass(frozen=True)
@@ -118,7 +119,10 @@ def fit_law(
     if best.psi == "forced":
         best = _in_order(best, samples)
     if best.psi == "forced" and best.lambda_std > _LOCAL_DOUBT * abs(best.lambda_):
-        local = [local_lambda(best.law, u[:, i], v[:, i], v_c[:, i], dt, u_max) for i in samples.wheels]
+        windows = (LAMBDA_S, 2 * LAMBDA_S)
+        local = [
+            [local_lambda(best.law, u[:, i], v[:, i], v_c[:, i], dt, u_max, s) for s in windows] for i in samples.wheels
+        ]
         best = _with_local(best, samples, np.array(local))
     return best, *others
 
@@ -208,14 +212,17 @@ def _least(fit: LawFit, tried: list[LawFit], s: _Samples) -> LawFit:
 
 
 def _with_local(fit: LawFit, s: _Samples, local: NDArray[np.float64]) -> LawFit:
-    """The reading with λ̂ from short windows, where that is surer."""
-    known = local[np.isfinite(local)]
+    """The reading with λ̂ of each wheel from short windows, and from windows twice as long, where that is surer.
+
+    What the length of the windows changes is doubt: Ψ̂² is no exact line within them.
+    """
+    known = local[np.isfinite(local).all(axis=1)]
     if not known.size:
         return fit
-    middle = float(np.median(known))
-    spread = float(np.std(known)) if known.size > 1 else 0.0
-    doubt = float(np.hypot(spread, _LOCAL_DOUBT * abs(middle)))
+    middle, longer = np.median(known, axis=0).tolist()
+    spread = float(np.std(known[:, 0]))
+    doubt = float(np.sqrt(spread**2 + (_LOCAL_DOUBT * middle) ** 2 + (_LENGTH_DOUBT * (longer - middle)) ** 2))
     if not doubt < fit.lambda_std:
         return fit
-    found = _fit_one(fit.law, fit.psi, s, fit.lead, np.where(np.isfinite(local), local, middle))
+    found = _fit_one(fit.law, fit.psi, s, fit.lead, np.where(np.isfinite(local[:, 0]), local[:, 0], middle))
     return LawFit(**{**vars(found), "lambda_": middle, "lambda_std": doubt})

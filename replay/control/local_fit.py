@@ -15,7 +15,8 @@ from numpy.typing import NDArray
 from replay.control.mfhca import Array, adaptive_sign, proportional_part
 
 _SAMPLES = 1 << 16  # of a wheel that are looked at
-_LAMBDA_S, _PI_S = 0.1, 1.0  # length of a window
+LAMBDA_S = 0.05  # length of a window over which Ψ̂² is a line
+_PI_S = 1.0
 _LEAST_LENGTH, _LEAST_WINDOWS = 5, 8
 _PARTS = 10
 
@@ -28,7 +29,9 @@ def spread_windows(size: int, length: int) -> NDArray[np.int64]:
     return np.asarray(first[:, None] + np.arange(length))
 
 
-def local_lambda(law: str, u: Array, v: Array, v_c: Array, dt: float, u_max: float) -> float:
+def local_lambda(
+    law: str, u: Array, v: Array, v_c: Array, dt: float, u_max: float, window_s: float = LAMBDA_S
+) -> float:
     """λ of one wheel, with Ψ̂² a line within each window and its present step free.
 
     u = λ·p + s·(Ψ₀² + Ψ₁²t) + c·s·Ψ₀e² with the law's proportional part p and sign s; the last term is what the sample's own
@@ -44,13 +47,15 @@ def local_lambda(law: str, u: Array, v: Array, v_c: Array, dt: float, u_max: flo
         Step [s].
     u_max : float
         Saturation [fraction].
+    window_s : float
+        Length of a window [s].
 
     Returns
     -------
     float
         λ̂ [s/m]; NaN where too few windows answer.
     """
-    places = spread_windows(u.size, max(_LEAST_LENGTH, round(_LAMBDA_S / dt)))
+    places = spread_windows(u.size, max(_LEAST_LENGTH, round(window_s / dt)))
     u, v, v_c = (np.asarray(x[places]) for x in (u, v, v_c))
     part, sign = proportional_part(law, v, v_c), adaptive_sign(law, v, v_c)
     good = _free(u, u_max) & np.isfinite(part).all(axis=1) & (sign != 0).all(axis=1)

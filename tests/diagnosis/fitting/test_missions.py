@@ -152,6 +152,7 @@ def test_a_wheel_unlike_the_others_is_refused() -> None:
     result = fit_missions([mission(3, faults=(fault,))], haulotte())
     assert any("wheel RL" in text and "disagrees with the other wheels" in text for text in result.left_out)
     assert "RL" not in result.machine.plant.wheels
+    assert fit_toml(result).count("disagrees with the other wheels") == 1  # the reason is given once
 
 
 def test_too_little_driving_is_no_fit() -> None:
