@@ -36,7 +36,7 @@ def test_lambda_whatever_is_added_slowly(law: str) -> None:
 
 def test_lambda_of_too_short_a_log_is_not_known() -> None:
     v, v_c = drive()
-    assert np.isnan(local_lambda("signed", v[:200], v[:200], v_c[:200], DT, 1.0))
+    assert np.isnan(local_lambda("signed", v[:100], v[:100], v_c[:100], DT, 1.0))
 
 
 def pi_command(v: Array, v_c: Array, ff: float, kp: float, ki: float) -> Array:
