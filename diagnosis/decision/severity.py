@@ -2,9 +2,16 @@
 
 Assumption 1: a sensor that is stuck or silent is tolerable when brief, else stop and repair. Assumption 2: a stuck
 actuator, or one without control signal, means stop at once. Everything else is watched.
+
+Both are about the part that is named, so *high* needs its probability, not that of any fault: the named side must be faulty
+with `limits.min_probability` (as every stated fault is), and be stuck or without signal with odds of three to one. A machine
+that is stopped for the wrong part, or for a row that is no reason to stop, stands without need; the fault that misses these
+bounds is still *medium*, to be checked before the next mission.
 """
 
 from __future__ import annotations
+
+from collections.abc import Container
 
 from diagnosis.results.assessment import Finding
 from diagnosis.results.fault_rows import row_of
@@ -15,7 +22,7 @@ from replay.machine.config import Limits
 _LIKELY = 0.6  # probability of any fault from which on one is worth a check
 _MARKED_EPSILON = 0.3
 _SHORT_NOISE_S = 1.0
-_PROBABLY_TOTAL = 0.5
+_PROBABLY_TOTAL = 0.75  # that the named side is stuck or without signal, from which on the machine is stopped
 
 
 def severity_of(finding: Finding, seconds: float, limits: Limits, kind: Kind = Kind.WHEEL) -> tuple[Severity, str]:
@@ -42,7 +49,12 @@ def severity_of(finding: Finding, seconds: float, limits: Limits, kind: Kind = K
 
 def _severity_of_total(finding: Finding, seconds: float, limits: Limits, kind: Kind) -> tuple[Severity, str]:
     """Severity and advice of a part that is stuck or without signal, with enough probability of a fault."""
-    if sum(h.p for h in finding.hypotheses if h.mode in TOTAL) < _PROBABLY_TOTAL:
+    if _of_named_side(finding) < limits.min_probability:
+        return (
+            Severity.MEDIUM,
+            "Faulty, but which part is not certain enough to stop for: check sensor and valve before the next mission.",
+        )
+    if _of_named_side(finding, TOTAL) < _PROBABLY_TOTAL:
         return (
             Severity.MEDIUM,
             "Faulty, but probably neither stuck nor without signal: check it before the next mission.",
@@ -62,6 +74,13 @@ def _severity_of_total(finding: Finding, seconds: float, limits: Limits, kind: K
     return Severity.HIGH, (
         f"Stop and repair the sensor: it delivered nothing usable for more than {limits.brief:g} s (Assumption 1)."
     )
+
+
+def _of_named_side(finding: Finding, modes: Container[str] | None = None) -> float:
+    """Probability that the side that the finding names is faulty, of given modes or any."""
+    named = [h for h in finding.hypotheses if h.mode != "healthy" and (modes is None or h.mode in modes)]
+    either = finding.side is Side.SENSOR_OR_ACTUATOR
+    return sum(h.p for h in named if either or h.side == finding.side.value)
 
 
 def _check_of(finding: Finding, kind: Kind) -> str:

@@ -101,10 +101,11 @@ def findings_of(path: WheelPath, limits: Limits, *, gains: bool) -> WheelFinding
             continue
         if runs.model[r] in TOTAL_SENSOR and path.model.constant_noise >= path.model.noise:
             held = y[start:stop][np.isfinite(y[start:stop])]
-            if held.size and float(np.ptp(held)) > 0:
-                continue  # it moves, by a rounding step at least
-            if held.size and _as_expected(path, r, float(held[0])):
-                out.opened[Side.SENSOR][start:stop] = True  # rounding hides the noise of a steady speed
+            moves = held.size > 0 and float(np.ptp(held)) > 0  # by a rounding step at least: it is not stuck
+            expected = held.size > 0 and _as_expected(path, r, float(np.median(held)))
+            if moves or expected:
+                for side in _left_by_rounding(moves=moves, expected=expected):
+                    out.opened[side][start:stop] = True
                 continue
         run = Run(start, stop, int(runs.model[r]), evidence.evidence[r], evidence.mean[r], evidence.cov[r])
         verdict = judge(run, y[start:stop], path.model, limits, path.names, path.dt, gains=gains)
@@ -115,6 +116,17 @@ def findings_of(path: WheelPath, limits: Limits, *, gains: bool) -> WheelFinding
         if verdict.finding is not None:
             out.findings.append(_detected(path, r, verdict.finding))
     return out
+
+
+def _left_by_rounding(*, moves: bool, expected: bool) -> tuple[Side, ...]:
+    """Sides that stay open where a steady speed has no noise because of its rounding.
+
+    A speed that a healthy wheel would have says nothing against the valve, and nothing of the sensor unless it moves. Any other
+    speed that moves is no stuck sensor; what it is instead, such as a valve that stands open, the run does not tell.
+    """
+    if expected:
+        return () if moves else (Side.SENSOR,)
+    return (Side.SENSOR, Side.ACTUATOR)
 
 
 def _edges(path: WheelPath, r: int) -> tuple[int, int]:

@@ -60,6 +60,7 @@ class _Draft:
     missing: dict[str, str] = field(default_factory=dict)
     notes: list[str] = field(default_factory=list)
     named: list[str] = field(default_factory=list)
+    given: dict[tuple[str, str], str] = field(default_factory=dict)  # by source and channel: signal that it is given as
 
     def take(
         self, name: str, log: RawLog, channel: Channel, converted: Converted, origin: SignalSource, guessed: bool
@@ -128,6 +129,7 @@ def _take_given(draft: _Draft, name: str, source: SignalSource, logs: Sequence[R
         origin = replace(source, unit=unit)
         converted = convert(name, _data(log, channel, origin), origin, draft.machine, log.store)
         draft.take(name, log, channel, converted, origin, False)
+        draft.given.setdefault((log.source, channel.name), name)
         return
     known = [k for log in chosen for k in log.channels]
     near = difflib.get_close_matches(source.label, known, 3, 0.6)
@@ -142,6 +144,10 @@ def _take_guess(draft: _Draft, name: str, found: list[tuple[Candidate, RawLog]])
     for i, (candidate, log) in enumerate(ranked):
         channel = _find(log, candidate.origin)
         if channel is None:
+            continue
+        other = draft.given.get((log.source, channel.name))
+        if other is not None:  # the machine file says what it is
+            reason = f"{candidate.origin.label}, which would fit, is given as {other}"
             continue
         data = _data(log, channel, candidate.origin)
         if not np.isfinite(data[1]).any():
@@ -161,11 +167,20 @@ def _take_guess(draft: _Draft, name: str, found: list[tuple[Candidate, RawLog]])
         text = f"{name} is taken from {origin.label} ({candidate.why}"
         text += f", in {origin.unit.replace('1', 'fractions')}" if origin.unit else ", unit not stated, SI assumed"
         text += f" at the {origin.at})" if origin.unit in ("rpm", "rad/s") and name.startswith("wheel.") else ")"
-        rivals = [c.origin.label for c, _ in ranked[i + 1 :] if c.rank == candidate.rank]
+        rivals = [
+            c.origin.label
+            for c, rival in ranked[i + 1 :]
+            if c.rank == candidate.rank and not _is_given(draft, rival, c)
+        ]
         text += f"; {rivals[0]} would fit as well" if rivals else ""
         draft.notes.append(text)
         return
     draft.missing[name] = reason
+
+
+def _is_given(draft: _Draft, log: RawLog, candidate: Candidate) -> bool:
+    channel = _find(log, candidate.origin)
+    return channel is not None and (log.source, channel.name) in draft.given
 
 
 def _size(log: RawLog, candidate: Candidate) -> int:

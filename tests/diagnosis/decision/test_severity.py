@@ -100,3 +100,36 @@ def test_what_to_check_is_said_of_the_row(side: Side, mode: FaultMode, kind: Kin
     assert severity_of(finding(side, mode, epsilon=0.5), 60.0, LIMITS, kind)[1] == (
         f"This alone is no reason to stop; {words}."
     )
+
+
+def split(*parts: tuple[str, str, float]) -> tuple[Hypothesis, ...]:
+    return tuple(Hypothesis(*part) for part in parts)
+
+
+@TOTAL
+def test_a_part_that_may_be_the_other_one_does_not_stop_the_machine(mode: FaultMode) -> None:
+    found = replace(
+        finding(Side.ACTUATOR, mode, p=0.5),
+        hypotheses=split(("actuator", mode.value, 0.5), ("sensor", "stuck", 0.48), ("none", "healthy", 0.02)),
+    )
+    severity, advice = severity_of(found, 8.0, LIMITS)
+    assert severity == "medium"
+    assert "which part is not certain" in advice
+
+
+def test_odds_of_three_to_one_for_a_dead_part_stop_the_machine() -> None:
+    for p, expected in ((0.7, "medium"), (0.8, "high")):
+        rest = ("actuator", "noisy", 0.98 - p)
+        found = replace(
+            finding(Side.ACTUATOR, FaultMode.STUCK, p=p),
+            hypotheses=split(("actuator", "stuck", p), rest, ("none", "healthy", 0.02)),
+        )
+        assert severity_of(found, 8.0, LIMITS)[0] == expected
+
+
+def test_stuck_or_silent_is_one_dead_part() -> None:
+    found = replace(
+        finding(Side.SENSOR, FaultMode.STUCK, p=0.5),
+        hypotheses=split(("sensor", "stuck", 0.5), ("sensor", "no_signal", 0.48), ("none", "healthy", 0.02)),
+    )
+    assert severity_of(found, 8.0, LIMITS)[0] == "high"

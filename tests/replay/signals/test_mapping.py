@@ -232,6 +232,22 @@ def test_given_signals_are_taken_exactly() -> None:
     assert not found["wheel.FR.v"].guessed
 
 
+def test_a_channel_that_is_given_is_guessed_for_nothing_else() -> None:
+    names = [f"wheel_{w.lower()}" for w in MACHINE.wheels]
+    second = joints({f"velocity[{n}]": np.full(200, 0.3) for n in names}, "/wheel_reference_speeds")
+    assert "wheel.FR.v_ref" in mapped(*second).items  # by its topic's name alone
+    machine = replace(
+        MACHINE,
+        signals={
+            f"wheel.{w}.v_true": SignalSource(topic="/wheel_reference_speeds", field=f"velocity[{n}]", unit="rad/s")
+            for w, n in zip(MACHINE.wheels, names, strict=True)
+        },
+    )
+    found = mapped(*second, machine=machine)
+    assert set(found.items) == {f"wheel.{w}.v_true" for w in MACHINE.wheels}
+    assert "is given as wheel.FR.v_true" in found.missing["wheel.FR.v_ref"]
+
+
 def test_a_given_signal_that_is_not_there_is_missing_with_similar_names() -> None:
     found = mapped(channel("MAIN.fSpeed", [1.0]), machine=given(cmd__v=SignalSource(symbol="MAIN.fSped", unit="m/s")))
     assert "cmd.v" not in found.items
