@@ -232,6 +232,7 @@ def scan(
             out.steer_u_late[row] = state.line[(k - U_DELAY) % DELAY_LINE, 2 * n + 2 :]
             body[:] = state.body
         _move(k, slope[j], u_v, p, m, state, s, slip, flow)
+        line[n : 2 * n] = state.spool  # a measured opening is the spool's, not the command's
         if recorded:
             out.slip[row], out.body[row] = slip, body
             row += 1
