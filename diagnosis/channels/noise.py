@@ -18,6 +18,8 @@ Array = NDArray[np.float64]
 
 COARSE_STEP_S = 0.005  # slower logs do not fix the delay between a command and its measurement
 _COARSE_SHARE = 0.3
+_MOST_SHARE = 2.5  # of a reference that is white between its samples too it is 2: more is a fault
+_GRID_PARTS, _GRID_SAMPLES, _GRID_SHARE = 20, 100, 0.4
 _PLACES = 8000
 _SOUND_SHARE = 0.25  # quantile of windows that stands for healthy ones
 _QUIET_WINDOW_S, _QUIET_SHARE = 0.5, 0.4  # quantile of windows that stands for healthy ones
@@ -28,6 +30,19 @@ def moving_sum(x: NDArray[np.float64] | NDArray[np.bool_], width: int) -> Array:
     """Sum over a centred window of `width` samples, shape (n,); the window is cut at the ends, and to n."""
     width = min(width, x.size)
     return np.convolve(np.asarray(x, dtype=np.float64), np.ones(width), mode="same") if width else np.zeros(0)
+
+
+def usual_rounding(values: Array) -> float:
+    """Rounding step of a channel of which parts may be off their grid; 0 where most show none.
+
+    A faulty channel's noise or loss of gain takes its values off the grid of the healthy ones.
+    """
+    whole = rounding_step(values)
+    if whole > 0.0 or values.size < _GRID_PARTS * _GRID_SAMPLES:
+        return whole
+    found = np.array([rounding_step(part) for part in np.array_split(values, _GRID_PARTS)])
+    shown = found > 0.0
+    return float(np.median(found[shown])) if np.mean(shown) > _GRID_SHARE else 0.0
 
 
 def usual_distance(new: NDArray[np.bool_]) -> float:
@@ -166,9 +181,9 @@ def white_part(x: Array) -> Array:
 
 
 def unresolved(
-    residual: Array, x: Array, use: NDArray[np.bool_], noise: float, dt: float
-) -> tuple[NDArray[np.bool_], float]:
-    """Where a reference changes faster than the log's rate can resolve, so that a delay below a step decides y − x.
+    residual: Array, x: Array, use: NDArray[np.bool_], noise: float, dt: float, known: float | None = None
+) -> tuple[Array, float]:
+    """What comes to y − x because a reference changes faster than the log's rate can resolve: a delay below a step decides.
 
     The share of the reference's white part that shows up in the residual is read off the mission: where that part is
     large, the lower quartile over windows of 0.3 s. It is near 0 where the delay is a whole number of steps.
@@ -183,11 +198,13 @@ def unresolved(
         Healthy noise of y − x.
     dt : float
         Step [s].
+    known : float or None
+        The share, where it is known from elsewhere.
 
     Returns
     -------
-    blind : NDArray[np.bool_], shape (n,)
-        Samples that cannot be judged.
+    power : Array, shape (n,)
+        Variance that comes to the noise [unit²].
     share : float
         Share of the power of the white part that shows up; 0 where all is resolved.
     """
@@ -201,7 +218,9 @@ def unresolved(
     share = _COARSE_SHARE if dt >= COARSE_STEP_S else 0.0
     if np.count_nonzero(lively) >= 10 * width:
         seen = uniform_filter1d(np.where(kept, residual, 0.0) ** 2, width, mode="constant")
-        share = max(share, float(np.quantile(seen[lively] / power[lively], _SOUND_SHARE)))
+        found = float(np.quantile(seen[lively] / power[lively], _SOUND_SHARE))
+        share = max(share, found if found < _MOST_SHARE else 0.0)
+    share = share if known is None else known
     if share <= 0.05:
-        return np.zeros(x.size, dtype=np.bool_), 0.0
-    return np.asarray(share * power > (2 * noise) ** 2), share
+        return np.zeros(x.size), 0.0
+    return share * power, share

@@ -1,0 +1,188 @@
+"""How a channel is updated: at every sample, in counting windows, or when the wheel has travelled from pole to pole.
+
+A counting window gives one value for its whole length; a pole sensor gives the mean speed between two poles, holds it until
+the next one, longer at low speed, and reads zero after a timeout. Held values are no news, and a hold speaks for a stuck
+channel only beyond this habit. No healthy window is assumed: every figure is a median over windows in which values change.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from diagnosis.channels.noise import rounding_step, usual_distance
+
+Array = NDArray[np.float64]
+
+_WINDOW_S = 0.5
+_LEAST_RUNS, _LEAST_WINDOWS = 3, 5
+_MOST_WINDOWS = 300
+_SHORT, _ABOUT = 0.2, 1.3  # quantile of the runs of a window: a repeated value is one long run; how alike two are
+_FALLING = -0.35  # exponent of the hold over the speed: −1 between poles, 0 in counting windows
+_APART = 0.3  # least distance of two log-speeds that say something about it
+_LEAST_PAIRS = 20
+_TICK_RUNS = 60
+_TIMEOUT_S, _LONGEST_S = 0.25, 1.0
+
+
+class Habit(NamedTuple):
+    """How long a channel holds a value.
+
+    Attributes
+    ----------
+    window : float
+        Shortest hold [s]; the sample period where every sample is news.
+    travel : float
+        What moves past between two updates [unit·s]; 0 where the hold does not depend on the speed.
+    timeout : float
+        Longest hold [s], after which the channel reads zero.
+    stepwise : bool
+        Whether values are held for longer than a sample.
+    tick : float
+        Rounding step of the inverse of the value [1/unit]: time between two poles is counted in clock ticks.
+    """
+
+    window: float
+    travel: float
+    timeout: float
+    stepwise: bool
+    tick: float = 0.0
+
+    def hold(self, speed: Array) -> Array:
+        """Time between two updates at some speeds [s]."""
+        if not self.travel:
+            return np.full(speed.shape, self.window)
+        with np.errstate(divide="ignore"):
+            return np.clip(self.travel / np.abs(speed), self.window, self.timeout)
+
+    def rounding_noise(self, lsb: float) -> float:
+        """Variance of the white part of a channel by its rounding alone, as second differences show it [unit²].
+
+        A value is off by lsb²/12. A count is the difference of two rounded places, f(k) − f(k−1), so that the second
+        differences of counts are third differences of f, of 20 times its variance and 20/6 of that as white noise.
+        """
+        return lsb**2 / 12 * (20.0 / 6.0 if self.stepwise else 1.0)
+
+    def rounding(self, speed: Array) -> Array:
+        """Rounding step at some speeds by the counted time [unit]."""
+        return np.asarray(self.tick * speed**2)
+
+
+EVERY_SAMPLE = Habit(0.0, 0.0, 0.0, stepwise=False)
+
+
+class _Runs(NamedTuple):
+    """Runs of one value between two changes: first step, length [steps], the value held and the next one."""
+
+    start: NDArray[np.intp]
+    length: NDArray[np.intp]
+    value: Array
+    following: Array
+
+
+def identify_habit(y: Array, fresh: NDArray[np.bool_], dt: float) -> Habit:
+    """Habit of a channel.
+
+    Parameters
+    ----------
+    y : Array, shape (n,)
+        Its readings; NaN where not valid.
+    fresh : NDArray[np.bool_], shape (n,)
+        Steps with a new sample.
+    dt : float
+        Step [s].
+    """
+    known = fresh & np.isfinite(y)
+    period = dt * (usual_distance(known) if np.count_nonzero(known) > 1 else 1.0)
+    every = Habit(period, 0.0, period, stepwise=False)
+    runs = _runs(y, known)
+    moving = (runs.value != 0.0) & (runs.following != 0.0) & ~_fading(runs, period / dt)
+    shortest, distance, speed = _by_window(runs, moving, max(1, round(_WINDOW_S / dt)), dt)
+    if shortest.size < _LEAST_WINDOWS:
+        return every
+    window = float(np.median(shortest)) * dt
+    if window < 1.5 * period:
+        return every
+    slope = _slope(np.log(speed), np.log(shortest))
+    if slope is not None and slope > _FALLING:
+        return Habit(window, 0.0, window, stepwise=True)
+    travel = float(np.median(distance))
+    return Habit(period, travel, _timeout(runs, travel, dt), stepwise=True, tick=_tick(runs))
+
+
+def _runs(y: Array, known: NDArray[np.bool_]) -> _Runs:
+    steps = np.flatnonzero(known)
+    values = y[steps]
+    change = np.flatnonzero(np.diff(values) != 0.0) + 1
+    start = steps[change]
+    return _Runs(start[:-1], np.diff(start), values[change[:-1]], values[change[1:]])
+
+
+def _fading(runs: _Runs, sample: float) -> NDArray[np.bool_]:
+    """Runs of one sample that only say that the next pole is late: its speed can be no more than a pole in this time."""
+    falls = np.abs(runs.value) < np.abs(np.r_[np.inf, runs.value[:-1]])
+    return np.asarray(falls & (runs.length <= 1.5 * sample))
+
+
+def _by_window(runs: _Runs, use: NDArray[np.bool_], width: int, dt: float) -> tuple[Array, Array, Array]:
+    """Of windows with several runs: their usual shortest run [steps], median travel of a run [unit·s] and median speed [unit]."""
+    window = runs.start[use] // width
+    if not window.size:
+        return np.zeros(0), np.zeros(0), np.zeros(0)
+    length, following = runs.length[use], np.abs(runs.following[use])
+    first = np.flatnonzero(np.diff(window, prepend=window[0] - 1))
+    last = np.r_[first[1:], window.size]
+    many = last - first >= _LEAST_RUNS
+    first, last = first[many], last[many]
+    some = np.linspace(0, first.size - 1, min(first.size, _MOST_WINDOWS)).round().astype(np.intp)
+    found = [_usual(length[a:b], following[a:b]) for a, b in zip(first[some], last[some], strict=True)]
+    table = np.array(found, dtype=np.float64).reshape(-1, 3)
+    return table[:, 0], table[:, 1] * dt, table[:, 2]
+
+
+def _usual(length: NDArray[np.intp], following: Array) -> tuple[float, float, float]:
+    """A short run, but not the shortest ones, median travel of runs about as long, and median speed."""
+    least = float(np.quantile(length, _SHORT, method="nearest"))
+    kept = length <= _ABOUT * least
+    return least, float(np.median(length[kept] * following[kept])), float(np.median(following))
+
+
+def _slope(x: Array, y: Array) -> float | None:
+    """Median slope of all pairs that lie apart in x (Theil and Sen); None where there are too few."""
+    i, j = np.triu_indices(x.size, 1)
+    apart = np.abs(x[i] - x[j]) > _APART
+    if np.count_nonzero(apart) < _LEAST_PAIRS:
+        return None
+    i, j = i[apart], j[apart]
+    return float(np.median((y[i] - y[j]) / (x[i] - x[j])))
+
+
+def _tick(runs: _Runs) -> float:
+    """Step on which the inverse of the held values lies; 0 where most parts of the mission show none."""
+    held = np.abs(runs.value[(runs.length > 1) & (runs.value != 0.0)])
+    parts = [rounding_step(1.0 / x) for x in np.array_split(held, max(1, held.size // _TICK_RUNS))]
+    found = [step for step in parts if step > 0.0]
+    return float(np.median(found)) if 2 * len(found) > len(parts) else 0.0
+
+
+def _timeout(runs: _Runs, travel: float, dt: float) -> float:
+    """Hold before the channel falls to zero [s]: by its length, or by the speed that it stands for where it fades."""
+    fell = (runs.following == 0.0) & (runs.value != 0.0)
+    if not fell.any():
+        return _TIMEOUT_S
+    held = np.maximum(runs.length[fell] * dt, travel / np.abs(runs.value[fell]))
+    return float(np.clip(np.median(held), 2 * dt, _LONGEST_S))
+
+
+def of_kind(habits: Sequence[Habit]) -> list[Habit]:
+    """Habits of sensors of one kind: one that did not show its own has what most of the others have."""
+    shown = [h for h in habits if h.stepwise]
+    if 2 * len(shown) <= len(habits):
+        return list(habits)
+    window, travel, timeout, _, tick = (float(x) for x in np.median(np.array(shown, dtype=np.float64), axis=0))
+    usual = Habit(window, travel, timeout, stepwise=True, tick=tick)
+    between = usual.travel > 0.0
+    return [h if h.stepwise and (h.travel > 0.0) is between else usual for h in habits]
