@@ -36,11 +36,16 @@ def assess_pair(pair: Pair, limits: Limits) -> Assessment:
     limits : Limits
         Smallest ε and saturation term that count.
     """
-    found = identify(pair, limits)
+    return assess_identified(identify(pair, limits), limits)
+
+
+def assess_identified(found: IdentifiedPair, limits: Limits) -> Assessment:
+    """Judge a channel by its reference, as `assess_pair` does."""
+    pair = found.pair
     path = most_probable(with_consistent(found.samples, found.model.noise), found.model, pair.store)
     faults = find_faults(path, found, limits)
     states = _states(found, faults)
-    y, x, status, _ = found.samples
+    y, x, status, *_ = found.samples
     pictured = evidence_columns(found, path, steps_of(faults.findings, x.size, pair.dt))
     return Assessment(
         states=states,
@@ -84,10 +89,21 @@ def _reasons(side: Side) -> dict[State, str]:
 def _notes(found: IdentifiedPair, below: int) -> tuple[str, ...]:
     """Figures that the judgement used."""
     pair = found.pair
-    figures = (
-        f"{pair.y_name} against {pair.x_name}: noise {found.model.noise:.2g} {pair.unit}, rounding step {found.lsb:.2g} "
-        f"{pair.unit}, delay {found.lag * pair.dt * 1e3:.3g} ms."
-    )
+    relation, ms = found.relation, 1e3
+    parts = [
+        f"{pair.y_name} against {pair.x_name}: noise {found.model.noise:.2g} {pair.unit}",
+        f"rounding step {found.lsb:.2g} {pair.unit}",
+        f"delay {relation.delay * pair.dt * ms:.3g} ms",
+    ]
+    if relation.lag:
+        parts.append(f"lag {relation.lag * ms:.2g} ms")
+    if relation.play:
+        parts.append(f"hysteresis {relation.play:.2g} {pair.unit}")
+    if pair.habit.travel:
+        parts.append(f"values held for {pair.habit.travel:.2g} m of travel")
+    elif pair.habit.stepwise:
+        parts.append(f"values held for {pair.habit.window * ms:.2g} ms")
+    figures = ", ".join(parts) + "."
     if not below:
         return (figures,)
     return (

@@ -32,7 +32,8 @@ def evidence_columns(found: IdentifiedPair, path: ModePath, step: NDArray[np.int
     step : NDArray[np.int64], shape (m,)
         Steps of which every sample is wanted.
     """
-    pair, noise, (y_all, x, status, _) = found.pair, found.model.noise, found.samples
+    pair, model, noise = found.pair, found.model, found.model.noise
+    y_all, x, status, _, white, passing, _ = found.samples
     bucket, store = bucket_of(x.size), pair.store
     tracked = GainBiasModel(
         noise=noise,
@@ -51,7 +52,10 @@ def evidence_columns(found: IdentifiedPair, path: ModePath, step: NDArray[np.int
         use, y, ref = status[part] == PAIR, y_all[part], x[part]
         track = track_gain_bias(y, ref, use, tracked, state)
         state = track.state
-        residual, threshold = np.where(use, y - ref, np.nan), np.full(y.size, 3 * noise)
+        residual, threshold = (
+            np.where(use, y - ref, np.nan),
+            3 * np.sqrt(noise**2 * white[part] + model.tolerance**2 * (passing[part] - 1.0)),
+        )
         series = (residual, threshold, ref, track.delta, track.delta_std, track.bias, track.bias_std)
         for (name, column), values in zip(columns.items(), series, strict=True):
             column.append(envelope(values, bucket))

@@ -6,14 +6,18 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from diagnosis.direct.assess import assess_pair
+from diagnosis.channels.habit import Habit, identify_habit, of_kind
+from diagnosis.direct.assess import assess_identified
+from diagnosis.direct.identification import IdentifiedPair, identify
 from diagnosis.direct.inputs import Pair, make_pair
+from diagnosis.direct.uncertainty import usual_of_kind
 from diagnosis.estimation.lag import low_passed
 from diagnosis.evidence import ACTUATOR, SENSOR, Array, Contribution, Flags, MissionView, Part
 from diagnosis.results.assessment import Assessment, unassessed
 from diagnosis.results.vocabulary import Tier
 from replay.arrays.numeric import without_nan
 from replay.faults import Side, State
+from replay.machine.config import Limits
 from replay.progress import Progress, Stage
 
 _QUIET = 0.4  # of the driving speed
@@ -29,18 +33,47 @@ class DirectEvidence:
     def assess(self, mission: MissionView) -> Contribution:
         """Judge what is measured twice."""
         parts: dict[Part, Assessment] = {}
+        pairs: dict[Part, Pair] = {}
+        habits = _habits(mission)
         for wheel in mission.wheels:
-            mission.progress(Progress(Stage.JUDGING_WHEEL, wheel))
             one = _WheelPairs(mission, wheel)
             if (wheel, SENSOR) not in mission.known and one.logged("v_true") and one.logged("v"):
-                parts[wheel, SENSOR] = assess_pair(one.speeds(), mission.machine.limits)
+                pairs[wheel, SENSOR] = one.speeds(habits[wheel])
             if (wheel, ACTUATOR) not in mission.known and one.logged("u_applied"):
                 if one.logged("u"):
-                    parts[wheel, ACTUATOR] = assess_pair(one.openings(), mission.machine.limits)
+                    pairs[wheel, ACTUATOR] = one.openings()
                 else:
                     why = "the valve's position is logged but not its command"
                     parts[wheel, ACTUATOR] = unassessed(mission.timeline.size, State.NOT_ASSESSED, why)
+        limits = mission.machine.limits
+        for (wheel, side), found in _identified(pairs, limits, mission).items():
+            mission.progress(Progress(Stage.JUDGING_WHEEL, wheel))
+            parts[wheel, side] = assess_identified(found, limits)
         return Contribution(parts)
+
+
+def _identified(pairs: dict[Part, Pair], limits: Limits, mission: MissionView) -> dict[Part, IdentifiedPair]:
+    """Pairs with what is identified of them; noise that those of one kind do not have is none of a healthy channel."""
+    found = {}
+    for part, pair in pairs.items():
+        mission.progress(Progress(Stage.JUDGING_WHEEL, part[0]))
+        found[part] = identify(pair, limits)
+    for side in (SENSOR, ACTUATOR):
+        kind = {part: one for part, one in found.items() if part[1] == side}
+        usual = usual_of_kind([one.own for one in kind.values()])
+        for part, one in kind.items():
+            if usual is not None and one.own.exceeds(usual):
+                found[part] = identify(one.pair, limits, usual)
+    return found
+
+
+def _habits(mission: MissionView) -> dict[str, Habit]:
+    """How the speed sensors are updated, for wheels with a second one."""
+    twice = [w for w in mission.wheels if mission.logged(f"wheel.{w}.v") and mission.logged(f"wheel.{w}.v_true")]
+    names = [f"wheel.{w}.v" for w in twice]
+    timeline = mission.timeline
+    found = of_kind([identify_habit(timeline.signals[n], timeline.fresh[n], timeline.dt) for n in names])
+    return dict(zip(twice, found, strict=True))
 
 
 @dataclass(frozen=True)
@@ -56,10 +89,10 @@ class _WheelPairs:
     def logged(self, leaf: str) -> bool:
         return self.mission.logged(self.name(leaf))
 
-    def speeds(self) -> Pair:
+    def speeds(self, habit: Habit) -> Pair:
         """The speed sensor against the second one."""
         pair = self._pair(Side.SENSOR, "v", "v_true", self._quiet(), "m/s", 2.2 * self.mission.machine.max_speed)
-        return replace(pair, instruments=self._instruments())
+        return replace(pair, instruments=self._instruments(), habit=habit)
 
     def openings(self) -> Pair:
         """The valve's position against its command."""

@@ -2,23 +2,38 @@
 
 from __future__ import annotations
 
-from diagnosis.channels.sample_status import SILENT
-from diagnosis.estimation.fault_models import HEALTHY, UNSATURATED_ROWS, VARYING_ROWS, ModeModel
+import numpy as np
+from numpy.typing import NDArray
+
+from diagnosis.channels.sample_status import CLEAR, PAIR, SILENT
+from diagnosis.estimation.fault_models import (
+    HEALTHY,
+    SCALED_ROWS,
+    UNSATURATED_ROWS,
+    VALUE_ROWS,
+    VARYING_ROWS,
+    ModeModel,
+)
 from diagnosis.estimation.filter_kernel import segment_evidence
 from diagnosis.estimation.samples import Samples
 from diagnosis.estimation.segments import Run, absorb_short, join_noisy, merge_equal, runs_of, trim
 from diagnosis.estimation.viterbi import ModePath
 
+Array = NDArray[np.float64]
+
 _BRIDGE_S, _APART_S = 5.0, 30.0
 _BRIEF_S = 0.1
+_NEAR = 20  # samples between runs that follow each other
+_PLAYS = 3.0  # by which a command must move for a valve with a loss of gain to follow
 
 
-def fault_runs(path: ModePath, samples: Samples, model: ModeModel, dt: float, shortest: int) -> list[Run]:
+def fault_runs(path: ModePath, samples: Samples, model: ModeModel, dt: float, shortest: int, play: float) -> list[Run]:
     """Faulty runs of a path, joined where they belong together, without the ends in which nothing moves."""
     runs = absorb_short(runs_of(path), shortest)
     runs = join_noisy(runs)
     runs = merge_equal(runs, max(2, round(0.02 / dt)), VARYING_ROWS + UNSATURATED_ROWS)
     runs = _bridged(_renamed([r for r in runs if r.row != HEALTHY], samples, model), samples, model)
+    runs = _bridged(_resting(runs, samples, model, play), samples, model)
     out = []
     for run in runs:
         if run.row in UNSATURATED_ROWS:
@@ -30,6 +45,38 @@ def fault_runs(path: ModePath, samples: Samples, model: ModeModel, dt: float, sh
             run = kept
         out.append(run)
     return out
+
+
+def _resting(runs: list[Run], samples: Samples, model: ModeModel, play: float) -> list[Run]:
+    """Constant runs beside one of a loss of gain under that one's row, where the reference rests and the gain explains them.
+
+    The reference rests where it moves no more than its noise, or than a valve's play.
+    """
+    out = list(runs)
+    for i, run in enumerate(runs):
+        if run.row not in VALUE_ROWS:
+            continue
+        y, x, noise = _pairs(run, samples, model)
+        if y.size < 3 or (float(np.std(x)) > 2 * noise and float(np.ptp(x)) > _PLAYS * play):
+            continue
+        for near in out[max(0, i - 1) : i] + runs[i + 1 : i + 2]:
+            if near.row not in SCALED_ROWS or min(abs(run.start - near.stop), abs(near.start - run.stop)) > _NEAR:
+                continue
+            other, reference, _ = _pairs(near, samples, model)
+            power = float(reference @ reference)
+            delta = float(reference @ other) / power if power > 0.0 else 0.0
+            if abs(float(y.mean()) - delta * float(x.mean())) < max(noise, play):
+                out[i] = Run(run.start, run.stop, near.row)
+                break
+    return out
+
+
+def _pairs(run: Run, samples: Samples, model: ModeModel) -> tuple[Array, Array, float]:
+    """Both values of the samples of a run that have them, and their usual noise."""
+    part = samples.part(run.start, run.stop)
+    use = (part.status == PAIR) | (part.status == CLEAR)
+    white = part.white[use]
+    return part.y[use], part.x[use], model.noise * float(np.sqrt(white.mean())) if white.size else model.noise
 
 
 def _renamed(runs: list[Run], samples: Samples, model: ModeModel) -> list[Run]:

@@ -24,6 +24,7 @@ from replay.machine.config import Limits
 _SHORTEST_S = 0.01
 _HOLD_S = 0.1
 _LEAD_S, _TAIL_S, _CHAIN_S = 0.3, 0.1, 0.05
+_SETTLED_LAGS = 5.0  # after a fault a channel returns with its lag
 _GROWTH_S = 0.1  # a shorter time of growth is not worth a sentence
 
 
@@ -60,8 +61,9 @@ def find_faults(path: ModePath, found: IdentifiedPair, limits: Limits) -> Faults
     """
     dt, size = found.pair.dt, path.model.size
     shortest = max(3, round(_SHORTEST_S / dt))
-    runs = fault_runs(path, found.samples, found.model, dt, shortest)
-    chained = with_leads(runs, *(max(2, round(s / dt)) for s in (_LEAD_S, _TAIL_S, _CHAIN_S)))
+    runs = fault_runs(path, found.samples, found.model, dt, shortest, found.relation.play)
+    returns = _TAIL_S + _SETTLED_LAGS * (found.relation.lag + max(0.0, found.relation.delay * dt))
+    chained = with_leads(runs, *(max(2, round(s / dt)) for s in (_LEAD_S, returns, _CHAIN_S)))
     findings, timing, below = [], [], 0
     for i, (main, start, stop) in enumerate(chained):
         before, after = chained[i - 1][2] if i else 0, chained[i + 1][1] if i + 1 < len(chained) else size
@@ -97,7 +99,8 @@ def finding_of(run: Run, found: IdentifiedPair, limits: Limits) -> Finding | Non
     lines = sentences(isolated, found, mode, epsilon)
     if run.row in (STUCK, INEFFICIENT) and isolated.seen.still:
         # nothing moved: a constant value and a constant share of a constant are the same
-        p[STUCK] = p[INEFFICIENT] = (p[STUCK] + p[INEFFICIENT]) / 2
+        if run.row == STUCK:
+            p[STUCK] = p[INEFFICIENT] = (p[STUCK] + p[INEFFICIENT]) / 2
         lines += (alike_sentence(found),)
     shift = max(0, round(found.lag)) if pair.side is Side.ACTUATOR else 0
     hypotheses = [Hypothesis(pair.side.value, ROWS[row].value, float(p[row])) for row in codes_of(pair.side)]
@@ -117,12 +120,13 @@ def finding_of(run: Run, found: IdentifiedPair, limits: Limits) -> Finding | Non
 
 def _mode_of(isolated: Isolated, found: IdentifiedPair, limits: Limits) -> FaultMode | None:
     """Mode of an isolated run; None where it lies below the limits or may be noise."""
-    seen, noise = isolated.seen, found.model.noise
+    seen, noise = isolated.seen, isolated.seen.noise
     mode = FaultMode(ROWS[isolated.run.row])
     if mode.scaled:
         return _mode_of_gain(isolated, noise, limits)
     if mode.varying:
-        return None if seen.deviation < max(2.5 * noise, limits.min_sat / 2) else mode
+        least = max(2.5 * found.model.noise, 1.5 * noise, limits.min_sat / 2)
+        return None if seen.deviation < least else mode
     if found.pair.side is Side.ACTUATOR and seen.deviation < 2.5 * noise:
         return None  # the command hardly moved: a noisy reading of it looks constant too
     return mode

@@ -2,36 +2,33 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from diagnosis.channels.noise import (
-    moving_sum,
-    relative_lag,
-    rounding_step,
-    shifted,
-    slow_mismatch,
-    unresolved,
-    usual_distance,
-    white_noise,
-)
-from diagnosis.channels.sample_status import BLIND, PAIR, sample_status
+from diagnosis.channels.held import Held, held_reference, news_alone
+from diagnosis.channels.noise import moving_sum, relative_lag, shifted, unresolved, white_noise, white_part
+from diagnosis.channels.sample_status import BLIND, PAIR, SKIP, sample_status
 from diagnosis.direct.inputs import Pair
+from diagnosis.direct.relation import Relation, relation_of
+from diagnosis.direct.uncertainty import HealthyNoise, uncertainty_of
 from diagnosis.estimation.fault_models import ModeModel
 from diagnosis.estimation.samples import Samples
-from diagnosis.results.fault_rows import codes_of
 from replay.faults import Side
 from replay.machine.config import Limits
 
 Array = NDArray[np.float64]
 
 _MAX_LAG_S = 0.05
-_MEAN_HEALTHY_S = 60.0
-_COARSE_COST = 0.2  # where a log is too slow for its commands, what is left of them looks like a fault's drift
+_WHOLE = 0.25
+_JUMP = 3.5  # times the noise
+_COARSE, _COARSE_COST = (
+    0.3,
+    0.2,
+)  # where a log is too slow for its commands, what is left of them looks like a fault's drift
 _AROUND = 11
 _SETTLED = 7
 
@@ -63,8 +60,8 @@ class IdentifiedPair:
     ----------
     pair : Pair
         Channel, reference and circumstances.
-    lag : float
-        Delay of y against its reference [steps].
+    relation : Relation
+        How y follows its reference.
     samples : Samples
         The channel beside the reference, which is delayed as y is.
     model : ModeModel
@@ -75,15 +72,23 @@ class IdentifiedPair:
         Samples that cannot be judged because the command changes too fast for the log.
     unresolved_share : float
         Share of the power of the command's quick changes that shows up as a residual; 0 where all is resolved.
+    own : HealthyNoise
+        Noise of y − x.
     """
 
     pair: Pair
-    lag: float
+    relation: Relation
     samples: Samples
     model: ModeModel
     lsb: float
     unresolved: NDArray[np.bool_]
     unresolved_share: float = 0.0
+    own: HealthyNoise = field(default_factory=HealthyNoise)
+
+    @property
+    def lag(self) -> float:
+        """Delay of y against its reference [steps]."""
+        return self.relation.delay
 
     @property
     def coarse(self) -> bool:
@@ -99,15 +104,14 @@ class IdentifiedPair:
     def texture(self) -> Texture:
         """Noise and rounding step of both measurements."""
         pair = self.pair
-        known = pair.fresh & np.isfinite(pair.y)
+        known = np.isin(self.samples.status, (PAIR, BLIND))
         y, x = pair.y[known], self.samples.x[known]
-        lsb = pair.known_noise.lsb if pair.known_noise.lsb is not None else rounding_step(y)
         white, own = (float(np.nan_to_num(white_noise(z, pair.dt))) for z in (y, x))
-        return Texture(y.size, white, lsb, own)
+        return Texture(y.size, white, self.lsb, own)
 
 
-def identify(pair: Pair, limits: Limits) -> IdentifiedPair:
-    """Find delay and noise of a pair, and what of it the log does not resolve.
+def identify(pair: Pair, limits: Limits, usual: HealthyNoise | None = None) -> IdentifiedPair:
+    """Find how a channel follows its reference, its noise, and what of it the log does not resolve.
 
     Parameters
     ----------
@@ -115,62 +119,56 @@ def identify(pair: Pair, limits: Limits) -> IdentifiedPair:
         Channel, reference and circumstances.
     limits : Limits
         The smallest saturation term that counts bounds the mismatch of two healthy instruments.
+    usual : HealthyNoise or None
+        What healthy channels of its kind have; None: what this one has.
     """
-    usable = pair.fresh & np.isfinite(pair.y) & np.isfinite(pair.x)
-    max_lag = max(1, round(_MAX_LAG_S / pair.dt)) if pair.dt <= _MAX_LAG_S else 0
-    least_lag = 0 if pair.side is Side.ACTUATOR else -max_lag
-    lag = relative_lag(pair.y, pair.x, usable & ~pair.quiet, least_lag, max_lag)
-    x = pair.store.keep(shifted(pair.x, lag))
-    status = sample_status(pair.y, x, pair.fresh, pair.alive, pair.dt)
-    model, lsb = mode_model(pair, x, status, 0.25 * limits.min_sat)
-    blind, share = np.zeros(x.size, dtype=np.bool_), 0.0
-    if pair.side is Side.ACTUATOR:  # a command may jump from step to step, a speed may not
+    dt, sensor = pair.dt, pair.side is Side.SENSOR
+    habit = pair.habit
+    held = held_reference(pair.x, habit, dt) if habit.stepwise else Held(pair.x, np.zeros(pair.x.size))
+    hold = habit.hold(np.nan_to_num(held.mean))
+    relation = _relation(pair, held.mean, hold, sensor)
+    x = pair.store.keep(relation.expected(held.mean, dt))
+    spread = np.nan_to_num(shifted(held.spread, relation.delay))
+    status = sample_status(pair.y, x, pair.fresh, pair.alive, dt)
+    if habit.stepwise:
+        status = news_alone(status, pair.y, hold, dt)
+    doubt = uncertainty_of(pair, x, spread, status, 0.25 * limits.min_sat, relation, usual)
+    model = doubt.model
+    own, white, blind, share = doubt.own, doubt.white, np.zeros(x.size, dtype=np.bool_), 0.0
+    if not sensor:  # a command may jump from step to step, a speed may not
         paired = status == PAIR
-        blind, share = unresolved(np.where(paired, pair.y - x, np.nan), x, paired, model.noise, pair.dt)
+        known = None if usual is None else usual.unresolved
+        power, share = unresolved(np.where(paired, pair.y - x, np.nan), x, paired, model.noise, dt, known)
+        own = own._replace(unresolved=share)
         if share:
-            blind &= _unsettled(x, model.noise)
+            white = pair.store.keep(white + power / model.noise**2)
+            blind = _unsettled(x, model.noise * np.sqrt(white))
             status[blind & paired] = BLIND
-            model = replace(model, drift_cost=model.drift_cost + _COARSE_COST)
-    return IdentifiedPair(pair, lag, Samples(pair.y, x, status, pair.quiet), model, lsb, blind, share)
+            model = replace(model, drift_cost=model.drift_cost + _COARSE_COST * min(1.0, share / _COARSE))
+    samples = Samples(pair.y, x, status, pair.quiet, white, doubt.passing, doubt.constant)
+    return IdentifiedPair(pair, relation, samples, model, doubt.lsb, blind, share, own)
 
 
-def mode_model(pair: Pair, x: Array, status: NDArray[np.int8], tolerance: float) -> tuple[ModeModel, float]:
-    """Noise of the channel, found from the mission where the machine file does not give it, and its rounding step."""
-    paired = status == PAIR
-    fresh_y = pair.y[paired]
-    lsb = pair.known_noise.lsb if pair.known_noise.lsb is not None else rounding_step(fresh_y)
-    residual = np.where(paired, pair.y - x, np.nan)
-    period = pair.dt * max(1.0, usual_distance(paired) if fresh_y.size > 1 else 1.0)
-    white = white_noise(residual[paired], period)
-    slow = slow_mismatch(residual, paired & ~pair.quiet, pair.dt)
-    measured = max(np.nan_to_num(white), np.nan_to_num(slow))
-    noise = max(measured, pair.known_noise.std or 0.0, lsb / np.sqrt(12), 1e-5 * pair.span)
-    # a stuck sensor has no noise left, a stuck valve is still read by a noisy spool sensor
-    constant = max(lsb / np.sqrt(12), noise / 50) if pair.side is Side.SENSOR else noise
-    rate = 1.0 / period
-    # a command is known to the last digit, a second speed has noise of its own
-    own = white_noise(pair.x[paired], period) if pair.side is Side.SENSOR else 0.0
-    explained = min(0.5, np.nan_to_num(own) ** 2 / noise**2)
-    rows = len(codes_of(pair.side)) - 1  # every one of both sides is as probable as the others
-    model = ModeModel(
-        noise=noise,
-        constant_noise=constant,
-        tolerance=tolerance,
-        span=pair.span,
-        switch_cost=float(np.log(_MEAN_HEALTHY_S * rate * 2 * rows)),
-        dt=period,
-        own_cost=-0.5 * float(np.log(1.0 - explained)),
-        side=pair.side,
-    )
-    return model, lsb
+def _relation(pair: Pair, x: Array, hold: Array, sensor: bool) -> Relation:
+    """How y follows a reference that is already held as y is."""
+    usable = pair.fresh & np.isfinite(pair.y) & np.isfinite(x) & ~pair.quiet
+    if pair.habit.stepwise:
+        status = np.where(usable, PAIR, SKIP).astype(np.int8)
+        usable = news_alone(status, pair.y, hold, pair.dt) == PAIR
+    most = max(1, round(_MAX_LAG_S / pair.dt)) if pair.dt <= _MAX_LAG_S else 0
+    delays = (-most if sensor else 0, most)
+    delay = relative_lag(pair.y, x, usable, *delays)
+    if abs(delay - round(delay)) < _WHOLE:  # what one computer samples is late by whole steps
+        delay = float(round(delay))
+    start = Relation(delay=delay)
+    return relation_of(pair.y, x, usable, start, pair.dt, delays, 0.0 if sensor else pair.span)
 
 
-def _unsettled(x: Array, noise: float) -> NDArray[np.bool_]:
-    """Where a reference changes within three samples by more than the noise, shape (n,)."""
-    from scipy.ndimage import maximum_filter1d, minimum_filter1d
+def _unsettled(x: Array, noise: Array) -> NDArray[np.bool_]:
+    """Within three samples of a jump of the reference that noise does not explain, shape (n,)."""
+    from scipy.ndimage import maximum_filter1d
 
-    known = np.nan_to_num(x)
-    return np.asarray(maximum_filter1d(known, _SETTLED) - minimum_filter1d(known, _SETTLED) > 2 * noise)
+    return np.asarray(maximum_filter1d(np.abs(white_part(np.nan_to_num(x))), _SETTLED) > _JUMP * noise)
 
 
 def _neighbours(x: Array) -> Array:

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from diagnosis.channels.habit import EVERY_SAMPLE, Habit
 from diagnosis.channels.liveness import alive
 from replay.arrays.column_store import ColumnStore
 from replay.faults import Side
@@ -44,6 +45,8 @@ class Pair:
         From the machine file.
     instruments : Array, shape (n, k), or None
         Signals that drive x but know nothing of the fault; see `diagnosis.estimation.fault_size`.
+    habit : Habit
+        How y is updated.
     store : ColumnStore
         Where long columns stand.
     """
@@ -61,6 +64,7 @@ class Pair:
     x_name: str
     known_noise: Noise
     instruments: Array | None = None
+    habit: Habit = EVERY_SAMPLE
     store: ColumnStore = field(default_factory=ColumnStore, repr=False)
 
 

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from diagnosis.channels.sample_status import BLIND, PAIR
+from diagnosis.direct.behind_play import gain_behind_play
 from diagnosis.direct.fault_runs import inner
 from diagnosis.direct.identification import IdentifiedPair
 from diagnosis.estimation.fault_models import (
@@ -18,6 +19,7 @@ from diagnosis.estimation.fault_models import (
     STEADY_ROWS,
     STUCK,
     TOTAL_ROWS,
+    VARYING_ROWS,
 )
 from diagnosis.estimation.fault_size import estimate_fault
 from diagnosis.estimation.filter_kernel import segment_evidence
@@ -34,6 +36,7 @@ Estimate = tuple[Epsilon | None, Sat | None, float]
 # From tuning missions, by `python tests/benchmarks/calibrate_direct.py`: share of findings that are not what they seem, and
 # the length at which half of those in a log too slow for its commands are.
 _LAPSE, _COARSE_S = 0.01, 1.7
+_RESTLESS, _RESTLESS_P = 0.1, 0.8  # share of changing news from which a channel is not stuck, and how probably so
 _CLEARLY = 2.0  # times as probable as the path's row, from which on another one is stated
 
 
@@ -55,6 +58,8 @@ class RunSamples:
         Whether its reference hardly moves.
     deviation : float
         Root mean square of y − x [unit of y]; infinite where there is none.
+    noise : float
+        Root mean square of what a healthy channel would show in its place [unit of y].
     """
 
     y: Array
@@ -64,6 +69,7 @@ class RunSamples:
     zero: bool
     still: bool
     deviation: float
+    noise: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,18 +99,22 @@ class Isolated:
 
 def run_samples(run: Run, found: IdentifiedPair) -> RunSamples:
     """Samples of a run and what they look like."""
-    y, x, status, _ = found.samples.part(run.start, run.stop)
+    y, x, status, _, white, passing, _ = found.samples.part(run.start, run.stop)
     use = np.isin(status, (PAIR, BLIND))
     model = found.model
-    zero = not use.any() or abs(float(np.mean(y[use]))) <= 3 * model.constant_noise / np.sqrt(min(use.sum(), 100))
-    still = bool(use.any()) and float(np.std(x[use])) < 2 * model.noise
+    power = model.noise**2 * white[use] + model.tolerance**2 * (passing[use] - 1.0)
+    noise = float(np.sqrt(power.mean())) if use.any() else model.noise
+    play = found.relation.play
+    slack = 3 * model.constant_noise / np.sqrt(min(use.sum(), 100)) + 0.6 * play if use.any() else 0.0
+    zero = not use.any() or abs(float(np.mean(y[use]))) <= slack
+    still = bool(use.any()) and (float(np.std(x[use])) < 2 * noise or float(np.ptp(x[use])) < 2 * play)
     deviation = float(np.sqrt(np.mean((y[use] - x[use]) ** 2))) if use.any() else float("inf")
-    return RunSamples(y, x, status, use, zero, still, deviation)
+    return RunSamples(y, x, status, use, zero, still, deviation, noise)
 
 
 def estimate_run(run: Run, found: IdentifiedPair) -> Estimate | None:
     """ε̂, the saturation term and δ̂ of a run; see `estimate_fault`."""
-    y, x, status, _ = found.samples.part(run.start, run.stop)
+    y, x, status, *_ = found.samples.part(run.start, run.stop)
     use = np.isin(status, (PAIR, BLIND))
     known = found.instruments
     instruments = None if known is None else np.nan_to_num(known[run.start : run.stop][use])
@@ -135,6 +145,10 @@ def isolate(run: Run, found: IdentifiedPair) -> Isolated | None:
         other = estimate_run(replace(run, row=row), found)
         if other is not None:
             run, estimate = replace(run, row=row), other
+    if found.relation.play and run.row in VARYING_ROWS and (delta := gain_behind_play(run, found)) is not None:
+        p[INEFFICIENT], p[run.row] = p[run.row], p[INEFFICIENT]
+        run = replace(run, row=INEFFICIENT)
+        estimate = _of_gain(delta, estimate_run(run, found)) or estimate
     gain = float(evidence[run.row] - evidence[HEALTHY])
     p = _with_lapses(p, run.row, model.side, run.size * found.pair.dt if found.coarse else None)
     if run.row in TOTAL_ROWS and seen.zero:
@@ -142,13 +156,34 @@ def isolate(run: Run, found: IdentifiedPair) -> Isolated | None:
         run = replace(run, row=NO_SIGNAL)
         p[NO_SIGNAL] += p[STUCK] + p[INEFFICIENT]
         p[[STUCK, INEFFICIENT]] = 0.0
-    if run.row == INEFFICIENT and _shifted_away(seen, estimate[2], model.noise):  # a constant of its own, not a share
+    if run.row == STUCK and seen.still and found.pair.side is Side.SENSOR and _changes(seen) > _RESTLESS:
+        # nothing moved, but the last digit did: a stuck channel does not do that
+        other = estimate_run(replace(run, row=INEFFICIENT), found)
+        if other is not None and 0.0 < other[2] < 1.0:
+            run, estimate = replace(run, row=INEFFICIENT), other
+            both = p[STUCK] + p[INEFFICIENT]
+            p[INEFFICIENT], p[STUCK] = _RESTLESS_P * both, (1.0 - _RESTLESS_P) * both
+    if run.row == INEFFICIENT and _shifted_away(seen, estimate[2], seen.noise):  # a constant of its own, not a share
         run = replace(run, row=STUCK)
         other = estimate_run(run, found)
         if other is None:
             return None
         estimate = other
     return Isolated(run, seen, estimate, p, gain)
+
+
+def _changes(seen: RunSamples) -> float:
+    """Share of the news of a run that differ from the value before."""
+    y = seen.y[seen.use]
+    return float(np.mean(np.diff(y) != 0.0)) if y.size > 1 else 0.0
+
+
+def _of_gain(delta: float, estimate: Estimate | None) -> Estimate | None:
+    """An estimate of a loss of gain with another δ."""
+    if estimate is None or estimate[0] is None:
+        return estimate
+    half = 0.5 * (estimate[0].high - estimate[0].low)
+    return Epsilon(1.0 - delta, 1.0 - delta - half, 1.0 - delta + half), None, delta
 
 
 def _shifted_away(seen: RunSamples, delta: float, noise: float) -> bool:

@@ -37,7 +37,7 @@ def sentences(isolated: Isolated, found: IdentifiedPair, mode: FaultMode, epsilo
     if seen.use.any():
         out += _values(isolated, found, epsilon, seconds)
         out.append(
-            f"Residual {seen.deviation:.3g} {pair.unit} root mean square; threshold {3 * model.noise:.2g} {pair.unit}."
+            f"Residual {seen.deviation:.3g} {pair.unit} root mean square; threshold {3 * seen.noise:.2g} {pair.unit}."
         )
     if mode is FaultMode.OUTSIDE_TABLE:
         out.append("The gain is outside 0…1, which no row of the tables describes.")
@@ -71,6 +71,6 @@ def _values(isolated: Isolated, found: IdentifiedPair, epsilon: Epsilon | None, 
     if sat is not None:
         out.append(
             f"The rest has a mean of {sat.mean * epsilon.value:.3g} and a root mean square of {sat.rms * epsilon.value:.3g} "
-            f"{pair.unit}; healthy noise is {found.model.noise:.2g} {pair.unit}."
+            f"{pair.unit}; healthy noise is {seen.noise:.2g} {pair.unit}."
         )
     return out

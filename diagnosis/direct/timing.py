@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from diagnosis.channels.noise import white_part
 from diagnosis.direct.identification import IdentifiedPair
+from diagnosis.direct.isolation import run_samples
 from diagnosis.estimation.segments import Run
 from replay.faults import FaultMode, Side
 
@@ -25,7 +26,7 @@ def timing_explains(found: IdentifiedPair, run: Run, mode: FaultMode) -> bool:
     """Whether a deviation may be nothing but a delay between y and its reference, or its rounding.
 
     Shorter than a spool sensor's delay; or, where a log is too slow for its commands: what changes from sample to
-    sample is as large, or y is x with its sign at other moments, or a constant y is met by most samples of x. For a
+    sample is as large, or y is x with its sign at other moments, or a constant y is as far off as a healthy one may be. For a
     speed: shorter than half a second and no more than 10 ms of the reference's slope, or a reading that rests beside a
     reference that hardly moves, no longer than its noise allows. Whatever the rate, the answer to a command of which
     nothing is left but jumps between samples depends on the valve's lag.
@@ -50,7 +51,7 @@ def timing_explains(found: IdentifiedPair, run: Run, mode: FaultMode) -> bool:
     if not found.coarse:
         return False
     if mode.total:
-        return run.size < _FLIPS or (np.isfinite(deviation) and float(np.nanmedian(size)) < 0.5 * deviation)
+        return run.size < _FLIPS or (np.isfinite(deviation) and deviation < 2.5 * run_samples(run, found).noise)
     if not mode.varying:
         return False
     sudden = max(_sudden(z, run) for z in (pair.x, pair.y))
@@ -78,6 +79,6 @@ def _rests_by_chance(found: IdentifiedPair, run: Run, deviation: float) -> bool:
     texture = found.texture
     if not y.size or deviation > 2.5 * math.hypot(texture.white, texture.reference_white):
         return False
-    noise = math.sqrt(max(texture.white**2 - texture.lsb**2 / 12, 0.0))
+    noise = math.sqrt(max(texture.white**2 - pair.habit.rounding_noise(texture.lsb), 0.0))
     close = math.erf((float(np.ptp(y)) + texture.lsb) / (math.sqrt(8.0) * noise)) if noise else 1.0
     return bool(texture.readings * close ** (y.size - 1) > _FALSE_RESTS)

@@ -49,7 +49,7 @@ ROW_OF_MODEL = np.array([HEALTHY, STUCK, NO_SIGNAL, INEFFICIENT, HEALTHY] + [NOI
 MODELS = ROW_OF_MODEL.size
 
 _OUTLIER = -18.0
-_MISMATCH_S = 0.05  # correlation time of a passing mismatch of two healthy instruments
+MISMATCH_S = 0.05  # correlation time of a passing mismatch of two healthy instruments
 _DRIFT_COST = 0.04  # what the noisy row must gain per sample to be preferred
 
 
@@ -112,6 +112,8 @@ class ModeModel:
         Minus the log-probability of entering a row at one sample.
     dt : float
         Step [s].
+    mismatch_s : float
+        Correlation time of that mismatch [s].
     drift_cost : float
         What the noisy row must gain per sample to be preferred.
     own_cost : float
@@ -126,6 +128,7 @@ class ModeModel:
     span: float
     switch_cost: float
     dt: float
+    mismatch_s: float = MISMATCH_S
     drift_cost: float = _DRIFT_COST
     own_cost: float = 0.0
     side: Side = Side.SENSOR
@@ -147,7 +150,7 @@ class ModeModel:
             log_r=float(np.log(2 * np.pi * r)),
             log_constant_r=float(np.log(2 * np.pi * constant_r)),
             floor=_OUTLIER - float(np.log(self.span)),
-            decay=float(np.exp(-self.dt / _MISMATCH_S)),
+            decay=float(np.exp(-self.dt / self.mismatch_s)),
             drift_cost=float(self.drift_cost + self.own_cost),
             admitted=self.admitted(),
         )

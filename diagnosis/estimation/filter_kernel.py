@@ -33,6 +33,7 @@ from diagnosis.results.fault_rows import ROWS
 Array = NDArray[np.float64]
 
 _SILENT_COST = -6.0
+_BEYOND, _LARGE = 0.2, 4.0  # cost of a mismatch per squared deviation beyond so many
 _FAULT_COST = 0.02  # what a faulty row must gain per sample to be preferred
 
 
@@ -88,38 +89,55 @@ def enter(m, bank, mean, cov):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _update(y, x, bank, mean, cov, out):  # type: ignore[no-untyped-def]
+def _beyond(b, power, passing):  # type: ignore[no-untyped-def]
+    """What a sample costs a mismatch that is larger than two instruments have; the usual one is held small by its walk."""
+    return _BEYOND * max(b * b / (power * passing) - _LARGE, 0.0) if passing > 1.0 else 0.0
+
+
+@njit(cache=True)
+def _update(y, x, white, passing, constant, bank, mean, cov, out):  # type: ignore[no-untyped-def]
     """Kalman update of every model with y = H·[·,·] + n; writes the innovations' log-likelihoods."""
+    own = bank.r * white
     e = y - x
-    out[EXACT] = -0.5 * (e * e / bank.r + bank.log_r)
+    out[EXACT] = -0.5 * (e * e / own + (bank.log_r if white == 1.0 else np.log(2 * np.pi * own)))
     out[ZERO] = -0.5 * (y * y / bank.constant_r + bank.log_constant_r)
-    # one unknown: H = 1 or x, P = (I − K H) P
-    for m in (CONSTANT, GAIN):
-        h, r = (1.0, bank.constant_r) if m == CONSTANT else (x, bank.r)
-        if (
-            m == GAIN and bank.r > 4.0 * bank.constant_r
-        ):  # a sensor's noise comes before its gain, that of a valve's feedback after it
-            r *= max(1.0, mean[m, 0] ** 2)
-        s = h * h * cov[m, 0] + r
-        i = 1.0 / s
-        e = y - h * mean[m, 0]
-        mean[m, 0] += h * cov[m, 0] * i * e
-        cov[m, 0] *= r * i
-        out[m] = -0.5 * (e * e * i + np.log(2 * np.pi * s))
-    m, f = MISMATCH, bank.decay
-    c = f * f * cov[m, 2] + (1 - f * f) * bank.mismatch_r
-    s = c + bank.r
+    # one unknown: H = 1, P = (I − K H) P
+    m, r = CONSTANT, bank.constant_r * constant
+    s = cov[m, 0] + r
+    i = 1.0 / s
+    e = y - mean[m, 0]
+    mean[m, 0] += cov[m, 0] * i * e
+    cov[m, 0] *= r * i
+    out[m] = -0.5 * (e * e * i + np.log(2 * np.pi * s))
+    # gain, and what of the passing mismatch comes to the usual one
+    m, f, r = GAIN, bank.decay, own
+    if bank.r > 4.0 * bank.constant_r:  # a sensor's noise comes before its gain, that of a valve's feedback after it
+        r *= max(1.0, mean[m, 0] ** 2)
+    mean[m, 1] *= f
+    a, b = cov[m, 0], f * cov[m, 1]
+    c = f * f * cov[m, 2] + (1 - f * f) * bank.mismatch_r * (passing - 1.0)
+    g0, g1 = a * x + b, b * x + c
+    s = x * g0 + g1 + r
+    i = 1.0 / s
+    e = y - x * mean[m, 0] - mean[m, 1]
+    mean[m, 0] += g0 * i * e
+    mean[m, 1] += g1 * i * e
+    cov[m, 0], cov[m, 1], cov[m, 2] = a - g0 * i * g0, b - g0 * i * g1, c - g1 * i * g1
+    out[m] = -0.5 * (e * e * i + np.log(2 * np.pi * s)) - _beyond(mean[m, 1], bank.mismatch_r, passing)
+    m = MISMATCH
+    c = f * f * cov[m, 2] + (1 - f * f) * bank.mismatch_r * passing
+    s = c + own
     e = y - x - f * mean[m, 1]
     mean[m, 1] = f * mean[m, 1] + c / s * e
-    cov[m, 2] = c * bank.r / s
-    out[m] = -0.5 * (e * e / s + np.log(2 * np.pi * s))
+    cov[m, 2] = c * own / s
+    out[m] = -0.5 * (e * e / s + np.log(2 * np.pi * s)) - _beyond(mean[m, 1], bank.mismatch_r, passing)
     for m in range(FIRST_NOISY, out.size):
         j = m - FIRST_NOISY
         a, b = cov[m, 0], cov[m, 1]
         c = cov[m, 2] + (NOISY_MODELS[j, 0] * bank.span) ** 2 * bank.dt
         # S = H P Hᵀ + R
         g0, g1 = a * x + b, b * x + c
-        s = x * g0 + g1 + bank.r * NOISY_MODELS[j, 1] ** 2
+        s = x * g0 + g1 + own * NOISY_MODELS[j, 1] ** 2
         i = 1.0 / s
         e = y - x * mean[m, 0] - mean[m, 1]
         k0, k1 = g0 * i, g1 * i
@@ -149,8 +167,9 @@ def _blind(y, x, bank, mean, cov, out):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def likelihoods(y, x, status, quiet, bank, mean, cov, out):  # type: ignore[no-untyped-def]
-    """Log-likelihood of one sample under every model; where nothing moves, a zero reading speaks for no fault."""
+def likelihoods(k, samples, bank, mean, cov, out):  # type: ignore[no-untyped-def]
+    """Log-likelihood of sample k under every model; where nothing moves, a zero reading speaks for no fault."""
+    y, x, status, quiet = samples.y[k], samples.x[k], samples.status[k], samples.quiet[k]
     if status == SILENT:
         out[:] = _SILENT_COST
         out[ZERO] = 0.0
@@ -158,7 +177,7 @@ def likelihoods(y, x, status, quiet, bank, mean, cov, out):  # type: ignore[no-u
     if status == BLIND:
         _blind(y, x, bank, mean, cov, out)
         return
-    _update(y, x, bank, mean, cov, out)
+    _update(y, x, samples.white[k], samples.passing[k], samples.constant[k], bank, mean, cov, out)
     for m in range(out.size):
         out[m] = max(out[m], bank.floor)
         if ROW_OF_MODEL[m] == NOISY:
@@ -180,12 +199,12 @@ def likelihoods(y, x, status, quiet, bank, mean, cov, out):  # type: ignore[no-u
 @njit(cache=True)
 def _scan_evidence(samples, bank, state):  # type: ignore[no-untyped-def]
     """Add up the log-likelihoods of all samples in `state.score`."""
-    y, x, status, quiet = samples
+    status = samples.status
     score, mean, cov = state
     gain = np.zeros(score.size)
-    for k in range(y.size):
+    for k in range(status.size):
         if status[k] != SKIP:
-            likelihoods(y[k], x[k], status[k], quiet[k], bank, mean, cov, gain)
+            likelihoods(k, samples, bank, mean, cov, gain)
             score += gain
 
 

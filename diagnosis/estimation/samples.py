@@ -21,12 +21,18 @@ class Samples(NamedTuple):
         See `diagnosis.channels.sample_status`.
     quiet : NDArray[np.bool_]
         Where the machine stands, so that a reading of zero is what a healthy channel gives too.
+    white, passing, constant : Array
+        Variance of the healthy noise, power of the passing mismatch, and variance of a stuck channel, as shares of what
+        `ModeModel` has of them [1].
     """
 
     y: Array
     x: Array
     status: NDArray[np.int8]
     quiet: NDArray[np.bool_]
+    white: Array
+    passing: Array
+    constant: Array
 
     def part(self, start: int, stop: int) -> Samples:
         """Samples [start, stop)."""
@@ -34,8 +40,13 @@ class Samples(NamedTuple):
 
     def at(self, steps: slice) -> Samples:
         """Samples of a slice."""
-        return Samples(self.y[steps], self.x[steps], self.status[steps], self.quiet[steps])
+        return Samples._make(column[steps] for column in self)
 
     def reversed(self) -> Samples:
         """The same samples backwards."""
-        return Samples(self.y[::-1].copy(), self.x[::-1].copy(), self.status[::-1].copy(), self.quiet[::-1].copy())
+        return Samples._make(column[::-1].copy() for column in self)
+
+    @classmethod
+    def even(cls, y: Array, x: Array, status: NDArray[np.int8], quiet: NDArray[np.bool_]) -> Samples:
+        """Samples whose noise is the same everywhere."""
+        return cls(y, x, status, quiet, *(np.broadcast_to(1.0, y.shape).copy() for _ in range(3)))

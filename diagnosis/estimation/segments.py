@@ -12,6 +12,8 @@ from numpy.typing import NDArray
 from diagnosis.estimation.fault_models import HEALTHY, SCALED_ROWS, STEADY_ROWS, VARYING_ROWS
 from diagnosis.estimation.viterbi import ModePath
 
+_RESTS = 5  # times as long as a rest at its end: a noisy run
+
 
 @dataclass(frozen=True)
 class Run:
@@ -57,7 +59,7 @@ def absorb_short(runs: Iterable[Run], shortest: int) -> list[Run]:
 
 
 def join_noisy(runs: Iterable[Run]) -> list[Run]:
-    """Give an inefficient run that lies between two noisy ones, without a gap and no longer than they, to them.
+    """Give an inefficient run that lies between two noisy ones, no longer than they, or beside a much longer one to them.
 
     A drifting bias that rests for a while looks like a loss of gain.
     """
@@ -68,6 +70,14 @@ def join_noisy(runs: Iterable[Run]) -> list[Run]:
         if b.row in SCALED_ROWS and a.row == c.row and a.row in VARYING_ROWS and b.size <= a.size + c.size:
             out[k - 1 : k + 2] = [Run(a.start, c.stop, a.row)]
             k = max(1, k - 1)
+        else:
+            k += 1
+    k = 1
+    while k < len(out):
+        a, b = out[k - 1 : k + 1]
+        noisy, scaled = (a, b) if a.row in VARYING_ROWS else (b, a)
+        if noisy.row in VARYING_ROWS and scaled.row in SCALED_ROWS and scaled.size * _RESTS <= noisy.size:
+            out[k - 1 : k + 1] = [Run(a.start, b.stop, noisy.row)]
         else:
             k += 1
     return out

@@ -72,12 +72,12 @@ def _enter_from_best(k, best, bank, state, back):  # type: ignore[no-untyped-def
 @njit(cache=True)
 def _scan_modes(samples, bank, state, out):  # type: ignore[no-untyped-def]
     """Viterbi over the models; writes back-pointers (n, models) and softmax of scores by row (n, rows)."""
-    y, x, status, quiet = samples
+    status = samples.status
     score, mean, cov = state
     back, filtered = out
     models = score.size
     gain = np.zeros(models)
-    for k in range(y.size):
+    for k in range(status.size):
         best = 0
         for m in range(1, models):
             if score[m] > score[best]:
@@ -91,7 +91,7 @@ def _scan_modes(samples, bank, state, out):  # type: ignore[no-untyped-def]
             continue
         if status[k] != SKIP:
             _enter_from_best(k, best, bank, state, back)
-            likelihoods(y[k], x[k], status[k], quiet[k], bank, mean, cov, gain)
+            likelihoods(k, samples, bank, mean, cov, gain)
             top = -np.inf
             for m in range(models):
                 score[m] += gain[m]

@@ -26,7 +26,7 @@ def channel(seed: int = 1) -> tuple[Array, Array, Array]:
 
 def consistent(y: Array, x: Array, status: Array) -> Array:
     """Status of every sample after the test."""
-    return with_consistent(Samples(y, x, status, np.zeros(N, dtype=np.bool_)), MODEL.noise).status
+    return with_consistent(Samples.even(y, x, status, np.zeros(N, dtype=np.bool_)), MODEL.noise).status
 
 
 def test_most_of_a_healthy_channel_is_cleared() -> None:
@@ -72,6 +72,6 @@ def test_the_path_is_the_same_with_and_without(seed: int) -> None:
     y[START:STOP] *= 0.5
     y[15_000:15_400] = 0.0
     quiet = np.zeros(N, dtype=np.bool_)
-    whole = most_probable(Samples(y, x, status, quiet), MODEL)
-    quick = most_probable(Samples(y, x, consistent(y, x, status), quiet), MODEL)
+    whole = most_probable(Samples.even(y, x, status, quiet), MODEL)
+    quick = most_probable(Samples.even(y, x, consistent(y, x, status), quiet), MODEL)
     assert_array_equal(quick.row, whole.row)

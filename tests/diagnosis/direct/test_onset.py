@@ -26,7 +26,7 @@ def disturbed(seed: int) -> Samples:
     valve = u.copy()
     valve[START:STOP] = (0.6 * u + 0.4 * (0.08 + 0.08 * drift))[START:STOP]
     y = valve + MODEL.noise * rng.normal(size=N)
-    return Samples(y, u, np.full(N, PAIR, dtype=np.int8), np.zeros(N, dtype=np.bool_))
+    return Samples.even(y, u, np.full(N, PAIR, dtype=np.int8), np.zeros(N, dtype=np.bool_))
 
 
 @pytest.mark.parametrize("seed", range(4))

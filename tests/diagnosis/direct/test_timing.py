@@ -5,8 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from diagnosis.channels.sample_status import PAIR
 from diagnosis.direct.identification import IdentifiedPair
 from diagnosis.direct.inputs import Pair
+from diagnosis.direct.relation import Relation
 from diagnosis.direct.timing import timing_explains
 from diagnosis.estimation.fault_models import ModeModel
 from diagnosis.estimation.samples import Samples
@@ -26,8 +28,8 @@ def pair(side: Side, y: Array, x: Array) -> Pair:
 
 
 def explained(p: Pair, mode: FaultMode, start: int = A, stop: int = B, share: float = 0.0) -> bool:
-    samples = Samples(p.y, p.x, np.zeros(N, dtype=np.int8), p.quiet)
-    found = IdentifiedPair(p, 0.0, samples, MODEL, 0.0, ~p.alive, share)
+    samples = Samples.even(p.y, p.x, np.full(N, PAIR, dtype=np.int8), p.quiet)
+    found = IdentifiedPair(p, Relation(), samples, MODEL, 0.0015, ~p.alive, share)
     return timing_explains(found, Run(start, stop, 1), mode)
 
 

@@ -123,7 +123,7 @@ def test_evidence_of_every_row_is_filterpys(name: str) -> None:
     y[40:50] = np.nan
     by_model, _ = stepped(y, x, status, MODEL)
     expected = [by_model[i == ROW_OF_MODEL].max() for i in range(5)]
-    assert_allclose(segment_evidence(Samples(y, x, status, busy(150)), MODEL), expected, rtol=1e-9)
+    assert_allclose(segment_evidence(Samples.even(y, x, status, busy(150)), MODEL), expected, rtol=1e-9)
 
 
 @pytest.mark.parametrize("name", SIGNALS)
@@ -135,7 +135,7 @@ def test_filter_of_every_model_is_filterpys(name: str) -> None:
     for k in range(y.size):
         level = FilterState(np.zeros(MODELS), state.mean, state.cov)  # equal scores: no model is entered anew
         one = slice(k, k + 1)
-        _, state = forward(Samples(y[one], x[one], pairs(1), busy(1)), MODEL, level)
+        _, state = forward(Samples.even(y[one], x[one], pairs(1), busy(1)), MODEL, level)
         gain = np.array([f.step(y[k], x[k]) for f in filters])
         assert_allclose(state.score, gain - gain.max(), rtol=1e-9, atol=1e-9)
     for m, f in enumerate(filters):
@@ -172,7 +172,7 @@ def test_path_is_the_naive_twins(name: str) -> None:
     x = drive(260)
     y = measured(x, 5)
     y[80:180] = SIGNALS[name](x, np.random.default_rng(6))[80:180]
-    path = most_probable(Samples(y, x, pairs(260), busy(260)), MODEL)
+    path = most_probable(Samples.even(y, x, pairs(260), busy(260)), MODEL)
     expected, filtered = naive_path(y, x, MODEL)
     assert_array_equal(path.model, expected)
     assert_allclose(path.filtered, filtered, rtol=1e-6, atol=1e-9)
@@ -189,7 +189,7 @@ def test_blocks_are_the_whole(cuts: list[int]) -> None:
     status[::3] = SKIP
     status[900:930] = SILENT
     quiet = np.arange(n) > 950
-    samples = Samples(y, x, status, quiet)
+    samples = Samples.even(y, x, status, quiet)
     whole, end = forward(samples, MODEL, initial_state(MODEL))
     state, parts = initial_state(MODEL), []
     for start, stop in itertools.pairwise([0, *cuts, n]):
@@ -204,7 +204,7 @@ def test_blocks_are_the_whole(cuts: list[int]) -> None:
 def test_forward_leaves_its_start_alone() -> None:
     start = initial_state(MODEL)
     before = [a.copy() for a in (start.score, start.mean, start.cov)]
-    forward(Samples(measured(drive(50)), drive(50), pairs(50), busy(50)), MODEL, start)
+    forward(Samples.even(measured(drive(50)), drive(50), pairs(50), busy(50)), MODEL, start)
     for array, kept in zip((start.score, start.mean, start.cov), before, strict=True):
         assert_array_equal(array, kept)
 
@@ -228,27 +228,27 @@ def test_row_and_onset_are_recognised(row: int, fault: object, seed: int) -> Non
     assert abs(x[ONSET]) > 0.1  # a fault shows at once
     y = measured(x, seed)
     y[ONSET:END] = fault(x, np.random.default_rng(seed + 50))[ONSET:END]  # type: ignore[operator]
-    path = most_probable(Samples(y, x, pairs(N), busy(N)), MODEL)
+    path = most_probable(Samples.even(y, x, pairs(N), busy(N)), MODEL)
     assert (path.row[ONSET + 2 : END - 2] == row).all()
     assert (path.row[: ONSET - 3] == HEALTHY).all()
     assert (path.row[END + 2 :] == HEALTHY).all()
     assert path.filtered[END - 2, row] > 0.99
     assert_allclose(path.filtered.sum(axis=1), 1.0, rtol=1e-6)
-    evidence = segment_evidence(Samples(y, x, pairs(N), busy(N)).part(ONSET + 2, END - 2), MODEL)
+    evidence = segment_evidence(Samples.even(y, x, pairs(N), busy(N)).part(ONSET + 2, END - 2), MODEL)
     assert int(np.argmax(evidence)) == row
 
 
 @pytest.mark.parametrize("seed", range(5))
 def test_healthy_channel_has_no_other_row(seed: int) -> None:
     x = drive(20_000)
-    path = most_probable(Samples(measured(x, seed), x, pairs(x.size), busy(x.size)), MODEL)
+    path = most_probable(Samples.even(measured(x, seed), x, pairs(x.size), busy(x.size)), MODEL)
     assert (path.row == HEALTHY).all()
 
 
 def test_small_passing_mismatch_is_healthy() -> None:
     x = drive(5000)
     bias = 0.006 * np.sin(np.arange(5000) * 0.02)
-    path = most_probable(Samples(measured(x) + bias, x, pairs(5000), busy(5000)), MODEL)
+    path = most_probable(Samples.even(measured(x) + bias, x, pairs(5000), busy(5000)), MODEL)
     assert (path.row == HEALTHY).all()
 
 
@@ -256,7 +256,7 @@ def test_silence_beside_living_siblings_is_no_signal() -> None:
     x = drive(1000)
     y, status = measured(x), pairs(1000)
     y[300:600], status[300:600] = np.nan, SILENT
-    path = most_probable(Samples(y, x, status, busy(1000)), MODEL)
+    path = most_probable(Samples.even(y, x, status, busy(1000)), MODEL)
     assert_array_equal(np.flatnonzero(path.row == NO_SIGNAL), np.arange(300, 600))
     assert (path.row[:300] == HEALTHY).all()
     assert (path.row[600:] == HEALTHY).all()
@@ -266,9 +266,9 @@ def test_zero_at_standstill_speaks_for_no_fault() -> None:
     n = 2000
     zero = np.zeros(n)
     still = np.ones(n, dtype=np.bool_)
-    path = most_probable(Samples(zero, zero, pairs(n), still), MODEL)
+    path = most_probable(Samples.even(zero, zero, pairs(n), still), MODEL)
     assert (path.row == HEALTHY).all()
-    stuck = most_probable(Samples(zero + 0.2, zero, pairs(n), still), MODEL)
+    stuck = most_probable(Samples.even(zero + 0.2, zero, pairs(n), still), MODEL)
     assert (stuck.row == STUCK).mean() > 0.99
 
 
@@ -276,7 +276,7 @@ def test_nothing_new_changes_nothing() -> None:
     start = initial_state(MODEL)
     status = np.full(40, SKIP, dtype=np.int8)
     nothing = np.full(40, np.nan)
-    samples = Samples(nothing, nothing, status, busy(40))
+    samples = Samples.even(nothing, nothing, status, busy(40))
     out, end = forward(samples, MODEL, start)
     for name in ("score", "mean", "cov"):
         assert_array_equal(getattr(end, name), getattr(start, name))

@@ -54,7 +54,7 @@ def test_nothing_later_is_used() -> None:
     x = 0.2 + 0.1 * np.sin(np.arange(n) / 40)
     y = x + 0.004 * np.random.default_rng(1).normal(size=n)
     y[200:] = 0.0
-    samples = Samples(y, x, np.full(n, PAIR, dtype=np.int8), np.zeros(n, dtype=np.bool_))
+    samples = Samples.even(y, x, np.full(n, PAIR, dtype=np.int8), np.zeros(n, dtype=np.bool_))
     whole = most_probable(samples, model)
     cut = most_probable(samples.part(0, 210), model)
     np.testing.assert_array_equal(whole.filtered[:210], cut.filtered)
@@ -70,7 +70,7 @@ def test_rows_that_the_side_lacks_are_never_entered(monkeypatch: pytest.MonkeyPa
     x = 0.2 + 0.1 * np.sin(np.arange(n) / 40)
     y = x + 0.004 * rng.normal(size=n)
     y[150:] = 0.6 * x[150:] + 0.1 * rng.normal(size=n - 150)
-    samples = Samples(y, x, np.full(n, PAIR, dtype=np.int8), np.zeros(n, dtype=np.bool_))
+    samples = Samples.even(y, x, np.full(n, PAIR, dtype=np.int8), np.zeros(n, dtype=np.bool_))
     model = ModeModel(
         noise=0.004, constant_noise=0.0005, tolerance=0.005, span=0.8, switch_cost=13.0, dt=0.001, side=Side.ACTUATOR
     )

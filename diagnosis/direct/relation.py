@@ -1,0 +1,215 @@
+"""How a channel follows its reference while both are healthy: delay, lag, play and scale, found from the mission itself.
+
+Two speed sensors differ in delay, lag and scale. A spool is no wire: it follows its command behind play (hysteresis) and a
+lag. The relation is y(t) = gain·w(t − delay) with lag·ẇ + w = P(x), P the play operator, and it is the one with the least
+misfit by Cauchy's loss of scale s, mean ln(1 + (misfit/s)²), where the reference moves: a fault leaves it alone.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from diagnosis.channels.noise import shifted
+
+Array = NDArray[np.float64]
+
+_CHUNK_S, _WARM_S, _CHUNKS = 2.0, 0.5, 30
+_PLACES = 6_000
+_STILL, _MOTION_S = 0.3, 0.02  # share of the chunks that moves least; time over which a reference moves
+_DELAY_S = 0.004
+_LAGS_S = (0.004, 0.008, 0.012, 0.018, 0.026, 0.036, 0.05, 0.07)
+_PLAYS = (0.006, 0.012, 0.02, 0.03, 0.045, 0.065)  # of the span
+_BETTER = 0.03  # of the loss, by which a lag or play is believed
+_ROUNDS, _FINE = 5, (0.8, 0.9, 0.95, 1.05, 1.1, 1.25)
+_USUAL, _LARGE = 0.35, 3.0
+_LARGEST_SCALE = 0.02  # what differs by more is a loss of effectiveness
+
+
+class Relation(NamedTuple):
+    """How a channel follows its reference.
+
+    Attributes
+    ----------
+    delay : float
+        [steps]
+    lag : float
+        Of first order [s].
+    play : float
+        Width of the hysteresis [unit of the reference].
+    gain : float
+        Scale of the channel against its reference [1].
+    """
+
+    delay: float = 0.0
+    lag: float = 0.0
+    play: float = 0.0
+    gain: float = 1.0
+
+    def expected(self, x: Array, dt: float) -> Array:
+        """What a healthy channel reads beside x, shape (n,); NaN where x is."""
+        followed = x if self.lag == 0.0 and self.play == 0.0 else _followed(x, self.play, self.lag, dt)
+        moved = shifted(followed, self.delay)
+        return moved if self.gain == 1.0 else self.gain * moved
+
+
+def _followed(x: Array, play: float, lag: float, dt: float) -> Array:
+    known = np.isfinite(x)
+    out = np.empty(x.size)
+    _follow(np.where(known, x, 0.0), known, 0.5 * play, float(np.exp(-dt / lag)) if lag > 0.0 else 0.0, out)
+    out[~known] = np.nan
+    return out
+
+
+@njit(cache=True)
+def _follow(x, known, half, keep, out):  # type: ignore[no-untyped-def]
+    """Play of ± half, then a lag that keeps a share of the last value; held where x is not known."""
+    first = 0
+    while first < x.size - 1 and not known[first]:
+        first += 1
+    held = x[first] if x.size else 0.0
+    y = held
+    for k in range(x.size):
+        if known[k]:
+            held = min(max(held, x[k] - half), x[k] + half)
+            y = keep * y + (1.0 - keep) * held
+        out[k] = y
+
+
+class _Places(NamedTuple):
+    """Stretches of a mission in which the reference moves, one after the other, and places in them to compare at."""
+
+    x: Array
+    at: NDArray[np.intp]
+    y: Array
+
+
+def relation_of(
+    y: Array, x: Array, use: NDArray[np.bool_], start: Relation, dt: float, delays: tuple[int, int], span: float
+) -> Relation:
+    """The relation of a channel to its reference.
+
+    Parameters
+    ----------
+    y, x : Array, shape (n,)
+        Channel and reference.
+    use : NDArray[np.bool_], shape (n,)
+        Samples that count.
+    start : Relation
+        With the delay that alone explains most; what is not better stays.
+    dt : float
+        Step [s].
+    delays : tuple[int, int]
+        Least and largest delay [steps].
+    span : float
+        Largest plausible magnitude of the reference where it may have play; 0: it has none.
+    """
+    places = _places(y, x, use, dt, max(abs(d) for d in delays))
+    if places.at.size < 200:
+        return start
+    best, least = start, np.inf
+    for _ in range(2):  # the usual misfit is that of the best relation so far
+        scale = _scale(places, best, dt)
+        least = _misfit(places, best, dt, scale)
+        plain = best
+        found, misfit = _least(places, _trials(best, delays, span, dt), dt, scale)
+        if misfit < least - _BETTER:
+            best, least = found, misfit
+        if best is plain:
+            break
+    for _ in range(_ROUNDS if best.lag or best.play else 0):
+        found, misfit = _least(places, _near(best, delays), dt, scale)
+        if misfit >= least:
+            break
+        best, least = found, misfit
+    return best._replace(gain=_gain(places, best, dt))
+
+
+def _trials(near: Relation, delays: tuple[int, int], span: float, dt: float) -> Iterable[Relation]:
+    """Lags with plays with delays."""
+    step = max(1, round(_DELAY_S / dt))
+    for lag in (0.0, *(s for s in _LAGS_S if s > 0.5 * dt)):
+        for play in (0.0, *(_PLAYS if span else ())):
+            for delay in range(delays[0], delays[1] + 1, step):
+                yield near._replace(delay=float(delay), lag=lag, play=play * span)
+
+
+def _near(best: Relation, delays: tuple[int, int]) -> Iterable[Relation]:
+    yield from (best._replace(lag=best.lag * f) for f in _FINE if best.lag)
+    yield from (best._replace(play=best.play * f) for f in _FINE if best.play)
+    yield from (
+        best._replace(delay=best.delay + d) for d in (-1.0, -0.3, 0.3, 1.0) if delays[0] <= best.delay + d <= delays[1]
+    )
+
+
+def _places(y: Array, x: Array, use: NDArray[np.bool_], dt: float, margin: int) -> _Places:
+    """Where the reference moves, in chunks of the mission, each after a time to settle in."""
+    length, warm = max(20, round(_CHUNK_S / dt)), round(_WARM_S / dt)
+    warm = max(warm, 2 * margin)
+    count = (x.size - warm - margin) // length
+    if count < 1:
+        return _Places(x, np.zeros(0, np.intp), y)
+    first = warm + length * np.arange(count)
+    filled = np.nan_to_num(x)
+    moved = np.abs(np.diff(filled))[warm : warm + count * length - 1]
+    moved = np.r_[moved, 0.0].reshape(count, length).sum(axis=1)
+    kept = first[moved >= np.quantile(moved, _STILL)]
+    kept = kept[np.linspace(0, kept.size - 1, min(kept.size, _CHUNKS)).round().astype(np.intp)]
+    steps = (kept[:, None] + np.arange(-warm, length + margin)).ravel()
+    inside = np.tile(np.r_[np.zeros(warm, np.bool_), np.ones(length, np.bool_), np.zeros(margin, np.bool_)], kept.size)
+    good = inside & use[steps] & np.isfinite(x[steps]) & np.isfinite(y[steps])
+    reach = max(1, round(_MOTION_S / dt))
+    motion = np.abs(np.roll(filled[steps], -reach) - np.roll(filled[steps], reach))
+    at = np.flatnonzero(good & (motion > np.median(motion[good]))) if good.any() else np.zeros(0, np.intp)
+    at = at[:: max(1, at.size // _PLACES)]
+    return _Places(x[steps], at, y[steps][at])
+
+
+def _at(places: _Places, relation: Relation, dt: float) -> Array:
+    """What the relation expects at the places, but for its gain."""
+    followed = _followed(places.x, relation.play, relation.lag, dt) if relation.lag or relation.play else places.x
+    whole = int(np.floor(relation.delay))
+    part = relation.delay - whole
+    near = followed[places.at - whole]
+    return near if part < 1e-9 else (1.0 - part) * near + part * followed[places.at - whole - 1]
+
+
+def _scale(places: _Places, relation: Relation, dt: float) -> float:
+    """Usual size of the misfit: a low quantile, which faults in half of the places leave alone."""
+    misfit = np.abs(places.y - relation.gain * _at(places, relation, dt))
+    return max(float(np.nanquantile(misfit, _USUAL)), 1e-12)
+
+
+def _misfit(places: _Places, relation: Relation, dt: float, scale: float) -> float:
+    misfit = (places.y - relation.gain * _at(places, relation, dt)) / scale
+    return float(np.nanmean(np.log1p(misfit * misfit)))
+
+
+def _least(places: _Places, trials: Iterable[Relation], dt: float, scale: float) -> tuple[Relation, float]:
+    """The trial that leaves least, and what it leaves."""
+    best, least, followed, key = Relation(), np.inf, places.x, (0.0, 0.0)
+    for trial in trials:
+        if (trial.lag, trial.play) != key:
+            key = (trial.lag, trial.play)
+            followed = _followed(places.x, trial.play, trial.lag, dt)
+        misfit = _misfit(places._replace(x=followed), trial._replace(lag=0.0, play=0.0), dt, scale)
+        if misfit < least:
+            best, least = trial, misfit
+    return best, least
+
+
+def _gain(places: _Places, relation: Relation, dt: float) -> float:
+    """Scale by least squares over places that a healthy channel explains; 1 where it is no mere error of scale."""
+    x, y, gain = _at(places, relation, dt), places.y, 1.0
+    for _ in range(5):
+        misfit = np.abs(y - gain * x)
+        good = misfit <= _LARGE * float(np.nanquantile(misfit, _USUAL))
+        power = float(x[good] @ x[good])
+        if power <= 0.0:
+            return 1.0
+        gain = float(np.clip((x[good] @ y[good]) / power, 1.0 - _LARGEST_SCALE, 1.0 + _LARGEST_SCALE))
+    return gain if abs(gain - 1.0) < 0.99 * _LARGEST_SCALE else 1.0

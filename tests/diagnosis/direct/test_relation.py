@@ -1,0 +1,64 @@
+"""Delay, lag, play and scale of a healthy channel are found beside faults."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from diagnosis.direct.relation import Relation, relation_of
+
+DT, N = 0.001, 60_000
+Array = np.ndarray
+
+
+def command(seed: int = 0) -> Array:
+    t = np.arange(N) * DT
+    rng = np.random.default_rng(seed)
+    steps = np.repeat(rng.uniform(-0.5, 0.5, N // 1500), 1500)
+    slow = np.convolve(steps, np.ones(400) / 400, mode="same")
+    return np.asarray(slow + 0.1 * np.sin(2 * np.pi * t / 1.7))
+
+
+def found(y: Array, x: Array, span: float, least: int = 0) -> Relation:
+    use = np.isfinite(y)
+    return relation_of(y, x, use, Relation(delay=0.0), DT, (least, 50), span)
+
+
+def noisy(y: Array, std: float = 0.003) -> Array:
+    return np.asarray(y + std * np.random.default_rng(7).normal(size=N))
+
+
+@pytest.mark.parametrize("faulty", [False, True])
+def test_spool_with_lag_and_hysteresis(faulty: bool) -> None:
+    x, true = command(), Relation(delay=2.0, lag=0.03, play=0.02)
+    y = true.expected(x, DT)
+    if faulty:
+        y[10_000:20_000] = 0.1
+        y[35_000:45_000] *= 0.5
+    relation = found(noisy(y), x, 1.0)
+    assert relation.lag + relation.delay * DT == pytest.approx(0.032, abs=0.006)
+    assert relation.play == pytest.approx(0.02, abs=0.005)
+    healthy = np.r_[1000:9000, 21_000:34_000, 46_000:59_000]
+    left = (relation.expected(x, DT) - true.expected(x, DT))[healthy]
+    assert np.sqrt(np.nanmean(left**2)) < 0.003
+
+
+def test_wire_has_neither() -> None:
+    x = command()
+    relation = relation_of(noisy(np.roll(x, 2)), x, np.ones(N, bool), Relation(delay=2.0), DT, (0, 50), 1.0)
+    assert relation[:3] == (2.0, 0.0, 0.0)
+    assert relation.gain == pytest.approx(1.0, abs=0.002)
+
+
+def test_scale_of_a_second_sensor_but_no_loss_of_gain() -> None:
+    x = command()
+    assert found(noisy(1.006 * x), x, 0.0, -50).gain == pytest.approx(1.006, abs=0.001)
+    assert found(noisy(0.8 * x), x, 0.0, -50).gain == 1.0
+
+
+def test_expectation_is_the_lag_of_the_play() -> None:
+    x = np.r_[np.zeros(100), np.ones(400)]
+    y = Relation(delay=3.0, lag=0.05, play=0.2).expected(x, DT)
+    assert_allclose(y[103 + 50], 0.9 * (1 - np.exp(-51 / 50)), rtol=1e-9)
+    assert np.isnan(y[:3]).all()
