@@ -12,6 +12,7 @@ from diagnosis.evidence import Part
 from diagnosis.results.assessment import CODE, Assessment, unassessed
 from diagnosis.results.vocabulary import Tier
 from diagnosis.steering.blocks import SteeringBlocks
+from diagnosis.steering.driven import driven_by
 from diagnosis.steering.evidence import evidence_columns, path_angle
 from diagnosis.steering.findings import findings_of
 from diagnosis.steering.identification import SteeringPlant, identify_plants
@@ -109,7 +110,7 @@ def _judged_by_model(inputs: AxleInputs, blocks: SteeringBlocks, plant: Steering
     model = model_of(blocks, plant, inputs.noise, machine.max_steer)
     valve_judged = inputs.valve_redundant or (plant.reliable and not inputs.command_missing)
     allowed = allowed_models(sensor=inputs.measured == "phi", actuator=valve_judged, redundant=inputs.redundant)
-    axle = AxleFilter(blocks, blocks.driven(plant.gain, plant.rate), model, allowed, inputs.names)
+    axle = AxleFilter(blocks, driven_by(plant, blocks), model, allowed, inputs.names)
     path = refine_path(axle, most_probable(axle))
     found = {side: findings_of(side, inputs, axle, path, machine.limits) for side in _SIDES}
     dead = [(f.start, f.stop) for f in found[Side.SENSOR].findings if f.mode.total]

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from diagnosis.channels.noise import rounding_step
 from diagnosis.channels.sample_status import PAIR, SILENT, SKIP
-from diagnosis.steering.filter_state import BlockSeries, Redundancy
+from diagnosis.steering.filter_state import Redundancy
 from replay.arrays.blocks import blocks as cut
 from replay.arrays.blocks import release
 from replay.arrays.column_store import ColumnStore
@@ -66,17 +66,8 @@ class SteeringBlocks:
     redundancy: Redundancy
     store: ColumnStore = field(default_factory=ColumnStore, repr=False)
 
-    def driven(self, gain: float, rate: float) -> Array:
-        """Mean of sat(gain·u) between the middles of blocks [rad/s], shape (m,); NaN in blind blocks."""
-        driven = _between(self.raw_u, self.length, self.mean.size, lambda u: np.clip(gain * u, -rate, rate))
-        return np.where(self.blind, np.nan, driven)
 
-    def series(self, driven: Array) -> BlockSeries:
-        """The blocks as the compiled filters take them, with `driven` of a plant."""
-        return BlockSeries(self.mean, self.power, self.count, driven, self.u, self.status, self.redundancy)
-
-
-def _between(x: Array, length: int, blocks: int, function: Callable[[Array], Array] = np.asarray) -> Array:
+def between(x: Array, length: int, blocks: int, function: Callable[[Array], Array] = np.asarray) -> Array:
     """Mean of function(x) over `length` samples up to the middle of each block."""
     middle = np.minimum(np.arange(blocks) * length + length // 2, x.size)
     until, total = np.empty(blocks), 0.0
@@ -144,8 +135,10 @@ def blocks_of(
         release(y, u)
     mean, power, count, status, blind = (np.concatenate(x) for x in zip(*parts, strict=True))
     raw_u, redundancy = opening.finish(), Redundancy.nothing(mean.size)
-    u_mean = _between(raw_u, length, mean.size)
-    return SteeringBlocks(length, length * dt, mean, power, count, u_mean, status, raw_u, blind, redundancy, store)
+    u_mean = between(raw_u, length, mean.size)
+    return SteeringBlocks(
+        length, length * dt, mean, power, count, u_mean, status, raw_u, blind, redundancy, store=store
+    )
 
 
 def window_means(x: Array, length: int) -> Array:

@@ -7,6 +7,7 @@ import numpy as np
 from diagnosis.channels.sample_status import PAIR
 from diagnosis.results.result import Epsilon, Sat
 from diagnosis.steering.filter_state import Array, SteeringPath
+from diagnosis.steering.isolation import stuck_opening
 from diagnosis.steering.model_bank import INEFFICIENT, NO_SIGNAL, STUCK
 from diagnosis.steering.path import AxleFilter
 from replay.faults import Side
@@ -21,7 +22,7 @@ def estimate_size(
     """ε̂ and the saturation term of a row of the filter over blocks [a, b)."""
     if side is Side.SENSOR:
         return _sensor_size(row, a, b, axle, path)
-    return _valve_size(row, a, b, axle.model.plant.gain, path)
+    return _valve_size(row, a, b, axle, path)
 
 
 def level_of(a: int, b: int, axle: AxleFilter) -> tuple[float, float, int]:
@@ -48,17 +49,18 @@ def _sensor_size(row: int, a: int, b: int, axle: AxleFilter, path: SteeringPath)
     return epsilon, _sat(residual / max(epsilon.value, 0.1), "rad")
 
 
-def _valve_size(row: int, a: int, b: int, gain: float, path: SteeringPath) -> tuple[Epsilon | None, Sat | None]:
+def _valve_size(row: int, a: int, b: int, axle: AxleFilter, path: SteeringPath) -> tuple[Epsilon | None, Sat | None]:
     if row == NO_SIGNAL:
         return _GONE, None
     last, var = path.mean[b - 1], path.variance[b - 1]
     if row == STUCK:
-        level, half = float(last[3]) / gain, 1.96 * float(np.sqrt(var[3])) / gain
+        gain = axle.model.plant.gain
+        level, half = stuck_opening(float(last[3]), axle), 1.96 * float(np.sqrt(var[3])) / gain
         return _GONE, Sat(level, abs(level), level - half, level + half, _OPENING)
     epsilon = _epsilon(float(last[2]), float(np.sqrt(var[2])))
     if row == INEFFICIENT:
         return epsilon, None
-    return epsilon, _sat(path.mean[a:b, 3] / gain / max(epsilon.value, 0.1), _OPENING)
+    return epsilon, _sat(path.mean[a:b, 3] / axle.model.plant.gain / max(epsilon.value, 0.1), _OPENING)
 
 
 def _epsilon(gain: float, std: float) -> Epsilon:

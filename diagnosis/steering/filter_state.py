@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 
 from diagnosis.steering.model_bank import ACTUATOR, SENSOR
@@ -53,6 +54,7 @@ class BlockSeries(NamedTuple):
     power: Array
     samples: Array
     driven: Array
+    spread: Array
     u: Array
     status: NDArray[np.int8]
     redundancy: Redundancy
@@ -70,7 +72,9 @@ class Block(NamedTuple):
     samples : float
         New samples.
     driven : float
-        Mean of sat(gain·u) [rad/s]; NaN where nobody knows the opening.
+        Mean rate that the valve's map gives at the command [rad/s]; NaN where nobody knows it.
+    spread : float
+        Standard deviation of the rate that is expected [rad/s].
     u : float
         Mean opening [fraction].
     status : int
@@ -81,8 +85,15 @@ class Block(NamedTuple):
     power: float
     samples: float
     driven: float
+    spread: float
     u: float
     status: int
+
+
+@njit(cache=True, error_model="numpy", inline="always")
+def resting(block: Block) -> Block:
+    """The same block with a valve at rest."""
+    return Block(block.mean, block.power, block.samples, 0.0, block.spread, 0.0, block.status)
 
 
 class RedundantBlock(NamedTuple):
@@ -106,6 +117,8 @@ class FilterBank(NamedTuple):
         Of x = [φ, r, a, b, d, c].
     noise : Array, shape (models, 2)
         α and β of the inverse gamma distribution of the sensor's noise, where it is learned.
+    gap : Array, shape (models, 2)
+        How far the cylinder is ahead of the sensor's shaft [rad], and the variance of that [rad²].
     room : Array, shape (3, 6)
         Room to work in.
     """
@@ -113,6 +126,7 @@ class FilterBank(NamedTuple):
     mean: Array
     cov: Array
     noise: Array
+    gap: Array
     room: Array
 
 
@@ -127,12 +141,15 @@ class SteeringPath(NamedTuple):
         Of [φ, r, a, b, d, c] along that path.
     noise : Array, shape (m, 2)
         α and β of the sensor's noise where it is learned.
+    gap : Array, shape (m, 2)
+        How far the cylinder is ahead of the sensor's shaft, and the variance of that.
     """
 
     model: NDArray[np.uint8]
     mean: Array
     cov: Array
     noise: Array
+    gap: Array
 
     @property
     def variance(self) -> Array:

@@ -12,6 +12,7 @@ from diagnosis.results.assessment import Finding
 from diagnosis.results.fault_rows import mode_words
 from diagnosis.results.result import Epsilon, Hypothesis
 from diagnosis.results.vocabulary import Kind, Tier, part_name
+from diagnosis.steering.excitation import asked
 from diagnosis.steering.fault_size import estimate_size, level_of
 from diagnosis.steering.filter_state import SteeringPath
 from diagnosis.steering.inputs import AxleInputs
@@ -29,7 +30,9 @@ Span = tuple[int, int]
 
 _TEMPER = 0.35
 _MOST = 0.6  # of a mission: the longest fault of a valve
-_BRIEF_S = 0.05
+_BRIEF_S = 0.3
+_BELIEVED_S = 6.0  # for how long before and after a motion that did not come a valve's fault is believed
+_LEAST_ASKED_S = 0.35  # for how long a motion must be asked for, to see that it does not come
 _LEAST_NAMED, _LEAST_LISTED = 0.005, 5e-4  # probabilities from which on another explanation is named in words, listed
 _NO_FAULT: Fault = (None, None)
 
@@ -88,6 +91,11 @@ class _Choice(NamedTuple):
         """Whether the channel alone shows it."""
         return self.side is Side.SENSOR and self.mode.total
 
+    @property
+    def needs_motion(self) -> bool:
+        """Whether only a motion that is asked for can show it."""
+        return self.side is Side.ACTUATOR and self.mode in (FaultMode.NO_SIGNAL, FaultMode.INEFFICIENT)
+
 
 def findings_of(side: Side, inputs: AxleInputs, axle: AxleFilter, path: SteeringPath, limits: Limits) -> SideFindings:
     """Faults of one side, with their ends at the samples that show them."""
@@ -136,11 +144,18 @@ def _judge(run: _Run) -> Judged:
     stuck_valve = choice.side is Side.ACTUATOR and choice.mode is FaultMode.STUCK
     if stuck_valve and sat is not None and abs(sat.mean) < limits.min_sat:
         choice, sat = choice._replace(mode=FaultMode.NO_SIGNAL), None
+    start, stop = run.start, run.stop
+    if choice.needs_motion:
+        first, last, seconds = asked(run.axle, start, stop)
+        if seconds < _LEAST_ASKED_S:
+            return Judged(run.start, run.stop, None)
+        pad = round(_BELIEVED_S / run.axle.blocks.dt)
+        start, stop = max(start, first - pad), min(stop, last + pad)
     if not _may_be_stated(choice, epsilon, run):
         return Judged(run.start, run.stop, None)
     finding = Finding(
-        start=run.start * length,
-        stop=run.stop * length,
+        start=start * length,
+        stop=stop * length,
         side=choice.stated,
         mode=choice.mode,
         probability=min(1.0, choice.probability),
@@ -150,7 +165,7 @@ def _judge(run: _Run) -> Judged:
         evidence=_sentences(choice, gain, ranked, run),
         tier=Tier.SIGNAL if choice.dead_sensor else Tier.MODEL,
     )
-    return Judged(run.start, run.stop, finding)
+    return Judged(start, stop, finding)
 
 
 def _ranked(evidence: Mapping[Explanation, float], run: _Run) -> list[tuple[Fault, float]]:

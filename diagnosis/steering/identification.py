@@ -1,4 +1,4 @@
-"""Valve gain, rate limit and lag of a steering axle, identified from the mission with faults in it."""
+"""Valve map, lag and play of a steering axle, identified from the mission with faults in it."""
 
 from __future__ import annotations
 
@@ -6,189 +6,116 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
-from diagnosis.steering.blocks import WHITE_DOF, SensorNoise, SteeringBlocks, window_means
-from diagnosis.steering.simplex import minimize
+from diagnosis.steering.blocks import SensorNoise, SteeringBlocks
+from diagnosis.steering.plant_fit import (
+    DEAD,
+    LAG,
+    LIMITS,
+    PLAY,
+    SIZE,
+    SLOPES,
+    TOLERANCES,
+    Belief,
+    FittedPlant,
+    fit_plant,
+    moving,
+    packed,
+    predicted_by,
+    robust_loss,
+    unpacked,
+)
+from diagnosis.steering.valve_map import ValveMap, rates_at
+from diagnosis.steering.windows import Windows, windows_of
 
 Array = NDArray[np.float64]
 
-_WINDOW_S = 0.25
-_SHORT_WINDOW_S = 0.1
+_LONG_S, _SHORT_S = 0.25, 0.1
 _LEAST_WINDOWS = 8
+_LEAST_MISFIT = 0.02
+_DRIFT = 0.05  # standard deviation of a slope from mission to mission, relative to it
+_EACH_SLOPE, _EACH_DEAD, _EACH_LIMIT = 0.15, 0.003, 0.1  # of one direction against the other
+_CONFIRMING = 1.2  # times the opening at which a limit is reached: from there on it was seen
+_OPEN_LIMIT, _OPEN_LIMIT_STD = 1.5, 0.3  # a limit that was not seen: times the largest rate, and its relative std
+_BEYOND = 0.5  # of what a rate grows beyond the openings that were seen: its standard deviation
 
 
 @dataclass(frozen=True)
 class SteeringPlant:
-    """Valve and cylinder of an axle: ṙ = (sat(gain·u) − r)/lag, φ̇ = r.
+    """Valve and cylinder of an axle: ṙ = (f(u) − r)/lag, φ̇ = r, and the sensor follows φ with a play.
 
     Attributes
     ----------
-    gain : float
-        Rate per full opening [rad/s].
-    rate : float
-        Rate limit [rad/s]; the largest rate seen where the mission never reached it.
+    valve : ValveMap
+        f, the rate by opening.
     lag : float
         Lag [s].
+    play : float
+        Half of the sensor's play [rad].
+    cov : Array, shape (8, 8)
+        Covariance of the constants, in the order of `diagnosis.steering.plant_fit`.
     misfit : float
         Share of a rate that the model does not explain, in the windows that it explains better.
     windows : int
         Windows of steering behind it.
+    seen : tuple[float, float]
+        Smallest and largest opening at which the axle was seen to obey it [fraction].
     """
 
-    gain: float
-    rate: float
+    valve: ValveMap
     lag: float
+    play: float
+    cov: Array
     misfit: float
     windows: int
+    seen: tuple[float, float]
+
+    @property
+    def gain(self) -> float:
+        """Rate per opening beyond the dead band, mean of both directions [rad/s per full opening]."""
+        return self.valve.gain
+
+    @property
+    def rate(self) -> float:
+        """Largest rate [rad/s]."""
+        return self.valve.limit
+
+    @property
+    def lag_std(self) -> float:
+        """Standard deviation of the lag's logarithm, at most 1."""
+        return float(min(np.sqrt(self.cov[LAG, LAG]), 1.0))
 
     @property
     def reliable(self) -> bool:
         """Whether valves can be judged by it."""
         return self.windows >= _LEAST_WINDOWS and self.misfit < 0.25
 
-
-@njit(cache=True)
-def _scan_rates(u, gain, limit, a, length):  # type: ignore[no-untyped-def]
-    """Means over windows of `length` of r' = a·r + (1 − a)·sat(gain·u)."""
-    out = np.zeros(u.size // length)
-    r = 0.0
-    for w in range(out.size):
-        total = 0.0
-        for k in range(w * length, (w + 1) * length):
-            r = a * r + (1 - a) * min(max(gain * u[k], -limit), limit)
-            total += r
-        out[w] = total / length
-    return out
-
-
-@dataclass(frozen=True)
-class Windows:
-    """Rates of one axle in windows, and what drives them."""
-
-    rate: Array  # mean rate between the middles of neighbouring windows [rad/s]
-    u: Array  # opening by block
-    good: NDArray[np.bool_]
-    length: int
-    dt: float
-    noise: float  # of the rates [rad/s]
-
-    def predicted(self, gain: float, limit: float, lag: float) -> Array:
-        """Rates that a plant gives at these openings."""
-        a = float(np.exp(-self.dt / max(lag, 1e-4)))
-        means = _scan_rates(self.u, gain, limit, a, self.length)
-        return np.asarray((means[:-1] + means[1:]) / 2)
-
-
-def windows_of(blocks: SteeringBlocks, noise: SensorNoise, stop: float, window_s: float) -> Windows:
-    """Rates between windows of `window_s`, marked where the sensor shows its usual noise and no end stop is near."""
-    length = max(2, round(window_s / blocks.dt))
-    known = blocks.count > 0
-    mean = blocks.mean
-    if not known.all() and known.any():
-        mean = np.interp(np.arange(mean.size), np.flatnonzero(known), mean[known])
-    power = window_means(blocks.power, length)
-    middle = window_means(mean, length)
-    # less or more noise than usual: not the healthy sensor; at its end stop an axle does not answer
-    counts = float(np.median(blocks.count[known])) * length if known.any() else 1.0
-    usual = 1 + max(0.3, 4 * float(np.sqrt(2 / (WHITE_DOF * counts))))
-    alive = (window_means(known.astype(np.float64), length) > 0.9) & (np.abs(middle) < 0.97 * stop)
-    alive &= window_means(blocks.blind.astype(np.float64), length) == 0.0
-    alive &= power < usual * noise.white
-    if noise.resolved:
-        alive &= power > noise.white / usual
-    rate = np.diff(middle) / (length * blocks.dt)
-    spread = float(np.sqrt(2 * noise.white / max(counts, 1.0))) / (length * blocks.dt)
-    return Windows(rate, blocks.u, alive[1:] & alive[:-1], length, blocks.dt, spread)
-
-
-def _loss(parts: Sequence[Windows], gain: float, limit: float, lag: float, scale: float, tolerance: float) -> float:
-    """Mean of capped residuals over windows in which the axle is steered or turns."""
-    total, count = 0.0, 0
-    for w in parts:
-        predicted = w.predicted(gain, limit, lag)
-        use = w.good & (np.maximum(np.abs(predicted), np.abs(w.rate)) > 0.1 * scale)
-        residual = np.abs(w.rate[use] - predicted[use]) / (tolerance * (scale + np.abs(w.rate[use])) + 2 * w.noise)
-        total += float(np.minimum(residual, 3.0).sum())
-        count += int(np.count_nonzero(use))
-    return total / count if count else np.inf
-
-
-def _fit(
-    parts: Sequence[Windows], short: Sequence[Windows], start: SteeringPlant | None = None
-) -> SteeringPlant | None:
-    """Gain, rate limit and lag with the smallest loss, from `start` or a coarse grid on.
-
-    `parts` are long windows for the grid, `short` ones show the lag.
-    """
-    rates = np.concatenate([np.abs(w.rate[w.good]) for w in parts])
-    noise = max(w.noise for w in parts)
-    moving = rates[rates > max(5 * noise, 1e-4)]
-    if moving.size < _LEAST_WINDOWS:
-        return None
-    scale = float(np.quantile(moving, 0.8))
-    openings = np.concatenate(
-        [np.abs(w.predicted(1.0, np.inf, 0.05))[w.good & (np.abs(w.rate) > 0.3 * scale)] for w in parts]
-    )
-    openings = openings[openings > 0]
-    if not openings.size:
-        return None
-    typical = scale / float(np.median(openings))
-    top = float(np.quantile(moving, 0.98))
-    best = _best_of_grid(parts, typical, top, scale) if start is None else (start.gain, start.rate, start.lag)
-    gain, limit, lag = _refined_fit(short, best, scale)
-    residuals = []
-    for w in parts:
-        predicted = w.predicted(gain, limit, lag)
-        use = w.good & (np.abs(predicted) > 0.3 * scale)
-        residuals.append(np.abs(w.rate[use] - predicted[use]) / np.abs(predicted[use]))
-    shares = np.concatenate(residuals)
-    if not shares.size:
-        return None
-    return SteeringPlant(float(gain), float(limit), float(lag), float(np.quantile(shares, 0.3)), shares.size)
-
-
-def _best_of_grid(parts: Sequence[Windows], gain: float, rate: float, scale: float) -> tuple[float, float, float]:
-    """Gain, rate limit and lag of the smallest loss on a grid around a typical gain and the largest rate."""
-    return min(
-        (_loss(parts, g, limit, lag, scale, 0.1), g, limit, lag)
-        for g in gain * np.geomspace(0.3, 5.0, 14)
-        for limit in rate * np.array([0.6, 0.8, 1.0, 1.25])
-        for lag in (0.02, 0.06, 0.18)
-    )[1:]
-
-
-def _refined_fit(
-    parts: Sequence[Windows], start: tuple[float, float, float], scale: float
-) -> tuple[float, float, float]:
-    """Gain, rate limit and lag from a start on, with a loss that tolerates less and less."""
-    best = start
-    for tolerance in (0.05, 0.02, 0.006):
-        # gain and lag trade off against each other: a simplex in their logarithms follows the valley
-
-        def misfit(x: Array, tolerance: float = tolerance) -> float:
-            return _loss(parts, np.exp(x[0]), np.exp(x[1]), np.exp(x[2]), scale, tolerance)
-
-        found = minimize(
-            misfit,
-            np.log(best) + np.array([[0, 0, 0], [1, 0, 0.0], [0, 1, 0], [0, 0, 5]]) * 3 * tolerance,
-            calls=45,
-            x_tol=1e-3,
-            f_tol=1e-4,
-        )
-        gain, limit, lag = np.exp(found)
-        best = gain, limit, lag
-    return best
+    def spread(self, u: Array) -> Array:
+        """Standard deviation of the rate that is expected at openings [rad/s], shape of u."""
+        grid = np.unique(np.concatenate([np.linspace(u.min(), u.max(), 201), [0.0]])) if u.size else np.zeros(1)
+        x = packed(self.valve, self.lag, self.play)
+        rates = rates_at(grid, self.valve)
+        variance = (max(self.misfit, _LEAST_MISFIT) * rates) ** 2
+        jacobian = np.empty((grid.size, 6))
+        for i in range(6):
+            h = np.sqrt(self.cov[i, i])
+            up, down = x.copy(), x.copy()
+            up[i] += h
+            down[i] -= h
+            jacobian[:, i] = (rates_at(grid, unpacked(up)[0]) - rates_at(grid, unpacked(down)[0])) / (2 * h)
+        variance += np.einsum("ki,ij,kj->k", jacobian, self.cov[:6, :6], jacobian)
+        edges = rates_at(np.clip(grid, *self.seen), self.valve)
+        variance += (_BEYOND * (rates - edges)) ** 2
+        return np.asarray(np.interp(u, grid, np.sqrt(variance)))
 
 
 def identify_plants(
     axles: Sequence[SteeringBlocks | None], noises: Sequence[SensorNoise], stop: float
 ) -> list[SteeringPlant | None]:
-    """Identify each axle's plant: its own where both axles agree, else that of both together.
+    """Identify each axle's plant: its own about what both axles have in common.
 
-    A fault that lasts would make one axle look slow; a plant that the other axle does not confirm within a fifth is
-    not believed.
+    A fault that lasts would make one axle look slow; what the other axle has is the prior of each.
 
     Parameters
     ----------
@@ -200,21 +127,130 @@ def identify_plants(
         Angle of the end stops [rad].
     """
     windows = [
-        None if b is None else (windows_of(b, w, stop, _WINDOW_S), windows_of(b, w, stop, _SHORT_WINDOW_S))
+        None if b is None else (windows_of(b, w, stop, _LONG_S), windows_of(b, w, stop, _SHORT_S))
         for b, w in zip(axles, noises, strict=True)
     ]
     usable = [w for w in windows if w is not None]
-    pooled = _fit([w[0] for w in usable], [w[1] for w in usable]) if usable else None
-    if pooled is None:
+    scale = usual_rate([w[0] for w in usable])
+    if scale is None:
         return [None for _ in axles]
-    out: list[SteeringPlant | None] = []
-    for w in windows:
-        own = pooled if w is None or len(usable) == 1 else _fit([w[0]], [w[1]], pooled)
-        agrees = own is not None and own.reliable and abs(np.log(own.gain / pooled.gain)) < 0.2
-        limit = max(pooled.rate, own.rate) if own is not None and agrees else pooled.rate
-        out.append(
-            SteeringPlant(own.gain, limit, pooled.lag, own.misfit, own.windows)
-            if own is not None and agrees
-            else pooled
+    fits = iter(_fit_axles(usable, scale))
+    return [None if w is None else plant_of([w[0]], next(fits), scale) for w in windows]
+
+
+def _fit_axles(windows: Sequence[tuple[Windows, Windows]], scale: float) -> list[FittedPlant]:
+    """Constants of every axle: those of least loss about one that is believed of all, an axle's own or the common ones."""
+    alone = [_fit_alone([w[0]], [w[1]], scale) for w in windows]
+    if len(windows) == 1:
+        return alone
+    common = _fit_alone([w[0] for w in windows], [w[1] for w in windows], scale)
+    tried = []
+    for reference in (*alone, common):
+        prior = Belief(reference.x, own_spread(reference.cov))
+        tried.append(
+            [
+                min(
+                    (fit_plant([w[1]], x, prior, scale, TOLERANCES[1:]) for x in (reference.x, own.x)),
+                    key=lambda fit: fit.loss,
+                )
+                for w, own in zip(windows, alone, strict=True)
+            ]
         )
+    return min(tried, key=lambda fits: sum(f.loss for f in fits))
+
+
+def own_spread(cov: Array) -> Array:
+    """Covariance of one axle's constants about those of another."""
+    return np.asarray(cov + _structure(0.2, 0.012, 0.1, lag=0.2, play=0.002))
+
+
+def usual_rate(parts: Sequence[Windows]) -> float | None:
+    """Rate at which the axles usually turn [rad/s]; None where they turn too little."""
+    rates = np.concatenate([np.abs(w.rate[w.good]) for w in parts]) if parts else np.zeros(0)
+    noise = max((w.noise for w in parts), default=0.0)
+    turning = rates[rates > max(5 * noise, 1e-4)]
+    return float(np.quantile(turning, 0.8)) if turning.size >= _LEAST_WINDOWS else None
+
+
+def _fit_alone(long: Sequence[Windows], short: Sequence[Windows], scale: float) -> FittedPlant:
+    """Constants that windows share, from a coarse grid on."""
+    starts = _best_of_grid(long, scale)
+    rough = [fit_plant(long, x, Belief(x, _wide_spread()), scale, TOLERANCES[:2]) for x in starts]
+    best = sorted(rough, key=lambda f: f.loss)[:2]
+    return min(
+        (fit_plant(short, f.x, Belief(f.x, _wide_spread()), scale, TOLERANCES[1:]) for f in best), key=lambda f: f.loss
+    )
+
+
+def _wide_spread() -> Array:
+    """Covariance of the constants about a point of the coarse grid."""
+    return _structure(0.7, 0.02, 0.5, lag=1.0, play=0.004)
+
+
+def _structure(slope: float, dead: float, limit: float, *, lag: float, play: float) -> Array:
+    """Covariance from what both directions share and what each has for itself."""
+    out = np.zeros((SIZE, SIZE))
+    for both, common, each in (
+        (SLOPES, slope, _EACH_SLOPE),
+        (DEAD, dead, _EACH_DEAD),
+        (LIMITS, limit, _EACH_LIMIT),
+    ):
+        out[both, both] = common**2 + each**2 * np.eye(2)
+    out[LAG, LAG], out[PLAY, PLAY] = lag**2, play**2
     return out
+
+
+def _best_of_grid(parts: Sequence[Windows], scale: float) -> list[Array]:
+    """The constants of least loss on a grid, one for each dead band."""
+    turning = [w.good & (np.abs(w.rate) > 0.3 * scale) for w in parts]
+    openings = np.concatenate([np.abs(w.opening[t]) for w, t in zip(parts, turning, strict=True)])
+    rates = np.concatenate([np.abs(w.rate[t]) for w, t in zip(parts, turning, strict=True)])
+    usable = openings > 0
+    top = float(rates.max(initial=scale))
+    if not usable.any():
+        return [packed(ValveMap(1.0, 1.0, 0.0, 0.0, top, top), 0.06, 0.0)]
+    typical, rate = float(np.median(openings[usable])), float(np.median(rates[usable]))
+    found = []
+    for share in (0.0, 0.2, 0.4, 0.6, 0.8):
+        dead = share * typical
+        trials = [
+            packed(ValveMap(s, s, dead, dead, limit, limit), 0.06, 0.0)
+            for s in rate / (typical - dead) * np.geomspace(0.4, 4.0, 12)
+            for limit in top * np.array([0.8, 1.5])
+        ]
+        found.append(min(trials, key=lambda x: robust_loss(parts, x, scale, 0.2)))
+    return found
+
+
+def plant_of(parts: Sequence[Windows], fitted: FittedPlant, scale: float) -> SteeringPlant:
+    """The plant of an axle with what it leaves unexplained in the windows that it explains better."""
+    valve, lag, play = unpacked(fitted.x)
+    shares, low, high = [], 0.0, 0.0
+    for part in parts:
+        predicted = predicted_by(part, fitted.x)
+        use = moving(part, predicted, scale) & (np.abs(predicted) > 0.2 * scale)
+        share = np.abs(part.rate - predicted)[use] / np.abs(predicted)[use]
+        shares.append(share)
+        obeyed = part.opening[use][share < 0.15]
+        if obeyed.size:
+            low, high = min(low, float(obeyed.min())), max(high, float(obeyed.max()))
+    all_shares = np.concatenate(shares)
+    misfit = float(np.quantile(all_shares, 0.3)) if all_shares.size else 1.0
+    valve, cov = _with_open_limits(valve, fitted.cov, (low, high))
+    return SteeringPlant(valve, lag, play, cov, misfit, all_shares.size, (low, high))
+
+
+def _with_open_limits(valve: ValveMap, cov: Array, seen: tuple[float, float]) -> tuple[ValveMap, Array]:
+    """Limits that no opening well beyond them has shown are set beyond what was seen, and known roughly."""
+    cov = cov.copy()
+    down, up = -seen[0], seen[1]
+    limits = [valve.limit_up, valve.limit_down]
+    for i, (reach, slope, dead) in enumerate(
+        ((up, valve.slope_up, valve.dead_up), (down, valve.slope_down, valve.dead_down))
+    ):
+        if reach < _CONFIRMING * (dead + limits[i] / slope):
+            limits[i] = max(limits[i], _OPEN_LIMIT * slope * max(reach - dead, 0.0))
+            place = LIMITS.start + i
+            cov[place], cov[:, place] = 0.0, 0.0
+            cov[place, place] = _OPEN_LIMIT_STD**2
+    return valve._replace(limit_up=limits[0], limit_down=limits[1]), cov

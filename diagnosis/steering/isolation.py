@@ -22,6 +22,7 @@ from diagnosis.steering.model_bank import (
 )
 from diagnosis.steering.path import AxleFilter, Models, evidence_of
 from diagnosis.steering.path_refinement import run_out_evidence
+from diagnosis.steering.valve_map import opening_for
 from replay.faults import FaultMode, Side
 
 _SENSOR_ROWS = (HEALTHY, STUCK, NO_SIGNAL, INEFFICIENT, NOISY, COLOURED)
@@ -78,7 +79,7 @@ def evidence_of_explanations(
             trial[a:b] = numbers
             found = NO_FAULT if row == HEALTHY else Explanation(named, row)
             evidence = run_out_evidence(axle, known, trial, a, b)
-            if found == (Side.ACTUATOR, STUCK) and abs(_stuck_opening(axle, known, trial, a, b)) < min_sat:
+            if found == (Side.ACTUATOR, STUCK) and abs(_opening_in(axle, known, trial, a, b)) < min_sat:
                 found = Explanation(Side.ACTUATOR, NO_SIGNAL)
             out[found] = max(evidence, out.get(found, -np.inf))
     if NO_FAULT not in out:
@@ -109,6 +110,12 @@ def _model_number(sensor: int, actuator: int, *, redundant: bool) -> int:
     return int(found[0]) if found.size else -1
 
 
-def _stuck_opening(axle: AxleFilter, known: SteeringPath, models: Models, a: int, b: int) -> float:
+def _opening_in(axle: AxleFilter, known: SteeringPath, models: Models, a: int, b: int) -> float:
     """Opening of a valve that is taken for stuck in [a, b) [fraction]."""
-    return float(evidence_of(axle, known, models, a, b)[1][3]) / axle.model.plant.gain
+    return stuck_opening(float(evidence_of(axle, known, models, a, b)[1][3]), axle)
+
+
+def stuck_opening(b: float, axle: AxleFilter) -> float:
+    """Opening [fraction] of a stuck valve whose state is b [rad/s]."""
+    plant = axle.model.plant
+    return b / plant.gain if axle.model.opening_measured else opening_for(b, plant.valve)

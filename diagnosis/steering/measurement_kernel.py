@@ -23,9 +23,10 @@ from diagnosis.steering.model_bank import (
     STATES,
     STUCK,
 )
-from diagnosis.steering.models import SensorConstants
+from diagnosis.steering.models import AxleConstants, SensorConstants
 
 _OUTLIER = -18.0
+_LOST_S = 0.03  # how long an axle may turn unseen
 _LEAST_GAIN, _MOST_GAIN = 0.1, 0.92  # of an inefficient part
 
 
@@ -62,11 +63,14 @@ def _learned_noise(alpha: float, beta: float, nu: float, power: float) -> float:
 
 
 @njit(cache=True, error_model="numpy")
-def update(m: int, block: Block, stop: float, sensor: SensorConstants, bank: FilterBank) -> float:
+def update(m: int, block: Block, least: float, axle: AxleConstants, sensor: SensorConstants, bank: FilterBank) -> float:
     """Kalman update with a block's mean, and the evidence of mean and white power; returns the log-likelihood.
 
-    A block that the model cannot explain costs it a fixed amount and teaches it nothing but that its constant was wrong.
+    A block that the model cannot explain costs it a fixed amount and teaches it nothing but that its constant was wrong,
+    or that the axle is elsewhere, no further than it turns in some milliseconds. `least` is the smallest variance [rad²]
+    that the angle is given in the likelihood.
     """
+    stop = axle.stop
     z, P, noise, gain = bank.mean, bank.cov, bank.noise, bank.room[2]
     s, power = SENSOR[m], block.power
     nu = sensor.white_dof * block.samples
@@ -87,11 +91,14 @@ def update(m: int, block: Block, stop: float, sensor: SensorConstants, bank: Fil
         gain[i] = P[m, i, 0] * d + P[m, i, 4] * phi + P[m, i, 5]
     total += gain[0] * d + gain[4] * phi + gain[5]
     innovation = block.mean - d * phi - z[m, 5]
-    likelihood -= 0.5 * (innovation * innovation / total + log(2 * pi * total))
+    doubt = max(total, least + r) if least > 0.0 else total
+    likelihood -= 0.5 * (innovation * innovation / doubt + log(2 * pi * doubt))
     floor = _OUTLIER - log(stop) - 0.5 * nu * (1 + log(max(power, sensor.constant)))
     if likelihood < floor:
         if s == STUCK:
             _forget(m, 5, stop, z, P)
+        elif s == HEALTHY:
+            P[m, 0, 0] += min(innovation * innovation, (axle.rate_limit * _LOST_S) ** 2)
         return float(floor)
     noise[m, 0], noise[m, 1] = after, scaled
     for n in range(FREE[m]):
@@ -144,7 +151,7 @@ def measure_redundant(m: int, seen: RedundantBlock, g: float, rate_limit: float,
     if not np.isnan(seen.angle):
         h[:] = 0.0
         h[0] = 1.0
-        likelihood += _linear(m, seen.angle - z[m, 0], seen.angle_variance, bank)
+        likelihood += _linear(m, seen.angle - z[m, 0] - bank.gap[m, 0], seen.angle_variance + bank.gap[m, 1], bank)
     if not np.isnan(seen.opening):
         expected = seen.command if a == HEALTHY else 0.0
         h[:] = 0.0

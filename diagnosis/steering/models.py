@@ -8,12 +8,21 @@ from typing import NamedTuple
 import numpy as np
 
 from diagnosis.steering.blocks import WHITE_DOF, SensorNoise, SteeringBlocks
-from diagnosis.steering.identification import SteeringPlant, windows_of
+from diagnosis.steering.identification import SteeringPlant
+from diagnosis.steering.valve_map import ValveMap, rates_at
+from diagnosis.steering.windows import windows_of
 
 _MEAN_HEALTHY_S = 60.0
 _RATE_ERROR_S = 1.0
+_LEAST_LAG_STD = 0.1  # of the lag, relative to it
+_LAG_ERROR = 0.5  # noise of a rate whose sum over a change is as large as what a wrong lag makes of it
+_STOP_SHARE, _REST_S = 0.02, 0.1  # how far from the given stop it may be, relative to it; how long an axle rests there
 _DISTURBANCE_S = 0.8  # how fast a valve's disturbance and a sensor's slow noise change
 _COLOURED_S = 0.08  # how fast a sensor's coloured noise changes
+_IDLE_ERRORS, _IDLE_JITTER = (
+    5.0,
+    3.0,
+)  # errors of the rate, and changes from block to block, that ask nothing of a valve
 _HIDDEN_DOF = 0.02  # degrees of freedom per sample of a white part that rounding hides
 
 
@@ -24,16 +33,28 @@ class AxleConstants(NamedTuple):
     ----------
     dt : float
         Length of a block [s].
+    valve : ValveMap
+        Rate by opening.
     gain, rate_limit : float
-        Rate per full opening and its limit [rad/s].
+        Rate per opening beyond the dead band and its limit, both directions together [rad/s].
+    play : float
+        Half of the sensor's play [rad].
     lag, rate_decay : float
         Lag of the rate [s], and what is left of a rate after a block, exp(−dt/lag) [1].
+    lag_error : float
+        What the lag's error makes of a rate's change in a block [1].
     stop : float
         Angle of the end stops [rad].
+    stop_up, stop_down : float
+        What the sensor reads at them [rad].
     rate_error, rate_error_decay : float
         Standard deviation of the rate's error [rad/s], and what is left of it after a block [1].
-    gain_variance : float
-        Variance of the valve's characteristic, relative to it [1].
+    rate_error_s : float
+        How long an error of the rate lasts [s].
+    idle_rate : float
+        Commanded rate up to which nothing is asked of the valve [rad/s].
+    opening_measured : bool
+        Whether the valve's opening is logged beside its command.
     angle_variance : float
         Variance that a block adds to the angle [rad²].
     stop_variance : float
@@ -43,14 +64,21 @@ class AxleConstants(NamedTuple):
     """
 
     dt: float
+    valve: ValveMap
     gain: float
     rate_limit: float
+    play: float
     lag: float
     rate_decay: float
+    lag_error: float
     stop: float
+    stop_up: float
+    stop_down: float
     rate_error: float
     rate_error_decay: float
-    gain_variance: float
+    rate_error_s: float
+    idle_rate: float
+    opening_measured: bool
     angle_variance: float
     stop_variance: float
     disturbance_decay: float
@@ -101,6 +129,9 @@ class FilterConstants(NamedTuple):
         Minus the log-probability that a row is entered in a block.
     freedom_cost : float
         What a model with a free gain must gain per block [log-likelihood].
+    idle_variance : float
+        Least variance of an angle whose valve is at fault while nothing is asked of it [rad²]: that of a healthy axle
+        at rest, so that no fault gains by being surer of rest.
     redundant : bool
         Whether anything is measured redundantly.
     """
@@ -109,6 +140,7 @@ class FilterConstants(NamedTuple):
     sensor: SensorConstants
     switch_cost: float
     freedom_cost: float
+    idle_variance: float
     redundant: bool
 
 
@@ -132,6 +164,12 @@ class SteeringModel:
         Length of a block [s].
     redundant : bool
         Whether anything is measured redundantly.
+    idle_rate : float
+        Commanded rate up to which nothing is asked of the valve [rad/s].
+    stops : tuple[float, float]
+        What the sensor reads at the lower and the upper one [rad].
+    opening_measured : bool
+        Whether the valve's opening is.
     """
 
     plant: SteeringPlant
@@ -141,6 +179,9 @@ class SteeringModel:
     count: float
     dt: float
     redundant: bool
+    idle_rate: float
+    stops: tuple[float, float]
+    opening_measured: bool = False
 
     @property
     def switch_cost(self) -> float:
@@ -156,20 +197,29 @@ class SteeringModel:
         return float(rounding + (1e-7 * self.stop) ** 2)
 
     @property
-    def rest_cost(self) -> float:
-        """What a healthy axle at rest loses per block, by its freedom, on a constant reading; and a little more.
+    def block_variance(self) -> float:
+        """Variance of a block's mean by the healthy sensor's noise [rad²]."""
+        return self.noise.white / self.count + self.mean_rounding
 
-        A constant reading must gain as much to be taken for a stuck sensor where rounding hides the noise.
-        """
-        r = self.noise.white / self.count + self.mean_rounding
+    @property
+    def rest_variance(self) -> float:
+        """Variance of a healthy axle's angle at rest, before a block is measured [rad²]."""
+        r = self.block_variance
         f = np.array([[1.0, self.dt], [0.0, np.exp(-self.dt / _RATE_ERROR_S)]])
         q = np.diag([0.0, (1 - f[1, 1] ** 2) * self.rate_error**2])
         p = np.diag([r, self.rate_error**2])
         for _ in range(200):  # Riccati recursion to its steady state
             p = f @ p @ f.T + q
             p -= np.outer(p[:, 0], p[0]) / (p[0, 0] + r)
-        p = f @ p @ f.T + q
-        return float(0.5 * np.log(1 + p[0, 0] / r) + 0.03)
+        return float((f @ p @ f.T + q)[0, 0])
+
+    @property
+    def rest_cost(self) -> float:
+        """What a healthy axle at rest loses per block, by its freedom, on a constant reading; and a little more.
+
+        A constant reading must gain as much to be taken for a stuck sensor where rounding hides the noise.
+        """
+        return float(0.5 * np.log(1 + self.rest_variance / self.block_variance) + 0.03)
 
     def constants(self) -> FilterConstants:
         """Constants of the compiled filters."""
@@ -179,6 +229,7 @@ class SteeringModel:
             sensor=self._sensor(),
             switch_cost=self.switch_cost,
             freedom_cost=0.5 * self.dt if resolved else 0.03,
+            idle_variance=1.5 * self.rest_variance,
             redundant=self.redundant,
         )
 
@@ -187,14 +238,21 @@ class SteeringModel:
         lag = max(plant.lag, 1e-4)
         return AxleConstants(
             dt=self.dt,
+            valve=plant.valve,
             gain=plant.gain,
             rate_limit=plant.rate,
+            play=plant.play if plant.play > 0.3 * self.noise.std else 0.0,
             lag=lag,
             rate_decay=float(np.exp(-self.dt / lag)),
+            lag_error=_LAG_ERROR * float(np.hypot(_LEAST_LAG_STD, plant.lag_std) * np.sqrt(lag / self.dt)),
             stop=self.stop,
+            stop_up=self.stops[1],
+            stop_down=self.stops[0],
             rate_error=self.rate_error,
             rate_error_decay=float(np.exp(-self.dt / _RATE_ERROR_S)),
-            gain_variance=max(0.02, plant.misfit) ** 2,
+            rate_error_s=_RATE_ERROR_S,
+            idle_rate=self.idle_rate,
+            opening_measured=self.opening_measured,
             angle_variance=(0.1 * self.rate_error * self.dt) ** 2,
             stop_variance=self.mean_rounding + 0.01 * noise.white,
             disturbance_decay=float(np.exp(-self.dt / _DISTURBANCE_S)),
@@ -231,7 +289,7 @@ def model_of(blocks: SteeringBlocks, plant: SteeringPlant, noise: SensorNoise, s
         Angle of the end stops [rad].
     """
     windows = windows_of(blocks, noise, stop, 0.5)
-    predicted = windows.predicted(plant.gain, plant.rate, plant.lag)
+    predicted = windows.predicted(plant.valve, plant.lag, plant.play)
     residual = np.abs(windows.rate - predicted)[windows.good & (np.abs(predicted) < 0.05 * plant.rate)]
     error = 0.0
     if residual.size >= 8:
@@ -239,4 +297,23 @@ def model_of(blocks: SteeringBlocks, plant: SteeringPlant, noise: SensorNoise, s
     known = blocks.count[blocks.count > 0]
     count = float(np.median(known)) if known.size else 1.0
     redundant = bool(blocks.redundancy.known.any())
-    return SteeringModel(plant, noise, stop, max(error, 5e-4 * plant.rate), count, blocks.dt, redundant)
+    measured = bool(np.isfinite(blocks.redundancy.opening).any())
+    error = max(error, 5e-4 * plant.rate)
+    jitter = float(np.median(np.abs(np.diff(rates_at(blocks.u, plant.valve))))) if blocks.u.size > 1 else 0.0
+    idle = max(_IDLE_ERRORS * error, _IDLE_JITTER * jitter)
+    return SteeringModel(
+        plant, noise, stop, error, count, blocks.dt, redundant, idle, _stops(blocks, noise, stop), measured
+    )
+
+
+def _stops(blocks: SteeringBlocks, noise: SensorNoise, stop: float) -> tuple[float, float]:
+    """What the sensor reads at the end stops [rad]: where the axle rests next to them, else what the machine file says."""
+    usual = blocks.mean[(blocks.count > 0) & (blocks.power > 0.1 * noise.white) & (blocks.power < 10 * noise.white)]
+    out = []
+    for side in (-1.0, 1.0):
+        near = side * usual
+        near = near[np.abs(near / stop - 1) < _STOP_SHARE]
+        resting = near[near > near.max(initial=0.0) - max(4 * noise.std, noise.lsb)]
+        found = float(np.median(resting)) if resting.size * blocks.dt > _REST_S else stop
+        out.append(side * found)
+    return out[0], out[1]

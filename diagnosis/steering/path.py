@@ -12,6 +12,7 @@ from diagnosis.channels.sample_status import PAIR
 from diagnosis.estimation.back_pointers import STAY, trace
 from diagnosis.steering import path_kernel
 from diagnosis.steering.blocks import SteeringBlocks
+from diagnosis.steering.driven import Driven
 from diagnosis.steering.filter_state import Array, BlockSeries, FilterBank, SteeringPath
 from diagnosis.steering.model_bank import ACTUATOR, FIRST_HIDDEN, HEALTHY, HEALTHY_MODEL, MODELS, SENSOR, STATES
 from diagnosis.steering.models import FilterConstants, SteeringModel
@@ -27,8 +28,8 @@ class AxleFilter:
     ----------
     blocks : SteeringBlocks
         The axle's samples.
-    driven : Array, shape (m,)
-        `SteeringBlocks.driven` with the plant's gain and rate limit [rad/s].
+    driven : Driven
+        What the valve's map gives at the command.
     model : SteeringModel
         Constants.
     allowed : NDArray[np.bool_], shape (models,)
@@ -38,7 +39,7 @@ class AxleFilter:
     """
 
     blocks: SteeringBlocks
-    driven: Array
+    driven: Driven
     model: SteeringModel
     allowed: NDArray[np.bool_]
     names: tuple[str, str]
@@ -51,7 +52,7 @@ class AxleFilter:
     @cached_property
     def series(self) -> BlockSeries:
         """The blocks for the compiled filters."""
-        return self.blocks.series(self.driven)
+        return self.driven.series(self.blocks)
 
     @property
     def first_angle(self) -> float:
@@ -94,6 +95,7 @@ def follow_path(axle: AxleFilter, models: Models) -> SteeringPath:
         mean=axle.blocks.store.zeros((size, STATES), np.float64),
         cov=axle.blocks.store.zeros((size, STATES, STATES), np.float64),
         noise=np.ones((size, 2)),
+        gap=np.zeros((size, 2)),
     )
     bank = path_kernel.empty_bank()
     path_kernel.start(int(models[0]), axle.first_angle, axle.constants, bank)

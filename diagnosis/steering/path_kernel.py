@@ -18,6 +18,7 @@ from diagnosis.steering.filter_state import (
 )
 from diagnosis.steering.model_bank import (
     ACTUATOR,
+    HEALTHY,
     HEALTHY_MODEL,
     MODELS,
     NO_SIGNAL,
@@ -32,7 +33,14 @@ from diagnosis.steering.step_kernel import advance, enter
 from replay.arrays.numeric import uncounted
 
 _LEARNING_COST = 8.0  # what a model whose states are yet to be learnt must gain to be entered [log-likelihood]
+_CHANGE_COST = 12.0
 _NOISE_COST = 3.0  # of one kind of noise after the other [log-likelihood]
+
+
+@njit(cache=True, error_model="numpy", inline="always")
+def _change(row: int, old: int) -> float:
+    """Minus the log-probability that a part goes from one row to another without being healthy between them."""
+    return _CHANGE_COST if row != HEALTHY and old != HEALTHY else 0.0
 
 
 @njit(cache=True, error_model="numpy")
@@ -42,16 +50,25 @@ def switch_cost(m: int, old: int, constants: FilterConstants) -> float:
     cost = constants.switch_cost
     out = 0.0
     if s != s0:
-        out += _NOISE_COST if s >= NOISY and s0 >= NOISY else cost
+        out += _NOISE_COST if s >= NOISY and s0 >= NOISY else cost + _change(s, s0)
     if ACTUATOR[m] != ACTUATOR[old]:
-        out += 0.0 if s in (STUCK, NO_SIGNAL) and not constants.redundant else cost
+        hidden = s in (STUCK, NO_SIGNAL) and not constants.redundant
+        out += 0.0 if hidden else cost + _change(ACTUATOR[m], ACTUATOR[old])
     return out
 
 
 @njit(cache=True, error_model="numpy", inline="always")
 def _block(k: int, series: BlockSeries) -> Block:
     """Block k of an axle."""
-    return Block(series.mean[k], series.power[k], series.samples[k], series.driven[k], series.u[k], series.status[k])
+    return Block(
+        series.mean[k],
+        series.power[k],
+        series.samples[k],
+        series.driven[k],
+        series.spread[k],
+        series.u[k],
+        series.status[k],
+    )
 
 
 @njit(cache=True, error_model="numpy", inline="always")
@@ -78,7 +95,13 @@ def scan(
     back: NDArray[np.uint8],
 ) -> None:
     """Viterbi over the models; changes `score` and `states`, writes back-pointers (n, models)."""
-    bank = FilterBank(uncounted(states.mean), uncounted(states.cov), uncounted(states.noise), uncounted(states.room))
+    bank = FilterBank(
+        uncounted(states.mean),
+        uncounted(states.cov),
+        uncounted(states.noise),
+        uncounted(states.gap),
+        uncounted(states.room),
+    )
     for k in range(series.mean.size):
         best = 0
         for m in range(1, MODELS):
@@ -111,20 +134,30 @@ def follow(series: BlockSeries, constants: FilterConstants, states: FilterBank, 
 
     `states` hold the first model as `start` leaves it.
     """
-    bank = FilterBank(uncounted(states.mean), uncounted(states.cov), uncounted(states.noise), uncounted(states.room))
+    bank = FilterBank(
+        uncounted(states.mean),
+        uncounted(states.cov),
+        uncounted(states.noise),
+        uncounted(states.gap),
+        uncounted(states.room),
+    )
     for k in range(series.mean.size):
         m = np.int64(path.model[k])
         if k > 0 and m != path.model[k - 1]:
             enter(m, np.int64(path.model[k - 1]), constants, bank)
         advance(m, _block(k, series), _redundant_block(k, series.redundancy), constants, bank)
-        path.mean[k], path.cov[k], path.noise[k] = bank.mean[m], bank.cov[m], bank.noise[m]
+        path.mean[k], path.cov[k], path.noise[k], path.gap[k] = bank.mean[m], bank.cov[m], bank.noise[m], bank.gap[m]
 
 
 @njit(cache=True, error_model="numpy")
 def empty_bank() -> FilterBank:
     """States of all models, before any has begun."""
     return FilterBank(
-        np.zeros((MODELS, STATES)), np.zeros((MODELS, STATES, STATES)), np.ones((MODELS, 2)), np.zeros((3, STATES))
+        np.zeros((MODELS, STATES)),
+        np.zeros((MODELS, STATES, STATES)),
+        np.ones((MODELS, 2)),
+        np.zeros((MODELS, 2)),
+        np.zeros((3, STATES)),
     )
 
 
@@ -134,6 +167,7 @@ def start(m: int, first: float, constants: FilterConstants, bank: FilterBank) ->
     stop = constants.axle.stop
     bank.mean[m, 0] = min(max(first, -stop), stop)
     bank.cov[m, 0, 0], bank.cov[m, 1, 1] = stop**2, (0.2 * constants.axle.rate_limit) ** 2
+    bank.gap[m, 1] = constants.axle.play**2
     enter(m, m, constants, bank)
 
 
@@ -154,7 +188,7 @@ def path_evidence(
     if begin > 0:
         before = np.int64(known.model[begin - 1])
         bank.mean[before], bank.cov[before] = known.mean[begin - 1], known.cov[begin - 1]
-        bank.noise[before] = known.noise[begin - 1]
+        bank.noise[before], bank.gap[before] = known.noise[begin - 1], known.gap[begin - 1]
     else:
         before = np.int64(models[0])
         start(before, series.mean[0], constants, bank)

@@ -7,18 +7,23 @@ Every change made here is one that raises the path's evidence, its switches paid
 from __future__ import annotations
 
 from collections.abc import Iterator
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
 from diagnosis.steering.filter_state import SteeringPath
-from diagnosis.steering.model_bank import HEALTHY_MODEL
+from diagnosis.steering.model_bank import ACTUATOR, HEALTHY_MODEL, NOISY, SENSOR
 from diagnosis.steering.path import AxleFilter, Models, evidence_of, follow_path
 
 _RUN_OUT_S = 0.7
 _GAP_S = 0.1
 _FLICKER_S = 0.04
 _STRAY_S = 1.5
+_JOINED_S, _RETURN_COST = (
+    2.0,
+    25.0,
+)  # a fault that returns so soon is the same one, unless the evidence [nat] is against it
 _SHIFTS_S = (0.01, 0.02, 0.04, 0.08, 0.16, 0.32, 0.64, 1.28)
 
 
@@ -47,6 +52,9 @@ def refine_path(axle: AxleFilter, models: Models) -> SteeringPath:
         if faulty:
             _unify(axle, known, models, a, b)
             _merge(axle, known, models, a, b)
+    known = follow_path(axle, models)
+    for side in (SENSOR, ACTUATOR):
+        _join(axle, known, models, side)
     for _ in range(2):
         known = follow_path(axle, models)
         for c in (np.flatnonzero(np.diff(models.astype(np.int64))) + 1).tolist():
@@ -66,6 +74,19 @@ def _unify(axle: AxleFilter, known: SteeringPath, models: Models, a: int, b: int
         if evidence > most:
             best, most = models[a:b].copy(), evidence
     models[a:b] = best
+
+
+def _join(axle: AxleFilter, known: SteeringPath, models: Models, side: NDArray[np.int64]) -> None:
+    """Fill a short gap between two stretches of one disturbed or noisy part: it will not have healed and failed again."""
+    dt = axle.blocks.dt
+    runs = list(runs_of((side[models] >= NOISY).astype(np.int64)))
+    for (_, a, before), (_, b, noisy) in pairwise(runs):
+        if noisy or not before or b == models.size or (b - a) * dt > _JOINED_S:
+            continue
+        own, most = models[a:b].copy(), run_out_evidence(axle, known, models, a, b)
+        models[a:b] = models[a - 1]
+        if run_out_evidence(axle, known, models, a, b) < most - _RETURN_COST:
+            models[a:b] = own
 
 
 def _merge(axle: AxleFilter, known: SteeringPath, models: Models, a: int, b: int) -> None:

@@ -7,9 +7,9 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from diagnosis.channels.noise import moving_sum
 from diagnosis.channels.sample_status import PAIR
 from diagnosis.results.assessment import CODE
+from diagnosis.steering.excitation import exercised
 from diagnosis.steering.filter_state import SteeringPath
 from diagnosis.steering.findings import SideFindings, Span
 from diagnosis.steering.inputs import AxleInputs
@@ -31,15 +31,6 @@ REASONS: dict[Side, Mapping[State, str]] = {
         State.NO_DATA: "no samples",
     },
 }
-
-
-def exercised(axle: AxleFilter) -> NDArray[np.bool_]:
-    """Blocks in which the command moves the axle by much more than the sensor's noise. Shape (m,)."""
-    width = max(1, round(0.5 / axle.blocks.dt))
-    travel = np.abs(moving_sum(np.nan_to_num(axle.driven), width)) * axle.blocks.dt
-    model, noise = axle.model, axle.model.noise
-    least = 10 * np.sqrt(noise.white / max(1.0, width * float(np.median(axle.blocks.count)))) + noise.lsb
-    return np.asarray(travel > max(least, 0.5 * model.rate_error, 1e-3 * model.stop))
 
 
 def vouched(healthy: NDArray[np.bool_], shown: NDArray[np.bool_], dt: float) -> NDArray[np.bool_]:

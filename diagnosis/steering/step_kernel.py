@@ -3,7 +3,9 @@
 Every model is an extended Kalman filter on x = [φ, r, a, b, d, c]: angle φ and rate r of the axle, gain a and rate b
 that a valve fault adds, gain d and offset c of the sensor:
 
-    ṙ = (sat(g·a·u + b) − r)/τ,  φ̇ = r (with end stops),  y = d·φ + c + n,  variance of n known or learned
+    ṙ = (f(a·u) + b − r)/τ,  φ̇ = r (with end stops and the sensor's play),  y = d·φ + c + n,  variance of n known or learned
+
+f is the valve's map; see `diagnosis.steering.prediction_kernel`.
 
 A row of either table frees some of them. Blocks of samples come as their mean and the power of their white part, which
 tells how much noise the sensor still shows.
@@ -11,17 +13,16 @@ tells how much noise the sensor still shows.
 
 from __future__ import annotations
 
-import numpy as np
+from math import isnan
+
 from numba import njit
 
 from diagnosis.channels.sample_status import PAIR, SILENT
-from diagnosis.steering.filter_state import Array, Block, FilterBank, RedundantBlock
+from diagnosis.steering.filter_state import Array, Block, FilterBank, RedundantBlock, resting
 from diagnosis.steering.measurement_kernel import measure_redundant, update
 from diagnosis.steering.model_bank import (
-    ACTIVE,
     ACTUATOR,
     COLOURED,
-    FREE,
     HEALTHY,
     INEFFICIENT,
     NO_SIGNAL,
@@ -30,7 +31,8 @@ from diagnosis.steering.model_bank import (
     STATES,
     STUCK,
 )
-from diagnosis.steering.models import AxleConstants, FilterConstants
+from diagnosis.steering.models import FilterConstants
+from diagnosis.steering.prediction_kernel import predict
 
 _SILENT_COST = -6.0
 
@@ -45,6 +47,7 @@ def enter(m: int, old: int, constants: FilterConstants, bank: FilterBank) -> Non
             for j in range(STATES):
                 P[m, i, j] = P[old, i, j]
         bank.noise[m, 0], bank.noise[m, 1] = bank.noise[old, 0], bank.noise[old, 1]
+        bank.gap[m, 0], bank.gap[m, 1] = bank.gap[old, 0], bank.gap[old, 1]
     fresh_s = m == old or SENSOR[m] != SENSOR[old]
     fresh_a = m == old or ACTUATOR[m] != ACTUATOR[old]
     for i in range(2, STATES):
@@ -99,95 +102,17 @@ def _enter_sensor(m: int, constants: FilterConstants, bank: FilterBank) -> None:
         noise[m, 0], noise[m, 1] = 0.5, 5.0 * white
 
 
-@njit(cache=True, error_model="numpy")
-def predict(m: int, driven: float, u: float, axle: AxleConstants, coloured_decay: float, bank: FilterBank) -> None:
-    """x = f(x, u), P = F P Fᵀ + Q over one block; `driven` is the mean of sat(g·u) over the block's samples."""
-    z, P, row = bank.mean, bank.cov, bank.room
-    dt, fade, g, lift = axle.dt, axle.rate_decay, axle.gain, axle.rate_limit
-    by_a, by_b = 0.0, 1.0
-    if ACTUATOR[m] == HEALTHY:
-        f = driven + z[m, 3]
-    else:
-        f = g * z[m, 2] * u + z[m, 3]
-        by_a = g * u
-        if abs(f) > lift:
-            f = lift if f > 0 else -lift
-            by_a = by_b = 0.0
-    # r' = fade·r + (1 − fade)·f,  φ' = φ + τ(1 − fade)·r + (dt − τ(1 − fade))·f
-    k_r = axle.lag * (1 - fade)
-    k_f = dt - k_r
-    r = z[m, 1]
-    z[m, 0] += k_r * r + k_f * f
-    z[m, 1] = fade * r + (1 - fade) * f
-    for n in range(FREE[m]):
-        j = ACTIVE[m, n]
-        force = by_a * P[m, 2, j] + by_b * P[m, 3, j]
-        row[0, j] = P[m, 0, j] + k_r * P[m, 1, j] + k_f * force
-        row[1, j] = fade * P[m, 1, j] + (1 - fade) * force
-    for n in range(FREE[m]):
-        j = ACTIVE[m, n]
-        P[m, 0, j], P[m, 1, j] = row[0, j], row[1, j]
-    for n in range(FREE[m]):
-        i = ACTIVE[m, n]
-        force = by_a * P[m, i, 2] + by_b * P[m, i, 3]
-        p0 = P[m, i, 0] + k_r * P[m, i, 1] + k_f * force
-        P[m, i, 1] = fade * P[m, i, 1] + (1 - fade) * force
-        P[m, i, 0] = p0
-    P[m, 0, 0] += axle.angle_variance
-    _drift(m, driven, axle, coloured_decay, z, P)
-    if abs(z[m, 0]) > axle.stop:
-        # an end stop holds the axle
-        z[m, 0], z[m, 1] = (axle.stop if z[m, 0] > 0 else -axle.stop), 0.0
-        for j in range(STATES):
-            P[m, 0, j] = P[m, j, 0] = P[m, 1, j] = P[m, j, 1] = 0.0
-        P[m, 0, 0], P[m, 1, 1] = axle.stop_variance, (0.02 * lift) ** 2
-
-
-@njit(cache=True, error_model="numpy", inline="always")
-def _drift(m: int, driven: float, axle: AxleConstants, coloured_decay: float, z: Array, P: Array) -> None:
-    """One block of the added rate b and of the sensor's offset c, which change by themselves."""
-    a = ACTUATOR[m]
-    if a in (HEALTHY, INEFFICIENT, NO_SIGNAL):
-        f_b, error = axle.rate_error_decay, axle.rate_error
-        # the valve's characteristic is known to a share only: the error grows with the rate
-        q_b = (1 - f_b * f_b) * (error * error + axle.gain_variance * driven * driven * (a != NO_SIGNAL))
-    elif a == STUCK:
-        f_b, q_b = 1.0, (0.02 * axle.rate_limit) ** 2 * axle.dt
-    else:
-        f_b = axle.disturbance_decay
-        q_b = (1 - f_b * f_b) * (0.6 * axle.rate_limit) ** 2
-    _relax(m, 3, f_b, q_b, z, P)
-    if SENSOR[m] == NOISY:
-        P[m, 5, 5] += (0.02 * axle.stop) ** 2 * axle.dt
-    elif SENSOR[m] == COLOURED:
-        f_c = coloured_decay
-        _relax(m, 5, f_c, (1 - f_c * f_c) * (0.1 * axle.stop) ** 2, z, P)
-
-
-@njit(cache=True, error_model="numpy")
-def _relax(m: int, i: int, f: float, q: float, z: Array, P: Array) -> None:
-    """One step of x_i' = f·x_i + noise of variance q."""
-    z[m, i] *= f
-    for n in range(FREE[m]):
-        P[m, i, ACTIVE[m, n]] *= f
-    for n in range(FREE[m]):
-        P[m, ACTIVE[m, n], i] *= f
-    P[m, i, i] += q
-
-
 @njit(cache=True, error_model="numpy", inline="always")
 def advance(m: int, block: Block, seen: RedundantBlock, constants: FilterConstants, bank: FilterBank) -> float:
     """One block of one model: prediction, update, log-likelihood; `driven` is NaN where nobody knows the opening."""
     axle, coloured_decay, P = constants.axle, constants.sensor.coloured_decay, bank.cov
-    blind = np.isnan(block.driven)
+    blind = isnan(block.driven)
+    predict(m, block if not blind else resting(block), axle, coloured_decay, bank)
     if blind:
-        predict(m, 0.0, 0.0, axle, coloured_decay, bank)
         # the axle may turn either way at its full rate; without a sample to follow it, to anywhere
         P[m, 1, 1] = max(P[m, 1, 1], axle.rate_limit**2)
         reach = (axle.rate_limit * axle.dt) ** 2 + ((0.2 * axle.stop) ** 2 if block.status != PAIR else 0.0)
         P[m, 0, 0] = max(P[m, 0, 0], min(P[m, 0, 0] + reach, axle.stop**2))
-    else:
-        predict(m, block.driven, block.u, axle, coloured_decay, bank)
     redundant = 0.0
     if constants.redundant:
         redundant = measure_redundant(m, seen, axle.gain, axle.rate_limit, bank)
@@ -195,7 +120,8 @@ def advance(m: int, block: Block, seen: RedundantBlock, constants: FilterConstan
         return redundant if SENSOR[m] == NO_SIGNAL else redundant + _SILENT_COST
     if block.status != PAIR:
         return redundant
-    measured = update(m, block, axle.stop, constants.sensor, bank)
+    idle = ACTUATOR[m] != HEALTHY and isnan(seen.opening) and abs(block.driven) < axle.idle_rate
+    measured = update(m, block, constants.idle_variance if idle else 0.0, axle, constants.sensor, bank)
     if blind:  # a free angle fits everything; a smaller gain would only seem surer of it
         return redundant
     out = redundant + measured

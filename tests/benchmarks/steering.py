@@ -20,7 +20,7 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
 from diagnosis.channels.liveness import alive_sources
-from diagnosis.decision.decide import intervals_of, spans_of
+from diagnosis.decision.intervals import intervals_of, spans_of
 from diagnosis.evaluation.counts import COLUMNS, TRUE_STATES, Counts, add
 from diagnosis.evaluation.evaluate import evaluate_report
 from diagnosis.evaluation.scores import figures

@@ -7,14 +7,17 @@ import pytest
 from numpy.testing import assert_allclose
 
 from diagnosis.steering.blocks import SensorNoise, blocks_of
+from diagnosis.steering.driven import driven_by
 from diagnosis.steering.identification import SteeringPlant
 from diagnosis.steering.model_bank import HEALTHY, SENSOR, STUCK
 from diagnosis.steering.models import model_of
 from diagnosis.steering.path import AxleFilter, allowed_models, evidence_of, follow_path, most_probable
 from diagnosis.steering.path_refinement import refine_path
+from diagnosis.steering.valve_map import ValveMap
 
 DT, START, STOP = 0.002, 8.0, 12.0
-PLANT = SteeringPlant(gain=4.0, rate=0.25, lag=0.05, misfit=0.01, windows=50)
+VALVE = ValveMap(4.0, 4.0, 0.0, 0.0, 0.25, 0.25)
+PLANT = SteeringPlant(VALVE, 0.05, 0.0, 1e-4 * np.eye(8), 0.01, 50, (-0.1, 0.1))
 
 
 @pytest.fixture(scope="module")
@@ -33,7 +36,7 @@ def axle() -> AxleFilter:
     noise = SensorNoise(white=2.5e-7, spread=0.01, step=0.0, lsb=0.0)
     model = model_of(blocks, PLANT, noise, stop=0.785)
     allowed = allowed_models(sensor=True, actuator=True, redundant=False)
-    return AxleFilter(blocks, blocks.driven(PLANT.gain, PLANT.rate), model, allowed, ("phi", "u"))
+    return AxleFilter(blocks, driven_by(PLANT, blocks), model, allowed, ("phi", "u"))
 
 
 def test_a_stuck_sensor_lies_where_it_was_put(axle: AxleFilter) -> None:

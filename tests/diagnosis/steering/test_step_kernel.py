@@ -25,39 +25,53 @@ from diagnosis.steering.model_bank import (
 )
 from diagnosis.steering.models import SteeringModel
 from diagnosis.steering.path import start_states
-from diagnosis.steering.step_kernel import advance, predict
+from diagnosis.steering.prediction_kernel import predict
+from diagnosis.steering.step_kernel import advance
+from diagnosis.steering.valve_map import ValveMap, expected_rate, rate_at
 
+VALVE = ValveMap(4.0, 4.4, 0.01, 0.012, 0.25, 0.24)
 MODEL = SteeringModel(
-    plant=SteeringPlant(gain=4.0, rate=0.25, lag=0.05, misfit=0.01, windows=50),
+    plant=SteeringPlant(VALVE, 0.05, 0.0, 1e-4 * np.eye(8), 0.01, 50, (-0.1, 0.1)),
     noise=SensorNoise(white=2.6e-7, spread=0.01, step=1.33e-8, lsb=4e-4),
     stop=0.785,
     rate_error=2e-3,
     count=10.0,
     dt=0.01,
     redundant=False,
+    idle_rate=1e-3,
+    stops=(-0.785, 0.785),
 )
-DT, LAG, GAIN, RATE, STOP = 0.01, 0.05, 4.0, 0.25, 0.785
+DT, LAG, GAIN, RATE, STOP = 0.01, 0.05, VALVE.gain, 0.25, 0.785
+SPREAD = 2e-3
 FADE = np.exp(-DT / LAG)
 K_R = LAG * (1 - FADE)
 K_F = DT - K_R
 NOTHING = RedundantBlock(*[np.nan] * 7)
 
 
-def force(m: int, x: np.ndarray, u: float, driven: float) -> tuple[float, float, float]:
+def force(m: int, x: np.ndarray, P: np.ndarray, u: float, driven: float) -> tuple[float, float, float]:
     """What drives the rate, and its derivatives by a and b."""
     if ACTUATOR[m] == HEALTHY:
         return driven + x[3], 0.0, 1.0
-    f = GAIN * x[2] * u + x[3]
-    return (f, GAIN * u, 1.0) if abs(f) <= RATE else (np.sign(f) * RATE, 0.0, 0.0)
+    f, by_a = x[3], 0.0
+    if ACTUATOR[m] == NOISY:
+        h = np.array([0, 0, u, 1 / GAIN, 0, 0])
+        f, slope = expected_rate(float(h @ x), float(np.sqrt(h @ P @ h)), VALVE)
+        return f, slope * u, slope / GAIN
+    if ACTUATOR[m] == INEFFICIENT:
+        rate, slope = expected_rate(x[2] * u, abs(u) * P[2, 2] ** 0.5, VALVE)
+        f, by_a = f + rate, slope * u
+    return (f, by_a, 1.0) if abs(f) <= RATE else (np.sign(f) * RATE, 0.0, 0.0)
 
 
-def process_noise(m: int, driven: float) -> tuple[np.ndarray, np.ndarray]:
+def process_noise(m: int, driven: float, f: float, r: float) -> tuple[np.ndarray, np.ndarray]:
     """Decay of each state over a block, and Q."""
     decay, q = np.ones(6), np.zeros(6)
     q[0] = (0.1 * MODEL.rate_error * DT) ** 2
+    q[1] = (MODEL.constants().axle.lag_error * (1 - FADE) * (f - r)) ** 2
     a, s = ACTUATOR[m], SENSOR[m]
     if a in (HEALTHY, INEFFICIENT, NO_SIGNAL):
-        share = 0.0 if a == NO_SIGNAL else 0.02 * driven
+        share = SPREAD if a == HEALTHY or driven == 0 else SPREAD * min(abs(f / driven), 1.0)
         decay[3] = np.exp(-DT)
         q[3] = (1 - decay[3] ** 2) * (MODEL.rate_error**2 + share**2)
     elif a == STUCK:
@@ -88,10 +102,10 @@ def test_model_is_filterpys_extended_kalman_filter(m: int) -> None:
     kf.R = np.array([[r]])
     for k in range(60):
         u = 0.04 * np.sin(k / 9.0)
-        driven = GAIN * u
+        driven = rate_at(u, VALVE)
         x = kf.x[:, 0].copy()
-        f, by_a, by_b = force(m, x, u, driven)
-        decay, q = process_noise(m, driven)
+        f, by_a, by_b = force(m, x, kf.P, u, driven)
+        decay, q = process_noise(m, driven, f, x[1])
         F = np.diag(decay)
         F[0, :4] = [1.0, K_R, K_F * by_a, K_F * by_b]
         F[1, :4] = [0.0, FADE, (1 - FADE) * by_a, (1 - FADE) * by_b]
@@ -108,7 +122,7 @@ def test_model_is_filterpys_extended_kalman_filter(m: int) -> None:
         )
         if ACTUATOR[m] in (INEFFICIENT, NOISY):
             kf.x[2, 0] = min(max(kf.x[2, 0], 0.1), 0.92)
-        block = Block(y, 2.6e-7 if not dead else 0.0, 10.0, driven, u, PAIR)
+        block = Block(y, 2.6e-7 if not dead else 0.0, 10.0, driven, SPREAD, u, PAIR)
         advance(m, block, NOTHING, constants, bank)
         assert_allclose(z[m], kf.x[:, 0], atol=1e-9, rtol=1e-9)
         assert_allclose(P[m], kf.P, atol=1e-9, rtol=1e-7)
@@ -120,7 +134,7 @@ def test_an_end_stop_holds_the_axle() -> None:
     m = int(np.flatnonzero((ACTUATOR == STUCK) & (SENSOR == HEALTHY))[0])
     bank.mean[m, 3] = RATE
     for _ in range(100):
-        predict(m, 0.0, 0.0, constants.axle, constants.sensor.coloured_decay, bank)
+        predict(m, Block(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, PAIR), constants.axle, constants.sensor.coloured_decay, bank)
     assert bank.mean[m, 0] == pytest.approx(STOP)
     assert bank.mean[m, 1] == 0.0
 
@@ -131,8 +145,8 @@ def test_a_block_that_no_model_explains_teaches_nothing() -> None:
     bank.cov[0, 0, 0], before = 1e-8, bank.mean[0].copy()
 
     def likelihood(angle: float) -> float:
-        block = Block(angle, 2.6e-7, 10.0, 0.0, 0.0, PAIR)
-        return float(update(0, block, STOP, constants.sensor, bank))
+        block = Block(angle, 2.6e-7, 10.0, 0.0, 0.0, 0.0, PAIR)
+        return float(update(0, block, 0.0, constants.axle, constants.sensor, bank))
 
     far = likelihood(0.6)
     assert_allclose(bank.mean[0], before)

@@ -1,0 +1,107 @@
+"""Rates of a steering axle in windows, and what a plant gives at the same openings."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from diagnosis.steering.blocks import WHITE_DOF, SensorNoise, SteeringBlocks, window_means
+from diagnosis.steering.valve_map import ValveMap, rate_at
+
+Array = NDArray[np.float64]
+
+_OBEYED, _NEARLY = 4.0, 1e-3  # standard deviations and opening [fraction] by which a healthy valve may differ
+
+
+@njit(cache=True, error_model="numpy")
+def _window_angles(u, valve, lag, play, dt, length):  # type: ignore[no-untyped-def]
+    """Means over windows of `length` blocks of the measured angle, from a start at 0: lag, cylinder, play."""
+    out = np.zeros(u.size // length)
+    a = np.exp(-dt / max(lag, 1e-4))
+    k_r = lag * (1 - a)
+    r = phi = seen = 0.0
+    for w in range(out.size):
+        total = 0.0
+        for k in range(w * length, (w + 1) * length):
+            f = rate_at(u[k], valve)
+            phi += k_r * r + (dt - k_r) * f
+            r = a * r + (1 - a) * f
+            seen = min(max(seen, phi - play), phi + play)
+            total += seen
+        out[w] = total / length
+    return out
+
+
+@dataclass(frozen=True)
+class Windows:
+    """Rates of one axle in windows, and what drives them.
+
+    Attributes
+    ----------
+    rate : Array, shape (w,)
+        Mean rate between the middles of neighbouring windows [rad/s].
+    u : Array, shape (m,)
+        Opening by block [fraction].
+    opening : Array, shape (w,)
+        Its mean between those middles [fraction].
+    good : NDArray[np.bool_], shape (w,)
+        Windows with the sensor's usual noise, away from the end stops.
+    length : int
+        Blocks per window.
+    dt : float
+        Length of a block [s].
+    noise : float
+        Of the rates [rad/s].
+    """
+
+    rate: Array
+    u: Array
+    opening: Array
+    good: NDArray[np.bool_]
+    length: int
+    dt: float
+    noise: float
+
+    def predicted(self, valve: ValveMap, lag: float, play: float) -> Array:
+        """Rates that a plant gives at these openings [rad/s], shape (w,)."""
+        angles = _window_angles(self.u, valve, lag, play, self.dt, self.length)
+        return np.asarray(np.diff(angles) / (self.length * self.dt))
+
+
+def windows_of(blocks: SteeringBlocks, noise: SensorNoise, stop: float, window_s: float) -> Windows:
+    """Rates between windows of `window_s`, marked where the sensor shows its usual noise and no end stop is near."""
+    length = max(2, round(window_s / blocks.dt))
+    known = blocks.count > 0
+    mean = blocks.mean
+    if not known.all() and known.any():
+        mean = np.interp(np.arange(mean.size), np.flatnonzero(known), mean[known])
+    power = window_means(blocks.power, length)
+    middle = window_means(mean, length)
+    # less or more noise than usual: not the healthy sensor; at its end stop an axle does not answer
+    counts = float(np.median(blocks.count[known])) * length if known.any() else 1.0
+    usual = 1 + max(0.3, 4 * float(np.sqrt(2 / (WHITE_DOF * counts))))
+    alive = (window_means(known.astype(np.float64), length) > 0.9) & (np.abs(middle) < 0.97 * stop)
+    alive &= window_means(blocks.blind.astype(np.float64), length) == 0.0
+    alive &= power < usual * noise.white
+    if noise.resolved:
+        alive &= power > noise.white / usual
+    rate = np.diff(middle) / (length * blocks.dt)
+    alive &= _obeyed(blocks, length)
+    opening = window_means(blocks.u, length)
+    spread = float(np.sqrt(2 * noise.white / max(counts, 1.0))) / (length * blocks.dt)
+    middle_u = (opening[1:] + opening[:-1]) / 2
+    return Windows(rate, blocks.u, middle_u, alive[1:] & alive[:-1], length, blocks.dt, spread)
+
+
+def _obeyed(blocks: SteeringBlocks, length: int) -> NDArray[np.bool_]:
+    """Windows of `length` blocks in which the valve's opening, where it is measured, follows its command. Shape (w,)."""
+    seen = blocks.redundancy
+    known = np.isfinite(seen.opening) & np.isfinite(seen.command)
+    deviation = np.where(known, seen.opening - seen.command, 0.0)
+    count = window_means(known.astype(np.float64), length) * length
+    variance = window_means(np.where(known, seen.opening_variance, 0.0), length) / np.maximum(count, 1.0)
+    share = window_means(deviation, length) * length / np.maximum(count, 1.0)
+    return np.asarray((count == 0) | (np.abs(share) < _OBEYED * np.sqrt(variance) + _NEARLY))
