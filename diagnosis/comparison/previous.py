@@ -104,10 +104,10 @@ def _without_name(mission: ComparedMissionRow) -> OtherMissionRow:
 
 
 def _losses(older: ReportDocument, newer: ReportDocument) -> list[LossChangeRow]:
-    """Mission-wide ε̂ of the parts for which both missions have one."""
-    before = {(x["component"], x["side"]): x["epsilon"] for x in older["loss"]}
+    """Mission-wide ε̂ of the parts for which both missions have one; two missions are too few for those against other wheels."""
+    before = {(x["component"], x["side"]): x["epsilon"] for x in older["loss"] if not x["relative"]}
     return [
         {"component": x["component"], "side": x["side"], "older": epsilon, "newer": x["epsilon"]}
         for x in newer["loss"]
-        if (epsilon := before.get((x["component"], x["side"]))) is not None
+        if not x["relative"] and (epsilon := before.get((x["component"], x["side"]))) is not None
     ]

@@ -180,7 +180,7 @@ def _count(machine: MachineRow) -> str:
 
 def _coverage(report: ReportDocument) -> list[Context]:
     rows, why = [], _why_undecided(report)
-    loss = {(x["component"], x["side"]): bounded(x["epsilon"]) for x in report["loss"]}
+    loss = {(x["component"], x["side"]): bounded(x["epsilon"]) for x in report["loss"] if not x["relative"]}
     for row in report["coverage"]:
         key, seconds = (row["component"], row["side"]), row["seconds"]
         total = sum(seconds.values())

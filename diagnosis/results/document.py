@@ -184,12 +184,16 @@ class CoverageRow(TypedDict):
 
 
 class LossRow(TypedDict):
-    """Loss of effectiveness of one part over the whole mission, and the driving time behind it."""
+    """Loss of effectiveness of one part over the whole mission, and the driving time behind it.
+
+    `relative`: against the other wheels, so that only its change over missions counts.
+    """
 
     component: str
     side: str
     epsilon: EpsilonRow
     seconds: float
+    relative: bool
 
 
 class MeanRow(TypedDict):

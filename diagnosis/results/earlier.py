@@ -26,6 +26,7 @@ def completed(document: Row) -> Row:
     complete: dict[str, Callable[[Json], Json]] = {
         "log": _log,
         "verdict": lambda row: _with(row, cleared=False, not_cleared=""),
+        "loss": lambda rows: _rows(rows, lambda row: _with(row, relative=False)),
         "coverage": lambda rows: _rows(rows, _coverage),
         "intervals": lambda rows: _rows(rows, lambda row: _with(row, detected_s=None)),
     }

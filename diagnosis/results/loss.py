@@ -23,10 +23,14 @@ _LEAST_WINDOWS = 10
 
 @dataclass(frozen=True)
 class Loss:
-    """Loss of effectiveness and the driving time behind it [s]."""
+    """Loss of effectiveness and the driving time behind it [s].
+
+    `relative` where it is one against the other wheels, which holds how unlike they are made: its change over missions counts.
+    """
 
     epsilon: Epsilon
     seconds: float
+    relative: bool = False
 
 
 def loss_of(y: Array, x: Array, use: NDArray[np.bool_], dt: float) -> Loss | None:
@@ -71,7 +75,13 @@ def loss_of(y: Array, x: Array, use: NDArray[np.bool_], dt: float) -> Loss | Non
 def loss_rows(losses: Mapping[tuple[str, str], Loss | None]) -> list[LossRow]:
     """Rows of ``loss`` in ``report.json``: one for each component and side that has one."""
     return [
-        {"component": component, "side": side, "epsilon": loss.epsilon.row(), "seconds": loss.seconds}
+        {
+            "component": component,
+            "side": side,
+            "epsilon": loss.epsilon.row(),
+            "seconds": loss.seconds,
+            "relative": loss.relative,
+        }
         for (component, side), loss in losses.items()
         if loss is not None
     ]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,8 +11,10 @@ from numpy.typing import NDArray
 from diagnosis.channels.sample_status import PAIR
 from diagnosis.results.assessment import Assessment, Finding
 from diagnosis.results.evidence_columns import Pictured, steps_of
+from diagnosis.results.loss import Loss
 from diagnosis.results.vocabulary import Tier
 from diagnosis.wheels.blocks import WheelBlocks, blocks_of, per_sample
+from diagnosis.wheels.effectiveness import relative_losses
 from diagnosis.wheels.filter import JointPass, forward, most_probable
 from diagnosis.wheels.filter_identification import joint_model
 from diagnosis.wheels.findings import WheelFindings, WheelPath, findings_of
@@ -48,13 +51,23 @@ def assess_wheels(data: WheelsData, limits: Limits, *, gains: bool) -> dict[int,
     model = joint_model(data, blocks)
     done = settled(blocks, model, forward(blocks, model))
     out = {}
+    losses = _losses(data, limits)
     for i, wheel in enumerate(model.wheels):
         if wheel is None:
             continue
         path = _path(data, i, wheel, blocks, model, done)
         found = findings_of(path, limits, gains=gains)
-        out[i] = _assessments(data, i, path, found, gains=gains)
+        sensor, actuator = _assessments(data, i, path, found, gains=gains)
+        out[i] = sensor, actuator if data.measured[i] else replace(actuator, loss=losses[i])
     return out
+
+
+def _losses(data: WheelsData, limits: Limits) -> list[Loss | None]:
+    """Loss of each wheel's speed per opening against the others over the mission."""
+    taus = [p.tau for p in data.plants if p is not None]
+    usable = (data.status == PAIR).all(axis=1)
+    tau = float(np.median(taus)) if taus else 0.0
+    return relative_losses(data.y, data.u, data.ratio, usable, tau, limits.driving_speed, data.dt)
 
 
 def _path(

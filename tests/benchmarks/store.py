@@ -40,7 +40,7 @@ def summary_of(number: int) -> dict[str, Any]:
     components = [
         {
             "component": component, "side": side, "driving_s": 500.0, "decided_s": 480.0, "healthy_s": 400.0,
-            "faulty_s": 80.0, "worst": "inefficient", **epsilon, "epsilon_s": 400.0,
+            "faulty_s": 80.0, "worst": "inefficient", **epsilon, "epsilon_s": 400.0, "epsilon_relative": 0,
         }
         for component in _COMPONENTS
         for side in ("sensor", "actuator")

@@ -55,6 +55,7 @@ class Part:
     driving_s: float
     decided_s: float
     epsilon: Bounds | None
+    relative: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -110,7 +111,7 @@ _FAULTS = (
     "probability FROM fault ORDER BY result, start_ns, length(id), id"
 )
 _PARTS = (
-    "SELECT result, component, side, driving_s, decided_s, epsilon, epsilon_low, epsilon_high FROM component "
+    "SELECT result, component, side, driving_s, decided_s, epsilon, epsilon_low, epsilon_high, epsilon_relative FROM component "
     "ORDER BY result, rowid"
 )
 _MISSIONS = "SELECT name, files, bytes, result, gone IS NOT NULL FROM mission ORDER BY name"
@@ -137,8 +138,8 @@ def read_missions(store: Path) -> list[Mission]:
             found = FoundFault(name, component, kind, side, mode, Severity(severity), seconds, _bounds(e, low, high), p)
             faults[r].append(found)
         parts: dict[int, list[Part]] = defaultdict(list)
-        for r, component, side, driving, decided, e, low, high in db.rows(_PARTS):
-            parts[r].append(Part(component, side, driving, decided, _bounds(e, low, high)))
+        for r, component, side, driving, decided, e, low, high, relative in db.rows(_PARTS):
+            parts[r].append(Part(component, side, driving, decided, _bounds(e, low, high), bool(relative)))
         results = {row[0]: _result(row, tuple(faults[row[0]]), tuple(parts[row[0]])) for row in db.rows(_RESULTS)}
         missions = [
             Mission(name, tuple(map(str, json.loads(files))), size, results.get(r), bool(gone))

@@ -12,6 +12,7 @@ from diagnosis.audit.fleet.trend_types import Axis
 from diagnosis.audit.trends.trend import REACH, Forecast, Series, Trend, trend_of
 
 _DAY_NS = 86_400 * 10**9
+_FIRST = 2  # missions whose mean is where a relative loss begins
 
 
 @dataclass(frozen=True)
@@ -55,7 +56,12 @@ def trends_of(machine: Machine, axis: Axis = "hours") -> list[PartTrend]:
         ]
         if not found:
             continue
+        relative = found[-1][1].parts[component, side].relative
+        found = [f for f in found if f[1].parts[component, side].relative == relative]
         x, value, low, high = np.array([(x, e.value, e.low, e.high) for x, _, e in found]).T
+        if relative:  # how unlike the wheels are made is no loss: it counts from the machine's first missions
+            made = float(value[:_FIRST].mean())
+            value, low, high = value - made, low - made, high - made
         series = Series(x, value, low, high, now)
         trend = trend_of(series, machine.limits.min_epsilon)
         if not machine.id:

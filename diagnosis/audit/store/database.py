@@ -13,7 +13,7 @@ from pathlib import Path
 from replay.errors import OutputError
 from replay.version import __version__
 
-SCHEMA = "1"
+SCHEMA = "2"
 _APPLICATION = 0x6D666863  # "mfhc": tells the file from other SQLite files
 _BUSY_MS = 1_000
 _PATIENCE_S = 120.0

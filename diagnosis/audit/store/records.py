@@ -23,7 +23,7 @@ _FAULT = (
 )  # fmt: skip
 _COMPONENT = (
     "component", "side", "driving_s", "decided_s", "healthy_s", "faulty_s", "worst",
-    "epsilon", "epsilon_low", "epsilon_high", "epsilon_s",
+    "epsilon", "epsilon_low", "epsilon_high", "epsilon_s", "epsilon_relative",
 )  # fmt: skip
 _NO_REPORT: ResultFacts = {"machine_name": "", "title": "", "open_loop": 0}
 

@@ -85,5 +85,6 @@ CREATE TABLE component (
     worst TEXT NOT NULL DEFAULT '', -- most severe mode in the mission, empty where none
     epsilon REAL, epsilon_low REAL, epsilon_high REAL,  -- over healthy and inefficient driving; NULL where not identifiable
     epsilon_s REAL,                 -- driving time behind it
+    epsilon_relative INTEGER NOT NULL DEFAULT 0,  -- 1: against the other wheels, only its change over missions counts
     PRIMARY KEY (result, component, side)
 ) STRICT;

@@ -65,6 +65,7 @@ class ComponentColumns(BoundsColumns):
     faulty_s: float
     worst: str
     epsilon_s: float | None
+    epsilon_relative: int
 
 
 class MissionSummary(TypedDict):
@@ -132,6 +133,7 @@ def _component(row: CoverageRow, intervals: Sequence[IntervalRow], loss: Sequenc
         "worst": worst["mode"] if worst else "",
         **_bounds(None if found is None else found["epsilon"]),
         "epsilon_s": found["seconds"] if found else None,
+        "epsilon_relative": int(found["relative"]) if found else 0,
     }
 
 

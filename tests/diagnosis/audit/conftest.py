@@ -74,7 +74,7 @@ def make_report() -> Callable[..., dict[str, Any]]:
             "verdict": {"status": "watch", "title": "1 fault to watch"},
             "intervals": [fault],
             "coverage": coverage,
-            "loss": [{"component": "FR", "side": "actuator", "epsilon": bounds, "seconds": 55.0}],
+            "loss": [{"component": "FR", "side": "actuator", "epsilon": bounds, "seconds": 55.0, "relative": False}],
         }
 
     return make

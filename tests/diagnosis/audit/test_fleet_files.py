@@ -169,6 +169,17 @@ def test_trends_lie_over_the_hours_driven(tmp_path: Path) -> None:
     assert list(t.series.x) == pytest.approx([7200 * 1.4 / 172_800 + 3 * k for k in range(3)])
 
 
+def test_a_loss_against_the_other_wheels_begins_with_the_machines_first_missions(tmp_path: Path) -> None:
+    values = [0.12, 0.12, 0.14, 0.16, 0.18, 0.21]
+    missions = [Sample(f"{k}", day=float(k), epsilon={VALVE: bounds(v)}, relative=True) for k, v in enumerate(values)]
+    (m,) = machines(tmp_path, *missions)
+    (t,) = trends_of(m)
+    assert list(t.series.value) == pytest.approx([v - 0.12 for v in values])
+    assert list(t.series.high - t.series.low) == pytest.approx([0.02] * 6, abs=0.02)
+    assert t.trend.direction == "rising"
+    assert t.trend.forecast.state == "crossing"  # 0.21 alone, above the limit, is how the wheels were made
+
+
 def test_missions_that_may_be_of_several_machines_give_no_forecast(tmp_path: Path) -> None:
     missions = [Sample(f"{k}", "", float(k), epsilon={VALVE: bounds(0.01 * k)}) for k in range(9)]
     (m,) = machines(tmp_path, *missions)

@@ -88,7 +88,7 @@ def test_order_goes_by_the_logs_clocks() -> None:
 def test_losses_of_both() -> None:
     def loss(component: str, value: float) -> dict[str, Any]:
         epsilon = {"value": value, "low": value - 0.01, "high": value + 0.01}
-        return {"component": component, "side": "actuator", "epsilon": epsilon, "seconds": 40.0}
+        return {"component": component, "side": "actuator", "epsilon": epsilon, "seconds": 40.0, "relative": False}
 
     newer = document(start_ns=LATER, loss=[loss("FR", 0.2), loss("FL", 0.0)])
     got = with_previous(newer, document(loss=[loss("FR", 0.1)]))["previous"]["loss"]

@@ -62,6 +62,7 @@ def test_losses_are_listed_where_they_differ() -> None:
                 "side": "actuator",
                 "epsilon": {"value": v, "low": v - 0.01, "high": v + 0.01},
                 "seconds": 9.0,
+                "relative": False,
             }
             for c, v in zip(("FL", "FR"), values, strict=True)
         ]

@@ -68,4 +68,5 @@ def test_rows_of_the_report() -> None:
     found = loss_of(y, x, np.ones(x.size, np.bool_), DT)
     assert found is not None
     rows = loss_rows({("FR", "sensor"): found, ("FR", "actuator"): None})
-    assert rows == [{"component": "FR", "side": "sensor", "epsilon": found.epsilon.row(), "seconds": found.seconds}]
+    expected = {"component": "FR", "side": "sensor", "epsilon": found.epsilon.row(), "seconds": found.seconds}
+    assert rows == [{**expected, "relative": False}]

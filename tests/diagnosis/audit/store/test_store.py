@@ -312,7 +312,7 @@ def test_files_that_are_no_store(tmp_path: Path) -> None:
 def test_store_of_another_schema(path: Path) -> None:
     with Store.open(path) as store:
         store.database.rows("UPDATE meta SET value = '99' WHERE name = 'schema'")
-    with pytest.raises(OutputError, match=r"store of schema '99', '1' expected.*results/ are taken over"):
+    with pytest.raises(OutputError, match=r"store of schema '99', '2' expected.*results/ are taken over"):
         Store.open(path)
 
 
