@@ -106,7 +106,18 @@ def _write(c: Any, k: int, s: Sample) -> None:
         for part in s.parts if judged else ():
             decided = 0.0 if part in s.blind else s.driving_s * 0.95
             e = s.epsilon.get(part, (None, None, None))
-            row = (k, *part, s.driving_s, decided, decided, 0.0, "", *e, None if e[0] is None else decided, int(s.relative))
+            row = (
+                k,
+                *part,
+                s.driving_s,
+                decided,
+                decided,
+                0.0,
+                "",
+                *e,
+                None if e[0] is None else decided,
+                int(s.relative),
+            )
             c.execute("INSERT INTO component VALUES (?,?,?,?,?,?,?,?,?,?,?,?,?)", row)
     for name in (s.name, *s.copies):
         files = json.dumps([f"logs/{name}.mcap"])
