@@ -14,6 +14,7 @@ from diagnosis.fitting.geometry import fit_offset
 from diagnosis.fitting.machine import Constant, with_control, with_drives, with_noise, with_offset, with_plants
 from diagnosis.fitting.noise import fit_noise
 from diagnosis.fitting.plants import fit_plants
+from diagnosis.fitting.steering import fit_steering, with_steering
 from diagnosis.fitting.units import UnitError, find_unit_errors, speed_mistakes
 from diagnosis.fitting.wheels import WheelFit
 from diagnosis.fitting.windows import WheelRecord
@@ -113,6 +114,7 @@ def fit_missions(missions: Sequence[Mission], machine: Machine, *, progress: Sub
     if len(machine.wheels) == 1 or machine.geometry is None:
         progress(Progress(Stage.FITTING_DRIVES))
         out = _with_drives(out, machine, list(zip(timelines, replays, strict=True)), spoiled, constants)
+    out = with_steering(out, machine, fit_steering(timelines, machine, bad), len(timelines), constants)
     out = with_noise(out, fit_noise(timelines, machine), bad, constants)
     return FitResult(
         machine=out,

@@ -15,11 +15,13 @@ from diagnosis.steering.blocks import SteeringBlocks
 from diagnosis.steering.driven import driven_by
 from diagnosis.steering.evidence import evidence_columns, path_angle
 from diagnosis.steering.findings import findings_of
-from diagnosis.steering.identification import SteeringPlant, identify_plants
+from diagnosis.steering.identification import identify_plants
 from diagnosis.steering.inputs import AxleInputs, Counts, axle_inputs
 from diagnosis.steering.models import model_of
 from diagnosis.steering.path import AxleFilter, allowed_models, most_probable
 from diagnosis.steering.path_refinement import refine_path
+from diagnosis.steering.plant import SteeringPlant
+from diagnosis.steering.prior import plant_before
 from diagnosis.steering.states import REASONS, states_of
 from replay.control.loop import Replay
 from replay.faults import Side, State
@@ -101,7 +103,8 @@ def _plants(axles: Sequence[AxleInputs], machine: Machine, progress: Subscriber)
     if not modelled:
         return {}
     progress(Progress(Stage.IDENTIFYING_STEERING))
-    plants = identify_plants([a.blocks for a in modelled], [a.noise for a in modelled], machine.max_steer)
+    known = [None if (k := machine.steering.get(a.name)) is None else plant_before(k) for a in modelled]
+    plants = identify_plants([a.blocks for a in modelled], [a.noise for a in modelled], machine.max_steer, known)
     return {a.name: plant for a, plant in zip(modelled, plants, strict=True)}
 
 

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from diagnosis.steering.blocks import SteeringBlocks, between
 from diagnosis.steering.filter_state import BlockSeries
-from diagnosis.steering.identification import SteeringPlant
+from diagnosis.steering.plant import SteeringPlant
 from diagnosis.steering.valve_map import rates_at
 
 Array = NDArray[np.float64]

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from diagnosis.steering.blocks import SensorNoise, SteeringBlocks
+from diagnosis.steering.plant import LEAST_WINDOWS, OPEN_LIMIT, OPEN_LIMIT_STD, SteeringPlant
 from diagnosis.steering.plant_fit import (
     DEAD,
     LAG,
@@ -26,94 +27,37 @@ from diagnosis.steering.plant_fit import (
     robust_loss,
     unpacked,
 )
-from diagnosis.steering.valve_map import ValveMap, rates_at
+from diagnosis.steering.valve_map import ValveMap
 from diagnosis.steering.windows import Windows, windows_of
 
 Array = NDArray[np.float64]
 
-_LONG_S, _SHORT_S = 0.25, 0.1
-_LEAST_WINDOWS = 8
-_LEAST_MISFIT = 0.02
-_DRIFT = 0.05  # standard deviation of a slope from mission to mission, relative to it
+LONG_S, SHORT_S = 0.25, 0.1
 _EACH_SLOPE, _EACH_DEAD, _EACH_LIMIT = 0.15, 0.003, 0.1  # of one direction against the other
 _CONFIRMING = 1.2  # times the opening at which a limit is reached: from there on it was seen
-_OPEN_LIMIT, _OPEN_LIMIT_STD = 1.5, 0.3  # a limit that was not seen: times the largest rate, and its relative std
-_BEYOND = 0.5  # of what a rate grows beyond the openings that were seen: its standard deviation
 
 
 @dataclass(frozen=True)
-class SteeringPlant:
-    """Valve and cylinder of an axle: ṙ = (f(u) − r)/lag, φ̇ = r, and the sensor follows φ with a play.
+class AxleWindows:
+    """Windows of one axle, one entry per mission.
 
     Attributes
     ----------
-    valve : ValveMap
-        f, the rate by opening.
-    lag : float
-        Lag [s].
-    play : float
-        Half of the sensor's play [rad].
-    cov : Array, shape (8, 8)
-        Covariance of the constants, in the order of `diagnosis.steering.plant_fit`.
-    misfit : float
-        Share of a rate that the model does not explain, in the windows that it explains better.
-    windows : int
-        Windows of steering behind it.
-    seen : tuple[float, float]
-        Smallest and largest opening at which the axle was seen to obey it [fraction].
+    long, short : tuple[Windows, ...]
+        For the map, and for lag and play.
     """
 
-    valve: ValveMap
-    lag: float
-    play: float
-    cov: Array
-    misfit: float
-    windows: int
-    seen: tuple[float, float]
-
-    @property
-    def gain(self) -> float:
-        """Rate per opening beyond the dead band, mean of both directions [rad/s per full opening]."""
-        return self.valve.gain
-
-    @property
-    def rate(self) -> float:
-        """Largest rate [rad/s]."""
-        return self.valve.limit
-
-    @property
-    def lag_std(self) -> float:
-        """Standard deviation of the lag's logarithm, at most 1."""
-        return float(min(np.sqrt(self.cov[LAG, LAG]), 1.0))
-
-    @property
-    def reliable(self) -> bool:
-        """Whether valves can be judged by it."""
-        return self.windows >= _LEAST_WINDOWS and self.misfit < 0.25
-
-    def spread(self, u: Array) -> Array:
-        """Standard deviation of the rate that is expected at openings [rad/s], shape of u."""
-        grid = np.unique(np.concatenate([np.linspace(u.min(), u.max(), 201), [0.0]])) if u.size else np.zeros(1)
-        x = packed(self.valve, self.lag, self.play)
-        rates = rates_at(grid, self.valve)
-        variance = (max(self.misfit, _LEAST_MISFIT) * rates) ** 2
-        jacobian = np.empty((grid.size, 6))
-        for i in range(6):
-            h = np.sqrt(self.cov[i, i])
-            up, down = x.copy(), x.copy()
-            up[i] += h
-            down[i] -= h
-            jacobian[:, i] = (rates_at(grid, unpacked(up)[0]) - rates_at(grid, unpacked(down)[0])) / (2 * h)
-        variance += np.einsum("ki,ij,kj->k", jacobian, self.cov[:6, :6], jacobian)
-        edges = rates_at(np.clip(grid, *self.seen), self.valve)
-        variance += (_BEYOND * (rates - edges)) ** 2
-        return np.asarray(np.interp(u, grid, np.sqrt(variance)))
+    long: tuple[Windows, ...]
+    short: tuple[Windows, ...]
 
 
 def identify_plants(
-    axles: Sequence[SteeringBlocks | None], noises: Sequence[SensorNoise], stop: float
+    axles: Sequence[SteeringBlocks | None],
+    noises: Sequence[SensorNoise],
+    stop: float,
+    known: Sequence[SteeringPlant | None],
 ) -> list[SteeringPlant | None]:
-    """Identify each axle's plant: its own about what both axles have in common.
+    """Identify each axle's plant: about the one that is known of it, else its own about what both axles have in common.
 
     A fault that lasts would make one axle look slow; what the other axle has is the prior of each.
 
@@ -125,32 +69,54 @@ def identify_plants(
         Noise of each sensor.
     stop : float
         Angle of the end stops [rad].
+    known : Sequence[SteeringPlant or None]
+        What is known of each axle before the mission.
     """
     windows = [
-        None if b is None else (windows_of(b, w, stop, _LONG_S), windows_of(b, w, stop, _SHORT_S))
-        for b, w in zip(axles, noises, strict=True)
+        None if b is None else AxleWindows((windows_of(b, n, stop, LONG_S),), (windows_of(b, n, stop, SHORT_S),))
+        for b, n in zip(axles, noises, strict=True)
     ]
-    usable = [w for w in windows if w is not None]
-    scale = usual_rate([w[0] for w in usable])
+    unknown = iter(fit_axles([w for w, k in zip(windows, known, strict=True) if w is not None and k is None]))
+    return [
+        None if w is None else next(unknown) if k is None else _refined(k, w)
+        for w, k in zip(windows, known, strict=True)
+    ]
+
+
+def fit_axles(windows: Sequence[AxleWindows]) -> list[SteeringPlant | None]:
+    """Plants of axles of which nothing is known; None for all where they turn too little."""
+    scale = usual_rate([part for w in windows for part in w.long])
     if scale is None:
-        return [None for _ in axles]
-    fits = iter(_fit_axles(usable, scale))
-    return [None if w is None else plant_of([w[0]], next(fits), scale) for w in windows]
+        return [None for _ in windows]
+    return [plant_of(w.long, fit, scale) for w, fit in zip(windows, _fit_axles(windows, scale), strict=True)]
 
 
-def _fit_axles(windows: Sequence[tuple[Windows, Windows]], scale: float) -> list[FittedPlant]:
+def _refined(known: SteeringPlant, windows: AxleWindows) -> SteeringPlant:
+    """A known plant after a mission; as it was where the axle turns too little."""
+    scale = usual_rate(windows.long)
+    if scale is None:
+        return known
+    prior = Belief(packed(known.valve, known.lag, known.play), known.cov)
+    fit = fit_plant(windows.short, prior.mean, prior, scale, TOLERANCES[1:])
+    now = plant_of(windows.long, fit, scale)
+    seen = min(known.seen[0], now.seen[0]), max(known.seen[1], now.seen[1])
+    # the fault of a whole mission leaves nothing that the plant explains: what was known of it holds
+    return replace(now, misfit=known.misfit, windows=known.windows, seen=seen)
+
+
+def _fit_axles(windows: Sequence[AxleWindows], scale: float) -> list[FittedPlant]:
     """Constants of every axle: those of least loss about one that is believed of all, an axle's own or the common ones."""
-    alone = [_fit_alone([w[0]], [w[1]], scale) for w in windows]
+    alone = [_fit_alone(w.long, w.short, scale) for w in windows]
     if len(windows) == 1:
         return alone
-    common = _fit_alone([w[0] for w in windows], [w[1] for w in windows], scale)
+    common = _fit_alone([p for w in windows for p in w.long], [p for w in windows for p in w.short], scale)
     tried = []
     for reference in (*alone, common):
         prior = Belief(reference.x, own_spread(reference.cov))
         tried.append(
             [
                 min(
-                    (fit_plant([w[1]], x, prior, scale, TOLERANCES[1:]) for x in (reference.x, own.x)),
+                    (fit_plant(w.short, x, prior, scale, TOLERANCES[1:]) for x in (reference.x, own.x)),
                     key=lambda fit: fit.loss,
                 )
                 for w, own in zip(windows, alone, strict=True)
@@ -169,7 +135,7 @@ def usual_rate(parts: Sequence[Windows]) -> float | None:
     rates = np.concatenate([np.abs(w.rate[w.good]) for w in parts]) if parts else np.zeros(0)
     noise = max((w.noise for w in parts), default=0.0)
     turning = rates[rates > max(5 * noise, 1e-4)]
-    return float(np.quantile(turning, 0.8)) if turning.size >= _LEAST_WINDOWS else None
+    return float(np.quantile(turning, 0.8)) if turning.size >= LEAST_WINDOWS else None
 
 
 def _fit_alone(long: Sequence[Windows], short: Sequence[Windows], scale: float) -> FittedPlant:
@@ -249,8 +215,8 @@ def _with_open_limits(valve: ValveMap, cov: Array, seen: tuple[float, float]) ->
         ((up, valve.slope_up, valve.dead_up), (down, valve.slope_down, valve.dead_down))
     ):
         if reach < _CONFIRMING * (dead + limits[i] / slope):
-            limits[i] = max(limits[i], _OPEN_LIMIT * slope * max(reach - dead, 0.0))
+            limits[i] = max(limits[i], OPEN_LIMIT * slope * max(reach - dead, 0.0))
             place = LIMITS.start + i
             cov[place], cov[:, place] = 0.0, 0.0
-            cov[place, place] = _OPEN_LIMIT_STD**2
+            cov[place, place] = OPEN_LIMIT_STD**2
     return valve._replace(limit_up=limits[0], limit_down=limits[1]), cov

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from diagnosis.steering.blocks import WHITE_DOF, SensorNoise, SteeringBlocks
-from diagnosis.steering.identification import SteeringPlant
+from diagnosis.steering.plant import SteeringPlant
 from diagnosis.steering.valve_map import ValveMap, rates_at
 from diagnosis.steering.windows import windows_of
 

@@ -11,6 +11,7 @@ from typing import Literal
 
 from replay.errors import ConfigError, check_range
 from replay.log.source_options import SignalSource, SourceOptions
+from replay.machine.axle_plant import AxlePlant
 from replay.machine.drive_model import DriveModel
 from replay.machine.geometry import Geometry, four_wheel_geometry
 from replay.machine.signal_table import names_of, signal_of
@@ -226,6 +227,8 @@ class Machine:
         Options per source, keyed by file name pattern.
     drives : Mapping[str, DriveModel]
         How single drives answer, by wheel; from healthy missions.
+    steering : Mapping[str, AxlePlant]
+        Valve, cylinder and sensor by steering axle; from healthy missions.
     """
 
     name: str
@@ -242,6 +245,7 @@ class Machine:
     sources: Mapping[str, SourceOptions] = field(default_factory=dict)
     signals: Mapping[str, SignalSource] = field(default_factory=dict)
     drives: Mapping[str, DriveModel] = field(default_factory=dict)
+    steering: Mapping[str, AxlePlant] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         """Check values and that signals name this machine's wheels and axles."""
@@ -267,6 +271,9 @@ class Machine:
         for name in self.drives:
             if name not in self.wheels:
                 raise ConfigError(f"[drive] {name!r}: no such wheel; machine.wheels has {list(self.wheels)}")
+        for name in self.steering:
+            if name not in self.axles:
+                raise ConfigError(f"[steering] {name!r}: no such axle; the geometry has {list(self.axles)}")
 
     def _check_name(self, section: str, name: str) -> None:
         """Raise where a signal is not known or names no part of this machine."""

@@ -11,13 +11,14 @@ from typing import Any, TypeVar
 
 from replay.errors import ConfigError
 from replay.log.source_options import SignalSource, SourceOptions
+from replay.machine.axle_plant import AxlePlant
 from replay.machine.config import Control, Limits, Machine, Noise, Plant, WheelPlant, haulotte
 from replay.machine.drive_model import drive_from_table, drive_table
 from replay.machine.geometry import Geometry, WheelGeometry, four_wheel_geometry
 from replay.machine.units import si_factor
 
 _T = TypeVar("_T")
-_SECTIONS = {"machine", "geometry", "control", "plant", "drive", "noise", "limits", "sources", "signals"}
+_SECTIONS = {"machine", "geometry", "control", "plant", "drive", "steering", "noise", "limits", "sources", "signals"}
 _STANDARD = ("wheelbase", "joint_spacing", "wheel_offset")
 _MACHINE_LEVEL = ("gear_ratio", "max_speed", "max_steer")
 
@@ -79,6 +80,7 @@ def _machine(data: Mapping[str, Any]) -> Machine:
         sources={k: _build(SourceOptions, f"sources.{k}", v) for k, v in data.get("sources", {}).items()},
         signals={k: _signal(k, v) for k, v in data.get("signals", {}).items()},
         drives={k: drive_from_table(f"drive.{k}", v) for k, v in data.get("drive", {}).items()},
+        steering={k: _build(AxlePlant, f"steering.{k}", v) for k, v in data.get("steering", {}).items()},
     )
     for name, source in machine.signals.items():
         if source.unit:
@@ -239,6 +241,9 @@ def dump_machine(machine: Machine, notes: Mapping[str, Sequence[str]] | None = N
     lines += [f"{_key(w)} = {{ {', '.join(_table(p))} }}" for w, p in machine.plant.wheels.items()]
     if machine.drives or "drive" in said:
         lines += ["", *head("drive"), *(f"{_key(w)} = {_inline(drive_table(d))}" for w, d in machine.drives.items())]
+    if machine.steering or "steering" in said:
+        lines += ["", *head("steering")]
+        lines += [f"{_key(a)} = {{ {', '.join(_table(p))} }}" for a, p in machine.steering.items()]
     lines += ["", *head("limits"), *_table(machine.limits)]
     for section, items in (("noise", machine.noise), ("sources", machine.sources), ("signals", machine.signals)):
         lines += ["", *head(section), *(f"{_key(k)} = {{ {', '.join(_table(v))} }}" for k, v in items.items())]

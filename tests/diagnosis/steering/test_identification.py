@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from diagnosis.steering.blocks import SensorNoise, SteeringBlocks, blocks_of
-from diagnosis.steering.identification import SteeringPlant, identify_plants
+from diagnosis.steering.identification import identify_plants
+from diagnosis.steering.plant import SteeringPlant
 from diagnosis.steering.valve_map import ValveMap, rate_at
 
 DT, STOP = 0.002, 0.785
@@ -41,7 +42,7 @@ def axle(
 
 
 def found(*axles: SteeringBlocks) -> list[SteeringPlant]:
-    plants = identify_plants(axles, [NOISE] * len(axles), STOP)
+    plants = identify_plants(axles, [NOISE] * len(axles), STOP, [None] * len(axles))
     assert all(p is not None for p in plants)
     return [p for p in plants if p is not None]
 
@@ -81,4 +82,4 @@ def test_beyond_the_openings_that_were_seen_the_rate_is_uncertain() -> None:
 def test_an_axle_that_rests_has_no_plant() -> None:
     still = np.random.default_rng(2).normal(0.0, 5e-4, 20_000)
     always = np.ones(still.size, np.bool_)
-    assert identify_plants([blocks_of(still, -still, always, always, DT)], [NOISE], STOP) == [None]
+    assert identify_plants([blocks_of(still, -still, always, always, DT)], [NOISE], STOP, [None]) == [None]

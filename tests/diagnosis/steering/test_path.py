@@ -8,11 +8,11 @@ from numpy.testing import assert_allclose
 
 from diagnosis.steering.blocks import SensorNoise, blocks_of
 from diagnosis.steering.driven import driven_by
-from diagnosis.steering.identification import SteeringPlant
 from diagnosis.steering.model_bank import HEALTHY, SENSOR, STUCK
 from diagnosis.steering.models import model_of
 from diagnosis.steering.path import AxleFilter, allowed_models, evidence_of, follow_path, most_probable
 from diagnosis.steering.path_refinement import refine_path
+from diagnosis.steering.plant import SteeringPlant
 from diagnosis.steering.valve_map import ValveMap
 
 DT, START, STOP = 0.002, 8.0, 12.0

@@ -10,7 +10,6 @@ from numpy.testing import assert_allclose
 from diagnosis.channels.sample_status import PAIR
 from diagnosis.steering.blocks import SensorNoise
 from diagnosis.steering.filter_state import Block, RedundantBlock
-from diagnosis.steering.identification import SteeringPlant
 from diagnosis.steering.measurement_kernel import update
 from diagnosis.steering.model_bank import (
     ACTUATOR,
@@ -25,6 +24,7 @@ from diagnosis.steering.model_bank import (
 )
 from diagnosis.steering.models import SteeringModel
 from diagnosis.steering.path import start_states
+from diagnosis.steering.plant import SteeringPlant
 from diagnosis.steering.prediction_kernel import predict
 from diagnosis.steering.step_kernel import advance
 from diagnosis.steering.valve_map import ValveMap, expected_rate, rate_at
