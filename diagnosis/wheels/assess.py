@@ -20,6 +20,7 @@ from diagnosis.wheels.filter_identification import joint_model
 from diagnosis.wheels.findings import WheelFindings, WheelPath, findings_of
 from diagnosis.wheels.inputs import WheelsData
 from diagnosis.wheels.models import HEALTHY, JointModel, WheelFilterModel
+from diagnosis.wheels.readings import with_readings
 from diagnosis.wheels.run_kernel import evidence_of_runs
 from diagnosis.wheels.runs import runs_of
 from diagnosis.wheels.settle import settled
@@ -48,6 +49,7 @@ def assess_wheels(data: WheelsData, limits: Limits, *, gains: bool) -> dict[int,
         Sensor and actuator by wheel.
     """
     blocks = blocks_of(data.y, data.u, data.status, data.quiet, data.ratio, data.turn, data.dead, data.dt, data.store)
+    blocks = with_readings(blocks, data.y, data.habits, data.speed_noises, limits.driving_speed)
     model = joint_model(data, blocks)
     done = settled(blocks, model, forward(blocks, model))
     out = {}
@@ -86,6 +88,7 @@ def _path(
         evidence=evidence_of_runs(blocks, model, done, i, runs),
         raised=done.best[:, i] != HEALTHY,
         fault=done.fault[:, i],
+        habit=blocks.habit[:, i],
     )
 
 

@@ -53,6 +53,11 @@ class WheelBlocks:
         geometry.
     blind : NDArray[np.bool_], shape (n, wheels)
         Blocks in most of which nobody knows the opening.
+    white, slack : Array, shape (n, wheels)
+        Variance of the readings' noise as a share of the usual one [1], and how far they may be off because they are late
+        [m/s].
+    habit : NDArray[np.int8], shape (n, wheels)
+        What a reading shows by its updates alone: `RESTS`, `RESTLESS` or 0.
     """
 
     width: int
@@ -67,6 +72,9 @@ class WheelBlocks:
     ratio: Array
     turn: Array
     blind: NDArray[np.bool_]
+    white: Array
+    slack: Array
+    habit: NDArray[np.int8]
     store: ColumnStore = field(default_factory=ColumnStore, repr=False)
 
     @property
@@ -90,6 +98,9 @@ class WheelBlocks:
             ratio=self.ratio[cut],
             turn=self.turn[cut],
             blind=self.blind[cut],
+            white=self.white[cut],
+            slack=self.slack[cut],
+            habit=self.habit[cut],
             store=self.store,
         )
 
@@ -170,7 +181,8 @@ def blocks_of(
     if width < 4:  # too few samples to see by themselves what changes within a block
         quick = np.stack([np.abs(white_part(driven[:, i])) for i in range(wheels)], axis=1)
         whole["unsteady"] = np.maximum(whole["unsteady"], quick.reshape(-1, width, wheels).mean(axis=1))
-    return WheelBlocks(width=width, raw_dt=dt, u=driven, store=store, **whole)
+    even, late, usual = np.ones(whole["y"].shape), np.zeros(whole["y"].shape), np.zeros(whole["y"].shape, np.int8)
+    return WheelBlocks(width=width, raw_dt=dt, u=driven, white=even, slack=late, habit=usual, store=store, **whole)
 
 
 def _framed(values: NDArray[Any], width: int) -> NDArray[Any]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from diagnosis.channels.noise import moving_sum, quick_noise, rounding_step, slow_mismatch, usual_distance, white_noise
+from diagnosis.channels.noise import moving_sum, quick_noise, slow_mismatch, usual_distance, usual_rounding, white_noise
 from diagnosis.channels.sample_status import PAIR
 from diagnosis.wheels.blocks import WheelBlocks
 from diagnosis.wheels.filter import forward
@@ -38,10 +38,13 @@ def filter_model(data: WheelsData, i: int) -> WheelFilterModel:
     fresh = y[pair]
     period = data.dt * (usual_distance(pair) if fresh.size > 1 else 1.0)
     known = data.noise[i]
-    lsb = known.lsb if known.lsb is not None else rounding_step(fresh)
+    lsb = known.lsb if known.lsb is not None else usual_rounding(fresh)
     white = known.std or float(np.nan_to_num(white_noise(fresh, period)))
     rounding = lsb / np.sqrt(12)
     noise = max(float(np.hypot(white, rounding)) if known.std else white, rounding, 1e-4 * data.span)
+    growing = data.speed_noises[i]
+    if growing is not None and not known.std:
+        noise = max(growing.usual, rounding, 1e-4 * data.span)
     if period > 0.005:  # too slow to tell noise from motion by steps alone
         width = max(3, round(0.5 / data.dt))
         changing = moving_sum(np.diff(y, prepend=y[:1]) != 0, width) > 0.1 * width
@@ -55,7 +58,7 @@ def filter_model(data: WheelsData, i: int) -> WheelFilterModel:
         tau=plant.tau,
         noise=noise,
         # noise within one rounding step leaves readings constant for a while: that proves nothing then
-        constant_noise=max(rounding / 3, noise / 50) if noise > lsb else noise,
+        constant_noise=max(rounding / 3, noise / 50) if noise > lsb and not data.habits[i].stepwise else noise,
         rounding=max(rounding, 1e-5 * data.span),
         load=max(min(load, _MOST_LOAD * data.span), _LEAST_LOAD * data.span, 0.5 * noise),
         span=data.span,

@@ -10,16 +10,18 @@ from numpy.typing import NDArray
 from diagnosis.estimation.viterbi import first_lasting
 from diagnosis.results.assessment import Finding
 from diagnosis.wheels.isolation import Run, judge
-from diagnosis.wheels.models import HEALTHY, TOTAL_SENSOR, WheelFilterModel
+from diagnosis.wheels.models import HEALTHY, S_GAIN, S_NONE, S_STUCK, TOTAL_SENSOR, WheelFilterModel
 from diagnosis.wheels.onset import onset_sentence, refined, released
 from diagnosis.wheels.run_kernel import RunEvidence
 from diagnosis.wheels.runs import Runs
+from diagnosis.wheels.step_kernel import RESTS
 from replay.faults import Side
 from replay.machine.config import Limits
 
 Array = NDArray[np.float64]
 
 _HOLD_S = 0.1
+_CONSTANT_S = 0.5  # a shorter time of one value may be a hold
 
 
 @dataclass(frozen=True)
@@ -44,6 +46,8 @@ class WheelPath:
         Where a causal reading holds a fault for most probable.
     fault : Array, shape (blocks,)
         Probability by the same that the wheel is not healthy.
+    habit : NDArray[np.int8], shape (blocks,)
+        As in `WheelBlocks`.
     """
 
     y: Array
@@ -55,6 +59,7 @@ class WheelPath:
     evidence: RunEvidence
     raised: NDArray[np.bool_]
     fault: Array
+    habit: NDArray[np.int8]
 
 
 @dataclass(frozen=True)
@@ -99,7 +104,7 @@ def findings_of(path: WheelPath, limits: Limits, *, gains: bool) -> WheelFinding
         start, stop = _edges(path, r)
         if stop <= start:
             continue
-        if runs.model[r] in TOTAL_SENSOR and path.model.constant_noise >= path.model.noise:
+        if runs.model[r] in TOTAL_SENSOR and path.model.constant_noise >= path.model.noise and not _rests(path, r):
             held = y[start:stop][np.isfinite(y[start:stop])]
             moves = held.size > 0 and float(np.ptp(held)) > 0  # by a rounding step at least: it is not stuck
             expected = held.size > 0 and _as_expected(path, r, float(np.median(held)))
@@ -107,7 +112,9 @@ def findings_of(path: WheelPath, limits: Limits, *, gains: bool) -> WheelFinding
                 for side in _left_by_rounding(moves=moves, expected=expected):
                     out.opened[side][start:stop] = True
                 continue
-        run = Run(start, stop, int(runs.model[r]), evidence.evidence[r], evidence.mean[r], evidence.cov[r])
+        run = Run(
+            start, stop, _constant(path, r, y[start:stop]), evidence.evidence[r], evidence.mean[r], evidence.cov[r]
+        )
         verdict = judge(run, y[start:stop], path.model, limits, path.names, path.dt, gains=gains)
         for side in verdict.open_sides:
             out.opened[side][start:stop] = True
@@ -127,6 +134,22 @@ def _left_by_rounding(*, moves: bool, expected: bool) -> tuple[Side, ...]:
     if expected:
         return () if moves else (Side.SENSOR,)
     return (Side.SENSOR, Side.ACTUATOR)
+
+
+def _constant(path: WheelPath, r: int, y: Array) -> int:
+    """Model of a run: no signal or stuck where a sensor that seems to give a share of the speed gives one value alone."""
+    m = int(path.runs.model[r])
+    held = y[np.isfinite(y)]
+    if m != S_GAIN or held.size * path.dt < _CONSTANT_S or float(np.ptp(held)) > 0:
+        return m
+    if held[0] == 0.0:
+        return S_NONE
+    return S_STUCK if _rests(path, r) else m
+
+
+def _rests(path: WheelPath, r: int) -> bool:
+    """Whether a stepwise sensor kept its value for longer than its kind does, in most of a run."""
+    return bool(np.mean(path.habit[path.runs.start[r] : path.runs.stop[r]] == RESTS) > 0.5)
 
 
 def _edges(path: WheelPath, r: int) -> tuple[int, int]:

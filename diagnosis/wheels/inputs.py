@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from diagnosis.channels.habit import Habit
 from diagnosis.channels.liveness import alive
 from diagnosis.channels.sample_status import sample_status
 from diagnosis.estimation.lag import low_passed_on
@@ -17,6 +18,7 @@ from diagnosis.results.wheel_model import WheelModelFit
 from diagnosis.wheels.blocks import block_width
 from diagnosis.wheels.identification import demand, identify
 from diagnosis.wheels.parity import slipping
+from diagnosis.wheels.readings import SpeedNoise, habits_of, news, speed_noises
 from replay.arrays.blocks import release
 from replay.arrays.column_store import ColumnStore
 from replay.arrays.numeric import without_nan
@@ -109,6 +111,8 @@ class WheelsData:
         Largest plausible speed and what the pump feeds, as a sum of speeds [m/s].
     coupling : str
         ``auto``, ``free`` or ``ground``.
+    habits : Sequence[Habit]
+        How each speed sensor is updated.
     dt : float
         Step [s].
     store : ColumnStore
@@ -130,8 +134,14 @@ class WheelsData:
     span: float
     flow: float
     coupling: str
+    habits: Sequence[Habit]
     dt: float
     store: ColumnStore = field(default_factory=ColumnStore, repr=False)
+
+    @cached_property
+    def speed_noises(self) -> list[SpeedNoise | None]:
+        """Noise of each speed sensor where it depends on the speed."""
+        return speed_noises(self.y, self.status, self.habits, self.dt)
 
     @property
     def dead(self) -> Array:
@@ -228,6 +238,9 @@ def wheels_data(
         status[:, i] = sample_status(y[:, i], u[:, i], timeline.fresh[speed], alive(timeline, counts, speed), dt)
         apart, quiet[:, i] = _apart(y[:, i], u[:, i], replay.v_ref[:, i], plant, limit, timeline)
         residual[i] = timeline.map(lambda s, r: np.where(s, np.nan, r), starved, apart)
+    fresh = [timeline.fresh.get(speed, np.zeros(timeline.size, dtype=np.bool_)) for speed, _ in names]
+    habits = habits_of(y, fresh, dt)
+    status = news(status, y, habits, dt)
     ratio, turn = _in_motion(angle, machine, timeline)
     return WheelsData(
         y=y,
@@ -245,6 +258,7 @@ def wheels_data(
         span=2.2 * machine.max_speed,
         flow=machine.plant.flow or 1e9,
         coupling=machine.plant.coupling,
+        habits=habits,
         dt=dt,
         store=timeline.store,
     )

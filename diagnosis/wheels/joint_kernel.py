@@ -62,6 +62,9 @@ class JointInput(NamedTuple):
     y: Array
     samples: Array
     jitter: Array
+    white: Array
+    slack: Array
+    habit: NDArray[np.int8]
     chatter: Array
     wander: Array
     ratio: Array  # speed of the wheel per speed of the body [1]
@@ -300,6 +303,9 @@ def scan_wheels(
                 y=blocks.y[n, i],
                 samples=blocks.samples[n, i],
                 jitter=blocks.jitter[n, i],
+                white=blocks.white[n, i],
+                slack=blocks.slack[n, i],
+                habit=blocks.habit[n, i],
                 drive=x[DRIVE],
                 drive_half=x[DRIVE_HALF],
                 drive_none=x[DRIVE_NONE],

@@ -33,6 +33,9 @@ class RunInput(NamedTuple):
     y: Array
     samples: Array
     jitter: Array
+    white: Array
+    slack: Array
+    habit: NDArray[np.int8]
     chatter: Array
     wander: Array
     inputs: Array  # (n, 8) as in `JointOutput`
@@ -95,6 +98,9 @@ def _scan_runs(
                 y=blocks.y[n],
                 samples=blocks.samples[n],
                 jitter=blocks.jitter[n],
+                white=blocks.white[n],
+                slack=blocks.slack[n],
+                habit=blocks.habit[n],
                 drive=x[DRIVE],
                 drive_half=x[DRIVE_HALF],
                 drive_none=x[DRIVE_NONE],
@@ -148,6 +154,9 @@ def evidence_of_runs(blocks: WheelBlocks, model: JointModel, done: JointPass, wh
         y=np.ascontiguousarray(blocks.y[:, wheel]),
         samples=np.ascontiguousarray(blocks.count[:, wheel]),
         jitter=np.ascontiguousarray(blocks.jitter[:, wheel]),
+        white=np.ascontiguousarray(blocks.white[:, wheel]),
+        slack=np.ascontiguousarray(blocks.slack[:, wheel]),
+        habit=np.ascontiguousarray(blocks.habit[:, wheel]),
         chatter=blocks.unsteady[:, wheel] * per_opening[0],
         wander=np.ascontiguousarray(blocks.wander(per_opening)[:, wheel]),
         inputs=np.ascontiguousarray(done.inputs[:, wheel]),

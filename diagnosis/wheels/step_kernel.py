@@ -38,6 +38,10 @@ _OCCAM = 0.5  # what a row with unknowns must gain on healthy per second
 _WORST = 30.0  # by which a block can speak against a model at most
 _SILENT = -6.0
 _REVERSED = 1.0  # what a block costs a gain below zero
+#: A stepwise sensor that holds its value for longer than its kind does, or that changes it more often.
+RESTS, RESTLESS = 1, 2
+_RESTS = 0.05  # of the noise: what is left of it
+_RESTLESS_GAIN = 2.0  # what such a block says for noise
 _NO_LOSS = 0.9  # a gain above this is none
 
 
@@ -47,6 +51,9 @@ class WheelInput(NamedTuple):
     y: float  # mean measured speed [m/s]
     samples: float  # new ones in it
     jitter: float  # mean squared step from sample to sample [m²/s²]
+    white: float  # variance of its noise as a share of the usual one [1]
+    slack: float  # how far the readings may be off because they are late [m/s]
+    habit: int  # what they show by their updates alone, see `RESTS`
     drive: float  # mean opening as the pump feeds it, as this wheel's healthy valve asks [fraction]
     drive_half: float  # the same if its valve took half of that
     drive_none: float  # and if it took nothing
@@ -203,9 +210,12 @@ def predict(m: int, q: WheelInput, k: WheelConstants, z: Array, P: Array) -> flo
 
 
 @njit(cache=True, error_model="numpy")
-def _readout(m: int, k: WheelConstants, z: Array) -> tuple[float, float, float, float]:
+def _readout(m: int, q: WheelInput, k: WheelConstants, z: Array) -> tuple[float, float, float, float]:
     """Row H = [h0, 0, 0, h3] of model m, variance of one sample's noise, and of its steps from sample to sample."""
-    own = k.noise**2
+    own = k.noise**2 * q.white
+    if q.habit == RESTS and (m == S_STUCK or m == S_NONE):
+        rest = (_RESTS * k.noise) ** 2
+        return 0.0, 1.0 if m == S_STUCK else 0.0, rest, rest
     if m == S_STUCK:
         return 0.0, 1.0, k.constant_noise**2, k.constant_noise**2
     if m == S_NONE:
@@ -233,10 +243,10 @@ def correct(m: int, q: WheelInput, share: float, k: WheelConstants, z: Array, P:
     The steps from sample to sample tell noise, and constancy, without any model of the wheel: their mean square is
     distributed as χ² with two thirds of a degree of freedom each.
     """
-    h0, h3, white, steps = _readout(m, k, z)
+    h0, h3, white, steps = _readout(m, q, k, z)
     r = white / max(q.samples, 1.0) + 1e-12
     if h0 > 0.0:
-        r += (q.chatter * share) ** 2
+        r += (q.chatter * share) ** 2 + q.slack**2
     g0, g1 = P[m, 0, 0] * h0 + P[m, 0, 3] * h3, P[m, 0, 1] * h0 + P[m, 1, 3] * h3
     g2, g3 = P[m, 0, 2] * h0 + P[m, 2, 3] * h3, P[m, 0, 3] * h0 + P[m, 3, 3] * h3
     s = h0 * g0 + h3 * g3 + r
@@ -260,6 +270,8 @@ def correct(m: int, q: WheelInput, share: float, k: WheelConstants, z: Array, P:
     P[m, 1, 0], P[m, 2, 0], P[m, 3, 0] = P[m, 0, 1], P[m, 0, 2], P[m, 0, 3]
     P[m, 2, 1], P[m, 3, 1], P[m, 3, 2] = P[m, 1, 2], P[m, 1, 3], P[m, 2, 3]
     by_mean = innovation * innovation * part + np.log(2.0 * np.pi * s)
+    if q.habit == RESTLESS and m >= S_WHITE_3 and m <= S_OU_LARGE:
+        by_mean -= 2.0 * _RESTLESS_GAIN
     if q.samples <= 1.5:
         return float(-0.5 * by_mean)
     freedom = 2.0 * q.samples / 3.0

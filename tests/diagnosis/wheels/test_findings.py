@@ -37,7 +37,9 @@ def found(level: float, expected: float, *, flickers: bool) -> WheelFindings:
         np.full(BLOCKS, 1e-4),
     )
     none = np.zeros(BLOCKS, np.bool_)
-    path = WheelPath(y, ("v", "u"), MODEL, 0.002, WIDTH, runs, evidence, none, np.zeros(BLOCKS))
+    path = WheelPath(
+        y, ("v", "u"), MODEL, 0.002, WIDTH, runs, evidence, none, np.zeros(BLOCKS), np.zeros(BLOCKS, np.int8)
+    )
     return findings_of(path, Limits(), gains=True)
 
 

@@ -280,7 +280,7 @@ def advanced(q: WheelInput, status: int, quiet: bool = False, speed: float = 0.2
 
 
 def shown(y: float, jitter: float = 3e-5) -> WheelInput:
-    return WheelInput(y, 10.0, jitter, 0.08, 0.08, 0.08, 1.0, 1.0, 0.0, 0.0, np.nan, 0.0)
+    return WheelInput(y, 10.0, jitter, 1.0, 0.0, 0, 0.08, 0.08, 0.08, 1.0, 1.0, 0.0, 0.0, np.nan, 0.0)
 
 
 def test_a_block_speaks_within_limits() -> None:
