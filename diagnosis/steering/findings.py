@@ -30,8 +30,8 @@ Span = tuple[int, int]
 
 _TEMPER = 0.35
 _MOST = 0.6  # of a mission: the longest fault of a valve
-_BRIEF_S = 0.3
-_BELIEVED_S = 6.0  # for how long before and after a motion that did not come a valve's fault is believed
+_BRIEF_S = 0.9  # a shorter stretch is rather what the model leaves out
+_BELIEVED_S = 4.0  # for how long before and after a motion that did not come a valve's fault is believed
 _LEAST_ASKED_S = 0.35  # for how long a motion must be asked for, to see that it does not come
 _LEAST_NAMED, _LEAST_LISTED = 0.005, 5e-4  # probabilities from which on another explanation is named in words, listed
 _NO_FAULT: Fault = (None, None)

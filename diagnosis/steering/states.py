@@ -17,7 +17,7 @@ from diagnosis.steering.model_bank import HEALTHY
 from diagnosis.steering.path import AxleFilter
 from replay.faults import Side, State
 
-_ALONE_S, _BETWEEN_S = 6.0, 30.0
+_ALONE_S, _BETWEEN_S = 4.0, 10.0
 REASONS: dict[Side, Mapping[State, str]] = {
     Side.SENSOR: {
         State.NOT_EXCITED: "the axle was not steered, and the sensor's rounding hides its noise",
@@ -36,8 +36,8 @@ REASONS: dict[Side, Mapping[State, str]] = {
 def vouched(healthy: NDArray[np.bool_], shown: NDArray[np.bool_], dt: float) -> NDArray[np.bool_]:
     """Healthy blocks for which a movement nearby speaks.
 
-    Between two movements that were obeyed a fault would have had to come and go, which is believed for half a minute;
-    before the first and after the last one for as long as a fault is improbable at one in a minute. Shape (m,).
+    Between two movements that were obeyed a fault would have had to come and go, which is not believed within some
+    seconds; before the first and after the last one health is believed for fewer. Shape (m,).
     """
     out = shown & healthy
     idle = healthy & ~shown
