@@ -11,6 +11,7 @@ from diagnosis.fitting.geometry import offset_pattern
 from diagnosis.fitting.noise import NoiseFit
 from diagnosis.fitting.robust import Estimate
 from diagnosis.fitting.wheels import WheelFit
+from diagnosis.wheels.plant_identification import PlantFit
 from replay.machine.config import Law, Machine, Noise, PsiMode, WheelPlant
 from replay.machine.drive_model import DriveModel
 
@@ -108,12 +109,22 @@ _LEFT_OUT = "the wheel is left out"  # which says why, once
 _PLANT = (("K", "m/s per full opening"), ("tau", "s"), ("dead", "of full opening"), ("offset", "m/s"), ("load", "m/s"))
 
 
+_MAP = (("hysteresis", "of full opening"), ("grip", ""), ("wander", "m/s/√s"))
+_NO_MAP = "the wheels' speeds and openings do not show the map of the valve"
+
+
 def with_plants(
-    out: Machine, machine: Machine, fits: list[WheelFit | None], spoiled: list[str], constants: list[Constant]
+    out: Machine,
+    machine: Machine,
+    fits: list[WheelFit | None],
+    maps: PlantFit | None,
+    spoiled: list[str],
+    constants: list[Constant],
 ) -> Machine:
-    """Put the wheels' constants into the plant section."""
+    """Put the wheels' constants into the plant section; the map of a valve stands beside its linear model."""
     wheels = dict(machine.plant.wheels)
-    for w, fit, error in zip(machine.wheels, fits, spoiled, strict=True):
+    mapped = maps.plants if maps is not None else (None,) * len(machine.wheels)
+    for w, fit, found, error in zip(machine.wheels, fits, mapped, spoiled, strict=True):
         before = wheels.get(w)
         for name, unit in _PLANT:
             e = Estimate(float("nan"), float("nan"), f"{error} has a wrong unit or sign" if error else "not logged")
@@ -140,7 +151,25 @@ def with_plants(
                 offset=fit.offset.value,
                 offset_std=_known(fit.offset.std),
             )
+        if found is not None:
+            wheels[w] = _mapped(wheels.get(w), found)
+        for name, unit in _MAP:
+            e = Estimate(float("nan"), float("nan"), _NO_MAP)
+            if found is not None:
+                e = Estimate(float(getattr(found, name)), float("nan"))
+            old = None if before is None else getattr(before, name)
+            windows = 0 if maps is None else maps.windows
+            constants.append(_constant(f"plant.{w}.{name}", e, unit, old, windows, 0, written=True))
     return replace(out, plant=replace(machine.plant, wheels=wheels))
+
+
+def _mapped(linear: WheelPlant | None, found: WheelPlant) -> WheelPlant:
+    """A wheel with the map of its valve; lag and load go with the map, gain and dead zone stay those of the linear fit."""
+    if linear is None:
+        return found
+    return replace(
+        found, K=linear.K, K_std=linear.K_std, tau_std=linear.tau_std, dead=linear.dead, dead_std=linear.dead_std
+    )
 
 
 def _known(x: float) -> float | None:

@@ -16,6 +16,7 @@ from diagnosis.fitting.noise import fit_noise
 from diagnosis.fitting.plants import fit_plants
 from diagnosis.fitting.steering import fit_steering, with_steering
 from diagnosis.fitting.units import UnitError, find_unit_errors, speed_mistakes
+from diagnosis.fitting.valve_maps import fit_maps
 from diagnosis.fitting.wheels import WheelFit
 from diagnosis.fitting.windows import WheelRecord
 from replay.control.loop import Replay, replay_loop
@@ -105,12 +106,13 @@ def fit_missions(missions: Sequence[Mission], machine: Machine, *, progress: Sub
     spoiled = [_spoiled(w, timelines, bad) for w in machine.wheels]
     usable = [[None if s else r for r, s in zip(wheels, spoiled, strict=True)] for wheels in records]
     plants = fit_plants(usable, machine.plant.flow) if usable else []
+    maps = fit_maps(timelines, replays, machine, spoiled)
     progress(Progress(Stage.FITTING_GEOMETRY))
     offset, blocks, turned = fit_offset(timelines, machine, bad)
     constants: list[Constant] = []
     out = with_offset(machine, offset, blocks, len(turned), constants)
     out = with_control(out, machine, control, bool(doubt), constants)
-    out = with_plants(out, machine, plants, spoiled, constants)
+    out = with_plants(out, machine, plants, maps, spoiled, constants)
     if len(machine.wheels) == 1 or machine.geometry is None:
         progress(Progress(Stage.FITTING_DRIVES))
         out = _with_drives(out, machine, list(zip(timelines, replays, strict=True)), spoiled, constants)

@@ -17,9 +17,9 @@ from diagnosis.wheels.blocks import WheelBlocks, blocks_of, per_sample
 from diagnosis.wheels.effectiveness import relative_losses
 from diagnosis.wheels.filter import JointPass, forward, most_probable
 from diagnosis.wheels.filter_identification import joint_model
-from diagnosis.wheels.findings import WheelFindings, WheelPath, findings_of
+from diagnosis.wheels.findings import Surroundings, WheelFindings, WheelPath, findings_of
 from diagnosis.wheels.inputs import WheelsData
-from diagnosis.wheels.models import HEALTHY, JointModel, WheelFilterModel
+from diagnosis.wheels.models import ODD, JointModel, WheelFilterModel
 from diagnosis.wheels.readings import with_readings
 from diagnosis.wheels.run_kernel import evidence_of_runs
 from diagnosis.wheels.runs import runs_of
@@ -48,16 +48,20 @@ def assess_wheels(data: WheelsData, limits: Limits, *, gains: bool) -> dict[int,
     dict[int, tuple[Assessment, Assessment]]
         Sensor and actuator by wheel.
     """
-    blocks = blocks_of(data.y, data.u, data.status, data.quiet, data.ratio, data.turn, data.dead, data.dt, data.store)
+    blocks = blocks_of(data.y, data.u, data.status, data.quiet, data.ratio, data.turn, data.plants, data.dt, data.store)
     blocks = with_readings(blocks, data.y, data.habits, data.speed_noises, limits.driving_speed)
-    model = joint_model(data, blocks)
+    model, blocks = joint_model(data, blocks)
     done = settled(blocks, model, forward(blocks, model))
+    traced = {i: most_probable(done, i) for i, wheel in enumerate(model.wheels) if wheel is not None}
+    faulty = np.zeros(blocks.y.shape, dtype=np.bool_)
+    for i, (models, _) in traced.items():
+        faulty[:, i] = models > ODD
     out = {}
     losses = _losses(data, limits)
     for i, wheel in enumerate(model.wheels):
         if wheel is None:
             continue
-        path = _path(data, i, wheel, blocks, model, done)
+        path = _path(data, i, wheel, blocks, model, done, traced[i], _surroundings(data, i, blocks, faulty))
         found = findings_of(path, limits, gains=gains)
         sensor, actuator = _assessments(data, i, path, found, gains=gains)
         out[i] = sensor, actuator if data.measured[i] else replace(actuator, loss=losses[i])
@@ -73,10 +77,17 @@ def _losses(data: WheelsData, limits: Limits) -> list[Loss | None]:
 
 
 def _path(
-    data: WheelsData, i: int, wheel: WheelFilterModel, blocks: WheelBlocks, model: JointModel, done: JointPass
+    data: WheelsData,
+    i: int,
+    wheel: WheelFilterModel,
+    blocks: WheelBlocks,
+    model: JointModel,
+    done: JointPass,
+    traced: tuple[NDArray[np.uint8], NDArray[np.bool_]],
+    surroundings: Surroundings,
 ) -> WheelPath:
-    """Wheel i on its most probable path, with all models' evidence over its runs."""
-    models, entered = most_probable(done, i)
+    """Wheel i on its most probable path, `traced`, with all models' evidence over its runs."""
+    models, entered = traced
     runs = runs_of(models, entered, blocks.quiet[:, i], blocks.status[:, i], blocks.dt)
     return WheelPath(
         y=data.y[:, i],
@@ -86,9 +97,30 @@ def _path(
         width=blocks.width,
         runs=runs,
         evidence=evidence_of_runs(blocks, model, done, i, runs),
-        raised=done.best[:, i] != HEALTHY,
+        raised=done.best[:, i] > ODD,
+        odd=models == ODD,
         fault=done.fault[:, i],
         habit=blocks.habit[:, i],
+        surroundings=surroundings,
+    )
+
+
+def _surroundings(data: WheelsData, i: int, blocks: WheelBlocks, faulty: NDArray[np.bool_]) -> Surroundings:
+    """What the judgement of wheel i is weighed by; `faulty` (blocks, wheels) is where each is taken to be."""
+    n = blocks.y.shape[0]
+    opening = blocks.u[:, i].reshape(n, blocks.width).mean(axis=1)
+    driven = np.abs(opening)[~blocks.quiet[:, i]]
+    doubtful = np.zeros(n, dtype=np.bool_)
+    steps = np.asarray(data.doubtful[:: blocks.width].any(axis=1), dtype=np.bool_)[:n]
+    doubtful[: steps.size] = steps
+    return Surroundings(
+        misfit=data.misfit,
+        given=data.given[i],
+        opening=opening,
+        usual=float(np.median(driven)) if driven.size else 1.0,
+        others=faulty.sum(axis=1) - faulty[:, i].astype(np.float64),
+        unseen=blocks.unseen[:, i] != 0,
+        doubtful=doubtful,
     )
 
 

@@ -6,7 +6,8 @@ jumps) stays in the mean square of the steps, and onsets are refined at the raw 
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, fields
+from collections.abc import Sequence
+from dataclasses import dataclass, field, fields, replace
 from typing import Any
 
 import numpy as np
@@ -14,9 +15,11 @@ from numpy.typing import NDArray
 
 from diagnosis.channels.noise import white_part
 from diagnosis.channels.sample_status import PAIR, SILENT, SKIP
+from diagnosis.wheels.valve_map import effective
 from replay.arrays.blocks import release
 from replay.arrays.column_store import ColumnStore
 from replay.arrays.numeric import without_nan
+from replay.machine.config import WheelPlant
 
 Array = NDArray[np.float64]
 
@@ -41,7 +44,9 @@ class WheelBlocks:
     jitter : Array, shape (n, wheels)
         Mean squared step between consecutive new samples [m²/s²].
     u : Array, shape (n·width, wheels)
-        Valve opening of every sample beyond its dead zone [fraction]; 0 where unknown.
+        Effective valve opening of every sample [fraction] (see `diagnosis.wheels.valve_map`); 0 where unknown.
+    unseen : Array, shape (n, wheels)
+        Part of it that lies beyond what a healthy wheel was seen with [fraction].
     unsteady : Array, shape (n, wheels)
         Root mean square of what changes within a block in u [fraction].
     status : NDArray[np.int8], shape (n, wheels)
@@ -66,6 +71,7 @@ class WheelBlocks:
     count: Array
     jitter: Array
     u: Array
+    unseen: Array
     unsteady: Array
     status: NDArray[np.int8]
     quiet: NDArray[np.bool_]
@@ -76,6 +82,7 @@ class WheelBlocks:
     slack: Array
     habit: NDArray[np.int8]
     store: ColumnStore = field(default_factory=ColumnStore, repr=False)
+    ended: bool = field(default=False, kw_only=True)
 
     @property
     def dt(self) -> float:
@@ -92,6 +99,7 @@ class WheelBlocks:
             count=self.count[cut],
             jitter=self.jitter[cut],
             u=np.ascontiguousarray(self.u[first * self.width : min(last, self.y.shape[0]) * self.width]),
+            unseen=self.unseen[cut],
             unsteady=self.unsteady[cut],
             status=self.status[cut],
             quiet=self.quiet[cut],
@@ -102,7 +110,13 @@ class WheelBlocks:
             slack=self.slack[cut],
             habit=self.habit[cut],
             store=self.store,
+            ended=self.ended,
         )
+
+    def ending(self) -> WheelBlocks:
+        """The same if valves end where they were last seen, and what they give beyond is not known."""
+        less = np.repeat(self.unseen, self.width, axis=0)
+        return replace(self, u=self.u - less, ended=True)
 
     def wander(self, speed_per_opening: Array) -> Array:
         """Error of the modelled speed after a block from openings that the log does not resolve [m/s], (n, wheels).
@@ -130,7 +144,7 @@ def blocks_of(
     quiet: NDArray[np.bool_],
     ratio: Array,
     turn: Array,
-    dead: Array,
+    plants: Sequence[WheelPlant | None],
     dt: float,
     store: ColumnStore | None = None,
 ) -> WheelBlocks:
@@ -146,8 +160,8 @@ def blocks_of(
         Where a wheel is neither commanded nor expected to move.
     ratio, turn : Array, shape (m, wheels)
         As in `WheelBlocks`.
-    dead : Array, shape (wheels,)
-        Dead zone of each valve [fraction].
+    plants : Sequence[WheelPlant or None]
+        Wheels with the maps of their valves.
     dt : float
         Step [s].
     store : ColumnStore or None
@@ -157,9 +171,10 @@ def blocks_of(
     width, (size, wheels) = block_width(dt), y.shape
     opening, parts = store.column(np.float64, (wheels,)), []
     ends = [_Ends(_usual_gap(status[:, i])) for i in range(wheels)]
+    spools: list[float | None] = [None] * wheels
     for cut in store.blocks(size, width):
-        beyond = without_nan(u[cut])
-        beyond = _framed(np.sign(beyond) * np.maximum(np.abs(beyond) - dead, 0.0), width)
+        driving, more, spools = _effective(u[cut], plants, spools)
+        beyond = _framed(driving, width)
         opening.append(beyond.reshape(-1, wheels))
         mean, count, jitter, state = _samples(y[cut], status[cut], width, len(beyond), ends)
         parts.append(
@@ -167,6 +182,7 @@ def blocks_of(
                 y=mean,
                 count=count,
                 jitter=jitter,
+                unseen=_framed(more, width).mean(axis=1),
                 unsteady=beyond.std(axis=1),
                 status=state,
                 quiet=np.asarray(_framed(quiet[cut], width).all(axis=1)),
@@ -182,7 +198,23 @@ def blocks_of(
         quick = np.stack([np.abs(white_part(driven[:, i])) for i in range(wheels)], axis=1)
         whole["unsteady"] = np.maximum(whole["unsteady"], quick.reshape(-1, width, wheels).mean(axis=1))
     even, late, usual = np.ones(whole["y"].shape), np.zeros(whole["y"].shape), np.zeros(whole["y"].shape, np.int8)
-    return WheelBlocks(width=width, raw_dt=dt, u=driven, white=even, slack=late, habit=usual, store=store, **whole)
+    return WheelBlocks(
+        width=width, raw_dt=dt, u=driven, white=even, slack=late, habit=usual, store=store, ended=False, **whole
+    )
+
+
+def _effective(
+    u: Array, plants: Sequence[WheelPlant | None], spools: Sequence[float | None]
+) -> tuple[Array, Array, list[float | None]]:
+    """Effective openings of all wheels, what of them nobody has seen, and where the spools stand at the end."""
+    opening, more, held = np.zeros(u.shape), np.zeros(u.shape), list(spools)
+    for i, plant in enumerate(plants):
+        if plant is None:
+            opening[:, i] = without_nan(u[:, i])
+        else:
+            opening[:, i], more[:, i], held[i] = effective(u[:, i], plant, held[i])
+            opening[:, i] += more[:, i]
+    return opening, more, held
 
 
 def _framed(values: NDArray[Any], width: int) -> NDArray[Any]:
@@ -198,6 +230,7 @@ class _Part:
     y: Array
     count: Array
     jitter: Array
+    unseen: Array
     unsteady: Array
     status: NDArray[np.int8]
     quiet: NDArray[np.bool_]

@@ -22,12 +22,16 @@ class WheelEvidence:
         if len(machine.wheels) < 2 or (channels.has_true & channels.has_applied).all():
             return Contribution({})
         mission.progress(Progress(Stage.IDENTIFYING_WHEELS))
-        fit = wheel_fit(channels, replay, timeline, machine)
-        if fit is None or mission.angle is None or mission.doubtful is None:
+        if mission.angle is None or mission.doubtful is None:
+            return Contribution({})
+        fit = wheel_fit(channels, replay, timeline, machine, mission.angle)
+        if fit is None:
             return Contribution({})
         mission.progress(Progress(Stage.JUDGING_WHEELS))
         slip = slip_of(timeline, replay, machine, channels.v, mission.angle, mission.doubtful)
-        data = wheels_data(timeline, replay, machine, channels, fit, mission.alive, mission.angle, slip)
+        data = wheels_data(
+            timeline, replay, machine, channels, fit, mission.alive, mission.angle, mission.doubtful, slip
+        )
         parts: dict[Part, Assessment] = {}
         for i, (sensor, actuator) in assess_wheels(data, machine.limits, gains=fit.reliable).items():
             wheel = machine.wheels[i]

@@ -150,6 +150,7 @@ def _forward(blocks: WheelBlocks, model: JointModel, state: JointState, given: N
         habit=blocks.habit,
         chatter=blocks.unsteady * per_opening,
         wander=blocks.wander(per_opening),
+        unseen=blocks.unseen * np.array([w.K if blocks.ended else 0.0 for w in _filled(model)]),
         ratio=blocks.ratio,
         turn=blocks.turn,
         status=blocks.status,

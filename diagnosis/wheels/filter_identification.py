@@ -16,12 +16,18 @@ Array = NDArray[np.float64]
 
 _MEAN_HEALTHY_S = 60.0
 _LEAST_LOAD, _MOST_LOAD = 0.0175, 0.1  # of the span
-_TYRES = (0.06, 0.125, 0.25)  # largest load of a tyre, of the span
+_GRIP_OF_LEAST = 3.2  # 1 + grip, from which on the least load grows with it
+_TYRES = (0.027, 0.057, 0.114)  # slip at which a tyre transmits its largest load, of the span
+_GRIP = 2.2  # where neither machine file nor mission shows it
+_DRIFT = 0.008  # least process noise of the speed [m/s/√s]
 _TRIAL_S = 60.0
 
 
-def joint_model(data: WheelsData, blocks: WheelBlocks) -> JointModel:
-    """Constants of all wheels' filters, on the ground or in the air by what explains the mission best."""
+def joint_model(data: WheelsData, blocks: WheelBlocks) -> tuple[JointModel, WheelBlocks]:
+    """Constants of all wheels' filters, on the ground or in the air by what explains the mission best.
+
+    Also the blocks as they are to be read: whether valves go on beyond the openings at which they were seen.
+    """
     model = JointModel(
         wheels=tuple(None if p is None else filter_model(data, i) for i, p in enumerate(data.plants)),
         flow=data.flow,
@@ -53,6 +59,8 @@ def filter_model(data: WheelsData, i: int) -> WheelFilterModel:
     load = plant.load
     if load is None:
         load = float(np.nan_to_num(slow_mismatch(residual, pair & ~data.quiet[:, i], data.dt)))
+    held = 1.0 + (plant.grip or 0.0)
+    least = _LEAST_LOAD * max(1.0, held / _GRIP_OF_LEAST)
     return WheelFilterModel(
         K=plant.K,
         tau=plant.tau,
@@ -60,25 +68,46 @@ def filter_model(data: WheelsData, i: int) -> WheelFilterModel:
         # noise within one rounding step leaves readings constant for a while: that proves nothing then
         constant_noise=max(rounding / 3, noise / 50) if noise > lsb and not data.habits[i].stepwise else noise,
         rounding=max(rounding, 1e-5 * data.span),
-        load=max(min(load, _MOST_LOAD * data.span), _LEAST_LOAD * data.span, 0.5 * noise),
+        load=max(min(load, _MOST_LOAD * held * data.span), least * data.span, 0.5 * noise),
         span=data.span,
         valve_span=0.15 if data.span < 1.5 * plant.K else 0.5 * data.span / plant.K,
         offset=plant.offset,
         measured=data.measured[i],
+        grip=_GRIP if plant.grip is None else plant.grip,
+        drift=max(_DRIFT, plant.wander or 0.0),
     )
 
 
-def _coupled(blocks: WheelBlocks, model: JointModel, data: WheelsData) -> JointModel:
-    """Tyres on the ground or wheels in the air: whichever explains a minute of driving best."""
-    if data.coupling == "free" or not np.isfinite(blocks.ratio).any():
-        return model
-    trials = [model.on_ground(share * data.span) for share in _TYRES]
-    if data.coupling != "ground":
-        trials.insert(0, model)
+def _coupled(blocks: WheelBlocks, model: JointModel, data: WheelsData) -> tuple[JointModel, WheelBlocks]:
+    """Tyres on the ground or wheels in the air, maps that end or go on: whichever explains a minute of driving best."""
+    trials = [model]
+    if data.coupling != "free" and np.isfinite(blocks.ratio).any():
+        trials = _on_ground(model, data)
     driven = np.flatnonzero(~blocks.quiet.all(axis=1))
     if not driven.size:
-        return trials[0]
+        return trials[0], blocks
+    middle = driven[driven.size // 2]
+    if len(trials) > 1:
+        trials = [max(trials, key=lambda trial: forward(_minute(blocks, middle), trial).evidence)]
+    beyond = np.flatnonzero(blocks.unseen.any(axis=1))
+    if beyond.size:
+        part = _minute(blocks, beyond[beyond.size // 2])
+        if forward(part.ending(), trials[0]).evidence > forward(part, trials[0]).evidence:
+            return trials[0], blocks.ending()
+    return trials[0], blocks
+
+
+def _on_ground(model: JointModel, data: WheelsData) -> list[JointModel]:
+    """Tyres that slide at several slips; also wheels in the air where nothing says that they stand on the ground."""
+    known = [p.grip for p in data.plants if p is not None and p.grip is not None]
+    if known and not any(known) and data.coupling != "ground":
+        return [model]
+    trials = [model.sliding_at(share * data.span) for share in _TYRES]
+    return trials if known or data.coupling == "ground" else [model, *trials]
+
+
+def _minute(blocks: WheelBlocks, middle: int) -> WheelBlocks:
+    """Blocks around `middle`."""
     length = round(_TRIAL_S / blocks.dt)
-    middle = int(np.clip(driven[driven.size // 2] - length // 2, 0, max(0, blocks.y.shape[0] - length)))
-    part = blocks.part(middle, middle + length)
-    return max(trials, key=lambda trial: forward(part, trial).evidence)
+    first = int(np.clip(middle - length // 2, 0, max(0, blocks.y.shape[0] - length)))
+    return blocks.part(first, first + length)

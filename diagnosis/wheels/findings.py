@@ -7,8 +7,11 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from diagnosis.channels.debounce import debounced
 from diagnosis.estimation.viterbi import first_lasting
 from diagnosis.results.assessment import Finding
+from diagnosis.wheels.blocks import per_sample
+from diagnosis.wheels.calibration import RunContext
 from diagnosis.wheels.isolation import Run, judge
 from diagnosis.wheels.models import HEALTHY, S_GAIN, S_NONE, S_STUCK, TOTAL_SENSOR, WheelFilterModel
 from diagnosis.wheels.onset import onset_sentence, refined, released
@@ -22,6 +25,36 @@ Array = NDArray[np.float64]
 
 _HOLD_S = 0.1
 _CONSTANT_S = 0.5  # a shorter time of one value may be a hold
+_ODD_S, _GAP_S = 0.5, 0.2
+
+
+@dataclass(frozen=True)
+class Surroundings:
+    """What a wheel's judgement is weighed by, beside its own path.
+
+    Attributes
+    ----------
+    misfit : float
+        What the wheels' plants leave of the speed in the windows that agree best [1].
+    given : bool
+        Whether the plant comes from the machine file.
+    opening : Array, shape (blocks,)
+        Mean effective opening [fraction].
+    usual : float
+        Its usual size where the wheel drives [fraction].
+    others : Array, shape (blocks,)
+        Other wheels that are taken to be faulty.
+    unseen, doubtful : NDArray[np.bool_], shape (blocks,)
+        Where the opening lies beyond what a healthy wheel was seen with, and where a steering angle is in doubt.
+    """
+
+    misfit: float
+    given: bool
+    opening: Array
+    usual: float
+    others: Array
+    unseen: NDArray[np.bool_]
+    doubtful: NDArray[np.bool_]
 
 
 @dataclass(frozen=True)
@@ -48,6 +81,10 @@ class WheelPath:
         Probability by the same that the wheel is not healthy.
     habit : NDArray[np.int8], shape (blocks,)
         As in `WheelBlocks`.
+    odd : NDArray[np.bool_], shape (blocks,)
+        Where a healthy wheel under an unusual load is most probable: what its valve does then stays open.
+    surroundings : Surroundings
+        What its judgement is weighed by besides.
     """
 
     y: Array
@@ -60,6 +97,8 @@ class WheelPath:
     raised: NDArray[np.bool_]
     fault: Array
     habit: NDArray[np.int8]
+    odd: NDArray[np.bool_]
+    surroundings: Surroundings
 
 
 @dataclass(frozen=True)
@@ -100,6 +139,8 @@ def findings_of(path: WheelPath, limits: Limits, *, gains: bool) -> WheelFinding
     y, runs, evidence = path.y, path.runs, path.evidence
     none = {side: np.zeros(y.size, dtype=np.bool_) for side in (Side.SENSOR, Side.ACTUATOR)}
     out = WheelFindings(opened=none, unexplained={side: at.copy() for side, at in none.items()})
+    odd = np.asarray(per_sample(path.odd, path.width, y.size))
+    out.opened[Side.ACTUATOR][debounced(odd, round(_GAP_S / path.dt), round(_ODD_S / path.dt))] = True
     for r in np.flatnonzero(runs.model != HEALTHY).tolist():
         start, stop = _edges(path, r)
         if stop <= start:
@@ -113,7 +154,13 @@ def findings_of(path: WheelPath, limits: Limits, *, gains: bool) -> WheelFinding
                     out.opened[side][start:stop] = True
                 continue
         run = Run(
-            start, stop, _constant(path, r, y[start:stop]), evidence.evidence[r], evidence.mean[r], evidence.cov[r]
+            start=start,
+            stop=stop,
+            model=_constant(path, r, y[start:stop]),
+            evidence=evidence.evidence[r],
+            mean=evidence.mean[r],
+            cov=evidence.cov[r],
+            context=_context(path, r, (stop - start) * path.dt),
         )
         verdict = judge(run, y[start:stop], path.model, limits, path.names, path.dt, gains=gains)
         for side in verdict.open_sides:
@@ -150,6 +197,27 @@ def _constant(path: WheelPath, r: int, y: Array) -> int:
 def _rests(path: WheelPath, r: int) -> bool:
     """Whether a stepwise sensor kept its value for longer than its kind does, in most of a run."""
     return bool(np.mean(path.habit[path.runs.start[r] : path.runs.stop[r]] == RESTS) > 0.5)
+
+
+def _context(path: WheelPath, r: int, seconds: float) -> RunContext:
+    """What is known of a run beside its evidence."""
+    runs, around = path.runs, path.surroundings
+    part = slice(int(runs.start[r]), max(int(runs.stop[r]), int(runs.start[r]) + 1))
+    u = around.opening[part]
+    return RunContext(
+        seconds=seconds,
+        misfit=around.misfit,
+        given=around.given,
+        load=path.model.load / (1 + path.model.grip) / path.model.span,
+        noise=path.model.noise / path.model.span,
+        grip=path.model.grip,
+        others=float(around.others[part].mean()),
+        unseen=float(around.unseen[part].mean()),
+        doubtful=float(around.doubtful[part].mean()),
+        changes=float(u.std() / max(around.usual, 1e-6)),
+        before=int(runs.model[r - 1]) if r > 0 else HEALTHY,
+        after=int(runs.model[r + 1]) if r + 1 < runs.model.size else HEALTHY,
+    )
 
 
 def _edges(path: WheelPath, r: int) -> tuple[int, int]:

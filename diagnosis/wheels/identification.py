@@ -12,8 +12,10 @@ from numpy.typing import NDArray
 
 from diagnosis.estimation.lag import low_passed
 from diagnosis.results.wheel_model import WheelModelFit
+from diagnosis.wheels.plant_identification import Drive, identify_plants
+from diagnosis.wheels.robust_fit import mode
 from replay.arrays.numeric import without_nan
-from replay.machine.config import WheelPlant
+from replay.machine.config import Machine, WheelPlant
 
 Array = NDArray[np.float64]
 
@@ -21,7 +23,38 @@ _TAUS = (0.02, 0.035, 0.05, 0.075, 0.1, 0.14, 0.19, 0.25, 0.32, 0.4, 0.5, 0.65, 
 _WINDOW_S = 2.0
 _MAX_SPREAD = 0.25
 _OWN_RANGE = 0.2
+_MOST_MISFIT = 0.04  # of the speed, left by the windows that agree best
 _LEAST_OWN = 6  # windows near the machine's gain that a wheel needs for its own
+
+
+def identified(drive: Drive, machine: Machine, given: dict[int, WheelPlant]) -> WheelModelFit | None:
+    """Plants with maps of valves, from all wheels together; None where they drive too little.
+
+    Parameters
+    ----------
+    drive : Drive
+        Block means of all wheels.
+    machine : Machine
+        Its top speed and coupling.
+    given : dict[int, WheelPlant]
+        Models from the machine file by wheel index; they are taken as they are.
+    """
+    found = identify_plants([drive], machine.max_speed, coupling=machine.plant.coupling)
+    if found is None or all(p is None for p in found.plants):
+        return None
+    plants = tuple(given.get(i, p) for i, p in enumerate(found.plants))
+    reliable = found.misfit <= _MOST_MISFIT
+    shown = ", ".join("–" if p is None else f"{p.K:.3g}" for p in plants)
+    first = next(p for p in found.plants if p is not None)
+    note = (
+        f"Wheel model identified in {found.windows} windows of 1 s: K = {shown} m/s per full opening where the machine "
+        f"works, τ = {first.tau:.2g} s, hysteresis {100 * first.hysteresis:.2g} %, "
+        + ("wheels free of the ground" if not first.grip else f"grip {first.grip:.2g}")
+        + f"; the better windows leave {100 * found.misfit:.1f} % of the speed unexplained, the median one "
+        f"{100 * found.typical:.1f} %"
+        + ("." if reliable else f": too uncertain to judge gains by (limit {100 * _MOST_MISFIT:.0f} %).")
+    )
+    return WheelModelFit(plants, found.misfit, found.windows, reliable, note)
 
 
 def identify(
@@ -127,17 +160,6 @@ def _identify(y: Array, u: Array, moving: NDArray[np.bool_], dt: float, given: d
         + ("." if reliable else f": too uncertain to judge gains by (limit {100 * _MAX_SPREAD:.0f} %).")
     )
     return WheelModelFit(tuple(plants), spread, int(pooled.size), reliable, note, any(i not in given for i in wheels))
-
-
-def mode(values: Array) -> float:
-    """Half-sample mode: the densest half, over and over, until a few values are left; their median."""
-    x = np.sort(values)
-    while x.size > 4:
-        half = (x.size + 1) // 2
-        widths = x[half - 1 :] - x[: x.size - half + 1]
-        k = int(np.argmin(widths))
-        x = x[k : k + half]
-    return float(np.median(x))
 
 
 def _windowed(y: Array, p: Array, moving: NDArray[np.bool_], length: int) -> tuple[Array, Array]:

@@ -16,9 +16,11 @@ from diagnosis.channels.sample_status import sample_status
 from diagnosis.estimation.lag import low_passed_on
 from diagnosis.results.wheel_model import WheelModelFit
 from diagnosis.wheels.blocks import block_width
-from diagnosis.wheels.identification import demand, identify
+from diagnosis.wheels.identification import demand, identified, identify
 from diagnosis.wheels.parity import slipping
+from diagnosis.wheels.plant_identification import Drive
 from diagnosis.wheels.readings import SpeedNoise, habits_of, news, speed_noises
+from diagnosis.wheels.valve_map import effective
 from replay.arrays.blocks import release
 from replay.arrays.column_store import ColumnStore
 from replay.arrays.numeric import without_nan
@@ -115,6 +117,12 @@ class WheelsData:
         How each speed sensor is updated.
     dt : float
         Step [s].
+    misfit : float
+        What the plants leave of the speed in the windows that agree best [1].
+    given : Sequence[bool]
+        Whether a wheel's plant comes from the machine file.
+    doubtful : NDArray[np.bool_], shape (n, axles)
+        Where a steering angle is in doubt.
     store : ColumnStore
         Where long columns stand.
     """
@@ -136,17 +144,15 @@ class WheelsData:
     coupling: str
     habits: Sequence[Habit]
     dt: float
+    misfit: float
+    given: Sequence[bool]
+    doubtful: NDArray[np.bool_]
     store: ColumnStore = field(default_factory=ColumnStore, repr=False)
 
     @cached_property
     def speed_noises(self) -> list[SpeedNoise | None]:
         """Noise of each speed sensor where it depends on the speed."""
         return speed_noises(self.y, self.status, self.habits, self.dt)
-
-    @property
-    def dead(self) -> Array:
-        """Dead zone of each valve [fraction], shape (wheels,)."""
-        return np.array([0.0 if p is None else p.dead for p in self.plants])
 
 
 def wheel_channels(timeline: Timeline, machine: Machine) -> WheelChannels:
@@ -157,11 +163,25 @@ def wheel_channels(timeline: Timeline, machine: Machine) -> WheelChannels:
     return WheelChannels(v, u, true, applied, timeline.store)
 
 
-def wheel_fit(channels: WheelChannels, replay: Replay, timeline: Timeline, machine: Machine) -> WheelModelFit | None:
-    """Wheel models of the machine file, or identified in this mission; None where nothing allows it."""
+def wheel_fit(
+    channels: WheelChannels, replay: Replay, timeline: Timeline, machine: Machine, angle: Array
+) -> WheelModelFit | None:
+    """Wheel models of the machine file, or identified in this mission; None where nothing allows it.
+
+    Parameters
+    ----------
+    channels, replay, timeline, machine
+        The mission.
+    angle : Array, shape (n, axles)
+        Best estimate of the axles' angles [rad].
+    """
     if not (any_finite(channels.opening).any() and any_finite(channels.speed).any()):
         return None
     given = {i: p for i, w in enumerate(machine.wheels) if (p := machine.plant.wheels.get(w)) is not None}
+    if len(given) < len(machine.wheels):
+        found = identified(wheel_drive(channels, replay, timeline, machine, angle), machine, given)
+        if found is not None:
+            return found
     width = min(block_width(timeline.dt), timeline.size)
     limit = machine.limits.driving_speed
 
@@ -185,6 +205,44 @@ def wheel_fit(channels: WheelChannels, replay: Replay, timeline: Timeline, machi
     )
 
 
+def wheel_drive(channels: WheelChannels, replay: Replay, timeline: Timeline, machine: Machine, angle: Array) -> Drive:
+    """Block means of all wheels for `diagnosis.wheels.plant_identification`; parameters as in `wheel_fit`."""
+    width = min(block_width(timeline.dt), timeline.size)
+    limit = machine.limits.driving_speed
+    ratio, turn = _in_motion(angle, machine, timeline)
+
+    def mean(function: Callable[..., NDArray[Any]], *columns: Array) -> Array:
+        out = []
+        for part in timeline.store.blocks(timeline.size // width * width, width):
+            x = np.asarray(function(*(c[part] for c in columns)), np.float64)
+            out.append(x.reshape(-1, width, x.shape[1]).mean(axis=1))
+            release(*columns)
+        return np.concatenate(out)
+
+    moving = mean(lambda ref, v: np.abs(np.where(np.isfinite(ref), ref, v)) > limit, replay.v_ref, channels.speed)
+    y = mean(np.asarray, channels.speed)
+    return Drive(
+        y=y,
+        u=mean(np.asarray, channels.opening),
+        body=body_speeds(y, mean(np.asarray, ratio), mean(np.asarray, turn)),
+        moving=np.asarray(moving > 0.5),
+        dt=timeline.dt * width,
+    )
+
+
+def body_speeds(y: Array, ratio: Array, turn: Array) -> Array:
+    """Speed at which each wheel would roll by the median of the other wheels [m/s], shape (n, wheels)."""
+    with np.errstate(invalid="ignore", divide="ignore"):
+        speed = (y + turn) / ratio
+    out = np.full(y.shape, np.nan)
+    for i in range(y.shape[1]):
+        others = np.delete(speed, i, axis=1)
+        known = np.isfinite(others).all(axis=1)
+        if others.shape[1] and known.any():
+            out[known, i] = np.median(others[known], axis=1) * ratio[known, i] - turn[known, i]
+    return out
+
+
 def slip_of(
     timeline: Timeline, replay: Replay, machine: Machine, v: Array, angle: Array, doubtful: NDArray[np.bool_]
 ) -> NDArray[np.bool_]:
@@ -206,6 +264,7 @@ def wheels_data(
     fit: WheelModelFit,
     counts: dict[str, NDArray[np.int16]],
     angle: Array,
+    doubtful: NDArray[np.bool_],
     slip: NDArray[np.bool_],
 ) -> WheelsData:
     """Channels for the wheel models.
@@ -220,10 +279,13 @@ def wheels_data(
         From `diagnosis.channels.liveness.alive_sources`.
     angle : Array, shape (n, axles)
         Best estimate of the axles' angles [rad].
+    doubtful : NDArray[np.bool_], shape (n, axles)
+        Where it rests on a model or on a sensor in doubt.
     slip : NDArray[np.bool_], shape (n, wheels)
         Where a wheel breaks the parity of the body.
     """
     y, u, dt = channels.speed, channels.opening, timeline.dt
+    given = [machine.plant.wheels.get(w) is not None for w in machine.wheels]
     names = channels.names(machine.wheels)
     status = np.zeros(y.shape, dtype=np.int8)
     quiet = np.ones(y.shape, dtype=np.bool_)
@@ -260,8 +322,16 @@ def wheels_data(
         coupling=machine.plant.coupling,
         habits=habits,
         dt=dt,
+        misfit=fit.spread if not all(given) else max(_share(p, machine.max_speed) for p in fit.plants),
+        given=given,
+        doubtful=doubtful,
         store=timeline.store,
     )
+
+
+def _share(plant: WheelPlant | None, top: float) -> float:
+    """Load of a wheel as its tyre passes it on, as a share of the top speed."""
+    return 0.0 if plant is None else (plant.load or 0.0) / (1.0 + (plant.grip or 0.0)) / top
 
 
 def _apart(
@@ -270,15 +340,18 @@ def _apart(
     """Speed beyond what the opening drives [m/s], and where the wheel is neither commanded nor driven."""
 
     def apart(
-        state: float | None, y: Array, u: Array, v_ref: Array
-    ) -> tuple[tuple[Array, NDArray[np.bool_]], float | None]:
-        beyond = np.sign(u) * np.maximum(np.abs(u) - plant.dead, 0.0)
-        asked = np.abs(plant.K * without_nan(beyond))
+        state: tuple[float | None, float | None], y: Array, u: Array, v_ref: Array
+    ) -> tuple[tuple[Array, NDArray[np.bool_]], tuple[float | None, float | None]]:
+        """The state is the lagged opening [fraction], and where the spool stands."""
+        lagged, held = state
+        beyond, _, held = effective(u, plant, held)
+        asked = np.abs(plant.K * beyond)
         quiet = (np.abs(without_nan(v_ref)) < limit) & (asked < limit)
-        driven, state = low_passed_on(beyond, plant.tau, timeline.dt, state)
-        return (y - plant.K * driven - plant.offset, quiet), state
+        driven, lagged = low_passed_on(beyond, plant.tau, timeline.dt, lagged)
+        return (y - plant.K * driven - plant.offset, quiet), (lagged, held)
 
-    (residual, quiet), _ = timeline.scan(apart, None, y, u, v_ref)
+    start: tuple[float | None, float | None] = (None, None)
+    (residual, quiet), _ = timeline.scan(apart, start, y, u, v_ref)
     return residual, quiet
 
 

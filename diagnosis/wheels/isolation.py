@@ -11,6 +11,7 @@ from diagnosis.results.assessment import Finding
 from diagnosis.results.fault_rows import mode_words
 from diagnosis.results.result import Hypothesis
 from diagnosis.results.vocabulary import Kind, Tier, part_name
+from diagnosis.wheels.calibration import RunContext, calibrated
 from diagnosis.wheels.estimates import estimate
 from diagnosis.wheels.models import (
     A_BIAS,
@@ -18,7 +19,7 @@ from diagnosis.wheels.models import (
     A_NONE,
     A_STUCK,
     HEALTHY,
-    MODELS,
+    ODD,
     ROW_OF_MODEL,
     S_GAIN,
     S_NONE,
@@ -35,16 +36,12 @@ from replay.machine.config import Limits
 
 Array = NDArray[np.float64]
 
-_TEMPER = 0.1
-_PRIOR = np.log(np.where(np.arange(MODELS) == HEALTHY, 0.6, 0.4 / (MODELS - 1)))
+_ODD_COST = 2.0  # by which an unusual load must explain more than the usual one
 _SIDES = (Side.SENSOR, Side.ACTUATOR)
-_PATH_SHARE = 0.5  # of the most probable row's probability, from which on the path's row is stated
 _WEAK_GAIN = 0.35  # a sensor's gain below this hides what the valve does
-_LEAST_DISTURBANCE_S = 2.0  # shorter ones are what the model gets wrong while a wheel recovers
-_STEEP, _HALF = 1.2, 5.9  # calibrated on tuning seeds: half of the valve findings with exp(5.9) are right
-_NOISY_EVIDENCE, _LEAST_NOISE_S = 500.0, 1.0  # per second; seconds
-_USUAL = 0.25
-_LEAST_TRUST, _NO_TRUST = 0.5, 0.05  # a finding is stated from the first on; below the second it leaves nothing open
+_LEAST_DISTURBANCE_S = 1.0  # shorter ones are what the model gets wrong while a wheel recovers
+_USUAL = 0.75  # probability of a healthy wheel above which a run leaves nothing unexplained
+_LEAST_SIDE, _LEAST_ROW = 0.7, 0.4  # probabilities of a side and of its row from which on a finding is stated
 _LEAST_PART = 0.02  # a hypothesis below this is left out of the text
 _LEAST_HYPOTHESIS = 5e-4
 #: Models that need no model of the wheel: a sensor that is constant, silent or has white noise.
@@ -63,6 +60,8 @@ class Run:
         Log-likelihoods; −inf where a model is not considered.
     mean, cov : Array, shape (models, 4) and (models, 4, 4)
         States at its end.
+    context : RunContext
+        What else is known of it.
     """
 
     start: int
@@ -71,10 +70,11 @@ class Run:
     evidence: Array
     mean: Array
     cov: Array
+    context: RunContext
 
     def ahead(self, m: int) -> float:
-        """Log-evidence of model m against a healthy wheel."""
-        return float(self.evidence[m] - self.evidence[HEALTHY])
+        """Log-evidence of model m against a healthy wheel, also one under an unusual load."""
+        return float(self.evidence[m] - max(self.evidence[HEALTHY], self.evidence[ODD] - _ODD_COST))
 
 
 @dataclass(frozen=True)
@@ -106,21 +106,6 @@ class _Weighed:
     row: Row
 
 
-def probabilities(run: Run) -> dict[Row | None, float]:
-    """Probability of every row; several models of one row add up.
-
-    The models' errors are no white noise, so that their log-likelihoods count for a tenth (calibrated on simulated
-    missions by `tests/benchmarks/accuracy.py`).
-    """
-    weight = _PRIOR + np.clip(_TEMPER * (run.evidence - run.evidence.max()), -700.0, 0.0)
-    p = np.exp(weight - weight.max())
-    p /= p.sum()
-    out: dict[Row | None, float] = {}
-    for row, q in zip(ROW_OF_MODEL, p, strict=True):
-        out[row] = out.get(row, 0.0) + float(q)
-    return out
-
-
 def judge(
     run: Run,
     y: Array,
@@ -147,70 +132,57 @@ def judge(
         Whether the wheel model is good enough to judge gains and the valve by.
     """
     known, seconds = y[np.isfinite(y)], (run.stop - run.start) * dt
-    weighed = _weighed(run, known, model, limits)
+    weighed = _weighed(run, known, model)
     side = weighed.row[0]
     open_sides = tuple(s for s in _SIDES if weighed.faulty[s] > 1 - limits.min_probability)
-    chance = _chance(max(run.ahead(m) for m, row in enumerate(ROW_OF_MODEL) if row is not None and row[0] is side))
-    if side is Side.ACTUATOR and chance < _NO_TRUST:
-        return RunVerdict(None, tuple(s for s in open_sides if s is not side))
-    usual = side is Side.ACTUATOR and chance < _USUAL
-    stated = _stated(weighed, limits)
+    usual = weighed.pooled[None] > _USUAL
+    stated = _stated(weighed)
     if stated is None:
         return RunVerdict(None, open_sides, usual)
-    m, supported = _models_of(run, weighed.row)
+    m, _ = _models_of(run, weighed.row)
     if not gains and m not in _WITHOUT_PLANT:
         return RunVerdict(None, _SIDES)
-    trust = _trust(run, supported, seconds)
-    if trust < _LEAST_TRUST:
-        return RunVerdict(None, tuple({*open_sides, side}), usual)
     epsilon, sat = estimate(m, known, run.mean[m], run.cov[m], model)
     if epsilon is not None and m in (S_GAIN, A_GAIN) and epsilon.value < limits.min_epsilon:
         return RunVerdict(None)
     if m == A_BIAS and (seconds < _LEAST_DISTURBANCE_S or (epsilon is not None and epsilon.high < 0)):
         return RunVerdict(None, (*open_sides, Side.ACTUATOR), usual)  # the model's own error, or nothing that is lost
-    ranked = _trusted(weighed.ranked, trust)
     finding = Finding(
         start=run.start,
         stop=run.stop,
         side=stated[0],
         mode=weighed.row[1],
-        probability=min(1.0, stated[1] * trust),
-        hypotheses=tuple(Hypothesis(*_names(row), q) for row, q in ranked if q >= _LEAST_HYPOTHESIS),
+        probability=min(1.0, stated[1]),
+        hypotheses=tuple(Hypothesis(*_names(row), q) for row, q in weighed.ranked if q >= _LEAST_HYPOTHESIS),
         epsilon=epsilon,
         sat=sat,
-        evidence=_sentences(run, m, (stated[0], weighed.row), known, ranked, names, seconds),
+        evidence=_sentences(run, m, (stated[0], weighed.row), known, weighed.ranked, names, seconds),
         tier=Tier.SIGNAL if m in TOTAL_SENSOR else Tier.MODEL,
     )
     return RunVerdict(finding, _left_open(open_sides, side, m, run))
 
 
-def _weighed(run: Run, y: Array, model: WheelFilterModel, limits: Limits) -> _Weighed:
+def _weighed(run: Run, y: Array, model: WheelFilterModel) -> _Weighed:
     """Rows of a run by their probability; rows that the data cannot tell apart are one."""
-    pooled = probabilities(run)
+    pooled = calibrated(run.model, run.evidence, run.context)
     silent = y.size == 0 or abs(float(np.mean(y))) <= 3 * model.rounding
     if silent and run.model in TOTAL_SENSOR:  # stuck at zero and no signal are one row of the table
         pooled[Side.SENSOR, FaultMode.NO_SIGNAL] += pooled.pop((Side.SENSOR, FaultMode.STUCK))
-    drained = float(run.mean[A_STUCK, 3]) / model.K
-    if abs(drained) < max(limits.min_sat, 1.5 * model.load / model.K):  # stuck shut is no control signal
-        pooled[Side.ACTUATOR, FaultMode.NO_SIGNAL] += pooled.pop((Side.ACTUATOR, FaultMode.STUCK))
     ranked = sorted(pooled.items(), key=lambda item: -item[1])
     faulty = {side: sum(p for row, p in ranked if row is not None and row[0] is side) for side in _SIDES}
     side = max(_SIDES, key=lambda s: faulty[s])
     row = next(row for row, _ in ranked if row is not None and row[0] is side)
-    own = ROW_OF_MODEL[run.model]
-    if own is not None and own[0] is side and pooled.get(own, 0.0) > _PATH_SHARE * pooled[row]:
-        row = own  # the path knows what came before and after
     return _Weighed(pooled, ranked, faulty, row)
 
 
-def _stated(weighed: _Weighed, limits: Limits) -> tuple[Side, float] | None:
+def _stated(weighed: _Weighed) -> tuple[Side, float] | None:
     """Side that is stated, which is the union for a loss of gain of either, and its probability; None: too uncertain."""
     (side, mode), probability = weighed.row, weighed.pooled[weighed.row]
-    if weighed.faulty[side] >= limits.min_probability:
+    if weighed.faulty[side] >= _LEAST_SIDE and probability >= _LEAST_ROW:
         return side, probability
     other = Side.ACTUATOR if side is Side.SENSOR else Side.SENSOR
     both = probability + weighed.pooled.get((other, mode), 0.0)
-    if mode is not FaultMode.INEFFICIENT or both < limits.min_probability:
+    if mode is not FaultMode.INEFFICIENT or both < _LEAST_SIDE:
         return None
     return Side.SENSOR_OR_ACTUATOR, both
 
@@ -225,34 +197,9 @@ def _models_of(run: Run, row: Row) -> tuple[int, int]:
     return m, m
 
 
-def _trusted(ranked: Ranking, trust: float) -> Ranking:
-    """Rows by their probability, if the finding is a fault at all with probability `trust`."""
-    shared = [(row, p * trust + (1 - trust if row is None else 0.0)) for row, p in ranked]
-    return sorted(shared, key=lambda item: -item[1])
-
-
 def _names(row: Row | None) -> tuple[str, str]:
     """Side and mode of a row as a hypothesis names them."""
     return ("none", "healthy") if row is None else (row[0].value, row[1].value)
-
-
-def _trust(run: Run, m: int, seconds: float) -> float:
-    """Share of findings with this much evidence that are faults at all, on simulated missions with many faults.
-
-    A wheel that recovers, a tyre that slips or a wrong share of the pump's flow may speak against a healthy wheel too,
-    with hundreds of units of log-evidence; a loss of a sensor's gain, its silence or constancy are never their work.
-    """
-    ahead = run.ahead(m)
-    if m >= A_GAIN:
-        return _chance(ahead)
-    if m >= S_WHITE_3:  # what a recovering wheel does may look like a second of noise
-        return 1.0 if ahead > _NOISY_EVIDENCE * seconds and seconds > _LEAST_NOISE_S else 0.4
-    return 1.0
-
-
-def _chance(ahead: float) -> float:
-    """The same for valves by their log-evidence against a healthy wheel."""
-    return float(1 / (1 + np.exp(-_STEEP * (np.log(max(ahead, 1.0)) - _HALF))))
 
 
 def _left_open(open_sides: tuple[Side, ...], side: Side, m: int, run: Run) -> tuple[Side, ...]:

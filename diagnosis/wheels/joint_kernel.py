@@ -23,6 +23,7 @@ from diagnosis.wheels.models import (
     A_STUCK,
     HEALTHY,
     MODELS,
+    ODD,
     S_GAIN,
     S_NONE,
     S_OU_LARGE,
@@ -36,6 +37,7 @@ Array = NDArray[np.float64]
 
 _RECOVERY = 14.0  # minus the log-probability that a fault ends in one block
 _LEARNING = 6.0  # by which a model with unknowns must beat the entry's cost
+_OTHER_LOAD = 9.0  # minus the log-probability that an unusual load begins or ends in one block
 _OTHER_NOISE = 4.0  # the same for noise of another strength
 
 #: Columns of `JointOutput.inputs`: fields of `WheelInput`, and the log-likelihood of the block.
@@ -67,6 +69,7 @@ class JointInput(NamedTuple):
     habit: NDArray[np.int8]
     chatter: Array
     wander: Array
+    unseen: Array  # by how much faster a valve may drive its wheel than anyone has seen [m/s]
     ratio: Array  # speed of the wheel per speed of the body [1]
     turn: Array  # what it rolls less because it steers [m/s]
     status: NDArray[np.int8]
@@ -147,6 +150,8 @@ def _trust_in(m: int) -> float:
         return 0.7
     if m == S_GAIN:
         return 0.4
+    if m == ODD:
+        return 0.7
     return 1.0 if m == HEALTHY else 0.15
 
 
@@ -251,9 +256,11 @@ def _enter_models(
         if m == top:
             continue
         price = cost if m != HEALTHY else _RECOVERY
+        if m == ODD or (m == HEALTHY and top == ODD):
+            price = _OTHER_LOAD
         if m >= S_WHITE_3 and m <= S_OU_LARGE and top >= S_WHITE_3 and top <= S_OU_LARGE:
             price = _OTHER_NOISE
-        learning = 0.0 if m == HEALTHY or m == S_NONE or m == A_NONE else _LEARNING
+        learning = 0.0 if m <= ODD or m == S_NONE or m == A_NONE else _LEARNING
         if score[top] - price - learning > score[m]:
             score[m] = score[top] - price
             back[m] = top
@@ -273,7 +280,8 @@ def _rank(models: int, score: Array, gain: Array) -> tuple[int, float, float]:
         if score[m] > score[lead]:
             lead = m
         total += np.exp(max(score[m], -600.0))
-    return lead, 1.0 - np.exp(max(score[HEALTHY], -600.0)) / total, most
+    sound = np.exp(max(score[HEALTHY], -600.0)) + np.exp(max(score[ODD], -600.0))
+    return lead, 1.0 - sound / total, most
 
 
 @njit(cache=True, error_model="numpy")
@@ -315,6 +323,7 @@ def scan_wheels(
                 wander=blocks.wander[n, i],
                 body=body,
                 doubt=doubt,
+                unseen=blocks.unseen[n, i],
             )
             if status != SKIP:
                 _enter_models(models, work.top[i], constants.cost, k, score[i], z[i], P[i], back[n, i])

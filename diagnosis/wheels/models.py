@@ -16,12 +16,14 @@ from replay.faults import FaultMode, Side
 #: A row of the paper's tables; None stands for a healthy wheel.
 Row = tuple[Side, FaultMode]
 
-HEALTHY, S_STUCK, S_NONE, S_GAIN, S_WHITE_3, S_WHITE_8, S_WHITE_24, S_OU_SMALL, S_OU_LARGE = range(9)
-A_GAIN, A_STUCK, A_NONE, A_BIAS = range(9, 13)
-MODELS = 13
+#: `ODD` is a healthy wheel under a load that the wheel's usual one does not explain: no row, and nothing is stated of it.
+HEALTHY, ODD, S_STUCK, S_NONE, S_GAIN, S_WHITE_3, S_WHITE_8, S_WHITE_24, S_OU_SMALL, S_OU_LARGE = range(10)
+A_GAIN, A_STUCK, A_NONE, A_BIAS = range(10, 14)
+MODELS = 14
 
 #: Row of each model, by the model's code.
 ROW_OF_MODEL: tuple[Row | None, ...] = (
+    None,
     None,
     (Side.SENSOR, FaultMode.STUCK),
     (Side.SENSOR, FaultMode.NO_SIGNAL),
@@ -41,6 +43,7 @@ TOTAL_SENSOR = (S_STUCK, S_NONE)
 #: Models of a sensor with noise, the weakest white one first.
 NOISY_SENSOR = tuple(range(S_WHITE_3, S_OU_LARGE + 1))
 
+ODD_LOAD = 4.0  # times the usual load
 DISTURBED_S = 0.8  # correlation time of a valve's disturbance [s]
 COLOURED_S = 0.05  # correlation time of a coloured sensor noise [s]
 
@@ -99,6 +102,8 @@ class WheelFilterModel:
         Constant load, as a speed [m/s].
     measured : bool
         Whether the opening is the measured one, so that the valve is judged elsewhere.
+    drift : float
+        What the model gets wrong from block to block [m/s/√s].
     """
 
     K: float
@@ -113,9 +118,9 @@ class WheelFilterModel:
     grip_most: float = 0.0
     offset: float = 0.0
     measured: bool = False
+    drift: float = 0.008
 
     load_s = 6.0  # correlation time of the load [s]
-    drift = 0.008  # process noise of the speed [m/s/√s]
 
     @property
     def models(self) -> int:
@@ -165,6 +170,8 @@ class JointModel:
     flow: float
     switch_cost: float
 
-    def on_ground(self, grip_most: float) -> JointModel:
-        """The same with tyres that transmit `grip_most` [m/s]."""
-        return replace(self, wheels=tuple(None if w is None else replace(w, grip_most=grip_most) for w in self.wheels))
+    def sliding_at(self, slip: float) -> JointModel:
+        """The same with tyres that transmit no more than their force at `slip` [m/s]."""
+        return replace(
+            self, wheels=tuple(None if w is None else replace(w, grip_most=w.grip * slip) for w in self.wheels)
+        )

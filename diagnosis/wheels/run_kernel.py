@@ -38,6 +38,7 @@ class RunInput(NamedTuple):
     habit: NDArray[np.int8]
     chatter: Array
     wander: Array
+    unseen: Array
     inputs: Array  # (n, 8) as in `JointOutput`
     status: NDArray[np.int8]
     quiet: NDArray[np.bool_]
@@ -110,6 +111,7 @@ def _scan_runs(
                 wander=blocks.wander[n],
                 body=x[BODY],
                 doubt=x[DOUBT],
+                unseen=blocks.unseen[n],
             )
             predict(HEALTHY, block, k, free_z, free_P)
             out.expected[n], out.spread[n] = free_z[HEALTHY, 0], free_P[HEALTHY, 0, 0]
@@ -159,6 +161,7 @@ def evidence_of_runs(blocks: WheelBlocks, model: JointModel, done: JointPass, wh
         habit=np.ascontiguousarray(blocks.habit[:, wheel]),
         chatter=blocks.unsteady[:, wheel] * per_opening[0],
         wander=np.ascontiguousarray(blocks.wander(per_opening)[:, wheel]),
+        unseen=(own.K if blocks.ended else 0.0) * blocks.unseen[:, wheel],
         inputs=np.ascontiguousarray(done.inputs[:, wheel]),
         status=np.ascontiguousarray(blocks.status[:, wheel]),
         quiet=np.ascontiguousarray(blocks.quiet[:, wheel]),

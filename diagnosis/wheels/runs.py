@@ -13,6 +13,7 @@ from diagnosis.wheels.models import (
     A_STUCK,
     HEALTHY,
     NOISY_SENSOR,
+    ODD,
     S_GAIN,
     S_STUCK,
     S_WHITE_8,
@@ -71,6 +72,7 @@ def runs_of(
     Runs
         In order of time; they leave no gap.
     """
+    path = np.where(path == ODD, HEALTHY, path)
     kinds = np.where(np.isin(path, NOISY_SENSOR), S_WHITE_8, path)
     anew = entered & np.isin(path, (S_STUCK, S_GAIN, A_GAIN, A_STUCK))
     cut = np.flatnonzero(np.r_[True, (kinds[1:] != kinds[:-1]) | anew[1:]])

@@ -21,6 +21,8 @@ from diagnosis.wheels.models import (
     A_STUCK,
     COLOURED_S,
     HEALTHY,
+    ODD,
+    ODD_LOAD,
     S_GAIN,
     S_NONE,
     S_OU_LARGE,
@@ -63,6 +65,7 @@ class WheelInput(NamedTuple):
     wander: float  # the same, where the log is too slow to sum them up [m/s]
     body: float  # speed at which this wheel would roll without slip [m/s]; NaN where unknown
     doubt: float  # its uncertainty [m/s]
+    unseen: float  # by how much faster its valve may drive it than anyone has seen [m/s]
 
 
 @njit(cache=True, error_model="numpy")
@@ -82,7 +85,11 @@ def enter(m: int, old: int, k: WheelConstants, z: Array, P: Array) -> None:
         v = v / g
     elif old == S_STUCK or old == S_NONE:
         var += (0.05 * k.span) ** 2  # the model alone has carried the speed
-    if old != HEALTHY:
+    if old == ODD:
+        x *= ODD_LOAD
+    if m == ODD:
+        x /= ODD_LOAD
+    elif old > ODD:
         x_var = max(x_var, 0.5)
     z[m, :] = 0.0
     P[m, :, :] = 0.0
@@ -149,7 +156,10 @@ def _tyre(m: int, q: WheelInput, k: WheelConstants, z: Array) -> tuple[float, fl
             add = k.grip * q.body
     add += k.offset
     doubt = min(k.grip * q.doubt, k.grip_most)
-    s = np.sqrt(k.load**2 + (0.3 * held) ** 2 + doubt**2)
+    load = k.load * ODD_LOAD if m == ODD else k.load
+    s = np.sqrt(load**2 + (0.3 * held) ** 2 + doubt**2)
+    if (q.y - z[m, 0]) * q.unseen > 0.0:  # where no healthy wheel was seen, it may be faster, not slower
+        s = np.hypot(s, q.unseen)
     if held < 0.0:
         s = -s
     return a, b, add, s

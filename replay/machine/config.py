@@ -14,11 +14,13 @@ from replay.log.source_options import SignalSource, SourceOptions
 from replay.machine.axle_plant import AxlePlant
 from replay.machine.drive_model import DriveModel
 from replay.machine.geometry import Geometry, four_wheel_geometry
+from replay.machine.plant import Coupling as Coupling
+from replay.machine.plant import Plant as Plant
+from replay.machine.plant import WheelPlant as WheelPlant
 from replay.machine.signal_table import names_of, signal_of
 
 Law = Literal["auto", "signed", "opposed", "printed", "sign_abs", "none"]
 PsiMode = Literal["auto", "printed", "implied", "event_reset", "forced"]
-Coupling = Literal["auto", "free", "ground"]
 PhiDot = Literal["command", "measured", "zero"]
 
 LAWS: tuple[str, ...] = ("auto", "signed", "opposed", "printed", "sign_abs", "none")
@@ -82,80 +84,6 @@ class Control:
         check_range("control.k_ps", self.k_ps, 1e-6, 1e4, "1/rad")
         check_range("control.u_max", self.u_max, 1e-6, 1e6, "of full opening")
         check_range("control.phi_dot_hz", self.phi_dot_hz, 0.01, 1e3, "Hz")
-
-
-@dataclass(frozen=True)
-class WheelPlant:
-    """Wheel model τ v̇ = −v + K·sgn(u)·max(|u| − dead, 0) + offset of one wheel.
-
-    Attributes
-    ----------
-    K : float
-        Speed per full opening [m/s].
-    tau : float
-        Lag [s].
-    load : float or None
-        Standard deviation of load and model error in healthy driving, as a speed [m/s]; None where not known.
-    K_std, tau_std, load_std : float or None
-        Standard deviations, same units; None where not known.
-    dead : float
-        Opening that static friction takes, which gives no speed [fraction].
-    dead_std : float or None
-        Its standard deviation [fraction].
-    offset : float
-        Constant load as a speed [m/s].
-    offset_std : float or None
-        Its standard deviation [m/s].
-    """
-
-    K: float
-    tau: float
-    load: float | None = None
-    K_std: float | None = None
-    tau_std: float | None = None
-    load_std: float | None = None
-    dead: float = 0.0
-    dead_std: float | None = None
-    offset: float = 0.0
-    offset_std: float | None = None
-
-    def __post_init__(self) -> None:
-        """Check values."""
-        check_range("plant.K", self.K, 1e-9, 1e9, "m/s per full opening")
-        check_range("plant.tau", self.tau, 1e-4, 60.0, "s")
-        check_range("plant.dead", self.dead, 0.0, 1e6, "of full opening")
-        check_range("plant.offset", self.offset, -1e6, 1e6, "m/s")
-        spreads = (("load", "m/s"), ("K_std", "m/s"), ("tau_std", "s"), ("load_std", "m/s"), ("dead_std", ""))
-        for name, unit in (*spreads, ("offset_std", "m/s")):
-            value = getattr(self, name)
-            if value is not None:
-                check_range(f"plant.{name}", value, 0.0, 1e9, unit)
-
-
-@dataclass(frozen=True)
-class Plant:
-    """What is known of the wheels before the mission.
-
-    Attributes
-    ----------
-    coupling : str
-        ``free`` (wheels off the ground), ``ground``, or ``auto``.
-    flow : float or None
-        Sum of all wheels' speeds that the pump can feed [m/s]; None where every wheel has its own supply.
-    wheels : Mapping[str, WheelPlant]
-        Wheel models by name.
-    """
-
-    coupling: Coupling = "auto"
-    flow: float | None = None
-    wheels: Mapping[str, WheelPlant] = field(default_factory=dict)
-
-    def __post_init__(self) -> None:
-        """Check values."""
-        if self.coupling not in ("auto", "free", "ground"):
-            raise ConfigError(f"plant.coupling = {self.coupling!r} is not known; expected auto, free or ground")
-        if self.flow is not None:
-            check_range("plant.flow", self.flow, 1e-6, 1e6, "m/s, summed over the wheels")
 
 
 @dataclass(frozen=True)

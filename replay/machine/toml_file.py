@@ -197,7 +197,11 @@ def _build(kind: type[_T], section: str, value: Any, rename: Mapping[str, str] |
     for name, item in ((rename.get(k, k), v) for k, v in table.items()):
         kind_text = str(fields[name].type)
         key = f"{section}.{shown[name]}"
-        if "float" in kind_text:
+        if kind_text.startswith("tuple[float"):
+            if not isinstance(item, list):
+                raise ConfigError(f"{key} = {item!r} must be a list of numbers")
+            out[name] = tuple(_number(key, x) for x in item)
+        elif "float" in kind_text:
             out[name] = _number(key, item)
         elif kind_text == "bool":
             if not isinstance(item, bool):
@@ -259,11 +263,22 @@ def _table(item: Any, rename: Mapping[str, str] | None = None) -> list[str]:
     out = []
     for f in dataclasses.fields(item):
         value, default = getattr(item, f.name), f.default
-        if value is None or (isinstance(item, SignalSource) and value == default):
+        if (
+            value is None
+            or (isinstance(value, tuple) and not value)
+            or (isinstance(item, SignalSource) and value == default)
+        ):
             continue
-        text = (
-            _text(value) if isinstance(value, str) else str(value).lower() if isinstance(value, bool) else _real(value)
-        )
+        if isinstance(value, tuple):
+            text = _inline(list(value))
+        else:
+            text = (
+                _text(value)
+                if isinstance(value, str)
+                else str(value).lower()
+                if isinstance(value, bool)
+                else _real(value)
+            )
         out.append(f"{(rename or {}).get(f.name, f.name)} = {text}")
     return out
 

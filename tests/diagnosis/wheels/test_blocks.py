@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from itertools import pairwise
 from typing import Any
 
@@ -11,6 +12,8 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from diagnosis.channels.sample_status import PAIR, SILENT, SKIP
 from diagnosis.wheels.blocks import WheelBlocks, block_width, blocks_of, per_sample
+from replay.arrays.column_store import ColumnStore
+from replay.machine.config import WheelPlant
 
 WHEELS = 3
 Array = np.ndarray
@@ -33,11 +36,13 @@ def recorded(size: int, every: int = 1, seed: int = 1) -> tuple[Array, Array, Ar
     return y, u, status, quiet
 
 
-def cut(y: Array, u: Array, status: Array, quiet: Array, dt: float, dead: float = 0.01) -> WheelBlocks:
+def cut(
+    y: Array, u: Array, status: Array, quiet: Array, dt: float, plants: Sequence[WheelPlant | None] = ()
+) -> WheelBlocks:
     size = y.shape[0]
     ratio = np.linspace(0.9, 1.1, size)[:, None] * np.ones(WHEELS)
     turn = np.linspace(0.0, 0.02, size)[:, None] * np.arange(WHEELS)
-    return blocks_of(y, u, status, quiet, ratio, turn, np.full(WHEELS, dead), dt)
+    return blocks_of(y, u, status, quiet, ratio, turn, plants or [WheelPlant(1.0, 0.1, dead=0.01)] * WHEELS, dt)
 
 
 def naive(y: Array, u: Array, status: Array, width: int, i: int) -> list[tuple[Any, ...]]:
@@ -149,10 +154,55 @@ def test_part_and_spread() -> None:
     got = cut(y, u, status, quiet, 0.001)
     part = got.part(10, 41)
     assert part.y.shape[0] == 31
-    for name in ("y", "count", "jitter", "unsteady", "status", "quiet", "ratio", "turn"):
+    for name in ("y", "count", "jitter", "unseen", "unsteady", "status", "quiet", "ratio", "turn"):
         assert_array_equal(getattr(part, name), getattr(got, name)[10:41], err_msg=name)
     assert_array_equal(part.u, got.u[100:410])
     assert part.u.flags.c_contiguous
     whole = got.part(20, 999)
     assert whole.u.shape[0] == 10 * whole.y.shape[0]
     assert_array_equal(per_sample(np.array([1, 2, 3]), 4, 10), [1, 1, 1, 1, 2, 2, 2, 2, 3, 3])
+
+
+MAPPED = WheelPlant(
+    K=2.0,
+    tau=0.2,
+    openings=(-0.3, -0.02, 0.03, 0.08, 0.3),
+    speeds=(-0.5, 0.0, 0.0, 0.15, 0.15),
+    unseen=(-0.2, 0.0, 0.0, 0.0, 0.44),
+    hysteresis=0.02,
+)
+
+
+def test_openings_are_what_the_valves_make_of_them() -> None:
+    """Play, map and what nobody has seen beyond it, sample by sample; a wheel without a plant has its opening as it is."""
+    y, u, status, quiet = recorded(403)
+    got = cut(y, u, status, quiet, 0.001, [MAPPED, None, MAPPED])
+    for i in (0, 2):
+        spool, opening, unseen = u[0, i], [], []
+        for x in np.nan_to_num(u[:, i]):
+            spool = min(max(spool, x - 0.01), x + 0.01)
+            opening.append(np.interp(spool, MAPPED.openings, MAPPED.speeds) / 2.0)
+            unseen.append(np.interp(spool, MAPPED.openings, MAPPED.unseen) / 2.0)
+        most = np.array(opening) + unseen
+        assert_allclose(got.u[:403, i], most, atol=1e-13)
+        blockwise = np.pad(unseen, (0, 7), mode="edge").reshape(-1, 10).mean(axis=1)
+        assert_allclose(got.unseen[:, i], blockwise, atol=1e-13)
+        assert (blockwise > 0).any()
+        ended = got.ending()
+        assert ended.ended
+        assert_allclose(ended.u[:, i], got.u[:, i] - np.repeat(blockwise, 10), atol=1e-13)
+    assert_allclose(got.u[:403, 1], np.nan_to_num(u[:, 1]))
+    assert_array_equal(got.unseen[:, 1], 0.0)
+    assert not got.ended
+    assert ended.part(3, 9).ended
+
+
+def test_parts_of_a_long_mission_change_nothing_of_a_spool() -> None:
+    y, u, status, quiet = recorded(403)
+    ones = np.ones((403, WHEELS))
+    whole, parts = (
+        blocks_of(y, u, status, quiet, ones, ones, [MAPPED] * WHEELS, 0.001, ColumnStore(block=block))
+        for block in (10_000, 50)
+    )
+    for name in ("u", "unseen", "y", "jitter"):
+        assert_array_equal(getattr(parts, name), getattr(whole, name), err_msg=name)

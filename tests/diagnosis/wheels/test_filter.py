@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -29,6 +29,7 @@ from diagnosis.wheels.models import (
 from diagnosis.wheels.run_kernel import evidence_of_runs
 from diagnosis.wheels.runs import Runs
 from diagnosis.wheels.step_kernel import WheelInput, advance, enter, predict
+from replay.machine.config import WheelPlant
 
 RAW, WIDTH, DT = 0.001, 10, 0.01
 WHEEL = WheelFilterModel(
@@ -43,6 +44,7 @@ WHEEL = WheelFilterModel(
 )
 N, ONSET = 12_000, 6000
 ROW = np.array([ROW_OF_MODEL.index(row) for row in ROW_OF_MODEL])  # first model of each model's row
+PLANTS = (WheelPlant(WHEEL.K, WHEEL.tau),) * 4
 Array = np.ndarray
 Fault = Callable[[Array], Array]
 
@@ -73,11 +75,11 @@ def noisy(v: Array, seed: int = 1) -> Array:
     return measured
 
 
-def blocks(y: Array, u: Array, status: Array | None = None) -> WheelBlocks:
+def blocks(y: Array, u: Array, status: Array | None = None, plants: Sequence[WheelPlant] = PLANTS) -> WheelBlocks:
     n = y.shape[0]
     status = np.full((n, 4), PAIR, dtype=np.int8) if status is None else status
     ratio, turn = np.ones((n, 4)) * [1.0, 1.02, 0.98, 1.01], np.zeros((n, 4))
-    return blocks_of(y, u, status, np.zeros((n, 4), dtype=np.bool_), ratio, turn, np.zeros(4), RAW)
+    return blocks_of(y, u, status, np.zeros((n, 4), dtype=np.bool_), ratio, turn, plants, RAW)
 
 
 @pytest.mark.parametrize("grip_most", [0.0, 0.1], ids=["free", "ground"])
@@ -87,7 +89,7 @@ def test_two_parts_give_the_numbers_of_one(grip_most: float) -> None:
     applied[1500:2200, 1] = 0.0
     y = noisy(rolled(applied, 0.7))
     y[2500:3000, 2] = 0.2
-    model = machine(0.7).on_ground(grip_most)
+    model = machine(0.7).sliding_at(grip_most / WheelFilterModel.grip)
     whole = blocks(y, u)
     once = forward(whole, model)
     for cut in (1, 173, 399):
@@ -127,13 +129,26 @@ def test_first_known_speed() -> None:
     assert_allclose(first_speeds(blocks(y, np.zeros((50, 4)), status)), [0.1, 0.1, 0.1, 0.0])
 
 
-def test_evidence_is_what_a_loop_sums_up() -> None:
+MAP = WheelPlant(  # seen up to 7 % of opening
+    WHEEL.K,
+    WHEEL.tau,
+    openings=(-0.2, -0.07, 0.07, 0.2),
+    speeds=(-0.168, -0.168, 0.168, 0.168),
+    unseen=(-0.312, 0.0, 0.0, 0.312),
+)
+
+
+@pytest.mark.parametrize("ended", [False, True], ids=["map goes on", "map ends"])
+def test_evidence_is_what_a_loop_sums_up(ended: bool) -> None:
     u = openings(2400)
     y = noisy(rolled(u))
     y[1000:1600, 0] *= 0.5
     status = np.full((2400, 4), PAIR, dtype=np.int8)
     status[300:340] = SKIP
-    cut, model = blocks(y, u, status), machine()
+    cut, model = blocks(y, u, status, (MAP,) * 4), machine()
+    cut = cut.ending() if ended else cut
+    unseen = WHEEL.K * cut.unseen[:, 0] * ended
+    assert (np.abs(unseen) > 0.01).any() == ended
     done = forward(cut, model)
     runs = Runs(*(np.array(x) for x in ([0, 100, 160], [100, 160, 240], [HEALTHY, S_GAIN, HEALTHY], [0, 102, 160])))
     got = evidence_of_runs(cut, model, done, 0, runs)
@@ -154,7 +169,7 @@ def test_evidence_is_what_a_loop_sums_up() -> None:
         for n in range(first, last):
             x, chatter = done.inputs[n, 0], cut.unsteady[n, 0] * WHEEL.K * RAW / WHEEL.tau
             seen = (cut.y[n, 0], cut.count[n, 0], cut.jitter[n, 0], 1.0, 0.0, 0)
-            q = WheelInput(*seen, x[0], x[1], x[2], x[3], x[4], chatter, 0.0, x[5], x[6])
+            q = WheelInput(*seen, x[0], x[1], x[2], x[3], x[4], chatter, 0.0, x[5], x[6], unseen[n])
             predict(HEALTHY, q, k, free, free_P)
             expected[n], spread[n] = free[0, 0], free_P[0, 0, 0]
             advance(MODELS, q, cut.status[n, 0], False, k, z, P, gain)

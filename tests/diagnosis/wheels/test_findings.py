@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from diagnosis.wheels.findings import WheelFindings, WheelPath, findings_of
+from diagnosis.wheels.findings import Surroundings, WheelFindings, WheelPath, findings_of
 from diagnosis.wheels.models import HEALTHY, MODELS, S_STUCK, WheelFilterModel
 from diagnosis.wheels.run_kernel import RunEvidence
 from diagnosis.wheels.runs import Runs
@@ -20,7 +20,7 @@ BLOCKS, WIDTH = 300, 10
 Array = np.ndarray
 
 
-def found(level: float, expected: float, *, flickers: bool) -> WheelFindings:
+def found(level: float, expected: float, *, flickers: bool, odd: Array | None = None) -> WheelFindings:
     """A wheel at a steady speed, which the path calls stuck in the second half."""
     y = np.full(BLOCKS * WIDTH, level)
     if flickers:
@@ -37,9 +37,10 @@ def found(level: float, expected: float, *, flickers: bool) -> WheelFindings:
         np.full(BLOCKS, 1e-4),
     )
     none = np.zeros(BLOCKS, np.bool_)
-    path = WheelPath(
-        y, ("v", "u"), MODEL, 0.002, WIDTH, runs, evidence, none, np.zeros(BLOCKS), np.zeros(BLOCKS, np.int8)
-    )
+    odd = none if odd is None else odd
+    around = Surroundings(0.02, False, np.full(BLOCKS, 0.1), 0.1, np.zeros(BLOCKS), none, none)
+    habit = np.zeros(BLOCKS, np.int8)
+    path = WheelPath(y, ("v", "u"), MODEL, 0.002, WIDTH, runs, evidence, none, np.zeros(BLOCKS), habit, odd, around)
     return findings_of(path, Limits(), gains=True)
 
 
@@ -59,3 +60,16 @@ def test_sides_that_a_steady_speed_leaves_open(
     assert not out.findings
     assert {s for s, at in out.opened.items() if at[late].all()} == set(sides)
     assert all(not at[: BLOCKS * WIDTH // 2 - 50].any() for at in out.opened.values())
+
+
+def test_an_unusual_load_leaves_the_valve_open() -> None:
+    """Half a second of it does; less is what a healthy wheel shows at a bump."""
+    odd = np.zeros(BLOCKS, np.bool_)
+    odd[10:20], odd[40:110] = True, True
+    out = found(0.3, 0.3, flickers=True, odd=odd)
+    at = np.zeros(BLOCKS * WIDTH, np.bool_)
+    at[40 * WIDTH : 110 * WIDTH] = True
+    np.testing.assert_array_equal(out.opened[Side.ACTUATOR], at)
+    assert not out.opened[Side.SENSOR].any()
+    assert not out.findings
+    assert not any(x.any() for x in out.unexplained.values())

@@ -11,7 +11,8 @@ from scipy.integrate import solve_ivp
 
 from diagnosis.estimation.lag import low_passed
 from diagnosis.results.wheel_model import WheelModelFit
-from diagnosis.wheels.identification import demand, identify, mode
+from diagnosis.wheels.identification import demand, identify
+from diagnosis.wheels.robust_fit import mode
 from replay.machine.config import WheelPlant
 
 DT, N = 0.01, 6000

@@ -14,6 +14,7 @@ from diagnosis.wheels.blocks import WheelBlocks, blocks_of
 from diagnosis.wheels.filter import JointPass, forward, initial_state
 from diagnosis.wheels.joint_kernel import (
     _LEARNING,
+    _OTHER_LOAD,
     _OTHER_NOISE,
     _RECOVERY,
     BODY,
@@ -35,6 +36,7 @@ from diagnosis.wheels.models import (
     A_STUCK,
     HEALTHY,
     MODELS,
+    ODD,
     S_GAIN,
     S_NONE,
     S_OU_LARGE,
@@ -56,6 +58,7 @@ from diagnosis.wheels.step_kernel import (
     is_scaled,
     predict,
 )
+from replay.machine.config import WheelPlant
 
 RAW, WIDTH, DT = 0.001, 10, 0.01
 GAINS, LAGS = (2.4, 2.3, 2.5, 2.45), (0.25, 0.24, 0.26, 0.25)
@@ -77,7 +80,7 @@ def wheel(i: int = 0) -> WheelFilterModel:
 
 
 def machine(flow: float = 1e9, grip_most: float = 0.0) -> JointModel:
-    return JointModel(tuple(wheel(i) for i in range(4)), flow, COST).on_ground(grip_most)
+    return JointModel(tuple(wheel(i) for i in range(4)), flow, COST).sliding_at(grip_most / WheelFilterModel.grip)
 
 
 def blocks(y: Array, u: Array, status: int = PAIR, quiet: bool = False, body: bool = False) -> WheelBlocks:
@@ -89,7 +92,7 @@ def blocks(y: Array, u: Array, status: int = PAIR, quiet: bool = False, body: bo
         np.full(y.shape, quiet),
         fill * [1.05, 0.95, 1.0, 0.9],
         fill * [0.0, 0.01, -0.01, 0.0],
-        np.zeros(4),
+        [WheelPlant(K, tau) for K, tau in zip(GAINS, LAGS, strict=True)],
         RAW,
     )
 
@@ -203,6 +206,7 @@ def one_block(at: JointState, model: JointModel, y: Array, status: int = PAIR, b
         [HEALTHY] * 4,
         [S_GAIN, HEALTHY, HEALTHY, HEALTHY],
         [HEALTHY, S_STUCK, A_GAIN, S_WHITE_8],
+        [ODD, HEALTHY, S_STUCK, HEALTHY],
     ],
 )
 def test_body_is_the_weighted_median_of_the_other_wheels(tops: list[int]) -> None:
@@ -213,7 +217,7 @@ def test_body_is_the_weighted_median_of_the_other_wheels(tops: list[int]) -> Non
     ratio, turn = np.array([1.05, 0.95, 1.0, 0.9]), np.array([0.0, 0.01, -0.01, 0.0])
     # the lagged drive is the first speed, so that no wheel is held back and each rolls as it turns
     roll = (np.array(speeds) + turn) / ratio
-    trusts = {HEALTHY: 1.0, S_GAIN: 0.4, A_GAIN: 0.7}
+    trusts = {HEALTHY: 1.0, ODD: 0.7, S_GAIN: 0.4, A_GAIN: 0.7}
     trust = np.array([trusts.get(m, 0.15) for m in tops])
     for i in range(4):
         others = [j for j in range(4) if j != i]
@@ -245,7 +249,7 @@ def test_wheels_without_model_or_geometry_give_no_body() -> None:
     assert_array_equal(done.best[:, 1:], HEALTHY)
 
 
-@pytest.mark.parametrize("top", [HEALTHY, S_WHITE_3, A_GAIN])
+@pytest.mark.parametrize("top", [HEALTHY, ODD, S_WHITE_3, A_GAIN])
 @pytest.mark.parametrize("status", [PAIR, SILENT, SKIP])
 def test_models_are_entered_where_that_pays(top: int, status: int) -> None:
     model = machine()
@@ -255,9 +259,11 @@ def test_models_are_entered_where_that_pays(top: int, status: int) -> None:
     done = one_block(at, model, np.full(4, 0.2), status)
     for m in range(MODELS):
         price = _RECOVERY if m == HEALTHY else COST
+        if m == ODD or (m == HEALTHY and top == ODD):
+            price = _OTHER_LOAD  # no fault begins or ends
         if S_WHITE_3 <= m <= S_OU_LARGE and S_WHITE_3 <= top <= S_OU_LARGE:
             price = _OTHER_NOISE  # one row: what changes is how strong its noise is
-        price += 0.0 if m in (HEALTHY, S_NONE, A_NONE) else _LEARNING
+        price += 0.0 if m in (HEALTHY, ODD, S_NONE, A_NONE) else _LEARNING
         enters = m != top and status != SKIP and at.score[1, m] < -price
         assert done.back[1][0, m] == (top if enters else STAY)
 
@@ -280,7 +286,7 @@ def advanced(q: WheelInput, status: int, quiet: bool = False, speed: float = 0.2
 
 
 def shown(y: float, jitter: float = 3e-5) -> WheelInput:
-    return WheelInput(y, 10.0, jitter, 1.0, 0.0, 0, 0.08, 0.08, 0.08, 1.0, 1.0, 0.0, 0.0, np.nan, 0.0)
+    return WheelInput(y, 10.0, jitter, 1.0, 0.0, 0, 0.08, 0.08, 0.08, 1.0, 1.0, 0.0, 0.0, np.nan, 0.0, 0.0)
 
 
 def test_a_block_speaks_within_limits() -> None:

@@ -16,6 +16,7 @@ from diagnosis.wheels.models import (
     A_STUCK,
     HEALTHY,
     MODELS,
+    ODD,
     S_GAIN,
     S_NONE,
     S_OU_LARGE,
@@ -51,7 +52,12 @@ def test_a_healthy_path_is_one_run() -> None:
     assert runs((HEALTHY, 500)) == [(HEALTHY, 0, 500)]
 
 
-@pytest.mark.parametrize("m", range(1, MODELS))
+def test_an_unusual_load_is_no_fault() -> None:
+    assert runs((HEALTHY, 100), (ODD, 80), (HEALTHY, 50)) == [(HEALTHY, 0, 230)]
+    assert runs((ODD, 100), (A_GAIN, 80), (ODD, 50)) == [(HEALTHY, 0, 100), (A_GAIN, 100, 180), (HEALTHY, 180, 230)]
+
+
+@pytest.mark.parametrize("m", range(ODD + 1, MODELS))
 def test_a_fault_is_a_run(m: int) -> None:
     assert runs((HEALTHY, 100), (m, 80), (HEALTHY, 50)) == [(HEALTHY, 0, 100), (m, 100, 180), (HEALTHY, 180, 230)]
     assert runs((m, 80), (HEALTHY, 50)) == [(m, 0, 80), (HEALTHY, 80, 130)]

@@ -13,6 +13,7 @@ from diagnosis.wheels.filter import forward, most_probable
 from diagnosis.wheels.joint_kernel import SHARE_NONE
 from diagnosis.wheels.models import A_GAIN, A_NONE, HEALTHY, JointModel, WheelFilterModel
 from diagnosis.wheels.settle import settled
+from replay.machine.config import WheelPlant
 
 RAW, WIDTH, N, ONSET, STOP = 0.001, 10, 9000, 4000, 7000
 WHEEL = WheelFilterModel(
@@ -27,6 +28,7 @@ WHEEL = WheelFilterModel(
 )
 FLOW = 0.7
 MODEL = JointModel((WHEEL,) * 4, FLOW, float(np.log(60.0 / (WIDTH * RAW) * 12)))
+PLANTS = (WheelPlant(WHEEL.K, WHEEL.tau),) * 4
 Array = np.ndarray
 
 
@@ -46,7 +48,7 @@ def blocks(applied: Array, u: Array) -> WheelBlocks:
         v = a * v + (1 - a) * WHEEL.K * applied[k] * min(1.0, FLOW / max(WHEEL.K * np.abs(applied[k]).sum(), 1e-9))
     y += WHEEL.noise * np.random.default_rng(1).normal(size=y.shape)
     unknown, status = np.full(u.shape, np.nan), np.full(u.shape, PAIR, dtype=np.int8)
-    return blocks_of(y, u, status, np.zeros(u.shape, dtype=np.bool_), unknown, unknown, np.zeros(4), RAW)
+    return blocks_of(y, u, status, np.zeros(u.shape, dtype=np.bool_), unknown, unknown, PLANTS, RAW)
 
 
 def test_the_others_may_be_given_the_model_of_a_wheel() -> None:
