@@ -15,10 +15,17 @@ from replay.signals.signal import Signal, Signals
 from replay.signals.timeline import Timeline, align
 from replay.simulation.options import EvidenceLevel, SimulationOptions
 from replay.simulation.run import simulate_mission
+from tests.diagnosis.wheels.weights import by_evidence
 
 PAPER = haulotte()
 RATE, SECONDS = 1000, 40.0
 Key = tuple[str, str]
+
+
+@pytest.fixture(autouse=True)
+def _weights_by_evidence(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What is tested is the path and its evidence, not what training made of it."""
+    monkeypatch.setattr("diagnosis.wheels.calibration.calibration", by_evidence)
 
 
 def logged(coupling: str, *faults: FaultSpec, evidence: EvidenceLevel = "base") -> Signals:

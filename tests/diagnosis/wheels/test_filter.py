@@ -181,7 +181,8 @@ def test_evidence_is_what_a_loop_sums_up(ended: bool) -> None:
             if m == HEALTHY and n < stop:
                 free[0], free_P[0] = z[0], P[0]
         assert_allclose(got.evidence[r], total, rtol=1e-9)
-        assert np.argmax(total) == m
+        best = int(np.argmax(total))  # a wheel that is faster than a map that ends is healthy under an unusual load
+        assert (ROW[best] if ended else best) == m
     assert_allclose(got.expected, expected, rtol=1e-9, atol=1e-12)
     assert_allclose(got.spread, spread, rtol=1e-9)
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from diagnosis.wheels.calibration import CLASSES, GROUPS, Calibration, RunContext, features
 from diagnosis.wheels.isolation import Run, RunVerdict, judge
 from diagnosis.wheels.models import (
     A_BIAS,
@@ -15,7 +14,6 @@ from diagnosis.wheels.models import (
     HEALTHY,
     MODELS,
     ODD,
-    ROW_OF_MODEL,
     S_GAIN,
     S_NONE,
     S_OU_LARGE,
@@ -25,6 +23,7 @@ from diagnosis.wheels.models import (
 )
 from replay.faults import FaultMode, Side
 from replay.machine.config import Limits
+from tests.diagnosis.wheels.weights import CONTEXT, STEEP, by_evidence
 
 MODEL = WheelFilterModel(
     K=2.4,
@@ -38,29 +37,12 @@ MODEL = WheelFilterModel(
 )
 LIMITS, NAMES, DT = Limits(), ("wheel.FR.v", "wheel.FR.u"), 0.001
 SIZE = 3000
-CONTEXT = RunContext(3.0, 0.02, False, 0.01, 0.01, 0.0, 0.0, 0.0, 0.0, 0.3, HEALTHY, HEALTHY)
-STEEP = 2.0
 Array = np.ndarray
-
-
-def by_evidence(valves: float = 0.0) -> Calibration:
-    """The row with the most evidence, by (1 + what it lacks to the best)^−STEEP; `valves` speaks for their rows."""
-    weights = np.zeros((len(CLASSES), SIZE_OF_FEATURES + 1))
-    weights[0, len(GROUPS)] = -STEEP  # the best sound model, under any load
-    for c, row in enumerate(CLASSES):
-        if row is not None:
-            weights[c, next(g for g, models in enumerate(GROUPS) if ROW_OF_MODEL[models[0]] == row)] = -STEEP
-            weights[c, -1] = valves if row[0] is Side.ACTUATOR else 0.0
-    return Calibration(np.zeros(SIZE_OF_FEATURES), np.ones(SIZE_OF_FEATURES), weights)
 
 
 @pytest.fixture(autouse=True)
 def _weights_by_evidence(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("diagnosis.wheels.calibration.calibration", lambda: WEIGHTS)
-
-
-SIZE_OF_FEATURES = features(HEALTHY, np.zeros(MODELS), CONTEXT).size
-WEIGHTS = by_evidence()
+    monkeypatch.setattr("diagnosis.wheels.calibration.calibration", by_evidence)
 
 
 def run(model: int, evidence: dict[int, float], gain: float = 0.5, level: float = 0.2, gain_std: float = 0.01) -> Run:

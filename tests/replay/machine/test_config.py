@@ -13,6 +13,10 @@ from replay.machine.config import Control, Limits, Machine, Plant, WheelPlant, h
 from replay.machine.geometry import Geometry, WheelGeometry, four_wheel_geometry
 
 
+def mapped(openings: tuple[float, ...], speeds: tuple[float, ...], unseen: tuple[float, ...] = ()) -> WheelPlant:
+    return WheelPlant(2.4, 0.2, openings=openings, speeds=speeds, unseen=unseen)
+
+
 def test_papers_machine() -> None:
     machine = haulotte()
     assert machine.geometry is not None
@@ -60,6 +64,17 @@ def test_axle_places() -> None:
         (lambda: Control(phi_dot="x"), ["control.phi_dot", "'x'", "measured"]),  # type: ignore[arg-type]
         (lambda: WheelPlant(K=0.0, tau=0.2), ["plant.K", "0", "m/s per full opening"]),
         (lambda: WheelPlant(K=2.4, tau=90.0), ["plant.tau", "90", "s", "60"]),
+        (lambda: WheelPlant(2.4, 0.2, hysteresis=1.5), ["plant.hysteresis", "1.5", "full opening", "0 to 1"]),
+        (lambda: WheelPlant(2.4, 0.2, grip=-1.0), ["plant.grip", "-1"]),
+        (lambda: WheelPlant(2.4, 0.2, wander=-0.1), ["plant.wander", "-0.1", "m/s/√s"]),
+        (lambda: mapped((0.0, 1.0), (0.0,)), ["plant.openings, speeds and unseen", "2, 1 and 0", "as many"]),
+        (lambda: mapped((0.0, 1.0), ()), ["plant.openings, speeds and unseen", "2, 0 and 0"]),
+        (lambda: mapped((0.0, 1.0), (0.0, 2.0), (0.0,)), ["plant.openings, speeds and unseen", "2, 2 and 1"]),
+        (lambda: mapped((), (), (0.0, 1.0)), ["plant.openings, speeds and unseen", "0, 0 and 2"]),
+        (lambda: mapped((0.5,), (1.0,)), ["plant.openings", "one value", "two"]),
+        (lambda: mapped((0.0, 0.5, 0.5), (0.0, 1.0, 1.2)), ["plant.openings must rise"]),
+        (lambda: mapped((0.5, 0.0), (0.0, 1.0)), ["plant.openings must rise"]),
+        (lambda: mapped((0.0, 0.5, 1.0), (0.0, 1.0, 0.9)), ["plant.speeds must not fall"]),
         (lambda: Plant(coupling="glue"), ["plant.coupling", "glue", "free"]),  # type: ignore[arg-type]
         (lambda: Plant(flow=0.0), ["plant.flow", "0", "m/s"]),
         (lambda: Limits(brief=-1.0), ["limits.brief", "-1", "s", "3600"]),
@@ -129,3 +144,9 @@ def test_label_of_a_signal_source() -> None:
     assert SignalSource(topic="/cmd_vel", field="linear.x").label == "/cmd_vel.linear.x"
     assert SignalSource(symbol="MAIN.v").label == "MAIN.v"
     assert SignalSource(column="Speed").label == "Speed"
+
+
+def test_a_map_may_be_flat_and_known_throughout() -> None:
+    plant = mapped((-1.0, -0.03, 0.03, 1.0), (-2.0, 0.0, 0.0, 1.8))
+    assert plant.unseen == ()
+    assert mapped((0.0, 1.0), (0.0, 0.0), (0.0, 0.5)).unseen == (0.0, 0.5)

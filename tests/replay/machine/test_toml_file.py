@@ -57,7 +57,24 @@ def test_everything_given_round_trip(folder: Path) -> None:
         max_speed=2.5,
         max_steer=0.6,
         control=Control(law="printed", psi="event_reset", lambda_=2.5, psi0=0.25, phi_dot="measured", u_max=100.0),
-        plant=Plant(coupling="free", flow=8.0, wheels={"L1": WheelPlant(2.4, 0.25, 0.01, 0.1, 0.02, 0.003)}),
+        plant=Plant(
+            coupling="free",
+            flow=8.0,
+            wheels={
+                "L1": WheelPlant(2.4, 0.25, 0.01, 0.1, 0.02, 0.003),
+                "L2": WheelPlant(
+                    2.4,
+                    0.2,
+                    openings=(-1.0, -0.03, 0.025, 1.0),
+                    speeds=(-1.9, 0.0, 0.0, 2.3),
+                    unseen=(-0.4, 0.0, 0.0, 0.3),
+                    hysteresis=0.02,
+                    grip=2.5,
+                    wander=0.012,
+                ),
+                "L3": WheelPlant(2.4, 0.2, openings=(-1.0, 1.0), speeds=(-2.0, 2.0), grip=0.0),
+            },
+        ),
         noise={"wheel.L1.v": Noise(std=0.004, lsb=0.0015), "wheel.R1.u": Noise(std=0.001)},
         limits=Limits(brief=2.0, min_probability=0.95, min_epsilon=0.2, min_sat=0.1, min_assessed=3.0),
         sources={"*.csv": SourceOptions(time="t", time_unit="ms", epoch="2025-01-01", separator=";", scale=True)},
@@ -227,3 +244,23 @@ def test_unreadable_files(folder: Path) -> None:
     (folder / "latin.toml").write_bytes(b'[machine]\nname = "H\xe4nsel"\n')
     with pytest.raises(ConfigError, match=r"latin\.toml: byte 19 is not UTF-8"):
         load_machine(folder / "latin.toml")
+
+
+def test_maps_of_valves_are_lists_of_numbers(folder: Path) -> None:
+    machine = load(
+        folder,
+        "[plant]\nFR = { K = 2, tau = 0.2, openings = [-1, 0, 1], speeds = [-2, 0, 2.5], unseen = [-0.5, 0, 0.4] }",
+    )
+    plant = machine.plant.wheels["FR"]
+    assert (plant.openings, plant.speeds, plant.unseen) == ((-1.0, 0.0, 1.0), (-2.0, 0.0, 2.5), (-0.5, 0.0, 0.4))
+    assert (plant.hysteresis, plant.grip, plant.wander) == (0.0, None, None)
+    for wrong, words in (
+        ("openings = 0.5", "plant.FR.openings = 0.5 must be a list of numbers"),
+        ('openings = [0.0, "1"]', "plant.FR.openings = '1' must be a finite number"),
+        ("openings = [0.0, nan]", "plant.FR.openings = nan must be a finite number"),
+        ("openings = [0.0, 1.0], speeds = [0.0]", "plant.openings, speeds and unseen have 2, 1 and 0 values"),
+        ("opening = [0.0, 1.0]", "plant.FR.opening is not a known key"),
+    ):
+        with pytest.raises(ConfigError) as raised:
+            load(folder, f"[plant]\nFR = {{ K = 2, tau = 0.2, {wrong} }}")
+        assert words in str(raised.value)
