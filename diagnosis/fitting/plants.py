@@ -159,7 +159,7 @@ def _without_odd_wheels(fits: list[WheelFit | None]) -> list[WheelFit | None]:
             continue
         others = [g.K for g in fits if g is not None and not g.refused and g is not f]
         apart = float(np.std([k.value for k in others], ddof=1))
-        usual = float(np.nanmedian([k.std for k in others]))
+        usual = float(np.median([k.std for k in others if np.isfinite(k.std)] or [0.0]))
         doubt = _SURE * float(np.sqrt(np.nansum(np.square([min(f.K.std, 2 * usual), apart, usual]))))
         if abs(f.K.value - middle) > max(_ODD_WHEEL * middle, doubt):
             text = (
