@@ -115,7 +115,6 @@ def _surroundings(data: WheelsData, i: int, blocks: WheelBlocks, faulty: NDArray
     doubtful[: steps.size] = steps
     return Surroundings(
         misfit=data.misfit,
-        given=data.given[i],
         opening=opening,
         usual=float(np.median(driven)) if driven.size else 1.0,
         others=faulty.sum(axis=1) - faulty[:, i].astype(np.float64),

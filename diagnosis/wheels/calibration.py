@@ -61,14 +61,6 @@ class RunContext:
         Its length [s].
     misfit : float
         What the wheels' plants leave of the speed in the windows that agree best [1].
-    given : bool
-        Whether the plant comes from the machine file.
-    load : float
-        Usual load of the wheel, as a share of the top speed.
-    noise : float
-        Noise of the speed, as a share of the top speed.
-    grip : float
-        Speed that the tyre's force costs per slip [1].
     others : float
         Mean number of other wheels that are taken to be faulty meanwhile.
     unseen : float
@@ -83,10 +75,6 @@ class RunContext:
 
     seconds: float
     misfit: float
-    given: bool
-    load: float
-    noise: float
-    grip: float
     others: float
     unseen: float
     doubtful: float
@@ -121,10 +109,6 @@ def features(model: int, evidence: Array, context: RunContext) -> Array:
         [
             np.log(max(context.seconds, 0.02)),
             quality,
-            float(context.given),
-            np.log(max(context.load, 1e-4)),
-            np.log(max(context.noise, 1e-5)),
-            np.log1p(context.grip),
             context.others,
             context.unseen,
             context.doubtful,

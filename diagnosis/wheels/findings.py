@@ -36,8 +36,6 @@ class Surroundings:
     ----------
     misfit : float
         What the wheels' plants leave of the speed in the windows that agree best [1].
-    given : bool
-        Whether the plant comes from the machine file.
     opening : Array, shape (blocks,)
         Mean effective opening [fraction].
     usual : float
@@ -49,7 +47,6 @@ class Surroundings:
     """
 
     misfit: float
-    given: bool
     opening: Array
     usual: float
     others: Array
@@ -207,10 +204,6 @@ def _context(path: WheelPath, r: int, seconds: float) -> RunContext:
     return RunContext(
         seconds=seconds,
         misfit=around.misfit,
-        given=around.given,
-        load=path.model.load / (1 + path.model.grip) / path.model.span,
-        noise=path.model.noise / path.model.span,
-        grip=path.model.grip,
         others=float(around.others[part].mean()),
         unseen=float(around.unseen[part].mean()),
         doubtful=float(around.doubtful[part].mean()),

@@ -119,8 +119,6 @@ class WheelsData:
         Step [s].
     misfit : float
         What the plants leave of the speed in the windows that agree best [1].
-    given : Sequence[bool]
-        Whether a wheel's plant comes from the machine file.
     doubtful : NDArray[np.bool_], shape (n, axles)
         Where a steering angle is in doubt.
     store : ColumnStore
@@ -145,7 +143,6 @@ class WheelsData:
     habits: Sequence[Habit]
     dt: float
     misfit: float
-    given: Sequence[bool]
     doubtful: NDArray[np.bool_]
     store: ColumnStore = field(default_factory=ColumnStore, repr=False)
 
@@ -323,7 +320,6 @@ def wheels_data(
         habits=habits,
         dt=dt,
         misfit=fit.spread if not all(given) else max(_share(p, machine.max_speed) for p in fit.plants),
-        given=given,
         doubtful=doubtful,
         store=timeline.store,
     )

@@ -38,6 +38,7 @@ from replay.simulation.run import simulate_mission
 Array = NDArray[np.float64]
 
 WEIGHTS = Path(__file__).resolve().parents[2] / "diagnosis" / "wheels" / "calibration.json"
+SECONDS = 13  # place of log(seconds) among the features
 _RIDGE = 10.0
 _SHORT_S = 0.5
 _HELD_OUT = 5  # every fifth machine
@@ -151,7 +152,7 @@ def collect(file: Path, kinds: Sequence[str], first: int, count: int, duration: 
 
 
 def loaded(file: Path) -> tuple[Array, NDArray[np.int64], NDArray[np.int64], Array]:
-    """Features, classes, number of the machine, and weight of each run: a mission's runs of one kind count as twenty at most."""
+    """Features, classes, number of the machine, and weight of each run: its seconds; twenty runs of one kind in a mission count."""
     x, y, machine, weight = [], [], [], []
     numbers: dict[tuple[str, int], int] = {}
     for line in file.read_text().splitlines():
@@ -164,7 +165,8 @@ def loaded(file: Path) -> tuple[Array, NDArray[np.int64], NDArray[np.int64], Arr
             x.append(values)
             y.append(truth)
             machine.append(number)
-            weight.append(min(1.0, 20 / kinds[truth, model]))
+            seconds = float(np.exp(values[SECONDS]))
+            weight.append(min(1.0, 20 / kinds[truth, model]) * min(max(seconds, 0.25), 6.0))
     return np.array(x), np.array(y), np.array(machine), np.array(weight)
 
 

@@ -12,7 +12,7 @@ from diagnosis.wheels.calibration import CLASSES, GROUPS, Calibration, RunContex
 from diagnosis.wheels.models import A_BIAS, A_GAIN, A_NONE, HEALTHY, MODELS, ODD, ROW_OF_MODEL, S_GAIN, S_STUCK
 from replay.faults import Side
 
-CONTEXT = RunContext(3.0, 0.02, False, 0.01, 0.01, 2.0, 0.5, 0.1, 0.2, 0.3, HEALTHY, A_GAIN)
+CONTEXT = RunContext(3.0, 0.02, 0.5, 0.1, 0.2, 0.3, HEALTHY, A_GAIN)
 Array = np.ndarray
 
 
@@ -110,7 +110,7 @@ def test_an_unusual_load_is_a_healthy_wheel() -> None:
 
 def test_every_part_of_the_context_counts() -> None:
     base = features(A_NONE, evidence({A_NONE: 30.0}), CONTEXT)
-    other = RunContext(5.0, 0.05, True, 0.02, 0.03, 0.0, 1.5, 0.6, 0.7, 0.9, A_BIAS, S_STUCK)
+    other = RunContext(5.0, 0.05, 1.5, 0.6, 0.7, 0.9, A_BIAS, S_STUCK)
     for name in RunContext.__dataclass_fields__:
         changed = replace(CONTEXT, **{name: getattr(other, name)})
         got = features(A_NONE, evidence({A_NONE: 30.0}), changed)
@@ -119,7 +119,7 @@ def test_every_part_of_the_context_counts() -> None:
 
 
 def test_extremes_stay_finite() -> None:
-    nothing = RunContext(0.0, 0.0, False, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, HEALTHY, HEALTHY)
+    nothing = RunContext(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, HEALTHY, HEALTHY)
     for e in (np.zeros(MODELS), evidence({S_STUCK: 1e9}), np.where(np.arange(MODELS) < A_GAIN, 0.0, -np.inf)):
         assert np.isfinite(features(S_STUCK, e, nothing)).all()
         assert sum(calibrated(S_STUCK, e, nothing).values()) == pytest.approx(1.0)

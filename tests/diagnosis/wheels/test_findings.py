@@ -38,7 +38,7 @@ def found(level: float, expected: float, *, flickers: bool, odd: Array | None = 
     )
     none = np.zeros(BLOCKS, np.bool_)
     odd = none if odd is None else odd
-    around = Surroundings(0.02, False, np.full(BLOCKS, 0.1), 0.1, np.zeros(BLOCKS), none, none)
+    around = Surroundings(0.02, np.full(BLOCKS, 0.1), 0.1, np.zeros(BLOCKS), none, none)
     habit = np.zeros(BLOCKS, np.int8)
     path = WheelPath(y, ("v", "u"), MODEL, 0.002, WIDTH, runs, evidence, none, np.zeros(BLOCKS), habit, odd, around)
     return findings_of(path, Limits(), gains=True)

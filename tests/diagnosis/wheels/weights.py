@@ -8,7 +8,7 @@ from diagnosis.wheels.calibration import CLASSES, GROUPS, Calibration, RunContex
 from diagnosis.wheels.models import HEALTHY, MODELS, ROW_OF_MODEL
 from replay.faults import Side
 
-CONTEXT = RunContext(3.0, 0.02, False, 0.01, 0.01, 0.0, 0.0, 0.0, 0.0, 0.3, HEALTHY, HEALTHY)
+CONTEXT = RunContext(3.0, 0.02, 0.0, 0.0, 0.0, 0.3, HEALTHY, HEALTHY)
 STEEP = 2.0
 
 
