@@ -145,7 +145,7 @@ def _judge(run: _Run) -> Judged:
     if stuck_valve and sat is not None and abs(sat.mean) < limits.min_sat:
         choice, sat = choice._replace(mode=FaultMode.NO_SIGNAL), None
     start, stop = run.start, run.stop
-    if choice.needs_motion:
+    if choice.needs_motion and not run.axle.model.opening_measured:
         first, last, seconds = asked(run.axle, start, stop)
         if seconds < _LEAST_ASKED_S:
             return Judged(run.start, run.stop, None)

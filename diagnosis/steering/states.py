@@ -18,6 +18,7 @@ from diagnosis.steering.path import AxleFilter
 from replay.faults import Side, State
 
 _ALONE_S, _BETWEEN_S = 4.0, 10.0
+_SEEN_ALONE_S, _SEEN_BETWEEN_S = 6.0, 30.0  # where the valve's opening is measured: a fault shows at rest too
 REASONS: dict[Side, Mapping[State, str]] = {
     Side.SENSOR: {
         State.NOT_EXCITED: "the axle was not steered, and the sensor's rounding hides its noise",
@@ -33,19 +34,21 @@ REASONS: dict[Side, Mapping[State, str]] = {
 }
 
 
-def vouched(healthy: NDArray[np.bool_], shown: NDArray[np.bool_], dt: float) -> NDArray[np.bool_]:
+def vouched(healthy: NDArray[np.bool_], shown: NDArray[np.bool_], dt: float, *, seen: bool) -> NDArray[np.bool_]:
     """Healthy blocks for which a movement nearby speaks.
 
     Between two movements that were obeyed a fault would have had to come and go, which is not believed within some
-    seconds; before the first and after the last one health is believed for fewer. Shape (m,).
+    seconds; before the first and after the last one health is believed for fewer. Both for longer where the valve's
+    opening is `seen`. Shape (m,).
     """
     out = shown & healthy
     idle = healthy & ~shown
     cut = np.flatnonzero(np.diff(np.concatenate([[0], idle.astype(np.int8), [0]])))
-    alone = round(_ALONE_S / dt)
+    alone = round((_SEEN_ALONE_S if seen else _ALONE_S) / dt)
+    between = _SEEN_BETWEEN_S if seen else _BETWEEN_S
     for a, b in zip(cut[::2].tolist(), cut[1::2].tolist(), strict=True):
         left, right = a > 0 and out[a - 1], b < idle.size and healthy[b] and shown[b]
-        if left and right and (b - a) * dt <= _BETWEEN_S:
+        if left and right and (b - a) * dt <= between:
             out[a:b] = True
             continue
         if left:
@@ -106,7 +109,7 @@ def _of_blocks(
     shown = exercised(axle)
     if side is Side.SENSOR and axle.model.noise.resolved:
         shown[:] = True
-    healthy = vouched(rows == HEALTHY, shown, blocks.dt)
+    healthy = vouched(rows == HEALTHY, shown, blocks.dt, seen=axle.model.opening_measured)
     states = np.where(healthy, CODE[State.HEALTHY], CODE[State.NOT_EXCITED]).astype(np.int8)
     if not judged:
         states[:] = CODE[State.NOT_ASSESSED]
