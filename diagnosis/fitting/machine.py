@@ -124,8 +124,9 @@ def with_plants(
     """Put the wheels' constants into the plant section; the map of a valve stands beside its linear model."""
     wheels = dict(machine.plant.wheels)
     mapped = maps.plants if maps is not None else (None,) * len(machine.wheels)
-    for w, fit, found, error in zip(machine.wheels, fits, mapped, spoiled, strict=True):
+    for w, fit, mapped_fit, error in zip(machine.wheels, fits, mapped, spoiled, strict=True):
         before = wheels.get(w)
+        found = None if fit is not None and fit.refused else mapped_fit  # its windows contradict each other
         for name, unit in _PLANT:
             e = Estimate(float("nan"), float("nan"), f"{error} has a wrong unit or sign" if error else "not logged")
             if fit is not None:

@@ -41,7 +41,7 @@ _SIDES = (Side.SENSOR, Side.ACTUATOR)
 _WEAK_GAIN = 0.35  # a sensor's gain below this hides what the valve does
 _LEAST_DISTURBANCE_S = 1.0  # shorter ones are what the model gets wrong while a wheel recovers
 _USUAL = 0.75  # probability of a healthy wheel above which a run leaves nothing unexplained
-_LEAST_SIDE, _LEAST_ROW = 0.75, 0.5  # probabilities of a side and of its row from which on a finding is stated
+_LEAST_SIDE, _LEAST_ROW = 0.65, 0.45  # probabilities of a side and of its row from which on a finding is stated
 _LEAST_PART = 0.02  # a hypothesis below this is left out of the text
 _LEAST_HYPOTHESIS = 5e-4
 #: Models that need no model of the wheel: a sensor that is constant, silent or has white noise.

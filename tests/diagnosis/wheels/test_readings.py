@@ -30,7 +30,7 @@ def read(y: Array) -> tuple[WheelBlocks, Array]:
     habits = habits_of(y, fresh, DT)
     status = news(np.full(y.shape, PAIR, dtype=np.int8), y, habits, DT)
     none, quiet = np.zeros(y.shape), np.zeros(y.shape, dtype=np.bool_)
-    blocks = blocks_of(y, none, status, quiet, none + 1, none, np.zeros(WHEELS), DT)
+    blocks = blocks_of(y, none, status, quiet, none + 1, none, [None] * WHEELS, DT)
     return with_readings(blocks, y, habits, speed_noises(y, status, habits, DT), 0.05), status
 
 
