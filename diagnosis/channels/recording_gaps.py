@@ -15,6 +15,7 @@ from replay.signals.timeline import Timeline
 
 _LEAST_S = 0.25
 _PERIODS = 10  # a gap lasts for more than so many periods of the slowest wheel or steering signal
+_SETTLE_S = 0.25  # after a gap
 _LEAST_SEEN = 0.5  # share of a fault's time of which something must have been recorded
 Gap = tuple[int, int]
 
@@ -68,6 +69,9 @@ def without_gaps(assessment: Assessment, gaps: Sequence[Gap], timeline: Timeline
 
 def _cut(finding: Finding, gaps: Sequence[Gap], dt: float) -> Finding | None:
     start, stop = finding.start, finding.stop
+    settle = round(_SETTLE_S / dt)
+    if stop - start < 2 * settle and any(b <= start < b + settle for _, b in gaps):
+        return None  # delays and lags are not yet filled with what came after the gap
     inside = [(a, b) for a, b in gaps if a < stop and b > start]
     if not inside:
         return finding

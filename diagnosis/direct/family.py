@@ -47,7 +47,6 @@ class DirectEvidence:
                     parts[wheel, ACTUATOR] = unassessed(mission.timeline.size, State.NOT_ASSESSED, why)
         limits = mission.machine.limits
         for (wheel, side), found in _identified(pairs, limits, mission).items():
-            mission.progress(Progress(Stage.JUDGING_WHEEL, wheel))
             parts[wheel, side] = assess_identified(found, limits)
         return Contribution(parts)
 

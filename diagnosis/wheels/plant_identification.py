@@ -36,6 +36,8 @@ _FREE_ENOUGH = 1.3  # of the misfit with the body: below, the wheels run free of
 _OWN_WINDOWS = 12.0  # that weigh as much as the machine's map when a wheel's own is fitted
 _MOST_GRIP = 60.0
 _SEEN = 0.99
+_LEAST_SHARE = 0.03  # of the body in a wheel's speed: below, it runs free
+_WIDER, _WIDER_STEPS = 5.0, 4
 
 
 @dataclass(frozen=True)
@@ -130,7 +132,7 @@ def identify_plants(
         # the body explains a wheel with a dead valve too: only windows that obey their openings may show the tyres
         held = _search(drives, span, _HELD_SHARE, _LAGS, free.found.chosen)
         if held is not None and (coupling == "ground" or free.found.score > _FREE_ENOUGH**2 * held.found.score):
-            best = held
+            best = _widened(drives, held, span)
     return _finished(drives, best, span, healthy=share > 0.5)
 
 
@@ -185,6 +187,18 @@ def _search(
     for factor in (0.7, 1.4):
         best = _better(best, trial(best.hysteresis, best.lag * factor, best), _BETTER) or best
     return best
+
+
+def _widened(drives: Sequence[Drive], found: _Trial, span: float) -> _Trial:
+    """The same from all windows that it explains nearly as well: those that obey their openings alone show little of tyres."""
+    windows = _windows(drives, found.hysteresis, found.lag, span, body=True)
+    values, score = found.found.values, found.found.score
+    for _ in range(_WIDER_STEPS):
+        left = misfits(windows.normal, values, 0.3 * span)
+        chosen = np.flatnonzero(left <= _WIDER * score)
+        values = solve(windows.normal.part(chosen), _penalty(body=True))
+    left = misfits(windows.normal, values, 0.3 * span)
+    return replace(found, found=Trimmed(values, left, chosen, float(left[chosen].mean())), windows=windows)
 
 
 def _better(best: _Trial | None, found: _Trial | None, factor: float) -> _Trial | None:
@@ -274,6 +288,7 @@ def _plant(
 ) -> WheelPlant | None:
     """Constants of wheel i from its coefficients."""
     share = min(float(values[RAMPS]), _MOST_GRIP / (1 + _MOST_GRIP)) if values.size > RAMPS else 0.0
+    share = share if share >= _LEAST_SHARE else 0.0
     grip = share / (1.0 - share)
     half = RAMPS // 2
     slopes = values[:RAMPS] / (1.0 - share)

@@ -158,7 +158,9 @@ def _tyre(m: int, q: WheelInput, k: WheelConstants, z: Array) -> tuple[float, fl
     doubt = min(k.grip * q.doubt, k.grip_most)
     load = k.load * ODD_LOAD if m == ODD else k.load
     s = np.sqrt(load**2 + (0.3 * held) ** 2 + doubt**2)
-    if q.samples > 0.0 and (q.y - z[m, 0]) * q.unseen > 0.0:  # where no healthy wheel was seen, it may be faster, not slower
+    if (
+        q.samples > 0.0 and (q.y - z[m, 0]) * q.unseen > 0.0
+    ):  # where no healthy wheel was seen, it may be faster, not slower
         s = np.hypot(s, q.unseen)
     if held < 0.0:
         s = -s
