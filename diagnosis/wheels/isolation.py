@@ -40,6 +40,7 @@ _ODD_COST = 2.0  # by which an unusual load must explain more than the usual one
 _SIDES = (Side.SENSOR, Side.ACTUATOR)
 _WEAK_GAIN = 0.35  # a sensor's gain below this hides what the valve does
 _LEAST_DISTURBANCE_S = 1.0  # shorter ones are what the model gets wrong while a wheel recovers
+_LEAVES_OPEN = 0.05  # probability that a side is faulty above which it is not called healthy
 _USUAL = 0.75  # probability of a healthy wheel above which a run leaves nothing unexplained
 _LEAST_SIDE, _LEAST_ROW = 0.65, 0.45  # probabilities of a side and of its row from which on a finding is stated
 _LEAST_PART = 0.02  # a hypothesis below this is left out of the text
@@ -134,7 +135,7 @@ def judge(
     known, seconds = y[np.isfinite(y)], (run.stop - run.start) * dt
     weighed = _weighed(run, known, model)
     side = weighed.row[0]
-    open_sides = tuple(s for s in _SIDES if weighed.faulty[s] > 1 - limits.min_probability)
+    open_sides = tuple(s for s in _SIDES if weighed.faulty[s] > _LEAVES_OPEN)
     usual = weighed.pooled[None] > _USUAL
     stated = _stated(weighed)
     if stated is None:
