@@ -132,8 +132,7 @@ def identify_plants(
         # the body explains a wheel with a dead valve too: only windows that obey their openings may show the tyres
         held = _search(drives, span, _HELD_SHARE, _LAGS, free.found.chosen)
         if held is not None and (coupling == "ground" or free.found.score > _FREE_ENOUGH**2 * held.found.score):
-            held = _widened(drives, held, span)
-            best = held if held.found.values[RAMPS] >= _LEAST_SHARE else free
+            best = _widened(drives, held, span)
     return _finished(drives, best, span, healthy=share > 0.5)
 
 
@@ -289,6 +288,7 @@ def _plant(
 ) -> WheelPlant | None:
     """Constants of wheel i from its coefficients."""
     share = min(float(values[RAMPS]), _MOST_GRIP / (1 + _MOST_GRIP)) if values.size > RAMPS else 0.0
+    share = share if share >= _LEAST_SHARE else 0.0
     grip = share / (1.0 - share)
     half = RAMPS // 2
     slopes = values[:RAMPS] / (1.0 - share)

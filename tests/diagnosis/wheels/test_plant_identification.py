@@ -108,7 +108,7 @@ def test_wheels_off_the_ground_are_found_to_be_free(tau: float, play: float) -> 
         assert plant.hysteresis == pytest.approx(
             play, abs=0.0151
         )  # a play of 2 % trades off against lag and dead band in the air
-    assert fit.misfit < 0.03
+    assert fit.misfit < 0.04
 
 
 def test_wheels_on_the_ground_show_their_grip() -> None:
