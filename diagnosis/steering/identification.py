@@ -33,6 +33,7 @@ from diagnosis.steering.windows import Windows, windows_of
 Array = NDArray[np.float64]
 
 LONG_S, SHORT_S = 0.25, 0.1
+_COARSE = 5  # blocks
 _EACH_SLOPE, _EACH_DEAD, _EACH_LIMIT = 0.15, 0.003, 0.1  # of one direction against the other
 _CONFIRMING = 1.2  # times the opening at which a limit is reached: from there on it was seen
 
@@ -139,9 +140,10 @@ def usual_rate(parts: Sequence[Windows]) -> float | None:
 
 
 def _fit_alone(long: Sequence[Windows], short: Sequence[Windows], scale: float) -> FittedPlant:
-    """Constants that windows share, from a coarse grid on."""
-    starts = _best_of_grid(long, scale)
-    rough = [fit_plant(long, x, Belief(x, _wide_spread()), scale, TOLERANCES[:2]) for x in starts]
+    """Constants that windows share, from a coarse grid on; until a few are left, by openings of coarser blocks."""
+    coarse = [w.coarser(_COARSE) for w in long]
+    starts = _best_of_grid(coarse, scale)
+    rough = [fit_plant(coarse, x, Belief(x, _wide_spread()), scale, TOLERANCES[:2]) for x in starts]
     best = sorted(rough, key=lambda f: f.loss)[:2]
     return min(
         (fit_plant(short, f.x, Belief(f.x, _wide_spread()), scale, TOLERANCES[1:]) for f in best), key=lambda f: f.loss

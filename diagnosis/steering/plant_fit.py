@@ -16,7 +16,6 @@ Array = NDArray[np.float64]
 #: Places of the constants: logarithms of slopes and limits of both directions, dead bands, logarithm of the lag, play.
 SLOPES, DEAD, LIMITS, LAG, PLAY = slice(0, 2), slice(2, 4), slice(4, 6), 6, 7
 SIZE = 8
-_STEPS = np.array([1e-3, 1e-3, 1e-4, 1e-4, 1e-3, 1e-3, 1e-2, 5e-5])
 TOLERANCES = (0.3, 0.12, 0.05)
 _JUDGED = (0.03, 0.12)
 _ROUNDS = 8
@@ -78,6 +77,14 @@ def predicted_by(part: Windows, x: Array) -> Array:
     return part.predicted(*unpacked(x))
 
 
+def predicted_with_slopes(part: Windows, x: Array) -> tuple[Array, Array]:
+    """Rates of a window's axle by a vector of constants [rad/s], and their derivatives by it, shape (w, 8)."""
+    valve, lag, play = unpacked(x)
+    rates, slopes = part.slopes(valve, lag, play)
+    slopes *= np.array([valve.slope_up, valve.slope_down, 1.0, 1.0, valve.limit_up, valve.limit_down, lag, 1.0])
+    return rates, slopes
+
+
 def tolerance_of(part: Windows, scale: float, share: float) -> Array:
     """What a window's rate may differ by: noise, and a share of the rate [rad/s]."""
     return np.asarray(np.hypot(2 * part.noise, share * np.maximum(np.abs(part.rate), 0.1 * scale)))
@@ -123,19 +130,20 @@ def fit_plant(
         Tolerances of the rounds, as shares of a rate.
     """
     inverse = np.asarray(np.linalg.inv(prior.cov), dtype=np.float64)
-    x = start.copy()
+    x, tolerances = start.copy(), []
     for share in shares:
         damping = 1e-3
-        value = _objective(parts, x, prior.mean, inverse, scale, share)
+        tolerances = [tolerance_of(part, scale, share) for part in parts]
+        value = _objective(parts, x, prior.mean, inverse, tolerances)
         for _ in range(_ROUNDS):
-            hessian, gradient, _ = _normal_equations(parts, x, scale, share)
+            hessian, gradient, _ = _normal_equations(parts, x, tolerances)
             hessian, gradient = hessian + inverse, gradient + inverse @ (prior.mean - x)
             improved = False
             for _ in range(4):
                 step = np.linalg.solve(hessian + damping * np.diag(np.diag(hessian)), gradient)
                 trial = x + np.clip(step, -0.5, 0.5)
                 trial[DEAD], trial[PLAY] = np.maximum(trial[DEAD], 0.0), max(trial[PLAY], 0.0)
-                found = _objective(parts, trial, prior.mean, inverse, scale, share)
+                found = _objective(parts, trial, prior.mean, inverse, tolerances)
                 if found < value:
                     improved = value - found > 1e-4 * abs(value)
                     x, value, damping = trial, found, damping / 5
@@ -143,7 +151,7 @@ def fit_plant(
                 damping *= 10
             if not improved:
                 break
-    hessian, _, clusters = _normal_equations(parts, x, scale, shares[-1])
+    hessian, _, clusters = _normal_equations(parts, x, tolerances)
     bread = np.linalg.inv(hessian + inverse)
     meat = clusters.T @ clusters + inverse
     loss = float(np.mean([robust_loss(parts, x, scale, share) for share in _JUDGED]))
@@ -152,11 +160,11 @@ def fit_plant(
     return FittedPlant(x, bread @ meat @ bread, loss + charge)
 
 
-def _objective(parts: Sequence[Windows], x: Array, centre: Array, inverse: Array, scale: float, share: float) -> float:
+def _objective(parts: Sequence[Windows], x: Array, centre: Array, inverse: Array, tolerances: list[Array]) -> float:
     """Half the robust sum of squares and of the prior."""
     total = float((x - centre) @ inverse @ (x - centre))
-    for part in parts:
-        r2 = ((part.rate - predicted_by(part, x))[part.good] / tolerance_of(part, scale, share)[part.good]) ** 2
+    for part, tolerance in zip(parts, tolerances, strict=True):
+        r2 = ((part.rate - predicted_by(part, x)) / tolerance)[part.good] ** 2
         total += _independent(part) * float((r2 / (1 + r2)).sum())
     return total / 2
 
@@ -166,19 +174,14 @@ def _independent(part: Windows) -> float:
     return min(1.0, part.length * part.dt / _INDEPENDENT_S)
 
 
-def _normal_equations(parts: Sequence[Windows], x: Array, scale: float, share: float) -> tuple[Array, Array, Array]:
+def _normal_equations(parts: Sequence[Windows], x: Array, tolerances: list[Array]) -> tuple[Array, Array, Array]:
     """JᵀWJ, JᵀWr, and JᵀWr of stretches of some seconds, shape (c, 8)."""
     hessian, gradient, clusters = np.zeros((SIZE, SIZE)), np.zeros(SIZE), []
-    for part in parts:
-        predicted = predicted_by(part, x)
-        tolerance = tolerance_of(part, scale, share)
+    for part, tolerance in zip(parts, tolerances, strict=True):
+        predicted, jacobian = predicted_with_slopes(part, x)
+        jacobian /= tolerance[:, None]
         r = (part.rate - predicted) / tolerance
         weight = np.where(part.good, 1 / (1 + r * r) ** 2, 0.0)
-        jacobian = np.empty((r.size, SIZE))
-        for i, h in enumerate(_STEPS):
-            moved = x.copy()
-            moved[i] += h
-            jacobian[:, i] = (predicted_by(part, moved) - predicted) / (h * tolerance)
         weight *= _independent(part)
         pull = jacobian * (weight * r)[:, None]
         hessian += (jacobian * weight[:, None]).T @ jacobian

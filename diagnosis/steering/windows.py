@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numba import njit
@@ -33,6 +33,61 @@ def _window_angles(u, valve, lag, play, dt, length):  # type: ignore[no-untyped-
             total += seen
         out[w] = total / length
     return out
+
+
+@njit(cache=True, error_model="numpy")
+def _window_slopes(u, valve, lag, play, dt, length):  # type: ignore[no-untyped-def]
+    """What `_window_angles` gives, (w,), and its derivatives by slopes, dead bands, limits (up, down), lag and play, (w, 8).
+
+    The derivatives obey the plant's own recursion, driven by those of the rate; the play hands on those of the moment in
+    which the sensor last moved. Long, for a loop that is split stores what stays in registers.
+    """
+    out, slopes = np.zeros(u.size // length), np.zeros((u.size // length, 8))
+    lag = max(lag, 1e-4)
+    a = np.exp(-dt / lag)
+    b, k_r, k_f = 1 - a, lag * (1 - a), dt - lag * (1 - a)
+    a_lag = a * dt / lag**2
+    k_lag = (1 - a) - lag * a_lag
+    r = phi = seen = 0.0
+    by_rate, by_angle, by_seen, total_by = np.zeros(8), np.zeros(8), np.zeros(8), np.zeros(8)
+    for w in range(out.size):
+        total = 0.0
+        total_by[:] = 0.0
+        for k in range(w * length, (w + 1) * length):
+            f = rate_at(u[k], valve)
+            for i in range(8):
+                by_angle[i] += k_r * by_rate[i]
+                by_rate[i] *= a
+            by_angle[6] += k_lag * (r - f)
+            by_rate[6] += a_lag * (r - f)
+            if u[k] > valve.dead_up:
+                beyond = u[k] - valve.dead_up
+                if valve.slope_up * beyond < valve.limit_up:
+                    by_angle[0], by_rate[0] = by_angle[0] + k_f * beyond, by_rate[0] + b * beyond
+                    by_angle[2], by_rate[2] = by_angle[2] - k_f * valve.slope_up, by_rate[2] - b * valve.slope_up
+                else:
+                    by_angle[4], by_rate[4] = by_angle[4] + k_f, by_rate[4] + b
+            elif u[k] < -valve.dead_down:
+                beyond = u[k] + valve.dead_down
+                if -valve.slope_down * beyond < valve.limit_down:
+                    by_angle[1], by_rate[1] = by_angle[1] + k_f * beyond, by_rate[1] + b * beyond
+                    by_angle[3], by_rate[3] = by_angle[3] + k_f * valve.slope_down, by_rate[3] + b * valve.slope_down
+                else:
+                    by_angle[5], by_rate[5] = by_angle[5] - k_f, by_rate[5] - b
+            phi += k_r * r + k_f * f
+            r = a * r + b * f
+            if seen < phi - play or seen > phi + play:
+                for i in range(7):
+                    by_seen[i] = by_angle[i]
+                by_seen[7] = -1.0 if seen < phi - play else 1.0
+                seen = min(max(seen, phi - play), phi + play)
+            total += seen
+            for i in range(8):
+                total_by[i] += by_seen[i]
+        out[w] = total / length
+        for i in range(8):
+            slopes[w, i] = total_by[i] / length
+    return out, slopes
 
 
 @dataclass(frozen=True)
@@ -69,6 +124,18 @@ class Windows:
         """Rates that a plant gives at these openings [rad/s], shape (w,)."""
         angles = _window_angles(self.u, valve, lag, play, self.dt, self.length)
         return np.asarray(np.diff(angles) / (self.length * self.dt))
+
+    def slopes(self, valve: ValveMap, lag: float, play: float) -> tuple[Array, Array]:
+        """What `predicted` gives, and its derivatives by both slopes, dead bands and limits, lag and play, shape (w, 8)."""
+        angles, by = _window_slopes(self.u, valve, lag, play, self.dt, self.length)
+        span = self.length * self.dt
+        return np.diff(angles) / span, np.diff(by, axis=0) / span
+
+    def coarser(self, blocks: int) -> Windows:
+        """The same windows with openings that are means of `blocks`; as they are where that does not divide a window."""
+        if self.length % blocks:
+            return self
+        return replace(self, u=window_means(self.u, blocks), length=self.length // blocks, dt=self.dt * blocks)
 
 
 def windows_of(blocks: SteeringBlocks, noise: SensorNoise, stop: float, window_s: float) -> Windows:
