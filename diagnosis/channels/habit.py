@@ -24,7 +24,7 @@ _SHORT, _ABOUT = 0.2, 1.3  # quantile of the runs of a window: a repeated value 
 _FALLING = -0.35  # exponent of the hold over the speed: −1 between poles, 0 in counting windows
 _APART = 0.3  # least distance of two log-speeds that say something about it
 _LEAST_PAIRS = 20
-_TICK_RUNS = 60
+_TICK_RUNS, _TICK_PARTS = 60, 100  # runs in a part, and parts that are looked at
 _TIMEOUT_S, _LONGEST_S = 0.25, 1.0
 
 
@@ -100,12 +100,16 @@ def identify_habit(y: Array, fresh: NDArray[np.bool_], dt: float) -> Habit:
     every = Habit(period, 0.0, period, stepwise=False)
     runs = _runs(y, known)
     moving = (runs.value != 0.0) & (runs.following != 0.0) & ~_fading(runs, period / dt)
-    shortest, distance, speed = _by_window(runs, moving, max(1, round(_WINDOW_S / dt)), dt)
-    if shortest.size < _LEAST_WINDOWS:
+    parts = _parts_of(runs, moving, max(1, round(_WINDOW_S / dt)))
+    if parts.runs.size < _LEAST_WINDOWS:
         return every
+    shortest = _short(parts)
     window = float(np.median(shortest)) * dt
     if window < 1.5 * period:
         return every
+    kept = parts.length <= _ABOUT * shortest[parts.window]
+    distance = dt * _medians((parts.length * parts.following)[kept], parts.window[kept])
+    speed = _medians(parts.following, parts.window)
     slope = _slope(np.log(speed), np.log(shortest))
     if slope is not None and slope > _FALLING:
         return Habit(window, 0.0, window, stepwise=True)
@@ -127,27 +131,40 @@ def _fading(runs: _Runs, sample: float) -> NDArray[np.bool_]:
     return np.asarray(falls & (runs.length <= 1.5 * sample))
 
 
-def _by_window(runs: _Runs, use: NDArray[np.bool_], width: int, dt: float) -> tuple[Array, Array, Array]:
-    """Of windows with several runs: their usual shortest run [steps], median travel of a run [unit·s] and median speed [unit]."""
+class _Parts(NamedTuple):
+    """Runs of some windows of the mission, window by window: length [steps] and size of the value that follows; runs per window."""
+
+    window: NDArray[np.intp]
+    length: NDArray[np.intp]
+    following: Array
+    runs: NDArray[np.intp]
+
+
+def _parts_of(runs: _Runs, use: NDArray[np.bool_], width: int) -> _Parts:
+    """Windows of `width` steps with several runs, spread evenly over the mission where there are more than are needed."""
     window = runs.start[use] // width
-    if not window.size:
-        return np.zeros(0), np.zeros(0), np.zeros(0)
-    length, following = runs.length[use], np.abs(runs.following[use])
-    first = np.flatnonzero(np.diff(window, prepend=window[0] - 1))
-    last = np.r_[first[1:], window.size]
-    many = last - first >= _LEAST_RUNS
-    first, last = first[many], last[many]
-    some = np.linspace(0, first.size - 1, min(first.size, _MOST_WINDOWS)).round().astype(np.intp)
-    found = [_usual(length[a:b], following[a:b]) for a, b in zip(first[some], last[some], strict=True)]
-    table = np.array(found, dtype=np.float64).reshape(-1, 3)
-    return table[:, 0], table[:, 1] * dt, table[:, 2]
+    first = np.flatnonzero(np.diff(window, prepend=-1))
+    count = np.diff(first, append=window.size)
+    many = np.flatnonzero(count >= _LEAST_RUNS)
+    some = many[np.linspace(0, many.size - 1, min(many.size, _MOST_WINDOWS)).round().astype(np.intp)]
+    places = np.repeat(first[some] - np.cumsum(count[some]) + count[some], count[some]) + np.arange(count[some].sum())
+    number = np.repeat(np.arange(some.size), count[some])
+    return _Parts(number, runs.length[use][places], np.abs(runs.following[use][places]), count[some])
 
 
-def _usual(length: NDArray[np.intp], following: Array) -> tuple[float, float, float]:
-    """A short run, but not the shortest ones, median travel of runs about as long, and median speed."""
-    least = float(np.quantile(length, _SHORT, method="nearest"))
-    kept = length <= _ABOUT * least
-    return least, float(np.median(length[kept] * following[kept])), float(np.median(following))
+def _short(parts: _Parts) -> Array:
+    """A short run of every window, but not the shortest ones [steps]."""
+    order = np.sort(parts.window * (parts.length.max() + 1) + parts.length) - parts.window * (parts.length.max() + 1)
+    first = np.cumsum(parts.runs) - parts.runs
+    return np.asarray(order[first + np.rint(_SHORT * (parts.runs - 1)).astype(np.intp)], dtype=np.float64)
+
+
+def _medians(values: Array, window: NDArray[np.intp]) -> Array:
+    """Median of the values of every window, which stand together."""
+    ordered = values[np.lexsort((values, window))]
+    first = np.flatnonzero(np.diff(window, prepend=-1))
+    count = np.diff(first, append=window.size)
+    return np.asarray((ordered[first + (count - 1) // 2] + ordered[first + count // 2]) / 2)
 
 
 def _slope(x: Array, y: Array) -> float | None:
@@ -163,9 +180,10 @@ def _slope(x: Array, y: Array) -> float | None:
 def _tick(runs: _Runs) -> float:
     """Step on which the inverse of the held values lies; 0 where most parts of the mission show none."""
     held = np.abs(runs.value[(runs.length > 1) & (runs.value != 0.0)])
-    parts = [rounding_step(1.0 / x) for x in np.array_split(held, max(1, held.size // _TICK_RUNS))]
-    found = [step for step in parts if step > 0.0]
-    return float(np.median(found)) if 2 * len(found) > len(parts) else 0.0
+    parts = np.array_split(held, max(1, held.size // _TICK_RUNS))
+    some = np.linspace(0, len(parts) - 1, min(len(parts), _TICK_PARTS)).round().astype(np.intp)
+    steps = np.array([rounding_step(1.0 / parts[k]) for k in some])
+    return float(np.median(steps[steps > 0.0])) if np.mean(steps > 0.0) > 0.5 else 0.0
 
 
 def _timeout(runs: _Runs, travel: float, dt: float) -> float:

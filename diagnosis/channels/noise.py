@@ -20,16 +20,27 @@ COARSE_STEP_S = 0.005  # slower logs do not fix the delay between a command and 
 _COARSE_SHARE = 0.3
 _MOST_SHARE = 2.5  # of a reference that is white between its samples too it is 2: more is a fault
 _GRID_PARTS, _GRID_SAMPLES, _GRID_SHARE = 20, 100, 0.4
-_PLACES = 8000
+_PLACES, _ALL, _SOME = 8000, slice(None), slice(None, None, 4)  # some are enough for a limit
 _SOUND_SHARE = 0.25  # quantile of windows that stands for healthy ones
 _QUIET_WINDOW_S, _QUIET_SHARE = 0.5, 0.4  # quantile of windows that stands for healthy ones
 _HEALTHY_SHARE, _SOUND = 0.3, 10.0  # of the places; times their misfit
 
 
 def moving_sum(x: NDArray[np.float64] | NDArray[np.bool_], width: int) -> Array:
-    """Sum over a centred window of `width` samples, shape (n,); the window is cut at the ends, and to n."""
+    """Sum over a centred window of `width` samples, shape (n,); the window is cut at the ends, and to n.
+
+    Sums of 1, 2, 4… samples are put together, so that an outlier reaches no sum beyond its window.
+    """
     width = min(width, x.size)
-    return np.convolve(np.asarray(x, dtype=np.float64), np.ones(width), mode="same") if width else np.zeros(0)
+    sums = np.pad(np.asarray(x, dtype=np.float64), (width // 2, max(0, width - 1) // 2))
+    out, start, length = np.zeros(x.size), 0, 1
+    while length <= width:
+        if width & length:
+            out += sums[start : start + x.size]
+            start += length
+        sums = sums[:-length] + sums[length:] if 2 * length <= width else sums
+        length *= 2
+    return out
 
 
 def usual_rounding(values: Array) -> float:
@@ -147,11 +158,11 @@ def relative_lag(y: Array, x: Array, use: NDArray[np.bool_], least_lag: int, max
         return 0.0
     there = y[places]
 
-    def misfit(lag: float) -> Array:
-        return np.abs(there - x[places - int(lag)])
+    def misfit(lag: float, some: slice = _ALL) -> Array:
+        return np.abs(there[some] - x[places[some] - int(lag)])
 
     def lower(lag: float) -> float:
-        found = misfit(lag)
+        found = misfit(lag, _SOME)
         rank = round(_HEALTHY_SHARE * np.count_nonzero(found == found))  # NaN are sorted last
         return float(np.partition(found, rank)[rank])
 

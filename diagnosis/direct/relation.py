@@ -185,8 +185,28 @@ def _scale(places: _Places, relation: Relation, dt: float) -> float:
 
 
 def _misfit(places: _Places, relation: Relation, dt: float, scale: float) -> float:
-    misfit = (places.y - relation.gain * _at(places, relation, dt)) / scale
-    return float(np.nanmean(np.log1p(misfit * misfit)))
+    """Cauchy's loss at the places [1]."""
+    followed = _followed(places.x, relation.play, relation.lag, dt) if relation.lag or relation.play else places.x
+    whole = int(np.floor(relation.delay))
+    part = relation.delay - whole
+    return float(_loss(followed, places.at, places.y, whole, part if part >= 1e-9 else 0.0, relation.gain, scale))
+
+
+@njit(cache=True, error_model="numpy")
+def _loss(x, at, y, whole, part, gain, scale):  # type: ignore[no-untyped-def]
+    """Mean ln(1 + (misfit/scale)²) over the places where x is known, by logarithms of products."""
+    total, product, known = 0.0, 1.0, 0
+    for k in range(at.size):
+        near = x[at[k] - whole]
+        if part > 0.0:
+            near = (1.0 - part) * near + part * x[at[k] - whole - 1]
+        misfit = (y[k] - gain * near) / scale
+        if misfit == misfit:
+            product *= 1.0 + misfit * misfit
+            known += 1
+            if product > 1e100:
+                total, product = total + np.log(product), 1.0
+    return (total + np.log(product)) / known
 
 
 def _least(places: _Places, trials: Iterable[Relation], dt: float, scale: float) -> tuple[Relation, float]:

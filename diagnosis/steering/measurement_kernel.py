@@ -179,21 +179,26 @@ def measure_redundant(m: int, seen: RedundantBlock, g: float, rate_limit: float,
 
 @njit(cache=True, error_model="numpy")
 def _linear(m: int, innovation: float, r: float, bank: FilterBank) -> float:
-    """Kalman update with one linear measurement H = `bank.room[0]`; an outlier teaches nothing. Returns the log-likelihood."""
+    """Kalman update with one linear measurement H = `bank.room[0]`; an outlier teaches nothing. Returns the log-likelihood.
+
+    Only φ, a and b are measured so.
+    """
     z, P, h, gain = bank.mean, bank.cov, bank.room[0], bank.room[1]
     total = r
-    for i in range(STATES):
-        gain[i] = 0.0
-        for j in range(STATES):
-            gain[i] += P[m, i, j] * h[j]
-    for i in range(STATES):
+    for n in range(FREE[m]):
+        i = ACTIVE[m, n]
+        gain[i] = P[m, i, 0] * h[0] + P[m, i, 2] * h[2] + P[m, i, 3] * h[3]
+    for n in range(FREE[m]):
+        i = ACTIVE[m, n]
         total += h[i] * gain[i]
     # relative to what the measurement's own noise gives
     likelihood = -0.5 * (innovation * innovation / total + log(total / r))
     if likelihood < _OUTLIER:
         return _OUTLIER
-    for i in range(STATES):
-        z[m, i] += gain[i] * innovation / total
-        for j in range(STATES):
-            P[m, i, j] -= gain[i] * gain[j] / total
+    for n in range(FREE[m]):
+        i = ACTIVE[m, n]
+        share = gain[i] / total
+        z[m, i] += share * innovation
+        for k in range(FREE[m]):
+            P[m, i, ACTIVE[m, k]] -= share * gain[ACTIVE[m, k]]
     return float(likelihood)

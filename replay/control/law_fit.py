@@ -62,7 +62,7 @@ class LawFit:
 
 @dataclass(frozen=True)
 class _Samples:
-    """Usable samples of every wheel, each array of shape (n_i,)."""
+    """Usable samples of every wheel, each array of shape (n_i,), and the squares of u about its mean."""
 
     u: list[Array]
     v: list[Array]
@@ -70,6 +70,7 @@ class _Samples:
     printed: list[Array]
     forced: list[Array]
     ahead: list[Array]
+    variation: list[float]
     wheels: list[int]
     count: int
 
@@ -130,7 +131,7 @@ def fit_law(
 def _usable(u: Array, v: Array, v_c: Array, dt: float, xi: float, beta: float, u_max: float) -> _Samples:
     """Samples that are known and not saturated, of wheels with at least 100 of them."""
     stride = decimated(u.shape[0])
-    samples = _Samples([], [], [], [], [], [], [], u.shape[1])
+    samples = _Samples([], [], [], [], [], [], [], [], u.shape[1])
     for i in range(u.shape[1]):
         part = [np.ascontiguousarray(x[::stride, i]) for x in (u, v, v_c)]
         k = np.isfinite(part[0]) & np.isfinite(part[1]) & np.isfinite(part[2]) & (np.abs(part[0]) < u_max * (1 - 1e-9))
@@ -140,6 +141,7 @@ def _usable(u: Array, v: Array, v_c: Array, dt: float, xi: float, beta: float, u
         fields = (samples.u, samples.v, samples.v_c, samples.printed, samples.forced, samples.ahead)
         for field, x in zip(fields, (*part, *shapes), strict=True):
             field.append(x[k])
+        samples.variation.append(float(np.sum((samples.u[-1] - samples.u[-1].mean()) ** 2)))
         samples.wheels.append(i)
     return samples
 
@@ -153,12 +155,12 @@ def _fit_one(law: str, psi: str, s: _Samples, lead: float = 0.5, lambdas: Array 
         u = s.u[j]
         lam, adaptive = _solved(part, basis, u, None if lambdas is None else float(lambdas[j]))
         residual = u - lam * part - adaptive * basis
-        squares += float(residual @ residual)
-        total += float(np.sum((u - u.mean()) ** 2))
+        squares += _sum(residual, residual)
+        total += s.variation[j]
         count += residual.size
         gains.append(lam)
         adaptive_gains.append(adaptive)
-        weights.append(float(part @ part))
+        weights.append(_sum(part, part))
     lam = float(np.average(gains, weights=weights)) if sum(weights) > 0 else float("nan")
     spread = float(np.std(gains)) if len(gains) > 1 else 0.0
     explained = max(0.0, 1.0 - squares / total) if total > 0 else 0.0
@@ -179,10 +181,15 @@ def _fit_one(law: str, psi: str, s: _Samples, lead: float = 0.5, lambdas: Array 
     )
 
 
+def _sum(a: Array, b: Array) -> float:
+    """Sum of a·b, without the linear algebra's threads: they cost more than they save where other work is done beside."""
+    return float(np.einsum("i,i->", a, b))
+
+
 def _solved(part: Array, basis: Array, u: Array, given: float | None) -> tuple[float, float]:
     """λ and the gain of Ψ̂², which cannot be negative, by normal equations of scaled columns."""
-    pp, bb, pb = float(part @ part), float(basis @ basis), float(part @ basis)
-    pu, bu = float(part @ u), float(basis @ u)
+    pp, bb, pb = _sum(part, part), _sum(basis, basis), _sum(part, basis)
+    pu, bu = _sum(part, u), _sum(basis, u)
     if given is not None:
         return given, max(0.0, (bu - given * pb) / bb) if bb > 0 else 0.0
     alike = pb * pb / (pp * bb) if pp > 0 and bb > 0 else 1.0

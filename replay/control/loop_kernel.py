@@ -13,7 +13,7 @@ from replay.control import mfhca
 
 Array = NDArray[np.float64]
 
-FIT_SAMPLES = 1 << 16
+FIT_SAMPLES = 1 << 15
 _FORCING_S = 0.25
 
 

@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 
 from diagnosis.channels.noise import (
+    moving_sum,
     relative_lag,
     rounding_step,
     shifted,
@@ -130,3 +131,19 @@ def test_reference_that_jumps_from_sample_to_sample_is_not_resolved() -> None:
     assert share > 0.3
     quiet, _ = unresolved(white(0.003, N, 2), drive(), use, 0.003, DT)
     assert not quiet.any()
+
+
+@given(st.lists(st.floats(-1e3, 1e3), max_size=60), st.integers(0, 80))
+def test_moving_sum_is_a_convolution_with_ones(values: list[float], width: int) -> None:
+    x = np.array(values, dtype=np.float64)
+    kept = min(width, x.size)
+    expected = np.convolve(x, np.ones(kept), mode="same") if kept else np.zeros(x.size)
+    assert_allclose(moving_sum(x, width), expected, atol=1e-9)
+
+
+def test_an_outlier_reaches_no_sum_beyond_its_window() -> None:
+    x = white(1e-3)
+    outlier = x.copy()
+    outlier[100] = 1e200
+    far = slice(200, None)
+    assert_array_equal(moving_sum(outlier, 101)[far], moving_sum(x, 101)[far])

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from diagnosis.direct.relation import Relation, relation_of
+from diagnosis.direct.relation import Relation, _loss, relation_of
 
 DT, N = 0.001, 60_000
 Array = np.ndarray
@@ -62,3 +62,13 @@ def test_expectation_is_the_lag_of_the_play() -> None:
     y = Relation(delay=3.0, lag=0.05, play=0.2).expected(x, DT)
     assert_allclose(y[103 + 50], 0.9 * (1 - np.exp(-51 / 50)), rtol=1e-9)
     assert np.isnan(y[:3]).all()
+
+
+def test_loss_is_the_mean_of_cauchys() -> None:
+    rng = np.random.default_rng(3)
+    x, at = rng.normal(size=500), np.arange(10, 490)
+    x[200] = np.nan
+    y = 1.1 * (0.7 * x[at - 2] + 0.3 * x[at - 3]) + rng.normal(size=at.size)
+    y[7] = 1e60
+    misfit = (y - 1.1 * (0.7 * x[at - 2] + 0.3 * x[at - 3])) / 1e-4
+    assert_allclose(_loss(x, at, y, 2, 0.3, 1.1, 1e-4), np.nanmean(np.log1p(misfit**2)), rtol=1e-12)

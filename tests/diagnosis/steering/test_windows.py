@@ -1,0 +1,43 @@
+"""What a steering plant gives in windows: derivatives by its constants, and openings of coarser blocks."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from diagnosis.steering.valve_map import ValveMap
+from diagnosis.steering.windows import Windows
+
+CONSTANTS = np.array([1.0, 1.2, 0.03, 0.02, 0.25, 0.2, 0.06, 0.002])
+
+
+def windows(seed: int = 0) -> Windows:
+    rng = np.random.default_rng(seed)
+    u = np.repeat(rng.normal(0.0, 0.3, 120), 20) * np.sin(np.arange(2400) / 70)
+    none = np.zeros(95)
+    return Windows(none, u, none, none == 0, 25, 0.01, 0.0)
+
+
+def rates(x: np.ndarray) -> np.ndarray:
+    return windows().predicted(ValveMap(*x[:6]), x[6], x[7])
+
+
+@pytest.mark.parametrize("constant", range(8))
+def test_derivatives_are_those_of_finite_differences(constant: int) -> None:
+    predicted, slopes = windows().slopes(ValveMap(*CONSTANTS[:6]), CONSTANTS[6], CONSTANTS[7])
+    step = np.where(np.arange(8) == constant, 1e-7, 0.0)
+    seen = (rates(CONSTANTS + step) - rates(CONSTANTS - step)) / 2e-7
+    assert_allclose(predicted, rates(CONSTANTS), rtol=1e-12)
+    scale = np.abs(seen).max()
+    assert scale > 0
+    # where the play hands over within the step the difference is of both sides
+    assert np.mean(np.abs(seen - slopes[:, constant]) < 1e-5 * scale) > 0.97
+
+
+def test_coarser_openings_give_about_the_same_rates() -> None:
+    valve = ValveMap(*CONSTANTS[:6])
+    fine, coarse = (w.predicted(valve, 0.06, 0.002) for w in (windows(), windows().coarser(5)))
+    assert windows().coarser(5).u.size == windows().u.size // 5
+    assert np.abs(fine - coarse).max() < 0.1 * np.abs(fine).max()
+    assert windows().coarser(4).length == 25
