@@ -6,18 +6,22 @@ from typing import Any
 
 import msgspec
 
+from diagnosis.audit.fleet import fleet_types
 from diagnosis.audit.fleet.fleet_types import FleetDocument
+from diagnosis.evaluation import document as evaluation_document
 from diagnosis.evaluation.document import ScoresDocument
+from diagnosis.results import comparison_document
+from diagnosis.results import document as report_document
 from diagnosis.results.comparison_document import ComparisonDocument
 from diagnosis.results.document import ReportDocument
 from replay.errors import ConfigError
 
-#: Type of each document; its docstrings are the schema's descriptions.
-DOCUMENTS: dict[str, type] = {
-    "report": ReportDocument,
-    "comparison": ComparisonDocument,
-    "scores": ScoresDocument,
-    "fleet": FleetDocument,
+#: Type of each document, whose docstrings are the schema's descriptions, and what it says of its own schema.
+DOCUMENTS: dict[str, tuple[type, str]] = {
+    "report": (ReportDocument, report_document.SCHEMA),
+    "comparison": (ComparisonDocument, comparison_document.SCHEMA),
+    "scores": (ScoresDocument, evaluation_document.SCHEMA),
+    "fleet": (FleetDocument, fleet_types.SCHEMA),
 }
 
 
@@ -32,7 +36,8 @@ def schema_of(name: str) -> dict[str, Any]:
     Returns
     -------
     dict[str, Any]
-        Of JSON Schema 2020-12; further keys are allowed everywhere, because later versions may add some.
+        Of JSON Schema 2020-12; further keys are allowed everywhere, because later versions may add some. Its ``$id`` ends in
+        what the document's own ``schema`` says.
 
     Raises
     ------
@@ -41,4 +46,10 @@ def schema_of(name: str) -> dict[str, Any]:
     """
     if name not in DOCUMENTS:
         raise ConfigError(f"schema {name}: no such document; the tool writes {', '.join(DOCUMENTS)}")
-    return {"$schema": "https://json-schema.org/draft/2020-12/schema", **msgspec.json.schema(DOCUMENTS[name])}
+    document, version = DOCUMENTS[name]
+    return {
+        "$schema": "https://json-schema.org/draft/2020-12/schema",
+        "$id": f"urn:{version.replace('/', ':')}",
+        "title": f"mfhca {name}, {version}",
+        **msgspec.json.schema(document),
+    }

@@ -204,6 +204,7 @@ def _doubts(files: Sequence[MissionFile], paths: Sequence[Path], before: Signals
         with suppress(ConfigError):  # a file of that name that is no truth
             if read_truth(own).intervals:
                 out.append(
-                    f"{path}: {own.name} names faults that the recording already has; the new truth does not contain them"
+                    f"{path}: {own.name} names faults that the recording already has; the new truth does not contain them, "
+                    "and `mfhca evaluate` counts reports of them as false alarms: inject into a healthy recording"
                 )
     return out

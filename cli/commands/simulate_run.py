@@ -89,12 +89,18 @@ def run_simulation(terminal: Terminal, request: SimulateRequest) -> None:
         from replay.simulation.run import simulate_mission
         from replay.truth import write_truth
 
-        mission = simulate_mission(_changed(_options(request, faults), request.settings))
+        options = _changed(_options(request, faults), request.settings)
+        _check_law(request, options)
+        mission = simulate_mission(options)
         if not request.force:
             _keep_other_truth(truth, mission.truth)
         progress(Progress(Stage.WRITING, log.name))
         write_mission(mission, log, "ros1" if kind is LogFormat.BAG else kind.value)
         write_truth(mission.truth, truth)
+    if options.faults is None and options.scenario != "healthy" and not mission.truth.intervals:
+        terminal.note(
+            f"{log}: the {options.scenario} scenario has no fault in {options.duration_s:g} s; give a longer --duration, or --fault"
+        )
     _show(terminal, mission, log, truth, kind, request.json)
 
 
@@ -161,8 +167,19 @@ def _keep_other_truth(path: Path, truth: MissionTruth) -> None:
         )
 
 
+def _check_law(request: SimulateRequest, options: SimulationOptions) -> None:
+    """Raise a `ConfigError` where a law is asked for and the machine's structure has another."""
+    if request.law is None or options.structure is None:
+        return
+    own = options.structure.structure(options.seed).law
+    if own != "recorded":
+        raise ConfigError(
+            f"--law {request.law}: a machine of this structure has its own law, {own}; leave out --law, or structure"
+        )
+
+
 def _structure(settings: list[str]) -> StructureOptions | None:
-    """Structure that the settings name; the last one counts."""
+    """Structure that the settings name."""
     from replay.simulation.structures import StructureOptions
 
     names = [text for key, _, text in (words.partition("=") for words in settings) if key == "structure" and text]
@@ -179,8 +196,11 @@ def _changed(options: SimulationOptions, settings: list[str]) -> SimulationOptio
     """
     values: dict[str, float] = {}
     structure = _structure(settings)
-    for words in settings:
-        key, _, text = words.partition("=")
+    keys = [words.partition("=")[0] for words in settings]
+    for words, key in zip(settings, keys, strict=True):
+        text = words.partition("=")[2]
+        if keys.count(key) > 1:
+            raise ConfigError(f"--set {words}: {key} is given {keys.count(key)} times; give it once")
         if not text:
             raise ConfigError(f"--set {words}: the value is missing; expected KEY=VALUE")
         if key == "structure":

@@ -20,6 +20,8 @@ from diagnosis.results.vocabulary import Kind
 from replay.errors import ConfigError, LogError
 from replay.truth import MissionTruth
 
+_BEYOND_S, _BEYOND = 1.0, 0.01  # by which a result may reach beyond its truth [s], or as a share of it
+
 
 @dataclass(frozen=True)
 class MissionScores:
@@ -77,6 +79,12 @@ def _evaluate(report: ReportDocument, truth: MissionTruth, name: str, speeds: Sp
         raise ConfigError(
             f"{name}: begins {shift:.1f} s after the truth file's mission, which lasts {truth.duration_s:.1f} s, so they "
             "do not overlap; give the truth file of this log with --truth"
+        )
+    beyond = max(-shift, 0.0) + max(shift + float(report["log"]["duration_s"]) - truth.duration_s, 0.0)
+    if beyond > max(_BEYOND_S, _BEYOND * truth.duration_s):
+        raise ConfigError(
+            f"{name}: {beyond:.1f} s of its {float(report['log']['duration_s']):.1f} s lie outside of the truth file's mission, "
+            f"which lasts {truth.duration_s:.1f} s; expected the mission or a part of it; give the truth file of this log with --truth"
         )
     states: dict[str, dict[str, list[tuple[float, float, str]]]] = {}
     for row in report["states"]:

@@ -7,8 +7,8 @@ from collections.abc import Mapping, Sequence
 
 from diagnosis.report.judged_parts import kind_of
 from diagnosis.report.rows import Group, Row
-from diagnosis.results.document import MachineRow, ReportDocument
-from diagnosis.results.vocabulary import Kind
+from diagnosis.results.document import ReportDocument
+from diagnosis.results.vocabulary import Kind, Tier
 from replay.control.loop_columns import replayed_unit
 from replay.faults import Side
 from replay.machine.quantities import OPENING
@@ -17,7 +17,8 @@ from replay.machine.signal_table import BY_KIND, find_signal
 DEGREES = 180.0 / math.pi
 #: Leaf of the signal that tells what a component does.
 MOTION = {Kind.WHEEL: "v", Kind.STEER: "phi"}
-_OF_THE_SIGNAL = ("residual", "threshold", "expected", "delta_bar", "delta_bar_std")
+_COMPARED = ("residual", "threshold", "expected")
+_OF_THE_SIGNAL = ("delta_bar", "delta_bar_std")
 _UNKNOWN = "unknown unit"
 
 
@@ -50,18 +51,30 @@ def units_of(
         for c in (*(row.band or ()), *((row.threshold,) if row.threshold else ())):
             known.setdefault(c, (row.unit, row.band_scale))
     recorded = {s["name"]: s["unit"] for s in report["signals"]}
-    return [known.get(c) or on_page(recorded.get(c) or _unit(c, report["machine"])) for c in columns]
+    return [known.get(c) or on_page(recorded.get(c) or _unit(c, report)) for c in columns]
 
 
-def _unit(column: str, machine: MachineRow) -> str:
+def _unit(column: str, report: ReportDocument) -> str:
     head, _, rest = column.partition(".")
     component, _, leaf = rest.rpartition(".")
     if head == "evidence":
         part, _, side = component.rpartition(".")
-        return natural_unit(kind_of(part, machine), Side(side)) if leaf in _OF_THE_SIGNAL else "1"
+        kind = kind_of(part, report["machine"])
+        if leaf in _COMPARED:
+            return natural_unit(kind, Side(side)) if _measured(part, side, report) else motion_unit(kind)
+        return natural_unit(kind, Side(side)) if leaf in _OF_THE_SIGNAL else "1"
     if head == "replay":
         return replayed_unit(leaf) or _UNKNOWN
     if head == "path":
         return "m"
     signal = find_signal(column)
     return _UNKNOWN if signal is None else signal.shown_unit
+
+
+def _measured(component: str, side: str, report: ReportDocument) -> bool:
+    """Whether a side is judged by what is measured of it; a model compares the motion that a valve gives."""
+    return any(
+        row["tier"] == Tier.DIRECT
+        for row in report["coverage"]
+        if row["component"] == component and row["side"] == side
+    )

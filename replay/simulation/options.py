@@ -153,6 +153,11 @@ class SimulationOptions:
                 f"fault of {fault.component}: {fault.start_s:g}…{fault.stop_s:g} s is not an interval; start must be at "
                 "least 0 and before stop"
             )
+        if fault.start_s >= self.duration_s:
+            raise ConfigError(
+                f"fault of {fault.component}: begins at {fault.start_s:g} s, but the mission ends at {self.duration_s:g} s; "
+                "expected a start before that: give an earlier one, or a longer mission"
+            )
         check_range(f"fault of {fault.component}: epsilon", fault.epsilon, 0.0, 1.0, "")
         check_range(f"fault of {fault.component}: sat_std", fault.sat_std, 0.0, 1e3, "")
         check_range(f"fault of {fault.component}: sat_tau_s", fault.sat_tau_s, 0.0, 1e6, "s")

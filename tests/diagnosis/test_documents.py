@@ -42,6 +42,8 @@ def test_schemas_are_schemas_with_words(name: str) -> None:
     schema = schema_of(name)
     Draft202012Validator.check_schema(schema)
     assert schema["$schema"] == "https://json-schema.org/draft/2020-12/schema"
+    assert schema["$id"].startswith("urn:mfhca-")
+    assert schema["title"].startswith(f"mfhca {name}, mfhca-")
     for title, definition in schema["$defs"].items():
         assert definition["title"] == title
         assert len(definition["description"]) > 10, title

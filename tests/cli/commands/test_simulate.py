@@ -113,3 +113,35 @@ def test_an_earlier_log_and_the_truth_of_another_are_kept_without_force(
     assert run(["simulate", "-q", "-o", str(other), *SHORT]) == 0  # the same mission once more
     assert run(["simulate", "-q", "-o", str(log), *another, "--force"]) == 0
     assert len(read_truth(tmp_path / "s.truth.json").intervals) == 1
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (
+            ["--fault", "FR sensor stuck 9 12"],
+            "fault of FR: begins at 9 s, but the mission ends at 4 s; expected a start",
+        ),
+        (["--set", "structure=pump", "--set", "structure=valves"], "structure is given 2 times; give it once"),
+        (["--set", "K=1", "--set", "K=1.1"], "--set K=1: K is given 2 times; give it once"),
+        (
+            ["--set", "structure=valves", "--law", "signed"],
+            "--law signed: a machine of this structure has its own law, pi",
+        ),
+    ],
+)
+def test_what_would_be_ignored_is_refused(
+    words: list[str], message: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    log = tmp_path / "x.csv"
+    assert run(["simulate", "-o", str(log), *SHORT, *words]) == 2
+    assert message in capsys.readouterr().err
+    assert not log.exists()
+
+
+def test_a_scenario_whose_faults_come_later_says_so(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    short = ["--duration", "4", "--rate", "100", "--scenario", "paper"]
+    assert run(["simulate", "-o", str(tmp_path / "x.csv"), *short]) == 0
+    assert "the paper scenario has no fault in 4 s; give a longer --duration, or --fault" in capsys.readouterr().err
+    assert run(["simulate", "-o", str(tmp_path / "y.csv"), *SHORT, "--set", "structure=pump", "--law", "signed"]) == 0
+    assert "no fault" not in capsys.readouterr().err

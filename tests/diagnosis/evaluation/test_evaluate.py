@@ -323,7 +323,7 @@ def test_a_report_of_a_part_of_the_mission() -> None:
     """Times are compared on the log's clock, faults outside the part are left out."""
     truth = truth_of(fault("B", SENSOR, "stuck", 2.0, 4.0), fault("B", SENSOR, "stuck", 11.0, 14.0))
     report = report_of(row("B", "sensor", "stuck", 1.0, 4.0))
-    report["log"] = {"start_ns": START + 10_000_000_000, "duration_s": 20.0}
+    report["log"] = {"start_ns": START + 10_000_000_000, "duration_s": 10.0}
     counts = wheels(report, truth)
     assert [(f.start_s, f.stop_s, f.outcome) for f in counts.faults] == [(11.0, 14.0, "right")]
     assert counts.faults[0].onset_error_s == pytest.approx(0.0)
@@ -388,6 +388,12 @@ def test_truth_of_another_mission_is_refused() -> None:
     late["log"]["start_ns"] = START + 3_600_000_000_000
     with pytest.raises(ConfigError, match=r"mission\.json: begins 3600\.0 s after the truth file's mission"):
         evaluate_report(late, truth_of(), "mission.json")
+    longer = report_of()
+    longer["log"]["duration_s"] = 35.0
+    with pytest.raises(
+        ConfigError, match=r"mission\.json: 15\.0 s of its 35\.0 s lie outside .* lasts 20\.0 s; .* --truth"
+    ):
+        evaluate_report(longer, truth_of(), "mission.json")
     with pytest.raises(ConfigError, match="its components are X, the truth file's wheels A, B"):
         evaluate_report(report_of(parts=("X",)), truth_of())
     with pytest.raises(ConfigError, match="rate_hz is 0; expected the recorded rate"):

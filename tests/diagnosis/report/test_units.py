@@ -16,13 +16,25 @@ def test_units_of_columns_with_and_without_a_figure() -> None:
     shown = derived(columns, report["intervals"])
     figures = figures_of(report["intervals"], report["machine"], shown, None)
     groups = loop_groups(report["machine"]["wheels"], report["machine"]["axles"], shown)
+    assert report["coverage"]
+    for row in report["coverage"]:
+        if (row["component"], row["side"]) == ("FR", "actuator"):
+            row["tier"] = "direct"
     names = [
         "wheel.FR.v",
         "steer.front.phi",
         "imu.yaw_rate",
         "replay.FR.u_difference",
         "evidence.front.sensor.residual",
+        "evidence.FR.actuator.expected",
+        "evidence.RL.actuator.expected",
+        "evidence.rear.actuator.threshold",
+        "evidence.rear.actuator.delta_bar",
+        "path.x",
+        "made.up",
     ]
-    units = units_of([*names, "evidence.FR.actuator.expected", "path.x", "made.up"], report, figures, groups)
-    assert [u for u, _ in units] == ["m/s", "°", "°/s", "of full opening", "°", "of full opening", "m", "unknown unit"]
+    units = units_of(names, report, {}, ())
+    assert [u for u, _ in units_of(names[:5], report, figures, groups)] == ["m/s", "°", "°/s", "of full opening", "°"]
+    opening = "of full opening"
+    assert [u for u, _ in units] == ["m/s", "°", "°/s", opening, "°", opening, "m/s", "°", opening, "m", "unknown unit"]
     np.testing.assert_allclose([units[1][1], units[2][1], units[0][1]], [180 / math.pi, 180 / math.pi, 1.0])
