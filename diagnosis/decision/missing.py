@@ -21,12 +21,12 @@ _COSTS = {
     "steer.u_applied": "the steering valve is judged by how the angle follows its command; a constant angle gives no evidence on it",
     "cmd.v": "without recorded v_c,i no wheel has a command: no e, no Ψ̂, no driving time",
     "cmd.omega": "commands of the wheels are computed as if driving straight ahead, unless v_c,i is recorded",
-    "imu.yaw_rate": "no effect on the verdict: the yaw rate is only shown beside the evidence",
-    "gnss.lat": "the path is drawn from odometry; without GNSS and odometry no path is drawn",
-    "gnss.lon": "the path is drawn from odometry; without GNSS and odometry no path is drawn",
-    "gnss.speed": "no effect on the verdict: it is only shown beside the evidence",
-    "odom.x": "the path is drawn from GNSS; without GNSS and odometry no path is drawn",
-    "odom.y": "the path is drawn from GNSS; without GNSS and odometry no path is drawn",
+    "imu.yaw_rate": "the direction of travel rests on the steering angles alone",
+    "gnss.lat": "no speed of the body by GNSS to judge the wheels by; the path is drawn from odometry, if at all",
+    "gnss.lon": "no speed of the body by GNSS to judge the wheels by; the path is drawn from odometry, if at all",
+    "gnss.speed": "the speed of the body rests on positions, where they are logged",
+    "odom.x": "no speed of the body by odometry to judge the wheels by; the path is drawn from GNSS, if at all",
+    "odom.y": "no speed of the body by odometry to judge the wheels by; the path is drawn from GNSS, if at all",
     "odom.yaw": "no effect on the verdict: it is only shown beside the evidence",
 }
 

@@ -7,8 +7,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from diagnosis.wheels.inputs import wheel_channels, wheel_drive
 from diagnosis.wheels.plant_identification import PlantFit, identify_plants
+from diagnosis.wheels.wheel_channels import wheel_channels
+from diagnosis.wheels.wheel_fit import wheel_drive
 from replay.control.loop import Replay, stack
 from replay.machine.config import Machine
 from replay.signals.timeline import Timeline

@@ -63,6 +63,9 @@ class WheelBlocks:
         [m/s].
     habit : NDArray[np.int8], shape (n, wheels)
         What a reading shows by its updates alone: `RESTS`, `RESTLESS` or 0.
+    body_speed, body_std : Array, shape (n, wheels), or None
+        Speed at which each wheel rolls by sensors of the body, and its standard deviation [m/s]; NaN where unknown, None
+        without any.
     """
 
     width: int
@@ -83,6 +86,8 @@ class WheelBlocks:
     habit: NDArray[np.int8]
     store: ColumnStore = field(default_factory=ColumnStore, repr=False)
     ended: bool = field(default=False, kw_only=True)
+    body_speed: Array | None = field(default=None, kw_only=True)
+    body_std: Array | None = field(default=None, kw_only=True)
 
     @property
     def dt(self) -> float:
@@ -111,6 +116,8 @@ class WheelBlocks:
             habit=self.habit[cut],
             store=self.store,
             ended=self.ended,
+            body_speed=None if self.body_speed is None else self.body_speed[cut],
+            body_std=None if self.body_std is None else self.body_std[cut],
         )
 
     def ending(self) -> WheelBlocks:

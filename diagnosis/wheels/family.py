@@ -2,11 +2,17 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from diagnosis.evidence import ACTUATOR, SENSOR, Contribution, MissionView, Part
 from diagnosis.results.assessment import Assessment
 from diagnosis.results.vocabulary import Tier
 from diagnosis.wheels.assess import assess_wheels
-from diagnosis.wheels.inputs import WheelChannels, slip_of, wheel_channels, wheel_fit, wheels_data
+from diagnosis.wheels.body import measured_body
+from diagnosis.wheels.inputs import wheels_data
+from diagnosis.wheels.motion import slip_of
+from diagnosis.wheels.wheel_channels import WheelChannels, wheel_channels
+from diagnosis.wheels.wheel_fit import wheel_fit
 from replay.progress import Progress, Stage
 
 
@@ -24,13 +30,14 @@ class WheelEvidence:
         mission.progress(Progress(Stage.IDENTIFYING_WHEELS))
         if mission.angle is None or mission.doubtful is None:
             return Contribution({})
-        fit = wheel_fit(channels, replay, timeline, machine, mission.angle)
+        body = measured_body(timeline, machine, channels.speed, replay.v_ref, mission.angle)
+        fit = wheel_fit(channels, replay, timeline, machine, mission.angle, body)
         if fit is None:
             return Contribution({})
         mission.progress(Progress(Stage.JUDGING_WHEELS))
         slip = slip_of(timeline, replay, machine, channels.v, mission.angle, mission.doubtful)
         data = wheels_data(
-            timeline, replay, machine, channels, fit, mission.alive, mission.angle, mission.doubtful, slip
+            timeline, replay, machine, channels, fit, mission.alive, mission.angle, mission.doubtful, slip, body
         )
         parts: dict[Part, Assessment] = {}
         for i, (sensor, actuator) in assess_wheels(data, machine.limits, gains=fit.reliable).items():
@@ -39,7 +46,8 @@ class WheelEvidence:
                 parts[wheel, SENSOR] = sensor
             if wheel in mission.wheels and not channels.has_applied[i]:
                 parts[wheel, ACTUATOR] = actuator
-        return Contribution(parts, model=fit)
+        said = () if body is None else body.body.notes
+        return Contribution({part: replace(a, notes=(*a.notes, *said)) for part, a in parts.items()}, model=fit)
 
 
 def _channels(mission: MissionView) -> WheelChannels:

@@ -16,7 +16,9 @@ from numpy.typing import NDArray
 
 from diagnosis.estimation.back_pointers import STAY, trace
 from diagnosis.wheels.blocks import WheelBlocks
-from diagnosis.wheels.joint_kernel import (
+from diagnosis.wheels.entry_kernel import enter
+from diagnosis.wheels.joint_kernel import scan_wheels
+from diagnosis.wheels.joint_types import (
     GAIN,
     LAGGED_DRIVE,
     JointConstants,
@@ -24,10 +26,8 @@ from diagnosis.wheels.joint_kernel import (
     JointOutput,
     JointState,
     JointWork,
-    scan_wheels,
 )
 from diagnosis.wheels.models import HEALTHY, MODELS, JointModel, WheelFilterModel
-from diagnosis.wheels.step_kernel import enter
 from replay.arrays.blocks import blocks as cut_in
 from replay.arrays.blocks import release
 
@@ -153,6 +153,8 @@ def _forward(blocks: WheelBlocks, model: JointModel, state: JointState, given: N
         unseen=blocks.unseen * np.array([w.K if blocks.ended else 0.0 for w in _filled(model)]),
         ratio=blocks.ratio,
         turn=blocks.turn,
+        sensed=_or_unknown(blocks.body_speed, blocks.y.shape),
+        sensed_std=_or_unknown(blocks.body_std, blocks.y.shape),
         status=blocks.status,
         quiet=blocks.quiet,
         given=given,
@@ -167,6 +169,11 @@ def _forward(blocks: WheelBlocks, model: JointModel, state: JointState, given: N
     scan_wheels(seen, constants, after, out, JointWork.of(wheels, blocks.width))
     pointers = tuple(np.ascontiguousarray(out.back[:, i]) for i in range(wheels))
     return JointPass(pointers, out.best, out.fault, out.inputs, after)
+
+
+def _or_unknown(values: Array | None, shape: tuple[int, ...]) -> Array:
+    """Values of blocks; NaN where there are none."""
+    return np.full(shape, np.nan) if values is None else np.ascontiguousarray(values)
 
 
 def _filled(model: JointModel) -> list[WheelFilterModel]:

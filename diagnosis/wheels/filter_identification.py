@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from diagnosis.channels.noise import moving_sum, quick_noise, slow_mismatch, usual_distance, usual_rounding, white_noise
 from diagnosis.channels.sample_status import PAIR
 from diagnosis.wheels.blocks import WheelBlocks
+from diagnosis.wheels.body import with_body
 from diagnosis.wheels.filter import forward
 from diagnosis.wheels.inputs import WheelsData
 from diagnosis.wheels.models import JointModel, WheelFilterModel
@@ -26,8 +27,10 @@ _TRIAL_S = 60.0
 def joint_model(data: WheelsData, blocks: WheelBlocks) -> tuple[JointModel, WheelBlocks]:
     """Constants of all wheels' filters, on the ground or in the air by what explains the mission best.
 
-    Also the blocks as they are to be read: whether valves go on beyond the openings at which they were seen.
+    Also the blocks as they are to be read: with what sensors of the body say, and whether valves go on beyond the openings at
+    which they were seen.
     """
+    blocks = with_body(blocks, data.body)
     model = JointModel(
         wheels=tuple(None if p is None else filter_model(data, i) for i, p in enumerate(data.plants)),
         flow=data.flow,

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Sequence
+from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,74 +14,21 @@ from diagnosis.channels.liveness import alive
 from diagnosis.channels.sample_status import sample_status
 from diagnosis.estimation.lag import low_passed_on
 from diagnosis.results.wheel_model import WheelModelFit
-from diagnosis.wheels.blocks import block_width
-from diagnosis.wheels.identification import demand, identified, identify
-from diagnosis.wheels.parity import slipping
-from diagnosis.wheels.plant_identification import Drive
+from diagnosis.wheels.body import MeasuredBody
+from diagnosis.wheels.identification import demand
+from diagnosis.wheels.motion import in_motion
 from diagnosis.wheels.readings import SpeedNoise, habits_of, news, speed_noises
 from diagnosis.wheels.valve_map import effective
-from replay.arrays.blocks import release
+from diagnosis.wheels.wheel_channels import WheelChannels
 from replay.arrays.column_store import ColumnStore
 from replay.arrays.numeric import without_nan
-from replay.control.kinematics import low_pass, speed_ratios, wheel_angles
-from replay.control.loop import Replay, any_finite, stack
+from replay.control.loop import Replay, any_finite
 from replay.machine.config import Machine, Noise, WheelPlant
 from replay.signals.timeline import Timeline
 
 Array = NDArray[np.float64]
 
 _QUIET = 0.4
-_STEER_HZ = 3.0
-
-
-@dataclass(frozen=True)
-class WheelChannels:
-    """Speeds and openings of all wheels, shape (n, wheels), and which of them are measured by two instruments (wheels,)."""
-
-    v: Array
-    u: Array
-    true: Array
-    applied: Array
-    store: ColumnStore = field(default_factory=ColumnStore, repr=False)
-
-    def without_speed(self, wheels: Sequence[int]) -> WheelChannels:
-        """The same with the measured speeds of some wheels left out."""
-        v = np.array(self.v)
-        v[:, wheels] = np.nan
-        return replace(self, v=v)
-
-    @cached_property
-    def has_true(self) -> NDArray[np.bool_]:
-        """Wheels with a second speed."""
-        return any_finite(self.true)
-
-    @cached_property
-    def has_applied(self) -> NDArray[np.bool_]:
-        """Wheels whose opening is measured."""
-        return any_finite(self.applied)
-
-    def names(self, wheels: Sequence[str]) -> list[tuple[str, str]]:
-        """Names of the better speed and opening of each wheel."""
-        return [
-            (f"wheel.{w}.{'v_true' if true else 'v'}", f"wheel.{w}.{'u_applied' if applied else 'u'}")
-            for w, true, applied in zip(wheels, self.has_true, self.has_applied, strict=True)
-        ]
-
-    @cached_property
-    def speed(self) -> Array:
-        """The better speed of each wheel [m/s]."""
-        if not self.has_true.any():
-            return self.v
-        return self.store.map(lambda true, v: np.asarray(np.where(self.has_true, true, v)), self.true, self.v)
-
-    @cached_property
-    def opening(self) -> Array:
-        """The better opening of each wheel [fraction]."""
-        if not self.has_applied.any():
-            return self.u
-        return self.store.map(
-            lambda applied, u: np.asarray(np.where(self.has_applied, applied, u)), self.applied, self.u
-        )
 
 
 @dataclass(frozen=True)
@@ -121,6 +67,8 @@ class WheelsData:
         What the plants leave of the speed in the windows that agree best [1].
     doubtful : NDArray[np.bool_], shape (n, axles)
         Where a steering angle is in doubt.
+    body : MeasuredBody or None
+        The body by its own sensors; None without any.
     store : ColumnStore
         Where long columns stand.
     """
@@ -144,113 +92,13 @@ class WheelsData:
     dt: float
     misfit: float
     doubtful: NDArray[np.bool_]
+    body: MeasuredBody | None = None
     store: ColumnStore = field(default_factory=ColumnStore, repr=False)
 
     @cached_property
     def speed_noises(self) -> list[SpeedNoise | None]:
         """Noise of each speed sensor where it depends on the speed."""
         return speed_noises(self.y, self.status, self.habits, self.dt)
-
-
-def wheel_channels(timeline: Timeline, machine: Machine) -> WheelChannels:
-    """Channels of all wheels; NaN where a wheel lacks one."""
-    v, u, true, applied = (
-        stack(timeline, [f"wheel.{w}.{x}" for w in machine.wheels]) for x in ("v", "u", "v_true", "u_applied")
-    )
-    return WheelChannels(v, u, true, applied, timeline.store)
-
-
-def wheel_fit(
-    channels: WheelChannels, replay: Replay, timeline: Timeline, machine: Machine, angle: Array
-) -> WheelModelFit | None:
-    """Wheel models of the machine file, or identified in this mission; None where nothing allows it.
-
-    Parameters
-    ----------
-    channels, replay, timeline, machine
-        The mission.
-    angle : Array, shape (n, axles)
-        Best estimate of the axles' angles [rad].
-    """
-    if not (any_finite(channels.opening).any() and any_finite(channels.speed).any()):
-        return None
-    given = {i: p for i, w in enumerate(machine.wheels) if (p := machine.plant.wheels.get(w)) is not None}
-    if len(given) < len(machine.wheels):
-        found = identified(wheel_drive(channels, replay, timeline, machine, angle), machine, given)
-        if found is not None:
-            return found
-    width = min(block_width(timeline.dt), timeline.size)
-    limit = machine.limits.driving_speed
-
-    def mean(function: Callable[..., NDArray[Any]], *columns: Array) -> Array:
-        out = []
-        for part in timeline.store.blocks(timeline.size // width * width, width):
-            x = np.asarray(function(*(c[part] for c in columns)), np.float64)
-            out.append(x.reshape(-1, width, x.shape[1]).mean(axis=1))
-            release(*columns)
-        return np.concatenate(out)
-
-    moving = mean(lambda ref, v: np.abs(np.where(np.isfinite(ref), ref, v)) > limit, replay.v_ref, channels.speed)
-    return identify(
-        mean(np.asarray, channels.speed),
-        mean(np.asarray, channels.opening),
-        np.asarray(moving > 0.5),
-        timeline.dt * width,
-        given,
-        machine.plant.flow,
-        mean(lambda u: np.abs(without_nan(u)), channels.opening),
-    )
-
-
-def wheel_drive(channels: WheelChannels, replay: Replay, timeline: Timeline, machine: Machine, angle: Array) -> Drive:
-    """Block means of all wheels for `diagnosis.wheels.plant_identification`; parameters as in `wheel_fit`."""
-    width = min(block_width(timeline.dt), timeline.size)
-    limit = machine.limits.driving_speed
-    ratio, turn = _in_motion(angle, machine, timeline)
-
-    def mean(function: Callable[..., NDArray[Any]], *columns: Array) -> Array:
-        out = []
-        for part in timeline.store.blocks(timeline.size // width * width, width):
-            x = np.asarray(function(*(c[part] for c in columns)), np.float64)
-            out.append(x.reshape(-1, width, x.shape[1]).mean(axis=1))
-            release(*columns)
-        return np.concatenate(out)
-
-    moving = mean(lambda ref, v: np.abs(np.where(np.isfinite(ref), ref, v)) > limit, replay.v_ref, channels.speed)
-    y = mean(np.asarray, channels.speed)
-    return Drive(
-        y=y,
-        u=mean(np.asarray, channels.opening),
-        body=body_speeds(y, mean(np.asarray, ratio), mean(np.asarray, turn)),
-        moving=np.asarray(moving > 0.5),
-        dt=timeline.dt * width,
-    )
-
-
-def body_speeds(y: Array, ratio: Array, turn: Array) -> Array:
-    """Speed at which each wheel would roll by the median of the other wheels [m/s], shape (n, wheels)."""
-    with np.errstate(invalid="ignore", divide="ignore"):
-        speed = (y + turn) / ratio
-    out = np.full(y.shape, np.nan)
-    for i in range(y.shape[1]):
-        others = np.delete(speed, i, axis=1)
-        known = np.isfinite(others).all(axis=1)
-        if others.shape[1] and known.any():
-            out[known, i] = np.median(others[known], axis=1) * ratio[known, i] - turn[known, i]
-    return out
-
-
-def slip_of(
-    timeline: Timeline, replay: Replay, machine: Machine, v: Array, angle: Array, doubtful: NDArray[np.bool_]
-) -> NDArray[np.bool_]:
-    """Where a wheel breaks the parity of the body; nowhere without geometry, or where an axle's angle is in doubt."""
-    geometry = machine.geometry
-    if geometry is None or v.shape[1] < 4 or not any_finite(v).all() or not any_finite(angle).all():
-        return np.zeros(v.shape, dtype=np.bool_)
-    least = 2.5 * machine.limits.min_sat
-    turned = timeline.map(lambda a: wheel_angles(a, geometry), angle)
-    slip = slipping(v, angle, replay.phi_ref, turned, geometry, timeline.dt, least, timeline.store)
-    return timeline.map(lambda s, d: s & ~d.any(axis=1)[:, None], slip, doubtful)
 
 
 def wheels_data(
@@ -263,6 +111,7 @@ def wheels_data(
     angle: Array,
     doubtful: NDArray[np.bool_],
     slip: NDArray[np.bool_],
+    body: MeasuredBody | None = None,
 ) -> WheelsData:
     """Channels for the wheel models.
 
@@ -280,6 +129,8 @@ def wheels_data(
         Where it rests on a model or on a sensor in doubt.
     slip : NDArray[np.bool_], shape (n, wheels)
         Where a wheel breaks the parity of the body.
+    body : MeasuredBody or None
+        The body by its own sensors.
     """
     y, u, dt = channels.speed, channels.opening, timeline.dt
     given = [machine.plant.wheels.get(w) is not None for w in machine.wheels]
@@ -300,7 +151,7 @@ def wheels_data(
     fresh = [timeline.fresh.get(speed, np.zeros(timeline.size, dtype=np.bool_)) for speed, _ in names]
     habits = habits_of(y, fresh, dt)
     status = news(status, y, habits, dt)
-    ratio, turn = _in_motion(angle, machine, timeline)
+    ratio, turn = in_motion(angle, machine, timeline)
     return WheelsData(
         y=y,
         u=u,
@@ -321,6 +172,7 @@ def wheels_data(
         dt=dt,
         misfit=fit.spread if not all(given) else max(_share(p, machine.max_speed) for p in fit.plants),
         doubtful=doubtful,
+        body=body,
         store=timeline.store,
     )
 
@@ -366,23 +218,3 @@ def _starved(fit: WheelModelFit, u: Array, flow: float | None, timeline: Timelin
 
     (out,), _ = timeline.scan(starved, -(10**9), u)
     return out
-
-
-def _in_motion(angle: Array, machine: Machine, timeline: Timeline) -> tuple[Array, Array]:
-    """Wheel speed per speed of the body [1], and what each wheel rolls less because it steers [m/s]."""
-    wheels = len(machine.wheels)
-    geometry = machine.geometry
-    if geometry is None or not any_finite(angle).all():
-        return np.broadcast_to(np.nan, (timeline.size, wheels)), np.broadcast_to(0.0, (timeline.size, wheels))
-    offset, dt = np.array([w.offset for w in geometry.wheels.values()]), timeline.dt
-
-    def turning(state: tuple[Array, list[float]], angle: Array) -> tuple[tuple[Array], tuple[Array, list[float]]]:
-        """The state is the wheels' last angles [rad] and their low-passed rates [rad/s]."""
-        before, rates = state
-        turned = wheel_angles(angle, geometry)
-        rate = np.diff(turned, axis=0, prepend=before) / dt
-        smooth = np.stack([low_pass(rate[:, i], dt, _STEER_HZ, rates[i]) for i in range(wheels)], axis=1)
-        return (smooth * offset,), (turned[-1:], [float(x) for x in smooth[-1]])
-
-    (turn,), _ = timeline.scan(turning, (wheel_angles(angle[:1], geometry), [np.nan] * wheels), angle)
-    return timeline.map(lambda a: speed_ratios(a, geometry), angle), turn

@@ -9,8 +9,9 @@ from numba import njit
 from numpy.typing import NDArray
 
 from diagnosis.wheels.blocks import WheelBlocks
+from diagnosis.wheels.entry_kernel import enter
 from diagnosis.wheels.filter import JointPass, first_speeds
-from diagnosis.wheels.joint_kernel import (
+from diagnosis.wheels.joint_types import (
     BODY,
     DOUBT,
     DRIVE,
@@ -21,7 +22,7 @@ from diagnosis.wheels.joint_kernel import (
 )
 from diagnosis.wheels.models import HEALTHY, MODELS, JointModel, WheelConstants
 from diagnosis.wheels.runs import Runs
-from diagnosis.wheels.step_kernel import WheelInput, advance, enter, predict
+from diagnosis.wheels.step_kernel import WheelInput, advance, predict
 from replay.arrays.numeric import uncounted
 
 Array = NDArray[np.float64]

@@ -1,4 +1,4 @@
-"""Compiled Kalman step of one wheel's models: entry, prediction and correction on the means of one block of samples.
+"""Compiled Kalman step of one wheel's models: prediction and correction on the means of one block of samples.
 
 A model's state is z = [ν, g, x, c] with covariance P: ν the speed as its sensor scales it, g the unknown gain of the
 faulty side, x the load in units of its present standard deviation, c the stuck value or bias of the faulty side.
@@ -14,6 +14,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from diagnosis.channels.sample_status import PAIR, SILENT
+from diagnosis.wheels.entry_kernel import is_scaled
 from diagnosis.wheels.models import (
     A_BIAS,
     A_GAIN,
@@ -66,58 +67,6 @@ class WheelInput(NamedTuple):
     body: float  # speed at which this wheel would roll without slip [m/s]; NaN where unknown
     doubt: float  # its uncertainty [m/s]
     unseen: float  # by how much faster its valve may drive it than anyone has seen [m/s]
-
-
-@njit(cache=True, error_model="numpy")
-def is_scaled(m: int) -> bool:
-    """Whether ν of model m is in the scale of a faulty sensor."""
-    return m >= S_GAIN and m <= S_OU_LARGE
-
-
-@njit(cache=True, error_model="numpy")
-def enter(m: int, old: int, k: WheelConstants, z: Array, P: Array) -> None:
-    """Start model m from the state of model `old`: speed and load are carried over, the unknowns get their priors."""
-    v, var = z[old, 0], P[old, 0, 0]
-    x, x_var = z[old, 2], min(P[old, 2, 2], 1.0)
-    if is_scaled(old):
-        g = max(z[old, 1], 0.1)
-        var = var / (g * g) + (v / g) ** 2 * P[old, 1, 1] / (g * g)
-        v = v / g
-    elif old == S_STUCK or old == S_NONE:
-        var += (0.05 * k.span) ** 2  # the model alone has carried the speed
-    if old == ODD:
-        x *= ODD_LOAD
-    if m == ODD:
-        x /= ODD_LOAD
-    elif old > ODD:
-        x_var = max(x_var, 0.5)
-    z[m, :] = 0.0
-    P[m, :, :] = 0.0
-    z[m, 0], z[m, 1], z[m, 2] = v, 1.0, x
-    P[m, 0, 0], P[m, 2, 2] = var, x_var
-    if m == S_STUCK:
-        P[m, 3, 3] = k.span**2
-    elif is_scaled(m):
-        g, g_var = (0.5, 0.09) if m == S_GAIN else (0.65, 0.04)
-        z[m, 0], z[m, 1] = g * v, g
-        P[m, 0, 0] = g_var * v * v + (g * g + g_var) * var
-        P[m, 1, 1] = g_var
-        P[m, 0, 1] = P[m, 1, 0] = g_var * v
-        if m == S_OU_SMALL:
-            P[m, 3, 3] = (0.08 * k.span) ** 2
-        elif m == S_OU_LARGE:
-            P[m, 3, 3] = (0.15 * k.span) ** 2
-        elif m != S_GAIN:
-            P[m, 3, 3] = (0.1 * k.span) ** 2
-    elif m == A_GAIN:
-        z[m, 1], P[m, 1, 1] = 0.5, 0.09
-    elif m == A_NONE:
-        z[m, 1] = 0.0
-    elif m == A_STUCK:
-        z[m, 1], P[m, 3, 3] = 0.0, k.valve_span**2
-    elif m == A_BIAS:
-        z[m, 1], P[m, 1, 1] = 0.6, 0.04
-        P[m, 3, 3] = (0.5 * k.valve_span) ** 2
 
 
 @njit(cache=True, error_model="numpy")

@@ -37,7 +37,7 @@ TUNING = range(20)
 REPORTING = range(2000, 2040)
 SEEDS = {"tuning": TUNING, "reporting": REPORTING}
 
-EVIDENCE = ("direct", "spool", "base")
+EVIDENCE = ("direct", "spool", "base+body", "base")
 COUPLINGS = ("free", "ground")
 ICE = (0.0, 0.25)
 SCENARIOS = ("paper", "random", "healthy")
@@ -45,6 +45,7 @@ SCENARIOS = ("paper", "random", "healthy")
 _LACKS: dict[str, tuple[str, ...]] = {
     "direct": (),
     "spool": ("_true",),
+    "base+body": ("_true", ".u_applied"),
     "base": ("_true", ".u_applied", "imu.yaw_rate", "gnss.lat", "gnss.lon"),
 }
 

@@ -11,6 +11,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from diagnosis.channels.sample_status import PAIR, SILENT, SKIP
 from diagnosis.wheels.blocks import WheelBlocks, blocks_of
+from diagnosis.wheels.entry_kernel import enter
 from diagnosis.wheels.filter import first_speeds, forward, initial_state, most_probable
 from diagnosis.wheels.models import (
     A_GAIN,
@@ -28,7 +29,7 @@ from diagnosis.wheels.models import (
 )
 from diagnosis.wheels.run_kernel import evidence_of_runs
 from diagnosis.wheels.runs import Runs
-from diagnosis.wheels.step_kernel import WheelInput, advance, enter, predict
+from diagnosis.wheels.step_kernel import WheelInput, advance, predict
 from replay.machine.config import WheelPlant
 
 RAW, WIDTH, DT = 0.001, 10, 0.01

@@ -11,12 +11,15 @@ from numpy.testing import assert_allclose, assert_array_equal
 from diagnosis.channels.sample_status import PAIR, SILENT, SKIP
 from diagnosis.estimation.back_pointers import STAY
 from diagnosis.wheels.blocks import WheelBlocks, blocks_of
+from diagnosis.wheels.entry_kernel import is_scaled
 from diagnosis.wheels.filter import JointPass, forward, initial_state
 from diagnosis.wheels.joint_kernel import (
     _LEARNING,
     _OTHER_LOAD,
     _OTHER_NOISE,
     _RECOVERY,
+)
+from diagnosis.wheels.joint_types import (
     BODY,
     DOUBT,
     DRIVE,
@@ -26,8 +29,6 @@ from diagnosis.wheels.joint_kernel import (
     SHARE_NONE,
     SHARE_SOME,
     JointState,
-    taken,
-    weights,
 )
 from diagnosis.wheels.models import (
     A_BIAS,
@@ -46,6 +47,7 @@ from diagnosis.wheels.models import (
     JointModel,
     WheelFilterModel,
 )
+from diagnosis.wheels.shared_kernel import taken, weights
 from diagnosis.wheels.step_kernel import (
     _NO_LOSS,
     _OCCAM,
@@ -55,7 +57,6 @@ from diagnosis.wheels.step_kernel import (
     WheelInput,
     advance,
     correct,
-    is_scaled,
     predict,
 )
 from replay.machine.config import WheelPlant

@@ -10,7 +10,7 @@ from diagnosis.channels.sample_status import PAIR
 from diagnosis.estimation.back_pointers import STAY
 from diagnosis.wheels.blocks import WheelBlocks, blocks_of
 from diagnosis.wheels.filter import forward, most_probable
-from diagnosis.wheels.joint_kernel import SHARE_NONE
+from diagnosis.wheels.joint_types import SHARE_NONE
 from diagnosis.wheels.models import A_GAIN, A_NONE, HEALTHY, JointModel, WheelFilterModel
 from diagnosis.wheels.settle import settled
 from replay.machine.config import WheelPlant

@@ -13,6 +13,7 @@ from scipy.linalg import expm
 from scipy.stats import gamma
 
 from diagnosis.results.fault_rows import FAULT_ROWS
+from diagnosis.wheels.entry_kernel import enter
 from diagnosis.wheels.models import (
     A_BIAS,
     A_GAIN,
@@ -35,7 +36,7 @@ from diagnosis.wheels.models import (
     WheelConstants,
     WheelFilterModel,
 )
-from diagnosis.wheels.step_kernel import WheelInput, correct, enter, predict
+from diagnosis.wheels.step_kernel import WheelInput, correct, predict
 from replay.faults import FaultMode, Side
 
 MODEL = WheelFilterModel(

@@ -1,0 +1,107 @@
+"""Compiled Kalman smoother of what a sensor of the body says beyond the speed that the wheels have in common.
+
+State x = [e, β, a, c]: e the way by the sensor beyond that by the wheels [m], s·β the body's speed beyond the common one,
+s how far the wheels let it be off at that moment [m/s], a how far the sensor is mounted to the left [m], c the share by
+which the wheels count the way short [1].
+
+    ė = s·β + c·m + w_e,   β̇ = −β/T + w_β (of variance 1),   ȧ = ċ = 0,   measured  z = h·x + n
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+STATES = 4
+_JUMP = 6.0  # standard deviations beyond which a position has jumped
+
+
+class TrackModel(NamedTuple):
+    """Constants of the smoother. SI units."""
+
+    wander: float  # process noise of the sensor's own position [m/√s]
+    memory: float  # correlation time T of β [s]
+    mount: float  # standard deviation of a [m]
+    scale: float  # standard deviation of c [1]
+
+
+class TrackInput(NamedTuple):
+    """What is measured, per cell of `dt`."""
+
+    z: Array  # (n,) NaN: nothing
+    noise: Array  # (n,) its standard deviation
+    rows: Array  # (n, 4) h
+    moved: Array  # (n,) way by the wheels since the cell before [m]
+    off: Array  # (n,) s
+    dt: float
+
+
+class TrackOutput(NamedTuple):
+    """What the filter leaves for the smoother, per cell."""
+
+    before: Array  # (n, 4) predicted
+    before_cov: Array  # (n, 4, 4)
+    mean: Array  # (n, 4) filtered
+    cov: Array  # (n, 4, 4)
+    misfit: Array  # (n,) squared innovation over its variance; NaN without a sample
+    jumped: NDArray[np.bool_]  # (n,)
+
+
+@njit(cache=True, error_model="numpy")
+def filter_track(seen: TrackInput, k: TrackModel, out: TrackOutput) -> float:
+    """Run the filter over cells, filling `out`; the log-likelihood of the samples."""
+    x, P = np.zeros(STATES), np.zeros((STATES, STATES))
+    P[0, 0], P[1, 1], P[2, 2], P[3, 3] = 1e4, 1.0, k.mount**2, k.scale**2
+    keep = np.exp(-seen.dt / k.memory)
+    F = np.eye(STATES)
+    F[1, 1] = keep
+    likelihood, first = 0.0, True
+    for n in range(seen.z.size):
+        if n > 0:
+            F[0, 1], F[0, 3] = seen.off[n] * seen.dt, seen.moved[n]
+            x = F @ x
+            P = F @ P @ F.T
+            P[0, 0] += k.wander**2 * seen.dt
+            P[1, 1] += 1.0 - keep * keep
+        known = seen.z[n] == seen.z[n]
+        h = seen.rows[n]
+        out.jumped[n], out.misfit[n] = False, np.nan
+        innovation, s = 0.0, 1.0
+        if known:
+            innovation = seen.z[n] - h @ x
+            s = h @ P @ h + seen.noise[n] ** 2
+            if innovation * innovation > _JUMP**2 * s and h[0] != 0.0 and not first:
+                out.jumped[n] = True
+                P[0, 0] += innovation * innovation
+                s += innovation * innovation
+        out.before[n], out.before_cov[n] = x, P
+        if known:
+            share = innovation * innovation / s
+            gain = (P @ h) / s
+            x = x + gain * innovation
+            P = P - np.outer(gain, gain) * s
+            if not first:
+                likelihood -= 0.5 * (share + np.log(s))
+                out.misfit[n] = share
+            first = False
+        out.mean[n], out.cov[n] = x, P
+    return likelihood
+
+
+@njit(cache=True, error_model="numpy")
+def smooth_track(seen: TrackInput, k: TrackModel, out: TrackOutput) -> tuple[Array, Array]:
+    """Rauch-Tung-Striebel smoothing of what `filter_track` left: means (n, 4) and covariances (n, 4, 4)."""
+    mean, cov = out.mean.copy(), out.cov.copy()
+    F = np.eye(STATES)
+    F[1, 1] = np.exp(-seen.dt / k.memory)
+    for n in range(seen.z.size - 2, -1, -1):
+        F[0, 1], F[0, 3] = seen.off[n + 1] * seen.dt, seen.moved[n + 1]
+        gain = np.linalg.solve(out.before_cov[n + 1], F @ out.cov[n]).T
+        mean[n] = out.mean[n] + gain @ (mean[n + 1] - out.before[n + 1])
+        cov[n] = out.cov[n] + gain @ (cov[n + 1] - out.before_cov[n + 1]) @ gain.T
+    return mean, cov

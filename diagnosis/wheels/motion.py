@@ -1,0 +1,62 @@
+"""How wheels and body move together: the geometry in motion, the speed of the body by the wheels, wheels that slip."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from diagnosis.wheels.parity import slipping
+from replay.control.kinematics import low_pass, speed_ratios, wheel_angles
+from replay.control.loop import Replay, any_finite
+from replay.machine.config import Machine
+from replay.signals.timeline import Timeline
+
+Array = NDArray[np.float64]
+
+_STEER_HZ = 3.0
+
+
+def body_speeds(y: Array, ratio: Array, turn: Array) -> Array:
+    """Speed at which each wheel would roll by the median of the other wheels [m/s], shape (n, wheels)."""
+    with np.errstate(invalid="ignore", divide="ignore"):
+        speed = (y + turn) / ratio
+    out = np.full(y.shape, np.nan)
+    for i in range(y.shape[1]):
+        others = np.delete(speed, i, axis=1)
+        known = np.isfinite(others).all(axis=1)
+        if others.shape[1] and known.any():
+            out[known, i] = np.median(others[known], axis=1) * ratio[known, i] - turn[known, i]
+    return out
+
+
+def slip_of(
+    timeline: Timeline, replay: Replay, machine: Machine, v: Array, angle: Array, doubtful: NDArray[np.bool_]
+) -> NDArray[np.bool_]:
+    """Where a wheel breaks the parity of the body; nowhere without geometry, or where an axle's angle is in doubt."""
+    geometry = machine.geometry
+    if geometry is None or v.shape[1] < 4 or not any_finite(v).all() or not any_finite(angle).all():
+        return np.zeros(v.shape, dtype=np.bool_)
+    least = 2.5 * machine.limits.min_sat
+    turned = timeline.map(lambda a: wheel_angles(a, geometry), angle)
+    slip = slipping(v, angle, replay.phi_ref, turned, geometry, timeline.dt, least, timeline.store)
+    return timeline.map(lambda s, d: s & ~d.any(axis=1)[:, None], slip, doubtful)
+
+
+def in_motion(angle: Array, machine: Machine, timeline: Timeline) -> tuple[Array, Array]:
+    """Wheel speed per speed of the body [1], and what each wheel rolls less because it steers [m/s]."""
+    wheels = len(machine.wheels)
+    geometry = machine.geometry
+    if geometry is None or not any_finite(angle).all():
+        return np.broadcast_to(np.nan, (timeline.size, wheels)), np.broadcast_to(0.0, (timeline.size, wheels))
+    offset, dt = np.array([w.offset for w in geometry.wheels.values()]), timeline.dt
+
+    def turning(state: tuple[Array, list[float]], angle: Array) -> tuple[tuple[Array], tuple[Array, list[float]]]:
+        """The state is the wheels' last angles [rad] and their low-passed rates [rad/s]."""
+        before, rates = state
+        turned = wheel_angles(angle, geometry)
+        rate = np.diff(turned, axis=0, prepend=before) / dt
+        smooth = np.stack([low_pass(rate[:, i], dt, _STEER_HZ, rates[i]) for i in range(wheels)], axis=1)
+        return (smooth * offset,), (turned[-1:], [float(x) for x in smooth[-1]])
+
+    (turn,), _ = timeline.scan(turning, (wheel_angles(angle[:1], geometry), [np.nan] * wheels), angle)
+    return timeline.map(lambda a: speed_ratios(a, geometry), angle), turn
