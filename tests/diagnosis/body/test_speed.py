@@ -100,7 +100,7 @@ def test_body_that_stands_while_the_wheels_turn_is_left_out() -> None:
 
 
 def test_receiver_that_repeats_itself_says_nothing() -> None:
-    wheels, speed = rolling()
+    wheels, _ = rolling()
     still = Positions(np.arange(0, 100, 0.1), np.full(1000, 3.0 + 4.0j))
     found = body_speed(satellite(still), wheels)
     assert not found.known
