@@ -6,22 +6,22 @@ from typing import Any
 
 import msgspec
 
-from diagnosis.audit.fleet import fleet_types
+from diagnosis.audit.fleet.fleet_types import SCHEMA as FLEET_SCHEMA
 from diagnosis.audit.fleet.fleet_types import FleetDocument
-from diagnosis.evaluation import document as evaluation_document
+from diagnosis.evaluation.document import SCHEMA as SCORES_SCHEMA
 from diagnosis.evaluation.document import ScoresDocument
-from diagnosis.results import comparison_document
-from diagnosis.results import document as report_document
+from diagnosis.results.comparison_document import SCHEMA as COMPARISON_SCHEMA
 from diagnosis.results.comparison_document import ComparisonDocument
+from diagnosis.results.document import SCHEMA as REPORT_SCHEMA
 from diagnosis.results.document import ReportDocument
 from replay.errors import ConfigError
 
 #: Type of each document, whose docstrings are the schema's descriptions, and what it says of its own schema.
 DOCUMENTS: dict[str, tuple[type, str]] = {
-    "report": (ReportDocument, report_document.SCHEMA),
-    "comparison": (ComparisonDocument, comparison_document.SCHEMA),
-    "scores": (ScoresDocument, evaluation_document.SCHEMA),
-    "fleet": (FleetDocument, fleet_types.SCHEMA),
+    "report": (ReportDocument, REPORT_SCHEMA),
+    "comparison": (ComparisonDocument, COMPARISON_SCHEMA),
+    "scores": (ScoresDocument, SCORES_SCHEMA),
+    "fleet": (FleetDocument, FLEET_SCHEMA),
 }
 
 

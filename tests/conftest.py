@@ -7,6 +7,9 @@ from pathlib import Path
 
 import pytest
 
+# As in the command: threads of the linear algebra spin while they wait, and its products are small. Before numpy is imported.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
 from replay.arrays.kernel_cache import drop_stale_kernels
 
 ROOT = Path(__file__).resolve().parent.parent

@@ -13,6 +13,7 @@ from diagnosis.steering.valve_map import ValveMap, rate_at
 
 Array = NDArray[np.float64]
 
+_DEAD_STEP, _PLAY_STEP = 1e-4, 5e-5  # over which differences are taken [fraction], [rad]
 _OBEYED, _NEARLY = 4.0, 1e-3  # standard deviations and opening [fraction] by which a healthy valve may differ
 
 
@@ -40,7 +41,8 @@ def _window_slopes(u, valve, lag, play, dt, length):  # type: ignore[no-untyped-
     """What `_window_angles` gives, (w,), and its derivatives by slopes, dead bands, limits (up, down), lag and play, (w, 8).
 
     The derivatives obey the plant's own recursion, driven by those of the rate; the play hands on those of the moment in
-    which the sensor last moved. Long, for a loop that is split stores what stays in registers.
+    which the sensor last moved. Those by dead bands and play are differences over a step, for at a dead band or a play of 0
+    they would depend on openings and motions that are mere rounding. Long, for a loop that is split stores what stays in registers.
     """
     out, slopes = np.zeros(u.size // length), np.zeros((u.size // length, 8))
     lag = max(lag, 1e-4)
@@ -48,14 +50,14 @@ def _window_slopes(u, valve, lag, play, dt, length):  # type: ignore[no-untyped-
     b, k_r, k_f = 1 - a, lag * (1 - a), dt - lag * (1 - a)
     a_lag = a * dt / lag**2
     k_lag = (1 - a) - lag * a_lag
-    r = phi = seen = 0.0
-    by_rate, by_angle, by_seen, total_by = np.zeros(8), np.zeros(8), np.zeros(8), np.zeros(8)
+    r = phi = seen = wider = 0.0
+    by_rate, by_angle, by_seen, total_by = np.zeros(7), np.zeros(7), np.zeros(7), np.zeros(7)
     for w in range(out.size):
-        total = 0.0
+        total = total_wider = 0.0
         total_by[:] = 0.0
         for k in range(w * length, (w + 1) * length):
             f = rate_at(u[k], valve)
-            for i in range(8):
+            for i in range(7):
                 by_angle[i] += k_r * by_rate[i]
                 by_rate[i] *= a
             by_angle[6] += k_lag * (r - f)
@@ -64,14 +66,16 @@ def _window_slopes(u, valve, lag, play, dt, length):  # type: ignore[no-untyped-
                 beyond = u[k] - valve.dead_up
                 if valve.slope_up * beyond < valve.limit_up:
                     by_angle[0], by_rate[0] = by_angle[0] + k_f * beyond, by_rate[0] + b * beyond
-                    by_angle[2], by_rate[2] = by_angle[2] - k_f * valve.slope_up, by_rate[2] - b * valve.slope_up
+                    by_dead = -valve.slope_up * min(beyond / _DEAD_STEP, 1.0)
+                    by_angle[2], by_rate[2] = by_angle[2] + k_f * by_dead, by_rate[2] + b * by_dead
                 else:
                     by_angle[4], by_rate[4] = by_angle[4] + k_f, by_rate[4] + b
             elif u[k] < -valve.dead_down:
                 beyond = u[k] + valve.dead_down
                 if -valve.slope_down * beyond < valve.limit_down:
                     by_angle[1], by_rate[1] = by_angle[1] + k_f * beyond, by_rate[1] + b * beyond
-                    by_angle[3], by_rate[3] = by_angle[3] + k_f * valve.slope_down, by_rate[3] + b * valve.slope_down
+                    by_dead = valve.slope_down * min(-beyond / _DEAD_STEP, 1.0)
+                    by_angle[3], by_rate[3] = by_angle[3] + k_f * by_dead, by_rate[3] + b * by_dead
                 else:
                     by_angle[5], by_rate[5] = by_angle[5] - k_f, by_rate[5] - b
             phi += k_r * r + k_f * f
@@ -79,14 +83,16 @@ def _window_slopes(u, valve, lag, play, dt, length):  # type: ignore[no-untyped-
             if seen < phi - play or seen > phi + play:
                 for i in range(7):
                     by_seen[i] = by_angle[i]
-                by_seen[7] = -1.0 if seen < phi - play else 1.0
                 seen = min(max(seen, phi - play), phi + play)
+            wider = min(max(wider, phi - play - _PLAY_STEP), phi + play + _PLAY_STEP)
             total += seen
-            for i in range(8):
+            total_wider += wider
+            for i in range(7):
                 total_by[i] += by_seen[i]
         out[w] = total / length
-        for i in range(8):
+        for i in range(7):
             slopes[w, i] = total_by[i] / length
+        slopes[w, 7] = (total_wider - total) / (length * _PLAY_STEP)
     return out, slopes
 
 
