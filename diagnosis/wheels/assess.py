@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -15,16 +15,18 @@ from diagnosis.results.loss import Loss
 from diagnosis.results.vocabulary import Tier
 from diagnosis.wheels.blocks import WheelBlocks, blocks_of, per_sample
 from diagnosis.wheels.effectiveness import relative_losses
-from diagnosis.wheels.filter import JointPass, forward, most_probable
+from diagnosis.wheels.filter import JointPass
 from diagnosis.wheels.filter_identification import joint_model
-from diagnosis.wheels.findings import Surroundings, WheelFindings, WheelPath, findings_of
+from diagnosis.wheels.findings import Weighed, WheelFindings, WheelPath, findings_of
+from diagnosis.wheels.following import Following, follow
+from diagnosis.wheels.frames.features import mission_features
+from diagnosis.wheels.frames.windows import frames_at
 from diagnosis.wheels.inputs import WheelsData
 from diagnosis.wheels.models import ODD, JointModel, WheelFilterModel
 from diagnosis.wheels.readings import with_readings
 from diagnosis.wheels.run_kernel import evidence_of_runs
-from diagnosis.wheels.runs import runs_of
-from diagnosis.wheels.settle import settled
 from diagnosis.wheels.states import reasons_of, states_of, unexplained_s
+from diagnosis.wheels.tracks import Segment, Track, runs_between, segments_of, track_of
 from replay.faults import Side
 from replay.machine.config import Limits
 
@@ -41,7 +43,7 @@ def assess_wheels(data: WheelsData, limits: Limits, *, gains: bool) -> dict[int,
     limits : Limits
         What counts.
     gains : bool
-        Whether the models are good enough to judge gains and valves by.
+        Whether the wheel model is good enough to judge gains and valves by.
 
     Returns
     -------
@@ -51,18 +53,17 @@ def assess_wheels(data: WheelsData, limits: Limits, *, gains: bool) -> dict[int,
     blocks = blocks_of(data.y, data.u, data.status, data.quiet, data.ratio, data.turn, data.plants, data.dt, data.store)
     blocks = with_readings(blocks, data.y, data.habits, data.speed_noises, limits.driving_speed)
     model, blocks = joint_model(data, blocks)
-    done = settled(blocks, model, forward(blocks, model))
-    traced = {i: most_probable(done, i) for i, wheel in enumerate(model.wheels) if wheel is not None}
-    faulty = np.zeros(blocks.y.shape, dtype=np.bool_)
-    for i, (models, _) in traced.items():
-        faulty[:, i] = models > ODD
+    done, following = follow(data, blocks, model)
+    at = frames_at(len(blocks.y), blocks.dt)
+    features = mission_features(data, blocks, model, {i: f.described for i, f in following.items()}, at, gains=gains)
     out = {}
     losses = _losses(data, limits)
     for i, wheel in enumerate(model.wheels):
         if wheel is None:
             continue
-        path = _path(data, i, wheel, blocks, model, done, traced[i], _surroundings(data, i, blocks, faulty))
-        found = findings_of(path, limits, gains=gains)
+        track = track_of(features[i], at, blocks.dt, measured=bool(data.measured[i]))
+        path = _path(data, i, wheel, blocks, model, done, following[i], track)
+        found = findings_of(path, limits)
         sensor, actuator = _assessments(data, i, path, found, gains=gains)
         out[i] = sensor, actuator if data.measured[i] else replace(actuator, loss=losses[i])
     return out
@@ -83,12 +84,25 @@ def _path(
     blocks: WheelBlocks,
     model: JointModel,
     done: JointPass,
-    traced: tuple[NDArray[np.uint8], NDArray[np.bool_]],
-    surroundings: Surroundings,
+    following: Following,
+    track: Track,
 ) -> WheelPath:
-    """Wheel i on its most probable path, `traced`, with all models' evidence over its runs."""
-    models, entered = traced
-    runs = runs_of(models, entered, blocks.quiet[:, i], blocks.status[:, i], blocks.dt)
+    """Wheel i with its segments, and all models' evidence over them."""
+    n, runs = len(blocks.y), following.described.runs
+    segments = {side: segments_of(track, side, n, runs, blocks.dt) for side in (Side.SENSOR, Side.ACTUATOR)}
+    weighed: list[Weighed] = []
+    expected = following.evidence
+    for mine in segments.values():
+        if mine:
+            between, places = runs_between(mine, n)
+            found = evidence_of_runs(blocks, model, done, i, between)
+            weighed += [
+                Weighed(s, found.evidence[r], found.mean[r], found.cov[r]) for s, r in zip(mine, places, strict=True)
+            ]
+            expected = found
+    if all(segments.values()):  # what a healthy wheel would do is not to be learned from faults of either side
+        either, _ = runs_between(_united([*segments[Side.SENSOR], *segments[Side.ACTUATOR]]), n)
+        expected = evidence_of_runs(blocks, model, done, i, either)
     return WheelPath(
         y=data.y[:, i],
         names=data.names[i],
@@ -96,38 +110,30 @@ def _path(
         dt=data.dt,
         width=blocks.width,
         runs=runs,
-        evidence=evidence_of_runs(blocks, model, done, i, runs),
+        segments=weighed,
+        expected=expected.expected,
+        spread=expected.spread,
+        healthy={side: track.healthy(side, n) for side in segments},
         raised=done.best[:, i] > ODD,
-        odd=models == ODD,
         fault=done.fault[:, i],
-        habit=blocks.habit[:, i],
-        surroundings=surroundings,
     )
 
 
-def _surroundings(data: WheelsData, i: int, blocks: WheelBlocks, faulty: NDArray[np.bool_]) -> Surroundings:
-    """What the judgement of wheel i is weighed by; `faulty` (blocks, wheels) is where each is taken to be."""
-    n = blocks.y.shape[0]
-    opening = blocks.u[:, i].reshape(n, blocks.width).mean(axis=1)
-    driven = np.abs(opening)[~blocks.quiet[:, i]]
-    doubtful = np.zeros(n, dtype=np.bool_)
-    steps = np.asarray(data.doubtful[:: blocks.width].any(axis=1), dtype=np.bool_)[:n]
-    doubtful[: steps.size] = steps
-    return Surroundings(
-        misfit=data.misfit,
-        opening=opening,
-        usual=float(np.median(driven)) if driven.size else 1.0,
-        others=faulty.sum(axis=1) - faulty[:, i].astype(np.float64),
-        unseen=blocks.unseen[:, i] != 0,
-        doubtful=doubtful,
-    )
+def _united(segments: Sequence[Segment]) -> list[Segment]:
+    """Segments in order of time, without what an earlier one covers."""
+    out: list[Segment] = []
+    for s in sorted(segments, key=lambda s: s.start):
+        start = max(s.start, out[-1].stop) if out else s.start
+        if s.stop > start:
+            out.append(replace(s, start=start))
+    return out
 
 
 def _assessments(
     data: WheelsData, i: int, path: WheelPath, found: WheelFindings, *, gains: bool
 ) -> tuple[Assessment, Assessment]:
     """Sensor and actuator of wheel i."""
-    states = states_of(data, i, path, found, gains=gains)
+    states = states_of(data, i, path, found)
     no_opening = ~np.isfinite(data.u[:, i])
     step = steps_of(found.findings, path.y.size, data.dt)
     shared = Pictured.of(step, _series(path, data.status[:, i]))
@@ -156,14 +162,13 @@ def _series(path: WheelPath, status: NDArray[np.int8]) -> Iterator[tuple[str, Ar
     def held(values: Array) -> Array:
         return np.asarray(per_sample(values, path.width, path.y.size))
 
-    found = path.evidence
-    residual = held(found.expected)
+    residual = held(path.expected)
     np.subtract(path.y, residual, out=residual)
     residual[status != PAIR] = np.nan
     yield "residual", residual
     del residual
-    yield "threshold", held(3 * np.sqrt(found.spread + path.model.noise**2))
-    yield "expected", held(found.expected)
+    yield "threshold", held(3 * np.sqrt(path.spread + path.model.noise**2))
+    yield "expected", held(path.expected)
     yield "probability", held(path.fault)
 
 

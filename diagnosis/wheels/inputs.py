@@ -39,6 +39,8 @@ class WheelsData:
     ----------
     y, u : Array
         Measured speed [m/s] and valve opening [fraction], the second measurement where there is one.
+    reference : Array
+        Commanded speed [m/s]; NaN where there is none.
     residual : Sequence[Array], each of shape (n,)
         y − K·lowpass(u) of each wheel [m/s], NaN where the pump cannot feed it.
     status : NDArray[np.int8]
@@ -75,6 +77,7 @@ class WheelsData:
 
     y: Array
     u: Array
+    reference: Array
     residual: Sequence[Array]
     status: NDArray[np.int8]
     quiet: NDArray[np.bool_]
@@ -155,6 +158,7 @@ def wheels_data(
     return WheelsData(
         y=y,
         u=u,
+        reference=replay.v_ref,
         residual=residual,
         status=status,
         quiet=quiet,

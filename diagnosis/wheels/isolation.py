@@ -1,7 +1,8 @@
-"""Isolation: which row of the tables a run of one wheel is, with probabilities, and whether that is stated."""
+"""Isolation: which row of the tables a segment of one wheel is, with probabilities, and whether that is stated."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,10 +12,8 @@ from diagnosis.results.assessment import Finding
 from diagnosis.results.fault_rows import mode_words
 from diagnosis.results.result import Hypothesis
 from diagnosis.results.vocabulary import Kind, Tier, part_name
-from diagnosis.wheels.calibration import RunContext, calibrated
 from diagnosis.wheels.estimates import estimate
 from diagnosis.wheels.models import (
-    A_BIAS,
     A_GAIN,
     A_NONE,
     A_STUCK,
@@ -24,9 +23,7 @@ from diagnosis.wheels.models import (
     S_GAIN,
     S_NONE,
     S_OU_LARGE,
-    S_OU_SMALL,
     S_STUCK,
-    S_WHITE_3,
     TOTAL_SENSOR,
     Row,
     WheelFilterModel,
@@ -37,41 +34,37 @@ from replay.machine.config import Limits
 Array = NDArray[np.float64]
 
 _ODD_COST = 2.0  # by which an unusual load must explain more than the usual one
-_SIDES = (Side.SENSOR, Side.ACTUATOR)
 _WEAK_GAIN = 0.35  # a sensor's gain below this hides what the valve does
-_LEAST_DISTURBANCE_S = 1.0  # shorter ones are what the model gets wrong while a wheel recovers
-_LEAVES_OPEN = 0.05  # probability that a side is faulty above which it is not called healthy
-_USUAL = 0.75  # probability of a healthy wheel above which a run leaves nothing unexplained
 _LEAST_SIDE, _LEAST_ROW = 0.65, 0.45  # probabilities of a side and of its row from which on a finding is stated
 _LEAST_PART = 0.02  # a hypothesis below this is left out of the text
 _LEAST_HYPOTHESIS = 5e-4
-#: Models that need no model of the wheel: a sensor that is constant, silent or has white noise.
-_WITHOUT_PLANT = (*TOTAL_SENSOR, *range(S_WHITE_3, S_OU_SMALL))
 
 Ranking = list[tuple[Row | None, float]]
 
 
 @dataclass(frozen=True)
 class Run:
-    """One stretch of one wheel: samples [start, stop), the path's model, and every model's evidence and state.
+    """One stretch of one side of a wheel: samples [start, stop), how probable each row is, every model's evidence and state.
 
     Attributes
     ----------
+    side : Side
+        Sensor or actuator.
+    pooled : Mapping[Row or None, float]
+        Probability of every row; None: no fault.
     evidence : Array, shape (models,)
         Log-likelihoods; −inf where a model is not considered.
     mean, cov : Array, shape (models, 4) and (models, 4, 4)
         States at its end.
-    context : RunContext
-        What else is known of it.
     """
 
     start: int
     stop: int
-    model: int
+    side: Side
+    pooled: Mapping[Row | None, float]
     evidence: Array
     mean: Array
     cov: Array
-    context: RunContext
 
     def ahead(self, m: int) -> float:
         """Log-evidence of model m against a healthy wheel, also one under an unusual load."""
@@ -86,37 +79,25 @@ class RunVerdict:
     ----------
     finding : Finding or None
         Where it is a fault.
-    open_sides : tuple[Side, ...]
-        Sides of which it leaves open whether they are healthy.
-    usual : bool
-        Whether that is no more than what the model's own errors do on healthy missions too.
+    hidden : bool
+        Whether a sensor shows so little of the speed that nothing is known of the valve.
     """
 
     finding: Finding | None
-    open_sides: tuple[Side, ...] = ()
-    usual: bool = False
+    hidden: bool = False
 
 
 @dataclass(frozen=True)
 class _Weighed:
-    """Rows of a run by their probability; `row` is the one that holds if any does."""
+    """Rows of a run by their probability; `row` is the one of its side that holds if any does."""
 
     pooled: dict[Row | None, float]
     ranked: Ranking
-    faulty: dict[Side, float]
+    faulty: float
     row: Row
 
 
-def judge(
-    run: Run,
-    y: Array,
-    model: WheelFilterModel,
-    limits: Limits,
-    names: tuple[str, str],
-    dt: float,
-    *,
-    gains: bool,
-) -> RunVerdict:
+def judge(run: Run, y: Array, model: WheelFilterModel, limits: Limits, names: tuple[str, str], dt: float) -> RunVerdict:
     """Turn a run into a finding.
 
     Parameters
@@ -129,25 +110,16 @@ def judge(
         Speed and opening, for the text.
     dt : float
         Step [s].
-    gains : bool
-        Whether the wheel model is good enough to judge gains and the valve by.
     """
     known, seconds = y[np.isfinite(y)], (run.stop - run.start) * dt
     weighed = _weighed(run, known, model)
-    side = weighed.row[0]
-    open_sides = tuple(s for s in _SIDES if weighed.faulty[s] > _LEAVES_OPEN)
-    usual = weighed.pooled[None] > _USUAL
     stated = _stated(weighed)
     if stated is None:
-        return RunVerdict(None, open_sides, usual)
+        return RunVerdict(None)
     m, _ = _models_of(run, weighed.row)
-    if not gains and m not in _WITHOUT_PLANT:
-        return RunVerdict(None, _SIDES)
     epsilon, sat = estimate(m, known, run.mean[m], run.cov[m], model)
     if epsilon is not None and m in (S_GAIN, A_GAIN) and epsilon.value < limits.min_epsilon:
         return RunVerdict(None)
-    if m == A_BIAS and (seconds < _LEAST_DISTURBANCE_S or (epsilon is not None and epsilon.high < 0)):
-        return RunVerdict(None, (*open_sides, Side.ACTUATOR), usual)  # the model's own error, or nothing that is lost
     finding = Finding(
         start=run.start,
         stop=run.stop,
@@ -160,26 +132,24 @@ def judge(
         evidence=_sentences(run, m, (stated[0], weighed.row), known, weighed.ranked, names, seconds),
         tier=Tier.SIGNAL if m in TOTAL_SENSOR else Tier.MODEL,
     )
-    return RunVerdict(finding, _left_open(open_sides, side, m, run))
+    return RunVerdict(finding, S_GAIN <= m <= S_OU_LARGE and float(run.mean[m, 1]) < _WEAK_GAIN)
 
 
 def _weighed(run: Run, y: Array, model: WheelFilterModel) -> _Weighed:
     """Rows of a run by their probability; rows that the data cannot tell apart are one."""
-    pooled = calibrated(run.model, run.evidence, run.context)
+    pooled = dict(run.pooled)
     silent = y.size == 0 or abs(float(np.mean(y))) <= 3 * model.rounding
-    if silent and run.model in TOTAL_SENSOR:  # stuck at zero and no signal are one row of the table
+    if silent and run.side is Side.SENSOR:  # stuck at zero and no signal are one row of the table
         pooled[Side.SENSOR, FaultMode.NO_SIGNAL] += pooled.pop((Side.SENSOR, FaultMode.STUCK))
     ranked = sorted(pooled.items(), key=lambda item: -item[1])
-    faulty = {side: sum(p for row, p in ranked if row is not None and row[0] is side) for side in _SIDES}
-    side = max(_SIDES, key=lambda s: faulty[s])
-    row = next(row for row, _ in ranked if row is not None and row[0] is side)
-    return _Weighed(pooled, ranked, faulty, row)
+    own = [(row, p) for row, p in ranked if row is not None and row[0] is run.side]
+    return _Weighed(pooled, ranked, sum(p for _, p in own), own[0][0])
 
 
 def _stated(weighed: _Weighed) -> tuple[Side, float] | None:
     """Side that is stated, which is the union for a loss of gain of either, and its probability; None: too uncertain."""
     (side, mode), probability = weighed.row, weighed.pooled[weighed.row]
-    if weighed.faulty[side] >= _LEAST_SIDE and probability >= _LEAST_ROW:
+    if weighed.faulty >= _LEAST_SIDE and probability >= _LEAST_ROW:
         return side, probability
     other = Side.ACTUATOR if side is Side.SENSOR else Side.SENSOR
     both = probability + weighed.pooled.get((other, mode), 0.0)
@@ -201,14 +171,6 @@ def _models_of(run: Run, row: Row) -> tuple[int, int]:
 def _names(row: Row | None) -> tuple[str, str]:
     """Side and mode of a row as a hypothesis names them."""
     return ("none", "healthy") if row is None else (row[0].value, row[1].value)
-
-
-def _left_open(open_sides: tuple[Side, ...], side: Side, m: int, run: Run) -> tuple[Side, ...]:
-    """Sides that stay open beside a finding: also the valve under a sensor that shows hardly anything of it."""
-    left = {s for s in open_sides if s is not side}
-    if S_GAIN <= m <= S_OU_LARGE and float(run.mean[m, 1]) < _WEAK_GAIN:
-        left.add(Side.ACTUATOR)
-    return tuple(left)
 
 
 def _sentences(

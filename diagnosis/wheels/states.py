@@ -10,12 +10,10 @@ from numpy.typing import NDArray
 from diagnosis.channels.debounce import FLICKER_S, debounced
 from diagnosis.channels.sample_status import SILENT
 from diagnosis.results.assessment import CODE
-from diagnosis.wheels.blocks import per_sample
 from diagnosis.wheels.findings import WheelFindings, WheelPath
 from diagnosis.wheels.inputs import WheelsData
 from replay.faults import Side, State
 
-_DOUBTED = 0.02  # probability of a fault from which on slip and a sensor's loss are not distinguished
 _REASONS = {
     State.NOT_EXCITED: "the wheel is neither commanded nor moving",
     State.MASKED: "the speed sensor, which is needed for it, delivers nothing usable",
@@ -35,8 +33,8 @@ class WheelStates:
     quiet: NDArray[np.bool_]
 
 
-def states_of(data: WheelsData, i: int, path: WheelPath, found: WheelFindings, *, gains: bool) -> WheelStates:
-    """States of sensor and actuator of wheel i; `gains` as in `diagnosis.wheels.findings.findings_of`."""
+def states_of(data: WheelsData, i: int, path: WheelPath, found: WheelFindings) -> WheelStates:
+    """States of sensor and actuator of wheel i."""
     gap, least = (round(s / data.dt) for s in (FLICKER_S, FLICKER_S / 2))
     quiet = debounced(np.ascontiguousarray(data.quiet[:, i]), gap, 1)
     no_opening, healthy = ~np.isfinite(data.u[:, i]), CODE[State.HEALTHY]
@@ -44,18 +42,17 @@ def states_of(data: WheelsData, i: int, path: WheelPath, found: WheelFindings, *
     sensor[~np.isfinite(path.y) & (data.status[:, i] != SILENT)] = CODE[State.NO_DATA]
     actuator = sensor.copy()
     actuator[no_opening] = CODE[State.NO_DATA]
-    unseen = found.opened[Side.SENSOR] | (not gains) | no_opening
-    sensor[unseen & (sensor == healthy)] = CODE[State.NOT_ASSESSED]
+    sensor[(found.opened[Side.SENSOR] | no_opening) & (sensor == healthy)] = CODE[State.NOT_ASSESSED]
     if path.model.grip_most > 0:  # wheels in the air obey their own valves, not the body
-        doubted = np.asarray(per_sample(path.fault > _DOUBTED, path.width, path.y.size))
-        sensor[debounced(data.slip[:, i] & doubted, gap, least) & (sensor == healthy)] = CODE[State.SLIP]
-    actuator[(found.opened[Side.ACTUATOR] | (not gains)) & (actuator == healthy)] = CODE[State.NOT_ASSESSED]
+        slips = debounced(np.ascontiguousarray(data.slip[:, i]), gap, least)
+        sensor[slips & (sensor == CODE[State.NOT_ASSESSED])] = CODE[State.SLIP]
+    actuator[found.opened[Side.ACTUATOR] & (actuator == healthy)] = CODE[State.NOT_ASSESSED]
+    for f in found.of(Side.ACTUATOR):
+        actuator[f.start : f.stop] = CODE[State(f.mode.value)]
     for f in found.of(Side.SENSOR):
         sensor[f.start : f.stop] = CODE[State(f.mode.value)]
         if f.side is Side.SENSOR and f.mode.total:
             actuator[f.start : f.stop] = CODE[State.MASKED]
-    for f in found.of(Side.ACTUATOR):
-        actuator[f.start : f.stop] = CODE[State(f.mode.value)]
     return WheelStates({Side.SENSOR: sensor, Side.ACTUATOR: actuator}, quiet)
 
 

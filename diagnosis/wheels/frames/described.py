@@ -1,16 +1,8 @@
-"""Calibrated probabilities of a run's rows: a multinomial logistic model on the Kalman filters' evidence.
-
-The filters' errors are no white noise, and how far their evidence can be trusted depends on how well the wheels' plants are
-known and on what the other wheels do meanwhile. `tests/benchmarks/calibrate_wheels.py` fits the weights on simulated machines
-of many structures; they are data beside this module. A run whose features lie far outside of those is not trusted.
-"""
+"""A run of the Kalman models' path in figures: evidence of each group of models, length, and what else is known of it."""
 
 from __future__ import annotations
 
-import json
 from dataclasses import dataclass
-from functools import cache
-from importlib.resources import files
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,12 +15,11 @@ from diagnosis.wheels.models import (
     HEALTHY,
     NOISY_SENSOR,
     ODD,
-    ROW_OF_MODEL,
     S_GAIN,
     S_NONE,
     S_STUCK,
-    Row,
 )
+from diagnosis.wheels.runs import Runs
 
 Array = NDArray[np.float64]
 
@@ -45,10 +36,6 @@ GROUPS: tuple[tuple[int, ...], ...] = (
     (A_NONE,),
     (A_BIAS,),
 )
-#: Rows that the model tells apart, a healthy wheel first.
-CLASSES: tuple[Row | None, ...] = (None, *(row for g in GROUPS[2:] if (row := ROW_OF_MODEL[g[0]]) is not None))
-_FAR = 6.0  # standard deviations of the training runs, beyond which a feature counts as this
-_LEAST = 1e-4
 
 
 @dataclass(frozen=True)
@@ -83,7 +70,7 @@ class RunContext:
     after: int
 
 
-def features(model: int, evidence: Array, context: RunContext) -> Array:
+def described(model: int, evidence: Array, context: RunContext) -> Array:
     """Features of a run, shape (p,): evidence of each group against the best, its context, and the path's model.
 
     Parameters
@@ -123,47 +110,42 @@ def features(model: int, evidence: Array, context: RunContext) -> Array:
     return np.concatenate([behind, [ahead, rate, between], rest, path, mixed])
 
 
-@dataclass(frozen=True)
-class Calibration:
-    """Weights of the logistic model.
+def run_context(
+    runs: Runs,
+    r: int,
+    opening: Array,
+    usual: float,
+    others: Array,
+    unseen: Array,
+    doubtful: Array,
+    misfit: float,
+    dt: float,
+) -> RunContext:
+    """What is known of run r beside its evidence.
 
-    Attributes
+    Parameters
     ----------
-    centre, scale : Array, shape (p,)
-        Of the features in training.
-    weights : Array, shape (classes, p + 1)
-        The last column is constant.
+    runs, r
+        Runs of a wheel's path in blocks, and which.
+    opening, others, unseen, doubtful : Array, shape (n,)
+        Mean effective opening [fraction]; number of other wheels that are taken to be faulty; where the opening lies beyond
+        what a healthy wheel was seen with; where a steering angle is in doubt.
+    usual : float
+        Usual size of the opening where the wheel drives [fraction].
+    misfit : float
+        As in `RunContext`.
+    dt : float
+        Block [s].
     """
-
-    centre: Array
-    scale: Array
-    weights: Array
-
-    def probabilities(self, x: Array, considered: NDArray[np.bool_]) -> Array:
-        """Probability of every class, shape (classes,); 0 for those that are not considered."""
-        z = np.clip((x - self.centre) / self.scale, -_FAR, _FAR)
-        score = np.where(considered, self.weights @ np.r_[z, 1.0], -np.inf)
-        p = np.exp(score - score.max())
-        p = p / p.sum()
-        p = np.where(considered, np.maximum(p, _LEAST), 0.0)
-        return np.asarray(p / p.sum())
-
-
-@cache
-def calibration() -> Calibration:
-    """The weights that are shipped."""
-    text = files("diagnosis.wheels").joinpath("calibration.json").read_text(encoding="utf-8")
-    data = json.loads(text)
-    return Calibration(*(np.array(data[key], dtype=np.float64) for key in ("centre", "scale", "weights")))
-
-
-def calibrated(model: int, evidence: Array, context: RunContext) -> dict[Row | None, float]:
-    """Probability of every row of a run; None stands for a healthy wheel. Parameters as in `features`."""
-    considered = np.array([row is None or bool(np.isfinite(_evidence(evidence, row))) for row in CLASSES])
-    p = calibration().probabilities(features(model, evidence, context), considered)
-    return {row: float(q) for row, q in zip(CLASSES, p, strict=True)}
-
-
-def _evidence(evidence: Array, row: Row) -> float:
-    """Best log-likelihood of a row's models."""
-    return float(max(e for e, own in zip(evidence, ROW_OF_MODEL, strict=True) if own == row))
+    first, last = int(runs.start[r]), int(runs.stop[r])
+    part = slice(first, max(last, first + 1))
+    return RunContext(
+        seconds=(last - first) * dt,
+        misfit=misfit,
+        others=float(others[part].mean()),
+        unseen=float(unseen[part].mean()),
+        doubtful=float(doubtful[part].mean()),
+        changes=float(opening[part].std() / max(usual, 1e-6)),
+        before=int(runs.model[r - 1]) if r > 0 else HEALTHY,
+        after=int(runs.model[r + 1]) if r + 1 < runs.model.size else HEALTHY,
+    )

@@ -1,0 +1,99 @@
+"""Gradient-boosted trees that say how probable each row of the tables is in a frame; their training is described in docs/.
+
+The trees are data, made by ``tests/benchmarks/train_wheels.py`` from simulated machines of many structures. They add nothing to
+the evidence: they weigh it as it turned out on machines whose faults were known.
+"""
+
+from __future__ import annotations
+
+from functools import cache
+from importlib.resources import files
+from io import BytesIO
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from replay.arrays.numeric import uncounted
+
+Array = NDArray[np.float64]
+
+
+class Forest(NamedTuple):
+    """Trees of one side.
+
+    Attributes
+    ----------
+    feature : NDArray[np.int16], shape (nodes,)
+        What a node looks at.
+    threshold : NDArray[np.float32], shape (nodes,)
+        At most this goes left.
+    left, right : NDArray[np.int32], shape (nodes,)
+        The next node; below 0: leaf −1 − k.
+    value : NDArray[np.float32], shape (leaves,)
+        What a leaf adds to the score of its tree's class.
+    root : NDArray[np.int32], shape (trees,)
+        First node of each tree; below 0: a leaf. Trees take turns through the classes.
+    prior : Array, shape (classes,)
+        Share of each class in training.
+    low, high : NDArray[np.float32], shape (features,)
+        Range of each feature in training.
+    """
+
+    feature: NDArray[np.int16]
+    threshold: NDArray[np.float32]
+    left: NDArray[np.int32]
+    right: NDArray[np.int32]
+    value: NDArray[np.float32]
+    root: NDArray[np.int32]
+    prior: Array
+    low: NDArray[np.float32]
+    high: NDArray[np.float32]
+
+
+@njit(cache=True, error_model="numpy")
+def _scores(x: NDArray[np.float32], forest: Forest, out: Array) -> None:
+    """Add the leaves of every frame of x (frames, features) to its classes' scores, `out` (frames, classes)."""
+    x, forest = uncounted(x), uncounted(forest)
+    classes = out.shape[1]
+    for t in range(forest.root.size):
+        c = t % classes
+        for n in range(x.shape[0]):
+            k = forest.root[t]
+            while k >= 0:
+                k = forest.left[k] if x[n, forest.feature[k]] <= forest.threshold[k] else forest.right[k]
+            out[n, c] += forest.value[-1 - k]
+
+
+def log_probabilities(x: NDArray[np.float32], forest: Forest) -> Array:
+    """Log-probability of each class in each frame, shape (frames, classes).
+
+    Parameters
+    ----------
+    x : NDArray[np.float32], shape (frames, features)
+        From `diagnosis.wheels.frames`.
+    forest : Forest
+        Of one side.
+    """
+    out = np.zeros((len(x), forest.prior.size))
+    _scores(np.ascontiguousarray(x, np.float32), forest, out)
+    out -= out.max(axis=1, keepdims=True)
+    out -= np.log(np.exp(out).sum(axis=1, keepdims=True))
+    return np.asarray(out)
+
+
+def known_share(x: NDArray[np.float32], forest: Forest) -> Array:
+    """Share of each frame's features that lie within what training saw, shape (frames,)."""
+    return np.asarray(((x >= forest.low) & (x <= forest.high)).mean(axis=1))
+
+
+@cache
+def forests() -> tuple[Forest, Forest]:
+    """Trees of the sensors and of the valves."""
+    data = files("diagnosis.wheels").joinpath("forests.npz").read_bytes()
+    with np.load(BytesIO(data)) as kept:
+        sensor, actuator = (
+            Forest(*(kept[f"{side}_{name}"] for name in Forest._fields)) for side in ("sensor", "actuator")
+        )
+    return sensor, actuator

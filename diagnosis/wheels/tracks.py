@@ -1,0 +1,203 @@
+"""From frames to segments of one row: what the trees say of each frame, followed through the mission for both sides of a wheel."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from diagnosis.wheels.forest import Forest, forests, known_share, log_probabilities
+from diagnosis.wheels.frames.windows import FRAME_S, Blocks
+from diagnosis.wheels.models import A_BIAS, A_GAIN, A_NONE, A_STUCK, S_GAIN, S_NONE, S_STUCK, S_WHITE_8, Row
+from diagnosis.wheels.runs import Runs
+from replay.faults import FaultMode, Side
+
+Array = NDArray[np.float64]
+
+#: Modes by the trees' class, behind healthy.
+MODES = (FaultMode.STUCK, FaultMode.NO_SIGNAL, FaultMode.INEFFICIENT, FaultMode.NOISY)
+#: Model of the Kalman filters that stands for a mode of a side.
+MODEL_OF: dict[Row, int] = {
+    **{(Side.SENSOR, mode): m for mode, m in zip(MODES, (S_STUCK, S_NONE, S_GAIN, S_WHITE_8), strict=True)},
+    **{(Side.ACTUATOR, mode): m for mode, m in zip(MODES, (A_STUCK, A_NONE, A_GAIN, A_BIAS), strict=True)},
+}
+
+_AROUND_S = 0.4  # on either side, over which what is said of frames is averaged
+_FAULTY = 0.5
+_SHORT_S = 0.3
+_NEAR_S = 0.6  # within which an edge of the Kalman models' path is the segment's
+_STRANGE = 0.9  # share of known features below which nothing is concluded
+
+
+@dataclass(frozen=True)
+class Track:
+    """One wheel, frame by frame.
+
+    Attributes
+    ----------
+    at : NDArray[np.int64], shape (frames,)
+        Block in the middle of each.
+    hop : int
+        Blocks from frame to frame.
+    probability : dict[Side, Array], each of shape (frames, 5)
+        Of a healthy side and of each of `MODES`.
+    """
+
+    at: Blocks
+    hop: int
+    probability: dict[Side, Array]
+
+    def healthy(self, side: Side, n: int) -> Array:
+        """Probability that a side is healthy in each of n blocks, shape (n,)."""
+        place = np.clip(np.arange(n) // self.hop, 0, self.at.size - 1)
+        return np.asarray(self.probability[side][place, 0])
+
+
+@dataclass(frozen=True)
+class Segment:
+    """Blocks [start, stop) of one wheel in which one row of a side is most probable.
+
+    Attributes
+    ----------
+    pooled : dict[Row or None, float]
+        Probability of every row; None: no fault of either side.
+    """
+
+    start: int
+    stop: int
+    side: Side
+    mode: FaultMode
+    pooled: dict[Row | None, float]
+
+    @property
+    def model(self) -> int:
+        """Kalman model of its row."""
+        return MODEL_OF[self.side, self.mode]
+
+
+def track_of(x: NDArray[np.float32], at: Blocks, dt: float, *, measured: bool) -> Track:
+    """What the trees say of one wheel.
+
+    Parameters
+    ----------
+    x : NDArray[np.float32], shape (frames, p)
+        Features.
+    at : NDArray[np.int64], shape (frames,)
+        Their blocks.
+    dt : float
+        Block [s].
+    measured : bool
+        Whether the valve's opening is measured, so that the valve is judged elsewhere.
+    """
+    hop = int(at[1] - at[0]) if at.size > 1 else max(1, round(FRAME_S / dt))
+    probability: dict[Side, Array] = {}
+    for side, forest in zip((Side.SENSOR, Side.ACTUATOR), forests(), strict=True):
+        if side is Side.ACTUATOR and measured:
+            probability[side] = np.tile(np.eye(len(MODES) + 1)[0], (at.size, 1))
+        else:
+            probability[side] = _averaged(_said(x, forest), round(_AROUND_S / (hop * dt)))
+    return Track(at, hop, probability)
+
+
+def _said(x: NDArray[np.float32], forest: Forest) -> Array:
+    """Log-probabilities of each frame; the shares in training where its features are not such as the trees know."""
+    said = log_probabilities(x, forest)
+    said[known_share(x, forest) < _STRANGE] = np.log(forest.prior)
+    return said
+
+
+def _averaged(said: Array, around: int) -> Array:
+    """Geometric mean of each frame's probabilities and those of `around` frames on either side, shape (frames, classes).
+
+    Neighbouring windows overlap, so that frames do not add to each other's evidence: they agree or they do not.
+    """
+    n = len(said)
+    sums = np.concatenate([np.zeros((1, said.shape[1])), np.cumsum(said, axis=0)])
+    first, last = np.maximum(np.arange(n) - around, 0), np.minimum(np.arange(n) + around + 1, n)
+    mean = (sums[last] - sums[first]) / (last - first)[:, None]
+    p = np.exp(mean - mean.max(axis=1, keepdims=True))
+    return np.asarray(p / p.sum(axis=1, keepdims=True))
+
+
+def segments_of(track: Track, side: Side, n: int, runs: Runs, dt: float) -> list[Segment]:
+    """Segments of a side among n blocks, in order of time.
+
+    Parameters
+    ----------
+    track : Track
+        The wheel.
+    side : Side
+        Sensor or actuator.
+    n : int
+        Blocks.
+    runs : Runs
+        Of the Kalman models' path: an edge of theirs near a segment's is the better one.
+    dt : float
+        Block [s].
+    """
+    p = track.probability[side]
+    mode = np.where(p[:, 0] < _FAULTY, 1 + p[:, 1:].argmax(axis=1), 0)
+    cut = np.flatnonzero(np.r_[True, mode[1:] != mode[:-1]])
+    pieces = [[int(a), int(b), int(mode[a])] for a, b in zip(cut, np.r_[cut[1:], mode.size], strict=True)]
+    out = []
+    for a, b, k in _joined(pieces, round(_SHORT_S / (track.hop * dt))):
+        start, stop = _edges(
+            a * track.hop, min(n, b * track.hop) if b < mode.size else n, side, runs, round(_NEAR_S / dt)
+        )
+        if stop > start:
+            out.append(Segment(start, stop, side, MODES[k - 1], _pooled(track, side, slice(a, b))))
+    return out
+
+
+def _joined(pieces: list[list[int]], short: int) -> list[list[int]]:
+    """Faulty pieces; a short one goes to the faulty neighbour that is longer."""
+    out: list[list[int]] = []
+    for a, b, k in pieces:
+        if k == 0:
+            continue
+        before = out[-1] if out and out[-1][1] == a else None
+        if before is not None and (before[2] == k or min(b - a, before[1] - before[0]) <= short):
+            longer = before[2] if before[1] - before[0] >= b - a else k
+            out[-1] = [before[0], b, longer]
+        else:
+            out.append([a, b, k])
+    return out
+
+
+def _edges(start: int, stop: int, side: Side, runs: Runs, near: int) -> tuple[int, int]:
+    """Edges of a segment: those of the path's runs of its side where they are near."""
+    own = (runs.model >= A_GAIN) if side is Side.ACTUATOR else (runs.model >= S_STUCK) & (runs.model < A_GAIN)
+    first, last = start, stop
+    for edges, place in ((runs.start[own], start), (runs.stop[own], stop)):
+        if edges.size:
+            closest = int(edges[np.argmin(np.abs(edges - place))])
+            if abs(closest - place) <= near:
+                first, last = (closest, last) if place == start else (first, closest)
+    return (first, last) if last > first else (start, stop)
+
+
+def _pooled(track: Track, side: Side, part: slice) -> dict[Row | None, float]:
+    """Probability of each row over some frames: of the side's own, and of the other's where that side is healthy."""
+    other = Side.ACTUATOR if side is Side.SENSOR else Side.SENSOR
+    own, rest = (track.probability[s][part].mean(axis=0) for s in (side, other))
+    pooled: dict[Row | None, float] = {None: float(own[0] * rest[0])}
+    for k, mode in enumerate(MODES, 1):
+        pooled[side, mode] = float(own[k])
+        pooled[other, mode] = float(own[0] * rest[k])
+    return pooled
+
+
+def runs_between(segments: list[Segment], n: int) -> tuple[Runs, list[int]]:
+    """Runs of n blocks of which some are segments that do not overlap, and the run of each segment."""
+    rows, places, last = [], [], 0
+    for s in segments:
+        if s.start > last:
+            rows.append((last, s.start, 0, last))
+        places.append(len(rows))
+        rows.append((s.start, s.stop, s.model, s.start))
+        last = s.stop
+    if last < n or not rows:
+        rows.append((last, n, 0, last))
+    columns = np.array(rows, dtype=np.int64)
+    return Runs(*(np.ascontiguousarray(columns[:, j]) for j in range(4))), places
