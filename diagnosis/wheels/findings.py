@@ -134,7 +134,15 @@ def findings_of(path: WheelPath, limits: Limits) -> WheelFindings:
             out.opened[Side.ACTUATOR][start:stop] = True
         if verdict.finding is not None and not _repeated(verdict.finding, out.findings):
             out.findings.append(_detected(path, w.segment, verdict.finding))
+    blind = [f for f in out.findings if f.side is Side.SENSOR and f.mode.total]
+    out.findings[:] = [f for f in out.findings if f.side is not Side.ACTUATOR or _seen(f, blind) > 0.5]
     return out
+
+
+def _seen(finding: Finding, blind: Sequence[Finding]) -> float:
+    """Share of a valve's finding in which the wheel's speed is known."""
+    hidden = sum(max(0, min(f.stop, finding.stop) - max(f.start, finding.start)) for f in blind)
+    return 1.0 - hidden / (finding.stop - finding.start)
 
 
 def _repeated(finding: Finding, before: Sequence[Finding]) -> bool:

@@ -62,7 +62,7 @@ def usual_weights(x: Array, basis: Array) -> Array:
         return w
     for _ in range(_ROUNDS):
         weighted = (basis * weight[:, None]).T
-        w = np.linalg.solve(weighted @ basis + 1e-3 * np.eye(w.size), weighted @ x)
+        w = np.asarray(np.linalg.solve(weighted @ basis + 1e-3 * np.eye(w.size), weighted @ x), np.float64)
         left = x - basis @ w
         scale = max(1.48 * float(np.median(np.abs(left))), 1e-3)
         weight = np.maximum(1.0 - (left / (_TUKEY * scale)) ** 2, 0.0) ** 2 + 1e-6
@@ -148,12 +148,12 @@ def _weights(i: int, blocks: WheelBlocks, seen: MissionSignals, at: Blocks) -> t
     for part, signals, _ in _parts(blocks, seen, at):
         found = _Relations.of(i, part, signals)
         drives = np.flatnonzero(found.driving)[::step]
-        slips = np.flatnonzero(found.driving & found.signals.known & found.signals.has_b)[::step]
+        rolls = np.flatnonzero(found.driving & found.signals.known & found.signals.has_b)[::step]
         for column, x in zip(
-            kept, (found.opening[drives], found.openings[drives], found.slip[slips], found.slips[slips]), strict=True
+            kept, (found.opening[drives], found.openings[drives], found.slip[rolls], found.slips[rolls]), strict=True
         ):
             column.append(x)
-    u, openings, slip, slips = (np.concatenate(x) for x in kept)
+    u, openings, slip, slips = (np.concatenate(column) for column in kept)
     return usual_weights(u, openings), usual_weights(slip, slips)
 
 
