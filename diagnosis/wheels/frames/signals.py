@@ -11,13 +11,15 @@ from numpy.typing import NDArray
 from diagnosis.channels.sample_status import PAIR
 from diagnosis.estimation.lag import low_passed
 from diagnosis.wheels.blocks import WheelBlocks
-from diagnosis.wheels.inputs import WheelsData, body_speeds
+from diagnosis.wheels.inputs import WheelsData
 from diagnosis.wheels.models import JointModel
+from diagnosis.wheels.motion import body_speeds
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
 _STANDS = 1e-3  # of the usual speed
+_EXACT = 0.03  # of the largest speed: uncertainty up to which sensors of the body stand for it
 
 
 @dataclass(frozen=True)
@@ -33,7 +35,8 @@ class MissionSignals:
     asked : Array
         Speed that the valve alone asks for behind its lag [m/s].
     rolling : Array
-        Speed at which the wheel would roll by the other wheels [m/s]; NaN where nobody knows.
+        Speed at which the wheel would roll, by sensors of the body where they are exact enough, else by the other wheels
+        [m/s]; NaN where nobody knows.
     rough : Array
         Standard deviation of the effective opening within a block [fraction].
     measured : Array
@@ -62,7 +65,7 @@ class MissionSignals:
             reference=_block_means(data.reference, blocks),
             command=np.nan_to_num(_block_means(data.u, blocks)),
             asked=asked,
-            rolling=body_speeds(measured, blocks.ratio, blocks.turn),
+            rolling=_rolling(measured, blocks, data.span),
             rough=blocks.u.reshape(n, blocks.width, wheels).std(axis=1),
             measured=measured,
         )
@@ -128,6 +131,15 @@ class WheelSignals:
             u=seen.command[:, i] * toward,
             toward=toward,
         )
+
+
+def _rolling(measured: Array, blocks: WheelBlocks, span: float) -> Array:
+    """Speed at which each wheel would roll [m/s], shape (n, wheels)."""
+    by_wheels = body_speeds(measured, blocks.ratio, blocks.turn)
+    if blocks.body_speed is None or blocks.body_std is None:
+        return by_wheels
+    exact = np.isfinite(blocks.body_speed) & (blocks.body_std < _EXACT * span)
+    return np.where(exact, blocks.body_speed, by_wheels)
 
 
 def _block_means(x: Array, blocks: WheelBlocks) -> Array:
