@@ -20,7 +20,6 @@ from diagnosis.wheels.filter_identification import joint_model
 from diagnosis.wheels.findings import Weighed, WheelFindings, WheelPath, findings_of
 from diagnosis.wheels.following import Following, follow
 from diagnosis.wheels.frames.features import mission_features
-from diagnosis.wheels.frames.windows import frames_at
 from diagnosis.wheels.inputs import WheelsData
 from diagnosis.wheels.models import ODD, JointModel, WheelFilterModel
 from diagnosis.wheels.readings import with_readings
@@ -54,14 +53,13 @@ def assess_wheels(data: WheelsData, limits: Limits, *, gains: bool) -> dict[int,
     blocks = with_readings(blocks, data.y, data.habits, data.speed_noises, limits.driving_speed)
     model, blocks = joint_model(data, blocks)
     done, following = follow(data, blocks, model)
-    at = frames_at(len(blocks.y), blocks.dt)
-    features = mission_features(data, blocks, model, {i: f.described for i, f in following.items()}, at, gains=gains)
+    features = mission_features(data, blocks, model, {i: f.described for i, f in following.items()}, gains=gains)
     out = {}
     losses = _losses(data, limits)
     for i, wheel in enumerate(model.wheels):
         if wheel is None:
             continue
-        track = track_of(features[i], at, blocks.dt, measured=bool(data.measured[i]))
+        track = track_of(features.of[i], features.hop, blocks.dt, measured=bool(data.measured[i]))
         path = _path(data, i, wheel, blocks, model, done, following[i], track)
         found = findings_of(path, limits)
         sensor, actuator = _assessments(data, i, path, found, gains=gains)

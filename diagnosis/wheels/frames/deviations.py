@@ -6,15 +6,14 @@ windows leave: up to half of the mission may be faulty.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from diagnosis.wheels.blocks import WheelBlocks
 from diagnosis.wheels.frames.signals import MissionSignals, WheelSignals
-from diagnosis.wheels.frames.windows import MIDDLE, WINDOWS, Blocks, bounded, cuts, windowed
+from diagnosis.wheels.frames.windows import MIDDLE, WINDOWS, Steps, bounded, cuts, windowed
 
 Array = NDArray[np.float64]
 
@@ -34,12 +33,15 @@ class Deviations:
     ----------
     scaled, values : tuple of Array, one per window, shape (frames, relations)
         Deviation in units of the usual spread, compressed by arsinh; and the plain value, NaN where unknown.
+    shapes : tuple of Array, one per window, shape (frames, 8)
+        Spread within the window, and how slip and tracking go with the opening.
     scales : Array, shape (relations,)
         Usual spread in the middle window.
     """
 
     scaled: tuple[Array, ...]
     values: tuple[Array, ...]
+    shapes: tuple[Array, ...]
     scales: Array
 
 
@@ -81,15 +83,12 @@ class _Relations:
     signals: WheelSignals
 
     @classmethod
-    def of(cls, i: int, blocks: WheelBlocks, seen: MissionSignals) -> _Relations:
-        s = WheelSignals.of(i, blocks, seen)
+    def of(cls, i: int, seen: MissionSignals, dt: float) -> _Relations:
+        s = WheelSignals.of(i, seen)
         signed = np.nan_to_num(seen.reference[:, i]) / seen.usual
-        near = max(1, round(0.05 / blocks.dt))
-        smooth = signed
-        if signed.size > 4 * near:
-            smooth = np.convolve(signed, np.ones(2 * near + 1) / (2 * near + 1), mode="same")
-        rate = np.clip(np.gradient(smooth, blocks.dt), -5, 5) if signed.size > 1 else np.zeros(signed.size)
-        turned = signed * np.nan_to_num(blocks.ratio[:, i] - 1.0)
+        smooth = np.convolve(signed, np.ones(3) / 3, mode="same") if signed.size > 4 else signed
+        rate = np.clip(np.gradient(smooth, dt), -5, 5) if signed.size > 1 else np.zeros(signed.size)
+        turned = signed * np.nan_to_num(seen.ratio[:, i] - 1.0)
         columns = (signed, np.sign(signed), signed * np.abs(signed), np.ones(signed.size), rate, turned)
         openings = np.column_stack(columns)
         slips = np.column_stack([openings * s.toward[:, None], s.u, s.u * np.abs(signed)])
@@ -97,58 +96,75 @@ class _Relations:
         return cls(seen.command[:, i], openings, (s.y - s.b) / (np.abs(s.b) + 0.1), slips, driving, s)
 
     def table(self, opening: Array, slip: Array) -> Array:
-        """Relations, whether each is known, and where the wheel drives, shape (n, 13), by weights of opening and slip."""
+        """Relations, whether each is known, their products, and where the wheel drives, shape (n, 19), by weights of both."""
         s = self.signals
-        both, tracked = s.known & s.has_b, s.known & s.has_r
+        both, tracked = s.known * s.has_b, s.known * s.has_r
+        effort = (self.opening - self.openings @ opening) * s.toward * s.has_r
+        off = self.slip - self.slips @ slip
         columns = (
-            self.slip * both,
-            (self.opening - self.openings @ opening) * s.toward * s.has_r,
-            (s.y - s.r) * tracked,
-            (s.d - s.r) * s.has_r,
-            (s.d - s.y) * s.known,
-            (self.slip - self.slips @ slip) * both,
+            *(
+                self.slip * both,
+                effort,
+                (s.y - s.r) * tracked,
+                (s.d - s.r) * s.has_r,
+                (s.d - s.y) * s.known,
+                off * both,
+            ),
             *(both, s.has_r, tracked, s.has_r, s.known, both),
+            *(self.slip**2 * both, effort**2, (s.y - s.r) ** 2 * tracked, off**2 * both),
+            *(self.slip * effort * both, (s.y - s.r) * effort * tracked),
             self.driving,
         )
         return np.stack([np.asarray(c, np.float64) for c in columns], axis=1)
 
 
-def deviations(i: int, blocks: WheelBlocks, seen: MissionSignals, at: Blocks) -> Deviations:
-    """How far wheel i is from its usual self in frames at the blocks `at`."""
-    opening, slip = _weights(i, blocks, seen, at)
+def deviations(i: int, seen: MissionSignals, at: Steps, dt: float) -> Deviations:
+    """How far wheel i is from its usual self in frames at the steps `at` of dt [s]."""
+    opening, slip = _weights(i, seen, at, dt)
     parts: list[list[Array]] = [[] for _ in WINDOWS]
-    for part, signals, mine in _parts(blocks, seen, at):
-        for k, w in enumerate(windowed(_Relations.of(i, part, signals).table(opening, slip), mine, blocks.dt)):
+    for cut, mine in cuts(at, len(seen.speed), dt):
+        table = _Relations.of(i, seen.part(cut), dt).table(opening, slip)
+        for k, w in enumerate(windowed(table, mine, dt)):
             parts[k].append(w)
-    scaled, values, scales = [], [], np.zeros(RELATIONS)
+    scaled, values, shapes, scales = [], [], [], np.zeros(RELATIONS)
     q = RELATIONS
     for k, pieces in enumerate(parts):
         w = np.concatenate(pieces)
+        drives = w[:, -1] > 0.8
         mean = np.where(w[:, q : 2 * q] > 0.2, w[:, :q] / np.maximum(w[:, q : 2 * q], 1e-9), np.nan)
-        usual = np.array([shorth(mean[w[:, 2 * q] > 0.8, j]) for j in range(q)])
+        usual = np.array([shorth(mean[drives, j]) for j in range(q)])
         scaled.append(np.arcsinh((mean - usual[:, 0]) / usual[:, 1]))
         values.append(mean)
+        shapes.append(_shapes(w, mean, drives))
         if k == MIDDLE:
             scales = usual[:, 1]
-    return Deviations(tuple(scaled), tuple(values), scales)
+    return Deviations(tuple(scaled), tuple(values), tuple(shapes), scales)
 
 
-def _parts(
-    blocks: WheelBlocks, seen: MissionSignals, at: Blocks
-) -> Iterator[tuple[WheelBlocks, MissionSignals, Blocks]]:
-    n = len(blocks.y)
-    for cut, mine in cuts(at, n, blocks.dt):
-        yield (blocks if cut.stop - cut.start == n else blocks.part(cut.start, cut.stop)), seen.part(cut), mine
+def _shapes(w: Array, mean: Array, drives: NDArray[np.bool_]) -> Array:
+    """Spread of slip, opening, tracking and slip at this opening against the usual one, and slopes, shape (frames, 8).
+
+    Spreads are in decades; slope and correlation are those of slip and of tracking with the opening.
+    """
+    q = RELATIONS
+    known = np.maximum(w[:, [q, q + 1, q + 2, q + 5]], 1e-9)
+    spread = np.sqrt(np.maximum(w[:, 2 * q : 2 * q + 4] / known - mean[:, [0, 1, 2, 5]] ** 2, 0.0)) + 1e-5
+    usual = np.array([np.median(x) if (x := s[drives & np.isfinite(s)]).size else 1.0 for s in spread.T])
+    out = [*np.log10(spread / usual).T]
+    for product, first in ((2 * q + 4, 0), (2 * q + 5, 2)):
+        joint = w[:, product] / known[:, first] - mean[:, first] * mean[:, 1]
+        out += [joint / (spread[:, 1] ** 2 + 1e-4), joint / (spread[:, 1] * spread[:, first] + 1e-6)]
+    return np.stack(out, axis=1)
 
 
-def _weights(i: int, blocks: WheelBlocks, seen: MissionSignals, at: Blocks) -> tuple[Array, Array]:
-    """Weights of the regressors of opening and slip, fitted to some thousand blocks of the mission."""
+def _weights(i: int, seen: MissionSignals, at: Steps, dt: float) -> tuple[Array, Array]:
+    """Weights of the regressors of opening and slip, fitted to some thousand steps of the mission."""
     kept: list[list[Array]] = [[], [], [], []]
-    step = max(1, len(blocks.y) // _MOST_ROWS // 2)
-    for part, signals, _ in _parts(blocks, seen, at):
-        found = _Relations.of(i, part, signals)
+    step = max(1, len(seen.speed) // _MOST_ROWS)
+    for cut, _ in cuts(at, len(seen.speed), dt):
+        found = _Relations.of(i, seen.part(cut), dt)
         drives = np.flatnonzero(found.driving)[::step]
-        rolls = np.flatnonzero(found.driving & found.signals.known & found.signals.has_b)[::step]
+        rolls = np.flatnonzero(found.driving & (found.signals.known > 0.5) & found.signals.has_b)[::step]
         for column, x in zip(
             kept, (found.opening[drives], found.openings[drives], found.slip[rolls], found.slips[rolls]), strict=True
         ):
@@ -161,7 +177,7 @@ def deviation_features(i: int, found: Mapping[int, Deviations]) -> Array:
     """Features of wheel i by its own deviations and those of the others, shape (frames, p)."""
     own, others = found[i], [found[j] for j in found if j != i]
     frames = len(own.scaled[0])
-    out = [*own.scaled]
+    out = [*own.scaled, *own.shapes]
     for k in _OF_OTHERS:
         stated = own.values[k][:, :_STATED]
         if others:

@@ -12,8 +12,8 @@ from diagnosis.wheels.blocks import WheelBlocks
 from diagnosis.wheels.frames.deviations import deviation_features, deviations
 from diagnosis.wheels.frames.levels import level_features
 from diagnosis.wheels.frames.paths import Path, path_features, run_features
-from diagnosis.wheels.frames.signals import MissionSignals
-from diagnosis.wheels.frames.windows import LARGEST, Blocks, cuts
+from diagnosis.wheels.frames.signals import MissionSignals, step_width
+from diagnosis.wheels.frames.windows import LARGEST, cuts, frames_at
 from diagnosis.wheels.inputs import WheelsData
 from diagnosis.wheels.models import JointModel
 from diagnosis.wheels.runs import Runs
@@ -43,16 +43,26 @@ class Followed:
     fault: Array
 
 
+@dataclass(frozen=True)
+class Features:
+    """Features of a mission.
+
+    Attributes
+    ----------
+    of : dict[int, NDArray[np.float32]], shape (frames, p) each
+        By wheel.
+    hop : int
+        Blocks from frame to frame; the first frame begins with the first block.
+    """
+
+    of: dict[int, NDArray[np.float32]]
+    hop: int
+
+
 def mission_features(
-    data: WheelsData,
-    blocks: WheelBlocks,
-    model: JointModel,
-    followed: Mapping[int, Followed],
-    at: Blocks,
-    *,
-    gains: bool,
-) -> dict[int, NDArray[np.float32]]:
-    """Features of every wheel with a model, shape (frames, p) each.
+    data: WheelsData, blocks: WheelBlocks, model: JointModel, followed: Mapping[int, Followed], *, gains: bool
+) -> Features:
+    """Features of every wheel with a model.
 
     Parameters
     ----------
@@ -60,28 +70,28 @@ def mission_features(
         The wheels.
     followed : Mapping[int, Followed]
         By wheel.
-    at : NDArray[np.int64], shape (frames,)
-        Blocks in the middle of the frames.
     gains : bool
         Whether the wheel model is good enough to judge gains and valves by.
     """
-    seen, n = MissionSignals.of(data, blocks, model), len(blocks.y)
-    off = {i: deviations(i, blocks, seen, at) for i in followed}
+    seen, width = MissionSignals.of(data, blocks, model), step_width(blocks.dt)
+    n, dt = len(seen.speed), width * blocks.dt
+    at = frames_at(n, dt)
+    off = {i: deviations(i, seen, at, dt) for i in followed}
     out = {}
     for i, own in followed.items():
         others = [followed[j].path for j in followed if j != i]
-        rough = seen.rough[~blocks.quiet[:, i], i]
+        rough = seen.rough[seen.quiet[:, i] < 0.5, i]
         usual_rough = float(np.median(rough)) if rough.size else 1.0
         levels, paths = [], []
-        for cut, mine in cuts(at, n, blocks.dt):
-            part = blocks if cut.stop - cut.start == n else blocks.part(cut.start, cut.stop)
-            levels.append(level_features(i, part, model, seen.part(cut), usual_rough, mine))
-            paths.append(path_features(own.path[cut], [p[cut] for p in others], own.fault[cut], mine, blocks.dt))
-        runs = run_features(own.described, own.runs, at, blocks.dt)
+        for cut, mine in cuts(at, n, dt):
+            levels.append(level_features(i, model, seen.part(cut), usual_rough, mine, dt))
+            part = slice(cut.start * width, cut.stop * width)
+            paths.append(path_features(own.path[part], [p[part] for p in others], own.fault[part], width, mine, dt))
+        runs = run_features(own.described, own.runs, at * width + width // 2, blocks.dt)
         constant = np.tile(_constant(i, data, blocks, model, gains=gains), (at.size, 1))
         columns = (np.concatenate(levels), deviation_features(i, off), runs, np.concatenate(paths), constant)
         out[i] = np.concatenate(columns, axis=1).astype(np.float32)
-    return out
+    return Features(out, width * (int(at[1] - at[0]) if at.size > 1 else max(1, n)))
 
 
 def _constant(i: int, data: WheelsData, blocks: WheelBlocks, model: JointModel, *, gains: bool) -> Array:

@@ -5,65 +5,54 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from diagnosis.channels.sample_status import SILENT
-from diagnosis.wheels.blocks import WheelBlocks
 from diagnosis.wheels.frames.signals import MissionSignals, WheelSignals
-from diagnosis.wheels.frames.windows import MISSING, Blocks, bounded, windowed
+from diagnosis.wheels.frames.windows import MISSING, Steps, bounded, windowed
 from diagnosis.wheels.models import JointModel
-from diagnosis.wheels.step_kernel import RESTLESS, RESTS
 
 Array = NDArray[np.float64]
 
 _LEAST_SPEED = 0.02  # of the usual speed, below which a share of it says nothing
-_SATURATED = 0.95
 _LEAST_SHARE = 0.05  # of a window, of which something must be known
-_MOST_JITTER = 1e4  # of the usual one
 
 
-def level_features(
-    i: int, blocks: WheelBlocks, model: JointModel, seen: MissionSignals, usual_rough: float, at: Blocks
-) -> Array:
-    """Features of wheel i in frames at the blocks `at`, shape (frames, p)."""
+def level_features(i: int, model: JointModel, seen: MissionSignals, usual_rough: float, at: Steps, dt: float) -> Array:
+    """Features of wheel i in frames at the steps `at` of dt [s], shape (frames, p); `usual_rough` as in `MissionSignals.rough`."""
     wheel = model.wheels[i]
     assert wheel is not None
     grip = 1.0 + (wheel.grip if wheel.grip_most > 0 else 0.0)
-    table = _columns(i, blocks, model, seen, 2.0 * wheel.noise**2 * blocks.white[:, i] + 1e-12)
-    parts = [f for w in windowed(table, at, blocks.dt) for f in _of_window(w, grip, usual_rough)]
+    parts = [f for w in windowed(_columns(i, model, seen), at, dt) for f in _of_window(w, grip, usual_rough)]
     return bounded(np.stack(parts, axis=1))
 
 
-def _columns(i: int, blocks: WheelBlocks, model: JointModel, seen: MissionSignals, noise: Array) -> Array:
-    """What is averaged, shape (n, columns); `noise` is the usual mean square of the steps between readings [m²/s²]."""
-    s = WheelSignals.of(i, blocks, seen)
+def _columns(i: int, model: JointModel, seen: MissionSignals) -> Array:
+    """What is averaged, shape (n, columns)."""
+    s = WheelSignals.of(i, seen)
     r, y, d, b, has_r, has_b, known = s.r, s.y, s.d, s.b, s.has_r, s.has_b, s.known
-    kr, kb = (known & has_r).astype(np.float64), (known & has_b).astype(np.float64)
-    jitter = blocks.jitter[:, i]
-    steps = np.minimum(jitter / noise, _MOST_JITTER)
-    opening = np.abs(seen.command[:, i])
+    kr, kb = known * has_r, known * has_b
     columns = (
         *(known, has_r, has_b, r * has_r, y * known, d, b * has_b),
-        *(y * known * kr, r * kr, y * kb, b * kb, d * kb),
+        *(y * kr, r * kr, y * kb, b * kb, d * kb),
         *((y - r) ** 2 * kr, (y - b) ** 2 * kb, (d - r) ** 2 * has_r, (d - b) ** 2 * has_b),
         *((y - b) * (d - b) * kb, (y - b) * b * kb, b * b * kb),
         *(y * r * kr, r * r * kr, y * d * known, d * d * known, (y - d) ** 2 * known, y * y * known),
-        *(steps * known, np.sqrt(steps) * known, (jitter == 0) * known, (np.abs(y) < 1e-3) * known),
-        *(blocks.status[:, i] == SILENT, blocks.habit[:, i] == RESTS, blocks.habit[:, i] == RESTLESS),
-        *(blocks.quiet[:, i], opening, opening > _SATURATED, s.u, seen.rough[:, i], blocks.unseen[:, i]),
-        *_others(i, blocks, model, seen),
+        *(seen.jitter[:, i], seen.root_jitter[:, i], seen.constant[:, i], (np.abs(y) < 1e-3) * known),
+        *(seen.silent[:, i], seen.rests[:, i], seen.restless[:, i]),
+        *(seen.quiet[:, i], seen.opening[:, i], seen.saturated[:, i], s.u, seen.rough[:, i], seen.unseen[:, i]),
+        *_others(i, model, seen),
     )
     return np.stack([np.asarray(c, np.float64) for c in columns], axis=1)
 
 
-def _others(i: int, blocks: WheelBlocks, model: JointModel, seen: MissionSignals) -> Array:
+def _others(i: int, model: JointModel, seen: MissionSignals) -> Array:
     """Median and largest of the other wheels: asked and measured beyond the command [1], roughness; shape (6, n)."""
     apart = []
     for j, wheel in enumerate(model.wheels):
         if wheel is None or j == i:
             continue
         toward, r = seen.toward(j) / seen.usual, np.nan_to_num(seen.reference[:, j])
-        apart.append([(seen.asked[:, j] - r) * toward, (blocks.y[:, j] - r) * toward, seen.rough[:, j]])
+        apart.append([(seen.asked[:, j] - r) * toward, (seen.speed[:, j] - r) * toward, seen.rough[:, j]])
     if not apart:
-        return np.zeros((6, len(blocks.y)))
+        return np.zeros((6, len(seen.speed)))
     found = np.array(apart)
     return np.concatenate([np.median(found, axis=0), np.abs(found).max(axis=0)])
 

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from diagnosis.wheels.frames.windows import Blocks, windowed
+from diagnosis.wheels.frames.windows import Steps, in_steps, windowed
 from diagnosis.wheels.models import A_GAIN, HEALTHY, ODD, S_STUCK
 from diagnosis.wheels.runs import Runs
 
@@ -17,7 +17,7 @@ Path = NDArray[np.uint8]
 _WINDOWS = (0, -2, -1)
 
 
-def run_features(described: Array, runs: Runs, at: Blocks, dt: float) -> Array:
+def run_features(described: Array, runs: Runs, at: Steps, dt: float) -> Array:
     """Features of the runs of a path in which the blocks `at` lie, shape (frames, q).
 
     Parameters
@@ -36,23 +36,28 @@ def run_features(described: Array, runs: Runs, at: Blocks, dt: float) -> Array:
     return np.column_stack([described[r], since, left])
 
 
-def path_features(path: Path, others: Sequence[Path], fault: Array, at: Blocks, dt: float) -> Array:
+def path_features(path: Path, others: Sequence[Path], fault: Array, width: int, at: Steps, dt: float) -> Array:
     """Shares of sound, oddly loaded, sensor's and valve's models of a wheel's path, and of the others', shape (frames, 24).
 
     Parameters
     ----------
     path : NDArray[np.uint8], shape (n,)
-        Models of the wheel.
+        Models of the wheel, by block.
     others : Sequence of NDArray[np.uint8], shape (n,) each
         Those of the others.
     fault : Array, shape (n,)
         Probability by what came before that the wheel is faulty.
-    at, dt
-        As in `run_features`.
+    width : int
+        Blocks in a step.
+    at : NDArray[np.int64], shape (frames,)
+        Steps.
+    dt : float
+        Step [s].
     """
     table = [*_groups(path), fault]
     table += [np.sum([_groups(p)[k] for p in others], axis=0) if others else np.zeros(path.size) for k in (1, 2, 3)]
-    windows = windowed(np.stack([np.asarray(c, np.float64) for c in table], axis=1), at, dt)
+    columns = in_steps(np.stack([np.asarray(c, np.float32) for c in table], axis=1), width)
+    windows = windowed(columns, at, dt)
     return np.concatenate([windows[k] for k in _WINDOWS], axis=1)
 
 

@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
-Blocks = NDArray[np.int64]
+Steps = NDArray[np.int64]
 
-FRAME_S = 0.2
+STEP_S, FRAME_S = 0.04, 0.2
 MISSING, LARGEST = -9.0, 8.0  # a feature that nobody knows, and the largest one
 #: Windows around a moment [s]: from, to.
 WINDOWS: tuple[tuple[float, float], ...] = (
@@ -27,14 +27,14 @@ _REACH_S = 4.1
 _CUT_FRAMES = 4000
 
 
-def frames_at(n: int, dt: float) -> Blocks:
-    """Blocks in the middle of each frame of n blocks of dt [s]."""
+def frames_at(n: int, dt: float) -> Steps:
+    """Steps in the middle of each frame of n steps of dt [s]."""
     hop = max(1, round(FRAME_S / dt))
     return np.arange(min(hop // 2, n - 1), n, hop)
 
 
-def cuts(at: Blocks, n: int, dt: float) -> Iterator[tuple[slice, Blocks]]:
-    """Frames in turn: the blocks (of n) that their windows need, and the frames counted from the first of these."""
+def cuts(at: Steps, n: int, dt: float) -> Iterator[tuple[slice, Steps]]:
+    """Frames in turn: the steps (of n) that their windows need, and the frames counted from the first of these."""
     reach = round(_REACH_S / dt) + 1
     for k in range(0, at.size, _CUT_FRAMES):
         mine = at[k : k + _CUT_FRAMES]
@@ -42,8 +42,8 @@ def cuts(at: Blocks, n: int, dt: float) -> Iterator[tuple[slice, Blocks]]:
         yield slice(first, last), mine - first
 
 
-def windowed(columns: Array, at: Blocks, dt: float) -> list[Array]:
-    """Means of columns (n, k) over each of `WINDOWS` around the blocks `at`, shape (frames, k) each."""
+def windowed(columns: Array, at: Steps, dt: float) -> list[Array]:
+    """Means of columns (n, k) over each of `WINDOWS` around the steps `at`, shape (frames, k) each."""
     n = len(columns)
     sums = np.concatenate([np.zeros((1, columns.shape[1])), np.cumsum(columns, axis=0)])
     out = []
@@ -52,6 +52,12 @@ def windowed(columns: Array, at: Blocks, dt: float) -> list[Array]:
         last = np.clip(at + round(high / dt), first + 1, n)
         out.append((sums[last] - sums[first]) / (last - first)[:, None])
     return out
+
+
+def in_steps(x: NDArray[np.generic], width: int) -> Array:
+    """Means over steps of `width` rows, shape (⌈n/width⌉, ...); the last step is filled up with the last row."""
+    filled = np.pad(x, [(0, -len(x) % width)] + [(0, 0)] * (x.ndim - 1), mode="edge")
+    return np.asarray(filled.reshape(-1, width, *x.shape[1:]).mean(axis=1, dtype=np.float64))
 
 
 def bounded(features: Array) -> Array:
