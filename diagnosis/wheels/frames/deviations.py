@@ -66,8 +66,8 @@ def usual_weights(x: Array, basis: Array) -> Array:
         weighted = (basis * weight[:, None]).T
         w = np.asarray(np.linalg.solve(weighted @ basis + 1e-3 * np.eye(w.size), weighted @ x), np.float64)
         left = x - basis @ w
-        scale = max(1.48 * float(np.median(np.abs(left))), 1e-3)
-        weight = np.maximum(1.0 - (left / (_TUKEY * scale)) ** 2, 0.0) ** 2 + 1e-6
+        middle, scale = shorth(left)  # of a third that are off to one side, the median would be pulled along
+        weight = np.maximum(1.0 - ((left - middle) / (_TUKEY * max(scale, 1e-3))) ** 2, 0.0) ** 2 + 1e-6
     return w
 
 

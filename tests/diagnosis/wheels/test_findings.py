@@ -1,75 +1,102 @@
-"""What stays open where rounding hides the noise of a steady speed."""
+"""From segments to findings: what stays open, edges in the raw signal, valves behind a silent sensor."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
 
-from diagnosis.wheels.findings import Surroundings, WheelFindings, WheelPath, findings_of
-from diagnosis.wheels.models import HEALTHY, MODELS, S_STUCK, WheelFilterModel
-from diagnosis.wheels.run_kernel import RunEvidence
+from diagnosis.wheels.findings import Weighed, WheelFindings, WheelPath, findings_of
+from diagnosis.wheels.models import HEALTHY, MODELS, WheelFilterModel
 from diagnosis.wheels.runs import Runs
-from replay.faults import Side
+from diagnosis.wheels.tracks import MODES, Segment
+from replay.faults import FaultMode, Side
 from replay.machine.config import Limits
 
-STEP = 0.004
 MODEL = WheelFilterModel(
     K=2.4, tau=0.25, noise=0.001, constant_noise=0.001, rounding=0.001, load=0.014, span=0.8, valve_span=0.15
 )
-BLOCKS, WIDTH = 300, 10
+BLOCKS, WIDTH, DT = 300, 10, 0.001
 Array = np.ndarray
 
 
-def found(level: float, expected: float, *, flickers: bool, odd: Array | None = None) -> WheelFindings:
-    """A wheel at a steady speed, which the path calls stuck in the second half."""
-    y = np.full(BLOCKS * WIDTH, level)
-    if flickers:
-        y[::7] += STEP
-    at = np.array([0, BLOCKS // 2])
-    runs = Runs(at, np.array([BLOCKS // 2, BLOCKS]), np.array([HEALTHY, S_STUCK]), at)
-    log_evidence = np.full((2, MODELS), -1e4)
-    log_evidence[:, HEALTHY], log_evidence[1, S_STUCK] = 0.0, 500.0
-    evidence = RunEvidence(
-        log_evidence,
-        np.zeros((2, MODELS, 4)),
-        np.tile(np.eye(4), (2, MODELS, 1, 1)),
-        np.full(BLOCKS, expected),
-        np.full(BLOCKS, 1e-4),
+def pooled(side: Side, mode: FaultMode, p: float) -> dict:
+    rows = {(s, m): 0.0 for s in (Side.SENSOR, Side.ACTUATOR) for m in MODES}
+    return {None: 1 - p, **rows, (side, mode): p}
+
+
+def weighed(start: int, stop: int, side: Side, mode: FaultMode, p: float = 0.95, gain: float = 0.5) -> Weighed:
+    evidence = np.full(MODELS, -1e4)
+    evidence[HEALTHY] = 0.0
+    segment = Segment(start, stop, side, mode, pooled(side, mode, p))
+    evidence[segment.model] = 500.0
+    mean = np.zeros((MODELS, 4))
+    mean[:, 1] = gain
+    return Weighed(segment, evidence, mean, np.tile(1e-4 * np.eye(4), (MODELS, 1, 1)))
+
+
+def found(*segments: Weighed, y: Array | None = None, healthy: dict[Side, Array] | None = None) -> WheelFindings:
+    t = np.arange(BLOCKS * WIDTH) * DT
+    speed = 0.3 + 0.05 * np.sin(3 * t) + 0.001 * np.random.default_rng(1).normal(size=t.size) if y is None else y
+    sure = {side: np.full(BLOCKS, 0.99) for side in (Side.SENSOR, Side.ACTUATOR)}
+    whole = Runs(*(np.array([x]) for x in (0, BLOCKS, HEALTHY, 0)))
+    path = WheelPath(
+        y=speed,
+        names=("v", "u"),
+        model=MODEL,
+        dt=DT,
+        width=WIDTH,
+        runs=whole,
+        segments=segments,
+        expected=np.full(BLOCKS, 0.3),
+        spread=np.full(BLOCKS, 1e-4),
+        healthy=sure | (healthy or {}),
+        raised=np.zeros(BLOCKS, np.bool_),
+        fault=np.zeros(BLOCKS),
     )
-    none = np.zeros(BLOCKS, np.bool_)
-    odd = none if odd is None else odd
-    around = Surroundings(0.02, np.full(BLOCKS, 0.1), 0.1, np.zeros(BLOCKS), none, none)
-    habit = np.zeros(BLOCKS, np.int8)
-    path = WheelPath(y, ("v", "u"), MODEL, 0.002, WIDTH, runs, evidence, none, np.zeros(BLOCKS), habit, odd, around)
-    return findings_of(path, Limits(), gains=True)
+    return findings_of(path, Limits())
 
 
-@pytest.mark.parametrize(
-    ("level", "expected", "flickers", "sides"),
-    [
-        (0.3, 0.3, True, ()),  # a healthy wheel would do the same
-        (0.3, 0.3, False, (Side.SENSOR,)),  # its noise may be hidden
-        (0.5, 0.1, True, (Side.SENSOR, Side.ACTUATOR)),  # no stuck sensor: a valve that stands open would look like it
-    ],
-)
-def test_sides_that_a_steady_speed_leaves_open(
-    level: float, expected: float, flickers: bool, sides: tuple[Side, ...]
-) -> None:
-    out = found(level, expected, flickers=flickers)
-    late = slice(BLOCKS * WIDTH // 2 + 50, None)
+def test_a_side_that_may_be_faulty_stays_open() -> None:
+    p = np.full(BLOCKS, 0.99)
+    p[100:150], p[150:200] = 0.7, 0.3
+    out = found(healthy={Side.ACTUATOR: p})
     assert not out.findings
-    assert {s for s, at in out.opened.items() if at[late].all()} == set(sides)
-    assert all(not at[: BLOCKS * WIDTH // 2 - 50].any() for at in out.opened.values())
-
-
-def test_an_unusual_load_leaves_the_valve_open() -> None:
-    """Half a second of it does; less is what a healthy wheel shows at a bump."""
-    odd = np.zeros(BLOCKS, np.bool_)
-    odd[10:20], odd[40:110] = True, True
-    out = found(0.3, 0.3, flickers=True, odd=odd)
     at = np.zeros(BLOCKS * WIDTH, np.bool_)
-    at[40 * WIDTH : 110 * WIDTH] = True
+    at[100 * WIDTH : 200 * WIDTH] = True
     np.testing.assert_array_equal(out.opened[Side.ACTUATOR], at)
+    at[: 150 * WIDTH] = False
+    np.testing.assert_array_equal(out.unexplained[Side.ACTUATOR], at)
     assert not out.opened[Side.SENSOR].any()
-    assert not out.findings
-    assert not any(x.any() for x in out.unexplained.values())
+
+
+def test_a_probable_row_is_stated() -> None:
+    out = found(weighed(100, 200, Side.ACTUATOR, FaultMode.INEFFICIENT))
+    (finding,) = out.findings
+    assert (finding.start, finding.stop) == (100 * WIDTH, 200 * WIDTH)
+    assert (finding.side, finding.mode) == (Side.ACTUATOR, FaultMode.INEFFICIENT)
+    assert finding.probability == pytest.approx(0.95)
+    assert not found(weighed(100, 200, Side.ACTUATOR, FaultMode.INEFFICIENT, p=0.55)).findings
+
+
+def test_a_jump_in_the_raw_signal_is_the_edge() -> None:
+    y = np.full(BLOCKS * WIDTH, 0.3) + 0.001 * np.random.default_rng(2).normal(size=BLOCKS * WIDTH)
+    y[1137:1893] = 0.1
+    (finding,) = found(weighed(120, 180, Side.SENSOR, FaultMode.STUCK), y=y).findings
+    assert (finding.start, finding.stop) == (1137, 1893)
+
+
+def test_a_valve_behind_a_silent_sensor_is_not_judged() -> None:
+    y = 0.3 + 0.001 * np.random.default_rng(4).normal(size=BLOCKS * WIDTH)
+    y[1000:2000] = 0.0
+    silent = weighed(100, 200, Side.SENSOR, FaultMode.NO_SIGNAL)
+    hidden = found(silent, weighed(110, 190, Side.ACTUATOR, FaultMode.STUCK), y=y).findings
+    assert [f.side for f in hidden] == [Side.SENSOR]
+    both = found(silent, weighed(150, 290, Side.ACTUATOR, FaultMode.STUCK), y=y).findings
+    assert [f.side for f in both] == [Side.SENSOR, Side.ACTUATOR]
+
+
+def test_a_sensor_that_shows_hardly_anything_leaves_its_valve_open() -> None:
+    out = found(weighed(100, 200, Side.SENSOR, FaultMode.INEFFICIENT, gain=0.1))
+    (finding,) = out.findings
+    assert out.opened[Side.ACTUATOR][finding.start : finding.stop].all()
+    assert not found(weighed(100, 200, Side.SENSOR, FaultMode.INEFFICIENT)).opened[Side.ACTUATOR].any()
