@@ -25,7 +25,8 @@ MODEL_OF: dict[Row, int] = {
 _AROUND_S = 0.4  # on either side, over which what is said of frames is averaged
 _SHARPER = 1.3  # what agreement over that time adds, by machines that were held out of the training
 _FAULTY = 0.5
-_SHORT_S = 0.3
+_DOUBTED, _BRIDGED_S = 0.8, 3.0  # a shorter time in which a side is not healthier than this is no end of its fault
+_SHORT_S = 1.0  # a row that holds for less than this within a fault is that of its neighbour
 _NEAR_S = 0.6  # within which an edge of the Kalman models' path is the segment's
 _STRANGE = 0.9  # share of known features below which nothing is concluded
 
@@ -133,11 +134,12 @@ def segments_of(track: Track, side: Side, n: int, runs: Runs, dt: float) -> list
         Block [s].
     """
     p = track.probability[side]
-    mode = np.where(p[:, 0] < _FAULTY, 1 + p[:, 1:].argmax(axis=1), 0)
+    step = track.hop * dt
+    mode = np.where(_faulty(p[:, 0], round(_BRIDGED_S / step)), 1 + p[:, 1:].argmax(axis=1), 0)
     cut = np.flatnonzero(np.r_[True, mode[1:] != mode[:-1]])
     pieces = [[int(a), int(b), int(mode[a])] for a, b in zip(cut, np.r_[cut[1:], mode.size], strict=True)]
     out = []
-    for a, b, k in _joined(pieces, round(_SHORT_S / (track.hop * dt))):
+    for a, b, k in _joined(pieces, round(_SHORT_S / step)):
         start, stop = _edges(
             a * track.hop, min(n, b * track.hop) if b < mode.size else n, side, runs, round(_NEAR_S / dt)
         )
@@ -146,19 +148,35 @@ def segments_of(track: Track, side: Side, n: int, runs: Runs, dt: float) -> list
     return out
 
 
-def _joined(pieces: list[list[int]], short: int) -> list[list[int]]:
-    """Faulty pieces; a short one goes to the faulty neighbour that is longer."""
-    out: list[list[int]] = []
-    for a, b, k in pieces:
-        if k == 0:
-            continue
-        before = out[-1] if out and out[-1][1] == a else None
-        if before is not None and (before[2] == k or min(b - a, before[1] - before[0]) <= short):
-            longer = before[2] if before[1] - before[0] >= b - a else k
-            out[-1] = [before[0], b, longer]
-        else:
-            out.append([a, b, k])
+def _faulty(healthy: Array, bridged: int) -> NDArray[np.bool_]:
+    """Frames of faults, shape (frames,), by the probability of a healthy side; a doubtful pause of `bridged` frames is bridged."""
+    out = healthy < _FAULTY
+    edges = np.flatnonzero(np.diff(np.r_[False, out, False].astype(np.int8)))
+    for stop, start in zip(edges[1::2], edges[2::2], strict=False):
+        if start - stop <= bridged and healthy[stop:start].max() < _DOUBTED:
+            out[stop:start] = True
     return out
+
+
+def _joined(pieces: list[list[int]], short: int) -> list[list[int]]:
+    """Faulty pieces; one of less than `short` frames goes to the longest faulty neighbour, shortest first."""
+    out = [p for p in pieces if p[2] != 0]
+    while True:
+        for k in sorted(range(len(out)), key=lambda k: out[k][1] - out[k][0]):
+            near = [j for j in (k - 1, k + 1) if 0 <= j < len(out) and _touch(out, j, k)]
+            same = [j for j in near if out[j][2] == out[k][2]]
+            if same or (near and out[k][1] - out[k][0] < short):
+                j = max(same or near, key=lambda j: out[j][1] - out[j][0])
+                first, last = min(j, k), max(j, k)
+                out[first : last + 1] = [[out[first][0], out[last][1], out[j][2]]]
+                break
+        else:
+            return out
+
+
+def _touch(pieces: list[list[int]], j: int, k: int) -> bool:
+    """Whether two pieces follow each other without a pause."""
+    return pieces[min(j, k)][1] == pieces[max(j, k)][0]
 
 
 def _edges(start: int, stop: int, side: Side, runs: Runs, near: int) -> tuple[int, int]:
