@@ -14,7 +14,7 @@ from diagnosis.results.vocabulary import Tier
 from diagnosis.steering.blocks import SteeringBlocks
 from diagnosis.steering.driven import driven_by
 from diagnosis.steering.evidence import evidence_columns, path_angle
-from diagnosis.steering.findings import findings_of
+from diagnosis.steering.findings import apart, findings_of
 from diagnosis.steering.identification import identify_plants
 from diagnosis.steering.inputs import AxleInputs, Counts, axle_inputs
 from diagnosis.steering.models import model_of
@@ -116,6 +116,8 @@ def _judged_by_model(inputs: AxleInputs, blocks: SteeringBlocks, plant: Steering
     axle = AxleFilter(blocks, driven_by(plant, blocks), model, allowed, inputs.names)
     path = refine_path(axle, most_probable(axle))
     found = {side: findings_of(side, inputs, axle, path, machine.limits) for side in _SIDES}
+    if not (inputs.redundant or inputs.valve_redundant):
+        found[Side.ACTUATOR] = apart(found[Side.SENSOR], found[Side.ACTUATOR], blocks.length)
     dead = [(f.start, f.stop) for f in found[Side.SENSOR].findings if f.mode.total]
     masked = [] if inputs.redundant else dead
     columns = evidence_columns(inputs, axle, path, [f for side in _SIDES for f in found[side].findings])

@@ -31,6 +31,7 @@ Span = tuple[int, int]
 _TEMPER = 0.35
 _MOST = 0.6  # of a mission: the longest fault of a valve
 _BRIEF_S = 0.9  # a shorter stretch is rather what the model leaves out
+_FRAGMENT_S = 2.0  # a row that holds for less beside another one is rather its end
 _BELIEVED_S = 4.0  # for how long before and after a motion that did not come a valve's fault is believed
 _LEAST_ASKED_S = 0.35  # for how long a motion must be asked for, to see that it does not come
 _LEAST_NAMED, _LEAST_LISTED = 0.005, 5e-4  # probabilities from which on another explanation is named in words, listed
@@ -117,7 +118,7 @@ def judge_side(side: Side, axle: AxleFilter, path: SteeringPath, limits: Limits)
             continue
         one = _judge(_Run(side, start, stop, row, axle, path, limits))
         last = out[-1] if out else None
-        if last is not None and last.stop == start and _same(last.finding, one.finding):
+        if last is not None and last.stop == start and _one_fault(last, one, axle.blocks.dt):
             longer = max(last, one, key=lambda j: j.stop - j.start)
             assert longer.finding is not None
             length = axle.blocks.length
@@ -127,8 +128,35 @@ def judge_side(side: Side, axle: AxleFilter, path: SteeringPath, limits: Limits)
     return out
 
 
-def _same(a: Finding | None, b: Finding | None) -> bool:
-    return a is not None and b is not None and (a.side, a.mode) == (b.side, b.mode)
+def _one_fault(a: Judged, b: Judged, dt: float) -> bool:
+    """Whether two runs that follow each other are one fault: of one row, or one of them brief beside the other."""
+    if a.finding is None or b.finding is None or a.finding.side is not b.finding.side:
+        return False
+    brief, longer = sorted(((a.stop - a.start) * dt, (b.stop - b.start) * dt))
+    return a.finding.mode is b.finding.mode or (brief < _FRAGMENT_S and longer > 2 * brief)
+
+
+def apart(sensor: SideFindings, valve: SideFindings, length: int) -> SideFindings:
+    """The valve's findings without those in which the sensor's fault is what the angle shows.
+
+    An angle that its sensor scales or shakes is of no use to judge the valve behind it: there it stays open.
+
+    Parameters
+    ----------
+    sensor, valve : SideFindings
+        Of one axle whose valve is judged by the angle.
+    length : int
+        Samples per block.
+    """
+    blurred = [f for f in sensor.findings if not f.mode.total]
+    kept, open_ = [], list(valve.unexplained)
+    for f in valve.findings:
+        shared = sum(max(0, min(f.stop, b.stop) - max(f.start, b.start)) for b in blurred)
+        if 2 * shared > f.stop - f.start:
+            open_.append((f.start // length, -(-f.stop // length)))
+        else:
+            kept.append(f)
+    return SideFindings(tuple(kept), tuple(open_))
 
 
 def _judge(run: _Run) -> Judged:

@@ -20,3 +20,9 @@ def mission_log(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("logs") / "drive.mcap"
     write_mission(simulate_mission(options), path, "mcap")
     return path
+
+
+@pytest.fixture(autouse=True)
+def _width_of_a_pipe(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Output as wide as in a pipe, whatever the terminal or the runner of the tests says."""
+    monkeypatch.delenv("COLUMNS", raising=False)

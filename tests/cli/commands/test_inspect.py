@@ -191,6 +191,7 @@ def test_a_crash_in_one_file_does_not_stop_the_others(
 
     (tmp_path / "poison.mcap").write_text("x")
     monkeypatch.setattr("replay.inspection.inspect_log.inspect_index", inspect_index)
+    monkeypatch.setenv("COLUMNS", "300")  # temporary folders have long names
     assert run(["inspect", str(tmp_path), str(mission_log)]) == 70
     seen = capsys.readouterr()
     assert "poison.mcap: ValueError: boom" in seen.err
