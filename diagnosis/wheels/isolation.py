@@ -184,10 +184,18 @@ def _sentences(
 ) -> tuple[str, ...]:
     """What decided, with figures; `stated` is the side that is stated, and the row."""
     side, row = stated
+    share = dict(ranked)[row]
     lines = [
-        f"Over {seconds:.3f} s the model “{_words(row)}” explains {names[0]} better than a "
-        f"healthy wheel by a log-evidence of {run.ahead(m):.0f}."
+        f"Over {seconds:.3f} s {names[0]} and {names[1]} look as on machines with “{_words(row)}”: by what those showed, it is this "
+        f"with {100 * share:.0f} %."
     ]
+    ahead = run.ahead(m)
+    if ahead > 0:
+        lines.append(
+            f"Its Kalman model explains {names[0]} better than that of a healthy wheel by a log-evidence of {ahead:.0f}."
+        )
+    else:
+        lines.append("Its Kalman model alone would not be preferred to that of a healthy wheel.")
     if m in TOTAL_SENSOR and known.size:
         lines.append(f"{names[0]} stayed within {float(np.ptp(known)):.2g} m/s of {float(np.mean(known)):.4g} m/s.")
     for other, probability in ranked:

@@ -22,7 +22,7 @@ _REASONS = {
 }
 _NO_COMMAND = "no valve command to compare with"
 _UNCERTAIN = "the wheel model is too uncertain in this mission"
-_UNEXPLAINED = "no single fault explains the residual well enough"
+_UNEXPLAINED = "what it shows is probable of a healthy part and of a faulty one"
 
 
 @dataclass(frozen=True)
