@@ -98,10 +98,10 @@ def test_check_of_a_good_and_a_bad_file(tmp_path: Path, capsys: pytest.CaptureFi
     file = tmp_path / "machine.toml"
     file.write_text('[machine]\nname = "Crane"\n')
     assert run(["config", "check", str(file)]) == 0
-    assert "Crane, wheels FR, FL, RR, RL" in capsys.readouterr().out
+    assert "Crane, wheels FR, FL, RR, RL" in " ".join(capsys.readouterr().out.split())
     file.write_text("[control]\nlambda = -1\n")
     assert run(["config", "check", str(file)]) == 2
-    assert "control.lambda = -1 s/m is out of range" in capsys.readouterr().err
+    assert "control.lambda = -1 s/m is out of range" in " ".join(capsys.readouterr().err.split())
 
 
 def test_check_against_a_log(mission_log: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -16,7 +16,7 @@ def test_readings_are_printed_and_columns_written(
 ) -> None:
     out = tmp_path / "loop.parquet"
     assert run(["replay", str(mission_log), "-o", str(out), "--start", "2", "--end", "4"]) == 0
-    text = capsys.readouterr().out
+    text = " ".join(capsys.readouterr().out.split())
     assert "control law" in text
     assert "200 steps of 10 ms" in text or "201 steps of 10 ms" in text
     table = pq.read_table(out)
