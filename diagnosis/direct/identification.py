@@ -110,7 +110,9 @@ class IdentifiedPair:
         return Texture(y.size, white, self.lsb, own)
 
 
-def identify(pair: Pair, limits: Limits, usual: HealthyNoise | None = None) -> IdentifiedPair:
+def identify(
+    pair: Pair, limits: Limits, usual: HealthyNoise | None = None, given: Relation | None = None
+) -> IdentifiedPair:
     """Find how a channel follows its reference, its noise, and what of it the log does not resolve.
 
     Parameters
@@ -121,12 +123,14 @@ def identify(pair: Pair, limits: Limits, usual: HealthyNoise | None = None) -> I
         The smallest saturation term that counts bounds the mismatch of two healthy instruments.
     usual : HealthyNoise or None
         What healthy channels of its kind have; None: what this one has.
+    given : Relation or None
+        How channels of its kind follow their reference; None: as this one does.
     """
     dt, sensor = pair.dt, pair.side is Side.SENSOR
     habit = pair.habit
     held = held_reference(pair.x, habit, dt) if habit.stepwise else Held(pair.x, np.zeros(pair.x.size))
     hold = habit.hold(np.nan_to_num(held.mean))
-    relation = _relation(pair, held.mean, hold, sensor)
+    relation = _relation(pair, held.mean, hold, sensor) if given is None else given
     x = pair.store.keep(relation.expected(held.mean, dt))
     spread = np.nan_to_num(shifted(held.spread, relation.delay))
     status = sample_status(pair.y, x, pair.fresh, pair.alive, dt)

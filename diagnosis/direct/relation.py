@@ -7,7 +7,7 @@ misfit by Cauchy's loss of scale s, mean ln(1 + (misfit/s)²), where the referen
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -27,6 +27,7 @@ _PLAYS = (0.006, 0.012, 0.02, 0.03, 0.045, 0.065)  # of the span
 _BETTER = 0.03  # of the loss, by which a lag or play is believed
 _ROUNDS, _FINE = 5, (0.8, 0.9, 0.95, 1.05, 1.1, 1.25)
 _USUAL, _LARGE = 0.35, 3.0
+_SIBLINGS, _ALIKE = 3, 0.6  # channels of one kind, and steps by which they may differ
 _LARGEST_SCALE = 0.02  # what differs by more is a loss of effectiveness
 
 
@@ -55,6 +56,28 @@ class Relation(NamedTuple):
         followed = x if self.lag == 0.0 and self.play == 0.0 else _followed(x, self.play, self.lag, dt)
         moved = shifted(followed, self.delay)
         return moved if self.gain == 1.0 else self.gain * moved
+
+
+def relations_of_kind(found: Sequence[Relation], dt: float) -> list[Relation]:
+    """Relations of channels of one kind, of which three or more agree on how late they are: the rest are as late.
+
+    Faults that last for much of a mission may move what is found of one channel; its scale stays its own.
+
+    Parameters
+    ----------
+    found : Sequence[Relation]
+        As each was found.
+    dt : float
+        Step [s].
+    """
+    late = np.array([r.delay + r.lag / dt for r in found])
+    if late.size < _SIBLINGS:
+        return list(found)
+    apart = np.abs(late - np.median(late))
+    if np.count_nonzero(apart <= _ALIKE) < max(2, (late.size + 1) // 2):
+        return list(found)
+    typical = found[int(np.argmin(apart))]
+    return [r if d <= _ALIKE else typical._replace(gain=r.gain) for r, d in zip(found, apart, strict=True)]
 
 
 def _followed(x: Array, play: float, lag: float, dt: float) -> Array:

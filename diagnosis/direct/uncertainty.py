@@ -25,6 +25,7 @@ Array = NDArray[np.float64]
 _MEAN_HEALTHY_S = 60.0
 _SMOOTH_S, _MOTION_S = 0.02, 0.005
 _LEAST_CONSTANT = 0.02  # of the noise
+_MOST_MOTION = 1.0  # a mismatch beyond what the reference changes by within 5 ms is none of timing
 _SIBLINGS, _ALIKE, _SLACK = 3, 1.4, 0.01  # channels of one kind; how far one may be off the usual: times, and shares
 _REPEATS = 20  # news in a window of repeats
 _PLAY, _PLAY_S = (
@@ -132,7 +133,7 @@ def uncertainty_of(
     if pair.side is Side.SENSOR:
         constant = max(lsb / math.sqrt(12), noise * min(1.0, max(_LEAST_CONSTANT, repeats)))
     moved = _moved(x, pair.dt)
-    motion = _motion_share(evened, moved, paired, pair.dt) if usual is None else usual.motion
+    motion = min(_motion_share(evened, moved, paired, pair.dt), _MOST_MOTION) if usual is None else usual.motion
     mismatch = spread**2 + max(0.0, (_PLAY * relation.play) ** 2 - tolerance**2) + (motion * moved) ** 2
     rows = len(codes_of(pair.side)) - 1  # every one of both sides is as probable as the others
     model = ModeModel(
@@ -160,7 +161,7 @@ def usual_of_kind(found: Sequence[HealthyNoise]) -> HealthyNoise | None:
     """Noise of a healthy one of several channels of one kind: faults leave the medians alone; None where they are few."""
     if len(found) < _SIBLINGS:
         return None
-    return HealthyNoise(*(float(x) for x in np.median(np.array(found), axis=0)))
+    return HealthyNoise(*(float(x) for x in np.quantile(np.array(found), 0.5, axis=0, method="lower")))
 
 
 def _growth(residual: Array, size: Array, counted: Array, period: float) -> NoiseGrowth:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from diagnosis.direct.relation import Relation, _loss, relation_of
+from diagnosis.direct.relation import Relation, _loss, relation_of, relations_of_kind
 
 DT, N = 0.001, 60_000
 Array = np.ndarray
@@ -72,3 +72,19 @@ def test_loss_is_the_mean_of_cauchys() -> None:
     y[7] = 1e60
     misfit = (y - 1.1 * (0.7 * x[at - 2] + 0.3 * x[at - 3])) / 1e-4
     assert_allclose(_loss(x, at, y, 2, 0.3, 1.1, 1e-4), np.nanmean(np.log1p(misfit**2)), rtol=1e-12)
+
+
+def test_channels_of_one_kind_are_as_late_as_most_of_them() -> None:
+    found = [
+        Relation(delay=3.0, gain=1.001),
+        Relation(delay=-1.0, lag=0.004),
+        Relation(delay=3.1),
+        Relation(delay=9.0, gain=0.99),
+    ]
+    got = relations_of_kind(found, 0.001)
+    assert got[:3] == found[:3]  # a delay and a lag may stand for each other
+    assert got[3] == Relation(delay=got[3].delay, lag=got[3].lag, gain=0.99)
+    assert got[3].delay + got[3].lag / 0.001 == pytest.approx(3.0, abs=0.15)
+    apart = [Relation(delay=d) for d in (0.0, 3.0, 6.0, 9.0)]
+    assert relations_of_kind(apart, 0.001) == apart  # nobody agrees
+    assert relations_of_kind(found[2:], 0.001) == found[2:]  # too few
