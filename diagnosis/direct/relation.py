@@ -27,7 +27,7 @@ _PLAYS = (0.006, 0.012, 0.02, 0.03, 0.045, 0.065)  # of the span
 _BETTER = 0.03  # of the loss, by which a lag or play is believed
 _ROUNDS, _FINE = 5, (0.8, 0.9, 0.95, 1.05, 1.1, 1.25)
 _USUAL, _LARGE = 0.35, 3.0
-_SIBLINGS, _ALIKE = 3, 0.6  # channels of one kind, and steps by which they may differ
+_SIBLINGS, _ALIKE, _SCALES = 3, 0.6, 0.01  # channels of one kind; steps, and share, by which they may differ
 _LARGEST_SCALE = 0.02  # what differs by more is a loss of effectiveness
 
 
@@ -59,9 +59,9 @@ class Relation(NamedTuple):
 
 
 def relations_of_kind(found: Sequence[Relation], dt: float) -> list[Relation]:
-    """Relations of channels of one kind, of which three or more agree on how late they are: the rest are as late.
+    """Relations of three or more channels of one kind: as late, and of the scale, as most of them are.
 
-    Faults that last for much of a mission may move what is found of one channel; its scale stays its own.
+    Faults that last for much of a mission may move what is found of one channel; a scale keeps its own small error.
 
     Parameters
     ----------
@@ -70,14 +70,14 @@ def relations_of_kind(found: Sequence[Relation], dt: float) -> list[Relation]:
     dt : float
         Step [s].
     """
-    late = np.array([r.delay + r.lag / dt for r in found])
+    late, gain = np.array([r.delay + r.lag / dt for r in found]), np.array([r.gain for r in found])
     if late.size < _SIBLINGS:
         return list(found)
     apart = np.abs(late - np.median(late))
-    if np.count_nonzero(apart <= _ALIKE) < max(2, (late.size + 1) // 2):
-        return list(found)
-    typical = found[int(np.argmin(apart))]
-    return [r if d <= _ALIKE else typical._replace(gain=r.gain) for r, d in zip(found, apart, strict=True)]
+    agree = np.count_nonzero(apart <= _ALIKE) >= max(2, (late.size + 1) // 2)
+    typical, usual = found[int(np.argmin(apart))], float(np.median(gain))
+    timed = [typical._replace(gain=r.gain) if agree and d > _ALIKE else r for r, d in zip(found, apart, strict=True)]
+    return [r if abs(r.gain - usual) <= _SCALES else r._replace(gain=usual) for r in timed]
 
 
 def _followed(x: Array, play: float, lag: float, dt: float) -> Array:

@@ -79,12 +79,14 @@ def test_channels_of_one_kind_are_as_late_as_most_of_them() -> None:
         Relation(delay=3.0, gain=1.001),
         Relation(delay=-1.0, lag=0.004),
         Relation(delay=3.1),
-        Relation(delay=9.0, gain=0.99),
+        Relation(delay=9.0, gain=0.992),
     ]
     got = relations_of_kind(found, 0.001)
     assert got[:3] == found[:3]  # a delay and a lag may stand for each other
-    assert got[3] == Relation(delay=got[3].delay, lag=got[3].lag, gain=0.99)
+    assert got[3] == Relation(delay=got[3].delay, lag=got[3].lag, gain=0.992)
     assert got[3].delay + got[3].lag / 0.001 == pytest.approx(3.0, abs=0.15)
+    scaled = [Relation(gain=g) for g in (1.002, 0.982, 0.999, 1.0)]
+    assert [r.gain for r in relations_of_kind(scaled, 0.001)] == [1.002, 0.9995, 0.999, 1.0]
     apart = [Relation(delay=d) for d in (0.0, 3.0, 6.0, 9.0)]
     assert relations_of_kind(apart, 0.001) == apart  # nobody agrees
     assert relations_of_kind(found[2:], 0.001) == found[2:]  # too few
