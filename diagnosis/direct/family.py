@@ -61,7 +61,8 @@ def _identified(pairs: dict[Part, Pair], limits: Limits, mission: MissionView) -
     for side in (SENSOR, ACTUATOR):
         kind = {part: one for part, one in found.items() if part[1] == side}
         usual = usual_of_kind([one.own for one in kind.values()])
-        alike = relations_of_kind([one.relation for one in kind.values()], mission.timeline.dt)
+        own = [one.relation for one in kind.values()]
+        alike = relations_of_kind(own, mission.timeline.dt) if side == SENSOR else own
         for (part, one), relation in zip(kind.items(), alike, strict=True):
             exceeds = usual is not None and one.own.exceeds(usual)
             if exceeds or relation != one.relation:

@@ -133,7 +133,8 @@ def uncertainty_of(
     if pair.side is Side.SENSOR:
         constant = max(lsb / math.sqrt(12), noise * min(1.0, max(_LEAST_CONSTANT, repeats)))
     moved = _moved(x, pair.dt)
-    motion = min(_motion_share(evened, moved, paired, pair.dt), _MOST_MOTION) if usual is None else usual.motion
+    most = _MOST_MOTION if pair.side is Side.SENSOR else math.inf  # a command may jump
+    motion = min(_motion_share(evened, moved, paired, pair.dt), most) if usual is None else usual.motion
     mismatch = spread**2 + max(0.0, (_PLAY * relation.play) ** 2 - tolerance**2) + (motion * moved) ** 2
     rows = len(codes_of(pair.side)) - 1  # every one of both sides is as probable as the others
     model = ModeModel(

@@ -158,7 +158,10 @@ def wheels_data(
     return WheelsData(
         y=y,
         u=u,
-        reference=replay.v_ref,
+        # a controller follows its own sensor: beside the second one the command says nothing of the wheel
+        reference=timeline.map(lambda r: np.asarray(np.where(channels.has_true, np.nan, r)), replay.v_ref)
+        if channels.has_true.any()
+        else replay.v_ref,
         residual=residual,
         status=status,
         quiet=quiet,
