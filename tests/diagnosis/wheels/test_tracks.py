@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
 from diagnosis.wheels import tracks
@@ -53,6 +55,39 @@ def test_rows_that_follow_each_other_are_two_faults() -> None:
         (200, 400, FaultMode.STUCK),
         (400, 600, FaultMode.NOISY),
     ]
+
+
+PIECES = st.lists(st.tuples(st.integers(1, 6), st.integers(0, 3)), max_size=25)
+
+
+@given(PIECES, st.integers(0, 7))
+def test_pieces_are_joined_as_one_by_one(lengths: list[tuple[int, int]], short: int) -> None:
+    at, pieces = 0, []
+    for length, k in lengths:
+        pieces.append([at, at + length, k])
+        at += length
+    assert tracks._joined(pieces, short) == joined_one_by_one(pieces, short)
+
+
+def joined_one_by_one(pieces: list[list[int]], short: int) -> list[list[int]]:
+    """The same, from the start again after every piece that is joined."""
+    out = [p for p in pieces if p[2] != 0]
+    while True:
+        for k in sorted(range(len(out)), key=lambda k: out[k][1] - out[k][0]):
+            near = [j for j in (k - 1, k + 1) if 0 <= j < len(out) and out[min(j, k)][1] == out[max(j, k)][0]]
+            same = [j for j in near if out[j][2] == out[k][2]]
+            if same or (near and out[k][1] - out[k][0] < short):
+                j = max(same or near, key=lambda j: out[j][1] - out[j][0])
+                first, last = min(j, k), max(j, k)
+                out[first : last + 1] = [[out[first][0], out[last][1], out[j][2]]]
+                break
+        else:
+            return out
+
+
+@pytest.mark.parametrize(("edges", "want"), [([], 50), ([44, 57], 44), ([43, 57], 50), ([45, 55], 45)])
+def test_the_closest_edge_within_reach(edges: list[int], want: int) -> None:
+    assert tracks._closest(np.array(edges, np.int64), 50, 6) == want
 
 
 def test_an_edge_of_the_path_of_the_same_side_is_the_better_one() -> None:
