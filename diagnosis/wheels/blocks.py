@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, fields, replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +15,7 @@ from numpy.typing import NDArray
 from diagnosis.channels.noise import white_part
 from diagnosis.channels.sample_status import PAIR, SILENT, SKIP
 from diagnosis.wheels.valve_map import effective
-from replay.arrays.blocks import release
+from replay.arrays.blocks import block_means, framed, release
 from replay.arrays.column_store import ColumnStore
 from replay.arrays.numeric import without_nan
 from replay.machine.config import WheelPlant
@@ -181,7 +180,7 @@ def blocks_of(
     spools: list[float | None] = [None] * wheels
     for cut in store.blocks(size, width):
         driving, more, spools = _effective(u[cut], plants, spools)
-        beyond = _framed(driving, width)
+        beyond = framed(driving, width)
         opening.append(beyond.reshape(-1, wheels))
         mean, count, jitter, state = _samples(y[cut], status[cut], width, len(beyond), ends)
         parts.append(
@@ -189,13 +188,13 @@ def blocks_of(
                 y=mean,
                 count=count,
                 jitter=jitter,
-                unseen=_framed(more, width).mean(axis=1),
+                unseen=block_means(more, width),
                 unsteady=beyond.std(axis=1),
                 status=state,
-                quiet=np.asarray(_framed(quiet[cut], width).all(axis=1)),
-                ratio=_framed(ratio[cut], width).mean(axis=1),
-                turn=_framed(turn[cut], width).mean(axis=1),
-                blind=_framed(~np.isfinite(u[cut]), width).mean(axis=1) > 0.5,
+                quiet=np.asarray(framed(quiet[cut], width).all(axis=1)),
+                ratio=block_means(ratio[cut], width),
+                turn=block_means(turn[cut], width),
+                blind=block_means(~np.isfinite(u[cut]), width) > 0.5,
             )
         )
         release(y, u, ratio, turn)
@@ -222,12 +221,6 @@ def _effective(
             opening[:, i], more[:, i], held[i] = effective(u[:, i], plant, held[i])
             opening[:, i] += more[:, i]
     return opening, more, held
-
-
-def _framed(values: NDArray[Any], width: int) -> NDArray[Any]:
-    """Samples of all wheels by block, shape (n, width, wheels); the last block is filled up with the last sample."""
-    filled = np.pad(values, ((0, -len(values) % width), (0, 0)), mode="edge")
-    return filled.reshape(-1, width, values.shape[1])
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,7 @@ from diagnosis.body.sources import body_sensors
 from diagnosis.body.speed import BodySpeed, body_speed
 from diagnosis.wheels.blocks import WheelBlocks, block_width
 from diagnosis.wheels.motion import in_motion
-from replay.arrays.blocks import release
+from replay.arrays.blocks import block_means, release
 from replay.control.kinematics import low_pass, rotation
 from replay.control.loop import any_finite
 from replay.machine.config import Machine
@@ -61,12 +61,12 @@ def _rolling(
     assert geometry is not None
     parts = []
     for cut in timeline.blocks(width):
-        share, less = _means(ratio[cut], width), _means(turn[cut], width)
-        axles = _means(angle[cut], width)
+        share, less = block_means(ratio[cut], width), block_means(turn[cut], width)
+        axles = block_means(angle[cut], width)
         curvature, lateral = rotation(axles, geometry)
         with np.errstate(invalid="ignore", divide="ignore"):
-            by_wheel = (_means(y[cut], width) + less) / share
-            commanded = np.median((_means(v_ref[cut], width) + less) / share, axis=1)
+            by_wheel = (block_means(y[cut], width) + less) / share
+            commanded = np.median((block_means(v_ref[cut], width) + less) / share, axis=1)
         parts.append((by_wheel, commanded, np.nan_to_num(curvature), np.nan_to_num(lateral)))
         release(y, v_ref, ratio, turn, angle)
     by_wheel, command, curvature, lateral = (np.concatenate(column) for column in zip(*parts, strict=True))
@@ -80,12 +80,6 @@ def _rolling(
         lateral=lateral,
         top=machine.max_speed,
     )
-
-
-def _means(values: Array, width: int) -> Array:
-    """Means over blocks of rows; the last block is filled up with its last row."""
-    filled = np.pad(values, ((0, -len(values) % width), (0, 0)), mode="edge")
-    return np.asarray(filled.reshape(-1, width, values.shape[1]).mean(axis=1))
 
 
 @dataclass(frozen=True)

@@ -16,14 +16,12 @@ from diagnosis.wheels.estimates import estimate
 from diagnosis.wheels.models import (
     A_GAIN,
     A_NONE,
-    A_STUCK,
     HEALTHY,
     ODD,
     ROW_OF_MODEL,
     S_GAIN,
     S_NONE,
     S_OU_LARGE,
-    S_STUCK,
     TOTAL_SENSOR,
     Row,
     WheelFilterModel,
@@ -116,7 +114,7 @@ def judge(run: Run, y: Array, model: WheelFilterModel, limits: Limits, names: tu
     stated = _stated(weighed)
     if stated is None:
         return RunVerdict(None)
-    m, _ = _models_of(run, weighed.row)
+    m = _model_of(run, weighed.row)
     epsilon, sat = estimate(m, known, run.mean[m], run.cov[m], model)
     if epsilon is not None and m in (S_GAIN, A_GAIN) and epsilon.value < limits.min_epsilon:
         return RunVerdict(None)
@@ -158,14 +156,12 @@ def _stated(weighed: _Weighed) -> tuple[Side, float] | None:
     return Side.SENSOR_OR_ACTUATOR, both
 
 
-def _models_of(run: Run, row: Row) -> tuple[int, int]:
-    """Model of a row by which the fault is estimated, and the one whose evidence supports it."""
+def _model_of(run: Run, row: Row) -> int:
+    """Model of a row by which the fault is estimated."""
     side, mode = row
     if mode is FaultMode.NO_SIGNAL:  # also what is stuck at nothing
-        m, stuck = (S_NONE, S_STUCK) if side is Side.SENSOR else (A_NONE, A_STUCK)
-        return m, m if run.evidence[m] >= run.evidence[stuck] else stuck
-    m = int(np.argmax(np.where([r == row for r in ROW_OF_MODEL], run.evidence, -np.inf)))
-    return m, m
+        return S_NONE if side is Side.SENSOR else A_NONE
+    return int(np.argmax(np.where([r == row for r in ROW_OF_MODEL], run.evidence, -np.inf)))
 
 
 def _names(row: Row | None) -> tuple[str, str]:

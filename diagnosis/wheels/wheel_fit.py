@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -15,7 +16,7 @@ from diagnosis.wheels.identification import identified, identify
 from diagnosis.wheels.motion import body_speeds, in_motion
 from diagnosis.wheels.plant_identification import Drive
 from diagnosis.wheels.wheel_channels import WheelChannels
-from replay.arrays.blocks import release
+from replay.arrays.blocks import block_means, release
 from replay.arrays.numeric import without_nan
 from replay.control.loop import Replay, any_finite
 from replay.machine.config import Machine
@@ -53,25 +54,16 @@ def wheel_fit(
         if found is not None:
             return found
     width = min(block_width(timeline.dt), timeline.size)
-    limit = machine.limits.driving_speed
-
-    def mean(function: Callable[..., NDArray[Any]], *columns: Array) -> Array:
-        out = []
-        for part in timeline.store.blocks(timeline.size // width * width, width):
-            x = np.asarray(function(*(c[part] for c in columns)), np.float64)
-            out.append(x.reshape(-1, width, x.shape[1]).mean(axis=1))
-            release(*columns)
-        return np.concatenate(out)
-
-    moving = mean(lambda ref, v: np.abs(np.where(np.isfinite(ref), ref, v)) > limit, replay.v_ref, channels.speed)
+    means = partial(_means, timeline, width)
+    moving = _driving(channels, replay, timeline, width, machine.limits.driving_speed)
     return identify(
-        mean(np.asarray, channels.speed),
-        mean(np.asarray, channels.opening),
-        np.asarray(moving > 0.5),
+        means(np.asarray, channels.speed),
+        means(np.asarray, channels.opening),
+        moving,
         timeline.dt * width,
         given,
         machine.plant.flow,
-        mean(lambda u: np.abs(without_nan(u)), channels.opening),
+        means(lambda u: np.abs(without_nan(u)), channels.opening),
     )
 
 
@@ -85,20 +77,11 @@ def wheel_drive(
 ) -> Drive:
     """Block means of all wheels for `diagnosis.wheels.plant_identification`; parameters as in `wheel_fit`."""
     width = min(block_width(timeline.dt), timeline.size)
-    limit = machine.limits.driving_speed
+    means = partial(_means, timeline, width)
     ratio, turn = in_motion(angle, machine, timeline)
-
-    def mean(function: Callable[..., NDArray[Any]], *columns: Array) -> Array:
-        out = []
-        for part in timeline.store.blocks(timeline.size // width * width, width):
-            x = np.asarray(function(*(c[part] for c in columns)), np.float64)
-            out.append(x.reshape(-1, width, x.shape[1]).mean(axis=1))
-            release(*columns)
-        return np.concatenate(out)
-
-    moving = mean(lambda ref, v: np.abs(np.where(np.isfinite(ref), ref, v)) > limit, replay.v_ref, channels.speed)
-    y = mean(np.asarray, channels.speed)
-    ratios, turns = mean(np.asarray, ratio), mean(np.asarray, turn)
+    moving = _driving(channels, replay, timeline, width, machine.limits.driving_speed)
+    y = means(np.asarray, channels.speed)
+    ratios, turns = means(np.asarray, ratio), means(np.asarray, turn)
     rolls = body_speeds(y, ratios, turns)
     if body is not None and body.body.known:
         sensed, std = rolling_speeds(body, ratios, turns)
@@ -106,11 +89,31 @@ def wheel_drive(
         rolls = np.where(np.isfinite(sensed) & ~(doubt < _CONTRADICTS * std), sensed, rolls)
     return Drive(
         y=y,
-        u=mean(np.asarray, channels.opening),
+        u=means(np.asarray, channels.opening),
         body=rolls,
-        moving=np.asarray(moving > 0.5),
+        moving=moving,
         dt=timeline.dt * width,
     )
+
+
+def _means(timeline: Timeline, width: int, function: Callable[..., NDArray[Any]], *columns: NDArray[Any]) -> Array:
+    """Means of a function of columns over whole blocks of `width` rows, shape (n, wheels); a last, cut block is left out."""
+    out = []
+    for part in timeline.store.blocks(timeline.size // width * width, width):
+        out.append(block_means(function(*(c[part] for c in columns)), width))
+        release(*columns)
+    return np.concatenate(out)
+
+
+def _driving(
+    channels: WheelChannels, replay: Replay, timeline: Timeline, width: int, limit: float
+) -> NDArray[np.bool_]:
+    """Blocks of `width` samples in most of which a wheel drives faster than `limit` [m/s], shape (n, wheels)."""
+
+    def fast(reference: Array, speed: Array) -> NDArray[np.bool_]:
+        return np.asarray(np.abs(np.where(np.isfinite(reference), reference, speed)) > limit)
+
+    return np.asarray(_means(timeline, width, fast, replay.v_ref, channels.speed) > 0.5)
 
 
 def _disagreement(y: Array, rolls: Array, ratio: Array, turn: Array) -> Array:

@@ -18,6 +18,17 @@ def blocks(size: int, multiple: int = 1, rows: int | None = None) -> Iterator[sl
     return (slice(at, min(at + step, size)) for at in range(0, size, step))
 
 
+def framed(x: NDArray[Any], width: int) -> NDArray[Any]:
+    """Rows by block, shape (⌈n/width⌉, width, …); the last block is filled up with the last row."""
+    filled = np.pad(x, [(0, -len(x) % width)] + [(0, 0)] * (x.ndim - 1), mode="edge")
+    return filled.reshape(-1, width, *x.shape[1:])
+
+
+def block_means(x: NDArray[Any], width: int) -> NDArray[np.float64]:
+    """Means over blocks of `width` rows, shape (⌈n/width⌉, …), as `framed` has them."""
+    return np.asarray(framed(x, width).mean(axis=1, dtype=np.float64))
+
+
 def release(*arrays: NDArray[Any] | None) -> None:
     """Let go of the memory of columns that stand in temporary files until they are read again; others stay as they are."""
     for array in arrays:

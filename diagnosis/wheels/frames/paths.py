@@ -7,9 +7,10 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from diagnosis.wheels.frames.windows import Steps, in_steps, windowed
+from diagnosis.wheels.frames.windows import Steps, windowed
 from diagnosis.wheels.models import A_GAIN, HEALTHY, ODD, S_STUCK
 from diagnosis.wheels.runs import Runs
+from replay.arrays.blocks import block_means
 
 Array = NDArray[np.float64]
 Path = NDArray[np.uint8]
@@ -56,7 +57,7 @@ def path_features(path: Path, others: Sequence[Path], fault: Array, width: int, 
     """
     table = [*_groups(path), fault]
     table += [np.sum([_groups(p)[k] for p in others], axis=0) if others else np.zeros(path.size) for k in (1, 2, 3)]
-    columns = in_steps(np.stack([np.asarray(c, np.float32) for c in table], axis=1), width)
+    columns = block_means(np.stack([np.asarray(c, np.float32) for c in table], axis=1), width)
     windows = windowed(columns, at, dt)
     return np.concatenate([windows[k] for k in _WINDOWS], axis=1)
 

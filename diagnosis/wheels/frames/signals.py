@@ -11,11 +11,12 @@ from numpy.typing import NDArray
 from diagnosis.channels.sample_status import PAIR, SILENT
 from diagnosis.estimation.lag import low_passed
 from diagnosis.wheels.blocks import WheelBlocks
-from diagnosis.wheels.frames.windows import STEP_S, in_steps
+from diagnosis.wheels.frames.windows import STEP_S
 from diagnosis.wheels.inputs import WheelsData
 from diagnosis.wheels.models import JointModel
 from diagnosis.wheels.motion import body_speeds
 from diagnosis.wheels.step_kernel import RESTLESS, RESTS
+from replay.arrays.blocks import block_means
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -88,10 +89,10 @@ class MissionSignals:
         speed = np.take_along_axis(blocks.y, last, axis=0)
         known = (blocks.count > 0) & (blocks.status == PAIR)
         steps = np.minimum(blocks.jitter / noise, _MOST_JITTER) * known
-        command = np.nan_to_num(_block_means(data.u, blocks))
+        command = np.nan_to_num(block_means(data.u, blocks.width))
         found = {
             "speed": speed,
-            "reference": _block_means(data.reference, blocks),
+            "reference": block_means(data.reference, blocks.width),
             "asked": asked,
             "rolling": _rolling(speed, blocks, data.span),
             "command": command,
@@ -109,7 +110,7 @@ class MissionSignals:
             "rough": blocks.u.reshape(n, blocks.width, wheels).std(axis=1),
             "unseen": blocks.unseen,
         }
-        return cls(**{name: in_steps(x, width) for name, x in found.items()})
+        return cls(**{name: block_means(x, width) for name, x in found.items()})
 
     @cached_property
     def usual(self) -> float:
@@ -188,10 +189,3 @@ def _rolling(speed: Array, blocks: WheelBlocks, span: float) -> Array:
         return by_wheels
     exact = np.isfinite(blocks.body_speed) & (blocks.body_std < _EXACT * span)
     return np.where(exact, blocks.body_speed, by_wheels)
-
-
-def _block_means(x: Array, blocks: WheelBlocks) -> Array:
-    """Mean of each block, shape (n, wheels); the last block is filled up with the last sample."""
-    n, wheels = blocks.y.shape
-    filled = np.pad(x, ((0, n * blocks.width - len(x)), (0, 0)), mode="edge")
-    return np.asarray(filled.reshape(n, blocks.width, wheels).mean(axis=1))

@@ -54,12 +54,6 @@ def windowed(columns: Array, at: Steps, dt: float) -> list[Array]:
     return out
 
 
-def in_steps(x: NDArray[np.generic], width: int) -> Array:
-    """Means over steps of `width` rows, shape (⌈n/width⌉, ...); the last step is filled up with the last row."""
-    filled = np.pad(x, [(0, -len(x) % width)] + [(0, 0)] * (x.ndim - 1), mode="edge")
-    return np.asarray(filled.reshape(-1, width, *x.shape[1:]).mean(axis=1, dtype=np.float64))
-
-
 def bounded(features: Array) -> Array:
     """Features within the range that the trees know; `MISSING` where there is none."""
     return np.clip(np.nan_to_num(features, nan=MISSING), MISSING, LARGEST)

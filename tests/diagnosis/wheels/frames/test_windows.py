@@ -7,7 +7,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from diagnosis.wheels.frames import windows
-from diagnosis.wheels.frames.windows import LARGEST, MISSING, WINDOWS, bounded, cuts, frames_at, in_steps, windowed
+from diagnosis.wheels.frames.windows import LARGEST, MISSING, WINDOWS, bounded, cuts, frames_at, windowed
 
 DT = 0.04
 
@@ -33,12 +33,6 @@ def test_parts_give_what_the_whole_gives(monkeypatch: pytest.MonkeyPatch) -> Non
     assert len(parts) > 10
     for k in range(len(WINDOWS)):
         assert_allclose(np.concatenate([p[k] for p in parts]), whole[k], atol=1e-9)
-
-
-def test_steps_are_means_and_the_last_is_filled_up() -> None:
-    x = np.arange(10.0)[:, None]
-    assert_allclose(in_steps(x, 4)[:, 0], [1.5, 5.5, (8 + 9 + 9 + 9) / 4])
-    assert_allclose(in_steps(x[:, 0] > 4, 4), [0.0, 0.75, 1.0])
 
 
 def test_nothing_unknown_or_huge_reaches_the_trees() -> None:
