@@ -12,11 +12,11 @@ from diagnosis.results.document import IntervalRow
 from diagnosis.results.fault_rows import mode_words
 from diagnosis.results.size_rows import EpsilonRow
 from diagnosis.results.vocabulary import Kind, Severity, Tier
+from diagnosis.results.wheel_model import RESOLUTION
 from replay.faults import FaultMode, Side
 
 _LONGER, _LEAST_S = 2.0, 1.0
 _LEAST_EPSILON = 0.05  # bounds are those of one mission; the same fault differs more from mission to mission
-_MODEL_RESOLUTION = 0.25
 
 Sides = Mapping[tuple[str, str], SideCoverage]
 
@@ -131,7 +131,7 @@ def _found(key: tuple[str, Side, FaultMode], faults: Sequence[IntervalRow], side
     )
 
 
-def _keys(component: str, side: Side) -> list[tuple[str, str]]:
+def _keys(component: str, side: Side) -> list[tuple[str, Side]]:
     """Component and side of the parts that a fault may sit in."""
     sides = (Side.SENSOR, Side.ACTUATOR) if side is Side.SENSOR_OR_ACTUATOR else (side,)
     return [(component, s) for s in sides]
@@ -283,12 +283,12 @@ def _why_not_assessed(a: FoundFault, sides: Sides) -> str:
             return f"The newer result does not hold the {key[1]}."
         if not side.assessed:
             return f"In the newer mission the {key[1]} was {side.words}."
-        small = a.epsilon is not None and a.epsilon["low"] < _MODEL_RESOLUTION
+        small = a.epsilon is not None and a.epsilon["low"] < RESOLUTION[key[1]]
         if side.tier is Tier.TRACKING and not a.mode.total:
             return f"In the newer mission the {key[1]} was judged by its tracking alone, which does not show this row."
         if side.tier.strength < a.tier.strength and not a.mode.total and small:
             return (
-                f"In the newer mission the {key[1]} was judged by weaker evidence ({side.tier}, not {a.tier}), which does "
-                f"not show a loss below about {100 * _MODEL_RESOLUTION:.0f} %."
+                f"In the newer mission the {key[1]} was judged by weaker evidence ({side.tier}, not {a.tier}), which "
+                f"mostly does not show a loss below about {100 * RESOLUTION[key[1]]:.0f} % there."
             )
     return ""

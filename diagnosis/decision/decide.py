@@ -12,14 +12,13 @@ from diagnosis.results.assessment import Assessment
 from diagnosis.results.document import ActionRow, VerdictRow
 from diagnosis.results.result import FaultInterval
 from diagnosis.results.vocabulary import Kind, Severity, Tier, Verdict, part_words
-from diagnosis.results.wheel_model import WheelModelFit
+from diagnosis.results.wheel_model import RESOLUTION, WheelModelFit
 from replay.faults import Side
 from replay.machine.config import Limits
 
 #: A component and its side.
 Part = tuple[str, str]
 
-_MODEL_RESOLUTION = 0.25
 _COMPARED_WHEELS = 3
 _UNEXPLAINED_S = 0.5
 
@@ -110,8 +109,9 @@ def decide(
     if _modelled(assessments) and model is not None and model.identified:
         caveats += (
             "Speed sensors and valves without a second measurement were judged by a wheel model identified from this "
-            f"mission. It does not show a loss below about {100 * _MODEL_RESOLUTION:.0f} %, nor a loss that lasts the "
-            "whole mission on every wheel. A machine file with [plant], or a second measurement, would show them.",
+            f"mission. It mostly does not show a sensor's loss below about {100 * RESOLUTION[Side.SENSOR]:.0f} % or a valve's below "
+            f"about {100 * RESOLUTION[Side.ACTUATOR]:.0f} %, nor a loss that lasts the whole mission on every wheel. A second "
+            "measurement would show them; a machine file with [plant] shows the last.",
         )
     return replace(found, caveats=caveats, actions=actions_of(intervals))
 

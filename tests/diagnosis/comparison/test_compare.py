@@ -176,11 +176,22 @@ def test_a_part_that_the_newer_result_leaves_out_is_not_resolved() -> None:
     assert (only(found).status, only(found).note) == ("not_seen_again", "The newer result does not hold the sensor.")
 
 
-@pytest.mark.parametrize(("low", "status"), [(0.2, "not_seen_again"), (0.4, "resolved")])
-def test_a_model_does_not_resolve_a_small_loss(low: float, status: str) -> None:
+@pytest.mark.parametrize(
+    ("side", "low", "status"),
+    [
+        ("sensor", 0.2, "not_seen_again"),
+        ("sensor", 0.4, "resolved"),
+        ("actuator", 0.4, "not_seen_again"),
+        ("actuator", 0.6, "resolved"),
+    ],
+)
+def test_a_model_does_not_resolve_a_small_loss(side: str, low: float, status: str) -> None:
     small = {"value": low + 0.02, "low": low, "high": low + 0.04}
-    older = report(fault("FR", "actuator", "inefficient", epsilon=small))
-    assert only(compared(older, later(FR_actuator={"tier": "model"}))).status == status
+    older = report(fault("FR", side, "inefficient", epsilon=small))
+    gone = only(compared(older, later(**{f"FR_{side}": {"tier": "model"}})))
+    assert gone.status == status
+    if status == "not_seen_again":
+        assert f"below about {25 if side == 'sensor' else 50} % there" in gone.note
 
 
 def test_either_side_is_resolved_only_where_both_are_assessed() -> None:

@@ -10,7 +10,8 @@ import pytest
 from diagnosis.decision.decide import Decision, decide
 from diagnosis.decision.intervals import intervals_of
 from diagnosis.results.assessment import CODE, Assessment, Finding, unassessed
-from diagnosis.results.vocabulary import part_words
+from diagnosis.results.vocabulary import Tier, part_words
+from diagnosis.results.wheel_model import WheelModelFit
 from replay.faults import FaultMode, Side, State
 from replay.machine.config import Limits
 from tests.diagnosis.decision.findings import AXLES, LIMITS, SIDES, STEP, N, assessed, finding, machine
@@ -21,9 +22,11 @@ def verdict(
     decided: float | dict[tuple[str, str], float] = 20.0,
     damage: tuple[str, ...] = (),
     limits: Limits = LIMITS,
+    model: WheelModelFit | None = None,
 ) -> Decision:
     seconds = decided if isinstance(decided, dict) else dict.fromkeys(assessments, decided)
-    return decide(intervals_of(assessments, AXLES, 0, STEP, limits), assessments, seconds, AXLES, limits, damage)
+    intervals = intervals_of(assessments, AXLES, 0, STEP, limits)
+    return decide(intervals, assessments, seconds, AXLES, limits, damage, model=model)
 
 
 def test_healthy_machine_is_ready() -> None:
@@ -169,6 +172,15 @@ def test_no_action_and_no_advice_gives_leave_to_go_out() -> None:
             words = [str(a["text"]) for a in verdict(parts, 0.0).actions]
             words += [f.advice for f in intervals_of(parts, AXLES, 0, STEP, LIMITS)]
             assert not any("may go out" in w.lower() for w in words)
+
+
+def test_a_model_of_this_mission_says_what_it_does_not_show() -> None:
+    parts = {key: replace(a, tier=Tier.MODEL) for key, a in machine().items()}
+    model = WheelModelFit((None,) * 4, 0.02, 30, reliable=True, note="")
+    (words,) = verdict(parts, model=model).caveats
+    assert "a sensor's loss below about 25 % or a valve's below about 50 %" in words
+    assert verdict(parts, model=replace(model, identified=False)).caveats == ()
+    assert verdict(machine(), model=model).caveats == ()
 
 
 def test_stop_at_once_stands_before_other_stops() -> None:
