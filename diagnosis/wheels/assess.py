@@ -21,6 +21,7 @@ from diagnosis.wheels.findings import Weighed, WheelFindings, WheelPath, finding
 from diagnosis.wheels.following import Following, follow
 from diagnosis.wheels.frames.features import mission_features
 from diagnosis.wheels.inputs import WheelsData
+from diagnosis.wheels.looks import second_look
 from diagnosis.wheels.models import ODD, JointModel, WheelFilterModel
 from diagnosis.wheels.readings import with_readings
 from diagnosis.wheels.run_kernel import evidence_of_runs
@@ -54,12 +55,13 @@ def assess_wheels(data: WheelsData, limits: Limits, *, gains: bool) -> dict[int,
     model, blocks = joint_model(data, blocks)
     done, following = follow(data, blocks, model)
     features = mission_features(data, blocks, model, {i: f.described for i, f in following.items()}, gains=gains)
+    said = second_look(features, [bool(m) for m in data.measured], blocks.dt)
     out = {}
     losses = _losses(data, limits)
     for i, wheel in enumerate(model.wheels):
         if wheel is None:
             continue
-        track = track_of(features.of[i], features.hop, blocks.dt, measured=bool(data.measured[i]))
+        track = track_of(said[i], features.hop, blocks.dt)
         path = _path(data, i, wheel, blocks, model, done, following[i], track)
         found = findings_of(path, limits)
         sensor, actuator = _assessments(data, i, path, found, gains=gains)

@@ -52,6 +52,13 @@ class Forest(NamedTuple):
     high: NDArray[np.float32]
 
 
+class Look(NamedTuple):
+    """Trees of both sides that look at the same features."""
+
+    sensor: Forest
+    actuator: Forest
+
+
 @njit(cache=True, error_model="numpy")
 def _scores(x: NDArray[np.float32], forest: Forest, out: Array) -> None:
     """Add the leaves of every frame of x (frames, features) to its classes' scores, `out` (frames, classes)."""
@@ -89,11 +96,12 @@ def known_share(x: NDArray[np.float32], forest: Forest) -> Array:
 
 
 @cache
-def forests() -> tuple[Forest, Forest]:
-    """Trees of the sensors and of the valves."""
+def looks() -> tuple[Look, Look]:
+    """Trees of the first look and of the second."""
     data = files("diagnosis.wheels").joinpath("forests.npz").read_bytes()
     with np.load(BytesIO(data)) as kept:
-        sensor, actuator = (
-            Forest(*(kept[f"{side}_{name}"] for name in Forest._fields)) for side in ("sensor", "actuator")
+        first, second = (
+            Look(*(Forest(*(kept[f"{look}_{side}_{n}"] for n in Forest._fields)) for side in Look._fields))
+            for look in ("first", "second")
         )
-    return sensor, actuator
+    return first, second

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from heapq import heapify, heappop, heappush
 from itertools import compress, pairwise
@@ -9,7 +10,6 @@ from itertools import compress, pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from diagnosis.wheels.forest import Forest, forests, known_share, log_probabilities
 from diagnosis.wheels.models import A_BIAS, A_GAIN, A_NONE, A_STUCK, S_GAIN, S_NONE, S_STUCK, S_WHITE_8, Row
 from diagnosis.wheels.runs import Runs
 from replay.faults import FaultMode, Side
@@ -30,7 +30,6 @@ _FAULTY = 0.5
 _DOUBTED, _BRIDGED_S = 0.8, 3.0  # a shorter time in which a side is not healthier than this is no end of its fault
 _SHORT_S = 1.0  # a row that holds for less than this within a fault is that of its neighbour
 _NEAR_S = 0.6  # within which an edge of the Kalman models' path is the segment's
-_STRANGE = 0.9  # share of known features below which nothing is concluded
 
 
 @dataclass(frozen=True)
@@ -76,34 +75,20 @@ class Segment:
         return MODEL_OF[self.side, self.mode]
 
 
-def track_of(x: NDArray[np.float32], hop: int, dt: float, *, measured: bool) -> Track:
-    """What the trees say of one wheel.
+def track_of(said: Mapping[Side, Array], hop: int, dt: float) -> Track:
+    """What the trees say of one wheel, averaged over neighbouring frames.
 
     Parameters
     ----------
-    x : NDArray[np.float32], shape (frames, p)
-        Features.
+    said : Mapping[Side, Array], shape (frames, 5) each
+        Log-probabilities of its frames.
     hop : int
         Blocks from frame to frame.
     dt : float
         Block [s].
-    measured : bool
-        Whether the valve's opening is measured, so that the valve is judged elsewhere.
     """
-    probability: dict[Side, Array] = {}
-    for side, forest in zip((Side.SENSOR, Side.ACTUATOR), forests(), strict=True):
-        if side is Side.ACTUATOR and measured:
-            probability[side] = np.tile(np.eye(len(MODES) + 1)[0], (len(x), 1))
-        else:
-            probability[side] = _averaged(_said(x, forest), round(_AROUND_S / (hop * dt)))
-    return Track(hop, probability)
-
-
-def _said(x: NDArray[np.float32], forest: Forest) -> Array:
-    """Log-probabilities of each frame; the shares in training where its features are not such as the trees know."""
-    said = log_probabilities(x, forest)
-    said[known_share(x, forest) < _STRANGE] = np.log(forest.prior)
-    return said
+    around = round(_AROUND_S / (hop * dt))
+    return Track(hop, {side: _averaged(one, around) for side, one in said.items()})
 
 
 def _averaged(said: Array, around: int) -> Array:

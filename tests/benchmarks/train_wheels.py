@@ -1,9 +1,11 @@
-"""Trains the trees of `diagnosis.wheels.forest`; run as `python tests/benchmarks/train_wheels.py FOLDER [--collect N] [--fit]`.
+"""Trains the trees of `diagnosis.wheels.forest`; run as `python tests/benchmarks/train_wheels.py FOLDER [--collect N] [--fit LOOK]`.
 
 ``--collect`` simulates machines (the default one, varied ones, those of structures of kind ``tuning`` and of structures drawn
 at random; seeds below 1000), runs the Kalman models over their wheels' openings and speeds, and writes the features of every
-half second with what was true of it to FOLDER, a file per mission. ``--fit`` trains on four of five seeds, says how often the
-trees are right on the fifth, and writes them; it needs lightgbm (``pip install lightgbm``).
+half second with what was true of it to FOLDER, a file per mission. ``--fit first`` trains on four of five seeds below 500, says
+how often the trees are right on the fifth, and writes them; ``--fit second`` does the same for the second look, by the seeds
+from 500 on, whose missions are collected when the first is there: it learns what the first says of machines that it does not
+know. Training needs lightgbm (``pip install lightgbm``).
 """
 
 from __future__ import annotations
@@ -29,8 +31,11 @@ from diagnosis.pipeline import diagnose_mission
 from diagnosis.wheels.blocks import blocks_of
 from diagnosis.wheels.filter_identification import joint_model
 from diagnosis.wheels.following import follow
+from diagnosis.wheels.forest import Look
 from diagnosis.wheels.frames.features import mission_features
+from diagnosis.wheels.frames.said import said_features
 from diagnosis.wheels.inputs import WheelsData
+from diagnosis.wheels.looks import first_look
 from diagnosis.wheels.readings import with_readings
 from diagnosis.wheels.tracks import MODES
 from replay.errors import MfhcaError
@@ -47,12 +52,13 @@ Array = NDArray[np.float64]
 TREES = Path(__file__).resolve().parents[2] / "diagnosis" / "wheels" / "forests.npz"
 KINDS = ("random", "own", "vary", "valves", "pump", "torque")
 HELD_OUT = 5  # every fifth seed
+SECOND_FROM = 500  # seeds of the second look
 _EVERY = 2  # of the frames: neighbours hardly differ
 _EDGE_S = 0.15  # around an edge of a fault nothing is learned
 _OWN_SCHEDULE, _VALVES, _BOTH, _RAMPS = 0.65, 0.75, 1 / 7, 0.2
 _WITHOUT_REFERENCE, _WITHOUT_GEOMETRY = 0.12, 0.12
 _WEIGHTS = np.array([0.5, 1.0, 1.0, 1.0, 1.0])  # of frames, by class: healthy ones are many
-_MEASURED = -4  # column that tells whether the valve's opening is measured
+_MEASURED = 539  # column that tells whether the valve's opening is measured
 _SETTINGS: dict[str, Any] = {
     "objective": "multiclass",
     "num_class": len(MODES) + 1,
@@ -125,8 +131,8 @@ def _capture(data: WheelsData, limits: Limits, *, gains: bool) -> dict[int, Any]
     raise _Captured(data, limits, gains)
 
 
-def features_of(kind: str, seed: int, options: SimulationOptions, evidence: str) -> tuple[Array, Array, Array]:
-    """Features of all wheels' frames, rows of both sides, and where the wheel is quiet; shape (frames, …) each."""
+def features_of(kind: str, seed: int, options: SimulationOptions, evidence: str) -> tuple[Array, Array, Array, Array]:
+    """Features of all wheels' frames for both looks, rows of both sides, and where the wheel is quiet; shape (frames, …) each."""
     mission = simulate_mission(options)
     signals = (signals_of if kind == "own" else recorded_signals)(mission, evidence)
     machine = haulotte()
@@ -149,13 +155,15 @@ def features_of(kind: str, seed: int, options: SimulationOptions, evidence: str)
     model, blocks = joint_model(data, blocks)
     _, following = follow(data, blocks, model)
     features = mission_features(data, blocks, model, {i: f.described for i, f in following.items()}, gains=found.gains)
-    x, y, quiet = [], [], []
+    said = said_features(first_look(features, [bool(m) for m in data.measured]), features.hop * blocks.dt)
+    x, more, y, quiet = [], [], [], []
     for i, own in features.of.items():
         at = (np.arange(len(own)) + 0.5) * features.hop
         x.append(own[::_EVERY])
+        more.append(said[i][::_EVERY].astype(np.float32))
         y.append(true_rows(mission.truth, machine.wheels[i], at * blocks.dt)[::_EVERY])
         quiet.append(blocks.quiet[np.minimum(at.astype(int), len(blocks.quiet) - 1), i][::_EVERY])
-    return np.concatenate(x), np.concatenate(y), np.concatenate(quiet)
+    return np.concatenate(x), np.concatenate(more), np.concatenate(y), np.concatenate(quiet)
 
 
 def true_rows(truth: MissionTruth, wheel: str, t: Array) -> NDArray[np.int8]:
@@ -182,13 +190,15 @@ def collect(folder: Path, kinds: Sequence[str], first: int, count: int) -> None:
                     if name.exists():
                         continue
                     try:
-                        x, y, quiet = features_of(kind, seed, mission_options(kind, seed, healthy=healthy), evidence)
+                        x, said, y, quiet = features_of(
+                            kind, seed, mission_options(kind, seed, healthy=healthy), evidence
+                        )
                     except MfhcaError as error:
                         print(f"{name.stem}: {error}", flush=True)
                         continue
                     new = name.with_suffix(".new")
                     with new.open("wb") as out:
-                        np.savez(out, X=x, Y=y, Q=quiet)
+                        np.savez(out, X=x, S=said, Y=y, Q=quiet)
                     new.replace(name)
                     print(f"{name.stem}: {len(x)} frames", flush=True)
 
@@ -209,10 +219,13 @@ class Frames:
         return out
 
 
-def loaded(files: Iterator[Path]) -> Frames:
-    """Frames of some files."""
+def loaded(files: Iterator[Path], look: str) -> Frames:
+    """Frames of some files, with the features of a look."""
     parts = [np.load(f) for f in files]
-    return Frames(*(np.concatenate([p[key] for p in parts]) for key in ("X", "Y", "Q")))
+    x, y, quiet = (np.concatenate([p[key] for p in parts]) for key in ("X", "Y", "Q"))
+    if look == "second":
+        x = np.concatenate([x, np.concatenate([p["S"] for p in parts])], axis=1)
+    return Frames(x, y, quiet)
 
 
 def trained(frames: Frames, side: int, rounds: int) -> tuple[Any, Array]:
@@ -286,24 +299,31 @@ def main() -> None:
         "--rounds", type=int, nargs=2, default=(220, 260), help="rounds of boosting, sensors and valves"
     )
     parser.add_argument(
-        "--fit", action="store_true", help="train, report on machines that were held out, write the trees"
+        "--fit", choices=("first", "second"), help="train, report on machines that were held out, write the trees"
     )
     choice = parser.parse_args()
     warnings.filterwarnings("ignore")
     if choice.collect:
         collect(choice.folder, choice.kinds, choice.first, choice.collect)
-    if not choice.fit:
-        return
-    files, data = sorted(choice.folder.glob("*.npz")), {}
-    held = {f for f in files if int(f.stem.split("_")[1]) % HELD_OUT == 0}
-    for side, name in enumerate(("sensor", "actuator")):
+    if choice.fit:
+        fit(choice.folder, choice.fit, choice.rounds)
+
+
+def fit(folder: Path, look: str, rounds: Sequence[int]) -> None:
+    """Train both sides of a look, and write them beside the other look."""
+    seeds = {f: int(f.stem.split("_")[1]) for f in sorted(folder.glob("*.npz"))}
+    files = [f for f, seed in seeds.items() if (seed >= SECOND_FROM) == (look == "second")]
+    held = {f for f in files if seeds[f] % HELD_OUT == 0}
+    with np.load(TREES) as kept:
+        data = {key: kept[key] for key in kept.files if not key.startswith(look)}
+    for side, name in enumerate(Look._fields):
         mine = [f for f in files if side == 0 or f.stem.endswith("base")]  # else the valve's opening is measured
-        frames = loaded(f for f in mine if f not in held)
-        model, prior = trained(frames, side, choice.rounds[side])
+        frames = loaded((f for f in mine if f not in held), look)
+        model, prior = trained(frames, side, rounds[side])
         arrays = flat(model, prior, frames.x[frames.learned(side)])
-        data |= {f"{name}_{key}": value for key, value in arrays.items()}
+        data |= {f"{look}_{name}_{key}": value for key, value in arrays.items()}
         print(name, end=": ", flush=True)
-        reliability(model, loaded(f for f in mine if f in held), side)
+        reliability(model, loaded((f for f in mine if f in held), look), side)
     np.savez_compressed(TREES, **data)
     print(f"{TREES.name}: {TREES.stat().st_size / 1e6:.2f} MB from {len(files) - len(held)} missions")
 
