@@ -11,7 +11,7 @@ from diagnosis.fitting.geometry import offset_pattern
 from diagnosis.fitting.noise import NoiseFit
 from diagnosis.fitting.robust import Estimate
 from diagnosis.fitting.wheels import WheelFit
-from diagnosis.wheels.plant_identification import PlantFit
+from diagnosis.wheels.plant_constants import PlantFit
 from replay.machine.config import Law, Machine, Noise, PsiMode, WheelPlant
 from replay.machine.drive_model import DriveModel
 

@@ -7,7 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from diagnosis.wheels.plant_identification import PlantFit, identify_plants
+from diagnosis.wheels.plant_constants import PlantFit
+from diagnosis.wheels.plant_identification import identify_plants
 from diagnosis.wheels.wheel_channels import wheel_channels
 from diagnosis.wheels.wheel_fit import wheel_drive
 from replay.control.loop import Replay, stack

@@ -10,6 +10,7 @@ from math import lgamma, log, pi
 import numpy as np
 from numba import njit
 
+from diagnosis.steering.filter_constants import AxleConstants, SensorConstants
 from diagnosis.steering.filter_state import Array, Block, FilterBank, RedundantBlock
 from diagnosis.steering.model_bank import (
     ACTIVE,
@@ -23,7 +24,6 @@ from diagnosis.steering.model_bank import (
     STATES,
     STUCK,
 )
-from diagnosis.steering.models import AxleConstants, SensorConstants
 
 _OUTLIER = -18.0
 _LOST_S = 0.03  # how long an axle may turn unseen

@@ -13,9 +13,10 @@ from diagnosis.estimation.back_pointers import STAY, trace
 from diagnosis.steering import path_kernel
 from diagnosis.steering.blocks import SteeringBlocks
 from diagnosis.steering.driven import Driven
+from diagnosis.steering.filter_constants import FilterConstants
 from diagnosis.steering.filter_state import Array, BlockSeries, FilterBank, SteeringPath
 from diagnosis.steering.model_bank import ACTUATOR, FIRST_HIDDEN, HEALTHY, HEALTHY_MODEL, MODELS, SENSOR, STATES
-from diagnosis.steering.models import FilterConstants, SteeringModel
+from diagnosis.steering.models import SteeringModel
 
 Models = NDArray[np.uint8]
 

@@ -7,6 +7,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from diagnosis.channels.sample_status import SKIP
+from diagnosis.steering.filter_constants import FilterConstants
 from diagnosis.steering.filter_state import (
     Array,
     Block,
@@ -28,7 +29,6 @@ from diagnosis.steering.model_bank import (
     STATES,
     STUCK,
 )
-from diagnosis.steering.models import FilterConstants
 from diagnosis.steering.step_kernel import advance, enter
 from replay.arrays.numeric import uncounted
 

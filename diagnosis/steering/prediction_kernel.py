@@ -10,6 +10,7 @@ from math import exp
 
 from numba import njit
 
+from diagnosis.steering.filter_constants import AxleConstants
 from diagnosis.steering.filter_state import Array, Block, FilterBank
 from diagnosis.steering.model_bank import (
     ACTIVE,
@@ -24,7 +25,6 @@ from diagnosis.steering.model_bank import (
     STATES,
     STUCK,
 )
-from diagnosis.steering.models import AxleConstants
 from diagnosis.steering.valve_map import expected_rate
 
 _CROSSING = 0.1  # of the gap that a model crosses: its standard deviation

@@ -18,6 +18,7 @@ from math import isnan
 from numba import njit
 
 from diagnosis.channels.sample_status import PAIR, SILENT
+from diagnosis.steering.filter_constants import FilterConstants
 from diagnosis.steering.filter_state import Array, Block, FilterBank, RedundantBlock, resting
 from diagnosis.steering.measurement_kernel import measure_redundant, update
 from diagnosis.steering.model_bank import (
@@ -31,7 +32,6 @@ from diagnosis.steering.model_bank import (
     STATES,
     STUCK,
 )
-from diagnosis.steering.models import FilterConstants
 from diagnosis.steering.prediction_kernel import predict
 
 _SILENT_COST = -6.0

@@ -121,8 +121,12 @@ class WheelBlocks:
 
     def ending(self) -> WheelBlocks:
         """The same if valves end where they were last seen, and what they give beyond is not known."""
-        less = np.repeat(self.unseen, self.width, axis=0)
-        return replace(self, u=self.u - less, ended=True)
+        u = self.store.column(np.float64, self.u.shape[1:], len(self.u))
+        for cut in self.store.blocks(len(self.u), self.width):
+            less = self.unseen[cut.start // self.width : cut.stop // self.width]
+            u.append(self.u[cut] - np.repeat(less, self.width, axis=0))
+            release(self.u)
+        return replace(self, u=u.finish(), ended=True)
 
     def wander(self, speed_per_opening: Array) -> Array:
         """Error of the modelled speed after a block from openings that the log does not resolve [m/s], (n, wheels).

@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 
 from diagnosis.estimation.lag import low_passed
 from diagnosis.results.wheel_model import WheelModelFit
-from diagnosis.wheels.plant_identification import Drive, identify_plants
+from diagnosis.wheels.plant_identification import identify_plants
+from diagnosis.wheels.plant_windows import Drive
 from diagnosis.wheels.robust_fit import mode
 from replay.arrays.numeric import without_nan
 from replay.machine.config import Machine, WheelPlant

@@ -14,7 +14,7 @@ from diagnosis.wheels.blocks import block_width
 from diagnosis.wheels.body import MeasuredBody, rolling_speeds
 from diagnosis.wheels.identification import identified, identify
 from diagnosis.wheels.motion import body_speeds, in_motion
-from diagnosis.wheels.plant_identification import Drive
+from diagnosis.wheels.plant_windows import Drive
 from diagnosis.wheels.wheel_channels import WheelChannels
 from replay.arrays.blocks import block_means, release
 from replay.arrays.numeric import without_nan

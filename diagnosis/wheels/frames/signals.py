@@ -4,19 +4,21 @@ from __future__ import annotations
 
 from dataclasses import dataclass, fields
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from diagnosis.channels.sample_status import PAIR, SILENT
-from diagnosis.estimation.lag import low_passed
+from diagnosis.estimation.lag import low_passed_on
 from diagnosis.wheels.blocks import WheelBlocks
 from diagnosis.wheels.frames.windows import STEP_S
 from diagnosis.wheels.inputs import WheelsData
 from diagnosis.wheels.models import JointModel
 from diagnosis.wheels.motion import body_speeds
 from diagnosis.wheels.step_kernel import RESTLESS, RESTS
-from replay.arrays.blocks import block_means
+from replay.arrays.blocks import block_means, release
+from replay.arrays.blocks import blocks as rows_in_parts
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -76,41 +78,17 @@ class MissionSignals:
 
     @classmethod
     def of(cls, data: WheelsData, blocks: WheelBlocks, model: JointModel) -> MissionSignals:
-        """Signals of a mission."""
+        """Signals of a mission, part by part, so that only steps are ever in memory as a whole."""
         n, wheels = blocks.y.shape
         width = step_width(blocks.dt)
-        asked, noise = np.zeros((n, wheels)), np.ones((n, wheels))
-        for i, wheel in enumerate(model.wheels):
-            if wheel is not None:
-                opening = blocks.u[:, i].reshape(n, blocks.width).mean(1)
-                asked[:, i] = low_passed(opening * wheel.K, wheel.tau, blocks.dt)
-                noise[:, i] = 2.0 * wheel.noise**2 * blocks.white[:, i] + 1e-12
-        last = np.maximum.accumulate(np.where(blocks.count > 0, np.arange(n)[:, None], 0), axis=0)
-        speed = np.take_along_axis(blocks.y, last, axis=0)
-        known = (blocks.count > 0) & (blocks.status == PAIR)
-        steps = np.minimum(blocks.jitter / noise, _MOST_JITTER) * known
-        command = np.nan_to_num(block_means(data.u, blocks.width))
-        found = {
-            "speed": speed,
-            "reference": block_means(data.reference, blocks.width),
-            "asked": asked,
-            "rolling": _rolling(speed, blocks, data.span),
-            "command": command,
-            "opening": np.abs(command),
-            "ratio": blocks.ratio,
-            "known": known,
-            "silent": blocks.status == SILENT,
-            "rests": blocks.habit == RESTS,
-            "restless": blocks.habit == RESTLESS,
-            "quiet": blocks.quiet,
-            "saturated": np.abs(command) > _SATURATED,
-            "jitter": steps,
-            "root_jitter": np.sqrt(steps),
-            "constant": (blocks.jitter == 0) & known,
-            "rough": blocks.u.reshape(n, blocks.width, wheels).std(axis=1),
-            "unseen": blocks.unseen,
-        }
-        return cls(**{name: block_means(x, width) for name, x in found.items()})
+        out = {f.name: np.empty((-(-n // width), wheels)) for f in fields(cls)}
+        past = _Past([None] * wheels, blocks.y[:1])
+        for cut in rows_in_parts(n, width, max(1, blocks.store.block // blocks.width)):
+            steps = slice(cut.start // width, -(-cut.stop // width))
+            for name, x in _signals_by_block(cut, data, blocks, model, past).items():
+                out[name][steps] = block_means(x, width)
+            release(data.u, data.reference, blocks.u)
+        return cls(**out)
 
     @cached_property
     def usual(self) -> float:
@@ -180,6 +158,56 @@ class WheelSignals:
 def step_width(dt: float) -> int:
     """Blocks of dt [s] in a step."""
     return max(1, round(STEP_S / dt))
+
+
+@dataclass
+class _Past:
+    """What a part of a mission needs of the one before: the state of each valve's lag, and the last speeds, shape (1, wheels)."""
+
+    asked: list[float | None]
+    speed: Array
+
+
+def _signals_by_block(
+    cut: slice, data: WheelsData, blocks: WheelBlocks, model: JointModel, past: _Past
+) -> dict[str, NDArray[Any]]:
+    """Signals of `MissionSignals` for every block of a part, shape (m, wheels) each; `past` becomes that of the next part."""
+    part = blocks.part(cut.start, cut.stop)
+    samples = slice(cut.start * blocks.width, cut.stop * blocks.width)
+    m, wheels = part.y.shape
+    openings = part.u.reshape(m, blocks.width, wheels)
+    asked, noise = np.zeros((m, wheels)), np.ones((m, wheels))
+    for i, wheel in enumerate(model.wheels):
+        if wheel is not None:
+            wanted = openings[:, :, i].mean(axis=1) * wheel.K
+            asked[:, i], past.asked[i] = low_passed_on(wanted, wheel.tau, blocks.dt, past.asked[i])
+            noise[:, i] = 2.0 * wheel.noise**2 * part.white[:, i] + 1e-12
+    last = np.maximum.accumulate(np.where(part.count > 0, np.arange(1, m + 1)[:, None], 0), axis=0)
+    speed = np.take_along_axis(np.concatenate([past.speed, part.y]), last, axis=0)
+    past.speed = speed[-1:]
+    known = (part.count > 0) & (part.status == PAIR)
+    steps = np.minimum(part.jitter / noise, _MOST_JITTER) * known
+    command = np.nan_to_num(block_means(data.u[samples], blocks.width))
+    return {
+        "speed": speed,
+        "reference": block_means(data.reference[samples], blocks.width),
+        "asked": asked,
+        "rolling": _rolling(speed, part, data.span),
+        "command": command,
+        "opening": np.abs(command),
+        "ratio": part.ratio,
+        "known": known,
+        "silent": part.status == SILENT,
+        "rests": part.habit == RESTS,
+        "restless": part.habit == RESTLESS,
+        "quiet": part.quiet,
+        "saturated": np.abs(command) > _SATURATED,
+        "jitter": steps,
+        "root_jitter": np.sqrt(steps),
+        "constant": (part.jitter == 0) & known,
+        "rough": openings.std(axis=1),
+        "unseen": part.unseen,
+    }
 
 
 def _rolling(speed: Array, blocks: WheelBlocks, span: float) -> Array:

@@ -8,7 +8,9 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from diagnosis.wheels.plant_identification import Drive, PlantFit, identify_plants
+from diagnosis.wheels.plant_constants import PlantFit
+from diagnosis.wheels.plant_identification import identify_plants
+from diagnosis.wheels.plant_windows import Drive
 from replay.machine.config import WheelPlant
 
 DT, SECONDS, SPAN, FINE = 0.01, 120.0, 0.36, 5
