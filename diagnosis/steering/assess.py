@@ -22,6 +22,7 @@ from diagnosis.steering.path import AxleFilter, allowed_models, most_probable
 from diagnosis.steering.path_refinement import refine_path
 from diagnosis.steering.plant import SteeringPlant
 from diagnosis.steering.prior import plant_before
+from diagnosis.steering.reliability import weighed
 from diagnosis.steering.states import REASONS, states_of
 from replay.control.loop import Replay
 from replay.faults import Side, State
@@ -118,6 +119,7 @@ def _judged_by_model(inputs: AxleInputs, blocks: SteeringBlocks, plant: Steering
     found = {side: findings_of(side, inputs, axle, path, machine.limits) for side in _SIDES}
     if not (inputs.redundant or inputs.valve_redundant):
         found[Side.ACTUATOR] = apart(found[Side.SENSOR], found[Side.ACTUATOR], blocks.length)
+        found = weighed(found, blocks.length, inputs.timeline.dt)
     dead = [(f.start, f.stop) for f in found[Side.SENSOR].findings if f.mode.total]
     masked = [] if inputs.redundant else dead
     columns = evidence_columns(inputs, axle, path, [f for side in _SIDES for f in found[side].findings])

@@ -1,0 +1,97 @@
+"""How often findings on an axle that has its angle and command alone turn out right: their probability is not above that.
+
+The filters' evidence knows their own models alone, and is sure of what these leave out: brief remainders of a fault, stretches
+beside another one, two faults at once. `_WEIGHTS` is a logistic regression of what was right among the findings on simulated
+machines of the structures for tuning; ``tests/benchmarks/calibrate_steering.py`` fits it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from diagnosis.results.assessment import Finding
+from diagnosis.results.result import Hypothesis
+from diagnosis.results.vocabulary import Tier
+from diagnosis.steering.findings import SideFindings
+from replay.faults import FaultMode, Side, State
+
+_WEIGHTS = (-3.61, 4.14, -1.94, -0.84, -1.09)  # constant, and of `features_of`
+_LONG_S = 6.0  # from here on a finding gains nothing by being longer
+_NEAR_S = 1.0
+_OVERLAP = 0.2
+_LEAST = 0.6  # probability from which a finding is stated
+
+#: A stretch: first and last moment [s].
+Stretch = tuple[float, float]
+
+
+def features_of(
+    own: Stretch, mode: FaultMode, same: Sequence[Stretch], other: Sequence[Stretch]
+) -> NDArray[np.float64]:
+    """What tells how reliable a finding is, shape (4,).
+
+    Parameters
+    ----------
+    own, mode
+        The finding.
+    same, other : Sequence[tuple[float, float]]
+        Other findings on its side of the axle, and those on the other side.
+
+    Returns
+    -------
+    NDArray[np.float64]
+        Logarithm of its length up to 6 s, whether another one of its side is near, whether one of the other side overlaps, and
+        whether it is a loss.
+    """
+    start, stop = own
+    near = any(a < stop + _NEAR_S and b > start - _NEAR_S for a, b in same)
+    shared = max((min(b, stop) - max(a, start) for a, b in other), default=0.0)
+    loss = mode in (FaultMode.NO_SIGNAL, FaultMode.INEFFICIENT)
+    length = max(stop - start, 0.05)
+    return np.array([np.log(min(length, _LONG_S)), near, shared > _OVERLAP * length, loss], dtype=np.float64)
+
+
+def weighed(found: Mapping[Side, SideFindings], length: int, dt: float) -> dict[Side, SideFindings]:
+    """Findings of both sides of an axle with the probability that such findings deserve; unlikely ones stay open.
+
+    Parameters
+    ----------
+    found : Mapping[Side, SideFindings]
+        By side.
+    length : int
+        Samples per block.
+    dt : float
+        Sample [s].
+    """
+    spans = {side: [(f.start * dt, f.stop * dt) for f in one.findings] for side, one in found.items()}
+    out = {}
+    for side, one in found.items():
+        kept, open_ = [], list(one.unexplained)
+        others = [s for who, stretches in spans.items() if who is not side for s in stretches]
+        for k, f in enumerate(one.findings):
+            same = [s for j, s in enumerate(spans[side]) if j != k]
+            mine = f if f.tier is Tier.SIGNAL else _limited(f, features_of(spans[side][k], f.mode, same, others))
+            if mine.probability >= _LEAST:
+                kept.append(mine)
+            else:
+                open_.append((f.start // length, -(-f.stop // length)))
+        out[side] = SideFindings(tuple(kept), tuple(open_))
+    return out
+
+
+def _limited(finding: Finding, features: NDArray[np.float64]) -> Finding:
+    """A finding that is no more probable than findings of its sort are right; what is missing goes to no fault."""
+    most = float(1.0 / (1.0 + np.exp(-_WEIGHTS[0] - features @ np.array(_WEIGHTS[1:]))))
+    if finding.probability <= most:
+        return finding
+    share = most / finding.probability
+    named = [replace(h, p=h.p * share) for h in finding.hypotheses]
+    faults = [h for h in named if h.mode != State.HEALTHY.value]
+    none = Hypothesis("none", State.HEALTHY.value, 1.0 - sum(h.p for h in faults))
+    line = f"Findings of this length and company were right in {100 * most:.0f} of 100 cases on simulated machines."
+    hypotheses = tuple(sorted([*faults, none], key=lambda h: -h.p))
+    return replace(finding, probability=most, hypotheses=hypotheses, evidence=(*finding.evidence, line))
