@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from replay.log.reading_notes import Report
-from replay.readers.messages.assemble import Connection
+from replay.readers.messages.connection import Connection
 from replay.readers.rosbag1.records_kernel import BagRecords
 
 _MOST_TOLD = 200

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
-from replay.readers.messages.assemble import Connection
+from replay.readers.messages.connection import Connection
 from replay.readers.rosbag1.bag import Bag
 from replay.readers.rosbag1.records_kernel import BagRecords
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from replay.log.raw_log import Window
 from replay.log.reading_notes import Report
-from replay.readers.messages.assemble import Connection
+from replay.readers.messages.connection import Connection
 from replay.readers.rosbag2 import sqlite_kernel as scan
 from replay.readers.rosbag2.sqlite_file import Image, Table
 from replay.readers.rosbag2.sqlite_index_kernel import stamped_rows

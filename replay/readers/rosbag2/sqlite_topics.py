@@ -7,7 +7,7 @@ import re
 import numpy as np
 
 from replay.log.reading_notes import Report
-from replay.readers.messages.assemble import Connection
+from replay.readers.messages.connection import Connection
 from replay.readers.rosbag2 import sqlite_kernel as scan
 from replay.readers.rosbag2.metadata import MAX_BYTES, Metadata, parse_metadata
 from replay.readers.rosbag2.sqlite_file import Image, Value
