@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from replay.readers.mcap import format as fmt
 from replay.readers.mcap.records import BAD_RECORD, Channel, Schema, parse
-from replay.readers.messages.assemble import Connection
+from replay.readers.messages.connection import Connection
 
 _MAX_TEXT = 1 << 16
 

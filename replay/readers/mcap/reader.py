@@ -20,7 +20,8 @@ from replay.readers.mcap.file import McapFile, looks_like_mcap
 from replay.readers.mcap.opening import open_file
 from replay.readers.mcap.verify import account, check_data, counts_of, expected
 from replay.readers.mcap.walk import walk_file
-from replay.readers.messages.assemble import Assembler, Block, Connection
+from replay.readers.messages.assemble import Assembler
+from replay.readers.messages.connection import Block, Connection
 
 _HELD = 64 << 20
 

@@ -16,8 +16,7 @@ from replay.readers.common.message_stamps import Clocks
 from replay.readers.messages import cdr, json_messages, protobuf
 from replay.readers.messages.cdr_layout import MAX_ELEMENTS
 from replay.readers.messages.cdr_program import Spec
-from replay.readers.messages.definitions import DefinitionError, MessageType, resolve
-from replay.readers.messages.protobuf_schema import Schema, schema_of
+from replay.readers.messages.connection import Block, Connection
 from replay.readers.messages.tables import Budget, Cells, Table
 from replay.readers.messages.topic_store import Store
 
@@ -25,74 +24,6 @@ MEMORY = 512 << 20
 _SLOW_SHARE = 0.2
 _LOOK_EVERY = 16
 _MOST_ROWS = 1 << 14
-
-
-@dataclass(frozen=True)
-class Connection:
-    """One stream of messages of one type.
-
-    Attributes
-    ----------
-    topic, type_name : str
-        As recorded.
-    encoding : str
-        Serialisation of the payloads: ``cdr``, ``ros1``, ``json`` or ``protobuf``; others are not decoded.
-    schema_encoding, definition : str
-        Language and text of the message definition, one character per byte for ``protobuf``; empty where the log holds
-        none.
-    """
-
-    topic: str
-    type_name: str
-    encoding: str
-    schema_encoding: str = ""
-    definition: str = ""
-
-    def why_not(self) -> str:
-        """Return why messages of this stream cannot be decoded, or an empty string."""
-        if self.encoding == "json":
-            return ""
-        if self.encoding not in ("cdr", "ros1", "protobuf"):
-            return f"{self.encoding or 'unnamed'} serialisation is not decoded"
-        try:
-            self.protobuf_schema() if self.encoding == "protobuf" else self.message_type()
-        except DefinitionError as error:
-            return str(error)
-        return ""
-
-    def message_type(self) -> MessageType:
-        """Return the resolved type; raises `DefinitionError`."""
-        return resolve(self.type_name, self.schema_encoding, self.definition, self.encoding == "ros1")
-
-    def protobuf_schema(self) -> Schema:
-        """Return the resolved type of protobuf messages; raises `DefinitionError`."""
-        return schema_of(self.type_name, self.definition if self.schema_encoding == "protobuf" else "")
-
-
-@dataclass(frozen=True)
-class Block:
-    """Some messages of one connection.
-
-    Attributes
-    ----------
-    connection : Connection
-        Their stream.
-    data : NDArray[np.uint8], shape (b,)
-        Bytes that hold the payloads.
-    starts, lengths : NDArray[np.int64], shape (n,)
-        Place of each payload.
-    log_ns : NDArray[np.int64], shape (n,)
-        Log stamps [ns].
-    publish_ns : NDArray[np.int64], shape (n,) or None
-        Publish stamps [ns], where the container has them.
-    """
-
-    connection: Connection
-    data: NDArray[np.uint8]
-    starts: NDArray[np.int64]
-    lengths: NDArray[np.int64]
-    log_ns: NDArray[np.int64]
-    publish_ns: NDArray[np.int64] | None = None
 
 
 @dataclass
@@ -123,7 +54,7 @@ class _Topic:
         count = sum(len(b.starts) for b in blocks)
         if slots[0] is None and count > _MOST_ROWS:
             for part in (slice(at, at + _MOST_ROWS) for at in range(0, count, _MOST_ROWS)):
-                self.add([_cut(blocks[0], part)])
+                self.add([blocks[0].part(part)])
             return
         self.store.begin(count)
         for block, slot in zip(blocks, slots, strict=True):
@@ -314,12 +245,4 @@ def _within_range(block: Block, report: Report) -> Block:
     if not late.any():
         return block
     report.lost(f"{block.connection.topic}: {late.sum()} messages with impossible log stamps were left out")
-    return _cut(block, ~late)
-
-
-def _cut(block: Block, kept: NDArray[np.bool_] | slice) -> Block:
-    """Return a block of some of its messages."""
-    publish = None if block.publish_ns is None else block.publish_ns[kept]
-    return replace(
-        block, starts=block.starts[kept], lengths=block.lengths[kept], log_ns=block.log_ns[kept], publish_ns=publish
-    )
+    return block.part(~late)

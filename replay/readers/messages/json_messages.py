@@ -7,21 +7,18 @@ costs as much again. Integers stay exact to 64 bits while no fraction stands in 
 
 from __future__ import annotations
 
-import json
-import secrets
 from collections.abc import Iterable, Iterator, Sequence
 from itertools import chain, compress
 from operator import itemgetter
 from typing import Any
 
 import numpy as np
-import orjson
-from numba import njit
 from numpy.typing import NDArray
 
 from replay.readers.messages.cdr import Outcome, Part
 from replay.readers.messages.cdr_layout import MAX_ELEMENTS
 from replay.readers.messages.fields import is_key_list
+from replay.readers.messages.json_parsing import parse_singly, parse_together
 
 MAX_PATHS = 20_000
 MAX_DEPTH = 32
@@ -73,10 +70,10 @@ def decode(
 def _batch(
     data: NDArray[np.uint8], starts: NDArray[np.int64], lengths: NDArray[np.int64], first: int, outcome: Outcome
 ) -> tuple[str | None, list[Part]]:
-    values = _parse_together(data, starts, lengths)
+    values = parse_together(data, starts, lengths)
     rows: Sequence[int] = range(first, first + len(starts))
     if values is None:
-        kept = list(_parse_singly(data, starts, lengths, outcome))
+        kept = list(parse_singly(data, starts, lengths, outcome))
         rows, values = [first + i for i, _ in kept], [v for _, v in kept]
     taker = _Taker()
     taker.take("", rows, values, [], 0)
@@ -87,59 +84,6 @@ def _batch(
     stamp = _take_stamp(taker.columns, rows)
     outcome.slow += taker.slow
     return stamp, [Part(np.empty(0, np.int64), {}, tuple(taker.skipped)), *_parts(taker.columns)]
-
-
-@njit(cache=True)
-def _join(data, starts, lengths, between, out):  # type: ignore[no-untyped-def]
-    """Write ``[payload between payload between … payload]``."""
-    out[0] = 91
-    at = 1
-    for i in range(len(starts)):
-        if i:
-            out[at : at + len(between)] = between
-            at += len(between)
-        out[at : at + lengths[i]] = data[starts[i] : starts[i] + lengths[i]]
-        at += lengths[i]
-    out[at] = 93
-
-
-def _parse_together(data: NDArray[np.uint8], starts: NDArray[np.int64], lengths: NDArray[np.int64]) -> list[Any] | None:
-    """Values of all payloads, or None where one of them is not JSON value of its own.
-
-    A word that no payload can know stands between them, so that two broken ones cannot make up a valid whole.
-    """
-    word = secrets.token_hex(8)
-    between = np.frombuffer(f',"{word}",'.encode(), np.uint8)
-    out = np.empty(int(lengths.sum()) + len(between) * (len(starts) - 1) + 2, np.uint8)
-    _join(data, starts, lengths, between, out)
-    try:
-        together = orjson.loads(out.data)
-    except orjson.JSONDecodeError:
-        return None
-    own = len(together) == 2 * len(starts) - 1 and together[1::2].count(word) == len(starts) - 1
-    return together[::2] if own else None
-
-
-def _parse_singly(
-    data: NDArray[np.uint8], starts: NDArray[np.int64], lengths: NDArray[np.int64], outcome: Outcome
-) -> Iterator[tuple[int, Any]]:
-    """Yield number and value of each payload that is JSON, or JSON with NaN and Infinity."""
-    for i, (start, size) in enumerate(zip(starts.tolist(), lengths.tolist(), strict=True)):
-        raw = data[start : start + size].tobytes()
-        try:
-            yield i, orjson.loads(raw)
-        except orjson.JSONDecodeError as error:
-            if b"NaN" in raw or b"Infinity" in raw:
-                try:
-                    value = json.loads(raw)
-                except (ValueError, RecursionError):
-                    pass
-                else:
-                    outcome.slow += 1
-                    yield i, value
-                    continue
-            outcome.bad += 1
-            outcome.reason = outcome.reason or f"not JSON ({error.msg})"
 
 
 class _Taker:

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import struct
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import lru_cache
 from typing import NamedTuple
 
@@ -16,11 +16,20 @@ from numpy.typing import NDArray
 
 from replay.readers.messages.definitions import DefinitionError
 from replay.readers.messages.fields import is_key_list
+from replay.readers.messages.protobuf_types import (
+    DELIMITED,
+    IMPLICIT,
+    VERIFY,
+    ProtobufType,
+    block_of,
+    int_of,
+    parts_of,
+    text_of,
+    types_of,
+)
 
 MAX_BYTES = 16 << 20
-MAX_TYPES = 20_000
 MAX_FIELDS = 20_000
-MAX_NESTING = 32
 
 # Kinds of `Tables.kind`: numbers first, in the order of `NUMBERS`.
 NUMBERS = ("f8", "f4", "i8", "u8", "i4", "u8", "u4", "u1", "u4", "i4", "i4", "i8", "i4", "i8")
@@ -34,9 +43,6 @@ _KINDS = (
     SFIXED32, SFIXED64, SINT32, SINT64,
 )  # fmt: skip
 _REPEATED = 3
-_EXPLICIT, _IMPLICIT = 1, 2
-_VERIFY, _NO_CHECK = 2, 3
-_DELIMITED = 2
 
 
 @dataclass(frozen=True)
@@ -105,37 +111,6 @@ class Schema:
     notes: tuple[str, ...]
 
 
-@dataclass
-class _Features:
-    """What editions of the language turn on and off, inherited inwards."""
-
-    presence: int
-    utf8: int
-    encoding: int = 1
-
-    def with_options(self, options: bytes, number: int) -> _Features:
-        """Take over a FeatureSet found under a number of an options message."""
-        out = _Features(self.presence, self.utf8, self.encoding)
-        for n, value in _wire(options):
-            if n == number and isinstance(value, bytes):
-                for key, chosen in _wire(value):
-                    if isinstance(chosen, int):
-                        out.presence = chosen if key == 1 else out.presence
-                        out.utf8 = chosen if key == 4 else out.utf8
-                        out.encoding = chosen if key == 5 else out.encoding
-        return out
-
-
-@dataclass
-class _Type:
-    """A message type that was found but not yet read."""
-
-    raw: bytes
-    features: _Features
-    editions: bool
-    parts: list[tuple[int, int | bytes]] = field(default_factory=list)
-
-
 @lru_cache(maxsize=256)
 def schema_of(type_name: str, definition: str) -> Schema:
     """Read a message type.
@@ -159,47 +134,13 @@ def schema_of(type_name: str, definition: str) -> Schema:
     if len(raw) > MAX_BYTES:
         raise DefinitionError(f"its schema has {len(raw)} bytes; at most {MAX_BYTES} are read")
     try:
-        types = _types(raw)
+        types = types_of(raw)
         return _compile(type_name.removeprefix("."), types)
     except (ValueError, IndexError, struct.error, UnicodeDecodeError) as error:
         raise DefinitionError(f"its schema is not a FileDescriptorSet ({error})") from error
 
 
-def _types(raw: bytes) -> dict[str, _Type]:
-    """Find all message types of a FileDescriptorSet by their full names."""
-    types: dict[str, _Type] = {}
-    for number, file in _wire(raw):
-        if number != 1 or not isinstance(file, bytes):
-            continue
-        parts = list(_wire(file))
-        package, syntax = _text(parts, 2), _text(parts, 12)
-        editions = syntax == "editions"
-        open_kind = syntax == "proto3"
-        features = _Features(_IMPLICIT if open_kind else _EXPLICIT, _VERIFY if open_kind or editions else _NO_CHECK)
-        for n, value in parts:
-            if editions and n == 8 and isinstance(value, bytes):
-                features = features.with_options(value, 50)
-        for n, value in parts:
-            if n == 4 and isinstance(value, bytes):
-                _collect(types, value, package, features, editions, 0)
-    return types
-
-
-def _collect(types: dict[str, _Type], raw: bytes, scope: str, features: _Features, editions: bool, depth: int) -> None:
-    if depth > MAX_NESTING or len(types) >= MAX_TYPES:
-        raise ValueError(f"more than {MAX_TYPES} types, or nested deeper than {MAX_NESTING}")
-    kind = _Type(raw, features, editions, list(_wire(raw)))
-    name = _text(kind.parts, 1)
-    full = f"{scope}.{name}" if scope else name
-    if editions:
-        kind.features = features.with_options(_block(kind.parts, 7), 12)
-    types[full] = kind
-    for n, value in kind.parts:
-        if n == 3 and isinstance(value, bytes):
-            _collect(types, value, full, kind.features, editions, depth + 1)
-
-
-def _compile(root: str, types: dict[str, _Type]) -> Schema:
+def _compile(root: str, types: dict[str, ProtobufType]) -> Schema:
     """Number the types that the root reaches, and read their fields."""
     if root not in types:
         raise DefinitionError(f"its schema does not hold the message type {root!r}")
@@ -235,30 +176,32 @@ def _compile(root: str, types: dict[str, _Type]) -> Schema:
     return Schema(tuple(rows), tables, _stamp(rows, first, target), notes)
 
 
-def _fields(name: str, types: dict[str, _Type]) -> Iterator[Field]:
+def _fields(name: str, types: dict[str, ProtobufType]) -> Iterator[Field]:
     kind = types[name]
     for n, value in kind.parts:
         if n == 2 and isinstance(value, bytes):
-            yield _field(list(_wire(value)), name, kind, types)
+            yield _field(list(parts_of(value)), name, kind, types)
 
 
-def _field(parts: list[tuple[int, int | bytes]], scope: str, owner: _Type, types: dict[str, _Type]) -> Field:
-    name, number, code = _text(parts, 1), _int(parts, 3), _int(parts, 5)
+def _field(
+    parts: list[tuple[int, int | bytes]], scope: str, owner: ProtobufType, types: dict[str, ProtobufType]
+) -> Field:
+    name, number, code = text_of(parts, 1), int_of(parts, 3), int_of(parts, 5)
     if not name or not 0 < number < 1 << 29 or not 0 < code <= len(_KINDS):
         raise ValueError(f"field {name!r} of {scope} has number {number} and type {code}")
-    kind, repeated = _KINDS[code - 1], _int(parts, 4) == _REPEATED
+    kind, repeated = _KINDS[code - 1], int_of(parts, 4) == _REPEATED
     choice = next((v for n, v in parts if n == 9 and isinstance(v, int)), -1)
-    features = owner.features.with_options(_block(parts, 8), 21) if owner.editions else owner.features
+    features = owner.features.with_options(block_of(parts, 8), 21) if owner.editions else owner.features
     type_name, is_map = "", False
     if kind == MESSAGE:
-        type_name = _resolve(_text(parts, 6), scope, types)
-        is_map = bool(_int(list(_wire(_block(types[type_name].parts, 7))), 7))
-        kind = GROUP if features.encoding == _DELIMITED and not is_map else kind
-    implicit = not repeated and choice < 0 and features.presence == _IMPLICIT and kind < BYTES
-    return Field(name, number, kind, repeated, implicit, features.utf8 == _VERIFY, is_map, choice, type_name)
+        type_name = _resolve(text_of(parts, 6), scope, types)
+        is_map = bool(int_of(list(parts_of(block_of(types[type_name].parts, 7))), 7))
+        kind = GROUP if features.encoding == DELIMITED and not is_map else kind
+    implicit = not repeated and choice < 0 and features.presence == IMPLICIT and kind < BYTES
+    return Field(name, number, kind, repeated, implicit, features.utf8 == VERIFY, is_map, choice, type_name)
 
 
-def _resolve(name: str, scope: str, types: dict[str, _Type]) -> str:
+def _resolve(name: str, scope: str, types: dict[str, ProtobufType]) -> str:
     """Full name of a type: absolute with a leading dot, else searched from the inside outwards."""
     if name.startswith("."):
         if name[1:] in types:
@@ -288,49 +231,3 @@ def _stamp(rows: list[Field], first: list[int], target: list[int]) -> tuple[str,
                 if {sec, nsec} <= held:
                     return path, sec, nsec
     return None
-
-
-def _wire(raw: bytes) -> Iterator[tuple[int, int | bytes]]:
-    """Yield number and value of each field of a serialised message."""
-    at = 0
-    while at < len(raw):
-        tag, at = _varint(raw, at)
-        number, wire = tag >> 3, tag & 7
-        if wire == 0:
-            value, at = _varint(raw, at)
-            yield number, value
-        elif wire == 2:
-            size, at = _varint(raw, at)
-            if size > len(raw) - at:
-                raise ValueError("a part is longer than the whole")
-            yield number, raw[at : at + size]
-            at += size
-        elif wire in (1, 5):
-            at += 8 if wire == 1 else 4
-            if at > len(raw):
-                raise ValueError("it ends inside a field")
-        else:
-            raise ValueError(f"wire type {wire}")
-
-
-def _varint(raw: bytes, at: int) -> tuple[int, int]:
-    value = 0
-    for shift in range(0, 70, 7):
-        byte = raw[at]
-        at += 1
-        value |= (byte & 127) << shift
-        if byte < 128:
-            return value, at
-    raise ValueError("a number of more than ten bytes")
-
-
-def _text(parts: list[tuple[int, int | bytes]], number: int) -> str:
-    return _block(parts, number).decode()
-
-
-def _block(parts: list[tuple[int, int | bytes]], number: int) -> bytes:
-    return next((v for n, v in reversed(parts) if n == number and isinstance(v, bytes)), b"")
-
-
-def _int(parts: list[tuple[int, int | bytes]], number: int) -> int:
-    return next((v for n, v in reversed(parts) if n == number and isinstance(v, int)), 0)

@@ -1,18 +1,17 @@
-"""Structure of a ROS 1 bag: its header, connections, chunks and what its index says about them."""
+"""Opening of a ROS 1 bag: its header, and its connections and chunks from the index section or from a walk."""
 
 from __future__ import annotations
 
 import struct
-from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
-from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from replay.errors import LogError
 from replay.log.reading_notes import Report
-from replay.readers.messages.assemble import Connection
+from replay.readers.rosbag1.bag import Bag, Chunk
+from replay.readers.rosbag1.connections import DAMAGED, fields_of, take_connection
 from replay.readers.rosbag1.records_kernel import (
     CHUNK,
     CONNECTION,
@@ -27,73 +26,6 @@ from replay.readers.rosbag1.records_kernel import (
 
 MAGIC = b"#ROSBAG V"
 _VERSION = b"#ROSBAG V2.0\n"
-_BAD = (struct.error, KeyError, ValueError)
-_LONGEST_TEXT = 1 << 20
-_MOST_TOLD = 200
-
-
-@dataclass
-class Chunk:
-    """One chunk, and what the index section states about it.
-
-    Attributes
-    ----------
-    start, body, packed, size : int
-        Place of its record and of its data, their length, and their length when expanded [bytes].
-    compression : str
-        As stated.
-    first_ns, last_ns : int
-        Bounds of its stamps; both −1 where no index states them.
-    stated : dict[int, int] or None
-        Messages per connection, or None where no index states them.
-    cut : bool
-        Whether the file ends before the chunk does, or its length is not to be trusted.
-    """
-
-    start: int
-    body: int
-    packed: int
-    size: int
-    compression: str
-    first_ns: int = -1
-    last_ns: int = -1
-    stated: dict[int, int] | None = None
-    cut: bool = False
-
-
-@dataclass
-class Bag:
-    """One opened bag.
-
-    Attributes
-    ----------
-    connections : dict[int, Connection]
-        Streams by number.
-    chunks : list[Chunk]
-        In the order of the file.
-    loose : list[BagRecords]
-        Walks that met messages outside of chunks.
-    absent : dict[int, int]
-        Messages per connection of chunks that the index names and that are not in their place.
-    """
-
-    path: Path
-    data: NDArray[np.uint8]
-    report: Report
-    connections: dict[int, Connection] = field(default_factory=dict)
-    chunks: list[Chunk] = field(default_factory=list)
-    loose: list[BagRecords] = field(default_factory=list)
-    absent: dict[int, int] = field(default_factory=dict)
-    raw: dict[int, bytes] = field(default_factory=dict)
-    told: int = 0
-
-    def lost(self, text: str) -> None:
-        """Report a loss in this file; of very many, the first ones."""
-        self.told += 1
-        if self.told <= _MOST_TOLD:
-            self.report.lost(f"{self.path.name}: {text}")
-        elif self.told == _MOST_TOLD + 1:
-            self.report.lost(f"{self.path.name}: more than {_MOST_TOLD} places are damaged; the others are not listed")
 
 
 def open_bag(path: Path, report: Report, whole: bool) -> Bag:
@@ -143,17 +75,6 @@ def open_bag(path: Path, report: Report, whole: bool) -> Bag:
     return bag
 
 
-def fields_of(raw: bytes) -> dict[str, bytes]:
-    """Header fields ``name=value`` of one record."""
-    out, at = {}, 0
-    while at + 4 <= len(raw):
-        (size,) = struct.unpack_from("<I", raw, at)
-        name, _, value = raw[at + 4 : at + 4 + size].partition(b"=")
-        out[name.decode("ascii", "replace")] = value
-        at += 4 + size
-    return out
-
-
 def _header(bag: Bag) -> tuple[int, int, int] | None:
     """Index position, connection and chunk counts; None where the header record is damaged."""
     first = scan_bag(bag.data, len(_VERSION), min(len(bag.data), len(_VERSION) + (1 << 16)))
@@ -169,7 +90,7 @@ def _header(bag: Bag) -> tuple[int, int, int] | None:
         (place,) = struct.unpack("<Q", fields["index_pos"])
         (connections,) = struct.unpack("<I", fields["conn_count"])
         (chunks,) = struct.unpack("<I", fields["chunk_count"])
-    except _BAD:
+    except DAMAGED:
         return None
     return place, connections, chunks
 
@@ -194,7 +115,7 @@ def _infos(bag: Bag, records: BagRecords) -> dict[int, tuple[int, int, dict[int,
             )
             pairs = np.frombuffer(bag.data[body : body + size - size % 8].tobytes(), "<u4").reshape(-1, 2)
             out[place] = first, last, dict(pairs.tolist())
-        except _BAD as error:
+        except DAMAGED as error:
             bag.lost(f"the chunk-info record at byte {head - 4} is damaged ({type(error).__name__})")
     return out
 
@@ -217,7 +138,7 @@ def _from_index(bag: Bag, index: BagRecords) -> bool:
             body = place + 8 + size
             (packed,) = struct.unpack("<I", bag.data[body - 4 : body].tobytes())
             chunk = _chunk(bag, place + 4, body, packed)
-        except _BAD:
+        except DAMAGED:
             return False
         if body + packed > len(bag.data):
             return False
@@ -260,7 +181,7 @@ def _take_chunks(bag: Bag, records: BagRecords) -> None:
         head, body, size = int(records.head[i]), int(records.body[i]), int(records.size[i])
         try:
             chunk = _chunk(bag, head, body, size)
-        except _BAD as error:
+        except DAMAGED as error:
             bag.lost(f"the chunk at byte {head - 4} has a damaged header ({type(error).__name__})")
             chunk = Chunk(head - 4, body, size, 0, "", cut=True)
         bag.chunks.append(chunk)
@@ -296,44 +217,8 @@ def _overlong(bag: Bag, at: int) -> Chunk | None:
         if size > 4096:
             return None
         chunk = _chunk(bag, at + 4, at + 8 + size, 0)
-    except _BAD:
+    except DAMAGED:
         return None
     bag.lost(f"the chunk at byte {at} reaches beyond the end of the file; the part that is there was read")
     chunk.cut = True
     return chunk
-
-
-def take_connection(bag: Bag, data: NDArray[np.uint8], records: BagRecords, i: int) -> None:
-    """Take a connection record; of two copies that differ, the one that its checksum confirms."""
-    head, body, size, number = (int(a[i]) for a in (records.head, records.body, records.size, records.conn))
-    raw = data[head : body + min(size, _LONGEST_TEXT)].tobytes()
-    if bag.raw.get(number) == raw:
-        return
-    try:
-        topic = fields_of(raw[: body - 4 - head])["topic"].decode("utf-8", "replace")
-        inner = fields_of(raw[body - head :])
-        text = inner["message_definition"].decode("utf-8", "replace")
-        name = inner["type"].decode("ascii", "replace")
-        connection = Connection(topic, name, "ros1", "ros1msg", text)
-    except _BAD as error:
-        bag.lost(f"a record of connection {number} is damaged ({type(error).__name__})")
-        return
-    known = bag.connections.get(number)
-    bag.raw.setdefault(number, raw)
-    if known is None:
-        bag.connections[number] = connection
-    elif known != connection:
-        bag.lost(f"two records of connection {number} ({known.topic[:80]!r}) differ")
-        if not _confirmed(bag.raw[number], known) and _confirmed(raw, connection):
-            bag.connections[number], bag.raw[number] = connection, raw
-
-
-def _confirmed(raw: bytes, connection: Connection) -> bool:
-    """Whether the checksum in a connection record is that of its definition."""
-    try:
-        store = get_typestore(Stores.EMPTY)
-        store.register(get_types_from_msg(connection.definition, connection.type_name))
-        digest: str = store.generate_msgdef(connection.type_name, ros_version=1)[1]
-    except Exception:  # a damaged definition fails in any way
-        return False
-    return digest.encode() in raw

@@ -17,9 +17,12 @@ from replay.log.raw_log import Clock, LogSummary, RawLog, TopicInfo, Window
 from replay.log.reading_notes import Report
 from replay.log.source_options import SourceOptions
 from replay.readers.common.inflate import InflateError, Inflater
-from replay.readers.messages.assemble import Assembler, Block, Connection
+from replay.readers.messages.assemble import Assembler
+from replay.readers.messages.connection import Block, Connection
 from replay.readers.rosbag1 import parts
-from replay.readers.rosbag1.file import MAGIC, Bag, Chunk, open_bag, take_connection
+from replay.readers.rosbag1.bag import Bag, Chunk
+from replay.readers.rosbag1.connections import take_connection
+from replay.readers.rosbag1.file import MAGIC, open_bag
 from replay.readers.rosbag1.records_kernel import CONNECTION, MESSAGE, BagRecords, scan_bag
 
 _LOOK, _RECORDS = 4 << 20, 3

@@ -10,7 +10,7 @@ import zstandard
 
 from replay.log.reading_notes import Report
 from replay.readers.common.inflate import MAX_CHUNK
-from replay.readers.messages.assemble import Block
+from replay.readers.messages.connection import Block
 
 _HELD = 64 << 20
 

@@ -1,4 +1,4 @@
-"""Compiled walks over the pages of an SQLite file: tables, rows, overflow chains, the index of the stamps.
+"""Compiled walks over the pages of an SQLite file: tables, rows, overflow chains.
 
 Page numbers start at 1, as in the file. Nothing read from a page is trusted: places and lengths are checked against the
 page and the file, pages are visited once.
@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from replay.readers.common.compiled import part
 
-INTERIOR, LEAF, INDEX_INTERIOR, INDEX_LEAF = 5, 13, 2, 10
+INTERIOR, LEAF = 5, 13
 OK, DAMAGED, OTHER_TYPES, BEYOND = 0, 1, 2, 3
 
 
@@ -28,14 +28,15 @@ def big_endian(data, at, width):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _u16(data, at):  # type: ignore[no-untyped-def]
+def u16(data, at):  # type: ignore[no-untyped-def]
+    """Big-endian integer of two bytes."""
     return np.int64(data[at]) << 8 | np.int64(data[at + 1])
 
 
 @njit(cache=True)
 def unsigned(data, at):  # type: ignore[no-untyped-def]
     """Big-endian integer of four bytes."""
-    return _u16(data, at) << 16 | _u16(data, at + 2)
+    return u16(data, at) << 16 | u16(data, at + 2)
 
 
 @njit(cache=True)
@@ -57,7 +58,7 @@ def varint(data, at, stop):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _head(data, page, number):  # type: ignore[no-untyped-def]
+def page_head(data, page, number):  # type: ignore[no-untyped-def]
     """Start of the page, start of its tree header, and where the page ends."""
     start = (number - 1) * page
     return start, start + (100 if number == 1 else 0), min(start + page, len(data))
@@ -67,7 +68,7 @@ def _head(data, page, number):  # type: ignore[no-untyped-def]
 def _key(data: NDArray[np.uint8], page: int, place: tuple[int, int, int], cell: int, otherwise: int) -> Any:
     """Last row below a cell of an interior page (start, head and end: `place`), `otherwise` where it is damaged."""
     start, head, stop = place
-    at = start + (_u16(data, head + 12 + 2 * cell) & page - 1)
+    at = start + (u16(data, head + 12 + 2 * cell) & page - 1)
     if head + 12 <= at and at + 5 <= stop:
         key, end = varint(data, at + 4, stop)
         if end > 0:
@@ -106,7 +107,7 @@ def walk(data, page, root, seen, wanted, all_rows):  # type: ignore[no-untyped-d
     while depth:
         depth -= 1
         number, first, last = stack[depth], low[depth], high[depth]
-        start, head, stop = _head(data, page, number)
+        start, head, stop = page_head(data, page, number)
         kind = data[head] if head + 12 <= stop else 0
         if kind == LEAF:
             leaves[n] = number
@@ -116,13 +117,13 @@ def walk(data, page, root, seen, wanted, all_rows):  # type: ignore[no-untyped-d
             suspects[bad] = number
             bad += 1
             continue
-        cells = min(_u16(data, head + 3), (stop - head - 12) // 2)
+        cells = min(u16(data, head + 3), (stop - head - 12) // 2)
         top = last
         for i in range(cells, -1, -1):  # from the right, so that the left comes off the stack first
             if i == cells:
                 child, bottom_cell = unsigned(data, head + 8), i - 1
             else:
-                at = start + (_u16(data, head + 12 + 2 * i) & page - 1)
+                at = start + (u16(data, head + 12 + 2 * i) & page - 1)
                 if at < head + 12 or at + 5 > stop:
                     continue
                 child, bottom_cell = unsigned(data, at), i - 1
@@ -226,9 +227,9 @@ def cells_of(data, page, numbers):  # type: ignore[no-untyped-def]
     """Count of the cells that each leaf states, at most as many as fit."""
     counts = np.zeros(len(numbers), np.int64)
     for k in range(len(numbers)):
-        _, head, stop = _head(data, page, numbers[k])
+        _, head, stop = page_head(data, page, numbers[k])
         if head + 8 <= stop:
-            counts[k] = min(_u16(data, head + 3), (page - 8) // 2)
+            counts[k] = min(u16(data, head + 3), (page - 8) // 2)
     return counts
 
 
@@ -241,17 +242,17 @@ def locate(data, page, usable, numbers):  # type: ignore[no-untyped-def]
     k = 0
     most, least = usable - 35, (usable - 12) * 32 // 255 - 23
     for number in numbers:
-        start, head, stop = _head(data, page, number)
+        start, head, stop = page_head(data, page, number)
         if head + 8 > stop:
             continue
-        for i in range(min(_u16(data, head + 3), (page - 8) // 2)):
+        for i in range(min(u16(data, head + 3), (page - 8) // 2)):
             row[k] = place[k] = local[k] = total[k] = 0
             status[k] = DAMAGED
             at = head + 8 + 2 * i
             k += 1
             if at + 2 > stop:
                 continue
-            at = start + (_u16(data, at) & page - 1)
+            at = start + (u16(data, at) & page - 1)
             if at < head + 8 or at >= stop:
                 continue
             size, at = varint(data, at, stop)
@@ -297,78 +298,3 @@ def gather(data, page, usable, place, local, start, length, out, into, status): 
     for i in range(len(place)):
         if not copy_payload(data, page, usable, place[i], local[i], start[i], length[i], out, into[i]):
             status[i] = DAMAGED
-
-
-@part
-def _entry(data: NDArray[np.uint8], at: int, stop: int) -> tuple[Any, Any, bool]:
-    """Stamp and row number of an index entry, and whether it is sound."""
-    pair: tuple[Any, Any] = (np.int64(0), np.int64(0))
-    size, at = varint(data, at, stop)
-    if at < 0 or size < 3 or size > 32 or at + size > stop or data[at] != 3:
-        return pair[0], pair[1], False
-    p = at + 3
-    for k in range(2):
-        code: Any = np.int64(data[at + 1 + k])
-        if code > 9 or code == 7 or code == 0:
-            return pair[0], pair[1], False
-    for k in range(2):
-        code = np.int64(data[at + 1 + k])
-        width = code if code < 5 else 6 if code == 5 else 8 if code == 6 else 0
-        if p + width > at + size:
-            return pair[0], pair[1], False
-        value = big_endian(data, p, width) if width else code - 8
-        pair = (value, pair[1]) if k == 0 else (pair[0], value)
-        p += width
-    return pair[0], pair[1], True
-
-
-@njit(cache=True)
-def stamped_rows(data, page, root, seen, first, stop_stamp, rows):  # type: ignore[no-untyped-def]
-    """Fill `rows` with the row numbers of index entries first ≤ stamp < stop; return how many, and all entries met.
-
-    Both are −1 where a page or an entry of the index is damaged.
-    """
-    pages = len(seen) - 1
-    stack = np.empty(pages + 1, np.int64)
-    n = met = depth = 0
-    if 1 <= root <= pages:
-        stack[0], depth = root, 1
-    while depth:
-        depth -= 1
-        number = stack[depth]
-        if number < 1 or number > pages or seen[number]:
-            return -1, -1
-        seen[number] = 1
-        start, head, stop = _head(data, page, number)
-        kind = data[head] if head + 12 <= stop else 0
-        if kind != INDEX_LEAF and kind != INDEX_INTERIOR:
-            return -1, -1
-        inner = 4 if kind == INDEX_INTERIOR else 0
-        cells, below = _u16(data, head + 3), np.int64(np.iinfo(np.int64).min)
-        if head + 8 + inner + 2 * cells > stop:
-            return -1, -1
-        for i in range(cells):
-            at = start + (_u16(data, head + 8 + inner + 2 * i) & page - 1)
-            if at + inner >= stop:
-                return -1, -1
-            child = unsigned(data, at) if inner and at + 4 < stop else 0
-            stamp, row, sound = _entry(data, at + inner, stop)
-            if not sound:
-                return -1, -1
-            if inner and below < stop_stamp and stamp >= first:
-                if depth >= pages:
-                    return -1, -1
-                stack[depth] = child
-                depth += 1
-            below = stamp
-            met += 1
-            if first <= stamp < stop_stamp:
-                if n < len(rows):
-                    rows[n] = row
-                n += 1
-        if inner and below < stop_stamp:
-            if depth >= pages:
-                return -1, -1
-            stack[depth] = unsigned(data, head + 8)
-            depth += 1
-    return n, met

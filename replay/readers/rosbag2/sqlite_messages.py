@@ -12,17 +12,16 @@ from numpy.typing import NDArray
 
 from replay.log.raw_log import Window
 from replay.log.reading_notes import Report
-from replay.readers.messages.assemble import Connection
+from replay.readers.messages.connection import Connection
 from replay.readers.rosbag2 import sqlite_kernel as scan
-from replay.readers.rosbag2.metadata import MAX_BYTES, Metadata, parse_metadata
-from replay.readers.rosbag2.sqlite_file import Image, Table, Value
+from replay.readers.rosbag2.sqlite_file import Image, Table
+from replay.readers.rosbag2.sqlite_index_kernel import stamped_rows
 
 _PAGES = 8 << 20
 _BYTES = 32 << 20
 _LAYOUT = ["id", "topic_id", "timestamp", "data"]
 _STAMPS = re.compile(r"""\bon\s+["'`\[]?messages["'`\]]?\s*\(\s*["'`\[]?timestamp""", re.IGNORECASE)
 _PARTLY = re.compile(r"\b(desc|where)\b", re.IGNORECASE)
-_TYPE = re.compile(r"[A-Za-z]\w*(/[A-Za-z]\w*)+")
 
 
 @dataclass
@@ -128,7 +127,7 @@ class Database:
         rows = np.empty(1 << 16, np.int64)
         low, high = (min(max(w, -(2**63)), 2**63 - 1) for w in window)
         while True:
-            n, _ = scan.stamped_rows(image.data, image.page, index.root, np.zeros_like(image.seen), low, high, rows)
+            n, _ = stamped_rows(image.data, image.page, index.root, np.zeros_like(image.seen), low, high, rows)
             if n <= len(rows):
                 return rows[:n] if n >= 0 else None
             rows = np.empty(n, np.int64)
@@ -266,7 +265,7 @@ class Database:
         held = -1
         if index is not None:
             image = self.image
-            _, held = scan.stamped_rows(
+            _, held = stamped_rows(
                 image.data,
                 image.page,
                 index.root,
@@ -280,61 +279,3 @@ class Database:
             self.report.note(f"{text}; its index does not name them either, so they were deleted")
         else:
             self.report.lost(f"{text}; these messages are lost")
-
-
-def open_database(image: Image, report: Report) -> Database:
-    """Read the schema and the topics of a database, from wherever they are found where it is damaged."""
-    base = Database(image, report)
-    base.tables = image.schema()
-    topics = _named(base, "topics", ["id", "name", "type", "serialization_format"])
-    texts = _named(base, "message_definitions", ["topic_type", "encoding", "encoded_message_definition"])
-    if not topics and image.suspects:
-        topics, texts = _stray_topics(image)
-    base.stated = _own_counts(base)
-    definitions = {str(name): (str(encoding), str(text)) for name, encoding, text in texts}
-    for number, name, kind, encoding in topics:
-        if isinstance(number, int):
-            base.connections[number] = Connection(
-                str(name), str(kind), str(encoding), *definitions.get(str(kind), ("", ""))
-            )
-    return base
-
-
-def _own_counts(base: Database) -> dict[str, int] | None:
-    """Messages per topic from the recorder's last copy of its metadata; None for a part among others."""
-    texts = [str(text) for (text,) in _named(base, "metadata", ["metadata"])]
-    meta = parse_metadata(texts[-1][:MAX_BYTES]) if texts else Metadata()
-    return meta.counts if meta.counts and len(meta.files or []) == 1 and any(meta.counts.values()) else None
-
-
-def _named(base: Database, table: str, names: list[str]) -> list[list[Value]]:
-    """Values of some columns of a table; the row's number stands for an empty id."""
-    if table not in base.tables:
-        return []
-    columns = base.tables[table].columns()
-    out = []
-    for number, values in base.image.rows(base.image.leaves(base.tables[table].root)):
-        found = dict(zip(columns, values, strict=False))
-        if found.get("id") is None:
-            found["id"] = number
-        out.append([found.get(n) for n in names])
-    return out
-
-
-def _stray_topics(image: Image) -> tuple[list[list[Value]], list[list[Value]]]:
-    """Rows that look like topics and definitions, from pages that no table leads to."""
-    topics: list[list[Value]] = []
-    texts: list[list[Value]] = []
-    starts = np.arange(len(image.seen) - 1) * image.page
-    for page in (np.flatnonzero(image.data[starts] == scan.LEAF) + 1).tolist():
-        if image.seen[page] and page != 1:
-            continue
-        for number, values in image.rows(np.array([page], np.int64), 1000):
-            words = values[1:4]
-            if len(words) < 3 or not all(isinstance(w, str) for w in words):
-                continue
-            if str(words[0]).startswith("/") and _TYPE.fullmatch(str(words[1])):
-                topics.append([number, *words])
-            elif _TYPE.fullmatch(str(words[0])) and words[1] in ("ros2msg", "ros2idl"):
-                texts.append(words)
-    return topics, texts

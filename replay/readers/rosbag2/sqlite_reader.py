@@ -12,10 +12,12 @@ import numpy as np
 from replay.errors import LogError
 from replay.log.raw_log import Clock, LogSummary, RawLog, TopicInfo, Window
 from replay.log.reading_notes import Report
-from replay.readers.messages.assemble import Assembler, Block, Connection
+from replay.readers.messages.assemble import Assembler
+from replay.readers.messages.connection import Block, Connection
 from replay.readers.rosbag2.message_compression import unpacked
 from replay.readers.rosbag2.sqlite_file import open_image
-from replay.readers.rosbag2.sqlite_messages import Database, Rows, open_database
+from replay.readers.rosbag2.sqlite_messages import Database, Rows
+from replay.readers.rosbag2.sqlite_topics import open_database
 from replay.readers.rosbag2.sqlite_wal import SqliteError
 
 _SMALLEST_ROW = 16

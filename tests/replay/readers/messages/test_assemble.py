@@ -12,7 +12,8 @@ from replay.errors import LogError
 from replay.log.raw_log import LogSummary, RawLog
 from replay.log.reading_notes import Report
 from replay.readers.messages import assemble
-from replay.readers.messages.assemble import Assembler, Block, Connection
+from replay.readers.messages.assemble import Assembler
+from replay.readers.messages.connection import Block, Connection
 
 STORE = get_typestore(Stores.LATEST)
 KIND = "sensor_msgs/msg/JointState"

@@ -17,7 +17,8 @@ from replay.log.reading_notes import Report
 from replay.log.source_options import SourceOptions
 from replay.readers.registry import read_log
 from replay.readers.rosbag2.sqlite_file import open_image
-from replay.readers.rosbag2.sqlite_messages import Database, open_database
+from replay.readers.rosbag2.sqlite_messages import Database
+from replay.readers.rosbag2.sqlite_topics import open_database
 
 TABLES = """
 create table topics(id integer primary key, name text not null, type text not null, serialization_format text not null);

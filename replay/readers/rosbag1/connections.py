@@ -1,0 +1,64 @@
+"""Connection records of a ROS 1 bag: topic, type and definition, and which of two copies is right."""
+
+from __future__ import annotations
+
+import struct
+
+import numpy as np
+from numpy.typing import NDArray
+from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+
+from replay.readers.messages.connection import Connection
+from replay.readers.rosbag1.bag import Bag
+from replay.readers.rosbag1.records_kernel import BagRecords
+
+#: What reading a damaged header raises.
+DAMAGED = (struct.error, KeyError, ValueError)
+_LONGEST_TEXT = 1 << 20
+
+
+def fields_of(raw: bytes) -> dict[str, bytes]:
+    """Header fields ``name=value`` of one record."""
+    out, at = {}, 0
+    while at + 4 <= len(raw):
+        (size,) = struct.unpack_from("<I", raw, at)
+        name, _, value = raw[at + 4 : at + 4 + size].partition(b"=")
+        out[name.decode("ascii", "replace")] = value
+        at += 4 + size
+    return out
+
+
+def take_connection(bag: Bag, data: NDArray[np.uint8], records: BagRecords, i: int) -> None:
+    """Take a connection record; of two copies that differ, the one that its checksum confirms."""
+    head, body, size, number = (int(a[i]) for a in (records.head, records.body, records.size, records.conn))
+    raw = data[head : body + min(size, _LONGEST_TEXT)].tobytes()
+    if bag.raw.get(number) == raw:
+        return
+    try:
+        topic = fields_of(raw[: body - 4 - head])["topic"].decode("utf-8", "replace")
+        inner = fields_of(raw[body - head :])
+        text = inner["message_definition"].decode("utf-8", "replace")
+        name = inner["type"].decode("ascii", "replace")
+        connection = Connection(topic, name, "ros1", "ros1msg", text)
+    except DAMAGED as error:
+        bag.lost(f"a record of connection {number} is damaged ({type(error).__name__})")
+        return
+    known = bag.connections.get(number)
+    bag.raw.setdefault(number, raw)
+    if known is None:
+        bag.connections[number] = connection
+    elif known != connection:
+        bag.lost(f"two records of connection {number} ({known.topic[:80]!r}) differ")
+        if not _confirmed(bag.raw[number], known) and _confirmed(raw, connection):
+            bag.connections[number], bag.raw[number] = connection, raw
+
+
+def _confirmed(raw: bytes, connection: Connection) -> bool:
+    """Whether the checksum in a connection record is that of its definition."""
+    try:
+        store = get_typestore(Stores.EMPTY)
+        store.register(get_types_from_msg(connection.definition, connection.type_name))
+        digest: str = store.generate_msgdef(connection.type_name, ros_version=1)[1]
+    except Exception:  # a damaged definition fails in any way
+        return False
+    return digest.encode() in raw
