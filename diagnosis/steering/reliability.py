@@ -19,7 +19,7 @@ from diagnosis.results.vocabulary import Tier
 from diagnosis.steering.findings import SideFindings
 from replay.faults import FaultMode, Side, State
 
-_WEIGHTS = (-3.61, 4.14, -1.94, -0.84, -1.09)  # constant, and of `features_of`
+_WEIGHTS = (-4.46, 4.72, -2.24, -0.69, -0.99)  # constant, and of `features_of`
 _LONG_S = 6.0  # from here on a finding gains nothing by being longer
 _NEAR_S = 1.0
 _OVERLAP = 0.2

@@ -116,6 +116,7 @@ def _path(
         healthy={side: track.healthy(side, n) for side in segments},
         raised=done.best[:, i] > ODD,
         fault=done.fault[:, i],
+        others=sum(w is not None for w in model.wheels) - 1,
     )
 
 

@@ -23,7 +23,7 @@ Array = NDArray[np.float64]
 
 _HOLD_S = 0.1
 _REACH_S = 0.4  # within which the raw signal shows an edge that the Kalman models did not place
-_LEAST_HEALTHY = 0.9  # probability below which a side is not called healthy
+_LEAST_HEALTHY = 0.95  # probability below which a side is not called healthy
 _USUAL = 0.5  # below this it deviates by more than what healthy machines do
 
 
@@ -71,6 +71,8 @@ class WheelPath:
         Where a causal reading holds a fault for most probable.
     fault : Array, shape (blocks,)
         Probability by the same that the wheel is not healthy.
+    others : int
+        Other wheels with a model.
     """
 
     y: Array
@@ -85,6 +87,7 @@ class WheelPath:
     healthy: Mapping[Side, Array]
     raised: NDArray[np.bool_]
     fault: Array
+    others: int
 
 
 @dataclass(frozen=True)
@@ -128,7 +131,7 @@ def findings_of(path: WheelPath, limits: Limits) -> WheelFindings:
         start, stop = _edges(path, w.segment)
         if stop <= start:
             continue
-        run = Run(start, stop, w.segment.side, w.segment.pooled, w.evidence, w.mean, w.cov)
+        run = Run(start, stop, w.segment.side, w.segment.pooled, w.evidence, w.mean, w.cov, path.others)
         verdict = judge(run, y[start:stop], path.model, limits, path.names, path.dt)
         if verdict.hidden:
             out.opened[Side.ACTUATOR][start:stop] = True

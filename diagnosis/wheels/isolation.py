@@ -34,6 +34,7 @@ Array = NDArray[np.float64]
 _ODD_COST = 2.0  # by which an unusual load must explain more than the usual one
 _WEAK_GAIN = 0.35  # a sensor's gain below this hides what the valve does
 _LEAST_SIDE, _LEAST_ROW = 0.75, 0.55  # probabilities of a side and of its row from which on a finding is stated
+_LEAST_OTHERS = 2  # of two wheels that differ, either may be the one whose speed is wrong
 _LEAST_PART = 0.02  # a hypothesis below this is left out of the text
 _LEAST_HYPOTHESIS = 5e-4
 
@@ -54,6 +55,8 @@ class Run:
         Log-likelihoods; −inf where a model is not considered.
     mean, cov : Array, shape (models, 4) and (models, 4, 4)
         States at its end.
+    others : int
+        Other wheels that show how fast the body moves.
     """
 
     start: int
@@ -63,6 +66,7 @@ class Run:
     evidence: Array
     mean: Array
     cov: Array
+    others: int = 3
 
     def ahead(self, m: int) -> float:
         """Log-evidence of model m against a healthy wheel, also one under an unusual load."""
@@ -111,7 +115,7 @@ def judge(run: Run, y: Array, model: WheelFilterModel, limits: Limits, names: tu
     """
     known, seconds = y[np.isfinite(y)], (run.stop - run.start) * dt
     weighed = _weighed(run, known, model)
-    stated = _stated(weighed)
+    stated = _stated(weighed, apart=run.others >= _LEAST_OTHERS)
     if stated is None:
         return RunVerdict(None)
     m = _model_of(run, weighed.row)
@@ -144,10 +148,13 @@ def _weighed(run: Run, y: Array, model: WheelFilterModel) -> _Weighed:
     return _Weighed(pooled, ranked, sum(p for _, p in own), own[0][0])
 
 
-def _stated(weighed: _Weighed) -> tuple[Side, float] | None:
-    """Side that is stated, which is the union for a loss of gain of either, and its probability; None: too uncertain."""
+def _stated(weighed: _Weighed, *, apart: bool) -> tuple[Side, float] | None:
+    """Side that is stated, which is the union for a loss of gain of either, and its probability; None: too uncertain.
+
+    `apart`: whether the other wheels tell a loss of the sensor from one of the valve.
+    """
     (side, mode), probability = weighed.row, weighed.pooled[weighed.row]
-    if weighed.faulty >= _LEAST_SIDE and probability >= _LEAST_ROW:
+    if (apart or mode is not FaultMode.INEFFICIENT) and weighed.faulty >= _LEAST_SIDE and probability >= _LEAST_ROW:
         return side, probability
     other = Side.ACTUATOR if side is Side.SENSOR else Side.SENSOR
     both = probability + weighed.pooled.get((other, mode), 0.0)
@@ -182,8 +189,8 @@ def _sentences(
     side, row = stated
     share = dict(ranked)[row]
     lines = [
-        f"Over {seconds:.3f} s {names[0]} and {names[1]} look as on machines with “{_words(row)}”: by what those showed, it is this "
-        f"with {100 * share:.0f} %."
+        f"Over {seconds:.3f} s {names[0]} and {names[1]} fit “{_words(row)}”: on simulated machines with such signals it was this "
+        f"in {100 * share:.0f} of 100 cases."
     ]
     ahead = run.ahead(m)
     if ahead > 0:

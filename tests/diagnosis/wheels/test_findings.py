@@ -52,6 +52,7 @@ def found(*segments: Weighed, y: Array | None = None, healthy: dict[Side, Array]
         healthy=sure | (healthy or {}),
         raised=np.zeros(BLOCKS, np.bool_),
         fault=np.zeros(BLOCKS),
+        others=3,
     )
     return findings_of(path, Limits())
 

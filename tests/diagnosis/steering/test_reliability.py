@@ -1,0 +1,71 @@
+"""How probable a finding on an axle may be: its length, its company, and what becomes of the others."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from diagnosis.results.assessment import Finding
+from diagnosis.results.result import Hypothesis
+from diagnosis.results.vocabulary import Tier
+from diagnosis.steering.findings import SideFindings
+from diagnosis.steering.reliability import features_of, weighed
+from replay.faults import FaultMode, Side
+
+DT, LENGTH = 0.01, 5
+
+
+def finding(start: float, stop: float, mode: FaultMode = FaultMode.STUCK, tier: Tier = Tier.MODEL) -> Finding:
+    hypotheses = (Hypothesis("actuator", mode.value, 0.98), Hypothesis("none", "healthy", 0.02))
+    return Finding(
+        start=round(start / DT),
+        stop=round(stop / DT),
+        side=Side.ACTUATOR,
+        mode=mode,
+        probability=0.98,
+        hypotheses=hypotheses,
+        epsilon=None,
+        sat=None,
+        evidence=("It is seen.",),
+        tier=tier,
+    )
+
+
+def valves(*findings: Finding, sensors: tuple[Finding, ...] = ()) -> SideFindings:
+    both = {Side.SENSOR: SideFindings(sensors, ()), Side.ACTUATOR: SideFindings(findings, ((0, 3),))}
+    return weighed(both, LENGTH, DT)[Side.ACTUATOR]
+
+
+def test_a_long_finding_alone_stays_nearly_certain() -> None:
+    (found,) = valves(finding(10.0, 18.0)).findings
+    assert 0.95 < found.probability <= 0.98
+    assert_allclose(sum(h.p for h in found.hypotheses), 1.0)
+
+
+def test_a_brief_one_stays_open() -> None:
+    found = valves(finding(10.0, 11.5))
+    assert found.findings == ()
+    assert found.unexplained == ((0, 3), (200, 230))
+
+
+def test_company_lowers_the_probability() -> None:
+    (alone,) = valves(finding(10.0, 16.0)).findings
+    first, _ = valves(finding(10.0, 16.0), finding(16.5, 30.0)).findings
+    (beside,) = valves(finding(10.0, 16.0), sensors=(finding(12.0, 18.0),)).findings
+    assert first.probability < alone.probability
+    assert beside.probability < alone.probability
+    assert first.evidence[-1].startswith("Findings of this length and company were right in")
+    assert {h.mode: h.p for h in first.hypotheses}["healthy"] == pytest.approx(1.0 - first.probability)
+
+
+def test_what_the_channel_itself_shows_is_left_alone() -> None:
+    (found,) = valves(finding(10.0, 10.5, tier=Tier.SIGNAL)).findings
+    assert found.probability == 0.98
+
+
+def test_features() -> None:
+    got = features_of((10.0, 20.0), FaultMode.NO_SIGNAL, [(20.5, 30.0)], [(18.5, 40.0)])
+    assert_allclose(got, [np.log(6.0), 1.0, 0.0, 1.0])
+    got = features_of((10.0, 12.0), FaultMode.STUCK, [(13.5, 30.0)], [(11.0, 40.0)])
+    assert_allclose(got, [np.log(2.0), 0.0, 1.0, 0.0])
