@@ -33,7 +33,7 @@ Array = NDArray[np.float64]
 
 _ODD_COST = 2.0  # by which an unusual load must explain more than the usual one
 _WEAK_GAIN = 0.35  # a sensor's gain below this hides what the valve does
-_LEAST_SIDE, _LEAST_ROW = 0.75, 0.55  # probabilities of a side and of its row from which on a finding is stated
+_LEAST_SIDE, _LEAST_ROW = 0.7, 0.5  # probabilities of a side and of its row from which on a finding is stated
 _LEAST_OTHERS = 2  # of two wheels that differ, either may be the one whose speed is wrong
 _LEAST_PART = 0.02  # a hypothesis below this is left out of the text
 _LEAST_HYPOTHESIS = 5e-4

@@ -25,7 +25,7 @@ MODEL_OF: dict[Row, int] = {
 }
 
 _AROUND_S = 0.4  # on either side, over which what is said of frames is averaged
-_SHARPER = 1.3  # what agreement over that time adds, by machines that were held out of the training
+_SHARPER = 1.0  # what agreement over that time adds: nothing, by machines that were held out of the training
 _FAULTY = 0.5
 _DOUBTED, _BRIDGED_S = 0.8, 3.0  # a shorter time in which a side is not healthier than this is no end of its fault
 _SHORT_S = 1.0  # a row that holds for less than this within a fault is that of its neighbour

@@ -240,21 +240,26 @@ def trained(frames: Frames, side: int, rounds: int) -> tuple[Any, Array]:
     return lightgbm.train(_SETTINGS, data, num_boost_round=rounds), prior / prior.sum()
 
 
-def flat(model: Any, prior: Array, x: NDArray[np.float32]) -> dict[str, NDArray[Any]]:
-    """Trees as arrays, see `diagnosis.wheels.forest.Forest`; x holds the frames that they were trained on."""
+def flat(model: Any, prior: Array, x: NDArray[np.float32], *, stated: bool) -> dict[str, NDArray[Any]]:
+    """Trees as arrays, see `diagnosis.wheels.forest.Forest`; x holds the frames that they were trained on.
+
+    What is `stated` is the probability among frames as they are, without the weights of training.
+    """
     nodes: list[list[float]] = []
     leaves: list[float] = []
 
-    def walk(node: dict[str, Any]) -> int:
+    def walk(node: dict[str, Any], more: float) -> int:
         if "split_feature" not in node:
-            leaves.append(node["leaf_value"])
+            leaves.append(node["leaf_value"] + more)
             return -len(leaves)
         k = len(nodes)
         nodes.append([node["split_feature"], node["threshold"], 0, 0])
-        nodes[k][2], nodes[k][3] = walk(node["left_child"]), walk(node["right_child"])
+        nodes[k][2], nodes[k][3] = walk(node["left_child"], more), walk(node["right_child"], more)
         return k
 
-    root = [walk(tree["tree_structure"]) for tree in model.dump_model()["tree_info"]]
+    trees = model.dump_model()["tree_info"]
+    first = -np.log(_WEIGHTS) if stated else np.zeros(len(_WEIGHTS))  # of the first tree of each class
+    root = [walk(tree["tree_structure"], first[k] if k < first.size else 0.0) for k, tree in enumerate(trees)]
     feature, threshold, left, right = np.array(nodes).T
     low, high = x.min(axis=0), x.max(axis=0)
     margin = 0.02 * (high - low) + 1e-6
@@ -320,7 +325,7 @@ def fit(folder: Path, look: str, rounds: Sequence[int]) -> None:
         mine = [f for f in files if side == 0 or f.stem.endswith("base")]  # else the valve's opening is measured
         frames = loaded((f for f in mine if f not in held), look)
         model, prior = trained(frames, side, rounds[side])
-        arrays = flat(model, prior, frames.x[frames.learned(side)])
+        arrays = flat(model, prior, frames.x[frames.learned(side)], stated=look == "second")
         data |= {f"{look}_{name}_{key}": value for key, value in arrays.items()}
         print(name, end=": ", flush=True)
         reliability(model, loaded((f for f in mine if f in held), look), side)

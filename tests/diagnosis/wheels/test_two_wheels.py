@@ -101,3 +101,12 @@ def test_a_fault_stays_with_its_wheel_and_time(side: Side, mode: FaultMode, *, p
         assert f.stop / RATE <= FAULT_S[1] + 3.0
     if side is Side.SENSOR and mode is not FaultMode.INEFFICIENT:
         assert [(f.side, f.mode) for f in found] == [(side, mode)]
+
+
+@PLACED
+@pytest.mark.parametrize("side", [Side.SENSOR, Side.ACTUATOR])
+def test_a_loss_may_be_of_either_side(side: Side, *, placed: bool) -> None:
+    """Two wheels that differ do not tell whose speed is wrong, so that no loss is stated of one side."""
+    got = judged(driven(3, fault=(side, FaultMode.INEFFICIENT)), placed=placed)
+    for s in ("sensor", "actuator"):
+        assert {f.side for f in got["A", s].findings if f.mode is FaultMode.INEFFICIENT} <= {Side.SENSOR_OR_ACTUATOR}
