@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from heapq import heapify, heappop, heappush
-from itertools import compress, pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,7 +26,8 @@ _AROUND_S = 0.4  # on either side, over which what is said of frames is averaged
 _SHARPER = 1.0  # what agreement over that time adds: nothing, by machines that were held out of the training
 _FAULTY = 0.5
 _DOUBTED, _BRIDGED_S = 0.8, 3.0  # a shorter time in which a side is not healthier than this is no end of its fault
-_SHORT_S = 1.0  # a row that holds for less than this within a fault is that of its neighbour
+_CHANGE = 4.0  # log-probability times seconds by which another row must be better to take over within a fault
+_LEAST = 1e-6  # probability below which differences say nothing
 _NEAR_S = 0.6  # within which an edge of the Kalman models' path is the segment's
 
 
@@ -122,16 +121,15 @@ def segments_of(track: Track, side: Side, n: int, runs: Runs, dt: float) -> list
     """
     p = track.probability[side]
     step = track.hop * dt
-    mode = np.where(_faulty(p[:, 0], round(_BRIDGED_S / step)), 1 + p[:, 1:].argmax(axis=1), 0)
-    cut = np.flatnonzero(np.r_[True, mode[1:] != mode[:-1]])
-    pieces = [[int(a), int(b), int(mode[a])] for a, b in zip(cut, np.r_[cut[1:], mode.size], strict=True)]
+    faulty = _faulty(p[:, 0], round(_BRIDGED_S / step))
+    cut = np.flatnonzero(np.diff(np.r_[False, faulty, False].astype(np.int8)))
     out = []
-    for a, b, k in _joined(pieces, round(_SHORT_S / step)):
-        start, stop = _edges(
-            a * track.hop, min(n, b * track.hop) if b < mode.size else n, side, runs, round(_NEAR_S / dt)
-        )
-        if stop > start:
-            out.append(Segment(start, stop, side, MODES[k - 1], _pooled(track, side, slice(a, b))))
+    for first, last in zip(cut[::2].tolist(), cut[1::2].tolist(), strict=True):
+        for a, b, k in _rows_between(p, first, last, step):
+            stop = min(n, b * track.hop) if b < faulty.size else n
+            start, stop = _edges(a * track.hop, stop, side, runs, round(_NEAR_S / dt))
+            if stop > start:
+                out.append(Segment(start, stop, side, MODES[k], _pooled(track, side, slice(a, b))))
     return out
 
 
@@ -145,42 +143,27 @@ def _faulty(healthy: Array, bridged: int) -> NDArray[np.bool_]:
     return out
 
 
-def _joined(pieces: list[list[int]], short: int) -> list[list[int]]:
-    """Faulty pieces; one of less than `short` frames goes to the longest faulty neighbour, shortest first.
+def _rows_between(p: Array, first: int, last: int, step: float) -> list[tuple[int, int, int]]:
+    """Pieces [start, stop) of the faulty frames [first, last), and which of `MODES` each is in: the most probable path.
 
-    Neighbours follow each other without a pause; those of one row are one piece. What is joined stands in the place of its
-    first part and is looked at again with its neighbours, so that n pieces take about n·log n steps.
+    A row that takes over within a fault must be more probable by `_CHANGE`.
     """
-    out = [list(p) for p in pieces if p[2] != 0]
-    follows = [False, *(a[1] == b[0] for a, b in pairwise(out)), False]
-    before = [k - 1 if follows[k] else None for k in range(len(out))]
-    behind = [k + 1 if follows[k + 1] else None for k in range(len(out))]
-    kept = [True] * len(out)
-    queue = [(_length(p), k) for k, p in enumerate(out)]
-    heapify(queue)
-    while queue:
-        length, k = heappop(queue)
-        if not kept[k] or length != _length(out[k]):
-            continue  # joined since
-        near = [j for j in (before[k], behind[k]) if j is not None]
-        same = [j for j in near if out[j][2] == out[k][2]]
-        if not same and (not near or length >= short):
-            continue
-        j = max(same or near, key=lambda j: _length(out[j]))
-        first, last = min(j, k), max(j, k)
-        out[first], kept[last] = [out[first][0], out[last][1], out[j][2]], False
-        behind[first] = after = behind[last]
-        if after is not None:
-            before[after] = first
-        for place in (before[first], first, after):
-            if place is not None:
-                heappush(queue, (_length(out[place]), place))
-    return list(compress(out, kept))
-
-
-def _length(piece: list[int]) -> int:
-    """Frames of a piece."""
-    return piece[1] - piece[0]
+    gain = step * np.log(np.maximum(p[first:last, 1:], _LEAST))
+    score, back = gain[0].copy(), np.zeros(gain.shape, np.int8)
+    stay = np.arange(score.size)
+    for k in range(1, len(gain)):
+        best = int(score.argmax())
+        entered = score[best] - _CHANGE
+        back[k] = np.where(entered > score, best, stay)
+        score = np.maximum(score, entered) + gain[k]
+    row = np.empty(len(gain), np.int64)
+    row[-1] = score.argmax()
+    for k in range(len(gain) - 1, 0, -1):
+        row[k - 1] = back[k, row[k]]
+    cut = np.flatnonzero(np.r_[True, row[1:] != row[:-1]])
+    return [
+        (first + a, first + b, int(row[a])) for a, b in zip(cut.tolist(), [*cut[1:].tolist(), row.size], strict=True)
+    ]
 
 
 def _edges(start: int, stop: int, side: Side, runs: Runs, near: int) -> tuple[int, int]:

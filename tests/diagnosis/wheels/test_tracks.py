@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise, product
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -57,32 +59,21 @@ def test_rows_that_follow_each_other_are_two_faults() -> None:
     ]
 
 
-PIECES = st.lists(st.tuples(st.integers(1, 6), st.integers(0, 3)), max_size=25)
+@given(st.integers(0, 10_000), st.integers(1, 5))
+def test_rows_within_a_fault_are_the_best_of_all_paths(seed: int, frames: int) -> None:
+    p = np.random.default_rng(seed).dirichlet(np.full(5, 0.3), frames + 2)
+    step = 1.5
+    gain = step * np.log(np.maximum(p[1:-1, 1:], 1e-6))
 
+    def worth(path: tuple[int, ...]) -> float:
+        changes = sum(a != b for a, b in pairwise(path))
+        return float(sum(gain[k, row] for k, row in enumerate(path)) - tracks._CHANGE * changes)
 
-@given(PIECES, st.integers(0, 7))
-def test_pieces_are_joined_as_one_by_one(lengths: list[tuple[int, int]], short: int) -> None:
-    at, pieces = 0, []
-    for length, k in lengths:
-        pieces.append([at, at + length, k])
-        at += length
-    assert tracks._joined(pieces, short) == joined_one_by_one(pieces, short)
-
-
-def joined_one_by_one(pieces: list[list[int]], short: int) -> list[list[int]]:
-    """The same, from the start again after every piece that is joined."""
-    out = [p for p in pieces if p[2] != 0]
-    while True:
-        for k in sorted(range(len(out)), key=lambda k: out[k][1] - out[k][0]):
-            near = [j for j in (k - 1, k + 1) if 0 <= j < len(out) and out[min(j, k)][1] == out[max(j, k)][0]]
-            same = [j for j in near if out[j][2] == out[k][2]]
-            if same or (near and out[k][1] - out[k][0] < short):
-                j = max(same or near, key=lambda j: out[j][1] - out[j][0])
-                first, last = min(j, k), max(j, k)
-                out[first : last + 1] = [[out[first][0], out[last][1], out[j][2]]]
-                break
-        else:
-            return out
+    pieces = tracks._rows_between(p, 1, 1 + frames, step)
+    assert [a for a, _, _ in pieces] == [1, *(b for _, b, _ in pieces[:-1])]
+    assert pieces[-1][1] == 1 + frames
+    got = tuple(row for a, b, row in pieces for _ in range(b - a))
+    assert worth(got) == pytest.approx(max(map(worth, product(range(4), repeat=frames))))
 
 
 @pytest.mark.parametrize(("edges", "want"), [([], 50), ([44, 57], 44), ([43, 57], 50), ([45, 55], 45)])
