@@ -22,7 +22,7 @@ _REASONS = {
 }
 _NO_COMMAND = "no valve command to compare with"
 _UNCERTAIN = "the wheel model is too uncertain in this mission"
-_UNEXPLAINED = "what it shows is probable of a healthy part and of a faulty one"
+_UNEXPLAINED = "its signals fit a healthy part and a faulty one alike"
 
 
 @dataclass(frozen=True)

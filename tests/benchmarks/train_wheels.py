@@ -43,7 +43,7 @@ from replay.faults import FaultSpec, Side, drawn_modes
 from replay.machine.config import Limits, haulotte
 from replay.mission import Mission
 from replay.signals.timeline import align
-from replay.simulation.options import SimulationOptions
+from replay.simulation.options import SIMULATED_LAWS, SimulationOptions
 from replay.simulation.run import simulate_mission
 from replay.simulation.schedule import draw_fault
 from replay.truth import MissionTruth
@@ -57,6 +57,7 @@ _EVERY = 2  # of the frames: neighbours hardly differ
 _EDGE_S = 0.15  # around an edge of a fault nothing is learned
 _OWN_SCHEDULE, _VALVES, _BOTH, _RAMPS = 0.65, 0.75, 1 / 7, 0.2
 _WITHOUT_REFERENCE, _WITHOUT_GEOMETRY = 0.12, 0.12
+_OTHER_LAW = 0.5
 _WEIGHTS = np.array([0.5, 1.0, 1.0, 1.0, 1.0])  # of frames, by class: healthy ones are many
 _MEASURED = 539  # column that tells whether the valve's opening is measured
 _SETTINGS: dict[str, Any] = {
@@ -115,6 +116,8 @@ def mission_options(kind: str, seed: int, *, healthy: bool) -> SimulationOptions
         options = varied_options(seed, kind="tuning", scenario="healthy" if healthy else None, duration_s=duration)
     else:
         options = options_of(Task(kind, seed, duration, ("base",), False), scenario, int(healthy))
+    if seed >= SECOND_FROM and kind != "vary" and rng.random() < _OTHER_LAW:
+        options = replace(options, law=str(rng.choice(SIMULATED_LAWS)))  # type: ignore[arg-type]
     if healthy or rng.random() >= _OWN_SCHEDULE:
         return options
     return replace(options, scenario="random", faults=faults_for(seed, duration))
