@@ -10,7 +10,7 @@ from diagnosis.results.vocabulary import Tier
 from diagnosis.wheels.assess import assess_wheels
 from diagnosis.wheels.body import measured_body
 from diagnosis.wheels.inputs import wheels_data
-from diagnosis.wheels.motion import slip_of
+from diagnosis.wheels.motion import MOST_AGAINST, against_command, slip_of
 from diagnosis.wheels.wheel_channels import WheelChannels, wheel_channels
 from diagnosis.wheels.wheel_fit import wheel_fit
 from replay.progress import Progress, Stage
@@ -46,7 +46,13 @@ class WheelEvidence:
                 parts[wheel, SENSOR] = sensor
             if wheel in mission.wheels and not channels.has_applied[i]:
                 parts[wheel, ACTUATOR] = actuator
-        said = () if body is None else body.body.notes
+        said = [] if body is None else list(body.body.notes)
+        against = against_command(channels.speed, replay.v_ref)
+        if against > MOST_AGAINST:
+            said.append(
+                f"The wheels turned against their commanded speeds for {100 * against:.0f} % of the driving: the controller does not "
+                "follow them, and they were left out."
+            )
         return Contribution({part: replace(a, notes=(*a.notes, *said)) for part, a in parts.items()}, model=fit)
 
 

@@ -16,7 +16,7 @@ from diagnosis.estimation.lag import low_passed_on
 from diagnosis.results.wheel_model import WheelModelFit
 from diagnosis.wheels.body import MeasuredBody
 from diagnosis.wheels.identification import demand
-from diagnosis.wheels.motion import in_motion
+from diagnosis.wheels.motion import MOST_AGAINST, against_command, in_motion
 from diagnosis.wheels.readings import SpeedNoise, habits_of, news, speed_noises
 from diagnosis.wheels.valve_map import effective
 from diagnosis.wheels.wheel_channels import WheelChannels
@@ -158,10 +158,7 @@ def wheels_data(
     return WheelsData(
         y=y,
         u=u,
-        # a controller follows its own sensor: beside the second one the command says nothing of the wheel
-        reference=timeline.map(lambda r: np.asarray(np.where(channels.has_true, np.nan, r)), replay.v_ref)
-        if channels.has_true.any()
-        else replay.v_ref,
+        reference=_reference(timeline, replay.v_ref, channels),
         residual=residual,
         status=status,
         quiet=quiet,
@@ -208,6 +205,18 @@ def _apart(
     start: tuple[float | None, float | None] = (None, None)
     (residual, quiet), _ = timeline.scan(apart, start, y, u, v_ref)
     return residual, quiet
+
+
+def _reference(timeline: Timeline, v_ref: Array, channels: WheelChannels) -> Array:
+    """Commanded speeds that say something of the wheels, shape (n, wheels); NaN elsewhere.
+
+    Beside a second speed sensor the command says nothing, for the controller follows its own; nor does it where no wheel
+    follows it.
+    """
+    ignored = against_command(channels.speed, v_ref) > MOST_AGAINST
+    if not (channels.has_true.any() or ignored):
+        return v_ref
+    return timeline.map(lambda r: np.asarray(np.where(channels.has_true | ignored, np.nan, r)), v_ref)
 
 
 def _starved(fit: WheelModelFit, u: Array, flow: float | None, timeline: Timeline) -> NDArray[np.bool_]:

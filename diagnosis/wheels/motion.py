@@ -13,7 +13,11 @@ from replay.signals.timeline import Timeline
 
 Array = NDArray[np.float64]
 
+#: Share of the driving time against the commands beyond which these say nothing of the wheels.
+MOST_AGAINST = 0.12
 _STEER_HZ = 3.0
+_MOVES = 0.1  # of the usual speed, from which a wheel's direction is clear
+_MOST_ROWS = 20_000
 
 
 def body_speeds(y: Array, ratio: Array, turn: Array) -> Array:
@@ -27,6 +31,29 @@ def body_speeds(y: Array, ratio: Array, turn: Array) -> Array:
         if others.shape[1] and known.any():
             out[known, i] = np.median(others[known], axis=1) * ratio[known, i] - turn[known, i]
     return out
+
+
+def against_command(y: Array, reference: Array) -> float:
+    """Share of its driving time in which a wheel turns against its command: the median of the wheels [1].
+
+    A controller that follows its commands is there for moments after they change sign, and a sensor that is wrong is one of
+    several. A law that is unstable in reverse, as the printed one, drives all wheels away from their commands.
+
+    Parameters
+    ----------
+    y, reference : Array, shape (n, wheels)
+        Measured and commanded speed [m/s]; NaN where unknown.
+    """
+    step = max(1, len(y) // _MOST_ROWS)
+    v, r = np.nan_to_num(y[::step]), np.nan_to_num(reference[::step])
+    commanded = np.abs(r[r != 0.0])
+    if not commanded.size:
+        return 0.0
+    least = _MOVES * float(np.quantile(commanded, 0.9))
+    driving = (np.abs(v) > least) & (np.abs(r) > least)
+    against = (driving & (v * r < 0.0)).sum(axis=0)
+    seen = driving.sum(axis=0)
+    return float(np.median(against[seen > 0] / seen[seen > 0])) if seen.any() else 0.0
 
 
 def slip_of(
