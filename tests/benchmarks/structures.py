@@ -40,13 +40,14 @@ FIRST = {"tuning": 0, "reporting": 2000}
 
 @dataclass(frozen=True)
 class Task:
-    """One machine: its structure, seed, length of its missions, and how it is diagnosed."""
+    """One machine: its structure, seed, length of its missions, how it is diagnosed, and whether it has healthy missions alone."""
 
     structure: str
     seed: int
     duration: float
     evidence: tuple[str, ...]
     fit: bool
+    healthy: bool = False
 
 
 @dataclass(frozen=True)
@@ -89,7 +90,8 @@ def machine_for(task: Task, evidence: str) -> Machine:
 def judge(task: Task) -> list[Outcome | str]:
     """Outcomes of the machine's missions."""
     out: list[Outcome | str] = []
-    missions = [(s, simulate_mission(options_of(task, s, k))) for k, s in enumerate(("random", "healthy"))]
+    scenarios = [(k, s) for k, s in enumerate(("random", "healthy")) if s == "healthy" or not task.healthy]
+    missions = [(s, simulate_mission(options_of(task, s, k))) for k, s in scenarios]
     for evidence in task.evidence:
         try:
             machine = machine_for(task, evidence)
@@ -167,12 +169,13 @@ def main() -> None:
     parser.add_argument("--evidence", nargs="+", choices=EVIDENCE, default=list(EVIDENCE))
     parser.add_argument("--structure", nargs="+", choices=STRUCTURE_NAMES, default=None)
     parser.add_argument("--fit", action="store_true", help="fit a machine file from three healthy missions")
+    parser.add_argument("--healthy", action="store_true", help="healthy missions alone, for false alarms")
     parser.add_argument("--jobs", type=int, default=1)
     choice = parser.parse_args()
     names = choice.structure or [n for n, s in STRUCTURES.items() if s.kind == choice.seeds]
     first = FIRST[choice.seeds] + choice.first
     tasks = [
-        Task(name, seed, choice.duration, tuple(choice.evidence), choice.fit)
+        Task(name, seed, choice.duration, tuple(choice.evidence), choice.fit, choice.healthy)
         for name in names
         for seed in range(first, first + choice.count)
     ]
