@@ -9,7 +9,7 @@ const Export = (() => {
     a.href = url;
     a.download = safe(name);
     a.click();
-    setTimeout(() => URL.revokeObjectURL(url), 1000);
+    setTimeout(() => URL.revokeObjectURL(url), 60_000); // a browser on a busy machine fetches it late
   }
 
   async function image(figure, name, form) {

@@ -141,7 +141,7 @@
 
   const actions = {
     zoom: (b) => zoom(b.dataset.zoom),
-    csv: ({ dataset: { of } }) => figures[of].drawn && figures[of].csv().then((text) => Export.save(`${fileName(of)}.csv`, "text/csv", text)),
+    csv: ({ dataset: { of } }) => figures[of].rows.length && figures[of].csv().then((text) => Export.save(`${fileName(of)}.csv`, "text/csv", text)),
     image: ({ dataset: { of, form } }) => figures[of].drawn && Export.image(figures[of], fileName(of), form),
     json: () => Export.json(current),
     table: () => Export.table(),
