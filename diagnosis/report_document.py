@@ -9,10 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from diagnosis.assess import ComponentResult
+from diagnosis.clearing.checks import checks_of
 from diagnosis.decision import metrics, quality
 from diagnosis.decision.caveats import more_caveats
 from diagnosis.decision.decide import Decision, decide
 from diagnosis.decision.intervals import intervals_of, spans_of
+from diagnosis.results.clearing import Checked, clearing_rows
 from diagnosis.results.document import SCHEMA, CoverageRow, FileRow, LogRow, MachineRow, ReportDocument, WheelPlace
 from diagnosis.results.loss import loss_rows
 from diagnosis.results.result import FaultInterval, to_json
@@ -23,6 +25,8 @@ from replay.mission import Mission, MissionFile
 from replay.readers.machine_identity import stated_machine
 from replay.signals.timeline import Timeline
 from replay.version import __version__
+
+_CUT_S = 0.5  # of a log, not judged
 
 
 @dataclass(frozen=True)
@@ -57,6 +61,11 @@ class Judged:
             self.found.assessments, self.machine.axles, line.start_ns, line.step_ns, self.machine.limits
         )
 
+    @cached_property
+    def checks(self) -> tuple[Checked, ...]:
+        """What stands behind an all-clear."""
+        return checks_of(self.mission.timeline, self.replay, self.machine, self.intervals)
+
     @property
     def damage(self) -> list[str]:
         """What the files lost."""
@@ -88,6 +97,7 @@ def report_of_mission(judged: Judged, identity: MachineRow) -> ReportDocument:
         "states": to_json(spans_of(found.assessments, timeline.step_ns)),
         "phases": metrics.phases(timeline, replay, machine),
         "coverage": coverage,
+        "clearing": clearing_rows(judged.checks),
         "loss": loss_rows({key: a.loss for key, a in found.assessments.items()}),
         "metrics": metrics.loop_metrics(timeline, replay, machine, moving),
         "signals": list(judged.recorded.rows),
@@ -118,7 +128,26 @@ def _decision(judged: Judged, coverage: list[CoverageRow], decided_s: dict[tuple
         judged.damage,
         driving_s={(row["component"], row["side"]): row["driving_s"] for row in coverage},
         model=judged.found.wheel_model,
+        checks=judged.checks,
+        scope=_scope(judged),
     )
+
+
+def _scope(judged: Judged) -> tuple[str, ...]:
+    """Why the mission that was judged is not the whole one."""
+    out, line, machine = [], judged.mission.timeline, judged.machine
+    left_out = [w for w in machine.wheels if not any(component == w for component, _ in judged.found.assessments)]
+    if left_out:
+        out.append(
+            f"the wheel{'s' if len(left_out) > 1 else ''} {', '.join(left_out)} {'were' if len(left_out) > 1 else 'was'} not judged"
+        )
+    cut = (line.start_ns - judged.recorded.first_ns) * 1e-9
+    rest = (judged.recorded.last_ns - line.start_ns) * 1e-9 - line.size * line.dt
+    if max(cut, rest) > _CUT_S:
+        out.append(
+            f"only {line.size * line.dt:.1f} s of {(judged.recorded.last_ns - judged.recorded.first_ns) * 1e-9:.1f} s of the log were judged"
+        )
+    return tuple(out)
 
 
 def _log(mission: Mission, moving: NDArray[np.bool_], machine: Machine) -> LogRow:

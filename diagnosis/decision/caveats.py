@@ -10,6 +10,7 @@ import numpy as np
 from diagnosis.decision.wording import count_words, join_words, unanswered
 from diagnosis.results.assessed import needed_s
 from diagnosis.results.assessment import STATES, Assessment
+from diagnosis.results.clearing import Checked
 from diagnosis.results.result import FaultInterval
 from diagnosis.results.vocabulary import Kind, Tier, part_words
 from replay.faults import DECIDED, State
@@ -39,12 +40,18 @@ class Reservations:
         Whether the wheel model comes from this mission alone and from too few wheels to be compared.
     damage : tuple[str, ...]
         What the log lost.
+    open : tuple[Checked, ...]
+        Checks that do not clear their part.
+    scope : tuple[str, ...]
+        Why what was judged is not the whole mission.
     """
 
     short: tuple[Part, ...] = ()
     unexplained: tuple[Part, ...] = ()
     not_compared: bool = False
     damage: tuple[str, ...] = ()
+    open: tuple[Checked, ...] = ()
+    scope: tuple[str, ...] = ()
 
 
 def doubt_of(watch: Sequence[FaultInterval], against: Reservations) -> str:
@@ -59,7 +66,21 @@ def doubt_of(watch: Sequence[FaultInterval], against: Reservations) -> str:
         out.append("a residual is not explained by any fault")
     if against.not_compared:
         out.append("a loss that lasts the whole mission would not show")
+    out += against.scope
+    if against.open:
+        out.append(open_words(against.open))
     return join_words(out)
+
+
+def open_words(checks: Sequence[Checked]) -> str:
+    """Why checks clear nothing, by the one that is furthest beyond its limit and the number of others."""
+    most = max(checks, key=lambda c: np.inf if c.worst is None else c.worst / c.limit)
+    others = len({(c.component, c.check) for c in checks}) - 1
+    return most.text + (
+        f", and {count_words(others, 'more check')} of the all-clear {'is' if others == 1 else 'are'} open"
+        if others
+        else ""
+    )
 
 
 def caveats_of(

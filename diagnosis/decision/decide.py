@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from diagnosis.decision.caveats import Reservations, caveats_of, doubt_of
+from diagnosis.decision.caveats import Reservations, caveats_of, doubt_of, open_words
 from diagnosis.decision.wording import actions_of, count_words, join_words, seconds_words, sentence_of
 from diagnosis.results.assessed import needed_s
 from diagnosis.results.assessment import Assessment
+from diagnosis.results.clearing import Checked
 from diagnosis.results.document import ActionRow, VerdictRow
 from diagnosis.results.result import FaultInterval
 from diagnosis.results.vocabulary import Kind, Severity, Tier, Verdict, part_words
@@ -74,6 +75,8 @@ def decide(
     *,
     driving_s: Mapping[Part, float] | None = None,
     model: WheelModelFit | None = None,
+    checks: Sequence[Checked] = (),
+    scope: Sequence[str] = (),
 ) -> Decision:
     """Give the verdict.
 
@@ -101,9 +104,14 @@ def decide(
         Seconds of driving of the component; None: only `min_assessed` counts.
     model : WheelModelFit or None
         Wheel models behind the judgement, where any.
+    checks : Sequence[Checked]
+        What is asked once more before a machine is cleared.
+    scope : Sequence[str]
+        Why what was judged is not the whole mission.
     """
     driven = driving_s or {}
     against = _reservations(assessments, decided_s, driven, axles, limits, damage, model)
+    against = replace(against, open=tuple(c for c in checks if not c.passed), scope=tuple(scope))
     found = _with_faults(intervals, against) or _without_faults(assessments, decided_s, axles, against)
     caveats = caveats_of(against, assessments, decided_s, driven, axles, limits)
     if _modelled(assessments) and model is not None and model.identified:
@@ -178,6 +186,12 @@ def _without_faults(
             "lasts the whole mission. Give K and tau of the wheels in [plant] of a machine file."
         )
         return Decision(Verdict.NOT_ASSESSED, "No fault found, not fully assessed", text)
+    if against.scope:
+        text = f"No fault was found, but {join_words(list(against.scope))}."
+        return Decision(Verdict.NOT_ASSESSED, "No fault found, not the whole mission", text)
+    if against.open:
+        text = f"No fault was identified, but this mission does not exclude one: {open_words(against.open)}."
+        return Decision(Verdict.NOT_ASSESSED, "No fault found, not cleared", text)
     if against.damage:
         text = "Parts of the log are lost: " + against.damage[0]
         return Decision(Verdict.WATCH, "No fault found in a damaged log", text, not_cleared=doubt_of((), against))

@@ -35,17 +35,21 @@ class Recorded:
         99 % quantile of the distance of wheel stamps from their period [ms].
     first_ns : int
         First stamp of a wheel signal; 0 where there is none.
+    last_ns : int
+        Last one.
     """
 
     rows: Sequence[SignalRow]
     jitter_ms: float
     first_ns: int
+    last_ns: int = 0
 
 
 def recorded(signals: Signals, timeline: Timeline) -> Recorded:
     """Look through the samples of all signals."""
     first = min((int(s.stamps[0]) for n, s in signals.items.items() if n.startswith("wheel.")), default=0)
-    return Recorded(signal_rows(signals, timeline), _jitter_ms(signals, timeline), first)
+    last = max((int(s.stamps[-1]) for n, s in signals.items.items() if n.startswith("wheel.")), default=0)
+    return Recorded(signal_rows(signals, timeline), _jitter_ms(signals, timeline), first, last)
 
 
 def signal_rows(signals: Signals, timeline: Timeline) -> list[SignalRow]:

@@ -10,7 +10,7 @@ from diagnosis.channels.habit import Habit, identify_habit, of_kind
 from diagnosis.direct.assess import assess_identified
 from diagnosis.direct.identification import IdentifiedPair, identify
 from diagnosis.direct.inputs import Pair, make_pair
-from diagnosis.direct.relation import relations_of_kind
+from diagnosis.direct.relation import relations_of_kind, valves_of_kind
 from diagnosis.direct.uncertainty import usual_of_kind
 from diagnosis.estimation.lag import low_passed
 from diagnosis.evidence import ACTUATOR, SENSOR, Array, Contribution, Flags, MissionView, Part
@@ -62,7 +62,7 @@ def _identified(pairs: dict[Part, Pair], limits: Limits, mission: MissionView) -
         kind = {part: one for part, one in found.items() if part[1] == side}
         usual = usual_of_kind([one.own for one in kind.values()])
         own = [one.relation for one in kind.values()]
-        alike = relations_of_kind(own, mission.timeline.dt) if side == SENSOR else own
+        alike = relations_of_kind(own, mission.timeline.dt) if side == SENSOR else valves_of_kind(own)
         for (part, one), relation in zip(kind.items(), alike, strict=True):
             exceeds = usual is not None and one.own.exceeds(usual)
             if exceeds or relation != one.relation:

@@ -28,6 +28,7 @@ _BETTER = 0.03  # of the loss, by which a lag or play is believed
 _ROUNDS, _FINE = 5, (0.8, 0.9, 0.95, 1.05, 1.1, 1.25)
 _USUAL, _LARGE = 0.35, 3.0
 _SIBLINGS, _ALIKE, _SCALES = 3, 0.6, 0.01  # channels of one kind; steps, and share, by which they may differ
+_UNLIKE = 1.6  # times the usual play or lag of valves of one kind
 _LARGEST_SCALE = 0.02  # what differs by more is a loss of effectiveness
 
 
@@ -78,6 +79,17 @@ def relations_of_kind(found: Sequence[Relation], dt: float) -> list[Relation]:
     typical, usual = found[int(np.argmin(apart))], float(np.median(gain))
     timed = [typical._replace(gain=r.gain) if agree and d > _ALIKE else r for r, d in zip(found, apart, strict=True)]
     return [r if abs(r.gain - usual) <= _SCALES else r._replace(gain=usual) for r in timed]
+
+
+def valves_of_kind(found: Sequence[Relation]) -> list[Relation]:
+    """Relations of three or more valves of one kind: play and lag that no other has are a fault's, and become the usual ones."""
+    if len(found) < _SIBLINGS:
+        return list(found)
+    size = np.array([(r.play, r.lag) for r in found])
+    usual = np.quantile(size, 0.5, axis=0, method="lower")
+    typical = found[int(np.argmin(np.abs(size - usual) @ np.array([1.0, 0.5])))]
+    odd = (size > _UNLIKE * usual + np.array([_PLAYS[0], _LAGS_S[3]])).any(axis=1)
+    return [typical._replace(gain=r.gain) if strange else r for r, strange in zip(found, odd, strict=True)]
 
 
 def _followed(x: Array, play: float, lag: float, dt: float) -> Array:
@@ -145,7 +157,7 @@ def relation_of(
         if best is plain:
             break
     for _ in range(_ROUNDS if best.lag or best.play else 0):
-        found, misfit = _least(places, _near(best, delays), dt, scale)
+        found, misfit = _least(places, _near(best, delays, _PLAYS[-1] * span), dt, scale)
         if misfit >= least:
             break
         best, least = found, misfit
@@ -161,9 +173,10 @@ def _trials(near: Relation, delays: tuple[int, int], span: float, dt: float) -> 
                 yield near._replace(delay=float(delay), lag=lag, play=play * span)
 
 
-def _near(best: Relation, delays: tuple[int, int]) -> Iterable[Relation]:
-    yield from (best._replace(lag=best.lag * f) for f in _FINE if best.lag)
-    yield from (best._replace(play=best.play * f) for f in _FINE if best.play)
+def _near(best: Relation, delays: tuple[int, int], widest: float) -> Iterable[Relation]:
+    lags, plays = ((x * f for f in _FINE) for x in (best.lag, best.play))
+    yield from (best._replace(lag=lag) for lag in lags if 0.0 < lag <= _LAGS_S[-1])
+    yield from (best._replace(play=play) for play in plays if 0.0 < play <= widest)
     yield from (
         best._replace(delay=best.delay + d) for d in (-1.0, -0.3, 0.3, 1.0) if delays[0] <= best.delay + d <= delays[1]
     )

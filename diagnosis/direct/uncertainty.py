@@ -25,7 +25,12 @@ Array = NDArray[np.float64]
 _MEAN_HEALTHY_S = 60.0
 _SMOOTH_S, _MOTION_S = 0.02, 0.005
 _LEAST_CONSTANT = 0.02  # of the noise
-_MOST_MOTION = 1.0  # a mismatch beyond what the reference changes by within 5 ms is none of timing
+_MOST_MOTION = {
+    Side.SENSOR: 1.0,
+    Side.ACTUATOR: 6.0,
+}  # mismatch by timing: of what the reference changes by within 5 ms
+_MOST_SHARE = 0.1  # no healthy instrument's noise is more of its reading: what deviates by more is a fault's
+_MOST_SLOW = 0.03  # of the span: a mismatch that lasts is a fault's beyond this
 _SIBLINGS, _ALIKE, _SLACK = 3, 1.4, 0.01  # channels of one kind; how far one may be off the usual: times, and shares
 _REPEATS = 20  # news in a window of repeats
 _PLAY, _PLAY_S = (
@@ -121,6 +126,7 @@ def uncertainty_of(
     counted = habit.rounding(size) ** 2 * _COUNTED
     if usual is None:
         growth = _growth(residual[paired], size[paired], counted[paired], period)
+        growth = NoiseGrowth(growth.floor, min(growth.share, _MOST_SHARE))
     else:
         growth = NoiseGrowth(usual.floor, usual.share)
     relative = _relative_white(pair, growth, size, counted)
@@ -133,9 +139,8 @@ def uncertainty_of(
     if pair.side is Side.SENSOR:
         constant = max(lsb / math.sqrt(12), noise * min(1.0, max(_LEAST_CONSTANT, repeats)))
     moved = _moved(x, pair.dt)
-    most = _MOST_MOTION if pair.side is Side.SENSOR else math.inf  # a command may jump
-    motion = min(_motion_share(evened, moved, paired, pair.dt), most) if usual is None else usual.motion
-    mismatch = spread**2 + max(0.0, (_PLAY * relation.play) ** 2 - tolerance**2) + (motion * moved) ** 2
+    own = min(_motion_share(evened, moved, paired, pair.dt), _MOST_MOTION[pair.side]) if usual is None else usual.motion
+    mismatch = spread**2 + max(0.0, (_PLAY * relation.play) ** 2 - tolerance**2) + (own * moved) ** 2
     rows = len(codes_of(pair.side)) - 1  # every one of both sides is as probable as the others
     model = ModeModel(
         noise=noise,
@@ -154,7 +159,7 @@ def uncertainty_of(
         white=relative,
         passing=pair.store.keep(1.0 + np.nan_to_num(mismatch) / tolerance**2),
         constant=_constant(pair, relative, counted, noise, constant),
-        own=HealthyNoise(growth.floor, growth.share, motion),
+        own=HealthyNoise(growth.floor, growth.share, own),
     )
 
 
@@ -176,7 +181,8 @@ def _noise(
     pair: Pair, evened: Array, moving: NDArray[np.bool_], lsb: float, period: float, most: float | None
 ) -> float:
     """Noise of y − x at standstill from the news: white, or slower; no more than `most` where that is known."""
-    measured = max(np.nan_to_num(white_noise(evened, period)), np.nan_to_num(slow_mismatch(evened, moving, period)))
+    slow = min(float(np.nan_to_num(slow_mismatch(evened, moving, period))), _MOST_SLOW * pair.span)
+    measured = max(float(np.nan_to_num(white_noise(evened, period))), slow)
     if most is not None:
         measured = min(measured, most)
     return float(max(measured, pair.known_noise.std or 0.0, lsb / math.sqrt(12), 1e-5 * pair.span))

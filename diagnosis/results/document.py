@@ -196,6 +196,25 @@ class LossRow(TypedDict):
     relative: bool
 
 
+class ClearingRow(TypedDict):
+    """One check behind an all-clear: a fault of the size `LimitsRow.clear_at` would have been beyond the limit for three seconds.
+
+    `worst` is null where the mission does not show it; `start_s` and `stop_s` are null where it holds for the whole mission.
+    `text` says why the part is not cleared, and is empty where it is.
+    """
+
+    component: str
+    side: str
+    check: str
+    asked: str
+    worst: float | None
+    limit: float
+    start_s: Seconds | None
+    stop_s: Seconds | None
+    passed: bool
+    text: str
+
+
 class MeanRow(TypedDict):
     """Mean of the whole mission and of driving."""
 
@@ -269,6 +288,7 @@ class LimitsRow(TypedDict):
     min_sat: float
     min_assessed: float
     driving_speed: float
+    clear_at: float
 
 
 class ReportDocument(TypedDict):
@@ -288,6 +308,7 @@ class ReportDocument(TypedDict):
     phases: list[PhaseRow]
     coverage: list[CoverageRow]
     loss: list[LossRow]
+    clearing: list[ClearingRow]
     metrics: MetricsRow
     signals: list[SignalRow]
     missing: list[MissingRow]

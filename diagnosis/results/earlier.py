@@ -11,6 +11,7 @@ from typing import Any
 from diagnosis.results.assessed import needed_s
 from diagnosis.results.document import ReportDocument
 from diagnosis.results.vocabulary import Tier, Verdict
+from replay.machine.config import Limits
 
 #: JSON whose shape is not known yet.
 Json = Any
@@ -22,12 +23,13 @@ def completed(document: Row) -> Row:
 
     Whether the machine may go out is added by `with_leave`, which needs sound figures.
     """
-    out: Row = _with(document, loss=[])
+    out: Row = _with(document, loss=[], clearing=[])
     complete: dict[str, Callable[[Json], Json]] = {
         "log": _log,
         "verdict": lambda row: _with(row, cleared=False, not_cleared=""),
         "loss": lambda rows: _rows(rows, lambda row: _with(row, relative=False)),
         "coverage": lambda rows: _rows(rows, _coverage),
+        "limits": lambda row: _with(row, clear_at=Limits().clear_at),
         "intervals": lambda rows: _rows(rows, lambda row: _with(row, detected_s=None)),
     }
     return {key: complete[key](value) if key in complete else value for key, value in out.items()}

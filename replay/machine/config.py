@@ -112,6 +112,8 @@ class Limits:
         Decided driving time per wheel and side that ``ready`` needs [s].
     driving_speed : float
         |v_c,i| above which a wheel drives [m/s].
+    clear_at : float
+        Loss, or what deviates as much, that a mission must have shown to clear a machine [1].
     """
 
     brief: float = 1.0
@@ -120,6 +122,7 @@ class Limits:
     min_sat: float = 0.02
     min_assessed: float = 10.0
     driving_speed: float = 0.05
+    clear_at: float = 0.25
 
     def __post_init__(self) -> None:
         """Check values."""
@@ -129,6 +132,7 @@ class Limits:
         check_range("limits.min_sat", self.min_sat, 0.0, 1e6, "m/s, rad or fraction")
         check_range("limits.min_assessed", self.min_assessed, 0.0, 1e6, "s")
         check_range("limits.driving_speed", self.driving_speed, 0.0, 1e6, "m/s")
+        check_range("limits.clear_at", self.clear_at, 0.05, 0.9, "")
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from replay.errors import ConfigError, check_range
-from replay.faults import FaultSpec, Side
+from replay.faults import FaultMode, FaultSpec, Side
 from replay.machine.config import Machine, haulotte
 from replay.simulation.plant_options import PlantOptions
 from replay.simulation.structures import StructureOptions
@@ -158,7 +158,8 @@ class SimulationOptions:
                 f"fault of {fault.component}: begins at {fault.start_s:g} s, but the mission ends at {self.duration_s:g} s; "
                 "expected a start before that: give an earlier one, or a longer mission"
             )
-        check_range(f"fault of {fault.component}: epsilon", fault.epsilon, 0.0, 1.0, "")
+        least = -1.0 if fault.mode is FaultMode.OUTSIDE_TABLE else 0.0  # a channel that reads too much
+        check_range(f"fault of {fault.component}: epsilon", fault.epsilon, least, 1.0, "")
         check_range(f"fault of {fault.component}: sat_std", fault.sat_std, 0.0, 1e3, "")
         check_range(f"fault of {fault.component}: sat_tau_s", fault.sat_tau_s, 0.0, 1e6, "s")
         check_range(f"fault of {fault.component}: ramp_s", fault.ramp_s, 0.0, 1e6, "s")

@@ -1,0 +1,135 @@
+"""A mission in cells of a tenth of a second, and what moves in windows of three: enough to see what a fault leaves."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from replay.arrays.blocks import blocks, framed
+from replay.control.loop import Replay
+from replay.machine.config import Machine
+from replay.signals.timeline import Timeline
+
+Array = NDArray[np.float64]
+
+CELL_S = 0.1
+WINDOW_S = 3.0  # a fault of the size that counts, for this long, must show
+HOP_S = 0.5
+_MOSTLY = 0.3  # of the windows
+_LEAST_SHARE = 0.6  # of a window's cells that must be known
+
+
+@dataclass(frozen=True)
+class Cells:
+    """Channels of a mission by cells.
+
+    Attributes
+    ----------
+    timeline, replay, machine
+        The aligned mission, the replayed loop and the machine.
+    stated : Mapping[str, Sequence[tuple[float, float]]]
+        When a fault of a component is stated, by component [s].
+    """
+
+    timeline: Timeline
+    replay: Replay
+    machine: Machine
+    stated: Mapping[str, Sequence[tuple[float, float]]] = field(default_factory=dict)
+
+    @cached_property
+    def width(self) -> int:
+        """Samples in a cell."""
+        return max(1, round(CELL_S / self.timeline.dt))
+
+    @property
+    def dt(self) -> float:
+        """Length of a cell [s]."""
+        return self.width * self.timeline.dt
+
+    @property
+    def size(self) -> int:
+        """Number of cells."""
+        return -(-self.timeline.size // self.width)
+
+    @cached_property
+    def frame(self) -> Frame:
+        """Windows of `WINDOW_S`."""
+        return Frame(self.size, max(1, round(WINDOW_S / self.dt)), max(1, round(HOP_S / self.dt)))
+
+    def explained(self, component: str) -> NDArray[np.bool_]:
+        """Windows in which a fault of the component is stated anyhow, shape (windows,)."""
+        starts = self.frame.starts * self.dt
+        stops = starts + self.frame.length * self.dt
+        out = np.zeros(starts.size, dtype=np.bool_)
+        for a, b in self.stated.get(component, ()):
+            out |= (stops > a) & (starts < b)
+        return out
+
+    def mostly_explained(self, component: str) -> bool:
+        """Whether faults of the component are stated for so long that its usual behaviour is theirs."""
+        return bool(self.explained(component).mean() > _MOSTLY)
+
+    def means(self, name: str) -> Array:
+        """Mean of a signal in each cell; NaN where it has no value. Shape (cells,)."""
+        found = self.timeline.get(name)
+        return np.full(self.size, np.nan) if found is None else self.of(found)
+
+    def of(self, x: Array) -> Array:
+        """The same of any column of the timeline, shape (cells, …)."""
+        return np.concatenate([_means(x[part], self.width) for part in blocks(len(x), self.width)])
+
+    def wheels(self, leaf: str) -> Array:
+        """A signal of every wheel, shape (cells, wheels)."""
+        return np.column_stack([self.means(f"wheel.{w}.{leaf}") for w in self.machine.wheels])
+
+    def axles(self, leaf: str) -> Array:
+        """A signal of every steering axle, shape (cells, axles)."""
+        columns = [self.means(f"steer.{a}.{leaf}") for a in self.machine.axles]
+        return np.column_stack(columns) if columns else np.zeros((self.size, 0))
+
+
+def _means(x: Array, width: int) -> Array:
+    cut = framed(x, width)
+    known = np.isfinite(cut)
+    count = known.sum(axis=1)
+    return np.asarray(np.where(count > 0, np.where(known, cut, 0.0).sum(axis=1) / np.maximum(count, 1), np.nan))
+
+
+@dataclass(frozen=True)
+class Frame:
+    """Windows over cells: `length` cells each, one every `hop` cells.
+
+    Attributes
+    ----------
+    cells, length, hop : int
+        Cells of the mission, of a window, and from window to window.
+    """
+
+    cells: int
+    length: int
+    hop: int
+
+    @property
+    def starts(self) -> NDArray[np.intp]:
+        """First cell of each window; one window where the mission is shorter than it."""
+        return np.arange(0, max(self.cells - self.length, 0) + 1, self.hop)
+
+    def sums(self, x: Array) -> Array:
+        """Sum over each window of what is known, shape (windows, …)."""
+        total = np.concatenate([np.zeros((1, *x.shape[1:])), np.cumsum(np.nan_to_num(x), axis=0)])
+        stops = np.minimum(self.starts + self.length, self.cells)
+        return np.asarray(total[stops] - total[self.starts])
+
+    def mean(self, x: Array) -> Array:
+        """Mean over each window; NaN where less than most of it is known. Shape (windows, …)."""
+        count = self.sums(np.isfinite(x).astype(np.float64))
+        enough = count >= _LEAST_SHARE * min(self.length, self.cells)
+        return np.asarray(np.where(enough, self.sums(x) / np.maximum(count, 1), np.nan))
+
+    def rms(self, x: Array) -> Array:
+        """Root mean square over each window, as `mean`."""
+        return np.asarray(np.sqrt(self.mean(x**2)))

@@ -1,0 +1,38 @@
+"""All checks of a mission."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Sequence
+
+from diagnosis.clearing.axles import axle_checks
+from diagnosis.clearing.cells import Cells
+from diagnosis.clearing.wheels import wheel_checks
+from diagnosis.results.clearing import Checked
+from diagnosis.results.result import FaultInterval
+from diagnosis.results.vocabulary import Severity
+from replay.control.loop import Replay
+from replay.machine.config import Machine
+from replay.signals.timeline import Timeline
+
+
+def checks_of(
+    timeline: Timeline, replay: Replay, machine: Machine, faults: Sequence[FaultInterval] = ()
+) -> tuple[Checked, ...]:
+    """Whatever the log allows to ask of each part, whichever evidence judged it: more evidence never hides a fault.
+
+    Parameters
+    ----------
+    timeline, replay, machine
+        The aligned mission, the replayed loop and the machine.
+    faults : Sequence[FaultInterval]
+        What is stated: it need not be asked again whether something is wrong with such a part at that time.
+    """
+    stated: dict[str, list[tuple[float, float]]] = {}
+    for f in faults:
+        if f.severity is not Severity.INFO:
+            stated.setdefault(f.component, []).append((f.start_s, f.stop_s))
+    cells, clear_at = Cells(timeline, replay, machine, stated), machine.limits.clear_at
+    with warnings.catch_warnings():  # windows without any value
+        warnings.simplefilter("ignore", RuntimeWarning)
+        return (*wheel_checks(cells, clear_at), *axle_checks(cells, clear_at))

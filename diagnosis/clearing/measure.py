@@ -1,0 +1,91 @@
+"""What checks measure: how far a channel is off its reference, how late it is, and where a value is worst."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from diagnosis.clearing.cells import Array, Cells
+from diagnosis.results.clearing import Check, Checked
+from diagnosis.results.vocabulary import Kind
+from replay.faults import Side
+
+_EVEN_S = 0.2  # over which a channel and its reference are evened: two healthy instruments differ in lag
+_EARLIEST_S, _LATEST_S = 0.3, 1.0
+
+
+def lowest_passed(x: Array, dt: float, lag_s: float) -> Array:
+    """Columns behind a lag of first order, shape as x; gaps count as 0."""
+    from scipy.signal import lfilter
+
+    keep = np.exp(-dt / lag_s)
+    return np.asarray(lfilter([1.0 - keep], [1.0, -keep], np.nan_to_num(x), axis=0))
+
+
+def off_reference(cells: Cells, y: Array, x: Array, floor: float) -> Array:
+    """How far y is off x in each window, as a share of x, shape (windows,): by its gain, its mean, and what is left beside both.
+
+    Parameters
+    ----------
+    cells : Cells
+        The mission.
+    y, x : Array, shape (cells,)
+        Channel and reference.
+    floor : float
+        Windows in which x stays below this are left out unless y does not.
+    """
+    frame = cells.frame
+    known = np.isfinite(y) & np.isfinite(x)
+    a, b = (np.where(known, lowest_passed(z, cells.dt, _EVEN_S), np.nan) for z in (y, x))
+    size = np.maximum(frame.rms(b), floor)
+    moves = (frame.rms(b) > floor) | (frame.rms(a) > 2.0 * floor)
+    offset = np.abs(frame.mean(a - b)) / size
+    with np.errstate(divide="ignore", invalid="ignore"):
+        gain = np.abs(1.0 - frame.sums(np.where(known, a * b, 0.0)) / frame.sums(np.where(known, b * b, 0.0)))
+    scatter = np.sqrt(np.maximum(frame.mean((a - b) ** 2) - frame.mean(a - b) ** 2, 0.0)) / size
+    # what hysteresis and lag leave is no loss: it counts from half of the reference on
+    off = np.fmax(np.fmax(offset, np.where(frame.rms(b) > floor, gain, 0.0)), 0.5 * scatter)
+    return np.asarray(np.where(moves, off, np.nan))
+
+
+def late(speed: Array, reference: Array, dt: float) -> list[float | None]:
+    """By how much each wheel's speed is later, or earlier, than the other wheels', by its changes beside the command's [s].
+
+    None where a wheel's speed does not follow its command at any delay.
+    """
+    steps = np.arange(-round(_EARLIEST_S / dt), round(_LATEST_S / dt) + 1)
+    found: list[float | None] = []
+    for v, c in zip(speed.T, reference.T, strict=True):
+        changes, commanded = np.diff(v), np.diff(c)
+        alike = [_alike(changes, commanded, int(k)) for k in steps]
+        best = int(np.argmax(alike))
+        found.append(float(steps[best] * dt) if alike[best] > 0.3 else None)
+    known = [x for x in found if x is not None]
+    middle = float(np.median(known)) if known else 0.0
+    return [None if x is None else abs(x - middle) for x in found]
+
+
+def _alike(x: Array, y: Array, delay: int) -> float:
+    """Correlation of x with y delayed by some cells; 0 where nothing is known."""
+    if abs(delay) >= x.size:
+        return 0.0
+    a, b = (x[delay:], y[: y.size - delay]) if delay >= 0 else (x[:delay], y[-delay:])
+    known = np.isfinite(a) & np.isfinite(b)
+    a, b = a[known], b[known]
+    power = float(a @ a) * float(b @ b)
+    return float(a @ b) / power**0.5 if power > 0.0 else 0.0
+
+
+def worst(cells: Cells, part: tuple[Kind, str, Side, Check], values: Array, limit: float) -> Checked:
+    """The check of a part with its largest value among the windows; None where no window shows it."""
+    if not np.isfinite(values).any():
+        return Checked(*part, None, limit)
+    values = np.where(cells.explained(part[1]), 0.0, values)
+    k = int(np.nanargmax(values))
+    start = float(cells.frame.starts[k] * cells.dt)
+    stop = min(start + cells.frame.length * cells.dt, cells.timeline.size * cells.timeline.dt)
+    return Checked(*part, float(values[k]), limit, start, stop)
+
+
+def lasts(cells: Cells, part: tuple[Kind, str, Side, Check], value: float | None, limit: float) -> Checked:
+    """The check of a part over the whole mission; nothing new where its faults are stated for much of it."""
+    return Checked(*part, 0.0 if value is not None and cells.mostly_explained(part[1]) else value, limit)

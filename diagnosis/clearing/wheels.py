@@ -1,0 +1,133 @@
+"""Checks of wheels: second measurements, speed per opening and tracking beside the other wheels, quick changes, delay."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from diagnosis.clearing.cells import Array, Cells
+from diagnosis.clearing.measure import lasts, late, lowest_passed, off_reference, worst
+from diagnosis.results.clearing import Check, Checked
+from diagnosis.results.vocabulary import Kind
+from replay.faults import Side
+
+_LAG_S = 0.15  # of a valve and its drive
+_SETTLED_S, _SETTLED = 0.6, 0.03  # a command that has changed by less than this [m/s] over this time
+_MOVING = 0.08  # m/s, for a machine of .36 m/s
+_LEAST_CELLS = 0.5  # of a window
+_OTHERS = 2
+_FLOOR = 0.16  # of the top speed: a deviation is a share of at least this
+_OPEN = 0.03  # of full opening: likewise
+_ROUGH, _ROUGHER = 0.15, 5.0  # quick changes: share of the speed, times those of the other wheels
+_LATE_S = 0.2
+_TRACKING = 0.35
+#: Limits of speed per opening in windows and over the mission, as multiples of the loss that counts, by whether opening and speed
+#: are measured twice: what is judged by measurements need not be judged by its likeness to others once more.
+_RESPONSE = {
+    (False, False): (1.15, 1.0),
+    (True, False): (2.0, 1.2),
+    (False, True): (1.15, 1.0),
+    (True, True): (3.0, 2.0),
+}
+
+
+def wheel_checks(cells: Cells, clear_at: float) -> Iterator[Checked]:
+    """Checks of all wheels; `clear_at` is the loss that counts [1]."""
+    speed, command, opening, second = (cells.wheels(leaf) for leaf in ("v", "u", "u_applied", "v_true"))
+    reference = cells.of(cells.replay.v_ref)
+    twice = [(_known(opening[:, i]) and _known(command[:, i]), _known(second[:, i])) for i in range(speed.shape[1])]
+    used = np.where(np.isfinite(opening), opening, command)
+    windows, lasting = _responses(cells, speed, used, reference)
+    tracking, rough = _tracking(cells, speed, reference), _roughness(cells, speed)
+    delays = late(speed, reference, cells.dt)
+    either, share = Side.SENSOR_OR_ACTUATOR, -np.log1p(-clear_at)
+    top = cells.machine.max_speed
+    for i, wheel in enumerate(cells.machine.wheels):
+        about = (Kind.WHEEL, wheel)
+        if not _known(speed[:, i]):
+            continue
+        if twice[i][1]:
+            off = off_reference(cells, speed[:, i], second[:, i], _FLOOR * top)
+            yield worst(cells, (*about, Side.SENSOR, Check.SECOND_MEASUREMENT), off, clear_at)
+        if twice[i][0]:
+            off = off_reference(cells, opening[:, i], command[:, i], _OPEN)
+            yield worst(cells, (*about, Side.ACTUATOR, Check.SECOND_MEASUREMENT), off, clear_at)
+        brief, long = _RESPONSE[twice[i]]
+        if _known(used[:, i]) and speed.shape[1] > _OTHERS:
+            yield worst(cells, (*about, either, Check.RESPONSE), windows[:, i], brief * share)
+            yield lasts(cells, (*about, either, Check.LASTING_RESPONSE), lasting[i], long * share)
+        if _known(reference[:, i]):
+            yield worst(cells, (*about, either, Check.TRACKING), tracking[:, i], _TRACKING)
+            if delays[i] is not None:
+                yield lasts(cells, (*about, Side.SENSOR, Check.DELAY), delays[i], _LATE_S)
+        yield worst(cells, (*about, Side.SENSOR, Check.ROUGHNESS), rough[:, i], _ROUGH)
+
+
+def _known(x: Array) -> bool:
+    return bool(np.isfinite(x).any())
+
+
+def _others(x: Array) -> Array:
+    """Median of the other wheels at the same time, shape (windows, wheels)."""
+    columns = range(x.shape[1])
+    out = np.full(x.shape, np.nan)
+    for i in columns:
+        rest = x[:, [j for j in columns if j != i]]
+        enough = np.isfinite(rest).sum(axis=1) >= min(_OTHERS, rest.shape[1])
+        out[enough, i] = np.nanmedian(rest[enough], axis=1)
+    return out
+
+
+def _responses(cells: Cells, speed: Array, opening: Array, reference: Array) -> tuple[Array, list[float | None]]:
+    """|ln| of speed per opening over that of the other wheels: by windows against the wheel's usual one, and the usual one.
+
+    Only where a command (without one: the wheel) has settled; forward and reverse have usual ones of their own.
+    """
+    frame = cells.frame
+    scale = cells.machine.max_speed / 0.36
+    known = np.isfinite(reference)
+    motion = np.where(known, reference, speed)
+    back = max(1, round(_SETTLED_S / cells.dt))
+    before = np.concatenate([np.full((min(back, len(motion)), motion.shape[1]), np.nan), motion[:-back]])
+    with np.errstate(invalid="ignore"):
+        settled = (np.abs(motion) > _MOVING * scale) & (np.abs(motion - before) < _SETTLED * scale)
+    settled &= np.isfinite(speed) & np.isfinite(opening)
+    passed = lowest_passed(opening, cells.dt, _LAG_S)
+    moved, opened = (frame.sums(np.where(settled, np.abs(x), 0.0)) for x in (speed, passed))
+    enough = frame.sums(settled.astype(np.float64)) >= _LEAST_CELLS * min(frame.length, frame.cells)
+    ratio = np.where(enough, moved / np.maximum(opened, 1e-3 * frame.length), np.nan)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        log = np.log(np.maximum(ratio, 1e-3) / _others(ratio))
+    ahead = frame.mean(np.sign(np.nan_to_num(motion))) >= 0.0
+    off, lasting = np.full(log.shape, np.nan), []
+    for i in range(log.shape[1]):
+        usual = []
+        for way in (ahead[:, i], ~ahead[:, i]):
+            here = way & np.isfinite(log[:, i])
+            if here.any():
+                middle = float(np.median(log[here, i]))
+                off[here, i] = np.abs(log[here, i] - middle)
+                if np.count_nonzero(here) * frame.hop * cells.dt >= 3.0:
+                    usual.append(abs(middle))
+        lasting.append(max(usual) if usual else None)
+    return off, lasting
+
+
+def _tracking(cells: Cells, speed: Array, reference: Array) -> Array:
+    """Mean |v − v_c| by mean |v_c|, less that of the other wheels, shape (windows, wheels)."""
+    frame, floor = cells.frame, _FLOOR * cells.machine.max_speed
+    share = frame.mean(np.abs(speed - reference)) / np.maximum(frame.mean(np.abs(reference)), floor)
+    others = _others(share)
+    return np.asarray(share - np.where(np.isfinite(others), others, 0.0))
+
+
+def _roughness(cells: Cells, speed: Array) -> Array:
+    """Quick changes as a share of the speed, 0 unless they are much more than other wheels', shape (windows, wheels)."""
+    frame, floor = cells.frame, _FLOOR * cells.machine.max_speed
+    quick = np.full(speed.shape, np.nan)
+    quick[1:-1] = speed[1:-1] - (speed[:-2] + speed[1:-1] + speed[2:]) / 3.0
+    share = frame.rms(quick) / np.maximum(frame.rms(speed), floor)
+    others = _others(share)
+    usual = np.isfinite(others) & (share < _ROUGHER * np.maximum(others, 0.01))
+    return np.asarray(np.where(usual, 0.0, share))

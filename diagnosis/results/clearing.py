@@ -1,0 +1,131 @@
+"""What stands behind an all-clear: checks that a fault of the size that counts would not have passed."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+
+from diagnosis.results.document import ClearingRow
+from diagnosis.results.vocabulary import Kind, part_words
+from replay.faults import Side
+
+
+class Check(StrEnum):
+    """What is asked of a part; `CHECK_WORDS` has what a value beyond the limit means."""
+
+    SECOND_MEASUREMENT = "second_measurement"
+    RESPONSE = "response"
+    LASTING_RESPONSE = "lasting_response"
+    TRACKING = "tracking"
+    ROUGHNESS = "roughness"
+    DELAY = "delay"
+    STILL = "still"
+    RATE = "rate"
+    LASTING_RATE = "lasting_rate"
+
+
+#: What a check compares, and what is said where it is beyond its limit; ``{part}``, ``{value}`` and ``{limit}`` are filled in.
+CHECK_WORDS: dict[Check, tuple[str, str]] = {
+    Check.SECOND_MEASUREMENT: (
+        "against its second measurement",
+        "the {part} is off its second measurement by {value} % of what it should show",
+    ),
+    Check.RESPONSE: (
+        "speed per opening against the other wheels, by windows of 3 s",
+        "the speed of {part} per opening deviates from the other wheels' by {value} %",
+    ),
+    Check.LASTING_RESPONSE: (
+        "speed per opening against the other wheels, over the mission",
+        "the speed of {part} per opening is off the other wheels' by {value} % over the mission",
+    ),
+    Check.TRACKING: (
+        "error of tracking, less that of the other wheels",
+        "{part} is off its commanded speed by {value} % more than the other wheels are",
+    ),
+    Check.ROUGHNESS: ("quick changes of the speed", "the speed of {part} jumps by {value} % of itself"),
+    Check.DELAY: ("delay against the other wheels", "the speed of {part} comes {value} later than the other wheels'"),
+    Check.STILL: (
+        "valve command while the axle stands still",
+        "the {part} axle stands still while its valve is commanded to {value} % of full opening",
+    ),
+    Check.RATE: (
+        "steering rate per opening against the axle's usual one",
+        "the steering rate of the {part} axle per opening deviates from its usual one by {value} %",
+    ),
+    Check.LASTING_RATE: (
+        "steering rate per opening against the other axle, over the mission",
+        "the steering rate of the {part} axle per opening is off the other axle's by {value} % over the mission",
+    ),
+}
+
+
+@dataclass(frozen=True)
+class Checked:
+    """One check of one part.
+
+    Attributes
+    ----------
+    kind, component, side
+        The part; the union where the check does not tell its sides apart.
+    check : Check
+        What was asked.
+    worst : float or None
+        Largest value [1, seconds for `Check.DELAY`]; None: the mission does not show it.
+    limit : float
+        From here on the part is not cleared.
+    start_s, stop_s : float or None
+        Where it is largest [s]; None: over the whole mission.
+    """
+
+    kind: Kind
+    component: str
+    side: Side
+    check: Check
+    worst: float | None
+    limit: float
+    start_s: float | None = None
+    stop_s: float | None = None
+
+    @property
+    def passed(self) -> bool:
+        """Whether a fault of the size that counts would have been beyond the limit, and nothing is."""
+        return self.worst is not None and self.worst < self.limit
+
+    @property
+    def text(self) -> str:
+        """Why it does not clear the part; empty where it does."""
+        if self.passed:
+            return ""
+        words = part_words(self.kind, self.component, self.side)
+        if self.worst is None:
+            return f"{words}: the mission does not show {CHECK_WORDS[self.check][0]}"
+        two = self.check is Check.SECOND_MEASUREMENT
+        said = CHECK_WORDS[self.check][1].format(part=words if two else self.component, value=self._value)
+        return said + (f" at {self.start_s:.1f}–{self.stop_s:.1f} s" if self.start_s is not None else "")
+
+    @property
+    def _value(self) -> str:
+        assert self.worst is not None
+        if self.check is Check.DELAY:
+            return f"{self.worst:.2g} s"
+        return f"{100 * min(self.worst, 9.99):.0f}"
+
+
+def clearing_rows(checks: Sequence[Checked]) -> list[ClearingRow]:
+    """The checks for ``report.json``."""
+    return [
+        {
+            "component": c.component,
+            "side": c.side,
+            "check": c.check,
+            "asked": CHECK_WORDS[c.check][0],
+            "worst": c.worst,
+            "limit": c.limit,
+            "start_s": c.start_s,
+            "stop_s": c.stop_s,
+            "passed": c.passed,
+            "text": c.text,
+        }
+        for c in checks
+    ]

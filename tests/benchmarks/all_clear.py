@@ -1,0 +1,194 @@
+"""All-clears that are wrong, stops that are: `python tests/benchmarks/all_clear.py --seeds reporting`.
+
+Missions of 75 s with every kind of `troubles`, on the default machine and on one of another structure, judged with commands,
+speeds and openings alone (``base``), with valve positions (``spool``) and with second speeds (``direct``), and healthy ones. A
+mission is
+
+    wrong all-clear   ready, or cleared with faults to watch of which none is on a part that fails
+    named             a fault worth an action is on a part that fails
+    wrong part        of what is not named: a fault of severity high on a part that does not fail
+    abstained         neither cleared nor named
+
+Tune on ``--seeds tuning``; the structures of ``reporting`` are others.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from collections.abc import Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
+
+from accuracy import EVIDENCE
+from troubles import Part, Trouble, troubles
+from variation import recorded_signals
+
+from diagnosis.pipeline import diagnose_signals
+from diagnosis.results.document import ReportDocument
+from replay.errors import MfhcaError
+from replay.machine.config import haulotte
+from replay.simulation.options import SimulationOptions
+from replay.simulation.run import simulate_mission
+from replay.simulation.structures import STRUCTURES, StructureOptions
+
+TIERS = ("base", "spool", "direct")
+FIRST = {"tuning": 0, "reporting": 2000}
+DEFAULT = "default"
+
+
+@dataclass(frozen=True)
+class Task:
+    """One mission: its machine, which of the kinds of trouble it has (None: none), its seed, length, and the evidence to judge it with."""
+
+    machine: str
+    kind: int | None
+    seed: int
+    duration: float
+    tiers: tuple[str, ...]
+
+    @property
+    def trouble(self) -> Trouble | None:
+        """What is wrong; None: nothing."""
+        return None if self.kind is None else troubles(self.duration)[self.kind]
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What became of a mission at one level of evidence."""
+
+    machine: str
+    trouble: str
+    tier: str
+    outcome: str
+    wrong_high: int
+    high: int
+    status: str
+    words: str
+
+
+def options_of(task: Task) -> SimulationOptions:
+    """The mission."""
+    trouble = task.trouble
+    structure = None if task.machine == DEFAULT else StructureOptions(task.machine, machine_seed=task.seed % 7)
+    return SimulationOptions(
+        scenario="random" if trouble else "healthy",
+        seed=task.seed,
+        duration_s=task.duration,
+        rate_hz=200.0,
+        faults=trouble.faults if trouble else None,
+        structure=structure,
+    )
+
+
+def run(task: Task) -> list[Outcome]:
+    """Outcomes of one mission."""
+    mission, machine, trouble, out = simulate_mission(options_of(task)), haulotte(), task.trouble, []
+    if trouble is not None and trouble.given is not None:
+        machine = trouble.given(machine)
+    name = trouble.name if trouble else "healthy"
+    for tier in task.tiers:
+        assert tier in EVIDENCE
+        signals = recorded_signals(mission, tier)
+        if trouble is not None and trouble.edit is not None:
+            signals = trouble.edit(signals)
+        try:
+            report = diagnose_signals(signals, machine).report
+        except MfhcaError as error:
+            out.append(Outcome(task.machine, name, tier, "abstained", 0, 0, "error", str(error)))
+            continue
+        out.append(judged(task, tier, name, report, trouble.parts if trouble else None))
+    return out
+
+
+def judged(task: Task, tier: str, name: str, report: ReportDocument, parts: frozenset[Part] | None) -> Outcome:
+    """How a report stands to what is wrong: `parts` fail; None: nothing does."""
+    found = [f for f in report["intervals"] if f["severity"] != "info"]
+    high = [f for f in found if f["severity"] == "high"]
+    verdict = report["verdict"]
+    words = verdict["title"] + ": " + verdict["not_cleared"]
+    if parts is None:
+        return Outcome(task.machine, name, tier, verdict["status"], len(high), len(high), verdict["status"], words)
+    right = [any(_names(f["component"], f["side"], part) for part in parts) for f in found]
+    wrong_high = sum(f["severity"] == "high" and not ok for f, ok in zip(found, right, strict=True))
+    named = any(right)
+    if verdict["cleared"] and not named:
+        outcome = "cleared"
+    elif named:
+        outcome = "named"
+    else:
+        outcome = "wrong part" if wrong_high else "abstained"
+    return Outcome(task.machine, name, tier, outcome, wrong_high, len(high), verdict["status"], words)
+
+
+def _names(component: str, side: str, part: Part) -> bool:
+    return component == part[0] and side in (part[1], "sensor_or_actuator")
+
+
+def tasks_of(seeds: str, machines: Sequence[str], duration: float, every: int, healthy: int, first: int) -> list[Task]:
+    """All missions: one of every so many kinds, and healthy ones, of every machine."""
+    start, kinds = FIRST[seeds] + first, range(len(troubles(duration)))
+    out = []
+    for m, machine in enumerate(machines):
+        faulty = [Task(machine, k, start + k, duration, TIERS) for k in kinds if k % every == m % every]
+        sound = [Task(machine, None, start + 500 + k, duration, TIERS) for k in range(healthy)]
+        out += [*faulty, *sound]
+    return out
+
+
+def run_all(tasks: Sequence[Task], jobs: int) -> Iterator[list[Outcome]]:
+    """Outcomes as they come."""
+    with ProcessPoolExecutor(jobs) as pool:
+        futures = [pool.submit(run, task) for task in tasks]
+        for done, future in enumerate(as_completed(futures), 1):
+            print(f"\r{done} of {len(tasks)} missions   ", end="", file=sys.stderr, flush=True)
+            yield future.result()
+    print(file=sys.stderr)
+
+
+def table(outcomes: Sequence[Outcome]) -> Iterator[str]:
+    """Lines: a machine and level of evidence each."""
+    yield f"{'machine':<22}{'evidence':<9}{'faulty':>7}{'cleared':>8}{'abstain':>8}{'wrong':>6}{'named':>6}{'high wrong':>12}   healthy: stopped, watch, not assessed, ready"
+    for machine in dict.fromkeys(o.machine for o in outcomes):
+        for tier in TIERS:
+            own = [o for o in outcomes if (o.machine, o.tier) == (machine, tier)]
+            ill, sound = ([o for o in own if (o.trouble == "healthy") is flag] for flag in (False, True))
+            count = [sum(o.outcome == x for o in ill) for x in ("cleared", "abstained", "wrong part", "named")]
+            wrong, high = sum(o.wrong_high for o in ill), sum(o.high for o in ill)
+            states = [sum(o.status == s for o in sound) for s in ("stop", "watch", "not_assessed", "ready")]
+            yield (
+                f"{machine:<22}{tier:<9}{len(ill):>7}{count[0]:>8}{count[1]:>8}{count[2]:>6}{count[3]:>6}{wrong:>6} of {high:<5}"
+                f"   {', '.join(map(str, states))} of {len(sound)}"
+            )
+
+
+def main() -> None:
+    """Simulate, judge, print."""
+    parser = argparse.ArgumentParser(description="Wrong all-clears and wrong stops.")
+    parser.add_argument("--seeds", choices=FIRST, default="tuning")
+    parser.add_argument("--first", type=int, default=0, help="added to the first seed")
+    parser.add_argument("--machine", nargs="+", default=None, help="default, or structures")
+    parser.add_argument("--duration", type=float, default=75.0, help="length of a mission [s]")
+    parser.add_argument("--every", type=int, default=1, help="one of so many kinds of trouble")
+    parser.add_argument("--healthy", type=int, default=40, help="healthy missions of each machine")
+    parser.add_argument("--jobs", type=int, default=1)
+    parser.add_argument("--json", type=Path, metavar="FILE", help="write every outcome")
+    asked = parser.parse_args()
+    structure = next(n for n, s in STRUCTURES.items() if s.kind == asked.seeds)
+    machines = asked.machine or [DEFAULT, structure]
+    tasks = tasks_of(asked.seeds, machines, asked.duration, asked.every, asked.healthy, asked.first)
+    outcomes = [o for batch in run_all(tasks, asked.jobs) for o in batch]
+    print("\n".join(table(outcomes)))
+    for o in outcomes:
+        if o.outcome == "cleared":
+            print(f"cleared: {o.machine}, {o.tier}: {o.trouble}")
+    if asked.json:
+        asked.json.write_text("".join(json.dumps(asdict(o)) + "\n" for o in outcomes))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,215 @@
+"""Kinds of trouble of `all_clear.py`: what may be wrong with a machine, its recorder or its machine file.
+
+Every fault here is at least as large as the default of ``[limits] clear_at``: a loss of a quarter, or what deviates as much,
+for three seconds of driving. A kind is a part, a form and a time course; its sizes are drawn from a run's own seed.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from replay.faults import FaultMode, FaultSpec, Side
+from replay.machine.config import Machine
+from replay.signals.signal import Signals
+
+Courses = tuple[tuple[float, float], ...]
+#: A part with a fault: component and side.
+Part = tuple[str, str]
+
+
+@dataclass(frozen=True)
+class Form:
+    """What a fault makes of a part; see `FaultSpec`."""
+
+    name: str
+    mode: FaultMode
+    epsilon: float = 1.0
+    sat: float = 0.0
+    sat_std: float = 0.0
+    sat_tau_s: float = 0.0
+    ramp: bool = False
+
+
+@dataclass(frozen=True)
+class Trouble:
+    """One kind.
+
+    Attributes
+    ----------
+    name : str
+        ``FR valve dead, whole``.
+    faults : tuple[FaultSpec, ...]
+        In the simulated machine.
+    edit : Callable or None
+        What happens to the recorded signals.
+    given : Callable or None
+        What happens to the machine file.
+    parts : frozenset[Part]
+        Parts that are faulty, any of which is right to name; empty: no part is.
+    """
+
+    name: str
+    faults: tuple[FaultSpec, ...] = ()
+    edit: Callable[[Signals], Signals] | None = None
+    given: Callable[[Machine], Machine] | None = None
+    parts: frozenset[Part] = frozenset()
+
+
+_M = FaultMode
+VALVE = (
+    Form("dead", _M.NO_SIGNAL),
+    Form("stuck .06", _M.STUCK, sat=0.06),
+    Form("stuck -.1", _M.STUCK, sat=-0.1),
+    Form("stuck .3", _M.STUCK, sat=0.3),
+    Form("loses .3", _M.INEFFICIENT, 0.3),
+    Form("loses .5", _M.INEFFICIENT, 0.5),
+    Form("loses .8", _M.INEFFICIENT, 0.8),
+    Form("biased .12", _M.OUTSIDE_TABLE, 0.02, sat=6.0),
+    Form("disturbed", _M.NOISY, 0.4, sat=0.08, sat_std=0.08, sat_tau_s=0.8),
+    Form("fades to .6", _M.INEFFICIENT, 0.6, ramp=True),
+)
+SENSOR = (
+    Form("dead", _M.NO_SIGNAL),
+    Form("held", _M.STUCK, sat=math.nan),
+    Form("stuck .1", _M.STUCK, sat=0.1),
+    Form("loses .3", _M.INEFFICIENT, 0.3),
+    Form("loses .6", _M.INEFFICIENT, 0.6),
+    Form("reads 1.35", _M.OUTSIDE_TABLE, -0.35),
+    Form("offset .08", _M.OUTSIDE_TABLE, 0.01, sat=8.0),
+    Form("noisy .12", _M.NOISY, 0.4, sat=0.05, sat_std=0.12, sat_tau_s=0.05),
+    Form("white noise", _M.NOISY, 0.3, sat=0.0, sat_std=0.25),
+    Form("fades to .6", _M.INEFFICIENT, 0.6, ramp=True),
+)
+STEERING_VALVE = (
+    Form("dead", _M.NO_SIGNAL),
+    Form("stuck .1", _M.STUCK, sat=0.1),
+    Form("loses .5", _M.INEFFICIENT, 0.5),
+    Form("loses .8", _M.INEFFICIENT, 0.8),
+    Form("biased .1", _M.OUTSIDE_TABLE, 0.02, sat=5.0),
+)
+STEERING_SENSOR = (
+    Form("dead", _M.NO_SIGNAL),
+    Form("held", _M.STUCK, sat=math.nan),
+    Form("loses .4", _M.INEFFICIENT, 0.4),
+    Form("offset .15", _M.OUTSIDE_TABLE, 0.02, sat=7.5),
+    Form("noisy .2", _M.NOISY, 0.4, sat=0.0, sat_std=0.25, sat_tau_s=0.05),
+)
+
+
+def courses(duration: float) -> Mapping[str, Courses]:
+    """When a fault is there: spans of a mission."""
+    return {
+        "whole": ((0.0, duration),),
+        "first third": ((0.0, duration / 3),),
+        "last half": ((duration / 2, duration),),
+        "12 s": ((0.45 * duration, 0.45 * duration + 12.0),),
+        "five times 3 s": tuple((s * duration, s * duration + 3.0) for s in (0.15, 0.3, 0.45, 0.6, 0.75)),
+    }
+
+
+def faults_of(component: str, side: Side, form: Form, spans: Courses) -> tuple[FaultSpec, ...]:
+    """One form on one part, at its times."""
+    return tuple(
+        FaultSpec(
+            component, side, form.mode, a, b, form.epsilon, form.sat, form.sat_std, form.sat_tau_s, (b - a) * form.ramp
+        )
+        for a, b in spans
+    )
+
+
+def _single(duration: float) -> Iterator[Trouble]:
+    """One part."""
+    wheels, axles = ("FR", "FL", "RR", "RL"), ("front", "rear")
+    kinds = (
+        (wheels, Side.ACTUATOR, "valve", VALVE),
+        (wheels, Side.SENSOR, "sensor", SENSOR),
+        (axles, Side.ACTUATOR, "steering valve", STEERING_VALVE),
+        (axles, Side.SENSOR, "steering sensor", STEERING_SENSOR),
+    )
+    k = 0
+    for components, side, words, forms in kinds:
+        for form in forms:
+            for course, spans in courses(duration).items():
+                component = components[k % len(components)]
+                k += 1
+                yield Trouble(
+                    f"{component} {words} {form.name}, {course}",
+                    faults_of(component, side, form, spans),
+                    parts=frozenset({(component, side.value)}),
+                )
+
+
+def _several(duration: float) -> Iterator[Trouble]:
+    """Several parts at once."""
+    s, a = Side.SENSOR, Side.ACTUATOR
+    loss, half, dead = SENSOR[3], VALVE[5], VALVE[0]
+    sets: dict[str, tuple[tuple[str, Side, Form], ...]] = {
+        "RL sensor and its valve lose": (("RL", s, loss), ("RL", a, half)),
+        "FR sensor reads too much, its valve loses": (("FR", s, SENSOR[5]), ("FR", a, half)),
+        "both front valves lose half": (("FR", a, half), ("FL", a, half)),
+        "right valves dead": (("FR", a, dead), ("RR", a, dead)),
+        "three valves lose half": (("FR", a, half), ("FL", a, half), ("RR", a, half)),
+        "FL sensor dead, RR valve dead": (("FL", s, dead), ("RR", a, dead)),
+        "two sensors lose": (("FL", s, loss), ("RR", s, loss)),
+        "both steering valves dead": (("front", a, dead), ("rear", a, dead)),
+        "both steering sensors dead": (("front", s, dead), ("rear", s, dead)),
+        "steering valve dead, wheel valve dead": (("rear", a, dead), ("RL", a, dead)),
+    }
+    for words, parts in sets.items():
+        for course in ("whole", "first third", "12 s"):
+            spans = courses(duration)[course]
+            faults = tuple(f for c, side, form in parts for f in faults_of(c, side, form, spans))
+            yield Trouble(f"{words}, {course}", faults, parts=frozenset((c, side.value) for c, side, _ in parts))
+
+
+def _late(name: str, seconds: float) -> Callable[[Signals], Signals]:
+    """A channel that is late."""
+
+    def edit(signals: Signals) -> Signals:
+        one = signals.items[name]
+        return replace(signals, items={**signals.items, name: replace(one, stamps=one.stamps + round(seconds * 1e9))})
+
+    return edit
+
+
+def _changed(name: str, change: Callable[[np.ndarray, np.ndarray], np.ndarray]) -> Callable[[Signals], Signals]:
+    """A channel with other values; `change` gets seconds and values."""
+
+    def edit(signals: Signals) -> Signals:
+        one = signals.items[name]
+        seconds = (one.stamps - one.stamps[0]) * 1e-9
+        return replace(signals, items={**signals.items, name: replace(one, values=change(seconds, one.values))})
+
+    return edit
+
+
+def _spiky(seconds: np.ndarray, values: np.ndarray) -> np.ndarray:
+    out, rng = values.copy(), np.random.default_rng(3)
+    at = rng.random(values.size) < 0.03
+    out[at] += 0.3 * rng.choice((-1.0, 1.0), np.count_nonzero(at))
+    return out
+
+
+def _recorded(duration: float) -> Iterator[Trouble]:
+    """Sensors and recorders: late, drifting, spiky, ending."""
+    part = frozenset({("RR", "sensor")})
+    drift = _changed("wheel.RR.v", lambda t, y: y + 0.12 * t / duration)
+    yield Trouble("RR sensor late by .4 s", edit=_late("wheel.RR.v", 0.4), parts=part)
+    yield Trouble("RR sensor drifts", edit=drift, parts=part)
+    yield Trouble("RR sensor with spikes", edit=_changed("wheel.RR.v", _spiky), parts=part)
+    yield Trouble("RR sensor of the wrong sign", edit=_changed("wheel.RR.v", lambda t, y: -y), parts=part)
+    ends = _changed("wheel.RR.v", lambda t, y: np.where(t > 0.6 * duration, np.nan, y))
+    yield Trouble("RR sensor ends", edit=ends, parts=part)
+    turned = _changed("steer.front.phi", lambda t, y: -y)
+    yield Trouble("front steering sensor of the wrong sign", edit=turned, parts=frozenset({("front", "sensor")}))
+    late = _late("steer.rear.phi", 0.6)
+    yield Trouble("rear steering sensor late by .6 s", edit=late, parts=frozenset({("rear", "sensor")}))
+
+
+def troubles(duration: float) -> list[Trouble]:
+    """All kinds."""
+    return [*_single(duration), *_several(duration), *_recorded(duration)]
