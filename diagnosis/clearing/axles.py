@@ -16,9 +16,12 @@ from replay.faults import Side
 _FLOOR_RAD, _OPEN = 0.06, 0.03  # deviations are shares of at least this angle and opening
 _STILL_S, _STILL, _ANSWERED = 1.0, 0.015, 0.06  # s, rad/s, and of full opening
 _RATE_S = 8.0
-_LEAST_OPENING = 0.01  # r.m.s. of a window: below it, an axle is hardly steered
+_STEERED = 0.01  # of full opening beyond the dead band: below it, an axle is not steered
+_LEAST_S = 0.5  # of a window, in which it is steered
+_WIDEST = 0.06  # dead band of a healthy valve, of full opening
+_VALVE = 1.4  # dead band and hysteresis of a healthy valve: its limit, likewise
 _RATE = 2.0  # limit of the rate in windows, as a multiple of the loss that counts
-_FEW_S = 16.0  # of windows in which an axle is steered, for its usual rate
+_FEW_S = 2.0  # in which an axle is steered, for its usual rate
 
 
 def axle_checks(cells: Cells, clear_at: float) -> Iterator[Checked]:
@@ -27,7 +30,8 @@ def axle_checks(cells: Cells, clear_at: float) -> Iterator[Checked]:
     either, share = Side.SENSOR_OR_ACTUATOR, -np.log1p(-clear_at)
     used = np.where(np.isfinite(opening), opening, command)
     rate = np.gradient(angle, cells.dt, axis=0) if len(angle) > 1 else np.full(angle.shape, np.nan)
-    windows, usual = _rates(cells, rate, used)
+    dead = [min(_commanded_still(rate[:, j], used[:, j], cells)[0], _WIDEST) for j in range(angle.shape[1])]
+    windows, usual = _rates(cells, rate, used, np.array(dead))
     for j, axle in enumerate(cells.machine.axles):
         about = (Kind.STEER, axle)
         if not np.isfinite(angle[:, j]).any():
@@ -37,7 +41,7 @@ def axle_checks(cells: Cells, clear_at: float) -> Iterator[Checked]:
             yield worst(cells, (*about, Side.SENSOR, Check.SECOND_MEASUREMENT), off, clear_at)
         if np.isfinite(opening[:, j]).any() and np.isfinite(command[:, j]).any():
             off = off_reference(cells, opening[:, j], command[:, j], _OPEN)
-            yield worst(cells, (*about, Side.ACTUATOR, Check.SECOND_MEASUREMENT), off, clear_at)
+            yield worst(cells, (*about, Side.ACTUATOR, Check.SECOND_MEASUREMENT), off, _VALVE * clear_at)
         if np.isfinite(command[:, j]).any():
             yield _still(cells, axle, rate[:, j], command[:, j])
             yield worst(cells, (*about, either, Check.RATE), windows[:, j], _RATE * share)
@@ -46,37 +50,44 @@ def axle_checks(cells: Cells, clear_at: float) -> Iterator[Checked]:
 
 def _still(cells: Cells, axle: str, rate: Array, command: Array) -> Checked:
     """Largest mean command while the axle stands still for a second."""
+    part = (Kind.STEER, axle, Side.SENSOR_OR_ACTUATOR, Check.STILL)
+    largest, start = _commanded_still(rate, command, cells)
+    stop = start + _STILL_S
+    if any(start < b and stop > a for a, b in cells.stated.get(axle, ())):
+        return Checked(*part, 0.0, _ANSWERED)
+    return Checked(*part, largest if np.isfinite(largest) else None, _ANSWERED, start, stop)
+
+
+def _commanded_still(rate: Array, command: Array, cells: Cells) -> tuple[float, float]:
+    """Largest mean command while an axle stands still for a second [1], NaN where nothing is known, and when that begins [s]."""
     frame = Frame(cells.size, max(1, round(_STILL_S / cells.dt)), max(1, round(0.3 / cells.dt)))
-    still = frame.rms(rate) < _STILL
-    values = np.where(still, np.abs(frame.mean(command)), 0.0)
-    values = np.where(np.isfinite(frame.mean(command)), values, np.nan)
-    if not np.isfinite(values).any():
-        return Checked(Kind.STEER, axle, Side.SENSOR_OR_ACTUATOR, Check.STILL, None, _ANSWERED)
-    k = int(np.nanargmax(values))
-    start = float(frame.starts[k] * cells.dt)
-    stop = start + frame.length * cells.dt
-    return Checked(Kind.STEER, axle, Side.SENSOR_OR_ACTUATOR, Check.STILL, float(values[k]), _ANSWERED, start, stop)
+    mean = np.abs(frame.mean(command))
+    if not np.isfinite(mean).any():
+        return np.nan, 0.0
+    values = np.where(frame.rms(rate) < _STILL, mean, 0.0)
+    k = int(np.nanargmax(np.where(np.isfinite(mean), values, np.nan)))
+    return float(values[k]), float(frame.starts[k] * cells.dt)
 
 
-def _rates(cells: Cells, rate: Array, opening: Array) -> tuple[Array, list[float | None]]:
-    """|ln| of the steering rate per opening: by windows against the axle's usual one, and that against the other axle's."""
+def _rates(cells: Cells, rate: Array, opening: Array, dead: Array) -> tuple[Array, list[float | None]]:
+    """|ln| of the steering rate per opening: by windows against the axle's usual one, and that against the other axle's.
+
+    `dead` is what of an opening moves nothing, shape (axles,).
+    """
     frame = Frame(cells.size, max(1, round(_RATE_S / cells.dt)), cells.frame.hop)
-    known = np.isfinite(rate) & np.isfinite(opening)
-    power = frame.sums(np.where(known, opening**2, 0.0))
+    beyond = np.maximum(np.abs(opening) - np.nan_to_num(dead), 0.0)
+    steered = np.isfinite(rate) & (np.nan_to_num(beyond) > _STEERED)
+    ahead = np.where(steered, rate * np.sign(opening), 0.0)
+    opened = np.where(steered, beyond, 0.0)
+    time = frame.sums(steered.astype(np.float64)) * cells.dt
     with np.errstate(divide="ignore", invalid="ignore"):
-        gain = frame.sums(np.where(known, opening * rate, 0.0)) / power
-        steered = np.sqrt(power / np.maximum(frame.sums(known.astype(np.float64)), 1.0)) > _LEAST_OPENING
-        log = np.where(steered, np.log(np.maximum(gain, 1e-3)), np.nan)
-    middle = [
-        float(np.nanmedian(x)) if np.count_nonzero(np.isfinite(x)) * frame.hop * cells.dt >= _FEW_S else np.nan
-        for x in log.T
-    ]
-    out = np.abs(log - np.array(middle))
-    wide = np.full((cells.frame.starts.size, log.shape[1]), np.nan)
-    place = np.minimum(np.arange(len(wide)), len(out) - 1)
-    wide[:] = out[place]
-    apart: list[float | None] = [None] * len(middle)
-    for a, b in pairwise(range(len(middle))):
-        if np.isfinite(middle[a]) and np.isfinite(middle[b]):
-            apart[a] = apart[b] = abs(middle[a] - middle[b])
-    return wide, apart
+        log = np.where(time >= _LEAST_S, np.log(np.maximum(frame.sums(ahead) / frame.sums(opened), 1e-3)), np.nan)
+        whole = np.log(np.maximum(ahead.sum(axis=0) / opened.sum(axis=0), 1e-3))
+    whole = np.where(steered.sum(axis=0) * cells.dt >= _FEW_S, whole, np.nan)
+    out = np.abs(log - np.array([float(np.nanmedian(x)) if np.isfinite(x).any() else np.nan for x in log.T]))
+    place = np.minimum(np.arange(cells.frame.starts.size), len(out) - 1)
+    apart: list[float | None] = [None] * len(whole)
+    for a, b in pairwise(range(len(whole))):
+        if np.isfinite(whole[a]) and np.isfinite(whole[b]):
+            apart[a] = apart[b] = float(abs(whole[a] - whole[b]))
+    return out[place], apart

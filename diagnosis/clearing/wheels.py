@@ -22,6 +22,7 @@ _OPEN = 0.03  # of full opening: likewise
 _ROUGH, _ROUGHER = 0.15, 5.0  # quick changes: share of the speed, times those of the other wheels
 _LATE_S = 0.2
 _TRACKING = 0.35
+_VALVE = 1.4  # dead band and hysteresis of a healthy valve: the limit as a multiple of the loss that counts
 #: Limits of speed per opening in windows and over the mission, as multiples of the loss that counts, by whether opening and speed
 #: are measured twice: what is judged by measurements need not be judged by its likeness to others once more.
 _RESPONSE = {
@@ -52,7 +53,7 @@ def wheel_checks(cells: Cells, clear_at: float) -> Iterator[Checked]:
             yield worst(cells, (*about, Side.SENSOR, Check.SECOND_MEASUREMENT), off, clear_at)
         if twice[i][0]:
             off = off_reference(cells, opening[:, i], command[:, i], _OPEN)
-            yield worst(cells, (*about, Side.ACTUATOR, Check.SECOND_MEASUREMENT), off, clear_at)
+            yield worst(cells, (*about, Side.ACTUATOR, Check.SECOND_MEASUREMENT), off, _VALVE * clear_at)
         brief, long = _RESPONSE[twice[i]]
         if _known(used[:, i]) and speed.shape[1] > _OTHERS:
             yield worst(cells, (*about, either, Check.RESPONSE), windows[:, i], brief * share)

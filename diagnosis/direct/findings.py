@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from diagnosis.direct.fault_runs import fault_runs
 from diagnosis.direct.identification import IdentifiedPair
 from diagnosis.direct.isolation import Isolated, estimate_run, isolate
@@ -25,6 +27,7 @@ _SHORTEST_S = 0.01
 _HOLD_S = 0.1
 _LEAD_S, _TAIL_S, _CHAIN_S = 0.3, 0.1, 0.05
 _SETTLED_LAGS = 5.0  # after a fault a channel returns with its lag
+_CLEAR = 3.0  # times the noise
 _GROWTH_S = 0.1  # a shorter time of growth is not worth a sentence
 
 
@@ -127,9 +130,13 @@ def _mode_of(isolated: Isolated, found: IdentifiedPair, limits: Limits) -> Fault
     if mode.varying:
         least = max(2.5 * found.model.noise, 1.5 * noise, limits.min_sat / 2)
         return None if seen.deviation < least else mode
-    if found.pair.side is Side.ACTUATOR and seen.deviation < 2.5 * noise:
-        return None  # the command hardly moved: a noisy reading of it looks constant too
-    return mode
+    if found.pair.side is Side.ACTUATOR:
+        # the command hardly moved: a noisy reading of it looks constant too
+        return None if seen.deviation < _CLEAR * noise else mode
+    near = seen.use.any() and seen.deviation < limits.min_sat / 2
+    return (
+        None if near and float(np.ptp(seen.x[seen.use])) < limits.min_sat else mode
+    )  # it repeats what it had, which is true
 
 
 def _mode_of_gain(isolated: Isolated, noise: float, limits: Limits) -> FaultMode | None:

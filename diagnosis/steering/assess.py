@@ -22,7 +22,7 @@ from diagnosis.steering.path import AxleFilter, allowed_models, most_probable
 from diagnosis.steering.path_refinement import refine_path
 from diagnosis.steering.plant import SteeringPlant
 from diagnosis.steering.prior import plant_before
-from diagnosis.steering.reliability import weighed
+from diagnosis.steering.reliability import commanded, weighed
 from diagnosis.steering.states import REASONS, states_of
 from replay.control.loop import Replay
 from replay.faults import Side, State
@@ -117,6 +117,7 @@ def _judged_by_model(inputs: AxleInputs, blocks: SteeringBlocks, plant: Steering
     axle = AxleFilter(blocks, driven_by(plant, blocks), model, allowed, inputs.names)
     path = refine_path(axle, most_probable(axle))
     found = {side: findings_of(side, inputs, axle, path, machine.limits) for side in _SIDES}
+    found[Side.ACTUATOR] = commanded(found[Side.ACTUATOR], inputs.command, blocks.length)
     if not (inputs.redundant or inputs.valve_redundant):
         found[Side.ACTUATOR] = apart(found[Side.SENSOR], found[Side.ACTUATOR], blocks.length)
         found = weighed(found, blocks.length, inputs.timeline.dt)

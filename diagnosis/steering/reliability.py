@@ -23,6 +23,7 @@ _WEIGHTS = (-4.46, 4.72, -2.24, -0.69, -0.99)  # constant, and of `features_of`
 _LONG_S = 6.0  # from here on a finding gains nothing by being longer
 _NEAR_S = 1.0
 _OVERLAP = 0.2
+_ASKED, _PEAK = 0.01, 0.98  # of full opening: a command below this, but for its peaks, asks for nothing
 _LEAST = 0.6  # probability from which a finding is stated
 
 #: A stretch: first and last moment [s].
@@ -53,6 +54,30 @@ def features_of(
     loss = mode in (FaultMode.NO_SIGNAL, FaultMode.INEFFICIENT)
     length = max(stop - start, 0.05)
     return np.array([np.log(min(length, _LONG_S)), near, shared > _OVERLAP * length, loss], dtype=np.float64)
+
+
+def commanded(valve: SideFindings, command: NDArray[np.float64], length: int) -> SideFindings:
+    """The valve's findings without those of a valve that is said to give too little while hardly anything is asked of it.
+
+    Parameters
+    ----------
+    valve : SideFindings
+        Of one axle.
+    command : NDArray[np.float64], shape (n,)
+        Of its valve [fraction].
+    length : int
+        Samples per block.
+    """
+    kept, open_ = [], list(valve.unexplained)
+    for f in valve.findings:
+        asked = np.abs(command[f.start : f.stop])
+        asked = asked[np.isfinite(asked)]
+        lacks = f.mode in (FaultMode.NO_SIGNAL, FaultMode.INEFFICIENT)
+        if lacks and (not asked.size or float(np.quantile(asked, _PEAK)) < _ASKED):
+            open_.append((f.start // length, -(-f.stop // length)))
+        else:
+            kept.append(f)
+    return SideFindings(tuple(kept), tuple(open_))
 
 
 def weighed(found: Mapping[Side, SideFindings], length: int, dt: float) -> dict[Side, SideFindings]:

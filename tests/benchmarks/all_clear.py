@@ -110,7 +110,10 @@ def judged(task: Task, tier: str, name: str, report: ReportDocument, parts: froz
     found = [f for f in report["intervals"] if f["severity"] != "info"]
     high = [f for f in found if f["severity"] == "high"]
     verdict = report["verdict"]
-    words = verdict["title"] + ": " + verdict["not_cleared"]
+    still = [
+        f"{c['component']} {c['check']} {c['worst']} of {c['limit']:.2f}" for c in report["clearing"] if not c["passed"]
+    ]
+    words = "; ".join([verdict["title"], *still])
     if parts is None:
         return Outcome(task.machine, name, tier, verdict["status"], len(high), len(high), verdict["status"], words)
     right = [any(_names(f["component"], f["side"], part) for part in parts) for f in found]
