@@ -20,7 +20,8 @@ _STEERED = 0.01  # of full opening beyond the dead band: below it, an axle is no
 _LEAST_S = 0.5  # of a window, in which it is steered
 _WIDEST = 0.06  # dead band of a healthy valve, of full opening
 _VALVE = 1.4  # dead band and hysteresis of a healthy valve: its limit, likewise
-_RATE = 2.0  # limit of the rate in windows, as a multiple of the loss that counts
+#: Limits of the rate in windows and over the mission, as multiples of the loss that counts, by whether angle and opening are measured twice.
+_RATE = {False: (2.0, 1.0), True: (3.0, 2.0)}
 _FEW_S = 2.0  # in which an axle is steered, for its usual rate
 
 
@@ -44,8 +45,10 @@ def axle_checks(cells: Cells, clear_at: float) -> Iterator[Checked]:
             yield worst(cells, (*about, Side.ACTUATOR, Check.SECOND_MEASUREMENT), off, _VALVE * clear_at)
         if np.isfinite(command[:, j]).any():
             yield _still(cells, axle, rate[:, j], command[:, j])
-            yield worst(cells, (*about, either, Check.RATE), windows[:, j], _RATE * share)
-            yield lasts(cells, (*about, either, Check.LASTING_RATE), usual[j], share)
+            twice = bool(np.isfinite(second[:, j]).any() and np.isfinite(opening[:, j]).any())
+            brief, long = _RATE[twice]
+            yield worst(cells, (*about, either, Check.RATE), windows[:, j], brief * share)
+            yield lasts(cells, (*about, either, Check.LASTING_RATE), usual[j], long * share)
 
 
 def _still(cells: Cells, axle: str, rate: Array, command: Array) -> Checked:

@@ -11,6 +11,8 @@ from replay.faults import Side
 
 _EVEN_S = 0.2  # over which a channel and its reference are evened: two healthy instruments differ in lag
 _EARLIEST_S, _LATEST_S = 0.3, 1.0
+_SURE = 0.95
+_LOSSES = (Check.RESPONSE, Check.LASTING_RESPONSE, Check.RATE, Check.LASTING_RATE)
 
 
 def lowest_passed(x: Array, dt: float, lag_s: float) -> Array:
@@ -83,9 +85,18 @@ def worst(cells: Cells, part: tuple[Kind, str, Side, Check], values: Array, limi
     k = int(np.nanargmax(values))
     start = float(cells.frame.starts[k] * cells.dt)
     stop = min(start + cells.frame.length * cells.dt, cells.timeline.size * cells.timeline.dt)
-    return Checked(*part, float(values[k]), limit, start, stop)
+    usual = float(np.nanquantile(np.abs(values), _SURE))
+    return Checked(*part, float(values[k]), limit, start, stop, _shown(part[3], limit + usual))
 
 
 def lasts(cells: Cells, part: tuple[Kind, str, Side, Check], value: float | None, limit: float) -> Checked:
     """The check of a part over the whole mission; nothing new where its faults are stated for much of it."""
-    return Checked(*part, 0.0 if value is not None and cells.mostly_explained(part[1]) else value, limit)
+    stated = value is not None and cells.mostly_explained(part[1])
+    return Checked(*part, 0.0 if stated else value, limit, shows=None if value is None else _shown(part[3], limit))
+
+
+def _shown(check: Check, size: float) -> float | None:
+    """Loss [1] of which a value of this size is the trace."""
+    if check is Check.SECOND_MEASUREMENT:
+        return min(size, 1.0)
+    return float(-np.expm1(-size)) if check in _LOSSES else None

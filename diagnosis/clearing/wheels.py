@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import NamedTuple
 
 import numpy as np
 
@@ -23,13 +24,14 @@ _ROUGH, _ROUGHER = 0.15, 5.0  # quick changes: share of the speed, times those o
 _LATE_S = 0.2
 _TRACKING = 0.35
 _VALVE = 1.4  # dead band and hysteresis of a healthy valve: the limit as a multiple of the loss that counts
-#: Limits of speed per opening in windows and over the mission, as multiples of the loss that counts, by whether opening and speed
-#: are measured twice: what is judged by measurements need not be judged by its likeness to others once more.
+#: Limits of speed per opening below and above the other wheels', in windows and over the mission, as multiples of the loss
+#: that counts, by whether opening and speed are measured twice. What measurements judge need not be judged by its likeness to
+#: others as strictly; what reads too much is in no row of the tables, so that nothing else would tell it.
 _RESPONSE = {
-    (False, False): (1.15, 1.0),
-    (True, False): (2.0, 1.2),
-    (False, True): (1.15, 1.0),
-    (True, True): (3.0, 2.0),
+    (False, False): ((1.05, 0.95), (1.15, 1.0)),
+    (True, False): ((2.0, 1.2), (1.4, 1.05)),
+    (False, True): ((1.15, 1.0), (1.4, 1.2)),
+    (True, True): ((3.0, 2.0), (3.0, 2.0)),
 }
 
 
@@ -54,10 +56,12 @@ def wheel_checks(cells: Cells, clear_at: float) -> Iterator[Checked]:
         if twice[i][0]:
             off = off_reference(cells, opening[:, i], command[:, i], _OPEN)
             yield worst(cells, (*about, Side.ACTUATOR, Check.SECOND_MEASUREMENT), off, _VALVE * clear_at)
-        brief, long = _RESPONSE[twice[i]]
         if _known(used[:, i]) and speed.shape[1] > _OTHERS:
-            yield worst(cells, (*about, either, Check.RESPONSE), windows[:, i], brief * share)
-            yield lasts(cells, (*about, either, Check.LASTING_RESPONSE), lasting[i], long * share)
+            below, above = _RESPONSE[twice[i]]
+            yield worst(cells, (*about, either, Check.RESPONSE), -windows[:, i], below[0] * share)
+            yield lasts(cells, (*about, either, Check.LASTING_RESPONSE), lasting[i].below, below[1] * share)
+            yield worst(cells, (*about, either, Check.EXCESS), windows[:, i], above[0] * share)
+            yield lasts(cells, (*about, either, Check.LASTING_EXCESS), lasting[i].above, above[1] * share)
         if _known(reference[:, i]):
             yield worst(cells, (*about, either, Check.TRACKING), tracking[:, i], _TRACKING)
             if delays[i] is not None:
@@ -80,8 +84,15 @@ def _others(x: Array) -> Array:
     return out
 
 
-def _responses(cells: Cells, speed: Array, opening: Array, reference: Array) -> tuple[Array, list[float | None]]:
-    """|ln| of speed per opening over that of the other wheels: by windows against the wheel's usual one, and the usual one.
+class _Usual(NamedTuple):
+    """By how much a wheel's usual speed per opening is below and above the other wheels'; None where it is not known."""
+
+    below: float | None = None
+    above: float | None = None
+
+
+def _responses(cells: Cells, speed: Array, opening: Array, reference: Array) -> tuple[Array, list[_Usual]]:
+    """ln of speed per opening over that of the other wheels: by windows against the wheel's usual one, and the usual one.
 
     Only where a command (without one: the wheel) has settled; forward and reverse have usual ones of their own.
     """
@@ -101,17 +112,18 @@ def _responses(cells: Cells, speed: Array, opening: Array, reference: Array) -> 
     with np.errstate(divide="ignore", invalid="ignore"):
         log = np.log(np.maximum(ratio, 1e-3) / _others(ratio))
     ahead = frame.mean(np.sign(np.nan_to_num(motion))) >= 0.0
-    off, lasting = np.full(log.shape, np.nan), []
+    off = np.full(log.shape, np.nan)
+    lasting: list[_Usual] = []
     for i in range(log.shape[1]):
         usual = []
         for way in (ahead[:, i], ~ahead[:, i]):
             here = way & np.isfinite(log[:, i])
             if here.any():
                 middle = float(np.median(log[here, i]))
-                off[here, i] = np.abs(log[here, i] - middle)
+                off[here, i] = log[here, i] - middle
                 if np.count_nonzero(here) * frame.hop * cells.dt >= 3.0:
-                    usual.append(abs(middle))
-        lasting.append(max(usual) if usual else None)
+                    usual.append(middle)
+        lasting.append(_Usual(max(0.0, -min(usual)), max(0.0, *usual)) if usual else _Usual())
     return off, lasting
 
 

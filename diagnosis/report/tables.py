@@ -9,8 +9,10 @@ from diagnosis.pages.labels import bounded, clock, grouped, mode_legend, number,
 from diagnosis.report.confidence import headline, judged, sure_of, sure_of_verdict
 from diagnosis.report.edges import time_words
 from diagnosis.report.judged_parts import judged_sides, kind_of
+from diagnosis.results.clearing import Check
 from diagnosis.results.document import (
     ActionRow,
+    ClearingRow,
     FileRow,
     IntervalRow,
     LoopRow,
@@ -22,7 +24,7 @@ from diagnosis.results.document import (
     SignalRow,
 )
 from diagnosis.results.fault_rows import state_label
-from diagnosis.results.vocabulary import Kind, Tier, Verdict, part_name
+from diagnosis.results.vocabulary import Kind, Tier, Verdict, part_name, part_words
 from replay.faults import FAULT_STATES, UNDECIDED, FaultMode, State
 
 _SHOWN = 0.001
@@ -59,6 +61,7 @@ def context(report: ReportDocument, duration: float) -> Context:
         "metrics": _metrics(report["metrics"]),
         "signals": [_signal(s) for s in report["signals"]],
         "missing": _missing(report["missing"]),
+        "clearing": _clearing(report),
         "quality": checks,
         "quality_folded": folded,
         "files": [_file(f) for f in log["files"]],
@@ -197,6 +200,29 @@ def _coverage(report: ReportDocument) -> list[Context]:
                 "driving": row["decided_driving_s"],
                 "loss": loss.get(key, ""),
                 "why": why.get(key, []),
+            }
+        )
+    return rows
+
+
+def _size(row: ClearingRow, value: float) -> str:
+    return f"{value:.2f} s" if row["check"] == Check.DELAY else f"{100 * min(value, 9.99):.0f} %"
+
+
+def _clearing(report: ReportDocument) -> list[Context]:
+    """Checks behind an all-clear, those first that do not clear their part."""
+    rows = []
+    for c in sorted(report["clearing"], key=lambda c: c["passed"]):
+        start, stop = c["start_s"], c["stop_s"]
+        rows.append(
+            {
+                "ok": c["passed"],
+                "part": part_words(kind_of(c["component"], report["machine"]), c["component"], c["side"]),
+                "asked": c["asked"],
+                "worst": "not shown" if c["worst"] is None else _size(c, c["worst"]),
+                "limit": _size(c, c["limit"]),
+                "when": "" if start is None or stop is None else f"{start:.1f}–{stop:.1f} s",
+                "shows": "" if c["shows"] is None else f"from {100 * c['shows']:.0f} %",
             }
         )
     return rows

@@ -17,6 +17,8 @@ class Check(StrEnum):
     SECOND_MEASUREMENT = "second_measurement"
     RESPONSE = "response"
     LASTING_RESPONSE = "lasting_response"
+    EXCESS = "excess"
+    LASTING_EXCESS = "lasting_excess"
     TRACKING = "tracking"
     ROUGHNESS = "roughness"
     DELAY = "delay"
@@ -32,12 +34,20 @@ CHECK_WORDS: dict[Check, tuple[str, str]] = {
         "the {part} is off its second measurement by {value} % of what it should show",
     ),
     Check.RESPONSE: (
-        "speed per opening against the other wheels, by windows of 3 s",
-        "the speed of {part} per opening deviates from the other wheels' by {value} %",
+        "speed per opening below the other wheels', for 3 s",
+        "the speed of {part} per opening falls below the other wheels' by {value} %",
     ),
     Check.LASTING_RESPONSE: (
-        "speed per opening against the other wheels, over the mission",
-        "the speed of {part} per opening is off the other wheels' by {value} % over the mission",
+        "speed per opening below the other wheels', over the mission",
+        "the speed of {part} per opening is below the other wheels' by {value} % over the mission",
+    ),
+    Check.EXCESS: (
+        "speed per opening above the other wheels', for 3 s",
+        "the speed of {part} per opening rises above the other wheels' by {value} %",
+    ),
+    Check.LASTING_EXCESS: (
+        "speed per opening above the other wheels', over the mission",
+        "the speed of {part} per opening is above the other wheels' by {value} % over the mission",
     ),
     Check.TRACKING: (
         "error of tracking, less that of the other wheels",
@@ -76,6 +86,9 @@ class Checked:
         From here on the part is not cleared.
     start_s, stop_s : float or None
         Where it is largest [s]; None: over the whole mission.
+    shows : float or None
+        Smallest loss [1] that would have been beyond the limit with 95 %, by how the mission's other windows vary: for three
+        seconds, or for the whole mission where the check is of that. None: the check is not of a loss, or shows nothing.
     """
 
     kind: Kind
@@ -86,6 +99,7 @@ class Checked:
     limit: float
     start_s: float | None = None
     stop_s: float | None = None
+    shows: float | None = None
 
     @property
     def passed(self) -> bool:
@@ -124,6 +138,7 @@ def clearing_rows(checks: Sequence[Checked]) -> list[ClearingRow]:
             "limit": c.limit,
             "start_s": c.start_s,
             "stop_s": c.stop_s,
+            "shows": c.shows,
             "passed": c.passed,
             "text": c.text,
         }

@@ -200,7 +200,8 @@ class ClearingRow(TypedDict):
     """One check behind an all-clear: a fault of the size `LimitsRow.clear_at` would have been beyond the limit for three seconds.
 
     `worst` is null where the mission does not show it; `start_s` and `stop_s` are null where it holds for the whole mission.
-    `text` says why the part is not cleared, and is empty where it is.
+    `shows` is the smallest loss that the mission would have shown with 95 %, for three seconds, or lasting where the check is of
+    the whole mission. `text` says why the part is not cleared, and is empty where it is.
     """
 
     component: str
@@ -211,6 +212,7 @@ class ClearingRow(TypedDict):
     limit: float
     start_s: Seconds | None
     stop_s: Seconds | None
+    shows: float | None
     passed: bool
     text: str
 

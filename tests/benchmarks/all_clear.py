@@ -8,6 +8,7 @@ mission is
     named             a fault worth an action is on a part that fails
     wrong part        of what is not named: a fault of severity high on a part that does not fail
     abstained         neither cleared nor named
+    (not counted)     no part that fails was driven, or steered, for three seconds of its fault
 
 Tune on ``--seeds tuning``; the structures of ``reporting`` are others.
 """
@@ -24,6 +25,7 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
+import numpy as np
 from accuracy import EVIDENCE
 from troubles import Part, Trouble, troubles
 from variation import recorded_signals
@@ -32,13 +34,15 @@ from diagnosis.pipeline import diagnose_signals
 from diagnosis.results.document import ReportDocument
 from replay.errors import MfhcaError
 from replay.machine.config import haulotte
-from replay.simulation.options import SimulationOptions
+from replay.simulation.options import SimulatedMission, SimulationOptions
 from replay.simulation.run import simulate_mission
 from replay.simulation.structures import STRUCTURES, StructureOptions
 
 TIERS = ("base", "spool", "direct")
 FIRST = {"tuning": 0, "reporting": 2000}
 DEFAULT = "default"
+_DRIVEN, _STEERED = 0.06, 0.02  # m/s, rad/s
+_DRIVEN_S, _STEERED_S = 3.0, 1.0
 
 
 @dataclass(frozen=True)
@@ -102,7 +106,23 @@ def run(task: Task) -> list[Outcome]:
             out.append(Outcome(task.machine, name, tier, "abstained", 0, 0, "error", str(error)))
             continue
         out.append(judged(task, tier, name, report, trouble.parts if trouble else None))
-    return out
+    return out if trouble is None or exercised(mission, trouble) else []
+
+
+def exercised(mission: SimulatedMission, trouble: Trouble) -> bool:
+    """Whether a part that fails is driven, or its valve asked to steer, for some time of its fault; true where none is simulated."""
+    if not trouble.faults:
+        return True
+    t = (mission.stamps - mission.stamps[0]) * 1e-9
+    time: dict[str, float] = {}
+    for f in trouble.faults:
+        wheel = f"wheel.{f.component}.v_ref"
+        asked = np.abs(mission.columns[wheel if wheel in mission.columns else f"steer.{f.component}.phi_ref"])
+        used = asked > _DRIVEN if wheel in mission.columns else np.abs(np.gradient(asked, t)) > _STEERED
+        time[f.component] = time.get(f.component, 0.0) + float(np.mean(np.diff(t))) * float(
+            np.count_nonzero(used & (t >= f.start_s) & (t < f.stop_s))
+        )
+    return any(s >= (_DRIVEN_S if f"wheel.{c}.v_ref" in mission.columns else _STEERED_S) for c, s in time.items())
 
 
 def judged(task: Task, tier: str, name: str, report: ReportDocument, parts: frozenset[Part] | None) -> Outcome:
