@@ -302,6 +302,7 @@ def _report(
         ],
         "coverage": _coverage(states),
         "loss": [],
+        "clearing": [],
         "metrics": {
             "wheels": {w: {"tracking_error": error, "control_effort": effort} for w in wheels},
             "average": {"tracking_error": error, "control_effort": effort},

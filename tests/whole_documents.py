@@ -18,7 +18,18 @@ _FAULT |= {"hypotheses": [], "advice": "", "evidence": [], "tier": "none"}
 
 def whole_report(document: dict[str, Any]) -> ReportDocument:
     """The report with what is given, and nothing known where nothing is given."""
-    lists = ("readings", "intervals", "states", "phases", "coverage", "loss", "signals", "missing", "quality")
+    lists = (
+        "readings",
+        "intervals",
+        "states",
+        "phases",
+        "coverage",
+        "loss",
+        "clearing",
+        "signals",
+        "missing",
+        "quality",
+    )
     log = {"files": [], "start_ns": 0, "rate_hz": 100.0, "distance_m": None, "driving_s": 0.0} | document["log"]
     log["files"] = [_FILE | file for file in log["files"]]
     whole: dict[str, Any] = {

@@ -133,10 +133,9 @@ def _mode_of(isolated: Isolated, found: IdentifiedPair, limits: Limits) -> Fault
     if found.pair.side is Side.ACTUATOR:
         # the command hardly moved: a noisy reading of it looks constant too
         return None if seen.deviation < _CLEAR * noise else mode
-    near = seen.use.any() and seen.deviation < limits.min_sat / 2
-    return (
-        None if near and float(np.ptp(seen.x[seen.use])) < limits.min_sat else mode
-    )  # it repeats what it had, which is true
+    known = seen.x[seen.use]
+    at_rest = known.size and max(seen.deviation, float(np.max(np.abs(known)))) < limits.min_sat / 2
+    return None if at_rest else mode  # it repeats what it had, which is true
 
 
 def _mode_of_gain(isolated: Isolated, noise: float, limits: Limits) -> FaultMode | None:

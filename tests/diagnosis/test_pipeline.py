@@ -99,7 +99,8 @@ def test_healthy_mission_at_full_rate_is_ready(seed: int) -> None:
     assert [f for f in got["intervals"] if f["severity"] != "info"] == []
     assert got["verdict"]["status"] in ("ready", "not_assessed")
     decided = [row["decided_driving_s"] for row in got["coverage"] if row["component"] in PAPER.wheels]
-    assert (got["verdict"]["status"] == "ready") == (min(decided) >= PAPER.limits.min_assessed)
+    shown = all(check["passed"] for check in got["clearing"])
+    assert (got["verdict"]["status"] == "ready") == (min(decided) >= PAPER.limits.min_assessed and shown)
 
 
 @pytest.mark.parametrize("evidence", ["direct", "base"])
@@ -259,6 +260,7 @@ FIELDS: dict[str, Any] = {
     "phases": [{"name": str, **SPAN}],
     "coverage": [{"component": str, "side": str, "seconds": dict, "decided_driving_s": NUMBER}],
     "loss": list,
+    "clearing": list,
     "metrics": {"wheels": dict, "average": dict, "paper": [{"controller": str, "parameters": int}]},
     "signals": [
         {
@@ -278,7 +280,7 @@ FIELDS: dict[str, Any] = {
     ],
     "missing": [{"name": str, "cost": str}],
     "quality": [{"check": str, "result": str, "effect": str, "ok": bool}],
-    "limits": {"brief": NUMBER, "min_probability": NUMBER, "min_assessed": NUMBER},
+    "limits": {"brief": NUMBER, "min_probability": NUMBER, "min_assessed": NUMBER, "clear_at": NUMBER},
 }
 
 

@@ -146,7 +146,7 @@ def test_parts_that_the_result_left_out_are_said(
     made: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     folder = tmp_path / "only-RL"
-    assert run(["-q", "diagnose", str(made / "drive.mcap"), "--wheel", "RL", "-o", str(folder)]) == 0
+    assert run(["-q", "diagnose", str(made / "drive.mcap"), "--wheel", "RL", "-o", str(folder)]) == 3
     assert run(["evaluate", str(folder), "--truth", str(made / "drive.truth.json")]) == 0
     assert "FR is not in the result and not scored" in capsys.readouterr().err
 

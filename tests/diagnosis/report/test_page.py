@@ -130,7 +130,7 @@ def test_report_without_anything_is_still_a_page() -> None:
     assert "Nothing could be judged" in tree.text
 
 
-LISTS = ("readings", "intervals", "states", "phases", "coverage", "loss", "signals", "missing", "quality")
+LISTS = ("readings", "intervals", "states", "phases", "coverage", "loss", "clearing", "signals", "missing", "quality")
 
 
 @pytest.mark.parametrize("key", LISTS)
