@@ -174,7 +174,7 @@ def _trials(near: Relation, delays: tuple[int, int], span: float, dt: float) -> 
 
 
 def _near(best: Relation, delays: tuple[int, int], widest: float) -> Iterable[Relation]:
-    lags, plays = ((x * f for f in _FINE) for x in (best.lag, best.play))
+    lags, plays = [best.lag * f for f in _FINE], [best.play * f for f in _FINE]
     yield from (best._replace(lag=lag) for lag in lags if lag > 0.0 and (widest == 0.0 or lag <= _LAGS_S[-1]))
     yield from (best._replace(play=play) for play in plays if 0.0 < play <= widest)
     yield from (
