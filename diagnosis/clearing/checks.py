@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from diagnosis.clearing.axles import axle_checks
 from diagnosis.clearing.cells import Cells
 from diagnosis.clearing.wheels import wheel_checks
+from diagnosis.clearing.yaw import yaw_checks
 from diagnosis.results.clearing import Checked
 from diagnosis.results.result import FaultInterval
 from diagnosis.results.vocabulary import Severity
@@ -35,4 +36,4 @@ def checks_of(
     cells, clear_at = Cells(timeline, replay, machine, stated), machine.limits.clear_at
     with warnings.catch_warnings():  # windows without any value
         warnings.simplefilter("ignore", RuntimeWarning)
-        return (*wheel_checks(cells, clear_at), *axle_checks(cells, clear_at))
+        return (*wheel_checks(cells, clear_at), *axle_checks(cells, clear_at), *yaw_checks(cells))

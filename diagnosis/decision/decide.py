@@ -9,7 +9,7 @@ from diagnosis.decision.caveats import Reservations, caveats_of, doubt_of, open_
 from diagnosis.decision.wording import actions_of, count_words, join_words, seconds_words, sentence_of
 from diagnosis.results.assessed import needed_s
 from diagnosis.results.assessment import Assessment
-from diagnosis.results.clearing import Checked
+from diagnosis.results.clearing import Check, Checked
 from diagnosis.results.document import ActionRow, VerdictRow
 from diagnosis.results.result import FaultInterval
 from diagnosis.results.vocabulary import Kind, Severity, Tier, Verdict, part_words
@@ -22,6 +22,7 @@ Part = tuple[str, str]
 
 _COMPARED_WHEELS = 3
 _UNEXPLAINED_S = 0.5
+_NO_YAW = "An offset of a steering sensor that is there from start to end does not show in this log. A yaw rate (imu.yaw_rate) would show it."
 
 
 @dataclass(frozen=True)
@@ -121,6 +122,8 @@ def decide(
             f"about {100 * RESOLUTION[Side.ACTUATOR]:.0f} %, nor a loss that lasts the whole mission on every wheel. A second "
             "measurement would show them; a machine file with [plant] shows the last.",
         )
+    if axles and checks and not any(c.check is Check.LASTING_YAW for c in checks):
+        caveats += (_NO_YAW,)
     return replace(found, caveats=caveats, actions=actions_of(intervals))
 
 

@@ -9,10 +9,9 @@ from diagnosis.pages.labels import bounded, clock, grouped, mode_legend, number,
 from diagnosis.report.confidence import headline, judged, sure_of, sure_of_verdict
 from diagnosis.report.edges import time_words
 from diagnosis.report.judged_parts import judged_sides, kind_of
-from diagnosis.results.clearing import Check
+from diagnosis.results.clearing import size_words
 from diagnosis.results.document import (
     ActionRow,
-    ClearingRow,
     FileRow,
     IntervalRow,
     LoopRow,
@@ -205,10 +204,6 @@ def _coverage(report: ReportDocument) -> list[Context]:
     return rows
 
 
-def _size(row: ClearingRow, value: float) -> str:
-    return f"{value:.2f} s" if row["check"] == Check.DELAY else f"{100 * min(value, 9.99):.0f} %"
-
-
 def _clearing(report: ReportDocument) -> list[Context]:
     """Checks behind an all-clear, those first that do not clear their part."""
     rows = []
@@ -219,8 +214,8 @@ def _clearing(report: ReportDocument) -> list[Context]:
                 "ok": c["passed"],
                 "part": part_words(kind_of(c["component"], report["machine"]), c["component"], c["side"]),
                 "asked": c["asked"],
-                "worst": "not shown" if c["worst"] is None else _size(c, c["worst"]),
-                "limit": _size(c, c["limit"]),
+                "worst": "not shown" if c["worst"] is None else size_words(c["check"], c["worst"]),
+                "limit": size_words(c["check"], c["limit"]),
                 "when": "" if start is None or stop is None else f"{start:.1f}–{stop:.1f} s",
                 "shows": "" if c["shows"] is None else f"from {100 * c['shows']:.0f} %",
             }

@@ -25,6 +25,8 @@ class Check(StrEnum):
     STILL = "still"
     RATE = "rate"
     LASTING_RATE = "lasting_rate"
+    YAW = "yaw"
+    LASTING_YAW = "lasting_yaw"
 
 
 #: What a check compares, and what is said where it is beyond its limit; ``{part}``, ``{value}`` and ``{limit}`` are filled in.
@@ -67,6 +69,14 @@ CHECK_WORDS: dict[Check, tuple[str, str]] = {
         "steering rate per opening against the other axle, over the mission",
         "the steering rate of the {part} axle per opening is off the other axle's by {value} % over the mission",
     ),
+    Check.YAW: (
+        "yaw rate against that by the steering angles, for 3 s",
+        "the machine turns as if the {part} axle were {value} off its measured angle",
+    ),
+    Check.LASTING_YAW: (
+        "yaw rate against that by the steering angles, over the mission",
+        "the machine turns as if the {part} axle were {value} off its measured angle over the mission",
+    ),
 }
 
 
@@ -81,7 +91,7 @@ class Checked:
     check : Check
         What was asked.
     worst : float or None
-        Largest value [1, seconds for `Check.DELAY`]; None: the mission does not show it.
+        Largest value [1, seconds for `Check.DELAY`, radians for the yaw rate]; None: the mission does not show it.
     limit : float
         From here on the part is not cleared.
     start_s, stop_s : float or None
@@ -121,9 +131,14 @@ class Checked:
     @property
     def _value(self) -> str:
         assert self.worst is not None
-        if self.check is Check.DELAY:
-            return f"{self.worst:.2g} s"
-        return f"{100 * min(self.worst, 9.99):.0f}"
+        return size_words(self.check, self.worst).removesuffix(" %")
+
+
+def size_words(check: str, value: float) -> str:
+    """A value of a check in its unit."""
+    if check in (Check.YAW, Check.LASTING_YAW):
+        return f"{value:.2f} rad"
+    return f"{value:.2f} s" if check == Check.DELAY else f"{100 * min(value, 9.99):.0f} %"
 
 
 def clearing_rows(checks: Sequence[Checked]) -> list[ClearingRow]:

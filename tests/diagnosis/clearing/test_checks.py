@@ -104,3 +104,26 @@ def test_the_limit_follows_the_machine_file() -> None:
     key = ("FR", "sensor_or_actuator", Check.LASTING_RESPONSE)
     assert not _checks(_mission(fault), base=True)[key].passed
     assert _checks(_mission(fault), base=True, clear_at=0.6)[key].passed
+
+
+def test_an_angle_that_is_off_turns_the_machine() -> None:
+    fault = FaultSpec("rear", Side.SENSOR, FaultMode.OUTSIDE_TABLE, 0.0, _LENGTH, 0.02, 7.5)
+    key = ("rear", "sensor_or_actuator", Check.LASTING_YAW)
+    simulated = [
+        simulate_mission(
+            SimulationOptions(scenario="random", seed=5, duration_s=_LENGTH, rate_hz=100.0, faults=faults, imu=True)
+        )
+        for faults in ((), (fault,))
+    ]
+    healthy, off = (_checks(_with_yaw_rate(mission), base=False)[key] for mission in simulated)
+    assert healthy.passed
+    assert not off.passed
+    assert "rad off its measured angle" in off.text
+    assert key not in _checks(simulated[0], base=True)
+
+
+def _with_yaw_rate(mission: SimulatedMission) -> SimulatedMission:
+    """The yaw rate as a channel of the mission's own stamps."""
+    group = next(g for g in mission.slow if "imu.yaw_rate" in g.columns)
+    rate = np.interp(mission.stamps, group.stamps, group.columns["imu.yaw_rate"])
+    return replace(mission, columns={**mission.columns, "imu.yaw_rate": rate})

@@ -1,0 +1,63 @@
+"""The yaw rate against that by the steering angles: an angle that is off its sensor's by an offset or a scale turns the machine."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from diagnosis.clearing.cells import Array, Cells
+from diagnosis.clearing.measure import lasts, worst
+from diagnosis.results.clearing import Check, Checked
+from diagnosis.results.vocabulary import Kind
+from replay.faults import Side
+
+_STILL, _STILL_S = 0.01, 1.0  # m/s; at rest for this long, a gyro shows its bias
+_MOVING = 0.25  # of the top speed
+_OFF, _LASTING_OFF = 0.06, 0.04  # rad; turning, tyres and wheel offsets make the angles an approximation
+_STRAIGHT, _SHORTEST = 0.08, 0.1  # rad, m
+_LEAST_S = 6.0  # of driving
+
+
+def yaw_checks(cells: Cells) -> Iterator[Checked]:
+    """Checks of both steering axles together; none in a log without a yaw rate, or of a machine without two steered axles."""
+    off, part = _off_angles(cells), Side.SENSOR_OR_ACTUATOR
+    if off is None:
+        return
+    windows = np.abs(cells.frame.mean(np.where(off.straight, off.angle, np.nan)))
+    driven = np.count_nonzero(np.isfinite(off.angle)) * cells.dt >= _LEAST_S
+    lasting = abs(float(np.nanmedian(off.angle))) if driven else None
+    for axle in cells.machine.axles:
+        if np.isfinite(windows).any():
+            yield worst(cells, (Kind.STEER, axle, part, Check.YAW), windows, _OFF)
+        yield lasts(cells, (Kind.STEER, axle, part, Check.LASTING_YAW), lasting, _LASTING_OFF)
+
+
+class _Off(NamedTuple):
+    """By how much the path is off that by the angles, as an angle of one axle [rad], and where they point straight, shape (cells,)."""
+
+    angle: Array
+    straight: NDArray[np.bool_]
+
+
+def _off_angles(cells: Cells) -> _Off | None:
+    """How far the machine is off where its angles point; NaN where it is too slow. None without yaw rate, or two angles."""
+    geometry, axles = cells.machine.geometry, cells.machine.axles
+    yaw = cells.means("imu.yaw_rate")
+    if geometry is None or len(axles) != 2 or not np.isfinite(yaw).any():
+        return None
+    places = [float(np.mean([w.x for w in geometry.wheels.values() if w.axle == axle])) for axle in axles]
+    length, angle, speeds = places[0] - places[1], cells.axles("phi"), cells.wheels("v")
+    if abs(length) < _SHORTEST or not np.isfinite(angle).any(axis=0).all():
+        return None
+    known = np.asarray(np.isfinite(speeds).any(axis=1))
+    speed = np.nanmedian(np.where(known[:, np.newaxis], speeds, 0.0), axis=1)
+    rest = known & (np.abs(speed) < _STILL) & np.isfinite(yaw)
+    bias = float(np.median(yaw[rest])) if np.count_nonzero(rest) * cells.dt >= _STILL_S else 0.0
+    moving = np.abs(speed) > _MOVING * cells.machine.max_speed
+    turn = np.tan(angle[:, 0]) - np.tan(angle[:, 1])
+    with np.errstate(divide="ignore", invalid="ignore"):
+        off = np.where(moving, (yaw - bias) / speed * length - turn, np.nan)
+    return _Off(off, np.abs(turn) < _STRAIGHT)
