@@ -18,6 +18,7 @@ from diagnosis.results.clearing import Checked, clearing_rows
 from diagnosis.results.document import SCHEMA, CoverageRow, FileRow, LogRow, MachineRow, ReportDocument, WheelPlace
 from diagnosis.results.loss import loss_rows
 from diagnosis.results.result import FaultInterval, to_json
+from diagnosis.results.vocabulary import Tier
 from replay.arrays.envelope import bucket_of
 from replay.control.loop import Replay
 from replay.machine.config import Machine
@@ -141,6 +142,7 @@ def _scope(judged: Judged) -> tuple[str, ...]:
         out.append(
             f"the wheel{'s' if len(left_out) > 1 else ''} {', '.join(left_out)} {'were' if len(left_out) > 1 else 'was'} not judged"
         )
+    out += [f"the {axle} steering was not judged" for axle in machine.axles if _unjudged(judged.found, axle)]
     cut = (line.start_ns - judged.recorded.first_ns) * 1e-9
     rest = (judged.recorded.last_ns - line.start_ns) * 1e-9 - line.size * line.dt
     if max(cut, rest) > _CUT_S:
@@ -148,6 +150,11 @@ def _scope(judged: Judged) -> tuple[str, ...]:
             f"only {line.size * line.dt:.1f} s of {(judged.recorded.last_ns - judged.recorded.first_ns) * 1e-9:.1f} s of the log were judged"
         )
     return tuple(out)
+
+
+def _unjudged(found: ComponentResult, component: str) -> bool:
+    """Whether neither side of a component was judged by anything."""
+    return all(a.tier is Tier.NONE for (who, _), a in found.assessments.items() if who == component)
 
 
 def _log(mission: Mission, moving: NDArray[np.bool_], machine: Machine) -> LogRow:

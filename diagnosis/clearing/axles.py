@@ -18,6 +18,7 @@ _STILL_S, _STILL, _ANSWERED = 1.0, 0.015, 0.06  # s, rad/s, and of full opening
 _RATE_S = 8.0
 _STEERED = 0.01  # of full opening beyond the dead band: below it, an axle is not steered
 _LEAST_S = 0.5  # of a window, in which it is steered
+_WRONG_WAY = 5.0  # for an axle that turns against its opening
 _WIDEST = 0.06  # dead band of a healthy valve, of full opening
 _VALVE = 1.4  # dead band and hysteresis of a healthy valve: its limit, likewise
 #: Limits of the rate in windows and over the mission, as multiples of the loss that counts, by whether angle and opening are measured twice.
@@ -90,7 +91,10 @@ def _rates(cells: Cells, rate: Array, opening: Array, dead: Array) -> tuple[Arra
     out = np.abs(log - np.array([float(np.nanmedian(x)) if np.isfinite(x).any() else np.nan for x in log.T]))
     place = np.minimum(np.arange(cells.frame.starts.size), len(out) - 1)
     apart: list[float | None] = [None] * len(whole)
+    for j in np.flatnonzero(np.isfinite(whole) & (ahead.sum(axis=0) <= 0.0)):
+        apart[j] = _WRONG_WAY
     for a, b in pairwise(range(len(whole))):
         if np.isfinite(whole[a]) and np.isfinite(whole[b]):
-            apart[a] = apart[b] = float(abs(whole[a] - whole[b]))
+            between = float(abs(whole[a] - whole[b]))
+            apart[a], apart[b] = max(apart[a] or 0.0, between), max(apart[b] or 0.0, between)
     return out[place], apart

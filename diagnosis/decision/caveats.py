@@ -112,6 +112,22 @@ def caveats_of(
     return tuple(out)
 
 
+def limits_of(limits: Limits) -> tuple[str, ...]:
+    """Sentence on limits of the machine file that make it easier to be cleared; none where there are none."""
+    usual = Limits()
+    laxer = {
+        "min_epsilon": limits.min_epsilon > usual.min_epsilon,
+        "min_probability": limits.min_probability > usual.min_probability,
+        "min_assessed": limits.min_assessed < usual.min_assessed,
+        "clear_at": limits.clear_at > usual.clear_at,
+        "brief": limits.brief > usual.brief,
+    }
+    named = [
+        f"{key} = {getattr(limits, key):g} ({getattr(usual, key):g} is usual)" for key, lax in laxer.items() if lax
+    ]
+    return (f"The machine file's limits clear more than the usual ones: {join_words(named)}.",) if named else ()
+
+
 def _most_open(
     short: Sequence[Part],
     assessments: Mapping[Part, Assessment],

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from diagnosis.decision.caveats import Reservations, caveats_of, doubt_of, open_words
+from diagnosis.decision.caveats import Reservations, caveats_of, doubt_of, limits_of, open_words
 from diagnosis.decision.wording import actions_of, count_words, join_words, seconds_words, sentence_of
 from diagnosis.results.assessed import needed_s
 from diagnosis.results.assessment import Assessment
@@ -122,6 +122,7 @@ def decide(
             f"about {100 * RESOLUTION[Side.ACTUATOR]:.0f} %, nor a loss that lasts the whole mission on every wheel. A second "
             "measurement would show them; a machine file with [plant] shows the last.",
         )
+    caveats += limits_of(limits)
     if axles and checks and not any(c.check is Check.LASTING_YAW for c in checks):
         caveats += (_NO_YAW,)
     return replace(found, caveats=caveats, actions=actions_of(intervals))

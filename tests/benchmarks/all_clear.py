@@ -5,7 +5,7 @@ speeds and openings alone (``base``), with valve positions (``spool``) and with 
 mission is
 
     wrong all-clear   ready, or cleared with faults to watch of which none is on a part that fails
-    named             a fault worth an action is on a part that fails
+    named             a fault worth an action is on a part that fails; where a machine file is wrong, on any
     wrong part        of what is not named: a fault of severity high on a part that does not fail
     abstained         neither cleared nor named
     (not counted)     no part that fails was driven, or steered, for three seconds of its fault
@@ -92,8 +92,6 @@ def options_of(task: Task) -> SimulationOptions:
 def run(task: Task) -> list[Outcome]:
     """Outcomes of one mission."""
     mission, machine, trouble, out = simulate_mission(options_of(task)), haulotte(), task.trouble, []
-    if trouble is not None and trouble.given is not None:
-        machine = trouble.given(machine)
     name = trouble.name if trouble else "healthy"
     for tier in task.tiers:
         assert tier in EVIDENCE
@@ -137,8 +135,8 @@ def judged(task: Task, tier: str, name: str, report: ReportDocument, parts: froz
     if parts is None:
         return Outcome(task.machine, name, tier, verdict["status"], len(high), len(high), verdict["status"], words)
     right = [any(_names(f["component"], f["side"], part) for part in parts) for f in found]
-    wrong_high = sum(f["severity"] == "high" and not ok for f, ok in zip(found, right, strict=True))
-    named = any(right)
+    wrong_high = 0 if not parts else sum(f["severity"] == "high" and not ok for f, ok in zip(found, right, strict=True))
+    named = any(right) if parts else bool(found)
     if verdict["cleared"] and not named:
         outcome = "cleared"
     elif named:
@@ -152,9 +150,14 @@ def _names(component: str, side: str, part: Part) -> bool:
     return component == part[0] and side in (part[1], "sensor_or_actuator")
 
 
-def tasks_of(seeds: str, machines: Sequence[str], duration: float, every: int, healthy: int, first: int) -> list[Task]:
+def tasks_of(
+    seeds: str, machines: Sequence[str], duration: float, every: int, healthy: int, first: int, named: str | None
+) -> list[Task]:
     """All missions: one of every so many kinds, and healthy ones, of every machine."""
-    start, kinds = FIRST[seeds] + first, range(len(troubles(duration)))
+    start, kinds = (
+        FIRST[seeds] + first,
+        [k for k, t in enumerate(troubles(duration)) if named is None or named in t.name],
+    )
     out = []
     for m, machine in enumerate(machines):
         faulty = [Task(machine, k, start + k, duration, TIERS) for k in kinds if k % every == m % every]
@@ -198,12 +201,13 @@ def main() -> None:
     parser.add_argument("--duration", type=float, default=75.0, help="length of a mission [s]")
     parser.add_argument("--every", type=int, default=1, help="one of so many kinds of trouble")
     parser.add_argument("--healthy", type=int, default=40, help="healthy missions of each machine")
+    parser.add_argument("--kinds", default=None, help="only kinds whose name has this text")
     parser.add_argument("--jobs", type=int, default=1)
     parser.add_argument("--json", type=Path, metavar="FILE", help="write every outcome")
     asked = parser.parse_args()
     structure = next(n for n, s in STRUCTURES.items() if s.kind == asked.seeds)
     machines = asked.machine or [DEFAULT, structure]
-    tasks = tasks_of(asked.seeds, machines, asked.duration, asked.every, asked.healthy, asked.first)
+    tasks = tasks_of(asked.seeds, machines, asked.duration, asked.every, asked.healthy, asked.first, asked.kinds)
     outcomes = [o for batch in run_all(tasks, asked.jobs) for o in batch]
     print("\n".join(table(outcomes)))
     for o in outcomes:

@@ -13,7 +13,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from replay.faults import FaultMode, FaultSpec, Side
-from replay.machine.config import Machine
 from replay.signals.signal import Signals
 
 Courses = tuple[tuple[float, float], ...]
@@ -46,8 +45,6 @@ class Trouble:
         In the simulated machine.
     edit : Callable or None
         What happens to the recorded signals.
-    given : Callable or None
-        What happens to the machine file.
     parts : frozenset[Part]
         Parts that are faulty, any of which is right to name; empty: no part is.
     """
@@ -55,7 +52,6 @@ class Trouble:
     name: str
     faults: tuple[FaultSpec, ...] = ()
     edit: Callable[[Signals], Signals] | None = None
-    given: Callable[[Machine], Machine] | None = None
     parts: frozenset[Part] = frozenset()
 
 
@@ -210,6 +206,44 @@ def _recorded(duration: float) -> Iterator[Trouble]:
     yield Trouble("rear steering sensor late by .6 s", edit=late, parts=frozenset({("rear", "sensor")}))
 
 
+def _swapped(a: str, b: str) -> Callable[[Signals], Signals]:
+    """Two channels under each other's names, as a machine file may have them."""
+
+    def edit(signals: Signals) -> Signals:
+        items = dict(signals.items)
+        items[a], items[b] = replace(items[b], name=a), replace(items[a], name=b)
+        return replace(signals, items=items)
+
+    return edit
+
+
+def _misnamed(duration: float) -> Iterator[Trouble]:
+    """Machine files that are wrong: swaps, signs, units; no part fails, and none may be cleared."""
+    yield Trouble("FR and RL speeds swapped", edit=_swapped("wheel.FR.v", "wheel.RL.v"))
+    yield Trouble("FR and FL openings swapped", edit=_swapped("wheel.FR.u", "wheel.FL.u"))
+    yield Trouble("steering angles swapped", edit=_swapped("steer.front.phi", "steer.rear.phi"))
+    yield Trouble("steering commands swapped", edit=_swapped("steer.front.u", "steer.rear.u"))
+    for name, factor in (
+        ("wheel.FR.v", 0.5),
+        ("wheel.FL.v", 2.0),
+        ("wheel.RR.u", 0.5),
+        ("wheel.RL.u", -1.0),
+        ("steer.front.phi", 0.5),
+        ("steer.rear.phi", 1.7),
+        ("steer.front.u", -1.0),
+        ("steer.rear.u", 2.0),
+    ):
+        yield Trouble(f"{name} times {factor:g}", edit=_changed(name, _times(factor)))
+    ends = _changed("wheel.FL.u", lambda t, y: np.where(t > 0.7 * duration, np.nan, y))
+    yield Trouble("FL valve command ends", edit=ends)
+    ends = _changed("steer.front.phi", lambda t, y: np.where(t > 0.5 * duration, np.nan, y))
+    yield Trouble("front steering sensor ends", edit=ends)
+
+
+def _times(factor: float) -> Callable[[np.ndarray, np.ndarray], np.ndarray]:
+    return lambda t, y: factor * y
+
+
 def troubles(duration: float) -> list[Trouble]:
     """All kinds."""
-    return [*_single(duration), *_several(duration), *_recorded(duration)]
+    return [*_single(duration), *_several(duration), *_recorded(duration), *_misnamed(duration)]
