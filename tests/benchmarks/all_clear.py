@@ -27,10 +27,12 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
 import numpy as np
 from accuracy import EVIDENCE
+from foreign_machine import NAME as FOREIGN
+from foreign_machine import faults_for, has, maker, missions, scenario
 from troubles import Part, Trouble, troubles
 from variation import recorded_signals
 
-from diagnosis.pipeline import diagnose_signals
+from diagnosis.pipeline import diagnose_mission, diagnose_signals
 from diagnosis.results.document import ReportDocument
 from replay.errors import MfhcaError
 from replay.machine.config import haulotte
@@ -91,6 +93,8 @@ def options_of(task: Task) -> SimulationOptions:
 
 def run(task: Task) -> list[Outcome]:
     """Outcomes of one mission."""
+    if task.machine == FOREIGN:
+        return run_foreign(task)
     mission, machine, trouble, out = simulate_mission(options_of(task)), haulotte(), task.trouble, []
     name = trouble.name if trouble else "healthy"
     for tier in task.tiers:
@@ -105,6 +109,21 @@ def run(task: Task) -> list[Outcome]:
             continue
         out.append(judged(task, tier, name, report, trouble.parts if trouble else None))
     return out if trouble is None or exercised(mission, trouble) else []
+
+
+def run_foreign(task: Task) -> list[Outcome]:
+    """Outcomes of one mission of the reference data's foreign plant, at its own rate; its steering has no faults."""
+    make, trouble = maker(), task.trouble
+    drive = scenario(make, 9000 + task.seed, "forced", task.duration)
+    faults = trouble.faults if trouble else ()
+    if trouble and (trouble.edit or not all(has(make, f) for f in faults)):
+        return []
+    drive.faults = faults_for(make, faults)
+    name = trouble.name if trouble else "healthy"
+    return [
+        judged(task, tier, name, diagnose_mission(mission, machine).report, trouble.parts if trouble else None)
+        for tier, mission, machine in missions(make, drive, task.tiers)
+    ]
 
 
 def exercised(mission: SimulatedMission, trouble: Trouble) -> bool:
@@ -197,7 +216,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description="Wrong all-clears and wrong stops.")
     parser.add_argument("--seeds", choices=FIRST, default="tuning")
     parser.add_argument("--first", type=int, default=0, help="added to the first seed")
-    parser.add_argument("--machine", nargs="+", default=None, help="default, or structures")
+    parser.add_argument("--machine", nargs="+", default=None, help="default, structures, foreign")
     parser.add_argument("--duration", type=float, default=75.0, help="length of a mission [s]")
     parser.add_argument("--every", type=int, default=1, help="one of so many kinds of trouble")
     parser.add_argument("--healthy", type=int, default=40, help="healthy missions of each machine")

@@ -7,44 +7,16 @@ printed one. The data lies where ``MFHCA_REFERENCE_DATA`` says.
 from __future__ import annotations
 
 import argparse
-import importlib
-import os
 import sys
-import tempfile
 from pathlib import Path
-from typing import Any
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
-import numpy as np
+from foreign_machine import maker, missions, scenario
 
 from diagnosis.pipeline import diagnose_mission
-from replay.machine.toml_file import load_machine
-from replay.mission import load_mission
 
-PLANT = Path(os.environ.get("MFHCA_REFERENCE_DATA", "../shared")) / "foreign_plants"
 ROWS = ("stuck", "no_signal", "inefficient", "noisy", "outside_table")
-
-
-def healthy_report(make: Any, seed: int, law: str) -> dict[str, Any]:
-    """Report of one mission of 240 s with commands, speeds and valve commands alone."""
-    rng = np.random.default_rng(seed)
-    scenario = make.Scenario(
-        f"healthy{seed}",
-        seed,
-        ice=float(rng.choice([0.0, 0.8])),
-        slope=float(rng.choice([0.0, 0.05, 0.1])),
-        gain=float(rng.uniform(2.2, 4.0)),
-        tau=float(rng.uniform(0.1, 0.22)),
-        meas_noise=float(rng.uniform(0.001, 0.004)),
-        law=law,
-    )
-    with tempfile.TemporaryDirectory() as folder:
-        log, config = Path(folder) / "mission.mcap", Path(folder) / "machine.toml"
-        make.write_mcap(log, make.simulate(scenario), scenario, False, False)
-        config.write_text(make.machine(False, False))
-        machine = load_machine(config)
-        return dict(diagnose_mission(load_mission([log], machine), machine).report)
 
 
 def main() -> None:
@@ -54,13 +26,10 @@ def main() -> None:
     parser.add_argument("--count", type=int, default=50)
     parser.add_argument("--law", choices=("forced", "printed"), default="forced")
     asked = parser.parse_args()
-    if not PLANT.is_dir():
-        parser.error(f"{PLANT} is not there: set MFHCA_REFERENCE_DATA")
-    sys.dont_write_bytecode = True
-    sys.path.insert(0, str(PLANT))
-    make, alarms, verdicts = importlib.import_module("make"), 0, []
+    make, alarms, verdicts = maker(), 0, []
     for seed in range(asked.first, asked.first + asked.count):
-        report = healthy_report(make, seed, asked.law)
+        ((_, mission, machine),) = missions(make, scenario(make, seed, asked.law), ("base",))
+        report = diagnose_mission(mission, machine).report
         verdicts.append(report["verdict"]["status"])
         for i in report["intervals"]:
             if i["severity"] != "info" and i["mode"] in ROWS:
