@@ -347,6 +347,7 @@ def _report(
             "min_epsilon": 0.1,
             "min_sat": 0.02,
             "min_assessed": 10.0,
+            "clear_at": 0.25,
             "driving_speed": 0.02,
         },
     }

@@ -123,9 +123,16 @@ def decide(
             "measurement would show them; a machine file with [plant] shows the last.",
         )
     caveats += limits_of(limits)
-    if axles and checks and not any(c.check is Check.LASTING_YAW for c in checks):
+    if any(_offset_hidden(checks, axle) for axle in axles):
         caveats += (_NO_YAW,)
     return replace(found, caveats=caveats, actions=actions_of(intervals))
+
+
+def _offset_hidden(checks: Sequence[Checked], axle: str) -> bool:
+    """Whether an axle's angle is checked, but by nothing that would show its offset."""
+    asked = {(c.check, c.side) for c in checks if c.component == axle}
+    kinds = {check for check, _ in asked}
+    return bool(asked) and Check.LASTING_YAW not in kinds and (Check.SECOND_MEASUREMENT, Side.SENSOR) not in asked
 
 
 def _reservations(

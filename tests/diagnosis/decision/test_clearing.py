@@ -1,0 +1,77 @@
+"""What keeps a machine from being cleared though no fault is stated."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import pytest
+
+from diagnosis.decision.decide import Decision, decide
+from diagnosis.decision.intervals import intervals_of
+from diagnosis.results.assessment import Assessment
+from diagnosis.results.clearing import CHECK_WORDS, Check, Checked, clearing_rows
+from diagnosis.results.vocabulary import Kind
+from replay.faults import FaultMode, Side
+from replay.machine.config import Limits
+from tests.diagnosis.decision.findings import AXLES, LIMITS, STEP, assessed, finding, machine
+
+_BEYOND = Checked(Kind.WHEEL, "FR", Side.SENSOR_OR_ACTUATOR, Check.RESPONSE, 0.62, 0.3, 12.0, 15.0, 0.33)
+_WITHIN = replace(_BEYOND, worst=0.1)
+_UNSHOWN = Checked(Kind.STEER, "front", Side.SENSOR_OR_ACTUATOR, Check.LASTING_RATE, None, 0.3)
+
+
+def verdict(assessments: dict[tuple[str, str], Assessment], limits: Limits = LIMITS, **more: Any) -> Decision:
+    intervals = intervals_of(assessments, AXLES, 0, STEP, limits)
+    return decide(intervals, assessments, dict.fromkeys(assessments, 20.0), AXLES, limits, (), **more)
+
+
+def test_a_check_beyond_its_limit_clears_nothing() -> None:
+    got = verdict(machine(), checks=(_WITHIN, _BEYOND))
+    assert (got.status, got.cleared, got.title) == ("not_assessed", False, "No fault found, not cleared")
+    assert "the speed of FR per opening falls below the other wheels' by 62 % at 12.0–15.0 s" in got.text
+    assert verdict(machine(), checks=(_WITHIN,)).status == "ready"
+
+
+def test_what_the_mission_does_not_show_clears_nothing() -> None:
+    got = verdict(machine(), checks=(_UNSHOWN, _BEYOND))
+    assert "front steering sensor or steering valve" in got.text or "front steering sensor or valve" in got.text
+    assert "1 more check" in got.text.replace("one more check", "1 more check")
+
+
+def test_faults_to_watch_are_not_cleared_beside_an_open_check() -> None:
+    parts = machine(FR_actuator=assessed(finding(Side.ACTUATOR, FaultMode.INEFFICIENT, epsilon=0.3)))
+    assert verdict(parts, checks=(_WITHIN,)).cleared
+    got = verdict(parts, checks=(_BEYOND,))
+    assert (got.status, got.cleared) == ("watch", False)
+    assert "62 %" in got.not_cleared
+
+
+def test_a_part_of_a_mission_clears_nothing() -> None:
+    got = verdict(machine(), scope=("only 29.5 s of 60.0 s of the log were judged",))
+    assert (got.status, got.cleared) == ("not_assessed", False)
+    assert "29.5 s of 60.0 s" in got.text
+
+
+def test_limits_that_clear_more_are_named() -> None:
+    got = verdict(machine(), limits=Limits(min_epsilon=0.9, min_assessed=0.0))
+    (line,) = [c for c in got.caveats if "limits" in c]
+    assert "min_epsilon = 0.9 (0.1 is usual)" in line
+    assert "min_assessed = 0 (10 is usual)" in line
+    assert not verdict(machine(), limits=Limits(min_epsilon=0.05)).caveats
+
+
+def test_an_offset_that_nothing_would_show_is_said() -> None:
+    rate = replace(_UNSHOWN, worst=0.1)
+    yaw = replace(rate, check=Check.LASTING_YAW, worst=0.01, limit=0.04)
+    assert any("yaw rate" in c for c in verdict(machine(), checks=(rate,)).caveats)
+    assert not verdict(machine(), checks=(rate, yaw)).caveats
+
+
+@pytest.mark.parametrize("check", list(Check))
+def test_every_check_has_words(check: Check) -> None:
+    one = Checked(Kind.WHEEL, "FR", Side.SENSOR, check, 0.5, 0.1)
+    (row,) = clearing_rows([one])
+    assert row["asked"] == CHECK_WORDS[check][0]
+    assert "{" not in row["text"]
+    assert not row["passed"]
