@@ -16,19 +16,23 @@ from replay.faults import Side
 
 _STILL, _STILL_S = 0.01, 1.0  # m/s; at rest for this long, a gyro shows its bias
 _MOVING = 0.25  # of the top speed
-_OFF, _LASTING_OFF = 0.06, 0.04  # rad; turning, tyres and wheel offsets make the angles an approximation
+_OFF, _LASTING_OFF = 0.06, 0.04  # rad
 _STRAIGHT, _SHORTEST = 0.08, 0.1  # rad, m
-_LEAST_S = 6.0  # of driving
+_LEAST_S = 6.0  # of driving straight
 
 
 def yaw_checks(cells: Cells) -> Iterator[Checked]:
-    """Checks of both steering axles together; none in a log without a yaw rate, or of a machine without two steered axles."""
+    """Checks of both steering axles together; none without a yaw rate, two steered axles, and some driving straight.
+
+    In turns tyres and the wheels' offsets make the angles an approximation.
+    """
     off, part = _off_angles(cells), Side.SENSOR_OR_ACTUATOR
     if off is None:
         return
-    windows = np.abs(cells.frame.mean(np.where(off.straight, off.angle, np.nan)))
-    driven = np.count_nonzero(np.isfinite(off.angle)) * cells.dt >= _LEAST_S
-    lasting = abs(float(np.nanmedian(off.angle))) if driven else None
+    straight = np.where(off.straight, off.angle, np.nan)
+    if np.count_nonzero(np.isfinite(straight)) * cells.dt < _LEAST_S:
+        return
+    windows, lasting = np.abs(cells.frame.mean(straight)), abs(float(np.nanmedian(straight)))
     for axle in cells.machine.axles:
         if np.isfinite(windows).any():
             yield worst(cells, (Kind.STEER, axle, part, Check.YAW), windows, _OFF)

@@ -197,15 +197,15 @@ def _without_faults(
             "lasts the whole mission. Give K and tau of the wheels in [plant] of a machine file."
         )
         return Decision(Verdict.NOT_ASSESSED, "No fault found, not fully assessed", text)
+    if against.damage:
+        text = "Parts of the log are lost: " + against.damage[0]
+        return Decision(Verdict.WATCH, "No fault found in a damaged log", text, not_cleared=doubt_of((), against))
     if against.scope:
         text = f"No fault was found, but {join_words(list(against.scope))}."
         return Decision(Verdict.NOT_ASSESSED, "No fault found, not the whole mission", text)
     if against.open:
         text = f"No fault was identified, but this mission does not exclude one: {open_words(against.open)}."
         return Decision(Verdict.NOT_ASSESSED, "No fault found, not cleared", text)
-    if against.damage:
-        text = "Parts of the log are lost: " + against.damage[0]
-        return Decision(Verdict.WATCH, "No fault found in a damaged log", text, not_cleared=doubt_of((), against))
     least = min((decided_s[part] for part in assessments if part[0] not in axles), default=0.0)
     text = f"Every wheel's speed sensor and drive valve was judged healthy over at least {least:.0f} s of driving."
     return Decision(Verdict.READY, "No fault found", text, cleared=True)
