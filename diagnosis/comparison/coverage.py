@@ -30,7 +30,10 @@ class SideCoverage:
     judged_s : float
         Decided time of the whole mission [s].
     assessed : bool
-        Whether that is as much as a verdict of ``ready`` takes: `min_assessed` seconds and four fifths of the driving.
+        Whether that is as much as a verdict of ``ready`` takes: `min_assessed` seconds and four fifths of the driving of a whole
+        mission, and checks of the all-clear that none of its faults would have passed.
+    shown : bool
+        Whether the whole mission was judged, and the checks clear the component.
     """
 
     tier: Tier
@@ -38,6 +41,7 @@ class SideCoverage:
     decided_s: float
     judged_s: float
     assessed: bool
+    shown: bool = True
 
     @property
     def words(self) -> str:
@@ -45,7 +49,7 @@ class SideCoverage:
         if self.tier is Tier.NONE:
             return "not assessed"
         return f"judged for {self.decided_s:.1f} s of {self.driving_s:.1f} s driving" + (
-            "" if self.assessed else ", which is too little"
+            "" if self.assessed else ", which is too little" if self.shown else ", and not cleared"
         )
 
     @property
@@ -53,6 +57,8 @@ class SideCoverage:
         """How little it was judged, to follow *was*: not, hardly (less than half of the driving) or partly."""
         if self.tier is Tier.NONE or not self.judged_s:
             return "not assessed"
+        if not self.shown:
+            return "not cleared"
         much = "hardly" if self.decided_s < _HARDLY * self.driving_s else "only partly"
         return f"{much} assessed ({self.decided_s:.1f} of {self.driving_s:.1f} s of driving)"
 
@@ -75,12 +81,15 @@ class CoverageChange:
 def sides_of(report: ReportDocument) -> dict[Part, SideCoverage]:
     """Coverage of a report by component and side."""
     least = report["limits"]["min_assessed"]
+    open_ = {c["component"] for c in report["clearing"] if not c["passed"]}
+    whole = not report["verdict"]["scope"]
     out: dict[Part, SideCoverage] = {}
     for row in report["coverage"]:
         judged = sum(v for k, v in row["seconds"].items() if k in DECIDED)
         decided, driving, tier = row["decided_driving_s"], row["driving_s"], row["tier"]
-        assessed = tier is not Tier.NONE and decided >= needed_s(driving, least)
-        out[row["component"], row["side"]] = SideCoverage(tier, driving, decided, judged, assessed)
+        shown = whole and row["component"] not in open_
+        assessed = shown and tier is not Tier.NONE and decided >= needed_s(driving, least)
+        out[row["component"], row["side"]] = SideCoverage(tier, driving, decided, judged, assessed, shown)
     return out
 
 

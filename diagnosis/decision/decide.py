@@ -43,6 +43,8 @@ class Decision:
         Whether the machine may go out: ``ready``, or faults to watch in a mission that is ``ready`` but for them.
     not_cleared : str
         Why ``watch`` gives no such leave, to follow *not cleared:*; empty otherwise.
+    scope : tuple[str, ...]
+        Why what was judged is not the whole mission.
     """
 
     status: Verdict
@@ -52,6 +54,7 @@ class Decision:
     actions: tuple[ActionRow, ...] = ()
     cleared: bool = False
     not_cleared: str = ""
+    scope: tuple[str, ...] = ()
 
     def row(self, more_caveats: Sequence[str] = ()) -> VerdictRow:
         """The same for ``report.json``, with caveats that do not come from the judgement."""
@@ -61,6 +64,7 @@ class Decision:
             "not_cleared": self.not_cleared,
             "title": self.title,
             "text": self.text,
+            "scope": list(self.scope),
             "caveats": [*self.caveats, *more_caveats],
             "actions": list(self.actions),
         }
@@ -125,7 +129,7 @@ def decide(
     caveats += limits_of(limits)
     if any(_offset_hidden(checks, axle) for axle in axles):
         caveats += (_NO_YAW,)
-    return replace(found, caveats=caveats, actions=actions_of(intervals))
+    return replace(found, scope=tuple(scope), caveats=caveats, actions=actions_of(intervals))
 
 
 def _offset_hidden(checks: Sequence[Checked], axle: str) -> bool:

@@ -111,13 +111,14 @@ class ActionRow(TypedDict):
 
 
 class VerdictRow(TypedDict):
-    """Whether the machine may go out, and why not."""
+    """Whether the machine may go out, and why not; `scope` has why what was judged is not the whole mission."""
 
     status: Verdict
     cleared: bool
     not_cleared: str
     title: str
     text: str
+    scope: list[str]
     caveats: list[str]
     actions: list[ActionRow]
 

@@ -26,7 +26,7 @@ def completed(document: Row) -> Row:
     out: Row = _with(document, loss=[], clearing=[])
     complete: dict[str, Callable[[Json], Json]] = {
         "log": _log,
-        "verdict": lambda row: _with(row, cleared=False, not_cleared=""),
+        "verdict": lambda row: _with(row, cleared=False, not_cleared="", scope=[]),
         "loss": lambda rows: _rows(rows, lambda row: _with(row, relative=False)),
         "coverage": lambda rows: _rows(rows, _coverage),
         "limits": lambda row: _with(row, clear_at=Limits().clear_at),

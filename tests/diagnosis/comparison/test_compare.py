@@ -336,3 +336,28 @@ def test_the_document_is_plain_json() -> None:
     assert document["faults"][0]["older"]["ids"] == ["F1"]
     assert document["faults"][0]["newer"] is None
     assert document["coverage"][0]["newer"]["assessed"] is True
+
+
+def test_gone_in_a_part_of_a_mission_or_beside_an_open_check_is_not_resolved() -> None:
+    older = report(fault("FR", "sensor", "stuck"))
+    window = later()
+    window["verdict"]["scope"] = ["only 29.5 s of 60.0 s of the log were judged"]
+    open_check = {
+        "component": "FR",
+        "side": "sensor_or_actuator",
+        "check": "response",
+        "asked": "speed per opening",
+        "worst": 0.5,
+        "limit": 0.3,
+        "start_s": 1.0,
+        "stop_s": 4.0,
+        "shows": 0.3,
+        "passed": False,
+        "text": "the speed of FR falls",
+    }
+    unsure = {**later(), "clearing": [open_check]}
+    for newer in (window, unsure):
+        found = compared(older, newer)
+        assert found.counts["resolved"] == 0
+        assert "not cleared" in only(found).note
+    assert only(compared(older, later())).status == "resolved"
