@@ -28,7 +28,7 @@ _VALVE = 1.4  # dead band and hysteresis of a healthy valve: the limit as a mult
 #: that counts, by whether opening and speed are measured twice. What measurements judge need not be judged by its likeness to
 #: others as strictly; what reads too much is in no row of the tables, so that nothing else would tell it.
 _RESPONSE = {
-    (False, False): ((1.05, 0.8), (1.15, 0.8)),
+    (False, False): ((0.85, 0.75), (1.0, 0.8)),
     (True, False): ((2.0, 1.2), (1.4, 1.05)),
     (False, True): ((1.15, 1.0), (1.4, 1.2)),
     (True, True): ((3.0, 2.0), (3.0, 2.0)),

@@ -28,6 +28,9 @@ _HOLD_S = 0.1
 _LEAD_S, _TAIL_S, _CHAIN_S = 0.3, 0.1, 0.05
 _SETTLED_LAGS = 5.0  # after a fault a channel returns with its lag
 _CLEAR = 3.0  # times the noise
+_LEFT_S = (
+    0.03  # for which a command must leave the opening of a valve that is said to be stuck there, beside the valve's lag
+)
 _GROWTH_S = 0.1  # a shorter time of growth is not worth a sentence
 
 
@@ -132,7 +135,10 @@ def _mode_of(isolated: Isolated, found: IdentifiedPair, limits: Limits) -> Fault
         return None if seen.deviation < least else mode
     if found.pair.side is Side.ACTUATOR:
         # the command hardly moved: a noisy reading of it looks constant too
-        return None if seen.deviation < _CLEAR * noise else mode
+        away = np.count_nonzero(np.abs(seen.y - seen.x)[seen.use] > _CLEAR * noise) * found.pair.dt
+        relation = found.relation
+        returns = _LEFT_S + 2.0 * (relation.lag + max(0.0, relation.delay * found.pair.dt))
+        return None if seen.deviation < _CLEAR * noise or away < returns else mode
     known = seen.x[seen.use]
     at_rest = known.size and max(seen.deviation, float(np.max(np.abs(known)))) < limits.min_sat / 2
     return None if at_rest else mode  # it repeats what it had, which is true
