@@ -1,0 +1,47 @@
+"""A short form of `tests/benchmarks/all_clear.py`: faults that no machine may be cleared with, by every level of evidence."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from types import ModuleType
+
+import pytest
+
+BENCHMARKS = Path(__file__).parent / "benchmarks"
+KINDS = (
+    "FR valve dead, whole",
+    "FL valve loses .5, whole",
+    "RL sensor reads 1.35, whole",
+    "front steering valve dead, whole",
+    "front steering valve biased .1, whole",
+    "both steering valves dead, whole",
+    "RR sensor late by .4 s",
+    "FR and RL speeds swapped",
+)
+
+
+@pytest.fixture(scope="module")
+def all_clear() -> Iterator[ModuleType]:
+    sys.path.insert(0, str(BENCHMARKS))
+    import all_clear
+
+    yield all_clear
+    sys.path.remove(str(BENCHMARKS))
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_no_machine_is_cleared_with_a_fault(all_clear: ModuleType, kind: str) -> None:
+    names = [t.name for t in all_clear.troubles(60.0)]
+    found = all_clear.run(all_clear.Task("default", names.index(kind), 11, 60.0, all_clear.TIERS))
+    assert [o.tier for o in found] == list(all_clear.TIERS)
+    assert [(o.tier, o.words) for o in found if o.outcome == "cleared"] == []
+
+
+def test_healthy_machines_are_not_stopped_and_mostly_cleared(all_clear: ModuleType) -> None:
+    found = [
+        o for seed in (21, 22, 23) for o in all_clear.run(all_clear.Task("default", None, seed, 60.0, all_clear.TIERS))
+    ]
+    assert not any(o.status == "stop" for o in found)
+    assert sum(o.status == "ready" for o in found) >= len(found) / 2
