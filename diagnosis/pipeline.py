@@ -173,6 +173,13 @@ def _require_something(assessments: Mapping[tuple[str, str], Assessment], missio
             f"{names}: no wheel speed was found among its channels; run `mfhca channels` to see them, and name the wheels' "
             "signals in a machine file's [signals]"
         )
+    beside = [f"wheel.{w}.{leaf}" for w in machine.wheels for leaf in ("u", "v_ref", "v_true")]
+    if "cmd.v" in mission.signals.items or any(name in mission.signals.items for name in beside):
+        timeline = mission.timeline
+        raise NotJudged(
+            f"{names}: its {timeline.size * timeline.dt:.3g} s hold too little driving to judge anything; choose a longer "
+            "part of the log, or one in which the machine drives"
+        )
     raise NotJudged(
         f"{names}: wheel speeds are logged, but no valve command, no second speed and no commanded wheel speed beside "
         "them, so nothing can be judged; log wheel.<W>.u or wheel.<W>.v_true, or name them in the machine file's [signals]"

@@ -289,6 +289,6 @@ def _why_not_assessed(a: FoundFault, sides: Sides) -> str:
         if side.tier.strength < a.tier.strength and not a.mode.total and small:
             return (
                 f"In the newer mission the {key[1]} was judged by weaker evidence ({side.tier}, not {a.tier}), which "
-                f"mostly does not show a loss below about {100 * RESOLUTION[key[1]]:.0f} % there."
+                f"mostly does not name a loss below about {100 * RESOLUTION[key[1]]:.0f} % there."
             )
     return ""

@@ -52,8 +52,12 @@ def coverage_words(change: CoverageChangeRow) -> str:
         for side in (change["older"], change["newer"])
     )
     if change["change"] == "lost":
+        if change["newer"] is not None and not change["newer"]["shown"]:
+            return "no longer cleared"
         return "no longer long enough" if now else "no longer assessed"
     if change["change"] == "gained":
+        if change["older"] is not None and not change["older"]["shown"]:
+            return "cleared now"
         return "long enough now" if before else "assessed now"
     if any(side is not None and side["assessed"] for side in (change["older"], change["newer"])):
         return ""

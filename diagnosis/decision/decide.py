@@ -122,7 +122,7 @@ def decide(
     if _modelled(assessments) and model is not None and model.identified:
         caveats += (
             "Speed sensors and valves without a second measurement were judged by a wheel model identified from this "
-            f"mission. It mostly does not show a sensor's loss below about {100 * RESOLUTION[Side.SENSOR]:.0f} % or a valve's below "
+            f"mission. It mostly does not name a sensor's loss below about {100 * RESOLUTION[Side.SENSOR]:.0f} % or a valve's below "
             f"about {100 * RESOLUTION[Side.ACTUATOR]:.0f} %, nor a loss that lasts the whole mission on every wheel. A second "
             "measurement would show them; a machine file with [plant] shows the last.",
         )
@@ -206,7 +206,7 @@ def _without_faults(
         return Decision(Verdict.WATCH, "No fault found in a damaged log", text, not_cleared=doubt_of((), against))
     if against.scope:
         text = f"No fault was found, but {join_words(list(against.scope))}."
-        return Decision(Verdict.NOT_ASSESSED, "No fault found, not the whole mission", text)
+        return Decision(Verdict.NOT_ASSESSED, "No fault found, not all judged", text)
     if against.open:
         text = f"No fault was identified, but this mission does not exclude one: {open_words(against.open)}."
         return Decision(Verdict.NOT_ASSESSED, "No fault found, not cleared", text)

@@ -12,13 +12,13 @@ Array = NDArray[np.float64]
 
 
 def low_passed(u: Array, tau: float, dt: float) -> Array:
-    """Response of a first-order lag to u held over each step; NaN counts as 0."""
+    """Response of a first-order lag of tau [s], 0 for none, to u held over each step; NaN counts as 0."""
     return low_passed_on(u, tau, dt, None)[0] if u.size else u
 
 
 def low_passed_on(u: Array, tau: float, dt: float, state: float | None) -> tuple[Array, float]:
     """`low_passed` of a block, with the state from the block before and for the next; None before the first."""
-    a = np.exp(-dt / tau)
+    a = np.exp(-dt / tau) if tau > 0 else 0.0
     filled = without_nan(u)
     out = np.empty(u.size)
     last = _scan_lag(filled, a, float(filled[0]) if state is None else state, out)

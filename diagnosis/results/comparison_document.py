@@ -78,13 +78,14 @@ class FaultChangeRow(TypedDict):
 
 
 class SideCoverageRow(TypedDict):
-    """How long one component and side was judged in one mission [s]."""
+    """How long one component and side was judged in one mission [s]; `shown`: the whole mission was judged, and cleared it."""
 
     tier: Tier
     driving_s: float
     decided_s: float
     judged_s: float
     assessed: bool
+    shown: bool
 
 
 class CoverageChangeRow(TypedDict):

@@ -95,4 +95,4 @@ def _loss(gain: Array, forward: NDArray[np.bool_], turning: Array, window_s: flo
 def _means(x: Array, length: int) -> Array:
     """Means over blocks of so many rows; NaN where one is."""
     count = x.shape[0] // length
-    return np.asarray(np.mean(np.reshape(x[: count * length], (count, length, -1)), axis=1), np.float64)
+    return np.asarray(np.mean(np.reshape(x[: count * length], (count, length, *x.shape[1:])), axis=1), np.float64)

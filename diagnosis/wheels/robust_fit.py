@@ -64,7 +64,7 @@ class Trimmed(NamedTuple):
 def normal_equations(x: Array, y: Array, use: NDArray[np.bool_], length: int) -> Normal:
     """Normal equations of windows of `length` samples; x (m, p), y and use (m,)."""
     n = y.size // length
-    rows = x[: n * length].reshape(n, length, -1)
+    rows = x[: n * length].reshape(n, length, x.shape[1])
     kept = np.where(use[: n * length, None], x[: n * length], 0.0).reshape(rows.shape)
     there = np.where(use, y, 0.0)[: n * length].reshape(n, length)
     turned = np.ascontiguousarray(kept.transpose(0, 2, 1))

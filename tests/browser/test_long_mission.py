@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from tests.browser.downloads import saved
 from tests.browser.evidence_samples import SPIKES, spikes, spikes_long
 
 playwright = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
@@ -90,20 +91,19 @@ def test_csv_holds_every_sample_near_a_fault_and_extremes_elsewhere(open_page: O
     page = open_page("spikes_long", "#fault=F1&t=32.49,32.52&plots=wheel.FR.v")
     page.locator("#signals-figure .main-svg").first.wait_for()
 
-    def saved() -> tuple[str, np.ndarray]:
-        with page.expect_download() as download:
-            page.locator("[data-act=csv][data-of=signals]").click()
-        head, *lines = Path(download.value.path()).read_text(encoding="utf-8").splitlines()
+    def table() -> tuple[str, np.ndarray]:
+        path = Path(saved(page, page.locator("[data-act=csv][data-of=signals]")).path())
+        head, *lines = path.read_text(encoding="utf-8").splitlines()
         return head, np.array([[float(v) for v in line.split(",")] for line in lines])
 
     shown(page, 32.49, 32.52)
-    head, rows = saved()
+    head, rows = table()
     _, columns = spikes()
     assert head == '"t [s]","wheel.FR.v [m/s]"'
     np.testing.assert_allclose(rows[:, 0], np.arange(32_490, 32_521) / 1000, atol=1e-9)
     np.testing.assert_allclose(rows[:, 1], columns["wheel.FR.v"][32_490:32_521], atol=2e-4)
     shown(page, 77.68, 77.72)
-    head, rows = saved()
+    head, rows = table()
     _, envelopes, _ = spikes_long()
     assert re.fullmatch(r'"t \[s\]","wheel.FR.v \[m/s\] min of (\d+)","wheel.FR.v \[m/s\] max of \1"', head)
     assert rows[:, 2].max() == pytest.approx(1.998, abs=2e-4)

@@ -10,6 +10,7 @@ from typing import Any
 import pytest
 
 from tests import report_samples as samples
+from tests.browser.downloads import saved
 
 playwright = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
 expect = playwright.expect
@@ -206,10 +207,9 @@ def test_deep_link_and_change_of_address(open_page: OPEN) -> None:
 
 def test_csv_of_the_view(show: SHOW) -> None:
     page = show("#fault=F1&t=30,30.05")
-    with page.expect_download() as download:
-        page.get_by_role("button", name="CSV of view").first.click()
-    lines = Path(download.value.path()).read_text(encoding="utf-8").splitlines()
-    assert download.value.suggested_filename == "F1.csv"
+    download = saved(page, page.get_by_role("button", name="CSV of view").first)
+    lines = Path(download.path()).read_text(encoding="utf-8").splitlines()
+    assert download.suggested_filename == "F1.csv"
     heads = lines[0].split(",")
     assert heads[0] == '"t [s]"'
     at = heads.index('"wheel.FR.v [m/s]"')

@@ -12,6 +12,7 @@ from typing import Any
 import pytest
 
 from tests import report_samples as samples
+from tests.browser.downloads import saved
 
 playwright = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
 expect = playwright.expect
@@ -101,29 +102,25 @@ def test_extremes_stored_of_a_long_mission_are_never_called_samples(open_page: O
     assert grey[0][0] <= start <= grey[0][1] + 1e-9
     assert grey[0][1] - grey[0][0] == pytest.approx(64 * dt)
     expect(page.locator("#figure")).not_to_contain_text("every sample")
-    with page.expect_download() as download:
-        page.locator("[data-act=csv][data-of=evidence]").click()
-    assert " min of 64" in Path(download.value.path()).read_text(encoding="utf-8").splitlines()[0]
+    download = saved(page, page.locator("[data-act=csv][data-of=evidence]"))
+    assert " min of 64" in Path(download.path()).read_text(encoding="utf-8").splitlines()[0]
 
 
 def test_files_of_a_fault(open_page: OPEN) -> None:
     page = drawn(open_page("five_faults"))
-    with page.expect_download() as download:
-        page.get_by_role("button", name="JSON").click()
-    assert download.value.suggested_filename == "F1.json"
-    assert json.loads(Path(download.value.path()).read_text("utf-8")) == samples.five_faults()[0]["intervals"][0]
+    download = saved(page, page.get_by_role("button", name="JSON"))
+    assert download.suggested_filename == "F1.json"
+    assert json.loads(Path(download.path()).read_text("utf-8")) == samples.five_faults()[0]["intervals"][0]
     for form, begin in (("PNG", b"\x89PNG\r\n\x1a\n"), ("SVG", b"<svg")):
-        with page.expect_download() as download:
-            page.locator("#evidence").get_by_role("button", name=form).click()
-        assert download.value.suggested_filename == f"F1.{form.lower()}"
-        assert Path(download.value.path()).read_bytes().startswith(begin)
+        download = saved(page, page.locator("#evidence").get_by_role("button", name=form))
+        assert download.suggested_filename == f"F1.{form.lower()}"
+        assert Path(download.path()).read_bytes().startswith(begin)
 
 
 def test_table_of_faults_as_csv(open_page: OPEN) -> None:
     page = open_page("hostile")
-    with page.expect_download() as download:
-        page.get_by_role("button", name="CSV", exact=True).click()
-    with Path(download.value.path()).open(encoding="utf-8", newline="") as file:
+    download = saved(page, page.get_by_role("button", name="CSV", exact=True))
+    with Path(download.path()).open(encoding="utf-8", newline="") as file:
         head, *rows = csv.reader(file)
     assert head[:6] == ["id", "component", "side", "mode", "start [s]", "stop [s]"]
     intervals = samples.hostile()[0]["intervals"]

@@ -10,6 +10,8 @@ from typing import Any
 import numpy as np
 import pytest
 
+from tests.browser.downloads import saved
+
 playwright = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
 expect = playwright.expect
 
@@ -87,15 +89,13 @@ def test_files_of_the_chosen_signals(open_page: OPEN) -> None:
     page.locator("#signals-figure .main-svg").first.wait_for()
     settled(page, "plots=wheel.FR.v;path.x$")
     tools = page.locator("#signals-tools")
-    with page.expect_download() as download:
-        tools.get_by_role("button", name="CSV of view").click()
-    lines = Path(download.value.path()).read_text(encoding="utf-8").splitlines()
+    download = saved(page, tools.get_by_role("button", name="CSV of view"))
+    lines = Path(download.path()).read_text(encoding="utf-8").splitlines()
     assert lines[0] == '"t [s]","wheel.FR.v [m/s]","path.x [m]"'
     for form, begin in (("PNG", b"\x89PNG\r\n\x1a\n"), ("SVG", b"<svg")):
-        with page.expect_download() as download:
-            tools.get_by_role("button", name=form).click()
-        assert download.value.suggested_filename == f"signals.{form.lower()}"
-        assert Path(download.value.path()).read_bytes().startswith(begin)
+        download = saved(page, tools.get_by_role("button", name=form))
+        assert download.suggested_filename == f"signals.{form.lower()}"
+        assert Path(download.path()).read_bytes().startswith(begin)
 
 
 def test_hostile_names_are_found_and_stay_text(open_page: OPEN) -> None:
