@@ -9,12 +9,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from diagnosis.assess import ComponentResult
-from diagnosis.clearing.checks import checks_of
+from diagnosis.clearing.cells import Cells
+from diagnosis.clearing.checks import cells_of, checks_of
+from diagnosis.clearing.detectable import detectable
 from diagnosis.decision import metrics, quality
 from diagnosis.decision.caveats import more_caveats
 from diagnosis.decision.decide import Decision, decide
 from diagnosis.decision.intervals import intervals_of, spans_of
 from diagnosis.results.clearing import Checked, clearing_rows
+from diagnosis.results.detectability import detectability_table
 from diagnosis.results.document import SCHEMA, CoverageRow, FileRow, LogRow, MachineRow, ReportDocument, WheelPlace
 from diagnosis.results.loss import loss_rows
 from diagnosis.results.result import FaultInterval, to_json
@@ -63,9 +66,14 @@ class Judged:
         )
 
     @cached_property
+    def cells(self) -> Cells:
+        """The mission in cells, with what is stated."""
+        return cells_of(self.mission.timeline, self.replay, self.machine, self.intervals)
+
+    @cached_property
     def checks(self) -> tuple[Checked, ...]:
         """What stands behind an all-clear."""
-        return checks_of(self.mission.timeline, self.replay, self.machine, self.intervals)
+        return checks_of(self.cells)
 
     @property
     def damage(self) -> list[str]:
@@ -99,6 +107,7 @@ def report_of_mission(judged: Judged, identity: MachineRow) -> ReportDocument:
         "phases": metrics.phases(timeline, replay, machine),
         "coverage": coverage,
         "clearing": clearing_rows(judged.checks),
+        "detectability": detectability_table(detectable(judged.cells)),
         "loss": loss_rows({key: a.loss for key, a in found.assessments.items()}),
         "metrics": metrics.loop_metrics(timeline, replay, machine, moving),
         "signals": list(judged.recorded.rows),

@@ -11,7 +11,9 @@ from rich.console import RenderableType
 from rich.text import Text
 
 from cli.tables.layout import ByWidth, bullets, section, table, text
+from diagnosis.clearing.forecast import Forecast, forecast
 from diagnosis.decision.missing import cost_of_missing
+from diagnosis.results.vocabulary import part_name
 from replay.machine.config import Machine
 from replay.machine.signal_table import signal_of
 from replay.mission import MissionFile
@@ -62,6 +64,16 @@ class MissingSignal(TypedDict):
     cost: str
 
 
+class ForecastPart(TypedDict):
+    """What the signals can tell of one side of some parts, and what to log to be told more."""
+
+    components: list[str]
+    side: str
+    told: bool
+    words: str
+    log: list[str]
+
+
 class SignalsDocument(TypedDict):
     """What `mfhca channels --json` prints."""
 
@@ -69,6 +81,7 @@ class SignalsDocument(TypedDict):
     files: list[FilePart]
     signals: list[MappedSignal]
     missing: list[MissingSignal]
+    forecast: list[ForecastPart]
     notes: list[str]
 
 
@@ -93,6 +106,10 @@ def signals_document(files: Sequence[MissionFile], signals: Signals, machine: Ma
         "signals": [_signal(s) for s in signals.items.values()],
         "missing": [
             {"name": name, "reason": reason, "cost": cost_of_missing(name)} for name, reason in signals.missing.items()
+        ],
+        "forecast": [
+            {"components": list(f.components), "side": f.side, "told": f.told, "words": f.words, "log": list(f.log)}
+            for f in forecast(signals.items, machine)
         ],
         "notes": list(signals.notes),
     }
@@ -129,6 +146,13 @@ def signals_parts(signals: Signals, machine: Machine) -> list[RenderableType]:
     if signals.missing:
         lines = [(name, _cost(cost, reason)) for name, cost, reason in _missing_groups(signals.missing, machine)]
         parts += [section("Missing signals and their effect"), table(("signal", "effect"), lines)]
+    told = forecast(signals.items, machine)
+    if signals.items and told:
+        by_part = [(_part(f), f.words, "\n".join(f.log)) for f in told]
+        parts += [
+            section("What can be told with these signals"),
+            table(("part", "what shows", "log to tell more"), by_part),
+        ]
     notes = [n for n in signals.notes if _is_doubt(n)]
     if notes:
         parts += [section("Notes"), bullets(notes)]
@@ -142,6 +166,10 @@ def _row(signal: Signal, several: bool) -> tuple[str, str, str, str, str]:
     how = (f"  in {PurePath(signal.source).name}" if several else "") + ("" if signal.guessed else "  (given)")
     rate = f"{d['rate_hz']:.4g}" if d["rate_hz"] else "–"
     return d["name"], d["channel"] + how, d["recorded_unit"] or "SI", rate, span.strip()
+
+
+def _part(f: Forecast) -> str:
+    return f"{', '.join(f.components)} {part_name(f.kind, f.side)}"
 
 
 def _cost(cost: str, reason: str) -> Text:

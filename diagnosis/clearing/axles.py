@@ -4,25 +4,26 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 
 from diagnosis.clearing.cells import Array, Cells, Frame
-from diagnosis.clearing.measure import lasts, off_reference, worst
+from diagnosis.clearing.measure import compared, lasts, worst
 from diagnosis.results.clearing import Check, Checked
 from diagnosis.results.vocabulary import Kind
 from replay.faults import Side
 
-_FLOOR_RAD, _OPEN = 0.06, 0.03  # deviations are shares of at least this angle and opening
-_STILL_S, _STILL, _ANSWERED = 1.0, 0.015, 0.06  # s, rad/s, and of full opening
+FLOOR_RAD, OPENING = 0.06, 0.03  # deviations are shares of at least this angle and opening
+_STILL_S, _STILL, ANSWERED = 1.0, 0.015, 0.06  # s, rad/s, and of full opening
 _RATE_S = 8.0
 _STEERED = 0.01  # of full opening beyond the dead band: below it, an axle is not steered
 _LEAST_S = 0.5  # of a window, in which it is steered
 _WRONG_WAY = 5.0  # for an axle that turns against its opening
 _WIDEST = 0.06  # dead band of a healthy valve, of full opening
-_VALVE = 1.4  # dead band and hysteresis of a healthy valve: its limit, likewise
+VALVE = 1.4  # dead band and hysteresis of a healthy valve: its limit, likewise
 #: Limits of the rate in windows and over the mission, as multiples of the loss that counts, by whether angle and opening are measured twice.
-_RATE = {False: (2.0, 1.0), True: (3.0, 2.0)}
+RATE = {False: (2.0, 1.0), True: (3.0, 2.0)}
 _FEW_S = 2.0  # in which an axle is steered, for its usual rate
 
 
@@ -31,25 +32,30 @@ def axle_checks(cells: Cells, clear_at: float) -> Iterator[Checked]:
     angle, second, command, opening = (cells.axles(leaf) for leaf in ("phi", "phi_true", "u", "u_applied"))
     either, share = Side.SENSOR_OR_ACTUATOR, -np.log1p(-clear_at)
     used = np.where(np.isfinite(opening), opening, command)
-    rate = np.gradient(angle, cells.dt, axis=0) if len(angle) > 1 else np.full(angle.shape, np.nan)
-    dead = [min(_commanded_still(rate[:, j], used[:, j], cells)[0], _WIDEST) for j in range(angle.shape[1])]
-    windows, usual = _rates(cells, rate, used, np.array(dead))
+    rate = rate_of(angle, cells.dt)
+    rates = rates_of(cells, rate, used)
+    place = np.minimum(np.arange(cells.frame.starts.size), len(rates.off) - 1)
     for j, axle in enumerate(cells.machine.axles):
         about = (Kind.STEER, axle)
         if not np.isfinite(angle[:, j]).any():
             continue
         if np.isfinite(second[:, j]).any():
-            off = off_reference(cells, angle[:, j], second[:, j], _FLOOR_RAD)
+            off = compared(cells, angle[:, j], second[:, j], FLOOR_RAD).off
             yield worst(cells, (*about, Side.SENSOR, Check.SECOND_MEASUREMENT), off, clear_at)
         if np.isfinite(opening[:, j]).any() and np.isfinite(command[:, j]).any():
-            off = off_reference(cells, opening[:, j], command[:, j], _OPEN)
-            yield worst(cells, (*about, Side.ACTUATOR, Check.SECOND_MEASUREMENT), off, _VALVE * clear_at)
+            off = compared(cells, opening[:, j], command[:, j], OPENING).off
+            yield worst(cells, (*about, Side.ACTUATOR, Check.SECOND_MEASUREMENT), off, VALVE * clear_at)
         if np.isfinite(command[:, j]).any():
             yield _still(cells, axle, rate[:, j], command[:, j])
             twice = bool(np.isfinite(second[:, j]).any() and np.isfinite(opening[:, j]).any())
-            brief, long = _RATE[twice]
-            yield worst(cells, (*about, either, Check.RATE), windows[:, j], brief * share)
-            yield lasts(cells, (*about, either, Check.LASTING_RATE), usual[j], long * share)
+            brief, long = RATE[twice]
+            yield worst(cells, (*about, either, Check.RATE), np.abs(rates.off[place, j]), brief * share)
+            yield lasts(cells, (*about, either, Check.LASTING_RATE), rates.apart[j], long * share)
+
+
+def rate_of(angle: Array, dt: float) -> Array:
+    """Steering rates of angles (cells, axles) [rad/s]."""
+    return np.gradient(angle, dt, axis=0) if len(angle) > 1 else np.full(angle.shape, np.nan)
 
 
 def _still(cells: Cells, axle: str, rate: Array, command: Array) -> Checked:
@@ -58,13 +64,18 @@ def _still(cells: Cells, axle: str, rate: Array, command: Array) -> Checked:
     largest, start = _commanded_still(rate, command, cells)
     stop = start + _STILL_S
     if any(start < b and stop > a for a, b in cells.stated.get(axle, ())):
-        return Checked(*part, 0.0, _ANSWERED)
-    return Checked(*part, largest if np.isfinite(largest) else None, _ANSWERED, start, stop)
+        return Checked(*part, 0.0, ANSWERED)
+    return Checked(*part, largest if np.isfinite(largest) else None, ANSWERED, start, stop)
+
+
+def still_frame(cells: Cells) -> Frame:
+    """Windows in which an axle that is commanded must move."""
+    return Frame(cells.size, max(1, round(_STILL_S / cells.dt)), max(1, round(0.3 / cells.dt)))
 
 
 def _commanded_still(rate: Array, command: Array, cells: Cells) -> tuple[float, float]:
     """Largest mean command while an axle stands still for a second [1], NaN where nothing is known, and when that begins [s]."""
-    frame = Frame(cells.size, max(1, round(_STILL_S / cells.dt)), max(1, round(0.3 / cells.dt)))
+    frame = still_frame(cells)
     mean = np.abs(frame.mean(command))
     if not np.isfinite(mean).any():
         return np.nan, 0.0
@@ -73,11 +84,33 @@ def _commanded_still(rate: Array, command: Array, cells: Cells) -> tuple[float, 
     return float(values[k]), float(frame.starts[k] * cells.dt)
 
 
-def _rates(cells: Cells, rate: Array, opening: Array, dead: Array) -> tuple[Array, list[float | None]]:
-    """|ln| of the steering rate per opening: by windows against the axle's usual one, and that against the other axle's.
+class Rates(NamedTuple):
+    """ln of the steering rate per opening.
 
-    `dead` is what of an opening moves nothing, shape (axles,).
+    Attributes
+    ----------
+    frame : Frame
+        Windows of `_RATE_S`.
+    off : Array, shape (windows, axles)
+        Against the axle's usual one.
+    whole : Array, shape (axles,)
+        Over the mission; NaN where an axle is hardly steered.
+    apart : list[float | None]
+        How far that is from the other axle's.
+    weight : Array, shape (cells, axles)
+        Rate that counts in a window, 0 where none does [rad/s].
     """
+
+    frame: Frame
+    off: Array
+    whole: Array
+    apart: list[float | None]
+    weight: Array
+
+
+def rates_of(cells: Cells, rate: Array, opening: Array) -> Rates:
+    """Steering rates per opening beyond what of it moves nothing; arrays (cells, axles)."""
+    dead = np.array([min(_commanded_still(r, o, cells)[0], _WIDEST) for r, o in zip(rate.T, opening.T, strict=True)])
     frame = Frame(cells.size, max(1, round(_RATE_S / cells.dt)), cells.frame.hop)
     beyond = np.maximum(np.abs(opening) - np.nan_to_num(dead), 0.0)
     steered = np.isfinite(rate) & (np.nan_to_num(beyond) > _STEERED)
@@ -88,8 +121,7 @@ def _rates(cells: Cells, rate: Array, opening: Array, dead: Array) -> tuple[Arra
         log = np.where(time >= _LEAST_S, np.log(np.maximum(frame.sums(ahead) / frame.sums(opened), 1e-3)), np.nan)
         whole = np.log(np.maximum(ahead.sum(axis=0) / opened.sum(axis=0), 1e-3))
     whole = np.where(steered.sum(axis=0) * cells.dt >= _FEW_S, whole, np.nan)
-    out = np.abs(log - np.array([float(np.nanmedian(x)) if np.isfinite(x).any() else np.nan for x in log.T]))
-    place = np.minimum(np.arange(cells.frame.starts.size), len(out) - 1)
+    off = log - np.array([float(np.nanmedian(x)) if np.isfinite(x).any() else np.nan for x in log.T])
     apart: list[float | None] = [None] * len(whole)
     for j in np.flatnonzero(np.isfinite(whole) & (ahead.sum(axis=0) <= 0.0)):
         apart[j] = _WRONG_WAY
@@ -97,4 +129,4 @@ def _rates(cells: Cells, rate: Array, opening: Array, dead: Array) -> tuple[Arra
         if np.isfinite(whole[a]) and np.isfinite(whole[b]):
             between = float(abs(whole[a] - whole[b]))
             apart[a], apart[b] = max(apart[a] or 0.0, between), max(apart[b] or 0.0, between)
-    return out[place], apart
+    return Rates(frame, off, whole, apart, ahead)

@@ -39,6 +39,7 @@ class Cells:
     replay: Replay
     machine: Machine
     stated: Mapping[str, Sequence[tuple[float, float]]] = field(default_factory=dict)
+    _kept: dict[str, Array] = field(default_factory=dict, repr=False, compare=False)
 
     @cached_property
     def width(self) -> int:
@@ -60,10 +61,11 @@ class Cells:
         """Windows of `WINDOW_S`."""
         return Frame(self.size, max(1, round(WINDOW_S / self.dt)), max(1, round(HOP_S / self.dt)))
 
-    def explained(self, component: str) -> NDArray[np.bool_]:
-        """Windows in which a fault of the component is stated anyhow, shape (windows,)."""
-        starts = self.frame.starts * self.dt
-        stops = starts + self.frame.length * self.dt
+    def explained(self, component: str, frame: Frame | None = None) -> NDArray[np.bool_]:
+        """Windows, of `frame` if given, in which a fault of the component is stated anyhow, shape (windows,)."""
+        frame = frame or self.frame
+        starts = frame.starts * self.dt
+        stops = starts + frame.length * self.dt
         out = np.zeros(starts.size, dtype=np.bool_)
         for a, b in self.stated.get(component, ()):
             out |= (stops > a) & (starts < b)
@@ -75,12 +77,19 @@ class Cells:
 
     def means(self, name: str) -> Array:
         """Mean of a signal in each cell; NaN where it has no value. Shape (cells,)."""
-        found = self.timeline.get(name)
-        return np.full(self.size, np.nan) if found is None else self.of(found)
+        if name not in self._kept:
+            found = self.timeline.get(name)
+            self._kept[name] = np.full(self.size, np.nan) if found is None else self.of(found)
+        return self._kept[name]
 
     def of(self, x: Array) -> Array:
         """The same of any column of the timeline, shape (cells, …)."""
         return np.concatenate([_means(x[part], self.width) for part in blocks(len(x), self.width)])
+
+    @cached_property
+    def reference(self) -> Array:
+        """Commanded speed of every wheel, shape (cells, wheels)."""
+        return self.of(self.replay.v_ref)
 
     def wheels(self, leaf: str) -> Array:
         """A signal of every wheel, shape (cells, wheels)."""

@@ -17,10 +17,8 @@ from replay.machine.config import Machine
 from replay.signals.timeline import Timeline
 
 
-def checks_of(
-    timeline: Timeline, replay: Replay, machine: Machine, faults: Sequence[FaultInterval] = ()
-) -> tuple[Checked, ...]:
-    """Whatever the log allows to ask of each part, whichever evidence judged it: more evidence never hides a fault.
+def cells_of(timeline: Timeline, replay: Replay, machine: Machine, faults: Sequence[FaultInterval] = ()) -> Cells:
+    """A mission in cells.
 
     Parameters
     ----------
@@ -33,7 +31,12 @@ def checks_of(
     for f in faults:
         if f.severity is not Severity.INFO:
             stated.setdefault(f.component, []).append((f.start_s, f.stop_s))
-    cells, clear_at = Cells(timeline, replay, machine, stated), machine.limits.clear_at
+    return Cells(timeline, replay, machine, stated)
+
+
+def checks_of(cells: Cells) -> tuple[Checked, ...]:
+    """Whatever the log allows to ask of each part, whichever evidence judged it: more evidence never hides a fault."""
+    clear_at = cells.machine.limits.clear_at
     with warnings.catch_warnings():  # windows without any value
         warnings.simplefilter("ignore", RuntimeWarning)
         return (*wheel_checks(cells, clear_at), *axle_checks(cells, clear_at), *yaw_checks(cells))

@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
-import numpy as np
+from typing import NamedTuple
 
-from diagnosis.clearing.cells import Array, Cells
+import numpy as np
+from numpy.typing import NDArray
+
+from diagnosis.clearing.cells import Array, Cells, Frame
+from diagnosis.estimation.lag import low_passed
 from diagnosis.results.clearing import Check, Checked
 from diagnosis.results.vocabulary import Kind
 from replay.faults import Side
@@ -17,14 +21,50 @@ _LOSSES = (Check.RESPONSE, Check.LASTING_RESPONSE, Check.RATE, Check.LASTING_RAT
 
 def lowest_passed(x: Array, dt: float, lag_s: float) -> Array:
     """Columns behind a lag of first order, shape as x; gaps count as 0."""
-    from scipy.signal import lfilter
+    columns = x[:, np.newaxis] if x.ndim == 1 else x
+    passed = [low_passed(np.append(np.nan_to_num(column), 0.0), lag_s, dt)[1:] for column in columns.T]
+    return np.column_stack(passed).reshape(x.shape)
 
-    keep = np.exp(-dt / lag_s)
-    return np.asarray(lfilter([1.0 - keep], [1.0, -keep], np.nan_to_num(x), axis=0))
+
+class Compared(NamedTuple):
+    """A channel and its reference.
+
+    Attributes
+    ----------
+    frame : Frame
+        Windows.
+    a, b : Array, shape (cells,)
+        Both, evened; NaN where one is.
+    size : Array, shape (windows,)
+        What a deviation is a share of.
+    mean : Array, shape (windows,)
+        Mean of a − b.
+    driven, moves : NDArray[np.bool_], shape (windows,)
+        Whether the reference is beyond its floor, and whether it or the channel is.
+    """
+
+    frame: Frame
+    a: Array
+    b: Array
+    size: Array
+    mean: Array
+    driven: NDArray[np.bool_]
+    moves: NDArray[np.bool_]
+
+    @property
+    def off(self) -> Array:
+        """How far a is off b in each window, as a share of b: by its gain, its mean, and what is left beside both. Shape (windows,)."""
+        frame, a, b = self.frame, self.a, self.b
+        with np.errstate(divide="ignore", invalid="ignore"):
+            gain = np.abs(1.0 - frame.sums(a * b) / frame.sums(b * b))
+        scatter = np.sqrt(np.maximum(frame.mean((a - b) ** 2) - self.mean**2, 0.0)) / self.size
+        # what hysteresis and lag leave is no loss: it counts from half of the reference on
+        off = np.fmax(np.fmax(np.abs(self.mean) / self.size, np.where(self.driven, gain, 0.0)), 0.5 * scatter)
+        return np.asarray(np.where(self.moves, off, np.nan))
 
 
-def off_reference(cells: Cells, y: Array, x: Array, floor: float) -> Array:
-    """How far y is off x in each window, as a share of x, shape (windows,): by its gain, its mean, and what is left beside both.
+def compared(cells: Cells, y: Array, x: Array, floor: float) -> Compared:
+    """A channel y and its reference x.
 
     Parameters
     ----------
@@ -38,15 +78,9 @@ def off_reference(cells: Cells, y: Array, x: Array, floor: float) -> Array:
     frame = cells.frame
     known = np.isfinite(y) & np.isfinite(x)
     a, b = (np.where(known, lowest_passed(z, cells.dt, _EVEN_S), np.nan) for z in (y, x))
-    size = np.maximum(frame.rms(b), floor)
-    moves = (frame.rms(b) > floor) | (frame.rms(a) > 2.0 * floor)
-    offset = np.abs(frame.mean(a - b)) / size
-    with np.errstate(divide="ignore", invalid="ignore"):
-        gain = np.abs(1.0 - frame.sums(np.where(known, a * b, 0.0)) / frame.sums(np.where(known, b * b, 0.0)))
-    scatter = np.sqrt(np.maximum(frame.mean((a - b) ** 2) - frame.mean(a - b) ** 2, 0.0)) / size
-    # what hysteresis and lag leave is no loss: it counts from half of the reference on
-    off = np.fmax(np.fmax(offset, np.where(frame.rms(b) > floor, gain, 0.0)), 0.5 * scatter)
-    return np.asarray(np.where(moves, off, np.nan))
+    large, driven = frame.rms(b), frame.rms(b) > floor
+    moves = driven | (frame.rms(a) > 2.0 * floor)
+    return Compared(frame, a, b, np.maximum(large, floor), frame.mean(a - b), driven, moves)
 
 
 def late(speed: Array, reference: Array, dt: float) -> list[float | None]:

@@ -99,6 +99,8 @@ class ReportOutcome:
         ε̂ [1], as reported.
     speed, slip_share : float or None, float
         As for `FaultOutcome`.
+    bounds_hold : bool or None
+        Whether its 95 % bounds of ε hold the truth; None where it is not right, or states none.
     """
 
     id: str
@@ -115,6 +117,7 @@ class ReportOutcome:
     epsilon: float | None = None
     speed: float | None = None
     slip_share: float = 0.0
+    bounds_hold: bool | None = None
 
 
 def _empty(bands: int = 0) -> dict[str, Array]:

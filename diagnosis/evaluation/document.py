@@ -185,12 +185,17 @@ class ProbabilityBin(TypedDict):
 
 
 class ReliabilityFigures(TypedDict):
-    """How well stated probabilities hold: counts, Brier score, expected calibration error, bins."""
+    """How well stated probabilities hold: counts, Brier score, expected calibration error, bins.
+
+    `bounds` right reports give 95 % bounds of ε; `bounds_hold` is the share of these that hold the truth.
+    """
 
     reported: int
     right: int
     brier: float | None
     ece: float | None
+    bounds: int
+    bounds_hold: float | None
     bins: list[ProbabilityBin]
 
 
@@ -253,6 +258,7 @@ class ReportRow(TypedDict):
     epsilon: float | None
     speed: float | None
     slip_share: float
+    bounds_hold: bool | None
 
 
 class MissionFigures(Figures):

@@ -8,6 +8,7 @@ from diagnosis.evaluation.aligned import Compared, Fault
 from diagnosis.evaluation.counts import FaultOutcome, ReportOutcome
 from diagnosis.evaluation.matching import assign, difference
 from diagnosis.evaluation.spans import covered, length, within, without
+from diagnosis.results.size_rows import EpsilonRow
 
 
 def match_events(group: Compared) -> tuple[tuple[FaultOutcome, ...], tuple[ReportOutcome, ...]]:
@@ -21,6 +22,7 @@ def match_events(group: Compared) -> tuple[tuple[FaultOutcome, ...], tuple[Repor
         overlap[i] = both / np.maximum((b - a) + (stop - start) - both, 1e-12)
     match = assign(overlap, [[difference(f.truth, row) for row in group.rows] for f in group.faults])
     outcomes = ["surplus"] * len(group.rows)
+    truths: dict[int, float] = {}
     faults = []
     for i, f in enumerate(group.faults):
         j = match.get(i)
@@ -28,7 +30,8 @@ def match_events(group: Compared) -> tuple[tuple[FaultOutcome, ...], tuple[Repor
         faults.append(fault)
         if j is not None:
             outcomes[j] = "ignored" if fault.outcome in ("not_excited", "masked") else fault.outcome
-    return tuple(faults), tuple(_report(group, j, outcome) for j, outcome in enumerate(outcomes))
+            truths[j] = f.truth.epsilon
+    return tuple(faults), tuple(_report(group, j, outcome, truths.get(j)) for j, outcome in enumerate(outcomes))
 
 
 def _fault(group: Compared, fault: Fault, j: int | None, overlap: float) -> FaultOutcome:
@@ -71,7 +74,7 @@ def _fault(group: Compared, fault: Fault, j: int | None, overlap: float) -> Faul
     )
 
 
-def _report(group: Compared, j: int, outcome: str) -> ReportOutcome:
+def _report(group: Compared, j: int, outcome: str, truth: float | None) -> ReportOutcome:
     row, start, stop = group.rows[j], float(group.start[j]), float(group.stop[j])
     component, side = str(row["component"]), str(row["side"])
     if outcome == "surplus" and not without([(start, stop)], group.hidden(component, side)):
@@ -94,4 +97,12 @@ def _report(group: Compared, j: int, outcome: str) -> ReportOutcome:
         epsilon=None if estimate is None else float(estimate["value"]),
         speed=speed,
         slip_share=slip,
+        bounds_hold=_bounds_hold(estimate, truth) if outcome == "right" else None,
     )
+
+
+def _bounds_hold(estimate: EpsilonRow | None, truth: float | None) -> bool | None:
+    """Whether bounds hold the truth; None where there are none: a part that is stuck or silent has ε = 1 by its row."""
+    if estimate is None or truth is None or estimate["low"] == estimate["high"]:
+        return None
+    return bool(estimate["low"] <= truth <= estimate["high"])

@@ -239,6 +239,8 @@ def _plots(title: str, faults: Sequence[FaultRow], figures: EventFigures) -> Ite
 def _reliability(r: Reliability) -> dict[str, object]:
     title = "all reports" if r["tier"] == "all" else f"{r['tier']}, {r['side'].replace('_', ' ')}"
     words = f"{r['right']} of {r['reported']} right; Brier {_share(r['brier'])}, ECE {_share(r['ece'])}"
+    if r["bounds"]:
+        words += f"; 95 % bounds of ε hold the truth of {_share(r['bounds_hold'])} of {r['bounds']}"
     return {"title": title, "words": words, "plot": reliability_diagram(title, r["bins"])}
 
 

@@ -42,7 +42,8 @@ def reliability(reports: Sequence[ReportOutcome]) -> list[Reliability]:
     -------
     list[Reliability]
         ``tier`` and ``side`` (``all`` first), ``reported``, ``right``, ``brier`` = mean (p − right)² (Brier 1950),
-        ``ece`` = Σ n_k/n·|mean p_k − share right_k| over the bins (expected calibration error), and ``bins``.
+        ``ece`` = Σ n_k/n·|mean p_k − share right_k| over the bins (expected calibration error), ``bounds`` and
+        ``bounds_hold``: reports with 95 % bounds of ε, and the share of them that hold the truth, and ``bins``.
     """
     judged = [r for r in reports if r.outcome in REPORT_OUTCOMES]
     keys = sorted({(r.tier, r.side) for r in judged})
@@ -55,6 +56,7 @@ def _figures(reports: Sequence[ReportOutcome]) -> ReliabilityFigures:
     stated = np.array([r.probability for r in reports])
     right = np.array([r.outcome == "right" for r in reports], dtype=np.float64)
     bins = probability_bins(reports)
+    hold = [r.bounds_hold for r in reports if r.bounds_hold is not None]
     gaps = [
         b["reported"] * abs(b["probability"] - b["right"])
         for b in bins
@@ -65,5 +67,7 @@ def _figures(reports: Sequence[ReportOutcome]) -> ReliabilityFigures:
         "right": int(right.sum()),
         "brier": float(np.mean((stated - right) ** 2)) if reports else None,
         "ece": sum(gaps) / len(reports) if reports else None,
+        "bounds": len(hold),
+        "bounds_hold": float(np.mean(hold)) if hold else None,
         "bins": bins,
     }

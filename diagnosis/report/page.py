@@ -37,6 +37,7 @@ from diagnosis.report.plot_data import Axis, axis_of, blocks_of, channels_of, fi
 from diagnosis.report.plot_rows import loop_groups
 from diagnosis.report.previous import previous_section
 from diagnosis.report.rows import Columns, derived
+from diagnosis.report.shown import HEADS, shown_lanes, shown_parts
 from diagnosis.report.thumbnail import thumbnail
 from diagnosis.report.timeline import timeline
 from diagnosis.results.document import IntervalRow, ReportDocument
@@ -146,6 +147,7 @@ def _pictures(
     path = driven_path(report, series.filled, series.axis.step)
     thumbs = worst(report["intervals"], _THUMBNAILS) if series.axis.rows else []
     return {
+        "shown": {"parts": shown_parts(report), "lanes": shown_lanes(report, duration), "heads": HEADS},
         "timeline": timeline(report, duration, {f["id"] for f in detailed}),
         "picture": machine_picture(report),
         "path": Markup("")

@@ -61,6 +61,7 @@ def context(report: ReportDocument, duration: float) -> Context:
         "signals": [_signal(s) for s in report["signals"]],
         "missing": _missing(report["missing"]),
         "clearing": _clearing(report),
+        "limits_clear_at": report["limits"]["clear_at"],
         "clear_at": f"{100 * report['limits']['clear_at']:.0f} %",
         "quality": checks,
         "quality_folded": folded,

@@ -218,6 +218,43 @@ class ClearingRow(TypedDict):
     text: str
 
 
+class DetectabilityRow(TypedDict):
+    """How large a fault of one side of a part must be to be found in this mission.
+
+    `deviation` is a row of the fault tables, or excess, offset, delay. A fault of `for_s` seconds, null for the whole mission,
+    begins anywhere while the part is driven: `size` is the smallest that is found at 95 % of `places`, null where none is. `unit`
+    is ``1`` for shares, m/s, rad or s, and empty where there is no size. `share` is the share of the places at which a loss or
+    excess of `LimitsRow.clear_at`, a signal that is lost, or one that stays at its last value is found. `told` is the side it is
+    ascribed to.
+    """
+
+    component: str
+    side: str
+    deviation: str
+    for_s: float | None
+    size: float | None
+    unit: str
+    share: float | None
+    places: int
+    told: str
+
+
+class DetectabilityTrace(TypedDict):
+    """The smallest loss of ten seconds that is found, by when it begins; null where none is."""
+
+    component: str
+    side: str
+    start_s: list[float]
+    loss: list[float | None]
+
+
+class DetectabilityTable(TypedDict):
+    """What a mission would have shown."""
+
+    rows: list[DetectabilityRow]
+    traces: list[DetectabilityTrace]
+
+
 class MeanRow(TypedDict):
     """Mean of the whole mission and of driving."""
 
@@ -312,6 +349,7 @@ class ReportDocument(TypedDict):
     coverage: list[CoverageRow]
     loss: list[LossRow]
     clearing: list[ClearingRow]
+    detectability: DetectabilityTable
     metrics: MetricsRow
     signals: list[SignalRow]
     missing: list[MissingRow]

@@ -23,7 +23,7 @@ def completed(document: Row) -> Row:
 
     Whether the machine may go out is added by `with_leave`, which needs sound figures.
     """
-    out: Row = _with(document, loss=[], clearing=[])
+    out: Row = _with(document, loss=[], clearing=[], detectability={"rows": [], "traces": []})
     complete: dict[str, Callable[[Json], Json]] = {
         "log": _log,
         "verdict": lambda row: _with(row, cleared=False, not_cleared="", scope=[]),

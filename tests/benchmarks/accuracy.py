@@ -187,7 +187,7 @@ def detail(figures_: dict[str, Any]) -> Iterator[str]:
     for r in figures_["reliability"]:
         yield (
             f"    {r['tier']:9} {r['side']:18} {r['right']:4} of {r['reported']:4} reports right, Brier {number(r['brier'])}, "
-            f"ECE {number(r['ece'])}"
+            f"ECE {number(r['ece'])}, bounds of ε hold {number(r['bounds_hold'])} of {r['bounds']}"
         )
 
 

@@ -7,38 +7,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from diagnosis.clearing.checks import checks_of
 from diagnosis.results.clearing import Check, Checked
-from replay.arrays.envelope import bucket_of
-from replay.control.loop import replay_loop
 from replay.faults import FaultMode, FaultSpec, Side
-from replay.log.source_options import SignalSource
-from replay.machine.config import haulotte
-from replay.signals.signal import Signal, Signals
-from replay.signals.timeline import align
 from replay.simulation.options import SimulatedMission, SimulationOptions
 from replay.simulation.run import simulate_mission
-
-_LENGTH = 60.0
-_BASE = ("_true", ".u_applied", "imu.yaw_rate", "gnss.lat", "gnss.lon")
-
-
-def _mission(*faults: FaultSpec, seed: int = 5) -> SimulatedMission:
-    return simulate_mission(
-        SimulationOptions(scenario="random", seed=seed, duration_s=_LENGTH, rate_hz=100.0, faults=faults)
-    )
-
-
-def _checks(mission: SimulatedMission, *, base: bool, clear_at: float = 0.25) -> dict[tuple[str, str, Check], Checked]:
-    items = {
-        name: Signal(name, mission.stamps, values, SignalSource(column=name), "simulated", guessed=False)
-        for name, values in mission.columns.items()
-        if not (base and name.endswith(_BASE))
-    }
-    timeline, machine = align(Signals(items=items, missing={})), haulotte()
-    machine = replace(machine, limits=replace(machine.limits, clear_at=clear_at))
-    found = checks_of(timeline, replay_loop(timeline, machine, bucket_of(timeline.size)), machine)
-    return {(c.component, c.side.value, c.check): c for c in found}
+from tests.diagnosis.clearing.missions import LENGTH, simulated
+from tests.diagnosis.clearing.missions import checks as checks_by_part
 
 
 def _open(checks: dict[tuple[str, str, Check], Checked], component: str) -> set[Check]:
@@ -46,12 +20,12 @@ def _open(checks: dict[tuple[str, str, Check], Checked], component: str) -> set[
 
 
 def test_a_healthy_mission_passes_all_checks_and_says_what_it_would_have_shown() -> None:
-    checks = _checks(_mission(), base=False)
+    checks = checks_by_part(simulated(), base=False)
     assert [c.text for c in checks.values() if not c.passed] == []
     shown = checks["FR", "sensor", Check.SECOND_MEASUREMENT].shows
     assert shown is not None
     assert 0.25 <= shown < 0.3
-    base = _checks(_mission(), base=True)
+    base = checks_by_part(simulated(), base=True)
     assert Check.SECOND_MEASUREMENT not in {check for _, _, check in base}
     response = base["FR", "sensor_or_actuator", Check.RESPONSE]
     assert response.shows is not None
@@ -73,53 +47,57 @@ def test_a_healthy_mission_passes_all_checks_and_says_what_it_would_have_shown()
 def test_a_fault_that_lasts_the_whole_mission_does_not_pass(
     component: str, side: Side, mode: FaultMode, epsilon: float, sat: float, base: bool
 ) -> None:
-    checks = _checks(_mission(FaultSpec(component, side, mode, 0.0, _LENGTH, epsilon, sat)), base=base)
+    checks = checks_by_part(simulated(FaultSpec(component, side, mode, 0.0, LENGTH, epsilon, sat)), base=base)
     assert _open(checks, component)
 
 
 def test_spikes_and_delay_do_not_pass() -> None:
-    mission = _mission()
+    mission = simulated()
     rng = np.random.default_rng(1)
     spiky = mission.columns["wheel.RL.v"].copy()
     spiky[rng.random(spiky.size) < 0.05] += 0.3
     late = np.roll(mission.columns["wheel.FR.v"], 40)
     late[:40] = 0.0
-    checks = _checks(replace(mission, columns={**mission.columns, "wheel.RL.v": spiky, "wheel.FR.v": late}), base=True)
+    checks = checks_by_part(
+        replace(mission, columns={**mission.columns, "wheel.RL.v": spiky, "wheel.FR.v": late}), base=True
+    )
     assert not checks["RL", "sensor", Check.ROUGHNESS].passed
     assert not checks["FR", "sensor", Check.DELAY].passed
     assert checks["RR", "sensor", Check.ROUGHNESS].passed
 
 
 def test_an_axle_that_is_not_steered_is_not_cleared() -> None:
-    mission = _mission()
+    mission = simulated()
     still = {name: np.zeros_like(x) if name.startswith("steer.") else x for name, x in mission.columns.items()}
-    check = _checks(replace(mission, columns=still), base=True)["front", "sensor_or_actuator", Check.LASTING_RATE]
+    check = checks_by_part(replace(mission, columns=still), base=True)[
+        "front", "sensor_or_actuator", Check.LASTING_RATE
+    ]
     assert check.worst is None
     assert not check.passed
     assert "does not show" in check.text
 
 
 def test_the_limit_follows_the_machine_file() -> None:
-    fault = FaultSpec("FR", Side.ACTUATOR, FaultMode.INEFFICIENT, 0.0, _LENGTH, 0.35)
+    fault = FaultSpec("FR", Side.ACTUATOR, FaultMode.INEFFICIENT, 0.0, LENGTH, 0.35)
     key = ("FR", "sensor_or_actuator", Check.LASTING_RESPONSE)
-    assert not _checks(_mission(fault), base=True)[key].passed
-    assert _checks(_mission(fault), base=True, clear_at=0.6)[key].passed
+    assert not checks_by_part(simulated(fault), base=True)[key].passed
+    assert checks_by_part(simulated(fault), base=True, clear_at=0.6)[key].passed
 
 
 def test_an_angle_that_is_off_turns_the_machine() -> None:
-    fault = FaultSpec("rear", Side.SENSOR, FaultMode.OUTSIDE_TABLE, 0.0, _LENGTH, 0.02, 7.5)
+    fault = FaultSpec("rear", Side.SENSOR, FaultMode.OUTSIDE_TABLE, 0.0, LENGTH, 0.02, 7.5)
     key = ("rear", "sensor_or_actuator", Check.LASTING_YAW)
-    simulated = [
+    driven = [
         simulate_mission(
-            SimulationOptions(scenario="random", seed=5, duration_s=_LENGTH, rate_hz=100.0, faults=faults, imu=True)
+            SimulationOptions(scenario="random", seed=5, duration_s=LENGTH, rate_hz=100.0, faults=faults, imu=True)
         )
         for faults in ((), (fault,))
     ]
-    healthy, off = (_checks(_with_yaw_rate(mission), base=False)[key] for mission in simulated)
+    healthy, off = (checks_by_part(_with_yaw_rate(mission), base=False)[key] for mission in driven)
     assert healthy.passed
     assert not off.passed
     assert "rad off its measured angle" in off.text
-    assert key not in _checks(simulated[0], base=True)
+    assert key not in checks_by_part(driven[0], base=True)
 
 
 def _with_yaw_rate(mission: SimulatedMission) -> SimulatedMission:

@@ -91,8 +91,8 @@ def seconds(counts: Counts, side: str) -> dict[tuple[str, str], float]:
 def test_a_perfect_report() -> None:
     truth = truth_of(fault("A", SENSOR, "stuck", 4.0, 8.0), fault("B", ACTUATOR, "inefficient", 10.0, 15.0, 0.4))
     report = report_of(
-        row("A", "sensor", "stuck", 4.0, 8.0, epsilon={"value": 1.0}),
-        row("B", "actuator", "inefficient", 10.0, 15.0, epsilon={"value": 0.43}),
+        row("A", "sensor", "stuck", 4.0, 8.0, epsilon={"value": 1.0, "low": 1.0, "high": 1.0}),
+        row("B", "actuator", "inefficient", 10.0, 15.0, epsilon={"value": 0.43, "low": 0.39, "high": 0.47}),
     )
     counts = wheels(report, truth)
     # A drives 16 s, 4 of them stuck; B drives 20 s.
@@ -104,6 +104,7 @@ def test_a_perfect_report() -> None:
     assert (found["events"]["precision"], found["events"]["recall"], found["events"]["f1"]) == (1.0, 1.0, 1.0)
     assert found["epsilon"]["mae"] == pytest.approx((0.0 + 0.03) / 2)
     assert found["epsilon"]["mae_partial"] == pytest.approx(0.03)
+    assert (found["reliability"][0]["bounds"], found["reliability"][0]["bounds_hold"]) == (1, 1.0)
     # 20 s less 4 s on A, less 5 s on B
     assert found["false_alarms"]["healthy_h"] == pytest.approx((16.0 + 15.0) / 2 / 3600)
     assert found["false_alarms"]["per_hour"] == 0.0

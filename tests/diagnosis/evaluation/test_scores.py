@@ -52,7 +52,9 @@ def report_of(*rows: tuple[Any, ...], start_ns: int = 0) -> dict[str, Any]:
     for k, (side, mode, start, stop, epsilon, detected) in enumerate(rows):
         row = {"id": f"F{k + 1}", "component": "A", "side": side, "mode": mode, "start_s": start, "stop_s": stop}
         row |= {"probability": 0.9, "severity": "high", "tier": "direct", "detected_s": detected}
-        intervals.append(row | {"epsilon": None if epsilon is None else {"value": epsilon}})
+        intervals.append(
+            row | {"epsilon": None if epsilon is None else {"value": epsilon, "low": epsilon, "high": epsilon}}
+        )
     for side in ("sensor", "actuator"):
         at = 0.0
         for r in sorted((r for r in intervals if r["side"] == side), key=lambda r: r["start_s"]):

@@ -1,0 +1,97 @@
+"""What a mission would have shown of each part: the checks of the all-clear, asked about faults that are not there.
+
+A fault of a size and length is laid at many places of the mission; it is found where it would have brought a check beyond its
+limit. The smallest size that is found at 95 % of the places is what the mission shows.
+"""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Iterator
+
+import numpy as np
+
+from diagnosis.clearing.cells import Array, Cells
+from diagnosis.clearing.gauges import Gauges, gauges_of
+from diagnosis.clearing.placements import Placements, placements
+from diagnosis.results.detectability import Detectability, Detectable, Deviation, Trace
+from diagnosis.results.vocabulary import Kind
+from replay.faults import Side
+
+LENGTHS_S = (2.0, 10.0, None)
+_TRACED_S = 10.0
+_SURE = 0.95
+_MARGIN = 1.1  # of sizes: loops are closed, and what they do about a fault hides some of it
+_STEERED_S = 0.5  # of a fault of a steering axle, which mostly rests
+
+
+def detectable(cells: Cells) -> Detectability:
+    """Rows and traces of all parts that the log shows."""
+    rows: list[Detectable] = []
+    traces: list[Trace] = []
+    clear_at = cells.machine.limits.clear_at
+    with warnings.catch_warnings(), np.errstate(divide="ignore", invalid="ignore"):
+        warnings.simplefilter("ignore", RuntimeWarning)  # windows without any value
+        for gauges in gauges_of(cells):
+            rows += _rows(gauges, cells, clear_at)
+            traces.append(_trace(gauges, cells))
+    return Detectability(tuple(rows), tuple(traces))
+
+
+def _rows(g: Gauges, cells: Cells, clear_at: float) -> Iterator[Detectable]:
+    for length in LENGTHS_S:
+        places = places_of(g, cells, length)
+        loss = g.sizes(places, lambda r: r.loss, lambda r: r.loss)
+        excess = g.excesses(places)
+        if length is None:
+            loss = np.minimum(loss, g.lasting.get(Deviation.INEFFICIENT, np.inf))
+            excess = np.minimum(excess, g.lasting.get(Deviation.EXCESS, np.inf))
+        yield _row(g, Deviation.INEFFICIENT, length, np.where(loss <= 1.0, loss, np.inf), "1", clear_at)
+        dead = loss <= 1.0
+        if g.still is not None:
+            dead |= g.still.shows(places.overlap(g.still.frame))
+        yield _row(g, Deviation.NO_SIGNAL, length, np.where(dead, 1.0, np.inf), "", 1.0)
+        if length is not None:
+            yield _row(g, Deviation.STUCK, length, np.where(g.held(places), 1.0, np.inf), "", 1.0)
+        yield _row(g, Deviation.EXCESS, length, excess, "1", clear_at)
+        if g.side is Side.SENSOR:
+            offset = g.sizes(places, lambda r: r.offset, lambda r: r.offset)
+            if length is None:
+                offset = np.minimum(offset, g.lasting.get(Deviation.OFFSET, np.inf))
+            yield _row(g, Deviation.OFFSET, length, offset, g.unit, None)
+        if g.rough is not None:
+            noise = g.rough.noise(places.overlap(g.rough.frame))
+            yield _row(g, Deviation.NOISY, length, noise, g.unit, None)
+    if (delay := g.lasting.get(Deviation.DELAY)) is not None:
+        yield _row(g, Deviation.DELAY, None, np.array([delay]), "s", None)
+
+
+def places_of(g: Gauges, cells: Cells, length: float | None) -> Placements:
+    """Where a fault of a length [s], None for the whole mission, is laid."""
+    enough = g.moving.size if g.kind is Kind.WHEEL else round(_STEERED_S / cells.dt)
+    return placements(g.moving, None if length is None else round(length / cells.dt), enough)
+
+
+def _row(
+    g: Gauges, deviation: Deviation, length: float | None, sizes: Array, unit: str, natural: float | None
+) -> Detectable:
+    if unit:
+        sizes = _MARGIN * sizes
+    size = float(np.quantile(sizes, _SURE, method="higher")) if sizes.size else np.inf
+    if unit == "1" and deviation is Deviation.INEFFICIENT and size > 1.0:
+        size = np.inf
+    share = None if natural is None or not sizes.size else float(np.mean(sizes <= natural))
+    known = size if np.isfinite(size) else None
+    return Detectable(g.kind, g.component, g.side, deviation, length, known, unit, share, sizes.size, g.told)
+
+
+def _trace(g: Gauges, cells: Cells) -> Trace:
+    places = places_of(g, cells, _TRACED_S)
+    loss = g.sizes(places, lambda r: r.loss, lambda r: r.loss)
+    return Trace(
+        g.kind,
+        g.component,
+        g.side,
+        tuple(float(x) for x in places.first * cells.dt),
+        tuple(float(x) if x <= 1.0 else None for x in loss),
+    )

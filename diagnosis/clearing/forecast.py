@@ -1,0 +1,129 @@
+"""What a log's signals can tell of each part, before anything is judged, and which signal would tell more."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from dataclasses import dataclass
+
+from diagnosis.results.vocabulary import Kind
+from replay.faults import Side
+from replay.machine.config import Machine
+
+_OTHERS = 2
+
+
+@dataclass(frozen=True)
+class Forecast:
+    """What can be told of one side of parts whose signals are the same.
+
+    Attributes
+    ----------
+    components : tuple[str, ...]
+        Wheels or axles.
+    kind : Kind
+        What they are.
+    side : Side
+        Which side.
+    told : bool
+        Whether a fault of it is told from one of the other side, at any time of the mission.
+    words : str
+        What shows, and what does not.
+    log : tuple[str, ...]
+        Signals that would tell more, ``<W>`` and ``<A>`` for a wheel and an axle.
+    """
+
+    components: tuple[str, ...]
+    kind: Kind
+    side: Side
+    told: bool
+    words: str
+    log: tuple[str, ...]
+
+
+def forecast(logged: Collection[str], machine: Machine) -> tuple[Forecast, ...]:
+    """What the signals `logged` can tell of the machine's parts, parts with the same signals together.
+
+    Parameters
+    ----------
+    logged : Collection[str]
+        Names of the signals that were found.
+    machine : Machine
+        The machine.
+    """
+    speeds = sum(f"wheel.{w}.v" in logged for w in machine.wheels)
+    groups: dict[tuple[Kind, Side, bool, str, tuple[str, ...]], list[str]] = {}
+    for kind, prefix, names in ((Kind.WHEEL, "wheel", machine.wheels), (Kind.STEER, "steer", machine.axles)):
+        for name in names:
+            has = {signal.rpartition(".")[2] for signal in logged if signal.startswith(f"{prefix}.{name}.")}
+            if kind is Kind.WHEEL:
+                sides = _wheel_sensor(has, speeds), _wheel_valve(has, speeds)
+            else:
+                sides = _angle_sensor(has, "imu.yaw_rate" in logged), _steering_valve(has)
+            for side, found in zip((Side.SENSOR, Side.ACTUATOR), sides, strict=True):
+                groups.setdefault((kind, side, *found), []).append(name)
+    return tuple(Forecast(tuple(who), *key) for key, who in groups.items())
+
+
+#: Whether a side is told from the other one, what shows, and what to log.
+_Told = tuple[bool, str, tuple[str, ...]]
+
+
+def _wheel_sensor(has: set[str], speeds: int) -> _Told:
+    more = ("wheel.<W>.v_true",)
+    if "v" not in has:
+        return False, "not judged: no speed is logged", ("wheel.<W>.v",)
+    if "v_true" in has:
+        return True, "told at any time, against its second measurement", ()
+    if not has & {"u", "u_applied"}:
+        return (
+            False,
+            "only what departs from the commanded speed shows, as a fault of either side",
+            ("wheel.<W>.u", *more),
+        )
+    if speeds <= _OTHERS:
+        return False, "too few wheels to compare with: a loss that lasts the whole mission does not show", more
+    return (
+        False,
+        "a loss shows beside the other wheels, mostly as one of sensor or valve, and not where it is all wheels'",
+        more,
+    )
+
+
+def _wheel_valve(has: set[str], speeds: int) -> _Told:
+    more = ("wheel.<W>.u_applied",)
+    if "u" not in has:
+        return False, "not judged: no valve command is logged", ("wheel.<W>.u", *more)
+    if "u_applied" in has:
+        return True, "told at any time, by its opening", ()
+    if "v" not in has:
+        return False, "not judged: no speed and no opening is logged", ("wheel.<W>.v", *more)
+    if speeds <= _OTHERS:
+        return False, "too few wheels to compare with: a loss that lasts the whole mission does not show", more
+    return (
+        False,
+        "a loss shows beside the other wheels, mostly as one of sensor or valve, and not where it is all wheels'",
+        more,
+    )
+
+
+def _angle_sensor(has: set[str], yaw: bool) -> _Told:
+    if "phi" not in has:
+        return False, "not judged: no angle is logged", ("steer.<A>.phi",)
+    if "phi_true" in has:
+        return True, "told at any time, against its second measurement", ()
+    more = ("steer.<A>.phi_true",) if yaw else ("steer.<A>.phi_true or imu.yaw_rate",)
+    if not has & {"u", "u_applied"}:
+        return False, "not judged: no valve command is logged", ("steer.<A>.u", *more)
+    offset = "an offset shows by the yaw rate" if yaw else "an offset does not show"
+    return False, f"shows while the axle is steered, mostly as one of sensor or valve; {offset}", more
+
+
+def _steering_valve(has: set[str]) -> _Told:
+    more = ("steer.<A>.u_applied",)
+    if "u" not in has:
+        return False, "not judged: no valve command is logged", ("steer.<A>.u", *more)
+    if "u_applied" in has:
+        return True, "told at any time, by its opening", ()
+    if "phi" not in has:
+        return False, "not judged: no angle and no opening is logged", ("steer.<A>.phi", *more)
+    return False, "shows while the axle is steered, mostly as one of sensor or valve", more

@@ -1,0 +1,211 @@
+"""What can be asked of each side of a part: its motion per opening, its second measurement, its quick changes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from diagnosis.clearing import axles, wheels
+from diagnosis.clearing.cells import Array, Cells
+from diagnosis.clearing.measure import compared, late
+from diagnosis.clearing.placements import Overlap, Placements, Ratio, Reference, Rough, Still
+from diagnosis.results.detectability import Deviation
+from diagnosis.results.vocabulary import Kind
+from replay.faults import Side
+
+#: Smallest size at each place.
+Sizes = Callable[[Overlap], Array]
+
+
+@dataclass(frozen=True)
+class Gauges:
+    """What can be asked of one side of a part.
+
+    Attributes
+    ----------
+    kind, component, side
+        The part.
+    unit : str
+        Of its channel.
+    moving : NDArray[np.bool_], shape (cells,)
+        Whether it is driven.
+    channel : Array, shape (cells,)
+        What it measures, or its opening.
+    ratio : Ratio or None
+        Its motion per opening.
+    reference : Reference or None
+        Its second measurement, or the measured opening.
+    rough : Rough or None
+        Its quick changes.
+    still : Still or None
+        Whether it rests while it is commanded.
+    lasting : dict[Deviation, float]
+        Smallest sizes over the whole mission by what is usual of it.
+    """
+
+    kind: Kind
+    component: str
+    side: Side
+    unit: str
+    moving: NDArray[np.bool_]
+    channel: Array
+    ratio: Ratio | None
+    reference: Reference | None
+    rough: Rough | None = None
+    still: Still | None = None
+    lasting: dict[Deviation, float] = field(default_factory=dict)
+
+    @property
+    def told(self) -> Side:
+        """The side that the checks name."""
+        return self.side if self.reference is not None else Side.SENSOR_OR_ACTUATOR
+
+    @property
+    def _jumps(self) -> bool:
+        """Whether a fault's beginning and end are motion of their own: an angle that is scaled jumps."""
+        return self.kind is Kind.STEER and self.side is Side.SENSOR
+
+    def excesses(self, places: Placements) -> Array:
+        """`sizes` of an excess; an axle that turns faster for some seconds shows by its second measurements alone."""
+        alone = replace(self, ratio=None) if self.kind is Kind.STEER else self
+        return alone.sizes(places, lambda r: r.excess, lambda r: r.excess)
+
+    def sizes(
+        self, places: Placements, ratio: Callable[[Ratio], Sizes], reference: Callable[[Reference], Sizes]
+    ) -> Array:
+        """Smallest size that either shows at each place; infinite where none does. Shape (places,)."""
+        out = np.full(places.first.size, np.inf)
+        if self.ratio is not None:
+            sizes = ratio(self.ratio)(places.overlap(self.ratio.frame, within=self._jumps))
+            out = np.minimum(out, sizes)
+        if self.reference is not None:
+            out = np.minimum(out, reference(self.reference)(places.overlap(self.reference.compared.frame)))
+        return out
+
+    def held(self, places: Placements) -> NDArray[np.bool_]:
+        """Whether either shows that the channel stays at its last value, shape (places,)."""
+        out = np.zeros(places.first.size, dtype=np.bool_)
+        if self.ratio is not None:
+            over = places.overlap(self.ratio.frame, within=self._jumps)
+            shown = self.ratio.shows_hold(over, self.channel, places.first)
+            out |= shown
+        if self.reference is not None:
+            out |= self.reference.shows_hold(places.overlap(self.reference.compared.frame), places.first)
+        return out
+
+
+def gauges_of(cells: Cells) -> Iterator[Gauges]:
+    """Of all sides of all parts that the log shows."""
+    yield from _wheels(cells)
+    yield from _axles(cells)
+
+
+def _wheels(cells: Cells) -> Iterator[Gauges]:
+    speed, command, opening, second = (cells.wheels(leaf) for leaf in ("v", "u", "u_applied", "v_true"))
+    clear_at, top = cells.machine.limits.clear_at, cells.machine.max_speed
+    used, share = np.where(np.isfinite(opening), opening, command), -np.log1p(-clear_at)
+    responses = wheels.responses_of(cells, speed, used, cells.reference)
+    delays, rough = late(speed, cells.reference, cells.dt), wheels.roughness_of(cells, speed)
+    for i, name in enumerate(cells.machine.wheels):
+        v, u, a, x = (z[:, i] for z in (speed, command, opening, second))
+        if not _known(v):
+            continue
+        twice, measured = _known(a) and _known(u), _known(x)
+        motion = np.where(np.isfinite(cells.reference[:, i]), cells.reference[:, i], v)
+        moving = (np.abs(motion) > wheels.MOVING * top / 0.36) & ~_stated(cells, name)
+        ratio = None
+        lasting: dict[Deviation, float] = {}
+        if _known(used[:, i]) and speed.shape[1] > wheels.OTHERS:
+            below, above = (np.array(pair) * share for pair in wheels.RESPONSE[twice, measured])
+            off = np.where(cells.explained(name), np.nan, responses.windows[:, i])
+            usual, back = responses.usual[i], (~responses.ahead[:, i]).astype(np.intp)
+            rooms = _rooms(usual.ways, below[1], above[1])
+            ratio = Ratio(cells.frame, off, responses.weight[:, i], below[0], above[0], back, rooms)
+            if usual.least is not None and usual.most is not None:
+                lasting = _lasting(below[1] + usual.least, above[1] - usual.most)
+        delay = delays[i]
+        late_by = {} if delay is None else {Deviation.DELAY: wheels.LATE_S + delay + cells.dt}
+        second_one = _reference(cells, name, (v, x, wheels.FLOOR * top), clear_at) if measured else None
+        own = Rough(cells.frame, rough.quick[:, i], rough.size[:, i], rough.limit[:, i], cells.width)
+        about = (Kind.WHEEL, name)
+        yield Gauges(*about, Side.SENSOR, "m/s", moving, v, ratio, second_one, own, lasting={**lasting, **late_by})
+        if twice:
+            asked = _reference(cells, name, (a, u, wheels.OPENING), wheels.VALVE * clear_at)
+            yield Gauges(*about, Side.ACTUATOR, "1", moving, a, None, asked)
+        elif _known(u):
+            yield Gauges(*about, Side.ACTUATOR, "1", moving, v, ratio, None, lasting=lasting)
+
+
+def _axles(cells: Cells) -> Iterator[Gauges]:
+    angle, second, command, opening = (cells.axles(leaf) for leaf in ("phi", "phi_true", "u", "u_applied"))
+    clear_at, frame = cells.machine.limits.clear_at, axles.still_frame(cells)
+    used, share = np.where(np.isfinite(opening), opening, command), -np.log1p(-clear_at)
+    rates = axles.rates_of(cells, axles.rate_of(angle, cells.dt), used)
+    for j, name in enumerate(cells.machine.axles):
+        phi, x, u, a = (z[:, j] for z in (angle, second, command, opening))
+        if not _known(phi):
+            continue
+        twice, measured = _known(a) and _known(u), _known(x)
+        moving = (rates.weight[:, j] != 0.0) & ~_stated(cells, name)
+        ratio = None
+        lasting: dict[Deviation, float] = {}
+        if _known(used[:, j]):
+            brief, long = (limit * share for limit in axles.RATE[twice and measured])
+            off = np.where(cells.explained(name, rates.frame), np.nan, rates.off[:, j])
+            ratio = Ratio(
+                rates.frame,
+                off,
+                rates.weight[:, j],
+                brief,
+                brief,
+                np.zeros(len(off), dtype=np.intp),
+                ((np.inf, np.inf),),
+            )
+            others = np.delete(rates.whole, j)
+            if np.isfinite(rates.whole[j]) and np.isfinite(others).any():
+                ahead = float(rates.whole[j] - np.nanmedian(others))
+                lasting = _lasting(long + ahead, long - ahead)
+        still = Still(frame, np.abs(frame.mean(u)) >= axles.ANSWERED) if _known(u) else None
+        second_one = _reference(cells, name, (phi, x, axles.FLOOR_RAD), clear_at) if measured else None
+        about = (Kind.STEER, name)
+        yield Gauges(*about, Side.SENSOR, "rad", moving, phi, ratio, second_one, None, still, lasting)
+        if twice:
+            asked = _reference(cells, name, (a, u, axles.OPENING), axles.VALVE * clear_at)
+            yield Gauges(*about, Side.ACTUATOR, "1", moving, a, None, asked, None, still)
+        elif _known(u):
+            yield Gauges(*about, Side.ACTUATOR, "1", moving, phi, ratio, None, None, still, lasting)
+
+
+def _rooms(usual: tuple[float | None, ...], below: float, above: float) -> tuple[tuple[float, float], ...]:
+    """How far usual ones [ln] are from their limits; infinite where they are not known."""
+    return tuple((np.inf, np.inf) if x is None else (below + x, above - x) for x in usual)
+
+
+def _lasting(below: float, above: float) -> dict[Deviation, float]:
+    """Smallest loss and excess over the mission, by what is left to their limits [ln]."""
+    return {
+        Deviation.INEFFICIENT: max(0.0, float(-np.expm1(-below))),
+        Deviation.EXCESS: max(0.0, float(np.expm1(above))),
+    }
+
+
+def _reference(cells: Cells, component: str, pair: tuple[Array, Array, float], limit: float) -> Reference:
+    """A channel, its reference and its floor; nothing where a fault is stated."""
+    found = compared(cells, *pair)
+    return Reference(found._replace(moves=found.moves & ~cells.explained(component)), limit)
+
+
+def _stated(cells: Cells, component: str) -> NDArray[np.bool_]:
+    """Cells in which a fault of the component is stated."""
+    at = np.arange(cells.size) * cells.dt
+    out = np.zeros(cells.size, dtype=np.bool_)
+    for start, stop in cells.stated.get(component, ()):
+        out |= (at + cells.dt > start) & (at < stop)
+    return out
+
+
+def _known(x: Array) -> bool:
+    return bool(np.isfinite(x).any())

@@ -1,0 +1,101 @@
+"""How large a fault must be to be found, against faults that are laid into the recorded columns."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from diagnosis.clearing.checks import checks_of
+from diagnosis.clearing.detectable import detectable, places_of
+from diagnosis.clearing.gauges import Gauges, gauges_of
+from diagnosis.clearing.placements import placements
+from diagnosis.results.detectability import Deviation
+from replay.faults import FaultMode, FaultSpec, Side
+from replay.simulation.options import SimulatedMission
+from tests.diagnosis.clearing.missions import LENGTH, in_cells, simulated
+
+_COLUMNS = {
+    ("FR", Side.SENSOR): "wheel.FR.v",
+    ("FR", Side.ACTUATOR): "wheel.FR.u_applied",
+    ("rear", Side.SENSOR): "steer.rear.phi",
+}
+
+
+def _gauges(mission: SimulatedMission, part: str, side: Side, *, base: bool) -> Gauges:
+    return next(g for g in gauges_of(in_cells(mission, base=base)) if (g.component, g.side) == (part, side))
+
+
+def _with(mission: SimulatedMission, name: str, start: float, stop: float, factor: float) -> SimulatedMission:
+    t = (mission.stamps - mission.stamps[0]) * 1e-9
+    x = mission.columns[name]
+    return replace(mission, columns={**mission.columns, name: np.where((t >= start) & (t < stop), factor * x, x)})
+
+
+def _found(mission: SimulatedMission, part: str, *, base: bool) -> bool:
+    return any(c.component == part and not c.passed for c in checks_of(in_cells(mission, base=base)))
+
+
+@pytest.mark.parametrize(
+    ("part", "side", "base", "length"),
+    [
+        ("FR", Side.SENSOR, False, 2.0),
+        ("FR", Side.SENSOR, False, 10.0),
+        ("FR", Side.ACTUATOR, False, 2.0),
+        ("FR", Side.ACTUATOR, False, 10.0),
+        ("FR", Side.SENSOR, True, 2.0),
+        ("FR", Side.SENSOR, True, 10.0),
+        ("rear", Side.SENSOR, False, 10.0),
+    ],
+)
+def test_a_loss_is_found_from_the_size_that_is_stated(part: str, side: Side, base: bool, length: float) -> None:
+    mission, name = simulated(), _COLUMNS[part, side]
+    gauges, cells = _gauges(mission, part, side, base=base), in_cells(mission, base=base)
+    places = places_of(gauges, cells, length)
+    sizes = gauges.sizes(places, lambda r: r.loss, lambda r: r.loss)
+    known = np.flatnonzero((sizes > 0.0) & (sizes < 0.75))
+    assert known.size
+    for k in known[:: max(1, known.size // 4)]:
+        span = float(places.first[k] * cells.dt), float(places.last[k] * cells.dt)
+        assert _found(_with(mission, name, *span, 1.0 - 1.25 * sizes[k]), part, base=base), (span, sizes[k])
+        if side is Side.ACTUATOR:  # where no other check sees it earlier
+            assert not _found(_with(mission, name, *span, 1.0 - 0.6 * sizes[k]), part, base=base), (span, sizes[k])
+
+
+def test_rows_state_every_part_and_length() -> None:
+    cells = in_cells(simulated(), base=False)
+    found = detectable(cells)
+    parts = {(d.component, d.side) for d in found.rows}
+    assert len(parts) == 12
+    for part in parts:
+        own = [d for d in found.rows if (d.component, d.side) == part]
+        assert {d.for_s for d in own if d.deviation is Deviation.INEFFICIENT} == {2.0, 10.0, None}
+        assert {d.told for d in own} == {part[1]}
+    assert {d.told for d in detectable(in_cells(simulated(), base=True)).rows} == {Side.SENSOR_OR_ACTUATOR}
+    assert {(t.component, t.side) for t in found.traces} == parts
+    longer = {
+        d.for_s: d.size for d in found.rows if (d.component, d.side, d.deviation) == ("FR", "sensor", "inefficient")
+    }
+    assert longer[2.0] is not None
+    assert longer[10.0] is not None
+    assert longer[2.0] > longer[10.0]
+
+
+def test_what_is_stated_is_no_place_for_another_fault() -> None:
+    cells = in_cells(simulated(FaultSpec("FR", Side.ACTUATOR, FaultMode.NO_SIGNAL, 10.0, 30.0)), base=False)
+    stated = replace(cells, stated={"FR": [(10.0, 30.0)]})
+    gauges = next(g for g in gauges_of(stated) if g.component == "FR")
+    places = places_of(gauges, stated, 2.0)
+    assert places.first.size
+    assert not np.any((places.first * cells.dt > 10.2) & (places.last * cells.dt < 29.8))
+
+
+def test_a_part_that_rests_has_no_places() -> None:
+    moving = np.zeros(600, dtype=np.bool_)
+    assert placements(moving, 20, 600).first.size == 0
+    whole = placements(moving, None, 600)
+    assert (whole.first.tolist(), whole.last.tolist()) == ([0], [600])
+    moving[100:200] = True
+    assert placements(moving, 20, 600).first.min() == 92  # 12 of 20 cells are driven
+    assert LENGTH == 60.0

@@ -1,0 +1,50 @@
+"""What a log's signals can tell, before anything is judged."""
+
+from __future__ import annotations
+
+from diagnosis.clearing.forecast import Forecast, forecast
+from replay.faults import Side
+from replay.machine.config import haulotte
+
+_BASE = [f"wheel.{w}.{leaf}" for w in ("FR", "FL", "RR", "RL") for leaf in ("v", "u")] + [
+    f"steer.{a}.{leaf}" for a in ("front", "rear") for leaf in ("phi", "u")
+]
+
+
+def _by_part(logged: list[str]) -> dict[tuple[str, Side], Forecast]:
+    return {(c, f.side): f for f in forecast(logged, haulotte()) for c in f.components}
+
+
+def test_single_measurements_do_not_tell_sensor_from_valve() -> None:
+    found = forecast(_BASE, haulotte())
+    assert [(len(f.components), f.side, f.told) for f in found] == [
+        (4, Side.SENSOR, False),
+        (4, Side.ACTUATOR, False),
+        (2, Side.SENSOR, False),
+        (2, Side.ACTUATOR, False),
+    ]
+    assert [f.log for f in found] == [
+        ("wheel.<W>.v_true",),
+        ("wheel.<W>.u_applied",),
+        ("steer.<A>.phi_true or imu.yaw_rate",),
+        ("steer.<A>.u_applied",),
+    ]
+
+
+def test_second_measurements_tell_their_side_at_any_time() -> None:
+    found = _by_part([*_BASE, "wheel.FR.v_true", "wheel.FL.u_applied", "steer.front.phi_true", "imu.yaw_rate"])
+    assert found["FR", Side.SENSOR].told
+    assert not found["FR", Side.ACTUATOR].told
+    assert found["FL", Side.ACTUATOR].told
+    assert found["front", Side.SENSOR].told
+    assert "offset shows by the yaw rate" in found["rear", Side.SENSOR].words
+
+
+def test_what_is_not_logged_is_not_judged() -> None:
+    found = _by_part(["wheel.FR.v", "wheel.FR.v_ref", "wheel.FL.u", "steer.front.phi"])
+    assert "not judged: no valve command" in found["FR", Side.ACTUATOR].words
+    assert "departs from the commanded speed" in found["FR", Side.SENSOR].words
+    assert found["FL", Side.SENSOR].words == "not judged: no speed is logged"
+    assert found["FL", Side.ACTUATOR].words == "not judged: no speed and no opening is logged"
+    assert found["front", Side.SENSOR].log[0] == "steer.<A>.u"
+    assert "too few wheels" in _by_part(["wheel.FR.v", "wheel.FR.u"])["FR", Side.SENSOR].words
