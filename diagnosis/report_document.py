@@ -12,6 +12,7 @@ from diagnosis.assess import ComponentResult
 from diagnosis.clearing.cells import Cells
 from diagnosis.clearing.checks import cells_of, checks_of
 from diagnosis.clearing.detectable import detectable
+from diagnosis.clearing.mapping import mapping_hints
 from diagnosis.decision import metrics, quality
 from diagnosis.decision.caveats import more_caveats
 from diagnosis.decision.decide import Decision, decide
@@ -101,7 +102,9 @@ def report_of_mission(judged: Judged, identity: MachineRow) -> ReportDocument:
         "log": _log(mission, moving, machine),
         "machine": identity,
         "readings": to_json(replay.readings),
-        "verdict": _decision(judged, coverage, decided_s).row(more_caveats(mission, judged.recorded.first_ns, machine)),
+        "verdict": _decision(judged, coverage, decided_s).row(
+            [*mapping_hints(judged.cells), *more_caveats(mission, judged.recorded.first_ns, machine)]
+        ),
         "intervals": to_json(judged.intervals),
         "states": to_json(spans_of(found.assessments, timeline.step_ns)),
         "phases": metrics.phases(timeline, replay, machine),

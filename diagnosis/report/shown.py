@@ -76,6 +76,8 @@ def _cell(row: DetectabilityRow | None) -> str:
         return "found" if share >= 0.95 else f"{100 * share:.0f} % of the time"
     if size is None:
         return "not shown"
+    if not size:
+        return "not cleared"
     return f"{100 * size:.0f} %" if unit == "1" else f"{size:.2g} {unit}"
 
 

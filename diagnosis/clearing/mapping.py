@@ -1,0 +1,140 @@
+"""Signals that look as if the machine file had their sign, their unit or their place wrong."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Iterator, Sequence
+from itertools import combinations
+from math import pi
+
+import numpy as np
+
+from diagnosis.clearing.axles import rate_of
+from diagnosis.clearing.cells import Array, Cells
+from diagnosis.clearing.measure import lowest_passed
+
+_LAG_S = 0.3  # of what follows a command
+_MOVED = 0.3  # of the largest value: less of it says nothing
+_LEAST_S = 5.0
+_AGAINST = -0.8  # correlation
+_APART, _EVEN = 0.08, 0.12  # of a factor from a known one, and how much it may vary [ln]
+_TRACKS = 0.3  # by how much a loop usually stays behind its command [ln]
+_BETTER = 0.5  # of what is left, once two are swapped
+_DIFFER = 0.04  # of the largest value: two that are more alike cannot be told from each other
+
+#: Factors between units that are mixed up, and what they are.
+_FACTORS: tuple[tuple[float, str], ...] = (
+    (2.0, "twice"),
+    (0.5, "half"),
+    (3.6, "3.6 times (km/h read as m/s?)"),
+    (1 / 3.6, "1/3.6 times (m/s read as km/h?)"),
+    (180 / pi, "57.3 times (degrees read as radians?)"),
+    (pi / 180, "1/57.3 times (radians read as degrees?)"),
+    (30 / pi, "9.55 times (turns per minute read as rad/s?)"),
+    (pi / 30, "1/9.55 times (rad/s read as turns per minute?)"),
+    (100.0, "100 times (percent read as a fraction?)"),
+    (0.01, "1/100 times (a fraction read as percent?)"),
+    (1000.0, "1000 times"),
+    (0.001, "1/1000 times"),
+)
+
+_LOOK = "look at its entry in the machine file ([signals] channel, sign, unit or scale) before any part is replaced."
+
+
+def mapping_hints(cells: Cells) -> tuple[str, ...]:
+    """Sentences on signals that fit another sign, unit or place better over the whole mission; none where all fit.
+
+    A fault that lasts from start to end can look alike: the sentences ask for the machine file to be looked at first.
+    """
+    machine, wanted = cells.machine, cells.reference
+    with warnings.catch_warnings():  # means without any value
+        warnings.simplefilter("ignore", RuntimeWarning)
+        speeds, angles = cells.wheels("v"), cells.axles("phi")
+        return (
+            *_hints(cells, speeds, wanted, [f"wheel.{w}.v" for w in machine.wheels], "its commanded speed"),
+            *_openings(
+                cells, cells.wheels("u"), wanted, [f"wheel.{w}.u" for w in machine.wheels], "its commanded speed"
+            ),
+            *_hints(
+                cells, angles, cells.axles("phi_ref"), [f"steer.{a}.phi" for a in machine.axles], "its commanded angle"
+            ),
+            *_openings(
+                cells,
+                cells.axles("u"),
+                rate_of(angles, cells.dt),
+                [f"steer.{a}.u" for a in machine.axles],
+                "the rate of its angle",
+            ),
+        )
+
+
+def _openings(cells: Cells, opening: Array, wanted: Array, names: Sequence[str], what: str) -> Iterator[str]:
+    """Hints for valve commands, whose size says nothing, by what they cause."""
+    scaled = opening * (np.nanmean(np.abs(wanted), axis=0) / np.maximum(np.nanmean(np.abs(opening), axis=0), 1e-6))
+    yield from _hints(cells, scaled, wanted, names, what, sizes=False)
+
+
+def _hints(
+    cells: Cells, measured: Array, wanted: Array, names: Sequence[str], what: str, *, sizes: bool = True
+) -> Iterator[str]:
+    """Hints for signals `measured`, each of which follows its own of `wanted`, both (cells, n)."""
+    if not measured.size or not np.isfinite(wanted).any():
+        return
+    follows = np.where(np.isfinite(wanted), lowest_passed(wanted, cells.dt, _LAG_S if sizes else cells.dt), np.nan)
+    told: set[int] = set()
+    for i, j in combinations(range(len(names)), 2):
+        if _swapped(measured[:, [i, j]], follows[:, [i, j]]):
+            told |= {i, j}
+            yield f"{names[i]} follows {what.replace('its', 'the')} of {_part(names[j])}, and {names[j]} that of {_part(names[i])}: {_LOOK}"
+    rest = [i for i in range(len(names)) if i not in told]
+    pairs = {i: pair for i in rest if len((pair := _moving(measured[:, i], follows[:, i]))[0]) * cells.dt >= _LEAST_S}
+    ratios = {i: _ratio(*pair) for i, pair in pairs.items()}
+    usual = float(np.median([r for r in ratios.values() if np.isfinite(r)] or [0.0]))
+    for i, (y, x) in pairs.items():
+        if _alike(y, x) < _AGAINST:
+            yield f"{names[i]} runs against {what} throughout: {_LOOK}"
+        elif sizes and (words := _factor(ratios[i] - (usual if abs(usual) < _TRACKS else 0.0))):
+            yield f"{names[i]} is {words} {what} throughout: {_LOOK}"
+
+
+def _moving(y: Array, x: Array) -> tuple[Array, Array]:
+    """Both where x is large."""
+    use = np.isfinite(y) & np.isfinite(x) & (np.abs(x) > _MOVED * np.nanmax(np.abs(x), initial=0.0))
+    return y[use], x[use]
+
+
+def _part(name: str) -> str:
+    return name.split(".")[1]
+
+
+def _alike(y: Array, x: Array) -> float:
+    """Correlation about zero; 0 where either rests."""
+    power = float(y @ y) * float(x @ x)
+    return float(y @ x) / power**0.5 if power > 0.0 else 0.0
+
+
+def _ratio(y: Array, x: Array) -> float:
+    """ln of y by x; NaN where it varies."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        ratio = np.log(y / x)
+    ratio = ratio[np.isfinite(ratio)]
+    if ratio.size < 0.9 * x.size:
+        return np.nan
+    middle = float(np.median(ratio))
+    return middle if 1.4826 * float(np.median(np.abs(ratio - middle))) < _EVEN else np.nan
+
+
+def _factor(ratio: float) -> str:
+    """A known factor in words; empty for any other."""
+    return next((words for factor, words in _FACTORS if abs(ratio - np.log(factor)) < _APART), "")
+
+
+def _swapped(measured: Array, wanted: Array) -> bool:
+    """Whether two signals, (cells, 2), follow each other's command much better than their own."""
+    use = np.isfinite(measured).all(axis=1) & np.isfinite(wanted).all(axis=1)
+    y, x = measured[use], wanted[use]
+    if not y.size or np.mean(np.abs(x[:, 0] - x[:, 1])) < _DIFFER * np.max(np.abs(x)):
+        return False
+    y = y * (np.abs(x).sum() / max(float(np.abs(y).sum()), 1e-9))  # loops stay behind their commands
+    own, other = (np.mean(np.abs(y - z)) for z in (x, x[:, ::-1]))
+    return bool(other < _BETTER * own)

@@ -1,0 +1,57 @@
+"""Signals with the sign, the unit or the place of another."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import pytest
+
+from diagnosis.clearing.mapping import mapping_hints
+from replay.faults import FaultMode, FaultSpec, Side
+from replay.simulation.options import SimulatedMission
+from tests.diagnosis.clearing.missions import LENGTH, in_cells, simulated
+
+EDIT = Callable[[SimulatedMission], SimulatedMission]
+
+
+def _times(name: str, factor: float) -> EDIT:
+    return lambda m: replace(m, columns={**m.columns, name: factor * m.columns[name]})
+
+
+def _swapped(a: str, b: str) -> EDIT:
+    return lambda m: replace(m, columns={**m.columns, a: m.columns[b], b: m.columns[a]})
+
+
+@pytest.mark.parametrize(
+    ("edit", "words"),
+    [
+        (_times("wheel.RR.v", -1.0), "wheel.RR.v runs against its commanded speed throughout"),
+        (_times("wheel.FR.v", 2.0), "wheel.FR.v is twice its commanded speed"),
+        (_times("wheel.FR.u", -1.0), "wheel.FR.u runs against its commanded speed"),
+        (_times("steer.rear.phi", -1.0), "steer.rear.phi runs against its commanded angle"),
+        (_times("steer.front.phi", 57.29578), "steer.front.phi is 57.3 times (degrees read as radians?) its"),
+        (_times("steer.front.u", -1.0), "steer.front.u runs against the rate of its angle"),
+        (
+            _swapped("wheel.FR.v", "wheel.RL.v"),
+            "wheel.FR.v follows the commanded speed of RL, and wheel.RL.v that of FR",
+        ),
+        (_swapped("steer.front.phi", "steer.rear.phi"), "steer.front.phi follows the commanded angle of rear"),
+    ],
+)
+def test_a_wrong_sign_unit_or_place_is_told(edit: EDIT, words: str) -> None:
+    (hint, *others) = mapping_hints(in_cells(edit(simulated()), base=True))
+    assert hint.startswith(words)
+    assert "look at its entry in the machine file" in hint
+    assert len(others) <= 1
+
+
+@pytest.mark.parametrize("seed", [5, 6, 7])
+def test_healthy_missions_and_faults_of_parts_are_not_the_files(seed: int) -> None:
+    assert mapping_hints(in_cells(simulated(seed=seed), base=True)) == ()
+    for fault in (
+        FaultSpec("FR", Side.ACTUATOR, FaultMode.NO_SIGNAL, 0.0, LENGTH),
+        FaultSpec("FR", Side.SENSOR, FaultMode.STUCK, 0.0, LENGTH, 1.0, 0.1),
+        FaultSpec("front", Side.ACTUATOR, FaultMode.INEFFICIENT, 0.0, LENGTH, 0.5),
+    ):
+        assert mapping_hints(in_cells(simulated(fault, seed=seed), base=True)) == ()
