@@ -7,6 +7,7 @@ import numpy as np
 from diagnosis.channels.sample_status import SILENT
 from diagnosis.direct.identification import IdentifiedPair
 from diagnosis.direct.isolation import Isolated
+from diagnosis.direct.shape import shape_sentence
 from diagnosis.estimation.fault_models import TOTAL_ROWS
 from diagnosis.results.result import Epsilon
 from replay.faults import FaultMode
@@ -35,6 +36,9 @@ def sentences(isolated: Isolated, found: IdentifiedPair, mode: FaultMode, epsilo
             f"{pair.y_name} delivered nothing for {silent * pair.dt:.3f} s while other channels of its source did."
         )
     if seen.use.any():
+        if mode in (FaultMode.NOISY, FaultMode.OUTSIDE_TABLE):
+            names = pair.y_name, pair.x_name
+            out += [s for s in [shape_sentence(seen.y[seen.use], seen.x[seen.use], pair.dt, names, pair.unit)] if s]
         out += _values(isolated, found, epsilon, seconds)
         out.append(
             f"Residual {seen.deviation:.3g} {pair.unit} root mean square; threshold {3 * seen.noise:.2g} {pair.unit}."
