@@ -46,7 +46,7 @@ def shape_sentence(y: Array, x: Array, dt: float, names: tuple[str, str], unit: 
         and (late := -float(off @ change) / float(change @ change)) > 0
     ):
         return f"A delay: {channel} comes {late * 1e3:.0f} ms after {reference}."
-    t = (np.arange(y.size) - 0.5 * y.size) * dt
+    t: Array = (np.arange(y.size, dtype=np.float64) - 0.5 * y.size) * dt
     slope = float(off @ t) / float(t @ t)
     if _without(off - offset, t) < (1.0 - _EXPLAINED) * float(np.mean((off - offset) ** 2)):
         return f"A drift: {channel} departs from {reference} by {slope:.2g} {unit} a second."
