@@ -41,7 +41,7 @@ def test_no_machine_is_cleared_with_a_fault(all_clear: ModuleType, kind: str) ->
 
 def test_healthy_machines_are_not_stopped_and_mostly_cleared(all_clear: ModuleType) -> None:
     found = [
-        o for seed in (21, 22, 23) for o in all_clear.run(all_clear.Task("default", None, seed, 60.0, all_clear.TIERS))
+        o for seed in (21, 22) for o in all_clear.run(all_clear.Task("default", None, seed, 60.0, all_clear.TIERS))
     ]
     assert not any(o.status == "stop" for o in found)
     assert sum(o.status == "ready" for o in found) >= len(found) / 2
