@@ -18,10 +18,11 @@ from replay.signals.timeline import Timeline
 
 @dataclass(frozen=True)
 class ComponentResult:
-    """Assessments by (component, side), and the wheel model that stood behind them."""
+    """Assessments by (component, side), the wheel model that stood behind them, and what happened to the machine as a whole."""
 
     assessments: dict[Part, Assessment]
     wheel_model: WheelModelFit | None
+    events: tuple[str, ...] = ()
 
 
 def assess_components(
@@ -44,7 +45,7 @@ def assess_components(
         mission = mission.after(family.assess(mission))
     parts = [(component, side) for component in (*chosen, *machine.axles) for side in (SENSOR, ACTUATOR)]
     found = {part: mission.known.get(part) or _without_evidence(mission, *part) for part in parts}
-    return ComponentResult(found, mission.model)
+    return ComponentResult(found, mission.model, mission.events)
 
 
 def _without_evidence(mission: MissionView, wheel: str, side: str) -> Assessment:

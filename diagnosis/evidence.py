@@ -52,12 +52,15 @@ class Contribution:
         Best estimate of the true steering angles [rad], and where it rests on a model or on a sensor in doubt.
     model : WheelModelFit or None
         Wheel models behind the judgement.
+    events : tuple[str, ...]
+        What happened to the machine as a whole and is no part's fault, one sentence each.
     """
 
     parts: Mapping[Part, Assessment]
     angle: Array | None = None
     doubtful: Flags | None = None
     model: WheelModelFit | None = None
+    events: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -76,7 +79,7 @@ class MissionView:
         Called at the beginning of each stage.
     known : Mapping[Part, Assessment]
         What families before this one have judged: a family leaves these parts out.
-    angle, doubtful, model
+    angle, doubtful, model, events
         As in `Contribution`, from families before this one.
     """
 
@@ -90,6 +93,7 @@ class MissionView:
     angle: Array | None = None
     doubtful: Flags | None = None
     model: WheelModelFit | None = None
+    events: tuple[str, ...] = ()
 
     def values(self, name: str) -> Array:
         """A signal on the timeline, shape (n,); NaN where it is not logged."""
@@ -112,6 +116,7 @@ class MissionView:
             angle=self.angle if found.angle is None else found.angle,
             doubtful=self.doubtful if found.doubtful is None else found.doubtful,
             model=self.model if found.model is None else found.model,
+            events=self.events + found.events,
         )
 
 

@@ -10,6 +10,7 @@ from diagnosis.channels.family import DeadSensors
 from diagnosis.direct.family import DirectEvidence
 from diagnosis.drives.family import DriveEvidence, TrackingEvidence
 from diagnosis.evidence import EvidenceFamily
+from diagnosis.response.family import ResponseEvidence
 from diagnosis.steering.family import SteeringEvidence
 from diagnosis.wheels.family import WheelEvidence
 
@@ -18,6 +19,7 @@ FAMILIES: tuple[EvidenceFamily, ...] = (
     DeadSensors(),
     DirectEvidence(),
     WheelEvidence(),
+    ResponseEvidence(),
     DriveEvidence(),
     TrackingEvidence(),
 )

@@ -143,6 +143,7 @@ def _decision(judged: Judged, coverage: list[CoverageRow], decided_s: dict[tuple
         model=judged.found.wheel_model,
         checks=judged.checks,
         scope=_scope(judged),
+        events=judged.found.events,
     )
 
 

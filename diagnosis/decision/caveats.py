@@ -44,6 +44,8 @@ class Reservations:
         Checks that do not clear their part.
     scope : tuple[str, ...]
         Why what was judged is not the whole mission.
+    events : tuple[str, ...]
+        What happened to the machine as a whole.
     """
 
     short: tuple[Part, ...] = ()
@@ -52,6 +54,7 @@ class Reservations:
     damage: tuple[str, ...] = ()
     open: tuple[Checked, ...] = ()
     scope: tuple[str, ...] = ()
+    events: tuple[str, ...] = ()
 
 
 def doubt_of(watch: Sequence[FaultInterval], against: Reservations) -> str:
@@ -67,6 +70,8 @@ def doubt_of(watch: Sequence[FaultInterval], against: Reservations) -> str:
     if against.not_compared:
         out.append("a loss that lasts the whole mission would not show")
     out += against.scope
+    if against.events:
+        out.append("the machine did not follow its commands for a time")
     if against.open:
         out.append(open_words(against.open))
     return join_words(out)
@@ -92,7 +97,7 @@ def caveats_of(
     limits: Limits,
 ) -> tuple[str, ...]:
     """Sentences on damage, parts that were not judged long enough, the most driving left open, and unjudged steering."""
-    out, damage = [], against.damage
+    out, damage = list(against.events), against.damage
     if damage:
         said = "" if _LEFT_OUT in damage[0] else "The log is damaged: "
         out.append(f"{said}{damage[0]}" + (f" (and {len(damage) - 1} more)" if len(damage) > 1 else ""))

@@ -82,6 +82,7 @@ def decide(
     model: WheelModelFit | None = None,
     checks: Sequence[Checked] = (),
     scope: Sequence[str] = (),
+    events: Sequence[str] = (),
 ) -> Decision:
     """Give the verdict.
 
@@ -113,10 +114,12 @@ def decide(
         What is asked once more before a machine is cleared.
     scope : Sequence[str]
         Why what was judged is not the whole mission.
+    events : Sequence[str]
+        What happened to the machine as a whole and is no part's fault.
     """
     driven = driving_s or {}
     against = _reservations(assessments, decided_s, driven, axles, limits, damage, model)
-    against = replace(against, open=tuple(c for c in checks if not c.passed), scope=tuple(scope))
+    against = replace(against, open=tuple(c for c in checks if not c.passed), scope=tuple(scope), events=tuple(events))
     found = _with_faults(intervals, against) or _without_faults(assessments, decided_s, axles, against)
     caveats = caveats_of(against, assessments, decided_s, driven, axles, limits)
     if _modelled(assessments) and model is not None and model.identified:
@@ -183,6 +186,10 @@ def _without_faults(
     against: Reservations,
 ) -> Decision:
     """The verdict where no fault is worth an action: the first reservation that there is, else ``ready``."""
+    if against.events:
+        return Decision(Verdict.NOT_ASSESSED, "The machine did not follow its commands", against.events[0])
+    if against.short and (seen := _sensors_alone(assessments, decided_s, axles, against)):
+        return Decision(Verdict.NOT_ASSESSED, "No sensor fault seen, drives not judged", seen)
     if against.short:
         who = join_words(sorted({part_words(Kind.WHEEL, c, s) for c, s in against.short}))
         text = f"No fault was found, but {who} could not be judged long enough to be called healthy."
@@ -213,3 +220,17 @@ def _without_faults(
     least = min((decided_s[part] for part in assessments if part[0] not in axles), default=0.0)
     text = f"Every wheel's speed sensor and drive valve was judged healthy over at least {least:.0f} s of driving."
     return Decision(Verdict.READY, "No fault found", text, cleared=True)
+
+
+def _sensors_alone(
+    assessments: Mapping[Part, Assessment], decided_s: Mapping[Part, float], axles: Sequence[str], against: Reservations
+) -> str:
+    """What to say where every speed sensor was judged long enough and what is missing are drives without effort; else empty."""
+    if not all(side == Side.ACTUATOR and assessments[c, side].tier is Tier.RESPONSE for c, side in against.short):
+        return ""
+    least = min(decided_s.get(p, 0.0) for p in assessments if p[0] not in axles and p[1] == Side.SENSOR)
+    who = join_words([c for c, _ in against.short])
+    return (
+        f"The speed sensors were judged over at least {least:.0f} s of driving and no fault was seen in them. Whether the drives of "
+        f"{who} are weak cannot be seen without their effort: log current, duty or torque (`effort` of /joint_states)."
+    )

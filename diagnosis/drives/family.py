@@ -8,6 +8,7 @@ from diagnosis.drives.assess import assess_drive
 from diagnosis.drives.inputs import DriveData, drive_data
 from diagnosis.drives.tracking import assess_tracking
 from diagnosis.evidence import ACTUATOR, SENSOR, Contribution, MissionView, Part
+from diagnosis.response.standstill import together_idle
 from diagnosis.results.assessment import Assessment, unassessed
 from diagnosis.results.vocabulary import Tier
 from replay.faults import State
@@ -43,10 +44,11 @@ class TrackingEvidence:
     def assess(self, mission: MissionView) -> Contribution:
         """Judge drives that no stronger evidence has judged."""
         parts: dict[Part, Assessment] = {}
+        dt, limits, idle = mission.timeline.dt, mission.machine.limits, together_idle(mission)
         for wheel in _alone(mission):
             if _drive(mission, wheel) is None:
-                speed, command = f"wheel.{wheel}.v", mission.command(wheel)
-                dt, limits = mission.timeline.dt, mission.machine.limits
+                speed = f"wheel.{wheel}.v"
+                command = np.where(idle, 0.0, mission.command(wheel))
                 both = assess_tracking(mission.values(speed), command, dt, limits, (speed, "its command"))
                 parts[wheel, SENSOR], parts[wheel, ACTUATOR] = both
         return Contribution(parts)

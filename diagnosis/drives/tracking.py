@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from diagnosis.channels.noise import moving_sum, shifted
+from diagnosis.channels.noise import moving_sum, rounding_step, shifted
 from diagnosis.results.assessment import CODE, Assessment, Finding
 from diagnosis.results.evidence_columns import Pictured, steps_of
 from diagnosis.results.result import Epsilon, Hypothesis, Sat
@@ -23,8 +23,18 @@ Array = NDArray[np.float64]
 
 _MAX_LAG_S = 2.5
 _MIN_STILL_S = 0.5
-_MIN_REMAINING = 0.25
-_MOVING = 0.1
+_MOST_TO_COME, _SOME_TO_COME = (
+    0.5,
+    0.25,
+)  # share of the commanded travel that must be still to come; of a long standstill
+_LONG_S = 10.0
+_JITTER, _STEPS = 8.0, 6.0  # times the position's jitter, and its rounding step: no motion
+_SHARE = 0.06  # of the commanded range
+_CLEAR = 4.0  # times what counts as no motion: commanded range from which a standstill shows
+_CENSORED_S = 0.6  # before the end of the log, and the response's delay: a command proves nothing
+_ANSWER_S = 0.5  # a motion may end as much later than the delay says
+_FINE = 4.0  # times the jitter: a motion that is just ending
+_SMOOTH_S = 0.5
 
 
 class _Tracking(NamedTuple):
@@ -38,6 +48,8 @@ class _Tracking(NamedTuple):
         Where it is commanded to move.
     last : int
         Sample after the last one at which it moved.
+    proved : bool
+        Whether enough was commanded after that, early enough for the drive to answer.
     lag : int
         Delay of the response [steps].
     """
@@ -45,6 +57,7 @@ class _Tracking(NamedTuple):
     asked: Array
     driven: NDArray[np.bool_]
     last: int
+    proved: bool
     lag: int
 
 
@@ -84,16 +97,12 @@ def assess_tracking(
     lag = estimate_lag(v, v_ref, dt)
     reference = shifted(v_ref, lag)
     width = max(1, round(0.1 / dt))
-    speed = moving_sum(np.nan_to_num(np.abs(v)), width) / width
     asked = moving_sum(np.nan_to_num(np.abs(reference)), width) / width
     driven = asked > limits.driving_speed
-    scale = float(np.quantile(asked[driven], 0.5)) if driven.any() else 0.0
-    still = speed < max(_MOVING * scale, 0.2 * limits.driving_speed)
     states = np.where(driven, CODE[State.NOT_ASSESSED], CODE[State.NOT_EXCITED]).astype(np.int8)
     states[~np.isfinite(v) | ~np.isfinite(v_ref)] = CODE[State.NO_DATA]
-    moving = np.flatnonzero(~still)
-    last = int(moving[-1]) + 1 if moving.size else 0
-    found = _standstill(v, _Tracking(asked, driven, last, lag), dt, names)
+    last, proved = _last_motion(v, reference, lag, dt)
+    found = _standstill(v, _Tracking(asked, driven, last, proved, lag), dt, names)
     findings = () if found is None else (found,)
     for finding in findings:
         states[finding.start :] = CODE[State.NO_SIGNAL]
@@ -109,13 +118,47 @@ def assess_tracking(
     return one, Assessment(states.copy(), reasons, findings, {}, Tier.TRACKING, (note,))
 
 
+def _last_motion(v: Array, reference: Array, lag: int, dt: float) -> tuple[int, bool]:
+    """Sample after the last one of net motion, and whether what was commanded after it shows a standstill.
+
+    Net motion is that of the position: jitter of some counts and single wild readings come to nothing in it.
+    """
+    from scipy.ndimage import median_filter
+
+    raw = np.cumsum(np.nan_to_num(v)) * dt
+    width = 2 * max(1, round(0.5 * _SMOOTH_S / dt)) + 1
+    place = median_filter(raw, width, mode="nearest")
+    asked = np.cumsum(np.nan_to_num(reference)) * dt
+    jitter = 1.4826 * float(np.median(np.abs(raw - place)))
+    step = rounding_step(np.abs(np.nan_to_num(v[:100_000]))) * dt
+    until = max(0, v.size - lag - round(_CENSORED_S / dt))
+    # largest and smallest of all later samples
+    high, low = (np.asarray(pick.accumulate(place[::-1]))[::-1] for pick in (np.maximum, np.minimum))
+    later = asked[:until][::-1]
+    spread = np.zeros(v.size)
+    if until:
+        spread[:until] = (np.maximum.accumulate(later) - np.minimum.accumulate(later))[::-1]
+    least = np.maximum(max(_JITTER * jitter, _STEPS * step), _SHARE * spread)
+    still = np.flatnonzero(high - low <= least)
+    if not still.size:
+        return v.size, False
+    last = int(still[0])
+    after = min(last + round(_ANSWER_S / dt), v.size - 1)
+    proved = bool(spread[after] > _CLEAR * least[last])
+    # the very end of the motion, by what is no jitter
+    near = np.abs(place[last:] - np.median(place[last:])) <= max(_FINE * jitter, 3.0 * step, 0.1 * least[last])
+    return last + int(np.argmax(near)), proved
+
+
 def _standstill(v: Array, tracking: _Tracking, dt: float, names: tuple[str, str]) -> Finding | None:
     """The drive that stopped for good while its command went on; None where it did not."""
-    asked, driven, last, lag = tracking
+    asked, driven, last, proved, lag = tracking
     remaining = driven[last:]
     travel = float(asked[last:][remaining].sum()) * dt
     whole = float(asked[driven].sum()) * dt
-    if remaining.sum() * dt < _MIN_STILL_S or whole <= 0 or travel < _MIN_REMAINING * whole:
+    still_s = float(remaining.sum()) * dt
+    to_come = _SOME_TO_COME if still_s >= _LONG_S else _MOST_TO_COME
+    if not proved or still_s < _MIN_STILL_S or whole <= 0 or travel < to_come * whole:
         return None
     start = last + int(np.flatnonzero(remaining)[0])
     level = float(np.nanmean(v[start:])) if np.isfinite(v[start:]).any() else 0.0

@@ -74,6 +74,7 @@ class Tier(StrEnum):
     MODEL = "model"
     DRIVE = "drive"
     SIGNAL = "signal"
+    RESPONSE = "response"
     TRACKING = "tracking"
     NONE = "none"
 
@@ -122,6 +123,12 @@ _TIERS = {
         2, "a model of the drive", "drive model", "by the drive's own effort, without a second measurement"
     ),
     Tier.SIGNAL: _TierRow(1, "single channels", "channel alone", "from the channel alone"),
+    Tier.RESPONSE: _TierRow(
+        1,
+        "how the drives answer their commands",
+        "command response",
+        "against what its command and the other wheels make it do, without a second measurement",
+    ),
     Tier.TRACKING: _TierRow(
         1,
         "how the command is followed",

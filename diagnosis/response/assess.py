@@ -1,0 +1,247 @@
+"""The walk: response of every drive → blocks → views of each wheel → states → findings."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from diagnosis.response.beside import views
+from diagnosis.response.channel import samples_of
+from diagnosis.response.findings import Spell, Wheel, finding_of, spells_of, spikes_of
+from diagnosis.response.identification import Response, identify_response
+from diagnosis.response.inputs import FollowerData, cell_of, cells
+from diagnosis.response.jumps import jumps_of
+from diagnosis.response.kernel import posterior
+from diagnosis.response.models import BLOCK_S, HEALTHY, NOISY, OTHER, STATES, Beside, blocks_of, scores
+from diagnosis.response.standstill import not_followed, repeated
+from diagnosis.results.assessment import CODE, Assessment, Finding
+from diagnosis.results.evidence_columns import Pictured, steps_of
+from diagnosis.results.vocabulary import Tier
+from replay.faults import State
+from replay.machine.config import Limits
+from replay.machine.geometry import Geometry
+
+Array = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+
+_MEAN_HEALTHY_S, _MEAN_FAULTY_S = 120.0, 10.0
+_AT_A_JUMP = 0.1, 0.3  # probability that a fault begins, or ends, where the channel jumps
+_MOVES = 0.4  # of the driving speed: enough to see whether a channel lives
+_LEAST_P = 0.6
+_LEAST_S = 1.0
+_REPEATED_S = 1.0
+_DOUBT_S = 0.5  # around a spell that is judged no fault
+_NO_EFFORT = (
+    "a drive that follows its command may still be weak; its effort (current, duty or torque: wheel.<W>.u, e.g. `effort` of "
+    "/joint_states) and `mfhca fit` would show that"
+)
+
+
+@dataclass(frozen=True)
+class Judgement:
+    """Both sides of each wheel that could be judged, and what happened to the machine as a whole, a sentence each."""
+
+    parts: Mapping[str, tuple[Assessment, Assessment]]
+    events: tuple[str, ...]
+
+
+class _Judged(NamedTuple):
+    """A wheel on the way: its data, response, readings, states and spells."""
+
+    data: FollowerData
+    response: Response
+    wheel: Wheel
+    driving: Flags
+    posterior: Array
+    spells: list[Spell]
+    speed: Array | None
+    calm: Flags
+
+
+def assess_response(
+    data: Mapping[str, FollowerData], geometry: Geometry | None, yaw: Array | None, limits: Limits, dt: float
+) -> Judgement:
+    """Judge drives by their response.
+
+    Parameters
+    ----------
+    data : Mapping[str, FollowerData]
+        All drives that are judged so, by wheel.
+    geometry : Geometry or None
+        Says which wheels are on one side.
+    yaw : Array or None, shape (n,)
+        Measured yaw rate [rad/s].
+    limits : Limits
+        ``driving_speed``.
+    dt : float
+        Step [s].
+    """
+    if not data:
+        return Judgement({}, ())
+    width, cell = max(1, round(BLOCK_S / dt)), cell_of(dt)
+    drives = list(data.values())
+    idle = not_followed([d.y for d in drives], [d.asked for d in drives], limits.driving_speed, dt)
+    size = drives[0].y.size
+    left_out = np.zeros(size, np.bool_)
+    for start, stop in idle:
+        left_out[start:stop] = True
+    copied = _long(repeated(drives, width, size), round(_REPEATED_S / BLOCK_S))
+    hidden = np.repeat(copied, width)[:size] | left_out
+    found = _wheels(data, hidden, (cell, width), limits, dt)
+    if not found:
+        return Judgement({}, _events(idle, dt))
+    turned = None if yaw is None else cells(yaw, width)
+    beside = views(list(found), {w: j.wheel.blocks for w, j in found.items()}, geometry, turned)
+    judged = {w: _judge(j, beside.get(w), found, w, dt, width) for w, j in found.items()}
+    kept = {w: [s for s in j.spells if not _others_fault(s, w, judged)] for w, j in judged.items()}
+    parts = {w: _sides(j, kept[w], left_out, np.repeat(copied, width)[:size], limits, dt) for w, j in judged.items()}
+    return Judgement(parts, _events(idle, dt))
+
+
+def _events(idle: Sequence[tuple[int, int]], dt: float) -> tuple[str, ...]:
+    if not idle:
+        return ()
+    total, (start, stop) = sum(b - a for a, b in idle) * dt, max(idle, key=lambda s: s[1] - s[0])
+    return (
+        f"For {total:.1f} s all drives stood still together while they were commanded to move (longest {start * dt:.1f}–{stop * dt:.1f} s): "
+        "disabled, stopped by an emergency stop, or driven by another source of commands. No wheel is blamed for it.",
+    )
+
+
+def _long(flags: Flags, least: int) -> Flags:
+    """Only stretches of at least `least` in a row."""
+    edge = np.flatnonzero(np.diff(np.r_[False, flags, False].astype(np.int8)))
+    out = np.zeros(flags.size, np.bool_)
+    for a, b in zip(edge[::2], edge[1::2], strict=True):
+        out[a:b] = b - a >= least
+    return out
+
+
+def _wheels(
+    data: Mapping[str, FollowerData], hidden: Flags, steps: tuple[int, int], limits: Limits, dt: float
+) -> dict[str, _Judged]:
+    """Wheels whose response could be found, with their blocks; nothing is judged yet."""
+    cell, width = steps
+    out: dict[str, _Judged] = {}
+    for w, d in data.items():
+        y = np.where(hidden, np.nan, d.y)
+        samples = samples_of(y, d.fresh)
+        y[samples.step[samples.wild]] = np.nan
+        response = identify_response(cells(y, cell), d.commands, cell * dt, limits.driving_speed)
+        if response is None:
+            continue
+        blocks = blocks_of(samples, response, cell, width, y.size)
+        moves = np.maximum(np.maximum(np.abs(blocks.low), np.abs(blocks.high)), np.abs(np.nan_to_num(blocks.mean)))
+        driving = moves > _MOVES * limits.driving_speed
+        jumps, calm = jumps_of(samples, blocks, width)
+        wheel = Wheel(d.name, samples, blocks, jumps, dt, "")
+        out[w] = _Judged(d, response, wheel, driving, np.zeros((0, STATES)), [], None, calm)
+    return out
+
+
+def _judge(one: _Judged, beside: Beside | None, found: Mapping[str, _Judged], w: str, dt: float, width: int) -> _Judged:
+    block_s = width * dt
+    score = scores(one.wheel.blocks, one.driving, block_s, beside)
+    jumped = one.wheel.samples.step[one.wheel.jumps.place] // width
+    enters, leaves = np.full((2, len(score)), [[-np.expm1(-block_s / t)] for t in (_MEAN_HEALTHY_S, _MEAN_FAULTY_S)])
+    enters[jumped], leaves[jumped] = _AT_A_JUMP
+    p = posterior(score, enters, leaves)
+    others = " and ".join(j.data.name for o, j in found.items() if o != w) if beside is not None else ""
+    return one._replace(
+        posterior=p,
+        spells=spells_of(p, block_s),
+        speed=None if beside is None else beside.speed,
+        wheel=one.wheel._replace(compared=others),
+    )
+
+
+def _others_fault(spell: Spell, wheel: str, judged: Mapping[str, _Judged]) -> bool:
+    """Whether what looks like a scale is the fault of the wheel that this one was compared with."""
+    one = judged[wheel]
+    if (not spell.mode.scaled and spell.mode.value != "outside_table") or one.speed is None:
+        return False
+    for other, j in judged.items():
+        for s in j.spells if other != wheel else ():
+            overlap = min(s.stop, spell.stop) - max(s.start, spell.start)
+            surer = not s.mode.scaled or s.p > spell.p or spell.mode.value == "outside_table"
+            if overlap > 0.3 * (spell.stop - spell.start) and surer and s.mode.value != "outside_table":
+                return True
+    return False
+
+
+def _sides(
+    one: _Judged, spells: Sequence[Spell], idle: Flags, copied: Flags, limits: Limits, dt: float
+) -> tuple[Assessment, Assessment]:
+    """Sensor and drive of a wheel."""
+    wheel, blocks, size = one.wheel, one.wheel.blocks, one.data.y.size
+    width = -(-size // blocks.start.size) if blocks.start.size < 2 else int(blocks.start[1])
+    findings, doubtful = spikes_of(wheel), one.posterior[:, HEALTHY] < 0.5
+    doubtful = doubtful & ~((one.posterior.argmax(axis=1) == OTHER) & (one.speed is None) & one.calm)
+    for spell in spells:
+        long = (spell.stop - spell.start) * width * dt >= _LEAST_S
+        found = finding_of(spell, wheel, one.speed) if long and spell.p >= _LEAST_P else None
+        if found is not None:
+            findings.append(found)
+        elif one.posterior[spell.start : spell.stop].argmax(axis=1).min() > NOISY and _entered_calmly(
+            one, spell, width, dt
+        ):
+            doubtful[spell.start : spell.stop] = False  # what came slowly is slip or load, no sensor's fault
+    findings.sort(key=lambda f: f.start)
+    known = np.isfinite(one.data.y)
+    driving = np.repeat(one.driving, width)[:size]
+    sensor = np.where(driving, CODE[State.HEALTHY], CODE[State.NOT_EXCITED]).astype(np.int8)
+    sensor[np.repeat(doubtful, width)[:size]] = CODE[State.NOT_ASSESSED]
+    drive = np.where(driving, CODE[State.NOT_ASSESSED], CODE[State.NOT_EXCITED]).astype(np.int8)
+    for states in (sensor, drive):
+        states[idle] = CODE[State.NOT_ASSESSED]
+        states[~known | copied] = CODE[State.NO_DATA]
+    both = [f for f in findings if len(f.side.sides) > 1]
+    for f in findings:
+        sensor[f.start : f.stop] = CODE[State(f.mode.value)]
+        drive[f.start : f.stop] = CODE[State(f.mode.value) if f in both else State.MASKED]
+    return _assessment(one, sensor, tuple(findings), limits, dt), _drive(one, drive, tuple(both))
+
+
+def _entered_calmly(one: _Judged, spell: Spell, width: int, dt: float) -> bool:
+    """Whether a spell began and ended in calm moments, in which a jump would have been seen."""
+    reach = max(1, round(_DOUBT_S / (width * dt)))
+    ends = (spell.start, spell.stop - 1)
+    return all(bool(one.calm[max(0, k - reach) : k + reach + 1].all()) for k in ends)
+
+
+def _assessment(
+    one: _Judged, states: NDArray[np.int8], findings: tuple[Finding, ...], limits: Limits, dt: float
+) -> Assessment:
+    y, size, cell = one.data.y, one.data.y.size, cell_of(dt)
+    expected = np.repeat(one.response.expected, cell)[:size]
+    width = np.repeat(3.0 * one.response.noise + 0.5 * (one.response.high - one.response.low), cell)[:size]
+    series = (("residual", y - expected), ("expected", expected), ("threshold", width))
+    pictured = Pictured.of(steps_of(findings, size, dt), series)
+    r = one.response
+    note = (
+        f"{one.data.name} answers its command after {r.delay:.2g} s with a lag of {r.lag:.2g} s, up to {r.limit:.3g} m/s and "
+        f"{r.rate:.2g} m/s²; usual misfit {float(np.median(r.noise)):.2g} m/s"
+        + (f"; compared with {one.wheel.compared}." if one.wheel.compared else ".")
+    )
+    wild = int(one.wheel.samples.wild.sum())
+    notes = (note, *((f"{wild} wild readings of {one.data.name} were set aside.",) if wild else ()))
+    reasons = {
+        State.NOT_ASSESSED: "the speed is neither what its command nor what other channels make likely, and no known fault explains it",
+        State.NOT_EXCITED: "nothing is commanded",
+        State.NO_DATA: "no samples, or rows that repeat as a whole",
+    }
+    return Assessment(states, reasons, findings, pictured.columns, Tier.RESPONSE, notes, closeups=pictured.closeups)
+
+
+def _drive(one: _Judged, states: NDArray[np.int8], findings: tuple[Finding, ...]) -> Assessment:
+    reasons = {
+        State.NOT_ASSESSED: _NO_EFFORT,
+        State.NOT_EXCITED: "nothing is commanded",
+        State.NO_DATA: "no samples, or rows that repeat as a whole",
+        State.MASKED: "its speed sensor is faulty",
+    }
+    return Assessment(states, reasons, findings, {}, Tier.RESPONSE)

@@ -1,0 +1,75 @@
+"""What a speed's samples show by themselves: wild readings, repeated values, and how much changes from sample to sample."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+
+_AROUND = 3  # samples on each side that a wild reading is compared with
+_WILD_SHARE, _WILD_NOISE = 0.4, 12.0  # of the usual top speed; times the usual distance from the neighbours
+
+
+class Samples(NamedTuple):
+    """New samples of a speed.
+
+    Attributes
+    ----------
+    step : NDArray[np.intp], shape (m,)
+        Timeline step of each.
+    value : Array, shape (m,)
+        Readings [m/s]; NaN for wild ones.
+    wild : Flags, shape (m,)
+        Single readings far off those before and after.
+    same : Flags, shape (m,)
+        Whether a reading repeats the one before to the last digit.
+    change : Array, shape (m,)
+        Difference to the reading before [m/s].
+    white : Array, shape (m,)
+        Second difference, as the noise of one sample [m/s].
+    """
+
+    step: NDArray[np.intp]
+    value: Array
+    wild: Flags
+    same: Flags
+    change: Array
+    white: Array
+
+
+def samples_of(y: Array, fresh: Flags) -> Samples:
+    """New samples of a channel, with what is wild in them set aside.
+
+    Parameters
+    ----------
+    y : Array, shape (n,)
+        Readings [m/s]; NaN where not valid.
+    fresh : Flags, shape (n,)
+        Steps with a new sample.
+    """
+    step = np.flatnonzero(fresh & np.isfinite(y))
+    value = y[step].astype(np.float64)
+    wild = _wild(value)
+    value = np.where(wild, np.nan, value)
+    before = np.r_[np.nan, value[:-1]]
+    change = value - before
+    white = np.zeros(value.size)
+    if value.size > 2:
+        white[1:-1] = (value[2:] - 2.0 * value[1:-1] + value[:-2]) / np.sqrt(6.0)
+    return Samples(step, value, wild, change == 0.0, change, np.nan_to_num(white))
+
+
+def _wild(value: Array) -> Flags:
+    """Readings that lie far off both their neighbourhoods, which agree with each other."""
+    if value.size < 2 * _AROUND + 1:
+        return np.zeros(value.size, np.bool_)
+    from scipy.ndimage import median_filter
+
+    usual = median_filter(value, 2 * _AROUND + 1, mode="nearest")
+    off = np.abs(value - usual)
+    top = float(np.quantile(np.abs(usual), 0.99))
+    return np.asarray(off > max(_WILD_SHARE * top, _WILD_NOISE * float(np.quantile(off, 0.75)), 1e-9))

@@ -1,0 +1,26 @@
+"""Drives with command and speed alone as a family of evidence."""
+
+from __future__ import annotations
+
+from diagnosis.evidence import ACTUATOR, SENSOR, Contribution, MissionView, Part
+from diagnosis.response.assess import assess_response
+from diagnosis.response.inputs import followers
+from diagnosis.results.assessment import Assessment
+from diagnosis.results.vocabulary import Tier
+
+
+class ResponseEvidence:
+    """Velocity-controlled drives, by how they answer, by each other, and by what each channel shows alone."""
+
+    tier = Tier.RESPONSE
+
+    def assess(self, mission: MissionView) -> Contribution:
+        """Judge drives whose response can be found in the mission and whose effort is not logged."""
+        yaw = mission.values("imu.yaw_rate") if mission.logged("imu.yaw_rate") else None
+        machine = mission.machine
+        judged = assess_response(followers(mission), machine.geometry, yaw, machine.limits, mission.timeline.dt)
+        parts: dict[Part, Assessment] = {}
+        for wheel in mission.wheels:
+            if wheel in judged.parts:
+                parts[wheel, SENSOR], parts[wheel, ACTUATOR] = judged.parts[wheel]
+        return Contribution(parts, events=judged.events)

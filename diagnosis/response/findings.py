@@ -1,0 +1,239 @@
+"""From the states of a wheel's blocks to findings, with onset, size and what tells sensor from drive."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from diagnosis.response.channel import Samples
+from diagnosis.response.jumps import Jumps, onset_of
+from diagnosis.response.models import FROZEN, NOISY, SCALES, SILENT, Blocks
+from diagnosis.results.assessment import Finding
+from diagnosis.results.result import Epsilon, Hypothesis, Sat
+from diagnosis.results.vocabulary import Tier
+from replay.faults import FaultMode, Side, State
+
+Array = NDArray[np.float64]
+
+_JOIN_S = 1.0
+_SPIKE_GAP_S, _LEAST_SPIKES = 10.0, 3
+_SENSOR = 0.96  # that what a channel alone shows is the sensor's
+_ONE_JUMP, _TWO_JUMPS = 0.92, 0.97
+
+
+class Wheel(NamedTuple):
+    """A wheel with everything that its findings are made from.
+
+    Attributes
+    ----------
+    name : str
+        Of its channel.
+    samples, blocks, jumps
+        Its readings, by blocks, and where they jump.
+    dt : float
+        Step of the timeline [s].
+    compared : str
+        Channels that show the same speed, in words; empty where there are none.
+    """
+
+    name: str
+    samples: Samples
+    blocks: Blocks
+    jumps: Jumps
+    dt: float
+    compared: str
+
+
+class Spell(NamedTuple):
+    """Blocks [start, stop) in one kind of state, with its probability."""
+
+    start: int
+    stop: int
+    mode: FaultMode
+    p: float
+
+
+def spells_of(posterior: Array, block_s: float) -> list[Spell]:
+    """Spells of faults along the most probable states; short interruptions of one mode are bridged."""
+    modes = _modes()
+    best = posterior.argmax(axis=1)
+    out: list[Spell] = []
+    for k in np.flatnonzero(best > 1).tolist():
+        mode = modes[best[k]]
+        if out and out[-1].mode is mode and (k - out[-1].stop) * block_s <= _JOIN_S:
+            out[-1] = out[-1]._replace(stop=k + 1)
+        else:
+            out.append(Spell(k, k + 1, mode, 0.0))
+    return [s._replace(p=_mean_probability(posterior[s.start : s.stop], s.mode)) for s in out]
+
+
+def _modes() -> dict[int, FaultMode]:
+    out = {FROZEN: FaultMode.STUCK, SILENT: FaultMode.NO_SIGNAL, NOISY: FaultMode.NOISY}
+    scaled = {
+        NOISY + 1 + k: FaultMode.INEFFICIENT if s < 1.0 else FaultMode.OUTSIDE_TABLE for k, s in enumerate(SCALES)
+    }
+    return out | scaled
+
+
+def _mean_probability(posterior: Array, mode: FaultMode) -> float:
+    same = [k for k, m in _modes().items() if m is mode]
+    return float(np.mean(posterior[:, same].sum(axis=1)))
+
+
+def finding_of(spell: Spell, wheel: Wheel, speed: Array | None) -> Finding | None:
+    """What a spell is; None where nothing tells that it is the sensor's or the drive's fault.
+
+    Parameters
+    ----------
+    spell : Spell
+        The spell.
+    wheel : Wheel
+        The wheel.
+    speed : Array or None, shape (b,)
+        Its speed by other channels [m/s].
+    """
+    step = wheel.samples.step
+    width = int(wheel.blocks.start[1]) if wheel.blocks.start.size > 1 else 1
+    first, last = spell.start * width, min(spell.stop * width, int(step[-1]) + 1)
+    if spell.mode is FaultMode.STUCK:
+        return _stuck(spell, wheel, first, last)
+    if spell.mode is FaultMode.NO_SIGNAL:
+        return _silent(spell, wheel, first, last, speed is not None)
+    if spell.mode is FaultMode.NOISY:
+        return _noisy(spell, wheel, first, last)
+    return _scaled(spell, wheel, (first, last), speed)
+
+
+def spikes_of(wheel: Wheel) -> list[Finding]:
+    """Findings of wild readings that come again and again."""
+    places = wheel.samples.step[wheel.samples.wild]
+    groups = np.split(places, np.flatnonzero(np.diff(places) * wheel.dt > _SPIKE_GAP_S) + 1) if places.size else []
+    out = []
+    for group in groups:
+        if group.size < _LEAST_SPIKES:
+            continue
+        text = (
+            f"Spikes: {group.size} readings of {wheel.name} within {(group[-1] - group[0]) * wheel.dt:.1f} s are far off those "
+            "before and after them, and no machine moves like that."
+        )
+        out.append(_finding(int(group[0]), int(group[-1]) + 1, FaultMode.NOISY, 0.97, None, None, (text,)))
+    return out
+
+
+def _stuck(spell: Spell, wheel: Wheel, first: int, last: int) -> Finding:
+    inside = np.flatnonzero((wheel.samples.step >= first) & (wheel.samples.step < last))
+    value = float(wheel.samples.value[inside[inside.size // 2]])
+    same = wheel.samples.value == value
+    start, stop = int(inside[inside.size // 2]), int(inside[inside.size // 2])
+    while start > 0 and same[start - 1]:
+        start -= 1
+    while stop + 1 < same.size and same[stop + 1]:
+        stop += 1
+    begin, end = int(wheel.samples.step[start]), int(wheel.samples.step[stop]) + 1
+    text = (
+        f"{wheel.name} read {value:.4g} m/s in {stop - start + 1} readings one after another, for {(end - begin) * wheel.dt:.2f} s; "
+        "while it drives it otherwise changes all the time."
+    )
+    sat = Sat(value, abs(value), value, value, "m/s")
+    return _finding(begin, end, FaultMode.STUCK, spell.p * _SENSOR, Epsilon(1.0, 1.0, 1.0), sat, (text,))
+
+
+def _silent(spell: Spell, wheel: Wheel, first: int, last: int, seen: bool) -> Finding:
+    fell = onset_of(wheel.jumps, wheel.samples, first, 0.0, wheel.dt)
+    rose = onset_of(wheel.jumps, wheel.samples, last, np.inf, wheel.dt)
+    begin = first if fell is None else int(wheel.samples.step[fell])
+    end = last if rose is None else int(wheel.samples.step[rose])
+    texts = [f"{wheel.name} read 0 for {(end - begin) * wheel.dt:.2f} s while its command asked for motion."]
+    sensor = {0: 0.5, 1: _ONE_JUMP, 2: _TWO_JUMPS}[(fell is not None) + (rose is not None)]
+    if fell is not None or rose is not None:
+        texts.append("It fell to 0, or rose from it, from one reading to the next: no drive stops or starts like that.")
+    if seen:
+        sensor = max(sensor, _SENSOR)
+        texts.append(f"{wheel.compared} went on moving.")
+    if sensor == 0.5:
+        texts.append(
+            "Without a jump or another view of this wheel, a drive at standstill and a dead sensor cannot be distinguished."
+        )
+    sat = Sat(0.0, 0.0, 0.0, 0.0, "m/s")
+    return _finding(
+        begin, max(end, begin + 1), FaultMode.NO_SIGNAL, spell.p, Epsilon(1.0, 1.0, 1.0), sat, tuple(texts), sensor
+    )
+
+
+def _noisy(spell: Spell, wheel: Wheel, first: int, last: int) -> Finding:
+    inside = (wheel.samples.step >= first) & (wheel.samples.step < last)
+    rms = float(np.sqrt(np.mean(wheel.samples.white[inside] ** 2)))
+    usual = float(np.sqrt(np.median(wheel.samples.white[~inside] ** 2))) if (~inside).any() else 0.0
+    text = (
+        f"{wheel.name} changes by {rms:.2g} m/s from reading to reading (second differences), otherwise by {usual:.2g} m/s; "
+        "a wheel's inertia forbids that."
+    )
+    sat = Sat(0.0, rms, -rms, rms, "m/s")
+    return _finding(first, last, FaultMode.NOISY, spell.p * _SENSOR, None, sat, (text,))
+
+
+def _scaled(spell: Spell, wheel: Wheel, span: tuple[int, int], speed: Array | None) -> Finding | None:
+    part = slice(spell.start, spell.stop)
+    middle = 0.5 * (wheel.blocks.low + wheel.blocks.high) if speed is None else speed
+    known = np.isfinite(wheel.blocks.mean[part]) & np.isfinite(middle[part])
+    x, y = middle[part][known], wheel.blocks.mean[part][known]
+    if not np.any(x * x > 0.0):
+        return None
+    gain = float(x @ y / (x @ x))
+    if not 0.02 < gain < 20.0:
+        return None
+    fell = onset_of(wheel.jumps, wheel.samples, span[0], gain, wheel.dt)
+    rose = onset_of(wheel.jumps, wheel.samples, span[1], 1.0 / gain, wheel.dt)
+    if speed is None and fell is None and rose is None:
+        return None
+    begin = span[0] if fell is None else int(wheel.samples.step[fell])
+    end = span[1] if rose is None else int(wheel.samples.step[rose])
+    texts = []
+    if speed is not None:
+        texts.append(f"{wheel.name} is {gain:.2f} × what {wheel.compared} show of the same speed.")
+    if fell is not None or rose is not None:
+        texts.append(f"It changed by a factor of about {gain:.2f} from one reading to the next, which no drive does.")
+    sensor = {0: _ONE_JUMP, 1: _ONE_JUMP, 2: _TWO_JUMPS}[(fell is not None) + (rose is not None)]
+    misfit = float(np.sqrt(np.mean((y - gain * x) ** 2)) / np.sqrt(np.mean(x * x)))
+    wide = 2.0 * misfit / np.sqrt(max(1.0, x.size / 4.0))
+    loss = 1.0 - gain
+    p = spell.p if speed is not None else 1.0 - (1.0 - spell.p) * 0.5
+    return _finding(
+        begin, max(end, begin + 1), spell.mode, p, Epsilon(loss, loss - wide, loss + wide), None, tuple(texts), sensor
+    )
+
+
+def _finding(
+    start: int,
+    stop: int,
+    mode: FaultMode,
+    p: float,
+    epsilon: Epsilon | None,
+    sat: Sat | None,
+    evidence: tuple[str, ...],
+    sensor: float = 1.0,
+) -> Finding:
+    """A finding with probability p of any fault, of which `sensor` is the sensor's share."""
+    own = sensor > 0.6
+    side = Side.SENSOR if own else Side.SENSOR_OR_ACTUATOR
+    stated = p * (sensor if own else 1.0)
+    drive = Hypothesis(Side.ACTUATOR.value, mode.value, p * (1.0 - sensor))
+    rest = (drive,) if own and drive.p > 0.0 else ()
+    return Finding(
+        start=start,
+        stop=stop,
+        side=side,
+        mode=mode,
+        probability=stated,
+        hypotheses=(
+            Hypothesis(side.value, mode.value, stated),
+            *rest,
+            Hypothesis("none", State.HEALTHY.value, 1.0 - p),
+        ),
+        epsilon=epsilon,
+        sat=sat,
+        evidence=evidence,
+        tier=Tier.RESPONSE,
+    )

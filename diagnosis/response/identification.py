@@ -1,0 +1,162 @@
+"""How the drives of a mission answer to their commands, found in the mission itself: mixing, delay, lag and limits.
+
+A faulty spell is not left out by hand: the misfit counts by its logarithm (Cauchy), so that what is far off has little to say.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from diagnosis.response.kernel import follow
+
+Array = NDArray[np.float64]
+
+_LEAST_S = 20.0  # driving that a response can be found in
+_DELAYS = (0.05, 0.3, 0.8)  # where the search begins [s]
+_MOST_DELAY_S, _MOST_LAG_S = 2.5, 5.0
+_TIMING_S = 0.4  # by which a transition may come earlier or later than expected
+_MOSTLY, _MOSTLY_NOISE = 0.8, 1.3  # share of the driving that is sound, and its largest misfit there
+_UNEXPLAINED = 0.35  # of the usual speed: more misfit in half of the driving is no response at all
+
+
+class Response(NamedTuple):
+    """A drive's answer to its command.
+
+    Attributes
+    ----------
+    weights : Array, shape (k,)
+        Share of each command column in the target.
+    delay, lag : float
+        Dead time and time constant [s].
+    limit, rate : float
+        Largest speed [m/s] and acceleration [m/s²].
+    low, high : Array, shape (cells,)
+        Between what the speed is expected [m/s].
+    noise : Array, shape (cells,)
+        Usual misfit beyond that [m/s].
+    expected : Array, shape (cells,)
+        Expected speed [m/s].
+    """
+
+    weights: Array
+    delay: float
+    lag: float
+    limit: float
+    rate: float
+    low: Array
+    high: Array
+    noise: Array
+    expected: Array
+
+
+def identify_response(y: Array, commands: Array, h: float, driving_speed: float) -> Response | None:
+    """The response of one drive; None where it drives too little, or its commands explain nothing.
+
+    Parameters
+    ----------
+    y : Array, shape (cells,)
+        Measured speed [m/s]; NaN where not known.
+    commands : Array, shape (cells, k)
+        What the target is put together from; NaN where not known.
+    h : float
+        Length of a cell [s].
+    driving_speed : float
+        Commanded speed from which a drive is driving [m/s].
+    """
+    from scipy.optimize import least_squares
+
+    asked = np.nan_to_num(commands)
+    known = np.isfinite(y) & np.isfinite(commands).all(axis=1)
+    driving = known & ((np.abs(asked).max(axis=1) > driving_speed) | (np.abs(np.nan_to_num(y)) > driving_speed))
+    if np.count_nonzero(driving) * h < _LEAST_S or np.ptp(asked[driving], axis=0).max(initial=0.0) <= driving_speed:
+        return None
+    some = np.flatnonzero(driving)
+    seen = y[some]
+    usual = float(np.median(np.abs(seen)))
+    if usual <= 0.2 * driving_speed:
+        return None
+    top = float(np.quantile(np.abs(seen), 0.99))
+    size = np.maximum(np.abs(asked).max(axis=0), 1e-9)
+
+    def speed(x: Array) -> Array:
+        *weights, limit, delay, lag, rate = x
+        target = np.clip(asked @ (np.array(weights) / size * top), -np.exp(limit), np.exp(limit))
+        place = np.arange(target.size) - delay / h
+        target = np.interp(place, np.arange(target.size), target)
+        return np.asarray(follow(target, float(target[0]), -np.expm1(-h / max(np.exp(lag), 1e-3)), np.exp(rate) * h))
+
+    scale = max(0.1 * usual, 1e-6)
+    least = [-8.0] * asked.shape[1] + [np.log(0.3 * top), 0.0, np.log(h / 3), np.log(0.05 * top)]
+    most = [8.0] * asked.shape[1] + [np.log(3.0 * top), _MOST_DELAY_S, np.log(_MOST_LAG_S), np.log(50.0 * top)]
+    best = None
+    for delay in _DELAYS:
+        weights = _first_weights(y, asked, known, round(delay / h)) * size / top
+        first = np.clip([*weights, np.log(1.05 * top), delay, np.log(0.4), np.log(2.0 * top)], least, most)
+        found = least_squares(
+            lambda x: (speed(x)[some] - seen) / scale,
+            first,
+            bounds=(least, most),
+            loss="cauchy",
+            diff_step=0.02,
+            max_nfev=25,
+        )
+        best = found if best is None or found.cost < best.cost else best
+    assert best is not None
+    expected = speed(best.x)
+    if float(np.median(np.abs(expected[some] - seen))) > _UNEXPLAINED * usual:
+        return None
+    reach = max(1, round(_TIMING_S / h))
+    low, high = _moving(expected, reach, np.minimum), _moving(expected, reach, np.maximum)
+    *weights, limit, delay, lag, rate = best.x
+    noise = _noise(y, expected, low, high, driving)
+    return Response(
+        np.array(weights) / size * top, float(delay), float(np.exp(lag)), float(np.exp(limit)), float(np.exp(rate)),
+        low, high, noise, expected,
+    )  # fmt: skip
+
+
+def beyond(y: Array, low: Array, high: Array) -> Array:
+    """How far values lie outside of a band; 0 within. Shape of y."""
+    return np.asarray(y - np.clip(y, low, high))
+
+
+def _first_weights(y: Array, asked: Array, known: NDArray[np.bool_], delay: int) -> Array:
+    """Weights of delayed commands by least squares, twice: the second time without what is far off."""
+    moved = np.zeros_like(asked)
+    moved[delay:] = asked[: asked.shape[0] - delay]
+    use = known.copy()
+    weights = np.zeros(asked.shape[1])
+    for _ in range(2):
+        weights = np.linalg.lstsq(moved[use], y[use], rcond=None)[0]
+        off = np.abs(y - moved @ weights)
+        use = known & (off <= np.nanquantile(off[known], 0.7))
+    return np.asarray(weights)
+
+
+def _moving(x: Array, reach: int, pick: np.ufunc) -> Array:
+    """Smallest or largest of the cells within `reach`."""
+    from scipy.ndimage import maximum_filter1d, minimum_filter1d
+
+    return np.asarray((minimum_filter1d if pick is np.minimum else maximum_filter1d)(x, 2 * reach + 1, mode="nearest"))
+
+
+def _noise(y: Array, expected: Array, low: Array, high: Array, driving: NDArray[np.bool_]) -> Array:
+    """Usual misfit: a floor, a share of the speed and a share of the change that is under way, by medians of the driving."""
+    off = np.abs(beyond(y, low, high))
+    change = high - low
+    calm = driving & (change < 0.1 * np.quantile(np.abs(expected[driving]), 0.9))
+    calm = calm if np.count_nonzero(calm) > 100 else driving
+    raw = np.abs(y - expected)
+    floor = float(np.quantile(raw[calm], 0.5)) * 1.2
+    share = float(
+        np.quantile(raw[calm] / np.maximum(np.abs(expected[calm]), 0.2 * np.median(np.abs(expected[calm]))), 0.5)
+    )
+    busy = driving & ~calm
+    moving = (
+        float(np.quantile(off[busy] / np.maximum(change[busy], 1e-9), 0.75)) if np.count_nonzero(busy) > 50 else 0.2
+    )
+    noise = np.sqrt((0.7 * floor) ** 2 + (share * np.abs(expected)) ** 2 + (min(moving, 0.5) * change) ** 2)
+    return np.asarray(noise * max(1.0, float(np.quantile((off / noise)[driving], _MOSTLY)) / _MOSTLY_NOISE))

@@ -1,0 +1,74 @@
+"""Channels of drives that are judged by their response."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from diagnosis.evidence import SENSOR, MissionView
+
+Array = NDArray[np.float64]
+
+CELL_S = 0.05
+
+
+@dataclass(frozen=True)
+class FollowerData:
+    """One wheel.
+
+    Attributes
+    ----------
+    y : Array, shape (n,)
+        Measured speed [m/s]; NaN where not valid.
+    fresh : NDArray[np.bool_], shape (n,)
+        Steps with a new sample.
+    commands : Array, shape (cells, k)
+        What its target is put together from: its own command, or those of the body.
+    asked : Array, shape (n,)
+        Its commanded speed [m/s].
+    name : str
+        Of its channel.
+    """
+
+    y: Array
+    fresh: NDArray[np.bool_]
+    commands: Array
+    asked: Array
+    name: str
+
+
+def cell_of(dt: float) -> int:
+    """Steps of a cell."""
+    return max(1, round(CELL_S / dt))
+
+
+def cells(x: Array, width: int) -> Array:
+    """Mean over cells of what is known, shape (cells,); NaN where nothing is."""
+    number = -(-x.size // width)
+    cut = np.full(number * width, np.nan)
+    cut[: x.size] = x
+    table = cut.reshape(number, width)
+    known = np.isfinite(table)
+    count = known.sum(axis=1)
+    return np.asarray(np.where(count > 0, np.where(known, table, 0.0).sum(axis=1) / np.maximum(count, 1), np.nan))
+
+
+def followers(mission: MissionView) -> dict[str, FollowerData]:
+    """Wheels with speed and command whose sensor nothing has judged, and whose effort is not logged; by name."""
+    timeline, machine = mission.timeline, mission.machine
+    width = cell_of(timeline.dt)
+    body: Array | None = None
+    if mission.logged("cmd.v") and mission.logged("cmd.omega") and not machine.axles:
+        body = np.column_stack([cells(mission.values(n), width) for n in ("cmd.v", "cmd.omega")])
+    out: dict[str, FollowerData] = {}
+    for w in machine.wheels:
+        name, asked = f"wheel.{w}.v", mission.command(w)
+        judged = (w, SENSOR) in mission.known or mission.logged(f"wheel.{w}.v_true") or mission.logged(f"wheel.{w}.u")
+        if judged or not mission.logged(name) or not np.isfinite(asked).any():
+            continue
+        own = mission.logged(f"wheel.{w}.v_ref") or body is None
+        commands = cells(asked, width)[:, None] if own or body is None else body
+        out[w] = FollowerData(mission.values(name), timeline.fresh[name], commands, asked, name)
+    return out

@@ -1,0 +1,196 @@
+"""States of a wheel that is judged by its response, and how well each explains a block of a quarter of a second."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from diagnosis.response.channel import Samples
+from diagnosis.response.identification import Response, beyond
+
+Array = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+
+BLOCK_S = 0.25
+#: Gains of a scaled sensor; between .75 and 1.35 a wheel's slip is as large.
+SCALES = (0.15, 0.3, 0.45, 0.6, 0.72, 1.4, 1.8, 2.5)
+HEALTHY, OTHER, FROZEN, SILENT, NOISY = range(5)
+STATES = 5 + len(SCALES)
+
+_FREEDOM = 3.0  # of Student's t: slip and wind-up are common
+_SECOND = 0.25  # weight of a block's misfit beside its command: that lasts for about a second
+_BESIDE = 0.5  # beside another wheel
+_REPEATS = 0.5  # weight of repeats
+_OTHER_Z = 4.0  # misfit from which nothing known explains a block
+_WHITE_SPREAD, _WHITE_MOST = 0.5, 3.0
+_WHITE_UP = np.log(3.0)
+_LONG_S = 2.0  # a value held for longer is no habit, unless a quarter of the driving is like that
+_STILL = 0.02  # of the usual top speed
+_NEVER = -60.0
+
+
+class Blocks(NamedTuple):
+    """A wheel by blocks.
+
+    Attributes
+    ----------
+    start : NDArray[np.intp], shape (b,)
+        First timeline step of each block.
+    mean : Array, shape (b,)
+        Mean reading [m/s]; NaN without one.
+    low, high, noise : Array, shape (b,)
+        Expected band and its usual misfit [m/s].
+    count, same, zero : Array, shape (b,)
+        Readings, those that repeat the one before, those of a wheel that stands still.
+    white : Array, shape (b,)
+        Root mean square of what changes from sample to sample, beside the usual one (logarithm).
+    """
+
+    start: NDArray[np.intp]
+    mean: Array
+    low: Array
+    high: Array
+    noise: Array
+    count: Array
+    same: Array
+    zero: Array
+    white: Array
+
+    @property
+    def held(self) -> Flags:
+        """Blocks whose every reading repeats the one before."""
+        return np.asarray((self.count > 0) & (self.same == self.count))
+
+
+class Beside(NamedTuple):
+    """What another view says of a wheel's speed.
+
+    Attributes
+    ----------
+    speed, noise : Array, shape (b,)
+        The speed by that view and the usual misfit [m/s]; NaN where it says nothing.
+    blame : Array, shape (b,)
+        How much of a misfit is this wheel's own, 0…1.
+    """
+
+    speed: Array
+    noise: Array
+    blame: Array
+
+
+def blocks_of(samples: Samples, response: Response, cell: int, width: int, size: int) -> Blocks:
+    """Put samples and expectation into blocks.
+
+    Parameters
+    ----------
+    samples : Samples
+        Of the wheel's speed.
+    response : Response
+        By cells.
+    cell, width : int
+        Steps in a cell and in a block.
+    size : int
+        Steps of the mission.
+    """
+    number = -(-size // width)
+    start = np.arange(number) * width
+    block = samples.step // width
+    good = np.isfinite(samples.value)
+
+    def total(x: Array | Flags) -> Array:
+        return np.bincount(block[good], weights=np.asarray(x, np.float64)[good], minlength=number)
+
+    count = total(np.ones(good.size))
+    mean = np.where(count > 0, total(np.nan_to_num(samples.value)) / np.maximum(count, 1), np.nan)
+    cells = np.minimum((start + width // 2) // cell, response.low.size - 1)
+    white = np.sqrt(total(samples.white**2) / np.maximum(count, 1))
+    usual = _usual_white(white, np.abs(mean), count)
+    still = np.abs(samples.value) <= _STILL * float(np.nanquantile(np.abs(samples.value), 0.99))
+    return Blocks(
+        start, mean, response.low[cells], response.high[cells], response.noise[cells], count,
+        total(samples.same), total(still), np.log((white + 0.3 * usual) / (1.3 * usual)),
+    )  # fmt: skip
+
+
+def scores(blocks: Blocks, driving: Flags, block_s: float, beside: Beside | None = None) -> Array:
+    """Log-likelihood of each block in each state, shape (b, states).
+
+    Parameters
+    ----------
+    blocks : Blocks
+        The wheel.
+    driving : Flags, shape (b,)
+        Where the wheel is expected to move.
+    block_s : float
+        Length of a block [s].
+    beside : Beside or None
+        Another view of the same speed. Where it agrees, a misfit beside the command is none of the sensor's.
+    """
+    out = np.zeros((blocks.mean.size, STATES))
+    moves = blocks.zero < blocks.count
+    hold = _hold_share(blocks, driving, block_s)
+    held = np.where(moves & blocks.held, np.log(hold), 0.0)
+    busy = -_REPEATS * 0.5 * np.minimum(np.maximum(blocks.white, 0.0) / _WHITE_SPREAD, _WHITE_MOST) ** 2
+    loud = -_REPEATS * 0.5 * (np.clip(blocks.white - _WHITE_UP, -2.0, 0.0) / _WHITE_SPREAD) ** 2
+    repeat = float(
+        np.clip(np.sum(blocks.same[driving & moves]) / max(np.sum(blocks.count[driving & moves]), 1.0), 0.02, 0.95)
+    )
+    usual = _REPEATS * (blocks.same * np.log(repeat) + (blocks.count - blocks.same) * np.log1p(-repeat)) * moves
+    for m, scale in ((HEALTHY, 1.0), *((NOISY + 1 + k, s) for k, s in enumerate(SCALES))):
+        out[:, m] = _misfit(blocks, scale, beside) + held + busy
+    out[:, OTHER] = (
+        -_SECOND * _loss(_OTHER_Z) - (0.0 if beside is None else _BESIDE * _loss(_OTHER_Z) * beside.blame) + held + busy
+    )
+    out[:, FROZEN] = np.where(blocks.held & moves, 0.0, _NEVER)
+    out[:, SILENT] = np.where(moves, _NEVER, 0.0)
+    # noise changes with every sample: nothing repeats
+    out[:, NOISY] = loud + _SECOND * 0.5 * _misfit(blocks, 1.0, None, 4.0) - 1.5 * blocks.same * moves - usual - 0.5
+    out[blocks.count == 0] = 0.0
+    return out
+
+
+def _misfit(blocks: Blocks, scale: float, beside: Beside | None, wider: float = 1.0) -> Array:
+    """Log-likelihood of a block's mean if the sensor shows `scale` of the speed, 0 at best."""
+    ends = np.array([scale * blocks.low, scale * blocks.high])
+    off = beyond(blocks.mean, ends.min(axis=0), ends.max(axis=0))
+    alone = -_SECOND * np.nan_to_num(_loss(off / (wider * max(scale, 0.3) * blocks.noise)))
+    if beside is None:
+        return np.asarray(alone)
+    other = _loss((blocks.mean - scale * beside.speed) / (max(scale, 0.3) * beside.noise))
+    known = np.isfinite(other)
+    # what two views agree on is no misfit of one of them
+    agreed = np.where(known, alone * np.clip(np.nan_to_num(other) / _loss(_OTHER_Z), 0.0, 1.0), alone)
+    return np.asarray(agreed - _BESIDE * np.nan_to_num(other) * np.where(known, beside.blame, 0.0))
+
+
+def _loss(z: Array | float) -> Array:
+    return np.asarray(0.5 * (_FREEDOM + 1.0) * np.log1p(np.asarray(z) ** 2 / _FREEDOM))
+
+
+def _hold_share(blocks: Blocks, driving: Flags, block_s: float) -> float:
+    """Share of blocks without any change while the wheel moves, beside long holds."""
+    use = driving & (blocks.count > 0) & (blocks.zero < blocks.count)
+    edge = np.flatnonzero(np.diff(np.r_[False, blocks.held & use, False].astype(np.int8)))
+    long = np.zeros(use.size, np.bool_)
+    for a, b in zip(edge[::2], edge[1::2], strict=True):
+        long[a:b] = (b - a) * block_s > _LONG_S
+    if np.count_nonzero(long) > 0.25 * max(np.count_nonzero(use), 1):
+        long[:] = False
+    kept = use & ~long
+    return float(np.clip(np.mean(blocks.held[kept]), 0.02, 0.95)) if kept.any() else 0.5
+
+
+def _usual_white(white: Array, speed: Array, count: Array) -> Array:
+    """Usual root mean square of what changes from sample to sample, at a block's speed."""
+    use = (count > 0) & (speed > 0)
+    if np.count_nonzero(use) < 20:
+        return np.full(white.size, max(float(np.max(white, initial=0.0)), 1e-6))
+    edges = np.quantile(speed[use], [0.0, 0.33, 0.67])
+    place = np.clip(np.searchsorted(edges, np.nan_to_num(speed), side="right") - 1, 0, 2)
+    levels = np.array(
+        [np.quantile(white[use & (place == k)], 0.7) if (use & (place == k)).any() else 0.0 for k in range(3)]
+    )
+    levels = np.maximum(np.maximum.accumulate(levels), 1e-6)
+    return np.asarray(levels[place])
