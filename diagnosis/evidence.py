@@ -23,11 +23,11 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from diagnosis.results.assessment import Assessment
+from diagnosis.results.assessment import CODE, Assessment
 from diagnosis.results.vocabulary import Tier
 from diagnosis.results.wheel_model import WheelModelFit
 from replay.control.loop import Replay
-from replay.faults import Side
+from replay.faults import Side, State
 from replay.machine.config import Machine
 from replay.progress import Subscriber
 from replay.signals.timeline import Timeline
@@ -104,20 +104,32 @@ class MissionView:
         """Whether a signal has any value."""
         return bool(np.isfinite(self.values(name)).any())
 
+    def judged(self, part: Part) -> bool:
+        """Whether a family before this one has judged a part."""
+        return part in self.known and self.known[part].tier is not Tier.NONE
+
     def command(self, wheel: str) -> Array:
         """Commanded speed of a wheel [m/s], shape (n,)."""
         return self.replay.v_ref[:, self.machine.wheels.index(wheel)]
 
     def after(self, found: Contribution) -> MissionView:
-        """The same for the families after one that found this; what was judged before stays."""
+        """The same for the families after one that found this; what was judged before stays, what could not be is open."""
         return replace(
             self,
-            known={**found.parts, **self.known},
+            known={**self.known, **{part: a for part, a in found.parts.items() if _open(self.known.get(part), a)}},
             angle=self.angle if found.angle is None else found.angle,
             doubtful=self.doubtful if found.doubtful is None else found.doubtful,
             model=self.model if found.model is None else found.model,
             events=self.events + found.events,
         )
+
+
+def _open(known: Assessment | None, found: Assessment) -> bool:
+    """Whether a part is still to be judged: nothing is known of it, or only why it could not be."""
+    if known is None:
+        return True
+    masked = CODE[State.MASKED] in known.states[:1]
+    return known.tier is Tier.NONE and found.tier is not Tier.NONE and not masked
 
 
 class EvidenceFamily(Protocol):

@@ -19,7 +19,7 @@ FAMILIES: tuple[EvidenceFamily, ...] = (
     DeadSensors(),
     DirectEvidence(),
     WheelEvidence(),
-    ResponseEvidence(),
     DriveEvidence(),
+    ResponseEvidence(),
     TrackingEvidence(),
 )

@@ -11,6 +11,7 @@ _COSTS = {
     "wheel.v_true": "ε of the speed sensor rests on the wheel model instead of a second measurement",
     "wheel.u": "the actuator is not assessed, no Ψ̂ is implied, and without v_true the speed sensor only by whether it follows v_c,i",
     "wheel.u_applied": "ε of the actuator rests on the wheel model, and a loss of the sensor and one of the actuator are harder to distinguish",
+    "wheel.effort": "a drive without a valve is judged by its speed alone, and whether it is weak is not assessed",
     "wheel.psi": "no effect on the verdict; the recorded and the replayed Ψ̂ cannot be compared",
     "wheel.pressure_a": "no effect on the verdict: pressures are only shown beside the evidence",
     "wheel.pressure_b": "no effect on the verdict: pressures are only shown beside the evidence",

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
+from diagnosis.channels.standstill import together_idle
 from diagnosis.drives.assess import assess_drive
 from diagnosis.drives.inputs import DriveData, drive_data
 from diagnosis.drives.tracking import assess_tracking
 from diagnosis.evidence import ACTUATOR, SENSOR, Contribution, MissionView, Part
-from diagnosis.response.standstill import together_idle
 from diagnosis.results.assessment import Assessment, unassessed
 from diagnosis.results.vocabulary import Tier
 from replay.faults import State

@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from diagnosis.channels.standstill import not_followed, repeated
 from diagnosis.response.beside import views
 from diagnosis.response.channel import samples_of
 from diagnosis.response.findings import Spell, Wheel, finding_of, spells_of, spikes_of
@@ -17,7 +18,6 @@ from diagnosis.response.inputs import FollowerData, cell_of, cells
 from diagnosis.response.jumps import jumps_of
 from diagnosis.response.kernel import posterior
 from diagnosis.response.models import BLOCK_S, HEALTHY, NOISY, OTHER, STATES, Beside, blocks_of, scores
-from diagnosis.response.standstill import not_followed, repeated
 from diagnosis.results.assessment import CODE, Assessment, Finding
 from diagnosis.results.evidence_columns import Pictured, steps_of
 from diagnosis.results.vocabulary import Tier
@@ -35,10 +35,7 @@ _LEAST_P = 0.6
 _LEAST_S = 1.0
 _REPEATED_S = 1.0
 _DOUBT_S = 0.5  # around a spell that is judged no fault
-_NO_EFFORT = (
-    "a drive that follows its command may still be weak; its effort (current, duty or torque: wheel.<W>.u, e.g. `effort` of "
-    "/joint_states) and `mfhca fit` would show that"
-)
+_NO_EFFORT = "a drive that follows its command may still be weak: only its effort would show that"
 
 
 @dataclass(frozen=True)
@@ -89,7 +86,7 @@ def assess_response(
     left_out = np.zeros(size, np.bool_)
     for start, stop in idle:
         left_out[start:stop] = True
-    copied = _long(repeated(drives, width, size), round(_REPEATED_S / BLOCK_S))
+    copied = _long(repeated([d.y for d in drives], [d.fresh for d in drives], width), round(_REPEATED_S / BLOCK_S))
     hidden = np.repeat(copied, width)[:size] | left_out
     found = _wheels(data, hidden, (cell, width), limits, dt)
     if not found:
@@ -116,7 +113,7 @@ def _long(flags: Flags, least: int) -> Flags:
     """Only stretches of at least `least` in a row."""
     edge = np.flatnonzero(np.diff(np.r_[False, flags, False].astype(np.int8)))
     out = np.zeros(flags.size, np.bool_)
-    for a, b in zip(edge[::2], edge[1::2], strict=True):
+    for a, b in zip(edge[::2].tolist(), edge[1::2].tolist(), strict=True):
         out[a:b] = b - a >= least
     return out
 

@@ -15,7 +15,7 @@ class ResponseEvidence:
     tier = Tier.RESPONSE
 
     def assess(self, mission: MissionView) -> Contribution:
-        """Judge drives whose response can be found in the mission and whose effort is not logged."""
+        """Judge drives whose response can be found in the mission and that nothing stronger has judged."""
         yaw = mission.values("imu.yaw_rate") if mission.logged("imu.yaw_rate") else None
         machine = mission.machine
         judged = assess_response(followers(mission), machine.geometry, yaw, machine.limits, mission.timeline.dt)

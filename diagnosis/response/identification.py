@@ -128,9 +128,9 @@ def _first_weights(y: Array, asked: Array, known: NDArray[np.bool_], delay: int)
     moved = np.zeros_like(asked)
     moved[delay:] = asked[: asked.shape[0] - delay]
     use = known.copy()
-    weights = np.zeros(asked.shape[1])
+    weights: Array = np.zeros(asked.shape[1])
     for _ in range(2):
-        weights = np.linalg.lstsq(moved[use], y[use], rcond=None)[0]
+        weights = np.asarray(np.linalg.lstsq(moved[use], y[use], rcond=None)[0], dtype=np.float64)
         off = np.abs(y - moved @ weights)
         use = known & (off <= np.nanquantile(off[known], 0.7))
     return np.asarray(weights)

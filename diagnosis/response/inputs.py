@@ -56,7 +56,7 @@ def cells(x: Array, width: int) -> Array:
 
 
 def followers(mission: MissionView) -> dict[str, FollowerData]:
-    """Wheels with speed and command whose sensor nothing has judged, and whose effort is not logged; by name."""
+    """Wheels with speed and command whose sensor nothing has judged, by name."""
     timeline, machine = mission.timeline, mission.machine
     width = cell_of(timeline.dt)
     body: Array | None = None
@@ -65,8 +65,8 @@ def followers(mission: MissionView) -> dict[str, FollowerData]:
     out: dict[str, FollowerData] = {}
     for w in machine.wheels:
         name, asked = f"wheel.{w}.v", mission.command(w)
-        judged = (w, SENSOR) in mission.known or mission.logged(f"wheel.{w}.v_true") or mission.logged(f"wheel.{w}.u")
-        if judged or not mission.logged(name) or not np.isfinite(asked).any():
+        taken = mission.judged((w, SENSOR)) or mission.logged(f"wheel.{w}.v_true")
+        if taken or not mission.logged(name) or not np.isfinite(asked).any():
             continue
         own = mission.logged(f"wheel.{w}.v_ref") or body is None
         commands = cells(asked, width)[:, None] if own or body is None else body

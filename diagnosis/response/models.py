@@ -42,7 +42,7 @@ class Blocks(NamedTuple):
         Mean reading [m/s]; NaN without one.
     low, high, noise : Array, shape (b,)
         Expected band and its usual misfit [m/s].
-    count, same, zero : Array, shape (b,)
+    readings, same, zero : Array, shape (b,)
         Readings, those that repeat the one before, those of a wheel that stands still.
     white : Array, shape (b,)
         Root mean square of what changes from sample to sample, beside the usual one (logarithm).
@@ -53,7 +53,7 @@ class Blocks(NamedTuple):
     low: Array
     high: Array
     noise: Array
-    count: Array
+    readings: Array
     same: Array
     zero: Array
     white: Array
@@ -61,7 +61,7 @@ class Blocks(NamedTuple):
     @property
     def held(self) -> Flags:
         """Blocks whose every reading repeats the one before."""
-        return np.asarray((self.count > 0) & (self.same == self.count))
+        return np.asarray((self.readings > 0) & (self.same == self.readings))
 
 
 class Beside(NamedTuple):
@@ -100,7 +100,7 @@ def blocks_of(samples: Samples, response: Response, cell: int, width: int, size:
     good = np.isfinite(samples.value)
 
     def total(x: Array | Flags) -> Array:
-        return np.bincount(block[good], weights=np.asarray(x, np.float64)[good], minlength=number)
+        return np.bincount(block[good], weights=np.asarray(x, np.float64)[good], minlength=number).astype(np.float64)
 
     count = total(np.ones(good.size))
     mean = np.where(count > 0, total(np.nan_to_num(samples.value)) / np.maximum(count, 1), np.nan)
@@ -129,15 +129,15 @@ def scores(blocks: Blocks, driving: Flags, block_s: float, beside: Beside | None
         Another view of the same speed. Where it agrees, a misfit beside the command is none of the sensor's.
     """
     out = np.zeros((blocks.mean.size, STATES))
-    moves = blocks.zero < blocks.count
+    moves = blocks.zero < blocks.readings
     hold = _hold_share(blocks, driving, block_s)
     held = np.where(moves & blocks.held, np.log(hold), 0.0)
     busy = -_REPEATS * 0.5 * np.minimum(np.maximum(blocks.white, 0.0) / _WHITE_SPREAD, _WHITE_MOST) ** 2
     loud = -_REPEATS * 0.5 * (np.clip(blocks.white - _WHITE_UP, -2.0, 0.0) / _WHITE_SPREAD) ** 2
     repeat = float(
-        np.clip(np.sum(blocks.same[driving & moves]) / max(np.sum(blocks.count[driving & moves]), 1.0), 0.02, 0.95)
+        np.clip(np.sum(blocks.same[driving & moves]) / max(np.sum(blocks.readings[driving & moves]), 1.0), 0.02, 0.95)
     )
-    usual = _REPEATS * (blocks.same * np.log(repeat) + (blocks.count - blocks.same) * np.log1p(-repeat)) * moves
+    usual = _REPEATS * (blocks.same * np.log(repeat) + (blocks.readings - blocks.same) * np.log1p(-repeat)) * moves
     for m, scale in ((HEALTHY, 1.0), *((NOISY + 1 + k, s) for k, s in enumerate(SCALES))):
         out[:, m] = _misfit(blocks, scale, beside) + held + busy
     out[:, OTHER] = (
@@ -147,7 +147,7 @@ def scores(blocks: Blocks, driving: Flags, block_s: float, beside: Beside | None
     out[:, SILENT] = np.where(moves, _NEVER, 0.0)
     # noise changes with every sample: nothing repeats
     out[:, NOISY] = loud + _SECOND * 0.5 * _misfit(blocks, 1.0, None, 4.0) - 1.5 * blocks.same * moves - usual - 0.5
-    out[blocks.count == 0] = 0.0
+    out[blocks.readings == 0] = 0.0
     return out
 
 
@@ -171,12 +171,13 @@ def _loss(z: Array | float) -> Array:
 
 def _hold_share(blocks: Blocks, driving: Flags, block_s: float) -> float:
     """Share of blocks without any change while the wheel moves, beside long holds."""
-    use = driving & (blocks.count > 0) & (blocks.zero < blocks.count)
-    edge = np.flatnonzero(np.diff(np.r_[False, blocks.held & use, False].astype(np.int8)))
+    use = driving & (blocks.readings > 0) & (blocks.zero < blocks.readings)
+    edge: NDArray[np.intp] = np.flatnonzero(np.diff(np.r_[False, blocks.held & use, False].astype(np.int8)))
     long = np.zeros(use.size, np.bool_)
-    for a, b in zip(edge[::2], edge[1::2], strict=True):
-        long[a:b] = (b - a) * block_s > _LONG_S
-    if np.count_nonzero(long) > 0.25 * max(np.count_nonzero(use), 1):
+    starts, stops = edge[::2], edge[1::2]
+    for k in np.flatnonzero((stops - starts) * block_s > _LONG_S):
+        long[starts[k] : stops[k]] = True
+    if np.count_nonzero(long) > 0.25 * max(int(np.count_nonzero(use)), 1):
         long[:] = False
     kept = use & ~long
     return float(np.clip(np.mean(blocks.held[kept]), 0.02, 0.95)) if kept.any() else 0.5

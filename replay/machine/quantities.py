@@ -5,7 +5,9 @@ from __future__ import annotations
 import math
 from typing import Literal
 
-Quantity = Literal["speed", "rotation", "angle", "length", "fraction", "pressure", "acceleration", "position_deg"]
+Quantity = Literal[
+    "speed", "rotation", "angle", "length", "fraction", "pressure", "acceleration", "effort", "position_deg"
+]
 
 #: Every unit that a machine file may name: its quantity and the factor to SI.
 UNITS: dict[str, tuple[Quantity, float]] = {
@@ -28,6 +30,11 @@ UNITS: dict[str, tuple[Quantity, float]] = {
     "bar": ("pressure", 1e5),
     "MPa": ("pressure", 1e6),
     "m/s^2": ("acceleration", 1.0),
+    "N·m": ("effort", 1.0),
+    "Nm": ("effort", 1.0),
+    "A": ("effort", 1.0),
+    "mA": ("effort", 1e-3),
+    "V": ("effort", 1.0),
 }
 #: Unit in which every signal of a quantity is kept; a position on the globe stays in degrees.
 SI_UNITS: dict[Quantity, str] = {

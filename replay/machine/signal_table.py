@@ -99,6 +99,7 @@ _ANGLE_COMMAND = (
 _ASKED = r"(joystick|cmd|command|driver|desired|ref)"
 _SECOND_SPEED = r"(velo(city)?|speed|vel)_?(redundant|true|second)"
 _SPEED = r"velo(city)?|speed|^vel|rpm|drehzahl|^omega"
+_EFFORT = r"effort|torque|current|duty|pwm|moment$"
 _YAW_RATE = r"(imu|gyro).*(yaw_?rate|gyro_?z|omega_?z|angular_velocity_z)"
 _Entry = CanonicalSignal
 
@@ -111,6 +112,9 @@ CANONICAL: tuple[CanonicalSignal, ...] = (
     _Entry("wheel", "v_true", "speed", "second measurement of the speed", 3, Named(5, _SECOND_SPEED)),
     _Entry("wheel", "u", "fraction", "valve command u_a", 8, _VALVE),
     _Entry("wheel", "u_applied", "fraction", "measured valve position", 10, _VALVE_POSITION),
+    _Entry(
+        "wheel", "effort", "effort", "effort of the drive: torque, current, voltage or duty", None, Named(8, _EFFORT)
+    ),
     _Entry("wheel", "psi", "fraction", "recorded Ψ̂", 16, Named(4, r"^psi")),
     _Entry("wheel", "pressure_a", "pressure", "pressure of port A", 17, Named(2, r"press(ure)?_?a$")),
     _Entry("wheel", "pressure_b", "pressure", "pressure of port B", 18, Named(3, r"press(ure)?_?b$")),

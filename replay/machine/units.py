@@ -58,8 +58,12 @@ def si_factor(
     if derivative:
         integral: dict[Quantity, Quantity] = {"length": "speed", "angle": "rotation"}
         quantity = integral.get(quantity, quantity)
-    if quantity == wanted:
+    if quantity == wanted or (wanted == "effort" and quantity == "fraction"):
         return factor
+    if quantity == "effort" and signal.endswith(".u"):
+        raise ConfigError(
+            f"[signals] {signal!r}: unit {unit!r} is an effort of a motor, not an opening; name it {signal[:-1]}effort"
+        )
     if wanted == "speed" and quantity == "rotation" and signal.startswith("wheel."):
         if wheel_radius is None:
             raise ConfigError(

@@ -172,6 +172,8 @@ def _by_joint(channel: Channel, machine: Machine, others: Mapping[str, Channel])
         part = f"wheel.{wheel}" if wheel else f"steer.{axle}" if axle else None
         if part and kind == "effort":
             yield Candidate(f"{part}.{role}", _source(channel, "1"), rank, why)
+    elif wheel and kind == "effort" and role == "measured":
+        yield Candidate(f"wheel.{wheel}.effort", _source(channel, "N·m"), rank, why)
     elif wheel and kind == "velocity":
         leaf = {"measured": "v", "ref": "v_ref", "true": "v_true"}.get(role)
         if leaf:

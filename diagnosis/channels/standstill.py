@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from diagnosis.evidence import MissionView
-from diagnosis.response.inputs import FollowerData
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -59,17 +58,24 @@ def not_followed(speeds: Sequence[Array], commands: Sequence[Array], driving_spe
     return out
 
 
-def repeated(drives: Sequence[FollowerData], width: int, size: int) -> NDArray[np.bool_]:
-    """Blocks in which the speeds of all of several drives repeat themselves while they move, shape (b,): the logger's rows do."""
-    number = -(-size // width)
-    if len(drives) < 2:
+def repeated(speeds: Sequence[Array], fresh: Sequence[Flags], width: int) -> Flags:
+    """Blocks in which the speeds of all of several drives repeat themselves while they move, shape (b,): the logger's rows do.
+
+    Parameters
+    ----------
+    speeds, fresh : Sequence[Array], Sequence[Flags], each of shape (n,)
+        Measured speeds of all drives [m/s], and where they have a new sample.
+    width : int
+        Steps in a block.
+    """
+    number = -(-speeds[0].size // width) if speeds else 0
+    if len(speeds) < 2:
         return np.zeros(number, np.bool_)
     held, moving = np.ones(number, np.bool_), np.zeros(number, np.bool_)
-    for d in drives:
-        step = np.flatnonzero(d.fresh & np.isfinite(d.y))
-        change = np.diff(d.y[step], prepend=np.nan) != 0.0
+    for y, new in zip(speeds, fresh, strict=True):
+        step = np.flatnonzero(new & np.isfinite(y))
+        change = np.diff(y[step], prepend=np.nan) != 0.0
         block = step // width
-        count = np.bincount(block, minlength=number)
-        held &= (np.bincount(block, weights=change, minlength=number) == 0) & (count > 0)
-        moving |= np.bincount(block, weights=np.abs(d.y[step]), minlength=number) > 0
+        held &= (np.bincount(block, weights=change, minlength=number) == 0) & (np.bincount(block, minlength=number) > 0)
+        moving |= np.bincount(block, weights=np.abs(y[step]), minlength=number) > 0
     return np.asarray(held & moving)
