@@ -13,7 +13,7 @@ from diagnosis.channels.standstill import not_followed, repeated
 from diagnosis.response.beside import views
 from diagnosis.response.channel import samples_of
 from diagnosis.response.findings import Spell, Wheel, finding_of, spells_of, spikes_of
-from diagnosis.response.identification import Response, identify_response
+from diagnosis.response.identification import Response, identify_response, without_command
 from diagnosis.response.inputs import FollowerData, cell_of, cells
 from diagnosis.response.jumps import jumps_of
 from diagnosis.response.kernel import posterior
@@ -36,6 +36,7 @@ _LEAST_S = 1.0
 _REPEATED_S = 1.0
 _DOUBT_S = 0.5  # around a spell that is judged no fault
 _NO_EFFORT = "a drive that follows its command may still be weak: only its effort would show that"
+_UNSEEN = "without its command or another wheel of its side only a speed that is frozen, wild or noisy shows"
 
 
 @dataclass(frozen=True)
@@ -128,11 +129,15 @@ def _wheels(
         y = np.where(hidden, np.nan, d.y)
         samples = samples_of(y, d.fresh)
         y[samples.step[samples.wild]] = np.nan
-        response = identify_response(cells(y, cell), d.commands, cell * dt, limits.driving_speed)
+        means = cells(y, cell)
+        found = identify_response(means, d.commands, cell * dt, limits.driving_speed)
+        response = without_command(means.size) if found is None and not np.isfinite(d.commands).any() else found
         if response is None:
             continue
         blocks = blocks_of(samples, response, cell, width, y.size)
-        moves = np.maximum(np.maximum(np.abs(blocks.low), np.abs(blocks.high)), np.abs(np.nan_to_num(blocks.mean)))
+        moves = np.abs(np.nan_to_num(blocks.mean))
+        if response.answered:
+            moves = np.maximum(np.maximum(np.abs(blocks.low), np.abs(blocks.high)), moves)
         driving = moves > _MOVES * limits.driving_speed
         jumps, calm = jumps_of(samples, blocks, width)
         wheel = Wheel(d.name, samples, blocks, jumps, dt, "")
@@ -191,7 +196,8 @@ def _sides(
     known = np.isfinite(one.data.y)
     driving = np.repeat(one.driving, width)[:size]
     sensor = np.where(driving, CODE[State.HEALTHY], CODE[State.NOT_EXCITED]).astype(np.int8)
-    sensor[np.repeat(doubtful, width)[:size]] = CODE[State.NOT_ASSESSED]
+    unseen = not one.response.answered and one.speed is None
+    sensor[np.repeat(doubtful | (one.driving & unseen), width)[:size]] = CODE[State.NOT_ASSESSED]
     drive = np.where(driving, CODE[State.NOT_ASSESSED], CODE[State.NOT_EXCITED]).astype(np.int8)
     for states in (sensor, drive):
         states[idle] = CODE[State.NOT_ASSESSED]
@@ -219,15 +225,22 @@ def _assessment(
     series = (("residual", y - expected), ("expected", expected), ("threshold", width))
     pictured = Pictured.of(steps_of(findings, size, dt), series)
     r = one.response
+    unseen = not r.answered and one.speed is None
     note = (
-        f"{one.data.name} answers its command after {r.delay:.2g} s with a lag of {r.lag:.2g} s, up to {r.limit:.3g} m/s and "
-        f"{r.rate:.2g} m/s²; usual misfit {float(np.median(r.noise)):.2g} m/s"
-        + (f"; compared with {one.wheel.compared}." if one.wheel.compared else ".")
+        f"{one.data.name} has no command"
+        if not r.answered
+        else (
+            f"{one.data.name} answers its command after {r.delay:.2g} s with a lag of {r.lag:.2g} s, up to {r.limit:.3g} m/s and "
+            f"{r.rate:.2g} m/s²; usual misfit {float(np.median(r.noise)):.2g} m/s"
+        )
     )
+    note += f"; compared with {one.wheel.compared}." if one.wheel.compared else "."
     wild = int(one.wheel.samples.wild.sum())
     notes = (note, *((f"{wild} wild readings of {one.data.name} were set aside.",) if wild else ()))
     reasons = {
-        State.NOT_ASSESSED: "the speed is neither what its command nor what other channels make likely, and no known fault explains it",
+        State.NOT_ASSESSED: _UNSEEN
+        if unseen
+        else "the speed is neither what its command nor what other channels make likely, and no known fault explains it",
         State.NOT_EXCITED: "nothing is commanded",
         State.NO_DATA: "no samples, or rows that repeat as a whole",
     }

@@ -51,6 +51,17 @@ class Response(NamedTuple):
     noise: Array
     expected: Array
 
+    @property
+    def answered(self) -> bool:
+        """Whether a command says what is expected."""
+        return self.weights.size > 0
+
+
+def without_command(size: int) -> Response:
+    """What is expected of a drive whose command is not logged: any speed."""
+    wide, nothing = np.full(size, np.inf), np.full(size, np.nan)
+    return Response(np.zeros(0), np.nan, np.nan, np.nan, np.nan, -wide, wide, np.ones(size), nothing)
+
 
 def identify_response(y: Array, commands: Array, h: float, driving_speed: float) -> Response | None:
     """The response of one drive; None where it drives too little, or its commands explain nothing.

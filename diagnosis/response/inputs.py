@@ -56,7 +56,7 @@ def cells(x: Array, width: int) -> Array:
 
 
 def followers(mission: MissionView) -> dict[str, FollowerData]:
-    """Wheels with speed and command whose sensor nothing has judged, by name."""
+    """Wheels whose sensor nothing has judged, by name: with a command, or with other wheels beside them."""
     timeline, machine = mission.timeline, mission.machine
     width = cell_of(timeline.dt)
     body: Array | None = None
@@ -66,7 +66,7 @@ def followers(mission: MissionView) -> dict[str, FollowerData]:
     for w in machine.wheels:
         name, asked = f"wheel.{w}.v", mission.command(w)
         taken = mission.judged((w, SENSOR)) or mission.logged(f"wheel.{w}.v_true")
-        if taken or not mission.logged(name) or not np.isfinite(asked).any():
+        if taken or not mission.logged(name) or (len(machine.wheels) < 2 and not np.isfinite(asked).any()):
             continue
         own = mission.logged(f"wheel.{w}.v_ref") or body is None
         commands = cells(asked, width)[:, None] if own or body is None else body

@@ -105,7 +105,7 @@ def test_joint_velocities_become_rim_speeds() -> None:
     found = mapped(
         *joints({"velocity[fr_wheel]": [0.1, 0.2], "velocity[arm]": [9.0, 9.0], "effort[fr_wheel]": [5.0, 5.0]})
     )
-    assert set(found.items) == {"wheel.FR.v"}
+    assert set(found.items) == {"wheel.FR.v", "wheel.FR.effort"}
     np.testing.assert_allclose(found.items["wheel.FR.v"].values, [0.1 * RADIUS, 0.2 * RADIUS])
     assert "no channel fits" in found.missing["wheel.FR.u"]
 
