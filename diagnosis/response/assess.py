@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from diagnosis.channels.standstill import not_followed, repeated
 from diagnosis.response.beside import views
 from diagnosis.response.channel import samples_of
-from diagnosis.response.findings import Spell, Wheel, finding_of, spells_of, spikes_of
+from diagnosis.response.findings import Spell, Wheel, finding_of, spells_of, spikes_of, where_asked
 from diagnosis.response.identification import Response, identify_response, without_command
 from diagnosis.response.inputs import FollowerData, cell_of, cells
 from diagnosis.response.jumps import jumps_of
@@ -96,6 +96,8 @@ def assess_response(
     beside = views(list(found), {w: j.wheel.blocks for w, j in found.items()}, geometry, turned)
     judged = {w: _judge(j, beside.get(w), found, w, dt, width) for w, j in found.items()}
     kept = {w: [s for s in j.spells if not _others_fault(s, w, judged)] for w, j in judged.items()}
+    least = max(1, round(_LEAST_S / BLOCK_S))
+    kept = {w: where_asked(spells, _asked(judged[w], limits), least) for w, spells in kept.items()}
     parts = {w: _sides(j, kept[w], left_out, np.repeat(copied, width)[:size], limits, dt) for w, j in judged.items()}
     return Judgement(parts, _events(idle, dt))
 
@@ -161,16 +163,29 @@ def _judge(one: _Judged, beside: Beside | None, found: Mapping[str, _Judged], w:
     )
 
 
+def _asked(one: _Judged, limits: Limits) -> Flags:
+    """Blocks in which the wheel must move, by its command or by the wheels beside it, shape (b,)."""
+    blocks, least = one.wheel.blocks, _MOVES * limits.driving_speed
+    asked = (blocks.low > least) | (blocks.high < -least)
+    return asked if one.speed is None else asked | (np.abs(np.nan_to_num(one.speed)) > least)
+
+
 def _others_fault(spell: Spell, wheel: str, judged: Mapping[str, _Judged]) -> bool:
-    """Whether what looks like a scale is the fault of the wheel that this one was compared with."""
+    """Whether what looks like a scale is the fault of the wheel that this one was compared with, or of the whole machine."""
     one = judged[wheel]
-    if (not spell.mode.scaled and spell.mode.value != "outside_table") or one.speed is None:
+    if not spell.mode.scaled and spell.mode.value != "outside_table":
         return False
     for other, j in judged.items():
         for s in j.spells if other != wheel else ():
             overlap = min(s.stop, spell.stop) - max(s.start, spell.start)
+            if overlap <= 0.3 * (spell.stop - spell.start):
+                continue
+            if one.speed is None:
+                if s.mode is spell.mode:  # both at once: load, slope or a weak battery
+                    return True
+                continue
             surer = not s.mode.scaled or s.p > spell.p or spell.mode.value == "outside_table"
-            if overlap > 0.3 * (spell.stop - spell.start) and surer and s.mode.value != "outside_table":
+            if surer and s.mode.value != "outside_table":
                 return True
     return False
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -16,11 +17,16 @@ from diagnosis.results.vocabulary import Tier
 from replay.faults import FaultMode, Side, State
 
 Array = NDArray[np.float64]
+Flags = NDArray[np.bool_]
 
 _JOIN_S = 1.0
 _SPIKE_GAP_S, _LEAST_SPIKES = 10.0, 3
 _SENSOR = 0.96  # that what a channel alone shows is the sensor's
 _ONE_JUMP, _TWO_JUMPS = 0.92, 0.97
+_BARE_P, _BARE_S = (
+    0.92,
+    5.0,
+)  # a scaled speed that only its command contradicts: loads and slip last less, or are less sure
 
 
 class Wheel(NamedTuple):
@@ -80,6 +86,29 @@ def _modes() -> dict[int, FaultMode]:
 def _mean_probability(posterior: Array, mode: FaultMode) -> float:
     same = [k for k, m in _modes().items() if m is mode]
     return float(np.mean(posterior[:, same].sum(axis=1)))
+
+
+def where_asked(spells: Sequence[Spell], asked: Flags, least: int) -> list[Spell]:
+    """Spells without those of a silent or scaled speed in which no motion is expected, and the ends of such spells cut to it.
+
+    Parameters
+    ----------
+    spells : Sequence[Spell]
+        Spells.
+    asked : Flags, shape (b,)
+        Blocks in which command or other wheels make the wheel move.
+    least : int
+        Blocks of expected motion that a spell needs.
+    """
+    out = []
+    for s in spells:
+        if s.mode is FaultMode.STUCK or s.mode is FaultMode.NOISY:
+            out.append(s)
+            continue
+        places = s.start + np.flatnonzero(asked[s.start : s.stop])
+        if places.size >= least:
+            out.append(s._replace(start=int(places[0]), stop=int(places[-1]) + 1))
+    return out
 
 
 def finding_of(spell: Spell, wheel: Wheel, speed: Array | None) -> Finding | None:
@@ -186,7 +215,8 @@ def _scaled(spell: Spell, wheel: Wheel, span: tuple[int, int], speed: Array | No
         return None
     fell = onset_of(wheel.jumps, wheel.samples, span[0], gain, wheel.dt)
     rose = onset_of(wheel.jumps, wheel.samples, span[1], 1.0 / gain, wheel.dt)
-    if speed is None and fell is None and rose is None:
+    bare = speed is None and fell is None and rose is None
+    if bare and (spell.p < _BARE_P or (span[1] - span[0]) * wheel.dt < _BARE_S):
         return None
     begin = span[0] if fell is None else int(wheel.samples.step[fell])
     end = span[1] if rose is None else int(wheel.samples.step[rose])
@@ -195,11 +225,17 @@ def _scaled(spell: Spell, wheel: Wheel, span: tuple[int, int], speed: Array | No
         texts.append(f"{wheel.name} is {gain:.2f} × what {wheel.compared} show of the same speed.")
     if fell is not None or rose is not None:
         texts.append(f"It changed by a factor of about {gain:.2f} from one reading to the next, which no drive does.")
-    sensor = {0: _ONE_JUMP, 1: _ONE_JUMP, 2: _TWO_JUMPS}[(fell is not None) + (rose is not None)]
+    if bare:
+        texts.append(
+            f"{wheel.name} is {gain:.2f} × what its command makes it do. It came while the speed was changing, and nothing else shows "
+            "this wheel's speed: a weak drive and a wrong sensor cannot be distinguished; another wheel of its side, a gyro or the "
+            "drive's effort would."
+        )
+    sensor = 0.5 if bare else {0: _ONE_JUMP, 1: _ONE_JUMP, 2: _TWO_JUMPS}[(fell is not None) + (rose is not None)]
     misfit = float(np.sqrt(np.mean((y - gain * x) ** 2)) / np.sqrt(np.mean(x * x)))
     wide = 2.0 * misfit / np.sqrt(max(1.0, x.size / 4.0))
     loss = 1.0 - gain
-    p = spell.p if speed is not None else 1.0 - (1.0 - spell.p) * 0.5
+    p = spell.p if speed is not None or bare else 1.0 - (1.0 - spell.p) * 0.5
     return _finding(
         begin, max(end, begin + 1), spell.mode, p, Epsilon(loss, loss - wide, loss + wide), None, tuple(texts), sensor
     )

@@ -28,6 +28,7 @@ _WHITE_SPREAD, _WHITE_MOST = 0.5, 3.0
 _WHITE_UP = np.log(3.0)
 _LONG_S = 2.0  # a value held for longer is no habit, unless a quarter of the driving is like that
 _STILL = 0.02  # of the usual top speed
+_QUIET = 0.01  # of the usual top speed: less than that from sample to sample is no noise worth a word
 _NEVER = -60.0
 
 
@@ -106,8 +107,9 @@ def blocks_of(samples: Samples, response: Response, cell: int, width: int, size:
     mean = np.where(count > 0, total(np.nan_to_num(samples.value)) / np.maximum(count, 1), np.nan)
     cells = np.minimum((start + width // 2) // cell, response.low.size - 1)
     white = np.sqrt(total(samples.white**2) / np.maximum(count, 1))
-    usual = _usual_white(white, np.abs(mean), count)
-    still = np.abs(samples.value) <= _STILL * float(np.nanquantile(np.abs(samples.value), 0.99))
+    top = float(np.nanquantile(np.abs(samples.value), 0.99))
+    usual = np.maximum(_usual_white(white, np.abs(mean), count), _QUIET * top)
+    still = np.abs(samples.value) <= _STILL * top
     return Blocks(
         start, mean, response.low[cells], response.high[cells], response.noise[cells], count,
         total(samples.same), total(still), np.log((white + 0.3 * usual) / (1.3 * usual)),
