@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from diagnosis.assess import ComponentResult, assess_components
+from diagnosis.channels.copied_rows import without_copied_rows
 from diagnosis.channels.recording_gaps import recording_gaps, without_gaps
 from diagnosis.decision import metrics, quality
 from diagnosis.report_document import Judged, machine_row, report_of_mission
@@ -138,7 +139,8 @@ def _walk(
     progress: Subscriber,
 ) -> MissionResult:
     """Replay → assess → decide → document; long columns leave memory at every stage until they are read again."""
-    timeline = mission.timeline
+    timeline = without_copied_rows(mission.timeline)
+    mission = replace(mission, timeline=timeline)
 
     def publish(stage: Progress) -> None:
         timeline.store.release()

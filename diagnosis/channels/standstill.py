@@ -56,26 +56,3 @@ def not_followed(speeds: Sequence[Array], commands: Sequence[Array], driving_spe
             if (stop - begin) * dt >= _TAIL_S:
                 out.append((begin, start + int(first[-1]) + 1))
     return out
-
-
-def repeated(speeds: Sequence[Array], fresh: Sequence[Flags], width: int) -> Flags:
-    """Blocks in which the speeds of all of several drives repeat themselves while they move, shape (b,): the logger's rows do.
-
-    Parameters
-    ----------
-    speeds, fresh : Sequence[Array], Sequence[Flags], each of shape (n,)
-        Measured speeds of all drives [m/s], and where they have a new sample.
-    width : int
-        Steps in a block.
-    """
-    number = -(-speeds[0].size // width) if speeds else 0
-    if len(speeds) < 2:
-        return np.zeros(number, np.bool_)
-    held, moving = np.ones(number, np.bool_), np.zeros(number, np.bool_)
-    for y, new in zip(speeds, fresh, strict=True):
-        step = np.flatnonzero(new & np.isfinite(y))
-        change = np.diff(y[step], prepend=np.nan) != 0.0
-        block = step // width
-        held &= (np.bincount(block, weights=change, minlength=number) == 0) & (np.bincount(block, minlength=number) > 0)
-        moving |= np.bincount(block, weights=np.abs(y[step]), minlength=number) > 0
-    return np.asarray(held & moving)

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from diagnosis.channels.standstill import not_followed, repeated
+from diagnosis.channels.standstill import not_followed
 from diagnosis.response.beside import views
 from diagnosis.response.channel import samples_of
 from diagnosis.response.findings import Spell, Wheel, finding_of, spells_of, spikes_of, where_asked
@@ -33,7 +33,6 @@ _AT_A_JUMP = 0.1, 0.3  # probability that a fault begins, or ends, where the cha
 _MOVES = 0.4  # of the driving speed: enough to see whether a channel lives
 _LEAST_P = 0.6
 _LEAST_S = 1.0
-_REPEATED_S = 1.0
 _DOUBT_S = 0.5  # around a spell that is judged no fault
 _NO_EFFORT = "a drive that follows its command may still be weak: only its effort would show that"
 _UNSEEN = "without its command or another wheel of its side only a speed that is frozen, wild or noisy shows"
@@ -87,9 +86,7 @@ def assess_response(
     left_out = np.zeros(size, np.bool_)
     for start, stop in idle:
         left_out[start:stop] = True
-    copied = _long(repeated([d.y for d in drives], [d.fresh for d in drives], width), round(_REPEATED_S / BLOCK_S))
-    hidden = np.repeat(copied, width)[:size] | left_out
-    found = _wheels(data, hidden, (cell, width), limits, dt)
+    found = _wheels(data, left_out, (cell, width), limits, dt)
     if not found:
         return Judgement({}, _events(idle, dt))
     turned = None if yaw is None else cells(yaw, width)
@@ -98,7 +95,7 @@ def assess_response(
     kept = {w: [s for s in j.spells if not _others_fault(s, w, judged)] for w, j in judged.items()}
     least = max(1, round(_LEAST_S / BLOCK_S))
     kept = {w: where_asked(spells, _asked(judged[w], limits), least) for w, spells in kept.items()}
-    parts = {w: _sides(j, kept[w], left_out, np.repeat(copied, width)[:size], limits, dt) for w, j in judged.items()}
+    parts = {w: _sides(j, kept[w], left_out, limits, dt) for w, j in judged.items()}
     return Judgement(parts, _events(idle, dt))
 
 
@@ -110,15 +107,6 @@ def _events(idle: Sequence[tuple[int, int]], dt: float) -> tuple[str, ...]:
         f"For {total:.1f} s all drives stood still together while they were commanded to move (longest {start * dt:.1f}–{stop * dt:.1f} s): "
         "disabled, stopped by an emergency stop, or driven by another source of commands. No wheel is blamed for it.",
     )
-
-
-def _long(flags: Flags, least: int) -> Flags:
-    """Only stretches of at least `least` in a row."""
-    edge = np.flatnonzero(np.diff(np.r_[False, flags, False].astype(np.int8)))
-    out = np.zeros(flags.size, np.bool_)
-    for a, b in zip(edge[::2].tolist(), edge[1::2].tolist(), strict=True):
-        out[a:b] = b - a >= least
-    return out
 
 
 def _wheels(
@@ -191,7 +179,7 @@ def _others_fault(spell: Spell, wheel: str, judged: Mapping[str, _Judged]) -> bo
 
 
 def _sides(
-    one: _Judged, spells: Sequence[Spell], idle: Flags, copied: Flags, limits: Limits, dt: float
+    one: _Judged, spells: Sequence[Spell], idle: Flags, limits: Limits, dt: float
 ) -> tuple[Assessment, Assessment]:
     """Sensor and drive of a wheel."""
     wheel, blocks, size = one.wheel, one.wheel.blocks, one.data.y.size
@@ -216,7 +204,7 @@ def _sides(
     drive = np.where(driving, CODE[State.NOT_ASSESSED], CODE[State.NOT_EXCITED]).astype(np.int8)
     for states in (sensor, drive):
         states[idle] = CODE[State.NOT_ASSESSED]
-        states[~known | copied] = CODE[State.NO_DATA]
+        states[~known] = CODE[State.NO_DATA]
     both = [f for f in findings if len(f.side.sides) > 1]
     for f in findings:
         sensor[f.start : f.stop] = CODE[State(f.mode.value)]
@@ -257,7 +245,7 @@ def _assessment(
         if unseen
         else "the speed is neither what its command nor what other channels make likely, and no known fault explains it",
         State.NOT_EXCITED: "nothing is commanded",
-        State.NO_DATA: "no samples, or rows that repeat as a whole",
+        State.NO_DATA: "no samples",
     }
     return Assessment(states, reasons, findings, pictured.columns, Tier.RESPONSE, notes, closeups=pictured.closeups)
 
@@ -266,7 +254,7 @@ def _drive(one: _Judged, states: NDArray[np.int8], findings: tuple[Finding, ...]
     reasons = {
         State.NOT_ASSESSED: _NO_EFFORT,
         State.NOT_EXCITED: "nothing is commanded",
-        State.NO_DATA: "no samples, or rows that repeat as a whole",
+        State.NO_DATA: "no samples",
         State.MASKED: "its speed sensor is faulty",
     }
     return Assessment(states, reasons, findings, {}, Tier.RESPONSE)
