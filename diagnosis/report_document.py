@@ -110,7 +110,9 @@ def report_of_mission(judged: Judged, identity: MachineRow) -> ReportDocument:
         "phases": metrics.phases(timeline, replay, machine),
         "coverage": coverage,
         "clearing": clearing_rows(judged.checks),
-        "detectability": detectability_table(detectable(judged.cells)),
+        "detectability": detectability_table(
+            detectable(judged.cells, {part: a.powers for part, a in found.assessments.items() if a.powers is not None})
+        ),
         "loss": loss_rows({key: a.loss for key, a in found.assessments.items()}),
         "metrics": metrics.loop_metrics(timeline, replay, machine, moving),
         "signals": list(judged.recorded.rows),

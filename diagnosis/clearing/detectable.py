@@ -7,14 +7,14 @@ limit. The smallest size that is found at 95 % of the places is what the mission
 from __future__ import annotations
 
 import warnings
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 
 import numpy as np
 
 from diagnosis.clearing.cells import Array, Cells
 from diagnosis.clearing.gauges import Gauges, gauges_of
 from diagnosis.clearing.placements import Placements, placements
-from diagnosis.results.detectability import Detectability, Detectable, Deviation, Trace
+from diagnosis.results.detectability import Detectability, Detectable, Deviation, Powers, Trace
 from diagnosis.results.vocabulary import Kind
 from replay.faults import Side
 
@@ -25,17 +25,41 @@ _MARGIN = 1.1  # of sizes: loops are closed, and what they do about a fault hide
 _STEERED_S = 0.5  # of a fault of a steering axle, which mostly rests
 
 
-def detectable(cells: Cells) -> Detectability:
-    """Rows and traces of all parts that the log shows."""
+def detectable(cells: Cells, powers: Mapping[tuple[str, str], Powers] | None = None) -> Detectability:
+    """Rows and traces of all parts that the log shows.
+
+    Parameters
+    ----------
+    cells : Cells
+        The mission.
+    powers : Mapping[tuple[str, str], Powers] or None
+        What families say themselves of parts that they have judged, by component and side.
+    """
+    own = powers or {}
     rows: list[Detectable] = []
     traces: list[Trace] = []
     clear_at = cells.machine.limits.clear_at
     with warnings.catch_warnings(), np.errstate(divide="ignore", invalid="ignore"):
         warnings.simplefilter("ignore", RuntimeWarning)  # windows without any value
         for gauges in gauges_of(cells):
-            rows += _rows(gauges, cells, clear_at)
-            traces.append(_trace(gauges, cells))
+            if (gauges.component, gauges.side.value) not in own:
+                rows += _rows(gauges, cells, clear_at)
+                traces.append(_trace(gauges, cells))
+    for (component, side), found in own.items():
+        about = (Kind.WHEEL, component, Side(side))
+        rows += [
+            Detectable(*about, p.deviation, p.for_s, p.size, p.unit, p.share, p.places, found.told) for p in found.rows
+        ]
+        if found.start_s:
+            traces.append(Trace(*about, found.start_s, found.loss))
+    rows.sort(key=lambda row: _place(cells, row.component))
+    traces.sort(key=lambda trace: _place(cells, trace.component))
     return Detectability(tuple(rows), tuple(traces))
+
+
+def _place(cells: Cells, component: str) -> int:
+    """Place of a component among the machine's."""
+    return [*cells.machine.wheels, *cells.machine.axles].index(component)
 
 
 def _rows(g: Gauges, cells: Cells, clear_at: float) -> Iterator[Detectable]:

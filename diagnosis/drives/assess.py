@@ -21,6 +21,7 @@ from diagnosis.drives.inputs import DriveData
 from diagnosis.drives.inverse_controller import implied_speed
 from diagnosis.drives.load import LoadTrack, track_load
 from diagnosis.drives.load_findings import load_findings
+from diagnosis.drives.power import load_powers, sensor_powers
 from diagnosis.drives.speed_pair import SpeedPair, speed_pair
 from diagnosis.results.assessment import CODE, Assessment, Finding, unassessed
 from diagnosis.results.evidence_columns import Pictured, steps_of
@@ -93,7 +94,11 @@ def assess_drive(data: DriveData, limits: Limits) -> tuple[Assessment, Assessmen
     findings, lead, below = find_rows(pair, limits)
     load, more = _extra_effort(data, pair, findings, limits)
     evidence = _Evidence(pair, lead, findings, load, more)
-    return _assessments(data, evidence, _notes(data, pair, controller, below))
+    sensor, actuator = _assessments(data, evidence, _notes(data, pair, controller, below))
+    sensor = replace(sensor, powers=sensor_powers(pair, limits))
+    if load is not None and data.model is not None and data.model.effort is not None:
+        actuator = replace(actuator, powers=load_powers(load, data.model.effort, limits))
+    return sensor, actuator
 
 
 def _controller(data: DriveData) -> InverseController | None:

@@ -22,7 +22,7 @@ from replay.machine.config import Limits
 Array = NDArray[np.float64]
 
 _LEAST_S = 2.0
-_LEAST_LOAD = 2.0  # of a finding [standard deviations of a mission's offset]
+LEAST_LOAD = 2.0  # of a finding [standard deviations of a mission's offset]
 _AROUND_S = 1.5
 _SIDE_BY_SIDE = 3  # samples compared on each side of a jump
 _PLAIN = 6.0  # size from which a jump cannot be overlooked [standard deviations of healthy changes]
@@ -147,7 +147,7 @@ def load_findings(data: DriveData, load: LoadTrack, between: float, limits: Limi
         if (
             stretch.epsilon.value >= limits.min_epsilon
             and stretch.seconds >= _LEAST_S
-            and stretch.mean_load >= _LEAST_LOAD * between
+            and stretch.mean_load >= LEAST_LOAD * between
         ):
             out.append(_finding(stretch, data))
     return out

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -18,6 +18,7 @@ from diagnosis.response.inputs import FollowerData, cell_of, cells
 from diagnosis.response.jumps import jumps_of
 from diagnosis.response.kernel import posterior
 from diagnosis.response.models import BLOCK_S, HEALTHY, NOISY, OTHER, STATES, Beside, blocks_of, scores
+from diagnosis.response.power import powers_of
 from diagnosis.results.assessment import CODE, Assessment, Finding
 from diagnosis.results.evidence_columns import Pictured, steps_of
 from diagnosis.results.vocabulary import Tier
@@ -96,6 +97,10 @@ def assess_response(
     least = max(1, round(_LEAST_S / BLOCK_S))
     kept = {w: where_asked(spells, _asked(judged[w], limits), least) for w, spells in kept.items()}
     parts = {w: _sides(j, kept[w], left_out, limits, dt) for w, j in judged.items()}
+    for w, (sensor, drive) in parts.items():
+        j, about = judged[w], _asked(judged[w], limits)
+        powers = powers_of(j.wheel.blocks, j.driving, about, width * dt, beside.get(w), limits.clear_at)
+        parts[w] = replace(sensor, powers=powers), drive
     return Judgement(parts, _events(idle, dt))
 
 

@@ -47,6 +47,8 @@ class Blocks(NamedTuple):
         Readings, those that repeat the one before, those of a wheel that stands still.
     white : Array, shape (b,)
         Root mean square of what changes from sample to sample, beside the usual one (logarithm).
+    usual : Array, shape (b,)
+        That usual one [m/s].
     """
 
     start: NDArray[np.intp]
@@ -58,6 +60,7 @@ class Blocks(NamedTuple):
     same: Array
     zero: Array
     white: Array
+    usual: Array
 
     @property
     def held(self) -> Flags:
@@ -112,7 +115,7 @@ def blocks_of(samples: Samples, response: Response, cell: int, width: int, size:
     still = np.abs(samples.value) <= _STILL * top
     return Blocks(
         start, mean, response.low[cells], response.high[cells], response.noise[cells], count,
-        total(samples.same), total(still), np.log((white + 0.3 * usual) / (1.3 * usual)),
+        total(samples.same), total(still), np.log((white + 0.3 * usual) / (1.3 * usual)), usual,
     )  # fmt: skip
 
 
@@ -132,7 +135,7 @@ def scores(blocks: Blocks, driving: Flags, block_s: float, beside: Beside | None
     """
     out = np.zeros((blocks.mean.size, STATES))
     moves = blocks.zero < blocks.readings
-    hold = _hold_share(blocks, driving, block_s)
+    hold = hold_share(blocks, driving, block_s)
     held = np.where(moves & blocks.held, np.log(hold), 0.0)
     busy = -_REPEATS * 0.5 * np.minimum(np.maximum(blocks.white, 0.0) / _WHITE_SPREAD, _WHITE_MOST) ** 2
     loud = -_REPEATS * 0.5 * (np.clip(blocks.white - _WHITE_UP, -2.0, 0.0) / _WHITE_SPREAD) ** 2
@@ -171,8 +174,8 @@ def _loss(z: Array | float) -> Array:
     return np.asarray(0.5 * (_FREEDOM + 1.0) * np.log1p(np.asarray(z) ** 2 / _FREEDOM))
 
 
-def _hold_share(blocks: Blocks, driving: Flags, block_s: float) -> float:
-    """Share of blocks without any change while the wheel moves, beside long holds."""
+def hold_share(blocks: Blocks, driving: Flags, block_s: float) -> float:
+    """Share of blocks without any change while the wheel moves, beside long holds [1]; parameters as of `scores`."""
     use = driving & (blocks.readings > 0) & (blocks.zero < blocks.readings)
     edge: NDArray[np.intp] = np.flatnonzero(np.diff(np.r_[False, blocks.held & use, False].astype(np.int8)))
     long = np.zeros(use.size, np.bool_)

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from diagnosis.results.detectability import Powers
 from diagnosis.results.loss import Loss
 from diagnosis.results.result import Closeups, Epsilon, Hypothesis, Sat
 from diagnosis.results.vocabulary import Tier
@@ -72,6 +73,8 @@ class Assessment:
         Every sample of `columns` around the findings, where they are envelopes.
     loss : Loss or None
         Loss of effectiveness over the mission, where a second measurement shows it.
+    powers : Powers or None
+        What the mission would have shown to this evidence; None: as to the checks of the all-clear.
     """
 
     states: NDArray[np.int8]
@@ -83,6 +86,7 @@ class Assessment:
     unexplained_s: float = 0.0
     closeups: Closeups | None = None
     loss: Loss | None = None
+    powers: Powers | None = None
 
 
 def unassessed(size: int, state: State, reason: str) -> Assessment:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import StrEnum
+from typing import NamedTuple
 
 from diagnosis.results.document import DetectabilityRow, DetectabilityTable, DetectabilityTrace
 from diagnosis.results.vocabulary import Kind
@@ -58,6 +59,36 @@ class Detectable:
     share: float | None
     places: int
     told: Side
+
+
+class Power(NamedTuple):
+    """What a family of evidence says of one side of a part that it has judged; fields as in `Detectable`."""
+
+    deviation: Deviation
+    for_s: float | None
+    size: float | None
+    unit: str
+    share: float | None
+    places: int
+
+
+class Powers(NamedTuple):
+    """All that a family says of one side.
+
+    Attributes
+    ----------
+    rows : tuple[Power, ...]
+        By deviation and length.
+    told : Side
+        The side that such a fault would be ascribed to.
+    start_s, loss : tuple
+        As in `Trace`.
+    """
+
+    rows: tuple[Power, ...]
+    told: Side
+    start_s: tuple[float, ...] = ()
+    loss: tuple[float | None, ...] = ()
 
 
 @dataclass(frozen=True)
