@@ -35,6 +35,7 @@ _MOVES = 0.4  # of the driving speed: enough to see whether a channel lives
 _LEAST_P = 0.6
 _LEAST_S = 1.0
 _DOUBT_S = 0.5  # around a spell that is judged no fault
+_LASTING = 0.8  # of what the other wheels make of the same command: over a whole mission no slip or load does that
 _NO_EFFORT = "a drive that follows its command may still be weak: only its effort would show that"
 _UNSEEN = "without its command or another wheel of its side only a speed that is frozen, wild or noisy shows"
 
@@ -97,11 +98,36 @@ def assess_response(
     least = max(1, round(_LEAST_S / BLOCK_S))
     kept = {w: where_asked(spells, _asked(judged[w], limits), least) for w, spells in kept.items()}
     parts = {w: _sides(j, kept[w], left_out, limits, dt) for w, j in judged.items()}
+    for w, text in _unlike(judged).items():
+        parts[w] = _doubted(parts[w][0], text), parts[w][1]
     for w, (sensor, drive) in parts.items():
         j, about = judged[w], _asked(judged[w], limits)
         powers = powers_of(j.wheel.blocks, j.driving, about, width * dt, beside.get(w), limits.clear_at)
         parts[w] = replace(sensor, powers=powers), drive
     return Judgement(parts, _events(idle, dt))
+
+
+def _unlike(judged: Mapping[str, _Judged]) -> dict[str, str]:
+    """Wheels that make less or more of the same command than the others over the whole mission, with a sentence."""
+    made = {w: abs(float(j.response.weights[0])) for w, j in judged.items() if j.response.answered}
+    out = {}
+    for w, own in made.items():
+        others = [x for o, x in made.items() if o != w]
+        if not others or not 0.0 < own < np.inf:
+            continue
+        share = own / float(np.median(others))
+        if not _LASTING <= share <= 1.0 / _LASTING:
+            out[w] = (
+                f"over the whole mission it reads {share:.2f} × what the other wheels make of the same command: a scaled or wrongly "
+                "mapped sensor, another wheel diameter, or a weak drive"
+            )
+    return out
+
+
+def _doubted(sensor: Assessment, why: str) -> Assessment:
+    """A sensor of which nothing healthy can be said."""
+    states = np.where(sensor.states == CODE[State.HEALTHY], CODE[State.NOT_ASSESSED], sensor.states).astype(np.int8)
+    return replace(sensor, states=states, reasons={**sensor.reasons, State.NOT_ASSESSED: why})
 
 
 def _events(idle: Sequence[tuple[int, int]], dt: float) -> tuple[str, ...]:
