@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,10 +12,11 @@ from diagnosis.channels.standstill import not_followed
 from diagnosis.response.beside import views
 from diagnosis.response.channel import samples_of
 from diagnosis.response.findings import Spell, Wheel, finding_of, spells_of, spikes_of, where_asked
-from diagnosis.response.identification import Response, identify_response, without_command
+from diagnosis.response.identification import identify_response, without_command
 from diagnosis.response.inputs import FollowerData, cell_of, cells
 from diagnosis.response.jumps import jumps_of
 from diagnosis.response.kernel import posterior
+from diagnosis.response.machine import Judged, otherwise, standstills, unlike
 from diagnosis.response.models import BLOCK_S, HEALTHY, NOISY, OTHER, STATES, Beside, blocks_of, scores
 from diagnosis.response.power import powers_of
 from diagnosis.results.assessment import CODE, Assessment, Finding
@@ -35,7 +35,6 @@ _MOVES = 0.4  # of the driving speed: enough to see whether a channel lives
 _LEAST_P = 0.6
 _LEAST_S = 1.0
 _DOUBT_S = 0.5  # around a spell that is judged no fault
-_LASTING = 0.8  # of what the other wheels make of the same command: over a whole mission no slip or load does that
 _NO_EFFORT = "a drive that follows its command may still be weak: only its effort would show that"
 _UNSEEN = "without its command or another wheel of its side only a speed that is frozen, wild or noisy shows"
 
@@ -46,19 +45,6 @@ class Judgement:
 
     parts: Mapping[str, tuple[Assessment, Assessment]]
     events: tuple[str, ...]
-
-
-class _Judged(NamedTuple):
-    """A wheel on the way: its data, response, readings, states and spells."""
-
-    data: FollowerData
-    response: Response
-    wheel: Wheel
-    driving: Flags
-    posterior: Array
-    spells: list[Spell]
-    speed: Array | None
-    calm: Flags
 
 
 def assess_response(
@@ -90,7 +76,7 @@ def assess_response(
         left_out[start:stop] = True
     found = _wheels(data, left_out, (cell, width), limits, dt)
     if not found:
-        return Judgement({}, _events(idle, dt))
+        return Judgement({}, standstills(idle, dt))
     turned = None if yaw is None else cells(yaw, width)
     beside = views(list(found), {w: j.wheel.blocks for w, j in found.items()}, geometry, turned)
     judged = {w: _judge(j, beside.get(w), found, w, dt, width) for w, j in found.items()}
@@ -98,30 +84,14 @@ def assess_response(
     least = max(1, round(_LEAST_S / BLOCK_S))
     kept = {w: where_asked(spells, _asked(judged[w], limits), least) for w, spells in kept.items()}
     parts = {w: _sides(j, kept[w], left_out, limits, dt) for w, j in judged.items()}
-    for w, text in _unlike(judged).items():
+    remarks = otherwise(judged, width * dt)
+    for w, text in unlike(judged).items():
         parts[w] = _doubted(parts[w][0], text), parts[w][1]
     for w, (sensor, drive) in parts.items():
         j, about = judged[w], _asked(judged[w], limits)
         powers = powers_of(j.wheel.blocks, j.driving, about, width * dt, beside.get(w), limits.clear_at)
-        parts[w] = replace(sensor, powers=powers), drive
-    return Judgement(parts, _events(idle, dt))
-
-
-def _unlike(judged: Mapping[str, _Judged]) -> dict[str, str]:
-    """Wheels that make less or more of the same command than the others over the whole mission, with a sentence."""
-    made = {w: abs(float(j.response.weights[0])) for w, j in judged.items() if j.response.answered}
-    out = {}
-    for w, own in made.items():
-        others = [x for o, x in made.items() if o != w]
-        if not others or not 0.0 < own < np.inf:
-            continue
-        share = own / float(np.median(others))
-        if not _LASTING <= share <= 1.0 / _LASTING:
-            out[w] = (
-                f"over the whole mission it reads {share:.2f} × what the other wheels make of the same command: a scaled or wrongly "
-                "mapped sensor, another wheel diameter, or a weak drive"
-            )
-    return out
+        parts[w] = replace(sensor, powers=powers, notes=(*sensor.notes, *remarks)), drive
+    return Judgement(parts, standstills(idle, dt))
 
 
 def _doubted(sensor: Assessment, why: str) -> Assessment:
@@ -130,22 +100,12 @@ def _doubted(sensor: Assessment, why: str) -> Assessment:
     return replace(sensor, states=states, reasons={**sensor.reasons, State.NOT_ASSESSED: why})
 
 
-def _events(idle: Sequence[tuple[int, int]], dt: float) -> tuple[str, ...]:
-    if not idle:
-        return ()
-    total, (start, stop) = sum(b - a for a, b in idle) * dt, max(idle, key=lambda s: s[1] - s[0])
-    return (
-        f"For {total:.1f} s all drives stood still together while they were commanded to move (longest {start * dt:.1f}–{stop * dt:.1f} s): "
-        "disabled, stopped by an emergency stop, or driven by another source of commands. No wheel is blamed for it.",
-    )
-
-
 def _wheels(
     data: Mapping[str, FollowerData], hidden: Flags, steps: tuple[int, int], limits: Limits, dt: float
-) -> dict[str, _Judged]:
+) -> dict[str, Judged]:
     """Wheels whose response could be found, with their blocks; nothing is judged yet."""
     cell, width = steps
-    out: dict[str, _Judged] = {}
+    out: dict[str, Judged] = {}
     for w, d in data.items():
         y = np.where(hidden, np.nan, d.y)
         samples = samples_of(y, d.fresh)
@@ -162,11 +122,11 @@ def _wheels(
         driving = moves > _MOVES * limits.driving_speed
         jumps, calm = jumps_of(samples, blocks, width)
         wheel = Wheel(d.name, samples, blocks, jumps, dt, "")
-        out[w] = _Judged(d, response, wheel, driving, np.zeros((0, STATES)), [], None, calm)
+        out[w] = Judged(d, response, wheel, driving, np.zeros((0, STATES)), [], None, calm)
     return out
 
 
-def _judge(one: _Judged, beside: Beside | None, found: Mapping[str, _Judged], w: str, dt: float, width: int) -> _Judged:
+def _judge(one: Judged, beside: Beside | None, found: Mapping[str, Judged], w: str, dt: float, width: int) -> Judged:
     block_s = width * dt
     score = scores(one.wheel.blocks, one.driving, block_s, beside)
     jumped = one.wheel.samples.step[one.wheel.jumps.place] // width
@@ -182,14 +142,14 @@ def _judge(one: _Judged, beside: Beside | None, found: Mapping[str, _Judged], w:
     )
 
 
-def _asked(one: _Judged, limits: Limits) -> Flags:
+def _asked(one: Judged, limits: Limits) -> Flags:
     """Blocks in which the wheel must move, by its command or by the wheels beside it, shape (b,)."""
     blocks, least = one.wheel.blocks, _MOVES * limits.driving_speed
     asked = (blocks.low > least) | (blocks.high < -least)
     return asked if one.speed is None else asked | (np.abs(np.nan_to_num(one.speed)) > least)
 
 
-def _others_fault(spell: Spell, wheel: str, judged: Mapping[str, _Judged]) -> bool:
+def _others_fault(spell: Spell, wheel: str, judged: Mapping[str, Judged]) -> bool:
     """Whether what looks like a scale is the fault of the wheel that this one was compared with, or of the whole machine."""
     one = judged[wheel]
     if not spell.mode.scaled and spell.mode.value != "outside_table":
@@ -210,7 +170,7 @@ def _others_fault(spell: Spell, wheel: str, judged: Mapping[str, _Judged]) -> bo
 
 
 def _sides(
-    one: _Judged, spells: Sequence[Spell], idle: Flags, limits: Limits, dt: float
+    one: Judged, spells: Sequence[Spell], idle: Flags, limits: Limits, dt: float
 ) -> tuple[Assessment, Assessment]:
     """Sensor and drive of a wheel."""
     wheel, blocks, size = one.wheel, one.wheel.blocks, one.data.y.size
@@ -243,7 +203,7 @@ def _sides(
     return _assessment(one, sensor, tuple(findings), limits, dt), _drive(one, drive, tuple(both))
 
 
-def _entered_calmly(one: _Judged, spell: Spell, width: int, dt: float) -> bool:
+def _entered_calmly(one: Judged, spell: Spell, width: int, dt: float) -> bool:
     """Whether a spell began and ended in calm moments, in which a jump would have been seen."""
     reach = max(1, round(_DOUBT_S / (width * dt)))
     ends = (spell.start, spell.stop - 1)
@@ -251,7 +211,7 @@ def _entered_calmly(one: _Judged, spell: Spell, width: int, dt: float) -> bool:
 
 
 def _assessment(
-    one: _Judged, states: NDArray[np.int8], findings: tuple[Finding, ...], limits: Limits, dt: float
+    one: Judged, states: NDArray[np.int8], findings: tuple[Finding, ...], limits: Limits, dt: float
 ) -> Assessment:
     y, size, cell = one.data.y, one.data.y.size, cell_of(dt)
     expected = np.repeat(one.response.expected, cell)[:size]
@@ -281,7 +241,7 @@ def _assessment(
     return Assessment(states, reasons, findings, pictured.columns, Tier.RESPONSE, notes, closeups=pictured.closeups)
 
 
-def _drive(one: _Judged, states: NDArray[np.int8], findings: tuple[Finding, ...]) -> Assessment:
+def _drive(one: Judged, states: NDArray[np.int8], findings: tuple[Finding, ...]) -> Assessment:
     reasons = {
         State.NOT_ASSESSED: _NO_EFFORT,
         State.NOT_EXCITED: "nothing is commanded",

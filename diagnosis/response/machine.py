@@ -1,0 +1,95 @@
+"""What concerns the machine as a whole: drives that stand still or go astray together, wheels that are unlike the others."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from diagnosis.response.findings import Spell, Wheel
+from diagnosis.response.identification import Response
+from diagnosis.response.inputs import FollowerData
+
+Array = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+
+_LASTING = 0.8  # of what the other wheels make of the same command: over a whole mission no slip or load does that
+_ELSEWHERE, _ELSEWHERE_S = 0.35, 1.5  # of the top speed: all drives that far off their commands, for so long
+
+
+class Judged(NamedTuple):
+    """A wheel on the way.
+
+    Attributes
+    ----------
+    data, response, wheel
+        Its channels, what its command makes of it, its readings.
+    driving : Flags, shape (b,)
+        Blocks in which it moves, or is to.
+    posterior : Array, shape (b, states)
+        Probability of each state of `models`.
+    spells : list[Spell]
+        Faults along the most probable states.
+    speed : Array or None, shape (b,)
+        Its speed by other channels [m/s].
+    calm : Flags, shape (b,)
+        Blocks in which a jump would be seen.
+    """
+
+    data: FollowerData
+    response: Response
+    wheel: Wheel
+    driving: Flags
+    posterior: Array
+    spells: list[Spell]
+    speed: Array | None
+    calm: Flags
+
+
+def standstills(idle: Sequence[tuple[int, int]], dt: float) -> tuple[str, ...]:
+    """A sentence where all drives stood still together, in steps [start, stop), although they were commanded to move."""
+    if not idle:
+        return ()
+    total, (start, stop) = sum(b - a for a, b in idle) * dt, max(idle, key=lambda s: s[1] - s[0])
+    return (
+        f"For {total:.1f} s all drives stood still together while they were commanded to move (longest {start * dt:.1f}–{stop * dt:.1f} s): "
+        "disabled, stopped by an emergency stop, or driven by another source of commands. No wheel is blamed for it.",
+    )
+
+
+def otherwise(judged: Mapping[str, Judged], block_s: float) -> tuple[str, ...]:
+    """A sentence where all drives together did something else than their commands for long; no wheel is blamed for it."""
+    off = []
+    for j in judged.values():
+        if not j.response.answered:
+            return ()
+        b = j.wheel.blocks
+        off.append(np.abs(b.mean - np.clip(b.mean, b.low, b.high)) > _ELSEWHERE * np.nanquantile(np.abs(b.mean), 0.99))
+    edge = np.flatnonzero(np.diff(np.r_[False, np.logical_and.reduce(off), False].astype(np.int8)))
+    spans = [(a, b) for a, b in zip(edge[::2] * block_s, edge[1::2] * block_s, strict=True) if b - a >= _ELSEWHERE_S]
+    if len(judged) < 2 or not spans:
+        return ()
+    longest = max(spans, key=lambda s: s[1] - s[0])
+    return (
+        f"For {sum(b - a for a, b in spans):.1f} s all drives together did something else than their commands (longest "
+        f"{longest[0]:.1f}–{longest[1]:.1f} s): commands that are held or ignored, another source of commands, or a slope.",
+    )
+
+
+def unlike(judged: Mapping[str, Judged]) -> dict[str, str]:
+    """Wheels that make less or more of the same command than the others over the whole mission, with a sentence."""
+    made = {w: abs(float(j.response.weights[0])) for w, j in judged.items() if j.response.answered}
+    out = {}
+    for w, own in made.items():
+        others = [x for o, x in made.items() if o != w]
+        if not others or not 0.0 < own < np.inf:
+            continue
+        share = own / float(np.median(others))
+        if not _LASTING <= share <= 1.0 / _LASTING:
+            out[w] = (
+                f"over the whole mission it reads {share:.2f} × what the other wheels make of the same command: a scaled or wrongly "
+                "mapped sensor, another wheel diameter, or a weak drive"
+            )
+    return out
