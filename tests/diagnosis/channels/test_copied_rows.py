@@ -1,0 +1,68 @@
+"""Rows that repeat as a whole are no data; a channel that repeats itself alone may be stuck."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from diagnosis.channels.copied_rows import without_copied_rows
+from replay.signals.timeline import Timeline
+
+MS = 1_000_000
+N = 3000
+HOLD = slice(1000, 1250)
+
+
+def timeline(*held: str) -> Timeline:
+    """Thirty seconds at 100 Hz of a drive's speed, effort and command, some of them held for 2.5 s."""
+    rng = np.random.default_rng(1)
+    signals = {
+        "wheel.M.v": 2.0 + 0.1 * rng.normal(size=N),
+        "wheel.M.u": 5.0 + rng.normal(size=N),
+        "wheel.M.v_ref": np.repeat([2.0, 2.2, 1.9], N // 3),
+    }
+    for name in held:
+        signals[name][HOLD] = signals[name][HOLD.start]
+    names = list(signals)
+    fresh = {n: np.ones(N, np.bool_) for n in names}
+    groups = {n: f"log.csv t wheel.{n.rsplit('.', 1)[-1]}" for n in names}
+    return Timeline(
+        0, 10 * MS, N, signals, fresh, dict.fromkeys(names, "log.csv"), dict.fromkeys(names, 10 * MS), groups=groups
+    )
+
+
+def test_rows_repeated_as_a_whole_are_no_data() -> None:
+    found = without_copied_rows(timeline("wheel.M.v", "wheel.M.u"))
+    inside = slice(HOLD.start + 2, HOLD.stop)
+    for name in found.signals:
+        assert np.isnan(found.signals[name][inside]).all()
+        assert not found.fresh[name][inside].any()
+        assert np.isfinite(found.signals[name][: HOLD.start]).all()
+        assert np.isfinite(found.signals[name][HOLD.stop :]).all()
+    assert "repeated the same values" in found.notes[0]
+    assert "10.0–12.5 s" in found.notes[0]
+
+
+def test_a_speed_that_repeats_itself_alone_stays() -> None:
+    given = timeline("wheel.M.v")
+    assert without_copied_rows(given) is given
+
+
+def test_an_effort_at_its_limit_says_nothing() -> None:
+    given = timeline("wheel.M.v")
+    given.signals["wheel.M.u"][HOLD] = 30.0
+    assert without_copied_rows(given) is given
+
+
+def test_repeats_that_are_the_sources_habit_stay() -> None:
+    given = timeline()
+    for name in ("wheel.M.v", "wheel.M.u"):
+        given.signals[name][:] = np.repeat(given.signals[name][::150], 150)
+    assert without_copied_rows(given) is given
+
+
+def test_channels_of_different_sources_are_not_one_row() -> None:
+    given = timeline("wheel.M.v", "wheel.M.u")
+    apart = replace(given, groups={"wheel.M.v": "a /speed", "wheel.M.u": "a /effort", "wheel.M.v_ref": "a /command"})
+    assert without_copied_rows(apart) is apart

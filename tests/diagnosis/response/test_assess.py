@@ -1,0 +1,148 @@
+"""Velocity-controlled robots: sensors by command, by the other wheels, and by the channel alone."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from diagnosis.response.assess import Judgement, assess_response
+from diagnosis.results.assessment import CODE, Finding
+from diagnosis.results.detectability import Deviation, Powers
+from replay.faults import FaultMode, Side, State
+from replay.machine.config import Limits
+from tests.diagnosis.response.robot import DT, TRACK, WHEELS, followers_of, geometry, speeds
+
+Array = NDArray[np.float64]
+
+LIMITS = Limits(driving_speed=0.05)
+PART = slice(round(60 / DT), round(70 / DT))
+
+
+def judged(measured: dict[str, Array], asked: dict[str, Array], body: Array, yaw: Array | None = None) -> Judgement:
+    names = tuple(measured)
+    return assess_response(followers_of(measured, asked, body), geometry(names), yaw, LIMITS, DT)
+
+
+def findings(j: Judgement) -> list[tuple[str, Finding]]:
+    return [(w, f) for w, (sensor, _) in j.parts.items() for f in sensor.findings]
+
+
+def share(j: Judgement, wheel: str, state: State) -> float:
+    states = j.parts[wheel][0].states
+    driven = states != CODE[State.NOT_EXCITED]
+    return float(np.mean(states[driven] == CODE[state]))
+
+
+def put(y: Array, kind: str) -> Array:
+    y, rng = y.copy(), np.random.default_rng(9)
+    size = PART.stop - PART.start
+    if kind == "no_signal":
+        y[PART] = 0.0
+    elif kind == "stuck":
+        y[PART] = y[PART.start - 1]
+    elif kind == "inefficient":
+        y[PART] *= 0.5
+    elif kind == "noisy":
+        y[PART] += rng.uniform(-0.25, 0.25, size)
+    else:
+        at = PART.start + np.flatnonzero(rng.random(size) < 0.04)
+        y[at] += rng.choice([-15.0, 15.0], at.size)
+    return y
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_a_healthy_robot_raises_nothing_and_is_judged_nearly_all_the_time(seed: int) -> None:
+    j = judged(*speeds(seed))
+    assert findings(j) == []
+    assert all(share(j, w, State.HEALTHY) > 0.95 for w in WHEELS)
+    assert j.events == ()
+
+
+@pytest.mark.parametrize("kind", ["no_signal", "stuck", "inefficient", "noisy", "spikes"])
+@pytest.mark.parametrize("seed", [4, 5])
+def test_a_fault_of_ten_seconds_is_found_at_its_wheel_and_side(kind: str, seed: int) -> None:
+    measured, asked, body = speeds(seed)
+    measured["RL"] = put(measured["RL"], kind)
+    ((wheel, found),) = findings(judged(measured, asked, body))
+    assert (wheel, found.side) == ("RL", Side.SENSOR)
+    assert found.mode is (FaultMode.NOISY if kind == "spikes" else FaultMode(kind))
+    assert found.start < PART.stop
+    assert found.stop > PART.start
+    assert abs(found.start - PART.start) * DT < 1.5
+
+
+def test_with_two_wheels_and_a_gyro_the_right_one_is_blamed() -> None:
+    measured, asked, body = speeds(6, ("FR", "FL"))
+    yaw = (measured["FR"] - measured["FL"]) / TRACK + np.random.default_rng(1).normal(0.0, 0.01, body.shape[0])
+    measured["FL"] = put(measured["FL"], "inefficient")
+    ((wheel, found),) = findings(judged(measured, asked, body, yaw))
+    assert (wheel, found.side, found.mode) == ("FL", Side.SENSOR, FaultMode.INEFFICIENT)
+    assert found.epsilon is not None
+    assert found.epsilon.value == pytest.approx(0.5, abs=0.1)
+
+
+def test_a_machine_that_stands_while_it_is_commanded_blames_no_wheel() -> None:
+    measured, asked, body = speeds(7)
+    stop = slice(round(100 / DT), round(120 / DT))
+    for y in measured.values():
+        y[stop] = 0.0
+    j = judged(measured, asked, body)
+    assert findings(j) == []
+    assert len(j.events) == 1
+    assert "No wheel is blamed" in j.events[0]
+    assert all(j.parts[w][0].states[stop.start + 100] != CODE[State.HEALTHY] for w in WHEELS)
+
+
+def test_commands_that_go_elsewhere_are_told_and_blame_no_wheel() -> None:
+    measured, asked, body = speeds(8)
+    part = slice(round(100 / DT), round(115 / DT))
+    body[part] = 0.0
+    for c in asked.values():
+        c[part] = 0.0
+    j = judged(measured, asked, body)
+    assert findings(j) == []
+    assert any("all drives together did something else" in n for n in j.parts["FR"][0].notes)
+
+
+@pytest.mark.parametrize("scale", [0.5, 0.7, 1.5])
+def test_a_scale_over_the_whole_mission_is_not_called_healthy(scale: float) -> None:
+    measured, asked, body = speeds(9)
+    measured["FL"] *= scale
+    j = judged(measured, asked, body)
+    assert share(j, "FL", State.HEALTHY) == 0.0
+    assert "what the other wheels make of the same command" in j.parts["FL"][0].reasons[State.NOT_ASSESSED]
+    assert share(j, "FR", State.HEALTHY) > 0.9
+
+
+def test_without_commands_wheels_of_a_side_judge_each_other() -> None:
+    measured, asked, body = speeds(10)
+    measured["RR"] = put(measured["RR"], "no_signal")
+    nothing = {w: np.full_like(c, np.nan) for w, c in asked.items()}
+    j = judged(measured, nothing, np.full_like(body, np.nan))
+    assert {w for w, _ in findings(j)} <= {"RR", "FR"}
+    assert share(j, "FL", State.HEALTHY) > 0.9
+
+
+def test_no_drive_is_called_healthy_without_its_effort() -> None:
+    j = judged(*speeds(11))
+    assert all(CODE[State.HEALTHY] not in drive.states for _, drive in j.parts.values())
+    assert "effort" in j.parts["FR"][1].reasons[State.NOT_ASSESSED]
+
+
+def test_what_would_have_shown_is_found_when_it_is_there() -> None:
+    measured, asked, body = speeds(12)
+    powers = judged(measured, asked, body).parts["FR"][0].powers
+    assert isinstance(powers, Powers)
+    loss = {(p.deviation, p.for_s): p for p in powers.rows}[Deviation.INEFFICIENT, 10.0]
+    assert loss.size is not None
+    assert loss.share is not None
+    rng = np.random.default_rng(2)
+    driven = np.flatnonzero(np.abs(asked["FR"][:-400]) > 0.3)
+    found = 0
+    places = rng.choice(driven, 12)
+    for start in places:
+        y = measured["FR"].copy()
+        y[start : start + 200] *= 1.0 - loss.size
+        found += any(w == "FR" for w, _ in findings(judged({**measured, "FR": y}, asked, body)))
+    assert found >= len(places) - 1
