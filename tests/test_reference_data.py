@@ -15,7 +15,7 @@ from diagnosis.fitting.drives import fit_drives
 from diagnosis.pipeline import diagnose, diagnose_signals
 from diagnosis.results.result import MissionResult
 from replay.control.loop import replay_loop
-from replay.errors import LogError, NotJudged
+from replay.errors import LogError
 from replay.faults import FaultMode, FaultSpec, Side
 from replay.injection.inject import inject_signals
 from replay.machine.config import Machine, haulotte
@@ -77,7 +77,6 @@ def serious(result: MissionResult) -> list[tuple[str, str]]:
     [
         ("robot_localization/test1.bag", LogError, "no wheel signal"),
         ("gps_nav_ws/bag", LogError, "no wheel signal"),
-        ("abitobot", NotJudged, "no valve command, no second speed and no commanded wheel speed"),
     ],
 )
 def test_a_log_without_evidence_is_refused_with_the_reason(
@@ -85,6 +84,29 @@ def test_a_log_without_evidence_is_refused_with_the_reason(
 ) -> None:
     with pytest.raises(error, match=reason):
         diagnose([reference_data / "reference_logs" / log], haulotte())
+
+
+def test_a_robot_without_commands_is_neither_blamed_nor_cleared(reference_data: Path) -> None:
+    result = diagnose([reference_data / "reference_logs/abitobot"], haulotte())
+    assert serious(result) == []
+    assert result.report["verdict"]["status"] == "not_assessed"
+
+
+@pytest.mark.parametrize("robot", ["husky_bag", "warthog_bag"])
+def test_the_sensors_of_a_healthy_robot_are_judged_by_its_commands(reference_data: Path, robot: str) -> None:
+    folder = reference_data / "fault_data/robots"
+    report = diagnose([folder / robot], load_machine(folder / f"{robot}.toml")).report
+    assert report["intervals"] == []
+    assert report["verdict"]["title"] == "No sensor fault seen, drives not judged"
+    sensors = [c for c in report["coverage"] if c["side"] == "sensor"]
+    assert all(c["decided_driving_s"] > 0.8 * c["driving_s"] for c in sensors)
+
+
+def test_a_disabled_robot_did_not_follow_and_no_wheel_is_blamed(reference_data: Path) -> None:
+    folder = reference_data / "fault_data/robots"
+    result = diagnose([folder / "warthog_disabled.csv"], load_machine(folder / "warthog_disabled.toml"))
+    assert serious(result) == []
+    assert result.report["verdict"]["title"] == "The machine did not follow its commands"
 
 
 @pytest.mark.parametrize("run", ["Healthy_01", "Healthy_02", "Healthy_03", "Healthy_04"])

@@ -127,8 +127,10 @@ def _wheels(
 
 
 def _judge(one: Judged, beside: Beside | None, found: Mapping[str, Judged], w: str, dt: float, width: int) -> Judged:
-    block_s = width * dt
-    score = scores(one.wheel.blocks, one.driving, block_s, beside)
+    block_s, blocks = width * dt, one.wheel.blocks
+    if beside is not None:  # what shakes other wheels too is no sensor's noise
+        blocks = blocks._replace(usual=np.maximum(blocks.usual, beside.rough))
+    score = scores(blocks, one.driving, block_s, beside)
     jumped = one.wheel.samples.step[one.wheel.jumps.place] // width
     enters, leaves = np.full((2, len(score)), [[-np.expm1(-block_s / t)] for t in (_MEAN_HEALTHY_S, _MEAN_FAULTY_S)])
     enters[jumped], leaves[jumped] = _AT_A_JUMP

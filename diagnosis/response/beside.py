@@ -49,7 +49,8 @@ def views(
             continue
         noise = _noise(blocks[w], speed)
         blame = np.ones(speed.size) if len(speeds) > 1 else _blame(blocks[w], [blocks[o] for o in others])
-        out[w] = Beside(speed, noise, blame)
+        rough = np.asarray(np.max([blocks[o].rough for o in others], axis=0))
+        out[w] = Beside(speed, noise, blame, rough)
     return out
 
 

@@ -45,10 +45,8 @@ class Blocks(NamedTuple):
         Expected band and its usual misfit [m/s].
     readings, same, zero : Array, shape (b,)
         Readings, those that repeat the one before, those of a wheel that stands still.
-    white : Array, shape (b,)
-        Root mean square of what changes from sample to sample, beside the usual one (logarithm).
-    usual : Array, shape (b,)
-        That usual one [m/s].
+    rough, usual : Array, shape (b,)
+        Root mean square of what changes from sample to sample, and the usual one [m/s].
     """
 
     start: NDArray[np.intp]
@@ -59,8 +57,13 @@ class Blocks(NamedTuple):
     readings: Array
     same: Array
     zero: Array
-    white: Array
+    rough: Array
     usual: Array
+
+    @property
+    def white(self) -> Array:
+        """What changes from sample to sample beside the usual (logarithm)."""
+        return np.asarray(np.log((self.rough + 0.3 * self.usual) / (1.3 * self.usual)))
 
     @property
     def held(self) -> Flags:
@@ -77,11 +80,14 @@ class Beside(NamedTuple):
         The speed by that view and the usual misfit [m/s]; NaN where it says nothing.
     blame : Array, shape (b,)
         How much of a misfit is this wheel's own, 0…1.
+    rough : Array, shape (b,)
+        What of the other wheels changes from sample to sample [m/s].
     """
 
     speed: Array
     noise: Array
     blame: Array
+    rough: Array
 
 
 def blocks_of(samples: Samples, response: Response, cell: int, width: int, size: int) -> Blocks:
@@ -115,7 +121,7 @@ def blocks_of(samples: Samples, response: Response, cell: int, width: int, size:
     still = np.abs(samples.value) <= _STILL * top
     return Blocks(
         start, mean, response.low[cells], response.high[cells], response.noise[cells], count,
-        total(samples.same), total(still), np.log((white + 0.3 * usual) / (1.3 * usual)), usual,
+        total(samples.same), total(still), white, usual,
     )  # fmt: skip
 
 

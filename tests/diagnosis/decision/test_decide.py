@@ -223,3 +223,10 @@ def test_a_short_drive_is_the_reason_not_the_standstill() -> None:
     seconds = dict.fromkeys(parts, 30.0) | {("FR", "sensor"): 5.0}
     got = decide((), parts, seconds, AXLES, LIMITS, (), driving_s=dict.fromkeys(parts, 30.0))
     assert "F1 hides it" in got.caveats[0]
+
+
+def test_a_machine_that_did_not_follow_is_neither_ready_nor_at_fault() -> None:
+    text = "For 12.0 s all drives stood still together while they were commanded to move."
+    found = decide([], machine(), dict.fromkeys(machine(), 60.0), AXLES, LIMITS, (), events=(text,))
+    assert (found.status, found.title, found.text) == ("not_assessed", "The machine did not follow its commands", text)
+    assert not found.cleared

@@ -87,3 +87,21 @@ def test_lost_samples_are_no_data() -> None:
     sensor, _ = assess_tracking(v, command(), DT, LIMITS, NAMES)
     assert (sensor.states[200:300] == CODE[State.NO_DATA]).all()
     assert (sensor.states[300:] != CODE[State.NO_DATA]).all()
+
+
+def test_jitter_of_a_still_position_is_no_motion() -> None:
+    v = response(25)
+    counts = 0.004 * np.random.default_rng(3).integers(-2, 3, N)  # the position hops by some counts, and comes back
+    v[600:] = np.diff(counts, prepend=0.0)[600:] / DT
+    (found,) = assess_tracking(v, command(), DT, LIMITS, NAMES)[0].findings
+    assert found.mode is FaultMode.NO_SIGNAL
+    assert found.start == pytest.approx(600, abs=20)
+
+
+def test_a_command_that_begins_as_the_log_ends_proves_nothing() -> None:
+    asked = command()
+    asked[:1400] = np.where(np.arange(1400) < 600, asked[:1400], 0.0)
+    asked[-20:] = 0.3
+    v = np.r_[np.zeros(25), asked[: N - 25]]
+    v[-20:] = 0.0
+    assert assess_tracking(v, asked, DT, LIMITS, NAMES)[0].findings == ()
