@@ -77,10 +77,8 @@ def test_four_wheels_of_a_body_with_known_angles_have_three_relations() -> None:
     phi_f, phi_r, base, half = 0.2, -0.1, 2.1, 0.73
     curvature = (np.tan(phi_f) - np.tan(phi_r)) / base
     lateral = np.tan(phi_f) - curvature * base / 2
-    rows = []
-    for x in (base / 2, -base / 2):
-        for y in (-half, half):
-            rows.append([np.hypot(1.0 - curvature * y, lateral + curvature * x)])
+    places = [(x, y) for x in (base / 2, -base / 2) for y in (-half, half)]
+    rows = [[np.hypot(1.0 - curvature * y, lateral + curvature * x)] for x, y in places]
     assert 4 - np.linalg.matrix_rank(np.array(rows)) == 3
 
 

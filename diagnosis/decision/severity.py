@@ -6,7 +6,8 @@ actuator, or one without control signal, means stop at once. Everything else is 
 Both are about the part that is named, so *high* needs its probability, not that of any fault: the named side must be faulty
 with `limits.min_probability` (as every stated fault is), and be stuck or without signal with odds of three to one. A machine
 that is stopped for the wrong part, or for a row that is no reason to stop, stands without need; the fault that misses these
-bounds is still *medium*, to be checked before the next mission.
+bounds is still *medium*, to be checked before the next mission. The risk decides, not the most probable row: a part of which
+hardly anything is left (ε̂ ≥ .9) is as good as without signal, whatever its row is called.
 """
 
 from __future__ import annotations
@@ -22,6 +23,7 @@ from replay.machine.config import Limits
 _LIKELY = 0.6  # probability of any fault from which on one is worth a check
 _MARKED_EPSILON = 0.3
 _SHORT_NOISE_S = 1.0
+_LOST = 0.9  # ε̂ from which on so little is left that the part is as good as without signal
 _PROBABLY_TOTAL = 0.75  # that the named side is stuck or without signal, from which on the machine is stopped
 
 
@@ -30,13 +32,14 @@ def severity_of(finding: Finding, seconds: float, limits: Limits, kind: Kind = K
     faulty = 1.0 - sum(h.p for h in finding.hypotheses if h.mode == "healthy")
     if faulty < _LIKELY:
         return Severity.INFO, "Not certain enough to act on. Compare with the next mission."
+    total = finding.mode.total or _at_risk(finding) >= _PROBABLY_TOTAL
     if faulty < limits.min_probability:
-        if finding.mode.total and finding.side is not Side.SENSOR:
+        if total and finding.side is not Side.SENSOR:
             return Severity.MEDIUM, "Probably a valve that does not answer: check it before the machine goes out again."
         return Severity.LOW, "Probable, not certain: check it at the next service, and compare with the next mission."
     if finding.mode.varying and finding.tier is Tier.MODEL and seconds < _SHORT_NOISE_S:
         return Severity.INFO, "Too short to act on, and shown by a model alone. Compare with the next mission."
-    if finding.mode.total:
+    if total:
         return _severity_of_total(finding, seconds, limits, kind)
     marked = finding.epsilon is not None and finding.epsilon.value >= _MARKED_EPSILON
     if finding.mode is FaultMode.OUTSIDE_TABLE:
@@ -54,7 +57,7 @@ def _severity_of_total(finding: Finding, seconds: float, limits: Limits, kind: K
             Severity.MEDIUM,
             "Faulty, but which part is not certain enough to stop for: check sensor and valve before the next mission.",
         )
-    if _of_named_side(finding, TOTAL) < _PROBABLY_TOTAL:
+    if _at_risk(finding) < _PROBABLY_TOTAL:
         return (
             Severity.MEDIUM,
             "Faulty, but probably neither stuck nor without signal: check it before the next mission.",
@@ -74,6 +77,12 @@ def _severity_of_total(finding: Finding, seconds: float, limits: Limits, kind: K
     return Severity.HIGH, (
         f"Stop and repair the sensor: it delivered nothing usable for more than {limits.brief:g} s (Assumption 1)."
     )
+
+
+def _at_risk(finding: Finding) -> float:
+    """Probability that nothing usable comes from the side that the finding names: stuck, without signal, or nearly all lost."""
+    lost = finding.epsilon is not None and finding.epsilon.value >= _LOST
+    return _of_named_side(finding, {*TOTAL, FaultMode.INEFFICIENT} if lost else TOTAL)
 
 
 def _of_named_side(finding: Finding, modes: Container[str] | None = None) -> float:

@@ -10,6 +10,11 @@ from diagnosis.results.result import FaultInterval
 from diagnosis.results.vocabulary import Severity, part_words
 from replay.faults import FaultMode, Side
 
+_MAJORITY, _CANDIDATE = (
+    0.5,
+    0.15,
+)  # of the probability of any fault of the part: a row that gives its name; one that is named beside others
+
 
 def actions_of(intervals: Sequence[FaultInterval]) -> tuple[ActionRow, ...]:
     """One action per component and side: valves to stop at once for, then other stops, then the rest, worst first."""
@@ -24,10 +29,10 @@ def actions_of(intervals: Sequence[FaultInterval]) -> tuple[ActionRow, ...]:
 def _action(n: int, faults: Sequence[FaultInterval]) -> ActionRow:
     """What to do about one part, with its faults worst first."""
     worst = faults[0]
-    modes: dict[FaultMode, list[FaultInterval]] = {}
+    kinds: dict[str, list[FaultInterval]] = {}
     for f in faults:
-        modes.setdefault(f.mode, []).append(f)
-    found = join_words([_how_long(worst.side, mode, same) for mode, same in modes.items()])
+        kinds.setdefault(fault_words(f), []).append(f)
+    found = join_words([_how_long(words, same) for words, same in kinds.items()])
     return {
         "n": n,
         "text": f"{_order(worst)} the {part_words(worst.kind, worst.component, worst.side)}: {found}.",
@@ -57,17 +62,32 @@ def _urgency(worst: FaultInterval) -> int:
     return {Severity.MEDIUM: 3, Severity.LOW: 4}.get(worst.severity, 5)
 
 
-def _how_long(side: Side, mode: FaultMode, faults: Sequence[FaultInterval]) -> str:
-    """A mode with the whole time of its faults on one part, and how many they are."""
+def fault_words(f: FaultInterval) -> str:
+    """What a fault is: its row, or *faulty* with the candidates where no row has half of the probability of any fault.
+
+    A word for one row of two that are as probable would be a coin toss.
+    """
+    rows: dict[FaultMode, float] = {}
+    for h in f.hypotheses:
+        if h.mode != "healthy" and (h.side == f.side.value or f.side is Side.SENSOR_OR_ACTUATOR):
+            rows[FaultMode(h.mode)] = rows.get(FaultMode(h.mode), 0.0) + h.p
+    ranked = sorted(rows, key=lambda mode: -rows[mode])
+    if len(ranked) < 2 or rows[ranked[0]] >= _MAJORITY * sum(rows.values()):
+        return mode_words(f.side, f.mode)
+    likely = [mode_words(f.side, mode) for mode in ranked if rows[mode] >= _CANDIDATE * sum(rows.values())]
+    return f"faulty, kind unclear ({', '.join(likely[:-1])} or {likely[-1]})"
+
+
+def _how_long(words: str, faults: Sequence[FaultInterval]) -> str:
+    """What faults are, with the whole time of them on one part, and how many they are."""
     total = seconds_words(sum(f.stop_s - f.start_s for f in faults))
-    return f"{mode_words(side, mode)} for {total}" + ("" if len(faults) == 1 else f" in {len(faults)} intervals")
+    return f"{words} for {total}" + ("" if len(faults) == 1 else f" in {len(faults)} intervals")
 
 
 def sentence_of(faults: Sequence[FaultInterval]) -> str:
     """The worst three faults in one sentence."""
     shown = [
-        f"the {part_words(f.kind, f.component, f.side)} was {mode_words(f.side, f.mode)} for "
-        f"{seconds_words(f.stop_s - f.start_s)}"
+        f"the {part_words(f.kind, f.component, f.side)} was {fault_words(f)} for {seconds_words(f.stop_s - f.start_s)}"
         for f in faults[:3]
     ]
     text = join_words(shown)

@@ -8,7 +8,9 @@ from itertools import pairwise
 import pytest
 
 from diagnosis.decision.intervals import intervals_of, spans_of
+from diagnosis.decision.wording import fault_words
 from diagnosis.results.assessment import unassessed
+from diagnosis.results.result import Hypothesis
 from replay.faults import FaultMode, Side, State
 from tests.diagnosis.decision.findings import AXLES, LIMITS, STEP, N, assessed, finding, machine
 
@@ -60,3 +62,15 @@ def test_spans_leave_no_gap() -> None:
     first, second = (s for s in spans if (s.component, s.side) == ("FR", "sensor"))
     assert (first.state, first.stop_s, second.state) == (State.STUCK, 0.1, State.HEALTHY)
     assert spans[-1].reason == "the valve is not in the log"
+
+
+def test_a_fault_without_a_majority_is_called_by_its_candidates() -> None:
+    rows = (
+        ("actuator", "inefficient", 0.45),
+        ("actuator", "stuck", 0.4),
+        ("actuator", "no_signal", 0.1),
+        ("none", "healthy", 0.05),
+    )
+    part = replace(finding(Side.ACTUATOR, FaultMode.INEFFICIENT), hypotheses=tuple(Hypothesis(*row) for row in rows))
+    (fault,) = intervals_of({("FR", "actuator"): assessed(part)}, AXLES, 0, STEP, LIMITS)
+    assert fault_words(fault) == "faulty, kind unclear (inefficient or stuck)"

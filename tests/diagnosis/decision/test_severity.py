@@ -7,8 +7,8 @@ from dataclasses import replace
 import pytest
 
 from diagnosis.decision.severity import severity_of
-from diagnosis.results.result import Hypothesis
-from diagnosis.results.vocabulary import Kind
+from diagnosis.results.result import Epsilon, Hypothesis
+from diagnosis.results.vocabulary import Kind, Severity
 from replay.faults import FaultMode, Side
 from replay.machine.config import Limits
 from tests.diagnosis.decision.findings import LIMITS, finding
@@ -71,7 +71,8 @@ def test_improbable_faults_are_no_ground_to_act(side: Side, mode: FaultMode) -> 
 @pytest.mark.parametrize("mode", list(FaultMode))
 def test_probable_faults_are_worth_a_check(side: Side, mode: FaultMode) -> None:
     dead_valve = side is not Side.SENSOR and mode in (FaultMode.STUCK, FaultMode.NO_SIGNAL)
-    assert severity_of(finding(side, mode, p=0.89), 60.0, LIMITS)[0] == ("medium" if dead_valve else "low")
+    part = finding(side, mode, p=0.89, epsilon=1.0 if mode.total else 0.5)
+    assert severity_of(part, 60.0, LIMITS)[0] == ("medium" if dead_valve else "low")
 
 
 def test_what_is_more_probably_alive_does_not_stop_the_machine() -> None:
@@ -133,3 +134,12 @@ def test_stuck_or_silent_is_one_dead_part() -> None:
         hypotheses=split(("sensor", "stuck", 0.5), ("sensor", "no_signal", 0.48), ("none", "healthy", 0.02)),
     )
     assert severity_of(found, 8.0, LIMITS)[0] == "high"
+
+
+def test_the_risk_decides_and_not_the_most_probable_row() -> None:
+    rows = (("actuator", "inefficient", 0.49), ("actuator", "stuck", 0.44), ("none", "healthy", 0.07))
+    likely = finding(Side.ACTUATOR, FaultMode.INEFFICIENT, epsilon=0.97)
+    likely = replace(likely, hypotheses=tuple(Hypothesis(*row) for row in rows))
+    assert severity_of(likely, 10.0, LIMITS)[0] is Severity.HIGH
+    half = replace(likely, epsilon=Epsilon(0.5, 0.4, 0.6))
+    assert severity_of(half, 10.0, LIMITS)[0] is Severity.MEDIUM
