@@ -13,6 +13,7 @@ from diagnosis.assess import ComponentResult, assess_components
 from diagnosis.channels.copied_rows import without_copied_rows
 from diagnosis.channels.recording_gaps import recording_gaps, without_gaps
 from diagnosis.decision import metrics, quality
+from diagnosis.decision.episodes import with_episodes
 from diagnosis.report_document import Judged, machine_row, report_of_mission
 from diagnosis.results.assessment import Assessment
 from diagnosis.results.closeups import closeups_of
@@ -159,9 +160,10 @@ def _walk(
 
 
 def _outside_gaps(found: ComponentResult, timeline: Timeline) -> ComponentResult:
-    """Nothing is judged where nothing was recorded."""
+    """Nothing is judged where nothing was recorded; findings that are one fault are one."""
     gaps = recording_gaps(timeline)
-    return replace(found, assessments={key: without_gaps(a, gaps, timeline) for key, a in found.assessments.items()})
+    seen = {key: without_gaps(a, gaps, timeline) for key, a in found.assessments.items()}
+    return replace(found, assessments=with_episodes(seen, timeline.dt))
 
 
 def _require_something(assessments: Mapping[tuple[str, str], Assessment], mission: Mission, machine: Machine) -> None:

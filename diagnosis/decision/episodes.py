@@ -1,0 +1,124 @@
+"""Findings of one part that are one fault: the same row, as large, and nothing healthy seen between them.
+
+A constant loss that shows only while the wheel is driven hard is found in pieces. Between them nothing can be judged; where the part
+was seen to be healthy for longer, the pieces are faults of their own.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from diagnosis.results.assessment import CODE, Assessment, Finding
+from diagnosis.results.result import Epsilon
+from diagnosis.results.vocabulary import Tier
+from replay.faults import State
+
+#: Healthy time between two findings that makes two faults of them [s]: second measurements see it at once, a model needs longer.
+_SEEN_HEALTHY_S = {Tier.DIRECT: 0.05}
+_SEEN_BY_MODELS_S = 0.5
+_SPARE = 0.1  # of ε̂: by which two bounds may miss each other
+_NAMED = 6
+Part = tuple[str, str]
+
+
+def with_episodes(assessments: Mapping[Part, Assessment], dt: float) -> dict[Part, Assessment]:
+    """The same with findings joined that are one fault.
+
+    Parameters
+    ----------
+    assessments : Mapping[Part, Assessment]
+        By component and side.
+    dt : float
+        Step [s].
+    """
+    out: dict[Part, Assessment] = {}
+    for part, a in assessments.items():
+        if len(a.findings) < 2:
+            out[part] = a
+            continue
+        states = {side: b.states for (component, side), b in assessments.items() if component == part[0]}
+        out[part] = replace(a, findings=joined(a.findings, states, dt))
+    return out
+
+
+def joined(findings: Sequence[Finding], states: Mapping[str, NDArray[np.int8]], dt: float) -> tuple[Finding, ...]:
+    """Findings in order of time, those that are one fault as one.
+
+    Parameters
+    ----------
+    findings : Sequence[Finding]
+        Of one side of a part.
+    states : Mapping[str, NDArray[np.int8]], each of shape (n,)
+        States of both sides of the component, by side: a finding that may be either's counts in both lists.
+    dt : float
+        Step [s].
+    """
+    groups: list[list[Finding]] = []
+    for f in sorted(findings, key=lambda f: f.start):
+        if groups and _continues(groups[-1][-1], f, states, dt):
+            groups[-1].append(f)
+        else:
+            groups.append([f])
+    return tuple(group[0] if len(group) == 1 else _episode(group, dt) for group in groups)
+
+
+def _continues(a: Finding, b: Finding, states: Mapping[str, NDArray[np.int8]], dt: float) -> bool:
+    """Whether b goes on with the fault that a is."""
+    if (a.side, a.mode, a.tier) != (b.side, b.mode, b.tier) or b.start < a.stop:
+        return False
+    sides = [states[s.value][a.stop : b.start] for s in a.side.sides if s.value in states]
+    healthy = np.logical_and.reduce([np.isin(s, (CODE[State.HEALTHY], CODE[State.NO_DATA])) for s in sides])
+    seen = np.count_nonzero(healthy) * dt >= _SEEN_HEALTHY_S.get(a.tier, _SEEN_BY_MODELS_S)
+    return not seen and _alike(a.epsilon, b.epsilon) and _same_value(a, b)
+
+
+def _alike(a: Epsilon | None, b: Epsilon | None) -> bool:
+    if a is None or b is None:
+        return a is b
+    return a.low - _SPARE <= b.high and b.low - _SPARE <= a.high
+
+
+def _same_value(a: Finding, b: Finding) -> bool:
+    """Whether parts that are stuck are stuck at the same value."""
+    if not a.mode.total or a.sat is None or b.sat is None:
+        return True
+    spare = 0.1 * max(abs(a.sat.mean), abs(b.sat.mean))
+    return a.sat.low - spare <= b.sat.high and b.sat.low - spare <= a.sat.high
+
+
+def _episode(group: Sequence[Finding], dt: float) -> Finding:
+    """One finding for several, with what the longest shows and the course of all."""
+    length = np.array([f.stop - f.start for f in group], dtype=np.float64)
+    longest = group[int(np.argmax(length))]
+    best = max(group, key=lambda f: f.probability)
+    spans = [f"{f.start * dt:.1f}–{f.stop * dt:.1f} s" for f in group[:_NAMED]]
+    more = f" and {len(group) - _NAMED} more" if len(group) > _NAMED else ""
+    course = f"It shows in {len(group)} stretches ({', '.join(spans)}{more}); between them nothing healthy was seen of this part: one fault."
+    known = [f.detected for f in group if f.detected is not None]
+    return replace(
+        longest,
+        start=group[0].start,
+        stop=group[-1].stop,
+        probability=best.probability,
+        hypotheses=best.hypotheses,
+        epsilon=_pooled([f.epsilon for f in group], length),
+        evidence=(*longest.evidence, course),
+        detected=min(known) if known else None,
+    )
+
+
+def _pooled(sizes: Sequence[Epsilon | None], length: NDArray[np.float64]) -> Epsilon | None:
+    """ε̂ of all, each by its bound and its length; the bound of the best one, or what they differ by."""
+    known = [(e, n) for e, n in zip(sizes, length, strict=True) if e is not None]
+    if not known:
+        return None
+    half = np.array([max(0.5 * (e.high - e.low), 1e-3) for e, _ in known])
+    value = np.array([e.value for e, _ in known])
+    weight = np.array([n for _, n in known]) / half**2
+    mean = float(weight @ value / weight.sum())
+    spread = max(float(np.min(half)), float(np.sqrt(weight @ (value - mean) ** 2 / weight.sum())))
+    return Epsilon(mean, mean - spread, mean + spread)
