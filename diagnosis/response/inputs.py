@@ -62,11 +62,12 @@ def followers(mission: MissionView) -> dict[str, FollowerData]:
     body: Array | None = None
     if mission.logged("cmd.v") and mission.logged("cmd.omega") and not machine.axles:
         body = np.column_stack([cells(mission.values(n), width) for n in ("cmd.v", "cmd.omega")])
+    several = sum(mission.logged(f"wheel.{w}.v") for w in machine.wheels) > 1
     out: dict[str, FollowerData] = {}
     for w in machine.wheels:
         name, asked = f"wheel.{w}.v", mission.command(w)
         taken = mission.judged((w, SENSOR)) or mission.logged(f"wheel.{w}.v_true")
-        if taken or not mission.logged(name) or (len(machine.wheels) < 2 and not np.isfinite(asked).any()):
+        if taken or not mission.logged(name) or not (several or np.isfinite(asked).any()):
             continue
         own = mission.logged(f"wheel.{w}.v_ref") or body is None
         commands = cells(asked, width)[:, None] if own or body is None else body

@@ -364,7 +364,13 @@ def test_wheel_that_does_not_exist(tmp_path: Path) -> None:
 
 def test_log_in_which_nothing_can_be_judged(mission: SimulatedMission) -> None:
     with pytest.raises(NotJudged, match="no valve command"):
-        diagnose_mission(in_memory(mission, keep=r"^wheel\.\w+\.v$"), PAPER)
+        diagnose_mission(in_memory(mission, keep=r"^wheel\.FR\.v$"), PAPER)
+
+
+def test_speeds_alone_are_neither_blamed_nor_cleared(mission: SimulatedMission) -> None:
+    report = diagnose_mission(in_memory(mission, keep=r"^wheel\.\w+\.v$"), PAPER).report
+    assert report["verdict"]["status"] == "not_assessed"
+    assert {i["mode"] for i in report["intervals"]} <= {"stuck", "noisy"}  # what a channel shows by itself
 
 
 def test_one_motor_rig() -> None:
