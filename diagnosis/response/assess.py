@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from diagnosis.channels.standstill import not_followed
 from diagnosis.response.beside import views
-from diagnosis.response.channel import samples_of
+from diagnosis.response.channel import holds_of, samples_of
 from diagnosis.response.findings import Spell, Wheel, finding_of, spells_of, spikes_of, where_asked
 from diagnosis.response.identification import identify_response, without_command
 from diagnosis.response.inputs import FollowerData, cell_of, cells
@@ -33,6 +33,7 @@ _MEAN_HEALTHY_S, _MEAN_FAULTY_S = 120.0, 10.0
 _AT_A_JUMP = 0.1, 0.3  # probability that a fault begins, or ends, where the channel jumps
 _MOVES = 0.4  # of the driving speed: enough to see whether a channel lives
 _LEAST_P = 0.6
+_OWN, _OTHERS = 4, 2  # holds of a channel that may be faults: of the one in question, and of each other
 _LEAST_S = 1.0
 _DOUBT_S = 0.5  # around a spell that is judged no fault
 _NO_EFFORT = "a drive that follows its command may still be weak: only its effort would show that"
@@ -77,6 +78,8 @@ def assess_response(
     found = _wheels(data, left_out, (cell, width), limits, dt)
     if not found:
         return Judgement({}, standstills(idle, dt))
+    holds = {w: holds_of(j.wheel.samples, _MOVES * limits.driving_speed, dt) for w, j in found.items()}
+    found = {w: j._replace(wheel=j.wheel._replace(habit=_habit(w, holds))) for w, j in found.items()}
     turned = None if yaw is None else cells(yaw, width)
     beside = views(list(found), {w: j.wheel.blocks for w, j in found.items()}, geometry, turned)
     judged = {w: _judge(j, beside.get(w), found, w, dt, width) for w, j in found.items()}
@@ -144,6 +147,12 @@ def _judge(one: Judged, beside: Beside | None, found: Mapping[str, Judged], w: s
     )
 
 
+def _habit(wheel: str, holds: Mapping[str, Array]) -> float:
+    """How long healthy channels stay at one value [s]: some holds may be faults, fewer of them another wheel's."""
+    longest = [x[k] for w, x in holds.items() if x.size > (k := _OWN if w == wheel else _OTHERS)]
+    return float(max(longest, default=0.0))
+
+
 def _asked(one: Judged, limits: Limits) -> Flags:
     """Blocks in which the wheel must move, by its command or by the wheels beside it, shape (b,)."""
     blocks, least = one.wheel.blocks, _MOVES * limits.driving_speed
@@ -188,7 +197,7 @@ def _sides(
             one, spell, width, dt
         ):
             doubtful[spell.start : spell.stop] = False  # what came slowly is slip or load, no sensor's fault
-    findings.sort(key=lambda f: f.start)
+    findings = _without_doubles(findings)
     known = np.isfinite(one.data.y)
     driving = np.repeat(one.driving, width)[:size]
     sensor = np.where(driving, CODE[State.HEALTHY], CODE[State.NOT_EXCITED]).astype(np.int8)
@@ -203,6 +212,15 @@ def _sides(
         sensor[f.start : f.stop] = CODE[State(f.mode.value)]
         drive[f.start : f.stop] = CODE[State(f.mode.value) if f in both else State.MASKED]
     return _assessment(one, sensor, tuple(findings), limits, dt), _drive(one, drive, tuple(both))
+
+
+def _without_doubles(findings: Sequence[Finding]) -> list[Finding]:
+    """In order of time; of two that say the same of the same time, as spikes and noise do, the longer one."""
+    kept: list[Finding] = []
+    for f in sorted(findings, key=lambda f: f.start - f.stop):
+        if not any(f.mode is k.mode and f.start < k.stop and k.start < f.stop for k in kept):
+            kept.append(f)
+    return sorted(kept, key=lambda f: f.start)
 
 
 def _entered_calmly(one: Judged, spell: Spell, width: int, dt: float) -> bool:

@@ -63,6 +63,25 @@ def samples_of(y: Array, fresh: Flags) -> Samples:
     return Samples(step, value, wild, change == 0.0, change, np.nan_to_num(white))
 
 
+def holds_of(samples: Samples, still: float, dt: float) -> Array:
+    """How long a channel stays at one value of more than `still` [m/s], for each time that it does [s], the longest first.
+
+    Parameters
+    ----------
+    samples : Samples
+        Of the channel.
+    still : float
+        What counts as standstill [m/s].
+    dt : float
+        Step [s].
+    """
+    held = samples.same & (np.abs(samples.value) > still)
+    edge = np.flatnonzero(np.diff(np.r_[False, held, False].astype(np.int8)))
+    starts, stops = edge[::2], edge[1::2]
+    length = (samples.step[stops - 1] - samples.step[np.maximum(starts - 1, 0)]) * dt
+    return np.asarray(np.sort(length)[::-1], dtype=np.float64)
+
+
 def _wild(value: Array) -> Flags:
     """Readings that lie far off both their neighbourhoods, which agree with each other."""
     if value.size < 2 * _AROUND + 1:

@@ -23,6 +23,7 @@ _JOIN_S = 1.0
 _SPIKE_GAP_S, _LEAST_SPIKES = 10.0, 3
 _SENSOR = 0.96  # that what a channel alone shows is the sensor's
 _ONE_JUMP, _TWO_JUMPS = 0.92, 0.97
+_BEYOND_HABIT = 2.5  # times as long as healthy channels stay at a value
 _BARE_P, _BARE_S = (
     0.92,
     5.0,
@@ -42,6 +43,8 @@ class Wheel(NamedTuple):
         Step of the timeline [s].
     compared : str
         Channels that show the same speed, in words; empty where there are none.
+    habit : float
+        How long healthy channels of this machine stay at one value [s].
     """
 
     name: str
@@ -50,6 +53,7 @@ class Wheel(NamedTuple):
     jumps: Jumps
     dt: float
     compared: str
+    habit: float = 0.0
 
 
 class Spell(NamedTuple):
@@ -151,7 +155,7 @@ def spikes_of(wheel: Wheel) -> list[Finding]:
     return out
 
 
-def _stuck(spell: Spell, wheel: Wheel, first: int, last: int) -> Finding:
+def _stuck(spell: Spell, wheel: Wheel, first: int, last: int) -> Finding | None:
     inside = np.flatnonzero((wheel.samples.step >= first) & (wheel.samples.step < last))
     value = float(wheel.samples.value[inside[inside.size // 2]])
     same = wheel.samples.value == value
@@ -161,6 +165,8 @@ def _stuck(spell: Spell, wheel: Wheel, first: int, last: int) -> Finding:
     while stop + 1 < same.size and same[stop + 1]:
         stop += 1
     begin, end = int(wheel.samples.step[start]), int(wheel.samples.step[stop]) + 1
+    if (end - begin) * wheel.dt < _BEYOND_HABIT * wheel.habit:
+        return None
     text = (
         f"{wheel.name} read {value:.4g} m/s in {stop - start + 1} readings one after another, for {(end - begin) * wheel.dt:.2f} s; "
         "while it drives it otherwise changes all the time."

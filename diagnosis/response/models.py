@@ -23,6 +23,8 @@ _FREEDOM = 3.0  # of Student's t: slip and wind-up are common
 _SECOND = 0.25  # weight of a block's misfit beside its command: that lasts for about a second
 _BESIDE = 0.5  # beside another wheel
 _REPEATS = 0.5  # weight of repeats
+_HABIT = 0.1  # share of repeats from which on their absence says something
+_FEW = 8.0  # of a block's readings, however many there are, so many count
 _OTHER_Z = 4.0  # misfit from which nothing known explains a block
 _WHITE_SPREAD, _WHITE_MOST = 0.5, 3.0
 _WHITE_UP = np.log(3.0)
@@ -141,14 +143,16 @@ def scores(blocks: Blocks, driving: Flags, block_s: float, beside: Beside | None
     """
     out = np.zeros((blocks.mean.size, STATES))
     moves = blocks.zero < blocks.readings
-    hold = hold_share(blocks, driving, block_s)
-    held = np.where(moves & blocks.held, np.log(hold), 0.0)
+    first, next_one = hold_shares(blocks, driving, block_s)
+    again = np.r_[False, blocks.held[:-1]]
+    held = np.where(moves & blocks.held, np.log(np.where(again, next_one, first)), 0.0)
     busy = -_REPEATS * 0.5 * np.minimum(np.maximum(blocks.white, 0.0) / _WHITE_SPREAD, _WHITE_MOST) ** 2
     loud = -_REPEATS * 0.5 * (np.clip(blocks.white - _WHITE_UP, -2.0, 0.0) / _WHITE_SPREAD) ** 2
     repeat = float(
         np.clip(np.sum(blocks.same[driving & moves]) / max(np.sum(blocks.readings[driving & moves]), 1.0), 0.02, 0.95)
     )
     usual = _REPEATS * (blocks.same * np.log(repeat) + (blocks.readings - blocks.same) * np.log1p(-repeat)) * moves
+    usual *= np.minimum(_FEW / np.maximum(blocks.readings, 1.0), 1.0) if repeat > _HABIT else 0.0
     for m, scale in ((HEALTHY, 1.0), *((NOISY + 1 + k, s) for k, s in enumerate(SCALES))):
         out[:, m] = _misfit(blocks, scale, beside) + held + busy
     out[:, OTHER] = (
@@ -157,7 +161,8 @@ def scores(blocks: Blocks, driving: Flags, block_s: float, beside: Beside | None
     out[:, FROZEN] = np.where(blocks.held & moves, 0.0, _NEVER)
     out[:, SILENT] = np.where(moves, _NEVER, 0.0)
     # noise changes with every sample: nothing repeats
-    out[:, NOISY] = loud + _SECOND * 0.5 * _misfit(blocks, 1.0, None, 4.0) - 1.5 * blocks.same * moves - usual - 0.5
+    few = np.minimum(blocks.readings, _FEW) * blocks.same / np.maximum(blocks.readings, 1.0)
+    out[:, NOISY] = loud + _SECOND * 0.5 * _misfit(blocks, 1.0, None, 4.0) - 1.5 * few * moves - usual - 0.5
     out[blocks.readings == 0] = 0.0
     return out
 
@@ -180,8 +185,11 @@ def _loss(z: Array | float) -> Array:
     return np.asarray(0.5 * (_FREEDOM + 1.0) * np.log1p(np.asarray(z) ** 2 / _FREEDOM))
 
 
-def hold_share(blocks: Blocks, driving: Flags, block_s: float) -> float:
-    """Share of blocks without any change while the wheel moves, beside long holds [1]; parameters as of `scores`."""
+def hold_shares(blocks: Blocks, driving: Flags, block_s: float) -> tuple[float, float]:
+    """Share of blocks without any change while the wheel moves, after one with a change and after one without, beside long holds [1].
+
+    Parameters are those of `scores`.
+    """
     use = driving & (blocks.readings > 0) & (blocks.zero < blocks.readings)
     edge: NDArray[np.intp] = np.flatnonzero(np.diff(np.r_[False, blocks.held & use, False].astype(np.int8)))
     long = np.zeros(use.size, np.bool_)
@@ -191,7 +199,12 @@ def hold_share(blocks: Blocks, driving: Flags, block_s: float) -> float:
     if np.count_nonzero(long) > 0.25 * max(int(np.count_nonzero(use)), 1):
         long[:] = False
     kept = use & ~long
-    return float(np.clip(np.mean(blocks.held[kept]), 0.02, 0.95)) if kept.any() else 0.5
+    if not kept.any():
+        return 0.5, 0.5
+    before = np.r_[False, blocks.held[:-1] & use[:-1]]
+    after = [blocks.held[kept & (before == was)] for was in (False, True)]
+    shares = [float(np.clip((x.sum() + 0.5) / (x.size + 1.0), 0.02, 0.95)) for x in after]
+    return shares[0], max(shares)
 
 
 def _usual_white(white: Array, speed: Array, count: Array) -> Array:

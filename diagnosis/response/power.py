@@ -7,7 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from diagnosis.response.models import HEALTHY, NOISY, SILENT, Beside, Blocks, hold_share, scores
+from diagnosis.response.models import HEALTHY, NOISY, SILENT, Beside, Blocks, hold_shares, scores
 from diagnosis.results.detectability import Deviation, Power, Powers
 from replay.faults import Side
 
@@ -46,7 +46,7 @@ def powers_of(
     gains = {size: _gain(blocks, driving, block_s, beside, size) for size in _SIZES}
     silent = blocks._replace(mean=0.0 * blocks.mean, zero=blocks.readings, same=blocks.readings)
     lost = _against(silent, driving, block_s, beside, slice(SILENT, SILENT + 1))
-    held = -np.log(hold_share(blocks, driving, block_s)) * (asked & (blocks.readings > 0))[:, np.newaxis]
+    held = -np.log(hold_shares(blocks, driving, block_s)[1]) * (asked & (blocks.readings > 0))[:, np.newaxis]
     rows: list[Power] = []
     starts: tuple[float, ...] = ()
     trace: tuple[float | None, ...] = ()
