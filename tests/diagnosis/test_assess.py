@@ -120,13 +120,18 @@ def test_axle_that_is_not_logged_is_no_data(base: SimulatedMission) -> None:
 
 
 def test_speed_alone_is_not_assessed(base: SimulatedMission) -> None:
+    got = assess({"wheel.FR.v": base.columns["wheel.FR.v"]})
+    sensor, actuator = got.assessments["FR", "sensor"], got.assessments["FR", "actuator"]
+    assert (sensor.tier, actuator.tier) == ("none", "none")
+    assert share(sensor, State.NOT_ASSESSED) == 1.0
+    assert "neither a valve command" in sensor.reasons[State.NOT_ASSESSED]
+
+
+def test_speeds_of_several_wheels_alone_are_never_called_healthy(base: SimulatedMission) -> None:
     columns = {k: x for k, x in base.columns.items() if k.endswith(".v") and k.startswith("wheel.")}
     got = assess(columns)
     for wheel in WHEELS:
-        sensor, actuator = got.assessments[wheel, "sensor"], got.assessments[wheel, "actuator"]
-        assert (sensor.tier, actuator.tier) == ("none", "none")
-        assert share(sensor, State.NOT_ASSESSED) == 1.0
-        assert "neither a valve command" in sensor.reasons[State.NOT_ASSESSED]
+        assert all(share(got.assessments[wheel, side], State.HEALTHY) == 0.0 for side in ("sensor", "actuator"))
 
 
 def test_wheel_that_is_not_logged_is_no_data(direct: SimulatedMission) -> None:
