@@ -367,10 +367,10 @@ def test_log_in_which_nothing_can_be_judged(mission: SimulatedMission) -> None:
         diagnose_mission(in_memory(mission, keep=r"^wheel\.FR\.v$"), PAPER)
 
 
-def test_speeds_alone_are_neither_blamed_nor_cleared(mission: SimulatedMission) -> None:
+def test_speeds_alone_show_what_each_channel_shows_and_clear_nothing(mission: SimulatedMission) -> None:
     report = diagnose_mission(in_memory(mission, keep=r"^wheel\.\w+\.v$"), PAPER).report
-    assert report["verdict"]["status"] == "not_assessed"
-    assert {i["mode"] for i in report["intervals"]} <= {"stuck", "noisy"}  # what a channel shows by itself
+    assert not report["verdict"]["cleared"]
+    assert {(i["side"], i["mode"]) for i in report["intervals"]} <= {("sensor", "stuck"), ("sensor", "noisy")}
 
 
 def test_one_motor_rig() -> None:
