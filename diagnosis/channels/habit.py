@@ -25,6 +25,8 @@ _FALLING = -0.35  # exponent of the hold over the speed: −1 between poles, 0 i
 _APART = 0.3  # least distance of two log-speeds that say something about it
 _LEAST_PAIRS = 20
 _TICK_RUNS, _TICK_PARTS = 60, 100  # runs in a part, and parts that are looked at
+_ALIKE, _PASSED, _MOSTLY, _SLOWER = 1.6, 3.0, 0.6, 1.3
+_LONG_HOLD = 2.5  # periods
 _TIMEOUT_S, _LONGEST_S = 0.25, 1.0
 
 
@@ -106,7 +108,12 @@ def identify_habit(y: Array, fresh: NDArray[np.bool_], dt: float) -> Habit:
     shortest = _short(parts)
     window = float(np.median(shortest)) * dt
     if window < 1.5 * period:
-        return every
+        travel = _slow_travel(parts, shortest, runs, moving, (period, dt))
+        return (
+            every
+            if travel is None
+            else Habit(period, travel, _timeout(runs, travel, dt), stepwise=True, tick=_tick(runs))
+        )
     kept = parts.length <= _ABOUT * shortest[parts.window]
     distance = dt * _medians((parts.length * parts.following)[kept], parts.window[kept])
     speed = _medians(parts.following, parts.window)
@@ -115,6 +122,31 @@ def identify_habit(y: Array, fresh: NDArray[np.bool_], dt: float) -> Habit:
         return Habit(window, 0.0, window, stepwise=True)
     travel = float(np.median(distance))
     return Habit(period, travel, _timeout(runs, travel, dt), stepwise=True, tick=_tick(runs))
+
+
+def _slow_travel(
+    parts: _Parts, shortest: Array, runs: _Runs, moving: NDArray[np.bool_], steps: tuple[float, float]
+) -> float | None:
+    """Distance between poles [unit·s] of a sensor whose poles only come slower than its samples where the wheel is slow.
+
+    None where the holds of slow windows, or the long holds of all of them, do not go with 1/speed, or fast windows should
+    have held as well. `steps` are the channel's period and the timeline's step [s].
+    """
+    period, dt = steps
+    speed = _medians(parts.following, parts.window)
+    slow = shortest * dt >= 1.5 * period
+    hold: NDArray[np.floating] = (shortest * dt)[slow]
+    at: NDArray[np.floating] = speed[slow]
+    if hold.size < _LEAST_WINDOWS:
+        long = moving & (runs.length * dt >= _LONG_HOLD * period)
+        hold, at = runs.length[long] * dt, np.abs(runs.following[long]).astype(np.float64)
+    if hold.size < _LEAST_WINDOWS:
+        return None
+    travel = float(np.median(hold * at))
+    alike = np.abs(np.log(hold * at / travel)) < np.log(_ALIKE)
+    passes = travel / speed[~slow] < _PASSED * period
+    fits = np.mean(alike) >= _MOSTLY and (not passes.size or np.mean(passes) >= _MOSTLY)
+    return travel if fits and at.max() > _SLOWER * at.min() else None
 
 
 def _runs(y: Array, known: NDArray[np.bool_]) -> _Runs:
@@ -196,9 +228,9 @@ def _timeout(runs: _Runs, travel: float, dt: float) -> float:
 
 
 def of_kind(habits: Sequence[Habit]) -> list[Habit]:
-    """Habits of sensors of one kind: one that did not show its own has what most of the others have."""
+    """Habits of sensors of one kind: one that did not show its own has what half of them, or more, have."""
     shown = [h for h in habits if h.stepwise]
-    if 2 * len(shown) <= len(habits):
+    if 2 * len(shown) < len(habits) or len(shown) < 2:
         return list(habits)
     window, travel, timeout, _, tick = (float(x) for x in np.median(np.array(shown, dtype=np.float64), axis=0))
     usual = Habit(window, travel, timeout, stepwise=True, tick=tick)

@@ -101,6 +101,16 @@ class IdentifiedPair:
         return _neighbours(self.samples.x) if self.coarse else self.pair.instruments
 
     @cached_property
+    def holds(self) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+        """Where y begins to hold a value other than 0, and for how many steps."""
+        known = np.flatnonzero(self.pair.fresh & np.isfinite(self.pair.y))
+        values = self.pair.y[known]
+        first = known[np.flatnonzero(np.r_[True, values[1:] != values[:-1]])] if known.size else known
+        length = np.diff(np.r_[first, self.pair.y.size])
+        moving = self.pair.y[first] != 0.0
+        return first[moving], length[moving]
+
+    @cached_property
     def texture(self) -> Texture:
         """Noise and rounding step of both measurements."""
         pair = self.pair

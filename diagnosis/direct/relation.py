@@ -165,20 +165,21 @@ def relation_of(
 
 
 def _trials(near: Relation, delays: tuple[int, int], span: float, dt: float) -> Iterable[Relation]:
-    """Lags with plays with delays."""
+    """Lags with plays with delays; what lags does not lead its reference as well, by more than a sample may hide."""
     step = max(1, round(_DELAY_S / dt))
     for lag in (0.0, *(s for s in _LAGS_S if s > 0.5 * dt)):
         for play in (0.0, *(_PLAYS if span else ())):
-            for delay in range(delays[0], delays[1] + 1, step):
+            for delay in range(delays[0] if lag == 0.0 else max(delays[0], -step), delays[1] + 1, step):
                 yield near._replace(delay=float(delay), lag=lag, play=play * span)
 
 
 def _near(best: Relation, delays: tuple[int, int], widest: float) -> Iterable[Relation]:
     lags, plays = [best.lag * f for f in _FINE], [best.play * f for f in _FINE]
+    least = delays[0] if best.lag == 0.0 else max(delays[0], min(best.delay, -1.0))
     yield from (best._replace(lag=lag) for lag in lags if lag > 0.0 and (widest == 0.0 or lag <= _LAGS_S[-1]))
     yield from (best._replace(play=play) for play in plays if 0.0 < play <= widest)
     yield from (
-        best._replace(delay=best.delay + d) for d in (-1.0, -0.3, 0.3, 1.0) if delays[0] <= best.delay + d <= delays[1]
+        best._replace(delay=best.delay + d) for d in (-1.0, -0.3, 0.3, 1.0) if least <= best.delay + d <= delays[1]
     )
 
 

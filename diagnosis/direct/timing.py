@@ -16,9 +16,13 @@ from replay.faults import FaultMode, Side
 Array = NDArray[np.float64]
 
 _SPOOL_DELAY_S = 0.005
-_SENSOR_DELAY_S = 0.01
+_SENSOR_DELAY_S, _SENSOR_SAMPLES = 0.01, 1.5
 _JUMPY = 0.6  # share of a command's size that jumps between samples, where there is nothing else to it
 _FALSE_RESTS = 1e-6  # expected number of such runs in a healthy mission, at most
+_ROUNDED = 0.8  # of the rounding step: by as much is a coarse reading off what it shows
+_LEAST_SHOWN = 0.02  # quantile of what a channel shows beside 0
+_ALIKE, _HOLDS = 1.5, 20  # speeds that are alike; holds that make a habit
+_LONG_HOLDS, _BEYOND_HOLDS = 0.98, 2.0  # quantile of holds that is long; times as long as that is no habit
 _FLIPS = 25  # samples in a row on one side of a command that switches to and fro between samples
 
 
@@ -27,7 +31,7 @@ def timing_explains(found: IdentifiedPair, run: Run, mode: FaultMode) -> bool:
 
     Shorter than a spool sensor's delay; or, where a log is too slow for its commands: what changes from sample to
     sample is as large, or y is x with its sign at other moments, or a constant y is as far off as a healthy one may be. For a
-    speed: shorter than half a second and no more than 10 ms of the reference's slope, or a reading that rests beside a
+    speed: shorter than half a second and no more than 10 ms, or one and a half samples, of the reference's slope, or a reading that rests beside a
     reference that hardly moves, no longer than its noise allows. Whatever the rate, the answer to a command of which
     nothing is left but jumps between samples depends on the valve's lag.
     """
@@ -39,9 +43,9 @@ def timing_explains(found: IdentifiedPair, run: Run, mode: FaultMode) -> bool:
     deviation = float(np.sqrt(np.nanmean(size**2))) if np.isfinite(size).any() else np.inf
     if pair.side is Side.SENSOR:
         slope = np.gradient(np.nan_to_num(x[max(0, run.start - 1) : run.stop + 1]), pair.dt)
-        moves = float(np.sqrt(np.mean(slope**2))) * _SENSOR_DELAY_S
+        moves = float(np.sqrt(np.mean(slope**2))) * max(_SENSOR_DELAY_S, _SENSOR_SAMPLES * pair.dt)
         if mode.total:
-            return _rests_by_chance(found, run, deviation)
+            return _rests_by_chance(found, run, deviation) or _held_by_habit(found, run)
         return mode.varying and seconds < 0.5 and deviation < moves
     if seconds <= _SPOOL_DELAY_S:
         return True
@@ -65,6 +69,30 @@ def _sudden(x: Array, run: Run) -> float:
     return float(np.sqrt(np.mean(white_part(x[first : run.stop + 1])[run.start - first :][: run.size] ** 2)))
 
 
+def _held_by_habit(found: IdentifiedPair, run: Run) -> bool:
+    """Whether a reading rests no longer than it does elsewhere at such speeds, or shows 0 where it never shows so little.
+
+    Sensors that count poles or their time hold a value until the next one comes, and read 0 below their least speed.
+    """
+    pair = found.pair
+    y, part = pair.y, slice(run.start, run.stop)
+    inside = y[part][np.isfinite(y[part])]
+    if not inside.size:
+        return False
+    value = float(np.median(np.abs(inside)))
+    if value == 0.0:
+        shown = np.abs(y[np.isfinite(y) & (y != 0.0)])
+        least = float(np.quantile(shown, _LEAST_SHOWN)) if shown.size else 0.0
+        return bool(np.nanmax(np.abs(found.samples.x[part]), initial=0.0) <= _ALIKE * least)
+    start, length = found.holds
+    apart = (start + length <= run.start) | (start >= run.stop)
+    size = np.abs(y[start])
+    near = length[apart & (size > value / _ALIKE) & (size < value * _ALIKE)]
+    if near.size < _HOLDS:
+        return False
+    return bool((run.stop - run.start) < _BEYOND_HOLDS * float(np.quantile(near, _LONG_HOLDS)))
+
+
 def _rests_by_chance(found: IdentifiedPair, run: Run, deviation: float) -> bool:
     """Whether a healthy sensor's noise may keep its readings as close as they are, beside a reference that explains them.
 
@@ -77,7 +105,7 @@ def _rests_by_chance(found: IdentifiedPair, run: Run, deviation: float) -> bool:
         return False  # a silent channel does not rest
     y = pair.y[run.start : run.stop][pair.fresh[run.start : run.stop]]
     texture = found.texture
-    if not y.size or deviation > 2.5 * math.hypot(texture.white, texture.reference_white):
+    if not y.size or deviation > max(2.5 * math.hypot(texture.white, texture.reference_white), _ROUNDED * texture.lsb):
         return False
     noise = math.sqrt(max(texture.white**2 - pair.habit.rounding_noise(texture.lsb), 0.0))
     close = math.erf((float(np.ptp(y)) + texture.lsb) / (math.sqrt(8.0) * noise)) if noise else 1.0

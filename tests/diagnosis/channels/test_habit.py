@@ -108,3 +108,17 @@ def test_only_news_count() -> None:
     stuck = news_alone(status, np.full(N, 0.3), np.full(N, 0.01), DT)
     assert np.mean(stuck == PAIR) == pytest.approx(1 / 15, abs=0.01)
     assert_array_equal(np.unique(out), [SKIP, PAIR])
+
+
+@pytest.mark.parametrize("every", [10, 20])
+def test_poles_that_come_faster_than_the_samples_show_where_the_wheel_is_slow(every: int) -> None:
+    y = between_poles(speed())[::every]
+    found = identify_habit(y, np.ones(y.size, dtype=np.bool_), every * DT)
+    assert found.stepwise
+    assert found.travel == pytest.approx(POLE, rel=0.5)
+
+
+@pytest.mark.parametrize("every", [10, 20])
+def test_a_sampled_sensor_has_no_poles_at_any_rate(every: int) -> None:
+    y = np.round((speed() + 0.003 * np.random.default_rng(0).normal(size=N))[::every] / 0.0015) * 0.0015
+    assert not identify_habit(y, np.ones(y.size, dtype=np.bool_), every * DT).stepwise
