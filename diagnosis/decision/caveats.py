@@ -22,6 +22,7 @@ from replay.signals.timeline import Timeline
 Part = tuple[str, str]
 
 _OPEN_S, _OPEN_SHARE = 1.0, 0.02  # driving that was not judged and is worth a word
+_SAID_S = 0.05  # of judged driving: less is nothing
 _EMPTY_S = 1.0  # without any wheel speed
 _LEFT_OUT = " was left out: its clock "
 
@@ -95,26 +96,52 @@ def caveats_of(
     driven: Mapping[Part, float],
     axles: Sequence[str],
     limits: Limits,
+    *,
+    short_named: bool = False,
 ) -> tuple[str, ...]:
-    """Sentences on damage, parts that were not judged long enough, the most driving left open, and unjudged steering."""
+    """Sentences on damage, parts that were not judged long enough, the most driving left open, and unjudged steering.
+
+    `short_named`: the verdict itself names the parts that were not judged long enough.
+    """
     out, damage = list(against.events), against.damage
     if damage:
         said = "" if _LEFT_OUT in damage[0] else "The log is damaged: "
         out.append(f"{said}{damage[0]}" + (f" (and {len(damage) - 1} more)" if len(damage) > 1 else ""))
-    for key in against.short:
-        reason = _why_short(assessments[key], driven.get(key), limits)
-        out.append(
-            f"{part_words(Kind.WHEEL, *key)}: judged for {decided_s.get(key, 0.0):.1f} s of driving, of "
-            f"{needed_s(driven.get(key, 0.0), limits.min_assessed):.3g} s needed"
-            + (f" ({reason})" if reason else "")
-            + "."
-        )
+    if not short_named:
+        out += _too_short(against.short, assessments, decided_s, driven, limits)
     out += _most_open(against.short, assessments, decided_s, driven, axles)
     unjudged = [k for k in assessments if k[0] in axles and assessments[k].tier is Tier.NONE]
     if unjudged:
         who = join_words([part_words(Kind.STEER, *k) for k in unjudged])
         out.append(f"Not assessed: {who} ({_main_reason(assessments[unjudged[0]])}).")
     return tuple(out)
+
+
+def _too_short(
+    short: Sequence[Part],
+    assessments: Mapping[Part, Assessment],
+    decided_s: Mapping[Part, float],
+    driven: Mapping[Part, float],
+    limits: Limits,
+) -> list[str]:
+    """Sentences on parts that were not judged long enough: one for all that nothing was said of for the same reason."""
+    silent: dict[str, list[Part]] = {}
+    out = []
+    for key in short:
+        reason = _why_short(assessments[key], driven.get(key), limits)
+        if decided_s.get(key, 0.0) < _SAID_S:
+            silent.setdefault(reason, []).append(key)
+            continue
+        out.append(
+            f"{part_words(Kind.WHEEL, *key)}: judged for {decided_s[key]:.1f} s of driving, of "
+            f"{needed_s(driven.get(key, 0.0), limits.min_assessed):.3g} s needed"
+            + (f" ({reason})" if reason else "")
+            + "."
+        )
+    for reason, parts in silent.items():
+        who = join_words([part_words(Kind.WHEEL, *key) for key in parts])
+        out.append(f"Not judged: {who}" + (f" ({reason})" if reason else "") + ".")
+    return out
 
 
 def limits_of(limits: Limits) -> tuple[str, ...]:
@@ -161,7 +188,7 @@ def _most_open(
 def _why_short(assessment: Assessment, driven: float | None, limits: Limits) -> str:
     """Why a part was not judged long enough; a machine at rest is no reason while it drives."""
     if driven is not None and driven < limits.min_assessed and assessment.tier is not Tier.NONE:
-        return f"only {driven:.1f} s were driven"
+        return f"they were driven for less than {limits.min_assessed:g} s"
     return _main_reason(assessment)
 
 

@@ -14,7 +14,7 @@ from diagnosis.results.document import ActionRow, VerdictRow
 from diagnosis.results.result import FaultInterval
 from diagnosis.results.vocabulary import Kind, Severity, Tier, Verdict, part_words
 from diagnosis.results.wheel_model import RESOLUTION, WheelModelFit
-from replay.faults import Side
+from replay.faults import Side, State
 from replay.machine.config import Limits
 
 #: A component and its side.
@@ -23,6 +23,8 @@ Part = tuple[str, str]
 _COMPARED_WHEELS = 3
 _UNEXPLAINED_S = 0.5
 _NO_YAW = "An offset of a steering sensor that is there from start to end does not show in this log. A yaw rate (imu.yaw_rate) would show it."
+
+_SENSORS_ALONE = "No sensor fault seen, drives not judged"
 
 
 @dataclass(frozen=True)
@@ -121,7 +123,8 @@ def decide(
     against = _reservations(assessments, decided_s, driven, axles, limits, damage, model)
     against = replace(against, open=tuple(c for c in checks if not c.passed), scope=tuple(scope), events=tuple(events))
     found = _with_faults(intervals, against) or _without_faults(assessments, decided_s, axles, against)
-    caveats = caveats_of(against, assessments, decided_s, driven, axles, limits)
+    said = found.title == _SENSORS_ALONE  # which parts are not judged, and why
+    caveats = caveats_of(against, assessments, decided_s, driven, axles, limits, short_named=said)
     if _modelled(assessments) and model is not None and model.identified:
         caveats += (
             "Speed sensors and valves without a second measurement were judged by a wheel model identified from this "
@@ -132,6 +135,7 @@ def decide(
     caveats += limits_of(limits)
     if any(_offset_hidden(checks, axle) for axle in axles):
         caveats += (_NO_YAW,)
+    caveats = tuple(c for c in caveats if c != found.text)
     return replace(found, scope=tuple(scope), caveats=caveats, actions=actions_of(intervals))
 
 
@@ -189,7 +193,7 @@ def _without_faults(
     if against.events:
         return Decision(Verdict.NOT_ASSESSED, "The machine did not follow its commands", against.events[0])
     if against.short and (seen := _sensors_alone(assessments, decided_s, axles, against)):
-        return Decision(Verdict.NOT_ASSESSED, "No sensor fault seen, drives not judged", seen)
+        return Decision(Verdict.NOT_ASSESSED, _SENSORS_ALONE, seen)
     if against.short:
         who = join_words(sorted({part_words(Kind.WHEEL, c, s) for c, s in against.short}))
         text = f"No fault was found, but {who} could not be judged long enough to be called healthy."
@@ -230,7 +234,8 @@ def _sensors_alone(
         return ""
     least = min(decided_s.get(p, 0.0) for p in assessments if p[0] not in axles and p[1] == Side.SENSOR)
     who = join_words([c for c, _ in against.short])
+    why = assessments[against.short[0]].reasons.get(State.NOT_ASSESSED, "")
     return (
         f"The speed sensors were judged over at least {least:.0f} s of driving and no fault was seen in them. Whether the drives of "
-        f"{who} are weak cannot be seen without their effort: log current, duty or torque (`effort` of /joint_states)."
+        f"{who} are weak was not judged: {why}."
     )

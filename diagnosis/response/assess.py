@@ -36,7 +36,8 @@ _LEAST_P = 0.6
 _OWN, _OTHERS = 4, 2  # holds of a channel that may be faults: of the one in question, and of each other
 _LEAST_S = 1.0
 _DOUBT_S = 0.5  # around a spell that is judged no fault
-_NO_EFFORT = "a drive that follows its command may still be weak: only its effort would show that"
+_NO_EFFORT = "only their effort would show it; log current, duty or torque (`effort` of /joint_states)"
+_UNUSED_EFFORT = "their effort is logged, but nothing says what effort is healthy in a body that all of them move"
 _UNSEEN = "without its command or another wheel of its side only a speed that is frozen, wild or noisy shows"
 
 
@@ -263,7 +264,7 @@ def _assessment(
 
 def _drive(one: Judged, states: NDArray[np.int8], findings: tuple[Finding, ...]) -> Assessment:
     reasons = {
-        State.NOT_ASSESSED: _NO_EFFORT,
+        State.NOT_ASSESSED: _UNUSED_EFFORT if one.data.effort else _NO_EFFORT,
         State.NOT_EXCITED: "nothing is commanded",
         State.NO_DATA: "no samples",
         State.MASKED: "its speed sensor is faulty",

@@ -30,6 +30,8 @@ class FollowerData:
         Its commanded speed [m/s].
     name : str
         Of its channel.
+    effort : bool
+        Whether its effort is logged.
     """
 
     y: Array
@@ -37,6 +39,7 @@ class FollowerData:
     commands: Array
     asked: Array
     name: str
+    effort: bool = False
 
 
 def cell_of(dt: float) -> int:
@@ -71,5 +74,7 @@ def followers(mission: MissionView) -> dict[str, FollowerData]:
             continue
         own = mission.logged(f"wheel.{w}.v_ref") or body is None
         commands = cells(asked, width)[:, None] if own or body is None else body
-        out[w] = FollowerData(mission.values(name), timeline.fresh[name], commands, asked, name)
+        out[w] = FollowerData(
+            mission.values(name), timeline.fresh[name], commands, asked, name, mission.logged(f"wheel.{w}.effort")
+        )
     return out

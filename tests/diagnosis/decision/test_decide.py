@@ -82,7 +82,7 @@ def test_side_without_any_decision_is_not_assessed() -> None:
 def test_faults_are_stated_however_little_was_driven() -> None:
     got = verdict(machine(FR_actuator=assessed(finding(Side.ACTUATOR, FaultMode.STUCK))), 0.0)
     assert got.status == "stop"
-    assert any("judged for 0.0 s" in c for c in got.caveats)
+    assert any(c.startswith("Not judged: ") for c in got.caveats)
 
 
 def test_unjudged_steering_is_said() -> None:
@@ -214,7 +214,7 @@ def test_a_short_drive_is_the_reason_not_the_standstill() -> None:
     states[:20_000] = CODE[State.NOT_EXCITED]
     parts = {k: replace(a, states=states, reasons={State.NOT_EXCITED: "nothing moves"}) for k, a in machine().items()}
     got = decide((), parts, dict.fromkeys(parts, 4.7), AXLES, LIMITS, (), driving_s=dict.fromkeys(parts, 5.0))
-    assert all("only 5.0 s were driven" in c for c in got.caveats)
+    assert all("driven for less than 10 s" in c for c in got.caveats)
     assert len(got.caveats) == 4
     states = states.copy()
     states[20_000:25_000] = CODE[State.MASKED]
