@@ -15,6 +15,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from replay.arrays.copying import put, put_rows
+
 Array = NDArray[np.float64]
 
 STATES = 4
@@ -58,8 +60,8 @@ def filter_track(seen: TrackInput, k: TrackModel, out: TrackOutput) -> float:
     x, P = np.zeros(STATES), np.zeros((STATES, STATES))
     P[0, 0], P[1, 1], P[2, 2], P[3, 3] = 1e4, 1.0, k.mount**2, k.scale**2
     keep = np.exp(-seen.dt / k.memory)
-    F = np.eye(STATES)
-    F[1, 1] = keep
+    F = np.zeros((STATES, STATES))
+    F[0, 0], F[1, 1], F[2, 2], F[3, 3] = 1.0, keep, 1.0, 1.0
     likelihood, first = 0.0, True
     for n in range(seen.z.size):
         if n > 0:
@@ -79,29 +81,39 @@ def filter_track(seen: TrackInput, k: TrackModel, out: TrackOutput) -> float:
                 out.jumped[n] = True
                 P[0, 0] += innovation * innovation
                 s += innovation * innovation
-        out.before[n], out.before_cov[n] = x, P
+        put(out.before[n], x)
+        put_rows(out.before_cov[n], P)
         if known:
             share = innovation * innovation / s
             gain = (P @ h) / s
             x = x + gain * innovation
-            P = P - np.outer(gain, gain) * s
+            for i in range(STATES):
+                for j in range(STATES):
+                    P[i, j] -= gain[i] * gain[j] * s
             if not first:
                 likelihood -= 0.5 * (share + np.log(s))
                 out.misfit[n] = share
             first = False
-        out.mean[n], out.cov[n] = x, P
+        put(out.mean[n], x)
+        put_rows(out.cov[n], P)
     return likelihood
 
 
-@njit(cache=True, error_model="numpy")
 def smooth_track(seen: TrackInput, k: TrackModel, out: TrackOutput) -> tuple[Array, Array]:
     """Rauch-Tung-Striebel smoothing of what `filter_track` left: means (n, 4) and covariances (n, 4, 4)."""
+    F = np.zeros((seen.z[1:].size, STATES, STATES))
+    F[:] = np.eye(STATES)
+    F[:, 0, 1], F[:, 0, 3], F[:, 1, 1] = seen.off[1:] * seen.dt, seen.moved[1:], np.exp(-seen.dt / k.memory)
+    gains = np.linalg.solve(out.before_cov[1:], F @ out.cov[:-1])
     mean, cov = out.mean.copy(), out.cov.copy()
-    F = np.eye(STATES)
-    F[1, 1] = np.exp(-seen.dt / k.memory)
-    for n in range(seen.z.size - 2, -1, -1):
-        F[0, 1], F[0, 3] = seen.off[n + 1] * seen.dt, seen.moved[n + 1]
-        gain = np.linalg.solve(out.before_cov[n + 1], F @ out.cov[n]).T
-        mean[n] = out.mean[n] + gain @ (mean[n + 1] - out.before[n + 1])
-        cov[n] = out.cov[n] + gain @ (cov[n + 1] - out.before_cov[n + 1]) @ gain.T
+    _smooth(np.ascontiguousarray(gains.transpose(0, 2, 1)), out, mean, cov)
     return mean, cov
+
+
+@njit(cache=True, error_model="numpy")
+def _smooth(gains: Array, out: TrackOutput, mean: Array, cov: Array) -> None:
+    """Go back over the cells with their gains, (n − 1, 4, 4), from the last filtered one."""
+    for n in range(gains.shape[0] - 1, -1, -1):
+        gain = gains[n]
+        put(mean[n], out.mean[n] + gain @ (mean[n + 1] - out.before[n + 1]))
+        put_rows(cov[n], out.cov[n] + gain @ (cov[n + 1] - out.before_cov[n + 1]) @ gain.T)

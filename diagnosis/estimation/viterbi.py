@@ -78,7 +78,7 @@ def _scan_modes(samples, bank, state, out):  # type: ignore[no-untyped-def]
     models = score.size
     gain = np.zeros(models)
     for k in range(status.size):
-        best = 0
+        best = int(np.int64(0))  # a literal 0 would compile what it is passed to once more
         for m in range(1, models):
             if score[m] > score[best]:
                 best = m

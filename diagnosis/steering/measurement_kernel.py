@@ -96,7 +96,7 @@ def update(m: int, block: Block, least: float, axle: AxleConstants, sensor: Sens
     floor = _OUTLIER - log(stop) - 0.5 * nu * (1 + log(max(power, sensor.constant)))
     if likelihood < floor:
         if s == STUCK:
-            _forget(m, 5, stop, z, P)
+            _forget(m, np.int64(5), stop, z, P)
         elif s == HEALTHY:
             P[m, 0, 0] += min(innovation * innovation, (axle.rate_limit * _LOST_S) ** 2)
         return float(floor)
@@ -164,7 +164,7 @@ def measure_redundant(m: int, seen: RedundantBlock, g: float, rate_limit: float,
                 expected += z[m, 3] / g
         one = _linear(m, seen.opening - expected, seen.opening_variance, bank)
         if one == _OUTLIER and a == STUCK:
-            _forget(m, 3, rate_limit, z, bank.cov)
+            _forget(m, np.int64(3), rate_limit, z, bank.cov)
         likelihood += one
     if not np.isnan(seen.share):
         expected = 1.0 if a == HEALTHY else 0.0

@@ -30,6 +30,7 @@ from diagnosis.steering.model_bank import (
     STUCK,
 )
 from diagnosis.steering.step_kernel import advance, enter
+from replay.arrays.copying import put, put_rows
 from replay.arrays.numeric import uncounted
 
 _LEARNING_COST = 8.0  # what a model whose states are yet to be learnt must gain to be entered [log-likelihood]
@@ -103,7 +104,7 @@ def scan(
         uncounted(states.room),
     )
     for k in range(series.mean.size):
-        best = 0
+        best = int(np.int64(0))  # a literal 0 would compile what it is passed to once more
         for m in range(1, MODELS):
             if score[m] > score[best]:
                 best = m
@@ -146,7 +147,10 @@ def follow(series: BlockSeries, constants: FilterConstants, states: FilterBank, 
         if k > 0 and m != path.model[k - 1]:
             enter(m, np.int64(path.model[k - 1]), constants, bank)
         advance(m, _block(k, series), _redundant_block(k, series.redundancy), constants, bank)
-        path.mean[k], path.cov[k], path.noise[k], path.gap[k] = bank.mean[m], bank.cov[m], bank.noise[m], bank.gap[m]
+        put(path.mean[k], bank.mean[m])
+        put_rows(path.cov[k], bank.cov[m])
+        put(path.noise[k], bank.noise[m])
+        put(path.gap[k], bank.gap[m])
 
 
 @njit(cache=True, error_model="numpy")
@@ -187,8 +191,10 @@ def path_evidence(
     bank = empty_bank()
     if begin > 0:
         before = np.int64(known.model[begin - 1])
-        bank.mean[before], bank.cov[before] = known.mean[begin - 1], known.cov[begin - 1]
-        bank.noise[before], bank.gap[before] = known.noise[begin - 1], known.gap[begin - 1]
+        put(bank.mean[before], known.mean[begin - 1])
+        put_rows(bank.cov[before], known.cov[begin - 1])
+        put(bank.noise[before], known.noise[begin - 1])
+        put(bank.gap[before], known.gap[begin - 1])
     else:
         before = np.int64(models[0])
         start(before, series.mean[0], constants, bank)

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from math import exp
 
+import numpy as np
 from numba import njit
 
 from diagnosis.steering.filter_constants import AxleConstants
@@ -137,12 +138,12 @@ def _drift(m: int, spread: float, axle: AxleConstants, coloured_decay: float, z:
         q_b = (1 - f_b * f_b) * (0.6 * axle.rate_limit) ** 2
     if axle.opening_measured and a in (STUCK, NOISY):  # b has no room for the rate's error
         P[m, 0, 0] += 2.0 * (error + spread * spread) * axle.rate_error_s * axle.dt
-    _relax(m, 3, f_b, q_b, z, P)
+    _relax(m, np.int64(3), f_b, q_b, z, P)
     if SENSOR[m] == NOISY:
         P[m, 5, 5] += (0.02 * axle.stop) ** 2 * axle.dt
     elif SENSOR[m] == COLOURED:
         f_c = coloured_decay
-        _relax(m, 5, f_c, (1 - f_c * f_c) * (0.1 * axle.stop) ** 2, z, P)
+        _relax(m, np.int64(5), f_c, (1 - f_c * f_c) * (0.1 * axle.stop) ** 2, z, P)
 
 
 @njit(cache=True, error_model="numpy")

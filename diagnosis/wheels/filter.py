@@ -186,7 +186,7 @@ def _joint_constants(model: JointModel, dt: float, raw_dt: float) -> JointConsta
     """Constants of the recursion for blocks of dt of samples of raw_dt [s]."""
     wheels = _filled(model)
     return JointConstants(
-        wheels=tuple(w.constants(dt, raw_dt) for w in wheels),
+        wheels=np.array([w.constants(dt, raw_dt) for w in wheels], np.float64),
         K=np.array([w.K for w in wheels]),
         known=np.array([w is not None for w in model.wheels]),
         models=np.array([w.models for w in wheels]),

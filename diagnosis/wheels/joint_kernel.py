@@ -31,7 +31,7 @@ from diagnosis.wheels.joint_types import (
     JointWork,
 )
 from diagnosis.wheels.models import A_NONE, HEALTHY, ODD, S_NONE, S_OU_LARGE, S_WHITE_3, WheelConstants
-from diagnosis.wheels.shared_kernel import LEAST_DOUBT, feed, lagged, rolls_at, see, weights, with_sensors
+from diagnosis.wheels.shared_kernel import LEAST_DOUBT, constants_of, feed, lagged, rolls_at, see, weights, with_sensors
 from diagnosis.wheels.step_kernel import WheelInput, advance
 from replay.arrays.numeric import uncounted
 
@@ -88,17 +88,21 @@ def scan_wheels(
     blocks, constants, state = uncounted(blocks), uncounted(constants), uncounted(state)
     out, work = uncounted(out), uncounted(work)
     score, z, P, inputs, back = state.score, state.mean, state.cov, out.inputs, out.back
-    width = work.here.shape[1]
     for i in range(work.top.size):
-        work.here[i], work.after[i] = weights(width, constants.wheels[i].lag)
+        weights(constants_of(constants.wheels[i]).lag, work.here[i], work.after[i])
     for n in range(blocks.y.shape[0]):
         for i in range(work.top.size):
-            see(n, i, constants.wheels[i], constants.known[i], constants.models[i], blocks, state, work)
+            see(n, i, constants_of(constants.wheels[i]), constants.known[i], constants.models[i], blocks, state, work)
         feed(n, blocks, constants, state, work, inputs[n])
         for i in range(work.top.size):
             if not constants.known[i]:
                 continue
-            k, x, models, status = constants.wheels[i], inputs[n, i], constants.models[i], blocks.status[n, i]
+            k, x, models, status = (
+                constants_of(constants.wheels[i]),
+                inputs[n, i],
+                constants.models[i],
+                blocks.status[n, i],
+            )
             body, doubt = rolls_at(i, work.speed, work.trust)
             body = body * blocks.ratio[n, i] - blocks.turn[n, i]
             body, doubt = with_sensors(body, doubt, blocks.sensed[n, i], blocks.sensed_std[n, i], LEAST_DOUBT * k.span)

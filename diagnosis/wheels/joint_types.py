@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from diagnosis.wheels.models import MODELS, WheelConstants
+from diagnosis.wheels.models import MODELS
 
 Array = NDArray[np.float64]
 
@@ -20,7 +20,7 @@ LAGGED_DRIVE = 3
 class JointConstants(NamedTuple):
     """What stays the same during a mission."""
 
-    wheels: tuple[WheelConstants, ...]
+    wheels: Array  # (wheels, 19) a row of `WheelConstants` each: a tuple would compile each number of wheels anew
     K: Array  # (wheels,) speed per full opening [m/s]
     known: NDArray[np.bool_]  # (wheels,) whether a wheel has a model
     models: NDArray[np.int64]  # (wheels,) how many models are considered

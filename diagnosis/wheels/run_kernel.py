@@ -23,6 +23,7 @@ from diagnosis.wheels.joint_types import (
 from diagnosis.wheels.models import HEALTHY, MODELS, JointModel, WheelConstants
 from diagnosis.wheels.runs import Runs
 from diagnosis.wheels.step_kernel import WheelInput, advance, predict
+from replay.arrays.copying import put, put_rows
 from replay.arrays.numeric import uncounted
 
 Array = NDArray[np.float64]
@@ -71,8 +72,10 @@ def _enter_all(models: int, old: int, k: WheelConstants, z: Array, P: Array) -> 
     fresh_z, fresh_P, hold_z, hold_P = z.copy(), P.copy(), z[old].copy(), P[old].copy()
     for m in range(models):
         enter(m, old, k, fresh_z, fresh_P)
-        z[m], P[m] = fresh_z[m], fresh_P[m]
-        fresh_z[old], fresh_P[old] = hold_z, hold_P
+        put(z[m], fresh_z[m])
+        put_rows(P[m], fresh_P[m])
+        put(fresh_z[old], hold_z)
+        put_rows(fresh_P[old], hold_P)
 
 
 @njit(cache=True, error_model="numpy")
@@ -86,9 +89,9 @@ def _scan_runs(
     """
     blocks, runs, out = uncounted(blocks), uncounted(runs), uncounted(out)
     z, P, gain = uncounted(z), uncounted(P), np.zeros(MODELS)
-    old = HEALTHY
+    old = np.int64(HEALTHY)
     for m in range(1, models):
-        enter(m, HEALTHY, k, z, P)
+        enter(m, old, k, z, P)
     free_z, free_P = z[:1].copy(), P[:1].copy()
     for r in range(runs.model.size):
         if r > 0:
@@ -114,16 +117,19 @@ def _scan_runs(
                 doubt=x[DOUBT],
                 unseen=blocks.unseen[n],
             )
-            predict(HEALTHY, block, k, free_z, free_P)
+            predict(np.int64(HEALTHY), block, k, free_z, free_P)
             out.expected[n], out.spread[n] = free_z[HEALTHY, 0], free_P[HEALTHY, 0, 0]
             advance(models, block, blocks.status[n], blocks.quiet[n], k, z, P, gain)
             if n < runs.stop[r]:
                 for m in range(models):
                     out.evidence[r, m] += gain[m]
                 if n + 1 == runs.stop[r]:
-                    out.mean[r], out.cov[r] = z, P
+                    put_rows(out.mean[r], z)
+                    for m in range(MODELS):
+                        put_rows(out.cov[r, m], P[m])
             if runs.model[r] == HEALTHY and n < runs.stop[r]:  # a fault leaves the expectation alone
-                free_z[0], free_P[0] = z[HEALTHY], P[HEALTHY]
+                put(free_z[0], z[HEALTHY])
+                put_rows(free_P[0], P[HEALTHY])
         old = runs.model[r]
 
 

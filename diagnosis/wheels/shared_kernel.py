@@ -5,6 +5,7 @@ from __future__ import annotations
 # ruff: noqa: SIM109 (compiled: a tuple of constants costs a search)
 import numpy as np
 from numba import njit
+from numba.np.unsafe.ndarray import to_fixed_tuple
 from numpy.typing import NDArray
 
 from diagnosis.estimation.back_pointers import STAY
@@ -26,7 +27,14 @@ from diagnosis.wheels.models import A_BIAS, A_GAIN, A_NONE, A_STUCK, HEALTHY, OD
 Array = NDArray[np.float64]
 
 LEAST_DOUBT = 0.01  # of the span: what wheels that agree may all be off
+_CONSTANTS = len(WheelConstants._fields)
 _APART = 3.0  # standard deviations from which on wheels and sensors of the body contradict each other
+
+
+@njit(cache=True, error_model="numpy")
+def constants_of(row: Array) -> WheelConstants:
+    """Constants of one wheel."""
+    return WheelConstants(*to_fixed_tuple(row, _CONSTANTS))
 
 
 @njit(cache=True, error_model="numpy")
@@ -44,17 +52,17 @@ def taken(m: int, gain: float, bias: float, K: float, x: float) -> float:
 
 
 @njit(cache=True, error_model="numpy")
-def weights(width: int, lag: float) -> tuple[Array, Array]:
+def weights(lag: float, here: Array, after: Array) -> None:
     """Weights with which an opening at place q of a block drives the mean speed of its own and of the next block."""
-    here, after = np.zeros(width), np.zeros(width)
+    width = here.size
     a = np.exp(-lag / width)
     c = (1.0 - a) / (1.0 - np.exp(-lag)) / width
     for q in range(width):
+        here[q], after[q] = 0.0, 0.0
         for n in range(q + 1, width):
             here[q] += c * a ** (n - 1 - q)
         for n in range(width, q + width + 1):
             after[q] += c * a ** (n - 1 - q)
-    return here, after
 
 
 @njit(cache=True, error_model="numpy")
@@ -97,8 +105,9 @@ def feed(
     """Openings of every wheel as the pump feeds them in block n, written into `inputs`, (wheels, 8), and `carried`."""
     z, carried, K, flow = state.mean, state.carried, constants.K, constants.flow
     wheels, width = work.here.shape
-    inputs[:, DRIVE : DRIVE_NONE + 1] = carried[:, DRIVE : DRIVE_NONE + 1]
-    carried[:, DRIVE : DRIVE_NONE + 1] = 0.0
+    for i in range(wheels):
+        for d in range(DRIVE, DRIVE_NONE + 1):
+            inputs[i, d], carried[i, d] = carried[i, d], 0.0
     for q in range(width):
         total = 0.0
         for j in range(wheels):

@@ -10,6 +10,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from replay.arrays.copying import put
 from replay.arrays.numeric import without_nan
 from replay.machine.config import WheelPlant
 
@@ -55,7 +56,7 @@ def lagged_ramps(u: Array, knots: Array, fade: float, every: int, out: Array) ->
     for k in range(u.size):
         x = u[k]
         if k % every == 0 and k // every < out.shape[0]:
-            out[k // every, : 2 * half] = state
+            put(out[k // every], state)
         for j in range(half):
             high = knots[j + 1] - knots[j]
             forward = min(max(x - knots[j], 0.0), high)

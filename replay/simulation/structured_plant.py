@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
+from replay.arrays.copying import put
 from replay.simulation.plant import _faulted, _friction, _law, _quantised, _references, _reset_at_jumps
 from replay.simulation.state import (
     DELAY_LINE,
@@ -217,23 +218,35 @@ def scan(
             u_sv[a] = _faulted(c, k, u_s[a], fault_normal[c], faults, state)
             state.last[c] = u_sv[a]
         line = state.line[k % DELAY_LINE]
-        line[:n], line[n : 2 * n], line[2 * n : 2 * n + 2], line[2 * n + 2 :] = state.v, u_v, state.phi, u_sv
+        put(line, state.v)
+        put(line[n:], u_v)
+        put(line[2 * n :], state.phi)
+        put(line[2 * n + 2 :], u_sv)
         if k == 0:
-            state.line[:] = line
+            for i in range(DELAY_LINE):
+                put(state.line[i], line)
         recorded = k % every == 0
         if recorded:
-            out.v[row], out.u[row], out.v_ref[row] = v, u, v_ref
-            out.v_actual[row], out.u_actual[row], out.psi[row] = state.v, u_v, state.psi
-            out.phi[row], out.phi_ref[row], out.phi_actual[row] = phi, state.axle_ref, state.phi
-            out.steer_u[row], out.steer_u_actual[row] = u_s, u_sv
-            out.v_late[row] = state.line[(k - V_DELAY) % DELAY_LINE, :n]
-            out.u_late[row] = state.line[(k - U_DELAY) % DELAY_LINE, n : 2 * n]
-            out.phi_late[row] = state.line[(k - PHI_DELAY) % DELAY_LINE, 2 * n : 2 * n + 2]
-            out.steer_u_late[row] = state.line[(k - U_DELAY) % DELAY_LINE, 2 * n + 2 :]
-            body[:] = state.body
+            put(out.v[row], v)
+            put(out.u[row], u)
+            put(out.v_ref[row], v_ref)
+            put(out.v_actual[row], state.v)
+            put(out.u_actual[row], u_v)
+            put(out.psi[row], state.psi)
+            put(out.phi[row], phi)
+            put(out.phi_ref[row], state.axle_ref)
+            put(out.phi_actual[row], state.phi)
+            put(out.steer_u[row], u_s)
+            put(out.steer_u_actual[row], u_sv)
+            put(out.v_late[row], state.line[(k - V_DELAY) % DELAY_LINE, :n])
+            put(out.u_late[row], state.line[(k - U_DELAY) % DELAY_LINE, n : 2 * n])
+            put(out.phi_late[row], state.line[(k - PHI_DELAY) % DELAY_LINE, 2 * n : 2 * n + 2])
+            put(out.steer_u_late[row], state.line[(k - U_DELAY) % DELAY_LINE, 2 * n + 2 :])
+            put(body, state.body)
         _move(k, slope[j], u_v, p, m, state, s, slip, flow)
-        line[n : 2 * n] = state.spool  # a measured opening is the spool's, not the command's
+        put(line[n : 2 * n], state.spool)  # a measured opening is the spool's, not the command's
         if recorded:
-            out.slip[row], out.body[row] = slip, body
+            put(out.slip[row], slip)
+            put(out.body[row], body)
             row += 1
         _steer(u_sv, p, m, state)

@@ -10,7 +10,9 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any, TypeVar
 
+import numpy as np
 from numba import njit
+from numpy.typing import NDArray
 
 _F = TypeVar("_F", bound=Callable[..., Any])
 
@@ -25,3 +27,10 @@ def routine(function: _F) -> _F:
     """Compile a part of a kernel that several places call, or that is seldom called."""
     compiled: _F = njit(no_cpython_wrapper=True, no_cfunc_wrapper=True, _nrt=False)(function)
     return compiled
+
+
+def plain(data: NDArray[Any]) -> NDArray[Any]:
+    """View the same numbers as a plain array that cannot be written, so that one compiled version serves all."""
+    data = data.view(np.ndarray)
+    data.flags.writeable = False
+    return data

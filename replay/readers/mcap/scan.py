@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from replay.readers.common.compiled import plain
 from replay.readers.mcap.collect_kernel import (
     scan_census,
     scan_chunk_heads,
@@ -64,7 +65,7 @@ def walk(
     inside : bool
         Whether these are the records of a chunk: names among messages belong to their runs.
     """
-    at, state = start, np.zeros(4, np.int64)
+    data, at, state = plain(data), start, np.zeros(4, np.int64)
     parts: list[NDArray[np.int64]] = []
     while at < stop:
         rows = np.empty((_ROOM, 4), np.int64)
@@ -113,7 +114,7 @@ class Scanner:
         """Count what stands in a stretch, up to `BATCH` messages."""
         bounds = np.array([2**63 - 1, -1], np.int64)
         _, met, named, other, end = scan_census(
-            data, start, stop, BATCH, self._counts, self._touched, self._names, bounds
+            plain(data), start, stop, BATCH, self._counts, self._touched, self._names, bounds
         )  # fmt: skip
         channels = np.sort(self._touched[:met])
         counts = self._counts[channels]
@@ -139,7 +140,7 @@ class Scanner:
         first, last = (-(2**63), 2**63 - 1) if window is None else (window[0], window[1] - 1)
         body, size, log, publish = (np.empty(int(stops[-1]), np.int64) for _ in range(4))
         self._slot[channels] = stops - counts
-        scan_collect(data, start, census.end, self._slot, first, last, body, size, log, publish)
+        scan_collect(plain(data), start, census.end, self._slot, first, last, body, size, log, publish)
         filled = self._slot[channels]
         self._slot[channels] = -1
         return [
@@ -152,14 +153,14 @@ class Scanner:
 def chunk_times(data: NDArray[np.uint8], rows: NDArray[np.int64]) -> NDArray[np.int64]:
     """First and last stamp that chunks state, shape (n, 2) [ns]."""
     out = np.empty((len(rows), 2), np.int64)
-    scan_chunk_heads(data, rows, out)
+    scan_chunk_heads(plain(data), rows, out)
     return out
 
 
 def index_counts(data: NDArray[np.uint8], rows: NDArray[np.int64]) -> NDArray[np.int64]:
     """Channel and number of messages of message index records, shape (n, 2)."""
     out = np.empty((len(rows), 2), np.int64)
-    scan_index_heads(data, rows, out)
+    scan_index_heads(plain(data), rows, out)
     return out
 
 
@@ -175,5 +176,5 @@ def chunk_indexes(data: NDArray[np.uint8], rows: NDArray[np.int64]) -> tuple[NDA
     """
     out: NDArray[np.int64] = np.empty((len(rows), 7), np.int64)
     pairs: NDArray[np.int64] = np.empty((int((rows[:, 2] - rows[:, 1]).sum()) // 10, 3), np.int64)
-    count = scan_chunk_indexes(data, rows, out, pairs)
+    count = scan_chunk_indexes(plain(data), rows, out, pairs)
     return out, pairs[:count]

@@ -75,7 +75,7 @@ def _turn(layout: FixedLayout, table: OpenTable, target: Ints, m: int) -> None:
 def _take(payloads: Payloads, layout: FixedLayout, table: OpenTable, source: Ints, target: Ints) -> tuple[int, int]:
     taken, left = 0, -1
     for begin in range(0, len(payloads.starts), _TILE):
-        m = 0
+        m = int(np.int64(0))  # a literal 0 would compile what it is passed to once more
         for row in range(begin, min(begin + _TILE, len(payloads.starts))):
             slot = payloads.slots[row]
             if table.owner[slot] != FREE:

@@ -12,6 +12,8 @@ import orjson
 from numba import njit
 from numpy.typing import NDArray
 
+from replay.arrays.copying import put
+from replay.readers.common.compiled import plain
 from replay.readers.messages.cdr import Outcome
 
 
@@ -22,9 +24,9 @@ def _join(data, starts, lengths, between, out):  # type: ignore[no-untyped-def]
     at = 1
     for i in range(len(starts)):
         if i:
-            out[at : at + len(between)] = between
+            put(out[at:], between)
             at += len(between)
-        out[at : at + lengths[i]] = data[starts[i] : starts[i] + lengths[i]]
+        put(out[at:], data[starts[i] : starts[i] + lengths[i]])
         at += lengths[i]
     out[at] = 93
 
@@ -37,7 +39,7 @@ def parse_together(data: NDArray[np.uint8], starts: NDArray[np.int64], lengths: 
     word = secrets.token_hex(8)
     between = np.frombuffer(f',"{word}",'.encode(), np.uint8)
     out = np.empty(int(lengths.sum()) + len(between) * (len(starts) - 1) + 2, np.uint8)
-    _join(data, starts, lengths, between, out)
+    _join(plain(data), starts, lengths, between, out)
     try:
         together = orjson.loads(out.data)
     except orjson.JSONDecodeError:

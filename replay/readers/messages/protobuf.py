@@ -13,9 +13,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from replay.readers.common.compiled import plain
 from replay.readers.messages import protobuf_kernel as kernel
 from replay.readers.messages.cdr import Outcome, Part
 from replay.readers.messages.cdr_layout import MAX_ELEMENTS
+from replay.readers.messages.cdr_rows import views
 from replay.readers.messages.protobuf_places import Places, Rows, Slots, make_root
 from replay.readers.messages.protobuf_schema import NUMBERS, Schema
 from replay.readers.messages.protobuf_wire import Wire
@@ -64,7 +66,8 @@ class Decoder:
         Part
             Numbers that stand in the same rows; rows of undecodable messages stand in none.
         """
-        wire = Wire(data, _numbers_at(data, 8), _numbers_at(data, 4))
+        _, _, halves, words = views(data)
+        wire = Wire(plain(data), words, halves)
         at = 0
         while at < len(starts):
             size = len(self.places.slot)
@@ -239,11 +242,6 @@ class Decoder:
             if all(held) and len(set(held)) == len(held):
                 names[slot] = held
         return names
-
-
-def _numbers_at(data: NDArray[np.uint8], size: int) -> NDArray[Any]:
-    """Unsigned numbers of a size that start at each byte."""
-    return np.ndarray((max(len(data) - size + 1, 0),), f"<u{size}", data, strides=(1,))
 
 
 def _doubled(numbers: NDArray[np.int64]) -> NDArray[np.int64]:

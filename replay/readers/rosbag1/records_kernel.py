@@ -8,6 +8,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from replay.readers.common.compiled import plain
+
 MESSAGE, HEADER, INDEX, CHUNK, INFO, CONNECTION = 2, 3, 4, 5, 6, 7
 _LONGEST_HEAD = 1 << 16
 
@@ -121,14 +123,14 @@ def _scan(data, start, stop, op, head, body, size, conn, stamp):  # type: ignore
         length = _u32(data, data_at) if code else np.int64(0)
         if code and inner + length > stop and sure and code == 2:
             # a message whose length cannot be right: it ends where the next record starts
-            again = _find(data, inner, stop, 0)
+            again = _find(data, inner, stop, np.int64(0))
             if again < stop:
                 length = again - inner
                 mended += 1
         if not code or inner + length > stop:
             if code == 5 and sure:
                 break  # a chunk that is cut off, or whose length is wrong: the caller looks into it
-            again = _find(data, last_body if last else at + 1, stop, at if last_op == 5 else 0)
+            again = _find(data, last_body if last else at + 1, stop, at if last_op == 5 else np.int64(0))
             if again < at and n and n <= len(op):
                 size[n - 1] = again - body[n - 1]
                 mended += 1
@@ -167,7 +169,7 @@ def scan_bag(data: NDArray[np.uint8], start: int = 0, stop: int | None = None) -
     start, stop : int
         Where the walk starts and ends [bytes].
     """
-    stop = len(data) if stop is None else stop
+    data, stop = plain(data), len(data) if stop is None else stop
     room = max(64, min(1 << 16, (stop - start) // 64))
     while True:
         op = np.empty(room, np.uint8)

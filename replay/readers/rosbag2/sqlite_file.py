@@ -11,8 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from replay.log.reading_notes import Report
+from replay.readers.common.compiled import plain
 from replay.readers.rosbag2 import sqlite_kernel as scan
-from replay.readers.rosbag2.sqlite_wal import SqliteError, plain, with_journal, with_wal
+from replay.readers.rosbag2.sqlite_wal import SqliteError, with_journal, with_wal
 
 MAGIC = b"SQLite format 3\0"
 _MAX_CELL = 16 << 20

@@ -285,8 +285,8 @@ def messages_of(data, page, usable, place, local, total, status, columns):  # ty
         found = parse(data, at, at + local[i], total[i], columns[0], columns[1], columns[2])
         if found[0] == BEYOND:
             whole = np.empty(total[i], np.uint8)
-            if copy_payload(data, page, usable, at, local[i], 0, total[i], whole, 0):
-                found = parse(whole, 0, total[i], total[i], columns[0], columns[1], columns[2])
+            if copy_payload(data, page, usable, at, local[i], np.int64(0), total[i], whole, np.int64(0)):
+                found = parse(whole, np.int64(0), total[i], total[i], columns[0], columns[1], columns[2])
         status[i] = DAMAGED if found[0] == BEYOND else found[0]
         topic[i], stamp[i], start[i], length[i] = found[1], found[2], found[3], found[4]
     return topic, stamp, start, length

@@ -13,6 +13,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from replay.log.reading_notes import Report
+from replay.readers.common.compiled import plain
 from replay.readers.rosbag2 import sqlite_kernel as scan
 
 _WAL_MAGICS = (0x377F0682, 0x377F0683)
@@ -22,13 +23,6 @@ _SPARE = 256 << 20
 
 class SqliteError(Exception):
     """A file is no SQLite database that can be read; the text says why."""
-
-
-def plain(data: NDArray[np.uint8]) -> NDArray[np.uint8]:
-    """The same bytes as a plain read-only array, so that the compiled walks are compiled once."""
-    plain = np.frombuffer(data.data, np.uint8)
-    plain.flags.writeable = False
-    return plain
 
 
 def _copy(path: Path, data: NDArray[np.uint8], room: int) -> IO[bytes]:
@@ -70,11 +64,11 @@ def _wal_sum(log, at, until, little, s0, s1):  # type: ignore[no-untyped-def]
 @njit(cache=True)
 def _wal_frames(log, page, little):  # type: ignore[no-untyped-def]
     """Count of the frames up to the last complete transaction before the first one whose checksums fail."""
-    s0, s1 = _wal_sum(log, 0, 24, little, np.int64(0), np.int64(0))
+    s0, s1 = _wal_sum(log, np.int64(0), np.int64(24), little, np.int64(0), np.int64(0))
     if s0 != scan.unsigned(log, 24) or s1 != scan.unsigned(log, 28):
         return 0
     n = complete = 0
-    at = 32
+    at = np.int64(32)
     while at + 24 + page <= len(log):
         s0, s1 = _wal_sum(log, at, at + 8, little, s0, s1)
         s0, s1 = _wal_sum(log, at + 24, at + 24 + page, little, s0, s1)

@@ -18,6 +18,7 @@ from replay.errors import LogError
 from replay.log.raw_log import Clock, LogSummary, RawLog, TopicInfo, Window
 from replay.log.reading_notes import Report
 from replay.log.source_options import SourceOptions
+from replay.readers.common.compiled import plain
 from replay.readers.tables.columns import ArrayColumn, unique_names
 from replay.readers.tables.iso_kernel import iso_many
 from replay.readers.tables.row_kernel import MISSING
@@ -235,7 +236,7 @@ def _cells(array: Any, exact: bool = False) -> NDArray[Any]:
     if pa.types.is_string(kind) or pa.types.is_large_string(kind):
         text = array.fill_null("").cast(pa.large_string())
         starts = np.frombuffer(text.buffers()[1], np.int64, len(text) + 1, 8 * text.offset)
-        moments: NDArray[np.int64] = iso_many(np.frombuffer(text.buffers()[2] or b"", np.uint8), starts)
+        moments: NDArray[np.int64] = iso_many(plain(np.frombuffer(text.buffers()[2] or b"", np.uint8)), starts)
         return moments
     if pa.types.is_timestamp(kind) or pa.types.is_date(kind):
         whole = array.cast(pa.timestamp("ns", getattr(kind, "tz", None))).cast(pa.int64())
