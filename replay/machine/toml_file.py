@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 import math
-import tomllib
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, TypeVar
@@ -16,10 +15,12 @@ from replay.machine.config import Control, Limits, Machine, Noise, Plant, WheelP
 from replay.machine.drive_model import drive_from_table, drive_table
 from replay.machine.geometry import Geometry, WheelGeometry, four_wheel_geometry
 from replay.machine.units import si_factor
+from replay.toml_text import MAX_BYTES, TomlError, parse_toml
 
 _T = TypeVar("_T")
 _SECTIONS = {"machine", "geometry", "control", "plant", "drive", "steering", "noise", "limits", "sources", "signals"}
 _STANDARD = ("wheelbase", "joint_spacing", "wheel_offset")
+_LONGEST = 1000
 _MACHINE_LEVEL = ("gear_ratio", "max_speed", "max_steer")
 
 
@@ -34,17 +35,20 @@ def load_machine(path: Path) -> Machine:
         Where the file cannot be read, is not TOML, or names an unknown key, signal, unit or a value out of range.
     """
     try:
-        data = tomllib.loads(path.read_text(encoding="utf-8"))
+        with path.open("rb") as file:
+            raw = file.read(MAX_BYTES + 1)
+        data = parse_toml(raw.decode())
     except OSError as error:
         raise ConfigError(f"{path}: cannot read the machine file: {error.strerror or error}") from error
     except UnicodeDecodeError as error:
         raise ConfigError(f"{path}: byte {error.start} is not UTF-8; a machine file is TOML text in UTF-8") from error
-    except tomllib.TOMLDecodeError as error:
-        raise ConfigError(f"{path}: not valid TOML: {error}") from error
+    except TomlError as error:
+        raise ConfigError(f"{path}: {error}") from error
     try:
         return _machine(data)
     except ConfigError as error:
-        raise ConfigError(f"{path}: {error}") from error
+        text = str(error)
+        raise ConfigError(f"{path}: {text if len(text) <= _LONGEST else text[:_LONGEST] + ' …'}") from error
 
 
 def _machine(data: Mapping[str, Any]) -> Machine:

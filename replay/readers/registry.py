@@ -13,15 +13,15 @@ from replay.log.file_types import check_regular
 from replay.log.formats import LOG_FORMATS, LogFormatRow
 from replay.log.raw_log import Clock, LogSummary, RawLog, Window
 from replay.log.source_options import SourceOptions
+from replay.readers.common.border import Bordered
 from replay.readers.common.protocol import Reader
 
 
 @cache
 def reader_of(row: LogFormatRow) -> Reader:
-    """Load the reader of a format."""
+    """Load the reader of a format, within its border."""
     module, name = row.reader.split(":")
-    reader: Reader = getattr(import_module(module), name)()
-    return reader
+    return Bordered(getattr(import_module(module), name)())
 
 
 def readers() -> Iterator[Reader]:

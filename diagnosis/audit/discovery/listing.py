@@ -134,7 +134,9 @@ class LocalPlace:
         return Path(file.path).read_text(encoding="utf-8")
 
     def inside(self, folder: Entry, name: str) -> Entry | None:
-        """File or folder within a folder, by real path."""
+        """File or folder within a folder, by real path; a name that reads like a URL is none."""
+        if "://" in name:
+            return None
         try:
             found = self.entry(os.path.join(folder.path, name))  # noqa: PTH118
         except (OSError, ValueError):

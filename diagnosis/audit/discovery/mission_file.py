@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import re
-import tomllib
 from dataclasses import dataclass
 
 from diagnosis.audit.discovery.listing import Entry, Place
 from replay.errors import ConfigError
+from replay.toml_text import MAX_BYTES, TomlError, parse_toml
 
 MISSION_FILE = "mission.toml"
 _KEYS = ("files", "machine_id", "machine", "name")
-_MOST_BYTES = 1 << 20
 _LONGEST = 200
 
 _MACHINE_ID = re.compile(r"""^[ \t]*machine_id[ \t]*=[ \t]*["']([^"'\\\n]+)["']""", re.MULTILINE)
@@ -45,14 +44,16 @@ def read_mission_file(place: Place, folder: Entry, file: Entry) -> MissionFile:
     ConfigError
         Where it is no such file, has an unknown key, or names what is not in its folder.
     """
-    if file.size > _MOST_BYTES:
-        raise ConfigError(f"{file.path}: has {file.size} bytes, at most {_MOST_BYTES} expected")
+    if file.size > MAX_BYTES:
+        raise ConfigError(f"{file.path}: has {file.size} bytes, at most {MAX_BYTES} expected")
     try:
-        data = tomllib.loads(place.text(file))
+        data = parse_toml(place.text(file))
     except OSError as error:
         raise ConfigError(f"{file.path}: cannot be read ({error.strerror or error})") from error
-    except (UnicodeDecodeError, tomllib.TOMLDecodeError, RecursionError) as error:
-        raise ConfigError(f"{file.path}: not valid TOML ({error})") from error
+    except UnicodeDecodeError as error:
+        raise ConfigError(f"{file.path}: byte {error.start} is not UTF-8; expected TOML text in UTF-8") from error
+    except TomlError as error:
+        raise ConfigError(f"{file.path}: {error}") from error
     for key in data:
         if key not in _KEYS:
             raise ConfigError(f"{file.path}: {key[:80]!r} is not a key; expected {', '.join(_KEYS)}")
@@ -73,7 +74,7 @@ def read_mission_file(place: Place, folder: Entry, file: Entry) -> MissionFile:
 def stated_machine(place: Place, file: Entry) -> str:
     """The machine that a ``mission.toml`` names which is wrong otherwise; empty where it names none."""
     try:
-        text = place.text(file) if file.size <= _MOST_BYTES else ""
+        text = place.text(file) if file.size <= MAX_BYTES else ""
     except (OSError, UnicodeDecodeError):
         return ""
     found = _MACHINE_ID.search(text)

@@ -25,6 +25,7 @@ Files are read in the order: message logs, then tables by name.
 from __future__ import annotations
 
 import os
+import re
 from collections import Counter, defaultdict
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -44,6 +45,7 @@ _AUDIT_FILES = ("fleet.csv", "failures.txt")
 _REPORT = {"report.json", "report.parquet"}
 _REPORT_TABLES = ("report.parquet", "report.windows.parquet")
 _CLIPS = "clips"
+_URL = re.compile(r"([A-Za-z][A-Za-z0-9+.:-]*)://")
 
 
 @dataclass(frozen=True)
@@ -277,8 +279,9 @@ def _paths(one: Unnamed) -> tuple[str, str]:
 
 
 def _scheme(path: str) -> str:
-    """Kind of a URL; empty for local paths."""
-    return path.partition("://")[0] if "://" in path else ""
+    """Kind of a URL; empty for local paths, also where a mission's name in them looks like a URL."""
+    found = _URL.match(path)
+    return found[1] if found else ""
 
 
 def _shared(bases: Sequence[str]) -> list[str]:

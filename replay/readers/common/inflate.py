@@ -7,6 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 MAX_CHUNK = 512 << 20
+_FREE_CHUNK, _CHUNK_TIMES = 128 << 20, 4
+_FREE_BYTES, _MOST_TIMES, _SLOWER = 4 << 30, 4096, {"bz2": 32}
 _COMMON_WINDOW, _MAX_WINDOW = 1 << 27, 1 << 28
 
 
@@ -14,10 +16,41 @@ class InflateError(Exception):
     """Compressed bytes cannot be expanded; the text says why."""
 
 
-class Inflater:
-    """Expands chunks one after another into one buffer: fresh memory for each would cost more than decompression."""
+def most_of_one(file_bytes: int) -> int:
+    """Most bytes that one chunk of a file of this size may expand to: recorders' chunks are a few MB at most."""
+    return min(MAX_CHUNK, max(_FREE_CHUNK, _CHUNK_TIMES * file_bytes))
 
-    def __init__(self) -> None:
+
+class Expansion:
+    """What the chunks of one file may expand to together, so that no small file takes hours; slow codecs count more.
+
+    Parameters
+    ----------
+    file_bytes : int
+        Size of the file.
+    """
+
+    def __init__(self, file_bytes: int) -> None:
+        self._left = _FREE_BYTES + _MOST_TIMES * file_bytes
+        self.why = f"the chunks before it expand to more than {_MOST_TIMES} times the file"
+
+    def allows(self, compression: str, size: int) -> bool:
+        """Take a chunk into account; whether it may be expanded."""
+        self._left -= min(size, MAX_CHUNK) * _SLOWER.get(compression, 1)
+        return self._left >= 0
+
+
+class Inflater:
+    """Expands chunks one after another into one buffer: fresh memory for each would cost more than decompression.
+
+    Parameters
+    ----------
+    file_bytes : int or None
+        Size of the file that holds the chunks, which bounds what one of them may expand to; None: `MAX_CHUNK` does.
+    """
+
+    def __init__(self, file_bytes: int | None = None) -> None:
+        self.most = MAX_CHUNK if file_bytes is None else most_of_one(file_bytes)
         self._room: NDArray[np.uint8] = np.empty(0, np.uint8)
 
     def expand(self, compression: str, data: NDArray[np.uint8], size: int) -> NDArray[np.uint8]:
@@ -40,16 +73,16 @@ class Inflater:
         Raises
         ------
         InflateError
-            Where the declared size is beyond `MAX_CHUNK`, the compression unknown, the bytes damaged or of another
+            Where the declared size is beyond `most`, the compression unknown, the bytes damaged or of another
             size.
         """
-        if not 0 <= size <= MAX_CHUNK:
-            raise InflateError(f"it declares {size} bytes; at most {MAX_CHUNK} are expanded")
         data = data.view(np.ndarray)
         if compression in ("", "none"):
             if len(data) != size:
                 raise InflateError(f"it holds {len(data)} bytes, not {size}")
             return data
+        if not 0 <= size <= self.most:
+            raise InflateError(f"it declares {size} bytes; at most {self.most} are expanded of a file of this size")
         if compression not in ("lz4", "zstd", "bz2"):
             raise InflateError(f"its compression {compression[:20]!r} is not known; expected lz4, zstd, bz2 or none")
         if not size and not len(data):

@@ -21,7 +21,7 @@ import numpy as np
 import zstandard
 from numpy.typing import NDArray
 
-from replay.readers.common.inflate import MAX_CHUNK, InflateError
+from replay.readers.common.inflate import InflateError
 from replay.readers.mcap import format as fmt
 from replay.readers.mcap import scan
 from replay.readers.mcap.file import McapFile
@@ -30,7 +30,6 @@ _FIXED = 49
 _PIECE = 1 << 16
 _ZEROS = 512
 _FRAME_HEAD = 32
-_MOST_BYTES, _MOST_TIMES = 4 << 30, 4096
 _COMPRESSIONS = ("", "none", "lz4", "zstd", "bz2")
 _FRAMES = {b"\x28\xb5\x2f\xfd": "zstd", b"\x04\x22\x4d\x18": "lz4"}
 
@@ -102,13 +101,10 @@ def open_chunk(file: McapFile, row: int) -> Chunk | None:
         file.lost("chunk", f"{where} was left out: its head is damaged{file.held(row)}")
         return None
     packed = file.data[head.body : head.body + head.packed]
-    if cut and head.size <= MAX_CHUNK:
+    if cut and head.size <= file.inflater.most:
         return _beginning(file, where, head, packed, "is cut off by the end of the file")
-    file.expanded += min(head.size, MAX_CHUNK)
-    if file.expanded > _MOST_BYTES + _MOST_TIMES * len(file.data):
-        file.lost(
-            "size", f"{where} was left out: the chunks before it expand to more than {_MOST_TIMES} times the file"
-        )
+    if not file.expansion.allows(head.compression, head.size):
+        file.lost("size", f"{where} was left out: {file.expansion.why}")
         return None
     reason = ""
     for size in _sizes(file, start, head, packed):
@@ -149,7 +145,7 @@ def _sizes(file: McapFile, start: int, head: _Head, packed: NDArray[np.uint8]) -
             others.append(len(packed))
     except (zstandard.ZstdError, RuntimeError, ValueError):
         pass
-    yield from (s for s in dict.fromkeys(others) if 0 < s <= MAX_CHUNK and s != head.size)
+    yield from (s for s in dict.fromkeys(others) if 0 < s <= file.inflater.most and s != head.size)
 
 
 def take_names(file: McapFile, row: int, chunk: Chunk) -> None:
@@ -196,7 +192,7 @@ def _open_for_names(file: McapFile, row: int) -> None:
 
 def _in_part(file: McapFile, row: int, where: str, head: _Head, packed: NDArray[np.uint8], reason: str) -> Chunk | None:
     """Take the beginning of a damaged chunk where it can be believed."""
-    if not head.crc and head.compression in ("lz4", "zstd") and head.size <= MAX_CHUNK:
+    if not head.crc and head.compression in ("lz4", "zstd") and head.size <= file.inflater.most:
         return _beginning(file, where, head, packed, f"is damaged ({reason})")
     if head.compression in ("lz4", "zstd") and len(packed) > _ZEROS and not packed[-_ZEROS:].any():
         kept = packed[: int(np.flatnonzero(packed)[-1]) + 1] if packed.any() else packed[:0]

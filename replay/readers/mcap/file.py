@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from replay.errors import LogError
 from replay.log.raw_log import AttachmentInfo
 from replay.log.reading_notes import Report
-from replay.readers.common.inflate import Inflater
+from replay.readers.common.inflate import Expansion, Inflater
 from replay.readers.mcap import format as fmt
 from replay.readers.mcap import scan
 from replay.readers.mcap.channels import Names
@@ -54,8 +54,6 @@ class McapFile:
         Number of records of unknown type in the chunks read.
     bare : bool
         Whether messages were met that no checksum covers.
-    expanded : int
-        Bytes that chunks expanded to so far.
     read_whole, read_topics : bool, frozenset[str] or None
         Whether all of its time was read, and which topics (None: all).
     loose, found : Tally
@@ -80,18 +78,19 @@ class McapFile:
     unknown: list[tuple[int, int, int]] = field(default_factory=list)
     strange: int = 0
     bare: bool = False
-    expanded: int = 0
     read_whole: bool = False
     read_topics: frozenset[str] | None = None
     loose: scan.Tally = field(default_factory=scan.Tally)
     found: scan.Tally = field(default_factory=scan.Tally)
-    inflater: Inflater = field(default_factory=Inflater)
+    inflater: Inflater = field(init=False)
+    expansion: Expansion = field(init=False)
     scanner: scan.Scanner = field(default_factory=scan.Scanner)
     _said: Counter[str] = field(default_factory=Counter)
     _texts: set[str] = field(default_factory=set)
 
     def __post_init__(self) -> None:
         self.names = Names(self.lost)
+        self.inflater, self.expansion = Inflater(len(self.data)), Expansion(len(self.data))
 
     @property
     def statistics(self) -> Statistics | None:

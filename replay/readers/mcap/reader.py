@@ -14,6 +14,7 @@ from replay.errors import LogError
 from replay.log.raw_log import AttachmentInfo, Clock, LogSummary, RawLog, TopicInfo, Window
 from replay.log.reading_notes import Report
 from replay.log.source_options import SourceOptions
+from replay.readers.common.border import bordered
 from replay.readers.mcap import format as fmt
 from replay.readers.mcap.chunk import name_channels, open_chunk
 from replay.readers.mcap.file import McapFile, looks_like_mcap
@@ -116,7 +117,8 @@ def open_files(files: list[Path], source: Path, report: Report, walk: bool = Fal
     opened, last = [], LogError(f"{source}: no MCAP file in it")
     for path in files:
         try:
-            opened.append(open_file(path, report, walk))
+            with bordered(path, "mcap"):
+                opened.append(open_file(path, report, walk))
         except LogError as error:
             last = error
             report.lost(str(error))

@@ -10,7 +10,7 @@ from typing import TypeAlias
 from replay.readers.mcap import format as fmt
 
 MAX_RECORD = 64 << 20
-BAD_RECORD = (struct.error, UnicodeDecodeError, IndexError, ValueError)
+BAD_RECORD = (struct.error, UnicodeDecodeError, IndexError, ValueError, OverflowError)
 
 
 @dataclass(frozen=True)
@@ -219,6 +219,8 @@ def _attachment(raw: bytes) -> Attachment:
     name, at = _text(raw, 16)
     media, at = _text(raw, at)
     (size,) = struct.unpack_from("<Q", raw, at)
+    if at + 12 + size > len(raw):
+        raise ValueError("its content reaches beyond its record")
     (crc,) = struct.unpack_from("<I", raw, at + 8 + size)
     return Attachment(log, created, name, media, raw[at + 8 : at + 8 + size], crc)
 
@@ -267,7 +269,7 @@ def parse(op: int, raw: bytes) -> Record | None:
 
     Raises
     ------
-    struct.error, UnicodeDecodeError, IndexError, ValueError
+    struct.error, UnicodeDecodeError, IndexError, ValueError, OverflowError
         (`BAD_RECORD`) where the content does not fit the type.
     """
     parser = PARSERS.get(op)

@@ -65,6 +65,7 @@ def walk(
     inside : bool
         Whether these are the records of a chunk: names among messages belong to their runs.
     """
+    _check_inside(data, start, stop)
     data, at, state = plain(data), start, np.zeros(4, np.int64)
     parts: list[NDArray[np.int64]] = []
     while at < stop:
@@ -74,6 +75,12 @@ def walk(
         if n and rows[n - 1, 0] == FOOTER and rows[n - 1, 3] == SOUND:
             break
     return Walk(np.concatenate(parts) if parts else np.empty((0, 4), np.int64), int(at))
+
+
+def _check_inside(data: NDArray[np.uint8], start: int, stop: int) -> None:
+    """Refuse a stretch that leaves the bytes, before compiled code that trusts it is entered."""
+    if not 0 <= start <= stop <= len(data):
+        raise IndexError(f"bytes {start} to {stop} do not lie within {len(data)} bytes")
 
 
 class Census(NamedTuple):
@@ -112,6 +119,7 @@ class Scanner:
 
     def census(self, data: NDArray[np.uint8], start: int, stop: int) -> Census:
         """Count what stands in a stretch, up to `BATCH` messages."""
+        _check_inside(data, start, stop)
         bounds = np.array([2**63 - 1, -1], np.int64)
         _, met, named, other, end = scan_census(
             plain(data), start, stop, BATCH, self._counts, self._touched, self._names, bounds
@@ -136,6 +144,7 @@ class Scanner:
         channels, counts = census.channels[wanted], census.counts[wanted]
         if not len(channels):
             return []
+        _check_inside(data, start, census.end)
         stops = np.cumsum(counts)
         first, last = (-(2**63), 2**63 - 1) if window is None else (window[0], window[1] - 1)
         body, size, log, publish = (np.empty(int(stops[-1]), np.int64) for _ in range(4))
@@ -151,14 +160,28 @@ class Scanner:
 
 
 def chunk_times(data: NDArray[np.uint8], rows: NDArray[np.int64]) -> NDArray[np.int64]:
-    """First and last stamp that chunks state, shape (n, 2) [ns]."""
-    out = np.empty((len(rows), 2), np.int64)
-    scan_chunk_heads(plain(data), rows, out)
+    """First and last stamp that chunks state, shape (n, 2) [ns]; −1 where a record is too short to state them."""
+    out = np.full((len(rows), 2), -1, np.int64)
+    long = _within(data, rows, 25)
+    heads = np.empty((int(long.sum()), 2), np.int64)
+    scan_chunk_heads(plain(data), rows[long], heads)
+    out[long] = heads
     return out
+
+
+def _within(data: NDArray[np.uint8], rows: NDArray[np.int64], size: int) -> NDArray[np.bool_]:
+    """Which records hold as many bytes, all of them in the data."""
+    start, stop = rows[:, 1], rows[:, 2]
+    within: NDArray[np.bool_] = (
+        (start >= 0) & (start <= len(data) - size) & (stop - start >= size) & (stop <= len(data))
+    )
+    return within
 
 
 def index_counts(data: NDArray[np.uint8], rows: NDArray[np.int64]) -> NDArray[np.int64]:
     """Channel and number of messages of message index records, shape (n, 2)."""
+    if not _within(data, rows, 15).all():
+        raise IndexError("a message index does not lie within the bytes")
     out = np.empty((len(rows), 2), np.int64)
     scan_index_heads(plain(data), rows, out)
     return out

@@ -14,6 +14,7 @@ from replay.readers.mcap.records import BAD_RECORD, AttachmentIndex, Footer, Met
 
 _FOOTER_SIZE = 29
 _CRC_SIZE = 4
+_BEYOND = 1 << 60  # no file is as long
 
 
 @dataclass(frozen=True)
@@ -62,9 +63,11 @@ class Summary:
             return False
         if not len(self.chunks):
             return stated is not None
+        if (self.chunks[:, 2:5] > self.start).any() or (self.chunks[:, 3] < 49).any():
+            return False
         starts = self.chunks[:, 2]
         stops = starts + self.chunks[:, 3] + self.chunks[:, 4]
-        if (self.chunks[:, 2:5] < 0).any() or (self.chunks[:, 3] < 49).any() or stops[-1] > self.start:
+        if stops[-1] > self.start:
             return False
         edges = np.concatenate(([len(fmt.MAGIC)], stops)), np.concatenate((starts, [self.start]))
         if (edges[1] < edges[0]).any():
@@ -114,6 +117,7 @@ def summary_from(
     """Gather the summary from the rows of a walk over it."""
     listed = rows[(rows[:, 0] == fmt.CHUNK_INDEX) & (rows[:, 3] == fmt.SOUND)]
     chunks, indexes = scan.chunk_indexes(data, listed)
+    chunks[:, 2:], indexes[:, 2] = _bounded(chunks[:, 2:]), _bounded(indexes[:, 2])
     if (chunks[1:, 2] < chunks[:-1, 2]).any():
         order = np.argsort(chunks[:, 2], kind="stable")
         chunks, indexes[:, 0] = chunks[order], np.argsort(order, kind="stable")[indexes[:, 0]]
@@ -141,6 +145,11 @@ def summary_from(
         *place, checked, sound, tuple(names), statistics,
         chunks, indexes, tuple(attachments), tuple(metadata),
     )  # fmt: skip
+
+
+def _bounded(places: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Places and lengths as stated, those beyond any file as `_BEYOND`, so that no sum of them leaves its 64 bits."""
+    return np.where((places < 0) | (places > _BEYOND), _BEYOND, places)
 
 
 def _flawed(rows: NDArray[np.int64]) -> bool:

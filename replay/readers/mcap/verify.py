@@ -207,7 +207,7 @@ def _index_counts(file: McapFile) -> tuple[dict[int, int], tuple[int, int]] | No
     places = summary.indexes[:, 2]
     if ((places < 0) | (places + 15 > size)).any() or (file.data[places] != fmt.MESSAGE_INDEX).any():
         return None
-    rows = np.stack((places, places), axis=1)
+    rows = np.stack((places, places, places + 15), axis=1)
     heads = scan.index_counts(file.data, rows)
     if (heads[:, 0] != summary.indexes[:, 1]).any():
         return None

@@ -12,7 +12,7 @@ from replay.log.raw_log import AttachmentInfo
 from replay.readers.mcap import format as fmt
 from replay.readers.mcap import scan
 from replay.readers.mcap.file import McapFile
-from replay.readers.mcap.records import BAD_RECORD, DataEnd, Header, Metadata, parse
+from replay.readers.mcap.records import BAD_RECORD, MAX_RECORD, DataEnd, Header, Metadata, parse
 from replay.readers.mcap.summary import Summary, read_summary, summary_from
 
 _MOST_RECORDS = 1 << 18
@@ -115,6 +115,8 @@ def take_record(file: McapFile, op: int, start: int, stop: int) -> None:
         if op == fmt.ATTACHMENT:
             _take_attachment(file, start, stop)
             return
+        if stop - start > MAX_RECORD:
+            raise ValueError("a record without end")
         record = parse(op, file.data[start + 9 : stop].tobytes())
     except BAD_RECORD as error:
         file.lost("record", f"record at byte {start} is damaged ({type(error).__name__})")

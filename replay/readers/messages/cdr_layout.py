@@ -222,8 +222,9 @@ class _Walk:
     def plain(self, name: str) -> bool:
         """Whether a message holds numbers alone."""
         return all(
-            self.plain(value) if kind == Nodetype.NAME else is_number((kind, value))
-            for _, (kind, value) in self.kind.fields[name]
+            kind == Nodetype.NAME or is_number((kind, value))
+            for within in self.kind.inside(name)
+            for _, (kind, value) in self.kind.fields[within]
         )
 
     def strings(self, path: Path, count: int, fixed: bool, scope: Scope) -> None:

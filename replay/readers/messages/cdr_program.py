@@ -41,11 +41,12 @@ END = 9
 DOPEN, DCLOSE = 10, 11
 
 MAX_COLUMNS = 4096
+MAX_STEPS = 1 << 17
 _WIDTH = 5
 
 
 class TooWide(Exception):
-    """A program would need too many columns."""
+    """A program would need too many columns or steps."""
 
 
 @dataclass(frozen=True)
@@ -105,6 +106,7 @@ class Compiler:
     specs: list[tuple[Path, str, str, int]] = field(default_factory=list)
     exact: list[object] = field(default_factory=list)
     guard: tuple[str, int] = ("", 0)
+    visits: int = 0
 
     def run(self) -> Program:
         """Compile.
@@ -112,7 +114,7 @@ class Compiler:
         Raises
         ------
         TooWide
-            Where the columns are too many.
+            Where the columns or steps are too many.
         """
         self.message((), self.kind.name, None, True, False)
         specs = tuple(Spec(text_of(p), t, g, n) for p, t, g, n in self.specs)
@@ -129,6 +131,9 @@ class Compiler:
 
     def message(self, path: Path, name: str, parent: Scope | None, emit: bool, loose: bool) -> None:
         """Compile one message; `loose` where it stands in a free sequence, so that no sample tells its lengths."""
+        self.visits += 1 + len(self.kind.fields[name])
+        if self.visits > MAX_STEPS:  # a definition may name parts in parts without end, none of which a message fills
+            raise TooWide
         scope = Scope(parent)
         fields = self.kind.fields[name]
         if self.kind.ros1 and name == TIME:
@@ -195,14 +200,14 @@ class Compiler:
 
     def keyed(self, name: str) -> bool:
         """Whether a message, or one inside it, may hold an array of names."""
-        for label, (kind, value) in self.kind.fields[name]:
-            inner = value[0] if kind in (Nodetype.ARRAY, Nodetype.SEQUENCE) else (kind, value)
-            if inner[0] == Nodetype.NAME:
-                if self.keyed(inner[1]):
-                    return True
-            elif inner[1][0] == "string" and is_key_list(label) and kind != Nodetype.BASE:
-                return True
-        return False
+        return any(
+            kind in (Nodetype.ARRAY, Nodetype.SEQUENCE)
+            and value[0][0] == Nodetype.BASE
+            and value[0][1][0] == "string"
+            and is_key_list(label)
+            for within in self.kind.inside(name)
+            for label, (kind, value) in self.kind.fields[within]
+        )
 
     def elements(self, path: Path, kind: Field, count: int, fixed: bool, scope: Scope, loose: bool) -> None:
         """Compile a known number of elements."""
@@ -267,6 +272,9 @@ class Compiler:
                 self.ops.append([NAME, len(self.names), len(name)])
                 self.names += name
         elif length >= 0:
+            self.visits += length
+            if self.visits > MAX_STEPS:
+                raise TooWide
             self.ops += [[STRING]] * length
         elif counted == 0 and is_key_list(str(path[-1])):
             self.exact.append((place_of(path), ()))

@@ -14,6 +14,7 @@ Fields: TypeAlias = tuple[tuple[str, Any], ...]
 
 MAX_DEFINITION = 1 << 20
 MAX_DEPTH = 32
+MAX_ARRAY = 1 << 28
 TIME = "builtin_interfaces/msg/Time"
 DURATION = "builtin_interfaces/msg/Duration"
 HEADER = "std_msgs/msg/Header"
@@ -71,6 +72,17 @@ class MessageType:
     stamp: str | None
     ros1: bool
     note: str = ""
+
+    def inside(self, name: str) -> set[str]:
+        """Names of all types within a type, itself among them, each met once however often it is named."""
+        met, waiting = {name}, [name]
+        while waiting:
+            for _, (kind, value) in self.fields[waiting.pop()]:
+                sub = value[0] if kind in (Nodetype.ARRAY, Nodetype.SEQUENCE) else (kind, value)
+                if sub[0] == Nodetype.NAME and sub[1] not in met:
+                    met.add(sub[1])
+                    waiting.append(sub[1])
+        return met
 
 
 def full_name(name: str) -> str:
@@ -155,7 +167,11 @@ def _reach(root: str, known: dict[str, Fields], out: dict[str, Fields], above: t
                 raise DefinitionError(f"its definition lacks the type {root}") from None
         else:
             raise DefinitionError(f"its definition does not define {root}")
-    for _, (kind, value) in known[root]:
+    for label, (kind, value) in known[root]:
+        if kind == Nodetype.ARRAY and value[1] > MAX_ARRAY:
+            raise DefinitionError(
+                f"its definition gives {label} {str(value[1])[:20]} elements; at most {MAX_ARRAY} are read"
+            )
         sub = value[0] if kind in (Nodetype.ARRAY, Nodetype.SEQUENCE) else (kind, value)
         if sub[0] == Nodetype.NAME:
             _reach(sub[1], known, out, (*above, root), ros1)

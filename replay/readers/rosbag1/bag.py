@@ -31,6 +31,8 @@ class Chunk:
         Messages per connection, or None where no index states them.
     cut : bool
         Whether the file ends before the chunk does, or its length is not to be trusted.
+    entries : list[tuple[int, int, int]]
+        Connection, place and length [bytes] of what the index records behind it hold.
     """
 
     start: int
@@ -42,6 +44,7 @@ class Chunk:
     last_ns: int = -1
     stated: dict[int, int] | None = None
     cut: bool = False
+    entries: list[tuple[int, int, int]] = field(default_factory=list)
 
 
 @dataclass
@@ -56,6 +59,8 @@ class Bag:
         In the order of the file.
     loose : list[BagRecords]
         Walks that met messages outside of chunks.
+    listed : set[int]
+        Connections that stand outside of chunks, which is in the index section.
     absent : dict[int, int]
         Messages per connection of chunks that the index names and that are not in their place.
     """
@@ -66,9 +71,15 @@ class Bag:
     connections: dict[int, Connection] = field(default_factory=dict)
     chunks: list[Chunk] = field(default_factory=list)
     loose: list[BagRecords] = field(default_factory=list)
+    listed: set[int] = field(default_factory=set)
     absent: dict[int, int] = field(default_factory=dict)
     raw: dict[int, bytes] = field(default_factory=dict)
     told: int = 0
+
+    def named(self, number: int) -> str:
+        """Topic of a connection, or its number where it is not named."""
+        known = self.connections.get(number)
+        return known.topic[:80] if known else f"connection {number}"
 
     def lost(self, text: str) -> None:
         """Report a loss in this file; of very many, the first ones."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import struct
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +13,7 @@ from replay.errors import LogError
 from replay.log.reading_notes import Report
 from replay.readers.rosbag1.bag import Bag, Chunk
 from replay.readers.rosbag1.connections import DAMAGED, fields_of, take_connection
+from replay.readers.rosbag1.reconcile import Info, counts_behind, take_entries, take_info
 from replay.readers.rosbag1.records_kernel import (
     CHUNK,
     CONNECTION,
@@ -69,7 +71,7 @@ def open_bag(path: Path, report: Report, whole: bool) -> Bag:
             f"its index section at byte {header[0]} is damaged or cut off (it should hold {header[1]} connections and "
             f"{header[2]} chunks); the whole file was walked instead"
         )
-    if sound and not whole and index is not None and _from_index(bag, index):
+    if sound and not whole and index is not None and header is not None and _from_index(bag, index, header[0]):
         return bag
     _walk(bag)
     return bag
@@ -102,7 +104,7 @@ def _sound(index: BagRecords, header: tuple[int, int, int]) -> bool:
     return not index.lost and not index.mended and bool(known) and (len(named), infos) == header[1:]
 
 
-def _infos(bag: Bag, records: BagRecords) -> dict[int, tuple[int, int, dict[int, int]]]:
+def _infos(bag: Bag, records: BagRecords) -> dict[int, Info]:
     """First and last stamp and messages per connection of each chunk by its place, from chunk-info records."""
     out = {}
     for i in np.flatnonzero(records.op == INFO).tolist():
@@ -114,6 +116,8 @@ def _infos(bag: Bag, records: BagRecords) -> dict[int, tuple[int, int, dict[int,
                 s * 1_000_000_000 + n for s, n in (struct.unpack("<II", fields[k]) for k in ("start_time", "end_time"))
             )
             pairs = np.frombuffer(bag.data[body : body + size - size % 8].tobytes(), "<u4").reshape(-1, 2)
+            if (len(pairs),) != struct.unpack("<I", fields["count"]):
+                raise ValueError("it counts other connections than it holds")
             out[place] = first, last, dict(pairs.tolist())
         except DAMAGED as error:
             bag.lost(f"the chunk-info record at byte {head - 4} is damaged ({type(error).__name__})")
@@ -126,13 +130,15 @@ def _chunk(bag: Bag, head: int, body: int, packed: int) -> Chunk:
     return Chunk(head - 4, body, packed, size, fields["compression"].decode("ascii", "replace"))
 
 
-def _from_index(bag: Bag, index: BagRecords) -> bool:
-    """Take connections and chunks from the index section; False where a chunk is not in its place."""
+def _from_index(bag: Bag, index: BagRecords, until: int) -> bool:
+    """Take connections and chunks from the index section at `until`; False where what stands before it contradicts it."""
     infos = _infos(bag, index)
     if len(infos) != np.count_nonzero(index.op == INFO):
         return False
     chunks = []
-    for place, (first, last, counts) in sorted(infos.items()):
+    starts = sorted(infos)
+    for place, after in pairwise([*starts, until]):
+        first, last, counts = infos[place]
         try:
             (size,) = struct.unpack("<I", bag.data[place : place + 4].tobytes())
             body = place + 8 + size
@@ -140,12 +146,16 @@ def _from_index(bag: Bag, index: BagRecords) -> bool:
             chunk = _chunk(bag, place + 4, body, packed)
         except DAMAGED:
             return False
-        if body + packed > len(bag.data):
+        if body + packed > min(after, len(bag.data)):
+            return False
+        behind = counts_behind(scan_bag(bag.data, body + packed, after))
+        if behind and behind != {n: c for n, c in counts.items() if c}:
             return False
         chunk.first_ns, chunk.last_ns, chunk.stated = first, last, counts
         chunks.append(chunk)
     for i in np.flatnonzero(index.op == CONNECTION).tolist():
         take_connection(bag, bag.data, index, i)
+        bag.listed.add(int(index.conn[i]))
     bag.chunks = chunks
     return True
 
@@ -153,19 +163,23 @@ def _from_index(bag: Bag, index: BagRecords) -> bool:
 def _walk(bag: Bag) -> None:
     """Walk the whole file; every byte belongs to a record or is reported."""
     at = len(_VERSION)
-    infos: dict[int, tuple[int, int, dict[int, int]]] = {}
+    infos: dict[int, Info] = {}
     while at < len(bag.data):
         records = scan_bag(bag.data, at)
         infos |= _infos(bag, records)
         for i in np.flatnonzero(records.op == CONNECTION).tolist():
             take_connection(bag, bag.data, records, i)
+            bag.listed.add(int(records.conn[i]))
         _take_chunks(bag, records)
         if np.any(records.op == MESSAGE):
             bag.loose.append(records)
         at = _behind(bag, records)
+    listed = bool(infos)
     for chunk in bag.chunks:
         if chunk.start in infos:
-            chunk.first_ns, chunk.last_ns, chunk.stated = infos.pop(chunk.start)
+            take_info(bag, chunk, infos.pop(chunk.start))
+        elif listed and not chunk.cut:
+            bag.lost(f"the index section does not list the chunk at byte {chunk.start}; it was read all the same")
     for place, (_, _, counts) in sorted(infos.items()):
         bag.lost(f"there is no chunk at byte {place}, where the index names one with {sum(counts.values())} messages")
         for number, count in counts.items():
@@ -187,9 +201,7 @@ def _take_chunks(bag: Bag, records: BagRecords) -> None:
         bag.chunks.append(chunk)
         mine = index[edges[k] : edges[k + 1]]
         if len(mine):
-            chunk.stated = {}
-            for number, count in zip(records.conn[mine].tolist(), (records.size[mine] // 12).tolist(), strict=True):
-                chunk.stated[number] = chunk.stated.get(number, 0) + count
+            take_entries(bag, chunk, records, mine)
 
 
 def _behind(bag: Bag, records: BagRecords) -> int:

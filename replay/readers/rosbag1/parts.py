@@ -10,6 +10,7 @@ from pathlib import Path
 from replay.errors import LogError
 from replay.log.file_types import part_of
 from replay.log.raw_log import LogSummary, TopicInfo
+from replay.readers.common.border import bordered
 
 _MOST_GAPS = 5
 
@@ -41,7 +42,8 @@ def over_parts(folder: Path, read: Callable[[Path], LogSummary]) -> LogSummary:
     lost += [f"{folder.name}: part {number} of the split bag is missing" for number in gaps]
     for part in parts:
         try:
-            found.append(read(part))
+            with bordered(part, "bag"):
+                found.append(read(part))
         except LogError as error:
             lost.append(str(error))
     if not found:

@@ -16,18 +16,20 @@ from replay.errors import LogError
 from replay.log.raw_log import Clock, LogSummary, RawLog, TopicInfo, Window
 from replay.log.reading_notes import Report
 from replay.log.source_options import SourceOptions
-from replay.readers.common.inflate import InflateError, Inflater
+from replay.readers.common.inflate import Expansion, InflateError, Inflater
 from replay.readers.messages.assemble import Assembler
 from replay.readers.messages.connection import Block, Connection
 from replay.readers.rosbag1 import parts
 from replay.readers.rosbag1.bag import Bag, Chunk
 from replay.readers.rosbag1.connections import take_connection
 from replay.readers.rosbag1.file import MAGIC, open_bag
+from replay.readers.rosbag1.reconcile import check_messages
 from replay.readers.rosbag1.records_kernel import CONNECTION, MESSAGE, BagRecords, scan_bag
 
 _LOOK, _RECORDS = 4 << 20, 3
 _SMALLEST = 43  # bytes of a message's record
 _MOST = 64 << 20  # of a chunk whose stated size is wrong
+_PIECE = 1 << 20
 _MAGICS = {b"\x04\x22\x4d\x18": "lz4", b"BZh": "bz2"}
 
 
@@ -100,7 +102,7 @@ class _Reading:
 
     def __init__(self, bag: Bag, topics: Collection[str] | None, window: Window | None) -> None:
         self.bag, self.topics, self.window = bag, topics, window
-        self.inflater = Inflater()
+        self.inflater, self.expansion = Inflater(len(bag.data)), Expansion(len(bag.data))
         self.found: Counter[int] = Counter()
         self.stated: Counter[int] = Counter(bag.absent)
         self.skipped: Counter[int] = Counter()
@@ -161,6 +163,9 @@ class _Reading:
                 bag.lost(f"the chunk at byte {chunk.start} states {chunk.size} bytes and holds {chunk.packed}")
             return packed
         reason = "it is cut off"
+        if not self.expansion.allows(chunk.compression, chunk.size if not chunk.cut else _MOST):
+            bag.lost(f"the chunk at byte {chunk.start} was left out: {self.expansion.why}")
+            return None
         if not chunk.cut:
             try:
                 return self.inflater.expand(chunk.compression, packed, chunk.size)
@@ -180,8 +185,16 @@ class _Reading:
                 f"the chunk at byte {chunk.start} is damaged: {records.lost} of its {len(data)} bytes hold no "
                 f"complete record, the lengths of {records.mended} records are wrong"
             )
+        elif not chunk.cut:
+            check_messages(self.bag, chunk, records)
         for i in np.flatnonzero(records.op == CONNECTION).tolist():
             take_connection(self.bag, data, records, i)
+            number = int(records.conn[i])
+            if self.bag.listed and number not in self.bag.listed:
+                self.bag.lost(
+                    f"connection {number} ({self.bag.named(number)!r}) stands in the chunk at byte {chunk.start}, the index "
+                    "section does not list it"
+                )
 
     def _split(self, data: NDArray[np.uint8], records: BagRecords) -> Iterator[Block]:
         """Blocks of one buffer, one per connection."""
@@ -252,16 +265,16 @@ def _expand_as_found(packed: bytes) -> tuple[bytes, bool]:
     """Expand as far as possible by the data's own magic bytes: (result, whether the data end as they should)."""
     kind = next((k for m, k in _MAGICS.items() if packed.startswith(m)), "")
     out: list[bytes] = []
-    size, ended = 0, False
+    size, at, ended = 0, 0, False
     stream = lz4.frame.LZ4FrameDecompressor() if kind == "lz4" else bz2.BZ2Decompressor()
     if not kind:
         return packed, bool(len(scan_bag(np.frombuffer(packed, np.uint8)).op))
     try:
-        for at in range(0, len(packed), 4096):
-            out.append(stream.decompress(packed[at : at + 4096]))
+        while not ended and size < _MOST and (at < len(packed) or not stream.needs_input):
+            piece = packed[at : at + 4096] if stream.needs_input else b""
+            at += len(piece)
+            out.append(stream.decompress(piece, min(_PIECE, _MOST - size)))
             size, ended = size + len(out[-1]), stream.eof
-            if ended or size > _MOST:
-                break
     except (RuntimeError, OSError, EOFError, ValueError):
         pass
     return b"".join(out), ended

@@ -98,7 +98,8 @@ class Image:
         while 1 <= trunk < len(self.seen) and not self.seen[trunk]:
             self.seen[trunk] = 1
             at = (trunk - 1) * self.page
-            words = np.frombuffer(self.data[at : at + self.page - self.page % 4].tobytes(), ">u4")
+            held = min(self.page, len(self.data) - at) // 4 * 4  # the file may end within the page
+            words = np.frombuffer(self.data[at : at + held].tobytes(), ">u4")
             if len(words) < 2:
                 return
             free = words[2 : 2 + int(words[1])]

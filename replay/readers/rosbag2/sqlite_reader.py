@@ -12,6 +12,7 @@ import numpy as np
 from replay.errors import LogError
 from replay.log.raw_log import Clock, LogSummary, RawLog, TopicInfo, Window
 from replay.log.reading_notes import Report
+from replay.readers.common.border import bordered
 from replay.readers.messages.assemble import Assembler
 from replay.readers.messages.connection import Block, Connection
 from replay.readers.rosbag2.message_compression import unpacked
@@ -97,9 +98,10 @@ def _open(files: list[Path], source: Path, report: Report) -> list[Database]:
     bases, last = [], "no storage file"
     for path in files:
         try:
-            base = open_database(open_image(path, report), report)
-        except (SqliteError, OSError) as error:
-            last = f"{path.name} cannot be read: {error}"
+            with bordered(path, "rosbag2"):
+                base = open_database(open_image(path, report), report)
+        except (SqliteError, LogError) as error:
+            last = str(error) if isinstance(error, LogError) else f"{path.name} cannot be read: {error}"
             report.lost(last)
             continue
         if "messages" in base.tables or base.connections or base.image.suspects:

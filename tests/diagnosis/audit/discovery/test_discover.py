@@ -205,7 +205,10 @@ def test_mission_file(tmp_path: Path) -> None:
         ("machine_id = 7", "machine_id must be a text"),
         ('name = ""', "name must be a text"),
         ("files = [", "not valid TOML"),
-        ("x = " + "[" * 3000, "not valid TOML"),
+        ("x = " + "[" * 3000, "nests more than 32 brackets"),
+        ("files = [" + "9" * 5000 + "]", "a number of 5000 digits"),
+        ("a" + ".a" * 50_000 + " = 1", "a key of 50001 parts"),
+        ('files = ["https://wiki/run7.mcap"]', "which is not in the folder"),
     ],
 )
 def test_mission_file_that_is_off(tmp_path: Path, text: str, said: str) -> None:

@@ -18,6 +18,7 @@ from mcap.writer import CompressionType, IndexType, Writer
 from replay.errors import LogError
 from replay.log.reading_notes import Report
 from replay.log.source_options import SourceOptions
+from replay.readers.common import inflate
 from replay.readers.mcap import chunk, reader
 from replay.readers.registry import read_log, summarise_log
 
@@ -354,8 +355,8 @@ def test_a_flood_of_small_records_stays_small(tmp_path: Path, record: bytes) -> 
 def test_chunks_that_expand_without_end_are_left_out(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     path = tmp_path / "log.mcap"
     write(path)
-    monkeypatch.setattr(chunk, "_MOST_BYTES", 10_000)
-    monkeypatch.setattr(chunk, "_MOST_TIMES", 0)
+    monkeypatch.setattr(inflate, "_FREE_BYTES", 10_000)
+    monkeypatch.setattr(inflate, "_MOST_TIMES", 0)
     log = read_log(path, OPTIONS)
     assert 0 < len(log.channels[f"{FAST}.data"].values) < COUNT
     assert any("expand to more than" in d for d in log.summary.damage)
