@@ -9,6 +9,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from replay.controllers.choice import Controller
 from replay.errors import ConfigError, check_range
 from replay.faults import FaultMode, FaultSpec, Side
 from replay.machine.config import Machine, haulotte
@@ -80,6 +81,8 @@ class SimulationOptions:
         Physics and sensors.
     structure : StructureOptions or None
         Another structure of valves, pump, drive, sensors and law; None: the default one.
+    controller : Controller or None
+        Another controller of the wheels' valves instead of `law` (and of the structure's); None: the law.
     """
 
     scenario: Scenario = "random"
@@ -109,6 +112,7 @@ class SimulationOptions:
     machine: Machine = field(default_factory=haulotte)
     plant: PlantOptions = field(default_factory=PlantOptions)
     structure: StructureOptions | None = None
+    controller: Controller | None = None
 
     def __post_init__(self) -> None:
         """Check values."""
