@@ -21,6 +21,7 @@ from cli.commands import (
     channels,
     compare,
     config,
+    controllers,
     diagnose,
     evaluate,
     fit,
@@ -80,6 +81,7 @@ for _panel, _function, _name, _epilog in (
     (_LOOK, replay_command.replay_log, "replay", replay_command.EXAMPLES),
     (_MAKE, fit.fit, "fit", fit.EXAMPLES),
     (_MAKE, simulate.simulate, "simulate", simulate.EXAMPLES),
+    (_MAKE, controllers.controllers, "evaluate controllers", controllers.EXAMPLES),
     (_MAKE, inject.inject, "inject", inject.EXAMPLES),
     (_MAKE, schema.schema, "schema", schema.EXAMPLES),
 ):

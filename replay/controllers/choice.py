@@ -144,7 +144,7 @@ class Controller:
     def _own(self) -> Any:
         values = {("lambda_" if k == "lambda" else k): float(v) for k, v in self.values.items()}
         if self.name == "mfhca":
-            values["reading"] = READINGS.index(self.reading)  # type: ignore[assignment]
+            values["reading"] = READINGS.index(self.reading)
         return self.kind.gains(**values)
 
 

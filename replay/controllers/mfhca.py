@@ -31,7 +31,7 @@ class MfhcaGains(NamedTuple):
     lambda_: float = 1.0  # [s/m]
     beta: float = 0.001  # [1/s]
     xi: float = 1.0  # [1/s]
-    zeta: float = 0.0  # [s/m²]
+    zeta: float = 2600.0  # of the preset paper-table [s/m²]; 0: Ψ̂ as printed
     lead: float = 1.0  # share of its own step that Ψ̂ has taken when the command is given
 
 
@@ -53,7 +53,7 @@ def read_law(reading: int, v_ref: float, v: float, psi: float, lam: float, u_max
         u = s * (lam * (abs(v_ref) - abs(v)) + psi * psi)
     else:
         u = -lam * e
-    return clipped(u, u_max)
+    return float(clipped(u, u_max))
 
 
 @njit(cache=True)

@@ -71,7 +71,7 @@ def _references(k: int, v: float, omega: float, p: PlantModel, state: PlantState
 @njit(cache=True)
 def _law(v_ref: float, v: float, psi: float, p: PlantModel) -> float:
     """u_a, L15 (14), in the simulated reading."""
-    return read_law(p.law, v_ref, v, psi, p.lam, p.u_max)
+    return float(read_law(p.law, v_ref, v, psi, p.lam, p.u_max))
 
 
 @njit(cache=True)
