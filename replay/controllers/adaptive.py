@@ -24,22 +24,22 @@ from replay.controllers.limits import F, bounded, clipped, winds_up
 class AdaptiveGains(NamedTuple):
     """16 parameters; speeds in m/s, u as a fraction of full opening."""
 
-    k: float = 2.0  # [s/m]
-    gamma_v: float = 100.0
-    gamma_tanh: float = 10.0
-    gamma_one: float = 20.0
-    gamma_rate: float = 20.0
-    gamma_y: float = 10.0
-    sigma_v: float = 1e-3
-    sigma_tanh: float = 1e-3
-    sigma_one: float = 1e-3
-    sigma_rate: float = 1e-3
-    sigma_y: float = 1e-3
-    gamma_rho: float = 5.0
-    sigma_rho: float = 0.01
-    epsilon: float = 0.02  # [m/s]
-    tau_f: float = 0.05  # [s]
-    bound: float = 2.0
+    k: float = 1.23  # [s/m]
+    gamma_v: float = 63.4
+    gamma_tanh: float = 8.52
+    gamma_one: float = 24.1
+    gamma_rate: float = 35.9
+    gamma_y: float = 9.89
+    sigma_v: float = 0.000791
+    sigma_tanh: float = 0.000757
+    sigma_one: float = 0.00185
+    sigma_rate: float = 0.000665
+    sigma_y: float = 0.0013
+    gamma_rho: float = 4.82
+    sigma_rho: float = 0.0143
+    epsilon: float = 0.0593  # [m/s]
+    tau_f: float = 0.0253  # [s]
+    bound: float = 2.6
 
 
 ADAPTIVE_STATES = 7  # θ̂ (5), ρ̂, v_f

@@ -25,13 +25,13 @@ LAYER = 0.02  # ε₀ [m/s]
 class FiniteTimeGains(NamedTuple):
     """7 parameters; speeds in m/s, u as a fraction of full opening."""
 
-    c: float = 2.0
-    alpha: float = 0.7
-    k1: float = 2.0  # [s/m]
-    k2: float = 0.1
-    beta: float = 0.6
-    gamma: float = 1.0
-    sigma: float = 0.1
+    c: float = 5.73
+    alpha: float = 0.789
+    k1: float = 2.01  # [s/m]
+    k2: float = 0.0126
+    beta: float = 0.26
+    gamma: float = 1.85
+    sigma: float = 0.971
 
 
 FINITE_TIME_STATES = 2  # ∫|e|^α sgn e, ρ̂

@@ -24,18 +24,18 @@ from replay.controllers.limits import F, clipped, winds_up
 class FuzzyGains(NamedTuple):
     """12 parameters; speeds in m/s, u as a fraction of full opening."""
 
-    k: float = 2.0  # [s/m]
-    k_i: float = 4.0  # [1/m]
-    gamma: float = 10.0
-    sigma: float = 1e-3
-    k_r: float = 0.02
-    epsilon: float = 0.02  # [m/s]
-    g_v: float = 3.0  # [s/m]
-    g_d: float = 1.0  # [s²/m]
-    g_u: float = 1.0
-    w_v: float = 0.6
-    w_d: float = 1.0
-    tau_f: float = 0.1  # [s]
+    k: float = 2.52  # [s/m]
+    k_i: float = 7.11  # [1/m]
+    gamma: float = 37.7
+    sigma: float = 0.000953
+    k_r: float = 0.0102
+    epsilon: float = 0.0386  # [m/s]
+    g_v: float = 13.0  # [s/m]
+    g_d: float = 0.871  # [s²/m]
+    g_u: float = 0.96
+    w_v: float = 0.203
+    w_d: float = 0.306
+    tau_f: float = 0.0605  # [s]
 
 
 FUZZY_STATES = 11  # θ̂ (9), ∫e, e_f

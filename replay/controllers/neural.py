@@ -26,12 +26,12 @@ NODES = 9
 class NeuralGains(NamedTuple):
     """6 parameters; speeds in m/s, u as a fraction of full opening."""
 
-    k: float = 2.0  # [s/m]
-    gamma: float = 10.0
-    sigma: float = 1e-3
-    width: float = 0.1  # [m/s]
-    range: float = 0.4  # [m/s]
-    k_r: float = 0.02
+    k: float = 2.09  # [s/m]
+    gamma: float = 4.68
+    sigma: float = 0.000954
+    width: float = 2.96  # [m/s]
+    range: float = 0.687  # [m/s]
+    k_r: float = 0.00369
 
 
 NEURAL_STATES = NODES  # Ŵ

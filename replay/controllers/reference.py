@@ -18,9 +18,9 @@ class PGains(NamedTuple):
 class PiGains(NamedTuple):
     """Proportional, integral and feed-forward: 3 parameters."""
 
-    kp: float = 2.0  # [s/m]
-    ki: float = 5.0  # [1/m]
-    ff: float = 0.4  # opening per commanded speed [s/m]
+    kp: float = 1.9  # [s/m]
+    ki: float = 29.1  # [1/m]
+    ff: float = 0.436  # opening per commanded speed [s/m]
 
 
 PI_STATES = 1  # ∫e
