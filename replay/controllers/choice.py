@@ -99,11 +99,14 @@ class Controller:
         Gains that differ from the class's own, by name.
     reading : str
         Reading of L15 (14) that MFHCA runs; others have none.
+    lead : float
+        Share of its own step that Ψ̂ has taken when a command is given; see `replay.control.mfhca.forced_psi`.
     """
 
     name: str
     values: Mapping[str, float] = field(default_factory=dict)
     reading: str = "opposed"
+    lead: float = 1.0
 
     def __post_init__(self) -> None:
         """Check names and values."""
@@ -144,7 +147,7 @@ class Controller:
     def _own(self) -> Any:
         values = {("lambda_" if k == "lambda" else k): float(v) for k, v in self.values.items()}
         if self.name == "mfhca":
-            values["reading"] = READINGS.index(self.reading)
+            values |= {"reading": READINGS.index(self.reading), "lead": self.lead}
         return self.kind.gains(**values)
 
 

@@ -11,11 +11,14 @@ from replay.counterfactual.kernel import Signals, scan, world_state
 from replay.counterfactual.world import CoupledPlant, OtherWorld, RecordedWorld
 from replay.errors import ConfigError
 
-_LONGEST_STEP = 0.002  # [s]
-
 
 def predict(
-    recorded: RecordedWorld, plant: CoupledPlant, controller: Controller, u_max: float, psi0: float = 0.0
+    recorded: RecordedWorld,
+    plant: CoupledPlant,
+    controller: Controller,
+    u_max: float,
+    psi0: tuple[float, ...] = (),
+    longest_step: float = 0.002,
 ) -> OtherWorld:
     """Run the recorded mission under a controller.
 
@@ -29,8 +32,10 @@ def predict(
         The law that answers in the other world.
     u_max : float
         Largest opening [fraction].
-    psi0 : float
-        Ψ̂(0), for MFHCA.
+    psi0 : tuple[float, ...]
+        Ψ̂(0) of each wheel, for MFHCA; empty: 0.
+    longest_step : float
+        Longest step of the integration [s]; slower logs are divided.
 
     Raises
     ------
@@ -46,10 +51,10 @@ def predict(
             raise ConfigError(f"counterfactual: {name} has values that are no numbers; fill them first")
     n, wheels = recorded.y.shape
     start = controller_state(wheels)
-    if controller.name == "mfhca":
+    if controller.name == "mfhca" and psi0:
         start[:, 0] = psi0
     out = [np.empty((n, wheels)) for _ in range(4)]
-    substeps = max(1, int(np.ceil(recorded.dt / _LONGEST_STEP - 1e-9)))
+    substeps = max(1, int(np.ceil(recorded.dt / longest_step - 1e-9)))
     scan(
         Signals(**columns),
         recorded.dt,
