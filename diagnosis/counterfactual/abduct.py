@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,6 +30,7 @@ Flags = NDArray[np.bool_]
 _MOST_SAMPLES = 2_000_000  # steps that fit into memory with all columns of both worlds
 _ICE = 0.1  # hold of the ground under a wheel that slips, as a share of firm ground's
 _HELD_SPEED, _HELD_OPENING = 0.012, 0.03  # within which a stuck part stands where it was at its onset [m/s], [fraction]
+_MOST_GRIP = 10.0  # beyond which a wheel model has the body drive the wheels, and not their valves
 _LEAST_LET = 0.2  # share of the speed that a sensor must let through for the speed to be read back from it
 
 
@@ -183,9 +184,21 @@ def _check(timeline: Timeline, replay: Replay, machine: Machine, name: str) -> N
 
 def _fit(timeline: Timeline, replay: Replay, machine: Machine, found: ComponentResult) -> WheelModelFit | None:
     """Wheel models that the diagnosis used; where it needed none, found the same way."""
-    if found.wheel_model is not None:
-        return found.wheel_model
-    return wheel_fit(wheel_channels(timeline, machine), replay, timeline, machine, _angle(timeline, machine))
+    channels, angle = wheel_channels(timeline, machine), _angle(timeline, machine)
+    fit = found.wheel_model or wheel_fit(channels, replay, timeline, machine, angle)
+    if fit is None or max(p.grip or 0.0 for p in fit.plants if p is not None) <= _MOST_GRIP:
+        return fit
+    # wheels that only follow the body say nothing of their own valves: what they have in common shows without it
+    free = replace(machine, plant=replace(machine.plant, coupling="free"))
+    again = wheel_fit(channels, replay, timeline, free, angle)
+    if again is None or any(p is None for p in again.plants):
+        return fit
+    plants = tuple(replace(p, grip=None) for p in again.plants if p is not None)
+    return replace(
+        again,
+        plants=plants,
+        note=f"{again.note} With the body its grip came out as implausible; a usual one was taken.",
+    )
 
 
 def _angle(timeline: Timeline, machine: Machine) -> Array:

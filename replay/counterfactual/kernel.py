@@ -103,11 +103,11 @@ def _tyres(world: int, k: int, v: F, r: Signals, p: CoupledPlant, state: WorldSt
 
 
 @njit(cache=True)
-def _read(k: int, r: Signals, state: WorldState, y: F) -> None:
+def _read(k: int, first: bool, r: Signals, state: WorldState, y: F) -> None:
     """y* = y + δ_s Δv; a sensor held at its onset stays where it was in the other world."""
     for i in range(y.size):
         if r.held_sensor[k, i]:
-            if k > 0 and not r.held_sensor[k - 1, i]:
+            if first and k > 0 and not r.held_sensor[k - 1, i]:
                 state.sensor_offset[i] = state.reading[i] - r.y[k - 1, i]
             y[i] = r.y[k, i] + state.sensor_offset[i]
         else:
@@ -116,11 +116,11 @@ def _read(k: int, r: Signals, state: WorldState, y: F) -> None:
 
 
 @njit(cache=True)
-def _open(k: int, h: float, r: Signals, u: F, u_max: float, state: WorldState, opening: F) -> None:
+def _open(k: int, first: bool, h: float, r: Signals, u: F, u_max: float, state: WorldState, opening: F) -> None:
     """u_v* = u_v + δ_a (u* − u); a valve held at its onset stays where it was in the other world."""
     for i in range(u.size):
         if r.held_valve[k, i]:
-            if k > 0 and not r.held_valve[k - 1, i]:
+            if first and k > 0 and not r.held_valve[k - 1, i]:
                 state.valve_offset[i] = state.given[i]
             more = state.valve_offset[i]
         else:
@@ -155,11 +155,11 @@ def scan(
         state.spool[:, i] = r.opening[0, i]
     for k in range(n):
         for sub in range(substeps):
-            _read(k, r, state, y)
+            _read(k, sub == 0, r, state, y)
             command(code, r.v_ref[k], y, h, u_max, gains, state.controller, u)
             if sub == 0:
                 out_y[k], out_u[k], out_shift[k], out_load[k] = y, u, state.shift, state.load
-            _open(k, h, r, u, u_max, state, opening)
+            _open(k, sub == 0, h, r, u, u_max, state, opening)
             _driven(0, r.opening[k], p, state, driven)
             _driven(1, opening, p, state, driven_other)
             for i in range(wheels):
