@@ -31,6 +31,7 @@ _MOST_SAMPLES = 2_000_000  # steps that fit into memory with all columns of both
 _ICE = 0.1  # hold of the ground under a wheel that slips, as a share of firm ground's
 _HELD_SPEED, _HELD_OPENING = 0.012, 0.03  # within which a stuck part stands where it was at its onset [m/s], [fraction]
 _MOST_GRIP = 10.0  # beyond which a wheel model has the body drive the wheels, and not their valves
+_SMOOTH_S = 0.05  # over which a measured opening is averaged
 _LEAST_LET = 0.2  # share of the speed that a sensor must let through for the speed to be read back from it
 
 
@@ -133,10 +134,12 @@ def abduct(timeline: Timeline, replay: Replay, machine: Machine, found: Componen
             held[fault.side][rows, i] = _held(y[:, i], y[min(f.start + 1, len(y) - 1), i], f, _HELD_SPEED)
         else:
             stuck = 0.0 if f.sat is None else f.sat.mean
-            opening[rows, i] = fault.let() * u[rows, i] + (1.0 - fault.let()) * stuck
+            rest = (1.0 - fault.let()) * stuck
+            opening[rows, i] = fault.let() * u[rows, i] + _rest(
+                channels.applied[rows, i], fault.let() * u[rows, i], rest, timeline.dt
+            )
             held[fault.side][rows, i] = _held(u[:, i], stuck, f, _HELD_OPENING)
     speed = np.where(channels.has_true, channels.true, speed)
-    opening = np.where(channels.has_applied & np.isfinite(channels.applied), channels.applied, opening)
     ratio, turn = in_motion(_angle(timeline, machine), machine, timeline)
     coupled = bool(np.isfinite(ratio).all()) and machine.plant.coupling != "free"
     world = RecordedWorld(
@@ -245,6 +248,18 @@ def _speed_behind(y: Array, fault: KnownFault) -> Array:
     """True speed behind a faulty sensor: y/δ where it is nothing but a share of it, else not known."""
     let = fault.let()
     return y / let if fault.finding.mode.scaled and let >= _LEAST_LET else np.full(y.shape, np.nan)
+
+
+def _rest(applied: Array, let: Array, rest: float, dt: float) -> Array:
+    """δ̄ of a faulty valve: what it opens beside its share of the command [fraction].
+
+    By the measured opening where there is one, smoothed: it is late, and a command with sgn(e) chatters from sample to sample.
+    """
+    if not np.isfinite(applied).all():
+        return np.full(let.shape, rest)
+    width = min(let.size, max(1, round(_SMOOTH_S / dt)))
+    total = np.convolve(applied - let, np.ones(width), "same")
+    return np.asarray(total / np.convolve(np.ones(let.size), np.ones(width), "same"))
 
 
 def _held(before: Array, value: float, finding: Finding, within: float) -> bool:
