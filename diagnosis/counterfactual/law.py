@@ -71,6 +71,17 @@ def asked_laws(names: Sequence[str], settings: Mapping[str, float], recorded: La
     Raises
     ------
     ConfigError
+        As `check_laws`.
+    """
+    return [_asked(name, settings, recorded, machine) for name in check_laws(names, settings)]
+
+
+def check_laws(names: Sequence[str], settings: Mapping[str, float]) -> list[str]:
+    """Names of the laws that are asked for, each once.
+
+    Raises
+    ------
+    ConfigError
         Where a name is not known, or parameters are given for several laws or for one that has none of that name.
     """
     wanted = list(dict.fromkeys(LAW_NAMES if "all" in names else names))
@@ -79,7 +90,9 @@ def asked_laws(names: Sequence[str], settings: Mapping[str, float], recorded: La
             raise ConfigError(f"--controller {name}: is not known; expected all or one of {', '.join(LAW_NAMES)}")
     if settings and len(wanted) > 1:
         raise ConfigError(f"--set: belongs to one law, {len(wanted)} are asked for; give one --controller")
-    return [_asked(name, settings, recorded, machine) for name in wanted]
+    for name in wanted:
+        Controller("mfhca" if name == PRINTED else name, settings)
+    return wanted
 
 
 def _asked(name: str, settings: Mapping[str, float], recorded: Law, machine: Machine) -> Law:

@@ -20,7 +20,7 @@ from diagnosis.counterfactual.document import (
     SelfReplayRow,
 )
 from diagnosis.counterfactual.figures import law_figures, recoveries
-from diagnosis.counterfactual.law import PRINTED, Law, asked_laws, recorded_law
+from diagnosis.counterfactual.law import PRINTED, Law, asked_laws, check_laws, recorded_law
 from diagnosis.counterfactual.tuning import tuned
 from replay.control.loop import Replay, replay_loop
 from replay.controllers.choice import Controller
@@ -35,6 +35,7 @@ from replay.version import __version__
 Array = NDArray[np.float64]
 
 ERROR_WITHIN, EFFORT_WITHIN = 0.02, 0.05  # of the recorded figures, for self-replay
+_LEAST_ERROR = 2e-4  # that counts, a tenth of a speed sensor's resolution [m/s]
 
 
 @dataclass(frozen=True)
@@ -113,6 +114,7 @@ def counterfactual(
     ConfigError
         Where a law or a parameter is not known.
     """
+    check_laws(request.laws, request.settings)
     name = ", ".join(p.name for p in paths)
     replay, abducted = _world(paths, machine, name, request.start_s, request.stop_s, progress)
     if request.recorded is not None:
@@ -207,8 +209,8 @@ def _self_replay(abducted: Abducted, law: Law, own: OtherWorld, name: str) -> Se
         "effort_replayed": replayed,
         "shift": float(np.abs(own.shift[known]).mean()),
     }
-    apart = (abs(after - before) / max(before, 1e-9), abs(replayed - effort) / max(effort, 1e-9))
-    if not (apart[0] <= ERROR_WITHIN and apart[1] <= EFFORT_WITHIN):
+    same = abs(after - before) <= max(ERROR_WITHIN * before, _LEAST_ERROR)
+    if not (same and abs(replayed - effort) <= EFFORT_WITHIN * max(effort, 1e-9)):
         raise NotJudged(
             f"{name}: self-replay: the law found in it ({row['law']}) gives a mean |e| of {after:.4f} instead of {before:.4f} m/s and "
             f"an effort of {replayed:.4f} instead of {effort:.4f} (allowed: {100 * ERROR_WITHIN:.0f} % and {100 * EFFORT_WITHIN:.0f} %), "

@@ -11,7 +11,6 @@ from replay.controllers.choice import ControllerGains, command
 from replay.counterfactual.world import CoupledPlant, F, Flags
 
 _NEWTON_STEPS = 2
-_HELD_S = 0.05  # over which a held valve's command counts: laws with sgn(e) chatter, and a single sample says nothing
 _OBSERVER = (8.0, 16.0)  # gains of the load observer: speed [1/s], load [1/s]
 
 
@@ -43,7 +42,7 @@ class WorldState(NamedTuple):
     sensor_offset: F  # what a held sensor shows more in the other world
     valve_offset: F
     reading: F  # y* of the step before
-    given: F  # u_v* less u_v, low-passed
+    given: F  # u_v* less u_v of the step before
     controller: F  # (wheels, STATES)
 
 
@@ -116,7 +115,7 @@ def _read(k: int, first: bool, r: Signals, state: WorldState, y: F) -> None:
 
 
 @njit(cache=True)
-def _open(k: int, first: bool, h: float, r: Signals, u: F, u_max: float, state: WorldState, opening: F) -> None:
+def _open(k: int, first: bool, r: Signals, u: F, u_max: float, state: WorldState, opening: F) -> None:
     """u_v* = u_v + δ_a (u* − u); a valve held at its onset stays where it was in the other world."""
     for i in range(u.size):
         if r.held_valve[k, i]:
@@ -126,7 +125,7 @@ def _open(k: int, first: bool, h: float, r: Signals, u: F, u_max: float, state: 
         else:
             more = r.let_valve[k, i] * (u[i] - r.u[k, i])
         opening[i] = min(max(r.opening[k, i] + more, -u_max), u_max)
-        state.given[i] += min(h / _HELD_S, 1.0) * (more - state.given[i])
+        state.given[i] = more
 
 
 @njit(cache=True)
@@ -159,7 +158,7 @@ def scan(
             command(code, r.v_ref[k], y, h, u_max, gains, state.controller, u)
             if sub == 0:
                 out_y[k], out_u[k], out_shift[k], out_load[k] = y, u, state.shift, state.load
-            _open(k, sub == 0, h, r, u, u_max, state, opening)
+            _open(k, sub == 0, r, u, u_max, state, opening)
             _driven(0, r.opening[k], p, state, driven)
             _driven(1, opening, p, state, driven_other)
             for i in range(wheels):
