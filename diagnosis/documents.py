@@ -8,6 +8,8 @@ import msgspec
 
 from diagnosis.audit.fleet.fleet_types import SCHEMA as FLEET_SCHEMA
 from diagnosis.audit.fleet.fleet_types import FleetDocument
+from diagnosis.counterfactual.document import SCHEMA as COUNTERFACTUAL_SCHEMA
+from diagnosis.counterfactual.document import CounterfactualDocument
 from diagnosis.evaluation.document import SCHEMA as SCORES_SCHEMA
 from diagnosis.evaluation.document import ScoresDocument
 from diagnosis.results.comparison_document import SCHEMA as COMPARISON_SCHEMA
@@ -21,6 +23,7 @@ DOCUMENTS: dict[str, tuple[type, str]] = {
     "report": (ReportDocument, REPORT_SCHEMA),
     "comparison": (ComparisonDocument, COMPARISON_SCHEMA),
     "scores": (ScoresDocument, SCORES_SCHEMA),
+    "counterfactual": (CounterfactualDocument, COUNTERFACTUAL_SCHEMA),
     "fleet": (FleetDocument, FLEET_SCHEMA),
 }
 

@@ -61,6 +61,10 @@ class Stage(Enum):
     FITTING_GEOMETRY = ("fitting the geometry",)
     FITTING_DRIVES = ("fitting the drives",)
 
+    PREDICTING = ("predicting the mission under",)
+    TUNING = ("tuning",)
+    DRAWING = ("drawing plants and faults for the bands",)
+
     SIMULATING = ("simulating",)
     INJECTING = ("injecting faults",)
     WRITING = ("writing",)

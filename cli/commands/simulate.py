@@ -24,6 +24,8 @@ Examples:
   mfhca simulate -o other.mcap --vary --seed 7
   mfhca simulate -o foreign.mcap --set structure=valves --rate 500 --evidence base
   mfhca simulate -o any.mcap --vary --set structure=random --seed 12
+  mfhca simulate -o table.mcap --preset paper-table
+  mfhca simulate -o fuzzy.mcap --controller fuzzy
 
 \b
 A fault is PART SIDE MODE START STOP [eps=] [sat=] [std=] [tau=] [ramp=]: part FR FL RR RL front
@@ -34,7 +36,7 @@ the time over which eps grows from 0.
 \b
 Keys of --set, SI units. Machine: K tau wheel_spread tau_spread dead_zone valve_lag droop leakage
 pump_flow mass friction ice_friction slip_stiffness rolling_resistance v_std v_lsb phi_std phi_lsb.
-Controller: lambda k_ps zeta psi0. Ground: steepness. Scenario: ramp_share ramp_max_s early_share
+Controller: lambda k_ps zeta psi0, or with --controller parameters of that class. Ground: steepness. Scenario: ramp_share ramp_max_s early_share
 (growing faults, faults from the first sample). Recorder: jitter drop_share drop_burst_s.
 structure=NAME: a machine of another structure, its sizes drawn by the seed: valves (dead band,
 hysteresis, resonance), pump (shared, load-dependent, warming), torque (drives that accelerate),
@@ -46,6 +48,7 @@ class Scenario(StrEnum):
     """What the machine does, and which faults it meets."""
 
     PAPER = "paper"
+    BRIEF = "brief"
     RANDOM = "random"
     HEALTHY = "healthy"
 
@@ -65,6 +68,24 @@ class Coupling(StrEnum):
     FREE = "free"
 
 
+class ControllerName(StrEnum):
+    """Controller of the wheels' valves: the paper's, references, and representatives of the classes it is compared with."""
+
+    MFHCA = "mfhca"
+    P = "p"
+    PI = "pi"
+    ADAPTIVE = "adaptive"
+    FINITE_TIME = "finite-time"
+    NEURAL = "neural"
+    FUZZY = "fuzzy"
+
+
+class PresetName(StrEnum):
+    """Named missions."""
+
+    PAPER_TABLE = "paper-table"
+
+
 class Law(StrEnum):
     """Control law of the simulated machine."""
 
@@ -80,7 +101,12 @@ Output = Annotated[
     Path | None,
     typer.Option("--output", "-o", metavar="FILE", help="Log to write. Default: mission with the format's ending."),
 ]
-ScenarioName = Annotated[Scenario, typer.Option(help="Drive and faults.")]
+ScenarioName = Annotated[
+    Scenario | None,
+    typer.Option(
+        help="Drive and faults; brief: the paper's drive, faults that Assumptions 1 and 2 allow.", show_default="paper"
+    ),
+]
 Seed = Annotated[int, typer.Option(help="The same seed gives the same mission.")]
 Duration = Annotated[float, typer.Option(metavar="S", help="Length of the mission [s].")]
 Rate = Annotated[float | None, typer.Option(metavar="HZ", help="Recorded rate [Hz], 50 to 1000.", show_default="1000")]
@@ -94,6 +120,18 @@ CouplingName = Annotated[
     Coupling | None, typer.Option(help="Wheels coupled by the ground, or free.", show_default="ground")
 ]
 LawName = Annotated[Law | None, typer.Option(help="Control law.", show_default="opposed")]
+ControllerChoice = Annotated[
+    ControllerName | None,
+    typer.Option("--controller", help="Controller of the valves, instead of a law.", show_default="mfhca"),
+]
+PresetChoice = Annotated[
+    PresetName | None,
+    typer.Option(
+        "--preset",
+        help="A named mission. paper-table: a reconstruction in which MFHCA comes to the paper's table.",
+        show_default=False,
+    ),
+]
 Ice = Annotated[
     float | None, typer.Option(metavar="SHARE", help="Share of icy ground, 0 to 0.9.", show_default="by scenario")
 ]
@@ -117,13 +155,15 @@ Force = Annotated[bool, typer.Option("--force", help="Replace an earlier simulat
 def simulate(
     context: typer.Context,
     output: Output = None,
-    scenario: ScenarioName = Scenario.PAPER,
+    scenario: ScenarioName = None,
+    preset: PresetChoice = None,
     seed: Seed = 1,
     duration: Duration = 240.0,
     rate: Rate = None,
     evidence: Logged = Evidence.DIRECT,
     coupling: CouplingName = None,
     law: LawName = None,
+    controller: ControllerChoice = None,
     ice: Ice = None,
     format: Format = None,  # noqa: A002 - the option's name
     fault: Faults = None,
@@ -137,13 +177,15 @@ def simulate(
     """Simulate a mission with known faults: a log, and its truth beside it."""
     request = SimulateRequest(
         output=output,
-        scenario=scenario.value,
+        scenario=None if scenario is None else scenario.value,
+        preset=None if preset is None else preset.value,
         seed=seed,
         duration_s=duration,
         rate_hz=rate,
         evidence=evidence.value,
         coupling=None if coupling is None else coupling.value,
         law=None if law is None else law.value,
+        controller=None if controller is None else controller.value,
         ice=ice,
         format=format,
         faults=fault or [],

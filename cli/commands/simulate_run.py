@@ -13,6 +13,7 @@ from replay.errors import ConfigError
 from replay.progress import Progress, Stage
 
 if TYPE_CHECKING:
+    from replay.controllers.choice import Controller
     from replay.faults import FaultSpec
     from replay.simulation.options import EvidenceLevel, Scenario, SimulatedLaw, SimulatedMission, SimulationOptions
     from replay.simulation.structures import StructureOptions
@@ -58,13 +59,15 @@ class SimulateRequest:
     """What the command line asks for; names and defaults as there, None for what is left to the scenario."""
 
     output: Path | None
-    scenario: Scenario
+    scenario: Scenario | None
+    preset: str | None
     seed: int
     duration_s: float
     rate_hz: float | None
     evidence: EvidenceLevel
     coupling: Literal["ground", "free"] | None
     law: SimulatedLaw | None
+    controller: str | None
     ice: float | None
     format: LogFormat | None
     faults: list[str]
@@ -101,7 +104,7 @@ def run_simulation(terminal: Terminal, request: SimulateRequest) -> None:
         terminal.note(
             f"{log}: the {options.scenario} scenario has no fault in {options.duration_s:g} s; give a longer --duration, or --fault"
         )
-    _show(terminal, mission, log, truth, kind, request.json)
+    _show(terminal, mission, log, truth, kind, request)
 
 
 def _check_absent(log: Path, truth: Path, force: bool) -> None:
@@ -115,15 +118,23 @@ def _check_absent(log: Path, truth: Path, force: bool) -> None:
 def _options(request: SimulateRequest, faults: tuple[FaultSpec, ...] | None) -> SimulationOptions:
     """Options of the scenario, with what the request gives instead."""
     from replay.simulation.options import SimulationOptions
+    from replay.simulation.presets import preset_options
     from replay.simulation.variation import varied_options
 
-    scenario, seed, duration = request.scenario, request.seed, request.duration_s
+    scenario: Scenario = request.scenario or "paper"
+    seed, duration = request.seed, request.duration_s
     if request.vary:
         kind: Literal["tuning", "reporting"] = "tuning" if seed < 1000 else "reporting"
         structure = _structure(request.settings)
         options = varied_options(seed, kind=kind, scenario=scenario, duration_s=duration, structure=structure)
     else:
         options = SimulationOptions(scenario=scenario, seed=seed, duration_s=duration)
+    options = replace(options, controller=_controller(request))
+    if request.preset is not None:
+        if request.scenario is not None or request.vary:
+            other = "--vary" if request.vary else "--scenario"
+            raise ConfigError(f"--preset {request.preset}: says itself what {other} would; leave one of them out")
+        options = preset_options(request.preset, options)
     return replace(
         options,
         evidence=request.evidence,
@@ -135,12 +146,48 @@ def _options(request: SimulateRequest, faults: tuple[FaultSpec, ...] | None) -> 
     )
 
 
-def _show(terminal: Terminal, mission: SimulatedMission, log: Path, truth: Path, kind: LogFormat, json: bool) -> None:
+def _controller(request: SimulateRequest) -> Controller | None:
+    """Controller that stands in for the law, with its own parameters of ``--set``; None for the paper's law."""
+    from replay.controllers.choice import Controller
+
+    if request.controller in (None, "mfhca"):
+        return None
+    settable = Controller(str(request.controller)).settable
+    given = [words.partition("=") for words in request.settings]
+    return Controller(
+        str(request.controller),
+        {key: _number(f"{key}={text}", text) for key, _, text in given if key in settable and text},
+    )
+
+
+def _preset_text(name: str) -> str:
+    from replay.simulation.presets import PRESETS
+
+    return f"{name}: {PRESETS[name].text}"
+
+
+def _loop(mission: SimulatedMission) -> tuple[float, float]:
+    """Mean |v_a − v_c| with the true speed [m/s] and mean |u| over the wheels."""
+    import numpy as np
+
+    wheels = mission.options.machine.wheels
+    error = [np.abs(mission.actual[f"wheel.{w}.v"] - mission.actual[f"wheel.{w}.v_ref"]).mean() for w in wheels]
+    effort = [np.abs(mission.columns[f"wheel.{w}.u"]).mean() for w in wheels]
+    return float(np.mean(error)), float(np.mean(effort))
+
+
+def _show(
+    terminal: Terminal, mission: SimulatedMission, log: Path, truth: Path, kind: LogFormat, request: SimulateRequest
+) -> None:
     words = ["mfhca", "diagnose", str(log)]
+    preset = None if request.preset is None else _preset_text(request.preset)
+    error, effort = _loop(mission)
     count, duration = len(mission.truth.intervals), mission.truth.duration_s
-    if json:
+    if request.json:
         terminal.show_json(
             {"log": str(log), "truth": str(truth), "faults": count, "duration_s": duration, "diagnose": words}
+            | {"tracking_error": error, "control_effort": effort}
+            | ({} if preset is None else {"preset": preset})
         )
         return
     from cli.tables.layout import key_values
@@ -149,6 +196,9 @@ def _show(terminal: Terminal, mission: SimulatedMission, log: Path, truth: Path,
         ("log", f"{log}  ({kind.value}, {duration:g} s at {mission.options.rate_hz:g} Hz)"),
         ("truth", f"{truth}  ({count} fault{'' if count == 1 else 's'})"),
     ]
+    rows.append(("loop", f"mean |v_a − v_c| {error:.4f} m/s, mean |u| {effort:.3f} of full opening"))
+    if preset is not None:
+        rows.append(("preset", preset))
     terminal.show(key_values([*rows, ("next", shlex.join(words))]))
 
 
@@ -169,6 +219,8 @@ def _keep_other_truth(path: Path, truth: MissionTruth) -> None:
 
 def _check_law(request: SimulateRequest, options: SimulationOptions) -> None:
     """Raise a `ConfigError` where a law is asked for and the machine's structure has another."""
+    if request.law is not None and request.controller not in (None, "mfhca"):
+        raise ConfigError(f"--law {request.law}: is a reading of MFHCA's law; leave it out, or --controller")
     if request.law is None or options.structure is None:
         return
     own = options.structure.structure(options.seed).law
@@ -186,6 +238,13 @@ def _structure(settings: list[str]) -> StructureOptions | None:
     return StructureOptions(names[-1]) if names else None
 
 
+def _number(words: str, text: str) -> float:
+    try:
+        return float(text)
+    except ValueError as error:
+        raise ConfigError(f"--set {words}: {text!r} is not a number") from error
+
+
 def _changed(options: SimulationOptions, settings: list[str]) -> SimulationOptions:
     """Options with constants changed as ``KEY=VALUE``.
 
@@ -197,21 +256,19 @@ def _changed(options: SimulationOptions, settings: list[str]) -> SimulationOptio
     values: dict[str, float] = {}
     structure = _structure(settings)
     keys = [words.partition("=")[0] for words in settings]
+    own = () if options.controller is None else options.controller.settable
     for words, key in zip(settings, keys, strict=True):
         text = words.partition("=")[2]
         if keys.count(key) > 1:
             raise ConfigError(f"--set {words}: {key} is given {keys.count(key)} times; give it once")
         if not text:
             raise ConfigError(f"--set {words}: the value is missing; expected KEY=VALUE")
-        if key == "structure":
+        if key == "structure" or key in own:
             continue
         if key not in (*_PLANT, *_CONTROL, *_MISSION):
-            known = ", ".join((*_PLANT, *_CONTROL, *_MISSION, "structure"))
+            known = ", ".join(dict.fromkeys((*_PLANT, *_CONTROL, *_MISSION, "structure", *own)))
             raise ConfigError(f"--set {words}: {key!r} is not known; expected KEY=VALUE with KEY one of {known}")
-        try:
-            values[key] = float(text)
-        except ValueError as error:
-            raise ConfigError(f"--set {words}: {text!r} is not a number") from error
+        values[key] = _number(words, text)
     given = [key for key in _DRAWN if key in values]
     if structure is not None and given:
         raise ConfigError(f"--set {given[0]}: a machine of another structure draws its own; leave it out, or structure")

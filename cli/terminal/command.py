@@ -69,6 +69,13 @@ class App(TyperGroup):
             raise typer.Exit(USAGE)
         return super().parse_args(ctx, args)
 
+    def resolve_command(self, ctx: Any, args: list[str]) -> tuple[str | None, Any, list[str]]:
+        """Command that the first words name: one of two words goes before that of its first word."""
+        two = " ".join(args[:2])
+        if len(args) > 1 and two in self.commands:
+            return two, self.commands[two], args[2:]
+        return super().resolve_command(ctx, args)
+
     def format_commands(self, ctx: Any, formatter: Any) -> None:
         """List the commands under the names of their panels."""
         panels: dict[str, list[tuple[str, str]]] = {}

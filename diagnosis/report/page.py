@@ -8,10 +8,7 @@ evidence in the markup, the others get it from the page's scripts.
 
 from __future__ import annotations
 
-import base64
-import hashlib
 import re
-import zlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
@@ -26,6 +23,7 @@ from numpy.typing import NDArray
 from diagnosis.decision.wording import join_words
 from diagnosis.pages import labels
 from diagnosis.pages.environment import SHARED, asset, environment, shared_style
+from diagnosis.pages.scripts import packed_plotly, script_policy
 from diagnosis.pages.svg import icon
 from diagnosis.report import tables
 from diagnosis.report.compared_channels import pair_of
@@ -44,7 +42,6 @@ from diagnosis.results.document import IntervalRow, ReportDocument
 from diagnosis.results.fault_rows import FAULT_ROWS, state_label
 from diagnosis.results.result import Closeups
 from diagnosis.results.vocabulary import part_name
-from replay.errors import ConfigError
 from replay.faults import FaultMode
 
 _ASSETS = Path(__file__).parent / "assets"
@@ -106,7 +103,7 @@ def build_page(
     series = _series(report, columns, closeups)
     duration = _duration(report, series.axis)
     plots = len(series.filled) > 1
-    plotly, packed, version = _plotly(plotlyjs) if plots else ("", "", "none, no plots")
+    plotly, packed, version = packed_plotly(plotlyjs) if plots else ("", "", "none, no plots")
     evidence = evidence_of(report, series.shown, series.place, series.axis.per, detailed, series.closeups)
     drawn = sum(len(p.picture) for e in evidence.values() for p in (*e.edges, *e.course))
     words = 400_000 + 6_000 * len(detailed) + 1_500 * len(report["intervals"]) + len(intervals)
@@ -183,7 +180,7 @@ def _scripts(plotly: Sequence[str]) -> tables.Context:
         "css": Markup(shared_style() + "".join(asset(path) for path in _STYLES)),
         "head": Markup(head),
         "scripts": [Markup(s) for s in scripts],
-        "csp": _policy([head, *scripts, *plotly]),
+        "csp": script_policy([head, *scripts, *plotly]),
     }
 
 
@@ -198,32 +195,6 @@ def _thumbnail(fault: IntervalRow, columns: Columns, start: float, step: float) 
     if pair is None:
         return Markup("")
     return thumbnail(fault, columns[pair.measured], columns[pair.reference] if pair.reference else None, start, step)
-
-
-@lru_cache
-def _plotly(path: Path | None) -> tuple[str, str, str]:
-    """Source of plotly.js, the same deflated in base64, and its version."""
-    if path is None:
-        from plotly.offline import get_plotlyjs
-
-        source = str(get_plotlyjs())
-    else:
-        try:
-            source = path.read_text("utf-8-sig")
-        except (OSError, UnicodeDecodeError) as e:
-            raise ConfigError(f"--plotlyjs {path}: cannot be read ({e}); expected a plotly.js bundle") from e
-    found = re.search(r"plotly\.js(?: \([\w-]+ - minified\))? v([\d.]+)", source[:2000])
-    packed = base64.b64encode(zlib.compress(source.encode(), 9)).decode("ascii")
-    return source, packed, found[1] if found else "unknown"
-
-
-def _policy(scripts: Sequence[str]) -> str:
-    """Content security policy that admits these scripts and nothing else."""
-    hashes = " ".join(f"'sha256-{base64.b64encode(hashlib.sha256(s.encode()).digest()).decode()}'" for s in scripts)
-    return (
-        f"default-src 'none'; script-src {hashes}; style-src 'unsafe-inline'; img-src data: blob:; font-src data:; "
-        "base-uri 'none'; form-action 'none'"
-    )
 
 
 def _headed(rows: Markup, heads: Sequence[str]) -> Markup:

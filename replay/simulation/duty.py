@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from replay.simulation.options import SimulationOptions
+from replay.simulation.options import PAPER_DRIVES, SimulationOptions
 
 _STEER_RATE = 0.2  # fastest commanded steering [rad/s]: below what the cylinders can follow
 _WOBBLE = 0.08  # share by which an operator's hand varies the speed
@@ -100,7 +100,7 @@ def duty_of(options: SimulationOptions, rng: np.random.Generator) -> Duty:
     """Duty cycle of a scenario: the paper's (repeated where the mission is longer), or a random one."""
     geometry = options.machine.geometry
     assert geometry is not None  # checked by SimulationOptions
-    paper = options.scenario == "paper"
+    paper = options.scenario in PAPER_DRIVES
     moves = _paper_moves(options.duration_s) if paper else _random_moves(options, rng)
     slopes = _paper_slopes(options.duration_s) if paper else _random_slopes(options.duration_s, rng)
     start, speed, steer = np.array(moves).T

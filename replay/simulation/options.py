@@ -9,6 +9,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from replay.controllers.choice import Controller
 from replay.errors import ConfigError, check_range
 from replay.faults import FaultMode, FaultSpec, Side
 from replay.machine.config import Machine, haulotte
@@ -16,11 +17,12 @@ from replay.simulation.plant_options import PlantOptions
 from replay.simulation.structures import StructureOptions
 from replay.truth import MissionTruth
 
-Scenario = Literal["paper", "random", "healthy"]
+Scenario = Literal["paper", "brief", "random", "healthy"]
 EvidenceLevel = Literal["base", "spool", "direct"]
 SimulatedLaw = Literal["opposed", "signed", "printed", "sign_abs", "p", "event_reset"]
 
-SCENARIOS: tuple[str, ...] = ("paper", "random", "healthy")
+SCENARIOS: tuple[str, ...] = ("paper", "brief", "random", "healthy")
+PAPER_DRIVES: tuple[str, ...] = ("paper", "brief")
 EVIDENCE_LEVELS: tuple[str, ...] = ("base", "spool", "direct")
 SIMULATED_LAWS: tuple[str, ...] = ("opposed", "signed", "printed", "sign_abs", "p", "event_reset")
 SIMULATED_AXLES: tuple[str, ...] = ("front", "rear")
@@ -33,7 +35,8 @@ class SimulationOptions:
     Attributes
     ----------
     scenario : str
-        ``paper`` (its duty cycle and faults), ``random`` (joystick-like, random faults), ``healthy`` (no faults).
+        ``paper`` (its duty cycle and faults), ``brief`` (its duty cycle, faults as brief and partial as Assumptions 1 and 2
+        demand), ``random`` (joystick-like, random faults), ``healthy`` (no faults).
     seed : int
         The same seed gives the same mission.
     duration_s, rate_hz : float
@@ -51,7 +54,7 @@ class SimulationOptions:
     psi0 : float
         Ψ̂(0).
     ice : float or None
-        Share of the ground under ice, 0…0.9; None: 0.25 in ``paper``, else 0.
+        Share of the ground under ice, 0…0.9; None: 0.25 in ``paper`` and ``brief``, else 0.
     slopes : bool
         Whether the ground rises and falls.
     steepness : float
@@ -80,6 +83,8 @@ class SimulationOptions:
         Physics and sensors.
     structure : StructureOptions or None
         Another structure of valves, pump, drive, sensors and law; None: the default one.
+    controller : Controller or None
+        Another controller of the wheels' valves instead of `law` (and of the structure's); None: the law.
     """
 
     scenario: Scenario = "random"
@@ -109,6 +114,7 @@ class SimulationOptions:
     machine: Machine = field(default_factory=haulotte)
     plant: PlantOptions = field(default_factory=PlantOptions)
     structure: StructureOptions | None = None
+    controller: Controller | None = None
 
     def __post_init__(self) -> None:
         """Check values."""
@@ -167,7 +173,7 @@ class SimulationOptions:
     @property
     def ice_share(self) -> float:
         """Share of the ground under ice."""
-        return (0.25 if self.scenario == "paper" else 0.0) if self.ice is None else self.ice
+        return (0.25 if self.scenario in PAPER_DRIVES else 0.0) if self.ice is None else self.ice
 
     @property
     def substeps(self) -> int:

@@ -6,6 +6,8 @@ import numpy as np
 from numba import njit
 
 from replay.arrays.copying import put
+from replay.controllers.choice import command as controlled
+from replay.controllers.mfhca import EVENT_RISE, read_law
 from replay.simulation.state import (
     DELAY_LINE,
     PHI_DELAY,
@@ -17,8 +19,6 @@ from replay.simulation.state import (
     PlantState,
     Recording,
 )
-
-_EVENT_RISE = 0.03  # rise of |e| that resets Ψ̂ [m/s]
 
 
 @njit(cache=True)
@@ -71,20 +71,8 @@ def _references(k: int, v: float, omega: float, p: PlantModel, state: PlantState
 
 @njit(cache=True)
 def _law(v_ref: float, v: float, psi: float, p: PlantModel) -> float:
-    """u_a in its readings, L15 (14): 0 opposed, 1 signed, 2 printed, 3 sign_abs, 4 proportional alone, 5 event_reset."""
-    e = v - v_ref
-    s = 1.0 if v_ref >= 0.0 else -1.0
-    if p.law == 0:
-        u = -p.lam * e - np.sign(e) * psi * psi
-    elif p.law == 1 or p.law == 5:
-        u = -p.lam * e + s * psi * psi
-    elif p.law == 2:
-        u = -p.lam * abs(v) + p.lam * abs(v_ref) + psi * psi
-    elif p.law == 3:
-        u = s * (p.lam * (abs(v_ref) - abs(v)) + psi * psi)
-    else:
-        u = -p.lam * e
-    return float(min(max(u, -p.u_max), p.u_max))
+    """u_a, L15 (14), in the simulated reading."""
+    return float(read_law(p.law, v_ref, v, psi, p.lam, p.u_max))
 
 
 @njit(cache=True)
@@ -94,9 +82,9 @@ def _reset_at_jumps(i: int, e: float, p: PlantModel, state: PlantState) -> None:
     error[0] += p.event_gains[0] * (abs(e) - error[0])
     error[1] += p.event_gains[1] * (abs(e) - error[1])
     rise = error[0] - error[1]
-    if error[2] == 0.0 and rise > _EVENT_RISE:
+    if error[2] == 0.0 and rise > EVENT_RISE:
         state.psi[i], error[2] = np.sqrt(p.lam * error[0]), 1.0
-    elif rise < 0.25 * _EVENT_RISE:
+    elif rise < 0.25 * EVENT_RISE:
         error[2] = 0.0
 
 
@@ -222,6 +210,9 @@ def scan(
             if p.law == 5:
                 _reset_at_jumps(i, v[i] - v_ref[i], p, state)
             u[i] = _law(v_ref[i], v[i], state.psi[i], p)
+        if p.controller >= 0:
+            controlled(p.controller, v_ref, v, p.dt, p.u_max, p.gains, state.controller, u)
+        for i in range(n):
             c = n + 2 + i
             u_v[i] = _faulted(c, k, u[i], fault_normal[c], faults, state)
             state.last[c] = u_v[i]

@@ -7,6 +7,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from replay.controllers.choice import NEUTRAL, controller_state
 from replay.errors import ConfigError
 from replay.faults import FaultSpec, Side
 from replay.simulation.duty import Duty, duty_of
@@ -130,6 +131,7 @@ def _initial_state(wheels: int, psi0: float, table: FaultTable) -> PlantState:
         row=table.first[:-1].copy(),
         varying=np.zeros(channels),
         line=np.zeros((DELAY_LINE, 2 * wheels + 4)),
+        controller=controller_state(wheels),
     )
 
 
@@ -187,6 +189,8 @@ def _model(options: SimulationOptions, rng: np.random.Generator) -> PlantModel:
         phi_lsb=plant.phi_lsb,
         ice_waves=waves,
         ice_level=level,
+        controller=-1 if options.controller is None else options.controller.kind.code,
+        gains=NEUTRAL if options.controller is None else options.controller.gains(),
     )
 
 

@@ -13,6 +13,7 @@ from replay.faults import FaultMode, FaultSpec, Range, Side, drawn_modes, table_
 from replay.simulation.duty import Duty
 from replay.simulation.options import SIMULATED_AXLES, SimulationOptions
 
+_BRIEF_S, _BRIEF_SHARE = 0.2, 0.3  # length of brief stuck sensors [s], and share of ε that is left of partial faults
 _NEVER_STOPPED = 0.12  # a fault begins where the machine drives at least this fast [m/s]
 
 
@@ -22,6 +23,8 @@ def faults_of(options: SimulationOptions, duty: Duty, rng: np.random.Generator) 
         faults = list(options.faults)
     elif options.scenario == "paper":
         faults = _paper_faults(options, duty, rng)
+    elif options.scenario == "brief":
+        faults = _brief_faults(options, duty, rng)
     elif options.scenario == "random":
         faults = _random_faults(options, duty, rng)
     else:
@@ -110,6 +113,23 @@ def _paper_faults(options: SimulationOptions, duty: Duty, rng: np.random.Generat
             if place is not None:
                 faults.append(draw_fault(wheel, side, mode, *place, rng, steer=False))
                 busy.append((*place, side))
+    return faults
+
+
+def _brief_faults(options: SimulationOptions, duty: Duty, rng: np.random.Generator) -> list[FaultSpec]:
+    """The paper's faults as far as a machine may go on with them.
+
+    By Assumption 1 a stuck or silent sensor is tolerable while it is brief, by Assumption 2 a stuck or silent valve stops the
+    machine: so the FR sensor is stuck for 0.2 s at each of its three times, no other part is stuck or silent, and partial
+    losses have three tenths of their ε.
+    """
+    first = options.machine.wheels[0]
+    faults = []
+    for fault in _paper_faults(options, duty, rng):
+        if not fault.mode.total:
+            faults.append(replace(fault, epsilon=_BRIEF_SHARE * fault.epsilon))
+        elif (fault.component, fault.side, fault.mode) == (first, Side.SENSOR, FaultMode.STUCK):
+            faults.append(replace(fault, stop_s=round(fault.start_s + _BRIEF_S, 3)))
     return faults
 
 

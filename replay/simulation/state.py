@@ -7,6 +7,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from replay.controllers.choice import NEUTRAL, ControllerGains
+
 F = NDArray[np.float64]
 I = NDArray[np.int64]  # noqa: E741
 
@@ -55,6 +57,8 @@ class PlantModel(NamedTuple):
     phi_lsb: float
     ice_waves: F
     ice_level: float
+    controller: int = -1  # of `replay.controllers.choice`, instead of the law; −1: the law
+    gains: ControllerGains = NEUTRAL
 
 
 class FaultTable(NamedTuple):
@@ -89,6 +93,7 @@ class PlantState(NamedTuple):
     row: I
     varying: F
     line: F  # delay line: v (n), u (n), φ (2), u_s (2)
+    controller: F  # state of a controller that stands in for the law, shape (n, STATES)
 
 
 class Recording(NamedTuple):

@@ -6,6 +6,7 @@ import numpy as np
 from numba import njit
 
 from replay.arrays.copying import put
+from replay.controllers.choice import command as controlled
 from replay.simulation.plant import _faulted, _friction, _law, _quantised, _references, _reset_at_jumps
 from replay.simulation.state import (
     DELAY_LINE,
@@ -204,6 +205,9 @@ def scan(
             v[i] = _quantised(_faulted(i, k, clean, fault_normal[i], faults, state), p.v_lsb)
             state.last[i] = v[i]
             u[i] = _command(i, v_ref[i], v[i], p, m, state, s)
+        if p.controller >= 0:
+            controlled(p.controller, v_ref, v, p.dt, p.u_max, p.gains, state.controller, u)
+        for i in range(n):
             c = n + 2 + i
             u_v[i] = _faulted(c, k, u[i], fault_normal[c], faults, state)
             state.last[c] = u_v[i]
