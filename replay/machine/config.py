@@ -17,6 +17,7 @@ from replay.machine.geometry import Geometry, four_wheel_geometry
 from replay.machine.plant import Coupling as Coupling
 from replay.machine.plant import Plant as Plant
 from replay.machine.plant import WheelPlant as WheelPlant
+from replay.machine.quantities import DEGREES
 from replay.machine.signal_table import names_of, signal_of
 
 Law = Literal["auto", "signed", "opposed", "printed", "sign_abs", "none"]
@@ -193,7 +194,7 @@ class Machine:
             object.__setattr__(self, "geometry", replace(self.geometry, wheels=places))
         check_range("geometry.gear_ratio", self.gear_ratio, 1e-3, 1e4, "")
         check_range("geometry.max_speed", self.max_speed, 1e-6, 1e6, "m/s")
-        check_range("geometry.max_steer", self.max_steer, 0.0, 3.2, "rad")
+        check_range("geometry.max_steer", self.max_steer, 0.0, 3.2, "rad", mistaken=DEGREES)
         self._check_drives()
         for section, names in (("signals", self.signals), ("noise", self.noise)):
             for name in names:

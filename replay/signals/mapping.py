@@ -17,6 +17,7 @@ from replay.errors import ConfigError
 from replay.log.raw_log import Channel, LogSummary, RawLog
 from replay.log.source_options import SignalSource
 from replay.machine.config import Machine
+from replay.machine.units import known_unit
 from replay.signals.rules import Candidate, candidates, wanted_type
 from replay.signals.signal import Signal, Signals
 from replay.signals.to_si import Converted, choose_motor_or_wheel, convert, doubt, usable_unit
@@ -166,7 +167,11 @@ def _take_guess(draft: _Draft, name: str, found: list[tuple[Candidate, RawLog]])
             return
         text = f"{name} is taken from {origin.label} ({candidate.why}"
         text += f", in {origin.unit.replace('1', 'fractions')}" if origin.unit else ", unit not stated, SI assumed"
-        text += f" at the {origin.at})" if origin.unit in ("rpm", "rad/s") and name.startswith("wheel.") else ")"
+        text += (
+            f" at the {origin.at})"
+            if known_unit(origin.unit) in ("rpm", "rad/s") and name.startswith("wheel.")
+            else ")"
+        )
         rivals = [
             c.origin.label
             for c, rival in ranked[i + 1 :]

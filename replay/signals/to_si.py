@@ -16,7 +16,7 @@ from replay.log.stamp_order import spread_ticks
 from replay.machine.config import Machine
 from replay.machine.quantities import SI_UNITS
 from replay.machine.signal_table import quantity_of
-from replay.machine.units import si_factor
+from replay.machine.units import known_unit, si_factor
 
 _TOO_FAST = 3.0
 _WIDE = 1.5
@@ -46,13 +46,11 @@ def usable_unit(signal: str, unit: str | None) -> str | None:
     """Return a recorded unit that can describe the signal, else None."""
     if not unit:
         return None
-    for text in (unit, unit.lower()):
-        try:
-            si_factor(signal, text, wheel_radius=1.0, gear_ratio=1.0, at="wheel")
-        except ConfigError:
-            continue
-        return text
-    return None
+    try:
+        si_factor(signal, unit, wheel_radius=1.0, gear_ratio=1.0, at="wheel")
+    except ConfigError:
+        return None
+    return unit
 
 
 def factor_of(signal: str, origin: SignalSource, machine: Machine) -> float:
@@ -164,7 +162,7 @@ def _peak(values: NDArray[Any]) -> float:
 
 def choose_motor_or_wheel(signal: str, origin: SignalSource, values: NDArray[Any], machine: Machine) -> SignalSource:
     """Decide where a guessed rotation was measured: at the motor where only that fits the machine's top speed."""
-    if not signal.startswith("wheel.") or origin.unit.lower() != "rpm" or machine.gear_ratio == 1.0:
+    if not signal.startswith("wheel.") or known_unit(origin.unit) != "rpm" or machine.gear_ratio == 1.0:
         return origin
     motor = replace(origin, at="motor")
     try:
