@@ -91,7 +91,7 @@ def check(
 
 def show(context: typer.Context, machine: MachineFile = None, quiet: Quiet = False, verbose: Verbose = False) -> None:
     """Show all settings in use, as a machine file."""
-    from replay.machine.toml_file import dump_machine
+    from replay.machine.toml_text import dump_machine
 
     the_machine, source = machine_of(machine)
     terminal_of(context).show_text(f"# {source}\n{dump_machine(the_machine)}")

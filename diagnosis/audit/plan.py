@@ -19,7 +19,7 @@ from diagnosis.audit.store.stored import StoredResult
 from diagnosis.audit.task import key_of, sizes_of
 from replay.errors import ConfigError
 from replay.machine.config import Machine, haulotte
-from replay.machine.toml_file import dump_machine
+from replay.machine.toml_text import dump_machine
 
 PAPER = "paper defaults"
 _REPORT = ("report.json", "report.html")

@@ -25,6 +25,8 @@ PsiMode = Literal["auto", "printed", "implied", "event_reset", "forced"]
 PhiDot = Literal["command", "measured", "zero"]
 
 LAWS: tuple[str, ...] = ("auto", "signed", "opposed", "printed", "sign_abs", "none")
+#: What a machine has from the paper's where no machine file gives it.
+ASSUMABLE: tuple[str, ...] = ("geometry", "gear_ratio", "max_speed", "max_steer", "flow", "control")
 PSI_MODES: tuple[str, ...] = ("auto", "printed", "implied", "event_reset", "forced")
 
 
@@ -162,6 +164,8 @@ class Machine:
         How single drives answer, by wheel; from healthy missions.
     steering : Mapping[str, AxlePlant]
         Valve, cylinder and sensor by steering axle; from healthy missions.
+    assumed : tuple[str, ...]
+        Keys that no machine file gave and that are the paper's machine's, of `ASSUMABLE`.
     """
 
     name: str
@@ -179,6 +183,7 @@ class Machine:
     signals: Mapping[str, SignalSource] = field(default_factory=dict)
     drives: Mapping[str, DriveModel] = field(default_factory=dict)
     steering: Mapping[str, AxlePlant] = field(default_factory=dict)
+    assumed: tuple[str, ...] = field(default=(), compare=False)
 
     def __post_init__(self) -> None:
         """Check values and that signals name this machine's wheels and axles."""
@@ -244,4 +249,5 @@ def haulotte() -> Machine:
         max_speed=0.36,
         # 63 l/min over motors of 100 cm³/rev, gear 17.7, wheel ⌀ 0.854 m
         plant=Plant(flow=1.59),
+        assumed=ASSUMABLE,
     )

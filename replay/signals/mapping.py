@@ -20,7 +20,8 @@ from replay.machine.config import Machine
 from replay.machine.units import known_unit
 from replay.signals.rules import Candidate, candidates, wanted_type
 from replay.signals.signal import Signal, Signals
-from replay.signals.to_si import Converted, choose_motor_or_wheel, convert, doubt, usable_unit
+from replay.signals.to_si import Converted, choose_motor_or_wheel, convert, usable_unit
+from replay.signals.unit_doubts import Doubt, doubt, questions
 
 
 def plan_topics(summaries: Sequence[LogSummary], machine: Machine) -> dict[str, tuple[str, ...] | None]:
@@ -60,6 +61,7 @@ class _Draft:
     items: dict[str, Signal] = field(default_factory=dict)
     missing: dict[str, str] = field(default_factory=dict)
     notes: list[str] = field(default_factory=list)
+    doubts: list[Doubt] = field(default_factory=list)
     named: list[str] = field(default_factory=list)
     given: dict[tuple[str, str], str] = field(default_factory=dict)  # by source and channel: signal that it is given as
 
@@ -70,8 +72,9 @@ class _Draft:
         self.items[name] = Signal(name, converted.stamps, converted.values, origin, log.source, guessed, beside)
         self.notes += [f"{name}: {note}" for note in converted.notes]
         unsure = doubt(name, converted.values, origin, self.machine)
-        if unsure:
-            self.notes.append(unsure)
+        if unsure is not None:
+            self.doubts.append(unsure)
+            self.notes.append(unsure.text)
 
 
 def map_signals(logs: Sequence[RawLog], machine: Machine) -> Signals:
@@ -111,7 +114,8 @@ def map_signals(logs: Sequence[RawLog], machine: Machine) -> Signals:
     order = {name: i for i, name in enumerate((*machine.canonical_signals(), *machine.signals))}
     items = dict(sorted(draft.items.items(), key=lambda item: order[item[0]]))
     store = logs[0].store if logs else ColumnStore()
-    return Signals(items, draft.missing, tuple(dict.fromkeys(draft.notes)), store=store)
+    asked = questions(draft.doubts, items)
+    return Signals(items, draft.missing, tuple(dict.fromkeys(draft.notes)), asked, store=store)
 
 
 def _take_given(draft: _Draft, name: str, source: SignalSource, logs: Sequence[RawLog]) -> None:

@@ -16,7 +16,8 @@ from replay.log.source_options import SignalSource, SourceOptions
 from replay.machine.config import Control, Limits, Plant, WheelPlant, haulotte
 from replay.machine.quantities import UNITS
 from replay.machine.signal_table import CANONICAL
-from replay.machine.toml_file import dump_machine, load_machine
+from replay.machine.toml_file import load_machine
+from replay.machine.toml_text import dump_machine
 
 
 def active(section: str) -> dict[str, object]:
