@@ -70,6 +70,7 @@ def check(
     terminal = terminal_of(context, json=json)
     machine, source = machine_of(file)
     lost: list[str] = []
+    asked: tuple[str, ...] = ()
     document: dict[str, object] = {"file": str(file), "ok": True, "given_signals": sorted(machine.signals)}
     if log:
         with terminal.progress(Stage.STARTING) as progress:
@@ -78,13 +79,16 @@ def check(
 
             files, signals = read_signals(mission_paths(log), machine, progress=progress)
         lost = [f"{name}: {signals.missing[name]}" for name in machine.signals if name in signals.missing]
-        document |= {"ok": not lost, "signals": signals_document(files, signals, machine, source)}
+        asked = signals.questions
+        document |= {"ok": not (lost or asked), "signals": signals_document(files, signals, machine, source)}
         if not json:
             terminal.show(*signals_parts(signals, machine))
     if json:
         terminal.show_json(document)
     if lost:
         raise ConfigError(f"{file}: {len(lost)} of its signals are not in the log: {'; '.join(lost)}")
+    if asked:
+        raise ConfigError(f"{file}: values of the log that cannot be with these units: {'; '.join(asked)}")
     count = len(machine.signals)
     terminal.show(f"{file}: valid. {machine.name}, wheels {', '.join(machine.wheels)}, {count} signals given.")
 
