@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import difflib
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from fnmatch import fnmatch
 from pathlib import PurePath
@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from replay.arrays.column_store import ColumnStore
 from replay.errors import ConfigError
-from replay.log.raw_log import Channel, LogSummary, RawLog
+from replay.log.raw_log import Channel, LogSummary, RawLog, TopicInfo
 from replay.log.source_options import SignalSource
 from replay.machine.config import Machine
 from replay.machine.units import known_unit
@@ -24,7 +24,9 @@ from replay.signals.to_si import Converted, choose_motor_or_wheel, convert, usab
 from replay.signals.unit_doubts import Doubt, doubt, questions
 
 
-def plan_topics(summaries: Sequence[LogSummary], machine: Machine) -> dict[str, tuple[str, ...] | None]:
+def plan_topics(
+    summaries: Sequence[LogSummary], machine: Machine, also: Callable[[TopicInfo], bool] | None = None
+) -> dict[str, tuple[str, ...] | None]:
     """Topics worth decoding in each source.
 
     Parameters
@@ -33,6 +35,8 @@ def plan_topics(summaries: Sequence[LogSummary], machine: Machine) -> dict[str, 
         What each source holds.
     machine : Machine
         Its given signals, and the rules for those not given.
+    also : Callable[[TopicInfo], bool] or None
+        What else is wanted.
 
     Returns
     -------
@@ -48,7 +52,9 @@ def plan_topics(summaries: Sequence[LogSummary], machine: Machine) -> dict[str, 
         plan[summary.source] = tuple(
             t.name
             for t in summary.topics
-            if _slashed(t.name) in given or (not t.note and (t.encoding == "json" or wanted_type(t.type_name)))
+            if _slashed(t.name) in given
+            or (also is not None and also(t))
+            or (not t.note and (t.encoding == "json" or wanted_type(t.type_name)))
         )
     return plan
 
