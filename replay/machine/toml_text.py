@@ -6,7 +6,7 @@ import dataclasses
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from replay.log.source_options import SignalSource
+from replay.log.source_options import SignalSource, SourceOptions
 from replay.machine.config import Machine
 from replay.machine.drive_model import drive_table
 from replay.machine.toml_file import MACHINE_LEVEL
@@ -14,7 +14,15 @@ from replay.machine.toml_file import MACHINE_LEVEL
 
 def signal_line(name: str, source: SignalSource) -> str:
     """Line of [signals] that `load_machine` reads back."""
-    return f"{_text(name)} = {{ {', '.join(_table(source))} }}"
+    return f"{text_of(name)} = {{ {', '.join(_table(source))} }}"
+
+
+def source_line(pattern: str, options: SourceOptions) -> str:
+    """Line of [sources] with what differs from the defaults."""
+    given = [f for f in dataclasses.fields(options) if getattr(options, f.name) != f.default]
+    values = {f.name: getattr(options, f.name) for f in given}
+    parts = [f"{k} = {v if isinstance(v, float) else text_of(str(v))}" for k, v in values.items()]
+    return f"{text_of(pattern)} = {{ {', '.join(parts)} }}"
 
 
 def dump_machine(machine: Machine, notes: Mapping[str, Sequence[str]] | None = None) -> str:
@@ -32,28 +40,34 @@ def dump_machine(machine: Machine, notes: Mapping[str, Sequence[str]] | None = N
     def head(section: str) -> list[str]:
         return [f"[{section}]", *said.get(section, [])]
 
-    lines = [*said.get("", []), *head("machine"), f"name = {_text(machine.name)}", f"id = {_text(machine.id)}"]
-    lines += [f"wheels = [{', '.join(_text(w) for w in machine.wheels)}]", "", *head("geometry")]
-    lines += [f"{key} = {_real(getattr(machine, key))}" for key in MACHINE_LEVEL]
+    lines = [*said.get("", []), *head("machine"), f"name = {text_of(machine.name)}", f"id = {text_of(machine.id)}"]
+    lines += [f"wheels = [{', '.join(text_of(w) for w in machine.wheels)}]", "", *head("geometry")]
+    lines += [f"{key} = {real_text(getattr(machine, key))}" for key in MACHINE_LEVEL]
     if machine.geometry is not None:
-        lines.append(f"wheel_diameter = {_real(machine.geometry.wheel_diameter)}")
+        lines.append(f"wheel_diameter = {real_text(machine.geometry.wheel_diameter)}")
         for w, g in machine.geometry.wheels.items():
             steer = "own" if g.axle == w else g.axle
-            place = f"x = {_real(g.x)}, y = {_real(g.y)}, offset = {_real(g.offset)}, steer = {_text(steer)}"
-            lines.append(f"{_key(w)} = {{ {place} }}")
+            place = (
+                f"x = {real_text(g.x)}, y = {real_text(g.y)}, offset = {real_text(g.offset)}, steer = {text_of(steer)}"
+            )
+            lines.append(f"{key_text(w)} = {{ {place} }}")
     lines += ["", *head("control"), *_table(machine.control, {"lambda_": "lambda"})]
-    lines += ["", *head("plant"), f"coupling = {_text(machine.plant.coupling)}"]
+    lines += ["", *head("plant"), f"coupling = {text_of(machine.plant.coupling)}"]
     if machine.plant.flow is not None:
-        lines.append(f"flow = {_real(machine.plant.flow)}")
-    lines += [f"{_key(w)} = {{ {', '.join(_table(p))} }}" for w, p in machine.plant.wheels.items()]
+        lines.append(f"flow = {real_text(machine.plant.flow)}")
+    lines += [f"{key_text(w)} = {{ {', '.join(_table(p))} }}" for w, p in machine.plant.wheels.items()]
     if machine.drives or "drive" in said:
-        lines += ["", *head("drive"), *(f"{_key(w)} = {_inline(drive_table(d))}" for w, d in machine.drives.items())]
+        lines += [
+            "",
+            *head("drive"),
+            *(f"{key_text(w)} = {_inline(drive_table(d))}" for w, d in machine.drives.items()),
+        ]
     if machine.steering or "steering" in said:
         lines += ["", *head("steering")]
-        lines += [f"{_key(a)} = {{ {', '.join(_table(p))} }}" for a, p in machine.steering.items()]
+        lines += [f"{key_text(a)} = {{ {', '.join(_table(p))} }}" for a, p in machine.steering.items()]
     lines += ["", *head("limits"), *_table(machine.limits)]
     for section, items in (("noise", machine.noise), ("sources", machine.sources), ("signals", machine.signals)):
-        lines += ["", *head(section), *(f"{_key(k)} = {{ {', '.join(_table(v))} }}" for k, v in items.items())]
+        lines += ["", *head(section), *(f"{key_text(k)} = {{ {', '.join(_table(v))} }}" for k, v in items.items())]
     return "\n".join(lines) + "\n"
 
 
@@ -76,11 +90,11 @@ def _table(item: Any, rename: Mapping[str, str] | None = None) -> list[str]:
             text = _inline(list(value))
         else:
             text = (
-                _text(value)
+                text_of(value)
                 if isinstance(value, str)
                 else str(value).lower()
                 if isinstance(value, bool)
-                else _real(value)
+                else real_text(value)
             )
         out.append(f"{(rename or {}).get(f.name, f.name)} = {text}")
     return out
@@ -89,20 +103,23 @@ def _table(item: Any, rename: Mapping[str, str] | None = None) -> list[str]:
 def _inline(value: Any) -> str:
     """Nested tables and lists of numbers on one line."""
     if isinstance(value, Mapping):
-        return "{ " + ", ".join(f"{_key(k)} = {_inline(v)}" for k, v in value.items()) + " }"
+        return "{ " + ", ".join(f"{key_text(k)} = {_inline(v)}" for k, v in value.items()) + " }"
     if isinstance(value, list):
         return "[" + ", ".join(_inline(v) for v in value) + "]"
-    return str(value) if isinstance(value, int) else _real(value)
+    return str(value) if isinstance(value, int) else real_text(value)
 
 
-def _real(value: float) -> str:
+def real_text(value: float) -> str:
+    """A number that reads back as it is."""
     return repr(float(value))
 
 
-def _text(value: str) -> str:
+def text_of(value: str) -> str:
+    """Text in quotes."""
     out = value.replace("\\", "\\\\").replace('"', '\\"')
     return '"' + "".join(c if c >= " " and c != "\x7f" else f"\\u{ord(c):04X}" for c in out) + '"'
 
 
-def _key(name: str) -> str:
-    return name if name.isascii() and name.replace("_", "").replace("-", "").isalnum() else _text(name)
+def key_text(name: str) -> str:
+    """A key, in quotes where it must be."""
+    return name if name.isascii() and name.replace("_", "").replace("-", "").isalnum() else text_of(name)

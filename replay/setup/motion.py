@@ -12,9 +12,11 @@ from replay.signals.signal import Signal
 
 Array = NDArray[np.float64]
 
-_MOST = 4000  # samples of a fit
+_MOST = 6000  # samples of a fit
+_STEP_S = 0.05
 _LEAST = 50
-_DELAYS_S = np.arange(0.0, 1.01, 0.05)
+_DELAYS_S = (0.0, 0.05, 0.1, 0.2, 0.3, 0.4, 0.5, 0.7)
+_LAGS_S = (0.0, 0.1, 0.3, 0.8)
 _TRIMMED = 0.2  # of the samples with the largest residuals are left out, twice: drives that were faulty for a time
 _SOUND = 0.8  # share of the variance that a fit must explain
 _MOVES = 0.02  # m/s or rad/s; standard deviation from which a motion counts
@@ -42,6 +44,8 @@ class WheelMotion:
 def wheel_motion(wheel: Signal, speed: Signal, turn: Signal | None) -> WheelMotion | None:
     """Fit one wheel to the robot's motion by least trimmed squares; None where the log does not show it.
 
+    The wheel may answer late and slowly: the delay and lag that explain it best are taken.
+
     Parameters
     ----------
     wheel : Signal
@@ -49,25 +53,38 @@ def wheel_motion(wheel: Signal, speed: Signal, turn: Signal | None) -> WheelMoti
     speed, turn : Signal
         The robot's speed [m/s] and yaw rate [rad/s], commanded or measured; None where there is no yaw rate.
     """
-    step = max(1, len(wheel.stamps) // _MOST)
-    at, y = wheel.stamps[::step], wheel.values[::step]
-    best: tuple[float, Array] | None = None
-    for delay in _DELAYS_S:
-        moment = at - int(delay * 1e9)
-        parts = [_held(speed, moment)] + ([] if turn is None else [_held(turn, moment)])
-        known = np.isfinite(y) & np.logical_and.reduce([np.isfinite(p) for p in parts])
-        if known.sum() < _LEAST or np.std(parts[0][known]) < _MOVES:
-            continue
-        use = np.array([np.std(p[known]) >= _MOVES for p in parts])
-        x = np.column_stack([p[known] if ok else np.zeros(known.sum()) for p, ok in zip(parts, use, strict=True)])
-        found = _trimmed(x, y[known])
-        if best is None or found[0] > best[0]:
-            best = found
-    if best is None or best[0] < _SOUND or best[1][0] == 0:
+    if len(wheel.stamps) < _LEAST:
+        return None
+    step = max(int(np.median(np.diff(wheel.stamps))), int(_STEP_S * 1e9))
+    at = np.arange(int(wheel.stamps[0]), int(wheel.stamps[-1]), step)[:_MOST]
+    y = _held(wheel, at)
+    parts = np.column_stack([_held(s, at) for s in (speed, turn) if s is not None])
+    known = np.isfinite(y) & np.isfinite(parts).all(axis=1)
+    if known.sum() < _LEAST or np.std(parts[known, 0]) < _MOVES:
+        return None
+    parts[~np.isfinite(parts)] = 0.0
+    parts[:, np.std(parts[known], axis=0) < _MOVES] = 0.0
+    best: tuple[float, Array] = (0.0, np.zeros(2))
+    for lag in _LAGS_S:
+        slow = _lagged(parts, 1 - np.exp(-step * 1e-9 / lag)) if lag else parts
+        for delay in sorted({round(d * 1e9 / step) for d in _DELAYS_S}):
+            use = known[delay:]
+            if use.sum() < _LEAST:
+                continue
+            found = _trimmed(slow[: len(slow) - delay][use], y[delay:][use])
+            best = max(best, found, key=lambda f: f[0])
+    if best[0] < _SOUND or best[1][0] == 0:
         return None
     gain = float(best[1][0])
     side = float(-best[1][1] / gain) if turn is not None and best[1][1] != 0 else None
     return WheelMotion(gain, side, best[0])
+
+
+def _lagged(x: Array, a: float) -> Array:
+    """First-order lag y += a (x − y) of each column."""
+    from scipy.signal import lfilter
+
+    return np.asarray(lfilter([a], [1.0, a - 1.0], x, axis=0, zi=(1 - a) * x[:1])[0])
 
 
 def _held(signal: Signal, at: NDArray[np.int64]) -> Array:
@@ -100,15 +117,11 @@ def backwards(wheels: Mapping[str, Signal], left: Sequence[str], right: Sequence
     yaw : Signal or None
         Measured yaw rate [rad/s]: a robot that turns on the spot has opposite sides too.
     """
-    a, b = (np.concatenate([_sampled(wheels[w], wheels[left[0]].stamps) for w in side[:1]]) for side in (left, right))
+    a, b = (np.concatenate([_held(wheels[w], wheels[left[0]].stamps) for w in side[:1]]) for side in (left, right))
     moving = np.isfinite(a) & np.isfinite(b) & (np.abs(a) > 0.2 * np.nanmax(np.abs(a), initial=0.0))
     if moving.sum() < 5 or np.mean(a[moving] * b[moving] < 0) < 0.8:
         return False
     if yaw is None:
         return True
-    turned = np.abs(_sampled(yaw, wheels[left[0]].stamps))[moving]
+    turned = np.abs(_held(yaw, wheels[left[0]].stamps))[moving]
     return bool(np.nanmedian(turned) < 0.2)
-
-
-def _sampled(signal: Signal, at: NDArray[np.int64]) -> Array:
-    return _held(signal, at)

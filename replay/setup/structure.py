@@ -5,11 +5,11 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from enum import StrEnum
 
 from replay.log.raw_log import Channel
 from replay.machine.config import Machine, haulotte
 from replay.machine.geometry import Geometry, WheelGeometry
+from replay.setup.preset import Preset
 from replay.setup.robot_description import RobotDescription, WheelJoint
 from replay.signals.name_parts import index_of, is_steering, position, tokens
 from replay.signals.rules import candidates
@@ -18,15 +18,6 @@ FOUR, SIX = ("FR", "FL", "RR", "RL"), ("FR", "FL", "MR", "ML", "RR", "RL")
 GERMAN, TWO, ONE = ("VR", "VL", "HR", "HL"), ("R", "L"), ("D",)
 _NUMBERED = (8, 6, 4, 3, 2)
 _TRACK, _BASE, _RADIUS = 0.5, 0.5, 0.1  # m; where nothing tells them
-
-
-class Preset(StrEnum):
-    """Usual kinds of machines."""
-
-    DIFF_DRIVE = "diff-drive"
-    SKID_4 = "skid-4"
-    ACKERMANN = "ackermann"
-    HAULOTTE = "haulotte"
 
 
 @dataclass(frozen=True)

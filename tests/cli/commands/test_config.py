@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from cli.commands.config import starter
+from cli.commands.config_init import starter
 from cli.main import run
 from replay.log.source_options import SignalSource, SourceOptions
 from replay.machine.config import Control, Limits, Plant, WheelPlant, haulotte
