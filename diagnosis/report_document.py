@@ -14,6 +14,7 @@ from diagnosis.clearing.checks import cells_of, checks_of
 from diagnosis.clearing.detectable import detectable
 from diagnosis.clearing.mapping import mapping_hints
 from diagnosis.decision import metrics, quality
+from diagnosis.decision.assumed import assumed_words
 from diagnosis.decision.caveats import more_caveats
 from diagnosis.decision.decide import Decision, decide
 from diagnosis.decision.intervals import intervals_of, spans_of
@@ -239,4 +240,5 @@ def machine_row(machine: Machine, mission: Mission, source: str, machine_id: str
         "axles": list(machine.axles),
         "geometry": geometry,
         "source": source,
+        "assumed": assumed_words(machine),
     }

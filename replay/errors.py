@@ -39,7 +39,28 @@ class NotJudged(LogError):
     """The log is readable, but it holds nothing from which a fault could be judged."""
 
 
-def check_range(key: str, value: float, low: float, high: float, unit: str) -> None:
-    """Raise a `ConfigError` that names the key, the value, the unit and the range."""
-    if not low <= value <= high:
-        raise ConfigError(f"{key} = {value:g} {unit} is out of range; expected {low:g} to {high:g} {unit}")
+def check_range(
+    key: str, value: float, low: float, high: float, unit: str, *, mistaken: tuple[str, float] | None = None
+) -> None:
+    """Raise a `ConfigError` that names the key, the value, the unit and the range.
+
+    Parameters
+    ----------
+    key : str
+        Section and key.
+    value, low, high : float
+        What was given, and its range.
+    unit : str
+        Unit of all three.
+    mistaken : tuple[str, float] or None
+        A unit that the value may have been given in by mistake, and its factor to `unit`: where the converted value lies
+        in the range, the message says what to write.
+    """
+    if low <= value <= high:
+        return
+    hint = ""
+    if mistaken is not None and low <= value * mistaken[1] <= high:
+        name, _, last = key.rpartition(".")
+        hint = f"; {value:g} looks like {mistaken[0]}: write {last} = {value * mistaken[1]:.5g}"
+        hint += f" in [{name}]" if name else ""
+    raise ConfigError(f"{key} = {value:g} {unit} is out of range; expected {low:g} to {high:g} {unit}{hint}")

@@ -11,7 +11,7 @@ from pathlib import Path
 from replay.arrays.column_store import ColumnStore
 from replay.clocks.align import align_clocks
 from replay.clocks.source_clock import SourceClock
-from replay.errors import LogError
+from replay.errors import ConfigError, LogError
 from replay.log.open_loop import is_open_loop, is_open_loop_table
 from replay.log.raw_log import LogSummary, RawLog
 from replay.log.source_options import SourceOptions
@@ -241,9 +241,10 @@ def load_mission(
     LogError
         Where a file cannot be read, no wheel signal is found, or the files do not overlap in time.
     ConfigError
-        Where a given unit does not fit its signal.
+        Where a given unit does not fit its signal, or values cannot be what their units make them.
     """
     files, signals = read_signals(paths, machine, progress=progress, store=store)
+    check_units(signals)
     progress(Progress(Stage.ALIGNING_SIGNALS))
     _require_use(files, signals)
     try:
@@ -252,6 +253,14 @@ def load_mission(
     except LogError as error:
         raise LogError(f"{', '.join(str(p) for p in paths)}: {error}{_cause(files)}") from error
     return Mission(files, signals, timeline)
+
+
+def check_units(signals: Signals) -> None:
+    """Raise a `ConfigError` where values cannot be what their units make them, with the lines that would mend them."""
+    if signals.questions:
+        first, rest = signals.questions[0], len(signals.questions) - 1
+        more = f" ({rest} more signal{'s' if rest > 1 else ''} likewise; `mfhca channels` lists them)" if rest else ""
+        raise ConfigError(f"values that cannot be, so nothing was judged: {first}{more}")
 
 
 def _require_use(files: Sequence[MissionFile], signals: Signals) -> None:

@@ -20,7 +20,8 @@ from replay.faults import FaultMode, FaultSpec, Side
 from replay.injection.inject import inject_signals
 from replay.machine.config import Machine, haulotte
 from replay.machine.drive_model import DriveModel
-from replay.machine.toml_file import dump_machine, load_machine
+from replay.machine.toml_file import load_machine
+from replay.machine.toml_text import dump_machine
 from replay.mission import read_signals
 from replay.signals.signal import Signals
 from replay.signals.timeline import align

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
 import typer
 
 from cli.terminal.command import Quiet, Verbose, terminal_of
@@ -9,16 +12,23 @@ from cli.terminal.inputs import machine_of, mission_paths
 from cli.terminal.options import Json, Logs, MachineFile
 from replay.progress import Stage
 
+if TYPE_CHECKING:
+    from cli.terminal.console import Terminal
+
 EXAMPLES = """\b
 Examples:
   mfhca channels mission.mcap
-  mfhca channels drive.bag plc-export.csv -m machine.toml"""
+  mfhca channels drive.bag plc-export.csv -m machine.toml
+  mfhca channels mission.mcap --all      # every topic.field, symbol or column"""
 
 
 def channels(
     context: typer.Context,
     logs: Logs,
     machine: MachineFile = None,
+    every: Annotated[
+        bool, typer.Option("--all", help="List every channel of the logs: rate, range, unit, and what it could be.")
+    ] = False,
     json: Json = False,
     quiet: Quiet = False,
     verbose: Verbose = False,
@@ -26,6 +36,9 @@ def channels(
     """Show where each signal was found, what is missing, and what the diagnosis cannot do without it."""
     terminal = terminal_of(context, json=json)
     paths = mission_paths(logs)
+    if every:
+        _show_all(terminal, paths, machine, json)
+        return
     the_machine, source = machine_of(machine)
     with terminal.progress(Stage.STARTING) as progress:
         from cli.tables.signals import signals_document, signals_parts
@@ -41,3 +54,29 @@ def channels(
     damage = [line for file in files for line in file.summary.damage]
     if damage:
         terminal.show(section("Damage"), bullets(damage))
+
+
+def _show_all(terminal: Terminal, paths: list[Path], machine: Path | None, json: bool) -> None:
+    """Every channel, and which signals of the machine it could be; without a machine file, of one with the wheels found."""
+    with terminal.progress(Stage.STARTING) as progress:
+        from cli.tables.all_channels import channels_document, channels_parts
+        from cli.terminal.streams import console_of
+        from replay.errors import LogError
+        from replay.machine.config import haulotte
+        from replay.setup.all_channels import channel_rows
+        from replay.setup.draft import structure_of
+        from replay.setup.read import read_everything
+
+        given, source = machine_of(machine) if machine is not None else (None, "names in the log")
+        logs = read_everything(paths, given, progress=progress)
+        try:
+            the_machine = given or structure_of(logs).machine()
+        except LogError:
+            the_machine = None
+        rows = channel_rows(logs, the_machine or haulotte())
+    if json:
+        terminal.show_json(channels_document(rows, the_machine, source))
+        return
+    import sys
+
+    terminal.show(*channels_parts(rows, the_machine, console_of(sys.stdout).width))

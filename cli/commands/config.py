@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-from importlib import resources
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
+from cli.commands.config_init import run_init
 from cli.terminal.command import App, Quiet, Verbose, terminal_of
 from cli.terminal.inputs import machine_of, mission_paths
 from cli.terminal.options import Json, MachineFile
 from replay.errors import ConfigError
 from replay.progress import Stage
+from replay.setup.preset import Preset
 
 app = typer.Typer(
     cls=App,
@@ -21,38 +22,42 @@ app = typer.Typer(
     context_settings={"help_option_names": ["-h", "--help"]},
     epilog="""\b
 Examples:
-  mfhca config init -o machine.toml
+  mfhca config init --log mission.mcap -o machine.toml     # filled in from a log
+  mfhca config init -o machine.toml                        # every key, explained
   mfhca config check machine.toml --log mission.mcap
   mfhca config show -m machine.toml""",
 )
-
-
-def starter() -> str:
-    """Commented machine file with every key, its unit and default."""
-    return resources.files("cli.commands").joinpath("starter.toml").read_text(encoding="utf-8")
 
 
 def init(
     context: typer.Context,
     output: Annotated[
         Path | None,
-        typer.Option("--output", "-o", metavar="FILE", help="File to write.", show_default="standard output"),
+        typer.Option(
+            "--output",
+            "-o",
+            metavar="FILE",
+            help="File to write; - is standard output.",
+            show_default="standard output",
+        ),
+    ] = None,
+    log: Annotated[
+        list[Path] | None,
+        typer.Option(
+            "--log",
+            metavar="LOG",
+            help="Fill it in from this log; may be given again for the files of one mission.",
+            show_default=False,
+        ),
+    ] = None,
+    preset: Annotated[
+        Preset | None, typer.Option("--preset", help="Kind of machine. Default: found in the log.", show_default=False)
     ] = None,
     quiet: Quiet = False,
     verbose: Verbose = False,
 ) -> None:
-    """Write a commented starter: every key, its unit and default."""
-    from replay.atomic_write import atomic_path
-
-    terminal = terminal_of(context)
-    if output is None:
-        terminal.show_text(starter())
-        return
-    if output.exists():
-        raise ConfigError(f"{output}: exists and was not changed; give another name")
-    with atomic_path(output) as temporary:
-        temporary.write_text(starter(), encoding="utf-8")
-    terminal.show(f"Wrote {output}; edit it, then run: mfhca config check {output} --log LOG")
+    """Write a machine file: from a log, or a commented starter with every key, its unit and default."""
+    run_init(terminal_of(context), output, log or [], preset)
 
 
 def check(
@@ -70,6 +75,7 @@ def check(
     terminal = terminal_of(context, json=json)
     machine, source = machine_of(file)
     lost: list[str] = []
+    asked: tuple[str, ...] = ()
     document: dict[str, object] = {"file": str(file), "ok": True, "given_signals": sorted(machine.signals)}
     if log:
         with terminal.progress(Stage.STARTING) as progress:
@@ -78,27 +84,30 @@ def check(
 
             files, signals = read_signals(mission_paths(log), machine, progress=progress)
         lost = [f"{name}: {signals.missing[name]}" for name in machine.signals if name in signals.missing]
-        document |= {"ok": not lost, "signals": signals_document(files, signals, machine, source)}
+        asked = signals.questions
+        document |= {"ok": not (lost or asked), "signals": signals_document(files, signals, machine, source)}
         if not json:
             terminal.show(*signals_parts(signals, machine))
     if json:
         terminal.show_json(document)
     if lost:
         raise ConfigError(f"{file}: {len(lost)} of its signals are not in the log: {'; '.join(lost)}")
+    if asked:
+        raise ConfigError(f"{file}: values of the log that cannot be with these units: {'; '.join(asked)}")
     count = len(machine.signals)
     terminal.show(f"{file}: valid. {machine.name}, wheels {', '.join(machine.wheels)}, {count} signals given.")
 
 
 def show(context: typer.Context, machine: MachineFile = None, quiet: Quiet = False, verbose: Verbose = False) -> None:
     """Show all settings in use, as a machine file."""
-    from replay.machine.toml_file import dump_machine
+    from replay.machine.toml_text import dump_machine
 
     the_machine, source = machine_of(machine)
     terminal_of(context).show_text(f"# {source}\n{dump_machine(the_machine)}")
 
 
 for _function, _example in (
-    (init, "mfhca config init -o machine.toml"),
+    (init, "mfhca config init --log mission.mcap -o machine.toml"),
     (check, "mfhca config check machine.toml --log mission.mcap"),
     (show, "mfhca config show -m machine.toml > full.toml"),
 ):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 
-from rich.console import Console, ConsoleOptions, RenderableType, RenderResult
+from rich.console import Console, ConsoleOptions, Group, RenderableType, RenderResult
 from rich.padding import Padding
 from rich.table import Table
 from rich.text import Text
@@ -35,6 +35,15 @@ def table(headings: Sequence[str], rows: Iterable[Sequence[object]], right: Sequ
     for row in rows:
         out.add_row(*(cell if isinstance(cell, Text) else text(cell) for cell in row))
     return out
+
+
+def whole_lines(lines: Iterable[Text]) -> Group:
+    """Lines that are never broken: names in them can be searched and copied on terminals of any width."""
+    out = []
+    for line in lines:
+        line.no_wrap, line.overflow = True, "ignore"
+        out.append(line)
+    return Group(*out)
 
 
 class ByWidth:

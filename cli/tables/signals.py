@@ -10,7 +10,7 @@ import numpy as np
 from rich.console import RenderableType
 from rich.text import Text
 
-from cli.tables.layout import ByWidth, bullets, section, table, text
+from cli.tables.layout import ByWidth, bullets, section, table, text, whole_lines
 from diagnosis.clearing.forecast import Forecast, forecast
 from diagnosis.decision.missing import cost_of_missing
 from diagnosis.results.vocabulary import part_name
@@ -83,6 +83,7 @@ class SignalsDocument(TypedDict):
     missing: list[MissingSignal]
     forecast: list[ForecastPart]
     notes: list[str]
+    questions: list[str]
 
 
 _NOT_FOUND = "no channel fits by its name or message type"
@@ -112,6 +113,7 @@ def signals_document(files: Sequence[MissionFile], signals: Signals, machine: Ma
             for f in forecast(signals.items, machine)
         ],
         "notes": list(signals.notes),
+        "questions": list(signals.questions),
     }
 
 
@@ -140,9 +142,10 @@ def signals_parts(signals: Signals, machine: Machine) -> list[RenderableType]:
         several = len({s.source for s in signals.items.values()}) > 1
         rows = [_row(s, several) for s in signals.items.values()]
         wide = table(("signal", "channel", "unit", "Hz", "range"), rows, right=(3,))
-        short = [(Text.assemble(text(name), "\n  ", text(channel, "dim")), *rest) for name, channel, *rest in rows]
-        narrow = table(("signal and channel", "unit", "Hz", "range"), short, right=(2,))
-        parts = [ByWidth(wide, narrow, 110)]
+        needs = sum(max(len(row[k]) for row in rows) + 2 for k in range(5))
+        parts = [ByWidth(wide, _two_lines(rows), needs)]
+    if signals.questions:
+        parts += [section("To be answered before anything is judged"), bullets(signals.questions, "red")]
     if signals.missing:
         lines = [(name, _cost(cost, reason)) for name, cost, reason in _missing_groups(signals.missing, machine)]
         parts += [section("Missing signals and their effect"), table(("signal", "effect"), lines)]
@@ -157,6 +160,22 @@ def signals_parts(signals: Signals, machine: Machine) -> list[RenderableType]:
     if notes:
         parts += [section("Notes"), bullets(notes)]
     return parts
+
+
+def _two_lines(rows: Sequence[tuple[str, str, str, str, str]]) -> RenderableType:
+    """Two lines for each signal: what it is and holds, and below it the whole name of its channel."""
+    heads = ("signal", "unit", "Hz", "range")
+    cells = [(name, unit, rate, span) for name, _, unit, rate, span in rows]
+    widths = [max(len(c) for c in column) for column in zip(heads, *cells, strict=True)]
+
+    def line(parts: Sequence[str]) -> str:
+        aligned = [p.rjust(w) if k == 2 else p.ljust(w) for k, (p, w) in enumerate(zip(parts, widths, strict=True))]
+        return "  ".join(aligned).rstrip()
+
+    out = [Text(line(heads), style="dim")]
+    for cell, (_, channel, *_) in zip(cells, rows, strict=True):
+        out += [text(line(cell)), text(f"  {channel}", "dim")]
+    return whole_lines(out)
 
 
 def _row(signal: Signal, several: bool) -> tuple[str, str, str, str, str]:

@@ -16,7 +16,7 @@ from diagnosis.report.confidence import headline as verdict_words
 from diagnosis.report.confidence import sure_of
 from diagnosis.report.tables import merged_caveats
 from diagnosis.results.comparison_document import FaultChangeRow, PreviousRow
-from diagnosis.results.document import ActionRow, IntervalRow, ReportDocument
+from diagnosis.results.document import PAPER_DEFAULTS, ActionRow, IntervalRow, MachineRow, ReportDocument
 from diagnosis.results.fault_rows import mode_words, state_label
 from diagnosis.results.size_rows import EpsilonRow, SatRow
 from diagnosis.results.vocabulary import part_words
@@ -33,7 +33,7 @@ def verdict_parts(report: ReportDocument) -> list[RenderableType]:
     first = verdict_title(verdict["status"], label)
     if answer:
         first.append_text(text(f"– {answer}", "bold"))
-    parts: list[RenderableType] = [first]
+    parts: list[RenderableType] = [*_assumed(report["machine"]), first]
     if title.casefold() != label.casefold():
         parts.append(text(title, "bold"))
     if verdict["text"] and verdict["text"] != title:
@@ -50,6 +50,24 @@ def verdict_parts(report: ReportDocument) -> list[RenderableType]:
     if verdict["caveats"]:
         parts += [section("Limits of this verdict"), bullets(merged_caveats(verdict["caveats"]))]
     return [*parts, ""]
+
+
+def _assumed(machine: MachineRow) -> list[RenderableType]:
+    """Numbers of the paper's machine that stand in for this one's, before anything that rests on them."""
+    if not machine["assumed"]:
+        return []
+    given = machine["source"] != PAPER_DEFAULTS
+    what = f"{machine['source']} leaves out some numbers" if given else "No machine file was given"
+    do = (
+        f"Add them to {machine['source']}."
+        if given
+        else "`mfhca config init --log LOG -o machine.toml` writes a machine file from the log."
+    )
+    return [
+        text(f"{what}: the paper's Haulotte 16RTJ PRO stands in.", "bold yellow"),
+        text(f"Of that machine, not known to be of this one: {'; '.join(machine['assumed'])}. {do}"),
+        "",
+    ]
 
 
 def _previous(found: PreviousRow) -> list[RenderableType]:

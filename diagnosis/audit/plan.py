@@ -17,11 +17,11 @@ from diagnosis.audit.store.outcome import TRANSIENT, limit_met
 from diagnosis.audit.store.store import Store
 from diagnosis.audit.store.stored import StoredResult
 from diagnosis.audit.task import key_of, sizes_of
+from diagnosis.results.document import PAPER_DEFAULTS
 from replay.errors import ConfigError
 from replay.machine.config import Machine, haulotte
-from replay.machine.toml_file import dump_machine
+from replay.machine.toml_text import dump_machine
 
-PAPER = "paper defaults"
 _REPORT = ("report.json", "report.html")
 _CLEARLY = 1.05  # what is free varies from one night to the next
 
@@ -118,7 +118,7 @@ def plan(missions: Iterable[MissionSource], options: AuditOptions) -> list[Plann
             machine, document = haulotte(), b""
         if problem:
             document = problem.encode("utf-8", "backslashreplace")
-        source = PAPER if name is None else Path(name).name
+        source = PAPER_DEFAULTS if name is None else Path(name).name
         stated = stated_id(options.machine_id, mission, machine)
         given = given_id(options.machine_id, mission) or ""
         planned.append(Planned(mission, machine, source, given, config_hash(document, hashed, stated), problem))

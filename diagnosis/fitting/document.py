@@ -7,7 +7,7 @@ from typing import Any
 
 from diagnosis.fitting.machine import Constant
 from diagnosis.fitting.missions import FitResult
-from replay.machine.toml_file import dump_machine
+from replay.machine.toml_text import dump_machine
 
 SCHEMA = "mfhca-fit/1"
 

@@ -11,6 +11,7 @@ from diagnosis.report.edges import time_words
 from diagnosis.report.judged_parts import judged_sides, kind_of
 from diagnosis.results.clearing import size_words
 from diagnosis.results.document import (
+    PAPER_DEFAULTS,
     ActionRow,
     FileRow,
     IntervalRow,
@@ -35,7 +36,8 @@ Context = dict[str, Any]
 
 def machine_name(machine: MachineRow) -> str:
     """Name and identity of the machine."""
-    return " · ".join(x for x in (machine["id"], machine["name"]) if x) or "Unnamed machine"
+    assumed = " (assumed)" if machine["assumed"] and machine["source"] == PAPER_DEFAULTS else ""
+    return " · ".join(x for x in (machine["id"], machine["name"] + assumed) if x) or "Unnamed machine"
 
 
 def context(report: ReportDocument, duration: float) -> Context:
@@ -73,6 +75,8 @@ def context(report: ReportDocument, duration: float) -> Context:
         "modes": [(m, mode_legend(m)) for m in FaultMode],
         "lines": (State.HEALTHY, *UNDECIDED),
         "open_loop": log["open_loop"],
+        "assumed": report["machine"]["assumed"],
+        "machine_file": "" if report["machine"]["source"] == PAPER_DEFAULTS else report["machine"]["source"],
         "min_percent": f"{100 * limits['min_probability']:g} %",
         "judged": any(judged_sides(report).values()),
     }

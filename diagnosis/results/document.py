@@ -16,6 +16,8 @@ from diagnosis.results.vocabulary import Kind, Severity, Tier, Verdict
 from replay.faults import FaultMode, Side, State
 
 SCHEMA: Final = "mfhca-report/1"
+#: Source of a machine's settings where no machine file was given.
+PAPER_DEFAULTS: Final = "paper defaults"
 
 #: A probability, but for rounding.
 Probability = Annotated[float, Meta(ge=-1e-6, le=1.0 + 1e-6)]
@@ -85,12 +87,13 @@ class MachineIdentity(TypedDict):
 
 
 class MachineRow(MachineIdentity):
-    """The machine, and where its settings come from."""
+    """The machine, where its settings come from, and in `assumed` which numbers are the paper's machine's for want of its own."""
 
     name: str
     axles: list[str]
     geometry: dict[str, WheelPlace] | None
     source: str
+    assumed: list[str]
 
 
 class ReadingRow(TypedDict):

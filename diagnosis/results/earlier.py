@@ -26,6 +26,7 @@ def completed(document: Row) -> Row:
     out: Row = _with(document, loss=[], clearing=[], detectability={"rows": [], "traces": []})
     complete: dict[str, Callable[[Json], Json]] = {
         "log": _log,
+        "machine": lambda row: _with(row, assumed=[]),
         "verdict": lambda row: _with(row, cleared=False, not_cleared="", scope=[]),
         "loss": lambda rows: _rows(rows, lambda row: _with(row, relative=False)),
         "coverage": lambda rows: _rows(rows, _coverage),

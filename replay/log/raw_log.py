@@ -149,6 +149,8 @@ class RawLog:
         The log's contents, with `notes` and `damage` completed by what decoding found.
     store : ColumnStore
         Where its long columns stand.
+    robot_description : str
+        Text of the last message on a topic called ``robot_description``; empty where there is none.
     """
 
     source: str
@@ -157,3 +159,4 @@ class RawLog:
     channels: Mapping[str, Channel]
     summary: LogSummary
     store: ColumnStore = field(default_factory=ColumnStore, repr=False, compare=False)
+    robot_description: str = field(default="", repr=False)

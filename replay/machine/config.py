@@ -17,6 +17,7 @@ from replay.machine.geometry import Geometry, four_wheel_geometry
 from replay.machine.plant import Coupling as Coupling
 from replay.machine.plant import Plant as Plant
 from replay.machine.plant import WheelPlant as WheelPlant
+from replay.machine.quantities import DEGREES
 from replay.machine.signal_table import names_of, signal_of
 
 Law = Literal["auto", "signed", "opposed", "printed", "sign_abs", "none"]
@@ -24,6 +25,8 @@ PsiMode = Literal["auto", "printed", "implied", "event_reset", "forced"]
 PhiDot = Literal["command", "measured", "zero"]
 
 LAWS: tuple[str, ...] = ("auto", "signed", "opposed", "printed", "sign_abs", "none")
+#: What a machine has from the paper's where no machine file gives it.
+ASSUMABLE: tuple[str, ...] = ("geometry", "gear_ratio", "max_speed", "max_steer", "flow", "control")
 PSI_MODES: tuple[str, ...] = ("auto", "printed", "implied", "event_reset", "forced")
 
 
@@ -161,6 +164,8 @@ class Machine:
         How single drives answer, by wheel; from healthy missions.
     steering : Mapping[str, AxlePlant]
         Valve, cylinder and sensor by steering axle; from healthy missions.
+    assumed : tuple[str, ...]
+        Keys that no machine file gave and that are the paper's machine's, of `ASSUMABLE`.
     """
 
     name: str
@@ -178,6 +183,7 @@ class Machine:
     signals: Mapping[str, SignalSource] = field(default_factory=dict)
     drives: Mapping[str, DriveModel] = field(default_factory=dict)
     steering: Mapping[str, AxlePlant] = field(default_factory=dict)
+    assumed: tuple[str, ...] = field(default=(), compare=False)
 
     def __post_init__(self) -> None:
         """Check values and that signals name this machine's wheels and axles."""
@@ -193,7 +199,7 @@ class Machine:
             object.__setattr__(self, "geometry", replace(self.geometry, wheels=places))
         check_range("geometry.gear_ratio", self.gear_ratio, 1e-3, 1e4, "")
         check_range("geometry.max_speed", self.max_speed, 1e-6, 1e6, "m/s")
-        check_range("geometry.max_steer", self.max_steer, 0.0, 3.2, "rad")
+        check_range("geometry.max_steer", self.max_steer, 0.0, 3.2, "rad", mistaken=DEGREES)
         self._check_drives()
         for section, names in (("signals", self.signals), ("noise", self.noise)):
             for name in names:
@@ -243,4 +249,5 @@ def haulotte() -> Machine:
         max_speed=0.36,
         # 63 l/min over motors of 100 cm³/rev, gear 17.7, wheel ⌀ 0.854 m
         plant=Plant(flow=1.59),
+        assumed=ASSUMABLE,
     )

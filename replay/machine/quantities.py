@@ -43,3 +43,6 @@ SI_UNITS: dict[Quantity, str] = {
 }
 #: What a fraction is a fraction of, to follow a number.
 OPENING = "of full opening"
+#: Units that lengths and angles of a machine file are given in by mistake, with the factor to SI.
+DEGREES = ("degrees", math.pi / 180)
+MILLIMETRES = ("millimetres", 1e-3)

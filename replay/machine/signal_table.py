@@ -98,15 +98,24 @@ _ANGLE_COMMAND = (
 )
 _ASKED = r"(joystick|cmd|command|driver|desired|ref)"
 _SECOND_SPEED = r"(velo(city)?|speed|vel)_?(redundant|true|second)"
-_SPEED = r"velo(city)?|speed|^vel|rpm|drehzahl|^omega"
+_SPEED = r"velo(city)?|speed|(^|_)vel(_|$)|rpm|drehzahl|^omega"
 _EFFORT = r"effort|torque|current|duty|pwm|moment$"
 _YAW_RATE = r"(imu|gyro).*(yaw_?rate|gyro_?z|omega_?z|angular_velocity_z)"
 _Entry = CanonicalSignal
 
 #: In reading order: group, leaf, quantity, words, rank for clocks, name in symbols.
 CANONICAL: tuple[CanonicalSignal, ...] = (
-    _Entry("cmd", "v", "speed", "commanded speed v_c", 0, Named(5, _ASKED + r".*(velocity|speed|_v$)")),
-    _Entry("cmd", "omega", "rotation", "commanded yaw rate ω_c", 1, Named(4, _ASKED + r".*(yaw_?rate|omega|turn)")),
+    _Entry(
+        "cmd", "v", "speed", "commanded speed v_c", 0, Named(5, _ASKED + r".*(velocity|speed|_v$|vel(_x|_lin\w*)?$)")
+    ),
+    _Entry(
+        "cmd",
+        "omega",
+        "rotation",
+        "commanded yaw rate ω_c",
+        1,
+        Named(4, _ASKED + r".*(yaw_?rate|omega|turn|vel_(z|ang\w*)$)"),
+    ),
     _Entry("wheel", "v_ref", "speed", "commanded speed v_c,i", 6, Named(6, _SPEED_COMMAND)),
     _Entry("wheel", "v", "speed", "measured speed", 2, Named(7, _SPEED)),
     _Entry("wheel", "v_true", "speed", "second measurement of the speed", 3, Named(5, _SECOND_SPEED)),

@@ -1,18 +1,18 @@
-"""Read and write machine files (TOML)."""
+"""Read machine files (TOML)."""
 
 from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, TypeVar
 
 from replay.errors import ConfigError
 from replay.log.source_options import SignalSource, SourceOptions
 from replay.machine.axle_plant import AxlePlant
-from replay.machine.config import Control, Limits, Machine, Noise, Plant, WheelPlant, haulotte
-from replay.machine.drive_model import drive_from_table, drive_table
+from replay.machine.config import ASSUMABLE, Control, Limits, Machine, Noise, Plant, WheelPlant, haulotte
+from replay.machine.drive_model import drive_from_table
 from replay.machine.geometry import Geometry, WheelGeometry, four_wheel_geometry
 from replay.machine.units import si_factor
 from replay.toml_text import MAX_BYTES, TomlError, parse_toml
@@ -21,7 +21,8 @@ _T = TypeVar("_T")
 _SECTIONS = {"machine", "geometry", "control", "plant", "drive", "steering", "noise", "limits", "sources", "signals"}
 _STANDARD = ("wheelbase", "joint_spacing", "wheel_offset")
 _LONGEST = 1000
-_MACHINE_LEVEL = ("gear_ratio", "max_speed", "max_steer")
+#: Keys of [geometry] that are the machine's own.
+MACHINE_LEVEL = ("gear_ratio", "max_speed", "max_steer")
 
 
 def load_machine(path: Path) -> Machine:
@@ -63,7 +64,7 @@ def _machine(data: Mapping[str, Any]) -> Machine:
     if not isinstance(wheels, list) or not all(isinstance(w, str) and w and "." not in w for w in wheels):
         raise ConfigError(f"machine.wheels = {wheels!r} must be a list of names without dots")
     geo = dict(data.get("geometry", {}))
-    top = {key: _number(f"geometry.{key}", geo.pop(key)) for key in _MACHINE_LEVEL if key in geo}
+    top = {key: _number(f"geometry.{key}", geo.pop(key)) for key in MACHINE_LEVEL if key in geo}
     geometry = _geometry(geo, tuple(wheels), base)
     speed = top.get("max_speed", base.max_speed)
     limits = dict(data.get("limits", {}))
@@ -86,6 +87,7 @@ def _machine(data: Mapping[str, Any]) -> Machine:
         drives={k: drive_from_table(f"drive.{k}", v) for k, v in data.get("drive", {}).items()},
         steering={k: _build(AxlePlant, f"steering.{k}", v) for k, v in data.get("steering", {}).items()},
     )
+    machine = dataclasses.replace(machine, assumed=_assumed(machine, data))
     for name, source in machine.signals.items():
         if source.unit:
             si_factor(
@@ -97,6 +99,22 @@ def _machine(data: Mapping[str, Any]) -> Machine:
                 derivative=source.derivative,
             )
     return machine
+
+
+def _assumed(machine: Machine, data: Mapping[str, Any]) -> tuple[str, ...]:
+    """What the file leaves to the paper's machine, of `ASSUMABLE`."""
+    places = data.get("geometry", {})
+    lengths = {*_STANDARD, "wheel_diameter"} <= set(places) or any(isinstance(v, dict) for v in places.values())
+    own_law = machine.control.law == "none"
+    left = {
+        "geometry": machine.geometry is not None and not lengths,
+        "gear_ratio": machine.geometry is not None and "geometry" not in data,
+        "max_speed": "max_speed" not in places,
+        "max_steer": bool(machine.axles) and "max_steer" not in places,
+        "flow": machine.plant.flow is not None and "flow" not in data.get("plant", {}),
+        "control": not own_law and not {"lambda", "xi", "beta", "k_ps"} & set(data.get("control", {})),
+    }
+    return tuple(key for key in ASSUMABLE if left[key])
 
 
 def _geometry(geo: dict[str, Any], wheels: tuple[str, ...], base: Machine) -> Geometry | None:
@@ -216,94 +234,3 @@ def _build(kind: type[_T], section: str, value: Any, rename: Mapping[str, str] |
                 raise ConfigError(f"{key} = {item!r} must be text")
             out[name] = item
     return kind(**out)
-
-
-def dump_machine(machine: Machine, notes: Mapping[str, Sequence[str]] | None = None) -> str:
-    """Write every setting of a machine as TOML that `load_machine` reads back.
-
-    Parameters
-    ----------
-    machine : Machine
-        The settings.
-    notes : Mapping[str, Sequence[str]] or None
-        Comment lines by section; those of "" stand at the top.
-    """
-    said = {section: _comments(lines) for section, lines in (notes or {}).items()}
-
-    def head(section: str) -> list[str]:
-        return [f"[{section}]", *said.get(section, [])]
-
-    lines = [*said.get("", []), *head("machine"), f"name = {_text(machine.name)}", f"id = {_text(machine.id)}"]
-    lines += [f"wheels = [{', '.join(_text(w) for w in machine.wheels)}]", "", *head("geometry")]
-    lines += [f"{key} = {_real(getattr(machine, key))}" for key in _MACHINE_LEVEL]
-    if machine.geometry is not None:
-        lines.append(f"wheel_diameter = {_real(machine.geometry.wheel_diameter)}")
-        for w, g in machine.geometry.wheels.items():
-            steer = "own" if g.axle == w else g.axle
-            place = f"x = {_real(g.x)}, y = {_real(g.y)}, offset = {_real(g.offset)}, steer = {_text(steer)}"
-            lines.append(f"{_key(w)} = {{ {place} }}")
-    lines += ["", *head("control"), *_table(machine.control, {"lambda_": "lambda"})]
-    lines += ["", *head("plant"), f"coupling = {_text(machine.plant.coupling)}"]
-    if machine.plant.flow is not None:
-        lines.append(f"flow = {_real(machine.plant.flow)}")
-    lines += [f"{_key(w)} = {{ {', '.join(_table(p))} }}" for w, p in machine.plant.wheels.items()]
-    if machine.drives or "drive" in said:
-        lines += ["", *head("drive"), *(f"{_key(w)} = {_inline(drive_table(d))}" for w, d in machine.drives.items())]
-    if machine.steering or "steering" in said:
-        lines += ["", *head("steering")]
-        lines += [f"{_key(a)} = {{ {', '.join(_table(p))} }}" for a, p in machine.steering.items()]
-    lines += ["", *head("limits"), *_table(machine.limits)]
-    for section, items in (("noise", machine.noise), ("sources", machine.sources), ("signals", machine.signals)):
-        lines += ["", *head(section), *(f"{_key(k)} = {{ {', '.join(_table(v))} }}" for k, v in items.items())]
-    return "\n".join(lines) + "\n"
-
-
-def _comments(lines: Sequence[str]) -> list[str]:
-    """Comment lines; what TOML forbids in comments becomes a space."""
-    return ["# " + "".join(c if c >= " " and c != "\x7f" else " " for c in line) for line in lines]
-
-
-def _table(item: Any, rename: Mapping[str, str] | None = None) -> list[str]:
-    out = []
-    for f in dataclasses.fields(item):
-        value, default = getattr(item, f.name), f.default
-        if (
-            value is None
-            or (isinstance(value, tuple) and not value)
-            or (isinstance(item, SignalSource) and value == default)
-        ):
-            continue
-        if isinstance(value, tuple):
-            text = _inline(list(value))
-        else:
-            text = (
-                _text(value)
-                if isinstance(value, str)
-                else str(value).lower()
-                if isinstance(value, bool)
-                else _real(value)
-            )
-        out.append(f"{(rename or {}).get(f.name, f.name)} = {text}")
-    return out
-
-
-def _inline(value: Any) -> str:
-    """Nested tables and lists of numbers on one line."""
-    if isinstance(value, Mapping):
-        return "{ " + ", ".join(f"{_key(k)} = {_inline(v)}" for k, v in value.items()) + " }"
-    if isinstance(value, list):
-        return "[" + ", ".join(_inline(v) for v in value) + "]"
-    return str(value) if isinstance(value, int) else _real(value)
-
-
-def _real(value: float) -> str:
-    return repr(float(value))
-
-
-def _text(value: str) -> str:
-    out = value.replace("\\", "\\\\").replace('"', '\\"')
-    return '"' + "".join(c if c >= " " and c != "\x7f" else f"\\u{ord(c):04X}" for c in out) + '"'
-
-
-def _key(name: str) -> str:
-    return name if name.isascii() and name.replace("_", "").replace("-", "").isalnum() else _text(name)

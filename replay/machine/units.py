@@ -12,7 +12,35 @@ from replay.errors import ConfigError
 from replay.machine.quantities import UNITS, Quantity
 from replay.machine.signal_table import quantity_of
 
-_ALIASES = {"°": "deg", "°/s": "deg/s", "percent": "%", "1/min": "rpm", "u/min": "rpm", "kph": "km/h"}
+#: Other spellings, as logs and people write them in English, German and French; compared without case and spaces.
+_SPELLINGS = {
+    "rpm": "r.p.m. r/min rev/min 1/min min-1 min^-1 min⁻¹ u/min umdr/min umdr./min upm tr/min t/min trs/min",
+    "rev/s": "rps u/s tr/s",
+    "deg": "° degs degree degrees grad degré degrés",
+    "deg/s": "°/s deg/sec degree/s degrees/s grad/s degré/s degrés/s dps",
+    "rad": "radian radians radiant radiants",
+    "rad/s": "rad/sec rads/s radian/s radians/s rad.s-1 rad*s^-1",
+    "m/s": "m/sec mps m.s-1 m*s^-1 meter/s meters/s mètre/s",
+    "km/h": "kph kmh kmph km/std",
+    "m": "meter meters metre metres mètre mètres",
+    "%": "percent prozent pct pourcent",
+    "1": "- ratio",
+    "m/s^2": "m/s² m/s2 m/s/s",
+    "N·m": "n.m n*m n-m newtonmeter",
+    "A": "amp amps ampere ampère",
+    "V": "volt volts",
+}
+_ALIASES = {word: name for name, words in _SPELLINGS.items() for word in words.split()}
+_NO_CASE = {name.casefold(): name for name in UNITS if name not in ("MPa", "mA")}
+
+
+def known_unit(text: str) -> str | None:
+    """Name in the table of units of a unit as logs and people write it (``U/min``, ``tr/min``: rpm); None where not known."""
+    bare = text.strip()
+    if bare in UNITS:
+        return bare
+    word = "".join(bare.split()).casefold()
+    return _ALIASES.get(word) or _NO_CASE.get(word)
 
 
 def si_factor(
@@ -47,12 +75,12 @@ def si_factor(
         Where the unit is unknown or does not describe the signal's quantity.
     """
     wanted = quantity_of(signal)
-    name = _ALIASES.get(unit.strip(), unit.strip())
+    name = known_unit(unit) or ""
     if wanted == "position_deg":
         if name != "deg":
             raise ConfigError(f"[signals] {signal!r}: unit {unit!r} does not fit; expected deg")
         return 1.0
-    if name not in UNITS:
+    if not name:
         raise ConfigError(f"[signals] {signal!r}: unit {unit!r} is not known; expected one of {', '.join(UNITS)}")
     quantity, factor = UNITS[name]
     if derivative:

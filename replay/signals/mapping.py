@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import difflib
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from fnmatch import fnmatch
 from pathlib import PurePath
@@ -14,15 +14,19 @@ from numpy.typing import NDArray
 
 from replay.arrays.column_store import ColumnStore
 from replay.errors import ConfigError
-from replay.log.raw_log import Channel, LogSummary, RawLog
+from replay.log.raw_log import Channel, LogSummary, RawLog, TopicInfo
 from replay.log.source_options import SignalSource
 from replay.machine.config import Machine
+from replay.machine.units import known_unit
 from replay.signals.rules import Candidate, candidates, wanted_type
 from replay.signals.signal import Signal, Signals
-from replay.signals.to_si import Converted, choose_motor_or_wheel, convert, doubt, usable_unit
+from replay.signals.to_si import Converted, choose_motor_or_wheel, convert, usable_unit
+from replay.signals.unit_doubts import Doubt, doubt, questions
 
 
-def plan_topics(summaries: Sequence[LogSummary], machine: Machine) -> dict[str, tuple[str, ...] | None]:
+def plan_topics(
+    summaries: Sequence[LogSummary], machine: Machine, also: Callable[[TopicInfo], bool] | None = None
+) -> dict[str, tuple[str, ...] | None]:
     """Topics worth decoding in each source.
 
     Parameters
@@ -31,6 +35,8 @@ def plan_topics(summaries: Sequence[LogSummary], machine: Machine) -> dict[str, 
         What each source holds.
     machine : Machine
         Its given signals, and the rules for those not given.
+    also : Callable[[TopicInfo], bool] or None
+        What else is wanted.
 
     Returns
     -------
@@ -46,7 +52,9 @@ def plan_topics(summaries: Sequence[LogSummary], machine: Machine) -> dict[str, 
         plan[summary.source] = tuple(
             t.name
             for t in summary.topics
-            if _slashed(t.name) in given or (not t.note and (t.encoding == "json" or wanted_type(t.type_name)))
+            if _slashed(t.name) in given
+            or (also is not None and also(t))
+            or (not t.note and (t.encoding == "json" or wanted_type(t.type_name)))
         )
     return plan
 
@@ -59,6 +67,7 @@ class _Draft:
     items: dict[str, Signal] = field(default_factory=dict)
     missing: dict[str, str] = field(default_factory=dict)
     notes: list[str] = field(default_factory=list)
+    doubts: list[Doubt] = field(default_factory=list)
     named: list[str] = field(default_factory=list)
     given: dict[tuple[str, str], str] = field(default_factory=dict)  # by source and channel: signal that it is given as
 
@@ -69,8 +78,9 @@ class _Draft:
         self.items[name] = Signal(name, converted.stamps, converted.values, origin, log.source, guessed, beside)
         self.notes += [f"{name}: {note}" for note in converted.notes]
         unsure = doubt(name, converted.values, origin, self.machine)
-        if unsure:
-            self.notes.append(unsure)
+        if unsure is not None:
+            self.doubts.append(unsure)
+            self.notes.append(unsure.text)
 
 
 def map_signals(logs: Sequence[RawLog], machine: Machine) -> Signals:
@@ -110,7 +120,8 @@ def map_signals(logs: Sequence[RawLog], machine: Machine) -> Signals:
     order = {name: i for i, name in enumerate((*machine.canonical_signals(), *machine.signals))}
     items = dict(sorted(draft.items.items(), key=lambda item: order[item[0]]))
     store = logs[0].store if logs else ColumnStore()
-    return Signals(items, draft.missing, tuple(dict.fromkeys(draft.notes)), store=store)
+    asked = questions(draft.doubts, items)
+    return Signals(items, draft.missing, tuple(dict.fromkeys(draft.notes)), asked, store=store)
 
 
 def _take_given(draft: _Draft, name: str, source: SignalSource, logs: Sequence[RawLog]) -> None:
@@ -166,7 +177,11 @@ def _take_guess(draft: _Draft, name: str, found: list[tuple[Candidate, RawLog]])
             return
         text = f"{name} is taken from {origin.label} ({candidate.why}"
         text += f", in {origin.unit.replace('1', 'fractions')}" if origin.unit else ", unit not stated, SI assumed"
-        text += f" at the {origin.at})" if origin.unit in ("rpm", "rad/s") and name.startswith("wheel.") else ")"
+        text += (
+            f" at the {origin.at})"
+            if known_unit(origin.unit) in ("rpm", "rad/s") and name.startswith("wheel.")
+            else ")"
+        )
         rivals = [
             c.origin.label
             for c, rival in ranked[i + 1 :]

@@ -11,11 +11,15 @@ _LONG = {
     "front": "front", "fore": "front", "fwd": "front", "vorne": "front", "vorn": "front",
     "rear": "rear", "back": "rear", "aft": "rear", "hinten": "rear",
     "left": "left", "links": "left", "right": "right", "rechts": "right",
+    "middle": "middle", "mid": "middle", "center": "middle", "centre": "middle", "mitte": "middle", "mittig": "middle",
+    "avant": "front", "arriere": "rear", "gauche": "left", "droite": "right", "droit": "right",
 }  # fmt: skip
 _PAIRS = {
     "fl": ("front", "left"), "lf": ("front", "left"), "fr": ("front", "right"), "rf": ("front", "right"),
     "rl": ("rear", "left"), "lr": ("rear", "left"), "bl": ("rear", "left"), "lb": ("rear", "left"),
     "rr": ("rear", "right"), "br": ("rear", "right"), "rb": ("rear", "right"),
+    "ml": ("middle", "left"), "mr": ("middle", "right"), "lm": ("middle", "left"), "rm": ("middle", "right"),
+    "avg": ("front", "left"), "avd": ("front", "right"), "arg": ("rear", "left"), "ard": ("rear", "right"),
     "vl": ("front", "left"), "vr": ("front", "right"), "hl": ("rear", "left"), "hr": ("rear", "right"),
 }  # fmt: skip
 _STEER = re.compile(r"steer|lenk|kingpin|azimuth|swivel|knuckle")
@@ -23,12 +27,18 @@ _DRIVE = re.compile(r"wheel|drive|motor|rad\b|traction|hub")
 # Type letters that PLC programs put before a name (fVelocity, lrSpeed, fbWheel).
 _PREFIX = re.compile(r"(?<![A-Za-z])(?:lr|fb|st|ar|[abefgimnprstuwx])(?=[A-Z][a-z])")
 _LOOSE = re.compile(r"(?<![A-Za-z0-9])[fblr](?![A-Za-z0-9])")
+# Words of a place that are written as one.
+_JOINED = re.compile(
+    r"(?i)(front|rear|back|middle|mid|vorne|vorn|hinten|left|right|links|rechts)(?=left|right|links|rechts|front|rear|back|wheel|rad)"
+)
+_NO_DRIVE = re.compile(r"castor|caster|arm|grip|finger|flipper|head|neck|elbow|shoulder|wrist|hip|knee|lift|torso")
 _INDEX = re.compile(r"\[(\d+)\]|(?<=[A-Za-z_])(\d+)(?!\d)")
 
 
 def tokens(name: str) -> list[str]:
     """Lower-case words of a name, split at other characters, at digits and before capitals; no type letters."""
-    return [t.lower() for t in re.findall(r"[A-Z]{1,}(?![a-z])|[A-Z]?[a-z]+|\d+", _PREFIX.sub("", name))]
+    parted = _JOINED.sub(r"\1_", _PREFIX.sub("", name))
+    return [t.lower() for t in re.findall(r"[A-Z]{1,}(?![a-z])|[A-Z]?[a-z]+|\d+", parted)]
 
 
 def position(name: str) -> tuple[str | None, str | None]:
@@ -37,7 +47,7 @@ def position(name: str) -> tuple[str | None, str | None]:
     loose = _LOOSE.findall(name.lower())
     for token in tokens(name):
         meaning = _LONG.get(token)
-        if meaning in ("front", "rear"):
+        if meaning in ("front", "rear", "middle"):
             along = along or meaning
         elif meaning is not None:
             across = across or meaning
@@ -66,14 +76,25 @@ def is_drive(name: str) -> bool:
     return _DRIVE.search(name.lower()) is not None and not is_steering(name)
 
 
+def side_of(name: str) -> str | None:
+    """Left or right of a name that says nothing of front and rear; None where it says more, or neither."""
+    along, across = position(name)
+    if along is None and across is None and "r" in _LOOSE.findall(name.lower()):
+        across = "right"
+    return across if along is None else None
+
+
 def wheel_of(name: str, machine: Machine) -> str | None:
     """Wheel that a name speaks of by its own name or by its place; None where it says neither."""
     words = tokens(name)
     for wheel in machine.wheels:
         if wheel.lower() in words and len(wheel) > 1:
             return wheel
+    sides = {side_of(w): w for w in machine.wheels}
+    if len(machine.wheels) == 2 and set(sides) == {"left", "right"}:  # one wheel, or chain of wheels, on each side
+        return None if _NO_DRIVE.search(name.lower()) else sides.get(side_of(name))
     place = position(name)
-    if None in place:
+    if None in place or re.search(r"cast[eo]r", name.lower()):
         return None
     return next((w for w in machine.wheels if position(w) == place), None)
 
@@ -87,7 +108,9 @@ def axle_of(name: str, machine: Machine) -> str | None:
     for axle in machine.axles:
         if axle.lower() in words:
             return axle
-    along = position(name)[0]
+    along, across = position(name)
+    if along is None and across is None and len(machine.axles) == 1 and is_steering(name):
+        return machine.axles[0]
     return along if along in machine.axles else None
 
 

@@ -68,6 +68,9 @@ class Signals:
         Canonical names that were looked for and not found, with the reason.
     notes : tuple[str, ...]
         Guesses made and doubts about them, one sentence each.
+    questions : tuple[str, ...]
+        Values that the machine cannot have, each with the line of the machine file that would mend it: nothing is judged
+        before they are answered.
     open_loop : bool
         Whether faults were written into the recording, so that its controller never met them.
     store : ColumnStore
@@ -77,6 +80,7 @@ class Signals:
     items: Mapping[str, Signal]
     missing: Mapping[str, str]
     notes: tuple[str, ...] = ()
+    questions: tuple[str, ...] = ()
     open_loop: bool = False
     store: ColumnStore = field(default_factory=ColumnStore, repr=False, compare=False)
 

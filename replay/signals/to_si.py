@@ -16,9 +16,8 @@ from replay.log.stamp_order import spread_ticks
 from replay.machine.config import Machine
 from replay.machine.quantities import SI_UNITS
 from replay.machine.signal_table import quantity_of
-from replay.machine.units import si_factor
+from replay.machine.units import known_unit, si_factor
 
-_TOO_FAST = 3.0
 _WIDE = 1.5
 _PEAK_SAMPLES = 1 << 18
 
@@ -46,13 +45,11 @@ def usable_unit(signal: str, unit: str | None) -> str | None:
     """Return a recorded unit that can describe the signal, else None."""
     if not unit:
         return None
-    for text in (unit, unit.lower()):
-        try:
-            si_factor(signal, text, wheel_radius=1.0, gear_ratio=1.0, at="wheel")
-        except ConfigError:
-            continue
-        return text
-    return None
+    try:
+        si_factor(signal, unit, wheel_radius=1.0, gear_ratio=1.0, at="wheel")
+    except ConfigError:
+        return None
+    return unit
 
 
 def factor_of(signal: str, origin: SignalSource, machine: Machine) -> float:
@@ -155,44 +152,27 @@ def slope(stamps: NDArray[np.int64], position: NDArray[np.float64]) -> NDArray[n
     return speed
 
 
-def _peak(values: NDArray[Any]) -> float:
-    """99th percentile of the magnitude, of a long signal that of every few samples; 0 where there is no number."""
+def magnitudes(values: NDArray[Any]) -> NDArray[np.float64]:
+    """Magnitudes of the numbers of a signal, of a long one those of every few samples."""
     some = values[:: max(1, len(values) // _PEAK_SAMPLES)]
-    finite = np.abs(some[np.isfinite(some)].astype(np.float64))
+    out: NDArray[np.float64] = np.abs(some[np.isfinite(some)].astype(np.float64))
+    return out
+
+
+def peak_of(values: NDArray[Any]) -> float:
+    """99th percentile of the magnitude; 0 where there is no number."""
+    finite = magnitudes(values)
     return float(np.percentile(finite, 99)) if len(finite) else 0.0
 
 
 def choose_motor_or_wheel(signal: str, origin: SignalSource, values: NDArray[Any], machine: Machine) -> SignalSource:
     """Decide where a guessed rotation was measured: at the motor where only that fits the machine's top speed."""
-    if not signal.startswith("wheel.") or origin.unit.lower() != "rpm" or machine.gear_ratio == 1.0:
+    if not signal.startswith("wheel.") or known_unit(origin.unit) != "rpm" or machine.gear_ratio == 1.0:
         return origin
     motor = replace(origin, at="motor")
     try:
-        at_motor = _peak(values) * factor_of(signal, motor, machine)
+        at_motor = peak_of(values) * factor_of(signal, motor, machine)
     except ConfigError:
         return origin
     at_wheel = at_motor * machine.gear_ratio
     return origin if at_wheel < _WIDE * machine.max_speed and at_motor < 0.02 * machine.max_speed else motor
-
-
-def doubt(signal: str, values: NDArray[np.float64], origin: SignalSource, machine: Machine) -> str:
-    """Return a sentence with figures where a signal is too large for the machine, else an empty string."""
-    quantity = quantity_of(signal)
-    peak = _peak(values)
-    unit = origin.unit or SI_UNITS[quantity]
-    if quantity == "speed" and not signal.startswith("gnss") and peak > _TOO_FAST * machine.max_speed:
-        times = peak / machine.max_speed
-        text = (
-            f"{signal} reaches {peak:.3g} m/s with unit {unit!r}, {times:.1f} times max_speed {machine.max_speed:g} m/s"
-        )
-        gear = machine.gear_ratio
-        if signal.startswith("wheel.") and origin.at == "wheel" and gear > 1 and times / gear <= _WIDE:
-            return f'{text}; it is probably measured at the motor (gear ratio {gear:g}): set at = "motor"'
-        return f"{text}; check its unit"
-    if quantity == "fraction" and not signal.endswith(".psi") and peak > _WIDE * machine.control.u_max:
-        more = "; it is probably %" if _WIDE < peak <= 150 else ""
-        return f"{signal} reaches {peak:.3g} of full opening with unit {unit!r}{more}; check its unit"
-    if quantity == "angle" and signal.startswith("steer.") and peak > 2 * max(machine.max_steer, 0.1):
-        more = "; it is probably deg" if peak * np.pi / 180 <= _WIDE * machine.max_steer else ""
-        return f"{signal} reaches {peak:.3g} rad with unit {unit!r}, max_steer is {machine.max_steer:.3g} rad{more}"
-    return ""

@@ -17,6 +17,7 @@ from replay.readers.messages import cdr, json_messages, protobuf
 from replay.readers.messages.cdr_layout import MAX_ELEMENTS
 from replay.readers.messages.cdr_program import Spec
 from replay.readers.messages.connection import Block, Connection
+from replay.readers.messages.description_text import description_in
 from replay.readers.messages.tables import Budget, Cells, Table
 from replay.readers.messages.topic_store import Store
 
@@ -122,6 +123,7 @@ class Assembler:
         self.stamps = (Spec("log", "i8"), Spec("publish", "i8"))[: 2 if clock == "publish" else 1]
         self.batches, self.budget = 0, Budget(MEMORY)
         self.clocks = Clocks(clock, report)
+        self.robot_description = ""
 
     def expect(self, connection: Connection, count: int) -> None:
         """Foretell how many messages of a connection will come, which spares memory and time; it need not be true."""
@@ -134,6 +136,7 @@ class Assembler:
         for block in arrived:
             batches.setdefault((block.connection.topic, block.connection.type_name), []).append(block)
         for key, batch in batches.items():
+            self.robot_description = description_in(batch) or self.robot_description
             topic = self.topics.get(key)
             if topic is None:
                 count = self.expected.get(key, 0)
@@ -175,7 +178,9 @@ class Assembler:
             notes=tuple(dict.fromkeys((*summary.notes, *self.report.notes))),
             damage=tuple(dict.fromkeys((*summary.damage, *self.report.damage))),
         )
-        return RawLog(summary.source, summary.format, self.clock, channels, summary, self.report.store)
+        return RawLog(
+            summary.source, summary.format, self.clock, channels, summary, self.report.store, self.robot_description
+        )
 
     def _channels(self, label: str, topic: _Topic) -> Iterable[Channel]:
         count = topic.store.count

@@ -30,7 +30,7 @@ from replay.readers.tables.text_table import (
     span,
 )
 from replay.readers.tables.time_cells import TimeBase, epoch_ns
-from replay.readers.tables.time_column import Sample, find_time
+from replay.readers.tables.time_column import Sample, TimeColumn, find_time
 
 _SAMPLES = (HEAD, 16 << 20)
 _NAMED = (".csv", ".tsv")
@@ -63,14 +63,15 @@ class CsvReader:
         """
         report = Report()
         table = open_text(path, options, report)
-        sample, name, unit = _time(table, options, report)
+        sample, time = _time(table, options, report)
+        name, unit, part = time
         last = table.file.tail(table.skip) if unit != "dc32" else b""
         tail = table.sample(last) if last else {}
         count, exact = row_count(table.file, table.skip)
         dated = sample[name].dtype.kind == "M"
-        base = TimeBase("iso" if dated else unit, epoch_ns(options, str(path), unit), path.name, Report())
-        start, stop = span(base, sample[name], tail.get(name), count)
-        fields = tuple(n for n in table.names if n != name and (n in sample or n in tail))
+        base = TimeBase("iso" if dated else unit, epoch_ns(options, str(path), unit), path.name, Report(), part)
+        start, stop = span(base, _cells(sample, time), _cells(tail, time), count)
+        fields = tuple(n for n in table.names if n not in time.names and (n in sample or n in tail))
         note = "" if exact else "rows and end are estimated from the first rows; reading the file counts them"
         topic = TopicInfo(path.name, "table", count, "table", fields, note)
         return LogSummary(str(path), self.format, start, stop, (topic,), tuple(report.notes), tuple(report.damage))
@@ -93,11 +94,11 @@ class CsvReader:
         """
         report = Report(store=store or ColumnStore())
         table = open_text(path, options, report)
-        sample, name, unit = _time(table, options, report)
-        time = name, unit, unit == "iso" or sample[name].dtype.kind == "M"
-        found = _read(table, time, options, window, report.store)
+        sample, time = _time(table, options, report)
+        dated = time.unit == "iso" or sample[time.name].dtype.kind == "M"
+        found = _read(table, time, dated, options, window, report.store)
         if not table.sure and any(_has_comma(cell) for cell in found.rows.examples.values()):
-            found = _read(table.commas(), time, options, window, report.store)
+            found = _read(table.commas(), time, dated, options, window, report.store)
         report.damage += found.rows.report.damage
         return _log(table, found, report, clock)
 
@@ -109,8 +110,13 @@ class _Found:
         self.rows, self.times, self.columns = rows, times, columns
 
 
-def _time(table: TextTable, options: SourceOptions, report: Report) -> tuple[Sample, str, str]:
-    """First rows, and name and unit of the time column; more rows are looked at where few do not tell."""
+def _cells(columns: Sample, time: TimeColumn) -> tuple[NDArray[Any], ...] | None:
+    """Cells of a table's time; None where a column of it is absent."""
+    return tuple(columns[n] for n in time.names) if all(n in columns for n in time.names) else None
+
+
+def _time(table: TextTable, options: SourceOptions, report: Report) -> tuple[Sample, TimeColumn]:
+    """First rows, and the time column; more rows are looked at where few do not tell."""
     for size in _SAMPLES:
         head = table.file.head(table.skip + size)[table.skip :]
         whole = len(head) < size
@@ -118,32 +124,36 @@ def _time(table: TextTable, options: SourceOptions, report: Report) -> tuple[Sam
         try:
             said = Report()
             columns = sample if options.time is None else {n: sample.get(n, np.empty(0)) for n in table.names}
-            name, unit = find_time(table.file.path, columns, options, said, table.texts(head, columns))
+            time = find_time(table.file.path, columns, options, said, table.texts(head, columns))
         except LogError:
             if whole or size == _SAMPLES[-1]:
                 raise
             continue
         for note in said.notes:
             report.note(note)
-        return columns, name, unit
+        return columns, time
     raise AssertionError("unreachable")
 
 
 def _read(
-    table: TextTable, time: tuple[str, str, bool], options: SourceOptions, window: Window | None, store: ColumnStore
+    table: TextTable,
+    time: TimeColumn,
+    dated: bool,
+    options: SourceOptions,
+    window: Window | None,
+    store: ColumnStore,
 ) -> _Found:
-    """One pass over a table whose time column has this name and unit, and may hold dates."""
-    name, unit, dated = time
+    """One pass over a table with this time column, which may hold dates."""
     report = Report(store=store)
     rows = table.rows(report)
-    at = table.names.index(name)
+    at = [table.names.index(n) for n in time.names]
     if dated:
-        rows.kinds[at] = MOMENT
-    times = RowTimes(table.file.path, name, unit, dated, options, window, report)
-    columns = {n: CellColumn(store) for n in table.names if n != name}
-    order = [(i, columns[n]) for i, n in enumerate(table.names) if n != name]
+        rows.kinds[at[0]] = MOMENT
+    times = RowTimes(table.file.path, time, dated, options, window, report)
+    columns = {n: CellColumn(store) for n in table.names if n not in time.names}
+    order = [(i, columns[n]) for i, n in enumerate(table.names) if n not in time.names]
     for cells in table.blocks(rows):
-        keep = times.keep(cells[at].view(np.float64) if rows.kinds[at] == REAL else cells[at])
+        keep = times.keep(*(cells[i].view(np.float64) if rows.kinds[i] == REAL else cells[i] for i in at))
         whole = bool(keep.all())
         for i, column in order:
             column.append(cells[i] if whole else cells[i][keep], rows.kinds[i])

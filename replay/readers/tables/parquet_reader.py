@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
@@ -24,10 +24,11 @@ from replay.readers.tables.iso_kernel import iso_many
 from replay.readers.tables.row_kernel import MISSING
 from replay.readers.tables.table_log import RowTimes, table_log
 from replay.readers.tables.time_cells import TimeBase, epoch_ns
-from replay.readers.tables.time_column import find_time
+from replay.readers.tables.time_column import TimeColumn, find_time
 
 _CELLS = 1 << 21
 _SAMPLE = 20_000
+_SECOND_NS = 1_000_000_000
 _ROUNDING = 1000  # statistics of dates may come back in whole microseconds [ns]
 _LARGEST_GROUP = 16 << 30
 _DAMAGE = (pa.ArrowException, OSError, ValueError, KeyError, TypeError, OverflowError, MemoryError, IndexError)
@@ -56,15 +57,14 @@ class ParquetReader:
         report = Report()
         with _opened(path) as file:
             table = _Parquet(path, file)
-            name, unit = table.time(options, report)
-            base = TimeBase(
-                "iso" if table.dated(name) else unit, epoch_ns(options, str(path), unit), path.name, Report()
-            )
-            ends = [base.stamps(cells) for cells in table.ends(name)]
+            time = table.time(options, report)
+            unit = "iso" if table.dated(time.name) else time.unit
+            base = TimeBase(unit, epoch_ns(options, str(path), time.unit), path.name, Report(), time.part)
+            ends = [base.stamps(*cells) for cells in table.ends(time.names)]
             given = np.concatenate(ends) if ends else np.empty(0, np.int64)
             given = given[given != MISSING]
             start, stop = (int(given.min()), int(given.max())) if len(given) else (0, 0)
-            fields = tuple(n for n in table.numeric if n != name)
+            fields = tuple(n for n in table.numeric if n not in time.names)
             topic = TopicInfo(path.name, "table", file.metadata.num_rows, "table", fields)
         return LogSummary(str(path), self.format, start, stop, (topic,), tuple(report.notes), tuple(report.damage))
 
@@ -87,12 +87,12 @@ class ParquetReader:
         report = Report(store=store or ColumnStore())
         with _opened(path) as file:
             table = _Parquet(path, file)
-            name, unit = table.time(options, report)
-            times = RowTimes(path, name, unit, table.dated(name), options, window, report)
-            columns = {n: ArrayColumn(report.store) for n in table.numeric if n != name}
-            groups = table.groups(name, unit, epoch_ns(options, str(path), unit), window)
-            for cells in table.blocks([name, *columns], groups):
-                keep = times.keep(cells[name])
+            time = table.time(options, report)
+            times = RowTimes(path, time, table.dated(time.name), options, window, report)
+            columns = {n: ArrayColumn(report.store) for n in table.numeric if n not in time.names}
+            groups = table.groups(time, epoch_ns(options, str(path), time.unit), window)
+            for cells in table.blocks([*time.names, *columns], groups):
+                keep = times.keep(*(cells[n] for n in time.names))
                 for label, column in columns.items():
                     column.append(cells[label][keep])
             return table.named(table_log(path, self.format, clock, times, columns, table.texts, table.about))
@@ -129,11 +129,11 @@ class _Parquet:
         if not file.metadata.num_rows:
             raise LogError(f"{path} has {len(names)} columns and no row of data; record or export it again")
 
-    def time(self, options: SourceOptions, report: Report) -> tuple[str, str]:
-        """Name and unit of the time column."""
+    def time(self, options: SourceOptions, report: Report) -> TimeColumn:
+        """Find the time column."""
         stated = self.about.get("mfhca.time")
         if stated in self.numeric and options.time is None:
-            return stated, "ns"
+            return TimeColumn(stated, "ns")
         wanted = (options.time or "").strip()
         dated = [n for n in self.texts if n == wanted and options.time_unit in ("iso", "dt")]
         if dated:
@@ -164,8 +164,9 @@ class _Parquet:
         kind = self.numeric[name].type
         return bool(pa.types.is_timestamp(kind) or pa.types.is_date(kind) or not _is_number(kind))
 
-    def groups(self, name: str, unit: str, epoch: int, window: Window | None) -> list[int]:
+    def groups(self, time: TimeColumn, epoch: int, window: Window | None) -> list[int]:
         """Row groups whose stamps may lie in the window, by the statistics of the time column."""
+        name, unit, part = time
         every = list(range(self.file.metadata.num_row_groups))
         if window is None or unit in ("dc32", "dt"):
             return every
@@ -173,7 +174,7 @@ class _Parquet:
         flat = [i for i in range(len(self.file.schema)) if self.file.schema.column(i).path == name]
         if index < 0 or len(flat) != 1:
             return every
-        slack = _ROUNDING if pa.types.is_temporal(self.numeric[name].type) else 0
+        slack = _ROUNDING if pa.types.is_temporal(self.numeric[name].type) else 0 if part is None else _SECOND_NS
         kept = []
         for group in every:
             statistics = self.file.metadata.row_group(group).column(flat[0]).statistics
@@ -186,14 +187,14 @@ class _Parquet:
                 kept.append(group)
         return kept
 
-    def ends(self, name: str) -> Iterator[NDArray[Any]]:
-        """Time cells of the first and the last row group."""
+    def ends(self, names: Sequence[str]) -> Iterator[list[NDArray[Any]]]:
+        """Time cells of the first and the last row group, one array per column of the clock."""
         last = self.file.metadata.num_row_groups - 1
         for group in sorted({0, last}):
-            for cells in self.blocks([name], [group]):
-                yield cells[name]
+            for cells in self.blocks(names, [group]):
+                yield [cells[n] for n in names]
 
-    def blocks(self, names: list[str], groups: list[int], size: int = 1 << 17) -> Iterator[dict[str, NDArray[Any]]]:
+    def blocks(self, names: Sequence[str], groups: list[int], size: int = 1 << 17) -> Iterator[dict[str, NDArray[Any]]]:
         """Columns by name, a limited number of rows at a time; integers of the first stay exact."""
         own = [self.numeric[n].name for n in names]
         size = max(min(size, _CELLS // len(own)), 1)

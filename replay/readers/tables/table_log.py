@@ -15,6 +15,7 @@ from replay.log.reading_notes import Report
 from replay.log.source_options import SourceOptions
 from replay.readers.tables.columns import compressed, pick, unit_of
 from replay.readers.tables.time_cells import TimeBase, epoch_ns, spread_seconds
+from replay.readers.tables.time_column import TimeColumn
 
 
 class Finished(Protocol):
@@ -32,7 +33,7 @@ class RowTimes:
     ----------
     path : Path
         File, for messages.
-    name, unit : str
+    column : TimeColumn
         Time column.
     dated : bool
         Whether its cells are moments [ns since 1970] already.
@@ -47,25 +48,27 @@ class RowTimes:
     def __init__(
         self,
         path: Path,
-        name: str,
-        unit: str,
+        column: TimeColumn,
         dated: bool,
         options: SourceOptions,
         window: Window | None,
         report: Report,
     ) -> None:
-        self.path, self.name, self.unit, self.report = path, name, unit, report
+        self.path, self.column, self.report = path, column, report
+        self.name = name = column.name
+        self.unit = unit = column.unit
         self.base = TimeBase(
-            "iso" if dated else unit, epoch_ns(options, str(path), unit), f"{path.name}, column {name!r}", report
-        )
+            "iso" if dated else unit, epoch_ns(options, str(path), unit), f"{path.name}, column {name!r}", report,
+            column.part,
+        )  # fmt: skip
         self._early = None if unit == "dt" else window
         self._late = window if unit == "dt" else None
         self._stamps = report.store.column(np.int64)
         self.seen = 0
 
-    def keep(self, cells: NDArray[Any]) -> NDArray[np.bool_]:
-        """Take the time cells of a block, shape (m,), and return which of its rows are kept."""
-        stamps = self.base.stamps(cells)
+    def keep(self, cells: NDArray[Any], parts: NDArray[Any] | None = None) -> NDArray[np.bool_]:
+        """Take the time cells of a block, and parts of its seconds, each of shape (m,); return which of its rows are kept."""
+        stamps = self.base.stamps(cells, parts)
         keep = pick(stamps, self._early)
         self.seen += len(stamps)
         self._stamps.append(stamps[keep])

@@ -6,7 +6,7 @@ import csv
 import io
 import re
 from collections import Counter
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -267,19 +267,22 @@ def row_count(file: TextFile, skip: int) -> tuple[int, bool]:
     return lines + (last != b"\n"), True
 
 
-def span(base: TimeBase, head: NDArray[Any], tail: NDArray[Any] | None, count: int) -> tuple[int, int]:
+def span(
+    base: TimeBase, head: Sequence[NDArray[Any]] | None, tail: Sequence[NDArray[Any]] | None, count: int
+) -> tuple[int, int]:
     """First and last stamp of a table [ns].
 
     Parameters
     ----------
     base : TimeBase
         Of its time column.
-    head, tail : NDArray
-        Time cells of its first and last rows; without the latter the end follows from the usual step.
+    head, tail : Sequence[NDArray] or None
+        Time cells of its first and last rows, one array per column of its clock; without the latter the end follows from
+        the usual step.
     count : int
         Number of rows.
     """
-    first = base.stamps(head)
+    first = base.stamps(*head) if head is not None else np.empty(0, np.int64)
     first = first[first != MISSING]
     if not len(first):
         return 0, 0
@@ -287,6 +290,6 @@ def span(base: TimeBase, head: NDArray[Any], tail: NDArray[Any] | None, count: i
     if tail is None:
         step = (stop - start) / max(len(first) - 1, 1)
         return start, max(stop, start + int(step * max(count - 1, 0)))
-    last = base.stamps(tail)
+    last = base.stamps(*tail)
     last = last[last != MISSING]
     return min(start, int(last.min(initial=start))), max(stop, int(last.max(initial=stop)))

@@ -12,6 +12,7 @@ from replay.errors import LogError
 from replay.log.reading_notes import Report
 from replay.log.source_options import SourceOptions
 from replay.readers.tables.row_kernel import MISSING
+from replay.readers.tables.split_time import Part, with_part
 
 FILETIME_EPOCH = 116_444_736_000_000_000
 DC_EPOCH = 946_684_800_000_000_000
@@ -66,26 +67,32 @@ class TimeBase:
         File and column, for messages.
     report : Report
         Takes notes and losses when all blocks are through.
+    part : Part or None
+        Column with the parts of whole seconds, where the clock stands in two columns.
     """
 
-    def __init__(self, unit: str, epoch: int, label: str, report: Report) -> None:
-        self.unit, self.epoch, self.label, self.report = unit, epoch, label, report
+    def __init__(self, unit: str, epoch: int, label: str, report: Report, part: Part | None = None) -> None:
+        self.unit, self.epoch, self.label, self.report, self.part = unit, epoch, label, report, part
         self.rows = self.missing = 0
         self._inexact = self._dated = False
         self._last: int | None = None
         self._turns = 0
         self._longest = 0
 
-    def stamps(self, cells: NDArray[Any]) -> NDArray[np.int64]:
+    def stamps(self, cells: NDArray[Any], parts: NDArray[Any] | None = None) -> NDArray[np.int64]:
         """Stamps [ns], `row_kernel.MISSING` where a cell holds no time.
 
         Parameters
         ----------
         cells : NDArray, shape (m,)
             Integers (`MISSING` where empty) or doubles (NaN where empty).
+        parts : NDArray or None, shape (m,)
+            Cells of the second column, where the clock stands in two.
         """
         self.rows += len(cells)
         ns = self._of_reals(cells) if cells.dtype.kind == "f" else self._of_integers(cells)
+        if parts is not None and self.part is not None:
+            ns = with_part(ns, parts, self.part.unit_ns)
         self.missing += int(np.count_nonzero(ns == MISSING))
         return ns
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +14,7 @@ from replay.errors import LogError
 from replay.log.reading_notes import Report
 from replay.log.source_options import SourceOptions
 from replay.readers.tables.columns import unit_of
+from replay.readers.tables.split_time import Part, split_times, with_part
 
 _TIME = re.compile(
     r"^(t|time|times?tamp|stamp|rel(ative)?[ _]?time|elapsed([ _]?time)?|date[ _]?time|zeit|zeitstempel|seconds?|secs?|"
@@ -36,10 +37,31 @@ _SIZES = (  # a distributed clock counts from 2000: years 2014 to 2031
 Sample = Mapping[str, NDArray[Any]]
 
 
+class TimeColumn(NamedTuple):
+    """Where the time of a table stands.
+
+    Attributes
+    ----------
+    name, unit : str
+        Column, and its unit as in `SourceOptions.time_unit`.
+    part : Part or None
+        Column with the parts of its whole seconds, where the clock stands in two columns.
+    """
+
+    name: str
+    unit: str
+    part: Part | None = None
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Its columns, which are no signals."""
+        return (self.name,) if self.part is None else (self.name, self.part.name)
+
+
 def find_time(
     path: Path, sample: Sample, options: SourceOptions, report: Report, texts: Mapping[str, str] | None = None
-) -> tuple[str, str]:
-    """Name and unit of the time column: as given, by its name, or the first that only rises.
+) -> TimeColumn:
+    """Time column: as given, seconds and nanoseconds in two columns, by its name, or the first that only rises.
 
     Parameters
     ----------
@@ -70,7 +92,9 @@ def find_time(
                 "time_unit = 'dc32' (a 32-bit distributed clock)"
             )
         moment = sample[wanted].dtype.kind == "M" and options.time_unit != "dt"
-        return wanted, "iso" if moment else options.time_unit
+        return _split(path, sample, options, report) or TimeColumn(wanted, "iso" if moment else options.time_unit)
+    if (both := _split(path, sample, options, report)) is not None:
+        return both
     called = [n for n in names if _TIME.match(_bare(n).lower())]
     rising = [n for n in names if rises(sample[n]) or turns(sample[n])]
     named = [n for n in called if n in rising]
@@ -81,7 +105,7 @@ def find_time(
         unit = _time_unit(path, name, sample[name], options)
         how = "by its name" if name in called else _course(sample[name], unit)
         report.note(f"{path.name}: time is column {name!r} in {unit}, found {how}; [sources] time and time_unit set it")
-        return name, unit
+        return TimeColumn(name, unit)
     for name in called or names:
         if rises(sample[name], often=False):
             raise LogError(
@@ -91,6 +115,24 @@ def find_time(
     raise LogError(
         f"{path} has no time column (none rises); give [sources] time; its columns are {_some([*texts, *names])}"
     )
+
+
+def _split(path: Path, sample: Sample, options: SourceOptions, report: Report) -> TimeColumn | None:
+    """Clock in two columns, of which the whole seconds are the given column where one is given."""
+    if options.time_unit != "s":
+        return None
+    wanted = None if options.time is None else options.time.strip()
+    for name, part in split_times(sample):
+        if wanted not in (None, name):
+            continue
+        seconds = _given(sample[name]).astype(np.int64)
+        cells = sample[part.name]
+        if len(seconds) == len(cells) and rises(with_part(seconds * 1_000_000_000, cells, part.unit_ns)):
+            report.note(
+                f"{path.name}: time is column {name!r} in s with {part.name!r} in {part.unit}; [sources] time sets it"
+            )
+            return TimeColumn(name, "s", part)
+    return None
 
 
 def _refuse_text(path: Path, texts: Mapping[str, str], names: list[str], sure: bool) -> None:

@@ -10,13 +10,14 @@ from pathlib import Path
 
 import pytest
 
-from cli.commands.config import starter
+from cli.commands.config_init import starter
 from cli.main import run
 from replay.log.source_options import SignalSource, SourceOptions
 from replay.machine.config import Control, Limits, Plant, WheelPlant, haulotte
 from replay.machine.quantities import UNITS
 from replay.machine.signal_table import CANONICAL
-from replay.machine.toml_file import dump_machine, load_machine
+from replay.machine.toml_file import load_machine
+from replay.machine.toml_text import dump_machine
 
 
 def active(section: str) -> dict[str, object]:

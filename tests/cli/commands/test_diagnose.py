@@ -315,3 +315,17 @@ def test_the_fault_table_breaks_no_number(width: int) -> None:
     assert all(word in out for word in ("1000.00–1105.18", "0.94", "0.998", "medium", "sensor or"))
     assert ("+0.300 m/s" in out) == (width == 120)
     assert out.lower().count("not assessed") == 1, "once"
+
+
+@pytest.mark.parametrize(
+    ("source", "words"), [("paper defaults", "No machine file was given"), ("m.toml", "m.toml leaves out")]
+)
+def test_the_paper_s_numbers_are_said_before_the_verdict(source: str, words: str) -> None:
+    report = result("high").report
+    report["machine"] |= {"source": source, "assumed": ["gear ratio 17.7"]}
+    console = Console(width=80)
+    with console.capture() as capture:
+        console.print(*verdict_parts(report))
+    out = capture.get()
+    assert out.startswith(words)
+    assert -1 < out.index("gear ratio 17.7") < out.index("1 faults")

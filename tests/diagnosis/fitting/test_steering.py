@@ -15,7 +15,8 @@ from replay.errors import ConfigError
 from replay.log.source_options import SignalSource
 from replay.machine.axle_plant import AxlePlant
 from replay.machine.config import haulotte
-from replay.machine.toml_file import dump_machine, load_machine
+from replay.machine.toml_file import load_machine
+from replay.machine.toml_text import dump_machine
 from replay.signals.signal import Signal, Signals
 from replay.signals.timeline import Timeline, align
 from replay.simulation.options import SimulationOptions

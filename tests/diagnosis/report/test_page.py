@@ -312,3 +312,12 @@ def test_loss_over_the_mission_stands_with_the_coverage() -> None:
     page = build_page({**report, "loss": loss}, columns)
     assert "Loss ε̂ over the mission" in page
     assert "0.123 (0.100 to 0.150)" in page
+
+
+def test_the_paper_s_numbers_are_said_before_the_verdict() -> None:
+    report, columns = samples.no_faults()
+    assert 'id="assumed"' not in build_page(report, columns)
+    machine = {**report["machine"], "source": "paper defaults", "assumed": ["gear ratio 17.7"]}
+    page = build_page({**report, "machine": machine}, columns)
+    assert page.index("gear ratio 17.7") < page.index('id="verdict"')
+    assert f"{machine['name']} (assumed)" in page

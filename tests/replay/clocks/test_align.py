@@ -17,7 +17,8 @@ from replay.export.recording import write_recording
 from replay.log.raw_log import Channel, LogSummary, RawLog
 from replay.log.source_options import SignalSource, SourceOptions
 from replay.machine.config import haulotte
-from replay.machine.toml_file import dump_machine, load_machine
+from replay.machine.toml_file import load_machine
+from replay.machine.toml_text import dump_machine
 from replay.mission import load_mission, read_signals
 from replay.signals.signal import Signal, Signals
 

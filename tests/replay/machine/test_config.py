@@ -102,6 +102,12 @@ def test_value_out_of_range_is_named(build: Any, words: list[str]) -> None:
     assert [w for w in words if w not in str(caught.value)] == []
 
 
+def test_degrees_where_radians_are_meant_get_the_line_to_write() -> None:
+    with pytest.raises(ConfigError) as caught:
+        replace(haulotte(), max_steer=45.0)
+    assert "45 looks like degrees: write max_steer = 0.7854 in [geometry]" in str(caught.value)
+
+
 def test_not_a_number_is_out_of_range() -> None:
     with pytest.raises(ConfigError, match=r"control\.lambda"):
         Control(lambda_=float("nan"))

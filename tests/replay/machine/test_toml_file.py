@@ -13,7 +13,8 @@ from replay.errors import ConfigError
 from replay.log.source_options import SignalSource, SourceOptions
 from replay.machine.config import Control, Limits, Machine, Noise, Plant, WheelPlant, haulotte
 from replay.machine.geometry import Geometry, WheelGeometry
-from replay.machine.toml_file import dump_machine, load_machine
+from replay.machine.toml_file import load_machine
+from replay.machine.toml_text import dump_machine
 
 SETTINGS = settings(max_examples=60, deadline=None)
 

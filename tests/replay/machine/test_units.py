@@ -44,6 +44,18 @@ def factor(signal: str, unit: str, **changed: Any) -> float:
         # a rotation of the wheel, r = 0.427 m
         ("wheel.FR.v", "rad/s", 0.427),
         ("wheel.FR.v_ref", "rpm", 2 * math.pi / 60 * 0.427),
+        # as German and French programs write it
+        ("wheel.FR.v", "U/min", 2 * math.pi / 60 * 0.427),
+        ("wheel.FR.v", "tr/min", 2 * math.pi / 60 * 0.427),
+        ("wheel.FR.v", "min^-1", 2 * math.pi / 60 * 0.427),
+        ("wheel.FR.v", "RPM", 2 * math.pi / 60 * 0.427),
+        ("wheel.FR.v", "Umdr./min", 2 * math.pi / 60 * 0.427),
+        ("cmd.v", "km/std", 1 / 3.6),
+        ("cmd.v", "KM/H", 1 / 3.6),
+        ("imu.yaw_rate", "Grad/s", math.pi / 180),
+        ("steer.front.phi", "degrés", math.pi / 180),
+        ("wheel.FR.u", "Prozent", 0.01),
+        ("wheel.FR.effort", "mA", 1e-3),
     ],
 )
 def test_factor_to_si(signal: str, unit: str, expected: float) -> None:

@@ -1,0 +1,60 @@
+"""Every channel of a log, for the terminal and as JSON."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import asdict
+from pathlib import PurePath
+
+from rich.console import RenderableType
+from rich.text import Text
+
+from cli.tables.layout import text, whole_lines
+from replay.machine.config import Machine
+from replay.setup.all_channels import ChannelRow
+
+_NARROW, _WIDE = 26, 44  # characters of a field that share a line with the rest, on terminals of 80 and of 120 columns
+
+
+def channels_document(rows: Sequence[ChannelRow], machine: Machine | None, source: str) -> dict[str, object]:
+    """All channels as JSON values."""
+    known = None if machine is None else {"name": machine.name, "source": source, "wheels": list(machine.wheels)}
+    return {"machine": known, "channels": [asdict(row) for row in rows]}
+
+
+def channels_parts(rows: Sequence[ChannelRow], machine: Machine | None, width: int) -> list[RenderableType]:
+    """A heading for each topic or table, and a line or two for each of its channels."""
+    whose = (
+        text("No wheels were found in the names; the machine's signals need a machine file.", "bold")
+        if machine is None
+        else text(f"Could be: signals of a machine with the wheels {', '.join(machine.wheels)}.", "dim")
+    )
+    lines = list(_lines(rows, _WIDE if width >= 110 else _NARROW, width))
+    count = f"{len(rows)} channels."
+    return [whole_lines(lines), "", text(count, "dim"), whose]
+
+
+def _lines(rows: Sequence[ChannelRow], field: int, width: int) -> Iterator[Text]:
+    heading = ""
+    for row in rows:
+        place = row.topic or PurePath(row.source).name
+        if place != heading:
+            rate = f"  {row.rate_hz:.4g} Hz" if row.rate_hz else ""
+            kind = row.type_name.rpartition("/")[2] if row.topic else ""
+            yield Text.assemble("\n" if heading else "", text(place, "bold"), text(f"  {kind}{rate}", "dim"))
+            heading = place
+        yield from _row(row, field, width)
+
+
+def _row(row: ChannelRow, field: int, width: int) -> Iterator[Text]:
+    """The channel's whole name, then range, unit and signals: on one line where they fit."""
+    name = f"  {row.field}"
+    unit = f"{row.unit}{'?' if row.guessed and row.unit else ''}" or "–"
+    span = "no number" if row.low is None else f"{row.low:.4g} … {row.high:.4g}"
+    could = ", ".join(row.could_be)
+    rest = f"{span:<23}  {unit:<6}  {could}".rstrip()
+    if len(name) <= field + 2 and len(name) + 2 + len(rest) <= max(width, field + 2 + len(rest)):
+        yield text(f"{name:<{field + 2}}  {rest}")
+        return
+    yield text(name)
+    yield text(f"{'':<{field + 2}}  {rest}")

@@ -1,0 +1,215 @@
+"""A first machine from the files of one mission: structure, signals, lengths and speeds, and what a person must still say."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from pathlib import PurePath
+
+from replay.errors import ConfigError, LogError
+from replay.log.raw_log import Channel, RawLog
+from replay.log.source_options import SignalSource
+from replay.machine.config import Control, Machine, haulotte
+from replay.machine.geometry import Geometry
+from replay.setup.draft_notes import Draft
+from replay.setup.given import given_signals, odometry, table_sources
+from replay.setup.lengths import largest_angle, limits_for, wheel_places, wheel_radius, with_speeds
+from replay.setup.motion import WheelMotion, backwards, wheel_motion
+from replay.setup.preset import Preset
+from replay.setup.robot_description import RobotDescription, parse_description
+from replay.setup.structure import ONE, Structure, described_structure, named_structure, preset_structure
+from replay.signals.mapping import map_signals
+from replay.signals.signal import Signals
+
+_SPEEDS = ("v", "v_true", "v_ref")
+
+
+def structure_of(logs: Sequence[RawLog]) -> Structure:
+    """Wheels of the machine that recorded some logs; raises `LogError` where none can be found."""
+    channels = {name: channel for log in logs for name, channel in log.channels.items()}
+    return _structure(channels, _description(logs, []), None)
+
+
+def preset_draft(preset: Preset) -> Draft:
+    """A machine of a usual kind without a log: every length is to be filled in, and every signal found by its name."""
+    structure = preset_structure(preset)
+    draft = Draft(
+        replace(haulotte(), assumed=())
+        if preset is Preset.HAULOTTE
+        else Machine("unnamed machine", "", structure.wheels, None)
+    )
+    draft.say("machine", f"Wheels {', '.join(structure.wheels)}, from {structure.how}.")
+    if preset is Preset.HAULOTTE:
+        return draft
+    places = wheel_places(draft, structure, {})
+    assert places is not None
+    draft.ask("geometry", "how large are the wheels, and how fast can it go? 0.1 m radius and 1 m/s stand in.")
+    draft.machine = replace(
+        draft.machine,
+        geometry=Geometry(dict(places), 0.2),
+        control=_control(preset),
+        max_speed=1.0,
+        limits=limits_for(1.0),
+    )
+    draft.notes["signals"] = ["Found by their names; `mfhca channels LOG` shows which."]
+    return draft
+
+
+def draft_machine(logs: Sequence[RawLog], preset: Preset | None = None) -> Draft:
+    """Draft the machine that recorded the files of one mission.
+
+    Parameters
+    ----------
+    logs : Sequence[RawLog]
+        With the topics that may hold signals, and the robot's description.
+    preset : Preset or None
+        Kind of the machine; None: found.
+
+    Raises
+    ------
+    LogError
+        Where no wheel or drive can be found.
+    """
+    channels = {name: channel for log in logs for name, channel in log.channels.items()}
+    doubts: list[str] = []
+    description = _description(logs, doubts)
+    structure = _structure(channels, description, preset)
+    draft = Draft(Machine(_name(description, logs), "", structure.wheels, None))
+    draft.say("machine", f"Wheels {', '.join(structure.wheels)}, from {structure.how}.")
+    if "numbers" in structure.how:
+        draft.ask("machine", "which wheel has which number? The names do not say; put the wheels into their order.")
+    for doubt in doubts:
+        draft.ask("geometry", doubt)
+    given = given_signals(structure, channels, logs)
+    sources = table_sources(logs, draft)
+    raw = replace(structure.machine(1.0), signals=given, sources=sources)
+    found = map_signals(logs, raw)
+    motions = _motions(found, structure.wheels)
+    origins = _in_one_direction(draft, structure, found, motions)
+    radius = wheel_radius(draft, structure, found, motions, origins)
+    places = wheel_places(draft, structure, motions)
+    geometry = None if places is None or radius is None else Geometry(dict(places), 2 * radius)
+    machine = replace(
+        raw, name=draft.machine.name, geometry=geometry, signals=origins, control=_control(preset),
+        max_steer=largest_angle(draft, structure, found),
+    )  # fmt: skip
+    if preset is Preset.HAULOTTE:
+        machine = replace(haulotte(), signals=origins, sources=sources)
+    else:
+        machine = with_speeds(draft, machine, logs)
+    draft.machine = machine
+    draft.signals = map_signals(logs, machine)
+    draft.questions += draft.signals.questions
+    return draft
+
+
+def _description(logs: Sequence[RawLog], doubts: list[str]) -> RobotDescription | None:
+    for log in logs:
+        if log.robot_description:
+            try:
+                return parse_description(log.robot_description)
+            except LogError as error:
+                doubts.append(f"{error}; its lengths are not used.")
+    return None
+
+
+def _structure(
+    channels: Mapping[str, Channel], description: RobotDescription | None, preset: Preset | None
+) -> Structure:
+    joints = [m[1] for c in channels.values() if (m := re.search(r"\[([^\[\]]+)\]$", c.field)) and c.topic]
+    described = None if description is None else described_structure(description, joints)
+    if preset is not None:
+        fixed = preset_structure(preset)
+        return described if described is not None and described.wheels == fixed.wheels else fixed
+    if described is not None:
+        return described
+    named = named_structure(channels)
+    if named is not None:
+        return named
+    if odometry(channels) is not None:
+        return Structure(ONE, None, how="odometry: no wheel is in the log, the drive is judged as a whole")
+    raise LogError(
+        "no wheel speed is in the log: no joint, symbol or column is called like a wheel's speed, and there is no odometry; "
+        "`mfhca channels LOG --all` lists what it holds; record /joint_states, or give the structure with --preset and name "
+        "the signals in [signals]"
+    )
+
+
+def _name(description: RobotDescription | None, logs: Sequence[RawLog]) -> str:
+    if description is not None and description.name:
+        return description.name
+    return f"robot of {PurePath(logs[0].source).name}"
+
+
+def _motions(found: Signals, wheels: Sequence[str]) -> dict[str, WheelMotion]:
+    """How each wheel's signals follow the commanded motion."""
+    speed, turn = found.items.get("cmd.v"), found.items.get("cmd.omega")
+    out = {}
+    for wheel in wheels:
+        for leaf in _SPEEDS:
+            signal = found.items.get(f"wheel.{wheel}.{leaf}")
+            asked = speed or found.items.get(f"wheel.{wheel}.v_ref")
+            if signal is None or asked is None or signal is asked:
+                continue
+            motion = wheel_motion(signal, asked, turn if asked is speed else None)
+            if motion is not None:
+                out[signal.name] = motion
+    return out
+
+
+def _in_one_direction(
+    draft: Draft, structure: Structure, found: Signals, motions: Mapping[str, WheelMotion]
+) -> dict[str, SignalSource]:
+    """Origins of all signals, those of wheels that count backwards with a negative gain."""
+    flipped: dict[str, str] = {}
+    for wheel in structure.wheels:
+        motion = motions.get(f"wheel.{wheel}.v")
+        if motion is not None:
+            if motion.gain < 0:
+                flipped[wheel] = "it turns against the command"
+        elif wheel in structure.joints and structure.joints[wheel].mirrored:
+            flipped[wheel] = "the axis of its joint says so"
+    if not motions and not structure.joints:
+        flipped |= _by_signs(structure, found)
+    if flipped:
+        why = "; ".join(dict.fromkeys(flipped.values()))
+        draft.say("signals", f"Mirrored, written with gain = -1: {', '.join(flipped)} ({why}).")
+    if any("taken" in why for why in flipped.values()):
+        draft.ask(
+            "signals", "which side counts backwards? The log shows only that left and right count against each other."
+        )
+    origins = {}
+    for name, signal in found.items.items():
+        group, part, leaf = (*name.split("."), "", "")[:3]
+        against = part in flipped and leaf in ("v", "v_true", "effort")
+        if leaf == "v_ref" and name in motions:
+            against = motions[name].gain < 0
+        origin = signal.origin
+        origins[name] = replace(origin, gain=-origin.gain) if group == "wheel" and against else origin
+    return origins
+
+
+def _by_signs(structure: Structure, found: Signals) -> dict[str, str]:
+    """Wheels of the right side, where they count against those of the left although the robot hardly turns."""
+    speeds = {w: found.items[f"wheel.{w}.v"] for w in structure.wheels if f"wheel.{w}.v" in found.items}
+    sides = structure.places or {}
+    left = [w for w in speeds if w in sides and sides[w].y > 0]
+    right = [w for w in speeds if w in sides and sides[w].y < 0]
+    if left and right and backwards(speeds, left, right, found.items.get("imu.yaw_rate")):
+        return dict.fromkeys(
+            right, "left and right turn against each other; the right side is taken to be the mirrored one"
+        )
+    return {}
+
+
+def _control(preset: Preset | None) -> Control:
+    return Control() if preset is Preset.HAULOTTE else Control(law="none")
+
+
+def check_draft(draft: Draft) -> None:
+    """Raise a `ConfigError` where no wheel of a draft has a speed."""
+    if not any(re.fullmatch(r"wheel\.[^.]+\.(v|v_true|u_applied)", name) for name in draft.signals.items):
+        raise ConfigError(
+            "no wheel of the structure has a speed in the log; `mfhca channels LOG --all` lists what it holds"
+        )

@@ -1,0 +1,91 @@
+"""Signals that rules for names would not find: joints of a description, a drive as a whole, tables called cmd_vel."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from pathlib import PurePath
+
+from replay.log.raw_log import Channel, RawLog
+from replay.log.source_options import SignalSource, SourceOptions
+from replay.setup.draft_notes import Draft
+from replay.setup.structure import ONE, Structure
+
+_JOINT_TYPES = ("JointState", "DynamicJointState")
+
+
+def odometry(channels: Mapping[str, Channel]) -> Channel | None:
+    """Speed of the body by odometry."""
+    found = [c for c in channels.values() if c.field == "twist.twist.linear.x" and len(c.values) > 1]
+    return min(found, key=lambda c: ("filter" in c.topic, len(c.topic)), default=None)
+
+
+def given_signals(
+    structure: Structure, channels: Mapping[str, Channel], logs: Sequence[RawLog]
+) -> dict[str, SignalSource]:
+    """Signals by canonical name, with their units; the rules find the others."""
+    given: dict[str, SignalSource] = {}
+    for wheel, joint in structure.joints.items():
+        for c in channels.values():
+            if c.type_name.rpartition("/")[2] not in _JOINT_TYPES or re.search(r"cmd|command|ref|target", c.topic):
+                continue
+            where = SignalSource(topic=c.topic, field=c.field)
+            if c.field == f"velocity[{joint.joint}]":
+                given.setdefault(f"wheel.{wheel}.v", replace(where, unit="rad/s"))
+            elif c.field == f"effort[{joint.joint}]":
+                given.setdefault(f"wheel.{wheel}.effort", replace(where, unit="N·m"))
+            elif c.field == f"position[{joint.steering}]" and joint.steering:
+                given.setdefault(f"steer.{wheel}.phi", replace(where, unit="rad"))
+    whole = odometry(channels)
+    if structure.wheels == ONE and "odometry" in structure.how and whole is not None:
+        given["wheel.D.v"] = SignalSource(topic=whole.topic, field=whole.field, unit="m/s")
+    for log in logs:
+        if len({c.topic for c in log.channels.values()}) == 1 and re.search(
+            r"cmd|command", PurePath(log.source).stem, re.I
+        ):
+            given |= _commands(log)
+    if structure.wheels == ONE and "wheel.D.v_ref" not in given:
+        asked = given.pop("cmd.v", None) or _command(channels)
+        if asked is not None:
+            given["wheel.D.v_ref"] = asked
+    return given
+
+
+def _commands(log: RawLog) -> dict[str, SignalSource]:
+    """Commands in a table of their own, such as one topic of a bag written as CSV."""
+    words = {
+        "cmd.v": r"(linear[._]x|v|vx|speed|velocity)",
+        "cmd.omega": r"(angular[._]z|w|wz|omega|yaw_?rate)",
+    }
+    source = PurePath(log.source).name
+    found: dict[str, SignalSource] = {}
+    for signal, pattern in words.items():
+        for c in log.channels.values():
+            if not c.topic and re.fullmatch(rf"(.*\.)?{pattern}", c.name.strip(), re.I):
+                unit = "m/s" if signal == "cmd.v" else "rad/s"
+                found.setdefault(signal, SignalSource(column=c.name, unit=c.unit or unit, source=source))
+    return found
+
+
+def _command(channels: Mapping[str, Channel]) -> SignalSource | None:
+    """Commanded speed of the whole machine."""
+    for c in channels.values():
+        kind = c.type_name.rpartition("/")[2]
+        asked = kind.startswith("Twist") and re.search(r"cmd|command", c.topic.lower())
+        if (asked and c.field in ("linear.x", "twist.linear.x")) or (
+            kind.startswith("AckermannDrive") and c.field in ("speed", "drive.speed")
+        ):
+            return SignalSource(topic=c.topic, field=c.field, unit="m/s")
+    return None
+
+
+def table_sources(logs: Sequence[RawLog], draft: Draft) -> dict[str, SourceOptions]:
+    """Several tables with dated stamps are taken to come from one recorder."""
+    tables = [log for log in logs if all(not c.topic for c in log.channels.values())]
+    if len(tables) < 2 or any(t.summary.start_ns < 10**18 for t in tables):
+        return {}
+    draft.ask(
+        "sources", "were all tables stamped by one computer? It is taken so; else remove clock, and it is estimated."
+    )
+    return {f"*{PurePath(tables[0].source).suffix}": SourceOptions(clock="as recorded")}

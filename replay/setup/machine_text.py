@@ -1,0 +1,113 @@
+"""A draft of a machine as a commented machine file."""
+
+from __future__ import annotations
+
+import textwrap
+from collections.abc import Iterable, Sequence
+
+import numpy as np
+
+from replay.machine.config import Machine
+from replay.machine.signal_table import signal_of
+from replay.machine.toml_text import key_text, real_text, signal_line, source_line, text_of
+from replay.setup.all_channels import ChannelRow
+from replay.setup.draft_notes import Draft
+from replay.signals.signal import Signal
+from replay.signals.timeline import median_period
+
+_WIDTH = 110
+_LISTED = 60
+
+
+def machine_text(draft: Draft, logs: str, rows: Sequence[ChannelRow] = ()) -> str:
+    """Machine file of a draft, with where each number comes from, the open questions, and the channels that are not used.
+
+    Parameters
+    ----------
+    draft : Draft
+        The machine.
+    logs : str
+        What it was drafted from, in words.
+    rows : Sequence[ChannelRow]
+        Every channel of the logs.
+    """
+    machine = draft.machine
+    lines = [
+        *_comment(f"Machine file of mfhca, from {logs}."),
+        *_comment("What is marked QUESTION the log does not tell: check it. `mfhca config init` explains every key."),
+        "",
+        "[machine]",
+        *_said(draft, "machine"),
+        f"name = {text_of(machine.name)}",
+        f"wheels = [{', '.join(text_of(w) for w in machine.wheels)}]",
+        "",
+        "[geometry]",
+        *_said(draft, "geometry"),
+        *_geometry(machine),
+        "",
+        "[control]",
+        *_control(machine),
+    ]
+    if machine.sources:
+        lines += ["", "[sources]", *_said(draft, "sources"), *(source_line(k, v) for k, v in machine.sources.items())]
+    lines += ["", "[signals]", *_said(draft, "signals")]
+    for name, origin in machine.signals.items():
+        found = draft.signals.items.get(name)
+        lines.append(f"{signal_line(name, origin)}{'' if found is None else f'  # {_holds(found)}'}")
+    return "\n".join([*lines, *_unused(machine, rows)]) + "\n"
+
+
+def _said(draft: Draft, section: str) -> list[str]:
+    return [line for text in draft.notes.get(section, []) for line in _comment(text)]
+
+
+def _comment(text: str) -> list[str]:
+    clean = "".join(c if c >= " " and c != "\x7f" else " " for c in text)
+    return textwrap.wrap(clean, _WIDTH, initial_indent="# ", subsequent_indent="#   ", break_long_words=False)
+
+
+def _geometry(machine: Machine) -> Iterable[str]:
+    if machine.gear_ratio != 1.0:
+        yield f"gear_ratio = {real_text(machine.gear_ratio)}"
+    yield f"max_speed = {real_text(machine.max_speed)}  # m/s, at the rim"
+    if machine.axles:
+        yield f"max_steer = {real_text(round(machine.max_steer, 6))}  # rad"
+    if machine.geometry is None:
+        return
+    yield f"wheel_diameter = {real_text(round(machine.geometry.wheel_diameter, 6))}  # m"
+    yield "# x forward, y to the left, offset from the steering joint to the wheel [m]; steer: front, rear, own or fixed"
+    for w, g in machine.geometry.wheels.items():
+        offset = f"offset = {real_text(g.offset)}, " if g.offset else ""
+        steer = "own" if g.axle == w else g.axle
+        yield f"{key_text(w)} = {{ x = {real_text(g.x)}, y = {real_text(g.y)}, {offset}steer = {text_of(steer)} }}"
+
+
+def _control(machine: Machine) -> list[str]:
+    if machine.control.law == "none":
+        return ['law = "none"  # another controller than the paper\'s']
+    return [f"law = {text_of(machine.control.law)}"]
+
+
+def _holds(signal: Signal) -> str:
+    """Rate and range in SI."""
+    period, known = median_period(signal.stamps), signal.values[np.isfinite(signal.values)]
+    rate = f"{1e9 / period:.4g} Hz" if period > 0 else "one sample"
+    unit = signal_of(signal.name).unit.replace("1", "")
+    return f"{rate}, {known.min():.3g} … {known.max():.3g} {unit}".rstrip() if len(known) else f"{rate}, no number"
+
+
+def _unused(machine: Machine, rows: Sequence[ChannelRow]) -> list[str]:
+    """Channels that no signal is taken from, as comments."""
+    used = {s.label for s in machine.signals.values()}
+    heading = "pose.pose.orientation"
+    rest = [r for r in rows if r.name not in used and f"{r.topic}.{heading}" not in used]
+    rest = [r for r in rest if r.low is not None and not r.field.startswith(("header.", "stamp."))]
+    if not rest:
+        return []
+    out = ["", "# Also in the log, and not used (`mfhca channels LOG --all` has rates and more):"]
+    for r in rest[:_LISTED]:
+        could = f"; could be {', '.join(r.could_be)}" if r.could_be else ""
+        unit = f" {r.unit}{'?' if r.guessed else ''}" if r.unit else ""
+        where = f"topic = {text_of(r.topic)}, field = {text_of(r.field)}" if r.topic else f"column = {text_of(r.name)}"
+        out.append(f"#   {where}   {r.low:.4g} … {r.high:.4g}{unit}{could}")
+    return out + ([f"#   and {len(rest) - _LISTED} more"] if len(rest) > _LISTED else [])

@@ -1,0 +1,127 @@
+"""How each wheel's recorded speed follows the robot's: its scale, its side, and which way it counts, found in a log."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from replay.signals.signal import Signal
+
+Array = NDArray[np.float64]
+
+_MOST = 6000  # samples of a fit
+_STEP_S = 0.05
+_LEAST = 50
+_DELAYS_S = (0.0, 0.05, 0.1, 0.2, 0.3, 0.4, 0.5, 0.7)
+_LAGS_S = (0.0, 0.1, 0.3, 0.8)
+_TRIMMED = 0.2  # of the samples with the largest residuals are left out, twice: drives that were faulty for a time
+_SOUND = 0.8  # share of the variance that a fit must explain
+_MOVES = 0.02  # m/s or rad/s; standard deviation from which a motion counts
+
+
+@dataclass(frozen=True)
+class WheelMotion:
+    """recorded = gain · (v − y·ω), with the robot's speed v and yaw rate ω.
+
+    Attributes
+    ----------
+    gain : float
+        Recorded unit per m/s; negative where the wheel counts backwards.
+    y : float or None
+        Distance to the left of the middle [m]; None where the robot never turned.
+    explained : float
+        Share of the variance that this explains [1].
+    """
+
+    gain: float
+    y: float | None
+    explained: float
+
+
+def wheel_motion(wheel: Signal, speed: Signal, turn: Signal | None) -> WheelMotion | None:
+    """Fit one wheel to the robot's motion by least trimmed squares; None where the log does not show it.
+
+    The wheel may answer late and slowly: the delay and lag that explain it best are taken.
+
+    Parameters
+    ----------
+    wheel : Signal
+        Speed of the wheel in any unit.
+    speed, turn : Signal
+        The robot's speed [m/s] and yaw rate [rad/s], commanded or measured; None where there is no yaw rate.
+    """
+    if len(wheel.stamps) < _LEAST:
+        return None
+    step = max(int(np.median(np.diff(wheel.stamps))), int(_STEP_S * 1e9))
+    at = np.arange(int(wheel.stamps[0]), int(wheel.stamps[-1]), step)[:_MOST]
+    y = _held(wheel, at)
+    parts = np.column_stack([_held(s, at) for s in (speed, turn) if s is not None])
+    known = np.isfinite(y) & np.isfinite(parts).all(axis=1)
+    if known.sum() < _LEAST or np.std(parts[known, 0]) < _MOVES:
+        return None
+    parts[~np.isfinite(parts)] = 0.0
+    parts[:, np.std(parts[known], axis=0) < _MOVES] = 0.0
+    best: tuple[float, Array] = (0.0, np.zeros(2))
+    for lag in _LAGS_S:
+        slow = _lagged(parts, 1 - np.exp(-step * 1e-9 / lag)) if lag else parts
+        for delay in sorted({round(d * 1e9 / step) for d in _DELAYS_S}):
+            use = known[delay:]
+            if use.sum() < _LEAST:
+                continue
+            found = _trimmed(slow[: len(slow) - delay][use], y[delay:][use])
+            best = max(best, found, key=lambda f: f[0])
+    if best[0] < _SOUND or best[1][0] == 0:
+        return None
+    gain = float(best[1][0])
+    side = float(-best[1][1] / gain) if turn is not None and best[1][1] != 0 else None
+    return WheelMotion(gain, side, best[0])
+
+
+def _lagged(x: Array, a: float) -> Array:
+    """First-order lag y += a (x − y) of each column."""
+    from scipy.signal import lfilter
+
+    return np.asarray(lfilter([a], [1.0, a - 1.0], x, axis=0, zi=(1 - a) * x[:1])[0])
+
+
+def _held(signal: Signal, at: NDArray[np.int64]) -> Array:
+    """Last value before each moment; NaN before the first."""
+    index = np.searchsorted(signal.stamps, at, side="right") - 1
+    return np.where(index >= 0, signal.values[np.maximum(index, 0)], np.nan)
+
+
+def _trimmed(x: Array, y: Array) -> tuple[float, Array]:
+    """Least squares without the samples that fit worst: share explained, and the coefficients."""
+    kept = np.ones(len(y), np.bool_)
+    for _ in range(3):
+        coefficients = np.linalg.lstsq(x[kept], y[kept], rcond=None)[0]
+        residual = np.abs(y - x @ coefficients)
+        kept = residual <= np.quantile(residual, 1 - _TRIMMED)
+    spread = float(np.sum(y[kept] ** 2))
+    rest = float(np.sum(residual[kept] ** 2))
+    return (1 - rest / spread if spread > 0 else 0.0), np.asarray(coefficients)
+
+
+def backwards(wheels: Mapping[str, Signal], left: Sequence[str], right: Sequence[str], yaw: Signal | None) -> bool:
+    """Whether the wheels of the right side count against those of the left, by their signs alone.
+
+    Parameters
+    ----------
+    wheels : Mapping[str, Signal]
+        Speeds by wheel.
+    left, right : Sequence[str]
+        Wheels of each side.
+    yaw : Signal or None
+        Measured yaw rate [rad/s]: a robot that turns on the spot has opposite sides too.
+    """
+    a, b = (np.concatenate([_held(wheels[w], wheels[left[0]].stamps) for w in side[:1]]) for side in (left, right))
+    moving = np.isfinite(a) & np.isfinite(b) & (np.abs(a) > 0.2 * np.nanmax(np.abs(a), initial=0.0))
+    if moving.sum() < 5 or np.mean(a[moving] * b[moving] < 0) < 0.8:
+        return False
+    if yaw is None:
+        return True
+    turned = np.abs(_held(yaw, wheels[left[0]].stamps))[moving]
+    return bool(np.nanmedian(turned) < 0.2)

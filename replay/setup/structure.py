@@ -1,0 +1,184 @@
+"""Which wheels a machine has, what steers them, and where they are: from a preset, a description, or the names in a log."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+from replay.log.raw_log import Channel
+from replay.machine.config import Machine, haulotte
+from replay.machine.geometry import Geometry, WheelGeometry
+from replay.setup.preset import Preset
+from replay.setup.robot_description import RobotDescription, WheelJoint
+from replay.signals.name_parts import index_of, is_steering, position, tokens
+from replay.signals.rules import candidates
+
+FOUR, SIX = ("FR", "FL", "RR", "RL"), ("FR", "FL", "MR", "ML", "RR", "RL")
+GERMAN, TWO, ONE = ("VR", "VL", "HR", "HL"), ("R", "L"), ("D",)
+_NUMBERED = (8, 6, 4, 3, 2)
+_TRACK, _BASE, _RADIUS = 0.5, 0.5, 0.1  # m; where nothing tells them
+
+
+@dataclass(frozen=True)
+class Structure:
+    """The wheels of a machine.
+
+    Attributes
+    ----------
+    wheels : tuple[str, ...]
+        Names in order.
+    places : Mapping[str, WheelGeometry] or None
+        Where they are, and their steering axle; None for a drive without geometry.
+    radius : float or None
+        Of a wheel [m], where it is known.
+    measured : tuple[str, ...]
+        Which of ``track``, ``wheelbase`` are known rather than supposed.
+    joints : Mapping[str, WheelJoint]
+        Joints of a description, by wheel.
+    max_steer : float or None
+        Largest steering angle [rad], where it is known.
+    how : str
+        Where the structure comes from, in words.
+    """
+
+    wheels: tuple[str, ...]
+    places: Mapping[str, WheelGeometry] | None
+    radius: float | None = None
+    measured: tuple[str, ...] = ()
+    joints: Mapping[str, WheelJoint] = field(default_factory=dict)
+    max_steer: float | None = None
+    how: str = ""
+
+    def machine(self, radius: float | None = None) -> Machine:
+        """A machine of this structure, without signals; `radius` [m] instead of the known one."""
+        size = radius or self.radius or _RADIUS
+        geometry = None if self.places is None else Geometry(dict(self.places), 2 * size)
+        return Machine("unnamed machine", "", self.wheels, geometry, max_speed=1e6)
+
+
+def supposed(wheels: Sequence[str], steered: Mapping[str, str] | None = None) -> Mapping[str, WheelGeometry] | None:
+    """Places of wheels by their names, half a metre apart; None where the names say no side."""
+    rows = {"front": 1.0, "middle": 0.0, "rear": -1.0, None: 0.0}
+    out = {}
+    for wheel in wheels:
+        along, across = position(wheel)
+        across = across or ("right" if wheel == "R" else None)
+        if across is None:
+            return None
+        y = _TRACK / 2 if across == "left" else -_TRACK / 2
+        out[wheel] = WheelGeometry(rows[along] * _BASE / 2, y, 0.0, (steered or {}).get(wheel, "fixed"))
+    return out
+
+
+def preset_structure(preset: Preset) -> Structure:
+    """Structure of a usual kind of machine, with lengths to be filled in but for the paper's."""
+    how = f"preset {preset.value}"
+    if preset is Preset.HAULOTTE:
+        machine = haulotte()
+        assert machine.geometry is not None
+        measured = ("track", "wheelbase")
+        return Structure(machine.wheels, machine.geometry.wheels, machine.wheel_radius, measured, how=how)
+    if preset is Preset.DIFF_DRIVE:
+        return Structure(TWO, supposed(TWO), how=how)
+    steered = {"FR": "front", "FL": "front"} if preset is Preset.ACKERMANN else None
+    return Structure(FOUR, supposed(FOUR, steered), how=how)
+
+
+def described_structure(description: RobotDescription, joints: Sequence[str]) -> Structure | None:
+    """Structure of a described robot; None where it describes no wheels.
+
+    Parameters
+    ----------
+    description : RobotDescription
+        The robot.
+    joints : Sequence[str]
+        Joints whose states were recorded: of the wheels only these count, where there are any.
+    """
+    recorded = [w for w in description.wheels if w.joint in joints]
+    wheels = recorded or list(description.wheels)
+    if not wheels:
+        return None
+    names = _names(wheels)
+    places, rows = {}, len({n[0] for n in names})
+    middle = (max(w.x for w in wheels) + min(w.x for w in wheels)) / 2
+    for name, w in zip(names, wheels, strict=True):
+        axle = "fixed" if not w.steering else name
+        places[name] = WheelGeometry(round(w.x - middle, 4), round(w.y, 4), round(w.offset, 4), axle)
+    radii = [w.radius for w in wheels if w.radius is not None]
+    measured = ("track", "wheelbase") if rows > 1 else ("track",)
+    order = sorted(names, key=lambda n: (-places[n].x, places[n].y))
+    return Structure(
+        tuple(order), {n: places[n] for n in order}, max(radii) if radii else None, measured,
+        dict(zip(names, wheels, strict=True)), description.max_steer, "/robot_description",
+    )  # fmt: skip
+
+
+def _names(wheels: Sequence[WheelJoint]) -> list[str]:
+    """FR, FL, MR … by their places; W1, W2 … where two would be called the same."""
+    rows: list[float] = []
+    for x in sorted((w.x for w in wheels), reverse=True):
+        if not rows or rows[-1] - x > 0.05:
+            rows.append(x)
+    letters = {1: [""], 2: ["F", "R"], 3: ["F", "M", "R"]}.get(len(rows), [str(i + 1) for i in range(len(rows))])
+    if any({"vl", "vr", "hl", "hr"} & set(tokens(w.joint)) for w in wheels):
+        letters = ["V" if x == "F" else "H" if x == "R" else x for x in letters]
+    out = []
+    for w in wheels:
+        row = min(range(len(rows)), key=lambda i: abs(rows[i] - w.x))
+        side = "L" if w.y > 0.01 else "R" if w.y < -0.01 else "C"
+        out.append(f"{letters[row]}{side}" if letters[row].isalpha() or not letters[row] else f"{side}{letters[row]}")
+    return out if len(set(out)) == len(out) else [f"W{i + 1}" for i in range(len(out))]
+
+
+def named_structure(channels: Mapping[str, Channel]) -> Structure | None:
+    """Structure by what the wheels are called in a log; None where no name speaks of wheels."""
+    named: tuple[tuple[str, ...], ...] = (SIX, FOUR, TWO)
+    for names in named:
+        if _covers(channels, names):
+            german = names == FOUR and any(
+                {"vl", "vr", "hl", "hr", "vorne", "hinten"} & set(tokens(c)) for c in channels
+            )
+            wheels = GERMAN if german else names
+            return Structure(wheels, supposed(wheels, _steered(channels, wheels)), how="the names in the log")
+    for count in _NUMBERED:
+        wheels = FOUR if count == 4 else TWO if count == 2 else tuple(f"W{i + 1}" for i in range(count))
+        if _covers(channels, wheels):
+            return Structure(
+                wheels, supposed(wheels, _steered(channels, wheels)), how="numbers in the log, in this order"
+            )
+    if _covers(channels, ONE):
+        return Structure(ONE, None, how="the only drive in the log")
+    return None
+
+
+def _covers(channels: Mapping[str, Channel], wheels: tuple[str, ...]) -> bool:
+    """Whether every one of these wheels has a speed that is its own."""
+    trial = Structure(wheels, supposed(wheels)).machine(1.0)
+    found: dict[str, set[str]] = {}
+    for c in candidates(channels, trial):
+        group, part, leaf = (*c.signal.split("."), "", "")[:3]
+        if group == "wheel" and leaf in ("v", "v_true", "u_applied"):
+            found.setdefault(part, set()).add(c.origin.label)
+    return set(found) == set(wheels)
+
+
+def _steered(channels: Mapping[str, Channel], wheels: Sequence[str]) -> Mapping[str, str]:
+    """Steering axle of each steered wheel: its own, where each has an angle, else that of its end of the machine."""
+    names = set()
+    for c in channels.values():
+        inner = re.search(r"\[([^\[\]]+)\]$", c.field)
+        name = inner[1] if inner and c.topic else c.name
+        if is_steering(name):
+            names.add(name)
+    ends = {position(n) for n in names}
+    if any(c.type_name.rpartition("/")[2].startswith("AckermannDrive") for c in channels.values()):
+        ends.add((None, None))
+    own = {w: w for w in wheels if position(w) in ends}
+    if own:
+        return own
+    numbers = {found[1] for n in names if position(n) == (None, None) and (found := index_of(n)) is not None}
+    along = {"front" if a is None else a for a, _ in ends} & {"front", "rear"} | (
+        {"rear"} if len(numbers) > 1 else set()
+    )
+    return {w: end for w in wheels if (end := position(w)[0]) in along and end is not None}

@@ -1,0 +1,181 @@
+"""Values that a machine cannot have: doubts about their units in figures, and the line of the machine file that mends them.
+
+A unit that is wrong shows in most samples of every signal that was recorded with it; a faulty sensor shows in one channel,
+for a time. Only the former is a question that must be answered before a mission is judged.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from replay.errors import ConfigError
+from replay.log.source_options import SignalSource
+from replay.machine.config import Machine
+from replay.machine.quantities import SI_UNITS
+from replay.machine.signal_table import quantity_of
+from replay.machine.toml_text import signal_line
+from replay.machine.units import known_unit
+from replay.signals.signal import Signal, quantity_kind
+from replay.signals.to_si import factor_of, magnitudes, peak_of
+
+_TOO_FAST = 3.0
+_WIDE = 1.5
+_MOST_OF_IT = 0.2  # of the samples other than zero lie beyond the limit: no spikes
+_ANY_MACHINE = 30.0  # m/s; faster than any machine whose top speed was not given
+_SOUND = 2  # other signals of the kind, recorded in the same unit, that are plausible: then it is a fault of this one
+_TURN = 3.1  # rad; a machine file can give no larger limit of steering
+_ROTATIONS = ("rad/s", "rpm")
+_SPEED_UNITS = ("m/s", "rad/s", "rpm", "km/h", "mm/s", "cm/s", "deg/s")
+
+
+@dataclass(frozen=True)
+class Doubt:
+    """One signal whose values do not fit the machine.
+
+    Attributes
+    ----------
+    signal : str
+        Canonical name.
+    text : str
+        What it reaches, with its unit, and what that is compared with.
+    line : str
+        Line of [signals], or key of [geometry], that would make it fit; empty where none is known.
+    impossible : bool
+        Whether most of its values cannot be.
+    """
+
+    signal: str
+    text: str
+    line: str = ""
+    impossible: bool = False
+
+    @property
+    def question(self) -> str:
+        """The sentence that asks for the answer."""
+        answer = f". If so, write: {self.line}" if self.line else "; give its unit, gain or source in [signals]"
+        return f"{self.text}{answer}"
+
+
+def _mostly_beyond(values: NDArray[Any], limit: float) -> bool:
+    """Whether many of the samples other than zero lie beyond a limit."""
+    moving = magnitudes(values)
+    moving = moving[moving > 0]
+    return bool(len(moving) and np.count_nonzero(moving > limit) >= _MOST_OF_IT * len(moving))
+
+
+def doubt(signal: str, values: NDArray[np.float64], origin: SignalSource, machine: Machine) -> Doubt | None:
+    """Return what is wrong with a signal that is too large for the machine; None where nothing is.
+
+    Parameters
+    ----------
+    signal : str
+        Canonical name.
+    values : NDArray[np.float64], shape (n,)
+        SI values.
+    origin : SignalSource
+        How it was recorded, with the unit that was used.
+    machine : Machine
+        Its limits.
+    """
+    quantity, peak = quantity_of(signal), peak_of(values)
+    if quantity == "speed" and not signal.startswith("gnss") and peak > _TOO_FAST * machine.max_speed:
+        return _too_fast(signal, values, peak, origin, machine)
+    if quantity == "fraction" and not signal.endswith(".psi") and peak > _WIDE * machine.control.u_max:
+        return _too_open(signal, values, peak, origin, machine)
+    if quantity == "angle" and signal.startswith("steer.") and peak > 2 * max(machine.max_steer, 0.1):
+        return _too_far(signal, values, peak, origin, machine)
+    return None
+
+
+def _too_fast(signal: str, values: NDArray[np.float64], peak: float, origin: SignalSource, machine: Machine) -> Doubt:
+    top, times = machine.max_speed, peak / machine.max_speed
+    unit = origin.unit or SI_UNITS["speed"]
+    text = f"{signal} reaches {peak:.3g} m/s with unit {unit!r}, {times:.1f} times max_speed {top:g} m/s"
+    limit = _ANY_MACHINE if "max_speed" in machine.assumed else 0.0
+    impossible = peak > limit and _mostly_beyond(values, max(top, limit))
+    gear = machine.gear_ratio
+    turns = known_unit(origin.unit) in _ROTATIONS
+    if turns and signal.startswith("wheel.") and origin.at == "wheel" and gear > 1 and times / gear <= _WIDE:
+        motor = signal_line(signal, replace(origin, at="motor"))
+        text += f'; it is probably measured at the motor (gear ratio {gear:g}): set at = "motor"'
+        return Doubt(signal, text, motor, impossible)
+    fitting = _fitting_speed(signal, peak, origin, machine) if impossible else ""
+    other = f", or [geometry] max_speed = {_rounded_up(peak)} if the machine is that fast"
+    line = f"{fitting}{other}" if fitting else f"[geometry] max_speed = {_rounded_up(peak)}"
+    return Doubt(signal, f"{text}; check its unit", line, impossible)
+
+
+def _fitting_speed(signal: str, peak: float, origin: SignalSource, machine: Machine) -> str:
+    """Line of the signal with the unit with which it just fits the machine's top speed; empty where none does."""
+    recorded = peak / abs(factor_of(signal, origin, machine))
+    best, most = "", 0.0
+    ways = [replace(origin, unit=unit, at="wheel") for unit in _SPEED_UNITS]
+    if machine.gear_ratio > 1:
+        ways += [replace(origin, unit=unit, at="motor") for unit in _ROTATIONS]
+    for tried in ways:
+        try:
+            reached = recorded * abs(factor_of(signal, tried, machine))
+        except ConfigError:
+            continue
+        if most < reached <= _WIDE * machine.max_speed:
+            best, most = signal_line(signal, tried), reached
+    return best if most > 0.1 * machine.max_speed else ""
+
+
+def _too_open(signal: str, values: NDArray[np.float64], peak: float, origin: SignalSource, machine: Machine) -> Doubt:
+    unit = origin.unit or SI_UNITS["fraction"]
+    percent = _WIDE < peak <= 150
+    text = f"{signal} reaches {peak:.3g} of full opening with unit {unit!r}{'; it is probably %' if percent else ''}"
+    tried = replace(origin, unit="%") if percent else replace(origin, gain=float(f"{origin.gain / peak:.3g}"))
+    return Doubt(
+        signal, f"{text}; check its unit", signal_line(signal, tried), _mostly_beyond(values, machine.control.u_max)
+    )
+
+
+def _too_far(signal: str, values: NDArray[np.float64], peak: float, origin: SignalSource, machine: Machine) -> Doubt:
+    unit = origin.unit or SI_UNITS["angle"]
+    degrees = peak * np.pi / 180 <= _WIDE * machine.max_steer
+    text = f"{signal} reaches {peak:.3g} rad with unit {unit!r}, max_steer is {machine.max_steer:.3g} rad"
+    impossible = peak > _TURN and machine.max_steer < _TURN and _mostly_beyond(values, max(machine.max_steer, 0.1))
+    line = (
+        signal_line(signal, replace(origin, unit="deg")) if degrees else f"[geometry] max_steer = {min(peak, 3.2):.3g}"
+    )
+    return Doubt(signal, f"{text}{'; it is probably deg' if degrees else ''}", line, impossible)
+
+
+def _rounded_up(value: float) -> str:
+    """Two digits, not less than the value."""
+    digits = 10.0 ** (np.floor(np.log10(value)) - 1)
+    return f"{np.ceil(value / digits) * digits:g}"
+
+
+def questions(doubts: Sequence[Doubt], items: Mapping[str, Signal]) -> tuple[str, ...]:
+    """Sentences on values that cannot be and that no faulty sensor explains.
+
+    Parameters
+    ----------
+    doubts : Sequence[Doubt]
+        Of all signals of a mission.
+    items : Mapping[str, Signal]
+        The signals by name.
+    """
+    doubted = {d.signal for d in doubts}
+    out = []
+    for d in doubts:
+        sound = [
+            n
+            for n, s in items.items()
+            if n not in doubted and _alike(n, d.signal) and s.origin.unit == items[d.signal].origin.unit
+        ]
+        if d.impossible and len(sound) < _SOUND:
+            out.append(d.question)
+    return tuple(out)
+
+
+def _alike(a: str, b: str) -> bool:
+    return quantity_kind(a) == quantity_kind(b)

@@ -1,0 +1,99 @@
+"""Values that cannot be ask for the line that mends them; faults of one sensor do not."""
+
+from __future__ import annotations
+
+import tomllib
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from replay.errors import ConfigError
+from replay.log.raw_log import Channel, LogSummary, RawLog
+from replay.log.source_options import SignalSource
+from replay.machine.config import Machine, haulotte
+from replay.machine.toml_file import load_machine
+from replay.mission import check_units
+from replay.signals.mapping import map_signals
+from replay.signals.signal import Signals
+
+WHEELS = haulotte().wheels
+KNOWN = replace(haulotte(), assumed=())
+WAVE = np.sin(np.arange(400) * 0.05)
+
+
+def mapped(columns: dict[str, Any], given: dict[str, SignalSource], machine: Machine = KNOWN) -> Signals:
+    stamps = np.arange(400) * 10_000_000
+    channels = {n: Channel(n, "", n, stamps, np.asarray(v)) for n, v in columns.items()}
+    log = RawLog("run.csv", "csv", "header", channels, LogSummary("run.csv", "csv", 0, 0, ()))
+    return map_signals([log], replace(machine, signals=given))
+
+
+@pytest.mark.parametrize(
+    ("signal", "unit", "size", "line"),
+    [
+        ("wheel.FR.u", "1", 5.6, '"wheel.FR.u" = { column = "x", unit = "%" }'),
+        ("wheel.FR.u", "1", 32767.0, '"wheel.FR.u" = { column = "x", unit = "1", gain = 3.05e-05 }'),
+        ("steer.front.phi", "rad", 31.0, '"steer.front.phi" = { column = "x", unit = "deg" }'),
+        ("wheel.FR.v", "m/s", 142.0, '"wheel.FR.v" = { column = "x", unit = "rpm", at = "motor" }'),
+        ("cmd.v", "m/s", 300.0, '"cmd.v" = { column = "x", unit = "mm/s" }'),
+    ],
+)
+def test_a_unit_that_cannot_be_asks_for_the_line(signal: str, unit: str, size: float, line: str) -> None:
+    found = mapped({"x": size * WAVE}, {signal: SignalSource(column="x", unit=unit)})
+    assert len(found.questions) == 1
+    assert line in found.questions[0]
+    with pytest.raises(ConfigError, match="values that cannot be, so nothing was judged"):
+        check_units(found)
+
+
+def test_the_line_is_read_back_and_answers_the_question() -> None:
+    found = mapped({"x": 31.0 * WAVE}, {"steer.front.phi": SignalSource(column="x", unit="rad")})
+    line = found.questions[0].partition("write: ")[2]
+    name, table = next(iter(tomllib.loads(line).items()))
+    assert not mapped({"x": 31.0 * WAVE}, {name: SignalSource(**table)}).questions
+
+
+def test_80_metres_per_second_are_asked_about_without_a_machine_file() -> None:
+    found = mapped({"x": 80.0 * WAVE}, {"wheel.FR.v": SignalSource(column="x", unit="m/s")}, haulotte())
+    assert "reaches 80 m/s" in found.questions[0]
+
+
+def test_a_faster_robot_than_the_paper_s_is_no_question_while_its_top_speed_is_not_known() -> None:
+    given = {"wheel.FR.v": SignalSource(column="x", unit="m/s")}
+    assert not mapped({"x": 5.0 * WAVE}, given, haulotte()).questions
+    assert mapped({"x": 5.0 * WAVE}, given).questions
+
+
+def test_a_sensor_that_lies_beside_sound_ones_is_no_question() -> None:
+    columns = dict.fromkeys(WHEELS, 0.3 * WAVE) | {"FR": np.full(400, 2.0)}
+    given = {f"wheel.{w}.v": SignalSource(column=w, unit="m/s") for w in WHEELS}
+    found = mapped(columns, given)
+    assert not found.questions
+    assert any("wheel.FR.v reaches 2 m/s" in note for note in found.notes)
+
+
+def test_spikes_are_no_question() -> None:
+    wave = 0.3 * WAVE
+    wave[::40] = 900.0
+    assert not mapped({"x": wave}, {"wheel.FR.v": SignalSource(column="x", unit="m/s")}).questions
+
+
+@pytest.mark.parametrize(
+    ("text", "assumed"),
+    [
+        ("", ("geometry", "gear_ratio", "max_speed", "max_steer", "flow", "control")),
+        ("[geometry]\nmax_speed = 2\nmax_steer = 0.5\n", ("geometry", "flow", "control")),
+        ('[machine]\nwheels = ["L", "R"]\n[control]\nlaw = "none"\n', ("max_speed",)),
+        (
+            '[machine]\nwheels = ["L", "R"]\n[control]\nlaw = "none"\n[geometry]\nwheel_diameter = 0.3\nmax_speed = 2\n'
+            "L = { x = 0.0, y = 0.3 }\nR = { x = 0.0, y = -0.3 }\n",
+            (),
+        ),
+    ],
+)
+def test_a_machine_knows_what_is_the_paper_s(tmp_path: Path, text: str, assumed: tuple[str, ...]) -> None:
+    (tmp_path / "m.toml").write_text(text)
+    assert load_machine(tmp_path / "m.toml").assumed == assumed
