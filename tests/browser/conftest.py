@@ -54,47 +54,84 @@ def pages(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Path]:
     return written
 
 
+class Tabs:
+    """Tabs that tests may use again: a tab has compiled a page's scripts, most of what opening it costs."""
+
+    def __init__(self, browser: Any) -> None:
+        self.browser = browser
+        self.free: dict[tuple[int, str], list[Any]] = {}
+
+    def take(self, width: int, theme: str, script: bool) -> Any:
+        """A blank tab as if no test had used it."""
+        size = {"width": width, "height": 900}
+        kept = self.free.get((width, theme), [])
+        if not script or not kept:
+            context = self.browser.new_context(
+                viewport=size, color_scheme=theme, java_script_enabled=script, offline=True
+            )
+            page = context.new_page()
+            page.add_init_script(WATCH)
+            return page
+        page = kept.pop()
+        page.set_viewport_size(size)
+        page.emulate_media(media="null", color_scheme=theme, reduced_motion="null")
+        return page
+
+    def give_back(self, page: Any, width: int, theme: str, script: bool) -> None:
+        """Keep a tab for another test, unless more than it was opened or its page cannot have cleared its traces."""
+        if not script or len(page.context.pages) > 1:
+            page.context.close()
+            return
+        page.evaluate("localStorage.clear(), sessionStorage.clear()")
+        page.goto("about:blank")
+        page.mouse.move(0, 0)
+        self.free.setdefault((width, theme), []).append(page)
+
+
 class Watch:
     """Opens pages offline and keeps what no page may do: errors, console messages, requests, breaches of the policy."""
 
-    def __init__(self, browser: Any, pages: Callable[[str], Path]) -> None:
-        self.browser, self.pages = browser, pages
-        self.contexts: list[Any] = []
+    def __init__(self, tabs: Tabs, pages: Callable[[str], Path]) -> None:
+        self.tabs, self.pages = tabs, pages
+        self.open_tabs: list[tuple[Any, tuple[int, str, bool], dict[str, Callable[[Any], None]]]] = []
         self.wrong: list[str] = []
 
     def open(
         self, name: str, address: str = "", *, width: int = 1280, theme: str = "light", script: bool = True
     ) -> Any:
-        context = self.browser.new_context(
-            viewport={"width": width, "height": 900}, color_scheme=theme, java_script_enabled=script, offline=True
-        )
-        self.contexts.append(context)
-        page = context.new_page()
-        page.add_init_script(WATCH)
-        page.on("pageerror", lambda e: self.wrong.append(f"error {e}"))
-        page.on("console", lambda m: self.wrong.append(f"console {m.type} {m.text}"))
+        page = self.tabs.take(width, theme, script)
         url = self.pages(name).as_uri()
         own = (url, "blob:")
-        page.on("request", lambda r: None if r.url.startswith(own) else self.wrong.append(r.url))
+        heard: dict[str, Callable[[Any], None]] = {
+            "pageerror": lambda e: self.wrong.append(f"error {e}"),
+            "console": lambda m: self.wrong.append(f"console {m.type} {m.text}"),
+            "request": lambda r: None if r.url.startswith(own) else self.wrong.append(r.url),
+        }
+        for event, listener in heard.items():
+            page.on(event, listener)
+        self.open_tabs.append((page, (width, theme, script), heard))
         page.goto(url + address)
         if script:
             page.locator("html[data-ready]").wait_for(state="attached")
         return page
 
     def check(self) -> None:
-        for context in self.contexts:
-            for page in context.pages:
+        for tab, *_ in self.open_tabs:
+            for page in tab.context.pages:
                 self.wrong += page.evaluate("window.breaches || []")
         assert self.wrong == []
 
     def close(self) -> None:
-        for context in self.contexts:
-            context.close()
+        for page, kind, heard in self.open_tabs:
+            for event, listener in heard.items():
+                page.remove_listener(event, listener)
+            self.tabs.give_back(page, *kind)
 
 
 @pytest.fixture(scope="module")
 def new_watch(browser: Any, pages: Callable[[str], Path]) -> Callable[[], Watch]:
-    return lambda: Watch(browser, pages)
+    tabs = Tabs(browser)
+    return lambda: Watch(tabs, pages)
 
 
 @pytest.fixture

@@ -257,7 +257,7 @@ def small_table(tmp_path: Path) -> pd.DataFrame:
 
 
 @pytest.mark.parametrize(
-    ("name", "code"), [("three rows", 3), ("infinite", 0), ("beyond any speed", 0), ("an hour's gap", 0)]
+    ("name", "code"), [("three rows", 3), ("infinite", 0), ("beyond any speed", 0), ("ten minutes' gap", 0)]
 )
 def test_odd_tables_are_judged_or_refused_without_a_crash(tmp_path: Path, name: str, code: int) -> None:
     table = small_table(tmp_path)
@@ -269,7 +269,7 @@ def test_odd_tables_are_judged_or_refused_without_a_crash(tmp_path: Path, name: 
     elif name == "beyond any speed":
         table.loc[half, "wheel.FR.v"] = 1e300
     else:
-        table.loc[half:, "time_ns"] += 3600 * 10**9
+        table.loc[half:, "time_ns"] += 600 * 10**9
     log = tmp_path / "odd.csv"
     table.to_csv(log, index=False)
     assert run(["diagnose", str(log), "-o", str(tmp_path / "out")]) == code

@@ -73,11 +73,6 @@ def free() -> FitResult:
 
 
 @pytest.fixture(scope="module")
-def clean() -> FitResult:
-    return fit_missions([mission(s, "ground") for s in (3, 4, 5)], haulotte())
-
-
-@pytest.fixture(scope="module")
 def ground() -> FitResult:
     return fit_missions([mission(s, "ground") for s in (3, 4)], haulotte())
 
@@ -131,11 +126,11 @@ def test_no_steering_leaves_the_offset_as_it_is() -> None:
 
 
 @pytest.mark.parametrize(("side", "epsilon"), [(Side.ACTUATOR, 0.5), (Side.SENSOR, 0.4), (Side.ACTUATOR, 0.2)], ids=str)
-def test_a_mission_that_is_faulty_half_its_time_is_not_learned(clean: FitResult, side: Side, epsilon: float) -> None:
+def test_a_mission_that_is_faulty_half_its_time_is_not_learned(ground: FitResult, side: Side, epsilon: float) -> None:
     fault = FaultSpec("FR", side, FaultMode.INEFFICIENT, 30.0, 60.0, epsilon)
     healthy = [mission(s, "ground") for s in (3, 4)]
     result = fit_missions([*healthy, mission(5, "ground", faults=(fault,))], haulotte())
-    assert values(result, "K") == pytest.approx(values(clean, "K"), rel=0.03)
+    assert values(result, "K") == pytest.approx(values(ground, "K"), rel=0.03)
     assert any("wheel FR" in text for text in result.left_out)
 
 
