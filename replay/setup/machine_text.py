@@ -101,7 +101,7 @@ def _unused(machine: Machine, rows: Sequence[ChannelRow]) -> list[str]:
     used = {s.label for s in machine.signals.values()}
     heading = "pose.pose.orientation"
     rest = [r for r in rows if r.name not in used and f"{r.topic}.{heading}" not in used]
-    rest = [r for r in rest if r.low is not None and not r.field.startswith(("header.", "stamp."))]
+    rest = [r for r in rest if r.low != r.high and "covariance" not in r.field]
     if not rest:
         return []
     out = ["", "# Also in the log, and not used (`mfhca channels LOG --all` has rates and more):"]
