@@ -16,7 +16,7 @@ from replay.setup.all_channels import ChannelRow
 
 _LONG_ARRAY = 4
 _LONG_ARRAY = 4
-_NARROW, _WIDE = 26, 44  # characters of a field that share a line with the rest, on terminals of 80 and of 120 columns
+_NARROW, _WIDE = 25, 44  # characters of a field that share a line with the rest, on terminals of 80 and of 120 columns
 
 
 def channels_document(rows: Sequence[ChannelRow], machine: Machine | None, source: str) -> dict[str, object]:
@@ -32,12 +32,12 @@ def channels_parts(rows: Sequence[ChannelRow], machine: Machine | None, width: i
         if machine is None
         else text(f"Could be: signals of a machine with the wheels {', '.join(machine.wheels)}.", "dim")
     )
-    lines = list(_lines(rows, _WIDE if width >= 110 else _NARROW, width))
+    lines = list(_lines(rows, _WIDE if width >= 110 else _NARROW))
     count = f"{len(rows)} channels."
     return [whole_lines(lines), "", text(count, "dim"), whose]
 
 
-def _lines(rows: Sequence[ChannelRow], field: int, width: int) -> Iterator[Text]:
+def _lines(rows: Sequence[ChannelRow], field: int) -> Iterator[Text]:
     heading = ""
     for row in _folded(rows):
         place = row.topic or PurePath(row.source).name
@@ -46,7 +46,7 @@ def _lines(rows: Sequence[ChannelRow], field: int, width: int) -> Iterator[Text]
             kind = row.type_name.rpartition("/")[2] if row.topic else ""
             yield Text.assemble("\n" if heading else "", text(place, "bold"), text(f"  {kind}{rate}", "dim"))
             heading = place
-        yield from _row(row, field, width)
+        yield from _row(row, field)
 
 
 def _folded(rows: Sequence[ChannelRow]) -> Iterator[ChannelRow]:
@@ -77,14 +77,14 @@ def _joined(run: Sequence[ChannelRow]) -> Iterator[ChannelRow]:
     )
 
 
-def _row(row: ChannelRow, field: int, width: int) -> Iterator[Text]:
-    """The channel's whole name, then range, unit and signals: on one line where they fit."""
-    name = f"  {row.field}"
+def _row(row: ChannelRow, field: int) -> Iterator[Text]:
+    """The channel's whole name, then range, unit and signals, below it where it is long."""
+    name = f"  {row.field if row.topic else row.name}"
     unit = f"{row.unit}{'?' if row.guessed and row.unit else ''}" or "–"
     span = "no number" if row.low is None else f"{row.low:.4g} … {row.high:.4g}"
     could = ", ".join(row.could_be)
-    rest = f"{span:<23}  {unit:<6}  {could}".rstrip()
-    if len(name) <= field + 2 and len(name) + 2 + len(rest) <= max(width, field + 2 + len(rest)):
+    rest = f"{span:<21}  {unit:<5}  {could}".rstrip()
+    if len(name) <= field + 2:
         yield text(f"{name:<{field + 2}}  {rest}")
         return
     yield text(name)
