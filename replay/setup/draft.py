@@ -22,6 +22,7 @@ from replay.setup.structure import ONE, Structure, described_structure, named_st
 from replay.signals.mapping import map_signals
 from replay.signals.signal import Signals
 
+_SUPPOSED = "left and right turn against each other"
 _SPEEDS = ("v", "v_true", "v_ref")
 
 
@@ -201,15 +202,15 @@ def _in_one_direction(
         motion = motions.get(f"wheel.{wheel}.v")
         if motion is not None:
             if motion.gain < 0:
-                flipped[wheel] = "it turns against the command"
+                flipped[wheel] = "they turn against the command"
         elif wheel in structure.joints and structure.joints[wheel].mirrored:
-            flipped[wheel] = "the axis of its joint says so"
+            flipped[wheel] = "by the axes of their joints"
     if not motions and not structure.joints:
         flipped |= _by_signs(structure, found)
     if flipped:
         why = "; ".join(dict.fromkeys(flipped.values()))
         draft.say("signals", f"Mirrored, written with a negative gain: {', '.join(flipped)} ({why}).")
-    if any("taken" in why for why in flipped.values()):
+    if any(why.startswith(_SUPPOSED) for why in flipped.values()):
         draft.ask(
             "signals", "which side counts backwards? The log shows only that left and right count against each other."
         )
@@ -230,11 +231,11 @@ def _by_signs(structure: Structure, found: Signals) -> dict[str, str]:
     sides = structure.places or {}
     left = [w for w in speeds if w in sides and sides[w].y > 0]
     right = [w for w in speeds if w in sides and sides[w].y < 0]
-    if left and right and backwards(speeds, left, right, found.items.get("imu.yaw_rate")):
-        return dict.fromkeys(
-            right, "left and right turn against each other; the right side is taken to be the mirrored one"
-        )
-    return {}
+    if not left or not right:
+        return {}
+    side, sure = backwards(speeds[left[0]], speeds[right[0]], found.items.get("imu.yaw_rate"))
+    why = "by the measured yaw rate" if sure else f"{_SUPPOSED}; the right side is taken"
+    return dict.fromkeys({"left": left, "right": right}.get(side, []), why)
 
 
 def _control(found: Signals) -> Control:

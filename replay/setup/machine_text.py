@@ -7,7 +7,7 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 
-from replay.machine.config import Machine
+from replay.machine.config import Machine, haulotte
 from replay.machine.signal_table import signal_of
 from replay.machine.toml_text import key_text, real_text, signal_line, source_line, text_of
 from replay.setup.all_channels import ChannelRow
@@ -85,7 +85,13 @@ def _geometry(machine: Machine) -> Iterable[str]:
 def _control(machine: Machine) -> list[str]:
     if machine.control.law == "none":
         return ['law = "none"  # another controller than the paper\'s']
-    return [f"law = {text_of(machine.control.law)}"]
+    lines = [f"law = {text_of(machine.control.law)}"]
+    if machine.geometry == haulotte().geometry:
+        c = machine.control
+        lines += [f"xi = {real_text(c.xi)}", f"beta = {real_text(c.beta)}", f"k_ps = {real_text(c.k_ps)}"]
+    if machine.plant.flow is not None:
+        lines += ["", "[plant]", f"flow = {real_text(machine.plant.flow)}  # m/s over all wheels"]
+    return lines
 
 
 def _holds(signal: Signal) -> str:
