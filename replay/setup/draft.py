@@ -14,7 +14,7 @@ from replay.machine.config import Control, Machine, haulotte
 from replay.machine.geometry import Geometry
 from replay.setup.draft_notes import Draft
 from replay.setup.given import given_signals, odometry, table_sources
-from replay.setup.lengths import largest_angle, limits_for, wheel_places, wheel_radius, with_speeds
+from replay.setup.lengths import largest_angle, limits_for, wheel_places, wheel_radius, with_speeds, without_size
 from replay.setup.motion import WheelMotion, backwards, wheel_motion
 from replay.setup.preset import Preset
 from replay.setup.robot_description import RobotDescription, parse_description
@@ -94,7 +94,10 @@ def draft_machine(logs: Sequence[RawLog], preset: Preset | None = None) -> Draft
     _ask_for_commands(draft, found)
     radius = wheel_radius(draft, structure, found, motions, origins)
     places = wheel_places(draft, structure, motions)
-    geometry = None if places is None or radius is None else Geometry(dict(places), 2 * radius)
+    geometry = None if places is None else Geometry(dict(places), 2 * radius)
+    if geometry is None:
+        origins = {n: without_size(o, radius) if n.startswith("wheel.") else o for n, o in origins.items()}
+    origins = {n: origins[n] for n in raw.canonical_signals() if n in origins}
     machine = replace(
         raw, name=draft.machine.name, geometry=geometry, signals=origins, control=_control(found),
         max_steer=largest_angle(draft, structure, found),

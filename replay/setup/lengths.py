@@ -12,6 +12,7 @@ from replay.log.raw_log import RawLog
 from replay.log.source_options import SignalSource
 from replay.machine.config import Limits, Machine, haulotte
 from replay.machine.geometry import WheelGeometry
+from replay.machine.quantities import UNITS
 from replay.machine.units import known_unit
 from replay.setup.draft_notes import Draft
 from replay.setup.motion import WheelMotion
@@ -31,8 +32,8 @@ _WHEEL_SIZES = (0.04, 1.0)  # m; of a radius that explains a speed without a uni
 def wheel_radius(
     draft: Draft, structure: Structure, found: Signals, motions: Mapping[str, WheelMotion],
     origins: dict[str, SignalSource],
-) -> float | None:  # fmt: skip
-    """Wheel radius [m]; None for a drive without places. Signals without a unit get the one that fits the command."""
+) -> float:  # fmt: skip
+    """Wheel radius [m]. Signals without a unit get the one that fits the command."""
     turning = [n for w in structure.wheels if (n := f"wheel.{w}.v") in origins and _is_rotation(origins[n])]
     bare = [n for w in structure.wheels if (n := f"wheel.{w}.v") in origins and not origins[n].unit]
     asked = [n for w in structure.wheels if (n := f"wheel.{w}.v_ref") in origins and _is_rotation(origins[n])]
@@ -67,12 +68,21 @@ def wheel_radius(
             "geometry",
             "how large are the wheels? Nothing in the log tells it; 0.1 m radius stands in, and with it every speed.",
         )
-    return 0.1 if structure.places is not None else None
+    return 0.1
 
 
 def _is_rotation(origin: SignalSource) -> bool:
     unit = known_unit(origin.unit)
     return unit in ("rad/s", "rpm", "rev/s", "deg/s") or (unit == "rad" and origin.derivative)
+
+
+def without_size(origin: SignalSource, radius: float) -> SignalSource:
+    """Rotation of a wheel as a speed, for a machine file without geometry that could give the wheel's size [m]."""
+    if not _is_rotation(origin):
+        return origin
+    quantity, factor = UNITS[known_unit(origin.unit) or "rad/s"]
+    unit = "m" if quantity == "angle" else "m/s"
+    return replace(origin, unit=unit, gain=float(f"{origin.gain * factor * radius:.6g}"))
 
 
 def _agreed(values: Sequence[float]) -> float | None:
@@ -123,9 +133,7 @@ def wheel_places(
     """Places with the track that turns show, where no description gives them."""
     places = structure.places
     if places is None:
-        if structure.wheels != ONE:
-            draft.ask("geometry", "where are the wheels? Their names do not say; without places no turn is compared.")
-        return None
+        return None if structure.wheels == ONE else _sides(draft, structure.wheels, motions)
     tracks = [2 * m.y * (1 if places[n.split(".")[1]].y > 0 else -1) for n, m in motions.items() if m.y is not None]
     found = _agreed([t if _TRACKS[0] <= t <= _TRACKS[1] else math.inf for t in tracks])
     fixed = all(p.axle == "fixed" for p in places.values())
@@ -149,6 +157,18 @@ def wheel_places(
         )
     scale = track / max(max(p.y for p in places.values()) - min(p.y for p in places.values()), 1e-9)
     return {w: replace(p, y=round(p.y * scale, 4)) for w, p in places.items()}
+
+
+def _sides(
+    draft: Draft, wheels: Sequence[str], motions: Mapping[str, WheelMotion]
+) -> Mapping[str, WheelGeometry] | None:
+    """Sides of wheels whose names say none, from how their speeds follow turns."""
+    sides = {w: m.y for w in wheels if (m := motions.get(f"wheel.{w}.v")) is not None and m.y is not None}
+    if set(sides) != set(wheels) or max(map(abs, sides.values())) > _TRACKS[1] / 2:
+        draft.ask("geometry", "where are the wheels? Neither names nor turns tell; without places no turn is compared.")
+        return None
+    draft.ask("geometry", "where are the wheels? Their sides follow from how they answer turns; nothing tells x.")
+    return {w: WheelGeometry(0.0, float(_round(y)), 0.0, "fixed") for w, y in sides.items()}
 
 
 def largest_angle(draft: Draft, structure: Structure, found: Signals) -> float:

@@ -21,7 +21,8 @@ CAR = """<robot name="car"><link name="base_link"/><link name="knuckle"/><link n
 def test_wheels_stand_where_their_joints_are() -> None:
     found = parse_description(urdf(mirrored=("rear_right_wheel_joint",)))
     assert found.name == "lorry"
-    assert {w.joint: (w.x, w.y) for w in found.wheels} == pytest.approx(WHEELS)
+    assert {w.joint: w.x for w in found.wheels} == pytest.approx({n: x for n, (x, _) in WHEELS.items()})
+    assert {w.joint: w.y for w in found.wheels} == pytest.approx({n: y for n, (_, y) in WHEELS.items()})
     assert {w.radius for w in found.wheels} == {RADIUS}
     assert [w.joint for w in found.wheels if w.mirrored] == ["rear_right_wheel_joint"]
 
