@@ -38,7 +38,7 @@ def read_back(draft: Draft, tmp_path: Path) -> Draft:
         draft.machine.max_speed,
         draft.machine.limits,
     )
-    assert not set(loaded.assumed) - {"control"}
+    assert not loaded.assumed
     return draft
 
 
