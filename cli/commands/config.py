@@ -95,7 +95,9 @@ def check(
     if asked:
         raise ConfigError(f"{file}: values of the log that cannot be with these units: {'; '.join(asked)}")
     count = len(machine.signals)
-    terminal.show(f"{file}: valid. {machine.name}, wheels {', '.join(machine.wheels)}, {count} signals given.")
+    still = sum(line.startswith("# QUESTION: ") for line in file.read_text(encoding="utf-8").splitlines())
+    open_ = f" {still} of its comments are questions; remove each when it is answered." if still else ""
+    terminal.show(f"{file}: valid. {machine.name}, wheels {', '.join(machine.wheels)}, {count} signals given.{open_}")
 
 
 def show(context: typer.Context, machine: MachineFile = None, quiet: Quiet = False, verbose: Verbose = False) -> None:

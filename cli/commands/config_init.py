@@ -86,8 +86,9 @@ def _show(terminal: Terminal, draft: Draft, name: Path, logs: Sequence[Path]) ->
     from cli.tables.layout import bullets, section
 
     words = " ".join(shlex.quote(str(log)) for log in logs) or "LOG"
-    count = len(draft.machine.signals)
-    terminal.show(f"Wrote {name}: {len(draft.machine.wheels)} wheels, {count} signal{'' if count == 1 else 's'}.")
+    wheels, count = len(draft.machine.wheels), len(draft.machine.signals)
+    many = f"{wheels} wheels" if wheels > 1 else "one drive"
+    terminal.show(f"Wrote {name}: {many}, {count} signal{'' if count == 1 else 's'}.")
     if draft.found:
         terminal.show(section("Found"), bullets(draft.found))
     if draft.questions:

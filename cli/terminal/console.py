@@ -116,7 +116,7 @@ def _begun(subscriber: Subscriber, first: Progress) -> Subscriber:
 def _rendered(console: Console, parts: tuple[RenderableType, ...], *, wrap: bool = True) -> str:
     with console.capture() as capture:
         for part in parts:
-            console.print(part, soft_wrap=not wrap)
+            console.print(part, soft_wrap=not wrap, crop=False)
     return _PADDING.sub("", capture.get())
 
 

@@ -112,7 +112,7 @@ def _assumed(machine: Machine, data: Mapping[str, Any]) -> tuple[str, ...]:
         "max_speed": "max_speed" not in places,
         "max_steer": bool(machine.axles) and "max_steer" not in places,
         "flow": machine.plant.flow is not None and "flow" not in data.get("plant", {}),
-        "control": not own_law and not {"lambda", "xi", "beta", "k_ps"} & set(data.get("control", {})),
+        "control": not lengths and not own_law and not {"lambda", "xi", "beta", "k_ps"} & set(data.get("control", {})),
     }
     return tuple(key for key in ASSUMABLE if left[key])
 

@@ -14,7 +14,7 @@ from replay.machine.config import Control, Machine, haulotte
 from replay.machine.geometry import Geometry
 from replay.setup.draft_notes import Draft
 from replay.setup.given import given_signals, odometry, table_sources
-from replay.setup.lengths import largest_angle, limits_for, wheel_places, wheel_radius, with_speeds
+from replay.setup.lengths import largest_angle, limits_for, wheel_places, wheel_radius, with_speeds, without_size
 from replay.setup.motion import WheelMotion, backwards, wheel_motion
 from replay.setup.preset import Preset
 from replay.setup.robot_description import RobotDescription, parse_description
@@ -22,12 +22,13 @@ from replay.setup.structure import ONE, Structure, described_structure, named_st
 from replay.signals.mapping import map_signals
 from replay.signals.signal import Signals
 
+_SUPPOSED = "left and right turn against each other"
 _SPEEDS = ("v", "v_true", "v_ref")
 
 
 def structure_of(logs: Sequence[RawLog]) -> Structure:
     """Wheels of the machine that recorded some logs; raises `LogError` where none can be found."""
-    channels = {name: channel for log in logs for name, channel in log.channels.items()}
+    channels = _all_channels(logs)
     return _structure(channels, _description(logs, []), None)
 
 
@@ -48,7 +49,7 @@ def preset_draft(preset: Preset) -> Draft:
     draft.machine = replace(
         draft.machine,
         geometry=Geometry(dict(places), 0.2),
-        control=_control(preset),
+        control=Control(law="none"),
         max_speed=1.0,
         limits=limits_for(1.0),
     )
@@ -71,37 +72,62 @@ def draft_machine(logs: Sequence[RawLog], preset: Preset | None = None) -> Draft
     LogError
         Where no wheel or drive can be found.
     """
-    channels = {name: channel for log in logs for name, channel in log.channels.items()}
+    channels = _all_channels(logs)
     doubts: list[str] = []
     description = _description(logs, doubts)
     structure = _structure(channels, description, preset)
     draft = Draft(Machine(_name(description, logs), "", structure.wheels, None))
-    draft.say("machine", f"Wheels {', '.join(structure.wheels)}, from {structure.how}.")
+    many = f"Wheels {', '.join(structure.wheels)}" if len(structure.wheels) > 1 else f"One drive, {structure.wheels[0]}"
+    draft.say("machine", f"{many}, from {structure.how}.")
     if "numbers" in structure.how:
         draft.ask("machine", "which wheel has which number? The names do not say; put the wheels into their order.")
     for doubt in doubts:
         draft.ask("geometry", doubt)
+    if preset is Preset.HAULOTTE:
+        return _haulotte_draft(draft, logs)
     given = given_signals(structure, channels, logs)
     sources = table_sources(logs, draft)
     raw = replace(structure.machine(1.0), signals=given, sources=sources)
     found = map_signals(logs, raw)
     motions = _motions(found, structure.wheels)
     origins = _in_one_direction(draft, structure, found, motions)
+    _ask_for_commands(draft, found)
     radius = wheel_radius(draft, structure, found, motions, origins)
     places = wheel_places(draft, structure, motions)
-    geometry = None if places is None or radius is None else Geometry(dict(places), 2 * radius)
+    geometry = None if places is None else Geometry(dict(places), 2 * radius)
+    if geometry is None:
+        origins = {n: without_size(o, radius) if n.startswith("wheel.") else o for n, o in origins.items()}
+    origins = {n: origins[n] for n in raw.canonical_signals() if n in origins}
     machine = replace(
-        raw, name=draft.machine.name, geometry=geometry, signals=origins, control=_control(preset),
+        raw, name=draft.machine.name, geometry=geometry, signals=origins, control=_control(found),
         max_steer=largest_angle(draft, structure, found),
     )  # fmt: skip
-    if preset is Preset.HAULOTTE:
-        machine = replace(haulotte(), signals=origins, sources=sources)
-    else:
-        machine = with_speeds(draft, machine, logs)
-    draft.machine = machine
+    draft.machine = with_speeds(draft, machine, logs)
+    return _finished(draft, logs)
+
+
+def _haulotte_draft(draft: Draft, logs: Sequence[RawLog]) -> Draft:
+    """The paper's machine, with every signal that it finds by itself."""
+    machine = replace(haulotte(), sources=table_sources(logs, draft), assumed=())
+    origins = {name: signal.origin for name, signal in map_signals(logs, machine).items.items()}
+    draft.machine = replace(machine, signals=origins)
+    return _finished(draft, logs)
+
+
+def _finished(draft: Draft, logs: Sequence[RawLog]) -> Draft:
+    machine = draft.machine
     draft.signals = map_signals(logs, machine)
     draft.questions += draft.signals.questions
     return draft
+
+
+def _all_channels(logs: Sequence[RawLog]) -> dict[str, Channel]:
+    """Channels of all files; of two of one name in several tables both are kept."""
+    out: dict[str, Channel] = {}
+    for log in logs:
+        for name, channel in log.channels.items():
+            out[name if name not in out else f"{log.source} {name}"] = channel
+    return out
 
 
 def _description(logs: Sequence[RawLog], doubts: list[str]) -> RobotDescription | None:
@@ -158,6 +184,18 @@ def _motions(found: Signals, wheels: Sequence[str]) -> dict[str, WheelMotion]:
     return out
 
 
+def _ask_for_commands(draft: Draft, found: Signals) -> None:
+    """Ask for what nothing can be judged without."""
+    leaves = {name.rpartition(".")[2] for name in found.items if name.startswith("wheel.")}
+    if "cmd.v" not in found.items and not leaves & {"v_ref", "u", "u_applied", "v_true"}:
+        only = (
+            "wheels can only be compared with each other" if len(draft.machine.wheels) > 1 else "nothing can be judged"
+        )
+        draft.ask(
+            "signals", f"where are the commands? None is in the log, so {only}; record /cmd_vel, or name its topic."
+        )
+
+
 def _in_one_direction(
     draft: Draft, structure: Structure, found: Signals, motions: Mapping[str, WheelMotion]
 ) -> dict[str, SignalSource]:
@@ -167,15 +205,15 @@ def _in_one_direction(
         motion = motions.get(f"wheel.{wheel}.v")
         if motion is not None:
             if motion.gain < 0:
-                flipped[wheel] = "it turns against the command"
+                flipped[wheel] = "they turn against the command"
         elif wheel in structure.joints and structure.joints[wheel].mirrored:
-            flipped[wheel] = "the axis of its joint says so"
+            flipped[wheel] = "by the axes of their joints"
     if not motions and not structure.joints:
         flipped |= _by_signs(structure, found)
     if flipped:
         why = "; ".join(dict.fromkeys(flipped.values()))
-        draft.say("signals", f"Mirrored, written with gain = -1: {', '.join(flipped)} ({why}).")
-    if any("taken" in why for why in flipped.values()):
+        draft.say("signals", f"Mirrored, written with a negative gain: {', '.join(flipped)} ({why}).")
+    if any(why.startswith(_SUPPOSED) for why in flipped.values()):
         draft.ask(
             "signals", "which side counts backwards? The log shows only that left and right count against each other."
         )
@@ -196,15 +234,16 @@ def _by_signs(structure: Structure, found: Signals) -> dict[str, str]:
     sides = structure.places or {}
     left = [w for w in speeds if w in sides and sides[w].y > 0]
     right = [w for w in speeds if w in sides and sides[w].y < 0]
-    if left and right and backwards(speeds, left, right, found.items.get("imu.yaw_rate")):
-        return dict.fromkeys(
-            right, "left and right turn against each other; the right side is taken to be the mirrored one"
-        )
-    return {}
+    if not left or not right:
+        return {}
+    side, sure = backwards(speeds[left[0]], speeds[right[0]], found.items.get("imu.yaw_rate"))
+    why = "by the measured yaw rate" if sure else f"{_SUPPOSED}; the right side is taken"
+    return dict.fromkeys({"left": left, "right": right}.get(side, []), why)
 
 
-def _control(preset: Preset | None) -> Control:
-    return Control() if preset is Preset.HAULOTTE else Control(law="none")
+def _control(found: Signals) -> Control:
+    """Law of the paper's kind where valve commands are logged, which is fitted; else another controller."""
+    return Control() if any(re.fullmatch(r"wheel\.[^.]+\.u", n) for n in found.items) else Control(law="none")
 
 
 def check_draft(draft: Draft) -> None:

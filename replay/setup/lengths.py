@@ -12,6 +12,7 @@ from replay.log.raw_log import RawLog
 from replay.log.source_options import SignalSource
 from replay.machine.config import Limits, Machine, haulotte
 from replay.machine.geometry import WheelGeometry
+from replay.machine.quantities import UNITS
 from replay.machine.units import known_unit
 from replay.setup.draft_notes import Draft
 from replay.setup.motion import WheelMotion
@@ -20,31 +21,26 @@ from replay.signals.mapping import map_signals
 from replay.signals.signal import Signal, Signals
 from replay.signals.to_si import peak_of
 
-_RADII, _TRACKS = (0.02, 2.5), (0.05, 10.0)  # m
+_RADII, _TRACKS = (0.02, 2.5), (0.05, 4.0)  # m
 _HEADROOM = 1.2
 _DIFFERS = 0.15
 _LEAST_SPEED = 0.05  # m/s
+_AGREE = 1.33
 _WHEEL_SIZES = (0.04, 1.0)  # m; of a radius that explains a speed without a unit
 
 
 def wheel_radius(
     draft: Draft, structure: Structure, found: Signals, motions: Mapping[str, WheelMotion],
     origins: dict[str, SignalSource],
-) -> float | None:  # fmt: skip
-    """Wheel radius [m]; signals without a unit get the one with which they follow the command."""
-    turning = []
-    for wheel in structure.wheels:
-        name = f"wheel.{wheel}.v"
-        motion, origin = motions.get(name), origins.get(name)
-        if origin is None:
-            continue
-        unit = known_unit(origin.unit)
-        if unit in ("rad/s", "rpm", "rev/s", "deg/s") or (unit == "rad" and origin.derivative):
-            turning.append(1 / abs(motion.gain) if motion is not None else math.nan)
-        elif not origin.unit and motion is not None and abs(abs(motion.gain) - 1) > _DIFFERS:
-            turning += _unit_by_size(draft, structure, name, origin, motion, origins)
-    known = [r for r in turning if math.isfinite(r) and _RADII[0] <= r <= _RADII[1]]
-    measured = float(np.median(known)) if known else None
+) -> float:  # fmt: skip
+    """Wheel radius [m]. Signals without a unit get the one that fits the command."""
+    turning = [n for w in structure.wheels if (n := f"wheel.{w}.v") in origins and _is_rotation(origins[n])]
+    bare = [n for w in structure.wheels if (n := f"wheel.{w}.v") in origins and not origins[n].unit]
+    asked = [n for w in structure.wheels if (n := f"wheel.{w}.v_ref") in origins and _is_rotation(origins[n])]
+    exact = _agreed([1 / abs(motions[n].gain) for n in asked if n in motions])
+    measured = exact or _agreed([1 / abs(motions[n].gain) for n in turning if n in motions])
+    if bare:
+        measured = _unit_of_speeds(draft, structure, found, bare, motions, origins) or measured
     if structure.radius is not None:
         draft.say("geometry", f"Wheel radius {structure.radius:g} m from {structure.how}.")
         if measured is not None and abs(measured / structure.radius - 1) > _DIFFERS:
@@ -53,11 +49,18 @@ def wheel_radius(
                 f"is the wheel radius {structure.radius:g} m? By commanded and measured speeds it would be {measured:.3g} m.",
             )
         return structure.radius
-    if measured is not None:
-        draft.say(
+    if measured is not None and measured < _WHEEL_SIZES[0]:
+        draft.ask(
             "geometry",
-            f"Wheel radius {_round(measured)} m, from commanded speed over measured rotation: a slip or scale that all wheels "
-            "share does not show with it; measure the wheel.",
+            f"were the motors measured? Radius over gear ratio is {measured:.3g} m; for motors give gear_ratio and wheel_diameter "
+            'here, and at = "motor" in [signals].',
+        )
+        return max(float(_round(measured)), _RADII[0] / 2)
+    if measured is not None and measured <= _RADII[1]:
+        draft.ask(
+            "geometry",
+            f"is the wheel radius {measured:.3g} m? It is what makes commands and speeds agree; a scale that all wheels share "
+            "does not show with it. Measure the wheel.",
         )
         return float(_round(measured))
     if turning:
@@ -65,28 +68,59 @@ def wheel_radius(
             "geometry",
             "how large are the wheels? Nothing in the log tells it; 0.1 m radius stands in, and with it every speed.",
         )
-        return 0.1
-    return 0.1 if structure.places is not None else None
+    return 0.1
 
 
-def _unit_by_size(
-    draft: Draft, structure: Structure, name: str, origin: SignalSource, motion: WheelMotion,
+def _is_rotation(origin: SignalSource) -> bool:
+    unit = known_unit(origin.unit)
+    return unit in ("rad/s", "rpm", "rev/s", "deg/s") or (unit == "rad" and origin.derivative)
+
+
+def without_size(origin: SignalSource, radius: float) -> SignalSource:
+    """Rotation of a wheel as a speed, for a machine file without geometry that could give the wheel's size [m]."""
+    if not _is_rotation(origin):
+        return origin
+    quantity, factor = UNITS[known_unit(origin.unit) or "rad/s"]
+    unit = "m" if quantity == "angle" else "m/s"
+    return replace(origin, unit=unit, gain=float(f"{origin.gain * factor * radius:.6g}"))
+
+
+def _agreed(values: Sequence[float]) -> float | None:
+    """Median of values that agree within a third; None where they do not."""
+    if not values or max(values) > _AGREE * min(values):
+        return None
+    return float(np.median(values))
+
+
+def _unit_of_speeds(
+    draft: Draft, structure: Structure, found: Signals, names: Sequence[str], motions: Mapping[str, WheelMotion],
     origins: dict[str, SignalSource],
-) -> list[float]:  # fmt: skip
-    """Give a speed without a unit the one that makes its wheel a usual size; return the radius, if one fits."""
+) -> float | None:  # fmt: skip
+    """Give speeds without a unit the one that makes the wheels a usual size, else a scale; return the radius, if one fits."""
+    how = "it makes them follow the command"
+    gain = _agreed([abs(motions[n].gain) for n in names if n in motions]) if set(names) <= set(motions) else None
+    asked = found.items.get("cmd.v")
+    if gain is None and asked is not None and peak_of(asked.values) > 0:
+        gain = float(np.median([peak_of(found.items[n].values) for n in names])) / peak_of(asked.values)
+        how = "by the largest commanded and measured speeds"
+    labels = ", ".join(origins[n].label for n in names)
+    if gain is None or gain <= 0:
+        draft.ask("signals", f"in which unit are {labels}? None is stated, and m/s is taken.")
+        return None
+    if abs(gain - 1) <= _DIFFERS:
+        return None
     for unit, turn in (("rad/s", 1.0), ("rpm", 2 * math.pi / 60)):
-        radius = 1 / (abs(motion.gain) * turn)
+        radius = 1 / (gain * turn)
         if structure.places is not None and _WHEEL_SIZES[0] <= radius <= _WHEEL_SIZES[1]:
-            origins[name] = replace(origin, unit=unit)
-            draft.ask(
-                "signals",
-                f"is {origin.label} in {unit}? No unit is stated; with it the wheel's radius is {radius:.3g} m.",
-            )
-            return [radius]
-    scale = float(f"{1 / motion.gain:.6g}")
-    origins[name] = replace(origin, unit="m/s", gain=scale)
-    draft.ask("signals", f"is {scale:g} the scale of {origin.label} to m/s? It is what makes it follow the command.")
-    return []
+            for n in names:
+                origins[n] = replace(origins[n], unit=unit)
+            draft.ask("signals", f"are {labels} in {unit}? None is stated; {how} with wheels of {radius:.3g} m radius.")
+            return radius
+    for n in names:
+        scale = float(f"{origins[n].gain / gain:.6g}")
+        origins[n] = replace(origins[n], unit="m/s", gain=scale)
+    draft.ask("signals", f"what is the scale of {labels}? No unit is stated; {1 / gain:.6g} makes it m/s: {how}.")
+    return None
 
 
 def _round(value: float) -> str:
@@ -99,18 +133,18 @@ def wheel_places(
     """Places with the track that turns show, where no description gives them."""
     places = structure.places
     if places is None:
-        if structure.wheels != ONE:
-            draft.ask("geometry", "where are the wheels? Their names do not say; without places no turn is compared.")
-        return None
+        return None if structure.wheels == ONE else _sides(draft, structure.wheels, motions)
     tracks = [2 * m.y * (1 if places[n.split(".")[1]].y > 0 else -1) for n, m in motions.items() if m.y is not None]
-    tracks = [t for t in tracks if _TRACKS[0] <= t <= _TRACKS[1]]
+    found = _agreed([t if _TRACKS[0] <= t <= _TRACKS[1] else math.inf for t in tracks])
     fixed = all(p.axle == "fixed" for p in places.values())
     track = max(p.y for p in places.values()) - min(p.y for p in places.values())
     if "track" in structure.measured:
         draft.say("geometry", f"Track {track:.4g} m from {structure.how}.")
-    elif tracks and fixed:
-        track = float(_round(float(np.median(tracks))))
-        draft.say("geometry", f"Track {track:g} m, from commanded turns over the wheels' speeds; measure it.")
+    elif found is not None and math.isfinite(found) and fixed:
+        track = float(_round(found))
+        draft.ask(
+            "geometry", f"is the track {track:g} m? It is what makes commanded turns and speeds agree. Measure it."
+        )
     else:
         draft.ask("geometry", f"how far are left and right wheels apart? Nothing tells it; {track:g} m stand in.")
     base = max(p.x for p in places.values()) - min(p.x for p in places.values())
@@ -123,6 +157,18 @@ def wheel_places(
         )
     scale = track / max(max(p.y for p in places.values()) - min(p.y for p in places.values()), 1e-9)
     return {w: replace(p, y=round(p.y * scale, 4)) for w, p in places.items()}
+
+
+def _sides(
+    draft: Draft, wheels: Sequence[str], motions: Mapping[str, WheelMotion]
+) -> Mapping[str, WheelGeometry] | None:
+    """Sides of wheels whose names say none, from how their speeds follow turns."""
+    sides = {w: m.y for w in wheels if (m := motions.get(f"wheel.{w}.v")) is not None and m.y is not None}
+    if set(sides) != set(wheels) or max(map(abs, sides.values())) > _TRACKS[1] / 2:
+        draft.ask("geometry", "where are the wheels? Neither names nor turns tell; without places no turn is compared.")
+        return None
+    draft.ask("geometry", "where are the wheels? Their sides follow from how they answer turns; nothing tells x.")
+    return {w: WheelGeometry(0.0, float(_round(y)), 0.0, "fixed") for w, y in sides.items()}
 
 
 def largest_angle(draft: Draft, structure: Structure, found: Signals) -> float:

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 
-from replay.machine.config import Machine
+from replay.machine.config import Machine, haulotte
 from replay.machine.signal_table import signal_of
 from replay.machine.toml_text import key_text, real_text, signal_line, source_line, text_of
 from replay.setup.all_channels import ChannelRow
@@ -85,7 +85,13 @@ def _geometry(machine: Machine) -> Iterable[str]:
 def _control(machine: Machine) -> list[str]:
     if machine.control.law == "none":
         return ['law = "none"  # another controller than the paper\'s']
-    return [f"law = {text_of(machine.control.law)}"]
+    lines = [f"law = {text_of(machine.control.law)}"]
+    if machine.geometry == haulotte().geometry:
+        c = machine.control
+        lines += [f"xi = {real_text(c.xi)}", f"beta = {real_text(c.beta)}", f"k_ps = {real_text(c.k_ps)}"]
+    if machine.plant.flow is not None:
+        lines += ["", "[plant]", f"flow = {real_text(machine.plant.flow)}  # m/s over all wheels"]
+    return lines
 
 
 def _holds(signal: Signal) -> str:
@@ -101,7 +107,7 @@ def _unused(machine: Machine, rows: Sequence[ChannelRow]) -> list[str]:
     used = {s.label for s in machine.signals.values()}
     heading = "pose.pose.orientation"
     rest = [r for r in rows if r.name not in used and f"{r.topic}.{heading}" not in used]
-    rest = [r for r in rest if r.low is not None and not r.field.startswith(("header.", "stamp."))]
+    rest = [r for r in rest if r.low != r.high and "covariance" not in r.field]
     if not rest:
         return []
     out = ["", "# Also in the log, and not used (`mfhca channels LOG --all` has rates and more):"]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -19,6 +18,7 @@ _DELAYS_S = (0.0, 0.05, 0.1, 0.2, 0.3, 0.4, 0.5, 0.7)
 _LAGS_S = (0.0, 0.1, 0.3, 0.8)
 _TRIMMED = 0.2  # of the samples with the largest residuals are left out, twice: drives that were faulty for a time
 _SOUND = 0.8  # share of the variance that a fit must explain
+_TURNS = 0.05  # rad/s; standard deviation of a yaw rate that turns show in
 _MOVES = 0.02  # m/s or rad/s; standard deviation from which a motion counts
 
 
@@ -105,23 +105,43 @@ def _trimmed(x: Array, y: Array) -> tuple[float, Array]:
     return (1 - rest / spread if spread > 0 else 0.0), np.asarray(coefficients)
 
 
-def backwards(wheels: Mapping[str, Signal], left: Sequence[str], right: Sequence[str], yaw: Signal | None) -> bool:
-    """Whether the wheels of the right side count against those of the left, by their signs alone.
+def backwards(left: Signal, right: Signal, yaw: Signal | None) -> tuple[str, bool]:
+    """Which side counts backwards, where no command tells it, and whether that is sure.
+
+    A robot turns left by what its right wheels run faster: the yaw rate goes with the difference of the two sides, or with
+    their sum where one of them is mirrored, and its sign tells which. Without turns, sides that always run against each
+    other tell that one is mirrored, but not which.
 
     Parameters
     ----------
-    wheels : Mapping[str, Signal]
-        Speeds by wheel.
-    left, right : Sequence[str]
-        Wheels of each side.
+    left, right : Signal
+        Speed of a wheel of each side, in one unit.
     yaw : Signal or None
-        Measured yaw rate [rad/s]: a robot that turns on the spot has opposite sides too.
+        Measured yaw rate [rad/s].
+
+    Returns
+    -------
+    str
+        ``left``, ``right``, or empty where neither does.
+    bool
+        Whether the side is known rather than supposed.
     """
-    a, b = (np.concatenate([_held(wheels[w], wheels[left[0]].stamps) for w in side[:1]]) for side in (left, right))
-    moving = np.isfinite(a) & np.isfinite(b) & (np.abs(a) > 0.2 * np.nanmax(np.abs(a), initial=0.0))
-    if moving.sum() < 5 or np.mean(a[moving] * b[moving] < 0) < 0.8:
-        return False
-    if yaw is None:
-        return True
-    turned = np.abs(_held(yaw, wheels[left[0]].stamps))[moving]
-    return bool(np.nanmedian(turned) < 0.2)
+    at = left.stamps
+    a, b = left.values, _held(right, at)
+    turn = np.zeros(len(at)) if yaw is None else _held(yaw, at)
+    known = np.isfinite(a) & np.isfinite(b) & np.isfinite(turn)
+    a, b, turn = a[known], b[known], turn[known]
+    if len(a) < _LEAST:
+        return "", False
+    if np.std(turn) >= _TURNS:
+        apart, same = _correlation(b - a, turn), _correlation(b + a, turn)
+        if abs(same) > 0.7 and abs(same) > abs(apart) + 0.2:
+            return ("left" if same > 0 else "right"), True
+        return "", True
+    moving = np.abs(a) > 0.2 * np.max(np.abs(a), initial=0.0)
+    against = moving.sum() >= 5 and np.mean(a[moving] * b[moving] < 0) >= 0.8
+    return ("right", False) if against and (yaw is None or np.median(np.abs(turn[moving])) < 0.2) else ("", False)
+
+
+def _correlation(x: Array, y: Array) -> float:
+    return float(np.corrcoef(x, y)[0, 1]) if np.std(x) > 0 and np.std(y) > 0 else 0.0

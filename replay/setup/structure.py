@@ -11,7 +11,7 @@ from replay.machine.config import Machine, haulotte
 from replay.machine.geometry import Geometry, WheelGeometry
 from replay.setup.preset import Preset
 from replay.setup.robot_description import RobotDescription, WheelJoint
-from replay.signals.name_parts import index_of, is_steering, position, tokens
+from replay.signals.name_parts import index_of, is_steering, position, tokens, wheel_of
 from replay.signals.rules import candidates
 
 FOUR, SIX = ("FR", "FL", "RR", "RL"), ("FR", "FL", "MR", "ML", "RR", "RL")
@@ -51,9 +51,10 @@ class Structure:
     how: str = ""
 
     def machine(self, radius: float | None = None) -> Machine:
-        """A machine of this structure, without signals; `radius` [m] instead of the known one."""
+        """A machine to find signals with; wheels without places stand in the middle; `radius` [m] instead of the known one."""
         size = radius or self.radius or _RADIUS
-        geometry = None if self.places is None else Geometry(dict(self.places), 2 * size)
+        places = self.places or {w: WheelGeometry(0.0, 0.0, 0.0, "fixed") for w in self.wheels}
+        geometry = Geometry(dict(places), 2 * size)
         return Machine("unnamed machine", "", self.wheels, geometry, max_speed=1e6)
 
 
@@ -135,7 +136,7 @@ def named_structure(channels: Mapping[str, Channel]) -> Structure | None:
     """Structure by what the wheels are called in a log; None where no name speaks of wheels."""
     named: tuple[tuple[str, ...], ...] = (SIX, FOUR, TWO)
     for names in named:
-        if _covers(channels, names):
+        if _covers(channels, names, by_name=True):
             german = names == FOUR and any(
                 {"vl", "vr", "hl", "hr", "vorne", "hinten"} & set(tokens(c)) for c in channels
             )
@@ -152,14 +153,19 @@ def named_structure(channels: Mapping[str, Channel]) -> Structure | None:
     return None
 
 
-def _covers(channels: Mapping[str, Channel], wheels: tuple[str, ...]) -> bool:
-    """Whether every one of these wheels has a speed that is its own."""
+def _covers(channels: Mapping[str, Channel], wheels: tuple[str, ...], by_name: bool = False) -> bool:
+    """Whether every one of these wheels has a speed that is its own, found by its name alone or also by its number."""
     trial = Structure(wheels, supposed(wheels)).machine(1.0)
     found: dict[str, set[str]] = {}
     for c in candidates(channels, trial):
         group, part, leaf = (*c.signal.split("."), "", "")[:3]
-        if group == "wheel" and leaf in ("v", "v_true", "u_applied"):
-            found.setdefault(part, set()).add(c.origin.label)
+        if group != "wheel" or leaf not in ("v", "v_true", "u_applied"):
+            continue
+        name = c.origin.label
+        inner = re.search(r"\[([A-Za-z_][^\[\]]*)\]$", name)
+        if by_name and wheel_of(inner[1] if inner else re.sub(r"\[\d+\]", "", name), trial) != part:
+            continue
+        found.setdefault(part, set()).add(name)
     return set(found) == set(wheels)
 
 

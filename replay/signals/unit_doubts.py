@@ -29,8 +29,8 @@ _MOST_OF_IT = 0.2  # of the samples other than zero lie beyond the limit: no spi
 _ANY_MACHINE = 30.0  # m/s; faster than any machine whose top speed was not given
 _SOUND = 2  # other signals of the kind, recorded in the same unit, that are plausible: then it is a fault of this one
 _TURN = 3.1  # rad; a machine file can give no larger limit of steering
-_ROTATIONS = ("rad/s", "rpm")
-_SPEED_UNITS = ("m/s", "rad/s", "rpm", "km/h", "mm/s", "cm/s", "deg/s")
+_ROTATIONS, _TURNING = ("rad/s", "rpm", "deg/s"), ("rad/s", "rpm", "deg/s", "rev/s")
+_SPEED_UNITS = ("m/s", "km/h", "mm/s", "cm/s")
 
 
 @dataclass(frozen=True)
@@ -113,18 +113,23 @@ def _too_fast(signal: str, values: NDArray[np.float64], peak: float, origin: Sig
 def _fitting_speed(signal: str, peak: float, origin: SignalSource, machine: Machine) -> str:
     """Line of the signal with the unit with which it just fits the machine's top speed; empty where none does."""
     recorded = peak / abs(factor_of(signal, origin, machine))
-    best, most = "", 0.0
-    ways = [replace(origin, unit=unit, at="wheel") for unit in _SPEED_UNITS]
+    turns = [replace(origin, unit=unit, at="wheel") for unit in _ROTATIONS]
     if machine.gear_ratio > 1:
-        ways += [replace(origin, unit=unit, at="motor") for unit in _ROTATIONS]
-    for tried in ways:
-        try:
-            reached = recorded * abs(factor_of(signal, tried, machine))
-        except ConfigError:
-            continue
-        if most < reached <= _WIDE * machine.max_speed:
-            best, most = signal_line(signal, tried), reached
-    return best if most > 0.1 * machine.max_speed else ""
+        turns += [replace(origin, unit=unit, at="motor") for unit in _ROTATIONS]
+    speeds = [replace(origin, unit=unit, at="wheel") for unit in _SPEED_UNITS]
+    rotation = known_unit(origin.unit) in _TURNING
+    for ways in (turns, speeds) if rotation else (speeds + turns,):
+        best, most = "", 0.1 * machine.max_speed
+        for tried in ways:
+            try:
+                reached = recorded * abs(factor_of(signal, tried, machine))
+            except ConfigError:
+                continue
+            if most < reached <= _WIDE * machine.max_speed:
+                best, most = signal_line(signal, tried), reached
+        if best:
+            return best
+    return ""
 
 
 def _too_open(signal: str, values: NDArray[np.float64], peak: float, origin: SignalSource, machine: Machine) -> Doubt:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+from itertools import pairwise
 from pathlib import Path
 
 import fsspec
@@ -165,9 +166,11 @@ def test_several_files_are_named(mission_log: Path, tmp_path: Path, capsys: pyte
     table.write_text("time_ns,wheel.FR.pressure_a\n" + rows)
     assert run(["channels", str(mission_log), str(table)]) == 0
     out = capsys.readouterr().out
-    rows = {line.split()[0]: line for line in out.splitlines() if line.startswith("wheel.FR.")}
-    assert "wheel.FR.pressure_a  in plc.csv" in rows["wheel.FR.pressure_a"]
-    assert "in drive.mcap" in rows["wheel.FR.v"]
+    below = {
+        line.split()[0]: next_line for line, next_line in pairwise(out.splitlines()) if line.startswith("wheel.FR.")
+    }
+    assert "wheel.FR.pressure_a  in plc.csv" in below["wheel.FR.pressure_a"]
+    assert "in drive.mcap" in below["wheel.FR.v"]
 
 
 @pytest.mark.parametrize("columns", ["80", "120"])

@@ -1,0 +1,141 @@
+"""Drafts of machines from logs of robots, and what they ask."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from replay.errors import LogError
+from replay.machine.toml_file import load_machine
+from replay.setup.all_channels import channel_rows
+from replay.setup.draft import draft_machine, preset_draft
+from replay.setup.draft_notes import Draft
+from replay.setup.machine_text import machine_text
+from replay.setup.preset import Preset
+from replay.setup.read import read_everything
+from tests.ros_robots import RADIUS, TRACK, WHEELS, Robot, urdf, write_robot
+
+RIGHT = tuple(n for n in WHEELS if "right" in n)
+
+
+def drafted(tmp_path: Path, robot: Robot, preset: Preset | None = None) -> Draft:
+    write_robot(tmp_path / "run.mcap", robot, 30.0)
+    return read_back(draft_machine(read_everything([tmp_path / "run.mcap"], every=False), preset), tmp_path)
+
+
+def read_back(draft: Draft, tmp_path: Path) -> Draft:
+    """The draft, whose file gives the same machine and leaves nothing to the paper's."""
+    file = tmp_path / "machine.toml"
+    file.write_text(machine_text(draft, "run"), encoding="utf-8")
+    loaded = load_machine(file)
+    assert loaded.signals == draft.machine.signals
+    assert loaded.geometry == draft.machine.geometry
+    assert (loaded.wheels, loaded.max_speed, loaded.limits) == (
+        draft.machine.wheels,
+        draft.machine.max_speed,
+        draft.machine.limits,
+    )
+    assert not loaded.assumed
+    return draft
+
+
+def test_a_description_gives_lengths_and_the_log_which_wheels_are_mirrored(tmp_path: Path) -> None:
+    draft = drafted(tmp_path, Robot(mirrored=RIGHT, description=urdf(mirrored=RIGHT)))
+    machine = draft.machine
+    assert (machine.name, machine.wheels, machine.control.law) == ("lorry", ("FR", "FL", "RR", "RL"), "none")
+    assert machine.wheel_radius == RADIUS
+    assert machine.geometry is not None
+    assert machine.geometry.wheels["FL"].y == TRACK / 2
+    assert {n for n, s in machine.signals.items() if s.gain == -1.0} == {"wheel.FR.v", "wheel.RR.v"}
+    assert any("Mirrored" in text and "FR, RR" in text for text in draft.found)
+    assert len(draft.questions) == 1  # the top speed
+
+
+def test_without_a_description_lengths_follow_from_the_commands_and_are_asked(tmp_path: Path) -> None:
+    draft = drafted(tmp_path, Robot(mirrored=RIGHT))
+    machine = draft.machine
+    assert machine.wheel_radius == pytest.approx(RADIUS, rel=0.03)
+    assert machine.geometry is not None
+    assert 2 * machine.geometry.wheels["FL"].y == pytest.approx(TRACK, rel=0.05)
+    assert any("is the wheel radius" in q for q in draft.questions)
+    assert any("is the track" in q for q in draft.questions)
+    assert {n for n, s in machine.signals.items() if s.gain == -1.0} == {"wheel.FR.v", "wheel.RR.v"}
+
+
+def test_without_commands_the_yaw_rate_tells_what_is_mirrored(tmp_path: Path) -> None:
+    draft = drafted(tmp_path, Robot(mirrored=RIGHT, commands=False))
+    assert {n for n, s in draft.machine.signals.items() if s.gain == -1.0} == {"wheel.FR.v", "wheel.RR.v"}
+    assert any("where are the commands?" in q for q in draft.questions)
+
+
+@pytest.mark.parametrize(
+    ("names", "wheels"),
+    [
+        (("left_wheel_joint", "right_wheel_joint"), ("R", "L")),
+        (("wheel_l", "wheel_r"), ("R", "L")),
+        (("rad_vl", "rad_vr", "rad_hl", "rad_hr"), ("VR", "VL", "HR", "HL")),
+        (("lf_wheel", "rf_wheel", "lr_wheel", "rr_wheel"), ("FR", "FL", "RR", "RL")),
+        (("wheel_1", "wheel_2", "wheel_3"), ("W1", "W2", "W3")),
+    ],
+)
+def test_names_as_people_write_them(tmp_path: Path, names: tuple[str, ...], wheels: tuple[str, ...]) -> None:
+    places = {n: (0.0, TRACK / 2 if i % 2 == 0 else -TRACK / 2) for i, n in enumerate(names)}
+    write_robot(tmp_path / "run.mcap", Robot(wheels=places, imu=False), 10.0)
+    draft = draft_machine(read_everything([tmp_path / "run.mcap"], every=False))
+    assert draft.machine.wheels == wheels
+    assert {f"wheel.{w}.v" for w in wheels} <= set(draft.machine.signals)
+
+
+def test_tables_of_one_topic_each_with_seconds_and_nanoseconds(tmp_path: Path) -> None:
+    t = 1_651_608_966_000_000_000 + np.arange(600) * 50_000_000
+    v = np.repeat(np.random.default_rng(1).uniform(0.2, 2.0, 15), 40)
+    clock = {"header.stamp.secs": t // 10**9, "header.stamp.nsecs": t % 10**9}
+    pd.DataFrame(clock | {"linear.x": v, "angular.z": 0.0}).to_csv(tmp_path / "cmd_vel.csv", index=False)
+    rpm = -8000 * v + np.random.default_rng(2).normal(0.0, 20.0, 600)
+    pd.DataFrame(clock | {"RPM": rpm}).to_csv(tmp_path / "core.csv", index=False)
+    draft = draft_machine(read_everything([tmp_path / "cmd_vel.csv", tmp_path / "core.csv"]))
+    read_back(draft, tmp_path)
+    assert draft.machine.wheels == ("D",)
+    assert draft.machine.signals["wheel.D.v"].gain == pytest.approx(-1 / 8000, rel=0.02)
+    assert draft.machine.signals["wheel.D.v_ref"].source == "cmd_vel.csv"
+    assert any("what is the scale of RPM" in q for q in draft.questions)
+
+
+def test_speeds_without_a_unit_get_the_one_that_fits_the_commands(tmp_path: Path) -> None:
+    t = np.arange(600) * 0.05
+    v = np.repeat(np.random.default_rng(1).uniform(0.2, 2.0, 15), 40)
+    columns = {"time": t, "cmd_vel_x": v, "meas_left_vel": v / 0.3, "meas_right_vel": v / 0.3}
+    pd.DataFrame(columns).to_csv(tmp_path / "run.csv", index=False)
+    draft = read_back(draft_machine(read_everything([tmp_path / "run.csv"])), tmp_path)
+    assert draft.machine.wheels == ("R", "L")
+    assert draft.machine.signals["wheel.L.v"].unit == "rad/s"
+    assert draft.machine.wheel_radius == pytest.approx(0.3, rel=0.02)
+    assert any("in rad/s? None is stated" in q for q in draft.questions)
+
+
+def test_a_log_without_a_drive_says_what_to_record(tmp_path: Path) -> None:
+    pd.DataFrame({"time": np.arange(50.0), "temperature": 20.0}).to_csv(tmp_path / "run.csv", index=False)
+    with pytest.raises(LogError, match="no wheel speed is in the log"):
+        draft_machine(read_everything([tmp_path / "run.csv"]))
+
+
+@pytest.mark.parametrize("preset", Preset)
+def test_presets_are_machines_that_load(tmp_path: Path, preset: Preset) -> None:
+    read_back(preset_draft(preset), tmp_path)
+
+
+def test_every_channel_is_listed_with_unit_range_and_signals(tmp_path: Path) -> None:
+    write_robot(tmp_path / "run.mcap", Robot(), 5.0)
+    logs = read_everything([tmp_path / "run.mcap"])
+    rows = {r.name: r for r in channel_rows(logs, draft_machine(logs).machine)}
+    speed = rows["/joint_states.velocity[front_left_wheel_joint]"]
+    assert (speed.unit, speed.guessed, speed.could_be) == ("rad/s", False, ("wheel.FL.v",))
+    assert speed.rate_hz == pytest.approx(20.0)
+    assert speed.low is not None
+    assert speed.high is not None
+    assert speed.low < speed.high
+    assert rows["/cmd_vel.linear.x"].could_be == ("cmd.v",)
+    assert (rows["/imu.linear_acceleration.z"].unit, rows["/imu.linear_acceleration.z"].could_be) == ("m/s^2", ())
