@@ -16,6 +16,7 @@ NOTES = (
     "parameters; those authors' own code and gains are not public, and these figures say nothing about them",
     "parameters as the paper counts them; the forcing ζ of Ψ̂, which the paper does not have, is not among MFHCA's four",
     "ζ is that of the preset, not tuned; the gains of the others are tuned on one healthy mission",
+    "the paper's ranking is not reproduced: healthy, an integrating law leaves less error than Ψ̂ forced by e², which vanishes with e",
     "while a wheel is faulty, the fault decides its error and the law hardly does: look at the last two columns",
 )
 

@@ -11,19 +11,7 @@ if TYPE_CHECKING:
 
     from diagnosis.counterfactual.document import BandRow, CounterfactualDocument, LawRow
 
-_HEADINGS = (
-    "law",
-    "error m/s",
-    "90 %",
-    "healthy",
-    "in faults",
-    "effort",
-    "90 %",
-    "recovery s",
-    "variation /s",
-    "saturated",
-    "param.",
-)
+_HEADINGS = ("law", "error m/s", "90 %", "healthy", "faulty", "effort", "90 %", "back s", "wear /s", "full", "par.")
 
 
 def counterfactual_parts(document: CounterfactualDocument) -> list[RenderableType]:
@@ -60,7 +48,8 @@ def _legend(document: CounterfactualDocument) -> str:
     return (
         "error: mean |v − v_c| where the wheel's speed is known; effort: mean |u|; "
         + draws
-        + "recovery: median over faults of the time from a fault's end until the wheel is back; variation: Σ|Δu| per second"
+        + "back: median time from a fault's end until the wheel follows again; wear: Σ|Δu| per second; full: share of commands at their limit; "
+        "par.: parameters as the paper counts them"
     )
 
 

@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from diagnosis.assess import ComponentResult
-from diagnosis.counterfactual.plant import coupled_plant
+from diagnosis.counterfactual.plant import lightest, measured_angle, wheel_fits
 from diagnosis.results.assessment import CODE, Finding
 from diagnosis.results.wheel_model import WheelModelFit
 from diagnosis.wheels.motion import in_motion
 from diagnosis.wheels.wheel_channels import wheel_channels
-from diagnosis.wheels.wheel_fit import wheel_fit
 from replay.arrays.numeric import without_nan
 from replay.control.loop import Replay, any_finite, stack
 from replay.control.mfhca import fill_forward
@@ -30,7 +29,6 @@ Flags = NDArray[np.bool_]
 _MOST_SAMPLES = 2_000_000  # steps that fit into memory with all columns of both worlds
 _ICE = 0.1  # hold of the ground under a wheel that slips, as a share of firm ground's
 _HELD_SPEED, _HELD_OPENING = 0.012, 0.03  # within which a stuck part stands where it was at its onset [m/s], [fraction]
-_MOST_GRIP = 10.0  # beyond which a wheel model has the body drive the wheels, and not their valves
 _SMOOTH_S = 0.05  # over which a measured opening is averaged
 _LEAST_LET = 0.2  # share of the speed that a sensor must let through for the speed to be read back from it
 
@@ -110,8 +108,8 @@ def abduct(timeline: Timeline, replay: Replay, machine: Machine, found: Componen
         Where commands, speeds or wheel models are missing, or the mission is too long.
     """
     _check(timeline, replay, machine, name)
-    fit = _fit(timeline, replay, machine, found)
-    if fit is None or any(p is None for p in fit.plants):
+    fits = wheel_fits(timeline, replay, machine, found)
+    if not fits:
         raise NotJudged(
             f"{name}: no model of every wheel could be found, without which no other law can be predicted; give K and tau of each "
             "wheel in a machine file's [plant] (`mfhca fit`), or a mission that drives more"
@@ -140,7 +138,7 @@ def abduct(timeline: Timeline, replay: Replay, machine: Machine, found: Componen
             )
             held[fault.side][rows, i] = _held(u[:, i], stuck, f, _HELD_OPENING)
     speed = np.where(channels.has_true, channels.true, speed)
-    ratio, turn = in_motion(_angle(timeline, machine), machine, timeline)
+    ratio, turn = in_motion(measured_angle(timeline, machine), machine, timeline)
     coupled = bool(np.isfinite(ratio).all()) and machine.plant.coupling != "free"
     world = RecordedWorld(
         dt=timeline.dt,
@@ -157,7 +155,7 @@ def abduct(timeline: Timeline, replay: Replay, machine: Machine, found: Componen
         turn=without_nan(np.array(turn)),
         ground=_ground(found, machine, y.shape),
     )
-    plant = coupled_plant(fit, machine, coupled=coupled)
+    fit, plant = lightest(fits, world, machine, coupled=coupled)
     known = np.isfinite(speed)
     return Abducted(
         world, fit, plant, known, faulty, faults, tuple(_notes(machine, known, faulty, faults, timeline.dt))
@@ -183,31 +181,6 @@ def _check(timeline: Timeline, replay: Replay, machine: Machine, name: str) -> N
         raise NotJudged(
             f"{name}: the commanded speeds of the wheels are not known; log cmd.v and cmd.omega, or wheel.<W>.v_ref"
         )
-
-
-def _fit(timeline: Timeline, replay: Replay, machine: Machine, found: ComponentResult) -> WheelModelFit | None:
-    """Wheel models that the diagnosis used; where it needed none, found the same way."""
-    channels, angle = wheel_channels(timeline, machine), _angle(timeline, machine)
-    fit = found.wheel_model or wheel_fit(channels, replay, timeline, machine, angle)
-    if fit is None or max(p.grip or 0.0 for p in fit.plants if p is not None) <= _MOST_GRIP:
-        return fit
-    # wheels that only follow the body say nothing of their own valves: what they have in common shows without it
-    free = replace(machine, plant=replace(machine.plant, coupling="free"))
-    again = wheel_fit(channels, replay, timeline, free, angle)
-    if again is None or any(p is None for p in again.plants):
-        return fit
-    plants = tuple(replace(p, grip=None) for p in again.plants if p is not None)
-    return replace(
-        again,
-        plants=plants,
-        note=f"{again.note} With the body its grip came out as implausible; a usual one was taken.",
-    )
-
-
-def _angle(timeline: Timeline, machine: Machine) -> Array:
-    """Measured angles of the axles [rad], the second sensor where there is one, shape (n, axles)."""
-    measured, second = (stack(timeline, [f"steer.{a}.{x}" for a in machine.axles]) for x in ("phi", "phi_true"))
-    return np.where(any_finite(second), second, measured) if machine.axles else measured
 
 
 def _faults(found: ComponentResult, machine: Machine) -> tuple[KnownFault, ...]:

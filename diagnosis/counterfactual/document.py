@@ -90,6 +90,30 @@ class PlantRow(TypedDict):
     tau_std: float
 
 
+class SpanRow(TypedDict):
+    """A stretch of the mission [s]."""
+
+    start_s: float
+    stop_s: float
+
+
+class ProofRow(TypedDict):
+    """The paper's stability proof on one wheel of the recorded mission; see `replay.control.lyapunov`.
+
+    Largest |F| and |D| [m/s²] and V [m/s]; seconds in which V' and its bound L22 are known, in which V' exceeds it, and in which a = 0;
+    stretches of at least 0.1 s in which it does.
+    """
+
+    wheel: str
+    F_most: float | None
+    D_most: float | None
+    V_most: float | None
+    known_s: float
+    broken_s: float
+    uncontrolled_s: float
+    broken: list[SpanRow]
+
+
 class CounterfactualDocument(TypedDict):
     """A recorded mission under other laws."""
 
@@ -107,5 +131,6 @@ class CounterfactualDocument(TypedDict):
     self_replay: SelfReplayRow
     recorded: LawRow
     laws: list[LawRow]
+    proof: list[ProofRow]
     draws: int
     notes: list[str]

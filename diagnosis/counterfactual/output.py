@@ -27,7 +27,7 @@ def write_counterfactual(result: CounterfactualResult, folder: Path) -> tuple[Pa
     OutputError
         Where the folder cannot be written.
     """
-    columns = world_columns(result.abducted, result.wheels, result.worlds)
+    columns = world_columns(result.abducted, result.wheels, result.worlds, result.proof)
     paths = tuple(folder / name for name in (HTML, JSON, PARQUET))
     page = build_counterfactual_page(result.document, columns, result.abducted, result.wheels)
     with made_folder(folder), atomic_paths(*paths) as (html, document, table):

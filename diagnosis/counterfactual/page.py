@@ -13,7 +13,7 @@ from markupsafe import Markup
 from numpy.typing import NDArray
 
 from diagnosis.counterfactual.abduct import Abducted
-from diagnosis.counterfactual.document import BandRow, CounterfactualDocument, LawRow
+from diagnosis.counterfactual.document import BandRow, CounterfactualDocument, LawRow, ProofRow
 from diagnosis.counterfactual.plots import MOST_FAULTS, page_plots
 from diagnosis.pages import labels
 from diagnosis.pages.environment import SHARED, asset, environment, shared_style
@@ -85,6 +85,7 @@ def build_counterfactual_page(
         "laws": [_law(row, worst) for row in rows],
         "recoveries": _recoveries(rows),
         "law_names": [row["law"] for row in rows],
+        "proof": [_proof(row) for row in document["proof"]],
         "plant": document["plant"],
         "plant_note": document["plant_note"],
         "draws": document["draws"],
@@ -159,6 +160,21 @@ def _recoveries(rows: Sequence[LawRow]) -> list[Context]:
             }
         )
     return found
+
+
+def _proof(row: ProofRow) -> Context:
+    known = max(row["known_s"], 1e-9)
+    longest = max(row["broken"], key=lambda s: s["stop_s"] - s["start_s"], default=None)
+    where = "" if longest is None else f"longest {longest['start_s']:.1f}–{longest['stop_s']:.1f} s"
+    return {
+        "wheel": row["wheel"],
+        "F": _number(row["F_most"], 2),
+        "D": _number(row["D_most"], 2),
+        "V": _number(row["V_most"], 3),
+        "broken": f"{row['broken_s']:.1f} s ({100 * row['broken_s'] / known:.1f} %)",
+        "where": where,
+        "uncontrolled": f"{row['uncontrolled_s']:.1f} s",
+    }
 
 
 def _number(value: float | None, digits: int) -> str:

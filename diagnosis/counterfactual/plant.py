@@ -2,17 +2,28 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 
+from diagnosis.assess import ComponentResult
 from diagnosis.results.wheel_model import WheelModelFit
-from replay.counterfactual.world import CoupledPlant
+from diagnosis.wheels.wheel_channels import wheel_channels
+from diagnosis.wheels.wheel_fit import wheel_fit
+from replay.control.loop import Replay, any_finite, stack
+from replay.controllers.choice import Controller
+from replay.counterfactual.predict import predict
+from replay.counterfactual.world import CoupledPlant, RecordedWorld
 from replay.machine.config import Machine, WheelPlant
+from replay.signals.timeline import Timeline
 
 Array = NDArray[np.float64]
 
 _SPAN = 2.2  # of the top speed, as the wheel models have it
 _SLIDES_AT = 0.057  # slip from which a tyre transmits no more, of the span: the middle of what the wheel models try
+_LIGHTER = 0.8  # of the load, from which another wheel model is believed rather than the diagnosis's
 _GRIP = 2.2  # where neither machine file nor mission shows it
 
 
@@ -53,3 +64,43 @@ def _map(plant: WheelPlant, u_max: float, *, beyond: bool) -> tuple[Array, Array
     edge = max(plant.dead, 1e-9)
     top = plant.K * max(u_max - edge, 0.0)
     return np.array([-u_max, -edge, edge, u_max]), np.array([-top, 0.0, 0.0, top])
+
+
+def wheel_fits(timeline: Timeline, replay: Replay, machine: Machine, found: ComponentResult) -> list[WheelModelFit]:
+    """Wheel models that come into question: the diagnosis's, and where those were found in the mission, ones without the body."""
+    channels, angle = wheel_channels(timeline, machine), measured_angle(timeline, machine)
+    fits = [found.wheel_model or wheel_fit(channels, replay, timeline, machine, angle)]
+    if fits[0] is not None and fits[0].identified and machine.plant.coupling != "free":
+        free = replace(machine, plant=replace(machine.plant, coupling="free"))
+        own = wheel_fit(channels, replay, timeline, free, angle)
+        fits.append(own)
+        if own is not None:
+            fits.append(replace(own, plants=tuple(None if p is None else replace(p, grip=None) for p in own.plants)))
+    return [f for f in fits if f is not None and all(p is not None for p in f.plants)]
+
+
+def lightest(
+    fits: Sequence[WheelModelFit], world: RecordedWorld, machine: Machine, *, coupled: bool
+) -> tuple[WheelModelFit, CoupledPlant]:
+    """The model that leaves the wheels the least load in the recorded world, by its median.
+
+    What drives a wheel beside its own valve (the body, when it is taken to tie the wheels more or less than it does) ends up in
+    the load, which stays as it was in every other world.
+    """
+    best: tuple[float, WheelModelFit, CoupledPlant] | None = None
+    seen = np.isfinite(world.speed)
+    for fit in fits:
+        plant = coupled_plant(fit, machine, coupled=coupled)
+        load = float("inf")
+        if len(fits) > 1 and seen.any():
+            load = float(np.median(np.abs(predict(world, plant, Controller("p"), machine.control.u_max).load[seen])))
+        if best is None or load < _LIGHTER * best[0]:
+            best = load, fit, plant
+    assert best is not None  # there is one fit at least
+    return best[1], best[2]
+
+
+def measured_angle(timeline: Timeline, machine: Machine) -> Array:
+    """Measured angles of the axles [rad], the second sensor where there is one, shape (n, axles)."""
+    measured, second = (stack(timeline, [f"steer.{a}.{x}" for a in machine.axles]) for x in ("phi", "phi_true"))
+    return np.where(any_finite(second), second, measured) if machine.axles else measured

@@ -21,8 +21,10 @@ from diagnosis.counterfactual.document import (
 )
 from diagnosis.counterfactual.figures import law_figures, recoveries
 from diagnosis.counterfactual.law import PRINTED, Law, asked_laws, check_laws, recorded_law
+from diagnosis.counterfactual.proof import proof_of, proof_rows
 from diagnosis.counterfactual.tuning import tuned
 from replay.control.loop import Replay, replay_loop
+from replay.control.lyapunov import ProofTerms
 from replay.controllers.choice import Controller
 from replay.counterfactual.predict import predict
 from replay.counterfactual.world import OtherWorld
@@ -81,12 +83,15 @@ class CounterfactualResult:
         Names of its columns.
     worlds : Mapping[str, OtherWorld]
         By law; ``recorded`` is the recorded law replayed in the loop.
+    proof : ProofTerms or None
+        Terms of the stability proof, where MFHCA ran.
     """
 
     document: CounterfactualDocument
     abducted: Abducted
     wheels: tuple[str, ...]
     worlds: Mapping[str, OtherWorld]
+    proof: ProofTerms | None = None
 
 
 def counterfactual(
@@ -144,6 +149,7 @@ def counterfactual(
         _row(law, abducted, machine, worlds[law.name].u, worlds[law.name].shift, c, was_tuned=law.name in was_tuned)
         for law, c in zip(laws, changes, strict=True)
     ]
+    proof = proof_of(abducted, replay, machine)
     document: CounterfactualDocument = {
         "schema": SCHEMA,
         "tool": {"name": "mfhca", "version": __version__},
@@ -161,10 +167,11 @@ def counterfactual(
         "self_replay": self_replay,
         "recorded": _row(recorded, abducted, machine, abducted.world.u, np.zeros_like(own.shift)),
         "laws": rows,
+        "proof": [] if proof is None else proof_rows(proof, machine, abducted.world.dt),
         "draws": request.draws,
         "notes": list(abducted.notes),
     }
-    return CounterfactualResult(document, abducted, machine.wheels, worlds)
+    return CounterfactualResult(document, abducted, machine.wheels, worlds, proof)
 
 
 def _world(
