@@ -24,11 +24,19 @@ class _Broken:
     matches = summarise = read = _fail
 
 
-@pytest.mark.parametrize("error", [IndexError("at 7"), RecursionError("deep"), OverflowError("too large"), KeyError("k")])
+@pytest.mark.parametrize(
+    "error", [IndexError("at 7"), RecursionError("deep"), OverflowError("too large"), KeyError("k")]
+)
 def test_foreign_errors_are_stated(error: Exception) -> None:
     reader = Bordered(_Broken(error))  # type: ignore[arg-type]
-    for act in (reader.matches, lambda p: reader.summarise(p, SourceOptions()), lambda p: reader.read(p, SourceOptions())):
-        with pytest.raises(UnforeseenContent, match=rf"a\.odd cannot be read as odd: .*{type(error).__name__}") as found:
+    for act in (
+        reader.matches,
+        lambda p: reader.summarise(p, SourceOptions()),
+        lambda p: reader.read(p, SourceOptions()),
+    ):
+        with pytest.raises(
+            UnforeseenContent, match=rf"a\.odd cannot be read as odd: .*{type(error).__name__}"
+        ) as found:
             act(Path("a.odd"))
         assert found.value.exit_code == 3
         assert found.value.__cause__ is error
