@@ -25,6 +25,7 @@ from diagnosis.audit.task import Attempt, Task, audit_one, key_of
 TICK_S = 0.5
 _AHEAD = 2
 _LOST_TRIES = 5
+_KILLED_TRIES = 1
 
 
 @dataclass
@@ -152,8 +153,9 @@ class Runner:
         for one, attempt in ended:
             if not attempt.kept:
                 keep(attempt, one.planned, self._store)
-            if attempt.outcome.state in TRANSIENT and one.tries <= self._options.retries:
-                outcome = attempt.outcome
+            outcome = attempt.outcome
+            tries = max(self._options.retries, _KILLED_TRIES) if outcome.killed else self._options.retries
+            if (outcome.killed or outcome.state in TRANSIENT) and one.tries <= tries:
                 self._emit("retry", {"name": attempt.mission.name, "state": outcome.state, "reason": outcome.reason})
                 self._submit(replace(one, number=one.number + 1, tries=one.tries + 1))
             else:

@@ -22,7 +22,7 @@ from diagnosis.audit.previous_pages import compare_newest
 from diagnosis.audit.runner import Runner, skip
 from diagnosis.audit.store.folders import own_report, run_folders, sweep
 from diagnosis.audit.store.ingest import ingest
-from diagnosis.audit.store.locks import exclusively
+from diagnosis.audit.store.locks import check_locks, exclusively
 from diagnosis.audit.store.store import FILE_NAME, Store
 from diagnosis.audit.store.stored import StoredResult
 from replay.errors import LogError, OutputError
@@ -110,6 +110,7 @@ def audit(
         from diagnosis.audit.fleet_files import check_baseline
 
         check_baseline(baseline, options.output / FILE_NAME)
+    check_locks(options.output)
     with Store.open(options.output / FILE_NAME) as store:
         page = _FleetPage(options.output, baseline, axis, emit)
         complete = page.is_current()  # else an earlier run was ended before its last steps

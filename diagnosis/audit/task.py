@@ -7,7 +7,7 @@ import secrets
 import shutil
 import tempfile
 import time
-from contextlib import suppress
+from contextlib import ExitStack, suppress
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -18,7 +18,7 @@ from diagnosis.audit.isolation import child
 from diagnosis.audit.isolation.child import Work
 from diagnosis.audit.isolation.limits import Limits
 from diagnosis.audit.isolation.run import isolation, over_time, run_isolated
-from diagnosis.audit.store.folders import MISSIONS, publish
+from diagnosis.audit.store.folders import MISSIONS, publish, swept_folder
 from diagnosis.audit.store.keys import Key, file_roles, log_hash, unhashed_log
 from diagnosis.audit.store.locks import cannot_write
 from diagnosis.audit.store.objects import Objects
@@ -136,19 +136,21 @@ def audit_one(task: Task) -> Attempt:
     """
     name = f"{os.getpid()}-{secrets.token_hex(6)}"
     folder = Path(task.folder) / name
-    try:
-        folder.mkdir(parents=True)
-        temporary = Path(tempfile.mkdtemp(prefix="mfhca-audit-", dir=task.temporary or None))
-    except OSError as error:
-        raise cannot_write(error, folder) from error
-    try:
+    with ExitStack() as ending:
+        try:
+            folder.mkdir(parents=True)
+            ending.callback(shutil.rmtree, folder, ignore_errors=True)
+            if task.temporary:
+                temporary = Path(tempfile.mkdtemp(dir=task.temporary))
+                ending.callback(shutil.rmtree, temporary, ignore_errors=True)
+            else:  # of a worker on another machine, which may be ended by force
+                temporary = ending.enter_context(swept_folder())
+        except OSError as error:
+            raise cannot_write(error, folder) from error
         attempt = _audit(task, folder, temporary)
         if task.objects:
             _put(task, attempt)
         return replace(attempt, kept=bool(task.objects))
-    finally:
-        shutil.rmtree(folder, ignore_errors=True)
-        shutil.rmtree(temporary, ignore_errors=True)
 
 
 def _audit(task: Task, folder: Path, temporary: Path) -> Attempt:

@@ -11,10 +11,9 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Protocol
 
+from diagnosis.audit.discovery.apart import HELPER, Span
 from replay.errors import LogError
-from replay.log.raw_log import LogSummary
-from replay.log.source_options import SourceOptions
-from replay.readers.registry import readers, summarise_log
+from replay.readers.registry import readers
 
 _PAUSE_NS = 5_000_000_000
 _OVERLAP_NS = 2_000_000_000
@@ -172,7 +171,7 @@ class LocalPlace:
     def continuous(self, parts: Sequence[Entry]) -> bool:
         """Whether logs go on from one to the next, by their indexes."""
         try:
-            return continues(summarise_log(Path(part.path), SourceOptions()) for part in parts)
+            return continues(HELPER.span(part.path) for part in parts)
         except LogError:
             return False
 
@@ -180,7 +179,7 @@ class LocalPlace:
         """Whether a reader knows the content."""
         try:
             return any(reader.matches(Path(file.path)) for reader in readers())
-        except OSError:
+        except (OSError, LogError):
             return True
 
 
@@ -191,12 +190,12 @@ def joined(folder: Entry, rows: Iterable[tuple[str, int, str]]) -> Entry:
     return Entry(folder.path, folder.name, folder.real, sum(r[1] for r in held), digest[:32], folder.link)
 
 
-def continues(parts: Iterable[LogSummary]) -> bool:
+def continues(parts: Iterable[Span]) -> bool:
     """Whether each log goes on where the one before ended, with the same topics; none is taken behind one that does not."""
     for before, after in pairwise(parts):
         pause = after.start_ns - before.stop_ns
-        known, found = ({t.name for t in part.topics} for part in (before, after))
-        if not (-_OVERLAP_NS <= pause <= _PAUSE_NS and (found <= known or known <= found)):
+        related = after.topics <= before.topics or before.topics <= after.topics
+        if not (-_OVERLAP_NS <= pause <= _PAUSE_NS and related):
             return False
     return True
 

@@ -10,7 +10,7 @@ from typing import Any
 
 from diagnosis.audit.discovery.finder import Finder
 from diagnosis.audit.discovery.listing import Entry, continues, joined
-from diagnosis.audit.discovery.remote_mcap import summarised, why
+from diagnosis.audit.discovery.remote_mcap import span_behind, why
 from replay.errors import ConfigError, LogError
 from replay.log.file_types import split_ending
 
@@ -193,7 +193,7 @@ class RemotePlace:
         if any(split_ending(part.name)[1] != ".mcap" for part in parts):
             return False
         try:
-            return continues(summarised(self._system, self._path(part), part.size) for part in parts)
+            return continues(span_behind(self._system, self._path(part), part.size) for part in parts)
         except LogError:
             return False
 

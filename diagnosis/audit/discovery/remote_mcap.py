@@ -9,10 +9,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+from diagnosis.audit.discovery.apart import HELPER, Span
 from replay.errors import LogError
-from replay.log.raw_log import LogSummary
-from replay.log.source_options import SourceOptions
-from replay.readers.registry import summarise_log
 
 _AHEAD = 1 << 20
 _BEFORE_SUMMARY = 1 << 16
@@ -69,19 +67,20 @@ def fetched_index(system: Any, path: str, size: int) -> Iterator[Path]:
         yield local
 
 
-def summarised(system: Any, path: str, size: int) -> LogSummary:
-    """List an MCAP file's contents from its index; see `fetched_index`.
+def span_behind(system: Any, path: str, size: int) -> Span:
+    """Span of an MCAP file by its index, read in a process of its own; see `fetched_index`.
 
     Raises
     ------
     LogError
-        Where it cannot be read, is no MCAP file, or its index does not account for the whole file.
+        Where it cannot be read, is no MCAP file, its index does not account for the whole file, or reading it took that
+        process down.
     """
     with fetched_index(system, path, size) as local:
-        summary = summarise_log(local, SourceOptions())
-    if summary.format != "mcap" or summary.damage:
+        span = HELPER.span(str(local))
+    if span.format != "mcap" or not span.clean:
         raise LogError(f"{path}: its index does not account for the whole file; read it whole")
-    return summary
+    return span
 
 
 def _metadata_places(local: Path) -> list[tuple[int, int]]:

@@ -16,16 +16,15 @@ import shutil
 import signal
 import socket
 import sys
-import tempfile
 import time
 from contextlib import suppress
 from dataclasses import dataclass, field
 from multiprocessing.connection import Connection
-from pathlib import Path
 
 from diagnosis.audit.isolation import child
 from diagnosis.audit.isolation.child import Work
 from diagnosis.audit.isolation.limits import Limits, follow, held_mb
+from diagnosis.audit.store.folders import swept_folder
 
 POLL_S = 0.05
 _STUCK_S = 10.0
@@ -175,10 +174,10 @@ def warm() -> None:
     from replay.machine.config import haulotte
     from replay.warm_up import write_warm_up_log
 
-    with tempfile.TemporaryDirectory(prefix="mfhca-") as folder:
-        log = Path(folder) / "warm.mcap"
+    with swept_folder() as folder:
+        log = folder / "warm.mcap"
         write_warm_up_log(log)
-        child.judge(Work((str(log),), haulotte(), "", "", "", folder, folder))
+        child.judge(Work((str(log),), haulotte(), "", "", "", str(folder), str(folder)))
 
 
 def main(descriptor: int, parent: int, *, warmed: bool) -> None:

@@ -35,6 +35,14 @@ _CLOSE_S = 2.0
 _LEAST_S = 0.01
 _NO_MEMORY = re.compile(r"bad_alloc|MemoryError|out of memory|cannot allocate memory|LLVM ERROR", re.IGNORECASE)
 _FRAME = re.compile(r'^  File "([^"]+)", line (\d+) in (\S+)', re.MULTILINE)
+_NO_MEMORY_LEFT = "the system had no memory left and ended its process; run fewer at once with -j"
+_OUTSIDE = {
+    getattr(signal, name)
+    for name in ("SIGHUP", "SIGINT", "SIGQUIT", "SIGTERM", "SIGALRM", "SIGUSR1", "SIGUSR2", "SIGPWR")
+    if hasattr(signal, name)
+}
+"""Signals that no program sends itself by a fault in it."""
+_OUTSIDE_START = re.compile(r"ended with SIG(KILL|TERM|HUP|INT|QUIT)|^cannot start a process")
 # One thread for each child: missions run beside each other, and a process with one thread may be forked.
 _ONE_THREAD = {
     "OPENBLAS_NUM_THREADS": "1",
@@ -71,13 +79,19 @@ def run_isolated(work: Work, limits: Limits, isolation: Isolation, spent_s: floa
     kills = memory_kills()
     ended = isolation.run(work, replace(limits, wall_s=max(limits.wall_s - spent_s, _LEAST_S)))
     if isinstance(ended, str):
-        return Outcome(MissionState.CRASHED, ended)
+        killed = _OUTSIDE_START.search(ended) is not None
+        return Outcome(
+            MissionState.UNREADABLE if killed else MissionState.CRASHED, ended, passing=killed, killed=killed
+        )
     found = _left_by(work) if not ended.code else None
     if ended.code == child.NOT_WRITTEN or (found is not None and found["state"] == child.NOT_KEPT):
         raise OutputError((found["reason"] if found is not None else "") or os.strerror(errno.ENOSPC))
     if found is None:
         state, reason = _why(ended, _messages(work), limits, killed=memory_kills() > kills)
-        return Outcome(state, reason, ended.wall_s + spent_s, ended.cpu_s, ended.peak_mb)
+        killed = reason in (_NO_MEMORY_LEFT, _from_outside(-ended.code))
+        return Outcome(
+            state, reason, ended.wall_s + spent_s, ended.cpu_s, ended.peak_mb, passing=killed, killed=killed
+        )  # fmt: skip
     state, reason = MissionState(found["state"]), found["reason"]
     if state is MissionState.OUT_OF_MEMORY:
         reason = _over_memory(limits, reason)
@@ -114,12 +128,9 @@ def _why(ended: Ended, messages: str, limits: Limits, *, killed: bool) -> tuple[
     if name == "SIGXCPU" or (name == "SIGKILL" and over_cpu):
         return MissionState.TIMEOUT, f"took more than {limits.cpu_s:g} s of a processor; allow more with --cpu"
     if name == "SIGKILL":
-        if killed:
-            return (
-                MissionState.OUT_OF_MEMORY,
-                "the system had no memory left and ended its process; run fewer at once with -j",
-            )
-        return MissionState.CRASHED, "its process was ended from outside by SIGKILL"
+        return (MissionState.OUT_OF_MEMORY, _NO_MEMORY_LEFT) if killed else (MissionState.UNREADABLE, _from_outside(9))
+    if -ended.code in _OUTSIDE:
+        return MissionState.UNREADABLE, _from_outside(-ended.code)
     if _NO_MEMORY.search(messages):
         return MissionState.OUT_OF_MEMORY, _over_memory(limits)
     if name == "SIGBUS":
@@ -128,6 +139,10 @@ def _why(ended: Ended, messages: str, limits: Limits, *, killed: bool) -> tuple[
             f"its process ended with SIGBUS: a file became shorter while it was read{_place(messages)}",
         )
     return MissionState.CRASHED, f"its process ended with {name}{_place(messages)}"
+
+
+def _from_outside(number: int) -> str:
+    return f"its process was ended from outside by {_signal_name(number)}; audit again"
 
 
 def over_time(limits: Limits) -> str:

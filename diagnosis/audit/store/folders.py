@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+import errno
 import os
 import secrets
 import shutil
@@ -15,11 +16,13 @@ from pathlib import Path
 
 from diagnosis.audit.store.keys import Key
 from diagnosis.audit.store.locks import WORKING, FileLock, cannot_write, lock_mission
+from replay.errors import OutputError
 
 MISSIONS, RESULTS = "missions", "results"
 _TEMPORARY = "mfhca-audit-"
 _HELD = ".held"
 _MARK = ".key"
+_TRIES = 100
 _AT_FDCWD, _RENAME_EXCHANGE = -100, 2
 
 
@@ -62,29 +65,53 @@ def run_folders(output: Path) -> Iterator[RunFolders]:
 
 
 def _own_folder(base: Path, ending: ExitStack) -> tuple[Path, FileLock]:
-    while True:
+    for _ in range(_TRIES):
         folder = base / f"{os.getpid()}-{secrets.token_hex(4)}"
         lock = FileLock(base / f"{folder.name}.lock")
-        if lock.acquire():
+        if _acquired(lock):
             ending.callback(lock.release)
             ending.callback(_unlink, lock.path)
             ending.callback(shutil.rmtree, folder, ignore_errors=True)
             folder.mkdir()
             return folder, lock
         lock.release()  # another run that sweeps was faster
+    raise OSError(errno.EBUSY, "other processes remove its files as fast as they are made", str(base))
+
+
+def _acquired(lock: FileLock) -> bool:
+    """Acquire a lock whose file is of no use where there are no locks."""
+    try:
+        return lock.acquire()
+    except BaseException:
+        lock.release()
+        _unlink(lock.path)
+        raise
 
 
 def _own_temporary(note: Path, ending: ExitStack) -> Path:
-    while True:
+    for _ in range(_TRIES):
         temporary = Path(tempfile.gettempdir()) / f"{_TEMPORARY}{secrets.token_hex(8)}"
         note.write_bytes(os.fsencode(temporary))  # first, so that the next run finds it in any case
         temporary.mkdir(0o700)
         ending.callback(shutil.rmtree, temporary, ignore_errors=True)
         held = FileLock(temporary / _HELD)
         ending.callback(held.release)
-        if held.acquire():
+        if _acquired(held):
             return temporary
         held.release()  # another run that sweeps was faster
+    raise OSError(errno.EBUSY, "other processes remove its folders as fast as they are made", tempfile.gettempdir())
+
+
+@contextmanager
+def swept_folder() -> Iterator[Path]:
+    """Make a temporary folder that the next audit removes where this process is ended by force."""
+    with ExitStack() as ending:
+        folder = Path(tempfile.mkdtemp(prefix=_TEMPORARY))
+        ending.callback(shutil.rmtree, folder, ignore_errors=True)
+        held = FileLock(folder / _HELD)
+        ending.callback(held.release)
+        held.acquire()
+        yield folder
 
 
 def _unlink(path: Path) -> None:
@@ -116,8 +143,9 @@ def sweep(output: Path) -> None:
             lock = FileLock(held)
         except OSError:  # another user's
             continue
-        if lock.acquire():
-            shutil.rmtree(held.parent, ignore_errors=True)
+        with suppress(OutputError):  # a disk without locks: whose folder it is cannot be told
+            if lock.acquire():
+                shutil.rmtree(held.parent, ignore_errors=True)
         lock.release()
 
 

@@ -14,10 +14,16 @@ from diagnosis.audit.store.objects import Objects
 from diagnosis.audit.store.outcome import ENDS
 from diagnosis.audit.store.records import SCHEMA, ResultObject, write_document
 from diagnosis.audit.store.store import RESULTS, Store
+from diagnosis.results.validation import validated
 from diagnosis.results.vocabulary import Severity, Verdict
+from replay.errors import MfhcaError
 
 _MOST_BYTES = 64 << 20
 _AT_ONCE = 200
+_MISFITS = (
+    sqlite3.IntegrityError, sqlite3.ProgrammingError, sqlite3.DataError, sqlite3.InterfaceError,
+    KeyError, TypeError, ValueError, AttributeError, OverflowError,
+)  # fmt: skip
 _LINK = re.compile(r"-m[0-9a-f]{8}\.json$")
 _MISSIONS = "missions/"
 _VERDICTS, _SEVERITIES = {v.value for v in Verdict}, {s.value for s in Severity}
@@ -65,7 +71,7 @@ def ingest(store: Store, place: str | None = None) -> Ingested:
             continue
         try:
             document = _checked(name, objects.read(name))
-        except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
+        except (OSError, ValueError, KeyError, TypeError, AttributeError, MfhcaError) as error:
             problems.append(f"{objects.place}/{name}: is not a result object of this tool ({_short(error)}); left out")
             continue
         if document.get("attempt") is not None or document["mission"]["name"] not in placed:
@@ -79,7 +85,7 @@ def ingest(store: Store, place: str | None = None) -> Ingested:
                 try:
                     write_document(connection, document, store.run)
                     taken[document.get("attempt") is not None] += 1
-                except (sqlite3.IntegrityError, sqlite3.ProgrammingError, KeyError, TypeError, OverflowError) as error:
+                except _MISFITS as error:
                     connection.execute("ROLLBACK TO one")
                     problems.append(f"{objects.place}/{name}: does not fit the store ({_short(error)}); left out")
                 connection.execute("RELEASE one")
@@ -113,9 +119,9 @@ def _checked(name: str, content: bytes) -> ResultObject:
         raise ValueError("a fault's severity is not known")
     if not isinstance(document["made_ns"], int) or not isinstance(mission["files"], list) or not mission["files"]:
         raise ValueError("files or time of making are missing")
-    checked: ResultObject = document
-    return checked
+    return validated(document, ResultObject, "content", "nothing of it was taken")
 
 
 def _short(error: Exception) -> str:
-    return f"{type(error).__name__}: {error}"[:160].replace("\n", " ")
+    text = str(error) if isinstance(error, MfhcaError) else f"{type(error).__name__}: {error}"
+    return text[:160].replace("\n", " ")

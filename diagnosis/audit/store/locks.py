@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import hashlib
 import os
 import sys
@@ -15,6 +16,12 @@ from replay.errors import OutputError
 
 WORKING = ".work"
 _POLL_S = 0.05
+_HELD = {errno.EAGAIN, errno.EWOULDBLOCK, errno.EACCES, errno.EDEADLK, errno.ENOENT, errno.EINTR}
+"""Errors that say that another process holds a lock, or has just removed its file."""
+_REMEDY = (
+    "give an output folder on a local disk with -o (and set TMPDIR to one where this is the folder for temporary files), or "
+    "have the file system mounted with locks (Lustre: -o flock, NFS: with its lock daemon)"
+)
 
 
 class FileLock:
@@ -25,7 +32,13 @@ class FileLock:
         self.path = path
 
     def acquire(self) -> bool:
-        """Acquire it unless another process holds it."""
+        """Acquire it unless another process holds it.
+
+        Raises
+        ------
+        OutputError
+            Where the file system gives no locks at all.
+        """
         try:
             if sys.platform == "win32":
                 import msvcrt
@@ -38,8 +51,13 @@ class FileLock:
                 fcntl.flock(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB)
                 # a run that sweeps may have removed the file before it was locked
                 return os.path.samestat(os.fstat(self._file.fileno()), self.path.stat())
-        except OSError:
-            return False
+        except OSError as error:
+            if error.errno in _HELD:
+                return False
+            raise OutputError(
+                f"{self.path.parent}: its file system gives no locks ({error.strerror or error}), and without them two audits "
+                f"would write over each other; {_REMEDY}"
+            ) from error
         return True
 
     def release(self) -> None:
@@ -61,10 +79,26 @@ def lock_mission(output: Path, name: str) -> FileLock | None:
         lock = FileLock(folder / hashlib.sha256(name.encode("utf-8", "surrogateescape")).hexdigest()[:24])
     except OSError as error:
         raise cannot_write(error, output) from error
-    if lock.acquire():
-        return lock
-    lock.release()
-    return None
+    taken = False
+    try:
+        taken = lock.acquire()
+    finally:
+        if not taken:
+            lock.release()
+    return lock if taken else None
+
+
+def check_locks(output: Path) -> None:
+    """Find out at once whether the output's file system gives locks.
+
+    Raises
+    ------
+    OutputError
+        Where it does not, or the output cannot be written.
+    """
+    lock = lock_mission(output, "locks")
+    if lock is not None:
+        lock.release()
 
 
 @contextmanager

@@ -90,6 +90,9 @@ class Outcome:
         From `diagnosis.audit.store.summary.summarise`; None where there is no report.
     passing : bool
         Whether the files could not be read for a reason outside of them, which may pass: no result of their content.
+    killed : bool
+        Whether something outside of the mission ended its process: an operator, or the system for want of memory. It is
+        tried once more in any case, and always again by the next audit.
     """
 
     state: MissionState
@@ -99,6 +102,7 @@ class Outcome:
     peak_mb: float = 0.0
     summary: MissionSummary | None = None
     passing: bool = False
+    killed: bool = False
 
     def __post_init__(self) -> None:
         if self.state not in ENDS:

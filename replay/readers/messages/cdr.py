@@ -28,6 +28,7 @@ MAX_PROGRAMS = 64
 GIVE_UP = 500
 PATIENCE = 2_000_000
 _WORTH = 0.25
+_TRIES = 4
 
 
 @dataclass
@@ -111,6 +112,7 @@ class Decoder:
     room: dict[Place, int] = field(default_factory=dict)
     tried: int = 0
     spent: int = 0
+    wide: int = 0
     count: NDArray[np.int64] = field(default_factory=lambda: np.arange(0))
 
     def decode(
@@ -211,11 +213,12 @@ class Decoder:
 
     def _compile(self, layout: Layout) -> _Walked | None:
         """Compile a program and put it before all others; None where there are too many or it would be too wide."""
-        if len(self.walked) >= MAX_PROGRAMS:
+        if len(self.walked) >= MAX_PROGRAMS or self.wide >= _TRIES:
             return None
         try:
             program = Compiler(self.kind, layout, self.room).run()
         except TooWide:
+            self.wide += 1
             return None
         plan = _Walked(program, layout.skipped, self.store)
         self.walked = [plan, *(w for w in self.walked if w.program.shape != program.shape)]

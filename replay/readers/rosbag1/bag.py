@@ -59,6 +59,8 @@ class Bag:
         In the order of the file.
     loose : list[BagRecords]
         Walks that met messages outside of chunks.
+    renamed : dict[int, tuple[str, str]]
+        Topic, and the one that the publisher's own header names, of connections where they differ.
     listed : set[int]
         Connections that stand outside of chunks, which is in the index section.
     absent : dict[int, int]
@@ -73,6 +75,7 @@ class Bag:
     loose: list[BagRecords] = field(default_factory=list)
     listed: set[int] = field(default_factory=set)
     absent: dict[int, int] = field(default_factory=dict)
+    renamed: dict[int, tuple[str, str]] = field(default_factory=dict)
     raw: dict[int, bytes] = field(default_factory=dict)
     told: int = 0
 

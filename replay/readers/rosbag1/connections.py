@@ -39,10 +39,13 @@ def take_connection(bag: Bag, data: NDArray[np.uint8], records: BagRecords, i: i
         inner = fields_of(raw[body - head :])
         text = inner["message_definition"].decode("utf-8", "replace")
         name = inner["type"].decode("ascii", "replace")
+        own = inner.get("topic", b"").decode("utf-8", "replace")
         connection = Connection(topic, name, "ros1", "ros1msg", text)
     except DAMAGED as error:
         bag.lost(f"a record of connection {number} is damaged ({type(error).__name__})")
         return
+    if own and own != topic:  # tools that rename topics leave the publisher's header as it was; so does damage
+        bag.renamed[number] = topic, own
     known = bag.connections.get(number)
     bag.raw.setdefault(number, raw)
     if known is None:

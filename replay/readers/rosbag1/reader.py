@@ -228,6 +228,12 @@ class _Reading:
         bag, totals = self.bag, self.found + self.skipped
         if bag.report.damage and not bag.connections and not totals:
             raise LogError(f"{bag.path} holds nothing that can be read: {'; '.join(bag.report.damage[:3])}")
+        if bag.renamed:
+            pairs = [f"{topic[:80]} (there {own[:80]})" for topic, own in list(bag.renamed.values())[:6]]
+            bag.report.note(
+                f"{bag.path.name}: {len(bag.renamed)} topics have another name than in their publishers' headers, because "
+                f"they were renamed or are damaged: {', '.join(pairs)}{' and more' if len(bag.renamed) > 6 else ''}"
+            )
         beyond: list[str] = []
         for number in sorted(self.stated.keys() | self.found.keys()):
             stated, found = self.stated[number], self.found[number]

@@ -153,6 +153,8 @@ def _scan(data, start, stop, op, head, body, size, conn, stamp):  # type: ignore
 
 def end_of_chunk(data: NDArray[np.uint8], body: int) -> int:
     """Where the record behind a chunk starts whose length is not to be trusted; the end of the data without one."""
+    if body < 0:
+        raise IndexError(f"byte {body} is not one of {len(data)} bytes")
     return int(_find(data, body, len(data), len(data)))
 
 
@@ -167,9 +169,12 @@ def scan_bag(data: NDArray[np.uint8], start: int = 0, stop: int | None = None) -
     data : NDArray[np.uint8], shape (b,)
         Bytes of the bag or chunk.
     start, stop : int
-        Where the walk starts and ends [bytes].
+        Where the walk starts and ends [bytes]; what of it leaves the data is not walked.
     """
-    data, stop = plain(data), len(data) if stop is None else stop
+    data = plain(data)
+    stop = len(data) if stop is None else min(stop, len(data))
+    if start < 0:
+        raise IndexError(f"byte {start} is not one of {len(data)} bytes")
     room = max(64, min(1 << 16, (stop - start) // 64))
     while True:
         op = np.empty(room, np.uint8)

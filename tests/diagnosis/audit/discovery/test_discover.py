@@ -8,12 +8,10 @@ import pytest
 from rosbags.rosbag1 import Writer
 from rosbags.typesys import Stores, get_typestore
 
-from diagnosis.audit.discovery import listing
+from diagnosis.audit.discovery.apart import HELPER, Span
 from diagnosis.audit.discovery.discover import Discovery, discover
 from diagnosis.audit.discovery.identity import fallback_id
 from replay.log.file_types import LOG_ENDINGS
-from replay.log.raw_log import LogSummary
-from replay.log.source_options import SourceOptions
 
 STORE = get_typestore(Stores.ROS1_NOETIC)
 T0 = 1_700_000_000
@@ -164,13 +162,13 @@ def test_numbered_missions_are_looked_at_no_further_than_to_tell(
     for i in range(5):
         bag(tmp_path / f"run_{i}.bag", 600.0 * i)
     looked = []
-    look = listing.summarise_log
+    look = HELPER.span
 
-    def counted(path: Path, options: SourceOptions) -> LogSummary:
-        looked.append(path.name)
-        return look(path, options)
+    def counted(path: str) -> Span:
+        looked.append(Path(path).name)
+        return look(path)
 
-    monkeypatch.setattr(listing, "summarise_log", counted)
+    monkeypatch.setattr(HELPER, "span", counted)
     assert len(discover([str(tmp_path)]).missions) == 5
     assert looked == ["run_0.bag", "run_1.bag"]
 

@@ -11,12 +11,13 @@ from typing import Any
 import fsspec
 import pytest
 
+from diagnosis.audit.discovery.apart import span_of
 from diagnosis.audit.discovery.discover import discover
 from diagnosis.audit.discovery.inspect_remote import inspect_remotely, logs_at
 from diagnosis.audit.discovery.listing import Entry
 from diagnosis.audit.discovery.missions import MissionSource
 from diagnosis.audit.discovery.remote import RemotePlace, file_system
-from diagnosis.audit.discovery.remote_mcap import summarised
+from diagnosis.audit.discovery.remote_mcap import span_behind
 from diagnosis.audit.discovery.staging import machine_at, stage
 from diagnosis.audit.store.objects import Objects
 from replay.errors import ConfigError, LogError
@@ -246,9 +247,7 @@ def test_the_index_of_a_large_mcap_file_takes_few_requests(bucket: Bucket) -> No
     assert [r.split()[0] for r in met] == ["GET", "GET"]
     assert all("bytes=" in r for r in met)
     system, name = file_system(url)
-    assert replace(summarised(system, name, logs[0].bytes), source="") == replace(
-        summarise_log(path, SourceOptions()), source=""
-    )
+    assert span_behind(system, name, logs[0].bytes) == span_of(summarise_log(path, SourceOptions()))
 
 
 def test_what_an_index_does_not_tell_is_read_whole(memory: Any) -> None:
@@ -276,7 +275,7 @@ def test_a_damaged_mcap_file_has_no_outline(memory: Any) -> None:
     memory.pipe_file("/fleet/cut.mcap", (SAMPLES / "paper.mcap").read_bytes()[: 2 << 20])
     for name, size in (("cut", 2 << 20), ("missing", 100)):
         with pytest.raises(LogError):
-            summarised(memory, f"/fleet/{name}.mcap", size)
+            span_behind(memory, f"/fleet/{name}.mcap", size)
 
 
 def test_parts_behind_urls_are_one_mission_where_they_go_on(memory: Any) -> None:

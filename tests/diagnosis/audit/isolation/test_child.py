@@ -33,7 +33,7 @@ SHORT = Limits(memory_mb=150, wall_s=0.5)
 POISON = [
     ("fine", "ok", ""),
     ("damaged", "degraded", "12 bytes are missing"),
-    ("kill", "crashed", "ended from outside by SIGKILL"),
+    ("kill", "unreadable", "ended from outside by SIGKILL; audit again"),
     ("hang", "timeout", "longer than 0.5 s; allow more with --timeout"),
     ("raise", "crashed", "internal error: KeyError: 'topic' (in poison.py, line "),
     ("segfault", "crashed", "ended with SIGSEGV (in string_at"),
@@ -93,7 +93,9 @@ def test_a_child_ends_with_the_server_that_started_it(tmp_path: Path) -> None:
     assert server._process is not None
     os.kill(server._process.pid, signal.SIGKILL)
     thread.join()
-    assert [(e.state, e.reason) for e in ends] == [("crashed", "the process that starts missions ended with SIGKILL")]
+    assert [(e.state, e.reason) for e in ends] == [
+        ("unreadable", "the process that starts missions ended with SIGKILL")
+    ]
     _wait_until_gone(child)
     again = run_isolated(work_of("fine", _made(tmp_path / "again")), LIMITS, server)  # it starts anew
     server.close()
