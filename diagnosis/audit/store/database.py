@@ -202,7 +202,7 @@ def unless_damaged(path: Path) -> Iterator[None]:
         raise
     except Exception as error:
         with closing(Database(path, read_only=True)) as database:
-            found = database.rows("PRAGMA quick_check(1)")[0][0]
+            found = database.rows("PRAGMA integrity_check(1)")[0][0]
             if found != "ok":
                 raise database.plain(sqlite3.DatabaseError(str(found)[:120])) from error
         raise
