@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import re
 import shlex
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
@@ -68,7 +68,11 @@ class Ending:
 
 def endings(store: Store, missions: Iterable[MissionSource]) -> list[Ending]:
     """Ends of missions, in the order of their names; those without a result are left out."""
-    wanted = {mission.name: mission.files for mission in missions}
+    with store.database.decoding():
+        return _endings(store, {mission.name: mission.files for mission in missions})
+
+
+def _endings(store: Store, wanted: Mapping[str, Sequence[str]]) -> list[Ending]:
     faults: dict[int, list[Severity]] = {}
     for row in store.database.rows("SELECT result, severity FROM fault"):
         faults.setdefault(row[0], []).append(Severity(row[1]))

@@ -16,6 +16,7 @@ from diagnosis.audit.fleet.news import first_runs
 from diagnosis.audit.fleet.read import Mission, content_mark, read_missions, read_run
 from diagnosis.audit.fleet.table import fleet_csv
 from diagnosis.audit.fleet.trend_types import Axis
+from diagnosis.audit.store.database import unless_damaged
 from diagnosis.audit.store.folders import holds_report
 from diagnosis.audit.store.keys import Key
 from diagnosis.audit.store.store import FILE_NAME
@@ -60,17 +61,18 @@ def write_fleet(store_path: Path, out: Path, *, baseline: Path | None = None, ax
 
     if baseline is not None:
         check_baseline(baseline, store_path)
-    mark = content_mark(store_path)  # first: what is written meanwhile makes the page an old one
-    fleet = load_fleet(store_path, out, axis)
-    fleet = replace(fleet, first_runs=first_runs(out / "fleet.json", fleet.missions, fleet.run))
-    document = fleet_json(fleet, baseline)
-    document["mark"] = mark
-    files = FleetFiles(out / "fleet.html", out / "fleet.json", out / "fleet.csv")
-    texts = {
-        files.json: orjson.dumps(document, option=orjson.OPT_APPEND_NEWLINE),
-        files.csv: fleet_csv(document).encode("utf-8-sig", "backslashreplace"),
-        files.html: build_fleet_page(document).encode("utf-8", "backslashreplace"),
-    }
+    with unless_damaged(_store(store_path)):
+        mark = content_mark(store_path)  # first: what is written meanwhile makes the page an old one
+        fleet = load_fleet(store_path, out, axis)
+        fleet = replace(fleet, first_runs=first_runs(out / "fleet.json", fleet.missions, fleet.run))
+        document = fleet_json(fleet, baseline)
+        document["mark"] = mark
+        files = FleetFiles(out / "fleet.html", out / "fleet.json", out / "fleet.csv")
+        texts = {
+            files.json: orjson.dumps(document, option=orjson.OPT_APPEND_NEWLINE),
+            files.csv: fleet_csv(document).encode("utf-8-sig", "backslashreplace"),
+            files.html: build_fleet_page(document).encode("utf-8", "backslashreplace"),
+        }
     for path, content in texts.items():
         with atomic_path(path) as temporary:
             temporary.write_bytes(content)

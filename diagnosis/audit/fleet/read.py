@@ -131,7 +131,7 @@ def read_missions(store: Path) -> list[Mission]:
     OutputError
         Where there is no store, it is damaged, or of another kind or version.
     """
-    with closing(_opened(store)) as db, db.snapshot():
+    with closing(_opened(store)) as db, db.snapshot(), db.decoding():
         faults: dict[int, list[FoundFault]] = defaultdict(list)
         for row in db.rows(_FAULTS):
             r, name, component, kind, side, mode, severity, seconds, e, low, high, p = row
@@ -176,7 +176,8 @@ def read_run(store: Path) -> int:
     """
     with closing(_opened(store)) as db:
         rows = db.rows("SELECT value FROM meta WHERE name = 'run'")
-        return int(rows[0][0]) if rows else 0
+        with db.decoding():
+            return int(rows[0][0]) if rows else 0
 
 
 def content_mark(store: Path) -> str:

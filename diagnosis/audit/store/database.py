@@ -7,10 +7,10 @@ import sqlite3
 import threading
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import closing, contextmanager, suppress
 from pathlib import Path
 
-from replay.errors import OutputError
+from replay.errors import MfhcaError, OutputError
 from replay.version import __version__
 
 SCHEMA = "2"
@@ -35,7 +35,7 @@ class Database:
             if not read_only:
                 path.parent.mkdir(parents=True, exist_ok=True)
             self._open(read_only)
-        except (sqlite3.Error, OSError) as error:
+        except (sqlite3.Error, OSError, UnicodeDecodeError) as error:
             raise self.plain(error) from error
 
     def _open(self, read_only: bool) -> None:
@@ -114,7 +114,7 @@ class Database:
                     with suppress(sqlite3.Error):
                         self._connection.execute("ROLLBACK")
                     raise
-            except sqlite3.Error as error:
+            except (sqlite3.Error, UnicodeDecodeError) as error:
                 raise self.plain(error) from error
 
     @contextmanager
@@ -138,8 +138,26 @@ class Database:
         with self._lock:
             try:
                 return self._connection.execute(query, parameters).fetchall()
-            except sqlite3.Error as error:
+            except (sqlite3.Error, UnicodeDecodeError) as error:
                 raise self.plain(error) from error
+
+    @contextmanager
+    def decoding(self) -> Iterator[None]:
+        """Turn what a row of damaged values leads to into the store's own error.
+
+        Raises
+        ------
+        OutputError
+            Where a value is none that this tool writes.
+        """
+        try:
+            yield
+        except (ValueError, TypeError, KeyError, IndexError, AttributeError, OverflowError) as error:
+            text = " ".join(str(error).split())[:120]
+            raise OutputError(
+                f"{self.path}: is damaged (a row holds what no audit writes: {text}); move it away and audit again: results "
+                "in the folder results/ are kept"
+            ) from error
 
     def close(self) -> None:
         """Close the connection; what was written stays."""
@@ -160,11 +178,34 @@ class Database:
             )
         elif isinstance(error, sqlite3.OperationalError) and "readonly" in text:
             what = "cannot be written (read-only); give another output folder"
-        elif isinstance(error, sqlite3.DatabaseError) and not isinstance(error, sqlite3.IntegrityError):
+        elif isinstance(error, sqlite3.DatabaseError | UnicodeDecodeError) and not isinstance(
+            error, sqlite3.IntegrityError
+        ):
             what = f"is damaged or is not a store ({text}); move it away and audit again: results in the folder results/ are kept"
         else:
             what = f"does not take the row ({text})"
         return OutputError(f"{self.path}: {what}")
+
+
+@contextmanager
+def unless_damaged(path: Path) -> Iterator[None]:
+    """Work on what was read from a store: where that fails, and SQLite finds the store damaged, this is the reason.
+
+    Raises
+    ------
+    OutputError
+        Where the work failed and the store is damaged; else the error stays as it is.
+    """
+    try:
+        yield
+    except MfhcaError:
+        raise
+    except Exception as error:
+        with closing(Database(path, read_only=True)) as database:
+            found = database.rows("PRAGMA integrity_check(1)")[0][0]
+            if found != "ok":
+                raise database.plain(sqlite3.DatabaseError(str(found)[:120])) from error
+        raise
 
 
 def _statements(script: str) -> Iterator[str]:
@@ -178,7 +219,7 @@ def _statements(script: str) -> Iterator[str]:
 
 
 def _busy(error: sqlite3.OperationalError) -> bool:
-    return (error.sqlite_errorcode & 0xFF) in (sqlite3.SQLITE_BUSY, sqlite3.SQLITE_LOCKED)
+    return (getattr(error, "sqlite_errorcode", 0) & 0xFF) in (sqlite3.SQLITE_BUSY, sqlite3.SQLITE_LOCKED)
 
 
 def _free(path: Path) -> str:

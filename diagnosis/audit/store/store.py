@@ -53,7 +53,8 @@ class Store:
         self.database = Database(path, read_only=read_only)
         self._objects = Objects(str(self.folder / RESULTS)) if objects and not read_only else None
         self._reasons: dict[tuple[int, str], ReasonTemplate] = {}
-        self.run = int(self.database.rows("SELECT value FROM meta WHERE name = 'run'")[0][0])
+        with self.database.decoding():
+            self.run = int(self.database.rows("SELECT value FROM meta WHERE name = 'run'")[0][0])
 
     @classmethod
     def open(cls, path: Path, *, read_only: bool = False) -> Self:
@@ -80,7 +81,8 @@ class Store:
         """Count this audit; its number marks the missions that it sees."""
         with self.database.transaction() as connection:
             connection.execute("UPDATE meta SET value = CAST(value AS INTEGER) + 1 WHERE name = 'run'")
-            self.run = int(connection.execute("SELECT value FROM meta WHERE name = 'run'").fetchone()[0])
+            with self.database.decoding():
+                self.run = int(connection.execute("SELECT value FROM meta WHERE name = 'run'").fetchone()[0])
         return self.run
 
     def adopt(self, missions: Iterable[MissionSource], roots: Sequence[str] = ()) -> tuple[MissionSource, ...]:
@@ -102,7 +104,7 @@ class Store:
         from diagnosis.audit.store.adoption import adopt
 
         given = [(mission, self._files(mission)) for mission in missions]
-        with self.database.transaction() as connection:
+        with self.database.decoding(), self.database.transaction() as connection:
             names = adopt(connection, given, [self.relative(r) for r in roots], self.run, self._real)
         return tuple(replace(mission, name=name) for (mission, _), name in zip(given, names, strict=True))
 
@@ -122,7 +124,8 @@ class Store:
         """Result of a key, whatever its state."""
         query = f"SELECT {_STORED} FROM result WHERE {_BY_KEY}"
         found = self.database.rows(query, (key.log_hash, key.config_hash, key.version))
-        return result_of_row(found[0]) if found else None
+        with self.database.decoding():
+            return result_of_row(found[0]) if found else None
 
     def record(
         self,
@@ -210,7 +213,10 @@ class Store:
         """Reason of a result for one of the missions that share it: it names that mission's files, not its copies'."""
         if (result, reason) not in self._reasons:
             rows = self.database.rows("SELECT files FROM mission WHERE result = ?", (result,))
-            self._reasons[result, reason] = reason_template(reason, (json.loads(row[0]) for row in rows), self._real)
+            with self.database.decoding():
+                self._reasons[result, reason] = reason_template(
+                    reason, (json.loads(row[0]) for row in rows), self._real
+                )
         return self._reasons[result, reason].for_files(files)
 
     def missions(self) -> list[StoredMission]:
@@ -219,7 +225,9 @@ class Store:
             "SELECT m.name, m.files, m.bytes, m.seen, m.gone, r.* FROM mission m LEFT JOIN result r ON r.id = m.result "
             "ORDER BY m.name"
         )
-        return [mission_of_row(row) for row in self.database.rows(query)]
+        rows = self.database.rows(query)
+        with self.database.decoding():
+            return [mission_of_row(row) for row in rows]
 
     def missions_of(self, machine_id: str) -> list[StoredMission]:
         """Missions of one machine in the order of the log's clock; copies once, under their first name."""
@@ -228,7 +236,9 @@ class Store:
             "ON m.result = r.id AND m.gone IS NULL WHERE r.machine_id = ? GROUP BY r.id "
             "ORDER BY r.start_ns IS NULL, r.start_ns, 1"
         )
-        return [mission_of_row(row) for row in self.database.rows(query, (machine_id,))]
+        rows = self.database.rows(query, (machine_id,))
+        with self.database.decoding():
+            return [mission_of_row(row) for row in rows]
 
     def counts(self, run: int | None = None) -> dict[MissionState, int]:
         """Number of missions per state, of those that are there and were seen in or after a run (None: in any)."""
@@ -236,12 +246,16 @@ class Store:
             "SELECT r.state, count(*) FROM mission m JOIN result r ON r.id = m.result "
             "WHERE m.gone IS NULL AND m.seen >= ? GROUP BY 1 ORDER BY 1"
         )
-        return {MissionState(row[0]): row[1] for row in self.database.rows(query, (run or 0,))}
+        rows = self.database.rows(query, (run or 0,))
+        with self.database.decoding():
+            return {MissionState(row[0]): row[1] for row in rows}
 
     def object_names(self) -> set[str]:
         """Names of the result objects of all recorded attempts."""
         query = "SELECT log_hash, config_hash, version, number FROM attempt JOIN result ON id = result"
-        return {attempt_name(Key(*row[:3]).stem, row[3]) for row in map(tuple, self.database.rows(query))}
+        rows = self.database.rows(query)
+        with self.database.decoding():
+            return {attempt_name(Key(*row[:3]).stem, row[3]) for row in map(tuple, rows)}
 
     def relative(self, path: str) -> str:
         """Path as the store holds it: relative to its folder, so that both may move together; URLs stay."""

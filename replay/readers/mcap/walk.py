@@ -32,6 +32,8 @@ def walk_file(file: McapFile) -> None:
     ends = np.flatnonzero(rows[:, 0] == fmt.DATA_END)
     inside, behind = (rows[: ends[-1] + 1], rows[ends[-1] + 1 :]) if len(ends) else (rows, rows[:0])
     _say_ending(file, rows, closed)
+    if closed:
+        _check_footer(file, int(rows[-1, 1]), bool(len(ends)))
     if len(behind) > closed and (file.summary is None or not file.summary.sound):
         _mend_summary(file, behind, closed)
     if file.summary is not None:
@@ -72,6 +74,17 @@ def _say_ending(file: McapFile, rows: NDArray[np.int64], closed: bool) -> None:
         f"{file.path.name} ends without a footer ({where}): {len(file.data) - last} bytes after byte {last} "
         "hold no complete record"
     )
+
+
+def _check_footer(file: McapFile, place: int, ended: bool) -> None:
+    """Say where a footer contradicts what stands before it, as where the middle of a file is lost and its end is there."""
+    stated = int.from_bytes(file.data[place + 9 : place + 17].tobytes(), "little")
+    if stated and file.summary is None:
+        file.lost(
+            "summary", f"its footer names a summary at byte {stated}, where none is: what stood before it may be lost"
+        )
+    if not ended:
+        file.lost("record", "the record that ends its data is missing or damaged: what stood there may be lost")
 
 
 def _take_rows(file: McapFile, rows: NDArray[np.int64], closed: bool) -> None:

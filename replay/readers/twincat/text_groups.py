@@ -18,6 +18,7 @@ from replay.readers.tables.row_kernel import MISSING, REAL
 from replay.readers.tables.time_cells import TimeBase
 from replay.readers.twincat.text_header import HOW, Scope
 
+_LONGEST_NS = 1e15  # no channel is sampled more seldom than every eleven days
 _FULL_TIME = 10**15
 _NAN = np.array([np.nan]).view(np.int64)[0]
 _NEAR = 0.02
@@ -195,6 +196,12 @@ class Repeats:
         try:
             own = float(period_cell(self.scope, column).replace(",", ".")) * 1e6
         except ValueError:
+            own = 0.0
+        if not 0.0 <= own <= _LONGEST_NS:
+            self.report.note(
+                f"{self.scope.file.path.name}: the sample time {period_cell(self.scope, column)[:20]!r} of {label} is none; it "
+                "was not used"
+            )
             own = 0.0
         ratio = round(own / step) if step > 0 else 0
         if own and ratio < 2:

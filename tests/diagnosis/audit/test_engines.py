@@ -24,7 +24,7 @@ from tests.diagnosis.audit.samples import asked_for, missions, run
 POISON = ("kill", "hang", "raise", "segfault", "exhaust")
 WORKS = ("fine-1", *POISON, "fine-2", "damaged", "broken")
 TABLE = {
-    "fine-1": "ok", "fine-2": "ok", "damaged": "degraded", "broken": "unreadable", "kill": "crashed", "hang": "timeout",
+    "fine-1": "ok", "fine-2": "ok", "damaged": "degraded", "broken": "unreadable", "kill": "unreadable", "hang": "timeout",
     "raise": "crashed", "segfault": "crashed", "exhaust": "out_of_memory",
 }  # fmt: skip
 

@@ -109,7 +109,7 @@ def test_an_attempt_whose_row_was_not_written_is_found(audited: Path, make_key: 
         ({"mission": {"name": "m", "files": [], "bytes": 1}}, "files or time of making"),
         (
             {"mission": {"name": "m", "files": [{"path": "m"}], "bytes": "many"}},
-            "mission.bytes: text found",
+            "mission.files[0]: key 'size' expected, not found",
         ),
         ({"attempt": {"number": 1, "state": "fine", "reason": ""}}, "state 'fine'"),
         ({"attempt": {"number": 1, "state": "ok", "reason": ""}}, "attempt: key 'wall_s' expected, not found"),
