@@ -86,7 +86,7 @@ def test_a_failed_audit_of_a_changed_log_leaves_the_earlier_report(tmp_path: Pat
     before = (tmp_path / "out" / "missions" / "fine-1" / "report.json").read_bytes()
     (tmp_path / "logs" / "fine-1.bag").write_text("kill", encoding="utf-8")
     ends, _ = run(missions(tmp_path / "logs", "fine-1"), asked_for(tmp_path / "out"))
-    assert (ends["fine-1"].state, ends["fine-1"].report) == ("crashed", None)
+    assert (ends["fine-1"].state, ends["fine-1"].report) == ("unreadable", None)
     assert (tmp_path / "out" / "missions" / "fine-1" / "report.json").read_bytes() == before
 
 

@@ -22,7 +22,7 @@ SLOW = FAST[::10].copy()
 
 
 def signal(name: str, stamps: np.ndarray, seed: int) -> Signal:
-    values = np.random.default_rng(seed).standard_normal(stamps.size)
+    values = 0.3 * np.random.default_rng(seed).standard_normal(stamps.size)
     return Signal(name, stamps, values, SignalSource(column="x"), "drive", False)
 
 
