@@ -28,6 +28,7 @@ _COSTS = {
     "gnss.speed": "the speed of the body rests on positions, where they are logged",
     "odom.x": "no speed of the body by odometry to judge the wheels by; the path is drawn from GNSS, if at all",
     "odom.y": "no speed of the body by odometry to judge the wheels by; the path is drawn from GNSS, if at all",
+    "odom.v": "the speed of the body by odometry rests on its positions, where they are logged",
     "odom.yaw": "no effect on the verdict: it is only shown beside the evidence",
 }
 

@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from diagnosis.channels.standstill import not_followed
-from diagnosis.response.beside import views
+from diagnosis.response.beside import Bodies, views
+from diagnosis.response.body import BodySpeed
 from diagnosis.response.channel import holds_of, samples_of
 from diagnosis.response.findings import Spell, Wheel, finding_of, spells_of, spikes_of, where_asked
 from diagnosis.response.identification import identify_response, without_command
@@ -50,7 +51,12 @@ class Judgement:
 
 
 def assess_response(
-    data: Mapping[str, FollowerData], geometry: Geometry | None, yaw: Array | None, limits: Limits, dt: float
+    data: Mapping[str, FollowerData],
+    geometry: Geometry | None,
+    yaw: Array | None,
+    limits: Limits,
+    dt: float,
+    speeds: tuple[BodySpeed, ...] = (),
 ) -> Judgement:
     """Judge drives by their response.
 
@@ -66,6 +72,8 @@ def assess_response(
         ``driving_speed``.
     dt : float
         Step [s].
+    speeds : tuple[BodySpeed, ...]
+        The body's speed by its own sensors, in blocks of `BLOCK_S`.
     """
     if not data:
         return Judgement({}, ())
@@ -81,14 +89,15 @@ def assess_response(
         return Judgement({}, standstills(idle, dt))
     holds = {w: holds_of(j.wheel.samples, _MOVES * limits.driving_speed, dt) for w, j in found.items()}
     found = {w: j._replace(wheel=j.wheel._replace(habit=_habit(w, holds))) for w, j in found.items()}
-    turned = None if yaw is None else cells(yaw, width)
-    beside = views(list(found), {w: j.wheel.blocks for w, j in found.items()}, geometry, turned)
-    judged = {w: _judge(j, beside.get(w), found, w, dt, width) for w, j in found.items()}
+    bodies = Bodies(speeds, None if yaw is None else cells(yaw, width), width * dt)
+    names = {w: j.data.name for w, j in found.items()}
+    beside, left_notes = views(names, {w: j.wheel.blocks for w, j in found.items()}, geometry, bodies)
+    judged = {w: _judge(j, beside.get(w), dt, width) for w, j in found.items()}
     kept = {w: [s for s in j.spells if not _others_fault(s, w, judged)] for w, j in judged.items()}
     least = max(1, round(_LEAST_S / BLOCK_S))
     kept = {w: where_asked(spells, _asked(judged[w], limits), least) for w, spells in kept.items()}
     parts = {w: _sides(j, kept[w], left_out, limits, dt) for w, j in judged.items()}
-    remarks = otherwise(judged, width * dt)
+    remarks = (*otherwise(judged, width * dt), *left_notes)
     for w, text in unlike(judged).items():
         parts[w] = _doubted(parts[w][0], text), parts[w][1]
     for w, (sensor, drive) in parts.items():
@@ -130,7 +139,7 @@ def _wheels(
     return out
 
 
-def _judge(one: Judged, beside: Beside | None, found: Mapping[str, Judged], w: str, dt: float, width: int) -> Judged:
+def _judge(one: Judged, beside: Beside | None, dt: float, width: int) -> Judged:
     block_s, blocks = width * dt, one.wheel.blocks
     if beside is not None:  # what shakes other wheels too is no sensor's noise
         blocks = blocks._replace(usual=np.maximum(blocks.usual, beside.rough))
@@ -139,12 +148,11 @@ def _judge(one: Judged, beside: Beside | None, found: Mapping[str, Judged], w: s
     enters, leaves = np.full((2, len(score)), [[-np.expm1(-block_s / t)] for t in (_MEAN_HEALTHY_S, _MEAN_FAULTY_S)])
     enters[jumped], leaves[jumped] = _AT_A_JUMP
     p = posterior(score, enters, leaves)
-    others = " and ".join(j.data.name for o, j in found.items() if o != w) if beside is not None else ""
     return one._replace(
         posterior=p,
         spells=spells_of(p, block_s),
         speed=None if beside is None else beside.speed,
-        wheel=one.wheel._replace(compared=others),
+        wheel=one.wheel._replace(compared="" if beside is None else beside.compared),
     )
 
 

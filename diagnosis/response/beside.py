@@ -1,12 +1,14 @@
-"""Other views of a wheel's speed: wheels of its side, and the opposite side with the yaw rate between them."""
+"""Other views of a wheel's speed: wheels of its side, the opposite side with the yaw rate between them, sensors of the body."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from diagnosis.response.body import BodySpeed, View, made_of, view_of
 from diagnosis.response.models import Beside, Blocks
 from replay.machine.geometry import Geometry
 
@@ -16,42 +18,105 @@ _LEAST_BLOCKS = 80
 _ALIKE = 0.4  # median misfit, of the usual speed, beyond which two wheels do not move together
 _SHARE = 0.03  # of the speed
 _BLAME_BLOCKS = 9  # over which it is asked whose command misfit is the larger
+_OWN_MISFIT = (
+    1.5  # times the usual misfit beside the command: from there on a misfit beside the body's sensor is the wheel's
+)
+
+
+class Bodies(NamedTuple):
+    """Sensors of the body.
+
+    Attributes
+    ----------
+    speeds : tuple[BodySpeed, ...]
+        Its speed.
+    yaw : Array or None, shape (b,)
+        Measured yaw rate [rad/s].
+    block_s : float
+        Length of a block [s].
+    """
+
+    speeds: tuple[BodySpeed, ...] = ()
+    yaw: Array | None = None
+    block_s: float = 0.25
 
 
 def views(
-    wheels: Sequence[str], blocks: Mapping[str, Blocks], geometry: Geometry | None, yaw: Array | None
-) -> dict[str, Beside]:
-    """Views of each wheel that has one.
+    wheels: Mapping[str, str], blocks: Mapping[str, Blocks], geometry: Geometry | None, bodies: Bodies
+) -> tuple[dict[str, Beside], tuple[str, ...]]:
+    """Views of each wheel that has one, and a sentence on each sensor of the body that was left out.
 
     Parameters
     ----------
-    wheels : Sequence[str]
-        Wheels with blocks.
+    wheels : Mapping[str, str]
+        Channel of each wheel with blocks.
     blocks : Mapping[str, Blocks]
         By wheel.
     geometry : Geometry or None
         Says which wheels are on one side.
-    yaw : Array or None, shape (b,)
-        Measured yaw rate [rad/s].
+    bodies : Bodies
+        Sensors of the body.
     """
+    means = {w: blocks[w].mean for w in wheels}
+    made = [b for b in bodies.speeds if b.name == "odometry" and made_of(b, list(means.values()))]
+    notes = tuple(f"Body sensor {b.name} left out: it is computed from the wheels' own speeds." for b in made)
+    kept = [b for b in bodies.speeds if b not in made]
+    by_body = {w: v for w in wheels if (v := view_of(means[w], kept, means, bodies.yaw, bodies.block_s)) is not None}
     out: dict[str, Beside] = {}
     for w in wheels:
-        others = [o for o in wheels if o != w and _same_side(w, o, geometry)]
-        speeds = [s for o in others if (s := _scaled(blocks[w].mean, blocks[o].mean)) is not None]
-        speed: Array | None = None
-        if speeds:
-            speed = np.asarray(np.median(np.array(speeds), axis=0))
-        elif yaw is not None and (far := [o for o in wheels if o != w and not _same_side(w, o, geometry)]):
-            others = far
-            mean = np.asarray(np.mean([blocks[o].mean for o in far], axis=0))
-            speed = _turned(blocks[w].mean, mean, yaw)
-        if speed is None:
-            continue
-        noise = _noise(blocks[w], speed)
-        blame = np.ones(speed.size) if len(speeds) > 1 else _blame(blocks[w], [blocks[o] for o in others])
-        rough = np.asarray(np.max([blocks[o].rough for o in others], axis=0))
-        out[w] = Beside(speed, noise, blame, rough)
-    return out
+        found = _by_wheels(w, wheels, blocks, geometry, bodies.yaw, by_body)
+        found = _by_body(w, wheels, blocks, by_body) if found is None else found
+        if found is not None:
+            out[w] = found
+    return out, notes
+
+
+def _by_wheels(
+    w: str,
+    wheels: Mapping[str, str],
+    blocks: Mapping[str, Blocks],
+    geometry: Geometry | None,
+    yaw: Array | None,
+    by_body: Mapping[str, View],
+) -> Beside | None:
+    """What the other wheels say of one."""
+    others = [o for o in wheels if o != w and _same_side(w, o, geometry)]
+    speeds = [s for o in others if (s := _scaled(blocks[w].mean, blocks[o].mean)) is not None]
+    speed: Array | None = None
+    if speeds:
+        speed = np.asarray(np.median(np.array(speeds), axis=0))
+    elif yaw is not None and (far := [o for o in wheels if o != w and not _same_side(w, o, geometry)]):
+        others = far
+        mean = np.asarray(np.mean([blocks[o].mean for o in far], axis=0))
+        speed = _turned(blocks[w].mean, mean, yaw)
+    if speed is None:
+        return None
+    if len(speeds) > 1:
+        blame = np.ones(speed.size)
+    elif all(o in by_body for o in (w, *others)):
+        blame = _blame([_off_body(blocks[o], by_body[o]) for o in (w, *others)])
+    else:
+        blame = _blame([_off_command(blocks[o]) for o in (w, *others)])
+    rough = np.asarray(np.max([blocks[o].rough for o in others], axis=0))
+    return Beside(speed, _noise(blocks[w], speed), blame, rough, " and ".join(wheels[o] for o in others))
+
+
+def _by_body(
+    w: str, wheels: Mapping[str, str], blocks: Mapping[str, Blocks], by_body: Mapping[str, View]
+) -> Beside | None:
+    """What a sensor of the body says of a wheel; the misfit is the wheel's own where command, or other wheels, say so too."""
+    if w not in by_body:
+        return None
+    view, own = by_body[w], blocks[w]
+    rivals = [o for o in wheels if o != w and o in by_body]
+    if np.isfinite(own.low).any():
+        blame = _blame([_off_command(own), np.full(own.mean.size, _OWN_MISFIT)])
+    elif rivals:
+        blame = _blame([_off_body(blocks[o], by_body[o]) for o in (w, *rivals)])
+    else:
+        return None
+    noise = _noise(own, view.speed) * np.sqrt(view.reach)
+    return Beside(view.speed, noise, blame, np.zeros(own.mean.size), f"{view.name}")
 
 
 def _same_side(a: str, b: str, geometry: Geometry | None) -> bool:
@@ -98,9 +163,18 @@ def _noise(blocks: Blocks, speed: Array) -> Array:
     )
 
 
-def _blame(own: Blocks, others: Sequence[Blocks]) -> Array:
-    """Share of a misfit that is the wheel's own, by which of them is further off its command."""
-    away = [np.minimum(np.abs(b.mean - np.clip(b.mean, b.low, b.high)) / b.noise, 8.0) for b in (own, *others)]
+def _off_command(blocks: Blocks) -> Array:
+    """Misfit beside the command, in usual ones."""
+    return np.abs(blocks.mean - np.clip(blocks.mean, blocks.low, blocks.high)) / blocks.noise
+
+
+def _off_body(blocks: Blocks, view: View) -> Array:
+    """Misfit beside a sensor of the body, in usual ones."""
+    return np.abs(blocks.mean - view.speed) / _noise(blocks, view.speed)
+
+
+def _blame(away: Sequence[Array]) -> Array:
+    """Share of a misfit that is the first one's own, by which of them is further off what it should be."""
     kernel = np.ones(_BLAME_BLOCKS) / _BLAME_BLOCKS
-    smooth = [np.convolve(np.nan_to_num(a), kernel, mode="same") for a in away]
+    smooth = [np.convolve(np.nan_to_num(np.minimum(a, 8.0)), kernel, mode="same") for a in away]
     return np.asarray(1.0 / (1.0 + np.exp(-4.0 * (smooth[0] - np.max(smooth[1:], axis=0)))))

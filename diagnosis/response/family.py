@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from diagnosis.evidence import ACTUATOR, SENSOR, Contribution, MissionView, Part
 from diagnosis.response.assess import assess_response
+from diagnosis.response.body import body_speeds
 from diagnosis.response.inputs import followers
+from diagnosis.response.models import BLOCK_S
 from diagnosis.results.assessment import Assessment
 from diagnosis.results.vocabulary import Tier
 
@@ -18,7 +20,10 @@ class ResponseEvidence:
         """Judge drives whose response can be found in the mission and that nothing stronger has judged."""
         yaw = mission.values("imu.yaw_rate") if mission.logged("imu.yaw_rate") else None
         machine = mission.machine
-        judged = assess_response(followers(mission), machine.geometry, yaw, machine.limits, mission.timeline.dt)
+        dt = mission.timeline.dt
+        data = followers(mission)
+        speeds = body_speeds(mission.timeline, max(1, round(BLOCK_S / dt))) if data else ()
+        judged = assess_response(data, machine.geometry, yaw, machine.limits, dt, speeds)
         parts: dict[Part, Assessment] = {}
         for wheel in mission.wheels:
             if wheel in judged.parts:

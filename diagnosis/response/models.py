@@ -84,12 +84,15 @@ class Beside(NamedTuple):
         How much of a misfit is this wheel's own, 0…1.
     rough : Array, shape (b,)
         What of the other wheels changes from sample to sample [m/s].
+    compared : str
+        What the view is by, in words.
     """
 
     speed: Array
     noise: Array
     blame: Array
     rough: Array
+    compared: str = ""
 
 
 def blocks_of(samples: Samples, response: Response, cell: int, width: int, size: int) -> Blocks:

@@ -35,7 +35,7 @@ def measured_body(timeline: Timeline, machine: Machine, y: Array, v_ref: Array, 
     angle : Array, shape (n, axles)
         Best estimate of the axles' angles [rad].
     """
-    if machine.geometry is None or not any_finite(angle).all():
+    if machine.geometry is None or not angle.shape[1] or not any_finite(angle).all():
         return None
     width = min(block_width(timeline.dt), timeline.size)
     sensors = body_sensors(timeline, width)

@@ -141,6 +141,7 @@ CANONICAL: tuple[CanonicalSignal, ...] = (
     _Entry("odom", "x", "length", "forward position", 14),
     _Entry("odom", "y", "length", "position to the left", 15),
     _Entry("odom", "yaw", "angle", "heading", 13),
+    _Entry("odom", "v", "speed", "forward speed by odometry"),
 )
 #: By name without wheel or axle: ``wheel.v``.
 BY_KIND = {entry.kind: entry for entry in CANONICAL}

@@ -123,6 +123,8 @@ def _by_message(channel: Channel, machine: Machine, others: Mapping[str, Channel
         for axis in ("x", "y"):
             if field == f"pose.pose.position.{axis}":
                 yield found(f"odom.{axis}", "m", rank)
+        if field == "twist.twist.linear.x":
+            yield found("odom.v", "m/s", rank)
         if field == "pose.pose.orientation.w":
             whole = SignalSource(topic=topic, field="pose.pose.orientation", unit="rad")
             yield Candidate("odom.yaw", whole, rank, f"quaternion of {leaf} on {topic}")

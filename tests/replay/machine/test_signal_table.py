@@ -25,7 +25,7 @@ def test_names_in_reading_order() -> None:
             for x in ("v_ref", "v", "v_true", "u", "u_applied", "effort", "psi", "pressure_a", "pressure_b")
         ),
         *(f"steer.front.{x}" for x in ("phi_ref", "phi", "phi_true", "u", "u_applied")),
-        *("imu.yaw_rate", "gnss.lat", "gnss.lon", "gnss.speed", "odom.x", "odom.y", "odom.yaw"),
+        *("imu.yaw_rate", "gnss.lat", "gnss.lon", "gnss.speed", "odom.x", "odom.y", "odom.yaw", "odom.v"),
     )
 
 
@@ -74,7 +74,7 @@ def test_a_name_that_is_not_in_the_table_is_none(name: str) -> None:
 def test_the_refusal_names_every_group() -> None:
     assert known_names()[0] == "cmd.v|omega"
     assert known_names()[2] == "steer.<A>.phi_ref|phi|phi_true|u|u_applied"
-    with pytest.raises(ConfigError, match=r"wheel\.<W>\.v_ref\|v\|.* or odom\.x\|y\|yaw$"):
+    with pytest.raises(ConfigError, match=r"wheel\.<W>\.v_ref\|v\|.* or odom\.x\|y\|yaw\|v$"):
         signal_of("odom.z")
 
 
