@@ -14,6 +14,7 @@ from diagnosis.channels.copied_rows import without_copied_rows
 from diagnosis.channels.recording_gaps import recording_gaps, without_gaps
 from diagnosis.decision import metrics, quality
 from diagnosis.decision.episodes import with_episodes
+from diagnosis.decision.second_onsets import with_second_onsets
 from diagnosis.report_document import Judged, machine_row, report_of_mission
 from diagnosis.results.assessment import Assessment
 from diagnosis.results.closeups import closeups_of
@@ -163,7 +164,8 @@ def _outside_gaps(found: ComponentResult, timeline: Timeline) -> ComponentResult
     """Nothing is judged where nothing was recorded; findings that are one fault are one."""
     gaps = recording_gaps(timeline)
     seen = {key: without_gaps(a, gaps, timeline) for key, a in found.assessments.items()}
-    return replace(found, assessments=with_episodes(seen, timeline.dt))
+    joined = with_episodes(seen, timeline.dt)
+    return replace(found, assessments=with_second_onsets(joined, timeline.dt))
 
 
 def _require_something(assessments: Mapping[tuple[str, str], Assessment], mission: Mission, machine: Machine) -> None:

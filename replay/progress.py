@@ -51,6 +51,7 @@ class Stage(Enum):
     WRITING_REPORT = ("writing the report", 0.055)
 
     CUTTING_CLIPS = ("cutting clips",)
+    VERIFYING = ("verifying by filterpy",)
     REPLAYING_FOR_CLIPS = ("replaying the loop for the clips",)
     READING_FOR_CLIPS = ("reading the messages for the clips",)
 

@@ -18,6 +18,7 @@ Examples:
   mfhca diagnose mission.mcap --start 100 --end 160 --wheel FR --fail-on high
   mfhca diagnose mission.mcap --clips --open        # each fault cut out for Foxglove and PlotJuggler
   mfhca diagnose tuesday.mcap --previous monday-report   # what is new, resolved, changed
+  mfhca diagnose mission.mcap --verify           # each fault once more by filterpy, reading by reading
   mfhca diagnose mission.mcap --json | jq .verdict"""
 
 Output = Annotated[
@@ -48,6 +49,9 @@ ClipMargin = Annotated[
     float,
     typer.Option("--clip-margin", metavar="S", min=0.0, max=3600.0, help="Time before and after each clip [s]."),
 ]
+Verify = Annotated[
+    bool, typer.Option("--verify", help="Check every fault by filterpy, stepped reading by reading (slow).")
+]
 
 
 def diagnose(
@@ -67,6 +71,7 @@ def diagnose(
     clips: Clips = False,
     clip_margin: ClipMargin = 5.0,
     max_size: MaxSize = 15.0,
+    verify: Verify = False,
     quiet: Quiet = False,
     verbose: Verbose = False,
 ) -> None:
@@ -87,6 +92,7 @@ def diagnose(
         clips=clips,
         clip_margin_s=clip_margin,
         max_size_mb=max_size,
+        verify=verify,
     )
     code = run_diagnosis(terminal_of(context, json=json), request)
     if code:

@@ -43,6 +43,7 @@ class DiagnoseRequest:
     clips: bool
     clip_margin_s: float
     max_size_mb: float
+    verify: bool = False
 
 
 @dataclass(frozen=True)
@@ -82,6 +83,8 @@ def run_diagnosis(terminal: Terminal, request: DiagnoseRequest) -> int:
         from cli.tables.verdict import verdict_parts
 
         terminal.show(*verdict_parts(result.report))
+    if request.verify:
+        _verify(terminal, result)
     terminal.show(f"Report: {page}")
     if mission is not None:
         _cut_clips(terminal, mission, result, checked, request.clip_margin_s)
@@ -158,6 +161,17 @@ def _judged(request: DiagnoseRequest, checked: _Checked, progress: Subscriber) -
     return mission, pipeline.diagnose_mission(
         mission, machine, machine_source=source, wheels=wheels, machine_id=name, progress=progress
     )
+
+
+def _verify(terminal: Terminal, result: MissionResult) -> None:
+    """Show each fault beside what filterpy makes of it; on stderr where stdout holds the document."""
+    with terminal.progress(Stage.VERIFYING) as progress:
+        from diagnosis.decision.verified import verified
+
+        found = verified(result, lambda done, of: progress(Progress(Stage.VERIFYING, f"{done} of {of} faults")))
+    from cli.tables.verified import verified_parts
+
+    terminal.show(*verified_parts(result.report, found))
 
 
 def _cut_clips(terminal: Terminal, mission: Mission, result: MissionResult, checked: _Checked, margin_s: float) -> None:
