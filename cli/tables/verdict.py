@@ -15,9 +15,10 @@ from diagnosis.comparison.words import OUTCOMES, headline
 from diagnosis.report.confidence import headline as verdict_words
 from diagnosis.report.confidence import sure_of
 from diagnosis.report.tables import merged_caveats
+from diagnosis.results.candidates import label_of
 from diagnosis.results.comparison_document import FaultChangeRow, PreviousRow
 from diagnosis.results.document import PAPER_DEFAULTS, ActionRow, IntervalRow, MachineRow, ReportDocument
-from diagnosis.results.fault_rows import mode_words, state_label
+from diagnosis.results.fault_rows import mode_words
 from diagnosis.results.size_rows import EpsilonRow, SatRow
 from diagnosis.results.vocabulary import part_words
 
@@ -139,7 +140,7 @@ def _fault(fault: IntervalRow, bounds: bool) -> tuple[object, ...]:
     return (
         text(fault["id"], "dim"),
         part_words(fault["kind"], fault["component"], fault["side"]),
-        mode_text(fault["mode"], state_label(fault["mode"], fault["side"]).lower()),
+        mode_text(fault["mode"], label_of(fault).lower()),
         f"{fault['start_s']:.{digits}f}–{fault['stop_s']:.{digits}f}",
         _epsilon(fault["epsilon"], bounds),
         _sat(fault["sat"]),

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from diagnosis.assess import assess_components
 from diagnosis.counterfactual.abduct import Abducted, abduct
-from diagnosis.counterfactual.bands import band, bands, spread_of
+from diagnosis.counterfactual.bands import EFFORT_OFF, ERROR_OFF, band, bands, spread_of
 from diagnosis.counterfactual.document import (
     SCHEMA,
     CounterfactualDocument,
@@ -248,8 +248,8 @@ def _row(
         "gains": law.controller.own,
         "tuned": was_tuned,
         "figures": figures,
-        "error_band": band(figures["tracking_error"]["mission"], error),
-        "effort_band": band(figures["control_effort"]["mission"], effort),
+        "error_band": band(figures["tracking_error"]["mission"], error, ERROR_OFF),
+        "effort_band": band(figures["control_effort"]["mission"], effort, EFFORT_OFF),
         "recoveries": recoveries(abducted, machine, shift),
     }
 

@@ -81,8 +81,10 @@ def _severity_of_total(finding: Finding, seconds: float, limits: Limits, kind: K
 
 def _at_risk(finding: Finding) -> float:
     """Probability that nothing usable comes from the side that the finding names: stuck, without signal, or nearly all lost."""
-    # a stuck part's ε is 1 by its row and says nothing of what else it may be
-    lost = not finding.mode.total and finding.epsilon is not None and finding.epsilon.value >= _LOST
+    # a stuck part's ε is 1 by its row; what else it may be says the lower bound, where a second measurement gives it
+    size = finding.epsilon
+    known = size is not None and (not finding.mode.total or finding.tier is Tier.DIRECT)
+    lost = known and size is not None and (size.low if finding.mode.total else size.value) >= _LOST
     return _of_named_side(finding, {*TOTAL, FaultMode.INEFFICIENT} if lost else TOTAL)
 
 

@@ -4,16 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from diagnosis.results.candidates import candidates, unclear_words
 from diagnosis.results.document import ActionRow
 from diagnosis.results.fault_rows import mode_words
 from diagnosis.results.result import FaultInterval
 from diagnosis.results.vocabulary import Severity, part_words
-from replay.faults import FaultMode, Side
-
-_MAJORITY, _CANDIDATE = (
-    0.5,
-    0.15,
-)  # of the probability of any fault of the part: a row that gives its name; one that is named beside others
+from replay.faults import Side
 
 
 def actions_of(intervals: Sequence[FaultInterval]) -> tuple[ActionRow, ...]:
@@ -63,19 +59,9 @@ def _urgency(worst: FaultInterval) -> int:
 
 
 def fault_words(f: FaultInterval) -> str:
-    """What a fault is: its row, or *faulty* with the candidates where no row has half of the probability of any fault.
-
-    A word for one row of two that are as probable would be a coin toss.
-    """
-    rows: dict[FaultMode, float] = {}
-    for h in f.hypotheses:
-        if h.mode != "healthy" and (h.side == f.side.value or f.side is Side.SENSOR_OR_ACTUATOR):
-            rows[FaultMode(h.mode)] = rows.get(FaultMode(h.mode), 0.0) + h.p
-    ranked = sorted(rows, key=lambda mode: -rows[mode])
-    if len(ranked) < 2 or rows[ranked[0]] >= _MAJORITY * sum(rows.values()):
-        return mode_words(f.side, f.mode)
-    likely = [mode_words(f.side, mode) for mode in ranked if rows[mode] >= _CANDIDATE * sum(rows.values())]
-    return f"faulty, kind unclear ({', '.join(likely[:-1])} or {likely[-1]})"
+    """What a fault is: its row, or *faulty* with the candidates where no row has half of the probability of any fault."""
+    modes = candidates(f.side.value, ((h.side, h.mode, h.p) for h in f.hypotheses))
+    return unclear_words(f.side, modes) if modes else mode_words(f.side, f.mode)
 
 
 def _how_long(words: str, faults: Sequence[FaultInterval]) -> str:

@@ -18,7 +18,7 @@ from diagnosis.estimation.segments import Run, with_leads
 from diagnosis.estimation.viterbi import ModePath
 from diagnosis.results.assessment import Finding
 from diagnosis.results.fault_rows import ROWS, codes_of
-from diagnosis.results.result import Hypothesis
+from diagnosis.results.result import Epsilon, Hypothesis
 from diagnosis.results.vocabulary import Tier
 from replay.faults import FaultMode, Side
 from replay.machine.config import Limits
@@ -103,10 +103,12 @@ def finding_of(run: Run, found: IdentifiedPair, limits: Limits) -> Finding | Non
     if epsilon is not None and mode is not FaultMode.OUTSIDE_TABLE:
         epsilon = epsilon.as_share()
     lines = sentences(isolated, found, mode, epsilon)
-    if run.row in (STUCK, INEFFICIENT) and isolated.seen.still:
+    share = _left_share(isolated)
+    if run.row in (STUCK, INEFFICIENT) and isolated.seen.still and share is not None:
         # nothing moved: a constant value and a constant share of a constant are the same
         if run.row == STUCK:
             p[STUCK] = p[INEFFICIENT] = (p[STUCK] + p[INEFFICIENT]) / 2
+            epsilon = Epsilon(1.0, 1.0 - share, 1.0)  # all, if it is stuck; else what is not left
         lines += (alike_sentence(found),)
     shift = max(0, round(found.lag)) if pair.side is Side.ACTUATOR else 0
     hypotheses = [Hypothesis(pair.side.value, ROWS[row].value, float(p[row])) for row in codes_of(pair.side)]
@@ -122,6 +124,14 @@ def finding_of(run: Run, found: IdentifiedPair, limits: Limits) -> Finding | Non
         evidence=lines,
         tier=Tier.DIRECT,
     )
+
+
+def _left_share(isolated: Isolated) -> float | None:
+    """What a constant value is of a reference that hardly moves [1]; None where it is no share of it."""
+    seen = isolated.seen
+    x, y = (float(np.mean(c[seen.use])) if seen.use.any() else 0.0 for c in (seen.x, seen.y))
+    share = y / x if x != 0.0 else np.inf
+    return share if 0.0 <= share <= 1.0 else None
 
 
 def _mode_of(isolated: Isolated, found: IdentifiedPair, limits: Limits) -> FaultMode | None:

@@ -221,6 +221,9 @@ def _with_lapses(p: Array, row: int, side: Side, seconds: float | None) -> Array
         kept *= seconds**2 / (seconds**2 + _COARSE_S**2)
     out = p.copy()
     others = [r for r in codes_of(side) if r not in (HEALTHY, row)]
+    share = 1.0 / len(others)
+    level = (float(p[others].max()) + share * float(p[row])) / max((1.0 + share) * float(p[row]), 1e-300)
+    kept = max(kept, min(level, 1.0))
     out[others] += p[row] * (1.0 - kept) / len(others)
     out[row] = p[row] * kept
     return out

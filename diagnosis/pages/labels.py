@@ -10,6 +10,7 @@ from enum import Enum
 from string import Formatter
 from typing import Any, TypeVar, cast
 
+from diagnosis.results.candidates import candidates_of, unclear_words
 from diagnosis.results.document import IntervalRow
 from diagnosis.results.fault_rows import LOOKS, row_of, state_label
 from diagnosis.results.size_rows import EpsilonRow
@@ -129,6 +130,8 @@ def fault_title(fault: IntervalRow) -> str:
     """One line that names component, part, mode and size of a fault."""
     side, mode, sat, epsilon = fault["side"], fault["mode"], fault["sat"], fault["epsilon"]
     part = part_words(fault["kind"], fault["component"], side)
+    if modes := candidates_of(fault):
+        return f"{part} {unclear_words(side, modes)}"
     sizes = {"part": part}
     if sat:
         sizes |= {"mean": sat_text(sat["mean"], sat["unit"]), "rms": sat_text(sat["rms"], sat["unit"])}

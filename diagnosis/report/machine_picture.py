@@ -12,8 +12,8 @@ from diagnosis.comparison.coverage import sides_of
 from diagnosis.pages.labels import span
 from diagnosis.pages.svg import badge, text
 from diagnosis.report.judged_parts import judged_sides
+from diagnosis.results.candidates import label_of
 from diagnosis.results.document import IntervalRow, ReportDocument, WheelPlace
-from diagnosis.results.fault_rows import state_label
 from diagnosis.results.vocabulary import Kind, Severity, part_name
 from replay.faults import State
 
@@ -57,7 +57,7 @@ def condition(
     if mine:
         worst = min(mine, key=lambda f: (-Severity(f["severity"]).rank, f["start_s"]))
         name = part_name(kind, worst["side"])
-        label = state_label(worst["mode"], worst["side"]).lower()
+        label = label_of(worst).lower()
         length = span(worst["stop_s"] - worst["start_s"])
         more = (f"and {len(mine) - 1} more",) if len(mine) > 1 else ()
         words = name[0].upper() + name[1:]

@@ -9,6 +9,7 @@ from diagnosis.pages.labels import bounded, clock, grouped, mode_legend, number,
 from diagnosis.report.confidence import headline, judged, sure_of, sure_of_verdict
 from diagnosis.report.edges import time_words
 from diagnosis.report.judged_parts import judged_sides, kind_of
+from diagnosis.results.candidates import label_of
 from diagnosis.results.clearing import size_words
 from diagnosis.results.document import (
     PAPER_DEFAULTS,
@@ -112,6 +113,7 @@ def _fault(fault: IntervalRow) -> Context:
     likely = max(1, sum(h["p"] >= _SHOWN for h in hypotheses))
     return {
         **fault,
+        "label": label_of(fault),
         "tier": Tier(fault["tier"]).name_of(Kind(fault["kind"])),
         "delay": _delay(fault),
         "likely": hypotheses[:likely],

@@ -12,6 +12,7 @@ import numpy as np
 from diagnosis.comparison.coverage import sides_of
 from diagnosis.pages.labels import clock, fault_title, span
 from diagnosis.report.judged_parts import kind_of
+from diagnosis.results.candidates import label_of
 from diagnosis.results.document import IntervalRow, PhaseRow, ReportDocument
 from diagnosis.results.fault_rows import state_label
 from diagnosis.results.vocabulary import Kind, Tier, part_name
@@ -127,7 +128,7 @@ def causes(faults: Sequence[IntervalRow]) -> dict[str, str]:
 def _bar(fault: IntervalRow, duration: float, cause: str = "") -> Bar:
     left = 100 * fault["start_s"] / duration
     width = 100 * (fault["stop_s"] - fault["start_s"]) / duration
-    mode = state_label(fault["mode"], fault["side"])
+    mode = label_of(fault)
     words = f"{fault['id']} {mode.lower()}"
     label = words if width > 10 else fault["id"] if width > 0.9 + 0.8 * len(fault["id"]) else ""
     times = f"{clock(fault['start_s'], 2)} to {clock(fault['stop_s'], 2)}"

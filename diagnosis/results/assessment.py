@@ -43,6 +43,8 @@ class Finding:
     def __post_init__(self) -> None:
         if self.epsilon is not None and self.mode is not FaultMode.OUTSIDE_TABLE:
             object.__setattr__(self, "epsilon", self.epsilon.as_share())
+        if self.sat is not None:
+            object.__setattr__(self, "sat", self.sat.as_possible())
         for name in ("epsilon", "sat"):
             size = getattr(self, name)
             if size is not None and not all(isfinite(x) for x in astuple(size) if isinstance(x, float)):

@@ -14,6 +14,7 @@ from diagnosis.results.document import ReportDocument
 from diagnosis.results.size_rows import EpsilonRow
 from diagnosis.results.vocabulary import Kind, Severity, Tier
 from replay.faults import FaultMode, Side, State
+from replay.machine.quantities import OPENING
 
 
 @dataclass(frozen=True)
@@ -42,6 +43,13 @@ class Sat:
     low: float
     high: float
     unit: str
+
+    def as_possible(self) -> Sat:
+        """The same within what there can be: no valve opens further than to its end."""
+        if self.unit != OPENING:
+            return self
+        mean, low, high = (min(1.0, max(-1.0, x)) for x in (self.mean, self.low, self.high))
+        return Sat(mean, min(self.rms, 1.0), low, high, self.unit)
 
 
 @dataclass(frozen=True)

@@ -7,6 +7,7 @@
 Missions: scenarios paper and random, wheels on the ground and free, reporting seeds 2000 to 2002, 240 s at 1 kHz, recorded under
 MFHCA (ζ = 1000). What self-replay refuses is named and not counted. Predicted and simulated again, with the same seed and so the same noise, faults and ground: MFHCA with ζ = 2400
 and the six other laws. Compared: mean |v − v_c| over the samples of which the log tells the speed, and mean |u|.
+With --draws N, also whether the stated 90 % bands hold what was simulated.
 """
 
 from __future__ import annotations
@@ -21,8 +22,9 @@ from tempfile import TemporaryDirectory
 import numpy as np
 
 from diagnosis.assess import assess_components
-from diagnosis.counterfactual.abduct import abduct
-from diagnosis.counterfactual.law import recorded_law
+from diagnosis.counterfactual.abduct import Abducted, abduct
+from diagnosis.counterfactual.bands import EFFORT_OFF, ERROR_OFF, band, bands
+from diagnosis.counterfactual.law import Law, recorded_law
 from diagnosis.counterfactual.run import EFFORT_WITHIN, ERROR_WITHIN
 from replay.control.kinematics import speed_ratios, wheel_angles
 from replay.control.loop import replay_loop
@@ -44,12 +46,14 @@ LAWS = (Controller("mfhca", {"zeta": OTHER_ZETA}), *(Controller(name) for name i
 
 @dataclass(frozen=True)
 class Case:
-    """A mission with what is known of it, and the law that ran."""
+    """A mission with what is known of it, and the law that ran; `abducted` where it comes from a diagnosis."""
 
     mission: SimulatedMission
     world: RecordedWorld
     plant: CoupledPlant
     recorded: Controller
+    abducted: Abducted | None = None
+    psi0: tuple[float, ...] = ()
 
 
 def stacked(mission: SimulatedMission, leaf: str, *, actual: bool) -> np.ndarray:
@@ -129,7 +133,8 @@ def diagnosed_case(mission: SimulatedMission) -> Case:
     replay = replay_loop(timeline, machine)
     found = assess_components(timeline, replay, machine, machine.wheels, silent)
     abducted = abduct(timeline, replay, machine, found, log.name)
-    return Case(mission, abducted.world, abducted.plant, recorded_law(replay, machine, log.name).controller)
+    law = recorded_law(replay, machine, log.name)
+    return Case(mission, abducted.world, abducted.plant, law.controller, abducted, law.psi0)
 
 
 def errors(case: Case) -> dict[str, tuple[float, float, float]]:
@@ -156,6 +161,27 @@ def errors(case: Case) -> dict[str, tuple[float, float, float]]:
     return found
 
 
+def held(case: Case, found: dict[str, tuple[float, float, float]], draws: int) -> tuple[int, int, int]:
+    """Predictions whose bands hold the simulated error, the simulated effort, and all of them."""
+    if case.abducted is None:
+        return 0, 0, 0
+    laws = [Law(law.name, law, case.psi0) for law in LAWS]
+    error, effort, count = 0, 0, 0
+    known = np.isfinite(case.world.speed)
+    for law, (e, u) in zip(laws, bands(case.abducted, laws, 1.0, draws), strict=True):
+        _, off_u, truth = found[f"{law.name} ζ" if law.name == "mfhca" else law.name]
+        predicted = predict(case.world, case.plant, law.controller, 1.0)
+        level = float(np.abs(predicted.u).mean())
+        by_error = band(_mean(case.world.speed + predicted.shift - case.world.v_ref, known), e, ERROR_OFF)
+        by_effort = band(level, u, EFFORT_OFF)
+        assert by_error is not None
+        assert by_effort is not None
+        error += by_error["low"] <= truth <= by_error["high"]
+        effort += by_effort["low"] <= level / (1.0 + off_u) <= by_effort["high"]
+        count += 1
+    return error, effort, count
+
+
 def _mean(x: np.ndarray, known: np.ndarray) -> float:
     return float(np.abs(x)[known].mean())
 
@@ -170,7 +196,9 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("--duration", type=float, default=240.0)
     parser.add_argument("--rate", type=float, default=1000.0)
     parser.add_argument("--ice", type=float, default=0.0)
+    parser.add_argument("--draws", type=int, default=0)
     asked = parser.parse_args(arguments)
+    covered = np.zeros(3, dtype=np.int64)
     rows: list[dict[str, tuple[float, float, float]]] = []
     seeds = range(asked.first, asked.first + asked.count)
     for scenario, coupling, seed in product(("paper", "random"), ("ground", "free"), seeds):
@@ -196,6 +224,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
             print(f"{scenario} {coupling} {seed}: refused: {words}", flush=True)
             continue
         rows.append(found)
+        covered += held(case, found, asked.draws) if asked.draws else (0, 0, 0)
         words = ", ".join(f"{law} {100 * e:+.1f}/{100 * u:+.1f}" for law, (e, u, _) in rows[-1].items())
         print(
             f"{scenario} {coupling} {seed}: error/effort [%]: {words}; self |Δv| {1e3 * rows[-1]['self'][2]:.2f} mm/s",
@@ -207,6 +236,11 @@ def main(arguments: Sequence[str] | None = None) -> None:
         print(
             f"{law:12} |e| median {np.median(error):.1f} %, worst {error.max():.1f} %; effort median {np.median(effort):.1f} %, "
             f"worst {effort.max():.1f} %"
+        )
+    if covered[2]:
+        error_held, effort_held, count = covered.tolist()
+        print(
+            f"90 % bands hold |e| {100 * error_held / count:.0f} %, effort {100 * effort_held / count:.0f} % of {count} predictions"
         )
 
 

@@ -105,6 +105,9 @@ def test_a_thinned_mission_keeps_its_times() -> None:
 
 
 def test_a_band_holds_its_value() -> None:
-    assert band(0.05, np.array([0.01, 0.02])) == {"low": 0.05, "high": pytest.approx(0.0695)}
-    assert band(None, np.array([0.01])) is None
-    assert band(0.05, np.empty(0)) is None
+    changes = np.array([0.01, 0.02])
+    assert band(0.05, changes, 0.0) == {"low": 0.05, "high": pytest.approx(0.0695)}
+    wider = band(0.05, changes, 0.1)
+    assert wider == {"low": pytest.approx(0.045), "high": pytest.approx(0.05 + np.hypot(0.0195, 0.005))}
+    assert band(None, changes, 0.1) is None
+    assert band(0.05, np.empty(0), 0.1) is None

@@ -1,0 +1,136 @@
+"""Results that contradict themselves, over hundreds of missions: `python tests/benchmarks/contradictions.py --count 6`.
+
+Three kinds of data: the simulator's scenarios and machines of other structures, in every tier; the reference data's foreign
+plant; real robots and arms as they are, and with faults written into them. Each result is read by `tests.contradictions`:
+verdict, title, hypotheses, severity, advice, sizes, times, states and the terminal's words must agree. Ends with 1 where one
+does not. Seeds from 2000 on. The real logs and the plant lie where ``MFHCA_REFERENCE_DATA`` says; without them they are left out.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+from collections import Counter
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
+
+import foreign_machine
+import numpy as np
+import robots
+from variation import recorded_signals
+
+from diagnosis.pipeline import diagnose, diagnose_mission
+from replay.errors import MfhcaError
+from replay.machine.config import haulotte
+from replay.machine.toml_file import load_machine
+from replay.mission import Mission, load_mission
+from replay.signals.timeline import align
+from replay.simulation.options import SimulationOptions
+from replay.simulation.run import simulate_mission
+from replay.simulation.structures import STRUCTURE_NAMES, StructureOptions
+from tests.contradictions import contradictions
+
+FIRST = 2000
+TIERS = ("base", "spool", "direct")
+Named = tuple[str, Mapping[str, Any]]
+
+
+def simulated(count: int) -> Iterator[Named]:
+    """The simulator's scenarios and machines of other structures."""
+    for structure in ("", *STRUCTURE_NAMES):
+        for k in range(count if structure else 2 * count):
+            scenario = ("random", "paper")[k % 2] if not structure else "random"
+            options = SimulationOptions(
+                scenario=scenario,  # type: ignore[arg-type]
+                seed=FIRST + k,
+                duration_s=60.0,
+                rate_hz=(200.0, 100.0)[k % 2],
+                steering_faults=True,
+                structure=StructureOptions(structure) if structure else None,
+            )
+            made = simulate_mission(options)
+            for tier in TIERS:
+                signals = recorded_signals(made, tier)
+                name = f"{structure or scenario} {FIRST + k} {tier}"
+                try:
+                    mission = Mission(files=(), signals=signals, timeline=align(signals))
+                    yield name, diagnose_mission(mission, haulotte()).report
+                except MfhcaError as error:
+                    print(f"{name}: {error}")
+
+
+def foreign(count: int) -> Iterator[Named]:
+    """The reference data's foreign plant, with faults."""
+    make = foreign_machine.maker()
+    for k in range(count):
+        drive = foreign_machine.scenario(make, 7200 + k, ("forced", "printed")[k % 2], 90.0)
+        rng = np.random.default_rng(k)
+        modes = ("stuck", "no_signal", "inefficient", "noisy")
+        faults = [
+            make.Fault(
+                int(rng.integers(4)),
+                str(rng.choice(["sensor", "actuator"])),
+                str(rng.choice(modes)),
+                a,
+                a + 9.0,
+                0.5,
+                0.15,
+            )
+            for a in (20.0, 40.0, 60.0)
+        ]
+        drive = replace(drive, faults=faults)
+        for tier, mission, machine in foreign_machine.missions(make, drive, TIERS):
+            yield f"foreign {7200 + k} {tier}", diagnose_mission(mission, machine).report
+
+
+def real(count: int) -> Iterator[Named]:
+    """Robots as they are and with faults, the disabled one, and arms."""
+    folder = robots.data_folder()
+    for name in ("husky_bag", "warthog_bag"):
+        machine = load_machine(folder / f"robots/{name}.toml")
+        mission = load_mission([folder / "robots" / name], machine)
+        yield name, diagnose_mission(mission, machine).report
+        rng, t = np.random.default_rng(FIRST), mission.timeline
+        for k in range(2 * count):
+            wheel, kind = machine.wheels[rng.integers(len(machine.wheels))], robots.KINDS[k % len(robots.KINDS)]
+            start = rng.uniform(15.0, t.size * t.dt - 20.0)
+            part = slice(int(start / t.dt), int((start + robots.SPELL_S) / t.dt))
+            speed = robots.injected(t.signals[f"wheel.{wheel}.v"], kind, part, robots.RADIUS[name], rng)
+            changed = replace(mission, timeline=replace(t, signals={**t.signals, f"wheel.{wheel}.v": speed}))
+            yield f"{name} {wheel} {kind} {start:.0f} s", diagnose_mission(changed, machine).report
+    disabled = load_machine(folder / "robots/warthog_disabled.toml")
+    yield "disabled warthog", diagnose([folder / "robots/warthog_disabled.csv"], disabled).report
+    arm = load_machine(folder / "robot_arm_raw/machine.toml")
+    for path in sorted((folder / "robot_arm_raw").glob("*.csv"))[: 10 * count]:
+        yield f"arm {path.stem}", diagnose([path], arm).report
+
+
+def main() -> None:
+    """Diagnose, check, print."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--count", type=int, default=6)
+    count = parser.parse_args().count
+    sources = {"simulated": simulated(count)}
+    if (Path(os.environ.get("MFHCA_REFERENCE_DATA", "../shared")) / "fault_data").is_dir():
+        sources |= {"foreign plant": foreign(count), "real": real(count)}
+    results: Counter[str] = Counter()
+    wrong: Counter[str] = Counter()
+    for kind, reports in sources.items():
+        for name, report in reports:
+            results[kind] += 1
+            found = contradictions(report)
+            wrong[kind] += bool(found)
+            for text in found:
+                print(f"{name}: {text}", flush=True)
+    for kind, n in results.items():
+        print(f"{kind}: {n} results, {wrong[kind]} contradict themselves")
+    sys.exit(1 if sum(wrong.values()) else 0)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,187 @@
+"""Statements of one result that cannot all be true: verdict, severity, hypotheses, advice, sizes, times, states, words."""
+
+from __future__ import annotations
+
+import io
+import re
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+from cli.tables.verdict import verdict_parts
+from diagnosis.pages.labels import fault_title
+from diagnosis.results.candidates import candidates_of, label_of
+from diagnosis.results.vocabulary import Severity
+from replay.machine.quantities import OPENING
+
+_TOTAL = ("stuck", "no_signal")
+_AT_RISK = 0.75
+_LOST = 0.9
+_SPARE_S = 0.05
+
+
+def contradictions(report: Mapping[str, Any]) -> list[str]:
+    """One sentence for each contradiction in a ``report.json``; empty where there is none.
+
+    Parameters
+    ----------
+    report : Mapping[str, Any]
+        The document.
+    """
+    out = [*_verdict(report), *_actions(report), *_coverage(report), *_terminal(report)]
+    for fault in report["intervals"]:
+        name = f"{fault['id']} {fault['component']} {fault['side']} {fault['mode']}"
+        out += [f"{name}: {text}" for text in (*_chances(fault), *_sizes(fault), *_urgency(fault, report))]
+        out += [f"{name}: {text}" for text in (*_times(fault, report), *_words(fault))]
+    return out
+
+
+def _verdict(report: Mapping[str, Any]) -> Iterator[str]:
+    verdict, faults = report["verdict"], report["intervals"]
+    high = sum(f["severity"] == "high" for f in faults)
+    watch = sum(f["severity"] in ("medium", "low") for f in faults)
+    if (verdict["status"] == "stop") != (high > 0):
+        yield f"verdict {verdict['status']} with {high} faults of high severity"
+    if verdict["status"] in ("ready", "not_assessed") and watch:
+        yield f"verdict {verdict['status']} with {watch} faults to watch"
+    if verdict["status"] == "ready" and not verdict["cleared"]:
+        yield "ready, and not cleared"
+    if verdict["cleared"] and verdict["status"] not in ("ready", "watch"):
+        yield f"cleared with verdict {verdict['status']}"
+    if verdict["cleared"] and verdict["not_cleared"]:
+        yield "cleared, with a reason why not"
+    counts = [
+        int(n)
+        for n in re.findall(r"(\d+) faults? to repair|(\d+) (?:faults? )?to watch", verdict["title"])
+        for n in n
+        if n
+    ]
+    if counts and counts != [n for n in (high, watch) if n]:
+        yield f"title {verdict['title']!r} with {high} and {watch} faults"
+    open_checks = [c for c in report.get("clearing", []) if not c["passed"]]
+    if verdict["cleared"] and open_checks:
+        yield f"cleared with {len(open_checks)} open checks"
+
+
+def _actions(report: Mapping[str, Any]) -> Iterator[str]:
+    faults = {f["id"]: f for f in report["intervals"]}
+    named: dict[str, int] = {}
+    for action in report["verdict"]["actions"]:
+        worst = max(Severity(faults[f]["severity"]).rank for f in action["faults"])
+        if Severity(action["severity"]).rank != worst:
+            yield f"action {action['n']} is {action['severity']}, its worst fault is not"
+        if action["text"].startswith("Stop") != (action["severity"] == "high"):
+            yield f"action {action['n']} ({action['severity']}) begins with {action['text'][:12]!r}"
+        for f in action["faults"]:
+            named[f] = named.get(f, 0) + 1
+    for f in faults.values():
+        if named.get(f["id"], 0) != (f["severity"] != "info"):
+            yield f"{f['id']} ({f['severity']}) stands in {named.get(f['id'], 0)} actions"
+
+
+def _coverage(report: Mapping[str, Any]) -> Iterator[str]:
+    for row in report["coverage"]:
+        total = sum(row["states_s"].values()) if "states_s" in row else None
+        spans = [s for s in report["states"] if (s["component"], s["side"]) == (row["component"], row["side"])]
+        length = sum(s["stop_s"] - s["start_s"] for s in spans)
+        if total is not None and abs(total - length) > 0.01 * max(length, 1.0):
+            yield f"coverage of {row['component']} {row['side']} is {total:.1f} s of {length:.1f} s"
+        if row["decided_driving_s"] > row["driving_s"] + _SPARE_S:
+            yield f"{row['component']} {row['side']} was judged for longer than it drove"
+
+
+def _chances(fault: Mapping[str, Any]) -> Iterator[str]:
+    hypotheses = fault["hypotheses"]
+    total = sum(h["p"] for h in hypotheses)
+    if hypotheses and abs(total - 1.0) > 0.02:
+        yield f"probabilities add up to {total:.3f}"
+    named = [h["p"] for h in hypotheses if h["mode"] == fault["mode"] and h["side"] == fault["side"]]
+    if named and abs(max(named) - fault["probability"]) > 1e-3:
+        yield f"probability {fault['probability']:.3f}, its hypothesis {max(named):.3f}"
+    either = fault["side"] == "sensor_or_actuator"
+    rows: dict[str, float] = {}
+    for h in hypotheses:
+        if h["mode"] != "healthy" and (either or h["side"] == fault["side"]):
+            rows[h["mode"]] = rows.get(h["mode"], 0.0) + h["p"]
+    if rows and rows.get(fault["mode"], 0.0) < max(rows.values()) - 0.01:
+        best = max(rows, key=lambda mode: rows[mode])
+        yield f"{best} is more probable ({rows[best]:.2f}) than the row it is called ({rows.get(fault['mode'], 0.0):.2f})"
+    unclear = bool(candidates_of(fault))  # type: ignore[arg-type]
+    if ("unclear" in label_of(fault)) != unclear or ("unclear" in fault_title(fault)) != unclear:  # type: ignore[arg-type]
+        yield "heading and title do not agree on whether its kind is clear"
+    healthy = sum(h["p"] for h in hypotheses if h["mode"] == "healthy")
+    if fault["severity"] != "info" and healthy > 0.5:
+        yield f"{fault['severity']} although healthy is more probable ({healthy:.2f})"
+
+
+def _sizes(fault: Mapping[str, Any]) -> Iterator[str]:
+    epsilon, sat = fault["epsilon"], fault["sat"]
+    if epsilon is not None:
+        if not epsilon["low"] <= epsilon["value"] <= epsilon["high"]:
+            yield f"ε̂ {epsilon['value']:.2f} outside of its bounds"
+        if fault["mode"] != "outside_table" and not (epsilon["low"] >= 0.0 and epsilon["high"] <= 1.0):
+            yield f"ε̂ from {epsilon['low']:.2f} to {epsilon['high']:.2f}"
+        if fault["mode"] == "no_signal" and epsilon["value"] < 0.9:
+            yield f"no signal with ε̂ {epsilon['value']:.2f}"
+    if sat is not None:
+        if not sat["low"] <= sat["mean"] <= sat["high"]:
+            yield "saturation term outside of its bounds"
+        if sat["unit"] == OPENING and not all(abs(sat[k]) <= 1.0 + 1e-6 for k in ("mean", "low", "high")):
+            yield f"an opening of {sat['mean']:.2f} ({sat['low']:.2f} to {sat['high']:.2f})"
+
+
+def _urgency(fault: Mapping[str, Any], report: Mapping[str, Any]) -> Iterator[str]:
+    high = fault["severity"] == "high"
+    if fault["advice"].startswith("Stop") != high:
+        yield f"severity {fault['severity']} with advice {fault['advice'][:30]!r}"
+    either = fault["side"] == "sensor_or_actuator"
+    named = [h for h in fault["hypotheses"] if h["mode"] != "healthy" and (either or h["side"] == fault["side"])]
+    total = sum(h["p"] for h in named if h["mode"] in _TOTAL)
+    lost = fault["epsilon"] is not None and fault["epsilon"]["value"] >= _LOST and fault["mode"] == "inefficient"
+    risk = total + sum(h["p"] for h in named if lost and h["mode"] == "inefficient")
+    limits = report["limits"]
+    sure = sum(h["p"] for h in named) >= limits["min_probability"]
+    brief = fault["side"] == "sensor" and fault["stop_s"] - fault["start_s"] <= limits["brief"]
+    if high and risk < _AT_RISK:
+        yield f"stopped for, although stuck, silent or lost is {risk:.2f} probable"
+    if not high and risk >= _AT_RISK and sure and not brief:
+        yield f"stuck, silent or lost is {risk:.2f} probable, and its severity is {fault['severity']}"
+
+
+def _times(fault: Mapping[str, Any], report: Mapping[str, Any]) -> Iterator[str]:
+    start, stop, seen = fault["start_s"], fault["stop_s"], fault["detected_s"]
+    if stop <= start:
+        yield f"it ends at {stop:.3f} s, before it begins"
+    if seen is not None and not start - _SPARE_S <= seen <= stop + _SPARE_S:
+        yield f"detected at {seen:.2f} s, and lasts from {start:.2f} to {stop:.2f} s"
+    sides = ("sensor", "actuator") if fault["side"] == "sensor_or_actuator" else (fault["side"],)
+    inside = healthy = 0.0
+    for s in report["states"]:
+        if s["component"] == fault["component"] and s["side"] in sides:
+            shared = max(0.0, min(stop, s["stop_s"]) - max(start, s["start_s"]))
+            inside += shared
+            healthy += shared if s["state"] == "healthy" else 0.0
+    if inside and healthy > 0.5 * inside and fault["severity"] != "info":
+        yield f"its part is called healthy for {100 * healthy / inside:.0f} % of it"
+
+
+def _words(fault: Mapping[str, Any]) -> Iterator[str]:
+    for text in fault["evidence"]:
+        found = re.search(r"it was this in (\d+) of 100 cases", text)
+        if found and abs(int(found.group(1)) - 100 * fault["probability"]) > 1.6:
+            yield f"{found.group(0)!r} beside a probability of {fault['probability']:.3f}"
+    if re.search(r"\b(nan|inf)\b", " ".join((*fault["evidence"], fault["advice"], fault_title(fault)))):  # type: ignore[arg-type]
+        yield "a number in it is none"
+
+
+def _terminal(report: Mapping[str, Any]) -> Iterator[str]:
+    from rich.console import Console
+
+    console = Console(width=200, record=True, file=io.StringIO(), color_system=None)
+    console.print(*verdict_parts(report))  # type: ignore[arg-type]
+    shown = " ".join(console.export_text().split())
+    title = report["verdict"]["title"]
+    if title and title.casefold() not in shown.casefold():
+        yield f"the terminal does not show the title {title!r}"
+    for fault in report["intervals"][:40]:
+        if label_of(fault).lower() not in shown.casefold():  # type: ignore[arg-type]
+            yield f"{fault['id']}: the terminal does not show {label_of(fault)!r}"  # type: ignore[arg-type]

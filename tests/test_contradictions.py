@@ -1,0 +1,97 @@
+"""No result says two things that cannot both be true: missions with many faults, and the checker itself."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Callable
+from typing import Any
+
+import orjson
+import pytest
+
+from diagnosis.pipeline import diagnose_mission
+from replay.log.source_options import SignalSource
+from replay.machine.config import haulotte
+from replay.mission import Mission
+from replay.signals.signal import Signal, Signals
+from replay.signals.timeline import align
+from replay.simulation.options import EvidenceLevel, SimulationOptions
+from replay.simulation.run import simulate_mission
+from tests.contradictions import contradictions
+
+Document = dict[str, Any]
+
+
+def diagnosed(evidence: EvidenceLevel, seed: int) -> Document:
+    options = SimulationOptions(
+        scenario="random", seed=seed, duration_s=60.0, rate_hz=200.0, evidence=evidence, steering_faults=True
+    )
+    made = simulate_mission(options)
+    items = {
+        n: Signal(n, made.stamps, x, SignalSource(column=n), "a.mcap", guessed=False) for n, x in made.columns.items()
+    }
+    signals = Signals(items, {})
+    result = diagnose_mission(Mission((), signals, align(signals)), haulotte())
+    return orjson.loads(orjson.dumps(result.report))  # type: ignore[no-any-return]
+
+
+@pytest.fixture(scope="module")
+def document() -> Document:
+    return diagnosed("direct", 2)
+
+
+@pytest.mark.parametrize(("evidence", "seed"), [("base", 1), ("spool", 2000), ("direct", 2000)])
+def test_missions_with_many_faults_do_not_contradict_themselves(evidence: EvidenceLevel, seed: int) -> None:
+    found = diagnosed(evidence, seed)
+    assert len(found["intervals"]) > 5
+    assert contradictions(found) == []
+
+
+def _first(d: Document, severity: str) -> Document:
+    return next(f for f in d["intervals"] if f["severity"] == severity)  # type: ignore[no-any-return]
+
+
+def _calm(d: Document) -> None:
+    d["verdict"]["status"] = "ready"
+
+
+def _advice(d: Document) -> None:
+    _first(d, "high")["advice"] = "Nothing to do."
+
+
+def _minority(d: Document) -> None:
+    fault = _first(d, "high")
+    fault["mode"] = "noisy"
+
+
+def _size(d: Document) -> None:
+    next(f for f in d["intervals"] if f["epsilon"])["epsilon"]["value"] = 1.7
+
+
+def _late(d: Document) -> None:
+    d["intervals"][0]["detected_s"] = d["intervals"][0]["stop_s"] + 3.0
+
+
+def _softer(d: Document) -> None:
+    _first(d, "high")["severity"] = "low"
+
+
+def _healthy(d: Document) -> None:
+    for s in d["states"]:
+        s["state"] = "healthy"
+
+
+def _untold(d: Document) -> None:
+    d["verdict"]["actions"] = d["verdict"]["actions"][1:]
+
+
+def _sum(d: Document) -> None:
+    d["intervals"][0]["hypotheses"][0]["p"] = 0.2
+
+
+@pytest.mark.parametrize("spoil", [_calm, _advice, _minority, _size, _late, _softer, _healthy, _untold, _sum])
+def test_a_spoilt_result_is_seen(document: Document, spoil: Callable[[Document], None]) -> None:
+    assert contradictions(document) == []
+    changed = copy.deepcopy(document)
+    spoil(changed)
+    assert contradictions(changed) != []
