@@ -9,6 +9,7 @@ _COSTS = {
     "wheel.v_ref": "v_c,i is computed from v_c and ω_c by the kinematics; without those and a geometry there is no e and no Ψ̂",
     "wheel.v": "the speed sensor is not assessed, and the actuator only where its valve opening is measured (u_applied)",
     "wheel.v_true": "ε of the speed sensor rests on the wheel model instead of a second measurement",
+    "wheel.v_position": "a speed channel that leaves its own position is seen by other channels alone",
     "wheel.u": "the actuator is not assessed, no Ψ̂ is implied, and without v_true the speed sensor only by whether it follows v_c,i",
     "wheel.u_applied": "ε of the actuator rests on the wheel model, and a loss of the sensor and one of the actuator are harder to distinguish",
     "wheel.effort": "a drive without a valve is judged by its speed alone, and whether it is weak is not assessed",

@@ -15,6 +15,7 @@ from diagnosis.response.channel import holds_of, samples_of
 from diagnosis.response.findings import Spell, Wheel, finding_of, spells_of, spikes_of, where_asked
 from diagnosis.response.identification import identify_response, without_command
 from diagnosis.response.inputs import FollowerData, cell_of, cells
+from diagnosis.response.joint import cut, joint_of
 from diagnosis.response.jumps import jumps_of
 from diagnosis.response.kernel import posterior
 from diagnosis.response.machine import Judged, otherwise, standstills, unlike
@@ -23,7 +24,7 @@ from diagnosis.response.power import powers_of
 from diagnosis.results.assessment import CODE, Assessment, Finding
 from diagnosis.results.evidence_columns import Pictured, steps_of
 from diagnosis.results.vocabulary import Tier
-from replay.faults import State
+from replay.faults import FaultMode, State
 from replay.machine.config import Limits
 from replay.machine.geometry import Geometry
 
@@ -98,7 +99,8 @@ def assess_response(
     kept = {w: where_asked(spells, _asked(judged[w], limits), least) for w, spells in kept.items()}
     parts = {w: _sides(j, kept[w], left_out, limits, dt) for w, j in judged.items()}
     remarks = (*otherwise(judged, width * dt), *left_notes)
-    for w, text in unlike(judged).items():
+    doubts = {w: j.joint.unlike for w, j in judged.items() if j.joint is not None and j.joint.unlike}
+    for w, text in (doubts | unlike(judged)).items():
         parts[w] = _doubted(parts[w][0], text), parts[w][1]
     for w, (sensor, drive) in parts.items():
         j, about = judged[w], _asked(judged[w], limits)
@@ -143,15 +145,18 @@ def _judge(one: Judged, beside: Beside | None, dt: float, width: int) -> Judged:
     block_s, blocks = width * dt, one.wheel.blocks
     if beside is not None:  # what shakes other wheels too is no sensor's noise
         blocks = blocks._replace(usual=np.maximum(blocks.usual, beside.rough))
-    score = scores(blocks, one.driving, block_s, beside)
+    rolled = one.data.rolled
+    joint = None if rolled is None else joint_of(blocks, cells(rolled, width), beside)
+    score = scores(blocks, one.driving, block_s, beside, None if joint is None else joint.view)
     jumped = one.wheel.samples.step[one.wheel.jumps.place] // width
     enters, leaves = np.full((2, len(score)), [[-np.expm1(-block_s / t)] for t in (_MEAN_HEALTHY_S, _MEAN_FAULTY_S)])
     enters[jumped], leaves[jumped] = _AT_A_JUMP
     p = posterior(score, enters, leaves)
     return one._replace(
         posterior=p,
-        spells=spells_of(p, block_s),
+        spells=cut(spells_of(p, block_s), joint, blocks),
         speed=None if beside is None else beside.speed,
+        joint=joint,
         wheel=one.wheel._replace(compared="" if beside is None else beside.compared),
     )
 
@@ -172,7 +177,7 @@ def _asked(one: Judged, limits: Limits) -> Flags:
 def _others_fault(spell: Spell, wheel: str, judged: Mapping[str, Judged]) -> bool:
     """Whether what looks like a scale is the fault of the wheel that this one was compared with, or of the whole machine."""
     one = judged[wheel]
-    if not spell.mode.scaled and spell.mode.value != "outside_table":
+    if spell.own or (not spell.mode.scaled and spell.mode is not FaultMode.OUTSIDE_TABLE):
         return False
     for other, j in judged.items():
         for s in j.spells if other != wheel else ():
@@ -199,7 +204,7 @@ def _sides(
     doubtful = doubtful & ~((one.posterior.argmax(axis=1) == OTHER) & (one.speed is None) & one.calm)
     for spell in spells:
         long = (spell.stop - spell.start) * width * dt >= _LEAST_S
-        found = finding_of(spell, wheel, one.speed) if long and spell.p >= _LEAST_P else None
+        found = finding_of(spell, *_shown_by(one, spell)) if long and spell.p >= _LEAST_P else None
         if found is not None:
             findings.append(found)
         elif one.posterior[spell.start : spell.stop].argmax(axis=1).min() > NOISY and _entered_calmly(
@@ -221,6 +226,14 @@ def _sides(
         sensor[f.start : f.stop] = CODE[State(f.mode.value)]
         drive[f.start : f.stop] = CODE[State(f.mode.value) if f in both else State.MASKED]
     return _assessment(one, sensor, tuple(findings), limits, dt), _drive(one, drive, tuple(both))
+
+
+def _shown_by(one: Judged, spell: Spell) -> tuple[Wheel, Array | None]:
+    """The wheel and its speed by the channels that contradict it in a spell: its own position first."""
+    if one.joint is None or not spell.own:
+        return one.wheel, one.speed
+    view = one.joint.view
+    return one.wheel._replace(compared=view.compared), view.speed
 
 
 def _without_doubles(findings: Sequence[Finding]) -> list[Finding]:

@@ -57,12 +57,13 @@ class Wheel(NamedTuple):
 
 
 class Spell(NamedTuple):
-    """Blocks [start, stop) in one kind of state, with its probability."""
+    """Blocks [start, stop) in one kind of state, with its probability, and whether the position of its joint contradicts it."""
 
     start: int
     stop: int
     mode: FaultMode
     p: float
+    own: bool = False
 
 
 def spells_of(posterior: Array, block_s: float) -> list[Spell]:
@@ -238,6 +239,7 @@ def _scaled(spell: Spell, wheel: Wheel, span: tuple[int, int], speed: Array | No
             "drive's effort would."
         )
     sensor = 0.5 if bare else {0: _ONE_JUMP, 1: _ONE_JUMP, 2: _TWO_JUMPS}[(fell is not None) + (rose is not None)]
+    sensor = _TWO_JUMPS if spell.own else sensor  # one encoder, two channels
     misfit = float(np.sqrt(np.mean((y - gain * x) ** 2)) / np.sqrt(np.mean(x * x)))
     wide = 2.0 * misfit / np.sqrt(max(1.0, x.size / 4.0))
     loss = 1.0 - gain

@@ -32,6 +32,8 @@ class FollowerData:
         Of its channel.
     effort : bool
         Whether its effort is logged.
+    rolled : Array or None, shape (n,)
+        Speed by the position of its joint [m/s]; None where that is not logged.
     """
 
     y: Array
@@ -40,6 +42,7 @@ class FollowerData:
     asked: Array
     name: str
     effort: bool = False
+    rolled: Array | None = None
 
 
 def cell_of(dt: float) -> int:
@@ -74,7 +77,7 @@ def followers(mission: MissionView) -> dict[str, FollowerData]:
             continue
         own = mission.logged(f"wheel.{w}.v_ref") or body is None
         commands = cells(asked, width)[:, None] if own or body is None else body
-        out[w] = FollowerData(
-            mission.values(name), timeline.fresh[name], commands, asked, name, mission.logged(f"wheel.{w}.effort")
-        )
+        position, effort = f"wheel.{w}.v_position", mission.logged(f"wheel.{w}.effort")
+        rolled = mission.values(position) if mission.logged(position) else None
+        out[w] = FollowerData(mission.values(name), timeline.fresh[name], commands, asked, name, effort, rolled)
     return out

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from diagnosis.response.findings import Spell, Wheel
 from diagnosis.response.identification import Response
 from diagnosis.response.inputs import FollowerData
+from diagnosis.response.joint import Joint
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -36,6 +37,8 @@ class Judged(NamedTuple):
         Its speed by other channels [m/s].
     calm : Flags, shape (b,)
         Blocks in which a jump would be seen.
+    joint : Joint or None
+        The position of its joint.
     """
 
     data: FollowerData
@@ -46,6 +49,7 @@ class Judged(NamedTuple):
     spells: list[Spell]
     speed: Array | None
     calm: Flags
+    joint: Joint | None = None
 
 
 def standstills(idle: Sequence[tuple[int, int]], dt: float) -> tuple[str, ...]:

@@ -130,7 +130,9 @@ def blocks_of(samples: Samples, response: Response, cell: int, width: int, size:
     )  # fmt: skip
 
 
-def scores(blocks: Blocks, driving: Flags, block_s: float, beside: Beside | None = None) -> Array:
+def scores(
+    blocks: Blocks, driving: Flags, block_s: float, beside: Beside | None = None, joint: Beside | None = None
+) -> Array:
     """Log-likelihood of each block in each state, shape (b, states).
 
     Parameters
@@ -143,6 +145,8 @@ def scores(blocks: Blocks, driving: Flags, block_s: float, beside: Beside | None
         Length of a block [s].
     beside : Beside or None
         Another view of the same speed. Where it agrees, a misfit beside the command is none of the sensor's.
+    joint : Beside or None
+        The position of the same joint. Where it agrees it says nothing: both come from one encoder.
     """
     out = np.zeros((blocks.mean.size, STATES))
     moves = blocks.zero < blocks.readings
@@ -157,10 +161,12 @@ def scores(blocks: Blocks, driving: Flags, block_s: float, beside: Beside | None
     usual = _REPEATS * (blocks.same * np.log(repeat) + (blocks.readings - blocks.same) * np.log1p(-repeat)) * moves
     usual *= np.minimum(_FEW / np.maximum(blocks.readings, 1.0), 1.0) if repeat > _HABIT else 0.0
     for m, scale in ((HEALTHY, 1.0), *((NOISY + 1 + k, s) for k, s in enumerate(SCALES))):
-        out[:, m] = _misfit(blocks, scale, beside) + held + busy
+        out[:, m] = _misfit(blocks, scale, beside) + _contradicted(blocks, scale, joint) + held + busy
     out[:, OTHER] = (
         -_SECOND * _loss(_OTHER_Z) - (0.0 if beside is None else _BESIDE * _loss(_OTHER_Z) * beside.blame) + held + busy
     )
+    if joint is not None:
+        out[:, OTHER] -= _BESIDE * _loss(_OTHER_Z) * joint.blame * _apart(blocks, joint)
     out[:, FROZEN] = np.where(blocks.held & moves, 0.0, _NEVER)
     out[:, SILENT] = np.where(moves, _NEVER, 0.0)
     # noise changes with every sample: nothing repeats
@@ -182,6 +188,19 @@ def _misfit(blocks: Blocks, scale: float, beside: Beside | None, wider: float = 
     # what two views agree on is no misfit of one of them
     agreed = np.where(known, alone * np.clip(np.nan_to_num(other) / _loss(_OTHER_Z), 0.0, 1.0), alone)
     return np.asarray(agreed - _BESIDE * np.nan_to_num(other) * np.where(known, beside.blame, 0.0))
+
+
+def _contradicted(blocks: Blocks, scale: float, joint: Beside | None) -> Array:
+    """What a position takes from a scale of the speed beside it; nothing where both channels agree, whatever they show."""
+    if joint is None:
+        return np.zeros(blocks.mean.size)
+    off = _loss((blocks.mean - scale * joint.speed) / (max(scale, 0.3) * joint.noise))
+    return np.asarray(-_BESIDE * np.nan_to_num(off) * joint.blame * _apart(blocks, joint))
+
+
+def _apart(blocks: Blocks, joint: Beside) -> Array:
+    """How surely speed and position differ, 0…1."""
+    return np.clip(np.nan_to_num(_loss((blocks.mean - joint.speed) / joint.noise)) / _loss(_OTHER_Z), 0.0, 1.0)
 
 
 def _loss(z: Array | float) -> Array:

@@ -119,6 +119,7 @@ CANONICAL: tuple[CanonicalSignal, ...] = (
     _Entry("wheel", "v_ref", "speed", "commanded speed v_c,i", 6, Named(6, _SPEED_COMMAND)),
     _Entry("wheel", "v", "speed", "measured speed", 2, Named(7, _SPEED)),
     _Entry("wheel", "v_true", "speed", "second measurement of the speed", 3, Named(5, _SECOND_SPEED)),
+    _Entry("wheel", "v_position", "speed", "speed by the position of its joint"),
     _Entry("wheel", "u", "fraction", "valve command u_a", 8, _VALVE),
     _Entry("wheel", "u_applied", "fraction", "measured valve position", 10, _VALVE_POSITION),
     _Entry(

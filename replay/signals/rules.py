@@ -182,6 +182,10 @@ def _by_joint(channel: Channel, machine: Machine, others: Mapping[str, Channel])
             yield Candidate(f"wheel.{wheel}.{leaf}", _source(channel, "rad/s"), rank, why)
     elif wheel and kind == "position" and role == "measured":
         yield Candidate(f"wheel.{wheel}.v", _source(channel, "rad", derivative=True), rank + 20, f"position of {why}")
+        beside = re.sub(r"position", "velocity", channel.field, count=1)
+        if f"{channel.topic}.{beside}" in others:  # else it is the speed itself
+            source = _source(channel, "rad", derivative=True)
+            yield Candidate(f"wheel.{wheel}.v_position", source, rank, f"position of {why}")
     elif axle and kind == "position":
         leaf = {"measured": "phi", "ref": "phi_ref", "true": "phi_true"}.get(role)
         if leaf:

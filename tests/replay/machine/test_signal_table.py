@@ -18,11 +18,33 @@ def test_names_in_reading_order() -> None:
         *("cmd.v", "cmd.omega"),
         *(
             f"wheel.L.{x}"
-            for x in ("v_ref", "v", "v_true", "u", "u_applied", "effort", "psi", "pressure_a", "pressure_b")
+            for x in (
+                "v_ref",
+                "v",
+                "v_true",
+                "v_position",
+                "u",
+                "u_applied",
+                "effort",
+                "psi",
+                "pressure_a",
+                "pressure_b",
+            )
         ),
         *(
             f"wheel.R.{x}"
-            for x in ("v_ref", "v", "v_true", "u", "u_applied", "effort", "psi", "pressure_a", "pressure_b")
+            for x in (
+                "v_ref",
+                "v",
+                "v_true",
+                "v_position",
+                "u",
+                "u_applied",
+                "effort",
+                "psi",
+                "pressure_a",
+                "pressure_b",
+            )
         ),
         *(f"steer.front.{x}" for x in ("phi_ref", "phi", "phi_true", "u", "u_applied")),
         *("imu.yaw_rate", "gnss.lat", "gnss.lon", "gnss.speed", "odom.x", "odom.y", "odom.yaw", "odom.v"),
