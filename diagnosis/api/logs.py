@@ -26,7 +26,7 @@ class Log(Mapping[str, "pd.DataFrame"]):
 
     Each table has shape (samples, fields). It is indexed by ``time`` (UTC, the log's nanoseconds) in recorded order; its
     columns are fields as recorded (``velocity[fr_wheel]``), numbers in the recorded type, texts as text. ``attrs["units"]`` has
-    the units that the log states, ``attrs["type"]`` the message type. A field that a message does not hold is NaN, a text None.
+    the units that the log states, ``attrs["type"]`` the message type. A field that a message does not hold is missing (NaN).
     """
 
     def __init__(self, log: RawLog) -> None:
@@ -162,4 +162,4 @@ def read_log(
         if start_s is not None or stop_s is not None:
             last = summary.stop_ns + 1 if stop_s is None else summary.start_ns + round(stop_s * 1e9)
             window = summary.start_ns + round((start_s or 0.0) * 1e9), last
-    return Log(read(place, options, wanted, clock, window))
+    return Log(read(place, options, wanted, clock, window, texts=True))
