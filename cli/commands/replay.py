@@ -30,7 +30,8 @@ Output = Annotated[
     ),
 ]
 Raw = Annotated[
-    bool, typer.Option("--raw", help="Convert the log itself: all its numbers at their own stamps, no replay.")
+    bool,
+    typer.Option("--raw", help="Convert the log itself: all its numbers and texts at their own stamps, no replay."),
 ]
 Force = Annotated[bool, typer.Option("--force", help="Replace files that something else wrote.")]
 

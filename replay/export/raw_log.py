@@ -84,7 +84,7 @@ def write_raw(
     log = read_log(path, options, window=_window(path, options, start_s, stop_s), texts=True)
     groups = _groups(log)
     if not groups:
-        raise LogError(f"{path}: no numbers to convert: {_nothing(log)}")
+        raise LogError(f"{path}: no samples to convert: {_nothing(log)}")
     progress(Progress(Stage.HASHING, path.name))
     head = _head(path, log)
     try:
@@ -124,7 +124,7 @@ def _write_all(folder: Path, log: RawLog, groups: Sequence[_Group], head: RawHea
 
 
 def _nothing(log: RawLog) -> str:
-    """Say why a log holds no numbers."""
+    """Say why a log holds no samples."""
     topics = log.summary.topics
     if not topics or not any(t.count for t in topics):
         return "; ".join(log.summary.damage) or ("its topics hold no messages" if topics else "it holds no topics")

@@ -129,9 +129,8 @@ class _Taker:
         kinds = set(map(type, values))
         if self.with_texts and str in kinds and depth <= MAX_DEPTH and not self.full:
             pick = [type(v) is str and not (float in kinds and v in _WORDS) for v in values]
-            self.texts.append(
-                (path or "value", list(compress(rows, pick)), [_clean(v) for v in compress(values, pick)])
-            )
+            some = [_clean(v) for v in compress(values, pick)]
+            self.texts += [(path or "value", list(compress(rows, pick)), some)] if some else []
         if depth > MAX_DEPTH or self.full or kinds <= {str, type(None)}:
             return
         if kinds <= _NUMBERS:
