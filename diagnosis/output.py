@@ -152,11 +152,11 @@ def rebuild(path: Path, *, max_size_mb: float = 15.0, previous: tuple[Path, Repo
     """
     folder = path if path.is_dir() else path.parent
     source = folder / JSON if path.is_dir() else path
-    report = load_report(source)
+    saved = load_result(source)
+    report, columns, windows = saved.report, saved.columns, saved.windows
     if previous is not None:
         compared: ReportDocument = writable(with_previous(report, previous[1], str(previous[0])))
         report = compared
-    columns, windows = _read_table(folder / PARQUET), _read_windows(folder / WINDOWS)
     if previous is None:
         with atomic_path(folder / HTML) as html:
             _write_page(report, columns, windows, html, max_size_mb)
@@ -165,6 +165,19 @@ def rebuild(path: Path, *, max_size_mb: float = 15.0, previous: tuple[Path, Repo
             document.write_bytes(_json(report))
             _write_page(report, columns, windows, html, max_size_mb)
     return folder / HTML
+
+
+def load_result(path: Path) -> MissionResult:
+    """Read a saved result: a ``report.json`` and the time series beside it.
+
+    Raises
+    ------
+    LogError
+        Where one of its files is missing, damaged, or not of this tool.
+    """
+    report = load_report(path)
+    columns = _read_table(path.with_name(PARQUET))
+    return MissionResult(report, columns, _read_windows(path.with_name(WINDOWS)))
 
 
 def load_report(path: Path) -> ReportDocument:

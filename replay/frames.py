@@ -15,13 +15,14 @@ def log_frames(log: RawLog) -> dict[str, pd.DataFrame]:
     Parameters
     ----------
     log : RawLog
-        From `replay.readers.registry.read_log`.
+        From `replay.readers.registry.read_log`; with `texts` the tables hold texts too.
 
     Returns
     -------
     dict[str, pd.DataFrame]
         By topic, or by the file's groups ``group 1``, ``group 2`` …; indexed by time (UTC) in recorded order, one column
-        per field as recorded. ``attrs["units"]`` holds the units that the log states. Fields that are not in every
+        per field as recorded. ``attrs["units"]`` holds the units that the log states, ``attrs["type"]`` the type of
+        the messages. Fields that are not in every
         message have NaN elsewhere.
     """
     groups: dict[object, list[Channel]] = {}
@@ -41,6 +42,7 @@ def _frame(channels: list[Channel]) -> pd.DataFrame:
         columns[channel.field] = series.to_numpy()
     frame = pd.DataFrame(columns, index=pd.to_datetime(whole, utc=True).rename("time"))
     frame.attrs["units"] = {c.field: c.unit for c in channels if c.unit}
+    frame.attrs["type"] = channels[0].type_name
     return frame
 
 

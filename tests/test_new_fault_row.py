@@ -53,7 +53,7 @@ sys.meta_path.insert(0, Finder())
 
 import numpy as np
 
-from cli.commands.fault_spec import parse_fault
+from diagnosis.api.fault_words import parse_fault
 from cli.tables.looks import mode_text
 from diagnosis.audit.fleet.page.svg import LEGEND, sprite
 from diagnosis.decision.severity import severity_of

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).resolve().parents[1]
-PACKAGES = ("replay", "diagnosis", "cli")
+PACKAGES = ("replay", "diagnosis", "cli", "mfhca")
 
 
 def test_the_trees_are_a_resource_of_their_package() -> None:

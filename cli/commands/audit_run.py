@@ -2,22 +2,21 @@
 
 from __future__ import annotations
 
-import os
 import signal
-from collections.abc import Callable, Iterator
-from contextlib import AbstractContextManager, contextmanager, suppress
-from dataclasses import dataclass, replace
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 from cli.terminal.console import Terminal
 from cli.terminal.options import FailOn
-from replay.errors import ConfigError, LogError, OutputError
+from diagnosis.api.auditing import AuditRequest as ApiRequest
+from replay.errors import ConfigError, OutputError
 from replay.progress import Stage
 
 if TYPE_CHECKING:
     from diagnosis.audit.discovery.discover import Discovery
-    from diagnosis.audit.engines import Engine
     from diagnosis.audit.events import Emit, EventFacts
     from diagnosis.audit.plan import AuditOptions
 
@@ -60,17 +59,12 @@ class AuditRequest:
     dask: str | None
     max_size_mb: float
 
-    @property
-    def at_once(self) -> int:
-        """Missions at once on this machine."""
-        return self.jobs or _processors()
-
-    def engine(self) -> Callable[[], AbstractContextManager[Engine]]:
-        """What runs missions: processes of this machine, or a Dask cluster."""
-        from diagnosis.audit import engines
-
-        address = self.dask
-        return (lambda: engines.dask(address)) if address else (lambda: engines.local(self.at_once))
+    def asked(self) -> ApiRequest:
+        """What is asked of the audit itself, whoever shows it."""
+        return ApiRequest(
+            tuple(self.paths), self.output, self.machine, self.machine_id, self.jobs, self.memory_mb, self.timeout_s,
+            self.cpu_s, self.retries, self.resume, self.dask, self.max_size_mb,
+        )  # fmt: skip
 
     def check(self) -> None:
         """Raise a `ConfigError` where options do not go together."""
@@ -78,8 +72,7 @@ class AuditRequest:
             raise ConfigError("--json and --events -: both would write to stdout; give --events a file")
         if self.export not in (None, "parquet"):
             raise ConfigError(f"--export {self.export}: expected parquet")
-        if self.machine_id is not None and not self.machine_id.strip():
-            raise ConfigError("--machine-id: is empty; give a name or leave it out")
+        self.asked().check()
 
 
 def run_audit(terminal: Terminal, request: AuditRequest) -> int:
@@ -87,7 +80,7 @@ def run_audit(terminal: Terminal, request: AuditRequest) -> int:
     request.check()
     _end_with_the_terminal()
     with terminal.progress(Stage.LOOKING_FOR_MISSIONS):
-        found, asked = _found(request)
+        found, asked = request.asked().found()
     for problem in found.problems:
         terminal.error(problem)  # also when quiet: a disk may not be there
     for note in found.notes:
@@ -100,37 +93,11 @@ def run_audit(terminal: Terminal, request: AuditRequest) -> int:
     return _audit(terminal, request, found, asked)
 
 
-def _found(request: AuditRequest) -> tuple[Discovery, AuditOptions]:
-    """Missions, and how each is to be diagnosed."""
-    from diagnosis.audit.discovery.discover import discover
-    from diagnosis.audit.isolation.limits import Limits, usual_memory_mb
-    from diagnosis.audit.plan import AuditOptions, merged_machines
-
-    found = discover(request.paths, exclude=request.output)
-    memory = request.memory_mb or (usual_memory_mb(request.at_once) if request.dask is None else Limits.memory_mb)
-    limits = Limits(memory, request.timeout_s, request.cpu_s)
-    asked = AuditOptions(
-        request.output,
-        request.machine,
-        request.machine_id or "",
-        limits,
-        request.retries,
-        request.resume,
-        request.max_size_mb,
-    )
-    return replace(found, notes=(*found.notes, *merged_machines(found.missions, asked))), asked
-
-
 def _end_with_the_terminal() -> None:
     """Take a lost terminal as being asked to end, where SIGTERM is and the caller (nohup) does not ignore it."""
     ended = signal.getsignal(signal.SIGTERM)
     if hasattr(signal, "SIGHUP") and callable(ended) and signal.getsignal(signal.SIGHUP) is signal.SIG_DFL:
         signal.signal(signal.SIGHUP, ended)
-
-
-def _processors() -> int:
-    """Processors that this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def _list(terminal: Terminal, found: Discovery, asked: AuditOptions, json: bool) -> None:
@@ -152,24 +119,21 @@ def _list(terminal: Terminal, found: Discovery, asked: AuditOptions, json: bool)
 
 def _audit(terminal: Terminal, request: AuditRequest, found: Discovery, asked: AuditOptions) -> int:
     from cli.tables.audit import document, summary_parts
-    from diagnosis.audit.endings import NOT_READ, exit_code
-    from diagnosis.audit.session import Audited, audit
+    from diagnosis.api.auditing import run
+    from diagnosis.audit.endings import NOT_READ
+    from diagnosis.audit.session import Audited
 
     with _published(terminal, request) as emit:
-        for text in (*found.problems, *found.notes):
-            emit("problem", {"reason": text})
-        if not found.missions:
-            if request.json:
-                terminal.show_json(document(Audited((), 0, 0), found, asked.output, NOT_READ))
-            skipped = f" ({found.left_aside} files are not logs)" if found.left_aside else ""
-            raise LogError(f"no mission was found{skipped}")
+        if not found.missions and request.json:
+            terminal.show_json(document(Audited((), 0, 0), found, asked.output, NOT_READ))
         baseline = request.baseline
         store = baseline / "fleet.sqlite" if baseline is not None and baseline.is_dir() else baseline
-        audited = audit(found, asked, request.engine(), emit, baseline=store, axis=request.trends)
+        done = run(request.asked(), found, asked, emit, store, request.trends)
         if request.export:
             _export(asked.output)
-        code = max(exit_code(audited.ends, request.fail_on.value), NOT_READ if found.problems else 0)
-        emit("end", {"code": code, "failed": audited.failed})
+        code = done.exit_code(request.fail_on.value)
+        emit("end", {"code": code, "failed": done.failed})
+    audited = Audited(done.ends, done.skipped, done.failed, done.gone)
     if request.json:
         terminal.show_json(document(audited, found, asked.output, code))
     else:

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from cli.terminal.command import Quiet, Verbose, terminal_of
-from cli.terminal.inputs import machine_of, mission_paths
 from cli.terminal.options import Json, Logs, MachineFile
+from diagnosis.api.inputs import machine_of, mission_paths
 from replay.progress import Stage
 
 if TYPE_CHECKING:

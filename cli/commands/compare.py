@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from cli.commands.saved_results import result_file
 from cli.terminal.command import Quiet, Verbose, terminal_of
-from cli.terminal.inputs import check_output
 from cli.terminal.options import Json
+from diagnosis.api.inputs import check_output
+from diagnosis.api.saved_results import result_file
 
 if TYPE_CHECKING:
     from diagnosis.comparison.compare import Comparison

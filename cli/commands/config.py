@@ -9,8 +9,8 @@ import typer
 
 from cli.commands.config_init import run_init
 from cli.terminal.command import App, Quiet, Verbose, terminal_of
-from cli.terminal.inputs import machine_of, mission_paths
 from cli.terminal.options import Json, MachineFile
+from diagnosis.api.inputs import machine_of, mission_paths
 from replay.errors import ConfigError
 from replay.progress import Stage
 from replay.setup.preset import Preset

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from cli.terminal.console import Terminal
-from cli.terminal.inputs import mission_paths
+from diagnosis.api.inputs import mission_paths
 from replay.errors import ConfigError
 from replay.progress import Stage
 

@@ -12,8 +12,8 @@ import typer
 from cli.terminal.browser import show_page
 from cli.terminal.command import Quiet, Verbose, terminal_of
 from cli.terminal.console import Terminal
-from cli.terminal.inputs import check_output, check_times, machine_of, mission_paths
 from cli.terminal.options import End, Json, Logs, MachineFile, OpenPage, Start
+from diagnosis.api.inputs import check_output, check_times, machine_of, mission_paths
 from replay.errors import ConfigError
 from replay.progress import Progress, Stage
 

@@ -6,12 +6,12 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from cli.commands.saved_results import previous_result
 from cli.tables.clips import FOLDER, show_clips
 from cli.terminal.browser import show_page
 from cli.terminal.console import Terminal
-from cli.terminal.inputs import check_output, check_times, check_wheels, machine_of, mission_paths
 from cli.terminal.options import FailOn
+from diagnosis.api.inputs import check_output, check_times, check_wheels, machine_of, mission_paths
+from diagnosis.api.saved_results import previous_result
 from replay.progress import Progress, Stage, Subscriber
 
 if TYPE_CHECKING:
@@ -20,7 +20,6 @@ if TYPE_CHECKING:
     from replay.machine.config import Machine
     from replay.mission import Mission
 
-_FAULTS, _NOT_JUDGED = 1, 3
 _OUTPUTS = ("report.html", "report.json", "report.parquet")
 
 
@@ -90,7 +89,9 @@ def run_diagnosis(terminal: Terminal, request: DiagnoseRequest) -> int:
         _cut_clips(terminal, mission, result, checked, request.clip_margin_s)
     if request.open_page:
         show_page(terminal, page)
-    return _exit_code(result.report, request.fail_on)
+    from diagnosis.api.verdict import exit_code
+
+    return exit_code(result.report, request.fail_on.value)
 
 
 def _checked(request: DiagnoseRequest) -> _Checked:
@@ -187,18 +188,6 @@ def _default_folder(log: Path) -> Path:
     """``<stem>-report`` in the current folder; a compressed table loses both endings."""
     stem = log.resolve().name if log.is_dir() else log.name.removesuffix(".gz").rsplit(".", 1)[0]
     return Path(f"{stem or log.name}-report")
-
-
-def _exit_code(report: ReportDocument, fail_on: FailOn) -> int:
-    """1 where an interval is at least as severe as asked, else 3 where nothing could be judged."""
-    if fail_on is FailOn.NEVER:
-        return 0
-    from diagnosis.results.vocabulary import Severity, Verdict
-
-    least = Severity(fail_on.value).rank
-    if any(Severity(interval["severity"]).rank >= least for interval in report["intervals"]):
-        return _FAULTS
-    return _NOT_JUDGED if report["verdict"]["status"] == Verdict.NOT_ASSESSED else 0
 
 
 def _show_plan(terminal: Terminal, checked: _Checked, json: bool) -> None:

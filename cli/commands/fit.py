@@ -8,8 +8,9 @@ from typing import Annotated
 import typer
 
 from cli.terminal.command import Quiet, Verbose, terminal_of
-from cli.terminal.inputs import check_output, find_logs, machine_of
+from cli.terminal.inputs import find_logs
 from cli.terminal.options import Json, MachineFile
+from diagnosis.api.inputs import check_output, machine_of
 from replay.errors import ConfigError, LogError, NotJudged
 from replay.progress import Stage
 

@@ -8,10 +8,11 @@ from typing import Annotated
 
 import typer
 
-from cli.commands.inject_run import InjectRequest, run_injection
+from cli.commands.inject_run import run_injection
 from cli.terminal.command import Quiet, Verbose, terminal_of
-from cli.terminal.log_format import LogFormat
 from cli.terminal.options import Json, Logs, MachineFile
+from diagnosis.api.injecting import InjectRequest
+from diagnosis.api.log_format import LogFormat
 
 EXAMPLES = """\b
 Examples:
@@ -92,9 +93,9 @@ def inject(
 ) -> None:
     """Inject sensor (L4) and actuator (L8) faults into a recorded log: a new log, and its truth beside it."""
     request = InjectRequest(
-        logs=logs,
+        paths=tuple(logs),
         output=output,
-        faults=fault or [],
+        faults=tuple(fault or ()),
         random=random,
         count=count,
         seed=seed,
@@ -103,9 +104,7 @@ def inject(
         keep_true=keep_true,
         second_noise=second_noise,
         plant=plant,
-        machine=machine,
         format=format,
         force=force,
-        json=json,
     )
-    run_injection(terminal_of(context, json=json), request)
+    run_injection(terminal_of(context, json=json), request, machine, json)

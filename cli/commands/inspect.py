@@ -13,8 +13,9 @@ import typer
 
 from cli.terminal.command import Quiet, Verbose, terminal_of
 from cli.terminal.console import Terminal
-from cli.terminal.inputs import FoundLogs, find_logs, machine_of
+from cli.terminal.inputs import FoundLogs, find_logs
 from cli.terminal.options import Json, MachineFile
+from diagnosis.api.inputs import machine_of
 from replay.errors import MfhcaError
 from replay.progress import Stage
 

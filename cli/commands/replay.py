@@ -10,8 +10,8 @@ import typer
 
 from cli.terminal.command import Quiet, Verbose, terminal_of
 from cli.terminal.console import Terminal
-from cli.terminal.inputs import check_output, check_times, machine_of, mission_paths
 from cli.terminal.options import End, Json, Logs, MachineFile, Start
+from diagnosis.api.inputs import check_output, check_times, machine_of, mission_paths
 from replay.errors import ConfigError
 from replay.progress import Progress, Stage
 
@@ -30,7 +30,8 @@ Output = Annotated[
     ),
 ]
 Raw = Annotated[
-    bool, typer.Option("--raw", help="Convert the log itself: all its numbers at their own stamps, no replay.")
+    bool,
+    typer.Option("--raw", help="Convert the log itself: all its numbers and texts at their own stamps, no replay."),
 ]
 Force = Annotated[bool, typer.Option("--force", help="Replace files that something else wrote.")]
 

@@ -7,11 +7,11 @@ from typing import Annotated
 
 import typer
 
-from cli.commands.saved_results import previous_result
 from cli.terminal.browser import show_page
 from cli.terminal.command import Quiet, Verbose, terminal_of
-from cli.terminal.inputs import mission_paths
 from cli.terminal.options import MaxSize, OpenPage, Previous
+from diagnosis.api.inputs import mission_paths
+from diagnosis.api.saved_results import previous_result
 from replay.progress import Stage
 
 EXAMPLES = """\b

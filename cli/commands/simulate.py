@@ -8,10 +8,11 @@ from typing import Annotated
 
 import typer
 
-from cli.commands.simulate_run import SimulateRequest, run_simulation
+from cli.commands.simulate_run import run_simulation
 from cli.terminal.command import Quiet, Verbose, terminal_of
-from cli.terminal.log_format import LogFormat
 from cli.terminal.options import Json
+from diagnosis.api.log_format import LogFormat
+from diagnosis.api.simulation_options import SimulateRequest
 
 EXAMPLES = """\b
 Examples:
@@ -188,10 +189,9 @@ def simulate(
         controller=None if controller is None else controller.value,
         ice=ice,
         format=format,
-        faults=fault or [],
-        settings=setting or [],
+        faults=tuple(fault or ()),
+        settings=tuple(setting or ()),
         vary=vary,
         force=force,
-        json=json,
     )
-    run_simulation(terminal_of(context, json=json), request)
+    run_simulation(terminal_of(context, json=json), request, json)

@@ -1,98 +1,13 @@
-"""From what the user typed to checked paths, machines and times."""
+"""From the words of a command line to the logs behind them."""
 
 from __future__ import annotations
 
 import glob
-import math
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING
 
-from replay.errors import ConfigError, LogError
-from replay.log.file_types import LOG_ENDINGS, check_regular, is_result, part_of, words_of
-
-if TYPE_CHECKING:
-    from replay.machine.config import Machine
-
-DEFAULT_MACHINE = "paper defaults"
-
-
-def machine_of(path: Path | None) -> tuple[Machine, str]:
-    """Read the machine file, or take the paper's machine; with the name to show for it."""
-    from replay.machine.config import haulotte
-    from replay.machine.toml_file import load_machine
-
-    return (haulotte(), DEFAULT_MACHINE) if path is None else (load_machine(path), path.name)
-
-
-def mission_paths(paths: Sequence[Path]) -> list[Path]:
-    """Check that the files of one mission are there, each once.
-
-    Raises
-    ------
-    LogError
-        Where one does not exist, is a pipe or a device, or is a folder of separate logs.
-    ConfigError
-        Where one is given twice.
-    """
-    for path in paths:
-        if not path.exists():
-            hint = "; give each file of the mission by its name" if glob.has_magic(str(path)) else ""
-            raise LogError(f"{path}: no such file{hint}")
-        check_regular(path)
-        if path.is_dir():
-            _check_one_recording(path)
-    real = [p.resolve() for p in paths]
-    for i, path in enumerate(real):
-        if path in real[:i]:
-            raise ConfigError(f"{paths[i]}: given twice; give each file of the mission once")
-    return list(paths)
-
-
-def _check_one_recording(folder: Path) -> None:
-    """Raise a `LogError` where a folder without rosbag2's description holds files that are no numbered parts."""
-    if (folder / "metadata.yaml").is_file():
-        return
-    parts = [p.name for p in folder.iterdir() if p.name.lower().endswith((".db3", ".mcap"))]
-    stems = {part[0] if (part := part_of(name)) else name for name in parts}
-    if len(stems) > 1:
-        raise LogError(
-            f"{folder}: is a folder of {len(parts)} logs, not one rosbag2 recording; give the files of one mission "
-            "by their names"
-        )
-
-
-def check_output(outputs: Iterable[Path], inputs: Iterable[Path]) -> None:
-    """Raise a `ConfigError` where a result would replace a log, or stand inside a recording's folder."""
-    for output in (o.resolve() for o in outputs):
-        for path in inputs:
-            real = path.resolve()
-            if output == real or real in output.parents:
-                raise ConfigError(
-                    f"{path}: would be changed by writing {output.name} there; give another place with -o"
-                )
-
-
-def check_times(start: float | None, end: float | None) -> None:
-    """Raise a `ConfigError` where the asked part of a mission cannot be one."""
-    for name, value in (("--start", start), ("--end", end)):
-        if value is not None and not (math.isfinite(value) and value >= 0):
-            raise ConfigError(f"{name} {value:g}: expected seconds from the mission's start, 0 or more")
-    if start is not None and end is not None and end <= start:
-        raise ConfigError(f"--end {end:g}: must be later than --start {start:g}")
-
-
-def check_wheels(wheels: Sequence[str] | None, machine: Machine) -> tuple[str, ...] | None:
-    """Give the asked wheels as the machine spells them, in its order; None where none are asked for."""
-    if not wheels:
-        return None
-    spelling = {w.casefold(): w for w in machine.wheels}
-    for wheel in wheels:
-        if wheel.casefold() not in spelling:
-            raise ConfigError(f"--wheel {wheel}: no such wheel; the machine has {', '.join(machine.wheels)}")
-    asked = {spelling[w.casefold()] for w in wheels}
-    return tuple(w for w in machine.wheels if w in asked)
+from replay.log.file_types import LOG_ENDINGS, is_result, words_of
 
 
 @dataclass

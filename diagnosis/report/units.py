@@ -51,10 +51,11 @@ def units_of(
         for c in (*(row.band or ()), *((row.threshold,) if row.threshold else ())):
             known.setdefault(c, (row.unit, row.band_scale))
     recorded = {s["name"]: s["unit"] for s in report["signals"]}
-    return [known.get(c) or on_page(recorded.get(c) or _unit(c, report)) for c in columns]
+    return [known.get(c) or on_page(recorded.get(c) or unit_of(c, report)) for c in columns]
 
 
-def _unit(column: str, report: ReportDocument) -> str:
+def unit_of(column: str, report: ReportDocument) -> str:
+    """Unit of a column as it is kept: SI, ``1`` for shares and probabilities, ``unknown unit`` where nothing tells."""
     head, _, rest = column.partition(".")
     component, _, leaf = rest.rpartition(".")
     if head == "evidence":

@@ -75,16 +75,16 @@ def write_raw(
     Raises
     ------
     LogError
-        Where the log cannot be read or holds no numbers.
+        Where the log cannot be read or holds no samples.
     OutputError
         Where the folder cannot be written, or holds something else.
     """
     refuse_foreign_folder(folder, force=force)
     progress(Progress(Stage.READING, path.name))
-    log = read_log(path, options, window=_window(path, options, start_s, stop_s))
+    log = read_log(path, options, window=_window(path, options, start_s, stop_s), texts=True)
     groups = _groups(log)
     if not groups:
-        raise LogError(f"{path}: no numbers to convert: {_nothing(log)}")
+        raise LogError(f"{path}: no samples to convert: {_nothing(log)}")
     progress(Progress(Stage.HASHING, path.name))
     head = _head(path, log)
     try:
@@ -124,7 +124,7 @@ def _write_all(folder: Path, log: RawLog, groups: Sequence[_Group], head: RawHea
 
 
 def _nothing(log: RawLog) -> str:
-    """Say why a log holds no numbers."""
+    """Say why a log holds no samples."""
     topics = log.summary.topics
     if not topics or not any(t.count for t in topics):
         return "; ".join(log.summary.damage) or ("its topics hold no messages" if topics else "it holds no topics")
@@ -185,6 +185,11 @@ def _names(groups: Iterable[_Group]) -> list[str]:
     return names
 
 
+def _type_of(channel: Channel) -> str:
+    """Number type, or ``text``."""
+    return "text" if channel.values.dtype == object else str(channel.values.dtype)
+
+
 def _write(path: Path, group: _Group, head: RawHead) -> RawFile:
     """Write one file, some rows at a time, and describe it."""
     names = [c.name for c in group.channels]
@@ -192,7 +197,9 @@ def _write(path: Path, group: _Group, head: RawHead) -> RawFile:
     fields = [pa.field(stamp, pa.int64(), nullable=False, metadata={"unit": "ns"})]
     for c in group.channels:
         about = {"topic": c.topic, "field": c.field, "type": c.type_name} | ({"unit": c.unit} if c.unit else {})
-        fields.append(pa.field(c.name, pa.from_numpy_dtype(c.values.dtype), nullable=False, metadata=about))
+        text = c.values.dtype == object
+        kind = pa.string() if text else pa.from_numpy_dtype(c.values.dtype)
+        fields.append(pa.field(c.name, kind, nullable=text, metadata=about))
     origin = {f"mfhca.{key}": str(value) for key, value in head.items()} | {
         "mfhca.topic": group.topic,
         "mfhca.time": stamp,
@@ -203,7 +210,8 @@ def _write(path: Path, group: _Group, head: RawHead) -> RawFile:
     with pq.ParquetWriter(path, schema, compression="zstd", write_page_checksum=True) as writer:
         for at in range(0, count, step):
             part = slice(at, min(at + step, count))
-            arrays = [pa.array(group.stamps[part]), *(pa.array(c.values[part]) for c in group.channels)]
+            cells = zip(group.channels, fields[1:], strict=True)
+            arrays = [pa.array(group.stamps[part]), *(pa.array(c.values[part], field.type) for c, field in cells)]
             writer.write_batch(pa.record_batch(arrays, schema=schema))
     return {
         "file": path.name,
@@ -212,7 +220,5 @@ def _write(path: Path, group: _Group, head: RawHead) -> RawFile:
         "rows": count,
         "first_ns": int(group.stamps.min()) if count else None,
         "last_ns": int(group.stamps.max()) if count else None,
-        "columns": [
-            {"name": c.name, "field": c.field, "dtype": str(c.values.dtype), "unit": c.unit} for c in group.channels
-        ],
+        "columns": [{"name": c.name, "field": c.field, "dtype": _type_of(c), "unit": c.unit} for c in group.channels],
     }

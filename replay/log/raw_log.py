@@ -29,7 +29,8 @@ class Channel:
     stamps : NDArray[np.int64], shape (n,)
         Time of each sample on the chosen clock, in nanoseconds since 1970, in recorded order.
     values : NDArray, shape (n,)
-        Recorded values in the recorded number type; NaN only where NaN was recorded or a cell was empty.
+        Recorded values in the recorded number type; NaN only where NaN was recorded or a cell was empty. Texts, which are
+        channels where they are asked for, are objects; None where a cell was empty.
     unit : str or None
         Unit as the file states it, or None where it states none.
     type_name : str

@@ -94,14 +94,15 @@ def read_log(
     clock: Clock | None = None,
     window: Window | None = None,
     store: ColumnStore | None = None,
+    texts: bool = False,
 ) -> RawLog:
     """Decode a log, or the given topics and time of it, with its long columns in the store (None: one of its own).
 
-    The clock is that of the options unless given.
+    The clock is that of the options unless given. Fields of text become channels where `texts` says so.
 
     Raises
     ------
     LogError
         Where nothing in the log can be read.
     """
-    return open_log(path).read(path, options, topics, clock or options.stamp, window, store)
+    return open_log(path).read(path, options, topics, clock or options.stamp, window, store, texts)

@@ -102,6 +102,7 @@ class Bordered:
         clock: Clock = "header",
         window: Window | None = None,
         store: ColumnStore | None = None,
+        texts: bool = False,
     ) -> RawLog:
         """Decode the log, as `Reader.read`.
 
@@ -111,4 +112,4 @@ class Bordered:
             Where nothing in the log can be read.
         """
         with bordered(path, self.format):
-            return self.inner.read(path, options, topics, clock, window, store)
+            return self.inner.read(path, options, topics, clock, window, store, texts)

@@ -38,6 +38,7 @@ class Reader(Protocol):
         clock: Clock = "header",
         window: Window | None = None,
         store: ColumnStore | None = None,
+        texts: bool = False,
     ) -> RawLog:
         """Decode the numeric fields of the given topics (all where None) into columns.
 
@@ -56,6 +57,8 @@ class Reader(Protocol):
             places outside is not opened.
         store : ColumnStore or None
             Where long columns stand; None: one of the log's own.
+        texts : bool
+            Whether fields of text become channels too, arrays of text objects, shape (n,).
 
         Raises
         ------

@@ -60,6 +60,7 @@ class McapReader:
         clock: Clock = "header",
         window: Window | None = None,
         store: ColumnStore | None = None,
+        texts: bool = False,
     ) -> RawLog:
         """Decode the given topics and time.
 
@@ -68,7 +69,9 @@ class McapReader:
         LogError
             Where nothing in the file can be read.
         """
-        return read_files([path], path, self.format, Report(store=store or ColumnStore()), topics, clock, window)
+        return read_files(
+            [path], path, self.format, Report(store=store or ColumnStore()), topics, clock, window, texts=texts
+        )
 
 
 def read_files(
@@ -80,14 +83,15 @@ def read_files(
     clock: Clock,
     window: Window | None = None,
     unpack: Callable[[Iterable[Block]], Iterator[list[Block]]] | None = None,
+    texts: bool = False,
 ) -> RawLog:
     """Read the files of one recording as one log; a file that cannot be read is damage unless it is the only one.
 
     Without a window every record of every file is walked and held against index and statistics; with one, only what
-    the index places inside it is opened. `unpack` expands messages that were compressed one by one.
+    the index places inside it is opened. `unpack` expands messages that were compressed one by one; `texts` are channels where wanted.
     """
     opened = open_files(files, source, report, walk=window is None)
-    assembler = Assembler(clock, report)
+    assembler = Assembler(clock, report, texts)
     for file in opened:
         if window is None:
             for number, count in expected(file)[0].items():

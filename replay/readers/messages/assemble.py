@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
+from itertools import chain
 from typing import Any
 
 import numpy as np
@@ -18,7 +19,9 @@ from replay.readers.messages.cdr_layout import MAX_ELEMENTS
 from replay.readers.messages.cdr_program import Spec
 from replay.readers.messages.connection import Block, Connection
 from replay.readers.messages.description_text import description_in
+from replay.readers.messages.protobuf_texts import text_parts
 from replay.readers.messages.tables import Budget, Cells, Table
+from replay.readers.messages.texts import GIVE_UP, TextDecoder, TextStore, has_texts
 from replay.readers.messages.topic_store import Store
 
 MEMORY = 512 << 20
@@ -38,7 +41,9 @@ class _Topic:
     stamp: str | None = None
     outcome: cdr.Outcome = field(default_factory=cdr.Outcome)
     known: set[Connection] = field(default_factory=set)
+    texts: TextStore | None = None
     decoders: dict[Connection, cdr.Decoder] = field(default_factory=dict)
+    readers: dict[Connection, TextDecoder | None] = field(default_factory=dict)
     walkers: dict[Connection, protobuf.Decoder] = field(default_factory=dict)
     mute: str = ""
 
@@ -67,7 +72,10 @@ class _Topic:
         connection, places = block.connection, (block.data, block.starts, block.lengths)
         if connection.encoding in ("json", "protobuf"):
             for part in self._parts(connection, places):
-                self.store.add(part if slots is None else replace(part, rows=slots[part.rows]))
+                own = part if slots is None else replace(part, rows=slots[part.rows])
+                self.store.add(own)
+                if self.texts is not None and own.texts:
+                    self.texts.add(own.rows + self.store.count, own.texts)
             return
         decoder = self.decoders.get(connection)
         if decoder is None:
@@ -75,12 +83,22 @@ class _Topic:
             self.stamp = kind.stamp
             decoder = self.decoders[connection] = cdr.Decoder(kind, self.outcome, self.store)
         decoder.decode(*places, slots)
+        if self.texts is not None:
+            self._take_texts(self.texts, block, np.arange(len(block.starts)) if slots is None else slots)
+
+    def _take_texts(self, texts: TextStore, block: Block, slots: NDArray[np.int64]) -> None:
+        if block.connection not in self.readers:
+            kind = block.connection.message_type()
+            self.readers[block.connection] = TextDecoder(kind, texts) if has_texts(kind) else None
+        reader = self.readers[block.connection]
+        if reader is not None:
+            reader.decode(block.data, block.starts, block.lengths, slots + self.store.count)
 
     def _parts(
         self, connection: Connection, places: tuple[NDArray[np.uint8], NDArray[np.int64], NDArray[np.int64]]
     ) -> Iterable[cdr.Part]:
         if connection.encoding == "json":
-            stamp, parts = json_messages.decode(*places, self.outcome)
+            stamp, parts = json_messages.decode(*places, self.outcome, texts=self.texts is not None)
             self.stamp = stamp or self.stamp
             return parts
         walker = self.walkers.get(connection)
@@ -88,7 +106,7 @@ class _Topic:
             schema = connection.protobuf_schema()
             self.stamp = schema.stamp and schema.stamp[0]
             walker = self.walkers[connection] = protobuf.Decoder(schema, self.outcome)
-        return walker.decode(*places)
+        return chain(walker.decode(*places), text_parts(walker.schema, *places) if self.texts is not None else ())
 
     def _keep_stamps(self, blocks: list[Block], slots: list[NDArray[np.int64] | None], count: int) -> None:
         """Copy the container's stamps; publish stamps only where they are asked for."""
@@ -114,10 +132,10 @@ def _slots(blocks: list[Block]) -> list[NDArray[np.int64] | None]:
 
 
 class Assembler:
-    """Collects blocks and builds the `RawLog`."""
+    """Collects blocks and builds the `RawLog`, with the messages' texts where they are asked for."""
 
-    def __init__(self, clock: Clock, report: Report) -> None:
-        self.clock, self.report = clock, report
+    def __init__(self, clock: Clock, report: Report, texts: bool = False) -> None:
+        self.clock, self.report, self.texts = clock, report, texts
         self.topics: dict[tuple[str, str], _Topic] = {}
         self.expected: dict[tuple[str, str], int] = {}
         self.stamps = (Spec("log", "i8"), Spec("publish", "i8"))[: 2 if clock == "publish" else 1]
@@ -142,8 +160,9 @@ class Assembler:
                 count = self.expected.get(key, 0)
                 stamps = Table(0, self.stamps, self.report.store, count, self.budget)
                 topic = self.topics[key] = _Topic(
-                    batch[0].connection, Store(count, self.budget, self.report.store), stamps
-                )
+                    batch[0].connection, Store(count, self.budget, self.report.store), stamps,
+                    texts=TextStore() if self.texts else None,
+                )  # fmt: skip
             topic.add([_within_range(b, self.report) for b in batch])
         self.batches += 1
         if self.batches % _LOOK_EVERY == 0:
@@ -185,6 +204,7 @@ class Assembler:
     def _channels(self, label: str, topic: _Topic) -> Iterable[Channel]:
         count = topic.store.count
         columns = topic.store.finish()
+        texts = {} if topic.texts is None else topic.texts.finish(count)
         self._say(label, topic)
         if topic.mute or not count:
             return
@@ -192,6 +212,7 @@ class Assembler:
         header = _take_header(topic.stamp, columns, count, topic.outcome.bad, self.report.store)
         stamps = self.clocks.stamps(label, header, log, publish[0] if publish else log)
         shared: dict[int, tuple[NDArray[np.int64], NDArray[np.int64]]] = {}
+        columns |= {path if path not in columns else f"{path} (text)": cells for path, cells in texts.items()}
         for path, (rows, values) in columns.items():
             at = stamps
             if rows is not None:
@@ -201,7 +222,13 @@ class Assembler:
             yield Channel(f"{label}.{path}", label, path, at, values, None, topic.connection.type_name)
 
     def _say(self, label: str, topic: _Topic) -> None:
-        report, outcome, skipped = self.report, topic.outcome, sorted(topic.store.skipped)
+        report, outcome = self.report, topic.outcome
+        skipped = sorted(topic.store.skipped | (topic.texts.skipped if topic.texts is not None else set()))
+        lost = sum(reader.bad > GIVE_UP for reader in topic.readers.values() if reader is not None)
+        if lost:
+            report.note(
+                f"{label}: more than {GIVE_UP} messages do not fit their definition; texts of others may be missing"
+            )
         if topic.mute:
             report.note(f"{label} is not decoded: {topic.mute}")
         for walker in topic.walkers.values():

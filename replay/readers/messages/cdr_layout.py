@@ -55,6 +55,10 @@ class Layout:
         Length of every sequence.
     names : Mapping[Place, tuple[bytes, ...]]
         Raw strings of every array of names that may key others.
+    texts : tuple[tuple[str, int, int], ...]
+        Path, offset and bytes of every text but those that name elements of an array beside them.
+    long : tuple[str, ...]
+        Arrays of texts too long to become channels.
     """
 
     size: int
@@ -64,6 +68,8 @@ class Layout:
     dialect: Dialect
     counts: Mapping[Place, int]
     names: Mapping[Place, tuple[bytes, ...]]
+    texts: tuple[tuple[str, int, int], ...] = ()
+    long: tuple[str, ...] = ()
 
     @cached_property
     def naming(self) -> frozenset[Place]:
@@ -98,6 +104,8 @@ class _Walk:
         self.skipped: list[Path] = []
         self.counts: dict[Place, int] = {}
         self.names: dict[Place, tuple[bytes, ...]] = {}
+        self.texts: list[tuple[Path, int, int]] = []
+        self.long: list[Path] = []
         self.steps = 0
         self.dialect = dialect_of(data, kind.ros1)
         self.base = self.pos = self.dialect.base
@@ -110,7 +118,22 @@ class _Walk:
             raise LayoutError(f"{self.end - self.pos} bytes follow the last field; the definition does not fit")
         slots = tuple(Slot(text_of(p), o, t) for p, o, t in self.slots)
         skipped = tuple(text_of(p) for p in self.skipped)
-        return Layout(self.end, slots, tuple(self.checks), skipped, self.dialect, self.counts, self.names)
+        long = tuple(text_of(p) for p in self.long)
+        return Layout(
+            self.end, slots, tuple(self.checks), skipped, self.dialect, self.counts, self.names, self.free_texts(), long
+        )
+
+    def free_texts(self) -> tuple[tuple[str, int, int], ...]:
+        """Texts but for the names that stand in the paths of numbers."""
+        used = {part.label() for path, _, _ in self.slots for part in path if isinstance(part, Index)}
+        keys = {
+            (*place, i)
+            for place, raw in self.names.items()
+            if used >= {f"[{r.rstrip(bytes(1)).decode('utf-8', 'replace').strip()}]" for r in raw}
+            for i in range(len(raw))
+        }
+        end = 1 if self.dialect.head else 0  # the zero byte behind it
+        return tuple((text_of(p), at, size - end) for p, at, size in self.texts if place_of(p) not in keys)
 
     def take(self, size: int, align: int) -> int:
         """Reserve `size` bytes, aligned in CDR, and return where they start."""
@@ -179,7 +202,9 @@ class _Walk:
         if kind[0] == Nodetype.NAME:
             self.message(path, kind[1], scope, emit)
         elif kind[1][0] == "string":
-            self.string()
+            at, size = self.string()
+            if emit:
+                self.texts.append((path, at, size))
         else:
             self.number(path, type_of(kind[1][0]), emit)
 
@@ -193,7 +218,7 @@ class _Walk:
         if not fixed:
             count = self.counts[place_of(path)] = self.word()
         if kind[0] == Nodetype.BASE and kind[1][0] == "string":
-            self.strings(path, count, fixed, scope)
+            self.strings(path, count, fixed, scope, emit)
             return
         wanted = emit and count <= MAX_ELEMENTS
         if emit and not wanted:
@@ -227,11 +252,16 @@ class _Walk:
             for _, (kind, value) in self.kind.fields[within]
         )
 
-    def strings(self, path: Path, count: int, fixed: bool, scope: Scope) -> None:
-        keys = is_key_list(str(path[-1])) and count <= MAX_ELEMENTS
+    def strings(self, path: Path, count: int, fixed: bool, scope: Scope, emit: bool) -> None:
+        short = count <= MAX_ELEMENTS
+        keys = is_key_list(str(path[-1])) and short
+        if emit and not short:
+            self.long.append(path)
         names = []
-        for _ in range(count):
+        for i in range(count):
             at, length = self.string()
+            if emit and short:
+                self.texts.append(((*path, Index(i, count, fixed, scope)), at, length))
             if keys:
                 names.append(self.data[at : at + length])
                 self.checks.append((at, names[-1]))

@@ -35,7 +35,12 @@ Columns = dict[str, list[tuple[Sequence[int], NDArray[Any]]]]
 
 
 def decode(
-    data: NDArray[np.uint8], starts: NDArray[np.int64], lengths: NDArray[np.int64], outcome: Outcome
+    data: NDArray[np.uint8],
+    starts: NDArray[np.int64],
+    lengths: NDArray[np.int64],
+    outcome: Outcome,
+    *,
+    texts: bool = False,
 ) -> tuple[str | None, list[Part]]:
     """Decode JSON payloads.
 
@@ -47,6 +52,8 @@ def decode(
         Place of each payload in `data`.
     outcome : Outcome
         Counts of undecodable and slowly decoded messages, added to.
+    texts : bool
+        Whether texts are wanted too.
 
     Returns
     -------
@@ -60,7 +67,7 @@ def decode(
     while first < len(starts):
         before = int(ends[first - 1]) if first else 0
         stop = max(int(np.searchsorted(ends, before + _BATCH_BYTES)), first + 1)
-        found, own = _batch(data, starts[first:stop], lengths[first:stop], first, outcome)
+        found, own = _batch(data, starts[first:stop], lengths[first:stop], first, outcome, texts)
         stamp = found or stamp
         parts += own
         first = stop
@@ -68,14 +75,19 @@ def decode(
 
 
 def _batch(
-    data: NDArray[np.uint8], starts: NDArray[np.int64], lengths: NDArray[np.int64], first: int, outcome: Outcome
+    data: NDArray[np.uint8],
+    starts: NDArray[np.int64],
+    lengths: NDArray[np.int64],
+    first: int,
+    outcome: Outcome,
+    texts: bool,
 ) -> tuple[str | None, list[Part]]:
     values = parse_together(data, starts, lengths)
     rows: Sequence[int] = range(first, first + len(starts))
     if values is None:
         kept = list(parse_singly(data, starts, lengths, outcome))
         rows, values = [first + i for i, _ in kept], [v for _, v in kept]
-    taker = _Taker()
+    taker = _Taker(texts)
     taker.take("", rows, values, [], 0)
     if taker.full:
         outcome.bad += len(values)
@@ -83,14 +95,17 @@ def _batch(
         return None, []
     stamp = _take_stamp(taker.columns, rows)
     outcome.slow += taker.slow
-    return stamp, [Part(np.empty(0, np.int64), {}, tuple(taker.skipped)), *_parts(taker.columns)]
+    words = [Part(np.array(own, np.int64), {}, (), {path: some}) for path, own, some in taker.texts]
+    return stamp, [Part(np.empty(0, np.int64), {}, tuple(taker.skipped)), *_parts(taker.columns), *words]
 
 
 class _Taker:
     """Takes lists of values of one path apart, down to numbers."""
 
-    def __init__(self) -> None:
+    def __init__(self, with_texts: bool = False) -> None:
         self.columns: Columns = {}
+        self.with_texts = with_texts
+        self.texts: list[tuple[str, Sequence[int], list[str]]] = []
         self.skipped: set[str] = set()
         self.slow = 0
         self.full = False
@@ -112,6 +127,10 @@ class _Taker:
             Nesting so far.
         """
         kinds = set(map(type, values))
+        if self.with_texts and str in kinds and depth <= MAX_DEPTH and not self.full:
+            pick = [type(v) is str and not (float in kinds and v in _WORDS) for v in values]
+            some = [_clean(v) for v in compress(values, pick)]
+            self.texts += [(path or "value", list(compress(rows, pick)), some)] if some else []
         if depth > MAX_DEPTH or self.full or kinds <= {str, type(None)}:
             return
         if kinds <= _NUMBERS:
@@ -169,7 +188,10 @@ class _Taker:
             pick = [len(v) == size for v in values] if len(sizes) > 1 else None
             own_rows = rows if pick is None else list(compress(rows, pick))
             own = values if pick is None else list(compress(values, pick))
-            labels = [f"{path}[{_clean(n)}]" for n in next((n for n in scopes if len(n) == size), range(size))]
+            names = next((n for n in scopes if len(n) == size), None)
+            if names is not None and tuple(own[0]) == names:
+                continue  # the names themselves, which stand in the paths beside them
+            labels = [f"{path}[{_clean(n)}]" for n in (range(size) if names is None else names)]
             kinds = set(map(type, chain.from_iterable(own)))
             if len(kinds) == 1 and kinds <= _NUMBERS:  # one conversion for all elements
                 table = _column(list(chain.from_iterable(own)), kinds).reshape(-1, size)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -30,11 +30,14 @@ class Part:
         Values by field path.
     skipped : tuple[str, ...]
         Arrays too long to become channels.
+    texts : Mapping[str, Sequence[str]], each of shape (m,)
+        Texts by field path, where they are asked for.
     """
 
     rows: Rows
     columns: Mapping[str, NDArray[Any]]
     skipped: tuple[str, ...]
+    texts: Mapping[str, Sequence[str]] = field(default_factory=dict)
 
 
 @dataclass

@@ -76,6 +76,7 @@ class Ros1BagReader:
         clock: Clock = "header",
         window: Window | None = None,
         store: ColumnStore | None = None,
+        texts: bool = False,
     ) -> RawLog:
         """Decode the given topics and time; chunks that the index places outside are not opened.
 
@@ -84,7 +85,7 @@ class Ros1BagReader:
         LogError
             Where nothing in the bag can be read.
         """
-        assembler = Assembler(clock, report := Report(store=store or ColumnStore()))
+        assembler = Assembler(clock, report := Report(store=store or ColumnStore()), texts)
 
         def take(part: Path) -> LogSummary:
             mine = Report() if path.is_dir() else report

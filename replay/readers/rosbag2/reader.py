@@ -63,6 +63,7 @@ class Rosbag2Reader:
         clock: Clock = "header",
         window: Window | None = None,
         store: ColumnStore | None = None,
+        texts: bool = False,
     ) -> RawLog:
         """Decode the given topics and time of all parts.
 
@@ -77,9 +78,9 @@ class Rosbag2Reader:
             packed = meta.facts.get("compression_mode") == "message"
             if _is_mcap(files, path):
                 unpack = partial(unpacked, name=path.name, report=report) if packed else None
-                log = reader.read_files(files, path, self.format, report, topics, clock, window, unpack)
+                log = reader.read_files(files, path, self.format, report, topics, clock, window, unpack, texts)
             else:
-                log = sqlite_reader.read(files, path, report, topics, clock, window, packed, meta.counts)
+                log = sqlite_reader.read(files, path, report, topics, clock, window, packed, meta.counts, texts)
             calls = _services(log.summary)
             channels = {name: c for name, c in log.channels.items() if c.topic not in calls}
             return replace(log, channels=channels, summary=_complete(log.summary, meta, compare=window is None))

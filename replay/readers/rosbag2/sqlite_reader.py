@@ -33,6 +33,7 @@ def read(
     window: Window | None,
     packed: bool,
     counted: Mapping[str, int] | None = None,
+    texts: bool = False,
 ) -> RawLog:
     """Read the files of one recording as one log.
 
@@ -50,13 +51,15 @@ def read(
         Whether messages are compressed one by one.
     counted : Mapping[str, int] or None
         Messages per topic as the recording's metadata state them; they stand in the summary of a window.
+    texts : bool
+        As in `Reader.read`.
 
     Raises
     ------
     LogError
         Where none of the files can be read.
     """
-    assembler = Assembler(clock, report)
+    assembler = Assembler(clock, report, texts)
     bases = _open(files, source, report)
     own = bases[0].stated if counted is None and len(bases) == 1 else None
     counted = own if counted is None else counted

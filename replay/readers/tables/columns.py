@@ -86,6 +86,8 @@ def compressed(values: NDArray[Any], keep: NDArray[np.bool_], store: ColumnStore
     """Return the kept values, as a column of the store; the same array where all are kept."""
     if keep.all():
         return values
+    if values.dtype == object:
+        return values[keep]
     kept = store.column(values.dtype)
     for s in blocks(len(values)):
         kept.append(values[s][keep[s]])

@@ -17,7 +17,8 @@ from replay.log.source_options import SourceOptions
 from replay.readers.tables.columns import CellColumn
 from replay.readers.tables.row_kernel import FIRST_LONG, FIRST_SHORT, FIRST_TEXT, LONG, MOMENT, REAL, SHORT, TEXT
 from replay.readers.tables.rows import Rows
-from replay.readers.tables.table_log import RowTimes, table_log
+from replay.readers.tables.table_log import Finished, RowTimes, table_log
+from replay.readers.tables.text_cells import text_columns
 from replay.readers.tables.text_file import first_text
 from replay.readers.tables.text_table import (
     HEAD,
@@ -84,6 +85,7 @@ class CsvReader:
         clock: Clock = "header",
         window: Window | None = None,
         store: ColumnStore | None = None,
+        texts: bool = False,
     ) -> RawLog:
         """Read all columns.
 
@@ -100,7 +102,7 @@ class CsvReader:
         if not table.sure and any(_has_comma(cell) for cell in found.rows.examples.values()):
             found = _read(table.commas(), time, dated, options, window, report.store)
         report.damage += found.rows.report.damage
-        return _log(table, found, report, clock)
+        return _log(table, found, report, clock, texts)
 
 
 class _Found:
@@ -108,6 +110,7 @@ class _Found:
 
     def __init__(self, rows: Rows, times: RowTimes, columns: dict[str, CellColumn]) -> None:
         self.rows, self.times, self.columns = rows, times, columns
+        self.kept: list[NDArray[np.bool_]] = []
 
 
 def _cells(columns: Sample, time: TimeColumn) -> tuple[NDArray[Any], ...] | None:
@@ -152,12 +155,14 @@ def _read(
     times = RowTimes(table.file.path, time, dated, options, window, report)
     columns = {n: CellColumn(store) for n in table.names if n not in time.names}
     order = [(i, columns[n]) for i, n in enumerate(table.names) if n not in time.names]
+    found = _Found(rows, times, columns)
     for cells in table.blocks(rows):
         keep = times.keep(*(cells[i].view(np.float64) if rows.kinds[i] == REAL else cells[i] for i in at))
+        found.kept.append(keep)
         whole = bool(keep.all())
         for i, column in order:
             column.append(cells[i] if whole else cells[i][keep], rows.kinds[i])
-    return _Found(rows, times, columns)
+    return found
 
 
 def _has_comma(cell: str) -> bool:
@@ -187,7 +192,7 @@ def _headers_again(table: TextTable, rows: Rows, texts: NDArray[Any], report: Re
     return count
 
 
-def _log(table: TextTable, found: _Found, report: Report, clock: Clock) -> RawLog:
+def _log(table: TextTable, found: _Found, report: Report, clock: Clock, with_texts: bool) -> RawLog:
     path, rows = table.file.path, found.rows
     if not rows.count:
         raise LogError(f"{path} has a header and no row of data; record or export it again")
@@ -210,6 +215,8 @@ def _log(table: TextTable, found: _Found, report: Report, clock: Clock) -> RawLo
             f"{path.name}: {rows.table[LONG]} rows have more cells than the header (the first at byte "
             f"{rows.table[FIRST_LONG]}); the cells beyond were left out"
         )
-    kept = {n: c for n, c in found.columns.items() if not texts[table.names.index(n)]}
+    kept: dict[str, Finished] = {n: c for n, c in found.columns.items() if not texts[table.names.index(n)]}
     left = [n for n in found.columns if n not in kept]
+    if with_texts and left and (words := text_columns(table, left, np.concatenate(found.kept))):
+        kept, left = kept | words, []
     return table_log(path, "csv", clock, found.times, kept, left, {})

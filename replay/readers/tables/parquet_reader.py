@@ -22,7 +22,8 @@ from replay.readers.common.compiled import plain
 from replay.readers.tables.columns import ArrayColumn, unique_names
 from replay.readers.tables.iso_kernel import iso_many
 from replay.readers.tables.row_kernel import MISSING
-from replay.readers.tables.table_log import RowTimes, table_log
+from replay.readers.tables.table_log import Finished, RowTimes, table_log
+from replay.readers.tables.text_cells import TextColumn
 from replay.readers.tables.time_cells import TimeBase, epoch_ns
 from replay.readers.tables.time_column import TimeColumn, find_time
 
@@ -76,8 +77,9 @@ class ParquetReader:
         clock: Clock = "header",
         window: Window | None = None,
         store: ColumnStore | None = None,
+        texts: bool = False,
     ) -> RawLog:
-        """Read all columns of numbers; row groups whose statistics lie outside the window are not opened.
+        """Read all columns of numbers, and of texts where asked for; row groups whose statistics lie outside the window are not opened.
 
         Raises
         ------
@@ -90,12 +92,17 @@ class ParquetReader:
             time = table.time(options, report)
             times = RowTimes(path, time, table.dated(time.name), options, window, report)
             columns = {n: ArrayColumn(report.store) for n in table.numeric if n not in time.names}
+            words = {n: TextColumn() for n in table.words if n not in time.names} if texts else {}
             groups = table.groups(time, epoch_ns(options, str(path), time.unit), window)
-            for cells in table.blocks([*time.names, *columns], groups):
+            for cells in table.blocks([*time.names, *columns, *words], groups):
                 keep = times.keep(*(cells[n] for n in time.names))
                 for label, column in columns.items():
                     column.append(cells[label][keep])
-            return table.named(table_log(path, self.format, clock, times, columns, table.texts, table.about))
+                for label, word in words.items():
+                    word.append(cells[label].tolist(), keep)
+            left = [n for n in table.texts if n not in words]
+            every: dict[str, Finished] = {**columns, **words}
+            return table.named(table_log(path, self.format, clock, times, every, left, table.about))
 
 
 @contextmanager
@@ -124,6 +131,7 @@ class _Parquet:
         flat = [i for i, field in enumerate(schema) if not pa.types.is_nested(field.type)]
         self.numeric = {names[i]: schema.field(i) for i in flat if _is_number(schema.field(i).type)}
         self.texts = [names[i] for i in range(len(names)) if names[i] not in self.numeric]
+        self.words = {names[i]: schema.field(i) for i in flat if _is_text(schema.field(i).type)}
         if twice:
             raise LogError(f"{path} has two columns of the same name; rename one of them")
         if not file.metadata.num_rows:
@@ -152,7 +160,8 @@ class _Parquet:
             return log
         channels = {}
         for name, channel in log.channels.items():
-            told = {k: v.decode("utf-8", "replace") for k, v in (self.numeric[name].metadata or {}).items()}
+            about = self.numeric[name] if name in self.numeric else self.words[name]
+            told = {k: v.decode("utf-8", "replace") for k, v in (about.metadata or {}).items()}
             channels[name] = replace(
                 channel, topic=told.get(b"topic", ""), field=told.get(b"field", name), unit=told.get(b"unit"),
                 type_name=told.get(b"type", channel.type_name),
@@ -196,7 +205,7 @@ class _Parquet:
 
     def blocks(self, names: Sequence[str], groups: list[int], size: int = 1 << 17) -> Iterator[dict[str, NDArray[Any]]]:
         """Columns by name, a limited number of rows at a time; integers of the first stay exact."""
-        own = [self.numeric[n].name for n in names]
+        own = [(self.numeric[n] if n in self.numeric else self.words[n]).name for n in names]
         size = max(min(size, _CELLS // len(own)), 1)
         for group in groups:
             declared = self.file.metadata.row_group(group).total_byte_size
@@ -206,7 +215,10 @@ class _Parquet:
                     "with smaller row groups"
                 )
             for batch in self.file.iter_batches(size, row_groups=[group], columns=own, use_threads=False):
-                yield {n: _cells(batch.column(o), n == names[0]) for n, o in zip(names, own, strict=True)}
+                yield {
+                    n: _cells(batch.column(o), n == names[0]) if n in self.numeric else _texts(batch.column(o))
+                    for n, o in zip(names, own, strict=True)
+                }
 
 
 def _is_number(kind: Any) -> bool:
@@ -215,6 +227,18 @@ def _is_number(kind: Any) -> bool:
     numeric = pa.types.is_integer(kind) or pa.types.is_floating(kind) or pa.types.is_decimal(kind)
     dated = pa.types.is_timestamp(kind) or pa.types.is_date(kind) or pa.types.is_duration(kind)
     return bool(numeric or dated or pa.types.is_boolean(kind))
+
+
+def _is_text(kind: Any) -> bool:
+    inner = kind.value_type if pa.types.is_dictionary(kind) else kind
+    return bool(pa.types.is_string(inner) or pa.types.is_large_string(inner))
+
+
+def _texts(array: Any) -> NDArray[Any]:
+    """Texts of one column as objects; None where there is none."""
+    out = np.empty(len(array), object)
+    out[:] = array.to_pylist()
+    return out
 
 
 def _cells(array: Any, exact: bool = False) -> NDArray[Any]:

@@ -131,7 +131,9 @@ def table_log(
     channels: dict[str, Channel] = {}
     for label, column in columns.items():
         values = column.finish() if remain is None else compressed(column.finish(), remain, report.store)
-        channels[label] = Channel(label, "", label, at, values, unit_of(label), str(values.dtype))
+        channels[label] = Channel(
+            label, "", label, at, values, unit_of(label), "text" if values.dtype == object else str(values.dtype)
+        )
     if texts:
         report.note(f"{path.name}: columns of text were left out: {', '.join([*texts][:6])}")
     back = int(sum(np.count_nonzero(np.diff(at[i : i + 1_048_577]) < 0) for i in range(0, len(at), 1_048_576)))

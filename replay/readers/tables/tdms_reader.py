@@ -55,6 +55,7 @@ class TdmsReader:
         clock: Clock = "header",
         window: Window | None = None,
         store: ColumnStore | None = None,
+        texts: bool = False,
     ) -> RawLog:
         """Read all channels of numbers.
 
@@ -63,10 +64,18 @@ class TdmsReader:
         LogError
             Where npTDMS is absent, the file cannot be read, or none of its channels has a time.
         """
-        return self._log(path, options, clock, window, Report(store=store or ColumnStore()), decode=True)
+        report = Report(store=store or ColumnStore())
+        return self._log(path, options, clock, window, report, decode=True, texts=texts)
 
     def _log(
-        self, path: Path, options: SourceOptions, clock: Clock, window: Window | None, report: Report, decode: bool
+        self,
+        path: Path,
+        options: SourceOptions,
+        clock: Clock,
+        window: Window | None,
+        report: Report,
+        decode: bool,
+        texts: bool = False,
     ) -> RawLog:
         channels: dict[str, Channel] = {}
         topics: list[TopicInfo] = []
@@ -79,7 +88,7 @@ class TdmsReader:
                 members, count = [], 0
                 for channel in group.channels():
                     label = f"{group.name}/{channel.name}"
-                    if channel is times.channel or not _is_number(channel):
+                    if channel is times.channel or not (_is_number(channel) or (texts and _is_text(channel))):
                         continue
                     if len(channel) * channel.dtype.itemsize > 16 * size:
                         raise LogError(
@@ -260,8 +269,18 @@ class _GroupTimes:
         return stamps.finish()
 
 
+def _is_text(channel: Any) -> bool:
+    kind = channel.dtype
+    return kind is not None and kind.kind == "O" and len(channel) > 0
+
+
 def _channel(label: str, channel: Any, stamps: NDArray[np.int64], window: Window | None, times: _GroupTimes) -> Channel:
     store = times.report.store
+    if _is_text(channel):
+        at, keep = times.kept(stamps, window)
+        words = np.empty(len(channel), object)
+        words[:] = [str(text) for text in channel[:]]
+        return Channel(label, "", label, at, words[keep], None, "text")
     values = store.column(channel.dtype)
     for s in blocks(len(channel)):
         values.append(np.asarray(channel[s.start : s.stop], channel.dtype))

@@ -82,6 +82,7 @@ class SvdxReader:
         clock: Clock = "header",
         window: Window | None = None,
         store: ColumnStore | None = None,
+        texts: bool = False,
     ) -> RawLog:
         """Read all channels.
 

@@ -86,6 +86,7 @@ class TwincatCsvReader:
         clock: Clock = "header",
         window: Window | None = None,
         store: ColumnStore | None = None,
+        texts: bool = False,
     ) -> RawLog:
         """Read all channels.
 

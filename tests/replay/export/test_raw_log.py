@@ -146,9 +146,19 @@ def test_why_a_topic_stands_in_several_files_is_said(tmp_path: Path) -> None:
     assert note.endswith("keeps its own stamp: /a: a.parquet, a~2.parquet")
 
 
-def test_a_log_without_numbers_writes_nothing(tmp_path: Path) -> None:
-    path = write_log(tmp_path / "a.mcap", {"/a": [(1, {"v": "text"})]})
-    with pytest.raises(LogError, match=r"no numbers to convert: its topics hold none: /a \(V\)$"):
+def test_texts_are_converted_and_come_back(tmp_path: Path) -> None:
+    said = ["drive", "", "stop ü"]
+    rows = [(i, {"v": i, "mode": text}) for i, text in enumerate(said)]
+    index = write_raw(write_log(tmp_path / "a.mcap", {"/a": rows}), tmp_path / "out", SourceOptions())
+    assert {c["name"]: c["dtype"] for c in index["files"][0]["columns"]}["/a.mode"] == "text"
+    back = read_log(tmp_path / "out" / index["files"][0]["file"], SourceOptions(), texts=True)
+    assert back.channels["/a.mode"].values.tolist() == said
+    assert back.channels["/a.mode"].topic == "/a"
+
+
+def test_a_log_without_samples_writes_nothing(tmp_path: Path) -> None:
+    path = write_log(tmp_path / "a.mcap", {"/a": [(1, {"v": None})]})
+    with pytest.raises(LogError, match=r"no samples to convert: its topics hold none: /a \(V\)$"):
         write_raw(path, tmp_path / "out", SourceOptions())
     assert not (tmp_path / "out").exists()
 

@@ -6,7 +6,7 @@ import math
 
 import pytest
 
-from cli.commands.fault_spec import parse_fault
+from diagnosis.api.fault_words import parse_fault
 from replay.errors import ConfigError
 from replay.faults import FaultMode, FaultSpec, Side
 

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from cli.terminal.inputs import mission_paths
+from diagnosis.api.inputs import mission_paths
 from replay.errors import ConfigError, LogError
 from replay.log.file_types import LOG_ENDINGS
 

@@ -44,3 +44,16 @@ def format_of(output: Path) -> LogFormat:
     raise ConfigError(
         f"{output}: cannot tell the format from its name; expected {known} or a folder name, or give --format"
     )
+
+
+def format_named(name: str) -> LogFormat:
+    """Format of a name.
+
+    Raises
+    ------
+    ConfigError
+        Where no format has that name.
+    """
+    if name not in list(LogFormat):
+        raise ConfigError(f"format = {name!r} is not known; expected one of {', '.join(LogFormat)}")
+    return LogFormat(name)

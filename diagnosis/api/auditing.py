@@ -1,0 +1,307 @@
+"""Audit a folder of missions from Python: each diagnosed in a process of its own, and what came of them as a table."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Literal
+
+from diagnosis.api.errors import stated
+from diagnosis.api.inputs import StrPath, path_of
+from replay.errors import ConfigError, LogError
+
+if TYPE_CHECKING:
+    from contextlib import AbstractContextManager
+
+    import pandas as pd
+
+    from diagnosis.audit.discovery.discover import Discovery
+    from diagnosis.audit.endings import Ending
+    from diagnosis.audit.engines import Engine
+    from diagnosis.audit.events import Emit, EventFacts
+    from diagnosis.audit.plan import AuditOptions
+
+OUTPUT = "mfhca-audit"
+
+
+@dataclass(frozen=True)
+class AuditRequest:
+    """What is asked for; names and defaults as on the command line.
+
+    Attributes
+    ----------
+    words : tuple[str, ...]
+        Folders, logs, globs and URLs.
+    output : Path
+        Folder of the store, the fleet page and the reports.
+    machine : Path or None
+        Machine file of missions that name none of their own.
+    machine_id : str or None
+        Id of the machine that all missions belong to.
+    jobs : int or None
+        Missions at once; None: one per processor.
+    memory_mb, timeout_s, cpu_s : float or None
+        Limits of each mission [MB], [s], [s].
+    retries : int
+        Further attempts at a mission that crashed or met a limit.
+    resume : bool
+        Whether finished missions are left as they are.
+    dask : str or None
+        Scheduler of a Dask cluster.
+    max_size_mb : float
+        Size each page should keep to [MB].
+    """
+
+    words: tuple[str, ...]
+    output: Path
+    machine: Path | None = None
+    machine_id: str | None = None
+    jobs: int | None = None
+    memory_mb: float | None = None
+    timeout_s: float = 1800.0
+    cpu_s: float | None = None
+    retries: int = 1
+    resume: bool = True
+    dask: str | None = None
+    max_size_mb: float = 15.0
+
+    @property
+    def at_once(self) -> int:
+        """Missions at once on this machine."""
+        return self.jobs or processors()
+
+    def engine(self) -> Callable[[], AbstractContextManager[Engine]]:
+        """What runs missions: processes of this machine, or a Dask cluster."""
+        from diagnosis.audit import engines
+
+        address = self.dask
+        return (lambda: engines.dask(address)) if address else (lambda: engines.local(self.at_once))
+
+    def check(self) -> None:
+        """Raise a `ConfigError` where an option cannot be."""
+        if self.machine_id is not None and not self.machine_id.strip():
+            raise ConfigError("--machine-id: is empty; give a name or leave it out")
+        for name, value, least in (
+            ("--jobs", self.jobs, 1), ("--memory", self.memory_mb, 16), ("--timeout", self.timeout_s, 0.1),
+            ("--cpu", self.cpu_s, 1), ("--retries", self.retries, 0), ("--max-size", self.max_size_mb, 0.5),
+        ):  # fmt: skip
+            if value is not None and not value >= least:
+                raise ConfigError(f"{name} {value:g}: expected {least:g} or more")
+
+    def found(self) -> tuple[Discovery, AuditOptions]:
+        """Missions, and how each is to be diagnosed."""
+        from diagnosis.audit.discovery.discover import discover
+        from diagnosis.audit.isolation.limits import Limits, usual_memory_mb
+        from diagnosis.audit.plan import AuditOptions, merged_machines
+
+        missions = discover(self.words, exclude=self.output)
+        memory = self.memory_mb or (usual_memory_mb(self.at_once) if self.dask is None else Limits.memory_mb)
+        limits = Limits(memory, self.timeout_s, self.cpu_s)
+        asked = AuditOptions(
+            self.output, self.machine, self.machine_id or "", limits, self.retries, self.resume, self.max_size_mb
+        )
+        return replace(missions, notes=(*missions.notes, *merged_machines(missions.missions, asked))), asked
+
+
+def processors() -> int:
+    """Processors that this process may use."""
+    import os
+
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+@dataclass(frozen=True)
+class Audit:
+    """What came of an audit.
+
+    Attributes
+    ----------
+    output : Path
+        Folder of the store, the fleet page and the reports.
+    ends : tuple[Ending, ...]
+        How each mission stands; see `diagnosis.audit.endings.Ending`.
+    skipped, failed, gone : int
+        Missions that were done before; that failed (see ``failures.txt``); known ones that are not there any more.
+    problems : tuple[str, ...]
+        Words, folders and links behind which no mission was found, and what else is to be known.
+    unread : bool
+        Whether one of them may hide a mission.
+    """
+
+    output: Path
+    ends: tuple[Ending, ...]
+    skipped: int
+    failed: int
+    gone: int
+    problems: tuple[str, ...] = ()
+    unread: bool = False
+
+    @property
+    def page(self) -> Path:
+        """The fleet page, ``fleet.html``."""
+        return self.output / "fleet.html"
+
+    @property
+    def missions(self) -> pd.DataFrame:
+        """How the missions stand, shape (missions, 10), indexed by ``name``.
+
+        ``state`` (``ok``, ``degraded``, ``unreadable``, ``timeout``, ``out_of_memory``, ``crashed``), ``reason``,
+        ``attempts``, ``machine_id``, ``machine_name``, ``verdict``, ``title``, ``report`` (folder below `output`, for
+        `mfhca.read_result`), ``faults`` (number), ``severity`` (of the worst).
+        """
+        import pandas as pd
+
+        from diagnosis.audit.endings import Ending
+
+        rows = [{k: str(v) if isinstance(v, str) else v for k, v in asdict(end).items()} for end in self.ends]
+        return pd.DataFrame(rows, columns=list(Ending.__dataclass_fields__)).set_index("name")
+
+    def exit_code(self, fail_on: str = "low") -> int:
+        """Exit code of `mfhca audit`: 0 no fault, 1 faults, 3 not read or not judged, 70 crashed.
+
+        Parameters
+        ----------
+        fail_on : str
+            Lowest severity that counts as a fault: ``info``, ``low``, ``medium``, ``high``, or ``never``.
+
+        Raises
+        ------
+        ConfigError
+            Where `fail_on` is none of them.
+        """
+        from diagnosis.api.verdict import check_fail_on
+        from diagnosis.audit.endings import NOT_READ, exit_code
+
+        check_fail_on(fail_on)
+        return max(exit_code(self.ends, fail_on), NOT_READ if self.unread else 0)
+
+
+@stated
+def audit(
+    paths: StrPath | Iterable[StrPath],
+    output: StrPath = OUTPUT,
+    *,
+    machine: StrPath | None = None,
+    machine_id: str | None = None,
+    jobs: int | None = None,
+    memory_mb: float | None = None,
+    timeout_s: float = 1800.0,
+    cpu_s: float | None = None,
+    retries: int = 1,
+    resume: bool = True,
+    dask: str | None = None,
+    baseline: StrPath | None = None,
+    trends: Literal["hours", "days"] = "hours",
+    max_size_mb: float = 15.0,
+    events: Callable[[str, EventFacts], None] | None = None,
+) -> Audit:
+    """Diagnose every mission behind some paths, as `mfhca audit` does: reports, ``fleet.html``, ``fleet.json``, a store.
+
+    Missions run in processes of their own; what is done and unchanged is left as it is.
+
+    Parameters
+    ----------
+    paths : str, Path or several
+        Folders, logs, globs, or URLs.
+    output : str or Path
+        Folder of the store, the fleet page and the reports.
+    machine : str, Path or None
+        Machine file of missions that name none of their own; None: the paper's machine.
+    machine_id : str or None
+        Id of the machine that all missions belong to.
+    jobs : int or None
+        Missions at once; None: one per processor.
+    memory_mb, timeout_s, cpu_s : float or None
+        Most memory [MB], time [s] and processor time [s] of each mission; None: a share of the free memory, no limit.
+    retries : int
+        Further attempts at a mission that crashed or met a limit.
+    resume : bool
+        Whether missions that are done and unchanged are skipped.
+    dask : str or None
+        Address of the scheduler of a Dask cluster; None: this machine.
+    baseline : str, Path or None
+        Store or folder of an audit to compare the fleet with.
+    trends : str
+        Trends over ``hours`` of driving or over ``days``.
+    max_size_mb : float
+        Size each page should keep to [MB].
+    events : Callable[[str, EventFacts], None] or None
+        Called with the name and facts of every event.
+
+    Raises
+    ------
+    LogError
+        Where no mission is found.
+    ConfigError
+        Where an option or the machine file is wrong.
+    OutputError
+        Where the output cannot be written.
+    """
+    given = [paths] if isinstance(paths, str) or not isinstance(paths, Iterable) else list(paths)
+    words = tuple(word if isinstance(word, str) and "://" in word else str(path_of(word)) for word in given)
+    request = AuditRequest(
+        words, path_of(output), None if machine is None else path_of(machine), machine_id, jobs, memory_mb, timeout_s, cpu_s,
+        retries, resume, dask, max_size_mb,
+    )  # fmt: skip
+    request.check()
+    if trends not in ("hours", "days"):
+        raise ConfigError(f"--trends {trends}: is not known; expected hours or days")
+    found, asked = request.found()
+    if not found.missions:
+        raise LogError("; ".join((none_found(found), *found.problems)))
+    return run(request, found, asked, events or (lambda name, facts: None), _store_at(baseline), trends)
+
+
+def none_found(found: Discovery) -> str:
+    """Say that no mission was found."""
+    skipped = f" ({found.left_aside} files are not logs)" if found.left_aside else ""
+    return f"no mission was found{skipped}"
+
+
+def _store_at(baseline: StrPath | None) -> Path | None:
+    if baseline is None:
+        return None
+    place = path_of(baseline)
+    return place / "fleet.sqlite" if place.is_dir() else place
+
+
+def run(
+    request: AuditRequest,
+    found: Discovery,
+    asked: AuditOptions,
+    emit: Emit,
+    baseline: Path | None,
+    axis: Literal["hours", "days"],
+) -> Audit:
+    """Audit missions that were found; see `audit`.
+
+    Parameters
+    ----------
+    request : AuditRequest
+        What is asked for.
+    found, asked : Discovery, AuditOptions
+        From `AuditRequest.found`.
+    emit : Emit
+        Takes every event.
+    baseline : Path or None
+        Store to compare with.
+    axis : {"hours", "days"}
+        What trends are drawn over.
+
+    Raises
+    ------
+    LogError
+        Where there is no mission.
+    ConfigError, OutputError
+        See `audit`.
+    """
+    from diagnosis.audit.session import audit as audit_all
+
+    for text in (*found.problems, *found.notes):
+        emit("problem", {"reason": text})
+    if not found.missions:
+        raise LogError(none_found(found))
+    done = audit_all(found, asked, request.engine(), emit, baseline=baseline, axis=axis)
+    problems = (*found.problems, *found.notes)
+    return Audit(asked.output, done.ends, done.skipped, done.failed, done.gone, problems, bool(found.problems))
