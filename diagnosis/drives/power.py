@@ -42,7 +42,7 @@ def added_noise(count: Array, needed: float) -> Array:
     # rate·n − spread·√n = needed
     least = ((spread + np.sqrt(spread**2 + 4.0 * rate * needed)) / (2.0 * rate)) ** 2
     place = np.searchsorted(-np.minimum.accumulate(least), -np.asarray(count))
-    return np.r_[_ADDED, np.inf][place]
+    return np.asarray(np.r_[_ADDED, np.inf][place], dtype=np.float64)
 
 
 def sensor_powers(pair: SpeedPair, limits: Limits) -> Powers:
