@@ -100,7 +100,7 @@ class SpanRow(TypedDict):
 class ProofRow(TypedDict):
     """The paper's stability proof on one wheel of the recorded mission; see `replay.control.lyapunov`.
 
-    Largest |F| and |D| [m/s²] and V [m/s]; seconds in which V' and its bound L22 are known, in which V' exceeds it, and in which a = 0;
+    Largest |F| and |D| [m/s²] and V [m]; seconds in which V' and its bound L22 are known, in which V' exceeds it, and in which a = 0;
     stretches of at least 0.1 s in which it does.
     """
 

@@ -136,8 +136,7 @@ def _isolated(run: Run, pair: SpeedPair, model: RowModel, limits: Limits) -> Iso
         return None
     y, x = samples.y[use], samples.x[use]
     gain = float(evidence[row] - evidence[HEALTHY])
-    # into the row and out of it again; a fault that lasts to the end of the log need not end
-    if gain < (2.0 if run.stop < pair.samples.y.size else 1.5) * model.switch_cost:
+    if gain < thinnest(model.switch_cost, ends=run.stop < pair.samples.y.size):
         return None
     if row == STUCK and abs(float(np.mean(y))) <= max(3 * model.constant_noise, limits.min_sat):
         row = NO_SIGNAL
@@ -146,6 +145,11 @@ def _isolated(run: Run, pair: SpeedPair, model: RowModel, limits: Limits) -> Iso
         p[NO_SIGNAL] += p[STUCK]
         p[STUCK] = 0.0
     return Isolated(replace(run, row=row), y, x, p, gain)
+
+
+def thinnest(switch_cost: float, *, ends: bool) -> float:
+    """Least log-evidence of a finding: into its row and out of it again; one that lasts to the end of the log need not end."""
+    return (2.0 if ends else 1.5) * switch_cost
 
 
 def _last_before(pair: SpeedPair, start: int) -> float:

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from diagnosis.channels.sample_status import PAIR
+from diagnosis.drives.findings import thinnest
 from diagnosis.drives.load import LoadTrack
 from diagnosis.drives.load_findings import LEAST_LOAD
 from diagnosis.drives.speed_pair import SpeedPair
@@ -17,16 +18,38 @@ from replay.machine.drive_model import EffortMap
 Array = NDArray[np.float64]
 
 LENGTHS_S = (2.0, 10.0, None)
-_NEEDED = 15.0  # log-evidence that outweighs how seldom faults begin
 _LIKE = 4.0  # so many samples of the implied speed err alike
 _SURE = 0.95
 _QUANTILE = 1.645  # of a normal distribution, 95 %
+_ADDED = np.geomspace(
+    0.5, 64.0, 400
+)  # added noise that is tried, as the states of the noisy row have it [healthy noise]
+
+
+def noncentrality(needed: float) -> float:
+    """d at which log-evidence of mean d²/2 and variance d² exceeds `needed` in 95 of 100 cases: d²/2 − 1.645·d = needed."""
+    return float(_QUANTILE + np.sqrt(_QUANTILE**2 + 2.0 * needed))
+
+
+def added_noise(count: Array, needed: float) -> Array:
+    """Smallest added white noise, as a multiple κ of the healthy one, that `count` independent samples show at 95 %.
+
+    Against noise of its own power, healthy noise loses (κ² − ln(1 + κ²))/2 a sample on average, with variance κ⁴/2. Infinite where
+    not even the strongest state shows.
+    """
+    power = _ADDED**2
+    rate, spread = 0.5 * (power - np.log1p(power)), _QUANTILE * np.sqrt(0.5) * power
+    # rate·n − spread·√n = needed
+    least = ((spread + np.sqrt(spread**2 + 4.0 * rate * needed)) / (2.0 * rate)) ** 2
+    place = np.searchsorted(-np.minimum.accumulate(least), -np.asarray(count))
+    return np.asarray(np.r_[_ADDED, np.inf][place], dtype=np.float64)
 
 
 def sensor_powers(pair: SpeedPair, limits: Limits) -> Powers:
     """Smallest faults of the speed's channel that the controller did not meet.
 
-    A loss ε leaves ε·v beside the implied speed; n samples of noise σ show it where n/4·(ε·v/σ)²/2 is enough.
+    A loss ε leaves ε·v beside the implied speed. Samples of which four count as one, of noise σ each, give log-evidence of mean d²/2
+    and variance d², d² = Σ(ε·v/σ)²/4; it must exceed what a finding needs (`diagnosis.drives.findings.thinnest`) in 95 of 100 cases.
 
     Parameters
     ----------
@@ -37,19 +60,24 @@ def sensor_powers(pair: SpeedPair, limits: Limits) -> Powers:
     """
     x = np.abs(pair.samples.x)
     seen = (pair.samples.status == PAIR) & (np.nan_to_num(x) > limits.driving_speed)
+    variance = pair.noise**2 + np.nan_to_num(pair.samples.slack) ** 2
+    switch_cost = pair.model().switch_cost
     rows: list[Power] = []
     for length in LENGTHS_S:
         n = x.size if length is None else max(1, round(length / pair.dt))
-        count, speed = _places(np.where(seen, x, 0.0), seen, n)
+        needed = thinnest(switch_cost, ends=length is not None)
+        count, information = _places(np.where(seen, x**2 / variance, 0.0), seen, n)
+        noise = np.sqrt(_places(np.where(seen, variance, 0.0), seen, n)[1])
         with np.errstate(divide="ignore", invalid="ignore"):
-            off = pair.noise * np.sqrt(2.0 * _LIKE * _NEEDED / count)
-            loss = np.where(count > 0, np.maximum(off / speed, limits.min_epsilon), np.inf)
+            loss = noncentrality(needed) * np.sqrt(_LIKE / (count * information))
+            loss = np.where(count > 0, np.maximum(loss, limits.min_epsilon), np.inf)
         loss[loss > 1.0] = np.inf
         total = np.where(np.isfinite(loss), 1.0, np.inf)
+        noisy = np.maximum(noise * added_noise(count / _LIKE, needed), limits.min_sat)
         rows += [
             _row(Deviation.INEFFICIENT, length, loss, "1", limits.clear_at),
             _row(Deviation.NO_SIGNAL, length, total, "", 1.0),
-            _row(Deviation.NOISY, length, np.maximum(np.where(count > 0, off, np.inf), limits.min_sat), "m/s", None),
+            _row(Deviation.NOISY, length, noisy, "m/s", None),
         ]
         if length is not None:
             rows.append(_row(Deviation.STUCK, length, total, "", 1.0))

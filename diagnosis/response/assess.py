@@ -18,8 +18,20 @@ from diagnosis.response.inputs import FollowerData, cell_of, cells
 from diagnosis.response.joint import cut, joint_of
 from diagnosis.response.jumps import jumps_of
 from diagnosis.response.kernel import posterior
-from diagnosis.response.machine import Judged, otherwise, standstills, unlike
-from diagnosis.response.models import BLOCK_S, HEALTHY, NOISY, OTHER, STATES, Beside, blocks_of, scores
+from diagnosis.response.machine import Judged, lasting_losses, otherwise, standstills, unlike
+from diagnosis.response.models import (
+    BLOCK_S,
+    HEALTHY,
+    LEAST_P,
+    MEAN_FAULTY_S,
+    MEAN_HEALTHY_S,
+    NOISY,
+    OTHER,
+    STATES,
+    Beside,
+    blocks_of,
+    scores,
+)
 from diagnosis.response.power import powers_of
 from diagnosis.results.assessment import CODE, Assessment, Finding
 from diagnosis.results.evidence_columns import Pictured, steps_of
@@ -31,10 +43,8 @@ from replay.machine.geometry import Geometry
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
-_MEAN_HEALTHY_S, _MEAN_FAULTY_S = 120.0, 10.0
 _AT_A_JUMP = 0.1, 0.3  # probability that a fault begins, or ends, where the channel jumps
 _MOVES = 0.4  # of the driving speed: enough to see whether a channel lives
-_LEAST_P = 0.6
 _OWN, _OTHERS = 4, 2  # holds of a channel that may be faults: of the one in question, and of each other
 _LEAST_S = 1.0
 _DOUBT_S = 0.5  # around a spell that is judged no fault
@@ -102,9 +112,10 @@ def assess_response(
     doubts = {w: j.joint.unlike for w, j in judged.items() if j.joint is not None and j.joint.unlike}
     for w, text in (doubts | unlike(judged)).items():
         parts[w] = _doubted(parts[w][0], text), parts[w][1]
+    lasting = lasting_losses(judged)
     for w, (sensor, drive) in parts.items():
         j, about = judged[w], _asked(judged[w], limits)
-        powers = powers_of(j.wheel.blocks, j.driving, about, width * dt, beside.get(w), limits.clear_at)
+        powers = powers_of(j.wheel.blocks, j.driving, about, width * dt, beside.get(w), limits.clear_at, lasting[w])
         parts[w] = replace(sensor, powers=powers, notes=(*sensor.notes, *remarks)), drive
     return Judgement(parts, standstills(idle, dt))
 
@@ -149,7 +160,7 @@ def _judge(one: Judged, beside: Beside | None, dt: float, width: int) -> Judged:
     joint = None if rolled is None else joint_of(blocks, cells(rolled, width), beside)
     score = scores(blocks, one.driving, block_s, beside, None if joint is None else joint.view)
     jumped = one.wheel.samples.step[one.wheel.jumps.place] // width
-    enters, leaves = np.full((2, len(score)), [[-np.expm1(-block_s / t)] for t in (_MEAN_HEALTHY_S, _MEAN_FAULTY_S)])
+    enters, leaves = np.full((2, len(score)), [[-np.expm1(-block_s / t)] for t in (MEAN_HEALTHY_S, MEAN_FAULTY_S)])
     enters[jumped], leaves[jumped] = _AT_A_JUMP
     p = posterior(score, enters, leaves)
     return one._replace(
@@ -204,7 +215,7 @@ def _sides(
     doubtful = doubtful & ~((one.posterior.argmax(axis=1) == OTHER) & (one.speed is None) & one.calm)
     for spell in spells:
         long = (spell.stop - spell.start) * width * dt >= _LEAST_S
-        found = finding_of(spell, *_shown_by(one, spell)) if long and spell.p >= _LEAST_P else None
+        found = finding_of(spell, *_shown_by(one, spell)) if long and spell.p >= LEAST_P else None
         if found is not None:
             findings.append(found)
         elif one.posterior[spell.start : spell.stop].argmax(axis=1).min() > NOISY and _entered_calmly(

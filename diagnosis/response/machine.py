@@ -84,16 +84,29 @@ def otherwise(judged: Mapping[str, Judged], block_s: float) -> tuple[str, ...]:
 
 def unlike(judged: Mapping[str, Judged]) -> dict[str, str]:
     """Wheels that make less or more of the same command than the others over the whole mission, with a sentence."""
+    return {
+        w: f"over the whole mission it reads {share:.2f} × what the other wheels make of the same command: a scaled or wrongly "
+        "mapped sensor, another wheel diameter, or a weak drive"
+        for w, share in _shares(judged).items()
+        if not _LASTING <= share <= 1.0 / _LASTING
+    }
+
+
+def lasting_losses(judged: Mapping[str, Judged]) -> dict[str, float]:
+    """Smallest loss [1] over the whole mission by which a wheel would be `unlike` the others; infinite where none can be.
+
+    The response itself is found in the mission and takes such a loss for its own.
+    """
+    shares = _shares(judged)
+    return {w: max(1.0 - _LASTING / shares[w], 0.0) if w in shares else np.inf for w in judged}
+
+
+def _shares(judged: Mapping[str, Judged]) -> dict[str, float]:
+    """What each wheel makes of its command beside what the others make of it [1]; wheels without any to compare are left out."""
     made = {w: abs(float(j.response.weights[0])) for w, j in judged.items() if j.response.answered}
     out = {}
     for w, own in made.items():
         others = [x for o, x in made.items() if o != w]
-        if not others or not 0.0 < own < np.inf:
-            continue
-        share = own / float(np.median(others))
-        if not _LASTING <= share <= 1.0 / _LASTING:
-            out[w] = (
-                f"over the whole mission it reads {share:.2f} × what the other wheels make of the same command: a scaled or wrongly "
-                "mapped sensor, another wheel diameter, or a weak drive"
-            )
+        if others and 0.0 < own < np.inf:
+            out[w] = own / float(np.median(others))
     return out

@@ -18,6 +18,10 @@ BLOCK_S = 0.25
 SCALES = (0.15, 0.3, 0.45, 0.6, 0.72, 1.4, 1.8, 2.5)
 HEALTHY, OTHER, FROZEN, SILENT, NOISY = range(5)
 STATES = 5 + len(SCALES)
+#: How long a wheel stays healthy, and a fault stays, on average [s].
+MEAN_HEALTHY_S, MEAN_FAULTY_S = 120.0, 10.0
+#: Mean probability of its state from which a spell is a finding.
+LEAST_P = 0.6
 
 _FREEDOM = 3.0  # of Student's t: slip and wind-up are common
 _SECOND = 0.25  # weight of a block's misfit beside its command: that lasts for about a second

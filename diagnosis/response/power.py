@@ -7,7 +7,19 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from diagnosis.response.models import HEALTHY, NOISY, SILENT, Beside, Blocks, hold_shares, scores
+from diagnosis.response.models import (
+    HEALTHY,
+    LEAST_P,
+    MEAN_FAULTY_S,
+    MEAN_HEALTHY_S,
+    NOISY,
+    SILENT,
+    STATES,
+    Beside,
+    Blocks,
+    hold_shares,
+    scores,
+)
 from diagnosis.results.detectability import Deviation, Power, Powers
 from replay.faults import Side
 
@@ -17,7 +29,6 @@ Flags = NDArray[np.bool_]
 LENGTHS_S = (2.0, 10.0, None)
 _TRACED_S = 10.0
 _SIZES = (0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.75, 0.9)
-_NEEDED = 13.0  # log-evidence that outweighs how seldom faults begin and end
 _SURE = 0.95
 _LEAST_S = 1.0  # of expected motion in a place
 _APART_S = 1.0
@@ -25,9 +36,18 @@ _BARE_S = 5.0  # beside its command alone
 
 
 def powers_of(
-    blocks: Blocks, driving: Flags, asked: Flags, block_s: float, beside: Beside | None, clear_at: float
+    blocks: Blocks,
+    driving: Flags,
+    asked: Flags,
+    block_s: float,
+    beside: Beside | None,
+    clear_at: float,
+    lasting: float = np.inf,
 ) -> Powers:
     """Smallest faults that would have been found.
+
+    The response, the other view and the usual noise are found in the mission itself, so that of what lasts all through it only a
+    silent speed, and what makes a wheel unlike the others, would have shown.
 
     Parameters
     ----------
@@ -41,6 +61,8 @@ def powers_of(
         Another view of its speed.
     clear_at : float
         Loss that counts [1].
+    lasting : float
+        Smallest loss over the whole mission that makes the wheel unlike the others [1].
     """
     steps = np.cumsum(np.r_[0, asked])
     gains = {size: _gain(blocks, driving, block_s, beside, size) for size in _SIZES}
@@ -56,16 +78,20 @@ def powers_of(
         last = np.minimum(first + number, asked.size)
         enough = (steps[last] - steps[first]) * block_s >= min(_LEAST_S, 0.5 * number * block_s)
         first, last = first[enough], last[enough]
-        losses = _smallest(first, last, gains)
+        needed = _needed(last - first, block_s, ends=length is not None)
+        losses = np.full(first.size, lasting) if length is None else _smallest(first, last, gains, needed)
+        loud = np.inf if length is None else _loud(blocks)
         if beside is None and length is not None and length < _BARE_S:
             losses[:] = np.inf
         rows += [
             _row(Deviation.INEFFICIENT, length, losses, "1", clear_at),
-            _row(Deviation.NO_SIGNAL, length, np.where(_shown(lost, first, last), 1.0, np.inf), "", 1.0),
-            _row(Deviation.NOISY, length, np.full(first.size, _loud(blocks)), "m/s", None),
+            _row(Deviation.NO_SIGNAL, length, np.where(_shown(lost, first, last, needed), 1.0, np.inf), "", 1.0),
+            _row(Deviation.NOISY, length, np.full(first.size, loud), "m/s", None),
         ]
         if length is not None:
-            rows.append(_row(Deviation.STUCK, length, np.where(_shown(held, first, last), 1.0, np.inf), "", 1.0))
+            rows.append(
+                _row(Deviation.STUCK, length, np.where(_shown(held, first, last, needed), 1.0, np.inf), "", 1.0)
+            )
         if length == _TRACED_S:
             starts = tuple((first * block_s).tolist())
             trace = tuple(float(x) if np.isfinite(x) else None for x in losses)
@@ -84,17 +110,24 @@ def _against(blocks: Blocks, driving: Flags, block_s: float, beside: Beside | No
     return np.asarray(score[:, states] - score[:, [HEALTHY]])
 
 
-def _shown(gain: Array, first: NDArray[np.intp], last: NDArray[np.intp]) -> Flags:
+def _needed(number: NDArray[np.intp], block_s: float, *, ends: bool) -> Array:
+    """Log-evidence of so many blocks that outweighs how seldom a fault begins, stays so long, and ends, shape of `number`."""
+    enter, leave = -np.expm1(-block_s / MEAN_HEALTHY_S), -np.expm1(-block_s / MEAN_FAULTY_S)
+    once = np.log((STATES - 1) / enter) - (np.log(leave) if ends else 0.0) + np.log(LEAST_P / (1.0 - LEAST_P))
+    return np.asarray(once + number * (block_s / MEAN_FAULTY_S - block_s / MEAN_HEALTHY_S))
+
+
+def _shown(gain: Array, first: NDArray[np.intp], last: NDArray[np.intp], needed: Array) -> Flags:
     """Whether the evidence in each place [first, last) is enough."""
     total = np.vstack([np.zeros(gain.shape[1]), np.cumsum(gain, axis=0)])
-    return np.asarray((total[last] - total[first]).max(axis=1, initial=-np.inf) >= _NEEDED)
+    return np.asarray((total[last] - total[first]).max(axis=1, initial=-np.inf) >= needed)
 
 
-def _smallest(first: NDArray[np.intp], last: NDArray[np.intp], gains: Mapping[float, Array]) -> Array:
+def _smallest(first: NDArray[np.intp], last: NDArray[np.intp], gains: Mapping[float, Array], needed: Array) -> Array:
     """Smallest loss that shows in each place; infinite where none does. Shape (places,)."""
     out = np.full(first.size, np.inf)
     for size in reversed(_SIZES):
-        found = _shown(gains[size], first, last)
+        found = _shown(gains[size], first, last, needed)
         out[found] = size
     return out
 

@@ -4,11 +4,11 @@ A wheel τ v' = −v + K·(δ_a u + b_a) + d gives, with e = v_a − v_c and fau
 
     e' = a u + F + D         a = K δ_a/τ,  F = −v_a/τ,  D = (K b_a + d)/τ − v_c'
 
-    V = e²/(2ā) + Ψ̂²/2       ā = K/τ, the largest a; with ½ on e², as L18 and L26 have it
+    V = e²/(2ā) + Ψ̂²/2       ā = K/τ, the largest a; with ½ on e², as L18 (16) and L26 (24) have it
 
-    V' ≤ −λ (a/ā) e² + |e| (F* + D* + λξ) − β Ψ̂²                     L22, F* and D* the largest |F|/ā and |D|/ā
+    V' ≤ −λ (a/ā) e² + |e| (F* + D* + λξ) − β Ψ̂²                     L22 (20), F* and D* the largest |F|/ā and |D|/ā
 
-The bound that follows from it (L33) is so wide with the paper's parameters that no mission leaves it; what can fail on the way
+The bound that follows from it (L33 (31)) is so wide with the paper's parameters that no mission leaves it; what can fail on the way
 is L22 itself, as where Ψ̂ is driven by something that L16 does not have, and its premise a > 0.
 """
 
@@ -32,9 +32,9 @@ class ProofTerms:
     F, D : Array
         Lumped terms [m/s²].
     V : Array
-        Lyapunov function of each wheel at each sample [m/s]; the sum over the wheels is L26.
+        Lyapunov function of each wheel at each sample [m], Ψ̂² counted as m; the sum over the wheels is L26 (24).
     rate, bound : Array
-        V' and the right side of L22 [m/s²].
+        V' and the right side of L22 (20) [m/s].
     broken : NDArray[np.bool_]
         Where V' exceeds the bound.
     uncontrolled : NDArray[np.bool_]
@@ -52,7 +52,7 @@ class ProofTerms:
 
 @dataclass(frozen=True)
 class ProofConstants:
-    """Gain [m/s] and lag [s] of each wheel, shape (wheels,); λ [s/m], ξ and β [1/s]."""
+    """Gain [m/s] and lag [s] of each wheel, shape (wheels,); λ [s/m], ξ and β [1/s]; λξ counts ξ as a speed, as L21 (19) does."""
 
     K: Array
     tau: Array

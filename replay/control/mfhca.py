@@ -269,13 +269,14 @@ def implied_forcing(implied: Array, rho: Array, dt: float, window_s: float = 0.2
     out = np.full(implied.size, np.nan)
     if implied.size <= 2 * half:
         return out
-    total = np.concatenate(([0.0], np.cumsum(without_nan(rho * implied)))) * dt
+    # what the printed law takes from Ψ̂² in a step, by its exponential
+    total = np.concatenate(([0.0], np.cumsum(without_nan(-np.expm1(-2.0 * rho * dt) * implied))))
     missing = np.concatenate(([0], np.cumsum(~np.isfinite(rho * implied))))
     span = 2 * half * dt
     a, b = implied[: -2 * half], implied[2 * half :]
     integral = total[2 * half : -1] - total[: -2 * half - 1]
     gap = missing[2 * half : -1] - missing[: -2 * half - 1]
-    out[half:-half] = np.where(gap == 0, (b - a) / span + 2 * integral / span, np.nan)
+    out[half:-half] = np.where(gap == 0, (b - a + integral) / span, np.nan)
     return out
 
 

@@ -146,3 +146,21 @@ def test_what_would_have_shown_is_found_when_it_is_there() -> None:
         y[start : start + 200] *= 1.0 - loss.size
         found += any(w == "FR" for w, _ in findings(judged({**measured, "FR": y}, asked, body)))
     assert found >= len(places) - 1
+
+
+def test_what_lasts_all_through_shows_by_the_other_wheels_alone() -> None:
+    """The response is found in the mission itself: it takes a lasting loss, and lasting noise, for its own."""
+    measured, asked, body = speeds(13)
+    powers = judged(measured, asked, body).parts["FR"][0].powers
+    assert powers is not None
+    size = {p.deviation: p.size for p in powers.rows if p.for_s is None}
+    loss = size[Deviation.INEFFICIENT]
+    assert loss == pytest.approx(0.2, abs=0.05)
+    assert size[Deviation.NOISY] is None
+    for less, cleared in ((loss - 0.02, True), (loss + 0.02, False)):
+        j = judged({**measured, "FR": (1.0 - less) * measured["FR"]}, asked, body)
+        assert findings(j) == []
+        assert (share(j, "FR", State.HEALTHY) > 0.9) is cleared
+    one = judged({"FR": measured["FR"]}, {"FR": asked["FR"]}, body).parts["FR"][0].powers
+    assert one is not None
+    assert {p.size for p in one.rows if p.for_s is None and p.deviation is Deviation.INEFFICIENT} == {None}
