@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import math
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -19,18 +20,28 @@ from replay.export.formats.rosbag1 import write_ros1_bag
 from replay.export.formats.rosbag2 import write_rosbag2
 from replay.export.formats.topics import axle_joint, mission_topics, wheel_joint
 from replay.export.formats.twincat import plc_symbol, write_twincat
+from replay.faults import FaultMode, FaultSpec, Side
 from replay.machine.config import haulotte
 from replay.machine.toml_file import load_machine
 from replay.simulation.options import SimulatedMission, SimulationOptions
 from replay.simulation.run import simulate_mission
 from replay.truth import write_truth
 
-# 50 Hz keeps all of them together below 15 MB; `mfhca simulate` writes them at 1 kHz.
+# 50 Hz keeps all of them together below 16 MB; `mfhca simulate` writes them at 1 kHz.
 _RATE = 50.0
 
 # Log, machine file that names its signals, and how the mission is simulated.
 _PAPER = SimulationOptions(scenario="paper", seed=7, rate_hz=_RATE, imu=False)
+_THREE = (
+    FaultSpec("FR", Side.SENSOR, FaultMode.STUCK, 10.0, 18.0, 1.0, math.nan),
+    FaultSpec("RL", Side.ACTUATOR, FaultMode.INEFFICIENT, 29.0, 39.0, 0.5),
+    FaultSpec("FL", Side.SENSOR, FaultMode.INEFFICIENT, 45.0, 53.0, 0.3),
+)
 SAMPLES: Mapping[str, tuple[str, SimulationOptions]] = {
+    "three_faults.mcap": (
+        "haulotte.toml",
+        SimulationOptions(scenario="healthy", seed=4, duration_s=60.0, rate_hz=_RATE, imu=False, faults=_THREE),
+    ),
     "paper.mcap": ("haulotte.toml", _PAPER),
     "paper.bag": ("haulotte.toml", _PAPER),
     "paper_rosbag2": ("haulotte.toml", _PAPER),
@@ -66,6 +77,9 @@ wheel_offset = 0.20    # m
 gear_ratio = 17.7
 max_speed = 0.36       # m/s
 max_steer = 0.7853981633974483 # rad
+
+[plant]
+flow = 1.59            # m/s, summed over the wheels that the pump can feed
 
 [signals]
 """

@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 
 FOLDER = Path(__file__).resolve().parents[1] / "sample_logs"
-STEMS = ("paper", "healthy_ice", "spool", "base")
+STEMS = ("three_faults", "paper", "healthy_ice", "spool", "base")
 STEP = 0.02  # of the samples' 50 Hz [s]
 
 
