@@ -67,7 +67,10 @@ def wheel_checks(cells: Cells, clear_at: float) -> Iterator[Checked]:
             yield worst(cells, (*about, either, Check.EXCESS), windows[:, i], above[0] * share)
             yield lasts(cells, (*about, either, Check.LASTING_EXCESS), lasting[i].above, above[1] * share)
         if _known(reference[:, i]):
-            yield worst(cells, (*about, either, Check.TRACKING), tracking[:, i], _TRACKING)
+            if (
+                _known(used[:, i]) or twice[i][1]
+            ):  # a drive with a command alone is judged by how it answers it, not by its lag
+                yield worst(cells, (*about, either, Check.TRACKING), tracking[:, i], _TRACKING)
             if delays[i] is not None:
                 yield lasts(cells, (*about, Side.SENSOR, Check.DELAY), delays[i], LATE_S)
         yield worst(cells, (*about, Side.SENSOR, Check.ROUGHNESS), rough[:, i], ROUGH)

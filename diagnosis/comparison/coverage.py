@@ -9,7 +9,7 @@ from diagnosis.results.assessed import needed_s
 from diagnosis.results.comparison_document import CoverageStep
 from diagnosis.results.document import ReportDocument
 from diagnosis.results.vocabulary import Kind, Tier
-from replay.faults import DECIDED
+from replay.faults import DECIDED, Side
 
 #: A component and its side.
 Part = tuple[str, str]
@@ -81,13 +81,13 @@ class CoverageChange:
 def sides_of(report: ReportDocument) -> dict[Part, SideCoverage]:
     """Coverage of a report by component and side."""
     least = report["limits"]["min_assessed"]
-    open_ = {c["component"] for c in report["clearing"] if not c["passed"]}
+    open_ = {(c["component"], s) for c in report["clearing"] if not c["passed"] for s in Side(c["side"]).sides}
     whole = not report["verdict"]["scope"]
     out: dict[Part, SideCoverage] = {}
     for row in report["coverage"]:
         judged = sum(v for k, v in row["seconds"].items() if k in DECIDED)
         decided, driving, tier = row["decided_driving_s"], row["driving_s"], row["tier"]
-        shown = whole and row["component"] not in open_
+        shown = whole and (row["component"], row["side"]) not in open_
         assessed = shown and tier is not Tier.NONE and decided >= needed_s(driving, least)
         out[row["component"], row["side"]] = SideCoverage(tier, driving, decided, judged, assessed, shown)
     return out

@@ -233,9 +233,10 @@ def _sensors_alone(
     if not all(side == Side.ACTUATOR and assessments[c, side].tier is Tier.RESPONSE for c, side in against.short):
         return ""
     least = min(decided_s.get(p, 0.0) for p in assessments if p[0] not in axles and p[1] == Side.SENSOR)
-    who = join_words([c for c, _ in against.short])
+    drives = [c for c, _ in against.short]
+    who = f"the drive of {drives[0]} is" if len(drives) == 1 else f"the drives of {join_words(drives)} are"
     why = assessments[against.short[0]].reasons.get(State.NOT_ASSESSED, "")
     return (
-        f"The speed sensors were judged over at least {least:.0f} s of driving and no fault was seen in them. Whether the drives of "
-        f"{who} are weak was not judged: {why}."
+        f"The speed sensors were judged over at least {least:.0f} s of driving and no fault was seen in them. Whether "
+        f"{who} weak was not judged: {why}."
     )

@@ -22,6 +22,7 @@ from replay.machine.config import Limits
 Array = NDArray[np.float64]
 
 _MAX_LAG_S = 2.5
+_ALIKE = 0.7  # correlation of a reading that is a copy of its command
 _MIN_STILL_S = 0.5
 _MOST_TO_COME, _SOME_TO_COME = (
     0.5,
@@ -102,20 +103,34 @@ def assess_tracking(
     states = np.where(driven, CODE[State.NOT_ASSESSED], CODE[State.NOT_EXCITED]).astype(np.int8)
     states[~np.isfinite(v) | ~np.isfinite(v_ref)] = CODE[State.NO_DATA]
     last, proved = _last_motion(v, reference, lag, dt)
-    found = _standstill(v, _Tracking(asked, driven, last, proved, lag), dt, names)
+    small = _small_copy(v[last:], reference[last:], dt)
+    found = None if small else _standstill(v, _Tracking(asked, driven, last, proved, lag), dt, names)
     findings = () if found is None else (found,)
     for finding in findings:
         states[finding.start :] = CODE[State.NO_SIGNAL]
     series = (("residual", np.where(np.isfinite(v), v - reference, np.nan)), ("expected", reference))
     pictured = Pictured.of(steps_of(findings, v.size, dt), series)
     reasons = {
-        State.NOT_ASSESSED: "without a valve command or a second measurement, only a standstill under command can be detected",
+        State.NOT_ASSESSED: f"it follows its command at {small:.2g} of its size: a wrong unit, a scaled or wrongly mapped channel"
+        if small
+        else "without a valve command or a second measurement, only a standstill under command can be detected",
         State.NOT_EXCITED: "nothing is commanded",
         State.NO_DATA: "no samples",
     }
     note = f"{names[0]} against {names[1]}: lag {lag * dt:.3g} s."
     one = Assessment(states, reasons, findings, pictured.columns, Tier.TRACKING, (note,), closeups=pictured.closeups)
     return one, Assessment(states.copy(), reasons, findings, {}, Tier.TRACKING, (note,))
+
+
+def _small_copy(v: Array, reference: Array, dt: float) -> float:
+    """How large a speed is beside the command whose shape it has, where it is far too small; 0 where it has another shape."""
+    width = max(1, round(_SMOOTH_S / dt))
+    known = np.isfinite(v) & np.isfinite(reference)
+    a, b = (moving_sum(np.where(known, x, 0.0), width) for x in (v, reference))
+    size = float(np.sqrt(float(a @ a) * float(b @ b)))
+    if size <= 0.0 or float(a @ b) / size < _ALIKE:
+        return 0.0
+    return float(a @ b) / float(b @ b)
 
 
 def _last_motion(v: Array, reference: Array, lag: int, dt: float) -> tuple[int, bool]:

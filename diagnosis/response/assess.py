@@ -48,8 +48,8 @@ _MOVES = 0.4  # of the driving speed: enough to see whether a channel lives
 _OWN, _OTHERS = 4, 2  # holds of a channel that may be faults: of the one in question, and of each other
 _LEAST_S = 1.0
 _DOUBT_S = 0.5  # around a spell that is judged no fault
-_NO_EFFORT = "only their effort would show it; log current, duty or torque (`effort` of /joint_states)"
-_UNUSED_EFFORT = "their effort is logged, but nothing says what effort is healthy in a body that all of them move"
+_HIDDEN = "a controller that holds the speed hides a weak drive, and what effort is healthy is not known where several drives move one body"
+_ALONE = "a controller that holds the speed hides a weak drive; name its current, duty or torque as its command (`wheel.{0}.u`) to have it judged"
 _UNSEEN = "without its command or another wheel of its side only a speed that is frozen, wild or noisy shows"
 
 
@@ -148,7 +148,7 @@ def _wheels(
         driving = moves > _MOVES * limits.driving_speed
         jumps, calm = jumps_of(samples, blocks, width)
         wheel = Wheel(d.name, samples, blocks, jumps, dt, "")
-        out[w] = Judged(d, response, wheel, driving, np.zeros((0, STATES)), [], None, calm)
+        out[w] = Judged(d, response, wheel, driving, np.zeros((0, STATES)), [], None, calm, alone=len(data) == 1)
     return out
 
 
@@ -296,7 +296,7 @@ def _assessment(
 
 def _drive(one: Judged, states: NDArray[np.int8], findings: tuple[Finding, ...]) -> Assessment:
     reasons = {
-        State.NOT_ASSESSED: _UNUSED_EFFORT if one.data.effort else _NO_EFFORT,
+        State.NOT_ASSESSED: _ALONE.format(one.data.name.split(".")[1]) if one.alone else _HIDDEN,
         State.NOT_EXCITED: "nothing is commanded",
         State.NO_DATA: "no samples",
         State.MASKED: "its speed sensor is faulty",

@@ -30,8 +30,6 @@ class FollowerData:
         Its commanded speed [m/s].
     name : str
         Of its channel.
-    effort : bool
-        Whether its effort is logged.
     rolled : Array or None, shape (n,)
         Speed by the position of its joint [m/s]; None where that is not logged.
     """
@@ -41,7 +39,6 @@ class FollowerData:
     commands: Array
     asked: Array
     name: str
-    effort: bool = False
     rolled: Array | None = None
 
 
@@ -77,7 +74,7 @@ def followers(mission: MissionView) -> dict[str, FollowerData]:
             continue
         own = mission.logged(f"wheel.{w}.v_ref") or body is None
         commands = cells(asked, width)[:, None] if own or body is None else body
-        position, effort = f"wheel.{w}.v_position", mission.logged(f"wheel.{w}.effort")
+        position = f"wheel.{w}.v_position"
         rolled = mission.values(position) if mission.logged(position) else None
-        out[w] = FollowerData(mission.values(name), timeline.fresh[name], commands, asked, name, effort, rolled)
+        out[w] = FollowerData(mission.values(name), timeline.fresh[name], commands, asked, name, rolled)
     return out

@@ -17,6 +17,7 @@ Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
 _LASTING = 0.8  # of what the other wheels make of the same command: over a whole mission no slip or load does that
+_NEAR = 0.5, 2.0  # of its command: what any healthy drive makes of it
 _ELSEWHERE, _ELSEWHERE_S = 0.35, 1.5  # of the top speed: all drives that far off their commands, for so long
 
 
@@ -39,6 +40,8 @@ class Judged(NamedTuple):
         Blocks in which a jump would be seen.
     joint : Joint or None
         The position of its joint.
+    alone : bool
+        Whether it is the only drive.
     """
 
     data: FollowerData
@@ -50,6 +53,7 @@ class Judged(NamedTuple):
     speed: Array | None
     calm: Flags
     joint: Joint | None = None
+    alone: bool = False
 
 
 def standstills(idle: Sequence[tuple[int, int]], dt: float) -> tuple[str, ...]:
@@ -83,13 +87,25 @@ def otherwise(judged: Mapping[str, Judged], block_s: float) -> tuple[str, ...]:
 
 
 def unlike(judged: Mapping[str, Judged]) -> dict[str, str]:
-    """Wheels that make less or more of the same command than the others over the whole mission, with a sentence."""
-    return {
+    """Wheels that make something else of their command than other wheels do, or any drive would, with a sentence."""
+    out = {
         w: f"over the whole mission it reads {share:.2f} × what the other wheels make of the same command: a scaled or wrongly "
         "mapped sensor, another wheel diameter, or a weak drive"
         for w, share in _shares(judged).items()
         if not _LASTING <= share <= 1.0 / _LASTING
     }
+    for w, own in _made(judged).items():
+        if w not in out and not _NEAR[0] <= own <= _NEAR[1]:
+            out[w] = (
+                f"over the whole mission it reads {own:.2g} × its command: a wrong unit of one of them, another wheel diameter, or a "
+                "wrongly mapped channel"
+            )
+    return out
+
+
+def _made(judged: Mapping[str, Judged]) -> dict[str, float]:
+    """What each wheel makes of its command [1]."""
+    return {w: abs(float(j.response.weights[0])) for w, j in judged.items() if j.response.answered}
 
 
 def lasting_losses(judged: Mapping[str, Judged]) -> dict[str, float]:
@@ -103,8 +119,7 @@ def lasting_losses(judged: Mapping[str, Judged]) -> dict[str, float]:
 
 def _shares(judged: Mapping[str, Judged]) -> dict[str, float]:
     """What each wheel makes of its command beside what the others make of it [1]; wheels without any to compare are left out."""
-    made = {w: abs(float(j.response.weights[0])) for w, j in judged.items() if j.response.answered}
-    out = {}
+    made, out = _made(judged), {}
     for w, own in made.items():
         others = [x for o, x in made.items() if o != w]
         if others and 0.0 < own < np.inf:

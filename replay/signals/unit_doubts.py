@@ -6,6 +6,7 @@ for a time. Only the former is a question that must be answered before a mission
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -30,6 +31,8 @@ _ANY_MACHINE = 30.0  # m/s; faster than any machine whose top speed was not give
 _SOUND = 2  # other signals of the kind, recorded in the same unit, that are plausible: then it is a fault of this one
 _TURN = 3.1  # rad; a machine file can give no larger limit of steering
 _ROTATIONS, _TURNING = ("rad/s", "rpm", "deg/s"), ("rad/s", "rpm", "deg/s", "rev/s")
+_LINEAR = re.compile(r"(^|\.)linear\.[xyz]$")  # of a Twist, which is in m/s by definition
+_JOINT = re.compile(r"(^|\.)velocit\w*\[")  # of a JointState, which is no speed over ground
 _SPEED_UNITS = ("m/s", "km/h", "mm/s", "cm/s")
 
 
@@ -107,18 +110,23 @@ def _too_fast(signal: str, values: NDArray[np.float64], peak: float, origin: Sig
     fitting = _fitting_speed(signal, peak, origin, machine) if impossible else ""
     other = f", or [geometry] max_speed = {_rounded_up(peak)} if the machine is that fast"
     line = f"{fitting}{other}" if fitting else f"[geometry] max_speed = {_rounded_up(peak)}"
-    return Doubt(signal, f"{text}; check its unit", line, impossible)
+    other_file = _LINEAR.search(origin.field or "") is not None
+    check = "a Twist is in m/s: is this the machine file of another machine?" if other_file else "check its unit"
+    return Doubt(signal, f"{text}; {check}", line, impossible)
 
 
 def _fitting_speed(signal: str, peak: float, origin: SignalSource, machine: Machine) -> str:
     """Line of the signal with the unit with which it just fits the machine's top speed; empty where none does."""
+    if _LINEAR.search(origin.field or ""):
+        return ""
     recorded = peak / abs(factor_of(signal, origin, machine))
     turns = [replace(origin, unit=unit, at="wheel") for unit in _ROTATIONS]
     if machine.gear_ratio > 1:
         turns += [replace(origin, unit=unit, at="motor") for unit in _ROTATIONS]
     speeds = [replace(origin, unit=unit, at="wheel") for unit in _SPEED_UNITS]
     rotation = known_unit(origin.unit) in _TURNING
-    for ways in (turns, speeds) if rotation else (speeds + turns,):
+    joint = _JOINT.search(origin.field or "") is not None
+    for ways in (turns,) if joint else (turns, speeds) if rotation else (speeds + turns,):
         best, most = "", 0.1 * machine.max_speed
         for tried in ways:
             try:

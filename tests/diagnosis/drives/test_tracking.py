@@ -105,3 +105,9 @@ def test_a_command_that_begins_as_the_log_ends_proves_nothing() -> None:
     v = np.r_[np.zeros(25), asked[: N - 25]]
     v[-20:] = 0.0
     assert assess_tracking(v, asked, DT, LIMITS, NAMES)[0].findings == ()
+
+
+def test_a_small_copy_of_the_command_is_a_wrong_unit_and_no_standstill() -> None:
+    for one in assess_tracking(np.round(response(25) / 57.3, 4), command(), DT, LIMITS, NAMES):
+        assert one.findings == ()
+        assert "0.017 of its size: a wrong unit" in one.reasons[State.NOT_ASSESSED]

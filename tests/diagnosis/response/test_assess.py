@@ -164,3 +164,12 @@ def test_what_lasts_all_through_shows_by_the_other_wheels_alone() -> None:
     one = judged({"FR": measured["FR"]}, {"FR": asked["FR"]}, body).parts["FR"][0].powers
     assert one is not None
     assert {p.size for p in one.rows if p.for_s is None and p.deviation is Deviation.INEFFICIENT} == {None}
+
+
+def test_speeds_in_another_unit_than_their_commands_are_not_called_healthy() -> None:
+    measured, asked, body = speeds(11)
+    for y in measured.values():
+        y *= 0.3
+    j = judged(measured, asked, body)
+    assert all(share(j, w, State.HEALTHY) == 0.0 for w in WHEELS)
+    assert "× its command: a wrong unit" in j.parts["FR"][0].reasons[State.NOT_ASSESSED]
