@@ -77,6 +77,8 @@ def sensor_powers(pair: SpeedPair, limits: Limits) -> Powers:
         loss[loss > 1.0] = np.inf
         total = np.where(np.isfinite(loss), 1.0, np.inf)
         noisy = np.maximum(noise * added_noise(count / _LIKE, needed), limits.min_sat)
+        if length is None:
+            noisy[:] = np.inf  # the healthy noise is found in the mission itself
         rows += [
             _row(Deviation.INEFFICIENT, length, loss, "1", limits.clear_at),
             _row(Deviation.NO_SIGNAL, length, total, "", 1.0),

@@ -71,6 +71,11 @@ def test_noise_of_the_stated_size_is_found_in_95_of_100(kept: float) -> None:
     assert found(lambda y, rng: y + rng.normal(0, size, y.size), kept) >= 0.9
 
 
+def test_noise_that_lasts_all_through_is_taken_for_the_drives_own() -> None:
+    rows = sensor_powers(pair(0), LIMITS).rows
+    assert [p.size for p in rows if p.deviation is Deviation.NOISY and p.for_s is None] == [None]
+
+
 def test_half_the_stated_loss_is_not_found_as_often() -> None:
     size = stated(Deviation.INEFFICIENT)
     assert found(lambda y, rng: (1 - 0.5 * size) * y, 0.6) < 0.7
