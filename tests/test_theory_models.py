@@ -13,7 +13,7 @@ from diagnosis.channels.sample_status import PAIR
 from diagnosis.drives.effort_map import EffortMap
 from diagnosis.drives.inverse_controller import high_passed
 from diagnosis.drives.load import LoadTrack
-from diagnosis.drives.power import added_noise, load_powers, noncentrality
+from diagnosis.drives.power import added_noise, least_load, load_powers, noncentrality
 from diagnosis.estimation.fault_models import CONSTANT, EXACT, ZERO, ModeModel
 from diagnosis.estimation.row_probability import row_probabilities
 from diagnosis.estimation.samples import Samples
@@ -328,12 +328,14 @@ def test_t18_added_noise_against_the_chi_square_law() -> None:
 
 
 @pytest.mark.parametrize("seconds", [2.0, 10.0, None])
-def test_t19_a_load_that_is_sure_to_be_found(seconds: float | None) -> None:
+def test_t19_a_load_that_is_found_in_95_of_100(seconds: float | None) -> None:
     effort = EffortMap(offset=0.1, slope=0.05, between=0.01, drift=0.001, noise=0.004)
-    steps = np.full(60, 0.3)
-    found = load_powers(LoadTrack(0 * steps, 0 * steps, steps, 100), effort, Limits())
+    limits, steps = Limits(), np.full(60, 0.3)
+    found = load_powers(LoadTrack(0 * steps, 0 * steps, steps, 100), effort, limits)
     (size,) = [p.size for p in found.rows if p.for_s == seconds and p.deviation is Deviation.INEFFICIENT]
     own = 0.01 if seconds is None else np.sqrt(0.004**2 / seconds + 0.001**2 * seconds)
-    load = 2 * 0.01 + 1.645 * own
+    least = max(least_load(seconds, 0.3, effort, limits), limits.min_epsilon / (1 - limits.min_epsilon) * 0.3)
+    load = least + 1.645 * own
     assert size == pytest.approx(load / (0.3 + load))
-    assert norm.sf((2 * 0.01 - load) / own) == pytest.approx(0.95, abs=1e-3)
+    assert norm.sf((least - load) / own) == pytest.approx(0.95, abs=1e-3)
+    assert least > 2 * 0.01  # twice the spread alone is not enough

@@ -70,11 +70,26 @@ def track_load(record: DriveRecord, effort: EffortMap, least_speed: float) -> Lo
         Commanded speed from which the drive is driven [m/s].
     """
     speed, used, length = step_means(record, least_speed)
-    steps = np.flatnonzero(np.isfinite(speed))
-    nan = np.full(speed.size, np.nan)
+    return track_steps(effort.offset + effort.slope * speed, used, effort, length)
+
+
+def track_steps(needed: Array, used: Array, effort: EffortMap, length: int) -> LoadTrack:
+    """The same by steps of one second.
+
+    Parameters
+    ----------
+    needed, used : Array, shape (steps,)
+        Effort that the map says for the step's speed, and the one that was used [unit of effort]; NaN where nothing is driven.
+    effort : EffortMap
+        From healthy missions.
+    length : int
+        Samples per step.
+    """
+    steps = np.flatnonzero(np.isfinite(needed))
+    nan = np.full(needed.size, np.nan)
     if not steps.size:
         return LoadTrack(nan, nan.copy(), nan.copy(), length)
-    healthy = effort.offset + effort.slope * speed[steps]
+    healthy = needed[steps]
     reference = float(np.median(np.abs(healthy)))
     offsets = np.linspace(-3.0, 3.0, _OFFSETS) * max(effort.between, effort.noise)
     levels = _LEVELS * reference

@@ -22,7 +22,7 @@ from replay.machine.config import Limits
 Array = NDArray[np.float64]
 
 _LEAST_S = 2.0
-LEAST_LOAD = 2.0  # of a finding [standard deviations of a mission's offset]
+_LEAST_LOAD = 2.0  # of a finding [standard deviations of a mission's offset]
 _AROUND_S = 1.5
 _SIDE_BY_SIDE = 3  # samples compared on each side of a jump
 _PLAIN = 6.0  # size from which a jump cannot be overlooked [standard deviations of healthy changes]
@@ -139,17 +139,22 @@ def load_findings(data: DriveData, load: LoadTrack, between: float, limits: Limi
     limits : Limits
         What counts.
     """
+    return [_finding(stretch, data) for stretch in load_stretches(load, between, limits, data.dt)]
+
+
+def load_stretches(load: LoadTrack, between: float, limits: Limits, dt: float) -> list[LoadStretch]:
+    """Stretches of extra load that are findings; parameters are those of `load_findings`, `dt` the distance of samples [s]."""
     sure = np.nan_to_num(load.probability) >= limits.min_probability
     edge = np.flatnonzero(np.diff(np.r_[False, sure, False].astype(np.int8)))
     out = []
     for a, b in zip(edge[::2], edge[1::2], strict=True):
-        stretch = LoadStretch.of(load, int(a), int(b), data.dt)
+        stretch = LoadStretch.of(load, int(a), int(b), dt)
         if (
             stretch.epsilon.value >= limits.min_epsilon
             and stretch.seconds >= _LEAST_S
-            and stretch.mean_load >= LEAST_LOAD * between
+            and stretch.mean_load >= _LEAST_LOAD * between
         ):
-            out.append(_finding(stretch, data))
+            out.append(stretch)
     return out
 
 

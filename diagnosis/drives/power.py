@@ -6,9 +6,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from diagnosis.channels.sample_status import PAIR
+from diagnosis.drives.effort_map import STEP_S
 from diagnosis.drives.findings import thinnest
-from diagnosis.drives.load import LoadTrack
-from diagnosis.drives.load_findings import LEAST_LOAD
+from diagnosis.drives.load import LoadTrack, track_steps
+from diagnosis.drives.load_findings import load_stretches
 from diagnosis.drives.speed_pair import SpeedPair
 from diagnosis.results.detectability import Deviation, Power, Powers
 from replay.faults import Side
@@ -21,6 +22,8 @@ LENGTHS_S = (2.0, 10.0, None)
 _LIKE = 4.0  # so many samples of the implied speed err alike
 _SURE = 0.95
 _QUANTILE = 1.645  # of a normal distribution, 95 %
+_AROUND = 30  # steps without load around a load, and with it where it lasts all through
+_LOADS = np.geomspace(0.01, 0.6, 48)  # that are tried [share of the healthy effort]
 _ADDED = np.geomspace(
     0.5, 64.0, 400
 )  # added noise that is tried, as the states of the noisy row have it [healthy noise]
@@ -74,6 +77,8 @@ def sensor_powers(pair: SpeedPair, limits: Limits) -> Powers:
         loss[loss > 1.0] = np.inf
         total = np.where(np.isfinite(loss), 1.0, np.inf)
         noisy = np.maximum(noise * added_noise(count / _LIKE, needed), limits.min_sat)
+        if length is None:
+            noisy[:] = np.inf  # the healthy noise is found in the mission itself
         rows += [
             _row(Deviation.INEFFICIENT, length, loss, "1", limits.clear_at),
             _row(Deviation.NO_SIGNAL, length, total, "", 1.0),
@@ -85,7 +90,9 @@ def sensor_powers(pair: SpeedPair, limits: Limits) -> Powers:
 
 
 def load_powers(load: LoadTrack, effort: EffortMap, limits: Limits) -> Powers:
-    """Smallest loads, as shares of the effort, that are more than what healthy missions differ by.
+    """Smallest loads, as shares of the effort, that would have been findings.
+
+    What `diagnosis.drives.load` needs without noise, and what noise, drift and the mission's own offset hide of it in 95 of 100 cases.
 
     Parameters
     ----------
@@ -94,9 +101,11 @@ def load_powers(load: LoadTrack, effort: EffortMap, limits: Limits) -> Powers:
     effort : EffortMap
         From healthy missions.
     limits : Limits
-        ``clear_at``.
+        ``clear_at``, and what a finding needs.
     """
     known = np.isfinite(load.expected)
+    driven = np.abs(load.expected[known])
+    reference = float(np.median(driven)) if driven.size else np.nan
     rows: list[Power] = []
     for length in LENGTHS_S:
         n = int(known.size) if length is None else round(length)
@@ -104,10 +113,42 @@ def load_powers(load: LoadTrack, effort: EffortMap, limits: Limits) -> Powers:
         own = (
             effort.between if length is None else np.hypot(effort.noise / np.sqrt(max(n, 1)), effort.drift * np.sqrt(n))
         )
-        least = LEAST_LOAD * effort.between + _QUANTILE * own
-        share = np.where(2 * count > min(n, known.sum()), least / (np.abs(expected) + least), np.inf)
+        least_share = limits.min_epsilon / (1.0 - limits.min_epsilon) * np.abs(expected)
+        least = np.maximum(least_load(length, reference, effort, limits), least_share) + _QUANTILE * own
+        with np.errstate(invalid="ignore"):
+            share = np.where(2 * count > min(n, known.sum()), least / (np.abs(expected) + least), np.inf)
+        share[~np.isfinite(share)] = np.inf
         rows.append(_row(Deviation.INEFFICIENT, length, share, "1", limits.clear_at))
     return Powers(tuple(rows), Side.SENSOR_OR_ACTUATOR)
+
+
+def least_load(length: float | None, reference: float, effort: EffortMap, limits: Limits) -> float:
+    """Smallest load [unit of effort] that is a finding where efforts are just what map and load say; infinite where none is.
+
+    Parameters
+    ----------
+    length : float or None
+        Of the load [s], between two stretches without it; None: over the whole mission.
+    reference : float
+        Usual healthy effort [unit of effort].
+    effort, limits
+        As in `load_powers`.
+    """
+    around = 0 if length is None else _AROUND
+    loaded = _AROUND if length is None else round(length)
+    needed = np.full(loaded + 2 * around, reference)
+
+    def found(load: float) -> bool:
+        used = needed.copy()
+        used[around : around + loaded] += load
+        return bool(load_stretches(track_steps(needed, used, effort, 1), effort.between, limits, STEP_S))
+
+    loads = _LOADS * reference
+    first, last = 0, loads.size
+    while first < last:  # the first of them that is found
+        middle = (first + last) // 2
+        first, last = (first, middle) if found(float(loads[middle])) else (middle + 1, last)
+    return float(np.r_[loads, np.inf][first])
 
 
 def _places(x: Array, use: NDArray[np.bool_], n: int) -> tuple[Array, Array]:

@@ -10,11 +10,14 @@ from numpy.typing import NDArray
 
 from diagnosis.channels.sample_status import PAIR
 from diagnosis.drives.findings import find_rows, thinnest
+from diagnosis.drives.load import track_steps
+from diagnosis.drives.load_findings import load_stretches
 from diagnosis.drives.path import SpeedSamples
-from diagnosis.drives.power import added_noise, noncentrality, sensor_powers
+from diagnosis.drives.power import added_noise, load_powers, noncentrality, sensor_powers
 from diagnosis.drives.speed_pair import SpeedPair
 from diagnosis.results.detectability import Deviation
 from replay.machine.config import Limits
+from replay.machine.drive_model import EffortMap
 
 Array = NDArray[np.float64]
 Fault = Callable[[Array, np.random.Generator], Array]
@@ -68,6 +71,11 @@ def test_noise_of_the_stated_size_is_found_in_95_of_100(kept: float) -> None:
     assert found(lambda y, rng: y + rng.normal(0, size, y.size), kept) >= 0.9
 
 
+def test_noise_that_lasts_all_through_is_taken_for_the_drives_own() -> None:
+    rows = sensor_powers(pair(0), LIMITS).rows
+    assert [p.size for p in rows if p.deviation is Deviation.NOISY and p.for_s is None] == [None]
+
+
 def test_half_the_stated_loss_is_not_found_as_often() -> None:
     size = stated(Deviation.INEFFICIENT)
     assert found(lambda y, rng: (1 - 0.5 * size) * y, 0.6) < 0.7
@@ -86,3 +94,22 @@ def test_added_noise_is_never_below_the_weakest_state() -> None:
     assert (np.diff(sizes) <= 0).all()
     assert sizes[-1] == 0.5
     assert np.isinf(added_noise(np.array([0.5]), 21.6)[0])
+
+
+@pytest.mark.parametrize("seconds", [2.0, 10.0, None])
+@pytest.mark.parametrize("effort", [EffortMap(0.1, 0.05, 0.01, 0.001, 0.004), EffortMap(0.1, 0.05, 0.02, 0.001, 0.01)])
+def test_a_load_of_the_stated_size_is_found_in_95_of_100(effort: EffortMap, seconds: float | None) -> None:
+    needed, limits, steps = np.full(120, 0.25), Limits(), 120
+    part = slice(0, steps) if seconds is None else slice(40, 40 + round(seconds))
+    stated = load_powers(track_steps(needed, needed, effort, 1), effort, limits).rows
+    (share,) = [p.size for p in stated if p.for_s == seconds]
+    assert share is not None
+    load, hits = 0.25 * share / (1 - share), 0
+    for seed in range(MISSIONS):
+        rng = np.random.default_rng(seed)
+        used = needed + rng.normal(0, effort.between) + np.cumsum(rng.normal(0, effort.drift, steps))
+        used += rng.normal(0, effort.noise, steps)
+        used[part] += load
+        found = load_stretches(track_steps(needed, used, effort, 1), effort.between, limits, 1.0)
+        hits += any(s.start < part.stop and s.stop > part.start for s in found)
+    assert hits >= 0.9 * MISSIONS
