@@ -92,9 +92,9 @@ def write_export(
     first = report["log"]["start_ns"]
     if first < 0 or first + report["log"]["duration_s"] * 1e9 >= _LAST_ROS_NS:
         raise OutputError(f"{path}: ROS stamps hold 1970 to 2106, the log starts at {np.datetime64(first, 'ns')}")
-    definitions = Definitions()
+    definitions, found = Definitions(), list[str]()
     with TemporaryDirectory(prefix="mfhca-") as scratch:
-        sources = list(open_sources(mission, Path(scratch), found := []))
+        sources = list(open_sources(mission, Path(scratch), found))
         notes = _notes(mission, sources, contents, [n for n in found if n.startswith(UNREADABLE)])
         places = sources[0].places if sources else unmoved
         parts: list[Iterator[Records]] = []

@@ -35,6 +35,11 @@ def fault_words(f: FleetFault) -> str:
     return f"{part_words(f.kind, f.component, f.side)} {mode_words(f.side, f.mode)}"
 
 
+def open_words(is_open: bool, clean: int, needed: int) -> str:
+    """How far an open fault is refuted: ``, clean in 3 of the 10 missions that close it``; empty where it is not, or just found."""
+    return f", clean in {clean} of the {needed} missions that close it" if is_open and clean else ""
+
+
 def forecast_words(f: Forecast, limit: float, axis: Axis = "hours") -> str:
     """When a limit is reached, in one phrase."""
     unit = _UNITS[axis]
@@ -56,6 +61,8 @@ def standing(m: Machine) -> str:
     words = m.verdict.short
     if m.verdict is Verdict.READY:
         return words
+    if m.waiting_ns is not None:
+        return f"{words} since the repair on {utc(m.waiting_ns)[:10]}"
     if m.verdict is Verdict.NOT_ASSESSED:
         if m.last_verdict is Verdict.NOT_ASSESSED:
             return words
@@ -68,9 +75,16 @@ def standing(m: Machine) -> str:
         lasting = m.last_judged is not None and m.last_judged.result.verdict is Verdict.WATCH
         if lasting and m.cleared is False:
             words += ", not cleared"
+        elif _is_open(m):
+            words = "Fault open, no repair recorded"
         elif lasting and m.cleared and not m.unjudged:
             words = "Ready, with faults to watch"
     return words + (", and later missions not judged" if m.unjudged else "")
+
+
+def _is_open(m: Machine) -> bool:
+    """Whether a fault of high severity is open that the last mission did not show."""
+    return any(f.open and f.since for f in m.faults)
 
 
 def is_damaged(m: Machine) -> bool:
@@ -216,4 +230,4 @@ def _named(machines: Sequence[Machine]) -> str:
 
 def _found(m: Machine, f: FleetFault) -> str:
     many = f" in {f.missions} of {len(m.runs)} missions" if len(m.runs) > 1 else ""
-    return f"{fault_words(f)}{many}"
+    return f"{fault_words(f)}{many}{open_words(f.open, f.clean, f.needed)}"
