@@ -11,6 +11,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import IntEnum
 
+from diagnosis.results.candidates import candidates_of, label_of, unclear_words
 from diagnosis.results.document import CoverageRow, IntervalRow, ReportDocument, StateRow
 from diagnosis.results.fault_rows import mode_words, state_label
 from diagnosis.results.vocabulary import Kind, Severity, part_words
@@ -66,9 +67,10 @@ def courses(report: ReportDocument) -> tuple[PartCourse, ...]:
 
 
 def fault_name(fault: IntervalRow) -> str:
-    """Part and row of a fault: ``FR speed sensor stuck``."""
+    """Part and row of a fault: ``FR speed sensor stuck``; its candidates where no row has the majority."""
     part = part_words(fault["kind"], fault["component"], fault["side"])
-    return f"{part} {mode_words(fault['side'], fault['mode'])}"
+    modes = candidates_of(fault)
+    return f"{part} {unclear_words(fault['side'], modes) if modes else mode_words(fault['side'], fault['mode'])}"
 
 
 def level_of(severity: str) -> Level:
@@ -128,16 +130,16 @@ def _status(name: str, hardware: str, row: CoverageRow, state: StateRow | None, 
 def _fault_message(fault: IntervalRow) -> str:
     epsilon = fault["epsilon"]
     size = "" if epsilon is None else f", ε {epsilon['value']:.2f}"
-    label = state_label(fault["mode"], fault["side"])
-    return f"{label}{size}, p {fault['probability']:.2f}, {fault['severity']} ({fault['id']})"
+    return f"{label_of(fault)}{size}, p {fault['probability']:.2f}, {fault['severity']} ({fault['id']})"
 
 
 def _fault_values(fault: IntervalRow) -> list[tuple[str, str]]:
     """Key values of a fault; what is not known is left out, so that a key holds numbers only or texts only."""
     epsilon = fault["epsilon"]
+    modes = candidates_of(fault)
     values = [
-        ("state", str(fault["mode"])),
-        ("row", f"{fault['side']} {fault['mode']}"),
+        ("state", "faulty" if modes else str(fault["mode"])),
+        ("candidates", ", ".join(modes)) if modes else ("row", f"{fault['side']} {fault['mode']}"),
         ("fault", fault["id"]),
         ("severity", str(fault["severity"])),
         ("p", f"{fault['probability']:.6g}"),

@@ -191,6 +191,18 @@ def test_a_size_that_is_not_known_is_left_out(tmp_path: Path) -> None:
     assert not any(v.key.startswith("epsilon") for v in found.status[0].values)
 
 
+def test_a_fault_without_a_majority_has_candidates_and_no_row(tmp_path: Path) -> None:
+    unclear = fault(1, "actuator", "stuck", (4.0, 6.125), "high", 0.9)
+    rows = [("stuck", 0.45), ("inefficient", 0.4), ("noisy", 0.1)]
+    unclear["hypotheses"] = [{"side": "actuator", "mode": mode, "p": p} for mode, p in rows]
+    found = by_rosbags(written(tmp_path, report([unclear])))
+    status = next(m for t, m in found["/mfhca/diagnostics"] if t == START + 4 * SECOND).status[1]
+    assert status.message.startswith("Faulty, kind unclear, ε 0.90")
+    values = {v.key: v.value for v in status.values}
+    assert (values["state"], values["candidates"], "row" in values) == ("faulty", "stuck, inefficient", False)
+    assert "FR drive valve faulty, kind unclear (stuck or inefficient)" in found["/mfhca/events"][1][1].msg
+
+
 def test_each_second_and_each_change_has_a_message(tmp_path: Path) -> None:
     path = written(tmp_path, report())
     seconds = [(t - START) / SECOND for t, _ in by_rosbags(path)["/mfhca/diagnostics"]]
