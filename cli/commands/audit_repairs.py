@@ -4,15 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from cli.terminal.console import Terminal
+from cli.terminal.dates import moment_of, nanoseconds, shown_moment
 from replay.errors import ConfigError
 from replay.progress import Stage
 
 if TYPE_CHECKING:
     from diagnosis.audit.events import EventFacts
+
+_FIRST_YEAR = 2000
 
 
 @dataclass(frozen=True)
@@ -52,27 +56,42 @@ class RepairRequest:
 def run_repairs(terminal: Terminal, request: RepairRequest) -> None:
     """Record repairs, or take them back, and show the machines as the fleet page has them afterwards."""
     with terminal.progress(Stage.WRITING):
-        from diagnosis.audit.repairs import record_repairs, repair_date
+        from diagnosis.audit.repairs import record_repairs
 
         assert request.on is not None
         withdrawn = bool(request.not_repaired)
         words = request.not_repaired or request.repaired
-        recorded = record_repairs(request.output, words, repair_date(request.on), _unheard, withdrawn=withdrawn)
+        recorded = record_repairs(request.output, words, _date(request.on), _unheard, withdrawn=withdrawn)
     if request.json:
         told = [{**asdict(t), "withdrawn": withdrawn} for t in recorded.told]
         terminal.show_json({"repairs": told, "machines": [asdict(m) for m in recorded.machines]})
         return
     from cli.tables.audit import machine_parts
     from cli.tables.layout import text
-    from diagnosis.pages.labels import utc
 
     for t in recorded.told:
         what = "taken back" if withdrawn else "recorded"
-        terminal.show(text(f"Repair {what}: {t.machine} {t.part} on {utc(t.repaired_ns)[:16]} UTC"))
+        terminal.show(text(f"Repair {what}: {t.machine} {t.part} on {shown_moment(t.repaired_ns)}"))
         if not withdrawn:
             closes = "; ".join(t.closes) or "no fault that stands"
             terminal.show(text(f"  closes: {closes}", "dim"))
     terminal.show(*machine_parts(recorded.machines), "", text(f"fleet page  {request.output / 'fleet.html'}"))
+
+
+def _date(text: str, now: datetime | None = None) -> int:
+    """Moment of a repair [ns since 1970].
+
+    Raises
+    ------
+    ConfigError
+        Where it is no date, or one on which no repair can have been.
+    """
+    moment = moment_of("--on", text)
+    if moment > (now or datetime.now(UTC)):
+        raise ConfigError(f"--on {text}: lies ahead; give the date on which the part was repaired")
+    if moment.year < _FIRST_YEAR:
+        raise ConfigError(f"--on {text}: lies before {_FIRST_YEAR}; give the date on which the part was repaired")
+    return nanoseconds(moment)
 
 
 def _unheard(event: str, facts: EventFacts) -> None:

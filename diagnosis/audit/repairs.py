@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from datetime import UTC, datetime
 from pathlib import Path
 
 from diagnosis.audit.events import Emit
@@ -43,38 +42,6 @@ class Recorded:
     machines: tuple[ListedMachine, ...]
 
 
-def repair_date(text: str, now: datetime | None = None) -> int:
-    """Moment of a repair from ``2026-10-05`` or ``2026-10-05T14:30``, with or without an offset; without one it is UTC.
-
-    Parameters
-    ----------
-    text : str
-        Date and time in the form of ISO 8601.
-    now : datetime or None
-        The present moment; None: by the computer's clock.
-
-    Returns
-    -------
-    int
-        Nanoseconds since 1970.
-
-    Raises
-    ------
-    ConfigError
-        Where it is no date, or lies ahead.
-    """
-    try:
-        moment = datetime.fromisoformat(text.strip())
-    except ValueError as error:
-        raise ConfigError(f"--on {text}: is no date; expected one such as 2026-10-05 or 2026-10-05T14:30") from error
-    moment = moment.replace(tzinfo=UTC) if moment.tzinfo is None else moment
-    if moment > (now or datetime.now(UTC)):
-        raise ConfigError(f"--on {text}: lies ahead; give the date on which the part was repaired")
-    if moment.year < 2000:
-        raise ConfigError(f"--on {text}: lies before 2000; give the date on which the part was repaired")
-    return round(moment.timestamp()) * 10**9
-
-
 def record_repairs(
     output: Path, repairs: Sequence[str], repaired_ns: int, emit: Emit, *, withdrawn: bool = False
 ) -> Recorded:
@@ -87,7 +54,7 @@ def record_repairs(
     repairs : Sequence[str]
         ``MACHINE PART [side]``, as the fleet page calls them.
     repaired_ns : int
-        From `repair_date`.
+        When they were made [ns since 1970].
     emit : Emit
         Takes the events.
     withdrawn : bool

@@ -25,6 +25,7 @@ from diagnosis.results.document import (
     SignalRow,
 )
 from diagnosis.results.fault_rows import state_label
+from diagnosis.results.left_out import only_left_out
 from diagnosis.results.vocabulary import Kind, Tier, Verdict, part_name, part_words
 from replay.faults import FAULT_STATES, UNDECIDED, FaultMode, State
 
@@ -289,5 +290,5 @@ def _file(file: FileRow) -> Context:
         "sha256": file["sha256"] or "–",
         "size": f"{grouped(file['bytes'])} bytes",
         "notes": [*file["damage"], *file["notes"]],
-        "damaged": bool(file["damage"]),
+        "heading": "Left out" if only_left_out(file["damage"]) else "Damage" if file["damage"] else "Notes",
     }
