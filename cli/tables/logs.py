@@ -56,5 +56,5 @@ def _clock(clock: ClockRow | None) -> str:
 def _time(seconds: float, *, sign: bool = False) -> str:
     """Time in s or ms, whichever reads better."""
     value, unit = (seconds, "s") if abs(seconds) >= 1 else (seconds * 1e3, "ms")
-    shown = f"{value:+.3g}" if sign else f"{value:.3g}"
-    return f"{shown if abs(value) < 1000 else f'{value:+.1f}' if sign else f'{value:.1f}'} {unit}"
+    digits = ".1f" if abs(value) >= 1000 else ".3g"
+    return f"{value:{'+' if sign else ''}{digits}} {unit}"

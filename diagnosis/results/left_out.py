@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable
 
-_SAID = " was left out"
+# As `replay.mission` and the audit word it; of a damaged log only chunks are "left out:" with a reason.
+_FILE = re.compile(r"(?P<file>[^:]+?) was left out(?:: |, because nothing could be judged together with it)")
+_CHUNK = re.compile(r"\bchunk at byte \d+$")
 
 
 def is_left_out(text: str) -> bool:
-    """Whether a sentence on a log's damage says no more than that a file was left out, or why."""
-    return _SAID in text
+    """Whether a sentence on a log's damage says no more than that a whole file was left out, and why."""
+    found = _FILE.match(text)
+    return found is not None and not _CHUNK.search(found["file"])
 
 
 def only_left_out(texts: Iterable[str]) -> bool:
