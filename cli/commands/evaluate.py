@@ -60,8 +60,8 @@ def evaluate(
         from diagnosis.api.evaluating import score
 
         found = score(pairs, machine, progress)
-    for log, report in logs_and_their_reports(pairs):
-        terminal.note(f"{report} is a report of {log}, which is given too: the mission counts twice")
+    for log, saved in logs_and_their_reports(pairs):
+        terminal.note(f"{saved} is a report of {log}, which is given too: the mission counts twice")
     for (path, _), mission in zip(pairs, found.scores, strict=True):
         if mission.left_out:
             verb = "is" if len(mission.left_out) == 1 else "are"

@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from cli.commands.saved_results import result_file
 from cli.terminal.command import Quiet, Verbose, terminal_of
 from cli.terminal.console import Terminal
-from cli.terminal.inputs import check_output, machine_of, mission_paths
 from cli.terminal.options import Json, Logs, MachineFile
+from diagnosis.api.inputs import check_output, machine_of, mission_paths
+from diagnosis.api.saved_results import result_file
 from replay.errors import ConfigError, OutputError
 from replay.progress import Progress, Stage
 

@@ -10,6 +10,7 @@ import typer
 
 from cli.commands.simulate_run import run_simulation
 from cli.terminal.command import Quiet, Verbose, terminal_of
+from cli.terminal.dates import moment_of, nanoseconds
 from cli.terminal.options import Json
 from diagnosis.api.log_format import LogFormat
 from diagnosis.api.simulation_options import SimulateRequest
@@ -192,7 +193,7 @@ def simulate(
         scenario=None if scenario is None else scenario.value,
         preset=None if preset is None else preset.value,
         seed=seed,
-        start=start,
+        start_ns=None if start is None else nanoseconds(moment_of("--start", start)),
         duration_s=duration,
         rate_hz=rate,
         evidence=evidence.value,

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from diagnosis.pages.labels import bounded, clock, grouped, mode_legend, number, sat_text, utc
+from diagnosis.pages.labels import bounded, clock, grouped, mode_legend, number, sat_text, utc_mark
 from diagnosis.report.confidence import headline, judged, sure_of, sure_of_verdict
 from diagnosis.report.edges import time_words
 from diagnosis.report.judged_parts import judged_sides, kind_of
@@ -172,7 +172,7 @@ def _facts(report: ReportDocument, duration: float) -> list[tuple[str, str]]:
     machine, log = report["machine"], report["log"]
     facts = [
         ("Machine", machine["id"] or machine["name"] or "unnamed"),
-        ("Start (UTC)", utc(log["start_ns"])),
+        ("Start (UTC)", utc_mark(log["start_ns"], both=True)),
         ("Duration", clock(duration)),
         ("Driving", clock(log["driving_s"])),
     ]

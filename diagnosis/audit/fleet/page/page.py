@@ -156,7 +156,9 @@ def _span(counts: CountsRow) -> str:
 def _audit(audit: AuditRow) -> str:
     run, made = audit["run"], audit["made_ns"]
     words = [f"audit run {run}"] if run else []
-    return ", ".join([*words, f"newest result made {labels.utc(made)[:16]} UTC"] if made else words)
+    if made:
+        words.append(Markup("newest result made {} UTC").format(labels.utc_mark(made, 16)))
+    return Markup(", ").join(words)
 
 
 def _hours(seconds: float) -> str:
