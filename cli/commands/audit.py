@@ -8,6 +8,7 @@ from typing import Annotated
 
 import typer
 
+from cli.commands.audit_repairs import RepairRequest, run_repairs
 from cli.commands.audit_run import AuditRequest, run_audit
 from cli.terminal.command import Quiet, Verbose, terminal_of
 from cli.terminal.options import FailOn, Json, MachineFile, MaxSize
@@ -18,6 +19,7 @@ Examples:
   mfhca audit logs/ -o night -m machine.toml -j 8    # again: only what is new or changed
   mfhca audit logs/ --dry-run
   mfhca audit s3://fleet/2026/ --dask tcp://scheduler:8786 --events events.jsonl
+  mfhca audit --repaired "HX4-07 FR sensor" --on 2026-10-05   # close the faults of that part
   find logs -name '*.bag' -mtime -1 | mfhca audit - --json | jq .counts"""
 
 OUTPUT = Path("mfhca-audit")
@@ -31,7 +33,7 @@ class TrendAxis(StrEnum):
 
 
 Paths = Annotated[
-    list[str],
+    list[str] | None,
     typer.Argument(metavar="PATH", help="Folders, logs, globs, URLs, or - for names on stdin.", show_default=False),
 ]
 Output = Annotated[
@@ -111,11 +113,33 @@ Dask = Annotated[
     str | None,
     typer.Option("--dask", metavar="ADDRESS", help="Scheduler of a Dask cluster to run on.", show_default=False),
 ]
+Repaired = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--repaired",
+        metavar="WORDS",
+        help='Record a repair, "MACHINE PART" or "MACHINE PART sensor|actuator", and audit nothing; may be given again.',
+        show_default=False,
+    ),
+]
+NotRepaired = Annotated[
+    list[str] | None,
+    typer.Option("--not-repaired", metavar="WORDS", help="Take back a repair of that date.", show_default=False),
+]
+On = Annotated[
+    str | None,
+    typer.Option(
+        "--on",
+        metavar="DATE",
+        help="When it was repaired: 2026-10-05 or 2026-10-05T14:30, UTC without an offset.",
+        show_default=False,
+    ),
+]
 
 
 def audit(
     context: typer.Context,
-    paths: Paths,
+    paths: Paths = None,
     output: Output = OUTPUT,
     machine: MachineFile = None,
     machine_id: MachineId = None,
@@ -134,12 +158,19 @@ def audit(
     export: Export = None,
     dask: Dask = None,
     max_size: MaxSize = 15.0,
+    repaired: Repaired = None,
+    not_repaired: NotRepaired = None,
+    on: On = None,
     quiet: Quiet = False,
     verbose: Verbose = False,
 ) -> None:
-    """Diagnose a tree of logs: a report per mission and a page about the fleet."""
+    """Diagnose a tree of logs: a report per mission and a page about the fleet; or record a repair."""
+    repairs = RepairRequest(output, repaired or [], not_repaired or [], on, json)
+    if repairs.is_asked(paths or []):
+        run_repairs(terminal_of(context, json=json), repairs)
+        return
     request = AuditRequest(
-        paths=paths,
+        paths=paths or [],
         output=output,
         machine=machine,
         machine_id=machine_id,

@@ -10,6 +10,7 @@ import typer
 
 from cli.commands.simulate_run import run_simulation
 from cli.terminal.command import Quiet, Verbose, terminal_of
+from cli.terminal.dates import moment_of, nanoseconds
 from cli.terminal.options import Json
 from diagnosis.api.log_format import LogFormat
 from diagnosis.api.simulation_options import SimulateRequest
@@ -22,6 +23,7 @@ Examples:
                  --fault "RL actuator inefficient 60 75 eps=0.4 ramp=5"
   mfhca simulate -o worn.mcap --set K=1.6 --set dead_zone=0.03 --set leakage=0.01
   mfhca simulate -o lossy.mcap --rate 200 --set jitter=0.5 --set drop_share=0.02
+  mfhca simulate -o monday.mcap --start 2026-10-05T07:30   # then tuesday.mcap …, for mfhca audit
   mfhca simulate -o other.mcap --vary --seed 7
   mfhca simulate -o foreign.mcap --set structure=valves --rate 500 --evidence base
   mfhca simulate -o any.mcap --vary --set structure=random --seed 12
@@ -109,6 +111,15 @@ ScenarioName = Annotated[
     ),
 ]
 Seed = Annotated[int, typer.Option(help="The same seed gives the same mission.")]
+Begin = Annotated[
+    str | None,
+    typer.Option(
+        "--start",
+        metavar="DATE",
+        help="When the mission begins: 2026-10-05 or 2026-10-05T14:30, UTC without an offset.",
+        show_default="2025-10-09T08:53:20",
+    ),
+]
 Duration = Annotated[float, typer.Option(metavar="S", help="Length of the mission [s].")]
 Rate = Annotated[float | None, typer.Option(metavar="HZ", help="Recorded rate [Hz], 50 to 1000.", show_default="1000")]
 Logged = Annotated[
@@ -159,6 +170,7 @@ def simulate(
     scenario: ScenarioName = None,
     preset: PresetChoice = None,
     seed: Seed = 1,
+    start: Begin = None,
     duration: Duration = 240.0,
     rate: Rate = None,
     evidence: Logged = Evidence.DIRECT,
@@ -181,6 +193,7 @@ def simulate(
         scenario=None if scenario is None else scenario.value,
         preset=None if preset is None else preset.value,
         seed=seed,
+        start_ns=None if start is None else nanoseconds(moment_of("--start", start)),
         duration_s=duration,
         rate_hz=rate,
         evidence=evidence.value,

@@ -18,13 +18,14 @@ from diagnosis.results.vocabulary import Verdict
 
 if TYPE_CHECKING:
     from diagnosis.audit.discovery.discover import Discovery
+    from diagnosis.audit.fleet.listed import ListedMachine
     from diagnosis.audit.plan import Planned
     from diagnosis.audit.session import Audited
 
 SCHEMA = "mfhca-audit/1"
 _VERDICTS = (Verdict.STOP, Verdict.WATCH, Verdict.READY, Verdict.NOT_ASSESSED)
 _WORST_FIRST = (MissionState.CRASHED, MissionState.OUT_OF_MEMORY, MissionState.TIMEOUT, MissionState.UNREADABLE)
-_SHOWN, _MACHINES = 10, 5
+_SHOWN, _MACHINES, _FAULTS = 10, 20, 2
 
 
 def plan_parts(rows: Sequence[tuple[Planned, str]], found: Discovery) -> list[RenderableType]:
@@ -42,7 +43,7 @@ def plan_parts(rows: Sequence[tuple[Planned, str]], found: Discovery) -> list[Re
 
 
 def summary_parts(audited: Audited, found: Discovery, output: Path) -> list[RenderableType]:
-    """What failed, the worst machines, counts, and where the page is."""
+    """What failed, the machines, counts, and where the page is."""
     ends = audited.ends
     parts: list[RenderableType] = []
     failed = sorted((end for end in ends if end.state not in READ), key=lambda end: _WORST_FIRST.index(end.state))
@@ -54,17 +55,7 @@ def summary_parts(audited: Audited, found: Discovery, output: Path) -> list[Rend
         parts += [section("Failed"), bullets(rows)]
         if len(failed) > _SHOWN:
             parts.append(text(f"… and {len(failed) - _SHOWN} more", "dim"))
-    machines: dict[str, Counter[str]] = {}
-    for end in ends:
-        if end.verdict in (Verdict.STOP, Verdict.WATCH):
-            machines.setdefault(end.machine_id or end.machine_name, Counter())[end.verdict] += 1
-    if machines:
-        worst = sorted(machines.items(), key=lambda m: (-m[1][Verdict.STOP], -m[1][Verdict.WATCH], m[0]))
-        rows_ = [(name, str(c[Verdict.STOP] or "–"), str(c[Verdict.WATCH] or "–")) for name, c in worst[:_MACHINES]]
-        parts += [
-            section("Worst machines"),
-            table(("machine", *(v.short.lower() for v in (Verdict.STOP, Verdict.WATCH))), rows_, right=(1, 2)),
-        ]
+    parts += machine_parts(audited.machines)
     verdicts: Counter[str | None] = Counter(end.verdict for end in ends)
     states: Counter[str] = Counter(end.state for end in ends)
     counted = [
@@ -86,6 +77,24 @@ def summary_parts(audited: Audited, found: Discovery, output: Path) -> list[Rend
     return [*parts, "", key_values(files)]
 
 
+def machine_parts(machines: Sequence[ListedMachine]) -> list[RenderableType]:
+    """The machines as the fleet page lists them: the same order, the same words."""
+    if not machines:
+        return []
+    rows = []
+    for m in machines[:_MACHINES]:
+        more = [f"+{len(m.faults) - _FAULTS}"] if len(m.faults) > _FAULTS else []
+        faults = "; ".join(m.faults[:_FAULTS]) + "".join(f" {w}" for w in more)
+        rows.append((m.label, text(m.words, verdict_style(m.verdict)), faults or "–", f"{m.with_faults} of {m.judged}"))
+    parts: list[RenderableType] = [
+        section("Machines, worst first"),
+        table(("machine", "now", "faults", "missions with faults"), rows, right=(3,)),
+    ]
+    if len(machines) > _MACHINES:
+        parts.append(text(f"… and {len(machines) - _MACHINES} more on the fleet page", "dim"))
+    return parts
+
+
 def document(audited: Audited, found: Discovery, output: Path, code: int) -> dict[str, object]:
     """The audit as a JSON document."""
     return {
@@ -98,6 +107,7 @@ def document(audited: Audited, found: Discovery, output: Path, code: int) -> dic
         "counts": dict(Counter(end.state for end in audited.ends)),
         "verdicts": dict(Counter(end.verdict for end in audited.ends if end.verdict)),
         "problems": [*found.problems, *found.notes],
+        "machines": [asdict(m) for m in audited.machines],
         "missions": [asdict(end) for end in audited.ends],
     }
 

@@ -10,6 +10,7 @@ from rich.table import Table
 from rich.text import Text
 
 from cli.tables.layout import bullets, section, table, text
+from cli.tables.logs import log_parts
 from cli.tables.looks import mode_text, severity_text, verdict_title
 from diagnosis.comparison.words import OUTCOMES, headline
 from diagnosis.report.confidence import headline as verdict_words
@@ -50,7 +51,7 @@ def verdict_parts(report: ReportDocument) -> list[RenderableType]:
         parts += [section("Compared with another mission of the machine"), *_previous(report["previous"])]
     if verdict["caveats"]:
         parts += [section("Limits of this verdict"), bullets(merged_caveats(verdict["caveats"]))]
-    return [*parts, ""]
+    return [*parts, *log_parts(report), ""]
 
 
 def _assumed(machine: MachineRow) -> list[RenderableType]:

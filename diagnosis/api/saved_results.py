@@ -41,6 +41,22 @@ def results_and_truths(words: Sequence[Path], truth: Path | None) -> list[tuple[
     return [(path, truth or _truth_of(path)) for path in results]
 
 
+def logs_and_their_reports(pairs: Sequence[tuple[Path, Path]]) -> list[tuple[Path, Path]]:
+    """Each log with a report of the same truth that is given too: such a mission counts twice.
+
+    Parameters
+    ----------
+    pairs : Sequence[tuple[Path, Path]]
+        From `results_and_truths`.
+    """
+    logs = {truth.resolve(): path for path, truth in pairs if saved_report(path) is None}
+    return [
+        (logs[truth.resolve()], path)
+        for path, truth in pairs
+        if saved_report(path) is not None and truth.resolve() in logs
+    ]
+
+
 def is_truth(path: Path) -> bool:
     """Whether a word of the command line is a truth file."""
     if path.suffix.lower() != ".json" or not path.is_file():

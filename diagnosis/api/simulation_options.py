@@ -59,6 +59,8 @@ class SimulateRequest:
     ----------
     output : Path or None
         Log to write; None: ``mission`` with the format's ending.
+    start_ns : int or None
+        When the mission begins [ns since 1970].
     faults : tuple[str, ...]
         Faults in words, see `diagnosis.api.fault_words`.
     settings : tuple[str, ...]
@@ -71,6 +73,7 @@ class SimulateRequest:
     scenario: Scenario | None = None
     preset: str | None = None
     seed: int = 1
+    start_ns: int | None = None
     duration_s: float = 240.0
     rate_hz: float | None = None
     evidence: EvidenceLevel = "direct"
@@ -125,6 +128,7 @@ def _options(request: SimulateRequest, faults: tuple[FaultSpec, ...] | None) -> 
         options,
         evidence=request.evidence,
         faults=faults,
+        start_ns=options.start_ns if request.start_ns is None else request.start_ns,
         rate_hz=options.rate_hz if request.rate_hz is None else request.rate_hz,
         coupling=options.coupling if request.coupling is None else request.coupling,
         law=options.law if request.law is None else request.law,

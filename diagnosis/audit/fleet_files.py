@@ -13,7 +13,7 @@ from diagnosis.audit.fleet.fleet_types import FleetDocument
 from diagnosis.audit.fleet.gather import machines_of
 from diagnosis.audit.fleet.machines import Limits
 from diagnosis.audit.fleet.news import first_runs
-from diagnosis.audit.fleet.read import Mission, content_mark, read_missions, read_run
+from diagnosis.audit.fleet.read import Mission, content_mark, fleet_repairs, read_missions, read_run
 from diagnosis.audit.fleet.table import fleet_csv
 from diagnosis.audit.fleet.trend_types import Axis
 from diagnosis.audit.store.database import unless_damaged
@@ -25,6 +25,7 @@ from replay.atomic_write import atomic_path
 from replay.errors import ConfigError
 
 _MOST_BYTES = 50_000_000
+_FAULT_S = 10.0  # length of the faults by which missions are asked whether they would have shown one
 
 
 @dataclass(frozen=True)
@@ -120,7 +121,11 @@ def load_fleet(store_path: Path, out: Path | None = None, axis: Axis = "hours") 
     first_seen = first_seen_times(place, missions)
     missions = without_false_dates(missions, first_seen)
     machines, unknown = machines_of(
-        missions, lambda report: _limits(folder / report / "report.json"), first_seen, str(place)
+        missions,
+        lambda report: _limits(folder / report / "report.json"),
+        first_seen,
+        str(place),
+        fleet_repairs(store_path),
     )
     fleet = fleet_of(machines, missions, axis, unknown)
     return replace(fleet, run=read_run(store_path), made_ns=newest_result_ns(place, missions))
@@ -169,6 +174,11 @@ def _limits(path: Path) -> Limits:
             wheels=tuple(map(str, machine["wheels"])),
             axles=tuple(map(str, machine["axles"])),
             cleared=report["verdict"]["cleared"],
+            found={
+                (r["component"], r["side"], r["deviation"]): float(r["share"])
+                for r in report.get("detectability", {}).get("rows", ())
+                if r["for_s"] == _FAULT_S and r["share"] is not None
+            },
         )
     except (OSError, ValueError, TypeError, KeyError, AttributeError):
         return Limits()

@@ -18,6 +18,7 @@ from replay.signals.signal import Signals
 
 Stamps = NDArray[np.int64]
 APART_S = 0.1
+UNREADABLE = "Without original messages:"
 
 
 @dataclass(frozen=True)
@@ -75,7 +76,7 @@ def open_sources(mission: Mission, scratch: Path, notes: list[str]) -> Iterator[
             stamps, topic = _longest(mission.signals, str(file.path))
             parts = tuple(ClipSource(path, topic) for path in paths)
         except LogError as error:
-            notes.append(f"Without original messages: {error}")
+            notes.append(f"{UNREADABLE} {error}")
             continue
         source = Source(parts, *_paired(stamps, np.sort(np.concatenate([p.log_stamps for p in parts]))))
         if abs(source.apart_s) >= APART_S:

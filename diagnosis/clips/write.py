@@ -16,6 +16,7 @@ from diagnosis.clips.sources import APART_S, Source, open_sources
 from diagnosis.results.document import IntervalRow
 from diagnosis.results.result import MissionResult
 from diagnosis.results.vocabulary import Severity
+from diagnosis.ros.records import diagnosis_records, unmoved
 from replay.atomic_write import atomic_path
 from replay.control.loop import Replay, replay_loop
 from replay.errors import OutputError
@@ -89,7 +90,8 @@ def write_clips(
     """Write a clip and two layouts per fault.
 
     A clip holds the original messages of MCAP logs as they were written, all topics, and beside them, for every format,
-    the mapped signals (``/mfhca/mapped_<n>``), the replayed loop (``/mfhca/…``) and the evidence (``/mfhca/evidence``).
+    the mapped signals (``/mfhca/mapped_<n>``), the replayed loop (``/mfhca/…``), the evidence (``/mfhca/evidence``), the state
+    of every part (``/mfhca/diagnostics``) and the beginnings and ends of faults (``/mfhca/events``).
     Clips of an earlier run in the folder are replaced; other files in it are left alone.
 
     Parameters
@@ -202,9 +204,12 @@ def _write(
     batches = [*(b for b, _ in named), *loop]
     if mission.open_loop:
         batches.append(open_loop_topic(max(start, mission.timeline.start_ns)))
-    if sources and abs(sources[0].apart_s) >= APART_S:  # beside the original messages, not hours from them
-        batches = [replace(b, log_stamps=sources[0].places(b.log_stamps)) for b in batches]
+    moved = bool(sources) and abs(sources[0].apart_s) >= APART_S
+    places = sources[0].places if moved else unmoved
+    if moved:  # beside the original messages, not hours from them
+        batches = [replace(b, log_stamps=places(b.log_stamps)) for b in batches]
     own = [batch_records(batch, definitions) for batch in batches]
+    told = diagnosis_records(diagnosed.result.report, definitions, places, start, stop)
     about = {
         "fault": " ".join((fault["id"], fault["component"], fault["side"], fault["mode"], fault["severity"])),
         "start_ns": str(fault["start_ns"]),
@@ -213,7 +218,7 @@ def _write(
         "logs": ", ".join(f.path.name for f in mission.files),
     }
     path = stem.with_name(stem.name + ENDINGS[0])
-    write_clip(path, definitions, chain(own, *copied), about)
+    write_clip(path, definitions, chain(own, told, *copied), about)
     parts = [(b.topic, names) for b, names in named] + [
         (b.topic, machine.axles if b.topic.startswith("/mfhca/steer_") else machine.wheels) for b in loop
     ]

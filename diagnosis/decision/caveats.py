@@ -11,6 +11,7 @@ from diagnosis.decision.wording import count_words, join_words, unanswered
 from diagnosis.results.assessed import needed_s
 from diagnosis.results.assessment import STATES, Assessment
 from diagnosis.results.clearing import Checked
+from diagnosis.results.left_out import is_left_out
 from diagnosis.results.result import FaultInterval
 from diagnosis.results.vocabulary import Kind, Tier, part_words
 from replay.faults import DECIDED, State
@@ -24,7 +25,6 @@ Part = tuple[str, str]
 _OPEN_S, _OPEN_SHARE = 1.0, 0.02  # driving that was not judged and is worth a word
 _SAID_S = 0.05  # of judged driving: less is nothing
 _EMPTY_S = 1.0  # without any wheel speed
-_LEFT_OUT = " was left out: its clock "
 
 
 @dataclass(frozen=True)
@@ -63,7 +63,7 @@ def doubt_of(watch: Sequence[FaultInterval], against: Reservations) -> str:
     out = [f"the {part_words(f.kind, f.component, f.side)} may not answer" for f in watch if unanswered(f)]
     out = list(dict.fromkeys(out))
     if against.damage:
-        out.append("part of the log was left out" if _LEFT_OUT in against.damage[0] else "the log is damaged")
+        out.append("part of the log was left out" if is_left_out(against.damage[0]) else "the log is damaged")
     if short := len(against.short):
         out.append(f"{count_words(short, 'part')} {'was' if short == 1 else 'were'} not judged long enough")
     if against.unexplained:
@@ -105,7 +105,7 @@ def caveats_of(
     """
     out, damage = list(against.events), against.damage
     if damage:
-        said = "" if _LEFT_OUT in damage[0] else "The log is damaged: "
+        said = "" if is_left_out(damage[0]) else "The log is damaged: "
         out.append(f"{said}{damage[0]}" + (f" (and {len(damage) - 1} more)" if len(damage) > 1 else ""))
     if not short_named:
         out += _too_short(against.short, assessments, decided_s, driven, limits)

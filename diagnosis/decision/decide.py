@@ -11,6 +11,7 @@ from diagnosis.results.assessed import needed_s
 from diagnosis.results.assessment import Assessment
 from diagnosis.results.clearing import Check, Checked
 from diagnosis.results.document import ActionRow, VerdictRow
+from diagnosis.results.left_out import only_left_out
 from diagnosis.results.result import FaultInterval
 from diagnosis.results.vocabulary import Kind, Severity, Tier, Verdict, part_words
 from diagnosis.results.wheel_model import RESOLUTION, WheelModelFit
@@ -213,8 +214,10 @@ def _without_faults(
         )
         return Decision(Verdict.NOT_ASSESSED, "No fault found, not fully assessed", text)
     if against.damage:
-        text = "Parts of the log are lost: " + against.damage[0]
-        return Decision(Verdict.WATCH, "No fault found in a damaged log", text, not_cleared=doubt_of((), against))
+        apart = only_left_out(against.damage)
+        text = against.damage[0] if apart else "Parts of the log are lost: " + against.damage[0]
+        title = "No fault found, but a file was left out" if apart else "No fault found in a damaged log"
+        return Decision(Verdict.WATCH, title, text, not_cleared=doubt_of((), against))
     if against.scope:
         text = f"No fault was found, but {join_words(list(against.scope))}."
         return Decision(Verdict.NOT_ASSESSED, "No fault found, not all judged", text)

@@ -12,6 +12,7 @@ from diagnosis.channels.noise import rounding_step
 from diagnosis.decision.missing import cost_of_missing
 from diagnosis.results.assessment import Assessment
 from diagnosis.results.document import ClockRow, MissingRow, QualityRow, SignalRow
+from diagnosis.results.left_out import is_left_out
 from diagnosis.results.wheel_model import WheelModelFit
 from replay.arrays.blocks import blocks, release
 from replay.clocks.source_clock import SourceClock
@@ -114,7 +115,9 @@ def checks(
         _sample_rate(found.jitter_ms, timeline.step_ns),
         *_injected(signals),
         *(
-            _row("Damage", text, "lost data are not assessed; a damaged log does not get “ready”", False)
+            _row("Left out", text, "its signals are not assessed; a mission without them does not get “ready”", False)
+            if is_left_out(text)
+            else _row("Damage", text, "lost data are not assessed; a damaged log does not get “ready”", False)
             for text in damage
         ),
         _gap_check(found.rows),

@@ -269,11 +269,15 @@ class MissionFigures(Figures):
 
 
 class ResultRow(TypedDict):
-    """One result: its figures for wheels and steering, each where the result holds such components."""
+    """One result: its figures for wheels and steering, each where the result holds such components.
+
+    `left_out`: components with faults that the result does not hold; `not_driven`: faults during which the part was not driven.
+    """
 
     result: str
     truth: str
     left_out: list[str]
+    not_driven: list[str]
     wheel: NotRequired[MissionFigures]
     steer: NotRequired[MissionFigures]
 

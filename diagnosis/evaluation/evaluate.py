@@ -33,10 +33,13 @@ class MissionScores:
         ``wheel`` and ``steer``, each where the result holds such components.
     left_out : tuple[str, ...]
         Components with injected faults that the result does not hold.
+    not_driven : tuple[str, ...]
+        Injected faults during which their part was not driven at all: nothing could show them.
     """
 
     groups: Mapping[str, Counts]
     left_out: tuple[str, ...]
+    not_driven: tuple[str, ...] = ()
 
 
 def evaluate_report(
@@ -104,4 +107,16 @@ def _evaluate(report: ReportDocument, truth: MissionTruth, name: str, speeds: Sp
             faults, reports = match_events(compared)
             groups[group.value] = replace(state_time(compared), faults=faults, reports=reports)
     left_out = tuple(dict.fromkeys(f.component for f in truth.intervals if f.component not in states))
-    return MissionScores(groups, left_out)
+    return MissionScores(groups, left_out, _not_driven(truth, window))
+
+
+def _not_driven(truth: MissionTruth, window: tuple[float, float]) -> tuple[str, ...]:
+    """Faults within the judged part of the mission that lie wholly outside of their component's driving."""
+    out = []
+    for fault in truth.intervals:
+        driven = [(s.start_s, s.stop_s) for s in truth.driving if s.component == fault.component]
+        start, stop = max(fault.start_s, window[0]), min(fault.stop_s, window[1])
+        if driven and start < stop and not any(a < stop and start < b for a, b in driven):
+            words = (fault.component, fault.side, fault.mode.value.replace("_", " "))
+            out.append(f"{' '.join(words)} from {fault.start_s:g} to {fault.stop_s:g} s")
+    return tuple(out)

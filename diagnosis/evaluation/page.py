@@ -104,6 +104,7 @@ def build_scores_page(document: ScoresDocument) -> str:
         "count": count,
         "groups": groups,
         "left_out": left_out,
+        "not_driven": [f"{r['result']}: {', '.join(r['not_driven'])}" for r in results if r["not_driven"]],
         "missions": _missions(results),
         "definitions": _DEFINITIONS,
     }

@@ -102,7 +102,12 @@ def scores_document(
 
 
 def _result_row(result: str, truth: str, mission: MissionScores) -> ResultRow:
-    row: ResultRow = {"result": result, "truth": truth, "left_out": list(mission.left_out)}
+    row: ResultRow = {
+        "result": result,
+        "truth": truth,
+        "left_out": list(mission.left_out),
+        "not_driven": list(mission.not_driven),
+    }
     if "wheel" in mission.groups:
         row["wheel"] = _mission_figures(mission.groups["wheel"])
     if "steer" in mission.groups:

@@ -10,6 +10,8 @@ from enum import Enum
 from string import Formatter
 from typing import Any, TypeVar, cast
 
+from markupsafe import Markup
+
 from diagnosis.results.candidates import candidates_of, unclear_words
 from diagnosis.results.document import IntervalRow
 from diagnosis.results.fault_rows import LOOKS, row_of, state_label
@@ -117,6 +119,21 @@ def utc(start_ns: Any) -> str:
     except (TypeError, ValueError, OverflowError, OSError):
         return "unknown"
     return moment.strftime("%Y-%m-%d %H:%M:%S")
+
+
+def utc_mark(start_ns: Any, length: int = 19, *, both: bool = False) -> Markup:
+    """The same as an element, to which the page's script adds the reader's local time: as a hint, or also beside it.
+
+    Parameters
+    ----------
+    start_ns : int
+        Nanoseconds since 1970.
+    length : int
+        Characters to show; 16: without seconds.
+    both : bool
+        Whether local time stands beside it.
+    """
+    return Markup("<time{}>{}</time>").format(Markup(' class="both"') if both else "", utc(start_ns)[:length])
 
 
 def sat_text(mean: float, unit: str) -> str:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from diagnosis.pages.labels import bounded, clock, grouped, mode_legend, number, sat_text, utc
+from diagnosis.pages.labels import bounded, clock, grouped, mode_legend, number, sat_text, utc_mark
 from diagnosis.report.confidence import headline, judged, sure_of, sure_of_verdict
 from diagnosis.report.edges import time_words
 from diagnosis.report.judged_parts import judged_sides, kind_of
@@ -25,6 +25,7 @@ from diagnosis.results.document import (
     SignalRow,
 )
 from diagnosis.results.fault_rows import state_label
+from diagnosis.results.left_out import only_left_out
 from diagnosis.results.vocabulary import Kind, Tier, Verdict, part_name, part_words
 from replay.faults import FAULT_STATES, UNDECIDED, FaultMode, State
 
@@ -171,7 +172,7 @@ def _facts(report: ReportDocument, duration: float) -> list[tuple[str, str]]:
     machine, log = report["machine"], report["log"]
     facts = [
         ("Machine", machine["id"] or machine["name"] or "unnamed"),
-        ("Start (UTC)", utc(log["start_ns"])),
+        ("Start (UTC)", utc_mark(log["start_ns"], both=True)),
         ("Duration", clock(duration)),
         ("Driving", clock(log["driving_s"])),
     ]
@@ -289,5 +290,5 @@ def _file(file: FileRow) -> Context:
         "sha256": file["sha256"] or "–",
         "size": f"{grouped(file['bytes'])} bytes",
         "notes": [*file["damage"], *file["notes"]],
-        "damaged": bool(file["damage"]),
+        "heading": "Left out" if only_left_out(file["damage"]) else "Damage" if file["damage"] else "Notes",
     }

@@ -14,6 +14,7 @@ from replay.log.formats import LOG_FORMATS, LogFormatRow
 from replay.log.raw_log import Clock, LogSummary, RawLog, Window
 from replay.log.source_options import SourceOptions
 from replay.readers.common.border import Bordered
+from replay.readers.common.mistaken import lfs_pointer, mistaken
 from replay.readers.common.protocol import Reader
 
 
@@ -54,9 +55,13 @@ def open_log(path: Path) -> Reader:
         if path.is_file() and path.stat().st_size == 0:
             raise LogError(f"{path} is empty (0 bytes); the recording was not written, copy or record it again")
         check_regular(path)
+        if pointer := lfs_pointer(path):
+            raise LogError(pointer)
         for reader in readers():
             if reader.matches(path):
                 return reader
+        if other := mistaken(path):
+            raise LogError(other)
         raise LogError(f"{path} is not a log that can be read: found {_found(path)}; expected {_expected()}")
     except OSError as error:
         raise LogError(f"{path} cannot be read: {error.strerror or error}") from error

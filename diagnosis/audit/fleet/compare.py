@@ -13,6 +13,7 @@ from diagnosis.audit.fleet.document_rows import bounds_row
 from diagnosis.audit.fleet.fault_types import FaultChange, FaultChangeRow, FaultStandingRow
 from diagnosis.audit.fleet.fleet_types import BaselineRow, CoverageChangeRow
 from diagnosis.audit.fleet.machines import FleetFault, Machine, is_assessed
+from diagnosis.pages.labels import utc
 from replay.faults import Side
 
 OUTCOMES: tuple[FaultChange, ...] = ("new", "worse", "better", "not_seen_again", "resolved", "unchanged")
@@ -96,8 +97,10 @@ def _gone(f: FleetFault, b: Machine | None) -> tuple[FaultChange, FleetFault, No
     known = next((g for g in b.faults if _same(f, g) and not g.standing), None)
     last = f.last.result.start_ns
     later = [r for r in b.dated if last is not None and (r.result.start_ns or 0) > last]
+    if known is not None and known.repaired_ns is not None and known.status == "repaired":
+        return "resolved", f, None, f"repaired on {utc(known.repaired_ns)[:10]}"
     if known is not None:  # found in this audit too, and refuted since
-        return "resolved", f, None, f"not in the last {known.since} missions that assessed it"
+        return "resolved", f, None, f"not in the last {known.clean} missions that assessed it"
     again = any(r.result.start_ns == last and r.name == f.last.name for r in b.dated)
     assessed = sum(r.assessed(f.component, f.side, b.limits) for r in later)
     if assessed:

@@ -29,7 +29,7 @@ from diagnosis.results.vocabulary import Verdict
 from replay.faults import Side
 from replay.version import __version__
 
-_STATUSES: tuple[Status, ...] = ("new", "recurring", "once", "past")
+_STATUSES: tuple[Status, ...] = ("new", "recurring", "once", "past", "repaired")
 
 
 @dataclass(frozen=True)
@@ -218,4 +218,8 @@ def _fault(k: int, f: FleetFault, at: Mapping[str, int], first_run: int | None) 
         "since": f.since,
         "first_run": first_run,
         "epsilon": bounds_row(f.epsilon),
+        "open": f.open,
+        "needed": f.needed,
+        "clean": f.clean,
+        "repaired_ns": f.repaired_ns,
     }

@@ -6,8 +6,8 @@ from typing import Literal, TypedDict
 
 from diagnosis.results.vocabulary import Severity
 
-#: Whether a fault is new, comes and goes, was found once, or is past; see `diagnosis.audit.fleet.machines.FleetFault`.
-Status = Literal["new", "recurring", "once", "past"]
+#: Whether a fault is new, comes and goes, was found once, is past or repaired; see `diagnosis.audit.fleet.machines.FleetFault`.
+Status = Literal["new", "recurring", "once", "past", "repaired"]
 #: What became of a fault against an earlier audit; see `diagnosis.audit.fleet.compare`.
 FaultChange = Literal["new", "worse", "better", "not_seen_again", "resolved", "unchanged"]
 
@@ -32,7 +32,7 @@ class FleetFaultRow(TypedDict):
     severity : Severity
         The worst since the part was last assessed without it.
     status : Status
-        Whether it is new, recurring, found once or past.
+        Whether it is new, recurring, found once, past or repaired.
     missions, assessed : int
         Missions with it, of those that assessed the part.
     first, last : int
@@ -45,6 +45,12 @@ class FleetFaultRow(TypedDict):
         Audit run that brought the first mission with it; null: not known.
     epsilon : BoundsRow or None
         ε̂ in the last one.
+    open : bool
+        Whether it was of high severity, is not repaired, and was not refuted by enough missions.
+    needed, clean : int
+        Missions without it after which it is past, and those so far.
+    repaired_ns : int or None
+        When the part was repaired last, as far as that was recorded.
     """
 
     machine: int
@@ -62,6 +68,10 @@ class FleetFaultRow(TypedDict):
     since: int
     first_run: int | None
     epsilon: BoundsRow | None
+    open: bool
+    needed: int
+    clean: int
+    repaired_ns: int | None
 
 
 class MissionFaultRow(TypedDict):

@@ -4,16 +4,19 @@ from __future__ import annotations
 
 from collections import Counter, defaultdict
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import cache
+from typing import NamedTuple
 
 from diagnosis.audit.fleet.fault_types import Status
-from diagnosis.audit.fleet.machines import STANDING, FleetFault, Limits, Machine, Run
+from diagnosis.audit.fleet.machines import OPEN, STANDING, FleetFault, Limits, Machine, Run
 from diagnosis.audit.fleet.owners import Owner, Owners
 from diagnosis.audit.fleet.read import FoundFault, Mission
-from diagnosis.results.vocabulary import Verdict
+from diagnosis.audit.store.repairs import Repair, repaired_at
+from diagnosis.results.vocabulary import Severity, Verdict
 
 Key = tuple[str, str, str]
+_LIKELY = 0.5  # that ten missions all miss a fault of theirs is then less probable than 1 in 1000
 
 
 def machines_of(
@@ -21,6 +24,7 @@ def machines_of(
     limits: Callable[[str], Limits] | None = None,
     first_seen: Callable[[str], int | None] | None = None,
     folder: str = ".",
+    repairs: Sequence[Repair] = (),
 ) -> tuple[list[Machine], list[Mission]]:
     """Gather missions by machine.
 
@@ -34,6 +38,8 @@ def machines_of(
         Gives when a mission was first seen by its name, from `diagnosis.audit.fleet.first_seen`; None: not known.
     folder : str
         Folder of the store.
+    repairs : Sequence[Repair]
+        Repairs that were recorded.
 
     Returns
     -------
@@ -59,19 +65,41 @@ def machines_of(
         else:
             failed[key].append(m)
     first_seen = first_seen or (lambda _: None)
-    out = [_machine(key, runs[key].values(), failed[key], limits, first_seen) for key in sorted({*runs, *failed})]
+    out = []
+    for key in sorted({*runs, *failed}):
+        own = _Known(limits, first_seen, tuple(r for r in repairs if r.machine == key))
+        out.append(_machine(key, runs[key].values(), failed[key], own))
     ready = [_began(m, first_seen) for m in out if m.verdict is Verdict.READY]
     later = [m for m in nowhere if not m.gone and any(_may_be_later(m.name, began, first_seen) for began in ready)]
     return out, later
 
 
-def _machine(
-    key: Owner,
-    runs: Iterable[Run],
-    failed: Sequence[Mission],
-    limits: Callable[[str], Limits] | None,
-    first_seen: Callable[[str], int | None],
-) -> Machine:
+@dataclass(frozen=True)
+class _Known:
+    """What is known of a machine beside its missions: reports, when an audit first saw a mission, repairs."""
+
+    limits: Callable[[str], Limits] | None
+    first_seen: Callable[[str], int | None]
+    repairs: tuple[Repair, ...]
+
+    def is_repaired(self, run: Run, key: Key) -> bool:
+        """Whether a mission's fault is of the time before its part was repaired; one without a date if it was seen before."""
+        at = repaired_at(self.repairs, key[0], key[1])
+        if at is None:
+            return False
+        start = run.result.start_ns
+        when = self.first_seen(run.name) if start is None else start
+        return when is not None and when < at
+
+    def would_show(self, run: Run, key: Key) -> bool:
+        """Whether a mission would have shown a fault more often than not; also where its report does not say."""
+        if self.limits is None or run.result.report is None:
+            return True
+        return self.limits(run.result.report).found.get(key, 1.0) >= _LIKELY
+
+
+def _machine(key: Owner, runs: Iterable[Run], failed: Sequence[Mission], known: _Known) -> Machine:
+    limits, first_seen = known.limits, known.first_seen
     found = list(runs)
     starts = Counter(r.result.start_ns for r in found if r.result.start_ns is not None)
     alone = {start for start, count in starts.items() if count == 1}
@@ -81,7 +109,7 @@ def _machine(
     own = limits(last.result.report or "") if limits and last else Limits()
     name = key[1] or (last.result.machine_name if last else "")
     m = Machine(key[0], name, tuple(dated), tuple(undated), tuple(failed), own)
-    return _with_faults(replace(m, cleared=_cleared(m, limits), unjudged=_unjudged(m, first_seen)))
+    return _with_faults(replace(m, cleared=_cleared(m, limits), unjudged=_unjudged(m, first_seen)), known)
 
 
 def _cleared(m: Machine, limits: Callable[[str], Limits] | None) -> bool | None:
@@ -110,46 +138,85 @@ def _may_be_later(name: str, began: int | None, first_seen: Callable[[str], int 
     return began is None or seen is None or seen >= began
 
 
-def _with_faults(m: Machine) -> Machine:
+def _with_faults(m: Machine, own: _Known) -> Machine:
     groups: dict[Key, list[tuple[Run, FoundFault]]] = defaultdict(list)
     for run in m.runs:
         for f in run.faults:
             groups[f.component, f.side, f.mode].append((run, f))
-    faults = [_fleet_fault(m, found) for found in groups.values()]
+    repaired = frozenset(
+        (run.result.id, *key) for key, found in groups.items() for run, _ in found if own.is_repaired(run, key)
+    )
+    faults = [_fleet_fault(m, found, own) for found in groups.values()]
     faults.sort(key=lambda f: (not f.standing, -f.severity.rank, -f.missions, f.component, f.side, f.mode))
-    return replace(m, faults=tuple(faults))
+    return replace(m, faults=tuple(faults), repaired=repaired)
 
 
-def _fleet_fault(m: Machine, found: Sequence[tuple[Run, FoundFault]]) -> FleetFault:
+def _fleet_fault(m: Machine, found: Sequence[tuple[Run, FoundFault]], own: _Known) -> FleetFault:
     f = found[0][1]
+    key = (f.component, f.side, f.mode)
     ids = list(dict.fromkeys(r.result.id for r, _ in found))
-    last_run = found[-1][0]
-    dated = [k for k, r in enumerate(m.dated) if r.result.id in set(ids)]
-    if dated:
-        last_run = m.dated[dated[-1]]
-    in_last = [g for r, g in found if r.result.id == last_run.result.id]
+    live = [(r, g) for r, g in found if not own.is_repaired(r, key)]
+    shown = live or found
+    now = list(dict.fromkeys(r.result.id for r, _ in shown))
+    every = [k for k, r in enumerate(m.dated) if r.result.id in set(ids)]
+    dated = [k for k, r in enumerate(m.dated) if r.result.id in set(now)]
+    last_run = m.dated[dated[-1]] if dated else shown[-1][0]
+    in_last = [g for r, g in shown if r.result.id == last_run.result.id]
     worst = max(in_last, key=lambda g: (g.severity.rank, g.seconds))
     assessed = [r.assessed(f.component, f.side, m.limits) for r in m.dated]
-    since = sum(assessed[dated[-1] + 1 :]) if dated and len(dated) == len(ids) else 0
+    ordered = bool(dated) and len(dated) == len(now)
+    since = sum(assessed[dated[-1] + 1 :]) if ordered else 0
     before = sum(assessed[: dated[0]]) if dated else 0
     undated = sum(r.assessed(f.component, f.side, m.limits) for r in m.undated)
     without = [k for k in range(dated[-1]) if assessed[k] and k not in set(dated)] if dated else []
     past = {m.dated[k].result.id for k in dated if without and k < without[-1]}
-    status: Status = "past" if since >= STANDING else "recurring" if len(ids) > 1 else "once"
-    if len(ids) == 1 and dated and dated[0] == len(m.dated) - 1 and before:
+    episode = _episode(m, shown, assessed, own)
+    needed, clean = (OPEN, episode.clean if ordered else 0) if episode.high and live else (STANDING, since)
+    status: Status = "recurring" if len(ids) > 1 else "once"
+    if not live:
+        status = "repaired"
+    elif clean >= needed:
+        status = "past"
+    elif len(ids) == 1 and dated and dated[0] == len(m.dated) - 1 and before:
         status = "new"
     return FleetFault(
         component=f.component,
         kind=f.kind,
         side=f.side,
         mode=f.mode,
-        severity=max((g.severity for r, g in found if r.result.id not in past), key=lambda severity: severity.rank),
+        severity=max((g.severity for r, g in shown if r.result.id not in past), key=lambda severity: severity.rank),
         status=status,
         missions=len(ids),
         assessed=max(len(ids), sum(assessed) + undated),
-        first=m.dated[dated[0]] if dated else found[0][0],
+        first=m.dated[every[0]] if every else found[0][0],
         last=last_run,
         last_id=worst.id,
         since=since,
         epsilon=worst.epsilon,
+        needed=needed,
+        clean=clean,
+        repaired_ns=repaired_at(own.repairs, f.component, f.side),
     )
+
+
+class _Episode(NamedTuple):
+    """The last time that a fault came and was not refuted: whether it ever was of high severity, and clean missions since."""
+
+    high: bool
+    clean: int
+
+
+def _episode(m: Machine, found: Sequence[tuple[Run, FoundFault]], assessed: Sequence[bool], own: _Known) -> _Episode:
+    """Go through a fault's missions: enough clean ones end an episode, ten that would have shown it where it was severe."""
+    severe: dict[int, bool] = {}
+    for run, f in found:
+        severe[run.result.id] = severe.get(run.result.id, False) or f.severity is Severity.HIGH
+    key = found[0][1].component, found[0][1].side, found[0][1].mode
+    high, clean = any(severe[run.result.id] for run in m.undated if run.result.id in severe), 0
+    for k, run in enumerate(m.dated):
+        if run.result.id in severe:
+            high = severe[run.result.id] or (high and clean < OPEN)
+            clean = 0
+        elif assessed[k] and own.would_show(run, key):
+            clean += 1
+    return _Episode(high, clean)

@@ -3,6 +3,9 @@
 Copies of a log count once. Missions whose log does not know the date (or says one after an audit had seen it), or which
 start at the same moment as another one of the machine, cannot be ordered: they count, but they take no part in trends or what is new. Where one of them is worse than the last dated one, the machine stands as the worse.
 
+A fault of high severity that does not show any more may be a loose contact: it stays open until its part is repaired, or until
+ten missions that would have shown it are clean.
+
 A machine is ``ready`` only where no mission that was not judged may be later than its last judged one. A log that was not
 read, or does not know the date, may be later unless an audit saw it before that mission began.
 """
@@ -10,6 +13,7 @@ read, or does not know the date, may be later unless an audit saw it before that
 from __future__ import annotations
 
 import itertools
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -18,7 +22,10 @@ from diagnosis.audit.fleet.read import Bounds, FoundFault, Mission, Part, Result
 from diagnosis.results.vocabulary import Kind, Severity, Verdict
 from replay.faults import Side
 
+#: Missions that assessed the part without the fault after which a fault is past.
 STANDING = 3
+#: The same of a fault that was of high severity and that nobody is known to have repaired.
+OPEN = 10
 _LEAST_SHARE = 0.8
 
 
@@ -26,7 +33,8 @@ _LEAST_SHARE = 0.8
 class Limits:
     """What a report says of limits, which components steer, and whether the machine may go out (None: it does not say).
 
-    The defaults are those of the paper's machine.
+    The defaults are those of the paper's machine. `found` has the share of places of the mission at which a fault of ten
+    seconds would have been found, by component, side and mode; what is not there was not said.
     """
 
     min_epsilon: float = 0.1
@@ -34,6 +42,7 @@ class Limits:
     wheels: tuple[str, ...] = ("FR", "FL", "RR", "RL")
     axles: tuple[str, ...] = ("front", "rear")
     cleared: bool | None = None
+    found: Mapping[tuple[str, str, str], float] = field(default_factory=dict, hash=False)
 
 
 @dataclass(frozen=True)
@@ -87,7 +96,8 @@ class FleetFault:
         The worst in its last missions: those after the last mission before them that assessed the part without it.
     status : str
         ``new``: in the machine's last mission and in none of the earlier ones, of which one assessed the part;
-        ``recurring``: in several missions; ``once``; ``past``: not found in the last three missions that assessed it.
+        ``recurring``: in several missions; ``once``; ``past``: not found in the last `needed` missions that assessed it;
+        ``repaired``: not found since the part was repaired.
     missions, assessed : int
         Missions with it, and missions that assessed the part.
     first, last : Run
@@ -98,6 +108,12 @@ class FleetFault:
         Missions that assessed the part after the last one with it.
     epsilon : Bounds or None
         ε̂ in the last one.
+    needed : int
+        Missions without it after which it is past: `STANDING`, or `OPEN` where it was of high severity and not repaired.
+    clean : int
+        Such missions so far; of an open fault those that would have shown it.
+    repaired_ns : int or None
+        When the part was repaired last, as far as that was recorded.
     """
 
     component: str
@@ -113,11 +129,19 @@ class FleetFault:
     last_id: str
     since: int
     epsilon: Bounds | None
+    needed: int = STANDING
+    clean: int = 0
+    repaired_ns: int | None = None
 
     @property
     def standing(self) -> bool:
         """Whether it counts as there."""
-        return self.status != "past"
+        return self.status not in ("past", "repaired")
+
+    @property
+    def open(self) -> bool:
+        """Whether it was of high severity, is not repaired, and was not refuted by enough missions."""
+        return self.standing and self.needed == OPEN
 
 
 @dataclass(frozen=True)
@@ -143,6 +167,8 @@ class Machine:
         Missions that were not judged and may be later than the last judged one.
     faults : tuple[FleetFault, ...]
         Faults by part and row, those that stand and the severe ones first.
+    repaired : frozenset[tuple[int, str, str, str]]
+        Faults of missions before the repair of their part: result, component, side and mode.
     """
 
     id: str
@@ -154,6 +180,7 @@ class Machine:
     cleared: bool | None = None
     unjudged: int = 0
     faults: tuple[FleetFault, ...] = ()
+    repaired: frozenset[tuple[int, str, str, str]] = frozenset()
 
     @property
     def label(self) -> str:
@@ -180,12 +207,35 @@ class Machine:
     def last_verdict(self) -> Verdict:
         """Where it stood when it was judged last.
 
-        Worse where a mission of unknown date says so, or where no later mission assessed the part of an earlier fault.
+        Worse where a mission of unknown date says so, where no later mission assessed the part of an earlier fault, or while a
+        fault of high severity is open. What was repaired since does not count: of a machine of which nothing else is known it
+        is not known whether it is ready.
         """
-        found = [r.result.verdict for r in self.newest]
-        found += [Verdict.STOP if f.severity is Severity.HIGH else Verdict.WATCH for f in self.faults if not f.since]
+        found = [self._now(r) for r in self.newest]
+        standing = [f for f in self.faults if f.standing]
+        found += [Verdict.STOP if f.severity is Severity.HIGH else Verdict.WATCH for f in standing if not f.since]
+        found += [Verdict.WATCH for f in standing if f.open]
         known = [v for v in found if v is not None]
         return max(known, key=lambda verdict: verdict.rank, default=Verdict.NOT_ASSESSED)
+
+    def _now(self, run: Run) -> Verdict | None:
+        """Verdict of a mission without the faults that were repaired since."""
+        verdict = run.result.verdict
+        if verdict not in (Verdict.STOP, Verdict.WATCH):
+            return verdict
+        left = [f for f in run.faults if (run.result.id, f.component, f.side, f.mode) not in self.repaired]
+        if len(left) == len(run.faults):
+            return verdict
+        if not left:
+            return Verdict.NOT_ASSESSED
+        return Verdict.STOP if any(f.severity is Severity.HIGH for f in left) else Verdict.WATCH
+
+    @property
+    def waiting_ns(self) -> int | None:
+        """Date of the last repair of a machine of which nothing was assessed since; None of any other."""
+        if self.verdict is not Verdict.NOT_ASSESSED or all(self._now(r) is r.result.verdict for r in self.newest):
+            return None
+        return max((f.repaired_ns or 0 for f in self.faults if f.status == "repaired"), default=None)
 
     @property
     def verdict(self) -> Verdict:

@@ -16,6 +16,7 @@ from pathlib import Path
 from diagnosis.audit.store.database import Database
 from diagnosis.audit.store.outcome import MissionState
 from diagnosis.audit.store.reason_template import ReasonTemplate, reason_template, whole_path
+from diagnosis.audit.store.repairs import Repair, read_repairs
 from diagnosis.audit.store.store import FILE_NAME
 from diagnosis.results.vocabulary import Severity, Verdict
 
@@ -180,8 +181,20 @@ def read_run(store: Path) -> int:
             return int(rows[0][0]) if rows else 0
 
 
+def fleet_repairs(store: Path) -> list[Repair]:
+    """Repairs that were recorded in a store.
+
+    Raises
+    ------
+    OutputError
+        As `read_missions`.
+    """
+    with closing(_opened(store)) as db, db.decoding():
+        return read_repairs(db)
+
+
 def content_mark(store: Path) -> str:
-    """What changes with the missions and results of a store, and not with runs that bring nothing.
+    """What changes with the missions, results and repairs of a store, and not with runs that bring nothing.
 
     Raises
     ------
@@ -193,6 +206,8 @@ def content_mark(store: Path) -> str:
         for query in _CONTENT:
             for row in db.rows(query):
                 digest.update(repr(tuple(row)).encode("utf-8", "backslashreplace"))
+        for repair in read_repairs(db):
+            digest.update(repr(repair).encode("utf-8", "backslashreplace"))
     return digest.hexdigest()[:16]
 
 

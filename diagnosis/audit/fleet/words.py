@@ -11,6 +11,7 @@ from diagnosis.audit.trends.trend import Forecast
 from diagnosis.decision.wording import join_words
 from diagnosis.pages.labels import utc
 from diagnosis.results.fault_rows import mode_words
+from diagnosis.results.left_out import only_left_out
 from diagnosis.results.vocabulary import Verdict, part_words
 
 _SHOWN = 3
@@ -35,6 +36,11 @@ def fault_words(f: FleetFault) -> str:
     return f"{part_words(f.kind, f.component, f.side)} {mode_words(f.side, f.mode)}"
 
 
+def open_words(is_open: bool, clean: int, needed: int) -> str:
+    """How far an open fault is refuted: ``, clean in 3 of the 10 missions that close it``; empty where it is not, or just found."""
+    return f", clean in {clean} of the {needed} missions that close it" if is_open and clean else ""
+
+
 def forecast_words(f: Forecast, limit: float, axis: Axis = "hours") -> str:
     """When a limit is reached, in one phrase."""
     unit = _UNITS[axis]
@@ -56,6 +62,8 @@ def standing(m: Machine) -> str:
     words = m.verdict.short
     if m.verdict is Verdict.READY:
         return words
+    if m.waiting_ns is not None:
+        return f"{words} since the repair on {utc(m.waiting_ns)[:10]}"
     if m.verdict is Verdict.NOT_ASSESSED:
         if m.last_verdict is Verdict.NOT_ASSESSED:
             return words
@@ -63,14 +71,26 @@ def standing(m: Machine) -> str:
         since = f" since {utc(last.result.start_ns)[:10]}" if last and last.result.start_ns is not None else ""
         return f"{words}{since}: last judged ready" + (", but not cleared" if m.cleared is False else "")
     if is_damaged(m):
-        words = "No fault found, but its last log is damaged"
+        words = f"No fault found, but {'a file of its last log was left out' if _lacks_a_file(m) else 'its last log is damaged'}"
     elif m.verdict is Verdict.WATCH:
         lasting = m.last_judged is not None and m.last_judged.result.verdict is Verdict.WATCH
         if lasting and m.cleared is False:
             words += ", not cleared"
+        elif _is_open(m):
+            words = "Fault open, no repair recorded"
         elif lasting and m.cleared and not m.unjudged:
             words = "Ready, with faults to watch"
     return words + (", and later missions not judged" if m.unjudged else "")
+
+
+def _is_open(m: Machine) -> bool:
+    """Whether a fault of high severity is open that the last mission did not show."""
+    return any(f.open and f.since for f in m.faults)
+
+
+def _lacks_a_file(m: Machine) -> bool:
+    """Whether nothing is wrong with the logs of a machine's last missions but that a file was left out."""
+    return only_left_out(r.result.reason for r in m.newest if r.result.verdict is Verdict.WATCH)
 
 
 def is_damaged(m: Machine) -> bool:
@@ -92,13 +112,14 @@ def headline(machines: Sequence[Machine], unknown: int = 0) -> tuple[Verdict, st
     verdicts = [m.verdict for m in machines]
     status = max(verdicts, key=lambda verdict: verdict.rank, default=Verdict.NOT_ASSESSED)
     n, damaged = len(machines), sum(map(is_damaged, machines))
+    apart = all(_lacks_a_file(m) for m in machines if is_damaged(m))
     work = sum(v in _WORK for v in verdicts) - damaged
     open_ = verdicts.count(Verdict.NOT_ASSESSED)
     if not n:
         return Verdict.NOT_ASSESSED, "nothing judged", "No mission could be judged"
     tag = f"{count(verdicts.count(status), 'machine')}: {_small(status.short)}"
     if status is Verdict.WATCH and not work:
-        tag = f"{count(damaged, 'machine')}: damaged logs"
+        tag = f"{count(damaged, 'machine')}: {'files left out' if apart else 'damaged logs'}"
     if work and n == 1:
         title = "The machine needs work"
     elif work:
@@ -117,7 +138,12 @@ def headline(machines: Sequence[Machine], unknown: int = 0) -> tuple[Verdict, st
     if open_ and open_ < n:
         title += f", {open_} {'is' if open_ == 1 else 'are'} not assessed"
     if damaged and damaged < n:
-        title += f", {damaged} {'has a damaged log' if damaged == 1 else 'have damaged logs'}"
+        one, many = (
+            ("a log without one of its files", "logs without all of their files")
+            if apart
+            else ("a damaged log", "damaged logs")
+        )
+        title += f", {damaged} {f'has {one}' if damaged == 1 else f'have {many}'}"
     return status, tag, title
 
 
@@ -216,4 +242,4 @@ def _named(machines: Sequence[Machine]) -> str:
 
 def _found(m: Machine, f: FleetFault) -> str:
     many = f" in {f.missions} of {len(m.runs)} missions" if len(m.runs) > 1 else ""
-    return f"{fault_words(f)}{many}"
+    return f"{fault_words(f)}{many}{open_words(f.open, f.clean, f.needed)}"

@@ -19,6 +19,8 @@ _BUSY_MS = 1_000
 _PATIENCE_S = 120.0
 _WHAT = "SELECT application_id FROM pragma_application_id UNION ALL SELECT name FROM sqlite_schema WHERE type = 'table'"
 _TABLES = {"meta", "file", "mission", "result", "attempt", "fault", "component"}
+#: Tables that stores of the same schema may lack, because they were made by an earlier version.
+_LATER = ("repair",)
 _FULL = ("database or disk is full", "disk I/O error", "unable to open database file")
 
 
@@ -54,6 +56,7 @@ class Database:
                 with self.transaction() as connection:
                     if not connection.execute("PRAGMA application_id").fetchone()[0]:
                         self._create(connection)
+                    self._add_later(connection)
         except BaseException:
             self._connection.close()
             raise
@@ -76,9 +79,19 @@ class Database:
                 "in the folder results/ are taken over"
             )
 
+    def _add_later(self, connection: sqlite3.Connection) -> None:
+        """Add the tables that an earlier version did not know."""
+        known = {row[0] for row in connection.execute("SELECT name FROM sqlite_schema WHERE type = 'table'")}
+        for name in _LATER:
+            if name not in known:
+                connection.execute(next(s for s in _schema() if f"CREATE TABLE {name} (" in s))
+
+    def has_table(self, name: str) -> bool:
+        """Whether the store has a table; one that is only read may be of an earlier version."""
+        return bool(self.rows("SELECT 1 FROM sqlite_schema WHERE type = 'table' AND name = ?", (name,)))
+
     def _create(self, connection: sqlite3.Connection) -> None:
-        schema = Path(__file__).with_name("schema.sql").read_text(encoding="utf-8")
-        for statement in _statements(schema):
+        for statement in _schema():
             connection.execute(statement)
         connection.execute(f"PRAGMA application_id = {_APPLICATION}")
         rows = [("schema", SCHEMA), ("run", "0"), ("created_by", f"mfhca-replay {__version__}")]
@@ -206,6 +219,10 @@ def unless_damaged(path: Path) -> Iterator[None]:
             if found != "ok":
                 raise database.plain(sqlite3.DatabaseError(str(found)[:120])) from error
         raise
+
+
+def _schema() -> Iterator[str]:
+    return _statements(Path(__file__).with_name("schema.sql").read_text(encoding="utf-8"))
 
 
 def _statements(script: str) -> Iterator[str]:

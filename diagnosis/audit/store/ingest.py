@@ -13,6 +13,7 @@ from diagnosis.audit.store.keys import Key
 from diagnosis.audit.store.objects import Objects
 from diagnosis.audit.store.outcome import ENDS
 from diagnosis.audit.store.records import SCHEMA, ResultObject, write_document
+from diagnosis.audit.store.repairs import ingest_repairs
 from diagnosis.audit.store.store import RESULTS, Store
 from diagnosis.results.validation import validated
 from diagnosis.results.vocabulary import Severity, Verdict
@@ -89,6 +90,7 @@ def ingest(store: Store, place: str | None = None) -> Ingested:
                     connection.execute("ROLLBACK TO one")
                     problems.append(f"{objects.place}/{name}: does not fit the store ({_short(error)}); left out")
                 connection.execute("RELEASE one")
+    problems += ingest_repairs(store, objects)
     return Ingested(taken[True], taken[False], tuple(problems))
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import re
 import secrets
+from collections.abc import Mapping
 from contextlib import suppress
 from pathlib import Path
 
@@ -15,6 +16,8 @@ from diagnosis.results.json_text import dump_json
 from replay.errors import OutputError
 
 _NAME = re.compile(r"[0-9a-f]{8}-[0-9a-f]{8}-.+-(?:[0-9]+|m[0-9a-f]{8})\.json")
+#: Names of recorded repairs.
+REPAIR = re.compile(r"repair-[0-9a-f]{16}\.json")
 _TRIES = 10_000
 
 
@@ -37,8 +40,8 @@ class Objects:
         else:
             self._root = place
 
-    def names(self) -> list[str]:
-        """Names of the objects, sorted; other files are left aside.
+    def names(self, pattern: re.Pattern[str] = _NAME) -> list[str]:
+        """Names of the objects of results, or those of another pattern, sorted; other files are left aside.
 
         Raises
         ------
@@ -53,7 +56,7 @@ class Objects:
                 names = os.listdir(self._root) if Path(self._root).is_dir() else []  # noqa: PTH208 - names alone
         except OSError as error:
             raise OutputError(f"{self.place}: cannot be listed ({error.strerror or error})") from error
-        return sorted(name for name in names if _NAME.fullmatch(name))
+        return sorted(name for name in names if pattern.fullmatch(name))
 
     def read(self, name: str) -> bytes:
         """Content of an object; raises an `OSError` where it cannot be read."""
@@ -118,7 +121,7 @@ def attempt_name(stem: str, number: int) -> str:
     return f"{stem}-{number}.json"
 
 
-def encode(document: ResultObject) -> bytes:
+def encode(document: Mapping[str, object]) -> bytes:
     """Bytes of a document; the same document gives the same bytes."""
     return dump_json(document, option=orjson.OPT_SORT_KEYS | orjson.OPT_INDENT_2)
 

@@ -29,7 +29,7 @@ def export(store: Store, folder: Path) -> tuple[Path, ...]:
     Returns
     -------
     tuple[Path, ...]
-        ``mission.parquet``, ``file.parquet``, ``result.parquet``, ``attempt.parquet``, ``fault.parquet``,
+        ``mission.parquet``, ``file.parquet``, ``repair.parquet``, ``result.parquet``, ``attempt.parquet``, ``fault.parquet``,
         ``component.parquet``.
 
     Raises
@@ -38,7 +38,7 @@ def export(store: Store, folder: Path) -> tuple[Path, ...]:
         Where a file cannot be written or the store not be read.
     """
     written = []
-    for table in ("mission", "file", *_JOINED):
+    for table in ("mission", "file", "repair", *_JOINED):
         columns = {
             row["name"]: _TYPES[row["type"]]
             for row in store.database.rows(f"SELECT name, type FROM pragma_table_info('{table}')")

@@ -88,3 +88,15 @@ CREATE TABLE component (
     epsilon_relative INTEGER NOT NULL DEFAULT 0,  -- 1: against the other wheels, only its change over missions counts
     PRIMARY KEY (result, component, side)
 ) STRICT;
+
+-- What `mfhca audit --repaired` was told, one row per repair; stores of earlier versions get this table when they are opened.
+CREATE TABLE repair (
+    machine_id TEXT NOT NULL,
+    machine_name TEXT NOT NULL,     -- of a machine without an identity, else empty
+    component TEXT NOT NULL,
+    side TEXT NOT NULL,             -- sensor or actuator; empty: both
+    repaired_ns INTEGER NOT NULL,   -- from when on the part counts as another one, by the clock of the logs
+    withdrawn INTEGER NOT NULL,     -- 1: the repair was recorded by mistake
+    noted_ns INTEGER NOT NULL,      -- when it was recorded; of one repair the last note counts
+    PRIMARY KEY (machine_id, machine_name, component, side, repaired_ns, noted_ns)
+) STRICT;

@@ -98,11 +98,15 @@ class Definitions:
         return b"".join(map(_record, schemas)), b"".join(map(_record, self.channels))
 
 
+def own_channel(topic: str, type_name: str, definitions: Definitions) -> int:
+    """Number of the channel of a topic of our own, which is added with the whole definition of its type."""
+    text = get_typestore(Stores.ROS2_HUMBLE).generate_msgdef(type_name, ros_version=2)[0]
+    return definitions.channel(topic, "cdr", {}, definitions.schema(type_name, "ros2msg", text.encode()))
+
+
 def batch_records(batch: TopicBatch, definitions: Definitions) -> Records:
     """Records of a topic of our own; its channel is added to the definitions."""
-    text = get_typestore(Stores.ROS2_HUMBLE).generate_msgdef(batch.type_name, ros_version=2)[0]
-    schema = definitions.schema(batch.type_name, "ros2msg", text.encode())
-    channel = definitions.channel(batch.topic, "cdr", {}, schema)
+    channel = own_channel(batch.topic, batch.type_name, definitions)
     count = len(batch.log_stamps)
     head = np.empty(count, _MESSAGE_HEAD)
     head["opcode"], head["length"] = int(Opcode.MESSAGE), _MESSAGE_HEAD.itemsize - 9 + batch.size
@@ -113,7 +117,34 @@ def batch_records(batch: TopicBatch, definitions: Definitions) -> Records:
     return Records(rows.reshape(-1), offsets, np.full(count, channel, np.int64), batch.log_stamps)
 
 
-def write_clip(path: Path, definitions: Definitions, parts: Iterable[Records], about: Mapping[str, str]) -> int:
+def message_records(messages: Sequence[bytes], log_stamps: NDArray[np.int64], channel: int) -> Records:
+    """Records of messages whose length varies, of one channel.
+
+    Parameters
+    ----------
+    messages : Sequence[bytes]
+        Whole messages in CDR.
+    log_stamps : NDArray[np.int64], shape (n,)
+        Log stamp of each [ns].
+    channel : int
+        From `own_channel`.
+    """
+    count = len(messages)
+    heads = np.empty(count, _MESSAGE_HEAD)
+    lengths = np.array([len(m) for m in messages], np.int64)
+    heads["opcode"], heads["length"] = int(Opcode.MESSAGE), _MESSAGE_HEAD.itemsize - 9 + lengths
+    heads["channel"], heads["sequence"] = channel, np.arange(count)
+    heads["log"] = heads["publish"] = log_stamps
+    octets = b"".join(part for pair in zip(heads, messages, strict=True) for part in (pair[0].tobytes(), pair[1]))
+    sizes = lengths + _MESSAGE_HEAD.itemsize
+    return Records(
+        np.frombuffer(octets, np.uint8), np.cumsum(sizes) - sizes, np.full(count, channel, np.int64), log_stamps
+    )
+
+
+def write_clip(
+    path: Path, definitions: Definitions, parts: Iterable[Records], about: Mapping[str, str], mark: str = MARK
+) -> int:
     """Write a file; give the number of its messages.
 
     Parameters
@@ -125,7 +156,9 @@ def write_clip(path: Path, definitions: Definitions, parts: Iterable[Records], a
     parts : Iterable[Records]
         Messages.
     about : Mapping[str, str]
-        What the clip shows; kept as the metadata record ``mfhca_clip`` at the head of the file.
+        What the file shows; kept as a metadata record at the head of the file.
+    mark : str
+        Name of that record, which tells the files of this tool from others.
 
     Raises
     ------
@@ -133,7 +166,7 @@ def write_clip(path: Path, definitions: Definitions, parts: Iterable[Records], a
         Where the file cannot be written.
     """
     with atomic_path(path) as temporary, temporary.open("wb") as file:
-        return _Writer(file, definitions, about).write(parts)
+        return _Writer(file, definitions, about, mark).write(parts)
 
 
 def _record(record: McapRecord) -> bytes:
@@ -145,8 +178,8 @@ def _record(record: McapRecord) -> bytes:
 class _Writer:
     """One file being written."""
 
-    def __init__(self, file: BinaryIO, definitions: Definitions, about: Mapping[str, str]) -> None:
-        self._file, self._crc = file, 0
+    def __init__(self, file: BinaryIO, definitions: Definitions, about: Mapping[str, str], mark: str) -> None:
+        self._file, self._crc, self._mark = file, 0, mark
         self._schemas, self._channels = definitions.octets()
         self._definitions, self._about = definitions, dict(about)
         self._counts = np.zeros(len(definitions.channels) + 1, np.int64)
@@ -155,13 +188,13 @@ class _Writer:
 
     def write(self, parts: Iterable[Records]) -> int:
         self._put(_MAGIC + _record(Header(profile="", library=f"mfhca-replay {__version__}")))
-        metadata, start = _record(Metadata(name=MARK, metadata=self._about)), self._file.tell()
+        metadata, start = _record(Metadata(name=self._mark, metadata=self._about)), self._file.tell()
         self._put(metadata + self._schemas + self._channels)
         for part in parts:
             for piece in _pieces(part):
                 self._chunk(piece)
         self._file.write(_record(DataEnd(self._crc)))
-        self._summary(MetadataIndex(length=len(metadata), name=MARK, offset=start))
+        self._summary(MetadataIndex(length=len(metadata), name=self._mark, offset=start))
         return int(self._counts.sum())
 
     def _put(self, octets: bytes) -> None:

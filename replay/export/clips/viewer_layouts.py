@@ -15,7 +15,7 @@ from xml.etree import ElementTree
 
 from replay.export.clips.mcap import MARK
 
-_COLOURS = ("#0a5a9c", "#e4571e", "#2fa98c", "#a03080", "#8b97a4", "#d99a00")
+COLOURS = ("#0a5a9c", "#e4571e", "#2fa98c", "#a03080", "#8b97a4", "#d99a00")
 
 
 @dataclass(frozen=True)
@@ -48,7 +48,7 @@ def foxglove_layout(title: str, plots: Sequence[Plot]) -> str:
                     "label": c.label,
                     "enabled": True,
                     "timestampMethod": "receiveTime",
-                    "color": _COLOURS[k % len(_COLOURS)],
+                    "color": COLOURS[k % len(COLOURS)],
                 }
                 for k, c in enumerate(plot.curves)
             ],
@@ -66,17 +66,17 @@ def foxglove_layout(title: str, plots: Sequence[Plot]) -> str:
         "configById": panels,
         "userNodes": {},
         "playbackConfig": {"speed": 1},
-        "layout": _stacked(list(panels)),
+        "layout": stacked(list(panels)),
     }
     return json.dumps(document, indent=2, ensure_ascii=False) + "\n"
 
 
-def _stacked(names: Sequence[str]) -> Any:
+def stacked(names: Sequence[str]) -> Any:
     """Panels of equal height: a tree that halves them off one after the other."""
     if len(names) == 1:
         return names[0]
     share = round(100 / len(names), 3)
-    return {"first": names[0], "second": _stacked(names[1:]), "direction": "column", "splitPercentage": share}
+    return {"first": names[0], "second": stacked(names[1:]), "direction": "column", "splitPercentage": share}
 
 
 def plotjuggler_layout(title: str, plots: Sequence[Plot]) -> str:
@@ -93,7 +93,7 @@ def plotjuggler_layout(title: str, plots: Sequence[Plot]) -> str:
         drawn = ElementTree.SubElement(area, "plot", mode="TimeSeries", style="Lines", flip_x="false", flip_y="false")
         for k, c in enumerate(plot.curves):
             name = f"{c.topic}/{c.joint}/position"
-            ElementTree.SubElement(drawn, "curve", name=name, color=_COLOURS[k % len(_COLOURS)])
+            ElementTree.SubElement(drawn, "curve", name=name, color=COLOURS[k % len(COLOURS)])
     ElementTree.SubElement(window, "currentTabIndex", index="0")
     ElementTree.indent(root, " ")
     return "<?xml version='1.0' encoding='UTF-8'?>\n" + ElementTree.tostring(root, encoding="unicode") + "\n"

@@ -241,7 +241,7 @@ def test_an_id_in_the_machine_file_for_logs_of_several_folders_is_said(
 @pytest.mark.parametrize(
     ("words", "code", "text"),
     [
-        (["audit"], 2, "Missing argument"),
+        (["audit"], 2, "no PATH is given"),
         (["audit", "nowhere"], 3, "no mission was found"),
         (["audit", "LOGS", "--json", "--events", "-"], 2, "both would write to stdout"),
         (["audit", "LOGS", "--export", "csv"], 2, "expected parquet"),

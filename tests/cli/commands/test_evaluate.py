@@ -151,6 +151,24 @@ def test_parts_that_the_result_left_out_are_said(
     assert "FR is not in the result and not scored" in capsys.readouterr().err
 
 
+def test_a_log_and_its_own_report_count_twice_which_is_said(made: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    log, report = str(made / "drive.mcap"), str(made / "monday")
+    assert run(["evaluate", log, report]) == 0
+    assert f"{report} is a report of {log}, which is given too: the mission counts twice" in capsys.readouterr().err
+    assert run(["evaluate", report]) == 0
+    assert "counts twice" not in capsys.readouterr().err
+
+
+def test_a_truth_outside_of_driving_is_said(made: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    truth = json.loads((made / "drive.truth.json").read_text(encoding="utf-8"))
+    driving = [d for d in truth["driving"] if d["component"] == "FR"]
+    before = truth["intervals"][0] | {"start_s": 0.0, "stop_s": driving[0]["start_s"]}
+    (tmp_path / "t.json").write_text(json.dumps(truth | {"intervals": [before]}), encoding="utf-8")
+    assert run(["evaluate", str(made / "monday"), "--truth", str(tmp_path / "t.json")]) == 0
+    said = " ".join(capsys.readouterr().err.split())
+    assert "the truth has faults outside of driving, where nothing can show them: FR sensor stuck from 0 to" in said
+
+
 def test_what_cannot_be_evaluated_is_one_line(
     made: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:

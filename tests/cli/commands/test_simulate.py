@@ -145,3 +145,21 @@ def test_a_scenario_whose_faults_come_later_says_so(tmp_path: Path, capsys: pyte
     assert "the paper scenario has no fault in 4 s; give a longer --duration, or --fault" in capsys.readouterr().err
     assert run(["simulate", "-o", str(tmp_path / "y.csv"), *SHORT, "--set", "structure=pump", "--law", "signed"]) == 0
     assert "no fault" not in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("name", ["m.mcap", "m.bag", "m.txt", "m.csv", "m.parquet"])
+def test_a_mission_begins_when_it_is_asked_to(name: str, tmp_path: Path) -> None:
+    log = tmp_path / name
+    assert run(["simulate", "-o", str(log), *SHORT, "--start", "2026-10-05T09:30+02:00"]) == 0
+    start = 1_791_185_400 * 10**9
+    assert read_truth(tmp_path / "m.truth.json").start_ns == start
+    assert load_mission([log], haulotte()).timeline.start_ns == start
+
+
+@pytest.mark.parametrize(("date", "said"), [("monday", "is no date"), ("1899-01-01", "expected 1970 to 2099")])
+def test_a_start_that_is_no_date_is_refused(
+    date: str, said: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert run(["simulate", "-o", str(tmp_path / "m.mcap"), *SHORT, "--start", date]) == 2
+    assert said in capsys.readouterr().err
+    assert list(tmp_path.iterdir()) == []

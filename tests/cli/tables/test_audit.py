@@ -8,8 +8,10 @@ from rich.console import Console
 from cli.tables.audit import document, summary_parts
 from diagnosis.audit.discovery.discover import Discovery
 from diagnosis.audit.endings import Ending
+from diagnosis.audit.fleet.listed import ListedMachine
 from diagnosis.audit.session import Audited
 from diagnosis.audit.store.outcome import MissionState
+from diagnosis.results.vocabulary import Verdict
 
 
 def ending(name: str, state: str, verdict: str | None = None, machine: str = "M1") -> Ending:
@@ -18,9 +20,15 @@ def ending(name: str, state: str, verdict: str | None = None, machine: str = "M1
     )
 
 
-def printed(*ends: Ending) -> list[str]:
+M2 = ListedMachine("M2", Verdict.STOP, "Stop and repair", ("FR speed sensor stuck", "b", "c"), 2, 9)
+M1 = ListedMachine("M1", Verdict.READY, "Ready", (), 0, 4)
+
+
+def printed(*ends: Ending, machines: tuple[ListedMachine, ...] = (M2, M1)) -> list[str]:
     console = Console(file=io.StringIO(), width=100, markup=False)
-    for part in summary_parts(Audited(ends, 2, sum(e.state == "crashed" for e in ends)), Discovery(()), Path("out")):
+    for part in summary_parts(
+        Audited(ends, 2, sum(e.state == "crashed" for e in ends), 0, machines), Discovery(()), Path("out")
+    ):
         console.print(part)
     assert isinstance(console.file, io.StringIO)
     return [line.rstrip() for line in console.file.getvalue().splitlines() if line.strip()]
@@ -35,10 +43,10 @@ def test_failures_stand_first_then_machines_then_counts_and_the_page() -> None:
         "Failed",
         "• crashed  b  [/] why",
         "• unreadable  a  [/] why",
-        "Worst machines",
-        "machine  stop and repair  faults to watch",
-        "M2                     1                –",
-        "M1                     –                1",
+        "Machines, worst first",
+        "machine  now              faults                       missions with faults",
+        "M2       Stop and repair  FR speed sensor stuck; b +1                2 of 9",
+        "M1       Ready            –                                          0 of 4",
         "Missions",
         "stop and repair: 1 · faults to watch: 1 · ready: 1 · not assessed: 1 · unreadable: 1 · crashed: 1",
         "6 in all, 2 of them from an earlier run, 1 with damage or parts that cannot be judged",

@@ -248,7 +248,7 @@ def test_a_page_that_fails_on_the_way_costs_no_mission(tmp_path: Path, monkeypat
             raise KeyError("machine")
         return SimpleNamespace(html=tmp_path)
 
-    monkeypatch.setattr("diagnosis.audit.session.PAGE_S", 0.0)
+    monkeypatch.setattr("diagnosis.audit.fleet_page.PAGE_S", 0.0)
     monkeypatch.setattr("diagnosis.audit.fleet_files.write_fleet", write_fleet)
     ends, _ = run(missions(tmp_path / "logs", "fine-1", "fine-2"), asked_for(tmp_path / "out"))
     assert [e.state for e in ends.values()] == ["ok", "ok"]

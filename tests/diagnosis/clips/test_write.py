@@ -17,16 +17,11 @@ from diagnosis.clips.write import Clips, chosen_faults, clip_name, write_clips
 from diagnosis.pipeline import diagnose, diagnose_mission
 from diagnosis.results.result import MissionResult
 from replay.errors import OutputError
-from replay.export.mission import write_mission
-from replay.faults import FaultMode, FaultSpec, Side
 from replay.log.source_options import SourceOptions
 from replay.machine.config import haulotte
 from replay.mission import Mission, load_mission
 from replay.readers.registry import read_log
-from replay.simulation.options import SimulationOptions
-from replay.simulation.run import simulate_mission
-
-STUCK = FaultSpec("FR", Side.SENSOR, FaultMode.STUCK, 8.0, 12.0, 1.0, 0.3)
+from tests.clip_samples import drive, judged, with_log_stamps
 
 
 def fault(number: int = 1, severity: str = "high", start: float = 1.0, component: str = "FR") -> dict[str, Any]:
@@ -38,20 +33,6 @@ def fault(number: int = 1, severity: str = "high", start: float = 1.0, component
         "severity": severity,
         "start_s": start,
     }
-
-
-def judged(folder: Path, format: str = "mcap") -> tuple[Mission, MissionResult]:  # noqa: A002
-    options = SimulationOptions(scenario="healthy", duration_s=20.0, rate_hz=100.0, faults=(STUCK,), evidence="direct")
-    path = folder / f"drive.{format}"
-    write_mission(simulate_mission(options), path, format)
-    mission = load_mission([path], haulotte())
-    return mission, diagnose_mission(mission, haulotte())
-
-
-@pytest.fixture(scope="module")
-def mission(tmp_path_factory: pytest.TempPathFactory) -> tuple[Mission, MissionResult]:
-    """20 s at 100 Hz with the FR speed sensor stuck from 8 to 12 s, diagnosed."""
-    return judged(tmp_path_factory.mktemp("log"))
 
 
 def cut(mission: tuple[Mission, MissionResult], folder: Path, **options: Any) -> Clips:
@@ -96,6 +77,8 @@ def test_a_clip_holds_the_messages_around_its_fault_and_what_was_replayed(
     for topic, stamps in original.items():
         wanted = [t for t in stamps if start <= t < stop]
         assert len(set(wanted) ^ set(found[topic])) <= 2, topic  # header and log stamps differ by less than a step
+    assert [found["/mfhca/diagnostics"][k] for k in (0, -1)] == [start, stop]
+    assert found["/mfhca/events"] == [start, start + 2 * 10**9, stop - 2 * 10**9]
     for topic in ("/mfhca/mapped_1", "/mfhca/evidence", "/mfhca/v_ref", "/mfhca/u_replayed"):
         assert min(found[topic]) >= start
         assert max(found[topic]) < stop
@@ -230,11 +213,8 @@ def test_a_mission_without_faults_has_no_clips(mission: tuple[Mission, MissionRe
 def test_log_stamps_of_another_clock_are_followed(tmp_path: Path) -> None:
     """A recorder an hour ahead of the headers: messages are found by their headers, and all stands on its clock."""
     hour = 3600 * 10**9
-    options = SimulationOptions(scenario="healthy", duration_s=20.0, rate_hz=100.0, faults=(STUCK,), evidence="direct")
-    path = tmp_path / "drive.mcap"
-    write_mission(simulate_mission(options), path, "mcap")
     later = tmp_path / "later.mcap"
-    _with_log_stamps_moved(path, later, hour)
+    with_log_stamps(drive(tmp_path), later, lambda ns: ns + hour)
     mission = load_mission([later], haulotte())
     clips = cut((mission, diagnose_mission(mission, haulotte())), tmp_path / "clips", margin_s=1.0)
     found = contents(clips.paths[0])
@@ -242,21 +222,3 @@ def test_log_stamps_of_another_clock_are_followed(tmp_path: Path) -> None:
     assert (max(moments) - min(moments)) * 1e-9 == pytest.approx(6.0, abs=0.1)
     assert len(found["/joint_states"]) == pytest.approx(600, abs=3)
     assert "from the mission's clock" in clips.notes[0]
-
-
-def _with_log_stamps_moved(source: Path, target: Path, by_ns: int) -> None:
-    from mcap.writer import Writer
-
-    with source.open("rb") as file, target.open("wb") as out:
-        writer = Writer(out)
-        writer.start()
-        schemas: dict[int, int] = {}
-        channels: dict[int, int] = {}
-        for schema, channel, m in make_reader(file).iter_messages():
-            assert schema is not None
-            if schema.id not in schemas:
-                schemas[schema.id] = writer.register_schema(schema.name, schema.encoding, schema.data)
-            if channel.id not in channels:
-                channels[channel.id] = writer.register_channel(channel.topic, "cdr", schemas[schema.id])
-            writer.add_message(channels[channel.id], m.log_time + by_ns, m.data, m.publish_time + by_ns)
-        writer.finish()

@@ -417,3 +417,15 @@ def test_sets_of_spans() -> None:
     assert_allclose(covered(np.array([0.0, 2.5, 20.0]), [(2.0, 3.0), (9.0, 12.0)]), [0.0, 0.5, 4.0])
     assert covered(1.0, []) == 0.0
     assert codes_at(np.array([0.5, 1.5, 2.5]), [(1.0, 2.0, 7)], -1).tolist() == [-1, 7, -1]
+
+
+def test_faults_outside_of_driving_are_named() -> None:
+    """A drives from 2 to 18 s, B all the time; of the front axle nothing is known."""
+    faults = (
+        fault("A", SENSOR, "no_signal", 18.5, 19.0),
+        fault("A", ACTUATOR, "stuck", 1.0, 2.5),
+        fault("B", SENSOR, "stuck", 0.0, 1.0),
+        fault("front", SENSOR, "stuck", 0.0, 1.0),
+    )
+    scores = evaluate_report(report_of(), truth_of(*faults))
+    assert scores.not_driven == ("A sensor no signal from 18.5 to 19 s",)

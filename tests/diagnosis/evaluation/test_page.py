@@ -66,6 +66,7 @@ def document(*missions: tuple[str, Counts], left_out: tuple[str, ...] = ()) -> d
             "result": name,
             "truth": "truth.json",
             "left_out": list(left_out),
+            "not_driven": [],
             "wheel": figures(c)
             | {"faults": [to_json(asdict(f)) for f in c.faults], "reported": [to_json(asdict(r)) for r in c.reports]},
         }

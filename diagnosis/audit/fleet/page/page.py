@@ -18,6 +18,7 @@ from markupsafe import Markup
 
 from diagnosis.audit.fleet.fault_types import FleetFaultRow
 from diagnosis.audit.fleet.fleet_types import AuditRow, CountsRow, FleetDocument, MachineRow
+from diagnosis.audit.fleet.listed import GONE, machine_words
 from diagnosis.audit.fleet.page import rows
 from diagnosis.audit.fleet.page.changes import changes_of
 from diagnosis.audit.fleet.page.matrix import matrix
@@ -25,7 +26,7 @@ from diagnosis.audit.fleet.page.shown import Context, ShownDocument, fault_addre
 from diagnosis.audit.fleet.page.svg import LEGEND, mark, sparkline, sprite
 from diagnosis.audit.fleet.page.trends import MOST, chosen, course, interest, level_words
 from diagnosis.audit.fleet.trend_types import TrendRow
-from diagnosis.audit.fleet.words import count
+from diagnosis.audit.fleet.words import count, open_words
 from diagnosis.audit.store.outcome import MissionState
 from diagnosis.pages import labels
 from diagnosis.pages.environment import DARK, SHARED, asset, environment, shared_style
@@ -39,7 +40,7 @@ _FAULTS = 400
 _OPEN_ROWS = 40
 _FILTER = (Verdict.STOP, Verdict.WATCH, Verdict.READY, Verdict.NOT_ASSESSED)
 _UNITS = {"hours": "h", "days": "d"}
-_STATUS = {"new": "New", "recurring": "Recurring", "once": "Once", "past": "Past"}
+_STATUS = {"new": "New", "recurring": "Recurring", "once": "Once", "past": "Past", "repaired": "Repaired"}
 _DEFINITIONS = (
     "The verdict of a machine is that of its last mission that could be assessed. It is worse where no later mission assessed "
     "the part of an earlier fault. A machine counts as ready only if no mission without a verdict may be later. A log that cannot "
@@ -49,6 +50,9 @@ _DEFINITIONS = (
     "at the same moment.",
     "New: in the last mission of the machine and in no earlier one, of which at least one assessed the part. Recurring: in several missions. "
     "Past: not found in the last three missions that assessed the part. Faults of severity “info” are left out.",
+    "A fault of high severity that no longer shows may be a loose contact. It stays open until the repair of its part is recorded "
+    "(mfhca audit --repaired), or until ten missions are clean that would have shown it: the part was assessed, and by its report the "
+    "mission would have shown such a fault of ten seconds more often than not. Repaired: not found since the repair.",
     "Assessed: judged for the seconds that the verdict “ready” takes, and for four fifths of its driving.",
     "Trend: weighted line through the missions' ε̂ over time; the spread from mission to mission is estimated with it. "
     "Outliers (×) are excluded. A step or bend (↓ ↑ ∠), such as a repair, starts a new line. "
@@ -71,8 +75,8 @@ def build_fleet_page(found: FleetDocument) -> str:
     trends: list[TrendRow] = [{**t, "component": labels.visible(t["component"])} for t in found["trends"]]
     axis = document["axis"]
     scripts = [asset(SHARED / "theme.js"), asset(_HERE / "fleet.js")]
-    present = [f for f in document["faults"] if f["status"] != "past"]
-    past = [f for f in document["faults"] if f["status"] == "past"]
+    present = [f for f in document["faults"] if f["status"] not in GONE]
+    past = [f for f in document["faults"] if f["status"] in GONE]
     drawn, standing = chosen(trends), _by_machine(present)
     own: dict[int, list[TrendRow]] = defaultdict(list)
     for t in trends:
@@ -152,7 +156,9 @@ def _span(counts: CountsRow) -> str:
 def _audit(audit: AuditRow) -> str:
     run, made = audit["run"], audit["made_ns"]
     words = [f"audit run {run}"] if run else []
-    return ", ".join([*words, f"newest result made {labels.utc(made)[:16]} UTC"] if made else words)
+    if made:
+        words.append(Markup("newest result made {} UTC").format(labels.utc_mark(made, 16)))
+    return Markup(", ").join(words)
 
 
 def _hours(seconds: float) -> str:
@@ -220,14 +226,10 @@ def _machine(
     leading = max((t for t in trends if t["line"] is not None), key=interest, default=None)
     line = leading["line"] if leading else None
     judged = len(m["missions"]) + len(m["undated"])
-    words, symbol = m["standing"], m["verdict"].symbol
-    if m["verdict"] is Verdict.WATCH and not standing:
-        symbol = "warning"  # a damaged log
-    if m["verdict"] is Verdict.READY and standing:
-        often = any(f["status"] == "recurring" for f in standing)
-        words, symbol = f"Ready, fault {'comes and goes' if often else 'seen lately'}", "warning"
-    elif m["verdict"] is Verdict.READY and any(t["approaching"] for t in trends):
-        words, symbol = "Ready, limit comes near", "warning"
+    near = any(t["approaching"] for t in trends)
+    words, symbol = machine_words(m, standing, near), m["verdict"].symbol
+    if (m["verdict"] is Verdict.WATCH and not standing) or (m["verdict"] is Verdict.READY and (standing or near)):
+        symbol = "warning"  # a damaged log, or a ready one that shows something
     return {
         "label": m["label"],
         "name": m["name"] if m["name"] != m["label"] else "",
@@ -262,7 +264,13 @@ def _fault(f: FleetFaultRow, document: ShownDocument, directions: Mapping[tuple[
         notes.append(f"ε̂ {e['value']:.2f} ({e['low']:.2f} to {e['high']:.2f})".replace("-", "−"))
         direction = directions.get((f["machine"], f["component"], f["side"]), "not_known")
         notes += [direction] if direction != "not_known" else []
-    if f["since"]:
+    if f["status"] == "repaired" and f["repaired_ns"] is not None:
+        notes.append(f"repaired on {rows.day(f['repaired_ns'])}")
+    elif f["repaired_ns"] is not None:
+        notes.append(f"found again since the repair on {rows.day(f['repaired_ns'])}")
+    if f["open"] and f["clean"]:
+        notes.append(f"open{open_words(True, f['clean'], f['needed'])}")
+    elif f["since"]:
         last_ones = f"last {count(f['since'], 'mission')}" if f["since"] > 1 else "last mission"
         notes.append(f"not in the {last_ones} that assessed it")
     return {

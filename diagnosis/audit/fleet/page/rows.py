@@ -121,7 +121,7 @@ def _row(m: ShownMission) -> str:
         status = f"{mark(symbol(m))}{verdict.short}"
     kind += " degraded" if m["state"] is MissionState.DEGRADED else ""
     return (
-        f'<tr class="{kind}"><td>{head}{note}</td><td>{labels.utc(start)[:16] if start is not None else "no date"}</td>'
+        f'<tr class="{kind}"><td>{head}{note}</td><td>{labels.utc_mark(start, 16) if start is not None else "no date"}</td>'
         f'<td class="num">{labels.span(driving) if driving is not None else "–"}</td>'
         f'<td><span class="st">{status}</span></td><td>{escape(words)}</td></tr>\n'
     )

@@ -81,5 +81,8 @@ def test_the_page_says_of_when_its_logs_and_results_are(tmp_path: Path) -> None:
     assert d["audit"] == {"run": 4, "made_ns": samples.START_NS + 3 * samples.DAY_NS}
     page = (tmp_path / "fleet.html").read_text("utf-8")
     span = "logs from 2026-10-26 to 2026-10-27"
-    assert f"Fleet audit of 2 missions · {span} · audit run 4, newest result made 2026-10-29 07:33 UTC</p>" in page
+    assert (
+        f"Fleet audit of 2 missions · {span} · audit run 4, newest result made <time>2026-10-29 07:33</time> UTC</p>"
+        in page
+    )
     assert f"fleet audit, {span}</title>" in page

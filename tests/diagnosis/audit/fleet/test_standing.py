@@ -233,3 +233,12 @@ def test_a_damaged_log_is_no_work_to_do(tmp_path: Path) -> None:
     assert (d["verdict"]["status"], d["verdict"]["tag"]) == ("watch", "1 machine: damaged logs")
     d = document(tmp_path / "one", Sample("a", "M1", verdict="watch"))
     assert d["verdict"]["title"] == "The machine is not known to be ready"
+
+
+def test_a_file_that_was_left_out_is_no_damage(tmp_path: Path) -> None:
+    reason = "plc.csv was left out: its clock could not be compared with a.mcap: nothing in common"
+    d = document(tmp_path, Sample("a", "M1", state="degraded", verdict="watch", reason=reason), Sample("b", "M2"))
+    standing = {m["id"]: m["standing"] for m in d["machines"]}
+    assert standing["M1"] == "No fault found, but a file of its last log was left out"
+    assert d["verdict"]["title"] == "1 of 2 machines is ready, 1 has a log without one of its files"
+    assert d["verdict"]["tag"] == "1 machine: files left out"

@@ -16,7 +16,7 @@ from diagnosis.audit.store.store import Store
 from diagnosis.audit.store.summary import summarise
 from replay.errors import OutputError
 
-TABLES = ["mission", "file", "result", "attempt", "fault", "component"]
+TABLES = ["mission", "file", "repair", "result", "attempt", "fault", "component"]
 
 
 def test_tables_with_the_missions_names(

@@ -1,0 +1,80 @@
+"""The list of a fleet's machines, the same on page and terminal: order, state in words, faults."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from diagnosis.audit.fleet.fault_types import FleetFaultRow
+from diagnosis.audit.fleet.fleet_types import FleetDocument, MachineRow
+from diagnosis.audit.fleet.page.rows import fault_words
+from diagnosis.audit.fleet.words import open_words
+from diagnosis.results.vocabulary import Verdict
+
+#: Statuses of faults that do not stand.
+GONE = ("past", "repaired")
+
+
+@dataclass(frozen=True)
+class ListedMachine:
+    """One machine as page and terminal list it.
+
+    Attributes
+    ----------
+    label : str
+        What it is called.
+    verdict : Verdict
+        Where it stands.
+    words : str
+        The same in words.
+    faults : tuple[str, ...]
+        Its faults that stand.
+    with_faults, judged : int
+        Missions with faults, and missions that were judged.
+    """
+
+    label: str
+    verdict: Verdict
+    words: str
+    faults: tuple[str, ...]
+    with_faults: int
+    judged: int
+
+
+def machine_words(m: MachineRow, standing: Sequence[FleetFaultRow], approaching: bool) -> str:
+    """Where a machine stands, with what a ready one still shows.
+
+    Parameters
+    ----------
+    m : MachineRow
+        The machine.
+    standing : Sequence[FleetFaultRow]
+        Its faults that stand.
+    approaching : bool
+        Whether a trend of its comes near its limit.
+    """
+    if m["verdict"] == Verdict.READY and standing:
+        often = any(f["status"] == "recurring" for f in standing)
+        return f"Ready, fault {'comes and goes' if often else 'seen lately'}"
+    if m["verdict"] == Verdict.READY and approaching:
+        return "Ready, limit comes near"
+    return m["standing"]
+
+
+def listed_machines(document: FleetDocument) -> tuple[ListedMachine, ...]:
+    """Machines of a fleet's document in its order, worst first."""
+    near = {t["machine"] for t in document["trends"] if t["approaching"]}
+    out = []
+    for k, m in enumerate(document["machines"]):
+        standing = [f for f in document["faults"] if f["machine"] == k and f["status"] not in GONE]
+        out.append(
+            ListedMachine(
+                m["label"],
+                Verdict(m["verdict"]),
+                machine_words(m, standing, k in near),
+                tuple(fault_words(f) + open_words(f["open"], f["clean"], f["needed"]) for f in standing),
+                m["with_faults"],
+                len(m["missions"]) + len(m["undated"]),
+            )
+        )
+    return tuple(out)

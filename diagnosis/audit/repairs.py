@@ -1,0 +1,150 @@
+"""Repairs as a user tells of them: which machine and part is meant, kept in the store and shown on the fleet page."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from diagnosis.audit.events import Emit
+from diagnosis.audit.fleet.document import Fleet
+from diagnosis.audit.fleet.listed import ListedMachine
+from diagnosis.audit.fleet.machines import Machine, Run
+from diagnosis.audit.fleet.words import fault_words
+from diagnosis.audit.fleet_files import load_fleet
+from diagnosis.audit.fleet_page import FleetPage
+from diagnosis.audit.store.repairs import Repair, read_repairs, record_repair
+from diagnosis.audit.store.store import FILE_NAME, Store
+from diagnosis.pages.labels import utc
+from replay.errors import ConfigError, OutputError
+from replay.faults import Side
+
+_SIDES = {"sensor": Side.SENSOR.value, "actuator": Side.ACTUATOR.value, "valve": Side.ACTUATOR.value}
+_EXPECTED = 'expected "MACHINE PART", or "MACHINE PART sensor" or "MACHINE PART actuator"'
+_NAMED = 12
+
+
+@dataclass(frozen=True)
+class Told:
+    """One repair that was recorded or withdrawn: the machine's label, the part in words, and the faults it closes."""
+
+    machine: str
+    part: str
+    repaired_ns: int
+    closes: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Recorded:
+    """What was recorded, and the machines of the fleet page afterwards."""
+
+    told: tuple[Told, ...]
+    machines: tuple[ListedMachine, ...]
+
+
+def record_repairs(
+    output: Path, repairs: Sequence[str], repaired_ns: int, emit: Emit, *, withdrawn: bool = False
+) -> Recorded:
+    """Record repairs, or that they were recorded by mistake, and write the fleet page anew.
+
+    Parameters
+    ----------
+    output : Path
+        Folder of an audit.
+    repairs : Sequence[str]
+        ``MACHINE PART [side]``, as the fleet page calls them.
+    repaired_ns : int
+        When they were made [ns since 1970].
+    emit : Emit
+        Takes the events.
+    withdrawn : bool
+        Whether they are taken back.
+
+    Raises
+    ------
+    ConfigError
+        Where a machine or part is not known, or the fault was found on the same day and the time of the repair is not given.
+    OutputError
+        Where there is no audit, or it cannot be written.
+    """
+    store_path = output / FILE_NAME
+    if not store_path.is_file():
+        raise OutputError(f"{store_path}: there is no store; run `mfhca audit` first, or give its folder with -o")
+    fleet = load_fleet(store_path, output)
+    found = [_meant(words, fleet, repaired_ns) for words in repairs]  # all of them, before one is written
+    with Store.open(store_path) as store:
+        known = read_repairs(store.database)
+        for (machine, repair), words in zip(found, repairs, strict=True):
+            if withdrawn and repair not in known:
+                day = utc(repaired_ns)[:16]
+                listed = ", ".join(_dates(r for r in known if r.machine == repair.machine)) or "none"
+                raise ConfigError(
+                    f"--not-repaired {words!r}: no repair of it on {day} UTC is recorded; of {machine.label}: {listed}"
+                )
+        for _, repair in found:
+            record_repair(store, repair, withdrawn=withdrawn)
+    page = FleetPage(output, None, "hours", emit)
+    page.renew()
+    told = [
+        Told(m.label, f"{r.component} {r.side}".strip(), r.repaired_ns, () if withdrawn else _closed(m, r))
+        for m, r in found
+    ]
+    return Recorded(tuple(told), page.machines())
+
+
+def _dates(repairs: Iterable[Repair]) -> list[str]:
+    return [f"{r.component} {r.side}".strip() + f" on {utc(r.repaired_ns)[:16]}" for r in repairs]
+
+
+def _meant(words: str, fleet: Fleet, repaired_ns: int) -> tuple[Machine, Repair]:
+    """Machine and part that are meant."""
+    parts = words.split()
+    side = _SIDES.get(parts[-1].casefold(), "") if len(parts) > 2 else ""
+    parts = parts[:-1] if side else parts
+    if len(parts) < 2:
+        raise ConfigError(f"--repaired {words!r}: {_EXPECTED}")
+    name, part = " ".join(parts[:-1]), parts[-1]
+    machines = [m for m in fleet.machines if name.casefold() in (m.id.casefold(), m.label.casefold())]
+    if len(machines) != 1:
+        known = ", ".join(m.label for m in fleet.machines[:_NAMED]) + (" …" if len(fleet.machines) > _NAMED else "")
+        what = f"{len(machines)} machines are called so" if machines else "no such machine"
+        raise ConfigError(f"--repaired {words!r}: {name}: {what}; the audit has {known or 'none'}; {_EXPECTED}")
+    machine = machines[0]
+    components = list(dict.fromkeys(component for component, _ in machine.parts))
+    component = next((c for c in components if c.casefold() == part.casefold()), None)
+    if component is None:
+        raise ConfigError(
+            f"--repaired {words!r}: {machine.label} has no part {part}; it has {', '.join(components) or 'none'}; {_EXPECTED}"
+        )
+    repair = Repair((machine.id, "" if machine.id else machine.name), component, side, repaired_ns)
+    _check_day(machine, repair, words)
+    return machine, repair
+
+
+def _check_day(machine: Machine, repair: Repair, words: str) -> None:
+    """Refuse a day without a time on which the part's fault was found: it is not known what was first."""
+    if repair.repaired_ns % (86_400 * 10**9):
+        return
+    day = utc(repair.repaired_ns)[:10]
+    same = [r for r in machine.dated if utc(r.result.start_ns)[:10] == day and _faults(r, repair)]
+    if same:
+        at = utc(same[-1].result.start_ns)[11:16]
+        raise ConfigError(
+            f"--repaired {words!r}: a mission that began on {day} at {at} UTC shows the fault; give the time of the repair, such as "
+            f"--on {day}T{at}"
+        )
+
+
+def _faults(run: Run, repair: Repair) -> bool:
+    return any(f.component == repair.component and repair.side in ("", *Side(f.side).sides) for f in run.faults)
+
+
+def _closed(machine: Machine, repair: Repair) -> tuple[str, ...]:
+    """Standing faults whose last mission was before the repair."""
+    out = []
+    for f in machine.faults:
+        start = f.last.result.start_ns
+        meant = f.component == repair.component and repair.side in ("", f.side)
+        if f.standing and meant and start is not None and start < repair.repaired_ns:
+            out.append(fault_words(f))
+    return tuple(out)

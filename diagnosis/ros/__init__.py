@@ -1,0 +1,1 @@
+"""A diagnosis as ROS messages, to lie beside its log in viewers."""

@@ -1,0 +1,80 @@
+"""What people give in place of a log: pointers, archives, workbooks, web pages; named for what they are."""
+
+from __future__ import annotations
+
+import re
+import zipfile
+from pathlib import Path
+
+_POINTER = b"version https://git-lfs.github.com/spec/"
+_MOST_POINTER = 1024
+_HEAD = 512
+_NAMED = 5
+_PAGE = re.compile(rb"\s*(<!doctype html|<html)", re.IGNORECASE)
+#: First bytes, what they are of, and what to do.
+_KINDS = (
+    (b"\x1f\x8b", "a gzip archive", "unpack it and give what is in it"),
+    (b"BZh", "a bzip2 archive", "unpack it and give what is in it"),
+    (b"\xfd7zXZ\x00", "an xz archive", "unpack it and give what is in it"),
+    (b"\x28\xb5\x2f\xfd", "a zstd archive", "unpack it and give what is in it"),
+    (b"7z\xbc\xaf\x27\x1c", "a 7z archive", "unpack it and give what is in it"),
+    (b"Rar!\x1a\x07", "a RAR archive", "unpack it and give what is in it"),
+    (b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1", "a file of Microsoft Office", "export its table as CSV and give that"),
+    (b"%PDF-", "a PDF document", "give the log that it tells of"),
+    (b"\x7fELF", "a program", "give the log"),
+)
+
+
+def lfs_pointer(path: Path) -> str:
+    """Sentence on a git-LFS pointer that stands where a log belongs, in a recording's folder too; else empty.
+
+    Parameters
+    ----------
+    path : Path
+        File or folder.
+    """
+    if path.is_dir():
+        return next((found for child in sorted(path.iterdir()) if child.is_file() and (found := _pointer(child))), "")
+    return _pointer(path)
+
+
+def _pointer(path: Path) -> str:
+    if path.stat().st_size > _MOST_POINTER:
+        return ""
+    text = path.read_bytes()
+    if not text.startswith(_POINTER):
+        return ""
+    size = re.search(rb"^size (\d+)", text, re.MULTILINE)
+    whole = f", which has {int(size[1])} bytes" if size else ""
+    return f"{path} is a git-LFS pointer, not the log itself{whole}; fetch the log with `git lfs pull`"
+
+
+def mistaken(path: Path) -> str:
+    """Sentence on a file that is known to be something else than a log; else empty."""
+    if not path.is_file():
+        return ""
+    with path.open("rb") as file:
+        head = file.read(_HEAD)
+    if head.startswith(b"PK\x03\x04"):
+        return _zip(path)
+    for first, what, remedy in _KINDS:
+        if head.startswith(first):
+            return f"{path} is {what}, not a log; {remedy}"
+    if head[257:262] == b"ustar":
+        return f"{path} is a tar archive, not a log; unpack it and give what is in it"
+    if _PAGE.match(head):
+        return f"{path} is a web page, not a log: the download gave a page in its place; download the file itself"
+    return ""
+
+
+def _zip(path: Path) -> str:
+    try:
+        with zipfile.ZipFile(path) as archive:
+            names = [name for name in archive.namelist() if not name.endswith("/")]
+    except (zipfile.BadZipFile, OSError, NotImplementedError, UnicodeDecodeError):
+        names = []
+    if "xl/workbook.xml" in names:
+        return f"{path} is an Excel workbook, not a log; export its sheet as CSV and give that"
+    more = ", …" if len(names) > _NAMED else ""
+    holds = f" (holds {', '.join(names[:_NAMED])}{more})" if names else ""
+    return f"{path} is a ZIP archive{holds}, not a log; unpack it and give what is in it"

@@ -1,0 +1,68 @@
+"""Dates of the command line, and moments in UTC and local time."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+
+import pytest
+
+from cli.terminal.dates import moment_of, nanoseconds, shown_moment
+from replay.errors import ConfigError
+
+
+@pytest.fixture
+def zone(monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[[str], None]]:
+    """Sets the computer's time zone."""
+
+    def set_zone(name: str) -> None:
+        monkeypatch.setenv("TZ", name)
+        time.tzset()
+
+    yield set_zone
+    monkeypatch.undo()
+    time.tzset()
+
+
+@pytest.mark.parametrize(
+    ("text", "ns"),
+    [
+        ("1970-01-01", 0),
+        ("2026-10-05", 1_791_158_400 * 10**9),
+        ("2026-10-05T14:30", 1_791_210_600 * 10**9),
+        (" 2026-10-05 14:30:00.25 ", 1_791_210_600_250_000_000),
+        ("2026-10-05T14:30+02:00", 1_791_203_400 * 10**9),
+        ("2026-10-05T14:30Z", 1_791_210_600 * 10**9),
+    ],
+)
+def test_moments(text: str, ns: int) -> None:
+    assert nanoseconds(moment_of("--start", text)) == ns
+
+
+@pytest.mark.parametrize("text", ["monday", "", "05.10.2026", "2026-02-30", "14:30", "1791158400"])
+def test_what_is_no_date(text: str) -> None:
+    with pytest.raises(ConfigError, match=r"--start .*: is no date; expected one such as 2026-10-05"):
+        moment_of("--start", text)
+
+
+@pytest.mark.parametrize("text", ["1969-12-31", "2100-01-01"])
+def test_what_no_log_has(text: str) -> None:
+    with pytest.raises(ConfigError, match="is out of range; expected 1970 to 2099"):
+        moment_of("--start", text)
+
+
+@pytest.mark.parametrize(
+    ("name", "shown"),
+    [
+        ("UTC", "2026-10-05 12:30:00 UTC"),
+        ("Europe/Berlin", "2026-10-05 12:30:00 UTC (14:30:00 CEST)"),
+        ("Pacific/Auckland", "2026-10-05 12:30:00 UTC (2026-10-06 01:30:00 NZDT)"),
+    ],
+)
+def test_local_time_stands_beside_utc(zone: Callable[[str], None], name: str, shown: str) -> None:
+    zone(name)
+    assert shown_moment(nanoseconds(moment_of("--on", "2026-10-05T12:30"))) == shown
+
+
+def test_a_time_beyond_calendars_is_no_error() -> None:
+    assert shown_moment(10**30) == "an unknown time"
