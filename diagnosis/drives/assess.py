@@ -181,7 +181,7 @@ def _reasons(load: LoadTrack | None) -> dict[State, str]:
     """Why a state that is no judgement was given."""
     return {
         State.NOT_EXCITED: "the drive is neither commanded nor moving",
-        State.MASKED: "the speed sensor, which is needed for it, delivers nothing usable",
+        State.MASKED: "the {wheel.sensor}, which is needed for it, delivers nothing usable",
         State.NO_DATA: "no samples",
         State.NOT_ASSESSED: "no effort of healthy missions to compare with"
         if load is None
@@ -192,8 +192,8 @@ def _reasons(load: LoadTrack | None) -> dict[State, str]:
 def _notes(data: DriveData, pair: SpeedPair, controller: InverseController, below: int) -> tuple[str, ...]:
     """Figures that the judgement used."""
     figures = (
-        f"{data.names[0]} against the speed to which {data.names[2]} answered: noise {pair.noise:.3g} m/s "
-        f"({100 * pair.exact:.0f} % of the samples within {pair.core:.2g} m/s), integral time {controller.memory_s:.3g} s."
+        f"{data.names[0]} against the speed to which {data.names[2]} answered: noise {pair.noise:.3g} {{speed_unit}} "
+        f"({100 * pair.exact:.0f} % of the samples within {pair.core:.2g} {{speed_unit}}), integral time {controller.memory_s:.3g} s."
     )
     if not below:
         return (figures,)

@@ -109,7 +109,7 @@ def assess_tracking(
     series = (("residual", np.where(np.isfinite(v), v - reference, np.nan)), ("expected", reference))
     pictured = Pictured.of(steps_of(findings, v.size, dt), series)
     reasons = {
-        State.NOT_ASSESSED: "without a valve command or a second measurement, only a standstill under command can be detected",
+        State.NOT_ASSESSED: "without a {valve} command or a second measurement, only a standstill under command can be detected",
         State.NOT_EXCITED: "nothing is commanded",
         State.NO_DATA: "no samples",
     }

@@ -50,7 +50,7 @@ _LEAST_S = 1.0
 _DOUBT_S = 0.5  # around a spell that is judged no fault
 _NO_EFFORT = "only their effort would show it; log current, duty or torque (`effort` of /joint_states)"
 _UNUSED_EFFORT = "their effort is logged, but nothing says what effort is healthy in a body that all of them move"
-_UNSEEN = "without its command or another wheel of its side only a speed that is frozen, wild or noisy shows"
+_UNSEEN = "without its command or another {wheel} of its side only a speed that is frozen, wild or noisy shows"
 
 
 @dataclass(frozen=True)
@@ -277,8 +277,8 @@ def _assessment(
         f"{one.data.name} has no command"
         if not r.answered
         else (
-            f"{one.data.name} answers its command after {r.delay:.2g} s with a lag of {r.lag:.2g} s, up to {r.limit:.3g} m/s and "
-            f"{r.rate:.2g} m/s²; usual misfit {float(np.median(r.noise)):.2g} m/s"
+            f"{one.data.name} answers its command after {r.delay:.2g} s with a lag of {r.lag:.2g} s, up to {r.limit:.3g} {{speed_unit}} and "
+            f"{r.rate:.2g} m/s²; usual misfit {float(np.median(r.noise)):.2g} {{speed_unit}}"
         )
     )
     note += f"; compared with {one.wheel.compared}." if one.wheel.compared else "."
@@ -299,6 +299,6 @@ def _drive(one: Judged, states: NDArray[np.int8], findings: tuple[Finding, ...])
         State.NOT_ASSESSED: _UNUSED_EFFORT if one.data.effort else _NO_EFFORT,
         State.NOT_EXCITED: "nothing is commanded",
         State.NO_DATA: "no samples",
-        State.MASKED: "its speed sensor is faulty",
+        State.MASKED: "its {wheel.sensor} is faulty",
     }
     return Assessment(states, reasons, findings, {}, Tier.RESPONSE)

@@ -16,7 +16,7 @@ from diagnosis.response.joint import Joint
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
-_LASTING = 0.8  # of what the other wheels make of the same command: over a whole mission no slip or load does that
+_LASTING = 0.8  # of what the other {{wheels}} make of the same command: over a whole mission no slip or load does that
 _ELSEWHERE, _ELSEWHERE_S = 0.35, 1.5  # of the top speed: all drives that far off their commands, for so long
 
 
@@ -59,7 +59,7 @@ def standstills(idle: Sequence[tuple[int, int]], dt: float) -> tuple[str, ...]:
     total, (start, stop) = sum(b - a for a, b in idle) * dt, max(idle, key=lambda s: s[1] - s[0])
     return (
         f"For {total:.1f} s all drives stood still together while they were commanded to move (longest {start * dt:.1f}–{stop * dt:.1f} s): "
-        "disabled, stopped by an emergency stop, or driven by another source of commands. No wheel is blamed for it.",
+        "disabled, stopped by an emergency stop, or driven by another source of commands. No {wheel} is blamed for it.",
     )
 
 
@@ -85,8 +85,8 @@ def otherwise(judged: Mapping[str, Judged], block_s: float) -> tuple[str, ...]:
 def unlike(judged: Mapping[str, Judged]) -> dict[str, str]:
     """Wheels that make less or more of the same command than the others over the whole mission, with a sentence."""
     return {
-        w: f"over the whole mission it reads {share:.2f} × what the other wheels make of the same command: a scaled or wrongly "
-        "mapped sensor, another wheel diameter, or a weak drive"
+        w: f"over the whole mission it reads {share:.2f} × what the other {{wheels}} make of the same command: a scaled or wrongly "
+        "mapped sensor, {or_size}a weak {valve}"
         for w, share in _shares(judged).items()
         if not _LASTING <= share <= 1.0 / _LASTING
     }

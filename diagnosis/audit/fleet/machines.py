@@ -15,6 +15,7 @@ from functools import cached_property
 
 from diagnosis.audit.fleet.fault_types import Status
 from diagnosis.audit.fleet.read import Bounds, FoundFault, Mission, Part, Result
+from diagnosis.results.machine_words import HYDRAULIC, MachineWords
 from diagnosis.results.vocabulary import Kind, Severity, Verdict
 from replay.faults import Side
 
@@ -24,7 +25,7 @@ _LEAST_SHARE = 0.8
 
 @dataclass(frozen=True)
 class Limits:
-    """What a report says of limits, which components steer, and whether the machine may go out (None: it does not say).
+    """What a report says of limits, steering components, leave to go out (None: it does not say), and words.
 
     The defaults are those of the paper's machine.
     """
@@ -34,6 +35,7 @@ class Limits:
     wheels: tuple[str, ...] = ("FR", "FL", "RR", "RL")
     axles: tuple[str, ...] = ("front", "rear")
     cleared: bool | None = None
+    words: MachineWords = HYDRAULIC
 
 
 @dataclass(frozen=True)
