@@ -78,6 +78,7 @@ assert "<circle r='3'/>" in icon(drifting)
 assert drifting in LEGEND and 'id="g-drifting"' in sprite()
 sat = {"mean": 0.1, "rms": 0.25, "low": 0.0, "high": 0.2, "unit": "m/s"}
 fault = {"kind": "wheel", "component": "FR", "side": "sensor", "mode": "drifting", "sat": sat, "epsilon": None}
+fault |= {"hypotheses": []}
 assert fault_title(fault, HYDRAULIC) == "FR speed sensor drifting, 0.25 m/s r.m.s."
 assert fault_title(fault | {"sat": None}, HYDRAULIC) == "FR speed sensor drifting"
 assert "no reason to stop" in severity_of(finding(Side.SENSOR, drifting, epsilon=0.5), 60.0, LIMITS, HYDRAULIC)[1]

@@ -19,7 +19,7 @@ from diagnosis.estimation.viterbi import most_probable
 from diagnosis.results.assessment import CODE, Assessment
 from diagnosis.results.evidence_columns import steps_of
 from diagnosis.results.loss import loss_of
-from diagnosis.results.sizes import amount
+from diagnosis.results.sizes import amount, not_reported
 from diagnosis.results.vocabulary import Tier
 from replay.faults import Side, State
 from replay.machine.config import Limits
@@ -109,5 +109,5 @@ def _notes(found: IdentifiedPair, below: int) -> tuple[str, ...]:
         return (figures,)
     return (
         figures,
-        f"{below} deviations of {pair.y_name} are below the limits of the machine file and are not reported.",
+        not_reported(below, pair.y_name),
     )

@@ -61,7 +61,7 @@ def _values(isolated: Isolated, found: IdentifiedPair, epsilon: Epsilon | None, 
     y, x = seen.y[seen.use], seen.x[seen.use]
     if isolated.run.row in TOTAL_ROWS:
         return [
-            f"{pair.y_name} stayed within {amount(float(np.ptp(y)), pair.unit, 2)} of {amount(float(np.mean(y)), pair.unit, 4)} "
+            f"{pair.y_name} stayed within {amount(float(np.ptp(y)), pair.unit, 2)} of {amount(float(np.mean(y)), pair.unit)} "
             f"for {seconds:.3f} s while {pair.x_name} moved over {amount(float(np.ptp(x)), pair.unit, 2)}."
         ]
     if epsilon is None:

@@ -25,6 +25,7 @@ from diagnosis.drives.power import load_powers, sensor_powers
 from diagnosis.drives.speed_pair import SpeedPair, speed_pair
 from diagnosis.results.assessment import CODE, Assessment, Finding, unassessed
 from diagnosis.results.evidence_columns import Pictured, steps_of
+from diagnosis.results.sizes import not_reported
 from diagnosis.results.vocabulary import Tier
 from replay.faults import Side, State
 from replay.machine.config import Limits
@@ -199,5 +200,5 @@ def _notes(data: DriveData, pair: SpeedPair, controller: InverseController, belo
         return (figures,)
     return (
         figures,
-        f"{below} deviations of {data.names[0]} are below the limits of the machine file and are not reported.",
+        not_reported(below, data.names[0]),
     )

@@ -19,7 +19,7 @@ from diagnosis.results.vocabulary import Kind, Severity
 from replay.faults import State
 
 _MARGIN, _LINE = 26.0, 15  # room for text on either side, and characters that fit in a line of it
-_W, _TYRE_W, _TYRE_H, _PITCH, _JOINT = 372.0, 50.0, 96.0, 132.0, 72.0
+_W, _TYRE_W, _TYRE_H, _PITCH, _JOINT = 372.0, 50.0, 96.0, 132.0, 58.0
 
 
 @dataclass(frozen=True)

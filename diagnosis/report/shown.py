@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
@@ -79,6 +80,8 @@ def _cell(row: DetectabilityRow | None) -> str:
         return "not shown"
     if not size:
         return "not cleared"
+    if unit == "rad":
+        return f"{math.degrees(size):.2g}°"
     return f"{100 * size:.0f} %" if unit == "1" else f"{size:.2g} {unit}"
 
 

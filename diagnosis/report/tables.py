@@ -28,6 +28,7 @@ from diagnosis.results.fault_rows import state_label
 from diagnosis.results.machine_words import MachineWords, words_of
 from diagnosis.results.vocabulary import Kind, Tier, Verdict
 from replay.faults import FAULT_STATES, UNDECIDED, FaultMode, State
+from replay.machine.quantities import OPENING
 
 _SHOWN = 0.001
 _UNFOLDED = 4  # notes and evidence beyond this number fold away
@@ -65,7 +66,7 @@ def context(report: ReportDocument, duration: float) -> Context:
         "metrics": _metrics(report["metrics"], words),
         "words": words,
         "steered": bool(report["machine"]["axles"]),
-        "signals": [_signal(s) for s in report["signals"]],
+        "signals": [_signal(s, words) for s in report["signals"]],
         "missing": _missing(report["missing"]),
         "clearing": _clearing(report),
         "limits_clear_at": report["limits"]["clear_at"],
@@ -111,7 +112,7 @@ def _fault(fault: IntervalRow, words: MachineWords) -> Context:
         figures.append(("ε̂", number(epsilon["value"]), f"{number(epsilon['low'])} to {number(epsilon['high'])}"))
     if sat:
         unit = sat["unit"]
-        bounds = f"{sat_text(sat['low'], unit, words)} to {sat_text(sat['high'], unit, words)}"
+        bounds = f"{sat_text(sat['low'], unit, words).partition(' ')[0]} to {sat_text(sat['high'], unit, words)}"
         figures.append(("sat", sat_text(sat["mean"], unit, words), bounds))
         figures.append(("sat r.m.s.", sat_text(sat["rms"], unit, words), ""))
     hypotheses = sorted(fault["hypotheses"], key=lambda h: -h["p"])
@@ -294,8 +295,10 @@ def _metrics(metrics: MetricsRow, words: MachineWords) -> Context:
     return {"rows": shown, "effort": effort, "paper": paper}
 
 
-def _signal(signal: SignalRow) -> Context:
-    unit, recorded, missing = signal["unit"], signal["recorded_unit"], signal["missing_share"]
+def _signal(signal: SignalRow, words: MachineWords) -> Context:
+    unit, recorded, missing, step = signal["unit"], signal["recorded_unit"], signal["missing_share"], signal["lsb"]
+    if unit in (OPENING, words.unit(OPENING)):
+        unit, step = words.percent.strip(), None if step is None else 100 * step
     return {
         "name": signal["name"],
         "channel": signal["channel"] or "–",
@@ -304,7 +307,7 @@ def _signal(signal: SignalRow) -> Context:
         "samples": grouped(signal["samples"]),
         "gaps": f"{signal['gaps']}, longest {number(signal['longest_gap_s'])} s" if signal["gaps"] else "none",
         "missing": "–" if missing is None else f"{100 * missing:.2g} %",
-        "lsb": f"{number(signal['lsb'])} {unit}" if signal["lsb"] else "–",
+        "lsb": f"{number(step)} {unit}" if step else "–",
         "found": "guessed" if signal["guessed"] else "given",
         "poor": missing is not None and missing > 0.01,
     }

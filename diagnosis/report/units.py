@@ -35,7 +35,7 @@ def natural_unit(kind: Kind, side: Side, words: MachineWords) -> str:
 
 def on_page(unit: str, words: MachineWords) -> tuple[str, float]:
     """Unit in which the page shows a recorded one, and the factor to it: angles in degrees, commands in percent."""
-    if unit == OPENING:
+    if unit in (OPENING, words.unit(OPENING)):
         return words.percent.strip(), 100.0
     if unit == words.speed_unit:
         return unit, 1.0

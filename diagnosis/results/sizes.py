@@ -26,6 +26,12 @@ def amount(value: float, unit: str, digits: int = 3) -> str:
     return f"{value:.{digits}g} {'{speed_unit}' if unit == 'm/s' else unit}".rstrip()
 
 
+def not_reported(below: int, name: str) -> str:
+    """Sentence on deviations of a channel that are too small to count."""
+    many = f"{below} deviations of {name} are" if below != 1 else f"1 deviation of {name} is"
+    return f"{many} below the limits of the machine file and not reported."
+
+
 def times_as_probable(log_evidence: float) -> str:
     """A log-evidence in words, to be followed by *with this fault as without*: ``about 3 000 times as probable``."""
     if log_evidence > math.log(_MOST):
