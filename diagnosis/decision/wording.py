@@ -81,7 +81,7 @@ def sentence_of(faults: Sequence[FaultInterval], words: MachineWords) -> str:
         for f in faults[:3]
     ]
     text = join_words(shown)
-    more = f"; {len(faults) - 3} more are listed below" if len(faults) > 3 else ""
+    more = f"; {rest} more {'is' if rest == 1 else 'are'} listed below" if (rest := len(faults) - 3) > 0 else ""
     return text[0].upper() + text[1:] + more + "."
 
 

@@ -124,7 +124,9 @@ def _fault(fault: IntervalRow, words: MachineWords) -> Context:
         "delay": _delay(fault),
         "likely": hypotheses[:likely],
         "unlikely": ", ".join(
-            f"{state_label(h['mode'], h['side']).lower()} ({h['side']})" for h in hypotheses[likely:]
+            (f"{words.part_name(fault['kind'], h['side'])} " if h["side"] != "none" else "")
+            + state_label(h["mode"], h["side"]).lower()
+            for h in hypotheses[likely:]
         ),
         "figures": figures,
         "check": fault.get("check", ""),

@@ -229,7 +229,9 @@ def _scaled(spell: Spell, wheel: Wheel, span: tuple[int, int], speed: Array | No
     end = span[1] if rose is None else int(wheel.samples.step[rose])
     texts = []
     if speed is not None:
-        texts.append(f"{wheel.name} is {gain:.2f} × what {wheel.compared} show of the same speed.")
+        texts.append(
+            f"{wheel.name} is {gain:.2f} × what {wheel.compared} show{'' if ' and ' in wheel.compared else 's'} of the same speed."
+        )
     if fell is not None or rose is not None:
         texts.append(f"It changed by a factor of about {gain:.2f} from one reading to the next, which no drive does.")
     if bare:
