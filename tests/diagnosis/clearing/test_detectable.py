@@ -25,7 +25,7 @@ _COLUMNS = {
 
 
 def _gauges(mission: SimulatedMission, part: str, side: Side, *, base: bool) -> Gauges:
-    return next(g for g in gauges_of(in_cells(mission, base=base), HYDRAULIC) if (g.component, g.side) == (part, side))
+    return next(g for g in gauges_of(in_cells(mission, base=base)) if (g.component, g.side) == (part, side))
 
 
 def _with(mission: SimulatedMission, name: str, start: float, stop: float, factor: float) -> SimulatedMission:
