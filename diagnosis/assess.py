@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from diagnosis.channels.liveness import alive_sources
 from diagnosis.evidence import ACTUATOR, SENSOR, MissionView, Part
 from diagnosis.families import FAMILIES
 from diagnosis.results.assessment import Assessment, unassessed
+from diagnosis.results.machine_words import HYDRAULIC, MachineWords, machine_words
 from diagnosis.results.wheel_model import WheelModelFit
+from diagnosis.results.worded import worded
 from replay.control.loop import Replay
 from replay.faults import State
 from replay.machine.config import Machine
@@ -18,11 +20,12 @@ from replay.signals.timeline import Timeline
 
 @dataclass(frozen=True)
 class ComponentResult:
-    """Assessments by (component, side), the wheel model that stood behind them, and what happened to the machine as a whole."""
+    """Assessments by (component, side), the wheel model behind them, what happened to the machine as a whole, and its words."""
 
     assessments: dict[Part, Assessment]
     wheel_model: WheelModelFit | None
     events: tuple[str, ...] = ()
+    words: MachineWords = HYDRAULIC
 
 
 def assess_components(
@@ -45,7 +48,13 @@ def assess_components(
         mission = mission.after(family.assess(mission))
     parts = [(component, side) for component in (*chosen, *machine.axles) for side in (SENSOR, ACTUATOR)]
     found = {part: mission.known.get(part) or _without_evidence(mission, *part) for part in parts}
-    return ComponentResult(found, mission.model, mission.events)
+    words = machine_words(machine, timeline.signals)
+    return ComponentResult(
+        {part: worded(a, words) for part, a in found.items()},
+        None if mission.model is None else replace(mission.model, note=words.fill(mission.model.note)),
+        tuple(words.fill(event) for event in mission.events),
+        words,
+    )
 
 
 def _without_evidence(mission: MissionView, wheel: str, side: str) -> Assessment:
@@ -53,10 +62,10 @@ def _without_evidence(mission: MissionView, wheel: str, side: str) -> Assessment
     size = mission.timeline.size
     if side == SENSOR:
         if not mission.logged(f"wheel.{wheel}.v"):
-            return unassessed(size, State.NO_DATA, "the wheel's speed is not in the log")
-        why = "neither a valve command, a second speed nor a commanded speed is in the log"
+            return unassessed(size, State.NO_DATA, "the speed of the {wheel} is not in the log")
+        why = "neither a {valve} command, a second speed nor a commanded speed is in the log"
         return unassessed(size, State.NOT_ASSESSED, why)
     if mission.logged(f"wheel.{wheel}.u"):
-        why = "the valve command is logged, but no speed to compare with it"
+        why = "the {valve} command is logged, but no speed to compare with it"
         return unassessed(size, State.NOT_ASSESSED, why)
-    return unassessed(size, State.NO_DATA, "the wheel's valve command is not in the log")
+    return unassessed(size, State.NO_DATA, "the command of the {wheel.actuator} is not in the log")

@@ -19,6 +19,7 @@ from diagnosis.report_document import Judged, machine_row, report_of_mission
 from diagnosis.results.assessment import Assessment
 from diagnosis.results.closeups import closeups_of
 from diagnosis.results.document import MachineRow
+from diagnosis.results.machine_words import machine_words
 from diagnosis.results.result import MissionResult
 from diagnosis.results.vocabulary import Tier
 from replay.arrays.column_store import ColumnStore
@@ -79,7 +80,7 @@ def diagnose(
     """
     chosen = _chosen(wheels, machine)
     mission = load_mission(paths, machine, start_s=start_s, stop_s=stop_s, progress=progress, store=store)
-    recorded = quality.recorded(mission.signals, mission.timeline)
+    recorded = quality.recorded(mission.signals, mission.timeline, machine_words(machine, mission.signals.items))
     mission = replace(mission, signals=mission.signals.without_samples())  # which leaves their memory to the diagnosis
     return _walk(
         mission, recorded, machine, chosen, machine_row(machine, mission, machine_source, machine_id), progress
@@ -118,7 +119,7 @@ def diagnose_mission(
         Where `wheels` names no wheel of the machine.
     """
     chosen = _chosen(wheels, machine)
-    recorded = quality.recorded(mission.signals, mission.timeline)
+    recorded = quality.recorded(mission.signals, mission.timeline, machine_words(machine, mission.signals.items))
     return _walk(
         mission, recorded, machine, chosen, machine_row(machine, mission, machine_source, machine_id), progress
     )
@@ -176,7 +177,7 @@ def _require_something(assessments: Mapping[tuple[str, str], Assessment], missio
     names = ", ".join(str(f.path) for f in mission.files) or "the mission"
     if not speeds:
         raise NotJudged(
-            f"{names}: no wheel speed was found among its channels; run `mfhca channels` to see them, and name the wheels' "
+            f"{names}: no speed of a {machine.part} was found among its channels; run `mfhca channels` to see them, and name the {machine.part}s' "
             "signals in a machine file's [signals]"
         )
     beside = [f"wheel.{w}.{leaf}" for w in machine.wheels for leaf in ("u", "v_ref", "v_true")]
@@ -184,11 +185,11 @@ def _require_something(assessments: Mapping[tuple[str, str], Assessment], missio
         timeline = mission.timeline
         raise NotJudged(
             f"{names}: its {timeline.size * timeline.dt:.3g} s hold too little driving to judge anything; choose a longer "
-            "part of the log, or one in which the machine drives"
+            "part of the log, or one in which the machine moves"
         )
     raise NotJudged(
-        f"{names}: wheel speeds are logged, but no valve command, no second speed and no commanded wheel speed beside "
-        "them, so nothing can be judged; log wheel.<W>.u or wheel.<W>.v_true, or name them in the machine file's [signals]"
+        f"{names}: speeds of the {machine.part}s are logged, but no command and no second speed beside them, so nothing can be judged; "
+        "log wheel.<W>.v_ref or cmd.v, a valve's wheel.<W>.u, or wheel.<W>.v_true, or name them in the machine file's [signals]"
     )
 
 

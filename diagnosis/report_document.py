@@ -22,6 +22,7 @@ from diagnosis.results.clearing import Checked, clearing_rows
 from diagnosis.results.detectability import detectability_table
 from diagnosis.results.document import SCHEMA, CoverageRow, FileRow, LogRow, MachineRow, ReportDocument, WheelPlace
 from diagnosis.results.loss import loss_rows
+from diagnosis.results.machine_words import machine_words
 from diagnosis.results.result import FaultInterval, to_json
 from diagnosis.results.vocabulary import Tier
 from replay.arrays.envelope import bucket_of
@@ -63,9 +64,7 @@ class Judged:
     def intervals(self) -> tuple[FaultInterval, ...]:
         """Faults, worst first."""
         line = self.mission.timeline
-        return intervals_of(
-            self.found.assessments, self.machine.axles, line.start_ns, line.step_ns, self.machine.limits
-        )
+        return intervals_of(self.found.assessments, self.machine, self.found.words, line.start_ns, line.step_ns)
 
     @cached_property
     def cells(self) -> Cells:
@@ -75,7 +74,7 @@ class Judged:
     @cached_property
     def checks(self) -> tuple[Checked, ...]:
         """What stands behind an all-clear."""
-        return checks_of(self.cells)
+        return checks_of(self.cells, self.found.words)
 
     @property
     def damage(self) -> list[str]:
@@ -112,12 +111,13 @@ def report_of_mission(judged: Judged, identity: MachineRow) -> ReportDocument:
         "coverage": coverage,
         "clearing": clearing_rows(judged.checks),
         "detectability": detectability_table(
-            detectable(judged.cells, {part: a.powers for part, a in found.assessments.items() if a.powers is not None})
+            detectable(judged.cells, {part: a.powers for part, a in found.assessments.items() if a.powers is not None}),
+            found.words,
         ),
         "loss": loss_rows({key: a.loss for key, a in found.assessments.items()}),
         "metrics": metrics.loop_metrics(timeline, replay, machine, moving),
         "signals": list(judged.recorded.rows),
-        "missing": quality.missing_rows(mission.signals, machine),
+        "missing": quality.missing_rows(mission.signals, machine, found.words),
         "quality": quality.checks(
             mission.signals,
             judged.recorded,
@@ -126,6 +126,7 @@ def report_of_mission(judged: Judged, identity: MachineRow) -> ReportDocument:
             [text for f in mission.files for text in f.summary.notes],
             found.assessments,
             found.wheel_model,
+            found.words,
             [f.clock for f in mission.files if f.clock is not None],
         ),
         "limits": to_json(machine.limits),
@@ -142,6 +143,7 @@ def _decision(judged: Judged, coverage: list[CoverageRow], decided_s: dict[tuple
         judged.machine.axles,
         judged.machine.limits,
         judged.damage,
+        judged.found.words,
         driving_s={(row["component"], row["side"]): row["driving_s"] for row in coverage},
         model=judged.found.wheel_model,
         checks=judged.checks,
@@ -156,7 +158,7 @@ def _scope(judged: Judged) -> tuple[str, ...]:
     left_out = [w for w in machine.wheels if not any(component == w for component, _ in judged.found.assessments)]
     if left_out:
         out.append(
-            f"the wheel{'s' if len(left_out) > 1 else ''} {', '.join(left_out)} {'were' if len(left_out) > 1 else 'was'} not judged"
+            f"the {machine.part}{'s' if len(left_out) > 1 else ''} {', '.join(left_out)} {'were' if len(left_out) > 1 else 'was'} not judged"
         )
     out += [f"the {axle} steering was not judged" for axle in machine.axles if _unjudged(judged.found, axle)]
     cut = (line.start_ns - judged.recorded.first_ns) * 1e-9
@@ -241,4 +243,5 @@ def machine_row(machine: Machine, mission: Mission, source: str, machine_id: str
         "geometry": geometry,
         "source": source,
         "assumed": assumed_words(machine),
+        "words": machine_words(machine, mission.signals.items).row(),
     }

@@ -10,6 +10,7 @@ from typing import Any
 from cli.tables.verdict import verdict_parts
 from diagnosis.pages.labels import fault_title
 from diagnosis.results.candidates import candidates_of, label_of
+from diagnosis.results.machine_words import HYDRAULIC
 from diagnosis.results.vocabulary import Severity
 from replay.machine.quantities import OPENING
 
@@ -106,7 +107,7 @@ def _chances(fault: Mapping[str, Any]) -> Iterator[str]:
         best = max(rows, key=lambda mode: rows[mode])
         yield f"{best} is more probable ({rows[best]:.2f}) than the row it is called ({rows.get(fault['mode'], 0.0):.2f})"
     unclear = bool(candidates_of(fault))  # type: ignore[arg-type]
-    if ("unclear" in label_of(fault)) != unclear or ("unclear" in fault_title(fault)) != unclear:  # type: ignore[arg-type]
+    if ("unclear" in label_of(fault)) != unclear or ("unclear" in fault_title(fault, HYDRAULIC)) != unclear:  # type: ignore[arg-type]
         yield "heading and title do not agree on whether its kind is clear"
     healthy = sum(h["p"] for h in hypotheses if h["mode"] == "healthy")
     if fault["severity"] != "info" and healthy > 0.5:
@@ -169,7 +170,7 @@ def _words(fault: Mapping[str, Any]) -> Iterator[str]:
         found = re.search(r"it was this in (\d+) of 100 cases", text)
         if found and abs(int(found.group(1)) - 100 * fault["probability"]) > 1.6:
             yield f"{found.group(0)!r} beside a probability of {fault['probability']:.3f}"
-    if re.search(r"\b(nan|inf)\b", " ".join((*fault["evidence"], fault["advice"], fault_title(fault)))):  # type: ignore[arg-type]
+    if re.search(r"\b(nan|inf)\b", " ".join((*fault["evidence"], fault["advice"], fault_title(fault, HYDRAULIC)))):  # type: ignore[arg-type]
         yield "a number in it is none"
 
 

@@ -56,12 +56,15 @@ import numpy as np
 from diagnosis.api.fault_words import parse_fault
 from cli.tables.looks import mode_text
 from diagnosis.audit.fleet.page.svg import LEGEND, sprite
+from diagnosis.decision.advice import check_of
 from diagnosis.decision.severity import severity_of
 from diagnosis.estimation.row_probability import row_probabilities
 from diagnosis.pages.labels import fault_title, known, mode_legend
 from diagnosis.pages.mode_style import mode_style
 from diagnosis.pages.svg import icon
 from diagnosis.results.fault_rows import ROWS, codes_of, mode_words, prior, state_label
+from diagnosis.results.machine_words import HYDRAULIC
+from diagnosis.results.vocabulary import Kind
 from replay.errors import ConfigError
 from replay.faults import FaultMode, Side, drawn_modes
 from tests.diagnosis.decision.findings import LIMITS, finding
@@ -75,9 +78,11 @@ assert "<circle r='3'/>" in icon(drifting)
 assert drifting in LEGEND and 'id="g-drifting"' in sprite()
 sat = {"mean": 0.1, "rms": 0.25, "low": 0.0, "high": 0.2, "unit": "m/s"}
 fault = {"kind": "wheel", "component": "FR", "side": "sensor", "mode": "drifting", "sat": sat, "epsilon": None}
-assert fault_title(fault) == "FR speed sensor drifting, 0.25 m/s r.m.s."
-assert fault_title(fault | {"sat": None}) == "FR speed sensor drifting"
-assert severity_of(finding(Side.SENSOR, drifting, epsilon=0.5), 60.0, LIMITS)[1].endswith("check the sensor.")
+fault |= {"hypotheses": []}
+assert fault_title(fault, HYDRAULIC) == "FR speed sensor drifting, 0.25 m/s r.m.s."
+assert fault_title(fault | {"sat": None}, HYDRAULIC) == "FR speed sensor drifting"
+assert "no reason to stop" in severity_of(finding(Side.SENSOR, drifting, epsilon=0.5), 60.0, LIMITS, HYDRAULIC)[1]
+assert check_of(Kind.WHEEL, "FR", Side.SENSOR, drifting, HYDRAULIC)
 assert parse_fault("FR sensor drifting 30 60").sat_tau_s == 60.0
 try:
     parse_fault("FR actuator drifting 30 60")

@@ -65,7 +65,7 @@ def _show(terminal: Terminal, made: MadeLog, mission: SimulatedMission, named: s
         ("log", f"{made.log}  ({made.format}, {duration:g} s at {mission.options.rate_hz:g} Hz)"),
         ("truth", f"{made.truth_file}  ({count} fault{'' if count == 1 else 's'})"),
     ]
-    rows.append(("loop", f"mean |v_a − v_c| {error:.4f} m/s, mean |u| {effort:.3f} of full opening"))
+    rows.append(("loop", f"mean |v_a − v_c| {error:.4f} m/s, mean |u| {100 * effort:.3g} % of opening"))
     if preset is not None:
         rows.append(("preset", preset))
     terminal.show(key_values([*rows, ("next", shlex.join(words))]))

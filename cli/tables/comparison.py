@@ -12,7 +12,7 @@ from cli.tables.looks import mode_text, severity_text, verdict_style
 from diagnosis.comparison.words import CHANGES, OUTCOMES, headline, times
 from diagnosis.pages.labels import utc
 from diagnosis.results.fault_rows import state_label
-from diagnosis.results.vocabulary import part_words
+from diagnosis.results.machine_words import MachineWords, words_of
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
@@ -29,16 +29,17 @@ _COLUMNS = {"new": (0, 1, 3), "not_seen_again": (0, 1, 2), "resolved": (0, 1, 2)
 
 def comparison_parts(found: Comparison) -> list[RenderableType]:
     """Headline, the two missions, faults by what became of them, coverage, figures, and what to bear in mind."""
+    words = words_of({"words": found.words})
     label, style = ("WORSE", "bold white on #b63a00") if found.worse else ("NOT WORSE", "bold white on #1d7a63")
     parts: list[RenderableType] = [
         Text.assemble((f" {label} ", style), "  ", text(headline(found.counts), "bold")),
         "",
         key_values([("older", _mission(found.older)), ("newer", _mission(found.newer))]),
     ]
-    parts += _faults(found.faults)
-    parts += [section("Assessed long enough"), *_coverage(found.coverage)]
+    parts += _faults(found.faults, words)
+    parts += [section("Assessed long enough"), *_coverage(found.coverage, words)]
     if found.metrics:
-        parts += [section("While driving"), _metrics(found.metrics)]
+        parts += [section("While driving"), _metrics(found.metrics, words)]
     if found.notes:
         parts += [section("Notes"), bullets(found.notes)]
     return [*parts, ""]
@@ -53,13 +54,13 @@ def _mission(m: ComparedMission) -> Text:
     )
 
 
-def _part(c: FaultChange) -> str:
-    return part_words(c.kind, c.component, c.side)
+def _part(c: FaultChange, words: MachineWords) -> str:
+    return words.part_words(c.kind, c.component, c.side)
 
 
-def _faults(faults: Sequence[FaultChange]) -> list[RenderableType]:
+def _faults(faults: Sequence[FaultChange], machine_words: MachineWords) -> list[RenderableType]:
     """A table per outcome, their columns in line; what limits a statement stands beneath it."""
-    width = max((len(_part(c)) for c in faults), default=0)
+    width = max((len(_part(c, machine_words)) for c in faults), default=0)
     parts: list[RenderableType] = []
     for outcome, words in OUTCOMES.items():
         mine = [c for c in faults if (c.trend or c.status) == outcome]
@@ -72,14 +73,17 @@ def _faults(faults: Sequence[FaultChange]) -> list[RenderableType]:
         wide, narrow = (
             table(
                 [_HEADINGS[i] for i in kept],
-                [[(_part(c).ljust(width), _rows(c), *_both(c, bounds), _changed(c))[i] for i in kept] for c in shown],
+                [
+                    [(_part(c, machine_words).ljust(width), _rows(c), *_both(c, bounds), _changed(c))[i] for i in kept]
+                    for c in shown
+                ],
             )
             for bounds in (True, False)
         )
         parts.append(ByWidth(wide, narrow, 110))
         if len(mine) > _SHOWN:
             parts.append(text(f"… and {len(mine) - _SHOWN} more (--json, -o FILE.html)", "dim"))
-        notes = list(dict.fromkeys(f"{_part(c)}: {c.note}" for c in shown if c.note))
+        notes = list(dict.fromkeys(f"{_part(c, machine_words)}: {c.note}" for c in shown if c.note))
         if notes:
             parts.append(bullets(notes, "dim"))
     return parts
@@ -110,15 +114,17 @@ def _changed(c: FaultChange) -> str:
     return ", ".join(CHANGES[name] for name in c.changes)
 
 
-def _coverage(changes: Sequence[CoverageChange]) -> list[RenderableType]:
+def _coverage(changes: Sequence[CoverageChange], words: MachineWords) -> list[RenderableType]:
     differing = [c for c in changes if c.change]
-    neither = [part_words(c.kind, c.component, c.side) for c in changes if not c.change and not _assessed(c.newer)]
+    neither = [
+        words.part_words(c.kind, c.component, c.side) for c in changes if not c.change and not _assessed(c.newer)
+    ]
     parts: list[RenderableType] = []
     if differing:
         rows = [
             (
                 text(c.change, "bold red" if c.change == "lost" else "#2fa98c"),
-                part_words(c.kind, c.component, c.side),
+                words.part_words(c.kind, c.component, c.side),
                 _judged(c.older),
                 _judged(c.newer),
             )
@@ -142,23 +148,35 @@ def _judged(side: SideCoverage | None) -> str:
     return "no evidence" if side.tier == "none" else f"{side.decided_s:.1f} of {side.driving_s:.1f} s ({side.tier})"
 
 
-def _metrics(rows: Sequence[MetricChange]) -> RenderableType:
+def _metrics(rows: Sequence[MetricChange], words: MachineWords) -> RenderableType:
     cells = [
         (
             r.wheel,
             *_pair(r.tracking_error_older, r.tracking_error_newer),
-            *_pair(r.control_effort_older, r.control_effort_newer),
+            *_pair(_percent(r.control_effort_older), _percent(r.control_effort_newer), 1),
         )
         for r in rows
     ]
-    headings = ("", "error, older [m/s]", "newer", "", "effort, older", "newer", "")
+    headings = (
+        "",
+        f"error, older [{words.speed_unit}]",
+        "newer",
+        "",
+        f"effort, older [{words.percent.strip()}]",
+        "newer",
+        "",
+    )
     return table(headings, cells, right=range(1, 7))
 
 
-def _pair(a: float | None, b: float | None) -> tuple[str, str, str]:
+def _percent(share: float | None) -> float | None:
+    return None if share is None else 100 * share
+
+
+def _pair(a: float | None, b: float | None, digits: int = 3) -> tuple[str, str, str]:
     change = f"{round(100 * (b / a - 1)):+d} %" if a and b is not None else ""
-    return _number(a), _number(b), change
+    return _number(a, digits), _number(b, digits), change
 
 
-def _number(value: float | None) -> str:
-    return "–" if value is None else f"{value:.3f}"
+def _number(value: float | None, digits: int) -> str:
+    return "–" if value is None else f"{value:.{digits}f}"

@@ -10,7 +10,7 @@ from rich.text import Text
 from cli.tables.layout import key_values, section, table, text
 from cli.tables.looks import mode_text
 from diagnosis.results.fault_rows import state_label
-from diagnosis.results.vocabulary import part_words
+from diagnosis.results.machine_words import ANY_DRIVE
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
@@ -274,7 +274,7 @@ def _wrong(kind: str, counts: Counts) -> Table | None:
     if not wrong:
         return None
     rows = [
-        (f"{a:.2f}–{b:.2f}", part_words(kind, component, side), _mode(mode, side), what, report)
+        (f"{a:.2f}–{b:.2f}", ANY_DRIVE.part_words(kind, component, side), _mode(mode, side), what, report)
         for a, b, component, side, mode, what, report in sorted(wrong)[:_SHOWN]
     ]
     if len(wrong) > _SHOWN:

@@ -12,8 +12,8 @@ from rich.text import Text
 
 from cli.tables.layout import ByWidth, bullets, section, table, text, whole_lines
 from diagnosis.clearing.forecast import Forecast, forecast
-from diagnosis.decision.missing import cost_of_missing
-from diagnosis.results.vocabulary import part_name
+from diagnosis.decision.missing import applies, cost_of_missing
+from diagnosis.results.machine_words import MachineWords, machine_words
 from replay.machine.config import Machine
 from replay.machine.signal_table import signal_of
 from replay.mission import MissionFile
@@ -91,6 +91,7 @@ _NOT_FOUND = "no channel fits by its name or message type"
 
 def signals_document(files: Sequence[MissionFile], signals: Signals, machine: Machine, source: str) -> SignalsDocument:
     """Mapped and missing signals as JSON values."""
+    words = machine_words(machine, signals.items)
     return {
         "machine": {"name": machine.name, "source": source, "wheels": list(machine.wheels)},
         "files": [
@@ -104,27 +105,31 @@ def signals_document(files: Sequence[MissionFile], signals: Signals, machine: Ma
             }
             for f in files
         ],
-        "signals": [_signal(s) for s in signals.items.values()],
+        "signals": [_signal(s, words) for s in signals.items.values()],
         "missing": [
-            {"name": name, "reason": reason, "cost": cost_of_missing(name)} for name, reason in signals.missing.items()
+            {"name": name, "reason": reason, "cost": cost_of_missing(name, words)}
+            for name, reason in signals.missing.items()
+            if applies(name, words)
         ],
         "forecast": [
             {"components": list(f.components), "side": f.side, "told": f.told, "words": f.words, "log": list(f.log)}
-            for f in forecast(signals.items, machine)
+            for f in forecast(signals.items, machine, words)
         ],
         "notes": list(signals.notes),
         "questions": list(signals.questions),
     }
 
 
-def _signal(signal: Signal) -> MappedSignal:
+def _signal(signal: Signal, words: MachineWords) -> MappedSignal:
     finite = signal.values[np.isfinite(signal.values)]
     period = median_period(signal.stamps)
     return {
         "name": signal.name,
         "channel": signal.origin.label,
         "recorded_unit": signal.origin.unit or None,
-        "unit": signal_of(signal.name).unit,
+        "unit": words.unit(signal_of(signal.name).unit)
+        if signal.name.startswith("wheel.")
+        else signal_of(signal.name).unit,
         "guessed": signal.guessed,
         "source": signal.source,
         "samples": int(signal.stamps.size),
@@ -137,21 +142,22 @@ def _signal(signal: Signal) -> MappedSignal:
 
 def signals_parts(signals: Signals, machine: Machine) -> list[RenderableType]:
     """Mapped signals, missing ones with their cost, and doubts, for the terminal."""
+    words = machine_words(machine, signals.items)
     parts: list[RenderableType] = [text("No signal of the machine was found.", "bold")]
     if signals.items:
         several = len({s.source for s in signals.items.values()}) > 1
-        rows = [_row(s, several) for s in signals.items.values()]
+        rows = [_row(s, several, words) for s in signals.items.values()]
         wide = table(("signal", "channel", "unit", "Hz", "range"), rows, right=(3,))
         needs = sum(max(len(row[k]) for row in rows) + 2 for k in range(5))
         parts = [ByWidth(wide, _two_lines(rows), needs)]
     if signals.questions:
         parts += [section("To be answered before anything is judged"), bullets(signals.questions, "red")]
     if signals.missing:
-        lines = [(name, _cost(cost, reason)) for name, cost, reason in _missing_groups(signals.missing, machine)]
+        lines = [(name, _cost(cost, reason)) for name, cost, reason in _missing_groups(signals.missing, machine, words)]
         parts += [section("Missing signals and their effect"), table(("signal", "effect"), lines)]
-    told = forecast(signals.items, machine)
+    told = forecast(signals.items, machine, words)
     if signals.items and told:
-        by_part = [(_part(f), f.words, "\n".join(f.log)) for f in told]
+        by_part = [(_part(f, words), f.words, "\n".join(f.log)) for f in told]
         parts += [
             section("What can be told with these signals"),
             table(("part", "what shows", "log to tell more"), by_part),
@@ -178,17 +184,17 @@ def _two_lines(rows: Sequence[tuple[str, str, str, str, str]]) -> RenderableType
     return whole_lines(out)
 
 
-def _row(signal: Signal, several: bool) -> tuple[str, str, str, str, str]:
+def _row(signal: Signal, several: bool, words: MachineWords) -> tuple[str, str, str, str, str]:
     """Signal, channel with its file where there are several, recorded unit, rate, range in SI."""
-    d = _signal(signal)
+    d = _signal(signal, words)
     span = "no number" if d["min"] is None else f"{d['min']:.4g} … {d['max']:.4g} {d['unit'].replace('1', '')}"
     how = (f"  in {PurePath(signal.source).name}" if several else "") + ("" if signal.guessed else "  (given)")
     rate = f"{d['rate_hz']:.4g}" if d["rate_hz"] else "–"
-    return d["name"], d["channel"] + how, d["recorded_unit"] or "SI", rate, span.strip()
+    return d["name"], d["channel"] + how, d["recorded_unit"] or d["unit"], rate, span.strip()
 
 
-def _part(f: Forecast) -> str:
-    return f"{', '.join(f.components)} {part_name(f.kind, f.side)}"
+def _part(f: Forecast, words: MachineWords) -> str:
+    return f"{', '.join(f.components)} {words.part_name(f.kind, f.side)}"
 
 
 def _cost(cost: str, reason: str) -> Text:
@@ -200,13 +206,15 @@ def _is_doubt(note: str) -> bool:
     return " is taken from " not in note or "would fit as well" in note or "not stated" in note
 
 
-def _missing_groups(missing: Mapping[str, str], machine: Machine) -> list[tuple[str, str, str]]:
+def _missing_groups(missing: Mapping[str, str], machine: Machine, words: MachineWords) -> list[tuple[str, str, str]]:
     """Missing signals of equal cost and reason in one line each: names, cost, reason."""
     groups: dict[tuple[str, str, str], dict[str, list[str]]] = {}
     for name, reason in missing.items():
+        if not applies(name, words):
+            continue
         group, _, rest = name.partition(".")
         part, _, leaf = rest.rpartition(".")
-        leaves = groups.setdefault((group, cost_of_missing(name), reason), {})
+        leaves = groups.setdefault((group, cost_of_missing(name, words), reason), {})
         leaves.setdefault(leaf, []).append(part)
     out = []
     every = {"wheel": machine.wheels, "steer": machine.axles}

@@ -20,8 +20,9 @@ from diagnosis.results.candidates import label_of
 from diagnosis.results.comparison_document import FaultChangeRow, PreviousRow
 from diagnosis.results.document import PAPER_DEFAULTS, ActionRow, IntervalRow, MachineRow, ReportDocument
 from diagnosis.results.fault_rows import mode_words
+from diagnosis.results.machine_words import MachineWords, words_of
 from diagnosis.results.size_rows import EpsilonRow, SatRow
-from diagnosis.results.vocabulary import part_words
+from replay.machine.quantities import OPENING
 
 _SHOWN, _FAULTS_NAMED, _ENDLESS = 40, 6, 10_000
 _WORDS, _SATURATION = (1, 2), 5  # columns of words, which may wrap between them, and the one that is needed least
@@ -31,6 +32,7 @@ def verdict_parts(report: ReportDocument) -> list[RenderableType]:
     """Verdict, what to do, faults and caveats of a report document."""
     verdict = report["verdict"]
     label, answer = verdict_words(report)
+    words = words_of(report["machine"])
     title = verdict["title"]
     first = verdict_title(verdict["status"], label)
     if answer:
@@ -43,12 +45,12 @@ def verdict_parts(report: ReportDocument) -> list[RenderableType]:
     if verdict["actions"]:
         parts += [section("What to do"), _actions(verdict["actions"], report)]
     if report["intervals"]:
-        parts += [section("Faults"), _faults(report["intervals"])]
+        parts += [section("Faults"), _faults(report["intervals"], words)]
         rest = len(report["intervals"]) - _SHOWN
         if rest > 0:
             parts.append(text(f"… and {rest} more in the report", "dim"))
     if "previous" in report:
-        parts += [section("Compared with another mission of the machine"), *_previous(report["previous"])]
+        parts += [section("Compared with another mission of the machine"), *_previous(report["previous"], words)]
     if verdict["caveats"]:
         parts += [section("Limits of this verdict"), bullets(merged_caveats(verdict["caveats"]))]
     return [*parts, *log_parts(report), ""]
@@ -72,7 +74,7 @@ def _assumed(machine: MachineRow) -> list[RenderableType]:
     ]
 
 
-def _previous(found: PreviousRow) -> list[RenderableType]:
+def _previous(found: PreviousRow, words: MachineWords) -> list[RenderableType]:
     """How many faults became what, and the new and worse ones."""
     mission = found["mission"]
     which = "later" if found["order"] == "later" else "previous"
@@ -80,29 +82,35 @@ def _previous(found: PreviousRow) -> list[RenderableType]:
     parts: list[RenderableType] = [text(f"{headline(found['counts'])} ({which} mission: {logs})")]
     worth_saying = ("new", "worse", "resolved", "not_seen_again")
     named = [c for c in found["faults"] if (c["trend"] or c["status"]) in worth_saying]
-    parts += [bullets([_became(c) for c in named[:_SHOWN]])] if named else []
+    parts += [bullets([_became(c, words) for c in named[:_SHOWN]])] if named else []
     return parts
 
 
-def _became(c: FaultChangeRow) -> str:
-    words = OUTCOMES[c["trend"] or c["status"]]
-    return f"{words}: {part_words(c['kind'], c['component'], c['side'])} {mode_words(c['side'], c['mode'])}"
+def _became(c: FaultChangeRow, words: MachineWords) -> str:
+    outcome = OUTCOMES[c["trend"] or c["status"]]
+    return f"{outcome}: {words.part_words(c['kind'], c['component'], c['side'])} {mode_words(c['side'], c['mode'])}"
 
 
 def _actions(actions: Sequence[ActionRow], report: ReportDocument) -> Table:
     """Each action with its faults, and how sure the tool is of the worst of them."""
     intervals = {i["id"]: i for i in report["intervals"]}
     out = Table.grid(padding=(0, 2, 0, 0))
+    said: dict[str, int] = {}
     for action in actions:
+        lead = action.get("lead", "")
         faults = ", ".join(action["faults"][:_FAULTS_NAMED])
         more = "" if len(action["faults"]) <= _FAULTS_NAMED else ", …"
         out.add_row(
             severity_text(action["severity"], action["n"]),
-            Text.assemble(text(action["text"]), "  ", (faults + more, "dim")),
+            Text.assemble(text(lead, "bold"), text(action["text"].removeprefix(lead)), "  ", (faults + more, "dim")),
         )
         worst = next((intervals[f] for f in action["faults"] if f in intervals), None)
         if worst is not None and (sure := sure_of(worst, report)):
             out.add_row("", text(f"{sure}.", "dim"))
+        if check := action.get("check"):
+            same = said.setdefault(check, action["n"])
+            how = check if same == action["n"] else f"as for {same}."
+            out.add_row("", Text.assemble(text("How to check: ", "bold"), text(how)))
     return out
 
 
@@ -118,13 +126,13 @@ class _Fitting:
         yield next(fitting, self._tables[-1])
 
 
-def _faults(intervals: Sequence[IntervalRow]) -> _Fitting:
+def _faults(intervals: Sequence[IntervalRow], words: MachineWords) -> _Fitting:
     """Table of faults; on a narrow terminal without the saturation, on a narrower one without the bounds of ε."""
     heads = ("", "part", "fault", "time [s]", "ε", "saturation", "p", "severity")
     forms = []
     for left_out, bounds in (((), True), ((_SATURATION,), True), ((_SATURATION,), False)):
         keep = [k for k in range(len(heads)) if k not in left_out]
-        rows = [_fault(i, bounds) for i in intervals[:_SHOWN]]
+        rows = [_fault(i, words, bounds) for i in intervals[:_SHOWN]]
         form = table(
             [heads[k] for k in keep],
             [[row[k] for k in keep] for row in rows],
@@ -136,15 +144,15 @@ def _faults(intervals: Sequence[IntervalRow]) -> _Fitting:
     return _Fitting(forms)
 
 
-def _fault(fault: IntervalRow, bounds: bool) -> tuple[object, ...]:
+def _fault(fault: IntervalRow, words: MachineWords, bounds: bool) -> tuple[object, ...]:
     digits = 2 if fault["stop_s"] - fault["start_s"] >= 0.1 else 3
     return (
         text(fault["id"], "dim"),
-        part_words(fault["kind"], fault["component"], fault["side"]),
+        words.part_words(fault["kind"], fault["component"], fault["side"]),
         mode_text(fault["mode"], label_of(fault).lower()),
         f"{fault['start_s']:.{digits}f}–{fault['stop_s']:.{digits}f}",
         _epsilon(fault["epsilon"], bounds),
-        _sat(fault["sat"]),
+        _sat(fault["sat"], words),
         f"{fault['probability']:.3f}",
         severity_text(fault["severity"]),
     )
@@ -156,8 +164,11 @@ def _epsilon(epsilon: EpsilonRow | None, bounds: bool) -> str:
     return f"{epsilon['value']:.2f}" + (f" ({epsilon['low']:.2f}–{epsilon['high']:.2f})" if bounds else "")
 
 
-def _sat(sat: SatRow | None) -> str:
+def _sat(sat: SatRow | None, words: MachineWords) -> str:
     if sat is None:
         return "–"
+    if sat["unit"] == OPENING:
+        share = f"{100 * sat['mean']:+.1f}"
+        return ("0" if float(share) == 0 else share) + words.percent
     mean, unit = f"{sat['mean']:+.3f}", sat["unit"]
-    return ("0" if float(mean) == 0 else mean) + (f" {unit}" if unit in ("m/s", "rad") else "")
+    return ("0" if float(mean) == 0 else mean) + (f" {unit}" if unit else "")

@@ -11,7 +11,7 @@ from diagnosis.pages.labels import visible
 from diagnosis.report.rows import Row
 from diagnosis.results.document import IntervalRow
 from diagnosis.results.fault_rows import LOOKS, state_label
-from diagnosis.results.vocabulary import part_name
+from diagnosis.results.machine_words import MachineWords
 from replay.faults import FaultMode, State
 
 if TYPE_CHECKING:
@@ -185,7 +185,10 @@ def _shade(figure: go.Figure, plot: Plot, row: Row, number: int) -> None:
 
 
 def timeline_figure(
-    lanes: Iterable[tuple[str, str, str]], spans: Sequence[tuple[str, str, str, float, float, str]], title: str
+    lanes: Iterable[tuple[str, str, str]],
+    spans: Sequence[tuple[str, str, str, float, float, str]],
+    title: str,
+    words: MachineWords,
 ) -> go.Figure:
     """States of every part over the mission, one lane for each side of a component.
 
@@ -197,10 +200,14 @@ def timeline_figure(
         Component, side, state, begin and end [s], and what is said of it.
     title : str
         Heading.
+    words : MachineWords
+        How to speak of the machine.
     """
     import plotly.graph_objects as go
 
-    names = {(component, side): visible(f"{component} {part_name(kind, side)}") for component, kind, side in lanes}
+    names = {
+        (component, side): visible(f"{words.part_words(kind, component, side)}") for component, kind, side in lanes
+    }
     figure = go.Figure()
     for state in dict.fromkeys((*LOOKS, *(span[2] for span in spans))):
         mine = [span for span in spans if span[2] == state and (span[0], span[1]) in names]

@@ -11,8 +11,8 @@ from diagnosis.api.verdict import Verdict, assumed_words
 from diagnosis.pages.labels import bounded, made_visible, sat_text
 from diagnosis.results.document import IntervalRow, ReportDocument
 from diagnosis.results.fault_rows import state_label
+from diagnosis.results.machine_words import MachineWords, words_of
 from diagnosis.results.vocabulary import Verdict as Status
-from diagnosis.results.vocabulary import part_words
 
 if TYPE_CHECKING:
     import jinja2
@@ -31,21 +31,21 @@ def html_of(document: ReportDocument, verdict: Verdict) -> str:
         mission=", ".join(str(file["path"]) for file in log["files"]),
         log=log,
         assumed=assumed_words(report),
-        faults=[_fault(f) for f in report["intervals"][:_SHOWN]],
+        faults=[_fault(f, words_of(report["machine"])) for f in report["intervals"][:_SHOWN]],
         more=max(len(report["intervals"]) - _SHOWN, 0),
     )
 
 
-def _fault(fault: IntervalRow) -> dict[str, str]:
+def _fault(fault: IntervalRow, words: MachineWords) -> dict[str, str]:
     sat, epsilon = fault["sat"], fault["epsilon"]
     return {
         "id": fault["id"],
-        "part": part_words(fault["kind"], fault["component"], fault["side"]),
+        "part": words.part_words(fault["kind"], fault["component"], fault["side"]),
         "mode": state_label(fault["mode"], fault["side"]).lower(),
         "colour": colour_of(fault["mode"]),
         "time": f"{fault['start_s']:.2f} to {fault['stop_s']:.2f}",
         "epsilon": "–" if epsilon is None else bounded(epsilon, 2),
-        "sat": "–" if sat is None else sat_text(sat["mean"], sat["unit"]),
+        "sat": "–" if sat is None else sat_text(sat["mean"], sat["unit"], words),
         "p": f"{fault['probability']:.3f}",
         "severity": fault["severity"],
     }

@@ -12,6 +12,7 @@ from diagnosis.report.judged_parts import kind_of
 from diagnosis.report.plot_rows import fault_rows, loop_groups
 from diagnosis.report.rows import Row, Trace
 from diagnosis.report.units import on_page, unit_of
+from diagnosis.results.machine_words import words_of
 from diagnosis.results.vocabulary import Kind
 from replay.errors import ConfigError
 from replay.faults import Side
@@ -41,7 +42,9 @@ def mission_figure(series: Series, names: Sequence[str], start_s: float | None, 
     if not names:
         return _timeline(series, span)
     machine = series.report["machine"]
-    groups = {g.key: g.rows for g in loop_groups(machine["wheels"], machine["axles"], series.columns)}
+    groups = {
+        g.key: g.rows for g in loop_groups(machine["wheels"], machine["axles"], series.columns, words_of(machine))
+    }
     rows: list[Row] = []
     for name in names:
         if name not in groups and name not in series.columns:
@@ -79,13 +82,13 @@ def fault_figure(series: Series, fault: str, margin_s: float | None) -> go.Figur
         raise ConfigError(f"plot_fault: margin_s = {margin_s:g}: expected 0 s or more")
     one, machine = faults[fault], report["machine"]
     peers = machine["axles"] if one["kind"] == Kind.STEER else machine["wheels"]
-    rows = fault_rows(one, peers, series.columns, report["limits"]["min_probability"])
+    rows = fault_rows(one, peers, series.columns, words_of(machine), report["limits"]["min_probability"])
     if not rows:
         raise ConfigError(f"plot_fault: no time series of {fault} was kept")
     margin = max(0.5, 0.35 * (one["stop_s"] - one["start_s"])) if margin_s is None else margin_s
     near = [f for f in report["intervals"] if f["component"] == one["component"] and f["kind"] == one["kind"]]
     span = (one["start_s"] - margin, one["stop_s"] + margin)
-    return rows_figure(Plot(series, rows, span, f"{fault}: {fault_title(one)}", near, fault))
+    return rows_figure(Plot(series, rows, span, f"{fault}: {fault_title(one, words_of(machine))}", near, fault))
 
 
 def _span(series: Series, start_s: float | None, stop_s: float | None) -> Span:
@@ -107,18 +110,21 @@ def _timeline(series: Series, span: Span) -> go.Figure:
         (s["component"], str(s["side"]), str(s["state"]), s["start_s"], s["stop_s"], s["reason"])
         for s in report["states"]
     ]
+    machine_words = words_of(machine)
     for f in report["intervals"]:
-        words = f"{f['id']}: {fault_title(f)}"
+        words = f"{f['id']}: {fault_title(f, machine_words)}"
         spans += [
             (f["component"], s.value, str(f["mode"]), f["start_s"], f["stop_s"], words) for s in Side(f["side"]).sides
         ]
     used = {(c, s) for c, s, *_ in spans}
-    figure = timeline_figure([lane for lane in lanes if (lane[0], lane[2]) in used], spans, report["verdict"]["title"])
+    figure = timeline_figure(
+        [lane for lane in lanes if (lane[0], lane[2]) in used], spans, report["verdict"]["title"], machine_words
+    )
     figure.update_xaxes(range=list(span))
     return figure
 
 
 def _column_row(series: Series, name: str) -> Row:
     recorded = {s["name"]: s["unit"] for s in series.report["signals"]}
-    unit, scale = on_page(recorded.get(name) or unit_of(name, series.report))
+    unit, scale = on_page(recorded.get(name) or unit_of(name, series.report), words_of(series.report["machine"]))
     return Row(name, name, unit, (Trace(name, name, "measured", scale),))

@@ -21,6 +21,7 @@ from diagnosis.audit.store.folders import holds_report
 from diagnosis.audit.store.keys import Key
 from diagnosis.audit.store.store import FILE_NAME
 from diagnosis.results.document import ReportDocument
+from diagnosis.results.machine_words import words_of
 from replay.atomic_write import atomic_path
 from replay.errors import ConfigError
 
@@ -179,6 +180,7 @@ def _limits(path: Path) -> Limits:
                 for r in report.get("detectability", {}).get("rows", ())
                 if r["for_s"] == _FAULT_S and r["share"] is not None
             },
+            words=words_of(machine),
         )
     except (OSError, ValueError, TypeError, KeyError, AttributeError):
         return Limits()

@@ -146,5 +146,5 @@ def _closed(machine: Machine, repair: Repair) -> tuple[str, ...]:
         start = f.last.result.start_ns
         meant = f.component == repair.component and repair.side in ("", f.side)
         if f.standing and meant and start is not None and start < repair.repaired_ns:
-            out.append(fault_words(f))
+            out.append(fault_words(f, machine.limits.words))
     return tuple(out)

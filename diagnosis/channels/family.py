@@ -28,6 +28,6 @@ class DeadSensors:
             wheel, others = machine.wheels[i], np.delete(v, list(frozen), axis=1)
             parts[wheel, SENSOR] = frozen_sensor(v[:, i], value, others, f"wheel.{wheel}.v", timeline.dt)
             if not mission.logged(f"wheel.{wheel}.u_applied"):
-                why = "the speed sensor is dead for the whole mission"
+                why = "the {wheel.sensor} is dead for the whole mission"
                 parts[wheel, ACTUATOR] = unassessed(timeline.size, State.MASKED, why)
         return Contribution(parts)

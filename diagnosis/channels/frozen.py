@@ -76,9 +76,9 @@ def frozen_sensor(y: Array, value: float, others: Array, name: str, dt: float) -
     p = _SURE if value or _noisy(others, dt) else _LIKELY
     silent = Hypothesis(Side.ACTUATOR.value, FaultMode.NO_SIGNAL.value, 1.0 - p)
     sentences = (
-        f"{name} read {value:.4g} m/s in all {known.size} samples of the mission, while the wheel was commanded to drive and "
-        "other wheels moved.",
-        *(() if p == _SURE else ("A wheel at standstill gives the same reading, so its drive may be dead instead.",)),
+        f"{name} read {value:.4g} {{speed_unit}} in all {known.size} samples of the mission, while the {{wheel}} was commanded to move and "
+        "other {wheels} moved.",
+        *(() if p == _SURE else ("A {wheel} at standstill gives the same reading, so its drive may be dead instead.",)),
     )
     finding = Finding(
         start=start,

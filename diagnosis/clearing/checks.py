@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Sequence
+from dataclasses import replace
 
 from diagnosis.clearing.axles import axle_checks
 from diagnosis.clearing.cells import Cells
 from diagnosis.clearing.wheels import wheel_checks
 from diagnosis.clearing.yaw import yaw_checks
 from diagnosis.results.clearing import Checked
+from diagnosis.results.machine_words import MachineWords
 from diagnosis.results.result import FaultInterval
 from diagnosis.results.vocabulary import Severity
 from replay.control.loop import Replay
@@ -34,9 +36,10 @@ def cells_of(timeline: Timeline, replay: Replay, machine: Machine, faults: Seque
     return Cells(timeline, replay, machine, stated)
 
 
-def checks_of(cells: Cells) -> tuple[Checked, ...]:
+def checks_of(cells: Cells, words: MachineWords) -> tuple[Checked, ...]:
     """Whatever the log allows to ask of each part, whichever evidence judged it: more evidence never hides a fault."""
     clear_at = cells.machine.limits.clear_at
     with warnings.catch_warnings():  # windows without any value
         warnings.simplefilter("ignore", RuntimeWarning)
-        return (*wheel_checks(cells, clear_at), *axle_checks(cells, clear_at), *yaw_checks(cells))
+        found = (*wheel_checks(cells, clear_at), *axle_checks(cells, clear_at), *yaw_checks(cells))
+    return tuple(replace(c, words=words) for c in found)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection
 from dataclasses import dataclass
 
+from diagnosis.results.machine_words import MachineWords
 from diagnosis.results.vocabulary import Kind
 from replay.faults import Side
 from replay.machine.config import Machine
@@ -40,7 +41,7 @@ class Forecast:
     log: tuple[str, ...]
 
 
-def forecast(logged: Collection[str], machine: Machine) -> tuple[Forecast, ...]:
+def forecast(logged: Collection[str], machine: Machine, words: MachineWords) -> tuple[Forecast, ...]:
     """What the signals `logged` can tell of the machine's parts, parts with the same signals together.
 
     Parameters
@@ -49,6 +50,8 @@ def forecast(logged: Collection[str], machine: Machine) -> tuple[Forecast, ...]:
         Names of the signals that were found.
     machine : Machine
         The machine.
+    words : MachineWords
+        How to speak of it.
     """
     speeds = sum(f"wheel.{w}.v" in logged for w in machine.wheels)
     groups: dict[tuple[Kind, Side, bool, str, tuple[str, ...]], list[str]] = {}
@@ -56,74 +59,83 @@ def forecast(logged: Collection[str], machine: Machine) -> tuple[Forecast, ...]:
         for name in names:
             has = {signal.rpartition(".")[2] for signal in logged if signal.startswith(f"{prefix}.{name}.")}
             if kind is Kind.WHEEL:
-                sides = _wheel_sensor(has, speeds), _wheel_valve(has, speeds)
+                sides = _wheel_sensor(has, speeds, words), _wheel_drive(has, speeds, words)
             else:
-                sides = _angle_sensor(has, "imu.yaw_rate" in logged), _steering_valve(has)
+                sides = _angle_sensor(has, "imu.yaw_rate" in logged, words), _steering_drive(has, words)
             for side, found in zip((Side.SENSOR, Side.ACTUATOR), sides, strict=True):
                 groups.setdefault((kind, side, *found), []).append(name)
-    return tuple(Forecast(tuple(who), *key) for key, who in groups.items())
+    return tuple(
+        Forecast(tuple(who), kind, side, told, words.fill(text), more)
+        for (kind, side, told, text, more), who in groups.items()
+    )
 
 
 #: Whether a side is told from the other one, what shows, and what to log.
 _Told = tuple[bool, str, tuple[str, ...]]
 
 
-def _wheel_sensor(has: set[str], speeds: int) -> _Told:
-    more = ("wheel.<W>.v_true",)
+def _wheel_sensor(has: set[str], speeds: int, words: MachineWords) -> _Told:
+    more: tuple[str, ...] = ("wheel.<W>.v_true",)
     if "v" not in has:
         return False, "not judged: no speed is logged", ("wheel.<W>.v",)
     if "v_true" in has:
         return True, "told at any time, against its second measurement", ()
     if not has & {"u", "u_applied"}:
+        if words.drive == "valve":
+            more = ("wheel.<W>.u", *more)
         return (
             False,
-            "only what departs from the commanded speed shows, as a fault of either side",
-            ("wheel.<W>.u", *more),
+            "what departs from the commanded speed or from the other {wheels} shows, a standstill as a fault of either side",
+            more,
         )
     if speeds <= _OTHERS:
-        return False, "too few wheels to compare with: a loss that lasts the whole mission does not show", more
+        return False, "too few {wheels} to compare with: a loss that lasts the whole mission does not show", more
     return (
         False,
-        "a loss shows beside the other wheels, mostly as one of sensor or valve, and not where it is all wheels'",
+        "a loss shows beside the other {wheels}, mostly as one of sensor or {valve}, and not where it is all {wheels}'",
         more,
     )
 
 
-def _wheel_valve(has: set[str], speeds: int) -> _Told:
+def _wheel_drive(has: set[str], speeds: int, words: MachineWords) -> _Told:
     more = ("wheel.<W>.u_applied",)
+    if "u" not in has and words.drive != "valve":
+        if "effort" in has:
+            return False, "whether it is weak is not judged: what effort is healthy is not known", ()
+        return False, "only a standstill under command shows; whether it is weak is not judged", ("wheel.<W>.effort",)
     if "u" not in has:
-        return False, "not judged: no valve command is logged", ("wheel.<W>.u", *more)
+        return False, "not judged: no {valve} command is logged", ("wheel.<W>.u", *more)
     if "u_applied" in has:
         return True, "told at any time, by its opening", ()
     if "v" not in has:
         return False, "not judged: no speed and no opening is logged", ("wheel.<W>.v", *more)
     if speeds <= _OTHERS:
-        return False, "too few wheels to compare with: a loss that lasts the whole mission does not show", more
+        return False, "too few {wheels} to compare with: a loss that lasts the whole mission does not show", more
     return (
         False,
-        "a loss shows beside the other wheels, mostly as one of sensor or valve, and not where it is all wheels'",
+        "a loss shows beside the other {wheels}, mostly as one of sensor or {valve}, and not where it is all {wheels}'",
         more,
     )
 
 
-def _angle_sensor(has: set[str], yaw: bool) -> _Told:
+def _angle_sensor(has: set[str], yaw: bool, words: MachineWords) -> _Told:
     if "phi" not in has:
         return False, "not judged: no angle is logged", ("steer.<A>.phi",)
     if "phi_true" in has:
         return True, "told at any time, against its second measurement", ()
     more = ("steer.<A>.phi_true",) if yaw else ("steer.<A>.phi_true or imu.yaw_rate",)
     if not has & {"u", "u_applied"}:
-        return False, "not judged: no valve command is logged", ("steer.<A>.u", *more)
+        return False, "not judged: no {valve} command is logged", ("steer.<A>.u", *more)
     offset = "an offset shows by the yaw rate" if yaw else "an offset does not show"
-    return False, f"shows while the axle is steered, mostly as one of sensor or valve; {offset}", more
+    return False, f"shows while the axle is steered, mostly as one of sensor or {words.drive}; {offset}", more
 
 
-def _steering_valve(has: set[str]) -> _Told:
+def _steering_drive(has: set[str], words: MachineWords) -> _Told:
     more = ("steer.<A>.u_applied",)
     if "u" not in has:
-        return False, "not judged: no valve command is logged", ("steer.<A>.u", *more)
+        return False, "not judged: no {valve} command is logged", ("steer.<A>.u", *more)
     if "u_applied" in has:
         return True, "told at any time, by its opening", ()
     if "phi" not in has:
         return False, "not judged: no angle and no opening is logged", ("steer.<A>.phi", *more)
-    return False, "shows while the axle is steered, mostly as one of sensor or valve", more
+    return False, "shows while the axle is steered, mostly as one of sensor or {valve}", more

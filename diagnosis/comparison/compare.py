@@ -9,8 +9,10 @@ from diagnosis.comparison.coverage import CoverageChange, coverage_changes, side
 from diagnosis.comparison.faults import FaultChange, found_faults, is_worse, match_faults
 from diagnosis.results.comparison_document import SCHEMA, ComparisonDocument, Outcome
 from diagnosis.results.document import LimitsRow, MachineIdentity, ReportDocument
+from diagnosis.results.machine_words import words_of
 from diagnosis.results.result import to_json
 from diagnosis.results.vocabulary import Verdict
+from diagnosis.results.words_row import WordsRow
 from replay.errors import ConfigError
 
 COUNTED: tuple[Outcome, ...] = ("new", "worse", "other", "better", "not_seen_again", "resolved", "unchanged")
@@ -89,6 +91,8 @@ class Comparison:
         Tracking error and control effort per wheel.
     notes : tuple[str, ...]
         What to bear in mind: order of the missions, settings and versions that differ.
+    words : WordsRow
+        How to speak of the machine, by the newer result.
     """
 
     schema: str
@@ -100,6 +104,7 @@ class Comparison:
     coverage: tuple[CoverageChange, ...]
     metrics: tuple[MetricChange, ...]
     notes: tuple[str, ...]
+    words: WordsRow
 
 
 def compare_reports(
@@ -139,6 +144,7 @@ def compare_reports(
         coverage=coverage_changes(had, has, axles),
         metrics=_metrics(older, newer),
         notes=tuple(_notes(older, newer, a, b, difference)),
+        words=words_of(newer["machine"]).row(),
     )
 
 

@@ -22,7 +22,8 @@ from diagnosis.results.comparison_document import (
     SideCoverageRow,
 )
 from diagnosis.results.fault_rows import state_label
-from diagnosis.results.vocabulary import Tier, part_words
+from diagnosis.results.machine_words import MachineWords, words_of
+from diagnosis.results.vocabulary import Tier
 
 #: What a template is filled with.
 Context = dict[str, object]
@@ -51,9 +52,9 @@ def build_compare_page(document: ComparisonDocument) -> str:
         From `diagnosis.comparison.compare.comparison_json`.
     """
     document = labels.made_visible(document)
-    groups = []
+    groups, machine_words = [], words_of(document)
     for outcome, words in OUTCOMES.items():
-        rows = [_row(c) for c in document["faults"] if (c["trend"] or c["status"]) == outcome]
+        rows = [_row(c, machine_words) for c in document["faults"] if (c["trend"] or c["status"]) == outcome]
         groups.append({"outcome": outcome, "words": words[0].upper() + words[1:], "sign": SIGNS[outcome], "rows": rows})
     context: Context = {
         "title": f"{document['older']['name']} and {document['newer']['name']}",
@@ -63,9 +64,10 @@ def build_compare_page(document: ComparisonDocument) -> str:
         "headline": headline(document["counts"]),
         "missions": [_mission("older", document["older"]), _mission("newer", document["newer"])],
         "groups": groups,
-        "coverage": [_coverage(c) for c in document["coverage"]],
+        "coverage": [_coverage(c, machine_words) for c in document["coverage"]],
         "metrics": [_metric(m) for m in document["metrics"]],
         "notes": document["notes"],
+        "machine_words": machine_words,
         "definitions": _DEFINITIONS,
     }
     return _environment().get_template("compare.html.j2").render(context)
@@ -94,11 +96,11 @@ def _mission(word: str, m: ComparedMissionRow) -> Context:
     }
 
 
-def _row(c: FaultChangeRow) -> Context:
+def _row(c: FaultChangeRow, words: MachineWords) -> Context:
     found = [f for f in (c["older"], c["newer"]) if f is not None]
     rows = {f["mode"]: (f["mode"], state_label(f["mode"], f["side"])) for f in found}
     return {
-        "part": part_words(c["kind"], c["component"], c["side"]),
+        "part": words.part_words(c["kind"], c["component"], c["side"]),
         "rows": list(rows.values()),
         "older": _found(c["older"]),
         "newer": _found(c["newer"]),
@@ -124,9 +126,9 @@ def _few(ids: Sequence[str]) -> list[str]:
     return [*ids[:4], "…"] if len(ids) > 4 else list(ids)
 
 
-def _coverage(c: CoverageChangeRow) -> Context:
+def _coverage(c: CoverageChangeRow, words: MachineWords) -> Context:
     return {
-        "part": part_words(c["kind"], c["component"], c["side"]),
+        "part": words.part_words(c["kind"], c["component"], c["side"]),
         "change": c["change"],
         "words": coverage_words(c),
         "older": _judged(c["older"]),
@@ -148,7 +150,7 @@ def _metric(m: MetricChangeRow) -> Context:
         (m["control_effort_older"], m["control_effort_newer"]),
     )
     cells: list[str] = []
-    for a, b in pairs:
+    for (a, b), scale, digits in zip(pairs, (1.0, 100.0), (3, 1), strict=True):
         change = f"{round(100 * (b / a - 1)):+d} %".replace("-", "−") if a and b is not None else ""
-        cells += ["–" if a is None else f"{a:.3f}", "–" if b is None else f"{b:.3f}", change]
+        cells += [*("–" if x is None else f"{scale * x:.{digits}f}" for x in (a, b)), change]
     return {"wheel": m["wheel"], "cells": cells}

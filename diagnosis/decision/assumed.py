@@ -10,7 +10,8 @@ _WORDS: Mapping[str, Callable[[Machine], str]] = {
     "geometry": lambda m: _geometry(m),
     "gear_ratio": lambda m: f"gear ratio {m.gear_ratio:g}",
     "max_speed": lambda m: (
-        f"top speed {m.max_speed:g} m/s, and with it the limits: a wheel drives above {m.limits.driving_speed:.3g} m/s"
+        f"top speed {m.max_speed:g} {m.speed_unit}, and with it the limits: a {m.part} is driven above "
+        f"{m.limits.driving_speed:.3g} {m.speed_unit}"
     ),
     "max_steer": lambda m: f"largest steering angle {m.max_steer:.3g} rad",
     "flow": lambda m: f"pump flow for {m.plant.flow:g} m/s over all wheels",

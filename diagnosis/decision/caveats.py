@@ -12,8 +12,9 @@ from diagnosis.results.assessed import needed_s
 from diagnosis.results.assessment import STATES, Assessment
 from diagnosis.results.clearing import Checked
 from diagnosis.results.left_out import is_left_out
+from diagnosis.results.machine_words import HYDRAULIC, MachineWords
 from diagnosis.results.result import FaultInterval
-from diagnosis.results.vocabulary import Kind, Tier, part_words
+from diagnosis.results.vocabulary import Kind, Tier
 from replay.faults import DECIDED, State
 from replay.machine.config import Limits, Machine
 from replay.mission import Mission
@@ -47,6 +48,8 @@ class Reservations:
         Why what was judged is not the whole mission.
     events : tuple[str, ...]
         What happened to the machine as a whole.
+    words : MachineWords
+        How to speak of the machine.
     """
 
     short: tuple[Part, ...] = ()
@@ -56,11 +59,14 @@ class Reservations:
     open: tuple[Checked, ...] = ()
     scope: tuple[str, ...] = ()
     events: tuple[str, ...] = ()
+    words: MachineWords = HYDRAULIC
 
 
 def doubt_of(watch: Sequence[FaultInterval], against: Reservations) -> str:
     """Why a mission with faults to watch is not cleared; empty where it is."""
-    out = [f"the {part_words(f.kind, f.component, f.side)} may not answer" for f in watch if unanswered(f)]
+    out = [
+        f"the {against.words.part_words(f.kind, f.component, f.side)} may not answer" for f in watch if unanswered(f)
+    ]
     out = list(dict.fromkeys(out))
     if against.damage:
         out.append("part of the log was left out" if is_left_out(against.damage[0]) else "the log is damaged")
@@ -108,17 +114,17 @@ def caveats_of(
         said = "" if is_left_out(damage[0]) else "The log is damaged: "
         out.append(f"{said}{damage[0]}" + (f" (and {len(damage) - 1} more)" if len(damage) > 1 else ""))
     if not short_named:
-        out += _too_short(against.short, assessments, decided_s, driven, limits)
-    out += _most_open(against.short, assessments, decided_s, driven, axles)
+        out += _too_short(against, assessments, decided_s, driven, limits)
+    out += _most_open(against, assessments, decided_s, driven, axles)
     unjudged = [k for k in assessments if k[0] in axles and assessments[k].tier is Tier.NONE]
     if unjudged:
-        who = join_words([part_words(Kind.STEER, *k) for k in unjudged])
+        who = join_words([against.words.part_words(Kind.STEER, *k) for k in unjudged])
         out.append(f"Not assessed: {who} ({_main_reason(assessments[unjudged[0]])}).")
     return tuple(out)
 
 
 def _too_short(
-    short: Sequence[Part],
+    against: Reservations,
     assessments: Mapping[Part, Assessment],
     decided_s: Mapping[Part, float],
     driven: Mapping[Part, float],
@@ -127,20 +133,20 @@ def _too_short(
     """Sentences on parts that were not judged long enough: one for all that nothing was said of for the same reason."""
     silent: dict[str, list[Part]] = {}
     out = []
-    for key in short:
+    words = against.words
+    for key in against.short:
         reason = _why_short(assessments[key], driven.get(key), limits)
         if decided_s.get(key, 0.0) < _SAID_S:
             silent.setdefault(reason, []).append(key)
             continue
         out.append(
-            f"{part_words(Kind.WHEEL, *key)}: judged for {decided_s[key]:.1f} s of driving, of "
+            f"{words.part_words(Kind.WHEEL, *key)}: judged for {decided_s[key]:.1f} s of {words.moving}, of "
             f"{needed_s(driven.get(key, 0.0), limits.min_assessed):.3g} s needed"
             + (f" ({reason})" if reason else "")
             + "."
         )
     for reason, parts in silent.items():
-        who = join_words([part_words(Kind.WHEEL, *key) for key in parts])
-        out.append(f"Not judged: {who}" + (f" ({reason})" if reason else "") + ".")
+        out.append(f"Not judged: {words.listed(Kind.WHEEL, parts)}" + (f" ({reason})" if reason else "") + ".")
     return out
 
 
@@ -161,7 +167,7 @@ def limits_of(limits: Limits) -> tuple[str, ...]:
 
 
 def _most_open(
-    short: Sequence[Part],
+    against: Reservations,
     assessments: Mapping[Part, Assessment],
     decided_s: Mapping[Part, float],
     driven: Mapping[Part, float],
@@ -171,16 +177,16 @@ def _most_open(
     open_s = {
         k: driven[k] - decided_s.get(k, 0.0)
         for k in assessments
-        if k in driven and k not in short and k[0] not in axles
+        if k in driven and k not in against.short and k[0] not in axles
     }
     most = max(open_s, key=lambda k: open_s[k], default=None)
     if most is None or open_s[most] <= max(_OPEN_S, _OPEN_SHARE * driven[most]):
         return []
     reason = _main_reason(assessments[most])
     return [
-        f"{part_words(Kind.WHEEL, *most)}: {open_s[most]:.1f} s of {driven[most]:.1f} s of driving could not be judged"
+        f"{against.words.part_words(Kind.WHEEL, *most)}: {open_s[most]:.1f} s of {driven[most]:.1f} s of {against.words.moving} could not be judged"
         + (f" ({reason})" if reason else "")
-        + f"; this is the most of all parts{' judged long enough' if short else ''}."
+        + f"; this is the most of all parts{' judged long enough' if against.short else ''}."
         " The timeline shows when."
     ]
 
@@ -188,7 +194,7 @@ def _most_open(
 def _why_short(assessment: Assessment, driven: float | None, limits: Limits) -> str:
     """Why a part was not judged long enough; a machine at rest is no reason while it drives."""
     if driven is not None and driven < limits.min_assessed and assessment.tier is not Tier.NONE:
-        return f"they were driven for less than {limits.min_assessed:g} s"
+        return f"driven for less than {limits.min_assessed:g} s"
     return _main_reason(assessment)
 
 
@@ -216,7 +222,7 @@ def more_caveats(mission: Mission, first_ns: int, machine: Machine) -> list[str]
         )
     empty = _without_speed(mission.timeline, machine)
     if empty > _EMPTY_S:
-        out.append(f"No wheel speed was recorded for {empty:.1f} s. That time is not assessed.")
+        out.append(f"No speed of any {machine.part} was recorded for {empty:.1f} s. That time is not assessed.")
     absent = [name for name in machine.signals if name not in mission.signals.items]
     if absent:
         reason = mission.signals.missing.get(absent[0], "")

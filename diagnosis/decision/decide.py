@@ -12,8 +12,9 @@ from diagnosis.results.assessment import Assessment
 from diagnosis.results.clearing import Check, Checked
 from diagnosis.results.document import ActionRow, VerdictRow
 from diagnosis.results.left_out import only_left_out
+from diagnosis.results.machine_words import MachineWords
 from diagnosis.results.result import FaultInterval
-from diagnosis.results.vocabulary import Kind, Severity, Tier, Verdict, part_words
+from diagnosis.results.vocabulary import Kind, Severity, Tier, Verdict
 from diagnosis.results.wheel_model import RESOLUTION, WheelModelFit
 from replay.faults import Side, State
 from replay.machine.config import Limits
@@ -80,6 +81,7 @@ def decide(
     axles: Sequence[str],
     limits: Limits,
     damage: Sequence[str],
+    words: MachineWords,
     *,
     driving_s: Mapping[Part, float] | None = None,
     model: WheelModelFit | None = None,
@@ -109,6 +111,8 @@ def decide(
         What ``ready`` needs.
     damage : Sequence[str]
         What the log lost.
+    words : MachineWords
+        How to speak of the machine.
     driving_s : Mapping or None
         Seconds of driving of the component; None: only `min_assessed` counts.
     model : WheelModelFit or None
@@ -122,22 +126,26 @@ def decide(
     """
     driven = driving_s or {}
     against = _reservations(assessments, decided_s, driven, axles, limits, damage, model)
-    against = replace(against, open=tuple(c for c in checks if not c.passed), scope=tuple(scope), events=tuple(events))
+    against = replace(
+        against, words=words, open=tuple(c for c in checks if not c.passed), scope=tuple(scope), events=tuple(events)
+    )
     found = _with_faults(intervals, against) or _without_faults(assessments, decided_s, axles, against)
     said = found.title == _SENSORS_ALONE  # which parts are not judged, and why
     caveats = caveats_of(against, assessments, decided_s, driven, axles, limits, short_named=said)
     if _modelled(assessments) and model is not None and model.identified:
         caveats += (
-            "Speed sensors and valves without a second measurement were judged by a wheel model identified from this "
-            f"mission. It mostly does not name a sensor's loss below about {100 * RESOLUTION[Side.SENSOR]:.0f} % or a valve's below "
-            f"about {100 * RESOLUTION[Side.ACTUATOR]:.0f} %, nor a loss that lasts the whole mission on every wheel. A second "
+            words.fill(
+                "Sensors and {valve}s without a second measurement were judged by a {wheel} model identified from this mission. "
+            )
+            + f" It mostly does not name a sensor's loss below about {100 * RESOLUTION[Side.SENSOR]:.0f} % or a {words.drive}'s below "
+            f"about {100 * RESOLUTION[Side.ACTUATOR]:.0f} %, nor a loss that lasts the whole mission on every {words.part}. A second "
             "measurement would show them; a machine file with [plant] shows the last.",
         )
     caveats += limits_of(limits)
     if any(_offset_hidden(checks, axle) for axle in axles):
         caveats += (_NO_YAW,)
     caveats = tuple(c for c in caveats if c != found.text)
-    return replace(found, scope=tuple(scope), caveats=caveats, actions=actions_of(intervals))
+    return replace(found, scope=tuple(scope), caveats=caveats, actions=actions_of(intervals, words))
 
 
 def _offset_hidden(checks: Sequence[Checked], axle: str) -> bool:
@@ -177,10 +185,10 @@ def _with_faults(intervals: Sequence[FaultInterval], against: Reservations) -> D
     watch = [f for f in intervals if f.severity in (Severity.MEDIUM, Severity.LOW)]
     if stop:
         title = f"{count_words(len(stop), 'fault')} to repair" + (f", {len(watch)} to watch" if watch else "")
-        return Decision(Verdict.STOP, title, sentence_of(stop))
+        return Decision(Verdict.STOP, title, sentence_of(stop, against.words))
     if watch:
         title, doubt = f"{count_words(len(watch), 'fault')} to watch", doubt_of(watch, against)
-        return Decision(Verdict.WATCH, title, sentence_of(watch), cleared=not doubt, not_cleared=doubt)
+        return Decision(Verdict.WATCH, title, sentence_of(watch, against.words), cleared=not doubt, not_cleared=doubt)
     return None
 
 
@@ -196,21 +204,24 @@ def _without_faults(
     if against.short and (seen := _sensors_alone(assessments, decided_s, axles, against)):
         return Decision(Verdict.NOT_ASSESSED, _SENSORS_ALONE, seen)
     if against.short:
-        who = join_words(sorted({part_words(Kind.WHEEL, c, s) for c, s in against.short}))
+        who = against.words.listed(Kind.WHEEL, against.short)
         text = f"No fault was found, but {who} could not be judged long enough to be called healthy."
         return Decision(Verdict.NOT_ASSESSED, "Not judged long enough", text)
     if against.unexplained:
-        who = join_words(sorted({part_words(Kind.WHEEL, c, Side.SENSOR_OR_ACTUATOR) for c, _ in against.unexplained}))
+        who = join_words(
+            sorted({against.words.part_words(Kind.WHEEL, c, Side.SENSOR_OR_ACTUATOR) for c, _ in against.unexplained})
+        )
         most = max(assessments[part].unexplained_s for part in against.unexplained)
         text = (
             f"No fault was identified, but no single fault explains the residual of the {who} for up to {seconds_words(most)}. "
-            "Inspect these parts, or add a second measurement of speed or valve position."
+            "Inspect these parts, or add a second measurement of the speed"
+            + (" or valve position." if against.words.drive == "valve" else ".")
         )
         return Decision(Verdict.NOT_ASSESSED, "Unexplained residuals", text)
     if against.not_compared:
         text = (
-            "No fault was found, but the wheel model was identified from this mission alone. It does not show a loss that "
-            "lasts the whole mission. Give K and tau of the wheels in [plant] of a machine file."
+            f"No fault was found, but the {against.words.part} model was identified from this mission alone. It does not show a loss "
+            f"that lasts the whole mission. Give K and tau of the {against.words.parts} in [plant] of a machine file."
         )
         return Decision(Verdict.NOT_ASSESSED, "No fault found, not fully assessed", text)
     if against.damage:
@@ -225,7 +236,9 @@ def _without_faults(
         text = f"No fault was identified, but this mission does not exclude one: {open_words(against.open)}."
         return Decision(Verdict.NOT_ASSESSED, "No fault found, not cleared", text)
     least = min((decided_s[part] for part in assessments if part[0] not in axles), default=0.0)
-    text = f"Every wheel's speed sensor and drive valve was judged healthy over at least {least:.0f} s of driving."
+    text = against.words.fill(
+        f"The {{wheel.sensor}} and the {{wheel.actuator}} of every {{wheel}} were judged healthy over at least {least:.0f} s of {{moving}}."
+    )
     return Decision(Verdict.READY, "No fault found", text, cleared=True)
 
 
@@ -240,6 +253,8 @@ def _sensors_alone(
     who = f"the drive of {drives[0]} is" if len(drives) == 1 else f"the drives of {join_words(drives)} are"
     why = assessments[against.short[0]].reasons.get(State.NOT_ASSESSED, "")
     return (
-        f"The speed sensors were judged over at least {least:.0f} s of driving and no fault was seen in them. Whether "
-        f"{who} weak was not judged: {why}."
+        against.words.fill(
+            f"The {{wheel.sensor}}s were judged over at least {least:.0f} s of {{moving}} and no fault was seen in them."
+        )
+        + f" Whether {who} weak was not judged: {why}."
     )

@@ -2,31 +2,33 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
 
+from diagnosis.decision.advice import check_of
 from diagnosis.decision.severity import severity_of
 from diagnosis.results.assessment import STATES, Assessment
+from diagnosis.results.machine_words import MachineWords
 from diagnosis.results.result import FaultInterval, StateSpan
 from diagnosis.results.vocabulary import Kind
-from replay.machine.config import Limits
+from replay.machine.config import Machine
 
 #: A component and its side.
 Part = tuple[str, str]
 
 
 def intervals_of(
-    assessments: Mapping[Part, Assessment], axles: Sequence[str], start_ns: int, step_ns: int, limits: Limits
+    assessments: Mapping[Part, Assessment], machine: Machine, words: MachineWords, start_ns: int, step_ns: int
 ) -> tuple[FaultInterval, ...]:
     """Number the findings of all components: worst first, then by time; a shared finding counts once."""
     found: dict[tuple[str, str, int, int], FaultInterval] = {}
     for (component, _), assessment in assessments.items():
-        kind = Kind.STEER if component in axles else Kind.WHEEL
+        kind = Kind.STEER if component in machine.axles else Kind.WHEEL
         for f in assessment.findings:
             seconds = (f.stop - f.start) * step_ns * 1e-9
-            severity, advice = severity_of(f, seconds, limits, kind)
+            severity, advice = severity_of(f, seconds, machine.limits, words, kind)
             found[component, f.side, f.start, f.stop] = FaultInterval(
                 id="",
                 component=component,
@@ -43,6 +45,7 @@ def intervals_of(
                 hypotheses=f.hypotheses,
                 severity=severity,
                 advice=advice,
+                check=check_of(kind, component, f.side, f.mode, words, machine.advice),
                 evidence=f.evidence,
                 tier=f.tier,
                 detected_s=None if f.detected is None else f.detected * step_ns * 1e-9,

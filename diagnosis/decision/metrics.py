@@ -132,9 +132,18 @@ def _mean_speed(v_ref: Array, v: Array) -> Array:
     return np.where(count > 0, np.nansum(speeds, axis=1) / np.maximum(count, 1), np.nan)
 
 
+def _fastest(v_ref: Array) -> Array:
+    """Largest commanded speed of any joint; NaN where none is commanded."""
+    size = np.abs(v_ref)
+    return np.where(np.isfinite(size).any(axis=1), np.nanmax(np.where(np.isfinite(size), size, 0.0), axis=1), np.nan)
+
+
 def phases(timeline: Timeline, replay: Replay, machine: Machine) -> list[PhaseRow]:
-    """Forward, reverse, standstill and turning by the command, or unknown; pieces below 0.5 s join the one before."""
-    v, omega = body_motion(timeline, replay, machine)
+    """Forward, reverse, standstill and turning by the command, or unknown, of joints moving and standstill; pieces below 0.5 s join the one before."""
+    if machine.part == "joint":
+        v, omega = timeline.map(_fastest, replay.v_ref), np.broadcast_to(0.0, (timeline.size,))
+    else:
+        v, omega = body_motion(timeline, replay, machine)
     limit = machine.limits.driving_speed / 2
     half = 1.0 if machine.geometry is None else max(abs(w.x) for w in machine.geometry.wheels.values())
 
@@ -145,7 +154,7 @@ def phases(timeline: Timeline, replay: Replay, machine: Machine) -> list[PhaseRo
         return np.where(unknown, 4, np.where((code > 0) & turning, 3, code)).astype(np.int8)
 
     code = timeline.map(coded, v, omega)
-    names = ("standstill", "forward", "reverse", "turning", "unknown")
+    names = ("standstill", "moving" if machine.part == "joint" else "forward", "reverse", "turning", "unknown")
     cut = np.flatnonzero(np.r_[True, code[1:] != code[:-1]])
     out: list[PhaseRow] = []
     for a, b in zip(cut, np.r_[cut[1:], code.size], strict=True):

@@ -9,15 +9,15 @@ from pathlib import PurePath
 import numpy as np
 
 from diagnosis.channels.noise import rounding_step
-from diagnosis.decision.missing import cost_of_missing
+from diagnosis.decision.missing import applies, cost_of_missing
 from diagnosis.results.assessment import Assessment
 from diagnosis.results.document import ClockRow, MissingRow, QualityRow, SignalRow
 from diagnosis.results.left_out import is_left_out
+from diagnosis.results.machine_words import MachineWords
 from diagnosis.results.wheel_model import WheelModelFit
 from replay.arrays.blocks import blocks, release
 from replay.clocks.source_clock import SourceClock
 from replay.machine.config import Machine
-from replay.machine.signal_table import signal_of
 from replay.signals.signal import Signal, Signals
 from replay.signals.timeline import Timeline
 
@@ -46,14 +46,14 @@ class Recorded:
     last_ns: int = 0
 
 
-def recorded(signals: Signals, timeline: Timeline) -> Recorded:
+def recorded(signals: Signals, timeline: Timeline, words: MachineWords) -> Recorded:
     """Look through the samples of all signals."""
     first = min((int(s.stamps[0]) for n, s in signals.items.items() if n.startswith("wheel.")), default=0)
     last = max((int(s.stamps[-1]) for n, s in signals.items.items() if n.startswith("wheel.")), default=0)
-    return Recorded(signal_rows(signals, timeline), _jitter_ms(signals, timeline), first, last)
+    return Recorded(signal_rows(signals, timeline, words), _jitter_ms(signals, timeline), first, last)
 
 
-def signal_rows(signals: Signals, timeline: Timeline) -> list[SignalRow]:
+def signal_rows(signals: Signals, timeline: Timeline, words: MachineWords) -> list[SignalRow]:
     """One row per mapped signal: origin, rate, gaps, missing share, rounding step."""
     rows: list[SignalRow] = []
     for name, signal in signals.items.items():
@@ -66,7 +66,7 @@ def signal_rows(signals: Signals, timeline: Timeline) -> list[SignalRow]:
             {
                 "name": name,
                 "channel": signal.origin.label,
-                "unit": signal_of(name).shown_unit,
+                "unit": words.unit_of(name),
                 "recorded_unit": signal.origin.unit,
                 "rate_hz": 1e9 / period if period else None,
                 "samples": int(signal.stamps.size),
@@ -94,10 +94,10 @@ def _gaps(signal: Signal, period: int) -> tuple[int, float]:
     return count, longest * 1e-9
 
 
-def missing_rows(signals: Signals, machine: Machine) -> list[MissingRow]:
+def missing_rows(signals: Signals, machine: Machine, words: MachineWords) -> list[MissingRow]:
     """Signals that would sharpen the diagnosis and are not in the log, with what that costs."""
-    names = (name for name in machine.canonical_signals() if name not in signals.items)
-    return [{"name": name, "cost": cost_of_missing(name)} for name in names]
+    names = (name for name in machine.canonical_signals() if name not in signals.items and applies(name, words))
+    return [{"name": name, "cost": cost_of_missing(name, words)} for name in names]
 
 
 def checks(
@@ -108,6 +108,7 @@ def checks(
     notes: Sequence[str],
     assessments: Mapping[tuple[str, str], Assessment],
     model: WheelModelFit | None,
+    words: MachineWords,
     clocks: Sequence[SourceClock] = (),
 ) -> list[QualityRow]:
     """Checks of the data with their effect on the verdict."""
@@ -122,7 +123,7 @@ def checks(
         ),
         _gap_check(found.rows),
         *_guessed(signals),
-        *_wheel_model(model),
+        *_wheel_model(model, words),
         *(_row("Clock", clock.sentence, *_effect_of(clock)) for clock in clocks if clock.sentence),
         *_notes((*signals.notes, *timeline.notes, *notes), clocks),
         *(_row("Evidence", text) for text in dict.fromkeys(note for a in assessments.values() for note in a.notes)),
@@ -183,11 +184,11 @@ def _guessed(signals: Signals) -> list[QualityRow]:
     ]
 
 
-def _wheel_model(model: WheelModelFit | None) -> list[QualityRow]:
+def _wheel_model(model: WheelModelFit | None, words: MachineWords) -> list[QualityRow]:
     if model is None:
         return []
-    effect = "none" if model.reliable else "gains and valves are not assessed"
-    return [_row("Wheel model", model.note, effect, model.reliable)]
+    effect = "none" if model.reliable else "gains and drives are not assessed"
+    return [_row(f"{words.part.capitalize()} model", model.note, effect, model.reliable)]
 
 
 def _notes(texts: Iterable[str], clocks: Sequence[SourceClock]) -> list[QualityRow]:

@@ -15,7 +15,7 @@ from __future__ import annotations
 from collections.abc import Container
 
 from diagnosis.results.assessment import Finding
-from diagnosis.results.fault_rows import row_of
+from diagnosis.results.machine_words import MachineWords
 from diagnosis.results.vocabulary import Kind, Severity, Tier
 from replay.faults import TOTAL, FaultMode, Side
 from replay.machine.config import Limits
@@ -27,7 +27,9 @@ _LOST = 0.9  # ε̂ from which on so little is left that the part is as good as 
 _PROBABLY_TOTAL = 0.75  # that the named side is stuck or without signal, from which on the machine is stopped
 
 
-def severity_of(finding: Finding, seconds: float, limits: Limits, kind: Kind = Kind.WHEEL) -> tuple[Severity, str]:
+def severity_of(
+    finding: Finding, seconds: float, limits: Limits, words: MachineWords, kind: Kind = Kind.WHEEL
+) -> tuple[Severity, str]:
     """Severity and advice of one fault that lasts `seconds`; see the module's docstring."""
     faulty = 1.0 - sum(h.p for h in finding.hypotheses if h.mode == "healthy")
     if faulty < _LIKELY:
@@ -35,27 +37,33 @@ def severity_of(finding: Finding, seconds: float, limits: Limits, kind: Kind = K
     total = finding.mode.total or _at_risk(finding) >= _PROBABLY_TOTAL
     if faulty < limits.min_probability:
         if total and finding.side is not Side.SENSOR:
-            return Severity.MEDIUM, "Probably a valve that does not answer: check it before the machine goes out again."
+            return Severity.MEDIUM, words.fill(
+                "Probably a {valve} that does not answer: check it before the machine goes out again."
+            )
         return Severity.LOW, "Probable, not certain: check it at the next service, and compare with the next mission."
     if finding.mode.varying and finding.tier is Tier.MODEL and seconds < _SHORT_NOISE_S:
         return Severity.INFO, "Too short to act on, and shown by a model alone. Compare with the next mission."
     if total:
-        return _severity_of_total(finding, seconds, limits, kind)
+        return _severity_of_total(finding, seconds, limits, words, kind)
     marked = finding.epsilon is not None and finding.epsilon.value >= _MARKED_EPSILON
     if finding.mode is FaultMode.OUTSIDE_TABLE:
         return (
             Severity.MEDIUM,
             "Check scaling and sign of the channel: no fault of the tables gives such a gain.",
         )
-    return Severity.MEDIUM if marked else Severity.LOW, f"This alone is no reason to stop; {_check_of(finding, kind)}."
+    return Severity.MEDIUM if marked else Severity.LOW, "This alone is no reason to stop; check it before it grows."
 
 
-def _severity_of_total(finding: Finding, seconds: float, limits: Limits, kind: Kind) -> tuple[Severity, str]:
+def _severity_of_total(
+    finding: Finding, seconds: float, limits: Limits, words: MachineWords, kind: Kind
+) -> tuple[Severity, str]:
     """Severity and advice of a part that is stuck or without signal, with enough probability of a fault."""
     if _of_named_side(finding) < limits.min_probability:
         return (
             Severity.MEDIUM,
-            "Faulty, but which part is not certain enough to stop for: check sensor and valve before the next mission.",
+            words.fill(
+                "Faulty, but which part is not certain enough to stop for: check sensor and {valve} before the next mission."
+            ),
         )
     if _at_risk(finding) < _PROBABLY_TOTAL:
         return (
@@ -63,9 +71,11 @@ def _severity_of_total(finding: Finding, seconds: float, limits: Limits, kind: K
             "Faulty, but probably neither stuck nor without signal: check it before the next mission.",
         )
     if finding.side is Side.ACTUATOR:
-        return Severity.HIGH, "Stop at once and repair: the valve does not answer its command (Assumption 2)."
+        return Severity.HIGH, words.fill(
+            "Stop at once and repair: the {valve} does not answer its command (Assumption 2)."
+        )
     if finding.side is Side.SENSOR_OR_ACTUATOR:
-        part = "steering valve" if kind is Kind.STEER else "drive"
+        part = words.part_name(kind, Side.ACTUATOR)
         return (
             Severity.HIGH,
             f"Stop and find out whether the {part} or its sensor fails; treat it as the {part} until then.",
@@ -93,12 +103,3 @@ def _of_named_side(finding: Finding, modes: Container[str] | None = None) -> flo
     named = [h for h in finding.hypotheses if h.mode != "healthy" and (modes is None or h.mode in modes)]
     either = finding.side is Side.SENSOR_OR_ACTUATOR
     return sum(h.p for h in named if either or h.side == finding.side.value)
-
-
-def _check_of(finding: Finding, kind: Kind) -> str:
-    """What to check at a part that fails in a way that is no reason to stop."""
-    if finding.side is Side.SENSOR_OR_ACTUATOR:
-        return f"measure {'angle' if kind is Kind.STEER else 'speed'} and valve travel to distinguish sensor and valve"
-    row = row_of(finding.side, finding.mode)
-    found = "" if row is None else (kind is Kind.STEER and row.check_steer) or row.check
-    return f"check the {found or ('sensor' if finding.side is Side.SENSOR else 'valve')}"

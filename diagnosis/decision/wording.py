@@ -7,31 +7,35 @@ from collections.abc import Sequence
 from diagnosis.results.candidates import candidates, unclear_words
 from diagnosis.results.document import ActionRow
 from diagnosis.results.fault_rows import mode_words
+from diagnosis.results.machine_words import MachineWords
 from diagnosis.results.result import FaultInterval
-from diagnosis.results.vocabulary import Severity, part_words
+from diagnosis.results.vocabulary import Severity
 from replay.faults import Side
 
 
-def actions_of(intervals: Sequence[FaultInterval]) -> tuple[ActionRow, ...]:
-    """One action per component and side: valves to stop at once for, then other stops, then the rest, worst first."""
+def actions_of(intervals: Sequence[FaultInterval], words: MachineWords) -> tuple[ActionRow, ...]:
+    """One action per component and side: drives to stop at once for, then other stops, then the rest, worst first."""
     parts: dict[tuple[str, str], list[FaultInterval]] = {}
     for f in intervals:
         if f.severity is not Severity.INFO:
             parts.setdefault((f.component, f.side), []).append(f)
     ordered = sorted(parts.values(), key=lambda faults: _urgency(faults[0]))
-    return tuple(_action(n, faults) for n, faults in enumerate(ordered, 1))
+    return tuple(_action(n, faults, words) for n, faults in enumerate(ordered, 1))
 
 
-def _action(n: int, faults: Sequence[FaultInterval]) -> ActionRow:
+def _action(n: int, faults: Sequence[FaultInterval], words: MachineWords) -> ActionRow:
     """What to do about one part, with its faults worst first."""
     worst = faults[0]
     kinds: dict[str, list[FaultInterval]] = {}
     for f in faults:
         kinds.setdefault(fault_words(f), []).append(f)
-    found = join_words([_how_long(words, same) for words, same in kinds.items()])
+    found = join_words([_how_long(kind, same) for kind, same in kinds.items()])
+    lead = f"{_order(worst)} the {words.part_words(worst.kind, worst.component, worst.side)}"
     return {
         "n": n,
-        "text": f"{_order(worst)} the {part_words(worst.kind, worst.component, worst.side)}: {found}.",
+        "text": f"{lead}: {found}.",
+        "lead": lead,
+        "check": worst.check,
         "faults": [f.id for f in faults],
         "severity": worst.severity,
     }
@@ -47,7 +51,7 @@ def _order(worst: FaultInterval) -> str:
 
 
 def unanswered(fault: FaultInterval) -> bool:
-    """Whether a valve probably does not answer, though that is not certain enough to stop for."""
+    """Whether a drive probably does not answer, though that is not certain enough to stop for."""
     return fault.severity is Severity.MEDIUM and fault.mode.total and fault.side is not Side.SENSOR
 
 
@@ -70,14 +74,14 @@ def _how_long(words: str, faults: Sequence[FaultInterval]) -> str:
     return f"{words} for {total}" + ("" if len(faults) == 1 else f" in {len(faults)} intervals")
 
 
-def sentence_of(faults: Sequence[FaultInterval]) -> str:
+def sentence_of(faults: Sequence[FaultInterval], words: MachineWords) -> str:
     """The worst three faults in one sentence."""
     shown = [
-        f"the {part_words(f.kind, f.component, f.side)} was {fault_words(f)} for {seconds_words(f.stop_s - f.start_s)}"
+        f"the {words.part_words(f.kind, f.component, f.side)} was {fault_words(f)} for {seconds_words(f.stop_s - f.start_s)}"
         for f in faults[:3]
     ]
     text = join_words(shown)
-    more = f"; {len(faults) - 3} more are listed below" if len(faults) > 3 else ""
+    more = f"; {rest} more {'is' if rest == 1 else 'are'} listed below" if (rest := len(faults) - 3) > 0 else ""
     return text[0].upper() + text[1:] + more + "."
 
 

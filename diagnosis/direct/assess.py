@@ -19,6 +19,7 @@ from diagnosis.estimation.viterbi import most_probable
 from diagnosis.results.assessment import CODE, Assessment
 from diagnosis.results.evidence_columns import steps_of
 from diagnosis.results.loss import loss_of
+from diagnosis.results.sizes import amount, not_reported
 from diagnosis.results.vocabulary import Tier
 from replay.faults import Side, State
 from replay.machine.config import Limits
@@ -80,7 +81,7 @@ def _reasons(side: Side) -> dict[State, str]:
     return {
         State.NOT_EXCITED: "nothing is commanded and nothing moves",
         State.NO_DATA: "no samples",
-        State.NOT_ASSESSED: "the command changes faster than the log's rate or the valve's lag can resolve"
+        State.NOT_ASSESSED: "the command changes faster than the log's rate or the {valve}'s lag can resolve"
         if side is Side.ACTUATOR
         else "the residual may come from a delay or from the rounding of the channel",
     }
@@ -91,14 +92,14 @@ def _notes(found: IdentifiedPair, below: int) -> tuple[str, ...]:
     pair = found.pair
     relation, ms = found.relation, 1e3
     parts = [
-        f"{pair.y_name} against {pair.x_name}: noise {found.model.noise:.2g} {pair.unit}",
-        f"rounding step {found.lsb:.2g} {pair.unit}",
+        f"{pair.y_name} against {pair.x_name}: noise {amount(found.model.noise, pair.unit, 2)}",
+        f"rounding step {amount(found.lsb, pair.unit, 2)}",
         f"delay {relation.delay * pair.dt * ms:.3g} ms",
     ]
     if relation.lag:
         parts.append(f"lag {relation.lag * ms:.2g} ms")
     if relation.play:
-        parts.append(f"hysteresis {relation.play:.2g} {pair.unit}")
+        parts.append(f"hysteresis {amount(relation.play, pair.unit, 2)}")
     if pair.habit.travel:
         parts.append(f"values held for {pair.habit.travel:.2g} m of travel")
     elif pair.habit.stepwise:
@@ -108,5 +109,5 @@ def _notes(found: IdentifiedPair, below: int) -> tuple[str, ...]:
         return (figures,)
     return (
         figures,
-        f"{below} deviations of {pair.y_name} are below the limits of the machine file and are not reported.",
+        not_reported(below, pair.y_name),
     )

@@ -44,7 +44,7 @@ class DirectEvidence:
                 if one.logged("u"):
                     pairs[wheel, ACTUATOR] = one.openings()
                 else:
-                    why = "the valve's position is logged but not its command"
+                    why = "the {position} is logged but not its command"
                     parts[wheel, ACTUATOR] = unassessed(mission.timeline.size, State.NOT_ASSESSED, why)
         limits = mission.machine.limits
         for (wheel, side), found in _identified(pairs, limits, mission).items():

@@ -10,6 +10,7 @@ from diagnosis.direct.isolation import Isolated
 from diagnosis.direct.shape import shape_sentence
 from diagnosis.estimation.fault_models import TOTAL_ROWS
 from diagnosis.results.result import Epsilon
+from diagnosis.results.sizes import amount, times_as_probable
 from replay.faults import FaultMode
 
 
@@ -27,7 +28,7 @@ def sentences(isolated: Isolated, found: IdentifiedPair, mode: FaultMode, epsilo
     epsilon : Epsilon or None
         What is stated of it.
     """
-    pair, model, seen = found.pair, found.model, isolated.seen
+    pair, seen = found.pair, isolated.seen
     out = []
     seconds = seen.y.size * pair.dt
     silent = int(np.count_nonzero(seen.status == SILENT))
@@ -41,13 +42,11 @@ def sentences(isolated: Isolated, found: IdentifiedPair, mode: FaultMode, epsilo
             out += [s for s in [shape_sentence(seen.y[seen.use], seen.x[seen.use], pair.dt, names, pair.unit)] if s]
         out += _values(isolated, found, epsilon, seconds)
         out.append(
-            f"Residual {seen.deviation:.3g} {pair.unit} root mean square; threshold {3 * seen.noise:.2g} {pair.unit}."
+            f"Residual {amount(seen.deviation, pair.unit)} root mean square; threshold {amount(3 * seen.noise, pair.unit, 2)}."
         )
     if mode is FaultMode.OUTSIDE_TABLE:
         out.append("The gain is outside 0…1, which no row of the tables describes.")
-    out.append(
-        f"Log-evidence against healthy: {isolated.gain:.0f}; a fault is considered from {model.switch_cost:.0f}."
-    )
+    out.append(f"{pair.y_name} is {times_as_probable(isolated.gain)} with this fault as without one.")
     return tuple(out)
 
 
@@ -62,8 +61,8 @@ def _values(isolated: Isolated, found: IdentifiedPair, epsilon: Epsilon | None, 
     y, x = seen.y[seen.use], seen.x[seen.use]
     if isolated.run.row in TOTAL_ROWS:
         return [
-            f"{pair.y_name} stayed within {float(np.ptp(y)):.2g} {pair.unit} of {float(np.mean(y)):.4g} {pair.unit} "
-            f"for {seconds:.3f} s while {pair.x_name} moved over {float(np.ptp(x)):.2g} {pair.unit}."
+            f"{pair.y_name} stayed within {amount(float(np.ptp(y)), pair.unit, 2)} of {amount(float(np.mean(y)), pair.unit)} "
+            f"for {seconds:.3f} s while {pair.x_name} moved over {amount(float(np.ptp(x)), pair.unit, 2)}."
         ]
     if epsilon is None:
         return []
@@ -74,7 +73,7 @@ def _values(isolated: Isolated, found: IdentifiedPair, epsilon: Epsilon | None, 
     sat = isolated.estimate[1]
     if sat is not None:
         out.append(
-            f"The rest has a mean of {sat.mean * epsilon.value:.3g} and a root mean square of {sat.rms * epsilon.value:.3g} "
-            f"{pair.unit}; healthy noise is {seen.noise:.2g} {pair.unit}."
+            f"The rest has a mean of {amount(sat.mean * epsilon.value, pair.unit)} and a root mean square of "
+            f"{amount(sat.rms * epsilon.value, pair.unit)}; healthy noise is {amount(seen.noise, pair.unit, 2)}."
         )
     return out

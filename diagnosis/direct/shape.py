@@ -5,6 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from diagnosis.results.sizes import amount
+
 Array = NDArray[np.float64]
 
 _EXPLAINED = 0.85  # of the mean square, by one shape alone
@@ -37,7 +39,7 @@ def shape_sentence(y: Array, x: Array, dt: float, names: tuple[str, str], unit: 
     offset = float(np.mean(off))
     if offset**2 > _EXPLAINED * whole:
         more = "more" if offset > 0.0 else "less"
-        return f"An offset: {channel} reads {abs(offset):.3g} {unit} {more} than {reference}."
+        return f"An offset: {channel} reads {amount(abs(offset), unit)} {more} than {reference}."
     if _without(off, x) < (1.0 - _EXPLAINED) * whole:
         return f"A scale: {channel} is {1.0 + float(off @ x) / float(x @ x):.3g} × {reference}, without an offset."
     change = np.asarray(np.gradient(x, dt), dtype=np.float64)
@@ -49,12 +51,12 @@ def shape_sentence(y: Array, x: Array, dt: float, names: tuple[str, str], unit: 
     t: Array = (np.arange(y.size, dtype=np.float64) - 0.5 * y.size) * dt
     slope = float(off @ t) / float(t @ t)
     if _without(off - offset, t) < (1.0 - _EXPLAINED) * float(np.mean((off - offset) ** 2)):
-        return f"A drift: {channel} departs from {reference} by {slope:.2g} {unit} a second."
+        return f"A drift: {channel} departs from {reference} by {amount(slope, unit, 2)} a second."
     usual = 1.4826 * float(np.median(np.abs(off - np.median(off))))
     spikes = np.abs(off - np.median(off)) > max(_OUTLIER * usual, 1e-9)
     if 0 < np.count_nonzero(spikes) <= _SPIKES * y.size and np.sum(off[spikes] ** 2) > _EXPLAINED * np.sum(off**2):
         size = float(np.median(np.abs(off[spikes])))
-        return f"Spikes: {np.count_nonzero(spikes)} of {y.size} samples are off by about {size:.2g} {unit}, the others are not."
+        return f"Spikes: {np.count_nonzero(spikes)} of {y.size} samples are off by about {amount(size, unit, 2)}, the others are not."
     return ""
 
 

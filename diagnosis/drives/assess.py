@@ -25,6 +25,7 @@ from diagnosis.drives.power import load_powers, sensor_powers
 from diagnosis.drives.speed_pair import SpeedPair, speed_pair
 from diagnosis.results.assessment import CODE, Assessment, Finding, unassessed
 from diagnosis.results.evidence_columns import Pictured, steps_of
+from diagnosis.results.sizes import not_reported
 from diagnosis.results.vocabulary import Tier
 from replay.faults import Side, State
 from replay.machine.config import Limits
@@ -181,7 +182,7 @@ def _reasons(load: LoadTrack | None) -> dict[State, str]:
     """Why a state that is no judgement was given."""
     return {
         State.NOT_EXCITED: "the drive is neither commanded nor moving",
-        State.MASKED: "the speed sensor, which is needed for it, delivers nothing usable",
+        State.MASKED: "the {wheel.sensor}, which is needed for it, delivers nothing usable",
         State.NO_DATA: "no samples",
         State.NOT_ASSESSED: "no effort of healthy missions to compare with"
         if load is None
@@ -192,12 +193,12 @@ def _reasons(load: LoadTrack | None) -> dict[State, str]:
 def _notes(data: DriveData, pair: SpeedPair, controller: InverseController, below: int) -> tuple[str, ...]:
     """Figures that the judgement used."""
     figures = (
-        f"{data.names[0]} against the speed to which {data.names[2]} answered: noise {pair.noise:.3g} m/s "
-        f"({100 * pair.exact:.0f} % of the samples within {pair.core:.2g} m/s), integral time {controller.memory_s:.3g} s."
+        f"{data.names[0]} against the speed to which {data.names[2]} answered: noise {pair.noise:.3g} {{speed_unit}} "
+        f"({100 * pair.exact:.0f} % of the samples within {pair.core:.2g} {{speed_unit}}), integral time {controller.memory_s:.3g} s."
     )
     if not below:
         return (figures,)
     return (
         figures,
-        f"{below} deviations of {data.names[0]} are below the limits of the machine file and are not reported.",
+        not_reported(below, data.names[0]),
     )

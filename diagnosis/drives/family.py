@@ -28,7 +28,7 @@ class DriveEvidence:
                 continue
             if mission.machine.geometry is not None and wheel not in mission.machine.drives:
                 # wheels of one body under one pump push each other: alone, none of them can be told from the others
-                why = "no model of the wheels could be found in this mission"
+                why = "no model of the {wheels} could be found in this mission"
                 both = (unassessed(mission.timeline.size, State.NOT_ASSESSED, why),) * 2
             else:
                 both = assess_drive(drive, mission.machine.limits)

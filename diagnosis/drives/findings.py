@@ -27,6 +27,7 @@ from diagnosis.estimation.segments import Run, merge_equal
 from diagnosis.results.assessment import Finding
 from diagnosis.results.fault_rows import ROWS, codes
 from diagnosis.results.result import Hypothesis
+from diagnosis.results.sizes import times_as_probable
 from diagnosis.results.vocabulary import Tier
 from replay.faults import FaultMode, Side
 from replay.machine.config import Limits
@@ -218,22 +219,20 @@ def _sentences(isolated: Isolated, pair: SpeedPair, delta: float) -> tuple[str, 
     out = []
     if row in TOTAL_ROWS and y.size:
         out.append(
-            f"{pair.name} stayed within {float(np.ptp(y)):.2g} m/s of {float(np.mean(y)):.4g} m/s for {seconds:.2f} s, while the "
-            f"drive was commanded; healthy samples differ by {pair.noise:.2g} m/s."
+            f"{pair.name} stayed within {float(np.ptp(y)):.2g} {{speed_unit}} of {float(np.mean(y)):.4g} {{speed_unit}} for {seconds:.2f} s, while the "
+            f"drive was commanded; healthy samples differ by {pair.noise:.2g} {{speed_unit}}."
         )
     elif row in TOTAL_ROWS:
         out.append(f"{pair.name} delivered nothing for {seconds:.2f} s while the controller went on.")
     else:
         out.append(
             f"{pair.name} was {delta:.3f} times the speed that the controller answered to, over {seconds:.2f} s; the rest has a "
-            f"root mean square of {float(np.sqrt(np.mean((y - delta * x) ** 2))):.3g} m/s, healthy noise is {pair.noise:.2g} m/s."
+            f"root mean square of {float(np.sqrt(np.mean((y - delta * x) ** 2))):.3g} {{speed_unit}}, healthy noise is {pair.noise:.2g} {{speed_unit}}."
         )
     if deviation > pair.noise:
         out.append(
-            f"The logged speed is not the one that the controller acted on (difference {deviation:.3g} m/s root mean square), "
+            f"The logged speed is not the one that the controller acted on (difference {deviation:.3g} {{speed_unit}} root mean square), "
             "so the drive follows its command and the channel of the speed is faulty."
         )
-    out.append(
-        f"Log-evidence against healthy: {isolated.gain:.0f}; a fault is considered from {pair.model().switch_cost:.0f}."
-    )
+    out.append(f"{pair.name} is {times_as_probable(isolated.gain)} with this fault as without one.")
     return tuple(out)

@@ -196,13 +196,13 @@ def _sentences(stretch: LoadStretch, onset: Onset, side: Side, data: DriveData) 
         lines.append("The recorded controller met no fault of the sensor, so the drive itself took more effort.")
     elif side is Side.SENSOR:
         lines.append(
-            f"The measured speed dropped by {onset.seen:.3g} m/s at once; a sensor that lost this much gain drops by "
-            f"{onset.wanted:.3g} m/s, a loaded drive falls with its lag."
+            f"The measured speed dropped by {onset.seen:.3g} {{speed_unit}} at once; a sensor that lost this much gain drops by "
+            f"{onset.wanted:.3g} {{speed_unit}}, a loaded drive falls with its lag."
         )
     elif side is Side.ACTUATOR:
         lines.append(
-            f"A sensor that lost this much gain would have dropped by {onset.wanted:.3g} m/s at once; no more than "
-            f"{onset.seen:.3g} m/s was seen."
+            f"A sensor that lost this much gain would have dropped by {onset.wanted:.3g} {{speed_unit}} at once; no more than "
+            f"{onset.seen:.3g} {{speed_unit}} was seen."
         )
     else:
         lines.append(

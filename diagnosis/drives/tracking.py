@@ -113,7 +113,7 @@ def assess_tracking(
     reasons = {
         State.NOT_ASSESSED: f"it follows its command at {small:.2g} of its size: a wrong unit, a scaled or wrongly mapped channel"
         if small
-        else "without a valve command or a second measurement, only a standstill under command can be detected",
+        else "without a {valve} command or a second measurement, only a standstill under command can be detected",
         State.NOT_EXCITED: "nothing is commanded",
         State.NO_DATA: "no samples",
     }

@@ -28,7 +28,7 @@ from diagnosis.pages import labels
 from diagnosis.pages.environment import POLICY, environment, plain_style
 from diagnosis.pages.svg import icon
 from diagnosis.results.fault_rows import state_label
-from diagnosis.results.vocabulary import part_name
+from diagnosis.results.machine_words import ANY_DRIVE
 
 _HERE = Path(__file__).parent
 
@@ -292,4 +292,4 @@ def _row(kind: str, x: FaultRow | ReportRow, outcome: str, report: str, more: st
 
 
 def _part(kind: str, x: FaultRow | ReportRow) -> str:
-    return f"{x['component']} {part_name(kind, x['side'])} {state_label(x['mode'], x['side']).lower()}"
+    return f"{x['component']} {ANY_DRIVE.part_name(kind, x['side'])} {state_label(x['mode'], x['side']).lower()}"

@@ -15,9 +15,10 @@ from markupsafe import Markup
 from diagnosis.results.candidates import candidates_of, unclear_words
 from diagnosis.results.document import IntervalRow
 from diagnosis.results.fault_rows import LOOKS, row_of, state_label
+from diagnosis.results.machine_words import MachineWords
 from diagnosis.results.size_rows import EpsilonRow
-from diagnosis.results.vocabulary import part_words
 from replay.faults import FaultMode, Side
+from replay.machine.quantities import OPENING
 
 T = TypeVar("T")
 
@@ -136,22 +137,24 @@ def utc_mark(start_ns: Any, length: int = 19, *, both: bool = False) -> Markup:
     return Markup("<time{}>{}</time>").format(Markup(' class="both"') if both else "", utc(start_ns)[:length])
 
 
-def sat_text(mean: float, unit: str) -> str:
-    """Saturation value with its unit; angles in degrees."""
+def sat_text(mean: float, unit: str, words: MachineWords) -> str:
+    """Saturation value with its unit; angles in degrees, commands in percent."""
+    if unit == OPENING:
+        return f"{number(100 * mean)}{words.percent}"
     if unit == "rad":
         return f"{number(mean * 57.29577951308232)}°"
     return f"{number(mean)}{'' if unit in {'', '1', 'fraction'} else ' ' + unit}"
 
 
-def fault_title(fault: IntervalRow) -> str:
+def fault_title(fault: IntervalRow, words: MachineWords) -> str:
     """One line that names component, part, mode and size of a fault."""
     side, mode, sat, epsilon = fault["side"], fault["mode"], fault["sat"], fault["epsilon"]
-    part = part_words(fault["kind"], fault["component"], side)
+    part = words.part_words(fault["kind"], fault["component"], side)
     if modes := candidates_of(fault):
         return f"{part} {unclear_words(side, modes)}"
     sizes = {"part": part}
     if sat:
-        sizes |= {"mean": sat_text(sat["mean"], sat["unit"]), "rms": sat_text(sat["rms"], sat["unit"])}
+        sizes |= {"mean": sat_text(sat["mean"], sat["unit"], words), "rms": sat_text(sat["rms"], sat["unit"], words)}
     if epsilon:
         sizes["lost"] = f"{100 * epsilon['value']:.0f}"
     row = row_of(side, mode)

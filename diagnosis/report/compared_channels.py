@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from diagnosis.pages.labels import number
 from diagnosis.report.units import MOTION, motion_unit, on_page
 from diagnosis.results.document import IntervalRow
+from diagnosis.results.machine_words import MachineWords
 from diagnosis.results.vocabulary import Kind, Tier
 from replay.faults import Side
 from replay.machine.quantities import OPENING
@@ -73,14 +74,14 @@ class Pair:
         return f"{number(value)}{'' if self.unit == '°' else ' '}{self.unit}"
 
 
-def motion_of(component: str, kind: Kind, columns: Collection[str]) -> Motion:
+def motion_of(component: str, kind: Kind, columns: Collection[str], words: MachineWords) -> Motion:
     """Columns and unit of a component's motion; of two commands the replayed one, where it is there."""
     leaf = MOTION[kind]
     own = f"{kind}.{component}.{leaf}"
     replayed = f"replay.{component}.{leaf}_ref"
     commanded = own + "_ref" if own + "_ref" in columns and replayed not in columns else replayed
-    title = "Steering angle" if kind == Kind.STEER else "Wheel speed"
-    return Motion(title, *on_page(motion_unit(kind)), own, commanded, own + "_true")
+    title = "Steering angle" if kind == Kind.STEER else f"{words.part.capitalize()} speed"
+    return Motion(title, *on_page(motion_unit(kind, words), words), own, commanded, own + "_true")
 
 
 def by_valve(fault: IntervalRow, columns: Collection[str]) -> bool:
@@ -89,7 +90,7 @@ def by_valve(fault: IntervalRow, columns: Collection[str]) -> bool:
     return fault["side"] == Side.ACTUATOR and fault["tier"] == Tier.DIRECT and applied in columns
 
 
-def pair_of(fault: IntervalRow, columns: Collection[str]) -> Pair | None:
+def pair_of(fault: IntervalRow, columns: Collection[str], machine_words: MachineWords) -> Pair | None:
     """Channel of a fault and what it was compared with; None where the channel is not there.
 
     Parameters
@@ -98,6 +99,8 @@ def pair_of(fault: IntervalRow, columns: Collection[str]) -> Pair | None:
         One of the report's intervals.
     columns : Collection[str]
         Names of the columns.
+    machine_words : MachineWords
+        How to speak of the machine.
     """
     component, kind = fault["component"], fault["kind"]
     bases = [f"evidence.{component}.{side}." for side in Side(fault["side"]).sides]
@@ -106,9 +109,15 @@ def pair_of(fault: IntervalRow, columns: Collection[str]) -> Pair | None:
         command = f"{kind}.{component}.u"
         reference = command if command in columns else None
         return Pair(
-            "Valve position", command + "_applied", reference, "command", reference is not None, OPENING, 1.0, base
+            machine_words.position.capitalize(),
+            command + "_applied",
+            reference,
+            "command",
+            reference is not None,
+            *on_page(OPENING, machine_words),
+            base,
         )
-    motion = motion_of(component, kind, columns)
+    motion = motion_of(component, kind, columns, machine_words)
     if motion.measured not in columns:
         return None
     choices = [(base + "expected", "expected value"), (motion.commanded, "commanded")]
@@ -119,7 +128,7 @@ def pair_of(fault: IntervalRow, columns: Collection[str]) -> Pair | None:
     return Pair(motion.title, motion.measured, reference, words, independent, motion.unit, motion.scale, base)
 
 
-def rests_on(fault: IntervalRow, columns: Iterable[str]) -> str:
+def rests_on(fault: IntervalRow, columns: Iterable[str], words: MachineWords) -> str:
     """Kind of evidence of a fault, and the channels that its sentences name in their order."""
     text = " ".join(fault["evidence"])
     places = {}
@@ -127,7 +136,7 @@ def rests_on(fault: IntervalRow, columns: Iterable[str]) -> str:
         if "." in name and not name.startswith(("evidence.", "replay.")) and (at := _place(name, text)) >= 0:
             places[name] = at
     channels = sorted(places, key=lambda n: places[n])
-    tier = Tier(fault["tier"]).name_of(Kind(fault["kind"]))
+    tier = words.evidence(Tier(fault["tier"]), Kind(fault["kind"]))
     return f"{tier}: {', '.join(channels)}" if tier and channels else tier or ", ".join(channels)
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from diagnosis.comparison.coverage import SideCoverage, sides_of
 from diagnosis.results.document import IntervalRow, ReportDocument
 from diagnosis.results.fault_rows import state_label
+from diagnosis.results.machine_words import words_of
 from diagnosis.results.vocabulary import Kind, Tier, Verdict
 from replay.faults import Side, State
 
@@ -40,7 +41,8 @@ def sure_of(fault: IntervalRow, report: ReportDocument) -> str:
         first = max(h["p"] for h in hypotheses if h["mode"] != State.HEALTHY) <= p + _TIE
         row = f"{'most likely' if first else 'perhaps'} {state_label(fault['mode'], side).lower()}"
         words = [f"{_likely(faulty)} faulty ({percent(faulty)}), {row} ({percent(p)})"]
-    how = Tier(fault["tier"]).decided(Kind(fault["kind"]), side)
+    machine_words = words_of(report["machine"])
+    how = machine_words.decided(Tier(fault["tier"]), Kind(fault["kind"]), side)
     words += [how] if how else []
     shares = [
         row["decided_driving_s"] / row["driving_s"]
@@ -48,7 +50,7 @@ def sure_of(fault: IntervalRow, report: ReportDocument) -> str:
         if row["component"] == fault["component"] and row["side"] in side.sides and row["driving_s"]
     ]
     if shares:
-        words.append(f"{_share(min(shares))} of its driving was judged")
+        words.append(f"{_share(min(shares))} of its {machine_words.moving} was judged")
     return ", ".join(words)
 
 
@@ -69,13 +71,14 @@ def sure_of_verdict(report: ReportDocument) -> str:
     if not wheels:
         return ""
     done = [s for s in wheels if s.assessed]
-    tiers = list(dict.fromkeys(Tier(s.tier).words for s in wheels if s.tier != Tier.NONE))
+    words = words_of(report["machine"])
+    tiers = list(dict.fromkeys(words.fill(Tier(s.tier).words) for s in wheels if s.tier != Tier.NONE))
     how = f", by {' and '.join(tiers)}" if tiers else ""
     if len(done) < len(wheels):
-        return f"{len(done)} of {len(wheels)} wheel parts were judged long enough{how}."
+        return f"{len(done)} of {len(wheels)} {words.part} parts were judged long enough{how}."
     shares = [s.decided_s / s.driving_s for s in wheels if s.driving_s > 0]
-    least = f", each for {_least(min(shares))} of its driving" if shares else ""
-    return f"All {len(wheels)} wheel parts were judged{least}{how}."
+    least = f", each for {_least(min(shares))} of its {words.moving}" if shares else ""
+    return f"All {len(wheels)} {words.part} parts were judged{least}{how}."
 
 
 def _wheel_sides(report: ReportDocument) -> list[SideCoverage]:

@@ -14,6 +14,7 @@ from diagnosis.report.panels import course_picture, edge_picture
 from diagnosis.report.plot_rows import course_rows
 from diagnosis.report.rows import Columns, Row
 from diagnosis.results.document import IntervalRow, ReportDocument
+from diagnosis.results.machine_words import words_of
 from diagnosis.results.result import Closeups
 
 Stretch = tuple[Columns, tuple[float, float]]
@@ -85,7 +86,7 @@ def evidence_of(
     closeups : Closeups or None
         Where rows are extremes: the samples from which onset and end can be drawn.
     """
-    limit, every = report["limits"]["min_probability"], report["intervals"]
+    limit, every, words = report["limits"]["min_probability"], report["intervals"], words_of(report["machine"])
     rates = {s["name"]: s["rate_hz"] for s in report["signals"]}
     peers: dict[str, list[IntervalRow]] = {}
     for fault in every:
@@ -94,14 +95,14 @@ def evidence_of(
     stretches = _stretches(closeups, axis[0], step)
     out = {}
     for i, fault in enumerate(every if faults is None else faults):
-        pair = pair_of(fault, columns)
+        pair = pair_of(fault, columns, words)
         whole = (columns, axis) if per == 1 else None
         edges = _edges(fault, peers[fault["component"]], pair, whole, stretches) if pair else ()
         course = _course(fault, pair, columns, axis, limit) if pair and i < _COURSES else ()
         keys = _keys(pair) if pair and edges else ()
         note = _note(pair, rates, step) if pair and edges else _missing(pair, columns, per)
         out[fault["id"]] = Evidence(
-            rests_on(fault, columns), delay_words(fault), shape_sentence(fault), keys, edges, course, note
+            rests_on(fault, columns, words), delay_words(fault), shape_sentence(fault), keys, edges, course, note
         )
     return out
 

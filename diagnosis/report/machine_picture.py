@@ -14,11 +14,12 @@ from diagnosis.pages.svg import badge, text
 from diagnosis.report.judged_parts import judged_sides
 from diagnosis.results.candidates import label_of
 from diagnosis.results.document import IntervalRow, ReportDocument, WheelPlace
-from diagnosis.results.vocabulary import Kind, Severity, part_name
+from diagnosis.results.machine_words import HYDRAULIC, MachineWords, words_of
+from diagnosis.results.vocabulary import Kind, Severity
 from replay.faults import State
 
 _MARGIN, _LINE = 26.0, 15  # room for text on either side, and characters that fit in a line of it
-_W, _TYRE_W, _TYRE_H, _PITCH = 372.0, 50.0, 96.0, 132.0
+_W, _TYRE_W, _TYRE_H, _PITCH, _JOINT = 372.0, 50.0, 96.0, 132.0, 58.0
 
 
 @dataclass(frozen=True)
@@ -37,6 +38,7 @@ def condition(
     faults: Sequence[IntervalRow],
     judged: Mapping[tuple[str, str], bool],
     enough: Mapping[tuple[str, str], bool] | None = None,
+    words: MachineWords = HYDRAULIC,
 ) -> Condition:
     """Worst fault of a component, or whether it was judged at all.
 
@@ -52,20 +54,22 @@ def condition(
         Whether any time of a component and side was decided.
     enough : Mapping[tuple[str, str], bool] or None
         Whether it was decided for as long as a verdict of *ready* takes; None: not known.
+    words : MachineWords
+        How to speak of the machine.
     """
     mine = [f for f in faults if f["component"] == component and f["kind"] == kind]
     if mine:
         worst = min(mine, key=lambda f: (-Severity(f["severity"]).rank, f["start_s"]))
-        name = part_name(kind, worst["side"])
+        name = words.part_name(kind, worst["side"])
         label = label_of(worst).lower()
         length = span(worst["stop_s"] - worst["start_s"])
         more = (f"and {len(mine) - 1} more",) if len(mine) > 1 else ()
-        words = name[0].upper() + name[1:]
+        heading = name[0].upper() + name[1:]
         title = f"{component}: {name} {label}, {length}{', ' + more[0] if more else ''}"
-        return Condition(worst["mode"], (words, label, length, *more), worst["id"], title)
+        return Condition(worst["mode"], (heading, label, length, *more), worst["id"], title)
     sides = {side: done for (c, side), done in judged.items() if c == component}
-    open_sides = [part_name(kind, side) for side, done in sides.items() if not done]
-    brief = [part_name(kind, side) for (c, side), done in (enough or {}).items() if c == component and not done]
+    open_sides = [words.part_name(kind, side) for side, done in sides.items() if not done]
+    brief = [words.part_name(kind, side) for (c, side), done in (enough or {}).items() if c == component and not done]
     if not sides or len(open_sides) == len(sides):
         return Condition(State.NOT_ASSESSED, ("Not assessed",), "", f"{component}: not assessed")
     if brief and not open_sides:
@@ -109,6 +113,7 @@ def machine_picture(report: ReportDocument) -> Markup:
     """Picture of the machine for a report; wheels stand in a grid where the geometry is not known."""
     machine, faults, judged = report["machine"], report["intervals"], judged_sides(report)
     wheels, axles, geometry = machine["wheels"], machine["axles"], machine["geometry"] or {}
+    words = words_of(machine)
     enough = {key: side.assessed for key, side in sides_of(report).items()}
     rows = _rows(wheels, geometry)
     placed = bool(wheels) and all(w in geometry for w in wheels)
@@ -121,28 +126,39 @@ def machine_picture(report: ReportDocument) -> Markup:
         shape = '<rect class="body" x="146" y="{}" width="80" height="{}" rx="18"/>'
         parts.append(Markup(shape).format(top - 6, bottom - top + 12))
     else:
-        parts.append(text(186, 12, "positions not known", "lbl mid"))
+        parts.append(
+            text(186, 12, "positions not known" if words.part == "wheel" else "joints in their listed order", "lbl mid")
+        )
     axle_rows: dict[str, float] = {}
     for i, row in enumerate(rows):
         y = top + i * _PITCH
         for j, w in enumerate(row):
             centre, outward = _column(j, len(row), wide)
-            parts.append(_wheel(w, centre, y, outward, condition(w, Kind.WHEEL, faults, judged, enough)))
+            parts.append(
+                _wheel(w, centre, y, outward, words.part, condition(w, Kind.WHEEL, faults, judged, enough, words))
+            )
             if placed:
                 axle_rows.setdefault(geometry[w]["axle"], y + _TYRE_H / 2)
     extra = 0
     for a in axles:
-        c = condition(a, Kind.STEER, faults, judged, enough)
+        c = condition(a, Kind.STEER, faults, judged, enough, words)
         if a in axle_rows and a not in wheels:
             parts.append(_axle(a, 186, axle_rows[a], c))
         else:
             parts.append(_axle(a, 100 + 172 * (extra % 2), bottom + 40 + 48 * (extra // 2), c))
             extra += 1
     height = bottom + 20 + (48 * ((extra + 1) // 2) + 4 if extra else 0)
-    note = "front at the top" if placed else "positions not known, wheels in their listed order"
+    note = "front at the top" if placed else f"positions not known, {words.parts} in their listed order"
     return Markup(
-        '<svg class="machine" viewBox="{x:.0f} 0 {w:.0f} {h:.0f}" role="group" aria-label="Machine from above, {n}">{p}</svg>'
-    ).format(x=-_MARGIN, w=_W + 2 * _MARGIN, h=height, n=note, p=Markup("").join(parts))
+        '<svg class="machine" viewBox="{x:.0f} 0 {w:.0f} {h:.0f}" role="group" aria-label="{m}, {n}">{p}</svg>'
+    ).format(
+        x=-_MARGIN,
+        w=_W + 2 * _MARGIN,
+        h=height,
+        n=note,
+        m="Machine from above" if words.part == "wheel" else "Joints",
+        p=Markup("").join(parts),
+    )
 
 
 def _column(j: int, count: int, wide: int) -> tuple[float, int]:
@@ -154,9 +170,11 @@ def _column(j: int, count: int, wide: int) -> tuple[float, int]:
     return (123.0, -1) if j == 0 else (249.0, 1)
 
 
-def _wheel(name: str, x: float, y: float, outward: int, c: Condition) -> Markup:
-    shapes = Markup('<rect class="tyre {}" x="{}" y="{}" width="{}" height="{}" rx="12"/>').format(
-        c.state, x - _TYRE_W / 2, y, _TYRE_W, _TYRE_H
+def _wheel(name: str, x: float, y: float, outward: int, part: str, c: Condition) -> Markup:
+    round_ = part == "joint"  # a joint is drawn as a circle
+    width, height = (_JOINT, _JOINT) if round_ else (_TYRE_W, _TYRE_H)
+    shapes = Markup('<rect class="tyre {}" x="{}" y="{}" width="{}" height="{}" rx="{}"/>').format(
+        c.state, x - width / 2, y + (_TYRE_H - height) / 2, width, height, width / 2 if round_ else 12
     )
     shapes += text(x, y + 30, _short(name, 6), "name") + badge(c.state, x, y + 60, 24)
     style = "side end" if outward < 0 else "side"

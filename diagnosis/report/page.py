@@ -40,8 +40,8 @@ from diagnosis.report.thumbnail import thumbnail
 from diagnosis.report.timeline import timeline
 from diagnosis.results.document import IntervalRow, ReportDocument
 from diagnosis.results.fault_rows import FAULT_ROWS, state_label
+from diagnosis.results.machine_words import MachineWords, words_of
 from diagnosis.results.result import Closeups
-from diagnosis.results.vocabulary import part_name
 from replay.faults import FaultMode
 
 _ASSETS = Path(__file__).parent / "assets"
@@ -141,6 +141,7 @@ def _pictures(
     report: ReportDocument, detailed: Sequence[IntervalRow], series: _Series, duration: float
 ) -> tables.Context:
     """Timeline, machine, driven path and thumbnails."""
+    words = words_of(report["machine"])
     path = driven_path(report, series.filled, series.axis.step)
     thumbs = worst(report["intervals"], _THUMBNAILS) if series.axis.rows else []
     return {
@@ -153,7 +154,7 @@ def _pictures(
         "path_words": path.words,
         "tested": join_words(list(dict.fromkeys(row.words for row in FAULT_ROWS))),
         "path_modes": [m for m in FaultMode if any(f["mode"] == m for f in detailed)],
-        "thumbs": {f["id"]: _thumbnail(f, series.shown, *series.place) for f in thumbs},
+        "thumbs": {f["id"]: _thumbnail(f, words, series.shown, *series.place) for f in thumbs},
     }
 
 
@@ -163,7 +164,7 @@ def _plots(
     """Rows of the linked plots and the encoded columns behind them, within a budget [bytes]."""
     machine, shown, axis = report["machine"], series.shown, series.axis
     figures = figures_of(report["intervals"], machine, shown, report["limits"]["min_probability"])
-    groups = loop_groups(machine["wheels"], machine["axles"], shown)
+    groups = loop_groups(machine["wheels"], machine["axles"], shown, words_of(machine))
     worst_alone: ReportDocument = {**report, "intervals": list(detailed)}
     channels = channels_of(worst_alone, shown, figures, groups, axis, budget, series.closeups)
     return {
@@ -190,8 +191,8 @@ def _duration(report: ReportDocument, axis: Axis) -> float:
     return max(report["log"]["duration_s"], columns_end, *(row["stop_s"] for row in rows), 0.0)
 
 
-def _thumbnail(fault: IntervalRow, columns: Columns, start: float, step: float) -> Markup:
-    pair = pair_of(fault, columns)
+def _thumbnail(fault: IntervalRow, words: MachineWords, columns: Columns, start: float, step: float) -> Markup:
+    pair = pair_of(fault, columns, words)
     if pair is None:
         return Markup("")
     return thumbnail(fault, columns[pair.measured], columns[pair.reference] if pair.reference else None, start, step)
@@ -212,5 +213,5 @@ def _environment() -> jinja2.Environment:
     found = environment(_ASSETS)
     found.filters |= {"clock": labels.clock, "span": labels.span, "num": labels.number, "state": state_label}
     found.filters["headed"] = _headed
-    found.globals |= {"icon": icon, "part": part_name, "title": labels.fault_title}
+    found.globals |= {"icon": icon, "title": labels.fault_title}
     return found

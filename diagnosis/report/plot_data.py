@@ -19,6 +19,7 @@ from diagnosis.report.tables import machine_name
 from diagnosis.report.units import units_of
 from diagnosis.results.document import IntervalRow, MachineRow, ReportDocument
 from diagnosis.results.fault_rows import LOOKS
+from diagnosis.results.machine_words import words_of
 from diagnosis.results.result import Closeups
 from diagnosis.results.vocabulary import Kind, Severity
 
@@ -101,7 +102,7 @@ def figures_of(
         key = (f["component"], f["kind"], f["side"], f["tier"], f["sat"]["unit"] if f["sat"] else "")
         if key not in known:
             peers = machine["axles"] if f["kind"] == Kind.STEER else machine["wheels"]
-            known[key] = fault_rows(f, peers, columns, limit)
+            known[key] = fault_rows(f, peers, columns, words_of(machine), limit)
         out[f["id"]] = known[key]
     return out
 
@@ -159,6 +160,7 @@ def view(
     index = {c.name: i for i, c in enumerate(channels)}
     distinct = {id(rows): rows for rows in figures.values()}
     place = {key: i for i, key in enumerate(distinct)}
+    words = words_of(report["machine"])
     faults = [
         {
             "id": f["id"],
@@ -168,7 +170,7 @@ def view(
             "mode": f["mode"],
             "component": f["component"],
             "severity": f["severity"],
-            "title": labels.fault_title(f),
+            "title": labels.fault_title(f, words),
             "rows": place[id(figures[f["id"]])],
         }
         for f in report["intervals"]

@@ -14,13 +14,14 @@ from diagnosis.report.rows import Columns, Group, Row, Trace
 from diagnosis.report.units import natural_unit, on_page
 from diagnosis.results.document import IntervalRow
 from diagnosis.results.fault_rows import state_label
+from diagnosis.results.machine_words import MachineWords
 from diagnosis.results.vocabulary import Kind
 from replay.faults import DECIDED, Side
 from replay.machine.quantities import OPENING
 
 
 def fault_rows(
-    fault: IntervalRow, peers: Sequence[str], columns: Columns, limit: float | None = None
+    fault: IntervalRow, peers: Sequence[str], columns: Columns, words: MachineWords, limit: float | None = None
 ) -> tuple[Row, ...]:
     """Rows of the linked plots of one fault.
 
@@ -32,11 +33,13 @@ def fault_rows(
         Components of the same kind, the faulty one included.
     columns : Columns
         Columns with those of `diagnosis.report.rows.derived`.
+    words : MachineWords
+        How to speak of the machine.
     limit : float or None
         Probability from which a fault is stated.
     """
     c, kind, side = fault["component"], fault["kind"], Side(fault["side"])
-    motion = motion_of(c, kind, columns)
+    motion = motion_of(c, kind, columns, words)
     valve_read = by_valve(fault, columns)
     expected = f"evidence.{c}.{side.sides[0]}.expected"
     speed_or_angle = Row(
@@ -50,24 +53,25 @@ def fault_rows(
             Trace(motion.measured, "measured", "measured", motion.scale),
         ),
     )
+    unit, scale = on_page(OPENING, words)
     valve = Row(
         "u",
-        "Valve command",
-        OPENING,
+        f"{words.drive.capitalize()} command",
+        unit,
         (
-            Trace(f"{kind}.{c}.u", "recorded", "measured"),
-            Trace(f"replay.{c}.u", "replayed", "replayed"),
-            Trace(f"{kind}.{c}.u_applied", "applied", "applied"),
-            *((Trace(expected, "expected", "expected"),) if valve_read else ()),
+            Trace(f"{kind}.{c}.u", "recorded", "measured", scale),
+            Trace(f"replay.{c}.u", "replayed", "replayed", scale),
+            Trace(f"{kind}.{c}.u_applied", "applied", "applied", scale),
+            *((Trace(expected, "expected", "expected", scale),) if valve_read else ()),
         ),
     )
-    residual_unit = (OPENING, 1.0) if valve_read else (motion.unit, motion.scale)
+    residual_unit = (unit, scale) if valve_read else (motion.unit, motion.scale)
     rows = [speed_or_angle]
     rows += [valve] if side == Side.ACTUATOR else []
-    rows += [row for s in side.sides for row in _side_rows(fault, s, residual_unit, limit)]
-    rows += [psi_row(c, columns)] if kind == Kind.WHEEL else []
+    rows += [row for s in side.sides for row in _side_rows(fault, s, residual_unit, limit, words)]
+    rows += [psi_row(c, columns)] if kind == Kind.WHEEL and has_psi(c, columns) else []
     rows += [valve] if side != Side.ACTUATOR else []
-    rows += _peer_row(c, kind, peers, columns)
+    rows += _peer_row(c, kind, peers, columns, words)
     return tuple(r for row in rows for r in row.shown(columns))
 
 
@@ -118,12 +122,14 @@ def probability_row(base: str, limit: float | None, of: str = "", limits: tuple[
     )
 
 
-def _side_rows(fault: IntervalRow, side: Side, residual_unit: tuple[str, float], limit: float | None) -> list[Row]:
+def _side_rows(
+    fault: IntervalRow, side: Side, residual_unit: tuple[str, float], limit: float | None, words: MachineWords
+) -> list[Row]:
     """Residual, probability that the side is not healthy, ε̂, saturation term and mode probabilities of one side."""
     base = f"evidence.{fault['component']}.{side}."
     of = f" ({side})" if fault["side"] == Side.SENSOR_OR_ACTUATOR else ""
     recorded = fault["sat"]["unit"] if fault["sat"] else ""
-    sat_unit, sat_scale = on_page(recorded or natural_unit(Kind(fault["kind"]), side))
+    sat_unit, sat_scale = on_page(recorded or natural_unit(Kind(fault["kind"]), side, words), words)
     return [
         residual_row(base, *residual_unit, of),
         probability_row(base, limit, of),
@@ -153,6 +159,11 @@ def _side_rows(fault: IntervalRow, side: Side, residual_unit: tuple[str, float],
     ]
 
 
+def has_psi(c: str, columns: Columns) -> bool:
+    """Whether there is any Ψ̂ of a wheel: not with another controller than the paper's."""
+    return any(n in columns for n in (f"replay.{c}.psi_printed", f"replay.{c}.psi_implied", f"wheel.{c}.psi"))
+
+
 def psi_row(c: str, columns: Columns, component: str = "") -> Row:
     """Ψ̂ of the printed law, as the recorded command implies it and as recorded, with ρ on the right."""
     return Row(
@@ -170,34 +181,40 @@ def psi_row(c: str, columns: Columns, component: str = "") -> Row:
     )
 
 
-def _peer_row(c: str, kind: Kind, peers: Sequence[str], columns: Columns) -> list[Row]:
+def _peer_row(c: str, kind: Kind, peers: Sequence[str], columns: Columns, words: MachineWords) -> list[Row]:
     """The same channel of the other components, where one of them has it."""
-    motion = motion_of(c, kind, columns)
-    channels = [(p, motion_of(p, kind, columns).measured) for p in peers if p != c]
+    motion = motion_of(c, kind, columns, words)
+    channels = [(p, motion_of(p, kind, columns, words).measured) for p in peers if p != c]
     if not any(name in columns for _, name in channels):
         return []
     traces = [Trace(name, p, "peer", motion.scale) for p, name in channels]
-    title = "Other axles" if kind == Kind.STEER else "Peer wheels"
+    title = "Other axles" if kind == Kind.STEER else f"Other {words.parts}"
     own = Trace(motion.measured, c, "measured", motion.scale)
     return [Row("peers", title, motion.unit, (*traces, own))]
 
 
-def loop_groups(wheels: Sequence[str], axles: Sequence[str], columns: Columns) -> tuple[Group, ...]:
+def loop_groups(
+    wheels: Sequence[str], axles: Sequence[str], columns: Columns, words: MachineWords
+) -> tuple[Group, ...]:
     """Rows of the loop replay over the whole mission, as in the paper's figures; groups without data are left out."""
     groups = {
-        ("speed", "Wheel speeds"): [_loop_motion(w, Kind.WHEEL, columns) for w in wheels],
-        ("drive", "Drive valves u_a"): [_loop_valve(w, Kind.WHEEL) for w in wheels],
-        ("steering", "Steering φ and u_s"): [
-            row for a in axles for row in (_loop_motion(a, Kind.STEER, columns), _loop_valve(a, Kind.STEER))
+        ("speed", f"{words.part.capitalize()} speeds"): [_loop_motion(w, Kind.WHEEL, columns, words) for w in wheels],
+        ("drive", f"{words.part_name(Kind.WHEEL, Side.ACTUATOR).capitalize()}s u_a"): [
+            _loop_valve(w, Kind.WHEEL, words) for w in wheels
         ],
-        ("psi", "Ψ̂ printed and implied"): [psi_row(w, columns, component=w) for w in wheels],
+        ("steering", "Steering φ and u_s"): [
+            row
+            for a in axles
+            for row in (_loop_motion(a, Kind.STEER, columns, words), _loop_valve(a, Kind.STEER, words))
+        ],
+        ("psi", "Ψ̂ printed and implied"): [psi_row(w, columns, component=w) for w in wheels if has_psi(w, columns)],
     }
     found = [(key, tuple(r for row in rows for r in row.shown(columns))) for key, rows in groups.items()]
     return tuple(Group(*key, rows) for key, rows in found if rows)
 
 
-def _loop_motion(c: str, kind: Kind, columns: Columns) -> Row:
-    motion = motion_of(c, kind, columns)
+def _loop_motion(c: str, kind: Kind, columns: Columns, words: MachineWords) -> Row:
+    motion = motion_of(c, kind, columns, words)
     key, title, measured, commanded = ("phi", "φ", "φ", "φ_c") if kind == Kind.STEER else ("v", "Speed", "v", "v_ref")
     traces = (
         Trace(motion.measured, f"{measured} measured", "measured", motion.scale),
@@ -206,6 +223,10 @@ def _loop_motion(c: str, kind: Kind, columns: Columns) -> Row:
     return Row(key, f"{title} {c}", motion.unit, traces, component=c)
 
 
-def _loop_valve(c: str, kind: Kind) -> Row:
-    traces = (Trace(f"{kind}.{c}.u", "recorded", "measured"), Trace(f"replay.{c}.u", "replayed", "replayed"))
-    return Row("u", f"{'u_s' if kind == Kind.STEER else 'u_a'} {c}", OPENING, traces, component=c)
+def _loop_valve(c: str, kind: Kind, words: MachineWords) -> Row:
+    unit, scale = on_page(OPENING, words)
+    traces = (
+        Trace(f"{kind}.{c}.u", "recorded", "measured", scale),
+        Trace(f"replay.{c}.u", "replayed", "replayed", scale),
+    )
+    return Row("u", f"{'u_s' if kind == Kind.STEER else 'u_a'} {c}", unit, traces, component=c)

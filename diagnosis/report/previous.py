@@ -16,8 +16,9 @@ from diagnosis.results.comparison_document import (
 )
 from diagnosis.results.document import MachineRow, ReportDocument
 from diagnosis.results.fault_rows import state_label
+from diagnosis.results.machine_words import MachineWords, words_of
 from diagnosis.results.size_rows import EpsilonRow
-from diagnosis.results.vocabulary import Tier, Verdict, part_words
+from diagnosis.results.vocabulary import Tier, Verdict
 from replay.faults import FaultMode
 
 _BAD = ("new", "worse")
@@ -34,9 +35,9 @@ def previous_section(report: ReportDocument) -> Context | None:
     found = report.get("previous")
     if found is None:
         return None
-    later = found["order"] == "later"
+    later, words = found["order"] == "later", words_of(report["machine"])
     counts = {name: n for name, n in found["counts"].items() if name in OUTCOMES and n}
-    words = [f"{n} {'not seen again' if k == 'not_seen_again' else OUTCOMES[k]}" for k, n in counts.items()]
+    short = [f"{n} {'not seen again' if k == 'not_seen_again' else OUTCOMES[k]}" for k, n in counts.items()]
     return {
         "title": "Against a later mission" if later else "Against the previous mission",
         "heads": ["This mission", "Later mission"] if later else ["Previous mission", "This mission"],
@@ -44,9 +45,9 @@ def previous_section(report: ReportDocument) -> Context | None:
         "later": later,
         "mission": _mission(found["mission"]),
         "counts": [(SIGNS[name], OUTCOMES[name], n, name in _BAD) for name, n in counts.items()],
-        "short": ", ".join(words) or "no fault in either",
-        "faults": [_row(c) for c in found["faults"]],
-        "coverage": [_coverage(c) for c in found["coverage"]],
+        "short": ", ".join(short) or "no fault in either",
+        "faults": [_row(c, words) for c in found["faults"]],
+        "coverage": [_coverage(c, words) for c in found["coverage"]],
         "loss": [_loss(x, report["machine"]) for x in found["loss"] if _differs(x)],
         "same_loss": sum(not _differs(x) for x in found["loss"]),
         "notes": found["notes"],
@@ -64,7 +65,7 @@ def _mission(m: OtherMissionRow) -> Context:
     }
 
 
-def _row(c: FaultChangeRow) -> Context:
+def _row(c: FaultChangeRow, words: MachineWords) -> Context:
     outcome = c["trend"] or c["status"]
     both = [c["older"], c["newer"]]
     modes = {f["mode"]: (f["mode"], state_label(f["mode"], f["side"])) for f in both if f}
@@ -73,7 +74,7 @@ def _row(c: FaultChangeRow) -> Context:
         "sign": SIGNS[outcome],
         "outcome": OUTCOMES[outcome],
         "bad": outcome in _BAD,
-        "part": part_words(c["kind"], c["component"], c["side"]),
+        "part": words.part_words(c["kind"], c["component"], c["side"]),
         "modes": list(modes.values()),
         "cells": [_found(f) for f in both],
         "ids": [f["ids"][:3] if f else [] for f in both],
@@ -93,9 +94,9 @@ def _epsilon(e: EpsilonRow) -> str:
     return f"{e['value']:.2f} ({e['low']:.2f}–{e['high']:.2f})"
 
 
-def _coverage(c: CoverageChangeRow) -> Context:
+def _coverage(c: CoverageChangeRow, words: MachineWords) -> Context:
     return {
-        "part": part_words(c["kind"], c["component"], c["side"]),
+        "part": words.part_words(c["kind"], c["component"], c["side"]),
         "lost": c["change"] == "lost",
         "words": coverage_words(c),
         "cells": [_judged(c["older"]), _judged(c["newer"])],
@@ -119,7 +120,7 @@ def _differs(x: LossChangeRow) -> bool:
 def _loss(x: LossChangeRow, machine: MachineRow) -> Context:
     change = x["newer"]["value"] - x["older"]["value"]
     return {
-        "part": part_words(kind_of(x["component"], machine), x["component"], x["side"]),
+        "part": words_of(machine).part_words(kind_of(x["component"], machine), x["component"], x["side"]),
         "cells": [labels.bounded(x["older"]), labels.bounded(x["newer"])],
         "change": f"{change:+.3f}".replace("-", "−"),
     }

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
@@ -9,7 +10,8 @@ from itertools import pairwise
 from diagnosis.report.judged_parts import kind_of
 from diagnosis.results.detectability import Deviation
 from diagnosis.results.document import DetectabilityRow, DetectabilityTrace, ReportDocument
-from diagnosis.results.vocabulary import Kind, part_name, part_words
+from diagnosis.results.machine_words import MachineWords, words_of
+from diagnosis.results.vocabulary import Kind
 from replay.faults import Side
 
 _WIDE, _HIGH = 2000, 100
@@ -56,11 +58,11 @@ def shown_parts(report: ReportDocument) -> list[ShownPart]:
     by_part: dict[tuple[str, str], dict[tuple[str, float | None], DetectabilityRow]] = {}
     for row in report["detectability"]["rows"]:
         by_part.setdefault((row["component"], row["side"]), {})[row["deviation"], row["for_s"]] = row
-    out = []
+    out, words = [], words_of(report["machine"])
     for (component, side), rows in by_part.items():
         kind = kind_of(component, report["machine"])
         cells = tuple(_cell(rows.get((deviation, length))) for deviation, length, _ in _COLUMNS)
-        out.append(ShownPart(part_words(kind, component, side), cells, _told(kind, side, rows)))
+        out.append(ShownPart(words.part_words(kind, component, side), cells, _told(kind, side, rows, words)))
     return out
 
 
@@ -69,7 +71,7 @@ def _cell(row: DetectabilityRow | None) -> str:
     if row is None:
         return ""
     if not row["places"]:
-        return "not driven"
+        return "too brief"
     size, unit = row["size"], row["unit"]
     if not unit:
         share = row["share"] or 0.0
@@ -78,14 +80,16 @@ def _cell(row: DetectabilityRow | None) -> str:
         return "not shown"
     if not size:
         return "not cleared"
+    if unit == "rad":
+        return f"{math.degrees(size):.2g}°"
     return f"{100 * size:.0f} %" if unit == "1" else f"{size:.2g} {unit}"
 
 
-def _told(kind: Kind, side: str, rows: Mapping[tuple[str, float | None], DetectabilityRow]) -> str:
+def _told(kind: Kind, side: str, rows: Mapping[tuple[str, float | None], DetectabilityRow], words: MachineWords) -> str:
     """From what else such a fault is told."""
     told = next((r["told"] for r in rows.values()), side)
     other = Side.ACTUATOR if side == Side.SENSOR else Side.SENSOR
-    return "every other part" if told != Side.SENSOR_OR_ACTUATOR else f"all but the {part_name(kind, other)}"
+    return "every other part" if told != Side.SENSOR_OR_ACTUATOR else f"all but the {words.part_name(kind, other)}"
 
 
 def shown_lanes(report: ReportDocument, duration: float) -> list[ShownLane]:
@@ -93,7 +97,7 @@ def shown_lanes(report: ReportDocument, duration: float) -> list[ShownLane]:
     out: list[ShownLane] = []
     for trace in _merged(report["detectability"]["traces"]):
         component, side = trace["component"], trace["side"]
-        part = part_name(kind_of(component, report["machine"]), side)
+        part = words_of(report["machine"]).part_name(kind_of(component, report["machine"]), side)
         first = not out or out[-1].component != component
         area, blind = _paths(trace, duration)
         out.append(ShownLane(component, part, first, area, blind, _ten_seconds(report, trace)))

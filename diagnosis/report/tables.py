@@ -26,8 +26,10 @@ from diagnosis.results.document import (
 )
 from diagnosis.results.fault_rows import state_label
 from diagnosis.results.left_out import only_left_out
-from diagnosis.results.vocabulary import Kind, Tier, Verdict, part_name, part_words
+from diagnosis.results.machine_words import MachineWords, words_of
+from diagnosis.results.vocabulary import Kind, Tier, Verdict
 from replay.faults import FAULT_STATES, UNDECIDED, FaultMode, State
+from replay.machine.quantities import OPENING
 
 _SHOWN = 0.001
 _UNFOLDED = 4  # notes and evidence beyond this number fold away
@@ -53,16 +55,19 @@ def context(report: ReportDocument, duration: float) -> Context:
         Length of the mission [s].
     """
     log, limits, tool = report["log"], report["limits"], report["tool"]
+    words = words_of(report["machine"])
     checks, folded = _folded(sorted(report["quality"], key=lambda q: q["ok"]))
     return {
         "machine": machine_name(report["machine"]),
         "mission": " + ".join(f["path"] for f in log["files"]) or "no log named",
         "verdict": _verdict(report),
         "facts": _facts(report, duration),
-        "faults": [_fault(f) for f in report["intervals"]],
+        "faults": [_fault(f, words) for f in report["intervals"]],
         "coverage": _coverage(report),
-        "metrics": _metrics(report["metrics"]),
-        "signals": [_signal(s) for s in report["signals"]],
+        "metrics": _metrics(report["metrics"], words),
+        "words": words,
+        "steered": bool(report["machine"]["axles"]),
+        "signals": [_signal(s, words) for s in report["signals"]],
         "missing": _missing(report["missing"]),
         "clearing": _clearing(report),
         "limits_clear_at": report["limits"]["clear_at"],
@@ -71,11 +76,11 @@ def context(report: ReportDocument, duration: float) -> Context:
         "quality_folded": folded,
         "files": [_file(f) for f in log["files"]],
         "readings": report["readings"],
-        "limits": [(k.replace("_", " "), number(v)) for k, v in limits.items()],
+        "limits": _limits(report, words),
         "tool": f"{tool['name']} {tool['version']}",
         "schema": report["schema"],
         "modes": [(m, mode_legend(m)) for m in FaultMode],
-        "lines": (State.HEALTHY, *UNDECIDED),
+        "lines": (State.HEALTHY, *(s for s in UNDECIDED if words.part == "wheel" or s is not State.SLIP)),
         "open_loop": log["open_loop"],
         "assumed": report["machine"]["assumed"],
         "machine_file": "" if report["machine"]["source"] == PAPER_DEFAULTS else report["machine"]["source"],
@@ -91,6 +96,7 @@ def _verdict(report: ReportDocument) -> Context:
     return {
         "state": Verdict(verdict["status"]).symbol,
         "words": words,
+        "steered": bool(report["machine"]["axles"]),
         "answer": answer,
         "sure": "" if verdict["actions"] else sure_of_verdict(report),
         "title": verdict["title"] or words,
@@ -100,28 +106,31 @@ def _verdict(report: ReportDocument) -> Context:
     }
 
 
-def _fault(fault: IntervalRow) -> Context:
+def _fault(fault: IntervalRow, words: MachineWords) -> Context:
     epsilon, sat = fault["epsilon"], fault["sat"]
     figures = []
     if epsilon:
         figures.append(("ε̂", number(epsilon["value"]), f"{number(epsilon['low'])} to {number(epsilon['high'])}"))
     if sat:
         unit = sat["unit"]
-        bounds = f"{sat_text(sat['low'], unit)} to {sat_text(sat['high'], unit)}"
-        figures.append(("sat", sat_text(sat["mean"], unit), bounds))
-        figures.append(("sat r.m.s.", sat_text(sat["rms"], unit), ""))
+        bounds = f"{sat_text(sat['low'], unit, words).partition(' ')[0]} to {sat_text(sat['high'], unit, words)}"
+        figures.append(("sat", sat_text(sat["mean"], unit, words), bounds))
+        figures.append(("sat r.m.s.", sat_text(sat["rms"], unit, words), ""))
     hypotheses = sorted(fault["hypotheses"], key=lambda h: -h["p"])
     likely = max(1, sum(h["p"] >= _SHOWN for h in hypotheses))
     return {
         **fault,
         "label": label_of(fault),
-        "tier": Tier(fault["tier"]).name_of(Kind(fault["kind"])),
+        "tier": words.evidence(Tier(fault["tier"]), Kind(fault["kind"])),
         "delay": _delay(fault),
         "likely": hypotheses[:likely],
         "unlikely": ", ".join(
-            f"{state_label(h['mode'], h['side']).lower()} ({h['side']})" for h in hypotheses[likely:]
+            (f"{words.part_name(fault['kind'], h['side'])} " if h["side"] != "none" else "")
+            + state_label(h["mode"], h["side"]).lower()
+            for h in hypotheses[likely:]
         ),
         "figures": figures,
+        "check": fault.get("check", ""),
         "percent": f"{100 * fault['probability']:.1f} %",
     }
 
@@ -160,7 +169,9 @@ def _action(action: ActionRow, intervals: Mapping[str, IntervalRow], report: Rep
     faults = [f for f in action["faults"] if f in intervals]
     first = intervals[faults[0]] if faults else None
     return {
-        "text": action["text"],
+        "lead": action.get("lead", ""),
+        "text": action["text"].removeprefix(action.get("lead", "")),
+        "check": action.get("check", ""),
         "faults": faults,
         "state": first["mode"] if first else "warning",
         "severity": action["severity"],
@@ -174,13 +185,13 @@ def _facts(report: ReportDocument, duration: float) -> list[tuple[str, str]]:
         ("Machine", machine["id"] or machine["name"] or "unnamed"),
         ("Start (UTC)", utc_mark(log["start_ns"], both=True)),
         ("Duration", clock(duration)),
-        ("Driving", clock(log["driving_s"])),
+        (words_of(machine).moving.capitalize(), clock(log["driving_s"])),
     ]
-    if log["distance_m"] is not None:
+    if log["distance_m"] is not None and words_of(machine).speed_unit == "m/s":
         facts.append(("Distance", f"{number(log['distance_m'])} m"))
     facts.append(("Sample rate", f"{number(log['rate_hz'])} Hz"))
     parts = judged(report)
-    facts.append(("Judged", parts) if parts else ("Wheels", _count(machine)))
+    facts.append(("Judged", parts) if parts else (words_of(machine).parts.capitalize(), _count(machine)))
     return facts
 
 
@@ -190,7 +201,7 @@ def _count(machine: MachineRow) -> str:
 
 
 def _coverage(report: ReportDocument) -> list[Context]:
-    rows, why = [], _why_undecided(report)
+    rows, why, words = [], _why_undecided(report), words_of(report["machine"])
     loss = {(x["component"], x["side"]): bounded(x["epsilon"]) for x in report["loss"] if not x["relative"]}
     for row in report["coverage"]:
         key, seconds = (row["component"], row["side"]), row["seconds"]
@@ -200,7 +211,7 @@ def _coverage(report: ReportDocument) -> list[Context]:
         rows.append(
             {
                 "component": row["component"],
-                "part": part_name(kind_of(row["component"], report["machine"]), row["side"]),
+                "part": words.part_name(kind_of(row["component"], report["machine"]), row["side"]),
                 "parts": [(k, v, 100 * v / total) for k, v in seconds.items() if total > 0 and v > 0],
                 "healthy": healthy,
                 "faulty": faulty,
@@ -215,13 +226,13 @@ def _coverage(report: ReportDocument) -> list[Context]:
 
 def _clearing(report: ReportDocument) -> list[Context]:
     """Checks behind an all-clear, those first that do not clear their part."""
-    rows = []
+    rows, words = [], words_of(report["machine"])
     for c in sorted(report["clearing"], key=lambda c: c["passed"]):
         start, stop = c["start_s"], c["stop_s"]
         rows.append(
             {
                 "ok": c["passed"],
-                "part": part_words(kind_of(c["component"], report["machine"]), c["component"], c["side"]),
+                "part": words.part_words(kind_of(c["component"], report["machine"]), c["component"], c["side"]),
                 "asked": c["asked"],
                 "worst": "not shown" if c["worst"] is None else size_words(c["check"], c["worst"]),
                 "limit": size_words(c["check"], c["limit"]),
@@ -246,21 +257,51 @@ def _why_undecided(report: ReportDocument) -> dict[tuple[str, str], list[str]]:
     }
 
 
-def _cells(row: LoopRow) -> list[str]:
-    return [number(v) for q in (row["tracking_error"], row["control_effort"]) for v in (q["mission"], q["driving"])]
+def _cells(row: LoopRow, commanded: bool) -> list[str]:
+    error, effort = row["tracking_error"], row["control_effort"]
+    cells = [number(error["mission"]), number(error["driving"])]
+    return cells + [number(None if x is None else 100 * x) for x in (effort["mission"], effort["driving"]) if commanded]
 
 
-def _metrics(metrics: MetricsRow) -> Context:
+#: Unit of each limit of the machine file; absent: a plain number. ``{speed}`` is the machine's own.
+_LIMIT_UNITS = {
+    "brief": "s",
+    "min_assessed": "s",
+    "driving_speed": "{speed}",
+    "min_sat": "{speed}{angles}, of commands as a share",
+}
+_SHARES = ("min_probability", "clear_at")
+
+
+def _limits(report: ReportDocument, words: MachineWords) -> list[tuple[str, str]]:
+    """Limits of the machine file with their units."""
+    out = []
+    angles = ", of angles in rad" if report["machine"]["axles"] else ""
+    for key, value in report["limits"].items():
+        unit = _LIMIT_UNITS.get(key, "").replace("{speed}", words.speed_unit).replace("{angles}", angles)
+        size = value if isinstance(value, float) else float("nan")
+        out.append(
+            (key.replace("_", " "), f"{100 * size:g} %" if key in _SHARES else f"{number(value)} {unit}".rstrip())
+        )
+    return out
+
+
+def _metrics(metrics: MetricsRow, words: MachineWords) -> Context:
     rows = [*metrics["wheels"].items(), ("Average", metrics["average"])]
     paper = [
-        (p["controller"], [number(p["tracking_error"]), number(p["control_effort"]), number(p["parameters"])])
-        for p in metrics["paper"]
+        (p["controller"], [number(p["tracking_error"]), number(100 * p["control_effort"]), number(p["parameters"])])
+        for p in (metrics["paper"] if words.drive == "valve" else ())
     ]
-    return {"rows": [(name, _cells(values)) for name, values in rows], "paper": paper}
+    some = any(q["mission"] is not None for _, r in rows for q in (r["tracking_error"], r["control_effort"]))
+    effort = any(r["control_effort"]["mission"] is not None for _, r in rows)
+    shown = [(name, _cells(values, effort)) for name, values in rows] if some else []
+    return {"rows": shown, "effort": effort, "paper": paper}
 
 
-def _signal(signal: SignalRow) -> Context:
-    unit, recorded, missing = signal["unit"], signal["recorded_unit"], signal["missing_share"]
+def _signal(signal: SignalRow, words: MachineWords) -> Context:
+    unit, recorded, missing, step = signal["unit"], signal["recorded_unit"], signal["missing_share"], signal["lsb"]
+    if unit in (OPENING, words.unit(OPENING)):
+        unit, step = words.percent.strip(), None if step is None else 100 * step
     return {
         "name": signal["name"],
         "channel": signal["channel"] or "–",
@@ -269,7 +310,7 @@ def _signal(signal: SignalRow) -> Context:
         "samples": grouped(signal["samples"]),
         "gaps": f"{signal['gaps']}, longest {number(signal['longest_gap_s'])} s" if signal["gaps"] else "none",
         "missing": "–" if missing is None else f"{100 * missing:.2g} %",
-        "lsb": f"{number(signal['lsb'])} {unit}" if signal["lsb"] else "–",
+        "lsb": f"{number(step)} {unit}" if step else "–",
         "found": "guessed" if signal["guessed"] else "given",
         "poor": missing is not None and missing > 0.01,
     }

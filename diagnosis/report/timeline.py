@@ -15,7 +15,8 @@ from diagnosis.report.judged_parts import kind_of
 from diagnosis.results.candidates import label_of
 from diagnosis.results.document import IntervalRow, PhaseRow, ReportDocument
 from diagnosis.results.fault_rows import state_label
-from diagnosis.results.vocabulary import Kind, Tier, part_name
+from diagnosis.results.machine_words import MachineWords, words_of
+from diagnosis.results.vocabulary import Kind, Tier
 from replay.faults import FAULT_STATES, FaultMode, Side, State
 
 _BUCKETS = 2000
@@ -125,14 +126,14 @@ def causes(faults: Sequence[IntervalRow]) -> dict[str, str]:
     return out
 
 
-def _bar(fault: IntervalRow, duration: float, cause: str = "") -> Bar:
+def _bar(fault: IntervalRow, duration: float, words: MachineWords, cause: str = "") -> Bar:
     left = 100 * fault["start_s"] / duration
     width = 100 * (fault["stop_s"] - fault["start_s"]) / duration
     mode = label_of(fault)
-    words = f"{fault['id']} {mode.lower()}"
-    label = words if width > 10 else fault["id"] if width > 0.9 + 0.8 * len(fault["id"]) else ""
+    named = f"{fault['id']} {mode.lower()}"
+    label = named if width > 10 else fault["id"] if width > 0.9 + 0.8 * len(fault["id"]) else ""
     times = f"{clock(fault['start_s'], 2)} to {clock(fault['stop_s'], 2)}"
-    title = f"{fault['id']}: {fault_title(fault)}, {times}" + (f"; may follow from {cause}" if cause else "")
+    title = f"{fault['id']}: {fault_title(fault, words)}, {times}" + (f"; may follow from {cause}" if cause else "")
     return Bar(fault["id"], fault["mode"], left, width, label, title, bool(cause))
 
 
@@ -167,7 +168,7 @@ def timeline(report: ReportDocument, duration: float, bars: Collection[str] | No
     bars : Collection[str] or None
         Names of the faults that get a bar of their own, the others are part of their lane's line; None: all.
     """
-    faults = report["intervals"]
+    faults, machine_words = report["intervals"], words_of(report["machine"])
     brief = {key for key, side in sides_of(report).items() if not side.assessed}
     cause = causes([f for f in faults if bars is None or f["id"] in bars])
     lanes: list[Lane] = []
@@ -178,14 +179,14 @@ def timeline(report: ReportDocument, duration: float, bars: Collection[str] | No
         group = lanes if mine else quiet
         first = not group or group[-1].component != c
         if mine:
-            group.append(_faulty_lane(c, side, mine, spans, duration, bars, cause, first))
+            group.append(_faulty_lane(c, side, mine, spans, duration, bars, cause, first, machine_words))
             continue
         state = _main_state(spans)
         words = "healthy" if state == State.HEALTHY else f"{state_label(state).lower()} throughout"
         if state == State.HEALTHY and (c, side) in brief:
             state, words = State.NOT_ASSESSED, "not judged long enough"
         counts[words] = counts.get(words, 0) + 1
-        group.append(Lane(c, part_name(kind, side), state, _lines(spans, side, duration), (), "", first))
+        group.append(Lane(c, machine_words.part_name(kind, side), state, _lines(spans, side, duration), (), "", first))
     summary = f"{len(quiet)} lane{'s' * (len(quiet) != 1)} without a fault: " + ", ".join(
         f"{n} {words}" for words, n in counts.items()
     )
@@ -215,17 +216,18 @@ def _faulty_lane(
     bars: Collection[str] | None,
     cause: Mapping[str, str],
     first: bool,
+    machine_words: MachineWords,
 ) -> Lane:
     """Lane with faults; those without a bar of their own are part of its line."""
     own = [f for f in sorted(faults, key=lambda f: f["start_s"]) if bars is None or f["id"] in bars]
-    drawn = tuple(_bar(f, duration, cause.get(f["id"], "")) for f in own) if duration > 0 else ()
+    drawn = tuple(_bar(f, duration, machine_words, cause.get(f["id"], "")) for f in own) if duration > 0 else ()
     if len(own) < len(faults):
         spans = [*spans, *((f["mode"], f["start_s"], f["stop_s"]) for f in faults)]
     total = sum(f["stop_s"] - f["start_s"] for f in faults)
     share = 100 * total / duration if duration > 0 else 0.0
     words = f"{share:.1f} %" if share >= 0.05 else span(total)
     first_fault = faults[0]
-    name = part_name(first_fault["kind"], side)
+    name = machine_words.part_name(first_fault["kind"], side)
     return Lane(component, name, first_fault["mode"], _lines(spans, side, duration), drawn, words, first)
 
 

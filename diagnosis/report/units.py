@@ -8,6 +8,7 @@ from collections.abc import Mapping, Sequence
 from diagnosis.report.judged_parts import kind_of
 from diagnosis.report.rows import Group, Row
 from diagnosis.results.document import ReportDocument
+from diagnosis.results.machine_words import MachineWords, words_of
 from diagnosis.results.vocabulary import Kind, Tier
 from replay.control.loop_columns import replayed_unit
 from replay.faults import Side
@@ -22,18 +23,22 @@ _OF_THE_SIGNAL = ("delta_bar", "delta_bar_std")
 _UNKNOWN = "unknown unit"
 
 
-def motion_unit(kind: Kind) -> str:
-    """Unit of what a component does, as recorded."""
-    return BY_KIND[f"{kind}.{MOTION[kind]}"].shown_unit
+def motion_unit(kind: Kind, words: MachineWords) -> str:
+    """Unit of what a component does, as it is kept."""
+    return words.speed_unit if kind == Kind.WHEEL else BY_KIND[f"{kind}.{MOTION[kind]}"].shown_unit
 
 
-def natural_unit(kind: Kind, side: Side) -> str:
-    """Unit of the signal of a component's side: its motion, or the opening of its valve."""
-    return OPENING if side == Side.ACTUATOR else motion_unit(kind)
+def natural_unit(kind: Kind, side: Side, words: MachineWords) -> str:
+    """Unit of the signal of a component's side: its motion, or the command of its drive."""
+    return OPENING if side == Side.ACTUATOR else motion_unit(kind, words)
 
 
-def on_page(unit: str) -> tuple[str, float]:
-    """Unit in which the page shows a recorded one, and the factor to it: angles in degrees."""
+def on_page(unit: str, words: MachineWords) -> tuple[str, float]:
+    """Unit in which the page shows a recorded one, and the factor to it: angles in degrees, commands in percent."""
+    if unit in (OPENING, words.unit(OPENING)):
+        return words.percent.strip(), 100.0
+    if unit == words.speed_unit:
+        return unit, 1.0
     return ("°", DEGREES) if unit == "rad" else ("°/s", DEGREES) if unit == "rad/s" else (unit, 1.0)
 
 
@@ -44,6 +49,7 @@ def units_of(
     groups: Sequence[Group],
 ) -> list[tuple[str, float]]:
     """Unit shown and factor to it, for each column."""
+    words = words_of(report["machine"])
     known: dict[str, tuple[str, float]] = {}
     for row in (r for rows in [*figures.values(), *(g.rows for g in groups)] for r in rows):
         for t in row.traces:
@@ -51,25 +57,29 @@ def units_of(
         for c in (*(row.band or ()), *((row.threshold,) if row.threshold else ())):
             known.setdefault(c, (row.unit, row.band_scale))
     recorded = {s["name"]: s["unit"] for s in report["signals"]}
-    return [known.get(c) or on_page(recorded.get(c) or unit_of(c, report)) for c in columns]
+    return [known.get(c) or on_page(recorded.get(c) or unit_of(c, report), words) for c in columns]
 
 
 def unit_of(column: str, report: ReportDocument) -> str:
-    """Unit of a column as it is kept: SI, ``1`` for shares and probabilities, ``unknown unit`` where nothing tells."""
+    """Unit of a column as it is kept: SI or the machine's unit of speed, ``1`` for shares, ``unknown unit`` where nothing tells."""
+    words = words_of(report["machine"])
     head, _, rest = column.partition(".")
     component, _, leaf = rest.rpartition(".")
     if head == "evidence":
         part, _, side = component.rpartition(".")
         kind = kind_of(part, report["machine"])
         if leaf in _COMPARED:
-            return natural_unit(kind, Side(side)) if _measured(part, side, report) else motion_unit(kind)
-        return natural_unit(kind, Side(side)) if leaf in _OF_THE_SIGNAL else "1"
+            return natural_unit(kind, Side(side), words) if _measured(part, side, report) else motion_unit(kind, words)
+        return natural_unit(kind, Side(side), words) if leaf in _OF_THE_SIGNAL else "1"
     if head == "replay":
-        return replayed_unit(leaf) or _UNKNOWN
+        unit = replayed_unit(leaf) or _UNKNOWN
+        return words.speed_unit if unit == "m/s" else unit
     if head == "path":
         return "m"
     signal = find_signal(column)
-    return _UNKNOWN if signal is None else signal.shown_unit
+    if signal is None:
+        return _UNKNOWN
+    return words.speed_unit if signal.group == "wheel" and signal.quantity == "speed" else signal.shown_unit
 
 
 def _measured(component: str, side: str, report: ReportDocument) -> bool:

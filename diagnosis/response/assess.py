@@ -49,8 +49,8 @@ _OWN, _OTHERS = 4, 2  # holds of a channel that may be faults: of the one in que
 _LEAST_S = 1.0
 _DOUBT_S = 0.5  # around a spell that is judged no fault
 _HIDDEN = "a controller that holds the speed hides a weak drive, and what effort is healthy is not known where several drives move one body"
-_ALONE = "a controller that holds the speed hides a weak drive; name its current, duty or torque as its command (`wheel.{0}.u`) to have it judged"
-_UNSEEN = "without its command or another wheel of its side only a speed that is frozen, wild or noisy shows"
+_ALONE = "a controller that holds the speed hides a weak drive; name its current, duty or torque as its command (`wheel.{name}.u`) to have it judged"
+_UNSEEN = "without its command or another {wheel} of its side only a speed that is frozen, wild or noisy shows"
 
 
 @dataclass(frozen=True)
@@ -277,8 +277,8 @@ def _assessment(
         f"{one.data.name} has no command"
         if not r.answered
         else (
-            f"{one.data.name} answers its command after {r.delay:.2g} s with a lag of {r.lag:.2g} s, up to {r.limit:.3g} m/s and "
-            f"{r.rate:.2g} m/s²; usual misfit {float(np.median(r.noise)):.2g} m/s"
+            f"{one.data.name} answers its command after {r.delay:.2g} s with a lag of {r.lag:.2g} s, up to {r.limit:.3g} {{speed_unit}} and "
+            f"{r.rate:.2g} m/s²; usual misfit {float(np.median(r.noise)):.2g} {{speed_unit}}"
         )
     )
     note += f"; compared with {one.wheel.compared}." if one.wheel.compared else "."
@@ -296,9 +296,9 @@ def _assessment(
 
 def _drive(one: Judged, states: NDArray[np.int8], findings: tuple[Finding, ...]) -> Assessment:
     reasons = {
-        State.NOT_ASSESSED: _ALONE.format(one.data.name.split(".")[1]) if one.alone else _HIDDEN,
+        State.NOT_ASSESSED: _ALONE.replace("{name}", one.data.name.split(".")[1]) if one.alone else _HIDDEN,
         State.NOT_EXCITED: "nothing is commanded",
         State.NO_DATA: "no samples",
-        State.MASKED: "its speed sensor is faulty",
+        State.MASKED: "its {wheel.sensor} is faulty",
     }
     return Assessment(states, reasons, findings, {}, Tier.RESPONSE)

@@ -169,7 +169,7 @@ def _stuck(spell: Spell, wheel: Wheel, first: int, last: int) -> Finding | None:
     if (end - begin) * wheel.dt < _BEYOND_HABIT * wheel.habit:
         return None
     text = (
-        f"{wheel.name} read {value:.4g} m/s in {stop - start + 1} readings one after another, for {(end - begin) * wheel.dt:.2f} s; "
+        f"{wheel.name} read {value:.4g} {{speed_unit}} in {stop - start + 1} readings one after another, for {(end - begin) * wheel.dt:.2f} s; "
         "while it drives it otherwise changes all the time."
     )
     sat = Sat(value, abs(value), value, value, "m/s")
@@ -190,7 +190,7 @@ def _silent(spell: Spell, wheel: Wheel, first: int, last: int, seen: bool) -> Fi
         texts.append(f"{wheel.compared} went on moving.")
     if sensor == 0.5:
         texts.append(
-            "Without a jump or another view of this wheel, a drive at standstill and a dead sensor cannot be distinguished."
+            "Without a jump or another view of this {wheel}, a drive at standstill and a dead sensor cannot be distinguished."
         )
     sat = Sat(0.0, 0.0, 0.0, 0.0, "m/s")
     return _finding(
@@ -203,8 +203,8 @@ def _noisy(spell: Spell, wheel: Wheel, first: int, last: int) -> Finding:
     rms = float(np.sqrt(np.mean(wheel.samples.white[inside] ** 2)))
     usual = float(np.sqrt(np.median(wheel.samples.white[~inside] ** 2))) if (~inside).any() else 0.0
     text = (
-        f"{wheel.name} changes by {rms:.2g} m/s from reading to reading (second differences), otherwise by {usual:.2g} m/s; "
-        "a wheel's inertia forbids that."
+        f"{wheel.name} changes by {rms:.2g} {{speed_unit}} from reading to reading (second differences), otherwise by {usual:.2g} {{speed_unit}}; "
+        "the inertia of a {wheel} forbids that."
     )
     sat = Sat(0.0, rms, -rms, rms, "m/s")
     return _finding(first, last, FaultMode.NOISY, spell.p * _SENSOR, None, sat, (text,))
@@ -229,14 +229,15 @@ def _scaled(spell: Spell, wheel: Wheel, span: tuple[int, int], speed: Array | No
     end = span[1] if rose is None else int(wheel.samples.step[rose])
     texts = []
     if speed is not None:
-        texts.append(f"{wheel.name} is {gain:.2f} × what {wheel.compared} show of the same speed.")
+        texts.append(
+            f"{wheel.name} is {gain:.2f} × what {wheel.compared} show{'' if ' and ' in wheel.compared else 's'} of the same speed."
+        )
     if fell is not None or rose is not None:
         texts.append(f"It changed by a factor of about {gain:.2f} from one reading to the next, which no drive does.")
     if bare:
         texts.append(
             f"{wheel.name} is {gain:.2f} × what its command makes it do. It came while the speed was changing, and nothing else shows "
-            "this wheel's speed: a weak drive and a wrong sensor cannot be distinguished; another wheel of its side, a gyro or the "
-            "drive's effort would."
+            "the speed of this {wheel}: a weak drive and a wrong sensor cannot be distinguished; {or_view}the drive's effort would tell them apart."
         )
     sensor = 0.5 if bare else {0: _ONE_JUMP, 1: _ONE_JUMP, 2: _TWO_JUMPS}[(fell is not None) + (rose is not None)]
     sensor = _TWO_JUMPS if spell.own else sensor  # one encoder, two channels

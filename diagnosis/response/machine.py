@@ -63,7 +63,7 @@ def standstills(idle: Sequence[tuple[int, int]], dt: float) -> tuple[str, ...]:
     total, (start, stop) = sum(b - a for a, b in idle) * dt, max(idle, key=lambda s: s[1] - s[0])
     return (
         f"For {total:.1f} s all drives stood still together while they were commanded to move (longest {start * dt:.1f}–{stop * dt:.1f} s): "
-        "disabled, stopped by an emergency stop, or driven by another source of commands. No wheel is blamed for it.",
+        "disabled, stopped by an emergency stop, or driven by another source of commands. No {wheel} is blamed for it.",
     )
 
 
@@ -89,8 +89,8 @@ def otherwise(judged: Mapping[str, Judged], block_s: float) -> tuple[str, ...]:
 def unlike(judged: Mapping[str, Judged]) -> dict[str, str]:
     """Wheels that make something else of their command than other wheels do, or any drive would, with a sentence."""
     out = {
-        w: f"over the whole mission it reads {share:.2f} × what the other wheels make of the same command: a scaled or wrongly "
-        "mapped sensor, another wheel diameter, or a weak drive"
+        w: f"over the whole mission it reads {share:.2f} × what the other {{wheels}} make of the same command: a scaled or wrongly "
+        "mapped sensor, {or_size}a weak {valve}"
         for w, share in _shares(judged).items()
         if not _LASTING <= share <= 1.0 / _LASTING
     }

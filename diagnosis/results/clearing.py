@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 
 from diagnosis.results.document import ClearingRow
-from diagnosis.results.vocabulary import Kind, part_words
+from diagnosis.results.machine_words import HYDRAULIC, MachineWords
+from diagnosis.results.vocabulary import Kind
 from replay.faults import Side
 
 
@@ -29,45 +31,49 @@ class Check(StrEnum):
     LASTING_YAW = "lasting_yaw"
 
 
-#: What a check compares, and what is said where it is beyond its limit; ``{part}``, ``{value}`` and ``{limit}`` are filled in.
+#: What a check compares, and what is said where it is beyond its limit; ``{part}`` and ``{value}`` are filled in, and the
+#: machine's words.
 CHECK_WORDS: dict[Check, tuple[str, str]] = {
     Check.SECOND_MEASUREMENT: (
         "against its second measurement",
         "the {part} is off its second measurement by {value} % of what it should show",
     ),
     Check.RESPONSE: (
-        "speed per opening below the other wheels', for 3 s",
-        "the speed of {part} per opening falls below the other wheels' by {value} %",
+        "speed per {unit_command} below the other {wheels}', for 3 s",
+        "the speed of {part} per {unit_command} falls below the other {wheels}' by {value} %",
     ),
     Check.LASTING_RESPONSE: (
-        "speed per opening below the other wheels', over the mission",
-        "the speed of {part} per opening is below the other wheels' by {value} % over the mission",
+        "speed per {unit_command} below the other {wheels}', over the mission",
+        "the speed of {part} per {unit_command} is below the other {wheels}' by {value} % over the mission",
     ),
     Check.EXCESS: (
-        "speed per opening above the other wheels', for 3 s",
-        "the speed of {part} per opening rises above the other wheels' by {value} %",
+        "speed per {unit_command} above the other {wheels}', for 3 s",
+        "the speed of {part} per {unit_command} rises above the other {wheels}' by {value} %",
     ),
     Check.LASTING_EXCESS: (
-        "speed per opening above the other wheels', over the mission",
-        "the speed of {part} per opening is above the other wheels' by {value} % over the mission",
+        "speed per {unit_command} above the other {wheels}', over the mission",
+        "the speed of {part} per {unit_command} is above the other {wheels}' by {value} % over the mission",
     ),
     Check.TRACKING: (
-        "error of tracking, less that of the other wheels",
-        "{part} is off its commanded speed by {value} % more than the other wheels are",
+        "error of tracking, less that of the other {wheels}",
+        "{part} is off its commanded speed by {value} % more than the other {wheels} are",
     ),
     Check.ROUGHNESS: ("quick changes of the speed", "the speed of {part} jumps by {value} % of itself"),
-    Check.DELAY: ("delay against the other wheels", "the speed of {part} comes {value} later than the other wheels'"),
+    Check.DELAY: (
+        "delay against the other {wheels}",
+        "the speed of {part} comes {value} later than the other {wheels}'",
+    ),
     Check.STILL: (
-        "valve command while the axle stands still",
-        "the {part} axle stands still while its valve is commanded to {value} % of full opening",
+        "{valve} command while the axle stands still",
+        "the {part} axle stands still while its {valve} is commanded to {value}{percent}",
     ),
     Check.RATE: (
-        "steering rate per opening against the axle's usual one",
-        "the steering rate of the {part} axle per opening deviates from its usual one by {value} %",
+        "steering rate per {unit_command} against the axle's usual one",
+        "the steering rate of the {part} axle per {unit_command} deviates from its usual one by {value} %",
     ),
     Check.LASTING_RATE: (
-        "steering rate per opening against the other axle, over the mission",
-        "the steering rate of the {part} axle per opening is off the other axle's by {value} % over the mission",
+        "steering rate per {unit_command} against the other axle, over the mission",
+        "the steering rate of the {part} axle per {unit_command} is off the other axle's by {value} % over the mission",
     ),
     Check.YAW: (
         "yaw rate against that by the steering angles, for 3 s",
@@ -99,6 +105,8 @@ class Checked:
     shows : float or None
         Smallest loss [1] that would have been beyond the limit with 95 %, by how the mission's other windows vary: for three
         seconds, or for the whole mission where the check is of that. None: the check is not of a loss, or shows nothing.
+    words : MachineWords
+        How to speak of the machine.
     """
 
     kind: Kind
@@ -110,6 +118,12 @@ class Checked:
     start_s: float | None = None
     stop_s: float | None = None
     shows: float | None = None
+    words: MachineWords = HYDRAULIC
+
+    @property
+    def asked(self) -> str:
+        """What the check compares."""
+        return self.words.fill(CHECK_WORDS[self.check][0])
 
     @property
     def passed(self) -> bool:
@@ -121,11 +135,13 @@ class Checked:
         """Why it does not clear the part; empty where it does."""
         if self.passed:
             return ""
-        words = part_words(self.kind, self.component, self.side)
+        words = self.words.part_words(self.kind, self.component, self.side)
         if self.worst is None:
-            return f"{words}: the mission does not show {CHECK_WORDS[self.check][0]}"
+            return f"{words}: the mission does not show {self.asked}"
         two = self.check is Check.SECOND_MEASUREMENT
-        said = CHECK_WORDS[self.check][1].format(part=words if two else self.component, value=self._value)
+        said = self.words.fill(CHECK_WORDS[self.check][1]).format(
+            part=words if two else self.component, value=self._value
+        )
         return said + (f" at {self.start_s:.1f}–{self.stop_s:.1f} s" if self.start_s is not None else "")
 
     @property
@@ -137,7 +153,7 @@ class Checked:
 def size_words(check: str, value: float) -> str:
     """A value of a check in its unit."""
     if check in (Check.YAW, Check.LASTING_YAW):
-        return f"{value:.2f} rad"
+        return f"{math.degrees(value):.1f}°"
     return f"{value:.2f} s" if check == Check.DELAY else f"{100 * min(value, 9.99):.0f} %"
 
 
@@ -148,7 +164,7 @@ def clearing_rows(checks: Sequence[Checked]) -> list[ClearingRow]:
             "component": c.component,
             "side": c.side,
             "check": c.check,
-            "asked": CHECK_WORDS[c.check][0],
+            "asked": c.asked,
             "worst": c.worst,
             "limit": c.limit,
             "start_s": c.start_s,

@@ -9,6 +9,7 @@ from typing import Final, Literal, TypedDict
 
 from diagnosis.results.size_rows import EpsilonRow
 from diagnosis.results.vocabulary import Kind, Severity, Tier, Verdict
+from diagnosis.results.words_row import Worded
 from replay.faults import FaultMode, Side
 
 SCHEMA: Final = "mfhca-compare/1"
@@ -131,7 +132,7 @@ class PreviousRow(TypedDict):
     notes: list[str]
 
 
-class ComparisonDocument(TypedDict):
+class ComparisonDocument(Worded):
     """Two missions of one machine, as `mfhca compare --json` prints them: faults that are new, worse, changed, gone."""
 
     schema: Literal["mfhca-compare/1"]

@@ -8,6 +8,7 @@ from enum import StrEnum
 from typing import NamedTuple
 
 from diagnosis.results.document import DetectabilityRow, DetectabilityTable, DetectabilityTrace
+from diagnosis.results.machine_words import MachineWords
 from diagnosis.results.vocabulary import Kind
 from replay.faults import Side
 
@@ -39,7 +40,7 @@ class Detectable:
     size : float or None
         Smallest size that the mission would have shown at 95 % of such places, in `unit`; None: it would not.
     unit : str
-        ``1``: share of the true value; else m/s, rad or s.
+        ``1``: share of the true value; else m/s (of joints their unit of speed, in documents), rad or s.
     share : float or None
         Share of the places [1] at which a fault of the size that counts, a signal that is lost or one that stays at its last
         value would have been found; None for what has no such size.
@@ -120,19 +121,19 @@ class Detectability:
     traces: tuple[Trace, ...]
 
 
-def detectability_table(found: Detectability) -> DetectabilityTable:
+def detectability_table(found: Detectability, words: MachineWords) -> DetectabilityTable:
     """For ``report.json``."""
-    return {"rows": [_row(d) for d in found.rows], "traces": [_trace(t) for t in found.traces]}
+    return {"rows": [_row(d, words) for d in found.rows], "traces": [_trace(t) for t in found.traces]}
 
 
-def _row(d: Detectable) -> DetectabilityRow:
+def _row(d: Detectable, words: MachineWords) -> DetectabilityRow:
     return {
         "component": d.component,
         "side": d.side,
         "deviation": d.deviation,
         "for_s": d.for_s,
         "size": d.size,
-        "unit": d.unit,
+        "unit": words.unit(d.unit),
         "share": d.share,
         "places": d.places,
         "told": d.told,

@@ -1,7 +1,7 @@
 """`report.json` as types: the document that pages, comparison, audit and scripts read.
 
 Fields may be added within the schema, none renamed or removed. All times are seconds from the mission's start unless a
-name ends in ``_ns``; speeds are m/s, angles rad, shares and ε plain numbers; what is not known is null.
+name ends in ``_ns``; speeds are m/s (of joints in the unit of `MachineRow.words`), angles rad, shares and ε plain numbers; what is not known is null.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ from msgspec import Meta
 from diagnosis.results.comparison_document import PreviousRow
 from diagnosis.results.size_rows import EpsilonRow, SatRow
 from diagnosis.results.vocabulary import Kind, Severity, Tier, Verdict
+from diagnosis.results.words_row import Worded
 from replay.faults import FaultMode, Side, State
 
 SCHEMA: Final = "mfhca-report/1"
@@ -86,8 +87,11 @@ class MachineIdentity(TypedDict):
     wheels: list[str]
 
 
-class MachineRow(MachineIdentity):
-    """The machine, where its settings come from, and in `assumed` which numbers are the paper's machine's for want of its own."""
+class MachineRow(MachineIdentity, Worded):
+    """The machine, where its settings come from, and in `assumed` which numbers are the paper's machine's for want of its own.
+
+    Speeds are in `words.speed_unit`, which is m/s but for joints.
+    """
 
     name: str
     axles: list[str]
@@ -105,10 +109,15 @@ class ReadingRow(TypedDict):
 
 
 class ActionRow(TypedDict):
-    """What to do about one part."""
+    """What to do about one part.
+
+    `lead`: the order and the part, with which `text` begins; `check`: how to go about it, of the part's worst fault.
+    """
 
     n: int
     text: str
+    lead: NotRequired[str]
+    check: NotRequired[str]
     faults: list[str]
     severity: Severity
 
@@ -155,6 +164,7 @@ class IntervalRow(TypedDict):
     evidence: list[str]
     tier: Tier
     detected_s: Seconds | None
+    check: NotRequired[str]
 
 
 class StateRow(TypedDict):
@@ -169,7 +179,7 @@ class StateRow(TypedDict):
 
 
 class PhaseRow(TypedDict):
-    """What the machine was doing: ``standstill``, ``forward``, ``reverse``, ``turning``."""
+    """What the machine was doing: ``standstill``, ``forward``, ``reverse``, ``turning``, of joints ``moving``."""
 
     name: str
     start_s: Seconds

@@ -4,8 +4,8 @@ A row is a side and a mode. Whatever names or shows a row looks it up here: code
 labels of pages and terminal, titles, advice, colours, signs and curves. What a row makes of a signal says
 `replay.faults.TABLE_ROWS`; which filters stand for it says the family of evidence that sees it.
 
-A new row is a member of `replay.faults.FaultMode` and `State`, an entry in `replay.faults.TABLE_ROWS`, in `FAULT_ROWS` and
-in `LOOKS`, and a model with its filter in at least one family, such as `diagnosis.estimation.fault_models`.
+A new row is a member of `replay.faults.FaultMode` and `State`, an entry in `replay.faults.TABLE_ROWS`, in `FAULT_ROWS`, in
+`LOOKS` and in the tables of `diagnosis.decision.advice`, and a model with its filter in at least one family, such as `diagnosis.estimation.fault_models`.
 """
 
 from __future__ import annotations
@@ -35,10 +35,6 @@ class FaultRow:
     title : str
         Title of a fault whose size is known, with any of ``{part}``, ``{mean}`` and ``{rms}`` of the saturation term and
         ``{lost}`` [%]; without it, or with a size not known, part and label.
-    check : str
-        What to check where the fault is no reason to stop, to follow *check the*; empty: sensor or valve.
-    check_steer : str
-        The same of a steering axle; empty: as of a wheel.
     """
 
     side: Side
@@ -47,8 +43,6 @@ class FaultRow:
     label: str
     words: str
     title: str = ""
-    check: str = ""
-    check_steer: str = ""
 
 
 FAULT_ROWS: tuple[FaultRow, ...] = (
@@ -61,8 +55,6 @@ FAULT_ROWS: tuple[FaultRow, ...] = (
         "Inefficient",
         "inefficient",
         "{part} inefficient, {lost} % lost",
-        "sensor's gap, magnet and scaling",
-        "sensor's wire, mount and scaling",
     ),
     FaultRow(
         Side.SENSOR,
@@ -71,7 +63,6 @@ FAULT_ROWS: tuple[FaultRow, ...] = (
         "Noisy",
         "noisy",
         "{part} noisy, {rms} r.m.s.",
-        "sensor's shield, ground and supply",
     ),
     FaultRow(Side.ACTUATOR, FaultMode.STUCK, 0.05, "Stuck", "stuck", "{part} stuck at {mean}"),
     FaultRow(
@@ -84,7 +75,6 @@ FAULT_ROWS: tuple[FaultRow, ...] = (
         "Inefficient",
         "inefficient",
         "{part} inefficient, {lost} % lost",
-        "valve's pressure, leakage and spool travel",
     ),
     FaultRow(
         Side.ACTUATOR,
@@ -93,7 +83,6 @@ FAULT_ROWS: tuple[FaultRow, ...] = (
         "Disturbed",
         "disturbed",
         "{part} disturbed, {rms} r.m.s.",
-        "valve's command wiring and pilot",
     ),
 )
 
@@ -204,6 +193,11 @@ def state_label(state: str, side: str = "") -> str:
 
 
 def mode_words(side: str, mode: str) -> str:
-    """A fault mode in words for its side, to follow *was*; words of other tools' documents stay."""
+    """A fault mode in words for its side, to follow *was*; words of other tools' documents stay.
+
+    Of a part of which either side may be faulty, a standstill is no missing signal.
+    """
+    if side == Side.SENSOR_OR_ACTUATOR and mode == FaultMode.NO_SIGNAL:
+        return "without signal or motion"
     found = row_of(side, mode)
     return found.words if found is not None else state_label(mode).lower()

@@ -94,6 +94,8 @@ class FaultInterval:
     detected_s : float or None
         Mission time [s] at which the same evidence, read without anything later, would have raised the fault; None
         where that is not known.
+    check : str
+        How a technician checks the part.
     """
 
     id: str
@@ -114,6 +116,7 @@ class FaultInterval:
     evidence: tuple[str, ...]
     tier: Tier
     detected_s: float | None = None
+    check: str = ""
 
 
 @dataclass(frozen=True)

@@ -1,7 +1,8 @@
-"""The words of a diagnosis, once: severities, verdicts, tiers of evidence, kinds of component and their parts.
+"""The words of a diagnosis, once: severities, verdicts, tiers of evidence, kinds of component.
 
 Terminal, pages, JSON, comparison and fleet take rank and words from here; fault modes and states have theirs in
-`diagnosis.results.fault_rows`. Everything is a `StrEnum`, so that a member is its own name in JSON.
+`diagnosis.results.fault_rows`, the parts of a machine in `diagnosis.results.machine_words`, which also fills in words in
+braces. Everything is a `StrEnum`, so that a member is its own name in JSON.
 """
 
 from __future__ import annotations
@@ -90,15 +91,15 @@ class Tier(StrEnum):
 
     @property
     def words(self) -> str:
-        """What the evidence is, to follow *by*."""
+        """What the evidence is, to follow *by*; for `MachineWords.fill`."""
         return _TIERS[self].by
 
     def name_of(self, kind: Kind) -> str:
-        """Name of the evidence: ``second measurement``, ``wheel model``; empty where there is none."""
+        """Name of the evidence: ``second measurement``, ``{wheel} model``; empty where there is none; for `MachineWords.fill`."""
         return _TIERS[self].evidence.format(kind=_KIND_WORDS[kind])
 
     def decided(self, kind: Kind, side: Side) -> str:
-        """How a fault of a component and side was decided; empty where nothing says so."""
+        """How a fault of a component and side was decided; empty where nothing says so; for `MachineWords.fill`."""
         second = _SECOND.get((kind, side), "")
         how = _TIERS[self].decided
         return how.format(kind=_KIND_WORDS[kind], second=second) if second or "{second}" not in how else ""
@@ -117,7 +118,7 @@ _TIER_RANK = {member: i for i, member in enumerate(Tier)}
 _TIERS = {
     Tier.DIRECT: _TierRow(3, "second measurements", "second measurement", "measured against {second}"),
     Tier.MODEL: _TierRow(
-        2, "a model of the wheels", "{kind} model", "by the {kind} model, without a second measurement"
+        2, "a model of the {wheels}", "{kind} model", "by the {kind} model, without a second measurement"
     ),
     Tier.DRIVE: _TierRow(
         2, "a model of the drive", "drive model", "by the drive's own effort, without a second measurement"
@@ -127,7 +128,7 @@ _TIERS = {
         1,
         "how the drives answer their commands",
         "command response",
-        "against what its command and the other wheels make it do, without a second measurement",
+        "against what its command and the other {{wheels}} make it do, without a second measurement",
     ),
     Tier.TRACKING: _TierRow(
         1,
@@ -146,29 +147,11 @@ class Kind(StrEnum):
     STEER = "steer"
 
 
-_KIND_WORDS = {Kind.WHEEL: "wheel", Kind.STEER: "steering"}
+_KIND_WORDS = {Kind.WHEEL: "{wheel}", Kind.STEER: "steering"}
 # What a part's channel is measured against, where it is measured twice.
 _SECOND = {
-    (Kind.WHEEL, Side.SENSOR): "a second speed sensor",
-    (Kind.WHEEL, Side.ACTUATOR): "the valve's position",
+    (Kind.WHEEL, Side.SENSOR): "a second {wheel.sensor}",
+    (Kind.WHEEL, Side.ACTUATOR): "the {position}",
     (Kind.STEER, Side.SENSOR): "a second angle sensor",
-    (Kind.STEER, Side.ACTUATOR): "the valve's position",
+    (Kind.STEER, Side.ACTUATOR): "the {position}",
 }
-_PARTS: dict[tuple[str, str], str] = {
-    (Kind.WHEEL, Side.SENSOR): "speed sensor",
-    (Kind.WHEEL, Side.ACTUATOR): "drive valve",
-    (Kind.WHEEL, Side.SENSOR_OR_ACTUATOR): "speed sensor or drive valve",
-    (Kind.STEER, Side.SENSOR): "steering sensor",
-    (Kind.STEER, Side.ACTUATOR): "steering valve",
-    (Kind.STEER, Side.SENSOR_OR_ACTUATOR): "steering sensor or valve",
-}
-
-
-def part_name(kind: str, side: str) -> str:
-    """Words for the part of a component on one side: ``drive valve``; words of other tools' documents stay."""
-    return _PARTS.get((kind, side), side.replace("_", " "))
-
-
-def part_words(kind: str, component: str, side: str) -> str:
-    """A component and its part in words: ``FR speed sensor``, ``front steering valve``."""
-    return f"{component} {part_name(kind, side)}"

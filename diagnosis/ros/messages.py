@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from diagnosis.report.confidence import headline
 from diagnosis.results.document import IntervalRow, ReportDocument
+from diagnosis.results.machine_words import words_of
 from diagnosis.results.vocabulary import Verdict
 from diagnosis.ros.statuses import Level, Status, courses, fault_name, level_of
 from replay.export.formats.cdr import Cdr
@@ -92,19 +93,19 @@ def events(report: ReportDocument) -> list[tuple[int, bytes]]:
     level = Level.ERROR if status == Verdict.STOP else Level.WARN if status == Verdict.WATCH else Level.OK
     found = [(first, 0, _event(first, level, "verdict", words))]
     for fault in report["intervals"]:
-        part = fault_name(fault)
+        part = fault_name(fault, words_of(report["machine"]))
         begin, end = fault["start_ns"], fault["stop_ns"]
-        found.append((begin, 2, _event(begin, level_of(fault["severity"]), part, _begins(fault))))
+        found.append((begin, 2, _event(begin, level_of(fault["severity"]), part, _begins(fault, part))))
         lasted = fault["stop_s"] - fault["start_s"]
         found.append((end, 1, _event(end, Level.OK, part, f"{fault['id']} ends: {part}, after {lasted:.2f} s")))
     return [(ns, octets) for ns, _, octets in sorted(found, key=lambda e: e[:2])]
 
 
-def _begins(fault: IntervalRow) -> str:
+def _begins(fault: IntervalRow, part: str) -> str:
     epsilon = fault["epsilon"]
     size = [] if epsilon is None else [f"ε {epsilon['value']:.2f} ({epsilon['low']:.2f}–{epsilon['high']:.2f})"]
     facts = ", ".join([*size, f"p {fault['probability']:.3f}", f"severity {fault['severity']}"])
-    return " ".join([f"{fault['id']} begins: {fault_name(fault)}, {facts}.", *fault["evidence"]])
+    return " ".join([f"{fault['id']} begins: {part}, {facts}.", *fault["evidence"]])
 
 
 def _event(ns: int, level: Level, name: str, words: str) -> bytes:

@@ -14,7 +14,8 @@ from enum import IntEnum
 from diagnosis.results.candidates import candidates_of, label_of, unclear_words
 from diagnosis.results.document import CoverageRow, IntervalRow, ReportDocument, StateRow
 from diagnosis.results.fault_rows import mode_words, state_label
-from diagnosis.results.vocabulary import Kind, Severity, part_words
+from diagnosis.results.machine_words import MachineWords, words_of
+from diagnosis.results.vocabulary import Kind, Severity
 from replay.faults import FAULT_STATES, Side, State
 
 
@@ -66,9 +67,9 @@ def courses(report: ReportDocument) -> tuple[PartCourse, ...]:
     return tuple(_course(report, row) for row in report["coverage"])
 
 
-def fault_name(fault: IntervalRow) -> str:
+def fault_name(fault: IntervalRow, words: MachineWords) -> str:
     """Part and row of a fault: ``FR speed sensor stuck``; its candidates where no row has the majority."""
-    part = part_words(fault["kind"], fault["component"], fault["side"])
+    part = words.part_words(fault["kind"], fault["component"], fault["side"])
     modes = candidates_of(fault)
     return f"{part} {unclear_words(fault['side'], modes) if modes else mode_words(fault['side'], fault['mode'])}"
 
@@ -86,7 +87,7 @@ def hardware_of(report: ReportDocument) -> str:
 def _course(report: ReportDocument, row: CoverageRow) -> PartCourse:
     component, side = row["component"], row["side"]
     kind = Kind.STEER if component in report["machine"]["axles"] else Kind.WHEEL
-    name, origin = part_words(kind, component, side), report["log"]["start_ns"]
+    name, origin = words_of(report["machine"]).part_words(kind, component, side), report["log"]["start_ns"]
     states = sorted(
         (s for s in report["states"] if (s["component"], s["side"]) == (component, side)), key=lambda s: s["start_s"]
     )

@@ -145,7 +145,7 @@ def _note(axle: AxleFilter) -> str:
     """The figures that the judgement used."""
     plant, noise = axle.model.plant, axle.model.noise
     return (
-        f"{axle.names[0]} by the steering model with {axle.names[1]}: {plant.gain:.3g} rad/s per full opening, at most "
+        f"{axle.names[0]} by the steering model with {axle.names[1]}: {plant.gain:.3g} rad/s at 100{{percent}}, at most "
         f"{plant.rate:.3g} rad/s, lag {plant.lag:.2g} s, noise {noise.std:.2g} rad, rounding step "
         f"{noise.lsb:.2g} rad, error of the rate {axle.model.rate_error:.2g} rad/s."
     )
@@ -158,15 +158,15 @@ def _assessment(side: Side, inputs: AxleInputs, judged: _Judged | None) -> Asses
         return unassessed(size, State.NO_DATA, "the steering angle is not in the log")
     if side is Side.ACTUATOR:
         if not {"u", "u_applied", "phi"} & inputs.logged:
-            return unassessed(size, State.NO_DATA, "the steering valve's command is not in the log")
+            return unassessed(size, State.NO_DATA, "the {steer.actuator}'s command is not in the log")
         if inputs.command_missing:
-            return unassessed(size, State.NOT_ASSESSED, "the valve's position is logged but not its command")
+            return unassessed(size, State.NOT_ASSESSED, "the {position} is logged but not its command")
     if judged is not None:
         return judged.sides[side]
     if inputs.blocks is None:
-        why = "neither a steering command nor the valve's position is in the log"
+        why = "neither a steering command nor the {position} is in the log"
     else:
-        why = "the axle was steered too little to identify what its valve does"
+        why = "the axle was steered too little to identify what its {valve} does"
     return unassessed(size, State.NOT_ASSESSED, why)
 
 

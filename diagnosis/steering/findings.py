@@ -10,8 +10,10 @@ import numpy as np
 
 from diagnosis.results.assessment import Finding
 from diagnosis.results.fault_rows import mode_words
+from diagnosis.results.machine_words import part_token
 from diagnosis.results.result import Epsilon, Hypothesis
-from diagnosis.results.vocabulary import Kind, Tier, part_name
+from diagnosis.results.sizes import times_as_probable
+from diagnosis.results.vocabulary import Kind, Tier
 from diagnosis.steering.excitation import asked
 from diagnosis.steering.fault_size import estimate_size, level_of
 from diagnosis.steering.filter_state import SteeringPath
@@ -245,8 +247,8 @@ def _sentences(choice: _Choice, gain: float, ranked: Sequence[tuple[Fault, float
     """What decided, one sentence each."""
     channel = run.axle.names[0]
     lines = [
-        f"Over {run.seconds:.2f} s the model “{_words((choice.side, choice.mode))}” explains {channel} better than "
-        f"a healthy axle by a log-evidence of {gain:.0f}; a fault is considered from {run.axle.model.switch_cost:.0f}."
+        f"Over {run.seconds:.2f} s {channel} is {times_as_probable(gain)} with “{_words((choice.side, choice.mode))}” as with a "
+        "healthy axle."
     ]
     if choice.dead_sensor:
         level, spread, count = level_of(run.start, run.stop, run.axle)
@@ -260,7 +262,7 @@ def _sentences(choice: _Choice, gain: float, ranked: Sequence[tuple[Fault, float
         lines.append(f"Next best: {_words(fault)} with {100 * probability:.1f} %.")
     if choice.stated is Side.SENSOR_OR_ACTUATOR:
         lines.append(
-            "Without a second measurement, a loss of gain of the sensor and one of the valve cannot be distinguished here."
+            "Without a second measurement, a loss of gain of the sensor and one of the {valve} cannot be distinguished here."
         )
     return tuple(lines)
 
@@ -275,4 +277,4 @@ def _hypothesis(fault: Fault, probability: float) -> Hypothesis:
 def _words(fault: Fault) -> str:
     """Part and mode: ``steering valve stuck``."""
     hypothesis = _hypothesis(fault, 1.0)
-    return f"{part_name(Kind.STEER, hypothesis.side)} {mode_words(hypothesis.side, hypothesis.mode)}"
+    return f"{part_token(Kind.STEER, hypothesis.side)} {mode_words(hypothesis.side, hypothesis.mode)}"

@@ -22,11 +22,11 @@ _SEEN_ALONE_S, _SEEN_BETWEEN_S = 6.0, 30.0  # where the valve's opening is measu
 REASONS: dict[Side, Mapping[State, str]] = {
     Side.SENSOR: {
         State.NOT_EXCITED: "the axle was not steered, and the sensor's rounding hides its noise",
-        State.NOT_ASSESSED: "no valve command to compare with, or no single fault explains the angle well enough",
+        State.NOT_ASSESSED: "no {valve} command to compare with, or no single fault explains the angle well enough",
         State.NO_DATA: "no samples",
     },
     Side.ACTUATOR: {
-        State.NOT_EXCITED: "the axle was not steered, so there is no evidence on its valve",
+        State.NOT_EXCITED: "the axle was not steered, so there is no evidence on its {valve}",
         State.MASKED: "the steering sensor, which is needed for it, delivers nothing usable",
         State.NOT_ASSESSED: "the steering model does not hold here, or no single fault explains the angle",
         State.NO_DATA: "no samples",

@@ -178,9 +178,13 @@ def _note(path: WheelPath) -> str:
     model, (speed, opening) = path.model, path.names
     air = model.grip_most <= 0
     return (
-        f"{speed} by the wheel model with {opening}: noise {model.noise:.2g} m/s, load and model error "
-        f"{model.load:.2g} m/s, K {model.K:.3g} m/s per full opening, τ {model.tau:.2g} s, "
-        + ("no coupling by the ground." if air else f"tyres that hold up to {model.grip_most:.2g} m/s of load.")
+        f"{speed} by the {{wheel}} model with {opening}: noise {model.noise:.2g} {{speed_unit}}, load and model error "
+        f"{model.load:.2g} {{speed_unit}}, K {model.K:.3g} {{speed_unit}} at 100{{percent}}, τ {model.tau:.2g} s, "
+        + (
+            "no coupling by the ground."
+            if air
+            else f"tyres that hold up to {model.grip_most:.2g} {{speed_unit}} of load."
+        )
     )
 
 

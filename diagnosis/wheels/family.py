@@ -50,7 +50,7 @@ class WheelEvidence:
         against = against_command(channels.speed, replay.v_ref)
         if against > MOST_AGAINST:
             said.append(
-                f"The wheels turned against their commanded speeds for {100 * against:.0f} % of the driving: the controller does not "
+                f"The {{wheels}} turned against their commanded speeds for {100 * against:.0f} % of the driving: the controller does not "
                 "follow them, and they were left out."
             )
         return Contribution({part: replace(a, notes=(*a.notes, *said)) for part, a in parts.items()}, model=fit)

@@ -48,9 +48,9 @@ def identified(drive: Drive, machine: Machine, given: dict[int, WheelPlant]) -> 
     shown = ", ".join("–" if p is None else f"{p.K:.3g}" for p in plants)
     first = next(p for p in found.plants if p is not None)
     note = (
-        f"Wheel model identified in {found.windows} windows of 1 s: K = {shown} m/s per full opening where the machine "
+        f"Model of the {{wheels}} identified in {found.windows} windows of 1 s: K = {shown} {{speed_unit}} at 100{{percent}} where the machine "
         f"works, τ = {first.tau:.2g} s, hysteresis {100 * first.hysteresis:.2g} %, "
-        + ("wheels free of the ground" if not first.grip else f"grip {first.grip:.2g}")
+        + ("{wheels} free of the ground" if not first.grip else f"grip {first.grip:.2g}")
         + f"; the better windows leave {100 * found.misfit:.1f} % of the speed unexplained, the median one "
         f"{100 * found.typical:.1f} %"
         + ("." if reliable else f": too uncertain to judge gains by (limit {100 * _MOST_MISFIT:.0f} %).")
@@ -139,8 +139,10 @@ def _identify(y: Array, u: Array, moving: NDArray[np.bool_], dt: float, given: d
         plants[i] = plant
     if best is None:
         known = all(p is not None for p in plants)
-        why = "from the machine file" if known else "no window in which a wheel moves under a recorded valve command"
-        return WheelModelFit(tuple(plants), 0.0, 0, known, f"Wheel model: {why}.", not known)
+        why = (
+            "from the machine file" if known else "no window in which a {wheel} moves under a recorded {valve} command"
+        )
+        return WheelModelFit(tuple(plants), 0.0, 0, known, f"Model of the {{wheels}}: {why}.", not known)
     _, tau, gains = best
     pooled = np.concatenate(gains)
     centre = mode(pooled)
@@ -156,7 +158,7 @@ def _identify(y: Array, u: Array, moving: NDArray[np.bool_], dt: float, given: d
     reliable = len(given) == len(wheels) or (pooled.size >= 5 and spread <= _MAX_SPREAD and centre > 0)
     shown = ", ".join("–" if p is None else f"{p.K:.3g}" for p in plants)
     note = (
-        f"Wheel model identified in {pooled.size} windows of {_WINDOW_S:g} s: K = {shown} m/s per full opening, "
+        f"Model of the {{wheels}} identified in {pooled.size} windows of {_WINDOW_S:g} s: K = {shown} {{speed_unit}} at 100{{percent}}, "
         f"τ = {tau:g} s, spread of the windows {100 * spread:.0f} %"
         + ("." if reliable else f": too uncertain to judge gains by (limit {100 * _MAX_SPREAD:.0f} %).")
     )

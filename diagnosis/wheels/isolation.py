@@ -10,8 +10,10 @@ from numpy.typing import NDArray
 
 from diagnosis.results.assessment import Finding
 from diagnosis.results.fault_rows import mode_words
+from diagnosis.results.machine_words import part_token
 from diagnosis.results.result import Hypothesis
-from diagnosis.results.vocabulary import Kind, Tier, part_name
+from diagnosis.results.sizes import times_as_probable
+from diagnosis.results.vocabulary import Kind, Tier
 from diagnosis.wheels.estimates import estimate
 from diagnosis.wheels.models import (
     A_GAIN,
@@ -194,13 +196,13 @@ def _sentences(
     ]
     ahead = run.ahead(m)
     if ahead > 0:
-        lines.append(
-            f"Its Kalman model explains {names[0]} better than that of a healthy wheel by a log-evidence of {ahead:.0f}."
-        )
+        lines.append(f"{names[0]} is {times_as_probable(ahead)} by its Kalman model as by that of a healthy {{wheel}}.")
     else:
-        lines.append("Its Kalman model alone would not be preferred to that of a healthy wheel.")
+        lines.append("Its Kalman model alone would not be preferred to that of a healthy {wheel}.")
     if m in TOTAL_SENSOR and known.size:
-        lines.append(f"{names[0]} stayed within {float(np.ptp(known)):.2g} m/s of {float(np.mean(known)):.4g} m/s.")
+        lines.append(
+            f"{names[0]} stayed within {float(np.ptp(known)):.2g} {{speed_unit}} of {float(np.mean(known)):.4g} {{speed_unit}}."
+        )
     for other, probability in ranked:
         if other is not None and other != row:
             if probability >= _LEAST_PART:
@@ -208,11 +210,11 @@ def _sentences(
             break
     if side is Side.SENSOR_OR_ACTUATOR:
         lines.append(
-            "Without a second measurement, a loss of gain of the sensor and one of the valve cannot be distinguished here."
+            "Without a second measurement, a loss of gain of the sensor and one of the {valve} cannot be distinguished here."
         )
     return tuple(lines)
 
 
 def _words(row: Row) -> str:
     side, mode = row
-    return f"{part_name(Kind.WHEEL, side)} {mode_words(side, mode)}"
+    return f"{part_token(Kind.WHEEL, side)} {mode_words(side, mode)}"

@@ -20,18 +20,22 @@ def onset_sentence(start: int, y: Array, model: WheelFilterModel, dt: float, nam
     largest = float(steps.max())
     fastest = float(np.nan_to_num(np.abs(y[low - 1 : high])).max())
     able = (model.K + fastest) * min(1.0, dt / model.tau)  # by a wheel whose valve opens wholly the other way
-    jump = f"At its onset {name} jumps by {largest:.2g} m/s within one sample ({largest / model.noise:.0f} times its noise)"
+    jump = f"At its onset {name} jumps by {largest:.2g} {{speed_unit}} within one sample ({largest / model.noise:.0f} times its noise)"
     beyond = largest > max(8 * model.noise, able)
     if side is Side.ACTUATOR:
         if beyond:
-            return f"{jump}: a fault of the valve alone does not explain this."
+            return f"{jump}: a fault of the {{valve}} alone does not explain this."
         return (
-            f"At its onset {name} changes with the lag of the wheel, and no step exceeds {largest:.2g} m/s: this is how a wheel "
-            "reacts when its valve fails."
+            f"At its onset {name} changes with the lag of the {{wheel}}, and no step exceeds {largest:.2g} {{speed_unit}}: this is how a {{wheel}} "
+            "reacts when its {valve} fails."
         )
     if beyond:
-        return f"{jump}. A sensor can do this, a wheel cannot."
-    return f"{jump}." if largest > 8 * model.noise else f"At its onset no step of {name} exceeds {largest:.2g} m/s."
+        return f"{jump}. A sensor can do this, a {{wheel}} cannot."
+    return (
+        f"{jump}."
+        if largest > 8 * model.noise
+        else f"At its onset no step of {name} exceeds {largest:.2g} {{speed_unit}}."
+    )
 
 
 def refined(start: int, y: Array, reach: int, m: int, noise: float) -> int:

@@ -15,13 +15,13 @@ from diagnosis.wheels.inputs import WheelsData
 from replay.faults import Side, State
 
 _REASONS = {
-    State.NOT_EXCITED: "the wheel is neither commanded nor moving",
-    State.MASKED: "the speed sensor, which is needed for it, delivers nothing usable",
+    State.NOT_EXCITED: "the {wheel} is neither commanded nor moving",
+    State.MASKED: "the {wheel.sensor}, which is needed for it, delivers nothing usable",
     State.NO_DATA: "no samples",
-    State.SLIP: "the wheel's speed contradicts the other wheels while it follows its valve: it slips, or its sensor is faulty",
+    State.SLIP: "the {wheel}'s speed contradicts the other {wheels} while it follows its {valve}: it slips, or its sensor is faulty",
 }
-_NO_COMMAND = "no valve command to compare with"
-_UNCERTAIN = "the wheel model is too uncertain in this mission"
+_NO_COMMAND = "no {valve} command to compare with"
+_UNCERTAIN = "the {wheel} model is too uncertain in this mission"
 _UNEXPLAINED = "its signals fit a healthy part and a faulty one alike"
 
 

@@ -193,7 +193,7 @@ def _commands(timeline: Timeline, machine: Machine, phi: Array, readings: list[R
 
 def _say_commands(machine: Machine, logged: bool, mapped: bool, readings: list[Reading]) -> None:
     if logged:
-        readings.append(Reading("commanded wheel speed v_c,i", "as recorded"))
+        readings.append(Reading(f"commanded {machine.part} speed v_c,i", "as recorded"))
     elif mapped:
         assert machine.geometry is not None
         offsets = sorted({abs(w.offset) for w in machine.geometry.wheels.values()})
@@ -208,7 +208,9 @@ def _say_commands(machine: Machine, logged: bool, mapped: bool, readings: list[R
         )
         readings.append(Reading("steering angle φ_c,i", "by L2 (2)", "along the rolling direction, held at standstill"))
     else:
-        readings.append(Reading("commanded wheel speed v_c,i", "not available", "neither v_c,i nor v_c with geometry"))
+        readings.append(
+            Reading(f"commanded {machine.part} speed v_c,i", "not available", "neither v_c,i nor v_c with geometry")
+        )
 
 
 def any_finite(values: Array) -> NDArray[np.bool_]:

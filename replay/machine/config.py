@@ -23,10 +23,16 @@ from replay.machine.signal_table import names_of, signal_of
 Law = Literal["auto", "signed", "opposed", "printed", "sign_abs", "none"]
 PsiMode = Literal["auto", "printed", "implied", "event_reset", "forced"]
 PhiDot = Literal["command", "measured", "zero"]
+Drive = Literal["auto", "valve", "motor"]
+MovedPart = Literal["wheel", "joint"]
+SpeedUnit = Literal["m/s", "rad/s", "deg/s"]
 
 LAWS: tuple[str, ...] = ("auto", "signed", "opposed", "printed", "sign_abs", "none")
 #: What a machine has from the paper's where no machine file gives it.
 ASSUMABLE: tuple[str, ...] = ("geometry", "gear_ratio", "max_speed", "max_steer", "flow", "control")
+DRIVES: tuple[str, ...] = ("auto", "valve", "motor")
+MOVED_PARTS: tuple[str, ...] = ("wheel", "joint")
+SPEED_UNITS: tuple[str, ...] = ("m/s", "rad/s", "deg/s")
 PSI_MODES: tuple[str, ...] = ("auto", "printed", "implied", "event_reset", "forced")
 
 
@@ -147,13 +153,21 @@ class Machine:
     name, id : str
         Shown name, and identity for trends across missions.
     wheels : tuple[str, ...]
-        Drive wheels in order (1…N).
+        Drive wheels, or driven joints, in order (1…N).
+    drive : str
+        What moves them, for the words of a report: ``valve``, ``motor``, or ``auto``, which goes by the signals of the log.
+    part : str
+        What moves, for the words of a report: ``wheel`` or ``joint``.
+    speed_unit : str
+        Unit in which their speeds, and all limits of speed, are given and shown: ``m/s`` at the rim, else ``rad/s`` or ``deg/s``.
+    advice : Mapping[str, str]
+        The operator's own instructions, by part, side and mode; see `diagnosis.decision.advice`.
     geometry : Geometry or None
         None: no kinematic evidence.
     gear_ratio : float
         Motor turns per wheel turn [1].
     max_speed : float
-        Top speed at the rim [m/s].
+        Top speed at the rim [m/s], of joints in `speed_unit`.
     max_steer : float
         Largest steering angle [rad].
     signals : Mapping[str, SignalSource]
@@ -183,10 +197,25 @@ class Machine:
     signals: Mapping[str, SignalSource] = field(default_factory=dict)
     drives: Mapping[str, DriveModel] = field(default_factory=dict)
     steering: Mapping[str, AxlePlant] = field(default_factory=dict)
+    drive: Drive = "auto"
+    part: MovedPart = "wheel"
+    speed_unit: SpeedUnit = "m/s"
+    advice: Mapping[str, str] = field(default_factory=dict)
     assumed: tuple[str, ...] = field(default=(), compare=False)
 
     def __post_init__(self) -> None:
         """Check values and that signals name this machine's wheels and axles."""
+        for key, value, known in (
+            ("drive", self.drive, DRIVES),
+            ("part", self.part, MOVED_PARTS),
+            ("speed_unit", self.speed_unit, SPEED_UNITS),
+        ):
+            if value not in known:
+                raise ConfigError(f"machine.{key} = {value!r} is not known; expected one of {', '.join(known)}")
+        if self.geometry is not None and (self.part != "wheel" or self.speed_unit != "m/s"):
+            raise ConfigError(
+                "machine.part = 'joint' and machine.speed_unit are for machines without [geometry]; leave the geometry out"
+            )
         if not self.wheels or len(set(self.wheels)) != len(self.wheels):
             raise ConfigError(f"machine.wheels = {list(self.wheels)} must name each wheel once, and at least one")
         if self.geometry is not None and set(self.geometry.wheels) != set(self.wheels):
@@ -198,7 +227,7 @@ class Machine:
             places = {w: self.geometry.wheels[w] for w in self.wheels}
             object.__setattr__(self, "geometry", replace(self.geometry, wheels=places))
         check_range("geometry.gear_ratio", self.gear_ratio, 1e-3, 1e4, "")
-        check_range("geometry.max_speed", self.max_speed, 1e-6, 1e6, "m/s")
+        check_range("geometry.max_speed", self.max_speed, 1e-6, 1e6, self.speed_unit)
         check_range("geometry.max_steer", self.max_steer, 0.0, 3.2, "rad", mistaken=DEGREES)
         self._check_drives()
         for section, names in (("signals", self.signals), ("noise", self.noise)):

@@ -4,23 +4,30 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, TypeVar
 
 from replay.errors import ConfigError
+from replay.faults import FaultMode, Side
 from replay.log.source_options import SignalSource, SourceOptions
 from replay.machine.axle_plant import AxlePlant
 from replay.machine.config import ASSUMABLE, Control, Limits, Machine, Noise, Plant, WheelPlant, haulotte
 from replay.machine.drive_model import drive_from_table
 from replay.machine.geometry import Geometry, WheelGeometry, four_wheel_geometry
-from replay.machine.units import si_factor
+from replay.machine.quantities import UNITS
+from replay.machine.units import known_unit, si_factor
 from replay.toml_text import MAX_BYTES, TomlError, parse_toml
 
 _T = TypeVar("_T")
-_SECTIONS = {"machine", "geometry", "control", "plant", "drive", "steering", "noise", "limits", "sources", "signals"}
+_SECTIONS = {
+    "machine", "geometry", "control", "plant", "drive", "steering", "noise", "limits", "sources", "signals", "advice",
+}  # fmt: skip
+_HEAD = {"name", "id", "wheels", "drive", "part", "speed_unit"}
 _STANDARD = ("wheelbase", "joint_spacing", "wheel_offset")
 _LONGEST = 1000
+_SIDES = tuple(side.value for side in Side)
+_MODES = tuple(mode.value for mode in FaultMode)
 #: Keys of [geometry] that are the machine's own.
 MACHINE_LEVEL = ("gear_ratio", "max_speed", "max_steer")
 
@@ -59,7 +66,7 @@ def _machine(data: Mapping[str, Any]) -> Machine:
         if not isinstance(content, dict):
             raise ConfigError(f"{section} = {content!r} must be a section: write [{section}]")
     base = haulotte()
-    head = _known("machine", data.get("machine", {}), {"name", "id", "wheels"})
+    head = _known("machine", data.get("machine", {}), _HEAD)
     wheels = head.get("wheels", list(base.wheels))
     if not isinstance(wheels, list) or not all(isinstance(w, str) and w and "." not in w for w in wheels):
         raise ConfigError(f"machine.wheels = {wheels!r} must be a list of names without dots")
@@ -70,6 +77,7 @@ def _machine(data: Mapping[str, Any]) -> Machine:
     limits = dict(data.get("limits", {}))
     limits.setdefault("driving_speed", round(base.limits.driving_speed * speed / base.max_speed, 9))
     limits.setdefault("min_sat", round(base.limits.min_sat * speed / base.max_speed, 9))
+    signals = {k: _signal(k, v) for k, v in data.get("signals", {}).items()}
     machine = Machine(
         name=str(head.get("name", base.name if wheels == list(base.wheels) else "unnamed machine")),
         id=str(head.get("id", "")),
@@ -83,11 +91,21 @@ def _machine(data: Mapping[str, Any]) -> Machine:
         noise={k: _build(Noise, f"noise.{k}", v) for k, v in data.get("noise", {}).items()},
         limits=_build(Limits, "limits", limits),
         sources={k: _build(SourceOptions, f"sources.{k}", v) for k, v in data.get("sources", {}).items()},
-        signals={k: _signal(k, v) for k, v in data.get("signals", {}).items()},
+        signals=signals,
         drives={k: drive_from_table(f"drive.{k}", v) for k, v in data.get("drive", {}).items()},
         steering={k: _build(AxlePlant, f"steering.{k}", v) for k, v in data.get("steering", {}).items()},
+        drive=head.get("drive", "auto"),
+        part=head.get("part", "wheel"),
+        speed_unit=_speed_unit(head, signals),
+        advice=_advice(data.get("advice", {}), (*wheels, *(geometry.axles if geometry is not None else ()))),
     )
     machine = dataclasses.replace(machine, assumed=_assumed(machine, data))
+    _check_units(machine)
+    return machine
+
+
+def _check_units(machine: Machine) -> None:
+    """Raise where a unit of a signal does not fit it."""
     for name, source in machine.signals.items():
         if source.unit:
             si_factor(
@@ -97,8 +115,19 @@ def _machine(data: Mapping[str, Any]) -> Machine:
                 gear_ratio=machine.gear_ratio,
                 at=source.at,
                 derivative=source.derivative,
+                speed_unit=machine.speed_unit,
             )
-    return machine
+
+
+def _speed_unit(head: Mapping[str, Any], signals: Mapping[str, SignalSource]) -> Any:
+    """Unit of the machine's speeds: as given, of joints by the unit of their signals, else m/s."""
+    if "speed_unit" in head or head.get("part", "wheel") != "joint":
+        return head.get("speed_unit", "m/s")
+    units = [known_unit(s.unit) for name, s in signals.items() if name.startswith("wheel.") and s.unit]
+    of_speed = next((u for u in units if u is not None and UNITS[u][0] in ("rotation", "angle", "speed", "length")), "")
+    if of_speed in ("deg", "deg/s"):
+        return "deg/s"
+    return "m/s" if UNITS.get(of_speed, ("rotation", 1.0))[0] in ("speed", "length") else "rad/s"
 
 
 def _assumed(machine: Machine, data: Mapping[str, Any]) -> tuple[str, ...]:
@@ -170,6 +199,26 @@ def _place(wheel: str, value: Mapping[str, Any], wheels: tuple[str, ...]) -> Whe
         offset=_number(f"{section}.offset", value.get("offset", 0.0)),
         axle=wheel if steer == "own" else steer,
     )
+
+
+def _advice(value: Mapping[str, Any], parts: Sequence[str]) -> dict[str, str]:
+    """The operator's instructions, with keys such as ``wheel.sensor.stuck`` or ``FR.actuator``."""
+    for key, words in value.items():
+        who, *rest = key.split(".")
+        side, mode = (*rest, "", "")[:2]
+        if (
+            who not in (*parts, "wheel", "steer")
+            or side not in _SIDES
+            or len(rest) > 2
+            or (mode and mode not in _MODES)
+        ):
+            raise ConfigError(
+                f'[advice] {key!r} is not known; expected "PART.SIDE" or "PART.SIDE.MODE" with PART wheel, steer or one of '
+                f"{', '.join(parts)}, SIDE one of {', '.join(_SIDES)} and MODE one of {', '.join(_MODES)}"
+            )
+        if not isinstance(words, str) or not words.strip() or len(words) > _LONGEST:
+            raise ConfigError(f"[advice] {key!r} must be text of 1 to {_LONGEST} characters")
+    return dict(value)
 
 
 def _plant(value: Mapping[str, Any], wheels: tuple[str, ...], default_flow: float | None) -> Plant:

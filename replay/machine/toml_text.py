@@ -41,7 +41,7 @@ def dump_machine(machine: Machine, notes: Mapping[str, Sequence[str]] | None = N
         return [f"[{section}]", *said.get(section, [])]
 
     lines = [*said.get("", []), *head("machine"), f"name = {text_of(machine.name)}", f"id = {text_of(machine.id)}"]
-    lines += [f"wheels = [{', '.join(text_of(w) for w in machine.wheels)}]", "", *head("geometry")]
+    lines += [f"wheels = [{', '.join(text_of(w) for w in machine.wheels)}]", *_kind(machine), "", *head("geometry")]
     lines += [f"{key} = {real_text(getattr(machine, key))}" for key in MACHINE_LEVEL]
     if machine.geometry is not None:
         lines.append(f"wheel_diameter = {real_text(machine.geometry.wheel_diameter)}")
@@ -68,7 +68,16 @@ def dump_machine(machine: Machine, notes: Mapping[str, Sequence[str]] | None = N
     lines += ["", *head("limits"), *_table(machine.limits)]
     for section, items in (("noise", machine.noise), ("sources", machine.sources), ("signals", machine.signals)):
         lines += ["", *head(section), *(f"{key_text(k)} = {{ {', '.join(_table(v))} }}" for k, v in items.items())]
+    if machine.advice:
+        lines += ["", *head("advice"), *(f"{text_of(k)} = {text_of(v)}" for k, v in machine.advice.items())]
     return "\n".join(lines) + "\n"
+
+
+def _kind(machine: Machine) -> list[str]:
+    """What moves the machine, where that is not what a machine file without these lines means."""
+    usual = {"drive": "auto", "part": "wheel", "speed_unit": "m/s" if machine.part == "wheel" else ""}
+    given = {key: getattr(machine, key) for key in usual}
+    return [f"{key} = {text_of(value)}" for key, value in given.items() if value != usual[key]]
 
 
 def _comments(lines: Sequence[str]) -> list[str]:

@@ -9,7 +9,7 @@ from __future__ import annotations
 from typing import Literal
 
 from replay.errors import ConfigError
-from replay.machine.quantities import UNITS, Quantity
+from replay.machine.quantities import SI_UNITS, UNITS, Quantity
 from replay.machine.signal_table import quantity_of
 
 #: Other spellings, as logs and people write them in English, German and French; compared without case and spaces.
@@ -51,6 +51,7 @@ def si_factor(
     gear_ratio: float,
     at: Literal["motor", "wheel"],
     derivative: bool = False,
+    speed_unit: str = "m/s",
 ) -> float:
     """Factor from a recorded unit to the signal's SI unit.
 
@@ -68,6 +69,8 @@ def si_factor(
         Where a rotation was measured.
     derivative : bool
         Whether the recorded value is a position whose time derivative is the signal.
+    speed_unit : str
+        Unit in which the machine's wheel or joint speeds are kept: m/s, or rad/s or deg/s of a joint.
 
     Raises
     ------
@@ -86,6 +89,13 @@ def si_factor(
     if derivative:
         integral: dict[Quantity, Quantity] = {"length": "speed", "angle": "rotation"}
         quantity = integral.get(quantity, quantity)
+    if wanted == "speed" and speed_unit != SI_UNITS["speed"] and signal.startswith("wheel."):
+        if quantity != "rotation":
+            raise ConfigError(
+                f"[signals] {signal!r}: unit {unit!r} is a {quantity}, and the machine's speeds are in {speed_unit} "
+                "(machine.part, machine.speed_unit); expected rad/s, deg/s, rpm or rev/s, or rad or deg with derivative = true"
+            )
+        return factor / UNITS[speed_unit][1] / (gear_ratio if at == "motor" else 1.0)
     if quantity == wanted or (wanted == "effort" and quantity == "fraction"):
         return factor
     if quantity == "effort" and signal.endswith(".u"):
@@ -95,7 +105,8 @@ def si_factor(
     if wanted == "speed" and quantity == "rotation" and signal.startswith("wheel."):
         if wheel_radius is None:
             raise ConfigError(
-                f"[signals] {signal!r}: unit {unit!r} needs the wheel's size; set geometry.wheel_diameter [m]"
+                f"[signals] {signal!r}: unit {unit!r} needs the wheel's size; set geometry.wheel_diameter [m], or "
+                'machine.part = "joint" where it is the speed of a joint'
             )
         return factor * wheel_radius / (gear_ratio if at == "motor" else 1.0)
     fitting = ", ".join(u for u, (q, _) in UNITS.items() if q == wanted)

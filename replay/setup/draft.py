@@ -158,7 +158,7 @@ def _structure(
     raise LogError(
         "no wheel speed is in the log: no joint, symbol or column is called like a wheel's speed, and there is no odometry; "
         "`mfhca channels LOG --all` lists what it holds; record /joint_states, or give the structure with --preset and name "
-        "the signals in [signals]"
+        'the signals in [signals]; an arm needs a machine file with its joints as wheels and part = "joint"'
     )
 
 

@@ -57,9 +57,9 @@ def factor_of(signal: str, origin: SignalSource, machine: Machine) -> float:
     unit = origin.unit
     if not unit:
         quantity = quantity_of(signal)
-        unit = SI_UNITS[quantity]
+        unit = machine.speed_unit if quantity == "speed" and signal.startswith("wheel.") else SI_UNITS[quantity]
         if origin.derivative:
-            unit = {"speed": "m", "rotation": "rad"}.get(quantity, unit)
+            unit = {"m/s": "m", "rad/s": "rad", "deg/s": "deg"}.get(unit, unit)
     return si_factor(
         signal,
         unit,
@@ -67,6 +67,7 @@ def factor_of(signal: str, origin: SignalSource, machine: Machine) -> float:
         gear_ratio=machine.gear_ratio,
         at=origin.at,
         derivative=origin.derivative,
+        speed_unit=machine.speed_unit,
     )
 
 

@@ -97,8 +97,9 @@ def doubt(signal: str, values: NDArray[np.float64], origin: SignalSource, machin
 
 def _too_fast(signal: str, values: NDArray[np.float64], peak: float, origin: SignalSource, machine: Machine) -> Doubt:
     top, times = machine.max_speed, peak / machine.max_speed
-    unit = origin.unit or SI_UNITS["speed"]
-    text = f"{signal} reaches {peak:.3g} m/s with unit {unit!r}, {times:.1f} times max_speed {top:g} m/s"
+    shown = machine.speed_unit if signal.startswith("wheel.") else SI_UNITS["speed"]
+    unit = origin.unit or shown
+    text = f"{signal} reaches {peak:.3g} {shown} with unit {unit!r}, {times:.1f} times max_speed {top:g} {shown}"
     limit = _ANY_MACHINE if "max_speed" in machine.assumed else 0.0
     impossible = peak > limit and _mostly_beyond(values, max(top, limit))
     gear = machine.gear_ratio

@@ -25,6 +25,7 @@ from diagnosis.clearing.checks import cells_of, checks_of
 from diagnosis.clearing.detectable import detectable, places_of
 from diagnosis.clearing.gauges import gauges_of
 from diagnosis.results.detectability import Detectable, Deviation
+from diagnosis.results.machine_words import HYDRAULIC
 from replay.arrays.envelope import bucket_of
 from replay.control.loop import replay_loop
 from replay.faults import FaultMode, FaultSpec, Side
@@ -94,7 +95,7 @@ def run(machine: str, seed: int, duration: float, faults: int) -> list[Tried]:
     options, rng, out = options_of(machine, seed, duration), np.random.default_rng(seed), []
     for tier in TIERS:
         healthy = cells(options, tier)
-        open_before = {c.component for c in checks_of(healthy) if not c.passed}
+        open_before = {c.component for c in checks_of(healthy, HYDRAULIC) if not c.passed}
         gauges = {(g.component, g.side): g for g in gauges_of(healthy)}
         rows = [r for r in detectable(healthy).rows if r.places and r.component not in open_before]
         done = 0
@@ -107,7 +108,7 @@ def run(machine: str, seed: int, duration: float, faults: int) -> list[Tried]:
             if fault is None:
                 continue
             stated = 0.95 if row.unit else (row.share or 0.0)
-            checks = checks_of(cells(replace(options, faults=(fault,)), tier))
+            checks = checks_of(cells(replace(options, faults=(fault,)), tier), HYDRAULIC)
             found = any(c.component == row.component and not c.passed for c in checks)
             kind = "axle" if row.component in healthy.machine.axles else "wheel"
             part = f"{kind} {'sensor' if row.side is Side.SENSOR else 'valve'}"

@@ -23,6 +23,7 @@ from accuracy import EVIDENCE, signals_of
 from diagnosis import assess
 from diagnosis.channels.liveness import alive_sources
 from diagnosis.decision.intervals import intervals_of
+from diagnosis.results.machine_words import HYDRAULIC
 from diagnosis.steering.assess import assess_steering
 from replay.control.loop import replay_loop
 from replay.machine.config import haulotte
@@ -57,7 +58,7 @@ def main() -> None:
                 for _ in range(asked.runs + 1):
                     begin = time.process_time()
                     found = assess.assess_components(timeline, replay, machine, machine.wheels, silent)
-                    intervals_of(found.assessments, machine.axles, timeline.start_ns, timeline.step_ns, machine.limits)
+                    intervals_of(found.assessments, machine, HYDRAULIC, timeline.start_ns, timeline.step_ns)
                     whole.append(time.process_time() - begin)
                     begin = time.process_time()
                     assess_steering(timeline, replay, machine, counts, silent)

@@ -24,6 +24,7 @@ from diagnosis.decision.intervals import intervals_of, spans_of
 from diagnosis.evaluation.counts import COLUMNS, TRUE_STATES, Counts, add
 from diagnosis.evaluation.evaluate import evaluate_report
 from diagnosis.evaluation.scores import figures
+from diagnosis.results.machine_words import HYDRAULIC
 from diagnosis.results.result import to_json
 from diagnosis.steering.assess import SteeringResult, assess_steering
 from replay.control.loop import replay_loop
@@ -92,7 +93,7 @@ def counts_of(mission: SimulatedMission, result: SteeringResult, timeline: Timel
     """What the steering's assessments got right; a wheel stands in, since a report without wheels is refused."""
     machine = haulotte()
     wheel = {"component": "FR", "state": "healthy", "start_s": 0.0, "stop_s": timeline.size * timeline.dt}
-    intervals = intervals_of(result.assessments, machine.axles, timeline.start_ns, timeline.step_ns, machine.limits)
+    intervals = intervals_of(result.assessments, machine, HYDRAULIC, timeline.start_ns, timeline.step_ns)
     report = to_json(
         {
             "log": {"start_ns": timeline.start_ns, "duration_s": timeline.size * timeline.dt},

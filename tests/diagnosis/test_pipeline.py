@@ -363,7 +363,7 @@ def test_wheel_that_does_not_exist(tmp_path: Path) -> None:
 
 
 def test_log_in_which_nothing_can_be_judged(mission: SimulatedMission) -> None:
-    with pytest.raises(NotJudged, match="no valve command"):
+    with pytest.raises(NotJudged, match="no command and no second speed"):
         diagnose_mission(in_memory(mission, keep=r"^wheel\.FR\.v$"), PAPER)
 
 

@@ -181,6 +181,7 @@ def _machine(m: Machine, at: Mapping[str, int]) -> MachineRow:
         "decided": rounded(m.decided),
         "min_epsilon": m.limits.min_epsilon,
         "parts": [_part(m, *key) for key in m.parts],
+        "words": m.limits.words.row(),
     }
 
 

@@ -14,6 +14,7 @@ from diagnosis.audit.fleet.fault_types import FaultChangeRow, FleetFaultRow, Mis
 from diagnosis.audit.fleet.trend_types import Axis, TrendRow
 from diagnosis.audit.store.outcome import MissionState
 from diagnosis.results.vocabulary import Verdict
+from diagnosis.results.words_row import Worded
 
 SCHEMA = "mfhca-fleet/1"
 
@@ -97,7 +98,7 @@ class PartRow(TypedDict):
     modes: dict[str, int]
 
 
-class MachineRow(TypedDict):
+class MachineRow(Worded):
     """One machine.
 
     Attributes

@@ -9,6 +9,7 @@ from diagnosis.audit.fleet.fault_types import FleetFaultRow
 from diagnosis.audit.fleet.fleet_types import FleetDocument, MachineRow
 from diagnosis.audit.fleet.page.rows import fault_words
 from diagnosis.audit.fleet.words import open_words
+from diagnosis.results.machine_words import words_of
 from diagnosis.results.vocabulary import Verdict
 
 #: Statuses of faults that do not stand.
@@ -72,7 +73,7 @@ def listed_machines(document: FleetDocument) -> tuple[ListedMachine, ...]:
                 m["label"],
                 Verdict(m["verdict"]),
                 machine_words(m, standing, k in near),
-                tuple(fault_words(f) + open_words(f["open"], f["clean"], f["needed"]) for f in standing),
+                tuple(fault_words(f, words_of(m)) + open_words(f["open"], f["clean"], f["needed"]) for f in standing),
                 m["with_faults"],
                 len(m["missions"]) + len(m["undated"]),
             )

@@ -19,6 +19,7 @@ from functools import cached_property
 
 from diagnosis.audit.fleet.fault_types import Status
 from diagnosis.audit.fleet.read import Bounds, FoundFault, Mission, Part, Result
+from diagnosis.results.machine_words import HYDRAULIC, MachineWords
 from diagnosis.results.vocabulary import Kind, Severity, Verdict
 from replay.faults import Side
 
@@ -31,7 +32,7 @@ _LEAST_SHARE = 0.8
 
 @dataclass(frozen=True)
 class Limits:
-    """What a report says of limits, which components steer, and whether the machine may go out (None: it does not say).
+    """What a report says of limits, steering components, leave to go out (None: it does not say), and words.
 
     The defaults are those of the paper's machine. `found` has the share of places of the mission at which a fault of ten
     seconds would have been found, by component, side and mode; what is not there was not said.
@@ -43,6 +44,7 @@ class Limits:
     axles: tuple[str, ...] = ("front", "rear")
     cleared: bool | None = None
     found: Mapping[tuple[str, str, str], float] = field(default_factory=dict, hash=False)
+    words: MachineWords = HYDRAULIC
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,8 @@ from diagnosis.decision.wording import join_words
 from diagnosis.pages.labels import utc
 from diagnosis.results.fault_rows import mode_words
 from diagnosis.results.left_out import only_left_out
-from diagnosis.results.vocabulary import Verdict, part_words
+from diagnosis.results.machine_words import MachineWords
+from diagnosis.results.vocabulary import Verdict
 
 _SHOWN = 3
 _NAMED = 12
@@ -31,9 +32,9 @@ def round_to(value: float, digits: int = 2) -> str:
     return text.rstrip("0").rstrip(".") if "." in text else text
 
 
-def fault_words(f: FleetFault) -> str:
+def fault_words(f: FleetFault, words: MachineWords) -> str:
     """Part and row: ``RL drive valve inefficient``."""
-    return f"{part_words(f.kind, f.component, f.side)} {mode_words(f.side, f.mode)}"
+    return f"{words.part_words(f.kind, f.component, f.side)} {mode_words(f.side, f.mode)}"
 
 
 def open_words(is_open: bool, clean: int, needed: int) -> str:
@@ -202,7 +203,7 @@ def sentences(
     near.sort(key=lambda p: p[1].trend.forecast.likely or 0.0)
     for m, t in near[:2]:
         words = forecast_words(t.trend.forecast, t.limit, axis)
-        out.append(f"{m.label}: the loss of the {part_words(t.kind, t.component, t.side)} {words}.")
+        out.append(f"{m.label}: the loss of the {m.limits.words.part_words(t.kind, t.component, t.side)} {words}.")
     unread, open_, pending = failed
     if unread or open_:
         both = f": {unread} not read, {open_} read but not assessed" if unread and open_ else ""
@@ -220,7 +221,7 @@ def new_words(missions: int, faults: Sequence[tuple[Machine, FleetFault]]) -> li
     """What the last audit run brought, in no or one sentence; see `diagnosis.audit.fleet.news.news`."""
     if not missions:
         return []
-    named = [f"{m.label} {fault_words(f)} ({f.severity})" for m, f in faults[:_NAMED]]
+    named = [f"{m.label} {fault_words(f, m.limits.words)} ({f.severity})" for m, f in faults[:_NAMED]]
     more = f" and {len(faults) - len(named)} more" if len(faults) > len(named) else ""
     return [
         f"New since the run before, in {count(missions, 'mission')}: {'; '.join(named) + more if named else 'no new fault'}."
@@ -242,4 +243,4 @@ def _named(machines: Sequence[Machine]) -> str:
 
 def _found(m: Machine, f: FleetFault) -> str:
     many = f" in {f.missions} of {len(m.runs)} missions" if len(m.runs) > 1 else ""
-    return f"{fault_words(f)}{many}{open_words(f.open, f.clean, f.needed)}"
+    return f"{fault_words(f, m.limits.words)}{many}{open_words(f.open, f.clean, f.needed)}"

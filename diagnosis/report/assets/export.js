@@ -38,7 +38,7 @@ const Export = (() => {
 
   // What the article of a fault says, as lines of text.
   async function copy(article, button) {
-    const text = `${Data.view.name}\n${article.dataset.text}\n` + [...article.querySelectorAll("li, .advice")].map((e) => `- ${e.textContent.trim()}`).join("\n") + `\n${location.hash}\n`;
+    const text = `${Data.view.name}\n${article.dataset.text}\n` + [...article.querySelectorAll("li, .advice, p.how")].map((e) => `- ${e.textContent.trim()}`).join("\n") + `\n${location.hash}\n`;
     try { await navigator.clipboard.writeText(text); } catch {
       const area = document.createElement("textarea");
       area.value = text;

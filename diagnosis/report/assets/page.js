@@ -65,6 +65,7 @@
     article.dataset.text = `${f.id} ${f.title}, ${times}`;
     article.querySelector("ul").replaceChildren(...(words.evidence || []).map((s) => { const li = document.createElement("li"); li.textContent = s; return li; }));
     article.querySelector(".advice").textContent = words.advice || "Nothing was recorded.";
+    article.querySelector(".how").textContent = words.check || "";
   }
 
   const articleOf = (id) => one(`article[data-ev="${CSS.escape(id)}"]`);

@@ -15,6 +15,7 @@ import mfhca
 from diagnosis.api.figures import COLOURS, STYLES, colour_of
 from diagnosis.api.series import Series
 from diagnosis.report.plot_rows import fault_rows
+from diagnosis.results.machine_words import words_of
 from diagnosis.results.result import Closeups
 from replay.faults import State
 
@@ -35,7 +36,13 @@ def test_evidence_of_a_fault_is_that_of_the_page(result: mfhca.Diagnosis) -> Non
     report, first = result.report, result.report["intervals"][0]
     figure: Any = result.plot_fault("F1", margin_s=1.0)
     series = Series(report, result.columns)
-    rows = fault_rows(first, report["machine"]["wheels"], series.columns, report["limits"]["min_probability"])
+    rows = fault_rows(
+        first,
+        report["machine"]["wheels"],
+        series.columns,
+        words_of(report["machine"]),
+        report["limits"]["min_probability"],
+    )
     titles = [a.text for a in figure.layout.annotations if a.xref == "paper"]
     assert titles[: len(rows)] == [f"{row.title} ({row.unit})" for row in rows]
     assert list(figure.layout.xaxis.range) == [first["start_s"] - 1, first["stop_s"] + 1]

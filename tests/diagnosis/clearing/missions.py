@@ -7,6 +7,7 @@ from dataclasses import replace
 from diagnosis.clearing.cells import Cells
 from diagnosis.clearing.checks import cells_of, checks_of
 from diagnosis.results.clearing import Check, Checked
+from diagnosis.results.machine_words import HYDRAULIC
 from replay.arrays.envelope import bucket_of
 from replay.control.loop import replay_loop
 from replay.faults import FaultSpec
@@ -42,5 +43,5 @@ def in_cells(mission: SimulatedMission, *, base: bool, clear_at: float = 0.25) -
 
 def checks(mission: SimulatedMission, *, base: bool, clear_at: float = 0.25) -> dict[tuple[str, str, Check], Checked]:
     """Its checks by component, side and what is asked."""
-    found = checks_of(in_cells(mission, base=base, clear_at=clear_at))
+    found = checks_of(in_cells(mission, base=base, clear_at=clear_at), HYDRAULIC)
     return {(c.component, c.side.value, c.check): c for c in found}

@@ -96,7 +96,7 @@ def test_an_angle_that_is_off_turns_the_machine() -> None:
     healthy, off = (checks_by_part(_with_yaw_rate(mission), base=False)[key] for mission in driven)
     assert healthy.passed
     assert not off.passed
-    assert "rad off its measured angle" in off.text
+    assert "° off its measured angle" in off.text
     assert key not in checks_by_part(driven[0], base=True)
 
 

@@ -12,6 +12,7 @@ from diagnosis.clearing.detectable import detectable, places_of
 from diagnosis.clearing.gauges import Gauges, gauges_of
 from diagnosis.clearing.placements import placements
 from diagnosis.results.detectability import Deviation
+from diagnosis.results.machine_words import HYDRAULIC
 from replay.faults import FaultMode, FaultSpec, Side
 from replay.simulation.options import SimulatedMission
 from tests.diagnosis.clearing.missions import LENGTH, in_cells, simulated
@@ -34,7 +35,7 @@ def _with(mission: SimulatedMission, name: str, start: float, stop: float, facto
 
 
 def _found(mission: SimulatedMission, part: str, *, base: bool) -> bool:
-    return any(c.component == part and not c.passed for c in checks_of(in_cells(mission, base=base)))
+    return any(c.component == part and not c.passed for c in checks_of(in_cells(mission, base=base), HYDRAULIC))
 
 
 @pytest.mark.parametrize(

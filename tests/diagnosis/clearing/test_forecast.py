@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from diagnosis.clearing.forecast import Forecast, forecast
+from diagnosis.results.machine_words import HYDRAULIC
 from replay.faults import Side
 from replay.machine.config import haulotte
 
@@ -12,11 +13,11 @@ _BASE = [f"wheel.{w}.{leaf}" for w in ("FR", "FL", "RR", "RL") for leaf in ("v",
 
 
 def _by_part(logged: list[str]) -> dict[tuple[str, Side], Forecast]:
-    return {(c, f.side): f for f in forecast(logged, haulotte()) for c in f.components}
+    return {(c, f.side): f for f in forecast(logged, haulotte(), HYDRAULIC) for c in f.components}
 
 
 def test_single_measurements_do_not_tell_sensor_from_valve() -> None:
-    found = forecast(_BASE, haulotte())
+    found = forecast(_BASE, haulotte(), HYDRAULIC)
     assert [(len(f.components), f.side, f.told) for f in found] == [
         (4, Side.SENSOR, False),
         (4, Side.ACTUATOR, False),

@@ -8,10 +8,11 @@ from diagnosis.results.assessment import CODE, Assessment, Finding
 from diagnosis.results.result import Epsilon, Hypothesis
 from diagnosis.results.vocabulary import Tier
 from replay.faults import FaultMode, Side, State
-from replay.machine.config import Limits
+from replay.machine.config import Limits, haulotte
 
 N, STEP = 30_000, 1_000_000  # 30 s at 1 kHz
 LIMITS = Limits()
+MACHINE = haulotte()
 WHEELS, AXLES = ("FR", "FL"), ("front",)
 SIDES = ("sensor", "actuator")
 

@@ -11,10 +11,11 @@ from diagnosis.decision.decide import Decision, decide
 from diagnosis.decision.intervals import intervals_of
 from diagnosis.results.assessment import Assessment
 from diagnosis.results.clearing import CHECK_WORDS, Check, Checked, clearing_rows
+from diagnosis.results.machine_words import HYDRAULIC
 from diagnosis.results.vocabulary import Kind
 from replay.faults import FaultMode, Side
 from replay.machine.config import Limits
-from tests.diagnosis.decision.findings import AXLES, LIMITS, STEP, assessed, finding, machine
+from tests.diagnosis.decision.findings import AXLES, LIMITS, MACHINE, STEP, assessed, finding, machine
 
 _BEYOND = Checked(Kind.WHEEL, "FR", Side.SENSOR_OR_ACTUATOR, Check.RESPONSE, 0.62, 0.3, 12.0, 15.0, 0.33)
 _WITHIN = replace(_BEYOND, worst=0.1)
@@ -22,8 +23,8 @@ _UNSHOWN = Checked(Kind.STEER, "front", Side.SENSOR_OR_ACTUATOR, Check.LASTING_R
 
 
 def verdict(assessments: dict[tuple[str, str], Assessment], limits: Limits = LIMITS, **more: Any) -> Decision:
-    intervals = intervals_of(assessments, AXLES, 0, STEP, limits)
-    return decide(intervals, assessments, dict.fromkeys(assessments, 20.0), AXLES, limits, (), **more)
+    intervals = intervals_of(assessments, replace(MACHINE, limits=limits), HYDRAULIC, 0, STEP)
+    return decide(intervals, assessments, dict.fromkeys(assessments, 20.0), AXLES, limits, (), HYDRAULIC, **more)
 
 
 def test_a_check_beyond_its_limit_clears_nothing() -> None:
@@ -72,6 +73,6 @@ def test_an_offset_that_nothing_would_show_is_said() -> None:
 def test_every_check_has_words(check: Check) -> None:
     one = Checked(Kind.WHEEL, "FR", Side.SENSOR, check, 0.5, 0.1)
     (row,) = clearing_rows([one])
-    assert row["asked"] == CHECK_WORDS[check][0]
+    assert row["asked"] == HYDRAULIC.fill(CHECK_WORDS[check][0])
     assert "{" not in row["text"]
     assert not row["passed"]

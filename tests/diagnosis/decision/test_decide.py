@@ -10,11 +10,12 @@ import pytest
 from diagnosis.decision.decide import Decision, decide
 from diagnosis.decision.intervals import intervals_of
 from diagnosis.results.assessment import CODE, Assessment, Finding, unassessed
-from diagnosis.results.vocabulary import Tier, part_words
+from diagnosis.results.machine_words import HYDRAULIC
+from diagnosis.results.vocabulary import Tier
 from diagnosis.results.wheel_model import WheelModelFit
 from replay.faults import FaultMode, Side, State
 from replay.machine.config import Limits
-from tests.diagnosis.decision.findings import AXLES, LIMITS, SIDES, STEP, N, assessed, finding, machine
+from tests.diagnosis.decision.findings import AXLES, LIMITS, MACHINE, SIDES, STEP, N, assessed, finding, machine
 
 
 def verdict(
@@ -25,8 +26,8 @@ def verdict(
     model: WheelModelFit | None = None,
 ) -> Decision:
     seconds = decided if isinstance(decided, dict) else dict.fromkeys(assessments, decided)
-    intervals = intervals_of(assessments, AXLES, 0, STEP, limits)
-    return decide(intervals, assessments, seconds, AXLES, limits, damage, model=model)
+    intervals = intervals_of(assessments, replace(MACHINE, limits=limits), HYDRAULIC, 0, STEP)
+    return decide(intervals, assessments, seconds, AXLES, limits, damage, HYDRAULIC, model=model)
 
 
 def test_healthy_machine_is_ready() -> None:
@@ -68,7 +69,7 @@ def test_too_little_driving_is_not_assessed(side: str) -> None:
     seconds = dict.fromkeys(machine(), 20.0) | {("FL", side): 9.9}
     got = verdict(machine(), seconds)
     assert got.status == "not_assessed"
-    assert part_words("wheel", "FL", side) in got.text
+    assert HYDRAULIC.part_words("wheel", "FL", side) in got.text
     assert len(got.caveats) == 1
     assert "9.9 s of driving, of 10 s needed" in got.caveats[0]
     assert verdict(machine(), seconds, limits=Limits(min_assessed=9.0)).status == "ready"
@@ -112,7 +113,7 @@ def test_every_fault_above_info_has_an_action() -> None:
         FL_actuator=assessed(finding(Side.ACTUATOR, FaultMode.INEFFICIENT, epsilon=0.4)),
     )
     got = verdict(parts)
-    intervals = intervals_of(parts, AXLES, 0, STEP, LIMITS)
+    intervals = intervals_of(parts, MACHINE, HYDRAULIC, 0, STEP)
     named = {i for action in got.actions for i in action["faults"]}
     assert named == {f.id for f in intervals if f.severity != "info"}
     assert [a["n"] for a in got.actions] == list(range(1, len(got.actions) + 1))
@@ -125,7 +126,7 @@ def test_every_fault_above_info_has_an_action() -> None:
 def test_deviations_that_nothing_explains_give_no_all_clear() -> None:
     parts = machine()
     parts["FR", "actuator"] = replace(parts["FR", "actuator"], unexplained_s=6.0)
-    got = decide((), parts, dict.fromkeys(parts, 20.0), AXLES, Limits(), ())
+    got = decide((), parts, dict.fromkeys(parts, 20.0), AXLES, Limits(), (), HYDRAULIC)
     assert got.status == "not_assessed"
     assert "FR speed sensor or drive valve" in got.text
 
@@ -133,8 +134,14 @@ def test_deviations_that_nothing_explains_give_no_all_clear() -> None:
 def test_a_fifth_of_the_driving_undecided_gives_no_all_clear() -> None:
     parts = machine()
     driven = dict.fromkeys(parts, 30.0)
-    assert decide((), parts, dict.fromkeys(parts, 23.0), AXLES, Limits(), (), driving_s=driven).status == "not_assessed"
-    assert decide((), parts, dict.fromkeys(parts, 25.0), AXLES, Limits(), (), driving_s=driven).status == "ready"
+    assert (
+        decide((), parts, dict.fromkeys(parts, 23.0), AXLES, Limits(), (), HYDRAULIC, driving_s=driven).status
+        == "not_assessed"
+    )
+    assert (
+        decide((), parts, dict.fromkeys(parts, 25.0), AXLES, Limits(), (), HYDRAULIC, driving_s=driven).status
+        == "ready"
+    )
 
 
 WATCHED = finding(Side.ACTUATOR, FaultMode.INEFFICIENT, epsilon=0.5)
@@ -170,7 +177,7 @@ def test_no_action_and_no_advice_gives_leave_to_go_out() -> None:
         for mode in FaultMode:
             parts = machine(FR_sensor=assessed(finding(side, mode, epsilon=0.5)))
             words = [str(a["text"]) for a in verdict(parts, 0.0).actions]
-            words += [f.advice for f in intervals_of(parts, AXLES, 0, STEP, LIMITS)]
+            words += [f.advice for f in intervals_of(parts, MACHINE, HYDRAULIC, 0, STEP)]
             assert not any("may go out" in w.lower() for w in words)
 
 
@@ -203,9 +210,9 @@ def test_the_worst_open_time_is_named_truly() -> None:
     parts = machine()
     driven = dict.fromkeys(parts, 60.0)
     decided = dict.fromkeys(parts, 60.0) | {("FL", "sensor"): 50.0}
-    only = decide((), parts, decided, AXLES, LIMITS, (), driving_s=driven)
+    only = decide((), parts, decided, AXLES, LIMITS, (), HYDRAULIC, driving_s=driven)
     assert any("10.0 s of 60.0 s" in c and "this is the most of all parts." in c for c in only.caveats)
-    worse = decide((), parts, decided | {("FR", "sensor"): 20.0}, AXLES, LIMITS, (), driving_s=driven)
+    worse = decide((), parts, decided | {("FR", "sensor"): 20.0}, AXLES, LIMITS, (), HYDRAULIC, driving_s=driven)
     assert any("FL" in c and "this is the most of all parts judged long enough." in c for c in worse.caveats)
 
 
@@ -213,7 +220,9 @@ def test_a_short_drive_is_the_reason_not_the_standstill() -> None:
     states = np.full(N, CODE[State.HEALTHY])
     states[:20_000] = CODE[State.NOT_EXCITED]
     parts = {k: replace(a, states=states, reasons={State.NOT_EXCITED: "nothing moves"}) for k, a in machine().items()}
-    got = decide((), parts, dict.fromkeys(parts, 4.7), AXLES, LIMITS, (), driving_s=dict.fromkeys(parts, 5.0))
+    got = decide(
+        (), parts, dict.fromkeys(parts, 4.7), AXLES, LIMITS, (), HYDRAULIC, driving_s=dict.fromkeys(parts, 5.0)
+    )
     assert all("driven for less than 10 s" in c for c in got.caveats)
     assert len(got.caveats) == 4
     states = states.copy()
@@ -221,12 +230,12 @@ def test_a_short_drive_is_the_reason_not_the_standstill() -> None:
     reasons = {State.NOT_EXCITED: "nothing moves", State.MASKED: "F1 hides it"}
     parts["FR", "sensor"] = replace(parts["FR", "sensor"], states=states, reasons=reasons)
     seconds = dict.fromkeys(parts, 30.0) | {("FR", "sensor"): 5.0}
-    got = decide((), parts, seconds, AXLES, LIMITS, (), driving_s=dict.fromkeys(parts, 30.0))
+    got = decide((), parts, seconds, AXLES, LIMITS, (), HYDRAULIC, driving_s=dict.fromkeys(parts, 30.0))
     assert "F1 hides it" in got.caveats[0]
 
 
 def test_a_machine_that_did_not_follow_is_neither_ready_nor_at_fault() -> None:
     text = "For 12.0 s all drives stood still together while they were commanded to move."
-    found = decide([], machine(), dict.fromkeys(machine(), 60.0), AXLES, LIMITS, (), events=(text,))
+    found = decide([], machine(), dict.fromkeys(machine(), 60.0), AXLES, LIMITS, (), HYDRAULIC, events=(text,))
     assert (found.status, found.title, found.text) == ("not_assessed", "The machine did not follow its commands", text)
     assert not found.cleared

@@ -10,9 +10,10 @@ import pytest
 from diagnosis.decision.intervals import intervals_of, spans_of
 from diagnosis.decision.wording import fault_words
 from diagnosis.results.assessment import unassessed
+from diagnosis.results.machine_words import HYDRAULIC
 from diagnosis.results.result import Hypothesis
 from replay.faults import FaultMode, Side, State
-from tests.diagnosis.decision.findings import AXLES, LIMITS, STEP, N, assessed, finding, machine
+from tests.diagnosis.decision.findings import MACHINE, STEP, N, assessed, finding, machine
 
 
 def test_intervals_are_numbered_worst_first_then_by_time() -> None:
@@ -25,7 +26,7 @@ def test_intervals_are_numbered_worst_first_then_by_time() -> None:
         ),
         front_sensor=assessed(finding(Side.SENSOR, FaultMode.INEFFICIENT, 6000, 7000, epsilon=0.5)),
     )
-    got = intervals_of(parts, AXLES, 5_000_000_000, STEP, LIMITS)
+    got = intervals_of(parts, MACHINE, HYDRAULIC, 5_000_000_000, STEP)
     assert [(f.id, f.component, f.severity, f.start_s) for f in got] == [
         ("F1", "FR", "high", 3.0),
         ("F2", "FR", "high", 8.0),
@@ -40,13 +41,13 @@ def test_intervals_are_numbered_worst_first_then_by_time() -> None:
 def test_time_of_detection_is_the_samples() -> None:
     causal = replace(finding(Side.SENSOR, FaultMode.STUCK, 1000, 9000), detected=1004)
     parts = machine(FR_sensor=assessed(causal), FL_sensor=assessed(finding(Side.SENSOR, FaultMode.STUCK)))
-    got = {f.component: f.detected_s for f in intervals_of(parts, AXLES, 5_000_000_000, STEP, LIMITS)}
+    got = {f.component: f.detected_s for f in intervals_of(parts, MACHINE, HYDRAULIC, 5_000_000_000, STEP)}
     assert got == {"FR": pytest.approx(1.004), "FL": None}
 
 
 def test_shared_finding_counts_once() -> None:
     shared = finding(Side.SENSOR_OR_ACTUATOR, FaultMode.INEFFICIENT, epsilon=0.5)
-    got = intervals_of(machine(FR_sensor=assessed(shared), FR_actuator=assessed(shared)), AXLES, 0, STEP, LIMITS)
+    got = intervals_of(machine(FR_sensor=assessed(shared), FR_actuator=assessed(shared)), MACHINE, HYDRAULIC, 0, STEP)
     assert [f.id for f in got] == ["F1"]
 
 
@@ -72,5 +73,5 @@ def test_a_fault_without_a_majority_is_called_by_its_candidates() -> None:
         ("none", "healthy", 0.05),
     )
     part = replace(finding(Side.ACTUATOR, FaultMode.INEFFICIENT), hypotheses=tuple(Hypothesis(*row) for row in rows))
-    (fault,) = intervals_of({("FR", "actuator"): assessed(part)}, AXLES, 0, STEP, LIMITS)
+    (fault,) = intervals_of({("FR", "actuator"): assessed(part)}, MACHINE, HYDRAULIC, 0, STEP)
     assert fault_words(fault) == "faulty, kind unclear (inefficient or stuck)"

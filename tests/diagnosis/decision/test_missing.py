@@ -5,23 +5,24 @@ from __future__ import annotations
 import pytest
 
 from diagnosis.decision.missing import _COSTS, cost_of_missing
+from diagnosis.results.machine_words import HYDRAULIC
 from replay.errors import ConfigError
 from replay.machine.config import haulotte
 from replay.machine.signal_table import CANONICAL
 
 
 def test_every_canonical_signal_has_a_cost() -> None:
-    assert [name for name in haulotte().canonical_signals() if not cost_of_missing(name)] == []
+    assert [name for name in haulotte().canonical_signals() if not cost_of_missing(name, HYDRAULIC)] == []
     assert set(_COSTS) == {entry.kind for entry in CANONICAL}
 
 
 @pytest.mark.parametrize("name", ["wheel.FR.colour", "moon.phase"])
 def test_an_unknown_name_is_refused(name: str) -> None:
     with pytest.raises(ConfigError, match="not a known signal"):
-        cost_of_missing(name)
+        cost_of_missing(name, HYDRAULIC)
 
 
 def test_sensor_and_actuator_differ() -> None:
-    assert "actuator is not assessed" in cost_of_missing("wheel.RL.u")
-    assert "rests on the wheel model" in cost_of_missing("wheel.RL.v_true")
-    assert cost_of_missing("steer.front.u") != cost_of_missing("wheel.FR.u")
+    assert "drive valve is judged by its effort alone" in cost_of_missing("wheel.RL.u", HYDRAULIC)
+    assert "rests on a model" in cost_of_missing("wheel.RL.v_true", HYDRAULIC)
+    assert cost_of_missing("steer.front.u", HYDRAULIC) != cost_of_missing("wheel.FR.u", HYDRAULIC)

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from diagnosis.decision.quality import Recorded, checks, clock_row, recorded
+from diagnosis.results.machine_words import HYDRAULIC
 from replay.clocks.source_clock import SourceClock
 from replay.log.source_options import SignalSource
 from replay.signals.signal import Signal, Signals
@@ -21,7 +22,7 @@ def rows(*clocks: SourceClock) -> list[dict[str, object]]:
     told = tuple(c.sentence for c in clocks if c.sentence)
     return [
         r
-        for r in checks(Signals({}, {}, told), Recorded((), 0.0, 0), LINE, (), (), {}, None, clocks)
+        for r in checks(Signals({}, {}, told), Recorded((), 0.0, 0), LINE, (), (), {}, None, HYDRAULIC, clocks)
         if told and r["result"] in told
     ]
 
@@ -51,7 +52,7 @@ def test_samples_without_a_number_are_a_gap() -> None:
     signal = Signal("wheel.FR.v", stamps, values, SignalSource(column="v"), "a.csv", False)
     line = Timeline(0, 10_000_000, 2, {"wheel.FR.v": np.zeros(2)}, {}, {}, {"wheel.FR.v": 10_000_000})
     signals = Signals({"wheel.FR.v": signal}, {})
-    told = recorded(signals, line)
-    (row,) = [r for r in checks(signals, told, line, (), (), {}, None) if r["check"] == "Gaps"]
+    told = recorded(signals, line, HYDRAULIC)
+    (row,) = [r for r in checks(signals, told, line, (), (), {}, None, HYDRAULIC) if r["check"] == "Gaps"]
     assert row["ok"] is False
     assert "longest 2.01 s" in str(row["result"])

@@ -7,8 +7,9 @@ from dataclasses import replace
 import pytest
 
 from diagnosis.decision.severity import severity_of
+from diagnosis.results.machine_words import HYDRAULIC
 from diagnosis.results.result import Epsilon, Hypothesis
-from diagnosis.results.vocabulary import Kind, Severity
+from diagnosis.results.vocabulary import Severity
 from replay.faults import FaultMode, Side
 from replay.machine.config import Limits
 from tests.diagnosis.decision.findings import LIMITS, finding
@@ -18,7 +19,7 @@ TOTAL = pytest.mark.parametrize("mode", [FaultMode.STUCK, FaultMode.NO_SIGNAL])
 
 @TOTAL
 def test_assumption_1_brief_sensor_fault_is_tolerable(mode: FaultMode) -> None:
-    severity, advice = severity_of(finding(Side.SENSOR, mode), 1.0, LIMITS)
+    severity, advice = severity_of(finding(Side.SENSOR, mode), 1.0, LIMITS, HYDRAULIC)
     assert severity == "low"
     assert "Tolerable" in advice
     assert "Assumption 1" in advice
@@ -26,16 +27,16 @@ def test_assumption_1_brief_sensor_fault_is_tolerable(mode: FaultMode) -> None:
 
 @TOTAL
 def test_assumption_1_persistent_sensor_fault_means_stop(mode: FaultMode) -> None:
-    severity, advice = severity_of(finding(Side.SENSOR, mode), 1.001, LIMITS)
+    severity, advice = severity_of(finding(Side.SENSOR, mode), 1.001, LIMITS, HYDRAULIC)
     assert severity == "high"
     assert "Stop and repair" in advice
-    assert severity_of(finding(Side.SENSOR, mode), 1.5, Limits(brief=2.0))[0] == "low"
+    assert severity_of(finding(Side.SENSOR, mode), 1.5, Limits(brief=2.0), HYDRAULIC)[0] == "low"
 
 
 @TOTAL
 @pytest.mark.parametrize("seconds", [0.05, 100.0])
 def test_assumption_2_actuator_fault_means_stop_at_once(mode: FaultMode, seconds: float) -> None:
-    severity, advice = severity_of(finding(Side.ACTUATOR, mode), seconds, LIMITS)
+    severity, advice = severity_of(finding(Side.ACTUATOR, mode), seconds, LIMITS, HYDRAULIC)
     assert severity == "high"
     assert "Stop at once" in advice
     assert "Assumption 2" in advice
@@ -43,20 +44,20 @@ def test_assumption_2_actuator_fault_means_stop_at_once(mode: FaultMode, seconds
 
 @TOTAL
 def test_drive_that_may_be_either_is_treated_as_the_actuator(mode: FaultMode) -> None:
-    assert severity_of(finding(Side.SENSOR_OR_ACTUATOR, mode), 0.5, LIMITS)[0] == "high"
+    assert severity_of(finding(Side.SENSOR_OR_ACTUATOR, mode), 0.5, LIMITS, HYDRAULIC)[0] == "high"
 
 
 @pytest.mark.parametrize("side", list(Side))
 @pytest.mark.parametrize("mode", [FaultMode.INEFFICIENT, FaultMode.NOISY])
 def test_other_rows_are_watched(side: Side, mode: FaultMode) -> None:
-    marked, advice = severity_of(finding(side, mode, epsilon=0.5), 60.0, LIMITS)
-    slight, _ = severity_of(finding(side, mode, epsilon=0.15), 60.0, LIMITS)
+    marked, advice = severity_of(finding(side, mode, epsilon=0.5), 60.0, LIMITS, HYDRAULIC)
+    slight, _ = severity_of(finding(side, mode, epsilon=0.15), 60.0, LIMITS, HYDRAULIC)
     assert (marked, slight) == ("medium", "low")
     assert "no reason to stop" in advice
 
 
 def test_gain_outside_the_table_is_checked() -> None:
-    severity, advice = severity_of(finding(Side.SENSOR, FaultMode.OUTSIDE_TABLE, epsilon=-0.4), 60.0, LIMITS)
+    severity, advice = severity_of(finding(Side.SENSOR, FaultMode.OUTSIDE_TABLE, epsilon=-0.4), 60.0, LIMITS, HYDRAULIC)
     assert severity == "medium"
     assert "scaling" in advice
 
@@ -64,7 +65,7 @@ def test_gain_outside_the_table_is_checked() -> None:
 @pytest.mark.parametrize("side", list(Side))
 @pytest.mark.parametrize("mode", list(FaultMode))
 def test_improbable_faults_are_no_ground_to_act(side: Side, mode: FaultMode) -> None:
-    assert severity_of(finding(side, mode, p=0.59), 60.0, LIMITS)[0] == "info"
+    assert severity_of(finding(side, mode, p=0.59), 60.0, LIMITS, HYDRAULIC)[0] == "info"
 
 
 @pytest.mark.parametrize("side", list(Side))
@@ -72,35 +73,13 @@ def test_improbable_faults_are_no_ground_to_act(side: Side, mode: FaultMode) -> 
 def test_probable_faults_are_worth_a_check(side: Side, mode: FaultMode) -> None:
     dead_valve = side is not Side.SENSOR and mode in (FaultMode.STUCK, FaultMode.NO_SIGNAL)
     part = finding(side, mode, p=0.89, epsilon=1.0 if mode.total else 0.5)
-    assert severity_of(part, 60.0, LIMITS)[0] == ("medium" if dead_valve else "low")
+    assert severity_of(part, 60.0, LIMITS, HYDRAULIC)[0] == ("medium" if dead_valve else "low")
 
 
 def test_what_is_more_probably_alive_does_not_stop_the_machine() -> None:
     found = finding(Side.ACTUATOR, FaultMode.STUCK, p=0.3)
     found = replace(found, hypotheses=(Hypothesis("actuator", "stuck", 0.3), Hypothesis("actuator", "noisy", 0.69)))
-    assert severity_of(found, 8.0, LIMITS)[0] == "medium"
-
-
-@pytest.mark.parametrize(
-    ("side", "mode", "kind", "words"),
-    [
-        (Side.SENSOR, FaultMode.INEFFICIENT, Kind.WHEEL, "check the sensor's gap, magnet and scaling"),
-        (Side.SENSOR, FaultMode.INEFFICIENT, Kind.STEER, "check the sensor's wire, mount and scaling"),
-        (Side.SENSOR, FaultMode.NOISY, Kind.STEER, "check the sensor's shield, ground and supply"),
-        (Side.ACTUATOR, FaultMode.INEFFICIENT, Kind.STEER, "check the valve's pressure, leakage and spool travel"),
-        (Side.ACTUATOR, FaultMode.NOISY, Kind.WHEEL, "check the valve's command wiring and pilot"),
-        (
-            Side.SENSOR_OR_ACTUATOR,
-            FaultMode.NOISY,
-            Kind.STEER,
-            "measure angle and valve travel to distinguish sensor and valve",
-        ),
-    ],
-)
-def test_what_to_check_is_said_of_the_row(side: Side, mode: FaultMode, kind: Kind, words: str) -> None:
-    assert severity_of(finding(side, mode, epsilon=0.5), 60.0, LIMITS, kind)[1] == (
-        f"This alone is no reason to stop; {words}."
-    )
+    assert severity_of(found, 8.0, LIMITS, HYDRAULIC)[0] == "medium"
 
 
 def split(*parts: tuple[str, str, float]) -> tuple[Hypothesis, ...]:
@@ -113,7 +92,7 @@ def test_a_part_that_may_be_the_other_one_does_not_stop_the_machine(mode: FaultM
         finding(Side.ACTUATOR, mode, p=0.5),
         hypotheses=split(("actuator", mode.value, 0.5), ("sensor", "stuck", 0.48), ("none", "healthy", 0.02)),
     )
-    severity, advice = severity_of(found, 8.0, LIMITS)
+    severity, advice = severity_of(found, 8.0, LIMITS, HYDRAULIC)
     assert severity == "medium"
     assert "which part is not certain" in advice
 
@@ -125,7 +104,7 @@ def test_odds_of_three_to_one_for_a_dead_part_stop_the_machine() -> None:
             finding(Side.ACTUATOR, FaultMode.STUCK, p=p),
             hypotheses=split(("actuator", "stuck", p), rest, ("none", "healthy", 0.02)),
         )
-        assert severity_of(found, 8.0, LIMITS)[0] == expected
+        assert severity_of(found, 8.0, LIMITS, HYDRAULIC)[0] == expected
 
 
 def test_stuck_or_silent_is_one_dead_part() -> None:
@@ -133,13 +112,13 @@ def test_stuck_or_silent_is_one_dead_part() -> None:
         finding(Side.SENSOR, FaultMode.STUCK, p=0.5),
         hypotheses=split(("sensor", "stuck", 0.5), ("sensor", "no_signal", 0.48), ("none", "healthy", 0.02)),
     )
-    assert severity_of(found, 8.0, LIMITS)[0] == "high"
+    assert severity_of(found, 8.0, LIMITS, HYDRAULIC)[0] == "high"
 
 
 def test_the_risk_decides_and_not_the_most_probable_row() -> None:
     rows = (("actuator", "inefficient", 0.49), ("actuator", "stuck", 0.44), ("none", "healthy", 0.07))
     likely = finding(Side.ACTUATOR, FaultMode.INEFFICIENT, epsilon=0.97)
     likely = replace(likely, hypotheses=tuple(Hypothesis(*row) for row in rows))
-    assert severity_of(likely, 10.0, LIMITS)[0] is Severity.HIGH
+    assert severity_of(likely, 10.0, LIMITS, HYDRAULIC)[0] is Severity.HIGH
     half = replace(likely, epsilon=Epsilon(0.5, 0.4, 0.6))
-    assert severity_of(half, 10.0, LIMITS)[0] is Severity.MEDIUM
+    assert severity_of(half, 10.0, LIMITS, HYDRAULIC)[0] is Severity.MEDIUM

@@ -9,6 +9,7 @@ import pytest
 from numpy.typing import NDArray
 
 from diagnosis.direct.shape import shape_sentence
+from diagnosis.results.machine_words import HYDRAULIC
 
 Array = NDArray[np.float64]
 DT = 0.01
@@ -32,7 +33,7 @@ RNG = np.random.default_rng(4)
 )
 def test_a_deviation_gets_its_name(change: Callable[[Array], Array], words: str) -> None:
     y = change(X) + 1e-4 * np.sin(37.0 * T)
-    said = shape_sentence(y, X, DT, ("a", "b"), "m/s")
+    said = HYDRAULIC.fill(shape_sentence(y, X, DT, ("a", "b"), "m/s"))
     assert said.startswith(words)
     assert bool(said) == bool(words)
 

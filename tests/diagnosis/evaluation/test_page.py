@@ -123,7 +123,7 @@ def test_what_was_not_right_is_listed_with_its_time() -> None:
     text = Tree(build_scores_page(document(("drive", counted())))).text
     assert "drive 1 of 2 right, 1 false alarm" in text
     assert "30.00–35.00" in text
-    assert "FR drive valve inefficient ○ missed ε 0.25" in text
+    assert "FR drive inefficient ○ missed ε 0.25" in text
     assert "50.00–52.00" in text
     assert "FR speed sensor noisy ! false alarm probability 0.60, severity low, tier model F2" in text
 

@@ -3,6 +3,7 @@ from __future__ import annotations
 import pytest
 
 from diagnosis.pages import labels
+from diagnosis.results.machine_words import HYDRAULIC
 from replay.faults import FaultMode
 from tests.report_samples import fault
 
@@ -70,11 +71,14 @@ def test_start_in_utc() -> None:
 
 
 def test_titles_name_part_mode_and_size() -> None:
-    assert labels.fault_title(fault()) == "FR speed sensor stuck at 0.21 m/s"
+    assert labels.fault_title(fault(), HYDRAULIC) == "FR speed sensor stuck at 0.21 m/s"
     sat = {"mean": 0.1, "rms": 0.1, "low": 0.0, "high": 0.2, "unit": "rad"}
-    assert labels.fault_title(fault(component="front", kind="steer", sat=sat)) == "front steering sensor stuck at 5.73°"
-    assert labels.fault_title(fault(side="actuator", mode="noisy", sat=None)) == "FR drive valve disturbed"
-    assert labels.fault_title(fault(mode="outside_table")) == "FR speed sensor outside the tables"
+    assert (
+        labels.fault_title(fault(component="front", kind="steer", sat=sat), HYDRAULIC)
+        == "front steering sensor stuck at 5.73°"
+    )
+    assert labels.fault_title(fault(side="actuator", mode="noisy", sat=None), HYDRAULIC) == "FR drive valve disturbed"
+    assert labels.fault_title(fault(mode="outside_table"), HYDRAULIC) == "FR speed sensor outside the tables"
 
 
 def test_legend_names_both_sides_where_they_differ() -> None:
@@ -86,7 +90,7 @@ def test_titles_of_all_rows_with_their_sizes() -> None:
     sat = {"mean": 0.1, "rms": 0.25, "low": 0.0, "high": 0.2, "unit": "m/s"}
     epsilon = {"value": 0.123, "low": 0.1, "high": 0.2}
     titles = {
-        (side, mode): labels.fault_title(fault(side=side, mode=mode, sat=sat, epsilon=epsilon))
+        (side, mode): labels.fault_title(fault(side=side, mode=mode, sat=sat, epsilon=epsilon), HYDRAULIC)
         for side in ("sensor", "actuator", "sensor_or_actuator")
         for mode in ("no_signal", "inefficient", "noisy")
     }
@@ -101,4 +105,4 @@ def test_titles_of_all_rows_with_their_sizes() -> None:
         "FR speed sensor or drive valve inefficient, 12 % lost",
         "FR speed sensor or drive valve noisy, 0.25 m/s r.m.s.",
     ]
-    assert labels.fault_title(fault(mode="inefficient", epsilon=None)) == "FR speed sensor inefficient"
+    assert labels.fault_title(fault(mode="inefficient", epsilon=None), HYDRAULIC) == "FR speed sensor inefficient"

@@ -7,6 +7,7 @@ import numpy as np
 from diagnosis.report.compared_channels import Pair, pair_of, rests_on, shape_sentence
 from diagnosis.report.units import DEGREES
 from diagnosis.results.document import IntervalRow
+from diagnosis.results.machine_words import HYDRAULIC
 from tests import report_samples as samples
 
 ONE = np.zeros(1)
@@ -17,7 +18,7 @@ def fault(**changes: Any) -> IntervalRow:
 
 
 def pair(found: IntervalRow, *names: str) -> Pair:
-    result = pair_of(found, dict.fromkeys(names, ONE))
+    result = pair_of(found, dict.fromkeys(names, ONE), HYDRAULIC)
     assert result is not None
     return result
 
@@ -29,7 +30,7 @@ def test_second_measurement_is_the_reference_of_direct_evidence_alone() -> None:
     assert (model.reference, model.words, model.independent) == ("evidence.FR.sensor.expected", "expected value", False)
     assert pair(fault(tier="tracking"), "wheel.FR.v", "replay.FR.v_ref").words == "commanded"
     assert pair(fault(), "wheel.FR.v").reference is None
-    assert pair_of(fault(), {}) is None
+    assert pair_of(fault(), {}, HYDRAULIC) is None
 
 
 def test_valve_position_is_compared_with_its_command_where_it_decided() -> None:
@@ -52,9 +53,9 @@ def test_a_loss_on_either_side_takes_the_side_that_has_evidence() -> None:
 def test_channels_that_the_sentences_name() -> None:
     found = fault(evidence=["wheel.FR.v_true moved on.", "Noise of wheel.FR.v."])
     columns = ["t", "wheel.FR.v", "wheel.FR.v_true", "wheel.FR.u", "evidence.FR.sensor.residual"]
-    assert rests_on(found, columns) == "second measurement: wheel.FR.v_true, wheel.FR.v"
-    assert rests_on(fault(evidence=["wheel.FR.v2 moved."]), columns) == "second measurement"
-    assert rests_on(fault(tier="none"), columns) == ""
+    assert rests_on(found, columns, HYDRAULIC) == "second measurement: wheel.FR.v_true, wheel.FR.v"
+    assert rests_on(fault(evidence=["wheel.FR.v2 moved."]), columns, HYDRAULIC) == "second measurement"
+    assert rests_on(fault(tier="none"), columns, HYDRAULIC) == ""
 
 
 def test_sentence_about_the_onset() -> None:

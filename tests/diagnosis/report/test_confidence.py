@@ -47,7 +47,7 @@ def test_phrase_of_a_fault() -> None:
     report = samples.report_with(coverage=[row("actuator", 91.0), row("sensor", 100.0)])
     nothing = samples.report_with(coverage=[])
     assert sure_of(fault(0.995), report) == (
-        "Practically certain (99.5 %), measured against the valve's position, 91 % of its driving was judged"
+        "Practically certain (99.5 %), measured against the valve position, 91 % of its driving was judged"
     )
     # certainly faulty, the row less so
     words = sure_of(fault(0.49, hypotheses=[{"side": "actuator", "mode": "stuck", "p": 0.49}]), nothing)

@@ -7,6 +7,7 @@ import pytest
 
 from diagnosis.report.compared_channels import Pair, pair_of
 from diagnosis.report.edges import Edge, edge_of, edge_words, time_words
+from diagnosis.results.machine_words import HYDRAULIC
 
 STEP = 0.005
 FAULT = {"component": "FR", "kind": "wheel", "side": "sensor", "tier": "direct", "start_s": 5.0, "stop_s": 6.0}
@@ -23,7 +24,7 @@ def log(*, second: bool) -> dict[str, np.ndarray[Any, Any]]:
 
 def edge(name: str, columns: dict[str, Any], *others: dict[str, Any], **changes: Any) -> tuple[Edge | None, Pair]:
     fault = {**FAULT, **changes}
-    pair = pair_of(fault, columns)
+    pair = pair_of(fault, columns, HYDRAULIC)
     assert pair is not None
     return edge_of(name, fault, [fault, *others], pair, columns, (0.0, STEP)), pair
 
@@ -46,7 +47,7 @@ def test_window_holds_thirty_samples_or_fifty_milliseconds_on_each_side() -> Non
     assert found is not None
     np.testing.assert_allclose(found.t[[0, 30, -1]], [-0.15, 0.0, 0.15], atol=1e-12)
     np.testing.assert_array_equal(found.y, columns["wheel.FR.v"][970:1031])
-    pair = pair_of(FAULT, columns)
+    pair = pair_of(FAULT, columns, HYDRAULIC)
     assert pair is not None
     fast = edge_of("onset", {**FAULT, "start_s": 1.0, "stop_s": 1.2}, [], pair, columns, (0.0, 0.001))
     assert fast is not None

@@ -232,7 +232,7 @@ def test_unlikely_explanations_are_named_without_a_bar() -> None:
         {"side": "sensor", "mode": "noisy", "p": 1e-300},
     ]
     text = build_page(report, columns)
-    assert "Below 0.1 %: noisy (sensor)." in text
+    assert "Below 0.1 %: speed sensor noisy." in text
     assert text.count('<b class="noisy"') == 0
     assert "--limit:90%" in text
 

@@ -10,6 +10,7 @@ import pytest
 from diagnosis.report.plot_data import axis_of, channels_of, figures_of, packed_intervals, worst
 from diagnosis.report.plot_rows import loop_groups
 from diagnosis.report.rows import derived
+from diagnosis.results.machine_words import HYDRAULIC
 from tests import report_samples as samples
 
 
@@ -42,7 +43,7 @@ def test_columns_without_a_figure_get_what_is_left_of_the_budget() -> None:
     columns = {name: rng.standard_normal(60_000) for name in ("wheel.A.v", "gnss.speed")}
     report = samples.report_with()
     axis = axis_of({"t": np.arange(60_000) / 1000.0}, 1000.0)
-    groups = loop_groups(["A"], [], columns)
+    groups = loop_groups(["A"], [], columns, HYDRAULIC)
     shown, other = channels_of(report, columns, {}, groups, axis, 150_000)
     assert (shown.name, shown.segments[0].stride) == ("wheel.A.v", 1)
     assert other.segments[0].stride > 1

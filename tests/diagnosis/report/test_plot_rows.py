@@ -5,6 +5,7 @@ import numpy as np
 from diagnosis.report.compared_channels import pair_of
 from diagnosis.report.plot_rows import course_rows, fault_rows, loop_groups
 from diagnosis.report.rows import derived
+from diagnosis.results.machine_words import HYDRAULIC
 from tests import report_samples as samples
 
 WHEELS = ["FR", "FL", "RR", "RL"]
@@ -13,7 +14,7 @@ WHEELS = ["FR", "FL", "RR", "RL"]
 def test_rows_of_a_sensor_fault() -> None:
     report, columns = samples.five_faults()
     fault = report["intervals"][0]
-    rows = fault_rows(fault, WHEELS, derived(columns, [fault]))
+    rows = fault_rows(fault, WHEELS, derived(columns, [fault]), HYDRAULIC)
     assert [r.key for r in rows] == ["v", "residual", "epsilon", "sat", "modes", "psi", "u", "peers"]
     assert [t.role for t in rows[0].traces] == ["commanded", "reference", "expected", "measured"]
     assert all(r.unit for r in rows)
@@ -22,7 +23,7 @@ def test_rows_of_a_sensor_fault() -> None:
 def test_steering_is_shown_in_degrees() -> None:
     report, columns = samples.five_faults()
     fault = report["intervals"][3]
-    rows = fault_rows(fault, ["front", "rear"], derived(columns, [fault]))
+    rows = fault_rows(fault, ["front", "rear"], derived(columns, [fault]), HYDRAULIC)
     assert rows[0].unit == "°"
     assert rows[0].traces[-1].scale == 180 / np.pi
 
@@ -30,15 +31,15 @@ def test_steering_is_shown_in_degrees() -> None:
 def test_directly_measured_valve_is_compared_with_its_command() -> None:
     report, columns = samples.five_faults()
     fault = {**report["intervals"][1], "tier": "direct"}
-    rows = {r.key: r for r in fault_rows(fault, WHEELS, derived(columns, [fault]))}
+    rows = {r.key: r for r in fault_rows(fault, WHEELS, derived(columns, [fault]), HYDRAULIC)}
     assert "expected" in [t.role for t in rows["u"].traces]
     assert "expected" not in [t.role for t in rows["v"].traces]
-    assert rows["residual"].unit == "of full opening"
+    assert rows["residual"].unit == "% of opening"
 
 
 def test_only_existing_columns_make_rows() -> None:
-    assert fault_rows(samples.fault(), ["FR"], {}) == ()
-    (group,) = loop_groups(["FR"], [], {"wheel.FR.u": np.zeros(3)})
+    assert fault_rows(samples.fault(), ["FR"], {}, HYDRAULIC) == ()
+    (group,) = loop_groups(["FR"], [], {"wheel.FR.u": np.zeros(3)}, HYDRAULIC)
     assert (group.key, [r.title for r in group.rows]) == ("drive", ["u_a FR"])
 
 
@@ -46,7 +47,7 @@ def test_small_pictures_show_what_the_evidence_compares() -> None:
     report, columns = samples.five_faults()
     fault = report["intervals"][0]
     columns["evidence.FR.sensor.probability"] = 1.0 - columns["evidence.FR.sensor.p_healthy"]
-    pair = pair_of(fault, columns)
+    pair = pair_of(fault, columns, HYDRAULIC)
     assert pair is not None
     motion, residual, probability = course_rows(fault, pair, columns, 0.9)
     assert [(t.column, t.role) for t in motion.traces] == [(pair.reference, "reference"), (pair.measured, "measured")]
@@ -57,7 +58,7 @@ def test_small_pictures_show_what_the_evidence_compares() -> None:
 def test_both_figures_draw_the_same_residual() -> None:
     report, columns = samples.five_faults()
     fault = report["intervals"][3]
-    pair = pair_of(fault, columns)
+    pair = pair_of(fault, columns, HYDRAULIC)
     assert pair is not None
-    linked = {r.key: r for r in fault_rows(fault, ["front", "rear"], derived(columns, [fault]))}
+    linked = {r.key: r for r in fault_rows(fault, ["front", "rear"], derived(columns, [fault]), HYDRAULIC)}
     assert course_rows(fault, pair, columns, None)[1] == linked["residual"]

@@ -37,7 +37,7 @@ def test_the_table_says_size_share_or_that_nothing_shows() -> None:
         ">Stuck for 10 s": "found",
         ">Too much for 10 s": "",
         ">Offset for 10 s": "0.042 m/s",
-        ">Noise for 10 s": "not driven",
+        ">Noise for 10 s": "too brief",
         ">Delay": "",
     }
     assert part.told == "every other part"

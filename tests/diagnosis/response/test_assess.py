@@ -90,7 +90,7 @@ def test_a_machine_that_stands_while_it_is_commanded_blames_no_wheel() -> None:
     j = judged(measured, asked, body)
     assert findings(j) == []
     assert len(j.events) == 1
-    assert "No wheel is blamed" in j.events[0]
+    assert "No {wheel} is blamed" in j.events[0]
     assert all(j.parts[w][0].states[stop.start + 100] != CODE[State.HEALTHY] for w in WHEELS)
 
 
@@ -111,7 +111,7 @@ def test_a_scale_over_the_whole_mission_is_not_called_healthy(scale: float) -> N
     measured["FL"] *= scale
     j = judged(measured, asked, body)
     assert share(j, "FL", State.HEALTHY) == 0.0
-    assert "what the other wheels make of the same command" in j.parts["FL"][0].reasons[State.NOT_ASSESSED]
+    assert "what the other {wheels} make of the same command" in j.parts["FL"][0].reasons[State.NOT_ASSESSED]
     assert share(j, "FR", State.HEALTHY) > 0.9
 
 

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from diagnosis.results.vocabulary import Kind, Severity, Tier, Verdict, part_words
+from diagnosis.results.machine_words import HYDRAULIC
+from diagnosis.results.vocabulary import Kind, Severity, Tier, Verdict
 from replay.faults import Side, State
 
 
@@ -28,10 +29,10 @@ def test_every_member_has_words() -> None:
 
 def test_parts_are_named_by_kind_and_side() -> None:
     for side in Side:
-        assert part_words(Kind.WHEEL, "FR", side).startswith("FR ")
-        assert "steering" in part_words(Kind.STEER, "front", side)
-    assert part_words(Kind.WHEEL, "FR", "sensor_or_actuator") == "FR speed sensor or drive valve"
-    assert part_words("crane", "boom", "hook_side") == "boom hook side"
+        assert HYDRAULIC.part_words(Kind.WHEEL, "FR", side).startswith("FR ")
+        assert "steering" in HYDRAULIC.part_words(Kind.STEER, "front", side)
+    assert HYDRAULIC.part_words(Kind.WHEEL, "FR", "sensor_or_actuator") == "FR speed sensor or drive valve"
+    assert HYDRAULIC.part_words("crane", "boom", "hook_side") == "boom hook side"
 
 
 @pytest.mark.parametrize(
@@ -47,13 +48,16 @@ def test_parts_are_named_by_kind_and_side() -> None:
     ],
 )
 def test_plain_words_for_the_kind_of_evidence(kind: Kind, tier: Tier, words: str) -> None:
-    assert tier.name_of(kind) == words
+    assert HYDRAULIC.evidence(tier, kind) == words
 
 
 def test_how_a_fault_was_decided() -> None:
-    assert Tier.DIRECT.decided(Kind.STEER, Side.SENSOR) == "measured against a second angle sensor"
-    assert Tier.MODEL.decided(Kind.STEER, Side.ACTUATOR) == "by the steering model, without a second measurement"
-    assert Tier.DIRECT.decided(Kind.WHEEL, Side.SENSOR_OR_ACTUATOR) == ""
+    assert HYDRAULIC.decided(Tier.DIRECT, Kind.STEER, Side.SENSOR) == "measured against a second angle sensor"
+    assert (
+        HYDRAULIC.decided(Tier.MODEL, Kind.STEER, Side.ACTUATOR)
+        == "by the steering model, without a second measurement"
+    )
+    assert HYDRAULIC.decided(Tier.DIRECT, Kind.WHEEL, Side.SENSOR_OR_ACTUATOR) == ""
 
 
 @pytest.mark.parametrize("tier", Tier)

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 from diagnosis.audit.fleet.compare import OUTCOMES
 from diagnosis.audit.fleet.fault_types import FaultChange, FaultStandingRow
 from diagnosis.audit.fleet.page.shown import Context, ShownBaseline, ShownFaultChange
 from diagnosis.audit.fleet.words import count
 from diagnosis.pages import labels
 from diagnosis.results.fault_rows import state_label
-from diagnosis.results.vocabulary import part_words
+from diagnosis.results.machine_words import HYDRAULIC, MachineWords
 
 _CHANGES: dict[FaultChange, tuple[str, str]] = {
     "new": ("+", "new"),
@@ -21,28 +23,28 @@ _CHANGES: dict[FaultChange, tuple[str, str]] = {
 _CHANGED = {"severity": "severity", "epsilon": "ε̂", "frequency": "how often"}
 
 
-def changes_of(b: ShownBaseline | None) -> Context | None:
-    """What changed against another audit, in words."""
+def changes_of(b: ShownBaseline | None, words: Mapping[str, MachineWords]) -> Context | None:
+    """What changed against another audit, in words; `words` has how to speak of each machine by its label."""
     if b is None:
         return None
     groups = []
     for outcome in OUTCOMES:
-        found = [_changed(f) for f in b["faults"] if f["outcome"] == outcome]
-        sign, words = _CHANGES[outcome]
-        groups.append({"outcome": outcome, "sign": sign, "words": words[0].upper() + words[1:], "rows": found})
+        found = [_changed(f, words.get(f["machine"], HYDRAULIC)) for f in b["faults"] if f["outcome"] == outcome]
+        sign, said = _CHANGES[outcome]
+        groups.append({"outcome": outcome, "sign": sign, "words": said[0].upper() + said[1:], "rows": found})
     notes = [f"{c['machine']}: {c['older'].short} → {c['newer'].short}" for c in b["machines"]["changed"]]
     machines = b["machines"]
-    for labels_of, words in (
+    for labels_of, said in (
         (machines["new"], "not in the earlier audit"),
         (machines["missing"], "no longer in the audit"),
     ):
         if labels_of:
-            notes.append(f"Machines {words}: {', '.join(labels_of[:20])}" + (" …" if len(labels_of) > 20 else ""))
+            notes.append(f"Machines {said}: {', '.join(labels_of[:20])}" + (" …" if len(labels_of) > 20 else ""))
     coverage = [
         {
             "change": c["change"],
             "words": {"lost": "no longer assessed", "gained": "assessed now"}[c["change"]],
-            "part": f"{c['machine']}: {part_words(c['kind'], c['component'], c['side'])}",
+            "part": f"{c['machine']}: {words.get(c['machine'], HYDRAULIC).part_words(c['kind'], c['component'], c['side'])}",
         }
         for c in b["coverage"]
     ]
@@ -64,11 +66,11 @@ def changes_of(b: ShownBaseline | None) -> Context | None:
     }
 
 
-def _changed(f: ShownFaultChange) -> Context:
+def _changed(f: ShownFaultChange, words: MachineWords) -> Context:
     return {
         "machine": f["machine"],
         "symbol": labels.known(f["mode"]),
-        "words": f"{part_words(f['kind'], f['component'], f['side'])} {state_label(f['mode'], f['side']).lower()}",
+        "words": f"{words.part_words(f['kind'], f['component'], f['side'])} {state_label(f['mode'], f['side']).lower()}",
         "older": _standing(f["older"]),
         "newer": _standing(f["newer"]),
         "address": f["address"],

@@ -11,9 +11,9 @@ from diagnosis.audit.fleet.fleet_types import MachineRow, PartRow
 from diagnosis.audit.fleet.page.svg import mark
 from diagnosis.pages import labels
 from diagnosis.results.fault_rows import state_label
+from diagnosis.results.machine_words import words_of
 from replay.faults import Side
 
-_SIDES: dict[str, str] = {Side.SENSOR: "sensor", Side.ACTUATOR: "valve"}
 _LEVELS = 4
 
 
@@ -52,7 +52,9 @@ def matrix(machines: Sequence[MachineRow]) -> Matrix:
             heads[-1] = (component, heads[-1][1] + 1)
         else:
             heads.append((component, 1))
-    sides = [_SIDES.get(side, side) for _, side in columns]
+    drives = {words_of(m).drive for m in machines}
+    names = {Side.SENSOR.value: "sensor", Side.ACTUATOR.value: drives.pop() if len(drives) == 1 else "drive"}
+    sides = [names.get(side, side) for _, side in columns]
     return Matrix(heads, sides, rows, sums, quiet, sum(sums))
 
 

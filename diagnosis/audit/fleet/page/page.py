@@ -32,7 +32,8 @@ from diagnosis.pages import labels
 from diagnosis.pages.environment import DARK, SHARED, asset, environment, shared_style
 from diagnosis.pages.mode_style import mode_rules
 from diagnosis.results.fault_rows import state_label
-from diagnosis.results.vocabulary import Verdict, part_words
+from diagnosis.results.machine_words import words_of
+from diagnosis.results.vocabulary import Verdict
 from replay.faults import SCALED
 
 _HERE = Path(__file__).parent
@@ -93,7 +94,7 @@ def build_fleet_page(found: FleetDocument) -> str:
         "span": _span(document["counts"]),
         "audit": _audit(document["audit"]),
         "kpis": _kpis(document),
-        "baseline": changes_of(document["baseline"]),
+        "baseline": changes_of(document["baseline"], {m["label"]: words_of(m) for m in document["machines"]}),
         "strip": rows.STRIP,
         "machines": [_machine(k, m, document, standing[k], own[k]) for k, m in enumerate(document["machines"])],
         "faults": [_fault(f, document, directions) for f in present[:_FAULTS]],
@@ -238,13 +239,13 @@ def _machine(
         "words": words,
         "note": m["note"],
         "open": len(standing),
-        "faults": "; ".join(rows.fault_words(f) for f in standing[:2])
+        "faults": "; ".join(rows.fault_words(f, words_of(m)) for f in standing[:2])
         + (f" +{len(standing) - 2}" if len(standing) > 2 else ""),
         "strip": rows.strip(document["missions"], m),
         "with_faults": m["with_faults"],
         "judged": judged,
         "trend": sparkline(leading) if leading else "",
-        "trend_words": f"{part_words(leading['kind'], leading['component'], leading['side'])}: {level_words(leading, line)}"
+        "trend_words": f"{words_of(m).part_words(leading['kind'], leading['component'], leading['side'])}: {level_words(leading, line)}"
         if leading and line
         else "",
         "level": line["level"]["value"] if line else -1.0,
@@ -277,7 +278,7 @@ def _fault(f: FleetFaultRow, document: ShownDocument, directions: Mapping[tuple[
         "machine": document["machines"][f["machine"]]["label"],
         "symbol": labels.known(f["mode"]),
         "words": state_label(f["mode"], f["side"]),
-        "part": part_words(f["kind"], f["component"], f["side"]),
+        "part": words_of(document["machines"][f["machine"]]).part_words(f["kind"], f["component"], f["side"]),
         "severity": f["severity"],
         "status": _STATUS[f["status"]],
         "kind": f["status"],

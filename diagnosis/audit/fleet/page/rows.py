@@ -14,7 +14,8 @@ from diagnosis.audit.fleet.page.svg import mark
 from diagnosis.audit.store.outcome import MissionState
 from diagnosis.pages import labels
 from diagnosis.results.fault_rows import state_label
-from diagnosis.results.vocabulary import Verdict, part_words
+from diagnosis.results.machine_words import ANY_DRIVE, MachineWords, words_of
+from diagnosis.results.vocabulary import Verdict
 from replay.faults import SCALED
 
 STRIP = 14
@@ -30,9 +31,9 @@ def symbol(mission: ShownMission) -> str:
     return "warning" if verdict == Verdict.WATCH else Verdict(verdict).symbol
 
 
-def fault_words(fault: FleetFaultRow | MissionFaultRow) -> str:
+def fault_words(fault: FleetFaultRow | MissionFaultRow, machine_words: MachineWords) -> str:
     """Part, mode and size in few words: ``RL drive valve inefficient 12 %``."""
-    words = part_words(fault["kind"], fault["component"], fault["side"])
+    words = machine_words.part_words(fault["kind"], fault["component"], fault["side"])
     words += f" {state_label(fault['mode'], fault['side']).lower()}"
     e = fault["epsilon"]
     return words + (f" {100 * e['value']:.0f} %" if e and fault["mode"] in SCALED else "")
@@ -49,10 +50,11 @@ def day(start_ns: int | None) -> str:
 
 def strip(missions: Sequence[ShownMission], machine: MachineRow) -> Markup:
     """The last missions, oldest first, then apart those of unknown order and those that were not read."""
+    words = words_of(machine)
     dated = [missions[k] for k in machine["missions"]]
-    shown = Markup("").join(_cell(m) for m in dated[-STRIP:])
+    shown = Markup("").join(_cell(m, words) for m in dated[-STRIP:])
     apart = [missions[k] for k in (*machine["undated"], *machine["failed"])]
-    extra = Markup("").join(_cell(m) for m in apart[:6])
+    extra = Markup("").join(_cell(m, words) for m in apart[:6])
     more = Markup('<span class="muted">+{}</span>').format(len(apart) - 6) if len(apart) > 6 else Markup("")
     if extra:
         extra = Markup(
@@ -61,10 +63,10 @@ def strip(missions: Sequence[ShownMission], machine: MachineRow) -> Markup:
     return Markup('<div class="cells">{}{}</div>').format(shown, extra)
 
 
-def _cell(m: ShownMission) -> Markup:
+def _cell(m: ShownMission, machine_words: MachineWords) -> Markup:
     state, address = symbol(m), m["address"]
     faults = m["faults"]
-    found = fault_words(faults[0]) if faults else m["state"].words or _verdict_words(m["verdict"])
+    found = fault_words(faults[0], machine_words) if faults else m["state"].words or _verdict_words(m["verdict"])
     more = f" and {len(faults) - 1} more" if len(faults) > 1 else ""
     words = f"{day(m.get('start_ns'))}: {found}{more}"
     inner = Markup('<svg><use href="#g-{}"/></svg>').format(state)
@@ -85,18 +87,18 @@ def groups(document: ShownDocument) -> Iterator[tuple[str, str, int, Markup]]:
     for k, m in enumerate(document["machines"]):
         rows = [missions[i] for i in (*reversed(m["missions"]), *m["undated"], *m["failed"])] + copies[k]
         words = f"{len(rows)} mission{'s' if len(rows) != 1 else ''}, {m['with_faults']} with faults"
-        yield m["label"], words, len(rows), Markup("".join(map(_row, rows)))
+        yield m["label"], words, len(rows), Markup("".join(_row(r, words_of(m)) for r in rows))
     rest = [m for m in missions if m["machine"] is None]
     if rest:
         yield (
             "No machine known",
             f"{len(rest)} mission{'s' if len(rest) != 1 else ''}",
             len(rest),
-            Markup("".join(map(_row, rest))),
+            Markup("".join(_row(r, ANY_DRIVE) for r in rest)),
         )
 
 
-def _row(m: ShownMission) -> str:
+def _row(m: ShownMission, machine_words: MachineWords) -> str:
     """One mission; its class is what the selection above the list asks for."""
     verdict, faults, address = m["verdict"], m["faults"], m["address"]
     name = escape(m["name"])
@@ -112,7 +114,9 @@ def _row(m: ShownMission) -> str:
         notes.append(m["reason"])
     note = f'<div class="small muted">{escape("; ".join(notes))}</div>' if notes else ""
     start, driving = m.get("start_ns"), m.get("driving_s")
-    words = "; ".join(fault_words(f) for f in faults[:2]) + (f" +{len(faults) - 2}" if len(faults) > 2 else "")
+    words = "; ".join(fault_words(f, machine_words) for f in faults[:2]) + (
+        f" +{len(faults) - 2}" if len(faults) > 2 else ""
+    )
     if verdict is None:
         kind, words = ("pending" if m["state"] is MissionState.PENDING else "failed"), m["reason"]
         status = f"{mark('warning')}{m['state'].words.capitalize()}"

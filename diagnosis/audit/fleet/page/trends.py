@@ -9,7 +9,7 @@ from diagnosis.audit.fleet.page.shown import Context
 from diagnosis.audit.fleet.page.svg import trend_picture
 from diagnosis.audit.fleet.trend_types import LineRow, TrendRow
 from diagnosis.audit.fleet.words import count
-from diagnosis.results.vocabulary import part_words
+from diagnosis.results.machine_words import words_of
 
 MOST = 48
 
@@ -46,7 +46,7 @@ def chosen(trends: Sequence[TrendRow]) -> list[TrendRow]:
 
 def course(t: TrendRow, machines: Sequence[MachineRow], unit: str) -> Context:
     """Title, picture and words of one course."""
-    title = f"{machines[t['machine']]['label']} · {part_words(t['kind'], t['component'], t['side'])}"
+    title = f"{machines[t['machine']]['label']} · {words_of(machines[t['machine']]).part_words(t['kind'], t['component'], t['side'])}"
     line = t["line"]
     notes = []
     if line is not None:

@@ -130,7 +130,7 @@ def test_missing_machines_and_missions_are_worse_and_told(tmp_path: Path) -> Non
     assert found["worse"]
     assert found["machines"]["missing"] == ["HX-2", "HX-3"]
     assert len(found["missions"]["missing"]) == 7
-    changes = changes_of(found)
+    changes = changes_of(found, {})
     assert changes
     assert changes["headline"].startswith("2 machines and 7 missions of the earlier audit are missing. ")
     assert changes["notes"][-1].startswith("Missions missing: HX-1/2, HX-2/0, ")

@@ -1,0 +1,47 @@
+"""Sizes in the sentences of an assessment: amounts with their unit, and how much more probable a fault makes a channel."""
+
+from __future__ import annotations
+
+import math
+
+from replay.machine.quantities import OPENING
+
+_MOST, _LEAST = 1e6, 1.5
+
+
+def amount(value: float, unit: str, digits: int = 3) -> str:
+    """A value with its unit, for `MachineWords.fill`: ``0.31 {speed_unit}``, of a command ``2.1{percent}``.
+
+    Parameters
+    ----------
+    value : float
+        The value, in `unit`.
+    unit : str
+        As recorded: m/s, rad, a fraction of full opening.
+    digits : int
+        Significant digits.
+    """
+    if unit == OPENING:
+        return f"{100 * value:.{digits}g}{{percent}}"
+    return f"{value:.{digits}g} {'{speed_unit}' if unit == 'm/s' else unit}".rstrip()
+
+
+def not_reported(below: int, name: str) -> str:
+    """Sentence on deviations of a channel that are too small to count."""
+    many = f"{below} deviations of {name} are" if below != 1 else f"1 deviation of {name} is"
+    return f"{many} below the limits of the machine file and not reported."
+
+
+def times_as_probable(log_evidence: float) -> str:
+    """A log-evidence in words, to be followed by *with this fault as without*: ``about 3 000 times as probable``."""
+    if log_evidence > math.log(_MOST):
+        return "more than a million times as probable"
+    times = math.exp(log_evidence)
+    if times < _LEAST:
+        return "about as probable" if times > 1.0 / _LEAST else "less probable"
+    rounded = float(f"{times:.1g}") if times >= 10.0 else float(f"{times:.2g}")
+    return (
+        f"about {rounded:,.0f}".replace(",", "\u202f") + " times as probable"
+        if times >= 10.0
+        else f"{rounded:g} times as probable"
+    )
