@@ -116,9 +116,10 @@ def _read_table(path: Path) -> dict[str, NDArray[Any]]:
     try:
         with path.open("rb") as file:
             table = pq.read_table(file)
-    except (OSError, pa.ArrowException) as error:
-        raise LogError(f"{path}: cannot be read ({error}); run `mfhca diagnose` on the log again") from error
-    return {name: table.column(name).to_numpy() for name in table.column_names}
+        return {name: table.column(name).to_numpy() for name in table.column_names}
+    except (OSError, pa.ArrowException, ValueError, KeyError, TypeError, OverflowError) as error:
+        said = " ".join(str(error).split())[:200]
+        raise LogError(f"{path}: cannot be read ({said}); run `mfhca diagnose` on the log again") from error
 
 
 def _read_windows(path: Path) -> Closeups | None:

@@ -8,6 +8,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, TypeVar
 
+from replay.border import UnforeseenValue, bordered
 from replay.errors import ConfigError
 from replay.log.source_options import SignalSource, SourceOptions
 from replay.machine.axle_plant import AxlePlant
@@ -46,7 +47,10 @@ def load_machine(path: Path) -> Machine:
     except TomlError as error:
         raise ConfigError(f"{path}: {error}") from error
     try:
-        return _machine(data)
+        with bordered(path, "machine file", UnforeseenValue, "look at the values of that kind in it"):
+            return _machine(data)
+    except UnforeseenValue:
+        raise
     except ConfigError as error:
         text = str(error)
         raise ConfigError(f"{path}: {text if len(text) <= _LONGEST else text[:_LONGEST] + ' …'}") from error
@@ -233,4 +237,8 @@ def _build(kind: type[_T], section: str, value: Any, rename: Mapping[str, str] |
             if not isinstance(item, str):
                 raise ConfigError(f"{key} = {item!r} must be text")
             out[name] = item
+    needed = (f.name for f in fields.values() if f.default is f.default_factory is dataclasses.MISSING)
+    for name in needed:
+        if name not in out:
+            raise ConfigError(f"{section}.{shown[name]} is missing; give it, or leave [{section}] out")
     return kind(**out)

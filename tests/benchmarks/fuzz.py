@@ -76,7 +76,9 @@ def main() -> int:
     parser.add_argument("--first", type=int, default=0, help="number of the first input of each format")
     parser.add_argument("--inputs", type=int, default=10**9, help="most inputs of each format")
     parser.add_argument("--jobs", type=int, default=os.cpu_count() or 1)
-    parser.add_argument("--out", type=Path, default=Path(tempfile.gettempdir()) / "mfhca-fuzz", help="folder of findings")
+    parser.add_argument(
+        "--out", type=Path, default=Path(tempfile.gettempdir()) / "mfhca-fuzz", help="folder of findings"
+    )
     parser.add_argument("--repeat", metavar="FORMAT:SEED:NUMBER")
     choice = parser.parse_args()
     drop_stale_kernels([ROOT / "replay", ROOT / "diagnosis"], ROOT / "replay" / "__pycache__" / "kernels.json")
@@ -85,7 +87,10 @@ def main() -> int:
     load_readers()
     choice.out.mkdir(parents=True, exist_ok=True)
     print(f"seed {choice.seed}", flush=True)
-    with tempfile.TemporaryDirectory(prefix="mfhca-fuzz-") as folder:
+    shared = Path("/dev/shm")  # many small files: in memory where that can be
+    with tempfile.TemporaryDirectory(
+        prefix="mfhca-fuzz-", dir=shared if os.access(shared, os.W_OK) else None
+    ) as folder:
         names = choice.format or list(TARGETS)
         pool = Pool(names, choice.seed, choice.first, Path(folder), choice.out, choice.jobs)
         pool.run(choice.minutes * 60, choice.inputs)

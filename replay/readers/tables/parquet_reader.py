@@ -197,7 +197,7 @@ class _Parquet:
     def blocks(self, names: Sequence[str], groups: list[int], size: int = 1 << 17) -> Iterator[dict[str, NDArray[Any]]]:
         """Columns by name, a limited number of rows at a time; integers of the first stay exact."""
         own = [self.numeric[n].name for n in names]
-        size = max(min(size, _CELLS // len(own)), 1)
+        size = max(min(size, _CELLS // max(len(own), 1)), 1)
         for group in groups:
             declared = self.file.metadata.row_group(group).total_byte_size
             if declared > _LARGEST_GROUP:

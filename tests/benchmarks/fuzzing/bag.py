@@ -85,7 +85,10 @@ class Ros1Bag:
             if compression != "none":
                 writer.set_compression(Writer.CompressionFormat[compression.upper()])
             with writer:
-                links = {kind: writer.add_connection(f"/{k}", kind, typestore=STORE) for k, kind in enumerate((FLOAT, TIME, TEXT))}
+                links = {
+                    kind: writer.add_connection(f"/{k}", kind, typestore=STORE)
+                    for k, kind in enumerate((FLOAT, TIME, TEXT))
+                }
                 for i in range(COUNT):
                     for kind in (FLOAT, TIME, TEXT)[: 3 if i % 5 == 0 else 1]:
                         writer.write(links[kind], T0 + i * 10_000_000, _message(kind, i))
@@ -107,7 +110,9 @@ class Ros1Bag:
         for _ in range(source.choice((1, 1, 1, 2, 3))):
             chunks = [r for r in records if r.inner]
             inside = bool(chunks) and source.random() < 0.5
-            done.append(("in a chunk: " if inside else "") + _among(source.choice(chunks).inner if inside else records, source))
+            done.append(
+                ("in a chunk: " if inside else "") + _among(source.choice(chunks).inner if inside else records, source)
+            )
         return Case(MAGIC + b"".join(r.bytes() for r in records), "; ".join(done), {"sites": len(done)})
 
     def read(self, path: Path, source: random.Random) -> Reading:
@@ -151,7 +156,9 @@ def _message(kind: str, i: int) -> bytes:
         message = types[TEXT]("x" * (i % 9))
     else:
         stamp = types["builtin_interfaces/msg/Time"](T0 // 10**9 + i // 100, i % 100 * 10_000_000)
-        message = types[TIME](types["std_msgs/msg/Header"](i, stamp, "base"), types["geometry_msgs/msg/Point"](1.0, i, 2.0))
+        message = types[TIME](
+            types["std_msgs/msg/Header"](i, stamp, "base"), types["geometry_msgs/msg/Point"](1.0, i, 2.0)
+        )
     return bytes(STORE.serialize_ros1(message, kind))
 
 

@@ -118,7 +118,11 @@ class Tdms(_Binary):
 
     def corpus(self, folder: Path) -> list[Sample]:
         """Waveforms, a time channel, text, and an index beside."""
-        wave = {"wf_start_time": np.datetime64("2022-06-15T10:00:00", "us"), "wf_increment": 0.001, "wf_start_offset": 0.0}
+        wave = {
+            "wf_start_time": np.datetime64("2022-06-15T10:00:00", "us"),
+            "wf_increment": 0.001,
+            "wf_start_offset": 0.0,
+        }
         n = np.arange(float(COUNT))
         stamps = np.datetime64("2022-06-15T10:00:00", "us") + (n * 1000).astype("timedelta64[us]")
         tables = {
@@ -146,7 +150,9 @@ class Tdms(_Binary):
         at, size = source.choice(((4, 4), (8, 4), (12, 8), (20, 8), (28, 4)))
         if source.random() < 0.75:
             at, size = 28 + source.randrange(max(data, 1)), source.choice((1, 4, 4, 8))
-        return Case(with_number(raw, Spot(start + at, size, "int"), source), f"number at {at} of the segment at {start}")
+        return Case(
+            with_number(raw, Spot(start + at, size, "int"), source), f"number at {at} of the segment at {start}"
+        )
 
 
 class Svdx(_Binary):
@@ -164,10 +170,14 @@ class Svdx(_Binary):
             xml, blocks = xml + b"</P>", b""
             for k, kind in enumerate(kinds, 1):
                 blocks += _block(k, kind)
-            starts = [40 + len(b"".join(_block(j, kinds[j - 1]) for j in range(1, k))) for k in range(1, len(kinds) + 1)]
+            starts = [
+                40 + len(b"".join(_block(j, kinds[j - 1]) for j in range(1, k))) for k in range(1, len(kinds) + 1)
+            ]
             table = b"".join(struct.pack("<QQI", s, len(_block(k, kinds[k - 1])), k) for k, s in enumerate(starts, 1))
             shift = len(table) - 20
-            table = b"".join(struct.pack("<QQI", s + shift, len(_block(k, kinds[k - 1])), k) for k, s in enumerate(starts, 1))
+            table = b"".join(
+                struct.pack("<QQI", s + shift, len(_block(k, kinds[k - 1])), k) for k, s in enumerate(starts, 1)
+            )
             raw = struct.pack("<QQI", 20 + len(table) + len(blocks), len(xml), len(kinds)) + table + blocks + xml
             samples.append(Sample(name, {"log.svdx": raw}, "log.svdx", "log.svdx"))
         return samples
@@ -182,7 +192,11 @@ class Svdx(_Binary):
             return Case(raw[:8] + struct.pack("<Q", len(part)) + raw[16:at] + part, f"{what} in the XML")
         if way < 0.4:
             entity = b'<!DOCTYPE P [<!ENTITY a "' + b"x" * 1000 + b'"><!ENTITY b "&a;&a;&a;&a;&a;&a;&a;&a;">]>'
-            part = raw[at : at + 3] + source.choice((entity, b"<a>" * 5000, b"<!-- " * 100)) + raw[at + 3 :].replace(b"M.1", b"&b;")
+            part = (
+                raw[at : at + 3]
+                + source.choice((entity, b"<a>" * 5000, b"<!-- " * 100))
+                + raw[at + 3 :].replace(b"M.1", b"&b;")
+            )
             return Case(raw[:8] + struct.pack("<Q", len(part)) + raw[16:at] + part, "other XML")
         if way < 0.75:
             size = source.choice((2, 4, 8))
@@ -193,8 +207,7 @@ class Svdx(_Binary):
 
 def _block(number: int, kind: str) -> bytes:
     letter = {"INT16": "h", "REAL64": "d"}[kind]
-    size = struct.calcsize(letter) * 8
-    head = b"01.00.00.40" + struct.pack("<QQQQQQQ", START, 5, START, START, number, size, 10_000) + bytes(16) + bytes(4)
+    head = b"01.00.00.40" + struct.pack("<QQQQQQQ", START, 5, START, START, number, 16, 10_000) + bytes(16) + bytes(4)
     block = head + struct.pack("<Q", len(head) + 8)
     for s in range(5):
         block += struct.pack("<QI", START + s * 100, 3) + b"".join(struct.pack(f"<I{letter}", k, k) for k in range(3))

@@ -5,10 +5,11 @@ from __future__ import annotations
 import random
 from pathlib import Path
 
-from replay.errors import LogError
+from replay.border import UnforeseenContent
+from replay.errors import ConfigError, LogError
 from replay.log.raw_log import RawLog
 from replay.log.source_options import SourceOptions
-from replay.readers.common.border import UnforeseenContent
+from replay.readers.common.protocol import Reader
 from replay.readers.registry import open_log
 from tests.benchmarks.fuzzing.case import Finding, Reading
 
@@ -26,9 +27,11 @@ def read(path: Path, source: random.Random) -> Reading:
     """
     try:
         reader = open_log(path)
-        summary = reader.summarise(path, OPTIONS)
+        reader.summarise(path, OPTIONS)
         log = reader.read(path, OPTIONS)
         _shape(log)
+        if log.summary.topics and log.summary.topics[0].encoding == "table" and source.random() < 0.2:
+            _again(reader, path, source)
         if source.random() < 0.2:
             first = next(iter(log.channels.values()), None)
             start = int(first.stamps[0]) if first is not None and len(first.stamps) else 0
@@ -42,9 +45,23 @@ def read(path: Path, source: random.Random) -> Reading:
         if path.name not in text or "\n" in text or len(text) > _LONGEST:
             raise Finding("shape", f"a message that names no file, or is long: {text[:300]!r}") from error
         return Reading("refused", None, (text,))
-    del summary
     said = (*log.summary.damage, *log.summary.notes, *(f"{t.name}: {t.note}" for t in log.summary.topics if t.note))
     return Reading("degraded" if log.summary.damage else "whole", log, said)
+
+
+def _again(reader: Reader, path: Path, source: random.Random) -> None:
+    """Read a table with its clock stated otherwise; being refused is all right."""
+    unit = source.choice(("s", "ms", "us", "ns", "filetime", "iso", "dc", "dc32", "dt"))
+    epoch = source.choice((None, None, "2024-05-01T10:00:00Z", "1601-01-01", "9999-12-31"))
+    column = source.choice((None, "t", "v", "a", "when", "s"))
+    try:
+        options = SourceOptions(time=column, time_unit=unit, epoch=epoch, decimal=source.choice((None, ",", ".")))
+        reader.summarise(path, options)
+        _shape(reader.read(path, options))
+    except UnforeseenContent:
+        raise
+    except (LogError, ConfigError):
+        pass
 
 
 def _shape(log: RawLog) -> None:

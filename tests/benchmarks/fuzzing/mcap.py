@@ -23,7 +23,12 @@ from tests.benchmarks.fuzzing.mcap_file import CHUNK, Record
 
 T0, COUNT = 1_760_000_000_000_000_000, 40
 JOINTS = "builtin_interfaces/Time stamp\nstring frame\nstring[] name\nfloat64[] velocity\nfloat32[4] effort\nuint8[<=8] mode\na/E[] e\n"
-JOINTS += "=" * 80 + "\nMSG: builtin_interfaces/Time\nint32 sec\nuint32 nanosec\n" + "=" * 80 + "\nMSG: a/E\nbool on\nwstring w\n"
+JOINTS += (
+    "=" * 80
+    + "\nMSG: builtin_interfaces/Time\nint32 sec\nuint32 nanosec\n"
+    + "=" * 80
+    + "\nMSG: a/E\nbool on\nwstring w\n"
+)
 IDL = "module a { module msg { enum M { @value(3) OFF, ON }; @appendable struct I { double v; sequence<short, 5> s; M m; string<9> t; }; }; };"
 OPTIONS: dict[str, dict[str, Any]] = {
     "zstd": {"compression": CompressionType.ZSTD},
@@ -74,7 +79,9 @@ def _protobuf(i: int) -> bytes:
 
 
 def _json(i: int) -> bytes:
-    return json.dumps({"stamp": {"sec": T0 // 10**9 + i, "nsec": 5}, "v": [i, i / 7], "on": True, "s": "é\n", "o": None}).encode()
+    return json.dumps(
+        {"stamp": {"sec": T0 // 10**9 + i, "nsec": 5}, "v": [i, i / 7], "on": True, "s": "é\n", "o": None}
+    ).encode()
 
 
 TOPICS = (
@@ -156,7 +163,9 @@ def _peer(content: bytes) -> dict[str, int] | None:
     """Messages of each topic that the mcap package gives with checksums on; None where it gives up."""
     found: Counter[str] = Counter()
     try:
-        for _, channel, _ in NonSeekingReader(io.BytesIO(content), validate_crcs=True).iter_messages(log_time_order=False):
+        for _, channel, _ in NonSeekingReader(io.BytesIO(content), validate_crcs=True).iter_messages(
+            log_time_order=False
+        ):
             found[channel.topic] += 1
     except (McapError, Exception):  # what it makes of damage is its own
         return None

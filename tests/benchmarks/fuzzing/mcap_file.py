@@ -132,9 +132,7 @@ def join(records: list[Record], *, places: bool, checksums: bool) -> bytes:
             record.body = struct.pack("<QQ", summary if summary < len(out) else 0, 0) + record.body[16:]
         if record.op == FOOTER and checksums and len(record.body) == 20 and any(record.body[16:]):
             start = int.from_bytes(record.body[:8], "little") or len(out)
-            record.body = record.body[:16] + struct.pack(
-                "<I", zlib.crc32(bytes(out[start:]) + record.bytes()[:-4])
-            )
+            record.body = record.body[:16] + struct.pack("<I", zlib.crc32(bytes(out[start:]) + record.bytes()[:-4]))
         if record.op == DATA_END and checksums and len(record.body) == 4 and any(record.body):
             record.body = struct.pack("<I", zlib.crc32(bytes(out)))
         out += record.bytes()
@@ -150,7 +148,9 @@ def damage_record(record: Record, source: random.Random) -> str:
         record.op = source.choice((*range(17), 0x80, 0xFF))
         return "kind"
     if way < 0.12:
-        record.length = source.choice((0, 1, len(record.body) + 1, max(len(record.body) - 1, 0), 2**31, 2**63, 2**64 - 9))
+        record.length = source.choice(
+            (0, 1, len(record.body) + 1, max(len(record.body) - 1, 0), 2**31, 2**63, 2**64 - 9)
+        )
         return "length"
     found = spots(record.op, record.body)
     if not found:

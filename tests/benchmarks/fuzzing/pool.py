@@ -23,7 +23,7 @@ from tests.benchmarks.fuzzing.formats import TARGETS
 from tests.benchmarks.fuzzing.worker import Answer, input_of, lay_out, source_of, tried, work
 
 HANG_CPU_S, HANG_WALL_S = 10.0, 60.0
-BATCH, KEPT = 40, 3
+BATCH, KEPT = 200, 3
 _CONTEXT = multiprocessing.get_context("fork")
 _TICKS = os.sysconf("SC_CLK_TCK")
 
@@ -59,6 +59,7 @@ class Pool:
     def __init__(self, names: list[str], seed: int, first: int, folder: Path, out: Path, jobs: int) -> None:
         self.names, self.seed, self.folder, self.out = names, seed, folder, out
         self.scores = {name: Score() for name in names}
+        self._first = first
         self._next = dict.fromkeys(names, first)
         self._spent = dict.fromkeys(names, 0.0)
         self._slots = [Slot(k) for k in range(jobs)]
@@ -91,7 +92,7 @@ class Pool:
                 self._stop(slot)
 
     def _give(self, slot: Slot, most: int) -> None:
-        names = [n for n in self.names if self._next[n] - min(self._next.values()) < 10**9 and self.scores[n].inputs < most]
+        names = [n for n in self.names if self._next[n] - self._first < most]
         if not names:
             return
         name = min(names, key=self._spent.__getitem__)
@@ -100,7 +101,7 @@ class Pool:
             slot.name = name
             self._start(slot)
         first = self._next[name]
-        self._next[name] = first + min(BATCH, most)
+        self._next[name] = min(first + BATCH, self._first + most)
         slot.todo = list(range(first, self._next[name]))
         self._spent[name] += 1e-3
         self._send(slot)
@@ -123,7 +124,8 @@ class Pool:
         try:
             while slot.todo and slot.link.poll():
                 got: Any = slot.link.recv()
-                self._spent[slot.name] += time.monotonic() - slot.since
+                if slot.stage != "starting":
+                    self._spent[slot.name] += time.monotonic() - slot.since
                 slot.since, slot.cpu_at = time.monotonic(), _cpu(slot)
                 if isinstance(got, str):
                     slot.stage = got
@@ -153,7 +155,10 @@ class Pool:
         trace = (self.folder / f"worker-{slot.number}.trace").read_text(errors="replace")
         if slot.stage in ("starting", "making") and kind == "crash":
             raise RuntimeError(f"{slot.name} {self.seed}:{number}: the worker ended (exit code {code}): {trace}")
-        what = {"hang": f"no end after {HANG_CPU_S:g} s of a processor", "crash": f"the interpreter died (exit code {code})"}
+        what = {
+            "hang": f"no end after {HANG_CPU_S:g} s of a processor",
+            "crash": f"the interpreter died (exit code {code})",
+        }
         if slot.stage == "checking":
             kind, what["peer"] = "peer", "another library hangs or dies"
         answer = Answer(
@@ -210,7 +215,10 @@ def _make_corpus(name: str, folder: Path, out: Path) -> None:
     for k, sample in enumerate(samples):
         case = Case(sample.raw, "sound", {"sound": True})
         answer = tried(target, sample, case, source_of(0, name, k), lay_out(sample, case, folder / f"sound-{k}"))
-        if answer["kind"] not in ("", "memory") or answer["outcome"] not in (sample.facts.get("sound", "whole"), "memory"):
+        if answer["kind"] not in ("", "memory") or answer["outcome"] not in (
+            sample.facts.get("sound", "whole"),
+            "memory",
+        ):
             print(f"{name}, sound sample {sample.name}: {answer}", file=sys.stderr, flush=True)
 
 
@@ -227,5 +235,6 @@ def _cpu(slot: Slot) -> float:
 def _mark(answer: Answer) -> str:
     """What findings of one cause share."""
     places = re.findall(r'File "[^"]*?([\w.]+)", line (\d+)', answer["trace"])
-    last = answer["trace"].strip().rpartition("\n")[2]
-    return f"{answer['kind']} {places[-3:]} {last.partition(':')[0][:60]} {re.sub('[0-9]+', '#', answer['text'])[:40]}"
+    last = answer["trace"].strip().rpartition("\n")[2].partition(":")[0][:60]
+    words = "" if answer["kind"] == "foreign" else re.sub("[0-9]+", "#", answer["text"])[:40]
+    return f"{answer['kind']} {places[-3:]} {last} {words}"

@@ -111,7 +111,9 @@ def _sample(way: str, folder: Path) -> Sample:
     base = next(name for name in files if not name.endswith(".yaml"))
     if way in ("db3", "wal"):
         files = {name: content for name, content in files.items() if not name.endswith(".yaml")}
-        return Sample(way, files, f"bag/{folder.name}.db3", f"bag/{folder.name}.db3{'-wal' if way == 'wal' else ''}", facts)
+        return Sample(
+            way, files, f"bag/{folder.name}.db3", f"bag/{folder.name}.db3{'-wal' if way == 'wal' else ''}", facts
+        )
     return Sample(way, files, "bag", "bag/metadata.yaml" if "yaml" in way else base, facts)
 
 
@@ -150,11 +152,16 @@ def _yaml(raw: bytes, source: random.Random) -> tuple[bytes, str]:
     elif way == 1:
         lines.insert(k, lines[source.randrange(len(lines))])
     elif way == 2:
-        lines[k] = indent + source.choice(("- " * 60 + "x", "? " * 200, "&a [*a, *a]", "!!python/object/apply:os.getcwd []", "\t", "{" * 500))
+        lines[k] = indent + source.choice(
+            ("- " * 60 + "x", "? " * 200, "&a [*a, *a]", "!!python/object/apply:os.getcwd []", "\t", "{" * 500)
+        )
     else:
         odd = (*map(str, FAR), "-1", "null", "[]", "{}", "1e400", ".nan", "'x'", "../../etc/passwd", "/dev/zero", "9" * 5000, "2001-01-01",
                "[" * 2000, "{a: " * 500, "|\n  x", "0x7fffffffffffffff", "bag.db3\\0", "1:1:1:1")  # fmt: skip
         lines[k] = f"{key}: {source.choice(odd)}"
     if source.random() < 0.05:
-        lines[:0] = ["a: &a [1,1,1,1,1,1,1,1,1]", *[f"b{n}: &b{n} [{','.join([f'*b{n - 1}' if n else '*a'] * 9)}]" for n in range(9)]]
+        lines[:0] = [
+            "a: &a [1,1,1,1,1,1,1,1,1]",
+            *[f"b{n}: &b{n} [{','.join([f'*b{n - 1}' if n else '*a'] * 9)}]" for n in range(9)],
+        ]
     return "\n".join(lines).encode(), f"line {k} of the metadata"

@@ -62,7 +62,10 @@ def rewritten(raw: bytes, folder: Path, source: random.Random) -> tuple[bytes, s
 
 def _statement(link: sqlite3.Connection, source: random.Random) -> str:
     link.text_factory = lambda raw: raw.decode(errors="replace")
-    tables = [row[0] for row in link.execute("select name from sqlite_schema where type = 'table' and name not like 'sqlite%'")]
+    tables = [
+        row[0]
+        for row in link.execute("select name from sqlite_schema where type = 'table' and name not like 'sqlite%'")
+    ]
     if not tables:
         return "vacuum"
     table = source.choice(tables)

@@ -73,7 +73,9 @@ class _Text:
             end = source.choice(("\r", "\n\n", "\n\r", "\r\n", "\0\n"))
         content = _table(rows, mark, end)
         if source.random() < 0.05:
-            content = content.decode(errors="replace").encode(source.choice(("utf-16", "utf-16-be", "utf-8-sig", "utf-32")))
+            content = content.decode(errors="replace").encode(
+                source.choice(("utf-16", "utf-16-be", "utf-8-sig", "utf-32"))
+            )
         return Case(_packed(content, pack), "; ".join(done)[:200])
 
     def read(self, path: Path, source: random.Random) -> Reading:
@@ -91,8 +93,16 @@ class Csv(_Text):
         mixed = _table([HEADER, *map(_plain, range(COUNT))], ",")
         simple = _table(SIMPLE, ",")
         german = _table([[c.replace(".", ",") for c in row] for row in SIMPLE], ";")
-        files = [("mixed", mixed, ",", ""), ("simple", simple, ",", ""), ("simple 2", simple, ",", ""), ("german", german, ";", "")]
-        files += [("gzip", gzip.compress(mixed, mtime=0), ",", "gz"), ("zstd", zstandard.ZstdCompressor(write_checksum=True).compress(mixed), ",", "zst")]
+        files = [
+            ("mixed", mixed, ",", ""),
+            ("simple", simple, ",", ""),
+            ("simple 2", simple, ",", ""),
+            ("german", german, ";", ""),
+        ]
+        files += [
+            ("gzip", gzip.compress(mixed, mtime=0), ",", "gz"),
+            ("zstd", zstandard.ZstdCompressor(write_checksum=True).compress(mixed), ",", "zst"),
+        ]
         return [
             Sample(name, {(log := f"log.csv{'.' + pack if pack else ''}"): raw}, log, log, {"mark": mark, "pack": pack})
             for name, raw, mark, pack in files
@@ -115,7 +125,9 @@ def _unpacks(content: bytes, pack: str) -> None:
         else:
             zstandard.ZstdDecompressor().decompressobj().decompress(content)
     except (OSError, EOFError, zstandard.ZstdError, Exception) as error:
-        raise Finding("silent", f"the packed table is damaged ({type(error).__name__}: {error}), and nothing says so") from error
+        raise Finding(
+            "silent", f"the packed table is damaged ({type(error).__name__}: {error}), and nothing says so"
+        ) from error
 
 
 def _as_pandas(content: bytes, reading: Reading) -> None:
@@ -123,7 +135,12 @@ def _as_pandas(content: bytes, reading: Reading) -> None:
     try:
         text = content.decode("ascii")
         lines = text.split("\n")
-        if any(c in text for c in "\"'\r\0\t ;#") or lines[0] != "t,a,b" or any(line.count(",") != 2 for line in lines[:-1]) or lines[-1]:
+        if (
+            any(c in text for c in "\"'\r\0\t ;#")
+            or lines[0] != "t,a,b"
+            or any(line.count(",") != 2 for line in lines[:-1])
+            or lines[-1]
+        ):
             return  # a table of another kind: what it means is not pandas' to say
         frame = pd.read_csv(io.BytesIO(content), float_precision="round_trip", dtype=np.float64)
     except Exception:  # what it makes of damage is its own
@@ -154,11 +171,14 @@ class Scope(_Text):
 
     def corpus(self, folder: Path) -> list[Sample]:
         """Three dialects."""
-        return [Sample(f"scope {k}", {"log.csv": _scope(k)}, "log.csv", "log.csv", {"mark": "\t;,"[k]}) for k in range(3)]
+        return [
+            Sample(f"scope {k}", {"log.csv": _scope(k)}, "log.csv", "log.csv", {"mark": "\t;,"[k]}) for k in range(3)
+        ]
 
     def check(self, sample: Sample, case: Case, path: Path, reading: Reading) -> None:
         """Nothing in an export counts or proves its rows but its last line."""
-        if reading.outcome == "whole" and b"EOF" not in case.content and not reading.said and reading.content.format == "twincat":
+        ended = b"EOF" in case.content.replace(b"\0", b"")
+        if reading.outcome == "whole" and not (ended or reading.said) and reading.content.format == "twincat":
             raise Finding("silent", "the export has no end, and nothing says so")
 
 

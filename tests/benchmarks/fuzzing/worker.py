@@ -21,6 +21,7 @@ from tests.benchmarks.fuzzing.formats import TARGETS
 
 SPARE_BYTES, TIMES_FILE = 256 << 20, 4
 ADDRESS_BYTES = 8 << 30
+_STATUS, _CLEAR = Path("/proc/self/status"), Path("/proc/self/clear_refs")
 
 
 class Answer(TypedDict):
@@ -144,17 +145,19 @@ def _trace(error: BaseException) -> str:
 
 
 def _reset_peak() -> int:
-    """Set the process's peak of resident memory to what is resident now [bytes]."""
-    Path("/proc/self/clear_refs").write_text("5")
+    """Set the process's peak of resident memory to what is resident now [bytes]; elsewhere than on Linux nothing is known of it."""
+    if not _STATUS.exists():
+        return 0
+    _CLEAR.write_text("5")
     return _status("VmRSS")
 
 
 def _peak() -> int:
-    return _status("VmHWM")
+    return _status("VmHWM") if _STATUS.exists() else 0
 
 
 def _status(key: str) -> int:
-    for line in Path("/proc/self/status").read_text().splitlines():
+    for line in _STATUS.read_text().splitlines():
         if line.startswith(key):
             return int(line.split()[1]) << 10
     return 0
