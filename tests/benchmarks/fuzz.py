@@ -35,7 +35,7 @@ from replay.arrays.kernel_cache import drop_stale_kernels  # noqa: E402
 from replay.readers.registry import load_readers  # noqa: E402
 from tests.benchmarks.fuzzing.formats import TARGETS  # noqa: E402
 from tests.benchmarks.fuzzing.pool import Pool, Score  # noqa: E402
-from tests.benchmarks.fuzzing.worker import input_of, lay_out, tried  # noqa: E402
+from tests.benchmarks.fuzzing.worker import input_of, lay_out, sound_samples, tried  # noqa: E402
 
 
 def table(scores: dict[str, Score]) -> str:
@@ -59,7 +59,7 @@ def again(words: str) -> int:
     target = TARGETS[name]()
     with tempfile.TemporaryDirectory() as folder:
         (place := Path(folder) / "corpus").mkdir()
-        sample, case, source = input_of(target, target.corpus(place), int(seed), int(number))
+        sample, case, source = input_of(target, sound_samples(target, place), int(seed), int(number))
         path = lay_out(sample, case, Path(folder) / "input")
         answer = tried(target, sample, case, source, path)
     for key, value in answer.items():

@@ -15,7 +15,7 @@ import pyarrow.parquet as pq
 
 from tests.benchmarks.fuzzing import logs
 from tests.benchmarks.fuzzing.case import Case, Finding, Reading, Sample
-from tests.benchmarks.fuzzing.damage import Spot, blindly, with_number
+from tests.benchmarks.fuzzing.damage import Spot, blindly, reworded, with_number
 
 COUNT, START = 60, 133_000_000_000_000_000
 
@@ -188,7 +188,7 @@ class Svdx(_Binary):
         at = raw.index(b"\xef\xbb\xbf")
         way = source.random()
         if way < 0.3:
-            part, what = blindly(raw[at:], source)
+            part, what = source.choice((blindly, reworded))(raw[at:], source)
             return Case(raw[:8] + struct.pack("<Q", len(part)) + raw[16:at] + part, f"{what} in the XML")
         if way < 0.4:
             entity = b'<!DOCTYPE P [<!ENTITY a "' + b"x" * 1000 + b'"><!ENTITY b "&a;&a;&a;&a;&a;&a;&a;&a;">]>'

@@ -41,7 +41,7 @@ class Sample:
     target : str
         The path that is damaged.
     facts : Mapping[str, Any]
-        What the format's module knows of it.
+        What the format's module knows of it; ``said`` is what is said of it when it is read, ``sound`` the outcome.
     """
 
     name: str
@@ -86,7 +86,7 @@ class Reading:
     content : Any
         What came out; None where it was refused.
     said : tuple[str, ...]
-        What was said of it.
+        What was said of it, but for what is said of the sound sample too.
     """
 
     outcome: str

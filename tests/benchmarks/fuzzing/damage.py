@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import random
+import re
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
@@ -100,6 +101,43 @@ def _tail(raw: bytes, source: random.Random) -> bytes:
 def _nest(raw: bytes, source: random.Random) -> bytes:
     at, mark = source.randrange(len(raw)), source.choice((b"(", b"[", b"{", b"<", b'"', b"'", b"-", b"/", b",", b"."))
     return raw[:at] + mark * source.choice((3, 30, 3000)) + raw[at:]
+
+
+_TOKENS = re.compile(rb"[\w.]+|\s+|[^\w\s]")
+_PAIRS = (
+    (b"(", b")"),
+    (b"[", b"]"),
+    (b"{", b"}"),
+    (b"<", b">"),
+    (b'"', b'"'),
+    (b"sequence<", b">"),
+    (b"/*", b"*/"),
+    (b"<a>", b"</a>"),
+)
+
+
+def reworded(raw: bytes, source: random.Random) -> tuple[bytes, str]:
+    """Wrap, repeat, swap, drop or replace words and signs of a text."""
+    words = _TOKENS.findall(raw) or [b"x"]
+    for _ in range(source.choice((1, 1, 2, 4))):
+        k = source.randrange(len(words))
+        way = source.randrange(6)
+        if way == 0:
+            left, right = source.choice(_PAIRS)
+            times = source.choice((1, 2, 3, 4, 30, 2000))
+            words[k] = left * times + words[k] + right * (times if source.random() < 0.8 else 0)
+        elif way == 1:
+            words[k : k + 1] = words[k : k + source.choice((1, 2, 6))] * source.choice((2, 10, 500))
+        elif way == 2:
+            j = source.randrange(len(words))
+            words[j], words[k] = words[k], words[j]
+        elif way == 3:
+            words[k] = b""
+        elif way == 4:
+            words[k] = str(source.choice((*FAR, -1, 1e400, 10**30))).encode()
+        else:
+            words[k] = source.choice(words)
+    return b"".join(words), "reworded"
 
 
 BLIND: tuple[Callable[[bytes, random.Random], bytes], ...] = (

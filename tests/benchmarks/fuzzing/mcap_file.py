@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 import lz4.frame
 import zstandard
 
-from tests.benchmarks.fuzzing.damage import Spot, blindly, with_number
+from tests.benchmarks.fuzzing.damage import Spot, blindly, reworded, with_number
 
 MAGIC = b"\x89MCAP0\r\n"
 _SIZES = {"B": 1, "H": 2, "I": 4, "Q": 8}
@@ -19,7 +19,7 @@ LAYOUT = {
     1: "ss", 2: "QQI", 3: "Hssb", 4: "HHssm", 5: "HIQQ*", 6: "QQQIs", 7: "Hm", 8: "QQQQmQsQQ", 9: "QQssLI", 10: "QQQQQss",
     11: "QHIIIIQQm", 12: "sm", 13: "QQs", 14: "BQQ", 15: "I",
 }  # fmt: skip
-CHUNK, DATA_END, INDEX, FOOTER = 6, 15, 8, 2
+SCHEMA, CHUNK, DATA_END, INDEX, FOOTER = 3, 6, 15, 8, 2
 
 
 @dataclass
@@ -161,7 +161,8 @@ def damage_record(record: Record, source: random.Random) -> str:
     if spot.kind == "int":
         record.body = with_number(record.body, spot, source)
         return f"number {n} of record {record.op}"
-    part, what = blindly(record.body[spot.at : spot.at + spot.size], source)
+    way_of = reworded if record.op == SCHEMA and source.random() < 0.7 else blindly
+    part, what = way_of(record.body[spot.at : spot.at + spot.size], source)
     before = record.body[: spot.at]
     if n and found[n - 1].kind == "int" and found[n - 1].at + found[n - 1].size == spot.at and source.random() < 0.7:
         size = found[n - 1].size

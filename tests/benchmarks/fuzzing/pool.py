@@ -18,9 +18,8 @@ from multiprocessing.process import BaseProcess
 from pathlib import Path
 from typing import Any
 
-from tests.benchmarks.fuzzing.case import Case
 from tests.benchmarks.fuzzing.formats import TARGETS
-from tests.benchmarks.fuzzing.worker import Answer, input_of, lay_out, source_of, tried, work
+from tests.benchmarks.fuzzing.worker import Answer, input_of, lay_out, sound_samples, work
 
 HANG_CPU_S, HANG_WALL_S = 10.0, 60.0
 BATCH, KEPT = 200, 3
@@ -208,18 +207,7 @@ class Pool:
 
 
 def _make_corpus(name: str, folder: Path, out: Path) -> None:
-    """Make the samples of a format, and read each: what is compiled at first use is compiled here."""
-    target = TARGETS[name]()
-    samples = target.corpus(folder)
-    out.write_bytes(pickle.dumps(samples))
-    for k, sample in enumerate(samples):
-        case = Case(sample.raw, "sound", {"sound": True})
-        answer = tried(target, sample, case, source_of(0, name, k), lay_out(sample, case, folder / f"sound-{k}"))
-        if answer["kind"] not in ("", "memory") or answer["outcome"] not in (
-            sample.facts.get("sound", "whole"),
-            "memory",
-        ):
-            print(f"{name}, sound sample {sample.name}: {answer}", file=sys.stderr, flush=True)
+    out.write_bytes(pickle.dumps(sound_samples(TARGETS[name](), folder)))
 
 
 def _cpu(slot: Slot) -> float:

@@ -16,7 +16,7 @@ from rosbags.typesys import Stores, get_typestore
 
 from tests.benchmarks.fuzzing import logs, sqlite_file
 from tests.benchmarks.fuzzing.case import Case, Finding, Reading, Sample
-from tests.benchmarks.fuzzing.damage import FAR, blindly
+from tests.benchmarks.fuzzing.damage import FAR, blindly, reworded
 
 STORE = get_typestore(Stores.LATEST)
 T0, COUNT = 1_700_000_000_000_000_000, 60
@@ -41,7 +41,7 @@ class Rosbag2:
         if source.random() < 0.2:
             return Case(*blindly(raw, source), {"blind": True})
         if target.endswith(".yaml"):
-            return Case(*_yaml(raw, source), {"blind": True})
+            return Case(*source.choice((_yaml, _yaml, reworded))(raw, source), {"blind": True})
         if content.startswith(b"SQLite format 3"):
             if source.random() < 0.35:
                 with tempfile.TemporaryDirectory() as folder:

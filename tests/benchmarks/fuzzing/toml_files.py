@@ -10,7 +10,7 @@ from replay.border import UnforeseenValue
 from replay.errors import ConfigError
 from replay.machine.toml_file import load_machine
 from tests.benchmarks.fuzzing.case import Case, Finding, Reading, Sample
-from tests.benchmarks.fuzzing.damage import FAR, blindly
+from tests.benchmarks.fuzzing.damage import FAR, blindly, reworded
 
 VALUES = (*map(str, FAR), "-1", "1e400", "nan", "-inf", "true", '""', "'x'", '"\\u0000"', '"\\ud800"', '"""\n"""', "[]", "{}", "[[]]", "[1, 'a']", "{ a = 1 }",
           "1979-05-27", "07:32:00", "1979-05-27T07:32:00Z", "0x" + "f" * 90, "9" * 5000, "0o7", "1_0", "[" * 40, "[" * 5000, "{a=" * 40, '"x" * 3', "0.1.2",
@@ -112,7 +112,9 @@ class Toml:
 
     def damaged(self, sample: Sample, source: random.Random) -> Case:
         """Other lines, or blind damage."""
-        if source.random() < 0.25:
+        if source.random() < 0.15:
+            return Case(*reworded(sample.raw, source))
+        if source.random() < 0.2:
             return Case(*blindly(sample.raw, source))
         lines, done = sample.raw.decode().splitlines(), []
         for _ in range(source.choice((1, 1, 2, 3))):
