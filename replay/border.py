@@ -14,8 +14,14 @@ from pathlib import Path
 
 from replay.errors import ConfigError, LogError, MfhcaError
 
-_LONGEST = 200
+MAX_SENTENCE = 1_500
+_LONGEST, _END = 200, 400
 _AGAIN = "it is probably damaged: copy or record it again"
+
+
+def shortened(text: str) -> str:
+    """A sentence that may quote a file, without its middle where it is long: what to do stands at its end."""
+    return text if len(text) <= MAX_SENTENCE else f"{text[: MAX_SENTENCE - _END - 3]} … {text[-_END:]}"
 
 
 class UnforeseenContent(LogError):
@@ -28,7 +34,7 @@ class UnforeseenValue(ConfigError):
 
 @contextmanager
 def bordered(path: Path, name: str, kind: type[MfhcaError] = UnforeseenContent, remedy: str = _AGAIN) -> Iterator[None]:
-    """Turn what reading a file raises into stated errors; a lack of memory stays what it is.
+    """Turn what reading a file raises into stated errors of bounded length; a lack of memory stays what it is.
 
     Parameters
     ----------
@@ -50,8 +56,13 @@ def bordered(path: Path, name: str, kind: type[MfhcaError] = UnforeseenContent, 
     """
     try:
         yield
-    except (MfhcaError, MemoryError):
+    except MemoryError:
         raise
+    except MfhcaError as error:
+        text = str(error)
+        if len(text) <= MAX_SENTENCE:
+            raise
+        raise type(error)(shortened(text)) from error
     except OSError as error:
         raise LogError(f"{path} cannot be read: {error.strerror or error}") from error
     except Exception as error:

@@ -80,13 +80,14 @@ class Parquet(_Binary):
         if reading.outcome != "whole" or reading.said:
             return
         try:
-            rows = pq.read_table(io.BytesIO(case.content), page_checksum_verification=True).num_rows
+            numbers = ["t", "v"] if sample.name == "zstd" and case.what != "made up" else None  # text is not read
+            rows = pq.read_table(io.BytesIO(case.content), columns=numbers, page_checksum_verification=True).num_rows
         except Exception:  # what it makes of damage is its own
             rows = None
         counted = [t.count for t in reading.content.summary.topics]
         if rows is not None and counted != [rows]:
             raise Finding("silent", f"{counted} rows; pyarrow reads {rows}")
-        if rows is None and sample.name == "zstd":
+        if rows is None and sample.name == "zstd" and case.what != "made up":
             raise Finding("silent", "pages have checksums, pyarrow refuses them, and nothing says so")
 
 

@@ -14,7 +14,7 @@ from replay.readers.registry import open_log
 from tests.benchmarks.fuzzing.case import Finding, Reading
 
 OPTIONS = SourceOptions()
-_LONGEST = 4000
+_LONGEST = 2000
 
 
 def read(path: Path, source: random.Random) -> Reading:
@@ -45,6 +45,8 @@ def read(path: Path, source: random.Random) -> Reading:
         if path.name not in text or "\n" in text or len(text) > _LONGEST:
             raise Finding("shape", f"a message that names no file, or is long: {text[:300]!r}") from error
         return Reading("refused", None, (text,))
+    if long := next((text for text in (*log.summary.damage, *log.summary.notes) if len(text) > _LONGEST), ""):
+        raise Finding("shape", f"a sentence of {len(long)} characters: {long[:300]!r}")
     said = (*log.summary.damage, *log.summary.notes, *(f"{t.name}: {t.note}" for t in log.summary.topics if t.note))
     return Reading("degraded" if log.summary.damage else "whole", log, said)
 

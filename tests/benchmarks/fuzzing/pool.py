@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import multiprocessing
 import os
-import pickle
 import re
 import shutil
 import signal
@@ -18,6 +17,7 @@ from multiprocessing.process import BaseProcess
 from pathlib import Path
 from typing import Any
 
+from tests.benchmarks.fuzzing.case import Sample
 from tests.benchmarks.fuzzing.formats import TARGETS
 from tests.benchmarks.fuzzing.worker import Answer, input_of, lay_out, sound_samples, work
 
@@ -62,14 +62,11 @@ class Pool:
         self._next = dict.fromkeys(names, first)
         self._spent = dict.fromkeys(names, 0.0)
         self._slots = [Slot(k) for k in range(jobs)]
-        for name in names:
+        self._samples: dict[str, list[Sample]] = {}
+        for name in names:  # here, so that workers are forked with what was loaded and compiled for them
             place = folder / f"corpus-{name}"
             place.mkdir()
-            made = _CONTEXT.Process(target=_make_corpus, args=(name, place, self._corpus(name)))
-            made.start()
-            made.join()
-            if made.exitcode:
-                raise RuntimeError(f"the samples of {name} could not be made")
+            self._samples[name] = sound_samples(TARGETS[name](), place)
 
     def run(self, seconds: float, most: int) -> None:
         """Run for a time, or until each format had its number of inputs."""
@@ -108,7 +105,7 @@ class Pool:
     def _start(self, slot: Slot) -> None:
         slot.link, end = _CONTEXT.Pipe()
         place = self.folder / f"worker-{slot.number}"
-        arguments = (end, slot.name, self._corpus(slot.name), place, self.seed, self.out)
+        arguments = (end, slot.name, self._samples[slot.name], place, self.seed)
         slot.process = _CONTEXT.Process(target=work, args=arguments, daemon=True)
         slot.process.start()
         end.close()
@@ -185,17 +182,13 @@ class Pool:
         place = self.out / f"{name}-{self.seed}-{answer['number']}"
         if place.exists():
             shutil.rmtree(place)
-        samples = pickle.loads(self._corpus(name).read_bytes())
-        sample, case, _ = input_of(TARGETS[name](), samples, self.seed, answer["number"])
+        sample, case, _ = input_of(TARGETS[name](), self._samples[name], self.seed, answer["number"])
         lay_out(sample, case, place)
         answer.update(sample=sample.name, what=case.what)
         (place / "finding.json").write_text(json.dumps({"format": name, "seed": self.seed, **answer}, indent=1))
         if score.findings[mark] == 1:
             words = f"{name} {self.seed}:{answer['number']} ({sample.name}; {case.what}): {answer['kind']}: {answer['text'][:400]}"
             print(f"{words}\n  {place}", file=sys.stderr, flush=True)
-
-    def _corpus(self, name: str) -> Path:
-        return self.folder / f"{name}.samples"
 
     def _stop(self, slot: Slot) -> None:
         if slot.link is not None:
@@ -204,10 +197,6 @@ class Pool:
             slot.process.kill()
             slot.process.join()
         slot.process = slot.link = None
-
-
-def _make_corpus(name: str, folder: Path, out: Path) -> None:
-    out.write_bytes(pickle.dumps(sound_samples(TARGETS[name](), folder)))
 
 
 def _cpu(slot: Slot) -> float:

@@ -17,6 +17,7 @@ from diagnosis.audit.store.store import FILE_NAME, Store
 from diagnosis.comparison.compare import compare_reports
 from diagnosis.output import load_report, rebuild, write_result
 from diagnosis.results.result import MissionResult
+from replay.border import UnforeseenContent
 from replay.errors import ConfigError, LogError, MfhcaError
 from replay.truth import read_truth
 from tests import fleet_samples, report_samples
@@ -64,6 +65,8 @@ class Results:
             if source.random() < _REBUILT:
                 rebuild(path)
             return Reading("whole", report)
+        except UnforeseenContent as error:
+            raise Finding("foreign", str(error)) from error
         except (LogError, ConfigError) as error:
             text = str(error)
             if ".json" not in text and ".parquet" not in text and "machine" not in text:

@@ -80,7 +80,7 @@ def _peer(path: Path) -> dict[str, int] | None:
             for name, count in link.execute(query):
                 out[str(name)] = out.get(str(name), 0) + count
             return out
-    except sqlite3.Error:
+    except (sqlite3.Error, UnicodeDecodeError):
         return None
 
 

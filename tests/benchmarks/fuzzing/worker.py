@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import faulthandler
 import os
-import pickle
 import random
 import resource
 import shutil
@@ -109,24 +108,22 @@ def tried(target: Target, sample: Sample, case: Case, source: random.Random, pat
     return answer
 
 
-def work(link: Connection, name: str, corpus: Path, folder: Path, seed: int, out: Path) -> None:
+def work(link: Connection, name: str, samples: list[Sample], folder: Path, seed: int) -> None:
     """Answer batches of numbers until the other end closes the link.
 
     Parameters
     ----------
     link : Connection
         Gets lists of numbers, gives ``checking`` before other libraries read, and an `Answer` for each number.
-    name, corpus, folder : str, Path, Path
-        Of the format, its pickled samples, and a folder for inputs.
+    name, samples, folder : str, list[Sample], Path
+        Of the format, its samples, and a folder for inputs, beside which the traces of a dying interpreter go.
     seed : int
         Of the run.
-    out : Path
-        Where traces of a dying interpreter go, and inputs with findings.
     """
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
     resource.setrlimit(resource.RLIMIT_AS, (ADDRESS_BYTES, ADDRESS_BYTES))
-    target, samples = TARGETS[name](), pickle.loads(corpus.read_bytes())
+    target = TARGETS[name]()
     with (folder.parent / f"{folder.name}.trace").open("w") as trace:
         faulthandler.enable(trace)
         faulthandler.register(signal.SIGUSR1, trace, all_threads=False)

@@ -13,15 +13,6 @@ AROUND = "module a {{ module msg {{ {} struct I {{ double v; {} }}; }}; }};"
 VERBATIM = '@verbatim (language="comment", text="a (b) ((c))" "d") @unit(value="m/s") @default (value=0.5)\n'
 
 
-def parsed(text: str) -> bool:
-    try:
-        resolve("a/msg/I", "ros2idl", text, False)
-    except DefinitionError as error:
-        assert "in time" in str(error)
-        return False
-    return True
-
-
 @pytest.mark.parametrize(
     "text",
     [
@@ -41,7 +32,8 @@ def test_what_would_take_minutes_is_refused_at_once(text: str) -> None:
     start = time.process_time()
     milliseconds(text)
     if milliseconds(text) > MAX_MILLISECONDS:
-        assert not parsed(text)
+        with pytest.raises(DefinitionError, match="in time"):
+            resolve("a/msg/I", "ros2idl", text, False)
     assert time.process_time() - start < 5.0
 
 
@@ -55,4 +47,4 @@ def test_what_would_take_minutes_is_refused_at_once(text: str) -> None:
     ids=["bracket", "signs", "annotations"],
 )
 def test_what_recorders_write_is_parsed(text: str) -> None:
-    assert parsed(text)
+    assert resolve("a/msg/I", "ros2idl", text, False).fields
