@@ -35,7 +35,9 @@ def test_what_was_said_of_a_log_is_shortened_too() -> None:
 
 def test_settings_have_their_own_kind() -> None:
     with (
-        pytest.raises(UnforeseenValue, match=r"m\.toml cannot be read as machine file: .*KeyError .*; look, and report") as found,
+        pytest.raises(
+            UnforeseenValue, match=r"m\.toml cannot be read as machine file: .*KeyError .*; look, and report"
+        ) as found,
         bordered(Path("m.toml"), "machine file", UnforeseenValue, "look"),
     ):
         raise KeyError("x")
