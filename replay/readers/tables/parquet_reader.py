@@ -30,7 +30,7 @@ _CELLS = 1 << 21
 _SAMPLE = 20_000
 _SECOND_NS = 1_000_000_000
 _ROUNDING = 1000  # statistics of dates may come back in whole microseconds [ns]
-_LARGEST_GROUP = 16 << 30
+MAX_GROUP = 16 << 30
 _DAMAGE = (pa.ArrowException, OSError, ValueError, KeyError, TypeError, OverflowError, MemoryError, IndexError)
 
 
@@ -204,9 +204,9 @@ class _Parquet:
         size = max(min(size, _CELLS // max(len(own), 1)), 1)
         for group in groups:
             declared = self.file.metadata.row_group(group).total_byte_size
-            if declared > _LARGEST_GROUP:
+            if declared > MAX_GROUP:
                 raise LogError(
-                    f"{self.path}: row group {group} declares {declared} bytes; at most {_LARGEST_GROUP} are read; write it "
+                    f"{self.path}: row group {group} declares {declared} bytes; at most {MAX_GROUP} are read; write it "
                     "with smaller row groups"
                 )
             missing = self.file.metadata.row_group(group).num_rows
