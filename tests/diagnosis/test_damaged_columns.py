@@ -13,7 +13,7 @@ import pytest
 from diagnosis.output import rebuild, write_result
 from diagnosis.results.result import MissionResult
 from replay.errors import LogError
-from tests.report_samples import no_faults
+from tests.report_samples import five_faults, no_faults
 
 
 @pytest.fixture(scope="module")
@@ -50,3 +50,16 @@ def test_one_sentence_says_what_is_wrong(saved: Path, columns: dict[str, list[ob
     with pytest.raises(LogError, match=words) as found:
         rebuild(saved)
     assert "run `mfhca diagnose` on the log again" in str(found.value)
+
+
+@pytest.mark.parametrize("value", [np.inf, -np.inf, 3e38, -3e38, 1e-45])
+def test_absurd_values_are_no_reason_to_have_no_page(tmp_path: Path, value: float) -> None:
+    report, columns = five_faults(20.0, 20.0)
+    write_result(MissionResult(report, columns), tmp_path)
+    table = pq.read_table(tmp_path / "report.parquet")
+    damaged = {name: table.column(name).to_numpy().copy() for name in table.column_names}
+    for name, values in damaged.items():
+        if name != "t":
+            values[3:7] = value
+    pq.write_table(pa.table(damaged), tmp_path / "report.parquet")
+    assert rebuild(tmp_path).stat().st_size > 100_000

@@ -7,6 +7,7 @@ import json
 import random
 import struct
 from collections import Counter
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -18,8 +19,9 @@ from mcap.writer import CompressionType, IndexType, Writer
 
 from tests.benchmarks.fuzzing import logs, mcap_file
 from tests.benchmarks.fuzzing.case import Case, Finding, Reading, Sample
-from tests.benchmarks.fuzzing.damage import blindly, reworded
+from tests.benchmarks.fuzzing.damage import Spot, blindly, reworded, with_number
 from tests.benchmarks.fuzzing.mcap_file import CHUNK, Record
+from tests.benchmarks.fuzzing.mcap_values import Decoder, compare
 
 T0, COUNT = 1_760_000_000_000_000_000, 40
 JOINTS = "builtin_interfaces/Time stamp\nstring frame\nstring[] name\nfloat64[] velocity\nfloat32[4] effort\nuint8[<=8] mode\na/E[] e\n"
@@ -98,6 +100,11 @@ TOPICS = (
 )  # fmt: skip
 
 
+@cache
+def _decoder() -> Decoder:
+    return Decoder(JOINTS.encode(), IDL.encode())
+
+
 class Mcap:
     """MCAP files of all encodings, with and without compression, chunks, index and checksums."""
 
@@ -127,6 +134,8 @@ class Mcap:
             chunks = [r for r in records if r.op == CHUNK and r.inner]
             if chunks and source.random() < 0.15:
                 done.append(_redefined(chunks, source, seal))
+            elif chunks and source.random() < 0.25:
+                done.append(_other_payload(chunks, source, seal))
             elif chunks and source.random() < 0.5:
                 chunk = source.choice(chunks)
                 done.append("in a chunk: " + _among(chunk.inner, source))
@@ -154,6 +163,8 @@ class Mcap:
             ours = {k: v for k, v in logs.counts(log).items() if v}
             if ours != theirs and not (ours == sample.facts["counts"] and _behind_data(case.content)):
                 raise Finding("silent", f"messages {ours}; the mcap package reads {theirs} without an error")
+            if not reading.said and ours == theirs:
+                compare(_decoder(), case.content, log)
 
 
 def _redefined(chunks: list[Record], source: random.Random, seal: bool) -> str:
@@ -170,6 +181,18 @@ def _redefined(chunks: list[Record], source: random.Random, seal: bool) -> str:
     if seal:
         mcap_file.seal_chunk(chunk)
     return f"{what} definition"
+
+
+def _other_payload(chunks: list[Record], source: random.Random, seal: bool) -> str:
+    """Another number in messages of one chunk."""
+    chunk = source.choice(chunks)
+    for record in source.sample(chunk.inner, min(len(chunk.inner), source.choice((1, 3, 20)))):
+        if record.op == 5 and len(record.body) > 30:
+            at = 22 + 4 * source.randrange((len(record.body) - 22) // 4)
+            record.body = with_number(record.body, Spot(at, 4, "int"), source)
+    if seal:
+        mcap_file.seal_chunk(chunk)
+    return "numbers of messages"
 
 
 def _as_it_was(sample: Sample, reading: Reading) -> None:
