@@ -7,6 +7,7 @@ program. Tests and the fuzzer tell these from the foreseen ones by their type.
 
 from __future__ import annotations
 
+import re
 import traceback
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -16,11 +17,13 @@ from replay.errors import ConfigError, LogError, MfhcaError
 
 MAX_SENTENCE = 1_500
 _LONGEST, _END = 200, 400
+_CONTROLS = re.compile("[\x00-\x1f\x7f-\x9f\u2028\u2029]+")
 _AGAIN = "it is probably damaged: copy or record it again"
 
 
 def shortened(text: str) -> str:
-    """A sentence that may quote a file, without its middle where it is long: what to do stands at its end."""
+    """A sentence that may quote a file on one line, without its middle where it is long: what to do stands at its end."""
+    text = _CONTROLS.sub(" ", text)
     return text if len(text) <= MAX_SENTENCE else f"{text[: MAX_SENTENCE - _END - 3]} … {text[-_END:]}"
 
 
@@ -59,10 +62,10 @@ def bordered(path: Path, name: str, kind: type[MfhcaError] = UnforeseenContent, 
     except MemoryError:
         raise
     except MfhcaError as error:
-        text = str(error)
-        if len(text) <= MAX_SENTENCE:
+        text = shortened(str(error))
+        if text == str(error):
             raise
-        raise type(error)(shortened(text)) from error
+        raise type(error)(text) from error
     except OSError as error:
         raise LogError(f"{path} cannot be read: {error.strerror or error}") from error
     except Exception as error:

@@ -67,6 +67,8 @@ def _machine(data: Mapping[str, Any]) -> Machine:
     wheels = head.get("wheels", list(base.wheels))
     if not isinstance(wheels, list) or not all(isinstance(w, str) and w and "." not in w for w in wheels):
         raise ConfigError(f"machine.wheels = {wheels!r} must be a list of names without dots")
+    if not wheels:
+        raise ConfigError("machine.wheels = [] must name each wheel once, and at least one")
     geo = dict(data.get("geometry", {}))
     top = {key: _number(f"geometry.{key}", geo.pop(key)) for key in MACHINE_LEVEL if key in geo}
     geometry = _geometry(geo, tuple(wheels), base)

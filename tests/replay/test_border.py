@@ -19,6 +19,12 @@ def test_long_sentences_keep_their_ends() -> None:
     assert shortened("short") == "short"
 
 
+def test_sentences_are_one_line_without_control_characters() -> None:
+    assert shortened("columns 'a\r\nb', \x1b[31mred\x9b0m\u2028c") == "columns 'a b',  [31mred 0m c"
+    with pytest.raises(LogError, match=r"^a\.csv: x y$"), bordered(Path("a.csv"), "csv"):
+        raise LogError("a.csv: x\ny")
+
+
 def test_the_border_keeps_the_kind_of_a_long_error() -> None:
     with pytest.raises(LogError, match=r"^a\.csv: x+ … x+$") as found, bordered(Path("a.csv"), "csv"):
         raise LogError("a.csv: " + "x" * 9000)
