@@ -20,6 +20,7 @@ MOTION = {Kind.WHEEL: "v", Kind.STEER: "phi"}
 _COMPARED = ("residual", "threshold", "expected")
 _OF_THE_SIGNAL = ("delta_bar", "delta_bar_std")
 _UNKNOWN = "unknown unit"
+_SIDES = {side.value for side in Side}
 
 
 def motion_unit(kind: Kind) -> str:
@@ -59,6 +60,8 @@ def _unit(column: str, report: ReportDocument) -> str:
     component, _, leaf = rest.rpartition(".")
     if head == "evidence":
         part, _, side = component.rpartition(".")
+        if side not in _SIDES:
+            return _UNKNOWN
         kind = kind_of(part, report["machine"])
         if leaf in _COMPARED:
             return natural_unit(kind, Side(side)) if _measured(part, side, report) else motion_unit(kind)

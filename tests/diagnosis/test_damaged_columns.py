@@ -61,5 +61,8 @@ def test_absurd_values_are_no_reason_to_have_no_page(tmp_path: Path, value: floa
     for name, values in damaged.items():
         if name != "t":
             values[3:7] = value
+            values.view("u4")[9] = 0x7F80_0001  # a NaN that signals
+    damaged["evidence.FR.sejsor.delta_bar"] = damaged["t"]
+    damaged["evidence.delta_bar"] = damaged["t"]
     pq.write_table(pa.table(damaged), tmp_path / "report.parquet")
     assert rebuild(tmp_path).stat().st_size > 100_000
