@@ -21,6 +21,7 @@ _RESOLUTION = 1024
 _PROBE, _PROBES = 4096, 5
 _BLOCK = 1 << 15
 _NEARLY = 1.05
+_ON_GRID = 0.1  # turns of the LSB; off its grid 0.25, and 0.06 where a result stores a quarter of it
 _RUNS, _WORDS = (5, zlib.Z_RLE), (4, zlib.Z_DEFAULT_STRATEGY)
 
 
@@ -104,7 +105,7 @@ def step_of(values: NDArray[np.floating], lsb: float | None) -> float:
         return 1.0
     if lsb is not None and _TINY < lsb < _HUGE:
         turns = probe / lsb
-        step = lsb if np.mean(np.abs(turns - np.rint(turns))) < 0.05 else lsb / 2
+        step = lsb if np.mean(np.abs(turns - np.rint(turns))) < _ON_GRID else lsb / 2
     else:
         low, high = np.quantile(probe, [0.001, 0.999])
         extent = max(float(high - low) or float(np.abs(probe).max()) or 1.0, _TINY)
