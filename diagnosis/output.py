@@ -29,7 +29,7 @@ HTML, JSON, PARQUET, WINDOWS = "report.html", "report.json", "report.parquet", "
 _AGAIN = "run `mfhca diagnose` on the log again"
 
 
-def write_result(result: MissionResult, folder: Path, *, max_size_mb: float = 15.0) -> tuple[Path, ...]:
+def write_result(result: MissionResult, folder: Path, *, max_size_mb: float = 8.0) -> tuple[Path, ...]:
     """Write the files of a result: all of them, or on a full disk none.
 
     Parameters
@@ -130,7 +130,7 @@ def _read_windows(path: Path) -> Closeups | None:
     return Closeups(step, columns)
 
 
-def rebuild(path: Path, *, max_size_mb: float = 15.0, previous: tuple[Path, ReportDocument] | None = None) -> Path:
+def rebuild(path: Path, *, max_size_mb: float = 8.0, previous: tuple[Path, ReportDocument] | None = None) -> Path:
     """Make ``report.html`` again from a saved result, without the log.
 
     Parameters

@@ -72,7 +72,7 @@ def build_page(
     columns: Mapping[str, NDArray[np.floating]],
     *,
     closeups: Closeups | None = None,
-    max_size_mb: float = 15.0,
+    max_size_mb: float = 8.0,
     plotlyjs: Path | None = None,
 ) -> str:
     """Page for one diagnosed mission; the same input gives the same text.
@@ -107,7 +107,7 @@ def build_page(
     plotly, packed, version = packed_plotly(plotlyjs) if plots else ("", "", "none, no plots")
     evidence = evidence_of(report, series.shown, series.place, series.axis.per, detailed, series.closeups)
     drawn = sum(len(p.picture) for e in evidence.values() for p in (*e.edges, *e.course))
-    words = 400_000 + 6_000 * len(detailed) + 1_500 * len(report["intervals"]) + len(intervals)
+    words = 470_000 + 6_000 * len(detailed) + 1_500 * len(report["intervals"]) + len(intervals)
     budget = max(int(max_size_mb * 1e6) - len(packed) - words - drawn, 200_000)
     context = {
         **tables.context(report, duration),
