@@ -39,6 +39,21 @@ class Figure {
   // Dots where few enough samples are in view to tell them apart.
   static mode(curve) { return curve.exact && curve.x.length <= 160 ? "lines+markers" : "lines"; }
 
+  // Whether extremes fill areas somewhere: dashes along them would interfere with each other and with other bands.
+  static dense({ exact, y }) {
+    if (exact) return false;
+    let low = Infinity, high = -Infinity, swings = 0;
+    for (const v of y) { if (v < low) low = v; if (v > high) high = v; }
+    const wide = 0.1 * (high - low);
+    for (let i = 2; i < y.length; i++) if (Math.abs(y[i] - y[i - 1]) > wide && (y[i] - y[i - 1]) * (y[i - 1] - y[i - 2]) < 0) swings += 1;
+    return swings > 12;
+  }
+
+  // Line of a curve: areas of extremes are even and let others show through.
+  static line(s, curve) {
+    return Figure.dense(curve) ? { width: Math.min(s.width, 1.2), dash: "solid", opacity: 0.65 } : { width: s.width, dash: s.dash || "solid", opacity: 1 };
+  }
+
   pixels() { return Math.max(200, this.element.clientWidth - 70); }
 
   // Curves of all rows for the current range, in the order of `traces`.
@@ -82,10 +97,10 @@ class Figure {
 
   traces(curves) {
     const list = [], add = (i, role, name, unit, right, more) => {
-      const s = Figure.style(role), d = curves[list.length];
-      list.push({
+      const s = Figure.style(role), d = curves[list.length], { opacity, ...line } = Figure.line(s, d);
+      list.push({ opacity,
         type: "scatter", mode: Figure.mode(d), marker: { size: 4 }, x: d.x, y: d.y, name: Figure.text(name), connectgaps: false, xaxis: "x",
-        yaxis: right ? `y${100 + i}` : `y${i ? i + 1 : ""}`, line: { color: Figure.colour(s.colour), width: s.width, dash: s.dash || "solid" },
+        yaxis: right ? `y${100 + i}` : `y${i ? i + 1 : ""}`, line: { color: Figure.colour(s.colour), ...line }, meta: role,
         hovertemplate: `%{y:.4~g} ${unit === "1" ? "" : Figure.text(unit)}<extra>${Figure.text(name)}</extra>`, ...more,
       });
     };
@@ -297,7 +312,11 @@ class Figure {
   // Samples of the curves as Plotly.update takes them; areas stay without dots.
   restyled(curves) {
     const mode = this.element.data.map((d, i) => (d.fill ? "lines" : Figure.mode(curves[i])));
-    return { x: curves.map((c) => c.x), y: curves.map((c) => c.y), mode };
+    const lines = this.element.data.map((d, i) => (d.fill ? { opacity: d.opacity, ...d.line } : Figure.line(Figure.style(d.meta), curves[i])));
+    return {
+      x: curves.map((c) => c.x), y: curves.map((c) => c.y), mode, opacity: lines.map((l) => l.opacity ?? 1),
+      "line.dash": lines.map((l) => l.dash), "line.width": lines.map((l) => l.width),
+    };
   }
 
   // Part of the range earlier (−) or later, and closer (below 1) or wider about its middle.
