@@ -51,7 +51,7 @@ class Figure {
 
   // Line of a curve: areas of extremes are even and let others show through.
   static line(s, curve) {
-    return Figure.dense(curve) ? { width: Math.min(s.width, 1.2), dash: "solid", opacity: 0.65 } : { width: s.width, dash: s.dash || "solid", opacity: 1 };
+    return Figure.dense(curve) ? { width: 1.8, dash: "solid", opacity: 0.65 } : { width: s.width, dash: s.dash || "solid", opacity: 1 };
   }
 
   pixels() { return Math.max(200, this.element.clientWidth - 70); }
@@ -163,7 +163,7 @@ class Figure {
 
   layout(width) {
     const [text, muted, line, grid] = ["text", "muted", "line", "line2"].map(Figure.colour);
-    const panel = width ? 78 : this.rows.length > 5 ? 104 : 128, foot = 44, headings = this.headings(this.curves);
+    const panel = !width && this.rows.length > 5 ? 104 : 128, foot = 44, headings = this.headings(this.curves);
     const heads = headings.map((h) => 15 + 16 * h.lines), plot = heads.reduce((sum, h) => sum + h + panel, 0), height = plot + foot;
     const last = this.rows.length;
     const layout = {
@@ -278,10 +278,28 @@ class Figure {
     this.onRange?.(this.range);
   }
 
-  // The same curves at once, for paper of `width` pixels.
-  print(width) { if (this.drawn) Plotly.react(this.element, this.traces(this.curves), this.layout(width)); }
+  // The same curves at once, for paper of `width` pixels: a drawing for every five rows, so that no sheet cuts one.
+  print(width) {
+    if (!this.drawn) return;
+    const curves = this.perRow(this.curves), most = 5;
+    this.sheets = [];
+    for (let i = 0; i < this.rows.length; i += most) {
+      const part = new Figure(i ? document.createElement("div") : this.element);
+      Object.assign(part, { rows: this.rows.slice(i, i + most), curves: curves.slice(i, i + most).flat(), shades: this.shades, range: this.range });
+      if (i) {
+        part.element.className = "sheet";
+        (this.sheets.at(-1) || this.element).after(part.element);
+        this.sheets.push(part.element);
+      }
+      Plotly.react(part.element, part.traces(part.curves), part.layout(width));
+    }
+  }
 
-  redraw() { return this.drawn ? this.draw(this.rows, this.shades, this.range) : undefined; }
+  redraw() {
+    for (const e of this.sheets || []) { Plotly.purge(e); e.remove(); }
+    this.sheets = [];
+    return this.drawn ? this.draw(this.rows, this.shades, this.range) : undefined;
+  }
 
   clip([a, b]) {
     const least = 4 * Data.view.dt, end = Data.view.t0 + Data.view.n * Data.view.dt;
