@@ -148,15 +148,22 @@ def signals_frame(
     Returns
     -------
     pd.DataFrame, shape (n, columns)
-        Indexed by ``t`` [s from the mission's start]; NaN where there is no sample. ``attrs["units"]`` has the unit of
+        Views of the columns, not to be written. Indexed by ``t`` [s from the mission's start]; NaN where there is no sample. ``attrs["units"]`` has the unit of
         every column.
     """
     t = columns["t"] if step is None else step / report["log"]["rate_hz"]
-    shown = {name: np.asarray(values) for name, values in columns.items() if name != "t"}
-    frame = pd.DataFrame(shown, index=pd.Index(np.asarray(t, np.float64), name="t"))
+    shown = {name: _read_only(values) for name, values in columns.items() if name != "t"}
+    frame = pd.DataFrame(shown, index=pd.Index(np.asarray(t, np.float64), name="t"), copy=False)
     recorded = {s["name"]: s["unit"] for s in report["signals"]}
     frame.attrs["units"] = {name: recorded.get(name) or unit_of(name, report) for name in shown}
     return frame
+
+
+def _read_only(values: NDArray[np.floating[Any]]) -> NDArray[np.floating[Any]]:
+    """The same numbers without a copy, guarded against being written."""
+    view = np.asarray(values).view()
+    view.flags.writeable = False
+    return view
 
 
 def truth_frame(truth: MissionTruth) -> pd.DataFrame:

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from dataclasses import asdict
 from functools import lru_cache
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from diagnosis.api.figures import COLOURS, colour_of
 from diagnosis.api.verdict import Verdict, assumed_words
+from diagnosis.pages.environment import environment
 from diagnosis.pages.labels import bounded, made_visible, sat_text
 from diagnosis.results.document import IntervalRow, ReportDocument
 from diagnosis.results.fault_rows import state_label
@@ -53,9 +55,4 @@ def _fault(fault: IntervalRow, words: MachineWords) -> dict[str, str]:
 
 @lru_cache
 def _template() -> jinja2.Template:
-    import jinja2
-
-    loader = jinja2.PackageLoader("diagnosis.api", ".")
-    return jinja2.Environment(loader=loader, autoescape=True, trim_blocks=True, lstrip_blocks=True).get_template(
-        "notebook.html.j2"
-    )
+    return environment(Path(__file__).parent).get_template("notebook.html.j2")
