@@ -10,7 +10,7 @@ import typer
 from cli.terminal.command import Quiet, Verbose, terminal_of
 from cli.terminal.options import Json, MachineFile
 from diagnosis.api.inputs import check_output
-from diagnosis.api.saved_results import logs_and_their_reports, results_and_truths
+from diagnosis.api.truths import logs_and_their_reports, results_and_truths
 from replay.progress import Stage
 
 EXAMPLES = """\b

@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING, TypeAlias
 from diagnosis.api.errors import stated
 from diagnosis.api.inputs import MachineLike, StrPath, check_output, machine_given, path_of, paths_of
 from diagnosis.api.result import Diagnosis
-from diagnosis.api.saved_results import results_and_truths, saved_report
+from diagnosis.api.saved_results import saved_report
+from diagnosis.api.truths import results_and_truths
 from replay.errors import ConfigError
 from replay.progress import Subscriber, silent
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import astuple, dataclass, fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
@@ -45,15 +45,18 @@ class MadeLog:
 
     @property
     def faults(self) -> pd.DataFrame:
-        """The injected faults, shape (faults, 9), one row each in order of their start.
+        """The injected faults, shape (faults, 10), one row each in order of their start.
 
         Columns: ``component`` and ``kind`` (``wheel`` or ``steer``), ``side`` and ``mode`` (row of the paper's tables),
         ``start_s`` and ``stop_s`` (mission time [s], half open), ``epsilon`` (ε of L4 or L8 [1]), ``sat_mean`` and
         ``sat_std`` (saturation term [m/s], [rad] or [fraction of full opening]), ``ramp_s`` (time over which ε grows [s]).
         """
-        from diagnosis.api.frames import truth_frame
+        import pandas as pd
 
-        return truth_frame(self.truth)
+        from replay.truth import TruthInterval
+
+        rows = [[str(x) if isinstance(x, str) else x for x in astuple(interval)] for interval in self.truth.intervals]
+        return pd.DataFrame(rows, columns=[f.name for f in fields(TruthInterval)])
 
 
 @stated
