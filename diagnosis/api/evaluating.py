@@ -32,7 +32,7 @@ _SIDES = ("driving_s", "macro_f1", "balanced_accuracy", "balanced_accuracy_decid
 
 @dataclass(frozen=True)
 class Evaluation:
-    """How diagnoses compare with the truth; README, *What `evaluate` counts*, defines every figure.
+    """How diagnoses compare with the truth; ``docs/how-to/own-faults.md`` defines every figure.
 
     Attributes
     ----------
