@@ -7,7 +7,7 @@ from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from diagnosis.api.figures import COLOURS, colour_of
+from diagnosis.api.figure_style import COLOURS, colour_of
 from diagnosis.api.verdict import Verdict, assumed_words
 from diagnosis.pages.environment import environment
 from diagnosis.pages.labels import bounded, made_visible, sat_text
