@@ -56,6 +56,19 @@ class Evaluation:
         return scores_document(self.pairs, self.scores, self.pooled)
 
     @property
+    def notes(self) -> tuple[str, ...]:
+        """What is not scored, and why, one sentence each."""
+        out = []
+        for (name, _), mission in zip(self.pairs, self.scores, strict=True):
+            if mission.left_out:
+                verb = "is" if len(mission.left_out) == 1 else "are"
+                out.append(f"{name}: {', '.join(mission.left_out)} {verb} not in the result and not scored")
+            if mission.not_driven:
+                faults = "; ".join(mission.not_driven)
+                out.append(f"{name}: the truth has faults outside of driving, where nothing can show them: {faults}")
+        return tuple(out)
+
+    @property
     def sides(self) -> pd.DataFrame:
         """States over driving time, shape (2 or 4, 6), indexed by ``group`` (``wheel``, ``steer``) and ``side``.
 
