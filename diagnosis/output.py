@@ -15,15 +15,18 @@ from numpy.typing import NDArray
 
 from diagnosis.comparison.previous import with_previous
 from diagnosis.report.page import build_page
+from diagnosis.report.plot_data import axis_of
 from diagnosis.results.document import ReportDocument
 from diagnosis.results.json_text import writable
 from diagnosis.results.result import Closeups, MissionResult
 from diagnosis.results.validation import report_of
 from replay.atomic_write import atomic_path, atomic_paths, made_folder
+from replay.border import bordered
 from replay.errors import LogError, OutputError
 
 HTML, JSON, PARQUET, WINDOWS = "report.html", "report.json", "report.parquet", "report.windows.parquet"
 _BLOCK = 1 << 15
+_AGAIN = "run `mfhca diagnose` on the log again"
 
 
 def write_result(result: MissionResult, folder: Path, *, max_size_mb: float = 15.0) -> tuple[Path, ...]:
@@ -60,7 +63,7 @@ def write_result(result: MissionResult, folder: Path, *, max_size_mb: float = 15
         for path in more:
             _write_table({"step": windows.step, **windows.columns} if windows else {}, path)
         document.write_bytes(_json(report))
-        _write_page(report, columns, windows, html, max_size_mb)
+        _write_text(build_page(report, columns, closeups=windows, max_size_mb=max_size_mb), html)
     if windows is None:
         (folder / WINDOWS).unlink(missing_ok=True)
     return paths
@@ -116,9 +119,23 @@ def _read_table(path: Path) -> dict[str, NDArray[Any]]:
     try:
         with path.open("rb") as file:
             table = pq.read_table(file)
-    except (OSError, pa.ArrowException) as error:
-        raise LogError(f"{path}: cannot be read ({error}); run `mfhca diagnose` on the log again") from error
-    return {name: table.column(name).to_numpy() for name in table.column_names}
+        columns = {name: table.column(name).to_numpy() for name in table.column_names}
+    except (OSError, pa.ArrowException, ValueError, KeyError, TypeError, OverflowError) as error:
+        said = " ".join(str(error).split())[:200]
+        raise LogError(f"{path}: cannot be read ({said}); {_AGAIN}") from error
+    if wrong := next((name for name, values in columns.items() if values.dtype.kind not in "fiu"), None):
+        raise LogError(f"{path}: column {wrong[:80]!r} holds no numbers; {_AGAIN}")
+    return columns
+
+
+def _read_columns(path: Path, rate: float) -> dict[str, NDArray[Any]]:
+    """Time series of a result, on one uniform axis."""
+    columns = _read_table(path)
+    try:
+        axis_of(columns, rate)
+    except ValueError as error:
+        raise LogError(f"{path}: {error}; {_AGAIN}") from error
+    return columns
 
 
 def _read_windows(path: Path) -> Closeups | None:
@@ -127,7 +144,7 @@ def _read_windows(path: Path) -> Closeups | None:
     columns = _read_table(path)
     step = columns.pop("step", None)
     if step is None or step.dtype.kind != "i" or (np.diff(step) < 1).any():
-        raise LogError(f"{path}: column 'step' is missing or does not increase; run `mfhca diagnose` on the log again")
+        raise LogError(f"{path}: column 'step' is missing or does not increase; {_AGAIN}")
     return Closeups(step, columns)
 
 
@@ -157,13 +174,15 @@ def rebuild(path: Path, *, max_size_mb: float = 15.0, previous: tuple[Path, Repo
     if previous is not None:
         compared: ReportDocument = writable(with_previous(report, previous[1], str(previous[0])))
         report = compared
+    with bordered(folder, "a saved result", remedy=_AGAIN):
+        page = build_page(report, columns, closeups=windows, max_size_mb=max_size_mb)
     if previous is None:
         with atomic_path(folder / HTML) as html:
-            _write_page(report, columns, windows, html, max_size_mb)
+            _write_text(page, html)
     else:
         with atomic_paths(folder / HTML, source) as (html, document):
             document.write_bytes(_json(report))
-            _write_page(report, columns, windows, html, max_size_mb)
+            _write_text(page, html)
     return folder / HTML
 
 
@@ -201,12 +220,5 @@ def _json(report: ReportDocument) -> bytes:
     return orjson.dumps(report, option=orjson.OPT_INDENT_2)
 
 
-def _write_page(
-    report: ReportDocument,
-    columns: Mapping[str, NDArray[np.floating]],
-    windows: Closeups | None,
-    path: Path,
-    size: float,
-) -> None:
-    page = build_page(report, columns, closeups=windows, max_size_mb=size)
+def _write_text(page: str, path: Path) -> None:
     path.write_text(page, encoding="utf-8", newline="\n")

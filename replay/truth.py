@@ -8,6 +8,8 @@ from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any
 
+import orjson
+
 from replay.atomic_write import atomic_path
 from replay.errors import ConfigError
 from replay.faults import FaultMode, FaultSpec, Side
@@ -149,14 +151,14 @@ def read_truth(path: Path) -> MissionTruth:
         Where the file is absent, is no truth file, or a part of it is missing or of the wrong kind.
     """
     try:
-        document = json.loads(path.read_text(encoding="utf-8"))
+        document = orjson.loads(path.read_bytes())
     except OSError as error:
         raise ConfigError(f"{path}: cannot be read ({error.strerror}); give the truth file of this mission") from error
     except ValueError as error:
         raise ConfigError(f"{path}: is not JSON ({error}); expected a truth file with schema {SCHEMA}") from error
     schema = document.get("schema") if isinstance(document, dict) else None
     if schema != SCHEMA:
-        raise ConfigError(f"{path}: schema is {schema!r}; expected {SCHEMA!r}")
+        raise ConfigError(f"{path}: schema is {schema!r:.80}; expected {SCHEMA!r}")
     try:
         return MissionTruth(
             wheels=tuple(str(w) for w in document["wheels"]),
@@ -170,9 +172,9 @@ def read_truth(path: Path) -> MissionTruth:
             open_loop=bool(document.get("open_loop", False)),
             driving=_spans(document, "driving"),
         )
-    except (KeyError, TypeError, ValueError, AttributeError) as error:
+    except (KeyError, TypeError, ValueError, AttributeError, OverflowError) as error:
         raise ConfigError(
-            f"{path}: is not a complete truth file ({error!r}); expected the fields of {SCHEMA}"
+            f"{path}: is not a complete truth file ({error!r:.200}); expected the fields of {SCHEMA}"
         ) from error
 
 

@@ -133,7 +133,7 @@ def _audit(terminal: Terminal, request: AuditRequest, found: Discovery, asked: A
             _export(asked.output)
         code = done.exit_code(request.fail_on.value)
         emit("end", {"code": code, "failed": done.failed})
-    audited = Audited(done.ends, done.skipped, done.failed, done.gone)
+    audited = Audited(done.ends, done.skipped, done.failed, done.gone, done.machines)
     if request.json:
         terminal.show_json(document(audited, found, asked.output, code))
     else:

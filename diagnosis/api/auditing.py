@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from diagnosis.audit.endings import Ending
     from diagnosis.audit.engines import Engine
     from diagnosis.audit.events import Emit, EventFacts
+    from diagnosis.audit.fleet.listed import ListedMachine
     from diagnosis.audit.plan import AuditOptions
 
 OUTPUT = "mfhca-audit"
@@ -127,6 +128,8 @@ class Audit:
         Words, folders and links behind which no mission was found, and what else is to be known.
     unread : bool
         Whether one of them may hide a mission.
+    machines : tuple[ListedMachine, ...]
+        The machines as the fleet page lists them, worst first; see `diagnosis.audit.fleet.listed.ListedMachine`.
     """
 
     output: Path
@@ -136,6 +139,7 @@ class Audit:
     gone: int
     problems: tuple[str, ...] = ()
     unread: bool = False
+    machines: tuple[ListedMachine, ...] = ()
 
     @property
     def page(self) -> Path:
@@ -304,4 +308,13 @@ def run(
         raise LogError(none_found(found))
     done = audit_all(found, asked, request.engine(), emit, baseline=baseline, axis=axis)
     problems = (*found.problems, *found.notes)
-    return Audit(asked.output, done.ends, done.skipped, done.failed, done.gone, problems, bool(found.problems))
+    return Audit(
+        asked.output,
+        done.ends,
+        done.skipped,
+        done.failed,
+        done.gone,
+        problems,
+        bool(found.problems),
+        done.machines,
+    )

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -58,10 +57,12 @@ def is_truth(path: Path) -> bool:
     """Whether a word of the command line is a truth file."""
     if path.suffix.lower() != ".json" or not path.is_file():
         return False
+    import orjson
+
     from replay.truth import SCHEMA
 
     try:
-        document = json.loads(path.read_text(encoding="utf-8"))
+        document = orjson.loads(path.read_bytes())
     except (OSError, ValueError):
         return False
     return isinstance(document, dict) and document.get("schema") == SCHEMA

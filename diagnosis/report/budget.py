@@ -161,9 +161,14 @@ def _equal(a: Values | None, b: Values | None) -> bool:
     return a.dtype == b.dtype and bool(np.array_equal(a.view(bits), b.view(bits)))
 
 
+def _quiet() -> None:
+    """Let no infinite or absurd value of a column warn: what NumPy tells of them stands for each thread alone."""
+    np.seterr(over="ignore", invalid="ignore")
+
+
 def _encoded(given: Encodable, budget: int) -> list[Channel]:
     columns, samples, per = given.columns, given.samples, given.per
-    with ThreadPoolExecutor(_WORKERS) as pool:
+    with ThreadPoolExecutor(_WORKERS, initializer=_quiet) as pool:
         plans = dict(zip(columns, pool.map(lambda c: plan_of(columns[c], given.lsb.get(c)), columns), strict=True))
         if per == 1 and sum(p.rate for p in plans.values()) * samples <= budget:
             channels = list(pool.map(lambda c: whole(c, columns[c], plans[c]), columns))

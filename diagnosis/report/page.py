@@ -66,6 +66,7 @@ class _Series:
         return self.axis.start, self.axis.step
 
 
+@np.errstate(over="ignore", invalid="ignore")  # a column may hold infinite and absurd values
 def build_page(
     report: ReportDocument,
     columns: Mapping[str, NDArray[np.floating]],

@@ -77,8 +77,8 @@ def axis_of(columns: Columns, rate: float) -> Axis:
         return Axis(0.0, 1.0, 0)
     if wrong := next((k for k, v in columns.items() if v.shape != t.shape), None):
         raise ValueError(f"column {wrong!r} has shape {columns[wrong].shape}, but t has {t.shape}")
-    step = float(t[-1] - t[0]) / (len(t) - 1)
-    if not step > 0 or np.abs(t - (t[0] + step * np.arange(len(t)))).max() > 0.5 * step:
+    step = float(t[-1] - t[0]) / (len(t) - 1) if np.isfinite(t).all() else 0.0
+    if not 0 < step < np.inf or np.abs(t - (t[0] + step * np.arange(len(t)))).max() > 0.5 * step:
         raise ValueError("column 't' is not uniform; resample the columns first")
     samples = step * rate
     return Axis(float(t[0]), step, len(t), round(2 * samples) if samples > 1.5 else 1)

@@ -21,6 +21,7 @@ MOTION = {Kind.WHEEL: "v", Kind.STEER: "phi"}
 _COMPARED = ("residual", "threshold", "expected")
 _OF_THE_SIGNAL = ("delta_bar", "delta_bar_std")
 _UNKNOWN = "unknown unit"
+_SIDES = {side.value for side in Side}
 
 
 def motion_unit(kind: Kind, words: MachineWords) -> str:
@@ -67,6 +68,8 @@ def unit_of(column: str, report: ReportDocument) -> str:
     component, _, leaf = rest.rpartition(".")
     if head == "evidence":
         part, _, side = component.rpartition(".")
+        if side not in _SIDES:
+            return _UNKNOWN
         kind = kind_of(part, report["machine"])
         if leaf in _COMPARED:
             return natural_unit(kind, Side(side), words) if _measured(part, side, report) else motion_unit(kind, words)

@@ -87,7 +87,7 @@ def _is_own(folder: Path) -> bool:
         index = json.loads((folder / INDEX).read_text(encoding="utf-8"))
         files = {INDEX, *(str(f["file"]) for f in index["files"])}
         return index["schema"] == SCHEMA and {p.name for p in folder.iterdir()} <= files
-    except (OSError, ValueError, KeyError, TypeError):
+    except (OSError, ValueError, KeyError, TypeError, RecursionError):
         return False
 
 

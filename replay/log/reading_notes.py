@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from replay.arrays.column_store import ColumnStore
+from replay.border import shortened
 
 
 @dataclass
@@ -17,10 +18,12 @@ class Report:
 
     def note(self, text: str) -> None:
         """Add a harmless fact."""
+        text = shortened(text)
         if text not in self.notes:
             self.notes.append(text)
 
     def lost(self, text: str) -> None:
         """Add a loss."""
+        text = shortened(text)
         if text not in self.damage:
             self.damage.append(text)

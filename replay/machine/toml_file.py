@@ -8,6 +8,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, TypeVar
 
+from replay.border import UnforeseenValue, bordered
 from replay.errors import ConfigError
 from replay.faults import FaultMode, Side
 from replay.log.source_options import SignalSource, SourceOptions
@@ -53,7 +54,10 @@ def load_machine(path: Path) -> Machine:
     except TomlError as error:
         raise ConfigError(f"{path}: {error}") from error
     try:
-        return _machine(data)
+        with bordered(path, "machine file", UnforeseenValue, "look at the values of that kind in it"):
+            return _machine(data)
+    except UnforeseenValue:
+        raise
     except ConfigError as error:
         text = str(error)
         raise ConfigError(f"{path}: {text if len(text) <= _LONGEST else text[:_LONGEST] + ' …'}") from error
@@ -70,6 +74,8 @@ def _machine(data: Mapping[str, Any]) -> Machine:
     wheels = head.get("wheels", list(base.wheels))
     if not isinstance(wheels, list) or not all(isinstance(w, str) and w and "." not in w for w in wheels):
         raise ConfigError(f"machine.wheels = {wheels!r} must be a list of names without dots")
+    if not wheels:
+        raise ConfigError("machine.wheels = [] must name each wheel once, and at least one")
     geo = dict(data.get("geometry", {}))
     top = {key: _number(f"geometry.{key}", geo.pop(key)) for key in MACHINE_LEVEL if key in geo}
     geometry = _geometry(geo, tuple(wheels), base)
@@ -282,4 +288,8 @@ def _build(kind: type[_T], section: str, value: Any, rename: Mapping[str, str] |
             if not isinstance(item, str):
                 raise ConfigError(f"{key} = {item!r} must be text")
             out[name] = item
+    needed = (f.name for f in fields.values() if f.default is f.default_factory is dataclasses.MISSING)
+    for name in needed:
+        if name not in out:
+            raise ConfigError(f"{section}.{shown[name]} is missing; give it, or leave [{section}] out")
     return kind(**out)

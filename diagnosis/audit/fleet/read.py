@@ -12,6 +12,7 @@ from collections.abc import Sequence
 from contextlib import closing
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 from diagnosis.audit.store.database import Database
 from diagnosis.audit.store.outcome import MissionState
@@ -20,6 +21,7 @@ from diagnosis.audit.store.repairs import Repair, read_repairs
 from diagnosis.audit.store.store import FILE_NAME
 from diagnosis.results.vocabulary import Severity, Verdict
 
+_LARGEST, _LONGEST = 1e6, 1e15  # of a loss ε, and of seconds and metres: more is damage
 CALENDAR_NS = 946_684_800 * 10**9  # a clock that says a time before 2000 does not know the date
 
 
@@ -135,11 +137,11 @@ def read_missions(store: Path) -> list[Mission]:
     with closing(_opened(store)) as db, db.snapshot(), db.decoding():
         faults: dict[int, list[FoundFault]] = defaultdict(list)
         for row in db.rows(_FAULTS):
-            r, name, component, kind, side, mode, severity, seconds, e, low, high, p = row
+            r, name, component, kind, side, mode, severity, seconds, e, low, high, p = _plausible(row)
             found = FoundFault(name, component, kind, side, mode, Severity(severity), seconds, _bounds(e, low, high), p)
             faults[r].append(found)
         parts: dict[int, list[Part]] = defaultdict(list)
-        for r, component, side, driving, decided, e, low, high, relative in db.rows(_PARTS):
+        for r, component, side, driving, decided, e, low, high, relative in map(_plausible, db.rows(_PARTS)):
             parts[r].append(Part(component, side, driving, decided, _bounds(e, low, high), bool(relative)))
         results = {row[0]: _result(row, tuple(faults[row[0]]), tuple(parts[row[0]])) for row in db.rows(_RESULTS)}
         missions = [
@@ -216,7 +218,7 @@ def _opened(store: Path) -> Database:
 
 
 def _result(row: sqlite3.Row, faults: tuple[FoundFault, ...], parts: tuple[Part, ...]) -> Result:
-    values = {k: row[k] for k in row.keys()}  # noqa: SIM118 - a row is no mapping
+    values = dict(zip(row.keys(), _plausible(row), strict=True))
     start, verdict = values["start_ns"], values["verdict"]
     values["start_ns"] = start if start is not None and start >= CALENDAR_NS else None
     values["state"] = MissionState(values["state"])
@@ -225,7 +227,17 @@ def _result(row: sqlite3.Row, faults: tuple[FoundFault, ...], parts: tuple[Part,
     return Result(**values, faults=faults, parts=parts)
 
 
+def _plausible(row: sqlite3.Row) -> tuple[Any, ...]:
+    """Values of a row; raises a `ValueError` where a real number is so large that sums and squares of it would not be."""
+    values = tuple(row)
+    if wrong := next((v for v in values if isinstance(v, float) and not abs(v) <= _LONGEST), None):
+        raise ValueError(f"a value of {wrong:g}")
+    return values
+
+
 def _bounds(value: float | None, low: float | None, high: float | None) -> Bounds | None:
     if value is None or low is None or high is None or not all(map(math.isfinite, (value, low, high))):
         return None
+    if max(map(abs, (value, low, high))) > _LARGEST:
+        raise ValueError(f"a loss ε of {value:g} ({low:g} to {high:g})")
     return Bounds(value, low, high)

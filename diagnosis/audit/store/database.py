@@ -165,7 +165,7 @@ class Database:
         """
         try:
             yield
-        except (ValueError, TypeError, KeyError, IndexError, AttributeError, OverflowError) as error:
+        except (ValueError, TypeError, KeyError, IndexError, AttributeError, OverflowError, RecursionError) as error:
             text = " ".join(str(error).split())[:120]
             raise OutputError(
                 f"{self.path}: is damaged (a row holds what no audit writes: {text}); move it away and audit again: results "

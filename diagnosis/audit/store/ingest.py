@@ -19,7 +19,7 @@ from diagnosis.results.validation import validated
 from diagnosis.results.vocabulary import Severity, Verdict
 from replay.errors import MfhcaError
 
-_MOST_BYTES = 64 << 20
+MAX_OBJECT = 64 << 20
 _AT_ONCE = 200
 _MISFITS = (
     sqlite3.IntegrityError, sqlite3.ProgrammingError, sqlite3.DataError, sqlite3.InterfaceError,
@@ -96,7 +96,7 @@ def ingest(store: Store, place: str | None = None) -> Ingested:
 
 def _checked(name: str, content: bytes) -> ResultObject:
     """Document of an object; raises where it is none, or would lead out of the audit's folder."""
-    if len(content) > _MOST_BYTES:
+    if len(content) > MAX_OBJECT:
         raise ValueError(f"{len(content)} bytes")
     document = orjson.loads(content)
     if document["schema"] != SCHEMA:

@@ -11,7 +11,7 @@ from replay.readers.mcap import format as fmt
 from replay.readers.mcap.records import BAD_RECORD, Channel, Schema, parse
 from replay.readers.messages.connection import Connection
 
-_MAX_TEXT = 1 << 16
+MAX_TEXT = 1 << 16
 
 
 class Names:
@@ -79,7 +79,7 @@ class Names:
         what = "schema" if op == fmt.SCHEMA else "channel"
         try:
             record = parse(op, raw)
-            if isinstance(record, Channel) and len(record.topic) > _MAX_TEXT:
+            if isinstance(record, Channel) and len(record.topic) > MAX_TEXT:
                 raise ValueError("a topic without end")
         except BAD_RECORD as error:
             self._lost("name", f"the {what} record {place} is damaged ({type(error).__name__})")

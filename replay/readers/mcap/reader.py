@@ -10,11 +10,11 @@ from numpy.typing import NDArray
 
 from replay.arrays.blocks import release
 from replay.arrays.column_store import ColumnStore
+from replay.border import bordered
 from replay.errors import LogError
 from replay.log.raw_log import AttachmentInfo, Clock, LogSummary, RawLog, TopicInfo, Window
 from replay.log.reading_notes import Report
 from replay.log.source_options import SourceOptions
-from replay.readers.common.border import bordered
 from replay.readers.mcap import format as fmt
 from replay.readers.mcap.chunk import name_channels, open_chunk
 from replay.readers.mcap.file import McapFile, looks_like_mcap

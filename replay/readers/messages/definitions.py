@@ -10,6 +10,8 @@ from typing import Any, TypeAlias
 from rosbags.interfaces import Nodetype
 from rosbags.typesys import Stores, get_types_from_idl, get_types_from_msg, get_typestore
 
+from replay.readers.messages.idl_cost import MAX_MILLISECONDS, milliseconds
+
 Fields: TypeAlias = tuple[tuple[str, Any], ...]
 
 MAX_DEFINITION = 1 << 20
@@ -124,8 +126,13 @@ def resolve(name: str, encoding: str, text: str, ros1: bool) -> MessageType:
 def _parse(root: str, encoding: str, text: str) -> dict[str, Fields]:
     if len(text) > MAX_DEFINITION:
         raise DefinitionError(f"its definition has {len(text)} characters; at most {MAX_DEFINITION} are read")
+    idl = encoding in ("ros2idl", "omgidl")
+    if idl and milliseconds(text) > MAX_MILLISECONDS:
+        raise DefinitionError(
+            "its definition holds too many expressions, or brackets within brackets, to be parsed in time"
+        )
     try:
-        parsed = _parse_idl(text) if encoding in ("ros2idl", "omgidl") else get_types_from_msg(text, root)
+        parsed = _parse_idl(text) if idl else get_types_from_msg(text, root)
     except Exception as error:  # the parser raises many kinds on hostile text, RecursionError among them
         raise DefinitionError(f"its definition cannot be parsed ({type(error).__name__})") from error
     return {name: tuple(parts[1]) for name, parts in parsed.items()}

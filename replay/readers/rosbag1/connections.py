@@ -14,7 +14,7 @@ from replay.readers.rosbag1.records_kernel import BagRecords
 
 #: What reading a damaged header raises.
 DAMAGED = (struct.error, KeyError, ValueError)
-_LONGEST_TEXT = 1 << 20
+MAX_TEXT = 1 << 20
 
 
 def fields_of(raw: bytes) -> dict[str, bytes]:
@@ -31,7 +31,7 @@ def fields_of(raw: bytes) -> dict[str, bytes]:
 def take_connection(bag: Bag, data: NDArray[np.uint8], records: BagRecords, i: int) -> None:
     """Take a connection record; of two copies that differ, the one that its checksum confirms."""
     head, body, size, number = (int(a[i]) for a in (records.head, records.body, records.size, records.conn))
-    raw = data[head : body + min(size, _LONGEST_TEXT)].tobytes()
+    raw = data[head : body + min(size, MAX_TEXT)].tobytes()
     if bag.raw.get(number) == raw:
         return
     try:

@@ -7,10 +7,10 @@ from dataclasses import replace
 from itertools import islice, pairwise
 from pathlib import Path
 
+from replay.border import bordered
 from replay.errors import LogError
 from replay.log.file_types import part_of
 from replay.log.raw_log import LogSummary, TopicInfo
-from replay.readers.common.border import bordered
 
 _MOST_GAPS = 5
 

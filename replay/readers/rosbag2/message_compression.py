@@ -12,7 +12,7 @@ from replay.log.reading_notes import Report
 from replay.readers.messages.connection import Block
 
 _HELD = 64 << 20
-_LONGEST = 64 << 20  # of one message
+MAX_MESSAGE = 64 << 20  # of one message
 
 
 def unpacked(blocks: Iterable[Block], name: str, report: Report) -> Iterator[list[Block]]:
@@ -47,9 +47,9 @@ def unpacked(blocks: Iterable[Block], name: str, report: Report) -> Iterator[lis
     for i in np.argsort(starts, kind="stable").tolist():
         frame = data[starts[i] : starts[i] + lengths[i]].tobytes()
         try:
-            if zstandard.get_frame_parameters(frame).content_size > _LONGEST:
+            if zstandard.get_frame_parameters(frame).content_size > MAX_MESSAGE:
                 raise zstandard.ZstdError("declared size")
-            parts.append(expander.decompress(frame, max_output_size=_LONGEST))
+            parts.append(expander.decompress(frame, max_output_size=MAX_MESSAGE))
         except zstandard.ZstdError:
             bad += 1
             continue

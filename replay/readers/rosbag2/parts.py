@@ -14,7 +14,7 @@ from replay.readers.rosbag2.metadata import Metadata, read_metadata
 
 _STORES = (".db3", ".mcap", ".db3.zstd", ".mcap.zstd")
 _ZSTD = b"\x28\xb5\x2f\xfd"
-_MAX_FILE = 64 << 30
+MAX_FILE = 64 << 30
 _RATIO = 200
 _SPARE = 256 << 20
 _PIECE = 4096  # expands to 128 MiB at most
@@ -132,7 +132,7 @@ def _expanded(path: Path, scratch: Path, serial: int, report: Report) -> Path | 
         return path
     out = scratch / str(serial) / path.stem
     out.parent.mkdir()
-    fair = min(_MAX_FILE, _RATIO * path.stat().st_size + (64 << 20))
+    fair = min(MAX_FILE, _RATIO * path.stat().st_size + (64 << 20))
     room = min(fair, shutil.disk_usage(scratch).free - _SPARE)
     whole, size = False, 0
     try:

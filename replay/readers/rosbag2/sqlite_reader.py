@@ -9,10 +9,10 @@ from pathlib import Path
 
 import numpy as np
 
+from replay.border import bordered
 from replay.errors import LogError
 from replay.log.raw_log import Clock, LogSummary, RawLog, TopicInfo, Window
 from replay.log.reading_notes import Report
-from replay.readers.common.border import bordered
 from replay.readers.messages.assemble import Assembler
 from replay.readers.messages.connection import Block, Connection
 from replay.readers.rosbag2.message_compression import unpacked

@@ -31,7 +31,7 @@ _CELLS = 1 << 21
 _SAMPLE = 20_000
 _SECOND_NS = 1_000_000_000
 _ROUNDING = 1000  # statistics of dates may come back in whole microseconds [ns]
-_LARGEST_GROUP = 16 << 30
+MAX_GROUP = 16 << 30
 _DAMAGE = (pa.ArrowException, OSError, ValueError, KeyError, TypeError, OverflowError, MemoryError, IndexError)
 
 
@@ -57,8 +57,8 @@ class ParquetReader:
         """
         report = Report()
         with _opened(path) as file:
-            table = _Parquet(path, file)
-            time = table.time(options, report)
+            table = _Parquet(path, file, report)
+            time = table.time(options)
             unit = "iso" if table.dated(time.name) else time.unit
             base = TimeBase(unit, epoch_ns(options, str(path), time.unit), path.name, Report(), time.part)
             ends = [base.stamps(*cells) for cells in table.ends(time.names)]
@@ -88,8 +88,8 @@ class ParquetReader:
         """
         report = Report(store=store or ColumnStore())
         with _opened(path) as file:
-            table = _Parquet(path, file)
-            time = table.time(options, report)
+            table = _Parquet(path, file, report)
+            time = table.time(options)
             times = RowTimes(path, time, table.dated(time.name), options, window, report)
             columns = {n: ArrayColumn(report.store) for n in table.numeric if n not in time.names}
             words = {n: TextColumn() for n in table.words if n not in time.names} if texts else {}
@@ -118,8 +118,8 @@ def _opened(path: Path) -> Iterator[Any]:
 class _Parquet:
     """Columns of an open file under unique names."""
 
-    def __init__(self, path: Path, file: Any) -> None:
-        self.path, self.file = path, file
+    def __init__(self, path: Path, file: Any, report: Report) -> None:
+        self.path, self.file, self.report = path, file, report
         schema = file.schema_arrow
         names = unique_names(list(schema.names))[0]
         # What a conversion of a log has written about it (see `replay.export.raw_log`).
@@ -134,10 +134,14 @@ class _Parquet:
         self.words = {names[i]: schema.field(i) for i in flat if _is_text(schema.field(i).type)}
         if twice:
             raise LogError(f"{path} has two columns of the same name; rename one of them")
-        if not file.metadata.num_rows:
+        rows = file.metadata.num_rows
+        if not rows:
             raise LogError(f"{path} has {len(names)} columns and no row of data; record or export it again")
+        held = sum(file.metadata.row_group(k).num_rows for k in range(file.metadata.num_row_groups))
+        if held != rows:
+            report.lost(f"{path.name}: its footer counts {rows} rows, its row groups {held}")
 
-    def time(self, options: SourceOptions, report: Report) -> TimeColumn:
+    def time(self, options: SourceOptions) -> TimeColumn:
         """Find the time column."""
         stated = self.about.get("mfhca.time")
         if stated in self.numeric and options.time is None:
@@ -152,7 +156,7 @@ class _Parquet:
         first = next(self.blocks(labels, [0], _SAMPLE), None)
         sample = first if first is not None else {n: np.empty(0) for n in labels}
         shown = {n: c.view("M8[ns]") if self.dated(n) and c.dtype == np.int64 else c for n, c in sample.items()}
-        return find_time(self.path, shown, options, report)
+        return find_time(self.path, shown, options, self.report)
 
     def named(self, log: RawLog) -> RawLog:
         """Give the channels of a converted log their topics, fields, types and units again."""
@@ -206,19 +210,25 @@ class _Parquet:
     def blocks(self, names: Sequence[str], groups: list[int], size: int = 1 << 17) -> Iterator[dict[str, NDArray[Any]]]:
         """Columns by name, a limited number of rows at a time; integers of the first stay exact."""
         own = [(self.numeric[n] if n in self.numeric else self.words[n]).name for n in names]
-        size = max(min(size, _CELLS // len(own)), 1)
+        size = max(min(size, _CELLS // max(len(own), 1)), 1)
         for group in groups:
             declared = self.file.metadata.row_group(group).total_byte_size
-            if declared > _LARGEST_GROUP:
+            if declared > MAX_GROUP:
                 raise LogError(
-                    f"{self.path}: row group {group} declares {declared} bytes; at most {_LARGEST_GROUP} are read; write it "
+                    f"{self.path}: row group {group} declares {declared} bytes; at most {MAX_GROUP} are read; write it "
                     "with smaller row groups"
                 )
+            missing = self.file.metadata.row_group(group).num_rows
             for batch in self.file.iter_batches(size, row_groups=[group], columns=own, use_threads=False):
+                missing -= batch.num_rows
                 yield {
                     n: _cells(batch.column(o), n == names[0]) if n in self.numeric else _texts(batch.column(o))
                     for n, o in zip(names, own, strict=True)
                 }
+            if missing and own:
+                self.report.lost(
+                    f"{self.path.name}: row group {group} gives {abs(missing)} rows {'less' if missing > 0 else 'more'} than its footer counts"
+                )
 
 
 def _is_number(kind: Any) -> bool:

@@ -20,6 +20,7 @@ _NANOSECONDS = {"s": 1_000_000_000, "ms": 1_000_000, "us": 1_000, "ns": 1, "dc":
 _WRAP = 1 << 32
 _BACK = 100_000_000
 _FAR = 2**62
+_EPOCHS = (1900, 2100)  # with cells below 2^62 ns, stamps stay below 2^63
 _SECOND = 1_000_000_000
 _DAY = 86_400 * _SECOND
 
@@ -39,7 +40,7 @@ def epoch_ns(options: SourceOptions, source: str, unit: str = "") -> int:
     Raises
     ------
     LogError
-        Where the epoch is not an ISO date and time.
+        Where the epoch is not an ISO date and time, or so far from 1970 that stamps would not fit.
     """
     if options.epoch is None:
         return DC_EPOCH if (unit or options.time_unit) in ("dc", "dc32") else 0
@@ -50,6 +51,11 @@ def epoch_ns(options: SourceOptions, source: str, unit: str = "") -> int:
             f"{source}: epoch = {options.epoch!r} is not an ISO date and time; write it like 2000-01-01T00:00:00Z"
         ) from error
     moment = moment if moment.tzinfo else moment.replace(tzinfo=UTC)
+    if not _EPOCHS[0] <= moment.year <= _EPOCHS[1]:
+        raise LogError(
+            f"{source}: epoch = {options.epoch!r} is out of range; expected a date of the years {_EPOCHS[0]} to {_EPOCHS[1]} "
+            "(FILETIME columns, which count from 1601, need none)"
+        )
     since = moment - datetime(1970, 1, 1, tzinfo=UTC)
     return (since.days * 86_400 + since.seconds) * 1_000_000_000 + since.microseconds * 1_000
 

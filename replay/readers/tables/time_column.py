@@ -23,6 +23,7 @@ _TIME = re.compile(
 _LIKE_TIME = re.compile(r".*(time|date|zeit|datum|stamp|uhr|clock).*|t|dt|ts")
 _SUFFIX = re.compile(r"[ _.](s|sec|ms|us|ns|nsec)$")
 _TURN = 1 << 32
+_LONGEST_NAME = 60
 _LONGEST_STEP = 5000  # a larger usual step is neither of seconds nor of milliseconds
 _UNITS = {"s": "s", "sec": "s", "seconds": "s", "ms": "ms", "us": "us", "µs": "us", "ns": "ns", "nsec": "ns"}
 
@@ -156,7 +157,7 @@ def _course(column: NDArray[Any], unit: str) -> str:
 
 
 def _some(names: list[str]) -> str:
-    return ", ".join(names[:12])
+    return ", ".join(name if len(name) <= _LONGEST_NAME else f"{name[:_LONGEST_NAME]}…" for name in names[:12])
 
 
 def _bare(name: str) -> str:
@@ -178,7 +179,8 @@ def rises(column: NDArray[Any], often: bool = True) -> bool:
     values = _given(column)
     if len(values) < 2 or len(values) < 0.9 * min(len(column), 2000):
         return often and len(column) == 1 and len(values) == 1
-    steps = np.diff(values) if values.dtype.kind in "iM" else np.diff(values.astype(np.float64))
+    with np.errstate(over="ignore", invalid="ignore"):  # infinite cells, and steps beyond the largest number
+        steps = np.diff(values) if values.dtype.kind in "iM" else np.diff(values.astype(np.float64))
     ups = (steps > 0).mean()
     return bool((steps >= 0).mean() > 0.99 and (ups > 0.5 if often else ups > 0))
 

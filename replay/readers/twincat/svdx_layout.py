@@ -17,8 +17,8 @@ from replay.errors import LogError
 VERSION = b"01.00.00.40"
 HEAD, ENTRY = 20, 20
 _BOM = b"\xef\xbb\xbf"
-_MAX_XML = 256 << 20
-_MAX_DEPTH = 200
+MAX_XML = 256 << 20
+MAX_DEPTH = 200
 _MAX_TEXT = 1 << 16
 _MAX_BLOCKS = 100_000
 _CHANNEL = "Acquisition"
@@ -117,8 +117,8 @@ def read_frame(path: Path, file: IO[bytes], size: int) -> Frame:
                 f"index and the XML at byte {xml}; {HOW}"
             )
         blocks.append(Block(offset, size_of, handle))
-    if length > _MAX_XML:
-        raise LogError(f"{path}: its XML takes {length} bytes; at most {_MAX_XML} are read; {HOW}")
+    if length > MAX_XML:
+        raise LogError(f"{path}: its XML takes {length} bytes; at most {MAX_XML} are read; {HOW}")
     return Frame(tuple(blocks), _acquisitions(path, _exactly(path, file, xml, length)))
 
 
@@ -170,8 +170,8 @@ class _Walk:
 
     def begin(self, name: str, _attributes: object) -> None:
         self.stack.append(name)
-        if len(self.stack) > _MAX_DEPTH:
-            raise LogError(f"{self.path}: its XML is nested deeper than {_MAX_DEPTH}; {HOW}")
+        if len(self.stack) > MAX_DEPTH:
+            raise LogError(f"{self.path}: its XML is nested deeper than {MAX_DEPTH}; {HOW}")
         if name.endswith(_CHANNEL) and self.acquisition is None:
             self.acquisition, self.level = {}, len(self.stack)
         self.text, self.held = [], 0

@@ -102,6 +102,11 @@ def test_the_summary_names_failures_first_and_the_page_last(
     shown, progress = capsys.readouterr()
     lines = shown.strip().splitlines()
     assert lines[0] == "Failed"
+    fleet = json.loads((audited / "fleet.json").read_text(encoding="utf-8"))
+    listed = [line for line in lines[lines.index("Machines, worst first") + 2 :] if line][: len(fleet["machines"])]
+    for line, machine in zip(listed, fleet["machines"], strict=True):  # the same order, the same words
+        assert line.startswith(machine["label"])
+        assert machine["standing"].split(",")[0] in " ".join(line.split())
     assert lines[1].startswith("• unreadable  text  ")
     assert "fleet.html" in lines[-2]
     assert "failures.txt" in lines[-1]

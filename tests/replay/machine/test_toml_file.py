@@ -265,3 +265,18 @@ def test_maps_of_valves_are_lists_of_numbers(folder: Path) -> None:
         with pytest.raises(ConfigError) as raised:
             load(folder, f"[plant]\nFR = {{ K = 2, tau = 0.2, {wrong} }}")
         assert words in str(raised.value)
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("[machine]\nwheels = []\n[geometry]\nwheelbase = 2.0\n", "at least one"),
+        ("[plant.FR]\ntau = 0.3\n", "plant.FR.K is missing"),
+        ("[plant.FR]\n", "plant.FR.K is missing"),
+        ("[steering.front]\nslope_up = 1.0\n", "steering.front.slope_down is missing"),
+    ],
+)
+def test_what_is_left_out_is_named(folder: Path, text: str, words: str) -> None:
+    (folder / "part.toml").write_text(text)
+    with pytest.raises(ConfigError, match=words):
+        load_machine(folder / "part.toml")

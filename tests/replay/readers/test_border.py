@@ -6,9 +6,10 @@ from pathlib import Path
 
 import pytest
 
+from replay.border import UnforeseenContent
 from replay.errors import LogError
 from replay.log.source_options import SourceOptions
-from replay.readers.common.border import Bordered, UnforeseenContent
+from replay.readers.common.border import Bordered
 from replay.readers.registry import readers
 
 

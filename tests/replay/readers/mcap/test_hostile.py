@@ -10,9 +10,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from replay.border import UnforeseenContent
 from replay.errors import LogError
 from replay.log.source_options import SourceOptions
-from replay.readers.common.border import UnforeseenContent
 from replay.readers.registry import read_log, summarise_log
 
 OPTIONS = SourceOptions()

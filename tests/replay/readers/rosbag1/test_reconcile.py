@@ -11,10 +11,10 @@ import pytest
 from rosbags.rosbag1 import Writer
 from rosbags.typesys import Stores, get_typestore
 
+from replay.border import UnforeseenContent
 from replay.errors import LogError
 from replay.log.raw_log import RawLog
 from replay.log.source_options import SourceOptions
-from replay.readers.common.border import UnforeseenContent
 from replay.readers.registry import read_log, summarise_log
 from replay.readers.rosbag1.records_kernel import CHUNK, CONNECTION, INDEX, INFO, MESSAGE, scan_bag
 

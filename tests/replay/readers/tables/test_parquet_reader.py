@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -111,3 +112,33 @@ def test_one_second_resolution_is_spread(target: Path) -> None:
 def test_tables_that_cannot_be_read(target: Path, columns: dict[str, Any], reason: str) -> None:
     with pytest.raises(LogError, match=reason):
         read_log(write(target, **columns), SourceOptions())
+
+
+def test_a_table_of_text_alone_has_no_time_column(target: Path) -> None:
+    write(target, a=["x", "y"], b=["z", "z"])
+    with pytest.raises(LogError, match="no time column"):
+        read_log(target, SourceOptions())
+
+
+def test_the_message_on_long_names_stays_short(target: Path) -> None:
+    write(target, **{"x" * 5000: [1.0, 0.0, 1.0], "y" * 5000: [1.0, 0.0, 1.0]})
+    with pytest.raises(LogError, match="no time column") as found:
+        read_log(target, SourceOptions())
+    assert len(str(found.value)) < 1000
+
+
+def test_a_row_group_that_gives_fewer_rows_than_the_footer_counts_is_told(
+    target: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Where bytes are gone from its pages, pyarrow may end a row group early without an error."""
+    write(target, 20, t=np.arange(60) / 10, v=np.arange(60))
+    whole = pq.ParquetFile.iter_batches
+
+    def shorter(self: pq.ParquetFile, *args: Any, row_groups: list[int], **options: Any) -> Iterator[Any]:
+        for batch in whole(self, *args, row_groups=row_groups, **options):
+            yield batch.slice(0, 13) if row_groups == [2] else batch
+
+    monkeypatch.setattr(pq.ParquetFile, "iter_batches", shorter)
+    log = read_log(target, SourceOptions())
+    assert len(log.channels["v"].values) == 53
+    assert "t.parquet: row group 2 gives 7 rows less than its footer counts" in log.summary.damage

@@ -5,8 +5,9 @@ import pytest
 
 from replay.errors import LogError
 from replay.log.reading_notes import Report
+from replay.log.source_options import SourceOptions
 from replay.readers.tables.row_kernel import MISSING
-from replay.readers.tables.time_cells import DC_EPOCH, FILETIME_EPOCH, TimeBase, spread_seconds
+from replay.readers.tables.time_cells import DC_EPOCH, FILETIME_EPOCH, TimeBase, epoch_ns, spread_seconds
 
 SECOND = 1_000_000_000
 
@@ -84,3 +85,18 @@ def test_a_gap_of_rows_is_told() -> None:
     spread = spread_seconds(stamps, "log.csv", report)
     assert (np.diff(spread) > 0).all()
     assert any("1 seconds hold more or fewer than 10 samples" in d for d in report.damage)
+
+
+@pytest.mark.parametrize("epoch", ["0001-01-01", "1601-01-01", "1899-12-31T23:59:59", "2101-01-01", "9999-12-31"])
+def test_an_epoch_with_which_stamps_would_not_fit_is_refused(epoch: str) -> None:
+    with pytest.raises(LogError, match=r"a\.csv: epoch = .* expected a date of the years 1900 to 2100"):
+        epoch_ns(SourceOptions(epoch=epoch), "a.csv")
+
+
+@pytest.mark.parametrize("epoch", ["1900-01-01", "2100-12-31T23:59:59"])
+@pytest.mark.parametrize("unit", ["s", "ms", "us", "ns", "dc", "dc32"])
+def test_stamps_at_the_ends_of_the_range_fit(epoch: str, unit: str) -> None:
+    zero = epoch_ns(SourceOptions(epoch=epoch), "a.csv")
+    found = TimeBase(unit, zero, "t", Report()).stamps(np.array([-(2**62), 0, 2**62, 2**63 - 1, 1]))
+    assert found[1] == zero
+    assert (np.abs((found[found != MISSING] - zero).astype(np.float64)) <= 2.0**62).all()

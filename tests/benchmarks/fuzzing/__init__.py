@@ -1,0 +1,1 @@
+"""Mutators of `tests/benchmarks/fuzz.py`, one module for each format."""
