@@ -132,6 +132,17 @@ def test_an_audit(made: mfhca.MadeLog, result: mfhca.Diagnosis, tmp_path: Path) 
     assert (again.skipped, len(again.missions)) == (1, 1)
 
 
+def test_an_audit_in_another_working_folder(
+    made: mfhca.MadeLog, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for name in ("monday", "tuesday"):
+        place = tmp_path / name
+        (place / "logs").mkdir(parents=True)
+        (place / "logs" / f"{name}.mcap").write_bytes(made.log.read_bytes())
+        monkeypatch.chdir(place)
+        assert mfhca.audit("logs", "out", jobs=1).missions["state"].to_dict() == {name: "ok"}
+
+
 def test_an_audit_of_nothing(tmp_path: Path) -> None:
     with pytest.raises(mfhca.LogError, match=r"no mission was found; .*no: no such file"):
         mfhca.audit(tmp_path / "no", tmp_path / "out")
