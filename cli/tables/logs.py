@@ -36,8 +36,8 @@ def _line(file: FileRow, files: Sequence[FileRow]) -> Text:
 
 
 def _clock(clock: ClockRow | None) -> str:
-    if clock is None:
-        return ""
+    if clock is None:  # of the file that the others were put onto
+        return "its clock is the mission's"
     method, offset = clock["method"], clock["offset_s"]
     if method == "reference":
         return "its clock is the mission's"

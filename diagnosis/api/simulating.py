@@ -63,6 +63,7 @@ def simulate(
     scenario: Scenario | None = None,
     faults: Sequence[str] = (),
     seed: int = 1,
+    start_ns: int | None = None,
     duration_s: float = 240.0,
     rate_hz: float | None = None,
     evidence: EvidenceLevel = "direct",
@@ -89,6 +90,8 @@ def simulate(
         seconds: ``"FR sensor stuck 30 45"``.
     seed : int
         The same seed gives the same mission.
+    start_ns : int or None
+        When the mission begins [ns since 1970]; None: on a day in October 2025.
     duration_s : float
         Length of the mission [s].
     rate_hz : float or None
@@ -126,6 +129,7 @@ def simulate(
         scenario=scenario,
         preset=preset,
         seed=seed,
+        start_ns=start_ns,
         duration_s=duration_s,
         rate_hz=rate_hz,
         evidence=evidence,
