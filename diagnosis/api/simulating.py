@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import astuple, dataclass, fields
-from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
@@ -67,7 +66,7 @@ def simulate(
     scenario: Scenario | None = None,
     faults: Sequence[str] = (),
     seed: int = 1,
-    start: datetime | None = None,
+    start_ns: int | None = None,
     duration_s: float = 240.0,
     rate_hz: float | None = None,
     evidence: EvidenceLevel = "direct",
@@ -94,8 +93,8 @@ def simulate(
         seconds: ``"FR sensor stuck 30 45"``.
     seed : int
         The same seed gives the same mission.
-    start : datetime or None
-        When the mission begins, UTC without an offset; None: 2025-10-09 08:53:20.
+    start_ns : int or None
+        When the mission begins [ns since 1970]; None: on a day in October 2025.
     duration_s : float
         Length of the mission [s].
     rate_hz : float or None
@@ -133,7 +132,7 @@ def simulate(
         scenario=scenario,
         preset=preset,
         seed=seed,
-        start_ns=None if start is None else _nanoseconds(start),
+        start_ns=start_ns,
         duration_s=duration_s,
         rate_hz=rate_hz,
         evidence=evidence,
@@ -188,14 +187,6 @@ def write_simulation(request: SimulateRequest, progress: Subscriber = silent) ->
     write_mission(mission, log, "ros1" if kind is LogFormat.BAG else kind.value)
     write_truth(mission.truth, truth)
     return MadeLog(log, truth, kind.value, mission.truth, _notes(log, options, mission)), mission
-
-
-def _nanoseconds(moment: datetime) -> int:
-    """Nanoseconds since 1970; UTC where the moment states no offset; a `ConfigError` where no log has such a date."""
-    aware = moment if moment.tzinfo is not None else moment.replace(tzinfo=UTC)
-    if not 1970 <= aware.astimezone(UTC).year < 2100:
-        raise ConfigError(f"start {moment}: is out of range; expected 1970 to 2099")
-    return (aware - datetime.fromtimestamp(0, UTC)) // timedelta(microseconds=1) * 1000
 
 
 def _notes(log: Path, options: SimulationOptions, mission: SimulatedMission) -> tuple[str, ...]:

@@ -18,7 +18,7 @@ from diagnosis.response.inputs import FollowerData, cell_of, cells
 from diagnosis.response.joint import cut, joint_of
 from diagnosis.response.jumps import jumps_of
 from diagnosis.response.kernel import posterior
-from diagnosis.response.machine import Judged, lasting_losses, otherwise, standstills, unlike
+from diagnosis.response.machine import Judged, lasting_losses, otherwise, standstills, unexplained, unlike
 from diagnosis.response.models import (
     BLOCK_S,
     HEALTHY,
@@ -97,7 +97,7 @@ def assess_response(
         left_out[start:stop] = True
     found = _wheels(data, left_out, (cell, width), limits, dt)
     if not found:
-        return Judgement({}, standstills(idle, dt))
+        return Judgement({}, standstills(idle, dt) or unexplained(drives, limits, dt))
     holds = {w: holds_of(j.wheel.samples, _MOVES * limits.driving_speed, dt) for w, j in found.items()}
     found = {w: j._replace(wheel=j.wheel._replace(habit=_habit(w, holds))) for w, j in found.items()}
     bodies = Bodies(speeds, None if yaw is None else cells(yaw, width), width * dt)

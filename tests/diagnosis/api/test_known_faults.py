@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from datetime import UTC, datetime, timedelta, timezone
 from pathlib import Path
 from typing import Any
 
@@ -36,21 +35,12 @@ def test_a_simulated_log_is_that_of_the_command_line(tmp_path: Path) -> None:
         ({"faults": ["FR sensor stuck 1"]}, "expected PART SIDE MODE START STOP"),
         ({"evidence": "all"}, "evidence = 'all' is not known"),
         ({"duration_s": -1}, "duration_s = -1 s is out of range"),
-        ({"start": datetime(1960, 1, 1, tzinfo=UTC)}, "start 1960-01-01 .* is out of range"),
     ],
 )
 def test_simulations_that_cannot_be(tmp_path: Path, options: dict[str, Any], words: str) -> None:
     with pytest.raises(mfhca.ConfigError, match=words):
         mfhca.simulate(tmp_path / "a.mcap", **options)
     assert list(tmp_path.iterdir()) == []
-
-
-def test_when_a_mission_begins(tmp_path: Path) -> None:
-    summer = timezone(timedelta(hours=2))
-    made = mfhca.simulate(tmp_path / "a.mcap", duration_s=1, start=datetime(2026, 10, 5, 9, 30, tzinfo=summer))
-    assert made.truth.start_ns == 1_791_185_400_000_000_000
-    naive = mfhca.simulate(tmp_path / "b.mcap", duration_s=1, start=datetime(2026, 10, 5, 7, 30))
-    assert naive.truth.start_ns == made.truth.start_ns
 
 
 def test_injected_faults(made: mfhca.MadeLog, tmp_path: Path) -> None:
