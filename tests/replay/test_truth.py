@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from diagnosis.api.saved_results import is_truth
+from diagnosis.api.truths import is_truth
 from replay.errors import ConfigError
 from replay.truth import MissionTruth, read_truth, write_truth
 
