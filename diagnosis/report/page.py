@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from diagnosis.decision.wording import join_words
 from diagnosis.pages import labels
 from diagnosis.pages.environment import SHARED, asset, environment, shared_style
-from diagnosis.pages.scripts import packed_plotly, script_policy
+from diagnosis.pages.scripts import packed, packed_plotly, script_policy
 from diagnosis.pages.svg import icon
 from diagnosis.report import tables
 from diagnosis.report.compared_channels import pair_of
@@ -45,8 +45,10 @@ from diagnosis.results.result import Closeups
 from replay.faults import FaultMode
 
 _ASSETS = Path(__file__).parent / "assets"
-_STYLES = (_ASSETS / "evidence.css", _ASSETS / "explorer.css", _ASSETS / "print.css")
+_STYLES = (_ASSETS / "evidence.css", _ASSETS / "explorer.css", _ASSETS / "reading.css", _ASSETS / "print.css")
 _SCRIPTS = tuple(_ASSETS / name for name in ("data.js", "plot.js", "export.js", "explorer.js", "page.js"))
+#: Scripts that a page holds packed, and expands when its first plot is drawn.
+_LATER = tuple(_ASSETS / name for name in ("reading.js", "pictures.js"))
 _LISTED, _THUMBNAILS, _DETAILED = 5000, 300, 120
 
 
@@ -104,22 +106,24 @@ def build_page(
     series = _series(report, columns, closeups)
     duration = _duration(report, series.axis)
     plots = len(series.filled) > 1
-    plotly, packed, version = packed_plotly(plotlyjs) if plots else ("", "", "none, no plots")
+    plotly, bundle, version = packed_plotly(plotlyjs) if plots else ("", "", "none, no plots")
+    later = "\n".join(asset(path) for path in _LATER)
     evidence = evidence_of(report, series.shown, series.place, series.axis.per, detailed, series.closeups)
     drawn = sum(len(p.picture) for e in evidence.values() for p in (*e.edges, *e.course))
     words = 400_000 + 6_000 * len(detailed) + 1_500 * len(report["intervals"]) + len(intervals)
-    budget = max(int(max_size_mb * 1e6) - len(packed) - words - drawn, 200_000)
+    budget = max(int(max_size_mb * 1e6) - len(bundle) - words - drawn, 200_000)
     context = {
         **tables.context(report, duration),
         **_pictures(report, detailed, series, duration),
         **_plots(report, detailed, series, duration, budget),
-        **_scripts([plotly] if plots else []),
+        **_scripts([plotly, later] if plots else []),
+        "later": packed(later.encode()) if plots else "",
         "previous": previous_section(report),
         "evidence": evidence,
         "unlisted": len(whole["intervals"]) - len(report["intervals"]),
         "has_plots": plots,
         "empty": [k for k in series.all if k not in series.filled],
-        "plotly": packed,
+        "plotly": bundle,
         "plotly_version": version,
     }
     context["blocks"].append(("intervals", intervals))
