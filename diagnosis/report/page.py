@@ -29,6 +29,7 @@ from diagnosis.report import tables
 from diagnosis.report.compared_channels import pair_of
 from diagnosis.report.driven_path import driven_path
 from diagnosis.report.evidence import evidence_of
+from diagnosis.report.healthy_lanes import healthy_lanes
 from diagnosis.report.machine_picture import machine_picture
 from diagnosis.report.path_picture import path_picture
 from diagnosis.report.plot_data import Axis, axis_of, blocks_of, channels_of, figures_of, packed_intervals, view, worst
@@ -48,7 +49,7 @@ _ASSETS = Path(__file__).parent / "assets"
 _STYLES = (_ASSETS / "evidence.css", _ASSETS / "explorer.css", _ASSETS / "reading.css", _ASSETS / "print.css")
 _SCRIPTS = tuple(_ASSETS / name for name in ("data.js", "plot.js", "export.js", "explorer.js", "page.js"))
 #: Scripts that a page holds packed, and expands when its first plot is drawn.
-_LATER = tuple(_ASSETS / name for name in ("reading.js", "pictures.js"))
+_LATER = tuple(_ASSETS / name for name in ("reading.js", "pictures.js", "lanes.js"))
 _LISTED, _THUMBNAILS, _DETAILED = 5000, 300, 120
 
 
@@ -152,6 +153,7 @@ def _pictures(
     return {
         "shown": {"parts": shown_parts(report), "lanes": shown_lanes(report, duration), "heads": HEADS},
         "timeline": timeline(report, duration, {f["id"] for f in detailed}),
+        "lane_details": healthy_lanes(report),
         "picture": machine_picture(report),
         "path": Markup("")
         if path.x is None or path.y is None

@@ -157,11 +157,11 @@ const Data = (() => {
     return { x, y, exact, stride: Math.max(per, Math.round(width * per)), stored: per };
   }
 
-  // Every value of a channel over [t0, t1], or the middle of the extremes of each block.
-  async function samples(c, t0, t1) {
+  // Every value of a channel over [t0, t1], or of each block the middle of its extremes, or that of the larger size.
+  async function samples(c, t0, t1, largest) {
     const { step, base } = view.channels[c], [a, b] = range(t0, t1), s = await segment(c, covering(c, a, b)), value = (v) => (v ? (base + v) * step : NaN);
     const i0 = Math.max(0, Math.floor((a - s.start) / s.stride)), i1 = Math.min(s.count, Math.ceil((b - s.start) / s.stride)), y = new Float64Array(Math.max(0, i1 - i0));
-    for (let i = i0; i < i1; i++) y[i - i0] = s.stride === 1 ? value(s.q[i]) : (value(s.low[i]) + value(s.high[i])) / 2;
+    for (let i = i0; i < i1; i++) y[i - i0] = s.stride === 1 ? value(s.q[i]) : largest ? (Math.abs(value(s.low[i])) > Math.abs(value(s.high[i])) ? value(s.low[i]) : value(s.high[i])) : (value(s.low[i]) + value(s.high[i])) / 2;
     return { y, t: view.t0 + (s.start + i0 * s.stride) * view.dt, dt: s.stride * view.dt, stride: s.stride };
   }
 

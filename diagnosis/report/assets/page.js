@@ -38,6 +38,14 @@
   });
   const figures = { evidence, loop, signals: explorer?.figure };
 
+  // Lanes without a fault, opened: drawn when asked for.
+  one("#timeline")?.addEventListener("toggle", (e) => {
+    const key = e.target.dataset.part;
+    if (!key || !e.target.open || figures[key] || !view.n) return;
+    const element = e.target.querySelector(".lane-figure"), figure = figures[key] = new Figure(element);
+    Data.later().then(() => Lanes.draw(figure, key, e.target.querySelector(".near"))).catch((wrong) => { element.textContent = `The plots cannot be drawn: ${wrong.message}`; throw wrong; });
+  }, true);
+
   // How the rows of a fault's figure are looked at: as they are, one row for every part, residuals as multiples of thresholds.
   const looks = { peers: "", ratio: false };
   function looked(f) {
@@ -175,6 +183,8 @@
     const at = document.activeElement;
     if (explorer?.active && one("#signals").contains(at)) return explorer.figure;
     if (loop?.drawn && one("#loop").contains(at)) return loop;
+    const lane = at?.closest(".more")?.dataset.part;
+    if (figures[lane]?.drawn) return figures[lane];
     return evidence?.drawn && !one("#figure").hidden ? evidence : explorer?.active ? explorer.figure : loop?.drawn ? loop : null;
   }
 
@@ -202,7 +212,7 @@
     root.dispatchEvent(new Event("theme"));
   }
 
-  const redraw = () => Promise.all([evidence?.redraw(), loop?.redraw(), explorer?.active && explorer.figure.redraw()]);
+  const redraw = () => Promise.all(Object.entries(figures).map(([name, f]) => (name !== "signals" || explorer?.active) && f?.redraw()));
   const fileName = (of) => ({ evidence: current, loop: `loop-${loopKey}`, signals: "signals" })[of];
 
   const actions = {
