@@ -91,8 +91,22 @@
   let pictures = null;
   root.addEventListener("now", () => {
     for (const f of Object.values(figures)) if (f?.drawn) f.read().show();
-    Data.later().then(() => (pictures ??= new Pictures(document)).show());
+    if (Now.playing && evidence?.drawn && (Now.t < evidence.range[0] || Now.t > evidence.range[1])) evidence.pan((Now.t - evidence.range[0]) / (evidence.range[1] - evidence.range[0]));
+    Data.later().then(() => { (pictures ??= new Pictures(document)).show(); return replay?.show(); });
   });
+
+  // Machine, path and plots on one stage, set up when it is first played or scrubbed.
+  let replay = null, staged = null;
+  const stage = () => (staged ??= Data.later().then(() => {
+    replay = new Replay(one);
+    pictures?.remove();
+    pictures = new Pictures(document);
+    figures.stage = replay.figure;
+    replay.open().catch(failed("#events-none"));
+  }));
+  const play = () => one("#replay") && stage().then(() => replay.play());
+  one("#scrub")?.addEventListener("input", (e) => { Now.set(+e.target.value, { held: true }); stage(); });
+  one("#events")?.addEventListener("click", (e) => { const b = e.target.closest("button"); if (b) Now.set(+b.dataset.at, { held: true }); });
   // The cursor may as well be led along the timeline.
   one("#timeline")?.addEventListener("pointermove", (e) => {
     const box = e.target.closest(".track")?.getBoundingClientRect();
@@ -220,7 +234,7 @@
     csv: ({ dataset: { of } }) => figures[of].rows.length && figures[of].csv().then((text) => Export.save(`${fileName(of)}.csv`, "text/csv", text)),
     image: ({ dataset: { of, form } }) => figures[of].drawn && Export.image(figures[of], fileName(of), form),
     ratio: (b) => look({ ratio: !looks.ratio }, b),
-    robust,
+    robust, play,
     taller: () => active()?.stretch(2),
     json: () => Export.json(current),
     table: () => Export.table(),
@@ -253,6 +267,7 @@
       "+": () => active()?.scale(0.5), "=": () => active()?.scale(0.5), "-": () => active()?.scale(2),
       ",": () => cursor(-1), ".": () => cursor(1), "<": () => cursor(-10), ">": () => cursor(10), a: () => mark("a"), b: () => mark("b"),
       Escape: () => Now.set(null, { a: null, b: null, held: false }), y: robust, z: () => active()?.stretch(2), Z: () => active()?.stretch(0.5),
+      p: play,
       g: () => { go("#evidence"); one("#figure")?.focus({ preventScroll: true }); },
       s: () => one("#find")?.focus(), t: actions.theme, "?": actions.help,
     }[e.key];

@@ -3,7 +3,7 @@
 class Pictures {
   constructor(root) {
     Object.assign(this, { root, last: null, machines: [...root.querySelectorAll("svg.machine")], maps: [...root.querySelectorAll("svg.map")] });
-    this.lines = [...root.querySelectorAll("#timeline .track, .clock .track")].map((track) => {
+    this.lines = [...root.querySelectorAll("#timeline .track")].map((track) => {
       const line = document.createElement("i");
       line.className = "now";
       track.append(line);
@@ -13,6 +13,8 @@ class Pictures {
     for (const map of this.maps) map.append(map.here = Pictures.svg("circle", { r: 6, class: "here" }));
     this.wheels = this.machines.flatMap((m) => [...m.querySelectorAll("[data-c]")]).map((g) => this.wheel(g));
   }
+
+  remove() { for (const e of [...this.lines, ...this.maps.map((m) => m.here), ...this.wheels.map((w) => w.live)]) e.remove(); }
 
   static svg(name, attributes) {
     const e = document.createElementNS("http://www.w3.org/2000/svg", name);
