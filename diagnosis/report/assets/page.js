@@ -34,6 +34,7 @@
     if (!current || !evidence?.drawn) shared = range;
     follow(evidence?.drawn && !one("#figure").hidden && evidence, range);
     if (!current) follow(loop?.drawn && loop, range, "#loop-linked");
+    explorer?.across();
     remember();
   });
   const figures = { evidence, loop, signals: explorer?.figure };
@@ -123,6 +124,7 @@
     const parts = current ? [`fault=${encodeURIComponent(current)}`] : [];
     if (shared) parts.push(`t=${shared.map((v) => v.toFixed(4)).join(",")}`);
     if (explorer?.plots.length) parts.push(`plots=${explorer.plots.map((p) => p.map(encodeURIComponent).join(",")).join(";")}`);
+    if (explorer?.plots.length && explorer.view !== "time") parts.push(`view=${explorer.view}`);
     const address = `#${parts.join("&")}`;
     if (!parts.length || address === location.hash) return;
     try { history[step ? "pushState" : "replaceState"](null, "", address); } catch { /* browsers limit how often; the next change tells */ }
@@ -226,7 +228,7 @@
     root.dispatchEvent(new Event("theme"));
   }
 
-  const redraw = () => Promise.all(Object.entries(figures).map(([name, f]) => (name !== "signals" || explorer?.active) && f?.redraw()));
+  const redraw = () => Promise.all(Object.entries(figures).map(([name, f]) => (name !== "signals" || explorer?.active) && f?.redraw()).concat(explorer?.across()));
   const fileName = (of) => ({ evidence: current, loop: `loop-${loopKey}`, signals: "signals" })[of];
 
   const actions = {
@@ -239,7 +241,7 @@
     json: () => Export.json(current),
     table: () => Export.table(),
     copy: (b) => Export.copy(articleOf(current), b),
-    add: () => explorer.add(one("#columns").value),
+    add: (b) => explorer.add(b.dataset.how),
     "signals-clear": () => { explorer.set([]); one("#find").focus(); },
     "loop-all": () => { one("#loop-linked").checked = false; loop.zoom([0, view.duration]); },
     theme: () => setTheme(root.dataset.theme === "dark" ? "light" : "dark"),
@@ -283,8 +285,9 @@
     if (faults.has(id)) select(id, { range, scroll });
     else if (!current && faults.size) select(faults.keys().next().value, { range });
     else if (!faults.size && range) shared = range;
+    if (explorer && plots) one("#signals-view").value = ["xy", "spectrum"].find((v) => v === read("view")) ?? "time";
     if (explorer && (plots || faults.has(id)) && JSON.stringify(wanted) !== JSON.stringify(explorer.plots)) explorer.set(wanted);
-    const lacking = explorer ? [...new Set(wanted.flat())].filter((n) => !explorer.names.has(n)) : [];
+    const lacking = explorer ? [...new Set(wanted.flat())].filter((n) => !explorer.meaning(n)) : [];
     tell([
       read("fault") && !faults.has(id) ? `There is no fault ${cut(id || read("fault"))} in this report${current ? `: ${current} is shown` : ""}.` : "",
       read("t") && !range ? `“${cut(plain(read("t")) || read("t"))}” is not a time: expected t=seconds or t=from,to.` : "",
