@@ -49,7 +49,9 @@ _ASSETS = Path(__file__).parent / "assets"
 _STYLES = (_ASSETS / "evidence.css", _ASSETS / "explorer.css", _ASSETS / "reading.css", _ASSETS / "print.css")
 _SCRIPTS = tuple(_ASSETS / name for name in ("data.js", "plot.js", "export.js", "explorer.js", "page.js"))
 #: Scripts that a page holds packed, and expands when its first plot is drawn.
-_LATER = tuple(_ASSETS / name for name in ("reading.js", "pictures.js", "lanes.js", "replay.js", "views.js"))
+_LATER = tuple(
+    _ASSETS / name for name in ("reading.js", "pictures.js", "lanes.js", "replay.js", "views.js", "whatif.js")
+)
 _LISTED, _THUMBNAILS, _DETAILED = 5000, 300, 120
 
 

@@ -87,6 +87,11 @@
     figure.read().show().then(() => { one("#live").textContent = figure.read().values ? figure.read().spoken() : ""; });
   }
 
+  // Sliders below the plots: made when they are first opened.
+  let panel = null;
+  const whatIf = () => Data.later().then(() => { panel ??= new WhatIfPanel(one); figures.whatif = panel.figure; return panel.open(faults.get(current)); }).catch(failed("#whatif-words"));
+  one("#whatif")?.addEventListener("toggle", (e) => e.target.open && current && panel?.f?.id !== current && whatIf());
+
   const mark = (name) => Now.t !== null && Now.set(Now.t, { [name]: Now.t });
 
   let pictures = null;
@@ -172,7 +177,8 @@
     remember(stepped && before && before !== id);
     if (!evidence) return;
     const rows = view.figures[f.rows];
-    articleOf(id).querySelector(".slot").append(one("#looks"), one("#figure"));
+    articleOf(id).querySelector(".slot").append(one("#looks"), one("#figure"), one("#whatif"));
+    if (one("#whatif").open) whatIf();
     one("#looks").hidden = !rows.length;
     one("#figure").hidden = !rows.length;
     for (const b of all("[data-of=evidence], [data-zoom]")) b.disabled = !rows.length;
@@ -260,7 +266,7 @@
   });
 
   document.addEventListener("keydown", (e) => {
-    if (e.ctrlKey || e.metaKey || e.altKey || document.querySelector("dialog[open]") || e.target.matches("input:not([type=checkbox]), select, textarea")) return;
+    if (e.ctrlKey || e.metaKey || e.altKey || document.querySelector("dialog[open]") || e.target.matches("input:not([type=checkbox], [type=range]), select, textarea") || (e.target.matches("[type=range]") && /^(Arrow|Home|End|Page)/.test(e.key))) return;
     if ((e.key === "Enter" || e.key === " ") && e.target.matches("g[data-f]")) { e.preventDefault(); select(e.target.dataset.f, { scroll: true, step: true }); return; }
     if (e.key.startsWith("Arrow") && e.target.closest(".scroll")) return;
     const key = {
@@ -269,7 +275,7 @@
       "+": () => active()?.scale(0.5), "=": () => active()?.scale(0.5), "-": () => active()?.scale(2),
       ",": () => cursor(-1), ".": () => cursor(1), "<": () => cursor(-10), ">": () => cursor(10), a: () => mark("a"), b: () => mark("b"),
       Escape: () => Now.set(null, { a: null, b: null, held: false }), y: robust, z: () => active()?.stretch(2), Z: () => active()?.stretch(0.5),
-      p: play,
+      p: play, w: () => { const e = one("#whatif"); if (e) { e.open = true; go("#whatif"); one("#whatif-mode").focus({ preventScroll: true }); } },
       g: () => { go("#evidence"); one("#figure")?.focus({ preventScroll: true }); },
       s: () => one("#find")?.focus(), t: actions.theme, "?": actions.help,
     }[e.key];

@@ -25,8 +25,12 @@ class Figure {
     return [v, v];
   }
 
-  // A curve made from others: difference, ratio, or change per second.
+  // A curve made from others: values worked out on the page, a difference, a ratio, or the change per second.
   static async computed(t, t0, t1) {
+    if (t.op === "given") {
+      const { y, t: from, dt } = t.data, i = Math.min(y.length, Math.max(0, Math.floor((t0 - from) / dt + 1e-6) - 1)), j = Math.max(i, Math.min(y.length, Math.ceil((t1 - from) / dt) + 2));
+      return { ...t.data, y: y.slice(i, j).map((v) => v * t.k), t: from + i * dt };
+    }
     const a = await Data.samples(t.c, t0, t1), b = t.other === undefined ? null : await Data.samples(t.other, t0, t1), n = a.y.length, y = new Float64Array(n);
     const other = (i) => b.y[Math.min(b.y.length - 1, Math.max(0, Math.round((a.t + i * a.dt - b.t) / b.dt)))];
     for (let i = 0; i < n; i++) y[i] = t.k * (t.op === "over" ? a.y[i] / other(i) : t.op === "minus" ? a.y[i] - other(i) : (a.y[Math.min(n - 1, i + 1)] - a.y[Math.max(0, i - 1)]) / (a.dt * (Math.min(n - 1, i + 1) - Math.max(0, i - 1))));
