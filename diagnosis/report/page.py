@@ -47,8 +47,10 @@ from replay.faults import FaultMode
 
 _ASSETS = Path(__file__).parent / "assets"
 _STYLES = (_ASSETS / "evidence.css", _ASSETS / "explorer.css", _ASSETS / "reading.css", _ASSETS / "print.css")
-_SCRIPTS = tuple(_ASSETS / name for name in ("data.js", "plot.js", "export.js", "explorer.js", "page.js"))
-#: Scripts that a page holds packed, and expands when its first plot is drawn.
+_FIRST = _ASSETS / "data.js"
+#: Scripts that a page holds packed, and expands when it is opened.
+_MAIN = tuple(_ASSETS / name for name in ("plot.js", "export.js", "explorer.js", "page.js"))
+#: Scripts that it expands when its first plot is drawn.
 _LATER = tuple(
     _ASSETS / name for name in ("reading.js", "pictures.js", "lanes.js", "replay.js", "views.js", "whatif.js")
 )
@@ -110,7 +112,7 @@ def build_page(
     duration = _duration(report, series.axis)
     plots = len(series.filled) > 1
     plotly, bundle, version = packed_plotly(plotlyjs) if plots else ("", "", "none, no plots")
-    later = "\n".join(asset(path) for path in _LATER)
+    main, later = ("\n".join(asset(path) for path in paths) for paths in (_MAIN, _LATER))
     evidence = evidence_of(report, series.shown, series.place, series.axis.per, detailed, series.closeups)
     drawn = sum(len(p.picture) for e in evidence.values() for p in (*e.edges, *e.course))
     words = 400_000 + 6_000 * len(detailed) + 1_500 * len(report["intervals"]) + len(intervals)
@@ -119,7 +121,8 @@ def build_page(
         **tables.context(report, duration),
         **_pictures(report, detailed, series, duration),
         **_plots(report, detailed, series, duration, budget),
-        **_scripts([plotly, later] if plots else []),
+        **_scripts([main, plotly, later] if plots else [main]),
+        "main": packed(main.encode()),
         "later": packed(later.encode()) if plots else "",
         "previous": previous_section(report),
         "evidence": evidence,
@@ -184,14 +187,14 @@ def _plots(
     }
 
 
-def _scripts(plotly: Sequence[str]) -> tables.Context:
-    """Style, scripts, and the policy that admits these scripts and the bundle of plotly.js."""
-    head, scripts = asset(SHARED / "theme.js"), [asset(path) for path in _SCRIPTS]
+def _scripts(expanded: Sequence[str]) -> tables.Context:
+    """Style, scripts, and the policy that admits these scripts and those that the page expands."""
+    head, scripts = asset(SHARED / "theme.js"), [asset(_FIRST)]
     return {
         "css": Markup(shared_style() + "".join(asset(path) for path in _STYLES)),
         "head": Markup(head),
         "scripts": [Markup(s) for s in scripts],
-        "csp": script_policy([head, *scripts, *plotly]),
+        "csp": script_policy([head, *scripts, *expanded]),
     }
 
 

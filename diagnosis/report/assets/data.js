@@ -249,7 +249,7 @@ const Data = (() => {
     return reading;
   }
 
-  return { view, full, curve, samples, at, thinned, csv, plotly, later, intervals, guard, fromBase64 };
+  return { view, full, curve, samples, at, thinned, csv, plotly, later, expanded, intervals, guard, fromBase64 };
 })();
 
 // One time for the whole page, and two markers.
@@ -257,6 +257,7 @@ const Now = {
   t: null, a: null, b: null, asked: false,
   set(t, more) {
     const { t0, dt, n } = Data.view;
+    if (!n) return; // without time series there is no time to show
     Object.assign(this, more);
     this.t = t === null ? null : t0 + dt * Math.min(n - 1, Math.max(0, Math.round((t - t0) / dt)));
     if (this.asked) return;
@@ -266,3 +267,6 @@ const Now = {
   leave() { if (this.t !== null && this.a === null && !this.held) this.set(null); },
   number: (v) => (Number.isFinite(v) ? `${+v.toPrecision(4)}`.replace("-", "−") : "–"),
 };
+
+// All else that the page does; where the browser cannot expand it, the page is as without scripts.
+Data.expanded("main").catch(() => document.documentElement.classList.remove("js"));
