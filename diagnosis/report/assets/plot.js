@@ -307,7 +307,7 @@ class Figure {
         const r = e["xaxis.range"] || ("xaxis.range[0]" in e ? [e["xaxis.range[0]"], e["xaxis.range[1]"]] : null);
         if (r && !this.busy) this.zoom(r.map(Number));
       });
-      this.element.on("plotly_doubleclick", () => this.zoom([0, Data.view.duration]));
+      this.element.on("plotly_doubleclick", () => { Now.set(Now.t, { a: null }); this.zoom([0, Data.view.duration]); });
     }
     this.onRange?.(this.range);
   }
