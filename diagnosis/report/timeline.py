@@ -170,7 +170,9 @@ def timeline(report: ReportDocument, duration: float, bars: Collection[str] | No
         Names of the faults that get a bar of their own, the others are part of their lane's line; None: all.
     """
     faults, machine_words = report["intervals"], words_of(report["machine"])
-    brief = {key for key, side in sides_of(report).items() if not side.assessed}
+    sides = sides_of(report)
+    brief = {key for key, side in sides.items() if not side.assessed}
+    seen = {key for key, side in sides.items() if side.long_enough}
     cause = causes([f for f in faults if bars is None or f["id"] in bars])
     lanes: list[Lane] = []
     quiet: list[Lane] = []
@@ -185,7 +187,7 @@ def timeline(report: ReportDocument, duration: float, bars: Collection[str] | No
         state = _main_state(spans)
         words = "healthy" if state == State.HEALTHY else f"{state_label(state).lower()} throughout"
         if state == State.HEALTHY and (c, side) in brief:
-            state, words = State.NOT_ASSESSED, "not judged long enough"
+            state, words = State.NOT_ASSESSED, "not cleared" if (c, side) in seen else "not judged long enough"
         counts[words] = counts.get(words, 0) + 1
         name = machine_words.part_name(kind, side)
         group.append(Lane(c, name, state, _lines(spans, side, duration), (), "", first, side))
