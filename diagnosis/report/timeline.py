@@ -60,6 +60,7 @@ class Lane:
     bars: tuple[Bar, ...]
     faulty: str
     first: bool = False
+    side: str = ""
 
 
 @dataclass(frozen=True)
@@ -188,7 +189,8 @@ def timeline(report: ReportDocument, duration: float, bars: Collection[str] | No
         if state == State.HEALTHY and (c, side) in brief:
             state, words = State.NOT_ASSESSED, "not cleared" if (c, side) in seen else "not judged long enough"
         counts[words] = counts.get(words, 0) + 1
-        group.append(Lane(c, machine_words.part_name(kind, side), state, _lines(spans, side, duration), (), "", first))
+        name = machine_words.part_name(kind, side)
+        group.append(Lane(c, name, state, _lines(spans, side, duration), (), "", first, side))
     summary = f"{len(quiet)} lane{'s' * (len(quiet) != 1)} without a fault: " + ", ".join(
         f"{n} {words}" for words, n in counts.items()
     )
@@ -230,7 +232,7 @@ def _faulty_lane(
     words = f"{share:.1f} %" if share >= 0.05 else span(total)
     first_fault = faults[0]
     name = machine_words.part_name(first_fault["kind"], side)
-    return Lane(component, name, first_fault["mode"], _lines(spans, side, duration), drawn, words, first)
+    return Lane(component, name, first_fault["mode"], _lines(spans, side, duration), drawn, words, first, side)
 
 
 def _phases(phases: Sequence[PhaseRow], duration: float) -> tuple[Bar, ...]:
