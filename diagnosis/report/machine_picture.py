@@ -103,12 +103,14 @@ def _rows(wheels: Sequence[str], geometry: Mapping[str, WheelPlace]) -> list[lis
     return [sorted(r, key=lambda w: -geometry[w]["y"]) for r in rows]
 
 
-def _hit(c: Condition, shapes: Markup) -> Markup:
+def _hit(name: str, c: Condition, shapes: Markup) -> Markup:
     if not c.fault:
-        return Markup('<g role="img" aria-label="{}"><title>{}</title>{}</g>').format(c.title, c.title, shapes)
+        return Markup('<g data-c="{}" role="img" aria-label="{}"><title>{}</title>{}</g>').format(
+            name, c.title, c.title, shapes
+        )
     return Markup(
-        '<g class="hit" data-f="{}" data-scroll role="button" tabindex="0" aria-label="{}"><title>{}</title>{}</g>'
-    ).format(c.fault, c.title, c.title, shapes)
+        '<g class="hit" data-c="{}" data-f="{}" data-scroll role="button" tabindex="0" aria-label="{}"><title>{}</title>{}</g>'
+    ).format(name, c.fault, c.title, c.title, shapes)
 
 
 def _short(words: str, length: int) -> str:
@@ -195,7 +197,7 @@ def _wheel(name: str, x: float, y: float, outward: int, part: str, c: Condition)
             line,
             style + (" b" if bold else ""),
         )
-    return _hit(c, shapes)
+    return _hit(name, c, shapes)
 
 
 def _axle(name: str, x: float, y: float, c: Condition) -> Markup:
@@ -203,4 +205,4 @@ def _axle(name: str, x: float, y: float, c: Condition) -> Markup:
         c.state, x - 36, y - 20
     )
     shapes += text(x, y - 6, _short(name, 10), "name small") + badge(c.state, x, y + 9, 17)
-    return _hit(c, shapes)
+    return _hit(name, c, shapes)

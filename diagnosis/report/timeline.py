@@ -74,6 +74,7 @@ class Lane:
     bars: tuple[Bar, ...]
     faulty: str
     first: bool = False
+    side: str = ""
 
 
 @dataclass(frozen=True)
@@ -227,7 +228,8 @@ def timeline(report: ReportDocument, duration: float, bars: Collection[str] | No
         if state == State.HEALTHY and (c, side) in brief:
             state, words = State.NOT_ASSESSED, "not cleared" if (c, side) in seen else "not judged long enough"
         counts[words] = counts.get(words, 0) + 1
-        group.append(Lane(c, machine_words.part_name(kind, side), state, _lines(spans, side, duration), (), "", first))
+        name = machine_words.part_name(kind, side)
+        group.append(Lane(c, name, state, _lines(spans, side, duration), (), "", first, side))
     summary = f"{len(quiet)} lane{'s' * (len(quiet) != 1)} without a fault: " + ", ".join(
         f"{n} {words}" for words, n in counts.items()
     )
@@ -269,8 +271,8 @@ def _faulty_lane(
     share = 100 * total / duration if duration > 0 else 0.0
     words = f"{share:.1f} %" if share >= 0.05 else span(total)
     name = machine_words.part_name(faults[0]["kind"], side)
-    painting = next((f["mode"] for f in faults if f["severity"] != Severity.INFO), None)
-    return Lane(component, name, painting or _main_state(spans), _lines(spans, side, duration), drawn, words, first)
+    painting = next((f["mode"] for f in faults if f["severity"] != Severity.INFO), None) or _main_state(spans)
+    return Lane(component, name, painting, _lines(spans, side, duration), drawn, words, first, side)
 
 
 def _phases(phases: Sequence[PhaseRow], duration: float) -> tuple[Bar, ...]:
