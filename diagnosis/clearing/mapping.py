@@ -130,12 +130,10 @@ def _ratio(y: Array, x: Array) -> float:
 
 def _factor(ratio: float, gear: float) -> str:
     """A factor in words: a known one, that of the gear, or one that no loop stays behind by; empty for any other."""
-    gears = (
-        (gear, f"{gear:g} times (the motor's speed read as the wheel's?)"),
-        (1.0 / gear, f"1/{gear:g} times (the wheel's speed read as the motor's?)"),
-    )
-    known = (*_FACTORS, *(gears if gear > _GEARED else ()))
-    words = next((words for factor, words in known if abs(ratio - np.log(factor)) < _APART), "")
+    words = next((words for factor, words in _FACTORS if abs(ratio - np.log(factor)) < _APART), "")
+    if not words and gear > _GEARED and abs(abs(ratio) - np.log(gear)) < _TRACKS:
+        read = "(the motor's speed read as the wheel's?)", "(the wheel's speed read as the motor's?)"
+        words = f"{gear:g} times {read[0]}" if ratio > 0.0 else f"1/{gear:g} times {read[1]}"
     return words or (f"{np.exp(ratio):.2g} times" if abs(ratio) > _NO_LOOP else "")
 
 
