@@ -38,7 +38,7 @@ from cli.commands import replay as replay_command  # the package of that name is
 from cli.terminal.command import USAGE, App, Quiet, Verbose
 from cli.terminal.console import Terminal, discard
 from cli.terminal.interrupts import asked, check, forget, listen
-from replay.arrays.kernel_cache import drop_stale_kernels
+from replay.arrays.kernel_cache import drop_own_stale_kernels
 from replay.errors import MfhcaError
 from replay.version import __version__
 
@@ -185,8 +185,7 @@ def main() -> None:
     if not sys.warnoptions:
         warnings.simplefilter("ignore")
     listen()  # being asked to end removes unfinished files too
-    root = Path(__file__).parents[1]
-    drop_stale_kernels([root / "replay", root / "diagnosis"], root / "replay" / "__pycache__" / "kernels.json")
+    drop_own_stale_kernels()
     sys.exit(run())
 
 

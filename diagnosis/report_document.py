@@ -103,7 +103,7 @@ def report_of_mission(judged: Judged, identity: MachineRow) -> ReportDocument:
         "machine": identity,
         "readings": to_json(replay.readings),
         "verdict": _decision(judged, coverage, decided_s).row(
-            [*mapping_hints(judged.cells), *more_caveats(mission, judged.recorded.first_ns, machine)]
+            [*more_caveats(mission, judged.recorded.first_ns, machine)]
         ),
         "intervals": to_json(judged.intervals),
         "states": to_json(spans_of(found.assessments, timeline.step_ns)),
@@ -149,6 +149,7 @@ def _decision(judged: Judged, coverage: list[CoverageRow], decided_s: dict[tuple
         checks=judged.checks,
         scope=_scope(judged),
         events=judged.found.events,
+        hints=mapping_hints(judged.cells),
     )
 
 

@@ -74,6 +74,9 @@ def __getattr__(name: str) -> object:
     """Load what a name stands for, once."""
     if name not in _HOME:
         raise AttributeError(f"module 'mfhca' has no attribute {name!r}")
+    from replay.arrays.kernel_cache import drop_own_stale_kernels
+
+    drop_own_stale_kernels()
     found = globals()[name] = getattr(import_module(_HOME[name]), name)
     return found
 

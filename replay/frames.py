@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pandas as pd
+from numpy.typing import NDArray
 
 from replay.log.raw_log import Channel, RawLog
 from replay.signals.timeline import Timeline
@@ -33,17 +34,33 @@ def log_frames(log: RawLog) -> dict[str, pd.DataFrame]:
 
 
 def _frame(channels: list[Channel]) -> pd.DataFrame:
-    whole = max(channels, key=lambda c: len(c.stamps)).stamps
-    columns = {}
-    for channel in channels:
-        series = pd.Series(channel.values, index=pd.Index(channel.stamps))
-        if len(channel.stamps) != len(whole):
-            series = series[~series.index.duplicated()].reindex(whole)
-        columns[channel.field] = series.to_numpy()
-    frame = pd.DataFrame(columns, index=pd.to_datetime(whole, utc=True).rename("time"))
+    """Rows are those of the channel with most samples, and those that only other channels have."""
+    sets = list({id(c.stamps): c.stamps for c in channels}.values())
+    stamps = max(sets, key=len)
+    alike = all(s is stamps or np.array_equal(s, stamps) for s in sets)
+    if alike:
+        columns = {c.field: c.values for c in channels}
+    else:
+        keys = {id(s): _keys(s) for s in sets}
+        rows = keys[id(stamps)]
+        for other in keys.values():
+            new = other.difference(rows, sort=False)
+            rows = rows if new.empty else rows.append(new)
+        stamps = rows.get_level_values(0).to_numpy()
+        if len(rows) > len(keys[id(max(sets, key=len))]):
+            rows = rows[np.argsort(stamps, kind="stable")]
+            stamps = rows.get_level_values(0).to_numpy()
+        columns = {c.field: pd.Series(c.values, index=keys[id(c.stamps)]).reindex(rows).to_numpy() for c in channels}
+    frame = pd.DataFrame(columns, index=pd.to_datetime(stamps, utc=True).rename("time"))
     frame.attrs["units"] = {c.field: c.unit for c in channels if c.unit}
     frame.attrs["type"] = channels[0].type_name
     return frame
+
+
+def _keys(stamps: NDArray[np.int64]) -> pd.MultiIndex:
+    """Each stamp with how often it was there before: several messages may have the same."""
+    before = pd.Series(stamps).groupby(stamps).cumcount().to_numpy()
+    return pd.MultiIndex.from_arrays([stamps, before])
 
 
 def timeline_frame(timeline: Timeline) -> pd.DataFrame:

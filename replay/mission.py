@@ -6,6 +6,7 @@ import hashlib
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from fnmatch import fnmatch
+from itertools import compress
 from pathlib import Path
 
 from replay.arrays.column_store import ColumnStore
@@ -25,6 +26,9 @@ from replay.signals.signal import Signals
 from replay.signals.timeline import Timeline, align, check_overlap
 
 _BLOCK = 1 << 22
+
+
+_UNUSED = "none of its channels is a signal of this machine; it is not used"
 
 
 @dataclass(frozen=True)
@@ -47,6 +51,8 @@ class MissionFile:
         How its clock was put onto the mission's.
     left_out : bool
         Whether its signals are not used, because its clock could not be compared with the others'.
+    strange : bool
+        Whether none of its channels is a signal of the machine; beside other files it is a note.
     """
 
     path: Path
@@ -56,6 +62,7 @@ class MissionFile:
     summary: LogSummary
     clock: SourceClock | None = None
     left_out: bool = False
+    strange: bool = False
 
 
 @dataclass(frozen=True)
@@ -146,15 +153,35 @@ def read_signals(
     """
     options = [SourceOptions() if is_open_loop_table(path) else source_options(path, machine) for path in paths]
     files, logs = _read(paths, options, machine, store or ColumnStore(), progress)
+    known = [any(True for _ in candidates(log.channels, machine)) or _given_in(log, machine) for log in logs]
+    known = known if any(known) else [True] * len(known)
+    logs, options = list(compress(logs, known)), list(compress(options, known))
     if len(logs) > 1:
         progress(Progress(Stage.COMPARING_CLOCKS))
     logs, clocks = align_clocks(logs, machine, options)
     progress(Progress(Stage.MAPPING_SIGNALS))
     marked = [log for log in logs if is_open_loop(log.summary)]
     signals = map_signals(logs, _without_given(machine, marked))
-    notes = (*signals.notes, *(clock.sentence for clock in clocks if clock.sentence))
-    dated = tuple(replace(file, clock=clock) for file, clock in zip(files, clocks, strict=True))
+    unused = (f"{file.path.name}: {_UNUSED}" for file, use in zip(files, known, strict=True) if not use)
+    notes = (*signals.notes, *unused, *(clock.sentence for clock in clocks if clock.sentence))
+    clock_of = iter(clocks)
+    dated = tuple(
+        replace(file, clock=next(clock_of)) if use else _strange(file) for file, use in zip(files, known, strict=True)
+    )
     return dated, replace(signals, notes=notes, open_loop=bool(marked))
+
+
+def _strange(file: MissionFile) -> MissionFile:
+    return replace(file, summary=replace(file.summary, notes=(*file.summary.notes, _UNUSED)), strange=True)
+
+
+def _given_in(log: RawLog, machine: Machine) -> bool:
+    """Whether a signal that the machine file names is a channel of a log."""
+    return any(
+        (s.topic is not None and any(c.topic.strip("/") == s.topic.strip("/") for c in log.channels.values()))
+        or (s.column or s.symbol) in log.channels
+        for s in machine.signals.values()
+    )
 
 
 def _read(
@@ -266,7 +293,7 @@ def check_units(signals: Signals) -> None:
 def _require_use(files: Sequence[MissionFile], signals: Signals) -> None:
     """Raise where one of several files adds nothing."""
     used = {signal.source for signal in signals.items.values()}
-    idle = [file.path for file in files if str(file.path) not in used]
+    idle = [file.path for file in files if str(file.path) not in used and not file.strange]
     if len(files) > 1 and idle and used:
         raise LogError(
             f"{idle[0]}: none of its channels is used, all signals were found in the other files; diagnose it by itself, "

@@ -10,14 +10,14 @@ import pytest
 # As in the command: threads of the linear algebra spin while they wait, and its products are small. Before numpy is imported.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
-from replay.arrays.kernel_cache import drop_stale_kernels
+from replay.arrays.kernel_cache import drop_own_stale_kernels
 
 ROOT = Path(__file__).resolve().parent.parent
 
 
 def pytest_configure() -> None:
     """Let no test run what was compiled from former sources."""
-    drop_stale_kernels([ROOT / "replay", ROOT / "diagnosis"], ROOT / "replay" / "__pycache__" / "kernels.json")
+    drop_own_stale_kernels()
 
 
 @pytest.fixture(scope="session")

@@ -10,7 +10,7 @@ import typer
 from cli.terminal.command import Quiet, Verbose, terminal_of
 from cli.terminal.options import Json, MachineFile
 from diagnosis.api.inputs import check_output
-from diagnosis.api.saved_results import logs_and_their_reports, results_and_truths
+from diagnosis.api.truths import logs_and_their_reports, results_and_truths
 from replay.progress import Stage
 
 EXAMPLES = """\b
@@ -62,14 +62,8 @@ def evaluate(
         found = score(pairs, machine, progress)
     for log, saved in logs_and_their_reports(pairs):
         terminal.note(f"{saved} is a report of {log}, which is given too: the mission counts twice")
-    for (path, _), mission in zip(pairs, found.scores, strict=True):
-        if mission.left_out:
-            verb = "is" if len(mission.left_out) == 1 else "are"
-            terminal.note(f"{path}: {', '.join(mission.left_out)} {verb} not in the result and not scored")
-        if mission.not_driven:
-            terminal.note(
-                f"{path}: the truth has faults outside of driving, where nothing can show them: {'; '.join(mission.not_driven)}"
-            )
+    for sentence in found.notes:
+        terminal.note(sentence)
     if html is not None:
         found.save(html)
     if json:

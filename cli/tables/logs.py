@@ -28,7 +28,10 @@ def _line(file: FileRow, files: Sequence[FileRow]) -> Text:
     gone = next((damage for damage in file["damage"] if is_left_out(damage)), "")
     damaged = any(not is_left_out(damage) for damage in file["damage"])
     words = [f"({file['format']}{', damaged' if damaged else ''})"]
-    if gone:
+    unused = next((note for note in file["notes"] if note.startswith("none of its channels")), "")
+    if unused:
+        words.append(unused)
+    elif gone:
         words.append("not used: its clock could not be compared" if file["clock"] else "not used")
     elif len(files) > 1 or (file["clock"] is not None and file["clock"]["method"] != "reference"):
         words.append(_clock(file["clock"]))
@@ -36,8 +39,8 @@ def _line(file: FileRow, files: Sequence[FileRow]) -> Text:
 
 
 def _clock(clock: ClockRow | None) -> str:
-    if clock is None:
-        return ""
+    if clock is None:  # of the file that the others were put onto
+        return "its clock is the mission's"
     method, offset = clock["method"], clock["offset_s"]
     if method == "reference":
         return "its clock is the mission's"

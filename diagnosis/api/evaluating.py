@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING, TypeAlias
 from diagnosis.api.errors import stated
 from diagnosis.api.inputs import MachineLike, StrPath, check_output, machine_given, path_of, paths_of
 from diagnosis.api.result import Diagnosis
-from diagnosis.api.saved_results import results_and_truths, saved_report
+from diagnosis.api.saved_results import saved_report
+from diagnosis.api.truths import results_and_truths
 from replay.errors import ConfigError
 from replay.progress import Subscriber, silent
 
@@ -31,7 +32,7 @@ _SIDES = ("driving_s", "macro_f1", "balanced_accuracy", "balanced_accuracy_decid
 
 @dataclass(frozen=True)
 class Evaluation:
-    """How diagnoses compare with the truth; README, *What `evaluate` counts*, defines every figure.
+    """How diagnoses compare with the truth; ``docs/how-to/own-faults.md`` defines every figure.
 
     Attributes
     ----------
@@ -53,6 +54,19 @@ class Evaluation:
         from diagnosis.evaluation.scores import scores_document
 
         return scores_document(self.pairs, self.scores, self.pooled)
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What is not scored, and why, one sentence each."""
+        out = []
+        for (name, _), mission in zip(self.pairs, self.scores, strict=True):
+            if mission.left_out:
+                verb = "is" if len(mission.left_out) == 1 else "are"
+                out.append(f"{name}: {', '.join(mission.left_out)} {verb} not in the result and not scored")
+            if mission.not_driven:
+                faults = "; ".join(mission.not_driven)
+                out.append(f"{name}: the truth has faults outside of driving, where nothing can show them: {faults}")
+        return tuple(out)
 
     @property
     def sides(self) -> pd.DataFrame:

@@ -1,49 +1,27 @@
-"""Figures of a result: the rows of the report's plots, and its timeline, for plotly."""
+"""Figures of a result for plotly: the rows of the report's plots over one time axis."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from diagnosis.api.series import Series, Span
-from diagnosis.pages.labels import visible
+import numpy as np
+from numpy.typing import NDArray
+
+from diagnosis.api.figure_style import BAND, COLOURS, MARGIN_PX, STUCK, colour_of, finish, inert, style_of
+from diagnosis.api.series import Curve, Series, Span
+from diagnosis.report.plot_data import worst
 from diagnosis.report.rows import Row
 from diagnosis.results.document import IntervalRow
-from diagnosis.results.fault_rows import LOOKS, state_label
-from diagnosis.results.machine_words import MachineWords
-from replay.faults import FaultMode, State
 
 if TYPE_CHECKING:
     import plotly.graph_objects as go
 
-#: Colours of the light page, see ``diagnosis/pages/style.css``.
-COLOURS = {
-    "text": "#17212b", "muted": "#536170", "accent": "#0a5a9c", "teal": "#00796b", "alt": "#a03080", "peer": "#8b97a4",
-    "line2": "#e9edf1",
-}  # fmt: skip
-_STUCK = LOOKS[State.STUCK].light
-#: Colour, width and dash of a curve by the part that it plays, as in ``diagnosis/report/assets/plot.js``.
-STYLES = {
-    "measured": (COLOURS["accent"], 1.7, "solid"),
-    "commanded": (COLOURS["text"], 1.3, "dot"),
-    "expected": (COLOURS["teal"], 1.5, "dash"),
-    "reference": (COLOURS["text"], 1.0, "solid"),
-    "replayed": (COLOURS["alt"], 1.5, "dash"),
-    "applied": (COLOURS["teal"], 1.5, "solid"),
-    "right": (COLOURS["muted"], 1.0, "dot"),
-    "peer": (COLOURS["peer"], 1.1, "solid"),
-    "threshold": (_STUCK, 1.3, "dash"),
-}
-_FREE = ("accent", "alt", "teal", "muted", "text", "peer")
-_ROW_PX, _LANE_PX, _MARGIN_PX = 150, 26, 130
-_QUIET = {
-    State.NOT_EXCITED: "#d5dce3",
-    State.MASKED: "#b9c3cd",
-    State.SLIP: "#9cc0de",
-    State.NO_DATA: "#f0f2f5",
-    State.NOT_ASSESSED: "#e2e7ec",
-}
+_ROW_PX = 150
+_SHADED = 100
+
+Shapes = list[dict[str, Any]]
 
 
 @dataclass(frozen=True)
@@ -77,27 +55,18 @@ class Plot:
     most: int = 20_000
 
 
-def colour_of(state: str) -> str:
-    """Colour of a mode or state on a light page."""
-    return (LOOKS[state].light if state in LOOKS else "") or _QUIET.get(State(state), COLOURS["peer"])
-
-
 def rows_figure(plot: Plot) -> go.Figure:
     """Panels over one time axis, the faults shaded behind those that show their component."""
     from plotly.subplots import make_subplots
 
     rows = plot.rows
-    titles = [f"{visible(row.title)} ({visible(row.unit)})" for row in rows]
+    titles = [f"{inert(row.title)} ({inert(row.unit)})" for row in rows]
     specs = [[{"secondary_y": row.right is not None}] for row in rows]
     gap = min(0.25 / max(len(rows) - 1, 1), 42 / (_ROW_PX * len(rows)))
     figure = make_subplots(len(rows), 1, shared_xaxes=True, subplot_titles=titles, specs=specs, vertical_spacing=gap)
-    coarse = 1
-    for number, row in enumerate(rows, 1):
-        coarse = max(coarse, _draw(figure, plot, row, number))
-    for number, row in enumerate(rows, 1):
-        _shade(figure, plot, row, number)
+    coarse = max([_draw(figure, plot, row, number) for number, row in enumerate(rows, 1)], default=1)
     drawn = "every sample" if coarse == 1 else f"extremes of up to {coarse} samples"
-    _finish(figure, f"{visible(plot.title)}<br><sup>{drawn}</sup>", _ROW_PX * len(rows) + _MARGIN_PX)
+    finish(figure, f"{inert(plot.title)}<br><sup>{drawn}{_shade(figure, plot)}</sup>", _ROW_PX * len(rows) + MARGIN_PX)
     figure.update_xaxes(range=list(plot.span))
     figure.update_xaxes(title_text="mission time (s)", row=len(rows), col=1)
     figure.update_annotations(font_size=12, x=0.0, xanchor="left", selector={"xref": "paper"})
@@ -112,46 +81,58 @@ def _draw(figure: go.Figure, plot: Plot, row: Row, number: int) -> int:
     """Draw the curves of one panel; of how many samples two of their points are the extremes."""
     import plotly.graph_objects as go
 
-    coarse, unit = 1, "" if row.unit == "1" else f" {visible(row.unit)}"
+    unit = "" if row.unit == "1" else f" {inert(row.unit)}"
+    strides, shown = [1], set[str]()
 
-    def add(name: str, label: str, role: str, scale: float, right: bool = False, **more: Any) -> None:
-        nonlocal coarse
-        curve = plot.series.curve(name, plot.span, scale, plot.most)
-        coarse = max(coarse, curve.stride)
-        colour, width, dash = _style(role)
-        line = {"color": colour, "width": width, "dash": dash} | more.pop("line", {})
+    def curve(name: str, scale: float) -> Curve:
+        found = plot.series.curve(name, plot.span, scale, plot.most)
+        strides.append(found.stride)
+        return found
+
+    def add(x: NDArray[Any], y: NDArray[Any], label: str, role: str, right: bool = False, **more: Any) -> None:
+        colour, width, dash = style_of(role)
+        looks = {"line": {"color": colour, "width": width, "dash": dash}, "hovertemplate": f"%{{y:.4~g}}{unit}"} | more
         trace = go.Scatter(
-            x=curve.t, y=curve.y, name=visible(label), legend=_legend(number), mode="lines", line=line,
-            showlegend=label not in shown, hovertemplate=f"%{{y:.4~g}}{'' if right else unit}", **more,
-        )  # fmt: skip
+            x=x, y=y, name=inert(label), legend=_legend(number), mode="lines", showlegend=label not in shown, **looks
+        )
         shown.add(label)
         figure.add_trace(trace, row=number, col=1, secondary_y=right)
 
-    shown: set[str] = set()
     if row.band:
-        low, high = row.band
-        add(low, "95 % band", "measured", row.band_scale, line={"width": 0}, hoverinfo="skip")
-        shown.add("95 % band")
-        fill: dict[str, Any] = {"fill": "tonexty", "fillcolor": "rgba(10, 90, 156, 0.18)"}
-        add(high, "95 % band", "measured", row.band_scale, line={"width": 0}, hoverinfo="skip", **fill)
+        outline = _outline(*(curve(name, row.band_scale) for name in row.band))
+        looks: dict[str, Any] = {"fill": "toself", "fillcolor": BAND, "hoverinfo": "skip", "hovertemplate": None}
+        add(*outline, "95 % band", "measured", line={"width": 0}, **looks)
     if row.threshold:
-        add(row.threshold, "± threshold", "threshold", row.band_scale)
-        add(row.threshold, "± threshold", "threshold", -row.band_scale)
+        found = curve(row.threshold, row.band_scale)
+        add(found.t, found.y, "± threshold", "threshold")
+        add(found.t, -found.y, "± threshold", "threshold")
     for trace in row.traces:
-        add(trace.column, trace.label, trace.role, trace.scale, trace.right)
+        found = curve(trace.column, trace.scale)
+        more = {"hovertemplate": "%{y:.4~g}"} if trace.right else {}
+        add(found.t, found.y, trace.label, trace.role, trace.right, **more)
     if row.level is not None:
-        figure.add_hline(row.level, row=number, col=1, line={"color": _STUCK, "width": 1.2, "dash": "dash"})
+        figure.add_hline(row.level, row=number, col=1, line={"color": STUCK, "width": 1.2, "dash": "dash"})
     if row.limits:
         figure.update_yaxes(range=list(row.limits), row=number, col=1, secondary_y=False)
     if row.clip:
-        figure.update_yaxes(
-            autorangeoptions={"clipmin": row.clip[0], "clipmax": row.clip[1]}, row=number, col=1, secondary_y=False
-        )
+        clip = {"clipmin": row.clip[0], "clipmax": row.clip[1]}
+        figure.update_yaxes(autorangeoptions=clip, row=number, col=1, secondary_y=False)
     if row.right:
-        figure.update_yaxes(
-            title_text=f"{row.right[0]} ({row.right[1]})", row=number, col=1, secondary_y=True, showgrid=False
-        )
-    return coarse
+        title = f"{row.right[0]} ({row.right[1]})"
+        figure.update_yaxes(title_text=title, row=number, col=1, secondary_y=True, showgrid=False)
+    return max(strides)
+
+
+def _outline(low: Curve, high: Curve) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Closed outlines between two curves, one for each stretch without a gap, divided by NaN."""
+    below = low.y if len(low.t) == len(high.t) else np.interp(high.t, low.t, low.y)
+    known = np.isfinite(below) & np.isfinite(high.y)
+    edges = np.flatnonzero(np.diff(known, prepend=False, append=False))
+    x, y = [np.empty(0)], [np.empty(0)]
+    for a, b in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True):
+        x += [high.t[a:b], high.t[a:b][::-1], np.array([np.nan])]
+        y += [high.y[a:b], below[a:b][::-1], np.array([np.nan])]
+    return np.concatenate(x), np.concatenate(y)
 
 
 def _legend(number: int) -> str:
@@ -159,84 +140,29 @@ def _legend(number: int) -> str:
     return "legend" if number == 1 else f"legend{number}"
 
 
-def _style(role: str) -> tuple[str, float, str]:
-    if role.startswith("mode-"):
-        mode = role.removeprefix("mode-")
-        return colour_of(mode), 1.6, LOOKS[mode].dash if mode in LOOKS else "solid"
-    if role.startswith("free-"):
-        return COLOURS[_FREE[int(role[5:]) % len(_FREE)]], 1.5, "solid"
-    return STYLES[role]
-
-
-def _shade(figure: go.Figure, plot: Plot, row: Row, number: int) -> None:
-    for fault in plot.faults:
-        if row.component and row.component != fault["component"]:
-            continue
-        main = fault["id"] == plot.main
-        label = {"annotation_text": fault["id"], "annotation_font_size": 11} if number == 1 else {}
-        figure.add_vrect(
-            fault["start_s"], fault["stop_s"], row=number, col=1, fillcolor=colour_of(fault["mode"]),
-            opacity=0.18 if main else 0.1, line_width=1 if main else 0, layer="below", **label,
-        )  # fmt: skip
-        if main and fault["detected_s"] is not None:
-            figure.add_vline(
-                fault["detected_s"], row=number, col=1, line={"color": COLOURS["text"], "width": 1.2, "dash": "dash"}
+def _shade(figure: go.Figure, plot: Plot) -> str:
+    """Shade the faults in view, the worst of very many; say so where some are left out."""
+    near = [f for f in plot.faults if f["start_s"] < plot.span[1] and f["stop_s"] > plot.span[0]]
+    faults = worst(near, _SHADED)
+    shapes: Shapes = []
+    names: Shapes = []
+    for number, row in enumerate(plot.rows, 1):
+        axes = next(figure.select_yaxes(row=number, col=1)).plotly_name.removeprefix("yaxis")
+        place = {"xref": f"x{number if number > 1 else ''}", "yref": f"y{axes} domain"}
+        for fault in faults:
+            if row.component and row.component != fault["component"]:
+                continue
+            main, colour = fault["id"] == plot.main, colour_of(fault["mode"])
+            edge = {"color": colour, "width": 1.0 if main else 0.0}
+            box = {**place, "y0": 0, "y1": 1, "x0": fault["start_s"], "x1": fault["stop_s"], "line": edge}
+            shapes.append(
+                {**box, "type": "rect", "fillcolor": colour, "opacity": 0.18 if main else 0.1, "layer": "below"}
             )
-
-
-def timeline_figure(
-    lanes: Iterable[tuple[str, str, str]],
-    spans: Sequence[tuple[str, str, str, float, float, str]],
-    title: str,
-    words: MachineWords,
-) -> go.Figure:
-    """States of every part over the mission, one lane for each side of a component.
-
-    Parameters
-    ----------
-    lanes : Iterable[tuple[str, str, str]]
-        Component, kind and side of each lane, from the top.
-    spans : Sequence[tuple[str, str, str, float, float, str]]
-        Component, side, state, begin and end [s], and what is said of it.
-    title : str
-        Heading.
-    words : MachineWords
-        How to speak of the machine.
-    """
-    import plotly.graph_objects as go
-
-    names = {
-        (component, side): visible(f"{words.part_words(kind, component, side)}") for component, kind, side in lanes
-    }
-    figure = go.Figure()
-    for state in dict.fromkeys((*LOOKS, *(span[2] for span in spans))):
-        mine = [span for span in spans if span[2] == state and (span[0], span[1]) in names]
-        if not mine:
-            continue
-        figure.add_bar(
-            orientation="h", name=state_label(state), marker={"color": colour_of(state), "line": {"width": 0}},
-            y=[names[span[0], span[1]] for span in mine], base=[span[3] for span in mine],
-            x=[span[4] - span[3] for span in mine], text=[_fault_named(span[5], state) for span in mine], customdata=[[span[3], span[4], visible(span[5])] for span in mine],
-            hovertemplate="%{y}<br>" + state_label(state) + ": %{customdata[0]:.3f} to %{customdata[1]:.3f} s<br>"
-            "%{customdata[2]}<extra></extra>",
-        )  # fmt: skip
-    _finish(figure, visible(title), _LANE_PX * len(names) + _MARGIN_PX)
-    figure.update_layout(barmode="overlay", hovermode="closest", bargap=0.25)
-    figure.update_yaxes(categoryorder="array", categoryarray=list(names.values())[::-1], automargin=True)
-    figure.update_xaxes(title_text="mission time (s)")
-    return figure
-
-
-def _fault_named(words: str, state: str) -> str:
-    """Name at the beginning of what is said of a fault: ``F1``; empty for other states."""
-    return words.partition(":")[0] if ":" in words and state in list(FaultMode) else ""
-
-
-def _finish(figure: go.Figure, title: str, height: int) -> None:
-    figure.update_layout(
-        title={"text": title, "font": {"size": 16}}, height=height, hovermode="x unified", template="plotly_white",
-        font={"color": COLOURS["text"], "size": 12}, margin={"l": 64, "r": 24, "t": 84, "b": 48},
-        legend={"orientation": "h", "yanchor": "bottom", "y": 1.0, "xanchor": "right", "x": 1.0},
-    )  # fmt: skip
-    figure.update_xaxes(gridcolor=COLOURS["line2"], zeroline=False)
-    figure.update_yaxes(gridcolor=COLOURS["line2"], zerolinecolor=COLOURS["line2"])
+            if number == 1 and len(faults) <= _SHADED // 3:
+                middle = (fault["start_s"] + fault["stop_s"]) / 2
+                names.append({**place, "x": middle, "y": 1, "yanchor": "top", "showarrow": False, "text": fault["id"]})
+            if main and (at := fault["detected_s"]) is not None:
+                line = {"color": COLOURS["text"], "width": 1.2, "dash": "dash"}
+                shapes.append({**box, "type": "line", "x0": at, "x1": at, "line": line})
+    figure.update_layout(shapes=[*figure.layout.shapes, *shapes], annotations=[*figure.layout.annotations, *names])
+    return f"; the {len(faults)} most severe of {len(near)} faults are shaded" if len(faults) < len(near) else ""

@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 
 from diagnosis.report.units import unit_of
 from diagnosis.results.document import IntervalRow, ReportDocument
-from replay.truth import MissionTruth
 
 #: Columns of the table of faults, and what each holds.
 FAULT_COLUMNS: Mapping[str, str] = {
@@ -43,9 +42,6 @@ _COVERAGE_COLUMNS = ("component", "side", "tier", "driving_s", "decided_driving_
 _CHANNEL_COLUMNS = (
     "channel", "unit", "recorded_unit", "rate_hz", "samples", "gaps", "longest_gap_s", "missing_share", "lsb", "guessed",
     "source",
-)  # fmt: skip
-_TRUTH_COLUMNS = (
-    "component", "kind", "side", "mode", "start_s", "stop_s", "epsilon", "sat_mean", "sat_std", "ramp_s",
 )  # fmt: skip
 _TEXTS = ("component", "kind", "side", "mode", "severity", "sat_unit", "tier", "advice", "evidence")
 
@@ -148,22 +144,22 @@ def signals_frame(
     Returns
     -------
     pd.DataFrame, shape (n, columns)
-        Indexed by ``t`` [s from the mission's start]; NaN where there is no sample. ``attrs["units"]`` has the unit of
+        Views of the columns, not to be written. Indexed by ``t`` [s from the mission's start]; NaN where there is no sample. ``attrs["units"]`` has the unit of
         every column.
     """
     t = columns["t"] if step is None else step / report["log"]["rate_hz"]
-    shown = {name: np.asarray(values) for name, values in columns.items() if name != "t"}
-    frame = pd.DataFrame(shown, index=pd.Index(np.asarray(t, np.float64), name="t"))
+    shown = {name: _read_only(values) for name, values in columns.items() if name != "t"}
+    frame = pd.DataFrame(shown, index=pd.Index(np.asarray(t, np.float64), name="t"), copy=False)
     recorded = {s["name"]: s["unit"] for s in report["signals"]}
     frame.attrs["units"] = {name: recorded.get(name) or unit_of(name, report) for name in shown}
     return frame
 
 
-def truth_frame(truth: MissionTruth) -> pd.DataFrame:
-    """Injected faults of a truth file; see `diagnosis.api.simulating.MadeLog.faults`."""
-    return _rows(
-        [{name: getattr(interval, name) for name in _TRUTH_COLUMNS} for interval in truth.intervals], _TRUTH_COLUMNS
-    )
+def _read_only(values: NDArray[np.floating[Any]]) -> NDArray[np.floating[Any]]:
+    """The same numbers without a copy, guarded against being written."""
+    view = np.asarray(values).view()
+    view.flags.writeable = False
+    return view
 
 
 def _rows(rows: Sequence[Mapping[str, Any]], columns: Sequence[str]) -> pd.DataFrame:

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 from dataclasses import asdict
 from functools import lru_cache
+from pathlib import Path
 from typing import TYPE_CHECKING
 
-from diagnosis.api.figures import COLOURS, colour_of
+from diagnosis.api.figure_style import COLOURS, colour_of
 from diagnosis.api.verdict import Verdict, assumed_words
+from diagnosis.pages.environment import environment
 from diagnosis.pages.labels import bounded, made_visible, sat_text
+from diagnosis.results.candidates import label_of
 from diagnosis.results.document import IntervalRow, ReportDocument
-from diagnosis.results.fault_rows import state_label
 from diagnosis.results.machine_words import MachineWords, words_of
 from diagnosis.results.vocabulary import Verdict as Status
 
@@ -41,7 +43,7 @@ def _fault(fault: IntervalRow, words: MachineWords) -> dict[str, str]:
     return {
         "id": fault["id"],
         "part": words.part_words(fault["kind"], fault["component"], fault["side"]),
-        "mode": state_label(fault["mode"], fault["side"]).lower(),
+        "mode": label_of(fault).lower(),
         "colour": colour_of(fault["mode"]),
         "time": f"{fault['start_s']:.2f} to {fault['stop_s']:.2f}",
         "epsilon": "–" if epsilon is None else bounded(epsilon, 2),
@@ -53,9 +55,4 @@ def _fault(fault: IntervalRow, words: MachineWords) -> dict[str, str]:
 
 @lru_cache
 def _template() -> jinja2.Template:
-    import jinja2
-
-    loader = jinja2.PackageLoader("diagnosis.api", ".")
-    return jinja2.Environment(loader=loader, autoescape=True, trim_blocks=True, lstrip_blocks=True).get_template(
-        "notebook.html.j2"
-    )
+    return environment(Path(__file__).parent).get_template("notebook.html.j2")

@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from diagnosis.api.figures import Plot, rows_figure, timeline_figure
+from diagnosis.api.figures import Plot, rows_figure
 from diagnosis.api.series import Series, Span
+from diagnosis.api.timeline_figure import timeline_figure
 from diagnosis.pages.labels import fault_title
 from diagnosis.report.judged_parts import kind_of
 from diagnosis.report.plot_rows import fault_rows, loop_groups

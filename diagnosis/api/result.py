@@ -113,7 +113,7 @@ class Diagnosis:
 
         ``wheel.<W>.v``, ``wheel.<W>.u``, ``steer.<A>.phi`` … as recorded in SI; ``replay.<W>.…`` the replayed loop;
         ``evidence.<part>.<side>.…`` residual, threshold, estimates and probabilities. NaN where there is no sample.
-        ``attrs["units"]`` has the unit of every column. Of missions longer than about 17 minutes at 1 kHz the rows are
+        ``attrs["units"]`` has the unit of every column. Copy the table before you change values in it. Of missions longer than about 17 minutes at 1 kHz the rows are
         extremes, two for every ``report["log"]["samples_per_bucket"]`` samples; `closeups` then has every sample around the
         worst faults.
         """

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import astuple, dataclass, fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
@@ -45,15 +45,18 @@ class MadeLog:
 
     @property
     def faults(self) -> pd.DataFrame:
-        """The injected faults, shape (faults, 9), one row each in order of their start.
+        """The injected faults, shape (faults, 10), one row each in order of their start.
 
         Columns: ``component`` and ``kind`` (``wheel`` or ``steer``), ``side`` and ``mode`` (row of the paper's tables),
         ``start_s`` and ``stop_s`` (mission time [s], half open), ``epsilon`` (ε of L4 or L8 [1]), ``sat_mean`` and
         ``sat_std`` (saturation term [m/s], [rad] or [fraction of full opening]), ``ramp_s`` (time over which ε grows [s]).
         """
-        from diagnosis.api.frames import truth_frame
+        import pandas as pd
 
-        return truth_frame(self.truth)
+        from replay.truth import TruthInterval
+
+        rows = [[str(x) if isinstance(x, str) else x for x in astuple(interval)] for interval in self.truth.intervals]
+        return pd.DataFrame(rows, columns=[f.name for f in fields(TruthInterval)])
 
 
 @stated
@@ -63,6 +66,7 @@ def simulate(
     scenario: Scenario | None = None,
     faults: Sequence[str] = (),
     seed: int = 1,
+    start_ns: int | None = None,
     duration_s: float = 240.0,
     rate_hz: float | None = None,
     evidence: EvidenceLevel = "direct",
@@ -89,6 +93,8 @@ def simulate(
         seconds: ``"FR sensor stuck 30 45"``.
     seed : int
         The same seed gives the same mission.
+    start_ns : int or None
+        When the mission begins [ns since 1970]; None: on a day in October 2025.
     duration_s : float
         Length of the mission [s].
     rate_hz : float or None
@@ -126,6 +132,7 @@ def simulate(
         scenario=scenario,
         preset=preset,
         seed=seed,
+        start_ns=start_ns,
         duration_s=duration_s,
         rate_hz=rate_hz,
         evidence=evidence,

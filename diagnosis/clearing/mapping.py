@@ -19,6 +19,8 @@ _LEAST_S = 5.0
 _AGAINST = -0.8  # correlation
 _APART, _EVEN = 0.08, 0.12  # of a factor from a known one, and how much it may vary [ln]
 _TRACKS = 0.3  # by how much a loop usually stays behind its command [ln]
+_GEARED = 1.2
+_NO_LOOP = 1.1  # ln: a third of its command, or three times as much, over a whole mission
 _BETTER = 0.5  # of what is left, once two are swapped
 _DIFFER = 0.04  # of the largest value: two that are more alike cannot be told from each other
 
@@ -93,7 +95,9 @@ def _hints(
     for i, (y, x) in pairs.items():
         if _alike(y, x) < _AGAINST:
             yield f"{names[i]} runs against {what} throughout: {_LOOK}"
-        elif sizes and (words := _factor(ratios[i] - (usual if abs(usual) < _TRACKS else 0.0))):
+        elif sizes and (
+            words := _factor(ratios[i] - (usual if abs(usual) < _TRACKS else 0.0), cells.machine.gear_ratio)
+        ):
             yield f"{names[i]} is {words} {what} throughout: {_LOOK}"
 
 
@@ -124,9 +128,13 @@ def _ratio(y: Array, x: Array) -> float:
     return middle if 1.4826 * float(np.median(np.abs(ratio - middle))) < _EVEN else np.nan
 
 
-def _factor(ratio: float) -> str:
-    """A known factor in words; empty for any other."""
-    return next((words for factor, words in _FACTORS if abs(ratio - np.log(factor)) < _APART), "")
+def _factor(ratio: float, gear: float) -> str:
+    """A factor in words: a known one, that of the gear, or one that no loop stays behind by; empty for any other."""
+    words = next((words for factor, words in _FACTORS if abs(ratio - np.log(factor)) < _APART), "")
+    if not words and gear > _GEARED and abs(abs(ratio) - np.log(gear)) < _TRACKS:
+        read = "(the motor's speed read as the wheel's?)", "(the wheel's speed read as the motor's?)"
+        words = f"{gear:g} times {read[0]}" if ratio > 0.0 else f"1/{gear:g} times {read[1]}"
+    return words or (f"{np.exp(ratio):.2g} times" if abs(ratio) > _NO_LOOP else "")
 
 
 def _swapped(measured: Array, wanted: Array) -> bool:

@@ -31,7 +31,7 @@ VALVE = 1.4  # dead band and hysteresis of a healthy valve: the limit as a multi
 #: that counts, by whether opening and speed are measured twice. What measurements judge need not be judged by its likeness to
 #: others as strictly; what reads too much is in no row of the tables, so that nothing else would tell it.
 RESPONSE = {
-    (False, False): ((0.85, 0.75), (1.0, 0.8)),
+    (False, False): ((0.75, 0.65), (0.9, 0.7)),
     (True, False): ((2.0, 1.2), (1.4, 1.05)),
     (False, True): ((1.15, 1.0), (1.4, 1.2)),
     (True, True): ((3.0, 2.0), (3.0, 2.0)),

@@ -34,6 +34,8 @@ class SideCoverage:
         mission, and checks of the all-clear that none of its faults would have passed.
     shown : bool
         Whether the whole mission was judged, and the checks clear the component.
+    long_enough : bool
+        Whether it was judged for as long as `assessed` needs, whatever the checks say.
     """
 
     tier: Tier
@@ -42,6 +44,7 @@ class SideCoverage:
     judged_s: float
     assessed: bool
     shown: bool = True
+    long_enough: bool = False
 
     @property
     def words(self) -> str:
@@ -88,8 +91,9 @@ def sides_of(report: ReportDocument) -> dict[Part, SideCoverage]:
         judged = sum(v for k, v in row["seconds"].items() if k in DECIDED)
         decided, driving, tier = row["decided_driving_s"], row["driving_s"], row["tier"]
         shown = whole and (row["component"], row["side"]) not in open_
-        assessed = shown and tier is not Tier.NONE and decided >= needed_s(driving, least)
-        out[row["component"], row["side"]] = SideCoverage(tier, driving, decided, judged, assessed, shown)
+        long_enough = tier is not Tier.NONE and decided >= needed_s(driving, least)
+        assessed = shown and long_enough
+        out[row["component"], row["side"]] = SideCoverage(tier, driving, decided, judged, assessed, shown, long_enough)
     return out
 
 

@@ -48,6 +48,8 @@ class Reservations:
         Why what was judged is not the whole mission.
     events : tuple[str, ...]
         What happened to the machine as a whole.
+    hints : tuple[str, ...]
+        Signals that fit another sign, unit or place better.
     words : MachineWords
         How to speak of the machine.
     """
@@ -59,6 +61,7 @@ class Reservations:
     open: tuple[Checked, ...] = ()
     scope: tuple[str, ...] = ()
     events: tuple[str, ...] = ()
+    hints: tuple[str, ...] = ()
     words: MachineWords = HYDRAULIC
 
 
@@ -76,6 +79,8 @@ def doubt_of(watch: Sequence[FaultInterval], against: Reservations) -> str:
         out.append("a residual is not explained by any fault")
     if against.not_compared:
         out.append("a loss that lasts the whole mission would not show")
+    if against.hints:
+        out.append("the machine file does not fit the log")
     out += against.scope
     if against.events:
         out.append("the machine did not follow its commands for a time")
@@ -109,7 +114,7 @@ def caveats_of(
 
     `short_named`: the verdict itself names the parts that were not judged long enough.
     """
-    out, damage = list(against.events), against.damage
+    out, damage = [*against.hints, *against.events], against.damage
     if damage:
         said = "" if is_left_out(damage[0]) else "The log is damaged: "
         out.append(f"{said}{damage[0]}" + (f" (and {len(damage) - 1} more)" if len(damage) > 1 else ""))

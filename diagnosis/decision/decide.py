@@ -88,6 +88,7 @@ def decide(
     checks: Sequence[Checked] = (),
     scope: Sequence[str] = (),
     events: Sequence[str] = (),
+    hints: Sequence[str] = (),
 ) -> Decision:
     """Give the verdict.
 
@@ -123,11 +124,18 @@ def decide(
         Why what was judged is not the whole mission.
     events : Sequence[str]
         What happened to the machine as a whole and is no part's fault.
+    hints : Sequence[str]
+        Signals that fit another sign, unit or place better over the whole mission.
     """
     driven = driving_s or {}
     against = _reservations(assessments, decided_s, driven, axles, limits, damage, model)
     against = replace(
-        against, words=words, open=tuple(c for c in checks if not c.passed), scope=tuple(scope), events=tuple(events)
+        against,
+        words=words,
+        open=tuple(c for c in checks if not c.passed),
+        scope=tuple(scope),
+        events=tuple(events),
+        hints=tuple(hints),
     )
     found = _with_faults(intervals, against) or _without_faults(assessments, decided_s, axles, against)
     said = found.title == _SENSORS_ALONE  # which parts are not judged, and why
@@ -201,6 +209,8 @@ def _without_faults(
     """The verdict where no fault is worth an action: the first reservation that there is, else ``ready``."""
     if against.events:
         return Decision(Verdict.NOT_ASSESSED, "The machine did not follow its commands", against.events[0])
+    if against.hints:
+        return Decision(Verdict.NOT_ASSESSED, "The machine file does not fit the log", against.hints[0])
     if against.short and (seen := _sensors_alone(assessments, decided_s, axles, against)):
         return Decision(Verdict.NOT_ASSESSED, _SENSORS_ALONE, seen)
     if against.short:
@@ -228,7 +238,7 @@ def _without_faults(
         apart = only_left_out(against.damage)
         text = against.damage[0] if apart else "Parts of the log are lost: " + against.damage[0]
         title = "No fault found, but a file was left out" if apart else "No fault found in a damaged log"
-        return Decision(Verdict.WATCH, title, text, not_cleared=doubt_of((), against))
+        return Decision(Verdict.NOT_ASSESSED, title, text)
     if against.scope:
         text = f"No fault was found, but {join_words(list(against.scope))}."
         return Decision(Verdict.NOT_ASSESSED, "No fault found, not all judged", text)

@@ -12,6 +12,7 @@ Array = NDArray[np.float64]
 _EXPLAINED = 0.85  # of the mean square, by one shape alone
 _LEAST = 20  # samples
 _SPIKES = 0.12  # of the samples
+_SHIFTED, _ADDED = 1.3, 0.05  # times what scale and offset leave together; of the reference's root mean square
 _OUTLIER = 6.0  # times the usual deviation
 
 
@@ -41,6 +42,11 @@ def shape_sentence(y: Array, x: Array, dt: float, names: tuple[str, str], unit: 
         more = "more" if offset > 0.0 else "less"
         return f"An offset: {channel} reads {amount(abs(offset), unit)} {more} than {reference}."
     if _without(off, x) < (1.0 - _EXPLAINED) * whole:
+        (gain, add), *_ = np.linalg.lstsq(np.column_stack([x, np.ones(x.size)]), y, rcond=None)
+        both = float(np.mean((y - gain * x - add) ** 2))
+        if _without(off, x) > _SHIFTED * both and abs(add) > _ADDED * float(np.sqrt(np.mean(x**2))):
+            sign = "more" if add > 0.0 else "less"
+            return f"A scale and an offset: {channel} is {gain:.3g} × {reference}, and {amount(abs(float(add)), unit)} {sign}."
         return f"A scale: {channel} is {1.0 + float(off @ x) / float(x @ x):.3g} × {reference}, without an offset."
     change = np.asarray(np.gradient(x, dt), dtype=np.float64)
     if (

@@ -61,7 +61,7 @@ def _likely(p: float) -> str:
 def judged(report: ReportDocument) -> str:
     """How many parts were judged as far as a verdict of *ready* takes; empty where there are none."""
     sides = sides_of(report)
-    done = sum(s.assessed for s in sides.values())
+    done = sum(s.long_enough for s in sides.values())
     return f"{done} of {len(sides)} parts" if sides else ""
 
 
@@ -70,7 +70,7 @@ def sure_of_verdict(report: ReportDocument) -> str:
     wheels = _wheel_sides(report)
     if not wheels:
         return ""
-    done = [s for s in wheels if s.assessed]
+    done = [s for s in wheels if s.long_enough]
     words = words_of(report["machine"])
     tiers = list(dict.fromkeys(words.fill(Tier(s.tier).words) for s in wheels if s.tier != Tier.NONE))
     how = f", by {' and '.join(tiers)}" if tiers else ""

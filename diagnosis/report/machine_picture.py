@@ -37,7 +37,7 @@ def condition(
     kind: Kind,
     faults: Sequence[IntervalRow],
     judged: Mapping[tuple[str, str], bool],
-    enough: Mapping[tuple[str, str], bool] | None = None,
+    enough: Mapping[tuple[str, str], str] | None = None,
     words: MachineWords = HYDRAULIC,
 ) -> Condition:
     """Worst fault of a component, or whether it was judged at all.
@@ -52,8 +52,8 @@ def condition(
         The report's intervals.
     judged : Mapping[tuple[str, str], bool]
         Whether any time of a component and side was decided.
-    enough : Mapping[tuple[str, str], bool] or None
-        Whether it was decided for as long as a verdict of *ready* takes; None: not known.
+    enough : Mapping[tuple[str, str], str] or None
+        What keeps each part from a verdict of *ready*, in words; empty where nothing does; None: not known.
     words : MachineWords
         How to speak of the machine.
     """
@@ -69,12 +69,13 @@ def condition(
         return Condition(worst["mode"], (heading, label, length, *more), worst["id"], title)
     sides = {side: done for (c, side), done in judged.items() if c == component}
     open_sides = [words.part_name(kind, side) for side, done in sides.items() if not done]
-    brief = [words.part_name(kind, side) for (c, side), done in (enough or {}).items() if c == component and not done]
+    kept = {words.part_name(kind, side): why for (c, side), why in (enough or {}).items() if c == component and why}
+    brief = list(kept)
     if not sides or len(open_sides) == len(sides):
         return Condition(State.NOT_ASSESSED, ("Not assessed",), "", f"{component}: not assessed")
     if brief and not open_sides:
         who = brief[0] if len(brief) < len(sides) else ""
-        lines = ("No fault found", *((who,) if who else ()), "judged too briefly")
+        lines = ("No fault found", *((who,) if who else ()), ", ".join(dict.fromkeys(kept.values())))
         return Condition(State.NOT_ASSESSED, lines, "", f"{component}: {', '.join(x.lower() for x in lines)}")
     if open_sides:
         lines = ("No fault found", f"{open_sides[0]}", "not assessed")
@@ -97,12 +98,14 @@ def _rows(wheels: Sequence[str], geometry: Mapping[str, WheelPlace]) -> list[lis
     return [sorted(r, key=lambda w: -geometry[w]["y"]) for r in rows]
 
 
-def _hit(c: Condition, shapes: Markup) -> Markup:
+def _hit(name: str, c: Condition, shapes: Markup) -> Markup:
     if not c.fault:
-        return Markup('<g role="img" aria-label="{}"><title>{}</title>{}</g>').format(c.title, c.title, shapes)
+        return Markup('<g data-c="{}" role="img" aria-label="{}"><title>{}</title>{}</g>').format(
+            name, c.title, c.title, shapes
+        )
     return Markup(
-        '<g class="hit" data-f="{}" data-scroll role="button" tabindex="0" aria-label="{}"><title>{}</title>{}</g>'
-    ).format(c.fault, c.title, c.title, shapes)
+        '<g class="hit" data-c="{}" data-f="{}" data-scroll role="button" tabindex="0" aria-label="{}"><title>{}</title>{}</g>'
+    ).format(name, c.fault, c.title, c.title, shapes)
 
 
 def _short(words: str, length: int) -> str:
@@ -114,7 +117,10 @@ def machine_picture(report: ReportDocument) -> Markup:
     machine, faults, judged = report["machine"], report["intervals"], judged_sides(report)
     wheels, axles, geometry = machine["wheels"], machine["axles"], machine["geometry"] or {}
     words = words_of(machine)
-    enough = {key: side.assessed for key, side in sides_of(report).items()}
+    enough = {
+        key: "" if side.assessed else "not cleared" if side.long_enough else "judged too briefly"
+        for key, side in sides_of(report).items()
+    }
     rows = _rows(wheels, geometry)
     placed = bool(wheels) and all(w in geometry for w in wheels)
     top = 40.0 if placed else 26.0
@@ -186,7 +192,7 @@ def _wheel(name: str, x: float, y: float, outward: int, part: str, c: Condition)
             line,
             style + (" b" if bold else ""),
         )
-    return _hit(c, shapes)
+    return _hit(name, c, shapes)
 
 
 def _axle(name: str, x: float, y: float, c: Condition) -> Markup:
@@ -194,4 +200,4 @@ def _axle(name: str, x: float, y: float, c: Condition) -> Markup:
         c.state, x - 36, y - 20
     )
     shapes += text(x, y - 6, _short(name, 10), "name small") + badge(c.state, x, y + 9, 17)
-    return _hit(c, shapes)
+    return _hit(name, c, shapes)

@@ -23,12 +23,13 @@ from numpy.typing import NDArray
 from diagnosis.decision.wording import join_words
 from diagnosis.pages import labels
 from diagnosis.pages.environment import SHARED, asset, environment, shared_style
-from diagnosis.pages.scripts import packed_plotly, script_policy
+from diagnosis.pages.scripts import packed, packed_plotly, script_policy
 from diagnosis.pages.svg import icon
 from diagnosis.report import tables
 from diagnosis.report.compared_channels import pair_of
 from diagnosis.report.driven_path import driven_path
 from diagnosis.report.evidence import evidence_of
+from diagnosis.report.healthy_lanes import healthy_lanes
 from diagnosis.report.machine_picture import machine_picture
 from diagnosis.report.path_picture import path_picture
 from diagnosis.report.plot_data import Axis, axis_of, blocks_of, channels_of, figures_of, packed_intervals, view, worst
@@ -45,8 +46,14 @@ from diagnosis.results.result import Closeups
 from replay.faults import FaultMode
 
 _ASSETS = Path(__file__).parent / "assets"
-_STYLES = (_ASSETS / "evidence.css", _ASSETS / "explorer.css", _ASSETS / "print.css")
-_SCRIPTS = tuple(_ASSETS / name for name in ("data.js", "plot.js", "export.js", "explorer.js", "page.js"))
+_STYLES = (_ASSETS / "evidence.css", _ASSETS / "explorer.css", _ASSETS / "reading.css", _ASSETS / "print.css")
+_FIRST = _ASSETS / "data.js"
+#: Scripts that a page holds packed, and expands when it is opened.
+_MAIN = tuple(_ASSETS / name for name in ("plot.js", "export.js", "explorer.js", "page.js"))
+#: Scripts that it expands when its first plot is drawn.
+_LATER = tuple(
+    _ASSETS / name for name in ("reading.js", "pictures.js", "lanes.js", "replay.js", "views.js", "whatif.js")
+)
 _LISTED, _THUMBNAILS, _DETAILED = 5000, 300, 120
 
 
@@ -104,22 +111,25 @@ def build_page(
     series = _series(report, columns, closeups)
     duration = _duration(report, series.axis)
     plots = len(series.filled) > 1
-    plotly, packed, version = packed_plotly(plotlyjs) if plots else ("", "", "none, no plots")
+    plotly, bundle, version = packed_plotly(plotlyjs) if plots else ("", "", "none, no plots")
+    main, later = ("\n".join(asset(path) for path in paths) for paths in (_MAIN, _LATER))
     evidence = evidence_of(report, series.shown, series.place, series.axis.per, detailed, series.closeups)
     drawn = sum(len(p.picture) for e in evidence.values() for p in (*e.edges, *e.course))
     words = 400_000 + 6_000 * len(detailed) + 1_500 * len(report["intervals"]) + len(intervals)
-    budget = max(int(max_size_mb * 1e6) - len(packed) - words - drawn, 200_000)
+    budget = max(int(max_size_mb * 1e6) - len(bundle) - words - drawn, 200_000)
     context = {
         **tables.context(report, duration),
         **_pictures(report, detailed, series, duration),
         **_plots(report, detailed, series, duration, budget),
-        **_scripts([plotly] if plots else []),
+        **_scripts([main, plotly, later] if plots else [main]),
+        "main": packed(main.encode()),
+        "later": packed(later.encode()) if plots else "",
         "previous": previous_section(report),
         "evidence": evidence,
         "unlisted": len(whole["intervals"]) - len(report["intervals"]),
         "has_plots": plots,
         "empty": [k for k in series.all if k not in series.filled],
-        "plotly": packed,
+        "plotly": bundle,
         "plotly_version": version,
     }
     context["blocks"].append(("intervals", intervals))
@@ -148,6 +158,8 @@ def _pictures(
     return {
         "shown": {"parts": shown_parts(report), "lanes": shown_lanes(report, duration), "heads": HEADS},
         "timeline": timeline(report, duration, {f["id"] for f in detailed}),
+        "duration": duration,
+        "lane_details": healthy_lanes(report),
         "picture": machine_picture(report),
         "path": Markup("")
         if path.x is None or path.y is None
@@ -175,14 +187,14 @@ def _plots(
     }
 
 
-def _scripts(plotly: Sequence[str]) -> tables.Context:
-    """Style, scripts, and the policy that admits these scripts and the bundle of plotly.js."""
-    head, scripts = asset(SHARED / "theme.js"), [asset(path) for path in _SCRIPTS]
+def _scripts(expanded: Sequence[str]) -> tables.Context:
+    """Style, scripts, and the policy that admits these scripts and those that the page expands."""
+    head, scripts = asset(SHARED / "theme.js"), [asset(_FIRST)]
     return {
         "css": Markup(shared_style() + "".join(asset(path) for path in _STYLES)),
         "head": Markup(head),
         "scripts": [Markup(s) for s in scripts],
-        "csp": script_policy([head, *scripts, *plotly]),
+        "csp": script_policy([head, *scripts, *expanded]),
     }
 
 

@@ -27,6 +27,11 @@ def _path_d(x: NDArray[np.floating], y: NDArray[np.floating]) -> str:
     return "".join(out)
 
 
+def _runs(good: NDArray[np.bool_]) -> str:
+    """Index of the first point of each stretch of a path without a gap, as the page's scripts read it."""
+    return " ".join(str(i) for i in np.flatnonzero(np.diff(good.astype(np.int8), prepend=0) == 1))
+
+
 def path_picture(
     x: NDArray[np.floating], y: NDArray[np.floating], start: float, step: float, faults: Sequence[IntervalRow]
 ) -> Markup:
@@ -53,7 +58,8 @@ def path_picture(
     px = (width - (right - left) * scale) / 2 + (x - left) * scale
     py = (height - 14 + (high - low) * scale) / 2 - (y - low) * scale
     every = max(1, len(x) // 1500)
-    parts = [Markup('<path class="track" d="{}"/>').format(_path_d(px[::every], py[::every]))]
+    times = f"{start:.10g} {every * step:.10g} {_runs(good[::every])}"
+    parts = [Markup('<path class="track" data-times="{}" d="{}"/>').format(times, _path_d(px[::every], py[::every]))]
     marks: list[tuple[IntervalRow, list[float]]] = []
     for fault in faults:
         a = max(0, int((fault["start_s"] - start) / step))

@@ -18,10 +18,11 @@ from diagnosis.report.rows import Columns, Group, Row, row_json
 from diagnosis.report.tables import machine_name
 from diagnosis.report.units import units_of
 from diagnosis.results.document import IntervalRow, MachineRow, ReportDocument
-from diagnosis.results.fault_rows import LOOKS
+from diagnosis.results.fault_rows import LOOKS, state_label
 from diagnosis.results.machine_words import words_of
 from diagnosis.results.result import Closeups
 from diagnosis.results.vocabulary import Kind, Severity
+from replay.faults import DECIDED
 
 _OTHERS = 0.1
 _LEAST = 50_000
@@ -184,6 +185,8 @@ def view(
         "duration": duration,
         "name": machine_name(report["machine"]),
         "faults": faults,
+        "limit": report["limits"]["min_probability"],
+        "words": {m: state_label(m, "sensor").lower() for m in DECIDED},
         "dashes": {state: look.dash for state, look in LOOKS.items() if look.dash != "solid"},
         "figures": [[row_json(r, index) for r in rows] for rows in distinct.values()],
         "loop": [{"key": g.key, "title": g.title, "rows": [row_json(r, index) for r in g.rows]} for g in groups],

@@ -55,15 +55,31 @@ class ShownPart:
 
 def shown_parts(report: ReportDocument) -> list[ShownPart]:
     """Lines of the table, in the machine's order."""
-    by_part: dict[tuple[str, str], dict[tuple[str, float | None], DetectabilityRow]] = {}
-    for row in report["detectability"]["rows"]:
-        by_part.setdefault((row["component"], row["side"]), {})[row["deviation"], row["for_s"]] = row
+    by_part = _by_part(report)
     out, words = [], words_of(report["machine"])
     for (component, side), rows in by_part.items():
-        kind = kind_of(component, report["machine"])
-        cells = tuple(_cell(rows.get((deviation, length))) for deviation, length, _ in _COLUMNS)
+        kind, cells = kind_of(component, report["machine"]), _cells(rows)
         out.append(ShownPart(words.part_words(kind, component, side), cells, _told(kind, side, rows, words)))
     return out
+
+
+def cells_of(report: ReportDocument) -> dict[tuple[str, str], tuple[str, ...]]:
+    """For each component and side the cells between the first and the last of `HEADS`."""
+    return {key: _cells(rows) for key, rows in _by_part(report).items()}
+
+
+_Rows = Mapping[tuple[str, float | None], DetectabilityRow]
+
+
+def _by_part(report: ReportDocument) -> dict[tuple[str, str], _Rows]:
+    out: dict[tuple[str, str], dict[tuple[str, float | None], DetectabilityRow]] = {}
+    for row in report["detectability"]["rows"]:
+        out.setdefault((row["component"], row["side"]), {})[row["deviation"], row["for_s"]] = row
+    return {**out}
+
+
+def _cells(rows: _Rows) -> tuple[str, ...]:
+    return tuple(_cell(rows.get((deviation, length))) for deviation, length, _ in _COLUMNS)
 
 
 def _cell(row: DetectabilityRow | None) -> str:

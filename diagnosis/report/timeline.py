@@ -60,6 +60,7 @@ class Lane:
     bars: tuple[Bar, ...]
     faulty: str
     first: bool = False
+    side: str = ""
 
 
 @dataclass(frozen=True)
@@ -169,7 +170,9 @@ def timeline(report: ReportDocument, duration: float, bars: Collection[str] | No
         Names of the faults that get a bar of their own, the others are part of their lane's line; None: all.
     """
     faults, machine_words = report["intervals"], words_of(report["machine"])
-    brief = {key for key, side in sides_of(report).items() if not side.assessed}
+    sides = sides_of(report)
+    brief = {key for key, side in sides.items() if not side.assessed}
+    seen = {key for key, side in sides.items() if side.long_enough}
     cause = causes([f for f in faults if bars is None or f["id"] in bars])
     lanes: list[Lane] = []
     quiet: list[Lane] = []
@@ -184,9 +187,10 @@ def timeline(report: ReportDocument, duration: float, bars: Collection[str] | No
         state = _main_state(spans)
         words = "healthy" if state == State.HEALTHY else f"{state_label(state).lower()} throughout"
         if state == State.HEALTHY and (c, side) in brief:
-            state, words = State.NOT_ASSESSED, "not judged long enough"
+            state, words = State.NOT_ASSESSED, "not cleared" if (c, side) in seen else "not judged long enough"
         counts[words] = counts.get(words, 0) + 1
-        group.append(Lane(c, machine_words.part_name(kind, side), state, _lines(spans, side, duration), (), "", first))
+        name = machine_words.part_name(kind, side)
+        group.append(Lane(c, name, state, _lines(spans, side, duration), (), "", first, side))
     summary = f"{len(quiet)} lane{'s' * (len(quiet) != 1)} without a fault: " + ", ".join(
         f"{n} {words}" for words, n in counts.items()
     )
@@ -228,7 +232,7 @@ def _faulty_lane(
     words = f"{share:.1f} %" if share >= 0.05 else span(total)
     first_fault = faults[0]
     name = machine_words.part_name(first_fault["kind"], side)
-    return Lane(component, name, first_fault["mode"], _lines(spans, side, duration), drawn, words, first)
+    return Lane(component, name, first_fault["mode"], _lines(spans, side, duration), drawn, words, first, side)
 
 
 def _phases(phases: Sequence[PhaseRow], duration: float) -> tuple[Bar, ...]:

@@ -18,7 +18,7 @@ from diagnosis.response.inputs import FollowerData, cell_of, cells
 from diagnosis.response.joint import cut, joint_of
 from diagnosis.response.jumps import jumps_of
 from diagnosis.response.kernel import posterior
-from diagnosis.response.machine import Judged, lasting_losses, otherwise, standstills, unlike
+from diagnosis.response.machine import Judged, lasting_losses, otherwise, standstills, unexplained, unlike
 from diagnosis.response.models import (
     BLOCK_S,
     HEALTHY,
@@ -47,6 +47,7 @@ _AT_A_JUMP = 0.1, 0.3  # probability that a fault begins, or ends, where the cha
 _MOVES = 0.4  # of the driving speed: enough to see whether a channel lives
 _OWN, _OTHERS = 4, 2  # holds of a channel that may be faults: of the one in question, and of each other
 _LEAST_S = 1.0
+_AT_ONCE_S = 5e-3
 _DOUBT_S = 0.5  # around a spell that is judged no fault
 _HIDDEN = "a controller that holds the speed hides a weak drive, and what effort is healthy is not known where several drives move one body"
 _ALONE = "a controller that holds the speed hides a weak drive; name its current, duty or torque as its command (`wheel.{name}.u`) to have it judged"
@@ -97,7 +98,7 @@ def assess_response(
         left_out[start:stop] = True
     found = _wheels(data, left_out, (cell, width), limits, dt)
     if not found:
-        return Judgement({}, standstills(idle, dt))
+        return Judgement({}, standstills(idle, dt) or unexplained(drives, limits, dt))
     holds = {w: holds_of(j.wheel.samples, _MOVES * limits.driving_speed, dt) for w, j in found.items()}
     found = {w: j._replace(wheel=j.wheel._replace(habit=_habit(w, holds))) for w, j in found.items()}
     bodies = Bodies(speeds, None if yaw is None else cells(yaw, width), width * dt)
@@ -273,11 +274,12 @@ def _assessment(
     pictured = Pictured.of(steps_of(findings, size, dt), series)
     r = one.response
     unseen = not r.answered and one.speed is None
+    late = "at once" if r.delay < _AT_ONCE_S else f"after {r.delay:.2g} s"
     note = (
         f"{one.data.name} has no command"
         if not r.answered
         else (
-            f"{one.data.name} answers its command after {r.delay:.2g} s with a lag of {r.lag:.2g} s, up to {r.limit:.3g} {{speed_unit}} and "
+            f"{one.data.name} answers its command {late} with a lag of {r.lag:.2g} s, up to {r.limit:.3g} {{speed_unit}} and "
             f"{r.rate:.2g} m/s²; usual misfit {float(np.median(r.noise)):.2g} {{speed_unit}}"
         )
     )

@@ -12,12 +12,14 @@ from diagnosis.response.findings import Spell, Wheel
 from diagnosis.response.identification import Response
 from diagnosis.response.inputs import FollowerData
 from diagnosis.response.joint import Joint
+from replay.machine.config import Limits
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
 _LASTING = 0.8  # of what the other wheels make of the same command: over a whole mission no slip or load does that
 _NEAR = 0.5, 2.0  # of its command: what any healthy drive makes of it
+_UNMADE, _UNMADE_S = 0.6, 10.0  # of its command, and commanded time, below which nothing is made of a command
 _ELSEWHERE, _ELSEWHERE_S = 0.35, 1.5  # of the top speed: all drives that far off their commands, for so long
 
 
@@ -64,6 +66,33 @@ def standstills(idle: Sequence[tuple[int, int]], dt: float) -> tuple[str, ...]:
     return (
         f"For {total:.1f} s all drives stood still together while they were commanded to move (longest {start * dt:.1f}–{stop * dt:.1f} s): "
         "disabled, stopped by an emergency stop, or driven by another source of commands. No {wheel} is blamed for it.",
+    )
+
+
+def unexplained(drives: Sequence[FollowerData], limits: Limits, dt: float) -> tuple[str, ...]:
+    """A sentence where no drive makes anything like its command of it, over the whole mission.
+
+    Parameters
+    ----------
+    drives : Sequence[FollowerData]
+        Drives of which no answer to their commands could be found.
+    limits : Limits
+        ``driving_speed``.
+    dt : float
+        Step [s].
+    """
+    made, asked = [], []
+    for d in drives:
+        driven = np.isfinite(d.y) & (np.abs(np.nan_to_num(d.asked)) > limits.driving_speed)
+        if np.count_nonzero(driven) * dt < _UNMADE_S:
+            return ()
+        asked.append(float(np.median(np.abs(d.asked[driven]))))
+        made.append(float(np.median(np.abs(d.y[driven]))))
+    if not made or max(m / a for m, a in zip(made, asked, strict=True)) > _UNMADE:
+        return ()
+    return (
+        f"The drives were commanded to {np.median(asked):.2g} {{speed_unit}} and made {np.median(made):.2g} {{speed_unit}} of it (medians), and "
+        "nothing relates the two: another source of commands, a wrong unit, a limit, or a machine that is held. No {wheel} is blamed for it.",
     )
 
 

@@ -11,6 +11,7 @@ import json
 import os
 from collections.abc import Iterable, Iterator
 from contextlib import suppress
+from functools import cache
 from hashlib import sha256
 from pathlib import Path
 
@@ -45,6 +46,13 @@ def drop_stale_kernels(packages: Iterable[Path], stamp: Path) -> list[str]:
         stamp.write_text(json.dumps(now), "utf-8")  # first: where nothing is remembered, nothing is removed each time
         return [folder for folder in changed if _removed(folder)]
     return []
+
+
+@cache
+def drop_own_stale_kernels() -> None:
+    """Do so for this installation, once in a process and before the first kernel is loaded."""
+    root = Path(__file__).parents[2]
+    drop_stale_kernels([root / "replay", root / "diagnosis"], root / "replay" / "__pycache__" / "kernels.json")
 
 
 def _folders(top: str) -> Iterator[str]:

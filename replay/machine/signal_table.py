@@ -89,16 +89,16 @@ class CanonicalSignal:
 _VALVE_POSITION = Named(0, r"(valve|spool)_?(act|actual|fb|feedback|pos|position|ist)|spool|^u_?applied")
 _VALVE = Named(1, r"valve_?(cmd|command|out|set|ref|soll)|valve$|^u_?cmd|control_?(out|cmd)|^u$")
 _SPEED_COMMAND = (
-    r"(velo(city)?|speed|vel|rpm)_?(ref|cmd|command|set|des|target|soll)|"
-    r"(ref|cmd|set|des(ired)?|target|soll)_?(velo(city)?|speed|vel|rpm)"
+    r"(velo(city)?|speed|vel|rpm|drehzahl|geschw\w*)_?(ref|cmd|command|set|des|target|soll)|"
+    r"(ref|cmd|set|des(ired)?|target|soll)_?(velo(city)?|speed|vel|rpm|drehzahl|geschw)"
 )
 _ANGLE_COMMAND = (
-    r"(angle|phi|steer\w*)_?(ref|cmd|command|set|des|target|soll)|"
-    r"(ref|cmd|set|des(ired)?|target|soll)_?(angle|phi|steer)"
+    r"(angle|phi|steer\w*|winkel)_?(ref|cmd|command|set|des|target|soll)|"
+    r"(ref|cmd|set|des(ired)?|target|soll)_?(angle|phi|steer|winkel)"
 )
 _ASKED = r"(joystick|cmd|command|driver|desired|ref)"
 _SECOND_SPEED = r"(velo(city)?|speed|vel)_?(redundant|true|second)"
-_SPEED = r"velo(city)?|speed|(^|_)vel(_|$)|rpm|drehzahl|^omega"
+_SPEED = r"velo(city)?|speed|(^|_)vel(_|$)|rpm|drehzahl|geschw|^omega"
 _EFFORT = r"effort|torque|current|duty|pwm|moment$"
 _YAW_RATE = r"(imu|gyro).*(yaw_?rate|gyro_?z|omega_?z|angular_velocity_z)"
 _Entry = CanonicalSignal

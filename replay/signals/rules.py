@@ -24,6 +24,7 @@ _COMMON_PACKAGES = frozenset(
         *("foxglove_msgs", "lifecycle_msgs", "statistics_msgs", "service_msgs", "theora_image_transport"),
     )
 )
+_EFFORT_UNITS = (("A", r"current|(^|_)amp"), ("V", r"volt"), ("%", r"duty|pwm"))
 _WORDS_REF = re.compile(r"ref|cmd|command|set|des|target|soll|demand")
 
 
@@ -250,7 +251,13 @@ def _by_symbol(channel: Channel, machine: Machine, first: Mapping[str, int]) -> 
     if part is not None:
         signal = f"{'steer' if steering else 'wheel'}.{part}.{leaf}"
         how = {9: "by its number", 10: "as the only wheel"}.get(rank, "by its name")
-        yield Candidate(signal, _source(channel, channel.unit or ""), rank, f"{channel.name} {how}")
+        unit = channel.unit or (_effort_unit(last) if leaf == "effort" else "")
+        yield Candidate(signal, _source(channel, unit), rank, f"{channel.name} {how}")
+
+
+def _effort_unit(word: str) -> str:
+    """Unit of an effort by its name; empty where that does not tell."""
+    return next((unit for unit, pattern in _EFFORT_UNITS if re.search(pattern, word)), "")
 
 
 def _family(channel: Channel, template: str) -> str:

@@ -20,7 +20,7 @@ import json
 import sys
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
@@ -221,12 +221,14 @@ def main() -> None:
     parser.add_argument("--every", type=int, default=1, help="one of so many kinds of trouble")
     parser.add_argument("--healthy", type=int, default=40, help="healthy missions of each machine")
     parser.add_argument("--kinds", default=None, help="only kinds whose name has this text")
+    parser.add_argument("--tiers", nargs="+", choices=TIERS, default=TIERS)
     parser.add_argument("--jobs", type=int, default=1)
     parser.add_argument("--json", type=Path, metavar="FILE", help="write every outcome")
     asked = parser.parse_args()
     structure = next(n for n, s in STRUCTURES.items() if s.kind == asked.seeds)
     machines = asked.machine or [DEFAULT, structure]
     tasks = tasks_of(asked.seeds, machines, asked.duration, asked.every, asked.healthy, asked.first, asked.kinds)
+    tasks = [replace(task, tiers=tuple(asked.tiers)) for task in tasks]
     outcomes = [o for batch in run_all(tasks, asked.jobs) for o in batch]
     print("\n".join(table(outcomes)))
     for o in outcomes:

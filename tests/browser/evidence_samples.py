@@ -96,3 +96,23 @@ def spikes_long() -> tuple[dict[str, Any], samples.Columns, Closeups]:
     near = {k: v[step] for k, v in columns.items() if k != "t"}
     rows = {k: envelope(v, 16) for k, v in columns.items() if k != "t"}
     return report, {"t": 0.008 * np.arange(15_000), **rows}, Closeups(step, near)
+
+
+def healthy_evidence() -> tuple[dict[str, Any], samples.Columns]:
+    """A mission without a fault, with the residual of one speed sensor, a check of it, and what it would have shown."""
+    report, columns = samples.no_faults()
+    t = columns["t"]
+    columns["evidence.FR.sensor.residual"] = 0.004 * np.sin(t) + 0.006 * np.exp(-((t - 40.0) ** 2))
+    columns["evidence.FR.sensor.threshold"] = np.full(len(t), 0.02)
+    report["clearing"] = [
+        {"component": "FR", "side": "sensor", "check": "second_measurement", "asked": "against its second measurement", "worst": 0.15,
+         "limit": 0.25, "start_s": 67.5, "stop_s": 70.5, "shows": 0.25, "passed": True, "text": ""}
+    ]  # fmt: skip
+    report["detectability"] = {
+        "rows": [
+            {"component": "FR", "side": "sensor", "deviation": "inefficient", "for_s": 2.0, "size": 0.3, "unit": "1",
+             "share": 1.0, "places": 9, "told": "sensor"}
+        ],
+        "traces": [],
+    }  # fmt: skip
+    return report, columns

@@ -9,8 +9,10 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.signal import welch
 
 from tests.browser.downloads import saved
+from tests.report_samples import five_faults
 
 playwright = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
 expect = playwright.expect
@@ -45,7 +47,7 @@ def test_signals_are_chosen_and_removed_without_a_mouse(open_page: OPEN) -> None
     page.locator("#into").select_option(label="plot 1")
     page.get_by_role("button", name="Add", exact=True).press("Enter")
     settled(page, "plots=wheel.FR.v_true,path.y;path.y$")
-    expect(page.locator("#signals-figure")).to_contain_text("(m/s, m)")
+    expect(page.locator("#signals-figure")).to_contain_text("→ (m)")
     expect(page.locator("#signals-figure")).to_contain_text("every sample")
     page.get_by_role("button", name="Remove path.y from plot 1").press("Enter")
     settled(page, "plots=wheel.FR.v_true;path.y$")
@@ -120,3 +122,58 @@ def test_no_fault_no_link_to_evidence_but_signals(open_page: OPEN) -> None:
     assert x_range(page, "signals-figure") == [10.0, 20.0]
     page.keyboard.press("-")
     settled(page, r"#t=5\.0000,25\.0000&plots=wheel.FR.v$")
+
+
+def test_signals_stand_by_part_and_several_are_added_at_once(open_page: OPEN) -> None:
+    page = open_page("five_faults", "#fault=F1&t=27,39")
+    groups = page.eval_on_selector_all("#columns optgroup", "all => all.map(g => g.label)")
+    assert {"FR", "RL", "front", "machine"} <= set(groups)
+    assert len(groups) == len(set(groups))
+    page.locator("#columns").select_option(["wheel.FR.v", "wheel.FL.v"])
+    page.get_by_role("button", name="Difference").click()
+    settled(page, r"plots=wheel\.FL\.v%7Cwheel\.FR\.v$")
+    page.get_by_role("button", name="Change per second").click()
+    settled(page, r";d%3Awheel\.FL\.v,d%3Awheel\.FR\.v$")
+    figure = page.locator("#signals-figure")
+    expect(figure).to_contain_text("wheel.FL.v − wheel.FR.v")
+    expect(figure).to_contain_text("(m/s/s)")
+    columns = five_faults()[1]
+    inside = (columns["t"] >= 28) & (columns["t"] <= 29)
+    page.evaluate("location.hash = '#fault=F1&t=28,29&plots=wheel.FR.v%7Cwheel.FL.v;d%3Awheel.FL.v'")
+    settled(page, r"t=28\.0000,29\.0000&plots=wheel\.FR")
+    expect(figure).not_to_contain_text("Plot 3")
+    page.wait_for_timeout(500)
+    x, y, slope = page.evaluate(
+        "(d => [Array.from(d[0].x), Array.from(d[0].y), Array.from(d[1].y)])(document.getElementById('signals-figure').data)"
+    )
+    keep = [i for i, t in enumerate(x) if 28 - 1e-6 <= t <= 29 + 1e-6]
+    apart = columns["wheel.FR.v"] - columns["wheel.FL.v"]
+    assert np.allclose(np.array(y)[keep], apart[inside], atol=2e-3)
+    assert np.allclose(np.array(slope)[keep], np.gradient(columns["wheel.FL.v"], 0.01)[inside], atol=0.25)
+
+
+def test_ready_choices_and_signals_against_each_other(open_page: OPEN) -> None:
+    page = open_page("five_faults", "#fault=F1&t=27,39")
+    page.locator("#preset").select_option("All speeds")
+    settled(page, r"plots=wheel\.\w\w\.v,wheel\.\w\w\.v,wheel\.\w\w\.v,wheel\.\w\w\.v$")
+    page.locator("#preset").select_option("Paper’s figure: Wheel speeds")
+    expect(page.locator("#plots li")).to_have_count(4)
+    page.locator("#preset").select_option("Opening against speed")
+    settled(page, r"&view=xy$")
+    expect(page.locator("#signals-other")).to_have_attribute("data-view", "xy")
+    x, y = page.evaluate("(d => [Array.from(d.x), Array.from(d.y)])(document.getElementById('signals-other').data[0])")
+    assert len(x) == len(y) == pytest.approx(1200, abs=5)
+    assert max(x) > 10  # per cent of opening
+
+
+def test_spectrum_is_that_of_welch(open_page: OPEN) -> None:
+    page = open_page("five_faults", "#fault=F1&t=10,25&plots=wheel.FR.v&view=spectrum")
+    expect(page.locator("#signals-other")).to_have_attribute("data-view", "spectrum")
+    expect(page.locator("#signals-other")).to_contain_text("Welch, ")
+    t = np.arange(3000) * 0.01
+    y = np.sin(2 * np.pi * 7 * t) + 0.1 * np.random.default_rng(1).standard_normal(len(t))
+    found = page.evaluate("y => Views.welch(y, 0.01)", y.tolist())
+    frequency, power = welch(y, 100.0, nperseg=found["length"])
+    assert found["length"] == 512
+    assert np.allclose(found["f"], frequency)
+    assert np.allclose(found["p"], power, rtol=1e-6)

@@ -124,7 +124,7 @@ def test_speed_alone_is_not_assessed(base: SimulatedMission) -> None:
     sensor, actuator = got.assessments["FR", "sensor"], got.assessments["FR", "actuator"]
     assert (sensor.tier, actuator.tier) == ("none", "none")
     assert share(sensor, State.NOT_ASSESSED) == 1.0
-    assert "neither a valve command" in sensor.reasons[State.NOT_ASSESSED]
+    assert "neither a drive command" in sensor.reasons[State.NOT_ASSESSED]
 
 
 def test_speeds_of_several_wheels_alone_are_never_called_healthy(base: SimulatedMission) -> None:

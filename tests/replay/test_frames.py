@@ -33,6 +33,16 @@ def test_topics_are_tables_in_time() -> None:
     assert found["/w"].index[1] == pd.Timestamp("1970-01-01 00:00:00.5", tz="UTC")
 
 
+def test_no_sample_is_lost_where_messages_hold_different_fields() -> None:
+    """One message has ``a``, the next ``b``; two have the same stamp."""
+    a, b = np.array([0, 2, 2, 6], np.int64), np.array([1, 2, 7], np.int64)
+    words = np.array(["x", "y", "z"], object)
+    frame = log_frames(log(Channel("/w.a", "/w", "a", a, np.arange(4)), Channel("/w.b", "/w", "b", b, words)))["/w"]
+    assert frame.index.astype("int64").tolist() == [0, 1, 2, 2, 6, 7]
+    assert_array_equal(frame["a"], [0, np.nan, 1, 2, 3, np.nan])
+    assert frame["b"].fillna("").tolist() == ["", "x", "y", "", "", "z"]
+
+
 def test_tables_are_told_apart_by_their_stamps() -> None:
     fast, slow = STAMPS, STAMPS[:2]
     found = log_frames(log(Channel("a", "", "a", fast, np.arange(3.0)), Channel("b", "", "b", slow, np.arange(2.0))))

@@ -5,8 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from cli.commands.saved_results import is_truth
 
+from diagnosis.api.truths import is_truth
 from replay.errors import ConfigError
 from replay.truth import MissionTruth, read_truth, write_truth
 

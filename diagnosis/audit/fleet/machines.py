@@ -216,7 +216,7 @@ class Machine:
         found = [self._now(r) for r in self.newest]
         standing = [f for f in self.faults if f.standing]
         found += [Verdict.STOP if f.severity is Severity.HIGH else Verdict.WATCH for f in standing if not f.since]
-        found += [Verdict.WATCH for f in standing if f.open]
+        found += [Verdict.STOP for f in standing if f.open]
         known = [v for v in found if v is not None]
         return max(known, key=lambda verdict: verdict.rank, default=Verdict.NOT_ASSESSED)
 

@@ -20,6 +20,7 @@ from diagnosis.audit.store.reason_template import ReasonTemplate, reason_templat
 from diagnosis.audit.store.repairs import Repair, read_repairs
 from diagnosis.audit.store.store import FILE_NAME
 from diagnosis.results.vocabulary import Severity, Verdict
+from replay.faults import Side
 
 _LARGEST, _LONGEST = 1e6, 1e15  # of a loss ε, and of seconds and metres: more is damage
 CALENDAR_NS = 946_684_800 * 10**9  # a clock that says a time before 2000 does not know the date
@@ -138,11 +139,13 @@ def read_missions(store: Path) -> list[Mission]:
         faults: dict[int, list[FoundFault]] = defaultdict(list)
         for row in db.rows(_FAULTS):
             r, name, component, kind, side, mode, severity, seconds, e, low, high, p = _plausible(row)
-            found = FoundFault(name, component, kind, side, mode, Severity(severity), seconds, _bounds(e, low, high), p)
+            found = FoundFault(
+                name, component, kind, Side(side), mode, Severity(severity), seconds, _bounds(e, low, high), p
+            )
             faults[r].append(found)
         parts: dict[int, list[Part]] = defaultdict(list)
         for r, component, side, driving, decided, e, low, high, relative in map(_plausible, db.rows(_PARTS)):
-            parts[r].append(Part(component, side, driving, decided, _bounds(e, low, high), bool(relative)))
+            parts[r].append(Part(component, Side(side), driving, decided, _bounds(e, low, high), bool(relative)))
         results = {row[0]: _result(row, tuple(faults[row[0]]), tuple(parts[row[0]])) for row in db.rows(_RESULTS)}
         missions = [
             Mission(name, tuple(map(str, json.loads(files))), size, results.get(r), bool(gone))

@@ -71,14 +71,15 @@ def standing(m: Machine) -> str:
         last = m.last_judged
         since = f" since {utc(last.result.start_ns)[:10]}" if last and last.result.start_ns is not None else ""
         return f"{words}{since}: last judged ready" + (", but not cleared" if m.cleared is False else "")
-    if is_damaged(m):
+    stopped = m.last_judged is not None and m.last_judged.result.verdict is Verdict.STOP
+    if m.verdict is Verdict.STOP and _is_open(m) and not stopped:
+        words = "Fault open, no repair recorded"
+    elif is_damaged(m):
         words = f"No fault found, but {'a file of its last log was left out' if _lacks_a_file(m) else 'its last log is damaged'}"
     elif m.verdict is Verdict.WATCH:
         lasting = m.last_judged is not None and m.last_judged.result.verdict is Verdict.WATCH
         if lasting and m.cleared is False:
             words += ", not cleared"
-        elif _is_open(m):
-            words = "Fault open, no repair recorded"
         elif lasting and m.cleared and not m.unjudged:
             words = "Ready, with faults to watch"
     return words + (", and later missions not judged" if m.unjudged else "")

@@ -296,12 +296,12 @@ class ForkServer:
             process.wait()
 
 
-_MADE: dict[tuple[str, int], Isolation] = {}
+_MADE: dict[tuple[str, int, str], Isolation] = {}
 _MAKING = threading.Lock()
 
 
 def isolation(kind: str = "") -> Isolation:
-    """Way to start children in this process; the same one until it is closed.
+    """Way to start children in this process and working folder, which names of files are read from; the same one until it is closed.
 
     Parameters
     ----------
@@ -310,7 +310,8 @@ def isolation(kind: str = "") -> Isolation:
     """
     kind = kind or ("fork" if LINUX else "spawn")
     with _MAKING:
-        made = _MADE.get((kind, os.getpid()))
+        key = kind, os.getpid(), os.path.realpath(".")
+        made = _MADE.get(key)
         if made is None or made.closed:
             if kind == "spawn":
                 from diagnosis.audit.isolation.fresh_process import Spawner
@@ -318,6 +319,6 @@ def isolation(kind: str = "") -> Isolation:
                 made = Spawner()
             else:
                 made = ForkServer(warmed=kind == "fork")
-            _MADE[kind, os.getpid()] = made
+            _MADE[key] = made
             atexit.register(made.close)
     return made

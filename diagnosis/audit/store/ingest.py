@@ -18,6 +18,7 @@ from diagnosis.audit.store.store import RESULTS, Store
 from diagnosis.results.validation import validated
 from diagnosis.results.vocabulary import Severity, Verdict
 from replay.errors import MfhcaError
+from replay.faults import Side
 
 MAX_OBJECT = 64 << 20
 _AT_ONCE = 200
@@ -28,6 +29,7 @@ _MISFITS = (
 _LINK = re.compile(r"-m[0-9a-f]{8}\.json$")
 _MISSIONS = "missions/"
 _VERDICTS, _SEVERITIES = {v.value for v in Verdict}, {s.value for s in Severity}
+_SIDES = {s.value for s in Side}
 
 
 @dataclass(frozen=True)
@@ -119,6 +121,8 @@ def _checked(name: str, content: bytes) -> ResultObject:
         raise ValueError(f"verdict {str(verdict)[:40]!r}")
     if any(fault["severity"] not in _SEVERITIES for fault in summary.get("faults") or ()):
         raise ValueError("a fault's severity is not known")
+    if any(row["side"] not in _SIDES for name in ("faults", "components") for row in summary.get(name) or ()):
+        raise ValueError("the side of a fault or component is not known")
     if not isinstance(document["made_ns"], int) or not isinstance(mission["files"], list) or not mission["files"]:
         raise ValueError("files or time of making are missing")
     return validated(document, ResultObject, "content", "nothing of it was taken")

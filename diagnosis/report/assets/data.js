@@ -157,6 +157,34 @@ const Data = (() => {
     return { x, y, exact, stride: Math.max(per, Math.round(width * per)), stored: per };
   }
 
+  // Every value of a channel over [t0, t1], or of each block the middle of its extremes, or that of the larger size.
+  async function samples(c, t0, t1, largest) {
+    const { step, base } = view.channels[c], [a, b] = range(t0, t1), s = await segment(c, covering(c, a, b)), value = (v) => (v ? (base + v) * step : NaN);
+    const i0 = Math.max(0, Math.floor((a - s.start) / s.stride)), i1 = Math.min(s.count, Math.ceil((b - s.start) / s.stride)), y = new Float64Array(Math.max(0, i1 - i0));
+    for (let i = i0; i < i1; i++) y[i - i0] = s.stride === 1 ? value(s.q[i]) : largest ? (Math.abs(value(s.low[i])) > Math.abs(value(s.high[i])) ? value(s.low[i]) : value(s.high[i])) : (value(s.low[i]) + value(s.high[i])) / 2;
+    return { y, t: view.t0 + (s.start + i0 * s.stride) * view.dt, dt: s.stride * view.dt, stride: s.stride };
+  }
+
+  // Smallest and largest value of a channel at a time: the same where every sample is stored.
+  async function at(c, t) {
+    const { step, base } = view.channels[c], i = Math.round((t - view.t0) / view.dt), s = await segment(c, covering(c, i, i + 1)), k = Math.floor((i - s.start) / s.stride);
+    return [s.q || s.low, s.q || s.high].map((q) => (q[k] ? (base + q[k]) * step : NaN));
+  }
+
+  // Values at even times as a curve: every one where few enough, else the extremes per pixel.
+  function thinned({ y: all, t, dt, stride }, pixels) {
+    const x = [], y = [], exact = all.length <= 2 * pixels, width = exact ? 1 : all.length / pixels;
+    for (let k = 0; k * width < all.length - 0.5; k++) {
+      let lo = -1, hi = -1;
+      for (let i = Math.floor(k * width); i < Math.min(all.length, Math.floor((k + 1) * width)); i++) {
+        if (!(all[i] >= all[lo])) lo = Number.isFinite(all[i]) ? i : lo;
+        if (!(all[i] <= all[hi])) hi = Number.isFinite(all[i]) ? i : hi;
+      }
+      for (const i of lo < 0 ? [-1] : lo === hi ? [lo] : [Math.min(lo, hi), Math.max(lo, hi)]) { x.push(t + dt * (i < 0 ? Math.floor(k * width) : i)); y.push(i < 0 ? NaN : all[i]); }
+    }
+    return { x, y, exact: exact && stride === 1, stride: Math.max(stride, Math.round(width * stride)), stored: stride };
+  }
+
   // Text as a cell that no spreadsheet takes for a formula.
   const guard = (s) => `"${(/^[=+\-@\t\r]/.test(s) ? "'" : "") + s.replaceAll('"', '""')}"`;
 
@@ -197,14 +225,17 @@ const Data = (() => {
     return lines.join("\n") + "\n";
   }
 
-  // plotly.js: expanded from the page's own text; its hash stands in the page's policy.
-  let loading = null;
+  // Scripts that are expanded from the page's own text, plotly.js among them; their hashes stand in the page's policy.
+  const expanded = (id) => inflated(id, true).then((r) => r.text()).then((source) => {
+    const script = document.createElement("script");
+    script.textContent = source;
+    document.head.append(script);
+    script.remove();
+  });
+  let loading = null, more = null;
+  const later = () => (more ??= expanded("later"));
   function plotly() {
-    loading ??= inflated("plotlyjs", true).then((r) => r.text()).then((source) => {
-      const script = document.createElement("script");
-      script.textContent = source;
-      document.head.append(script);
-      script.remove();
+    loading ??= Promise.all([expanded("plotlyjs"), later()]).then(() => {
       if (!window.Plotly) throw new Error("plotly.js did not start");
       return window.Plotly;
     });
@@ -218,5 +249,24 @@ const Data = (() => {
     return reading;
   }
 
-  return { view, full, curve, csv, plotly, intervals, guard, fromBase64 };
+  return { view, full, curve, samples, at, thinned, csv, plotly, later, expanded, intervals, guard, fromBase64 };
 })();
+
+// One time for the whole page, and two markers.
+const Now = {
+  t: null, a: null, b: null, asked: false,
+  set(t, more) {
+    const { t0, dt, n } = Data.view;
+    if (!n) return; // without time series there is no time to show
+    Object.assign(this, more);
+    this.t = t === null ? null : t0 + dt * Math.min(n - 1, Math.max(0, Math.round((t - t0) / dt)));
+    if (this.asked) return;
+    this.asked = true;
+    requestAnimationFrame(() => { this.asked = false; document.documentElement.dispatchEvent(new Event("now")); });
+  },
+  leave() { if (this.t !== null && this.a === null && !this.held) this.set(null); },
+  number: (v) => (Number.isFinite(v) ? `${+v.toPrecision(4)}`.replace("-", "−") : "–"),
+};
+
+// All else that the page does; where the browser cannot expand it, the page is as without scripts.
+Data.expanded("main").catch(() => document.documentElement.classList.remove("js"));

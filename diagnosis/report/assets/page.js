@@ -21,18 +21,107 @@
       w.style.width = `${100 * (range[1] - range[0]) / view.duration}%`;
     }
     follow(explorer?.active && explorer.figure, range);
+    follow(loop?.drawn && loop, range, "#loop-linked");
     remember();
   });
-  const loop = one("#loop-figure") && new Figure(one("#loop-figure"), one("#loop-badge"));
+  const loop = one("#loop-figure") && new Figure(one("#loop-figure"), one("#loop-badge"), (range) => {
+    if (!one("#loop-linked").checked) return;
+    if (!current || !evidence?.drawn) shared = range;
+    follow(evidence?.drawn && !one("#figure").hidden && evidence, range, "#loop-linked");
+    remember();
+  });
   const explorer = one("#signals") && new Explorer(showSignals, (range) => {
     if (!current || !evidence?.drawn) shared = range;
     follow(evidence?.drawn && !one("#figure").hidden && evidence, range);
+    if (!current) follow(loop?.drawn && loop, range, "#loop-linked");
+    explorer?.across();
     remember();
   });
   const figures = { evidence, loop, signals: explorer?.figure };
 
-  function follow(figure, range) {
-    if (figure && one("#linked").checked && figure.range.some((v, i) => Math.abs(v - range[i]) > 1e-9)) figure.zoom(range);
+  // Lanes without a fault, opened: drawn when asked for.
+  one("#timeline")?.addEventListener("toggle", (e) => {
+    const key = e.target.dataset.part;
+    if (!key || !e.target.open || figures[key] || !view.n) return;
+    const element = e.target.querySelector(".lane-figure"), figure = figures[key] = new Figure(element);
+    Data.later().then(() => Lanes.draw(figure, key, e.target.querySelector(".near"))).catch((wrong) => { element.textContent = `The plots cannot be drawn: ${wrong.message}`; throw wrong; });
+  }, true);
+
+  // How the rows of a fault's figure are looked at: as they are, one row for every part, residuals as multiples of thresholds.
+  const looks = { peers: "", ratio: false };
+  function looked(f) {
+    const rows = view.figures[f.rows], own = rows.find((r) => r.key === looks.peers), list = own ? Looks.peers(own, f.component) : rows;
+    return looks.ratio ? list.map(Looks.ratio) : list;
+  }
+
+  function choices(f) {
+    const many = view.figures[f.rows].filter((r) => r.key !== "peers" && Looks.peers(r, f.component).length > 1);
+    if (!many.some((r) => r.key === looks.peers)) looks.peers = "";
+    one("#peers").replaceChildren(new Option("every panel of this part", ""), ...many.map((r) => new Option(`${r.title.replace(` ${f.component}`, "")}, all parts`, r.key)));
+    one("#peers").value = looks.peers;
+  }
+
+  function drawEvidence() {
+    const f = faults.get(current), kind = looked(f);
+    const shades = shadesOf(view.faults.filter((g) => (looks.peers ? kind.some((r) => r.component === g.component) : g.component === f.component)), f.start).map((g) => ({ ...g, main: g.id === f.id }));
+    return evidence.draw(kind, shades, shared).catch(failed("#figure"));
+  }
+
+  function look(change, button) {
+    Object.assign(looks, change);
+    button?.setAttribute("aria-pressed", String(looks.ratio));
+    if (current && !one("#figure").hidden) drawEvidence();
+  }
+
+  function robust() {
+    for (const f of Object.values(figures)) if (f) { f.robust = !f.robust; f.redraw(); }
+    for (const b of all("[data-act=robust]")) b.setAttribute("aria-pressed", String(evidence?.robust ?? loop?.robust));
+  }
+
+  // The cursor by keys: some samples, or as many pixels as ten keys take.
+  function cursor(by) {
+    const figure = active();
+    if (!figure?.drawn) return;
+    const [a, b] = figure.range, step = Math.max(view.dt, (b - a) / figure.pixels());
+    Now.set(Now.t === null || Now.t < a || Now.t > b ? (a + b) / 2 : Now.t + by * step, { held: true });
+    figure.read().show().then(() => { one("#live").textContent = figure.read().values ? figure.read().spoken() : ""; });
+  }
+
+  // Sliders below the plots: made when they are first opened.
+  let panel = null;
+  const whatIf = () => Data.later().then(() => { panel ??= new WhatIfPanel(one); figures.whatif = panel.figure; return panel.open(faults.get(current)); }).catch(failed("#whatif-words"));
+  one("#whatif")?.addEventListener("toggle", (e) => e.target.open && current && panel?.f?.id !== current && whatIf());
+
+  const mark = (name) => Now.t !== null && Now.set(Now.t, { [name]: Now.t });
+
+  let pictures = null;
+  root.addEventListener("now", () => {
+    for (const f of Object.values(figures)) if (f?.drawn) f.read().show();
+    if (Now.playing && evidence?.drawn && (Now.t < evidence.range[0] || Now.t > evidence.range[1])) evidence.pan((Now.t - evidence.range[0]) / (evidence.range[1] - evidence.range[0]));
+    Data.later().then(() => { (pictures ??= new Pictures(document)).show(); return replay?.show(); });
+  });
+
+  // Machine, path and plots on one stage, set up when it is first played or scrubbed.
+  let replay = null, staged = null;
+  const stage = () => (staged ??= Data.later().then(() => {
+    replay = new Replay(one);
+    pictures?.remove();
+    pictures = new Pictures(document);
+    figures.stage = replay.figure;
+    replay.open().catch(failed("#events-none"));
+  }));
+  const play = () => one("#replay") && stage().then(() => replay.play());
+  one("#scrub")?.addEventListener("input", (e) => { Now.set(+e.target.value, { held: true }); stage(); });
+  one("#events")?.addEventListener("click", (e) => { const b = e.target.closest("button"); if (b) Now.set(+b.dataset.at, { held: true }); });
+  // The cursor may as well be led along the timeline.
+  one("#timeline")?.addEventListener("pointermove", (e) => {
+    const box = e.target.closest(".track")?.getBoundingClientRect();
+    if (box && view.n) Now.set(view.duration * Math.min(1, Math.max(0, (e.clientX - box.left) / box.width)));
+  });
+  one("#timeline")?.addEventListener("pointerleave", () => Now.leave());
+
+  function follow(figure, range, where = "#linked") {
+    if (figure && one(where).checked && figure.range.some((v, i) => Math.abs(v - range[i]) > 1e-9)) figure.zoom(range);
   }
 
   // The address restores what is shown: fault, time, chosen signals. A new fault is a step of the browser's history.
@@ -40,6 +129,7 @@
     const parts = current ? [`fault=${encodeURIComponent(current)}`] : [];
     if (shared) parts.push(`t=${shared.map((v) => v.toFixed(4)).join(",")}`);
     if (explorer?.plots.length) parts.push(`plots=${explorer.plots.map((p) => p.map(encodeURIComponent).join(",")).join(";")}`);
+    if (explorer?.plots.length && explorer.view !== "time") parts.push(`view=${explorer.view}`);
     const address = `#${parts.join("&")}`;
     if (!parts.length || address === location.hash) return;
     try { history[step ? "pushState" : "replaceState"](null, "", address); } catch { /* browsers limit how often; the next change tells */ }
@@ -82,17 +172,22 @@
     for (const e of all(`[data-f="${CSS.escape(id)}"]`)) if (e.matches(".fb, tr.fault")) e.setAttribute("aria-current", "true");
     keepInTable(one("tr.fault[aria-current]"));
     one("#live").textContent = `Showing ${id}: ${f.title}`;
-    if (scroll) one("#evidence").scrollIntoView({ behavior: matchMedia("(prefers-reduced-motion: reduce)").matches ? "auto" : "smooth" });
+    if (scroll) go("#evidence", scroll === "at once");
     shared = range || ranges.fault(f);
     remember(stepped && before && before !== id);
     if (!evidence) return;
     const rows = view.figures[f.rows];
-    articleOf(id).querySelector(".slot").append(one("#figure"));
+    articleOf(id).querySelector(".slot").append(one("#looks"), one("#figure"), one("#whatif"));
+    if (one("#whatif").open) whatIf();
+    one("#looks").hidden = !rows.length;
     one("#figure").hidden = !rows.length;
     for (const b of all("[data-of=evidence], [data-zoom]")) b.disabled = !rows.length;
     if (!rows.length) return;
-    const shades = shadesOf(view.faults.filter((g) => g.component === f.component), f.start).map((g) => ({ ...g, main: g.id === id }));
-    evidence.draw(rows, shades, shared).catch(failed("#figure"));
+    Data.later().then(() => { if (current === id) { choices(f); return drawEvidence(); } });
+  }
+
+  function go(where, atOnce) {
+    one(where).scrollIntoView({ behavior: atOnce || matchMedia("(prefers-reduced-motion: reduce)").matches ? "auto" : "smooth" });
   }
 
   function keepInTable(row) {
@@ -110,6 +205,8 @@
     const at = document.activeElement;
     if (explorer?.active && one("#signals").contains(at)) return explorer.figure;
     if (loop?.drawn && one("#loop").contains(at)) return loop;
+    const lane = at?.closest(".more")?.dataset.part;
+    if (figures[lane]?.drawn) return figures[lane];
     return evidence?.drawn && !one("#figure").hidden ? evidence : explorer?.active ? explorer.figure : loop?.drawn ? loop : null;
   }
 
@@ -120,7 +217,7 @@
     if (!loop || !group) return;
     loopKey = key;
     for (const b of all("[data-loop]")) b.setAttribute("aria-pressed", String(b.dataset.loop === key));
-    loop.draw(group.rows, shadesOf(view.faults).map((f) => ({ ...f, main: false })), loop.drawn ? loop.range : [0, view.duration]).catch(failed("#loop-figure"));
+    loop.draw(group.rows, shadesOf(view.faults).map((f) => ({ ...f, main: false })), one("#loop-linked").checked && shared ? shared : loop.drawn ? loop.range : [0, view.duration]).catch(failed("#loop-figure"));
   }
 
   function showSignals() {
@@ -137,19 +234,22 @@
     root.dispatchEvent(new Event("theme"));
   }
 
-  const redraw = () => Promise.all([evidence?.redraw(), loop?.redraw(), explorer?.active && explorer.figure.redraw()]);
+  const redraw = () => Promise.all(Object.entries(figures).map(([name, f]) => (name !== "signals" || explorer?.active) && f?.redraw()).concat(explorer?.across()));
   const fileName = (of) => ({ evidence: current, loop: `loop-${loopKey}`, signals: "signals" })[of];
 
   const actions = {
     zoom: (b) => zoom(b.dataset.zoom),
     csv: ({ dataset: { of } }) => figures[of].rows.length && figures[of].csv().then((text) => Export.save(`${fileName(of)}.csv`, "text/csv", text)),
     image: ({ dataset: { of, form } }) => figures[of].drawn && Export.image(figures[of], fileName(of), form),
+    ratio: (b) => look({ ratio: !looks.ratio }, b),
+    robust, play,
+    taller: () => active()?.stretch(2),
     json: () => Export.json(current),
     table: () => Export.table(),
     copy: (b) => Export.copy(articleOf(current), b),
-    add: () => explorer.add(one("#columns").value),
+    add: (b) => explorer.add(b.dataset.how),
     "signals-clear": () => { explorer.set([]); one("#find").focus(); },
-    "loop-all": () => loop.zoom([0, view.duration]),
+    "loop-all": () => { one("#loop-linked").checked = false; loop.zoom([0, view.duration]); },
     theme: () => setTheme(root.dataset.theme === "dark" ? "light" : "dark"),
     print: () => window.print(),
     "print-all": () => { root.dataset.print = "all"; window.print(); },
@@ -166,13 +266,17 @@
   });
 
   document.addEventListener("keydown", (e) => {
-    if (e.ctrlKey || e.metaKey || e.altKey || one("#help").open || e.target.matches("input:not([type=checkbox]), select, textarea")) return;
+    if (e.ctrlKey || e.metaKey || e.altKey || document.querySelector("dialog[open]") || e.target.matches("input:not([type=checkbox], [type=range]), select, textarea") || (e.target.matches("[type=range]") && /^(Arrow|Home|End|Page)/.test(e.key))) return;
     if ((e.key === "Enter" || e.key === " ") && e.target.matches("g[data-f]")) { e.preventDefault(); select(e.target.dataset.f, { scroll: true, step: true }); return; }
     if (e.key.startsWith("Arrow") && e.target.closest(".scroll")) return;
     const key = {
       j: () => step(1), k: () => step(-1), f: () => zoom("fault"), o: () => zoom("onset"), e: () => zoom("end"),
       m: () => active()?.zoom(ranges.mission()), ArrowLeft: () => active()?.pan(-0.25), ArrowRight: () => active()?.pan(0.25),
       "+": () => active()?.scale(0.5), "=": () => active()?.scale(0.5), "-": () => active()?.scale(2),
+      ",": () => cursor(-1), ".": () => cursor(1), "<": () => cursor(-10), ">": () => cursor(10), a: () => mark("a"), b: () => mark("b"),
+      Escape: () => Now.set(null, { a: null, b: null, held: false }), y: robust, z: () => active()?.stretch(2), Z: () => active()?.stretch(0.5),
+      p: play, w: () => { const e = one("#whatif"); if (e) { e.open = true; go("#whatif"); one("#whatif-mode").focus({ preventScroll: true }); } },
+      g: () => { go("#evidence"); one("#figure")?.focus({ preventScroll: true }); },
       s: () => one("#find")?.focus(), t: actions.theme, "?": actions.help,
     }[e.key];
     if (key) { e.preventDefault(); key(); }
@@ -187,8 +291,9 @@
     if (faults.has(id)) select(id, { range, scroll });
     else if (!current && faults.size) select(faults.keys().next().value, { range });
     else if (!faults.size && range) shared = range;
+    if (explorer && plots) one("#signals-view").value = ["xy", "spectrum"].find((v) => v === read("view")) ?? "time";
     if (explorer && (plots || faults.has(id)) && JSON.stringify(wanted) !== JSON.stringify(explorer.plots)) explorer.set(wanted);
-    const lacking = explorer ? [...new Set(wanted.flat())].filter((n) => !explorer.names.has(n)) : [];
+    const lacking = explorer ? [...new Set(wanted.flat())].filter((n) => !explorer.meaning(n)) : [];
     tell([
       read("fault") && !faults.has(id) ? `There is no fault ${cut(id || read("fault"))} in this report${current ? `: ${current} is shown` : ""}.` : "",
       read("t") && !range ? `“${cut(plain(read("t")) || read("t"))}” is not a time: expected t=seconds or t=from,to.` : "",
@@ -225,12 +330,23 @@
   });
 
   root.addEventListener("theme", () => { one("#theme").setAttribute("aria-pressed", String(root.dataset.theme === "dark")); redraw(); });
+  one("#peers")?.addEventListener("change", (e) => look({ peers: e.target.value }));
+  one("#loop-linked")?.addEventListener("change", () => loop.drawn && drawLoop(loopKey));
   one("#linked")?.addEventListener("change", () => explorer.active && showSignals());
   addEventListener("hashchange", (e) => fromAddress(new URL(e.newURL).hash, true));
   let resizing = 0;
   addEventListener("resize", () => { clearTimeout(resizing); resizing = setTimeout(redraw, 200); });
   one("#theme").setAttribute("aria-pressed", String(root.dataset.theme === "dark"));
-  fromAddress(location.hash, false);
+  const asked = location.hash;
+  fromAddress(asked, "at once");
+  // A link to signals alone shows them, also once what stands above them has grown, unless the reader has moved on.
+  if (explorer && /[#&]plots=/.test(asked) && !/[#&]fault=/.test(asked)) {
+    let moved = false;
+    for (const e of ["wheel", "pointerdown", "keydown"]) addEventListener(e, () => { moved = true; }, { once: true, passive: true });
+    const grown = new ResizeObserver(() => { if (!moved) go("#signals", true); });
+    for (const e of ["#figure", "#loop-figure", "#signals-figure"]) if (one(e)) grown.observe(one(e));
+    setTimeout(() => grown.disconnect(), 5000);
+  }
   if (loop) {
     // Drawn when it comes near, or a little later so that it is there to be printed.
     const begin = () => { seen.disconnect(); clearTimeout(later); drawLoop(loopKey); };

@@ -2,7 +2,50 @@
 // One figure: rows of panels over one time axis. Zooming thins the samples anew and restyles once.
 class Figure {
   constructor(element, badge, onRange) {
-    Object.assign(this, { element, badge, onRange, rows: [], shades: [], range: [0, 1], drawn: false, busy: false, again: false, job: 0 });
+    Object.assign(this, { element, badge, onRange, rows: [], shades: [], range: [0, 1], drawn: false, busy: false, again: false, job: 0, robust: false, tall: 1 });
+    element.addEventListener("pointermove", (e) => { if (this.drawn && !e.buttons && this.read().inside(e)) Now.set(this.read().time(e)); });
+    element.addEventListener("pointerleave", () => Now.leave());
+    // A click sets a marker; a drag is a zoom.
+    element.addEventListener("pointerdown", (e) => {
+      if (!this.drawn || e.button || !this.read().inside(e)) return;
+      addEventListener("pointerup", (up) => {
+        if (Math.hypot(up.clientX - e.clientX, up.clientY - e.clientY) > 4 || e.target.closest(".modebar")) return;
+        Now.set(this.read().time(e), { [e.shiftKey ? "b" : "a"]: this.read().time(e) });
+      }, { once: true, capture: true });
+    }, true);
+    element.addEventListener("wheel", (e) => { if (e.shiftKey && this.drawn) { e.preventDefault(); this.stretch(e.deltaY + e.deltaX < 0 ? 2 : 0.5); } }, { passive: false });
+  }
+
+  read() { return (this.reading ??= new Reading(this)); }
+
+  // Smallest and largest value of a curve at a time, in the row's unit.
+  static async at(t, time) {
+    if (!t.op) return (await Data.at(t.c, time)).map((v) => v * t.k);
+    const d = await Figure.computed(t, time, time), v = d.y[Math.round((time - d.t) / d.dt)];
+    return [v, v];
+  }
+
+  // A curve made from others: values worked out on the page, a difference, a ratio, or the change per second.
+  static async computed(t, t0, t1) {
+    if (t.op === "given") {
+      const { y, t: from, dt } = t.data, i = Math.min(y.length, Math.max(0, Math.floor((t0 - from) / dt + 1e-6) - 1)), j = Math.max(i, Math.min(y.length, Math.ceil((t1 - from) / dt) + 2));
+      return { ...t.data, y: y.slice(i, j).map((v) => v * t.k), t: from + i * dt };
+    }
+    const a = await Data.samples(t.c, t0, t1), b = t.other === undefined ? null : await Data.samples(t.other, t0, t1), n = a.y.length, y = new Float64Array(n);
+    const other = (i) => b.y[Math.min(b.y.length - 1, Math.max(0, Math.round((a.t + i * a.dt - b.t) / b.dt)))];
+    for (let i = 0; i < n; i++) y[i] = t.k * (t.op === "over" ? a.y[i] / other(i) : t.op === "minus" ? a.y[i] - other(i) : (a.y[Math.min(n - 1, i + 1)] - a.y[Math.max(0, i - 1)]) / (a.dt * (Math.min(n - 1, i + 1) - Math.max(0, i - 1))));
+    return { ...a, y };
+  }
+
+  // Height of the values: twice or half as tall about the middle of what is shown; `robust`: without a few outliers.
+  stretch(by) { this.tall = by ? Math.min(64, Math.max(1, this.tall * by)) : 1; return this.redraw(); }
+
+  // Range of a row's axis, or null for all values; and what it cuts off.
+  heights(row, curves) {
+    const y = curves.flatMap((c) => c.y.filter(Number.isFinite)), robust = this.robust && !row.limits ? Looks.robust(curves) : null;
+    if (this.tall === 1 || !y.length) return robust;
+    const least = y.reduce((a, b) => Math.min(a, b), Infinity), most = y.reduce((a, b) => Math.max(a, b), -Infinity), [low, high] = robust?.range ?? row.limits ?? [least, most], middle = (low + high) / 2, half = (high - low || 1) / 2 / this.tall;
+    return { range: [middle - half, middle + half], least, most };
   }
 
   static colour(name) { return getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim(); }
@@ -44,6 +87,7 @@ class Figure {
   // Curves of all rows for the current range, in the order of `traces`.
   async fetch(range) {
     const pixels = this.pixels(), [t0, t1] = range;
+    const made = (t) => Figure.computed(t, t0, t1).then((d) => Data.thinned(d, pixels));
     const one = (c, k) => Data.curve(c, t0, t1, pixels).then((d) => (k === 1 ? d : { ...d, y: d.y.map((v) => v * k) }));
     const curves = [];
     for (const row of this.rows) {
@@ -55,7 +99,7 @@ class Figure {
         const d = await one(row.threshold, row.bandScale);
         curves.push(d, { ...d, y: d.y.map((v) => -v) });
       }
-      for (const t of row.traces) curves.push(await one(t.c, t.k));
+      for (const t of row.traces) curves.push(await (t.op ? made(t) : one(t.c, t.k)));
     }
     return curves;
   }
@@ -86,11 +130,11 @@ class Figure {
       list.push({
         type: "scatter", mode: Figure.mode(d), marker: { size: 4 }, x: d.x, y: d.y, name: Figure.text(name), connectgaps: false, xaxis: "x",
         yaxis: right ? `y${100 + i}` : `y${i ? i + 1 : ""}`, line: { color: Figure.colour(s.colour), width: s.width, dash: s.dash || "solid" },
-        hovertemplate: `%{y:.4~g} ${unit === "1" ? "" : Figure.text(unit)}<extra>${Figure.text(name)}</extra>`, ...more,
+        hoverinfo: "skip", ...more,
       });
     };
     this.rows.forEach((row, i) => {
-      if (row.band) add(i, "band", "95 % band", row.unit, false, { fill: "toself", opacity: 0.22, fillcolor: Figure.colour("accent"), mode: "lines", hoverinfo: "skip", hovertemplate: null });
+      if (row.band) add(i, "band", "95 % band", row.unit, false, { fill: "toself", opacity: 0.22, fillcolor: Figure.colour("accent"), mode: "lines" });
       if (row.threshold !== undefined) {
         add(i, "threshold", "+ threshold", row.unit, false);
         add(i, "threshold", "− threshold", row.unit, false);
@@ -119,7 +163,7 @@ class Figure {
   }
 
   // Channels that a row draws.
-  static channels(row) { return [...row.traces.map((t) => t.c), ...(row.band || []), ...(row.threshold === undefined ? [] : [row.threshold])]; }
+  static channels(row) { return [...row.traces.flatMap((t) => (t.other === undefined ? [t.c] : [t.c, t.other])), ...(row.band || []), ...(row.threshold === undefined ? [] : [row.threshold])]; }
 
   // Title and legend of a row, wrapped to the figure's width; at the end how it is drawn.
   heading(row, curves) {
@@ -128,6 +172,7 @@ class Figure {
     if (peers.length) entries.unshift([Figure.style("peer"), peers.join(", ")]);
     if (row.threshold !== undefined) entries.push([Figure.style("threshold"), "± threshold"]);
     if (row.level !== undefined) entries.push([Figure.style("threshold"), `limit ${row.level}`]);
+    const cut = this.heights(row, curves);
     if (row === this.rows[0] && this.shades.some((s) => s.main && s.detected != null)) entries.push([{ colour: "text", sign: "╎" }, "detected"]);
     const muted = Figure.colour("muted"), room = this.pixels() / 6.4, title = `${row.title} (${row.unit})`;
     let text = `<b>${Figure.text(row.title)}</b> (${Figure.text(row.unit)})`, used = title.length, lines = 1;
@@ -136,7 +181,7 @@ class Figure {
       used += n.length + 6;
       text += `<span style="color:${Figure.colour(s.colour)}">${s.sign}</span> <span style="color:${muted}">${Figure.text(n)}</span>`;
     }
-    const drawn = Figure.drawn(curves);
+    const drawn = Figure.drawn(curves) + (cut ? ` · scale cut, values from ${Now.number(cut.least)} to ${Now.number(cut.most)}` : "");
     if (used + 30 > room) { text += "<br>"; lines += 1; } else text += "   ";
     return { text: `${text}<span style="color:${muted}"><i>${drawn}</i></span>`, lines };
   }
@@ -149,6 +194,7 @@ class Figure {
   layout(width) {
     const [text, muted, line, grid] = ["text", "muted", "line", "line2"].map(Figure.colour);
     const panel = width ? 78 : this.rows.length > 5 ? 104 : 128, foot = 44, headings = this.headings(this.curves);
+    this.lines = headings.map((h) => h.lines);
     const heads = headings.map((h) => 15 + 16 * h.lines), plot = heads.reduce((sum, h) => sum + h + panel, 0), height = plot + foot;
     const last = this.rows.length;
     const layout = {
@@ -156,24 +202,24 @@ class Figure {
       paper_bgcolor: "rgba(0,0,0,0)", plot_bgcolor: "rgba(0,0,0,0)", showlegend: false, dragmode: "zoom",
       modebar: { bgcolor: "rgba(0,0,0,0)", color: muted, activecolor: Figure.colour("accent") },
       font: { color: text, size: 12, family: getComputedStyle(document.body).fontFamily },
-      hovermode: "x unified", hoverlabel: { bgcolor: Figure.colour("surface"), bordercolor: line, font: { color: text } },
+      hovermode: false,
       xaxis: {
         range: [...this.range], tickformat: ".9~g", anchor: last > 1 ? `y${last}` : "y", gridcolor: grid, zeroline: false, linecolor: line, tickcolor: line,
-        ticks: "outside", unifiedhovertitle: { text: "%{x:.4f} s" }, showspikes: true, spikemode: "across", spikesnap: "cursor", spikethickness: 1, spikedash: "solid",
-        spikecolor: muted, title: { text: "mission time (s)", standoff: 4, font: { color: muted, size: 12 } },
+        ticks: "outside", title: { text: "mission time (s)", standoff: 4, font: { color: muted, size: 12 } },
       },
       shapes: [], annotations: [],
     };
     let down = 0;
+    const parts = this.perRow(this.curves), cuts = this.rows.map((r, i) => this.heights(r, parts[i]));
     this.rows.forEach((row, i) => {
       down += heads[i] + panel;
       const top = 1 - (down - panel) / plot, axis = `yaxis${i ? i + 1 : ""}`;
       layout[axis] = {
         domain: [Math.max(0, top - panel / plot), top], gridcolor: grid, zerolinecolor: line, fixedrange: true, nticks: 5, tickformat: ".4~g",
-        ...(row.limits ? { range: row.limits } : {}), ...(row.clip ? { autorangeoptions: { clipmin: row.clip[0], clipmax: row.clip[1] } } : {}),
+        ...Figure.ranged(cuts[i], row), ...(row.clip ? { autorangeoptions: { clipmin: row.clip[0], clipmax: row.clip[1] } } : {}),
       };
       if (row.rightUnit) layout[`yaxis${100 + i}`] = { overlaying: `y${i ? i + 1 : ""}`, side: "right", anchor: "x", showgrid: false, zeroline: false, fixedrange: true, nticks: 4, tickfont: { color: muted }, tickformat: ".3~g", title: { text: Figure.text(`${row.rightUnit.title} (${row.rightUnit.unit})`), font: { size: 11, color: muted }, standoff: 2 } };
-      if (row.level !== undefined) layout.shapes.push({ type: "line", xref: "paper", yref: `y${i ? i + 1 : ""}`, x0: 0, x1: 1, y0: row.level, y1: row.level, line: { color: Figure.colour("stuck"), width: 1.3, dash: "dash" } });
+      for (const level of row.levels ?? [row.level]) if (level !== undefined) layout.shapes.push({ type: "line", xref: "paper", yref: `y${i ? i + 1 : ""}`, x0: 0, x1: 1, y0: level, y1: level, line: { color: Figure.colour("stuck"), width: 1.3, dash: "dash" } });
       layout.annotations.push({
         xref: "paper", yref: "paper", x: 0, y: top, yshift: 3, xanchor: "left", yanchor: "bottom", showarrow: false, align: "left", font: { size: 12 },
         text: headings[i].text,
@@ -182,6 +228,8 @@ class Figure {
     this.shade(layout);
     return layout;
   }
+
+  static ranged(cut, row) { return cut ? { range: cut.range, autorange: false } : row.limits ? { range: row.limits, autorange: false } : { autorange: true }; }
 
   // Intervals of faults behind the panels that show their component, named in the first.
   shade(layout) {
@@ -252,13 +300,14 @@ class Figure {
     this.coarse = this.coarseness(curves);
     await Plotly.react(this.element, this.traces(curves), this.layout(), config);
     this.label(curves);
+    if (Now.t !== null) this.read().show();
     if (!this.drawn) {
       this.drawn = true;
       this.element.on("plotly_relayout", (e) => {
         const r = e["xaxis.range"] || ("xaxis.range[0]" in e ? [e["xaxis.range[0]"], e["xaxis.range[1]"]] : null);
         if (r && !this.busy) this.zoom(r.map(Number));
       });
-      this.element.on("plotly_doubleclick", () => this.zoom([0, Data.view.duration]));
+      this.element.on("plotly_doubleclick", () => { Now.set(Now.t, { a: null }); this.zoom([0, Data.view.duration]); });
     }
     this.onRange?.(this.range);
   }
@@ -288,8 +337,11 @@ class Figure {
         this.curves = curves;
         const coarse = this.coarseness(curves), shapes = coarse === this.coarse ? {} : { shapes: this.layout().shapes };
         this.coarse = coarse;
-        await Plotly.update(this.element, this.restyled(curves), { "xaxis.range": target, ...heads, ...shapes });
+        const axes = {};
+        if (this.robust || this.tall > 1) this.perRow(curves).forEach((part, i) => Object.entries(Figure.ranged(this.heights(this.rows[i], part), this.rows[i])).forEach(([k, v]) => { axes[`yaxis${i ? i + 1 : ""}.${k}`] = v; }));
+        await Plotly.update(this.element, this.restyled(curves), { "xaxis.range": target, ...heads, ...shapes, ...axes });
         this.label(curves);
+        if (Now.t !== null) this.read().show();
       } while (this.again);
     } finally { this.busy = false; }
   }
@@ -324,7 +376,8 @@ class Figure {
   csv() {
     const columns = new Map();
     for (const row of this.rows) {
-      for (const t of row.traces) columns.set(t.c, { c: t.c, k: t.k, unit: t.unit ?? (t.right ? row.rightUnit.unit : row.unit) });
+      for (const t of row.traces) if (t.other !== undefined) columns.set(t.other, { c: t.other, k: Data.view.channels[t.other].k, unit: Data.view.channels[t.other].unit });
+      for (const t of row.traces) columns.set(t.c, t.op ? { c: t.c, k: Data.view.channels[t.c].k, unit: Data.view.channels[t.c].unit } : { c: t.c, k: t.k, unit: t.unit ?? (t.right ? row.rightUnit.unit : row.unit) });
       for (const c of row.band || []) columns.set(c, { c, k: row.bandScale, unit: row.unit });
       if (row.threshold !== undefined) columns.set(row.threshold, { c: row.threshold, k: row.bandScale, unit: row.unit });
     }

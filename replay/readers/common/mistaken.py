@@ -21,7 +21,6 @@ _KINDS = (
     (b"Rar!\x1a\x07", "a RAR archive", "unpack it and give what is in it"),
     (b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1", "a file of Microsoft Office", "export its table as CSV and give that"),
     (b"%PDF-", "a PDF document", "give the log that it tells of"),
-    (b"\x7fELF", "a program", "give the log"),
 )
 
 

@@ -5,11 +5,11 @@ The diagnosis needs none, so that they are left out unless a log is to be given 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 from rosbags.interfaces import Nodetype
 
@@ -43,12 +43,16 @@ class TextStore:
     def add(self, rows: Rows, columns: Mapping[str, Sequence[str]]) -> None:
         """Add texts of some rows of the topic, shape (m,) each, by path."""
         for path, texts in columns.items():
-            if path not in self._parts and len(self._parts) >= MAX_PATHS:
-                self.skipped.add(path)
-                continue
-            values = np.empty(len(texts), object)
-            values[:] = [self._word(text) for text in texts]
-            self._parts.setdefault(path, []).append((rows, values))
+            self.add_words(rows, path, texts, None)
+
+    def add_words(self, rows: Rows, path: str, words: Sequence[str], which: Rows | None) -> None:
+        """Add texts of some rows, shape (m,): the words themselves, or those of the given numbers."""
+        if path not in self._parts and len(self._parts) >= MAX_PATHS:
+            self.skipped.add(path)
+            return
+        values = np.empty(len(words), object)
+        values[:] = [self._word(text) for text in words]
+        self._parts.setdefault(path, []).append((rows, values if which is None else values[which]))
 
     def _word(self, text: str) -> str:
         """The text itself, the same object wherever it occurs again."""
@@ -128,31 +132,45 @@ class TextDecoder:
         """Take the texts of payloads that lie as a layout says; give those that do not."""
         if not len(left):
             return left
-        at = np.concatenate([np.arange(a, a + len(c)) for a, c in layout.checks]) if layout.checks else np.arange(0)
-        content = np.frombuffer(b"".join(c for _, c in layout.checks), np.uint8)
         same = np.ones(len(left), np.bool_)
-        for offset, byte in zip(at.tolist(), content.tolist(), strict=True):
-            same &= data[starts[left] + offset] == byte
+        for at, content in _joined(layout.checks):
+            same &= (_cells(data, starts[left] + at, len(content)) == np.frombuffer(content, np.uint8)).all(axis=1)
         mine = left[same]
         if len(mine):
             self.store.skipped.update(layout.long)
-            self.store.add(rows[mine], {p: _texts(data, starts[mine] + a, n) for p, a, n in layout.texts})
+            for path, at, size in layout.texts:
+                self.store.add_words(rows[mine], path, *_texts(data, starts[mine] + at, size))
         return left[~same]
 
 
-def _texts(data: NDArray[np.uint8], starts: Rows, size: int) -> list[str]:
-    """Texts of one size [bytes] at some places; each distinct one is decoded once."""
+def _joined(checks: Sequence[tuple[int, bytes]]) -> list[tuple[int, bytes]]:
+    """Checked bytes, those that follow each other as one piece."""
+    out: list[tuple[int, bytes]] = []
+    for at, content in sorted(checks):
+        if out and at <= out[-1][0] + len(out[-1][1]):
+            first, held = out[-1]
+            out[-1] = first, held[: at - first] + content + held[at - first + len(content) :]
+        else:
+            out.append((at, content))
+    return out
+
+
+def _cells(data: NDArray[np.uint8], starts: Rows, size: int) -> NDArray[np.uint8]:
+    """Bytes at some places, shape (n, size)."""
+    return sliding_window_view(data, size)[starts]
+
+
+def _texts(data: NDArray[np.uint8], starts: Rows, size: int) -> tuple[list[str], Rows]:
+    """Distinct texts of one size [bytes] at some places, and which of them stands at each, shape (n,)."""
     if size <= 0:
-        return [""] * len(starts)
-    read: Callable[[int], str] = lambda at: _decoded(data[at : at + size].tobytes())  # noqa: E731
+        return [""], np.zeros(len(starts), np.int64)
     if len(starts) * size > _GATHERED:
-        return [read(at) for at in starts.tolist()]
-    cells: NDArray[Any] = np.ascontiguousarray(data[starts[:, None] + np.arange(size)])
+        return [_decoded(data[at : at + size].tobytes()) for at in starts.tolist()], np.arange(len(starts))
+    cells = _cells(data, starts, size)
     if (cells == cells[0]).all():
-        return [read(int(starts[0]))] * len(starts)
+        return [_decoded(cells[0].tobytes())], np.zeros(len(starts), np.int64)
     unique, which = np.unique(cells, axis=0, return_inverse=True)
-    words = [_decoded(row.tobytes()) for row in unique]
-    return [words[i] for i in which.ravel().tolist()]
+    return [_decoded(row.tobytes()) for row in unique], which.ravel()
 
 
 def _decoded(raw: bytes) -> str:

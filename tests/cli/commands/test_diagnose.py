@@ -329,3 +329,14 @@ def test_the_paper_s_numbers_are_said_before_the_verdict(source: str, words: str
     out = capture.get()
     assert out.startswith(words)
     assert -1 < out.index("gear ratio 17.7") < out.index("1 faults")
+
+
+def test_a_second_file_without_any_signal_is_a_note(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    table = small_table(tmp_path)
+    other = table[["time_ns"]].assign(temperature=21.5)
+    other.to_csv(tmp_path / "weather.csv", index=False)
+    out = tmp_path / "out"
+    assert run(["diagnose", str(tmp_path / "ok.csv"), str(tmp_path / "weather.csv"), "-o", str(out)]) in (0, 1, 3)
+    report = json.loads((out / "report.json").read_text(encoding="utf-8"))
+    assert "none of its channels is a signal" in capsys.readouterr().out
+    assert any("weather.csv: none of its channels is a signal" in q["result"] + q["effect"] for q in report["quality"])

@@ -184,6 +184,20 @@ def test_tables_keep_to_the_width(
     assert max(len(line) for line in capsys.readouterr().out.splitlines()) <= int(columns)
 
 
+def test_names_of_all_channels_are_never_broken(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("COLUMNS", "80")
+    log = Path(__file__).resolve().parents[3] / "sample_logs" / "paper.mcap"
+    assert run(["channels", str(log), "--all", "--json"]) == 0
+    fields = [row["field"] for row in json.loads(capsys.readouterr().out)["channels"]]
+    assert run(["channels", str(log), "--all"]) == 0
+    words = set(capsys.readouterr().out.split())
+    named = [field for field in fields if "covariance" not in field]
+    assert max(map(len, named)) > 25
+    assert {field for field in named if field not in words} == set()
+
+
 def test_a_crash_in_one_file_does_not_stop_the_others(
     mission_log: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -12,7 +12,7 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 import mfhca
-from diagnosis.api.figures import COLOURS, STYLES, colour_of
+from diagnosis.api.figure_style import COLOURS, STYLES, colour_of
 from diagnosis.api.series import Series
 from diagnosis.report.plot_rows import fault_rows
 from diagnosis.results.machine_words import words_of
@@ -127,3 +127,20 @@ def test_a_result_without_time_series_says_so(result: mfhca.Diagnosis) -> None:
     assert bare.plot() is not None
     with pytest.raises(mfhca.ConfigError, match="no time series of F1 was kept"):
         bare.plot_fault("F1")
+
+
+def test_names_from_logs_are_shown_verbatim(result: mfhca.Diagnosis) -> None:
+    report = result.report
+    files = [{**report["log"]["files"][0], "path": "<b>%{y}</b>.mcap"}]
+    odd: Any = {**report, "log": {**report["log"], "files": files}}
+    figure: Any = mfhca.Diagnosis(replace(result._result, report=odd)).plot("cmd.v")
+    assert figure.layout.title.text.startswith("&lt;b&gt;&#37;{y}&lt;/b&gt;.mcap<br>")
+
+
+def test_thousands_of_faults_are_not_all_shaded(result: mfhca.Diagnosis) -> None:
+    first = result.report["intervals"][0]
+    many = [{**first, "id": f"F{i}", "start_s": i * 0.01, "stop_s": i * 0.01 + 0.005} for i in range(1, 1501)]
+    crowded: Any = {**result.report, "intervals": many}
+    figure: Any = mfhca.Diagnosis(replace(result._result, report=crowded)).plot("speed")
+    assert "the 100 most severe of 1500 faults are shaded" in figure.layout.title.text
+    assert len(figure.layout.shapes) == 100  # of one wheel, in its own row

@@ -89,6 +89,7 @@ def test_scores_are_those_of_the_command_line(
     assert scores.faults["outcome"].tolist() == ["right", "right"]
     assert scores.events.loc["wheel", "right"] == 2
     assert scores.sides.loc[("wheel", "sensor"), "decided_share"] > 0.9
+    assert scores.notes == ()
     assert set(scores.reported["id"]) == set(result.faults.index)
     page = scores.save(tmp_path / "scores.html")
     assert "<html" in page.read_text(encoding="utf-8")
@@ -119,6 +120,17 @@ def test_an_audit(made: mfhca.MadeLog, result: mfhca.Diagnosis, tmp_path: Path) 
     assert events[0] == "start"
     again = mfhca.audit(str(logs), str(tmp_path / "out"), jobs=1)
     assert (again.skipped, len(again.missions)) == (1, 1)
+
+
+def test_an_audit_in_another_working_folder(
+    made: mfhca.MadeLog, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for name in ("monday", "tuesday"):
+        place = tmp_path / name
+        (place / "logs").mkdir(parents=True)
+        (place / "logs" / f"{name}.mcap").write_bytes(made.log.read_bytes())
+        monkeypatch.chdir(place)
+        assert mfhca.audit("logs", "out", jobs=1).missions["state"].to_dict() == {name: "ok"}
 
 
 def test_an_audit_of_nothing(tmp_path: Path) -> None:

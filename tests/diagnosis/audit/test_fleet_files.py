@@ -100,7 +100,7 @@ def test_every_way_to_end_is_counted_and_told(tmp_path: Path) -> None:
         ),
         (
             [Sample("a", verdict="stop", faults=[Fault("RL", "actuator", "stuck", "high")]), Sample("b", day=1.0)],
-            "watch",
+            "stop",
         ),
         (
             [Sample("a", verdict="stop", faults=[Fault("RL", "actuator", "noisy", "medium")]), Sample("b", day=1.0)],

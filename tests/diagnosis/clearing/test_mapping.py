@@ -55,3 +55,16 @@ def test_healthy_missions_and_faults_of_parts_are_not_the_files(seed: int) -> No
         FaultSpec("front", Side.ACTUATOR, FaultMode.INEFFICIENT, 0.0, LENGTH, 0.5),
     ):
         assert mapping_hints(in_cells(simulated(fault, seed=seed), base=True)) == ()
+
+
+def test_the_gear_read_into_every_speed_is_told_and_clears_nothing() -> None:
+    mission = simulated()
+    columns = {n: x / 17.7 if n.startswith("wheel.") and n.endswith(".v") else x for n, x in mission.columns.items()}
+    hints = mapping_hints(in_cells(replace(mission, columns=columns), base=True))
+    assert len(hints) == 4
+    assert all("1/17.7 times (the wheel's speed read as the motor's?) its commanded speed" in hint for hint in hints)
+
+
+def test_a_size_that_no_loop_stays_behind_by_is_told() -> None:
+    (hint,) = mapping_hints(in_cells(_times("wheel.FR.v", 0.2)(simulated()), base=True))
+    assert hint.startswith("wheel.FR.v is 0.2 times its commanded speed throughout")

@@ -40,3 +40,12 @@ def test_a_deviation_gets_its_name(change: Callable[[Array], Array], words: str)
 
 def test_a_few_samples_have_no_shape() -> None:
     assert shape_sentence(X[:10] + 1.0, X[:10], DT, ("a", "b"), "m/s") == ""
+
+
+def test_a_scale_with_an_offset_is_told_with_both() -> None:
+    t = np.arange(2000) * 0.01
+    x = 0.3 * np.sin(t) + 0.2
+    y = 0.575 * x + 0.033 + np.random.default_rng(1).normal(0.0, 0.002, t.size)
+    said = shape_sentence(y, x, 0.01, ("v", "v_true"), "m/s")
+    assert said.startswith("A scale and an offset: v is 0.57")
+    assert "0.033" in said

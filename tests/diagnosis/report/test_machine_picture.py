@@ -63,10 +63,10 @@ def test_path_breaks_at_gaps_and_survives_standing_still() -> None:
 
 def test_a_part_that_was_judged_too_briefly_is_not_called_healthy() -> None:
     judged = {("FR", "sensor"): True, ("FR", "actuator"): True}
-    short = condition("FR", Kind.WHEEL, [], judged, {("FR", "sensor"): True, ("FR", "actuator"): False})
+    short = condition("FR", Kind.WHEEL, [], judged, {("FR", "sensor"): "", ("FR", "actuator"): "judged too briefly"})
     assert short.state == "not_assessed"
     assert short.lines == ("No fault found", "drive valve", "judged too briefly")
-    assert condition("FR", Kind.WHEEL, [], judged, dict.fromkeys(judged, True)).lines == ("Healthy",)
+    assert condition("FR", Kind.WHEEL, [], judged, dict.fromkeys(judged, "")).lines == ("Healthy",)
 
 
 def test_long_words_stand_in_several_lines() -> None:

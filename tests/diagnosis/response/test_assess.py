@@ -173,3 +173,16 @@ def test_speeds_in_another_unit_than_their_commands_are_not_called_healthy() -> 
     j = judged(measured, asked, body)
     assert all(share(j, w, State.HEALTHY) == 0.0 for w in WHEELS)
     assert "× its command: a wrong unit" in j.parts["FR"][0].reasons[State.NOT_ASSESSED]
+
+
+def test_drives_that_make_nothing_of_their_commands_are_told_and_blame_no_wheel() -> None:
+    measured, asked, body = speeds(12)
+    rng = np.random.default_rng(2)
+    slow = {w: np.abs(rng.normal(0.1, 0.05, y.size)) for w, y in measured.items()}
+    j = judged(
+        slow,
+        {w: np.full(c.size, 1.0) for w, c in asked.items()},
+        np.column_stack([np.ones(len(body)), 0.0 * body[:, 0]]),
+    )
+    assert findings(j) == []
+    assert any("nothing relates the two" in e for e in j.events)

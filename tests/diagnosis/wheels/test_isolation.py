@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from diagnosis.results.machine_words import HYDRAULIC
 from diagnosis.wheels.isolation import Run, RunVerdict, judge
 from diagnosis.wheels.models import (
     A_BIAS,
@@ -106,7 +107,7 @@ def test_alternatives_add_up_and_the_next_best_is_said() -> None:
     got = judged(run(A_STUCK, {A_STUCK: 0.85, A_BIAS: 0.15})).finding
     assert got is not None
     assert sum(h.p for h in got.hypotheses) == pytest.approx(1.0, abs=0.01)
-    assert any(line.startswith("Next best: drive valve disturbed with 15 %") for line in got.evidence)
+    assert any(HYDRAULIC.fill(line).startswith("Next best: drive valve disturbed with 15 %") for line in got.evidence)
 
 
 def test_stuck_at_zero_is_no_signal() -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from diagnosis.results.machine_words import HYDRAULIC
 from diagnosis.wheels.models import A_GAIN, S_GAIN, S_STUCK, WheelFilterModel
 from diagnosis.wheels.onset import onset_sentence, refined, released
 from replay.faults import Side
@@ -49,7 +50,7 @@ def test_onsets_in_words() -> None:
     y = jumping()
 
     def words(start: int, side: Side, y: Array = y, dt: float = DT) -> str:
-        return onset_sentence(start, y, MODEL, dt, "v", side)
+        return HYDRAULIC.fill(onset_sentence(start, y, MODEL, dt, "v", side))
 
     assert "jumps by 0.15 m/s" in words(100, Side.SENSOR)
     assert words(100, Side.SENSOR).endswith("(38 times its noise). A sensor can do this, a wheel cannot.")

@@ -16,6 +16,7 @@ from replay.machine.config import Machine, haulotte
 from replay.readers.registry import read_log, summarise_log
 from replay.signals.mapping import map_signals, plan_topics
 from replay.signals.name_parts import axle_of, wheel_of
+from replay.signals.rules import _effort_unit
 from replay.signals.signal import Signals
 from replay.signals.to_si import slope
 from replay.simulation.options import SimulationOptions
@@ -335,3 +336,8 @@ def test_real_husky(reference_data: Path) -> None:
     found = map_signals([log], MACHINE).items
     assert {"imu.yaw_rate", "gnss.lat", "gnss.lon", "odom.x", "odom.y", "odom.yaw", "odom.v"} == set(found)
     assert np.abs(np.diff(found["odom.yaw"].values)).max() < 0.5
+
+
+@pytest.mark.parametrize(("column", "unit"), [("left_wheel_current", "A"), ("left_duty", "%"), ("left_torque", "")])
+def test_an_effort_has_the_unit_of_its_name(column: str, unit: str) -> None:
+    assert _effort_unit(column) == unit

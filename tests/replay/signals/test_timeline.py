@@ -214,3 +214,11 @@ def test_a_changed_timeline_keeps_no_columns_of_the_former_one() -> None:
     assert line.beside(["a"]) is line.beside(["a"])
     changed = replace(line, signals={"a": np.full(3, 7.0)})
     assert_array_equal(changed.beside(["a"])[:, 0], [7, 7, 7])
+
+
+def test_names_that_no_log_holds_are_said_where_no_wheel_is_found() -> None:
+    missing = {"wheel.FR.v": "the machine file names 'velocity[fr]', which no source holds; similar: velocity[f_r]"}
+    with pytest.raises(
+        LogError, match=r"wheel\.FR\.v: the machine file names 'velocity\[fr\]'.*similar.*correct its \[signals\]"
+    ):
+        align(Signals({}, missing))

@@ -159,7 +159,7 @@ def test_a_mission_that_may_be_the_last_is_cleared_too(
 
 
 @pytest.mark.parametrize(
-    ("between", "severity", "verdict"), [("....", "medium", "watch"), (".", "medium", "watch"), ("b", "high", "stop")]
+    ("between", "severity", "verdict"), [("....", "medium", "stop"), (".", "medium", "stop"), ("b", "high", "stop")]
 )
 def test_a_fault_that_comes_back_is_as_severe_as_it_is_now(
     tmp_path: Path, between: str, severity: str, verdict: str

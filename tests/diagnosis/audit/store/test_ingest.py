@@ -124,6 +124,11 @@ def test_an_attempt_whose_row_was_not_written_is_found(audited: Path, make_key: 
             "is not a result object",
         ),
         ({"summary": {"result": {}, "faults": [{"severity": "dire"}], "components": []}}, "a fault's severity"),
+        (
+            {"summary": {"result": {}, "faults": [{"severity": "low", "side": "SENSOR"}], "components": []}},
+            "the side of a fault",
+        ),
+        ({"summary": {"result": {}, "faults": [], "components": [{"side": ""}]}}, "the side of a fault or component"),
         ({"summary": {"result": {"verdict": "fine"}, "faults": [], "components": []}}, "verdict 'fine'"),
         ({"summary": [1]}, "is not a result object"),
     ],

@@ -1,0 +1,154 @@
+"use strict";
+// The mission played: one clock for machine, path, plots and mode probabilities, and a sentence at each crossing of a threshold.
+class Replay {
+  static APART = 0.5;
+  static MOST = 300;
+
+  constructor(one) {
+    Object.assign(this, { one, stage: one("#stage"), names: new Map(Data.view.channels.map((c, i) => [c.name, i])), events: [], frame: 0 });
+    this.parts = [...document.querySelectorAll("#timeline .lane[data-side]")].filter((l) => l.dataset.side).map((l) => ({ c: l.dataset.c, side: l.dataset.side, words: l.querySelector(".what").textContent.trim(), base: `evidence.${l.dataset.c}.${l.dataset.side}.` }));
+    for (const [from, to] of [["svg.machine", "#stage-machine"], ["svg.map", "#stage-path"]]) {
+      const copy = document.querySelector(from)?.cloneNode(true);
+      if (!copy) { one(to).hidden = true; continue; }
+      for (const e of copy.querySelectorAll(".live, .here, .ring ~ .bg")) e.remove();
+      for (const e of copy.querySelectorAll("[tabindex]")) { e.removeAttribute("tabindex"); e.removeAttribute("role"); e.removeAttribute("data-f"); }
+      copy.setAttribute("role", "img");
+      one(to).append(copy);
+    }
+    one("#stage-modes").append(...this.bars());
+    this.stage.hidden = false;
+    this.figure = new Figure(one("#stage-figure"), null, null);
+  }
+
+  bars() {
+    const modes = Object.keys(Data.view.words);
+    return this.parts.flatMap((part) => {
+      part.modes = modes.map((m) => ({ m, channel: this.names.get(`${part.base}p_${m}`) })).filter((x) => x.channel !== undefined);
+      if (!part.modes.length) return [];
+      const row = document.createElement("div"), name = document.createElement("span"), bar = document.createElement("span");
+      name.textContent = part.words;
+      bar.className = "stack";
+      bar.setAttribute("role", "img");
+      bar.append(...part.modes.map(({ m }) => Object.assign(document.createElement("i"), { className: m })));
+      part.bar = bar;
+      part.says = document.createElement("span");
+      part.says.className = "small muted";
+      row.append(name, bar, part.says);
+      return [row];
+    });
+  }
+
+  // Rows of the plot beside the pictures: every wheel in one panel.
+  rows() {
+    const row = (key, title, test) => {
+      const traces = Data.view.channels.map((c, i) => ({ c: i, name: c.name, k: c.k, unit: c.unit })).filter((t) => test.test(t.name)).map((t) => ({ ...t, name: t.name.split(".")[1] }));
+      const order = this.parts.map((part) => part.c);
+      traces.sort((a, b) => order.indexOf(a.name) - order.indexOf(b.name));
+      traces.splice(6);
+      traces.forEach((t, i) => { t.role = `free-${i}`; });
+      return traces.length ? [{ key, title, traces, unit: traces[0].unit, component: "\0" }] : [];
+    };
+    return [...row("v", "Speed", /^wheel\.[^.]+\.v$/), ...row("u", "Opening", /^wheel\.[^.]+\.u$/), ...row("phi", "Steering angle", /^steer\.[^.]+\.phi$/)];
+  }
+
+  async open() {
+    const rows = this.rows();
+    this.one("#stage-figure").hidden = !rows.length;
+    if (rows.length) await this.figure.draw(rows, Data.view.faults.slice(0, 40).map((f) => ({ ...f, main: false })), [0, Data.view.duration]);
+    const found = [];
+    for (const part of this.parts) found.push(...await this.crossings(part));
+    found.sort((a, b) => a.t - b.t);
+    found.splice(Replay.MOST);
+    this.one("#events").replaceChildren(...found.map((e) => {
+      const item = document.createElement("li"), b = document.createElement("button");
+      Object.assign(b, { className: "link", textContent: e.words });
+      b.dataset.at = e.t;
+      item.append(b);
+      e.item = item;
+      return item;
+    }));
+    this.events = found;
+    this.one("#events-none").hidden = this.events.length > 0;
+    this.one("#events-none").textContent = "No residual or probability passes its threshold in this mission.";
+    return this.show();
+  }
+
+  // Stretches in which values are beyond a limit, those that are close to each other as one.
+  static stretches(d, beyond) {
+    const list = [];
+    for (let i = 0; i < d.y.length; i++) {
+      if (!beyond(i)) continue;
+      const t = d.t + i * d.dt, last = list.at(-1);
+      if (last && t - last.stop < Replay.APART) last.stop = t;
+      else list.push({ start: t, stop: t });
+    }
+    return list.filter((s) => s.stop - s.start >= 2 * d.dt || d.stride > 1);
+  }
+
+  async crossings(part) {
+    const { t0, duration, limit, words } = Data.view, out = [], get = (leaf) => this.names.get(part.base + leaf), clock = (t) => `${t.toFixed(3)} s`;
+    const value = async (leaf, t) => { const c = get(leaf); if (c === undefined) return null; const { k, unit } = Data.view.channels[c], [a, b] = await Data.at(c, t); return { v: k * (a + b) / 2, text: `${Now.number(+(k * (a + b) / 2).toPrecision(3))}${unit === "1" ? "" : ` ${unit}`}` }; };
+    const p = get("probability"), r = get("residual"), h = get("threshold");
+    if (r !== undefined && h !== undefined) {
+      const [d, e] = await Promise.all([Data.samples(r, t0, duration, true), Data.samples(h, t0, duration)]), other = (i) => e.y[Math.min(e.y.length - 1, Math.max(0, Math.round((d.t + i * d.dt - e.t) / e.dt)))];
+      for (const s of Replay.stretches(d, (i) => Math.abs(d.y[i]) > other(i)).slice(0, Replay.MOST)) {
+        const [now, top, expected] = await Promise.all(["residual", "threshold", "expected"].map((leaf) => value(leaf, s.start)));
+        out.push({ t: s.start, words: `${clock(s.start)} · ${part.words}: the residual, ${now.text}, passes its threshold of ${top.text}${expected && Number.isFinite(expected.v) ? `; ${expected.text} was expected` : ""}.` });
+      }
+    }
+    if (p !== undefined && limit) {
+      const d = await Data.samples(p, t0, duration, true);
+      for (const s of Replay.stretches(d, (i) => d.y[i] >= limit).slice(0, Replay.MOST)) {
+        const t = Math.min(s.start + d.dt, s.stop), shares = (await Promise.all(part.modes.map(async ({ m }) => ({ m, p: (await value(`p_${m}`, t)).v })))).filter((x) => x.m !== "healthy" && Number.isFinite(x.p)).sort((a, b) => b.p - a.p), [now, top] = [await value("residual", t), await value("threshold", t)];
+        const ratio = now && top && top.v > 0 && Math.abs(now.v) > top.v ? `; the residual is ${Now.number(+(Math.abs(now.v) / top.v).toPrecision(2))} times its threshold` : "";
+        out.push({ t: s.start, words: `${clock(s.start)} · ${part.words}: the probability that it is not healthy passes ${Now.number(100 * limit)} %${shares.length ? `, ${words[shares[0].m]} ${Math.round(100 * shares[0].p)} %` : ""}${ratio}.` });
+        out.push({ t: s.stop, words: `${clock(s.stop)} · ${part.words}: the probability that it is not healthy falls below ${Now.number(100 * limit)} % again.` });
+      }
+    }
+    return out;
+  }
+
+  async show() {
+    const { t } = Now, { one } = this, words = Data.view.words;
+    this.figure.drawn && this.figure.read().show();
+    if (t === null) return;
+    one("#scrub").value = t;
+    one("#scrub").setAttribute("aria-valuetext", `${t.toFixed(2)} seconds`);
+    one("#clock").textContent = `${t.toFixed(2)} s`;
+    let last = null;
+    for (const e of this.events) { if (e.t <= t + 1e-9) last = e; e.item.removeAttribute("aria-current"); }
+    if (last) {
+      last.item.setAttribute("aria-current", "true");
+      const box = one("#events"), y = last.item.offsetTop - box.offsetTop;
+      if (y < box.scrollTop || y > box.scrollTop + box.clientHeight - 40) box.scrollTop = y - 30;
+    }
+    if (one("#why").textContent !== (last?.words ?? "")) one("#why").textContent = last?.words ?? "";
+    for (const part of this.parts) {
+      if (!part.bar) continue;
+      const shares = await Promise.all(part.modes.map(({ channel }) => Data.at(channel, t).then(([a, b]) => (a + b) / 2)));
+      let top = -1;
+      shares.forEach((p, i) => { part.bar.children[i].style.width = `${100 * (p || 0)}%`; if (p > (shares[top] ?? -1)) top = i; });
+      part.says.textContent = top < 0 ? "not judged" : `${words[part.modes[top].m]} ${Math.round(100 * shares[top])} %`;
+      part.bar.setAttribute("aria-label", `${part.words}: ${part.says.textContent}`);
+    }
+  }
+
+  // Plays on from where the clock stands, or from the beginning at the end.
+  play() {
+    const { one } = this, button = one("[data-act=play]"), end = Data.view.t0 + (Data.view.n - 1) * Data.view.dt;
+    const stop = () => { cancelAnimationFrame(this.frame); this.frame = 0; Now.playing = false; button.textContent = "Play"; };
+    if (this.frame) { stop(); return; }
+    let before = performance.now(), t = Now.t === null || Now.t >= end ? 0 : Now.t;
+    button.textContent = "Pause";
+    Now.playing = true;
+    const step = (now) => {
+      if (Now.t !== null && Math.abs(Now.t - t) > 2 * Data.view.dt) t = Now.t; // moved by hand meanwhile
+      t = Math.min(end, t + (now - before) / 1000 * +one("#speed").value);
+      before = now;
+      Now.set(t, { held: true });
+      if (t >= end) stop();
+      else this.frame = requestAnimationFrame(step);
+    };
+    this.frame = requestAnimationFrame(step);
+  }
+}

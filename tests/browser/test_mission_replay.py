@@ -1,0 +1,61 @@
+"""The mission played in Chromium: one clock for machine, path, plots and mode probabilities; sentences at thresholds."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+
+playwright = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
+expect = playwright.expect
+
+OPEN = Callable[..., Any]
+
+
+def test_one_clock_moves_everything(open_page: OPEN) -> None:
+    page = open_page("decided", "#fault=F1&t=27,39")
+    expect(page.locator("#stage")).to_be_hidden()
+    page.locator("#scrub").fill("33")
+    expect(page.locator("#clock")).to_have_text("33.00 s")
+    expect(page.locator("#stage-machine [data-c=FR] rect.tyre")).to_have_class("tyre stuck")
+    expect(page.locator("#stage-machine [data-c=FR] .live text")).to_contain_text("0.21 m/s")
+    assert page.locator("#stage-path .here").get_attribute("visibility") == "visible"
+    expect(page.locator("#stage-modes > div", has_text="FR speed sensor")).to_contain_text("stuck 96 %")
+    page.locator("#stage-figure .reading p").first.wait_for()
+    page.locator("#figure .reading p").first.wait_for()
+    page.locator("#scrub").fill("10")
+    expect(page.locator("#stage-machine [data-c=FR] rect.tyre")).to_have_class("tyre healthy")
+
+
+def test_sentences_say_why_now_and_lead_to_their_time(open_page: OPEN) -> None:
+    page = open_page("decided", "#fault=F1&t=27,39")
+    page.locator("#scrub").fill("36.5")
+    first = page.locator(
+        "#events button", has_text="FR speed sensor: the probability that it is not healthy passes 90 %"
+    ).first
+    expect(first).to_contain_text(
+        re.compile(r"^30\.\d{3} s · FR .*stuck \d+ %; the residual is [\d.]+ times its threshold\.$")
+    )
+    expect(page.locator("#events button", has_text="FR speed sensor: the residual").first).to_contain_text(
+        re.compile(r"m/s, passes its threshold of 0\.0\d+ m/s")
+    )
+    expect(page.locator("#why")).to_contain_text("falls below 90 % again")
+    first.click()
+    expect(page.locator("#clock")).to_have_text(re.compile(r"^30\.\d\d s$"))
+    expect(page.locator("#why")).to_contain_text("FR speed sensor")
+
+
+def test_it_plays_and_pauses_by_a_key(open_page: OPEN) -> None:
+    page = open_page("decided", "#fault=F1&t=27,39")
+    page.locator("#speed").select_option("20")
+    page.locator("#verdict").click()
+    page.keyboard.press("p")
+    expect(page.get_by_role("button", name="Pause")).to_be_visible()
+    expect(page.locator("#clock")).not_to_have_text(re.compile(r"^[01]\."))
+    page.keyboard.press("p")
+    expect(page.get_by_role("button", name="Play")).to_be_visible()
+    stands = page.locator("#clock").inner_text()
+    page.wait_for_timeout(200)
+    assert page.locator("#clock").inner_text() == stands

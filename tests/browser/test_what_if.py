@@ -1,0 +1,93 @@
+"""What if it were another fault, in Chromium: the page's equations against the program's, and what the sliders change."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.signal import lfilter
+
+from replay.faults import FaultMode, FaultSpec, Side, fault_affected
+from replay.injection.edited_signals import strength
+from replay.injection.valve import _opened
+from replay.machine.plant import WheelPlant
+
+playwright = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
+expect = playwright.expect
+
+OPEN = Callable[..., Any]
+
+
+def test_equations_are_those_of_the_program(open_page: OPEN) -> None:
+    page = open_page("five_faults")
+    page.evaluate("Data.later()")
+    rng = np.random.default_rng(3)
+    n, dt = 2000, 0.01
+    t = np.arange(n) * dt
+    u = 0.5 * np.sin(t) + 0.02 * rng.standard_normal(n)
+    fault = FaultSpec("FR", Side.ACTUATOR, FaultMode.INEFFICIENT, 4.0, 9.0, epsilon=0.4, sat=0.1)
+    plant = WheelPlant(0.8, 0.3, dead=0.05)
+    epsilon = strength(fault, t)
+    applied = fault_affected(u, epsilon, np.full(n, 0.1))
+    a = float(np.exp(-dt / plant.tau))
+    speed = plant.K * lfilter([0.0, 1.0 - a], [1.0, -a], _opened(applied, plant) - _opened(u, plant))
+    found = page.evaluate(
+        """([u, n, dt]) => {
+          const eps = WhatIf.strength(n, 0, dt, { start: 4, stop: 9, epsilon: 0.4 }), y = Float64Array.from(u);
+          const given = WhatIf.affected(y, eps, new Float64Array(n).fill(0.1));
+          return [eps, given, WhatIf.respond(y, given, { K: 0.8, tau: 0.3, dead: 0.05 }, dt)].map((v) => Array.from(v)); }""",
+        [u.tolist(), n, dt],
+    )
+    for mine, theirs in zip(found, (epsilon, applied, speed), strict=True):
+        assert np.allclose(mine, theirs, rtol=1e-9, atol=1e-12)
+
+
+def test_the_wheel_model_is_found_again(open_page: OPEN) -> None:
+    page = open_page("five_faults")
+    page.evaluate("Data.later()")
+    t = np.arange(6000) * 0.01
+    u = 0.4 * np.sin(0.7 * t) + 0.3 * np.sign(np.sin(0.31 * t))
+    plant = WheelPlant(0.8, 0.3, dead=0.04)
+    a = float(np.exp(-0.01 / plant.tau))
+    v = plant.K * lfilter([0.0, 1.0 - a], [1.0, -a], _opened(u, plant))
+    v = v + 0.005 * np.random.default_rng(1).standard_normal(len(t))
+    fit = page.evaluate(
+        "([u, v]) => WhatIf.fit(Float64Array.from(u), Float64Array.from(v), u.map(() => 1), 0.01)",
+        [u.tolist(), v.tolist()],
+    )
+    assert fit["dead"] == 0.04
+    assert fit["K"] == pytest.approx(0.8, rel=0.02)
+    assert fit["tau"] == pytest.approx(0.3, rel=0.15)
+    assert fit["explains"] > 0.99
+
+
+def test_sliders_change_residual_and_evidence(open_page: OPEN) -> None:
+    page = open_page("five_faults", "#fault=F1&t=27,39")
+    page.keyboard.press("w")
+    words = page.locator("#whatif-words")
+    expect(words).to_contain_text(re.compile(r"What if: residual [\d.]+ times its threshold, first beyond it "))
+    page.locator("#whatif-figure .main-svg").first.wait_for()
+    times = re.compile(r"What if: residual ([\d.]+) times its threshold.* Log: ([\d.]+) times")
+    found = times.search(words.inner_text())
+    assert found
+    assert float(found[1]) == pytest.approx(float(found[2]), rel=0.15)  # as it was diagnosed, it is as it was recorded
+    page.locator("#whatif-mode").select_option("inefficient")
+    page.locator("#whatif-epsilon").fill("0.2")
+    page.locator("#whatif-onset").fill("32")
+    expect(page.locator("#whatif-onset + output")).to_have_text(re.compile(r"^3[12]\.\d{3} s$"))
+    inefficient = times.search(words.inner_text())
+    assert inefficient
+    assert float(inefficient[1]) < float(found[1])
+    expect(page.locator("#whatif-sat")).to_be_disabled()
+    page.get_by_role("button", name="As diagnosed").click()
+    expect(page.locator("#whatif-mode")).to_have_value("stuck")
+
+
+def test_a_valve_moves_the_wheel(open_page: OPEN) -> None:
+    page = open_page("five_faults", "#fault=F2")
+    page.keyboard.press("w")
+    expect(page.locator("#whatif-words")).to_contain_text("Wheel model found here: K = ")
+    expect(page.locator("#whatif-figure")).to_contain_text("Change of the wheel’s speed")
