@@ -1,4 +1,4 @@
-"""Every finding's onset once more by a second filter, and how well both agree, beside the evidence."""
+"""Every finding's onset once more by filterpy, and how well both agree, beside the evidence."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ _MOST = 40  # findings of a mission, the surest first: what is computed again he
 
 
 def with_second_onsets(assessments: Mapping[Part, Assessment], dt: float) -> dict[Part, Assessment]:
-    """The same with a sentence on each finding: when a second filter, stepped sample by sample, sees it begin.
+    """The same with a sentence on each finding: when filterpy, stepped sample by sample over the readings, sees it begin.
 
     Parameters
     ----------
@@ -70,9 +70,9 @@ def said(finding: Finding, a: Assessment, dt: float) -> str:
     row = State(finding.mode.value) if shown else State.NOISY
     found = second_onset(y, expected, model, row)
     if found is None:
-        return "A second filter, stepped over the readings around the onset, sees no onset there that stands out."
+        return "filterpy, stepped over the readings around the onset, sees no onset there that stands out."
     off = (first + found.place * stride - finding.start) * dt
-    when = f"A second filter, stepped over the readings around it, sees the onset at {finding.start * dt + off:.3f} s"
+    when = f"filterpy, stepped over the readings around it, sees the onset at {finding.start * dt + off:.3f} s"
     if abs(off) < 0.5 * dt * stride:
         return f"{when}: the same {'sample' if stride == 1 else 'moment'}."
     size = f"{1e3 * abs(off):.0f} ms" if abs(off) < 1.0 else f"{abs(off):.1f} s"

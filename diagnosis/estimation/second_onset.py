@@ -1,4 +1,4 @@
-"""The onset of a fault once more, by a second filter: which sample divides healthy ones from those of the row best.
+"""The onset of a fault once more, by filterpy alone: which sample divides healthy ones from those of the row best.
 
 Forwards in time the healthy models are stepped over the samples around an onset, backwards the row's own; the onset is where
 the sum of what lies before it by the first, and of what lies behind it by the second, is largest. Nothing is taken from the
@@ -13,8 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from diagnosis.estimation.fault_models import EXACT, MISMATCH, VARYING_ROWS, ModeModel
-from diagnosis.estimation.row_filters import models_of
-from diagnosis.estimation.row_steps import stepped
+from diagnosis.estimation.row_filters import RowFilter, models_of
 from diagnosis.results.fault_rows import ROWS
 from replay.faults import State
 
@@ -86,15 +85,21 @@ def second_onset(y: Array, x: Array, model: ModeModel, state: State) -> Second |
         return None
     a, b = y[known], x[known]
     floor = _FLOOR - float(np.log(model.span))
-    healthy = np.maximum.reduce([np.maximum(stepped(a, b, model, m), floor) for m in (EXACT, MISMATCH)])
+    healthy = np.maximum.reduce([np.maximum(_stepped(a, b, model, m), floor) for m in (EXACT, MISMATCH)])
     row = ROWS.index(state)
     models = models_of(row)[:_VARYING] if row in VARYING_ROWS else models_of(row)
     best: Second | None = None
     for m in models:
-        faulty = np.maximum(stepped(a[::-1], b[::-1], model, m)[::-1], floor)
+        faulty = np.maximum(_stepped(a[::-1], b[::-1], model, m)[::-1], floor)
         total = np.r_[0.0, np.cumsum(healthy)] + np.r_[np.cumsum(faulty[::-1])[::-1], 0.0]
         k = int(np.argmax(total))
         gain = float(total[k] - total[-1])
         if k < known.size and gain >= _WORTH and (best is None or gain > best.gain):
             best = Second(int(known[k]), gain)
     return best
+
+
+def _stepped(y: Array, x: Array, model: ModeModel, m: int) -> Array:
+    """Log-likelihood of each sample given those before it, by one model."""
+    one = RowFilter(m, model)
+    return np.array([one.step(float(a), float(b)) for a, b in zip(y, x, strict=True)])

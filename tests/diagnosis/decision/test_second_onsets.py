@@ -1,4 +1,4 @@
-"""What a second filter says of onsets, and filterpy of whole faults, beside each fault of a mission."""
+"""What filterpy says of onsets and of whole faults, beside each fault of a mission."""
 
 from __future__ import annotations
 
@@ -42,11 +42,11 @@ def direct() -> MissionResult:
     return diagnosed("direct")
 
 
-def test_every_stated_fault_says_when_a_second_filter_sees_it_begin(direct: MissionResult) -> None:
+def test_every_stated_fault_says_when_filterpy_sees_it_begin(direct: MissionResult) -> None:
     stated = [f for f in direct.report["intervals"] if f["probability"] > 0.9]
     assert len(stated) == len(FAULTS)
     for f in stated:
-        (text,) = (e for e in f["evidence"] if e.startswith("A second filter"))
+        (text,) = (e for e in f["evidence"] if e.startswith("filterpy"))
         assert "the same sample" in text or text.endswith(("ms later.", "ms earlier."))
         seen = float(text.split("onset at ")[1].split(" s")[0])
         assert seen == pytest.approx(f["start_s"], abs=0.006)

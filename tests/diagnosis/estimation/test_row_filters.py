@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
@@ -12,7 +10,6 @@ from diagnosis.channels.sample_status import PAIR
 from diagnosis.estimation.fault_models import FIRST_NOISY, GAIN, MODELS, ROW_OF_MODEL, VALUE_ROWS, ModeModel
 from diagnosis.estimation.filter_kernel import FilterState, segment_evidence
 from diagnosis.estimation.row_filters import RowFilter, models_of
-from diagnosis.estimation.row_steps import stepped
 from diagnosis.estimation.samples import Samples
 from diagnosis.estimation.second_onset import channel_model, second_onset
 from diagnosis.estimation.viterbi import forward, initial_state
@@ -41,16 +38,6 @@ def test_every_row_has_the_evidence_of_the_compiled_filters(seed: int) -> None:
         mine[ROW_OF_MODEL[m]] = max(mine[ROW_OF_MODEL[m]], total)
     samples = Samples.even(y, x, np.full(n, PAIR, np.int8), np.zeros(n, np.bool_))
     assert_allclose(segment_evidence(samples, MODEL), mine[:5], rtol=1e-9)
-
-
-@pytest.mark.parametrize("m", range(MODELS))
-@pytest.mark.parametrize("constant_noise", [0.0005, 0.003])  # the gain's noise grows with it, or does not
-def test_plain_steps_are_filterpys(m: int, constant_noise: float) -> None:
-    x, y = signals(5)
-    y[40:60] *= 3.0
-    model = replace(MODEL, constant_noise=constant_noise)
-    one = RowFilter(m, model)
-    assert_allclose(stepped(y, x, model, m), [one.step(a, b) for a, b in zip(y, x, strict=True)], rtol=1e-9, atol=1e-9)
 
 
 def test_gains_are_those_of_the_compiled_filter() -> None:
