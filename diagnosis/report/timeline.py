@@ -271,8 +271,9 @@ def _faulty_lane(
     share = 100 * total / duration if duration > 0 else 0.0
     words = f"{share:.1f} %" if share >= 0.05 else span(total)
     name = machine_words.part_name(faults[0]["kind"], side)
-    painting = next((f["mode"] for f in faults if f["severity"] != Severity.INFO), None) or _main_state(spans)
-    return Lane(component, name, painting, _lines(spans, side, duration), drawn, words, first, side)
+    painting = next((f["mode"] for f in faults if f["severity"] != Severity.INFO), None)
+    state = painting or _main_state(spans)
+    return Lane(component, name, state, _lines(spans, side, duration), drawn, words, first, side)
 
 
 def _phases(phases: Sequence[PhaseRow], duration: float) -> tuple[Bar, ...]:

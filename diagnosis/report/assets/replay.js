@@ -57,8 +57,11 @@ class Replay {
     if (rows.length) await this.figure.draw(rows, Data.view.faults.slice(0, 40).map((f) => ({ ...f, main: false })), [0, Data.view.duration]);
     const found = [];
     for (const part of this.parts) found.push(...await this.crossings(part));
-    found.sort((a, b) => a.t - b.t);
+    // Of too many, those of probabilities first.
+    const left = Math.max(0, found.length - Replay.MOST);
+    found.sort((a, b) => (b.sure ?? 0) - (a.sure ?? 0) || a.t - b.t);
     found.splice(Replay.MOST);
+    found.sort((a, b) => a.t - b.t);
     this.one("#events").replaceChildren(...found.map((e) => {
       const item = document.createElement("li"), b = document.createElement("button");
       Object.assign(b, { className: "link", textContent: e.words });
@@ -68,21 +71,22 @@ class Replay {
       return item;
     }));
     this.events = found;
-    this.one("#events-none").hidden = this.events.length > 0;
-    this.one("#events-none").textContent = "No residual or probability passes its threshold in this mission.";
+    this.one("#events-none").hidden = found.length > 0 && !left;
+    this.one("#events-none").textContent = left ? `${left} more crossings of residuals are left out.` : "No residual or probability passes its threshold in this mission.";
     return this.show();
   }
 
-  // Stretches in which values are beyond a limit, those that are close to each other as one.
+  // Stretches in which values are beyond a limit for some samples on end, those that are close to each other as one.
   static stretches(d, beyond) {
-    const list = [];
-    for (let i = 0; i < d.y.length; i++) {
-      if (!beyond(i)) continue;
-      const t = d.t + i * d.dt, last = list.at(-1);
-      if (last && t - last.stop < Replay.APART) last.stop = t;
-      else list.push({ start: t, stop: t });
+    const list = [], least = d.stride > 1 ? 1 : 5;
+    for (let i = 0, run = 0; i < d.y.length; i++) {
+      run = beyond(i) ? run + 1 : 0;
+      if (run < least) continue;
+      const stop = d.t + i * d.dt, start = d.t + (i - run + 1) * d.dt, last = list.at(-1);
+      if (last && start - last.stop < Replay.APART) last.stop = stop;
+      else list.push({ start, stop });
     }
-    return list.filter((s) => s.stop - s.start >= 2 * d.dt || d.stride > 1);
+    return list;
   }
 
   async crossings(part) {
@@ -101,8 +105,8 @@ class Replay {
       for (const s of Replay.stretches(d, (i) => d.y[i] >= limit).slice(0, Replay.MOST)) {
         const t = Math.min(s.start + d.dt, s.stop), shares = (await Promise.all(part.modes.map(async ({ m }) => ({ m, p: (await value(`p_${m}`, t)).v })))).filter((x) => x.m !== "healthy" && Number.isFinite(x.p)).sort((a, b) => b.p - a.p), [now, top] = [await value("residual", t), await value("threshold", t)];
         const ratio = now && top && top.v > 0 && Math.abs(now.v) > top.v ? `; the residual is ${Now.number(+(Math.abs(now.v) / top.v).toPrecision(2))} times its threshold` : "";
-        out.push({ t: s.start, words: `${clock(s.start)} · ${part.words}: the probability that it is not healthy passes ${Now.number(100 * limit)} %${shares.length ? `, ${words[shares[0].m]} ${Math.round(100 * shares[0].p)} %` : ""}${ratio}.` });
-        out.push({ t: s.stop, words: `${clock(s.stop)} · ${part.words}: the probability that it is not healthy falls below ${Now.number(100 * limit)} % again.` });
+        out.push({ t: s.start, sure: 1, words: `${clock(s.start)} · ${part.words}: the probability that it is not healthy passes ${Now.number(100 * limit)} %${shares.length ? `, ${words[shares[0].m]} ${Math.round(100 * shares[0].p)} %` : ""}${ratio}.` });
+        out.push({ t: s.stop, sure: 1, words: `${clock(s.stop)} · ${part.words}: the probability that it is not healthy falls below ${Now.number(100 * limit)} % again.` });
       }
     }
     return out;
@@ -119,7 +123,7 @@ class Replay {
     for (const e of this.events) { if (e.t <= t + 1e-9) last = e; e.item.removeAttribute("aria-current"); }
     if (last) {
       last.item.setAttribute("aria-current", "true");
-      const box = one("#events"), y = last.item.offsetTop - box.offsetTop;
+      const box = one("#events"), y = last.item.offsetTop;
       if (y < box.scrollTop || y > box.scrollTop + box.clientHeight - 40) box.scrollTop = y - 30;
     }
     if (one("#why").textContent !== (last?.words ?? "")) one("#why").textContent = last?.words ?? "";
