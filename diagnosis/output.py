@@ -19,17 +19,17 @@ from diagnosis.report.plot_data import axis_of
 from diagnosis.results.document import ReportDocument
 from diagnosis.results.json_text import writable
 from diagnosis.results.result import Closeups, MissionResult
+from diagnosis.results.stored import grid_of, grids_of, stored
 from diagnosis.results.validation import report_of
 from replay.atomic_write import atomic_path, atomic_paths, made_folder
 from replay.border import bordered
 from replay.errors import LogError, OutputError
 
 HTML, JSON, PARQUET, WINDOWS = "report.html", "report.json", "report.parquet", "report.windows.parquet"
-_BLOCK = 1 << 15
 _AGAIN = "run `mfhca diagnose` on the log again"
 
 
-def write_result(result: MissionResult, folder: Path, *, max_size_mb: float = 15.0) -> tuple[Path, ...]:
+def write_result(result: MissionResult, folder: Path, *, max_size_mb: float = 8.0) -> tuple[Path, ...]:
     """Write the files of a result: all of them, or on a full disk none.
 
     Parameters
@@ -52,10 +52,12 @@ def write_result(result: MissionResult, folder: Path, *, max_size_mb: float = 15
     OutputError
         Where the folder cannot be written.
     """
-    columns = {k: v if k == "t" else _shortened(k, v) for k, v in result.columns.items()}
+    grids = grids_of(result.columns, {s["name"]: s["lsb"] for s in result.report["signals"] if s["lsb"]})
+    columns = {k: v if k == "t" else stored(k, v, grids[k]) for k, v in result.columns.items()}
     windows = result.windows
     if windows is not None:
-        windows = Closeups(windows.step, {k: _shortened(k, v) for k, v in windows.columns.items()})
+        near = {k: stored(k, v, grids[k] if k in grids else grid_of(k, v)) for k, v in windows.columns.items()}
+        windows = Closeups(windows.step, near)
     paths = tuple(folder / name for name in (HTML, JSON, PARQUET, *([] if windows is None else [WINDOWS])))
     report: ReportDocument = writable(result.report)
     with _made(folder), atomic_paths(*paths) as (html, document, table, *more):
@@ -82,28 +84,6 @@ def _made(folder: Path) -> Iterator[None]:
         yield
 
 
-def _shortened(name: str, values: NDArray[np.float64] | NDArray[np.float32]) -> NDArray[np.float32]:
-    """Column as stored: recorded signals as 32-bit floats, replayed ones to 4·10⁻⁵, evidence to 5·10⁻⁴ of each value.
-
-    Probabilities are rounded to 1/256.
-    """
-    bits = 8 if ".p_" in name else {"evidence": 10, "replay": 14}.get(name.partition(".")[0])
-    if bits is None:
-        return np.ascontiguousarray(values, dtype=np.float32)
-    out = np.empty(len(values), np.float32)
-    half, kept = np.uint32(1 << (22 - bits)), np.uint32(0xFFFFFFFF << (23 - bits) & 0xFFFFFFFF)
-    for i in range(0, len(out), _BLOCK):
-        part = out[i : i + _BLOCK]
-        part[:] = values[i : i + _BLOCK]
-        if ".p_" in name:
-            np.round(part * 256, out=part)
-            part /= 256
-            continue
-        raw = part.view(np.uint32)
-        np.copyto(raw, (raw + half) & kept, where=np.isfinite(part))
-    return out
-
-
 def _write_table(columns: Mapping[str, NDArray[Any]], path: Path) -> None:
     """Write columns without a copy (and without pandas, which pyarrow would load for its own conversion)."""
     arrays = [
@@ -112,7 +92,9 @@ def _write_table(columns: Mapping[str, NDArray[Any]], path: Path) -> None:
     ]
     table = pa.Table.from_arrays(arrays, names=list(columns))
     with path.open("wb") as file:  # pyarrow opens no name that is not UTF-8
-        pq.write_table(table, file, compression="zstd", use_dictionary=False, use_byte_stream_split=True)
+        pq.write_table(
+            table, file, compression="brotli", compression_level=5, use_dictionary=False, use_byte_stream_split=True
+        )
 
 
 def _read_table(path: Path) -> dict[str, NDArray[Any]]:
@@ -148,7 +130,7 @@ def _read_windows(path: Path) -> Closeups | None:
     return Closeups(step, columns)
 
 
-def rebuild(path: Path, *, max_size_mb: float = 15.0, previous: tuple[Path, ReportDocument] | None = None) -> Path:
+def rebuild(path: Path, *, max_size_mb: float = 8.0, previous: tuple[Path, ReportDocument] | None = None) -> Path:
     """Make ``report.html`` again from a saved result, without the log.
 
     Parameters

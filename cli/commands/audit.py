@@ -157,7 +157,7 @@ def audit(
     trends: Trends = TrendAxis.HOURS,
     export: Export = None,
     dask: Dask = None,
-    max_size: MaxSize = 15.0,
+    max_size: MaxSize = 8.0,
     repaired: Repaired = None,
     not_repaired: NotRepaired = None,
     on: On = None,

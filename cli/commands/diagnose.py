@@ -70,7 +70,7 @@ def diagnose(
     open_page: OpenPage = False,
     clips: Clips = False,
     clip_margin: ClipMargin = 5.0,
-    max_size: MaxSize = 15.0,
+    max_size: MaxSize = 8.0,
     verify: Verify = False,
     quiet: Quiet = False,
     verbose: Verbose = False,

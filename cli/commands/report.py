@@ -29,7 +29,7 @@ def report(
     context: typer.Context,
     result: Result,
     previous: Previous = None,
-    max_size: MaxSize = 15.0,
+    max_size: MaxSize = 8.0,
     open_page: OpenPage = False,
     quiet: Quiet = False,
     verbose: Verbose = False,

@@ -65,7 +65,7 @@ class AuditRequest:
     retries: int = 1
     resume: bool = True
     dask: str | None = None
-    max_size_mb: float = 15.0
+    max_size_mb: float = 8.0
 
     @property
     def at_once(self) -> int:
@@ -197,7 +197,7 @@ def audit(
     dask: str | None = None,
     baseline: StrPath | None = None,
     trends: Literal["hours", "days"] = "hours",
-    max_size_mb: float = 15.0,
+    max_size_mb: float = 8.0,
     events: Callable[[str, EventFacts], None] | None = None,
 ) -> Audit:
     """Diagnose every mission behind some paths, as `mfhca audit` does: reports, ``fleet.html``, ``fleet.json``, a store.

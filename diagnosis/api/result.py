@@ -165,7 +165,7 @@ class Diagnosis:
         return fault_figure(self._series, fault, margin_s)
 
     @stated
-    def save(self, folder: StrPath, *, max_size_mb: float = 15.0) -> Path:
+    def save(self, folder: StrPath, *, max_size_mb: float = 8.0) -> Path:
         """Write what `mfhca diagnose` writes: ``report.html``, ``report.json``, ``report.parquet``.
 
         Parameters

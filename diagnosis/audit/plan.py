@@ -58,7 +58,7 @@ class AuditOptions:
     limits: Limits = field(default_factory=Limits)
     retries: int = 1
     resume: bool = True
-    max_size_mb: float = 15.0
+    max_size_mb: float = 8.0
     isolation: str = ""
     judge: str = "diagnosis.audit.isolation.child:judge"
 

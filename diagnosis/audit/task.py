@@ -80,7 +80,7 @@ class Task:
     attempt: int = 1
     known: tuple[str, ...] = ()
     limits: Limits = field(default_factory=Limits)
-    max_size_mb: float = 15.0
+    max_size_mb: float = 8.0
     objects: str = ""
     described: tuple[str, ...] = ()
     isolation: str = ""

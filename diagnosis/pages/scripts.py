@@ -10,17 +10,18 @@ from collections.abc import Sequence
 from functools import lru_cache
 from pathlib import Path
 
+from diagnosis.pages.plotly_scatter import scatter_alone
 from replay.errors import ConfigError
 
 
 @lru_cache
 def packed_plotly(path: Path | None = None) -> tuple[str, str, str]:
-    """Source of plotly.js, the same deflated in base64, and its version.
+    """Source of plotly.js as pages embed it, the same deflated in base64, and its version.
 
     Parameters
     ----------
     path : Path or None
-        Bundle to take instead of the installed package's.
+        Bundle to take, as it is, instead of the installed package's, of which pages need the core alone.
 
     Raises
     ------
@@ -30,7 +31,7 @@ def packed_plotly(path: Path | None = None) -> tuple[str, str, str]:
     if path is None:
         from plotly.offline import get_plotlyjs
 
-        source = str(get_plotlyjs())
+        source = scatter_alone(str(get_plotlyjs()))
     else:
         try:
             source = path.read_text("utf-8-sig")

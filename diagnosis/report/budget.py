@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from diagnosis.report.encode import Channel, Plan, plan_of, reduced, whole, with_pieces
+from diagnosis.report.encode import Channel, Plan, plan_of, reduced, resolution_of, whole, with_pieces
 from diagnosis.results.result import Closeups
 
 Values = NDArray[np.floating]
@@ -23,7 +23,7 @@ Spans = list[tuple[int, int]]
 _PADS_S = ((20.0, 40.0), (10.0, 20.0), (5.0, 10.0), (2.0, 10.0), (2.0, 4.0), (1.0, 2.0))
 _MARGIN_S = 0.1
 _STRIDE, _BLOCKS, _FEWEST = 64, 32_768, 1024
-_AROUND, _MOST = 0.5, 0.9
+_AROUND, _MOST = 0.85, 0.9
 _RANK = {"replay": 1, "evidence": 2}
 _WORKERS = 4
 _MOST_WHOLE = 720_000
@@ -169,7 +169,13 @@ def _quiet() -> None:
 def _encoded(given: Encodable, budget: int) -> list[Channel]:
     columns, samples, per = given.columns, given.samples, given.per
     with ThreadPoolExecutor(_WORKERS, initializer=_quiet) as pool:
-        plans = dict(zip(columns, pool.map(lambda c: plan_of(columns[c], given.lsb.get(c)), columns), strict=True))
+        plans = dict(
+            zip(
+                columns,
+                pool.map(lambda c: plan_of(columns[c], given.lsb.get(c), resolution_of(c)), columns),
+                strict=True,
+            )
+        )
         if per == 1 and sum(p.rate for p in plans.values()) * samples <= budget:
             channels = list(pool.map(lambda c: whole(c, columns[c], plans[c]), columns))
             if sum(c.size for c in channels) <= budget:

@@ -17,10 +17,11 @@ from numpy.typing import NDArray
 
 _LEVELS = 2**24
 _HUGE, _TINY = 1e30, 1e-30
-_RESOLUTION = 1024
+_RECORDED, _DERIVED = 1024, 512  # least steps within the range of a column without an LSB
 _PROBE, _PROBES = 4096, 5
 _BLOCK = 1 << 15
 _NEARLY = 1.05
+_ON_GRID = 0.1  # turns of the LSB; off its grid 0.25, and 0.06 where a result stores a quarter of it
 _RUNS, _WORDS = (5, zlib.Z_RLE), (4, zlib.Z_DEFAULT_STRATEGY)
 
 
@@ -69,7 +70,7 @@ class Plan:
     rate: float
 
 
-def plan_of(values: NDArray[np.floating], lsb: float | None) -> Plan:
+def plan_of(values: NDArray[np.floating], lsb: float | None, resolution: int = _RECORDED) -> Plan:
     """Try a few stretches of a column: differences deflate better by their runs or by their repeated words.
 
     Parameters
@@ -78,8 +79,10 @@ def plan_of(values: NDArray[np.floating], lsb: float | None) -> Plan:
         Column; NaN where there is no sample.
     lsb : float or None
         Smallest increment of the recorded signal, in the column's unit.
+    resolution : int
+        Steps within the range, at least, where there is none.
     """
-    step, n = step_of(values, lsb), len(values)
+    step, n = step_of(values, lsb, resolution), len(values)
     starts = range(0, n, max(_PROBE, n // _PROBES))
     probes = [levels_of(values[i : i + _PROBE], step)[0] for i in starts]
     raws = [_planes([p])[1] for p in probes]
@@ -88,7 +91,12 @@ def plan_of(values: NDArray[np.floating], lsb: float | None) -> Plan:
     return Plan(step, way, 4 / 3 * sizes[way] / max(1, sum(len(p) for p in probes)))
 
 
-def step_of(values: NDArray[np.floating], lsb: float | None) -> float:
+def resolution_of(name: str) -> int:
+    """Steps within the range of a column: values move by a 2048th of it at most, replayed ones and evidence by a 1024th."""
+    return _DERIVED if name.startswith(("evidence.", "replay.")) else _RECORDED
+
+
+def step_of(values: NDArray[np.floating], lsb: float | None, resolution: int = _RECORDED) -> float:
     """Quantisation step of a column: the sensor's LSB (half of it where values lie off its grid), else by range.
 
     Parameters
@@ -97,6 +105,8 @@ def step_of(values: NDArray[np.floating], lsb: float | None) -> float:
         Column; NaN where there is no sample.
     lsb : float or None
         Smallest increment of the recorded signal, in the column's unit.
+    resolution : int
+        Steps within the range, at least, where there is none.
     """
     probe = values[:: max(1, len(values) // 20_000)].astype(np.float64)
     probe = probe[np.abs(probe) < _HUGE]
@@ -104,12 +114,12 @@ def step_of(values: NDArray[np.floating], lsb: float | None) -> float:
         return 1.0
     if lsb is not None and _TINY < lsb < _HUGE:
         turns = probe / lsb
-        step = lsb if np.mean(np.abs(turns - np.rint(turns))) < 0.05 else lsb / 2
+        step = lsb if np.mean(np.abs(turns - np.rint(turns))) < _ON_GRID else lsb / 2
     else:
         low, high = np.quantile(probe, [0.001, 0.999])
         extent = max(float(high - low) or float(np.abs(probe).max()) or 1.0, _TINY)
-        exponent = math.floor(math.log10(extent / _RESOLUTION))
-        mantissa = extent / _RESOLUTION / 10.0**exponent
+        exponent = math.floor(math.log10(extent / resolution))
+        mantissa = extent / resolution / 10.0**exponent
         step = max(m for m in (1.0, 2.0, 5.0) if m <= mantissa + 1e-9) * 10.0**exponent
     return step
 

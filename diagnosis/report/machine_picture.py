@@ -40,7 +40,7 @@ def condition(
     enough: Mapping[tuple[str, str], str] | None = None,
     words: MachineWords = HYDRAULIC,
 ) -> Condition:
-    """Worst fault of a component, or whether it was judged at all.
+    """Worst fault of a component, or whether it was judged at all; what is of severity *info* is a remark.
 
     Parameters
     ----------
@@ -57,7 +57,12 @@ def condition(
     words : MachineWords
         How to speak of the machine.
     """
-    mine = [f for f in faults if f["component"] == component and f["kind"] == kind]
+    every = [f for f in faults if f["component"] == component and f["kind"] == kind]
+    mine = [f for f in every if f["severity"] != Severity.INFO]
+    if every and not mine:
+        found = condition(component, kind, [], judged, enough, words)
+        remark = f"{len(every)} remark{'s' * (len(every) > 1)}"
+        return Condition(found.state, (*found.lines, remark), every[0]["id"], f"{found.title}; {remark}")
     if mine:
         worst = min(mine, key=lambda f: (-Severity(f["severity"]).rank, f["start_s"]))
         name = words.part_name(kind, worst["side"])

@@ -79,7 +79,7 @@ def build_page(
     columns: Mapping[str, NDArray[np.floating]],
     *,
     closeups: Closeups | None = None,
-    max_size_mb: float = 15.0,
+    max_size_mb: float = 8.0,
     plotlyjs: Path | None = None,
 ) -> str:
     """Page for one diagnosed mission; the same input gives the same text.
@@ -115,7 +115,7 @@ def build_page(
     main, later = ("\n".join(asset(path) for path in paths) for paths in (_MAIN, _LATER))
     evidence = evidence_of(report, series.shown, series.place, series.axis.per, detailed, series.closeups)
     drawn = sum(len(p.picture) for e in evidence.values() for p in (*e.edges, *e.course))
-    words = 400_000 + 6_000 * len(detailed) + 1_500 * len(report["intervals"]) + len(intervals)
+    words = 470_000 + 6_000 * len(detailed) + 1_500 * len(report["intervals"]) + len(intervals)
     budget = max(int(max_size_mb * 1e6) - len(bundle) - words - drawn, 200_000)
     context = {
         **tables.context(report, duration),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import groupby
 
 import numpy as np
@@ -16,10 +16,11 @@ from diagnosis.results.candidates import label_of
 from diagnosis.results.document import IntervalRow, PhaseRow, ReportDocument
 from diagnosis.results.fault_rows import state_label
 from diagnosis.results.machine_words import MachineWords, words_of
-from diagnosis.results.vocabulary import Kind, Tier
+from diagnosis.results.vocabulary import Kind, Severity, Tier
 from replay.faults import FAULT_STATES, FaultMode, Side, State
 
 _BUCKETS = 2000
+_LEAST_WIDTH, _MOST_ROWS = 0.6, 3  # percent of a lane that a bar takes at least on a screen; bars above each other
 _TICKS = (0.1, 0.2, 0.5, 1, 2, 5, 10, 15, 30, 60, 120, 300, 600, 900, 1800, 3600, 7200, 14400, 43200, 86400)
 
 
@@ -29,7 +30,17 @@ Span = tuple[str, float, float]
 
 @dataclass(frozen=True)
 class Bar:
-    """One fault on a lane; places in percent of the mission. `follows`: another fault may be its cause."""
+    """One fault on a lane; places in percent of the mission.
+
+    Attributes
+    ----------
+    follows : bool
+        Another fault may be its cause.
+    slight : bool
+        Of severity *info*: it paints no part.
+    row, rows : int
+        Where bars would cover each other they share the lane's height.
+    """
 
     fault: str
     state: str
@@ -38,6 +49,9 @@ class Bar:
     label: str
     title: str
     follows: bool = False
+    slight: bool = False
+    row: int = 0
+    rows: int = 1
 
 
 @dataclass(frozen=True)
@@ -130,12 +144,37 @@ def causes(faults: Sequence[IntervalRow]) -> dict[str, str]:
 def _bar(fault: IntervalRow, duration: float, words: MachineWords, cause: str = "") -> Bar:
     left = 100 * fault["start_s"] / duration
     width = 100 * (fault["stop_s"] - fault["start_s"]) / duration
-    mode = label_of(fault)
-    named = f"{fault['id']} {mode.lower()}"
-    label = named if width > 10 else fault["id"] if width > 0.9 + 0.8 * len(fault["id"]) else ""
+    label = f"{fault['id']} {label_of(fault).lower()}"
     times = f"{clock(fault['start_s'], 2)} to {clock(fault['stop_s'], 2)}"
     title = f"{fault['id']}: {fault_title(fault, words)}, {times}" + (f"; may follow from {cause}" if cause else "")
-    return Bar(fault["id"], fault["mode"], left, width, label, title, bool(cause))
+    slight = fault["severity"] == Severity.INFO
+    return Bar(fault["id"], fault["mode"], left, width, label, title, bool(cause), slight)
+
+
+def side_by_side(bars: Iterable[Bar]) -> tuple[Bar, ...]:
+    """Bars, ordered by their start, that would cover each other on a screen, in rows of their own."""
+    out: list[Bar] = []
+    group: list[Bar] = []
+    ends: list[float] = []
+
+    def close() -> None:
+        out.extend(replace(b, rows=len(ends)) for b in group)
+        group.clear()
+        ends.clear()
+
+    for b in bars:
+        if ends and b.left >= max(ends):
+            close()
+        row = next((i for i, end in enumerate(ends) if b.left >= end), len(ends))
+        stop = b.left + max(b.width, _LEAST_WIDTH)
+        if row == len(ends) < _MOST_ROWS:
+            ends.append(stop)
+        else:
+            row = min(row, _MOST_ROWS - 1)
+            ends[row] = max(ends[row], stop)
+        group.append(replace(b, row=row))
+    close()
+    return tuple(out)
 
 
 def _main_state(spans: Sequence[Span]) -> str:
@@ -224,15 +263,17 @@ def _faulty_lane(
 ) -> Lane:
     """Lane with faults; those without a bar of their own are part of its line."""
     own = [f for f in sorted(faults, key=lambda f: f["start_s"]) if bars is None or f["id"] in bars]
-    drawn = tuple(_bar(f, duration, machine_words, cause.get(f["id"], "")) for f in own) if duration > 0 else ()
+    bars_of = [_bar(f, duration, machine_words, cause.get(f["id"], "")) for f in own] if duration > 0 else []
+    drawn = side_by_side(bars_of)
     if len(own) < len(faults):
         spans = [*spans, *((f["mode"], f["start_s"], f["stop_s"]) for f in faults)]
     total = sum(f["stop_s"] - f["start_s"] for f in faults)
     share = 100 * total / duration if duration > 0 else 0.0
     words = f"{share:.1f} %" if share >= 0.05 else span(total)
-    first_fault = faults[0]
-    name = machine_words.part_name(first_fault["kind"], side)
-    return Lane(component, name, first_fault["mode"], _lines(spans, side, duration), drawn, words, first, side)
+    name = machine_words.part_name(faults[0]["kind"], side)
+    painting = next((f["mode"] for f in faults if f["severity"] != Severity.INFO), None)
+    state = painting or _main_state(spans)
+    return Lane(component, name, state, _lines(spans, side, duration), drawn, words, first, side)
 
 
 def _phases(phases: Sequence[PhaseRow], duration: float) -> tuple[Bar, ...]:
@@ -241,5 +282,5 @@ def _phases(phases: Sequence[PhaseRow], duration: float) -> tuple[Bar, ...]:
         left, width = 100 * a / _BUCKETS, 100 * (b - a) / _BUCKETS
         times = f"{clock(left * duration / 100)} to {clock((left + width) * duration / 100)}"
         style = name if name in {"forward", "reverse", "standstill", "turning"} else "other"
-        bars.append(Bar("", style, left, width, name if width > 0.9 * len(name) else "", f"{name}, {times}"))
+        bars.append(Bar("", style, left, width, name if width > 0.5 * len(name) else "", f"{name}, {times}"))
     return tuple(bars)

@@ -17,7 +17,6 @@ playwright = pytest.importorskip("playwright.sync_api", reason="playwright is no
 expect = playwright.expect
 
 OPEN = Callable[..., Any]
-TAGS = ["wcag2a", "wcag2aa", "wcag21a", "wcag21aa", "wcag22aa"]
 
 
 def few_since() -> list[samples.Sample]:
@@ -73,14 +72,13 @@ def test_page_fits_the_screen(open_page: OPEN, name: str, width: int, theme: str
     ("name", "width", "theme"),
     [("few", 1280, "light"), ("few", 1280, "dark"), ("few", 420, "light"), ("hostile", 1280, "dark")],
 )
-def test_no_breach_of_wcag(open_page: OPEN, axe: str, name: str, width: int, theme: str) -> None:
+def test_no_breach_of_any_rule(open_page: OPEN, axe: str, name: str, width: int, theme: str) -> None:
     page = open_page(name, width=width, theme=theme)
     page.evaluate("document.querySelectorAll('details').forEach(d => { d.open = true; })")
     page.evaluate(axe)
     found = page.evaluate(
-        "tags => axe.run(document, { runOnly: tags, resultTypes: ['violations'] }).then(r => r.violations"
-        ".flatMap(v => v.nodes.map(n => v.id + ' ' + n.target.join(' '))))",
-        TAGS,
+        "axe.run(document, { resultTypes: ['violations'] }).then(r => r.violations"
+        ".flatMap(v => v.nodes.map(n => v.id + ' ' + n.target.join(' '))))"
     )
     assert found == []
 

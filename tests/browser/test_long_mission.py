@@ -109,3 +109,15 @@ def test_csv_holds_every_sample_near_a_fault_and_extremes_elsewhere(open_page: O
     assert rows[:, 2].max() == pytest.approx(1.998, abs=2e-4)
     assert rows[0, 0] <= 77.68
     assert np.nanmax(envelopes["wheel.FR.v"]) == 1.998
+
+
+def test_no_dashes_run_along_dense_extremes(open_page: OPEN) -> None:
+    page = open_page("five_faults")
+    page.locator("#figure .main-svg").first.wait_for()
+    said = page.evaluate("""() => {
+      const x = [...Array(400).keys()], band = { exact: false, x, y: x.map(i => i % 2 ? 1 : -1) };
+      const calm = { exact: false, x, y: x.map(i => Math.sin(i / 50)) }, part = { ...calm, y: calm.y.map((v, i) => i < 350 ? v : band.y[i]) };
+      const s = { width: 1.5, dash: 'dash' };
+      return [band, part, calm, { ...band, exact: true }].map(c => Figure.line(s, c)).map(l => [l.dash, l.opacity < 1]);
+    }""")
+    assert said == [["solid", True], ["solid", True], ["dash", False], ["dash", False]]

@@ -165,3 +165,19 @@ def test_everything_on_paper_in_light_colours(open_page: OPEN) -> None:
     page.emulate_media(media="print")
     expect(page.locator("article.ev").last).to_be_visible()
     assert page.locator("html").get_attribute("data-theme") == "dark"
+
+
+def test_no_sheet_of_paper_cuts_a_plot(open_page: OPEN) -> None:
+    page = open_page("five_faults")
+    page.locator("#figure .main-svg").first.wait_for()
+    rows = page.locator("#figure .subplot").count()
+    page.evaluate("document.documentElement.dataset.print = 'all'; dispatchEvent(new Event('beforeprint'))")
+    sheets = page.locator("#figure, #figure ~ .sheet")
+    assert sheets.count() == -(-rows // 5)
+    heights = [s.bounding_box()["height"] for s in sheets.all()]
+    assert max(heights) <= 1000  # an A4 sheet with its margins has 1030 CSS pixels
+    plots = page.evaluate("document.querySelectorAll('#figure .subplot, .sheet .subplot').length")
+    assert plots == rows
+    page.evaluate("dispatchEvent(new Event('afterprint'))")
+    page.locator(".sheet").wait_for(state="detached")
+    assert page.locator("#figure .subplot").count() == rows

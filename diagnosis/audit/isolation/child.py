@@ -88,7 +88,7 @@ class Work:
     fallback_id: str
     folder: str
     temporary: str
-    max_size_mb: float = 15.0
+    max_size_mb: float = 8.0
     judge: str = "diagnosis.audit.isolation.child:judge"
 
 

@@ -2,7 +2,7 @@
 // Time series of the report: decoded from the page's own text when first needed, thinned per pixel for drawing.
 const Data = (() => {
   const view = JSON.parse(document.getElementById("view").textContent);
-  const BLOCK = 64, HELD = 64e6;
+  const BLOCK = 64, HELD = 32e6;
   const decoded = new Map();
   let held = 0;
 

@@ -83,6 +83,21 @@ class Figure {
   // Dots where few enough samples are in view to tell them apart.
   static mode(curve) { return curve.exact && curve.x.length <= 160 ? "lines+markers" : "lines"; }
 
+  // Whether extremes fill areas somewhere: dashes along them would interfere with each other and with other bands.
+  static dense({ exact, y }) {
+    if (exact) return false;
+    let low = Infinity, high = -Infinity, swings = 0;
+    for (const v of y) { if (v < low) low = v; if (v > high) high = v; }
+    const wide = 0.1 * (high - low);
+    for (let i = 2; i < y.length; i++) if (Math.abs(y[i] - y[i - 1]) > wide && (y[i] - y[i - 1]) * (y[i - 1] - y[i - 2]) < 0) swings += 1;
+    return swings > 12;
+  }
+
+  // Line of a curve: areas of extremes are even and let others show through.
+  static line(s, curve) {
+    return Figure.dense(curve) ? { width: 1.8, dash: "solid", opacity: 0.65 } : { width: s.width, dash: s.dash || "solid", opacity: 1 };
+  }
+
   pixels() { return Math.max(200, this.element.clientWidth - 70); }
 
   // Curves of all rows for the current range, in the order of `traces`.
@@ -127,10 +142,10 @@ class Figure {
 
   traces(curves) {
     const list = [], add = (i, role, name, unit, right, more) => {
-      const s = Figure.style(role), d = curves[list.length];
-      list.push({
+      const s = Figure.style(role), d = curves[list.length], { opacity, ...line } = Figure.line(s, d);
+      list.push({ opacity,
         type: "scatter", mode: Figure.mode(d), marker: { size: 4 }, x: d.x, y: d.y, name: Figure.text(name), connectgaps: false, xaxis: "x",
-        yaxis: right ? `y${100 + i}` : `y${i ? i + 1 : ""}`, line: { color: Figure.colour(s.colour), width: s.width, dash: s.dash || "solid" },
+        yaxis: right ? `y${100 + i}` : `y${i ? i + 1 : ""}`, line: { color: Figure.colour(s.colour), ...line }, meta: role,
         hoverinfo: "skip", ...more,
       });
     };
@@ -194,7 +209,7 @@ class Figure {
 
   layout(width) {
     const [text, muted, line, grid] = ["text", "muted", "line", "line2"].map(Figure.colour);
-    const panel = width ? 78 : this.rows.length > 5 ? 104 : 128, foot = 44, headings = this.headings(this.curves);
+    const panel = !width && this.rows.length > 5 ? 104 : 128, foot = 44, headings = this.headings(this.curves);
     this.lines = headings.map((h) => h.lines);
     const heads = headings.map((h) => 15 + 16 * h.lines), plot = heads.reduce((sum, h) => sum + h + panel, 0), height = plot + foot;
     const last = this.rows.length;
@@ -313,10 +328,28 @@ class Figure {
     this.onRange?.(this.range);
   }
 
-  // The same curves at once, for paper of `width` pixels.
-  print(width) { if (this.drawn) Plotly.react(this.element, this.traces(this.curves), this.layout(width)); }
+  // The same curves at once, for paper of `width` pixels: a drawing for every five rows, so that no sheet cuts one.
+  print(width) {
+    if (!this.drawn) return;
+    const curves = this.perRow(this.curves), most = 5;
+    this.sheets = [];
+    for (let i = 0; i < this.rows.length; i += most) {
+      const part = new Figure(i ? document.createElement("div") : this.element);
+      Object.assign(part, { rows: this.rows.slice(i, i + most), curves: curves.slice(i, i + most).flat(), shades: this.shades, range: this.range });
+      if (i) {
+        part.element.className = "sheet";
+        (this.sheets.at(-1) || this.element).after(part.element);
+        this.sheets.push(part.element);
+      }
+      Plotly.react(part.element, part.traces(part.curves), part.layout(width));
+    }
+  }
 
-  redraw() { return this.drawn ? this.draw(this.rows, this.shades, this.range) : undefined; }
+  redraw() {
+    for (const e of this.sheets || []) { Plotly.purge(e); e.remove(); }
+    this.sheets = [];
+    return this.drawn ? this.draw(this.rows, this.shades, this.range) : undefined;
+  }
 
   clip([a, b]) {
     const least = 4 * Data.view.dt, end = Data.view.t0 + Data.view.n * Data.view.dt;
@@ -350,7 +383,11 @@ class Figure {
   // Samples of the curves as Plotly.update takes them; areas stay without dots.
   restyled(curves) {
     const mode = this.element.data.map((d, i) => (d.fill ? "lines" : Figure.mode(curves[i])));
-    return { x: curves.map((c) => c.x), y: curves.map((c) => c.y), mode };
+    const lines = this.element.data.map((d, i) => (d.fill ? { opacity: d.opacity, ...d.line } : Figure.line(Figure.style(d.meta), curves[i])));
+    return {
+      x: curves.map((c) => c.x), y: curves.map((c) => c.y), mode, opacity: lines.map((l) => l.opacity ?? 1),
+      "line.dash": lines.map((l) => l.dash), "line.width": lines.map((l) => l.width),
+    };
   }
 
   // Part of the range earlier (−) or later, and closer (below 1) or wider about its middle.

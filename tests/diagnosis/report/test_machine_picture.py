@@ -97,3 +97,11 @@ def test_long_words_stand_in_several_lines() -> None:
         "1.0 s",
     ]
     assert max(map(len, words)) <= 15
+
+
+def test_what_is_of_little_severity_is_a_remark_and_paints_no_part() -> None:
+    judged = {("FR", "sensor"): True, ("FR", "actuator"): True}
+    faint = samples.fault(mode="noisy", severity="info", start_s=30.0, stop_s=30.013)
+    found = condition("FR", Kind.WHEEL, [faint], judged)
+    assert (found.state, found.lines, found.fault) == ("healthy", ("Healthy", "1 remark"), faint["id"])
+    assert condition("FR", Kind.WHEEL, [faint, samples.fault(id="F2")], judged).state == "stuck"

@@ -2,7 +2,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from diagnosis.report.timeline import causes, merged, ticks, timeline
+from diagnosis.report.timeline import Bar, causes, merged, side_by_side, ticks, timeline
 from diagnosis.results.document import IntervalRow
 from tests import report_samples as samples
 
@@ -80,3 +80,23 @@ def test_a_part_that_was_judged_too_briefly_does_not_count_as_healthy() -> None:
     t = timeline(report, 66.0)
     assert [lane.state for lane in t.quiet] == ["healthy", "not_assessed"]
     assert t.summary == "2 lanes without a fault: 1 healthy, 1 not judged long enough"
+
+
+def bar(left: float, width: float) -> Bar:
+    return Bar("F1", "stuck", left, width, "F1", "F1")
+
+
+def test_bars_that_would_cover_each_other_share_the_height() -> None:
+    found = side_by_side([bar(10, 20), bar(15, 2), bar(16, 30), bar(60, 0.01), bar(60.1, 0.01), bar(80, 5)])
+    assert [(b.row, b.rows) for b in found] == [(0, 3), (1, 3), (2, 3), (0, 2), (1, 2), (0, 1)]
+    many = side_by_side([bar(10 + 0.01 * k, 5) for k in range(9)])
+    assert {b.rows for b in many} == {3}
+    assert len(many) == 9
+
+
+def test_brief_noise_of_little_severity_is_drawn_and_paints_no_part() -> None:
+    report, _ = samples.one_wheel()
+    report["intervals"][0] |= {"mode": "noisy", "severity": "info", "start_s": 30.0, "stop_s": 30.013}
+    lane = timeline(report, 120.0).lanes[0]
+    assert lane.state != "noisy"
+    assert [b.slight for b in lane.bars] == [True]
