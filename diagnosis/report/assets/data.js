@@ -258,8 +258,9 @@ const Now = {
   set(t, more) {
     const { t0, dt, n } = Data.view;
     if (!n) return; // without time series there is no time to show
-    Object.assign(this, more);
-    this.t = t === null ? null : t0 + dt * Math.min(n - 1, Math.max(0, Math.round((t - t0) / dt)));
+    const sample = (v) => (v === null ? null : t0 + dt * Math.min(n - 1, Math.max(0, Math.round((v - t0) / dt))));
+    Object.assign(this, more, { t: sample(t) });
+    Object.assign(this, { a: sample(this.a), b: sample(this.b) });
     if (this.asked) return;
     this.asked = true;
     requestAnimationFrame(() => { this.asked = false; document.documentElement.dispatchEvent(new Event("now")); });

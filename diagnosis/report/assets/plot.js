@@ -8,6 +8,7 @@ class Figure {
     // A click sets a marker; a drag is a zoom.
     element.addEventListener("pointerdown", (e) => {
       if (!this.drawn || e.button || !this.read().inside(e)) return;
+      this.shifted = e.shiftKey; // a click and a shift-click soon after it are two markers, not a double click
       addEventListener("pointerup", (up) => {
         if (Math.hypot(up.clientX - e.clientX, up.clientY - e.clientY) > 4 || e.target.closest(".modebar")) return;
         Now.set(this.read().time(e), { [e.shiftKey ? "b" : "a"]: this.read().time(e) });
@@ -322,7 +323,7 @@ class Figure {
         const r = e["xaxis.range"] || ("xaxis.range[0]" in e ? [e["xaxis.range[0]"], e["xaxis.range[1]"]] : null);
         if (r && !this.busy) this.zoom(r.map(Number));
       });
-      this.element.on("plotly_doubleclick", () => { Now.set(Now.t, { a: null }); this.zoom([0, Data.view.duration]); });
+      this.element.on("plotly_doubleclick", () => { if (this.shifted) return; Now.set(Now.t, { a: null }); this.zoom([0, Data.view.duration]); });
     }
     this.onRange?.(this.range);
   }
