@@ -79,7 +79,10 @@ class FaultChangeRow(TypedDict):
 
 
 class SideCoverageRow(TypedDict):
-    """How long one component and side was judged in one mission [s]; `shown`: the whole mission was judged, and cleared it."""
+    """How long one component and side was judged in one mission [s]; `shown`: the whole mission was judged, and cleared it.
+
+    `long_enough`: whether it was judged for as long as `assessed` needs, whatever the checks say.
+    """
 
     tier: Tier
     driving_s: float
@@ -87,6 +90,7 @@ class SideCoverageRow(TypedDict):
     judged_s: float
     assessed: bool
     shown: bool
+    long_enough: bool
 
 
 class CoverageChangeRow(TypedDict):
