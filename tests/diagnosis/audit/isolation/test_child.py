@@ -194,23 +194,26 @@ def _wait_until_gone(pid: int) -> None:
     raise AssertionError(f"process {pid} is still there")
 
 
-@pytest.mark.parametrize(
-    ("text", "said"),
-    [("", "side.csv was left out: side.csv"), ("t,a,b\n0,1,2\n1,1,2\n2,1,2\n", "side.csv was left out: ")],
-    ids=["empty", "other columns"],
-)
-def test_a_side_file_that_is_off_costs_itself_alone(
-    text: str, said: str, mission_log: Path, forks: Isolation, tmp_path: Path
-) -> None:
-    (tmp_path / "side.csv").write_text(text, encoding="utf-8")
+def test_a_side_file_that_is_off_costs_itself_alone(mission_log: Path, forks: Isolation, tmp_path: Path) -> None:
+    said = "side.csv was left out: side.csv"
+    (tmp_path / "side.csv").write_text("", encoding="utf-8")
     work = work_of(str(mission_log), tmp_path, "diagnosis.audit.isolation.child:judge")
     outcome = run_isolated(replace(work, files=(str(mission_log), str(tmp_path / "side.csv"))), Limits(), forks)
     assert (outcome.state, outcome.reason[: len(said)]) == ("degraded", said)
     assert str(tmp_path) not in outcome.reason
     assert outcome.summary is not None
-    assert outcome.summary["result"]["verdict"] == "watch"  # a log with damage is never ready
+    assert outcome.summary["result"]["verdict"] == "not_assessed"  # a log with damage is never ready
     report = json.loads((tmp_path / "report" / "report.json").read_bytes())
     assert [file["damage"] for file in report["log"]["files"]] == [[outcome.reason]]
+
+
+def test_a_side_file_of_other_columns_is_a_note(mission_log: Path, forks: Isolation, tmp_path: Path) -> None:
+    (tmp_path / "side.csv").write_text("t,a,b\n0,1,2\n1,1,2\n2,1,2\n", encoding="utf-8")
+    work = work_of(str(mission_log), tmp_path, "diagnosis.audit.isolation.child:judge")
+    outcome = run_isolated(replace(work, files=(str(mission_log), str(tmp_path / "side.csv"))), Limits(), forks)
+    assert (outcome.state, outcome.reason) == ("ok", "")
+    report = json.loads((tmp_path / "report" / "report.json").read_bytes())
+    assert any("none of its channels" in note for file in report["log"]["files"] for note in file["notes"])
 
 
 def test_the_same_signals_twice_are_judged_from_the_recording(
