@@ -137,7 +137,15 @@ def _urgency(fault: Mapping[str, Any], report: Mapping[str, Any]) -> Iterator[st
     either = fault["side"] == "sensor_or_actuator"
     named = [h for h in fault["hypotheses"] if h["mode"] != "healthy" and (either or h["side"] == fault["side"])]
     total = sum(h["p"] for h in named if h["mode"] in _TOTAL)
-    lost = fault["epsilon"] is not None and fault["epsilon"]["value"] >= _LOST and fault["mode"] == "inefficient"
+    size = fault["epsilon"]
+    least = (
+        None
+        if size is None
+        else size["low"]
+        if fault["mode"] in _TOTAL and fault["tier"] == "direct"
+        else size["value"]
+    )
+    lost = least is not None and least >= _LOST and (fault["mode"] == "inefficient" or fault["tier"] == "direct")
     risk = total + sum(h["p"] for h in named if lost and h["mode"] == "inefficient")
     limits = report["limits"]
     sure = sum(h["p"] for h in named) >= limits["min_probability"]

@@ -6,6 +6,7 @@ was seen to be healthy for longer, the pieces are faults of their own.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
@@ -22,6 +23,8 @@ _SEEN_HEALTHY_S = {Tier.DIRECT: 0.05}
 _SEEN_BY_MODELS_S = 0.5
 _SPARE = 0.1  # of ε̂: by which two bounds may miss each other
 _NAMED = 6
+_CASES = "it was this in ", " of 100 cases"
+_IN_CASES = re.compile(rf"{_CASES[0]}\d+{_CASES[1]}")
 Part = tuple[str, str]
 
 
@@ -37,12 +40,17 @@ def with_episodes(assessments: Mapping[Part, Assessment], dt: float) -> dict[Par
     """
     out: dict[Part, Assessment] = {}
     for part, a in assessments.items():
-        if len(a.findings) < 2:
-            out[part] = a
-            continue
         states = {side: b.states for (component, side), b in assessments.items() if component == part[0]}
-        out[part] = replace(a, findings=joined(a.findings, states, dt))
+        findings = a.findings if len(a.findings) < 2 else joined(a.findings, states, dt)
+        told = tuple(_with_its_chance(f) for f in findings)
+        out[part] = a if told == a.findings else replace(a, findings=told)
     return out
+
+
+def _with_its_chance(finding: Finding) -> Finding:
+    """The same with sentences that give the probability of what it was joined or put together to, not of a part of it."""
+    said = f"{_CASES[0]}{100 * finding.probability:.0f}{_CASES[1]}"
+    return replace(finding, evidence=tuple(_IN_CASES.sub(said, text) for text in finding.evidence))
 
 
 def joined(findings: Sequence[Finding], states: Mapping[str, NDArray[np.int8]], dt: float) -> tuple[Finding, ...]:
