@@ -11,6 +11,7 @@ import pytest
 
 from tests import report_samples as samples
 from tests.browser.downloads import saved
+from tests.browser.figures import shows_time
 
 playwright = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
 expect = playwright.expect
@@ -53,10 +54,6 @@ def measured(page: Any) -> list[list[float]]:
         " return [Array.from(c.x), Array.from(c.y)]; })()"
     )
     return curve
-
-
-def x_range(page: Any, figure: str = "figure") -> list[float]:
-    return [float(v) for v in page.evaluate(f"document.getElementById('{figure}').layout.xaxis.range")]
 
 
 @pytest.mark.parametrize(
@@ -124,7 +121,7 @@ def test_zoom_buttons_and_badge(show: SHOW) -> None:
         expect(page.locator("#badge")).to_contain_text(
             "envelope" if name == "Mission" else "every sample drawn · 100 Hz"
         )
-        assert x_range(page) == expected
+        shows_time(page, "figure", expected)
 
 
 def test_samples_drawn_are_the_samples_recorded(show: SHOW) -> None:
@@ -153,9 +150,7 @@ def test_drag_zooms_and_double_click_shows_the_mission(show: SHOW) -> None:
     page.mouse.move(box["x"] + 0.28 * box["width"], box["y"] + 20, steps=6)
     page.mouse.up()
     expect(page.locator("#badge")).to_contain_text("every sample")
-    low, high = x_range(page)
-    assert low == pytest.approx(30.0, abs=0.5)
-    assert high == pytest.approx(33.6, abs=0.5)
+    shows_time(page, "figure", [30.0, 33.6], within=0.5)
     area.dblclick()
     page.wait_for_url(re.compile(r"t=0\.0000,120\.0000$"))
 
@@ -198,7 +193,7 @@ def test_theme_button_redraws(open_page: OPEN) -> None:
 
 def test_deep_link_and_change_of_address(open_page: OPEN) -> None:
     page = drawn(open_page("five_faults", "#fault=F3&t=44,46"))
-    assert x_range(page) == [44.0, 46.0]
+    shows_time(page, "figure", [44.0, 46.0])
     page.evaluate("location.hash = '#fault=F2'")
     expect(page.locator(".ev:not([hidden]) h2")).to_have_text(re.compile("^F2 · "))
     page.evaluate("location.hash = '#fault=nothing&t=x'")
@@ -235,7 +230,7 @@ def test_loop_replay(open_page: OPEN) -> None:
     for name, words in (("Drive valves", "u_a FR"), ("Steering", "u_s rear"), ("Ψ̂", "implied by the recorded command")):
         page.get_by_role("button", name=re.compile(name)).click()
         expect(page.locator("#loop-figure")).to_contain_text(words)
-    assert x_range(page, "loop-figure") == [0.0, 120.0]
+    shows_time(page, "loop-figure", [0.0, 120.0])
 
 
 def test_lanes_without_faults_unfold(show: SHOW) -> None:

@@ -12,16 +12,13 @@ import pytest
 from scipy.signal import welch
 
 from tests.browser.downloads import saved
+from tests.browser.figures import shows_time
 from tests.report_samples import five_faults
 
 playwright = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
 expect = playwright.expect
 
 OPEN = Callable[..., Any]
-
-
-def x_range(page: Any, figure: str) -> list[float]:
-    return [float(v) for v in page.evaluate(f"document.getElementById('{figure}').layout.xaxis.range")]
 
 
 def settled(page: Any, address: str) -> None:
@@ -60,20 +57,20 @@ def test_plots_keep_the_time_of_the_evidence_while_linked(open_page: OPEN) -> No
     page = open_page("five_faults", "#fault=F1&t=27,39&plots=wheel.FR.v;wheel.FR.u")
     page.locator("#signals-figure .main-svg").first.wait_for()
     page.locator("#figure .main-svg").first.wait_for()
-    assert x_range(page, "signals-figure") == [27.0, 39.0]
+    shows_time(page, "signals-figure", [27.0, 39.0])
     page.locator("#signals-figure").focus()
     page.keyboard.press("ArrowRight")
     settled(page, r"t=30\.0000,42\.0000&")
     page.keyboard.press("+")
     settled(page, r"t=33\.0000,39\.0000&")
     expect(page.locator("#figure").get_by_text("34", exact=True)).to_be_visible()
-    assert x_range(page, "figure") == [33.0, 39.0]
+    shows_time(page, "figure", [33.0, 39.0])
     page.get_by_label("same time as the evidence").uncheck()
     page.locator("#signals-figure").focus()
     page.keyboard.press("m")
     expect(page.locator("#signals-badge")).to_contain_text("envelope")
-    assert x_range(page, "signals-figure") == [0.0, 120.0]
-    assert x_range(page, "figure") == [33.0, 39.0]
+    shows_time(page, "signals-figure", [0.0, 120.0])
+    shows_time(page, "figure", [33.0, 39.0])
 
 
 def test_one_sample_is_seen_in_the_whole_mission(open_page: OPEN) -> None:
@@ -119,7 +116,7 @@ def test_hostile_names_are_found_and_stay_text(open_page: OPEN) -> None:
 def test_no_fault_no_link_to_evidence_but_signals(open_page: OPEN) -> None:
     page = open_page("no_faults", "#t=10,20&plots=wheel.FR.v")
     page.locator("#signals-figure .main-svg").first.wait_for()
-    assert x_range(page, "signals-figure") == [10.0, 20.0]
+    shows_time(page, "signals-figure", [10.0, 20.0])
     page.keyboard.press("-")
     settled(page, r"#t=5\.0000,25\.0000&plots=wheel.FR.v$")
 

@@ -306,7 +306,10 @@ class Figure {
 
   async draw(rows, shades, range) {
     Object.assign(this, { rows, shades, range: this.clip(range) });
-    const job = ++this.job, Plotly = await Data.plotly(), curves = await this.fetch(this.range);
+    const job = ++this.job, Plotly = await Data.plotly();
+    let curves, target;
+    // Zoomed while its samples were read: those of the new view.
+    do curves = await this.fetch(target = this.range); while (job === this.job && target !== this.range);
     if (job !== this.job) return;
     const config = {
       responsive: true, displaylogo: false, showSendToCloud: false, plotlyServerURL: "", doubleClick: false,
