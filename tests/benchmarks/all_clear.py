@@ -18,13 +18,14 @@ from __future__ import annotations
 import argparse
 import json
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
+import hydrostatic
 import numpy as np
 from accuracy import EVIDENCE
 from foreign_machine import NAME as FOREIGN
@@ -36,7 +37,7 @@ from diagnosis.pipeline import diagnose_mission, diagnose_signals
 from diagnosis.results.document import ReportDocument
 from replay.errors import MfhcaError
 from replay.machine.config import haulotte
-from replay.simulation.options import SimulatedMission, SimulationOptions
+from replay.simulation.options import SimulationOptions
 from replay.simulation.run import simulate_mission
 from replay.simulation.structures import STRUCTURES, StructureOptions
 
@@ -95,6 +96,8 @@ def run(task: Task) -> list[Outcome]:
     """Outcomes of one mission."""
     if task.machine == FOREIGN:
         return run_foreign(task)
+    if task.machine == hydrostatic.NAME:
+        return run_hydrostatic(task)
     mission, machine, trouble, out = simulate_mission(options_of(task)), haulotte(), task.trouble, []
     name = trouble.name if trouble else "healthy"
     for tier in task.tiers:
@@ -108,7 +111,28 @@ def run(task: Task) -> list[Outcome]:
             out.append(Outcome(task.machine, name, tier, "abstained", 0, 0, "error", str(error)))
             continue
         out.append(judged(task, tier, name, report, trouble.parts if trouble else None))
-    return out if trouble is None or exercised(mission, trouble) else []
+    columns = mission.columns
+    asked = {
+        c: columns.get(f"wheel.{c}.v_ref", columns.get(f"steer.{c}.phi_ref"))
+        for c in {f.component for f in (trouble.faults if trouble else ())}
+    }
+    return out if exercised((mission.stamps - mission.stamps[0]) * 1e-9, asked, trouble) else []
+
+
+def run_hydrostatic(task: Task) -> list[Outcome]:
+    """Outcomes of one mission of the machine of other physics."""
+    trouble, out = task.trouble, []
+    machine = hydrostatic.machine_of(hydrostatic.build(task.seed))
+    name = trouble.name if trouble else "healthy"
+    if trouble and not exercised(*hydrostatic.asked(task.seed, task.duration), trouble):
+        return []
+    for tier in task.tiers:
+        signals = hydrostatic.signals(task.seed, trouble.faults if trouble else (), task.duration, tier)
+        if trouble is not None and trouble.edit is not None:
+            signals = trouble.edit(signals)
+        report = diagnose_signals(signals, machine).report
+        out.append(judged(task, tier, name, report, trouble.parts if trouble else None))
+    return out
 
 
 def run_foreign(task: Task) -> list[Outcome]:
@@ -126,20 +150,18 @@ def run_foreign(task: Task) -> list[Outcome]:
     ]
 
 
-def exercised(mission: SimulatedMission, trouble: Trouble) -> bool:
+def exercised(t: np.ndarray, asked: Mapping[str, np.ndarray], trouble: Trouble | None) -> bool:
     """Whether a part that fails is driven, or its valve asked to steer, for some time of its fault; true where none is simulated."""
-    if not trouble.faults:
+    if trouble is None or not trouble.faults:
         return True
-    t = (mission.stamps - mission.stamps[0]) * 1e-9
     time: dict[str, float] = {}
     for f in trouble.faults:
-        wheel = f"wheel.{f.component}.v_ref"
-        asked = np.abs(mission.columns[wheel if wheel in mission.columns else f"steer.{f.component}.phi_ref"])
-        used = asked > _DRIVEN if wheel in mission.columns else np.abs(np.gradient(asked, t)) > _STEERED
+        wheel = f.component not in ("front", "rear")
+        used = np.abs(asked[f.component]) > _DRIVEN if wheel else np.abs(np.gradient(asked[f.component], t)) > _STEERED
         time[f.component] = time.get(f.component, 0.0) + float(np.mean(np.diff(t))) * float(
             np.count_nonzero(used & (t >= f.start_s) & (t < f.stop_s))
         )
-    return any(s >= (_DRIVEN_S if f"wheel.{c}.v_ref" in mission.columns else _STEERED_S) for c, s in time.items())
+    return any(s >= (_STEERED_S if c in ("front", "rear") else _DRIVEN_S) for c, s in time.items())
 
 
 def judged(task: Task, tier: str, name: str, report: ReportDocument, parts: frozenset[Part] | None) -> Outcome:
@@ -201,6 +223,8 @@ def table(outcomes: Sequence[Outcome]) -> Iterator[str]:
     for machine in dict.fromkeys(o.machine for o in outcomes):
         for tier in TIERS:
             own = [o for o in outcomes if (o.machine, o.tier) == (machine, tier)]
+            if not own:
+                continue
             ill, sound = ([o for o in own if (o.trouble == "healthy") is flag] for flag in (False, True))
             count = [sum(o.outcome == x for o in ill) for x in ("cleared", "abstained", "wrong part", "named")]
             wrong, high = sum(o.wrong_high for o in ill), sum(o.high for o in ill)
@@ -216,7 +240,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description="Wrong all-clears and wrong stops.")
     parser.add_argument("--seeds", choices=FIRST, default="tuning")
     parser.add_argument("--first", type=int, default=0, help="added to the first seed")
-    parser.add_argument("--machine", nargs="+", default=None, help="default, structures, foreign")
+    parser.add_argument("--machine", nargs="+", default=None, help="default, structures, foreign, hydrostatic")
     parser.add_argument("--duration", type=float, default=75.0, help="length of a mission [s]")
     parser.add_argument("--every", type=int, default=1, help="one of so many kinds of trouble")
     parser.add_argument("--healthy", type=int, default=40, help="healthy missions of each machine")
