@@ -23,13 +23,14 @@ _ROUNDED = 0.8  # of the rounding step: by as much is a coarse reading off what 
 _LEAST_SHOWN = 0.02  # quantile of what a channel shows beside 0
 _ALIKE, _HOLDS = 1.5, 20  # speeds that are alike; holds that make a habit
 _LONG_HOLDS, _BEYOND_HOLDS = 0.98, 2.0  # quantile of holds that is long; times as long as that is no habit
+_SETTLING_LAGS, _OVERSHOOT, _NOISES = 6.0, 0.3, 3.0  # of a valve of higher order; share of its move; times the noise
 _FLIPS = 25  # samples in a row on one side of a command that switches to and fro between samples
 
 
 def timing_explains(found: IdentifiedPair, run: Run, mode: FaultMode) -> bool:
     """Whether a deviation may be nothing but a delay between y and its reference, or its rounding.
 
-    Shorter than a spool sensor's delay; or, where a log is too slow for its commands: what changes from sample to
+    Shorter than a spool sensor's delay; or an overshoot that settles; or, where a log is too slow for its commands: what changes from sample to
     sample is as large, or y is x with its sign at other moments, or a constant y is as far off as a healthy one may be. For a
     speed: shorter than half a second and no more than 10 ms, or one and a half samples, of the reference's slope, or a reading that rests beside a
     reference that hardly moves, no longer than its noise allows. Whatever the rate, the answer to a command of which
@@ -47,7 +48,7 @@ def timing_explains(found: IdentifiedPair, run: Run, mode: FaultMode) -> bool:
         if mode.total:
             return _rests_by_chance(found, run, deviation) or _held_by_habit(found, run)
         return mode.varying and seconds < 0.5 and deviation < moves
-    if seconds <= _SPOOL_DELAY_S:
+    if seconds <= _SPOOL_DELAY_S or (mode.varying and _settles(found, run)):
         return True
     jumps = _sudden(pair.x, run)
     if not mode.total and deviation < 2 * jumps and jumps > _JUMPY * float(np.sqrt(np.nanmean(ref**2))):
@@ -61,6 +62,27 @@ def timing_explains(found: IdentifiedPair, run: Run, mode: FaultMode) -> bool:
     sudden = max(_sudden(z, run) for z in (pair.x, pair.y))
     unsigned = np.sqrt(np.nanmean((np.abs(y) - np.abs(pair.x[part])) ** 2))
     return bool(sudden > 0.3 * deviation or unsigned < 0.3 * deviation)
+
+
+def _settles(found: IdentifiedPair, run: Run) -> bool:
+    """Whether a spool swings about its command no longer and no further than one of second order does after a move.
+
+    The relation is of first order. A healthy spool of second order overshoots by at most `_OVERSHOOT` of what its command
+    moved within the last few lags, and rests when the command has rested for as long.
+    """
+    from scipy.ndimage import maximum_filter1d, minimum_filter1d
+
+    pair = found.pair
+    reach = max(3, round(_SETTLING_LAGS * (found.relation.lag / pair.dt + max(0.0, found.relation.delay) + 1.0)))
+    first = max(0, run.start - reach)
+    x = np.nan_to_num(pair.x[first : run.stop])
+    moved = (maximum_filter1d(x, reach, origin=(reach - 1) // 2) - minimum_filter1d(x, reach, origin=(reach - 1) // 2))[
+        run.start - first :
+    ]
+    part = slice(run.start, run.stop)
+    size = np.abs(pair.y[part] - found.samples.x[part])
+    known = np.isfinite(size)
+    return bool(known.any() and (size <= _OVERSHOOT * moved + _NOISES * found.model.noise)[known].all())
 
 
 def _sudden(x: Array, run: Run) -> float:

@@ -27,9 +27,9 @@ def pair(side: Side, y: Array, x: Array) -> Pair:
     return Pair(side, y, x, np.isfinite(y), every, ~every, DT, "m/s", 0.8, "y", "x", Noise())
 
 
-def explained(p: Pair, mode: FaultMode, start: int = A, stop: int = B, share: float = 0.0) -> bool:
+def explained(p: Pair, mode: FaultMode, start: int = A, stop: int = B, share: float = 0.0, lag: float = 0.0) -> bool:
     samples = Samples.even(p.y, p.x, np.full(N, PAIR, dtype=np.int8), p.quiet)
-    found = IdentifiedPair(p, Relation(), samples, MODEL, 0.0015, ~p.alive, share)
+    found = IdentifiedPair(p, Relation(lag=lag), samples, MODEL, 0.0015, ~p.alive, share)
     return timing_explains(found, Run(start, stop, 1), mode)
 
 
@@ -88,3 +88,17 @@ def test_lagging_answer_to_a_command_of_jumps_alone_is_no_fault(mode: FaultMode,
 def test_disturbance_beside_a_command_of_jumps_alone_is_a_fault() -> None:
     x = 0.012 * np.random.default_rng(7).normal(size=N)
     assert not explained(pair(Side.ACTUATOR, x + 0.05, x), FaultMode.NOISY, stop=A + 600)
+
+
+@pytest.mark.parametrize(("swing", "expected"), [(0.02, True), (0.06, False)])
+def test_overshoot_after_a_move_of_the_command_settles(swing: float, expected: bool) -> None:
+    x = np.where(np.arange(N) < A, 0.1, 0.2)
+    y, t = x.copy(), np.arange(20) * DT
+    y[A : A + 20] += swing * np.exp(-t / 0.02) * np.cos(300.0 * t)
+    assert explained(pair(Side.ACTUATOR, y, x), FaultMode.NOISY, stop=A + 20, lag=0.005) is expected
+
+
+def test_swing_beside_a_command_at_rest_does_not_settle() -> None:
+    x = np.full(N, 0.2)
+    y = x + 0.02 * np.sin(np.arange(N) * 0.3) * ((np.arange(N) >= A) & (np.arange(N) < A + 40))
+    assert not explained(pair(Side.ACTUATOR, y, x), FaultMode.NOISY, stop=A + 40, lag=0.005)
