@@ -27,12 +27,12 @@
   const loop = one("#loop-figure") && new Figure(one("#loop-figure"), one("#loop-badge"), (range) => {
     if (!one("#loop-linked").checked) return;
     if (!current || !evidence?.drawn) shared = range;
-    follow(evidence?.drawn && !one("#figure").hidden && evidence, range, "#loop-linked");
+    follow(evidence?.rows.length && !one("#figure").hidden && evidence, range, "#loop-linked");
     remember();
   });
   const explorer = one("#signals") && new Explorer(showSignals, (range) => {
     if (!current || !evidence?.drawn) shared = range;
-    follow(evidence?.drawn && !one("#figure").hidden && evidence, range);
+    follow(evidence?.rows.length && !one("#figure").hidden && evidence, range);
     if (!current) follow(loop?.drawn && loop, range, "#loop-linked");
     explorer?.across();
     remember();
