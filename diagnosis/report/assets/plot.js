@@ -328,7 +328,7 @@ class Figure {
       });
       this.element.on("plotly_doubleclick", () => { if (this.shifted) return; Now.set(Now.t, { a: null }); this.zoom([0, Data.view.duration]); });
     }
-    this.onRange?.(this.range);
+    this.onRange?.(this.range, true);
     if (target !== this.range) this.zoom(this.range); // zoomed while it was drawn
   }
 
