@@ -8,6 +8,7 @@ from diagnosis.channels.liveness import alive_sources
 from diagnosis.evidence import ACTUATOR, SENSOR, MissionView, Part
 from diagnosis.families import FAMILIES
 from diagnosis.results.assessment import Assessment, unassessed
+from diagnosis.results.machine_event import MachineEvent
 from diagnosis.results.machine_words import HYDRAULIC, MachineWords, machine_words
 from diagnosis.results.wheel_model import WheelModelFit
 from diagnosis.results.worded import worded
@@ -24,7 +25,7 @@ class ComponentResult:
 
     assessments: dict[Part, Assessment]
     wheel_model: WheelModelFit | None
-    events: tuple[str, ...] = ()
+    events: tuple[MachineEvent, ...] = ()
     words: MachineWords = HYDRAULIC
 
 
@@ -52,7 +53,7 @@ def assess_components(
     return ComponentResult(
         {part: worded(a, words) for part, a in found.items()},
         None if mission.model is None else replace(mission.model, note=words.fill(mission.model.note)),
-        tuple(words.fill(event) for event in mission.events),
+        tuple(event.worded(words) for event in mission.events),
         words,
     )
 

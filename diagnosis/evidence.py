@@ -24,6 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from diagnosis.results.assessment import CODE, Assessment
+from diagnosis.results.machine_event import MachineEvent
 from diagnosis.results.vocabulary import Tier
 from diagnosis.results.wheel_model import WheelModelFit
 from replay.control.loop import Replay
@@ -52,15 +53,15 @@ class Contribution:
         Best estimate of the true steering angles [rad], and where it rests on a model or on a sensor in doubt.
     model : WheelModelFit or None
         Wheel models behind the judgement.
-    events : tuple[str, ...]
-        What happened to the machine as a whole and is no part's fault, one sentence each.
+    events : tuple[MachineEvent, ...]
+        What happened to the machine as a whole and is no part's fault.
     """
 
     parts: Mapping[Part, Assessment]
     angle: Array | None = None
     doubtful: Flags | None = None
     model: WheelModelFit | None = None
-    events: tuple[str, ...] = ()
+    events: tuple[MachineEvent, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -93,7 +94,7 @@ class MissionView:
     angle: Array | None = None
     doubtful: Flags | None = None
     model: WheelModelFit | None = None
-    events: tuple[str, ...] = ()
+    events: tuple[MachineEvent, ...] = ()
 
     def values(self, name: str) -> Array:
         """A signal on the timeline, shape (n,); NaN where it is not logged."""

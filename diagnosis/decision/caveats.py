@@ -12,6 +12,7 @@ from diagnosis.results.assessed import needed_s
 from diagnosis.results.assessment import STATES, Assessment
 from diagnosis.results.clearing import Checked
 from diagnosis.results.left_out import is_left_out
+from diagnosis.results.machine_event import MachineEvent
 from diagnosis.results.machine_words import HYDRAULIC, MachineWords
 from diagnosis.results.result import FaultInterval
 from diagnosis.results.vocabulary import Kind, Tier
@@ -46,7 +47,7 @@ class Reservations:
         Checks that do not clear their part.
     scope : tuple[str, ...]
         Why what was judged is not the whole mission.
-    events : tuple[str, ...]
+    events : tuple[MachineEvent, ...]
         What happened to the machine as a whole.
     hints : tuple[str, ...]
         Signals that fit another sign, unit or place better.
@@ -60,7 +61,7 @@ class Reservations:
     damage: tuple[str, ...] = ()
     open: tuple[Checked, ...] = ()
     scope: tuple[str, ...] = ()
-    events: tuple[str, ...] = ()
+    events: tuple[MachineEvent, ...] = ()
     hints: tuple[str, ...] = ()
     words: MachineWords = HYDRAULIC
 
@@ -82,8 +83,7 @@ def doubt_of(watch: Sequence[FaultInterval], against: Reservations) -> str:
     if against.hints:
         out.append("the machine file does not fit the log")
     out += against.scope
-    if against.events:
-        out.append("the machine did not follow its commands for a time")
+    out += dict.fromkeys(event.doubt for event in against.events)
     if against.open:
         out.append(open_words(against.open))
     return join_words(out)
@@ -114,7 +114,7 @@ def caveats_of(
 
     `short_named`: the verdict itself names the parts that were not judged long enough.
     """
-    out, damage = [*against.hints, *against.events], against.damage
+    out, damage = [*against.hints, *(event.text for event in against.events)], against.damage
     if damage:
         said = "" if is_left_out(damage[0]) else "The log is damaged: "
         out.append(f"{said}{damage[0]}" + (f" (and {len(damage) - 1} more)" if len(damage) > 1 else ""))

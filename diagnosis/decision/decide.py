@@ -12,6 +12,7 @@ from diagnosis.results.assessment import Assessment
 from diagnosis.results.clearing import Check, Checked
 from diagnosis.results.document import ActionRow, VerdictRow
 from diagnosis.results.left_out import only_left_out
+from diagnosis.results.machine_event import MachineEvent
 from diagnosis.results.machine_words import MachineWords
 from diagnosis.results.result import FaultInterval
 from diagnosis.results.vocabulary import Kind, Severity, Tier, Verdict
@@ -87,7 +88,7 @@ def decide(
     model: WheelModelFit | None = None,
     checks: Sequence[Checked] = (),
     scope: Sequence[str] = (),
-    events: Sequence[str] = (),
+    events: Sequence[MachineEvent] = (),
     hints: Sequence[str] = (),
 ) -> Decision:
     """Give the verdict.
@@ -122,7 +123,7 @@ def decide(
         What is asked once more before a machine is cleared.
     scope : Sequence[str]
         Why what was judged is not the whole mission.
-    events : Sequence[str]
+    events : Sequence[MachineEvent]
         What happened to the machine as a whole and is no part's fault.
     hints : Sequence[str]
         Signals that fit another sign, unit or place better over the whole mission.
@@ -208,7 +209,7 @@ def _without_faults(
 ) -> Decision:
     """The verdict where no fault is worth an action: the first reservation that there is, else ``ready``."""
     if against.events:
-        return Decision(Verdict.NOT_ASSESSED, "The machine did not follow its commands", against.events[0])
+        return Decision(Verdict.NOT_ASSESSED, against.events[0].title, against.events[0].text)
     if against.hints:
         return Decision(Verdict.NOT_ASSESSED, "The machine file does not fit the log", against.hints[0])
     if against.short and (seen := _sensors_alone(assessments, decided_s, axles, against)):

@@ -8,6 +8,7 @@ from diagnosis.response.body import body_speeds
 from diagnosis.response.inputs import followers
 from diagnosis.response.models import BLOCK_S
 from diagnosis.results.assessment import Assessment
+from diagnosis.results.machine_event import not_following
 from diagnosis.results.vocabulary import Tier
 
 
@@ -28,4 +29,4 @@ class ResponseEvidence:
         for wheel in mission.wheels:
             if wheel in judged.parts:
                 parts[wheel, SENSOR], parts[wheel, ACTUATOR] = judged.parts[wheel]
-        return Contribution(parts, events=judged.events)
+        return Contribution(parts, events=tuple(not_following(e) for e in judged.events))

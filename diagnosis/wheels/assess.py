@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,6 +25,7 @@ from diagnosis.wheels.looks import second_look
 from diagnosis.wheels.models import ODD, JointModel, WheelFilterModel
 from diagnosis.wheels.readings import with_readings
 from diagnosis.wheels.run_kernel import evidence_of_runs
+from diagnosis.wheels.shared_swings import without_shared
 from diagnosis.wheels.states import reasons_of, states_of, unexplained_s
 from diagnosis.wheels.tracks import Segment, Track, runs_between, segments_of, track_of
 from replay.faults import Side
@@ -33,7 +34,15 @@ from replay.machine.config import Limits
 Array = NDArray[np.float64]
 
 
-def assess_wheels(data: WheelsData, limits: Limits, *, gains: bool) -> dict[int, tuple[Assessment, Assessment]]:
+@dataclass(frozen=True)
+class WheelsJudged:
+    """Sensor and actuator by wheel, and a sentence about what all wheels do together; empty where there is nothing to say."""
+
+    parts: dict[int, tuple[Assessment, Assessment]]
+    shared: str
+
+
+def assess_wheels(data: WheelsData, limits: Limits, *, gains: bool) -> WheelsJudged:
     """Judge sensor and actuator of every wheel that has a model.
 
     Parameters
@@ -47,7 +56,7 @@ def assess_wheels(data: WheelsData, limits: Limits, *, gains: bool) -> dict[int,
 
     Returns
     -------
-    dict[int, tuple[Assessment, Assessment]]
+    WheelsJudged
         Sensor and actuator by wheel.
     """
     blocks = blocks_of(data.y, data.u, data.status, data.quiet, data.ratio, data.turn, data.plants, data.dt, data.store)
@@ -56,17 +65,18 @@ def assess_wheels(data: WheelsData, limits: Limits, *, gains: bool) -> dict[int,
     done, following = follow(data, blocks, model)
     features = mission_features(data, blocks, model, {i: f.described for i, f in following.items()}, gains=gains)
     said = second_look(features, [bool(m) for m in data.measured], blocks.dt)
-    out = {}
     losses = _losses(data, limits)
-    for i, wheel in enumerate(model.wheels):
-        if wheel is None:
-            continue
-        track = track_of(said[i], features.hop, blocks.dt)
-        path = _path(data, i, wheel, blocks, model, done, following[i], track)
-        found = findings_of(path, limits)
-        sensor, actuator = _assessments(data, i, path, found, gains=gains)
+    paths = {
+        i: _path(data, i, wheel, blocks, model, done, following[i], track_of(said[i], features.hop, blocks.dt))
+        for i, wheel in enumerate(model.wheels)
+        if wheel is not None
+    }
+    swings = without_shared(paths, {i: findings_of(path, limits) for i, path in paths.items()})
+    out = {}
+    for i, path in paths.items():
+        sensor, actuator = _assessments(data, i, path, swings.found[i], gains=gains)
         out[i] = sensor, actuator if data.measured[i] else replace(actuator, loss=losses[i])
-    return out
+    return WheelsJudged(out, swings.sentence)
 
 
 def _losses(data: WheelsData, limits: Limits) -> list[Loss | None]:

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 from diagnosis.evidence import ACTUATOR, SENSOR, Contribution, MissionView, Part
 from diagnosis.results.assessment import Assessment
+from diagnosis.results.machine_event import swinging
 from diagnosis.results.vocabulary import Tier
 from diagnosis.wheels.assess import assess_wheels
 from diagnosis.wheels.body import measured_body
@@ -40,7 +41,8 @@ class WheelEvidence:
             timeline, replay, machine, channels, fit, mission.alive, mission.angle, mission.doubtful, slip, body
         )
         parts: dict[Part, Assessment] = {}
-        for i, (sensor, actuator) in assess_wheels(data, machine.limits, gains=fit.reliable).items():
+        judged = assess_wheels(data, machine.limits, gains=fit.reliable)
+        for i, (sensor, actuator) in judged.parts.items():
             wheel = machine.wheels[i]
             if wheel in mission.wheels and not channels.has_true[i]:
                 parts[wheel, SENSOR] = sensor
@@ -53,7 +55,8 @@ class WheelEvidence:
                 f"The {{wheels}} turned against their commanded speeds for {100 * against:.0f} % of the driving: the controller does not "
                 "follow them, and they were left out."
             )
-        return Contribution({part: replace(a, notes=(*a.notes, *said)) for part, a in parts.items()}, model=fit)
+        noted = {part: replace(a, notes=(*a.notes, *said)) for part, a in parts.items()}
+        return Contribution(noted, model=fit, events=(swinging(judged.shared),) if judged.shared else ())
 
 
 def _channels(mission: MissionView) -> WheelChannels:

@@ -10,6 +10,7 @@ import pytest
 from diagnosis.decision.decide import Decision, decide
 from diagnosis.decision.intervals import intervals_of
 from diagnosis.results.assessment import CODE, Assessment, Finding, unassessed
+from diagnosis.results.machine_event import not_following
 from diagnosis.results.machine_words import HYDRAULIC
 from diagnosis.results.vocabulary import Tier
 from diagnosis.results.wheel_model import WheelModelFit
@@ -236,6 +237,8 @@ def test_a_short_drive_is_the_reason_not_the_standstill() -> None:
 
 def test_a_machine_that_did_not_follow_is_neither_ready_nor_at_fault() -> None:
     text = "For 12.0 s all drives stood still together while they were commanded to move."
-    found = decide([], machine(), dict.fromkeys(machine(), 60.0), AXLES, LIMITS, (), HYDRAULIC, events=(text,))
+    found = decide(
+        [], machine(), dict.fromkeys(machine(), 60.0), AXLES, LIMITS, (), HYDRAULIC, events=(not_following(text),)
+    )
     assert (found.status, found.title, found.text) == ("not_assessed", "The machine did not follow its commands", text)
     assert not found.cleared

@@ -1,0 +1,41 @@
+"""What happened to the machine as a whole and is no part's fault."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+from diagnosis.results.machine_words import MachineWords
+
+
+@dataclass(frozen=True)
+class MachineEvent:
+    """What happened to a machine, and is no part's fault.
+
+    Attributes
+    ----------
+    title : str
+        The verdict's title where no part's fault stands before it.
+    text : str
+        One sentence, or two.
+    doubt : str
+        Why a mission with faults to watch is not cleared; continues "not cleared: …".
+    """
+
+    title: str
+    text: str
+    doubt: str
+
+    def worded(self, words: MachineWords) -> MachineEvent:
+        """With the machine's own words."""
+        return replace(self, title=words.fill(self.title), text=words.fill(self.text), doubt=words.fill(self.doubt))
+
+
+def not_following(text: str) -> MachineEvent:
+    """Commands went on, and no wheel, or none that nobody else explains, followed them."""
+    title = "The machine did not follow its commands"
+    return MachineEvent(title, text, "the machine did not follow its commands for a time")
+
+
+def swinging(text: str) -> MachineEvent:
+    """All wheels swing about their expected speeds together."""
+    return MachineEvent("The {wheels} swing together", text, "the {wheels} swing together for a time")
