@@ -1,12 +1,12 @@
 """Noise that all wheels share is no wheel's fault: a speed loop that hunts, or a pump that surges, swings every wheel.
 
-A noisy sensor or valve deviates by itself: what its wheel does beside its model is not what the others do beside theirs. Of a
-shared cause, the others' deviations explain most of a wheel's own, and theirs are as large.
+A noisy sensor or valve deviates by itself, by several times what the other wheels, which it may shake, deviate by. Of a shared
+cause most wheels deviate alike, or some begin and end together.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -19,8 +19,9 @@ from diagnosis.wheels.findings import WheelFindings, WheelPath
 Array = NDArray[np.float64]
 
 _MEAN_S = 0.1
-_EXPLAINED, _AS_LARGE = 0.7, 2.0  # least share of a deviation's power; most times the others' amplitude
-_OTHERS, _PLACES = 2, 12  # fewer wheels, or means, tell nothing
+_AS_LARGE = 2.0  # most times the others' amplitude
+_TOGETHER, _ALIKE = 0.7, 1.5  # share of two findings' time that is common to both; times in amplitude
+_OTHERS, _PLACES = 2, 6  # fewer wheels, or means, tell nothing
 
 
 @dataclass(frozen=True)
@@ -45,13 +46,13 @@ class Swings:
             return ""
         first, last = self.spans[0][0], max(stop for _, stop in self.spans)
         return (
-            f"Between {first:.1f} and {last:.1f} s the {{wheels}} swing about their expected speeds together: the speed loop hunts, or "
-            "the pump surges. No {wheel} is blamed for it. Lower the gains of the speed loop, or inspect the pump, and record again."
+            f"Between {first:.1f} and {last:.1f} s several {{wheels}} swing about their expected speeds together, as where the speed loop "
+            "hunts or the supply surges. No {wheel} is blamed for it. Check the gains of the speed loop and the supply, and record again."
         )
 
 
 def without_shared(paths: Mapping[int, WheelPath], found: Mapping[int, WheelFindings]) -> Swings:
-    """Take out the noisy findings that the other wheels' deviations explain; their time stays open, and unexplained.
+    """Take out the noisy findings that other wheels share; their time stays open, and unexplained.
 
     Parameters
     ----------
@@ -63,16 +64,25 @@ def without_shared(paths: Mapping[int, WheelPath], found: Mapping[int, WheelFind
         return Swings(dict(found), ())
     width = max(1, round(_MEAN_S / next(iter(paths.values())).dt))
     apart = {i: _means(p, width) for i, p in paths.items()}
+    others = {i: {j: a for j, a in apart.items() if j != i} for i in apart}
+    shared = {i: [f for f in noisy[i] if _shared(f, apart[i], others[i], noisy, width)] for i in found}
+    level = max((_size(f, apart[i], width) for i, fs in shared.items() for f in fs), default=0.0)
     out, spans = {}, []
     for i, wheel in found.items():
-        others = np.stack([a for j, a in apart.items() if j != i], axis=1)
-        shared = [f for f in noisy[i] if _shared(f, apart[i], others, width)]
-        for f in shared:
+        # What swings no further than the machine does elsewhere in the mission is no proof of a fault either.
+        taken = [f for f in noisy[i] if any(f is s for s in shared[i]) or _size(f, apart[i], width) <= level]
+        for f in taken:
             spans.append((f.start * paths[i].dt, f.stop * paths[i].dt))
             for flags in (*wheel.opened.values(), *wheel.unexplained.values()):
                 flags[f.start : f.stop] = True
-        out[i] = replace(wheel, findings=[f for f in wheel.findings if not any(f is s for s in shared)])
+        out[i] = replace(wheel, findings=[f for f in wheel.findings if not any(f is s for s in taken)])
     return Swings(out, tuple(sorted(spans)))
+
+
+def _size(f: Finding, own: Array, width: int) -> float:
+    """Standard deviation of a wheel's deviation in a finding; infinite where it is unknown."""
+    part = own[f.start // width : f.stop // width]
+    return float(np.nanstd(part)) if np.isfinite(part).any() else np.inf
 
 
 def _means(path: WheelPath, width: int) -> Array:
@@ -82,18 +92,29 @@ def _means(path: WheelPath, width: int) -> Array:
     return np.asarray(apart[:n].reshape(-1, width).mean(axis=1))
 
 
-def _shared(f: Finding, own: Array, others: Array, width: int) -> bool:
-    """Whether the others' deviations explain a wheel's own in a finding, and are as large."""
+def _shared(
+    f: Finding, own: Array, others: Mapping[int, Array], noisy: Mapping[int, Sequence[Finding]], width: int
+) -> bool:
+    """Whether most other wheels deviate as much as one does in a finding, or one does that has such a finding at the same time."""
     part = slice(f.start // width, f.stop // width)
-    y, x = own[part], others[part]
-    known = np.isfinite(y) & np.isfinite(x).all(axis=1)
-    y, x = y[known], x[known]
-    if y.size < max(_PLACES, 4 * x.shape[1]):
+    size = {j: _amplitude(own[part], a[part]) for j, a in others.items()}
+    if any(np.isnan(s).any() for s in size.values()):
         return False
-    y, x = y - y.mean(), x - x.mean(axis=0)
-    power = float(y @ y)
-    if power == 0.0 or float(np.std(y)) > _AS_LARGE * float(np.median(np.std(x, axis=0))):
-        return False
-    left = y - x @ np.linalg.lstsq(x, y, rcond=None)[0]
-    free = (y.size - 1) / (y.size - 1 - x.shape[1])
-    return bool(float(left @ left) * free <= (1.0 - _EXPLAINED) * power)
+    mine, theirs = (np.array([s[k] for s in size.values()]) for k in (0, 1))
+    if float(np.median(mine - _AS_LARGE * theirs)) <= 0.0:
+        return True
+    alike = [j for j, (a, b) in size.items() if max(a, b) <= _ALIKE * min(a, b)]
+    return any(g.side is f.side and _common(f, g) >= _TOGETHER for j in alike for g in noisy[j])
+
+
+def _amplitude(own: Array, other: Array) -> tuple[float, float]:
+    """Standard deviations of two deviations where both are known; NaN where that is too short."""
+    known = np.isfinite(own) & np.isfinite(other)
+    if np.count_nonzero(known) < _PLACES:
+        return float("nan"), float("nan")
+    return float(np.std(own[known])), float(np.std(other[known]))
+
+
+def _common(f: Finding, g: Finding) -> float:
+    """Share of the time of two findings that is common to both."""
+    return max(0, min(f.stop, g.stop) - max(f.start, g.start)) / (max(f.stop, g.stop) - min(f.start, g.start))

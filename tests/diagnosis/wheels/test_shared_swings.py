@@ -16,7 +16,7 @@ DT, WIDTH, N = 0.01, 2, 6_000
 PART = slice(2_000, 4_000)
 
 
-def judged(swings: dict[int, np.ndarray], mode: FaultMode = FaultMode.NOISY) -> Any:
+def judged(swings: dict[int, np.ndarray], mode: FaultMode = FaultMode.NOISY, noisy: tuple[int, ...] = (0,)) -> Any:
     rng = np.random.default_rng(1)
     paths: Any = {
         i: SimpleNamespace(y=s + 0.002 * rng.standard_normal(N), dt=DT, width=WIDTH, expected=np.zeros(N // WIDTH))
@@ -25,7 +25,7 @@ def judged(swings: dict[int, np.ndarray], mode: FaultMode = FaultMode.NOISY) -> 
     finding = SimpleNamespace(start=PART.start, stop=PART.stop, mode=mode, side=Side.SENSOR)
     found = {
         i: WheelFindings(
-            [finding] if i == 0 else [],  # type: ignore[list-item]
+            [finding] if i in noisy else [],  # type: ignore[list-item]
             {side: np.zeros(N, dtype=np.bool_) for side in (Side.SENSOR, Side.ACTUATOR)},
             {side: np.zeros(N, dtype=np.bool_) for side in (Side.SENSOR, Side.ACTUATOR)},
         )
@@ -47,7 +47,7 @@ def test_what_all_wheels_do_is_nobodys_noise() -> None:
     assert got.found[0].opened[Side.SENSOR][PART].all()
     assert got.found[0].unexplained[Side.ACTUATOR][PART].all()
     assert got.spans == ((20.0, 40.0),)
-    assert got.sentence.startswith("Between 20.0 and 40.0 s the {wheels} swing")
+    assert got.sentence.startswith("Between 20.0 and 40.0 s several {wheels} swing")
 
 
 @pytest.mark.parametrize("others", [0.0, 0.2])
@@ -59,10 +59,16 @@ def test_noise_of_one_wheel_stays_its_own(others: float) -> None:
     assert got.sentence == ""
 
 
-def test_wheels_that_swing_by_themselves_share_nothing() -> None:
+def test_wheels_that_hunt_each_by_itself_are_not_blamed_either() -> None:
     rng = np.random.default_rng(2)
     noise = {i: np.repeat(rng.standard_normal(N // 20), 20) * 0.05 for i in range(4)}
-    assert len(judged(noise).found[0].findings) == 1
+    assert judged(noise).found[0].findings == []
+
+
+def test_two_wheels_that_begin_and_end_together_share_a_cause() -> None:
+    swings = {i: swing(2.0 * i, 0.05 if i < 2 else 0.002) for i in range(4)}
+    assert [len(w.findings) for w in judged(swings, noisy=(0, 1)).found.values()] == [0, 0, 0, 0]
+    assert len(judged(swings, noisy=(0,)).found[0].findings) == 1
 
 
 def test_other_rows_and_machines_of_two_wheels_are_left_alone() -> None:
