@@ -7,10 +7,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from diagnosis.channels.habit import Habit, identify_habit, of_kind
+from diagnosis.channels.relation import relations_of_kind, valves_of_kind
 from diagnosis.direct.assess import assess_identified
 from diagnosis.direct.identification import IdentifiedPair, identify
 from diagnosis.direct.inputs import Pair, make_pair
-from diagnosis.direct.relation import relations_of_kind, valves_of_kind
 from diagnosis.direct.uncertainty import usual_of_kind
 from diagnosis.estimation.lag import low_passed
 from diagnosis.evidence import ACTUATOR, SENSOR, Array, Contribution, Flags, MissionView, Part

@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 
 from diagnosis.channels.held import Held, held_reference, news_alone
 from diagnosis.channels.noise import moving_sum, relative_lag, shifted, unresolved, white_noise, white_part
+from diagnosis.channels.relation import Relation, relation_of
 from diagnosis.channels.sample_status import BLIND, PAIR, SKIP, sample_status
 from diagnosis.direct.inputs import Pair
-from diagnosis.direct.relation import Relation, relation_of
 from diagnosis.direct.uncertainty import HealthyNoise, uncertainty_of
 from diagnosis.estimation.fault_models import ModeModel
 from diagnosis.estimation.samples import Samples

@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 from diagnosis.channels.habit import Habit
 from diagnosis.channels.noise import moving_sum, slow_mismatch, usual_distance, usual_rounding, white_noise, white_part
 from diagnosis.channels.noise_growth import NoiseGrowth, noise_growth
+from diagnosis.channels.relation import Relation
 from diagnosis.channels.sample_status import PAIR
 from diagnosis.direct.inputs import Pair
-from diagnosis.direct.relation import Relation
 from diagnosis.estimation.fault_models import MISMATCH_S, ModeModel
 from diagnosis.results.fault_rows import codes_of
 from replay.faults import Side

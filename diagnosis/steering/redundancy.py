@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from diagnosis.channels.noise import relative_lag, shifted, slow_mismatch
+from diagnosis.channels.relation import Relation, relation_of
 from diagnosis.steering.blocks import SteeringBlocks, second_differences
 
 Array = NDArray[np.float64]
@@ -18,6 +19,7 @@ _SHARE_RANGE = (0.85, 1.15)
 _LEAST_CHANGES = 4
 _LEAST_SHARE = 0.5
 _JITTER_S = 0.25
+_LAG_ERROR = 0.2  # of a lag
 _JITTER = 4.0  # standard deviations
 _MEDIAN_SQUARE = 0.455  # of a standard normal variable
 
@@ -59,7 +61,8 @@ def with_valve_opening(
 ) -> tuple[SteeringBlocks, Array]:
     """Add the valve's opening: its mean beside the command's, and how much of the command's changes it follows.
 
-    The share of changes says whether a valve obeys even where only the sensor's noise moves its command.
+    The share of changes says whether a valve obeys even where only the sensor's noise moves its command; a log that is slower
+    than the controller does not show it.
 
     Parameters
     ----------
@@ -82,8 +85,12 @@ def with_valve_opening(
     use = fresh & np.isfinite(u) & np.isfinite(position)
     most = _most_lag(dt)
     linked = _jitter_lag(position, u, use, most)
-    lag = relative_lag(position, u, use, 0, most) if linked is None else linked
-    command = shifted(u, lag)
+    if linked is None:
+        lag = relative_lag(position, u, use, 0, most)
+        command, doubt = _followed(position, u, use, lag, dt, blocks.length)
+    else:
+        lag = linked
+        command, doubt = shifted(u, lag), np.zeros(u.size)
     known = use & np.isfinite(command)
     deviation = np.where(known, position - command, 0.0)
     power = max(_white(deviation[known]), 1e-8)
@@ -98,10 +105,9 @@ def with_valve_opening(
         blocks.length,
     )
     variance = power / np.maximum(count, 1) + max(slow**2 - power, 0.0) / 4 + 0.05 * power
+    variance += _means(doubt, known, blocks)[0]
     if linked is None:
-        even, jitter = _without_jitter(command, known, dt)
-        command_mean = _means(even, known, blocks)[0]
-        variance += _means(jitter, known, blocks)[0] / np.maximum(count, 1)
+        share, share_variance = np.full(count.size, np.nan), np.full(count.size, np.nan)
     some = count > 0
     redundancy = blocks.redundancy._replace(
         opening=np.where(some, opening, np.nan),
@@ -112,6 +118,26 @@ def with_valve_opening(
     )
     deviation = shifted(np.where(known, deviation / np.sqrt(power), np.nan), -round(lag))
     return replace(blocks, redundancy=redundancy), deviation
+
+
+def _followed(position: Array, u: Array, use: Flags, delay: float, dt: float, length: int) -> tuple[Array, Array]:
+    """Command as a healthy valve follows it, whatever its gain, and the variance of a block's mean of that.
+
+    A valve that answers behind a lag follows the command's jitter no further than the lag lets it; of one without a lag, the
+    jitter is evened out. Where the command moves, the lag's own error counts.
+    """
+    span = float(np.max(np.abs(u[use]), initial=0.0))
+    found = relation_of(position, u, use, Relation(delay=delay), dt, (0, _most_lag(dt)), span)._replace(gain=1.0)
+    even, jitter = _without_jitter(u, np.isfinite(u), dt)
+    jitter = np.nan_to_num(shifted(jitter, found.delay))
+    if found.lag <= dt:
+        return found.expected(even, dt), jitter / length
+    kept = float(np.exp(-dt / found.lag))
+    command = found.expected(u, dt)
+    at_once = found._replace(lag=0.0).expected(u, dt)
+    lasting = max(1.0, 2 * found.lag / (length * dt))  # blocks for which an error lasts
+    of_lag = np.nan_to_num(_LAG_ERROR * (command - at_once)) ** 2
+    return command, lasting * ((1.0 - kept) / (1.0 + kept) * jitter + of_lag)
 
 
 def _most_lag(dt: float) -> int:

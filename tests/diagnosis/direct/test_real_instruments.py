@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from diagnosis.channels.habit import identify_habit
+from diagnosis.channels.relation import Relation
 from diagnosis.direct.assess import assess_pair
 from diagnosis.direct.inputs import Pair
-from diagnosis.direct.relation import Relation
 from replay.faults import FaultMode, Side
 from replay.machine.config import Limits, Noise
 from tests.diagnosis.channels.test_habit import DT, N, between_poles, counted, speed

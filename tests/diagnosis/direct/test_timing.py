@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from diagnosis.channels.relation import Relation
 from diagnosis.channels.sample_status import PAIR
 from diagnosis.direct.identification import IdentifiedPair
 from diagnosis.direct.inputs import Pair
-from diagnosis.direct.relation import Relation
 from diagnosis.direct.timing import timing_explains
 from diagnosis.estimation.fault_models import ModeModel
 from diagnosis.estimation.samples import Samples

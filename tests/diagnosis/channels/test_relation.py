@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from diagnosis.direct.relation import Relation, _loss, relation_of, relations_of_kind
+from diagnosis.channels.relation import Relation, _loss, relation_of, relations_of_kind
 
 DT, N = 0.001, 60_000
 Array = np.ndarray
