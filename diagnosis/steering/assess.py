@@ -117,7 +117,7 @@ def _judged_by_model(inputs: AxleInputs, blocks: SteeringBlocks, plant: Steering
     axle = AxleFilter(blocks, driven_by(plant, blocks), model, allowed, inputs.names)
     path = refine_path(axle, most_probable(axle))
     found = {side: findings_of(side, inputs, axle, path, machine.limits) for side in _SIDES}
-    found[Side.ACTUATOR] = commanded(found[Side.ACTUATOR], inputs.command, blocks.length)
+    found[Side.ACTUATOR] = commanded(found[Side.ACTUATOR], inputs.command, axle)
     if not (inputs.redundant or inputs.valve_redundant):
         found[Side.ACTUATOR] = apart(found[Side.SENSOR], found[Side.ACTUATOR], blocks.length)
         found = weighed(found, blocks.length, inputs.timeline.dt)

@@ -16,7 +16,9 @@ from numpy.typing import NDArray
 from diagnosis.results.assessment import Finding
 from diagnosis.results.result import Hypothesis
 from diagnosis.results.vocabulary import Tier
+from diagnosis.steering.excitation import asked as moving
 from diagnosis.steering.findings import SideFindings
+from diagnosis.steering.path import AxleFilter
 from replay.faults import FaultMode, Side, State
 
 _WEIGHTS = (-4.46, 4.72, -2.24, -0.69, -0.99)  # constant, and of `features_of`
@@ -24,6 +26,7 @@ _LONG_S = 6.0  # from here on a finding gains nothing by being longer
 _NEAR_S = 1.0
 _OVERLAP = 0.2
 _ASKED, _PEAK = 0.01, 0.98  # of full opening: a command below this, but for its peaks, asks for nothing
+_MOVED_S = 0.3  # for which a command must move its axle
 _LEAST = 0.6  # probability from which a finding is stated
 
 #: A stretch: first and last moment [s].
@@ -56,7 +59,7 @@ def features_of(
     return np.array([np.log(min(length, _LONG_S)), near, shared > _OVERLAP * length, loss], dtype=np.float64)
 
 
-def commanded(valve: SideFindings, command: NDArray[np.float64], length: int) -> SideFindings:
+def commanded(valve: SideFindings, command: NDArray[np.float64], axle: AxleFilter) -> SideFindings:
     """The valve's findings without those of a valve that is said to give too little while hardly anything is asked of it.
 
     Parameters
@@ -65,16 +68,21 @@ def commanded(valve: SideFindings, command: NDArray[np.float64], length: int) ->
         Of one axle.
     command : NDArray[np.float64], shape (n,)
         Of its valve [fraction].
-    length : int
-        Samples per block.
+    axle : AxleFilter
+        The axle: where its command moves it by more than the sensor's noise, and where its valve's opening follows, or not,
+        the command's jitter.
     """
+    length, share = axle.blocks.length, axle.blocks.redundancy.share
     kept, open_ = [], list(valve.unexplained)
     for f in valve.findings:
         asked = np.abs(command[f.start : f.stop])
         asked = asked[np.isfinite(asked)]
         lacks = f.mode in (FaultMode.NO_SIGNAL, FaultMode.INEFFICIENT)
-        if lacks and (not asked.size or float(np.quantile(asked, _PEAK)) < _ASKED):
-            open_.append((f.start // length, -(-f.stop // length)))
+        blocks = f.start // length, -(-f.stop // length)
+        jitter_tells = bool(np.isfinite(share[slice(*blocks)]).any())
+        moved = jitter_tells or moving(axle, *blocks)[2] >= _MOVED_S
+        if lacks and not (asked.size and float(np.quantile(asked, _PEAK)) >= _ASKED and moved):
+            open_.append(blocks)
         else:
             kept.append(f)
     return SideFindings(tuple(kept), tuple(open_))
