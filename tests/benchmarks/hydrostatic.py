@@ -106,19 +106,26 @@ def commands(seed: int, duration: float, top: float) -> tuple[Array, Array]:
     """Speed [m/s] and yaw rate [rad/s] asked for, at every step: spells of driving with rests, ramps of an operator."""
     rng = np.random.default_rng(71_000 + seed)
     n = round(duration / STEP_S)
-    speed, turn = np.zeros(n), np.zeros(n)
+    speed, bend = np.zeros(n), np.zeros(n)
     at, sign = round(rng.uniform(1.0, 3.0) / STEP_S), 1.0
     while at < n:
         length, rest = round(rng.uniform(6.0, 16.0) / STEP_S), round(rng.uniform(1.0, 3.0) / STEP_S)
-        v = sign * rng.uniform(0.25, 0.85) * top
-        speed[at : at + length] = v
-        if rng.random() < 0.65:
-            turn[at : at + length] = v * rng.uniform(-0.18, 0.18)
+        speed[at : at + length] = sign * rng.uniform(0.25, 0.85) * top
         at += length + rest
         sign = -sign if rng.random() < 0.35 else sign
-    weights = np.hanning(round(0.9 / STEP_S))
-    weights /= weights.sum()
-    return tuple(np.convolve(x, weights)[:n] for x in (speed, turn))  # type: ignore[return-value]
+    at = 0
+    while at < n:
+        length = round(rng.uniform(3.0, 9.0) / STEP_S)
+        bend[at : at + length] = rng.uniform(-0.18, 0.18) if rng.random() < 0.7 else 0.0
+        at += length
+    speed, bend = _smooth(speed, 0.9), _smooth(bend, 1.4)
+    return speed, speed * bend
+
+
+def _smooth(x: Array, seconds: float) -> Array:
+    """As an operator does it: ramps of some length."""
+    weights = np.hanning(round(seconds / STEP_S))
+    return np.asarray(np.convolve(x, weights / weights.sum())[: x.size])
 
 
 def courses(faults: Sequence[FaultSpec], duration: float, seed: int, top: float) -> tuple[Array, Array]:
@@ -260,11 +267,12 @@ def _drive(
 def asked(seed: int, duration: float) -> tuple[Array, dict[str, Array]]:
     """Time [s] and what is asked of every wheel [m/s] and axle [rad]."""
     v_c, w_c = commands(seed, duration, build(seed).top)
+    v_c, w_c = v_c[::10], w_c[::10]
     out, speeds, angles = np.zeros((v_c.size, 6)), np.zeros(4), np.zeros(2)
-    for k in range(0, v_c.size, 10):
+    for k in range(v_c.size):
         _asked(v_c[k], w_c[k], speeds, angles, _X, _Y, _LATERAL)
-        out[k : k + 10] = (*speeds, *angles)
-    return np.arange(v_c.size) * STEP_S, dict(zip((*WHEELS, *AXLES), out.T, strict=True))
+        out[k] = (*speeds, *angles)
+    return np.arange(v_c.size) * 10 * STEP_S, dict(zip((*WHEELS, *AXLES), out.T, strict=True))
 
 
 def signals(seed: int, faults: Sequence[FaultSpec], duration: float, tier: str, hunting: bool = False) -> Signals:
