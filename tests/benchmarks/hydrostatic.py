@@ -200,7 +200,7 @@ def _drive(
         np.zeros(4), np.zeros(4), np.zeros(4), np.zeros(4), np.zeros(4), np.zeros(2), np.zeros(2),
     )  # fmt: skip
     speeds, angles = np.zeros(4), np.zeros(2)
-    v = r = th = px = py = 0.0
+    v = side = r = th = px = py = 0.0
     for k in range(n):
         _asked(v_c[k], w_c[k], speeds, angles, xs, ys, lateral)
         for a in range(2):
@@ -218,7 +218,7 @@ def _drive(
         for i in range(4):
             need += abs(opening[i]) * b.top
         share = min(1.0, 4.0 * 0.62 * b.pump * b.top / max(need, 1e-6))
-        force = moment = 0.0
+        force = across = moment = 0.0
         for i in range(4):
             e = loss[k, i]
             y = (1 - e) * (x[i] + noise[k, i]) + e * sat[k, i]
@@ -247,15 +247,20 @@ def _drive(
             p[i] += h * (b.stiffness * (flow * head - x[i]) - b.leak * b.stiffness * 0.1 * p[i])
             p[i] = min(max(p[i], -1.3), 1.3)
             a = angle[i // 2]
-            ground = (v - r * ys[i]) * math.cos(a) + r * xs[i] * math.sin(a) - r * lateral[i]
+            vx, vy = v - r * ys[i], side + r * xs[i]
+            ground = vx * math.cos(a) + vy * math.sin(a) - r * lateral[i]
             push = b.grip * slip[k, i] * 2.2 * math.tanh((x[i] - ground) / 0.05)
             rub = b.friction * math.tanh(x[i] / 0.01) + 0.1 * x[i]
             x[i] += h * (6.0 * p[i] - push - rub) / 0.35
             true[k, i] = x[i]
-            force += push
-            moment += push * (-ys[i] * math.cos(a) + xs[i] * math.sin(a) - lateral[i])
+            hold = -b.grip * slip[k, i] * 2.2 * math.tanh((vy * math.cos(a) - vx * math.sin(a)) / 0.05)
+            fx, fy = push * math.cos(a) - hold * math.sin(a), push * math.sin(a) + hold * math.cos(a)
+            force += fx
+            across += fy
+            moment += xs[i] * fy - ys[i] * fx - push * lateral[i]
         hill = b.slope * math.sin(2 * math.pi * k * h / 53.0) * 9.81
-        v += h * (force / b.mass / 4 - 0.15 * v - hill)
+        v += h * (force / b.mass / 4 - 0.15 * v - hill + side * r)
+        side += h * (across / b.mass / 4 - v * r)
         r += h * (moment / b.mass / 4 - 2.0 * r)
         th += h * r
         px += h * v * math.cos(th)
