@@ -39,6 +39,9 @@ _LEAST_SIDE, _LEAST_ROW = 0.7, 0.5  # probabilities of a side and of its row fro
 _LEAST_OTHERS = 2  # of two wheels that differ, either may be the one whose speed is wrong
 _LEAST_PART = 0.02  # a hypothesis below this is left out of the text
 _LEAST_HYPOTHESIS = 5e-4
+_AT_REST = ((Side.SENSOR, FaultMode.STUCK), (Side.SENSOR, FaultMode.NO_SIGNAL))
+_MEAN_S, _FEW_MEANS, _EDGE_S, _INNER = 0.1, 10, 0.5, (0.02, 0.98)
+_AT_MOST, _LEAST_MOVE = 6.0, 0.005  # times the noise of a mean; m/s
 
 Ranking = list[tuple[Row | None, float]]
 
@@ -116,7 +119,8 @@ def judge(run: Run, y: Array, model: WheelFilterModel, limits: Limits, names: tu
         Step [s].
     """
     known, seconds = y[np.isfinite(y)], (run.stop - run.start) * dt
-    weighed = _weighed(run, known, model)
+    rests = _rests(known, model, dt) or any(run.ahead(m) > 0 for m in TOTAL_SENSOR)
+    weighed = _weighed(run, known, model, rests=rests)
     stated = _stated(weighed, apart=run.others >= _LEAST_OTHERS)
     if stated is None:
         return RunVerdict(None)
@@ -139,15 +143,31 @@ def judge(run: Run, y: Array, model: WheelFilterModel, limits: Limits, names: tu
     return RunVerdict(finding, S_GAIN <= m <= S_OU_LARGE and float(run.mean[m, 1]) < _WEAK_GAIN)
 
 
-def _weighed(run: Run, y: Array, model: WheelFilterModel) -> _Weighed:
-    """Rows of a run by their probability; rows that the data cannot tell apart are one."""
+def _weighed(run: Run, y: Array, model: WheelFilterModel, *, rests: bool) -> _Weighed:
+    """Rows of a run by their probability; rows that the data cannot tell apart are one, and one that they rule out is none.
+
+    `rests`: whether the readings may rest, as those of a sensor must that is stuck or gives no signal (L16 (4) with ε = 1).
+    """
     pooled = dict(run.pooled)
+    if not rests:
+        pooled |= dict.fromkeys(_AT_REST, 0.0)
     silent = y.size == 0 or abs(float(np.mean(y))) <= 3 * model.rounding
     if silent and run.side is Side.SENSOR:  # stuck at zero and no signal are one row of the table
         pooled[Side.SENSOR, FaultMode.NO_SIGNAL] += pooled.pop((Side.SENSOR, FaultMode.STUCK))
     ranked = sorted(pooled.items(), key=lambda item: -item[1])
     own = [(row, p) for row, p in ranked if row is not None and row[0] is run.side]
     return _Weighed(pooled, ranked, sum(p for _, p in own), own[0][0])
+
+
+def _rests(y: Array, model: WheelFilterModel, dt: float) -> bool:
+    """Whether the readings of a run, but for its edges, are one value but for their noise."""
+    width, edge = max(1, round(_MEAN_S / dt)), min(round(_EDGE_S / dt), y.size // 5)
+    inner = y[edge : y.size - edge]
+    means = inner[: inner.size // width * width].reshape(-1, width).mean(axis=1)
+    if means.size < _FEW_MEANS:
+        return True
+    low, high = np.quantile(means, _INNER)
+    return bool(high - low <= _AT_MOST * model.noise / np.sqrt(width) + 2 * model.rounding + _LEAST_MOVE)
 
 
 def _stated(weighed: _Weighed, *, apart: bool) -> tuple[Side, float] | None:

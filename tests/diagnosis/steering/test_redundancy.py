@@ -52,3 +52,23 @@ def test_a_second_angle_has_at_least_the_variance_of_the_tolerance() -> None:
     assert found.angle == pytest.approx(true.reshape(-1, 10).mean(axis=1), abs=2e-3)
     assert (found.angle_variance >= 1e-4).all()
     assert np.isnan(found.opening).all()
+
+
+def test_a_valve_behind_a_lag_in_a_slow_log_follows_its_command() -> None:
+    """The log holds every tenth sample: its command's jitter is not that of the controller, and the valve answers within 40 ms."""
+    rng = np.random.default_rng(5)
+    t = np.arange(10 * SIZE) * DT
+    u = 0.2 * np.clip(np.sin(0.5 * t) * 4, -1, 1) + rng.normal(0.0, 4e-3, t.size)
+    opening, keep = np.empty_like(u), np.exp(-DT / 0.04)
+    y = 0.0
+    for k, value in enumerate(u):
+        y = keep * y + (1 - keep) * value
+        opening[k] = y
+    opening += rng.normal(0.0, 2e-3, t.size)
+    u, opening = u[::10], opening[::10]
+    found, _ = with_valve_opening(blocks_of(np.zeros(SIZE), u, ALWAYS, ALWAYS, 10 * DT), u, opening, ALWAYS, 10 * DT)
+    r = found.redundancy
+    apart = (r.opening - r.command)[5:] / np.sqrt(r.opening_variance[5:])
+    assert np.isnan(r.share).all()
+    assert np.nanquantile(np.abs(apart), 0.99) < 2.0
+    assert np.nanmedian(np.sqrt(r.opening_variance)) < 0.01

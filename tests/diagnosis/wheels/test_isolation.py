@@ -194,3 +194,15 @@ def test_saturation_terms() -> None:
     assert valve is not None
     assert valve.sat is not None
     assert valve.sat.mean == pytest.approx(0.12 / MODEL.K / 0.5)
+
+
+def test_a_sensor_that_moves_is_not_stuck() -> None:
+    """Driven at one speed, with a ramp before: only its Kalman model could say more, and does not."""
+    y = np.r_[np.linspace(0.0, 0.2, SIZE // 3), np.full(SIZE - SIZE // 3, 0.2)]
+    y += 0.004 * np.random.default_rng(2).normal(size=SIZE)
+    of = run(S_STUCK, {S_STUCK: 0.9})
+    of.evidence[S_STUCK] = -10.0
+    assert judged(of, y).finding is None
+    resting = judged(of, np.full(SIZE, 0.2)).finding
+    assert resting is not None
+    assert resting.mode is FaultMode.STUCK
