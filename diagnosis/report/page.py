@@ -144,8 +144,9 @@ def _series(report: ReportDocument, columns: Columns, closeups: Closeups | None)
     near = None
     if closeups is not None:
         samples = {labels.visible(k): v for k, v in closeups.columns.items()}
-        near = Closeups(closeups.step, derived(samples, report["intervals"]))
-    return _Series(every, filled, derived(filled, report["intervals"]), near, axis)
+        times = axis.start + closeups.step * axis.sample_s, axis.sample_s
+        near = Closeups(closeups.step, derived(samples, report, times))
+    return _Series(every, filled, derived(filled, report), near, axis)
 
 
 def _pictures(

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from diagnosis.channels.sample_status import PAIR
-from diagnosis.results.assessment import Assessment, Finding
+from diagnosis.results.assessment import Assessment
 from diagnosis.results.evidence_columns import Pictured, steps_of
 from diagnosis.results.loss import Loss
 from diagnosis.results.vocabulary import Tier
@@ -141,17 +141,16 @@ def _assessments(
     out = []
     for side in (Side.SENSOR, Side.ACTUATOR):
         faults, codes = found.of(side), states.codes[side]
-        pictured = shared | Pictured.of(step, [("delta", _delta(faults, side, path.y.size))])
         out.append(
             Assessment(
                 states=codes,
                 reasons=reasons_of(codes, no_opening, gains=gains),
                 findings=tuple(faults),
-                columns=pictured.columns,
+                columns=shared.columns,
                 tier=Tier.MODEL,
                 notes=(_note(path),),
                 unexplained_s=unexplained_s(states, side, found, data.dt),
-                closeups=pictured.closeups,
+                closeups=shared.closeups,
             )
         )
     return out[0], out[1]
@@ -186,12 +185,3 @@ def _note(path: WheelPath) -> str:
             else f"tyres that hold up to {model.grip_most:.2g} {{speed_unit}} of load."
         )
     )
-
-
-def _delta(faults: list[Finding], side: Side, size: int) -> Array:
-    """Estimated gain of every sample: 1 outside of faults."""
-    delta = np.ones(size)
-    for f in faults:
-        if f.epsilon is not None and f.side is side:
-            delta[f.start : f.stop] = 1 - f.epsilon.value
-    return delta

@@ -14,8 +14,6 @@ const Lanes = {
     if (residual.length) rows.push({ key: "residual", title: "Residual", traces: residual, threshold: names.get(`${base}threshold`), bandScale: residual[0].k });
     const probability = trace(`${base}probability`, "not healthy", "measured");
     if (probability.length) rows.push({ key: "probability", title: "Probability that it is not healthy", traces: probability, limits: [-0.03, 1.03] });
-    const loss = trace(`${base}delta`, "gain that is left δ̂", "measured");
-    if (loss.length) rows.push({ key: "delta", title: "Gain that is left δ̂ = 1 − ε̂", traces: loss, clip: [-1, 2] });
     return rows.map((r) => ({ ...r, unit: r.traces[0].unit, component }));
   },
 

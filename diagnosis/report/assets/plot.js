@@ -187,6 +187,7 @@ class Figure {
     const peers = row.traces.filter((t) => t.role === "peer").map((t) => t.name);
     if (peers.length) entries.unshift([Figure.style("peer"), peers.join(", ")]);
     if (row.threshold !== undefined) entries.push([Figure.style("threshold"), "± threshold"]);
+    if (row.unknown) entries.push([{ colour: "muted", sign: "▒▒" }, "not identifiable"]);
     if (row.level !== undefined) entries.push([Figure.style("threshold"), `limit ${row.level}`]);
     const cut = this.heights(row, curves);
     if (row === this.rows[0] && this.shades.some((s) => s.main && s.detected != null)) entries.push([{ colour: "text", sign: "╎" }, "detected"]);
@@ -249,6 +250,9 @@ class Figure {
 
   // Intervals of faults behind the panels that show their component, named in the first.
   shade(layout) {
+    this.rows.forEach((row, i) => {
+      for (const [x0, x1] of row.unknown || []) layout.shapes.push({ type: "rect", xref: "x", yref: `y${i ? i + 1 : ""} domain`, x0, x1, y0: 0, y1: 1, fillcolor: Figure.colour("muted"), opacity: 0.22, line: { width: 0 }, layer: "below" });
+    });
     const stored = this.perRow(this.curves).map(Figure.stored), { t0, dt } = Data.view;
     for (const s of this.shades) {
       const fill = Figure.colour(s.mode), x0 = s.start, x1 = Math.max(s.stop, s.start + Data.view.dt);
