@@ -7,6 +7,9 @@ import re
 from collections.abc import Iterator, Mapping
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from cli.tables.verdict import verdict_parts
 from diagnosis.pages.labels import fault_title
 from diagnosis.results.candidates import candidates_of, label_of
@@ -20,19 +23,23 @@ _LOST = 0.9
 _SPARE_S = 0.05
 
 
-def contradictions(report: Mapping[str, Any]) -> list[str]:
-    """One sentence for each contradiction in a ``report.json``; empty where there is none.
+def contradictions(report: Mapping[str, Any], columns: Mapping[str, NDArray[Any]] | None = None) -> list[str]:
+    """One sentence for each contradiction in a ``report.json``, and between it and its plots; empty where there is none.
 
     Parameters
     ----------
     report : Mapping[str, Any]
         The document.
+    columns : Mapping[str, NDArray] or None
+        Columns of its plots, with ``t``: every sample of a short mission.
     """
     out = [*_verdict(report), *_actions(report), *_coverage(report), *_terminal(report)]
     for fault in report["intervals"]:
         name = f"{fault['id']} {fault['component']} {fault['side']} {fault['mode']}"
         out += [f"{name}: {text}" for text in (*_chances(fault), *_sizes(fault), *_urgency(fault, report))]
-        out += [f"{name}: {text}" for text in (*_times(fault, report), *_words(fault))]
+        out += [f"{name}: {text}" for text in (*_times(fault, report), *_words(fault), *_followed(fault))]
+        out += [f"{name}: {text}" for text in _plots(fault, report, columns or {})]
+    out += _healthy_plots(report, columns or {})
     return out
 
 
@@ -180,6 +187,68 @@ def _words(fault: Mapping[str, Any]) -> Iterator[str]:
             yield f"{found.group(0)!r} beside a probability of {fault['probability']:.3f}"
     if re.search(r"\b(nan|inf)\b", " ".join((*fault["evidence"], fault["advice"], fault_title(fault, HYDRAULIC)))):  # type: ignore[arg-type]
         yield "a number in it is none"
+
+
+def _followed(fault: Mapping[str, Any]) -> Iterator[str]:
+    """A gain that a sentence gives beside the ε̂ of the table."""
+    for text in fault["evidence"]:
+        found = re.search(r"followed (\S+) × .*\(95 %: (\S+) to (\S+)\)", text)
+        if found and fault["epsilon"] is not None and " stretches (" not in " ".join(fault["evidence"]):
+            said = [1.0 - float(x) for x in found.groups()]
+            sizes = [fault["epsilon"][k] for k in ("value", "high", "low")]
+            if not np.allclose(said, sizes, atol=1e-3):
+                yield f"{found.group(0)!r} beside ε̂ {sizes[0]:.3f} ({sizes[2]:.3f} to {sizes[1]:.3f})"
+
+
+def _rows(columns: Mapping[str, NDArray[Any]], start: float, stop: float) -> NDArray[np.bool_]:
+    """Samples between two times, whatever their last digit."""
+    t = columns["t"]
+    spare = 0.5 * float(t[1] - t[0])
+    return np.asarray((t >= start - spare) & (t < stop - spare))
+
+
+def _sides(fault: Mapping[str, Any]) -> tuple[str, ...]:
+    return ("sensor", "actuator") if fault["side"] == "sensor_or_actuator" else (fault["side"],)
+
+
+def _plots(fault: Mapping[str, Any], report: Mapping[str, Any], columns: Mapping[str, NDArray[Any]]) -> Iterator[str]:
+    """What the plots of a fault show during it, against the finding: ε̂, its band, the probability of a fault."""
+    for side in _sides(fault) if "t" in columns else ():
+        base, inside = (
+            f"evidence.{fault['component']}.{side}.",
+            _rows(columns, fault["start_s"], fault["stop_s"]),
+        )
+        for other in report["intervals"]:
+            if other["component"] == fault["component"] and side in _sides(other) and other["id"] != fault["id"]:
+                inside &= ~_rows(columns, other["start_s"], other["stop_s"])
+        if not inside.any() or not any(name.startswith(base) for name in columns):
+            continue
+        for leaf, key in (("epsilon", "value"), ("epsilon_low", "low"), ("epsilon_high", "high")):
+            said = np.nan if fault["epsilon"] is None else fault["epsilon"][key]
+            drawn = columns.get(base + leaf, np.full(inside.size, np.nan))[inside]
+            if not np.allclose(drawn, said, atol=1e-3, equal_nan=True):
+                yield f"its plot shows {leaf} from {np.nanmin(drawn):.2f} to {np.nanmax(drawn):.2f}, its table {said:.2f}"
+        chance = columns.get(base + "probability")
+        if chance is not None and fault["severity"] != "info" and np.isfinite(chance[inside]).any():
+            mean = float(np.nanmean(chance[inside]))
+            if mean < 0.5:
+                yield f"its plot shows it not healthy with {mean:.2f} on average"
+
+
+def _healthy_plots(report: Mapping[str, Any], columns: Mapping[str, NDArray[Any]]) -> Iterator[str]:
+    """A loss of effectiveness, or a sure fault, in plots of a part while it is called healthy or is not judged."""
+    for s in report["states"] if "t" in columns else ():
+        base, rows = f"evidence.{s['component']}.{s['side']}.", _rows(columns, s["start_s"], s["stop_s"])
+        for f in report["intervals"]:
+            if f["component"] == s["component"] and s["side"] in _sides(f):
+                rows &= ~_rows(columns, f["start_s"], f["stop_s"])
+        loss = columns.get(base + "epsilon")
+        if loss is None or not rows.any():
+            continue
+        if s["state"] == "healthy" and (loss[rows] != 0.0).any():
+            yield f"{s['component']} {s['side']} is healthy from {s['start_s']:.1f} s on, its plot shows ε̂ {np.nanmax(loss[rows]):.2f}"
+        if s["state"] != "healthy" and np.isfinite(loss[rows]).any():
+            yield f"{s['component']} {s['side']} is {s['state']} from {s['start_s']:.1f} s on, its plot shows ε̂ {np.nanmax(loss[rows]):.2f}"
 
 
 def _terminal(report: Mapping[str, Any]) -> Iterator[str]:

@@ -115,7 +115,6 @@ def _path(
         spread=expected.spread,
         healthy={side: track.healthy(side, n) for side in segments},
         raised=done.best[:, i] > ODD,
-        fault=done.fault[:, i],
         others=sum(w is not None for w in model.wheels) - 1,
     )
 
@@ -141,16 +140,18 @@ def _assessments(
     out = []
     for side in (Side.SENSOR, Side.ACTUATOR):
         faults, codes = found.of(side), states.codes[side]
+        doubted: Array = np.asarray(per_sample(1.0 - path.healthy[side], path.width, path.y.size), np.float64)
+        pictured = shared | Pictured.of(step, [("probability", doubted)])
         out.append(
             Assessment(
                 states=codes,
                 reasons=reasons_of(codes, no_opening, gains=gains),
                 findings=tuple(faults),
-                columns=shared.columns,
+                columns=pictured.columns,
                 tier=Tier.MODEL,
                 notes=(_note(path),),
                 unexplained_s=unexplained_s(states, side, found, data.dt),
-                closeups=shared.closeups,
+                closeups=pictured.closeups,
             )
         )
     return out[0], out[1]
@@ -169,7 +170,6 @@ def _series(path: WheelPath, status: NDArray[np.int8]) -> Iterator[tuple[str, Ar
     del residual
     yield "threshold", held(3 * np.sqrt(path.spread + path.model.noise**2))
     yield "expected", held(path.expected)
-    yield "probability", held(path.fault)
 
 
 def _note(path: WheelPath) -> str:
