@@ -57,6 +57,14 @@ def _verdict(report: Mapping[str, Any]) -> Iterator[str]:
         yield f"cleared with verdict {verdict['status']}"
     if verdict["cleared"] and verdict["not_cleared"]:
         yield "cleared, with a reason why not"
+    if (verdict["status"] == "ready") and verdict["to_clear"]:
+        yield f"ready, and open: {verdict['to_clear'][0]['reason']}"
+    if not verdict["cleared"] and verdict["status"] in ("watch", "not_assessed"):
+        told = bool(verdict["to_clear"]) or verdict["not_cleared"].endswith("may not answer")
+        if not told or not all(row["act"] for row in verdict["to_clear"]):
+            yield "not cleared, and nobody is told what would clear it"
+    if verdict["status"] == "not_assessed" and len(re.findall(r"[.](?= [A-Z]|$)", verdict["text"])) > 2:
+        yield f"more than two sentences: {verdict['text']!r}"
     counts = [
         int(n)
         for n in re.findall(r"(\d+) faults? to repair|(\d+) (?:faults? )?to watch", verdict["title"])

@@ -23,6 +23,7 @@ from diagnosis.results.document import (
     QualityRow,
     ReportDocument,
     SignalRow,
+    VerdictRow,
 )
 from diagnosis.results.fault_rows import state_label
 from diagnosis.results.left_out import only_left_out
@@ -101,7 +102,8 @@ def _verdict(report: ReportDocument) -> Context:
         "sure": "" if verdict["actions"] else sure_of_verdict(report),
         "title": verdict["title"] or words,
         "text": verdict["text"],
-        "caveats": merged_caveats(verdict["caveats"]),
+        "caveats": merged_caveats(other_caveats(verdict)),
+        "to_clear": clearing_sentences(verdict),
         "actions": [_action(a, faults, report) for a in verdict["actions"]],
     }
 
@@ -140,6 +142,19 @@ def _delay(fault: IntervalRow) -> str:
     if detected is None:
         return ""
     return "at once" if detected <= fault["start_s"] else "+" + time_words(detected - fault["start_s"])
+
+
+def other_caveats(verdict: VerdictRow) -> list[str]:
+    """Caveats but those that stand beside what would clear them."""
+    said = {row["reason"] for row in verdict.get("to_clear", [])}
+    return [text for text in verdict["caveats"] if text not in said]
+
+
+def clearing_sentences(verdict: VerdictRow) -> list[tuple[str, str]]:
+    """What keeps the machine from being cleared and what would clear it, but for what the verdict's own sentences say."""
+    text = verdict["text"]
+    rows = [row for row in verdict.get("to_clear", []) if row["reason"] not in text]
+    return [(row["reason"], "" if row["act"] in text else row["act"]) for row in rows]
 
 
 def merged_caveats(caveats: Sequence[str]) -> list[str]:

@@ -137,7 +137,7 @@ class Checked:
             return ""
         words = self.words.part_words(self.kind, self.component, self.side)
         if self.worst is None:
-            return f"{words}: the mission does not show {self.asked}"
+            return f"{words}: this mission leaves the check “{self.asked}” open"
         two = self.check is Check.SECOND_MEASUREMENT
         said = self.words.fill(CHECK_WORDS[self.check][1]).format(
             part=words if two else self.component, value=self._value

@@ -122,8 +122,18 @@ class ActionRow(TypedDict):
     severity: Severity
 
 
+class ToClearRow(TypedDict):
+    """What keeps the machine from being cleared, in a sentence, and what would clear it, to follow *to clear it*."""
+
+    reason: str
+    act: str
+
+
 class VerdictRow(TypedDict):
-    """Whether the machine may go out, and why not; `scope` has why what was judged is not the whole mission."""
+    """Whether the machine may go out, and why not; `scope` has why what was judged is not the whole mission.
+
+    `to_clear` has each reason against *ready* beside the faults; results of earlier versions lack it.
+    """
 
     status: Verdict
     cleared: bool
@@ -133,6 +143,7 @@ class VerdictRow(TypedDict):
     scope: list[str]
     caveats: list[str]
     actions: list[ActionRow]
+    to_clear: NotRequired[list[ToClearRow]]
 
 
 class HypothesisRow(TypedDict):

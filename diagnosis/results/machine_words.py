@@ -84,6 +84,11 @@ class MachineWords:
         return "driving" if self.part == "wheel" else "motion"
 
     @property
+    def parts_moved(self) -> str:
+        """What somebody moves to have parts judged, to follow *move*: ``the machine``, or ``the joints``."""
+        return "the machine" if self.part == "wheel" else "the joints"
+
+    @property
     def while_moving(self) -> str:
         """The same, to follow *while*."""
         return "driving" if self.part == "wheel" else "moving"
