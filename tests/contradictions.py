@@ -160,8 +160,9 @@ def _urgency(fault: Mapping[str, Any], report: Mapping[str, Any]) -> Iterator[st
         if fault["mode"] in _TOTAL and fault["tier"] == "direct"
         else size["value"]
     )
-    lost = least is not None and least >= _LOST and (fault["mode"] == "inefficient" or fault["tier"] == "direct")
-    risk = total + sum(h["p"] for h in named if lost and h["mode"] == "inefficient")
+    scaled = fault["mode"] in ("inefficient", "outside_table")
+    lost = least is not None and least >= _LOST and (scaled or fault["tier"] == "direct")
+    risk = total + sum(h["p"] for h in named if lost and h["mode"] in ("inefficient", "outside_table"))
     limits = report["limits"]
     sure = sum(h["p"] for h in named) >= limits["min_probability"]
     brief = fault["side"] == "sensor" and fault["stop_s"] - fault["start_s"] <= limits["brief"]
