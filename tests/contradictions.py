@@ -136,6 +136,8 @@ def _sizes(fault: Mapping[str, Any]) -> Iterator[str]:
             yield f"ε̂ {epsilon['value']:.2f} outside of its bounds"
         if fault["mode"] != "outside_table" and not (epsilon["low"] >= 0.0 and epsilon["high"] <= 1.0):
             yield f"ε̂ from {epsilon['low']:.2f} to {epsilon['high']:.2f}"
+        if fault["mode"] != "outside_table" and epsilon["high"] <= 0.0:
+            yield "a fault that for certain takes nothing away"
         if fault["mode"] == "no_signal" and epsilon["value"] < 0.9:
             yield f"no signal with ε̂ {epsilon['value']:.2f}"
     if sat is not None:

@@ -8,7 +8,7 @@ import numpy as np
 
 from diagnosis.decision.caveats import Reservations
 from diagnosis.decision.short import Part, ToClear, short_parts, unjudged_axles
-from diagnosis.decision.wording import join_words
+from diagnosis.decision.wording import count_words, join_words
 from diagnosis.results.assessment import Assessment
 from diagnosis.results.clearing import Check, Checked
 from diagnosis.results.left_out import is_left_out
@@ -18,6 +18,7 @@ from replay.faults import Side
 from replay.machine.config import Limits
 
 _STEERING = "steering was not judged"
+_NAMED = 2  # parts with an open check
 _STEERED = (Check.STILL, Check.RATE, Check.LASTING_RATE)
 _TURNED = (Check.YAW, Check.LASTING_YAW)
 
@@ -102,7 +103,13 @@ def _of_checks(checks: Sequence[Checked]) -> list[ToClear]:
     for own in worst.values():
         first = own[0]
         alike.setdefault(_act(first), []).append(first.text)
-    return [ToClear(f"{_sentence('; '.join(texts))}.", act) for act, texts in alike.items()]
+    return [ToClear(f"{_sentence(_some(texts))}.", act) for act, texts in alike.items()]
+
+
+def _some(texts: Sequence[str]) -> str:
+    """The first reasons, and how many more parts have one."""
+    rest = len(texts) - _NAMED
+    return "; ".join([*texts[:_NAMED], *([f"and {count_words(rest, 'more part')}"] if rest > 0 else [])])
 
 
 def _act(check: Checked) -> str:

@@ -86,6 +86,9 @@ CHECK_WORDS: dict[Check, tuple[str, str]] = {
 }
 
 
+_BELOW = (Check.RESPONSE, Check.LASTING_RESPONSE)
+
+
 @dataclass(frozen=True)
 class Checked:
     """One check of one part.
@@ -147,6 +150,8 @@ class Checked:
     @property
     def _value(self) -> str:
         assert self.worst is not None
+        if self.check in _BELOW and self.worst > 1.0:
+            return "over 100"
         return size_words(self.check, self.worst).removesuffix(" %")
 
 
