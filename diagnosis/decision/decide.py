@@ -163,7 +163,13 @@ def decide(
         caveats += (_NO_YAW,)
     caveats = tuple(c for c in caveats if c != found.text)
     actions = actions_of(intervals, words)
-    return replace(found, scope=tuple(scope), caveats=caveats, actions=actions, to_clear=open_points)
+    return replace(
+        found,
+        scope=tuple(scope),
+        caveats=caveats,
+        actions=actions,
+        to_clear=() if found.status is Verdict.READY else open_points,
+    )
 
 
 def _offset_hidden(checks: Sequence[Checked], axle: str) -> bool:

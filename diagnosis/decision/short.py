@@ -37,8 +37,9 @@ def short_parts(
     driven: Mapping[Part, float],
     limits: Limits,
     words: MachineWords,
+    kind: Kind = Kind.WHEEL,
 ) -> list[ToClear]:
-    """Parts of wheels that were not judged long enough, those together that are so for the same reason.
+    """Parts that were not judged long enough, those together that are so for the same reason.
 
     Parameters
     ----------
@@ -52,15 +53,21 @@ def short_parts(
         What counts.
     words : MachineWords
         How to speak of the machine.
+    kind : Kind
+        Of the parts' components.
     """
     alike: dict[tuple[str, str, bool], list[Part]] = {}
     for part in short:
         reason = _why_short(assessments[part], driven.get(part), limits)
-        act = _act(part, assessments[part], driven.get(part), limits, words)
+        act = (
+            _act(part, assessments[part], driven.get(part), limits, words)
+            if kind is Kind.WHEEL
+            else _act_of_axle(part[1], _main_state(assessments[part]))
+        )
         alike.setdefault((reason, act, decided_s.get(part, 0.0) < _SAID_S), []).append(part)
     out = []
     for (reason, act, silent), parts in alike.items():
-        who, why = words.listed(Kind.WHEEL, parts), f" ({reason})" if reason else ""
+        who, why = words.listed(kind, parts), f" ({reason})" if reason else ""
         named = act.replace("{who}", f"the {who}").replace("{c}", _components(parts))
         if silent:
             out.append(ToClear(f"Not judged: {who}{why}.", named))
@@ -74,7 +81,7 @@ def short_parts(
 def _components(parts: Sequence[Part]) -> str:
     """Components as a name of a signal has them: ``FR``, of several ``<W>``."""
     names = {component for component, _ in parts}
-    return names.pop() if len(names) == 1 else "<W>"
+    return names.pop() if len(names) == 1 else "<part>"
 
 
 def _span(values: Sequence[float], form: str) -> str:
@@ -90,7 +97,7 @@ def unjudged_axles(axles: Sequence[Part], assessments: Mapping[Part, Assessment]
     act = (
         "steer from stop to stop twice while the log runs"
         if STATES.index(State.NOT_EXCITED) in first.states
-        else "log steer.<A>.phi and steer.<A>.u, and steer from stop to stop twice while driving"
+        else "log steer.<part>.phi and steer.<part>.u, and steer from stop to stop twice while driving"
     )
     return ToClear(f"Not assessed: {who} ({main_reason(first)}).", act)
 
@@ -159,6 +166,18 @@ def _act(part: Part, assessment: Assessment, driven: float | None, limits: Limit
         return words.fill("log wheel.{c}.u (the {valve} command)")
     other = second if sensor else f"wheel.{{c}}.u_applied (the {words.position})"
     return f"log {other}; without it, drive straight at three steady speeds for 10 s each"
+
+
+def _act_of_axle(side: str, state: State | None) -> str:
+    """What somebody does to have a part of an axle judged."""
+    if state is State.MASKED:
+        return "repair the steering sensor first, then record a mission again"
+    if state is State.NOT_ASSESSED:
+        second = (
+            "phi_true (a second angle)" if side == Side.SENSOR else "u_applied (the second measurement of its command)"
+        )
+        return f"steer from stop to stop several times while driving, or log steer.{{c}}.{second}"
+    return "steer from stop to stop several times while driving"
 
 
 def _of_silent(sensor: bool, state: State | None) -> str:

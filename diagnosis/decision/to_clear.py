@@ -9,6 +9,7 @@ import numpy as np
 from diagnosis.decision.caveats import Reservations
 from diagnosis.decision.short import Part, ToClear, short_parts, unjudged_axles
 from diagnosis.decision.wording import count_words, join_words
+from diagnosis.results.assessed import needed_s
 from diagnosis.results.assessment import Assessment
 from diagnosis.results.clearing import Check, Checked
 from diagnosis.results.left_out import is_left_out
@@ -57,11 +58,11 @@ def to_clear(
         who = join_words(
             sorted({words.part_words(Kind.WHEEL, c, Side.SENSOR_OR_ACTUATOR) for c, _ in against.unexplained})
         )
-        other = " or wheel.<W>.u_applied (the valve position)" if words.drive == "valve" else ""
+        other = " or wheel.<part>.u_applied (the valve position)" if words.drive == "valve" else ""
         out.append(
             ToClear(
                 f"{who}: no single fault explains the residual.",
-                f"inspect these parts, and log wheel.<W>.v_true (a second speed){other}",
+                f"inspect these parts, and log wheel.<part>.v_true (a second speed){other}",
             )
         )
     if against.not_compared:
@@ -90,8 +91,16 @@ def to_clear(
             )
         )
     out += _of_checks(against.open)
-    unjudged = [k for k in assessments if k[0] in axles and assessments[k].tier is Tier.NONE]
+    steered = [k for k in assessments if k[0] in axles]
+    unjudged = [k for k in steered if assessments[k].tier is Tier.NONE]
+    brief = [k for k in steered if k not in unjudged and _brief(k, decided_s, driven, limits)]
+    out += short_parts(brief, assessments, decided_s, driven, limits, words, Kind.STEER)
     return tuple(out + ([unjudged_axles(unjudged, assessments, words)] if unjudged else []))
+
+
+def _brief(part: Part, decided_s: Mapping[Part, float], driven: Mapping[Part, float], limits: Limits) -> bool:
+    """Whether a part of an axle was judged for less than a part of a wheel must be."""
+    return part in driven and decided_s.get(part, 0.0) < needed_s(driven[part], limits.min_assessed)
 
 
 def _of_checks(checks: Sequence[Checked]) -> list[ToClear]:
@@ -125,7 +134,7 @@ def _act(check: Checked) -> str:
         return f"move all {words.parts} together at one steady speed for at least 10 s, and diagnose that log"
     return (
         f"lift the machine, give every {words.part} the same command for 10 s, and compare their speeds with a hand tachometer; a log with "
-        "wheel.<W>.v_true (a second speed) settles it"
+        "wheel.<part>.v_true (a second speed) settles it"
     )
 
 

@@ -27,7 +27,7 @@ def told(against: Reservations, parts: dict[tuple[str, str], Assessment] = PARTS
 def test_parts_that_are_open_for_the_same_reason_stand_together_with_the_signal_that_decides() -> None:
     (one,) = told(Reservations(short=(("FR", "actuator"), ("FL", "actuator"))))
     assert one.startswith("FR and FL drive valve: judged for 20.0 s of driving, of 48 s needed (it may be either).")
-    assert "log wheel.<W>.u_applied (the valve position)" in one
+    assert "log wheel.<part>.u_applied (the valve position)" in one
     (single,) = told(Reservations(short=(("FR", "sensor"),)))
     assert "log wheel.FR.v_true (a second speed)" in single
 
@@ -61,4 +61,11 @@ def test_unjudged_steering_has_one_reason() -> None:
     }
     (one,) = told(Reservations(scope=("the front steering was not judged",)), {**PARTS, **axle})
     assert "front steering sensor and front steering valve (nothing of it is in the log)" in one
-    assert "log steer.<A>.phi" in one
+    assert "log steer.<part>.phi" in one
+
+
+def test_an_axle_that_was_hardly_steered_is_named_with_what_to_do() -> None:
+    still = replace(OPEN, states=np.full(N, CODE[State.NOT_EXCITED]), reasons={State.NOT_EXCITED: "not steered"})
+    (one,) = told(Reservations(), {("front", "actuator"): still})
+    assert one.startswith("front steering valve: judged for 20.0 s of driving, of 48 s needed (not steered).")
+    assert "steer from stop to stop" in one
