@@ -30,7 +30,7 @@ class Trace:
         What it is called.
     role : str
         Part it plays, which gives its colour and dash: ``measured``, ``reference``, ``commanded``, ``expected``, ``replayed``,
-        ``applied``, ``peer``, ``right``, or ``mode-`` and a mode; see ``assets/plot.js``.
+        ``applied``, ``peer``, ``right``, or ``mode-`` and a mode; see ``assets/figure_looks.js``.
     scale : float
         Factor from the column's unit to the row's.
     right : bool

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 
-from diagnosis.results.document import ClearingRow
+from diagnosis.results.clearing_rows import ClearingRow
 from diagnosis.results.machine_words import HYDRAULIC, MachineWords
 from diagnosis.results.vocabulary import Kind
 from replay.faults import Side
