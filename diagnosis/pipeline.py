@@ -21,7 +21,7 @@ from diagnosis.results.closeups import closeups_of
 from diagnosis.results.document import MachineRow, ReportDocument
 from diagnosis.results.machine_words import machine_words
 from diagnosis.results.result import MissionResult
-from diagnosis.results.stated_sizes import size_columns
+from diagnosis.results.stated_sizes import known_probability, size_columns
 from diagnosis.results.vocabulary import Tier
 from replay.arrays.column_store import ColumnStore
 from replay.arrays.envelope import bucket_of
@@ -159,6 +159,9 @@ def _walk(
     report = report_of_mission(judged, identity)
     timeline.store.release()
     windows = closeups_of(timeline, replay, machine, found.assessments, judged.intervals)
+    if windows is not None:
+        near = known_probability(report, windows.step * timeline.dt, timeline.dt, windows.columns)
+        windows = replace(windows, columns={**windows.columns, **near})
     return MissionResult(report, _columns(judged, report), windows)
 
 
@@ -202,5 +205,6 @@ def _columns(judged: Judged, report: ReportDocument) -> dict[str, Array]:
         columns.update({f"evidence.{component}.{side}.{leaf}": x for leaf, x in assessment.columns.items()})
     parts = frozenset(part for part, a in judged.found.assessments.items() if a.columns)
     columns.update(size_columns(report, columns["t"], timeline.dt, parts))
+    columns.update(known_probability(report, columns["t"], timeline.dt, columns))
     columns.update(metrics.path_of(timeline))
     return columns

@@ -253,6 +253,10 @@ def _healthy_plots(report: Mapping[str, Any], columns: Mapping[str, NDArray[Any]
         for f in report["intervals"]:
             if f["component"] == s["component"] and s["side"] in _sides(f):
                 rows &= ~_rows(columns, f["start_s"], f["stop_s"])
+        chance = columns.get(base + "probability")
+        undecided = ("not_excited", "masked", "slip", "no_data", "not_assessed")
+        if chance is not None and s["state"] in undecided and np.isfinite(chance[rows]).any():
+            yield f"{s['component']} {s['side']} is {s['state']} from {s['start_s']:.1f} s on, its plot shows a probability"
         loss = columns.get(base + "epsilon")
         if loss is None or not rows.any():
             continue

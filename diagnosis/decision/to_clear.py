@@ -111,6 +111,8 @@ def _of_checks(checks: Sequence[Checked]) -> list[ToClear]:
     alike: dict[str, list[str]] = {}
     for own in worst.values():
         first = own[0]
+        if first.check is Check.LASTING_RATE and any(_act(first) == a for a in alike):
+            continue  # one axle against the other: said of the one is said of both
         alike.setdefault(_act(first), []).append(first.text)
     return [ToClear(f"{_sentence(_some(texts))}.", act) for act, texts in alike.items()]
 

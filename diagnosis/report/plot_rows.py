@@ -80,7 +80,7 @@ def fault_rows(
 
 
 def course_rows(fault: IntervalRow, pair: Pair, columns: Columns, limit: float | None) -> tuple[Row, ...]:
-    """Rows of the small pictures of one fault: channel and reference, residual, probability that it is not healthy.
+    """Rows of the small pictures of one fault: channel and reference, residual, probability that it deviates.
 
     Parameters
     ----------
@@ -97,7 +97,7 @@ def course_rows(fault: IntervalRow, pair: Pair, columns: Columns, limit: float |
     rows = (
         Row("v", pair.title, pair.unit, (*reference, Trace(pair.measured, "measured", "measured", pair.scale))),
         residual_row(pair.evidence, pair.unit, pair.scale),
-        probability_row(pair.evidence, limit, limits=(-0.04, 1.04)),
+        probability_row(pair.evidence, limit, columns, limits=(-0.04, 1.04)),
     )
     return tuple(r for row in rows for r in row.shown(columns))
 
@@ -114,15 +114,18 @@ def residual_row(base: str, unit: str, scale: float, of: str = "") -> Row:
     )
 
 
-def probability_row(base: str, limit: float | None, of: str = "", limits: tuple[float, float] = (-0.03, 1.03)) -> Row:
-    """Probability that a side is not healthy, and the limit from which a fault is stated."""
+def probability_row(
+    base: str, limit: float | None, columns: Columns, of: str = "", limits: tuple[float, float] = (-0.03, 1.03)
+) -> Row:
+    """Probability that a side deviates, also by less than counts as a fault, and the limit from which a fault is stated."""
     return Row(
         f"probability{of}",
-        f"Probability that it is not healthy{of}",
+        f"Probability that it deviates{of}",
         "1",
-        (Trace(base + "probability", "not healthy", "measured"),),
+        (Trace(base + "probability", "at all, also by less than counts as a fault", "measured"),),
         level=limit,
         limits=limits,
+        unknown=unknown_stretches(base + "probability", columns),
     )
 
 
@@ -151,13 +154,13 @@ def _side_rows(
     limit: float | None,
     words: MachineWords,
 ) -> list[Row]:
-    """Residual, probability that the side is not healthy, ε̂, saturation term and mode probabilities of one side."""
+    """Residual, probability that the side deviates, ε̂, saturation term and mode probabilities of one side."""
     base = f"evidence.{fault['component']}.{side}."
     of = f" ({side})" if fault["side"] == Side.SENSOR_OR_ACTUATOR else ""
     sat_unit, sat_scale = on_page(natural_unit(Kind(fault["kind"]), side, words), words)
     return [
         residual_row(base, *residual_unit, of),
-        probability_row(base, limit, of),
+        probability_row(base, limit, columns, of),
         Row(
             f"epsilon{of}",
             f"Loss of effectiveness ε̂{of}",

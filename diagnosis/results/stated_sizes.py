@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from diagnosis.results.document import ReportDocument
-from replay.faults import Side, State
+from replay.faults import DECIDED, Side, State
 from replay.machine.quantities import OPENING
 
 Array = NDArray[np.float32]
@@ -61,6 +61,27 @@ def size_columns(
                 columns[leaf][rows] = value
         base = f"evidence.{component}.{side}."
         out |= {base + leaf: x for leaf, x in columns.items() if np.isfinite(x).any()}
+    return out
+
+
+def known_probability(
+    report: ReportDocument, t: NDArray[np.floating], step: float, columns: Mapping[str, NDArray[Any]]
+) -> dict[str, NDArray[Any]]:
+    """The columns ``evidence.<component>.<side>.probability`` without what was not decided, which is NaN; see `size_columns`."""
+    out = {}
+    for component, side in {(s["component"], s["side"]): None for s in report["states"]}:
+        name = f"evidence.{component}.{side}.probability"
+        if name not in columns:
+            continue
+        known = np.zeros(t.size, np.bool_)
+        for s in report["states"]:
+            if (s["component"], s["side"]) == (component, side) and s["state"] in DECIDED:
+                known[_rows(t, step, s["start_s"], s["stop_s"])] = True
+        for fault in report["intervals"]:
+            if fault["component"] == component and side in Side(fault["side"]).sides:
+                known[_rows(t, step, fault["start_s"], fault["stop_s"])] = True
+        values = columns[name]
+        out[name] = np.where(known, values, values.dtype.type(np.nan))
     return out
 
 

@@ -16,6 +16,7 @@ from diagnosis.results.vocabulary import Severity, Verdict
 #: Statuses of faults that do not stand.
 GONE = ("past", "repaired")
 _FAULTS = 2
+_DAMAGE = "the log is damaged: "
 
 
 class Leave(StrEnum):
@@ -99,6 +100,9 @@ def _why(
 
 def _said(mission: MissionRow) -> str:
     """Why a mission gives no leave, in a few words."""
+    damage = mission["reason"].partition(_DAMAGE)[2]
+    if damage:
+        return f"{_DAMAGE}{damage.partition(': ')[0]}"
     reason = mission["reason"].partition(";")[0]
     head, _, tail = reason.partition(": ")
     names_a_file = tail and any(head.endswith(file.rpartition("/")[2]) for file in mission["files"])

@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from diagnosis.results.stated_sizes import size_columns
+from diagnosis.results.stated_sizes import known_probability, size_columns
 from replay.machine.quantities import OPENING
 from tests import report_samples as samples
 
@@ -53,3 +53,13 @@ def test_a_saturation_term_of_the_other_side_is_not_shown() -> None:
     either = samples.fault(side="sensor_or_actuator", start_s=10.0, stop_s=20.0, sat=term)
     assert "sat" not in columns_of(either)
     np.testing.assert_allclose(columns_of({**either, "sat": {**term, "unit": "m/s"}})["sat"][100:200], 0.5)
+
+
+def test_no_probability_is_shown_of_what_was_not_decided() -> None:
+    states = [state("healthy", 0.0, 10.0), state("not_excited", 10.0, 50.0), state("masked", 50.0, 100.0)]
+    report = samples.report_with() | {"intervals": [samples.fault(start_s=40.0, stop_s=60.0)], "states": states}
+    name = "evidence.FR.sensor.probability"
+    shown = known_probability(report, T, 0.1, {name: np.full(1000, 0.9, np.float32), "other": T})  # type: ignore[arg-type]
+    assert list(shown) == [name]
+    assert shown[name].dtype == np.float32
+    assert np.isfinite(shown[name]).nonzero()[0].tolist() == [*range(100), *range(400, 600)]
