@@ -122,7 +122,8 @@ class Figure extends FigureLooks {
       });
       this.element.on("plotly_doubleclick", () => { if (this.shifted) return; Now.set(Now.t, { a: null }); this.zoom([0, Data.view.duration]); });
     }
-    this.onRange?.(this.range);
+    this.onRange?.(this.range, true);
+    if (target !== this.range) this.zoom(this.range); // zoomed while it was drawn
   }
 
   // The same curves at once, for paper of `width` pixels: a drawing for every five rows, so that no sheet cuts one.
@@ -157,6 +158,7 @@ class Figure extends FigureLooks {
   async zoom(range) {
     this.range = this.clip(range);
     this.onRange?.(this.range);
+    if (!this.drawn) return; // what is being drawn looks for its range when it is done
     if (this.busy) { this.again = true; return; }
     this.busy = true;
     try {
