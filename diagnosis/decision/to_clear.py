@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 
 import numpy as np
 
@@ -90,7 +90,8 @@ def to_clear(
                 "diagnose the whole log, with every part (no --start, --end, --wheel)",
             )
         )
-    out += _of_checks(against.open)
+    twice = {c for (c, side), a in assessments.items() if a.tier is Tier.DIRECT and side == Side.SENSOR}
+    out += _of_checks(against.open, twice)
     steered = [k for k in assessments if k[0] in axles]
     unjudged = [k for k in steered if assessments[k].tier is Tier.NONE]
     brief = [k for k in steered if k not in unjudged and _brief(k, decided_s, driven, limits)]
@@ -103,17 +104,17 @@ def _brief(part: Part, decided_s: Mapping[Part, float], driven: Mapping[Part, fl
     return part in driven and decided_s.get(part, 0.0) < needed_s(driven[part], limits.min_assessed)
 
 
-def _of_checks(checks: Sequence[Checked]) -> list[ToClear]:
-    """Open checks, of each component that which is furthest beyond its limit."""
+def _of_checks(checks: Sequence[Checked], twice: Collection[str]) -> list[ToClear]:
+    """Open checks, of each component that which is furthest beyond its limit; `twice`: components with a second speed in the log."""
     worst: dict[str, list[Checked]] = {}
     for c in sorted(checks, key=lambda c: -(np.inf if c.worst is None else c.worst / c.limit)):
         worst.setdefault(c.component, []).append(c)
     alike: dict[str, list[str]] = {}
     for own in worst.values():
         first = own[0]
-        if first.check is Check.LASTING_RATE and any(_act(first) == a for a in alike):
+        if first.check is Check.LASTING_RATE and any(_act(first, twice) == a for a in alike):
             continue  # one axle against the other: said of the one is said of both
-        alike.setdefault(_act(first), []).append(first.text)
+        alike.setdefault(_act(first, twice), []).append(first.text)
     return [ToClear(f"{_sentence(_some(texts))}.", act) for act, texts in alike.items()]
 
 
@@ -123,7 +124,7 @@ def _some(texts: Sequence[str]) -> str:
     return "; ".join([*texts[:_NAMED], *([f"and {count_words(rest, 'more part')}"] if rest > 0 else [])])
 
 
-def _act(check: Checked) -> str:
+def _act(check: Checked, twice: Collection[str]) -> str:
     """What shows whether a part is sound that a check does not clear."""
     words: MachineWords = check.words
     if check.check in _TURNED:
@@ -134,9 +135,9 @@ def _act(check: Checked) -> str:
         return "compare both measurements at one steady speed with a third one, such as a hand tachometer, then repair or rescale the one that is off"
     if check.worst is None:
         return f"move all {words.parts} together at one steady speed for at least 10 s, and diagnose that log"
+    lifted = f"lift the machine, give every {words.part} the same command for 10 s, and compare their speeds with a hand tachometer"
     return (
-        f"lift the machine, give every {words.part} the same command for 10 s, and compare their speeds with a hand tachometer; a log with "
-        "wheel.<part>.v_true (a second speed) settles it"
+        lifted if check.component in twice else f"{lifted}; a log with wheel.<part>.v_true (a second speed) settles it"
     )
 
 
