@@ -242,7 +242,7 @@ def _plots(fault: Mapping[str, Any], report: Mapping[str, Any], columns: Mapping
         chance = columns.get(base + "probability")
         if chance is not None and fault["severity"] != "info" and np.isfinite(chance[inside]).any():
             mean = float(np.nanmean(chance[inside]))
-            if mean < 0.5:
+            if mean < (0.25 if len(_sides(fault)) > 1 else 0.5):  # one that may be either's divides it
                 yield f"its plot shows it not healthy with {mean:.2f} on average"
 
 
