@@ -18,9 +18,10 @@ from diagnosis.decision.second_onsets import with_second_onsets
 from diagnosis.report_document import Judged, machine_row, report_of_mission
 from diagnosis.results.assessment import Assessment
 from diagnosis.results.closeups import closeups_of
-from diagnosis.results.document import MachineRow
+from diagnosis.results.document import MachineRow, ReportDocument
 from diagnosis.results.machine_words import machine_words
 from diagnosis.results.result import MissionResult
+from diagnosis.results.stated_sizes import known_probability, size_columns
 from diagnosis.results.vocabulary import Tier
 from replay.arrays.column_store import ColumnStore
 from replay.arrays.envelope import bucket_of
@@ -158,7 +159,10 @@ def _walk(
     report = report_of_mission(judged, identity)
     timeline.store.release()
     windows = closeups_of(timeline, replay, machine, found.assessments, judged.intervals)
-    return MissionResult(report, _columns(judged), windows)
+    if windows is not None:
+        near = known_probability(report, windows.step * timeline.dt, timeline.dt, windows.columns)
+        windows = replace(windows, columns={**windows.columns, **near})
+    return MissionResult(report, _columns(judged, report), windows)
 
 
 def _outside_gaps(found: ComponentResult, timeline: Timeline) -> ComponentResult:
@@ -193,11 +197,14 @@ def _require_something(assessments: Mapping[tuple[str, str], Assessment], missio
     )
 
 
-def _columns(judged: Judged) -> dict[str, Array]:
+def _columns(judged: Judged, report: ReportDocument) -> dict[str, Array]:
     """Signals, replayed loop, evidence and path under their names."""
     timeline = judged.mission.timeline
     columns: dict[str, Array] = dict(replay_columns(timeline, judged.replay, judged.machine))
     for (component, side), assessment in judged.found.assessments.items():
         columns.update({f"evidence.{component}.{side}.{leaf}": x for leaf, x in assessment.columns.items()})
+    parts = frozenset(part for part, a in judged.found.assessments.items() if a.columns)
+    columns.update(size_columns(report, columns["t"], timeline.dt, parts))
+    columns.update(known_probability(report, columns["t"], timeline.dt, columns))
     columns.update(metrics.path_of(timeline))
     return columns

@@ -7,6 +7,9 @@ import re
 from collections.abc import Iterator, Mapping
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from cli.tables.verdict import verdict_parts
 from diagnosis.pages.labels import fault_title
 from diagnosis.results.candidates import candidates_of, label_of
@@ -20,19 +23,23 @@ _LOST = 0.9
 _SPARE_S = 0.05
 
 
-def contradictions(report: Mapping[str, Any]) -> list[str]:
-    """One sentence for each contradiction in a ``report.json``; empty where there is none.
+def contradictions(report: Mapping[str, Any], columns: Mapping[str, NDArray[Any]] | None = None) -> list[str]:
+    """One sentence for each contradiction in a ``report.json``, and between it and its plots; empty where there is none.
 
     Parameters
     ----------
     report : Mapping[str, Any]
         The document.
+    columns : Mapping[str, NDArray] or None
+        Columns of its plots, with ``t``: every sample of a short mission.
     """
     out = [*_verdict(report), *_actions(report), *_coverage(report), *_terminal(report)]
     for fault in report["intervals"]:
         name = f"{fault['id']} {fault['component']} {fault['side']} {fault['mode']}"
         out += [f"{name}: {text}" for text in (*_chances(fault), *_sizes(fault), *_urgency(fault, report))]
-        out += [f"{name}: {text}" for text in (*_times(fault, report), *_words(fault))]
+        out += [f"{name}: {text}" for text in (*_times(fault, report), *_words(fault), *_followed(fault))]
+        out += [f"{name}: {text}" for text in _plots(fault, report, columns or {})]
+    out += _healthy_plots(report, columns or {})
     return out
 
 
@@ -50,6 +57,14 @@ def _verdict(report: Mapping[str, Any]) -> Iterator[str]:
         yield f"cleared with verdict {verdict['status']}"
     if verdict["cleared"] and verdict["not_cleared"]:
         yield "cleared, with a reason why not"
+    if (verdict["status"] == "ready") and verdict["to_clear"]:
+        yield f"ready, and open: {verdict['to_clear'][0]['reason']}"
+    if not verdict["cleared"] and verdict["status"] in ("watch", "not_assessed"):
+        told = bool(verdict["to_clear"]) or verdict["not_cleared"].endswith("may not answer")
+        if not told or not all(row["act"] for row in verdict["to_clear"]):
+            yield "not cleared, and nobody is told what would clear it"
+    if verdict["status"] == "not_assessed" and len(re.findall(r"[.](?= [A-Z]|$)", verdict["text"])) > 2:
+        yield f"more than two sentences: {verdict['text']!r}"
     counts = [
         int(n)
         for n in re.findall(r"(\d+) faults? to repair|(\d+) (?:faults? )?to watch", verdict["title"])
@@ -121,6 +136,8 @@ def _sizes(fault: Mapping[str, Any]) -> Iterator[str]:
             yield f"ε̂ {epsilon['value']:.2f} outside of its bounds"
         if fault["mode"] != "outside_table" and not (epsilon["low"] >= 0.0 and epsilon["high"] <= 1.0):
             yield f"ε̂ from {epsilon['low']:.2f} to {epsilon['high']:.2f}"
+        if fault["mode"] != "outside_table" and epsilon["high"] <= 0.0:
+            yield "a fault that for certain takes nothing away"
         if fault["mode"] == "no_signal" and epsilon["value"] < 0.9:
             yield f"no signal with ε̂ {epsilon['value']:.2f}"
     if sat is not None:
@@ -145,8 +162,9 @@ def _urgency(fault: Mapping[str, Any], report: Mapping[str, Any]) -> Iterator[st
         if fault["mode"] in _TOTAL and fault["tier"] == "direct"
         else size["value"]
     )
-    lost = least is not None and least >= _LOST and (fault["mode"] == "inefficient" or fault["tier"] == "direct")
-    risk = total + sum(h["p"] for h in named if lost and h["mode"] == "inefficient")
+    scaled = fault["mode"] in ("inefficient", "outside_table")
+    lost = least is not None and least >= _LOST and (scaled or fault["tier"] == "direct")
+    risk = total + sum(h["p"] for h in named if lost and h["mode"] in ("inefficient", "outside_table"))
     limits = report["limits"]
     sure = sum(h["p"] for h in named) >= limits["min_probability"]
     brief = fault["side"] == "sensor" and fault["stop_s"] - fault["start_s"] <= limits["brief"]
@@ -180,6 +198,72 @@ def _words(fault: Mapping[str, Any]) -> Iterator[str]:
             yield f"{found.group(0)!r} beside a probability of {fault['probability']:.3f}"
     if re.search(r"\b(nan|inf)\b", " ".join((*fault["evidence"], fault["advice"], fault_title(fault, HYDRAULIC)))):  # type: ignore[arg-type]
         yield "a number in it is none"
+
+
+def _followed(fault: Mapping[str, Any]) -> Iterator[str]:
+    """A gain that a sentence gives beside the ε̂ of the table."""
+    for text in fault["evidence"]:
+        found = re.search(r"followed (\S+) × .*\(95 %: (\S+) to (\S+)\)", text)
+        if found and fault["epsilon"] is not None and " stretches (" not in " ".join(fault["evidence"]):
+            said = [1.0 - float(x) for x in found.groups()]
+            sizes = [fault["epsilon"][k] for k in ("value", "high", "low")]
+            if not np.allclose(said, sizes, atol=1e-3):
+                yield f"{found.group(0)!r} beside ε̂ {sizes[0]:.3f} ({sizes[2]:.3f} to {sizes[1]:.3f})"
+
+
+def _rows(columns: Mapping[str, NDArray[Any]], start: float, stop: float) -> NDArray[np.bool_]:
+    """Samples between two times, whatever their last digit."""
+    t = columns["t"]
+    spare = 0.5 * float(t[1] - t[0])
+    return np.asarray((t >= start - spare) & (t < stop - spare))
+
+
+def _sides(fault: Mapping[str, Any]) -> tuple[str, ...]:
+    return ("sensor", "actuator") if fault["side"] == "sensor_or_actuator" else (fault["side"],)
+
+
+def _plots(fault: Mapping[str, Any], report: Mapping[str, Any], columns: Mapping[str, NDArray[Any]]) -> Iterator[str]:
+    """What the plots of a fault show during it, against the finding: ε̂, its band, the probability of a fault."""
+    for side in _sides(fault) if "t" in columns else ():
+        base, inside = (
+            f"evidence.{fault['component']}.{side}.",
+            _rows(columns, fault["start_s"], fault["stop_s"]),
+        )
+        for other in report["intervals"]:
+            if other["component"] == fault["component"] and side in _sides(other) and other["id"] != fault["id"]:
+                inside &= ~_rows(columns, other["start_s"], other["stop_s"])
+        if not inside.any() or not any(name.startswith(base) for name in columns):
+            continue
+        for leaf, key in (("epsilon", "value"), ("epsilon_low", "low"), ("epsilon_high", "high")):
+            said = np.nan if fault["epsilon"] is None else fault["epsilon"][key]
+            drawn = columns.get(base + leaf, np.full(inside.size, np.nan))[inside]
+            if not np.allclose(drawn, said, atol=1e-3, equal_nan=True):
+                yield f"its plot shows {leaf} from {np.nanmin(drawn):.2f} to {np.nanmax(drawn):.2f}, its table {said:.2f}"
+        chance = columns.get(base + "probability")
+        if chance is not None and fault["severity"] != "info" and np.isfinite(chance[inside]).any():
+            mean = float(np.nanmean(chance[inside]))
+            if mean < (0.25 if len(_sides(fault)) > 1 else 0.5):  # one that may be either's divides it
+                yield f"its plot shows it not healthy with {mean:.2f} on average"
+
+
+def _healthy_plots(report: Mapping[str, Any], columns: Mapping[str, NDArray[Any]]) -> Iterator[str]:
+    """A loss of effectiveness, or a sure fault, in plots of a part while it is called healthy or is not judged."""
+    for s in report["states"] if "t" in columns else ():
+        base, rows = f"evidence.{s['component']}.{s['side']}.", _rows(columns, s["start_s"], s["stop_s"])
+        for f in report["intervals"]:
+            if f["component"] == s["component"] and s["side"] in _sides(f):
+                rows &= ~_rows(columns, f["start_s"], f["stop_s"])
+        chance = columns.get(base + "probability")
+        undecided = ("not_excited", "masked", "slip", "no_data", "not_assessed")
+        if chance is not None and s["state"] in undecided and np.isfinite(chance[rows]).any():
+            yield f"{s['component']} {s['side']} is {s['state']} from {s['start_s']:.1f} s on, its plot shows a probability"
+        loss = columns.get(base + "epsilon")
+        if loss is None or not rows.any():
+            continue
+        if s["state"] == "healthy" and (loss[rows] != 0.0).any():
+            yield f"{s['component']} {s['side']} is healthy from {s['start_s']:.1f} s on, its plot shows ε̂ {np.nanmax(loss[rows]):.2f}"
+        if s["state"] != "healthy" and np.isfinite(loss[rows]).any():
+            yield f"{s['component']} {s['side']} is {s['state']} from {s['start_s']:.1f} s on, its plot shows ε̂ {np.nanmax(loss[rows]):.2f}"
 
 
 def _terminal(report: Mapping[str, Any]) -> Iterator[str]:

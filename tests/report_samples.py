@@ -120,16 +120,10 @@ def _evidence(f: Fault, t: NDArray[np.float64], columns: Columns, rng: np.random
         "residual": measured - expected,
         "threshold": np.full(len(t), 0.02) + 0.01 * soft,
         "expected": expected,
-        "delta": 1 - f[6] * soft + rng.normal(0, 0.004, len(t)),
-        "delta_std": 0.02 + 0.02 * np.abs(np.sin(t / 7)),
-        "delta_bar": f[7] * soft,
-        "delta_bar_std": np.full(len(t), 0.01),
         "p_healthy": healthy,
         **{f"p_{m}": np.zeros(len(t)) + 0.01 * soft for m in ("stuck", "no_signal", "inefficient", "noisy")},
     }
     data[f"p_{f[3]}"] = 1 - healthy - 0.03 * soft
-    data["delta"][: len(t) // 10] = np.nan
-    data["delta_std"][: len(t) // 10] = np.nan
     return {base + k: v for k, v in data.items()}
 
 

@@ -6,8 +6,10 @@ import copy
 from collections.abc import Callable
 from typing import Any
 
+import numpy as np
 import orjson
 import pytest
+from numpy.typing import NDArray
 
 from diagnosis.pipeline import diagnose_mission
 from replay.log.source_options import SignalSource
@@ -20,9 +22,10 @@ from replay.simulation.run import simulate_mission
 from tests.contradictions import contradictions
 
 Document = dict[str, Any]
+Columns = dict[str, NDArray[Any]]
 
 
-def diagnosed(evidence: EvidenceLevel, seed: int) -> Document:
+def diagnosed(evidence: EvidenceLevel, seed: int) -> tuple[Document, Columns]:
     options = SimulationOptions(
         scenario="random", seed=seed, duration_s=60.0, rate_hz=200.0, evidence=evidence, steering_faults=True
     )
@@ -32,19 +35,19 @@ def diagnosed(evidence: EvidenceLevel, seed: int) -> Document:
     }
     signals = Signals(items, {})
     result = diagnose_mission(Mission((), signals, align(signals)), haulotte())
-    return orjson.loads(orjson.dumps(result.report))  # type: ignore[no-any-return]
+    return orjson.loads(orjson.dumps(result.report)), dict(result.columns)
 
 
 @pytest.fixture(scope="module")
-def document() -> Document:
+def result() -> tuple[Document, Columns]:
     return diagnosed("direct", 2)
 
 
 @pytest.mark.parametrize(("evidence", "seed"), [("base", 1), ("spool", 2000), ("direct", 2000)])
 def test_missions_with_many_faults_do_not_contradict_themselves(evidence: EvidenceLevel, seed: int) -> None:
-    found = diagnosed(evidence, seed)
+    found, columns = diagnosed(evidence, seed)
     assert len(found["intervals"]) > 5
-    assert contradictions(found) == []
+    assert contradictions(found, columns) == []
 
 
 def _first(d: Document, severity: str) -> Document:
@@ -90,8 +93,51 @@ def _sum(d: Document) -> None:
 
 
 @pytest.mark.parametrize("spoil", [_calm, _advice, _minority, _size, _late, _softer, _healthy, _untold, _sum])
-def test_a_spoilt_result_is_seen(document: Document, spoil: Callable[[Document], None]) -> None:
+def test_a_spoilt_result_is_seen(result: tuple[Document, Columns], spoil: Callable[[Document], None]) -> None:
+    document, _ = result
     assert contradictions(document) == []
     changed = copy.deepcopy(document)
     spoil(changed)
     assert contradictions(changed) != []
+
+
+def _another_loss(d: Document, columns: Columns) -> None:
+    fault = _first(d, "high")
+    name = f"evidence.{fault['component']}.{fault['side']}.epsilon"
+    columns[name] = columns[name] - 0.2
+
+
+def _narrow_band(d: Document, columns: Columns) -> None:
+    fault = next(f for f in d["intervals"] if f["epsilon"] and f["epsilon"]["high"] - f["epsilon"]["low"] > 0.01)
+    base = f"evidence.{fault['component']}.{fault['side']}."
+    columns[base + "epsilon_low"] = columns[base + "epsilon"]
+
+
+def _loss_while_healthy(d: Document, columns: Columns) -> None:
+    span = next(s for s in d["states"] if s["state"] == "healthy" and s["stop_s"] - s["start_s"] > 5.0)
+    name = f"evidence.{span['component']}.{span['side']}.epsilon"
+    columns[name] = np.where(np.isfinite(columns[name]), 0.9, np.nan)
+
+
+def _loss_while_unknown(d: Document, columns: Columns) -> None:
+    name = next(n for n, x in columns.items() if n.endswith(".epsilon") and np.isnan(x).any())
+    columns[name] = np.nan_to_num(columns[name])
+
+
+def _sure_of_health(d: Document, columns: Columns) -> None:
+    names = [f"evidence.{f['component']}.{f['side']}.probability" for f in d["intervals"] if f["severity"] == "high"]
+    name = next(n for n in names if n in columns)
+    columns[name] = np.zeros_like(columns[name])
+
+
+@pytest.mark.parametrize(
+    "spoil", [_another_loss, _narrow_band, _loss_while_healthy, _loss_while_unknown, _sure_of_health]
+)
+def test_plots_that_show_something_else_than_the_findings_are_seen(
+    result: tuple[Document, Columns], spoil: Callable[[Document, Columns], None]
+) -> None:
+    document, columns = result
+    assert contradictions(document, columns) == []
+    changed = dict(columns)
+    spoil(document, changed)
+    assert contradictions(document, changed) != []

@@ -13,6 +13,7 @@ from rich.text import Text
 
 from cli.tables.layout import bullets, key_values, section, table, text
 from cli.tables.looks import verdict_style
+from diagnosis.audit.fleet.leave import Leave
 from diagnosis.audit.store.outcome import ENDS, READ, MissionState
 from diagnosis.results.vocabulary import Verdict
 
@@ -25,6 +26,7 @@ if TYPE_CHECKING:
 SCHEMA = "mfhca-audit/1"
 _VERDICTS = (Verdict.STOP, Verdict.WATCH, Verdict.READY, Verdict.NOT_ASSESSED)
 _WORST_FIRST = (MissionState.CRASHED, MissionState.OUT_OF_MEMORY, MissionState.TIMEOUT, MissionState.UNREADABLE)
+_LEAVES = {Leave.MUST_NOT: Verdict.STOP, Leave.NOT_KNOWN: Verdict.NOT_ASSESSED, Leave.MAY: Verdict.READY}
 _SHOWN, _MACHINES, _FAULTS = 10, 20, 2
 
 
@@ -55,7 +57,7 @@ def summary_parts(audited: Audited, found: Discovery, output: Path) -> list[Rend
         parts += [section("Failed"), bullets(rows)]
         if len(failed) > _SHOWN:
             parts.append(text(f"… and {len(failed) - _SHOWN} more", "dim"))
-    parts += machine_parts(audited.machines)
+    parts += [*leave_parts(audited.machines), *machine_parts(audited.machines)]
     verdicts: Counter[str | None] = Counter(end.verdict for end in ends)
     states: Counter[str] = Counter(end.state for end in ends)
     counted = [
@@ -75,6 +77,27 @@ def summary_parts(audited: Audited, found: Discovery, output: Path) -> list[Rend
     if audited.failed:
         files.append(("failures", output / "failures.txt"))
     return [*parts, "", key_values(files)]
+
+
+def leave_parts(machines: Sequence[ListedMachine]) -> list[RenderableType]:
+    """Which machines must not go out, of which that is not known, and which may: why, and by which mission."""
+    parts: list[RenderableType] = []
+    for leave, verdict in _LEAVES.items():
+        mine = [m for m in machines if m.leave == leave]
+        if not mine:
+            continue
+        parts.append(Text(f"{leave[:1].upper()}{leave[1:]} ({len(mine)})", style=verdict_style(verdict)))
+        parts.append(
+            bullets(
+                [
+                    Text.assemble(text(m.label, "bold"), f" – {m.reason}  ", text(m.mission, "dim"))
+                    for m in mine[:_MACHINES]
+                ]
+            )
+        )
+        if len(mine) > _MACHINES:
+            parts.append(text(f"… and {len(mine) - _MACHINES} more on the fleet page", "dim"))
+    return [section("Which machines may go out"), *parts] if parts else []
 
 
 def machine_parts(machines: Sequence[ListedMachine]) -> list[RenderableType]:

@@ -15,7 +15,7 @@ from cli.tables.looks import mode_text, severity_text, verdict_title
 from diagnosis.comparison.words import OUTCOMES, headline
 from diagnosis.report.confidence import headline as verdict_words
 from diagnosis.report.confidence import sure_of
-from diagnosis.report.tables import merged_caveats
+from diagnosis.report.tables import clearing_sentences, merged_caveats, other_caveats
 from diagnosis.results.candidates import label_of
 from diagnosis.results.comparison_document import FaultChangeRow, PreviousRow
 from diagnosis.results.document import PAPER_DEFAULTS, ActionRow, IntervalRow, MachineRow, ReportDocument
@@ -51,8 +51,11 @@ def verdict_parts(report: ReportDocument) -> list[RenderableType]:
             parts.append(text(f"… and {rest} more in the report", "dim"))
     if "previous" in report:
         parts += [section("Compared with another mission of the machine"), *_previous(report["previous"], words)]
-    if verdict["caveats"]:
-        parts += [section("Limits of this verdict"), bullets(merged_caveats(verdict["caveats"]))]
+    if rows := clearing_sentences(verdict):
+        told = [f"{reason} To clear it: {act}." if act else reason for reason, act in rows]
+        parts += [section("What is open, and what would clear it"), bullets(told)]
+    if caveats := other_caveats(verdict):
+        parts += [section("Limits of this verdict"), bullets(merged_caveats(caveats))]
     return [*parts, *log_parts(report), ""]
 
 

@@ -19,7 +19,7 @@ COLOURS = {
 }  # fmt: skip
 BAND = "rgba(10, 90, 156, 0.18)"
 STUCK = LOOKS[State.STUCK].light
-#: Colour, width and dash of a curve by the part that it plays, as in ``diagnosis/report/assets/plot.js``.
+#: Colour, width and dash of a curve by the part that it plays, as in ``diagnosis/report/assets/figure_looks.js``.
 STYLES = {
     "measured": (COLOURS["accent"], 1.7, "solid"),
     "commanded": (COLOURS["text"], 1.3, "dot"),

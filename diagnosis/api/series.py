@@ -66,14 +66,15 @@ class Series:
     def columns(self) -> Mapping[str, NDArray[Any]]:
         """Columns that hold samples, with ε̂ and the bounds of estimates."""
         filled = {k: v for k, v in self.raw.items() if np.isfinite(v).any()} if self.axis.rows else {}
-        return derived(filled, self.report["intervals"])
+        return derived(filled, self.report)
 
     @cached_property
     def _near(self) -> tuple[NDArray[np.int64], Mapping[str, NDArray[Any]]]:
         """Steps of the stretches that have every sample, and these samples."""
         if self.closeups is None or self.axis.per == 1:
             return np.empty(0, np.int64), {}
-        return self.closeups.step, derived(self.closeups.columns, self.report["intervals"])
+        times = self.axis.start + self.closeups.step * self.axis.sample_s, self.axis.sample_s
+        return self.closeups.step, derived(self.closeups.columns, self.report, times)
 
     def curve(self, name: str, span: Span, scale: float, most: int) -> Curve:
         """One column within a span.

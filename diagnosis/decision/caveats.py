@@ -7,16 +7,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from diagnosis.decision.short import main_reason, short_parts, unjudged_axles
 from diagnosis.decision.wording import count_words, join_words, unanswered
-from diagnosis.results.assessed import needed_s
-from diagnosis.results.assessment import STATES, Assessment
+from diagnosis.results.assessment import Assessment
 from diagnosis.results.clearing import Checked
 from diagnosis.results.left_out import is_left_out
 from diagnosis.results.machine_event import MachineEvent
 from diagnosis.results.machine_words import HYDRAULIC, MachineWords
 from diagnosis.results.result import FaultInterval
 from diagnosis.results.vocabulary import Kind, Tier
-from replay.faults import DECIDED, State
 from replay.machine.config import Limits, Machine
 from replay.mission import Mission
 from replay.signals.timeline import Timeline
@@ -25,7 +24,7 @@ from replay.signals.timeline import Timeline
 Part = tuple[str, str]
 
 _OPEN_S, _OPEN_SHARE = 1.0, 0.02  # driving that was not judged and is worth a word
-_SAID_S = 0.05  # of judged driving: less is nothing
+_REASONS = 2  # that the heading names; all of them stand below it
 _EMPTY_S = 1.0  # without any wheel speed
 
 
@@ -86,7 +85,8 @@ def doubt_of(watch: Sequence[FaultInterval], against: Reservations) -> str:
     out += dict.fromkeys(event.doubt for event in against.events)
     if against.open:
         out.append(open_words(against.open))
-    return join_words(out)
+    rest = len(out) - _REASONS
+    return join_words([*out[:_REASONS], *([count_words(rest, "more reason")] if rest > 0 else [])])
 
 
 def open_words(checks: Sequence[Checked]) -> str:
@@ -119,40 +119,12 @@ def caveats_of(
         said = "" if is_left_out(damage[0]) else "The log is damaged: "
         out.append(f"{said}{damage[0]}" + (f" (and {len(damage) - 1} more)" if len(damage) > 1 else ""))
     if not short_named:
-        out += _too_short(against, assessments, decided_s, driven, limits)
+        out += [r.reason for r in short_parts(against.short, assessments, decided_s, driven, limits, against.words)]
     out += _most_open(against, assessments, decided_s, driven, axles)
     unjudged = [k for k in assessments if k[0] in axles and assessments[k].tier is Tier.NONE]
     if unjudged:
-        who = join_words([against.words.part_words(Kind.STEER, *k) for k in unjudged])
-        out.append(f"Not assessed: {who} ({_main_reason(assessments[unjudged[0]])}).")
+        out.append(unjudged_axles(unjudged, assessments, against.words).reason)
     return tuple(out)
-
-
-def _too_short(
-    against: Reservations,
-    assessments: Mapping[Part, Assessment],
-    decided_s: Mapping[Part, float],
-    driven: Mapping[Part, float],
-    limits: Limits,
-) -> list[str]:
-    """Sentences on parts that were not judged long enough: one for all that nothing was said of for the same reason."""
-    silent: dict[str, list[Part]] = {}
-    out = []
-    words = against.words
-    for key in against.short:
-        reason = _why_short(assessments[key], driven.get(key), limits)
-        if decided_s.get(key, 0.0) < _SAID_S:
-            silent.setdefault(reason, []).append(key)
-            continue
-        out.append(
-            f"{words.part_words(Kind.WHEEL, *key)}: judged for {decided_s[key]:.1f} s of {words.moving}, of "
-            f"{needed_s(driven.get(key, 0.0), limits.min_assessed):.3g} s needed"
-            + (f" ({reason})" if reason else "")
-            + "."
-        )
-    for reason, parts in silent.items():
-        out.append(f"Not judged: {words.listed(Kind.WHEEL, parts)}" + (f" ({reason})" if reason else "") + ".")
-    return out
 
 
 def limits_of(limits: Limits) -> tuple[str, ...]:
@@ -187,34 +159,13 @@ def _most_open(
     most = max(open_s, key=lambda k: open_s[k], default=None)
     if most is None or open_s[most] <= max(_OPEN_S, _OPEN_SHARE * driven[most]):
         return []
-    reason = _main_reason(assessments[most])
+    reason = main_reason(assessments[most])
     return [
         f"{against.words.part_words(Kind.WHEEL, *most)}: {open_s[most]:.1f} s of {driven[most]:.1f} s of {against.words.moving} could not be judged"
         + (f" ({reason})" if reason else "")
         + f"; this is the most of all parts{' judged long enough' if against.short else ''}."
         " The timeline shows when."
     ]
-
-
-def _why_short(assessment: Assessment, driven: float | None, limits: Limits) -> str:
-    """Why a part was not judged long enough; a machine at rest is no reason while it drives."""
-    if driven is not None and driven < limits.min_assessed and assessment.tier is not Tier.NONE:
-        return f"driven for less than {limits.min_assessed:g} s"
-    return _main_reason(assessment)
-
-
-def _main_reason(assessment: Assessment) -> str:
-    """Reason of the commonest state that is no judgement; a machine at rest is one only where nothing else is."""
-    best, most = "", 0.0
-    for state, reason in assessment.reasons.items():
-        if state in DECIDED:
-            continue
-        count = float(np.count_nonzero(assessment.states == STATES.index(state)))
-        if state is State.NOT_EXCITED:
-            count *= 1e-9
-        if count > most:
-            best, most = reason, count
-    return best
 
 
 def more_caveats(mission: Mission, first_ns: int, machine: Machine) -> list[str]:

@@ -6,6 +6,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from diagnosis.decision.caveats import Reservations, caveats_of, doubt_of, limits_of, open_words
+from diagnosis.decision.short import ToClear
+from diagnosis.decision.to_clear import to_clear
 from diagnosis.decision.wording import actions_of, count_words, join_words, seconds_words, sentence_of
 from diagnosis.results.assessed import needed_s
 from diagnosis.results.assessment import Assessment
@@ -50,6 +52,8 @@ class Decision:
         Why ``watch`` gives no such leave, to follow *not cleared:*; empty otherwise.
     scope : tuple[str, ...]
         Why what was judged is not the whole mission.
+    to_clear : tuple[ToClear, ...]
+        What stands against ``ready`` beside the faults, and what would clear it.
     """
 
     status: Verdict
@@ -60,6 +64,7 @@ class Decision:
     cleared: bool = False
     not_cleared: str = ""
     scope: tuple[str, ...] = ()
+    to_clear: tuple[ToClear, ...] = ()
 
     def row(self, more_caveats: Sequence[str] = ()) -> VerdictRow:
         """The same for ``report.json``, with caveats that do not come from the judgement."""
@@ -72,6 +77,7 @@ class Decision:
             "scope": list(self.scope),
             "caveats": [*self.caveats, *more_caveats],
             "actions": list(self.actions),
+            "to_clear": [{"reason": x.reason, "act": x.act} for x in self.to_clear],
         }
 
 
@@ -138,7 +144,10 @@ def decide(
         events=tuple(events),
         hints=tuple(hints),
     )
+    open_points = to_clear(against, assessments, decided_s, driven, axles, limits)
     found = _with_faults(intervals, against) or _without_faults(assessments, decided_s, axles, against)
+    if found.status is Verdict.NOT_ASSESSED and open_points:
+        found = replace(found, text=f"{found.text} To clear it: {open_points[0].act}.")
     said = found.title == _SENSORS_ALONE  # which parts are not judged, and why
     caveats = caveats_of(against, assessments, decided_s, driven, axles, limits, short_named=said)
     if _modelled(assessments) and model is not None and model.identified:
@@ -146,7 +155,7 @@ def decide(
             words.fill(
                 "Sensors and {valve}s without a second measurement were judged by a {wheel} model identified from this mission. "
             )
-            + f" It mostly does not name a sensor's loss below about {100 * RESOLUTION[Side.SENSOR]:.0f} % or a {words.drive}'s below "
+            + f"It mostly does not name a sensor's loss below about {100 * RESOLUTION[Side.SENSOR]:.0f} % or a {words.drive}'s below "
             f"about {100 * RESOLUTION[Side.ACTUATOR]:.0f} %, nor a loss that lasts the whole mission on every {words.part}. A second "
             "measurement would show them; a machine file with [plant] shows the last.",
         )
@@ -154,7 +163,14 @@ def decide(
     if any(_offset_hidden(checks, axle) for axle in axles):
         caveats += (_NO_YAW,)
     caveats = tuple(c for c in caveats if c != found.text)
-    return replace(found, scope=tuple(scope), caveats=caveats, actions=actions_of(intervals, words))
+    actions = actions_of(intervals, words)
+    return replace(
+        found,
+        scope=tuple(scope),
+        caveats=caveats,
+        actions=actions,
+        to_clear=() if found.status is Verdict.READY else open_points,
+    )
 
 
 def _offset_hidden(checks: Sequence[Checked], axle: str) -> bool:
@@ -223,16 +239,12 @@ def _without_faults(
             sorted({against.words.part_words(Kind.WHEEL, c, Side.SENSOR_OR_ACTUATOR) for c, _ in against.unexplained})
         )
         most = max(assessments[part].unexplained_s for part in against.unexplained)
-        text = (
-            f"No fault was identified, but no single fault explains the residual of the {who} for up to {seconds_words(most)}. "
-            "Inspect these parts, or add a second measurement of the speed"
-            + (" or valve position." if against.words.drive == "valve" else ".")
-        )
+        text = f"No fault was identified, but no single fault explains the residual of the {who} for up to {seconds_words(most)}."
         return Decision(Verdict.NOT_ASSESSED, "Unexplained residuals", text)
     if against.not_compared:
         text = (
-            f"No fault was found, but the {against.words.part} model was identified from this mission alone. It does not show a loss "
-            f"that lasts the whole mission. Give K and tau of the {against.words.parts} in [plant] of a machine file."
+            f"No fault was found, but the {against.words.part} model was identified from this mission alone, so a loss that lasts the "
+            "whole mission would not show."
         )
         return Decision(Verdict.NOT_ASSESSED, "No fault found, not fully assessed", text)
     if against.damage:
@@ -261,11 +273,9 @@ def _sensors_alone(
         return ""
     least = min(decided_s.get(p, 0.0) for p in assessments if p[0] not in axles and p[1] == Side.SENSOR)
     drives = [c for c, _ in against.short]
-    who = f"the drive of {drives[0]} is" if len(drives) == 1 else f"the drives of {join_words(drives)} are"
+    who = f"the drive of {drives[0]} was" if len(drives) == 1 else f"the drives of {join_words(drives)} were"
     why = assessments[against.short[0]].reasons.get(State.NOT_ASSESSED, "")
     return (
-        against.words.fill(
-            f"The {{wheel.sensor}}s were judged over at least {least:.0f} s of {{moving}} and no fault was seen in them."
-        )
-        + f" Whether {who} weak was not judged: {why}."
+        against.words.fill(f"No fault was seen in the {{wheel.sensor}}s over at least {least:.0f} s of {{moving}}; ")
+        + f"{who} not judged, for {why}."
     )

@@ -9,12 +9,14 @@ import numpy as np
 
 from diagnosis.decision.advice import check_of
 from diagnosis.decision.severity import severity_of
-from diagnosis.results.assessment import STATES, Assessment
+from diagnosis.results.assessment import STATES, Assessment, Finding
 from diagnosis.results.machine_words import MachineWords
-from diagnosis.results.result import FaultInterval, StateSpan
-from diagnosis.results.vocabulary import Kind
+from diagnosis.results.result import Epsilon, FaultInterval, StateSpan
+from diagnosis.results.vocabulary import Kind, Tier
+from replay.faults import FaultMode
 from replay.machine.config import Machine
 
+_MODEL_LOSS = 0.3  # beyond 95 % of the errors of a wheel's ε̂ by its model, on tuning seeds
 #: A component and its side.
 Part = tuple[str, str]
 
@@ -39,7 +41,7 @@ def intervals_of(
                 stop_s=f.stop * step_ns * 1e-9,
                 start_ns=start_ns + f.start * step_ns,
                 stop_ns=start_ns + f.stop * step_ns,
-                epsilon=f.epsilon,
+                epsilon=_bounded(f, kind),
                 sat=f.sat,
                 probability=f.probability,
                 hypotheses=f.hypotheses,
@@ -52,6 +54,14 @@ def intervals_of(
             )
     ordered = sorted(found.values(), key=lambda x: (-x.severity.rank, x.start_s, x.component, x.side))
     return tuple(replace(f, id=f"F{i + 1}") for i, f in enumerate(ordered))
+
+
+def _bounded(f: Finding, kind: Kind) -> Epsilon | None:
+    """ε̂ with bounds that hold: those of a model's own covariance leave out how far the model itself is off."""
+    e = f.epsilon
+    if e is None or f.tier is not Tier.MODEL or kind is not Kind.WHEEL or f.mode is not FaultMode.INEFFICIENT:
+        return e
+    return Epsilon(e.value, max(0.0, min(e.low, e.value - _MODEL_LOSS)), min(1.0, max(e.high, e.value + _MODEL_LOSS)))
 
 
 def spans_of(assessments: Mapping[Part, Assessment], step_ns: int) -> tuple[StateSpan, ...]:

@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from diagnosis.results.assessment import STATES, Assessment
-from diagnosis.results.document import CoverageRow, LoopRow, MeanRow, MetricsRow, PaperRow, PhaseRow
+from diagnosis.results.document import CoverageRow, PhaseRow
+from diagnosis.results.loop_rows import LoopRow, MeanRow, MetricsRow, PaperRow
 from replay.arrays.blocks import blocks
 from replay.arrays.envelope import shown
 from replay.arrays.numeric import without_nan

@@ -25,6 +25,7 @@ _MARKED_EPSILON = 0.3
 _SHORT_NOISE_S = 1.0
 _LOST = 0.9  # ε̂ from which on so little is left that the part is as good as without signal
 _PROBABLY_TOTAL = 0.75  # that the named side is stuck or without signal, from which on the machine is stopped
+_PARTIAL = (FaultMode.INEFFICIENT, FaultMode.OUTSIDE_TABLE)  # rows of which ε̂ says how much is left
 
 
 def severity_of(
@@ -95,7 +96,7 @@ def _at_risk(finding: Finding) -> float:
     size = finding.epsilon
     known = size is not None and (not finding.mode.total or finding.tier is Tier.DIRECT)
     lost = known and size is not None and (size.low if finding.mode.total else size.value) >= _LOST
-    return _of_named_side(finding, {*TOTAL, FaultMode.INEFFICIENT} if lost else TOTAL)
+    return _of_named_side(finding, {*TOTAL, *_PARTIAL} if lost else TOTAL)
 
 
 def _of_named_side(finding: Finding, modes: Container[str] | None = None) -> float:

@@ -87,6 +87,7 @@ def sentence_of(faults: Sequence[FaultInterval], words: MachineWords) -> str:
 
 def seconds_words(value: float) -> str:
     """A duration [s] as shown: ``140 ms``, ``6.4 s``."""
+    value = round(value, 6)  # which a difference of times may miss by its last digit
     return f"{value * 1e3:.0f} ms" if value < 1 else f"{value:.1f} s"
 
 

@@ -1,4 +1,4 @@
-"""The series behind the plots of direct evidence: residual, tracked gain and bias, probabilities of the rows."""
+"""The series behind the plots of direct evidence: residual, probabilities of the rows."""
 
 from __future__ import annotations
 
@@ -10,14 +10,13 @@ from numpy.typing import NDArray
 from diagnosis.channels.sample_status import PAIR
 from diagnosis.direct.identification import IdentifiedPair
 from diagnosis.estimation.fault_models import HEALTHY
-from diagnosis.estimation.gain_bias import GainBiasModel, track_gain_bias
 from diagnosis.estimation.viterbi import ModePath
 from diagnosis.results.evidence_columns import Pictured
 from diagnosis.results.fault_rows import ROWS, codes_of
 from replay.arrays.blocks import release
 from replay.arrays.envelope import bucket_of, envelope, in_buckets
 
-_SERIES = ("residual", "threshold", "expected", "delta", "delta_std", "delta_bar", "delta_bar_std")
+_SERIES = ("residual", "threshold", "expected")
 
 
 def evidence_columns(found: IdentifiedPair, path: ModePath, step: NDArray[np.int64]) -> Pictured:
@@ -35,28 +34,16 @@ def evidence_columns(found: IdentifiedPair, path: ModePath, step: NDArray[np.int
     pair, model, noise = found.pair, found.model, found.model.noise
     y_all, x, status, _, white, passing, _ = found.samples
     bucket, store = bucket_of(x.size), pair.store
-    tracked = GainBiasModel(
-        noise=noise,
-        gain_walk=0.3,
-        bias_walk=0.1 * pair.span,
-        gain_std=0.3,
-        bias_std=0.3 * pair.span,
-        relax_s=5.0,
-        dt=pair.dt,
-    )
     columns = {name: store.column(np.float64 if bucket == 1 else np.float32) for name in _SERIES}
     near: dict[str, list[NDArray[Any]]] = {name: [] for name in _SERIES}
-    state = None
     for part in store.blocks(x.size, bucket):
         at = step[np.searchsorted(step, part.start) : np.searchsorted(step, part.stop)] - part.start
         use, y, ref = status[part] == PAIR, y_all[part], x[part]
-        track = track_gain_bias(y, ref, use, tracked, state)
-        state = track.state
         residual, threshold = (
             np.where(use, y - ref, np.nan),
             3 * np.sqrt(noise**2 * white[part] + model.tolerance**2 * (passing[part] - 1.0)),
         )
-        series = (residual, threshold, ref, track.delta, track.delta_std, track.bias, track.bias_std)
+        series = (residual, threshold, ref)
         for (name, column), values in zip(columns.items(), series, strict=True):
             column.append(envelope(values, bucket))
             near[name].append(values[at].astype(np.float32))

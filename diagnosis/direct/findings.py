@@ -111,7 +111,10 @@ def finding_of(run: Run, found: IdentifiedPair, limits: Limits) -> Finding | Non
             epsilon = Epsilon(1.0, 1.0 - share, 1.0)  # all, if it is stuck; else what is not left
         lines += (alike_sentence(found),)
     shift = max(0, round(found.lag)) if pair.side is Side.ACTUATOR else 0
-    hypotheses = [Hypothesis(pair.side.value, ROWS[row].value, float(p[row])) for row in codes_of(pair.side)]
+    named = {run.row: mode.value}  # a gain beyond the table has the probability of the row that it was found by
+    hypotheses = [
+        Hypothesis(pair.side.value, named.get(row, ROWS[row].value), float(p[row])) for row in codes_of(pair.side)
+    ]
     return Finding(
         start=max(0, run.start - shift),
         stop=max(1, run.stop - shift),

@@ -174,7 +174,8 @@ def _finding(isolated: Isolated, pair: SpeedPair, model: RowModel, limits: Limit
             return None
     if run.row in VARYING_ROWS and math.sqrt(max(isolated.deviation**2 - pair.noise**2, 0.0)) < limits.min_sat:
         return None
-    hypotheses = [Hypothesis(Side.SENSOR.value, ROWS[row].value, float(p[row])) for row in _KNOWN]
+    named = {run.row: mode.value}
+    hypotheses = [Hypothesis(Side.SENSOR.value, named.get(row, ROWS[row].value), float(p[row])) for row in _KNOWN]
     raised = _detected(lead, run, max(3, round(_EDGE_S / pair.dt)))
     last = pair.samples.y.size - 1
     return Finding(

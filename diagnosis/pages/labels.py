@@ -78,6 +78,7 @@ def clock(seconds: float, digits: int = 0) -> str:
 
 def span(seconds: float) -> str:
     """Length of time with a unit that suits it."""
+    seconds = round(seconds, 6)  # which a difference of times may miss by its last digit
     if seconds < 1:
         return f"{seconds * 1e3:.0f} ms"
     if seconds < 120:

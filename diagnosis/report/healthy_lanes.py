@@ -7,7 +7,8 @@ from dataclasses import dataclass
 from diagnosis.pages.labels import clock
 from diagnosis.report.shown import HEADS, cells_of
 from diagnosis.results.clearing import size_words
-from diagnosis.results.document import ClearingRow, ReportDocument
+from diagnosis.results.clearing_rows import ClearingRow
+from diagnosis.results.document import ReportDocument
 from replay.faults import Side
 
 

@@ -49,7 +49,7 @@ _ASSETS = Path(__file__).parent / "assets"
 _STYLES = (_ASSETS / "evidence.css", _ASSETS / "explorer.css", _ASSETS / "reading.css", _ASSETS / "print.css")
 _FIRST = _ASSETS / "data.js"
 #: Scripts that a page holds packed, and expands when it is opened.
-_MAIN = tuple(_ASSETS / name for name in ("plot.js", "export.js", "explorer.js", "page.js"))
+_MAIN = tuple(_ASSETS / name for name in ("figure_looks.js", "plot.js", "export.js", "explorer.js", "page.js"))
 #: Scripts that it expands when its first plot is drawn.
 _LATER = tuple(
     _ASSETS / name for name in ("reading.js", "pictures.js", "lanes.js", "replay.js", "views.js", "whatif.js")
@@ -144,8 +144,9 @@ def _series(report: ReportDocument, columns: Columns, closeups: Closeups | None)
     near = None
     if closeups is not None:
         samples = {labels.visible(k): v for k, v in closeups.columns.items()}
-        near = Closeups(closeups.step, derived(samples, report["intervals"]))
-    return _Series(every, filled, derived(filled, report["intervals"]), near, axis)
+        times = axis.start + closeups.step * axis.sample_s, axis.sample_s
+        near = Closeups(closeups.step, derived(samples, report, times))
+    return _Series(every, filled, derived(filled, report), near, axis)
 
 
 def _pictures(

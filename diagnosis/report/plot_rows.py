@@ -9,6 +9,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+import numpy as np
+
 from diagnosis.report.compared_channels import Pair, by_valve, motion_of
 from diagnosis.report.rows import Columns, Group, Row, Trace
 from diagnosis.report.units import natural_unit, on_page
@@ -18,6 +20,8 @@ from diagnosis.results.machine_words import MachineWords
 from diagnosis.results.vocabulary import Kind
 from replay.faults import DECIDED, Side
 from replay.machine.quantities import OPENING
+
+_FINEST = 500  # stretches of a mission that are told apart
 
 
 def fault_rows(
@@ -68,7 +72,7 @@ def fault_rows(
     residual_unit = (unit, scale) if valve_read else (motion.unit, motion.scale)
     rows = [speed_or_angle]
     rows += [valve] if side == Side.ACTUATOR else []
-    rows += [row for s in side.sides for row in _side_rows(fault, s, residual_unit, limit, words)]
+    rows += [row for s in side.sides for row in _side_rows(fault, s, columns, residual_unit, limit, words)]
     rows += [psi_row(c, columns)] if kind == Kind.WHEEL and has_psi(c, columns) else []
     rows += [valve] if side != Side.ACTUATOR else []
     rows += _peer_row(c, kind, peers, columns, words)
@@ -76,7 +80,7 @@ def fault_rows(
 
 
 def course_rows(fault: IntervalRow, pair: Pair, columns: Columns, limit: float | None) -> tuple[Row, ...]:
-    """Rows of the small pictures of one fault: channel and reference, residual, probability that it is not healthy.
+    """Rows of the small pictures of one fault: channel and reference, residual, probability that it deviates.
 
     Parameters
     ----------
@@ -93,7 +97,7 @@ def course_rows(fault: IntervalRow, pair: Pair, columns: Columns, limit: float |
     rows = (
         Row("v", pair.title, pair.unit, (*reference, Trace(pair.measured, "measured", "measured", pair.scale))),
         residual_row(pair.evidence, pair.unit, pair.scale),
-        probability_row(pair.evidence, limit, limits=(-0.04, 1.04)),
+        probability_row(pair.evidence, limit, columns, limits=(-0.04, 1.04)),
     )
     return tuple(r for row in rows for r in row.shown(columns))
 
@@ -110,43 +114,68 @@ def residual_row(base: str, unit: str, scale: float, of: str = "") -> Row:
     )
 
 
-def probability_row(base: str, limit: float | None, of: str = "", limits: tuple[float, float] = (-0.03, 1.03)) -> Row:
-    """Probability that a side is not healthy, and the limit from which a fault is stated."""
+def probability_row(
+    base: str, limit: float | None, columns: Columns, of: str = "", limits: tuple[float, float] = (-0.03, 1.03)
+) -> Row:
+    """Probability that a side deviates, also by less than counts as a fault, and the limit from which a fault is stated."""
     return Row(
         f"probability{of}",
-        f"Probability that it is not healthy{of}",
+        f"Probability that it deviates{of}",
         "1",
-        (Trace(base + "probability", "not healthy", "measured"),),
+        (Trace(base + "probability", "at all, also by less than counts as a fault", "measured"),),
         level=limit,
         limits=limits,
+        unknown=unknown_stretches(base + "probability", columns),
     )
 
 
+def unknown_stretches(column: str, columns: Columns) -> tuple[tuple[float, float], ...]:
+    """First and last time [s] of the stretches in which a column has no value; those that nearly touch are one."""
+    if column not in columns or "t" not in columns:
+        return ()
+    t, gap = np.asarray(columns["t"], np.float64), ~np.isfinite(columns[column])
+    cut = np.flatnonzero(np.diff(np.concatenate(([False], gap, [False])).astype(np.int8)))
+    step = float(t[-1] - t[0]) / max(1, t.size - 1)
+    apart, out = max(step, float(t[-1] - t[0]) / _FINEST), list[tuple[float, float]]()
+    for a, b in zip(cut[::2], cut[1::2], strict=True):
+        start, stop = float(t[a]), float(t[b - 1]) + step
+        if out and start - out[-1][1] <= apart:
+            out[-1] = out[-1][0], stop
+        else:
+            out.append((start, stop))
+    return tuple((round(a, 4), round(b, 4)) for a, b in out)
+
+
 def _side_rows(
-    fault: IntervalRow, side: Side, residual_unit: tuple[str, float], limit: float | None, words: MachineWords
+    fault: IntervalRow,
+    side: Side,
+    columns: Columns,
+    residual_unit: tuple[str, float],
+    limit: float | None,
+    words: MachineWords,
 ) -> list[Row]:
-    """Residual, probability that the side is not healthy, ε̂, saturation term and mode probabilities of one side."""
+    """Residual, probability that the side deviates, ε̂, saturation term and mode probabilities of one side."""
     base = f"evidence.{fault['component']}.{side}."
     of = f" ({side})" if fault["side"] == Side.SENSOR_OR_ACTUATOR else ""
-    recorded = fault["sat"]["unit"] if fault["sat"] else ""
-    sat_unit, sat_scale = on_page(recorded or natural_unit(Kind(fault["kind"]), side, words), words)
+    sat_unit, sat_scale = on_page(natural_unit(Kind(fault["kind"]), side, words), words)
     return [
         residual_row(base, *residual_unit, of),
-        probability_row(base, limit, of),
+        probability_row(base, limit, columns, of),
         Row(
             f"epsilon{of}",
-            f"Loss ε̂{of}",
+            f"Loss of effectiveness ε̂{of}",
             "1",
-            (Trace(base + "epsilon", "estimate, 95 % band", "measured"),),
+            (Trace(base + "epsilon", "of the fault as stated, 95 % band; 0 where healthy", "measured"),),
             band=(base + "epsilon_low", base + "epsilon_high"),
             clip=(-1.0, 2.0),
+            unknown=unknown_stretches(base + "epsilon", columns),
         ),
         Row(
             f"sat{of}",
-            f"Saturation term ε̂·sat{of}",
+            f"Saturation term sat{of}",
             sat_unit,
-            (Trace(base + "delta_bar", "estimate, 95 % band", "measured", sat_scale),),
-            band=(base + "delta_bar_low", base + "delta_bar_high"),
+            (Trace(base + "sat", "mean of the fault as stated, 95 % band", "measured", sat_scale),),
+            band=(base + "sat_low", base + "sat_high"),
             band_scale=sat_scale,
         ),
         Row(

@@ -5,18 +5,17 @@ Which plots there are says `diagnosis.report.plot_rows`.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from diagnosis.results.document import IntervalRow
+from diagnosis.results.document import ReportDocument
+from diagnosis.results.stated_sizes import size_columns
 from replay.faults import Side
 
 Columns = Mapping[str, NDArray[np.floating]]
-
-_Z95 = 1.959964
 
 
 @dataclass(frozen=True)
@@ -31,7 +30,7 @@ class Trace:
         What it is called.
     role : str
         Part it plays, which gives its colour and dash: ``measured``, ``reference``, ``commanded``, ``expected``, ``replayed``,
-        ``applied``, ``peer``, ``right``, or ``mode-`` and a mode; see ``assets/plot.js``.
+        ``applied``, ``peer``, ``right``, or ``mode-`` and a mode; see ``assets/figure_looks.js``.
     scale : float
         Factor from the column's unit to the row's.
     right : bool
@@ -73,6 +72,8 @@ class Row:
         Title and unit of the axis on the right.
     component : str
         Component that the row is of, where a figure has several.
+    unknown : tuple[tuple[float, float], ...]
+        Stretches in which what the row shows cannot be known: first and last time [s].
     """
 
     key: str
@@ -87,6 +88,7 @@ class Row:
     clip: tuple[float, float] | None = None
     right: tuple[str, str] | None = None
     component: str = ""
+    unknown: tuple[tuple[float, float], ...] = ()
 
     def shown(self, columns: Columns) -> list[Row]:
         """The row with the curves that exist, or nothing; a band or threshold without its column is left out."""
@@ -113,24 +115,27 @@ class Group:
     rows: tuple[Row, ...]
 
 
-def derived(columns: Columns, faults: Sequence[IntervalRow]) -> dict[str, NDArray[np.floating]]:
-    """Columns with ε̂ = 1 − δ̂ and the 95 % bounds of ε̂ and of the saturation term added for the faults shown."""
-    result = dict(columns)
-    for fault in faults:
-        for side in Side(fault["side"]).sides:
-            base = f"evidence.{fault['component']}.{side}."
-            delta, bar = columns.get(base + "delta"), columns.get(base + "delta_bar")
-            if delta is not None and base + "epsilon" not in result:
-                result[base + "epsilon"] = 1.0 - delta
-                if (std := columns.get(base + "delta_std")) is not None:
-                    result[base + "epsilon_low"] = 1.0 - delta - _Z95 * std
-                    result[base + "epsilon_high"] = 1.0 - delta + _Z95 * std
-            if bar is not None and base + "delta_bar_low" not in result:
-                if (std := columns.get(base + "delta_bar_std")) is None:
-                    continue
-                result[base + "delta_bar_low"] = bar - _Z95 * std
-                result[base + "delta_bar_high"] = bar + _Z95 * std
-    return result
+def derived(
+    columns: Columns, report: ReportDocument, times: tuple[NDArray[np.floating], float] | None = None
+) -> dict[str, NDArray[np.floating]]:
+    """Columns with ε̂ and saturation terms of the parts with faults, as the document states them.
+
+    Parameters
+    ----------
+    columns : Columns
+        Columns by name.
+    report : ReportDocument
+        The document.
+    times : tuple[NDArray[np.floating], float] or None
+        Time of every row, and between samples [s]; None: by the column ``t``.
+    """
+    t: NDArray[np.floating] = columns["t"] if times is None and "t" in columns else np.empty(0)
+    step = float(t[-1] - t[0]) / (t.size - 1) if t.size > 1 else 0.0
+    if times is not None:
+        t, step = times
+    parts = {(f["component"], side.value) for f in report["intervals"] for side in Side(f["side"]).sides}
+    known = frozenset(p for p in parts if any(k.startswith(f"evidence.{p[0]}.{p[1]}.") for k in columns))
+    return {**columns, **size_columns(report, t, step, known)} if t.size else dict(columns)
 
 
 def row_json(row: Row, index: Mapping[str, int]) -> dict[str, object]:
@@ -155,6 +160,8 @@ def row_json(row: Row, index: Mapping[str, int]) -> dict[str, object]:
         data["limits"] = list(row.limits)
     if row.clip:
         data["clip"] = list(row.clip)
+    if row.unknown:
+        data["unknown"] = [list(stretch) for stretch in row.unknown]
     if row.component:
         data["component"] = row.component
     if row.right:

@@ -8,8 +8,9 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 from diagnosis.report.judged_parts import kind_of
+from diagnosis.results.clearing_rows import DetectabilityRow, DetectabilityTrace
 from diagnosis.results.detectability import Deviation
-from diagnosis.results.document import DetectabilityRow, DetectabilityTrace, ReportDocument
+from diagnosis.results.document import ReportDocument
 from diagnosis.results.machine_words import MachineWords, words_of
 from diagnosis.results.vocabulary import Kind
 from replay.faults import Side

@@ -9,6 +9,7 @@ from diagnosis.report.judged_parts import kind_of
 from diagnosis.report.rows import Group, Row
 from diagnosis.results.document import ReportDocument
 from diagnosis.results.machine_words import MachineWords, words_of
+from diagnosis.results.stated_sizes import SAT
 from diagnosis.results.vocabulary import Kind, Tier
 from replay.control.loop_columns import replayed_unit
 from replay.faults import Side
@@ -19,7 +20,7 @@ DEGREES = 180.0 / math.pi
 #: Leaf of the signal that tells what a component does.
 MOTION = {Kind.WHEEL: "v", Kind.STEER: "phi"}
 _COMPARED = ("residual", "threshold", "expected")
-_OF_THE_SIGNAL = ("delta_bar", "delta_bar_std")
+_OF_THE_SIGNAL = SAT
 _UNKNOWN = "unknown unit"
 _SIDES = {side.value for side in Side}
 

@@ -49,7 +49,7 @@ _OWN, _OTHERS = 4, 2  # holds of a channel that may be faults: of the one in que
 _LEAST_S = 1.0
 _AT_ONCE_S = 5e-3
 _DOUBT_S = 0.5  # around a spell that is judged no fault
-_HIDDEN = "a controller that holds the speed hides a weak drive, and what effort is healthy is not known where several drives move one body"
+_HIDDEN = "a controller that holds the speed hides a weak drive, and their healthy effort is not known"
 _ALONE = "a controller that holds the speed hides a weak drive; name its current, duty or torque as its command (`wheel.{name}.u`) to have it judged"
 _UNSEEN = "without its command or another {wheel} of its side only a speed that is frozen, wild or noisy shows"
 

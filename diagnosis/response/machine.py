@@ -65,7 +65,7 @@ def standstills(idle: Sequence[tuple[int, int]], dt: float) -> tuple[str, ...]:
     total, (start, stop) = sum(b - a for a, b in idle) * dt, max(idle, key=lambda s: s[1] - s[0])
     return (
         f"For {total:.1f} s all drives stood still together while they were commanded to move (longest {start * dt:.1f}–{stop * dt:.1f} s): "
-        "disabled, stopped by an emergency stop, or driven by another source of commands. No {wheel} is blamed for it.",
+        "disabled, stopped by an emergency stop, or driven by another source of commands; no {wheel} is blamed for it.",
     )
 
 
@@ -92,7 +92,7 @@ def unexplained(drives: Sequence[FollowerData], limits: Limits, dt: float) -> tu
         return ()
     return (
         f"The drives were commanded to {np.median(asked):.2g} {{speed_unit}} and made {np.median(made):.2g} {{speed_unit}} of it (medians), and "
-        "nothing relates the two: another source of commands, a wrong unit, a limit, or a machine that is held. No {wheel} is blamed for it.",
+        "nothing relates the two: another source of commands, a wrong unit, a limit, or a machine that is held; no {wheel} is blamed for it.",
     )
 
 

@@ -16,6 +16,7 @@ from diagnosis.results.result import Closeups, Epsilon, Hypothesis, Sat
 from diagnosis.results.vocabulary import Tier
 from replay.faults import FaultMode, Side, State
 
+_LEAST = 0.1  # ε̂ below which a varying saturation term is not told from it
 STATES: tuple[State, ...] = tuple(State)
 CODE = {state: np.int8(i) for i, state in enumerate(STATES)}
 
@@ -42,7 +43,10 @@ class Finding:
 
     def __post_init__(self) -> None:
         if self.epsilon is not None and self.mode is not FaultMode.OUTSIDE_TABLE:
-            object.__setattr__(self, "epsilon", self.epsilon.as_share())
+            known = self.epsilon.high > 0.0  # a fault of the tables that takes nothing away has no such size
+            object.__setattr__(self, "epsilon", self.epsilon.as_share() if known else None)
+        if self.sat is not None and self.mode.varying and (self.epsilon is None or self.epsilon.value < _LEAST):
+            object.__setattr__(self, "sat", None)  # ε·sat is known, but not what share of sat that is
         if self.sat is not None:
             object.__setattr__(self, "sat", self.sat.as_possible())
         for name in ("epsilon", "sat"):

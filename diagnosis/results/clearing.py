@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 
-from diagnosis.results.document import ClearingRow
+from diagnosis.results.clearing_rows import ClearingRow
 from diagnosis.results.machine_words import HYDRAULIC, MachineWords
 from diagnosis.results.vocabulary import Kind
 from replay.faults import Side
@@ -86,6 +86,9 @@ CHECK_WORDS: dict[Check, tuple[str, str]] = {
 }
 
 
+_BELOW = (Check.RESPONSE, Check.LASTING_RESPONSE)
+
+
 @dataclass(frozen=True)
 class Checked:
     """One check of one part.
@@ -137,7 +140,7 @@ class Checked:
             return ""
         words = self.words.part_words(self.kind, self.component, self.side)
         if self.worst is None:
-            return f"{words}: the mission does not show {self.asked}"
+            return f"{words}: this mission leaves the check “{self.asked}” open"
         two = self.check is Check.SECOND_MEASUREMENT
         said = self.words.fill(CHECK_WORDS[self.check][1]).format(
             part=words if two else self.component, value=self._value
@@ -147,6 +150,8 @@ class Checked:
     @property
     def _value(self) -> str:
         assert self.worst is not None
+        if self.check in _BELOW and self.worst > 1.0:
+            return "over 100"
         return size_words(self.check, self.worst).removesuffix(" %")
 
 

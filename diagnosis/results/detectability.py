@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import NamedTuple
 
-from diagnosis.results.document import DetectabilityRow, DetectabilityTable, DetectabilityTrace
+from diagnosis.results.clearing_rows import DetectabilityRow, DetectabilityTable, DetectabilityTrace
 from diagnosis.results.machine_words import MachineWords
 from diagnosis.results.vocabulary import Kind
 from replay.faults import Side

@@ -6,11 +6,12 @@ name ends in ``_ns``; speeds are m/s (of joints in the unit of `MachineRow.words
 
 from __future__ import annotations
 
-from typing import Annotated, Final, Literal, NotRequired, TypedDict
+from typing import Final, Literal, NotRequired, TypedDict
 
-from msgspec import Meta
-
+from diagnosis.results.clearing_rows import ClearingRow, DetectabilityTable
 from diagnosis.results.comparison_document import PreviousRow
+from diagnosis.results.document_numbers import Probability, Seconds
+from diagnosis.results.loop_rows import MetricsRow
 from diagnosis.results.size_rows import EpsilonRow, SatRow
 from diagnosis.results.vocabulary import Kind, Severity, Tier, Verdict
 from diagnosis.results.words_row import Worded
@@ -19,11 +20,6 @@ from replay.faults import FaultMode, Side, State
 SCHEMA: Final = "mfhca-report/1"
 #: Source of a machine's settings where no machine file was given.
 PAPER_DEFAULTS: Final = "paper defaults"
-
-#: A probability, but for rounding.
-Probability = Annotated[float, Meta(ge=-1e-6, le=1.0 + 1e-6)]
-#: A time or a length of time that a recording can have [s].
-Seconds = Annotated[float, Meta(ge=-1e9, le=1e9)]
 
 
 class ToolRow(TypedDict):
@@ -122,8 +118,18 @@ class ActionRow(TypedDict):
     severity: Severity
 
 
+class ToClearRow(TypedDict):
+    """What keeps the machine from being cleared, in a sentence, and what would clear it, to follow *to clear it*."""
+
+    reason: str
+    act: str
+
+
 class VerdictRow(TypedDict):
-    """Whether the machine may go out, and why not; `scope` has why what was judged is not the whole mission."""
+    """Whether the machine may go out, and why not; `scope` has why what was judged is not the whole mission.
+
+    `to_clear` has each reason against *ready* beside the faults; results of earlier versions lack it.
+    """
 
     status: Verdict
     cleared: bool
@@ -133,6 +139,7 @@ class VerdictRow(TypedDict):
     scope: list[str]
     caveats: list[str]
     actions: list[ActionRow]
+    to_clear: NotRequired[list[ToClearRow]]
 
 
 class HypothesisRow(TypedDict):
@@ -208,95 +215,6 @@ class LossRow(TypedDict):
     epsilon: EpsilonRow
     seconds: float
     relative: bool
-
-
-class ClearingRow(TypedDict):
-    """One check behind an all-clear: a fault of the size `LimitsRow.clear_at` would have been beyond the limit for three seconds.
-
-    `worst` is null where the mission does not show it; `start_s` and `stop_s` are null where it holds for the whole mission.
-    `shows` is the smallest loss that the mission would have shown with 95 %, for three seconds, or lasting where the check is of
-    the whole mission. `text` says why the part is not cleared, and is empty where it is.
-    """
-
-    component: str
-    side: str
-    check: str
-    asked: str
-    worst: float | None
-    limit: float
-    start_s: Seconds | None
-    stop_s: Seconds | None
-    shows: float | None
-    passed: bool
-    text: str
-
-
-class DetectabilityRow(TypedDict):
-    """How large a fault of one side of a part must be to be found in this mission.
-
-    `deviation` is a row of the fault tables, or excess, offset, delay. A fault of `for_s` seconds, null for the whole mission,
-    begins anywhere while the part is driven: `size` is the smallest that is found at 95 % of `places`, null where none is. `unit`
-    is ``1`` for shares, m/s, rad or s, and empty where there is no size. `share` is the share of the places at which a loss or
-    excess of `LimitsRow.clear_at`, a signal that is lost, or one that stays at its last value is found. `told` is the side it is
-    ascribed to.
-    """
-
-    component: str
-    side: str
-    deviation: str
-    for_s: float | None
-    size: float | None
-    unit: str
-    share: float | None
-    places: int
-    told: str
-
-
-class DetectabilityTrace(TypedDict):
-    """The smallest loss of ten seconds that is found, by when it begins; null where none is."""
-
-    component: str
-    side: str
-    start_s: list[float]
-    loss: list[float | None]
-
-
-class DetectabilityTable(TypedDict):
-    """What a mission would have shown."""
-
-    rows: list[DetectabilityRow]
-    traces: list[DetectabilityTrace]
-
-
-class MeanRow(TypedDict):
-    """Mean of the whole mission and of driving."""
-
-    mission: float | None
-    driving: float | None
-
-
-class LoopRow(TypedDict):
-    """Tracking error |e| [m/s] and control effort |u_a| [fraction of full opening]."""
-
-    tracking_error: MeanRow
-    control_effort: MeanRow
-
-
-class PaperRow(TypedDict):
-    """One line of the paper's table of controllers."""
-
-    controller: str
-    tracking_error: float
-    control_effort: float
-    parameters: int
-
-
-class MetricsRow(TypedDict):
-    """Figures of the control loop beside the paper's."""
-
-    wheels: dict[str, LoopRow]
-    average: LoopRow
-    paper: list[PaperRow]
 
 
 class SignalRow(TypedDict):

@@ -19,23 +19,35 @@ class MachineEvent:
         One sentence, or two.
     doubt : str
         Why a mission with faults to watch is not cleared; continues "not cleared: …".
+    act : str
+        What to do before a mission may be judged again.
     """
 
     title: str
     text: str
     doubt: str
+    act: str
 
     def worded(self, words: MachineWords) -> MachineEvent:
         """With the machine's own words."""
-        return replace(self, title=words.fill(self.title), text=words.fill(self.text), doubt=words.fill(self.doubt))
+        return replace(
+            self,
+            title=words.fill(self.title),
+            text=words.fill(self.text),
+            doubt=words.fill(self.doubt),
+            act=words.fill(self.act),
+        )
 
 
 def not_following(text: str) -> MachineEvent:
     """Commands went on, and no wheel, or none that nobody else explains, followed them."""
     title = "The machine did not follow its commands"
-    return MachineEvent(title, text, "the machine did not follow its commands for a time")
+    doubt = "the machine did not follow its commands for a time"
+    return MachineEvent(title, text, doubt, "enable the drives, release the emergency stop, and record a mission again")
 
 
 def swinging(text: str) -> MachineEvent:
     """All wheels swing about their expected speeds together."""
-    return MachineEvent("The {wheels} swing together", text, "the {wheels} swing together for a time")
+    doubt = "the {wheels} swing together for a time"
+    act = "lower the gains of the speed loop, inspect the supply of the drives, and record a mission again"
+    return MachineEvent("The {wheels} swing together", text, doubt, act)

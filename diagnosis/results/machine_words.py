@@ -12,6 +12,7 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
+from diagnosis.results.plain_numbers import plain
 from diagnosis.results.vocabulary import Kind, Tier
 from diagnosis.results.words_row import Worded, WordsRow
 from replay.faults import Side
@@ -84,6 +85,11 @@ class MachineWords:
         return "driving" if self.part == "wheel" else "motion"
 
     @property
+    def parts_moved(self) -> str:
+        """What somebody moves to have parts judged, to follow *move*: ``the machine``, or ``the joints``."""
+        return "the machine" if self.part == "wheel" else "the joints"
+
+    @property
     def while_moving(self) -> str:
         """The same, to follow *while*."""
         return "driving" if self.part == "wheel" else "moving"
@@ -126,8 +132,8 @@ class MachineWords:
     def amount(self, value: float, unit: str = "m/s", digits: int = 3) -> str:
         """A value with its unit, to follow a verb: ``0.31 m/s``, ``2.1 % of opening``."""
         if unit == OPENING:
-            return f"{100 * value:.{digits}g}{self.percent}"
-        return f"{value:.{digits}g} {self.unit(unit)}".rstrip()
+            return f"{plain(100 * value, digits)}{self.percent}"
+        return f"{plain(value, digits)} {self.unit(unit)}".rstrip()
 
     def fill(self, text: str) -> str:
         """A sentence of the tool's own with words in braces, such as ``{wheel}`` and ``{valve}``, filled in."""

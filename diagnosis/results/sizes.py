@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+from diagnosis.results.plain_numbers import plain
 from replay.machine.quantities import OPENING
 
 _MOST, _LEAST = 1e6, 1.5
@@ -22,8 +23,8 @@ def amount(value: float, unit: str, digits: int = 3) -> str:
         Significant digits.
     """
     if unit == OPENING:
-        return f"{100 * value:.{digits}g}{{percent}}"
-    return f"{value:.{digits}g} {'{speed_unit}' if unit == 'm/s' else unit}".rstrip()
+        return f"{plain(100 * value, digits)}{{percent}}"
+    return f"{plain(value, digits)} {'{speed_unit}' if unit == 'm/s' else unit}".rstrip()
 
 
 def not_reported(below: int, name: str) -> str:

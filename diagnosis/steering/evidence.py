@@ -21,8 +21,8 @@ Array = NDArray[np.float64]
 def evidence_columns(
     inputs: AxleInputs, axle: AxleFilter, path: SteeringPath, findings: Sequence[Finding]
 ) -> dict[Side, Pictured]:
-    """Residual, threshold, expected angle, δ̂ and δ̄ of both sides, and every sample of them around the findings."""
-    y, gain = inputs.angle, axle.model.plant.gain
+    """Residual, threshold and expected angle of both sides, and every sample of them around the findings."""
+    y = inputs.angle
     mean, std = path.mean, np.sqrt(np.maximum(path.variance, 0.0))
     step = steps_of(findings, y.size, inputs.timeline.dt)
 
@@ -37,17 +37,8 @@ def evidence_columns(
         yield "threshold", held(3 * std[:, 0])
         yield "expected", held(mean[:, 0])
 
-    def gains(i: int, scale: float) -> Iterator[tuple[str, Array]]:
-        yield "delta", held(mean[:, i])
-        yield "delta_std", held(std[:, i])
-        yield "delta_bar", held(mean[:, i + 1] / scale)
-        yield "delta_bar_std", held(std[:, i + 1] / scale)
-
     both = Pictured.of(step, shared())
-    return {
-        Side.SENSOR: both | Pictured.of(step, gains(4, 1.0)),
-        Side.ACTUATOR: both | Pictured.of(step, gains(2, gain)),
-    }
+    return {Side.SENSOR: both, Side.ACTUATOR: both}
 
 
 def path_angle(axle: AxleFilter, path: SteeringPath, timeline: Timeline) -> Array:

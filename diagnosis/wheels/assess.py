@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from diagnosis.channels.sample_status import PAIR
-from diagnosis.results.assessment import Assessment, Finding
+from diagnosis.results.assessment import Assessment
 from diagnosis.results.evidence_columns import Pictured, steps_of
 from diagnosis.results.loss import Loss
 from diagnosis.results.vocabulary import Tier
@@ -125,7 +125,6 @@ def _path(
         spread=expected.spread,
         healthy={side: track.healthy(side, n) for side in segments},
         raised=done.best[:, i] > ODD,
-        fault=done.fault[:, i],
         others=sum(w is not None for w in model.wheels) - 1,
     )
 
@@ -151,7 +150,8 @@ def _assessments(
     out = []
     for side in (Side.SENSOR, Side.ACTUATOR):
         faults, codes = found.of(side), states.codes[side]
-        pictured = shared | Pictured.of(step, [("delta", _delta(faults, side, path.y.size))])
+        doubted: Array = np.asarray(per_sample(1.0 - path.healthy[side], path.width, path.y.size), np.float64)
+        pictured = shared | Pictured.of(step, [("probability", doubted)])
         out.append(
             Assessment(
                 states=codes,
@@ -180,7 +180,6 @@ def _series(path: WheelPath, status: NDArray[np.int8]) -> Iterator[tuple[str, Ar
     del residual
     yield "threshold", held(3 * np.sqrt(path.spread + path.model.noise**2))
     yield "expected", held(path.expected)
-    yield "probability", held(path.fault)
 
 
 def _note(path: WheelPath) -> str:
@@ -196,12 +195,3 @@ def _note(path: WheelPath) -> str:
             else f"tyres that hold up to {model.grip_most:.2g} {{speed_unit}} of load."
         )
     )
-
-
-def _delta(faults: list[Finding], side: Side, size: int) -> Array:
-    """Estimated gain of every sample: 1 outside of faults."""
-    delta = np.ones(size)
-    for f in faults:
-        if f.epsilon is not None and f.side is side:
-            delta[f.start : f.stop] = 1 - f.epsilon.value
-    return delta

@@ -69,8 +69,6 @@ class WheelPath:
         Probability that a side is healthy.
     raised : NDArray[np.bool_], shape (blocks,)
         Where a causal reading holds a fault for most probable.
-    fault : Array, shape (blocks,)
-        Probability by the same that the wheel is not healthy.
     others : int
         Other wheels with a model.
     """
@@ -86,7 +84,6 @@ class WheelPath:
     spread: Array
     healthy: Mapping[Side, Array]
     raised: NDArray[np.bool_]
-    fault: Array
     others: int
 
 

@@ -26,7 +26,7 @@ def test_first_fault_shows_what_decided(open_page: OPEN) -> None:
     expect(article.locator(".edges svg.panel")).to_have_count(2)
     figure = article.locator("#figure")
     figure.locator(".main-svg").first.wait_for()
-    expect(figure).to_contain_text("Probability that it is not healthy")
+    expect(figure).to_contain_text("Probability that it deviates")
     expect(figure).to_contain_text("limit 0.9")
     expect(article.locator(".course")).to_be_hidden()
 

@@ -33,7 +33,7 @@ def test_sentences_say_why_now_and_lead_to_their_time(open_page: OPEN) -> None:
     page = open_page("decided", "#fault=F1&t=27,39")
     page.locator("#scrub").fill("36.5")
     first = page.locator(
-        "#events button", has_text="FR speed sensor: the probability that it is not healthy passes 90 %"
+        "#events button", has_text="FR speed sensor: the probability that it deviates passes 90 %"
     ).first
     expect(first).to_contain_text(
         re.compile(r"^30\.\d{3} s · FR .*stuck \d+ %; the residual is [\d.]+ times its threshold\.$")

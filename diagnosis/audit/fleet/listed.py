@@ -7,13 +7,11 @@ from dataclasses import dataclass
 
 from diagnosis.audit.fleet.fault_types import FleetFaultRow
 from diagnosis.audit.fleet.fleet_types import FleetDocument, MachineRow
+from diagnosis.audit.fleet.leave import GONE, lists_of
 from diagnosis.audit.fleet.page.rows import fault_words
 from diagnosis.audit.fleet.words import open_words
 from diagnosis.results.machine_words import words_of
 from diagnosis.results.vocabulary import Verdict
-
-#: Statuses of faults that do not stand.
-GONE = ("past", "repaired")
 
 
 @dataclass(frozen=True)
@@ -32,6 +30,8 @@ class ListedMachine:
         Its faults that stand.
     with_faults, judged : int
         Missions with faults, and missions that were judged.
+    leave, reason, mission : str
+        Whether it may go out, why, and the name of the mission that says so or blocks it.
     """
 
     label: str
@@ -40,6 +40,9 @@ class ListedMachine:
     faults: tuple[str, ...]
     with_faults: int
     judged: int
+    leave: str = ""
+    reason: str = ""
+    mission: str = ""
 
 
 def machine_words(m: MachineRow, standing: Sequence[FleetFaultRow], approaching: bool) -> str:
@@ -65,7 +68,7 @@ def machine_words(m: MachineRow, standing: Sequence[FleetFaultRow], approaching:
 def listed_machines(document: FleetDocument) -> tuple[ListedMachine, ...]:
     """Machines of a fleet's document in its order, worst first."""
     near = {t["machine"] for t in document["trends"] if t["approaching"]}
-    out = []
+    out, lists = [], lists_of(document)
     for k, m in enumerate(document["machines"]):
         standing = [f for f in document["faults"] if f["machine"] == k and f["status"] not in GONE]
         out.append(
@@ -76,6 +79,9 @@ def listed_machines(document: FleetDocument) -> tuple[ListedMachine, ...]:
                 tuple(fault_words(f, words_of(m)) + open_words(f["open"], f["clean"], f["needed"]) for f in standing),
                 m["with_faults"],
                 len(m["missions"]) + len(m["undated"]),
+                lists[k].leave.value,
+                lists[k].reason,
+                lists[k].name,
             )
         )
     return tuple(out)

@@ -12,10 +12,8 @@ const Lanes = {
     if (expected.length && measured.length && expected[0].unit === measured[0].unit) rows.push({ key: "value", title: "Expected and measured", traces: [...expected, ...measured] });
     const residual = trace(`${base}residual`, "residual", "measured");
     if (residual.length) rows.push({ key: "residual", title: "Residual", traces: residual, threshold: names.get(`${base}threshold`), bandScale: residual[0].k });
-    const probability = trace(`${base}probability`, "not healthy", "measured");
-    if (probability.length) rows.push({ key: "probability", title: "Probability that it is not healthy", traces: probability, limits: [-0.03, 1.03] });
-    const loss = trace(`${base}delta`, "gain that is left δ̂", "measured");
-    if (loss.length) rows.push({ key: "delta", title: "Gain that is left δ̂ = 1 − ε̂", traces: loss, clip: [-1, 2] });
+    const probability = trace(`${base}probability`, "at all, also by less than counts as a fault", "measured");
+    if (probability.length) rows.push({ key: "probability", title: "Probability that it deviates", traces: probability, limits: [-0.03, 1.03] });
     return rows.map((r) => ({ ...r, unit: r.traces[0].unit, component }));
   },
 

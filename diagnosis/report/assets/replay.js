@@ -105,8 +105,8 @@ class Replay {
       for (const s of Replay.stretches(d, (i) => d.y[i] >= limit).slice(0, Replay.MOST)) {
         const t = Math.min(s.start + d.dt, s.stop), shares = (await Promise.all(part.modes.map(async ({ m }) => ({ m, p: (await value(`p_${m}`, t)).v })))).filter((x) => x.m !== "healthy" && Number.isFinite(x.p)).sort((a, b) => b.p - a.p), [now, top] = [await value("residual", t), await value("threshold", t)];
         const ratio = now && top && top.v > 0 && Math.abs(now.v) > top.v ? `; the residual is ${Now.number(+(Math.abs(now.v) / top.v).toPrecision(2))} times its threshold` : "";
-        out.push({ t: s.start, sure: 1, words: `${clock(s.start)} · ${part.words}: the probability that it is not healthy passes ${Now.number(100 * limit)} %${shares.length ? `, ${words[shares[0].m]} ${Math.round(100 * shares[0].p)} %` : ""}${ratio}.` });
-        out.push({ t: s.stop, sure: 1, words: `${clock(s.stop)} · ${part.words}: the probability that it is not healthy falls below ${Now.number(100 * limit)} % again.` });
+        out.push({ t: s.start, sure: 1, words: `${clock(s.start)} · ${part.words}: the probability that it deviates passes ${Now.number(100 * limit)} %${shares.length ? `, ${words[shares[0].m]} ${Math.round(100 * shares[0].p)} %` : ""}${ratio}.` });
+        out.push({ t: s.stop, sure: 1, words: `${clock(s.stop)} · ${part.words}: the probability that it deviates falls below ${Now.number(100 * limit)} % again.` });
       }
     }
     return out;

@@ -110,7 +110,7 @@ def test_closeups_stand_for_the_extremes_around_them(result: mfhca.Diagnosis) ->
 def test_colours_and_styles_are_the_pages(result: mfhca.Diagnosis) -> None:
     css = (ROOT / "diagnosis" / "pages" / "style.css").read_text(encoding="utf-8").split("[data-theme=dark]")[0]
     assert {name: f"#{re.search(rf'--{name}: #([0-9a-f]+);', css)[1]}" for name in COLOURS} == COLOURS  # type: ignore[index]
-    script = (ROOT / "diagnosis" / "report" / "assets" / "plot.js").read_text(encoding="utf-8")
+    script = (ROOT / "diagnosis" / "report" / "assets" / "figure_looks.js").read_text(encoding="utf-8")
     for role, (colour, width, dash) in STYLES.items():
         drawn = re.search(rf'{role}: {{ colour: "([\w-]+)", width: ([\d.]+)(?:, dash: "(\w+)")?', script)
         assert drawn is not None

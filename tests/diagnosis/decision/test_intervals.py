@@ -12,6 +12,7 @@ from diagnosis.decision.wording import fault_words
 from diagnosis.results.assessment import unassessed
 from diagnosis.results.machine_words import HYDRAULIC
 from diagnosis.results.result import Hypothesis
+from diagnosis.results.vocabulary import Tier
 from replay.faults import FaultMode, Side, State
 from tests.diagnosis.decision.findings import MACHINE, STEP, N, assessed, finding, machine
 
@@ -75,3 +76,12 @@ def test_a_fault_without_a_majority_is_called_by_its_candidates() -> None:
     part = replace(finding(Side.ACTUATOR, FaultMode.INEFFICIENT), hypotheses=tuple(Hypothesis(*row) for row in rows))
     (fault,) = intervals_of({("FR", "actuator"): assessed(part)}, MACHINE, HYDRAULIC, 0, STEP)
     assert fault_words(fault) == "faulty, kind unclear (inefficient or stuck)"
+
+
+def test_bounds_of_a_loss_by_a_wheels_model_allow_for_the_model() -> None:
+    direct = finding(Side.SENSOR, FaultMode.INEFFICIENT, epsilon=0.4)
+    for tier, bounds in ((Tier.DIRECT, (0.39, 0.41)), (Tier.MODEL, (0.1, 0.7))):
+        parts = machine(FR_sensor=assessed(replace(direct, tier=tier)))
+        (got,) = intervals_of(parts, MACHINE, HYDRAULIC, 0, STEP)
+        assert got.epsilon is not None
+        assert (got.epsilon.low, got.epsilon.high) == pytest.approx(bounds)

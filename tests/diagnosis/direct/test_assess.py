@@ -295,7 +295,7 @@ def test_evidence_columns() -> None:
     assessment = judged(Side.SENSOR, l4(0.45, 0.0), 1)
     columns = assessment.columns
     assert {c: x.shape for c, x in columns.items()} == dict.fromkeys(columns, (N,))
-    assert {"residual", "threshold", "expected", "delta", "delta_std", "delta_bar", "delta_bar_std"} <= set(columns)
+    assert {"residual", "threshold", "expected"} <= set(columns)
     total = sum(columns[f"p_{row}"] for row in ROWS)
     assert np.allclose(total, 1.0)
     assert np.median(columns["p_inefficient"][START + 100 : STOP]) > 0.99

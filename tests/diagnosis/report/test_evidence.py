@@ -11,7 +11,7 @@ def test_panels_follow_the_columns() -> None:
     assert [p.title for p in found["F1"].course] == ["Wheel speed", "Residual"]
     columns["evidence.FR.sensor.probability"] = 1.0 - columns["evidence.FR.sensor.p_healthy"]
     found = evidence_of(report, columns, (0.0, 0.01))
-    assert [p.title for p in found["F1"].course][2:] == ["Probability that it is not healthy"]
+    assert [p.title for p in found["F1"].course][2:] == ["Probability that it deviates"]
     assert "limit 0.9" in found["F1"].course[2].picture
     assert [p.title for p in found["F4"].course][:1] == ["Steering angle"]
     assert [bool(p.picture) for p in found["F4"].edges] == [True, True]

@@ -187,8 +187,8 @@ def test_verdict_words(status: Verdict) -> None:
 
 def test_large_mission_keeps_to_the_size() -> None:
     report, columns = samples.five_faults(600.0, 200.0)
-    assert len(build_page(report, columns)) > 4.5e6
-    assert len(build_page(report, columns, max_size_mb=4.0)) < 4.2e6
+    assert len(build_page(report, columns)) > 2.6e6
+    assert len(build_page(report, columns, max_size_mb=2.4)) < 2.5e6
 
 
 def test_columns_must_fit_the_time_axis() -> None:

@@ -33,7 +33,7 @@ def test_the_most_severe_faults_in_the_order_given() -> None:
 def test_faults_of_one_part_share_their_rows() -> None:
     report, columns = samples.five_faults()
     faults = [*report["intervals"], {**report["intervals"][0], "id": "F9"}]
-    figures = figures_of(faults, report["machine"], derived(columns, faults), 0.9)
+    figures = figures_of(faults, report["machine"], derived(columns, report), 0.9)
     assert figures["F1"] is figures["F9"]
     assert figures["F1"] is not figures["F2"]
 

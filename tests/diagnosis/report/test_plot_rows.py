@@ -14,7 +14,7 @@ WHEELS = ["FR", "FL", "RR", "RL"]
 def test_rows_of_a_sensor_fault() -> None:
     report, columns = samples.five_faults()
     fault = report["intervals"][0]
-    rows = fault_rows(fault, WHEELS, derived(columns, [fault]), HYDRAULIC)
+    rows = fault_rows(fault, WHEELS, derived(columns, report), HYDRAULIC)
     assert [r.key for r in rows] == ["v", "residual", "epsilon", "sat", "modes", "psi", "u", "peers"]
     assert [t.role for t in rows[0].traces] == ["commanded", "reference", "expected", "measured"]
     assert all(r.unit for r in rows)
@@ -23,7 +23,7 @@ def test_rows_of_a_sensor_fault() -> None:
 def test_steering_is_shown_in_degrees() -> None:
     report, columns = samples.five_faults()
     fault = report["intervals"][3]
-    rows = fault_rows(fault, ["front", "rear"], derived(columns, [fault]), HYDRAULIC)
+    rows = fault_rows(fault, ["front", "rear"], derived(columns, report), HYDRAULIC)
     assert rows[0].unit == "°"
     assert rows[0].traces[-1].scale == 180 / np.pi
 
@@ -31,7 +31,7 @@ def test_steering_is_shown_in_degrees() -> None:
 def test_directly_measured_valve_is_compared_with_its_command() -> None:
     report, columns = samples.five_faults()
     fault = {**report["intervals"][1], "tier": "direct"}
-    rows = {r.key: r for r in fault_rows(fault, WHEELS, derived(columns, [fault]), HYDRAULIC)}
+    rows = {r.key: r for r in fault_rows(fault, WHEELS, derived(columns, report), HYDRAULIC)}
     assert "expected" in [t.role for t in rows["u"].traces]
     assert "expected" not in [t.role for t in rows["v"].traces]
     assert rows["residual"].unit == "% of opening"
@@ -60,5 +60,5 @@ def test_both_figures_draw_the_same_residual() -> None:
     fault = report["intervals"][3]
     pair = pair_of(fault, columns, HYDRAULIC)
     assert pair is not None
-    linked = {r.key: r for r in fault_rows(fault, ["front", "rear"], derived(columns, [fault]), HYDRAULIC)}
+    linked = {r.key: r for r in fault_rows(fault, ["front", "rear"], derived(columns, report), HYDRAULIC)}
     assert course_rows(fault, pair, columns, None)[1] == linked["residual"]

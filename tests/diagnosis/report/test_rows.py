@@ -10,13 +10,15 @@ ROW = Row(
 )
 
 
-def test_loss_and_its_bounds() -> None:
-    columns = {"evidence.FR.sensor.delta": np.array([0.7]), "evidence.FR.sensor.delta_std": np.array([0.1])}
-    result = derived(columns, [samples.fault()])
-    np.testing.assert_allclose(result["evidence.FR.sensor.epsilon"], 0.3)
-    np.testing.assert_allclose(result["evidence.FR.sensor.epsilon_low"], 0.3 - 0.1959964)
-    np.testing.assert_allclose(result["evidence.FR.sensor.epsilon_high"], 0.3 + 0.1959964)
-    assert set(columns) == {"evidence.FR.sensor.delta", "evidence.FR.sensor.delta_std"}
+def test_loss_and_its_bounds_are_those_of_the_fault() -> None:
+    report, columns = samples.five_faults()
+    shown = derived(columns, report)
+    for fault in report["intervals"]:
+        inside = (columns["t"] >= fault["start_s"]) & (columns["t"] < fault["stop_s"])
+        base = f"evidence.{fault['component']}.{fault['side']}."
+        for leaf, key in (("epsilon", "value"), ("epsilon_low", "low"), ("epsilon_high", "high")):
+            np.testing.assert_allclose(shown[base + leaf][inside], fault["epsilon"][key], rtol=1e-6)
+    assert not any(name.endswith("epsilon") for name in columns)
 
 
 def test_what_does_not_exist_is_left_out() -> None:

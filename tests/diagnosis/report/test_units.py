@@ -14,7 +14,7 @@ from tests import report_samples as samples
 
 def test_units_of_columns_with_and_without_a_figure() -> None:
     report, columns = samples.five_faults()
-    shown = derived(columns, report["intervals"])
+    shown = derived(columns, report)
     figures = figures_of(report["intervals"], report["machine"], shown, None)
     groups = loop_groups(report["machine"]["wheels"], report["machine"]["axles"], shown, HYDRAULIC)
     assert report["coverage"]
@@ -30,7 +30,7 @@ def test_units_of_columns_with_and_without_a_figure() -> None:
         "evidence.FR.actuator.expected",
         "evidence.RL.actuator.expected",
         "evidence.rear.actuator.threshold",
-        "evidence.rear.actuator.delta_bar",
+        "evidence.rear.actuator.sat",
         "path.x",
         "made.up",
     ]

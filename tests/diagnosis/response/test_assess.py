@@ -90,7 +90,7 @@ def test_a_machine_that_stands_while_it_is_commanded_blames_no_wheel() -> None:
     j = judged(measured, asked, body)
     assert findings(j) == []
     assert len(j.events) == 1
-    assert "No {wheel} is blamed" in j.events[0]
+    assert "no {wheel} is blamed" in j.events[0]
     assert all(j.parts[w][0].states[stop.start + 100] != CODE[State.HEALTHY] for w in WHEELS)
 
 

@@ -51,7 +51,6 @@ def found(*segments: Weighed, y: Array | None = None, healthy: dict[Side, Array]
         spread=np.full(BLOCKS, 1e-4),
         healthy=sure | (healthy or {}),
         raised=np.zeros(BLOCKS, np.bool_),
-        fault=np.zeros(BLOCKS),
         others=3,
     )
     return findings_of(path, Limits())

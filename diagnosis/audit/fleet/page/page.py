@@ -18,7 +18,8 @@ from markupsafe import Markup
 
 from diagnosis.audit.fleet.fault_types import FleetFaultRow
 from diagnosis.audit.fleet.fleet_types import AuditRow, CountsRow, FleetDocument, MachineRow
-from diagnosis.audit.fleet.listed import GONE, machine_words
+from diagnosis.audit.fleet.leave import GONE, Leave, Left, lists_of
+from diagnosis.audit.fleet.listed import machine_words
 from diagnosis.audit.fleet.page import rows
 from diagnosis.audit.fleet.page.changes import changes_of
 from diagnosis.audit.fleet.page.matrix import matrix
@@ -95,6 +96,7 @@ def build_fleet_page(found: FleetDocument) -> str:
         "audit": _audit(document["audit"]),
         "kpis": _kpis(document),
         "baseline": changes_of(document["baseline"], {m["label"]: words_of(m) for m in document["machines"]}),
+        "leave": _leave(lists_of(found), document),
         "strip": rows.STRIP,
         "machines": [_machine(k, m, document, standing[k], own[k]) for k, m in enumerate(document["machines"])],
         "faults": [_fault(f, document, directions) for f in present[:_FAULTS]],
@@ -103,6 +105,7 @@ def build_fleet_page(found: FleetDocument) -> str:
         "past_count": len(past),
         "trends": [course(t, document["machines"], _UNITS[axis]) for t in drawn],
         "quiet": len(trends) - len(drawn),
+        "brief": sum(t["forecast"]["state"] == "not_known" for t in trends if all(t is not d for d in drawn)),
         "crowded": len(drawn) == MOST,
         "matrix": matrix(document["machines"]),
         "groups": [(*g, len(document["missions"]) <= _OPEN_ROWS) for g in rows.groups(document)],
@@ -112,6 +115,28 @@ def build_fleet_page(found: FleetDocument) -> str:
         "axis": {"hours": "driving hours of the audited missions", "days": "days"}[axis],
     }
     return _environment().get_template("fleet.html.j2").render(context)
+
+
+def _leave(lists: Sequence[Left], document: ShownDocument) -> list[Context]:
+    """The three lists, those that keep machines back first; the mission's file where it has no name of its own."""
+    symbols = {Leave.MUST_NOT: Verdict.STOP, Leave.NOT_KNOWN: Verdict.NOT_ASSESSED, Leave.MAY: Verdict.READY}
+    out: list[Context] = []
+    for leave in Leave:
+        rows_ = [
+            {
+                "label": document["machines"][x.machine]["label"],
+                "group": x.machine,
+                "reason": labels.visible(x.reason),
+                "name": "" if x.mission is None else document["missions"][x.mission]["name"],
+                "files": [] if x.mission is None else document["missions"][x.mission]["files"][:2],
+                "address": "" if x.mission is None else document["missions"][x.mission]["address"],
+            }
+            for x in lists
+            if x.leave is leave
+        ]
+        words = leave.value[:1].upper() + leave.value[1:]
+        out.append({"symbol": symbols[leave].symbol, "words": words, "rows": rows_})
+    return out
 
 
 def _by_machine(faults: Sequence[FleetFaultRow]) -> dict[int, list[FleetFaultRow]]:
@@ -245,10 +270,10 @@ def _machine(
         "with_faults": m["with_faults"],
         "judged": judged,
         "trend": sparkline(leading) if leading else "",
-        "trend_words": f"{words_of(m).part_words(leading['kind'], leading['component'], leading['side'])}: {level_words(leading, line)}"
+        "trend_words": f"{words_of(m).part_words(leading['kind'], leading['component'], leading['side'])}: {level_words(leading)}"
         if leading and line
         else "",
-        "level": line["level"]["value"] if line else -1.0,
+        "level": leading["points"][-1][2] if leading and line else -1.0,
         "driven": _hours(m["driving_s"]),
         "driving_s": m["driving_s"],
         "decided": "–" if m["decided"] is None else f"{100 * m['decided']:.0f} %",

@@ -7,8 +7,8 @@ from collections.abc import Sequence
 from diagnosis.audit.fleet.fleet_types import MachineRow
 from diagnosis.audit.fleet.page.shown import Context
 from diagnosis.audit.fleet.page.svg import trend_picture
-from diagnosis.audit.fleet.trend_types import LineRow, TrendRow
-from diagnosis.audit.fleet.words import count
+from diagnosis.audit.fleet.trend_types import TrendRow
+from diagnosis.audit.fleet.words import count, round_to
 from diagnosis.results.machine_words import words_of
 
 MOST = 48
@@ -22,12 +22,17 @@ def interest(t: TrendRow) -> tuple[bool, float, float]:
     return above or t["approaching"], level if above else -(likely or 0.0) if t["approaching"] else 0.0, level
 
 
-def level_words(t: TrendRow, line: LineRow) -> str:
-    """Loss that the line of a trend gives for now, and where it goes."""
-    level = line["level"]
-    return f"ε̂ {level['value']:.2f}".replace("-", "−") + (
+def level_words(t: TrendRow) -> str:
+    """Loss of the last mission, as its report has it, and where the losses go."""
+    return f"ε̂ {t['points'][-1][2]:.2f} in its last mission".replace("-", "−") + (
         f", {t['direction']}" if t["direction"] != "not_known" else ""
     )
+
+
+def _between(t: TrendRow) -> float:
+    """Mean time between missions of a trend, in the unit of its axis."""
+    at = [point[1] for point in t["points"]]
+    return (max(at) - min(at)) / max(1, len(at) - 1)
 
 
 def chosen(trends: Sequence[TrendRow]) -> list[TrendRow]:
@@ -39,6 +44,7 @@ def chosen(trends: Sequence[TrendRow]) -> list[TrendRow]:
         or t["forecast"]["state"] == "above"
         or t["changes"]
         or t["outliers"]
+        or t["points"][-1][2] >= t["limit"]
         or (t["direction"] == "rising" and t["forecast"]["likely"] is not None)
     ]
     return sorted(found, key=interest, reverse=True)[:MOST]
@@ -50,13 +56,12 @@ def course(t: TrendRow, machines: Sequence[MachineRow], unit: str) -> Context:
     line = t["line"]
     notes = []
     if line is not None:
-        per = 10 if unit == "h" else 30
-        low, high = (f"{per * v:+.3f}".replace("-", "−") for v in (line["slope"]["low"], line["slope"]["high"]))
+        between = _between(t)
+        low, high = (f"{between * v:+.3f}".replace("-", "−") for v in (line["slope"]["low"], line["slope"]["high"]))
         level = line["level"]
         notes.append(
-            f"ε̂ now {level['value']:.3f} ({level['low']:.3f} to {level['high']:.3f}), {low} to {high} per {per} {unit} (95 %)".replace(
-                "-", "−"
-            )
+            f"by the line, ε̂ is {level['value']:.3f} now ({level['low']:.3f} to {level['high']:.3f}) and changes by {low} to {high} per mission "
+            f"({round_to(between)} {unit} apart), 95 %".replace("-", "−")
         )
     notes += [
         {"drop": "falls by {:.2f}: repaired?", "rise": "rises by {:.2f} at once", "bend": "the slope changes"}[
@@ -66,8 +71,11 @@ def course(t: TrendRow, machines: Sequence[MachineRow], unit: str) -> Context:
     ]
     if t["outliers"]:
         notes.append(f"{count(len(t['outliers']), 'outlier')} excluded")
-    words = t["forecast"]["words"]
-    state = "above" if t["forecast"]["state"] == "above" else "near" if t["approaching"] else "calm"
+    words, beyond = t["forecast"]["words"], t["points"][-1][2] >= t["limit"]
+    if beyond and t["forecast"]["state"] == "not_known":
+        notes.insert(0, f"how it goes on is {words}")
+        words = f"above the limit of {round_to(t['limit'])}: ε̂ {t['points'][-1][2]:.2f} in its last mission"
+    state = "above" if beyond or t["forecast"]["state"] == "above" else "near" if t["approaching"] else "calm"
     return {
         "title": title,
         "state": state,

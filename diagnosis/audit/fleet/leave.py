@@ -1,0 +1,109 @@
+"""Which machines may go out, which must not, and of which that is not known: each with why and the mission that says so."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+
+from diagnosis.audit.fleet.fault_types import FleetFaultRow
+from diagnosis.audit.fleet.fleet_types import FleetDocument, MachineRow, MissionRow
+from diagnosis.audit.fleet.page.rows import fault_words
+from diagnosis.audit.fleet.words import count
+from diagnosis.results.machine_words import words_of
+from diagnosis.results.vocabulary import Severity, Verdict
+
+#: Statuses of faults that do not stand.
+GONE = ("past", "repaired")
+_FAULTS = 2
+_DAMAGE = "the log is damaged: "
+
+
+class Leave(StrEnum):
+    """Whether a machine may go out."""
+
+    MUST_NOT = "must not go out"
+    NOT_KNOWN = "not known whether it may go out"
+    MAY = "may go out"
+
+
+@dataclass(frozen=True)
+class Left:
+    """A machine in one of the lists.
+
+    Attributes
+    ----------
+    leave : Leave
+        The list.
+    machine : int
+        Its place in the document.
+    label : str
+        What it is called.
+    reason : str
+        Why it is in this list.
+    mission : int or None
+        Place of the mission that says so, or that blocks it.
+    name : str
+        That mission's name; empty where there is none.
+    """
+
+    leave: Leave
+    machine: int
+    label: str
+    reason: str
+    mission: int | None
+    name: str
+
+
+def leave_of(m: MachineRow) -> Leave:
+    """Whether a machine may go out, by its verdict and what later missions leave open."""
+    if m["verdict"] == Verdict.STOP:
+        return Leave.MUST_NOT
+    fit = m["verdict"] == Verdict.READY or (m["verdict"] == Verdict.WATCH and m["cleared"] is True)
+    return Leave.MAY if fit and not m["unjudged"] else Leave.NOT_KNOWN
+
+
+def lists_of(document: FleetDocument) -> tuple[Left, ...]:
+    """Every machine of a fleet in one list, in the document's order."""
+    out = []
+    for k, m in enumerate(document["machines"]):
+        standing = [f for f in document["faults"] if f["machine"] == k and f["status"] not in GONE]
+        leave = leave_of(m)
+        place, reason = _why(leave, m, standing, document["missions"])
+        name = "" if place is None else document["missions"][place]["name"]
+        out.append(Left(leave, k, m["label"], reason, place, name))
+    return tuple(out)
+
+
+def _why(
+    leave: Leave, m: MachineRow, standing: Sequence[FleetFaultRow], missions: Sequence[MissionRow]
+) -> tuple[int | None, str]:
+    """Place of the mission behind a machine's place in the lists, and the reason."""
+    last = m["missions"][-1] if m["missions"] else next(iter(m["undated"]), None)
+    faults = sorted(standing, key=lambda f: -Severity(f["severity"]).rank)
+    named = "; ".join(fault_words(f, words_of(m)) for f in faults[:_FAULTS])
+    named += f" and {len(faults) - _FAULTS} more" if len(faults) > _FAULTS else ""
+    if leave is Leave.MUST_NOT:
+        place = faults[0]["last"] if faults else last
+        later = f"; {count(m['unjudged'], 'later mission')} not judged" if m["unjudged"] else ""
+        return place, (named or m["standing"]) + later
+    if leave is Leave.MAY:
+        if any(not f["since"] for f in faults):
+            return last, f"with {count(len(faults), 'fault')} to watch: {named}"
+        return last, "no fault in its last mission" + (f"; seen before: {named}" if faults else "")
+    for place in (*m["failed"], *reversed(m["undated"])):
+        if m["unjudged"] and missions[place]["verdict"] in (None, Verdict.NOT_ASSESSED):
+            more = f" ({count(m['unjudged'], 'mission')} not judged)" if m["unjudged"] > 1 else ""
+            return place, f"{_said(missions[place])}{more}"
+    return last, _said(missions[last]) if last is not None and m["verdict"] == Verdict.NOT_ASSESSED else m["standing"]
+
+
+def _said(mission: MissionRow) -> str:
+    """Why a mission gives no leave, in a few words."""
+    damage = mission["reason"].partition(_DAMAGE)[2]
+    if damage:
+        return f"{_DAMAGE}{damage.partition(': ')[0]}"
+    reason = mission["reason"].partition(";")[0]
+    head, _, tail = reason.partition(": ")
+    names_a_file = tail and any(head.endswith(file.rpartition("/")[2]) for file in mission["files"])
+    return (tail if names_a_file else reason).rstrip(".") or mission.get("title") or "not judged"

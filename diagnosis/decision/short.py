@@ -1,0 +1,187 @@
+"""Parts that were not judged, or not for long enough: why, and what somebody does to have them judged."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from diagnosis.decision.wording import join_words
+from diagnosis.results.assessed import needed_s
+from diagnosis.results.assessment import STATES, Assessment
+from diagnosis.results.machine_words import MachineWords
+from diagnosis.results.vocabulary import Kind, Tier
+from replay.faults import DECIDED, Side, State
+from replay.machine.config import Limits
+
+#: A component and its side.
+Part = tuple[str, str]
+
+_SAID_S = 0.05  # of judged driving: less is nothing
+_NOT_SAID = "no {valve} command"  # begins the reason of a model without it
+
+
+@dataclass(frozen=True)
+class ToClear:
+    """What keeps a machine from being cleared, in a sentence, and what would clear it, to follow *to clear it*."""
+
+    reason: str
+    act: str
+
+
+def short_parts(
+    short: Sequence[Part],
+    assessments: Mapping[Part, Assessment],
+    decided_s: Mapping[Part, float],
+    driven: Mapping[Part, float],
+    limits: Limits,
+    words: MachineWords,
+    kind: Kind = Kind.WHEEL,
+) -> list[ToClear]:
+    """Parts that were not judged long enough, those together that are so for the same reason.
+
+    Parameters
+    ----------
+    short : Sequence[Part]
+        The parts.
+    assessments : Mapping[Part, Assessment]
+        Of all parts.
+    decided_s, driven : Mapping[Part, float]
+        Driving that was decided, and all of it [s].
+    limits : Limits
+        What counts.
+    words : MachineWords
+        How to speak of the machine.
+    kind : Kind
+        Of the parts' components.
+    """
+    alike: dict[tuple[str, str, bool], list[Part]] = {}
+    for part in short:
+        reason = _why_short(assessments[part], driven.get(part), limits)
+        act = (
+            _act(part, assessments[part], driven.get(part), limits, words)
+            if kind is Kind.WHEEL
+            else _act_of_axle(part[1], _main_state(assessments[part]))
+        )
+        alike.setdefault((reason, act, decided_s.get(part, 0.0) < _SAID_S), []).append(part)
+    out = []
+    for (reason, act, silent), parts in alike.items():
+        who, why = words.listed(kind, parts), f" ({reason})" if reason else ""
+        named = act.replace("{who}", f"the {who}").replace("{c}", _components(parts))
+        if silent:
+            out.append(ToClear(f"Not judged: {who}{why}.", named))
+            continue
+        judged = _span([decided_s[part] for part in parts], ".1f")
+        needed = _span([needed_s(driven.get(part, 0.0), limits.min_assessed) for part in parts], ".3g")
+        out.append(ToClear(f"{who}: judged for {judged} s of {words.moving}, of {needed} s needed{why}.", named))
+    return out
+
+
+def _components(parts: Sequence[Part]) -> str:
+    """Components as a name of a signal has them: ``FR``, of several ``<W>``."""
+    names = {component for component, _ in parts}
+    return names.pop() if len(names) == 1 else "<part>"
+
+
+def _span(values: Sequence[float], form: str) -> str:
+    """One value, or the least and the largest of several."""
+    said = list(dict.fromkeys(format(x, form) for x in (min(values), max(values))))
+    return " to ".join(said)
+
+
+def unjudged_axles(axles: Sequence[Part], assessments: Mapping[Part, Assessment], words: MachineWords) -> ToClear:
+    """Parts of the steering that nothing judged."""
+    who = join_words([words.part_words(Kind.STEER, *part) for part in axles])
+    first = assessments[axles[0]]
+    act = (
+        "steer from stop to stop twice while the log runs"
+        if STATES.index(State.NOT_EXCITED) in first.states
+        else "log steer.<part>.phi and steer.<part>.u, and steer from stop to stop twice while driving"
+    )
+    return ToClear(f"Not assessed: {who} ({main_reason(first)}).", act)
+
+
+def _why_short(assessment: Assessment, driven: float | None, limits: Limits) -> str:
+    """Why a part was not judged long enough; a machine at rest is no reason while it drives."""
+    if driven is not None and driven < limits.min_assessed and assessment.tier is not Tier.NONE:
+        return f"driven for less than {limits.min_assessed:g} s"
+    return main_reason(assessment)
+
+
+def main_reason(assessment: Assessment) -> str:
+    """Reason of the commonest state that is no judgement; a machine at rest is one only where nothing else is."""
+    state = _main_state(assessment)
+    return "" if state is None else assessment.reasons[state]
+
+
+def _main_state(assessment: Assessment) -> State | None:
+    best, most = None, 0.0
+    for state in assessment.reasons:
+        if state in DECIDED:
+            continue
+        count = float(np.count_nonzero(assessment.states == STATES.index(state)))
+        if state is State.NOT_EXCITED:
+            count *= 1e-9
+        if count > most:
+            best, most = state, count
+    return best
+
+
+def _act(part: Part, assessment: Assessment, driven: float | None, limits: Limits, words: MachineWords) -> str:
+    """What somebody does to have a part judged; ``{who}`` and ``{c}`` are filled in by the parts that it holds for."""
+    sensor, tier, state = part[1] == Side.SENSOR, assessment.tier, _main_state(assessment)
+    faster = f"faster than {limits.driving_speed:g} {words.speed_unit}"
+    if driven is not None and driven < limits.min_assessed and tier is not Tier.NONE:
+        return f"move {words.parts_moved} {faster} for at least {limits.min_assessed:g} s, and diagnose that log"
+    if tier is Tier.NONE:
+        return _of_silent(sensor, state)
+    by_state = {
+        State.NO_DATA: "record again, with wheel.{c}.v and its command in the log all the time",
+        State.NOT_EXCITED: f"move {words.parts_moved} {faster} for at least {limits.min_assessed:g} s",
+        State.MASKED: words.fill("repair the {wheel.sensor} first, then record a mission again"),
+        State.SLIP: "drive straight ahead on ground with grip for at least 10 s",
+    }
+    if state in by_state:
+        return by_state[state]
+    second = "wheel.{c}.v_true (a second speed)"
+    by_tier = {
+        Tier.DIRECT: "log both measurements by one clock, with finer steps"
+        if sensor
+        else words.fill("hold each {valve} command for a second or longer, or log at a higher rate"),
+        Tier.DRIVE: "run `mfhca fit` on healthy missions of this machine, and diagnose with the file that it writes (-m)",
+        Tier.RESPONSE: f"log {second}"
+        if sensor
+        else words.fill(
+            "lift the machine, run each drive alone at one speed for 10 s, and compare their currents; or log the command of the "
+            "{valve} itself (wheel.{c}.u)"
+        ),
+        Tier.TRACKING: words.fill("log wheel.{c}.u (the {valve} command) or ") + second,
+    }
+    if tier in by_tier and "wrong unit" not in main_reason(assessment):
+        return by_tier[tier]
+    if tier in by_tier:
+        return "correct the unit or the channel of wheel.{c}.v and of its command under [signals] in the machine file"
+    if main_reason(assessment).startswith(words.fill(_NOT_SAID)):
+        return words.fill("log wheel.{c}.u (the {valve} command)")
+    other = second if sensor else f"wheel.{{c}}.u_applied (the {words.position})"
+    return f"log {other}; without it, drive straight at three steady speeds for 10 s each"
+
+
+def _act_of_axle(side: str, state: State | None) -> str:
+    """What somebody does to have a part of an axle judged."""
+    if state is State.MASKED:
+        return "repair the steering sensor first, then record a mission again"
+    if state is State.NOT_ASSESSED:
+        second = (
+            "phi_true (a second angle)" if side == Side.SENSOR else "u_applied (the second measurement of its command)"
+        )
+        return f"steer from stop to stop several times while driving, or log steer.{{c}}.{second}"
+    return "steer from stop to stop several times while driving"
+
+
+def _of_silent(sensor: bool, state: State | None) -> str:
+    """What to log for a part of which nothing is judged."""
+    if state is State.NO_DATA:
+        return "log wheel.{c}.v" if sensor else "log wheel.{c}.u"
+    return "log wheel.{c}.u or wheel.{c}.v_ref" if sensor else "log wheel.{c}.v"

@@ -1,0 +1,143 @@
+"""What keeps a machine from being cleared: each reason in a sentence, and what somebody does to clear it."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping, Sequence
+
+import numpy as np
+
+from diagnosis.decision.caveats import Reservations
+from diagnosis.decision.short import Part, ToClear, short_parts, unjudged_axles
+from diagnosis.decision.wording import count_words, join_words
+from diagnosis.results.assessed import needed_s
+from diagnosis.results.assessment import Assessment
+from diagnosis.results.clearing import Check, Checked
+from diagnosis.results.left_out import is_left_out
+from diagnosis.results.machine_words import MachineWords
+from diagnosis.results.vocabulary import Kind, Tier
+from replay.faults import Side
+from replay.machine.config import Limits
+
+_STEERING = "steering was not judged"
+_NAMED = 2  # parts with an open check
+_STEERED = (Check.STILL, Check.RATE, Check.LASTING_RATE)
+_TURNED = (Check.YAW, Check.LASTING_YAW)
+
+
+def to_clear(
+    against: Reservations,
+    assessments: Mapping[Part, Assessment],
+    decided_s: Mapping[Part, float],
+    driven: Mapping[Part, float],
+    axles: Sequence[str],
+    limits: Limits,
+) -> tuple[ToClear, ...]:
+    """Every reservation with what would clear it, in the order in which a verdict names them.
+
+    Parameters
+    ----------
+    against : Reservations
+        What stands against ``ready`` beside the faults.
+    assessments : Mapping[Part, Assessment]
+        Of all parts.
+    decided_s, driven : Mapping[Part, float]
+        Driving that was decided, and all of it [s].
+    axles : Sequence[str]
+        Steering axles.
+    limits : Limits
+        What counts.
+    """
+    words = against.words
+    out = [ToClear(event.text, event.act) for event in against.events]
+    out += [ToClear(text, "correct [signals] in the machine file, and diagnose again") for text in against.hints]
+    out += short_parts(against.short, assessments, decided_s, driven, limits, words)
+    if against.unexplained:
+        who = join_words(
+            sorted({words.part_words(Kind.WHEEL, c, Side.SENSOR_OR_ACTUATOR) for c, _ in against.unexplained})
+        )
+        other = " or wheel.<part>.u_applied (the valve position)" if words.drive == "valve" else ""
+        out.append(
+            ToClear(
+                f"{who}: no single fault explains the residual.",
+                f"inspect these parts, and log wheel.<part>.v_true (a second speed){other}",
+            )
+        )
+    if against.not_compared:
+        out.append(
+            ToClear(
+                f"The {words.part} model was identified from this mission alone, so a loss that lasts the whole mission would not show.",
+                f"run `mfhca fit` on healthy missions, and diagnose with the file that it writes (-m): it gives K and tau of the {words.parts} in [plant]",
+            )
+        )
+    if against.damage:
+        left_out = is_left_out(against.damage[0])
+        out.append(
+            ToClear(
+                against.damage[0] if left_out else f"The log is damaged: {against.damage[0]}",
+                "diagnose the files of one mission together, and others apart"
+                if left_out
+                else "copy the log from the machine once more, or record another mission",
+            )
+        )
+    cut = [text for text in against.scope if not text.endswith(_STEERING)]  # which has a reason of its own below
+    if cut:
+        out.append(
+            ToClear(
+                f"{_sentence(join_words(cut))}.",
+                "diagnose the whole log, with every part (no --start, --end, --wheel)",
+            )
+        )
+    twice = {c for (c, side), a in assessments.items() if a.tier is Tier.DIRECT and side == Side.SENSOR}
+    out += _of_checks(against.open, twice)
+    steered = [k for k in assessments if k[0] in axles]
+    unjudged = [k for k in steered if assessments[k].tier is Tier.NONE]
+    brief = [k for k in steered if k not in unjudged and _brief(k, decided_s, driven, limits)]
+    out += short_parts(brief, assessments, decided_s, driven, limits, words, Kind.STEER)
+    return tuple(out + ([unjudged_axles(unjudged, assessments, words)] if unjudged else []))
+
+
+def _brief(part: Part, decided_s: Mapping[Part, float], driven: Mapping[Part, float], limits: Limits) -> bool:
+    """Whether a part of an axle was judged for less than a part of a wheel must be."""
+    return part in driven and decided_s.get(part, 0.0) < needed_s(driven[part], limits.min_assessed)
+
+
+def _of_checks(checks: Sequence[Checked], twice: Collection[str]) -> list[ToClear]:
+    """Open checks, of each component that which is furthest beyond its limit; `twice`: components with a second speed in the log."""
+    worst: dict[str, list[Checked]] = {}
+    for c in sorted(checks, key=lambda c: -(np.inf if c.worst is None else c.worst / c.limit)):
+        worst.setdefault(c.component, []).append(c)
+    alike: dict[str, list[str]] = {}
+    for own in worst.values():
+        first = own[0]
+        if first.check is Check.LASTING_RATE and any(_act(first, twice) == a for a in alike):
+            continue  # one axle against the other: said of the one is said of both
+        alike.setdefault(_act(first, twice), []).append(first.text)
+    return [ToClear(f"{_sentence(_some(texts))}.", act) for act, texts in alike.items()]
+
+
+def _some(texts: Sequence[str]) -> str:
+    """The first reasons, and how many more parts have one."""
+    rest = len(texts) - _NAMED
+    return "; ".join([*texts[:_NAMED], *([f"and {count_words(rest, 'more part')}"] if rest > 0 else [])])
+
+
+def _act(check: Checked, twice: Collection[str]) -> str:
+    """What shows whether a part is sound that a check does not clear."""
+    words: MachineWords = check.words
+    if check.check in _TURNED:
+        return "set the axles straight, compare their angles with the marks on the machine, and drive ten seconds straight ahead"
+    if check.check in _STEERED or check.kind == Kind.STEER:
+        return "steer from stop to stop twice at standstill, and watch whether the axle follows"
+    if check.check is Check.SECOND_MEASUREMENT and check.worst is not None:
+        return "compare both measurements at one steady speed with a third one, such as a hand tachometer, then repair or rescale the one that is off"
+    if check.worst is None:
+        return f"move all {words.parts} together at one steady speed for at least 10 s, and diagnose that log"
+    lifted = f"lift the machine, give every {words.part} the same command for 10 s, and compare their speeds with a hand tachometer"
+    return (
+        lifted if check.component in twice else f"{lifted}; a log with wheel.<part>.v_true (a second speed) settles it"
+    )
+
+
+def _sentence(text: str) -> str:
+    """With a capital, unless it begins with a name."""
+    return text[:1].upper() + text[1:]

@@ -1,0 +1,164 @@
+"""Rows of the tables on what was judged and recorded: coverage, checks, limits, the loop, signals, files."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from diagnosis.pages.labels import bounded, grouped, number
+from diagnosis.report.judged_parts import kind_of
+from diagnosis.results.clearing import size_words
+from diagnosis.results.document import (
+    FileRow,
+    MissingRow,
+    ReportDocument,
+    SignalRow,
+)
+from diagnosis.results.fault_rows import state_label
+from diagnosis.results.left_out import only_left_out
+from diagnosis.results.loop_rows import LoopRow, MetricsRow
+from diagnosis.results.machine_words import MachineWords, words_of
+from replay.faults import FAULT_STATES, UNDECIDED, State
+from replay.machine.quantities import OPENING
+
+#: What the template is given.
+Context = dict[str, Any]
+
+
+def coverage_rows(report: ReportDocument) -> list[Context]:
+    """How long each part was in which state, and why not decided."""
+    rows, why, words = [], _why_undecided(report), words_of(report["machine"])
+    loss = {(x["component"], x["side"]): bounded(x["epsilon"]) for x in report["loss"] if not x["relative"]}
+    for row in report["coverage"]:
+        key, seconds = (row["component"], row["side"]), row["seconds"]
+        total = sum(seconds.values())
+        healthy = seconds.get(State.HEALTHY, 0.0)
+        faulty = sum(v for k, v in seconds.items() if k in FAULT_STATES)
+        rows.append(
+            {
+                "component": row["component"],
+                "part": words.part_name(kind_of(row["component"], report["machine"]), row["side"]),
+                "parts": [(k, v, 100 * v / total) for k, v in seconds.items() if total > 0 and v > 0],
+                "healthy": healthy,
+                "faulty": faulty,
+                "open": total - healthy - faulty,
+                "driving": row["decided_driving_s"],
+                "loss": loss.get(key, ""),
+                "why": why.get(key, []),
+            }
+        )
+    return rows
+
+
+def check_rows(report: ReportDocument) -> list[Context]:
+    """Checks behind an all-clear, those first that do not clear their part."""
+    rows, words = [], words_of(report["machine"])
+    for c in sorted(report["clearing"], key=lambda c: c["passed"]):
+        start, stop = c["start_s"], c["stop_s"]
+        rows.append(
+            {
+                "ok": c["passed"],
+                "part": words.part_words(kind_of(c["component"], report["machine"]), c["component"], c["side"]),
+                "asked": c["asked"],
+                "worst": "not shown" if c["worst"] is None else size_words(c["check"], c["worst"]),
+                "limit": size_words(c["check"], c["limit"]),
+                "when": "" if start is None or stop is None else f"{start:.1f}–{stop:.1f} s",
+                "shows": "" if c["shows"] is None else f"from {100 * c['shows']:.0f} %",
+            }
+        )
+    return rows
+
+
+def _why_undecided(report: ReportDocument) -> dict[tuple[str, str], list[str]]:
+    """For each component and side, the two reasons that cost most time without a decision."""
+    seconds: dict[tuple[str, str], dict[str, float]] = {}
+    for s in report["states"]:
+        if s["state"] in UNDECIDED:
+            reason = s["reason"] or state_label(s["state"]).lower()
+            mine = seconds.setdefault((s["component"], s["side"]), {})
+            mine[reason] = mine.get(reason, 0.0) + s["stop_s"] - s["start_s"]
+    return {
+        key: [f"{reason} ({length:.1f} s)" for reason, length in sorted(mine.items(), key=lambda r: -r[1])[:2]]
+        for key, mine in seconds.items()
+    }
+
+
+def _cells(row: LoopRow, commanded: bool) -> list[str]:
+    error, effort = row["tracking_error"], row["control_effort"]
+    cells = [number(error["mission"]), number(error["driving"])]
+    return cells + [number(None if x is None else 100 * x) for x in (effort["mission"], effort["driving"]) if commanded]
+
+
+#: Unit of each limit of the machine file; absent: a plain number. ``{speed}`` is the machine's own.
+_LIMIT_UNITS = {
+    "brief": "s",
+    "min_assessed": "s",
+    "driving_speed": "{speed}",
+    "min_sat": "{speed}{angles}, of commands as a share",
+}
+_SHARES = ("min_probability", "clear_at")
+
+
+def limit_rows(report: ReportDocument, words: MachineWords) -> list[tuple[str, str]]:
+    """Limits of the machine file with their units."""
+    out = []
+    angles = ", of angles in rad" if report["machine"]["axles"] else ""
+    for key, value in report["limits"].items():
+        unit = _LIMIT_UNITS.get(key, "").replace("{speed}", words.speed_unit).replace("{angles}", angles)
+        size = value if isinstance(value, float) else float("nan")
+        out.append(
+            (key.replace("_", " "), f"{100 * size:g} %" if key in _SHARES else f"{number(value)} {unit}".rstrip())
+        )
+    return out
+
+
+def loop_tables(metrics: MetricsRow, words: MachineWords) -> Context:
+    """Tracking error and control effort, beside the paper's table."""
+    rows = [*metrics["wheels"].items(), ("Average", metrics["average"])]
+    paper = [
+        (p["controller"], [number(p["tracking_error"]), number(100 * p["control_effort"]), number(p["parameters"])])
+        for p in (metrics["paper"] if words.drive == "valve" else ())
+    ]
+    some = any(q["mission"] is not None for _, r in rows for q in (r["tracking_error"], r["control_effort"]))
+    effort = any(r["control_effort"]["mission"] is not None for _, r in rows)
+    shown = [(name, _cells(values, effort)) for name, values in rows] if some else []
+    return {"rows": shown, "effort": effort, "paper": paper}
+
+
+def signal_row(signal: SignalRow, words: MachineWords) -> Context:
+    """One signal as the table shows it."""
+    unit, recorded, missing, step = signal["unit"], signal["recorded_unit"], signal["missing_share"], signal["lsb"]
+    if unit in (OPENING, words.unit(OPENING)):
+        unit, step = words.percent.strip(), None if step is None else 100 * step
+    return {
+        "name": signal["name"],
+        "channel": signal["channel"] or "–",
+        "unit": unit if unit == recorded or not recorded else f"{unit} (recorded {recorded})",
+        "rate": f"{number(signal['rate_hz'], 4)} Hz",
+        "samples": grouped(signal["samples"]),
+        "gaps": f"{signal['gaps']}, longest {number(signal['longest_gap_s'])} s" if signal["gaps"] else "none",
+        "missing": "–" if missing is None else f"{100 * missing:.2g} %",
+        "lsb": f"{number(step)} {unit}" if step else "–",
+        "found": "guessed" if signal["guessed"] else "given",
+        "poor": missing is not None and missing > 0.01,
+    }
+
+
+def missing_rows(rows: Sequence[MissingRow]) -> list[Context]:
+    """Missing signals that cost the same stand in one row."""
+    names: dict[str, list[str]] = {}
+    for row in rows:
+        names.setdefault(row["cost"], []).append(row["name"])
+    return [{"names": n, "cost": cost} for cost, n in names.items()]
+
+
+def file_row(file: FileRow) -> Context:
+    """One file of the mission."""
+    return {
+        "path": file["path"],
+        "format": file["format"],
+        "sha256": file["sha256"] or "–",
+        "size": f"{grouped(file['bytes'])} bytes",
+        "notes": [*file["damage"], *file["notes"]],
+        "heading": "Left out" if only_left_out(file["damage"]) else "Damage" if file["damage"] else "Notes",
+    }

@@ -1,0 +1,99 @@
+"""The one course of ε̂ and of the saturation term that a result has: of each stated fault its size, of health none.
+
+What plots, tables and files show of a size is that of the fault as it is stated. Outside of faults a part that was judged healthy has
+ε̂ = 0; where nothing was decided, or the fault's size is not known, there is none.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from diagnosis.results.document import ReportDocument
+from replay.faults import DECIDED, Side, State
+from replay.machine.quantities import OPENING
+
+Array = NDArray[np.float32]
+
+_OF_COMMANDS = (OPENING, "fraction")
+#: Leaves of evidence columns: ε̂ with its 95 % bounds, and the saturation term with its own.
+EPSILON = ("epsilon", "epsilon_low", "epsilon_high")
+SAT = ("sat", "sat_low", "sat_high")
+
+
+def size_columns(
+    report: ReportDocument, t: NDArray[np.floating], step: float, parts: frozenset[tuple[str, str]]
+) -> dict[str, Array]:
+    """Columns ``evidence.<component>.<side>.<leaf>`` of `EPSILON` and `SAT`; those without any value are left out.
+
+    Parameters
+    ----------
+    report : ReportDocument
+        The document, with its ``intervals`` and ``states``.
+    t : NDArray[np.floating], shape (n,)
+        Times that are wanted, increasing [s].
+    step : float
+        Time between samples [s].
+    parts : frozenset[tuple[str, str]]
+        Components and sides that are wanted.
+
+    Returns
+    -------
+    dict[str, Array], each of shape (n,)
+        ε̂ [1]; saturation terms in the unit that the fault gives.
+    """
+    spans: dict[tuple[str, str], list[tuple[float, float]]] = {part: [] for part in sorted(parts)}
+    for s in report["states"]:
+        if s["state"] == State.HEALTHY and (s["component"], s["side"]) in spans:
+            spans[s["component"], s["side"]].append((s["start_s"], s["stop_s"]))
+    out: dict[str, Array] = {}
+    for (component, side), healthy in spans.items():
+        columns = {leaf: np.full(t.size, np.nan, np.float32) for leaf in (*EPSILON, *SAT)}
+        for start, stop in healthy:
+            columns["epsilon"][_rows(t, step, start, stop)] = 0.0
+        mine = [f for f in report["intervals"] if f["component"] == component and side in Side(f["side"]).sides]
+        for fault in sorted(mine, key=lambda f: f["probability"]):
+            rows = _rows(t, step, fault["start_s"], fault["stop_s"])
+            for leaf, value in _sizes(fault, Side(side)).items():
+                columns[leaf][rows] = value
+        base = f"evidence.{component}.{side}."
+        out |= {base + leaf: x for leaf, x in columns.items() if np.isfinite(x).any()}
+    return out
+
+
+def known_probability(
+    report: ReportDocument, t: NDArray[np.floating], step: float, columns: Mapping[str, NDArray[Any]]
+) -> dict[str, NDArray[Any]]:
+    """The columns ``evidence.<component>.<side>.probability`` without what was not decided, which is NaN; see `size_columns`."""
+    out = {}
+    for component, side in {(s["component"], s["side"]): None for s in report["states"]}:
+        name = f"evidence.{component}.{side}.probability"
+        if name not in columns:
+            continue
+        known = np.zeros(t.size, np.bool_)
+        for s in report["states"]:
+            if (s["component"], s["side"]) == (component, side) and s["state"] in DECIDED:
+                known[_rows(t, step, s["start_s"], s["stop_s"])] = True
+        for fault in report["intervals"]:
+            if fault["component"] == component and side in Side(fault["side"]).sides:
+                known[_rows(t, step, fault["start_s"], fault["stop_s"])] = True
+        values = columns[name]
+        out[name] = np.where(known, values, values.dtype.type(np.nan))
+    return out
+
+
+def _rows(t: NDArray[np.floating], step: float, start: float, stop: float) -> slice:
+    """Samples from `start` to before `stop`, whatever their last digit."""
+    return slice(*np.searchsorted(t, (start - 0.5 * step, stop - 0.5 * step)).tolist())
+
+
+def _sizes(fault: Mapping[str, Any], side: Side) -> dict[str, float]:
+    """Sizes of a fault by leaf; NaN where they are not known, or of the other side."""
+    epsilon, sat = fault["epsilon"], fault["sat"]
+    known = sat is not None and (sat["unit"] in _OF_COMMANDS) == (side is Side.ACTUATOR)
+    sizes = [epsilon[k] for k in ("value", "low", "high")] if epsilon else [np.nan] * 3
+    terms = [sat[k] for k in ("mean", "low", "high")] if known else [np.nan] * 3
+    return dict(zip((*EPSILON, *SAT), (*sizes, *terms), strict=True))

@@ -1,0 +1,43 @@
+"""Every machine stands in one of three lists, with why and the mission that says so."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from diagnosis.audit.fleet.leave import Leave, Left, lists_of
+from diagnosis.audit.fleet.page.page import build_fleet_page
+from diagnosis.audit.fleet_files import fleet_json, load_fleet
+from tests import fleet_samples as samples
+from tests.fleet_samples import Fault, Sample
+
+
+def listed(tmp_path: Path, *missions: Sample) -> dict[str, Left]:
+    document = fleet_json(load_fleet(samples.write_store(tmp_path / "fleet.sqlite", missions)))
+    assert len(lists_of(document)) == len(document["machines"])
+    return {x.label: x for x in lists_of(document)}
+
+
+def test_every_machine_of_a_fleet_stands_in_one_list(tmp_path: Path) -> None:
+    found = listed(tmp_path, *samples.few())
+    assert found["HX4-07"].leave is Leave.MUST_NOT
+    assert found["HX4-07"].reason.startswith("front steering sensor stuck")
+    assert found["HX4-07"].name == "HX4-07/2026-11-14"
+    assert found["HX4-02"].leave is Leave.MAY
+    assert found["HX4-08"].leave is Leave.NOT_KNOWN
+    assert (found["HX4-08"].name, found["HX4-08"].reason) == ("HX4-08/broken", "ends after 12 bytes")
+
+
+def test_a_fault_that_was_not_seen_again_is_said_of_an_earlier_mission(tmp_path: Path) -> None:
+    slight = Sample("a", verdict="watch", faults=[Fault("FR", "sensor", "noisy", "low")])
+    (one,) = listed(tmp_path, slight, Sample("b", day=1.0)).values()
+    assert one.leave is Leave.MAY
+    assert one.reason == "no fault in its last mission; seen before: FR speed sensor noisy"
+    assert one.name == "b"
+
+
+def test_the_page_shows_as_many_machines_as_the_lists_hold(tmp_path: Path) -> None:
+    document = fleet_json(load_fleet(samples.write_store(tmp_path / "fleet.sqlite", samples.few())))
+    page = build_fleet_page(document)
+    for leave in Leave:
+        count = sum(x.leave is leave for x in lists_of(document))
+        assert f"{leave.value[:1].upper()}{leave.value[1:]} ({count})" in page

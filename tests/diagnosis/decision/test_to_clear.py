@@ -1,0 +1,71 @@
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from diagnosis.decision.caveats import Reservations
+from diagnosis.decision.to_clear import to_clear
+from diagnosis.results.assessment import CODE, Assessment, unassessed
+from diagnosis.results.clearing import Check, Checked
+from diagnosis.results.vocabulary import Kind, Tier
+from replay.faults import Side, State
+from replay.machine.config import Limits
+
+N = 1000
+OPEN = Assessment(np.full(N, CODE[State.NOT_ASSESSED]), {State.NOT_ASSESSED: "it may be either"}, tier=Tier.MODEL)
+PARTS = {(w, s): OPEN for w in ("FR", "FL") for s in ("sensor", "actuator")}
+
+
+def told(against: Reservations, parts: dict[tuple[str, str], Assessment] = PARTS, driven: float = 60.0) -> list[str]:
+    rows = to_clear(against, parts, dict.fromkeys(parts, 20.0), dict.fromkeys(parts, driven), ["front"], Limits())
+    assert all(row.reason.endswith(".") for row in rows)
+    assert not any(row.act.endswith(".") or "{" in row.act for row in rows)
+    return [f"{row.reason} {row.act}" for row in rows]
+
+
+def test_parts_that_are_open_for_the_same_reason_stand_together_with_the_signal_that_decides() -> None:
+    (one,) = told(Reservations(short=(("FR", "actuator"), ("FL", "actuator"))))
+    assert one.startswith("FR and FL drive valve: judged for 20.0 s of driving, of 48 s needed (it may be either).")
+    assert "log wheel.<part>.u_applied (the valve position)" in one
+    (single,) = told(Reservations(short=(("FR", "sensor"),)))
+    assert "log wheel.FR.v_true (a second speed)" in single
+
+
+def test_a_short_drive_is_made_longer() -> None:
+    (one,) = told(Reservations(short=tuple(PARTS)), driven=5.0)
+    assert "move the machine faster than 0.05 m/s for at least 10 s" in one
+
+
+def test_what_hides_a_part_is_repaired_first() -> None:
+    hidden = replace(OPEN, states=np.full(N, CODE[State.MASKED]), reasons={State.MASKED: "the sensor is dead"})
+    (one,) = told(Reservations(short=(("FR", "actuator"),)), {**PARTS, ("FR", "actuator"): hidden})
+    assert "repair the speed sensor first" in one
+
+
+def test_of_many_open_checks_each_component_has_one_line() -> None:
+    checks = [
+        Checked(Kind.WHEEL, w, Side.SENSOR_OR_ACTUATOR, check, worst, 0.1, 1.0, 4.0)
+        for w in ("FR", "FL")
+        for check, worst in ((Check.RESPONSE, 0.4), (Check.EXCESS, 0.2))
+    ]
+    (one,) = told(Reservations(open=tuple(checks)))
+    assert "by 40 % at 1.0–4.0 s" in one
+    assert "20 %" not in one
+    assert "hand tachometer" in one
+
+
+def test_unjudged_steering_has_one_reason() -> None:
+    axle = {
+        ("front", s): unassessed(N, State.NOT_ASSESSED, "nothing of it is in the log") for s in ("sensor", "actuator")
+    }
+    (one,) = told(Reservations(scope=("the front steering was not judged",)), {**PARTS, **axle})
+    assert "front steering sensor and front steering valve (nothing of it is in the log)" in one
+    assert "log steer.<part>.phi" in one
+
+
+def test_an_axle_that_was_hardly_steered_is_named_with_what_to_do() -> None:
+    still = replace(OPEN, states=np.full(N, CODE[State.NOT_EXCITED]), reasons={State.NOT_EXCITED: "not steered"})
+    (one,) = told(Reservations(), {("front", "actuator"): still})
+    assert one.startswith("front steering valve: judged for 20.0 s of driving, of 48 s needed (not steered).")
+    assert "steer from stop to stop" in one

@@ -1,0 +1,65 @@
+from __future__ import annotations
+
+import numpy as np
+
+from diagnosis.results.stated_sizes import known_probability, size_columns
+from replay.machine.quantities import OPENING
+from tests import report_samples as samples
+
+T = np.arange(1000) / 10.0
+FR = frozenset({("FR", "sensor")})
+
+
+def columns_of(*faults: object, states: object = ()) -> dict[str, list[float]]:
+    report = samples.report_with() | {"intervals": list(faults), "states": list(states)}
+    found = size_columns(report, T, 0.1, FR)  # type: ignore[arg-type]
+    return {name.removeprefix("evidence.FR.sensor."): x.tolist() for name, x in found.items()}
+
+
+def state(name: str, start: float, stop: float) -> dict[str, object]:
+    return {"component": "FR", "side": "sensor", "state": name, "start_s": start, "stop_s": stop, "reason": ""}
+
+
+def test_a_fault_shows_its_size_and_bounds_over_its_whole_length_and_nowhere_else() -> None:
+    size = {"value": 0.4, "low": 0.3, "high": 0.5}
+    found = columns_of(samples.fault(mode="inefficient", start_s=20.0, stop_s=30.0, epsilon=size))
+    for leaf, value in (("epsilon", 0.4), ("epsilon_low", 0.3), ("epsilon_high", 0.5)):
+        column = np.array(found[leaf])
+        np.testing.assert_allclose(column[200:300], value)
+        assert np.isnan(column[:200]).all()
+        assert np.isnan(column[300:]).all()
+
+
+def test_health_is_no_loss_and_what_was_not_decided_is_unknown() -> None:
+    states = [state("healthy", 0.0, 10.0), state("not_excited", 10.0, 20.0), state("healthy", 20.0, 100.0)]
+    found = np.array(columns_of(samples.fault(start_s=30.0, stop_s=40.0, epsilon=None), states=states)["epsilon"])
+    np.testing.assert_array_equal(found[:100], 0.0)
+    assert np.isnan(found[100:200]).all()
+    np.testing.assert_array_equal(found[200:300], 0.0)
+    assert np.isnan(found[300:400]).all()
+    assert "epsilon_low" not in columns_of(states=states)
+
+
+def test_of_two_faults_at_once_the_more_probable_one_is_shown() -> None:
+    small, large = ({"value": v, "low": v, "high": v} for v in (0.2, 0.8))
+    faults = [
+        samples.fault(start_s=10.0, stop_s=20.0, epsilon=e, probability=p) for e, p in ((large, 0.9), (small, 0.6))
+    ]
+    np.testing.assert_allclose(columns_of(*faults)["epsilon"][100:200], 0.8)
+
+
+def test_a_saturation_term_of_the_other_side_is_not_shown() -> None:
+    term = {"mean": 0.5, "rms": 0.5, "low": 0.4, "high": 0.6, "unit": OPENING}
+    either = samples.fault(side="sensor_or_actuator", start_s=10.0, stop_s=20.0, sat=term)
+    assert "sat" not in columns_of(either)
+    np.testing.assert_allclose(columns_of({**either, "sat": {**term, "unit": "m/s"}})["sat"][100:200], 0.5)
+
+
+def test_no_probability_is_shown_of_what_was_not_decided() -> None:
+    states = [state("healthy", 0.0, 10.0), state("not_excited", 10.0, 50.0), state("masked", 50.0, 100.0)]
+    report = samples.report_with() | {"intervals": [samples.fault(start_s=40.0, stop_s=60.0)], "states": states}
+    name = "evidence.FR.sensor.probability"
+    shown = known_probability(report, T, 0.1, {name: np.full(1000, 0.9, np.float32), "other": T})  # type: ignore[arg-type]
+    assert list(shown) == [name]
+    assert shown[name].dtype == np.float32
+    assert np.isfinite(shown[name]).nonzero()[0].tolist() == [*range(100), *range(400, 600)]
