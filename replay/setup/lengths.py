@@ -52,9 +52,12 @@ def wheel_radius(
     if measured is not None and measured < _WHEEL_SIZES[0]:
         draft.ask(
             "geometry",
-            f"were the motors measured? Radius over gear ratio is {measured:.3g} m; for motors give gear_ratio and wheel_diameter "
-            'here, and at = "motor" in [signals].',
+            f"were the motors measured? Radius over gear ratio is {measured:.3g} m, and rotations are written with at = "
+            '"motor": give gear_ratio and wheel_diameter here.',
         )
+        for n, origin in origins.items():
+            if n.startswith("wheel.") and _is_rotation(origin):
+                origins[n] = replace(origin, at="motor")
         return max(float(_round(measured)), _RADII[0] / 2)
     if measured is not None and measured <= _RADII[1]:
         draft.ask(

@@ -18,7 +18,8 @@ from replay.log.raw_log import Channel, LogSummary, RawLog, TopicInfo
 from replay.log.source_options import SignalSource
 from replay.machine.config import Machine
 from replay.machine.units import known_unit
-from replay.signals.rules import Candidate, candidates, wanted_type
+from replay.signals.candidate import Candidate
+from replay.signals.rules import candidates, wanted_type
 from replay.signals.signal import Signal, Signals
 from replay.signals.to_si import Converted, choose_motor_or_wheel, convert, usable_unit
 from replay.signals.unit_doubts import Doubt, doubt, questions
