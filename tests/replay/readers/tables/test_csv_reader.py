@@ -433,6 +433,18 @@ def test_times_of_day_run_on_over_midnight_and_take_their_date_from_the_epoch(ta
     assert datetime.fromtimestamp(int(dated[200]) / 1e9, tz=UTC).isoformat() == "2025-08-20T00:00:00+00:00"
 
 
+@pytest.mark.parametrize(("date", "time"), [("Datum", "Uhrzeit"), ("Date", "Time"), ("date", "heure")])
+def test_a_date_in_a_column_beside_times_of_day_dates_them(target: Path, date: str, time: str) -> None:
+    moments = [datetime(2025, 1, 1, 23, 59, 58, tzinfo=UTC) + timedelta(seconds=i / 100) for i in range(400)]
+    rows = [f"{m:%d.%m.%Y};{m:%H:%M:%S},{m.microsecond // 1000:03d};{i},5" for i, m in enumerate(moments)]
+    target.write_text("\n".join([f"{date};{time};a", *rows]) + "\n", encoding="utf-8")
+    log = read(target)
+    assert (log.channels["a"].stamps == [int(m.timestamp()) * 10**9 + m.microsecond * 1000 for m in moments]).all()
+    assert log.summary.start_ns == log.channels["a"].stamps[0]
+    assert any(f"the date is column '{date}'" in n for n in log.summary.notes)
+    assert read(target, epoch="2030-01-01T00:00:00Z").channels["a"].stamps[0] > log.channels["a"].stamps[0]
+
+
 @pytest.mark.parametrize(
     ("text", "hour"), [("08:00:00.5 AM", 8), ("12:00:00.5 AM", 0), ("12:00:00.5 PM", 12), ("11:00:00.5 PM", 23)]
 )
