@@ -20,7 +20,8 @@ from replay.log.stamp_order import in_order
 from replay.machine.config import Machine
 from replay.progress import Progress, Stage, Subscriber, silent
 from replay.readers.registry import read_log, summarise_log
-from replay.signals.mapping import map_signals, plan_topics
+from replay.signals.mapping import NO_CHANNEL, map_signals, plan_topics
+from replay.signals.near_misses import near_misses
 from replay.signals.rules import candidates
 from replay.signals.signal import Signals
 from replay.signals.timeline import Timeline, align, check_overlap
@@ -169,7 +170,8 @@ def read_signals(
     dated = tuple(
         replace(file, clock=next(clock_of)) if use else _strange(file) for file, use in zip(files, known, strict=True)
     )
-    return dated, replace(signals, notes=notes, open_loop=bool(marked))
+    missing = near_misses(signals.missing, [file.summary for file in files], NO_CHANNEL)
+    return dated, replace(signals, missing=missing, notes=notes, open_loop=bool(marked))
 
 
 def _strange(file: MissionFile) -> MissionFile:

@@ -42,6 +42,9 @@ def nanoseconds(moment: datetime) -> int:
     return ((since.days * 86_400 + since.seconds) * 1_000_000 + since.microseconds) * 1000
 
 
+_UNDATED = 365 * 86_400 * 10**9  # ns; no log is of 1970
+
+
 def shown_moment(start_ns: int) -> str:
     """Moment in UTC, and beside it in local time where that is another: ``2026-10-05 12:30:00 UTC (14:30:00 CEST)``."""
     try:
@@ -50,6 +53,8 @@ def shown_moment(start_ns: int) -> str:
     except (ValueError, OverflowError, OSError):
         return "an unknown time"
     shown = f"{moment:%Y-%m-%d %H:%M:%S} UTC"
+    if 0 <= start_ns < _UNDATED:
+        return f"{start_ns / 1e9:.3g} s of a clock without a date (simulated time, or counted from a start)"
     if not local.utcoffset():
         return shown
     day = "" if local.date() == moment.date() else f"{local:%Y-%m-%d} "

@@ -24,6 +24,9 @@ from replay.signals.signal import Signal, Signals
 from replay.signals.to_si import Converted, choose_motor_or_wheel, convert, usable_unit
 from replay.signals.unit_doubts import Doubt, doubt, questions
 
+#: Why a signal is missing for which nothing was found.
+NO_CHANNEL = "no channel fits by its name or message type"
+
 
 def plan_topics(
     summaries: Sequence[LogSummary], machine: Machine, also: Callable[[TopicInfo], bool] | None = None
@@ -151,7 +154,7 @@ def _take_given(draft: _Draft, name: str, source: SignalSource, logs: Sequence[R
 
 def _take_guess(draft: _Draft, name: str, found: list[tuple[Candidate, RawLog]]) -> None:
     """Take the surest candidate that holds a number."""
-    reason = "no channel fits by its name or message type"
+    reason = NO_CHANNEL
     ranked = sorted(found, key=lambda f: (f[0].rank, -_size(f[1], f[0])))
     for i, (candidate, log) in enumerate(ranked):
         channel = _find(log, candidate.origin)
