@@ -165,7 +165,7 @@ def _structure(
 def _name(description: RobotDescription | None, logs: Sequence[RawLog]) -> str:
     if description is not None and description.name:
         return description.name
-    return f"robot of {PurePath(logs[0].source).name}"
+    return f"machine of {PurePath(logs[0].source).name}"
 
 
 def _motions(found: Signals, wheels: Sequence[str]) -> dict[str, WheelMotion]:
