@@ -13,6 +13,7 @@ from replay.setup.preset import Preset
 from replay.setup.robot_description import RobotDescription, WheelJoint
 from replay.signals.name_parts import index_of, is_steering, position, wheel_of
 from replay.signals.name_words import tokens
+from replay.signals.named_units import bare_name
 from replay.signals.rules import candidates
 
 FOUR, SIX = ("FR", "FL", "RR", "RL"), ("FR", "FL", "MR", "ML", "RR", "RL")
@@ -172,7 +173,7 @@ def _covers(channels: Mapping[str, Channel], wheels: tuple[str, ...], by_name: b
         group, part, leaf = (*c.signal.split("."), "", "")[:3]
         if group != "wheel" or leaf not in ("v", "v_true", "u_applied"):
             continue
-        name = c.origin.label
+        name = bare_name(c.origin.label)[0]
         inner = re.search(r"\[([A-Za-z_][^\[\]]*)\]$", name)
         if by_name and wheel_of(inner[1] if inner else re.sub(r"\[\d+\]", "", name), trial) != part:
             continue

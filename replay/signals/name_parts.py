@@ -66,7 +66,7 @@ def is_steering(name: str) -> bool:
     if _STEER.search(name.lower()) is not None:
         return True
     words = tokens(name)
-    return bool({"winkel", "angle"} & {*words}) and position(name) in (("front", None), ("rear", None))
+    return bool({"winkel", "angle", "phi"} & {*words}) and position(name) in (("front", None), ("rear", None))
 
 
 def is_drive(name: str) -> bool:

@@ -40,13 +40,14 @@ _PLAIN = (
                 "angle",
                 "fahr",
                 "hydraulik",
+                "phi",
             ),
         )
     )
 )
 # Words beside which an asked speed is that of the whole machine.
 _WHOLE = ASKING | frozenset(
-    (*("speed", "velocity", "vel", "v", "r", "f", "lr", "x", "lin", "linear", "longitudinal", "fahr", "fahrzeug", "vehicle"),
+    (*("speed", "velocity", "vel", "v", "r", "f", "lr", "x", "lin", "linear", "longitudinal", "fahr", "fahrzeug", "fzg", "vehicle"),
      *("machine", "maschine", "engin", "vehicule", "body", "robot", "chassis", "forward")),
 )  # fmt: skip
 
@@ -143,6 +144,12 @@ def _family(channel: Channel, template: str) -> str:
     return found[0] if found is not None else template
 
 
+def _is_speed(last: Sequence[str], unit: str) -> bool:
+    """Whether words speak of a speed: by name, or as ``v`` in a unit of speed."""
+    speed = (known := known_unit(unit)) is not None and UNITS[known][0] == "speed"
+    return bool({"speed", "velocity", "vel"} & {*last}) or (speed and "v" in last)
+
+
 def _by_word(channel: Channel, text: str, last: Sequence[str], unit: str) -> Iterator[Candidate]:
     """Yield signals of the whole machine by the words of their symbol or column."""
     if re.search(r"wheel|steer|valve|axle", text) or any(is_place(w) and w != "fwd" for w in last):
@@ -151,7 +158,7 @@ def _by_word(channel: Channel, text: str, last: Sequence[str], unit: str) -> Ite
     asks = role(last)
     if "yaw_rate" in last and asks != "both":
         signal = "cmd.omega" if asks == "ref" else signal or "imu.yaw_rate"
-    elif signal is None and asks == "ref" and {"speed", "velocity", "vel"} & {*last} and {*last} <= _WHOLE:
+    elif signal is None and asks == "ref" and _is_speed(last, unit) and {*last} <= _WHOLE:
         signal = "cmd.v"
     if signal is not None:
         yield Candidate(signal, source_of(channel, unit), 9, f"{channel.name} by its name")

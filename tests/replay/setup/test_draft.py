@@ -153,6 +153,35 @@ def test_columns_of_motors_in_german_and_french(
     np.testing.assert_allclose(found.values, v, atol=1e-9)
 
 
+def test_what_cannot_be_si_gets_its_usual_unit_with_one_question_for_each_kind(tmp_path: Path) -> None:
+    v = np.repeat(np.random.default_rng(1).uniform(-0.5, 0.5, 15), 40)
+    columns: dict[str, Any] = {"Zeit": np.arange(600) * 0.05, "Sollgeschwindigkeit": v}
+    for i in range(1, 5):
+        columns |= {f"Rad{i}_Drehzahl_soll": 320 * v, f"Rad{i}_Drehzahl_ist": 320 * v, f"Rad{i}_Ventil": 80 * v}
+    columns |= {"Lenkwinkel_vorne_soll": 50 * v, "Lenkwinkel_vorne_ist": 50 * v}
+    pd.DataFrame(columns).to_csv(tmp_path / "run.csv", index=False)
+    draft = read_back(draft_machine(read_everything([tmp_path / "run.csv"])), tmp_path)
+    signals = draft.machine.signals
+    assert {signals[f"wheel.{w}.u"].unit for w in draft.machine.wheels} == {"%"}
+    assert signals["steer.front.phi"].unit == signals["steer.front.phi_ref"].unit == "deg"
+    assert signals["wheel.FR.v_ref"].gain == signals["wheel.FR.v"].gain == pytest.approx(1 / 320, rel=0.01)
+    assert draft.machine.max_speed < 1.0
+    assert sum("None is stated; in" in q for q in draft.questions) == 2
+    assert not any("cannot be" in q for q in draft.signals.questions)
+
+
+def test_rotations_tell_no_size_of_each_other(tmp_path: Path) -> None:
+    v = np.repeat(np.random.default_rng(1).uniform(-0.5, 0.5, 15), 40)
+    columns: dict[str, Any] = {"Zeit [s]": np.arange(600) * 0.05}
+    for name in ("vorne rechts", "vorne links", "hinten rechts", "hinten links"):
+        columns |= {f"Raddrehzahl {name} Sollwert [U/min]": 20 * v, f"Raddrehzahl {name} Istwert [U/min]": 19 * v}
+    pd.DataFrame(columns).to_csv(tmp_path / "run.csv", index=False)
+    draft = read_back(draft_machine(read_everything([tmp_path / "run.csv"])), tmp_path)
+    assert draft.machine.wheels == ("VR", "VL", "HR", "HL")
+    assert any("how large are the wheels?" in q for q in draft.questions)
+    assert not any("is the wheel radius" in q or "which number" in q for q in draft.questions)
+
+
 def test_a_log_without_a_drive_says_what_to_record(tmp_path: Path) -> None:
     pd.DataFrame({"time": np.arange(50.0), "temperature": 20.0}).to_csv(tmp_path / "run.csv", index=False)
     with pytest.raises(LogError, match="no wheel speed is in the log"):
