@@ -75,7 +75,7 @@ def test_the_fuzzer_notices_and_goes_on(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setitem(TARGETS, "faulty", Faulty)
-    monkeypatch.setattr(pool, "HANG_CPU_S", 0.3)
+    monkeypatch.setattr(pool, "HANG_CPU_S", 1.5)
     (work := tmp_path / "work").mkdir()
     (out := tmp_path / "out").mkdir()
     runs = Pool(["faulty"], SEED, 0, work, out, 1)

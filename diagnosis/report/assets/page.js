@@ -24,15 +24,18 @@
     follow(loop?.drawn && loop, range, "#loop-linked");
     remember();
   });
-  const loop = one("#loop-figure") && new Figure(one("#loop-figure"), one("#loop-badge"), (range) => {
+  // What has just been drawn (`drawn`) follows the shared time, which may have moved meanwhile; what is zoomed leads.
+  const loop = one("#loop-figure") && new Figure(one("#loop-figure"), one("#loop-badge"), (range, drawn) => {
     if (!one("#loop-linked").checked) return;
+    if (drawn && shared) { follow(loop, shared, "#loop-linked"); return; }
     if (!current || !evidence?.drawn) shared = range;
-    follow(evidence?.drawn && !one("#figure").hidden && evidence, range, "#loop-linked");
+    follow(evidence?.rows.length && !one("#figure").hidden && evidence, range, "#loop-linked");
     remember();
   });
-  const explorer = one("#signals") && new Explorer(showSignals, (range) => {
+  const explorer = one("#signals") && new Explorer(showSignals, (range, drawn) => {
+    if (drawn && shared && one("#linked").checked) { follow(explorer.figure, shared); return; }
     if (!current || !evidence?.drawn) shared = range;
-    follow(evidence?.drawn && !one("#figure").hidden && evidence, range);
+    follow(evidence?.rows.length && !one("#figure").hidden && evidence, range);
     if (!current) follow(loop?.drawn && loop, range, "#loop-linked");
     explorer?.across();
     remember();

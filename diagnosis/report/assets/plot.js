@@ -328,7 +328,8 @@ class Figure {
       });
       this.element.on("plotly_doubleclick", () => { if (this.shifted) return; Now.set(Now.t, { a: null }); this.zoom([0, Data.view.duration]); });
     }
-    this.onRange?.(this.range);
+    this.onRange?.(this.range, true);
+    if (target !== this.range) this.zoom(this.range); // zoomed while it was drawn
   }
 
   // The same curves at once, for paper of `width` pixels: a drawing for every five rows, so that no sheet cuts one.
@@ -363,6 +364,7 @@ class Figure {
   async zoom(range) {
     this.range = this.clip(range);
     this.onRange?.(this.range);
+    if (!this.drawn) return; // what is being drawn looks for its range when it is done
     if (this.busy) { this.again = true; return; }
     this.busy = true;
     try {
