@@ -139,6 +139,7 @@ def _signal(signal: Signal, words: MachineWords) -> MappedSignal:
 
 
 _LIST_ALL = "`mfhca channels LOG --all` lists what the log holds; name its signals in [signals] of a machine file."
+_OF_ANOTHER = (" times max_speed ", "max_steer is", "in step with cmd.v")  # compare with the paper's machine
 _STANDS_IN = (
     "no machine file was given: ranges of rotations are shown with the wheels of {} ({:.3g} m); "
     "`mfhca config init --log LOG` writes one from the log"
@@ -172,7 +173,7 @@ def signals_parts(signals: Signals, machine: Machine, given: bool = True) -> lis
         ]
     notes = [n for n in signals.notes if _is_doubt(n)]
     if not given and any(n.startswith("wheel.") for n in signals.items):
-        notes = [n for n in notes if " times max_speed " not in n and "max_steer is" not in n]  # of another machine
+        notes = [n for n in notes if not any(words in n for words in _OF_ANOTHER)]
         notes.insert(0, _STANDS_IN.format(machine.name, 2 * (machine.wheel_radius or 0.0)))
     if notes:
         parts += [section("Notes"), bullets(notes)]

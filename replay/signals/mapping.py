@@ -20,6 +20,7 @@ from replay.machine.config import Machine
 from replay.machine.units import known_unit
 from replay.signals.candidate import Candidate
 from replay.signals.rules import candidates, wanted_type
+from replay.signals.scale_doubt import scale_doubt
 from replay.signals.signal import Signal, Signals
 from replay.signals.to_si import Converted, choose_motor_or_wheel, convert, usable_unit
 from replay.signals.unit_doubts import Doubt, doubt, questions
@@ -125,6 +126,7 @@ def map_signals(logs: Sequence[RawLog], machine: Machine) -> Signals:
     items = dict(sorted(draft.items.items(), key=lambda item: order[item[0]]))
     store = logs[0].store if logs else ColumnStore()
     asked = questions(draft.doubts, items)
+    draft.notes += filter(None, [scale_doubt(items, machine)])
     return Signals(items, draft.missing, tuple(dict.fromkeys(draft.notes)), asked, store=store)
 
 
