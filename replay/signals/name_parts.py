@@ -24,6 +24,7 @@ _PAIRS = {
     "avg": ("front", "left"), "avd": ("front", "right"), "arg": ("rear", "left"), "ard": ("rear", "right"),
     "vl": ("front", "left"), "vr": ("front", "right"), "hl": ("rear", "left"), "hr": ("rear", "right"),
 }  # fmt: skip
+_FRENCH = frozenset(("av", "ar", "avant", "arriere"))
 _STEER = re.compile(r"steer|lenk|kingpin|azimuth|swivel|knuckle|braquage")
 _DRIVE = re.compile(r"wheel|drive|motor|rad(?![a-z]|_?s(?![a-z])|/)|traction|hub|antrieb|roue|moteur")
 _LOOSE = re.compile(r"(?<![A-Za-z0-9])[fblr](?![A-Za-z0-9])")
@@ -35,7 +36,8 @@ def position(name: str) -> tuple[str | None, str | None]:
     """Return front or rear, and left or right, as far as a name says."""
     along = across = None
     loose = _LOOSE.findall(name.lower())
-    for token in tokens(name):
+    words = tokens(name)
+    for token in words:
         meaning = _LONG.get(token)
         if meaning in ("front", "rear", "middle"):
             along = along or meaning
@@ -43,6 +45,8 @@ def position(name: str) -> tuple[str | None, str | None]:
             across = across or meaning
         elif token in _PAIRS:
             along, across = along or _PAIRS[token][0], across or _PAIRS[token][1]
+    if along is not None and across is None and _FRENCH & {*words}:
+        across = "left" if "g" in words else "right" if "d" in words else None
     for token in loose:
         if token in ("f", "b"):
             along = along or ("front" if token == "f" else "rear")

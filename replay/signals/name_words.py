@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 import unicodedata
 from collections.abc import Sequence
+from functools import lru_cache
 
 # Type letters that PLC programs put before a name (fVelocity, lrSpeed, fbWheel).
 _PREFIX = re.compile(r"(?<![A-Za-z])(?:lr|fb|st|ar|[abefgimnprstuwx])(?=[A-Z][a-z])")
@@ -24,7 +25,7 @@ _TOGETHER = re.compile(rf"(?:{'|'.join(_PARTS)})+")
 _PART = re.compile("|".join(sorted(_PARTS, key=len, reverse=True)))
 _MEANINGS = {
     "ref": "soll sollwert vorgabe vorg consigne cons",
-    "act": "ist istwert mess messwert gemessen mesure mesuree mes reel reelle",
+    "act": "ist istwert mess messwert gemessen rueckmeldung mesure mesuree mes reel reelle",
     "speed": "geschwindigkeit geschw vitesse vit",
     "rpm": "drehzahl regime",
     "angle": "winkel",
@@ -59,9 +60,14 @@ def folded(text: str) -> str:
 
 def tokens(name: str) -> list[str]:
     """Lower-case words of a name, split at other characters, at digits, before capitals and within German compounds."""
+    return [*_tokens(name)]
+
+
+@lru_cache(4096)
+def _tokens(name: str) -> tuple[str, ...]:
     parted = _JOINED.sub(r"\1_", _PREFIX.sub("", folded(name)))
     found = [t.lower() for t in re.findall(r"[A-Z]{1,}(?![a-z])|[A-Z]?[a-z]+|\d+", parted)]
-    return [part for word in found for part in (_PART.findall(word) if _TOGETHER.fullmatch(word) else (word,))]
+    return tuple(part for word in found for part in (_PART.findall(word) if _TOGETHER.fullmatch(word) else (word,)))
 
 
 def english(words: Sequence[str]) -> list[str]:

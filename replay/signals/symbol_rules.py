@@ -45,6 +45,7 @@ _PLAIN = (
         )
     )
 )
+_OWN = frozenset(("n", "v", "rad", "wheel"))  # that say it even alone: ``Rad VL [1/min]``
 # Words beside which an asked speed is that of the whole machine.
 _WHOLE = ASKING | frozenset(
     (*("speed", "velocity", "vel", "v", "r", "f", "lr", "x", "lin", "linear", "longitudinal", "fahr", "fahrzeug", "fzg", "vehicle"),
@@ -80,14 +81,15 @@ def by_symbol(channel: Channel, machine: Machine, first: Mapping[str, int]) -> I
     inner = re.search(r"\[([A-Za-z_][\w.\[\]]*)\]$", name)
     name = inner.group(1) if inner and channel.topic else name
     bare = re.sub(r"\[\d+\]", "", name)
-    unit = (channel.unit if channel.topic or stated or "[" not in channel.name else None) or stated or unit_by_end(name)
+    unit = _stated_unit(channel, stated) or unit_by_end(name)
     parts = [english(tokens(part)) for part in re.split(r"[./]", bare)]
     text = "_".join(word for part in parts for word in part)
     last = _last_words(parts, machine)
     asked = role([*last, *(w for part in parts if {*part} <= ASKING | {"st"} for w in part)])
     yield from _by_word(channel, text, parts[-1], unit)
     steering = is_steering(bare)
-    leaf = _leaf(last, asked, steering, unit)
+    valve = re.search(r"valve|spool", text) is not None and re.search(r"motor|drive", text) is None
+    leaf = _leaf(last, asked, steering, unit, valve)
     if leaf is None:
         return
     part = axle_of(bare, machine) if steering else wheel_of(bare, machine)
@@ -116,19 +118,27 @@ def _last_words(parts: Sequence[Sequence[str]], machine: Machine) -> list[str]:
     return []
 
 
-def _leaf(last: Sequence[str], asked: str, steering: bool, unit: str) -> str | None:
+def _stated_unit(channel: Channel, stated: str) -> str:
+    """Unit that the file states; not the name of a part that stands in brackets, ``velocity[front_left]``."""
+    inside = re.search(r"[\[(]([^\[\]()]*)[\])]\s*$", channel.name)
+    part = inside is not None and not stated and channel.unit == inside[1].strip() and not channel.topic
+    return ("" if part else channel.unit or "") or stated
+
+
+def _leaf(last: Sequence[str], asked: str, steering: bool, unit: str, valve: bool) -> str | None:
     """Last word of the canonical name, by the words of a symbol, or by a unit where these say no quantity."""
     word = "_".join(last)
     if asked == "both" or any(_NO_SIGNAL.search(w) for w in last):
         return None
     patterns = _PART_PATTERNS[Scope.AXLE if steering else Scope.WHEEL]
     leaf = next((leaf for leaf, pattern in patterns if re.search(pattern, word)), None)
-    if leaf == "effort" and {"valve", "spool"} & {*last}:  # a valve's current is no effort of its wheel
+    if valve and {"current", "voltage"} & {*last}:  # of a valve: no effort of its wheel, and no opening
         return None
     quantity = UNITS[known] if (known := known_unit(unit)) is not None else ("", 1.0)
-    if leaf is None and last and {w for w in last if not w.isdigit()} <= _PLAIN and asked:
+    if leaf is None and last and {w for w in last if not w.isdigit()} <= _PLAIN and (asked or _OWN & {*last}):
         leaf = "phi" if steering and quantity[0] == "angle" else None
         leaf = "v" if not steering and quantity[0] in ("speed", "rotation") else leaf
+        leaf = {"ref": "u", "act": "u_applied"}.get(asked) if valve and quantity[0] == "fraction" else leaf
     if leaf in ("v", "phi") and asked == "ref":
         return f"{leaf}_ref"
     return leaf

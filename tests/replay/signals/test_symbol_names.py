@@ -37,6 +37,10 @@ def found(channel: Channel) -> list[tuple[str, str]]:
         ("Solldrehzahl Vorderachse links [1/min]", "wheel.FL.v_ref"),
         ("v_HA_re_ist [km/h]", "wheel.RR.v"),
         ("VL [1/min]", None),
+        ("Rad VL [1/min]", "wheel.FL.v"),
+        ("n VL [1/min]", "wheel.FL.v"),
+        ("Vitesse roue AV G (tr/min)", "wheel.FL.v"),
+        ("Courant vanne AVG (mA)", None),
         ("y_Ventil_soll_VR [%]", "wheel.FR.u"),
         ("y_Ventil_ist_VR [%]", "wheel.FR.u_applied"),
         ("Stellgröße_HR (%)", "wheel.RR.u"),
@@ -93,6 +97,13 @@ def test_columns(name: str, signal: str | None) -> None:
         ("GVL_Fahren.fbRad_VR.nIst", None, None),
         ("GVL_Fahren.fbRad_VR.nIst", "°C", None),
         ("GVL_Fahren.rVSoll", "km/h", "cmd.v"),
+        ("MAIN.fbVentilVL.fSollwert", "%", "wheel.FL.u"),
+        ("MAIN.fbVentilVL.fRueckmeldung", "%", "wheel.FL.u_applied"),
+        ("MAIN.fbRad_VL.rSchlupf", "%", None),
+        ("MAIN.fbRad_VL.rSoll", "%", None),
+        ("MAIN.Dieselmotor.rSolldrehzahl", "1/min", None),
+        ("Axes.Axis_FL.NcToPlc.ActVelo", "mm/s", "wheel.FL.v"),
+        ("Axes.Axis_FL.NcToPlc.SetVelo", "mm/s", "wheel.FL.v_ref"),
         ("GVL_Fahren.fbRad_VR.rVentilSoll", "%", "wheel.FR.u"),
         ("GVL_Lenken.fbAchse_VA.rWinkelIst", "°", "steer.front.phi"),
         ("GVL_Lenken.fbAchse_VA.rIst", "°", "steer.front.phi"),
@@ -111,6 +122,12 @@ def test_what_is_asked_is_never_taken_for_what_is_measured() -> None:
     ]
     for name in names:
         assert {s for s, _ in found(column(f"{name} [1/min]"))} <= {"wheel.FL.v_ref"}, name
+
+
+def test_the_unit_of_a_numbered_symbol_stays_and_the_name_of_a_part_is_none() -> None:
+    assert found(symbol("GVL.stWheels[1].rRpmSetpoint", "U/min")) == [("wheel.FR.v_ref", "U/min")]
+    assert found(symbol("GVL.stWheels[1].rRpm", "Umdrehungen")) == [("wheel.FR.v", "Umdrehungen")]
+    assert found(column("speed[FL]")) == [("wheel.FL.v", "")]
 
 
 def test_units_in_names() -> None:
