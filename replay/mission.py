@@ -20,10 +20,12 @@ from replay.log.stamp_order import in_order
 from replay.machine.config import Machine
 from replay.progress import Progress, Stage, Subscriber, silent
 from replay.readers.registry import read_log, summarise_log
-from replay.signals.mapping import map_signals, plan_topics
+from replay.signals.mapping import NO_CHANNEL, map_signals, plan_topics
+from replay.signals.near_misses import near_misses
 from replay.signals.rules import candidates
 from replay.signals.signal import Signals
 from replay.signals.timeline import Timeline, align, check_overlap
+from replay.unused_files import require_use
 
 _BLOCK = 1 << 22
 
@@ -168,7 +170,8 @@ def read_signals(
     dated = tuple(
         replace(file, clock=next(clock_of)) if use else _strange(file) for file, use in zip(files, known, strict=True)
     )
-    return dated, replace(signals, notes=notes, open_loop=bool(marked))
+    missing = near_misses(signals.missing, [file.summary for file in files], NO_CHANNEL)
+    return dated, replace(signals, missing=missing, notes=notes, open_loop=bool(marked))
 
 
 def _strange(file: MissionFile) -> MissionFile:
@@ -273,7 +276,7 @@ def load_mission(
     files, signals = read_signals(paths, machine, progress=progress, store=store)
     check_units(signals)
     progress(Progress(Stage.ALIGNING_SIGNALS))
-    _require_use(files, signals)
+    require_use(files, signals)
     try:
         files, signals = _on_one_clock(files, signals)
         timeline = align(signals, start_s, stop_s)
@@ -288,17 +291,6 @@ def check_units(signals: Signals) -> None:
         first, rest = signals.questions[0], len(signals.questions) - 1
         more = f" ({rest} more signal{'s' if rest > 1 else ''} likewise; `mfhca channels` lists them)" if rest else ""
         raise ConfigError(f"values that cannot be, so nothing was judged: {first}{more}")
-
-
-def _require_use(files: Sequence[MissionFile], signals: Signals) -> None:
-    """Raise where one of several files adds nothing."""
-    used = {signal.source for signal in signals.items.values()}
-    idle = [file.path for file in files if str(file.path) not in used and not file.strange]
-    if len(files) > 1 and idle and used:
-        raise LogError(
-            f"{idle[0]}: none of its channels is used, all signals were found in the other files; diagnose it by itself, "
-            "or name its signals with source = in the machine file's [signals]"
-        )
 
 
 def _cause(files: Sequence[MissionFile]) -> str:

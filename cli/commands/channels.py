@@ -50,7 +50,7 @@ def channels(
         return
     from cli.tables.layout import bullets, section
 
-    terminal.show(*signals_parts(signals, the_machine))
+    terminal.show(*signals_parts(signals, the_machine, given=machine is not None))
     damage = [line for file in files for line in file.summary.damage]
     if damage:
         terminal.show(section("Damage"), bullets(damage))

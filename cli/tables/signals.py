@@ -17,6 +17,7 @@ from diagnosis.results.machine_words import MachineWords, machine_words
 from replay.machine.config import Machine
 from replay.machine.signal_table import signal_of
 from replay.mission import MissionFile
+from replay.signals.mapping import NO_CHANNEL
 from replay.signals.signal import Signal, Signals
 from replay.signals.timeline import median_period
 
@@ -86,9 +87,6 @@ class SignalsDocument(TypedDict):
     questions: list[str]
 
 
-_NOT_FOUND = "no channel fits by its name or message type"
-
-
 def signals_document(files: Sequence[MissionFile], signals: Signals, machine: Machine, source: str) -> SignalsDocument:
     """Mapped and missing signals as JSON values."""
     words = machine_words(machine, signals.items)
@@ -140,10 +138,21 @@ def _signal(signal: Signal, words: MachineWords) -> MappedSignal:
     }
 
 
-def signals_parts(signals: Signals, machine: Machine) -> list[RenderableType]:
-    """Mapped signals, missing ones with their cost, and doubts, for the terminal."""
+_LIST_ALL = "`mfhca channels LOG --all` lists what the log holds; name its signals in [signals] of a machine file."
+_OF_ANOTHER = (" times max_speed ", "max_steer is", "in step with cmd.v")  # compare with the paper's machine
+_STANDS_IN = (
+    "no machine file was given: ranges of rotations are shown with the wheels of {} ({:.3g} m); "
+    "`mfhca config init --log LOG` writes one from the log"
+)
+
+
+def signals_parts(signals: Signals, machine: Machine, given: bool = True) -> list[RenderableType]:
+    """Mapped signals, missing ones with their cost, and doubts, for the terminal; `given`: whether there is a machine file."""
     words = machine_words(machine, signals.items)
-    parts: list[RenderableType] = [text("No signal of the machine was found.", "bold")]
+    parts: list[RenderableType] = [
+        text("No signal of the machine was found.", "bold"),
+        text(_LIST_ALL, "dim"),
+    ]
     if signals.items:
         several = len({s.source for s in signals.items.values()}) > 1
         rows = [_row(s, several, words) for s in signals.items.values()]
@@ -163,6 +172,9 @@ def signals_parts(signals: Signals, machine: Machine) -> list[RenderableType]:
             table(("part", "what shows", "log to tell more"), by_part),
         ]
     notes = [n for n in signals.notes if _is_doubt(n)]
+    if not given and any(n.startswith("wheel.") for n in signals.items):
+        notes = [n for n in notes if not any(words in n for words in _OF_ANOTHER)]
+        notes.insert(0, _STANDS_IN.format(machine.name, 2 * (machine.wheel_radius or 0.0)))
     if notes:
         parts += [section("Notes"), bullets(notes)]
     return parts
@@ -198,7 +210,7 @@ def _part(f: Forecast, words: MachineWords) -> str:
 
 
 def _cost(cost: str, reason: str) -> Text:
-    return text(cost) if reason == _NOT_FOUND else Text.assemble(text(cost), "\n", text(reason, "dim"))
+    return text(cost) if reason == NO_CHANNEL else Text.assemble(text(cost), "\n", text(reason, "dim"))
 
 
 def _is_doubt(note: str) -> bool:

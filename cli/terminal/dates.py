@@ -44,12 +44,16 @@ def nanoseconds(moment: datetime) -> int:
 
 def shown_moment(start_ns: int) -> str:
     """Moment in UTC, and beside it in local time where that is another: ``2026-10-05 12:30:00 UTC (14:30:00 CEST)``."""
+    from diagnosis.pages.labels import UNDATED_NS  # loads much
+
     try:
         moment = datetime.fromtimestamp(start_ns // 10**9, tz=UTC)
         local = moment.astimezone()
     except (ValueError, OverflowError, OSError):
         return "an unknown time"
     shown = f"{moment:%Y-%m-%d %H:%M:%S} UTC"
+    if 0 <= start_ns < UNDATED_NS:
+        return f"{start_ns / 1e9:.3g} s of a clock without a date (simulated time, or counted from a start)"
     if not local.utcoffset():
         return shown
     day = "" if local.date() == moment.date() else f"{local:%Y-%m-%d} "

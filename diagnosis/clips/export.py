@@ -116,8 +116,8 @@ def write_export(
         messages = write_clip(path, definitions, chain(*parts), about, MARK)
     written = [path]
     if contents.diagnostics:
-        names = [course.name for course in courses(report)]
-        texts = foxglove_diagnosis(names), plotjuggler_diagnosis(hardware_of(report), names)
+        keys = {c.name: {k for s in c.statuses for k, _ in s.values} for c in courses(report)}
+        texts = foxglove_diagnosis(list(keys)), plotjuggler_diagnosis(hardware_of(report), keys)
         for ending, text in zip(LAYOUTS, texts, strict=True):
             layout = path.with_name(path.stem + ending)
             with atomic_path(layout) as temporary:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from diagnosis.pages.labels import clock, mode_legend, number, sat_text, utc_mark
+from diagnosis.pages.labels import UNDATED_NS, clock, mode_legend, number, sat_text, utc_mark
 from diagnosis.report.confidence import headline, judged, sure_of, sure_of_verdict
 from diagnosis.report.data_tables import (
     check_rows,
@@ -199,7 +199,9 @@ def _facts(report: ReportDocument, duration: float) -> list[tuple[str, str]]:
     machine, log = report["machine"], report["log"]
     facts = [
         ("Machine", machine["id"] or machine["name"] or "unnamed"),
-        ("Start (UTC)", utc_mark(log["start_ns"], both=True)),
+        ("Start (UTC)", utc_mark(log["start_ns"], both=True))
+        if not 0 <= log["start_ns"] < UNDATED_NS
+        else ("Start", "clock without a date"),
         ("Duration", clock(duration)),
         (words_of(machine).moving.capitalize(), clock(log["driving_s"])),
     ]

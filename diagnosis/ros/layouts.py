@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Collection, Mapping, Sequence
 from typing import Any
 from xml.etree import ElementTree
 
@@ -51,26 +51,31 @@ def foxglove_diagnosis(parts: Sequence[str]) -> str:
     return json.dumps(document, indent=2, ensure_ascii=False) + "\n"
 
 
-def plotjuggler_diagnosis(hardware_id: str, parts: Sequence[str]) -> str:
+def plotjuggler_diagnosis(hardware_id: str, parts: Mapping[str, Collection[str]]) -> str:
     """Level, ε̂ and probability of all parts, one area each.
+
+    A curve that no status holds would be asked about when the layout is loaded, so it is left out, as is an empty area.
 
     Parameters
     ----------
     hardware_id : str
         That of the statuses.
-    parts : Sequence[str]
-        Their names.
+    parts : Mapping[str, Collection[str]]
+        Their names, with the keys that their statuses have.
     """
+    shown = [key for key in _SHOWN if any(key in keys for keys in parts.values())]
     root = ElementTree.Element("root")
     window = ElementTree.SubElement(root, "tabbed_widget", {"name": "Main Window", "parent": "main_window"})
     tab = ElementTree.SubElement(window, "Tab", tab_name=_TITLE, containers="1")
     container = ElementTree.SubElement(tab, "Container")
-    sizes = ";".join([f"{1 / len(_SHOWN):.6f}"] * len(_SHOWN))
-    splitter = ElementTree.SubElement(container, "DockSplitter", orientation="-", count=str(len(_SHOWN)), sizes=sizes)
-    for key in _SHOWN:
+    sizes = ";".join([f"{1 / len(shown):.6f}"] * len(shown))
+    splitter = ElementTree.SubElement(container, "DockSplitter", orientation="-", count=str(len(shown)), sizes=sizes)
+    for key in shown:
         area = ElementTree.SubElement(splitter, "DockArea", name=key)
         drawn = ElementTree.SubElement(area, "plot", mode="TimeSeries", style="Steps", flip_x="false", flip_y="false")
         for k, part in enumerate(parts):
+            if key not in parts[part]:
+                continue
             name = "/".join(filter(None, (DIAGNOSTICS, hardware_id, part, key)))
             ElementTree.SubElement(drawn, "curve", name=name, color=COLOURS[k % len(COLOURS)])
     ElementTree.SubElement(window, "currentTabIndex", index="0")

@@ -13,6 +13,7 @@ from replay.log.raw_log import Channel, RawLog
 from replay.machine.config import Machine
 from replay.machine.units import known_unit
 from replay.signals.mapping import sparse_rows
+from replay.signals.named_units import unit_by_end
 from replay.signals.rules import candidates
 from replay.signals.timeline import median_period
 
@@ -29,12 +30,6 @@ _FIELDS = (
 _MESSAGES = re.compile(
     r"(JointState|Twist|TwistStamped|Odometry|Imu|NavSatFix|GPSFix|Pose\w*|AckermannDrive\w*|DynamicJointState)$"
 )
-# Ends of names that people give to columns.
-_ENDS = (
-    (r"rpm|u_?min|tr_?min", "rpm"), (r"mps|m_s|ms", "m/s"), (r"kmh|kph|km_h", "km/h"), (r"rads|rad_s|rps", "rad/s"),
-    (r"degs|deg_s|dps", "deg/s"), (r"deg|grad", "deg"), (r"rad", "rad"), (r"pct|percent|prozent", "%"), (r"bar", "bar"),
-    (r"nm", "N·m"), (r"amps?|current", "A"), (r"volts?|voltage", "V"), (r"mm", "mm"),
-)  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -127,8 +122,4 @@ def unit_of_channel(channel: Channel) -> tuple[str, bool]:
         for pattern, unit in _FIELDS:
             if re.search(pattern, channel.field):
                 return unit, False
-    bare = re.sub(r"[^a-z0-9]+", "_", re.sub(r"\[\d+\]", "", channel.name).lower()).strip("_")
-    for pattern, unit in _ENDS:
-        if re.search(rf"(^|_)({pattern})$", bare):
-            return unit, True
-    return "", True
+    return unit_by_end(channel.name, doubtful=True), True

@@ -19,6 +19,7 @@ from replay.setup.motion import WheelMotion, backwards, wheel_motion
 from replay.setup.preset import Preset
 from replay.setup.robot_description import RobotDescription, parse_description
 from replay.setup.structure import ONE, Structure, described_structure, named_structure, preset_structure
+from replay.setup.unstated_units import usual_units
 from replay.signals.mapping import map_signals
 from replay.signals.signal import Signals
 
@@ -89,6 +90,10 @@ def draft_machine(logs: Sequence[RawLog], preset: Preset | None = None) -> Draft
     sources = table_sources(logs, draft)
     raw = replace(structure.machine(1.0), signals=given, sources=sources)
     found = map_signals(logs, raw)
+    units = usual_units(draft, found)
+    if units:
+        raw = replace(raw, signals={**raw.signals, **units})
+        found = map_signals(logs, raw)
     motions = _motions(found, structure.wheels)
     origins = _in_one_direction(draft, structure, found, motions)
     _ask_for_commands(draft, found)
@@ -165,7 +170,7 @@ def _structure(
 def _name(description: RobotDescription | None, logs: Sequence[RawLog]) -> str:
     if description is not None and description.name:
         return description.name
-    return f"robot of {PurePath(logs[0].source).name}"
+    return f"machine of {PurePath(logs[0].source).name}"
 
 
 def _motions(found: Signals, wheels: Sequence[str]) -> dict[str, WheelMotion]:

@@ -37,8 +37,11 @@ def wheel_radius(
     turning = [n for w in structure.wheels if (n := f"wheel.{w}.v") in origins and _is_rotation(origins[n])]
     bare = [n for w in structure.wheels if (n := f"wheel.{w}.v") in origins and not origins[n].unit]
     asked = [n for w in structure.wheels if (n := f"wheel.{w}.v_ref") in origins and _is_rotation(origins[n])]
+    told = [
+        n for n in turning if "cmd.v" in found.items or f"{n}_ref" not in asked
+    ]  # rotations tell no size of each other
     exact = _agreed([1 / abs(motions[n].gain) for n in asked if n in motions])
-    measured = exact or _agreed([1 / abs(motions[n].gain) for n in turning if n in motions])
+    measured = exact or _agreed([1 / abs(motions[n].gain) for n in told if n in motions])
     if bare:
         measured = _unit_of_speeds(draft, structure, found, bare, motions, origins) or measured
     if structure.radius is not None:
@@ -52,9 +55,12 @@ def wheel_radius(
     if measured is not None and measured < _WHEEL_SIZES[0]:
         draft.ask(
             "geometry",
-            f"were the motors measured? Radius over gear ratio is {measured:.3g} m; for motors give gear_ratio and wheel_diameter "
-            'here, and at = "motor" in [signals].',
+            f"were the motors measured? Radius over gear ratio is {measured:.3g} m, and rotations are written with at = "
+            '"motor": give gear_ratio and wheel_diameter here.',
         )
+        for n, origin in origins.items():
+            if n.startswith("wheel.") and _is_rotation(origin):
+                origins[n] = replace(origin, at="motor")
         return max(float(_round(measured)), _RADII[0] / 2)
     if measured is not None and measured <= _RADII[1]:
         draft.ask(
@@ -112,15 +118,22 @@ def _unit_of_speeds(
     for unit, turn in (("rad/s", 1.0), ("rpm", 2 * math.pi / 60)):
         radius = 1 / (gain * turn)
         if structure.places is not None and _WHEEL_SIZES[0] <= radius <= _WHEEL_SIZES[1]:
-            for n in names:
+            for n in (*names, *_asked_alike(found, names, origins)):
                 origins[n] = replace(origins[n], unit=unit)
             draft.ask("signals", f"are {labels} in {unit}? None is stated; {how} with wheels of {radius:.3g} m radius.")
             return radius
-    for n in names:
+    for n in (*names, *_asked_alike(found, names, origins)):
         scale = float(f"{origins[n].gain / gain:.6g}")
         origins[n] = replace(origins[n], unit="m/s", gain=scale)
     draft.ask("signals", f"what is the scale of {labels}? No unit is stated; {1 / gain:.6g} makes it m/s: {how}.")
     return None
+
+
+def _asked_alike(found: Signals, names: Sequence[str], origins: Mapping[str, SignalSource]) -> list[str]:
+    """Commanded speeds of wheels without a unit, which are as large as the measured ones: they have the same one."""
+    asked = [n for name in names if (n := f"{name}_ref") in origins and not origins[n].unit]
+    sizes = [peak_of(found.items[n].values) / max(peak_of(found.items[n[:-4]].values), 1e-9) for n in asked]
+    return asked if sizes and all(0.4 < size < 2.5 for size in sizes) else []
 
 
 def _round(value: float) -> str:

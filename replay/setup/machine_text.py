@@ -67,7 +67,7 @@ def _comment(text: str) -> list[str]:
 
 
 def _geometry(machine: Machine) -> Iterable[str]:
-    if machine.gear_ratio != 1.0:
+    if machine.gear_ratio != 1.0 or any(s.at == "motor" for s in machine.signals.values()):
         yield f"gear_ratio = {real_text(machine.gear_ratio)}"
     yield f"max_speed = {real_text(machine.max_speed)}  # m/s, at the rim"
     if machine.axles:

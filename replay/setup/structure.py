@@ -11,11 +11,18 @@ from replay.machine.config import Machine, haulotte
 from replay.machine.geometry import Geometry, WheelGeometry
 from replay.setup.preset import Preset
 from replay.setup.robot_description import RobotDescription, WheelJoint
-from replay.signals.name_parts import index_of, is_steering, position, tokens, wheel_of
+from replay.signals.name_parts import index_of, is_steering, position, wheel_of
+from replay.signals.name_words import tokens
+from replay.signals.named_units import bare_name
 from replay.signals.rules import candidates
 
 FOUR, SIX = ("FR", "FL", "RR", "RL"), ("FR", "FL", "MR", "ML", "RR", "RL")
-GERMAN, TWO, ONE = ("VR", "VL", "HR", "HL"), ("R", "L"), ("D",)
+GERMAN, FRENCH = ("VR", "VL", "HR", "HL"), ("AVD", "AVG", "ARD", "ARG")
+TWO, ONE = ("R", "L"), ("D",)
+_LANGUAGES = (
+    (GERMAN, {"vl", "vr", "hl", "hr", "vorne", "vorn", "hinten", "vorder", "hinter", "va", "ha"}),
+    (FRENCH, {"avg", "avd", "arg", "ard", "avant", "arriere", "gauche", "droite"}),
+)
 _NUMBERED = (8, 6, 4, 3, 2)
 _TRACK, _BASE, _RADIUS = 0.5, 0.5, 0.1  # m; where nothing tells them
 
@@ -137,10 +144,7 @@ def named_structure(channels: Mapping[str, Channel]) -> Structure | None:
     named: tuple[tuple[str, ...], ...] = (SIX, FOUR, TWO)
     for names in named:
         if _covers(channels, names, by_name=True):
-            german = names == FOUR and any(
-                {"vl", "vr", "hl", "hr", "vorne", "hinten"} & set(tokens(c)) for c in channels
-            )
-            wheels = GERMAN if german else names
+            wheels = _called(channels) if names == FOUR else names
             return Structure(wheels, supposed(wheels, _steered(channels, wheels)), how="the names in the log")
     for count in _NUMBERED:
         wheels = FOUR if count == 4 else TWO if count == 2 else tuple(f"W{i + 1}" for i in range(count))
@@ -153,6 +157,14 @@ def named_structure(channels: Mapping[str, Channel]) -> Structure | None:
     return None
 
 
+def _called(channels: Mapping[str, Channel]) -> tuple[str, ...]:
+    """Names of four wheels in the language of the log: of two that it could be, the one with more words in it."""
+    said = [w for c in channels for w in tokens(c)]
+    known = [(sum(w in words for w in said), names) for names, words in _LANGUAGES]
+    count, names = max(known, key=lambda one: one[0])
+    return names if count else FOUR
+
+
 def _covers(channels: Mapping[str, Channel], wheels: tuple[str, ...], by_name: bool = False) -> bool:
     """Whether every one of these wheels has a speed that is its own, found by its name alone or also by its number."""
     trial = Structure(wheels, supposed(wheels)).machine(1.0)
@@ -161,7 +173,7 @@ def _covers(channels: Mapping[str, Channel], wheels: tuple[str, ...], by_name: b
         group, part, leaf = (*c.signal.split("."), "", "")[:3]
         if group != "wheel" or leaf not in ("v", "v_true", "u_applied"):
             continue
-        name = c.origin.label
+        name = bare_name(c.origin.label)[0]
         inner = re.search(r"\[([A-Za-z_][^\[\]]*)\]$", name)
         if by_name and wheel_of(inner[1] if inner else re.sub(r"\[\d+\]", "", name), trial) != part:
             continue

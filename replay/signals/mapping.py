@@ -18,10 +18,15 @@ from replay.log.raw_log import Channel, LogSummary, RawLog, TopicInfo
 from replay.log.source_options import SignalSource
 from replay.machine.config import Machine
 from replay.machine.units import known_unit
-from replay.signals.rules import Candidate, candidates, wanted_type
+from replay.signals.candidate import Candidate
+from replay.signals.rules import candidates, wanted_type
+from replay.signals.scale_doubt import scale_doubt
 from replay.signals.signal import Signal, Signals
 from replay.signals.to_si import Converted, choose_motor_or_wheel, convert, usable_unit
 from replay.signals.unit_doubts import Doubt, doubt, questions
+
+#: Why a signal is missing for which nothing was found.
+NO_CHANNEL = "no channel fits by its name or message type"
 
 
 def plan_topics(
@@ -121,6 +126,7 @@ def map_signals(logs: Sequence[RawLog], machine: Machine) -> Signals:
     items = dict(sorted(draft.items.items(), key=lambda item: order[item[0]]))
     store = logs[0].store if logs else ColumnStore()
     asked = questions(draft.doubts, items)
+    draft.notes += filter(None, [scale_doubt(items, machine)])
     return Signals(items, draft.missing, tuple(dict.fromkeys(draft.notes)), asked, store=store)
 
 
@@ -150,7 +156,7 @@ def _take_given(draft: _Draft, name: str, source: SignalSource, logs: Sequence[R
 
 def _take_guess(draft: _Draft, name: str, found: list[tuple[Candidate, RawLog]]) -> None:
     """Take the surest candidate that holds a number."""
-    reason = "no channel fits by its name or message type"
+    reason = NO_CHANNEL
     ranked = sorted(found, key=lambda f: (f[0].rank, -_size(f[1], f[0])))
     for i, (candidate, log) in enumerate(ranked):
         channel = _find(log, candidate.origin)

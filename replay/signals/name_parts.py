@@ -6,12 +6,14 @@ import re
 from collections.abc import Iterable
 
 from replay.machine.config import Machine
+from replay.signals.name_words import tokens
 
 _LONG = {
     "front": "front", "fore": "front", "fwd": "front", "vorne": "front", "vorn": "front",
     "rear": "rear", "back": "rear", "aft": "rear", "hinten": "rear",
     "left": "left", "links": "left", "right": "right", "rechts": "right",
     "middle": "middle", "mid": "middle", "center": "middle", "centre": "middle", "mitte": "middle", "mittig": "middle",
+    "vorder": "front", "va": "front", "hinter": "rear", "ha": "rear", "av": "front", "ar": "rear", "li": "left", "re": "right",
     "avant": "front", "arriere": "rear", "gauche": "left", "droite": "right", "droit": "right",
 }  # fmt: skip
 _PAIRS = {
@@ -22,30 +24,20 @@ _PAIRS = {
     "avg": ("front", "left"), "avd": ("front", "right"), "arg": ("rear", "left"), "ard": ("rear", "right"),
     "vl": ("front", "left"), "vr": ("front", "right"), "hl": ("rear", "left"), "hr": ("rear", "right"),
 }  # fmt: skip
-_STEER = re.compile(r"steer|lenk|kingpin|azimuth|swivel|knuckle")
-_DRIVE = re.compile(r"wheel|drive|motor|rad\b|traction|hub")
-# Type letters that PLC programs put before a name (fVelocity, lrSpeed, fbWheel).
-_PREFIX = re.compile(r"(?<![A-Za-z])(?:lr|fb|st|ar|[abefgimnprstuwx])(?=[A-Z][a-z])")
+_FRENCH = frozenset(("av", "ar", "avant", "arriere"))
+_STEER = re.compile(r"steer|lenk|kingpin|azimuth|swivel|knuckle|braquage")
+_DRIVE = re.compile(r"wheel|drive|motor|rad(?![a-z]|_?s(?![a-z])|/)|traction|hub|antrieb|roue|moteur")
 _LOOSE = re.compile(r"(?<![A-Za-z0-9])[fblr](?![A-Za-z0-9])")
-# Words of a place that are written as one.
-_JOINED = re.compile(
-    r"(?i)(front|rear|back|middle|mid|vorne|vorn|hinten|left|right|links|rechts)(?=left|right|links|rechts|front|rear|back|wheel|rad)"
-)
 _NO_DRIVE = re.compile(r"castor|caster|arm|grip|finger|flipper|head|neck|elbow|shoulder|wrist|hip|knee|lift|torso")
 _INDEX = re.compile(r"\[(\d+)\]|(?<=[A-Za-z_])(\d+)(?!\d)")
-
-
-def tokens(name: str) -> list[str]:
-    """Lower-case words of a name, split at other characters, at digits and before capitals; no type letters."""
-    parted = _JOINED.sub(r"\1_", _PREFIX.sub("", name))
-    return [t.lower() for t in re.findall(r"[A-Z]{1,}(?![a-z])|[A-Z]?[a-z]+|\d+", parted)]
 
 
 def position(name: str) -> tuple[str | None, str | None]:
     """Return front or rear, and left or right, as far as a name says."""
     along = across = None
     loose = _LOOSE.findall(name.lower())
-    for token in tokens(name):
+    words = tokens(name)
+    for token in words:
         meaning = _LONG.get(token)
         if meaning in ("front", "rear", "middle"):
             along = along or meaning
@@ -53,6 +45,8 @@ def position(name: str) -> tuple[str | None, str | None]:
             across = across or meaning
         elif token in _PAIRS:
             along, across = along or _PAIRS[token][0], across or _PAIRS[token][1]
+    if along is not None and across is None and _FRENCH & {*words}:
+        across = "left" if "g" in words else "right" if "d" in words else None
     for token in loose:
         if token in ("f", "b"):
             along = along or ("front" if token == "f" else "rear")
@@ -66,9 +60,17 @@ def position(name: str) -> tuple[str | None, str | None]:
     return along, across
 
 
+def is_place(word: str) -> bool:
+    """Whether a lower-case word says nothing but a place: ``left``, ``vl``, ``ha``."""
+    return word in _LONG or word in _PAIRS
+
+
 def is_steering(name: str) -> bool:
-    """Whether a name speaks of steering."""
-    return _STEER.search(name.lower()) is not None
+    """Whether a name speaks of steering, or of an angle of an axle."""
+    if _STEER.search(name.lower()) is not None:
+        return True
+    words = tokens(name)
+    return bool({"winkel", "angle", "phi"} & {*words}) and position(name) in (("front", None), ("rear", None))
 
 
 def is_drive(name: str) -> bool:

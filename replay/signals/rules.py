@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass
 
 from replay.log.raw_log import Channel
 from replay.log.source_options import SignalSource
 from replay.machine.config import Machine
-from replay.machine.signal_table import CANONICAL, Scope, signal_of
-from replay.signals.name_parts import axle_of, first_indices, index_of, is_drive, is_steering, tokens, wheel_of
+from replay.machine.signal_table import signal_of
+from replay.signals.candidate import Candidate, source_of
+from replay.signals.name_parts import axle_of, first_indices, index_of, is_drive, is_steering, wheel_of
+from replay.signals.name_words import tokens
+from replay.signals.symbol_rules import by_symbol
 
 MESSAGE_TYPES = (
     "JointState", "DynamicJointState", "Twist", "TwistStamped", "AckermannDrive", "AckermannDriveStamped", "Odometry",
@@ -24,40 +26,7 @@ _COMMON_PACKAGES = frozenset(
         *("foxglove_msgs", "lifecycle_msgs", "statistics_msgs", "service_msgs", "theora_image_transport"),
     )
 )
-_EFFORT_UNITS = (("A", r"current|(^|_)amp"), ("V", r"volt"), ("%", r"duty|pwm"))
 _WORDS_REF = re.compile(r"ref|cmd|command|set|des|target|soll|demand")
-
-
-def _named(scope: Scope) -> tuple[tuple[str, str], ...]:
-    """Signals of a scope with the patterns that name them, in the order in which these are tried."""
-    found = [(e.named, e.leaf if scope else e.kind) for e in CANONICAL if e.scope == scope and e.named is not None]
-    return tuple((signal, named.pattern) for named, signal in sorted(found, key=lambda pair: pair[0].order))
-
-
-_PART_PATTERNS = {scope: _named(scope) for scope in (Scope.WHEEL, Scope.AXLE)}
-_MACHINE_PATTERNS = _named(Scope.MACHINE)
-
-
-@dataclass(frozen=True)
-class Candidate:
-    """A channel that may hold a signal.
-
-    Attributes
-    ----------
-    signal : str
-        Canonical name.
-    origin : SignalSource
-        Channel and conversion; an empty unit is left to what the channel states.
-    rank : int
-        Smaller is surer.
-    why : str
-        Reason, for the report.
-    """
-
-    signal: str
-    origin: SignalSource
-    rank: int
-    why: str
 
 
 def wanted_type(type_name: str) -> bool:
@@ -73,15 +42,9 @@ def candidates(channels: Mapping[str, Channel], machine: Machine) -> Iterator[Ca
         yield from _by_canonical(channel, machine)
         if channel.topic:
             yield from _by_message(channel, machine, channels)
-        yield from _by_symbol(channel, machine, first)
-
-
-def _source(channel: Channel, unit: str = "", derivative: bool = False) -> SignalSource:
-    if channel.topic:
-        return SignalSource(topic=channel.topic, field=channel.field, unit=unit, derivative=derivative)
-    if channel.type_name and channel.name != channel.field:
-        return SignalSource(symbol=channel.name, unit=unit, derivative=derivative)
-    return SignalSource(column=channel.name, unit=unit, derivative=derivative)
+        if channel.topic and channel.type_name.rpartition("/")[2] in MESSAGE_TYPES[:11]:
+            continue
+        yield from by_symbol(channel, machine, first)
 
 
 def _by_canonical(channel: Channel, machine: Machine) -> Iterator[Candidate]:
@@ -94,7 +57,10 @@ def _by_canonical(channel: Channel, machine: Machine) -> Iterator[Candidate]:
         signal = known.get(text.lower())
         if signal is not None and not (text == path and channel.field != "data"):
             yield Candidate(
-                signal, _source(channel, channel.unit or signal_of(signal).unit), 0, "it carries the signal's own name"
+                signal,
+                source_of(channel, channel.unit or signal_of(signal).unit),
+                0,
+                "it carries the signal's own name",
             )
             return
 
@@ -105,7 +71,7 @@ def _by_message(channel: Channel, machine: Machine, others: Mapping[str, Channel
     plain = topic.rpartition("/")[2]
 
     def found(signal: str, unit: str, rank: int, why: str = "") -> Candidate:
-        return Candidate(signal, _source(channel, unit), rank, why or f"{leaf} on {topic}")
+        return Candidate(signal, source_of(channel, unit), rank, why or f"{leaf} on {topic}")
 
     if leaf in ("Twist", "TwistStamped") and re.search(r"cmd|command", topic.lower()):
         rank = {"cmd_vel": 1, "cmd": 2}.get(plain, 3) + topic.count("/") - 1
@@ -174,23 +140,23 @@ def _by_joint(channel: Channel, machine: Machine, others: Mapping[str, Channel])
     if role in ("u", "u_applied"):
         part = f"wheel.{wheel}" if wheel else f"steer.{axle}" if axle else None
         if part and kind == "effort":
-            yield Candidate(f"{part}.{role}", _source(channel, "1"), rank, why)
+            yield Candidate(f"{part}.{role}", source_of(channel, "1"), rank, why)
     elif wheel and kind == "effort" and role == "measured":
-        yield Candidate(f"wheel.{wheel}.effort", _source(channel, "N·m"), rank, why)
+        yield Candidate(f"wheel.{wheel}.effort", source_of(channel, "N·m"), rank, why)
     elif wheel and kind == "velocity":
         leaf = {"measured": "v", "ref": "v_ref", "true": "v_true"}.get(role)
         if leaf:
-            yield Candidate(f"wheel.{wheel}.{leaf}", _source(channel, "rad/s"), rank, why)
+            yield Candidate(f"wheel.{wheel}.{leaf}", source_of(channel, "rad/s"), rank, why)
     elif wheel and kind == "position" and role == "measured":
-        yield Candidate(f"wheel.{wheel}.v", _source(channel, "rad", derivative=True), rank + 20, f"position of {why}")
+        yield Candidate(f"wheel.{wheel}.v", source_of(channel, "rad", derivative=True), rank + 20, f"position of {why}")
         beside = re.sub(r"position", "velocity", channel.field, count=1)
         if f"{channel.topic}.{beside}" in others:  # else it is the speed itself
-            source = _source(channel, "rad", derivative=True)
+            source = source_of(channel, "rad", derivative=True)
             yield Candidate(f"wheel.{wheel}.v_position", source, rank, f"position of {why}")
     elif axle and kind == "position":
         leaf = {"measured": "phi", "ref": "phi_ref", "true": "phi_true"}.get(role)
         if leaf:
-            yield Candidate(f"steer.{axle}.{leaf}", _source(channel, "rad"), rank, why)
+            yield Candidate(f"steer.{axle}.{leaf}", source_of(channel, "rad"), rank, why)
 
 
 def _numbered(joint: str, machine: Machine, others: Iterable[str], channel: Channel) -> str | None:
@@ -214,62 +180,8 @@ def _by_command_array(channel: Channel, machine: Machine, others: Mapping[str, C
     why = f"entry {at} of {channel.topic}, its order taken to be"
     if re.search(r"steer|position", name) and count == len(machine.axles):
         signal = f"steer.{machine.axles[at]}.{'u' if 'valve' in name else 'phi_ref'}"
-        yield Candidate(signal, _source(channel, "1" if "valve" in name else "rad"), 6, f"{why} {machine.axles}")
+        yield Candidate(signal, source_of(channel, "1" if "valve" in name else "rad"), 6, f"{why} {machine.axles}")
     elif count == len(machine.wheels):
         valve = re.search(r"valve|effort|duty|pwm", name) is not None
         signal = f"wheel.{machine.wheels[at]}.{'u' if valve else 'v_ref'}"
-        yield Candidate(signal, _source(channel, "1" if valve else "rad/s"), 6, f"{why} {machine.wheels}")
-
-
-def _by_symbol(channel: Channel, machine: Machine, first: Mapping[str, int]) -> Iterator[Candidate]:
-    """Yield PLC symbols and table columns that name a wheel or axle and a quantity."""
-    if channel.topic and channel.field not in ("data", "value") and not re.search(r"\[[\w.]+\]$", channel.field):
-        return
-    if channel.topic and channel.type_name.rpartition("/")[2] in MESSAGE_TYPES[:11]:
-        return
-    name = re.sub(r"\s*\[[^\]\d][^\]]*\]\s*$", "", channel.name) if not channel.topic else channel.name
-    inner = re.search(r"\[([A-Za-z_][\w.\[\]]*)\]$", name)
-    name = inner.group(1) if inner and channel.topic else name
-    bare = re.sub(r"\[\d+\]", "", name)
-    last = "_".join(tokens(re.split(r"[./]", bare)[-1]))
-    text = "_".join(tokens(bare))
-    yield from _by_word(channel, text)
-    steering = is_steering(bare)
-    patterns = _PART_PATTERNS[Scope.AXLE if steering else Scope.WHEEL]
-    leaf = next((leaf for leaf, pattern in patterns if re.search(pattern, last)), None)
-    if leaf is None:
-        return
-    part = axle_of(bare, machine) if steering else wheel_of(bare, machine)
-    rank = 8
-    numbered = index_of(name)
-    if part is None and numbered is not None and (steering or is_drive(bare) or "valve" in last):
-        order = machine.axles if steering else machine.wheels
-        at = numbered[1] - min(first.get(_family(channel, numbered[0]), first.get(numbered[0], numbered[1])), 1)
-        part, rank = (order[at] if 0 <= at < len(order) else None), 9
-    if part is None and len(machine.wheels) == 1 and not steering and not re.search(r"gnss|gps|imu|odom", text):
-        part, rank = machine.wheels[0], 10
-    if part is not None:
-        signal = f"{'steer' if steering else 'wheel'}.{part}.{leaf}"
-        how = {9: "by its number", 10: "as the only wheel"}.get(rank, "by its name")
-        unit = channel.unit or (_effort_unit(last) if leaf == "effort" else "")
-        yield Candidate(signal, _source(channel, unit), rank, f"{channel.name} {how}")
-
-
-def _effort_unit(word: str) -> str:
-    """Unit of an effort by its name; empty where that does not tell."""
-    return next((unit for unit, pattern in _EFFORT_UNITS if re.search(pattern, word)), "")
-
-
-def _family(channel: Channel, template: str) -> str:
-    found = index_of(channel.name)
-    return found[0] if found is not None else template
-
-
-def _by_word(channel: Channel, text: str) -> Iterator[Candidate]:
-    """Yield signals of the whole machine by the words of their symbol or column."""
-    if re.search(r"wheel|steer|valve|axle", text):
-        return
-    for signal, pattern in _MACHINE_PATTERNS:
-        if re.search(pattern, text):
-            yield Candidate(signal, _source(channel, channel.unit or ""), 9, f"{channel.name} by its name")
-            return
+        yield Candidate(signal, source_of(channel, "1" if valve else "rad/s"), 6, f"{why} {machine.wheels}")

@@ -65,6 +65,11 @@ def machine_words(m: MachineRow, standing: Sequence[FleetFaultRow], approaching:
     return m["standing"]
 
 
+def _with_note(words: str, m: MachineRow) -> str:
+    """Words of a machine that is not assessed with what keeps it from being so, as the page has it below them."""
+    return f"{words} ({m['note']})" if m["verdict"] == Verdict.NOT_ASSESSED and m["note"] else words
+
+
 def listed_machines(document: FleetDocument) -> tuple[ListedMachine, ...]:
     """Machines of a fleet's document in its order, worst first."""
     near = {t["machine"] for t in document["trends"] if t["approaching"]}
@@ -75,7 +80,7 @@ def listed_machines(document: FleetDocument) -> tuple[ListedMachine, ...]:
             ListedMachine(
                 m["label"],
                 Verdict(m["verdict"]),
-                machine_words(m, standing, k in near),
+                _with_note(machine_words(m, standing, k in near), m),
                 tuple(fault_words(f, words_of(m)) + open_words(f["open"], f["clean"], f["needed"]) for f in standing),
                 m["with_faults"],
                 len(m["missions"]) + len(m["undated"]),

@@ -65,12 +65,12 @@ class CsvReader:
         report = Report()
         table = open_text(path, options, report)
         sample, time = _time(table, options, report)
-        name, unit, part = time
+        name, unit, part, day_ns = time
         last = table.file.tail(table.skip) if unit != "dc32" else b""
         tail = table.sample(last) if last else {}
         count, exact = row_count(table.file, table.skip)
         dated = sample[name].dtype.kind == "M"
-        base = TimeBase("iso" if dated else unit, epoch_ns(options, str(path), unit), path.name, Report(), part)
+        base = TimeBase("iso" if dated else unit, epoch_ns(options, str(path), unit, day_ns), path.name, Report(), part)
         start, stop = span(base, _cells(sample, time), _cells(tail, time), count)
         fields = tuple(n for n in table.names if n not in time.names and (n in sample or n in tail))
         note = "" if exact else "rows and end are estimated from the first rows; reading the file counts them"

@@ -60,7 +60,7 @@ class ParquetReader:
             table = _Parquet(path, file, report)
             time = table.time(options)
             unit = "iso" if table.dated(time.name) else time.unit
-            base = TimeBase(unit, epoch_ns(options, str(path), time.unit), path.name, Report(), time.part)
+            base = TimeBase(unit, epoch_ns(options, str(path), time.unit, time.day_ns), path.name, Report(), time.part)
             ends = [base.stamps(*cells) for cells in table.ends(time.names)]
             given = np.concatenate(ends) if ends else np.empty(0, np.int64)
             given = given[given != MISSING]
@@ -93,7 +93,7 @@ class ParquetReader:
             times = RowTimes(path, time, table.dated(time.name), options, window, report)
             columns = {n: ArrayColumn(report.store) for n in table.numeric if n not in time.names}
             words = {n: TextColumn() for n in table.words if n not in time.names} if texts else {}
-            groups = table.groups(time, epoch_ns(options, str(path), time.unit), window)
+            groups = table.groups(time, epoch_ns(options, str(path), time.unit, time.day_ns), window)
             for cells in table.blocks([*time.names, *columns, *words], groups):
                 keep = times.keep(*(cells[n] for n in time.names))
                 for label, column in columns.items():
@@ -179,7 +179,7 @@ class _Parquet:
 
     def groups(self, time: TimeColumn, epoch: int, window: Window | None) -> list[int]:
         """Row groups whose stamps may lie in the window, by the statistics of the time column."""
-        name, unit, part = time
+        name, unit, part, _ = time
         every = list(range(self.file.metadata.num_row_groups))
         if window is None or unit in ("dc32", "dt"):
             return every

@@ -58,7 +58,7 @@ class RowTimes:
         self.name = name = column.name
         self.unit = unit = column.unit
         self.base = TimeBase(
-            "iso" if dated else unit, epoch_ns(options, str(path), unit), f"{path.name}, column {name!r}", report,
+            "iso" if dated else unit, epoch_ns(options, str(path), unit, column.day_ns), f"{path.name}, column {name!r}", report,
             column.part,
         )  # fmt: skip
         self._early = None if unit == "dt" else window

@@ -22,6 +22,7 @@ from replay.readers.tables.row_kernel import FILLED, MISSING, MOMENT, TEXT
 from replay.readers.tables.rows import MAX_COLUMNS, Dialect, Rows
 from replay.readers.tables.text_file import BLOCK, TextFile, decoded
 from replay.readers.tables.time_cells import TimeBase
+from replay.readers.tables.units_row import units_of_row
 
 SEPARATORS = ("\t", ";", ",", "|")
 HEAD = 128 << 10
@@ -178,6 +179,11 @@ def open_text(path: Path, options: SourceOptions, report: Report) -> TextTable:
         )
     names, size = _names(file, head, at, separator, skipped)
     skip = at + size
+    below = head[skip : head.find(b"\n", skip) + 1]
+    units = units_of_row(decoded(below), separator, names) if size else None
+    if units is not None:
+        names, skip = units, skip + len(below)
+        report.note(f"{path.name}: the row below its header holds units")
     decimal, sure = _decimal(head[skip:] + file.tail(skip), separator)
     if options.decimal is not None:
         decimal, sure = options.decimal, True

@@ -25,7 +25,7 @@ _SECOND = 1_000_000_000
 _DAY = 86_400 * _SECOND
 
 
-def epoch_ns(options: SourceOptions, source: str, unit: str = "") -> int:
+def epoch_ns(options: SourceOptions, source: str, unit: str = "", day_ns: int = 0) -> int:
     """Zero of the time column [ns since 1970].
 
     Parameters
@@ -36,6 +36,8 @@ def epoch_ns(options: SourceOptions, source: str, unit: str = "") -> int:
         File, for messages.
     unit : str
         Unit that was found; that of the options where empty.
+    day_ns : int
+        Midnight of the date beside times of day [ns since 1970], where no epoch is given.
 
     Raises
     ------
@@ -43,7 +45,7 @@ def epoch_ns(options: SourceOptions, source: str, unit: str = "") -> int:
         Where the epoch is not an ISO date and time, or so far from 1970 that stamps would not fit.
     """
     if options.epoch is None:
-        return DC_EPOCH if (unit or options.time_unit) in ("dc", "dc32") else 0
+        return DC_EPOCH if (unit or options.time_unit) in ("dc", "dc32") else day_ns
     try:
         moment = datetime.fromisoformat(options.epoch)
     except ValueError as error:

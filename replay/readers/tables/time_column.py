@@ -17,10 +17,13 @@ from replay.readers.tables.columns import unit_of
 from replay.readers.tables.split_time import Part, split_times, with_part
 
 _TIME = re.compile(
-    r"^(t|time|times?tamp|stamp|rel(ative)?[ _]?time|elapsed([ _]?time)?|date[ _]?time|zeit|zeitstempel|seconds?|secs?|"
+    r"^(t|time|times?tamp|stamp|rel(ative)?[ _]?time|elapsed([ _]?time)?|date[ _]?time|seconds?|secs?|"
+    r"zeit|uhrzeit|zeitstempel|zeitpunkt|datum[ _/]?(uhr)?zeit|temps|heure|horodatage|"
     r"header\.stamp|log_time)([ _.]?(s|sec|ms|us|ns|nsec))?$"
 )
-_LIKE_TIME = re.compile(r".*(time|date|zeit|datum|stamp|uhr|clock).*|t|dt|ts")
+_LIKE_TIME = re.compile(r".*(time|date|zeit|datum|stamp|uhr|clock|heure|temps).*|t|dt|ts")
+_DATE = re.compile(r"date|datum|tag|day|jour")
+_DAY = 86_400_000_000_000  # ns
 _SUFFIX = re.compile(r"[ _.](s|sec|ms|us|ns|nsec)$")
 _TURN = 1 << 32
 _LONGEST_NAME = 60
@@ -47,11 +50,14 @@ class TimeColumn(NamedTuple):
         Column, and its unit as in `SourceOptions.time_unit`.
     part : Part or None
         Column with the parts of its whole seconds, where the clock stands in two columns.
+    day_ns : int
+        Midnight of the first row [ns since 1970], where a second column holds the dates of times of day.
     """
 
     name: str
     unit: str
     part: Part | None = None
+    day_ns: int = 0
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -93,7 +99,9 @@ def find_time(
                 "time_unit = 'dc32' (a 32-bit distributed clock)"
             )
         moment = sample[wanted].dtype.kind == "M" and options.time_unit != "dt"
-        return _split(path, sample, options, report) or TimeColumn(wanted, "iso" if moment else options.time_unit)
+        return _split(path, sample, options, report) or TimeColumn(
+            wanted, "iso" if moment else options.time_unit, None, _day(path, sample, wanted, options, report)
+        )
     if (both := _split(path, sample, options, report)) is not None:
         return both
     called = [n for n in names if _TIME.match(_bare(n).lower())]
@@ -106,7 +114,7 @@ def find_time(
         unit = _time_unit(path, name, sample[name], options)
         how = "by its name" if name in called else _course(sample[name], unit)
         report.note(f"{path.name}: time is column {name!r} in {unit}, found {how}; [sources] time and time_unit set it")
-        return TimeColumn(name, unit)
+        return TimeColumn(name, unit, None, _day(path, sample, name, options, report))
     for name in called or names:
         if rises(sample[name], often=False):
             raise LogError(
@@ -134,6 +142,19 @@ def _split(path: Path, sample: Sample, options: SourceOptions, report: Report) -
             )
             return TimeColumn(name, "s", part)
     return None
+
+
+def _day(path: Path, sample: Sample, name: str, options: SourceOptions, report: Report) -> int:
+    """Midnight of the date that stands in a column beside times of day [ns]; 0 where none does, or an epoch is given."""
+    times = _given(sample[name])
+    if sample[name].dtype.kind != "M" or options.epoch is not None or not len(times) or times.max() >= _DAY:
+        return 0
+    for other, column in sample.items():
+        days = _given(column) if column.dtype.kind == "M" else np.empty(0, np.int64)
+        if other != name and len(days) and _DATE.fullmatch(_bare(other).lower()) and not (days % _DAY).any():
+            report.note(f"{path.name}: the date is column {other!r}; [sources] epoch sets it")
+            return int(days[0])
+    return 0
 
 
 def _refuse_text(path: Path, texts: Mapping[str, str], names: list[str], sure: bool) -> None:

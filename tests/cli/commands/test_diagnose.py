@@ -279,10 +279,26 @@ def test_odd_tables_are_judged_or_refused_without_a_crash(tmp_path: Path, name: 
 
 def test_a_second_file_that_gives_nothing_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     table = small_table(tmp_path)
-    table["time_ns"] += 5 * 10**9
+    table["time_ns"] += 600 * 10**9
     table.to_csv(tmp_path / "later.csv", index=False)
     assert run(["diagnose", str(tmp_path / "ok.csv"), str(tmp_path / "later.csv"), "-o", str(tmp_path / "out")]) == 3
+    assert "tail -n +2 later.csv) > whole.csv" in capsys.readouterr().err
+    table["time_ns"] -= 595 * 10**9
+    table.to_csv(tmp_path / "same.csv", index=False)
+    assert run(["diagnose", str(tmp_path / "ok.csv"), str(tmp_path / "same.csv"), "-o", str(tmp_path / "out")]) == 3
     assert "none of its channels is used" in capsys.readouterr().err
+
+
+def test_a_table_of_something_else_is_refused_with_its_columns(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "weather.csv").write_text(
+        "time,temperature\n" + "".join(f"{i},20.5\n" for i in range(50)), encoding="utf-8"
+    )
+    assert run(["diagnose", str(tmp_path / "weather.csv"), "-o", str(tmp_path / "out")]) == 3
+    said = capsys.readouterr().err
+    assert "no column (temperature) is called like a signal" in said
+    assert "an audit takes patterns" in said
 
 
 def test_a_part_of_a_mission_says_so(tmp_path: Path) -> None:

@@ -66,3 +66,7 @@ def test_local_time_stands_beside_utc(zone: Callable[[str], None], name: str, sh
 
 def test_a_time_beyond_calendars_is_no_error() -> None:
     assert shown_moment(10**30) == "an unknown time"
+
+
+def test_a_clock_without_a_date_is_said_to_have_none() -> None:
+    assert shown_moment(12 * 10**9).startswith("12 s of a clock without a date")

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import ast
 import inspect
+import re
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -59,3 +61,45 @@ def test_classes_tell_every_member(name: str) -> None:
         if not m.startswith("_") and (callable(getattr(found, m)) or isinstance(vars(found)[m], property))
     ]
     assert [m for m in public if not inspect.getdoc(vars(found)[m])] == []
+
+
+def _functions() -> dict[str, Any]:
+    """Functions and methods by the name that a user writes."""
+    found = {n: getattr(mfhca, n) for n in mfhca.__all__}
+    out = {n: f for n, f in found.items() if inspect.isfunction(f)}
+    for name, cls in found.items():
+        if inspect.isclass(cls) and cls.__module__.startswith("diagnosis.api"):
+            out |= {f"{name}.{m}": f for m, f in vars(cls).items() if not m.startswith("_") and inspect.isfunction(f)}
+    return out
+
+
+@pytest.mark.parametrize("name", _functions())
+def test_arguments_with_a_unit_in_their_name_tell_it(name: str) -> None:
+    text = inspect.getdoc(_functions()[name]) or ""
+    for argument in inspect.signature(_functions()[name]).parameters:
+        unit = re.search(r"_(s|ns|hz|mb)$", argument)
+        if unit is not None:
+            described = re.search(rf"^(?:\w+, )*{argument}\b.* :.*\n(?:    .*\n?)+", text, re.M)
+            assert described, f"{name}: {argument}"
+            assert re.search(rf"\[{unit[1]}\b", described[0], re.I), f"{name}: {argument}"
+
+
+def _tables() -> dict[str, str]:
+    """Docstrings of all properties that give a table."""
+    out = {}
+    for name in mfhca.__all__:
+        for member, found in vars(getattr(mfhca, name)).items() if inspect.isclass(getattr(mfhca, name)) else ():
+            getter = getattr(found, "fget", None) or getattr(found, "func", None)
+            if (
+                not member.startswith("_")
+                and getter is not None
+                and "DataFrame" in str(getter.__annotations__.get("return", ""))
+            ):
+                out[f"{name}.{member}"] = inspect.getdoc(found) or ""
+    return out
+
+
+def test_tables_tell_their_shape() -> None:
+    tables = _tables()
+    assert len(tables) > 8
+    assert [name for name, text in tables.items() if "shape (" not in text] == []

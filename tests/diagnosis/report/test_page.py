@@ -132,6 +132,15 @@ def test_report_without_anything_is_still_a_page() -> None:
     assert "Nothing could be judged" in tree.text
 
 
+def test_a_clock_without_a_date_is_not_shown_as_1970() -> None:
+    report, columns = samples.five_faults(60.0, 20.0)
+    undated = {**report, "log": {**report["log"], "start_ns": 12 * 10**9}}
+    text = Tree(build_page(undated, columns)).text
+    assert "clock without a date" in text
+    assert "Start (UTC)" not in text
+    assert "Start (UTC)" in Tree(build_page(report, columns)).text
+
+
 LISTS = ("readings", "intervals", "states", "phases", "coverage", "loss", "clearing", "signals", "missing", "quality")
 
 

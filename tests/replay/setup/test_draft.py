@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -16,6 +18,7 @@ from replay.setup.draft_notes import Draft
 from replay.setup.machine_text import machine_text
 from replay.setup.preset import Preset
 from replay.setup.read import read_everything
+from replay.signals.mapping import map_signals
 from tests.ros_robots import RADIUS, TRACK, WHEELS, Robot, urdf, write_robot
 
 RIGHT = tuple(n for n in WHEELS if "right" in n)
@@ -114,6 +117,69 @@ def test_speeds_without_a_unit_get_the_one_that_fits_the_commands(tmp_path: Path
     assert draft.machine.signals["wheel.L.v"].unit == "rad/s"
     assert draft.machine.wheel_radius == pytest.approx(0.3, rel=0.02)
     assert any("in rad/s? None is stated" in q for q in draft.questions)
+
+
+@pytest.mark.parametrize(
+    ("places", "asked", "measured", "unit", "wheels"),
+    [
+        (("VR", "VL", "HR", "HL"), "n_soll_{}", "n_ist_{}", " [1/min]", ("VR", "VL", "HR", "HL")),
+        (("AVD", "AVG", "ARD", "ARG"), "consigne_{}", "vitesse_mesure_{}", " (tr/min)", ("AVD", "AVG", "ARD", "ARG")),
+    ],
+)
+def test_columns_of_motors_in_german_and_french(
+    tmp_path: Path, places: tuple[str, ...], asked: str, measured: str, unit: str, wheels: tuple[str, ...]
+) -> None:
+    v = np.repeat(np.random.default_rng(1).uniform(-0.5, 0.5, 15), 40)
+    gear, radius = 24.0, 0.64
+    rpm = v / radius * gear * 60 / (2 * np.pi)
+    columns: dict[str, Any] = {"Zeit [s]": np.arange(600) * 0.05, "v_soll [km/h]": 3.6 * v}
+    for name in places:
+        columns |= {asked.format(name) + unit: rpm, measured.format(name) + unit: rpm}
+    pd.DataFrame(columns).to_csv(tmp_path / "run.csv", index=False, sep=";", decimal=",", encoding="cp1252")
+    draft = read_back(draft_machine(read_everything([tmp_path / "run.csv"])), tmp_path)
+    assert draft.machine.wheels == wheels
+    assert any("were the motors measured?" in q for q in draft.questions)
+    for wheel in wheels:
+        speed = draft.machine.signals[f"wheel.{wheel}.v"]
+        assert speed.at == "motor"
+        assert measured.format(wheel) in speed.label
+        assert asked.format(wheel) in draft.machine.signals[f"wheel.{wheel}.v_ref"].label
+    assert draft.machine.geometry is not None
+    answered = replace(
+        draft.machine, gear_ratio=gear, geometry=replace(draft.machine.geometry, wheel_diameter=2 * radius)
+    )
+    logs = read_everything([tmp_path / "run.csv"])
+    found = map_signals(logs, answered).items[f"wheel.{wheels[0]}.v"]
+    np.testing.assert_allclose(found.values, v, atol=1e-9)
+
+
+def test_what_cannot_be_si_gets_its_usual_unit_with_one_question_for_each_kind(tmp_path: Path) -> None:
+    v = np.repeat(np.random.default_rng(1).uniform(-0.5, 0.5, 15), 40)
+    columns: dict[str, Any] = {"Zeit": np.arange(600) * 0.05, "Sollgeschwindigkeit": v}
+    for i in range(1, 5):
+        columns |= {f"Rad{i}_Drehzahl_soll": 320 * v, f"Rad{i}_Drehzahl_ist": 320 * v, f"Rad{i}_Ventil": 80 * v}
+    columns |= {"Lenkwinkel_vorne_soll": 50 * v, "Lenkwinkel_vorne_ist": 50 * v}
+    pd.DataFrame(columns).to_csv(tmp_path / "run.csv", index=False)
+    draft = read_back(draft_machine(read_everything([tmp_path / "run.csv"])), tmp_path)
+    signals = draft.machine.signals
+    assert {signals[f"wheel.{w}.u"].unit for w in draft.machine.wheels} == {"%"}
+    assert signals["steer.front.phi"].unit == signals["steer.front.phi_ref"].unit == "deg"
+    assert signals["wheel.FR.v_ref"].gain == signals["wheel.FR.v"].gain == pytest.approx(1 / 320, rel=0.01)
+    assert draft.machine.max_speed < 1.0
+    assert sum("None is stated; in" in q for q in draft.questions) == 2
+    assert not any("cannot be" in q for q in draft.signals.questions)
+
+
+def test_rotations_tell_no_size_of_each_other(tmp_path: Path) -> None:
+    v = np.repeat(np.random.default_rng(1).uniform(-0.5, 0.5, 15), 40)
+    columns: dict[str, Any] = {"Zeit [s]": np.arange(600) * 0.05}
+    for name in ("vorne rechts", "vorne links", "hinten rechts", "hinten links"):
+        columns |= {f"Raddrehzahl {name} Sollwert [U/min]": 20 * v, f"Raddrehzahl {name} Istwert [U/min]": 19 * v}
+    pd.DataFrame(columns).to_csv(tmp_path / "run.csv", index=False)
+    draft = read_back(draft_machine(read_everything([tmp_path / "run.csv"])), tmp_path)
+    assert draft.machine.wheels == ("VR", "VL", "HR", "HL")
+    assert any("how large are the wheels?" in q for q in draft.questions)
+    assert not any("is the wheel radius" in q or "which number" in q for q in draft.questions)
 
 
 def test_a_log_without_a_drive_says_what_to_record(tmp_path: Path) -> None:

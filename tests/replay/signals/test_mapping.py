@@ -16,8 +16,8 @@ from replay.machine.config import Machine, haulotte
 from replay.readers.registry import read_log, summarise_log
 from replay.signals.mapping import map_signals, plan_topics
 from replay.signals.name_parts import axle_of, wheel_of
-from replay.signals.rules import _effort_unit
 from replay.signals.signal import Signals
+from replay.signals.symbol_rules import _effort_unit
 from replay.signals.to_si import slope
 from replay.simulation.options import SimulationOptions
 from replay.simulation.run import simulate_mission

@@ -9,6 +9,7 @@ from typing import Any
 
 import pytest
 
+from diagnosis.audit.fleet.listed import listed_machines
 from diagnosis.audit.fleet.page.matrix import matrix
 from diagnosis.audit.fleet.page.page import build_fleet_page
 from diagnosis.audit.fleet_files import fleet_json, load_fleet
@@ -242,3 +243,11 @@ def test_a_file_that_was_left_out_is_no_damage(tmp_path: Path) -> None:
     assert standing["M1"] == "No fault found, but a file of its last log was left out"
     assert d["verdict"]["title"] == "1 of 2 machines is ready, 1 has a log without one of its files"
     assert d["verdict"]["tag"] == "1 machine: files left out"
+
+
+def test_the_terminal_says_why_a_machine_is_not_assessed(tmp_path: Path) -> None:
+    cut = Sample("cut", day=0.0, verdict="not_assessed", state="degraded", reason="cut off")
+    d = document(tmp_path, Sample("d0"), cut, Sample("d1", day=1.0))
+    (m,) = listed_machines(d)  # type: ignore[arg-type]
+    assert m.words.startswith("Not assessed since")
+    assert m.words.endswith("(2 missions of unknown order)")

@@ -19,6 +19,7 @@ from replay.readers.registry import open_log, read_log, summarise_log
 from replay.readers.tables import text_file, text_table
 from replay.readers.tables.iso_kernel import iso_ns
 from replay.readers.tables.row_kernel import MISSING
+from replay.readers.tables.units_row import units_of_row
 
 
 def read(path: Path, **options: object) -> RawLog:
@@ -431,6 +432,36 @@ def test_times_of_day_run_on_over_midnight_and_take_their_date_from_the_epoch(ta
     assert any("times of day without a date" in n for n in log.summary.notes)
     dated = read(target, epoch="2025-08-19T00:00:00Z").channels["a"].stamps
     assert datetime.fromtimestamp(int(dated[200]) / 1e9, tz=UTC).isoformat() == "2025-08-20T00:00:00+00:00"
+
+
+def test_a_row_of_units_below_the_header_is_read_as_such(target: Path) -> None:
+    rows = [f"{i / 10:.1f};{i},5;{i};0,5" for i in range(40)]
+    target.write_text(
+        "\n".join(["Zeit;nIst_VR;T_Oel;i", "s;1/min;°C;-", *rows]).replace(".", ",") + "\n", encoding="utf-8"
+    )
+    log = read(target)
+    assert not log.summary.damage
+    assert set(log.channels) == {"nIst_VR [1/min]", "T_Oel [°C]", "i"}
+    assert log.channels["nIst_VR [1/min]"].unit == "1/min"
+    assert len(log.channels["i"].values) == 40
+    assert any("the row below its header holds units" in n for n in log.summary.notes)
+
+
+@pytest.mark.parametrize("row", ["a;b;c;d", "s;1/min;7;-", "-;-;-;-", ";;;", "s;1/min"])
+def test_other_rows_are_no_units(row: str) -> None:
+    assert units_of_row(row, ";", ("t", "a", "b", "c")) is None
+
+
+@pytest.mark.parametrize(("date", "time"), [("Datum", "Uhrzeit"), ("Date", "Time"), ("date", "heure")])
+def test_a_date_in_a_column_beside_times_of_day_dates_them(target: Path, date: str, time: str) -> None:
+    moments = [datetime(2025, 1, 1, 23, 59, 58, tzinfo=UTC) + timedelta(seconds=i / 100) for i in range(400)]
+    rows = [f"{m:%d.%m.%Y};{m:%H:%M:%S},{m.microsecond // 1000:03d};{i},5" for i, m in enumerate(moments)]
+    target.write_text("\n".join([f"{date};{time};a", *rows]) + "\n", encoding="utf-8")
+    log = read(target)
+    assert (log.channels["a"].stamps == [int(m.timestamp()) * 10**9 + m.microsecond * 1000 for m in moments]).all()
+    assert log.summary.start_ns == log.channels["a"].stamps[0]
+    assert any(f"the date is column '{date}'" in n for n in log.summary.notes)
+    assert read(target, epoch="2030-01-01T00:00:00Z").channels["a"].stamps[0] > log.channels["a"].stamps[0]
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,103 @@
+"""Words of a recorded name, those of German and French programs in English: ``Lenkwinkel_soll``, ``consigne_angle``: steer angle ref."""
+
+from __future__ import annotations
+
+import re
+import unicodedata
+from collections.abc import Sequence
+from functools import lru_cache
+
+# Type letters that PLC programs put before a name (fVelocity, lrSpeed, fbWheel).
+_PREFIX = re.compile(r"(?<![A-Za-z])(?:lr|fb|st|ar|[abefgimnprstuwx])(?=[A-Z][a-z])")
+# Words of a place that are written as one.
+_JOINED = re.compile(
+    r"(?i)(front|rear|back|middle|mid|vorne|vorn|hinten|left|right|links|rechts)(?=left|right|links|rechts|front|rear|back|wheel|rad)"
+)
+_UMLAUTS = str.maketrans({"ä": "ae", "ö": "oe", "ü": "ue", "ß": "ss", "Ä": "Ae", "Ö": "Oe", "Ü": "Ue"})
+# German words that are written together: Lenkwinkel, Istdrehzahl, Vorderachse.
+_PARTS = (
+    "geschwindigkeit", "geschw", "drehzahl", "drehmoment", "drehrate", "gierrate", "gier", "winkel", "lenkung", "lenk",
+    "ventil", "schieber", "stellung", "stell", "groesse", "ansteuerung", "strom", "spannung", "moment", "druck", "motor",
+    "fahr", "antrieb", "achse", "achs", "vorder", "hinter", "vorne", "vorn", "hinten", "links", "rechts", "rad", "soll", "ist",
+    "mess", "wert", "werte", "vorgabe", "rate",
+)  # fmt: skip
+_TOGETHER = re.compile(rf"(?:{'|'.join(_PARTS)})+")
+_PART = re.compile("|".join(sorted(_PARTS, key=len, reverse=True)))
+_MEANINGS = {
+    "ref": "soll sollwert vorgabe vorg consigne cons",
+    "act": "ist istwert mess messwert gemessen rueckmeldung mesure mesuree mes reel reelle",
+    "speed": "geschwindigkeit geschw vitesse vit",
+    "rpm": "drehzahl regime",
+    "angle": "winkel",
+    "steer": "lenk lenkung braquage",
+    "valve": "ventil vanne distributeur",
+    "spool": "schieber tiroir",
+    "torque": "drehmoment couple",
+    "current": "strom courant",
+    "voltage": "spannung tension",
+    "press": "druck pression",
+    "wheel": "roue",
+    "drive": "antrieb",
+    "motor": "moteur",
+    "axle": "achse achs essieu",
+    "yaw_rate": "gierrate drehrate lacet gier",
+}
+_ENGLISH = {word: meaning for meaning, words in _MEANINGS.items() for word in words.split()}
+_TURNING = frozenset(("rate", "geschwindigkeit", "vitesse", "vit"))  # beside a word for yaw
+_FILLERS = frozenset(("wert", "werte", "value", "val", "values"))
+#: Words that ask for something: setpoints and commands, in English.
+ASKING = frozenset(
+    ("ref", "reference", "cmd", "command", "commanded", "set", "setpoint", "des", "desired", "target", "demand", "soll")
+)
+MEASURED = frozenset(("act", "actual", "meas", "measured", "fb", "feedback", "ist"))
+
+
+def folded(text: str) -> str:
+    """The text without umlauts and accents: ``Stellgröße``: Stellgroesse."""
+    plain = unicodedata.normalize("NFKD", unicodedata.normalize("NFC", text).translate(_UMLAUTS))
+    return "".join(c for c in plain if not unicodedata.combining(c))
+
+
+def tokens(name: str) -> list[str]:
+    """Lower-case words of a name, split at other characters, at digits, before capitals and within German compounds."""
+    return [*_tokens(name)]
+
+
+@lru_cache(4096)
+def _tokens(name: str) -> tuple[str, ...]:
+    parted = _JOINED.sub(r"\1_", _PREFIX.sub("", folded(name)))
+    found = [t.lower() for t in re.findall(r"[A-Z]{1,}(?![a-z])|[A-Z]?[a-z]+|\d+", parted)]
+    return tuple(part for word in found for part in (_PART.findall(word) if _TOGETHER.fullmatch(word) else (word,)))
+
+
+def english(words: Sequence[str]) -> list[str]:
+    """Words as the patterns of the signal table know them.
+
+    ``n`` and ``v`` beside a setpoint or a measurement are a rotational speed and a speed, ``Stellgröße`` is a valve's command.
+
+    Parameters
+    ----------
+    words : Sequence[str]
+        Of `tokens`.
+    """
+    out: list[str] = []
+    for word in words:
+        if word == "groesse" and out[-1:] == ["stell"]:
+            out[-1:] = ["valve", "cmd"]
+        elif word == "stellung" and out[-1:] == ["valve"]:
+            out.append("pos")
+        elif word in _FILLERS or (word in _TURNING and out[-1:] == ["yaw_rate"]):
+            continue
+        else:
+            out.append(_ENGLISH.get(word, word))
+    roles = ASKING | MEASURED
+    for i, word in enumerate(out):
+        if word in ("n", "v") and {*out[max(i - 1, 0) : i], *out[i + 1 : i + 2]} & roles:
+            out[i] = "rpm" if word == "n" else "speed"
+    return out
+
+
+def role(words: Sequence[str]) -> str:
+    """``ref`` where words ask, ``act`` where they measure, ``both`` where they do both, empty where they say neither."""
+    asks, measures = bool(ASKING & {*words}), bool(MEASURED & {*words})
+    return "both" if asks and measures else "ref" if asks else "act" if measures else ""

@@ -1,0 +1,84 @@
+"""Files that add nothing to a mission, with what to do about them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import pairwise
+from pathlib import Path
+from typing import Protocol
+
+from replay.errors import LogError
+from replay.log.raw_log import LogSummary
+from replay.signals.signal import Signals
+
+_SHOWN = 6
+
+
+class ReadFile(Protocol):
+    """What is asked of a file of a mission: see `replay.mission.MissionFile`."""
+
+    @property
+    def path(self) -> Path:
+        """As given."""
+
+    @property
+    def format(self) -> str:
+        """As in `LogSummary`."""
+
+    @property
+    def summary(self) -> LogSummary:
+        """Contents after decoding."""
+
+    @property
+    def strange(self) -> bool:
+        """Whether it is known to hold nothing of the machine."""
+
+
+def require_use(files: Sequence[ReadFile], signals: Signals) -> None:
+    """Raise where no file of a mission holds a signal, or one of several adds none.
+
+    Parameters
+    ----------
+    files : Sequence[ReadFile]
+        All files, after decoding.
+    signals : Signals
+        What was found in them.
+
+    Raises
+    ------
+    LogError
+        With the columns of tables that hold no signal, or how tables that go on from each other are joined.
+    """
+    if not signals.items and all(t.encoding == "table" for f in files for t in f.summary.topics):
+        columns = [c for f in files for t in f.summary.topics for c in t.fields]
+        shown = ", ".join(columns[:_SHOWN]) + (" …" if len(columns) > _SHOWN else "")
+        raise LogError(
+            f"{', '.join(str(f.path) for f in files)}: no wheel signal: no column ({shown}) is called like a signal of a machine "
+            "or stands in the machine file's [signals]; name them there (`mfhca channels LOG --all` lists them), or leave the file "
+            "out where it is no machine's log (an audit takes patterns: 'logs/**/*.mcap')"
+        )
+    used = {signal.source for signal in signals.items.values()}
+    idle = [file for file in files if str(file.path) not in used and not file.strange]
+    if len(files) < 2 or not idle or not used:
+        return
+    parts = _parts(idle[0], files)
+    if len(parts) > 1:
+        first, *rest = (p.name for p in parts)
+        joined = "; ".join([f"cat {first}", *(f"tail -n +2 {name}" for name in rest)])
+        raise LogError(
+            f"{idle[0].path}: is a part of the same table as {first}; parts of a table are not put together here: join them, as with "
+            f"`({joined}) > whole.csv`, or diagnose each by itself"
+        )
+    raise LogError(
+        f"{idle[0].path}: none of its channels is used, all signals were found in the other files; diagnose it by itself, "
+        "or name its signals with source = in the machine file's [signals]"
+    )
+
+
+def _parts(file: ReadFile, files: Sequence[ReadFile]) -> list[Path]:
+    """Tables with the same columns, one after the other in time; only the file itself where they overlap."""
+    fields = [t.fields for t in file.summary.topics]
+    alike = [f for f in files if f.format == file.format == "csv" and [t.fields for t in f.summary.topics] == fields]
+    alike.sort(key=lambda f: f.summary.start_ns)
+    apart = all(a.summary.stop_ns <= b.summary.start_ns for a, b in pairwise(alike))
+    return [f.path for f in alike] if apart else [file.path]

@@ -1,0 +1,149 @@
+"""Names as programmers of PLCs and loggers write them, in English, German and French."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from replay.log.raw_log import Channel
+from replay.machine.config import haulotte
+from replay.readers.tables.columns import unit_of
+from replay.signals.name_words import english, folded, role, tokens
+from replay.signals.named_units import bare_name, unit_by_end
+from replay.signals.rules import candidates
+
+STAMPS = np.arange(3, dtype=np.int64)
+
+
+def column(name: str, unit: str | None = None) -> Channel:
+    return Channel(name, "", name, STAMPS, np.zeros(3), unit or unit_of(name), "table")
+
+
+def symbol(name: str, unit: str | None = None) -> Channel:
+    return Channel(name, "", name.rpartition(".")[2], STAMPS, np.zeros(3), unit, "LREAL")
+
+
+def found(channel: Channel) -> list[tuple[str, str]]:
+    return [(c.signal, c.origin.unit) for c in candidates({channel.name: channel}, haulotte())]
+
+
+@pytest.mark.parametrize(
+    ("name", "signal"),
+    [
+        ("n_ist_VR [1/min]", "wheel.FR.v"),
+        ("n_soll_VR [1/min]", "wheel.FR.v_ref"),
+        ("Drehzahl_HL_soll (U/min)", "wheel.RL.v_ref"),
+        ("Istdrehzahl Rad hinten links [U/min]", "wheel.RL.v"),
+        ("Solldrehzahl Vorderachse links [1/min]", "wheel.FL.v_ref"),
+        ("v_HA_re_ist [km/h]", "wheel.RR.v"),
+        ("VL [1/min]", None),
+        ("Rad VL [1/min]", "wheel.FL.v"),
+        ("n VL [1/min]", "wheel.FL.v"),
+        ("Vitesse roue AV G (tr/min)", "wheel.FL.v"),
+        ("Courant vanne AVG (mA)", None),
+        ("y_Ventil_soll_VR [%]", "wheel.FR.u"),
+        ("y_Ventil_ist_VR [%]", "wheel.FR.u_applied"),
+        ("Stellgröße_HR (%)", "wheel.RR.u"),
+        ("Schieberstellung VL [%]", "wheel.FL.u_applied"),
+        ("Ventilstrom_VR [mA]", None),
+        ("Drehmoment_VL [Nm]", "wheel.FL.effort"),
+        ("Lenkwinkel_soll_VA [°]", "steer.front.phi_ref"),
+        ("Lenkwinkel_ist_HA [°]", "steer.rear.phi"),
+        ("Lenkventil_HA [%]", "steer.rear.u"),
+        ("v_soll [km/h]", "cmd.v"),
+        ("Fahrgeschwindigkeit_Soll (km/h)", "cmd.v"),
+        ("vFzgSoll [km/h]", "cmd.v"),
+        ("vFzgSoll", None),
+        ("phiSoll_VA [°]", "steer.front.phi_ref"),
+        ("Raddrehzahl vorne rechts Istwert [U/min]", "wheel.FR.v"),
+        ("Druck A vorne rechts [bar]", "wheel.FR.pressure_a"),
+        ("Gierrate_soll [°/s]", "cmd.omega"),
+        ("Giergeschwindigkeit [°/s]", "imu.yaw_rate"),
+        ("Lüfter_Geschwindigkeit_soll [m/s]", None),
+        ("Diesel_Drehzahl_soll [1/min]", None),
+        ("Drehzahlfehler_VR [1/min]", None),
+        ("n_max_VR [1/min]", None),
+        ("Abweichung_soll_ist_VR [1/min]", None),
+        ("Öltemperatur_VR [°C]", None),
+        ("p_Pumpe [bar]", None),
+        ("vitesse_mesure_AVG (tr/min)", "wheel.FL.v"),
+        ("consigne vitesse roue ARD (tr/min)", "wheel.RR.v_ref"),
+        ("vitesse roue arrière gauche mesurée (tr/min)", "wheel.RL.v"),
+        ("consigne_vitesse_AVD (tr/min)", "wheel.FR.v_ref"),
+        ("vanne_AVD (%)", "wheel.FR.u"),
+        ("angle_consigne_AV (°)", "steer.front.phi_ref"),
+        ("angle_mesure_AR (°)", "steer.rear.phi"),
+        ("consigne_vitesse (km/h)", "cmd.v"),
+        ("consigne_lacet (°/s)", "cmd.omega"),
+        ("vitesse_pompe_consigne (tr/min)", None),
+        ("speed_fl_setpoint (rpm)", "wheel.FL.v_ref"),
+        ("fl_actual_speed [rpm]", "wheel.FL.v"),
+        ("max_speed_fl [m/s]", None),
+    ],
+)
+def test_columns(name: str, signal: str | None) -> None:
+    assert [s for s, _ in found(column(name))] == ([] if signal is None else [signal])
+
+
+@pytest.mark.parametrize(
+    ("name", "unit", "signal"),
+    [
+        ("GVL_Fahren.fbRad_VR.nSoll", "1/min", "wheel.FR.v_ref"),
+        ("GVL_Fahren.fbRad_VR.nIst", "1/min", "wheel.FR.v"),
+        ("MAIN.stSollwerte.nDrehzahl_HL", "1/min", "wheel.RL.v_ref"),
+        ("MAIN.stRad_HL.Soll.Drehzahl", "1/min", "wheel.RL.v_ref"),
+        ("MAIN.stRad_HL.Ist.Drehzahl", "1/min", "wheel.RL.v"),
+        ("MAIN.Drehzahl.VL", "1/min", "wheel.FL.v"),
+        ("GVL_Fahren.fbRad_VR.nIst", None, None),
+        ("GVL_Fahren.fbRad_VR.nIst", "°C", None),
+        ("GVL_Fahren.rVSoll", "km/h", "cmd.v"),
+        ("MAIN.fbVentilVL.fSollwert", "%", "wheel.FL.u"),
+        ("MAIN.fbVentilVL.fRueckmeldung", "%", "wheel.FL.u_applied"),
+        ("MAIN.fbRad_VL.rSchlupf", "%", None),
+        ("MAIN.fbRad_VL.rSoll", "%", None),
+        ("MAIN.Dieselmotor.rSolldrehzahl", "1/min", None),
+        ("Axes.Axis_FL.NcToPlc.ActVelo", "mm/s", "wheel.FL.v"),
+        ("Axes.Axis_FL.NcToPlc.SetVelo", "mm/s", "wheel.FL.v_ref"),
+        ("GVL_Fahren.fbRad_VR.rVentilSoll", "%", "wheel.FR.u"),
+        ("GVL_Lenken.fbAchse_VA.rWinkelIst", "°", "steer.front.phi"),
+        ("GVL_Lenken.fbAchse_VA.rIst", "°", "steer.front.phi"),
+    ],
+)
+def test_symbols(name: str, unit: str | None, signal: str | None) -> None:
+    assert [s for s, _ in found(symbol(name, unit))] == ([] if signal is None else [signal])
+
+
+def test_what_is_asked_is_never_taken_for_what_is_measured() -> None:
+    words = ("soll", "Sollwert", "Vorgabe", "consigne", "ref", "cmd", "setpoint", "target", "desired")
+    names = [
+        t.format(w)
+        for w in words
+        for t in ("Drehzahl_VL_{}", "{}_Drehzahl_VL", "speed_{}_fl", "{}.Drehzahl.VL", "n_{}_VL")
+    ]
+    for name in names:
+        assert {s for s, _ in found(column(f"{name} [1/min]"))} <= {"wheel.FL.v_ref"}, name
+
+
+def test_the_unit_of_a_numbered_symbol_stays_and_the_name_of_a_part_is_none() -> None:
+    assert found(symbol("GVL.stWheels[1].rRpmSetpoint", "U/min")) == [("wheel.FR.v_ref", "U/min")]
+    assert found(symbol("GVL.stWheels[1].rRpm", "Umdrehungen")) == [("wheel.FR.v", "Umdrehungen")]
+    assert found(column("speed[FL]")) == [("wheel.FL.v", "")]
+
+
+def test_units_in_names() -> None:
+    assert bare_name("n_ist_VR [1/min]") == ("n_ist_VR", "1/min")
+    assert bare_name("n_ist_VR (U/min)") == ("n_ist_VR", "U/min")
+    assert bare_name("n_ist_VR 1/min") == ("n_ist_VR", "1/min")
+    assert bare_name("velocity[front_left_wheel]") == ("velocity[front_left_wheel]", "")
+    assert bare_name("fbWheel[1]") == ("fbWheel[1]", "")
+    assert found(column("n_ist_VR_U_min")) == [("wheel.FR.v", "rpm")]
+    assert found(column("velocity[front_left_wheel]")) == [("wheel.FL.v", "")]
+    assert (unit_by_end("speed_kmh"), unit_by_end("RPM"), unit_by_end("RPM", doubtful=True)) == ("km/h", "", "rpm")
+
+
+def test_words() -> None:
+    assert folded("Stellgröße, arrière") == "Stellgroesse, arriere"
+    assert tokens("rLenkwinkelSoll_VA") == ["lenk", "winkel", "soll", "va"]
+    assert english(tokens("Stellgröße_HR")) == ["valve", "cmd", "hr"]
+    assert english(tokens("cmd_omega_rad_s")) == ["cmd", "omega", "rad", "s"]
+    assert [role(english(tokens(n))) for n in ("n_soll", "n_ist", "soll_ist", "n")] == ["ref", "act", "both", ""]
