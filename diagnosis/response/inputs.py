@@ -12,6 +12,7 @@ from diagnosis.evidence import SENSOR, MissionView
 Array = NDArray[np.float64]
 
 CELL_S = 0.05
+_SIDEWAYS_S = 1.0
 
 
 @dataclass(frozen=True)
@@ -25,7 +26,7 @@ class FollowerData:
     fresh : NDArray[np.bool_], shape (n,)
         Steps with a new sample.
     commands : Array, shape (cells, k)
-        What its target is put together from: its own command, or those of the body.
+        What its target is put together from: its own command, or those of the body; three of them where that also moves sideways.
     asked : Array, shape (n,)
         Its commanded speed [m/s].
     name : str
@@ -58,13 +59,20 @@ def cells(x: Array, width: int) -> Array:
     return np.asarray(np.where(count > 0, np.where(known, table, 0.0).sum(axis=1) / np.maximum(count, 1), np.nan))
 
 
+def _moved_sideways(mission: MissionView) -> bool:
+    """Whether a machine with rollers on its wheels was commanded to move sideways."""
+    asked = np.abs(np.nan_to_num(mission.values("cmd.lateral")))
+    return bool(np.count_nonzero(asked > mission.machine.limits.driving_speed) * mission.timeline.dt > _SIDEWAYS_S)
+
+
 def followers(mission: MissionView) -> dict[str, FollowerData]:
     """Wheels whose sensor nothing has judged, by name: with a command, or with other wheels beside them."""
     timeline, machine = mission.timeline, mission.machine
     width = cell_of(timeline.dt)
     body: Array | None = None
     if mission.logged("cmd.v") and mission.logged("cmd.omega") and not machine.axles:
-        body = np.column_stack([cells(mission.values(n), width) for n in ("cmd.v", "cmd.omega")])
+        sideways = ("cmd.lateral",) if _moved_sideways(mission) else ()
+        body = np.column_stack([cells(mission.values(n), width) for n in ("cmd.v", "cmd.omega", *sideways)])
     several = sum(mission.logged(f"wheel.{w}.v") for w in machine.wheels) > 1
     out: dict[str, FollowerData] = {}
     for w in machine.wheels:

@@ -23,7 +23,7 @@ from pathlib import Path
 
 import numpy as np
 
-sys.path[:0] = [str(Path(__file__).resolve().parents[2]), str(Path(__file__).resolve().parent)]
+sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
 from ordinary_robots.faults import EVENTS, FAULTS, Fault, fault_of
 from ordinary_robots.log import write_log
@@ -155,7 +155,9 @@ def main() -> None:
     parser.add_argument("--faulty", type=int, default=3, help="missions of each kind of robot and fault")
     parser.add_argument("--kinds", nargs="+", choices=KINDS, default=KINDS)
     parser.add_argument("--faults", nargs="*", choices=FAULTS, default=FAULTS)
-    parser.add_argument("--detail", action="store_true", help="one line for each mission with something wrong in what was said")
+    parser.add_argument(
+        "--detail", action="store_true", help="one line for each mission with something wrong in what was said"
+    )
     args = parser.parse_args()
     by: dict[str, Counter[str]] = defaultdict(Counter)
     for kind in args.kinds:
@@ -192,16 +194,21 @@ def _detail(c: Case, seed: int) -> None:
     """One line of what was said."""
     r, f = c.robot, c.fault
     wheel = "" if f is None else c.names.get(r.wheels[f.wheel].joint, "?")
-    head = "healthy" if f is None else f"{f.kind} {wheel} {f.first * H:.1f}–{f.last * H:.1f} s, {f.size:.2f}{' counted' if f.counted else ''}"
-    shape = (
-        f"{r.rate:.0f} Hz{' closed' if r.closed else ''}{' positions' if r.positions else ''}{' efforts' if r.efforts else ''} odometry {r.odometry}"
+    head = (
+        "healthy"
+        if f is None
+        else f"{f.kind} {wheel} {f.first * H:.1f}–{f.last * H:.1f} s, {f.size:.2f}{' counted' if f.counted else ''}"
     )
+    shape = f"{r.rate:.0f} Hz{' closed' if r.closed else ''}{' positions' if r.positions else ''}{' efforts' if r.efforts else ''} odometry {r.odometry}"
     said = "; ".join(
         f"{i['component']} {i['side']} {i['mode']} {i['start_s']:.1f}–{i['stop_s']:.1f} p {i['probability']:.2f} {i['severity']}"
         f"{'' if c.right(i) else ' ✗'}"
         for i in c.told
     )
-    print(f"  [{seed} {r.kind}, {shape}] {head}: {c.report['verdict']['status']}, {c.report['verdict']['title']}: {said or 'nothing'}", flush=True)
+    print(
+        f"  [{seed} {r.kind}, {shape}] {head}: {c.report['verdict']['status']}, {c.report['verdict']['title']}: {said or 'nothing'}",
+        flush=True,
+    )
 
 
 if __name__ == "__main__":

@@ -27,7 +27,7 @@ class Fault:
     wheel, first, last : int
         Where and when.
     size : float
-        Scale, noise [rad/s], delay [s], share of the duty, duty.
+        Scale, noise [rad/s], delay [s], share of the duty, duty, time in which a jammed wheel comes to rest [s].
     counted : bool
         Whether it is in the counts, so that position and speed loop have it too, or in the published speed alone.
     """
@@ -71,6 +71,7 @@ def fault_of(kind: str, wheels: int, moving: NDArray[np.bool_], step: float, rng
         "encoder_noisy": float(rng.uniform(0.5, 3.0)),
         "encoder_spikes": 60.0,
         "encoder_late": float(rng.uniform(0.3, 1.0)),
+        "jammed": float(rng.uniform(0.02, 0.15)),
         "motor_weak": float(rng.uniform(0.2, 0.5)),
         "motor_on": float(rng.choice([-1, 1]) * rng.uniform(0.4, 0.9)),
     }.get(kind, 1.0)

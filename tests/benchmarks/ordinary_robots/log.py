@@ -12,7 +12,7 @@ from rosbags.rosbag2 import Writer as BagWriter
 from rosbags.typesys import Stores, get_typestore
 
 from .faults import Fault, published
-from .machines import H, Course, Robot
+from .machines import Course, H, Robot
 from .physics import Driven
 
 Array = NDArray[np.float64]
@@ -22,7 +22,9 @@ _START = 1_700_000_000.0
 _NONE = np.zeros(0)
 
 
-def write_log(path: Path, robot: Robot, course: Course, driven: Driven, fault: Fault | None, rng: np.random.Generator) -> None:
+def write_log(
+    path: Path, robot: Robot, course: Course, driven: Driven, fault: Fault | None, rng: np.random.Generator
+) -> None:
     """Write a mission: an MCAP file, or a folder of rosbag2 where `path` has no ending."""
     rows = [
         *_joints(robot, driven, fault, rng),
@@ -31,7 +33,9 @@ def write_log(path: Path, robot: Robot, course: Course, driven: Driven, fault: F
         *_odometry(robot, driven, fault, rng),
     ]
     if robot.described:
-        rows.append((0.0, "/robot_description", "std_msgs/msg/String", STORE.types["std_msgs/msg/String"](_urdf(robot))))
+        rows.append(
+            (0.0, "/robot_description", "std_msgs/msg/String", STORE.types["std_msgs/msg/String"](_urdf(robot)))
+        )
     rows.sort(key=lambda r: r[0])
     kinds = {topic: kind for _, topic, kind, _ in rows}
     if path.suffix == ".mcap":
@@ -65,7 +69,9 @@ def _sampled(x: Array, t: Array) -> Array:
     return np.asarray(x[np.clip((t / H).astype(np.intp), 0, len(x) - 1)])
 
 
-def _joints(robot: Robot, driven: Driven, fault: Fault | None, rng: np.random.Generator) -> list[tuple[float, str, str, Any]]:
+def _joints(
+    robot: Robot, driven: Driven, fault: Fault | None, rng: np.random.Generator
+) -> list[tuple[float, str, str, Any]]:
     t, arrives = _clock(robot.rate, len(driven.steer) * H, rng)
     step = 2 * np.pi / robot.counts
     angle = np.floor(_sampled(np.cumsum(driven.seen, axis=0) * H, t) / step) * step
@@ -137,7 +143,9 @@ def _inertia(course: Course, driven: Driven, rng: np.random.Generator) -> list[t
     ]  # fmt: skip
 
 
-def _odometry(robot: Robot, driven: Driven, fault: Fault | None, rng: np.random.Generator) -> list[tuple[float, str, str, Any]]:
+def _odometry(
+    robot: Robot, driven: Driven, fault: Fault | None, rng: np.random.Generator
+) -> list[tuple[float, str, str, Any]]:
     if robot.odometry == "none":
         return []
     t, arrives = _clock(float(rng.choice([10.0, 20.0, 50.0])), len(driven.steer) * H, rng)

@@ -103,7 +103,9 @@ class Course:
 
 def robot_of(kind: str, rng: np.random.Generator) -> Robot:
     """A random robot of a kind."""
-    size = {"differential": 0.4, "skid": 1.0, "rocker": 1.1, "ackermann": 0.8, "mecanum": 0.7}[kind] * rng.uniform(0.7, 1.4)
+    size = {"differential": 0.4, "skid": 1.0, "rocker": 1.1, "ackermann": 0.8, "mecanum": 0.7}[kind] * rng.uniform(
+        0.7, 1.4
+    )
     half, base = 0.3 * size, 0.5 * size
     rows = {"differential": [0.0], "skid": [base / 2, -base / 2], "rocker": [base, 0.0, -base], "ackermann": [0.0]}
     names = {1: [""], 2: ["front_", "rear_"], 3: ["front_", "middle_", "rear_"]}

@@ -9,7 +9,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from .faults import Fault
-from .machines import H, Course, Robot
+from .machines import Course, H, Robot
 
 Array = NDArray[np.float64]
 
@@ -72,7 +72,9 @@ def drive(robot: Robot, course: Course, fault: Fault | None, rng: np.random.Gene
         [robot.radius, robot.mass, robot.rail, robot.lag, robot.accel, robot.deadband, 1.7 * robot.top, grip,
          robot.wheelbase if ackermann else 0.0, float(robot.closed)]
     )  # fmt: skip
-    out = _scan(target, steer, effect, scale, stop, course.slope, course.load, course.kerbs, x, y, roller, bias, numbers)
+    out = _scan(
+        target, steer, effect, scale, stop, course.slope, course.load, course.kerbs, x, y, roller, bias, numbers
+    )
     return Driven(*out, steer)
 
 
@@ -128,21 +130,16 @@ def _scan(target: Any, steer: Any, effect: Any, scale: Any, stop: Any, slope: An
             torque -= rail * 0.03 * np.tanh(speed[i] / 0.02)
             along = vx - ys[i] * wz
             across = vy + xs[i] * wz
-            if roller[i] != 0.0:
-                slip = speed[i] - (along - roller[i] * across)
-            else:
-                slip = speed[i] - along
+            slip = speed[i] - (along - roller[i] * across) if roller[i] != 0.0 else speed[i] - along
             force = grip * weight * load[k] * np.tanh(slip / 0.06)
             push_x += force - kerbs[k, i] * np.tanh(along / 0.05)
             moment += -ys[i] * (force - kerbs[k, i] * np.tanh(along / 0.05))
-            if roller[i] != 0.0:
-                side = -roller[i] * force
-            else:
-                side = -0.6 * grip * weight * load[k] * np.tanh(across / 0.1)
+            side = -roller[i] * force if roller[i] != 0.0 else -0.6 * grip * weight * load[k] * np.tanh(across / 0.1)
             push_y += side
             moment += xs[i] * side
             if code == 4:
-                speed[i] = 0.0
+                speed[i] *= 1.0 - 1e-3 / scale[k, i]
+                speed[i] = 0.0 if abs(speed[i]) < 1e-3 else speed[i]
             elif stop[k]:
                 speed[i] *= 0.97  # brakes
             else:
