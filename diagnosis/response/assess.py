@@ -9,10 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from diagnosis.channels.standstill import not_followed
-from diagnosis.response.beside import Bodies, views
+from diagnosis.response.beside import Bodies, same_side, views
 from diagnosis.response.body import BodySpeed
 from diagnosis.response.channel import Samples, holds_of, samples_of
 from diagnosis.response.drive import unanswered
+from diagnosis.response.effort import idle_drives, shares_of
 from diagnosis.response.findings import Wheel, finding_of, spikes_of
 from diagnosis.response.identification import Response, identify_response, without_command
 from diagnosis.response.inputs import FollowerData, cell_of, cells
@@ -109,14 +110,19 @@ def assess_response(
     found = {w: j._replace(wheel=j.wheel._replace(habit=_habit(w, holds))) for w, j in found.items()}
     sideways = any(d.commands.shape[1] > _BODY_COMMANDS for d in drives)
     bodies = Bodies(speeds, None if yaw is None else cells(yaw, width), width * dt, sideways)
+    efforts = {w: cells(j.data.effort, width) for w, j in found.items() if j.data.effort is not None and not sideways}
+    pulls = shares_of(
+        found, efforts, {w: tuple(o for o in found if o != w and same_side(w, o, geometry)) for w in found}
+    )
+    found = {w: j._replace(wheel=j.wheel._replace(pull=pulls.get(w))) for w, j in found.items()}
     names = {w: j.data.name for w, j in found.items()}
     beside, left_notes = views(names, {w: j.wheel.blocks for w, j in found.items()}, geometry, bodies)
     judged = {w: _judge(j, beside.get(w), dt, width) for w, j in found.items()}
     kept = {w: [s for s in j.spells if not others_fault(s, w, judged)] for w, j in judged.items()}
     least = max(1, round(_LEAST_S / BLOCK_S))
     kept = {w: where_asked(spells, _asked(judged[w], limits), least) for w, spells in kept.items()}
-    idle_drives = {w: unanswered(w, judged, beside, width * dt) for w in judged}
-    parts = {w: _sides(j, kept[w], idle_drives[w], left_out, limits, dt) for w, j in judged.items()}
+    weak = {w: _drives(w, judged, beside, pulls.get(w), width * dt) for w in judged}
+    parts = {w: _sides(j, kept[w], weak[w], left_out, limits, dt) for w, j in judged.items()}
     remarks = (*otherwise(judged, width * dt), *left_notes)
     doubts = {w: j.joint.unlike for w, j in judged.items() if j.joint is not None and j.joint.unlike}
     for w, text in (doubts | unlike(judged)).items():
@@ -185,6 +191,15 @@ def _judge(one: Judged, beside: Beside | None, dt: float, width: int) -> Judged:
             blocks=blocks, compared="" if beside is None else beside.compared, own=beside is not None and beside.own
         ),
     )
+
+
+def _drives(
+    wheel: str, judged: Mapping[str, Judged], views: Mapping[str, Beside], pull: Array | None, block_s: float
+) -> list[Finding]:
+    """What is known to be a drive's fault, each time once."""
+    found = unanswered(wheel, judged, views, block_s)
+    more = idle_drives(judged[wheel], pull, block_s)
+    return found + [f for f in more if not any(f.start < g.stop and g.start < f.stop for g in found)]
 
 
 def _habit(wheel: str, holds: Mapping[str, Array]) -> float:

@@ -25,6 +25,7 @@ _SHARE = 0.03  # of the speed
 _BLAME_BLOCKS = 9  # over which it is asked whose command misfit is the larger
 _LEAST_TOGETHER, _TOGETHER = 3, 0.15  # other wheels, and their median misfit, of the usual speed
 _AGAINST, _AGAINST_BLOCKS = 0.1, 6  # of the top speed; blocks
+_DIFFER = 0.3  # of the speed: by as much two wheels that show one speed differ only where one of them is wrong
 _OWN_MISFIT = (
     1.5  # times the usual misfit beside the command: from there on a misfit beside the body's sensor is the wheel's
 )
@@ -95,14 +96,16 @@ def _by_wheels(
     by_body: Mapping[str, View],
 ) -> Beside | None:
     """What the other wheels say of one."""
-    others = [o for o in wheels if o != w and _same_side(w, o, geometry)]
+    others = [o for o in wheels if o != w and same_side(w, o, geometry)]
     speeds = [s for o in others if (s := _scaled(blocks[w].mean, blocks[o].mean)) is not None]
     speed: Array | None = None
-    apart: Array | float = 0.0
     if speeds:
         speed = np.asarray(np.median(np.array(speeds), axis=0))
-        apart = 0.5 * np.ptp(speeds, axis=0) if len(speeds) == 2 else 0.0  # of two that differ none is right
-    elif yaw is not None and (far := [o for o in wheels if o != w and not _same_side(w, o, geometry)]):
+        if len(speeds) == 2:  # of two that differ none is known to be right
+            speed[
+                np.abs(speeds[0] - speeds[1]) > _DIFFER * (np.abs(speed) + _DIFFER * np.nanquantile(np.abs(speed), 0.9))
+            ] = np.nan
+    elif yaw is not None and (far := [o for o in wheels if o != w and not same_side(w, o, geometry)]):
         others = far
         mean = np.asarray(np.mean([blocks[o].mean for o in far], axis=0))
         speed = _turned(blocks[w].mean, mean, yaw)
@@ -115,7 +118,7 @@ def _by_wheels(
     else:
         blame = _blame([_off_command(blocks[o]) for o in (w, *others)])
     rough = np.asarray(np.max([blocks[o].rough for o in others], axis=0))
-    noise = _noise(blocks[w], speed) + apart
+    noise = _noise(blocks[w], speed)
     alone = not speeds and len(wheels) == 2 and _turns_by_wheels(blocks[w].mean, blocks[others[0]].mean)
     return Beside(speed, noise, blame, rough, " and ".join(wheels[o] for o in others), own=alone)
 
@@ -166,7 +169,8 @@ def _by_body(
     return Beside(view.speed, noise, blame, np.zeros(own.mean.size), f"{view.name}", own=not rivals)
 
 
-def _same_side(a: str, b: str, geometry: Geometry | None) -> bool:
+def same_side(a: str, b: str, geometry: Geometry | None) -> bool:
+    """Whether two wheels are fixed on one side of the machine."""
     if geometry is None or a not in geometry.wheels or b not in geometry.wheels:
         return False
     one, two = geometry.wheels[a], geometry.wheels[b]
@@ -176,6 +180,7 @@ def _same_side(a: str, b: str, geometry: Geometry | None) -> bool:
 def _scaled(y: Array, x: Array) -> Array | None:
     """x times the gain that brings it to y; None where they do not move together."""
     use = np.isfinite(y) & np.isfinite(x) & (np.abs(x) > 0.1 * np.nanquantile(np.abs(x), 0.9))
+    use &= y != 0.0  # a wheel at rest, or a dead sensor, tells no gain, for however long
     if np.count_nonzero(use) < _LEAST_BLOCKS:
         return None
     gain = float(np.median(y[use] / x[use]))

@@ -23,6 +23,7 @@ _SPIKE_GAP_S, _LEAST_SPIKES = 10.0, 3
 _SENSOR = 0.96  # that what a channel alone shows is the sensor's
 _ONE_JUMP, _TWO_JUMPS = 0.92, 0.97
 _EITHER = 0.6  # that it is the sensor's, up to which its side is left open
+_LEAST_PULLS, _AS_USUAL = 8, (0.6, 1.5)  # blocks with an effort, and its size by the usual one
 _MOVING = 0.2  # of the usual speed
 _SHARP_S = 0.035  # between readings: a wheel that jams, or comes free, takes about as long
 _BLUNT = 0.5, 0.9  # that one jump, or two, between readings further apart are the sensor's
@@ -53,6 +54,8 @@ class Wheel(NamedTuple):
         How long healthy channels of this machine stay at one value [s].
     own : bool
         Whether those channels show how this wheel itself turns; others only how it should.
+    pull : Array or None, shape (b,)
+        Effort of its drive by its share of the load [1]; NaN where nothing is pulled, None where it is not logged.
     """
 
     name: str
@@ -63,6 +66,7 @@ class Wheel(NamedTuple):
     compared: str
     habit: float = 0.0
     own: bool = False
+    pull: Array | None = None
 
     @property
     def sharp(self) -> bool:
@@ -155,6 +159,9 @@ def _silent(spell: Spell, wheel: Wheel, first: int, last: int, speed: Array | No
     if seen or spell.own:
         texts.append(f"{wheel.compared} went on moving.")
         sensor = max(sensor, _SENSOR) if wheel.own or spell.own else sensor
+    if sensor < _SENSOR and _pulls_as_usual(wheel, part):
+        sensor = _SENSOR
+        texts.append("Its drive pulls as usual, as it does not where a {wheel} is held, or the drive has no power.")
     if sensor <= _EITHER:
         texts.append(
             "Without a sharp jump or another view of this {wheel}, one that stands still and a dead sensor cannot be distinguished."
@@ -163,6 +170,12 @@ def _silent(spell: Spell, wheel: Wheel, first: int, last: int, speed: Array | No
     return _finding(
         begin, max(end, begin + 1), FaultMode.NO_SIGNAL, spell.p, Epsilon(1.0, 1.0, 1.0), sat, tuple(texts), sensor
     )
+
+
+def _pulls_as_usual(wheel: Wheel, part: slice) -> bool:
+    """Whether a drive has its usual share of the load in most of some blocks."""
+    share = np.zeros(0) if wheel.pull is None else wheel.pull[part][np.isfinite(wheel.pull[part])]
+    return share.size >= _LEAST_PULLS and bool(_AS_USUAL[0] < np.median(share) < _AS_USUAL[1])
 
 
 def _by_jumps(wheel: Wheel, jumps: int) -> float:

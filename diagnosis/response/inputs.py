@@ -33,6 +33,8 @@ class FollowerData:
         Of its channel.
     rolled : Array or None, shape (n,)
         Speed by the position of its joint [m/s]; None where that is not logged.
+    effort : Array or None, shape (n,)
+        Torque, current or duty of its drive, in any unit; None where that is not logged.
     """
 
     y: Array
@@ -41,6 +43,7 @@ class FollowerData:
     asked: Array
     name: str
     rolled: Array | None = None
+    effort: Array | None = None
 
 
 def cell_of(dt: float) -> int:
@@ -84,5 +87,6 @@ def followers(mission: MissionView) -> dict[str, FollowerData]:
         commands = cells(asked, width)[:, None] if own or body is None else body
         position = f"wheel.{w}.v_position"
         rolled = mission.values(position) if mission.logged(position) else None
-        out[w] = FollowerData(mission.values(name), timeline.fresh[name], commands, asked, name, rolled)
+        effort = mission.values(f"wheel.{w}.effort") if mission.logged(f"wheel.{w}.effort") else None
+        out[w] = FollowerData(mission.values(name), timeline.fresh[name], commands, asked, name, rolled, effort)
     return out

@@ -88,7 +88,7 @@ def _joints(
     mirrored = robot.described is False and robot.counts > 2e4  # motors of one side are mounted the other way round
     sign = np.array([-1.0 if mirrored and w.y < 0 else 1.0 for w in robot.wheels])
     names = [w.joint for w in robot.wheels]
-    effort = sign * _sampled(driven.duty, t) * robot.rail * robot.radius
+    effort = sign * _sampled(driven.torque, t)
     effort = effort + rng.normal(0.0, 0.02 * robot.rail * robot.radius, effort.shape)
     steer = _sampled(driven.steer, t)
     made, kind = STORE.types["sensor_msgs/msg/JointState"], "sensor_msgs/msg/JointState"

@@ -21,8 +21,8 @@ class Driven(NamedTuple):
     ----------
     wheel, seen : Array, shape (n, wheels)
         True speed, and that of the encoder [rad/s].
-    duty : Array, shape (n, wheels)
-        Of each motor [1].
+    torque : Array, shape (n, wheels)
+        Of each motor at its wheel [N·m].
     body : Array, shape (n, 3)
         Forward, lateral [m/s] and yaw rate [rad/s].
     steer : Array, shape (n,)
@@ -31,7 +31,7 @@ class Driven(NamedTuple):
 
     wheel: Array
     seen: Array
-    duty: Array
+    torque: Array
     body: Array
     steer: Array
 
@@ -92,7 +92,7 @@ def _scan(target: Any, steer: Any, effect: Any, scale: Any, stop: Any, slope: An
     """One mission; one function, for its state is one."""
     radius, mass, rail, lag, accel, deadband, free, grip, base, closed = numbers
     n, m = target.shape
-    wheel, seen, duty, body = np.zeros((n, m)), np.zeros((n, m)), np.zeros((n, m)), np.zeros((n, 3))
+    wheel, seen, pull, body = np.zeros((n, m)), np.zeros((n, m)), np.zeros((n, m)), np.zeros((n, 3))
     ref, total, u, speed = np.zeros(m), np.zeros(m), np.zeros(m), np.zeros(m)
     vx = vy = wz = 0.0
     own = 0.15 * mass / m  # a wheel's and motor's own mass at the rim [kg]
@@ -127,6 +127,9 @@ def _scan(target: Any, steer: Any, effect: Any, scale: Any, stop: Any, slope: An
             live = u[i]
             live = 0.0 if abs(live) < deadband else live
             torque = bias[i] * rail * (live - speed[i] / free)
+            if code == 1:
+                torque = 0.0  # without power
+            pull[k, i] = torque * radius
             torque -= rail * 0.03 * np.tanh(speed[i] / 0.02)
             along = vx - ys[i] * wz
             across = vy + xs[i] * wz
@@ -146,7 +149,6 @@ def _scan(target: Any, steer: Any, effect: Any, scale: Any, stop: Any, slope: An
                 speed[i] += 1e-3 * (torque - force) / own
             wheel[k, i] = speed[i] / radius
             seen[k, i] = speed[i] * (scale[k, i] if code == 5 else 1.0) / radius
-            duty[k, i] = u[i]
         vx += 1e-3 * (push_x / heavy - 9.81 * np.sin(slope[k]) - 0.02 * 9.81 * np.tanh(vx / 0.05))
         if base > 0.0:
             vy = 0.0
@@ -155,4 +157,4 @@ def _scan(target: Any, steer: Any, effect: Any, scale: Any, stop: Any, slope: An
             wz += 1e-3 * (moment / inertia - 0.2 * wz)
             vy += 1e-3 * push_y / heavy
         body[k, 0], body[k, 1], body[k, 2] = vx, vy, wz
-    return wheel, seen, duty, body
+    return wheel, seen, pull, body
