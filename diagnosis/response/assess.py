@@ -29,13 +29,14 @@ from diagnosis.response.models import (
     MEAN_HEALTHY_S,
     NOISY,
     OTHER,
+    SILENT,
     STATES,
     Beside,
     blocks_of,
     scores,
 )
 from diagnosis.response.power import powers_of
-from diagnosis.response.rivals import by_each_other, jumped, others_fault, shared
+from diagnosis.response.rivals import by_each_other, held_back_together, jumped, others_fault, shared
 from diagnosis.response.spells import Spell, spells_of, where_asked
 from diagnosis.results.assessment import CODE, Assessment, Finding
 from diagnosis.results.evidence_columns import Pictured, steps_of
@@ -121,8 +122,9 @@ def assess_response(
     kept = {w: [s for s in j.spells if not others_fault(s, w, judged)] for w, j in judged.items()}
     least = max(1, round(_LEAST_S / BLOCK_S))
     kept = {w: where_asked(spells, _asked(judged[w], limits), least) for w, spells in kept.items()}
+    together = held_back_together(judged)
     weak = {w: _drives(w, judged, beside, pulls.get(w), width * dt) for w in judged}
-    parts = {w: _sides(j, kept[w], weak[w], left_out, limits, dt) for w, j in judged.items()}
+    parts = {w: _sides(j, kept[w], weak[w], (left_out, together), limits, dt) for w, j in judged.items()}
     remarks = (*otherwise(judged, width * dt), *left_notes)
     doubts = {w: j.joint.unlike for w, j in judged.items() if j.joint is not None and j.joint.unlike}
     for w, text in (doubts | unlike(judged)).items():
@@ -216,13 +218,24 @@ def _asked(one: Judged, limits: Limits) -> Flags:
 
 
 def _sides(
-    one: Judged, spells: Sequence[Spell], drives: Sequence[Finding], idle: Flags, limits: Limits, dt: float
+    one: Judged,
+    spells: Sequence[Spell],
+    drives: Sequence[Finding],
+    machine: tuple[Flags, Flags],
+    limits: Limits,
+    dt: float,
 ) -> tuple[Assessment, Assessment]:
-    """Sensor and drive of a wheel, with what is known to be its drive's."""
+    """Sensor and drive of a wheel, with what is known to be its drive's.
+
+    `machine` says where the machine as a whole stands, by steps, and where all wheels are held back together, by blocks.
+    """
+    idle, together = machine
     wheel, blocks, size = one.wheel, one.wheel.blocks, one.data.y.size
     width = -(-size // blocks.start.size) if blocks.start.size < 2 else int(blocks.start[1])
     findings, doubtful = spikes_of(wheel), one.posterior[:, HEALTHY] < 0.5
     doubtful = doubtful & ~((one.posterior.argmax(axis=1) == OTHER) & (one.speed is None) & one.calm)
+    if one.speed is None:
+        doubtful &= ~(together & (one.posterior.argmax(axis=1) != SILENT))
     for f in drives:
         doubtful[f.start // width : -(-f.stop // width)] = False
     for spell in spells:

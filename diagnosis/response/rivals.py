@@ -5,12 +5,19 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
+from numpy.typing import NDArray
 
 from diagnosis.response.machine import Judged
 from diagnosis.response.models import Beside, held_long
 from diagnosis.response.spells import Spell
 from replay.faults import FaultMode
 
+Flags = NDArray[np.bool_]
+
+_HELD_BACK, _ALIKE = (
+    1.0,
+    0.25,
+)  # usual misfits beside the command of each wheel, and by how much their shares of it may differ [1]
 _DOUBT_S = 0.5  # around the beginning and the end of a spell
 _ROUGHER = 2.0  # times what changes from sample to sample in other wheels, at most, is usual
 _ALSO_HELD = 0.05  # of the driving in which another wheel stays at one value for long: then it is a habit
@@ -70,6 +77,25 @@ def others_fault(spell: Spell, wheel: str, judged: Mapping[str, Judged]) -> bool
             elif s.mode.scaled and (s.p > spell.p or spell.mode is FaultMode.OUTSIDE_TABLE):
                 return True  # a sensor loses more often than it gains
     return False
+
+
+def held_back_together(judged: Mapping[str, Judged]) -> Flags:
+    """Blocks in which all wheels fall short of their commands, or exceed them, by like shares, shape (b,): a slope or load, no sensor's fault.
+
+    Sensors do not fail together, nor alike.
+    """
+    gains, off = [], []
+    for j in judged.values():
+        if not j.response.answered:
+            return np.zeros(j.driving.size, np.bool_)
+        b = j.wheel.blocks
+        middle = 0.5 * (b.low + b.high)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            gains.append(np.nan_to_num(b.mean / middle, nan=np.inf, posinf=np.inf, neginf=np.inf))
+        off.append(np.abs(b.mean - np.clip(b.mean, b.low, b.high)) > _HELD_BACK * b.noise)
+    spread = np.max(gains, axis=0) - np.min(gains, axis=0) if len(gains) > 1 else np.full(off[0].size, np.inf)
+    one_way = np.logical_or(np.max(gains, axis=0) < 1.0, np.min(gains, axis=0) > 1.0)
+    return np.asarray(np.logical_and.reduce(off) & one_way & (np.min(gains, axis=0) > 0.0) & (spread < _ALIKE))
 
 
 def jumped(one: Judged, spell: Spell) -> bool:
