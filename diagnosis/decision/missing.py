@@ -24,6 +24,7 @@ _COSTS = {
     "steer.u_applied": "the {steer.actuator} is judged by how the angle follows its command; a constant angle gives no evidence on it",
     "cmd.v": "without recorded v_c,i no {wheel} has a command: no tracking error, and driving time by measured speeds",
     "cmd.omega": "commands of the {wheels} are computed as if driving straight ahead, unless v_c,i is recorded",
+    "cmd.lateral": "{wheels} with rollers have no expected speed while the machine is to move sideways",
     "imu.yaw_rate": "how the machine turns is known by commands, {wheels} and steering angles alone",
     "gnss.lat": "no speed of the body by GNSS to judge the {wheels} by; the path is drawn from odometry, if at all",
     "gnss.lon": "no speed of the body by GNSS to judge the {wheels} by; the path is drawn from odometry, if at all",
@@ -38,6 +39,8 @@ _COSTS = {
 def applies(name: str, words: MachineWords) -> bool:
     """Whether a machine of this kind can have a canonical signal at all: no motor has pressures or a spool, no valve an effort, no arm an odometry."""
     leaf, group = name.rpartition(".")[2], name.partition(".")[0]
+    if name == "cmd.lateral":  # of few machines; nobody misses what no other one can do
+        return False
     if words.drive != "valve" and leaf in ("pressure_a", "pressure_b", "psi"):
         return False
     if leaf == ("effort" if words.drive == "valve" else "u_applied"):

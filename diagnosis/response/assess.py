@@ -9,11 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from diagnosis.channels.standstill import not_followed
-from diagnosis.response.beside import Bodies, views
+from diagnosis.response.beside import Bodies, same_side, views
 from diagnosis.response.body import BodySpeed
-from diagnosis.response.channel import holds_of, samples_of
-from diagnosis.response.findings import Spell, Wheel, finding_of, spells_of, spikes_of, where_asked
-from diagnosis.response.identification import identify_response, without_command
+from diagnosis.response.channel import Samples, holds_of, samples_of
+from diagnosis.response.drive import unanswered
+from diagnosis.response.effort import idle_drives, shares_of
+from diagnosis.response.findings import Wheel, finding_of, spikes_of
+from diagnosis.response.identification import Response, identify_response, without_command
 from diagnosis.response.inputs import FollowerData, cell_of, cells
 from diagnosis.response.joint import cut, joint_of
 from diagnosis.response.jumps import jumps_of
@@ -27,16 +29,19 @@ from diagnosis.response.models import (
     MEAN_HEALTHY_S,
     NOISY,
     OTHER,
+    SILENT,
     STATES,
     Beside,
     blocks_of,
     scores,
 )
 from diagnosis.response.power import powers_of
+from diagnosis.response.rivals import by_each_other, held_back_together, jumped, others_fault, shared
+from diagnosis.response.spells import Spell, spells_of, where_asked
 from diagnosis.results.assessment import CODE, Assessment, Finding
 from diagnosis.results.evidence_columns import Pictured, steps_of
 from diagnosis.results.vocabulary import Tier
-from replay.faults import FaultMode, State
+from replay.faults import State
 from replay.machine.config import Limits
 from replay.machine.geometry import Geometry
 
@@ -47,6 +52,8 @@ _AT_A_JUMP = 0.1, 0.3  # probability that a fault begins, or ends, where the cha
 _MOVES = 0.4  # of the driving speed: enough to see whether a channel lives
 _OWN, _OTHERS = 4, 2  # holds of a channel that may be faults: of the one in question, and of each other
 _LEAST_S = 1.0
+_LEAST_OTHERS = 2  # wheels that answer, beside one that does not
+_BODY_COMMANDS = 2  # speed and yaw rate
 _AT_ONCE_S = 5e-3
 _DOUBT_S = 0.5  # around a spell that is judged no fault
 _HIDDEN = "a controller that holds the speed hides a weak drive, and their healthy effort is not known"
@@ -99,16 +106,25 @@ def assess_response(
     found = _wheels(data, left_out, (cell, width), limits, dt)
     if not found:
         return Judgement({}, standstills(idle, dt) or unexplained(drives, limits, dt))
+    found = by_each_other(found, width * dt)
     holds = {w: holds_of(j.wheel.samples, _MOVES * limits.driving_speed, dt) for w, j in found.items()}
     found = {w: j._replace(wheel=j.wheel._replace(habit=_habit(w, holds))) for w, j in found.items()}
-    bodies = Bodies(speeds, None if yaw is None else cells(yaw, width), width * dt)
+    sideways = any(d.commands.shape[1] > _BODY_COMMANDS for d in drives)
+    bodies = Bodies(speeds, None if yaw is None else cells(yaw, width), width * dt, sideways)
+    efforts = {w: cells(j.data.effort, width) for w, j in found.items() if j.data.effort is not None and not sideways}
+    pulls = shares_of(
+        found, efforts, {w: tuple(o for o in found if o != w and same_side(w, o, geometry)) for w in found}
+    )
+    found = {w: j._replace(wheel=j.wheel._replace(pull=pulls.get(w))) for w, j in found.items()}
     names = {w: j.data.name for w, j in found.items()}
     beside, left_notes = views(names, {w: j.wheel.blocks for w, j in found.items()}, geometry, bodies)
     judged = {w: _judge(j, beside.get(w), dt, width) for w, j in found.items()}
-    kept = {w: [s for s in j.spells if not _others_fault(s, w, judged)] for w, j in judged.items()}
+    kept = {w: [s for s in j.spells if not others_fault(s, w, judged)] for w, j in judged.items()}
     least = max(1, round(_LEAST_S / BLOCK_S))
     kept = {w: where_asked(spells, _asked(judged[w], limits), least) for w, spells in kept.items()}
-    parts = {w: _sides(j, kept[w], left_out, limits, dt) for w, j in judged.items()}
+    together = held_back_together(judged)
+    weak = {w: _drives(w, judged, beside, pulls.get(w), width * dt) for w in judged}
+    parts = {w: _sides(j, kept[w], weak[w], (left_out, together), limits, dt) for w, j in judged.items()}
     remarks = (*otherwise(judged, width * dt), *left_notes)
     doubts = {w: j.joint.unlike for w, j in judged.items() if j.joint is not None and j.joint.unlike}
     for w, text in (doubts | unlike(judged)).items():
@@ -133,15 +149,19 @@ def _wheels(
     """Wheels whose response could be found, with their blocks; nothing is judged yet."""
     cell, width = steps
     out: dict[str, Judged] = {}
+    channels: dict[str, tuple[Samples, Response | None]] = {}
     for w, d in data.items():
         y = np.where(hidden, np.nan, d.y)
         samples = samples_of(y, d.fresh)
         y[samples.step[samples.wild]] = np.nan
-        means = cells(y, cell)
-        found = identify_response(means, d.commands, cell * dt, limits.driving_speed)
-        response = without_command(means.size) if found is None and not np.isfinite(d.commands).any() else found
-        if response is None:
+        channels[w] = samples, identify_response(cells(y, cell), d.commands, cell * dt, limits.driving_speed)
+    several = sum(found is not None for _, found in channels.values()) >= _LEAST_OTHERS
+    for w, d in data.items():
+        y, (samples, found) = d.y, channels[w]
+        if found is None and not several and np.isfinite(d.commands).any():
             continue
+        # a wheel that alone makes nothing of its command is judged by the others, and by its channel
+        response = without_command(-(-y.size // cell)) if found is None else found
         blocks = blocks_of(samples, response, cell, width, y.size)
         moves = np.abs(np.nan_to_num(blocks.mean))
         if response.answered:
@@ -160,17 +180,28 @@ def _judge(one: Judged, beside: Beside | None, dt: float, width: int) -> Judged:
     rolled = one.data.rolled
     joint = None if rolled is None else joint_of(blocks, cells(rolled, width), beside)
     score = scores(blocks, one.driving, block_s, beside, None if joint is None else joint.view)
-    jumped = one.wheel.samples.step[one.wheel.jumps.place] // width
+    places = one.wheel.samples.step[one.wheel.jumps.place] // width
     enters, leaves = np.full((2, len(score)), [[-np.expm1(-block_s / t)] for t in (MEAN_HEALTHY_S, MEAN_FAULTY_S)])
-    enters[jumped], leaves[jumped] = _AT_A_JUMP
+    enters[places], leaves[places] = _AT_A_JUMP
     p = posterior(score, enters, leaves)
     return one._replace(
         posterior=p,
-        spells=cut(spells_of(p, block_s), joint, blocks),
+        spells=[s if jumped(one, s) else shared(s, beside) for s in cut(spells_of(p, block_s), joint, blocks)],
         speed=None if beside is None else beside.speed,
         joint=joint,
-        wheel=one.wheel._replace(compared="" if beside is None else beside.compared),
+        wheel=one.wheel._replace(
+            blocks=blocks, compared="" if beside is None else beside.compared, own=beside is not None and beside.own
+        ),
     )
+
+
+def _drives(
+    wheel: str, judged: Mapping[str, Judged], views: Mapping[str, Beside], pull: Array | None, block_s: float
+) -> list[Finding]:
+    """What is known to be a drive's fault, each time once."""
+    found = unanswered(wheel, judged, views, block_s)
+    more = idle_drives(judged[wheel], pull, block_s)
+    return found + [f for f in more if not any(f.start < g.stop and g.start < f.stop for g in found)]
 
 
 def _habit(wheel: str, holds: Mapping[str, Array]) -> float:
@@ -186,35 +217,30 @@ def _asked(one: Judged, limits: Limits) -> Flags:
     return asked if one.speed is None else asked | (np.abs(np.nan_to_num(one.speed)) > least)
 
 
-def _others_fault(spell: Spell, wheel: str, judged: Mapping[str, Judged]) -> bool:
-    """Whether what looks like a scale is the fault of the wheel that this one was compared with, or of the whole machine."""
-    one = judged[wheel]
-    if spell.own or (not spell.mode.scaled and spell.mode is not FaultMode.OUTSIDE_TABLE):
-        return False
-    for other, j in judged.items():
-        for s in j.spells if other != wheel else ():
-            overlap = min(s.stop, spell.stop) - max(s.start, spell.start)
-            if overlap <= 0.3 * (spell.stop - spell.start):
-                continue
-            if one.speed is None:
-                if s.mode is spell.mode:  # both at once: load, slope or a weak battery
-                    return True
-                continue
-            surer = not s.mode.scaled or s.p > spell.p or spell.mode.value == "outside_table"
-            if surer and s.mode.value != "outside_table":
-                return True
-    return False
-
-
 def _sides(
-    one: Judged, spells: Sequence[Spell], idle: Flags, limits: Limits, dt: float
+    one: Judged,
+    spells: Sequence[Spell],
+    drives: Sequence[Finding],
+    machine: tuple[Flags, Flags],
+    limits: Limits,
+    dt: float,
 ) -> tuple[Assessment, Assessment]:
-    """Sensor and drive of a wheel."""
+    """Sensor and drive of a wheel, with what is known to be its drive's.
+
+    `machine` says where the machine as a whole stands, by steps, and where all wheels are held back together, by blocks.
+    """
+    idle, together = machine
     wheel, blocks, size = one.wheel, one.wheel.blocks, one.data.y.size
     width = -(-size // blocks.start.size) if blocks.start.size < 2 else int(blocks.start[1])
     findings, doubtful = spikes_of(wheel), one.posterior[:, HEALTHY] < 0.5
     doubtful = doubtful & ~((one.posterior.argmax(axis=1) == OTHER) & (one.speed is None) & one.calm)
+    if one.speed is None:
+        doubtful &= ~(together & (one.posterior.argmax(axis=1) != SILENT))
+    for f in drives:
+        doubtful[f.start // width : -(-f.stop // width)] = False
     for spell in spells:
+        if any(f.start < spell.stop * width and spell.start * width < f.stop for f in drives) and not spell.own:
+            continue
         long = (spell.stop - spell.start) * width * dt >= _LEAST_S
         found = finding_of(spell, *_shown_by(one, spell)) if long and spell.p >= LEAST_P else None
         if found is not None:
@@ -233,11 +259,13 @@ def _sides(
     for states in (sensor, drive):
         states[idle] = CODE[State.NOT_ASSESSED]
         states[~known] = CODE[State.NO_DATA]
+    for f in drives:
+        drive[f.start : f.stop] = CODE[State(f.mode.value)]
     both = [f for f in findings if len(f.side.sides) > 1]
     for f in findings:
         sensor[f.start : f.stop] = CODE[State(f.mode.value)]
         drive[f.start : f.stop] = CODE[State(f.mode.value) if f in both else State.MASKED]
-    return _assessment(one, sensor, tuple(findings), limits, dt), _drive(one, drive, tuple(both))
+    return _assessment(one, sensor, tuple(findings), limits, dt), _drive(one, drive, (*drives, *both))
 
 
 def _shown_by(one: Judged, spell: Spell) -> tuple[Wheel, Array | None]:
@@ -245,7 +273,7 @@ def _shown_by(one: Judged, spell: Spell) -> tuple[Wheel, Array | None]:
     if one.joint is None or not spell.own:
         return one.wheel, one.speed
     view = one.joint.view
-    return one.wheel._replace(compared=view.compared), view.speed
+    return one.wheel._replace(compared=view.compared, own=False), view.speed
 
 
 def _without_doubles(findings: Sequence[Finding]) -> list[Finding]:

@@ -1,4 +1,9 @@
-"""Other views of a wheel's speed: wheels of its side, the opposite side with the yaw rate between them, sensors of the body."""
+"""Other views of a wheel's speed: wheels of its side, the opposite side with the yaw rate between them, sensors of the body.
+
+Wheels of one side are pulled along by each other or skid, so that they tell what a sensor should read, not whether its wheel turns.
+The yaw rate beside the only other wheel, or a sensor of the body beside the only wheel, shows the wheel's own motion (`Beside.own`).
+Wheels with rollers go sideways: each of them is what the three others make it be, v_FL + v_FR = v_RL + v_RR.
+"""
 
 from __future__ import annotations
 
@@ -18,6 +23,9 @@ _LEAST_BLOCKS = 80
 _ALIKE = 0.4  # median misfit, of the usual speed, beyond which two wheels do not move together
 _SHARE = 0.03  # of the speed
 _BLAME_BLOCKS = 9  # over which it is asked whose command misfit is the larger
+_LEAST_TOGETHER, _TOGETHER = 3, 0.15  # other wheels, and their median misfit, of the usual speed
+_AGAINST, _AGAINST_BLOCKS = 0.1, 6  # of the top speed; blocks
+_DIFFER = 0.3  # of the speed: by as much two wheels that show one speed differ only where one of them is wrong
 _OWN_MISFIT = (
     1.5  # times the usual misfit beside the command: from there on a misfit beside the body's sensor is the wheel's
 )
@@ -34,11 +42,14 @@ class Bodies(NamedTuple):
         Measured yaw rate [rad/s].
     block_s : float
         Length of a block [s].
+    sideways : bool
+        Whether the machine also moves sideways, so that wheels of one side are not alike.
     """
 
     speeds: tuple[BodySpeed, ...] = ()
     yaw: Array | None = None
     block_s: float = 0.25
+    sideways: bool = False
 
 
 def views(
@@ -64,6 +75,11 @@ def views(
     by_body = {w: v for w in wheels if (v := view_of(means[w], kept, means, bodies.yaw, bodies.block_s)) is not None}
     out: dict[str, Beside] = {}
     for w in wheels:
+        if bodies.sideways:
+            found = _by_all_others(w, wheels, blocks)
+            if found is not None:
+                out[w] = found
+            continue
         found = _by_wheels(w, wheels, blocks, geometry, bodies.yaw, by_body)
         found = _by_body(w, wheels, blocks, by_body) if found is None else found
         if found is not None:
@@ -80,12 +96,16 @@ def _by_wheels(
     by_body: Mapping[str, View],
 ) -> Beside | None:
     """What the other wheels say of one."""
-    others = [o for o in wheels if o != w and _same_side(w, o, geometry)]
+    others = [o for o in wheels if o != w and same_side(w, o, geometry)]
     speeds = [s for o in others if (s := _scaled(blocks[w].mean, blocks[o].mean)) is not None]
     speed: Array | None = None
     if speeds:
         speed = np.asarray(np.median(np.array(speeds), axis=0))
-    elif yaw is not None and (far := [o for o in wheels if o != w and not _same_side(w, o, geometry)]):
+        if len(speeds) == 2:  # of two that differ none is known to be right
+            speed[
+                np.abs(speeds[0] - speeds[1]) > _DIFFER * (np.abs(speed) + _DIFFER * np.nanquantile(np.abs(speed), 0.9))
+            ] = np.nan
+    elif yaw is not None and (far := [o for o in wheels if o != w and not same_side(w, o, geometry)]):
         others = far
         mean = np.asarray(np.mean([blocks[o].mean for o in far], axis=0))
         speed = _turned(blocks[w].mean, mean, yaw)
@@ -97,6 +117,36 @@ def _by_wheels(
         blame = _blame([_off_body(blocks[o], by_body[o]) for o in (w, *others)])
     else:
         blame = _blame([_off_command(blocks[o]) for o in (w, *others)])
+    rough = np.asarray(np.max([blocks[o].rough for o in others], axis=0))
+    noise = _noise(blocks[w], speed)
+    alone = not speeds and len(wheels) == 2 and _turns_by_wheels(blocks[w].mean, blocks[others[0]].mean)
+    return Beside(speed, noise, blame, rough, " and ".join(wheels[o] for o in others), own=alone)
+
+
+def _turns_by_wheels(y: Array, x: Array) -> bool:
+    """Whether two wheels are what turns the machine: they turn against each other, as those of a steered car never do."""
+    least = _AGAINST * float(np.nanquantile(np.abs(x), 0.95))
+    return bool(np.count_nonzero((y * x < 0.0) & (np.abs(y) > least) & (np.abs(x) > least)) >= _AGAINST_BLOCKS)
+
+
+def _by_all_others(w: str, wheels: Mapping[str, str], blocks: Mapping[str, Blocks]) -> Beside | None:
+    """What all other wheels together say of one, by how they belong together in most of the mission."""
+    others = [o for o in wheels if o != w]
+    if len(others) < _LEAST_TOGETHER:
+        return None
+    y, table = blocks[w].mean, np.column_stack([blocks[o].mean for o in others])
+    use = np.isfinite(y) & np.isfinite(table).all(axis=1)
+    if np.count_nonzero(use) < _LEAST_BLOCKS:
+        return None
+    kept = use.copy()
+    speed = y
+    for _ in range(5):
+        speed = table @ np.linalg.lstsq(table[kept], y[kept], rcond=None)[0]
+        off = np.abs(y - speed)
+        kept = use & (off <= np.quantile(off[use], 0.7))
+    if np.median(np.abs(y - speed)[use]) > _TOGETHER * np.median(np.abs(y[use])):
+        return None
+    blame = _blame([_off_command(blocks[o]) for o in (w, *others)])
     rough = np.asarray(np.max([blocks[o].rough for o in others], axis=0))
     return Beside(speed, _noise(blocks[w], speed), blame, rough, " and ".join(wheels[o] for o in others))
 
@@ -116,10 +166,11 @@ def _by_body(
     else:
         return None
     noise = _noise(own, view.speed) * np.sqrt(view.reach)
-    return Beside(view.speed, noise, blame, np.zeros(own.mean.size), f"{view.name}")
+    return Beside(view.speed, noise, blame, np.zeros(own.mean.size), f"{view.name}", own=not rivals)
 
 
-def _same_side(a: str, b: str, geometry: Geometry | None) -> bool:
+def same_side(a: str, b: str, geometry: Geometry | None) -> bool:
+    """Whether two wheels are fixed on one side of the machine."""
     if geometry is None or a not in geometry.wheels or b not in geometry.wheels:
         return False
     one, two = geometry.wheels[a], geometry.wheels[b]
@@ -129,6 +180,7 @@ def _same_side(a: str, b: str, geometry: Geometry | None) -> bool:
 def _scaled(y: Array, x: Array) -> Array | None:
     """x times the gain that brings it to y; None where they do not move together."""
     use = np.isfinite(y) & np.isfinite(x) & (np.abs(x) > 0.1 * np.nanquantile(np.abs(x), 0.9))
+    use &= y != 0.0  # a wheel at rest, or a dead sensor, tells no gain, for however long
     if np.count_nonzero(use) < _LEAST_BLOCKS:
         return None
     gain = float(np.median(y[use] / x[use]))

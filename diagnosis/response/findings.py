@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -10,7 +9,8 @@ from numpy.typing import NDArray
 
 from diagnosis.response.channel import Samples
 from diagnosis.response.jumps import Jumps, onset_of
-from diagnosis.response.models import FROZEN, NOISY, SCALES, SILENT, Blocks
+from diagnosis.response.models import Blocks
+from diagnosis.response.spells import Spell
 from diagnosis.results.assessment import Finding
 from diagnosis.results.result import Epsilon, Hypothesis, Sat
 from diagnosis.results.vocabulary import Tier
@@ -19,10 +19,17 @@ from replay.faults import FaultMode, Side, State
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
-_JOIN_S = 1.0
 _SPIKE_GAP_S, _LEAST_SPIKES = 10.0, 3
 _SENSOR = 0.96  # that what a channel alone shows is the sensor's
 _ONE_JUMP, _TWO_JUMPS = 0.92, 0.97
+_EITHER = 0.6  # that it is the sensor's, up to which its side is left open
+_LEAST_PULLS, _AS_USUAL = 8, (0.6, 1.5)  # blocks with an effort, and its size by the usual one
+_MOVING = 0.2  # of the usual speed
+_SHARP_S = 0.035  # between readings: a wheel that jams, or comes free, takes about as long
+_BLUNT = 0.5, 0.9  # that one jump, or two, between readings further apart are the sensor's
+_WHOLE = 0.75  # of the speed: what rises, or falls, by less from one reading to the next is no whole jump
+_IN_SHARE, _VARIES = 0.06, 0.2  # misfit of a share of another speed, and how much that varies, by its own size
+_LOUD = 2.0  # times the usual change from reading to reading, the other wheels' at that time included
 _BEYOND_HABIT = 2.5  # times as long as healthy channels stay at a value
 _BARE_P, _BARE_S = (
     0.92,
@@ -45,6 +52,10 @@ class Wheel(NamedTuple):
         Channels that show the same speed, in words; empty where there are none.
     habit : float
         How long healthy channels of this machine stay at one value [s].
+    own : bool
+        Whether those channels show how this wheel itself turns; others only how it should.
+    pull : Array or None, shape (b,)
+        Effort of its drive by its share of the load [1]; NaN where nothing is pulled, None where it is not logged.
     """
 
     name: str
@@ -54,66 +65,14 @@ class Wheel(NamedTuple):
     dt: float
     compared: str
     habit: float = 0.0
-
-
-class Spell(NamedTuple):
-    """Blocks [start, stop) in one kind of state, with its probability, and whether the position of its joint contradicts it."""
-
-    start: int
-    stop: int
-    mode: FaultMode
-    p: float
     own: bool = False
+    pull: Array | None = None
 
-
-def spells_of(posterior: Array, block_s: float) -> list[Spell]:
-    """Spells of faults along the most probable states; short interruptions of one mode are bridged."""
-    modes = _modes()
-    best = posterior.argmax(axis=1)
-    out: list[Spell] = []
-    for k in np.flatnonzero(best > 1).tolist():
-        mode = modes[best[k]]
-        if out and out[-1].mode is mode and (k - out[-1].stop) * block_s <= _JOIN_S:
-            out[-1] = out[-1]._replace(stop=k + 1)
-        else:
-            out.append(Spell(k, k + 1, mode, 0.0))
-    return [s._replace(p=_mean_probability(posterior[s.start : s.stop], s.mode)) for s in out]
-
-
-def _modes() -> dict[int, FaultMode]:
-    out = {FROZEN: FaultMode.STUCK, SILENT: FaultMode.NO_SIGNAL, NOISY: FaultMode.NOISY}
-    scaled = {
-        NOISY + 1 + k: FaultMode.INEFFICIENT if s < 1.0 else FaultMode.OUTSIDE_TABLE for k, s in enumerate(SCALES)
-    }
-    return out | scaled
-
-
-def _mean_probability(posterior: Array, mode: FaultMode) -> float:
-    same = [k for k, m in _modes().items() if m is mode]
-    return float(np.mean(posterior[:, same].sum(axis=1)))
-
-
-def where_asked(spells: Sequence[Spell], asked: Flags, least: int) -> list[Spell]:
-    """Spells without those of a silent or scaled speed in which no motion is expected, and the ends of such spells cut to it.
-
-    Parameters
-    ----------
-    spells : Sequence[Spell]
-        Spells.
-    asked : Flags, shape (b,)
-        Blocks in which command or other wheels make the wheel move.
-    least : int
-        Blocks of expected motion that a spell needs.
-    """
-    out = []
-    for s in spells:
-        if s.mode is FaultMode.STUCK or s.mode is FaultMode.NOISY:
-            out.append(s)
-            continue
-        places = s.start + np.flatnonzero(asked[s.start : s.stop])
-        if places.size >= least:
-            out.append(s._replace(start=int(places[0]), stop=int(places[-1]) + 1))
-    return out
+    @property
+    def sharp(self) -> bool:
+        """Whether readings follow each other so fast that a jump between two of them is none that a drive could make."""
+        step = self.samples.step
+        return step.size > 1 and float(np.median(np.diff(step))) * self.dt <= _SHARP_S
 
 
 def finding_of(spell: Spell, wheel: Wheel, speed: Array | None) -> Finding | None:
@@ -134,7 +93,7 @@ def finding_of(spell: Spell, wheel: Wheel, speed: Array | None) -> Finding | Non
     if spell.mode is FaultMode.STUCK:
         return _stuck(spell, wheel, first, last)
     if spell.mode is FaultMode.NO_SIGNAL:
-        return _silent(spell, wheel, first, last, speed is not None)
+        return _silent(spell, wheel, first, last, speed)
     if spell.mode is FaultMode.NOISY:
         return _noisy(spell, wheel, first, last)
     return _scaled(spell, wheel, (first, last), speed)
@@ -176,21 +135,36 @@ def _stuck(spell: Spell, wheel: Wheel, first: int, last: int) -> Finding | None:
     return _finding(begin, end, FaultMode.STUCK, spell.p * _SENSOR, Epsilon(1.0, 1.0, 1.0), sat, (text,))
 
 
-def _silent(spell: Spell, wheel: Wheel, first: int, last: int, seen: bool) -> Finding:
-    fell = onset_of(wheel.jumps, wheel.samples, first, 0.0, wheel.dt)
-    rose = onset_of(wheel.jumps, wheel.samples, last, np.inf, wheel.dt)
+def _silent(spell: Spell, wheel: Wheel, first: int, last: int, speed: Array | None) -> Finding:
+    part = slice(spell.start, spell.stop)
+    middle = 0.5 * (wheel.blocks.low + wheel.blocks.high) if speed is None else speed
+    fell = _whole_jump(wheel, middle, first, 0.0)
+    rose = _whole_jump(wheel, middle, last, np.inf)
     begin = first if fell is None else int(wheel.samples.step[fell])
     end = last if rose is None else int(wheel.samples.step[rose])
     texts = [f"{wheel.name} read 0 for {(end - begin) * wheel.dt:.2f} s while its command asked for motion."]
-    sensor = {0: 0.5, 1: _ONE_JUMP, 2: _TWO_JUMPS}[(fell is not None) + (rose is not None)]
+    sensor = _by_jumps(wheel, (fell is not None) + (rose is not None))
     if fell is not None or rose is not None:
-        texts.append("It fell to 0, or rose from it, from one reading to the next: no drive stops or starts like that.")
-    if seen:
-        sensor = max(sensor, _SENSOR)
-        texts.append(f"{wheel.compared} went on moving.")
-    if sensor == 0.5:
         texts.append(
-            "Without a jump or another view of this {wheel}, a drive at standstill and a dead sensor cannot be distinguished."
+            "It fell to 0, or rose from it, from one reading to the next"
+            + (
+                ": no drive stops or starts like that."
+                if wheel.sharp
+                else ", and readings are too far apart to tell a jam from that."
+            )
+        )
+    seen = speed is not None and np.nanmedian(np.abs(speed[part])) > _MOVING * np.nanquantile(np.abs(speed), 0.9)
+    if speed is not None and wheel.own and not spell.own and not seen:
+        sensor = 0.5  # another view of this wheel has it at rest, too
+    if seen or spell.own:
+        texts.append(f"{wheel.compared} went on moving.")
+        sensor = max(sensor, _SENSOR) if wheel.own or spell.own else sensor
+    if sensor < _SENSOR and _pulls_as_usual(wheel, part):
+        sensor = _SENSOR
+        texts.append("Its drive pulls as usual, as it does not where a {wheel} is held, or the drive has no power.")
+    if sensor <= _EITHER:
+        texts.append(
+            "Without a sharp jump or another view of this {wheel}, one that stands still and a dead sensor cannot be distinguished."
         )
     sat = Sat(0.0, 0.0, 0.0, 0.0, "m/s")
     return _finding(
@@ -198,7 +172,33 @@ def _silent(spell: Spell, wheel: Wheel, first: int, last: int, seen: bool) -> Fi
     )
 
 
-def _noisy(spell: Spell, wheel: Wheel, first: int, last: int) -> Finding:
+def _pulls_as_usual(wheel: Wheel, part: slice) -> bool:
+    """Whether a drive has its usual share of the load in most of some blocks."""
+    share = np.zeros(0) if wheel.pull is None else wheel.pull[part][np.isfinite(wheel.pull[part])]
+    return share.size >= _LEAST_PULLS and bool(_AS_USUAL[0] < np.median(share) < _AS_USUAL[1])
+
+
+def _by_jumps(wheel: Wheel, jumps: int) -> float:
+    """Probability that what begins, or ends, within one reading is the sensor's [1]."""
+    sure = (_ONE_JUMP, _TWO_JUMPS) if wheel.sharp else _BLUNT
+    return (0.5, *sure)[jumps]
+
+
+def _whole_jump(wheel: Wheel, expected: Array, at: int, ratio: float) -> int | None:
+    """Sample behind a jump to 0, or from it, that is as large as the speed itself was to be; None where there is none."""
+    found = onset_of(wheel.jumps, wheel.samples, at, ratio, wheel.dt)
+    if found is None:
+        return None
+    width = int(wheel.blocks.start[1]) if wheel.blocks.start.size > 1 else 1
+    block = min(int(wheel.samples.step[found]) // width, expected.size - 1)
+    size = abs(float(np.nan_to_num(expected[block])))
+    return found if abs(float(np.nan_to_num(wheel.samples.change[found]))) > _WHOLE * size else None
+
+
+def _noisy(spell: Spell, wheel: Wheel, first: int, last: int) -> Finding | None:
+    part = slice(spell.start, spell.stop)
+    if np.median(wheel.blocks.rough[part] / wheel.blocks.usual[part]) < _LOUD:
+        return None  # what shakes other wheels too, or hardly more than usual, is no sensor's noise
     inside = (wheel.samples.step >= first) & (wheel.samples.step < last)
     rms = float(np.sqrt(np.mean(wheel.samples.white[inside] ** 2)))
     usual = float(np.sqrt(np.median(wheel.samples.white[~inside] ** 2))) if (~inside).any() else 0.0
@@ -222,7 +222,7 @@ def _scaled(spell: Spell, wheel: Wheel, span: tuple[int, int], speed: Array | No
         return None
     fell = onset_of(wheel.jumps, wheel.samples, span[0], gain, wheel.dt)
     rose = onset_of(wheel.jumps, wheel.samples, span[1], 1.0 / gain, wheel.dt)
-    bare = speed is None and fell is None and rose is None
+    bare = speed is None and _by_jumps(wheel, (fell is not None) + (rose is not None)) <= _EITHER
     if bare and (spell.p < _BARE_P or (span[1] - span[0]) * wheel.dt < _BARE_S):
         return None
     begin = span[0] if fell is None else int(wheel.samples.step[fell])
@@ -233,18 +233,30 @@ def _scaled(spell: Spell, wheel: Wheel, span: tuple[int, int], speed: Array | No
             f"{wheel.name} is {gain:.2f} × what {wheel.compared} show{'' if ' and ' in wheel.compared else 's'} of the same speed."
         )
     if fell is not None or rose is not None:
-        texts.append(f"It changed by a factor of about {gain:.2f} from one reading to the next, which no drive does.")
+        texts.append(
+            f"It changed by a factor of about {gain:.2f} from one reading to the next{', which no drive does' if wheel.sharp else ''}."
+        )
     if bare:
         texts.append(
             f"{wheel.name} is {gain:.2f} × what its command makes it do. It came while the speed was changing, and nothing else shows "
             "the speed of this {wheel}: a weak drive and a wrong sensor cannot be distinguished; {or_view}the drive's effort would tell them apart."
         )
-    sensor = 0.5 if bare else {0: _ONE_JUMP, 1: _ONE_JUMP, 2: _TWO_JUMPS}[(fell is not None) + (rose is not None)]
-    sensor = _TWO_JUMPS if spell.own else sensor  # one encoder, two channels
     misfit = float(np.sqrt(np.mean((y - gain * x) ** 2)) / np.sqrt(np.mean(x * x)))
+    sensor = _by_jumps(wheel, (fell is not None) + (rose is not None))
+    if spell.own:  # one encoder, two channels
+        sensor = _TWO_JUMPS
+    elif spell.kin or (speed is not None and wheel.own):
+        sensor = max(sensor, _ONE_JUMP)
+    elif speed is not None and misfit < _IN_SHARE and np.std(x) > _VARIES * np.sqrt(np.mean(x * x)):
+        sensor = max(sensor, _ONE_JUMP)  # a share that stays the same at every speed is no slip
+    if sensor <= _EITHER and not bare:
+        texts.append(
+            "It began and ended while the speed was changing, or too slowly for a jump: a {wheel} that is weak or skids and a wrong sensor "
+            "cannot be distinguished."
+        )
     wide = 2.0 * misfit / np.sqrt(max(1.0, x.size / 4.0))
     loss = 1.0 - gain
-    p = spell.p if speed is not None or bare else 1.0 - (1.0 - spell.p) * 0.5
+    p = spell.p * (0.5 + 0.5 * spell.mine) if speed is not None or bare else 1.0 - (1.0 - spell.p) * 0.5
     return _finding(
         begin, max(end, begin + 1), spell.mode, p, Epsilon(loss, loss - wide, loss + wide), None, tuple(texts), sensor
     )
@@ -261,7 +273,7 @@ def _finding(
     sensor: float = 1.0,
 ) -> Finding:
     """A finding with probability p of any fault, of which `sensor` is the sensor's share."""
-    own = sensor > 0.6
+    own = sensor > _EITHER
     side = Side.SENSOR if own else Side.SENSOR_OR_ACTUATOR
     stated = p * (sensor if own else 1.0)
     drive = Hypothesis(Side.ACTUATOR.value, mode.value, p * (1.0 - sensor))

@@ -12,6 +12,7 @@ from diagnosis.evidence import SENSOR, MissionView
 Array = NDArray[np.float64]
 
 CELL_S = 0.05
+_SIDEWAYS_S = 1.0
 
 
 @dataclass(frozen=True)
@@ -25,13 +26,15 @@ class FollowerData:
     fresh : NDArray[np.bool_], shape (n,)
         Steps with a new sample.
     commands : Array, shape (cells, k)
-        What its target is put together from: its own command, or those of the body.
+        What its target is put together from: its own command, or those of the body; three of them where that also moves sideways.
     asked : Array, shape (n,)
         Its commanded speed [m/s].
     name : str
         Of its channel.
     rolled : Array or None, shape (n,)
         Speed by the position of its joint [m/s]; None where that is not logged.
+    effort : Array or None, shape (n,)
+        Torque, current or duty of its drive, in any unit; None where that is not logged.
     """
 
     y: Array
@@ -40,6 +43,7 @@ class FollowerData:
     asked: Array
     name: str
     rolled: Array | None = None
+    effort: Array | None = None
 
 
 def cell_of(dt: float) -> int:
@@ -58,13 +62,20 @@ def cells(x: Array, width: int) -> Array:
     return np.asarray(np.where(count > 0, np.where(known, table, 0.0).sum(axis=1) / np.maximum(count, 1), np.nan))
 
 
+def _moved_sideways(mission: MissionView) -> bool:
+    """Whether a machine with rollers on its wheels was commanded to move sideways."""
+    asked = np.abs(np.nan_to_num(mission.values("cmd.lateral")))
+    return bool(np.count_nonzero(asked > mission.machine.limits.driving_speed) * mission.timeline.dt > _SIDEWAYS_S)
+
+
 def followers(mission: MissionView) -> dict[str, FollowerData]:
     """Wheels whose sensor nothing has judged, by name: with a command, or with other wheels beside them."""
     timeline, machine = mission.timeline, mission.machine
     width = cell_of(timeline.dt)
     body: Array | None = None
     if mission.logged("cmd.v") and mission.logged("cmd.omega") and not machine.axles:
-        body = np.column_stack([cells(mission.values(n), width) for n in ("cmd.v", "cmd.omega")])
+        sideways = ("cmd.lateral",) if _moved_sideways(mission) else ()
+        body = np.column_stack([cells(mission.values(n), width) for n in ("cmd.v", "cmd.omega", *sideways)])
     several = sum(mission.logged(f"wheel.{w}.v") for w in machine.wheels) > 1
     out: dict[str, FollowerData] = {}
     for w in machine.wheels:
@@ -76,5 +87,6 @@ def followers(mission: MissionView) -> dict[str, FollowerData]:
         commands = cells(asked, width)[:, None] if own or body is None else body
         position = f"wheel.{w}.v_position"
         rolled = mission.values(position) if mission.logged(position) else None
-        out[w] = FollowerData(mission.values(name), timeline.fresh[name], commands, asked, name, rolled)
+        effort = mission.values(f"wheel.{w}.effort") if mission.logged(f"wheel.{w}.effort") else None
+        out[w] = FollowerData(mission.values(name), timeline.fresh[name], commands, asked, name, rolled, effort)
     return out

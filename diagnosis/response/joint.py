@@ -12,8 +12,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from diagnosis.response.findings import Spell
 from diagnosis.response.models import Beside, Blocks
+from diagnosis.response.spells import Spell
 from replay.faults import FaultMode
 
 Array = NDArray[np.float64]
@@ -23,6 +23,7 @@ _SMOOTH_BLOCKS = 9
 _SAME = 0.9, 1.1  # gain of a speed that is its position's slope
 _SHARE = 0.02  # of the speed
 _MOVES = 0.3  # of the usual speed
+_GOES_ON = 0.3  # of the blocks of a silent spell
 _APART, _LEAST_APART = 2.5, 6  # usual misfits, and blocks, from which on speed and position differ
 
 
@@ -97,15 +98,24 @@ def cut(spells: Sequence[Spell], joint: Joint | None, blocks: Blocks) -> list[Sp
         return list(spells)
     out: list[Spell] = []
     for s in spells:
+        if s.mode is FaultMode.NO_SIGNAL:
+            out.append(s._replace(own=_goes_on(s, joint)))
+            continue
         spans = _parted(blocks, joint) if s.mode.scaled or s.mode is FaultMode.OUTSIDE_TABLE else []
         inside = [(max(a, s.start), min(b, s.stop)) for a, b in spans if a < s.stop and b > s.start]
         at = s.start
         for a, b in inside:
-            out += [s._replace(start=at, stop=a)] if a > at else []
+            out += [s._replace(start=at, stop=a, kin=True)] if a > at else []
             out.append(s._replace(start=a, stop=b, own=True))
             at = b
-        out += [s._replace(start=at)] if at < s.stop else []
+        out += [s._replace(start=at, kin=bool(inside))] if at < s.stop else []
     return out
+
+
+def _goes_on(spell: Spell, joint: Joint) -> bool:
+    """Whether the position moves on in a spell in which the speed is silent."""
+    part = slice(spell.start, spell.stop)
+    return bool(np.mean(np.abs(joint.view.speed[part]) > _APART * joint.view.noise[part]) > _GOES_ON)
 
 
 def _parted(blocks: Blocks, joint: Joint) -> list[tuple[int, int]]:

@@ -8,10 +8,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from diagnosis.response.findings import Spell, Wheel
+from diagnosis.response.findings import Wheel
 from diagnosis.response.identification import Response
 from diagnosis.response.inputs import FollowerData
 from diagnosis.response.joint import Joint
+from diagnosis.response.spells import Spell
 from replay.machine.config import Limits
 
 Array = NDArray[np.float64]

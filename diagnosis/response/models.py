@@ -15,7 +15,7 @@ Flags = NDArray[np.bool_]
 
 BLOCK_S = 0.25
 #: Gains of a scaled sensor; between .75 and 1.35 a wheel's slip is as large.
-SCALES = (0.15, 0.3, 0.45, 0.6, 0.72, 1.4, 1.8, 2.5)
+SCALES = (0.15, 0.21, 0.3, 0.38, 0.48, 0.6, 0.72, 1.4, 1.65, 1.95, 2.3, 2.7)
 HEALTHY, OTHER, FROZEN, SILENT, NOISY = range(5)
 STATES = 5 + len(SCALES)
 #: How long a wheel stays healthy, and a fault stays, on average [s].
@@ -53,6 +53,8 @@ class Blocks(NamedTuple):
         Readings, those that repeat the one before, those of a wheel that stands still.
     rough, usual : Array, shape (b,)
         Root mean square of what changes from sample to sample, and the usual one [m/s].
+    habitual : bool
+        Whether values that are held for long may be the channel's habit, as other wheels have it.
     """
 
     start: NDArray[np.intp]
@@ -65,6 +67,7 @@ class Blocks(NamedTuple):
     zero: Array
     rough: Array
     usual: Array
+    habitual: bool = True
 
     @property
     def white(self) -> Array:
@@ -90,6 +93,8 @@ class Beside(NamedTuple):
         What of the other wheels changes from sample to sample [m/s].
     compared : str
         What the view is by, in words.
+    own : bool
+        Whether it shows how this wheel itself turns, rather than how it should.
     """
 
     speed: Array
@@ -97,6 +102,7 @@ class Beside(NamedTuple):
     blame: Array
     rough: Array
     compared: str = ""
+    own: bool = False
 
 
 def blocks_of(samples: Samples, response: Response, cell: int, width: int, size: int) -> Blocks:
@@ -216,13 +222,8 @@ def hold_shares(blocks: Blocks, driving: Flags, block_s: float) -> tuple[float, 
 
     Parameters are those of `scores`.
     """
-    use = driving & (blocks.readings > 0) & (blocks.zero < blocks.readings)
-    edge: NDArray[np.intp] = np.flatnonzero(np.diff(np.r_[False, blocks.held & use, False].astype(np.int8)))
-    long = np.zeros(use.size, np.bool_)
-    starts, stops = edge[::2], edge[1::2]
-    for k in np.flatnonzero((stops - starts) * block_s > _LONG_S):
-        long[starts[k] : stops[k]] = True
-    if np.count_nonzero(long) > 0.25 * max(int(np.count_nonzero(use)), 1):
+    use, long = _long_holds(blocks, driving, block_s)
+    if blocks.habitual and np.count_nonzero(long) > 0.25 * max(int(np.count_nonzero(use)), 1):
         long[:] = False
     kept = use & ~long
     if not kept.any():
@@ -231,6 +232,23 @@ def hold_shares(blocks: Blocks, driving: Flags, block_s: float) -> tuple[float, 
     after = [blocks.held[kept & (before == was)] for was in (False, True)]
     shares = [float(np.clip((x.sum() + 0.5) / (x.size + 1.0), 0.02, 0.95)) for x in after]
     return shares[0], max(shares)
+
+
+def held_long(blocks: Blocks, driving: Flags, block_s: float) -> float:
+    """Share of the driving in which a value is held for long [1]; parameters are those of `scores`."""
+    use, long = _long_holds(blocks, driving, block_s)
+    return float(np.count_nonzero(long)) / max(int(np.count_nonzero(use)), 1)
+
+
+def _long_holds(blocks: Blocks, driving: Flags, block_s: float) -> tuple[Flags, Flags]:
+    """Blocks in which a channel should change, and those of them in which it holds one value for long; shapes (b,)."""
+    use = driving & (blocks.readings > 0) & (blocks.zero < blocks.readings)
+    edge: NDArray[np.intp] = np.flatnonzero(np.diff(np.r_[False, blocks.held & use, False].astype(np.int8)))
+    long = np.zeros(use.size, np.bool_)
+    starts, stops = edge[::2], edge[1::2]
+    for k in np.flatnonzero((stops - starts) * block_s > _LONG_S):
+        long[starts[k] : stops[k]] = True
+    return use, long
 
 
 def _usual_white(white: Array, speed: Array, count: Array) -> Array:

@@ -116,6 +116,7 @@ CANONICAL: tuple[CanonicalSignal, ...] = (
         1,
         Named(4, _ASKED + r".*(yaw_?rate|omega|turn|vel_(z|ang\w*)$)"),
     ),
+    _Entry("cmd", "lateral", "speed", "commanded speed to the left, of wheels with rollers"),
     _Entry("wheel", "v_ref", "speed", "commanded speed v_c,i", 6, Named(6, _SPEED_COMMAND)),
     _Entry("wheel", "v", "speed", "measured speed", 2, Named(7, _SPEED)),
     _Entry("wheel", "v_true", "speed", "second measurement of the speed", 3, Named(5, _SECOND_SPEED)),

@@ -175,7 +175,7 @@ def _name(description: RobotDescription | None, logs: Sequence[RawLog]) -> str:
 
 def _motions(found: Signals, wheels: Sequence[str]) -> dict[str, WheelMotion]:
     """How each wheel's signals follow the commanded motion."""
-    speed, turn = found.items.get("cmd.v"), found.items.get("cmd.omega")
+    speed, turn, lateral = (found.items.get(f"cmd.{leaf}") for leaf in ("v", "omega", "lateral"))
     out = {}
     for wheel in wheels:
         for leaf in _SPEEDS:
@@ -183,7 +183,7 @@ def _motions(found: Signals, wheels: Sequence[str]) -> dict[str, WheelMotion]:
             asked = speed or found.items.get(f"wheel.{wheel}.v_ref")
             if signal is None or asked is None or signal is asked:
                 continue
-            motion = wheel_motion(signal, asked, turn if asked is speed else None)
+            motion = wheel_motion(signal, asked, turn, lateral) if asked is speed else wheel_motion(signal, asked, None)
             if motion is not None:
                 out[signal.name] = motion
     return out
@@ -225,7 +225,7 @@ def _in_one_direction(
     origins = {}
     for name, signal in found.items.items():
         group, part, leaf = (*name.split("."), "", "")[:3]
-        against = part in flipped and leaf in ("v", "v_true", "effort")
+        against = part in flipped and leaf in ("v", "v_true", "v_position", "effort")
         if leaf == "v_ref" and name in motions:
             against = motions[name].gain < 0
         origin = signal.origin

@@ -41,7 +41,9 @@ class WheelMotion:
     explained: float
 
 
-def wheel_motion(wheel: Signal, speed: Signal, turn: Signal | None) -> WheelMotion | None:
+def wheel_motion(
+    wheel: Signal, speed: Signal, turn: Signal | None, lateral: Signal | None = None
+) -> WheelMotion | None:
     """Fit one wheel to the robot's motion by least trimmed squares; None where the log does not show it.
 
     The wheel may answer late and slowly: the delay and lag that explain it best are taken.
@@ -52,19 +54,21 @@ def wheel_motion(wheel: Signal, speed: Signal, turn: Signal | None) -> WheelMoti
         Speed of the wheel in any unit.
     speed, turn : Signal
         The robot's speed [m/s] and yaw rate [rad/s], commanded or measured; None where there is no yaw rate.
+    lateral : Signal or None
+        Its speed to the left [m/s], which wheels with rollers follow.
     """
     if len(wheel.stamps) < _LEAST:
         return None
     step = max(int(np.median(np.diff(wheel.stamps))), int(_STEP_S * 1e9))
     at = np.arange(int(wheel.stamps[0]), int(wheel.stamps[-1]), step)[:_MOST]
     y = _held(wheel, at)
-    parts = np.column_stack([_held(s, at) for s in (speed, turn) if s is not None])
+    parts = np.column_stack([_held(s, at) for s in (speed, turn, lateral) if s is not None])
     known = np.isfinite(y) & np.isfinite(parts).all(axis=1)
     if known.sum() < _LEAST or np.std(parts[known, 0]) < _MOVES:
         return None
     parts[~np.isfinite(parts)] = 0.0
     parts[:, np.std(parts[known], axis=0) < _MOVES] = 0.0
-    best: tuple[float, Array] = (0.0, np.zeros(2))
+    best: tuple[float, Array] = (0.0, np.zeros(3))
     for lag in _LAGS_S:
         slow = _lagged(parts, 1 - np.exp(-step * 1e-9 / lag)) if lag else parts
         for delay in sorted({round(d * 1e9 / step) for d in _DELAYS_S}):

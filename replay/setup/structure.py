@@ -23,6 +23,7 @@ _LANGUAGES = (
     (GERMAN, {"vl", "vr", "hl", "hr", "vorne", "vorn", "hinten", "vorder", "hinter", "va", "ha"}),
     (FRENCH, {"avg", "avd", "arg", "ard", "avant", "arriere", "gauche", "droite"}),
 )
+_PAIRS = ("RR", "RL"), ("FR", "FL")  # the driven wheels of a car
 _NUMBERED = (8, 6, 4, 3, 2)
 _TRACK, _BASE, _RADIUS = 0.5, 0.5, 0.1  # m; where nothing tells them
 
@@ -146,6 +147,9 @@ def named_structure(channels: Mapping[str, Channel]) -> Structure | None:
         if _covers(channels, names, by_name=True):
             wheels = _called(channels) if names == FOUR else names
             return Structure(wheels, supposed(wheels, _steered(channels, wheels)), how="the names in the log")
+    for pair in _PAIRS:
+        if _covered(channels, FOUR, by_name=True) == set(pair):
+            return Structure(pair, supposed(pair, _steered(channels, pair)), how="the names in the log")
     for count in _NUMBERED:
         wheels = FOUR if count == 4 else TWO if count == 2 else tuple(f"W{i + 1}" for i in range(count))
         if _covers(channels, wheels):
@@ -167,6 +171,11 @@ def _called(channels: Mapping[str, Channel]) -> tuple[str, ...]:
 
 def _covers(channels: Mapping[str, Channel], wheels: tuple[str, ...], by_name: bool = False) -> bool:
     """Whether every one of these wheels has a speed that is its own, found by its name alone or also by its number."""
+    return _covered(channels, wheels, by_name) == set(wheels)
+
+
+def _covered(channels: Mapping[str, Channel], wheels: tuple[str, ...], by_name: bool = False) -> set[str]:
+    """Those of some wheels that have a speed."""
     trial = Structure(wheels, supposed(wheels)).machine(1.0)
     found: dict[str, set[str]] = {}
     for c in candidates(channels, trial):
@@ -178,7 +187,7 @@ def _covers(channels: Mapping[str, Channel], wheels: tuple[str, ...], by_name: b
         if by_name and wheel_of(inner[1] if inner else re.sub(r"\[\d+\]", "", name), trial) != part:
             continue
         found.setdefault(part, set()).add(name)
-    return set(found) == set(wheels)
+    return set(found)
 
 
 def _steered(channels: Mapping[str, Channel], wheels: Sequence[str]) -> Mapping[str, str]:

@@ -5,6 +5,8 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Iterator, Mapping
 
+import numpy as np
+
 from replay.log.raw_log import Channel
 from replay.log.source_options import SignalSource
 from replay.machine.config import Machine
@@ -79,6 +81,8 @@ def _by_message(channel: Channel, machine: Machine, others: Mapping[str, Channel
             yield found("cmd.v", "m/s", rank)
         elif field in ("angular.z", "twist.angular.z"):
             yield found("cmd.omega", "rad/s", rank)
+        elif field in ("linear.y", "twist.linear.y") and np.any(channel.values):
+            yield found("cmd.lateral", "m/s", rank)
     elif leaf.startswith("AckermannDrive"):
         if field in ("speed", "drive.speed"):
             yield found("cmd.v", "m/s", 4)

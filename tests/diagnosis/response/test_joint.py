@@ -53,10 +53,13 @@ def test_a_speed_that_leaves_its_own_position_is_the_sensors_fault(seed: int, fa
 
 
 @pytest.mark.parametrize("seed", [41, 42])
-def test_an_encoder_that_fails_in_both_channels_is_found_as_without_a_position(seed: int) -> None:
+def test_an_encoder_that_fails_in_both_channels_may_as_well_be_a_jammed_wheel(seed: int) -> None:
     measured, asked, body = speeds(seed)
+    rolled = positions(measured)
     measured["RL"][PART] = 0.0
-    assert found(judged(measured, positions(measured), asked, body)) == [("RL", Side.SENSOR, FaultMode.NO_SIGNAL)]
+    either, mode = Side.SENSOR_OR_ACTUATOR, FaultMode.NO_SIGNAL
+    assert found(judged(measured, positions(measured), asked, body)) == [("RL", either, mode)]
+    assert found(judged(measured, rolled, asked, body)) == [("RL", Side.SENSOR, mode)]  # its position goes on
 
 
 @pytest.mark.parametrize("value", [0.0, 0.5])

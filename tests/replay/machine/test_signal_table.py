@@ -15,7 +15,7 @@ from replay.machine.signal_table import CANONICAL, Scope, find_signal, known_nam
 
 def test_names_in_reading_order() -> None:
     assert names_of(("L", "R"), ("front",)) == (
-        *("cmd.v", "cmd.omega"),
+        *("cmd.v", "cmd.omega", "cmd.lateral"),
         *(
             f"wheel.L.{x}"
             for x in (
@@ -94,7 +94,7 @@ def test_a_name_that_is_not_in_the_table_is_none(name: str) -> None:
 
 
 def test_the_refusal_names_every_group() -> None:
-    assert known_names()[0] == "cmd.v|omega"
+    assert known_names()[0] == "cmd.v|omega|lateral"
     assert known_names()[2] == "steer.<A>.phi_ref|phi|phi_true|u|u_applied"
     with pytest.raises(ConfigError, match=r"wheel\.<W>\.v_ref\|v\|.* or odom\.x\|y\|yaw\|v$"):
         signal_of("odom.z")

@@ -1,0 +1,117 @@
+"""What the effort of each drive says beside that of the wheels on its side: a drive that pulls nothing, a wheel that cannot turn.
+
+What effort a speed takes is not known where several drives move one body; but wheels of one side share their load, so that the ratio
+of their efforts is a habit of the machine.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from diagnosis.response.machine import Judged
+from diagnosis.results.assessment import Finding
+from diagnosis.results.result import Epsilon, Hypothesis
+from diagnosis.results.vocabulary import Tier
+from replay.faults import FaultMode, Side, State
+
+Array = NDArray[np.float64]
+
+_LEAST_BLOCKS = 80
+_PULLS = 0.4  # of the usual effort of the others: from there on something is to be pulled
+_NOTHING, _USUALLY = (
+    0.15,
+    0.4,
+)  # of its share of the load: nothing; and what it has in nine tenths of the mission at least
+_GAP_BLOCKS = 3
+_LEAST_S, _P = 3.0, 0.94
+
+
+def shares_of(
+    found: Mapping[str, Judged], efforts: Mapping[str, Array], sides: Mapping[str, tuple[str, ...]]
+) -> dict[str, Array]:
+    """Effort of each wheel by what those of its side make its part of the load [1], shape (b,); NaN where hardly anything is pulled.
+
+    Parameters
+    ----------
+    found : Mapping[str, Judged]
+        All wheels.
+    efforts : Mapping[str, Array], each of shape (b,)
+        Mean effort of each block, in any unit; wheels without one are left out.
+    sides : Mapping[str, tuple[str, ...]]
+        Wheels on the side of each wheel.
+    """
+    out = {}
+    for w, e in efforts.items():
+        others = [o for o in sides.get(w, ()) if o in efforts]
+        if not others:
+            continue
+        by_each = [x for o in others if (x := _beside(e, efforts[o], found[w].driving)) is not None]
+        if len(by_each) == len(
+            others
+        ):  # beside all of them: the one with the largest effort may be the one that is held
+            out[w] = np.asarray(np.max(by_each, axis=0))
+    return out
+
+
+def _beside(e: Array, other: Array, driving: NDArray[np.bool_]) -> Array | None:
+    """Effort by another one's, where that pulls [1]; 1 at most times, NaN elsewhere; None where that is hardly ever."""
+    load = np.abs(other)
+    use = driving & np.isfinite(e) & np.isfinite(load)
+    if np.count_nonzero(use) < _LEAST_BLOCKS:
+        return None
+    pulled = use & (load > _PULLS * float(np.median(load[use])))
+    ratio = float(np.median(np.abs(e[pulled]) / load[pulled])) if pulled.any() else 0.0
+    return np.where(pulled, np.abs(e) / (ratio * np.maximum(load, 1e-12)), np.nan) if ratio > 0.0 else None
+
+
+def idle_drives(one: Judged, share: Array | None, block_s: float) -> list[Finding]:
+    """Times in which a drive pulls nothing while those of its side do.
+
+    Parameters
+    ----------
+    one : Judged
+        The wheel.
+    share : Array or None, shape (b,)
+        From `shares_of`.
+    block_s : float
+        Length of a block [s].
+    """
+    if share is None or not np.isfinite(share).any():
+        return []
+    nothing = np.nan_to_num(share, nan=1.0) < _NOTHING
+    spans: list[tuple[int, int]] = []
+    for k in np.flatnonzero(nothing).tolist():
+        if spans and not np.any(share[spans[-1][1] : k] >= _NOTHING) and k - spans[-1][1] <= _GAP_BLOCKS / block_s:
+            spans[-1] = spans[-1][0], k + 1
+        else:
+            spans.append((k, k + 1))
+    long = [(a, b) for a, b in spans if np.count_nonzero(nothing[a:b]) * block_s >= _LEAST_S]
+    outside = np.isfinite(share)
+    for a, b in long:
+        outside[a:b] = False
+    # a wheel whose effort often comes near nothing tells nothing by it
+    if not long or not outside.any() or np.quantile(share[outside], 0.1) < _USUALLY:
+        return []
+    return [_finding(one, a, b, block_s) for a, b in long]
+
+
+def _finding(one: Judged, start: int, stop: int, block_s: float) -> Finding:
+    width = int(one.wheel.blocks.start[1])
+    wheel = one.data.name.split(".")[1]
+    text = (
+        f"wheel.{wheel}.effort is next to nothing for {(stop - start) * block_s:.1f} s while the drives of its side pull as usual: its "
+        "{valve} has no power, and the others drag the {wheel} along."
+    )
+    other = 0.5 * (1.0 - _P)
+    return Finding(
+        start=start * width, stop=min(stop * width, one.data.y.size), side=Side.ACTUATOR, mode=FaultMode.NO_SIGNAL, probability=_P,
+        hypotheses=(
+            Hypothesis(Side.ACTUATOR.value, FaultMode.NO_SIGNAL.value, _P),
+            Hypothesis(Side.ACTUATOR.value, FaultMode.INEFFICIENT.value, other),
+            Hypothesis("none", State.HEALTHY.value, other),
+        ),
+        epsilon=Epsilon(1.0, 1.0, 1.0), sat=None, evidence=(text,), tier=Tier.RESPONSE,
+    )  # fmt: skip

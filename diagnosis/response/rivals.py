@@ -1,0 +1,112 @@
+"""Whose fault it is where wheels differ: the one that jumps, that is further off its command, or that alone is rough or still."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from diagnosis.response.machine import Judged
+from diagnosis.response.models import Beside, held_long
+from diagnosis.response.spells import Spell
+from replay.faults import FaultMode
+
+Flags = NDArray[np.bool_]
+
+_HELD_BACK, _ALIKE = (
+    1.0,
+    0.25,
+)  # usual misfits beside the command of each wheel, and by how much their shares of it may differ [1]
+_DOUBT_S = 0.5  # around the beginning and the end of a spell
+_ROUGHER = 2.0  # times what changes from sample to sample in other wheels, at most, is usual
+_ALSO_HELD = 0.05  # of the driving in which another wheel stays at one value for long: then it is a habit
+_CLEARLY = 2.0  # times the misfit of another wheel beside its command: then it is clear whose fault it is
+
+
+def by_each_other(found: Mapping[str, Judged], block_s: float) -> dict[str, Judged]:
+    """Wheels with what is usual in them, by the others: a fault of half the mission is no habit where no other wheel has it."""
+    rough = {w: float(np.median(j.wheel.blocks.usual)) for w, j in found.items()}
+    held = {w: held_long(j.wheel.blocks, j.driving, block_s) for w, j in found.items()}
+    out = {}
+    for w, j in found.items():
+        others = [o for o in found if o != w]
+        blocks = j.wheel.blocks
+        if others:
+            most = _ROUGHER * float(np.median([rough[o] for o in others]))
+            share = min(1.0, most / rough[w]) if rough[w] > 0.0 and most > 0.0 else 1.0
+            blocks = blocks._replace(usual=share * blocks.usual, habitual=max(held[o] for o in others) > _ALSO_HELD)
+        out[w] = j._replace(wheel=j.wheel._replace(blocks=blocks))
+    return out
+
+
+def shared(spell: Spell, beside: Beside | None) -> Spell:
+    """A spell with how much of what other wheels say against it is its own."""
+    if beside is None or spell.own or not np.isfinite(beside.speed[spell.start : spell.stop]).any():
+        return spell
+    return spell._replace(mine=float(np.mean(beside.blame[spell.start : spell.stop])))
+
+
+def others_fault(spell: Spell, wheel: str, judged: Mapping[str, Judged]) -> bool:
+    """Whether what looks like a scale is the fault of the wheel that this one was compared with, or of the whole machine."""
+    one = judged[wheel]
+    if spell.own or (not spell.mode.scaled and spell.mode is not FaultMode.OUTSIDE_TABLE):
+        return False
+    for other, j in judged.items():
+        for s in j.spells if other != wheel else ():
+            overlap = min(s.stop, spell.stop) - max(s.start, spell.start)
+            if overlap > 0 and s.own:
+                return True
+            if overlap <= 0.3 * (spell.stop - spell.start):
+                continue
+            if one.speed is None:
+                if s.mode is spell.mode:  # both at once: load, slope or a weak battery
+                    return True
+                continue
+            if not s.mode.scaled and s.mode is not FaultMode.OUTSIDE_TABLE:
+                return True
+            jumps = jumped(one, spell), jumped(j, spell)
+            if jumps[0] != jumps[1]:
+                if jumps[1]:
+                    return True
+                continue
+            mine, its = _misfit_of(one, spell), _misfit_of(j, spell)
+            if max(mine, its) > _CLEARLY * min(mine, its):
+                if its > mine:
+                    return True
+            elif s.mode.scaled and (s.p > spell.p or spell.mode is FaultMode.OUTSIDE_TABLE):
+                return True  # a sensor loses more often than it gains
+    return False
+
+
+def held_back_together(judged: Mapping[str, Judged]) -> Flags:
+    """Blocks in which all wheels fall short of their commands, or exceed them, by like shares, shape (b,): a slope or load, no sensor's fault.
+
+    Sensors do not fail together, nor alike.
+    """
+    gains, off = [], []
+    for j in judged.values():
+        if not j.response.answered:
+            return np.zeros(j.driving.size, np.bool_)
+        b = j.wheel.blocks
+        middle = 0.5 * (b.low + b.high)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            gains.append(np.nan_to_num(b.mean / middle, nan=np.inf, posinf=np.inf, neginf=np.inf))
+        off.append(np.abs(b.mean - np.clip(b.mean, b.low, b.high)) > _HELD_BACK * b.noise)
+    spread = np.max(gains, axis=0) - np.min(gains, axis=0) if len(gains) > 1 else np.full(off[0].size, np.inf)
+    one_way = np.logical_or(np.max(gains, axis=0) < 1.0, np.min(gains, axis=0) > 1.0)
+    return np.asarray(np.logical_and.reduce(off) & one_way & (np.min(gains, axis=0) > 0.0) & (spread < _ALIKE))
+
+
+def jumped(one: Judged, spell: Spell) -> bool:
+    """Whether the channel jumps where a spell begins or ends."""
+    step, width = one.wheel.samples.step[one.wheel.jumps.place], int(one.wheel.blocks.start[1])
+    reach = round(_DOUBT_S / one.wheel.dt)
+    return any(bool((np.abs(step - at * width) <= reach).any()) for at in (spell.start, spell.stop))
+
+
+def _misfit_of(one: Judged, spell: Spell) -> float:
+    """Median misfit of a wheel beside its command in the blocks of a spell, in usual ones; 1 where nothing is known."""
+    part, b = slice(spell.start, spell.stop), one.wheel.blocks
+    off = (np.abs(b.mean - np.clip(b.mean, b.low, b.high)) / b.noise)[part]
+    return max(float(np.median(off[np.isfinite(off)])), 1.0) if np.isfinite(off).any() else 1.0

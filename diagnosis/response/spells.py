@@ -1,0 +1,82 @@
+"""Spells: blocks in which one kind of fault is the most probable state of a wheel."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from diagnosis.response.models import FROZEN, NOISY, SCALES, SILENT
+from replay.faults import FaultMode
+
+Array = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+
+_JOIN_S = 1.0
+
+
+class Spell(NamedTuple):
+    """Blocks [start, stop) in one kind of state, with its probability, and whether the position of its joint contradicts it.
+
+    `mine` is the share of the misfit beside other wheels that is this one's own [1]; `kin`: the position contradicts another part of it.
+    """
+
+    start: int
+    stop: int
+    mode: FaultMode
+    p: float
+    own: bool = False
+    mine: float = 1.0
+    kin: bool = False
+
+
+def spells_of(posterior: Array, block_s: float) -> list[Spell]:
+    """Spells of faults along the most probable states; short interruptions of one mode are bridged."""
+    modes = _modes()
+    best = posterior.argmax(axis=1)
+    out: list[Spell] = []
+    for k in np.flatnonzero(best > 1).tolist():
+        mode = modes[best[k]]
+        if out and out[-1].mode is mode and (k - out[-1].stop) * block_s <= _JOIN_S:
+            out[-1] = out[-1]._replace(stop=k + 1)
+        else:
+            out.append(Spell(k, k + 1, mode, 0.0))
+    return [s._replace(p=_mean_probability(posterior[s.start : s.stop], s.mode)) for s in out]
+
+
+def _modes() -> dict[int, FaultMode]:
+    out = {FROZEN: FaultMode.STUCK, SILENT: FaultMode.NO_SIGNAL, NOISY: FaultMode.NOISY}
+    scaled = {
+        NOISY + 1 + k: FaultMode.INEFFICIENT if s < 1.0 else FaultMode.OUTSIDE_TABLE for k, s in enumerate(SCALES)
+    }
+    return out | scaled
+
+
+def _mean_probability(posterior: Array, mode: FaultMode) -> float:
+    same = [k for k, m in _modes().items() if m is mode]
+    return float(np.mean(posterior[:, same].sum(axis=1)))
+
+
+def where_asked(spells: Sequence[Spell], asked: Flags, least: int) -> list[Spell]:
+    """Spells without those of a silent or scaled speed in which no motion is expected, and the ends of such spells cut to it.
+
+    Parameters
+    ----------
+    spells : Sequence[Spell]
+        Spells.
+    asked : Flags, shape (b,)
+        Blocks in which command or other wheels make the wheel move.
+    least : int
+        Blocks of expected motion that a spell needs.
+    """
+    out = []
+    for s in spells:
+        if s.mode is FaultMode.STUCK or s.mode is FaultMode.NOISY:
+            out.append(s)
+            continue
+        places = s.start + np.flatnonzero(asked[s.start : s.stop])
+        if places.size >= least:
+            out.append(s._replace(start=int(places[0]), stop=int(places[-1]) + 1))
+    return out
