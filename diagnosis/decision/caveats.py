@@ -11,11 +11,13 @@ from diagnosis.decision.short import main_reason, short_parts, unjudged_axles
 from diagnosis.decision.wording import count_words, join_words, unanswered
 from diagnosis.results.assessment import Assessment
 from diagnosis.results.clearing import Checked
+from diagnosis.results.detectability import Deviation
 from diagnosis.results.left_out import is_left_out
 from diagnosis.results.machine_event import MachineEvent
 from diagnosis.results.machine_words import HYDRAULIC, MachineWords
 from diagnosis.results.result import FaultInterval
 from diagnosis.results.vocabulary import Kind, Tier
+from replay.faults import Side
 from replay.machine.config import Limits, Machine
 from replay.mission import Mission
 from replay.signals.timeline import Timeline
@@ -63,6 +65,23 @@ class Reservations:
     events: tuple[MachineEvent, ...] = ()
     hints: tuple[str, ...] = ()
     words: MachineWords = HYDRAULIC
+
+
+def smallest_loads(assessments: Mapping[Part, Assessment], words: MachineWords) -> tuple[str, ...]:
+    """From which size on a load that lasts all through a mission shows on drives that are judged by their effort, a sentence each."""
+    out = []
+    for (component, side), a in assessments.items():
+        if a.tier is not Tier.DRIVE or side != Side.ACTUATOR.value or a.powers is None:
+            continue
+        sizes = [r.size for r in a.powers.rows if r.deviation is Deviation.INEFFICIENT and r.for_s is None]
+        if not sizes:
+            continue
+        said = "does not show" if sizes[0] is None else f"shows from {100 * sizes[0]:.0f} % of the effort on"
+        name = words.part_words(Kind.WHEEL, component, Side.ACTUATOR)
+        out.append(
+            f"A load on the {name}, or a loss, that lasts the whole mission {said}; healthy missions differ by less than that."
+        )
+    return tuple(out)
 
 
 def doubt_of(watch: Sequence[FaultInterval], against: Reservations) -> str:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from diagnosis.decision.caveats import Reservations, caveats_of, doubt_of, limits_of, open_words
+from diagnosis.decision.caveats import Reservations, caveats_of, doubt_of, limits_of, open_words, smallest_loads
 from diagnosis.decision.short import ToClear
 from diagnosis.decision.to_clear import to_clear
 from diagnosis.decision.wording import actions_of, count_words, join_words, seconds_words, sentence_of
@@ -159,6 +159,7 @@ def decide(
             f"about {100 * RESOLUTION[Side.ACTUATOR]:.0f} %, nor a loss that lasts the whole mission on every {words.part}. A second "
             "measurement would show them; a machine file with [plant] shows the last.",
         )
+    caveats += smallest_loads(assessments, words)
     caveats += limits_of(limits)
     if any(_offset_hidden(checks, axle) for axle in axles):
         caveats += (_NO_YAW,)

@@ -18,6 +18,7 @@ _HELD_BACK, _ALIKE = (
     1.0,
     0.25,
 )  # usual misfits beside the command of each wheel, and by how much their shares of it may differ [1]
+_NO_SHARE = 1e9
 _DOUBT_S = 0.5  # around the beginning and the end of a spell
 _ROUGHER = 2.0  # times what changes from sample to sample in other wheels, at most, is usual
 _ALSO_HELD = 0.05  # of the driving in which another wheel stays at one value for long: then it is a habit
@@ -91,7 +92,7 @@ def held_back_together(judged: Mapping[str, Judged]) -> Flags:
         b = j.wheel.blocks
         middle = 0.5 * (b.low + b.high)
         with np.errstate(divide="ignore", invalid="ignore"):
-            gains.append(np.nan_to_num(b.mean / middle, nan=np.inf, posinf=np.inf, neginf=np.inf))
+            gains.append(np.nan_to_num(b.mean / middle, nan=_NO_SHARE, posinf=_NO_SHARE, neginf=-_NO_SHARE))
         off.append(np.abs(b.mean - np.clip(b.mean, b.low, b.high)) > _HELD_BACK * b.noise)
     spread = np.max(gains, axis=0) - np.min(gains, axis=0) if len(gains) > 1 else np.full(off[0].size, np.inf)
     one_way = np.logical_or(np.max(gains, axis=0) < 1.0, np.min(gains, axis=0) > 1.0)
