@@ -87,12 +87,12 @@ class Place:
         words = [str(self.logs), "-o", str(self.out), "-j", "2", "--events", str(self.events), *more]
         return subprocess.Popen(command(*words), env={**os.environ, "TMPDIR": str(self.temporary)}, **_QUIET)  # type: ignore[call-overload, no-any-return]
 
-    def check(self, count: Count, code: int) -> None:
-        """Count what is wrong after an audit that ended by itself."""
+    def check(self, count: Count, code: int, *, left: bool = True) -> None:
+        """Count what is wrong after an audit that ended by itself; `left`: also what it has left behind."""
         count.codes += code not in _EXPECTED
         count.crashed += sum(state == "crashed" for state in states(self.out).values())
         count.crashed += sum(one.get("state") == "crashed" for one in told(self.events))
-        count.left += left_behind(self.out, self.temporary)
+        count.left += left_behind(self.out, self.temporary) if left else []
 
     def clear(self) -> None:
         shutil.rmtree(self.out)
@@ -142,7 +142,7 @@ def children(place: Place, wanted: int, draw: random.Random) -> Count:
                 with suppress(ProcessLookupError):
                     os.kill(draw.choice(victims), draw.choice(_SIGNALS))
                     count.kills += 1
-        place.check(count, process.wait())
+        place.check(count, process.wait(), left=False)  # the next audit removes what a killed server has left
         last = place.start()  # nobody ends anything
         place.check(count, last.wait())
         count.lost += lost(place.out, place.events) + sum(s != "ok" for s in states(place.out).values())
