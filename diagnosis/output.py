@@ -177,7 +177,7 @@ def load_result(path: Path) -> MissionResult:
         Where one of its files is missing, damaged, or not of this tool.
     """
     report = load_report(path)
-    columns = _read_table(path.with_name(PARQUET))
+    columns = _read_columns(path.with_name(PARQUET), report["log"]["rate_hz"])
     return MissionResult(report, columns, _read_windows(path.with_name(WINDOWS)))
 
 

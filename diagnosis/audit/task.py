@@ -17,7 +17,8 @@ from diagnosis.audit.discovery.staging import Late, Staged, stage
 from diagnosis.audit.isolation import child
 from diagnosis.audit.isolation.child import Work
 from diagnosis.audit.isolation.limits import Limits
-from diagnosis.audit.isolation.run import isolation, over_time, run_isolated
+from diagnosis.audit.isolation.run import isolation, run_isolated
+from diagnosis.audit.isolation.why import over_time
 from diagnosis.audit.store.folders import MISSIONS, publish, swept_folder
 from diagnosis.audit.store.keys import Key, file_roles, log_hash, unhashed_log
 from diagnosis.audit.store.locks import cannot_write
@@ -26,6 +27,7 @@ from diagnosis.audit.store.outcome import READ, MissionState, Outcome
 from diagnosis.audit.store.records import FileRecord, ResultObject, attempt_record
 from replay.errors import ConfigError, LogError, OutputError
 from replay.machine.config import Machine
+from replay.readers.common.room import FULL
 from replay.version import __version__
 
 
@@ -162,8 +164,8 @@ def _audit(task: Task, folder: Path, temporary: Path) -> Attempt:
         outcome = Outcome(MissionState.TIMEOUT, over_time(task.limits), time.monotonic() - start)
         return _unhashed(task, outcome)
     except (LogError, ConfigError) as error:
-        full = isinstance(error.__cause__, OSError) and error.__cause__.errno in child.FULL
-        return _unhashed(task, Outcome(MissionState.CRASHED if full else MissionState.UNREADABLE, str(error)))
+        full = isinstance(error.__cause__, OSError) and error.__cause__.errno in FULL
+        return _unhashed(task, Outcome(MissionState.UNREADABLE, str(error), passing=True, killed=full))
     hashes = staged.hashes
     key = key_of(task.mission, hashes, task.machine, task.config_hash)
     work = Work(

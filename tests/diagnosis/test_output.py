@@ -99,6 +99,17 @@ def test_report_without_its_columns(result: MissionResult, tmp_path: Path) -> No
         rebuild(tmp_path)
 
 
+def test_saved_columns_whose_clock_is_damaged(result: MissionResult, tmp_path: Path) -> None:
+    _, _, parquet = write_result(result, tmp_path)
+    table = pq.read_table(parquet)
+    t = table["t"].to_numpy().copy()
+    t[100] += 0.3
+    pq.write_table(table.set_column(table.column_names.index("t"), "t", [t]), parquet)
+    with pytest.raises(LogError, match=r"report\.parquet: column 't' is not uniform") as caught:
+        rebuild(tmp_path)
+    assert type(caught.value) is LogError  # foreseen
+
+
 def test_full_disk_leaves_the_earlier_result_whole(
     result: MissionResult, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -19,14 +19,13 @@ from diagnosis.audit.fleet.fleet_types import (
     MachineRow,
     PartRow,
 )
-from diagnosis.audit.fleet.machines import FleetFault, Machine
+from diagnosis.audit.fleet.machines import FleetFault, Machine, sides_of
 from diagnosis.audit.fleet.news import news, since_run
 from diagnosis.audit.fleet.read import Mission
 from diagnosis.audit.fleet.trend_types import Axis
 from diagnosis.audit.fleet.trends import PartTrend, trends_of
 from diagnosis.audit.store.outcome import ENDS, READ
 from diagnosis.results.vocabulary import Verdict
-from replay.faults import Side
 from replay.version import __version__
 
 _STATUSES: tuple[Status, ...] = ("new", "recurring", "once", "past", "repaired")
@@ -138,8 +137,8 @@ def _counts(fleet: Fleet, first: Mapping[int, str]) -> CountsRow:
     states = Counter(r.state for r in results)
     runs = [r for m in fleet.machines for r in m.runs]
     starts = [r.result.start_ns for r in runs if r.result.start_ns is not None]
-    parts = [p for r in runs for p in r.result.parts]
-    driving = sum(p.driving_s for p in parts)
+    judged = [m.judged_s for m in fleet.machines]
+    driving = sum(of[0] for of in judged)
     faults = Counter(str(f.status) for m in fleet.machines for f in m.faults)
     return {
         "machines": len(fleet.machines),
@@ -154,7 +153,7 @@ def _counts(fleet: Fleet, first: Mapping[int, str]) -> CountsRow:
         "with_faults": sum(bool(r.faults) for r in runs),
         "driving_s": six_digits(sum(r.result.driving_s or 0.0 for r in runs)),
         "distance_m": six_digits(sum(r.result.distance_m or 0.0 for r in runs)),
-        "decided": rounded(sum(p.decided_s for p in parts) / driving) if driving > 0 else None,
+        "decided": rounded(sum(of[1] for of in judged) / driving) if driving > 0 else None,
         "faults": {s: faults[s] for s in _STATUSES},
         "first_ns": min(starts, default=None),
         "last_ns": max(starts, default=None),
@@ -180,18 +179,21 @@ def _machine(m: Machine, at: Mapping[str, int]) -> MachineRow:
         "driving_s": six_digits(m.driving_s),
         "decided": rounded(m.decided),
         "min_epsilon": m.limits.min_epsilon,
-        "parts": [_part(m, *key) for key in m.parts],
+        "parts": _parts(m),
         "words": m.limits.words.row(),
     }
 
 
-def _part(m: Machine, component: str, side: str) -> PartRow:
-    assessed = [r.assessed(component, side, m.limits) for r in m.runs]
-    modes: Counter[str] = Counter()
+def _parts(m: Machine) -> list[PartRow]:
+    modes: dict[tuple[str, str], Counter[str]] = {key: Counter() for key in m.parts}
     for run in m.runs:
-        modes.update(
-            {f.mode for f in run.faults if f.component == component and f.side in (side, Side.SENSOR_OR_ACTUATOR)}
-        )
+        for component, side, mode in {(f.component, s, f.mode) for f in run.faults for s in sides_of(f.side)}:
+            modes[component, side][mode] += 1
+    return [_part(m, *key, modes[key]) for key in m.parts]
+
+
+def _part(m: Machine, component: str, side: str, modes: Counter[str]) -> PartRow:
+    assessed = m.assessed(component, side)
     return {
         "component": component,
         "side": side,

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
+from numpy.typing import NDArray
 
 from diagnosis.audit.fleet.fault_types import BoundsRow, MissionFaultRow
 from diagnosis.audit.fleet.fleet_types import MissionRow
@@ -16,11 +17,13 @@ from diagnosis.audit.store.outcome import MissionState
 from diagnosis.audit.trends.line import Line
 from diagnosis.results.vocabulary import Severity
 
+_POWERS = np.array([float(f"1e{k}") for k in range(17)])  # each of them exact
+
 
 def trend_row(k: int, t: PartTrend, at: Mapping[str, int], axis: Axis) -> TrendRow:
     """One trend of the machine at place `k`; `at` holds each mission's place."""
     s, f = t.series, t.trend.forecast
-    columns = [[six_digits(float(v)) for v in c] for c in (s.x, s.value, s.low, s.high)]
+    columns = six_digits_of(np.concatenate((s.x, s.value, s.low, s.high))).reshape(4, -1).tolist()
     return {
         "machine": k,
         "component": t.component,
@@ -130,6 +133,19 @@ def bounds_row(b: Bounds | None) -> BoundsRow | None:
 def rounded(value: float | None) -> float | None:
     """Six significant digits, None where there is no finite number."""
     return None if value is None or not np.isfinite(value) else six_digits(value)
+
+
+def six_digits_of(values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The same of finite numbers, shape (n,); a number as near to two of six digits as can be told may become either."""
+    size = np.abs(values)
+    place = 5 - np.floor(np.log10(np.where(size > 0, size, 1.0))).astype(np.intp)
+    if len(values) and (place.min() < 0 or place.max() >= len(_POWERS) - 1):
+        return np.array([six_digits(float(v)) for v in values])
+    place += np.rint(values * _POWERS[place]).__abs__() < 1e5  # where the logarithm was rounded up to a whole number
+    place -= np.rint(values * _POWERS[place]).__abs__() >= 1e6
+    place = np.maximum(place, 0)
+    rounded: NDArray[np.float64] = np.rint(values * _POWERS[place]) / _POWERS[place] + 0.0
+    return rounded
 
 
 def six_digits(value: float) -> float:

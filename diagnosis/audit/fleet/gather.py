@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter, defaultdict
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cache
 from typing import NamedTuple
 
@@ -109,7 +109,7 @@ def _machine(key: Owner, runs: Iterable[Run], failed: Sequence[Mission], known: 
     own = limits(last.result.report or "") if limits and last else Limits()
     name = key[1] or (last.result.machine_name if last else "")
     m = Machine(key[0], name, tuple(dated), tuple(undated), tuple(failed), own)
-    return _with_faults(replace(m, cleared=_cleared(m, limits), unjudged=_unjudged(m, first_seen)), known)
+    return _with_faults(m.told(cleared=_cleared(m, limits), unjudged=_unjudged(m, first_seen)), known)
 
 
 def _cleared(m: Machine, limits: Callable[[str], Limits] | None) -> bool | None:
@@ -148,7 +148,7 @@ def _with_faults(m: Machine, own: _Known) -> Machine:
     )
     faults = [_fleet_fault(m, found, own) for found in groups.values()]
     faults.sort(key=lambda f: (not f.standing, -f.severity.rank, -f.missions, f.component, f.side, f.mode))
-    return replace(m, faults=tuple(faults), repaired=repaired)
+    return m.told(faults=tuple(faults), repaired=repaired)
 
 
 def _fleet_fault(m: Machine, found: Sequence[tuple[Run, FoundFault]], own: _Known) -> FleetFault:
@@ -158,17 +158,20 @@ def _fleet_fault(m: Machine, found: Sequence[tuple[Run, FoundFault]], own: _Know
     live = [(r, g) for r, g in found if not own.is_repaired(r, key)]
     shown = live or found
     now = list(dict.fromkeys(r.result.id for r, _ in shown))
-    every = [k for k, r in enumerate(m.dated) if r.result.id in set(ids)]
-    dated = [k for k, r in enumerate(m.dated) if r.result.id in set(now)]
+    in_ids, in_now = set(ids), set(now)
+    every = [k for k, r in enumerate(m.dated) if r.result.id in in_ids]
+    dated = [k for k, r in enumerate(m.dated) if r.result.id in in_now]
     last_run = m.dated[dated[-1]] if dated else shown[-1][0]
     in_last = [g for r, g in shown if r.result.id == last_run.result.id]
     worst = max(in_last, key=lambda g: (g.severity.rank, g.seconds))
-    assessed = [r.assessed(f.component, f.side, m.limits) for r in m.dated]
+    every_assessed = m.assessed(f.component, f.side)
+    assessed = every_assessed[: len(m.dated)]
     ordered = bool(dated) and len(dated) == len(now)
     since = sum(assessed[dated[-1] + 1 :]) if ordered else 0
     before = sum(assessed[: dated[0]]) if dated else 0
-    undated = sum(r.assessed(f.component, f.side, m.limits) for r in m.undated)
-    without = [k for k in range(dated[-1]) if assessed[k] and k not in set(dated)] if dated else []
+    undated = sum(every_assessed[len(m.dated) :])
+    with_it = set(dated)
+    without = [k for k in range(dated[-1]) if assessed[k] and k not in with_it] if dated else []
     past = {m.dated[k].result.id for k in dated if without and k < without[-1]}
     episode = _episode(m, shown, assessed, own)
     needed, clean = (OPEN, episode.clean if ordered else 0) if episode.high and live else (STANDING, since)
@@ -200,7 +203,10 @@ def _fleet_fault(m: Machine, found: Sequence[tuple[Run, FoundFault]], own: _Know
 
 
 class _Episode(NamedTuple):
-    """The last time that a fault came and was not refuted: whether it ever was of high severity, and clean missions since."""
+    """The last time that a fault came and was not refuted: whether it ever was of high severity, and clean missions since.
+
+    They are counted up to as many as refute it, and not at all of a fault that never was severe.
+    """
 
     high: bool
     clean: int
@@ -213,10 +219,12 @@ def _episode(m: Machine, found: Sequence[tuple[Run, FoundFault]], assessed: Sequ
         severe[run.result.id] = severe.get(run.result.id, False) or f.severity is Severity.HIGH
     key = found[0][1].component, found[0][1].side, found[0][1].mode
     high, clean = any(severe[run.result.id] for run in m.undated if run.result.id in severe), 0
+    if not any(severe.values()):
+        return _Episode(False, 0)
     for k, run in enumerate(m.dated):
         if run.result.id in severe:
             high = severe[run.result.id] or (high and clean < OPEN)
             clean = 0
-        elif assessed[k] and own.would_show(run, key):
+        elif high and clean < OPEN and assessed[k] and own.would_show(run, key):
             clean += 1
     return _Episode(high, clean)

@@ -14,8 +14,9 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import Any
 
 from diagnosis.audit.fleet.fault_types import Status
 from diagnosis.audit.fleet.read import Bounds, FoundFault, Mission, Part, Result
@@ -28,6 +29,7 @@ STANDING = 3
 #: The same of a fault that was of high severity and that nobody is known to have repaired.
 OPEN = 10
 _LEAST_SHARE = 0.8
+_OF_RUNS = ("columns", "_assessed", "runs", "judged_s", "_kinds")
 
 
 @dataclass(frozen=True)
@@ -184,12 +186,18 @@ class Machine:
     faults: tuple[FleetFault, ...] = ()
     repaired: frozenset[tuple[int, str, str, str]] = frozenset()
 
+    def told(self, **more: Any) -> Machine:
+        """The same with other values than missions and limits; what was found about those is kept, for there is much of it."""
+        out = replace(self, **more)
+        out.__dict__.update({name: self.__dict__[name] for name in _OF_RUNS if name in self.__dict__})
+        return out
+
     @property
     def label(self) -> str:
         """What to call it."""
         return self.id or self.name or "machine without a name"
 
-    @property
+    @cached_property
     def runs(self) -> tuple[Run, ...]:
         """All judged missions."""
         return self.dated + self.undated
@@ -272,25 +280,59 @@ class Machine:
         return sum(bool(r.faults) for r in self.runs)
 
     @cached_property
+    def columns(self) -> dict[tuple[str, str], list[Part | None]]:
+        """Each component and side in every judged mission, in the order of `runs`; None where it has none."""
+        runs = self.runs
+        out: dict[tuple[str, str], list[Part | None]] = {}
+        for k, run in enumerate(runs):
+            for part in run.result.parts:
+                key = part[:2]
+                column = out.get(key)
+                if column is None:
+                    column = out[key] = [None] * len(runs)
+                column[k] = part
+        return out
+
+    @cached_property
+    def _assessed(self) -> dict[tuple[str, str], list[bool]]:
+        return {
+            key: [p is not None and is_assessed(p, self.limits) for p in column] for key, column in self.columns.items()
+        }
+
+    def assessed(self, component: str, side: str) -> list[bool]:
+        """Which missions judged a part for as long as a verdict of ``ready`` takes, in the order of `runs`."""
+        none = [False] * len(self.runs)
+        found = [self._assessed.get((component, s), none) for s in sides_of(side)]
+        return found[0] if len(found) == 1 else [all(column) for column in zip(*found, strict=True)]
+
+    @cached_property
     def parts(self) -> tuple[tuple[str, str], ...]:
         """Components and sides of any mission, in the order of the machine's wheels and axles."""
-        found = dict.fromkeys((p.component, p.side) for r in self.runs for p in r.result.parts)
+        found = dict.fromkeys(self.columns)
         found |= dict.fromkeys((f.component, s) for r in self.runs for f in r.faults for s in sides_of(f.side))
         order = {name: k for k, name in enumerate((*self.limits.wheels, *self.limits.axles))}
         return tuple(sorted(found, key=lambda k: order.get(k[0], len(order))))
 
     def kind(self, component: str) -> str:
         """Whether a component is a ``wheel`` or steers."""
-        if component in self.limits.axles:
-            return Kind.STEER
-        return next((f.kind for r in self.runs for f in r.result.faults if f.component == component), Kind.WHEEL)
+        return Kind.STEER if component in self.limits.axles else self._kinds.get(component, Kind.WHEEL)
+
+    @cached_property
+    def _kinds(self) -> dict[str, str]:
+        """Kind of each component that a fault names, by the first of them."""
+        return {f.component: f.kind for r in reversed(self.runs) for f in reversed(r.result.faults)}
+
+    @cached_property
+    def judged_s(self) -> tuple[float, float]:
+        """Driving time over all parts of all missions, and how much of it was judged [s]."""
+        parts = [p for r in self.runs for p in r.result.parts]
+        return sum(p.driving_s for p in parts), sum(p.decided_s for p in parts)
 
     @property
     def decided(self) -> float | None:
         """Share of the driving time that was judged, over all parts [1]."""
-        parts = [p for r in self.runs for p in r.result.parts]
-        driving = sum(p.driving_s for p in parts)
-        return sum(p.decided_s for p in parts) / driving if driving > 0 else None
+        driving, decided = self.judged_s
+        return decided / driving if driving > 0 else None
 
 
 def _count(n: int, word: str) -> str:

@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from contextlib import closing
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from diagnosis.audit.store.database import Database
 from diagnosis.audit.store.outcome import MissionState
@@ -26,8 +26,7 @@ _LARGEST, _LONGEST = 1e6, 1e15  # of a loss ε, and of seconds and metres: more 
 CALENDAR_NS = 946_684_800 * 10**9  # a clock that says a time before 2000 does not know the date
 
 
-@dataclass(frozen=True, slots=True)
-class Bounds:
+class Bounds(NamedTuple):
     """ε̂ with 95 % bounds [1]."""
 
     value: float
@@ -50,8 +49,7 @@ class FoundFault:
     probability: float
 
 
-@dataclass(frozen=True, slots=True)
-class Part:
+class Part(NamedTuple):
     """One component and side of one mission; see the table ``component``."""
 
     component: str
@@ -116,7 +114,14 @@ _FAULTS = (
 )
 _PARTS = (
     "SELECT result, component, side, driving_s, decided_s, epsilon, epsilon_low, epsilon_high, epsilon_relative FROM component "
-    "ORDER BY result, rowid"
+    "ORDER BY rowid"
+)
+_ABSURD = (
+    "SELECT count(*) FROM component WHERE (abs(driving_s) <= :long AND abs(decided_s) <= :long AND "
+    "coalesce(abs(epsilon), 0) <= :large AND coalesce(abs(epsilon_low), 0) <= :large AND coalesce(abs(epsilon_high), 0) <= :large "
+    "AND typeof(driving_s) IN ('real', 'integer') AND typeof(decided_s) IN ('real', 'integer') "
+    "AND typeof(epsilon) IN ('real', 'integer', 'null') AND typeof(epsilon_low) IN ('real', 'integer', 'null') "
+    "AND typeof(epsilon_high) IN ('real', 'integer', 'null')) IS NOT TRUE"
 )
 _MISSIONS = "SELECT name, files, bytes, result, gone IS NOT NULL FROM mission ORDER BY name"
 _CONTENT = ("SELECT id, attempts, state, reason, machine_id, verdict, report FROM result ORDER BY id", _MISSIONS)
@@ -143,9 +148,12 @@ def read_missions(store: Path) -> list[Mission]:
                 name, component, kind, Side(side), mode, Severity(severity), seconds, _bounds(e, low, high), p
             )
             faults[r].append(found)
+        _check_parts(db)
         parts: dict[int, list[Part]] = defaultdict(list)
-        for r, component, side, driving, decided, e, low, high, relative in map(_plausible, db.rows(_PARTS)):
-            parts[r].append(Part(component, Side(side), driving, decided, _bounds(e, low, high), bool(relative)))
+        sides = {side.value: side for side in Side}
+        for r, component, side, driving, decided, e, low, high, relative in db.rows(_PARTS):
+            bounds = None if e is None or low is None or high is None else Bounds(e, low, high)
+            parts[r].append(Part(component, sides[side], driving, decided, bounds, relative != 0))
         results = {row[0]: _result(row, tuple(faults[row[0]]), tuple(parts[row[0]])) for row in db.rows(_RESULTS)}
         missions = [
             Mission(name, tuple(map(str, json.loads(files))), size, results.get(r), bool(gone))
@@ -228,6 +236,13 @@ def _result(row: sqlite3.Row, faults: tuple[FoundFault, ...], parts: tuple[Part,
     values["verdict"] = Verdict(verdict) if verdict is not None else None
     values["open_loop"] = bool(values["open_loop"])
     return Result(**values, faults=faults, parts=parts)
+
+
+def _check_parts(db: Database) -> None:
+    """Raise a `ValueError` where a number of a part is none that sums and squares may be made of; there are many of them."""
+    found = db.rows(_ABSURD.replace(":long", repr(_LONGEST)).replace(":large", repr(_LARGEST)))[0][0]
+    if found:
+        raise ValueError(f"absurd numbers in {found} rows of parts")
 
 
 def _plausible(row: sqlite3.Row) -> tuple[Any, ...]:

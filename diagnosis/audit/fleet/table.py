@@ -26,7 +26,7 @@ def fleet_csv(document: FleetDocument) -> str:
     rows = csv.writer(out, lineterminator="\n")
     rows.writerow(COLUMNS)
     for m in document["missions"]:
-        rows.writerow([_cell(v) for v in _row(m, labels)])
+        rows.writerow([v if v.__class__ is not str or _is_plain(v) else _cell(v) for v in _row(m, labels)])
     return out.getvalue()
 
 
@@ -54,6 +54,11 @@ def _row(m: MissionRow, labels: list[str]) -> list[Value]:
         m.get("report"),
         " ".join(m["files"]),
     ]
+
+
+def _is_plain(text: str) -> bool:
+    """Whether a text is the same in a cell, as nearly all are."""
+    return not text or (text[0].isalnum() and text.isascii() and text.isprintable())
 
 
 def _cell(value: Value) -> Value:

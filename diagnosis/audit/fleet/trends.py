@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from diagnosis.audit.fleet.machines import Machine, Run
 from diagnosis.audit.fleet.trend_types import Axis
@@ -49,16 +50,14 @@ def trends_of(machine: Machine, axis: Axis = "hours") -> list[PartTrend]:
     places, now = _places(machine.dated, axis)
     out = []
     for component, side in machine.parts:
-        found = [
-            (x, run, part.epsilon)
-            for x, run in zip(places, machine.dated, strict=True)
-            if (part := run.parts.get((component, side))) is not None and part.epsilon is not None
-        ]
+        column = machine.columns.get((component, side), [])[: len(machine.dated)]
+        found = [(k, part) for k, part in enumerate(column) if part is not None and part.epsilon is not None]
         if not found:
             continue
-        relative = found[-1][1].parts[component, side].relative
-        found = [f for f in found if f[1].parts[component, side].relative == relative]
-        x, value, low, high = np.array([(x, e.value, e.low, e.high) for x, _, e in found]).T
+        relative = found[-1][1].relative
+        found = [(k, part) for k, part in found if part.relative == relative]
+        value, low, high = np.array([part.epsilon for _, part in found], np.float64).T
+        x = places[[k for k, _ in found]]
         if relative:  # how unlike the wheels are made is no loss: it counts from the machine's first missions
             made = float(value[:_FIRST].mean())
             value, low, high = value - made, low - made, high - made
@@ -67,18 +66,19 @@ def trends_of(machine: Machine, axis: Axis = "hours") -> list[PartTrend]:
         if not machine.id:
             none = Forecast("not_known", why="the machine has no identity, so that missions of several may be mixed")
             trend = Trend(None, trend.first, trend.outliers, trend.changes, "not_known", none)
-        runs = tuple(run for _, run, _ in found)
+        runs = tuple(machine.dated[k] for k, _ in found)
         kind = machine.kind(component)
         out.append(PartTrend(component, side, kind, machine.limits.min_epsilon, runs, series, trend))
     return out
 
 
-def _places(runs: Sequence[Run], axis: Axis) -> tuple[list[float], float]:
+def _places(runs: Sequence[Run], axis: Axis) -> tuple[NDArray[np.float64], float]:
     """Middle of each mission and end of the last, in hours of driving or days."""
     if axis == "days":
         begin = runs[0].result.start_ns or 0
         ends = [((r.result.start_ns or 0) - begin) / _DAY_NS + (r.result.duration_s or 0.0) / 86_400 for r in runs]
-        return [e - (r.result.duration_s or 0.0) / 172_800 for e, r in zip(ends, runs, strict=True)], max(ends)
+        half = [(r.result.duration_s or 0.0) / 172_800 for r in runs]
+        return np.array(ends) - np.array(half), max(ends)
     hours = np.array([(r.result.driving_s or 0.0) / 3600 for r in runs])
     after = np.cumsum(hours)
-    return [float(v) for v in after - hours / 2], float(after[-1])
+    return after - hours / 2, float(after[-1])

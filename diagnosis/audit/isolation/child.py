@@ -26,13 +26,14 @@ from diagnosis.results.json_text import dump_json
 from diagnosis.results.vocabulary import Verdict
 from replay.errors import ConfigError, LogError, NotJudged, OutputError
 from replay.machine.config import Machine
+from replay.readers.common.room import FULL
 
 if TYPE_CHECKING:
     from diagnosis.results.document import MachineRow
     from diagnosis.results.result import MissionResult
 
+NO_ROOM = "cannot keep temporary data: {}; make room or set TMPDIR to a folder that has it, then audit again"
 OUTCOME, REPORT, MESSAGES = "outcome.json", "report", "messages.txt"
-FULL = {errno.ENOSPC, errno.EFBIG, errno.EDQUOT}
 _PASSING = (
     "EIO", "ESTALE", "ETIMEDOUT", "EAGAIN", "EBUSY", "ENXIO", "ENODEV", "EACCES", "EPERM", "EMFILE", "ENFILE",
     "ENETDOWN", "ENETUNREACH", "EHOSTDOWN", "EHOSTUNREACH", "ECONNREFUSED", "ECONNRESET", "ECONNABORTED", "ENOTCONN",
@@ -53,6 +54,7 @@ class ChildOutcome(TypedDict):
     reason: str
     summary: MissionSummary | None
     passing: NotRequired[bool]
+    killed: NotRequired[bool]
 
 
 @dataclass(frozen=True)
@@ -178,7 +180,7 @@ def attempt(work: Work) -> ChildOutcome:
     except OSError as error:
         full, what = error.errno in FULL, error.strerror or error
         name = f"{error.filename}: " if error.filename else ""
-        reason = f"cannot keep temporary data: {what}" if full else f"{name}cannot be read: {what}"
+        reason = NO_ROOM.format(what) if full else f"{name}cannot be read: {what}"
         return _unread(error.errno, reason)
     except Exception as error:
         traceback.print_exc()
@@ -189,8 +191,9 @@ def attempt(work: Work) -> ChildOutcome:
 
 def _unread(number: int | None, reason: str) -> ChildOutcome:
     """End of a mission that cannot be read, by the number of the system's error where there is one."""
-    state = MissionState.CRASHED if number in FULL else MissionState.UNREADABLE
-    return {"state": state, "reason": reason, "summary": None, "passing": number in PASSING}
+    full = number in FULL
+    passing = full or number in PASSING
+    return {"state": MissionState.UNREADABLE, "reason": reason, "summary": None, "passing": passing, "killed": full}
 
 
 def _system_reason(error: BaseException) -> str:

@@ -27,6 +27,8 @@ from diagnosis.audit.isolation.limits import Limits, follow, held_mb
 from diagnosis.audit.store.folders import swept_folder
 
 POLL_S = 0.05
+TERMINATED = 128 + signal.SIGTERM
+"""Exit code of a server that was ended by SIGTERM while it started, and has removed what it had made."""
 _STUCK_S = 10.0
 
 
@@ -184,7 +186,7 @@ def main(descriptor: int, parent: int, *, warmed: bool) -> None:
     """Entry of the server's process."""
     for number in (signal.SIGINT, signal.SIGHUP):
         signal.signal(number, signal.SIG_IGN)  # the audit decides when it ends
-    signal.signal(signal.SIGTERM, lambda *_: sys.exit(1))
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(TERMINATED))
     follow(signal.SIGTERM)  # while it does not listen to its socket
     if os.getppid() != parent:
         os._exit(1)

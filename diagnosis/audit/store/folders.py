@@ -9,6 +9,7 @@ import secrets
 import shutil
 import sys
 import tempfile
+import time
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass
@@ -23,6 +24,7 @@ _TEMPORARY = "mfhca-audit-"
 _HELD = ".held"
 _MARK = ".key"
 _TRIES = 100
+_LONG_S = 3600.0  # nobody takes so long from making a folder to locking it
 _AT_FDCWD, _RENAME_EXCHANGE = -100, 2
 
 
@@ -93,7 +95,7 @@ def _own_temporary(note: Path, ending: ExitStack) -> Path:
         temporary = Path(tempfile.gettempdir()) / f"{_TEMPORARY}{secrets.token_hex(8)}"
         note.write_bytes(os.fsencode(temporary))  # first, so that the next run finds it in any case
         temporary.mkdir(0o700)
-        ending.callback(shutil.rmtree, temporary, ignore_errors=True)
+        ending.callback(_remove, temporary)
         held = FileLock(temporary / _HELD)
         ending.callback(held.release)
         if _acquired(held):
@@ -107,11 +109,22 @@ def swept_folder() -> Iterator[Path]:
     """Make a temporary folder that the next audit removes where this process is ended by force."""
     with ExitStack() as ending:
         folder = Path(tempfile.mkdtemp(prefix=_TEMPORARY))
-        ending.callback(shutil.rmtree, folder, ignore_errors=True)
+        ending.callback(_remove, folder)
         held = FileLock(folder / _HELD)
         ending.callback(held.release)
         held.acquire()
         yield folder
+
+
+def _remove(folder: Path) -> None:
+    """Remove a folder for temporary files, its lock last: who is ended meanwhile leaves what the next audit removes."""
+    with suppress(OSError):
+        for path in folder.iterdir():
+            if path.is_dir() and not path.is_symlink():
+                shutil.rmtree(path, ignore_errors=True)
+            elif path.name != _HELD:
+                _unlink(path)
+    shutil.rmtree(folder, ignore_errors=True)
 
 
 def _unlink(path: Path) -> None:
@@ -145,8 +158,12 @@ def sweep(output: Path) -> None:
             continue
         with suppress(OutputError):  # a disk without locks: whose folder it is cannot be told
             if lock.acquire():
-                shutil.rmtree(held.parent, ignore_errors=True)
+                _remove(held.parent)
         lock.release()
+    for folder in Path(tempfile.gettempdir()).glob(f"{_TEMPORARY}*"):  # ended between making it and its lock
+        with suppress(OSError):
+            if not (folder / _HELD).exists() and time.time() - folder.stat().st_mtime > _LONG_S:
+                shutil.rmtree(folder, ignore_errors=True)
 
 
 def publish(made: Path, place: Path, key: Key) -> None:
@@ -181,11 +198,14 @@ def mark_report(folder: Path, key: Key) -> None:
     (folder / _MARK).write_bytes(_marked(key))
 
 
-def holds_report(folder: Path, key: Key) -> bool:
+def holds_report(folder: Path | str, key: Key) -> bool:
     """Whether the report in a folder is that of a key's result, not of another one that took its place."""
     try:
-        with (folder / _MARK).open("rb") as file:
-            return file.read(1 << 12) == _marked(key)
+        mark = os.open(os.path.join(folder, _MARK), os.O_RDONLY)  # noqa: PTH118 - asked of every mission of a fleet
+        try:
+            return os.read(mark, 1 << 12) == _marked(key)
+        finally:
+            os.close(mark)
     except (OSError, ValueError):  # a name from a damaged store
         return False
 

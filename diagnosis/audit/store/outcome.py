@@ -91,8 +91,8 @@ class Outcome:
     passing : bool
         Whether the files could not be read for a reason outside of them, which may pass: no result of their content.
     killed : bool
-        Whether something outside of the mission ended its process: an operator, or the system for want of memory. It is
-        tried once more in any case, and always again by the next audit.
+        Whether something outside of the mission ended it: an operator, or the system for want of memory or of room for
+        temporary files. It is tried once more in any case, and always again by the next audit.
     """
 
     state: MissionState

@@ -16,7 +16,7 @@ import numpy as np
 from scipy.special import fdtrc
 
 from diagnosis.audit.trends.kinds import ChangeKind
-from diagnosis.audit.trends.line import Array, between, sums
+from diagnosis.audit.trends.line import Array, Weighted, varies, weighted
 
 _ALPHA = 0.01
 _LEAST = 5  # missions in a stretch that is searched
@@ -61,20 +61,22 @@ class _Best:
     size: float
 
 
-def find_changes(x: Array, y: Array, sigma: Array) -> Found:
+def find_changes(x: Array, y: Array, sigma: Array, known: Weighted | None = None) -> Found:
     """Search a series in order of x.
 
     Parameters
     ----------
     x, y, sigma : Array, shape (n,)
         Place, estimate and its standard error.
+    known : Weighted or None
+        From `diagnosis.audit.trends.line.weighted` over all of them, where that was asked for already.
     """
     outliers: list[int] = []
     changes: list[Change] = []
     todo = [np.arange(len(x))]
     while todo:
         at = todo.pop()
-        best = _unmasked(x[at], y[at], sigma[at])
+        best = _unmasked(x[at], y[at], sigma[at], known if len(at) == len(x) else None)
         if best is None:
             continue
         if best.kind == "outlier":
@@ -86,14 +88,12 @@ def find_changes(x: Array, y: Array, sigma: Array) -> Found:
     return Found(tuple(sorted(outliers)), tuple(sorted(changes, key=lambda c: c.index)))
 
 
-def possible_bend(x: Array, y: Array, sigma: Array) -> int | None:
-    """First mission after the likeliest bend of a stretch; None where the stretch is too short."""
-    if len(x) < 2 * _SIDE_BEND or not float(np.ptp(x)) > 0:
+def possible_bend(x: Array, y: Array, sigma: Array, known: Weighted | None = None) -> int | None:
+    """First mission after the likeliest bend of a stretch; None where the stretch is too short. `known` as in `fit_line`."""
+    if len(x) < 2 * _SIDE_BEND or not varies(x):
         return None
-    w = 1.0 / (sigma**2 + between(x, y, sigma**2))
-    centre, _, _, sxx, rest = sums(x, y, w)
-    whole, floor = float(w @ (rest * rest)), float(np.mean(w * sigma**2))
-    best = _bend(x - centre, w, rest, whole, sxx, floor)
+    of = known or weighted(x, y, sigma)
+    best = _bend(x - of.centre, of.w, of.rest, of.whole, of.sxx, float(np.mean(of.w * sigma**2)))
     return None if best is None else best.place
 
 
@@ -103,14 +103,14 @@ def _kind(best: _Best) -> ChangeKind:
     return "drop" if best.size < 0 else "rise"
 
 
-def _unmasked(x: Array, y: Array, sigma: Array) -> _Best | None:
+def _unmasked(x: Array, y: Array, sigma: Array, known: Weighted | None = None) -> _Best | None:
     """Like `_best`; where nothing is certain, also without the one or two missions furthest off, which may hide it.
 
     What was left out for the search is put back: it is judged again beside what was found.
     """
     at, alpha = np.arange(len(x)), _ALPHA
     for _ in range(3):
-        best = _best(x[at], y[at], sigma[at])
+        best = _best(x[at], y[at], sigma[at], known if len(at) == len(x) else None)
         if best is None:
             return None
         if best[0].p < alpha:
@@ -121,15 +121,14 @@ def _unmasked(x: Array, y: Array, sigma: Array) -> _Best | None:
     return None
 
 
-def _best(x: Array, y: Array, sigma: Array) -> tuple[_Best, int | None] | None:
+def _best(x: Array, y: Array, sigma: Array, known: Weighted | None = None) -> tuple[_Best, int | None] | None:
     """The most certain departure from one line, and the mission furthest off; None where there is none."""
     n = len(x)
-    if n < _LEAST or not float(np.ptp(x)) > 0:
+    if n < _LEAST or not varies(x):
         return None
-    w = 1.0 / (sigma**2 + between(x, y, sigma**2))
+    of = known or weighted(x, y, sigma)
+    w, centre, sxx, rest, whole = of.w, of.centre, of.sxx, of.rest, of.whole
     floor = float(np.mean(w * sigma**2))
-    centre, _, _, sxx, rest = sums(x, y, w)
-    whole = float(w @ (rest * rest))
     if whole <= floor * (n - 2) * 0.5:
         return None
     found = [

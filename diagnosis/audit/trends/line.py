@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -127,7 +128,29 @@ def between(x: Array, y: Array, variance: Array) -> float:
     return tau2
 
 
-def fit_line(x: Array, y: Array, sigma: Array) -> Line:
+class Weighted(NamedTuple):
+    """Weights and the line through them: τ², w, x̄, a, b, Sxx, residuals, and Σ w r²."""
+
+    tau2: float
+    w: Array
+    centre: float
+    level: float
+    slope: float
+    sxx: float
+    rest: Array
+    whole: float
+
+
+def weighted(x: Array, y: Array, sigma: Array) -> Weighted:
+    """Find τ², and the line with the weights that it gives; x must vary."""
+    variance = sigma * sigma
+    tau2 = between(x, y, variance)
+    w = 1.0 / (variance + tau2)
+    centre, level, slope, sxx, rest = sums(x, y, w)
+    return Weighted(tau2, w, centre, level, slope, sxx, rest, float(w @ (rest * rest)))
+
+
+def fit_line(x: Array, y: Array, sigma: Array, known: Weighted | None = None) -> Line:
     """Fit the line of the module's description.
 
     Parameters
@@ -136,18 +159,22 @@ def fit_line(x: Array, y: Array, sigma: Array) -> Line:
         Covariate; at least three values, not all equal.
     y, sigma : Array, shape (n,)
         Estimates and their standard errors, same unit.
+    known : Weighted or None
+        From `weighted`, where that was asked for already.
 
     Raises
     ------
     ValueError
         Where there are too few values or x does not vary.
     """
-    if len(x) < 3 or not float(np.ptp(x)) > 0:
+    if len(x) < 3 or not varies(x):
         raise ValueError(f"a line with a spread needs three values at different places, not {len(x)}")
-    variance = sigma * sigma
-    tau2 = between(x, y, variance)
-    w = 1.0 / (variance + tau2)
-    centre, level, slope, sxx, rest = sums(x, y, w)
+    of = known or weighted(x, y, sigma)
     dof = len(x) - 2
-    q = max(1.0, float(w @ (rest * rest)) / dof)
-    return Line(centre, level, slope, q / float(w.sum()), q / sxx, math.sqrt(tau2), dof)
+    q = max(1.0, of.whole / dof)
+    return Line(of.centre, of.level, of.slope, q / float(of.w.sum()), q / of.sxx, math.sqrt(of.tau2), dof)
+
+
+def varies(x: Array) -> bool:
+    """Whether not all places are the same; they are in order."""
+    return float(x[-1]) > float(x[0])

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from diagnosis.audit.trends.changes import Change, find_changes, possible_bend
 from diagnosis.audit.trends.kinds import Direction, ForecastState
-from diagnosis.audit.trends.line import Array, Line, fit_line, sigmas
+from diagnosis.audit.trends.line import Array, Line, Weighted, fit_line, sigmas, varies, weighted
 
 CONFIDENCE = 0.9
 LEAST_MISSIONS = 5
@@ -113,17 +113,20 @@ def trend_of(series: Series, limit: float) -> Trend:
     """
     x, y = series.x, series.value
     sigma = sigmas(y, series.low, series.high)
-    found = find_changes(x, y, sigma)
+    known = weighted(x, y, sigma) if len(x) >= 3 and varies(x) else None
+    found = find_changes(x, y, sigma, known)
     first = found.changes[-1].index if found.changes else 0
-    kept = np.setdiff1d(np.arange(first, len(x)), found.outliers)
+    kept = np.delete(np.arange(len(x)), found.outliers)
+    kept = kept[kept >= first]
+    known = known if len(kept) == len(x) else None
     line = None
-    if len(kept) >= 3 and float(np.ptp(x[kept])) > 0:
-        line = fit_line(x[kept], y[kept], sigma[kept])
+    if len(kept) >= 3 and varies(x[kept]):
+        line = fit_line(x[kept], y[kept], sigma[kept], known)
     why = _why_not(kept, found.outliers, found.changes, len(x), first)
     if why or line is None:
         forecast = Forecast("not_known", why=why or "the missions do not differ in driving time")
     else:
-        lines = [line, *_faster(x[kept], y[kept], sigma[kept], line)]
+        lines = [line, *_faster(x[kept], y[kept], sigma[kept], line, known)]
         forecast = _forecast(lines, limit, series.now, REACH * float(series.now - _begin(x, first)))
     return Trend(line, first, found.outliers, found.changes, _direction(line if not why else None), forecast)
 
@@ -153,10 +156,10 @@ def _direction(line: Line | None) -> Direction:
     return "rising" if line.slope > 0 else "falling"
 
 
-def _faster(x: Array, y: Array, sigma: Array, line: Line) -> list[Line]:
+def _faster(x: Array, y: Array, sigma: Array, line: Line, known: Weighted | None) -> list[Line]:
     """Line after the likeliest bend, where it rises faster: the bend may be there although it is not certain."""
-    bend = possible_bend(x, y, sigma)
-    if bend is None or not float(np.ptp(x[bend:])) > 0:
+    bend = possible_bend(x, y, sigma, known)
+    if bend is None or not varies(x[bend:]):
         return []
     late = fit_line(x[bend:], y[bend:], sigma[bend:])
     return [late] if late.slope > line.slope else []

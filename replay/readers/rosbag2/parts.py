@@ -10,6 +10,7 @@ import zstandard
 
 from replay.errors import LogError
 from replay.log.reading_notes import Report
+from replay.readers.common.room import FULL, NoRoom
 from replay.readers.rosbag2.metadata import Metadata, read_metadata
 
 _STORES = (".db3", ".mcap", ".db3.zstd", ".mcap.zstd")
@@ -127,7 +128,7 @@ def _inside(folder: Path, name: str, meta: Metadata, report: Report) -> Path | N
 
 
 def _expanded(path: Path, scratch: Path, serial: int, report: Report) -> Path | None:
-    """Expand a zstd-compressed storage file into the scratch folder, as far as there is room and it is not a bomb."""
+    """Expand a zstd-compressed storage file into the scratch folder, unless it is a bomb."""
     if path.suffix != ".zstd":
         return path
     out = scratch / str(serial) / path.stem
@@ -144,14 +145,10 @@ def _expanded(path: Path, scratch: Path, serial: int, report: Report) -> Path | 
                 size += len(raw)
                 if size > room:
                     out.unlink()
+                    if room < fair:
+                        raise NoRoom(f"{path.name}, which expands to more than {max(room, 0)} bytes")
                     report.lost(
-                        f"{path.name} expands to more than {room} bytes, "
-                        + (
-                            f"{_RATIO} times its size"
-                            if room == fair
-                            else "the room in the temporary folder; set TMPDIR"
-                        )
-                        + "; it was left out"
+                        f"{path.name} expands to more than {room} bytes, {_RATIO} times its size; it was left out"
                     )
                     return None
                 target.write(raw)
@@ -160,6 +157,8 @@ def _expanded(path: Path, scratch: Path, serial: int, report: Report) -> Path | 
                     block = stream.unused_data + block
                     stream = zstandard.ZstdDecompressor(max_window_size=1 << 28).decompressobj()
     except (zstandard.ZstdError, OSError) as error:
+        if isinstance(error, OSError) and error.errno in FULL:
+            raise NoRoom(f"{path.name}, expanded", error) from error
         report.lost(f"{path.name} is damaged or cannot be expanded ({error}); its first {size} bytes were read")
         return out
     if not whole:

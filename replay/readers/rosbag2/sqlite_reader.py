@@ -13,6 +13,7 @@ from replay.border import bordered
 from replay.errors import LogError
 from replay.log.raw_log import Clock, LogSummary, RawLog, TopicInfo, Window
 from replay.log.reading_notes import Report
+from replay.readers.common.room import NoRoom
 from replay.readers.messages.assemble import Assembler
 from replay.readers.messages.connection import Block, Connection
 from replay.readers.rosbag2.message_compression import unpacked
@@ -103,6 +104,8 @@ def _open(files: list[Path], source: Path, report: Report) -> list[Database]:
         try:
             with bordered(path, "rosbag2"):
                 base = open_database(open_image(path, report), report)
+        except NoRoom:
+            raise
         except (SqliteError, LogError) as error:
             last = str(error) if isinstance(error, LogError) else f"{path.name} cannot be read: {error}"
             report.lost(last)

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from replay.log.reading_notes import Report
 from replay.readers.common.compiled import plain
+from replay.readers.common.room import NoRoom
 from replay.readers.rosbag2 import sqlite_kernel as scan
 
 _WAL_MAGICS = (0x377F0682, 0x377F0683)
@@ -29,10 +30,7 @@ def _copy(path: Path, data: NDArray[np.uint8], room: int) -> IO[bytes]:
     """Copy a database to an unnamed temporary file."""
     free = shutil.disk_usage(tempfile.gettempdir()).free
     if room + _SPARE > free:
-        raise SqliteError(
-            f"its copy needs {room} bytes and the temporary folder {tempfile.gettempdir()} has {free}; set TMPDIR to a "
-            "folder with more room"
-        )
+        raise NoRoom(f"a copy of {path.name} ({room} bytes)")
     target: IO[bytes] = tempfile.TemporaryFile(prefix="mfhca-")  # noqa: SIM115
     if len(data):
         with path.open("rb") as source:

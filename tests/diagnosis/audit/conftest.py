@@ -9,7 +9,8 @@ from typing import Any
 import pytest
 
 from diagnosis.audit.discovery.missions import MissionSource
-from diagnosis.audit.isolation.run import ForkServer, Isolation
+from diagnosis.audit.isolation.forks import ForkServer
+from diagnosis.audit.isolation.run import Isolation
 from diagnosis.audit.store.keys import Key, config_hash, log_hash
 from replay.export.mission import write_mission
 from replay.simulation.options import SimulationOptions

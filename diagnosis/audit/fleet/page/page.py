@@ -40,6 +40,7 @@ from replay.faults import SCALED
 _HERE = Path(__file__).parent
 _FAULTS = 400
 _OPEN_ROWS = 40
+_FAILURES = 1000
 _FILTER = (Verdict.STOP, Verdict.WATCH, Verdict.READY, Verdict.NOT_ASSESSED)
 _UNITS = {"hours": "h", "days": "d"}
 _STATUS = {"new": "New", "recurring": "Recurring", "once": "Once", "past": "Past", "repaired": "Repaired"}
@@ -80,6 +81,7 @@ def build_fleet_page(found: FleetDocument) -> str:
     present = [f for f in document["faults"] if f["status"] not in GONE]
     past = [f for f in document["faults"] if f["status"] in GONE]
     drawn, standing = chosen(trends), _by_machine(present)
+    failed = [k for k, m in enumerate(found["missions"]) if m["verdict"] is None]
     own: dict[int, list[TrendRow]] = defaultdict(list)
     for t in trends:
         own[t["machine"]].append(t)
@@ -97,7 +99,7 @@ def build_fleet_page(found: FleetDocument) -> str:
         "kpis": _kpis(document),
         "baseline": changes_of(document["baseline"], {m["label"]: words_of(m) for m in document["machines"]}),
         "leave": _leave(lists_of(found), document),
-        "strip": rows.STRIP,
+        "strip": rows.strip_length(len(document["machines"])),
         "machines": [_machine(k, m, document, standing[k], own[k]) for k, m in enumerate(document["machines"])],
         "faults": [_fault(f, document, directions) for f in present[:_FAULTS]],
         "unlisted": max(0, len(present) - _FAULTS),
@@ -109,7 +111,9 @@ def build_fleet_page(found: FleetDocument) -> str:
         "crowded": len(drawn) == MOST,
         "matrix": matrix(document["machines"]),
         "groups": [(*g, len(document["missions"]) <= _OPEN_ROWS) for g in rows.groups(document)],
-        "failures": [m for m in document["missions"] if m["verdict"] is None],
+        "cut": len(document["missions"]) > rows.LISTED,
+        "failures": [document["missions"][k] for k in failed[:_FAILURES]],
+        "failed_more": max(0, len(failed) - _FAILURES),
         "definitions": _DEFINITIONS,
         "version": document["version"],
         "axis": {"hours": "driving hours of the audited missions", "days": "days"}[axis],
@@ -266,7 +270,7 @@ def _machine(
         "open": len(standing),
         "faults": "; ".join(rows.fault_words(f, words_of(m)) for f in standing[:2])
         + (f" +{len(standing) - 2}" if len(standing) > 2 else ""),
-        "strip": rows.strip(document["missions"], m),
+        "strip": rows.strip(document["missions"], m, rows.strip_length(len(document["machines"]))),
         "with_faults": m["with_faults"],
         "judged": judged,
         "trend": sparkline(leading) if leading else "",

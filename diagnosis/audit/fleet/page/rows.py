@@ -8,7 +8,7 @@ from collections.abc import Iterator, Sequence
 from markupsafe import Markup, escape
 
 from diagnosis.audit.fleet.fault_types import FleetFaultRow, MissionFaultRow
-from diagnosis.audit.fleet.fleet_types import MachineRow
+from diagnosis.audit.fleet.fleet_types import MachineRow, MissionRow
 from diagnosis.audit.fleet.page.shown import ShownDocument, ShownMission
 from diagnosis.audit.fleet.page.svg import mark
 from diagnosis.audit.store.outcome import MissionState
@@ -19,6 +19,14 @@ from diagnosis.results.vocabulary import Verdict
 from replay.faults import SCALED
 
 STRIP = 14
+# Missions of a fleet that are all listed; of a larger one those that say most, so that the page stays light.
+LISTED = 6000
+_CELLS, _LEAST = 6000, 3
+
+
+def strip_length(machines: int) -> int:
+    """How many missions each strip shows."""
+    return max(_LEAST, min(STRIP, _CELLS // max(machines, 1)))
 
 
 def symbol(mission: ShownMission) -> str:
@@ -48,13 +56,12 @@ def day(start_ns: int | None) -> str:
     return labels.utc(start_ns)[:10] if start_ns is not None else "no date"
 
 
-def strip(missions: Sequence[ShownMission], machine: MachineRow) -> Markup:
+def strip(missions: Sequence[ShownMission], machine: MachineRow, length: int = STRIP) -> Markup:
     """The last missions, oldest first, then apart those of unknown order and those that were not read."""
     words = words_of(machine)
-    dated = [missions[k] for k in machine["missions"]]
-    shown = Markup("").join(_cell(m, words) for m in dated[-STRIP:])
-    apart = [missions[k] for k in (*machine["undated"], *machine["failed"])]
-    extra = Markup("").join(_cell(m, words) for m in apart[:6])
+    shown = Markup("").join(_cell(missions[k], words) for k in machine["missions"][-length:])
+    apart = [*machine["undated"], *machine["failed"]]
+    extra = Markup("").join(_cell(missions[k], words) for k in apart[:6])
     more = Markup('<span class="muted">+{}</span>').format(len(apart) - 6) if len(apart) > 6 else Markup("")
     if extra:
         extra = Markup(
@@ -78,24 +85,48 @@ def _cell(m: ShownMission, machine_words: MachineWords) -> Markup:
 
 
 def groups(document: ShownDocument) -> Iterator[tuple[str, str, int, Markup]]:
-    """Name of a machine, what its missions add up to, their number, and their rows, newest first."""
-    missions = document["missions"]
-    copies: dict[int, list[ShownMission]] = defaultdict(list)
-    for c in missions:
-        if c.get("copy_of") and c["verdict"] is not None and c["machine"] is not None:
-            copies[c["machine"]].append(c)
-    for k, m in enumerate(document["machines"]):
-        rows = [missions[i] for i in (*reversed(m["missions"]), *m["undated"], *m["failed"])] + copies[k]
-        words = f"{len(rows)} mission{'s' if len(rows) != 1 else ''}, {m['with_faults']} with faults"
-        yield m["label"], words, len(rows), Markup("".join(_row(r, words_of(m)) for r in rows))
-    rest = [m for m in missions if m["machine"] is None]
+    """Name of a machine, what its missions add up to, how many are listed, and their rows, newest first."""
+    missions, machines = document["missions"], document["machines"]
+    most = None if len(missions) <= LISTED else max(_LEAST, LISTED // (len(machines) + 1))
+    copies: dict[int, list[int]] = defaultdict(list)
+    rest: list[int] = []
+    for k, found in enumerate(missions.as_found):
+        if found["machine"] is None:
+            rest.append(k)
+        elif found.get("copy_of") and found["verdict"] is not None:
+            copies[found["machine"]].append(k)
+    for k, m in enumerate(machines):
+        every = [*reversed(m["missions"]), *m["undated"], *m["failed"], *copies[k]]
+        listed = _telling(missions.as_found, every, most)
+        words = (
+            f"{len(every)} mission{'s' if len(every) != 1 else ''}, {m['with_faults']} with faults{_cut(listed, every)}"
+        )
+        yield m["label"], words, len(listed), Markup("".join(_row(missions[r], words_of(m)) for r in listed))
     if rest:
+        listed = rest[:most]
         yield (
             "No machine known",
-            f"{len(rest)} mission{'s' if len(rest) != 1 else ''}",
-            len(rest),
-            Markup("".join(_row(r, ANY_DRIVE) for r in rest)),
+            f"{len(rest)} mission{'s' if len(rest) != 1 else ''}{_cut(listed, rest)}",
+            len(listed),
+            Markup("".join(_row(missions[r], ANY_DRIVE) for r in listed)),
         )
+
+
+def _telling(missions: Sequence[MissionRow], every: Sequence[int], most: int | None) -> list[int]:
+    """Places of a machine's missions to be listed: half of them the first of `every`, half those with faults or without a report."""
+    if most is None or len(every) <= most:
+        return list(every)
+    chosen = set(every[: most // 2])
+    telling = [k for k in every if missions[k]["faults"] or missions[k]["verdict"] is None]
+    for k in (*telling, *every):
+        if len(chosen) >= most:
+            break
+        chosen.add(k)
+    return [k for k in every if k in chosen]
+
+
+def _cut(listed: Sequence[int], every: Sequence[int]) -> str:
+    return f"; {len(listed)} listed, all in fleet.csv" if len(listed) < len(every) else ""
 
 
 def _row(m: ShownMission, machine_words: MachineWords) -> str:

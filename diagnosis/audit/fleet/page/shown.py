@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import PurePosixPath
-from typing import TypedDict
+from typing import NotRequired, TypedDict
 from urllib.parse import quote
 
 from diagnosis.audit.fleet.fault_types import FaultChangeRow, FleetFaultRow
@@ -37,6 +38,31 @@ class ShownFaultChange(FaultChangeRow):
     address: str
 
 
+class ShownMissions(Sequence[ShownMission]):
+    """Missions as the page shows them, each made when it is asked for: of a large fleet few are.
+
+    Attributes
+    ----------
+    as_found : Sequence[MissionRow]
+        The same as the document has them.
+    """
+
+    def __init__(self, missions: Sequence[MissionRow]) -> None:
+        self.as_found = missions
+        self._made: dict[int, ShownMission] = {}
+
+    def __len__(self) -> int:
+        return len(self.as_found)
+
+    def __getitem__(self, place: int) -> ShownMission:  # type: ignore[override]
+        found = self._made.get(place)
+        if found is None:
+            m = self.as_found[place]
+            shown: ShownMission = {**m, "address": address(m.get("report"))}
+            found = self._made[place] = labels.made_visible(shown)
+        return found
+
+
 class ShownBaseline(TypedDict):
     """As in `diagnosis.audit.fleet.fleet_types.BaselineRow`."""
 
@@ -58,13 +84,12 @@ class ShownDocument(TypedDict):
     counts: CountsRow
     machines: list[MachineRow]
     faults: list[FleetFaultRow]
-    missions: list[ShownMission]
+    missions: NotRequired[ShownMissions]
     baseline: ShownBaseline | None
 
 
 def shown(document: FleetDocument) -> ShownDocument:
     """A document as the page shows it; names are made visible, addresses lead to the names as they are."""
-    missions: list[ShownMission] = [{**m, "address": address(m.get("report"))} for m in document["missions"]]
     found: ShownDocument = {
         "version": document["version"],
         "axis": document["axis"],
@@ -73,7 +98,6 @@ def shown(document: FleetDocument) -> ShownDocument:
         "counts": document["counts"],
         "machines": document["machines"],
         "faults": document["faults"],
-        "missions": missions,
         "baseline": None,
     }
     earlier = document["baseline"]
@@ -91,6 +115,7 @@ def shown(document: FleetDocument) -> ShownDocument:
             "coverage": earlier["coverage"],
         }
     visible: ShownDocument = labels.made_visible(found)
+    visible["missions"] = ShownMissions(document["missions"])
     return visible
 
 

@@ -17,9 +17,10 @@ import pytest
 from diagnosis.audit.isolation import fork_server
 from diagnosis.audit.isolation.child import Work
 from diagnosis.audit.isolation.fork_server import Ended, ServerLoop, Stopped, _Child
+from diagnosis.audit.isolation.forks import ForkServer
 from diagnosis.audit.isolation.fresh_process import Spawner
 from diagnosis.audit.isolation.limits import Limits
-from diagnosis.audit.isolation.run import ForkServer, Isolation, run_isolated
+from diagnosis.audit.isolation.run import Isolation, run_isolated
 from diagnosis.audit.store.outcome import Outcome
 from replay.errors import OutputError
 from replay.export.mission import write_mission
@@ -40,7 +41,7 @@ POISON = [
     ("exhaust", "out_of_memory", "more than 150 MB"),
     ("exhaust_shared", "out_of_memory", "more than 150 MB"),
     ("leave", "crashed", "ended with code 5"),
-    ("fill", "crashed", "temporary data: File too large"),
+    ("fill", "unreadable", "temporary data: File too large; make room or set TMPDIR"),
     ("cut", "crashed", "SIGBUS: a file became shorter while it was read (in _cut, poison.py, line "),
     ("broken", "unreadable", "x.bag ends at byte 12"),
     ("dumb", "degraded", "no wheel speed was found"),
@@ -121,7 +122,7 @@ def test_closing_the_server_ends_its_children_and_removes_their_folders(tmp_path
 
 def test_a_server_that_is_still_starting_ends_with_the_audit(tmp_path: Path) -> None:
     call = (
-        "import time; from diagnosis.audit.isolation.run import ForkServer; server = ForkServer(); server.start(); "
+        "import time; from diagnosis.audit.isolation.forks import ForkServer; server = ForkServer(); server.start(); "
         "print(server._process.pid, flush=True); time.sleep(60)"
     )
     environment = os.environ | {"PYTHONPATH": os.pathsep.join(p for p in sys.path if p), "TMPDIR": str(tmp_path)}

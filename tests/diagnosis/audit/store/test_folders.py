@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from diagnosis.audit.store.folders import run_folders, sweep
+from diagnosis.audit.store.folders import run_folders, sweep, swept_folder
 from diagnosis.audit.store.locks import WORKING, FileLock, check_locks
 from replay.errors import OutputError
 
@@ -30,6 +30,31 @@ def test_a_sweep_between_opening_and_locking_costs_no_run_its_folders(
         assert place.temporary.is_dir()
     assert swept
     assert list((tmp_path / WORKING).iterdir()) == []
+
+
+def test_folders_whose_process_was_ended_while_it_made_or_removed_them(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path / "temporary"))
+    now, before, fresh = (tmp_path / "temporary" / f"mfhca-audit-{name}" for name in ("now", "before", "fresh"))
+    for folder in (now, before, fresh):
+        (folder / "files").mkdir(parents=True)
+
+    def end(path: Path, *_: object, **__: object) -> None:
+        raise KeyboardInterrupt  # as SIGTERM does
+
+    ending = swept_folder()
+    half = ending.__enter__()
+    (half / "warm").mkdir()
+    with monkeypatch.context() as patch:
+        patch.setattr("shutil.rmtree", end)
+        with pytest.raises(KeyboardInterrupt):
+            ending.__exit__(None, None, None)
+    assert (half / ".held").exists()  # its lock goes last, and so the next one finds it
+    os.utime(before, (1e9, 1e9))
+    (tmp_path / WORKING).mkdir()
+    sweep(tmp_path)
+    assert sorted(p.name for p in (tmp_path / "temporary").iterdir()) == ["mfhca-audit-fresh", "mfhca-audit-now"]
 
 
 @pytest.mark.parametrize("number", [errno.ENOLCK, errno.ENOSYS, errno.EOPNOTSUPP])
