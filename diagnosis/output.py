@@ -93,7 +93,7 @@ def _write_table(columns: Mapping[str, NDArray[Any]], path: Path) -> None:
     table = pa.Table.from_arrays(arrays, names=list(columns))
     with path.open("wb") as file:  # pyarrow opens no name that is not UTF-8
         pq.write_table(
-            table, file, compression="brotli", compression_level=5, use_dictionary=False, use_byte_stream_split=True
+            table, file, compression="zstd", compression_level=3, use_dictionary=False, use_byte_stream_split=True
         )
 
 

@@ -43,15 +43,16 @@ def detectable(cells: Cells, powers: Mapping[tuple[str, str], Powers] | None = N
         warnings.simplefilter("ignore", RuntimeWarning)  # windows without any value
         for gauges in gauges_of(cells):
             if (gauges.component, gauges.side.value) not in own:
-                rows += _rows(gauges, cells, clear_at)
-                traces.append(_trace(gauges, cells))
-    for (component, side), found in own.items():
+                found, trace = _rows(gauges, cells, clear_at)
+                rows += found
+                traces.append(trace)
+    for (component, side), said in own.items():
         about = (Kind.WHEEL, component, Side(side))
         rows += [
-            Detectable(*about, p.deviation, p.for_s, p.size, p.unit, p.share, p.places, found.told) for p in found.rows
+            Detectable(*about, p.deviation, p.for_s, p.size, p.unit, p.share, p.places, said.told) for p in said.rows
         ]
-        if found.start_s:
-            traces.append(Trace(*about, found.start_s, found.loss))
+        if said.start_s:
+            traces.append(Trace(*about, said.start_s, said.loss))
     rows.sort(key=lambda row: _place(cells, row.component))
     traces.sort(key=lambda trace: _place(cells, trace.component))
     return Detectability(tuple(rows), tuple(traces))
@@ -62,10 +63,19 @@ def _place(cells: Cells, component: str) -> int:
     return [*cells.machine.wheels, *cells.machine.axles].index(component)
 
 
-def _rows(g: Gauges, cells: Cells, clear_at: float) -> Iterator[Detectable]:
-    for length in LENGTHS_S:
-        places = places_of(g, cells, length)
-        loss = g.sizes(places, lambda r: r.loss, lambda r: r.loss)
+def _rows(g: Gauges, cells: Cells, clear_at: float) -> tuple[list[Detectable], Trace]:
+    """Rows of a side, and its trace: the losses of one of the lengths, by place."""
+    placed = {length: places_of(g, cells, length) for length in LENGTHS_S}
+    losses = {length: g.sizes(places, lambda r: r.loss, lambda r: r.loss) for length, places in placed.items()}
+    rows = list(_rows_of(g, placed, losses, clear_at))
+    return rows, _trace(g, placed[_TRACED_S], losses[_TRACED_S], cells.dt)
+
+
+def _rows_of(
+    g: Gauges, placed: Mapping[float | None, Placements], losses: Mapping[float | None, Array], clear_at: float
+) -> Iterator[Detectable]:
+    for length, places in placed.items():
+        loss = losses[length]
         excess = g.excesses(places)
         if length is None:
             loss = np.minimum(loss, g.lasting.get(Deviation.INEFFICIENT, np.inf))
@@ -109,13 +119,11 @@ def _row(
     return Detectable(g.kind, g.component, g.side, deviation, length, known, unit, share, sizes.size, g.told)
 
 
-def _trace(g: Gauges, cells: Cells) -> Trace:
-    places = places_of(g, cells, _TRACED_S)
-    loss = g.sizes(places, lambda r: r.loss, lambda r: r.loss)
+def _trace(g: Gauges, places: Placements, loss: Array, dt: float) -> Trace:
     return Trace(
         g.kind,
         g.component,
         g.side,
-        tuple(float(x) for x in places.first * cells.dt),
+        tuple(float(x) for x in places.first * dt),
         tuple(float(x) if x <= 1.0 else None for x in loss),
     )

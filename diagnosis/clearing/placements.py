@@ -118,18 +118,18 @@ class Ratio:
     kinds: NDArray[np.intp]
     lasting: tuple[tuple[float, float], ...]
 
-    def room(self, over: Overlap) -> Array:
-        """`off` of the windows; NaN for those whose usual one the fault becomes. Shape (places, n)."""
+    def room(self, over: Overlap, share: Array) -> Array:
+        """`off` of the windows; NaN for those whose usual one the fault becomes; by `share` of them. Shape (places, n)."""
         unusual = np.zeros(over.windows.shape, dtype=np.bool_)
         for kind in range(len(self.lasting)):
-            few = self.filled(over, kind, _TOUCHED) < _USUAL
+            few = self.filled(over, share, kind, _TOUCHED) < _USUAL
             unusual |= few[:, np.newaxis] & (self.kinds[over.windows] == kind)
         return np.asarray(np.where(unusual, self.off[over.windows], np.nan))
 
-    def filled(self, over: Overlap, kind: int, share: float) -> Array:
+    def filled(self, over: Overlap, share: Array, kind: int, least_share: float) -> Array:
         """Share of the windows of a kind of which each fault fills so large a share, shape (places,)."""
         known = (self.kinds == kind) & np.isfinite(self.off)
-        full = known[over.windows] & (np.nan_to_num(self.share(over)) > share)
+        full = known[over.windows] & (np.nan_to_num(share) > least_share)
         return np.asarray(full.sum(axis=1) / max(1, np.count_nonzero(known)))
 
     def share(self, over: Overlap) -> Array:
@@ -140,23 +140,25 @@ class Ratio:
 
     def loss(self, over: Overlap) -> Array:
         """Smallest loss [1] that the windows show, or that what is usual does, shape (places,)."""
-        out = least(-np.expm1(-(self.below + self.room(over))) / self.share(over))
+        share = self.share(over)
+        out = least(-np.expm1(-(self.below + self.room(over, share))) / share)
         for kind, (below, _) in enumerate(self.lasting):
-            out = np.where(self.filled(over, kind, _FILLED) > _BECOMES, np.minimum(out, -np.expm1(-below)), out)
+            out = np.where(self.filled(over, share, kind, _FILLED) > _BECOMES, np.minimum(out, -np.expm1(-below)), out)
         return np.maximum(out, 0.0)
 
     def excess(self, over: Overlap) -> Array:
         """Smallest excess [1], likewise."""
-        out = least(np.expm1(self.above - self.room(over)) / self.share(over))
+        share = self.share(over)
+        out = least(np.expm1(self.above - self.room(over, share)) / share)
         for kind, (_, above) in enumerate(self.lasting):
-            out = np.where(self.filled(over, kind, _FILLED) > _BECOMES, np.minimum(out, np.expm1(above)), out)
+            out = np.where(self.filled(over, share, kind, _FILLED) > _BECOMES, np.minimum(out, np.expm1(above)), out)
         return np.maximum(out, 0.0)
 
     def offset(self, over: Overlap) -> Array:
         """Smallest offset of either sign, in the motion's unit, likewise."""
         inside, window = over.sums((self.weight > 0.0).astype(np.float64)), self.frame.sums(self.weight)[over.windows]
         with_it = np.where(inside > 0.0, window / inside, np.nan)
-        off = self.room(over)
+        off = self.room(over, self.share(over))
         return np.maximum(least(np.expm1(self.above - off) * with_it), least(-np.expm1(-(self.below + off)) * with_it))
 
     def shows_hold(self, over: Overlap, y: Array, first: NDArray[np.intp]) -> NDArray[np.bool_]:
@@ -165,7 +167,7 @@ class Ratio:
         window = self.frame.sums(self.weight)[over.windows]
         held = window - over.sums(self.weight) + np.abs(y[first])[:, np.newaxis] * over.sums(counted)
         with np.errstate(divide="ignore", invalid="ignore"):
-            off = self.room(over) + np.log(np.maximum(held / window, 1e-3))
+            off = self.room(over, self.share(over)) + np.log(np.maximum(held / window, 1e-3))
         touched = over.sums(counted) > 0.0
         return np.asarray((touched & ((off > self.above) | (off < -self.below))).any(axis=1))
 

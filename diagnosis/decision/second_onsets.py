@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from diagnosis.estimation.second_onset import SAMPLES, channel_model, second_onset
+from diagnosis.estimation.second_onset import SAMPLES, Readings, Second, channel_model, second_onsets
 from diagnosis.results.assessment import Assessment, Finding
 from diagnosis.results.vocabulary import Tier
 from replay.faults import FaultMode, Side, State
@@ -34,45 +35,65 @@ def with_second_onsets(assessments: Mapping[Part, Assessment], dt: float) -> dic
     """
     ranked = sorted((f for a in assessments.values() for f in a.findings), key=lambda f: (-f.probability, f.start))
     kept = {(f.start, f.stop, f.side, f.mode) for f in ranked[:_MOST]}
-    out = {}
-    for part, a in assessments.items():
-        found = tuple(_with_second(f, a, dt) if (f.start, f.stop, f.side, f.mode) in kept else f for f in a.findings)
-        out[part] = replace(a, findings=found)
-    return out
+    asked = {
+        (part, i): found
+        for part, a in assessments.items()
+        for i, f in enumerate(a.findings)
+        if (f.start, f.stop, f.side, f.mode) in kept and (found := _around(f, a, dt)) is not None
+    }
+    onsets = second_onsets([a.readings for a in asked.values()])
+    texts = {key: _said(one, onset, dt) for (key, one), onset in zip(asked.items(), onsets, strict=True)}
+    return {
+        part: replace(a, findings=tuple(_with(f, texts.get((part, i))) for i, f in enumerate(a.findings)))
+        for part, a in assessments.items()
+    }
 
 
-def _with_second(finding: Finding, a: Assessment, dt: float) -> Finding:
-    text = said(finding, a, dt)
-    return replace(finding, evidence=(*finding.evidence, text)) if text else finding
+def _with(finding: Finding, text: str | None) -> Finding:
+    return finding if text is None else replace(finding, evidence=(*finding.evidence, text))
 
 
-def said(finding: Finding, a: Assessment, dt: float) -> str:
-    """The sentence; empty where the readings around the onset are not kept, or the row is none of the tables'."""
+class _Around(NamedTuple):
+    """Every `stride`-th sample from `first` on, around an onset at `start` [steps]."""
+
+    start: int
+    first: int
+    stride: int
+    readings: Readings
+
+
+def _around(finding: Finding, a: Assessment, dt: float) -> _Around | None:
+    """The readings around an onset; None where they are not kept, or the row is none of the tables'."""
     if finding.mode is FaultMode.OUTSIDE_TABLE or finding.start == 0 or any(n not in a.columns for n in _NEEDED):
-        return ""
+        return None
     around = _AROUND_S.get(finding.tier, _AROUND_BY_MODELS_S)
     stride = max(1, round(around / dt / SAMPLES))
     reach = SAMPLES * stride
     first, last = max(0, finding.start - reach), min(finding.start + reach, finding.stop)
     columns = _steps(a, first, last)
     if columns is None:
-        return ""
+        return None
     residual, threshold, expected = (c[::stride] for c in columns)
     y = residual + expected
     known = np.isfinite(y)
     noise = float(np.nanmedian(threshold)) / 3.0 if np.isfinite(threshold).any() else 0.0
     if not known.any() or noise <= 0.0:
-        return ""
+        return None
     behind = np.isfinite(y) & np.isfinite(expected) & (first + np.arange(y.size) * stride >= finding.start)
     model = channel_model(noise, y[behind], expected[behind], dt * stride)
     # a valve behind a wheel model shows in the speed only: any departure from the expected one is its fault
     shown = finding.side is Side.SENSOR or finding.tier is Tier.DIRECT
     row = State(finding.mode.value) if shown else State.NOISY
-    found = second_onset(y, expected, model, row)
+    return _Around(finding.start, first, stride, Readings(y, expected, model, row))
+
+
+def _said(asked: _Around, found: Second | None, dt: float) -> str:
+    """The sentence."""
+    start, first, stride, _ = asked
     if found is None:
         return "filterpy, stepped over the readings around the onset, sees no onset there that stands out."
-    off = (first + found.place * stride - finding.start) * dt
-    when = f"filterpy, stepped over the readings around it, sees the onset at {finding.start * dt + off:.3f} s"
+    off = (first + found.place * stride - start) * dt
+    when = f"filterpy, stepped over the readings around it, sees the onset at {start * dt + off:.3f} s"
     if abs(off) < 0.5 * dt * stride:
         return f"{when}: the same {'sample' if stride == 1 else 'moment'}."
     size = f"{1e3 * abs(off):.0f} ms" if abs(off) < 1.0 else f"{abs(off):.1f} s"

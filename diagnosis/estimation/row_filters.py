@@ -40,7 +40,7 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-_LOG_2PI = float(np.log(2.0 * np.pi))
+LOG_2PI = float(np.log(2.0 * np.pi))
 
 
 def models_of(row: int) -> tuple[int, ...]:
@@ -113,7 +113,7 @@ class RowFilter:
             r = float(kf.R[0, 0]) * white * (max(1.0, float(kf.x[0, 0]) ** 2) if self.grows else 1.0)
         kf.update(y, R=r, H=np.array([self.row(x)]))
         s = float(kf.S[0, 0])
-        return -0.5 * (float(kf.y[0, 0]) ** 2 / s + float(np.log(s)) + _LOG_2PI)
+        return -0.5 * (float(kf.y[0, 0]) ** 2 / s + float(np.log(s)) + LOG_2PI)
 
     @property
     def gain(self) -> tuple[float, float]:

@@ -7,13 +7,15 @@ compiled recursions but the readings and their noise.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from diagnosis.estimation.fault_models import EXACT, MISMATCH, VARYING_ROWS, ModeModel
-from diagnosis.estimation.row_filters import RowFilter, models_of
+from diagnosis.estimation.joined_filters import Course, likelihoods
+from diagnosis.estimation.row_filters import models_of
 from diagnosis.results.fault_rows import ROWS
 from replay.faults import State
 
@@ -25,6 +27,8 @@ _WORTH = 3.0  # log-evidence that an onset must have beside none
 _TOLERANCE = 0.5  # of the noise: slow mismatch of healthy readings
 _VARYING = 2  # of the noisy row's models, the middle ones
 _FLOOR = -18.0
+_EQUAL = 1e-6  # log-evidence that is rounding
+_HEALTHY = (EXACT, MISMATCH)
 
 
 class Second(NamedTuple):
@@ -63,10 +67,10 @@ def channel_model(noise: float, y: Array, x: Array, dt: float) -> ModeModel:
     return ModeModel(noise, constant, _TOLERANCE * noise, max(size, 10.0 * noise), 0.0, dt)
 
 
-def second_onset(y: Array, x: Array, model: ModeModel, state: State) -> Second | None:
-    """The onset within some samples.
+class Readings(NamedTuple):
+    """Samples around an onset.
 
-    Parameters
+    Attributes
     ----------
     y, x : Array, shape (n,)
         Readings and what is expected of them; NaN where there are none.
@@ -74,32 +78,53 @@ def second_onset(y: Array, x: Array, model: ModeModel, state: State) -> Second |
         From `channel_model`.
     state : State
         The fault's row.
+    """
+
+    y: Array
+    x: Array
+    model: ModeModel
+    state: State
+
+    @property
+    def known(self) -> NDArray[np.intp]:
+        """Places of the samples that have both."""
+        return np.flatnonzero(np.isfinite(self.y) & np.isfinite(self.x))
+
+    def courses(self) -> list[Course]:
+        """Healthy models forwards, those of the row backwards; none where there are too few readings."""
+        known = self.known
+        if known.size < _LEAST:
+            return []
+        a, b, row = self.y[known], self.x[known], ROWS.index(self.state)
+        models = models_of(row)[:_VARYING] if row in VARYING_ROWS else models_of(row)
+        forwards = [Course(m, self.model, a, b) for m in _HEALTHY]
+        return forwards + [Course(m, self.model, a[::-1], b[::-1]) for m in models]
+
+
+def second_onsets(asked: Sequence[Readings]) -> list[Second | None]:
+    """The onset within the samples of each.
 
     Returns
     -------
-    Second or None
+    list[Second | None]
         None where there are too few readings, or where no place in them is an onset.
     """
-    known = np.flatnonzero(np.isfinite(y) & np.isfinite(x))
-    if known.size < _LEAST:
-        return None
-    a, b = y[known], x[known]
-    floor = _FLOOR - float(np.log(model.span))
-    healthy = np.maximum.reduce([np.maximum(_stepped(a, b, model, m), floor) for m in (EXACT, MISMATCH)])
-    row = ROWS.index(state)
-    models = models_of(row)[:_VARYING] if row in VARYING_ROWS else models_of(row)
+    courses = [one.courses() for one in asked]
+    found = iter(likelihoods([c for one in courses for c in one]))
+    return [_best(one, [next(found) for _ in of]) if of else None for one, of in zip(asked, courses, strict=True)]
+
+
+def _best(asked: Readings, found: list[Array]) -> Second | None:
+    """The best place of an onset, from the log-likelihoods of its courses."""
+    known, floor = asked.known, _FLOOR - float(np.log(asked.model.span))
+    bounded = [np.maximum(x, floor) for x in found]
+    healthy = np.maximum.reduce(bounded[: len(_HEALTHY)])
     best: Second | None = None
-    for m in models:
-        faulty = np.maximum(_stepped(a[::-1], b[::-1], model, m)[::-1], floor)
-        total = np.r_[0.0, np.cumsum(healthy)] + np.r_[np.cumsum(faulty[::-1])[::-1], 0.0]
-        k = int(np.argmax(total))
+    for faulty in bounded[len(_HEALTHY) :]:
+        total = np.r_[0.0, np.cumsum(healthy)] + np.r_[np.cumsum(faulty)[::-1], 0.0]
+        # the first of equal ones: a sample that is an outlier to both models divides them nowhere better than beside it
+        k = int(np.argmax(total >= total.max() - _EQUAL))
         gain = float(total[k] - total[-1])
         if k < known.size and gain >= _WORTH and (best is None or gain > best.gain):
             best = Second(int(known[k]), gain)
     return best
-
-
-def _stepped(y: Array, x: Array, model: ModeModel, m: int) -> Array:
-    """Log-likelihood of each sample given those before it, by one model."""
-    one = RowFilter(m, model)
-    return np.array([one.step(float(a), float(b)) for a, b in zip(y, x, strict=True)])

@@ -17,7 +17,8 @@ _BLOCK = 1 << 15
 _PROBE = 20_000
 _HUGE, _LEAST = 1e30, 1e-30
 #: Steps of the grid within the range, and bits kept of each value; for recorded signals a float's own.
-_BITS = {"evidence": (10, 10), "replay": (12, 14)}
+_BITS = {"evidence": (10, 10), "replay": (11, 11)}
+_ESTIMATE = (8, 8)  # δ̂, δ̄ and their deviations: a hundredth part of how well they are known
 _RECORDED, _WITH_LSB = 14, 16
 
 
@@ -45,8 +46,16 @@ def grid_of(name: str, values: NDArray[np.floating], lsb: float | None = None) -
     if lsb is not None and _LEAST < lsb < _HUGE:
         step = max(lsb / 4, float(high - low) / 2**_WITH_LSB)
     else:
-        step = float(high - low) / 2 ** _BITS.get(name.partition(".")[0], (_RECORDED, 0))[0]
+        step = float(high - low) / 2 ** _bits_of(name, (_RECORDED, 0))[0]
     return 2.0 ** math.floor(math.log2(step)) if step > _LEAST else 0.0
+
+
+def _bits_of(name: str, otherwise: tuple[int, int]) -> tuple[int, int]:
+    """Steps within the range and bits kept, for columns that were replayed or found."""
+    group = name.partition(".")[0]
+    if group == "evidence" and name.rpartition(".")[2].startswith("delta"):
+        return _ESTIMATE
+    return _BITS.get(group, otherwise)
 
 
 def grids_of(columns: Mapping[str, NDArray[np.floating]], lsb: Mapping[str, float]) -> dict[str, float]:
@@ -54,10 +63,24 @@ def grids_of(columns: Mapping[str, NDArray[np.floating]], lsb: Mapping[str, floa
     return {name: grid_of(name, values, lsb.get(name)) for name, values in columns.items()}
 
 
+def _put_on_grid(part: NDArray[np.float32], grid: np.float32) -> None:
+    """Round in place; a value of 2²³ steps or more is on the grid as it is."""
+    beyond = np.abs(part) >= grid * 2**23
+    if not beyond.any():
+        part /= grid
+        np.rint(part, out=part)
+        part *= grid
+        part += np.float32(0.0)
+    else:
+        within = ~beyond
+        part[within] = np.rint(part[within] / grid) * grid + np.float32(0.0)
+
+
 def stored(name: str, values: NDArray[np.floating], grid: float) -> NDArray[np.float32]:
     """Column as stored, wrong by half a step of its grid at most.
 
-    Replayed columns are also rounded to 4·10⁻⁵, evidence to 5·10⁻⁴ of each value, where that is coarser.
+    Replayed columns are also rounded to 2.5·10⁻⁴, evidence to 5·10⁻⁴, its estimates (δ̂, δ̄, their deviations) to 2·10⁻³ of each
+    value, where that is coarser.
 
     Parameters
     ----------
@@ -68,14 +91,13 @@ def stored(name: str, values: NDArray[np.floating], grid: float) -> NDArray[np.f
     grid : float
         From `grid_of`; 0 rounds to 32-bit floats alone.
     """
-    bits = 0 if ".p_" in name else _BITS.get(name.partition(".")[0], (0, 0))[1]
+    bits = 0 if ".p_" in name else _bits_of(name, (0, 0))[1]
     out = np.empty(len(values), np.float32)
     for i in range(0, len(out), _BLOCK):
         part = out[i : i + _BLOCK]
         part[:] = values[i : i + _BLOCK]
-        if grid:  # a value of 2²³ steps or more is on the grid as it is
-            within = np.abs(part) < grid * 2**23
-            part[within] = np.rint(part[within] / np.float32(grid)) * np.float32(grid) + 0.0
+        if grid:
+            _put_on_grid(part, np.float32(grid))
         if bits:
             half, kept = np.uint32(1 << (22 - bits)), np.uint32(0xFFFFFFFF << (23 - bits) & 0xFFFFFFFF)
             raw = part.view(np.uint32)

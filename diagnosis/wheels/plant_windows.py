@@ -95,9 +95,9 @@ def windows_of(drives: Sequence[Drive], hysteresis: float, lag: float, span: flo
             y = drive.y[::every, i]
             use = drive.moving[::every, i] & np.isfinite(y) & np.isfinite(drive.u[::every, i])
             usable = use & np.isfinite(x).all(axis=1)
-            found = normal_equations(np.nan_to_num(x), np.nan_to_num(y), usable, length)
+            found = normal_equations(x, y, usable, length)
             n = found.samples.size
-            power = np.where(use, np.nan_to_num(y) ** 2, 0.0)[: n * length].reshape(n, length).sum(axis=1)
+            power = np.where(use, y**2, 0.0)[: n * length].reshape(n, length).sum(axis=1)
             count = use[: n * length].reshape(n, length).sum(axis=1)
             driven = np.flatnonzero((count > 0.8 * length) & (power > count * (0.1 * span) ** 2))
             parts.append(found.part(driven))

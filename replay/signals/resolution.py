@@ -28,10 +28,10 @@ def rounding_step(values: Array) -> float:
     smallest = float(np.quantile(steps, 0.01))
     step = float(np.median(steps[steps < 1.5 * smallest]))
     multiple = steps / step
-    step *= float(np.sum(multiple * np.round(multiple)) / max(float(np.sum(np.round(multiple) ** 2)), 1e-300))
-    off = np.abs(steps / step - np.round(steps / step))
-    small = steps < 50 * step
-    return step if np.count_nonzero(small) >= 20 and float(np.mean(off[small] < 0.1)) > 0.97 else 0.0
+    whole = np.round(multiple)
+    step *= float(np.sum(multiple * whole) / max(float(np.sum(whole**2)), 1e-300))
+    small = steps[steps < 50 * step] / step
+    return step if small.size >= 20 and float(np.mean(np.abs(small - np.round(small)) < 0.1)) > 0.97 else 0.0
 
 
 def _first_known(values: Array, count: int) -> Array:

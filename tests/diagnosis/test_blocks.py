@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -18,11 +19,22 @@ from replay.simulation.options import SimulationOptions
 from replay.simulation.run import simulate_mission
 
 
-def log_of(folder: Path, evidence: str, scenario: str) -> Path:
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return tmp_path_factory.mktemp("logs")
+
+
+@cache
+def log_of(folder: Path, evidence: str) -> Path:
     path = folder / f"{evidence}.mcap"
-    options = SimulationOptions(scenario=scenario, seed=5, duration_s=40.0, evidence=evidence)  # type: ignore[arg-type]
+    options = SimulationOptions(scenario="random", seed=5, duration_s=40.0, evidence=evidence)  # type: ignore[arg-type]
     write_mission(simulate_mission(options), path, "mcap")
     return path
+
+
+@cache
+def in_one_piece(log: Path) -> MissionResult:
+    return diagnose([log], haulotte())
 
 
 def same(a: object, b: object, where: str = "") -> None:
@@ -48,9 +60,9 @@ def in_blocks_of(steps: int, log: Path, monkeypatch: pytest.MonkeyPatch) -> Miss
 
 
 @pytest.mark.parametrize("evidence", ["base", "direct"])
-def test_blocks_change_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, evidence: str) -> None:
-    log = log_of(tmp_path, evidence, "random")
-    whole, cut = diagnose([log], haulotte()), in_blocks_of(3_301, log, monkeypatch)
+def test_blocks_change_nothing(folder: Path, monkeypatch: pytest.MonkeyPatch, evidence: str) -> None:
+    log = log_of(folder, evidence)
+    whole, cut = in_one_piece(log), in_blocks_of(3_301, log, monkeypatch)
     assert whole.report["intervals"], "a mission without faults shows little"
     same(whole.report, cut.report)
     assert whole.columns.keys() == cut.columns.keys()
@@ -58,9 +70,9 @@ def test_blocks_change_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, 
         assert_allclose(cut.columns[name], values, rtol=1e-6, atol=1e-9, err_msg=name)
 
 
-def test_long_missions_show_envelopes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    log = log_of(tmp_path, "direct", "random")
-    whole = diagnose([log], haulotte())
+def test_long_missions_show_envelopes(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    log = log_of(folder, "direct")
+    whole = in_one_piece(log)
     monkeypatch.setattr(envelope, "FULL_STEPS", 10_000)
     monkeypatch.setattr(envelope, "_BUCKETS", 6_000)
     short = diagnose([log], haulotte())

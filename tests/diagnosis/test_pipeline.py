@@ -6,6 +6,7 @@ import ast
 import re
 from collections.abc import Mapping
 from dataclasses import replace
+from functools import cache
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -38,6 +39,7 @@ FAULTS = (
 SHIFT_NS = 86_400_000_000_000 + 7
 
 
+@cache
 def simulated(
     evidence: EvidenceLevel = "direct",
     faults: tuple[FaultSpec, ...] = FAULTS,
@@ -62,14 +64,19 @@ def in_memory(mission: SimulatedMission, shift_ns: int = 0, keep: str = "") -> M
     return Mission((), signals, align(signals))
 
 
+@cache
+def judged(evidence: EvidenceLevel) -> MissionResult:
+    return diagnose_mission(in_memory(simulated(evidence)), PAPER)
+
+
 @pytest.fixture(scope="module")
 def mission() -> SimulatedMission:
-    return simulated()
+    return simulated("direct")
 
 
 @pytest.fixture(scope="module")
-def result(mission: SimulatedMission) -> MissionResult:
-    return diagnose_mission(in_memory(mission), PAPER)
+def result() -> MissionResult:
+    return judged("direct")
 
 
 def document(result: MissionResult) -> dict[str, Any]:
@@ -105,8 +112,7 @@ def test_healthy_mission_at_full_rate_is_ready(seed: int) -> None:
 
 @pytest.mark.parametrize("evidence", ["direct", "base"])
 def test_shifting_the_clock_shifts_the_stamps_alone(evidence: EvidenceLevel) -> None:
-    logged = simulated(evidence)
-    here, there = (diagnose_mission(in_memory(logged, shift), PAPER) for shift in (0, SHIFT_NS))
+    here, there = judged(evidence), diagnose_mission(in_memory(simulated(evidence), SHIFT_NS), PAPER)
     first, second = document(here), document(there)
     assert second["log"].pop("start_ns") == first["log"].pop("start_ns") + SHIFT_NS
     assert len(first["intervals"]) > 0
@@ -133,10 +139,9 @@ def rounded(value: Any) -> Any:
 
 @pytest.mark.parametrize("evidence", ["direct", "base"])
 def test_permuting_the_wheels_permutes_the_result_alone(evidence: EvidenceLevel) -> None:
-    logged = simulated(evidence)
     order = ("RL", "FR", "RR", "FL")
-    straight = diagnose_mission(in_memory(logged), PAPER)
-    shuffled = diagnose_mission(in_memory(logged), replace(PAPER, wheels=order))
+    straight = judged(evidence)
+    shuffled = diagnose_mission(in_memory(simulated(evidence)), replace(PAPER, wheels=order))
     a, b = document(straight), document(shuffled)
     assert b["machine"]["wheels"] == list(order)
     assert len(a["intervals"]) > 0
@@ -151,26 +156,19 @@ def test_permuting_the_wheels_permutes_the_result_alone(evidence: EvidenceLevel)
         assert_allclose(shuffled.columns[name], x, rtol=1e-6, atol=1e-9, err_msg=name)
 
 
-def test_same_files_give_the_same_bytes_wherever_they_lie(tmp_path: Path) -> None:
-    logged = simulated()
-    reports = []
-    for folder in ("here", "over-there/deeper"):
-        path = tmp_path / folder / "mission.mcap"
+def test_same_files_give_the_same_bytes_at_any_time_wherever_they_lie(
+    tmp_path: Path, mission: SimulatedMission
+) -> None:
+    here, there = (tmp_path / folder / "mission.mcap" for folder in ("here", "over-there/deeper"))
+    for path in (here, there):
         path.parent.mkdir(parents=True)
-        write_mission(logged, path, "mcap")
-        reports.append(orjson.dumps(diagnose([path], PAPER).report))
-    assert reports[0] == reports[1]
-    text = reports[0].decode()
+        write_mission(mission, path, "mcap")
+    first, second, elsewhere = (orjson.dumps(diagnose([path], PAPER).report) for path in (here, here, there))
+    assert first == second == elsewhere
+    text = first.decode()
     assert str(tmp_path) not in text
     assert not re.search(r'"/(tmp|home|root|Users)/', text)
-    assert document(diagnose([path], PAPER))["log"]["files"][0]["path"] == "mission.mcap"
-
-
-def test_same_input_twice_gives_the_same_bytes(tmp_path: Path) -> None:
-    path = tmp_path / "mission.mcap"
-    write_mission(simulated(), path, "mcap")
-    first, second = (orjson.dumps(diagnose([path], PAPER).report) for _ in range(2))
-    assert first == second
+    assert orjson.loads(first)["log"]["files"][0]["path"] == "mission.mcap"
 
 
 def test_no_wall_time_in_the_report(mission: SimulatedMission, result: MissionResult) -> None:
@@ -181,10 +179,12 @@ def test_no_wall_time_in_the_report(mission: SimulatedMission, result: MissionRe
     assert all(first <= n <= last for n in stamps)
 
 
-def test_a_written_log_gives_what_its_signals_give(tmp_path: Path, mission: SimulatedMission) -> None:
+def test_a_written_log_gives_what_its_signals_give(
+    tmp_path: Path, mission: SimulatedMission, result: MissionResult
+) -> None:
     path = tmp_path / "m.mcap"
     write_mission(mission, path, "mcap")
-    read, held = diagnose([path], PAPER), diagnose_mission(in_memory(mission), PAPER)
+    read, held = diagnose([path], PAPER), result
     keys = ("component", "side", "mode")
     stated = [
         [(tuple(str(f[k]) for k in keys), f["start_s"]) for f in r.report["intervals"] if f["probability"] >= 0.9]
@@ -300,7 +300,7 @@ def check(value: Any, wanted: Any, place: str) -> None:
 
 @pytest.mark.parametrize("evidence", ["direct", "base"])
 def test_report_has_the_fields_of_its_schema(evidence: EvidenceLevel) -> None:
-    report = document(diagnose_mission(in_memory(simulated(evidence)), PAPER))
+    report = document(judged(evidence))
     check(report, FIELDS, "report")
     assert report["schema"] == "mfhca-report/1"
     for key in ("intervals", "states", "phases", "coverage", "signals", "quality", "readings"):

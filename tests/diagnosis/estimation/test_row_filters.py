@@ -9,14 +9,20 @@ from numpy.testing import assert_allclose
 from diagnosis.channels.sample_status import PAIR
 from diagnosis.estimation.fault_models import FIRST_NOISY, GAIN, MODELS, ROW_OF_MODEL, VALUE_ROWS, ModeModel
 from diagnosis.estimation.filter_kernel import FilterState, segment_evidence
+from diagnosis.estimation.joined_filters import Course, likelihoods
 from diagnosis.estimation.row_filters import RowFilter, models_of
 from diagnosis.estimation.samples import Samples
-from diagnosis.estimation.second_onset import channel_model, second_onset
+from diagnosis.estimation.second_onset import Readings, Second, channel_model, second_onsets
 from diagnosis.estimation.viterbi import forward, initial_state
 from replay.faults import State
 
 MODEL = ModeModel(noise=0.004, constant_noise=0.0005, tolerance=0.005, span=0.8, switch_cost=13.0, dt=0.001)
 FLOOR = -18.0 - np.log(MODEL.span)
+
+
+def second_onset(y: np.ndarray, x: np.ndarray, model: ModeModel, state: State) -> Second | None:
+    (found,) = second_onsets([Readings(y, x, model, state)])
+    return found
 
 
 def signals(seed: int, n: int = 160) -> tuple[np.ndarray, np.ndarray]:
@@ -38,6 +44,17 @@ def test_every_row_has_the_evidence_of_the_compiled_filters(seed: int) -> None:
         mine[ROW_OF_MODEL[m]] = max(mine[ROW_OF_MODEL[m]], total)
     samples = Samples.even(y, x, np.full(n, PAIR, np.int8), np.zeros(n, np.bool_))
     assert_allclose(segment_evidence(samples, MODEL), mine[:5], rtol=1e-9)
+
+
+def test_filters_that_are_stepped_together_give_what_each_gives_alone() -> None:
+    courses = []
+    for seed, n in ((1, 160), (2, 90), (3, 157)):
+        x, y = signals(seed, n)
+        courses += [Course(m, MODEL, y, x) for m in range(MODELS)]
+    for course, found in zip(courses, likelihoods(courses), strict=True):
+        one = RowFilter(course.m, course.model)
+        alone = [one.step(float(a), float(b)) for a, b in zip(course.y, course.x, strict=True)]
+        assert_allclose(found, alone, rtol=1e-9)
 
 
 def test_gains_are_those_of_the_compiled_filter() -> None:

@@ -22,11 +22,16 @@ def test_every_level_of_a_recorded_signal_is_found_again(lsb: float, levels: int
 
 
 @pytest.mark.parametrize(
-    ("name", "part"), [("wheel.FR.u", 2**-15), ("replay.FR.e", 2**-13), ("evidence.FR.sensor.residual", 2**-11)]
+    ("name", "part", "relative"),
+    [
+        ("wheel.FR.u", 2**-15, 1e-7),
+        ("replay.FR.e", 2**-12, 2**-12),
+        ("evidence.FR.sensor.residual", 2**-11, 2**-11),
+        ("evidence.FR.sensor.delta_std", 2**-9, 2**-9),
+    ],
 )
-def test_error_is_half_a_step_of_the_range(name: str, part: float) -> None:
+def test_error_is_half_a_step_of_the_range(name: str, part: float, relative: float) -> None:
     low, high = np.quantile(NOISE, [0.001, 0.999])
-    relative = {"wheel": 1e-7, "replay": 2**-15, "evidence": 2**-11}[name.partition(".")[0]]
     wrong = np.abs(stored(name, NOISE, grid_of(name, NOISE)) - NOISE)
     assert np.all(wrong <= part * (high - low) + relative * 1.01 * np.abs(NOISE))
     assert wrong.max() > part * (high - low) / 4
