@@ -45,3 +45,20 @@ def test_healthy_machines_are_not_stopped_and_mostly_cleared(all_clear: ModuleTy
     ]
     assert not any(o.status == "stop" for o in found)
     assert sum(o.status == "ready" for o in found) >= len(found) / 2
+
+
+def test_a_machine_of_other_physics_is_judged_alike(all_clear: ModuleType) -> None:
+    """Its steering valves answer behind a lag, in a log slower than its controller."""
+    names = [t.name for t in all_clear.troubles(60.0)]
+    for kind in (None, names.index("FR valve dead, whole")):
+        found = all_clear.run(all_clear.Task("hydrostatic", kind, 509, 60.0, ("base", "direct")))
+        assert [o.wrong_high for o in found] == [0, 0]
+        assert not any(o.outcome == "cleared" for o in found)
+
+
+def test_nobody_is_blamed_where_a_speed_loop_hunts(all_clear: ModuleType) -> None:
+    made = all_clear.hydrostatic.build(1002, hunting=True)
+    signals = all_clear.hydrostatic.signals(1002, (), 75.0, "base", hunting=True)
+    report = all_clear.diagnose_signals(signals, all_clear.hydrostatic.machine_of(made)).report
+    assert [f["id"] for f in report["intervals"] if f["severity"] != "info"] == []
+    assert report["verdict"]["title"] == "The wheels swing together"
