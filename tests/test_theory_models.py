@@ -248,13 +248,13 @@ def test_t15_the_evidence_of_a_block(mean: float, beside: float) -> None:
 
 def test_t15_the_chain_by_its_matrix() -> None:
     rng, n, states = np.random.default_rng(6), 40, response.STATES
-    assert states == 13
+    assert states == 17
     score, enters, leaves = rng.normal(0, 2, (n, states)), np.full(n, 0.25 / 120), np.full(n, 0.25 / 10)
     enters[20], leaves[20] = 0.1, 0.3
     chain = []
     for p, q in zip(enters, leaves, strict=True):
         A = np.diag(np.full(states, 1 - q))
-        A[0], A[1:, 0] = p / 12, q
+        A[0], A[1:, 0] = p / 16, q
         A[0, 0] = 1 - p
         assert A.sum(axis=1) == pytest.approx(1.0)
         chain.append(A)

@@ -64,19 +64,29 @@ def without_shared(paths: Mapping[int, WheelPath], found: Mapping[int, WheelFind
         return Swings(dict(found), ())
     width = max(1, round(_MEAN_S / next(iter(paths.values())).dt))
     apart = {i: _means(p, width) for i, p in paths.items()}
-    others = {i: {j: a for j, a in apart.items() if j != i} for i in apart}
-    shared = {i: [f for f in noisy[i] if _shared(f, apart[i], others[i], noisy, width)] for i in found}
+    shared: dict[int, list[Finding]] = {}
+    for i in found:
+        for f in noisy[i]:
+            # What a wheel with another fault deviates by says nothing of the machine.
+            others = {j: a for j, a in apart.items() if j != i and not _other_fault(found[j], f)}
+            if len(others) >= _OTHERS and _shared(f, apart[i], others, noisy, width):
+                shared.setdefault(i, []).append(f)
     level = max((_size(f, apart[i], width) for i, fs in shared.items() for f in fs), default=0.0)
     out, spans = {}, []
     for i, wheel in found.items():
         # What swings no further than the machine does elsewhere in the mission is no proof of a fault either.
-        taken = [f for f in noisy[i] if any(f is s for s in shared[i]) or _size(f, apart[i], width) <= level]
+        taken = [f for f in noisy[i] if any(f is s for s in shared.get(i, [])) or _size(f, apart[i], width) <= level]
         for f in taken:
             spans.append((f.start * paths[i].dt, f.stop * paths[i].dt))
             for flags in (*wheel.opened.values(), *wheel.unexplained.values()):
                 flags[f.start : f.stop] = True
         out[i] = replace(wheel, findings=[f for f in wheel.findings if not any(f is s for s in taken)])
     return Swings(out, tuple(sorted(spans)))
+
+
+def _other_fault(wheel: WheelFindings, f: Finding) -> bool:
+    """Whether a wheel has a fault of another row at the time of a finding."""
+    return any(not g.mode.varying and g.start < f.stop and f.start < g.stop for g in wheel.findings)
 
 
 def _size(f: Finding, own: Array, width: int) -> float:

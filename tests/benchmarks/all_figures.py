@@ -134,7 +134,7 @@ def page(kept: dict[str, dict[str, Any]]) -> str:
         f"| [{f.subject}](#{_anchor(f)}) | `{one['command']}` | {one['units']:.0f} | {one['unit_s']:.3f} s | {one['date']} |"
         for f, one in known
     ]
-    parts = [f"## {_anchor(f)}\n\n```\n" + "\n".join(one["lines"]) + "\n```\n" for f, one in known]
+    parts = [f"## {_anchor(f)}\n\n```text\n" + "\n".join(one["lines"]) + "\n```\n" for f, one in known]
     missing = [f"`{f.command}`" for f in FIGURES if f.script not in kept]
     rest = f"\nNot run yet: {', '.join(missing)}.\n" if missing else ""
     return _HEAD + "\n".join(rows) + "\n" + rest + "\n" + "\n".join(parts)

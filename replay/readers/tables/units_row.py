@@ -30,7 +30,11 @@ def units_of_row(line: str, separator: str, names: Sequence[str]) -> tuple[str, 
     names : Sequence[str]
         The columns.
     """
-    cells = [c.strip().strip("[]()").strip() for c in next(csv.reader([line], delimiter=separator), [])]
+    try:
+        row = next(csv.reader([line], delimiter=separator), [])
+    except csv.Error:  # a line that ends within, or holds what no line of a table may
+        return None
+    cells = [c.strip().strip("[]()").strip() for c in row]
     written = [c for c in cells if c]
     sure = [c for c in written if c != "-" and (c in _TIMES or known_unit(c) is not None)]
     units = len(sure) + sum(c in _OTHERS and c not in sure for c in written)

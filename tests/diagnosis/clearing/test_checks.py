@@ -74,7 +74,7 @@ def test_an_axle_that_is_not_steered_is_not_cleared() -> None:
     ]
     assert check.worst is None
     assert not check.passed
-    assert "does not show" in check.text
+    assert "leaves the check" in check.text
 
 
 def test_the_limit_follows_the_machine_file() -> None:
