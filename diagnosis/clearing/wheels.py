@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from diagnosis.clearing.cells import Array, Cells
 from diagnosis.clearing.measure import compared, lasts, late, lowest_passed, worst
+from diagnosis.clearing.wild import wild_readings
 from diagnosis.results.clearing import Check, Checked
 from diagnosis.results.vocabulary import Kind
 from replay.faults import Side
@@ -47,6 +48,7 @@ def wheel_checks(cells: Cells, clear_at: float) -> Iterator[Checked]:
     responses = responses_of(cells, speed, used, reference)
     windows, lasting = responses.windows, responses.usual
     tracking, rough = _tracking(cells, speed, reference), _rough_beside_others(roughness_of(cells, speed))
+    rough = np.fmax(rough, wild_readings(cells, speed, FLOOR * cells.machine.max_speed))
     delays = late(speed, reference, cells.dt)
     either, share = Side.SENSOR_OR_ACTUATOR, -np.log1p(-clear_at)
     top = cells.machine.max_speed

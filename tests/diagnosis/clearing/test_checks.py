@@ -105,3 +105,14 @@ def _with_yaw_rate(mission: SimulatedMission) -> SimulatedMission:
     group = next(g for g in mission.slow if "imu.yaw_rate" in g.columns)
     rate = np.interp(mission.stamps, group.stamps, group.columns["imu.yaw_rate"])
     return replace(mission, columns={**mission.columns, "imu.yaw_rate": rate})
+
+
+def test_readings_that_stand_out_by_themselves_do_not_clear() -> None:
+    """They are too brief for any mean to show."""
+    mission = simulated()
+    y = mission.columns["wheel.RR.v"].copy()
+    rng = np.random.default_rng(4)
+    y[rng.random(y.size) < 0.03] += 0.3
+    found = checks_by_part(replace(mission, columns={**mission.columns, "wheel.RR.v": y}), base=True)
+    assert not found["RR", "sensor", Check.ROUGHNESS].passed
+    assert found["RL", "sensor", Check.ROUGHNESS].passed

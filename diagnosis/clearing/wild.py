@@ -1,0 +1,49 @@
+"""Readings that stand out by themselves: a wheel's inertia forbids that its speed leaves both readings beside it at once."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from diagnosis.clearing.cells import Array, Cells
+
+_NOISES, _OF_TOP = 8.0, 0.1  # times the usual noise, and share of the top speed, from which on a reading is wild
+_FEW = 3  # in a window: fewer are a recorder's
+
+
+def wild_readings(cells: Cells, speed: Array, floor: float) -> Array:
+    """Mean height of the wild readings of each wheel as a share of its speed; 0 where there are few.
+
+    Parameters
+    ----------
+    cells : Cells
+        The mission.
+    speed : Array, shape (cells, wheels)
+        Mean speeds [m/s].
+    floor : float
+        Least speed of which the height is a share [m/s].
+
+    Returns
+    -------
+    Array, shape (windows, wheels)
+    """
+    frame = cells.frame
+    height, count = np.zeros(speed.shape), np.zeros(speed.shape)
+    for i, wheel in enumerate(cells.machine.wheels):
+        name = f"wheel.{wheel}.v"
+        y = cells.timeline.get(name)
+        if y is None:
+            continue
+        at = np.flatnonzero(cells.timeline.fresh[name] & np.isfinite(y))
+        v = y[at]
+        if v.size < _FEW:
+            continue
+        before, after = v[1:-1] - v[:-2], v[1:-1] - v[2:]
+        alone = np.where(before * after > 0.0, np.minimum(np.abs(before), np.abs(after)), 0.0)
+        usual = float(np.median(np.abs(before + after))) / 0.6745 / np.sqrt(6.0)
+        wild = alone > max(_NOISES * usual, _OF_TOP * cells.machine.max_speed)
+        cell = at[1:-1][wild] // cells.width
+        height[:, i] = np.bincount(cell, alone[wild], minlength=cells.size)
+        count[:, i] = np.bincount(cell, minlength=cells.size)
+    many = frame.sums(count)
+    mean = frame.sums(height) / np.maximum(many, 1.0)
+    return np.asarray(np.where(many >= _FEW, mean / np.maximum(np.nan_to_num(frame.rms(speed)), floor), 0.0))
