@@ -1,4 +1,4 @@
-"""CPU time and memory of reading a log whole; run as `python tests/benchmarks/reading.py --folder FOLDER`.
+"""CPU time and memory of reading a log whole; run as `python tests/benchmarks/reading.py [--folder FOLDER]`.
 
 The log is the benchmark's: JointState of six and TwistStamped at 1 kHz, Odometry at 100 Hz. Every reader brings every
 number into NumPy, in a process of its own; all figures of one run are comparable, those of two runs are not. The floor
@@ -13,6 +13,7 @@ import resource
 import statistics
 import subprocess
 import sys
+import tempfile
 import threading
 import time
 from pathlib import Path
@@ -130,7 +131,7 @@ def table(arguments: argparse.Namespace) -> None:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--folder", type=Path, help="where the logs are made and kept")
+    parser.add_argument("--folder", type=Path, help="where the logs are made and kept; default: made anew")
     parser.add_argument("--duration", type=float, default=120.0, help="length of the log [s]")
     parser.add_argument("--repeats", type=int, default=7, help="runs per figure")
     parser.add_argument("--slow", type=int, default=3, help="runs per figure of rosbags and mcap-ros2")
@@ -144,7 +145,9 @@ def main() -> None:
     if arguments.child:
         child(arguments.child, arguments.log, arguments.repeats, arguments.memory)
     elif arguments.folder is None:
-        parser.error("--folder is needed")
+        with tempfile.TemporaryDirectory() as folder:
+            arguments.folder = Path(folder)
+            table(arguments)
     else:
         table(arguments)
 
