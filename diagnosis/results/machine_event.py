@@ -51,3 +51,10 @@ def swinging(text: str) -> MachineEvent:
     doubt = "the {wheels} swing together for a time"
     act = "lower the gains of the speed loop, inspect the supply of the drives, and record a mission again"
     return MachineEvent("The {wheels} swing together", text, doubt, act)
+
+
+def foreign(text: str) -> MachineEvent:
+    """Most wheels deviate now and then from a wheel model that does not fit the machine."""
+    doubt = "most {wheels} deviate now and then from what the {wheel} model expects"
+    act = "record {valve} positions (wheel.<W>.u_applied), or give the machine's [plant], and diagnose again"
+    return MachineEvent("The {wheel} model does not fit this machine", text, doubt, act)

@@ -12,6 +12,7 @@ from diagnosis.channels.sample_status import PAIR
 from diagnosis.results.assessment import Assessment
 from diagnosis.results.evidence_columns import Pictured, steps_of
 from diagnosis.results.loss import Loss
+from diagnosis.results.machine_event import MachineEvent, foreign, swinging
 from diagnosis.results.vocabulary import Tier
 from diagnosis.wheels.blocks import WheelBlocks, blocks_of, per_sample
 from diagnosis.wheels.effectiveness import relative_losses
@@ -22,6 +23,7 @@ from diagnosis.wheels.following import Following, follow
 from diagnosis.wheels.frames.features import mission_features
 from diagnosis.wheels.inputs import WheelsData
 from diagnosis.wheels.looks import second_look
+from diagnosis.wheels.many_weak import without_many_weak
 from diagnosis.wheels.models import ODD, JointModel, WheelFilterModel
 from diagnosis.wheels.readings import with_readings
 from diagnosis.wheels.run_kernel import evidence_of_runs
@@ -36,10 +38,10 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class WheelsJudged:
-    """Sensor and actuator by wheel, and a sentence about what all wheels do together; empty where there is nothing to say."""
+    """Sensor and actuator by wheel, and what is the machine's rather than any part's."""
 
     parts: dict[int, tuple[Assessment, Assessment]]
-    shared: str
+    events: tuple[MachineEvent, ...]
 
 
 def assess_wheels(data: WheelsData, limits: Limits, *, gains: bool) -> WheelsJudged:
@@ -72,11 +74,15 @@ def assess_wheels(data: WheelsData, limits: Limits, *, gains: bool) -> WheelsJud
         if wheel is not None
     }
     swings = without_shared(paths, {i: findings_of(path, limits) for i, path in paths.items()})
+    doubted = without_many_weak(swings.found)
     out = {}
     for i, path in paths.items():
-        sensor, actuator = _assessments(data, i, path, swings.found[i], gains=gains)
+        sensor, actuator = _assessments(data, i, path, doubted.found[i], gains=gains)
         out[i] = sensor, actuator if data.measured[i] else replace(actuator, loss=losses[i])
-    return WheelsJudged(out, swings.sentence)
+    events = ((swinging(swings.sentence),) if swings.spans else ()) + (
+        (foreign(doubted.sentence),) if doubted.wheels else ()
+    )
+    return WheelsJudged(out, events)
 
 
 def _losses(data: WheelsData, limits: Limits) -> list[Loss | None]:

@@ -6,7 +6,6 @@ from dataclasses import replace
 
 from diagnosis.evidence import ACTUATOR, SENSOR, Contribution, MissionView, Part
 from diagnosis.results.assessment import Assessment
-from diagnosis.results.machine_event import swinging
 from diagnosis.results.vocabulary import Tier
 from diagnosis.wheels.assess import assess_wheels
 from diagnosis.wheels.body import measured_body
@@ -56,7 +55,7 @@ class WheelEvidence:
                 "follow them, and they were left out."
             )
         noted = {part: replace(a, notes=(*a.notes, *said)) for part, a in parts.items()}
-        return Contribution(noted, model=fit, events=(swinging(judged.shared),) if judged.shared else ())
+        return Contribution(noted, model=fit, events=judged.events)
 
 
 def _channels(mission: MissionView) -> WheelChannels:
