@@ -8,12 +8,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from diagnosis.channels.standstill import not_followed
 from diagnosis.response.beside import Bodies, same_side, views
 from diagnosis.response.body import BodySpeed
-from diagnosis.response.channel import Samples, holds_of, samples_of
+from diagnosis.response.channel import Samples, holds_of, samples_of, without_holds
+from diagnosis.response.common_cause import consequence, spans_of, standing, without_consequences
 from diagnosis.response.drive import unanswered
-from diagnosis.response.effort import idle_drives, shares_of
+from diagnosis.response.effort import idle_drives, own_pull, shares_of
 from diagnosis.response.findings import Wheel, finding_of, spikes_of
 from diagnosis.response.identification import Response, identify_response, without_command
 from diagnosis.response.inputs import FollowerData, cell_of, cells
@@ -98,11 +98,8 @@ def assess_response(
         return Judgement({}, ())
     width, cell = max(1, round(BLOCK_S / dt)), cell_of(dt)
     drives = list(data.values())
-    idle = not_followed([d.y for d in drives], [d.asked for d in drives], limits.driving_speed, dt)
-    size = drives[0].y.size
-    left_out = np.zeros(size, np.bool_)
-    for start, stop in idle:
-        left_out[start:stop] = True
+    left_out = standing(data, limits.driving_speed, dt)
+    idle = spans_of(np.logical_or.reduce(list(left_out.values())))
     found = _wheels(data, left_out, (cell, width), limits, dt)
     if not found:
         return Judgement({}, standstills(idle, dt) or unexplained(drives, limits, dt))
@@ -115,16 +112,17 @@ def assess_response(
     pulls = shares_of(
         found, efforts, {w: tuple(o for o in found if o != w and same_side(w, o, geometry)) for w in found}
     )
-    found = {w: j._replace(wheel=j.wheel._replace(pull=pulls.get(w))) for w, j in found.items()}
+    found = {w: j._replace(wheel=j.wheel._replace(pull=own_pull(j, efforts.get(w), pulls.get(w)))) for w, j in found.items()}
     names = {w: j.data.name for w, j in found.items()}
     beside, left_notes = views(names, {w: j.wheel.blocks for w, j in found.items()}, geometry, bodies)
     judged = {w: _judge(j, beside.get(w), dt, width) for w, j in found.items()}
-    kept = {w: [s for s in j.spells if not others_fault(s, w, judged)] for w, j in judged.items()}
+    kept = {w: [s for s in j.spells if not others_fault(s, w, judged) and not consequence(s, w, judged)] for w, j in judged.items()}
     least = max(1, round(_LEAST_S / BLOCK_S))
     kept = {w: where_asked(spells, _asked(judged[w], limits), least) for w, spells in kept.items()}
     together = held_back_together(judged)
     weak = {w: _drives(w, judged, beside, pulls.get(w), width * dt) for w in judged}
-    parts = {w: _sides(j, kept[w], weak[w], (left_out, together), limits, dt) for w, j in judged.items()}
+    weak = {w: without_consequences(found, w, judged, width) for w, found in weak.items()}
+    parts = {w: _sides(j, kept[w], weak[w], (left_out[w], together), limits, dt) for w, j in judged.items()}
     remarks = (*otherwise(judged, width * dt), *left_notes)
     doubts = {w: j.joint.unlike for w, j in judged.items() if j.joint is not None and j.joint.unlike}
     for w, text in (doubts | unlike(judged)).items():
@@ -144,17 +142,17 @@ def _doubted(sensor: Assessment, why: str) -> Assessment:
 
 
 def _wheels(
-    data: Mapping[str, FollowerData], hidden: Flags, steps: tuple[int, int], limits: Limits, dt: float
+    data: Mapping[str, FollowerData], hidden: Mapping[str, Flags], steps: tuple[int, int], limits: Limits, dt: float
 ) -> dict[str, Judged]:
     """Wheels whose response could be found, with their blocks; nothing is judged yet."""
     cell, width = steps
     out: dict[str, Judged] = {}
     channels: dict[str, tuple[Samples, Response | None]] = {}
     for w, d in data.items():
-        y = np.where(hidden, np.nan, d.y)
+        y = np.where(hidden[w], np.nan, d.y)
         samples = samples_of(y, d.fresh)
         y[samples.step[samples.wild]] = np.nan
-        channels[w] = samples, identify_response(cells(y, cell), d.commands, cell * dt, limits.driving_speed)
+        channels[w] = samples, _response(y, samples, d, cell, limits, dt)
     several = sum(found is not None for _, found in channels.values()) >= _LEAST_OTHERS
     for w, d in data.items():
         y, (samples, found) = d.y, channels[w]
@@ -171,6 +169,17 @@ def _wheels(
         wheel = Wheel(d.name, samples, blocks, jumps, dt, "")
         out[w] = Judged(d, response, wheel, driving, np.zeros((0, STATES)), [], None, calm, alone=len(data) == 1)
     return out
+
+
+def _response(
+    y: Array, samples: Samples, data: FollowerData, cell: int, limits: Limits, dt: float
+) -> Response | None:
+    """Response of a drive; a speed that is held for long says nothing of it, unless hardly any other is left."""
+    for source in (without_holds(y, samples, limits.driving_speed, dt), y):
+        found = identify_response(cells(source, cell), data.commands, cell * dt, limits.driving_speed)
+        if found is not None:
+            return found
+    return None
 
 
 def _judge(one: Judged, beside: Beside | None, dt: float, width: int) -> Judged:

@@ -25,8 +25,7 @@ _ONE_JUMP, _TWO_JUMPS = 0.92, 0.97
 _EITHER = 0.6  # that it is the sensor's, up to which its side is left open
 _LEAST_PULLS, _AS_USUAL = 8, (0.6, 1.5)  # blocks with an effort, and its size by the usual one
 _MOVING = 0.2  # of the usual speed
-_SHARP_S = 0.035  # between readings: a wheel that jams, or comes free, takes about as long
-_BLUNT = 0.5, 0.9  # that one jump, or two, between readings further apart are the sensor's
+_SHARP_S = 0.012  # between readings: a wheel that jams, or comes free, takes longer
 _WHOLE = 0.75  # of the speed: what rises, or falls, by less from one reading to the next is no whole jump
 _IN_SHARE, _VARIES = 0.06, 0.2  # misfit of a share of another speed, and how much that varies, by its own size
 _LOUD = 2.0  # times the usual change from reading to reading, the other wheels' at that time included
@@ -143,13 +142,14 @@ def _silent(spell: Spell, wheel: Wheel, first: int, last: int, speed: Array | No
     begin = first if fell is None else int(wheel.samples.step[fell])
     end = last if rose is None else int(wheel.samples.step[rose])
     texts = [f"{wheel.name} read 0 for {(end - begin) * wheel.dt:.2f} s while its command asked for motion."]
-    sensor = _by_jumps(wheel, (fell is not None) + (rose is not None))
+    # a wheel that comes free leaps ahead, for its loop has wound up
+    sensor = _by_jumps(wheel, 0 if fell is None else 1 + (rose is not None))
     if fell is not None or rose is not None:
         texts.append(
             "It fell to 0, or rose from it, from one reading to the next"
             + (
                 ": no drive stops or starts like that."
-                if wheel.sharp
+                if wheel.sharp and fell is not None
                 else ", and readings are too far apart to tell a jam from that."
             )
         )
@@ -164,7 +164,8 @@ def _silent(spell: Spell, wheel: Wheel, first: int, last: int, speed: Array | No
         texts.append("Its drive pulls as usual, as it does not where a {wheel} is held, or the drive has no power.")
     if sensor <= _EITHER:
         texts.append(
-            "Without a sharp jump or another view of this {wheel}, one that stands still and a dead sensor cannot be distinguished."
+            "Without a sharp jump or another view of this {wheel}, one that stands still and a dead sensor cannot be distinguished; readings "
+            "100 times a second, the position of its joint, or {or_view}the drive's effort would tell them apart."
         )
     sat = Sat(0.0, 0.0, 0.0, 0.0, "m/s")
     return _finding(
@@ -180,8 +181,7 @@ def _pulls_as_usual(wheel: Wheel, part: slice) -> bool:
 
 def _by_jumps(wheel: Wheel, jumps: int) -> float:
     """Probability that what begins, or ends, within one reading is the sensor's [1]."""
-    sure = (_ONE_JUMP, _TWO_JUMPS) if wheel.sharp else _BLUNT
-    return (0.5, *sure)[jumps]
+    return (0.5, _ONE_JUMP, _TWO_JUMPS)[jumps] if wheel.sharp else 0.5
 
 
 def _whole_jump(wheel: Wheel, expected: Array, at: int, ratio: float) -> int | None:
