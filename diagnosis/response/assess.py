@@ -112,11 +112,16 @@ def assess_response(
     pulls = shares_of(
         found, efforts, {w: tuple(o for o in found if o != w and same_side(w, o, geometry)) for w in found}
     )
-    found = {w: j._replace(wheel=j.wheel._replace(pull=own_pull(j, efforts.get(w), pulls.get(w)))) for w, j in found.items()}
+    found = {
+        w: j._replace(wheel=j.wheel._replace(pull=own_pull(j, efforts.get(w), pulls.get(w)))) for w, j in found.items()
+    }
     names = {w: j.data.name for w, j in found.items()}
     beside, left_notes = views(names, {w: j.wheel.blocks for w, j in found.items()}, geometry, bodies)
     judged = {w: _judge(j, beside.get(w), dt, width) for w, j in found.items()}
-    kept = {w: [s for s in j.spells if not others_fault(s, w, judged) and not consequence(s, w, judged)] for w, j in judged.items()}
+    kept = {
+        w: [s for s in j.spells if not others_fault(s, w, judged) and not consequence(s, w, judged)]
+        for w, j in judged.items()
+    }
     least = max(1, round(_LEAST_S / BLOCK_S))
     kept = {w: where_asked(spells, _asked(judged[w], limits), least) for w, spells in kept.items()}
     together = held_back_together(judged)
@@ -171,11 +176,9 @@ def _wheels(
     return out
 
 
-def _response(
-    y: Array, samples: Samples, data: FollowerData, cell: int, limits: Limits, dt: float
-) -> Response | None:
+def _response(y: Array, samples: Samples, data: FollowerData, cell: int, limits: Limits, dt: float) -> Response | None:
     """Response of a drive; a speed that is held for long says nothing of it, unless hardly any other is left."""
-    for source in (without_holds(y, samples, limits.driving_speed, dt), y):
+    for source in (without_holds(y, samples, dt), y):
         found = identify_response(cells(source, cell), data.commands, cell * dt, limits.driving_speed)
         if found is not None:
             return found
@@ -220,10 +223,15 @@ def _habit(wheel: str, holds: Mapping[str, Array]) -> float:
 
 
 def _asked(one: Judged, limits: Limits) -> Flags:
-    """Blocks in which the wheel must move, by its command or by the wheels beside it, shape (b,)."""
+    """Blocks in which the wheel must move, by its command or by another view, shape (b,).
+
+    Where it has a command only a view of this very wheel counts beside it: one that stands as it is told does nothing wrong.
+    """
     blocks, least = one.wheel.blocks, _MOVES * limits.driving_speed
     asked = (blocks.low > least) | (blocks.high < -least)
-    return asked if one.speed is None else asked | (np.abs(np.nan_to_num(one.speed)) > least)
+    if one.speed is None or (one.response.answered and not one.wheel.own):
+        return asked
+    return asked | (np.abs(np.nan_to_num(one.speed)) > least)
 
 
 def _sides(

@@ -83,7 +83,7 @@ def holds_of(samples: Samples, still: float, dt: float) -> Array:
     return np.asarray(np.sort(length)[::-1], dtype=np.float64)
 
 
-def without_holds(y: Array, samples: Samples, still: float, dt: float) -> Array:
+def without_holds(y: Array, samples: Samples, dt: float) -> Array:
     """Readings without those of times in which a moving speed is one value for long, NaN instead; shape of `y`.
 
     Parameters
@@ -92,13 +92,11 @@ def without_holds(y: Array, samples: Samples, still: float, dt: float) -> Array:
         Readings [m/s].
     samples : Samples
         New samples of it.
-    still : float
-        What counts as standstill [m/s].
     dt : float
         Step [s].
     """
     out = y.copy()
-    held = samples.same & (np.abs(samples.value) > still)
+    held = samples.same & (samples.value != 0.0)
     edge = np.flatnonzero(np.diff(np.r_[False, held, False].astype(np.int8)))
     for a, b in zip(edge[::2].tolist(), edge[1::2].tolist(), strict=True):
         first, last = int(samples.step[a]), int(samples.step[b - 1])

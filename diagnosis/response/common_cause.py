@@ -101,8 +101,10 @@ def without_consequences(
 
 def _evident(spell: Spell, one: Judged) -> bool:
     """Whether the channel shows by itself that it is wrong, without any command or other wheel."""
-    return spell.own or spell.mode in (FaultMode.STUCK, FaultMode.NOISY) or (
-        spell.mode is FaultMode.NO_SIGNAL and jumped(one, spell)
+    return (
+        spell.own
+        or spell.mode in (FaultMode.STUCK, FaultMode.NOISY)
+        or (spell.mode is FaultMode.NO_SIGNAL and jumped(one, spell))
     )
 
 

@@ -24,6 +24,7 @@ _SENSOR = 0.96  # that what a channel alone shows is the sensor's
 _ONE_JUMP, _TWO_JUMPS = 0.92, 0.97
 _EITHER = 0.6  # that it is the sensor's, up to which its side is left open
 _LEAST_PULLS, _AS_USUAL = 8, (0.6, 1.5)  # blocks with an effort, and its size by the usual one
+_CHANGES = 0.1  # of the readings, as a dead sensor's do not
 _MOVING = 0.2  # of the usual speed
 _SHARP_S = 0.012  # between readings: a wheel that jams, or comes free, takes longer
 _WHOLE = 0.75  # of the speed: what rises, or falls, by less from one reading to the next is no whole jump
@@ -162,6 +163,9 @@ def _silent(spell: Spell, wheel: Wheel, first: int, last: int, speed: Array | No
     if sensor < _SENSOR and _pulls_as_usual(wheel, part):
         sensor = _SENSOR
         texts.append("Its drive pulls as usual, as it does not where a {wheel} is held, or the drive has no power.")
+    if _lives(wheel, begin, end):
+        sensor = min(sensor, 0.5)
+        texts.append("Its readings, small as they are, still change: a dead sensor's do not.")
     if sensor <= _EITHER:
         texts.append(
             "Without a sharp jump or another view of this {wheel}, one that stands still and a dead sensor cannot be distinguished; readings "
@@ -171,6 +175,12 @@ def _silent(spell: Spell, wheel: Wheel, first: int, last: int, speed: Array | No
     return _finding(
         begin, max(end, begin + 1), FaultMode.NO_SIGNAL, spell.p, Epsilon(1.0, 1.0, 1.0), sat, tuple(texts), sensor
     )
+
+
+def _lives(wheel: Wheel, begin: int, end: int) -> bool:
+    """Whether readings in steps [begin, end) change now and then, as those of a dead sensor do not."""
+    inside = (wheel.samples.step > begin) & (wheel.samples.step < end) & np.isfinite(wheel.samples.change)
+    return bool(inside.any() and np.mean(~wheel.samples.same[inside]) > _CHANGES)
 
 
 def _pulls_as_usual(wheel: Wheel, part: slice) -> bool:
