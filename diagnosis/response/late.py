@@ -54,8 +54,7 @@ class Past(NamedTuple):
 def pasts_of(one: Judged, block_s: float) -> list[Past]:
     """Command and other view of a wheel, with usual misfits found in the mission."""
     blocks = one.wheel.blocks
-    expected = 0.5 * (blocks.low + blocks.high)
-    views = [expected] if one.response.answered else []
+    views = [0.5 * (blocks.low + blocks.high)] if one.response.answered else []
     if one.speed is not None:
         views.append(one.speed)
     return [_past(blocks.mean, v, one.driving, block_s) for v in views if np.isfinite(v).any()]
