@@ -2,34 +2,30 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from diagnosis.channels.standstill import not_followed
 from diagnosis.response.beside import Bodies, same_side, views
 from diagnosis.response.body import BodySpeed
-from diagnosis.response.channel import Samples, holds_of, samples_of
+from diagnosis.response.channel import Samples, holds_of, samples_of, without_holds
+from diagnosis.response.common_cause import consequence, spans_of, standing, without_consequences
 from diagnosis.response.drive import unanswered
-from diagnosis.response.effort import idle_drives, shares_of
-from diagnosis.response.findings import Wheel, finding_of, spikes_of
+from diagnosis.response.effort import idle_drives, own_pull, shares_of
+from diagnosis.response.findings import Wheel
 from diagnosis.response.identification import Response, identify_response, without_command
 from diagnosis.response.inputs import FollowerData, cell_of, cells
 from diagnosis.response.joint import cut, joint_of
 from diagnosis.response.jumps import jumps_of
 from diagnosis.response.kernel import posterior
+from diagnosis.response.late import late_neighbour, late_wheels, smallest_delay
 from diagnosis.response.machine import Judged, lasting_losses, otherwise, standstills, unexplained, unlike
 from diagnosis.response.models import (
     BLOCK_S,
-    HEALTHY,
-    LEAST_P,
     MEAN_FAULTY_S,
     MEAN_HEALTHY_S,
-    NOISY,
-    OTHER,
-    SILENT,
     STATES,
     Beside,
     blocks_of,
@@ -37,10 +33,9 @@ from diagnosis.response.models import (
 )
 from diagnosis.response.power import powers_of
 from diagnosis.response.rivals import by_each_other, held_back_together, jumped, others_fault, shared
-from diagnosis.response.spells import Spell, spells_of, where_asked
+from diagnosis.response.sides import sides_of
+from diagnosis.response.spells import spells_of, where_asked
 from diagnosis.results.assessment import CODE, Assessment, Finding
-from diagnosis.results.evidence_columns import Pictured, steps_of
-from diagnosis.results.vocabulary import Tier
 from replay.faults import State
 from replay.machine.config import Limits
 from replay.machine.geometry import Geometry
@@ -54,11 +49,6 @@ _OWN, _OTHERS = 4, 2  # holds of a channel that may be faults: of the one in que
 _LEAST_S = 1.0
 _LEAST_OTHERS = 2  # wheels that answer, beside one that does not
 _BODY_COMMANDS = 2  # speed and yaw rate
-_AT_ONCE_S = 5e-3
-_DOUBT_S = 0.5  # around a spell that is judged no fault
-_HIDDEN = "a controller that holds the speed hides a weak drive, and their healthy effort is not known"
-_ALONE = "a controller that holds the speed hides a weak drive; name its current, duty or torque as its command (`wheel.{name}.u`) to have it judged"
-_UNSEEN = "without its command or another {wheel} of its side only a speed that is frozen, wild or noisy shows"
 
 
 @dataclass(frozen=True)
@@ -98,11 +88,8 @@ def assess_response(
         return Judgement({}, ())
     width, cell = max(1, round(BLOCK_S / dt)), cell_of(dt)
     drives = list(data.values())
-    idle = not_followed([d.y for d in drives], [d.asked for d in drives], limits.driving_speed, dt)
-    size = drives[0].y.size
-    left_out = np.zeros(size, np.bool_)
-    for start, stop in idle:
-        left_out[start:stop] = True
+    left_out = standing(data, limits.driving_speed, dt)
+    idle = spans_of(np.logical_or.reduce(list(left_out.values())))
     found = _wheels(data, left_out, (cell, width), limits, dt)
     if not found:
         return Judgement({}, standstills(idle, dt) or unexplained(drives, limits, dt))
@@ -115,16 +102,26 @@ def assess_response(
     pulls = shares_of(
         found, efforts, {w: tuple(o for o in found if o != w and same_side(w, o, geometry)) for w in found}
     )
-    found = {w: j._replace(wheel=j.wheel._replace(pull=pulls.get(w))) for w, j in found.items()}
+    found = {
+        w: j._replace(wheel=j.wheel._replace(pull=own_pull(j, efforts.get(w), pulls.get(w)))) for w, j in found.items()
+    }
     names = {w: j.data.name for w, j in found.items()}
     beside, left_notes = views(names, {w: j.wheel.blocks for w, j in found.items()}, geometry, bodies)
     judged = {w: _judge(j, beside.get(w), dt, width) for w, j in found.items()}
-    kept = {w: [s for s in j.spells if not others_fault(s, w, judged)] for w, j in judged.items()}
+    kept = {
+        w: [s for s in j.spells if not others_fault(s, w, judged) and not consequence(s, w, judged)]
+        for w, j in judged.items()
+    }
     least = max(1, round(_LEAST_S / BLOCK_S))
     kept = {w: where_asked(spells, _asked(judged[w], limits), least) for w, spells in kept.items()}
     together = held_back_together(judged)
     weak = {w: _drives(w, judged, beside, pulls.get(w), width * dt) for w in judged}
-    parts = {w: _sides(j, kept[w], weak[w], (left_out, together), limits, dt) for w, j in judged.items()}
+    weak = {w: without_consequences(found, w, judged, width) for w, found in weak.items()}
+    late = late_wheels(judged, width * dt)
+    kept = {w: [x for x in spells if not late_neighbour(x, w, late, width)] for w, spells in kept.items()}
+    parts = {
+        w: sides_of(j, kept[w], (weak[w], late[w]), (left_out[w], together), limits, dt) for w, j in judged.items()
+    }
     remarks = (*otherwise(judged, width * dt), *left_notes)
     doubts = {w: j.joint.unlike for w, j in judged.items() if j.joint is not None and j.joint.unlike}
     for w, text in (doubts | unlike(judged)).items():
@@ -133,7 +130,9 @@ def assess_response(
     for w, (sensor, drive) in parts.items():
         j, about = judged[w], _asked(judged[w], limits)
         powers = powers_of(j.wheel.blocks, j.driving, about, width * dt, beside.get(w), limits.clear_at, lasting[w])
-        parts[w] = replace(sensor, powers=powers, notes=(*sensor.notes, *remarks)), drive
+        delay, told = smallest_delay(j, width * dt)
+        powers = powers._replace(rows=(*powers.rows, delay))
+        parts[w] = replace(sensor, powers=powers, notes=(*sensor.notes, told, *remarks)), drive
     return Judgement(parts, standstills(idle, dt))
 
 
@@ -144,17 +143,17 @@ def _doubted(sensor: Assessment, why: str) -> Assessment:
 
 
 def _wheels(
-    data: Mapping[str, FollowerData], hidden: Flags, steps: tuple[int, int], limits: Limits, dt: float
+    data: Mapping[str, FollowerData], hidden: Mapping[str, Flags], steps: tuple[int, int], limits: Limits, dt: float
 ) -> dict[str, Judged]:
     """Wheels whose response could be found, with their blocks; nothing is judged yet."""
     cell, width = steps
     out: dict[str, Judged] = {}
     channels: dict[str, tuple[Samples, Response | None]] = {}
     for w, d in data.items():
-        y = np.where(hidden, np.nan, d.y)
+        y = np.where(hidden[w], np.nan, d.y)
         samples = samples_of(y, d.fresh)
         y[samples.step[samples.wild]] = np.nan
-        channels[w] = samples, identify_response(cells(y, cell), d.commands, cell * dt, limits.driving_speed)
+        channels[w] = samples, _response(y, samples, d, cell, limits, dt)
     several = sum(found is not None for _, found in channels.values()) >= _LEAST_OTHERS
     for w, d in data.items():
         y, (samples, found) = d.y, channels[w]
@@ -171,6 +170,15 @@ def _wheels(
         wheel = Wheel(d.name, samples, blocks, jumps, dt, "")
         out[w] = Judged(d, response, wheel, driving, np.zeros((0, STATES)), [], None, calm, alone=len(data) == 1)
     return out
+
+
+def _response(y: Array, samples: Samples, data: FollowerData, cell: int, limits: Limits, dt: float) -> Response | None:
+    """Response of a drive; a speed that is held for long says nothing of it, unless hardly any other is left."""
+    for source in (without_holds(y, samples, dt), y):
+        found = identify_response(cells(source, cell), data.commands, cell * dt, limits.driving_speed)
+        if found is not None:
+            return found
+    return None
 
 
 def _judge(one: Judged, beside: Beside | None, dt: float, width: int) -> Judged:
@@ -211,124 +219,12 @@ def _habit(wheel: str, holds: Mapping[str, Array]) -> float:
 
 
 def _asked(one: Judged, limits: Limits) -> Flags:
-    """Blocks in which the wheel must move, by its command or by the wheels beside it, shape (b,)."""
+    """Blocks in which the wheel must move, by its command or by another view, shape (b,).
+
+    Where it has a command only a view of this very wheel counts beside it: one that stands as it is told does nothing wrong.
+    """
     blocks, least = one.wheel.blocks, _MOVES * limits.driving_speed
     asked = (blocks.low > least) | (blocks.high < -least)
-    return asked if one.speed is None else asked | (np.abs(np.nan_to_num(one.speed)) > least)
-
-
-def _sides(
-    one: Judged,
-    spells: Sequence[Spell],
-    drives: Sequence[Finding],
-    machine: tuple[Flags, Flags],
-    limits: Limits,
-    dt: float,
-) -> tuple[Assessment, Assessment]:
-    """Sensor and drive of a wheel, with what is known to be its drive's.
-
-    `machine` says where the machine as a whole stands, by steps, and where all wheels are held back together, by blocks.
-    """
-    idle, together = machine
-    wheel, blocks, size = one.wheel, one.wheel.blocks, one.data.y.size
-    width = -(-size // blocks.start.size) if blocks.start.size < 2 else int(blocks.start[1])
-    findings, doubtful = spikes_of(wheel), one.posterior[:, HEALTHY] < 0.5
-    doubtful = doubtful & ~((one.posterior.argmax(axis=1) == OTHER) & (one.speed is None) & one.calm)
-    if one.speed is None:
-        doubtful &= ~(together & (one.posterior.argmax(axis=1) != SILENT))
-    for f in drives:
-        doubtful[f.start // width : -(-f.stop // width)] = False
-    for spell in spells:
-        if any(f.start < spell.stop * width and spell.start * width < f.stop for f in drives) and not spell.own:
-            continue
-        long = (spell.stop - spell.start) * width * dt >= _LEAST_S
-        found = finding_of(spell, *_shown_by(one, spell)) if long and spell.p >= LEAST_P else None
-        if found is not None:
-            findings.append(found)
-        elif one.posterior[spell.start : spell.stop].argmax(axis=1).min() > NOISY and _entered_calmly(
-            one, spell, width, dt
-        ):
-            doubtful[spell.start : spell.stop] = False  # what came slowly is slip or load, no sensor's fault
-    findings = _without_doubles(findings)
-    known = np.isfinite(one.data.y)
-    driving = np.repeat(one.driving, width)[:size]
-    sensor = np.where(driving, CODE[State.HEALTHY], CODE[State.NOT_EXCITED]).astype(np.int8)
-    unseen = not one.response.answered and one.speed is None
-    sensor[np.repeat(doubtful | (one.driving & unseen), width)[:size]] = CODE[State.NOT_ASSESSED]
-    drive = np.where(driving, CODE[State.NOT_ASSESSED], CODE[State.NOT_EXCITED]).astype(np.int8)
-    for states in (sensor, drive):
-        states[idle] = CODE[State.NOT_ASSESSED]
-        states[~known] = CODE[State.NO_DATA]
-    for f in drives:
-        drive[f.start : f.stop] = CODE[State(f.mode.value)]
-    both = [f for f in findings if len(f.side.sides) > 1]
-    for f in findings:
-        sensor[f.start : f.stop] = CODE[State(f.mode.value)]
-        drive[f.start : f.stop] = CODE[State(f.mode.value) if f in both else State.MASKED]
-    return _assessment(one, sensor, tuple(findings), limits, dt), _drive(one, drive, (*drives, *both))
-
-
-def _shown_by(one: Judged, spell: Spell) -> tuple[Wheel, Array | None]:
-    """The wheel and its speed by the channels that contradict it in a spell: its own position first."""
-    if one.joint is None or not spell.own:
-        return one.wheel, one.speed
-    view = one.joint.view
-    return one.wheel._replace(compared=view.compared, own=False), view.speed
-
-
-def _without_doubles(findings: Sequence[Finding]) -> list[Finding]:
-    """In order of time; of two that say the same of the same time, as spikes and noise do, the longer one."""
-    kept: list[Finding] = []
-    for f in sorted(findings, key=lambda f: f.start - f.stop):
-        if not any(f.mode is k.mode and f.start < k.stop and k.start < f.stop for k in kept):
-            kept.append(f)
-    return sorted(kept, key=lambda f: f.start)
-
-
-def _entered_calmly(one: Judged, spell: Spell, width: int, dt: float) -> bool:
-    """Whether a spell began and ended in calm moments, in which a jump would have been seen."""
-    reach = max(1, round(_DOUBT_S / (width * dt)))
-    ends = (spell.start, spell.stop - 1)
-    return all(bool(one.calm[max(0, k - reach) : k + reach + 1].all()) for k in ends)
-
-
-def _assessment(
-    one: Judged, states: NDArray[np.int8], findings: tuple[Finding, ...], limits: Limits, dt: float
-) -> Assessment:
-    y, size, cell = one.data.y, one.data.y.size, cell_of(dt)
-    expected = np.repeat(one.response.expected, cell)[:size]
-    width = np.repeat(3.0 * one.response.noise + 0.5 * (one.response.high - one.response.low), cell)[:size]
-    series = (("residual", y - expected), ("expected", expected), ("threshold", width))
-    pictured = Pictured.of(steps_of(findings, size, dt), series)
-    r = one.response
-    unseen = not r.answered and one.speed is None
-    late = "at once" if r.delay < _AT_ONCE_S else f"after {r.delay:.2g} s"
-    note = (
-        f"{one.data.name} has no command"
-        if not r.answered
-        else (
-            f"{one.data.name} answers its command {late} with a lag of {r.lag:.2g} s, up to {r.limit:.3g} {{speed_unit}} and "
-            f"{r.rate:.2g} m/s²; usual misfit {float(np.median(r.noise)):.2g} {{speed_unit}}"
-        )
-    )
-    note += f"; compared with {one.wheel.compared}." if one.wheel.compared else "."
-    wild = int(one.wheel.samples.wild.sum())
-    notes = (note, *((f"{wild} wild readings of {one.data.name} were set aside.",) if wild else ()))
-    reasons = {
-        State.NOT_ASSESSED: _UNSEEN
-        if unseen
-        else "the speed is neither what its command nor what other channels make likely, and no known fault explains it",
-        State.NOT_EXCITED: "nothing is commanded",
-        State.NO_DATA: "no samples",
-    }
-    return Assessment(states, reasons, findings, pictured.columns, Tier.RESPONSE, notes, closeups=pictured.closeups)
-
-
-def _drive(one: Judged, states: NDArray[np.int8], findings: tuple[Finding, ...]) -> Assessment:
-    reasons = {
-        State.NOT_ASSESSED: _ALONE.replace("{name}", one.data.name.split(".")[1]) if one.alone else _HIDDEN,
-        State.NOT_EXCITED: "nothing is commanded",
-        State.NO_DATA: "no samples",
-        State.MASKED: "its {wheel.sensor} is faulty",
-    }
-    return Assessment(states, reasons, findings, {}, Tier.RESPONSE)
+    if one.speed is None or (one.response.answered and not one.wheel.own):
+        return asked
+    return asked | (np.abs(np.nan_to_num(one.speed)) > least)

@@ -193,8 +193,11 @@ def _turned(y: Array, x: Array, yaw: Array) -> Array | None:
     use = np.isfinite(y) & np.isfinite(x) & np.isfinite(yaw)
     if np.count_nonzero(use) < _LEAST_BLOCKS:
         return None
-    kept = use.copy()
-    k = 0.0
+    # every curve has one vote first: where a fault whirls the machine around, its yaw rate outweighs that of all others
+    turning = use & (np.abs(yaw) >= float(np.median(np.abs(yaw[use])))) & (yaw != 0.0)
+    k = float(np.median((y - x)[turning] / yaw[turning])) if turning.any() else 0.0
+    off = np.abs(y - x - k * yaw)
+    kept = use & (off <= np.quantile(off[use], 0.7))
     for _ in range(4):
         power = float(yaw[kept] @ yaw[kept])
         k = float(yaw[kept] @ (y - x)[kept]) / power if power > 0 else 0.0

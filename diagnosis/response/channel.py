@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
+_LONG_HOLD_S = 5.0  # a command stays as long, but no reading of a wheel that rolls
 _AROUND = 3  # samples on each side that a wild reading is compared with
 _WILD_SHARE, _WILD_NOISE = 0.4, 12.0  # of the usual top speed; times the usual distance from the neighbours
 
@@ -80,6 +81,28 @@ def holds_of(samples: Samples, still: float, dt: float) -> Array:
     starts, stops = edge[::2], edge[1::2]
     length = (samples.step[stops - 1] - samples.step[np.maximum(starts - 1, 0)]) * dt
     return np.asarray(np.sort(length)[::-1], dtype=np.float64)
+
+
+def without_holds(y: Array, samples: Samples, dt: float) -> Array:
+    """Readings without those of times in which a moving speed is one value for long, NaN instead; shape of `y`.
+
+    Parameters
+    ----------
+    y : Array, shape (n,)
+        Readings [m/s].
+    samples : Samples
+        New samples of it.
+    dt : float
+        Step [s].
+    """
+    out = y.copy()
+    held = samples.same & (samples.value != 0.0)
+    edge = np.flatnonzero(np.diff(np.r_[False, held, False].astype(np.int8)))
+    for a, b in zip(edge[::2].tolist(), edge[1::2].tolist(), strict=True):
+        first, last = int(samples.step[a]), int(samples.step[b - 1])
+        if (last - first) * dt > _LONG_HOLD_S:
+            out[first : last + 1] = np.nan
+    return out
 
 
 def _wild(value: Array) -> Flags:

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
+from diagnosis.response.inputs import cells
 from diagnosis.response.machine import Judged
 from diagnosis.response.models import Beside, Blocks
 from diagnosis.results.assessment import Finding
@@ -25,6 +26,7 @@ _CLOSER = (
 _GAP_S, _LEAST_S, _LONG_S = 0.75, 2.0, 4.0
 _P = 0.9, 0.95  # that the drive is at fault, from the least time on, and for long
 _STANDS, _FULL = 0.1, 0.9  # of what the command makes it do
+_ANSWER_S = 1.0  # within which a drive answers
 _STEADY = 0.25  # spread of a speed that does not follow its command, by its size
 
 
@@ -54,6 +56,7 @@ def unanswered(wheel: str, judged: Mapping[str, Judged], views: Mapping[str, Bes
     there = off > np.maximum(_FAR * blocks.noise, _FAR_OF_TOP * float(np.nanquantile(np.abs(blocks.mean), 0.95)))
     there &= (beside < _AGREES * np.nan_to_num(view.noise)) & (beside < _CLOSER * off)
     there &= np.logical_and.reduce([x < _CLOSER * off for x in others]) if others else True
+    there &= _off_asked(one, block_s) > _CLOSER * off
     found = []
     for start, stop in _spans(there, round(_GAP_S / block_s)):
         if (stop - start) * block_s >= _LEAST_S and np.mean(there[start:stop]) > 0.5:
@@ -63,6 +66,16 @@ def unanswered(wheel: str, judged: Mapping[str, Judged], views: Mapping[str, Bes
 
 def _off(blocks: Blocks) -> Array:
     return np.abs(blocks.mean - np.clip(blocks.mean, blocks.low, blocks.high))
+
+
+def _off_asked(one: Judged, block_s: float) -> Array:
+    """How far each block is from what is asked of the wheel [m/s], whatever the drive makes of it in most of the mission."""
+    blocks = one.wheel.blocks
+    asked = cells(one.data.asked, int(blocks.start[1]) if blocks.start.size > 1 else 1)
+    back = round(_ANSWER_S / block_s)
+    recent = [np.r_[np.full(k, np.nan), asked[: asked.size - k]] for k in range(back + 1)]
+    low, high = (pick.reduce(recent) for pick in (np.fmin, np.fmax))
+    return np.nan_to_num(np.abs(blocks.mean - np.clip(blocks.mean, low, high)), nan=np.inf)
 
 
 def _spans(there: Flags, gap: int) -> list[tuple[int, int]]:

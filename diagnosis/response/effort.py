@@ -56,6 +56,26 @@ def shares_of(
     return out
 
 
+def own_pull(one: Judged, effort: Array | None, share: Array | None) -> Array | None:
+    """Effort of a wheel by its part of the load, or by its own usual effort, whichever is larger [1], shape (b,).
+
+    Where a wheel is held those beside it pull more, too, and its part of the load looks usual; its effort does not.
+
+    Parameters
+    ----------
+    one : Judged
+        The wheel.
+    effort : Array or None, shape (b,)
+        Mean effort of each block, in any unit.
+    share : Array or None, shape (b,)
+        From `shares_of`.
+    """
+    if effort is None or share is None:
+        return None
+    usual = np.abs(effort[one.driving & np.isfinite(effort)])
+    return np.maximum(share, np.abs(effort) / max(float(np.median(usual)), 1e-12)) if usual.size else None
+
+
 def _beside(e: Array, other: Array, driving: NDArray[np.bool_]) -> Array | None:
     """Effort by another one's, where that pulls [1]; 1 at most times, NaN elsewhere; None where that is hardly ever."""
     load = np.abs(other)

@@ -24,9 +24,9 @@ _SENSOR = 0.96  # that what a channel alone shows is the sensor's
 _ONE_JUMP, _TWO_JUMPS = 0.92, 0.97
 _EITHER = 0.6  # that it is the sensor's, up to which its side is left open
 _LEAST_PULLS, _AS_USUAL = 8, (0.6, 1.5)  # blocks with an effort, and its size by the usual one
+_CHANGES = 0.1  # of the readings, as a dead sensor's do not
 _MOVING = 0.2  # of the usual speed
-_SHARP_S = 0.035  # between readings: a wheel that jams, or comes free, takes about as long
-_BLUNT = 0.5, 0.9  # that one jump, or two, between readings further apart are the sensor's
+_SHARP_S = 0.012  # between readings: a wheel that jams, or comes free, takes longer
 _WHOLE = 0.75  # of the speed: what rises, or falls, by less from one reading to the next is no whole jump
 _IN_SHARE, _VARIES = 0.06, 0.2  # misfit of a share of another speed, and how much that varies, by its own size
 _LOUD = 2.0  # times the usual change from reading to reading, the other wheels' at that time included
@@ -143,13 +143,14 @@ def _silent(spell: Spell, wheel: Wheel, first: int, last: int, speed: Array | No
     begin = first if fell is None else int(wheel.samples.step[fell])
     end = last if rose is None else int(wheel.samples.step[rose])
     texts = [f"{wheel.name} read 0 for {(end - begin) * wheel.dt:.2f} s while its command asked for motion."]
-    sensor = _by_jumps(wheel, (fell is not None) + (rose is not None))
+    # a wheel that comes free leaps ahead, for its loop has wound up
+    sensor = _by_jumps(wheel, 0 if fell is None else 1 + (rose is not None))
     if fell is not None or rose is not None:
         texts.append(
             "It fell to 0, or rose from it, from one reading to the next"
             + (
                 ": no drive stops or starts like that."
-                if wheel.sharp
+                if wheel.sharp and fell is not None
                 else ", and readings are too far apart to tell a jam from that."
             )
         )
@@ -162,14 +163,24 @@ def _silent(spell: Spell, wheel: Wheel, first: int, last: int, speed: Array | No
     if sensor < _SENSOR and _pulls_as_usual(wheel, part):
         sensor = _SENSOR
         texts.append("Its drive pulls as usual, as it does not where a {wheel} is held, or the drive has no power.")
+    if _lives(wheel, begin, end):
+        sensor = min(sensor, 0.5)
+        texts.append("Its readings, small as they are, still change: a dead sensor's do not.")
     if sensor <= _EITHER:
         texts.append(
-            "Without a sharp jump or another view of this {wheel}, one that stands still and a dead sensor cannot be distinguished."
+            "Without a sharp jump or another view of this {wheel}, one that stands still and a dead sensor cannot be distinguished; readings "
+            "100 times a second, the position of its joint, or {or_view}the drive's effort would tell them apart."
         )
     sat = Sat(0.0, 0.0, 0.0, 0.0, "m/s")
     return _finding(
         begin, max(end, begin + 1), FaultMode.NO_SIGNAL, spell.p, Epsilon(1.0, 1.0, 1.0), sat, tuple(texts), sensor
     )
+
+
+def _lives(wheel: Wheel, begin: int, end: int) -> bool:
+    """Whether readings in steps [begin, end) change now and then, as those of a dead sensor do not."""
+    inside = (wheel.samples.step > begin) & (wheel.samples.step < end) & np.isfinite(wheel.samples.change)
+    return bool(inside.any() and np.mean(~wheel.samples.same[inside]) > _CHANGES)
 
 
 def _pulls_as_usual(wheel: Wheel, part: slice) -> bool:
@@ -180,8 +191,7 @@ def _pulls_as_usual(wheel: Wheel, part: slice) -> bool:
 
 def _by_jumps(wheel: Wheel, jumps: int) -> float:
     """Probability that what begins, or ends, within one reading is the sensor's [1]."""
-    sure = (_ONE_JUMP, _TWO_JUMPS) if wheel.sharp else _BLUNT
-    return (0.5, *sure)[jumps]
+    return (0.5, _ONE_JUMP, _TWO_JUMPS)[jumps] if wheel.sharp else 0.5
 
 
 def _whole_jump(wheel: Wheel, expected: Array, at: int, ratio: float) -> int | None:

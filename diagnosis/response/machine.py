@@ -65,7 +65,7 @@ def standstills(idle: Sequence[tuple[int, int]], dt: float) -> tuple[str, ...]:
         return ()
     total, (start, stop) = sum(b - a for a, b in idle) * dt, max(idle, key=lambda s: s[1] - s[0])
     return (
-        f"For {total:.1f} s all drives stood still together while they were commanded to move (longest {start * dt:.1f}–{stop * dt:.1f} s): "
+        f"For {total:.1f} s all drives stood still together, one that reads wrong perhaps excepted, while they were commanded to move (longest {start * dt:.1f}–{stop * dt:.1f} s): "
         "disabled, stopped by an emergency stop, or driven by another source of commands; no {wheel} is blamed for it.",
     )
 

@@ -1,0 +1,112 @@
+"""One cause where many wheels are off: what explains all of them beats several faults at one time.
+
+Wheels share a body. Where one of them drives astray, as a loop does around an encoder that is wrong, the others are braked, pushed or
+dragged; and where all wheels but one stand still together the machine stands, whatever that one reads.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from diagnosis.channels.standstill import not_followed
+from diagnosis.response.inputs import FollowerData
+from diagnosis.response.machine import Judged
+from diagnosis.response.rivals import jumped
+from diagnosis.response.spells import Spell
+from diagnosis.results.assessment import Finding
+from replay.faults import FaultMode
+
+Flags = NDArray[np.bool_]
+
+_LEAST_TOGETHER = 2  # wheels that stand still, beside one that seems not to
+_OVERLAP = 0.5  # of what may be a consequence
+
+
+def standing(data: Mapping[str, FollowerData], driving_speed: float, dt: float) -> dict[str, Flags]:
+    """Steps in which each wheel stands still as all others do, one of them perhaps excepted, although they are commanded; shape (n,) each.
+
+    Parameters
+    ----------
+    data : Mapping[str, FollowerData]
+        All drives.
+    driving_speed : float
+        Commanded speed from which a drive is driving [m/s].
+    dt : float
+        Step [s].
+    """
+    out = {w: np.zeros(d.y.size, np.bool_) for w, d in data.items()}
+    groups = [list(data)] + [[o for o in data if o != w] for w in data if len(data) > _LEAST_TOGETHER]
+    for group in groups:
+        speeds, asked = [data[w].y for w in group], [data[w].asked for w in group]
+        for start, stop in not_followed(speeds, asked, driving_speed, dt):
+            for w in group:
+                out[w][start:stop] = True
+    return out
+
+
+def spans_of(there: Flags) -> list[tuple[int, int]]:
+    """Steps [start, stop) of each stretch in which something holds."""
+    edge = np.flatnonzero(np.diff(np.r_[False, there, False].astype(np.int8)))
+    return list(zip(edge[::2].tolist(), edge[1::2].tolist(), strict=True))
+
+
+def consequence(spell: Spell, wheel: str, judged: Mapping[str, Judged]) -> bool:
+    """Whether a deviation from command or peers may be what another wheel's evident fault does to the machine.
+
+    Parameters
+    ----------
+    spell : Spell
+        Of `wheel`.
+    wheel : str
+        The wheel.
+    judged : Mapping[str, Judged]
+        All wheels.
+    """
+    if _evident(spell, judged[wheel]):
+        return False
+    span = spell.start, spell.stop
+    return any(
+        o != wheel and _evident(s, j) and _shared((s.start, s.stop), span) for o, j in judged.items() for s in j.spells
+    )
+
+
+def without_consequences(
+    drives: Sequence[Finding], wheel: str, judged: Mapping[str, Judged], width: int
+) -> list[Finding]:
+    """Faults of a drive while no other wheel is still, held or noisy: readings and effort of such a wheel confirm nothing.
+
+    Parameters
+    ----------
+    drives : Sequence[Finding]
+        Of the drive of `wheel`.
+    wheel : str
+        The wheel.
+    judged : Mapping[str, Judged]
+        All wheels.
+    width : int
+        Steps of a block.
+    """
+    others = [
+        (s.start * width, s.stop * width)
+        for o, j in judged.items()
+        if o != wheel
+        for s in j.spells
+        if _evident(s, j) or s.mode is FaultMode.NO_SIGNAL
+    ]
+    return [f for f in drives if not any(_shared(span, (f.start, f.stop)) for span in others)]
+
+
+def _evident(spell: Spell, one: Judged) -> bool:
+    """Whether the channel shows by itself that it is wrong, without any command or other wheel."""
+    return (
+        spell.own
+        or spell.mode in (FaultMode.STUCK, FaultMode.NOISY)
+        or (spell.mode is FaultMode.NO_SIGNAL and jumped(one, spell))
+    )
+
+
+def _shared(cause: tuple[int, int], effect: tuple[int, int]) -> bool:
+    return min(cause[1], effect[1]) - max(cause[0], effect[0]) >= _OVERLAP * (effect[1] - effect[0])

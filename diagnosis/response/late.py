@@ -1,0 +1,197 @@
+"""A speed that comes late: it is what command and other wheels make it be, but a while ago.
+
+A delay shows only while the speed changes. Its states are healthy, one for each of some delays, and one that nothing explains; each block
+is scored by how far the reading is from what was expected so long ago, beside the command and beside the other view of the wheel.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from diagnosis.response.kernel import posterior
+from diagnosis.response.machine import Judged
+from diagnosis.response.spells import Spell
+from diagnosis.results.assessment import Finding
+from diagnosis.results.detectability import Deviation, Power
+from diagnosis.results.result import Hypothesis
+from diagnosis.results.vocabulary import Tier
+from replay.faults import FaultMode, Side, State
+
+Array = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+
+DELAYS_S = (0.3, 0.45, 0.6, 0.8, 1.05)
+_SLACK_S = 0.12  # by which readings of healthy wheels come earlier or later than expected
+_OFF = 2.5  # usual misfits from which on no delay explains a reading
+_FREEDOM = 3.0  # of Student's t
+_WEIGHT = 0.25  # of a block's misfit: that lasts for about a second
+_SHARE, _LEAST = 0.03, 0.02  # of the speed, and of its usual size: misfit that tells nothing
+_USUALLY, _USUAL = 0.9, 1.5  # quantile of the misfit of a healthy wheel, and what it is then, in usual ones
+_HEALTHY_S, _LATE_S = 120.0, 15.0  # for which a wheel stays as it is, on average
+_LEAST_P, _LEAST_S = 0.8, 3.0
+_SURE = 0.95
+_OWN = 0.95  # that it is the sensor's where another view shows how this wheel turns
+_LENGTH_S = 10.0
+
+
+class Past(NamedTuple):
+    """What a wheel is held against.
+
+    Attributes
+    ----------
+    speed, noise : Array, shape (b,)
+        Expected speed and its usual misfit [m/s]; NaN where nothing is.
+    """
+
+    speed: Array
+    noise: Array
+
+
+def pasts_of(one: Judged, block_s: float) -> list[Past]:
+    """Command and other view of a wheel, with usual misfits found in the mission."""
+    blocks = one.wheel.blocks
+    views = [0.5 * (blocks.low + blocks.high)] if one.response.answered else []
+    if one.speed is not None:
+        views.append(one.speed)
+    return [_past(blocks.mean, v, one.driving, block_s) for v in views if np.isfinite(v).any()]
+
+
+def _past(y: Array, speed: Array, driving: Flags, block_s: float) -> Past:
+    change = np.abs(np.gradient(np.nan_to_num(speed))) / block_s
+    off = np.abs(y - speed)
+    use = driving & np.isfinite(off)
+    usual = float(np.quantile(np.abs(speed[use]), 0.9)) if use.any() else 0.0
+    floor = float(np.median(off[use])) if use.any() else np.inf
+    noise = np.hypot(floor + _LEAST * usual + _SHARE * np.abs(speed), _SLACK_S * change)
+    over = float(np.quantile((off / noise)[use], _USUALLY)) if use.any() else 0.0
+    return Past(speed, np.asarray(noise * max(1.0, over / _USUAL)))
+
+
+def scores(y: Array, pasts: list[Past], block_s: float) -> Array:
+    """Log-likelihood of each block if healthy, if late by each of `DELAYS_S`, and if nothing explains it, shape (b, delays + 2)."""
+    out = np.zeros((y.size, len(DELAYS_S) + 2))
+    place = np.arange(y.size, dtype=np.float64)
+    for past in pasts:
+        known = np.isfinite(past.speed) & np.isfinite(y)
+        speed = np.where(np.isfinite(past.speed), past.speed, 0.0)
+        for k, delay in enumerate((0.0, *DELAYS_S)):
+            was = np.interp(place - delay / block_s, place, speed)
+            there = known & (np.interp(place - delay / block_s, place, known.astype(np.float64)) > 0.99)
+            noise = np.interp(place - delay / block_s, place, past.noise)
+            out[:, k] -= np.where(there, _WEIGHT * _loss((y - was) / np.where(there, noise, 1.0)), 0.0)
+        out[:, -1] -= _WEIGHT * _loss(np.full(y.size, _OFF)) * known
+    return out
+
+
+def _loss(z: Array) -> Array:
+    return np.asarray(0.5 * (_FREEDOM + 1.0) * np.log1p(np.nan_to_num(z) ** 2 / _FREEDOM))
+
+
+def late_of(one: Judged, block_s: float) -> list[Finding]:
+    """Times in which a wheel's speed comes late.
+
+    Parameters
+    ----------
+    one : Judged
+        The wheel.
+    block_s : float
+        Length of a block [s].
+    """
+    pasts = pasts_of(one, block_s)
+    if not pasts:
+        return []
+    score = scores(one.wheel.blocks.mean, pasts, block_s)
+    enters, leaves = (np.full(len(score), -np.expm1(-block_s / t)) for t in (_HEALTHY_S, _LATE_S))
+    p = posterior(score, enters, leaves)
+    late = p[:, 1:-1].sum(axis=1)
+    edge = np.flatnonzero(np.diff(np.r_[False, late > 0.5, False].astype(np.int8)))
+    out = []
+    for start, stop in zip(edge[::2].tolist(), edge[1::2].tolist(), strict=True):
+        part = slice(start, stop)
+        if (stop - start) * block_s >= _LEAST_S and float(np.mean(late[part])) >= _LEAST_P:
+            delay = float(np.asarray(DELAYS_S)[np.argmax(p[part, 1:-1].sum(axis=0))])
+            out.append(_finding(one, start, stop, (delay, float(np.mean(late[part]))), block_s))
+    return out
+
+
+def _finding(one: Judged, start: int, stop: int, said: tuple[float, float], block_s: float) -> Finding:
+    delay, p = said
+    width = int(one.wheel.blocks.start[1])
+    own = one.wheel.own
+    side = Side.SENSOR if own else Side.SENSOR_OR_ACTUATOR
+    beside = f"what {one.wheel.compared} show of it" if one.speed is not None else "what its command makes of it"
+    texts = [f"{one.data.name} follows {beside} about {delay:.2g} s late for {(stop - start) * block_s:.1f} s."]
+    if not own:
+        texts.append(
+            "Readings that are held up and a drive that answers late cannot be distinguished; stamps by the encoder itself, "
+            "{or_view}the drive's effort would tell them apart."
+        )
+    share = _OWN if own else 1.0
+    rest = (Hypothesis(Side.ACTUATOR.value, FaultMode.OUTSIDE_TABLE.value, p * (1.0 - share)),) if own else ()
+    return Finding(
+        start=start * width, stop=min(stop * width, one.data.y.size), side=side, mode=FaultMode.OUTSIDE_TABLE, probability=p * share,
+        hypotheses=(Hypothesis(side.value, FaultMode.OUTSIDE_TABLE.value, p * share), *rest, Hypothesis("none", State.HEALTHY.value, 1.0 - p)),
+        epsilon=None, sat=None, evidence=tuple(texts), tier=Tier.RESPONSE,
+    )  # fmt: skip
+
+
+def smallest_delay(one: Judged, block_s: float) -> tuple[Power, str]:
+    """Smallest delay of ten seconds that would have been found wherever in the driving it began, and a sentence on where it would not."""
+    y, pasts = one.wheel.blocks.mean, pasts_of(one, block_s)
+    number = round(_LENGTH_S / block_s)
+    first = np.arange(0, max(y.size - number, 0) + 1, max(1, round(1.0 / block_s)))
+    last = np.minimum(first + number, y.size)
+    driven = np.r_[0, np.cumsum(one.driving)]
+    enough = driven[last] - driven[first] >= 0.5 * number
+    first, last = first[enough], last[enough]
+    sizes = np.full(first.size, np.inf)
+    place, known = np.arange(y.size, dtype=np.float64), np.nan_to_num(y)
+    enter, leave = (-np.expm1(-block_s / t) for t in (_HEALTHY_S, _LATE_S))
+    needed = float(
+        np.log((len(DELAYS_S) + 1) / enter) - np.log(leave) + number * block_s * (1 / _LATE_S - 1 / _HEALTHY_S)
+    )
+    for k in range(len(DELAYS_S), 0, -1) if pasts else ():
+        delayed = np.where(np.isfinite(y), np.interp(place - DELAYS_S[k - 1] / block_s, place, known), np.nan)
+        score = scores(delayed, pasts, block_s)
+        run = np.r_[0.0, np.cumsum(score[:, k] - np.maximum(score[:, 0], score[:, -1]))]
+        sizes[run[last] - run[first] >= needed] = DELAYS_S[k - 1]
+    size = float(np.quantile(sizes, _SURE, method="higher")) if sizes.size else np.inf
+    seen = sizes[np.isfinite(sizes)]
+    told = f"A delay of {one.data.name} that lasts {_LENGTH_S:.0f} s "
+    told += (
+        f"would show from {float(np.median(seen)):.2g} s on, at {100 * seen.size / sizes.size:.0f} % of the places where it may begin; elsewhere, "
+        "and where it is less, it is not assessed."
+        if seen.size
+        else f"is not assessed: up to {DELAYS_S[-1]:.2g} s none would show, as the speed hardly changes or nothing else shows it."
+    )
+    return Power(Deviation.DELAY, _LENGTH_S, size if np.isfinite(size) else None, "s", None, int(sizes.size)), told
+
+
+def late_neighbour(spell: Spell, wheel: str, late: Mapping[str, Sequence[Finding]], width: int) -> bool:
+    """Whether what looks like a scale lies, for the most part, where another wheel's speed comes late: beside that one it differs, too."""
+    if spell.own or not (spell.mode.scaled or spell.mode is FaultMode.OUTSIDE_TABLE):
+        return False
+    start, stop = spell.start * width, spell.stop * width
+    return any(
+        2 * (min(f.stop, stop) - max(f.start, start)) >= stop - start
+        for other, found in late.items()
+        if other != wheel
+        for f in found
+    )
+
+
+def late_wheels(judged: Mapping[str, Judged], block_s: float) -> dict[str, list[Finding]]:
+    """Times in which the speed of each wheel comes late; none where several do: then commands, or clocks, are late."""
+    found = {w: late_of(j, block_s) for w, j in judged.items()}
+    return {
+        w: [
+            f
+            for f in own
+            if not any(f.start < g.stop and g.start < f.stop for o, its in found.items() if o != w for g in its)
+        ]
+        for w, own in found.items()
+    }

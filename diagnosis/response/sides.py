@@ -1,0 +1,166 @@
+"""From the spells of a wheel to its two sides: states over time, findings, and what is said of them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from diagnosis.response.findings import Wheel, finding_of, spikes_of
+from diagnosis.response.inputs import cell_of
+from diagnosis.response.machine import Judged
+from diagnosis.response.models import HEALTHY, LEAST_P, NOISY, OTHER, SILENT
+from diagnosis.response.spells import Spell
+from diagnosis.results.assessment import CODE, Assessment, Finding
+from diagnosis.results.evidence_columns import Pictured, steps_of
+from diagnosis.results.vocabulary import Tier
+from replay.faults import FaultMode, State
+from replay.machine.config import Limits
+
+Array = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+
+_LEAST_S = 1.0
+_DOUBT_S = 0.5  # around a spell that is judged no fault
+_AT_ONCE_S = 5e-3
+_HIDDEN = "a controller that holds the speed hides a weak drive, and their healthy effort is not known"
+_ALONE = "a controller that holds the speed hides a weak drive; name its current, duty or torque as its command (`wheel.{name}.u`) to have it judged"
+_UNSEEN = "without its command or another {wheel} of its side only a speed that is frozen, wild or noisy shows"
+
+
+def sides_of(
+    one: Judged,
+    spells: Sequence[Spell],
+    known: tuple[Sequence[Finding], Sequence[Finding]],
+    machine: tuple[Flags, Flags],
+    limits: Limits,
+    dt: float,
+) -> tuple[Assessment, Assessment]:
+    """Sensor and drive of a wheel.
+
+    Parameters
+    ----------
+    one : Judged
+        The wheel.
+    spells : Sequence[Spell]
+        Its faults along the most probable states.
+    known : tuple[Sequence[Finding], Sequence[Finding]]
+        What is known to be its drive's, and times in which its speed comes late.
+    machine : tuple[Flags, Flags]
+        Where the machine as a whole stands, by steps, and where all wheels are held back together, by blocks.
+    limits : Limits
+        ``driving_speed``.
+    dt : float
+        Step [s].
+    """
+    (drives, late), (idle, together) = known, machine
+    wheel, blocks, size = one.wheel, one.wheel.blocks, one.data.y.size
+    width = -(-size // blocks.start.size) if blocks.start.size < 2 else int(blocks.start[1])
+    findings, doubtful = spikes_of(wheel), one.posterior[:, HEALTHY] < 0.5
+    doubtful = doubtful & ~((one.posterior.argmax(axis=1) == OTHER) & (one.speed is None) & one.calm)
+    if one.speed is None:
+        doubtful &= ~(together & (one.posterior.argmax(axis=1) != SILENT))
+    for f in drives:
+        doubtful[f.start // width : -(-f.stop // width)] = False
+    for spell in spells:
+        if not spell.own and _met(spell, drives, width):
+            continue
+        if not spell.own and _met(spell, late, width) and (spell.mode.scaled or spell.mode is FaultMode.OUTSIDE_TABLE):
+            continue  # what is late is less, or more, whenever the speed changes
+        long = (spell.stop - spell.start) * width * dt >= _LEAST_S
+        found = finding_of(spell, *_shown_by(one, spell)) if long and spell.p >= LEAST_P else None
+        if found is not None:
+            findings.append(found)
+        elif one.posterior[spell.start : spell.stop].argmax(axis=1).min() > NOISY and _entered_calmly(
+            one, spell, width, dt
+        ):
+            doubtful[spell.start : spell.stop] = False  # what came slowly is slip or load, no sensor's fault
+    findings = _without_doubles([*findings, *late])
+    there = np.isfinite(one.data.y)
+    driving = np.repeat(one.driving, width)[:size]
+    sensor = np.where(driving, CODE[State.HEALTHY], CODE[State.NOT_EXCITED]).astype(np.int8)
+    unseen = not one.response.answered and one.speed is None
+    sensor[np.repeat(doubtful | (one.driving & unseen), width)[:size]] = CODE[State.NOT_ASSESSED]
+    drive = np.where(driving, CODE[State.NOT_ASSESSED], CODE[State.NOT_EXCITED]).astype(np.int8)
+    for states in (sensor, drive):
+        states[idle] = CODE[State.NOT_ASSESSED]
+        states[~there] = CODE[State.NO_DATA]
+    for f in drives:
+        drive[f.start : f.stop] = CODE[State(f.mode.value)]
+    both = [f for f in findings if len(f.side.sides) > 1]
+    for f in findings:
+        sensor[f.start : f.stop] = CODE[State(f.mode.value)]
+        drive[f.start : f.stop] = CODE[State(f.mode.value) if f in both else State.MASKED]
+    return _assessment(one, sensor, tuple(findings), limits, dt), _drive(one, drive, (*drives, *both))
+
+
+def _met(spell: Spell, findings: Sequence[Finding], width: int) -> bool:
+    """Whether any finding is at the time of a spell."""
+    return any(f.start < spell.stop * width and spell.start * width < f.stop for f in findings)
+
+
+def _shown_by(one: Judged, spell: Spell) -> tuple[Wheel, Array | None]:
+    """The wheel and its speed by the channels that contradict it in a spell: its own position first."""
+    if one.joint is None or not spell.own:
+        return one.wheel, one.speed
+    view = one.joint.view
+    return one.wheel._replace(compared=view.compared, own=False), view.speed
+
+
+def _without_doubles(findings: Sequence[Finding]) -> list[Finding]:
+    """In order of time; of two that say the same of the same time, as spikes and noise do, the longer one."""
+    kept: list[Finding] = []
+    for f in sorted(findings, key=lambda f: f.start - f.stop):
+        if not any(f.mode is k.mode and f.start < k.stop and k.start < f.stop for k in kept):
+            kept.append(f)
+    return sorted(kept, key=lambda f: f.start)
+
+
+def _entered_calmly(one: Judged, spell: Spell, width: int, dt: float) -> bool:
+    """Whether a spell began and ended in calm moments, in which a jump would have been seen."""
+    reach = max(1, round(_DOUBT_S / (width * dt)))
+    ends = (spell.start, spell.stop - 1)
+    return all(bool(one.calm[max(0, k - reach) : k + reach + 1].all()) for k in ends)
+
+
+def _assessment(
+    one: Judged, states: NDArray[np.int8], findings: tuple[Finding, ...], limits: Limits, dt: float
+) -> Assessment:
+    y, size, cell = one.data.y, one.data.y.size, cell_of(dt)
+    expected = np.repeat(one.response.expected, cell)[:size]
+    width = np.repeat(3.0 * one.response.noise + 0.5 * (one.response.high - one.response.low), cell)[:size]
+    series = (("residual", y - expected), ("expected", expected), ("threshold", width))
+    pictured = Pictured.of(steps_of(findings, size, dt), series)
+    r = one.response
+    unseen = not r.answered and one.speed is None
+    late = "at once" if r.delay < _AT_ONCE_S else f"after {r.delay:.2g} s"
+    note = (
+        f"{one.data.name} has no command"
+        if not r.answered
+        else (
+            f"{one.data.name} answers its command {late} with a lag of {r.lag:.2g} s, up to {r.limit:.3g} {{speed_unit}} and "
+            f"{r.rate:.2g} m/s²; usual misfit {float(np.median(r.noise)):.2g} {{speed_unit}}"
+        )
+    )
+    note += f"; compared with {one.wheel.compared}." if one.wheel.compared else "."
+    wild = int(one.wheel.samples.wild.sum())
+    notes = (note, *((f"{wild} wild readings of {one.data.name} were set aside.",) if wild else ()))
+    reasons = {
+        State.NOT_ASSESSED: _UNSEEN
+        if unseen
+        else "the speed is neither what its command nor what other channels make likely, and no known fault explains it",
+        State.NOT_EXCITED: "nothing is commanded",
+        State.NO_DATA: "no samples",
+    }
+    return Assessment(states, reasons, findings, pictured.columns, Tier.RESPONSE, notes, closeups=pictured.closeups)
+
+
+def _drive(one: Judged, states: NDArray[np.int8], findings: tuple[Finding, ...]) -> Assessment:
+    reasons = {
+        State.NOT_ASSESSED: _ALONE.replace("{name}", one.data.name.split(".")[1]) if one.alone else _HIDDEN,
+        State.NOT_EXCITED: "nothing is commanded",
+        State.NO_DATA: "no samples",
+        State.MASKED: "its {wheel.sensor} is faulty",
+    }
+    return Assessment(states, reasons, findings, {}, Tier.RESPONSE)

@@ -1,0 +1,92 @@
+"""One cause beats several faults at one time; what tells sensor from drive."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from diagnosis.response.assess import assess_response
+from diagnosis.response.beside import _turned
+from diagnosis.response.channel import samples_of, without_holds
+from diagnosis.results.assessment import Finding
+from replay.faults import FaultMode, Side
+from replay.machine.config import Limits
+from tests.diagnosis.response.robot import DT, TRACK, followers_of, geometry, speeds
+
+Array = NDArray[np.float64]
+
+LIMITS = Limits(driving_speed=0.05)
+
+
+def found(
+    measured: dict[str, Array], asked: dict[str, Array], body: Array, yaw: Array | None = None
+) -> list[tuple[str, Side, Finding]]:
+    parts = assess_response(followers_of(measured, asked, body), geometry(tuple(measured)), yaw, LIMITS, DT).parts
+    out = [(w, f.side, f) for w, sides in parts.items() for a in sides for f in a.findings]
+    return list({(w, f.start, f.mode): (w, s, f) for w, s, f in out}.values())
+
+
+def span(first: float, last: float) -> slice:
+    return slice(round(first / DT), round(last / DT))
+
+
+@pytest.mark.parametrize("kind", ["stuck", "noisy"])
+def test_a_stop_of_the_machine_in_the_middle_of_a_sensors_fault_blames_no_other_wheel(kind: str) -> None:
+    measured, asked, body = speeds(21)
+    fault, stop = span(60, 90), span(70, 80)
+    for y in measured.values():
+        y[stop] = 0.0
+    rng = np.random.default_rng(1)
+    y = measured["RL"]
+    y[fault] = y[fault.start - 1] if kind == "stuck" else y[fault] + rng.uniform(-0.3, 0.3, y[fault].size)
+    told = found(measured, asked, body)
+    assert {w for w, _, _ in told} == {"RL"}
+    assert any(f.mode is FaultMode(kind) for _, _, f in told)
+
+
+def test_wheels_that_a_runaway_neighbour_holds_back_are_no_faults_of_their_own() -> None:
+    """A frozen encoder lets its loop run away; two others stand for a while, as it pushes against them."""
+    measured, asked, body = speeds(22)
+    fault, held = span(60, 80), span(66, 74)
+    measured["FR"][fault] = 0.437
+    for w in ("RR", "RL"):
+        measured[w][held] *= np.r_[np.linspace(1, 0, 30), np.zeros(held.stop - held.start - 60), np.linspace(0, 1, 30)]
+    assert {w for w, _, _ in found(measured, asked, body)} == {"FR"}
+
+
+def test_a_wheel_at_rest_that_creeps_is_no_dead_sensor() -> None:
+    measured, asked, body = speeds(23, ("FR", "FL"))
+    yaw = (measured["FR"] - measured["FL"]) / TRACK
+    part = span(60, 70)
+    rng = np.random.default_rng(2)
+    measured["FL"][part] = np.round(0.004 + rng.normal(0.0, 0.002, part.stop - part.start), 4)
+    assert all(side is not Side.SENSOR for _, side, _ in found(measured, asked, body, yaw))
+
+
+def test_a_dead_sensor_is_told_where_a_gyro_shows_that_its_wheel_turns() -> None:
+    measured, asked, body = speeds(24, ("FR", "FL"))
+    yaw = (measured["FR"] - measured["FL"]) / TRACK
+    measured["FL"][span(60, 70)] = 0.0
+    ((wheel, side, finding),) = found(measured, asked, body, yaw)
+    assert (wheel, side, finding.mode) == ("FL", Side.SENSOR, FaultMode.NO_SIGNAL)
+
+
+def test_a_whirl_of_one_tenth_of_the_mission_does_not_make_the_relation_to_the_yaw_rate() -> None:
+    rng = np.random.default_rng(3)
+    x, yaw = np.full(400, 0.5), rng.choice([-0.3, 0.0, 0.3], 400)
+    y = x + 0.6 * yaw + rng.normal(0.0, 0.005, 400)
+    yaw[200:240], y[200:240] = 4.5, 0.0
+    speed = _turned(y, x, yaw)
+    assert speed is not None
+    assert np.median(np.abs(speed - x - 0.6 * yaw)[200:240]) < 0.1
+
+
+def test_a_value_that_is_held_for_long_is_no_answer_to_a_command() -> None:
+    y = np.sin(np.arange(400) * 0.05)
+    y[100:300] = 0.7
+    out = without_holds(y, samples_of(y, np.ones(400, np.bool_)), DT)
+    assert np.isnan(out[101:300]).all()
+    assert np.isfinite(out[:100]).all()
+    y[100:300] = 0.0  # a wheel at rest is an answer
+    assert np.isfinite(without_holds(y, samples_of(y, np.ones(400, np.bool_)), DT)).all()
