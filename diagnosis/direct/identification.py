@@ -10,7 +10,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from diagnosis.channels.held import Held, held_reference, news_alone
-from diagnosis.channels.noise import moving_sum, relative_lag, shifted, unresolved, white_noise, white_part
+from diagnosis.channels.noise import (
+    moving_sum,
+    relative_lag,
+    shifted,
+    unresolved,
+    usual_distance,
+    white_noise,
+    white_part,
+)
 from diagnosis.channels.relation import Relation, relation_of
 from diagnosis.channels.sample_status import BLIND, PAIR, SKIP, sample_status
 from diagnosis.direct.inputs import Pair
@@ -31,6 +39,7 @@ _COARSE, _COARSE_COST = (
 )  # where a log is too slow for its commands, what is left of them looks like a fault's drift
 _AROUND = 11
 _SETTLED = 7
+_SPARSE = 1.5  # steps between news, from which on a channel is slower than the timeline
 
 
 class Texture(NamedTuple):
@@ -98,7 +107,16 @@ class IdentifiedPair:
     @cached_property
     def instruments(self) -> Array | None:
         """Signals that drive x but know nothing of the fault; of a coarse log x but for its quick part. Shape (n, k)."""
-        return _neighbours(self.samples.x) if self.coarse else self.pair.instruments
+        if not self.coarse:
+            return self.pair.instruments
+        out = np.zeros((self.pair.y.size, 1))
+        out[self.news] = _neighbours(self.samples.x[self.news])
+        return out
+
+    @cached_property
+    def news(self) -> slice | NDArray[np.intp]:
+        """Samples that bring something new: all, or those that do where others come more often on the timeline."""
+        return _news(np.isin(self.samples.status, (PAIR, BLIND)))[0]
 
     @cached_property
     def holds(self) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
@@ -152,15 +170,26 @@ def identify(
     if not sensor:  # a command may jump from step to step, a speed may not
         paired = status == PAIR
         known = None if usual is None else usual.unresolved
-        power, share = unresolved(np.where(paired, pair.y - x, np.nan), x, paired, model.noise, dt, known)
+        at, steps = _news(paired)
+        power, share = unresolved(
+            np.where(paired, pair.y - x, np.nan)[at], x[at], paired[at], model.noise, steps * dt, known
+        )
         own = own._replace(unresolved=share)
         if share:
-            white = pair.store.keep(white + power / model.noise**2)
-            blind = _unsettled(x, model.noise * np.sqrt(white))
+            more = np.zeros(x.size)
+            more[at] = power / model.noise**2
+            white = pair.store.keep(white + more)
+            blind[at] = _unsettled(x[at], model.noise * np.sqrt(white[at]))
             status[blind & paired] = BLIND
             model = replace(model, drift_cost=model.drift_cost + _COARSE_COST * min(1.0, share / _COARSE))
     samples = Samples(pair.y, x, status, pair.quiet, white, doubt.passing, doubt.constant)
     return IdentifiedPair(pair, relation, samples, model, doubt.lsb, blind, share, own)
+
+
+def _news(paired: NDArray[np.bool_]) -> tuple[slice | NDArray[np.intp], float]:
+    """Samples to look at for what changes from one to the next, and their usual distance in steps."""
+    steps = usual_distance(paired) if np.count_nonzero(paired) > 1 else 1.0
+    return (slice(None), 1.0) if steps < _SPARSE else (np.flatnonzero(paired), steps)
 
 
 def _relation(pair: Pair, x: Array, hold: Array, sensor: bool) -> Relation:

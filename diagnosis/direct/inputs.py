@@ -9,12 +9,15 @@ from numpy.typing import NDArray
 
 from diagnosis.channels.habit import EVERY_SAMPLE, Habit
 from diagnosis.channels.liveness import alive
+from diagnosis.channels.noise import usual_distance
 from replay.arrays.column_store import ColumnStore
 from replay.faults import Side
 from replay.machine.config import Machine, Noise
 from replay.signals.timeline import Timeline
 
 Array = NDArray[np.float64]
+
+_MUCH_RARER, _FEW = 2.0, 3
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,7 +31,8 @@ class Pair:
     y, x : Array, shape (n,)
         Measured value and reference, SI; NaN where not valid.
     fresh : NDArray[np.bool_], shape (n,)
-        Steps with a new sample of y.
+        Steps with a new sample of y; where x comes at less than half of y's rate, those of them at which x is new too: what
+        x was in between is not known.
     alive : NDArray[np.bool_], shape (n,)
         Whether another channel of y's source delivers.
     quiet : NDArray[np.bool_], shape (n,)
@@ -108,7 +112,7 @@ def make_pair(
         side=side,
         y=y,
         x=x,
-        fresh=timeline.fresh[y_name],
+        fresh=_beside(timeline.fresh[y_name], timeline.fresh[x_name]),
         alive=alive(timeline, counts, y_name),
         quiet=quiet,
         dt=timeline.dt,
@@ -119,3 +123,11 @@ def make_pair(
         known_noise=machine.noise.get(y_name, Noise()),
         store=timeline.store,
     )
+
+
+def _beside(y: NDArray[np.bool_], x: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """New samples of y beside a new one of a reference that comes much more rarely; all of them beside any other."""
+    if min(np.count_nonzero(y), np.count_nonzero(x)) < _FEW or usual_distance(x) < _MUCH_RARER * usual_distance(y):
+        return y
+    later = np.r_[False, x[:-1]]  # stamps of one moment may fall into two steps
+    return max(y & x, y & later, key=np.count_nonzero)

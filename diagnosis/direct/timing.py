@@ -50,16 +50,18 @@ def timing_explains(found: IdentifiedPair, run: Run, mode: FaultMode) -> bool:
         return mode.varying and seconds < 0.5 and deviation < moves
     if seconds <= _SPOOL_DELAY_S or (mode.varying and _settles(found, run)):
         return True
-    jumps = _sudden(pair.x, run)
+    jumps = _sudden(found, pair.x, run)
     if not mode.total and deviation < 2 * jumps and jumps > _JUMPY * float(np.sqrt(np.nanmean(ref**2))):
         return True
     if not found.coarse:
         return False
     if mode.total:
-        return run.size < _FLIPS or (np.isfinite(deviation) and deviation < 2.5 * run_samples(run, found).noise)
+        return _readings(found, run).size < _FLIPS or (
+            np.isfinite(deviation) and deviation < 2.5 * run_samples(run, found).noise
+        )
     if not mode.varying:
         return False
-    sudden = max(_sudden(z, run) for z in (pair.x, pair.y))
+    sudden = max(_sudden(found, z, run) for z in (pair.x, pair.y))
     unsigned = np.sqrt(np.nanmean((np.abs(y) - np.abs(pair.x[part])) ** 2))
     return bool(sudden > 0.3 * deviation or unsigned < 0.3 * deviation)
 
@@ -85,10 +87,26 @@ def _settles(found: IdentifiedPair, run: Run) -> bool:
     return bool(known.any() and (size <= _OVERSHOOT * moved + _NOISES * found.model.noise)[known].all())
 
 
-def _sudden(x: Array, run: Run) -> float:
-    """Root mean square of what changes from sample to sample in a run."""
-    first = max(0, run.start - 1)
-    return float(np.sqrt(np.mean(white_part(x[first : run.stop + 1])[run.start - first :][: run.size] ** 2)))
+def _readings(found: IdentifiedPair, run: Run) -> NDArray[np.intp]:
+    """Samples of a run that bring something new."""
+    at = found.news
+    if isinstance(at, slice):
+        return np.arange(run.start, run.stop)
+    return at[np.searchsorted(at, run.start) : np.searchsorted(at, run.stop)]
+
+
+def _sudden(found: IdentifiedPair, x: Array, run: Run) -> float:
+    """Root mean square of what changes from reading to reading in a run."""
+    at = found.news
+    if isinstance(at, slice):
+        start, stop, values = run.start, run.stop, x
+    else:
+        start, stop = int(np.searchsorted(at, run.start)), int(np.searchsorted(at, run.stop))
+        values = x[at[max(0, start - 1) : stop + 1]]
+        start, stop = min(start, 1), min(start, 1) + stop - start
+    first = max(0, start - 1)
+    inside = white_part(values[first : stop + 1])[start - first :][: stop - start]
+    return float(np.sqrt(np.mean(inside**2))) if inside.size else 0.0
 
 
 def _held_by_habit(found: IdentifiedPair, run: Run) -> bool:
