@@ -12,6 +12,8 @@ from numpy.typing import NDArray
 from diagnosis.assess import ComponentResult, assess_components
 from diagnosis.channels.copied_rows import without_copied_rows
 from diagnosis.channels.recording_gaps import recording_gaps, without_gaps
+from diagnosis.clearing.mapping import mapping_hints
+from diagnosis.clearing.standing_out import what_stands_out, with_findings
 from diagnosis.decision import metrics, quality
 from diagnosis.decision.episodes import with_episodes
 from diagnosis.decision.second_onsets import with_second_onsets
@@ -155,7 +157,8 @@ def _walk(
     found = _outside_gaps(assess_components(timeline, replay, machine, chosen, publish), timeline)
     _require_something(found.assessments, mission, machine)
     publish(Progress(Stage.DECIDING))
-    judged = Judged(mission, recorded, machine, replay, found)
+    judged = _with_what_stands_out(Judged(mission, recorded, machine, replay, found))
+    found = judged.found
     report = report_of_mission(judged, identity)
     timeline.store.release()
     windows = closeups_of(timeline, replay, machine, found.assessments, judged.intervals)
@@ -171,6 +174,17 @@ def _outside_gaps(found: ComponentResult, timeline: Timeline) -> ComponentResult
     seen = {key: without_gaps(a, gaps, timeline) for key, a in found.assessments.items()}
     joined = with_episodes(seen, timeline.dt)
     return replace(found, assessments=with_second_onsets(joined, timeline.dt))
+
+
+def _with_what_stands_out(judged: Judged) -> Judged:
+    """The same with parts named that the checks of the all-clear leave no doubt about, unless the whole machine explains them."""
+    found = judged.found
+    if found.events or mapping_hints(judged.cells):
+        return judged
+    more = what_stands_out(judged.checks, judged.cells, found.words)
+    if not more:
+        return judged
+    return replace(judged, found=replace(found, assessments=with_findings(found.assessments, more)))
 
 
 def _require_something(assessments: Mapping[tuple[str, str], Assessment], mission: Mission, machine: Machine) -> None:

@@ -76,12 +76,17 @@ def still_frame(cells: Cells) -> Frame:
 def _commanded_still(rate: Array, command: Array, cells: Cells) -> tuple[float, float]:
     """Largest mean command while an axle stands still for a second [1], NaN where nothing is known, and when that begins [s]."""
     frame = still_frame(cells)
-    mean = np.abs(frame.mean(command))
-    if not np.isfinite(mean).any():
+    values = commanded_still(rate, command, frame)
+    if not np.isfinite(values).any():
         return np.nan, 0.0
-    values = np.where(frame.rms(rate) < _STILL, mean, 0.0)
-    k = int(np.nanargmax(np.where(np.isfinite(mean), values, np.nan)))
+    k = int(np.nanargmax(values))
     return float(values[k]), float(frame.starts[k] * cells.dt)
+
+
+def commanded_still(rate: Array, command: Array, frame: Frame) -> Array:
+    """Mean command of each window [1], 0 where the axle moves, NaN where nothing is known; from rates [rad/s] and commands by cells."""
+    mean = np.abs(frame.mean(command))
+    return np.where(np.isfinite(mean), np.where(frame.rms(rate) < _STILL, mean, 0.0), np.nan)
 
 
 class Rates(NamedTuple):

@@ -113,6 +113,8 @@ class Responses(NamedTuple):
     ----------
     windows : Array, shape (windows, wheels)
         Against the wheel's usual one.
+    beside : Array, shape (windows, wheels)
+        As they are.
     usual : list[Usual]
         The usual ones.
     weight : Array, shape (cells, wheels)
@@ -122,6 +124,7 @@ class Responses(NamedTuple):
     """
 
     windows: Array
+    beside: Array
     usual: list[Usual]
     weight: Array
     ahead: NDArray[np.bool_]
@@ -165,7 +168,7 @@ def responses_of(cells: Cells, speed: Array, opening: Array, reference: Array) -
         changed = _CHANGED * _change(log[:, i], [ahead[:, i], ~ahead[:, i]])
         below = max(0.0, -min(usual), changed) if usual else None
         lasting.append(Usual(below, max(0.0, *usual), min(usual), max(usual), (ways[0], ways[1])) if usual else Usual())
-    return Responses(off, lasting, np.where(settled, np.abs(speed), 0.0), ahead)
+    return Responses(off, log, lasting, np.where(settled, np.abs(speed), 0.0), ahead)
 
 
 def _change(log: Array, ways: list[NDArray[np.bool_]]) -> float:
