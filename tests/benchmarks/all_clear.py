@@ -18,6 +18,7 @@ from __future__ import annotations
 import argparse
 import json
 import sys
+import traceback
 from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from contextlib import nullcontext
@@ -140,7 +141,14 @@ def run_other(task: Task, physics: ModuleType) -> list[Outcome]:
         signals = physics.signals(task.seed, trouble.faults if trouble else (), task.duration, tier)
         if trouble is not None and trouble.edit is not None:
             signals = trouble.edit(signals)
-        report = diagnose_signals(signals, machine).report
+        try:
+            report = diagnose_signals(signals, machine).report
+        except Exception as error:  # a bug of the diagnosis, which the campaign outlives
+            words = "".join(traceback.format_exception(error)[-2:])
+            out.append(
+                Outcome(task.machine, name, tier, "crashed", 0, 0, "error", words, seed=task.seed, kind=task.kind)
+            )
+            continue
         out.append(judged(task, tier, name, report, trouble.parts if trouble else None))
     return out
 
@@ -283,8 +291,8 @@ def main() -> None:
                 file.flush()
     print("\n".join(table(outcomes)))
     for o in outcomes:
-        if o.outcome == "cleared":
-            print(f"cleared: {o.machine}, {o.tier}: {o.trouble}")
+        if o.outcome in ("cleared", "crashed"):
+            print(f"{o.outcome}: {o.machine}, {o.tier}: {o.trouble}, seed {o.seed}")
 
 
 if __name__ == "__main__":
