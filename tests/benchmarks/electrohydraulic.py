@@ -197,7 +197,7 @@ def signals(seed: int, faults: Sequence[FaultSpec], duration: float, tier: str) 
     made, has, rng = build(seed)[0], commands_of(seed), np.random.default_rng(84_000 + seed)
     speed, bend, _ = commands(seed, duration)
     ref, true, read, given, opened, body = driven(seed, tuple(faults), duration)
-    n, rate = speed.size, float(rng.choice([50.0, 100.0, 125.0, 250.0]))
+    n, rate = speed.size, min(float(rng.choice([50.0, 100.0, 125.0, 250.0])), 4000.0 / made.cycle)
     loses, gyro, ground = rng.choice([0.0, 0.002, 0.01]), rng.random() < 0.6, rng.random() < 0.4
     noise = np.random.default_rng(85_000 + seed)
     rows = {

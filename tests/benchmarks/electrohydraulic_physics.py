@@ -202,7 +202,7 @@ def drive(
     asked_v: Array, asked_bend: Array, asked_angle: Array, loss: Array, sat: Array, noise: Array, teeth: Array, soft_at: Array,
     parts: Array, b: Build,
 ) -> tuple[Array, Array, Array, Array, Array, Array]:  # fmt: skip
-    """References, true values, measured values, commands and openings of wheels and axles, and the body's motion, per millisecond."""
+    """References, true values, measured values, commands and openings as the controller's cycle has them, and the body, per ms."""
     n = asked_v.size
     ref, true, read, given, opened, body = (
         np.zeros((n, 6)), np.zeros((n, 6)), np.zeros((n, 6)), np.zeros((n, 6)), np.zeros((n, 6)), np.zeros((n, 5)),
@@ -213,6 +213,7 @@ def drive(
     )  # fmt: skip
     steering, rates, load, at = np.zeros(2), np.zeros(2), np.full(4, b.mass * 9.81 / 4), places(b)
     v = side = r = th = px = py = slow_v = fx_m = fy_m = 0.0
+    seen, at_spool = np.zeros(6), np.zeros(6)
     supply, swash, engine, quiet = b.supply, 0.2, 1.0, 0.0
     for i in range(4):
         w[i, PA] = w[i, PB] = 0.3 * b.supply
@@ -238,6 +239,7 @@ def drive(
                 us[a] = steering[a] * min(max(line + lift, -1.0), 1.0)
                 calm = calm and steering[a] == 0.0
             refs_of(slow_v, asked_bend[m], turning, angles, b, speeds)
+            seen[:4], seen[4:], at_spool[:4], at_spool[4:] = w[:, TURN] * b.radius, angle, w[:, SPOOL], spool
             for i in range(4):
                 calm = calm and abs(speeds[i]) < 0.005 * b.top
             quiet = quiet + t if calm else 0.0
@@ -304,8 +306,7 @@ def drive(
         swash += H / b.pump_lag * (min(max((b.supply + 0.5 * b.band - supply) / b.band, 0.02), 1.0) - swash)
         engine += H / 0.4 * (1 - b.droop * supply * flow / (b.supply * b.pump) - engine)
         if k % 2 == 0:
-            ref[m, :4], true[m, :4], read[m] = speeds, w[:, TURN] * b.radius, said
-            ref[m, 4:], true[m, 4:] = angles, angle
-            given[m, :4], given[m, 4:], opened[m, :4], opened[m, 4:] = w[:, ASKED], us, w[:, SPOOL], spool
+            ref[m, :4], ref[m, 4:], given[m, :4], given[m, 4:] = speeds, angles, w[:, ASKED], us
+            true[m], read[m], opened[m] = seen, said, at_spool
             body[m] = v, side, r, supply, ground.max()
     return ref, true, read, given, opened, body
