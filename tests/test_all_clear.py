@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from types import ModuleType
 
+import numpy as np
 import pytest
 
 BENCHMARKS = Path(__file__).parent / "benchmarks"
@@ -54,6 +55,23 @@ def test_a_machine_of_other_physics_is_judged_alike(all_clear: ModuleType) -> No
         found = all_clear.run(all_clear.Task("hydrostatic", kind, 509, 60.0, ("base", "direct")))
         assert [o.wrong_high for o in found] == [0, 0]
         assert not any(o.outcome == "cleared" for o in found)
+
+
+def test_a_machine_of_elastic_tyres_and_overlapping_valves_is_driven_soundly(all_clear: ModuleType) -> None:
+    """Its wheels and axles follow what is asked of them, and a dead valve is no all-clear."""
+    physics = all_clear.electrohydraulic
+    for seed in (502, 515):
+        ref, true, read, *_ = physics.driven(seed, (), 40.0)
+        top = physics.build(seed)[0].top
+        assert np.abs(read[:, :4] - ref[:, :4]).mean() < 0.03 * top
+        assert np.abs(true[:, :4] - read[:, :4]).mean() < 0.02 * top
+        assert np.abs(read[:, 4:] - ref[:, 4:]).mean() < 0.02
+    names = [t.name for t in all_clear.troubles(60.0)]
+    found = all_clear.run(
+        all_clear.Task("electrohydraulic", names.index("FR valve dead, whole"), 502, 60.0, ("base", "direct"))
+    )
+    assert [o.wrong_high for o in found] == [0, 0]
+    assert not any(o.outcome == "cleared" for o in found)
 
 
 def test_nobody_is_blamed_where_a_speed_loop_hunts(all_clear: ModuleType) -> None:
