@@ -24,6 +24,7 @@ _LEAST_SHOWN = 0.02  # quantile of what a channel shows beside 0
 _ALIKE, _HOLDS = 1.5, 20  # speeds that are alike; holds that make a habit
 _LONG_HOLDS, _BEYOND_HOLDS = 0.98, 2.0  # quantile of holds that is long; times as long as that is no habit
 _SETTLING_LAGS, _OVERSHOOT, _NOISES = 6.0, 0.3, 3.0  # of a valve of higher order; share of its move; times the noise
+_FIRST_EDGE_S = 0.02  # of driving at the largest plausible speed: as far may be from edge to edge
 _FLIPS = 25  # samples in a row on one side of a command that switches to and fro between samples
 
 
@@ -46,7 +47,9 @@ def timing_explains(found: IdentifiedPair, run: Run, mode: FaultMode) -> bool:
         slope = np.gradient(np.nan_to_num(x[max(0, run.start - 1) : run.stop + 1]), pair.dt)
         moves = float(np.sqrt(np.mean(slope**2))) * max(_SENSOR_DELAY_S, _SENSOR_SAMPLES * pair.dt)
         if mode.total:
-            return _rests_by_chance(found, run, deviation) or _held_by_habit(found, run)
+            return (
+                _rests_by_chance(found, run, deviation) or _held_by_habit(found, run) or _before_first_edge(found, run)
+            )
         return mode.varying and seconds < 0.5 and deviation < moves
     if seconds <= _SPOOL_DELAY_S or (mode.varying and _settles(found, run)):
         return True
@@ -131,6 +134,15 @@ def _held_by_habit(found: IdentifiedPair, run: Run) -> bool:
     if near.size < _HOLDS:
         return False
     return bool((run.stop - run.start) < _BEYOND_HOLDS * float(np.quantile(near, _LONG_HOLDS)))
+
+
+def _before_first_edge(found: IdentifiedPair, run: Run) -> bool:
+    """Whether a wheel that rested moved on by so little that a sensor which counts edges has not seen one yet."""
+    pair, x = found.pair, np.abs(np.nan_to_num(found.samples.x[run.start : run.stop]))
+    if not np.isfinite(pair.y[run.start : run.stop]).all() or np.any(pair.y[run.start : run.stop] != 0.0):
+        return False
+    noise = 3.0 * found.texture.reference_white
+    return float(np.sum(np.where(x > noise, x, 0.0))) * pair.dt <= _FIRST_EDGE_S * pair.span
 
 
 def _rests_by_chance(found: IdentifiedPair, run: Run, deviation: float) -> bool:

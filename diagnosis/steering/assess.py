@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 from diagnosis.evidence import Part
 from diagnosis.results.assessment import CODE, Assessment, unassessed
 from diagnosis.results.vocabulary import Tier
-from diagnosis.steering.blocks import SteeringBlocks
+from diagnosis.steering.acquittal import acquitted, moves_otherwise, scatter_of
+from diagnosis.steering.blocks import SteeringBlocks, without_growth
 from diagnosis.steering.driven import driven_by
 from diagnosis.steering.evidence import evidence_columns, path_angle
 from diagnosis.steering.findings import apart, findings_of
@@ -34,6 +35,10 @@ Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
 _SIDES = (Side.SENSOR, Side.ACTUATOR)
+_OTHERWISE = (
+    "The axles do not move as any model of them says, even where it fits best: only faults that a measurement of the same "
+    "quantity shows are stated."
+)
 
 
 @dataclass(frozen=True)
@@ -78,8 +83,15 @@ def assess_steering(
     progress : Subscriber
         Called at the beginning of each stage.
     """
-    axles = [axle_inputs(timeline, replay, machine, j, counts) for j in range(len(machine.axles))]
+    axles = _evened([axle_inputs(timeline, replay, machine, j, counts) for j in range(len(machine.axles))])
     plants = _plants(axles, machine, progress)
+    otherwise = moves_otherwise(
+        [
+            scatter_of(a.blocks, plant)
+            for a in axles
+            if a.blocks is not None and (plant := plants.get(a.name)) is not None
+        ]
+    )
     assessments: dict[Part, Assessment] = {}
     angles: list[Array] = []
     doubts: list[Flags] = []
@@ -87,7 +99,7 @@ def assess_steering(
         progress(Progress(Stage.JUDGING_STEERING, inputs.name))
         plant, judged = plants.get(inputs.name), None
         if inputs.blocks is not None and plant is not None:
-            judged = _judged_by_model(inputs, inputs.blocks, plant, machine)
+            judged = _judged_by_model(inputs, inputs.blocks, plant, machine, otherwise=otherwise)
         for side in _SIDES:
             assessments[inputs.name, side.value] = _assessment(side, inputs, judged)
         angle, doubt = _best_angle(inputs, assessments[inputs.name, Side.SENSOR.value], judged)
@@ -96,6 +108,13 @@ def assess_steering(
     if not axles:
         return SteeringResult({}, np.empty((timeline.size, 0)), np.empty((timeline.size, 0), np.bool_))
     return SteeringResult(assessments, timeline.store.beside(angles), timeline.store.beside(doubts))
+
+
+def _evened(axles: Sequence[AxleInputs]) -> list[AxleInputs]:
+    """Axles with blocks whose noise does not grow with the rate."""
+    told = [(a, a.blocks) for a in axles if a.blocks is not None]
+    blocks = dict(zip([a.name for a, _ in told], without_growth([b for _, b in told]), strict=True))
+    return [replace(a, blocks=blocks.get(a.name)) for a in axles]
 
 
 def _plants(axles: Sequence[AxleInputs], machine: Machine, progress: Subscriber) -> dict[str, SteeringPlant | None]:
@@ -109,8 +128,10 @@ def _plants(axles: Sequence[AxleInputs], machine: Machine, progress: Subscriber)
     return {a.name: plant for a, plant in zip(modelled, plants, strict=True)}
 
 
-def _judged_by_model(inputs: AxleInputs, blocks: SteeringBlocks, plant: SteeringPlant, machine: Machine) -> _Judged:
-    """Inputs → models → path → findings → states and evidence columns of both sides."""
+def _judged_by_model(
+    inputs: AxleInputs, blocks: SteeringBlocks, plant: SteeringPlant, machine: Machine, *, otherwise: bool
+) -> _Judged:
+    """Inputs → models → path → findings → states and evidence columns of both sides; `otherwise`: the models do not fit."""
     model = model_of(blocks, plant, inputs.noise, machine.max_steer)
     valve_judged = inputs.valve_redundant or (plant.reliable and not inputs.command_missing)
     allowed = allowed_models(sensor=inputs.measured == "phi", actuator=valve_judged, redundant=inputs.redundant)
@@ -121,6 +142,8 @@ def _judged_by_model(inputs: AxleInputs, blocks: SteeringBlocks, plant: Steering
     if not (inputs.redundant or inputs.valve_redundant):
         found[Side.ACTUATOR] = apart(found[Side.SENSOR], found[Side.ACTUATOR], blocks.length)
         found = weighed(found, blocks.length, inputs.timeline.dt)
+    if otherwise:
+        found = {side: acquitted(side, found[side], inputs, blocks) for side in _SIDES}
     dead = [(f.start, f.stop) for f in found[Side.SENSOR].findings if f.mode.total]
     masked = [] if inputs.redundant else dead
     columns = evidence_columns(inputs, axle, path, [f for side in _SIDES for f in found[side].findings])
@@ -135,7 +158,7 @@ def _judged_by_model(inputs: AxleInputs, blocks: SteeringBlocks, plant: Steering
             columns=columns[side].columns,
             closeups=columns[side].closeups,
             tier=Tier.MODEL,
-            notes=(_note(axle),),
+            notes=(_note(axle), _OTHERWISE) if otherwise else (_note(axle),),
             unexplained_s=unexplained * inputs.timeline.dt,
         )
     return _Judged(sides, path_angle(axle, path, inputs.timeline))

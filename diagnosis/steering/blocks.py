@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass, field
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from diagnosis.channels.noise import rounding_step
+from diagnosis.channels.noise_growth import noise_growth
 from diagnosis.channels.sample_status import PAIR, SILENT, SKIP
 from diagnosis.steering.filter_state import Redundancy
 from replay.arrays.blocks import blocks as cut
@@ -22,6 +23,7 @@ Array = NDArray[np.float64]
 WHITE_DOF = 0.514  # degrees of freedom per sample in the mean square of second differences
 _BLOCK_S = 0.01
 _WINDOW_S = 0.25
+_RATE_S = 0.05  # to either side, for the steering rate
 
 
 @dataclass(frozen=True)
@@ -177,6 +179,34 @@ class SensorNoise:
     def resolved(self) -> bool:
         """Whether it is larger than the rounding step, so that a constant reading means something."""
         return self.std > 0.6 * self.lsb
+
+
+def without_growth(axles: Sequence[SteeringBlocks]) -> list[SteeringBlocks]:
+    """Axles with the power of the white part as it would be at rest, where that of all grows with their rates all through the mission.
+
+    Stamps that jitter, and controllers that are slower than the log, make steps of every ramp; those are no noise of a sensor.
+    """
+    rates = [_rates(b) for b in axles]
+    growths = [
+        noise_growth(np.where(b.count > 0, b.power, np.nan), np.abs(r), b.dt) for b, r in zip(axles, rates, strict=True)
+    ]
+    if any(g is None or g.share == 0.0 or g.floor == 0.0 for g in growths):
+        return list(axles)
+    return [
+        replace(b, power=b.power * g.floor**2 / g.variance(r))
+        for b, r, g in zip(axles, rates, growths, strict=True)
+        if g is not None
+    ]
+
+
+def _rates(blocks: SteeringBlocks) -> Array:
+    """Steering rate in every block [rad/s]."""
+    known = np.flatnonzero(blocks.count > 0)
+    mean = np.interp(np.arange(blocks.mean.size), known, blocks.mean[known]) if known.size else blocks.mean
+    reach = max(1, round(_RATE_S / blocks.dt))
+    rate = np.zeros(mean.size)
+    rate[reach:-reach] = (mean[2 * reach :] - mean[: -2 * reach]) / (2 * reach * blocks.dt)
+    return rate
 
 
 def sensor_noise(blocks: SteeringBlocks, values: Array, known: Noise, stop: float) -> SensorNoise:

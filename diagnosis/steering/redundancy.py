@@ -15,6 +15,7 @@ Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
 _MAX_LAG_S = 0.05
+_ZERO_ERROR = 0.01  # rad: what two healthy angle sensors are set to zero apart
 _SHARE_RANGE = (0.85, 1.15)
 _LEAST_CHANGES = 4
 _LEAST_SHARE = 0.5
@@ -45,6 +46,7 @@ def with_second_angle(
     use = fresh & np.isfinite(y) & np.isfinite(true)
     most = _most_lag(dt)
     moved = shifted(true, -relative_lag(true, y, use, -most, most))
+    moved = moved + _zero_error(y - moved, use & np.isfinite(moved))
     known = np.isfinite(moved)
     mean, count = _means(moved, known, blocks)
     power = _white(moved[known])
@@ -54,6 +56,11 @@ def with_second_angle(
         angle_variance=power / np.maximum(count, 1) + max(slow**2 - power, 0.0) + tolerance**2,
     )
     return replace(blocks, redundancy=redundancy)
+
+
+def _zero_error(apart: Array, use: Flags) -> float:
+    """How far apart two angles were set to zero [rad], as the mission's median says it, as far as healthy ones are."""
+    return float(np.clip(np.median(apart[use]), -_ZERO_ERROR, _ZERO_ERROR)) if use.any() else 0.0
 
 
 def with_valve_opening(

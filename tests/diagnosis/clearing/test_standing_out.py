@@ -1,0 +1,70 @@
+"""A wheel that deviates alone and by far is named, whichever side of it fails; where several do, or an axle may drag them, none is."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from diagnosis.clearing.checks import checks_of
+from diagnosis.clearing.standing_out import what_stands_out, with_findings
+from diagnosis.results.assessment import CODE, Assessment, Finding
+from diagnosis.results.machine_words import HYDRAULIC
+from replay.faults import FaultMode, FaultSpec, Side, State
+from tests.diagnosis.clearing.missions import LENGTH, in_cells, simulated
+
+WHOLE = (0.0, LENGTH)
+
+
+def _found(*faults: FaultSpec, seed: int = 5) -> dict[str, Finding]:
+    cells = in_cells(simulated(*faults, seed=seed), base=True)
+    return what_stands_out(checks_of(cells, HYDRAULIC), cells, HYDRAULIC)
+
+
+def test_nothing_stands_out_in_a_healthy_mission() -> None:
+    assert _found() == {}
+
+
+@pytest.mark.parametrize("side", [Side.SENSOR, Side.ACTUATOR])
+def test_a_wheel_that_hardly_moves_is_named_with_what_is_lost(side: Side) -> None:
+    found = _found(FaultSpec("RR", side, FaultMode.NO_SIGNAL, *WHOLE))
+    assert list(found) == ["RR"]
+    fault = found["RR"]
+    assert (fault.side, fault.mode) == (Side.SENSOR_OR_ACTUATOR, FaultMode.INEFFICIENT)
+    assert fault.epsilon is not None
+    assert fault.epsilon.value > 0.8
+    assert (fault.stop - fault.start) / 100.0 > 0.8 * LENGTH  # at 100 Hz
+    assert "below the other wheels'" in fault.evidence[0]
+
+
+def test_a_reading_that_is_too_large_for_a_third_of_the_mission_is_named_where_it_is() -> None:
+    fault = _found(FaultSpec("FL", Side.SENSOR, FaultMode.OUTSIDE_TABLE, 0.0, LENGTH / 3, -1.0), seed=7)["FL"]
+    assert fault.mode is FaultMode.OUTSIDE_TABLE
+    assert fault.epsilon is not None
+    assert fault.epsilon.value < -0.4
+    assert fault.stop / 100.0 < LENGTH / 3 + 4.0
+
+
+def test_two_wheels_alike_leave_open_which_of_them_are_healthy() -> None:
+    dead = [FaultSpec(w, Side.ACTUATOR, FaultMode.NO_SIGNAL, *WHOLE) for w in ("FR", "RR")]
+    assert _found(*dead) == {}
+
+
+def test_an_axle_that_stands_still_is_named_and_explains_its_wheels() -> None:
+    found = _found(FaultSpec("front", Side.ACTUATOR, FaultMode.NO_SIGNAL, *WHOLE))
+    assert list(found) == ["front"]
+    assert found["front"].mode is FaultMode.NO_SIGNAL
+    assert "stands still" in found["front"].evidence[0]
+
+
+def test_states_of_both_sides_say_the_fault_but_where_nothing_was_known() -> None:
+    (fault,) = _found(FaultSpec("RR", Side.ACTUATOR, FaultMode.NO_SIGNAL, *WHOLE)).values()
+    states = np.full(round(100 * LENGTH) + 1, CODE[State.HEALTHY])
+    states[: fault.start + 5] = CODE[State.NO_DATA]
+    before = {(c, s): Assessment(states) for c in ("RR", "FR") for s in ("sensor", "actuator")}
+    after = with_findings(before, {"RR": fault})
+    assert after["FR", "sensor"] is before["FR", "sensor"]
+    for side in ("sensor", "actuator"):
+        a = after["RR", side]
+        assert a.findings == (fault,)
+        assert (a.states[: fault.start + 5] == CODE[State.NO_DATA]).all()
+        assert (a.states[fault.start + 5 : fault.stop] == CODE[State.INEFFICIENT]).all()
