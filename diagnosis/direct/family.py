@@ -11,6 +11,7 @@ from diagnosis.channels.relation import relations_of_kind, valves_of_kind
 from diagnosis.direct.assess import assess_identified
 from diagnosis.direct.identification import IdentifiedPair, identify
 from diagnosis.direct.inputs import Pair, make_pair
+from diagnosis.direct.low_speed import without_low_speed_habit
 from diagnosis.direct.uncertainty import usual_of_kind
 from diagnosis.estimation.lag import low_passed
 from diagnosis.evidence import ACTUATOR, SENSOR, Array, Contribution, Flags, MissionView, Part
@@ -47,9 +48,12 @@ class DirectEvidence:
                     why = "the {position} is logged but not its command"
                     parts[wheel, ACTUATOR] = unassessed(mission.timeline.size, State.NOT_ASSESSED, why)
         limits = mission.machine.limits
-        for (wheel, side), found in _identified(pairs, limits, mission).items():
-            parts[wheel, side] = assess_identified(found, limits)
-        return Contribution(parts)
+        identified = _identified(pairs, limits, mission)
+        for part, found in identified.items():
+            parts[part] = assess_identified(found, limits)
+        sensors = {wheel: found for (wheel, side), found in identified.items() if side == SENSOR}
+        told = without_low_speed_habit(sensors, {wheel: parts[wheel, SENSOR] for wheel in sensors})
+        return Contribution({**parts, **{(wheel, SENSOR): a for wheel, a in told.items()}})
 
 
 def _identified(pairs: dict[Part, Pair], limits: Limits, mission: MissionView) -> dict[Part, IdentifiedPair]:

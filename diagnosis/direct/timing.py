@@ -46,10 +46,10 @@ def timing_explains(found: IdentifiedPair, run: Run, mode: FaultMode) -> bool:
     if pair.side is Side.SENSOR:
         slope = np.gradient(np.nan_to_num(x[max(0, run.start - 1) : run.stop + 1]), pair.dt)
         moves = float(np.sqrt(np.mean(slope**2))) * max(_SENSOR_DELAY_S, _SENSOR_SAMPLES * pair.dt)
+        if _before_first_edge(found, run):
+            return True
         if mode.total:
-            return (
-                _rests_by_chance(found, run, deviation) or _held_by_habit(found, run) or _before_first_edge(found, run)
-            )
+            return _rests_by_chance(found, run, deviation) or _held_by_habit(found, run)
         return mode.varying and seconds < 0.5 and deviation < moves
     if seconds <= _SPOOL_DELAY_S or (mode.varying and _settles(found, run)):
         return True

@@ -1,0 +1,87 @@
+"""What the speed sensors of a machine do whenever it starts, stops or turns round is their habit, and no fault of one of them.
+
+Sensors that count edges see few at low speed: they read 0 before the first one, hold the last, and come late. How far they are
+off then is taken from all passages of all wheels through low speed; a finding there that is no further off is left open.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from diagnosis.channels.noise import moving_sum
+from diagnosis.channels.sample_status import PAIR
+from diagnosis.direct.identification import IdentifiedPair
+from diagnosis.results.assessment import CODE, Assessment, Finding
+from replay.faults import State
+
+Array = NDArray[np.float64]
+
+_LOW, _TOP = 0.2, 0.98  # of the speed that is reached, by this quantile
+_EVEN_S = 0.1  # over which a deviation is evened
+_SENSORS, _PASSAGES = 3, 8  # fewer show no habit
+_USUAL, _BEYOND = 0.7, 1.7  # quantile of passages, and times it
+_SLOWEST = 0.25  # of low speed, that a passage reaches
+_MOSTLY = 0.9  # of a finding at low speed
+
+
+def without_low_speed_habit(
+    found: Mapping[str, IdentifiedPair], assessments: Mapping[str, Assessment]
+) -> dict[str, Assessment]:
+    """Assessments of speed sensors without findings that all of them would have at low speed.
+
+    Parameters
+    ----------
+    found : Mapping[str, IdentifiedPair]
+        Sensors beside their references, by wheel.
+    assessments : Mapping[str, Assessment]
+        What was found of them.
+    """
+    if len(found) < _SENSORS or not any(a.findings for a in assessments.values()):
+        return dict(assessments)
+    speeds = {w: np.abs(np.nan_to_num(one.samples.x)) for w, one in found.items()}
+    low = _LOW * max(float(np.quantile(x, _TOP)) for x in speeds.values())
+    off = {w: _off(one) for w, one in found.items()}
+    peaks = np.concatenate([_peaks(off[w], speeds[w], low) for w in found])
+    if peaks.size < _PASSAGES:
+        return dict(assessments)
+    limit = _BEYOND * float(np.quantile(peaks, _USUAL))
+    return {
+        w: _without(a, [f for f in a.findings if _is_habit(f, off[w], speeds[w] < low, limit)])
+        for w, a in assessments.items()
+    }
+
+
+def _off(one: IdentifiedPair) -> Array:
+    """How far the readings are off their reference, evened [unit], shape (n,)."""
+    known = one.samples.status == PAIR
+    width = max(1, round(_EVEN_S / one.pair.dt))
+    count = moving_sum(known, width)
+    total = moving_sum(np.where(known, one.samples.y - one.samples.x, 0.0), width)
+    return np.asarray(np.abs(total) / np.maximum(count, 1))
+
+
+def _peaks(off: Array, speed: Array, low: float) -> Array:
+    """Largest deviation of each passage that comes near standstill, and begins or ends with motion."""
+    edge = np.flatnonzero(np.diff(np.r_[False, speed < low, False].astype(np.int8)))
+    spans = [(a, b) for a, b in zip(edge[::2], edge[1::2], strict=True) if a > 0 or b < speed.size]
+    return np.array([off[a:b].max() for a, b in spans if speed[a:b].min() < _SLOWEST * low])
+
+
+def _is_habit(finding: Finding, off: Array, low: NDArray[np.bool_], limit: float) -> bool:
+    part = slice(finding.start, finding.stop)
+    return bool(low[part].mean() >= _MOSTLY and off[part].max(initial=0.0) <= limit)
+
+
+def _without(a: Assessment, findings: list[Finding]) -> Assessment:
+    """An assessment that leaves open what some findings said."""
+    if not findings:
+        return a
+    states = a.states.copy()
+    for f in findings:
+        inside = states[f.start : f.stop]
+        inside[inside == CODE[State(f.mode.value)]] = CODE[State.NOT_ASSESSED]
+    return replace(a, states=states, findings=tuple(f for f in a.findings if f not in findings))
