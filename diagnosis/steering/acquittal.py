@@ -32,6 +32,7 @@ _BEST = 0.3  # quantile of windows
 _SCATTER = 0.0045  # of a motion: machines that move as their model says are below
 _MOTION_S = 0.05  # to either side
 _BEYOND = 2.5  # times what is usual at such motion
+_MOSTLY = 0.4  # of a finding: its ends may come late
 _LEAST = {Side.SENSOR: 0.012, Side.ACTUATOR: 0.02}  # rad and of full opening: less is nobody's fault
 
 
@@ -109,8 +110,8 @@ def _apart(side: Side, inputs: AxleInputs, blocks: SteeringBlocks) -> tuple[Arra
     """A channel less its second measurement in each block, NaN where there is none, and how fast it moves there [1/s]."""
     twice = blocks.redundancy
     if side is Side.SENSOR:
-        apart = blocks.mean - twice.angle if inputs.angle_redundant else np.full(blocks.mean.size, np.nan)
         by = np.where(blocks.count > 0, blocks.mean, np.nan)
+        apart = by - twice.angle if inputs.angle_redundant else np.full(by.size, np.nan)
     else:
         apart, by = twice.opening - twice.command, twice.command
     reach = max(1, round(_MOTION_S / blocks.dt))
@@ -122,5 +123,5 @@ def _apart(side: Side, inputs: AxleInputs, blocks: SteeringBlocks) -> tuple[Arra
 def _shown(finding: Finding, apart: Array, limit: Array) -> bool:
     known = np.isfinite(apart)
     if known.any():
-        return bool(np.mean(apart[known] ** 2) > np.mean(limit[known]))
+        return bool(np.mean(apart[known] ** 2 > limit[known]) >= _MOSTLY)
     return finding.side is Side.SENSOR and finding.mode is FaultMode.NO_SIGNAL
