@@ -18,7 +18,7 @@ import sys
 from collections import Counter
 from collections.abc import Iterator, Sequence, Set
 from concurrent.futures import ProcessPoolExecutor, as_completed
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
@@ -109,8 +109,8 @@ def recorded(
 
 
 def cells_in(signals: Signals, machine: Machine) -> Cells:
-    """What the checks are asked of."""
-    timeline = align(signals)
+    """What the checks are asked of; the law on the machine, whose fitting takes longest, is not."""
+    timeline, machine = align(signals), replace(machine, control=replace(machine.control, law="none"))
     return cells_of(timeline, replay_loop(timeline, machine, bucket_of(timeline.size)), machine)
 
 
@@ -136,7 +136,7 @@ def fault_of(row: Detectable, start: float, stop: float, sign: float, scale: flo
     return None
 
 
-def draw(healthy: Cells, open_before: Set[str], faults: int, rng: np.random.Generator) -> list[Drawn]:
+def draw(healthy: Cells, open_before: Set[str], faults: int, times: float, rng: np.random.Generator) -> list[Drawn]:
     """Faults of a healthy mission: random rows, each at a random one of its places."""
     gauges = {(g.component, g.side): g for g in gauges_of(healthy)}
     rows = [r for r in detectable(healthy).rows if r.places and r.component not in open_before]
@@ -145,6 +145,7 @@ def draw(healthy: Cells, open_before: Set[str], faults: int, rng: np.random.Gene
     for _ in range(10 * faults if all(parts) else 0):
         own = parts[int(rng.random() < _WHOLE)]
         row = own[int(rng.integers(len(own)))]
+        row = row if row.size is None else replace(row, size=times * row.size)
         places = places_of(gauges[row.component, row.side], healthy, row.for_s)
         at = int(rng.integers(places.first.size))
         span = float(places.first[at] * healthy.dt), float(places.last[at] * healthy.dt)
@@ -175,7 +176,7 @@ def groups(drawn: Sequence[Drawn], *, alone: bool) -> list[list[Drawn]]:
     return out
 
 
-def run(machine: str, seed: int, duration: float, faults: int, alone: bool) -> list[Tried]:
+def run(machine: str, seed: int, duration: float, faults: int, times: float, alone: bool) -> list[Tried]:
     """Faults at what one mission states, `faults` of each tier."""
     rng, out = np.random.default_rng(seed), list[Tried]()
     for tier in TIERS:
@@ -187,7 +188,7 @@ def run(machine: str, seed: int, duration: float, faults: int, alone: bool) -> l
 
         healthy = cells_in(*recorded(machine, seed, duration, (), tier))
         open_before = {c.component for c in checks_of(healthy, HYDRAULIC) if not c.passed}
-        for group in groups(draw(healthy, open_before, faults, rng), alone=alone):
+        for group in groups(draw(healthy, open_before, faults, times, rng), alone=alone):
             together = failed(*group)
             for d in group:
                 sure = len(group) == 1 or any(shows(c, d.fault) for c in together)
@@ -215,11 +216,11 @@ def _tried(d: Drawn, failed: Sequence[Checked], known: Set[str], healthy: Cells,
 
 
 def run_all(
-    machines: Sequence[str], seeds: Sequence[int], duration: float, faults: int, jobs: int, *, alone: bool
+    machines: Sequence[str], seeds: Sequence[int], duration: float, faults: int, times: float, jobs: int, *, alone: bool
 ) -> Iterator[Tried]:
     """Outcomes as they come."""
     with ProcessPoolExecutor(jobs) as pool:
-        futures = [pool.submit(run, m, s, duration, faults, alone) for s in seeds for m in machines]
+        futures = [pool.submit(run, m, s, duration, faults, times, alone) for s in seeds for m in machines]
         for done, future in enumerate(as_completed(futures), 1):
             print(f"\r{done} of {len(futures)} missions   ", end="", file=sys.stderr, flush=True)
             yield from future.result()
@@ -268,6 +269,7 @@ def main() -> None:
     parser.add_argument("--faults", type=int, default=40, help="of each mission and tier")
     parser.add_argument("--duration", type=float, default=75.0, help="length of a mission [s]")
     parser.add_argument("--machines", nargs="+", default=None, help="default, hydrostatic, structures by name")
+    parser.add_argument("--times", type=float, default=1.0, help="what is stated, times this")
     parser.add_argument("--alone", action="store_true", help="a simulated mission for each fault")
     parser.add_argument("--json", type=Path, default=None, help="every fault, a line each, added to this file")
     parser.add_argument("--jobs", type=int, default=1)
@@ -275,7 +277,7 @@ def main() -> None:
     named = [DEFAULT, hydrostatic.NAME, *(n for n, s in STRUCTURES.items() if s.kind == asked.seeds)]
     seeds = range(FIRST[asked.seeds] + asked.first, FIRST[asked.seeds] + asked.first + asked.missions)
     tried: list[Tried] = []
-    work = asked.machines or named, seeds, asked.duration, asked.faults, asked.jobs
+    work = asked.machines or named, seeds, asked.duration, asked.faults, asked.times, asked.jobs
     for t in run_all(*work, alone=asked.alone):
         tried.append(t)
         if asked.json is not None:
