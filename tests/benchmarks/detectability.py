@@ -137,13 +137,16 @@ def fault_of(row: Detectable, start: float, stop: float, sign: float, scale: flo
 
 
 def draw(healthy: Cells, open_before: Set[str], faults: int, times: float, rng: np.random.Generator) -> list[Drawn]:
-    """Faults of a healthy mission: random rows, each at a random one of its places."""
+    """Faults of a healthy mission: random deviations of random rows, each at a random one of its places."""
     gauges = {(g.component, g.side): g for g in gauges_of(healthy)}
     rows = [r for r in detectable(healthy).rows if r.places and r.component not in open_before]
     scale, out = 0.36 / healthy.machine.max_speed, list[Drawn]()
     parts = [[r for r in rows if (r.for_s is None) == whole] for whole in (False, True)]
     for _ in range(10 * faults if all(parts) else 0):
         own = parts[int(rng.random() < _WHOLE)]
+        kinds = sorted({r.deviation for r in own})
+        chosen = kinds[int(rng.integers(len(kinds)))]
+        own = [r for r in own if r.deviation is chosen]
         row = own[int(rng.integers(len(own)))]
         row = row if row.size is None else replace(row, size=times * row.size)
         places = places_of(gauges[row.component, row.side], healthy, row.for_s)
