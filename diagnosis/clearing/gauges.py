@@ -160,9 +160,10 @@ def _axles(cells: Cells) -> Iterator[Gauges]:
     used, share = np.where(np.isfinite(opening), opening, command), -np.log1p(-clear_at)
     rates = axles.rates_of(cells, axles.rate_of(angle, cells.dt), used)
     path = yaw.off_straight(cells)
-    answer = yaw.answer(cells)
-    straight = None if path is None else Straight(cells.frame, path, yaw.OFF / answer)
-    turned = {} if path is None else {Deviation.OFFSET: (yaw.LASTING_OFF + abs(float(np.nanmedian(path)))) / answer}
+    straight = None if path is None else Straight(cells.frame, path, yaw.OFF / yaw.ANSWERED)
+    turned = (
+        {} if path is None else {Deviation.OFFSET: (yaw.LASTING_OFF + abs(float(np.nanmedian(path)))) / yaw.ANSWERED}
+    )
     for j, name in enumerate(cells.machine.axles):
         phi, x, u, a = (z[:, j] for z in (angle, second, command, opening))
         if not _known(phi):

@@ -19,7 +19,7 @@ _MOVING = 0.25  # of the top speed
 OFF, LASTING_OFF = 0.06, 0.04  # rad
 _STRAIGHT, _SHORTEST = 0.08, 0.1  # rad, m
 _LEAST_S = 6.0  # of driving straight
-_LEAST_ANSWER = 0.3
+ANSWERED = 0.7  # of an angle by which one axle alone is off: tyres give way sideways
 
 
 def yaw_checks(cells: Cells) -> Iterator[Checked]:
@@ -46,22 +46,10 @@ def off_straight(cells: Cells) -> Array | None:
     return straight if np.count_nonzero(np.isfinite(straight)) * cells.dt >= _LEAST_S else None
 
 
-def answer(cells: Cells) -> float:
-    """By how much the machine turns where its angles do [1]: tyres that slip sideways make it less."""
-    off = _off_angles(cells)
-    if off is None:
-        return 1.0
-    known = np.isfinite(off.angle)
-    turn, path = off.turn[known], off.turn[known] + off.angle[known]
-    power = float(turn @ turn)
-    return float(np.clip(turn @ path / power, _LEAST_ANSWER, 1.0)) if power > 0.0 else 1.0
-
-
 class _Off(NamedTuple):
-    """By how much the path is off that by the angles, as an angle of one axle [rad], what those point to [rad], and where that is straight, shape (cells,)."""
+    """By how much the path is off that by the angles, as an angle of one axle [rad], and where they point straight, shape (cells,)."""
 
     angle: Array
-    turn: Array
     straight: NDArray[np.bool_]
 
 
@@ -83,4 +71,4 @@ def _off_angles(cells: Cells) -> _Off | None:
     turn = np.tan(angle[:, 0]) - np.tan(angle[:, 1])
     with np.errstate(divide="ignore", invalid="ignore"):
         off = np.where(moving, (yaw - bias) / speed * length - turn, np.nan)
-    return _Off(off, turn, np.abs(turn) < _STRAIGHT)
+    return _Off(off, np.abs(turn) < _STRAIGHT)
