@@ -119,10 +119,10 @@ def estimate_run(run: Run, found: IdentifiedPair) -> Estimate | None:
     known = found.instruments
     instruments = None if known is None else np.nan_to_num(known[run.start : run.stop][use])
     estimate = estimate_fault(run.row, y[use], x[use], found.model, found.pair.unit, instruments)
-    if estimate is None or estimate[0] is None or run.row in TOTAL_ROWS:
+    if estimate is None or run.row in TOTAL_ROWS:
         return estimate
     epsilon, sat, delta = estimate
-    return epsilon.with_gain(found.gain_spread), sat, delta
+    return estimate if epsilon is None else (epsilon.with_gain(found.gain_spread), sat, delta)
 
 
 def isolate(run: Run, found: IdentifiedPair) -> Isolated | None:

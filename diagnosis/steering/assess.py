@@ -22,7 +22,7 @@ from diagnosis.steering.path import AxleFilter, allowed_models, most_probable
 from diagnosis.steering.path_refinement import refine_path
 from diagnosis.steering.plant import SteeringPlant
 from diagnosis.steering.prior import plant_before
-from diagnosis.steering.reliability import commanded, weighed
+from diagnosis.steering.reliability import commanded, paired, weighed
 from diagnosis.steering.states import REASONS, states_of
 from replay.control.loop import Replay
 from replay.faults import Side, State
@@ -121,6 +121,8 @@ def _judged_by_model(inputs: AxleInputs, blocks: SteeringBlocks, plant: Steering
     if not (inputs.redundant or inputs.valve_redundant):
         found[Side.ACTUATOR] = apart(found[Side.SENSOR], found[Side.ACTUATOR], blocks.length)
         found = weighed(found, blocks.length, inputs.timeline.dt)
+    else:
+        found = paired(found)
     dead = [(f.start, f.stop) for f in found[Side.SENSOR].findings if f.mode.total]
     masked = [] if inputs.redundant else dead
     columns = evidence_columns(inputs, axle, path, [f for side in _SIDES for f in found[side].findings])
