@@ -8,10 +8,11 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from diagnosis.clearing import axles, wheels
+from diagnosis.clearing import axles, wheels, yaw
+from diagnosis.clearing.alone import Rough, Still, Straight
 from diagnosis.clearing.cells import Array, Cells
 from diagnosis.clearing.measure import compared, late
-from diagnosis.clearing.placements import Overlap, Placements, Ratio, Reference, Rough, Still
+from diagnosis.clearing.placements import Overlap, Placements, Ratio, Reference
 from diagnosis.results.detectability import Deviation
 from diagnosis.results.vocabulary import Kind
 from replay.faults import Side
@@ -42,6 +43,8 @@ class Gauges:
         Its quick changes.
     still : Still or None
         Whether it rests while it is commanded.
+    straight : Straight or None
+        Whether it points where the machine goes.
     lasting : dict[Deviation, float]
         Smallest sizes over the whole mission by what is usual of it.
     """
@@ -56,6 +59,7 @@ class Gauges:
     reference: Reference | None
     rough: Rough | None = None
     still: Still | None = None
+    straight: Straight | None = None
     lasting: dict[Deviation, float] = field(default_factory=dict)
 
     @property
@@ -72,6 +76,17 @@ class Gauges:
         """`sizes` of an excess; an axle that turns faster for some seconds shows by its second measurements alone."""
         alone = replace(self, ratio=None) if self.kind is Kind.STEER else self
         return alone.sizes(places, lambda r: r.excess, lambda r: r.excess)
+
+    def offsets(self, places: Placements) -> Array:
+        """`sizes` of an offset; of an angle it is no motion per opening, but one shows where the machine goes straight."""
+        if self.kind is not Kind.STEER:
+            return self.sizes(places, lambda r: r.offset, lambda r: r.offset)
+        alone = replace(self, ratio=None).sizes(places, lambda r: r.offset, lambda r: r.offset)
+        return (
+            alone
+            if self.straight is None
+            else np.minimum(alone, self.straight.offset(places.overlap(self.straight.frame)))
+        )
 
     def sizes(
         self, places: Placements, ratio: Callable[[Ratio], Sizes], reference: Callable[[Reference], Sizes]
@@ -144,6 +159,11 @@ def _axles(cells: Cells) -> Iterator[Gauges]:
     clear_at, frame = cells.machine.limits.clear_at, axles.still_frame(cells)
     used, share = np.where(np.isfinite(opening), opening, command), -np.log1p(-clear_at)
     rates = axles.rates_of(cells, axles.rate_of(angle, cells.dt), used)
+    path = yaw.off_straight(cells)
+    straight = None if path is None else Straight(cells.frame, path, yaw.OFF / yaw.ANSWERED)
+    turned = (
+        {} if path is None else {Deviation.OFFSET: (yaw.LASTING_OFF + abs(float(np.nanmedian(path)))) / yaw.ANSWERED}
+    )
     for j, name in enumerate(cells.machine.axles):
         phi, x, u, a = (z[:, j] for z in (angle, second, command, opening))
         if not _known(phi):
@@ -171,12 +191,14 @@ def _axles(cells: Cells) -> Iterator[Gauges]:
         still = Still(frame, np.abs(frame.mean(u)) >= axles.ANSWERED) if _known(u) else None
         second_one = _reference(cells, name, (phi, x, axles.FLOOR_RAD), clear_at) if measured else None
         about = (Kind.STEER, name)
-        yield Gauges(*about, Side.SENSOR, "rad", moving, phi, ratio, second_one, None, still, lasting)
+        yield Gauges(
+            *about, Side.SENSOR, "rad", moving, phi, ratio, second_one, None, still, straight, {**lasting, **turned}
+        )
         if twice:
             asked = _reference(cells, name, (a, u, axles.OPENING), axles.VALVE * clear_at)
-            yield Gauges(*about, Side.ACTUATOR, "1", moving, a, None, asked, None, still)
+            yield Gauges(*about, Side.ACTUATOR, "1", moving, a, None, asked, still=still)
         elif _known(u):
-            yield Gauges(*about, Side.ACTUATOR, "1", moving, phi, ratio, None, None, still, lasting)
+            yield Gauges(*about, Side.ACTUATOR, "1", moving, phi, ratio, None, still=still, lasting=lasting)
 
 
 def _rooms(usual: tuple[float | None, ...], below: float, above: float) -> tuple[tuple[float, float], ...]:

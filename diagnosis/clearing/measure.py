@@ -41,6 +41,8 @@ class Compared(NamedTuple):
         Mean of a − b.
     driven, moves : NDArray[np.bool_], shape (windows,)
         Whether the reference is beyond its floor, and whether it or the channel is.
+    floor : float
+        What `size` is at least.
     """
 
     frame: Frame
@@ -50,6 +52,7 @@ class Compared(NamedTuple):
     mean: Array
     driven: NDArray[np.bool_]
     moves: NDArray[np.bool_]
+    floor: float
 
     @property
     def off(self) -> Array:
@@ -80,7 +83,7 @@ def compared(cells: Cells, y: Array, x: Array, floor: float) -> Compared:
     a, b = (np.where(known, lowest_passed(z, cells.dt, _EVEN_S), np.nan) for z in (y, x))
     large, driven = frame.rms(b), frame.rms(b) > floor
     moves = driven | (frame.rms(a) > 2.0 * floor)
-    return Compared(frame, a, b, np.maximum(large, floor), frame.mean(a - b), driven, moves)
+    return Compared(frame, a, b, np.maximum(large, floor), frame.mean(a - b), driven, moves, floor)
 
 
 def late(speed: Array, reference: Array, dt: float) -> list[float | None]:

@@ -14,6 +14,7 @@ from diagnosis.clearing.measure import Compared
 _MOST = 160  # places that are tried
 _MOVED = 0.6  # of a fault's time, in which its part is driven, or as many cells as are asked
 _TOUCHED, _USUAL = 0.25, 0.4  # of a window, and of the windows: more of them shift what is usual
+_ROUNDS = 12  # of a fixed point
 _FILLED, _BECOMES = 0.9, 0.6  # of a window, and of the windows: so many of them are what is usual
 
 
@@ -90,6 +91,11 @@ def least(sizes: Array) -> Array:
     return np.asarray(np.maximum(np.min(np.where(np.isnan(sizes), np.inf, sizes), axis=1), 0.0))
 
 
+def countered(less: Array) -> Array:
+    """Excess of which a loop that keeps the motion as commanded leaves an opening, or a true motion, less by this share."""
+    return np.asarray(np.where(less < 1.0, np.maximum(less, 0.0) / np.maximum(1.0 - less, 1e-9), np.inf))
+
+
 @dataclass(frozen=True)
 class Ratio:
     """A check of motion per opening.
@@ -147,9 +153,9 @@ class Ratio:
         return np.maximum(out, 0.0)
 
     def excess(self, over: Overlap) -> Array:
-        """Smallest excess [1], likewise."""
+        """Smallest excess [1], likewise; the loop closes the valve until the motion is as commanded again."""
         share = self.share(over)
-        out = least(np.expm1(self.above - self.room(over, share)) / share)
+        out = least(countered(-np.expm1(self.room(over, share) - self.above) / share))
         for kind, (_, above) in enumerate(self.lasting):
             out = np.where(self.filled(over, share, kind, _FILLED) > _BECOMES, np.minimum(out, np.expm1(above)), out)
         return np.maximum(out, 0.0)
@@ -173,46 +179,6 @@ class Ratio:
 
 
 @dataclass(frozen=True)
-class Rough:
-    """The check of quick changes.
-
-    Attributes
-    ----------
-    frame : Frame
-        Its windows.
-    quick, size, limit : Array, shape (windows,)
-        Quick changes by their root mean square, what they are a share of, and the limit of that share.
-    width : int
-        Samples in a cell.
-    """
-
-    frame: Frame
-    quick: Array
-    size: Array
-    limit: Array
-    width: int
-
-    def noise(self, over: Overlap) -> Array:
-        """Smallest standard deviation of white noise of the samples that the windows show, shape (places,)."""
-        k, inside = over.windows, (over.last - over.first) / self.frame.length
-        lacks = np.maximum((self.limit * self.size)[k] ** 2 - self.quick[k] ** 2, 0.0)
-        return least(np.where(inside > 0.0, np.sqrt(lacks / inside * 1.5 * self.width), np.nan))
-
-
-@dataclass(frozen=True)
-class Still:
-    """The check of a command while its axle rests: `asked`, shape (windows,), is where the command is large enough."""
-
-    frame: Frame
-    asked: NDArray[np.bool_]
-
-    def shows(self, over: Overlap) -> NDArray[np.bool_]:
-        """Whether an axle that rests is found, shape (places,)."""
-        whole = over.last - over.first >= self.frame.length
-        return np.asarray((whole & self.asked[over.windows]).any(axis=1))
-
-
-@dataclass(frozen=True)
 class Reference:
     """A check of a channel against its second measurement, or an opening against its command."""
 
@@ -222,16 +188,15 @@ class Reference:
     def _window(self, over: Overlap, x: Array) -> Array:
         return np.asarray(self.compared.frame.sums(x)[over.windows])
 
-    def loss(self, over: Overlap, sign: float = 1.0) -> Array:
-        """Smallest loss [1] of the channel that its windows show, shape (places,); `sign` −1: excess."""
+    def loss(self, over: Overlap) -> Array:
+        """Smallest loss [1] of the channel that its windows show, shape (places,)."""
         c, limit = self.compared, self.limit
-        known = np.isfinite(c.a)
-        power = self._window(over, np.where(known, c.b * c.b, 0.0))
+        power = self._power(over)
         with np.errstate(divide="ignore", invalid="ignore"):
             off = 1.0 - self._window(over, c.a * c.b) / power
             slope = over.sums(c.a * c.b) / power
-            gain = np.where(c.driven[over.windows] & (slope > 0.0), (limit - sign * off) / slope, np.nan)
-            mean = sign * over.sums(c.a) / self._window(over, known.astype(np.float64))
+            gain = np.where(c.driven[over.windows] & (slope > 0.0), (limit - off) / slope, np.nan)
+            mean = over.sums(c.a) / self._window(over, np.isfinite(c.a).astype(np.float64))
             much, at = limit * c.size[over.windows], c.mean[over.windows]
             shifted = np.where(mean > 0.0, (much + at) / mean, (much - at) / -mean)
         shown = c.moves[over.windows] & (over.last > over.first)
@@ -239,8 +204,32 @@ class Reference:
         return np.minimum(least(np.where(shown, gain, np.nan)), least(shifted))
 
     def excess(self, over: Overlap) -> Array:
-        """Smallest excess [1], likewise."""
-        return self.loss(over, -1.0)
+        """Smallest excess [1], likewise; the loop takes the reference back until the motion is as commanded again."""
+        c = self.compared
+        power = self._power(over)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            share = over.sums(np.where(np.isfinite(c.a), c.b * c.b, 0.0)) / power
+            much = self.limit + 1.0 - self._window(over, c.a * c.b) / power
+            # by gain: share·s = much·((1 − share)·(1 + s)² + share)
+            square, line = much * (1.0 - share), share - 2.0 * much * (1.0 - share)
+            root = line**2 - 4.0 * square * much
+            gain = np.where((root >= 0.0) & (line > 0.0), 2.0 * much / (line + np.sqrt(np.maximum(root, 0.0))), np.nan)
+            mean = over.sums(c.a) / self._window(over, np.isfinite(c.a).astype(np.float64))
+            at = c.mean[over.windows] * np.sign(mean)
+            shifted = before = np.zeros(mean.shape)
+            for _ in range(_ROUNDS):  # what is left of the reference is what a deviation is a share of
+                before, left = shifted, np.sqrt(1.0 - share + share / (1.0 + shifted) ** 2)
+                size = np.maximum(left * c.size[over.windows], c.floor)
+                shifted = countered((self.limit * size - at) / np.abs(mean))
+            shifted = np.maximum(before, shifted)
+        shown = c.moves[over.windows] & (over.last > over.first)
+        shifted = np.where(shown & (mean != 0.0), shifted, np.nan)
+        return np.minimum(least(np.where(shown & c.driven[over.windows], gain, np.nan)), least(shifted))
+
+    def _power(self, over: Overlap) -> Array:
+        """Sum of the reference's squares in each window, shape (places, n)."""
+        c = self.compared
+        return self._window(over, np.where(np.isfinite(c.a), c.b * c.b, 0.0))
 
     def offset(self, over: Overlap) -> Array:
         """Smallest offset of either sign, in the channel's unit, likewise."""

@@ -16,9 +16,10 @@ from replay.faults import Side
 
 _STILL, _STILL_S = 0.01, 1.0  # m/s; at rest for this long, a gyro shows its bias
 _MOVING = 0.25  # of the top speed
-_OFF, _LASTING_OFF = 0.06, 0.04  # rad
+OFF, LASTING_OFF = 0.06, 0.04  # rad
 _STRAIGHT, _SHORTEST = 0.08, 0.1  # rad, m
 _LEAST_S = 6.0  # of driving straight
+ANSWERED = 0.7  # of an angle by which one axle alone is off: tyres give way sideways
 
 
 def yaw_checks(cells: Cells) -> Iterator[Checked]:
@@ -26,17 +27,23 @@ def yaw_checks(cells: Cells) -> Iterator[Checked]:
 
     In turns tyres and the wheels' offsets make the angles an approximation.
     """
-    off, part = _off_angles(cells), Side.SENSOR_OR_ACTUATOR
-    if off is None:
-        return
-    straight = np.where(off.straight, off.angle, np.nan)
-    if np.count_nonzero(np.isfinite(straight)) * cells.dt < _LEAST_S:
+    straight, part = off_straight(cells), Side.SENSOR_OR_ACTUATOR
+    if straight is None:
         return
     windows, lasting = np.abs(cells.frame.mean(straight)), abs(float(np.nanmedian(straight)))
     for axle in cells.machine.axles:
         if np.isfinite(windows).any():
-            yield worst(cells, (Kind.STEER, axle, part, Check.YAW), windows, _OFF)
-        yield lasts(cells, (Kind.STEER, axle, part, Check.LASTING_YAW), lasting, _LASTING_OFF)
+            yield worst(cells, (Kind.STEER, axle, part, Check.YAW), windows, OFF)
+        yield lasts(cells, (Kind.STEER, axle, part, Check.LASTING_YAW), lasting, LASTING_OFF)
+
+
+def off_straight(cells: Cells) -> Array | None:
+    """By how much the path is off that by the angles [rad], NaN but where they point straight, shape (cells,); None for too little."""
+    off = _off_angles(cells)
+    if off is None:
+        return None
+    straight = np.where(off.straight, off.angle, np.nan)
+    return straight if np.count_nonzero(np.isfinite(straight)) * cells.dt >= _LEAST_S else None
 
 
 class _Off(NamedTuple):

@@ -14,9 +14,11 @@ from diagnosis.results.machine_words import MachineWords
 from diagnosis.results.result import Epsilon, FaultInterval, StateSpan
 from diagnosis.results.vocabulary import Kind, Tier
 from replay.faults import FaultMode
+from replay.faults import Side
 from replay.machine.config import Machine
 
-_MODEL_LOSS = 0.3  # beyond 95 % of the errors of a wheel's ε̂ by its model, on tuning seeds
+#: 95 % of the errors of a wheel's ε̂ by its model, on tuning seeds: what a loop makes up for hides a sensor's size more than a valve's.
+_MODEL_LOSS = {Side.SENSOR: 0.45, Side.ACTUATOR: 0.3, Side.SENSOR_OR_ACTUATOR: 0.45}
 #: A component and its side.
 Part = tuple[str, str]
 
@@ -61,7 +63,8 @@ def _bounded(f: Finding, kind: Kind) -> Epsilon | None:
     e = f.epsilon
     if e is None or f.tier is not Tier.MODEL or kind is not Kind.WHEEL or f.mode is not FaultMode.INEFFICIENT:
         return e
-    return Epsilon(e.value, max(0.0, min(e.low, e.value - _MODEL_LOSS)), min(1.0, max(e.high, e.value + _MODEL_LOSS)))
+    most = _MODEL_LOSS[f.side]
+    return Epsilon(e.value, max(0.0, min(e.low, e.value - most)), min(1.0, max(e.high, e.value + most)))
 
 
 def spans_of(assessments: Mapping[Part, Assessment], step_ns: int) -> tuple[StateSpan, ...]:

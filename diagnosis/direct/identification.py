@@ -31,6 +31,8 @@ from replay.machine.config import Limits
 Array = NDArray[np.float64]
 
 _MAX_LAG_S = 0.05
+_GAIN_S, _GAIN_DRIVEN, _GAIN_WINDOWS = 1.0, 0.1, 6  # windows; of the span, from which on they move; the fewest of them
+_NORMAL_MEDIAN = 0.6745  # of the size of a normal variable of unit variance
 _WHOLE = 0.25
 _JUMP = 3.5  # times the noise
 _COARSE, _COARSE_COST = (
@@ -119,6 +121,11 @@ class IdentifiedPair:
         return _news(np.isin(self.samples.status, (PAIR, BLIND)))[0]
 
     @cached_property
+    def gain_spread(self) -> float:
+        """Standard deviation of y per reference from second to second while healthy [1]: it lasts, and does not average out."""
+        return gain_spread(self.samples, self.model.span, self.pair.dt)
+
+    @cached_property
     def holds(self) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
         """Where y begins to hold a value other than 0, and for how many steps."""
         known = np.flatnonzero(self.pair.fresh & np.isfinite(self.pair.y))
@@ -136,6 +143,29 @@ class IdentifiedPair:
         y, x = pair.y[known], self.samples.x[known]
         white, own = (float(np.nan_to_num(white_noise(z, pair.dt))) for z in (y, x))
         return Texture(y.size, white, self.lsb, own)
+
+
+def gain_spread(samples: Samples, span: float, dt: float) -> float:
+    """Robust standard deviation of the gain Σxy/Σx² of windows of a second about 1; 0 where few windows move.
+
+    Parameters
+    ----------
+    samples : Samples
+        A channel and its reference.
+    span : float
+        Of the channel [unit of y].
+    dt : float
+        Step [s].
+    """
+    width = max(2, round(_GAIN_S / dt))
+    size = samples.y.size // width * width
+    use = (samples.status[:size] == PAIR) & ~samples.quiet[:size]
+    x, y = (np.where(use, np.nan_to_num(z[:size]), 0.0).reshape(-1, width) for z in (samples.x, samples.y))
+    power, moved = np.einsum("ij,ij->i", x, x), np.einsum("ij,ij->i", x, y)
+    driven = power > width * (_GAIN_DRIVEN * span) ** 2
+    if np.count_nonzero(driven) < _GAIN_WINDOWS:
+        return 0.0
+    return float(np.median(np.abs(moved[driven] / power[driven] - 1.0)) / _NORMAL_MEDIAN)
 
 
 def identify(

@@ -37,6 +37,7 @@ Estimate = tuple[Epsilon | None, Sat | None, float]
 # the length at which half of those in a log too slow for its commands are.
 _LAPSE, _COARSE_S = 0.01, 1.7
 _RESTLESS, _RESTLESS_P = 0.1, 0.8  # share of changing news from which a channel is not stuck, and how probably so
+_OF_PLAY = 0.25  # standard deviation of a place within the play, as a share of its width
 _CLEARLY = 2.0  # times as probable as the path's row, from which on another one is stated
 
 
@@ -118,7 +119,18 @@ def estimate_run(run: Run, found: IdentifiedPair) -> Estimate | None:
     use = np.isin(status, (PAIR, BLIND))
     known = found.instruments
     instruments = None if known is None else np.nan_to_num(known[run.start : run.stop][use])
-    return estimate_fault(run.row, y[use], x[use], found.model, found.pair.unit, instruments)
+    estimate = estimate_fault(run.row, y[use], x[use], found.model, found.pair.unit, instruments)
+    if estimate is None or run.row in TOTAL_ROWS:
+        return estimate
+    epsilon, sat, delta = estimate
+    return estimate if epsilon is None else (epsilon.with_gain(_gain_std(x[use], found, delta)), sat, delta)
+
+
+def _gain_std(x: Array, found: IdentifiedPair, delta: float) -> float:
+    """Standard deviation of a gain as a share of it: what the healthy channel's own varies by, and the side of the play it is on."""
+    large = float(np.sqrt(np.mean(x**2))) if x.size else 0.0
+    played = _OF_PLAY * found.relation.play / (large * abs(delta)) if large > 0.0 and delta != 0.0 else 0.0
+    return float(np.hypot(found.gain_spread, min(played, 1.0)))
 
 
 def isolate(run: Run, found: IdentifiedPair) -> Isolated | None:

@@ -9,6 +9,7 @@ from diagnosis.evaluation.counts import FaultOutcome, ReportOutcome
 from diagnosis.evaluation.matching import assign, difference
 from diagnosis.evaluation.spans import covered, length, within, without
 from diagnosis.results.size_rows import EpsilonRow
+from replay.faults import TOTAL
 
 
 def match_events(group: Compared) -> tuple[tuple[FaultOutcome, ...], tuple[ReportOutcome, ...]]:
@@ -97,12 +98,12 @@ def _report(group: Compared, j: int, outcome: str, truth: float | None) -> Repor
         epsilon=None if estimate is None else float(estimate["value"]),
         speed=speed,
         slip_share=slip,
-        bounds_hold=_bounds_hold(estimate, truth) if outcome == "right" else None,
+        bounds_hold=_bounds_hold(estimate, truth) if outcome == "right" and row["mode"] not in TOTAL else None,
     )
 
 
 def _bounds_hold(estimate: EpsilonRow | None, truth: float | None) -> bool | None:
-    """Whether bounds hold the truth; None where there are none: a part that is stuck or silent has ε = 1 by its row."""
-    if estimate is None or truth is None or estimate["low"] == estimate["high"]:
+    """Whether bounds hold the truth; None where there are none."""
+    if estimate is None or truth is None:
         return None
     return bool(estimate["low"] <= truth <= estimate["high"])

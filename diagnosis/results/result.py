@@ -16,6 +16,8 @@ from diagnosis.results.vocabulary import Kind, Severity, Tier
 from replay.faults import FaultMode, Side, State
 from replay.machine.quantities import OPENING
 
+_TWO_SIDED = 1.96  # standard deviations of 95 % bounds
+
 
 @dataclass(frozen=True)
 class Epsilon:
@@ -28,6 +30,15 @@ class Epsilon:
     def as_share(self) -> Epsilon:
         """The same within [0, 1], where every fault of the table has its ε."""
         return Epsilon(*(min(1.0, max(0.0, x)) for x in (self.value, self.low, self.high)))
+
+    def with_gain(self, std: float) -> Epsilon:
+        """With bounds that hold a gain of the healthy part that is uncertain by this share as well."""
+        more = _TWO_SIDED * std * (1.0 - self.value)
+        return Epsilon(
+            self.value,
+            self.value - float(np.hypot(self.value - self.low, more)),
+            self.value + float(np.hypot(self.high - self.value, more)),
+        )
 
     def row(self) -> EpsilonRow:
         """The same for ``report.json``."""

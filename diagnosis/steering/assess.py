@@ -23,7 +23,7 @@ from diagnosis.steering.path import AxleFilter, allowed_models, most_probable
 from diagnosis.steering.path_refinement import refine_path
 from diagnosis.steering.plant import SteeringPlant
 from diagnosis.steering.prior import plant_before
-from diagnosis.steering.reliability import commanded, weighed
+from diagnosis.steering.reliability import commanded, paired, weighed
 from diagnosis.steering.states import REASONS, states_of
 from replay.control.loop import Replay
 from replay.faults import Side, State
@@ -142,6 +142,8 @@ def _judged_by_model(
     if not (inputs.redundant or inputs.valve_redundant):
         found[Side.ACTUATOR] = apart(found[Side.SENSOR], found[Side.ACTUATOR], blocks.length)
         found = weighed(found, blocks.length, inputs.timeline.dt)
+    else:
+        found = paired(found)
     if otherwise:
         found = {side: acquitted(side, found[side], inputs, blocks) for side in _SIDES}
     dead = [(f.start, f.stop) for f in found[Side.SENSOR].findings if f.mode.total]

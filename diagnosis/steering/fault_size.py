@@ -14,6 +14,7 @@ from replay.faults import Side
 
 _GONE = Epsilon(1.0, 1.0, 1.0)
 _OPENING = "of full opening"
+_LEAST_MISFIT = 0.01
 
 
 def estimate_size(
@@ -41,7 +42,7 @@ def _sensor_size(row: int, a: int, b: int, axle: AxleFilter, path: SteeringPath)
         half = 1.96 * float(np.sqrt(axle.model.noise.step)) + spread
         return _GONE, Sat(level, abs(level), level - half, level + half, "rad") if count else None
     last, var = path.mean[b - 1], path.variance[b - 1]
-    epsilon = _epsilon(float(last[4]), float(np.sqrt(var[4])))
+    epsilon = _epsilon(float(last[4]), float(np.sqrt(var[4])), axle)
     if row == INEFFICIENT:
         return epsilon, None
     use = axle.blocks.status[a:b] == PAIR
@@ -57,15 +58,16 @@ def _valve_size(row: int, a: int, b: int, axle: AxleFilter, path: SteeringPath) 
         gain = axle.model.plant.gain
         level, half = stuck_opening(float(last[3]), axle), 1.96 * float(np.sqrt(var[3])) / gain
         return _GONE, Sat(level, abs(level), level - half, level + half, _OPENING)
-    epsilon = _epsilon(float(last[2]), float(np.sqrt(var[2])))
+    epsilon = _epsilon(float(last[2]), float(np.sqrt(var[2])), axle)
     if row == INEFFICIENT:
         return epsilon, None
     return epsilon, _sat(path.mean[a:b, 3] / axle.model.plant.gain / max(epsilon.value, 0.1), _OPENING)
 
 
-def _epsilon(gain: float, std: float) -> Epsilon:
-    """ε̂ = 1 − δ̂ with its 95 % bounds."""
-    return Epsilon(1 - gain, 1 - gain - 1.96 * std, 1 - gain + 1.96 * std)
+def _epsilon(gain: float, std: float, axle: AxleFilter) -> Epsilon:
+    """ε̂ = 1 − δ̂ with its 95 % bounds: what the plant leaves unexplained does not average out over a fault."""
+    half = 1.96 * float(np.hypot(std, gain * max(axle.model.plant.misfit, _LEAST_MISFIT)))
+    return Epsilon(1 - gain, 1 - gain - half, 1 - gain + half)
 
 
 def _sat(values: Array, unit: str) -> Sat | None:

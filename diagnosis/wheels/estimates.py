@@ -10,7 +10,8 @@ from diagnosis.wheels.models import A_BIAS, A_GAIN, A_NONE, A_STUCK, S_GAIN, TOT
 
 Array = NDArray[np.float64]
 
-_NOISY_LOSS = 0.35  # 95 % of the errors of a noisy sensor's ε̂ on tuning seeds
+_NOISY_LOSS = 0.6  # 95 % of the errors of a noisy sensor's ε̂ on tuning seeds
+_BIASED_LOSS = 0.3  # and of that of a valve with a disturbance
 
 
 def estimate(m: int, y: Array, z: Array, P: Array, model: WheelFilterModel) -> tuple[Epsilon | None, Sat | None]:
@@ -49,11 +50,16 @@ def estimate(m: int, y: Array, z: Array, P: Array, model: WheelFilterModel) -> t
         return Epsilon(1.0, 0.0, 1.0), Sat(level, abs(level), level - half, level + half, "of full opening")
     eps = max(1 - g, 0.05)
     if m == A_BIAS:
+        loss = _at_least(1 - g, max(1.96 * g_std, _BIASED_LOSS))
         level, half = float(z[3]) / model.K, half / model.K
         return loss, Sat(level / eps, abs(level) / eps, (level - half) / eps, (level + half) / eps, "of full opening")
     # gain and bias of a noisy sensor trade off against each other while the speed hardly changes
-    half_loss = max(1.96 * g_std, _NOISY_LOSS)
-    loss = Epsilon(1 - g, max(0.0, 1 - g - half_loss), min(1.0, max(1 - g + half_loss, 1 - g)))
+    loss = _at_least(1 - g, max(1.96 * g_std, _NOISY_LOSS))
     noise = float(np.sqrt(np.mean((y - np.mean(y)) ** 2))) if y.size else 0.0
     level = float(z[3]) / eps
     return loss, Sat(level, float(np.hypot(level, noise / eps)), level - half / eps, level + half / eps, "m/s")
+
+
+def _at_least(loss: float, half: float) -> Epsilon:
+    """A loss with bounds that are a fault's, between 0 and 1."""
+    return Epsilon(loss, min(loss, max(0.0, loss - half)), max(loss, min(1.0, loss + half)))

@@ -7,10 +7,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from diagnosis.clearing.alone import Straight
+from diagnosis.clearing.cells import Frame
 from diagnosis.clearing.checks import checks_of
 from diagnosis.clearing.detectable import detectable, places_of
 from diagnosis.clearing.gauges import Gauges, gauges_of
-from diagnosis.clearing.placements import placements
+from diagnosis.clearing.placements import Placements, countered, placements
 from diagnosis.results.detectability import Deviation
 from diagnosis.results.machine_words import HYDRAULIC
 from replay.faults import FaultMode, FaultSpec, Side
@@ -100,3 +102,18 @@ def test_a_part_that_rests_has_no_places() -> None:
     moving[100:200] = True
     assert placements(moving, 20, 600).first.min() == 92  # 12 of 20 cells are driven
     assert LENGTH == 60.0
+
+
+def test_a_loop_that_counters_an_excess_hides_some_of_it() -> None:
+    less = np.array([-0.1, 0.0, 0.2, 0.5, 1.0, 2.0])
+    np.testing.assert_allclose(countered(less), [0.0, 0.0, 0.25, 1.0, np.inf, np.inf])
+
+
+def test_an_angle_that_is_off_shows_where_the_machine_goes_straight() -> None:
+    off = np.full(600, np.nan)
+    off[100:300] = 0.01
+    check = Straight(Frame(600, 30, 5), off, 0.06)
+    places = Placements(np.array([150, 400]), np.array([250, 500]))
+    sizes = check.offset(places.overlap(check.frame))
+    assert sizes[0] == pytest.approx(0.07)
+    assert np.isinf(sizes[1])

@@ -49,3 +49,11 @@ def test_nested_records() -> None:
         "sat": {"mean": 0.1, "rms": 0.2, "low": 0.0, "high": 0.3, "unit": "m/s"},
         "best": [{"side": "sensor", "mode": "stuck", "p": 1.0}],
     }
+
+
+def test_bounds_hold_what_is_not_known_of_the_healthy_gain() -> None:
+    sharp = Epsilon(0.4, 0.399, 0.401)
+    wide = sharp.with_gain(0.03)
+    assert wide.value == sharp.value
+    assert (wide.low, wide.high) == pytest.approx((0.4 - 1.96 * 0.03 * 0.6, 0.4 + 1.96 * 0.03 * 0.6), abs=1e-3)
+    assert sharp.with_gain(0.0).low == pytest.approx(sharp.low)

@@ -10,7 +10,7 @@ from diagnosis.results.assessment import Finding
 from diagnosis.results.result import Hypothesis
 from diagnosis.results.vocabulary import Tier
 from diagnosis.steering.findings import SideFindings
-from diagnosis.steering.reliability import features_of, weighed
+from diagnosis.steering.reliability import features_of, paired, weighed
 from replay.faults import FaultMode, Side
 
 DT, LENGTH = 0.01, 5
@@ -69,3 +69,21 @@ def test_features() -> None:
     assert_allclose(got, [np.log(6.0), 1.0, 0.0, 1.0])
     got = features_of((10.0, 12.0), FaultMode.STUCK, [(13.5, 30.0)], [(11.0, 40.0)])
     assert_allclose(got, [np.log(2.0), 0.0, 1.0, 0.0])
+
+
+def test_a_partial_fault_beside_one_of_the_other_side_is_a_set_of_candidates() -> None:
+    stuck, loss = finding(10.0, 18.0), finding(10.0, 12.0, FaultMode.INEFFICIENT)
+    found = paired({Side.SENSOR: SideFindings((loss,), ()), Side.ACTUATOR: SideFindings((stuck,), ((0, 3),))})
+    assert found[Side.ACTUATOR].findings == (stuck,)
+    assert found[Side.ACTUATOR].unexplained == ((0, 3),)
+    (doubted,) = found[Side.SENSOR].findings
+    assert doubted.probability < 0.9
+    assert_allclose(sum(h.p for h in doubted.hypotheses), 1.0)
+
+
+def test_faults_at_other_times_do_not_doubt_each_other() -> None:
+    both = {
+        Side.SENSOR: SideFindings((finding(10.0, 18.0, FaultMode.NOISY),), ()),
+        Side.ACTUATOR: SideFindings((finding(20.0, 28.0, FaultMode.INEFFICIENT),), ()),
+    }
+    assert paired(both) == both
