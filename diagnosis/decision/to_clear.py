@@ -50,7 +50,7 @@ def to_clear(
     words = against.words
     out = [ToClear(event.text, event.act) for event in against.events]
     out += [ToClear(text, "correct [signals] in the machine file, and diagnose again") for text in against.hints]
-    out += short_parts(against.short, assessments, decided_s, driven, limits, words)
+    out += short_parts(against.short, assessments, decided_s, driven, limits, words, open_state=against.open_state)
     if against.unexplained:
         who = join_words(
             sorted({words.part_words(Kind.WHEEL, c, Side.SENSOR_OR_ACTUATOR) for c, _ in against.unexplained})
@@ -92,7 +92,7 @@ def to_clear(
     steered = [k for k in assessments if k[0] in axles]
     unjudged = [k for k in steered if assessments[k].tier is Tier.NONE]
     brief = [k for k in steered if k not in unjudged and _brief(k, decided_s, driven, limits)]
-    out += short_parts(brief, assessments, decided_s, driven, limits, words, Kind.STEER)
+    out += short_parts(brief, assessments, decided_s, driven, limits, words, Kind.STEER, open_state=against.open_state)
     return tuple(out + ([unjudged_axles(unjudged, assessments, words)] if unjudged else []))
 
 
