@@ -166,6 +166,8 @@ def _sizes(fault: Mapping[str, Any]) -> Iterator[str]:
         if fault["mode"] == "no_signal" and epsilon["value"] < 0.9:
             yield f"no signal with ε̂ {epsilon['value']:.2f}"
     if sat is not None:
+        if fault["mode"] == "no_signal" and abs(sat["mean"]) > 0.05:
+            yield f"no signal, and a reading of {sat['mean']:.2f} {sat['unit']}"
         if not sat["low"] <= sat["mean"] <= sat["high"]:
             yield "saturation term outside of its bounds"
         if sat["unit"] == OPENING and not all(abs(sat[k]) <= 1.0 + 1e-6 for k in ("mean", "low", "high")):

@@ -77,7 +77,10 @@ def _around(finding: Finding, a: Assessment, dt: float) -> _Around | None:
     y = residual + expected
     known = np.isfinite(y)
     noise = float(np.nanmedian(threshold)) / 3.0 if np.isfinite(threshold).any() else 0.0
-    if not known.any() or noise <= 0.0:
+    after = known[(first + np.arange(y.size) * stride) >= finding.start]
+    if (
+        not known.any() or noise <= 0.0 or 2 * np.count_nonzero(after) < after.size
+    ):  # silence has no readings to step over
         return None
     behind = np.isfinite(y) & np.isfinite(expected) & (first + np.arange(y.size) * stride >= finding.start)
     model = channel_model(noise, y[behind], expected[behind], dt * stride)

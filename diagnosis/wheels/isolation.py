@@ -125,6 +125,8 @@ def judge(run: Run, y: Array, model: WheelFilterModel, limits: Limits, names: tu
     if stated is None:
         return RunVerdict(None)
     m = _model_of(run, weighed.row)
+    if m == S_NONE and known.size < y.size / 2:  # it delivers nothing: the few readings at its edges say nothing of it
+        known = known[:0]
     epsilon, sat = estimate(m, known, run.mean[m], run.cov[m], model)
     if epsilon is not None and m in (S_GAIN, A_GAIN) and epsilon.value < limits.min_epsilon:
         return RunVerdict(None)
@@ -219,7 +221,9 @@ def _sentences(
         lines.append(f"{names[0]} is {times_as_probable(ahead)} by its Kalman model as by that of a healthy {{wheel}}.")
     else:
         lines.append("Its Kalman model alone would not be preferred to that of a healthy {wheel}.")
-    if m in TOTAL_SENSOR and known.size:
+    if m == S_NONE and not known.size:
+        lines.append(f"{names[0]} delivered nothing in this time.")
+    elif m in TOTAL_SENSOR and known.size:
         lines.append(
             f"{names[0]} stayed within {float(np.ptp(known)):.2g} {{speed_unit}} of {float(np.mean(known)):.4g} {{speed_unit}}."
         )

@@ -49,7 +49,7 @@ def simulated(count: int) -> Iterator[Named]:
             options = SimulationOptions(
                 scenario=scenario,  # type: ignore[arg-type]
                 seed=FIRST + k,
-                duration_s=60.0,
+                duration_s=40.0,
                 rate_hz=(200.0, 100.0)[k % 2],
                 steering_faults=True,
                 structure=StructureOptions(structure) if structure else None,
@@ -69,7 +69,7 @@ def foreign(count: int) -> Iterator[Named]:
     """The reference data's foreign plant, with faults."""
     make = foreign_machine.maker()
     for k in range(count):
-        drive = foreign_machine.scenario(make, 7200 + k, ("forced", "printed")[k % 2], 90.0)
+        drive = foreign_machine.scenario(make, 7200 + k, ("forced", "printed")[k % 2], 60.0)
         rng = np.random.default_rng(k)
         modes = ("stuck", "no_signal", "inefficient", "noisy")
         faults = [
@@ -78,11 +78,11 @@ def foreign(count: int) -> Iterator[Named]:
                 str(rng.choice(["sensor", "actuator"])),
                 str(rng.choice(modes)),
                 a,
-                a + 9.0,
+                a + 8.0,
                 0.5,
                 0.15,
             )
-            for a in (20.0, 40.0, 60.0)
+            for a in (15.0, 30.0, 45.0)
         ]
         drive = replace(drive, faults=faults)
         for tier, mission, machine in foreign_machine.missions(make, drive, TIERS):
@@ -115,13 +115,16 @@ def main() -> None:
     """Diagnose, check, print."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--count", type=int, default=6)
-    count = parser.parse_args().count
-    sources = {"simulated": simulated(count)}
+    parser.add_argument("--only", nargs="*", help="kinds of data: simulated, foreign plant, real")
+    asked = parser.parse_args()
+    count, sources = asked.count, {"simulated": simulated(asked.count)}
     if (Path(os.environ.get("MFHCA_REFERENCE_DATA", "../shared")) / "fault_data").is_dir():
         sources |= {"foreign plant": foreign(count), "real": real(count)}
     results: Counter[str] = Counter()
     wrong: Counter[str] = Counter()
     for kind, reports in sources.items():
+        if asked.only and kind not in asked.only:
+            continue
         for name, result in reports:
             results[kind] += 1
             found = contradictions(orjson.loads(orjson.dumps(result.report)), result.columns)
