@@ -97,8 +97,8 @@ class IdentifiedPair:
 
     @cached_property
     def instruments(self) -> Array | None:
-        """Signals that drive x but know nothing of the fault; of a coarse log x but for its quick part. Shape (n, k)."""
-        return _neighbours(self.samples.x) if self.coarse else self.pair.instruments
+        """Signals that drive x but know nothing of the fault; of a coarse log that has none x but for its quick part. Shape (n, k)."""
+        return _neighbours(self.samples.x) if self.coarse and self.pair.instruments is None else self.pair.instruments
 
     @cached_property
     def holds(self) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
