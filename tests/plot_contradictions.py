@@ -41,8 +41,13 @@ def of_faults(
                 yield f"its plot shows {leaf} from {np.nanmin(drawn):.2f} to {np.nanmax(drawn):.2f}, its table {said:.2f}"
         chance = columns.get(base + "probability")
         if chance is not None and fault["severity"] != "info" and np.isfinite(chance[inside]).any():
-            mean = float(np.nanmean(chance[inside]))
-            if mean < (0.25 if len(_sides(fault)) > 1 else 0.5):  # one that may be either's divides it
+            both = [
+                columns.get(f"evidence.{fault['component']}.{s}.probability", chance)[inside] for s in _sides(fault)
+            ]
+            mean = float(
+                np.nansum([np.nanmean(x) for x in both if np.isfinite(x).any()])
+            )  # what may be either's is divided
+            if mean < 0.5:
                 yield f"its plot shows it not healthy with {mean:.2f} on average"
 
 
