@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import astuple, dataclass, field
+from dataclasses import astuple, dataclass, field, replace
 from math import isfinite
 from typing import Any
 
@@ -16,7 +16,7 @@ from diagnosis.results.result import Closeups, Epsilon, Hypothesis, Sat
 from diagnosis.results.vocabulary import Tier
 from replay.faults import TOTAL, FaultMode, Side, State
 
-_LEAST = 0.1  # ε̂ below which a varying saturation term is not told from it
+_LEAST = 0.1  # ε̂ of the smallest fault; below it a varying saturation term is not told from it
 _BOUND = 0.95  # of which the bounds of ε̂ speak
 STATES: tuple[State, ...] = tuple(State)
 CODE = {state: np.int8(i) for i, state in enumerate(STATES)}
@@ -57,10 +57,13 @@ class Finding:
                 object.__setattr__(self, name, None)
 
     def _bound_by_row(self) -> None:
-        """Where the readings do not bound what is left of a stuck or silent part, its row does (ε = 1), if it is as sure as the bound."""
+        """Where the readings do not bound what a stuck or silent part has lost, its rows do: all (ε = 1), else what counts as a fault."""
         if self.mode.total and self.epsilon is not None and self.epsilon.low <= 0.0:
-            sure = sum(h.p for h in self.hypotheses if h.mode in TOTAL) >= _BOUND
-            object.__setattr__(self, "epsilon", Epsilon(1.0, 1.0, 1.0) if sure else None)
+            total, healthy = (
+                sum(h.p for h in self.hypotheses if h.mode in modes) for modes in (TOTAL, {State.HEALTHY.value})
+            )
+            low = 1.0 if total >= _BOUND else _LEAST if healthy <= 1.0 - _BOUND else 0.0
+            object.__setattr__(self, "epsilon", replace(self.epsilon, low=low))
 
 
 @dataclass(frozen=True)

@@ -21,9 +21,10 @@ def test_a_size_that_is_not_finite_is_not_known() -> None:
 
 
 def test_what_the_readings_do_not_bound_the_row_does_where_it_is_as_sure() -> None:
-    def stuck(p: float) -> Finding:
-        rows = (Hypothesis("sensor", "stuck", p), Hypothesis("sensor", "inefficient", 1.0 - p))
+    def stuck(p: float, other: str = "inefficient") -> Finding:
+        rows = (Hypothesis("sensor", "stuck", p), Hypothesis("sensor", other, 1.0 - p))
         return Finding(0, 9, Side.SENSOR, FaultMode.STUCK, p, rows, Epsilon(1.0, 0.0, 1.0), None, (), Tier.MODEL)
 
     assert stuck(0.97).epsilon == Epsilon(1.0, 1.0, 1.0)
-    assert stuck(0.8).epsilon is None
+    assert stuck(0.8).epsilon == Epsilon(1.0, 0.1, 1.0)
+    assert stuck(0.8, "healthy").epsilon == Epsilon(1.0, 0.0, 1.0)
