@@ -67,8 +67,9 @@ def condition(
         worst = min(mine, key=_urgency)
         name = words.part_name(kind, worst["side"])
         label = label_of(worst).lower()
-        length = span(worst["stop_s"] - worst["start_s"])
-        more = (f"and {len(mine) - 1} more",) if len(mine) > 1 else ()
+        same = [f for f in mine if f["side"] == worst["side"] and label_of(f).lower() == label]
+        length = span(sum(f["stop_s"] - f["start_s"] for f in same))
+        more = (f"and {len(mine) - len(same)} more",) if len(mine) > len(same) else ()
         heading = name[0].upper() + name[1:]
         title = f"{component}: {name} {label}, {length}{', ' + more[0] if more else ''}"
         return Condition(worst["mode"], (heading, label, length, *more), worst["id"], title)
