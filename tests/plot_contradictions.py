@@ -40,10 +40,10 @@ def of_faults(
             if not np.allclose(drawn, said, atol=1e-3, equal_nan=True):
                 yield f"its plot shows {leaf} from {np.nanmin(drawn):.2f} to {np.nanmax(drawn):.2f}, its table {said:.2f}"
         chance = columns.get(base + "probability")
-        if chance is not None and fault["severity"] != "info" and np.isfinite(chance[inside]).any():
-            both = [
-                columns.get(f"evidence.{fault['component']}.{s}.probability", chance)[inside] for s in _sides(fault)
-            ]
+        # an onset is where a channel began to hold, which shows only later
+        late = inside & _rows(columns, 0.5 * (fault["start_s"] + fault["stop_s"]), fault["stop_s"])
+        if chance is not None and fault["severity"] != "info" and np.isfinite(chance[late]).any():
+            both = [columns.get(f"evidence.{fault['component']}.{s}.probability", chance)[late] for s in _sides(fault)]
             mean = float(
                 np.nansum([np.nanmean(x) for x in both if np.isfinite(x).any()])
             )  # what may be either's is divided

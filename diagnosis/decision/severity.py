@@ -69,6 +69,8 @@ def _severity_of_total(
                 "Faulty, but which part is not certain enough to stop for: check sensor and {valve} before the next mission."
             ),
         )
+    if _at_risk(finding) < _PROBABLY_TOTAL and finding.side is Side.SENSOR and seconds <= limits.brief:
+        return Severity.LOW, "Short, and its kind is not clear: check plug and cable at the next service."
     if _at_risk(finding) < _PROBABLY_TOTAL:
         return (
             Severity.MEDIUM,
