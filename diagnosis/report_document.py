@@ -27,6 +27,7 @@ from diagnosis.results.result import FaultInterval, to_json
 from diagnosis.results.vocabulary import Tier
 from replay.arrays.envelope import bucket_of
 from replay.control.loop import Replay
+from replay.faults import State
 from replay.machine.config import Machine
 from replay.mission import Mission, MissionFile
 from replay.readers.machine_identity import stated_machine
@@ -102,7 +103,7 @@ def report_of_mission(judged: Judged, identity: MachineRow) -> ReportDocument:
         "log": _log(mission, moving, machine),
         "machine": identity,
         "readings": to_json(replay.readings),
-        "verdict": _decision(judged, coverage, decided_s).row(
+        "verdict": _decision(judged, coverage, decided_s, metrics.open_states(found.assessments, moving, machine)).row(
             [*more_caveats(mission, judged.recorded.first_ns, machine)]
         ),
         "intervals": to_json(judged.intervals),
@@ -135,7 +136,12 @@ def report_of_mission(judged: Judged, identity: MachineRow) -> ReportDocument:
     return plain
 
 
-def _decision(judged: Judged, coverage: list[CoverageRow], decided_s: dict[tuple[str, str], float]) -> Decision:
+def _decision(
+    judged: Judged,
+    coverage: list[CoverageRow],
+    decided_s: dict[tuple[str, str], float],
+    open_state: dict[tuple[str, str], State],
+) -> Decision:
     return decide(
         judged.intervals,
         judged.found.assessments,
@@ -150,6 +156,7 @@ def _decision(judged: Judged, coverage: list[CoverageRow], decided_s: dict[tuple
         scope=_scope(judged),
         events=judged.found.events,
         hints=mapping_hints(judged.cells),
+        open_state=open_state,
     )
 
 

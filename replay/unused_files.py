@@ -51,9 +51,9 @@ def require_use(files: Sequence[ReadFile], signals: Signals) -> None:
     """
     if not signals.items and all(t.encoding == "table" for f in files for t in f.summary.topics):
         columns = [c for f in files for t in f.summary.topics for c in t.fields]
-        shown = ", ".join(columns[:_SHOWN]) + (" …" if len(columns) > _SHOWN else "")
+        shown = f" ({', '.join(columns[:_SHOWN])}{' …' if len(columns) > _SHOWN else ''})" if columns else ""
         raise LogError(
-            f"{', '.join(str(f.path) for f in files)}: no wheel signal: no column ({shown}) is called like a signal of a machine "
+            f"{', '.join(str(f.path) for f in files)}: no wheel signal: no column{shown} is called like a signal of a machine "
             "or stands in the machine file's [signals]; name them there (`mfhca channels LOG --all` lists them), or leave the file "
             "out where it is no machine's log (an audit takes patterns: 'logs/**/*.mcap')"
         )

@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from diagnosis.pipeline import diagnose
+from diagnosis.results.result import MissionResult
 from replay.atomic_write import atomic_path
 from replay.export.formats.mcap import write_mcap
 from replay.export.formats.rosbag1 import write_ros1_bag
@@ -171,10 +172,14 @@ def golden_names() -> dict[str, str]:
     return names
 
 
-def golden_of(log: Path, machine: Path | None = None) -> dict[str, Any]:
-    """Verdict and faults of a log, in order of time; without a machine file the signals are found by their names."""
-    report = diagnose([log], haulotte() if machine is None else load_machine(machine)).report
-    rows = []
+def diagnosed(log: Path, machine: Path | None = None) -> MissionResult:
+    """What is found in a log; without a machine file the signals are found by their names."""
+    return diagnose([log], haulotte() if machine is None else load_machine(machine))
+
+
+def golden_of(log: Path, result: MissionResult) -> dict[str, Any]:
+    """Verdict and faults of a log, in order of time."""
+    report, rows = result.report, []
     for fault in report["intervals"]:
         epsilon = (fault["epsilon"] or {}).get("value")
         rows.append(
@@ -190,7 +195,7 @@ def write_golden(folder: Path) -> None:
     """Write the golden files, one fault per line."""
     (folder / "golden").mkdir(exist_ok=True)
     for stem, name in golden_names().items():
-        found = golden_of(folder / name)
+        found = golden_of(folder / name, diagnosed(folder / name))
         rows = ",\n".join("    " + json.dumps(row) for row in found["intervals"])
         head = "".join(f"  {json.dumps(key)}: {json.dumps(found[key])},\n" for key in ("log", "verdict"))
         body = f"[\n{rows}\n  ]" if rows else "[]"

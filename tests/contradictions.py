@@ -16,6 +16,7 @@ from diagnosis.results.candidates import candidates_of, label_of
 from diagnosis.results.machine_words import HYDRAULIC
 from diagnosis.results.vocabulary import Severity
 from replay.machine.quantities import OPENING
+from tests.plot_contradictions import of_faults, of_states
 
 _TOTAL = ("stuck", "no_signal")
 _AT_RISK = 0.75
@@ -33,13 +34,13 @@ def contradictions(report: Mapping[str, Any], columns: Mapping[str, NDArray[Any]
     columns : Mapping[str, NDArray] or None
         Columns of its plots, with ``t``: every sample of a short mission.
     """
-    out = [*_verdict(report), *_actions(report), *_coverage(report), *_terminal(report)]
+    out = [*_verdict(report), *_actions(report), *_coverage(report), *_open(report), *_terminal(report)]
     for fault in report["intervals"]:
         name = f"{fault['id']} {fault['component']} {fault['side']} {fault['mode']}"
         out += [f"{name}: {text}" for text in (*_chances(fault), *_sizes(fault), *_urgency(fault, report))]
         out += [f"{name}: {text}" for text in (*_times(fault, report), *_words(fault), *_followed(fault))]
-        out += [f"{name}: {text}" for text in _plots(fault, report, columns or {})]
-    out += _healthy_plots(report, columns or {})
+        out += [f"{name}: {text}" for text in of_faults(fault, report, columns or {})]
+    out += of_states(report, columns or {})
     return out
 
 
@@ -89,6 +90,12 @@ def _actions(report: Mapping[str, Any]) -> Iterator[str]:
             yield f"action {action['n']} ({action['severity']}) begins with {action['text'][:12]!r}"
         for f in action["faults"]:
             named[f] = named.get(f, 0) + 1
+    for action in report["verdict"]["actions"]:
+        sizes = [faults[f]["epsilon"]["value"] for f in action["faults"] if faults[f]["epsilon"]]
+        for found in re.finditer(r"\((?:(\d+) to )?(\d+) % lost\)", action["text"]):
+            said = [int(x) for x in found.groups() if x]
+            if not all(any(abs(x - 100 * size) <= 0.6 for size in sizes) for x in said):
+                yield f"action {action['n']} says {found.group(0)!r}, its faults {[round(100 * x) for x in sizes]} %"
     for f in faults.values():
         if named.get(f["id"], 0) != (f["severity"] != "info"):
             yield f"{f['id']} ({f['severity']}) stands in {named.get(f['id'], 0)} actions"
@@ -103,6 +110,22 @@ def _coverage(report: Mapping[str, Any]) -> Iterator[str]:
             yield f"coverage of {row['component']} {row['side']} is {total:.1f} s of {length:.1f} s"
         if row["decided_driving_s"] > row["driving_s"] + _SPARE_S:
             yield f"{row['component']} {row['side']} was judged for longer than it drove"
+
+
+def _open(report: Mapping[str, Any]) -> Iterator[str]:
+    """The part of which the verdict says that most of its driving is open, against the table of coverage and the states."""
+    for text in report["verdict"]["caveats"]:
+        found = re.match(r"(\S+) .+: ([\d.]+) s of [\d.]+ s of .* could not be judged(?: \((.*)\))?; this", text)
+        if not found:
+            continue
+        component, seconds, reason = found.group(1), float(found.group(2)), found.group(3)
+        rows = [r for r in report["coverage"] if r["component"] == component]
+        if not any(abs(r["driving_s"] - r["decided_driving_s"] - seconds) <= _SPARE_S + 0.01 for r in rows):
+            yield f"{component} is not open for {seconds} s of driving: {text!r}"
+        spans = [s for s in report["states"] if s["component"] == component and s["reason"] == reason]
+        length = sum(s["stop_s"] - s["start_s"] for s in spans)
+        if reason and length < 0.3 * seconds:
+            yield f"its reason holds for {length:.1f} s: {text!r}"
 
 
 def _chances(fault: Mapping[str, Any]) -> Iterator[str]:
@@ -138,9 +161,13 @@ def _sizes(fault: Mapping[str, Any]) -> Iterator[str]:
             yield f"ε̂ from {epsilon['low']:.2f} to {epsilon['high']:.2f}"
         if fault["mode"] != "outside_table" and epsilon["high"] <= 0.0:
             yield "a fault that for certain takes nothing away"
+        if fault["mode"] in _TOTAL and epsilon["low"] <= 0.0 and fault["probability"] > 0.9:
+            yield f"{fault['mode']} with {fault['probability']:.2f}, and bounds of ε̂ that hold a healthy part"
         if fault["mode"] == "no_signal" and epsilon["value"] < 0.9:
             yield f"no signal with ε̂ {epsilon['value']:.2f}"
     if sat is not None:
+        if fault["mode"] == "no_signal" and abs(sat["mean"]) > 0.05:
+            yield f"no signal, and a reading of {sat['mean']:.2f} {sat['unit']}"
         if not sat["low"] <= sat["mean"] <= sat["high"]:
             yield "saturation term outside of its bounds"
         if sat["unit"] == OPENING and not all(abs(sat[k]) <= 1.0 + 1e-6 for k in ("mean", "low", "high")):
@@ -196,6 +223,14 @@ def _words(fault: Mapping[str, Any]) -> Iterator[str]:
         found = re.search(r"it was this in (\d+) of 100 cases", text)
         if found and abs(int(found.group(1)) - 100 * fault["probability"]) > 1.6:
             yield f"{found.group(0)!r} beside a probability of {fault['probability']:.3f}"
+    all_words = " ".join(fault["evidence"])
+    if "hardly moved" in all_words and " moved over " in all_words:
+        yield "a signal hardly moved, and moved"
+    if " moved over 0 " in all_words:
+        yield "a signal moved over nothing"
+    lost = re.search(r" lost (\d+) %", fault_title(fault, HYDRAULIC))  # type: ignore[arg-type]
+    if lost and fault["epsilon"] and abs(int(lost.group(1)) - 100 * fault["epsilon"]["value"]) > 0.6:
+        yield f"its title says {lost.group(0)!r}, its table {100 * fault['epsilon']['value']:.0f} %"
     if re.search(r"\b(nan|inf)\b", " ".join((*fault["evidence"], fault["advice"], fault_title(fault, HYDRAULIC)))):  # type: ignore[arg-type]
         yield "a number in it is none"
 
@@ -209,61 +244,6 @@ def _followed(fault: Mapping[str, Any]) -> Iterator[str]:
             sizes = [fault["epsilon"][k] for k in ("value", "high", "low")]
             if not np.allclose(said, sizes, atol=1e-3):
                 yield f"{found.group(0)!r} beside ε̂ {sizes[0]:.3f} ({sizes[2]:.3f} to {sizes[1]:.3f})"
-
-
-def _rows(columns: Mapping[str, NDArray[Any]], start: float, stop: float) -> NDArray[np.bool_]:
-    """Samples between two times, whatever their last digit."""
-    t = columns["t"]
-    spare = 0.5 * float(t[1] - t[0])
-    return np.asarray((t >= start - spare) & (t < stop - spare))
-
-
-def _sides(fault: Mapping[str, Any]) -> tuple[str, ...]:
-    return ("sensor", "actuator") if fault["side"] == "sensor_or_actuator" else (fault["side"],)
-
-
-def _plots(fault: Mapping[str, Any], report: Mapping[str, Any], columns: Mapping[str, NDArray[Any]]) -> Iterator[str]:
-    """What the plots of a fault show during it, against the finding: ε̂, its band, the probability of a fault."""
-    for side in _sides(fault) if "t" in columns else ():
-        base, inside = (
-            f"evidence.{fault['component']}.{side}.",
-            _rows(columns, fault["start_s"], fault["stop_s"]),
-        )
-        for other in report["intervals"]:
-            if other["component"] == fault["component"] and side in _sides(other) and other["id"] != fault["id"]:
-                inside &= ~_rows(columns, other["start_s"], other["stop_s"])
-        if not inside.any() or not any(name.startswith(base) for name in columns):
-            continue
-        for leaf, key in (("epsilon", "value"), ("epsilon_low", "low"), ("epsilon_high", "high")):
-            said = np.nan if fault["epsilon"] is None else fault["epsilon"][key]
-            drawn = columns.get(base + leaf, np.full(inside.size, np.nan))[inside]
-            if not np.allclose(drawn, said, atol=1e-3, equal_nan=True):
-                yield f"its plot shows {leaf} from {np.nanmin(drawn):.2f} to {np.nanmax(drawn):.2f}, its table {said:.2f}"
-        chance = columns.get(base + "probability")
-        if chance is not None and fault["severity"] != "info" and np.isfinite(chance[inside]).any():
-            mean = float(np.nanmean(chance[inside]))
-            if mean < (0.25 if len(_sides(fault)) > 1 else 0.5):  # one that may be either's divides it
-                yield f"its plot shows it not healthy with {mean:.2f} on average"
-
-
-def _healthy_plots(report: Mapping[str, Any], columns: Mapping[str, NDArray[Any]]) -> Iterator[str]:
-    """A loss of effectiveness, or a sure fault, in plots of a part while it is called healthy or is not judged."""
-    for s in report["states"] if "t" in columns else ():
-        base, rows = f"evidence.{s['component']}.{s['side']}.", _rows(columns, s["start_s"], s["stop_s"])
-        for f in report["intervals"]:
-            if f["component"] == s["component"] and s["side"] in _sides(f):
-                rows &= ~_rows(columns, f["start_s"], f["stop_s"])
-        chance = columns.get(base + "probability")
-        undecided = ("not_excited", "masked", "slip", "no_data", "not_assessed")
-        if chance is not None and s["state"] in undecided and np.isfinite(chance[rows]).any():
-            yield f"{s['component']} {s['side']} is {s['state']} from {s['start_s']:.1f} s on, its plot shows a probability"
-        loss = columns.get(base + "epsilon")
-        if loss is None or not rows.any():
-            continue
-        if s["state"] == "healthy" and (loss[rows] != 0.0).any():
-            yield f"{s['component']} {s['side']} is healthy from {s['start_s']:.1f} s on, its plot shows ε̂ {np.nanmax(loss[rows]):.2f}"
-        if s["state"] != "healthy" and np.isfinite(loss[rows]).any():
-            yield f"{s['component']} {s['side']} is {s['state']} from {s['start_s']:.1f} s on, its plot shows ε̂ {np.nanmax(loss[rows]):.2f}"
 
 
 def _terminal(report: Mapping[str, Any]) -> Iterator[str]:

@@ -12,6 +12,7 @@ from pathlib import Path
 import orjson
 
 from diagnosis.audit.fleet.document import Fleet, fleet_document, fleet_of
+from diagnosis.audit.fleet.elsewhere import copies_elsewhere
 from diagnosis.audit.fleet.first_seen import first_seen_times, newest_result_ns, without_false_dates
 from diagnosis.audit.fleet.fleet_types import FleetDocument
 from diagnosis.audit.fleet.gather import machines_of
@@ -138,15 +139,16 @@ def load_fleet(store_path: Path, out: Path | None = None, axis: Axis = "hours") 
         missions = [_with_own_report(mission, str(folder)) for mission in read_missions(store_path)]
         first_seen = first_seen_times(place, missions)
         missions = without_false_dates(missions, first_seen)
+        copies = copies_elsewhere(missions, first_seen, str(place))
         machines, unknown = machines_of(
-            missions,
+            [m for m in missions if m.name not in copies],
             lambda report: _limits(folder / report / "report.json"),
             first_seen,
             str(place),
             fleet_repairs(store_path),
         )
         fleet = fleet_of(machines, missions, axis, unknown)
-        return replace(fleet, run=read_run(store_path), made_ns=newest_result_ns(place, missions))
+        return replace(fleet, run=read_run(store_path), made_ns=newest_result_ns(place, missions), copies=copies)
 
 
 def fleet_json(fleet: Fleet, baseline: Path | None = None) -> FleetDocument:

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
-from diagnosis.decision.short import main_reason, short_parts, unjudged_axles
+from diagnosis.decision.short import main_reason, main_state, short_parts, unjudged_axles
 from diagnosis.decision.wording import count_words, join_words, unanswered
 from diagnosis.results.assessment import Assessment
 from diagnosis.results.clearing import Checked
@@ -17,7 +17,7 @@ from diagnosis.results.machine_event import MachineEvent
 from diagnosis.results.machine_words import HYDRAULIC, MachineWords
 from diagnosis.results.result import FaultInterval
 from diagnosis.results.vocabulary import Kind, Tier
-from replay.faults import Side
+from replay.faults import Side, State
 from replay.machine.config import Limits, Machine
 from replay.mission import Mission
 from replay.signals.timeline import Timeline
@@ -54,6 +54,8 @@ class Reservations:
         Signals that fit another sign, unit or place better.
     words : MachineWords
         How to speak of the machine.
+    open_state : Mapping[Part, State]
+        The commonest state of each part that is no judgement, while driving.
     """
 
     short: tuple[Part, ...] = ()
@@ -65,6 +67,7 @@ class Reservations:
     events: tuple[MachineEvent, ...] = ()
     hints: tuple[str, ...] = ()
     words: MachineWords = HYDRAULIC
+    open_state: Mapping[Part, State] = field(default_factory=dict)
 
 
 def smallest_loads(assessments: Mapping[Part, Assessment], words: MachineWords) -> tuple[str, ...]:
@@ -138,7 +141,12 @@ def caveats_of(
         said = "" if is_left_out(damage[0]) else "The log is damaged: "
         out.append(f"{said}{damage[0]}" + (f" (and {len(damage) - 1} more)" if len(damage) > 1 else ""))
     if not short_named:
-        out += [r.reason for r in short_parts(against.short, assessments, decided_s, driven, limits, against.words)]
+        out += [
+            r.reason
+            for r in short_parts(
+                against.short, assessments, decided_s, driven, limits, against.words, open_state=against.open_state
+            )
+        ]
     out += _most_open(against, assessments, decided_s, driven, axles)
     unjudged = [k for k in assessments if k[0] in axles and assessments[k].tier is Tier.NONE]
     if unjudged:
@@ -178,7 +186,7 @@ def _most_open(
     most = max(open_s, key=lambda k: open_s[k], default=None)
     if most is None or open_s[most] <= max(_OPEN_S, _OPEN_SHARE * driven[most]):
         return []
-    reason = main_reason(assessments[most])
+    reason = main_reason(assessments[most], against.open_state.get(most) or main_state(assessments[most]))
     return [
         f"{against.words.part_words(Kind.WHEEL, *most)}: {open_s[most]:.1f} s of {driven[most]:.1f} s of {against.words.moving} could not be judged"
         + (f" ({reason})" if reason else "")

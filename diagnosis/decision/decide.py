@@ -96,6 +96,7 @@ def decide(
     scope: Sequence[str] = (),
     events: Sequence[MachineEvent] = (),
     hints: Sequence[str] = (),
+    open_state: Mapping[Part, State] | None = None,
 ) -> Decision:
     """Give the verdict.
 
@@ -133,6 +134,8 @@ def decide(
         What happened to the machine as a whole and is no part's fault.
     hints : Sequence[str]
         Signals that fit another sign, unit or place better over the whole mission.
+    open_state : Mapping or None
+        The commonest state of each part that is no judgement, while driving.
     """
     driven = driving_s or {}
     against = _reservations(assessments, decided_s, driven, axles, limits, damage, model)
@@ -143,6 +146,7 @@ def decide(
         scope=tuple(scope),
         events=tuple(events),
         hints=tuple(hints),
+        open_state=open_state or {},
     )
     open_points = to_clear(against, assessments, decided_s, driven, axles, limits)
     found = _with_faults(intervals, against) or _without_faults(assessments, decided_s, axles, against)

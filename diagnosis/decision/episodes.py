@@ -1,7 +1,8 @@
 """Findings of one part that are one fault: the same row, as large, and nothing healthy seen between them.
 
 A constant loss that shows only while the wheel is driven hard is found in pieces. Between them nothing can be judged; where the part
-was seen to be healthy for longer, the pieces are faults of their own.
+was seen to be healthy for longer, the pieces are faults of their own. A shorter piece beside a fault, of which no row is probable
+enough to give it a name and that may be of the row of that fault, is the end or the beginning of it.
 """
 
 from __future__ import annotations
@@ -14,15 +15,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from diagnosis.results.assessment import CODE, Assessment, Finding
+from diagnosis.results.candidates import candidates
 from diagnosis.results.result import Epsilon
 from diagnosis.results.vocabulary import Tier
-from replay.faults import State
+from replay.faults import TOTAL, FaultMode, State
 
 #: Healthy time between two findings that makes two faults of them [s]: second measurements see it at once, a model needs longer.
 _SEEN_HEALTHY_S = {Tier.DIRECT: 0.05}
 _SEEN_BY_MODELS_S = 0.5
 _SPARE = 0.1  # of ε̂: by which two bounds may miss each other
 _NAMED = 6
+_TOUCHES_S = 0.1
 _CASES = "it was this in ", " of 100 cases"
 _IN_CASES = re.compile(rf"{_CASES[0]}\d+{_CASES[1]}")
 Part = tuple[str, str]
@@ -65,6 +68,7 @@ def joined(findings: Sequence[Finding], states: Mapping[str, NDArray[np.int8]], 
     dt : float
         Step [s].
     """
+    findings = _with_edges(findings, dt)
     groups: list[list[Finding]] = []
     for f in sorted(findings, key=lambda f: f.start):
         if groups and _continues(groups[-1][-1], f, states, dt):
@@ -72,6 +76,50 @@ def joined(findings: Sequence[Finding], states: Mapping[str, NDArray[np.int8]], 
         else:
             groups.append([f])
     return tuple(group[0] if len(group) == 1 else _episode(group, dt) for group in groups)
+
+
+def _with_edges(findings: Sequence[Finding], dt: float) -> list[Finding]:
+    """The same with pieces whose kind is unclear put to the fault that they touch and may be of."""
+    out = sorted(findings, key=lambda f: f.start)
+    k = 0
+    while k < len(out):
+        beside = [j for j in (k - 1, k + 1) if 0 <= j < len(out) and _edge_of(out[k], out[j], dt)]
+        if not beside:
+            k += 1
+            continue
+        most = max(beside, key=lambda j: _chance(out[k], out[j].mode))
+        piece, fault = out[k], out[most]
+        words = f"From {piece.start * dt:.2f} to {piece.stop * dt:.2f} s its kind is unclear: it may as well be of another row."
+        out[most] = replace(
+            fault,
+            start=min(piece.start, fault.start),
+            stop=max(piece.stop, fault.stop),
+            evidence=(*fault.evidence, words),
+        )
+        del out[k]
+        k = max(0, k - 1)
+    return out
+
+
+def _edge_of(piece: Finding, fault: Finding, dt: float) -> bool:
+    """Whether a piece of which no row has the majority may be the beginning or the end of a fault beside it, which is no milder."""
+    if len(piece.side.sides) > 1 or (piece.side, piece.tier) != (fault.side, fault.tier):
+        return False
+    if piece.stop - piece.start >= fault.stop - fault.start:
+        return False
+    gap = max(piece.start, fault.start) - min(piece.stop, fault.stop)
+    milder = (
+        not fault.mode.total and sum(_chance(piece, m) for m in TOTAL) > sum(_chance(fault, m) for m in TOTAL) + 0.5
+    )
+    return abs(gap) * dt <= _TOUCHES_S and not milder and not _rows(fault) and fault.mode in _rows(piece)
+
+
+def _rows(finding: Finding) -> tuple[str, ...]:
+    return candidates(finding.side.value, ((h.side, h.mode, h.p) for h in finding.hypotheses))
+
+
+def _chance(finding: Finding, mode: FaultMode) -> float:
+    return sum(h.p for h in finding.hypotheses if h.mode == mode)
 
 
 def _continues(a: Finding, b: Finding, states: Mapping[str, NDArray[np.int8]], dt: float) -> bool:

@@ -14,7 +14,7 @@ from replay.arrays.blocks import blocks
 from replay.arrays.envelope import shown
 from replay.arrays.numeric import without_nan
 from replay.control.loop import Replay, any_finite, stack
-from replay.faults import DECIDED, Side
+from replay.faults import DECIDED, Side, State
 from replay.machine.config import Machine
 from replay.signals.timeline import Timeline
 
@@ -116,6 +116,21 @@ def coverage(
             }
         )
     return rows, decided
+
+
+def open_states(
+    assessments: Mapping[tuple[str, str], Assessment], moving: NDArray[np.bool_], machine: Machine
+) -> dict[tuple[str, str], State]:
+    """The commonest state that is no judgement while a part is driven, by component and side; none where all is decided."""
+    out: dict[tuple[str, str], State] = {}
+    anything = moving.any(axis=1)
+    for (component, side), assessment in assessments.items():
+        drives = moving[:, machine.wheels.index(component)] if component in machine.wheels else anything
+        counts = np.bincount(assessment.states[drives], minlength=len(STATES))
+        counts[[s in DECIDED or s not in assessment.reasons for s in STATES]] = 0
+        if counts.any():
+            out[component, side] = STATES[int(np.argmax(counts))]
+    return out
 
 
 def body_motion(timeline: Timeline, replay: Replay, machine: Machine) -> tuple[Array, Array]:

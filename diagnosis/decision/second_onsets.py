@@ -77,9 +77,11 @@ def _around(finding: Finding, a: Assessment, dt: float) -> _Around | None:
     y = residual + expected
     known = np.isfinite(y)
     noise = float(np.nanmedian(threshold)) / 3.0 if np.isfinite(threshold).any() else 0.0
-    if not known.any() or noise <= 0.0:
+    later = first + np.arange(y.size) * stride >= finding.start
+    silent = bool(known[~later].any()) and 4.0 * known[later].mean() < known[~later].mean()  # nothing to step over
+    if not known.any() or noise <= 0.0 or silent:
         return None
-    behind = np.isfinite(y) & np.isfinite(expected) & (first + np.arange(y.size) * stride >= finding.start)
+    behind = known & np.isfinite(expected) & later
     model = channel_model(noise, y[behind], expected[behind], dt * stride)
     # a valve behind a wheel model shows in the speed only: any departure from the expected one is its fault
     shown = finding.side is Side.SENSOR or finding.tier is Tier.DIRECT

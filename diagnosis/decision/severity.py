@@ -23,6 +23,7 @@ from replay.machine.config import Limits
 _LIKELY = 0.6  # probability of any fault from which on one is worth a check
 _MARKED_EPSILON = 0.3
 _SHORT_NOISE_S = 1.0
+_CERTAIN = 0.99  # probability of any fault from which on even brief noise is worth a check
 _LOST = 0.9  # ε̂ from which on so little is left that the part is as good as without signal
 _PROBABLY_TOTAL = 0.75  # that the named side is stuck or without signal, from which on the machine is stopped
 _PARTIAL = (FaultMode.INEFFICIENT, FaultMode.OUTSIDE_TABLE)  # rows of which ε̂ says how much is left
@@ -35,6 +36,10 @@ def severity_of(
     faulty = 1.0 - sum(h.p for h in finding.hypotheses if h.mode == "healthy")
     if faulty < _LIKELY:
         return Severity.INFO, "Not certain enough to act on. Compare with the next mission."
+    brief = finding.mode.varying and seconds < _SHORT_NOISE_S
+    if brief and (finding.tier is Tier.MODEL or faulty < _CERTAIN):
+        by = ", and shown by a model alone" if finding.tier is Tier.MODEL else ", and not certain"
+        return Severity.INFO, f"Too short to act on{by}. Compare with the next mission."
     total = finding.mode.total or _at_risk(finding) >= _PROBABLY_TOTAL
     if faulty < limits.min_probability:
         if total and finding.side is not Side.SENSOR:
@@ -42,8 +47,6 @@ def severity_of(
                 "Probably a {valve} that does not answer: check it before the machine goes out again."
             )
         return Severity.LOW, "Probable, not certain: check it at the next service, and compare with the next mission."
-    if finding.mode.varying and finding.tier is Tier.MODEL and seconds < _SHORT_NOISE_S:
-        return Severity.INFO, "Too short to act on, and shown by a model alone. Compare with the next mission."
     if total:
         return _severity_of_total(finding, seconds, limits, words, kind)
     marked = finding.epsilon is not None and finding.epsilon.value >= _MARKED_EPSILON
@@ -66,6 +69,8 @@ def _severity_of_total(
                 "Faulty, but which part is not certain enough to stop for: check sensor and {valve} before the next mission."
             ),
         )
+    if _at_risk(finding) < _PROBABLY_TOTAL and finding.side is Side.SENSOR and seconds <= limits.brief:
+        return Severity.LOW, "Short, and its kind is not clear: check plug and cable at the next service."
     if _at_risk(finding) < _PROBABLY_TOTAL:
         return (
             Severity.MEDIUM,

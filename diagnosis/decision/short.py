@@ -38,6 +38,8 @@ def short_parts(
     limits: Limits,
     words: MachineWords,
     kind: Kind = Kind.WHEEL,
+    *,
+    open_state: Mapping[Part, State] | None = None,
 ) -> list[ToClear]:
     """Parts that were not judged long enough, those together that are so for the same reason.
 
@@ -55,14 +57,17 @@ def short_parts(
         How to speak of the machine.
     kind : Kind
         Of the parts' components.
+    open_state : Mapping[Part, State] or None
+        The commonest state that is no judgement, while driving.
     """
     alike: dict[tuple[str, str, bool], list[Part]] = {}
     for part in short:
-        reason = _why_short(assessments[part], driven.get(part), limits)
+        state = (open_state or {}).get(part) or main_state(assessments[part])
+        reason = _why_short(assessments[part], driven.get(part), limits, state)
         act = (
-            _act(part, assessments[part], driven.get(part), limits, words)
+            _act(part, assessments[part], driven.get(part), limits, words, state)
             if kind is Kind.WHEEL
-            else _act_of_axle(part[1], _main_state(assessments[part]))
+            else _act_of_axle(part[1], state)
         )
         alike.setdefault((reason, act, decided_s.get(part, 0.0) < _SAID_S), []).append(part)
     out = []
@@ -99,23 +104,23 @@ def unjudged_axles(axles: Sequence[Part], assessments: Mapping[Part, Assessment]
         if STATES.index(State.NOT_EXCITED) in first.states
         else "log steer.<part>.phi and steer.<part>.u, and steer from stop to stop twice while driving"
     )
-    return ToClear(f"Not assessed: {who} ({main_reason(first)}).", act)
+    return ToClear(f"Not assessed: {who} ({main_reason(first, main_state(first))}).", act)
 
 
-def _why_short(assessment: Assessment, driven: float | None, limits: Limits) -> str:
-    """Why a part was not judged long enough; a machine at rest is no reason while it drives."""
+def _why_short(assessment: Assessment, driven: float | None, limits: Limits, state: State | None) -> str:
+    """Why a part was not judged long enough."""
     if driven is not None and driven < limits.min_assessed and assessment.tier is not Tier.NONE:
         return f"driven for less than {limits.min_assessed:g} s"
-    return main_reason(assessment)
+    return main_reason(assessment, state)
 
 
-def main_reason(assessment: Assessment) -> str:
-    """Reason of the commonest state that is no judgement; a machine at rest is one only where nothing else is."""
-    state = _main_state(assessment)
-    return "" if state is None else assessment.reasons[state]
+def main_reason(assessment: Assessment, state: State | None) -> str:
+    """Reason of a state that is no judgement; empty where there is none."""
+    return "" if state is None else assessment.reasons.get(state, "")
 
 
-def _main_state(assessment: Assessment) -> State | None:
+def main_state(assessment: Assessment) -> State | None:
+    """The commonest state that is no judgement; a machine at rest is one only where nothing else is."""
     best, most = None, 0.0
     for state in assessment.reasons:
         if state in DECIDED:
@@ -128,9 +133,11 @@ def _main_state(assessment: Assessment) -> State | None:
     return best
 
 
-def _act(part: Part, assessment: Assessment, driven: float | None, limits: Limits, words: MachineWords) -> str:
+def _act(
+    part: Part, assessment: Assessment, driven: float | None, limits: Limits, words: MachineWords, state: State | None
+) -> str:
     """What somebody does to have a part judged; ``{who}`` and ``{c}`` are filled in by the parts that it holds for."""
-    sensor, tier, state = part[1] == Side.SENSOR, assessment.tier, _main_state(assessment)
+    sensor, tier, reason = part[1] == Side.SENSOR, assessment.tier, main_reason(assessment, state)
     faster = f"faster than {limits.driving_speed:g} {words.speed_unit}"
     if driven is not None and driven < limits.min_assessed and tier is not Tier.NONE:
         return f"move {words.parts_moved} {faster} for at least {limits.min_assessed:g} s, and diagnose that log"
@@ -158,11 +165,11 @@ def _act(part: Part, assessment: Assessment, driven: float | None, limits: Limit
         ),
         Tier.TRACKING: words.fill("log wheel.{c}.u (the {valve} command) or ") + second,
     }
-    if tier in by_tier and "wrong unit" not in main_reason(assessment):
+    if tier in by_tier and "wrong unit" not in reason:
         return by_tier[tier]
     if tier in by_tier:
         return "correct the unit or the channel of wheel.{c}.v and of its command under [signals] in the machine file"
-    if main_reason(assessment).startswith(words.fill(_NOT_SAID)):
+    if reason.startswith(words.fill(_NOT_SAID)):
         return words.fill("log wheel.{c}.u (the {valve} command)")
     other = second if sensor else f"wheel.{{c}}.u_applied (the {words.position})"
     return f"log {other}; without it, drive straight at three steady speeds for 10 s each"

@@ -50,7 +50,7 @@ def to_clear(
     words = against.words
     out = [ToClear(event.text, event.act) for event in against.events]
     out += [ToClear(text, "correct [signals] in the machine file, and diagnose again") for text in against.hints]
-    out += short_parts(against.short, assessments, decided_s, driven, limits, words)
+    out += short_parts(against.short, assessments, decided_s, driven, limits, words, open_state=against.open_state)
     if against.unexplained:
         who = join_words(
             sorted({words.part_words(Kind.WHEEL, c, Side.SENSOR_OR_ACTUATOR) for c, _ in against.unexplained})
@@ -92,7 +92,7 @@ def to_clear(
     steered = [k for k in assessments if k[0] in axles]
     unjudged = [k for k in steered if assessments[k].tier is Tier.NONE]
     brief = [k for k in steered if k not in unjudged and _brief(k, decided_s, driven, limits)]
-    out += short_parts(brief, assessments, decided_s, driven, limits, words, Kind.STEER)
+    out += short_parts(brief, assessments, decided_s, driven, limits, words, Kind.STEER, open_state=against.open_state)
     return tuple(out + ([unjudged_axles(unjudged, assessments, words)] if unjudged else []))
 
 
@@ -109,10 +109,22 @@ def _of_checks(checks: Sequence[Checked], twice: Collection[str]) -> list[ToClea
     alike: dict[str, list[str]] = {}
     for own in worst.values():
         first = own[0]
-        if first.check is Check.LASTING_RATE and any(_act(first, twice) == a for a in alike):
+        texts = alike.setdefault(_act(first, twice), [])
+        if first.check is Check.LASTING_RATE and texts:
             continue  # one axle against the other: said of the one is said of both
-        alike.setdefault(_act(first, twice), []).append(first.text)
+        twin = next((k for k, t in enumerate(texts) if first.check in _TURNED and _same_but_name(t, first)), None)
+        if twin is None:
+            texts.append(first.text)
+        else:  # the yaw rate does not say which axle it is
+            other = next(c.component for c in checks if c.text == texts[twin])
+            texts[twin] = texts[twin].replace(f" {other} ", f" {other} or {first.component} ", 1)
     return [ToClear(f"{_sentence(_some(texts))}.", act) for act, texts in alike.items()]
+
+
+def _same_but_name(text: str, check: Checked) -> bool:
+    """Whether a sentence says of another part what a check's says of its own."""
+    words, own = text.split(" "), check.text.split(" ")
+    return len(words) == len(own) and [b for a, b in zip(words, own, strict=True) if a != b] == [check.component]
 
 
 def _some(texts: Sequence[str]) -> str:

@@ -10,26 +10,29 @@ from diagnosis.results.fault_rows import mode_words
 from diagnosis.results.machine_words import MachineWords
 from diagnosis.results.result import FaultInterval
 from diagnosis.results.vocabulary import Severity
-from replay.faults import Side
+from replay.faults import FaultMode, Side
+
+_NAMED = 3  # parts in the verdict's sentence
 
 
 def actions_of(intervals: Sequence[FaultInterval], words: MachineWords) -> tuple[ActionRow, ...]:
     """One action per component and side: drives to stop at once for, then other stops, then the rest, worst first."""
+    return tuple(_action(n, faults, words) for n, faults in enumerate(_by_part(intervals), 1))
+
+
+def _by_part(intervals: Sequence[FaultInterval]) -> list[list[FaultInterval]]:
+    """Faults that are worth an action, those of one part together, the most urgent part first."""
     parts: dict[tuple[str, str], list[FaultInterval]] = {}
     for f in intervals:
         if f.severity is not Severity.INFO:
             parts.setdefault((f.component, f.side), []).append(f)
-    ordered = sorted(parts.values(), key=lambda faults: _urgency(faults[0]))
-    return tuple(_action(n, faults, words) for n, faults in enumerate(ordered, 1))
+    return sorted(parts.values(), key=lambda faults: _urgency(faults[0]))
 
 
 def _action(n: int, faults: Sequence[FaultInterval], words: MachineWords) -> ActionRow:
     """What to do about one part, with its faults worst first."""
     worst = faults[0]
-    kinds: dict[str, list[FaultInterval]] = {}
-    for f in faults:
-        kinds.setdefault(fault_words(f), []).append(f)
-    found = join_words([_how_long(kind, same) for kind, same in kinds.items()])
+    found = _course(faults)
     lead = f"{_order(worst)} the {words.part_words(worst.kind, worst.component, worst.side)}"
     return {
         "n": n,
@@ -68,20 +71,36 @@ def fault_words(f: FaultInterval) -> str:
     return unclear_words(f.side, modes) if modes else mode_words(f.side, f.mode)
 
 
+def _course(faults: Sequence[FaultInterval]) -> str:
+    """What one part was, kind by kind, and for how long."""
+    kinds: dict[str, list[FaultInterval]] = {}
+    for f in faults:
+        kinds.setdefault(fault_words(f), []).append(f)
+    return join_words([_how_long(kind, same) for kind, same in kinds.items()])
+
+
 def _how_long(words: str, faults: Sequence[FaultInterval]) -> str:
-    """What faults are, with the whole time of them on one part, and how many they are."""
+    """What faults are, how much they take, the whole time of them on one part, and how many they are."""
     total = seconds_words(sum(f.stop_s - f.start_s for f in faults))
-    return f"{words} for {total}" + ("" if len(faults) == 1 else f" in {len(faults)} intervals")
+    return f"{words}{_lost(faults)} for {total}" + ("" if len(faults) == 1 else f" in {len(faults)} intervals")
+
+
+def _lost(faults: Sequence[FaultInterval]) -> str:
+    """What faults take of their part's effectiveness, where that is what they are: `` (50 % lost)``."""
+    if not all(f.mode.scaled and f.mode is not FaultMode.OUTSIDE_TABLE for f in faults):
+        return ""
+    known = [round(100 * f.epsilon.value) for f in faults if f.epsilon is not None]
+    span = dict.fromkeys((min(known), max(known))) if known else {}
+    return f" ({' to '.join(map(str, span))} % lost)" if span else ""
 
 
 def sentence_of(faults: Sequence[FaultInterval], words: MachineWords) -> str:
-    """The worst three faults in one sentence."""
-    shown = [
-        f"the {words.part_words(f.kind, f.component, f.side)} was {fault_words(f)} for {seconds_words(f.stop_s - f.start_s)}"
-        for f in faults[:3]
-    ]
-    text = join_words(shown)
-    more = f"; {rest} more {'is' if rest == 1 else 'are'} listed below" if (rest := len(faults) - 3) > 0 else ""
+    """The most urgent three parts in one sentence, in the order of the actions."""
+    parts = _by_part(faults)
+    said = [f"the {words.part_words(f[0].kind, f[0].component, f[0].side)} was {_course(f)}" for f in parts[:_NAMED]]
+    text = "; ".join(said) if any(len(f) > 1 for f in parts[:_NAMED]) else join_words(said)
+    rest = len(parts) - _NAMED
+    more = f"; {count_words(rest, 'more part')} {'is' if rest == 1 else 'are'} listed below" if rest > 0 else ""
     return text[0].upper() + text[1:] + more + "."
 
 

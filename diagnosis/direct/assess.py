@@ -79,7 +79,9 @@ def _states(found: IdentifiedPair, faults: FaultsFound) -> NDArray[np.int8]:
 def _reasons(side: Side) -> dict[State, str]:
     """Why a state that is no judgement was given."""
     return {
-        State.NOT_EXCITED: "nothing is commanded and nothing moves",
+        State.NOT_EXCITED: "the {valve} is commanded to rest, and rests"
+        if side is Side.ACTUATOR
+        else "nothing moves, by both measurements",
         State.NO_DATA: "no samples",
         State.NOT_ASSESSED: "the command changes faster than the log's rate or the {valve}'s lag can resolve"
         if side is Side.ACTUATOR

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -99,14 +100,15 @@ class _WheelPairs:
     def speeds(self, habit: Habit) -> Pair:
         """The speed sensor against the second one."""
         pair = self._pair(Side.SENSOR, "v", "v_true", self._quiet(), "m/s", 2.2 * self.mission.machine.max_speed)
-        return replace(pair, instruments=self._instruments(), habit=habit)
+        return replace(pair, instruments=self._instruments, habit=habit)
 
     def openings(self) -> Pair:
         """The valve's position against its command."""
         span = max(self.mission.machine.control.u_max, 1e-6)
         u = self.mission.values(self.name("u"))
         idle = self.mission.timeline.map(lambda u: np.abs(without_nan(u)) < _IDLE * span, u)
-        return self._pair(Side.ACTUATOR, "u_applied", "u", idle, "of full opening", span)
+        pair = self._pair(Side.ACTUATOR, "u_applied", "u", idle, "of full opening", span)
+        return replace(pair, instruments=self._instruments)
 
     def _pair(self, side: Side, y: str, x: str, quiet: Flags, unit: str, span: float) -> Pair:
         mission = self.mission
@@ -124,8 +126,9 @@ class _WheelPairs:
         true = self.mission.values(self.name("v_true"))
         return self.mission.timeline.map(low, self.mission.command(self.wheel), true)
 
+    @cached_property
     def _instruments(self) -> Array | None:
-        """The commanded speed and two lags of it: what moves the wheel and knows nothing of its sensor."""
+        """The commanded speed and two lags of it: what drives the loop and knows nothing of a fault in it."""
         command = self.mission.command(self.wheel)
         if not np.isfinite(command).any():
             return None

@@ -52,7 +52,7 @@ def sentences(isolated: Isolated, found: IdentifiedPair, mode: FaultMode, epsilo
 
 def alike_sentence(found: IdentifiedPair) -> str:
     """Why a constant value and a constant share are equally probable."""
-    return f"{found.pair.x_name} hardly moved in this time, so stuck and inefficient cannot be distinguished."
+    return f"{found.pair.x_name} hardly moved but for its noise, so stuck and inefficient cannot be distinguished."
 
 
 def _values(isolated: Isolated, found: IdentifiedPair, epsilon: Epsilon | None, seconds: float) -> list[str]:
@@ -60,9 +60,14 @@ def _values(isolated: Isolated, found: IdentifiedPair, epsilon: Epsilon | None, 
     pair, seen = found.pair, isolated.seen
     y, x = seen.y[seen.use], seen.x[seen.use]
     if isolated.run.row in TOTAL_ROWS:
+        other = (
+            f"stood at {amount(float(np.mean(x)), pair.unit, 2)} (standard deviation {amount(float(np.std(x)), pair.unit, 2)})"
+            if seen.still
+            else f"moved over {amount(float(np.ptp(x)), pair.unit, 2)}"
+        )
         return [
             f"{pair.y_name} stayed within {amount(float(np.ptp(y)), pair.unit, 2)} of {amount(float(np.mean(y)), pair.unit)} "
-            f"for {seconds:.3f} s while {pair.x_name} moved over {amount(float(np.ptp(x)), pair.unit, 2)}."
+            f"for {seconds:.3f} s while {pair.x_name} {other}."
         ]
     if epsilon is None:
         return []

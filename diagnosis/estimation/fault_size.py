@@ -37,7 +37,9 @@ def estimate_fault(
     if row in fault_models.TOTAL_ROWS:
         level = float(np.mean(y))
         spread = float(np.std(y))
-        slack = min(1.0, 1.96 * (model.constant_noise + spread) / max(1e-300, float(np.std(x)) * np.sqrt(y.size)))
+        # what moved says what is left of it; of a silent channel, whose saturation term is 0, any command does
+        driven = float(np.sqrt(np.mean(x**2))) if row == fault_models.NO_SIGNAL else float(np.std(x))
+        slack = min(1.0, 1.96 * (model.constant_noise + spread) / max(1e-300, driven * np.sqrt(y.size)))
         se = 1.96 * max(model.constant_noise, spread) / np.sqrt(y.size)
         sat = Sat(level, float(np.sqrt(np.mean(y**2))), level - se, level + se, unit)
         return Epsilon(1.0, 1.0 - slack, 1.0), sat, 0.0

@@ -16,7 +16,7 @@ from diagnosis.results.candidates import label_of
 from diagnosis.results.document import IntervalRow, ReportDocument, WheelPlace
 from diagnosis.results.machine_words import HYDRAULIC, MachineWords, words_of
 from diagnosis.results.vocabulary import Kind, Severity
-from replay.faults import State
+from replay.faults import Side, State
 
 _MARGIN, _LINE = 26.0, 15  # room for text on either side, and characters that fit in a line of it
 _W, _TYRE_W, _TYRE_H, _PITCH, _JOINT = 372.0, 50.0, 96.0, 132.0, 58.0
@@ -64,11 +64,12 @@ def condition(
         remark = f"{len(every)} remark{'s' * (len(every) > 1)}"
         return Condition(found.state, (*found.lines, remark), every[0]["id"], f"{found.title}; {remark}")
     if mine:
-        worst = min(mine, key=lambda f: (-Severity(f["severity"]).rank, f["start_s"]))
+        worst = min(mine, key=_urgency)
         name = words.part_name(kind, worst["side"])
         label = label_of(worst).lower()
-        length = span(worst["stop_s"] - worst["start_s"])
-        more = (f"and {len(mine) - 1} more",) if len(mine) > 1 else ()
+        same = [f for f in mine if f["side"] == worst["side"] and label_of(f).lower() == label]
+        length = span(sum(f["stop_s"] - f["start_s"] for f in same))
+        more = (f"and {len(mine) - len(same)} more",) if len(mine) > len(same) else ()
         heading = name[0].upper() + name[1:]
         title = f"{component}: {name} {label}, {length}{', ' + more[0] if more else ''}"
         return Condition(worst["mode"], (heading, label, length, *more), worst["id"], title)
@@ -86,6 +87,13 @@ def condition(
         lines = ("No fault found", f"{open_sides[0]}", "not assessed")
         return Condition(State.NOT_ASSESSED, lines, "", f"{component}: no fault found, {open_sides[0]} not assessed")
     return Condition(State.HEALTHY, ("Healthy",), "", f"{component}: no fault found")
+
+
+def _urgency(fault: IntervalRow) -> tuple[int, int, float]:
+    """Place among the faults of one component, as among the actions: of those to stop for a drive's comes first."""
+    severity = Severity(fault["severity"])
+    sides = {Side.ACTUATOR.value: 0, Side.SENSOR_OR_ACTUATOR.value: 1}
+    return -severity.rank, sides.get(fault["side"], 2) if severity is Severity.HIGH else 0, fault["start_s"]
 
 
 def _rows(wheels: Sequence[str], geometry: Mapping[str, WheelPlace]) -> list[list[str]]:

@@ -22,7 +22,7 @@ from diagnosis.results.fault_rows import LOOKS, state_label
 from diagnosis.results.machine_words import words_of
 from diagnosis.results.result import Closeups
 from diagnosis.results.vocabulary import Kind, Severity
-from replay.faults import DECIDED
+from replay.faults import DECIDED, Side
 
 _OTHERS = 0.1
 _LEAST = 50_000
@@ -170,6 +170,7 @@ def view(
             "detected": f["detected_s"],
             "mode": f["mode"],
             "component": f["component"],
+            "words": state_label(f["mode"], f["side"]).lower(),
             "severity": f["severity"],
             "title": labels.fault_title(f, words),
             "rows": place[id(figures[f["id"]])],
@@ -186,7 +187,9 @@ def view(
         "name": machine_name(report["machine"]),
         "faults": faults,
         "limit": report["limits"]["min_probability"],
-        "words": {m: state_label(m, "sensor").lower() for m in DECIDED},
+        "words": {
+            side.value: {m: state_label(m, side).lower() for m in DECIDED} for side in (Side.SENSOR, Side.ACTUATOR)
+        },
         "dashes": {state: look.dash for state, look in LOOKS.items() if look.dash != "solid"},
         "figures": [[row_json(r, index) for r in rows] for rows in distinct.values()],
         "loop": [{"key": g.key, "title": g.title, "rows": [row_json(r, index) for r in g.rows]} for g in groups],

@@ -30,7 +30,7 @@ from diagnosis.results.document import (
 )
 from diagnosis.results.fault_rows import state_label
 from diagnosis.results.machine_words import MachineWords, words_of
-from diagnosis.results.vocabulary import Kind, Tier, Verdict
+from diagnosis.results.vocabulary import Kind, Severity, Tier, Verdict
 from replay.faults import UNDECIDED, FaultMode, State
 
 _SHOWN = 0.001
@@ -208,6 +208,9 @@ def _facts(report: ReportDocument, duration: float) -> list[tuple[str, str]]:
     if log["distance_m"] is not None and words_of(machine).speed_unit == "m/s":
         facts.append(("Distance", f"{number(log['distance_m'])} m"))
     facts.append(("Sample rate", f"{number(log['rate_hz'])} Hz"))
+    faulty = {(f["component"], f["side"]) for f in report["intervals"] if f["severity"] != Severity.INFO}
+    if faulty:
+        facts.append(("Faulty", f"{len(faulty)} part{'s' if len(faulty) > 1 else ''}"))
     parts = judged(report)
     facts.append(("Judged", parts) if parts else (words_of(machine).parts.capitalize(), _count(machine)))
     return facts

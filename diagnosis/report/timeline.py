@@ -20,6 +20,7 @@ from diagnosis.results.vocabulary import Kind, Severity, Tier
 from replay.faults import FAULT_STATES, FaultMode, Side, State
 
 _BUCKETS = 2000
+_TOUCHING = 1e-6  # percent of a lane: one bar ends where the next begins
 _LEAST_WIDTH, _MOST_ROWS = 0.6, 3  # percent of a lane that a bar takes at least on a screen; bars above each other
 _TICKS = (0.1, 0.2, 0.5, 1, 2, 5, 10, 15, 30, 60, 120, 300, 600, 900, 1800, 3600, 7200, 14400, 43200, 86400)
 
@@ -163,9 +164,9 @@ def side_by_side(bars: Iterable[Bar]) -> tuple[Bar, ...]:
         ends.clear()
 
     for b in bars:
-        if ends and b.left >= max(ends):
+        if ends and b.left >= max(ends) - _TOUCHING:
             close()
-        row = next((i for i, end in enumerate(ends) if b.left >= end), len(ends))
+        row = next((i for i, end in enumerate(ends) if b.left >= end - _TOUCHING), len(ends))
         stop = b.left + max(b.width, _LEAST_WIDTH)
         if row == len(ends) < _MOST_ROWS:
             ends.append(stop)

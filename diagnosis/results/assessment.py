@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import astuple, dataclass, field
+from dataclasses import astuple, dataclass, field, replace
 from math import isfinite
 from typing import Any
 
@@ -14,9 +14,10 @@ from diagnosis.results.detectability import Powers
 from diagnosis.results.loss import Loss
 from diagnosis.results.result import Closeups, Epsilon, Hypothesis, Sat
 from diagnosis.results.vocabulary import Tier
-from replay.faults import FaultMode, Side, State
+from replay.faults import TOTAL, FaultMode, Side, State
 
-_LEAST = 0.1  # ε̂ below which a varying saturation term is not told from it
+_LEAST = 0.1  # ε̂ of the smallest fault; below it a varying saturation term is not told from it
+_BOUND = 0.95  # of which the bounds of ε̂ speak
 STATES: tuple[State, ...] = tuple(State)
 CODE = {state: np.int8(i) for i, state in enumerate(STATES)}
 
@@ -45,6 +46,7 @@ class Finding:
         if self.epsilon is not None and self.mode is not FaultMode.OUTSIDE_TABLE:
             known = self.epsilon.high > 0.0  # a fault of the tables that takes nothing away has no such size
             object.__setattr__(self, "epsilon", self.epsilon.as_share() if known else None)
+            self._bound_by_row()
         if self.sat is not None and self.mode.varying and (self.epsilon is None or self.epsilon.value < _LEAST):
             object.__setattr__(self, "sat", None)  # ε·sat is known, but not what share of sat that is
         if self.sat is not None:
@@ -53,6 +55,15 @@ class Finding:
             size = getattr(self, name)
             if size is not None and not all(isfinite(x) for x in astuple(size) if isinstance(x, float)):
                 object.__setattr__(self, name, None)
+
+    def _bound_by_row(self) -> None:
+        """Where the readings do not bound what a stuck or silent part has lost, its rows do: all (ε = 1), else what counts as a fault."""
+        if self.mode.total and self.epsilon is not None and self.epsilon.low <= 0.0:
+            total, healthy = (
+                sum(h.p for h in self.hypotheses if h.mode in modes) for modes in (TOTAL, {State.HEALTHY.value})
+            )
+            low = 1.0 if total >= _BOUND else _LEAST if healthy <= 1.0 - _BOUND else 0.0
+            object.__setattr__(self, "epsilon", replace(self.epsilon, low=low))
 
 
 @dataclass(frozen=True)

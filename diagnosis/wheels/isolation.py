@@ -125,16 +125,19 @@ def judge(run: Run, y: Array, model: WheelFilterModel, limits: Limits, names: tu
     if stated is None:
         return RunVerdict(None)
     m = _model_of(run, weighed.row)
+    if m == S_NONE and known.size < y.size / 2:  # it delivers nothing: the few readings at its edges say nothing of it
+        known = known[:0]
     epsilon, sat = estimate(m, known, run.mean[m], run.cov[m], model)
     if epsilon is not None and m in (S_GAIN, A_GAIN) and epsilon.value < limits.min_epsilon:
         return RunVerdict(None)
+    ranked = _undivided(weighed) if stated[0] is Side.SENSOR_OR_ACTUATOR else weighed.ranked
     finding = Finding(
         start=run.start,
         stop=run.stop,
         side=stated[0],
         mode=weighed.row[1],
         probability=min(1.0, stated[1]),
-        hypotheses=tuple(Hypothesis(*_names(row), q) for row, q in weighed.ranked if q >= _LEAST_HYPOTHESIS),
+        hypotheses=tuple(Hypothesis(*_names(row), q) for row, q in ranked if q >= _LEAST_HYPOTHESIS),
         epsilon=epsilon,
         sat=sat,
         evidence=_sentences(run, m, (stated[0], weighed.row), known, weighed.ranked, names, seconds),
@@ -149,7 +152,8 @@ def _weighed(run: Run, y: Array, model: WheelFilterModel, *, rests: bool) -> _We
     `rests`: whether the readings may rest, as those of a sensor must that is stuck or gives no signal (L16 (4) with ε = 1).
     """
     pooled = dict(run.pooled)
-    if not rests:
+    if not rests:  # what is ruled out counts for no other fault
+        pooled[None] = pooled.get(None, 0.0) + sum(pooled.get(row, 0.0) for row in _AT_REST)
         pooled |= dict.fromkeys(_AT_REST, 0.0)
     silent = y.size == 0 or abs(float(np.mean(y))) <= 3 * model.rounding
     if silent and run.side is Side.SENSOR:  # stuck at zero and no signal are one row of the table
@@ -185,6 +189,14 @@ def _stated(weighed: _Weighed, *, apart: bool) -> tuple[Side, float] | None:
     return Side.SENSOR_OR_ACTUATOR, both
 
 
+def _undivided(weighed: _Weighed) -> Ranking:
+    """Rows by their probability where nothing tells a loss of the sensor from one of the valve: both have the same share of it."""
+    mode = weighed.row[1]
+    rows = [(Side.SENSOR, mode), (Side.ACTUATOR, mode)]
+    half = sum(weighed.pooled.get(row, 0.0) for row in rows) / 2
+    return sorted(({**weighed.pooled} | dict.fromkeys(rows, half)).items(), key=lambda item: -item[1])
+
+
 def _model_of(run: Run, row: Row) -> int:
     """Model of a row by which the fault is estimated."""
     side, mode = row
@@ -211,7 +223,7 @@ def _sentences(
     side, row = stated
     share = dict(ranked)[row]
     lines = [
-        f"Over {seconds:.3f} s {names[0]} and {names[1]} fit “{_words(row)}”: on simulated machines with such signals it was this "
+        f"Over {seconds:.3f} s {names[0]} and {names[1]} fit “{_words((side, row[1]))}”: on simulated machines with such signals it was this "
         f"in {100 * share:.0f} of 100 cases."
     ]
     ahead = run.ahead(m)
@@ -219,7 +231,9 @@ def _sentences(
         lines.append(f"{names[0]} is {times_as_probable(ahead)} by its Kalman model as by that of a healthy {{wheel}}.")
     else:
         lines.append("Its Kalman model alone would not be preferred to that of a healthy {wheel}.")
-    if m in TOTAL_SENSOR and known.size:
+    if m == S_NONE and not known.size:
+        lines.append(f"{names[0]} delivered nothing in this time.")
+    elif m in TOTAL_SENSOR and known.size:
         lines.append(
             f"{names[0]} stayed within {float(np.ptp(known)):.2g} {{speed_unit}} of {float(np.mean(known)):.4g} {{speed_unit}}."
         )

@@ -10,10 +10,14 @@ from replay.faults import Side
 
 Array = NDArray[np.float64]
 
+_SILENT = 10  # readings after an onset that are looked at for silence
+
 
 def onset_sentence(start: int, y: Array, model: WheelFilterModel, dt: float, name: str, side: Side) -> str:
     """What the shape of the onset says: a sensor's fault may jump by more than a wheel can, a valve's bends."""
     low, high = max(1, start - 2), min(y.size, start + 3)
+    if side is Side.SENSOR and start and not np.isfinite(y[start + _SILENT : start + 2 * _SILENT]).any():
+        return f"At its onset {name} falls silent."
     if high <= low or start == 0:
         return "The fault was present from the first sample, so its onset gives no evidence."
     steps = np.abs(np.nan_to_num(y[low:high] - y[low - 1 : high - 1]))

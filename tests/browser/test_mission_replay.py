@@ -20,13 +20,15 @@ def test_one_clock_moves_everything(open_page: OPEN) -> None:
     page.locator("#scrub").fill("33")
     expect(page.locator("#clock")).to_have_text("33.00 s")
     expect(page.locator("#stage-machine [data-c=FR] rect.tyre")).to_have_class("tyre stuck")
-    expect(page.locator("#stage-machine [data-c=FR] .live text")).to_contain_text("0.21 m/s")
+    expect(page.locator("#stage-machine [data-c=FR] .live text").first).to_contain_text("0.21 m/s")
+    expect(page.locator("#stage-machine [data-c=FR] .says")).to_have_text("stuck")  # at this time, not over the mission
     assert page.locator("#stage-path .here").get_attribute("visibility") == "visible"
     expect(page.locator("#stage-modes > div", has_text="FR speed sensor")).to_contain_text("stuck 96 %")
     page.locator("#stage-figure .reading p").first.wait_for()
     page.locator("#figure .reading p").first.wait_for()
     page.locator("#scrub").fill("10")
     expect(page.locator("#stage-machine [data-c=FR] rect.tyre")).to_have_class("tyre healthy")
+    expect(page.locator("#stage-machine [data-c=FR] .says")).to_have_text("healthy")
 
 
 def test_sentences_say_why_now_and_lead_to_their_time(open_page: OPEN) -> None:

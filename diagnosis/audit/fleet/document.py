@@ -45,6 +45,8 @@ class Fleet:
         When its newest result was made.
     first_runs : Mapping[str, int]
         Run in which each mission was first judged, as far as that is known.
+    copies : Mapping[str, str]
+        Missions that are copies of another machine's, and the name of that one's: they count for no machine.
     """
 
     machines: tuple[Machine, ...]
@@ -55,6 +57,7 @@ class Fleet:
     run: int = 0
     made_ns: int | None = None
     first_runs: Mapping[str, int] = field(default_factory=dict)
+    copies: Mapping[str, str] = field(default_factory=dict)
 
 
 def fleet_of(
@@ -91,6 +94,7 @@ def fleet_document(fleet: Fleet, baseline: BaselineRow | None = None) -> FleetDo
     for mission in sorted(fleet.missions, key=lambda m: m.name):
         if mission.result is not None:
             first.setdefault(mission.result.id, mission.name)
+    results = {m.name: m.result.id if m.result is not None else -1 for m in fleet.missions}
     at = {mission.name: k for k, mission in enumerate(fleet.missions)}
     status, tag, title = words.headline(fleet.machines, len(fleet.unknown))
     counts = _counts(fleet, first)
@@ -122,8 +126,8 @@ def fleet_document(fleet: Fleet, baseline: BaselineRow | None = None) -> FleetDo
         "missions": [
             mission_row(
                 m,
-                failed.get(m.name, owner.get(m.result.id if m.result is not None else -1)),
-                first,
+                failed.get(m.name, owner.get(results[fleet.copies.get(m.name, m.name)])),
+                fleet.copies.get(m.name, first.get(results[m.name])),
                 fleet.first_runs.get(m.name),
             )
             for m in fleet.missions
@@ -147,7 +151,7 @@ def _counts(fleet: Fleet, first: Mapping[int, str]) -> CountsRow:
         "not_assessed": sum(r.verdict is Verdict.NOT_ASSESSED for r in results),
         "unknown": len(fleet.unknown),
         "pending": len(fleet.missions) - len(results),
-        "copies": len(results) - len(first),
+        "copies": len(results) - len(first) + len(fleet.copies),
         "gone": sum(m.gone for m in fleet.missions),
         "undated": sum(len(m.undated) for m in fleet.machines),
         "with_faults": sum(bool(r.faults) for r in runs),

@@ -67,8 +67,8 @@ def _line(line: Line | None, now: float) -> LineRow | None:
     }
 
 
-def mission_row(m: Mission, owner: int | None, first: Mapping[int, str], first_run: int | None) -> MissionRow:
-    """One mission of the machine at place `owner`; `first` names the first of each result's copies."""
+def mission_row(m: Mission, owner: int | None, first: str | None, first_run: int | None) -> MissionRow:
+    """One mission of the machine at place `owner`; `first` names the first of its copies."""
     r = m.result
     if r is None:
         return {
@@ -104,7 +104,7 @@ def mission_row(m: Mission, owner: int | None, first: Mapping[int, str], first_r
         "version": r.version,
         "report": r.report,
         "first_run": first_run,
-        "copy_of": None if first[r.id] == m.name else first[r.id],
+        "copy_of": None if first == m.name else first,
         "faults": [_fault(f) for f in faults],
     }
 

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 
 from diagnosis.audit.fleet.fault_types import FleetFaultRow
 from diagnosis.audit.fleet.fleet_types import FleetDocument, MachineRow, MissionRow
 from diagnosis.audit.fleet.page.rows import fault_words
-from diagnosis.audit.fleet.words import count
+from diagnosis.audit.fleet.words import count, open_words
 from diagnosis.results.machine_words import words_of
 from diagnosis.results.vocabulary import Severity, Verdict
 
@@ -69,19 +69,33 @@ def lists_of(document: FleetDocument) -> tuple[Left, ...]:
     for k, m in enumerate(document["machines"]):
         standing = [f for f in document["faults"] if f["machine"] == k and f["status"] not in GONE]
         leave = leave_of(m)
-        place, reason = _why(leave, m, standing, document["missions"])
+        rising = {
+            (t["component"], t["side"])
+            for t in document["trends"]
+            if t["machine"] == k and t["direction"] == "rising" and t["points"][-1][2] >= t["limit"]
+        }
+        place, reason = _why(leave, m, standing, document["missions"], rising)
         name = "" if place is None else document["missions"][place]["name"]
         out.append(Left(leave, k, m["label"], reason, place, name))
     return tuple(out)
 
 
 def _why(
-    leave: Leave, m: MachineRow, standing: Sequence[FleetFaultRow], missions: Sequence[MissionRow]
+    leave: Leave,
+    m: MachineRow,
+    standing: Sequence[FleetFaultRow],
+    missions: Sequence[MissionRow],
+    rising: Collection[tuple[str, str]],
 ) -> tuple[int | None, str]:
     """Place of the mission behind a machine's place in the lists, and the reason."""
     last = m["missions"][-1] if m["missions"] else next(iter(m["undated"]), None)
     faults = sorted(standing, key=lambda f: -Severity(f["severity"]).rank)
-    named = "; ".join(fault_words(f, words_of(m)) for f in faults[:_FAULTS])
+    named = "; ".join(
+        fault_words(f, words_of(m))
+        + (", rising" if (f["component"], f["side"]) in rising else "")
+        + (", no repair recorded" + open_words(f["open"], f["clean"], f["needed"]) if f["open"] and f["since"] else "")
+        for f in faults[:_FAULTS]
+    )
     named += f" and {len(faults) - _FAULTS} more" if len(faults) > _FAULTS else ""
     if leave is Leave.MUST_NOT:
         place = faults[0]["last"] if faults else last
@@ -104,6 +118,10 @@ def _said(mission: MissionRow) -> str:
     if damage:
         return f"{_DAMAGE}{damage.partition(': ')[0]}"
     reason = mission["reason"].partition(";")[0]
+    for name in (file.rpartition("/")[2] for file in mission["files"]):
+        before, found, after = reason.partition(f"/{name} ")
+        if found and " " not in before:  # the whole path stands below
+            reason = f"{name} {after}"
     head, _, tail = reason.partition(": ")
     names_a_file = tail and any(head.endswith(file.rpartition("/")[2]) for file in mission["files"])
     return (tail if names_a_file else reason).rstrip(".") or mission.get("title") or "not judged"

@@ -33,7 +33,9 @@ class Pictures {
     const words = Pictures.svg("text", { x: x + w / 2, y: y + h + (steer ? 11 : 12) });
     live.append(words);
     g.append(live);
-    return { c, live, bars, words, rect, middle: y + h / 2, half: h / 2, steer, usual: rect.getAttribute("class") };
+    const says = g.closest("#stage") && !steer ? Pictures.svg("text", { x: x + w / 2, y: y + h / 2 + 8, class: "says" }) : null;
+    if (says) live.append(says);
+    return { c, live, bars, words, says, rect, middle: y + h / 2, half: h / 2, steer, usual: rect.getAttribute("class") };
   }
 
   // Largest size of a channel over the mission: what a full bar means.
@@ -46,9 +48,12 @@ class Pictures {
     return this.sizes.get(channel);
   }
 
-  // The worst fault of a part at a time, else what its lane says.
+  // The worst fault of a part at a time.
+  static fault(c, t) { return Data.view.faults.find((f) => f.component === c && f.start <= t && t < f.stop); }
+
+  // Its mode, else what the part's lane says.
   state(c, t) {
-    const fault = Data.view.faults.find((f) => f.component === c && f.start <= t && t < f.stop);
+    const fault = Pictures.fault(c, t);
     if (fault) return fault.mode;
     const at = 2000 * t / Data.view.duration;
     for (const path of this.root.querySelectorAll(`.lane[data-c="${CSS.escape(c)}"] path.ln`)) {
@@ -74,14 +79,16 @@ class Pictures {
     }
     for (const w of this.wheels) {
       w.live.setAttribute("visibility", off ? "hidden" : "visible");
-      w.rect.setAttribute("class", off ? w.usual : w.usual.replace(/ \w+$/, ` ${this.state(w.c, t)}`));
+      const state = off ? "" : this.state(w.c, t);
+      w.rect.setAttribute("class", off ? w.usual : w.usual.replace(/ \w+$/, ` ${state}`));
+      if (w.says) w.says.textContent = off ? "" : Pictures.fault(w.c, t)?.words ?? state.replaceAll("_", " ");
       const texts = [];
       for (const { channel, name, bar } of off ? [] : w.bars) {
         const { k, unit } = Data.view.channels[channel], [low, high] = await Data.at(channel, t), value = (low + high) / 2, part = Math.max(-1, Math.min(1, value / await this.full(channel))) || 0;
         if (job !== this.job) return;
         bar.setAttribute("y", w.middle - Math.max(0, part) * w.half);
         bar.setAttribute("height", Math.abs(part) * w.half);
-        if (!w.steer || name === "v") texts.push(`${name === "u" ? "u " : ""}${Now.number(+(value * k).toPrecision(2))}${unit === "1" ? "" : ` ${unit.replace("% of opening", "%")}`}`);
+        if (!w.steer || name === "v") texts.push(`${name === "u" ? "u " : ""}${Now.number(+(value * k).toPrecision(2))}${unit === "1" ? "" : unit === "°" ? unit : ` ${unit.replace("% of opening", "%")}`}`);
       }
       w.words.textContent = texts.join(" · ");
     }

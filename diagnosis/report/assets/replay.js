@@ -3,6 +3,7 @@
 class Replay {
   static APART = 0.5;
   static MOST = 300;
+  static BESIDE = 2; // of a fault [s]
 
   constructor(one) {
     Object.assign(this, { one, stage: one("#stage"), names: new Map(Data.view.channels.map((c, i) => [c.name, i])), events: [], frame: 0 });
@@ -10,7 +11,7 @@ class Replay {
     for (const [from, to] of [["svg.machine", "#stage-machine"], ["svg.map", "#stage-path"]]) {
       const copy = document.querySelector(from)?.cloneNode(true);
       if (!copy) { one(to).hidden = true; continue; }
-      for (const e of copy.querySelectorAll(".live, .here, .ring ~ .bg")) e.remove();
+      for (const e of copy.querySelectorAll(".live, .here, .ring ~ .bg, [data-c] > .side, [data-c] > .bg, [data-c] > title")) e.remove(); // what they say is of the whole mission
       for (const e of copy.querySelectorAll("[tabindex]")) { e.removeAttribute("tabindex"); e.removeAttribute("role"); e.removeAttribute("data-f"); }
       copy.setAttribute("role", "img");
       one(to).append(copy);
@@ -21,8 +22,8 @@ class Replay {
   }
 
   bars() {
-    const modes = Object.keys(Data.view.words);
     return this.parts.flatMap((part) => {
+      const modes = Object.keys(Data.view.words[part.side] ?? {});
       part.modes = modes.map((m) => ({ m, channel: this.names.get(`${part.base}p_${m}`) })).filter((x) => x.channel !== undefined);
       if (!part.modes.length) return [];
       const row = document.createElement("div"), name = document.createElement("span"), bar = document.createElement("span");
@@ -57,10 +58,11 @@ class Replay {
     if (rows.length) await this.figure.draw(rows, Data.view.faults.slice(0, 40).map((f) => ({ ...f, main: false })), [0, Data.view.duration]);
     const found = [];
     for (const part of this.parts) found.push(...await this.crossings(part));
-    // Of too many, those of probabilities first.
-    const left = Math.max(0, found.length - Replay.MOST);
-    found.sort((a, b) => (b.sure ?? 0) - (a.sure ?? 0) || a.t - b.t);
-    found.splice(Replay.MOST);
+    // Those of probabilities, and those beside a fault; where there are none, all, up to some.
+    const all = found.length, rank = (e) => (e.sure ? 2 : e.near ? 1 : 0), most = found.some(rank) ? found.filter(rank).length : all;
+    found.sort((a, b) => rank(b) - rank(a) || a.t - b.t);
+    found.splice(Math.min(most, Replay.MOST));
+    const left = all - found.length;
     found.sort((a, b) => a.t - b.t);
     this.one("#events").replaceChildren(...found.map((e) => {
       const item = document.createElement("li"), b = document.createElement("button");
@@ -72,7 +74,7 @@ class Replay {
     }));
     this.events = found;
     this.one("#events-none").hidden = found.length > 0 && !left;
-    this.one("#events-none").textContent = left ? `${left} more crossings of residuals are left out.` : "No residual or probability passes its threshold in this mission.";
+    this.one("#events-none").textContent = left ? `${left} more crossings of residuals, which led to no finding, are left out.` : "No residual or probability passes its threshold in this mission.";
     return this.show();
   }
 
@@ -90,14 +92,14 @@ class Replay {
   }
 
   async crossings(part) {
-    const { t0, duration, limit, words } = Data.view, out = [], get = (leaf) => this.names.get(part.base + leaf), clock = (t) => `${t.toFixed(3)} s`;
-    const value = async (leaf, t) => { const c = get(leaf); if (c === undefined) return null; const { k, unit } = Data.view.channels[c], [a, b] = await Data.at(c, t); return { v: k * (a + b) / 2, text: `${Now.number(+(k * (a + b) / 2).toPrecision(3))}${unit === "1" ? "" : ` ${unit}`}` }; };
+    const { t0, duration, limit } = Data.view, words = Data.view.words[part.side] ?? {}, out = [], near = (s) => Data.view.faults.some((f) => f.component === part.c && f.start - Replay.BESIDE < s.stop && s.start < f.stop + Replay.BESIDE), get = (leaf) => this.names.get(part.base + leaf), clock = (t) => `${t.toFixed(3)} s`;
+    const value = async (leaf, t) => { const c = get(leaf); if (c === undefined) return null; const { k, unit } = Data.view.channels[c], [a, b] = await Data.at(c, t); return { v: k * (a + b) / 2, text: `${Now.number(+(k * (a + b) / 2).toPrecision(3))}${unit === "1" ? "" : unit === "°" ? unit : ` ${unit}`}` }; };
     const p = get("probability"), r = get("residual"), h = get("threshold");
     if (r !== undefined && h !== undefined) {
       const [d, e] = await Promise.all([Data.samples(r, t0, duration, true), Data.samples(h, t0, duration)]), other = (i) => e.y[Math.min(e.y.length - 1, Math.max(0, Math.round((d.t + i * d.dt - e.t) / e.dt)))];
       for (const s of Replay.stretches(d, (i) => Math.abs(d.y[i]) > other(i)).slice(0, Replay.MOST)) {
         const [now, top, expected] = await Promise.all(["residual", "threshold", "expected"].map((leaf) => value(leaf, s.start)));
-        out.push({ t: s.start, words: `${clock(s.start)} · ${part.words}: the residual, ${now.text}, passes its threshold of ${top.text}${expected && Number.isFinite(expected.v) ? `; ${expected.text} was expected` : ""}.` });
+        out.push({ t: s.start, near: near(s), words: `${clock(s.start)} · ${part.words}: the residual, ${now.text}, passes its threshold of ${top.text}${expected && Number.isFinite(expected.v) ? `; ${expected.text} was expected` : ""}.` });
       }
     }
     if (p !== undefined && limit) {
@@ -113,7 +115,7 @@ class Replay {
   }
 
   async show() {
-    const { t } = Now, { one } = this, words = Data.view.words;
+    const { t } = Now, { one } = this;
     this.figure.drawn && this.figure.read().show();
     if (t === null) return;
     one("#scrub").value = t;
@@ -126,13 +128,14 @@ class Replay {
       const box = one("#events"), y = last.item.offsetTop;
       if (y < box.scrollTop || y > box.scrollTop + box.clientHeight - 40) box.scrollTop = y - 30;
     }
-    if (one("#why").textContent !== (last?.words ?? "")) one("#why").textContent = last?.words ?? "";
+    const why = last?.words ?? "Nothing has passed a threshold up to here.";
+    if (one("#why").textContent !== why) one("#why").textContent = why;
     for (const part of this.parts) {
       if (!part.bar) continue;
       const shares = await Promise.all(part.modes.map(({ channel }) => Data.at(channel, t).then(([a, b]) => (a + b) / 2)));
       let top = -1;
       shares.forEach((p, i) => { part.bar.children[i].style.width = `${100 * (p || 0)}%`; if (p > (shares[top] ?? -1)) top = i; });
-      part.says.textContent = top < 0 ? "not judged" : `${words[part.modes[top].m]} ${Math.round(100 * shares[top])} %`;
+      part.says.textContent = top < 0 ? "not judged" : `${Data.view.words[part.side][part.modes[top].m]} ${Math.round(100 * shares[top])} %`;
       part.bar.setAttribute("aria-label", `${part.words}: ${part.says.textContent}`);
     }
   }

@@ -244,3 +244,44 @@ def test_a_machine_that_did_not_follow_is_neither_ready_nor_at_fault() -> None:
     assert (found.status, found.title) == ("not_assessed", "The machine did not follow its commands")
     assert found.text.startswith(f"{text} To clear it: enable the drives")
     assert not found.cleared
+
+
+def test_the_sentence_names_parts_in_the_order_of_the_actions_with_what_they_lost() -> None:
+    got = verdict(
+        machine(
+            FR_sensor=assessed(finding(Side.SENSOR, FaultMode.STUCK, 0, 9000)),
+            FL_actuator=assessed(
+                finding(Side.ACTUATOR, FaultMode.NO_SIGNAL, 5000, 9000),
+                finding(Side.ACTUATOR, FaultMode.STUCK, 12_000, 14_000),
+                finding(Side.ACTUATOR, FaultMode.INEFFICIENT, 16_000, 19_000, epsilon=0.4),
+            ),
+        )
+    )
+    assert got.text == (
+        "The FL drive valve was without control signal for 4.0 s and stuck for 2.0 s; the FR speed sensor was stuck for 9.0 s."
+    )
+    assert "inefficient (40 % lost) for 3.0 s" in str(got.actions[0]["text"])
+
+
+def test_open_driving_has_the_reason_that_it_has_while_driving() -> None:
+    parts = machine()
+    driven = dict.fromkeys(parts, 60.0)
+    states = np.full(N, CODE[State.HEALTHY])
+    states[:9000] = CODE[State.NOT_EXCITED]
+    states[9000:9500] = CODE[State.NOT_ASSESSED]
+    reasons = {State.NOT_EXCITED: "the valve rests", State.NOT_ASSESSED: "too quick"}
+    parts["FL", "actuator"] = replace(assessed(), states=states, reasons=reasons)
+    decided = dict.fromkeys(parts, 60.0) | {("FL", "actuator"): 50.0}
+    for state, reason in reasons.items():
+        got = decide(
+            (),
+            parts,
+            decided,
+            AXLES,
+            LIMITS,
+            (),
+            HYDRAULIC,
+            driving_s=driven,
+            open_state={("FL", "actuator"): state},
+        )
+        assert any(f"could not be judged ({reason})" in c for c in got.caveats)

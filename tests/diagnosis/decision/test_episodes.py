@@ -10,6 +10,7 @@ import pytest
 
 from diagnosis.decision.episodes import with_episodes
 from diagnosis.results.assessment import CODE, Assessment, Finding
+from diagnosis.results.result import Hypothesis
 from diagnosis.results.vocabulary import Tier
 from replay.faults import FaultMode, Side, State
 from tests.diagnosis.decision.findings import N, finding
@@ -70,3 +71,47 @@ def test_a_sentence_gives_the_probability_of_the_whole() -> None:
     said = "on simulated machines with such signals it was this in 38 of 100 cases."
     (one,) = joined(replace(loss(1000, 1500), probability=0.89, evidence=(said, "Next best: 7 of 100.")))
     assert one.evidence == (said.replace("38", "89"), "Next best: 7 of 100.")
+
+
+def unclear(start: int, stop: int, **shares: float) -> Finding:
+    """A finding of which no row has the majority."""
+    hypotheses = tuple(Hypothesis("actuator", mode, p) for mode, p in shares.items())
+    first = max(hypotheses, key=lambda h: h.p)
+    found = finding(Side.ACTUATOR, FaultMode(first.mode), start, stop, p=first.p)
+    return replace(found, hypotheses=hypotheses)
+
+
+def test_a_piece_of_unclear_kind_belongs_to_the_fault_that_it_touches() -> None:
+    stuck = finding(Side.ACTUATOR, FaultMode.STUCK, 1000, 5000)
+    (one,) = joined(stuck, unclear(5000, 6000, inefficient=0.4, stuck=0.3, noisy=0.3))
+    assert (one.start, one.stop, one.mode) == (1000, 6000, FaultMode.STUCK)
+    assert one.hypotheses == stuck.hypotheses
+    assert one.evidence[-1].startswith("From 5.00 to 6.00 s its kind is unclear")
+
+
+def test_it_goes_to_the_fault_that_it_more_probably_is_of() -> None:
+    stuck, noisy = (
+        finding(Side.ACTUATOR, m, a, a + 3000) for m, a in ((FaultMode.STUCK, 1000), (FaultMode.NOISY, 5000))
+    )
+    found = joined(stuck, unclear(4000, 5000, inefficient=0.4, stuck=0.2, noisy=0.4), noisy)
+    assert [(f.mode, f.start, f.stop) for f in found] == [
+        (FaultMode.STUCK, 1000, 4000),
+        (FaultMode.NOISY, 4000, 8000),
+    ]
+
+
+@pytest.mark.parametrize(
+    "piece",
+    [
+        unclear(5000, 6000, inefficient=0.4, noisy=0.4, no_signal=0.2),  # never stuck
+        unclear(5300, 6000, inefficient=0.4, stuck=0.3, noisy=0.3),  # apart
+        unclear(5000, 9500, inefficient=0.4, stuck=0.3, noisy=0.3),  # longer
+    ],
+)
+def test_other_pieces_of_unclear_kind_stay_faults(piece: Finding) -> None:
+    assert len(joined(finding(Side.ACTUATOR, FaultMode.STUCK, 1000, 5000), piece, between=State.HEALTHY)) == 2
+
+
+def test_a_piece_that_may_be_dead_is_not_hidden_in_a_loss() -> None:
+    piece = unclear(5000, 6000, stuck=0.45, no_signal=0.3, inefficient=0.25)
+    assert len(joined(loss(1000, 5000), piece)) == 2

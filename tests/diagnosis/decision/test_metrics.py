@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from diagnosis.decision.metrics import body_motion, coverage, driving, loop_metrics, path_of, phases
+from diagnosis.decision.metrics import body_motion, coverage, driving, loop_metrics, open_states, path_of, phases
 from diagnosis.results.assessment import CODE, Assessment
 from diagnosis.results.vocabulary import Tier
 from replay.control.loop import Replay, replay_loop
@@ -101,6 +101,18 @@ def test_coverage_counts_every_sample() -> None:
     assert rows[1]["driving_s"] == pytest.approx(0.75)
     assert decided["front", "sensor"] == pytest.approx(0.5)
     assert rows[1]["decided_driving_s"] == decided["front", "sensor"]
+
+
+def test_the_commonest_open_state_counts_while_driving_alone() -> None:
+    states = np.repeat([CODE[s] for s in (State.NOT_EXCITED, State.MASKED, State.HEALTHY)], [50, 20, 30]).astype(
+        np.int8
+    )
+    reasons = {State.NOT_EXCITED: "it rests", State.MASKED: "a dead sensor"}
+    moving = np.zeros((100, 2), dtype=bool)
+    moving[45:, 0] = True
+    one = Assessment(states, reasons, tier=Tier.DIRECT)
+    assert open_states({("A", "sensor"): one}, moving, MACHINE) == {("A", "sensor"): State.MASKED}
+    assert open_states({("A", "sensor"): one}, moving & False, MACHINE) == {}
 
 
 def test_phases_by_the_command() -> None:

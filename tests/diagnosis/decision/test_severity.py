@@ -122,3 +122,16 @@ def test_the_risk_decides_and_not_the_most_probable_row() -> None:
     assert severity_of(likely, 10.0, LIMITS, HYDRAULIC)[0] is Severity.HIGH
     half = replace(likely, epsilon=Epsilon(0.5, 0.4, 0.6))
     assert severity_of(half, 10.0, LIMITS, HYDRAULIC)[0] is Severity.MEDIUM
+
+
+@pytest.mark.parametrize(("p", "seconds", "expected"), [(0.93, 0.4, "info"), (0.995, 0.4, "low"), (0.93, 4.0, "low")])
+def test_brief_noise_that_is_not_certain_is_a_remark(p: float, seconds: float, expected: str) -> None:
+    noise = finding(Side.SENSOR, FaultMode.NOISY, p=p, epsilon=0.2)
+    assert severity_of(noise, seconds, LIMITS, HYDRAULIC)[0] == expected
+
+
+@pytest.mark.parametrize(("seconds", "expected"), [(0.15, "low"), (5.0, "medium")])
+def test_a_brief_sensor_fault_of_unclear_kind_waits_for_the_next_service(seconds: float, expected: str) -> None:
+    rows = tuple(Hypothesis("sensor", mode, 0.48) for mode in ("stuck", "inefficient"))
+    stuck = replace(finding(Side.SENSOR, FaultMode.STUCK, p=0.48), hypotheses=rows, epsilon=Epsilon(1.0, 0.01, 1.0))
+    assert severity_of(stuck, seconds, LIMITS, HYDRAULIC)[0] == expected

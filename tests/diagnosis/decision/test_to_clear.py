@@ -55,6 +55,16 @@ def test_of_many_open_checks_each_component_has_one_line() -> None:
     assert "hand tachometer" in one
 
 
+def test_what_the_yaw_rate_shows_of_either_axle_is_said_once() -> None:
+    checks = [
+        Checked(Kind.STEER, axle, Side.SENSOR_OR_ACTUATOR, Check.YAW, 0.54, 0.06, 53.0, 56.0)
+        for axle in ("front", "rear")
+    ]
+    (one,) = told(Reservations(open=tuple(checks)))
+    assert "the front or rear axle" in one
+    assert one.count("at 53.0–56.0 s") == 1
+
+
 def test_unjudged_steering_has_one_reason() -> None:
     axle = {
         ("front", s): unassessed(N, State.NOT_ASSESSED, "nothing of it is in the log") for s in ("sensor", "actuator")

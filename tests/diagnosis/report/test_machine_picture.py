@@ -105,3 +105,10 @@ def test_what_is_of_little_severity_is_a_remark_and_paints_no_part() -> None:
     found = condition("FR", Kind.WHEEL, [faint], judged)
     assert (found.state, found.lines, found.fault) == ("healthy", ("Healthy", "1 remark"), faint["id"])
     assert condition("FR", Kind.WHEEL, [faint, samples.fault(id="F2")], judged).state == "stuck"
+
+
+def test_a_drive_to_stop_at_once_for_comes_before_a_sensor_as_among_the_actions() -> None:
+    sensor = samples.fault(id="F1", component="FR", side="sensor", mode="stuck", severity="high", start_s=1.0)
+    drive = samples.fault(id="F2", component="FR", side="actuator", mode="stuck", severity="high", start_s=3.0)
+    assert condition("FR", Kind.WHEEL, [sensor, drive], {}).fault == "F2"
+    assert condition("FR", Kind.WHEEL, [sensor, {**drive, "severity": "medium"}], {}).fault == "F1"

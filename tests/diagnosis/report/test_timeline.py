@@ -100,3 +100,9 @@ def test_brief_noise_of_little_severity_is_drawn_and_paints_no_part() -> None:
     lane = timeline(report, 120.0).lanes[0]
     assert lane.state != "noisy"
     assert [b.slight for b in lane.bars] == [True]
+
+
+def test_bars_that_touch_have_the_whole_height_each() -> None:
+    first = bar(100 * 174.5 / 240, 100 * (185.08 - 174.5) / 240)
+    second = bar(100 * 185.08 / 240, 3.0)
+    assert [b.rows for b in side_by_side([first, second])] == [1, 1]

@@ -127,6 +127,15 @@ def test_a_channel_without_a_sample_is_no_signal() -> None:
     assert (got.mode, got.sat) == (FaultMode.NO_SIGNAL, None)
 
 
+def test_the_last_readings_of_a_silent_channel_are_no_reading_of_it() -> None:
+    y = np.full(SIZE, np.nan)
+    y[:3] = 0.31
+    got = judged(run(S_NONE, {S_NONE: 0.999}), y).finding
+    assert got is not None
+    assert (got.mode, got.sat) == (FaultMode.NO_SIGNAL, None)
+    assert any(line.endswith("delivered nothing in this time.") for line in got.evidence)
+
+
 def test_a_valve_stuck_open_keeps_its_opening() -> None:
     open_ = judged(run(A_STUCK, {A_STUCK: 0.999}, level=0.08 * MODEL.K)).finding
     assert open_ is not None
@@ -142,6 +151,9 @@ def test_gain_that_may_be_either_sides_is_the_unions() -> None:
     assert got.finding.mode is FaultMode.INEFFICIENT
     assert got.finding.probability > 0.99
     assert any("cannot be distinguished" in line for line in got.finding.evidence)
+    shares = {h.side: h.p for h in got.finding.hypotheses if h.mode == "inefficient"}
+    assert shares["sensor"] == pytest.approx(shares["actuator"])
+    assert not any("“speed sensor inefficient”" in HYDRAULIC.fill(line) for line in got.finding.evidence)
     # other rows of the two sides have no union
     other = judged(run(S_WHITE_8, {S_WHITE_8: 0.5, A_STUCK: 0.5}))
     assert other.finding is None

@@ -60,7 +60,7 @@ def test_onsets_in_words() -> None:
     assert "changes with the lag of the wheel" in words(50, Side.ACTUATOR)
     assert "no step of v exceeds" in words(50, Side.SENSOR)
     assert "from the first sample" in words(0, Side.SENSOR)
-    assert "exceeds 0 m/s" in words(5, Side.SENSOR, np.full(9, np.nan))
+    assert "falls silent" in words(5, Side.SENSOR, np.full(9, np.nan))
 
 
 def test_a_stuck_sensor_ends_where_it_moves_again() -> None:

@@ -62,7 +62,7 @@ _DEFINITIONS = (
     "The band is its 90 % interval, the bar on the limit the 90 % interval of the crossing.",
     "A forecast needs five missions since the last change, and reaches at most three times as far ahead as the time that "
     "they cover. It gives the time at which the mean of missions reaches the limit if wear continues at this rate.",
-    "Copies of a log count once in machines, faults and trends.",
+    "Copies of a log count once in machines, faults and trends, and for one machine: that in whose folder an audit saw the log first.",
 )
 
 

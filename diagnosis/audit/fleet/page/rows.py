@@ -148,6 +148,8 @@ def _row(m: ShownMission, machine_words: MachineWords) -> str:
     words = "; ".join(fault_words(f, machine_words) for f in faults[:2]) + (
         f" +{len(faults) - 2}" if len(faults) > 2 else ""
     )
+    if verdict is Verdict.NOT_ASSESSED and not words:
+        words = m.get("title", "")
     if verdict is None:
         kind, words = ("pending" if m["state"] is MissionState.PENDING else "failed"), m["reason"]
         status = f"{mark('warning')}{m['state'].words.capitalize()}"

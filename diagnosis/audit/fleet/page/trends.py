@@ -55,7 +55,7 @@ def course(t: TrendRow, machines: Sequence[MachineRow], unit: str) -> Context:
     title = f"{machines[t['machine']]['label']} · {words_of(machines[t['machine']]).part_words(t['kind'], t['component'], t['side'])}"
     line = t["line"]
     notes = []
-    if line is not None:
+    if line is not None and t["forecast"]["state"] != "not_known":
         between = _between(t)
         low, high = (f"{between * v:+.3f}".replace("-", "−") for v in (line["slope"]["low"], line["slope"]["high"]))
         level = line["level"]

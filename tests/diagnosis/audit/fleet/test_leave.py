@@ -41,3 +41,28 @@ def test_the_page_shows_as_many_machines_as_the_lists_hold(tmp_path: Path) -> No
     for leave in Leave:
         count = sum(x.leave is leave for x in lists_of(document))
         assert f"{leave.value[:1].upper()}{leave.value[1:]} ({count})" in page
+
+
+def test_an_open_fault_and_a_rising_loss_are_said(tmp_path: Path) -> None:
+    stuck = Sample("a/1", "a", day=0.0, verdict="stop", faults=[Fault("FR", "sensor", "stuck", "high")])
+    valve = ("RL", "actuator")
+    worn = [
+        Sample(
+            f"b/{k}",
+            "b",
+            day=float(k),
+            verdict="watch",
+            faults=[Fault()],
+            epsilon={valve: samples.bounds(0.2 + 0.1 * k)},
+        )
+        for k in range(6)
+    ]
+    found = listed(tmp_path, stuck, Sample("a/2", "a", day=1.0), *worn)
+    assert found["a"].reason == "FR speed sensor stuck, no repair recorded, clean in 1 of the 10 missions that close it"
+    assert found["b"].reason.endswith("RL drive valve inefficient, rising") or found["b"].leave is not Leave.MAY
+
+
+def test_a_reason_names_its_log_without_the_folders(tmp_path: Path) -> None:
+    broken = Sample("x/y/z", "x", state="unreadable", reason="/data/x/y/z.mcap ends after 12 bytes; copy it again")
+    (one,) = listed(tmp_path, Sample("x/y/a", "x"), broken).values()
+    assert (one.leave, one.reason) == (Leave.NOT_KNOWN, "z.mcap ends after 12 bytes")
