@@ -56,6 +56,8 @@ class Wheel(NamedTuple):
         Whether those channels show how this wheel itself turns; others only how it should.
     pull : Array or None, shape (b,)
         Effort of its drive by its share of the load [1]; NaN where nothing is pulled, None where it is not logged.
+    spiky : bool
+        Whether single readings are far off more often than those of the other wheels.
     """
 
     name: str
@@ -67,6 +69,7 @@ class Wheel(NamedTuple):
     habit: float = 0.0
     own: bool = False
     pull: Array | None = None
+    spiky: bool = True
 
     @property
     def sharp(self) -> bool:
@@ -100,7 +103,9 @@ def finding_of(spell: Spell, wheel: Wheel, speed: Array | None) -> Finding | Non
 
 
 def spikes_of(wheel: Wheel) -> list[Finding]:
-    """Findings of wild readings that come again and again."""
+    """Findings of wild readings that come again and again; none where those of the other wheels do, too."""
+    if not wheel.spiky:
+        return []
     places = wheel.samples.step[wheel.samples.wild]
     groups = np.split(places, np.flatnonzero(np.diff(places) * wheel.dt > _SPIKE_GAP_S) + 1) if places.size else []
     out = []
