@@ -65,11 +65,11 @@ def consequence(spell: Spell, wheel: str, judged: Mapping[str, Judged]) -> bool:
     judged : Mapping[str, Judged]
         All wheels.
     """
-    if _evident(spell, judged[wheel]):
+    if evident(spell, judged[wheel]):
         return False
     span = spell.start, spell.stop
     return any(
-        o != wheel and _evident(s, j) and _shared((s.start, s.stop), span) for o, j in judged.items() for s in j.spells
+        o != wheel and evident(s, j) and overlaps((s.start, s.stop), span) for o, j in judged.items() for s in j.spells
     )
 
 
@@ -94,12 +94,12 @@ def without_consequences(
         for o, j in judged.items()
         if o != wheel
         for s in j.spells
-        if _evident(s, j) or s.mode is FaultMode.NO_SIGNAL
+        if evident(s, j) or s.mode is FaultMode.NO_SIGNAL
     ]
-    return [f for f in drives if not any(_shared(span, (f.start, f.stop)) for span in others)]
+    return [f for f in drives if not any(overlaps(span, (f.start, f.stop)) for span in others)]
 
 
-def _evident(spell: Spell, one: Judged) -> bool:
+def evident(spell: Spell, one: Judged) -> bool:
     """Whether the channel shows by itself that it is wrong, without any command or other wheel."""
     return (
         spell.own
@@ -108,5 +108,6 @@ def _evident(spell: Spell, one: Judged) -> bool:
     )
 
 
-def _shared(cause: tuple[int, int], effect: tuple[int, int]) -> bool:
+def overlaps(cause: tuple[int, int], effect: tuple[int, int]) -> bool:
+    """Whether a span covers so much of another one that this may be its consequence."""
     return min(cause[1], effect[1]) - max(cause[0], effect[0]) >= _OVERLAP * (effect[1] - effect[0])

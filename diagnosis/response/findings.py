@@ -28,7 +28,7 @@ _CHANGES = 0.1  # of the readings, as a dead sensor's do not
 _MOVING = 0.2  # of the usual speed
 _SHARP_S = 0.012  # between readings: a wheel that jams, or comes free, takes longer
 _WHOLE = 0.75  # of the speed: what rises, or falls, by less from one reading to the next is no whole jump
-_IN_SHARE, _VARIES = 0.06, 0.2  # misfit of a share of another speed, and how much that varies, by its own size
+_IN_SHARE, _VARIES = 0.06, 0.2  # misfit of a share of another speed, by its own size, and how much that speed varies
 _LOUD = 2.0  # times the usual change from reading to reading, the other wheels' at that time included
 _BEYOND_HABIT = 2.5  # times as long as healthy channels stay at a value
 _BARE_P, _BARE_S = (
@@ -262,7 +262,7 @@ def _scaled(spell: Spell, wheel: Wheel, span: tuple[int, int], speed: Array | No
         sensor = _TWO_JUMPS
     elif spell.kin or (speed is not None and wheel.own):
         sensor = max(sensor, _ONE_JUMP)
-    elif speed is not None and misfit < _IN_SHARE and np.std(x) > _VARIES * np.sqrt(np.mean(x * x)):
+    elif speed is not None and misfit < _IN_SHARE * min(gain, 1.0) and np.std(x) > _VARIES * np.sqrt(np.mean(x * x)):
         sensor = max(sensor, _ONE_JUMP)  # a share that stays the same at every speed is no slip
     if sensor <= _EITHER and not bare:
         texts.append(

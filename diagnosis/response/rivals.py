@@ -23,6 +23,7 @@ _DOUBT_S = 0.5  # around the beginning and the end of a spell
 _ROUGHER = 2.0  # times what changes from sample to sample in other wheels, at most, is usual
 _SPIKIER = 4.0  # times the wild readings of the other wheels (median): fewer are a habit of the machine, as coarse encoders have
 _ALSO_HELD = 0.05  # of the driving in which another wheel stays at one value for long: then it is a habit
+_WITHIN, _LONGER = 0.9, 2.0  # of a spell, and times its length: what lies so within another wheel's is its consequence
 _CLEARLY = 2.0  # times the misfit of another wheel beside its command: then it is clear whose fault it is
 
 
@@ -74,6 +75,10 @@ def others_fault(spell: Spell, wheel: str, judged: Mapping[str, Judged]) -> bool
                 if jumps[1]:
                     return True
                 continue
+            if overlap >= _WITHIN * (spell.stop - spell.start) and s.stop - s.start > _LONGER * (
+                spell.stop - spell.start
+            ):
+                return True  # one cause that goes on beats one more that comes and goes with it
             mine, its = _misfit_of(one, spell), _misfit_of(j, spell)
             if max(mine, its) > _CLEARLY * min(mine, its):
                 if its > mine:
