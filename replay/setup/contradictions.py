@@ -43,7 +43,9 @@ def in_turn_with_commands(
     origins : dict[str, SignalSource]
         Of all signals; that of the command is changed.
     """
-    places = structure.places or {}
+    places = structure.places
+    if places is None:
+        return motions
     sides = [m.y * places[n.split(".")[1]].y for n, m in motions.items() if m.y is not None and n.endswith(".v")]
     if not sides or max(sides) >= 0.0 or any(p.axle != "fixed" for p in places.values()):
         return motions
