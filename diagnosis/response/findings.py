@@ -31,10 +31,8 @@ _WHOLE = 0.75  # of the speed: what rises, or falls, by less from one reading to
 _IN_SHARE, _VARIES = 0.06, 0.2  # misfit of a share of another speed, by its own size, and how much that speed varies
 _LOUD = 2.0  # times the usual change from reading to reading, the other wheels' at that time included
 _BEYOND_HABIT = 2.5  # times as long as healthy channels stay at a value
-_BARE_P, _BARE_S = (
-    0.92,
-    5.0,
-)  # a scaled speed that only its command contradicts: loads and slip last less, or are less sure
+# a scaled speed that only its command contradicts: loads and slip last less, or are less sure
+_BARE_P, _BARE_S = 0.92, 5.0
 
 
 class Wheel(NamedTuple):
