@@ -41,6 +41,12 @@ class Robot:
         Whether /cmd_vel and /imu are recorded.
     stuck : tuple[str, float, float] or None
         A joint whose sensor is stuck, from and to [s].
+    turns : float
+        Commanded yaw rate by the one that is made of it [1].
+    scale : float
+        Recorded speeds by rad/s [1].
+    positions : bool
+        Whether positions of the joints are recorded.
     """
 
     wheels: Mapping[str, tuple[float, float]] = field(default_factory=lambda: WHEELS)
@@ -49,6 +55,9 @@ class Robot:
     commands: bool = True
     imu: bool = True
     stuck: tuple[str, float, float] | None = None
+    turns: float = 1.0
+    scale: float = 1.0
+    positions: bool = False
 
 
 def urdf(wheels: Mapping[str, tuple[float, float]] = WHEELS, mirrored: tuple[str, ...] = ()) -> str:
@@ -97,6 +106,7 @@ def write_robot(path: Path, robot: Robot, seconds: float = 60.0, seed: int = 3) 
             first, last = (round(t * 1e9 / STEP_NS) for t in robot.stuck[1:])
             wheel[first:last] = wheel[first]
         speeds[name] = -wheel if name in robot.mirrored else wheel
+    angles = {name: np.cumsum(speed) * STEP_NS * 1e-9 for name, speed in speeds.items()}
     with path.open("wb") as file:
         writer = _Topics(file)
         if robot.description:
@@ -104,9 +114,11 @@ def write_robot(path: Path, robot: Robot, seconds: float = 60.0, seed: int = 3) 
         for k in range(count):
             at = START_NS + k * STEP_NS
             if robot.commands:
-                writer.write("/cmd_vel", "geometry_msgs/msg/Twist", at, linear=(v[k], 0, 0), angular=(0, 0, omega[k]))
-            names, values = list(speeds), np.array([s[k] for s in speeds.values()])
-            writer.joints("/joint_states", at, names, values)
+                turn = robot.turns * omega[k]
+                writer.write("/cmd_vel", "geometry_msgs/msg/Twist", at, linear=(v[k], 0, 0), angular=(0, 0, turn))
+            values = np.array([robot.scale * s[k] for s in speeds.values()])
+            rolled = np.array([a[k] for a in angles.values()]) if robot.positions else np.empty(0)
+            writer.joints("/joint_states", at, list(speeds), values, rolled)
             if robot.imu:
                 writer.imu("/imu", at, omega[k] + rng.normal(0.0, 0.01))
         writer.close()
@@ -141,10 +153,11 @@ class _Topics:
         made = {k: vector(*map(float, x)) if isinstance(x, tuple) else x for k, x in values.items()}
         self.send(topic, kind, at, STORE.types[kind](**made))
 
-    def joints(self, topic: str, at: int, names: list[str], values: NDArray[np.float64]) -> None:
-        nothing = np.empty(0)
+    def joints(
+        self, topic: str, at: int, names: list[str], values: NDArray[np.float64], rolled: NDArray[np.float64]
+    ) -> None:
         kind = "sensor_msgs/msg/JointState"
-        made = STORE.types[kind](self.header(at), names, nothing, values, nothing)
+        made = STORE.types[kind](self.header(at), names, rolled, values, np.empty(0))
         self.send(topic, kind, at, made)
 
     def imu(self, topic: str, at: int, yaw_rate: float) -> None:

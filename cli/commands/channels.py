@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -14,6 +15,12 @@ from replay.progress import Stage
 
 if TYPE_CHECKING:
     from cli.terminal.console import Terminal
+    from replay.machine.config import Machine
+
+NAMES = "names in the log"  # where wheels come from without a machine file
+_OF_THE_PAPERS = re.compile(
+    r"^(wheel\..*\.(u|u_applied|v_true|psi)|steer\..*)$", re.MULTILINE
+)  # what ordinary robots have none of
 
 EXAMPLES = """\b
 Examples:
@@ -45,6 +52,11 @@ def channels(
         from replay.mission import read_signals
 
         files, signals = read_signals(paths, the_machine, progress=progress)
+        if machine is None and not _OF_THE_PAPERS.search("\n".join(signals.items)):
+            named = _named_in(paths)
+            if named is not None:
+                the_machine, source = named, NAMES
+                files, signals = read_signals(paths, the_machine, progress=progress)
     if json:
         terminal.show_json(signals_document(files, signals, the_machine, source))
         return
@@ -54,6 +66,18 @@ def channels(
     damage = [line for file in files for line in file.summary.damage]
     if damage:
         terminal.show(section("Damage"), bullets(damage))
+
+
+def _named_in(paths: list[Path]) -> Machine | None:
+    """A machine with the wheels that the names in a log tell; None where they tell none."""
+    from replay.errors import LogError
+    from replay.setup.draft import structure_of
+    from replay.setup.read import read_everything
+
+    try:
+        return structure_of(read_everything(paths, every=False)).machine()
+    except LogError:
+        return None
 
 
 def _show_all(terminal: Terminal, paths: list[Path], machine: Path | None, json: bool) -> None:
@@ -67,7 +91,7 @@ def _show_all(terminal: Terminal, paths: list[Path], machine: Path | None, json:
         from replay.setup.draft import structure_of
         from replay.setup.read import read_everything
 
-        given, source = machine_of(machine) if machine is not None else (None, "names in the log")
+        given, source = machine_of(machine) if machine is not None else (None, NAMES)
         logs = read_everything(paths, given, progress=progress)
         try:
             the_machine = given or structure_of(logs).machine()

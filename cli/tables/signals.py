@@ -144,6 +144,10 @@ _STANDS_IN = (
     "no machine file was given: ranges of rotations are shown with the wheels of {} ({:.3g} m); "
     "`mfhca config init --log LOG` writes one from the log"
 )
+_NAMED = (
+    "no machine file was given: the wheels are those that the log names, and ranges of rotations are shown with wheels of {:.3g} m; "
+    "`mfhca config init --log LOG` writes a machine file from the log"
+)
 
 
 def signals_parts(signals: Signals, machine: Machine, given: bool = True) -> list[RenderableType]:
@@ -174,7 +178,8 @@ def signals_parts(signals: Signals, machine: Machine, given: bool = True) -> lis
     notes = [n for n in signals.notes if _is_doubt(n)]
     if not given and any(n.startswith("wheel.") for n in signals.items):
         notes = [n for n in notes if not any(words in n for words in _OF_ANOTHER)]
-        notes.insert(0, _STANDS_IN.format(machine.name, 2 * (machine.wheel_radius or 0.0)))
+        size = 2 * (machine.wheel_radius or 0.0)
+        notes.insert(0, _STANDS_IN.format(machine.name, size) if machine.assumed else _NAMED.format(size))
     if notes:
         parts += [section("Notes"), bullets(notes)]
     return parts

@@ -98,8 +98,23 @@ def assess_drive(data: DriveData, limits: Limits) -> tuple[Assessment, Assessmen
     sensor, actuator = _assessments(data, evidence, _notes(data, pair, controller, below))
     sensor = replace(sensor, powers=sensor_powers(pair, limits))
     if load is not None and data.model is not None and data.model.effort is not None:
-        actuator = replace(actuator, powers=load_powers(load, data.model.effort, limits))
+        actuator = _as_far_as_seen(replace(actuator, powers=load_powers(load, data.model.effort, limits)), limits)
     return sensor, actuator
+
+
+def _as_far_as_seen(drive: Assessment, limits: Limits) -> Assessment:
+    """A drive that is not called healthy where a load that counts could last all through the mission without a trace."""
+    assert drive.powers is not None
+    (least,) = (r.size for r in drive.powers.rows if r.for_s is None)
+    if least is not None and least <= limits.clear_at:
+        return drive
+    shows = "in no size" if least is None else f"from {100 * least:.0f} % of the effort on"
+    why = (
+        f"a load that lasts all through the mission would show {shows} only, and {100 * limits.clear_at:.0f} % count (limits.clear_at); "
+        "more effort, as faster driving takes, shows smaller ones"
+    )
+    states = np.where(drive.states == CODE[State.HEALTHY], CODE[State.NOT_ASSESSED], drive.states).astype(np.int8)
+    return replace(drive, states=states, reasons={**drive.reasons, State.NOT_ASSESSED: why})
 
 
 def _controller(data: DriveData) -> InverseController | None:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from diagnosis.response.beside import Bodies, same_side, views
 from diagnosis.response.body import BodySpeed
 from diagnosis.response.channel import Samples, holds_of, samples_of, without_holds
-from diagnosis.response.common_cause import consequence, spans_of, standing, without_consequences
+from diagnosis.response.common_cause import consequence, less_sure, spans_of, standing, without_consequences
 from diagnosis.response.drive import unanswered
 from diagnosis.response.effort import idle_drives, own_pull, shares_of
 from diagnosis.response.findings import Wheel
@@ -109,7 +109,11 @@ def assess_response(
     beside, left_notes = views(names, {w: j.wheel.blocks for w, j in found.items()}, geometry, bodies)
     judged = {w: _judge(j, beside.get(w), dt, width) for w, j in found.items()}
     kept = {
-        w: [s for s in j.spells if not others_fault(s, w, judged) and not consequence(s, w, judged)]
+        w: [
+            less_sure(s, w, judged, width * dt)
+            for s in j.spells
+            if not others_fault(s, w, judged) and not consequence(s, w, judged)
+        ]
         for w, j in judged.items()
     }
     least = max(1, round(_LEAST_S / BLOCK_S))

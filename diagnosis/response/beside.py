@@ -116,7 +116,7 @@ def _by_wheels(
     elif all(o in by_body for o in (w, *others)):
         blame = _blame([_off_body(blocks[o], by_body[o]) for o in (w, *others)])
     else:
-        blame = _blame([_off_command(blocks[o]) for o in (w, *others)])
+        blame = _blame_by_commands(blocks[w], [blocks[o] for o in others])
     rough = np.asarray(np.max([blocks[o].rough for o in others], axis=0))
     noise = _noise(blocks[w], speed)
     alone = not speeds and len(wheels) == 2 and _turns_by_wheels(blocks[w].mean, blocks[others[0]].mean)
@@ -146,7 +146,7 @@ def _by_all_others(w: str, wheels: Mapping[str, str], blocks: Mapping[str, Block
         kept = use & (off <= np.quantile(off[use], 0.7))
     if np.median(np.abs(y - speed)[use]) > _TOGETHER * np.median(np.abs(y[use])):
         return None
-    blame = _blame([_off_command(blocks[o]) for o in (w, *others)])
+    blame = _blame_by_commands(blocks[w], [blocks[o] for o in others])
     rough = np.asarray(np.max([blocks[o].rough for o in others], axis=0))
     return Beside(speed, _noise(blocks[w], speed), blame, rough, " and ".join(wheels[o] for o in others))
 
@@ -226,6 +226,21 @@ def _off_command(blocks: Blocks) -> Array:
 def _off_body(blocks: Blocks, view: View) -> Array:
     """Misfit beside a sensor of the body, in usual ones."""
     return np.abs(blocks.mean - view.speed) / _noise(blocks, view.speed)
+
+
+def _blame_by_commands(own: Blocks, others: Sequence[Blocks]) -> Array:
+    """Share of a misfit that is the own wheel's: by who is further off its command, or who alone makes nothing of it at all."""
+    mine, theirs = _answers(own), [_answers(o) for o in others]
+    if mine and not all(theirs):
+        return np.zeros(own.mean.size)
+    if not mine and any(theirs):
+        return np.ones(own.mean.size)
+    return _blame([_off_command(b) for b in (own, *others)])
+
+
+def _answers(blocks: Blocks) -> bool:
+    """Whether a command says what a wheel's speed is to be."""
+    return bool(np.isfinite(blocks.low).any())
 
 
 def _blame(away: Sequence[Array]) -> Array:

@@ -12,6 +12,8 @@ Flags = NDArray[np.bool_]
 
 _LONG_HOLD_S = 5.0  # a command stays as long, but no reading of a wheel that rolls
 _AROUND = 3  # samples on each side that a wild reading is compared with
+_COARSE = 0.1  # of the readings of a moving wheel: as many that are far off are steps of a coarse encoder
+_MOVES = 0.1  # of the usual top speed
 _WILD_SHARE, _WILD_NOISE = 0.4, 12.0  # of the usual top speed; times the usual distance from the neighbours
 
 
@@ -114,4 +116,6 @@ def _wild(value: Array) -> Flags:
     usual = median_filter(value, 2 * _AROUND + 1, mode="nearest")
     off = np.abs(value - usual)
     top = float(np.quantile(np.abs(usual), 0.99))
-    return np.asarray(off > max(_WILD_SHARE * top, _WILD_NOISE * float(np.quantile(off, 0.75)), 1e-9))
+    wild = np.asarray(off > max(_WILD_SHARE * top, _WILD_NOISE * float(np.quantile(off, 0.75)), 1e-9))
+    moving = wild | (np.abs(usual) > _MOVES * top)
+    return wild if np.count_nonzero(wild) < _COARSE * np.count_nonzero(moving) else np.zeros_like(wild)

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from diagnosis.channels.standstill import not_followed
 from diagnosis.response.inputs import FollowerData
 from diagnosis.response.machine import Judged
+from diagnosis.response.models import LEAST_P
 from diagnosis.response.rivals import jumped
 from diagnosis.response.spells import Spell
 from diagnosis.results.assessment import Finding
@@ -23,6 +24,10 @@ Flags = NDArray[np.bool_]
 
 _LEAST_TOGETHER = 2  # wheels that stand still, beside one that seems not to
 _OVERLAP = 0.5  # of what may be a consequence
+_AFTER_S, _LESS = (
+    10.0,
+    0.85,
+)  # after another wheel's fault, and by how much what begins then is less sure to be one more
 
 
 def standing(data: Mapping[str, FollowerData], driving_speed: float, dt: float) -> dict[str, Flags]:
@@ -65,12 +70,42 @@ def consequence(spell: Spell, wheel: str, judged: Mapping[str, Judged]) -> bool:
     judged : Mapping[str, Judged]
         All wheels.
     """
-    if _evident(spell, judged[wheel]):
+    if evident(spell, judged[wheel]):
         return False
     span = spell.start, spell.stop
     return any(
-        o != wheel and _evident(s, j) and _shared((s.start, s.stop), span) for o, j in judged.items() for s in j.spells
+        o != wheel and evident(s, j) and overlaps((s.start, s.stop), span) for o, j in judged.items() for s in j.spells
     )
+
+
+def less_sure(spell: Spell, wheel: str, judged: Mapping[str, Judged], block_s: float) -> Spell:
+    """A spell that nothing in its own channel shows, less sure where it begins during another wheel's fault or soon after it.
+
+    Wheels share a body: one that a loop drives astray holds the others back, or drags them along, also after it reads right again.
+
+    Parameters
+    ----------
+    spell : Spell
+        Of `wheel`.
+    wheel : str
+        The wheel.
+    judged : Mapping[str, Judged]
+        All wheels.
+    block_s : float
+        Length of a block [s].
+    """
+    one = judged[wheel]
+    if evident(spell, one) or jumped(one, spell):
+        return spell
+    soon = _AFTER_S / block_s
+    before = any(
+        s.start < spell.start < s.stop + soon
+        for o, j in judged.items()
+        if o != wheel
+        for s in j.spells
+        if s.p >= LEAST_P
+    )
+    return spell._replace(p=_LESS * spell.p) if before else spell
 
 
 def without_consequences(
@@ -94,12 +129,12 @@ def without_consequences(
         for o, j in judged.items()
         if o != wheel
         for s in j.spells
-        if _evident(s, j) or s.mode is FaultMode.NO_SIGNAL
+        if evident(s, j) or s.mode is FaultMode.NO_SIGNAL
     ]
-    return [f for f in drives if not any(_shared(span, (f.start, f.stop)) for span in others)]
+    return [f for f in drives if not any(overlaps(span, (f.start, f.stop)) for span in others)]
 
 
-def _evident(spell: Spell, one: Judged) -> bool:
+def evident(spell: Spell, one: Judged) -> bool:
     """Whether the channel shows by itself that it is wrong, without any command or other wheel."""
     return (
         spell.own
@@ -108,5 +143,6 @@ def _evident(spell: Spell, one: Judged) -> bool:
     )
 
 
-def _shared(cause: tuple[int, int], effect: tuple[int, int]) -> bool:
+def overlaps(cause: tuple[int, int], effect: tuple[int, int]) -> bool:
+    """Whether a span covers so much of another one that this may be its consequence."""
     return min(cause[1], effect[1]) - max(cause[0], effect[0]) >= _OVERLAP * (effect[1] - effect[0])

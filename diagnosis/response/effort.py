@@ -27,6 +27,7 @@ _NOTHING, _USUALLY = (
 )  # of its share of the load: nothing; and what it has in nine tenths of the mission at least
 _GAP_BLOCKS = 3
 _LEAST_S, _P = 3.0, 0.94
+_CHANGES = 0.25  # of the top speed
 
 
 def shares_of(
@@ -88,7 +89,7 @@ def _beside(e: Array, other: Array, driving: NDArray[np.bool_]) -> Array | None:
 
 
 def idle_drives(one: Judged, share: Array | None, block_s: float) -> list[Finding]:
-    """Times in which a drive pulls nothing while those of its side do.
+    """Times in which a drive pulls nothing while those of its side do, and the speed was to change.
 
     Parameters
     ----------
@@ -115,7 +116,18 @@ def idle_drives(one: Judged, share: Array | None, block_s: float) -> list[Findin
     # a wheel whose effort often comes near nothing tells nothing by it
     if not long or not outside.any() or np.quantile(share[outside], 0.1) < _USUALLY:
         return []
-    return [_finding(one, a, b, block_s) for a, b in long]
+    return [_finding(one, a, b, block_s) for a, b in long if _sped_up(one, a, b)]
+
+
+def _sped_up(one: Judged, start: int, stop: int) -> bool:
+    """Whether the speed had to change in blocks [start, stop).
+
+    At one speed two loops that hold the wheels of a side may share the load in any way; a change takes effort from each of them.
+    """
+    if not one.response.answered:
+        return False
+    asked = (0.5 * (one.wheel.blocks.low + one.wheel.blocks.high))[start:stop]
+    return bool(np.ptp(asked) > _CHANGES * float(np.nanquantile(np.abs(one.wheel.blocks.mean), 0.99)))
 
 
 def _finding(one: Judged, start: int, stop: int, block_s: float) -> Finding:

@@ -28,13 +28,11 @@ _CHANGES = 0.1  # of the readings, as a dead sensor's do not
 _MOVING = 0.2  # of the usual speed
 _SHARP_S = 0.012  # between readings: a wheel that jams, or comes free, takes longer
 _WHOLE = 0.75  # of the speed: what rises, or falls, by less from one reading to the next is no whole jump
-_IN_SHARE, _VARIES = 0.06, 0.2  # misfit of a share of another speed, and how much that varies, by its own size
+_IN_SHARE, _VARIES = 0.06, 0.2  # misfit of a share of another speed, by its own size, and how much that speed varies
 _LOUD = 2.0  # times the usual change from reading to reading, the other wheels' at that time included
 _BEYOND_HABIT = 2.5  # times as long as healthy channels stay at a value
-_BARE_P, _BARE_S = (
-    0.92,
-    5.0,
-)  # a scaled speed that only its command contradicts: loads and slip last less, or are less sure
+# a scaled speed that only its command contradicts: loads and slip last less, or are less sure
+_BARE_P, _BARE_S = 0.92, 5.0
 
 
 class Wheel(NamedTuple):
@@ -56,6 +54,8 @@ class Wheel(NamedTuple):
         Whether those channels show how this wheel itself turns; others only how it should.
     pull : Array or None, shape (b,)
         Effort of its drive by its share of the load [1]; NaN where nothing is pulled, None where it is not logged.
+    spiky : bool
+        Whether single readings are far off more often than those of the other wheels.
     """
 
     name: str
@@ -67,6 +67,7 @@ class Wheel(NamedTuple):
     habit: float = 0.0
     own: bool = False
     pull: Array | None = None
+    spiky: bool = True
 
     @property
     def sharp(self) -> bool:
@@ -100,7 +101,9 @@ def finding_of(spell: Spell, wheel: Wheel, speed: Array | None) -> Finding | Non
 
 
 def spikes_of(wheel: Wheel) -> list[Finding]:
-    """Findings of wild readings that come again and again."""
+    """Findings of wild readings that come again and again; none where those of the other wheels do, too."""
+    if not wheel.spiky:
+        return []
     places = wheel.samples.step[wheel.samples.wild]
     groups = np.split(places, np.flatnonzero(np.diff(places) * wheel.dt > _SPIKE_GAP_S) + 1) if places.size else []
     out = []
@@ -257,7 +260,7 @@ def _scaled(spell: Spell, wheel: Wheel, span: tuple[int, int], speed: Array | No
         sensor = _TWO_JUMPS
     elif spell.kin or (speed is not None and wheel.own):
         sensor = max(sensor, _ONE_JUMP)
-    elif speed is not None and misfit < _IN_SHARE and np.std(x) > _VARIES * np.sqrt(np.mean(x * x)):
+    elif speed is not None and misfit < _IN_SHARE * min(gain, 1.0) and np.std(x) > _VARIES * np.sqrt(np.mean(x * x)):
         sensor = max(sensor, _ONE_JUMP)  # a share that stays the same at every speed is no slip
     if sensor <= _EITHER and not bare:
         texts.append(

@@ -28,7 +28,7 @@ class Response(NamedTuple):
     Attributes
     ----------
     weights : Array, shape (k,)
-        Share of each command column in the target.
+        Share of each command column in the target, the limit included.
     delay, lag : float
         Dead time and time constant [s].
     limit, rate : float
@@ -124,9 +124,15 @@ def identify_response(y: Array, commands: Array, h: float, driving_speed: float)
     *weights, limit, delay, lag, rate = best.x
     noise = _noise(y, expected, low, high, driving)
     return Response(
-        np.array(weights) / size * top, float(delay), float(np.exp(lag)), float(np.exp(limit)), float(np.exp(rate)),
+        _within(asked, np.array(weights) / size * top, float(np.exp(limit))), float(delay), float(np.exp(lag)), float(np.exp(limit)), float(np.exp(rate)),
         low, high, noise, expected,
     )  # fmt: skip
+
+
+def _within(asked: Array, weights: Array, limit: float) -> Array:
+    """Weights of what the limit leaves of the target: a larger one than the limit needs changes nothing and is told by nothing."""
+    made = np.clip(asked @ weights, -limit, limit)
+    return np.asarray(np.linalg.lstsq(asked, made, rcond=None)[0], dtype=np.float64)
 
 
 def beyond(y: Array, low: Array, high: Array) -> Array:

@@ -12,6 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from diagnosis.response.common_cause import evident, overlaps
 from diagnosis.response.kernel import posterior
 from diagnosis.response.machine import Judged
 from diagnosis.response.spells import Spell
@@ -185,13 +186,25 @@ def late_neighbour(spell: Spell, wheel: str, late: Mapping[str, Sequence[Finding
 
 
 def late_wheels(judged: Mapping[str, Judged], block_s: float) -> dict[str, list[Finding]]:
-    """Times in which the speed of each wheel comes late; none where several do: then commands, or clocks, are late."""
+    """Times in which the speed of each wheel comes late.
+
+    None where several do: then commands, or clocks, are late. None where another wheel is evidently wrong: what is held against its
+    readings, and dragged by its loop, tells no delay.
+    """
     found = {w: late_of(j, block_s) for w, j in judged.items()}
-    return {
-        w: [
+    width = {w: int(j.wheel.blocks.start[1]) for w, j in judged.items() if j.wheel.blocks.start.size > 1}
+    wrong = {
+        w: [(s.start * width.get(w, 1), s.stop * width.get(w, 1)) for s in j.spells if evident(s, j)]
+        for w, j in judged.items()
+    }
+    out = {}
+    for w, own in found.items():
+        late = [(f.start, f.stop) for o, its in found.items() if o != w for f in its]
+        others = [span for o, spans in wrong.items() if o != w for span in spans]
+        out[w] = [
             f
             for f in own
-            if not any(f.start < g.stop and g.start < f.stop for o, its in found.items() if o != w for g in its)
+            if not any(f.start < stop and start < f.stop for start, stop in late)
+            and not any(overlaps(span, (f.start, f.stop)) for span in others)
         ]
-        for w, own in found.items()
-    }
+    return out

@@ -21,7 +21,9 @@ _HELD_BACK, _ALIKE = (
 _NO_SHARE = 1e9
 _DOUBT_S = 0.5  # around the beginning and the end of a spell
 _ROUGHER = 2.0  # times what changes from sample to sample in other wheels, at most, is usual
+_SPIKIER = 4.0  # times the wild readings of the other wheels (median): fewer are a habit of the machine, as coarse encoders have
 _ALSO_HELD = 0.05  # of the driving in which another wheel stays at one value for long: then it is a habit
+_WITHIN, _LONGER = 0.9, 2.0  # of a spell, and times its length: what lies so within another wheel's is its consequence
 _CLEARLY = 2.0  # times the misfit of another wheel beside its command: then it is clear whose fault it is
 
 
@@ -29,6 +31,7 @@ def by_each_other(found: Mapping[str, Judged], block_s: float) -> dict[str, Judg
     """Wheels with what is usual in them, by the others: a fault of half the mission is no habit where no other wheel has it."""
     rough = {w: float(np.median(j.wheel.blocks.usual)) for w, j in found.items()}
     held = {w: held_long(j.wheel.blocks, j.driving, block_s) for w, j in found.items()}
+    wild = {w: float(np.mean(j.wheel.samples.wild)) if j.wheel.samples.wild.size else 0.0 for w, j in found.items()}
     out = {}
     for w, j in found.items():
         others = [o for o in found if o != w]
@@ -37,7 +40,8 @@ def by_each_other(found: Mapping[str, Judged], block_s: float) -> dict[str, Judg
             most = _ROUGHER * float(np.median([rough[o] for o in others]))
             share = min(1.0, most / rough[w]) if rough[w] > 0.0 and most > 0.0 else 1.0
             blocks = blocks._replace(usual=share * blocks.usual, habitual=max(held[o] for o in others) > _ALSO_HELD)
-        out[w] = j._replace(wheel=j.wheel._replace(blocks=blocks))
+        usual = bool(others) and wild[w] <= _SPIKIER * float(np.median([wild[o] for o in others]))
+        out[w] = j._replace(wheel=j.wheel._replace(blocks=blocks, spiky=not usual))
     return out
 
 
@@ -71,6 +75,10 @@ def others_fault(spell: Spell, wheel: str, judged: Mapping[str, Judged]) -> bool
                 if jumps[1]:
                     return True
                 continue
+            if overlap >= _WITHIN * (spell.stop - spell.start) and s.stop - s.start > _LONGER * (
+                spell.stop - spell.start
+            ):
+                return True  # one cause that goes on beats one more that comes and goes with it
             mine, its = _misfit_of(one, spell), _misfit_of(j, spell)
             if max(mine, its) > _CLEARLY * min(mine, its):
                 if its > mine:

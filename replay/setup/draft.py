@@ -12,6 +12,7 @@ from replay.log.raw_log import Channel, RawLog
 from replay.log.source_options import SignalSource
 from replay.machine.config import Control, Machine, haulotte
 from replay.machine.geometry import Geometry
+from replay.setup.contradictions import in_turn_with_commands, units_by_positions
 from replay.setup.draft_notes import Draft
 from replay.setup.given import given_signals, odometry, table_sources
 from replay.setup.lengths import largest_angle, limits_for, wheel_places, wheel_radius, with_speeds, without_size
@@ -90,13 +91,14 @@ def draft_machine(logs: Sequence[RawLog], preset: Preset | None = None) -> Draft
     sources = table_sources(logs, draft)
     raw = replace(structure.machine(1.0), signals=given, sources=sources)
     found = map_signals(logs, raw)
-    units = usual_units(draft, found)
-    if units:
-        raw = replace(raw, signals={**raw.signals, **units})
-        found = map_signals(logs, raw)
+    for units in (usual_units(draft, found), units_by_positions(draft, structure, found)):
+        if units:
+            raw = replace(raw, signals={**raw.signals, **units})
+            found = map_signals(logs, raw)
     motions = _motions(found, structure.wheels)
     origins = _in_one_direction(draft, structure, found, motions)
     _ask_for_commands(draft, found)
+    motions = in_turn_with_commands(draft, structure, found, motions, origins)
     radius = wheel_radius(draft, structure, found, motions, origins)
     places = wheel_places(draft, structure, motions)
     geometry = None if places is None else Geometry(dict(places), 2 * radius)
@@ -173,7 +175,7 @@ def _name(description: RobotDescription | None, logs: Sequence[RawLog]) -> str:
     return f"machine of {PurePath(logs[0].source).name}"
 
 
-def _motions(found: Signals, wheels: Sequence[str]) -> dict[str, WheelMotion]:
+def _motions(found: Signals, wheels: Sequence[str]) -> Mapping[str, WheelMotion]:
     """How each wheel's signals follow the commanded motion."""
     speed, turn, lateral = (found.items.get(f"cmd.{leaf}") for leaf in ("v", "omega", "lateral"))
     out = {}

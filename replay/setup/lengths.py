@@ -25,6 +25,7 @@ _RADII, _TRACKS = (0.02, 2.5), (0.05, 4.0)  # m
 _HEADROOM = 1.2
 _DIFFERS = 0.15
 _LEAST_SPEED = 0.05  # m/s
+_ANY_MACHINE, _STANDS_IN = 30.0, 10.0  # m/s; faster than any wheeled machine, and what is written then
 _AGREE = 1.33
 _WHEEL_SIZES = (0.04, 1.0)  # m; of a radius that explains a speed without a unit
 
@@ -210,6 +211,13 @@ def with_speeds(draft: Draft, machine: Machine, logs: Sequence[RawLog]) -> Machi
     tops = sorted(_top(s) for s in wheels)  # one wheel alone is no measure: its sensor may have been wild
     reached = max(tops[(len(tops) - 1) // 2] if tops else 0.0, asked)
     top = float(_round(max(_HEADROOM * reached, _LEAST_SPEED)))
+    if reached > _ANY_MACHINE:
+        draft.ask(
+            "geometry",
+            f"in which unit are the speeds? As they are taken the machine reaches {reached:.3g} m/s, as none does; give it under [signals]. "
+            f"max_speed = {_STANDS_IN:g} m/s stands in.",
+        )
+        return replace(machine, max_speed=_STANDS_IN, limits=limits_for(_STANDS_IN), assumed=())
     draft.ask(
         "geometry",
         f"how fast can it go? max_speed = {top:g} m/s is a fifth more than this log shows; limits grow and shrink with it.",

@@ -61,8 +61,8 @@ def wheel_motion(
         return None
     step = max(int(np.median(np.diff(wheel.stamps))), int(_STEP_S * 1e9))
     at = np.arange(int(wheel.stamps[0]), int(wheel.stamps[-1]), step)[:_MOST]
-    y = _held(wheel, at)
-    parts = np.column_stack([_held(s, at) for s in (speed, turn, lateral) if s is not None])
+    y = held(wheel, at)
+    parts = np.column_stack([held(s, at) for s in (speed, turn, lateral) if s is not None])
     known = np.isfinite(y) & np.isfinite(parts).all(axis=1)
     if known.sum() < _LEAST or np.std(parts[known, 0]) < _MOVES:
         return None
@@ -91,7 +91,7 @@ def _lagged(x: Array, a: float) -> Array:
     return np.asarray(lfilter([a], [1.0, a - 1.0], x, axis=0, zi=(1 - a) * x[:1])[0])
 
 
-def _held(signal: Signal, at: NDArray[np.int64]) -> Array:
+def held(signal: Signal, at: NDArray[np.int64]) -> Array:
     """Last value before each moment; NaN before the first."""
     index = np.searchsorted(signal.stamps, at, side="right") - 1
     return np.where(index >= 0, signal.values[np.maximum(index, 0)], np.nan)
@@ -131,8 +131,8 @@ def backwards(left: Signal, right: Signal, yaw: Signal | None) -> tuple[str, boo
         Whether the side is known rather than supposed.
     """
     at = left.stamps
-    a, b = left.values, _held(right, at)
-    turn = np.zeros(len(at)) if yaw is None else _held(yaw, at)
+    a, b = left.values, held(right, at)
+    turn = np.zeros(len(at)) if yaw is None else held(yaw, at)
     known = np.isfinite(a) & np.isfinite(b) & np.isfinite(turn)
     a, b, turn = a[known], b[known], turn[known]
     if len(a) < _LEAST:

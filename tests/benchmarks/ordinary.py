@@ -151,6 +151,7 @@ def main() -> None:
     """Print both tables."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--seeds", choices=FIRST, default="tuning")
+    parser.add_argument("--first", type=int, help="first seed, instead of that of --seeds")
     parser.add_argument("--healthy", type=int, default=13, help="healthy missions of each kind of robot")
     parser.add_argument("--faulty", type=int, default=3, help="missions of each kind of robot and fault")
     parser.add_argument("--kinds", nargs="+", choices=KINDS, default=KINDS)
@@ -159,9 +160,10 @@ def main() -> None:
         "--detail", action="store_true", help="one line for each mission with something wrong in what was said"
     )
     args = parser.parse_args()
+    first = FIRST[args.seeds] if args.first is None else args.first
     by: dict[str, Counter[str]] = defaultdict(Counter)
     for kind in args.kinds:
-        for seed in range(FIRST[args.seeds], FIRST[args.seeds] + args.healthy):
+        for seed in range(first, first + args.healthy):
             with tempfile.TemporaryDirectory() as folder:
                 c = case(kind, "", seed, Path(folder))
             by[kind] += healthy_score(c)
@@ -177,7 +179,7 @@ def main() -> None:
     faults: dict[str, Counter[str]] = defaultdict(Counter)
     for fault_kind in args.faults if args.faulty else ():
         for kind in args.kinds:
-            for seed in range(FIRST[args.seeds], FIRST[args.seeds] + args.faulty):
+            for seed in range(first, first + args.faulty):
                 with tempfile.TemporaryDirectory() as folder:
                     c = case(kind, fault_kind, seed, Path(folder))
                 score = fault_score(c)

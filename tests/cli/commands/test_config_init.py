@@ -54,6 +54,20 @@ def test_a_file_that_is_there_stays(robot_log: Path, tmp_path: Path, capsys: pyt
     assert run(["config", "init", "--preset", "skid-4", "-o", str(file)]) == 2
 
 
+def test_channels_of_a_robot_without_a_machine_file_are_those_of_its_own_wheels(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    two = {"left_wheel_joint": (0.0, 0.2), "right_wheel_joint": (0.0, -0.2)}
+    write_robot(tmp_path / "two.mcap", Robot(wheels=two), 30.0)
+    assert run(["channels", str(tmp_path / "two.mcap")]) == 0
+    out = " ".join(capsys.readouterr().out.split())
+    assert "wheel.L.v" in out
+    assert "steer" not in out
+    assert "the wheels are those that the log names" in out
+    assert run(["diagnose", str(tmp_path / "two.mcap"), "-o", str(tmp_path / "report")]) == 3
+    assert "`mfhca config init --log LOG` writes a machine file" in " ".join(capsys.readouterr().err.split())
+
+
 @pytest.mark.parametrize("width", ["80", "120"])
 def test_all_channels_keep_their_names(
     width: str, robot_log: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch

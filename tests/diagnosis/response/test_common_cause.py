@@ -90,3 +90,13 @@ def test_a_value_that_is_held_for_long_is_no_answer_to_a_command() -> None:
     assert np.isfinite(out[:100]).all()
     y[100:300] = 0.0  # a wheel at rest is an answer
     assert np.isfinite(without_holds(y, samples_of(y, np.ones(400, np.bool_)), DT)).all()
+
+
+@pytest.mark.parametrize("seed", [2, 8])
+def test_a_wheel_that_stands_for_most_of_the_mission_is_told_and_not_the_one_beside_it(seed: int) -> None:
+    """Nothing is left of its own answer to the command, and the other wheel of its side differs from it just as much."""
+    measured, asked, body = speeds(seed)
+    measured["RL"][round(45 / DT) :] = 0.0
+    j = assess_response(followers_of(measured, asked, body), geometry(), None, LIMITS, DT)
+    found = {w: {f.mode for f in sensor.findings} for w, (sensor, _) in j.parts.items()}
+    assert found == {"FR": set(), "FL": set(), "RR": set(), "RL": {FaultMode.NO_SIGNAL}}
