@@ -159,8 +159,8 @@ def align(signals: Signals, start_s: float | None = None, stop_s: float | None =
         )
     if not wheel:
         raise LogError(
-            "no wheel signal with at least two samples was found; run `mfhca channels` to see how signals map, and "
-            "name them in the machine file's [signals]"
+            "no wheel signal with at least two samples was found; `mfhca config init --log LOG -o machine.toml` writes a machine "
+            "file for the wheels of a log (then -m machine.toml), and `mfhca channels LOG --all` lists what it holds"
         )
     notes = list(check_overlap(signals))
     periods = _Periods()
