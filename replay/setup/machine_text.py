@@ -8,6 +8,7 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 
 from replay.machine.config import Machine, haulotte
+from replay.machine.geometry import own_axle
 from replay.machine.toml_text import key_text, real_text, signal_line, source_line, text_of
 from replay.machine.units import kept_unit
 from replay.setup.all_channels import ChannelRow
@@ -78,7 +79,7 @@ def _geometry(machine: Machine) -> Iterable[str]:
     yield "# x forward, y to the left, offset from the steering joint to the wheel [m]; steer: front, rear, own or fixed"
     for w, g in machine.geometry.wheels.items():
         offset = f"offset = {real_text(g.offset)}, " if g.offset else ""
-        steer = "own" if g.axle == w else g.axle
+        steer = "own" if g.axle == own_axle(w) else g.axle
         yield f"{key_text(w)} = {{ x = {real_text(g.x)}, y = {real_text(g.y)}, {offset}steer = {text_of(steer)} }}"
 
 

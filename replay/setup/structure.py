@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 
 from replay.log.raw_log import Channel
 from replay.machine.config import Machine, haulotte
-from replay.machine.geometry import Geometry, WheelGeometry
+from replay.machine.geometry import Geometry, WheelGeometry, own_axle
 from replay.setup.preset import Preset
 from replay.setup.robot_description import RobotDescription, WheelJoint
 from replay.signals.name_parts import end_of, index_of, is_steering, position, wheel_said
@@ -112,7 +112,7 @@ def described_structure(description: RobotDescription, joints: Sequence[str]) ->
     places, rows = {}, len({n[0] for n in names})
     middle = (max(w.x for w in wheels) + min(w.x for w in wheels)) / 2
     for name, w in zip(names, wheels, strict=True):
-        axle = "fixed" if not w.steering else name
+        axle = "fixed" if not w.steering else own_axle(name)
         places[name] = WheelGeometry(round(w.x - middle, 4), round(w.y, 4), round(w.offset, 4), axle)
     radii = [w.radius for w in wheels if w.radius is not None]
     measured = ("track", "wheelbase") if rows > 1 else ("track",)
@@ -197,7 +197,7 @@ def _steered(channels: Mapping[str, Channel], wheels: Sequence[str]) -> Mapping[
     ends = {(end_of(n), position(n)[1]) for n in names}
     if any(c.type_name.rpartition("/")[2].startswith("AckermannDrive") for c in channels.values()):
         ends.add((None, None))
-    own = {w: w for w in wheels if position(w) in ends}
+    own = {w: own_axle(w) for w in wheels if position(w) in ends}
     if own:
         return own
     numbers = {

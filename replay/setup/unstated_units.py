@@ -41,7 +41,8 @@ def valve_currents(
         As found by their names: valves whose openings are logged keep these.
     """
     named = {name: c for c in channels.values() if (name := valve_current(c, machine)) is not None}
-    out, shown = {}, []
+    out: dict[str, SignalSource] = {}
+    shown: list[str] = []
     for kind in ("wheel", "steer"):
         alike = {n: c for n, c in named.items() if n.startswith(kind) and n not in found.items}
         peak = max((peak_of(c.values) for c in alike.values()), default=0.0)

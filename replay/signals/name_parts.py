@@ -6,6 +6,7 @@ import re
 from collections.abc import Iterable
 
 from replay.machine.config import Machine
+from replay.machine.geometry import own_axle
 from replay.signals.name_words import tokens
 from replay.signals.named_units import bare_name
 
@@ -32,7 +33,7 @@ _STEER = re.compile(r"steer|lenk|kingpin|azimuth|swivel|knuckle|braquage")
 _DRIVE = re.compile(r"wheel|drive|(?<![a-z])drv|motor|rad(?![a-z]|_?s(?![a-z])|/)|traction|hub|antrieb|roue|moteur")
 _LOOSE = re.compile(r"(?<![A-Za-z0-9])[fblr](?![A-Za-z0-9])")
 _NO_DRIVE = re.compile(r"castor|caster|arm|grip|finger|flipper|head|neck|elbow|shoulder|wrist|hip|knee|lift|torso")
-_INDEX = re.compile(r"\[(\d+)\]|(?<=[A-Za-z_])(\d+)(?!\d)")
+_INDEX = re.compile(r"\[(\d+)\]|(?<=[A-Za-z_])[ #-]?(\d+)(?![\d.,/])")
 
 
 def position(name: str) -> tuple[str | None, str | None]:
@@ -122,8 +123,8 @@ def wheel_said(label: str, machine: Machine) -> str | None:
 def axle_of(name: str, machine: Machine) -> str | None:
     """Steering axle that a name speaks of."""
     wheel = wheel_of(name, machine)
-    if wheel is not None and wheel in machine.axles:
-        return wheel
+    if wheel is not None and own_axle(wheel) in machine.axles:
+        return own_axle(wheel)
     words = tokens(name)
     for axle in machine.axles:
         if axle.lower() in words:

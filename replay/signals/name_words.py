@@ -49,7 +49,7 @@ _FILLERS = frozenset(("wert", "werte", "value", "val", "values"))
 #: Words that ask for something: setpoints and commands, in English.
 ASKING = frozenset(
     ("ref", "reference", "cmd", "command", "commanded", "set", "setpoint", "des", "desired", "target", "demand", "soll",
-     *("references", "refs", "cmds", "commands", "setpoints", "targets"))
+     *("demanded", "requested", "references", "refs", "cmds", "commands", "setpoints", "targets"))
 )  # fmt: skip
 MEASURED = frozenset(("act", "actual", "meas", "measured", "fb", "feedback", "ist"))
 

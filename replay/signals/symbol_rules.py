@@ -147,7 +147,11 @@ def _part(channel: Channel, said: _Said, machine: Machine, first: Mapping[str, i
     """Wheel or axle by its name, by its number, or as the only one, with the rank of that."""
     part = axle_of(said.bare, machine) if said.steering else wheel_of(said.bare, machine)
     numbered = index_of(said.name)
-    if part is None and numbered is not None and (said.steering or is_drive(said.bare) or "valve" in said.last):
+    if (
+        part is None
+        and numbered is not None
+        and (said.steering or is_drive(said.bare) or "valve" in "_".join(said.last))
+    ):
         order = machine.axles if said.steering else machine.wheels
         at = numbered[1] - min(first.get(_family(channel, numbered[0]), first.get(numbered[0], numbered[1])), 1)
         return (order[at] if 0 <= at < len(order) else None), 9
