@@ -168,7 +168,11 @@ def _scope(judged: Judged) -> tuple[str, ...]:
         out.append(
             f"the {machine.part}{'s' if len(left_out) > 1 else ''} {', '.join(left_out)} {'were' if len(left_out) > 1 else 'was'} not judged"
         )
-    out += [f"the {axle} steering was not judged" for axle in machine.axles if _unjudged(judged.found, axle)]
+    out += [
+        f"the {axle.removesuffix('_steer')} steering was not judged"
+        for axle in machine.axles
+        if _unjudged(judged.found, axle)
+    ]
     cut = (line.start_ns - judged.recorded.first_ns) * 1e-9
     rest = (judged.recorded.last_ns - line.start_ns) * 1e-9 - line.size * line.dt
     if max(cut, rest) > _CUT_S:

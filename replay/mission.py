@@ -13,6 +13,7 @@ from replay.arrays.column_store import ColumnStore
 from replay.clocks.align import align_clocks
 from replay.clocks.source_clock import SourceClock
 from replay.errors import ConfigError, LogError
+from replay.log.joined_tables import joined_tables
 from replay.log.open_loop import is_open_loop, is_open_loop_table
 from replay.log.raw_log import LogSummary, RawLog
 from replay.log.source_options import SourceOptions
@@ -30,6 +31,7 @@ from replay.unused_files import require_use
 _BLOCK = 1 << 22
 
 
+_JOINED = "it goes on where another file's table ends, and was read as a part of that"
 _UNUSED = "none of its channels is a signal of this machine; it is not used"
 
 
@@ -55,6 +57,8 @@ class MissionFile:
         Whether its signals are not used, because its clock could not be compared with the others'.
     strange : bool
         Whether none of its channels is a signal of the machine; beside other files it is a note.
+    joined : bool
+        Whether it is a further part of another file's table.
     """
 
     path: Path
@@ -65,6 +69,7 @@ class MissionFile:
     clock: SourceClock | None = None
     left_out: bool = False
     strange: bool = False
+    joined: bool = False
 
 
 @dataclass(frozen=True)
@@ -153,10 +158,14 @@ def read_signals(
     ConfigError
         Where a given unit does not fit its signal.
     """
-    options = [SourceOptions() if is_open_loop_table(path) else source_options(path, machine) for path in paths]
-    files, logs = _read(paths, options, machine, store or ColumnStore(), progress)
+    asked = [SourceOptions() if is_open_loop_table(path) else source_options(path, machine) for path in paths]
+    files, parts = _read(paths, asked, machine, store or ColumnStore(), progress)
+    logs = joined_tables(parts)
+    heads = [next(i for i, part in enumerate(parts) if part.source == log.source) for log in logs]
+    options = [asked[i] for i in heads]
     known = [any(True for _ in candidates(log.channels, machine)) or _given_in(log, machine) for log in logs]
     known = known if any(known) else [True] * len(known)
+    use = dict(zip(heads, known, strict=True))
     logs, options = list(compress(logs, known)), list(compress(options, known))
     if len(logs) > 1:
         progress(Progress(Stage.COMPARING_CLOCKS))
@@ -164,14 +173,19 @@ def read_signals(
     progress(Progress(Stage.MAPPING_SIGNALS))
     marked = [log for log in logs if is_open_loop(log.summary)]
     signals = map_signals(logs, _without_given(machine, marked))
-    unused = (f"{file.path.name}: {_UNUSED}" for file, use in zip(files, known, strict=True) if not use)
+    unused = (f"{file.path.name}: {_UNUSED}" for i, file in enumerate(files) if not use.get(i, True))
     notes = (*signals.notes, *unused, *(clock.sentence for clock in clocks if clock.sentence))
     clock_of = iter(clocks)
     dated = tuple(
-        replace(file, clock=next(clock_of)) if use else _strange(file) for file, use in zip(files, known, strict=True)
+        _joined(file) if i not in use else replace(file, clock=next(clock_of)) if use[i] else _strange(file)
+        for i, file in enumerate(files)
     )
     missing = near_misses(signals.missing, [file.summary for file in files], NO_CHANNEL)
     return dated, replace(signals, missing=missing, notes=notes, open_loop=bool(marked))
+
+
+def _joined(file: MissionFile) -> MissionFile:
+    return replace(file, summary=replace(file.summary, notes=(*file.summary.notes, _JOINED)), joined=True)
 
 
 def _strange(file: MissionFile) -> MissionFile:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from itertools import pairwise
 from pathlib import Path
 from typing import Protocol
 
@@ -33,6 +32,10 @@ class ReadFile(Protocol):
     def strange(self) -> bool:
         """Whether it is known to hold nothing of the machine."""
 
+    @property
+    def joined(self) -> bool:
+        """Whether it is a further part of another file's table."""
+
 
 def require_use(files: Sequence[ReadFile], signals: Signals) -> None:
     """Raise where no file of a mission holds a signal, or one of several adds none.
@@ -47,7 +50,7 @@ def require_use(files: Sequence[ReadFile], signals: Signals) -> None:
     Raises
     ------
     LogError
-        With the columns of tables that hold no signal, or how tables that go on from each other are joined.
+        With the columns of tables that hold no signal, or the file that adds none.
     """
     if not signals.items and all(t.encoding == "table" for f in files for t in f.summary.topics):
         columns = [c for f in files for t in f.summary.topics for c in t.fields]
@@ -58,27 +61,10 @@ def require_use(files: Sequence[ReadFile], signals: Signals) -> None:
             "out where it is no machine's log (an audit takes patterns: 'logs/**/*.mcap')"
         )
     used = {signal.source for signal in signals.items.values()}
-    idle = [file for file in files if str(file.path) not in used and not file.strange]
+    idle = [file for file in files if str(file.path) not in used and not file.strange and not file.joined]
     if len(files) < 2 or not idle or not used:
         return
-    parts = _parts(idle[0], files)
-    if len(parts) > 1:
-        first, *rest = (p.name for p in parts)
-        joined = "; ".join([f"cat {first}", *(f"tail -n +2 {name}" for name in rest)])
-        raise LogError(
-            f"{idle[0].path}: is a part of the same table as {first}; parts of a table are not put together here: join them, as with "
-            f"`({joined}) > whole.csv`, or diagnose each by itself"
-        )
     raise LogError(
         f"{idle[0].path}: none of its channels is used, all signals were found in the other files; diagnose it by itself, "
         "or name its signals with source = in the machine file's [signals]"
     )
-
-
-def _parts(file: ReadFile, files: Sequence[ReadFile]) -> list[Path]:
-    """Tables with the same columns, one after the other in time; only the file itself where they overlap."""
-    fields = [t.fields for t in file.summary.topics]
-    alike = [f for f in files if f.format == file.format == "csv" and [t.fields for t in f.summary.topics] == fields]
-    alike.sort(key=lambda f: f.summary.start_ns)
-    apart = all(a.summary.stop_ns <= b.summary.start_ns for a, b in pairwise(alike))
-    return [f.path for f in alike] if apart else [file.path]

@@ -15,7 +15,7 @@ from diagnosis.clearing.forecast import Forecast, forecast
 from diagnosis.decision.missing import applies, cost_of_missing
 from diagnosis.results.machine_words import MachineWords, machine_words
 from replay.machine.config import Machine
-from replay.machine.signal_table import signal_of
+from replay.machine.units import kept_unit
 from replay.mission import MissionFile
 from replay.signals.mapping import NO_CHANNEL
 from replay.signals.signal import Signal, Signals
@@ -120,14 +120,12 @@ def signals_document(files: Sequence[MissionFile], signals: Signals, machine: Ma
 
 def _signal(signal: Signal, words: MachineWords) -> MappedSignal:
     finite = signal.values[np.isfinite(signal.values)]
-    period = median_period(signal.stamps)
+    period, unit = median_period(signal.stamps), kept_unit(signal.name, signal.origin.unit)
     return {
         "name": signal.name,
         "channel": signal.origin.label,
         "recorded_unit": signal.origin.unit or None,
-        "unit": words.unit(signal_of(signal.name).unit)
-        if signal.name.startswith("wheel.")
-        else signal_of(signal.name).unit,
+        "unit": words.unit(unit) if signal.name.startswith("wheel.") else unit,
         "guessed": signal.guessed,
         "source": signal.source,
         "samples": int(signal.stamps.size),

@@ -161,7 +161,7 @@ def machine_picture(report: ReportDocument) -> Markup:
     extra = 0
     for a in axles:
         c = condition(a, Kind.STEER, faults, judged, enough, words)
-        if a in axle_rows and a not in wheels:
+        if a in axle_rows and not a.endswith("_steer"):
             parts.append(_axle(a, 186, axle_rows[a], c))
         else:
             parts.append(_axle(a, 100 + 172 * (extra % 2), bottom + 40 + 48 * (extra // 2), c))

@@ -55,7 +55,7 @@ class MachineWords:
 
     def part_words(self, kind: str, component: str, side: str) -> str:
         """A component and its part in words: ``FR speed sensor``, ``front steering valve``, ``m5 joint motor``."""
-        return f"{component} {self.part_name(kind, side)}"
+        return f"{component.removesuffix('_steer')} {self.part_name(kind, side)}"
 
     @property
     def _driven(self) -> Mapping[str, str]:

@@ -14,7 +14,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from replay.machine.config import PhiDot
-from replay.machine.geometry import Geometry
+from replay.machine.geometry import Geometry, own_axle
 
 _STANDSTILL = 1e-3
 
@@ -174,7 +174,7 @@ def _axle_angles(
     out = np.empty((v.size, len(geometry.axles)))
     for j, axle in enumerate(geometry.axles):
         x = geometry.axle_x(axle)
-        y = geometry.wheels[axle].y if axle in geometry.wheels else 0.0
+        y = next((w.y for name, w in geometry.wheels.items() if axle == own_axle(name)), 0.0)
         key = f"axle {axle}"
         out[:, j] = steering_angle(v - omega * y, omega * x, max_steer, state.held.get(key, 0.0))
         state.held[key] = float(out[-1, j])
@@ -199,7 +199,7 @@ def rotation(axle_angle: NDArray[np.float64], geometry: Geometry) -> tuple[NDArr
     """
     axles = geometry.axles
     n = axle_angle.shape[0]
-    places = [(geometry.axle_x(a), np.tan(axle_angle[:, axles.index(a)])) for a in axles if a not in geometry.wheels]
+    places = [(geometry.axle_x(a), np.tan(axle_angle[:, axles.index(a)])) for a in axles if a in ("front", "rear")]
     fixed = [w.x for w in geometry.wheels.values() if w.axle == "fixed"]
     if len(places) == 1:
         places.append((float(np.mean(fixed)) if fixed else 0.0, np.zeros(n)))
@@ -225,8 +225,8 @@ def wheel_angles(axle_angle: NDArray[np.float64], geometry: Geometry) -> NDArray
     """
     out = np.zeros((axle_angle.shape[0], len(geometry.wheels)))
     curvature, lateral = rotation(axle_angle, geometry)
-    for i, w in enumerate(geometry.wheels.values()):
-        if w.axle in geometry.wheels:
+    for i, (name, w) in enumerate(geometry.wheels.items()):
+        if w.axle == own_axle(name):
             out[:, i] = axle_angle[:, geometry.axles.index(w.axle)]
         elif w.axle != "fixed":
             out[:, i] = np.arctan((lateral + curvature * w.x) / (1.0 - curvature * w.y))

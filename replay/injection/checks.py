@@ -68,7 +68,7 @@ def mission_span(signals: Signals) -> tuple[int, int]:
 
 def measured_name(component: str, side: Side, machine: Machine) -> str:
     """Channel that a fault of a part and side is written into."""
-    if component in machine.axles and component not in machine.wheels:
+    if component in machine.axles:
         return f"steer.{component}.{'phi' if side is Side.SENSOR else 'u_applied'}"
     return f"wheel.{component}.{'v' if side is Side.SENSOR else 'u_applied'}"
 
@@ -90,7 +90,7 @@ def check_faults(
 def _check(fault: FaultSpec, machine: Machine, signals: Signals, length: float, options: InjectionOptions) -> None:
     """Raise where a fault cannot be written into these signals."""
     who = f"{fault.side} fault of {fault.component}"
-    parts = (*machine.wheels, *(a for a in machine.axles if a not in machine.wheels))
+    parts = (*machine.wheels, *machine.axles)
     if fault.component not in parts:
         raise ConfigError(f"{who}: no such part; expected one of {', '.join(parts)}")
     if fault.side is Side.SENSOR_OR_ACTUATOR:

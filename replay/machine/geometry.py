@@ -20,13 +20,18 @@ class WheelGeometry:
     offset : float
         Distance from joint to wheel centre along the wheel's axle [m], positive to the left (d_i of L1 (1)).
     axle : str
-        Steering axle: ``front``, ``rear``, the wheel's own name, or ``fixed``.
+        Steering axle: ``front``, ``rear``, the wheel's own (`own_axle`), or ``fixed``.
     """
 
     x: float
     y: float
     offset: float
     axle: str
+
+
+def own_axle(wheel: str) -> str:
+    """Name of the axle of a wheel that is steered by itself, which is another part than the wheel: ``FR_steer``."""
+    return f"{wheel}_steer"
 
 
 @dataclass(frozen=True)

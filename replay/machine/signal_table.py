@@ -86,8 +86,11 @@ class CanonicalSignal:
         return OPENING if self.quantity == "fraction" else self.unit
 
 
-_VALVE_POSITION = Named(0, r"(valve|spool)_?(act|actual|fb|feedback|pos|position|ist)|spool|^u_?applied")
-_VALVE = Named(1, r"valve_?(cmd|command|out|set|ref|soll)|valve$|^u_?cmd|control_?(out|cmd)|^u$")
+_VALVE_POSITION = Named(0, r"(valve|spool)_?(\d+_)?(act|actual|fb|feedback|pos|position|ist)|spool|^u_?applied")
+_VALVE = Named(
+    1,
+    r"valve_?(\d+_)?(cmd|command|out|set|ref|soll)|(cmd|command|set|ref|soll)_?valve|valve$|^u_?cmd|control_?(out|cmd)|^u$",
+)
 _SPEED_COMMAND = (
     r"(velo(city)?|speed|vel|rpm|drehzahl|geschw\w*)_?(ref|cmd|command|set|des|target|soll)|"
     r"(ref|cmd|set|des(ired)?|target|soll)_?(velo(city)?|speed|vel|rpm|drehzahl|geschw)"

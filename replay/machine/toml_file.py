@@ -15,7 +15,7 @@ from replay.log.source_options import SignalSource, SourceOptions
 from replay.machine.axle_plant import AxlePlant
 from replay.machine.config import ASSUMABLE, Control, Limits, Machine, Noise, Plant, WheelPlant, haulotte
 from replay.machine.drive_model import drive_from_table
-from replay.machine.geometry import Geometry, WheelGeometry, four_wheel_geometry
+from replay.machine.geometry import Geometry, WheelGeometry, four_wheel_geometry, own_axle
 from replay.machine.quantities import UNITS
 from replay.machine.units import known_unit, si_factor
 from replay.toml_text import MAX_BYTES, TomlError, parse_toml
@@ -83,7 +83,8 @@ def _machine(data: Mapping[str, Any]) -> Machine:
     limits = dict(data.get("limits", {}))
     limits.setdefault("driving_speed", round(base.limits.driving_speed * speed / base.max_speed, 9))
     limits.setdefault("min_sat", round(base.limits.min_sat * speed / base.max_speed, 9))
-    signals = {k: _signal(k, v) for k, v in data.get("signals", {}).items()}
+    axles = () if geometry is None else geometry.axles
+    signals = {_of_own_axle(k, axles): _signal(k, v) for k, v in data.get("signals", {}).items()}
     machine = Machine(
         name=str(head.get("name", base.name if wheels == list(base.wheels) else "unnamed machine")),
         id=str(head.get("id", "")),
@@ -103,7 +104,7 @@ def _machine(data: Mapping[str, Any]) -> Machine:
         drive=head.get("drive", "auto"),
         part=head.get("part", "wheel"),
         speed_unit=_speed_unit(head, signals),
-        advice=_advice(data.get("advice", {}), (*wheels, *(geometry.axles if geometry is not None else ()))),
+        advice=_advice(data.get("advice", {}), (*wheels, *axles)),
     )
     machine = dataclasses.replace(machine, assumed=_assumed(machine, data))
     _check_units(machine)
@@ -203,7 +204,7 @@ def _place(wheel: str, value: Mapping[str, Any], wheels: tuple[str, ...]) -> Whe
         x=_number(f"{section}.x", value["x"]),
         y=_number(f"{section}.y", value["y"]),
         offset=_number(f"{section}.offset", value.get("offset", 0.0)),
-        axle=wheel if steer == "own" else steer,
+        axle=own_axle(wheel) if steer == "own" else steer,
     )
 
 
@@ -232,6 +233,13 @@ def _plant(value: Mapping[str, Any], wheels: tuple[str, ...], default_flow: floa
     flow = _number("plant.flow", value["flow"]) if "flow" in value else default_flow
     models = {w: _build(WheelPlant, f"plant.{w}", value[w]) for w in wheels if w in value}
     return Plant(coupling=value.get("coupling", "auto"), flow=flow, wheels=models)
+
+
+def _of_own_axle(name: str, axles: Sequence[str]) -> str:
+    """Name of a signal whose axle may be called by the wheel that it steers: ``steer.FR.phi`` is ``steer.FR_steer.phi``."""
+    group, part, leaf = (*name.split("."), "", "")[:3]
+    own = group == "steer" and part not in axles and own_axle(part) in axles
+    return f"steer.{own_axle(part)}.{leaf}" if own else name
 
 
 def _signal(name: str, value: Any) -> SignalSource:

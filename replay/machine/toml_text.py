@@ -9,6 +9,7 @@ from typing import Any
 from replay.log.source_options import SignalSource, SourceOptions
 from replay.machine.config import Machine
 from replay.machine.drive_model import drive_table
+from replay.machine.geometry import own_axle
 from replay.machine.toml_file import MACHINE_LEVEL
 
 
@@ -46,7 +47,7 @@ def dump_machine(machine: Machine, notes: Mapping[str, Sequence[str]] | None = N
     if machine.geometry is not None:
         lines.append(f"wheel_diameter = {real_text(machine.geometry.wheel_diameter)}")
         for w, g in machine.geometry.wheels.items():
-            steer = "own" if g.axle == w else g.axle
+            steer = "own" if g.axle == own_axle(w) else g.axle
             place = (
                 f"x = {real_text(g.x)}, y = {real_text(g.y)}, offset = {real_text(g.offset)}, steer = {text_of(steer)}"
             )

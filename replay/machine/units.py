@@ -43,6 +43,23 @@ def known_unit(text: str) -> str | None:
     return _ALIASES.get(word) or _NO_CASE.get(word)
 
 
+def kept_unit(signal: str, recorded: str) -> str:
+    """Unit in which a signal is kept: SI, of an effort the one of its kind: ``A`` of one in mA, ``1`` of a share.
+
+    Parameters
+    ----------
+    signal : str
+        Canonical name.
+    recorded : str
+        Unit of its source; may be empty.
+    """
+    unit = SI_UNITS[quantity_of(signal)]
+    name = known_unit(recorded) or unit
+    if quantity_of(signal) != "effort" or UNITS[name][0] not in ("effort", "fraction"):
+        return unit
+    return {"mA": "A", "Nm": "N·m", "%": "1", "fraction": "1"}.get(name, name)
+
+
 def si_factor(
     signal: str,
     unit: str,

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import PurePath
 
-from replay.errors import ConfigError, LogError
+from replay.errors import LogError
 from replay.log.raw_log import Channel, RawLog
 from replay.log.source_options import SignalSource
 from replay.machine.config import Control, Machine, haulotte
@@ -17,11 +17,12 @@ from replay.setup.draft_notes import Draft
 from replay.setup.given import given_signals, odometry, table_sources
 from replay.setup.lengths import largest_angle, limits_for, wheel_places, wheel_radius, with_speeds, without_size
 from replay.setup.motion import WheelMotion, backwards, wheel_motion
+from replay.setup.numbered_wheels import ask_for_numbers, ordered_by_turns
 from replay.setup.preset import Preset
 from replay.setup.robot_description import RobotDescription, parse_description
 from replay.setup.structure import ONE, Structure, described_structure, named_structure, preset_structure
-from replay.setup.unstated_units import usual_units
-from replay.signals.mapping import map_signals
+from replay.setup.unstated_units import usual_units, valve_currents
+from replay.signals.mapping import by_number, map_signals
 from replay.signals.signal import Signals
 
 _SUPPOSED = "left and right turn against each other"
@@ -81,8 +82,6 @@ def draft_machine(logs: Sequence[RawLog], preset: Preset | None = None) -> Draft
     draft = Draft(Machine(_name(description, logs), "", structure.wheels, None))
     many = f"Wheels {', '.join(structure.wheels)}" if len(structure.wheels) > 1 else f"One drive, {structure.wheels[0]}"
     draft.say("machine", f"{many}, from {structure.how}.")
-    if "numbers" in structure.how:
-        draft.ask("machine", "which wheel has which number? The names do not say; put the wheels into their order.")
     for doubt in doubts:
         draft.ask("geometry", doubt)
     if preset is Preset.HAULOTTE:
@@ -91,13 +90,24 @@ def draft_machine(logs: Sequence[RawLog], preset: Preset | None = None) -> Draft
     sources = table_sources(logs, draft)
     raw = replace(structure.machine(1.0), signals=given, sources=sources)
     found = map_signals(logs, raw)
-    for units in (usual_units(draft, found), units_by_positions(draft, structure, found)):
+    numbered = by_number(found.items, raw)
+    turned = ordered_by_turns(structure, _motions(found, structure.wheels)) if numbered else None
+    if turned is not None:
+        structure, raw = turned, replace(raw, wheels=turned.wheels, geometry=turned.machine(1.0).geometry)
+        found = map_signals(logs, raw)
+        numbered = by_number(found.items, raw)
+    ask_for_numbers(draft, numbered, turned is not None)
+    draft.machine = replace(draft.machine, wheels=structure.wheels)
+    for units in (
+        {**usual_units(draft, found), **valve_currents(draft, channels, raw, found)},
+        units_by_positions(draft, structure, found),
+    ):
         if units:
             raw = replace(raw, signals={**raw.signals, **units})
             found = map_signals(logs, raw)
     motions = _motions(found, structure.wheels)
     origins = _in_one_direction(draft, structure, found, motions)
-    _ask_for_commands(draft, found)
+    _ask_for_what_is_missing(draft, found)
     motions = in_turn_with_commands(draft, structure, found, motions, origins)
     radius = wheel_radius(draft, structure, found, motions, origins)
     places = wheel_places(draft, structure, motions)
@@ -191,9 +201,15 @@ def _motions(found: Signals, wheels: Sequence[str]) -> Mapping[str, WheelMotion]
     return out
 
 
-def _ask_for_commands(draft: Draft, found: Signals) -> None:
+def _ask_for_what_is_missing(draft: Draft, found: Signals) -> None:
     """Ask for what nothing can be judged without."""
     leaves = {name.rpartition(".")[2] for name in found.items if name.startswith("wheel.")}
+    if not leaves & {"v", "v_true"}:
+        draft.ask(
+            "signals",
+            "where are the speeds of the wheels? No name tells; give each a line as those below (topic and field, or column), "
+            f'"wheel.{draft.machine.wheels[0]}.v" = {{ … }} and so on.',
+        )
     if "cmd.v" not in found.items and not leaves & {"v_ref", "u", "u_applied", "v_true"}:
         only = (
             "wheels can only be compared with each other" if len(draft.machine.wheels) > 1 else "nothing can be judged"
@@ -251,11 +267,3 @@ def _by_signs(structure: Structure, found: Signals) -> dict[str, str]:
 def _control(found: Signals) -> Control:
     """Law of the paper's kind where valve commands are logged, which is fitted; else another controller."""
     return Control() if any(re.fullmatch(r"wheel\.[^.]+\.u", n) for n in found.items) else Control(law="none")
-
-
-def check_draft(draft: Draft) -> None:
-    """Raise a `ConfigError` where no wheel of a draft has a speed."""
-    if not any(re.fullmatch(r"wheel\.[^.]+\.(v|v_true|u_applied)", name) for name in draft.signals.items):
-        raise ConfigError(
-            "no wheel of the structure has a speed in the log; `mfhca channels LOG --all` lists what it holds"
-        )

@@ -9,6 +9,7 @@ from pathlib import PurePath
 
 from replay.log.raw_log import Channel, RawLog
 from replay.log.source_options import SignalSource, SourceOptions
+from replay.machine.geometry import own_axle
 from replay.setup.draft_notes import Draft
 from replay.setup.structure import ONE, Structure
 
@@ -36,7 +37,7 @@ def given_signals(
             elif c.field == f"effort[{joint.joint}]":
                 given.setdefault(f"wheel.{wheel}.effort", replace(where, unit="N·m"))
             elif c.field == f"position[{joint.steering}]" and joint.steering:
-                given.setdefault(f"steer.{wheel}.phi", replace(where, unit="rad"))
+                given.setdefault(f"steer.{own_axle(wheel)}.phi", replace(where, unit="rad"))
     whole = odometry(channels)
     if structure.wheels == ONE and "odometry" in structure.how and whole is not None:
         given["wheel.D.v"] = SignalSource(topic=whole.topic, field=whole.field, unit="m/s")

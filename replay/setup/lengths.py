@@ -18,6 +18,7 @@ from replay.setup.draft_notes import Draft
 from replay.setup.motion import WheelMotion
 from replay.setup.structure import ONE, Structure
 from replay.signals.mapping import map_signals
+from replay.signals.name_words import english, tokens
 from replay.signals.signal import Signal, Signals
 from replay.signals.to_si import peak_of
 
@@ -53,7 +54,8 @@ def wheel_radius(
                 f"is the wheel radius {structure.radius:g} m? By commanded and measured speeds it would be {measured:.3g} m.",
             )
         return structure.radius
-    if measured is not None and measured < _WHEEL_SIZES[0]:
+    wheels_own = all("wheel" in english(tokens(origins[n].label)) for n in turning)  # by the joints' names
+    if measured is not None and measured < (_RADII[0] if wheels_own else _WHEEL_SIZES[0]):
         draft.ask(
             "geometry",
             f"were the motors measured? Radius over gear ratio is {measured:.3g} m, and rotations are written with at = "
@@ -73,7 +75,8 @@ def wheel_radius(
     if turning:
         draft.ask(
             "geometry",
-            "how large are the wheels? Nothing in the log tells it; 0.1 m radius stands in, and with it every speed.",
+            "how large are the wheels? Nothing in the log tells it; 0.1 m radius stands in, and with it every speed. If the motors' "
+            'turns were logged, add gear_ratio here, and at = "motor" to the speeds below.',
         )
     return 0.1
 

@@ -8,8 +8,9 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 
 from replay.machine.config import Machine, haulotte
-from replay.machine.signal_table import signal_of
+from replay.machine.geometry import own_axle
 from replay.machine.toml_text import key_text, real_text, signal_line, source_line, text_of
+from replay.machine.units import kept_unit
 from replay.setup.all_channels import ChannelRow
 from replay.setup.draft_notes import Draft
 from replay.signals.signal import Signal
@@ -78,7 +79,7 @@ def _geometry(machine: Machine) -> Iterable[str]:
     yield "# x forward, y to the left, offset from the steering joint to the wheel [m]; steer: front, rear, own or fixed"
     for w, g in machine.geometry.wheels.items():
         offset = f"offset = {real_text(g.offset)}, " if g.offset else ""
-        steer = "own" if g.axle == w else g.axle
+        steer = "own" if g.axle == own_axle(w) else g.axle
         yield f"{key_text(w)} = {{ x = {real_text(g.x)}, y = {real_text(g.y)}, {offset}steer = {text_of(steer)} }}"
 
 
@@ -98,7 +99,7 @@ def _holds(signal: Signal) -> str:
     """Rate and range in SI."""
     period, known = median_period(signal.stamps), signal.values[np.isfinite(signal.values)]
     rate = f"{1e9 / period:.4g} Hz" if period > 0 else "one sample"
-    unit = signal_of(signal.name).unit.replace("1", "")
+    unit = kept_unit(signal.name, signal.origin.unit).replace("1", "")
     return f"{rate}, {known.min():.3g} … {known.max():.3g} {unit}".rstrip() if len(known) else f"{rate}, no number"
 
 

@@ -7,6 +7,7 @@ from fnmatch import fnmatch
 from pathlib import Path
 
 from replay.arrays.column_store import ColumnStore
+from replay.log.joined_tables import joined_tables
 from replay.log.raw_log import RawLog
 from replay.log.source_options import SourceOptions
 from replay.log.stamp_order import in_order
@@ -49,7 +50,7 @@ def read_everything(
             topics = plan[summary.source]
         progress(Progress(Stage.READING, path.name))
         logs.append(in_order(read_log(path, options, topics, store=store)))
-    return logs
+    return joined_tables(logs)
 
 
 def _options(path: Path, machine: Machine | None) -> SourceOptions:

@@ -8,10 +8,10 @@ from dataclasses import dataclass, field
 
 from replay.log.raw_log import Channel
 from replay.machine.config import Machine, haulotte
-from replay.machine.geometry import Geometry, WheelGeometry
+from replay.machine.geometry import Geometry, WheelGeometry, own_axle
 from replay.setup.preset import Preset
 from replay.setup.robot_description import RobotDescription, WheelJoint
-from replay.signals.name_parts import index_of, is_steering, position, wheel_of
+from replay.signals.name_parts import end_of, index_of, is_steering, position, wheel_said
 from replay.signals.name_words import tokens
 from replay.signals.named_units import bare_name
 from replay.signals.rules import candidates
@@ -112,7 +112,7 @@ def described_structure(description: RobotDescription, joints: Sequence[str]) ->
     places, rows = {}, len({n[0] for n in names})
     middle = (max(w.x for w in wheels) + min(w.x for w in wheels)) / 2
     for name, w in zip(names, wheels, strict=True):
-        axle = "fixed" if not w.steering else name
+        axle = "fixed" if not w.steering else own_axle(name)
         places[name] = WheelGeometry(round(w.x - middle, 4), round(w.y, 4), round(w.offset, 4), axle)
     radii = [w.radius for w in wheels if w.radius is not None]
     measured = ("track", "wheelbase") if rows > 1 else ("track",)
@@ -153,9 +153,7 @@ def named_structure(channels: Mapping[str, Channel]) -> Structure | None:
     for count in _NUMBERED:
         wheels = FOUR if count == 4 else TWO if count == 2 else tuple(f"W{i + 1}" for i in range(count))
         if _covers(channels, wheels):
-            return Structure(
-                wheels, supposed(wheels, _steered(channels, wheels)), how="numbers in the log, in this order"
-            )
+            return Structure(wheels, supposed(wheels, _steered(channels, wheels)), how="numbers in the log")
     if _covers(channels, ONE):
         return Structure(ONE, None, how="the only drive in the log")
     return None
@@ -182,11 +180,9 @@ def _covered(channels: Mapping[str, Channel], wheels: tuple[str, ...], by_name: 
         group, part, leaf = (*c.signal.split("."), "", "")[:3]
         if group != "wheel" or leaf not in ("v", "v_true", "u_applied"):
             continue
-        name = bare_name(c.origin.label)[0]
-        inner = re.search(r"\[([A-Za-z_][^\[\]]*)\]$", name)
-        if by_name and wheel_of(inner[1] if inner else re.sub(r"\[\d+\]", "", name), trial) != part:
+        if by_name and wheel_said(c.origin.label, trial) != part:
             continue
-        found.setdefault(part, set()).add(name)
+        found.setdefault(part, set()).add(bare_name(c.origin.label)[0])
     return set(found)
 
 
@@ -198,13 +194,15 @@ def _steered(channels: Mapping[str, Channel], wheels: Sequence[str]) -> Mapping[
         name = inner[1] if inner and c.topic else c.name
         if is_steering(name):
             names.add(name)
-    ends = {position(n) for n in names}
+    ends = {(end_of(n), position(n)[1]) for n in names}
     if any(c.type_name.rpartition("/")[2].startswith("AckermannDrive") for c in channels.values()):
         ends.add((None, None))
-    own = {w: w for w in wheels if position(w) in ends}
+    own = {w: own_axle(w) for w in wheels if position(w) in ends}
     if own:
         return own
-    numbers = {found[1] for n in names if position(n) == (None, None) and (found := index_of(n)) is not None}
+    numbers = {
+        found[1] for n in names if (end_of(n), position(n)[1]) == (None, None) and (found := index_of(n)) is not None
+    }
     along = {"front" if a is None else a for a, _ in ends} & {"front", "rear"} | (
         {"rear"} if len(numbers) > 1 else set()
     )

@@ -1,14 +1,19 @@
-"""Signals without a unit whose values cannot be SI: the unit that they usually have then, asked in one question for each kind."""
+"""Signals whose unit or scale the log does not tell: the one that they usually have then, asked in one question for each kind."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
 
+from replay.log.raw_log import Channel
 from replay.log.source_options import SignalSource
+from replay.machine.config import Machine
 from replay.machine.signal_table import quantity_of
 from replay.setup.draft_notes import Draft
+from replay.signals.candidate import source_of
+from replay.signals.named_units import bare_name
 from replay.signals.signal import Signals
+from replay.signals.symbol_rules import valve_current
 from replay.signals.to_si import peak_of
 
 #: By quantity: the unit, from and up to which largest value it is taken, and what the values would be in SI.
@@ -17,6 +22,42 @@ _USUAL = {
     "angle": ("deg", 3.2, 180.0, "radians"),
     "rotation": ("deg/s", 6.3, 400.0, "rad/s"),
 }
+
+
+def valve_currents(
+    draft: Draft, channels: Mapping[str, Channel], machine: Machine, found: Signals
+) -> Mapping[str, SignalSource]:
+    """Commands of valves that are logged as currents or voltages, as shares of the largest that the log shows.
+
+    Parameters
+    ----------
+    draft : Draft
+        Takes one question.
+    channels : Mapping[str, Channel]
+        All of the log.
+    machine : Machine
+        Its wheels and axles.
+    found : Signals
+        As found by their names: valves whose openings are logged keep these.
+    """
+    named = {name: c for c in channels.values() if (name := valve_current(c, machine)) is not None}
+    out: dict[str, SignalSource] = {}
+    shown: list[str] = []
+    for kind in ("wheel", "steer"):
+        alike = {n: c for n, c in named.items() if n.startswith(kind) and n not in found.items}
+        peak = max((peak_of(c.values) for c in alike.values()), default=0.0)
+        if peak > 0:
+            full = float(f"{peak:.4g}")
+            out |= {n: replace(source_of(c, "1"), gain=float(f"{1 / peak:.4g}")) for n, c in alike.items()}
+            unit = next((u for c in alike.values() if (u := c.unit or bare_name(c.name)[1])), "")
+            shown.append(f"{full:g} {unit}".rstrip() + f" of {next(iter(alike.values())).name}")
+    if out:
+        draft.ask(
+            "signals",
+            f"which current opens a valve fully? Valves are logged by their currents, and the largest in this log stands in "
+            f"({', '.join(shown)} and the like): gain = 1 / that current, negative where it closes.",
+        )
+    return out
 
 
 def usual_units(draft: Draft, found: Signals) -> Mapping[str, SignalSource]:

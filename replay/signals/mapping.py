@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import difflib
-from collections.abc import Callable, Sequence
+import re
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from fnmatch import fnmatch
 from pathlib import PurePath
@@ -19,6 +20,7 @@ from replay.log.source_options import SignalSource
 from replay.machine.config import Machine
 from replay.machine.units import known_unit
 from replay.signals.candidate import Candidate
+from replay.signals.name_parts import wheel_said
 from replay.signals.rules import candidates, wanted_type
 from replay.signals.scale_doubt import scale_doubt
 from replay.signals.signal import Signal, Signals
@@ -126,8 +128,27 @@ def map_signals(logs: Sequence[RawLog], machine: Machine) -> Signals:
     items = dict(sorted(draft.items.items(), key=lambda item: order[item[0]]))
     store = logs[0].store if logs else ColumnStore()
     asked = questions(draft.doubts, items)
+    numbered = by_number(items, machine)
+    if numbered:
+        draft.notes.append(
+            f"wheels are told by numbers alone: {', '.join(numbered)}; another order blames the wrong wheel, and [signals] of a "
+            "machine file sets it"
+        )
     draft.notes += filter(None, [scale_doubt(items, machine)])
     return Signals(items, draft.missing, tuple(dict.fromkeys(draft.notes)), asked, store=store)
+
+
+def by_number(items: Mapping[str, Signal], machine: Machine) -> list[str]:
+    """Labels with the wheel that they were taken for by nothing but a number: ``/speeds.data[0] as FR``, one for each wheel."""
+    out: dict[str, str] = {}
+    for name, signal in items.items():
+        group, wheel, _ = (*name.split("."), "", "")[:3]
+        numbered = re.search(r"\d", signal.origin.label) is not None
+        if group == "wheel" and signal.guessed and numbered and len(machine.wheels) > 1:
+            said = wheel_said(signal.origin.label, machine)
+            if said != wheel and signal.origin.label != name:
+                out.setdefault(wheel, f"{signal.origin.label} as {wheel}")
+    return [*out.values()]
 
 
 def _take_given(draft: _Draft, name: str, source: SignalSource, logs: Sequence[RawLog]) -> None:

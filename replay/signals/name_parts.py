@@ -6,7 +6,9 @@ import re
 from collections.abc import Iterable
 
 from replay.machine.config import Machine
+from replay.machine.geometry import own_axle
 from replay.signals.name_words import tokens
+from replay.signals.named_units import bare_name
 
 _LONG = {
     "front": "front", "fore": "front", "fwd": "front", "vorne": "front", "vorn": "front",
@@ -24,12 +26,14 @@ _PAIRS = {
     "avg": ("front", "left"), "avd": ("front", "right"), "arg": ("rear", "left"), "ard": ("rear", "right"),
     "vl": ("front", "left"), "vr": ("front", "right"), "hl": ("rear", "left"), "hr": ("rear", "right"),
 }  # fmt: skip
+_ANGLES = frozenset(("winkel", "angle", "ang", "phi"))
+_OF_STEERING = _ANGLES | {"valve", "vlv", "ventil"}  # beside which str is no text, but steering
 _FRENCH = frozenset(("av", "ar", "avant", "arriere"))
 _STEER = re.compile(r"steer|lenk|kingpin|azimuth|swivel|knuckle|braquage")
-_DRIVE = re.compile(r"wheel|drive|motor|rad(?![a-z]|_?s(?![a-z])|/)|traction|hub|antrieb|roue|moteur")
+_DRIVE = re.compile(r"wheel|drive|(?<![a-z])drv|motor|rad(?![a-z]|_?s(?![a-z])|/)|traction|hub|antrieb|roue|moteur")
 _LOOSE = re.compile(r"(?<![A-Za-z0-9])[fblr](?![A-Za-z0-9])")
 _NO_DRIVE = re.compile(r"castor|caster|arm|grip|finger|flipper|head|neck|elbow|shoulder|wrist|hip|knee|lift|torso")
-_INDEX = re.compile(r"\[(\d+)\]|(?<=[A-Za-z_])(\d+)(?!\d)")
+_INDEX = re.compile(r"\[(\d+)\]|(?<=[A-Za-z_])[ #-]?(\d+)(?![\d.,/])")
 
 
 def position(name: str) -> tuple[str | None, str | None]:
@@ -60,6 +64,12 @@ def position(name: str) -> tuple[str | None, str | None]:
     return along, across
 
 
+def end_of(name: str) -> str | None:
+    """Front or rear of the name of an axle: ``r`` alone is the rear, for an axle has no side."""
+    along, across = position(name)
+    return "rear" if along is None and across is None and "r" in _LOOSE.findall(name.lower()) else along
+
+
 def is_place(word: str) -> bool:
     """Whether a lower-case word says nothing but a place: ``left``, ``vl``, ``ha``."""
     return word in _LONG or word in _PAIRS
@@ -69,8 +79,10 @@ def is_steering(name: str) -> bool:
     """Whether a name speaks of steering, or of an angle of an axle."""
     if _STEER.search(name.lower()) is not None:
         return True
-    words = tokens(name)
-    return bool({"winkel", "angle", "phi"} & {*words}) and position(name) in (("front", None), ("rear", None))
+    words = {*tokens(name)}
+    if {"str", "strg"} & words and _OF_STEERING & words:
+        return True
+    return bool(_ANGLES & words) and position(name) in (("front", None), ("rear", None))
 
 
 def is_drive(name: str) -> bool:
@@ -101,19 +113,25 @@ def wheel_of(name: str, machine: Machine) -> str | None:
     return next((w for w in machine.wheels if position(w) == place), None)
 
 
+def wheel_said(label: str, machine: Machine) -> str | None:
+    """Wheel that the label of a source speaks of by words alone, not by a number: the joint in brackets, else the whole."""
+    name = bare_name(label)[0]
+    inner = re.search(r"\[([A-Za-z_][^\[\]]*)\]$", name)
+    return wheel_of(inner[1] if inner else re.sub(r"\[\d+\]", "", name), machine)
+
+
 def axle_of(name: str, machine: Machine) -> str | None:
     """Steering axle that a name speaks of."""
     wheel = wheel_of(name, machine)
-    if wheel is not None and wheel in machine.axles:
-        return wheel
+    if wheel is not None and own_axle(wheel) in machine.axles:
+        return own_axle(wheel)
     words = tokens(name)
     for axle in machine.axles:
         if axle.lower() in words:
             return axle
-    along, across = position(name)
-    if along is None and across is None and len(machine.axles) == 1 and is_steering(name):
+    if end_of(name) is None and position(name)[1] is None and len(machine.axles) == 1 and is_steering(name):
         return machine.axles[0]
-    return along if along in machine.axles else None
+    return end if (end := end_of(name)) in machine.axles else None
 
 
 def index_of(name: str) -> tuple[str, int] | None:

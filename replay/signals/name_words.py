@@ -19,25 +19,26 @@ _PARTS = (
     "geschwindigkeit", "geschw", "drehzahl", "drehmoment", "drehrate", "gierrate", "gier", "winkel", "lenkung", "lenk",
     "ventil", "schieber", "stellung", "stell", "groesse", "ansteuerung", "strom", "spannung", "moment", "druck", "motor",
     "fahr", "antrieb", "achse", "achs", "vorder", "hinter", "vorne", "vorn", "hinten", "links", "rechts", "rad", "soll", "ist",
-    "mess", "wert", "werte", "vorgabe", "rate",
+    "mess", "wert", "werte", "vorgabe", "rate", "position",
 )  # fmt: skip
 _TOGETHER = re.compile(rf"(?:{'|'.join(_PARTS)})+")
 _PART = re.compile("|".join(sorted(_PARTS, key=len, reverse=True)))
 _MEANINGS = {
     "ref": "soll sollwert vorgabe vorg consigne cons",
+    "cmd": "ansteuerung commande",
     "act": "ist istwert mess messwert gemessen rueckmeldung mesure mesuree mes reel reelle",
-    "speed": "geschwindigkeit geschw vitesse vit",
+    "speed": "geschwindigkeit geschw vitesse vit spd speeds velocities",
     "rpm": "drehzahl regime",
-    "angle": "winkel",
-    "steer": "lenk lenkung braquage",
-    "valve": "ventil vanne distributeur",
+    "angle": "winkel ang",
+    "steer": "lenk lenkung braquage strg",
+    "valve": "ventil vanne distributeur vlv",
     "spool": "schieber tiroir",
-    "torque": "drehmoment couple",
-    "current": "strom courant",
+    "torque": "drehmoment couple trq",
+    "current": "strom courant curr",
     "voltage": "spannung tension",
     "press": "druck pression",
     "wheel": "roue",
-    "drive": "antrieb",
+    "drive": "antrieb drv",
     "motor": "moteur",
     "axle": "achse achs essieu",
     "yaw_rate": "gierrate drehrate lacet gier",
@@ -47,8 +48,9 @@ _TURNING = frozenset(("rate", "geschwindigkeit", "vitesse", "vit"))  # beside a 
 _FILLERS = frozenset(("wert", "werte", "value", "val", "values"))
 #: Words that ask for something: setpoints and commands, in English.
 ASKING = frozenset(
-    ("ref", "reference", "cmd", "command", "commanded", "set", "setpoint", "des", "desired", "target", "demand", "soll")
-)
+    ("ref", "reference", "cmd", "command", "commanded", "set", "setpoint", "des", "desired", "target", "demand", "soll",
+     *("demanded", "requested", "references", "refs", "cmds", "commands", "setpoints", "targets"))
+)  # fmt: skip
 MEASURED = frozenset(("act", "actual", "meas", "measured", "fb", "feedback", "ist"))
 
 

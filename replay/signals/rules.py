@@ -13,7 +13,7 @@ from replay.machine.config import Machine
 from replay.machine.signal_table import signal_of
 from replay.signals.candidate import Candidate, source_of
 from replay.signals.name_parts import axle_of, first_indices, index_of, is_drive, is_steering, wheel_of
-from replay.signals.name_words import tokens
+from replay.signals.name_words import ASKING, tokens
 from replay.signals.symbol_rules import by_symbol
 
 MESSAGE_TYPES = (
@@ -44,7 +44,7 @@ def candidates(channels: Mapping[str, Channel], machine: Machine) -> Iterator[Ca
         yield from _by_canonical(channel, machine)
         if channel.topic:
             yield from _by_message(channel, machine, channels)
-        if channel.topic and channel.type_name.rpartition("/")[2] in MESSAGE_TYPES[:11]:
+        if channel.topic and channel.type_name.rpartition("/")[2] in MESSAGE_TYPES[:10]:
             continue
         yield from by_symbol(channel, machine, first)
 
@@ -177,7 +177,7 @@ def _by_command_array(channel: Channel, machine: Machine, others: Mapping[str, C
     """Yield entries of a controller's command array, in the order of the machine's wheels or axles."""
     found = re.match(r"data\[(\d+)\]$", channel.field)
     name = channel.topic.lower()
-    if found is None or not re.search(r"command|cmd|ref", name):
+    if found is None or not ASKING & {*tokens(channel.topic)}:
         return
     count = sum(1 for o in others if o.startswith(f"{channel.topic}.data["))
     at = int(found[1])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 
 from replay.log.raw_log import Channel
 from replay.machine.config import Machine
@@ -16,6 +17,10 @@ from replay.signals.name_words import ASKING, MEASURED, english, role, tokens
 from replay.signals.named_units import bare_name, unit_by_end
 
 _EFFORT_UNITS = (("A", r"current|(^|_)amp"), ("V", r"volt"), ("%", r"duty|pwm"))
+# Fields of messages that are no measured values.
+_NO_VALUE = re.compile(r"(^|[._])(header|stamp|seq|covariance|timestamp|time|layout)([._\[]|$)")
+_VALVE = re.compile(r"valve|spool")
+_ELECTRIC = frozenset(("current", "voltage"))
 # What is derived from a signal, or bounds it, is not the signal.
 _NO_SIGNAL = re.compile(r"^(err(or)?|diff|max(imum)?|ecart|erreur|seuil)$|fehler|abweichung|limit|grenz|schwelle")
 # Words beside which a single unit of speed or angle says what a part's channel holds: nIst, VL, Rad_VL.soll.
@@ -45,6 +50,8 @@ _PLAIN = (
         )
     )
 )
+_ANGLES = frozenset(("deg", "grad"))  # units
+_STATES = frozenset(("state", "states", "status", "feedback", "telemetry"))  # topics of what is measured
 _OWN = frozenset(("n", "v", "rad", "wheel"))  # that say it even alone: ``Rad VL [1/min]``
 # Words beside which an asked speed is that of the whole machine.
 _WHOLE = ASKING | frozenset(
@@ -69,43 +76,95 @@ def by_symbol(channel: Channel, machine: Machine, first: Mapping[str, int]) -> I
     Parameters
     ----------
     channel : Channel
-        Of a table or a PLC; of messages only plain numbers (``data``, ``value``) and numbered fields.
+        Of a table, a PLC, or a message of a type that is not a common one.
     machine : Machine
         Its wheels and axles.
     first : Mapping[str, int]
         Smallest number of each numbered family of names.
     """
-    if channel.topic and channel.field not in ("data", "value") and not re.search(r"\[[\w.]+\]$", channel.field):
+    said = _said(channel, machine)
+    if said is None:
         return
-    name, stated = (channel.name, "") if channel.topic else bare_name(channel.name)
+    yield from _by_word(channel, said.text, said.parts[-1], said.unit)
+    leaf = _leaf(said)
+    if leaf is None:
+        return
+    part, rank = _part(channel, said, machine, first)
+    if part is not None:
+        signal = f"{'steer' if said.steering else 'wheel'}.{part}.{leaf}"
+        how = {9: "by its number", 10: "as the only wheel"}.get(rank, "by its name")
+        unit = said.unit or (_effort_unit("_".join(said.last)) if leaf == "effort" else "")
+        yield Candidate(signal, source_of(channel, unit), rank, f"{channel.name} {how}")
+
+
+def valve_current(channel: Channel, machine: Machine) -> str | None:
+    """Canonical name of the command that a valve's current or voltage stands for; None where a channel is none.
+
+    A current opens its valve, by a scale that no name tells: it is no opening until somebody says which current is a full one.
+    """
+    said = _said(channel, machine)
+    if said is None or not said.valve or not _ELECTRIC & {*said.last} or said.asked == "both":
+        return None
+    part = axle_of(said.bare, machine) if said.steering else wheel_of(said.bare, machine)
+    return None if part is None else f"{'steer' if said.steering else 'wheel'}.{part}.u"
+
+
+@dataclass(frozen=True)
+class _Said:
+    """What a name says: words of all its parts, those of the last part that says more than a place, what it asks or measures."""
+
+    name: str
+    bare: str
+    unit: str
+    parts: tuple[list[str], ...]
+    text: str
+    last: list[str]
+    asked: str
+    steering: bool
+    valve: bool
+
+
+def _said(channel: Channel, machine: Machine) -> _Said | None:
+    """Words of a channel's name; None where its field holds no measured value."""
+    if channel.topic and _NO_VALUE.search(channel.field):
+        return None
+    name, stated = (_message_name(channel), "") if channel.topic else bare_name(channel.name)
     inner = re.search(r"\[([A-Za-z_][\w.\[\]]*)\]$", name)
     name = inner.group(1) if inner and channel.topic else name
     bare = re.sub(r"\[\d+\]", "", name)
-    unit = _stated_unit(channel, stated) or unit_by_end(name)
-    parts = [english(tokens(part)) for part in re.split(r"[./]", bare)]
+    parts = tuple(english(tokens(part)) for part in re.split(r"[./]", bare))
     text = "_".join(word for part in parts for word in part)
-    last = _last_words(parts, machine)
-    asked = role([*last, *(w for part in parts if {*part} <= ASKING | {"st"} for w in part)])
-    yield from _by_word(channel, text, parts[-1], unit)
-    steering = is_steering(bare)
-    valve = re.search(r"valve|spool", text) is not None and re.search(r"motor|drive", text) is None
-    leaf = _leaf(last, asked, steering, unit, valve)
-    if leaf is None:
-        return
-    part = axle_of(bare, machine) if steering else wheel_of(bare, machine)
-    rank = 8
-    numbered = index_of(name)
-    if part is None and numbered is not None and (steering or is_drive(bare) or "valve" in "_".join(last)):
-        order = machine.axles if steering else machine.wheels
+    last, topic = _last_words(parts, machine), {*english(tokens(channel.topic))}
+    asked = role([*last, *(w for part in parts if {*part} <= ASKING | {"st"} for w in part), *(topic & ASKING)])
+    valve = _VALVE.search("_".join(last)) or (_VALVE.search(text) and not re.search(r"motor|drive", text))
+    return _Said(
+        name, bare, _stated_unit(channel, stated) or unit_by_end(name), parts, text, last,
+        asked or ("act" if topic & _STATES else ""), is_steering(bare), valve is not None,
+    )  # fmt: skip
+
+
+def _part(channel: Channel, said: _Said, machine: Machine, first: Mapping[str, int]) -> tuple[str | None, int]:
+    """Wheel or axle by its name, by its number, or as the only one, with the rank of that."""
+    part = axle_of(said.bare, machine) if said.steering else wheel_of(said.bare, machine)
+    numbered = index_of(said.name)
+    if (
+        part is None
+        and numbered is not None
+        and (said.steering or is_drive(said.bare) or "valve" in "_".join(said.last))
+    ):
+        order = machine.axles if said.steering else machine.wheels
         at = numbered[1] - min(first.get(_family(channel, numbered[0]), first.get(numbered[0], numbered[1])), 1)
-        part, rank = (order[at] if 0 <= at < len(order) else None), 9
-    if part is None and len(machine.wheels) == 1 and not steering and not re.search(r"gnss|gps|imu|odom", text):
-        part, rank = machine.wheels[0], 10
-    if part is not None:
-        signal = f"{'steer' if steering else 'wheel'}.{part}.{leaf}"
-        how = {9: "by its number", 10: "as the only wheel"}.get(rank, "by its name")
-        unit = unit or (_effort_unit("_".join(last)) if leaf == "effort" else "")
-        yield Candidate(signal, source_of(channel, unit), rank, f"{channel.name} {how}")
+        return (order[at] if 0 <= at < len(order) else None), 9
+    own = not channel.topic or channel.field in ("data", "value") or is_drive(said.bare)
+    alone = own and len(machine.wheels) == 1 and not re.search(r"gnss|gps|imu|odom", said.text)
+    if part is None and alone and not said.steering:
+        return machine.wheels[0], 10
+    return part, 8
+
+
+def _message_name(channel: Channel) -> str:
+    """Topic and field, without a last word that says nothing: of ``/wheel_speeds.data[0]`` ``/wheel_speeds[0]``."""
+    return re.sub(r"\.(data|values?)(?=\[\d+\]$|$)", "", channel.name)
 
 
 def _last_words(parts: Sequence[Sequence[str]], machine: Machine) -> list[str]:
@@ -125,20 +184,21 @@ def _stated_unit(channel: Channel, stated: str) -> str:
     return ("" if part else channel.unit or "") or stated
 
 
-def _leaf(last: Sequence[str], asked: str, steering: bool, unit: str, valve: bool) -> str | None:
+def _leaf(said: _Said) -> str | None:
     """Last word of the canonical name, by the words of a symbol, or by a unit where these say no quantity."""
-    word = "_".join(last)
+    last, asked = said.last, said.asked
     if asked == "both" or any(_NO_SIGNAL.search(w) for w in last):
         return None
-    patterns = _PART_PATTERNS[Scope.AXLE if steering else Scope.WHEEL]
-    leaf = next((leaf for leaf, pattern in patterns if re.search(pattern, word)), None)
-    if valve and {"current", "voltage"} & {*last}:  # of a valve: no effort of its wheel, and no opening
+    patterns = _PART_PATTERNS[Scope.AXLE if said.steering else Scope.WHEEL]
+    leaf = next((leaf for leaf, pattern in patterns if re.search(pattern, "_".join(last))), None)
+    if said.valve and _ELECTRIC & {*last}:  # of a valve: no effort of its wheel, and no opening
         return None
-    quantity = UNITS[known] if (known := known_unit(unit)) is not None else ("", 1.0)
-    if leaf is None and last and {w for w in last if not w.isdigit()} <= _PLAIN and (asked or _OWN & {*last}):
-        leaf = "phi" if steering and quantity[0] == "angle" else None
-        leaf = "v" if not steering and quantity[0] in ("speed", "rotation") else leaf
-        leaf = {"ref": "u", "act": "u_applied"}.get(asked) if valve and quantity[0] == "fraction" else leaf
+    quantity = UNITS[known] if (known := known_unit(said.unit)) is not None else ("", 1.0)
+    words = {w for w in last if not w.isdigit()} - _ANGLES
+    if leaf is None and words and words <= _PLAIN and (asked or _OWN & words):
+        leaf = "phi" if said.steering and quantity[0] == "angle" else None
+        leaf = "v" if not said.steering and quantity[0] in ("speed", "rotation") else leaf
+        leaf = {"ref": "u", "act": "u_applied"}.get(asked) if said.valve and quantity[0] == "fraction" else leaf
     if leaf in ("v", "phi") and asked == "ref":
         return f"{leaf}_ref"
     return leaf

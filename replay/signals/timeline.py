@@ -159,8 +159,8 @@ def align(signals: Signals, start_s: float | None = None, stop_s: float | None =
         )
     if not wheel:
         raise LogError(
-            "no wheel signal with at least two samples was found; `mfhca config init --log LOG` writes a machine file for the wheels that "
-            "the log names, and `mfhca channels LOG --all` lists every channel, to be named in its [signals]"
+            "no wheel signal with at least two samples was found; `mfhca config init --log LOG -o machine.toml` writes a machine "
+            "file for the wheels of a log (then -m machine.toml), and `mfhca channels LOG --all` lists what it holds"
         )
     notes = list(check_overlap(signals))
     periods = _Periods()

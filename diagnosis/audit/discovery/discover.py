@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 from diagnosis.audit.discovery.finder import Finder
 from diagnosis.audit.discovery.missions import MissionSource, named_missions
 from replay.log.file_types import words_of
+
+_SHOWN = 3
 
 
 @dataclass(frozen=True)
@@ -64,5 +66,15 @@ def discover(words: Iterable[str], *, exclude: Path | None = None) -> Discovery:
         tuple(dict.fromkeys(finder.problems)),
         finder.left_aside,
         tuple(dict.fromkeys(finder.roots)),
-        tuple(dict.fromkeys(finder.notes)),
+        tuple(dict.fromkeys([*finder.notes, *_packed(finder.packed)])),
     )
+
+
+def _packed(files: Sequence[str]) -> list[str]:
+    """A sentence on files that may hold logs and are none as they are."""
+    if not files:
+        return []
+    shown = ", ".join(files[:_SHOWN]) + (f" and {len(files) - _SHOWN} more" if len(files) > _SHOWN else "")
+    return [
+        f"not looked into: {shown}; unpack archives, and close a .bag.active with `rosbag reindex`, to have their logs audited"
+    ]

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import glob
 import os
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
 from diagnosis.audit.discovery.folder_contents import Unnamed
 from diagnosis.audit.discovery.listing import Entry, LocalPlace, Place
-from diagnosis.audit.discovery.missions import is_log, is_mission, missions_in, missions_of
+from diagnosis.audit.discovery.missions import MACHINE_FILE, is_log, is_mission, missions_in, missions_of
 from replay.log.file_types import LOG_ENDINGS
 
 
@@ -27,6 +27,8 @@ class Finder:
         As in `Discovery`.
     left_aside : int
         As in `Discovery`.
+    packed : list[str]
+        Files among those left aside that may hold logs, such as archives.
     bases : list[str]
         Folders to which missions' names are relative.
     """
@@ -37,6 +39,8 @@ class Finder:
         self.notes: list[str] = []
         self.bases: list[str] = []
         self.left_aside = 0
+        self.packed: list[str] = []
+        self._machines: dict[str, str] = {}
         self._exclude = exclude
         self._found: list[Unnamed] = []
         self._links: list[Entry] = []
@@ -112,7 +116,9 @@ class Finder:
         for home, held in together.items():
             self.roots += [file.path for file in held.values()]
             self.bases.append(home)
-            self._add(missions_of(place, home, list(held.values())))
+            beside = place.inside(Entry(home, "", home), MACHINE_FILE)
+            machine = None if beside is None or place.is_folder(beside) else beside.path
+            self._add(replace(one, machine=machine) for one in missions_of(place, home, list(held.values())))
 
     def _follow(self, place: Place, roots: Sequence[str]) -> None:
         """Look through what links to folders lead to, within the given folders, and only what was not looked through."""
@@ -154,13 +160,17 @@ class Finder:
         self.problems += found.problems
         self.notes += found.notes
         self.left_aside += found.left_aside
+        self.packed += found.packed
+        machine = found.machine or self._machines.get(place.parent(folder.path))
+        if machine is not None:
+            self._machines[folder.path] = machine
         self._unlisted += found.unread
         self._links += found.links
         waiting += found.below
-        self._add(found.missions)
+        self._add(replace(one, machine=machine) for one in found.missions)
         return found.is_mission
 
-    def _add(self, missions: Sequence[Unnamed]) -> None:
+    def _add(self, missions: Iterable[Unnamed]) -> None:
         """Take missions; of those behind a link to a folder, with the name of the folder that their files are in."""
         for one in missions:
             home = os.path.basename(os.path.dirname(one.files[0].path)) if self._linked else ""  # noqa: PTH119, PTH120

@@ -26,6 +26,8 @@ class Unnamed:
         What is wrong with that; empty where nothing is.
     linked : str
         Name of the folder its files are in, where a link to a folder leads to them.
+    machine : str or None
+        Path of the closest ``machine.toml``.
     """
 
     folder: str
@@ -35,6 +37,7 @@ class Unnamed:
     home: str = ""
     problem: str = ""
     linked: str = ""
+    machine: str | None = None
 
 
 @dataclass
@@ -55,6 +58,10 @@ class FolderContents:
         What is to be known, and recordings that cannot be read, one sentence each.
     unread : list[str]
         Real paths of these recordings.
+    packed : list[str]
+        Files among those left aside that may hold logs, such as archives.
+    machine : str or None
+        Path of its ``machine.toml``.
     """
 
     missions: list[Unnamed] = field(default_factory=list)
@@ -65,3 +72,5 @@ class FolderContents:
     notes: list[str] = field(default_factory=list)
     problems: list[str] = field(default_factory=list)
     unread: list[str] = field(default_factory=list)
+    packed: list[str] = field(default_factory=list)
+    machine: str | None = None

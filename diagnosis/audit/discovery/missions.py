@@ -11,6 +11,9 @@
 
 Results of audits and reports, and what is hidden, are no logs.
 
+**Which machine file a mission has**: the one that its ``mission.toml`` names, else the ``machine.toml`` in its folder or the
+closest searched one around it.
+
 **What ``mission.toml`` says** (`read_mission_file`): ``files`` of the mission, its ``name``, the ``machine_id``, and
 ``machine``, a machine file; all of them inside its folder, all of them optional. One that is wrong makes its folder a
 mission with a problem, which is not diagnosed.
@@ -45,6 +48,9 @@ _AUDIT_FILES = ("fleet.csv", "failures.txt")
 _REPORT = {"report.json", "report.parquet"}
 _REPORT_TABLES = ("report.parquet", "report.windows.parquet")
 _CLIPS = "clips"
+#: Files that may hold logs and cannot be read as they are: archives, and ROS 1 bags that were not closed.
+_PACKED = (".zip", ".7z", ".rar", ".tar", ".tgz", ".tar.gz", ".tar.xz", ".tar.zst", ".bag.active")
+MACHINE_FILE = "machine.toml"
 _URL = re.compile(r"([A-Za-z][A-Za-z0-9+.:-]*)://")
 
 
@@ -65,7 +71,7 @@ class MissionSource:
     machine_id : str
         From ``mission.toml``; may be empty.
     machine_file : str or None
-        From ``mission.toml``: the machine file's path.
+        From ``mission.toml``, or the closest ``machine.toml``: the machine file's path.
     sizes : tuple[int, ...]
         Of each file [bytes].
     problem : str
@@ -107,6 +113,7 @@ def missions_in(
         Where it is a recording that cannot be read.
     """
     found, names = FolderContents(), {f.name: f for f in files}
+    found.machine = names[MACHINE_FILE].path if MACHINE_FILE in names else None
     if MISSION_FILE in names:
         own = [child for child in folders if not child.link]
         found.missions.append(_stated(place, folder, names[MISSION_FILE], files, own, output, found))
@@ -211,6 +218,8 @@ def _logs(place: Place, folder: Entry, files: Sequence[Entry], output: str, foun
             logs.append(file)
         else:
             found.left_aside += 1
+            if file.name.lower().endswith(_PACKED):
+                found.packed.append(file.path)
     return logs
 
 
@@ -262,7 +271,7 @@ def named_missions(found: Sequence[Unnamed], bases: Sequence[str]) -> list[Missi
             bytes=sum(e.size for e in one.files),
             stamps=tuple(e.stamp for e in one.files),
             machine_id=one.stated.machine_id,
-            machine_file=one.stated.machine,
+            machine_file=one.stated.machine or one.machine,
             sizes=tuple(e.size for e in one.files),
             problem=one.problem,
             folder=one.linked,

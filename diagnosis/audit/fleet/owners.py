@@ -9,6 +9,7 @@ from __future__ import annotations
 import os
 from collections.abc import Iterable, Iterator
 
+from diagnosis.audit.discovery.identity import telling_folder
 from diagnosis.audit.fleet.read import Mission, Result
 from diagnosis.audit.store.reason_template import whole_path
 from diagnosis.results.vocabulary import Verdict
@@ -78,10 +79,10 @@ class Owners:
             owners[owner] = owners.get(owner, True) and named
 
     def _by_folder(self, m: Mission) -> bool:
-        """Whether a result's machine is called as `diagnosis.audit.discovery.identity.fallback_id` calls it."""
+        """Whether a result's machine is called as `diagnosis.audit.discovery.identity.fallback_id` calls it, or as its folder."""
         path = whole_path(self._store, m.files[0]) if m.files else ""
-        folder = path.replace(os.sep, "/").rpartition("/")[0].rpartition("/")[2]
-        return m.result is not None and m.result.machine_id == folder
+        folders = path.replace(os.sep, "/").split("/")[:-1]
+        return m.result is not None and m.result.machine_id in (telling_folder(folders), *folders[-1:])
 
 
 def _folders(mission: Mission) -> Iterator[str]:

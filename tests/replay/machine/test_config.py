@@ -38,7 +38,7 @@ def test_axle_places() -> None:
     assert (geometry.axle_x("front"), geometry.axle_x("rear")) == (1.0, -1.0)
     mixed = Geometry(
         {
-            "A": WheelGeometry(1.0, 0.0, 0.0, "A"),
+            "A": WheelGeometry(1.0, 0.0, 0.0, "A_steer"),
             "B": WheelGeometry(0.0, 0.5, 0.0, "fixed"),
             "C": WheelGeometry(-1.0, 0.5, 0.0, "rear"),
             "D": WheelGeometry(-2.0, -0.5, 0.0, "rear"),

@@ -165,12 +165,16 @@ def test_places_per_wheel(folder: Path) -> None:
     A = { x = 1.0, y = 0, steer = "own" }
     B = { x = 0.0, y = 0.4, offset = 0.05, steer = "front" }
     C = { x = 0.0, y = -0.4 }
+    [signals]
+    "steer.A.phi" = { column = "a", unit = "deg" }
+    "steer.A_steer.phi_ref" = { column = "b", unit = "deg" }
     """
     machine = load(folder, text)
     assert machine.geometry is not None
-    assert machine.geometry.wheels["A"].axle == "A"
+    assert machine.geometry.wheels["A"].axle == "A_steer"
     assert machine.geometry.wheels["C"] == WheelGeometry(0.0, -0.4, 0.0, "fixed")
-    assert machine.axles == ("A", "front")
+    assert machine.axles == ("A_steer", "front")
+    assert [*machine.signals] == ["steer.A_steer.phi", "steer.A_steer.phi_ref"]
 
 
 TWO = '[machine]\nwheels = ["A", "B"]\n'

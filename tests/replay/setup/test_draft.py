@@ -182,6 +182,85 @@ def test_rotations_tell_no_size_of_each_other(tmp_path: Path) -> None:
     assert not any("is the wheel radius" in q or "which number" in q for q in draft.questions)
 
 
+def write_numbered(tmp_path: Path, order: tuple[float, ...], commands: bool = True) -> None:
+    """A robot whose wheels have only numbers: side of each in their order [m to the left]."""
+    rng = np.random.default_rng(3)
+    v, omega = np.repeat(rng.uniform(-0.5, 0.9, 30), 40), np.repeat(rng.uniform(-0.8, 0.8, 30), 40)
+    columns: dict[str, Any] = {"time": np.arange(1200) * 0.05}
+    if commands:
+        columns |= {"cmd_speed [m/s]": v, "cmd_yaw_rate [rad/s]": omega}
+    for i, y in enumerate(order):
+        columns[f"wheel{i}_speed [rad/s]"] = (v - y * omega) / 0.15 + 0.02 * rng.standard_normal(1200)
+    pd.DataFrame(columns).to_csv(tmp_path / "run.csv", index=False)
+
+
+@pytest.mark.parametrize(
+    ("order", "wheels"),
+    [
+        ((-0.4, 0.4, -0.4, 0.4), ("FR", "FL", "RR", "RL")),
+        ((0.4, -0.4, 0.4, -0.4), ("FL", "FR", "RL", "RR")),
+        ((0.4, 0.4, -0.4, -0.4), ("FL", "RL", "FR", "RR")),
+        ((0.4, -0.4), ("L", "R")),
+    ],
+)
+def test_turns_tell_the_sides_of_wheels_that_have_only_numbers(
+    tmp_path: Path, order: tuple[float, ...], wheels: tuple[str, ...]
+) -> None:
+    write_numbered(tmp_path, order)
+    draft = read_back(draft_machine(read_everything([tmp_path / "run.csv"])), tmp_path)
+    assert draft.machine.wheels == wheels
+    assert [draft.machine.signals[f"wheel.{w}.v"].column for w in wheels] == [
+        f"wheel{i}_speed [rad/s]" for i in range(len(order))
+    ]
+    assert draft.machine.geometry is not None
+    track = max(p.y for p in draft.machine.geometry.wheels.values()) * 2
+    assert track == pytest.approx(0.8, rel=0.05)
+    assert sum("which wheel has which number" in q for q in draft.questions) == 1
+
+
+def test_without_turns_the_numbers_are_asked(tmp_path: Path) -> None:
+    write_numbered(tmp_path, (0.4, -0.4, 0.4, -0.4), commands=False)
+    draft = draft_machine(read_everything([tmp_path / "run.csv"]))
+    assert draft.machine.wheels == ("FR", "FL", "RR", "RL")
+    assert any("wheel0_speed [rad/s] as FR" in q and "no name says it" in q for q in draft.questions)
+
+
+def test_currents_of_valves_stand_for_openings_once_somebody_says_their_scale(tmp_path: Path) -> None:
+    v = np.repeat(np.random.default_rng(1).uniform(-0.5, 0.5, 15), 40)
+    columns: dict[str, Any] = {"time": np.arange(600) * 0.05}
+    for name in ("FR", "FL", "RR", "RL"):
+        columns |= {
+            f"drive {name} speed setpoint [m/s]": v,
+            f"drive {name} speed [m/s]": v,
+            f"drive {name} valve current [mA]": 800 * v,
+        }
+    pd.DataFrame(columns).to_csv(tmp_path / "run.csv", index=False)
+    draft = read_back(draft_machine(read_everything([tmp_path / "run.csv"])), tmp_path)
+    source = draft.machine.signals["wheel.FL.u"]
+    assert (source.column, source.unit) == ("drive FL valve current [mA]", "1")
+    assert source.gain == pytest.approx(1 / (800 * np.abs(v).max()), rel=0.05)
+    assert sum("which current opens a valve fully?" in q and " mA " in q for q in draft.questions) == 1
+    assert not any(name.endswith("effort") for name in draft.machine.signals)
+
+
+def test_a_preset_whose_wheels_are_not_found_asks_for_their_speeds(tmp_path: Path) -> None:
+    pd.DataFrame({"time": np.arange(50.0), "temperature": 20.0}).to_csv(tmp_path / "run.csv", index=False)
+    draft = draft_machine(read_everything([tmp_path / "run.csv"]), Preset.SKID_4)
+    assert any("where are the speeds of the wheels?" in q and '"wheel.FR.v"' in q for q in draft.questions)
+
+
+def test_small_wheels_of_joints_called_wheels_are_no_motors(tmp_path: Path) -> None:
+    rng = np.random.default_rng(3)
+    v, omega = np.repeat(rng.uniform(-0.1, 0.2, 30), 40), np.repeat(rng.uniform(-0.8, 0.8, 30), 40)
+    columns: dict[str, Any] = {"time": np.arange(1200) * 0.05, "cmd_speed [m/s]": v, "cmd_yaw_rate [rad/s]": omega}
+    for name, y in (("left", 0.08), ("right", -0.08)):
+        columns[f"wheel_{name}_speed [rad/s]"] = (v - y * omega) / 0.033
+    pd.DataFrame(columns).to_csv(tmp_path / "run.csv", index=False)
+    draft = read_back(draft_machine(read_everything([tmp_path / "run.csv"])), tmp_path)
+    assert draft.machine.wheel_radius == pytest.approx(0.033, rel=0.02)
+    assert {s.at for s in draft.machine.signals.values()} == {"wheel"}
+
+
 def test_a_log_without_a_drive_says_what_to_record(tmp_path: Path) -> None:
     pd.DataFrame({"time": np.arange(50.0), "temperature": 20.0}).to_csv(tmp_path / "run.csv", index=False)
     with pytest.raises(LogError, match="no wheel speed is in the log"):

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -11,6 +13,7 @@ from replay.readers.tables.columns import unit_of
 from replay.signals.name_words import english, folded, role, tokens
 from replay.signals.named_units import bare_name, unit_by_end
 from replay.signals.rules import candidates
+from replay.signals.symbol_rules import valve_current
 
 STAMPS = np.arange(3, dtype=np.int64)
 
@@ -79,6 +82,19 @@ def found(channel: Channel) -> list[tuple[str, str]]:
         ("speed_fl_setpoint (rpm)", "wheel.FL.v_ref"),
         ("fl_actual_speed [rpm]", "wheel.FL.v"),
         ("max_speed_fl [m/s]", None),
+        ("drv_fr_spd_act_mps", "wheel.FR.v"),
+        ("drv_rl_spd_cmd_mps", "wheel.RL.v_ref"),
+        ("drv_fl_vlv_cmd_pct", "wheel.FL.u"),
+        ("drv_fl_vlv_pos_pct", "wheel.FL.u_applied"),
+        ("str_f_ang_act_deg", "steer.front.phi"),
+        ("str_r_ang_cmd_deg", "steer.rear.phi_ref"),
+        ("str_r_vlv_cmd_pct", "steer.rear.u"),
+        ("str_f_text", None),
+        ("Fahrantrieb VR Ventilansteuerung [%]", "wheel.FR.u"),
+        ("Fahrantrieb HL Schieberposition [%]", "wheel.RL.u_applied"),
+        ("Drive/FL valve current [mA]", None),
+        ("Fahrantrieb VL Ventilstrom [mA]", None),
+        ("Fahrantrieb VL Strom [A]", "wheel.FL.effort"),
     ],
 )
 def test_columns(name: str, signal: str | None) -> None:
@@ -111,6 +127,50 @@ def test_columns(name: str, signal: str | None) -> None:
 )
 def test_symbols(name: str, unit: str | None, signal: str | None) -> None:
     assert [s for s, _ in found(symbol(name, unit))] == ([] if signal is None else [signal])
+
+
+def message(name: str, kind: str = "acme_msgs/msg/Chassis") -> Channel:
+    topic, _, field = name.partition(".")
+    return Channel(name, topic, field, STAMPS, np.zeros(3), None, kind)
+
+
+@pytest.mark.parametrize(
+    ("name", "signal"),
+    [
+        ("/chassis/state.fl_rpm", "wheel.FL.v"),
+        ("/chassis/state.rear_right_speed", "wheel.RR.v"),
+        ("/chassis/command.fl_rpm", "wheel.FL.v_ref"),
+        ("/wheel_command.fl_speed", "wheel.FL.v_ref"),
+        ("/chassis/setpoints.speed_fl", "wheel.FL.v_ref"),
+        ("/chassis/state.steer_front_deg", "steer.front.phi"),
+        ("/chassis/state.wheels[1].speed", "wheel.FR.v"),
+        ("/chassis/state.header.stamp.sec", None),
+        ("/chassis/state.speed_fl_covariance[0]", None),
+        ("/battery/state.current", None),
+    ],
+)
+def test_fields_of_messages_of_ones_own(name: str, signal: str | None) -> None:
+    assert [s for s, _ in found(message(name))] == ([] if signal is None else [signal])
+
+
+def test_arrays_of_measured_and_asked_speeds() -> None:
+    names = [f"/rover/{t}.data[{i}]" for t in ("wheel_velocities", "wheel_setpoints") for i in range(4)]
+    channels = {n: message(n, "std_msgs/msg/Float64MultiArray") for n in names}
+    signals = [c.signal for c in candidates(channels, haulotte())]
+    assert signals == [f"wheel.{w}.{leaf}" for leaf in ("v", "v_ref") for w in haulotte().wheels]
+
+
+def test_a_battery_is_no_drive_of_a_machine_with_one() -> None:
+    one = replace(haulotte(), wheels=("D",), geometry=None)
+    channel = message("/battery/state.current")
+    assert not [*candidates({channel.name: channel}, one)]
+
+
+def test_currents_of_valves_are_known_for_what_they_are() -> None:
+    machine = haulotte()
+    assert valve_current(column("Drive/FL valve current [mA]"), machine) == "wheel.FL.u"
+    assert valve_current(column("Ventilstrom Lenkung hinten [mA]"), machine) == "steer.rear.u"
+    assert valve_current(column("Drive/FL motor current [A]"), machine) is None
 
 
 def test_what_is_asked_is_never_taken_for_what_is_measured() -> None:

@@ -1,0 +1,73 @@
+"""Folders that tell machines apart, machine files beside logs, and what is not looked into."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from diagnosis.audit.discovery.discover import discover
+from diagnosis.audit.discovery.identity import fallback_id, telling_folder
+
+
+def put(root: Path, *names: str) -> None:
+    for name in names:
+        path = root / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_bytes(b"\x89MCAP0\r\n" + name.encode())
+
+
+@pytest.mark.parametrize(
+    ("path", "machine"),
+    [
+        ("srv/Lader_07/2026-03-01", "Lader_07"),
+        ("srv/AX/2026/03/17", "AX"),
+        ("srv/AX/2026/March/17", "AX"),
+        ("srv/AX/2026/KW12", "AX"),
+        ("srv/AX/20260301_101500", "AX"),
+        ("srv/AX/2026-03-01T10:15:00Z/csv", "AX"),
+        ("srv/AX/14.03.2026", "AX"),
+        ("robots/kitchen/bags", "kitchen"),
+        ("fleet/1", "1"),
+        ("fleet/12/logs", "12"),
+        ("fleet/May", "May"),
+        ("logs", "logs"),
+        ("logs/2026-03-01", "2026-03-01"),
+        ("", ""),
+    ],
+)
+def test_dates_and_usual_words_are_no_machines(path: str, machine: str) -> None:
+    assert telling_folder(path.split("/")) == machine
+
+
+def test_missions_of_one_machine_on_several_days(tmp_path: Path) -> None:
+    put(tmp_path, "AX/2026-03-01/m.mcap", "AX/2026-03-02/m.mcap", "BX/2026-03-01/m.mcap", "BX/bags/n.mcap")
+    assert sorted(fallback_id(m) for m in discover([str(tmp_path)]).missions) == ["AX", "AX", "BX", "BX"]
+
+
+def test_the_closest_machine_file_counts(tmp_path: Path) -> None:
+    put(tmp_path, "AX/1/m.mcap", "AX/2/m.mcap", "BX/m.mcap", "m.mcap", "rec/metadata.yaml", "rec/r.db3", "AX/3/m.mcap")
+    for place in ("AX", "AX/2", "BX"):
+        (tmp_path / place / "machine.toml").write_text("")
+    (tmp_path / "AX/3/own.toml").write_text("")
+    (tmp_path / "AX/3/mission.toml").write_text('machine = "own.toml"')
+    found = {m.name: m.machine_file for m in discover([str(tmp_path)]).missions}
+    expected = {
+        "AX__1__m": "AX/machine.toml",
+        "AX__2__m": "AX/2/machine.toml",
+        "AX__3": "AX/3/own.toml",
+        "BX__m": "BX/machine.toml",
+    }
+    assert found == {n: str(tmp_path / f) for n, f in expected.items()} | {"m": None, "rec": None}
+    single = discover([str(tmp_path / "BX/m.mcap")]).missions
+    assert [m.machine_file for m in single] == [str(tmp_path / "BX/machine.toml")]
+
+
+def test_archives_and_open_bags_are_named(tmp_path: Path) -> None:
+    put(tmp_path, "m.mcap", "old.zip", "x/run.bag.active", "notes.md")
+    found = discover([str(tmp_path)])
+    assert len(found.missions) == 1
+    (note,) = found.notes
+    assert "old.zip" in note
+    assert "run.bag.active" in note
+    assert "notes.md" not in note
