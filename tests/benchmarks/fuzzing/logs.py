@@ -7,6 +7,9 @@ from pathlib import Path
 
 from replay.border import UnforeseenContent
 from replay.errors import ConfigError, LogError
+from replay.inspection.inspect_log import inspect_log
+from replay.inspection.mcap_index import mcap_index
+from replay.log.open_loop import is_open_loop_table
 from replay.log.raw_log import RawLog
 from replay.log.source_options import SourceOptions
 from replay.readers.common.protocol import Reader
@@ -28,10 +31,16 @@ def read(path: Path, source: random.Random) -> Reading:
     try:
         reader = open_log(path)
         reader.summarise(path, OPTIONS)
+        if reader.format == "mcap":
+            mcap_index(path, "header")
+        if path.is_file():
+            is_open_loop_table(path)
         log = reader.read(path, OPTIONS)
         _shape(log)
         if log.summary.topics and log.summary.topics[0].encoding == "table" and source.random() < 0.2:
             _again(reader, path, source)
+        if source.random() < 0.05:
+            inspect_log(path, OPTIONS)
         if source.random() < 0.2:
             first = next(iter(log.channels.values()), None)
             start = int(first.stamps[0]) if first is not None and len(first.stamps) else 0
