@@ -54,7 +54,7 @@ SIGNALS = ("t", *(f"wheel.{w}.{k}" for w in ("FR", "FL", "RR", "RL") for k in ("
 class FirstLook:
     """A ROS robot and a table of wheels."""
 
-    name = "first look"
+    name = "first-look"
 
     def corpus(self, folder: Path) -> list[Sample]:
         """Both sound."""

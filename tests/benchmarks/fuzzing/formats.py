@@ -26,5 +26,5 @@ TARGETS: dict[str, Callable[[], Target]] = {
     "toml": Toml,
     "results": Results,
     "store": AuditStore,
-    "first look": FirstLook,
+    "first-look": FirstLook,
 }
