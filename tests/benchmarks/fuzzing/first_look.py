@@ -88,7 +88,7 @@ class FirstLook:
                 return Reading("whole", (inspect_index(path, SourceOptions()), inspect_log(path, SourceOptions())))
             if way < 0.35:
                 return Reading("whole", read_signals([path], machine))
-            if way < 0.9:
+            if way < 0.7:
                 return Reading("whole", _drafted(path))
             return Reading("whole", diagnose([path], machine).report)
         except (UnforeseenContent, UnforeseenValue) as error:
