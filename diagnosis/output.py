@@ -107,7 +107,8 @@ def _read_table(path: Path) -> dict[str, NDArray[Any]]:
         raise LogError(f"{path}: cannot be read ({said}); {_AGAIN}") from error
     if wrong := next((name for name, values in columns.items() if values.dtype.kind not in "fiu"), None):
         raise LogError(f"{path}: column {wrong[:80]!r} holds no numbers; {_AGAIN}")
-    return columns
+    kept = (np.float32, np.float64)  # what this tool writes; whole numbers and halves that another wrote become floats
+    return {k: v if k == "step" or v.dtype in kept else v.astype(np.float64) for k, v in columns.items()}
 
 
 def _read_columns(path: Path, rate: float) -> dict[str, NDArray[Any]]:

@@ -20,7 +20,7 @@ from tests.benchmarks.fuzzing.formats import TARGETS
 from tests.benchmarks.fuzzing.pool import Pool
 from tests.benchmarks.fuzzing.worker import input_of, lay_out, sound_samples, tried
 
-SEED, COUNT = 7, {"mcap": 60, "rosbag2": 40, "store": 30, "results": 40}
+SEED, COUNT = 7, {"mcap": 60, "rosbag2": 40, "store": 30, "results": 40, "first-look": 30}
 
 
 @pytest.mark.parametrize("name", TARGETS)

@@ -60,7 +60,7 @@ def copied_rows(timeline: Timeline, names: Sequence[str]) -> list[Span]:
     names : Sequence[str]
         Channels of one source.
     """
-    moving = [n for n in names if n.rsplit(".", 1)[-1] in _MOVING]
+    moving = [n for n in names if n.rsplit(".", 1)[-1] in _MOVING and not np.isnan(timeline.signals[n]).all()]
     if len(moving) < _CHANNELS:
         return []
     changes = np.flatnonzero(_changed(timeline, names))

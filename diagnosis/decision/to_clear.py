@@ -71,9 +71,10 @@ def to_clear(
         )
     if against.damage:
         left_out = is_left_out(against.damage[0])
+        said = against.damage[0] if left_out else f"The log is damaged: {against.damage[0]}"
         out.append(
             ToClear(
-                against.damage[0] if left_out else f"The log is damaged: {against.damage[0]}",
+                f"{said.rstrip('.')}.",
                 "diagnose the files of one mission together, and others apart"
                 if left_out
                 else "copy the log from the machine once more, or record another mission",

@@ -87,4 +87,5 @@ def read_speeds(path: Path, wheels: Sequence[str]) -> Speeds | None:
         table = pq.read_table(path, columns=wanted)
     except (OSError, pa.ArrowException):
         return None
-    return speeds_of({name: table.column(name).to_numpy() for name in table.column_names}, wheels)
+    columns = {name: table.column(name).to_numpy() for name in table.column_names}
+    return speeds_of({name: v for name, v in columns.items() if v.dtype.kind in "fiu"}, wheels)

@@ -18,6 +18,7 @@ from replay.machine.quantities import SI_UNITS
 from replay.machine.signal_table import quantity_of
 from replay.machine.units import known_unit, si_factor
 
+LARGEST = 1e30
 _WIDE = 1.5
 _PEAK_SAMPLES = 1 << 18
 
@@ -80,6 +81,8 @@ def convert(
 ) -> Converted:
     """Order stamps, differentiate where asked, and convert: (recorded · gain + offset) · factor.
 
+    Numbers beyond `LARGEST` are damage, not readings: their squares and sums would overflow. They become missing.
+
     Parameters
     ----------
     signal : str
@@ -102,10 +105,24 @@ def convert(
     stamps, recorded, notes = _ordered(*data)
     if origin.derivative and recorded.dtype.kind in "iu" and len(recorded):
         recorded = recorded.astype(np.int64) - np.int64(recorded[0])  # exact before they become floats
+    beyond = 0
+
+    def in_si(x: NDArray[Any]) -> NDArray[np.float64]:
+        nonlocal beyond
+        y: NDArray[np.float64] = (np.asarray(x, np.float64) * origin.gain + origin.offset) * factor
+        far = np.abs(y) > LARGEST
+        if far.any():
+            far &= np.isfinite(y)
+            beyond += int(far.sum())
+            y[far] = np.nan
+        return y
+
     with np.errstate(all="ignore"):  # damaged logs hold any bits
-        values = store.map(lambda x: (np.asarray(x, np.float64) * origin.gain + origin.offset) * factor, recorded)
+        values = store.map(in_si, recorded)
         values = store.keep(slope(stamps, values)) if origin.derivative else values
     release(stamps, recorded)
+    if beyond:
+        notes = (*notes, f"{beyond} numbers beyond {LARGEST:g} are no readings and were left out")
     return Converted(stamps, values, notes)
 
 

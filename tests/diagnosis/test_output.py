@@ -110,6 +110,15 @@ def test_saved_columns_whose_clock_is_damaged(result: MissionResult, tmp_path: P
     assert type(caught.value) is LogError  # foreseen
 
 
+@pytest.mark.parametrize("kind", [np.int8, np.uint16, np.int64, np.float16])
+def test_saved_columns_of_other_numbers_are_read(result: MissionResult, tmp_path: Path, kind: type) -> None:
+    _, _, parquet = write_result(result, tmp_path)
+    table = pq.read_table(parquet)
+    column = np.zeros(table.num_rows, kind)
+    pq.write_table(table.set_column(table.column_names.index("wheel.FR.v"), "wheel.FR.v", [column]), parquet)
+    assert rebuild(tmp_path).stat().st_size > 100_000
+
+
 def test_full_disk_leaves_the_earlier_result_whole(
     result: MissionResult, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -25,6 +25,41 @@ _SAME_KIND = 8
 
 
 @dataclass
+class Losses:
+    """What is lost of one file, each sentence once and of each kind the first few.
+
+    Attributes
+    ----------
+    name : str
+        Of the file.
+    report : Report
+        Where the sentences go.
+    """
+
+    name: str
+    report: Report
+    _said: Counter[str] = field(default_factory=Counter)
+    _texts: set[str] = field(default_factory=set)
+
+    def lost(self, kind: str, text: str) -> None:
+        """Report a loss once; beyond a few of one kind they are only counted."""
+        if text in self._texts:
+            return
+        self._texts.add(text)
+        self._said[kind] += 1
+        if self._said[kind] <= _SAME_KIND:
+            self.report.lost(f"{self.name}: {text}")
+
+    def say_rest(self) -> None:
+        """Report how many losses were not said one by one."""
+        for kind, count in self._said.items():
+            if count > _SAME_KIND:
+                self.report.lost(f"{self.name}: {count - _SAME_KIND} more losses of the same kind ({kind})")
+        self._said.clear()
+        self._texts.clear()
+
+
+@dataclass
 class McapFile:
     """One opened file.
 
@@ -85,11 +120,11 @@ class McapFile:
     inflater: Inflater = field(init=False)
     expansion: Expansion = field(init=False)
     scanner: scan.Scanner = field(default_factory=scan.Scanner)
-    _said: Counter[str] = field(default_factory=Counter)
-    _texts: set[str] = field(default_factory=set)
+    losses: Losses = field(init=False)
 
     def __post_init__(self) -> None:
-        self.names = Names(self.lost)
+        self.losses = Losses(self.path.name, self.report)
+        self.names = Names(self.losses.lost)  # not of the file: what refers to itself keeps its memory
         self.inflater, self.expansion = Inflater(len(self.data)), Expansion(len(self.data))
 
     @property
@@ -98,21 +133,8 @@ class McapFile:
         return None if self.summary is None else self.summary.statistics
 
     def lost(self, kind: str, text: str) -> None:
-        """Report a loss once; beyond a few of one kind they are only counted."""
-        if text in self._texts:
-            return
-        self._texts.add(text)
-        self._said[kind] += 1
-        if self._said[kind] <= _SAME_KIND:
-            self.report.lost(f"{self.path.name}: {text}")
-
-    def say_rest(self) -> None:
-        """Report how many losses were not said one by one."""
-        for kind, count in self._said.items():
-            if count > _SAME_KIND:
-                self.report.lost(f"{self.path.name}: {count - _SAME_KIND} more losses of the same kind ({kind})")
-        self._said.clear()
-        self._texts.clear()
+        """Report a loss; see `Losses.lost`."""
+        self.losses.lost(kind, text)
 
     def held(self, row: int) -> str:
         """Say what the indexes say about a chunk's messages."""

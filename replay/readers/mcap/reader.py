@@ -241,7 +241,7 @@ def summary_of(files: list[McapFile], source: Path, name: str, report: Report) -
         if file.strange:
             report.note(f"{file.path.name}: {file.strange} records of unknown type in its chunks were left out")
         attachments += file.attachments
-        file.say_rest()
+        file.losses.say_rest()
     metadata.setdefault("integrity", "checksums")
     topics = tuple(TopicInfo(c.topic, c.type_name, n, c.encoding, (), c.why_not()) for c, n in totals.items())
     start, stop = (min(bounds), max(bounds)) if bounds else (0, 0)

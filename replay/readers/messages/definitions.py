@@ -15,6 +15,7 @@ from replay.readers.messages.idl_cost import MAX_MILLISECONDS, milliseconds
 Fields: TypeAlias = tuple[tuple[str, Any], ...]
 
 MAX_DEFINITION = 1 << 20
+MAX_LINES = 20_000
 MAX_DEPTH = 32
 MAX_ARRAY = 1 << 28
 TIME = "builtin_interfaces/msg/Time"
@@ -45,6 +46,7 @@ _STORES = (
 
 _IDL_FILE = re.compile(r"^=+[ \t\r]*\nIDL:[^\n]*\n", re.MULTILINE)
 _DIRECTIVE = re.compile(r"^[ \t]*#[^\n]*$", re.MULTILINE)
+_EMPTY = re.compile(r"\n(?:[ \t\r]*+(?:#[^\n]*+)?\n)++")
 
 
 class DefinitionError(Exception):
@@ -127,6 +129,10 @@ def _parse(root: str, encoding: str, text: str) -> dict[str, Fields]:
     if len(text) > MAX_DEFINITION:
         raise DefinitionError(f"its definition has {len(text)} characters; at most {MAX_DEFINITION} are read")
     idl = encoding in ("ros2idl", "omgidl")
+    if not idl:  # the parser takes as long for an empty line or a comment as for a field
+        text = _EMPTY.sub("\n", f"\n{text}")
+        if text.count("\n") > MAX_LINES:
+            raise DefinitionError(f"its definition has {text.count(chr(10))} lines; at most {MAX_LINES} are read")
     if idl and milliseconds(text) > MAX_MILLISECONDS:
         raise DefinitionError(
             "its definition holds too many expressions, or brackets within brackets, to be parsed in time"

@@ -52,14 +52,16 @@ class CellColumn:
 
 
 class ArrayColumn:
-    """A growing column of any number type; blocks of another type than the first make it float64."""
+    """A growing column of any number type but halves; blocks of another type than the first make it float64."""
 
     def __init__(self, store: ColumnStore) -> None:
         self._store = store
         self._parts: Column | None = None
 
     def append(self, values: NDArray[Any]) -> None:
-        """Add values, shape (m,)."""
+        """Add values, shape (m,); halves, which hold no limit or sum that others work with, as float32."""
+        if values.dtype == np.float16:
+            values = values.astype(np.float32)
         if self._parts is None:
             self._parts = self._store.column(values.dtype)
         elif self._parts.dtype != values.dtype:

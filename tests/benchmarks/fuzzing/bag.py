@@ -98,15 +98,26 @@ class Ros1Bag:
                 facts = {"records": split(content, len(MAGIC)), "closed": content is raw}
                 facts["sound"] = "whole" if content is raw else "degraded"
                 samples.append(Sample(name, {"log.bag": content}, "log.bag", "log.bag", facts))
+        for sample in samples:
+            sample.facts["others"] = [other.facts["records"] for other in samples if other is not sample]
         return samples
 
     def damaged(self, sample: Sample, source: random.Random) -> Case:
-        """Blind damage, or one to three damages of records."""
+        """Made up, blind damage, records of another bag, or one to three damages of records."""
+        from tests.benchmarks.fuzzing.bag_made import made_up
+
+        if source.random() < 0.15:
+            return made_up(source)
         if source.random() < 0.25:
             content, what = blindly(sample.raw, source)
             return Case(content, what, {"sites": 1})
         records = [r.copy() for r in sample.facts["records"]]
         done = []
+        if source.random() < 0.1:
+            others = source.choice(sample.facts["others"])
+            for _ in range(source.choice((1, 3, 10))):
+                records.insert(source.randrange(len(records) + 1), source.choice(others).copy())
+            return Case(MAGIC + b"".join(r.bytes() for r in records), "records of another bag", {"sites": 9})
         for _ in range(source.choice((1, 1, 1, 2, 3))):
             chunks = [r for r in records if r.inner]
             inside = bool(chunks) and source.random() < 0.5

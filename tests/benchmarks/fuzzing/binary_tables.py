@@ -13,9 +13,10 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from tests.benchmarks.fuzzing import logs
+from tests.benchmarks.fuzzing import logs, tdms_made
 from tests.benchmarks.fuzzing.case import Case, Finding, Reading, Sample
 from tests.benchmarks.fuzzing.damage import Spot, blindly, reworded, with_number
+from tests.benchmarks.fuzzing.parquet_footer import with_lies
 
 COUNT, START = 60, 133_000_000_000_000_000
 
@@ -62,6 +63,11 @@ class Parquet(_Binary):
         raw = sample.raw
         if source.random() < 0.1:
             return Case(_made_up(source), "made up")
+        if source.random() < 0.35:
+            part, what = with_lies(raw[-8 - int.from_bytes(raw[-8:-4], "little") : -8], source)
+            return Case(
+                raw[: -8 - int.from_bytes(raw[-8:-4], "little")] + part + struct.pack("<I", len(part)) + b"PAR1", what
+            )
         size = int.from_bytes(raw[-8:-4], "little")
         start = len(raw) - 8 - size
         if source.random() < 0.7:
@@ -145,6 +151,8 @@ class Tdms(_Binary):
     def damaged(self, sample: Sample, source: random.Random) -> Case:
         """Numbers of the segments' lead-ins and metadata, or blind damage."""
         raw = sample.raw
+        if source.random() < 0.3:
+            return tdms_made.made_up(source)
         if source.random() < 0.3:
             return Case(*blindly(raw, source))
         starts = [k for k in range(len(raw)) if raw.startswith(b"TDSm", k)]

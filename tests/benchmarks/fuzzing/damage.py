@@ -140,6 +140,15 @@ def reworded(raw: bytes, source: random.Random) -> tuple[bytes, str]:
     return b"".join(words), "reworded"
 
 
+def spliced(raw: bytes, other: bytes, source: random.Random) -> tuple[bytes, str]:
+    """The beginning of one file and the end, or a stretch, of another."""
+    at, to = source.randrange(len(raw) + 1), source.randrange(len(other) + 1)
+    if source.random() < 0.5:
+        return raw[:at] + other[to:], "spliced"
+    size = source.choice((16, 200, 2000))
+    return raw[:at] + other[to : to + size] + raw[at + source.choice((0, size)) :], "with a stretch of another"
+
+
 BLIND: tuple[Callable[[bytes, random.Random], bytes], ...] = (
     _cut, _flip, _flip, _overwrite, _insert, _delete, _repeat, _move, _number, _number, _tail, _nest,
 )  # fmt: skip

@@ -7,6 +7,7 @@ from collections.abc import Callable
 from tests.benchmarks.fuzzing.bag import Ros1Bag
 from tests.benchmarks.fuzzing.binary_tables import Parquet, Svdx, Tdms
 from tests.benchmarks.fuzzing.case import Target
+from tests.benchmarks.fuzzing.first_look import FirstLook
 from tests.benchmarks.fuzzing.mcap import Mcap
 from tests.benchmarks.fuzzing.results import AuditStore, Results
 from tests.benchmarks.fuzzing.rosbag2 import Rosbag2
@@ -25,4 +26,5 @@ TARGETS: dict[str, Callable[[], Target]] = {
     "toml": Toml,
     "results": Results,
     "store": AuditStore,
+    "first-look": FirstLook,
 }

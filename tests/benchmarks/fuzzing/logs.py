@@ -3,10 +3,15 @@
 from __future__ import annotations
 
 import random
+import tempfile
 from pathlib import Path
 
 from replay.border import UnforeseenContent
-from replay.errors import ConfigError, LogError
+from replay.errors import ConfigError, LogError, OutputError
+from replay.export.raw_log import write_raw
+from replay.inspection.inspect_log import inspect_log
+from replay.inspection.mcap_index import mcap_index
+from replay.log.open_loop import is_open_loop_table
 from replay.log.raw_log import RawLog
 from replay.log.source_options import SourceOptions
 from replay.readers.common.protocol import Reader
@@ -28,10 +33,18 @@ def read(path: Path, source: random.Random) -> Reading:
     try:
         reader = open_log(path)
         reader.summarise(path, OPTIONS)
+        if reader.format == "mcap":
+            mcap_index(path, "header")
+        if path.is_file():
+            is_open_loop_table(path)
         log = reader.read(path, OPTIONS)
         _shape(log)
         if log.summary.topics and log.summary.topics[0].encoding == "table" and source.random() < 0.2:
             _again(reader, path, source)
+        if source.random() < 0.05:
+            inspect_log(path, OPTIONS)
+        if source.random() < 0.1:
+            _converted(path)
         if source.random() < 0.2:
             first = next(iter(log.channels.values()), None)
             start = int(first.stamps[0]) if first is not None and len(first.stamps) else 0
@@ -49,6 +62,19 @@ def read(path: Path, source: random.Random) -> Reading:
         raise Finding("shape", f"a sentence of {len(long)} characters: {long[:300]!r}")
     said = (*log.summary.damage, *log.summary.notes, *(f"{t.name}: {t.note}" for t in log.summary.topics if t.note))
     return Reading("degraded" if log.summary.damage else "whole", log, said)
+
+
+def _converted(path: Path) -> None:
+    """Convert a log, texts too; nothing but the folder that is named may be written."""
+    with tempfile.TemporaryDirectory() as place:
+        try:
+            write_raw(path, Path(place) / "out", OPTIONS)
+        except UnforeseenContent:
+            raise
+        except (LogError, OutputError):
+            pass
+        if names := {p.name for p in Path(place).iterdir()} - {"out"}:
+            raise Finding("shape", f"conversion left {sorted(names)[:5]}")
 
 
 def _again(reader: Reader, path: Path, source: random.Random) -> None:

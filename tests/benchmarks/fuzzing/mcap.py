@@ -19,8 +19,9 @@ from mcap.writer import CompressionType, IndexType, Writer
 
 from tests.benchmarks.fuzzing import logs, mcap_file
 from tests.benchmarks.fuzzing.case import Case, Finding, Reading, Sample
-from tests.benchmarks.fuzzing.damage import Spot, blindly, reworded, with_number
+from tests.benchmarks.fuzzing.damage import Spot, blindly, reworded, spliced, with_number
 from tests.benchmarks.fuzzing.mcap_file import CHUNK, Record
+from tests.benchmarks.fuzzing.mcap_made import made_up
 from tests.benchmarks.fuzzing.mcap_values import Decoder, compare
 
 T0, COUNT = 1_760_000_000_000_000_000, 40
@@ -120,14 +121,23 @@ class Mcap:
                 facts = {"counts": {TOPICS[k][0]: COUNT for k in topics}, "records": mcap_file.split(raw)}
                 facts["checked"] = name not in ("without checksums",)
                 samples.append(Sample(f"{name} {topics}", {"log.mcap": raw}, "log.mcap", "log.mcap", facts))
+        for k, sample in enumerate(samples):
+            sample.facts["other"] = samples[k - 1]
         return samples
 
     def damaged(self, sample: Sample, source: random.Random) -> Case:
-        """Blind damage, or one to three damages of records, sealed or not."""
+        """Made up, blind damage, spliced, or one to three damages of records, sealed or not."""
+        way, other = source.random(), sample.facts["other"]
+        if way < 0.15:
+            return made_up(source)
+        if way < 0.2:
+            return Case(*spliced(sample.raw, other.raw, source), {"sealed": True})
         if source.random() < 0.25:
             content, what = blindly(sample.raw, source)
             return Case(content, what, {"sealed": False})
         records: list[Record] = [r.copy() for r in sample.facts["records"]]
+        if way < 0.3:
+            return _mixed(records, other.facts["records"], source)
         seal, places = source.random() < 0.7, source.random() < 0.6
         done = []
         for _ in range(source.choice((1, 1, 1, 2, 3))):
@@ -165,6 +175,19 @@ class Mcap:
                 raise Finding("silent", f"messages {ours}; the mcap package reads {theirs} without an error")
             if not reading.said and ours == theirs:
                 compare(_decoder(), case.content, log)
+
+
+def _mixed(records: list[Record], others: list[Record], source: random.Random) -> Case:
+    """Records of another sound file among those of this one, in the file and in its chunks; checksums are right."""
+    chunks = [[r for r in part if r.op == CHUNK and r.inner] for part in (records, others)]
+    for _ in range(source.choice((1, 3, 10))):
+        if all(chunks) and source.random() < 0.6:
+            ours, theirs = (source.choice(part) for part in chunks)
+            ours.inner.insert(source.randrange(len(ours.inner) + 1), source.choice(theirs.inner).copy())
+            mcap_file.seal_chunk(ours)
+        else:
+            records.insert(source.randrange(len(records) + 1), source.choice(others).copy())
+    return Case(mcap_file.join(records, places=True, checksums=True), "records of another file", {"sealed": True})
 
 
 def _redefined(chunks: list[Record], source: random.Random, seal: bool) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import json
 import random
 import sqlite3
@@ -9,12 +10,16 @@ import tempfile
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import orjson
+import pyarrow as pa
+import pyarrow.parquet as pq
 
 from diagnosis.audit.fleet_files import write_fleet
 from diagnosis.audit.store.ingest import ingest
 from diagnosis.audit.store.store import FILE_NAME, Store
 from diagnosis.comparison.compare import compare_reports
+from diagnosis.evaluation.excitation import read_speeds
 from diagnosis.output import load_report, rebuild, write_result
 from diagnosis.results.result import MissionResult
 from replay.border import UnforeseenContent
@@ -51,6 +56,8 @@ class Results:
 
     def damaged(self, sample: Sample, source: random.Random) -> Case:
         """Another document, or blind damage."""
+        if sample.name == "columns" and source.random() < 0.7:
+            return Case(*other_columns(sample.raw, source))
         if "document" not in sample.facts or source.random() < 0.15:
             return Case(*blindly(sample.raw, source))
         return Case(*json_tree.damaged(sample.facts["document"], sample.facts["paths"], source))
@@ -62,6 +69,7 @@ class Results:
                 return Reading("whole", read_truth(path))
             report = load_report(path / "report.json")
             orjson.dumps(compare_reports(report, report, ("a", "b"), force=True).__class__.__name__)
+            read_speeds(path / "report.parquet", report["machine"]["wheels"])
             if source.random() < _REBUILT:
                 rebuild(path)
             return Reading("whole", report)
@@ -75,6 +83,43 @@ class Results:
 
     def check(self, sample: Sample, case: Case, path: Path, reading: Reading) -> None:
         """Nothing to compare with."""
+
+
+def other_columns(raw: bytes, source: random.Random) -> tuple[bytes, str]:
+    """Columns of other types, lengths, names or values, in a sound table."""
+    table, done = pq.read_table(io.BytesIO(raw)), []
+    for _ in range(source.choice((1, 1, 2, 4))):
+        k = source.randrange(table.num_columns) if source.random() < 0.7 else 0
+        name, values = table.column_names[k], table.column(k).to_numpy()
+        values = values if values.dtype.kind in "fiu" else np.arange(len(values))
+        count = len(values)
+        with np.errstate(all="ignore"):
+            halved, tiny = values.astype(np.float16), values.astype(np.int8)
+        odd = (
+            pa.array(["x"] * count), pa.nulls(count), pa.array([None if i % 3 else float(i) for i in range(count)]), pa.array([[1.0]] * count),
+            pa.array([{"a": 1.0}] * count), pa.array([True] * count), pa.array([2**63 + 5] * count, pa.uint64()), pa.array(np.arange(count), pa.timestamp("ns")),
+            pa.array(values[::-1]), pa.array(values * 0), pa.array(np.full(count, source.choice((np.nan, np.inf, 1e300, -1.0)))), pa.array(halved),
+            pa.array([b"x"] * count), pa.array(tiny), pa.array(np.full(count, 1, np.int64)).cast(pa.decimal128(19)),
+        )  # fmt: skip
+        way = source.random()
+        with np.errstate(all="ignore"):
+            if way < 0.6:
+                table = table.set_column(k, name, source.choice(odd))
+            elif way < 0.7:
+                table = table.set_column(
+                    k, source.choice((*table.column_names, "", "x", "t", "\x1b[31m")), table.column(k)
+                )
+            elif way < 0.8 and table.num_columns > 1:
+                table = table.remove_column(k)
+            elif way < 0.9:
+                table = table.slice(0, source.choice((0, 1, 2, count // 2)))
+            else:
+                table = table.append_column(name, table.column(k))
+        done.append(name)
+        if not table.num_columns or not table.num_rows:
+            break
+    pq.write_table(table, out := io.BytesIO())
+    return out.getvalue(), f"columns {', '.join(done)}"
 
 
 class AuditStore:

@@ -17,6 +17,7 @@ from rosbags.typesys import Stores, get_typestore
 from tests.benchmarks.fuzzing import logs, sqlite_file
 from tests.benchmarks.fuzzing.case import Case, Finding, Reading, Sample
 from tests.benchmarks.fuzzing.damage import FAR, blindly, reworded
+from tests.benchmarks.fuzzing.sqlite_made import made_up
 
 STORE = get_typestore(Stores.LATEST)
 T0, COUNT = 1_700_000_000_000_000_000, 60
@@ -36,6 +37,9 @@ class Rosbag2:
     def damaged(self, sample: Sample, source: random.Random) -> Case:
         """Blind damage, damage of the database's structure, rows that no recorder writes, or another text."""
         raw, target = sample.raw, sample.target
+        if target.endswith(".db3") and source.random() < 0.3:
+            with tempfile.TemporaryDirectory() as folder:
+                return made_up(Path(folder), source)
         packed = target.endswith(".zstd")
         content = zstandard.ZstdDecompressor().decompress(raw, 1 << 24) if packed else raw
         if source.random() < 0.2:

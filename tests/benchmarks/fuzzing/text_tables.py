@@ -14,6 +14,7 @@ import zstandard
 from tests.benchmarks.fuzzing import logs
 from tests.benchmarks.fuzzing.case import Case, Finding, Reading, Sample
 from tests.benchmarks.fuzzing.damage import FAR, blindly
+from tests.benchmarks.fuzzing.text_made import made_up
 
 COUNT, START = 60, 133_000_000_000_000_000
 NUMBERS = (*map(str, FAR), "-0", "1e308", "1e309", "-1e-400", "4.9e-324", "0.1", "1.7976931348623157e308", "123456789.123456789", "5e", "e5",
@@ -59,6 +60,8 @@ class _Text:
         """Blind damage, or other cells, rows and marks."""
         pack = sample.facts.get("pack", "")
         raw = _unpacked(sample.raw, pack)
+        if source.random() < 0.15:
+            return made_up(pack, source)
         if source.random() < 0.2:
             return Case(*blindly(sample.raw, source))
         if source.random() < 0.2:

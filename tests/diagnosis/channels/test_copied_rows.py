@@ -55,6 +55,12 @@ def test_an_effort_at_its_limit_says_nothing() -> None:
     assert without_copied_rows(given) is given
 
 
+def test_a_channel_without_any_number_is_no_part_of_the_rows() -> None:
+    given = timeline("wheel.M.v", "wheel.M.u")
+    empty = replace(given, signals={**given.signals, "wheel.M.v_ref": np.full(N, np.nan)})
+    assert np.isnan(without_copied_rows(empty).signals["wheel.M.v"][HOLD.start + 2 : HOLD.stop]).all()
+
+
 def test_repeats_that_are_the_sources_habit_stay() -> None:
     given = timeline()
     for name in ("wheel.M.v", "wheel.M.u"):

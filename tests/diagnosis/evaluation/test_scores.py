@@ -7,6 +7,8 @@ from math import inf
 from typing import Any
 
 import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
 import pytest
 from numpy.testing import assert_allclose
 
@@ -312,6 +314,17 @@ def test_recorded_commands_go_before_replayed_ones(tmp_path: Any) -> None:
     assert {k: v.tolist() for k, v in speeds.by_wheel.items()} == {"A": [1.0, 0.0, 1.0], "B": [0.0, 1.0, 2.0]}
     assert speeds_of({"t": t}, ("A",)) is None
     assert read_speeds(tmp_path / "absent.parquet", ("A",)) is None
+
+
+def test_columns_without_numbers_hold_no_commands(tmp_path: Any) -> None:
+    words, numbers, path = ["x", "y"], [1.0, 2.0], tmp_path / "report.parquet"
+    for columns in (
+        {"t": words, "wheel.A.v_ref": numbers},
+        {"t": numbers, "wheel.A.v_ref": words},
+        {"t": [[1.0], [2.0]], "wheel.A.v_ref": numbers},
+    ):
+        pq.write_table(pa.table(columns), path)
+        assert read_speeds(path, ("A",)) is None
 
 
 @pytest.mark.parametrize(("value", "expected"), [(0.0, 0), (0.19, 0), (0.2, 1), (0.7, 3), (1.0, 3), (1.2, 3)])

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import gc
 import struct
 import time
+import weakref
 import zlib
 from pathlib import Path
 
@@ -13,6 +15,8 @@ import pytest
 from replay.border import UnforeseenContent
 from replay.errors import LogError
 from replay.log.source_options import SourceOptions
+from replay.readers.common.inflate import Inflater
+from replay.readers.mcap import file
 from replay.readers.registry import read_log, summarise_log
 
 OPTIONS = SourceOptions()
@@ -138,6 +142,27 @@ def test_arrays_of_impossible_length_are_said(tmp_path: Path, size: int) -> None
     path.write_bytes(build(f"float64 data\nfloat64[{size}] t"))
     (topic,) = summarise_log(path, OPTIONS).topics
     assert f"gives t {str(size)[:20]} elements" in topic.note
+
+
+def test_reading_leaves_no_memory_to_the_collector(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    made: list[weakref.ref[Inflater]] = []
+
+    class Watched(Inflater):
+        def __init__(self, file_bytes: int | None = None) -> None:
+            super().__init__(file_bytes)
+            made.append(weakref.ref(self))
+
+    monkeypatch.setattr(file, "Inflater", Watched)
+    path = tmp_path / "log.mcap"
+    path.write_bytes(build())
+    gc.disable()  # chunks' room of up to 512 MB must not wait for it
+    try:
+        summarise_log(path, OPTIONS)
+        read_log(path, OPTIONS)
+    finally:
+        gc.enable()
+    assert len(made) == 2
+    assert not any(one() is not None for one in made)
 
 
 def test_any_number_in_the_summary_may_be_wrong(tmp_path: Path) -> None:

@@ -10,6 +10,7 @@ import pyarrow.parquet as pq
 import pytest
 
 from replay.errors import LogError
+from replay.inspection.inspect_log import inspect_log
 from replay.log.source_options import SourceOptions
 from replay.readers.registry import read_log, summarise_log
 from replay.readers.tables import parquet_reader
@@ -42,6 +43,15 @@ def test_empty_cells_and_types_of_every_row_group(target: Path) -> None:
     assert log.channels["b"].values.tolist() == [1, 0, 1, 1, 0]
     assert log.channels["d"].values.tolist() == [1.0, 2.0, 3.0, 4.0, 5.0]
     assert any("left out: n, s" in n for n in log.summary.notes)
+
+
+def test_halves_are_worked_with_as_floats(target: Path) -> None:
+    h = np.array([0.5, 65504.0, np.nan, np.inf], np.float16)
+    pq.write_table(pa.table({"t": np.arange(4) / 10, "h": h}), target)
+    channel = read_log(target, SourceOptions()).channels["h"]
+    assert channel.values.dtype == np.float32
+    np.testing.assert_array_equal(channel.values, h.astype(np.float64))
+    assert inspect_log(target, SourceOptions()).topics[0].odd_values
 
 
 def test_long_integers_of_time_stay_exact_beside_empty_cells(target: Path) -> None:
