@@ -48,6 +48,5 @@ def kalman_filter() -> type[KalmanFilter]:
             import_module("filterpy.kalman")
         finally:
             del sys.modules[_STATS]
-    from filterpy.kalman import KalmanFilter
-
-    return KalmanFilter
+    found: type[KalmanFilter] = import_module("filterpy.kalman").KalmanFilter
+    return found
