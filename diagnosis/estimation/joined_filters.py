@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from diagnosis.estimation.fault_models import CONSTANT, FIRST_NOISY, MISMATCH, ZERO, ModeModel
+from diagnosis.estimation.filterpy_loading import kalman_filter
 from diagnosis.estimation.row_filters import LOG_2PI, RowFilter
 
 Array = NDArray[np.float64]
@@ -53,11 +54,9 @@ def likelihoods(courses: Sequence[Course]) -> list[Array]:
 
 
 def _stepped(courses: Sequence[Course]) -> Iterator[Array]:
-    from filterpy.kalman import KalmanFilter
-
     rows = [RowFilter(c.m, c.model) for c in courses]
     size, steps = len(rows), max(c.y.size for c in courses)
-    kf: KalmanFilter = KalmanFilter(dim_x=_UNKNOWNS * size, dim_z=size)
+    kf = kalman_filter()(dim_x=_UNKNOWNS * size, dim_z=size)
     kf.F, kf.Q, kf.P = (_diagonal([getattr(row.kf, name) for row in rows]) for name in "FQP")
     kf.x = np.concatenate([row.kf.x for row in rows])
     noise = np.array([row.kf.R[0, 0] for row in rows])

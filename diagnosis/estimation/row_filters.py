@@ -19,8 +19,6 @@ F is 1 but for b, which passes: exp(−dt/mismatch_s). Q is zero but for b and f
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -34,9 +32,7 @@ from diagnosis.estimation.fault_models import (
     ZERO,
     ModeModel,
 )
-
-if TYPE_CHECKING:
-    from filterpy.kalman import KalmanFilter
+from diagnosis.estimation.filterpy_loading import kalman_filter
 
 Array = NDArray[np.float64]
 
@@ -60,11 +56,9 @@ class RowFilter:
     """
 
     def __init__(self, m: int, model: ModeModel) -> None:
-        from filterpy.kalman import KalmanFilter
-
         self.m, self.noise = m, model.noise
         self.grows = m == GAIN and model.noise**2 > 4.0 * model.constant_noise**2
-        kf: KalmanFilter = KalmanFilter(dim_x=2, dim_z=1)
+        kf = kalman_filter()(dim_x=2, dim_z=1)
         kf.F, kf.Q, kf.P = np.eye(2), np.zeros((2, 2)), np.zeros((2, 2))
         kf.x = np.array([[1.0], [0.0]])
         noise = model.noise

@@ -5,10 +5,12 @@ from __future__ import annotations
 import os
 import re
 import sys
+from contextlib import suppress
 from functools import lru_cache
 from pathlib import Path
 
 import jinja2
+from jinja2.bccache import Bucket
 from markupsafe import Markup
 
 from diagnosis.pages.mode_style import mode_style
@@ -47,13 +49,21 @@ def environment(folder: Path) -> jinja2.Environment:
         undefined=jinja2.StrictUndefined,
         trim_blocks=True,
         lstrip_blocks=True,
-        bytecode_cache=_compiled_before(folder),
+        bytecode_cache=_compiled_before(),
     )
 
 
-def _compiled_before(templates: Path) -> jinja2.BytecodeCache | None:
-    """Compiled templates beside the compiled modules, where those may be written."""
-    folder = templates / "__pycache__"
+class _Kept(jinja2.FileSystemBytecodeCache):
+    """Compiled templates in a folder; one that cannot be written is compiled again next time."""
+
+    def dump_bytecode(self, bucket: Bucket) -> None:
+        with suppress(OSError):
+            super().dump_bytecode(bucket)
+
+
+def _compiled_before() -> jinja2.BytecodeCache | None:
+    """Compiled templates of all pages beside the compiled modules, where those may be written."""
+    folder = Path(__file__).parent / "__pycache__"
     if sys.dont_write_bytecode or not (folder.is_dir() and os.access(folder, os.W_OK)):
         return None
-    return jinja2.FileSystemBytecodeCache(str(folder), "template-%s.pyc")
+    return _Kept(str(folder), "template-%s.pyc")

@@ -137,9 +137,11 @@ def levels_of(values: NDArray[np.floating], step: float) -> tuple[NDArray[np.int
     low, high = _HUGE, -_HUGE
     for part in _blocks(len(values)):
         y = values[part]
-        good = np.abs(y) < _HUGE
-        low = min(low, float(y.min(where=good, initial=_HUGE)))
-        high = max(high, float(y.max(where=good, initial=-_HUGE)))
+        least, most = float(y.min()), float(y.max())
+        if not -_HUGE < least <= most < _HUGE:  # not so where any is NaN
+            good = np.abs(y) < _HUGE
+            least, most = float(y.min(where=good, initial=_HUGE)), float(y.max(where=good, initial=-_HUGE))
+        low, high = min(low, least), max(high, most)
     if low > high:
         return np.zeros(len(values), np.int32), step, 0.0
     step = max(step, (high - low) / _LEVELS, max(abs(low), abs(high)) * 1e-15)

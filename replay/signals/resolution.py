@@ -21,17 +21,36 @@ def rounding_step(values: Array) -> float:
         New samples only; NaN are left out.
     """
     known = _first_known(values, 200_000)
-    steps = np.abs(np.diff(known))
-    steps = steps[steps > 1e-12 * max(1.0, float(np.max(np.abs(known), initial=0.0)))]
+    steps = np.diff(known)
+    np.abs(steps, out=steps)
+    largest = max(-float(np.min(known, initial=0.0)), float(np.max(known, initial=0.0)))
+    steps = steps[steps > 1e-12 * max(1.0, largest)]
     if steps.size < 20:
         return 0.0
-    smallest = float(np.quantile(steps, 0.01))
+    smallest = _low_quantile(steps, 0.01)
     step = float(np.median(steps[steps < 1.5 * smallest]))
     multiple = steps / step
-    whole = np.round(multiple)
-    step *= float(np.sum(multiple * whole) / max(float(np.sum(whole**2)), 1e-300))
+    whole = np.rint(multiple)
+    multiple *= whole
+    whole *= whole
+    step *= float(np.sum(multiple) / max(float(np.sum(whole)), 1e-300))
     small = steps[steps < 50 * step] / step
-    return step if small.size >= 20 and float(np.mean(np.abs(small - np.round(small)) < 0.1)) > 0.97 else 0.0
+    if small.size < 20:
+        return 0.0
+    off = np.rint(small)
+    off -= small
+    np.abs(off, out=off)
+    return step if np.count_nonzero(off < 0.1) / small.size > 0.97 else 0.0
+
+
+def _low_quantile(values: Array, share: float) -> float:
+    """`np.quantile` of many finite values, without its search for the largest one."""
+    place = share * (values.size - 1)
+    k = int(place)
+    ranked = np.partition(values, k)
+    a, t = float(ranked[k]), place - k
+    b = float(ranked[k + 1 :].min())
+    return a + (b - a) * t if t < 0.5 else b - (b - a) * (1.0 - t)
 
 
 def _first_known(values: Array, count: int) -> Array:
