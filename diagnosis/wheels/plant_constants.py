@@ -173,6 +173,7 @@ def _unexplained(drives: Sequence[Drive], i: int, values: Array, best: Trial, *,
         x = regressors(drive, i, best.hysteresis, best.lag, 1, body=values.size > RAMPS)
         every, length = rows_of(drive.dt)
         left = drive.y[:, i] - x @ values
+        left = np.append(left, np.full(-left.size % every, np.nan))  # the last row of a window may be of fewer blocks
         rows = left[: left.size // (every * length) * every * length].reshape(-1, every * length)[mine]
         near, far = (_growth(rows, float(np.exp(-drive.dt / best.lag)), k) for k in (1, min(5, rows.shape[1] - 1)))
         slow.append(np.nanmean(rows, axis=1) ** 2)
