@@ -206,8 +206,9 @@ def signals(seed: int, faults: Sequence[FaultSpec], duration: float, tier: str) 
     rate = own if recorder_of(seed) == "controller" else min(float(rng.choice([50.0, 100.0, 125.0, 250.0])), 2 * own)
     loses, gyro, ground = rng.choice([0.0, 0.002, 0.01]), rng.random() < 0.6, rng.random() < 0.4
     noise = np.random.default_rng(85_000 + seed)
+    shake = 0.0 if recorder_of(seed) == "controller" else 0.12
     rows = {
-        g: _rows(rng, n, r, loses)
+        g: _rows(rng, n, r, loses, shake)
         for g, r in (("drive", rate), ("steer", rate), ("cmd", 50.0), ("imu", 100.0), ("gnss", 5.0))
     }
     columns: dict[str, tuple[str, Array]] = {}
