@@ -109,6 +109,11 @@ def commands_of(seed: int) -> str:
     return COMMANDS[int(np.random.default_rng(81_000 + seed).choice([0, 0, 1, 2]))]
 
 
+def recorder_of(seed: int) -> str:
+    """What records the individual's rows: its ``controller``, one a cycle, or a ``logger`` at a rate of its own that may repeat values."""
+    return str(np.random.default_rng(86_000 + seed).choice(["controller", "logger"]))
+
+
 def machine_of(individual: tuple[Build, Array]) -> Machine:
     """Its machine file: what is on the type plate; nothing of the plant."""
     made, _ = individual
@@ -180,11 +185,11 @@ def driven(seed: int, faults: tuple[FaultSpec, ...], duration: float) -> tuple[A
     return drive(speed, bend, angle, loss, sat, noise, teeth, soft, parts, made)
 
 
-def _rows(rng: np.random.Generator, n: int, rate: float, loses: float) -> tuple[np.ndarray, np.ndarray]:
+def _rows(rng: np.random.Generator, n: int, rate: float, loses: float, shake: float) -> tuple[np.ndarray, np.ndarray]:
     """Milliseconds at which a recorder takes its rows, and their stamps [ns]: jitter, and rows that are lost."""
     every = 1000.0 / rate
     at = np.arange(0.0, n - 1, every)
-    at = np.clip(at + rng.uniform(-0.12, 0.12, at.size) * every, 0, n - 1).astype(int)
+    at = np.clip(at + 1 + rng.uniform(-shake, shake, at.size) * every, 0, n - 1).astype(int)
     keep = rng.random(at.size) > loses
     for start in rng.integers(0, at.size, rng.integers(0, 4)):
         keep[start : start + int(rng.integers(3, 12))] = False
@@ -197,11 +202,13 @@ def signals(seed: int, faults: Sequence[FaultSpec], duration: float, tier: str) 
     made, has, rng = build(seed)[0], commands_of(seed), np.random.default_rng(84_000 + seed)
     speed, bend, _ = commands(seed, duration)
     ref, true, read, given, opened, body = driven(seed, tuple(faults), duration)
-    n, rate = speed.size, min(float(rng.choice([50.0, 100.0, 125.0, 250.0])), 4000.0 / made.cycle)
+    n, own = speed.size, 2000.0 / made.cycle
+    rate = own if recorder_of(seed) == "controller" else min(float(rng.choice([50.0, 100.0, 125.0, 250.0])), 2 * own)
     loses, gyro, ground = rng.choice([0.0, 0.002, 0.01]), rng.random() < 0.6, rng.random() < 0.4
     noise = np.random.default_rng(85_000 + seed)
+    shake = 0.0 if recorder_of(seed) == "controller" else 0.12
     rows = {
-        g: _rows(rng, n, r, loses)
+        g: _rows(rng, n, r, loses, shake)
         for g, r in (("drive", rate), ("steer", rate), ("cmd", 50.0), ("imu", 100.0), ("gnss", 5.0))
     }
     columns: dict[str, tuple[str, Array]] = {}
