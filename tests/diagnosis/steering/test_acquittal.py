@@ -1,0 +1,86 @@
+"""Machines whose axles do not move as their models say: told by all axles, and then accused by measurements alone."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from diagnosis.steering.acquittal import moves_otherwise, scatter_of
+from diagnosis.steering.blocks import SteeringBlocks, blocks_of, without_growth
+from diagnosis.steering.plant import SteeringPlant
+from diagnosis.steering.redundancy import with_second_angle
+from diagnosis.steering.valve_map import ValveMap
+
+DT, SECONDS = 0.01, 60.0
+SIZE = round(SECONDS / DT)
+ALWAYS = np.ones(SIZE, np.bool_)
+MAP = ValveMap(0.3, 0.3, 0.0, 0.0, 0.4, 0.4)
+PLANT = SteeringPlant(MAP, DT, 0.0, 1e-9 * np.eye(8), 0.001, 40, (-1.0, 1.0))
+Array = np.ndarray
+
+
+def moved(scatter: float, seed: int = 1) -> tuple[Array, Array]:
+    """Opening and angle of an axle whose rate per opening wanders by a share, from second to second."""
+    rng = np.random.default_rng(seed)
+    u = 0.6 * np.sign(np.sin(2 * np.pi * np.arange(SIZE) * DT / 6.0))
+    gain = 1.0 + scatter * np.repeat(rng.normal(size=round(SECONDS)), round(1.0 / DT))
+    return u, np.cumsum(0.3 * u * gain) * DT
+
+
+def blocks(u: Array, angle: Array) -> SteeringBlocks:
+    return blocks_of(angle, u, ALWAYS, ALWAYS, DT)
+
+
+def scatter(share: float) -> float:
+    found = scatter_of(blocks(*moved(share)), PLANT)
+    assert found is not None
+    return found
+
+
+def test_motions_scatter_as_the_rate_wanders() -> None:
+    assert scatter(0.0) < 1e-3
+    assert 0.005 < scatter(0.03) < scatter(0.1)
+
+
+def test_an_axle_that_loses_much_for_half_of_the_mission_is_no_other_structure() -> None:
+    u, angle = moved(0.0)
+    rate = np.gradient(angle)
+    rate[SIZE // 2 :] *= 0.3
+    found = scatter_of(blocks(u, np.cumsum(rate)), PLANT)
+    assert found is not None
+    assert found < 2e-3
+
+
+def test_one_axle_that_fits_speaks_for_the_models() -> None:
+    assert moves_otherwise([0.02, 0.01])
+    assert not moves_otherwise([0.02, 0.002])
+    assert not moves_otherwise([None, None])
+
+
+def test_an_axle_that_rests_says_nothing() -> None:
+    assert scatter_of(blocks(np.zeros(SIZE), np.zeros(SIZE)), PLANT) is None
+
+
+def test_steps_of_a_slow_controller_are_no_noise() -> None:
+    """Two of three rows are news: the ramp of an angle goes in steps, on both axles."""
+    rng = np.random.default_rng(2)
+    u, angle = moved(0.0)
+    kept = np.floor(np.arange(SIZE) / 1.5).astype(int)
+    noisy = [
+        np.repeat(angle + rng.normal(0.0, 3e-4, SIZE), 1)[np.minimum(np.round(kept * 1.5).astype(int), SIZE - 1)]
+        for _ in range(2)
+    ]
+    axles = [blocks(u, y) for y in noisy]
+    evened = without_growth(axles)
+    moving = np.abs(np.gradient(axles[0].mean)) > 1e-3 * DT
+    for before, after in zip(axles, evened, strict=True):
+        assert np.median(after.power[moving]) <= np.median(before.power[moving])
+    one_steady = without_growth([axles[0], blocks(np.zeros(SIZE), rng.normal(0.0, 3e-4, SIZE))])
+    assert one_steady[0] is axles[0]
+
+
+@pytest.mark.parametrize(("apart", "left"), [(0.004, 0.0), (0.05, 0.04)])
+def test_two_angles_may_be_set_to_zero_apart_no_further_than_healthy_ones(apart: float, left: float) -> None:
+    u, angle = moved(0.0)
+    found = with_second_angle(blocks(u, angle + apart), angle + apart, angle, ALWAYS, DT, 0.001)
+    assert np.nanmedian(found.mean - found.redundancy.angle) == pytest.approx(left, abs=1e-3)
