@@ -79,7 +79,7 @@ def consequence(spell: Spell, wheel: str, judged: Mapping[str, Judged]) -> bool:
 
 
 def less_sure(spell: Spell, wheel: str, judged: Mapping[str, Judged], block_s: float) -> Spell:
-    """A spell that nothing in its own channel shows, less sure where it begins during another wheel's fault or soon after it.
+    """A spell that nothing in its own channel shows, less sure where it is beside another wheel's longer one, or begins soon after it.
 
     Wheels share a body: one that a loop drives astray holds the others back, or drags them along, also after it reads right again.
 
@@ -98,8 +98,9 @@ def less_sure(spell: Spell, wheel: str, judged: Mapping[str, Judged], block_s: f
     if evident(spell, one) or jumped(one, spell):
         return spell
     soon = _AFTER_S / block_s
+    length = spell.stop - spell.start
     before = any(
-        s.start < spell.start < s.stop + soon
+        (s.start < spell.start or s.stop - s.start > length) and s.start < spell.stop and spell.start < s.stop + soon
         for o, j in judged.items()
         if o != wheel
         for s in j.spells

@@ -74,6 +74,8 @@ def test_what_begins_soon_after_another_wheels_fault_is_less_sure(mode: FaultMod
     spell = Spell(140, 170, mode, 0.95)
     judged = {"MR": wheel(spell), "RR": wheel(Spell(100, 120, FaultMode.OUTSIDE_TABLE, 0.95))}
     assert less_sure(spell, "MR", judged, 0.25).p == pytest.approx(share * 0.95)
+    before_it = spell._replace(start=95, stop=112)  # and shorter than the other one
+    assert less_sure(before_it, "MR", judged, 0.25).p == pytest.approx(share * 0.95)
     assert less_sure(spell._replace(start=400, stop=420), "MR", judged, 0.25).p == 0.95
 
 
