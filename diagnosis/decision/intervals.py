@@ -13,8 +13,7 @@ from diagnosis.results.assessment import STATES, Assessment, Finding
 from diagnosis.results.machine_words import MachineWords
 from diagnosis.results.result import Epsilon, FaultInterval, StateSpan
 from diagnosis.results.vocabulary import Kind, Tier
-from replay.faults import FaultMode
-from replay.faults import Side
+from replay.faults import FaultMode, Side
 from replay.machine.config import Machine
 
 #: 95 % of the errors of a wheel's ε̂ by its model, on tuning seeds: what a loop makes up for hides a sensor's size more than a valve's.
