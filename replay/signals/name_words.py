@@ -91,7 +91,7 @@ def english(words: Sequence[str]) -> list[str]:
         elif word in _FILLERS or (word in _TURNING and out[-1:] == ["yaw_rate"]):
             continue
         else:
-            out.append(_ENGLISH.get(word, word))
+            out.append("valve" if word.endswith("ventil") else _ENGLISH.get(word, word))  # Proportionalventil
     roles = ASKING | MEASURED
     for i, word in enumerate(out):
         if word in ("n", "v") and {*out[max(i - 1, 0) : i], *out[i + 1 : i + 2]} & roles:

@@ -22,7 +22,7 @@ from replay.control.kinematics import (
     wheel_commands,
 )
 from replay.machine.config import PhiDot, haulotte
-from replay.machine.geometry import Geometry, WheelGeometry
+from replay.machine.geometry import Geometry, WheelGeometry, own_axle
 
 Array = np.ndarray
 MAX = 1.5
@@ -194,9 +194,9 @@ def test_axle_angles_with_one_steered_axle_and_own_wheels() -> None:
     v, omega = np.full(4, 0.3), np.array([0.0, 0.05, -0.05, 0.1])
     got = commands(v, omega, car)
     assert_allclose(wheel_angles(got.axle_angle, car), got.angle, atol=1e-12)
-    own = Geometry({w: WheelGeometry(g.x, g.y, 0.1, w) for w, g in car.wheels.items()}, 0.6)
+    own = Geometry({w: WheelGeometry(g.x, g.y, 0.1, own_axle(w)) for w, g in car.wheels.items()}, 0.6)
     got = commands(v, omega, own)
-    assert own.axles == ("FL", "FR", "RL", "RR")
+    assert own.axles == ("FL_steer", "FR_steer", "RL_steer", "RR_steer")
     assert_allclose(got.axle_angle, got.angle, atol=1e-15)
     assert_allclose(wheel_angles(got.axle_angle, own), got.angle, atol=1e-15)
 

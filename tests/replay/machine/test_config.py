@@ -45,7 +45,7 @@ def test_axle_places() -> None:
         },
         0.5,
     )
-    assert mixed.axles == ("A", "rear")
+    assert mixed.axles == ("A_steer", "rear")
     assert mixed.axle_x("rear") == -1.5
 
 

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from replay.errors import ConfigError
 from replay.log.source_options import SignalSource, SourceOptions
 from replay.machine.config import Control, Limits, Machine, Noise, Plant, WheelPlant, haulotte
-from replay.machine.geometry import Geometry, WheelGeometry
+from replay.machine.geometry import Geometry, WheelGeometry, own_axle
 from replay.machine.toml_file import load_machine
 from replay.machine.toml_text import dump_machine
 
@@ -47,7 +47,7 @@ def test_everything_given_round_trip(folder: Path) -> None:
             {
                 "L1": WheelGeometry(2.0, 0.9, 0.1, "front"),
                 "L2": WheelGeometry(0.0, 0.9, 0.0, "fixed"),
-                "L3": WheelGeometry(-2.0, 0.9, 0.1, "L3"),
+                "L3": WheelGeometry(-2.0, 0.9, 0.1, "L3_steer"),
                 "R1": WheelGeometry(2.0, -0.9, -0.1, "front"),
                 "R2": WheelGeometry(0.0, -0.9, 0.0, "fixed"),
                 "R3": WheelGeometry(-2.0, -0.9, -0.1, "rear"),
@@ -115,7 +115,10 @@ def machines(draw: st.DrawFn) -> Machine:
         places = Geometry(
             {
                 w: WheelGeometry(
-                    draw(NUMBERS), draw(NUMBERS), draw(NUMBERS), draw(st.sampled_from(["front", "rear", "fixed", w]))
+                    draw(NUMBERS),
+                    draw(NUMBERS),
+                    draw(NUMBERS),
+                    draw(st.sampled_from(["front", "rear", "fixed", own_axle(w)])),
                 )
                 for w in wheels
             },
@@ -174,6 +177,7 @@ def test_places_per_wheel(folder: Path) -> None:
     assert machine.geometry.wheels["A"].axle == "A_steer"
     assert machine.geometry.wheels["C"] == WheelGeometry(0.0, -0.4, 0.0, "fixed")
     assert machine.axles == ("A_steer", "front")
+    assert not {*machine.wheels} & {*machine.axles}  # a wheel and its steering are two parts
     assert [*machine.signals] == ["steer.A_steer.phi", "steer.A_steer.phi_ref"]
 
 

@@ -95,6 +95,11 @@ def found(channel: Channel) -> list[tuple[str, str]]:
         ("Drive/FL valve current [mA]", None),
         ("Fahrantrieb VL Ventilstrom [mA]", None),
         ("Fahrantrieb VL Strom [A]", "wheel.FL.effort"),
+        ("DB_Antrieb_VR.Strom_Proportionalventil [mA]", None),
+        ("Wheels/Wheel 2 demanded speed [m/s]", "wheel.FL.v_ref"),
+        ("Valves/Valve 3 command [%]", "wheel.RR.u"),
+        ("Valves/Valve 3 spool position [%]", "wheel.RR.u_applied"),
+        ("roue_avant_droite_commande_vanne_pct", "wheel.FR.u"),
     ],
 )
 def test_columns(name: str, signal: str | None) -> None:
