@@ -37,7 +37,7 @@ Estimate = tuple[Epsilon | None, Sat | None, float]
 # the length at which half of those in a log too slow for its commands are.
 _LAPSE, _COARSE_S = 0.01, 1.7
 _RESTLESS, _RESTLESS_P = 0.1, 0.8  # share of changing news from which a channel is not stuck, and how probably so
-_OF_PLAY = 0.025  # of its width per rms opening: standard deviation of the gain that a play leaves in simulated valves
+_OF_PLAY = 0.2  # of its width per rms opening: standard deviation of the gain that a play leaves in simulated valves
 _CLEARLY = 2.0  # times as probable as the path's row, from which on another one is stated
 
 

@@ -100,7 +100,7 @@ class ReportOutcome:
     speed, slip_share : float or None, float
         As for `FaultOutcome`.
     bounds_hold : bool or None
-        Whether its 95 % bounds of ε hold the truth; None where it is not right, or states none.
+        Whether its 95 % bounds of ε hold the truth; None where it is not right, states none, or is stuck or silent (ε = 1).
     """
 
     id: str
