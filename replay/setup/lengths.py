@@ -54,7 +54,8 @@ def wheel_radius(
                 f"is the wheel radius {structure.radius:g} m? By commanded and measured speeds it would be {measured:.3g} m.",
             )
         return structure.radius
-    wheels_own = all("wheel" in english(tokens(origins[n].label)) for n in turning)  # by the joints' names
+    # a ROS joint that is called a wheel turns as the wheel; symbols of a PLC called so often hold its motor's turns
+    wheels_own = all(origins[n].topic is not None and "wheel" in english(tokens(origins[n].label)) for n in turning)
     if measured is not None and measured < (_RADII[0] if wheels_own else _WHEEL_SIZES[0]):
         draft.ask(
             "geometry",

@@ -249,15 +249,10 @@ def test_a_preset_whose_wheels_are_not_found_asks_for_their_speeds(tmp_path: Pat
     assert any("where are the speeds of the wheels?" in q and '"wheel.FR.v"' in q for q in draft.questions)
 
 
-def test_small_wheels_of_joints_called_wheels_are_no_motors(tmp_path: Path) -> None:
-    rng = np.random.default_rng(3)
-    v, omega = np.repeat(rng.uniform(-0.1, 0.2, 30), 40), np.repeat(rng.uniform(-0.8, 0.8, 30), 40)
-    columns: dict[str, Any] = {"time": np.arange(1200) * 0.05, "cmd_speed [m/s]": v, "cmd_yaw_rate [rad/s]": omega}
-    for name, y in (("left", 0.08), ("right", -0.08)):
-        columns[f"wheel_{name}_speed [rad/s]"] = (v - y * omega) / 0.033
-    pd.DataFrame(columns).to_csv(tmp_path / "run.csv", index=False)
-    draft = read_back(draft_machine(read_everything([tmp_path / "run.csv"])), tmp_path)
-    assert draft.machine.wheel_radius == pytest.approx(0.033, rel=0.02)
+def test_small_wheels_of_joints_called_wheels_are_no_motors(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("tests.ros_robots.RADIUS", 0.033)
+    draft = drafted(tmp_path, Robot())
+    assert draft.machine.wheel_radius == pytest.approx(0.033, rel=0.03)
     assert {s.at for s in draft.machine.signals.values()} == {"wheel"}
 
 
