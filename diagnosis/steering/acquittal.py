@@ -37,7 +37,9 @@ _LEAST = {Side.SENSOR: 0.012, Side.ACTUATOR: 0.02}  # rad and of full opening: l
 
 
 def scatter_of(blocks: SteeringBlocks, plant: SteeringPlant) -> float | None:
-    """By how much motions scatter about what the plant says of them, as a share, where it fits best; None where there are few.
+    """By how much motions scatter about what the plant says of them, as a share, where it fits best; infinite where it explains none.
+
+    None where there are few motions.
 
     Parameters
     ----------
@@ -62,11 +64,12 @@ def scatter_of(blocks: SteeringBlocks, plant: SteeringPlant) -> float | None:
         number = count[first + end] - count[first]
         return np.where(number > 0, (total[first + end] - total[first]) / np.maximum(number, 1), np.nan)
 
+    did = mean(start + n - end) - mean(start)
     with np.errstate(divide="ignore", invalid="ignore"):
-        share = (mean(start + n - end) - mean(start)) / should
+        share = did / should
     share = np.sort(share[(np.abs(should) > _MOVED) & (np.abs(share - 1.0) < _NEAR)])
     if share.size < _FEW:
-        return None
+        return float(np.inf) if np.count_nonzero(np.abs(did) > _MOVED) >= _FEW else None
     half = share.size // 2
     narrowest = int(np.argmin(share[half:] - share[: share.size - half]))
     usual = float(share[narrowest : narrowest + half + 1].mean())
