@@ -15,7 +15,9 @@ from diagnosis.results.vocabulary import Kind
 from replay.faults import Side
 
 FLOOR_RAD, OPENING = 0.06, 0.03  # deviations are shares of at least this angle and opening
-_STILL_S, _STILL, ANSWERED = 1.0, 0.015, 0.06  # s, rad/s, and of full opening
+_STILL_S, _STILL, _ANSWERED = 1.0, 0.015, 0.06  # s, rad/s, and of full opening
+_OVERLAP, _ALIKE = 0.13, 1.4  # of full opening: healthy valves open by then; times what another axle needs
+_END, _REACHED = 0.97, 0.5  # of the largest angle: an end stop, where that is as much of the machine's
 _RATE_S = 8.0
 _STEERED = 0.01  # of full opening beyond the dead band: below it, an axle is not steered
 _LEAST_S = 0.5  # of a window, in which it is steered
@@ -35,6 +37,7 @@ def axle_checks(cells: Cells, clear_at: float) -> Iterator[Checked]:
     rate = rate_of(angle, cells.dt)
     rates = rates_of(cells, rate, used)
     place = np.minimum(np.arange(cells.frame.starts.size), len(rates.off) - 1)
+    limit = answered(cells)
     for j, axle in enumerate(cells.machine.axles):
         about = (Kind.STEER, axle)
         if not np.isfinite(angle[:, j]).any():
@@ -46,7 +49,7 @@ def axle_checks(cells: Cells, clear_at: float) -> Iterator[Checked]:
             off = compared(cells, opening[:, j], command[:, j], OPENING).off
             yield worst(cells, (*about, Side.ACTUATOR, Check.SECOND_MEASUREMENT), off, VALVE * clear_at)
         if np.isfinite(command[:, j]).any():
-            yield _still(cells, axle, rate[:, j], command[:, j])
+            yield _still(cells, j, limit)
             twice = bool(np.isfinite(second[:, j]).any() and np.isfinite(opening[:, j]).any())
             brief, long = RATE[twice]
             yield worst(cells, (*about, either, Check.RATE), np.abs(rates.off[place, j]), brief * share)
@@ -58,14 +61,21 @@ def rate_of(angle: Array, dt: float) -> Array:
     return np.gradient(angle, dt, axis=0) if len(angle) > 1 else np.full(angle.shape, np.nan)
 
 
-def _still(cells: Cells, axle: str, rate: Array, command: Array) -> Checked:
-    """Largest mean command while the axle stands still for a second."""
+def answered(cells: Cells) -> float:
+    """Opening from which on an axle must move [1]: more where none does before, for valves overlap."""
+    need = [largest for j in range(len(cells.machine.axles)) if np.isfinite(largest := _longest_still(cells, j)[0])]
+    return min(max(_ANSWERED, _ALIKE * min(need)), _OVERLAP) if len(need) > 1 else _ANSWERED
+
+
+def _still(cells: Cells, j: int, limit: float) -> Checked:
+    """Largest mean command while an axle stands still for a second."""
+    axle = cells.machine.axles[j]
     part = (Kind.STEER, axle, Side.SENSOR_OR_ACTUATOR, Check.STILL)
-    largest, start = _commanded_still(rate, command, cells)
+    largest, start = _longest_still(cells, j)
     stop = start + _STILL_S
     if any(start < b and stop > a for a, b in cells.stated.get(axle, ())):
-        return Checked(*part, 0.0, ANSWERED)
-    return Checked(*part, largest if np.isfinite(largest) else None, ANSWERED, start, stop)
+        return Checked(*part, 0.0, limit)
+    return Checked(*part, largest if np.isfinite(largest) else None, limit, start, stop)
 
 
 def still_frame(cells: Cells) -> Frame:
@@ -73,20 +83,24 @@ def still_frame(cells: Cells) -> Frame:
     return Frame(cells.size, max(1, round(_STILL_S / cells.dt)), max(1, round(0.3 / cells.dt)))
 
 
-def _commanded_still(rate: Array, command: Array, cells: Cells) -> tuple[float, float]:
+def _longest_still(cells: Cells, j: int) -> tuple[float, float]:
     """Largest mean command while an axle stands still for a second [1], NaN where nothing is known, and when that begins [s]."""
-    frame = still_frame(cells)
-    values = commanded_still(rate, command, frame)
+    values = commanded_still(cells, j)
     if not np.isfinite(values).any():
         return np.nan, 0.0
     k = int(np.nanargmax(values))
-    return float(values[k]), float(frame.starts[k] * cells.dt)
+    return float(values[k]), float(still_frame(cells).starts[k] * cells.dt)
 
 
-def commanded_still(rate: Array, command: Array, frame: Frame) -> Array:
-    """Mean command of each window [1], 0 where the axle moves, NaN where nothing is known; from rates [rad/s] and commands by cells."""
-    mean = np.abs(frame.mean(command))
-    return np.where(np.isfinite(mean), np.where(frame.rms(rate) < _STILL, mean, 0.0), np.nan)
+def commanded_still(cells: Cells, j: int) -> Array:
+    """Mean command of each window of `still_frame` [1], 0 where the axle moves or is at its end stop, NaN where nothing is known."""
+    angle, command, opening = (cells.axles(leaf)[:, j] for leaf in ("phi", "u", "u_applied"))
+    command, frame = np.where(np.isfinite(command), command, opening), still_frame(cells)
+    mean, at = frame.mean(command), frame.mean(angle)
+    reached = float(np.max(np.nan_to_num(np.abs(angle)), initial=0.0))
+    stopped = (np.abs(at) >= _END * reached) & (at * mean > 0.0) & (reached >= _REACHED * cells.machine.max_steer)
+    rests = (frame.rms(rate_of(angle[:, np.newaxis], cells.dt)[:, 0]) < _STILL) & ~stopped
+    return np.asarray(np.where(np.isfinite(mean), np.where(rests, np.abs(mean), 0.0), np.nan))
 
 
 class Rates(NamedTuple):
@@ -115,7 +129,7 @@ class Rates(NamedTuple):
 
 def rates_of(cells: Cells, rate: Array, opening: Array) -> Rates:
     """Steering rates per opening beyond what of it moves nothing; arrays (cells, axles)."""
-    dead = np.array([min(_commanded_still(r, o, cells)[0], _WIDEST) for r, o in zip(rate.T, opening.T, strict=True)])
+    dead = np.array([min(_longest_still(cells, j)[0], _WIDEST) for j in range(rate.shape[1])])
     frame = Frame(cells.size, max(1, round(_RATE_S / cells.dt)), cells.frame.hop)
     beyond = np.maximum(np.abs(opening) - np.nan_to_num(dead), 0.0)
     steered = np.isfinite(rate) & (np.nan_to_num(beyond) > _STEERED)

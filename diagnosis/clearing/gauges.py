@@ -158,7 +158,7 @@ def _axles(cells: Cells) -> Iterator[Gauges]:
     angle, second, command, opening = (cells.axles(leaf) for leaf in ("phi", "phi_true", "u", "u_applied"))
     clear_at, frame = cells.machine.limits.clear_at, axles.still_frame(cells)
     used, share = np.where(np.isfinite(opening), opening, command), -np.log1p(-clear_at)
-    rates = axles.rates_of(cells, axles.rate_of(angle, cells.dt), used)
+    rates, limit = axles.rates_of(cells, axles.rate_of(angle, cells.dt), used), axles.answered(cells)
     path = yaw.off_straight(cells)
     straight = None if path is None else Straight(cells.frame, path, yaw.OFF / yaw.ANSWERED)
     turned = (
@@ -188,7 +188,7 @@ def _axles(cells: Cells) -> Iterator[Gauges]:
             if np.isfinite(rates.whole[j]) and np.isfinite(others).any():
                 ahead = float(rates.whole[j] - np.nanmedian(others))
                 lasting = _lasting(long + ahead, long - ahead)
-        still = Still(frame, np.abs(frame.mean(u)) >= axles.ANSWERED) if _known(u) else None
+        still = Still(frame, np.abs(frame.mean(u)) >= limit) if _known(u) else None
         second_one = _reference(cells, name, (phi, x, axles.FLOOR_RAD), clear_at) if measured else None
         about = (Kind.STEER, name)
         yield Gauges(

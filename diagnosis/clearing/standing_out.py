@@ -132,11 +132,8 @@ _UNTOLD = (
 
 def _axle(check: Checked, cells: Cells) -> Finding:
     """The fault of an axle that stands still while it is commanded."""
-    angle, command = cells.axles("phi"), cells.axles("u")
-    j = cells.machine.axles.index(check.component)
-    frame = axles.still_frame(cells)
-    still = axles.commanded_still(axles.rate_of(angle, cells.dt)[:, j], command[:, j], frame)
-    start, stop, _, _ = _where(_Shown(frame, still), cells)
+    shown = _Shown(axles.still_frame(cells), axles.commanded_still(cells, cells.machine.axles.index(check.component)))
+    start, stop, _, _ = _where(shown, cells)
     assert check.worst is not None
     text = (
         f"The {check.component} axle stands still while its {{valve}} is commanded to {100 * check.worst:.0f}{{percent}}; a healthy one "
