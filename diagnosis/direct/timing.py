@@ -24,6 +24,7 @@ _LEAST_SHOWN = 0.02  # quantile of what a channel shows beside 0
 _ALIKE, _HOLDS = 1.5, 20  # speeds that are alike; holds that make a habit
 _LONG_HOLDS, _BEYOND_HOLDS = 0.98, 2.0  # quantile of holds that is long; times as long as that is no habit
 _SETTLING_LAGS, _OVERSHOOT, _NOISES = 6.0, 0.3, 3.0  # of a valve of higher order; share of its move; times the noise
+_AT_REST = 0.02  # of the largest plausible speed
 _FIRST_EDGE_S = 0.02  # of driving at the largest plausible speed: as far may be from edge to edge
 _FLIPS = 25  # samples in a row on one side of a command that switches to and fro between samples
 
@@ -142,6 +143,8 @@ def _before_first_edge(found: IdentifiedPair, run: Run) -> bool:
     if not np.isfinite(pair.y[run.start : run.stop]).all() or np.any(pair.y[run.start : run.stop] != 0.0):
         return False
     noise = 3.0 * found.texture.reference_white
+    if min(x[0], x[-1]) > max(noise, _AT_REST * pair.span):
+        return False
     return float(np.sum(np.where(x > noise, x, 0.0))) * pair.dt <= _FIRST_EDGE_S * pair.span
 
 

@@ -317,7 +317,7 @@ def test_ended_at_any_moment_it_goes_on_where_it_was(
             time.sleep(draw.uniform(0.0, 0.2))
             os.kill(process.pid, asked)
             _, errors = process.communicate()
-        if asked is not signal.SIGKILL:
+        if asked is not signal.SIGKILL and process.returncode not in (1, 3):  # which had ended before the signal
             assert process.returncode == 130
             assert errors.splitlines() == [
                 "note: finished missions are kept; run the same command again to continue",
