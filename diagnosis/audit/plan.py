@@ -149,11 +149,7 @@ def merged_machines(missions: Iterable[MissionSource], options: AuditOptions) ->
 
 def known_hashes(planned: Planned, store: Store) -> tuple[str, ...]:
     """SHA-256 of each file of a mission, as far as they were hashed before and have not changed; else none."""
-    return hashes_of(planned.mission, store)
-
-
-def hashes_of(mission: MissionSource, store: Store) -> tuple[str, ...]:
-    """SHA-256 of each file of a mission, as far as they were hashed before and have not changed; else none."""
+    mission = planned.mission
     files = zip(mission.files, sizes_of(mission), mission.stamps, strict=True)
     found = [store.known_hash(*file) for file in files]
     return tuple(h for h in found if h) if all(found) else ()

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from diagnosis.audit.copies import with_originals_machines, without_copies
+from diagnosis.audit.copies import without_copies
 from diagnosis.audit.discovery.discover import Discovery
 from diagnosis.audit.endings import Ending, endings, write_failures
 from diagnosis.audit.engines import Engine
@@ -57,11 +57,12 @@ class Audited:
 def overview(discovery: Discovery, options: AuditOptions) -> list[tuple[Planned, str]]:
     """Each mission with its state: that of its result, or ``to do``; nothing is written."""
     path = options.output / FILE_NAME
+    planned = plan(discovery.missions, options)
     if not path.is_file():
-        return [(one, "to do") for one in plan(discovery.missions, options)]
+        return [(one, "to do") for one in planned]
     out: list[tuple[Planned, str]] = []
     with Store.open(path, read_only=True) as store:
-        for one in plan(with_originals_machines(discovery.missions, store, read=False), options):
+        for one in planned:
             result = stored_result(one, store) if options.resume else None
             out.append((one, result.state if result is not None and is_done(result, options) else "to do"))
     return out
@@ -132,7 +133,7 @@ def _begin(
     taken = ingest(store)
     if taken.attempts or taken.links or taken.problems:
         emit("ingested", {"attempts": taken.attempts, "links": taken.links, "problems": list(taken.problems)})
-    missions = with_originals_machines(store.adopt(discovery.missions, discovery.roots), store)
+    missions = store.adopt(discovery.missions, discovery.roots)
     planned = plan(missions, options)
     done, rest = list[Planned](), list[Planned]()
     emit("start", {"missions": len(planned), "bytes": sum(m.bytes for m in missions)})

@@ -65,7 +65,9 @@ def test_channels_of_a_robot_without_a_machine_file_are_those_of_its_own_wheels(
     assert "steer" not in out
     assert "the wheels are those that the log names" in out
     assert run(["diagnose", str(tmp_path / "two.mcap"), "-o", str(tmp_path / "report")]) == 3
-    assert "`mfhca config init --log LOG -o machine.toml` writes a machine file" in " ".join(capsys.readouterr().err.split())
+    assert "`mfhca config init --log LOG -o machine.toml` writes a machine file" in " ".join(
+        capsys.readouterr().err.split()
+    )
 
 
 @pytest.mark.parametrize("width", ["80", "120"])

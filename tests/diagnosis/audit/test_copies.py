@@ -6,11 +6,8 @@ from pathlib import Path
 import fsspec
 import pytest
 
-from diagnosis.audit.copies import with_originals_machines
 from diagnosis.audit.discovery.discover import discover
-from diagnosis.audit.discovery.identity import fallback_id
-from diagnosis.audit.session import overview
-from diagnosis.audit.store.store import FILE_NAME, Store
+from diagnosis.audit.store.store import Store
 from replay import mission as reading
 from tests.diagnosis.audit.samples import asked_for, run
 
@@ -35,30 +32,6 @@ def test_each_content_is_diagnosed_once(tmp_path: Path) -> None:
     write(logs / "d" / "m.mcap", "fine two")
     _, events = run(discover([str(logs)]), asked)
     assert counted(events) == {"skipped": ["a__m", "b__m", "c__m", "d__m"]}
-
-
-def test_copies_in_other_folders_belong_to_the_machine_with_the_most_logs(tmp_path: Path) -> None:
-    logs, asked = tmp_path / "logs", asked_for(tmp_path / "out")
-    for day in ("2026-03-01", "2026-03-02"):
-        write(logs / "AX" / day / "m.mcap", f"fine {day}")
-    write(logs / "BX" / "m.mcap", "fine 2026-04-01")
-    write(logs / "usb" / "old.mcap", "fine 2026-03-02")
-    write(logs / "usb" / "new.mcap", "fine 2026-05-01")  # of the same size, and no copy
-    (logs / "AX" / "machine.toml").write_text("[geometry]\nmax_speed = 0.5\n", encoding="utf-8")
-    for _ in range(2):
-        ends, events = run(discover([str(logs)]), asked)
-        assert ends["usb__old"].report == ends["AX__2026-03-02__m"].report
-    with Store.open(asked.output / FILE_NAME, read_only=True) as store:
-        found = with_originals_machines(discover([str(logs)]).missions, store, read=False)
-    assert {m.name: fallback_id(m) for m in found} == {
-        "AX__2026-03-01__m": "AX",
-        "AX__2026-03-02__m": "AX",
-        "BX__m": "BX",
-        "usb__new": "usb",
-        "usb__old": "AX",
-    }
-    assert counted(events) == {"skipped": sorted(ends)}
-    assert {state for _, state in overview(discover([str(logs)]), asked)} == {"ok"}
 
 
 def test_a_copy_whose_originals_report_was_replaced_gets_its_own(tmp_path: Path) -> None:
