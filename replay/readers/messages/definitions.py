@@ -15,7 +15,7 @@ from replay.readers.messages.idl_cost import MAX_MILLISECONDS, milliseconds
 Fields: TypeAlias = tuple[tuple[str, Any], ...]
 
 MAX_DEFINITION = 1 << 20
-MAX_LINES = 20_000
+MAX_LINES = 5_000  # some 0.7 s of the parser; the longest of the ROS distributions have some hundreds
 MAX_DEPTH = 32
 MAX_ARRAY = 1 << 28
 TIME = "builtin_interfaces/msg/Time"
@@ -129,10 +129,8 @@ def _parse(root: str, encoding: str, text: str) -> dict[str, Fields]:
     if len(text) > MAX_DEFINITION:
         raise DefinitionError(f"its definition has {len(text)} characters; at most {MAX_DEFINITION} are read")
     idl = encoding in ("ros2idl", "omgidl")
-    if not idl:  # the parser takes as long for an empty line or a comment as for a field
-        text = _EMPTY.sub("\n", f"\n{text}")
-        if text.count("\n") > MAX_LINES:
-            raise DefinitionError(f"its definition has {text.count(chr(10))} lines; at most {MAX_LINES} are read")
+    if not idl:
+        text = _bounded(text)
     if idl and milliseconds(text) > MAX_MILLISECONDS:
         raise DefinitionError(
             "its definition holds too many expressions, or brackets within brackets, to be parsed in time"
@@ -142,6 +140,34 @@ def _parse(root: str, encoding: str, text: str) -> dict[str, Fields]:
     except Exception as error:  # the parser raises many kinds on hostile text, RecursionError among them
         raise DefinitionError(f"its definition cannot be parsed ({type(error).__name__})") from error
     return {name: tuple(parts[1]) for name, parts in parsed.items()}
+
+
+@lru_cache(maxsize=256)
+def checksum(text: str, root: str) -> str:
+    """MD5 sum of a ROS 1 definition, as publishers state it; empty where it is none that can be read in time."""
+    try:
+        store = get_typestore(Stores.EMPTY)
+        store.register(get_types_from_msg(_bounded(text), root))
+        digest: str = store.generate_msgdef(root, ros_version=1)[1]
+    except Exception:  # a damaged definition fails in any way
+        return ""
+    return digest
+
+
+def _bounded(text: str) -> str:
+    """A definition without empty lines and comments, for which the parser takes as long as for fields.
+
+    Raises
+    ------
+    DefinitionError
+        Where it has more lines than are read.
+    """
+    if len(text) > MAX_DEFINITION:
+        raise DefinitionError(f"its definition has {len(text)} characters; at most {MAX_DEFINITION} are read")
+    text = _EMPTY.sub("\n", f"\n{text}")
+    if text.count("\n") > MAX_LINES:
+        raise DefinitionError(f"its definition has {text.count(chr(10))} lines; at most {MAX_LINES} are read")
+    return text
 
 
 def _parse_idl(text: str) -> dict[str, Any]:

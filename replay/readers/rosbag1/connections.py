@@ -6,9 +6,9 @@ import struct
 
 import numpy as np
 from numpy.typing import NDArray
-from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from replay.readers.messages.connection import Connection
+from replay.readers.messages.definitions import checksum
 from replay.readers.rosbag1.bag import Bag
 from replay.readers.rosbag1.records_kernel import BagRecords
 
@@ -58,10 +58,5 @@ def take_connection(bag: Bag, data: NDArray[np.uint8], records: BagRecords, i: i
 
 def _confirmed(raw: bytes, connection: Connection) -> bool:
     """Whether the checksum in a connection record is that of its definition."""
-    try:
-        store = get_typestore(Stores.EMPTY)
-        store.register(get_types_from_msg(connection.definition, connection.type_name))
-        digest: str = store.generate_msgdef(connection.type_name, ros_version=1)[1]
-    except Exception:  # a damaged definition fails in any way
-        return False
-    return digest.encode() in raw
+    digest = checksum(connection.definition, connection.type_name)
+    return bool(digest) and digest.encode() in raw

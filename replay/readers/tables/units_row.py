@@ -45,10 +45,12 @@ def units_of_row(line: str, separator: str, names: Sequence[str]) -> tuple[str, 
         or any(_number(c) or len(c) > _LONGEST for c in written)
     ):
         return None
-    return tuple(
+    told = [
         f"{name} [{cell}]" if cell and cell != "-" and unit_of(name) is None else name
         for name, cell in zip(names, cells, strict=True)
-    )
+    ]
+    # a column keeps its name where another one is called so with its unit
+    return tuple(name if told.count(new) > 1 else new for name, new in zip(names, told, strict=True))
 
 
 def _number(cell: str) -> bool:

@@ -6,7 +6,7 @@ import time
 
 import pytest
 
-from replay.readers.messages.definitions import MAX_LINES, DefinitionError, resolve
+from replay.readers.messages.definitions import MAX_LINES, DefinitionError, checksum, resolve
 
 LINE = "=" * 80
 
@@ -29,3 +29,9 @@ def test_definitions_of_too_many_lines_are_refused_before_they_are_parsed() -> N
     with pytest.raises(DefinitionError, match=f"at most {MAX_LINES} are read"):
         fields("float64 x\n" * 60_000)
     assert time.process_time() - start < 2.0
+
+
+def test_checksums_of_ros1_definitions_are_those_of_their_publishers() -> None:
+    assert checksum("# a comment\n\nfloat64 data\n", "std_msgs/msg/Float64") == "fdb28210bfa9d7c91146260178d9a584"
+    assert checksum("float64 data data\n???", "std_msgs/msg/Float64") == ""
+    assert checksum("\n".join(f"float64 x{k}" for k in range(MAX_LINES + 1)), "a/msg/B") == ""  # not parsed at all

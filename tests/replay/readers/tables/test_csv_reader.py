@@ -495,3 +495,7 @@ def test_a_word_in_one_cell_is_no_second_header(target: Path) -> None:
     target.write_text("t,speed,pressure\n" + "".join(f"{i},{'speed' if i == 7 else i},{i}\n" for i in range(50)))
     (said,) = read(target).summary.damage
     assert "1 cells of 'speed' are not numbers" in said
+
+
+def test_units_give_no_two_columns_one_name() -> None:
+    assert units_of_row("s,,rpm", ",", ["time", "v [rpm]", "v"]) == ("time [s]", "v [rpm]", "v")
