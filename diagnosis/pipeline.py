@@ -184,7 +184,9 @@ def _with_what_stands_out(judged: Judged) -> Judged:
     more = what_stands_out(judged.checks, judged.cells, found.words)
     if not more:
         return judged
-    return replace(judged, found=replace(found, assessments=with_findings(found.assessments, more)))
+    told = replace(found, assessments=with_findings(found.assessments, more))
+    open_ = tuple(c for c in judged.checks if c.component in more and not c.passed)
+    return replace(judged, found=told, named_by=open_)
 
 
 def _require_something(assessments: Mapping[tuple[str, str], Assessment], mission: Mission, machine: Machine) -> None:

@@ -53,6 +53,8 @@ class Judged:
         The replayed loop.
     found : ComponentResult
         Assessments of all parts.
+    named_by : tuple[Checked, ...]
+        Checks that alone name a fault of `found`: which part of it fails is not known, so that they stay open.
     """
 
     mission: Mission
@@ -60,6 +62,7 @@ class Judged:
     machine: Machine
     replay: Replay
     found: ComponentResult
+    named_by: tuple[Checked, ...] = ()
 
     @cached_property
     def intervals(self) -> tuple[FaultInterval, ...]:
@@ -75,7 +78,8 @@ class Judged:
     @cached_property
     def checks(self) -> tuple[Checked, ...]:
         """What stands behind an all-clear."""
-        return checks_of(self.cells, self.found.words)
+        told = {(c.component, c.check): c for c in self.named_by}
+        return tuple(told.get((c.component, c.check), c) for c in checks_of(self.cells, self.found.words))
 
     @property
     def damage(self) -> list[str]:

@@ -40,6 +40,15 @@ def test_no_machine_is_cleared_with_a_fault(all_clear: ModuleType, kind: str) ->
     assert [(o.tier, o.words) for o in found if o.outcome == "cleared"] == []
 
 
+def test_a_wheel_that_stands_out_is_named_and_stays_open(all_clear: ModuleType) -> None:
+    """Its checks alone name it: which part fails is not known, and another wheel's faults may look like it."""
+    names = [t.name for t in all_clear.troubles(75.0)]
+    kind = names.index("FR sensor reads 1.35, first third")
+    (found,) = all_clear.run(all_clear.Task("default", kind, 326, 75.0, ("base",)))
+    assert (found.outcome, found.status) == ("named", "watch")
+    assert "FR excess" in found.words
+
+
 def test_healthy_machines_are_not_stopped_and_mostly_cleared(all_clear: ModuleType) -> None:
     found = [
         o for seed in (21, 22) for o in all_clear.run(all_clear.Task("default", None, seed, 60.0, all_clear.TIERS))
