@@ -85,7 +85,7 @@ def read_speeds(path: Path, wheels: Sequence[str]) -> Speeds | None:
         names = pq.read_schema(path).names
         wanted = [n for n in names if n == "t" or n.endswith(".v_ref")]
         table = pq.read_table(path, columns=wanted)
-    except (OSError, pa.ArrowException):
+    except (OSError, ValueError, pa.ArrowException):  # ValueError: names that are no text
         return None
     columns = {name: table.column(name).to_numpy() for name in table.column_names}
     return speeds_of({name: v for name, v in columns.items() if v.dtype.kind in "fiu"}, wheels)

@@ -138,7 +138,8 @@ def separator_of(lines: list[str]) -> str | None:
 
 
 def _is_number(cell: str) -> bool:
-    return re.fullmatch(r"\s*\"?[+-]?(\d+[.,]?\d*|[.,]\d+)([eE][+-]?\d+)?\"?\s*", cell) is not None
+    # possessive: a cell of very many digits is looked at once
+    return re.fullmatch(r"\s*+\"?[+-]?(\d++([.,]\d*+)?|[.,]\d++)([eE][+-]?\d++)?\"?\s*+", cell) is not None
 
 
 def open_text(path: Path, options: SourceOptions, report: Report) -> TextTable:

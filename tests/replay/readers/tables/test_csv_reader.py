@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import gzip
+import time
 from collections.abc import Callable
 from datetime import UTC, datetime, timedelta, timezone
 from pathlib import Path
@@ -19,6 +20,7 @@ from replay.readers.registry import open_log, read_log, summarise_log
 from replay.readers.tables import text_file, text_table
 from replay.readers.tables.iso_kernel import iso_ns
 from replay.readers.tables.row_kernel import MISSING
+from replay.readers.tables.text_table import separator_of
 from replay.readers.tables.units_row import units_of_row
 
 
@@ -499,3 +501,10 @@ def test_a_word_in_one_cell_is_no_second_header(target: Path) -> None:
 
 def test_units_give_no_two_columns_one_name() -> None:
     assert units_of_row("s,,rpm", ",", ["time", "v [rpm]", "v"]) == ("time [s]", "v [rpm]", "v")
+
+
+def test_a_cell_of_very_many_digits_costs_no_time(target: Path) -> None:
+    target.write_text("t,a\n0," + "1" * 200_000 + "x\n" + "1," + "1" * 200_000 + "x\n", encoding="utf-8")
+    start = time.process_time()
+    separator_of(target.read_text(encoding="utf-8").splitlines())
+    assert time.process_time() - start < 2.0
