@@ -219,7 +219,14 @@ def _names(component: str, side: str, part: Part) -> bool:
 
 
 def tasks_of(
-    seeds: str, machines: Sequence[str], duration: float, every: int, healthy: int, first: int, named: str | None
+    seeds: str,
+    machines: Sequence[str],
+    duration: float,
+    every: int,
+    healthy: int,
+    first: int,
+    named: str | None,
+    offset: int = 0,
 ) -> list[Task]:
     """All missions: one of every so many kinds, and healthy ones, of every machine."""
     start, kinds = (
@@ -228,7 +235,7 @@ def tasks_of(
     )
     out = []
     for m, machine in enumerate(machines):
-        faulty = [Task(machine, k, start + k, duration, TIERS) for k in kinds if k % every == m % every]
+        faulty = [Task(machine, k, start + k, duration, TIERS) for k in kinds if k % every == (m + offset) % every]
         sound = [Task(machine, None, start + 500 + k, duration, TIERS) for k in range(healthy)]
         out += [*faulty, *sound]
     return out
@@ -272,6 +279,7 @@ def main() -> None:
     )
     parser.add_argument("--duration", type=float, default=75.0, help="length of a mission [s]")
     parser.add_argument("--every", type=int, default=1, help="one of so many kinds of trouble")
+    parser.add_argument("--offset", type=int, default=0, help="first kind, with --every")
     parser.add_argument("--healthy", type=int, default=40, help="healthy missions of each machine")
     parser.add_argument("--kinds", default=None, help="only kinds whose name has this text")
     parser.add_argument("--tiers", nargs="+", choices=TIERS, default=TIERS)
@@ -280,7 +288,9 @@ def main() -> None:
     asked = parser.parse_args()
     structure = next(n for n, s in STRUCTURES.items() if s.kind == asked.seeds)
     machines = asked.machine or [DEFAULT, structure]
-    tasks = tasks_of(asked.seeds, machines, asked.duration, asked.every, asked.healthy, asked.first, asked.kinds)
+    tasks = tasks_of(
+        asked.seeds, machines, asked.duration, asked.every, asked.healthy, asked.first, asked.kinds, asked.offset
+    )
     tasks = [replace(task, tiers=tuple(asked.tiers)) for task in tasks]
     outcomes = []
     with asked.json.open("w") if asked.json else nullcontext() as file:
