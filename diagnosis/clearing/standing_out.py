@@ -90,7 +90,7 @@ def _alone(checks: Sequence[Checked], cells: Cells) -> Checked | None:
     """The check of the one wheel that deviates, by far; None where there is no such wheel, or another part explains it."""
     if any(c.check is Check.STILL and _times(c) >= _DRAGS for c in checks):
         return None
-    if any(cells.stated.get(wheel) for wheel in cells.machine.wheels):
+    if any(cells.stated.get(part) for part in (*cells.machine.wheels, *cells.machine.axles)):
         return None
     worst: dict[str, Checked] = {}
     for c in checks:

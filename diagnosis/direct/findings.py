@@ -13,7 +13,7 @@ from diagnosis.direct.isolation import Isolated, estimate_run, isolate
 from diagnosis.direct.onset import refine
 from diagnosis.direct.sentences import alike_sentence, sentences
 from diagnosis.direct.timing import timing_explains
-from diagnosis.estimation.fault_models import INEFFICIENT, STUCK, VARYING_ROWS
+from diagnosis.estimation.fault_models import HEALTHY, INEFFICIENT, STUCK, VARYING_ROWS
 from diagnosis.estimation.segments import Run, with_leads
 from diagnosis.estimation.viterbi import ModePath
 from diagnosis.results.assessment import Finding
@@ -99,6 +99,8 @@ def finding_of(run: Run, found: IdentifiedPair, limits: Limits) -> Finding | Non
     if mode is None:
         return None
     pair, run, p = found.pair, isolated.run, isolated.p
+    if p[HEALTHY] > p[run.row]:
+        return None
     epsilon, sat, _ = isolated.estimate
     if epsilon is not None and mode is not FaultMode.OUTSIDE_TABLE:
         epsilon = epsilon.as_share()
@@ -146,12 +148,14 @@ def _mode_of(isolated: Isolated, found: IdentifiedPair, limits: Limits) -> Fault
     if mode.varying:
         least = max(2.5 * found.model.noise, 1.5 * noise, limits.min_sat / 2)
         return None if seen.deviation < least else mode
+    # a reference that hardly moves is as constant
+    away = np.count_nonzero(np.abs(seen.y - seen.x)[seen.use] > _CLEAR * noise) * found.pair.dt
     if found.pair.side is Side.ACTUATOR:
-        # the command hardly moved: a noisy reading of it looks constant too
-        away = np.count_nonzero(np.abs(seen.y - seen.x)[seen.use] > _CLEAR * noise) * found.pair.dt
         relation = found.relation
         returns = _LEFT_S + 2.0 * (relation.lag + max(0.0, relation.delay * found.pair.dt))
         return None if seen.deviation < _CLEAR * noise or away < returns else mode
+    if np.isfinite(seen.y).any() and away < min(_LEFT_S, 0.5 * isolated.run.size * found.pair.dt):
+        return None
     known = seen.x[seen.use]
     at_rest = known.size and max(seen.deviation, float(np.max(np.abs(known)))) < limits.min_sat / 2
     return None if at_rest else mode  # it repeats what it had, which is true

@@ -36,6 +36,8 @@ Estimate = tuple[Epsilon | None, Sat | None, float]
 # From tuning missions, by `python tests/benchmarks/calibrate_direct.py`: share of findings that are not what they seem, and
 # the length at which half of those in a log too slow for its commands are.
 _LAPSE, _COARSE_S = 0.01, 1.7
+_BURST_S = 0.6  # at which half of the bursts of noise are what a motion leaves out: right were 12 of 48 below 1 s, 8 of 8 up to 3 s
+_WILD, _WILD_S, _WILD_SAMPLES = 10.0, 0.04, 4.0  # times the noise; motion that a wrong time may be off by
 _RESTLESS, _RESTLESS_P = 0.1, 0.8  # share of changing news from which a channel is not stuck, and how probably so
 _OF_PLAY = 0.2  # of its width per rms opening: standard deviation of the gain that a play leaves in simulated valves
 _CLEARLY = 2.0  # times as probable as the path's row, from which on another one is stated
@@ -162,7 +164,12 @@ def isolate(run: Run, found: IdentifiedPair) -> Isolated | None:
         run = replace(run, row=INEFFICIENT)
         estimate = _of_gain(delta, estimate_run(run, found)) or estimate
     gain = float(evidence[run.row] - evidence[HEALTHY])
-    p = _with_lapses(p, run.row, model.side, run.size * found.pair.dt if found.coarse else None)
+    seconds = run.size * found.pair.dt
+    p = _with_lapses(p, run.row, model.side, seconds if found.coarse else None)
+    if run.row in VARYING_ROWS and not _wild(seen, found.pair.dt):
+        burst = seconds**2 / (seconds**2 + _BURST_S**2)
+        p[HEALTHY] += p[run.row] * (1.0 - burst)
+        p[run.row] *= burst
     if run.row in TOTAL_ROWS and seen.zero:
         # stuck at zero, a gain of zero and no signal are one row of the table
         run = replace(run, row=NO_SIGNAL)
@@ -182,6 +189,13 @@ def isolate(run: Run, found: IdentifiedPair) -> Isolated | None:
             return None
         estimate = other
     return Isolated(run, seen, estimate, p, gain)
+
+
+def _wild(seen: RunSamples, dt: float) -> bool:
+    """Whether readings are further off than noise and any timing of the motion put them: spikes, however brief."""
+    x = seen.x[seen.use]
+    slope = float(np.sqrt(np.mean(np.gradient(x) ** 2))) / dt if x.size > 1 else 0.0
+    return seen.deviation > max(_WILD * seen.noise, slope * max(_WILD_S, _WILD_SAMPLES * dt))
 
 
 def _changes(seen: RunSamples) -> float:

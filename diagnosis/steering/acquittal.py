@@ -33,7 +33,10 @@ _SCATTER = 0.0045  # of a motion: machines that move as their model says are bel
 _MOTION_S = 0.05  # to either side
 _BEYOND = 2.5  # times what is usual at such motion
 _MOSTLY = 0.4  # of a finding: its ends may come late
+_TELLING_S = 0.3  # for which a fault would have to show
+_LEFT = 0.5  # of the power between two measurements: what a fault that is believed leaves of it, at most
 _LEAST = {Side.SENSOR: 0.012, Side.ACTUATOR: 0.02}  # rad and of full opening: less is nobody's fault
+_BELIEVED = 0.5  # of these, where axles move as their model says
 
 
 def scatter_of(blocks: SteeringBlocks, plant: SteeringPlant) -> float | None:
@@ -82,7 +85,9 @@ def moves_otherwise(scatters: Sequence[float | None]) -> bool:
     return bool(known) and min(known) > _SCATTER
 
 
-def acquitted(side: Side, found: SideFindings, inputs: AxleInputs, blocks: SteeringBlocks) -> SideFindings:
+def acquitted(
+    side: Side, found: SideFindings, inputs: AxleInputs, blocks: SteeringBlocks, *, believed: bool
+) -> SideFindings:
     """Findings of a side that its own measurements show; the others are left unexplained.
 
     Parameters
@@ -95,36 +100,57 @@ def acquitted(side: Side, found: SideFindings, inputs: AxleInputs, blocks: Steer
         The axle's channels.
     blocks : SteeringBlocks
         The same in blocks.
+    believed : bool
+        Whether the axle moves as its model says, so that the model is believed where nothing is measured twice.
     """
-    apart, moved = _apart(side, inputs, blocks)
-    growth = noise_growth(apart**2, moved, blocks.dt) or NoiseGrowth(0.0, 0.0)
-    limit = np.maximum(_BEYOND**2 * growth.variance(moved), _LEAST[side] ** 2)
+    apart, by, moved = _apart(side, inputs, blocks)
+    spans = [(f.start // blocks.length, -(-f.stop // blocks.length)) for f in found.findings]
+    usual = apart**2
+    for a, b in spans:
+        usual[a:b] = np.nan
+    growth = noise_growth(usual, moved, blocks.dt) or NoiseGrowth(0.0, 0.0)
+    least = _LEAST[side] * (_BELIEVED if believed else 1.0)
+    limit = np.maximum(_BEYOND**2 * growth.variance(moved), least**2)
     kept, open_ = [], list(found.unexplained)
-    for f in found.findings:
-        a, b = f.start // blocks.length, -(-f.stop // blocks.length)
-        if _shown(f, apart[a:b], limit[a:b]):
+    for f, (a, b) in zip(found.findings, spans, strict=True):
+        if _shown(f, apart[a:b], by[a:b], limit[a:b], blocks.dt, believed=believed):
             kept.append(f)
         else:
             open_.append((a, b))
     return SideFindings(tuple(kept), tuple(open_))
 
 
-def _apart(side: Side, inputs: AxleInputs, blocks: SteeringBlocks) -> tuple[Array, Array]:
-    """A channel less its second measurement in each block, NaN where there is none, and how fast it moves there [1/s]."""
+def _apart(side: Side, inputs: AxleInputs, blocks: SteeringBlocks) -> tuple[Array, Array, Array]:
+    """A channel less its second measurement in each block, what it should be, NaN where there is none, and how fast that moves [1/s]."""
     twice = blocks.redundancy
     if side is Side.SENSOR:
-        by = np.where(blocks.count > 0, blocks.mean, np.nan)
-        apart = by - twice.angle if inputs.angle_redundant else np.full(by.size, np.nan)
+        by = twice.angle if inputs.angle_redundant else np.full(blocks.mean.size, np.nan)
+        apart, moves = np.where(blocks.count > 0, blocks.mean, np.nan) - by, blocks.mean
     else:
-        apart, by = twice.opening - twice.command, twice.command
+        by = moves = twice.command
+        apart = twice.opening - by
     reach = max(1, round(_MOTION_S / blocks.dt))
     moved = np.full(by.size, np.nan)
-    moved[reach:-reach] = np.abs(by[2 * reach :] - by[: -2 * reach]) / (2 * reach * blocks.dt)
-    return apart, np.nan_to_num(moved)
+    moved[reach:-reach] = np.abs(moves[2 * reach :] - moves[: -2 * reach]) / (2 * reach * blocks.dt)
+    return apart, by, np.nan_to_num(moved)
 
 
-def _shown(finding: Finding, apart: Array, limit: Array) -> bool:
+def _shown(finding: Finding, apart: Array, by: Array, limit: Array, dt: float, *, believed: bool) -> bool:
+    """Whether most of the blocks in which a fault would show do show it; `believed` where nothing is measured twice."""
     known = np.isfinite(apart)
-    if known.any():
-        return bool(np.mean(apart[known] ** 2 > limit[known]) >= _MOSTLY)
-    return finding.side is Side.SENSOR and finding.mode is FaultMode.NO_SIGNAL
+    if not known.any():
+        return believed or (finding.side is Side.SENSOR and finding.mode is FaultMode.NO_SIGNAL)
+    if finding.mode.varying:
+        return _mostly(apart[known] ** 2 > limit[known])
+    kept = 0.0 if finding.mode.total or finding.epsilon is None else 1.0 - finding.epsilon.value
+    level = finding.sat.mean if finding.sat is not None and finding.mode is FaultMode.STUCK else 0.0
+    should = kept * by + level - by  # what such a fault puts between both
+    telling = known & (should**2 > limit)
+    if np.count_nonzero(telling) < _TELLING_S / dt:
+        return False
+    left = float(np.sum((apart - should)[telling] ** 2))
+    return _mostly(apart[telling] ** 2 > limit[telling]) and left < _LEFT * float(np.sum(apart[telling] ** 2))
+
+
+def _mostly(shown: NDArray[np.bool_]) -> bool:
+    return bool(shown.size) and bool(np.mean(shown) >= _MOSTLY)

@@ -19,6 +19,7 @@ from diagnosis.steering.findings import apart, findings_of
 from diagnosis.steering.identification import identify_plants
 from diagnosis.steering.inputs import AxleInputs, Counts, axle_inputs
 from diagnosis.steering.models import model_of
+from diagnosis.steering.noise_claims import noise_shown
 from diagnosis.steering.path import AxleFilter, allowed_models, most_probable
 from diagnosis.steering.path_refinement import refine_path
 from diagnosis.steering.plant import SteeringPlant
@@ -144,8 +145,8 @@ def _judged_by_model(
         found = weighed(found, blocks.length, inputs.timeline.dt)
     else:
         found = paired(found)
-    if otherwise:
-        found = {side: acquitted(side, found[side], inputs, blocks) for side in _SIDES}
+    found = noise_shown(found, inputs, blocks)
+    found = {side: acquitted(side, found[side], inputs, blocks, believed=not otherwise) for side in _SIDES}
     dead = [(f.start, f.stop) for f in found[Side.SENSOR].findings if f.mode.total]
     masked = [] if inputs.redundant else dead
     columns = evidence_columns(inputs, axle, path, [f for side in _SIDES for f in found[side].findings])

@@ -114,7 +114,7 @@ def weighed(found: Mapping[Side, SideFindings], length: int, dt: float) -> dict[
             mine = (
                 f
                 if f.tier is Tier.SIGNAL
-                else _limited(f, _usually(features_of(spans[side][k], f.mode, same, others)), _SORT)
+                else limited(f, _usually(features_of(spans[side][k], f.mode, same, others)), _SORT)
             )
             if mine.probability >= _LEAST:
                 kept.append(mine)
@@ -133,7 +133,7 @@ def paired(found: Mapping[Side, SideFindings]) -> dict[Side, SideFindings]:
     for side, one in found.items():
         others = [(f.start, f.stop) for who, of in found.items() if who is not side for f in of.findings]
         kept = tuple(
-            _limited(f, _PAIRED, _BESIDE) if not f.mode.total and _shared((f.start, f.stop), others) else f
+            limited(f, _PAIRED, _BESIDE) if not f.mode.total and _shared((f.start, f.stop), others) else f
             for f in one.findings
         )
         out[side] = SideFindings(kept, one.unexplained)
@@ -150,7 +150,7 @@ def _usually(features: NDArray[np.float64]) -> float:
     return float(1.0 / (1.0 + np.exp(-_WEIGHTS[0] - features @ np.array(_WEIGHTS[1:]))))
 
 
-def _limited(finding: Finding, most: float, words: str) -> Finding:
+def limited(finding: Finding, most: float, words: str) -> Finding:
     """A finding that is no more probable than findings of its sort are right; what is missing goes to no fault."""
     if finding.probability <= most:
         return finding

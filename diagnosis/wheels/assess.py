@@ -121,6 +121,7 @@ def _path(
         expected = evidence_of_runs(blocks, model, done, i, either)
     return WheelPath(
         y=data.y[:, i],
+        reference=data.reference[:, i],
         names=data.names[i],
         model=wheel,
         dt=data.dt,

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from diagnosis.estimation.viterbi import first_lasting
 from diagnosis.results.assessment import Finding
+from diagnosis.wheels.alive import lives
 from diagnosis.wheels.blocks import per_sample
 from diagnosis.wheels.isolation import Run, judge
 from diagnosis.wheels.models import TOTAL_SENSOR, WheelFilterModel
@@ -53,6 +54,8 @@ class WheelPath:
     ----------
     y : Array, shape (n,)
         Measured speed [m/s].
+    reference : Array, shape (n,)
+        Commanded speed [m/s]; NaN where there is none.
     names : tuple[str, str]
         Names of speed and opening.
     model : WheelFilterModel
@@ -74,6 +77,7 @@ class WheelPath:
     """
 
     y: Array
+    reference: Array
     names: tuple[str, str]
     model: WheelFilterModel
     dt: float
@@ -128,7 +132,8 @@ def findings_of(path: WheelPath, limits: Limits) -> WheelFindings:
         start, stop = _edges(path, w.segment)
         if stop <= start:
             continue
-        run = Run(start, stop, w.segment.side, w.segment.pooled, w.evidence, w.mean, w.cov, path.others)
+        alive = lives(y[start:stop], path.reference[start:stop], path.model.noise)
+        run = Run(start, stop, w.segment.side, w.segment.pooled, w.evidence, w.mean, w.cov, path.others, alive)
         verdict = judge(run, y[start:stop], path.model, limits, path.names, path.dt)
         if verdict.hidden:
             out.opened[Side.ACTUATOR][start:stop] = True

@@ -2,14 +2,23 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
+
 import numpy as np
 import pytest
 
-from diagnosis.steering.acquittal import moves_otherwise, scatter_of
+from diagnosis.results.assessment import Finding
+from diagnosis.results.result import Epsilon, Sat
+from diagnosis.results.vocabulary import Tier
+from diagnosis.steering.acquittal import acquitted, moves_otherwise, scatter_of
 from diagnosis.steering.blocks import SteeringBlocks, blocks_of, without_growth
+from diagnosis.steering.findings import SideFindings
 from diagnosis.steering.plant import SteeringPlant
-from diagnosis.steering.redundancy import with_second_angle
+from diagnosis.steering.redundancy import with_second_angle, with_valve_opening
 from diagnosis.steering.valve_map import ValveMap
+from replay.faults import FaultMode, Side
 
 DT, SECONDS = 0.01, 60.0
 SIZE = round(SECONDS / DT)
@@ -84,3 +93,63 @@ def test_two_angles_may_be_set_to_zero_apart_no_further_than_healthy_ones(apart:
     u, angle = moved(0.0)
     found = with_second_angle(blocks(u, angle + apart), angle + apart, angle, ALWAYS, DT, 0.001)
     assert np.nanmedian(found.mean - found.redundancy.angle) == pytest.approx(left, abs=1e-3)
+
+
+def finding(side: Side, mode: FaultMode, start: int, stop: int, lost: float = 1.0, level: float | None = None) -> Finding:
+    return Finding(
+        start=start,
+        stop=stop,
+        side=side,
+        mode=mode,
+        probability=0.99,
+        hypotheses=(),
+        epsilon=Epsilon(lost, lost, lost),
+        sat=None if level is None else Sat(level, abs(level), level, level, "of full opening"),
+        evidence=(),
+        tier=Tier.MODEL,
+    )
+
+
+def kept(side: Side, found: Finding, of: SteeringBlocks, *, believed: bool = True) -> bool:
+    inputs: Any = SimpleNamespace(angle_redundant=True)
+    sides = SideFindings((found,), ())
+    return bool(acquitted(side, sides, inputs, of, believed=believed).findings)
+
+
+def valve(opening: Array, command: Array) -> SteeringBlocks:
+    noise = np.random.default_rng(3).normal(0.0, 0.003, SIZE)
+    told, _ = with_valve_opening(blocks(opening, np.cumsum(0.3 * opening) * DT), command, opening + noise, ALWAYS, DT)
+    return told
+
+
+def test_a_valve_whose_opening_follows_is_not_accused() -> None:
+    u, _ = moved(0.0)
+    lost = finding(Side.ACTUATOR, FaultMode.INEFFICIENT, SIZE // 2, SIZE, 0.4)
+    assert not kept(Side.ACTUATOR, lost, valve(u, u))
+    weak = np.where(np.arange(SIZE) < SIZE // 2, u, 0.6 * u)
+    assert kept(Side.ACTUATOR, lost, valve(weak, u))
+
+
+def test_a_loss_shows_where_the_valve_is_used_however_seldom() -> None:
+    at = np.arange(SIZE) * DT
+    u = np.where(at % 10.0 < 1.5, 0.5, 0.0)
+    weak = np.where(at < 30.0, u, 0.5 * u)
+    assert kept(Side.ACTUATOR, finding(Side.ACTUATOR, FaultMode.INEFFICIENT, SIZE // 2, SIZE, 0.5), valve(weak, u))
+
+
+def test_an_opening_that_stays_where_its_command_stays_is_not_stuck() -> None:
+    at = np.arange(SIZE) * DT
+    u = np.where((at > 20.0) & (at < 21.2), -1.0, 0.0)
+    late = np.interp(at - 0.06, at, u)
+    stuck = finding(Side.ACTUATOR, FaultMode.STUCK, 2005, 2124, 1.0, -1.0)
+    assert not kept(Side.ACTUATOR, stuck, valve(late, u))
+    really = np.where(at > 20.0, -1.0, 0.0)
+    assert kept(Side.ACTUATOR, replace(stuck, stop=SIZE), valve(really, u))
+
+
+def test_a_sensor_that_fails_all_through_is_no_habit() -> None:
+    u, angle = moved(0.0)
+    dead = with_second_angle(blocks(u, np.zeros(SIZE)), np.zeros(SIZE), angle, ALWAYS, DT, 0.0015)
+    assert kept(Side.SENSOR, finding(Side.SENSOR, FaultMode.NO_SIGNAL, 0, SIZE), dead)
+    near = with_second_angle(blocks(u, angle + 0.003), angle + 0.003, angle, ALWAYS, DT, 0.0015)
+    assert not kept(Side.SENSOR, finding(Side.SENSOR, FaultMode.INEFFICIENT, 500, 800, 0.3), near)

@@ -41,6 +41,7 @@ def found(*segments: Weighed, y: Array | None = None, healthy: dict[Side, Array]
     whole = Runs(*(np.array([x]) for x in (0, BLOCKS, HEALTHY, 0)))
     path = WheelPath(
         y=speed,
+        reference=np.full(speed.size, np.nan),
         names=("v", "u"),
         model=MODEL,
         dt=DT,

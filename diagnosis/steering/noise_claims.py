@@ -1,0 +1,83 @@
+"""What is called noise by a steering model alone: a sensor's noise shakes its reading, a valve's shows in its opening.
+
+To the filters everything that their plant leaves unexplained for a while looks like noise of one side.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from diagnosis.results.assessment import Finding
+from diagnosis.steering.blocks import SteeringBlocks
+from diagnosis.steering.findings import SideFindings
+from diagnosis.steering.inputs import AxleInputs
+from diagnosis.steering.reliability import limited
+from replay.faults import FaultMode, Side
+
+_SHAKEN = 2.0  # times the usual power of what changes from reading to reading
+_LEAST_USUAL_S = 5.0  # for which a reading must be known without its fault
+_DISTURBED = 0.6  # probability of a valve's noise behind an opening that nobody measured: none of 10 was right on tuning seeds
+_BURST_S = 0.6  # length at which half of the bursts of noise are what a model leaves out of a motion
+_BURST = "Bursts of noise of this length"
+_SORT = "Disturbances of {valve}s whose opening is not logged"
+
+
+def noise_shown(
+    found: Mapping[Side, SideFindings], inputs: AxleInputs, blocks: SteeringBlocks
+) -> dict[Side, SideFindings]:
+    """Findings of both sides; noise of the sensor that does not shake it is left unexplained, that of an unmeasured valve uncertain.
+
+    Parameters
+    ----------
+    found : Mapping[Side, SideFindings]
+        By the model.
+    inputs : AxleInputs
+        The axle's channels.
+    blocks : SteeringBlocks
+        The same in blocks.
+    """
+    out = dict(found)
+    sensor, valve = found[Side.SENSOR], found[Side.ACTUATOR]
+    if not inputs.angle_redundant:
+        usual = _usual_power(sensor, blocks)
+        still = [
+            f
+            for f in sensor.findings
+            if f.mode is FaultMode.NOISY and _power(blocks, *_span(f, blocks)) < _SHAKEN * usual
+        ]
+        kept = tuple(f for f in sensor.findings if f not in still)
+        out[Side.SENSOR] = SideFindings(kept, (*sensor.unexplained, *(_span(f, blocks) for f in still)))
+    if not inputs.valve_redundant:
+        findings = tuple(limited(f, _DISTURBED, _SORT) if f.mode is FaultMode.NOISY else f for f in valve.findings)
+        out[Side.ACTUATOR] = valve._replace(findings=findings)
+    return {side: one._replace(findings=_not_brief(one.findings, inputs.timeline.dt)) for side, one in out.items()}
+
+
+def _not_brief(findings: tuple[Finding, ...], dt: float) -> tuple[Finding, ...]:
+    """Findings; brief noise is no more probable than it is elsewhere."""
+    out = []
+    for f in findings:
+        seconds = (f.stop - f.start) * dt
+        brief = seconds**2 / (seconds**2 + _BURST_S**2)
+        out.append(limited(f, f.probability * brief, _BURST) if f.mode is FaultMode.NOISY else f)
+    return tuple(out)
+
+
+def _span(finding: Finding, blocks: SteeringBlocks) -> tuple[int, int]:
+    return finding.start // blocks.length, -(-finding.stop // blocks.length)
+
+
+def _power(blocks: SteeringBlocks, a: int, b: int) -> float:
+    """Mean power of what changes from reading to reading in blocks [a, b) [rad²]."""
+    use = blocks.count[a:b] > 0
+    return float(np.mean(blocks.power[a:b][use])) if use.any() else float("inf")
+
+
+def _usual_power(side: SideFindings, blocks: SteeringBlocks) -> float:
+    """That power where the side has no fault [rad²]; 0 where too little is left."""
+    use = np.asarray(blocks.count > 0)
+    for f in side.findings:
+        use[slice(*_span(f, blocks))] = False
+    return float(np.mean(blocks.power[use])) if np.count_nonzero(use) * blocks.dt >= _LEAST_USUAL_S else 0.0

@@ -1,0 +1,73 @@
+"""Noise that a model alone claims: a sensor's must shake its reading, a valve's is uncertain where nobody measures its opening."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from diagnosis.results.assessment import Finding
+from diagnosis.results.result import Hypothesis
+from diagnosis.results.vocabulary import Tier
+from diagnosis.steering.blocks import SteeringBlocks, blocks_of
+from diagnosis.steering.findings import SideFindings
+from diagnosis.steering.noise_claims import noise_shown
+from replay.faults import FaultMode, Side
+
+DT, SIZE = 0.01, 4000
+ALWAYS = np.ones(SIZE, np.bool_)
+NOTHING = SideFindings((), ())
+
+
+def axle(shaken: slice | None) -> SteeringBlocks:
+    rng = np.random.default_rng(4)
+    t = np.arange(SIZE) * DT
+    angle = 0.2 * np.sin(0.5 * t) + rng.normal(0.0, 5e-4, SIZE)
+    if shaken is not None:
+        angle[shaken] += rng.normal(0.0, 0.01, SIZE)[shaken]
+    return blocks_of(angle, np.cos(0.5 * t), ALWAYS, ALWAYS, DT)
+
+
+def noise(side: Side, start: int = 1000, stop: int = 2000) -> SideFindings:
+    found = Finding(
+        start=start,
+        stop=stop,
+        side=side,
+        mode=FaultMode.NOISY,
+        probability=0.99,
+        hypotheses=(Hypothesis(side.value, "noisy", 0.99),),
+        epsilon=None,
+        sat=None,
+        evidence=(),
+        tier=Tier.MODEL,
+    )
+    return SideFindings((found,), ())
+
+
+def inputs(*, angle: bool = False, valve: bool = False) -> Any:
+    return SimpleNamespace(angle_redundant=angle, valve_redundant=valve, timeline=SimpleNamespace(dt=DT))
+
+
+def test_noise_of_a_sensor_shakes_its_reading() -> None:
+    claimed = {Side.SENSOR: noise(Side.SENSOR), Side.ACTUATOR: NOTHING}
+    smooth = noise_shown(claimed, inputs(), axle(None))[Side.SENSOR]
+    assert not smooth.findings
+    assert smooth.unexplained == ((1000, 2000),)
+    assert noise_shown(claimed, inputs(), axle(slice(1000, 2000)))[Side.SENSOR].findings
+
+
+def test_noise_of_a_valve_is_uncertain_unless_its_opening_is_measured() -> None:
+    claimed = {Side.SENSOR: NOTHING, Side.ACTUATOR: noise(Side.ACTUATOR)}
+    (unseen,) = noise_shown(claimed, inputs(), axle(None))[Side.ACTUATOR].findings
+    assert unseen.probability == pytest.approx(0.6, abs=0.01)
+    assert sum(h.p for h in unseen.hypotheses) == pytest.approx(1.0)
+    (seen,) = noise_shown(claimed, inputs(valve=True), axle(None))[Side.ACTUATOR].findings
+    assert seen.probability > 0.98
+
+
+def test_a_burst_is_less_probable_than_lasting_noise() -> None:
+    claimed = {Side.SENSOR: NOTHING, Side.ACTUATOR: noise(Side.ACTUATOR, 1000, 1060)}
+    (brief,) = noise_shown(claimed, inputs(valve=True), axle(None))[Side.ACTUATOR].findings
+    assert brief.probability == pytest.approx(0.495)
