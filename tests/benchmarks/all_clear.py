@@ -28,6 +28,7 @@ from types import ModuleType
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
+import electric
 import electrohydraulic
 import hydrostatic
 import numpy as np
@@ -48,7 +49,7 @@ from replay.simulation.structures import STRUCTURES, StructureOptions
 TIERS = ("base", "spool", "direct")
 FIRST = {"tuning": 0, "reporting": 2000}
 DEFAULT = "default"
-OTHERS = {hydrostatic.NAME: hydrostatic, electrohydraulic.NAME: electrohydraulic}
+OTHERS = {m.NAME: m for m in (hydrostatic, electrohydraulic, electric)}
 _SURE = 0.9
 _DRIVEN, _STEERED = 0.06, 0.02  # m/s, rad/s
 _DRIVEN_S, _STEERED_S = 3.0, 1.0
@@ -275,7 +276,10 @@ def main() -> None:
     parser.add_argument("--seeds", choices=FIRST, default="tuning")
     parser.add_argument("--first", type=int, default=0, help="added to the first seed")
     parser.add_argument(
-        "--machine", nargs="+", default=None, help="default, structures, foreign, hydrostatic, electrohydraulic"
+        "--machine",
+        nargs="+",
+        default=None,
+        help="default, structures, foreign, hydrostatic, electrohydraulic, electric",
     )
     parser.add_argument("--duration", type=float, default=75.0, help="length of a mission [s]")
     parser.add_argument("--every", type=int, default=1, help="one of so many kinds of trouble")
