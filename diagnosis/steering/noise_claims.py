@@ -18,7 +18,9 @@ from replay.faults import FaultMode, Side
 
 _SHAKEN = 2.0  # times the usual power of what changes from reading to reading
 _LEAST_USUAL_S = 5.0  # for which a reading must be known without its fault
-_DISTURBED = 0.6  # probability of a valve's noise behind an opening that nobody measured: none of 10 was right on tuning seeds
+_DISTURBED = (
+    0.6  # probability of a valve's noise behind an opening that nobody measured: none of 10 was right on tuning seeds
+)
 _BURST_S = 0.6  # length at which half of the bursts of noise are what a model leaves out of a motion
 _BURST = "Bursts of noise of this length"
 _SORT = "Disturbances of {valve}s whose opening is not logged"

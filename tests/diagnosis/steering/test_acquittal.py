@@ -95,7 +95,9 @@ def test_two_angles_may_be_set_to_zero_apart_no_further_than_healthy_ones(apart:
     assert np.nanmedian(found.mean - found.redundancy.angle) == pytest.approx(left, abs=1e-3)
 
 
-def finding(side: Side, mode: FaultMode, start: int, stop: int, lost: float = 1.0, level: float | None = None) -> Finding:
+def finding(
+    side: Side, mode: FaultMode, start: int, stop: int, lost: float = 1.0, level: float | None = None
+) -> Finding:
     return Finding(
         start=start,
         stop=stop,
