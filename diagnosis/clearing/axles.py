@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from diagnosis.clearing.cells import Array, Cells, Frame
-from diagnosis.clearing.measure import compared, lasts, worst
+from diagnosis.clearing.measure import as_followed, compared, lasts, worst
 from diagnosis.results.clearing import Check, Checked
 from diagnosis.results.vocabulary import Kind
 from replay.faults import Side
@@ -34,6 +34,7 @@ def axle_checks(cells: Cells, clear_at: float) -> Iterator[Checked]:
     angle, second, command, opening = (cells.axles(leaf) for leaf in ("phi", "phi_true", "u", "u_applied"))
     either, share = Side.SENSOR_OR_ACTUATOR, -np.log1p(-clear_at)
     used = np.where(np.isfinite(opening), opening, command)
+    followed = as_followed(cells, opening, command, OPENING)
     rate = rate_of(angle, cells.dt)
     rates = rates_of(cells, rate, used)
     place = np.minimum(np.arange(cells.frame.starts.size), len(rates.off) - 1)
@@ -46,7 +47,7 @@ def axle_checks(cells: Cells, clear_at: float) -> Iterator[Checked]:
             off = compared(cells, angle[:, j], second[:, j], FLOOR_RAD).off
             yield worst(cells, (*about, Side.SENSOR, Check.SECOND_MEASUREMENT), off, clear_at)
         if np.isfinite(opening[:, j]).any() and np.isfinite(command[:, j]).any():
-            off = compared(cells, opening[:, j], command[:, j], OPENING).off
+            off = compared(cells, opening[:, j], followed[:, j], OPENING).off
             yield worst(cells, (*about, Side.ACTUATOR, Check.SECOND_MEASUREMENT), off, VALVE * clear_at)
         if np.isfinite(command[:, j]).any():
             yield _still(cells, j, limit)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from diagnosis.clearing import axles, wheels, yaw
 from diagnosis.clearing.alone import Rough, Still, Straight
 from diagnosis.clearing.cells import Array, Cells
-from diagnosis.clearing.measure import compared, late
+from diagnosis.clearing.measure import as_followed, compared, late
 from diagnosis.clearing.placements import Overlap, Placements, Ratio, Reference
 from diagnosis.results.detectability import Deviation
 from diagnosis.results.vocabulary import Kind
@@ -122,6 +122,7 @@ def _wheels(cells: Cells) -> Iterator[Gauges]:
     speed, command, opening, second = (cells.wheels(leaf) for leaf in ("v", "u", "u_applied", "v_true"))
     clear_at, top = cells.machine.limits.clear_at, cells.machine.max_speed
     used, share = np.where(np.isfinite(opening), opening, command), -np.log1p(-clear_at)
+    followed = as_followed(cells, opening, command, wheels.OPENING)
     responses = wheels.responses_of(cells, speed, used, cells.reference)
     delays, rough = late(speed, cells.reference, cells.dt), wheels.roughness_of(cells, speed)
     for i, name in enumerate(cells.machine.wheels):
@@ -148,7 +149,7 @@ def _wheels(cells: Cells) -> Iterator[Gauges]:
         about = (Kind.WHEEL, name)
         yield Gauges(*about, Side.SENSOR, "m/s", moving, v, ratio, second_one, own, lasting={**lasting, **late_by})
         if twice:
-            asked = _reference(cells, name, (a, u, wheels.OPENING), wheels.VALVE * clear_at)
+            asked = _reference(cells, name, (a, followed[:, i], wheels.OPENING), wheels.VALVE * clear_at)
             yield Gauges(*about, Side.ACTUATOR, "1", moving, a, None, asked)
         elif _known(u):
             yield Gauges(*about, Side.ACTUATOR, "1", moving, v, ratio, None, lasting=lasting)
@@ -158,6 +159,7 @@ def _axles(cells: Cells) -> Iterator[Gauges]:
     angle, second, command, opening = (cells.axles(leaf) for leaf in ("phi", "phi_true", "u", "u_applied"))
     clear_at, frame = cells.machine.limits.clear_at, axles.still_frame(cells)
     used, share = np.where(np.isfinite(opening), opening, command), -np.log1p(-clear_at)
+    followed = as_followed(cells, opening, command, axles.OPENING)
     rates, limit = axles.rates_of(cells, axles.rate_of(angle, cells.dt), used), axles.answered(cells)
     path = yaw.off_straight(cells)
     straight = None if path is None else Straight(cells.frame, path, yaw.OFF / yaw.ANSWERED)
@@ -195,7 +197,7 @@ def _axles(cells: Cells) -> Iterator[Gauges]:
             *about, Side.SENSOR, "rad", moving, phi, ratio, second_one, None, still, straight, {**lasting, **turned}
         )
         if twice:
-            asked = _reference(cells, name, (a, u, axles.OPENING), axles.VALVE * clear_at)
+            asked = _reference(cells, name, (a, followed[:, j], axles.OPENING), axles.VALVE * clear_at)
             yield Gauges(*about, Side.ACTUATOR, "1", moving, a, None, asked, still=still)
         elif _known(u):
             yield Gauges(*about, Side.ACTUATOR, "1", moving, phi, ratio, None, still=still, lasting=lasting)

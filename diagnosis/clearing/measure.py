@@ -14,6 +14,8 @@ from diagnosis.results.vocabulary import Kind
 from replay.faults import Side
 
 _EVEN_S = 0.2  # over which a channel and its reference are evened: two healthy instruments differ in lag
+_LAGS_S = (0.0, 0.03, 0.06, 0.1, 0.15, 0.2)  # of healthy valves, motors and their loops
+_FOLLOWED = 0.8  # quantile of the windows: lag shows where a command is quick
 _EARLIEST_S, _LATEST_S = 0.3, 1.0
 _SURE = 0.95
 _LOSSES = (Check.RESPONSE, Check.LASTING_RESPONSE, Check.RATE, Check.LASTING_RATE)
@@ -84,6 +86,39 @@ def compared(cells: Cells, y: Array, x: Array, floor: float) -> Compared:
     large, driven = frame.rms(b), frame.rms(b) > floor
     moves = driven | (frame.rms(a) > 2.0 * floor)
     return Compared(frame, a, b, np.maximum(large, floor), frame.mean(a - b), driven, moves, floor)
+
+
+def as_followed(cells: Cells, openings: Array, commands: Array, floor: float) -> Array:
+    """Commands as openings follow them: behind the lag that explains most of a machine's valves best, shape (cells, valves).
+
+    A valve whose opening comes later than that of the others still deviates.
+
+    Parameters
+    ----------
+    cells : Cells
+        The mission.
+    openings, commands : Array, shape (cells, valves)
+        Measured and commanded [1]; NaN where unknown.
+    floor : float
+        As of `compared`.
+    """
+    pairs = [
+        (y, x) for y, x in zip(openings.T, commands.T, strict=True) if np.isfinite(y).any() and np.isfinite(x).any()
+    ]
+    if not pairs:
+        return commands
+
+    def left(lag: float) -> float:
+        usual = [compared(cells, y, _behind(x, cells.dt, lag), floor).off for y, x in pairs]
+        known = [float(np.nanquantile(off, _FOLLOWED)) for off in usual if np.isfinite(off).any()]
+        return float(np.median(known)) if known else 0.0
+
+    return _behind(commands, cells.dt, min(_LAGS_S, key=left))
+
+
+def _behind(x: Array, dt: float, lag: float) -> Array:
+    """Columns behind a lag of first order; what is unknown stays so."""
+    return np.where(np.isfinite(x), lowest_passed(x, dt, lag), np.nan) if lag else x
 
 
 def late(speed: Array, reference: Array, dt: float) -> list[float | None]:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from diagnosis.clearing.cells import Array, Cells
-from diagnosis.clearing.measure import compared, lasts, late, lowest_passed, worst
+from diagnosis.clearing.measure import as_followed, compared, lasts, late, lowest_passed, worst
 from diagnosis.clearing.wild import wild_readings
 from diagnosis.results.clearing import Check, Checked
 from diagnosis.results.vocabulary import Kind
@@ -45,6 +45,7 @@ def wheel_checks(cells: Cells, clear_at: float) -> Iterator[Checked]:
     reference = cells.reference
     twice = [(_known(opening[:, i]) and _known(command[:, i]), _known(second[:, i])) for i in range(speed.shape[1])]
     used = np.where(np.isfinite(opening), opening, command)
+    followed = as_followed(cells, opening, command, OPENING)
     responses = responses_of(cells, speed, used, reference)
     windows, lasting = responses.windows, responses.usual
     tracking, rough = _tracking(cells, speed, reference), _rough_beside_others(roughness_of(cells, speed))
@@ -60,7 +61,7 @@ def wheel_checks(cells: Cells, clear_at: float) -> Iterator[Checked]:
             off = compared(cells, speed[:, i], second[:, i], FLOOR * top).off
             yield worst(cells, (*about, Side.SENSOR, Check.SECOND_MEASUREMENT), off, clear_at)
         if twice[i][0]:
-            off = compared(cells, opening[:, i], command[:, i], OPENING).off
+            off = compared(cells, opening[:, i], followed[:, i], OPENING).off
             yield worst(cells, (*about, Side.ACTUATOR, Check.SECOND_MEASUREMENT), off, VALVE * clear_at)
         if _known(used[:, i]) and speed.shape[1] > OTHERS:
             below, above = RESPONSE[twice[i]]

@@ -31,6 +31,8 @@ _CLEAR = 3.0  # times the noise
 _LEFT_S = (
     0.03  # for which a command must leave the opening of a valve that is said to be stuck there, beside the valve's lag
 )
+_AS_TRUE = 0.03  # of what a sensor measures: as far off may a healthy one be
+_ZERO = 0.01  # of the span: as far apart may two healthy instruments have their zero
 _GROWTH_S = 0.1  # a shorter time of growth is not worth a sentence
 
 
@@ -144,7 +146,7 @@ def _mode_of(isolated: Isolated, found: IdentifiedPair, limits: Limits) -> Fault
     seen, noise = isolated.seen, isolated.seen.noise
     mode = FaultMode(ROWS[isolated.run.row])
     if mode.scaled:
-        return _mode_of_gain(isolated, noise, limits)
+        return _mode_of_gain(isolated, noise, found, limits)
     if mode.varying:
         least = max(2.5 * found.model.noise, 1.5 * noise, limits.min_sat / 2)
         return None if seen.deviation < least else mode
@@ -157,19 +159,21 @@ def _mode_of(isolated: Isolated, found: IdentifiedPair, limits: Limits) -> Fault
     if np.isfinite(seen.y).any() and away < min(_LEFT_S, 0.5 * isolated.run.size * found.pair.dt):
         return None
     known = seen.x[seen.use]
+    if seen.deviation < _AS_TRUE * (float(np.sqrt(np.mean(known**2))) if known.size else 0.0):
+        return None
     at_rest = known.size and max(seen.deviation, float(np.max(np.abs(known)))) < limits.min_sat / 2
     return None if at_rest else mode  # it repeats what it had, which is true
 
 
-def _mode_of_gain(isolated: Isolated, noise: float, limits: Limits) -> FaultMode | None:
+def _mode_of_gain(isolated: Isolated, noise: float, found: IdentifiedPair, limits: Limits) -> FaultMode | None:
     """Inefficient, or outside the table where the gain is; None where ε is too small or nothing moves."""
     epsilon, _, delta = isolated.estimate
     outside = delta > 1.0 + limits.min_epsilon or delta < -limits.min_epsilon
     if not outside and epsilon is not None and epsilon.value < limits.min_epsilon:
         return None
     reference = isolated.seen.x[isolated.seen.use]
-    if abs(1.0 - delta) * math.sqrt(float((reference**2).mean())) < 0.5 * noise:
-        return None  # what is lost of hardly anything is the reference's own noise
+    if abs(1.0 - delta) * math.sqrt(float((reference**2).mean())) < max(0.5 * noise, _ZERO * found.pair.span):
+        return None  # what is lost of hardly anything is the reference's own noise, or where both have their zero
     return FaultMode.OUTSIDE_TABLE if outside else FaultMode.INEFFICIENT
 
 

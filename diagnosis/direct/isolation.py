@@ -184,6 +184,7 @@ def isolate(run: Run, found: IdentifiedPair) -> Isolated | None:
             p[INEFFICIENT], p[STUCK] = _RESTLESS_P * both, (1.0 - _RESTLESS_P) * both
     if run.row == INEFFICIENT and _shifted_away(seen, estimate[2], seen.noise):  # a constant of its own, not a share
         run = replace(run, row=STUCK)
+        p[STUCK], p[INEFFICIENT] = p[INEFFICIENT], p[STUCK]
         other = estimate_run(run, found)
         if other is None:
             return None

@@ -26,6 +26,7 @@ _LONG_HOLDS, _BEYOND_HOLDS = 0.98, 2.0  # quantile of holds that is long; times 
 _SETTLING_LAGS, _OVERSHOOT, _NOISES = 6.0, 0.3, 3.0  # of a valve of higher order; share of its move; times the noise
 _AT_REST = 0.02  # of the largest plausible speed
 _FIRST_EDGE_S = 0.02  # of driving at the largest plausible speed: as far may be from edge to edge
+_BRIEF_S = 0.5  # a shorter deviation may be of timing, or of a wheel that stops or starts
 _FLIPS = 25  # samples in a row on one side of a command that switches to and fro between samples
 
 
@@ -34,7 +35,7 @@ def timing_explains(found: IdentifiedPair, run: Run, mode: FaultMode) -> bool:
 
     Shorter than a spool sensor's delay; or an overshoot that settles; or, where a log is too slow for its commands: what changes from sample to
     sample is as large, or y is x with its sign at other moments, or a constant y is as far off as a healthy one may be. For a
-    speed: shorter than half a second and no more than 10 ms, or one and a half samples, of the reference's slope, or a reading that rests beside a
+    speed: shorter than half a second and no more than 10 ms, or one and a half samples, of the reference's slope, or as short near rest, or a reading that rests beside a
     reference that hardly moves, no longer than its noise allows. Whatever the rate, the answer to a command of which
     nothing is left but jumps between samples depends on the valve's lag.
     """
@@ -47,11 +48,11 @@ def timing_explains(found: IdentifiedPair, run: Run, mode: FaultMode) -> bool:
     if pair.side is Side.SENSOR:
         slope = np.gradient(np.nan_to_num(x[max(0, run.start - 1) : run.stop + 1]), pair.dt)
         moves = float(np.sqrt(np.mean(slope**2))) * max(_SENSOR_DELAY_S, _SENSOR_SAMPLES * pair.dt)
-        if _before_first_edge(found, run):
+        if _before_first_edge(found, run) or (seconds < _BRIEF_S and _near_rest(found, run)):
             return True
         if mode.total:
             return _rests_by_chance(found, run, deviation) or _held_by_habit(found, run)
-        return mode.varying and seconds < 0.5 and deviation < moves
+        return mode.varying and seconds < _BRIEF_S and deviation < moves
     if seconds <= _SPOOL_DELAY_S or (mode.varying and _settles(found, run)):
         return True
     jumps = _sudden(found, pair.x, run)
@@ -135,6 +136,13 @@ def _held_by_habit(found: IdentifiedPair, run: Run) -> bool:
     if near.size < _HOLDS:
         return False
     return bool((run.stop - run.start) < _BEYOND_HOLDS * float(np.quantile(near, _LONG_HOLDS)))
+
+
+def _near_rest(found: IdentifiedPair, run: Run) -> bool:
+    """Whether a wheel stops, starts or turns back near a run: sensors that time their edges are late there, and wild at the first."""
+    near = round(_BRIEF_S / found.pair.dt)
+    x = np.abs(found.samples.x[max(0, run.start - near) : run.stop + near])
+    return bool(np.nanmin(x, initial=np.inf) <= _AT_REST * found.pair.span)
 
 
 def _before_first_edge(found: IdentifiedPair, run: Run) -> bool:

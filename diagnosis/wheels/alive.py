@@ -16,7 +16,7 @@ _FEW = 10
 
 
 def lives(y: Array, reference: Array, noise: float) -> bool:
-    """Whether a run of readings is what a healthy sensor gives at a steady command; False where no command is known.
+    """Whether a run of readings is what a healthy sensor gives at a steady command, or at rest where none is given; False where no command is known.
 
     Parameters
     ----------
@@ -35,4 +35,6 @@ def lives(y: Array, reference: Array, noise: float) -> bool:
     near = max(_LEAST, _SHARE * float(np.max(np.abs([low, high]))))
     if max(high - low, abs(high - level), abs(low - level)) > near:
         return False
+    if max(abs(low), abs(high)) <= _LEAST:
+        return True  # nobody asked for motion
     return float(np.sqrt(np.mean(white_part(values) ** 2))) > _TREMBLES * noise

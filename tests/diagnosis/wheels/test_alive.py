@@ -21,5 +21,10 @@ def test_a_reading_that_rests_or_that_its_command_leaves_may_be_stuck() -> None:
     assert not lives(TREMBLING, np.full(SIZE, 0.5), NOISE)
 
 
+def test_a_wheel_that_nobody_asked_to_move_rests() -> None:
+    assert lives(np.zeros(SIZE), np.zeros(SIZE), NOISE)
+    assert not lives(np.zeros(SIZE), STEADY, NOISE)
+
+
 def test_without_a_command_nothing_is_known() -> None:
     assert not lives(TREMBLING, np.full(SIZE, np.nan), NOISE)
