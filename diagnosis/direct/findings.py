@@ -69,15 +69,20 @@ def find_faults(path: ModePath, found: IdentifiedPair, limits: Limits) -> Faults
     """
     dt, size = found.pair.dt, path.model.size
     shortest = max(3, round(_SHORTEST_S / dt))
-    runs = fault_runs(path, found.samples, found.model, dt, shortest, found.relation.play)
+    told = {
+        run: None if run.row in VARYING_ROWS else finding_of(run, found, limits)
+        for run in fault_runs(path, found.samples, found.model, dt, shortest, found.relation.play)
+    }
+    # a gain within the limits is none: what varies beside it does not lead up to it
+    runs = [run for run, finding in told.items() if run.row in VARYING_ROWS or finding is not None]
     returns = _TAIL_S + _SETTLED_LAGS * (found.relation.lag + max(0.0, found.relation.delay * dt))
     chained = with_leads(runs, *(max(2, round(s / dt)) for s in (_LEAD_S, returns, _CHAIN_S)))
-    findings, timing, below = [], [], 0
+    findings, timing, below = [], [], len(told) - len(runs)
     for i, (main, start, stop) in enumerate(chained):
         before, after = chained[i - 1][2] if i else 0, chained[i + 1][1] if i + 1 < len(chained) else size
         limit = (before if start == main.start else main.start, after if stop == main.stop else main.stop)
         run = _refined(main, found, limit)
-        finding = finding_of(run, found, limits)
+        finding = told.get(run) or finding_of(run, found, limits)
         if finding is None:
             below += 1
         elif timing_explains(found, run, finding.mode):
