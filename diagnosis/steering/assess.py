@@ -13,19 +13,21 @@ from diagnosis.results.assessment import CODE, Assessment, unassessed
 from diagnosis.results.vocabulary import Tier
 from diagnosis.steering.acquittal import acquitted, moves_otherwise, scatter_of
 from diagnosis.steering.blocks import SteeringBlocks, without_growth
+from diagnosis.steering.denied import not_denied
 from diagnosis.steering.driven import driven_by
 from diagnosis.steering.evidence import evidence_columns, path_angle
-from diagnosis.steering.findings import apart, findings_of
+from diagnosis.steering.filter_state import SteeringPath
+from diagnosis.steering.findings import SideFindings, apart, findings_of
 from diagnosis.steering.identification import identify_plants
 from diagnosis.steering.inputs import AxleInputs, Counts, axle_inputs
 from diagnosis.steering.models import model_of
-from diagnosis.steering.noise_claims import noise_shown
 from diagnosis.steering.path import AxleFilter, allowed_models, most_probable
 from diagnosis.steering.path_refinement import refine_path
 from diagnosis.steering.plant import SteeringPlant
 from diagnosis.steering.prior import plant_before
 from diagnosis.steering.reliability import commanded, paired, weighed
 from diagnosis.steering.states import REASONS, states_of
+from diagnosis.steering.together import not_together
 from replay.control.loop import Replay
 from replay.faults import Side, State
 from replay.machine.config import Machine
@@ -62,6 +64,16 @@ class SteeringResult:
     doubtful: Flags
 
 
+@dataclass(frozen=True, eq=False)
+class _Found:
+    """What the model of an axle finds."""
+
+    axle: AxleFilter
+    path: SteeringPath
+    sides: dict[Side, SideFindings]
+    valve_judged: bool
+
+
 @dataclass(frozen=True)
 class _Judged:
     """Both sides of an axle by its model, and the angle that the model gives [rad]."""
@@ -93,14 +105,23 @@ def assess_steering(
             if a.blocks is not None and (plant := plants.get(a.name)) is not None
         ]
     )
+    told: dict[str, _Found] = {}
+    for inputs in axles:
+        progress(Progress(Stage.JUDGING_STEERING, inputs.name))
+        plant = plants.get(inputs.name)
+        if inputs.blocks is not None and plant is not None:
+            told[inputs.name] = _found(inputs, inputs.blocks, plant, machine, otherwise=otherwise)
+    once = {a.name: told[a.name] for a in axles if a.name in told and not a.redundant}
+    length = max((one.axle.blocks.length for one in once.values()), default=1)
+    alone = not_together({name: one.sides for name, one in once.items()}, length, timeline.dt)
     assessments: dict[Part, Assessment] = {}
     angles: list[Array] = []
     doubts: list[Flags] = []
     for inputs in axles:
-        progress(Progress(Stage.JUDGING_STEERING, inputs.name))
-        plant, judged = plants.get(inputs.name), None
-        if inputs.blocks is not None and plant is not None:
-            judged = _judged_by_model(inputs, inputs.blocks, plant, machine, otherwise=otherwise)
+        one, judged = told.get(inputs.name), None
+        if one is not None:
+            sides = alone.get(inputs.name, one.sides)
+            judged = _judged(inputs, replace(one, sides=sides), otherwise=otherwise)
         for side in _SIDES:
             assessments[inputs.name, side.value] = _assessment(side, inputs, judged)
         angle, doubt = _best_angle(inputs, assessments[inputs.name, Side.SENSOR.value], judged)
@@ -129,10 +150,10 @@ def _plants(axles: Sequence[AxleInputs], machine: Machine, progress: Subscriber)
     return {a.name: plant for a, plant in zip(modelled, plants, strict=True)}
 
 
-def _judged_by_model(
+def _found(
     inputs: AxleInputs, blocks: SteeringBlocks, plant: SteeringPlant, machine: Machine, *, otherwise: bool
-) -> _Judged:
-    """Inputs → models → path → findings → states and evidence columns of both sides; `otherwise`: the models do not fit."""
+) -> _Found:
+    """Inputs → models → path → findings of both sides; `otherwise`: the models do not fit."""
     model = model_of(blocks, plant, inputs.noise, machine.max_steer)
     valve_judged = inputs.valve_redundant or (plant.reliable and not inputs.command_missing)
     allowed = allowed_models(sensor=inputs.measured == "phi", actuator=valve_judged, redundant=inputs.redundant)
@@ -145,15 +166,21 @@ def _judged_by_model(
         found = weighed(found, blocks.length, inputs.timeline.dt)
     else:
         found = paired(found)
-    found = noise_shown(found, inputs, blocks)
+    found = not_denied(found, inputs, blocks)
     found = {side: acquitted(side, found[side], inputs, blocks, believed=not otherwise) for side in _SIDES}
+    return _Found(axle, path, found, valve_judged)
+
+
+def _judged(inputs: AxleInputs, told: _Found, *, otherwise: bool) -> _Judged:
+    """Findings → states and evidence columns of both sides; `otherwise`: the models do not fit."""
+    axle, path, found, length = told.axle, told.path, told.sides, told.axle.blocks.length
     dead = [(f.start, f.stop) for f in found[Side.SENSOR].findings if f.mode.total]
     masked = [] if inputs.redundant else dead
     columns = evidence_columns(inputs, axle, path, [f for side in _SIDES for f in found[side].findings])
     sides = {}
     for side in _SIDES:
-        judged = valve_judged or side is Side.SENSOR
-        unexplained = sum((b - a) * blocks.length for a, b in found[side].unexplained)
+        judged = told.valve_judged or side is Side.SENSOR
+        unexplained = sum((b - a) * length for a, b in found[side].unexplained)
         sides[side] = Assessment(
             states=states_of(side, inputs, axle, path, found[side], masked, judged=judged),
             reasons=REASONS[side],

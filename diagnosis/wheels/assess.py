@@ -122,6 +122,7 @@ def _path(
     return WheelPath(
         y=data.y[:, i],
         reference=data.reference[:, i],
+        stands=data.stands,
         names=data.names[i],
         model=wheel,
         dt=data.dt,

@@ -25,6 +25,7 @@ Array = NDArray[np.float64]
 _HOLD_S = 0.1
 _REACH_S = 0.4  # within which the raw signal shows an edge that the Kalman models did not place
 _LEAST_HEALTHY = 0.95  # probability below which a side is not called healthy
+_TOGETHER = 0.5  # of a run: where no wheel turns, none of them is known to be dead
 _USUAL = 0.5  # below this it deviates by more than what healthy machines do
 
 
@@ -56,6 +57,8 @@ class WheelPath:
         Measured speed [m/s].
     reference : Array, shape (n,)
         Commanded speed [m/s]; NaN where there is none.
+    stands : NDArray[np.bool_], shape (n,)
+        Where every wheel reads as if the machine stood.
     names : tuple[str, str]
         Names of speed and opening.
     model : WheelFilterModel
@@ -78,6 +81,7 @@ class WheelPath:
 
     y: Array
     reference: Array
+    stands: NDArray[np.bool_]
     names: tuple[str, str]
     model: WheelFilterModel
     dt: float
@@ -132,7 +136,8 @@ def findings_of(path: WheelPath, limits: Limits) -> WheelFindings:
         start, stop = _edges(path, w.segment)
         if stop <= start:
             continue
-        alive = lives(y[start:stop], path.reference[start:stop], path.model.noise)
+        together = float(np.mean(path.stands[start:stop])) > _TOGETHER
+        alive = together or lives(y[start:stop], path.reference[start:stop], path.model.noise)
         run = Run(start, stop, w.segment.side, w.segment.pooled, w.evidence, w.mean, w.cov, path.others, alive)
         verdict = judge(run, y[start:stop], path.model, limits, path.names, path.dt)
         if verdict.hidden:

@@ -29,6 +29,7 @@ from replay.signals.timeline import Timeline
 Array = NDArray[np.float64]
 
 _QUIET = 0.4
+_STANDS = 0.02  # of the span
 
 
 @dataclass(frozen=True)
@@ -97,6 +98,11 @@ class WheelsData:
     doubtful: NDArray[np.bool_]
     body: MeasuredBody | None = None
     store: ColumnStore = field(default_factory=ColumnStore, repr=False)
+
+    @cached_property
+    def stands(self) -> NDArray[np.bool_]:
+        """Where every wheel reads as if the machine stood, shape (n,)."""
+        return np.asarray((np.abs(without_nan(self.y)) <= _STANDS * self.span).all(axis=1))
 
     @cached_property
     def speed_noises(self) -> list[SpeedNoise | None]:

@@ -63,7 +63,7 @@ class Run:
     others : int
         Other wheels that show how fast the body moves.
     lives : bool
-        Whether its readings tremble as ever at a steady command.
+        Whether its readings tremble as ever at a steady command, or no wheel of the machine turns.
     """
 
     start: int

@@ -34,7 +34,9 @@ def weighed(start: int, stop: int, side: Side, mode: FaultMode, p: float = 0.95,
     return Weighed(segment, evidence, mean, np.tile(1e-4 * np.eye(4), (MODELS, 1, 1)))
 
 
-def found(*segments: Weighed, y: Array | None = None, healthy: dict[Side, Array] | None = None) -> WheelFindings:
+def found(
+    *segments: Weighed, y: Array | None = None, healthy: dict[Side, Array] | None = None, stands: bool = False
+) -> WheelFindings:
     t = np.arange(BLOCKS * WIDTH) * DT
     speed = 0.3 + 0.05 * np.sin(3 * t) + 0.001 * np.random.default_rng(1).normal(size=t.size) if y is None else y
     sure = {side: np.full(BLOCKS, 0.99) for side in (Side.SENSOR, Side.ACTUATOR)}
@@ -42,6 +44,7 @@ def found(*segments: Weighed, y: Array | None = None, healthy: dict[Side, Array]
     path = WheelPath(
         y=speed,
         reference=np.full(speed.size, np.nan),
+        stands=np.full(speed.size, stands),
         names=("v", "u"),
         model=MODEL,
         dt=DT,
@@ -68,6 +71,13 @@ def test_a_side_that_may_be_faulty_stays_open() -> None:
     at[: 150 * WIDTH] = False
     np.testing.assert_array_equal(out.unexplained[Side.ACTUATOR], at)
     assert not out.opened[Side.SENSOR].any()
+
+
+def test_a_dead_sensor_is_not_told_where_no_wheel_turns() -> None:
+    dead = weighed(100, 200, Side.SENSOR, FaultMode.NO_SIGNAL)
+    still = np.zeros(BLOCKS * WIDTH)
+    assert found(dead, y=still).findings
+    assert not found(dead, y=still, stands=True).findings
 
 
 def test_a_probable_row_is_stated() -> None:

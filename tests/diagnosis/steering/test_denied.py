@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
@@ -12,8 +13,8 @@ from diagnosis.results.assessment import Finding
 from diagnosis.results.result import Hypothesis
 from diagnosis.results.vocabulary import Tier
 from diagnosis.steering.blocks import SteeringBlocks, blocks_of
+from diagnosis.steering.denied import not_denied
 from diagnosis.steering.findings import SideFindings
-from diagnosis.steering.noise_claims import noise_shown
 from replay.faults import FaultMode, Side
 
 DT, SIZE = 0.01, 4000
@@ -46,28 +47,43 @@ def noise(side: Side, start: int = 1000, stop: int = 2000) -> SideFindings:
     return SideFindings((found,), ())
 
 
-def inputs(*, angle: bool = False, valve: bool = False) -> Any:
-    return SimpleNamespace(angle_redundant=angle, valve_redundant=valve, timeline=SimpleNamespace(dt=DT))
+def inputs(*, angle: bool = False, valve: bool = False, reading: np.ndarray | None = None) -> Any:
+    return SimpleNamespace(
+        angle_redundant=angle,
+        valve_redundant=valve,
+        timeline=SimpleNamespace(dt=DT),
+        angle=reading,
+        fresh=ALWAYS,
+    )
 
 
 def test_noise_of_a_sensor_shakes_its_reading() -> None:
     claimed = {Side.SENSOR: noise(Side.SENSOR), Side.ACTUATOR: NOTHING}
-    smooth = noise_shown(claimed, inputs(), axle(None))[Side.SENSOR]
+    smooth = not_denied(claimed, inputs(), axle(None))[Side.SENSOR]
     assert not smooth.findings
     assert smooth.unexplained == ((1000, 2000),)
-    assert noise_shown(claimed, inputs(), axle(slice(1000, 2000)))[Side.SENSOR].findings
+    assert not_denied(claimed, inputs(), axle(slice(1000, 2000)))[Side.SENSOR].findings
 
 
 def test_noise_of_a_valve_is_uncertain_unless_its_opening_is_measured() -> None:
     claimed = {Side.SENSOR: NOTHING, Side.ACTUATOR: noise(Side.ACTUATOR)}
-    (unseen,) = noise_shown(claimed, inputs(), axle(None))[Side.ACTUATOR].findings
+    (unseen,) = not_denied(claimed, inputs(), axle(None))[Side.ACTUATOR].findings
     assert unseen.probability == pytest.approx(0.6, abs=0.01)
     assert sum(h.p for h in unseen.hypotheses) == pytest.approx(1.0)
-    (seen,) = noise_shown(claimed, inputs(valve=True), axle(None))[Side.ACTUATOR].findings
+    (seen,) = not_denied(claimed, inputs(valve=True), axle(None))[Side.ACTUATOR].findings
     assert seen.probability > 0.98
 
 
 def test_a_burst_is_less_probable_than_lasting_noise() -> None:
     claimed = {Side.SENSOR: NOTHING, Side.ACTUATOR: noise(Side.ACTUATOR, 1000, 1060)}
-    (brief,) = noise_shown(claimed, inputs(valve=True), axle(None))[Side.ACTUATOR].findings
+    (brief,) = not_denied(claimed, inputs(valve=True), axle(None))[Side.ACTUATOR].findings
     assert brief.probability == pytest.approx(0.495)
+
+
+@pytest.mark.parametrize("trembles", [True, False])
+def test_a_sensor_whose_last_digit_changes_is_not_stuck(trembles: bool) -> None:
+    reading = np.round(np.random.default_rng(5).normal(0.01, 4e-4 if trembles else 0.0, SIZE), 4)
+    (claimed,) = noise(Side.SENSOR).findings
+    stuck = SideFindings((replace(claimed, mode=FaultMode.STUCK),), ())
+    out = not_denied({Side.SENSOR: stuck, Side.ACTUATOR: NOTHING}, inputs(reading=reading), axle(None))[Side.SENSOR]
+    assert bool(out.findings) is not trembles

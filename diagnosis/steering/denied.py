@@ -1,6 +1,7 @@
-"""What is called noise by a steering model alone: a sensor's noise shakes its reading, a valve's shows in its opening.
+"""What a steering model alone claims and the readings deny: noise that shakes nothing, a sensor that is stuck and trembles.
 
-To the filters everything that their plant leaves unexplained for a while looks like noise of one side.
+To the filters everything that their plant leaves unexplained for a while looks like noise of one side, and an angle that stays
+like a stuck sensor, whoever holds it.
 """
 
 from __future__ import annotations
@@ -17,19 +18,18 @@ from diagnosis.steering.reliability import limited
 from replay.faults import FaultMode, Side
 
 _SHAKEN = 2.0  # times the usual power of what changes from reading to reading
+_RESTLESS = 0.1  # share of changing readings from which on a sensor lives
 _LEAST_USUAL_S = 5.0  # for which a reading must be known without its fault
-_DISTURBED = (
-    0.6  # probability of a valve's noise behind an opening that nobody measured: none of 10 was right on tuning seeds
-)
+_DISTURBED = 0.6  # probability of noise behind an opening that nobody measured: none of 10 was right on tuning seeds
 _BURST_S = 0.6  # length at which half of the bursts of noise are what a model leaves out of a motion
 _BURST = "Bursts of noise of this length"
 _SORT = "Disturbances of {valve}s whose opening is not logged"
 
 
-def noise_shown(
+def not_denied(
     found: Mapping[Side, SideFindings], inputs: AxleInputs, blocks: SteeringBlocks
 ) -> dict[Side, SideFindings]:
-    """Findings of both sides; noise of the sensor that does not shake it is left unexplained, that of an unmeasured valve uncertain.
+    """Findings of both sides; what a sensor's own readings deny is left unexplained, noise of an unmeasured valve uncertain.
 
     Parameters
     ----------
@@ -44,13 +44,14 @@ def noise_shown(
     sensor, valve = found[Side.SENSOR], found[Side.ACTUATOR]
     if not inputs.angle_redundant:
         usual = _usual_power(sensor, blocks)
-        still = [
+        denied = [
             f
             for f in sensor.findings
-            if f.mode is FaultMode.NOISY and _power(blocks, *_span(f, blocks)) < _SHAKEN * usual
+            if (f.mode is FaultMode.NOISY and _power(blocks, *_span(f, blocks)) < _SHAKEN * usual)
+            or (f.mode.total and _trembles(f, inputs))
         ]
-        kept = tuple(f for f in sensor.findings if f not in still)
-        out[Side.SENSOR] = SideFindings(kept, (*sensor.unexplained, *(_span(f, blocks) for f in still)))
+        kept = tuple(f for f in sensor.findings if f not in denied)
+        out[Side.SENSOR] = SideFindings(kept, (*sensor.unexplained, *(_span(f, blocks) for f in denied)))
     if not inputs.valve_redundant:
         findings = tuple(limited(f, _DISTURBED, _SORT) if f.mode is FaultMode.NOISY else f for f in valve.findings)
         out[Side.ACTUATOR] = valve._replace(findings=findings)
@@ -65,6 +66,14 @@ def _not_brief(findings: tuple[Finding, ...], dt: float) -> tuple[Finding, ...]:
         brief = seconds**2 / (seconds**2 + _BURST_S**2)
         out.append(limited(f, f.probability * brief, _BURST) if f.mode is FaultMode.NOISY else f)
     return tuple(out)
+
+
+def _trembles(finding: Finding, inputs: AxleInputs) -> bool:
+    """Whether the last digits of a reading go on changing, as those of a stuck sensor do not."""
+    part = slice(finding.start, finding.stop)
+    y = inputs.angle[part][inputs.fresh[part]]
+    y = y[np.isfinite(y)]
+    return y.size > 1 and bool(np.mean(np.diff(y) != 0.0) > _RESTLESS)
 
 
 def _span(finding: Finding, blocks: SteeringBlocks) -> tuple[int, int]:
