@@ -27,6 +27,7 @@ _NEAR_S = 1.0
 _OVERLAP = 0.2
 _ASKED, _PEAK = 0.01, 0.98  # of full opening: a command below this, but for its peaks, asks for nothing
 _MOVED_S = 0.3  # for which a command must move its axle
+_LEAST_TRAVEL = 0.03  # rad that a command must ask for: less is lost in a healthy dead band
 _LEAST = 0.6  # probability from which a finding is stated
 
 _PAIRED = 0.65  # how often a partial fault beside one of the other side was right: 18 of 28 on tuning seeds
@@ -84,12 +85,18 @@ def commanded(valve: SideFindings, command: NDArray[np.float64], axle: AxleFilte
         lacks = f.mode in (FaultMode.NO_SIGNAL, FaultMode.INEFFICIENT)
         blocks = f.start // length, -(-f.stop // length)
         jitter_tells = bool(np.isfinite(share[slice(*blocks)]).any())
-        moved = jitter_tells or moving(axle, *blocks)[2] >= _MOVED_S
+        moved = jitter_tells or (moving(axle, *blocks)[2] >= _MOVED_S and _travel(axle, *blocks) >= _LEAST_TRAVEL)
         if lacks and not (asked.size and float(np.quantile(asked, _PEAK)) >= _ASKED and moved):
             open_.append(blocks)
         else:
             kept.append(f)
     return SideFindings(tuple(kept), tuple(open_))
+
+
+def _travel(axle: AxleFilter, start: int, stop: int) -> float:
+    """How far a healthy valve would turn its axle in blocks [start, stop), between the extremes [rad]."""
+    angle = np.cumsum(np.nan_to_num(axle.driven.command[start:stop])) * axle.blocks.dt
+    return float(np.ptp(angle)) if angle.size else 0.0
 
 
 def weighed(found: Mapping[Side, SideFindings], length: int, dt: float) -> dict[Side, SideFindings]:
