@@ -32,6 +32,7 @@ _LEFT_S = (
     0.03  # for which a command must leave the opening of a valve that is said to be stuck there, beside the valve's lag
 )
 _AS_TRUE = 0.03  # of what a sensor measures: as far off may a healthy one be
+_LOST = 0.03  # of the span: as far from its command a healthy valve rests within its dead band
 _ZERO = 0.01  # of the span: as far apart may two healthy instruments have their zero
 _GROWTH_S = 0.1  # a shorter time of growth is not worth a sentence
 
@@ -160,7 +161,8 @@ def _mode_of(isolated: Isolated, found: IdentifiedPair, limits: Limits) -> Fault
     if found.pair.side is Side.ACTUATOR:
         relation = found.relation
         returns = _LEFT_S + 2.0 * (relation.lag + max(0.0, relation.delay * found.pair.dt))
-        return None if seen.deviation < _CLEAR * noise or away < returns else mode
+        least = max(_CLEAR * noise, _LOST * found.pair.span)
+        return None if seen.deviation < least or away < returns else mode
     if np.isfinite(seen.y).any() and away < min(_LEFT_S, 0.5 * isolated.run.size * found.pair.dt):
         return None
     known = seen.x[seen.use]

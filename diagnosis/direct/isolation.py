@@ -175,14 +175,16 @@ def isolate(run: Run, found: IdentifiedPair) -> Isolated | None:
         run = replace(run, row=NO_SIGNAL)
         p[NO_SIGNAL] += p[STUCK] + p[INEFFICIENT]
         p[[STUCK, INEFFICIENT]] = 0.0
-    if run.row == STUCK and seen.still and found.pair.side is Side.SENSOR and _changes(seen) > _RESTLESS:
+    restless = found.pair.side is Side.SENSOR and _changes(seen) > _RESTLESS
+    if run.row == STUCK and seen.still and restless:
         # nothing moved, but the last digit did: a stuck channel does not do that
         other = estimate_run(replace(run, row=INEFFICIENT), found)
         if other is not None and 0.0 < other[2] < 1.0:
             run, estimate = replace(run, row=INEFFICIENT), other
             both = p[STUCK] + p[INEFFICIENT]
             p[INEFFICIENT], p[STUCK] = _RESTLESS_P * both, (1.0 - _RESTLESS_P) * both
-    if run.row == INEFFICIENT and _shifted_away(seen, estimate[2], seen.noise):  # a constant of its own, not a share
+    if run.row == INEFFICIENT and not restless and _shifted_away(seen, estimate[2], seen.noise):
+        # a constant of its own, not a share
         run = replace(run, row=STUCK)
         p[STUCK], p[INEFFICIENT] = p[INEFFICIENT], p[STUCK]
         other = estimate_run(run, found)

@@ -33,6 +33,7 @@ _SCATTER = 0.0045  # of a motion: machines that move as their model says are bel
 _MOTION_S = 0.05  # to either side
 _BEYOND = 2.5  # times what is usual at such motion
 _MOSTLY = 0.4  # of a finding: its ends may come late
+_READ = 0.5  # of a finding: what delivers less is silent
 _TELLING_S = 0.3  # for which a fault would have to show
 _LEFT = 0.5  # of the power between two measurements: what a fault that is believed leaves of it, at most
 _LEAST = {Side.SENSOR: 0.012, Side.ACTUATOR: 0.02}  # rad and of full opening: less is nobody's fault
@@ -138,7 +139,7 @@ def _apart(side: Side, inputs: AxleInputs, blocks: SteeringBlocks) -> tuple[Arra
 def _shown(finding: Finding, apart: Array, by: Array, limit: Array, dt: float, *, believed: bool) -> bool:
     """Whether most of the blocks in which a fault would show do show it; `believed` where nothing is measured twice."""
     known = np.isfinite(apart)
-    if not known.any():
+    if not known.any() or (finding.mode.total and np.mean(known) < _READ):
         return believed or (finding.side is Side.SENSOR and finding.mode is FaultMode.NO_SIGNAL)
     if finding.mode.varying:
         return _mostly(apart[known] ** 2 > limit[known])

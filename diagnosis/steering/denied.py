@@ -71,9 +71,9 @@ def _not_brief(findings: tuple[Finding, ...], dt: float) -> tuple[Finding, ...]:
 def _trembles(finding: Finding, inputs: AxleInputs) -> bool:
     """Whether the last digits of a reading go on changing, as those of a stuck sensor do not."""
     part = slice(finding.start, finding.stop)
-    y = inputs.angle[part][inputs.fresh[part]]
-    y = y[np.isfinite(y)]
-    return y.size > 1 and bool(np.mean(np.diff(y) != 0.0) > _RESTLESS)
+    known = np.isfinite(inputs.angle[part])
+    y = inputs.angle[part][known & inputs.fresh[part]]
+    return bool(y.size > 1 and np.mean(known) > 0.5 and np.mean(np.diff(y) != 0.0) > _RESTLESS)
 
 
 def _span(finding: Finding, blocks: SteeringBlocks) -> tuple[int, int]:
