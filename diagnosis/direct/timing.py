@@ -26,6 +26,7 @@ _LONG_HOLDS, _BEYOND_HOLDS = 0.98, 2.0  # quantile of holds that is long; times 
 _SETTLING_LAGS, _OVERSHOOT, _NOISES = 6.0, 0.3, 3.0  # of a valve of higher order; share of its move; times the noise
 _AT_REST = 0.02  # of the largest plausible speed
 _FIRST_EDGE_S = 0.02  # of driving at the largest plausible speed: as far may be from edge to edge
+_ECHO = 2.0  # times a command's jumps: as large may be those of its answer
 _BRIEF_S = 0.5  # a shorter deviation may be of timing, or of a wheel that stops or starts
 _FLIPS = 25  # samples in a row on one side of a command that switches to and fro between samples
 
@@ -66,7 +67,8 @@ def timing_explains(found: IdentifiedPair, run: Run, mode: FaultMode) -> bool:
         )
     if not mode.varying:
         return False
-    sudden = max(_sudden(found, z, run) for z in (pair.x, pair.y))
+    of_command, of_answer = (_sudden(found, z, run) for z in (pair.x, pair.y))
+    sudden = max(of_command, min(of_answer, _ECHO * of_command))  # jumps that nothing commands are of no timing
     unsigned = np.sqrt(np.nanmean((np.abs(y) - np.abs(pair.x[part])) ** 2))
     return bool(sudden > 0.3 * deviation or unsigned < 0.3 * deviation)
 

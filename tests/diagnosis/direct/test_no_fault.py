@@ -1,0 +1,106 @@
+"""What healthy channels beside a second measurement do, and looks like a fault; and a fault that hid beside one."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from diagnosis.direct.assess import assess_pair
+from diagnosis.direct.inputs import Pair
+from diagnosis.results.assessment import Finding
+from replay.faults import FaultMode, Side
+from replay.machine.config import Limits, Noise
+
+DT, SECONDS = 0.01, 60.0
+N = round(SECONDS / DT)
+T = np.arange(N) * DT
+Array = np.ndarray
+LIMITS = Limits()
+
+
+def found(side: Side, y: Array, x: Array) -> list[Finding]:
+    sensor = side is Side.SENSOR
+    quiet = np.zeros(N, np.bool_)
+    pair = Pair(
+        side=side,
+        y=y,
+        x=x,
+        fresh=np.isfinite(y),
+        alive=np.ones(N, np.bool_),
+        quiet=quiet,
+        dt=DT,
+        unit="m/s" if sensor else "of full opening",
+        span=1.5 if sensor else 1.0,
+        y_name="y",
+        x_name="x",
+        known_noise=Noise(),
+    )
+    return assess_pair(pair, LIMITS).findings  # type: ignore[return-value]
+
+
+def noise(sigma: float, seed: int = 1) -> Array:
+    return np.random.default_rng(seed).normal(0.0, sigma, N)
+
+
+def command() -> Array:
+    """Moves for two seconds in six, and holds between."""
+    return 0.6 * np.clip(3.0 * np.sin(2 * np.pi * T / 12.0), -1.0, 1.0)
+
+
+def test_a_precise_sensor_at_a_steady_speed_is_not_stuck_beside_a_noisy_one() -> None:
+    speed = command()
+    assert not found(Side.SENSOR, speed + noise(5e-4), speed + noise(0.006, 2))
+
+
+def test_a_reading_that_is_off_by_a_hundredth_is_not_stuck() -> None:
+    speed = command()
+    y = np.where((T > 20.0) & (T < 21.0), 1.012 * speed, speed)
+    y[(T > 20.2) & (T < 20.8)] = y[round(20.2 / DT)]
+    assert not [f for f in found(Side.SENSOR, y + noise(2e-4), speed + noise(2e-4, 2)) if f.mode is FaultMode.STUCK]
+
+
+@pytest.mark.parametrize("near_rest", [True, False])
+def test_wild_readings_count_unless_the_wheel_starts(*, near_rest: bool) -> None:
+    speed = 0.6 * (T % 10.0 > 3.0)
+    speed = np.convolve(speed, np.ones(50) / 50, mode="same")
+    y = speed + noise(0.002)
+    at = round((43.2 if near_rest else 47.0) / DT)
+    y[at : at + 6] += np.array([0.2, -0.25, 0.22, -0.2, 0.25, -0.2])
+    assert bool(found(Side.SENSOR, y, speed + noise(0.002, 2))) is not near_rest
+
+
+def test_zeros_a_hundredth_apart_are_no_loss() -> None:
+    opening = 0.05 * np.sign(np.sin(2 * np.pi * T / 9.0)) * (T % 9.0 < 8.0)
+    assert not found(Side.ACTUATOR, opening + 0.006 + noise(0.001), opening)
+
+
+def test_an_opening_within_a_dead_band_of_its_command_is_not_stuck() -> None:
+    opening = command()
+    part = (T > 30.0) & (T < 32.0)
+    x = np.where(part, 0.025 * (np.floor(T / 0.04) % 2), opening)
+    y = np.where(part, 0.012, opening)
+    assert not [f for f in found(Side.ACTUATOR, y + noise(0.001), x) if f.mode.total]
+
+
+def test_a_valve_that_fades_between_harmless_gains_is_told() -> None:
+    """Its path is disturbed while it fades, and of a gain of 1.01 before and behind it."""
+    opening = command()
+    fades = np.zeros(N)
+    for start in (11.0, 23.0, 35.0):
+        part = (start <= T) & (start + 3.0 > T)
+        fades[part] = 0.6 * (T[part] - start) / 3.0
+    y = opening * np.where(fades > 0.0, 1.0 - fades, 1.012)
+    told = found(Side.ACTUATOR, y + noise(0.002), opening)
+    assert len(told) >= 3
+    assert all(any(f.start * DT < s + 2.5 and f.stop * DT > s + 0.5 for f in told) for s in (11.0, 23.0, 35.0))
+
+
+def test_a_burst_of_noise_is_less_probable_than_a_lasting_one() -> None:
+    opening = command()
+    probability = []
+    for stop in (31.0, 40.0):
+        y = opening + noise(0.003)
+        part = (T > 30.2) & (stop > T)
+        y[part] += np.random.default_rng(4).normal(0.0, 0.05, np.count_nonzero(part))
+        probability.append(max((f.probability for f in found(Side.ACTUATOR, y, opening)), default=0.0))
+    assert probability[0] < 0.8 < 0.95 < probability[1]
