@@ -124,6 +124,7 @@ def _wheels(cells: Cells) -> Iterator[Gauges]:
     used, share = np.where(np.isfinite(opening), opening, command), -np.log1p(-clear_at)
     followed = as_followed(cells, opening, command, wheels.OPENING)
     responses = wheels.responses_of(cells, speed, used, cells.reference)
+    follows = wheels.speeds_follow_openings(cells)
     delays, rough = late(speed, cells.reference, cells.dt), wheels.roughness_of(cells, speed)
     for i, name in enumerate(cells.machine.wheels):
         v, u, a, x = (z[:, i] for z in (speed, command, opening, second))
@@ -134,7 +135,7 @@ def _wheels(cells: Cells) -> Iterator[Gauges]:
         moving = (np.abs(motion) > wheels.MOVING * top / 0.36) & ~_stated(cells, name)
         ratio = None
         lasting: dict[Deviation, float] = {}
-        if _known(used[:, i]) and speed.shape[1] > wheels.OTHERS:
+        if _known(used[:, i]) and speed.shape[1] > wheels.OTHERS and (follows or not (twice and measured)):
             below, above = (np.array(pair) * share for pair in wheels.RESPONSE[twice, measured])
             off = np.where(cells.explained(name), np.nan, responses.windows[:, i])
             usual, back = responses.usual[i], (~responses.ahead[:, i]).astype(np.intp)

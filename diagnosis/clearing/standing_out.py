@@ -98,7 +98,7 @@ def _alone(checks: Sequence[Checked], cells: Cells) -> Checked | None:
     for c in checks:
         if c.kind is Kind.WHEEL and c.check in _BESIDE_OTHERS and c.worst is not None:
             worst[c.component] = max(worst.get(c.component, c), c, key=_times)
-    if len(worst) < _WHEELS:
+    if len(worst) < _WHEELS or not wheels.speeds_follow_openings(cells):
         return None
     first, second, *_ = sorted(worst.values(), key=_times, reverse=True)
     alone = _times(second) <= max(_OTHERS, _times(first) / _BY_FAR) and _times(first) >= max(
