@@ -34,9 +34,9 @@ VALVE = 1.4  # dead band and hysteresis of a healthy valve: the limit as a multi
 #: others as strictly; what reads too much is in no row of the tables, so that nothing else would tell it.
 RESPONSE = {
     (False, False): ((0.75, 0.65), (0.9, 0.7)),
-    (True, False): ((2.0, 1.2), (1.4, 1.05)),
+    (True, False): ((1.4, 1.15), (1.25, 0.95)),
     (False, True): ((1.15, 1.0), (1.4, 1.2)),
-    (True, True): ((3.0, 2.0), (3.0, 2.0)),
+    (True, True): ((2.0, 1.4), (2.0, 1.4)),
 }
 
 
