@@ -125,6 +125,20 @@ def test_a_shaft_carries_nothing_within_its_gears_play_and_dry_friction_stops(
     assert physics.dry(0.5, -0.1, 0.05) == pytest.approx(0.35)
 
 
+def test_an_encoder_shows_a_steady_speed_without_glitches(electric: ModuleType) -> None:
+    import electric_control as control
+
+    made = electric.build(SEEDS[0])[0]._replace(uneven=0.06, tick=1e-6)
+    teeth = np.random.default_rng(5).uniform(-0.5, 0.5, 64)
+    for speed, pitch in ((0.8, 0.003), (-0.46, 0.005), (0.05, 0.0015)):
+        e, shown = np.zeros(6), []
+        for k in range(1, 8001):
+            control.edges(e, speed * k * 0.0005, speed, k * 0.0005, pitch, teeth, made)
+            if k % 20 == 0:
+                shown.append(control.timed(e, k * 0.0005, pitch))
+        assert np.abs(np.array(shown[20:]) / speed - 1).max() < 0.07
+
+
 def test_a_fast_or_hot_motor_gives_less(electric: ModuleType, physics: ModuleType) -> None:
     made, parts = electric.build(SEEDS[0])
 

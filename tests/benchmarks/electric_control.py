@@ -48,15 +48,25 @@ def hit(good: float, e: float, sat: float, held: Array, i: int) -> float:
 
 
 @nb.njit(cache=True)
+def edge_at(k: int, teeth: Array, b: Build) -> float:
+    """Where an edge stands, in pitches: a little beside its place."""
+    return k + b.uneven * teeth[k % teeth.size]
+
+
+@nb.njit(cache=True)
 def edges(e: Array, way: float, speed: float, now: float, pitch: float, teeth: Array, b: Build) -> None:
-    """Count edges that passed in a step and note when the last did, in ticks of the timer; edges stand a little unevenly."""
+    """Count edges that passed in a step and note when the last did, in ticks of the timer."""
     at = way / pitch
-    tooth = math.floor(at + b.uneven * teeth[math.floor(at) % teeth.size])
-    if tooth != e[COUNT]:
-        behind = (at - (tooth if tooth > e[COUNT] else tooth + 1)) * pitch
-        late = min(abs(behind / speed), H) if abs(speed) > 1e-4 else 0.0
+    k = math.floor(at)
+    if at < edge_at(k, teeth, b):
+        k -= 1
+    elif at >= edge_at(k + 1, teeth, b):
+        k += 1
+    if k != e[COUNT]:
+        behind = at - edge_at(k if k > e[COUNT] else k + 1, teeth, b)
+        late = min(abs(behind * pitch / speed), H) if abs(speed) > 1e-4 else 0.0
         e[EDGE_T] = math.floor((now - late) / b.tick) * b.tick
-        e[COUNT] = tooth
+        e[COUNT] = k
 
 
 @nb.njit(cache=True)
