@@ -149,9 +149,8 @@ def measure_redundant(m: int, seen: RedundantBlock, g: float, rate_limit: float,
     a = ACTUATOR[m]
     likelihood = 0.0
     if not np.isnan(seen.angle):
-        likelihood += _linear(
-            m, 1.0, 0.0, 0.0, seen.angle - z[m, 0] - bank.gap[m, 0], seen.angle_variance + bank.gap[m, 1], z, P, bank.room
-        )
+        innovation = seen.angle - z[m, 0] - bank.gap[m, 0]
+        likelihood += _linear(m, 1.0, 0.0, 0.0, innovation, seen.angle_variance + bank.gap[m, 1], z, P, bank.room)
     if not np.isnan(seen.opening):
         expected = seen.command if a == HEALTHY else 0.0
         by_a = by_b = 0.0
