@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import Any
@@ -18,6 +18,7 @@ from diagnosis.report.page import build_page
 from diagnosis.report.plot_data import axis_of
 from diagnosis.results.document import ReportDocument
 from diagnosis.results.json_text import writable
+from diagnosis.results.restored import KEY, Layout, restored, sources_of
 from diagnosis.results.result import Closeups, MissionResult
 from diagnosis.results.stored import grid_of, grids_of, stored
 from diagnosis.results.validation import report_of
@@ -52,18 +53,20 @@ def write_result(result: MissionResult, folder: Path, *, max_size_mb: float = 8.
     OutputError
         Where the folder cannot be written.
     """
-    grids = grids_of(result.columns, {s["name"]: s["lsb"] for s in result.report["signals"] if s["lsb"]})
-    columns = {k: v if k == "t" else stored(k, v, grids[k]) for k, v in result.columns.items()}
-    windows = result.windows
+    lsb = {s["name"]: s["lsb"] for s in result.report["signals"] if s["lsb"]}
+    before = result.layout
+    steps = {**grids_of(result.columns, lsb), **(before.steps if before else {})}
+    columns, layout = _kept(result.columns, steps, before.made_of if before else None)
+    windows, near_layout = result.windows, Layout([])
     if windows is not None:
-        near = {k: stored(k, v, grids[k] if k in grids else grid_of(k, v)) for k, v in windows.columns.items()}
+        near, near_layout = _kept(windows.columns, {k: grid_of(k, v) for k, v in windows.columns.items()} | steps)
         windows = Closeups(windows.step, near)
     paths = tuple(folder / name for name in (HTML, JSON, PARQUET, *([] if windows is None else [WINDOWS])))
     report: ReportDocument = writable(result.report)
     with _made(folder), atomic_paths(*paths) as (html, document, table, *more):
-        _write_table(columns, table)
+        _write_table(columns, table, layout)
         for path in more:
-            _write_table({"step": windows.step, **windows.columns} if windows else {}, path)
+            _write_table({"step": windows.step, **windows.columns} if windows else {}, path, near_layout)
         document.write_bytes(_json(report))
         _write_text(build_page(report, columns, closeups=windows, max_size_mb=max_size_mb), html)
     if windows is None:
@@ -84,13 +87,24 @@ def _made(folder: Path) -> Iterator[None]:
         yield
 
 
-def _write_table(columns: Mapping[str, NDArray[Any]], path: Path) -> None:
+def _kept(
+    exact: Mapping[str, NDArray[Any]], grids: Mapping[str, float], among: Collection[str] | None = None
+) -> tuple[dict[str, NDArray[Any]], Layout]:
+    """Columns as a reader of the file gets them, and which of them the file makes of others."""
+    kept = {k: v if k == "t" else stored(k, v, grids[k]) for k, v in exact.items()}
+    made_of = sources_of(exact, kept, grids, among)
+    layout = Layout(list(kept), made_of, {k: grids[k] for k in kept})
+    return restored({k: v for k, v in kept.items() if k not in made_of}, layout), layout
+
+
+def _write_table(columns: Mapping[str, NDArray[Any]], path: Path, layout: Layout) -> None:
     """Write columns without a copy (and without pandas, which pyarrow would load for its own conversion)."""
+    own = {k: v for k, v in columns.items() if k not in layout.made_of}
     arrays = [
         pa.Array.from_buffers(pa.from_numpy_dtype(v.dtype), len(v), [None, pa.py_buffer(np.ascontiguousarray(v))])
-        for v in columns.values()
+        for v in own.values()
     ]
-    table = pa.Table.from_arrays(arrays, names=list(columns))
+    table = pa.Table.from_arrays(arrays, names=list(own), metadata=layout.metadata())
     with path.open("wb") as file:  # pyarrow opens no name that is not UTF-8
         pq.write_table(
             table,
@@ -103,34 +117,37 @@ def _write_table(columns: Mapping[str, NDArray[Any]], path: Path) -> None:
         )
 
 
-def _read_table(path: Path) -> dict[str, NDArray[Any]]:
+def _read_table(path: Path) -> tuple[dict[str, NDArray[Any]], Layout]:
+    """Columns of a file, and how they stand in it."""
     try:
         with path.open("rb") as file:
             table = pq.read_table(file)
         columns = {name: table.column(name).to_numpy() for name in table.column_names}
+        layout = Layout.stated((table.schema.metadata or {}).get(KEY), list(columns))
     except (OSError, pa.ArrowException, ValueError, KeyError, TypeError, OverflowError) as error:
         said = " ".join(str(error).split())[:200]
         raise LogError(f"{path}: cannot be read ({said}); {_AGAIN}") from error
     if wrong := next((name for name, values in columns.items() if values.dtype.kind not in "fiu"), None):
         raise LogError(f"{path}: column {wrong[:80]!r} holds no numbers; {_AGAIN}")
     kept = (np.float32, np.float64)  # what this tool writes; whole numbers and halves that another wrote become floats
-    return {k: v if k == "step" or v.dtype in kept else v.astype(np.float64) for k, v in columns.items()}
+    numbers = {k: v if k == "step" or v.dtype in kept else v.astype(np.float64) for k, v in columns.items()}
+    return restored(numbers, layout), layout
 
 
-def _read_columns(path: Path, rate: float) -> dict[str, NDArray[Any]]:
-    """Time series of a result, on one uniform axis."""
-    columns = _read_table(path)
+def _read_columns(path: Path, rate: float) -> tuple[dict[str, NDArray[Any]], Layout]:
+    """Time series of a result, on one uniform axis, and how they stand in the file."""
+    columns, layout = _read_table(path)
     try:
         axis_of(columns, rate)
     except ValueError as error:
         raise LogError(f"{path}: {error}; {_AGAIN}") from error
-    return columns
+    return columns, layout
 
 
 def _read_windows(path: Path) -> Closeups | None:
     if not path.exists():
         return None
-    columns = _read_table(path)
+    columns, _ = _read_table(path)
     step = columns.pop("step", None)
     if step is None or step.dtype.kind != "i" or (np.diff(step) < 1).any():
         raise LogError(f"{path}: column 'step' is missing or does not increase; {_AGAIN}")
@@ -184,8 +201,8 @@ def load_result(path: Path) -> MissionResult:
         Where one of its files is missing, damaged, or not of this tool.
     """
     report = load_report(path)
-    columns = _read_columns(path.with_name(PARQUET), report["log"]["rate_hz"])
-    return MissionResult(report, columns, _read_windows(path.with_name(WINDOWS)))
+    columns, layout = _read_columns(path.with_name(PARQUET), report["log"]["rate_hz"])
+    return MissionResult(report, columns, _read_windows(path.with_name(WINDOWS)), layout if layout.steps else None)
 
 
 def load_report(path: Path) -> ReportDocument:

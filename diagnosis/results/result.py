@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from diagnosis.results.document import ReportDocument
+from diagnosis.results.restored import Layout
 from diagnosis.results.size_rows import EpsilonRow
 from diagnosis.results.vocabulary import Kind, Severity, Tier
 from replay.faults import FaultMode, Side, State
@@ -175,11 +176,14 @@ class MissionResult:
         Time series on one uniform axis; ``t`` [s] first. Of long missions they are envelopes: see `replay.arrays.envelope`.
     windows : Closeups or None
         Every sample around the worst faults, where the columns are envelopes.
+    layout : Layout or None
+        How the columns stood in the file that they were read from.
     """
 
     report: ReportDocument
     columns: Mapping[str, NDArray[np.float64] | NDArray[np.float32]] = field(default_factory=dict)
     windows: Closeups | None = None
+    layout: Layout | None = None
 
 
 def _plain(value: Any) -> Any:

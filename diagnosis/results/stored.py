@@ -20,6 +20,7 @@ _HUGE, _LEAST = 1e30, 1e-30
 _BITS = {"evidence": (10, 10), "replay": (11, 11)}
 _ESTIMATE = (8, 8)  # δ̂, δ̄ and their deviations: a hundredth part of how well they are known
 _RECORDED, _WITH_LSB = 14, 16
+_RECORDED_OF = {"e": "v", "u_difference": "u"}
 
 
 def grid_of(name: str, values: NDArray[np.floating], lsb: float | None = None) -> float:
@@ -59,8 +60,15 @@ def _bits_of(name: str, otherwise: tuple[int, int]) -> tuple[int, int]:
 
 
 def grids_of(columns: Mapping[str, NDArray[np.floating]], lsb: Mapping[str, float]) -> dict[str, float]:
-    """Step of every column's grid, as `grid_of`."""
-    return {name: grid_of(name, values, lsb.get(name)) for name, values in columns.items()}
+    """Step of every column's grid, as `grid_of`; a difference from a recorded column is no finer than that one's."""
+    grids = {name: grid_of(name, values, lsb.get(name)) for name, values in columns.items()}
+    for name in grids:
+        group, _, rest = name.partition(".")
+        part, _, leaf = rest.rpartition(".")
+        if group == "replay" and leaf in _RECORDED_OF:
+            recorded = (f"{kind}.{part}.{_RECORDED_OF[leaf]}" for kind in ("wheel", "steer"))
+            grids[name] = max(grids[name], *(grids.get(r, 0.0) for r in recorded))
+    return grids
 
 
 def _put_on_grid(part: NDArray[np.float32], grid: np.float32) -> None:

@@ -145,60 +145,60 @@ def _forget(m: int, i: int, std: float, z: Array, P: Array) -> None:
 @njit(cache=True, error_model="numpy")
 def measure_redundant(m: int, seen: RedundantBlock, g: float, rate_limit: float, bank: FilterBank) -> float:
     """Update with the second angle, the valve's opening and its share of the command; returns the log-likelihood."""
-    z, h = bank.mean, bank.room[0]
+    z, P = bank.mean, bank.cov
     a = ACTUATOR[m]
     likelihood = 0.0
     if not np.isnan(seen.angle):
-        h[:] = 0.0
-        h[0] = 1.0
-        likelihood += _linear(m, seen.angle - z[m, 0] - bank.gap[m, 0], seen.angle_variance + bank.gap[m, 1], bank)
+        innovation = seen.angle - z[m, 0] - bank.gap[m, 0]
+        likelihood += _linear(m, 1.0, 0.0, 0.0, innovation, seen.angle_variance + bank.gap[m, 1], z, P, bank.room)
     if not np.isnan(seen.opening):
         expected = seen.command if a == HEALTHY else 0.0
-        h[:] = 0.0
+        by_a = by_b = 0.0
         if a != HEALTHY and a != NO_SIGNAL:
             if a != STUCK:
-                h[2] = seen.command
+                by_a = seen.command
                 expected += z[m, 2] * seen.command
             if a != INEFFICIENT:
-                h[3] = 1 / g
+                by_b = 1 / g
                 expected += z[m, 3] / g
-        one = _linear(m, seen.opening - expected, seen.opening_variance, bank)
+        one = _linear(m, 0.0, by_a, by_b, seen.opening - expected, seen.opening_variance, z, P, bank.room)
         if one == _OUTLIER and a == STUCK:
             _forget(m, np.int64(3), rate_limit, z, bank.cov)
         likelihood += one
     if not np.isnan(seen.share):
         expected = 1.0 if a == HEALTHY else 0.0
-        h[:] = 0.0
+        by_a = 0.0
         if a in (INEFFICIENT, NOISY):
-            h[2], expected = 1.0, z[m, 2]
-        likelihood += _linear(m, seen.share - expected, seen.share_variance, bank)
+            by_a, expected = 1.0, z[m, 2]
+        likelihood += _linear(m, 0.0, by_a, 0.0, seen.share - expected, seen.share_variance, z, P, bank.room)
     if a in (INEFFICIENT, NOISY):
         z[m, 2] = min(max(z[m, 2], _LEAST_GAIN), _MOST_GAIN)
     return float(likelihood)
 
 
 @njit(cache=True, error_model="numpy")
-def _linear(m: int, innovation: float, r: float, bank: FilterBank) -> float:
-    """Kalman update with one linear measurement H = `bank.room[0]`; an outlier teaches nothing. Returns the log-likelihood.
-
-    Only φ, a and b are measured so.
-    """
-    z, P, h, gain = bank.mean, bank.cov, bank.room[0], bank.room[1]
+def _linear(
+    m: int, h0: float, h2: float, h3: float, innovation: float, r: float, z: Array, P: Array, room: Array
+) -> float:
+    """Kalman update with one measurement of φ, a and b alone; an outlier teaches nothing. Returns the log-likelihood."""
+    if h0 == 0.0 and h2 == 0.0 and h3 == 0.0:
+        likelihood = -0.5 * (innovation * innovation / r)
+        return _OUTLIER if likelihood < _OUTLIER else likelihood
     total = r
     for n in range(FREE[m]):
         i = ACTIVE[m, n]
-        gain[i] = P[m, i, 0] * h[0] + P[m, i, 2] * h[2] + P[m, i, 3] * h[3]
-    for n in range(FREE[m]):
-        i = ACTIVE[m, n]
-        total += h[i] * gain[i]
+        room[1, i] = P[m, i, 0] * h0 + P[m, i, 2] * h2 + P[m, i, 3] * h3
+    total += h0 * room[1, 0]
+    total += h3 * room[1, 3]
+    total += h2 * room[1, 2]
     # relative to what the measurement's own noise gives
     likelihood = -0.5 * (innovation * innovation / total + log(total / r))
     if likelihood < _OUTLIER:
         return _OUTLIER
     for n in range(FREE[m]):
         i = ACTIVE[m, n]
-        share = gain[i] / total
+        share = room[1, i] / total
         z[m, i] += share * innovation
         for k in range(FREE[m]):
-            P[m, i, ACTIVE[m, k]] -= share * gain[ACTIVE[m, k]]
+            P[m, i, ACTIVE[m, k]] -= share * room[1, ACTIVE[m, k]]
     return float(likelihood)

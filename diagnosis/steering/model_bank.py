@@ -50,5 +50,5 @@ def _active_states(sensor: int, actuator: int) -> list[int]:
 
 _ACTIVE = [_active_states(sensor, actuator) for sensor, actuator in _MODELS]
 #: States that each model frees, the first `FREE` of each line.
-ACTIVE = np.array([free + [2] * (STATES - len(free)) for free in _ACTIVE])
-FREE = np.array([len(free) for free in _ACTIVE])
+ACTIVE = np.array([free + [2] * (STATES - len(free)) for free in _ACTIVE], np.uint64)
+FREE = np.array([len(free) for free in _ACTIVE], np.uint64)

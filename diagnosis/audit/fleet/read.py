@@ -154,7 +154,9 @@ def read_missions(store: Path) -> list[Mission]:
         for r, component, side, driving, decided, e, low, high, relative in db.rows(_PARTS):
             bounds = None if e is None or low is None or high is None else Bounds(e, low, high)
             parts[r].append(Part(component, sides[side], driving, decided, bounds, relative != 0))
-        results = {row[0]: _result(row, tuple(faults[row[0]]), tuple(parts[row[0]])) for row in db.rows(_RESULTS)}
+        rows = db.rows(_RESULTS)
+        names = rows[0].keys() if rows else []
+        results = {row[0]: _result(names, row, tuple(faults[row[0]]), tuple(parts[row[0]])) for row in rows}
         missions = [
             Mission(name, tuple(map(str, json.loads(files))), size, results.get(r), bool(gone))
             for name, files, size, r, gone in db.rows(_MISSIONS)
@@ -228,8 +230,8 @@ def _opened(store: Path) -> Database:
     return Database(store / FILE_NAME if store.is_dir() else store, read_only=True)
 
 
-def _result(row: sqlite3.Row, faults: tuple[FoundFault, ...], parts: tuple[Part, ...]) -> Result:
-    values = dict(zip(row.keys(), _plausible(row), strict=True))
+def _result(names: Sequence[str], row: sqlite3.Row, faults: tuple[FoundFault, ...], parts: tuple[Part, ...]) -> Result:
+    values = dict(zip(names, _plausible(row), strict=True))
     start, verdict = values["start_ns"], values["verdict"]
     values["start_ns"] = start if start is not None and start >= CALENDAR_NS else None
     values["state"] = MissionState(values["state"])

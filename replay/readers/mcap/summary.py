@@ -28,7 +28,7 @@ class Summary:
     checked : bool
         Whether it has a checksum, and it is right.
     sound : bool
-        Whether all its records could be read and its checksum, if any, is right.
+        Whether all its records could be read, none of them is one of the data, and its checksum, if any, is right.
     names : tuple[tuple[int, bytes, int], ...]
         Opcode, content and place of schema and channel records.
     statistics : Statistics or None
@@ -153,6 +153,7 @@ def _bounded(places: NDArray[np.int64]) -> NDArray[np.int64]:
 
 
 def _flawed(rows: NDArray[np.int64]) -> bool:
-    """Whether any row is a hole or had to be mended; unknown records of a later version of the format are no flaw."""
+    """Whether any row is a hole, of the data section, or had to be mended; unknown records of a later version are no flaw."""
     op, flag = rows[:, 0], rows[:, 3]
-    return bool(((op == fmt.HOLE) | ((flag == fmt.MENDED) & (op <= fmt.DATA_END))).any())
+    data = (op == fmt.CHUNK) | (op == fmt.MESSAGE) | (op == fmt.ATTACHMENT)
+    return bool((data | (op == fmt.HOLE) | ((flag == fmt.MENDED) & (op <= fmt.DATA_END))).any())

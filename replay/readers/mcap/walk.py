@@ -40,6 +40,10 @@ def walk_file(file: McapFile) -> None:
         take_listed_names(file, file.summary)
         if closed and not file.summary.sound:
             file.lost("summary", "its summary is damaged (checksum or records); topics and counts may be wrong")
+    if (behind[:, 0] == fmt.MESSAGE).any():  # what stands there is no part of the log and is not counted
+        file.loose = scan.Tally()
+        scan.walk(data, len(fmt.MAGIC), int(behind[0, 1]), file.names.named.copy(), file.loose)
+    _say_left_behind(file, behind)
     _take_rows(file, inside, closed)
     if not closed:
         _find_cut(file, inside)
@@ -74,6 +78,16 @@ def _say_ending(file: McapFile, rows: NDArray[np.int64], closed: bool) -> None:
         f"{file.path.name} ends without a footer ({where}): {len(file.data) - last} bytes after byte {last} "
         "hold no complete record"
     )
+
+
+def _say_left_behind(file: McapFile, behind: NDArray[np.int64]) -> None:
+    """Say which records of data stand behind the end of the data, where no recorder writes any."""
+    for op, name in ((fmt.CHUNK, "chunk"), (fmt.MESSAGE, "message"), (fmt.ATTACHMENT, "attachment")):
+        found = behind[behind[:, 0] == op]
+        if len(found):
+            count = int(found[:, 3].sum()) if op == fmt.MESSAGE else len(found)
+            text = f"{count} {name}{'s' * (count > 1)} from byte {found[0, 1]} stand behind the end of its data and were left out"
+            file.lost("record", text)
 
 
 def _check_footer(file: McapFile, place: int, ended: bool) -> None:

@@ -115,6 +115,20 @@ def test_a_chunk_without_content_at_the_end_of_the_file(tmp_path: Path) -> None:
     assert told(path, whole)
 
 
+@pytest.mark.parametrize("indexed", [False, True])
+def test_records_of_data_behind_the_end_of_the_data_are_told(tmp_path: Path, indexed: bool) -> None:
+    raw = build()
+    start = len(MAGIC) + len(record(1, text("") + text("")))
+    chunk = raw[start : raw.index(record(15, bytes(4)))]
+    message = record(5, struct.pack("<HIQQ", 1, 0, T0, T0) + b"\0\1\0\0" + bytes(8))
+    whole = build(extra=chunk + 2 * message)
+    if not indexed:  # a summary that lists no chunk is walked in any case
+        whole = build(extra=chunk + 2 * message, length=1)
+    said = told(tmp_path / "log.mcap", whole)
+    assert any("1 chunk from byte" in words and "behind the end of its data" in words for words in said), said
+    assert any("2 messages from byte" in words for words in said), said
+
+
 def test_arrays_that_no_message_fills_cost_nothing(tmp_path: Path) -> None:
     payloads, line = [], "=" * 80
     for i in range(COUNT):
