@@ -22,6 +22,7 @@ from replay.readers.tables.row_kernel import FILLED, MISSING, MOMENT, TEXT
 from replay.readers.tables.rows import MAX_COLUMNS, Dialect, Rows
 from replay.readers.tables.text_file import BLOCK, TextFile, decoded
 from replay.readers.tables.time_cells import TimeBase
+from replay.readers.tables.title_lines import LOOKED_AT, is_number, title_lines
 from replay.readers.tables.units_row import units_of_row
 
 SEPARATORS = ("\t", ";", ",", "|")
@@ -131,15 +132,10 @@ def separator_of(lines: list[str]) -> str | None:
             rows = [line.split(mark) for line in lines]
         width, agree = Counter(len(row) for row in rows).most_common(1)[0]
         cells = rows[-1] if len(rows) < 3 else rows[-2]
-        numeric = sum(_is_number(c) for c in cells)
+        numeric = sum(is_number(c) for c in cells)
         if width > 1 and agree * 2 > len(rows) and numeric and numeric * (mark != "," or 0.9) > score - 1:
             best, score = (mark, numeric + 1.0) if best is None or numeric > score - 1 else (best, score)
     return best
-
-
-def _is_number(cell: str) -> bool:
-    # possessive: a cell of very many digits is looked at once
-    return re.fullmatch(r"\s*+\"?[+-]?(\d++([.,]\d*+)?|[.,]\d++)([eE][+-]?\d++)?\"?\s*+", cell) is not None
 
 
 def open_text(path: Path, options: SourceOptions, report: Report) -> TextTable:
@@ -162,7 +158,7 @@ def open_text(path: Path, options: SourceOptions, report: Report) -> TextTable:
         if error.end < len(head) - 3:
             report.note(f"{path.name} is not UTF-8; it was read as Windows-1252, so some letters may be wrong")
     skipped, at, stated = _first_line(head)
-    lines = [x for x in decoded(head[at : at + HEAD]).splitlines()[:50] if x.strip()]
+    lines = [x for x in decoded(head[at : at + HEAD]).splitlines()[:LOOKED_AT] if x.strip()]
     separator = options.separator or stated
     if separator is None and len(lines) > 1:
         separator = separator_of(lines)
@@ -178,6 +174,7 @@ def open_text(path: Path, options: SourceOptions, report: Report) -> TextTable:
         raise LogError(
             f"{path}: separator = {separator!r} is not one plain character; give [sources] separator such as ';'"
         )
+    at += _titles(file, head, at, separator)
     names, size = _names(file, head, at, separator, skipped)
     skip = at + size
     below = head[skip : head.find(b"\n", skip) + 1]
@@ -203,13 +200,25 @@ def _first_line(head: bytes) -> tuple[bytes, int, str | None]:
     return skipped, at + (stated.end() if stated else 0), decoded(stated[1]) if stated else None
 
 
+def _titles(file: TextFile, head: bytes, at: int, separator: str) -> int:
+    """Bytes of the lines above the header."""
+    raw = head[at:].split(b"\n", LOOKED_AT)[:LOOKED_AT]
+    lines = [decoded(line).rstrip("\r") for line in raw]
+    above = title_lines(lines, separator)
+    titles = [line.strip(separator + " ") for line in lines[:above] if line.strip(separator + " ")]
+    if titles:
+        shown = "; ".join(title[:60] for title in titles[:3]) + ("; …" if len(titles) > 3 else "")
+        file.report.note(f"{file.path.name}: its header is its line {above + 1}; above it: {shown}")
+    return sum(len(line) + 1 for line in raw[:above])
+
+
 def _names(file: TextFile, head: bytes, at: int, separator: str, skipped: bytes) -> tuple[tuple[str, ...], int]:
     """Unique names of the columns, and how many bytes their header takes; 0 where there is none."""
     path, report = file.path, file.report
     names, size = _header(path, head[at:], separator)
     if len(names) > MAX_COLUMNS:
         raise LogError(f"{path} has {len(names)} columns; at most {MAX_COLUMNS} are read")
-    if all(_is_number(c) or not c for c in names):
+    if all(is_number(c) or not c for c in names):
         if file.tail(at).rstrip().endswith(b"EOF"):
             raise LogError(
                 f'{path} looks like a TwinCAT Scope export without its header (header "None"), so its columns cannot be '
