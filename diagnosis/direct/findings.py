@@ -151,7 +151,8 @@ def _mode_of(isolated: Isolated, found: IdentifiedPair, limits: Limits) -> Fault
         away = np.count_nonzero(np.abs(seen.y - seen.x)[seen.use] > _CLEAR * noise) * found.pair.dt
         relation = found.relation
         returns = _LEFT_S + 2.0 * (relation.lag + max(0.0, relation.delay * found.pair.dt))
-        return None if seen.deviation < _CLEAR * noise or away < returns else mode
+        least = max(_CLEAR * noise, limits.min_sat / 2)  # a relation found in the mission is no truer than that
+        return None if seen.deviation < least or away < returns else mode
     known = seen.x[seen.use]
     at_rest = known.size and max(seen.deviation, float(np.max(np.abs(known)))) < limits.min_sat / 2
     return None if at_rest else mode  # it repeats what it had, which is true
