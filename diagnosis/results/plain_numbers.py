@@ -6,7 +6,10 @@ from math import isfinite
 
 
 def plain(value: float, digits: int = 3) -> str:
-    """A value in significant digits without an exponent: ``127``, ``0.0031``; below a millionth 0."""
+    """A value in significant digits without an exponent: ``127``, ``0.0031``; below a millionth 0.
+
+    In the unit of the value [any].
+    """
     text = f"{value:.{digits}g}"
     if "e" not in text or not isfinite(value):
         return text

@@ -59,7 +59,7 @@ def _bits_of(name: str, otherwise: tuple[int, int]) -> tuple[int, int]:
 
 
 def grids_of(columns: Mapping[str, NDArray[np.floating]], lsb: Mapping[str, float]) -> dict[str, float]:
-    """Step of every column's grid, as `grid_of`."""
+    """Step of every column's grid, as `grid_of`. Columns of shape (n,); each step in its column's unit."""
     return {name: grid_of(name, values, lsb.get(name)) for name, values in columns.items()}
 
 

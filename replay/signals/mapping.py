@@ -281,7 +281,10 @@ def _sparse(stamps: NDArray[np.int64], values: NDArray[Any]) -> tuple[NDArray[np
 
 
 def sparse_rows(values: NDArray[Any]) -> NDArray[np.int64]:
-    """Rows of a slow column beside fast ones that hold its samples; all rows where the column is not slow."""
+    """Rows of a slow column beside fast ones that hold its samples; all rows where the column is not slow.
+
+    From shape (n,) to (k,).
+    """
     rows = np.flatnonzero(~np.isnan(values))
     steps = np.diff(rows)
     if len(rows) < 3 or len(rows) > 0.6 * len(values):

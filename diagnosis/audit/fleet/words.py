@@ -27,7 +27,7 @@ def count(n: int, word: str) -> str:
 
 
 def round_to(value: float, digits: int = 2) -> str:
-    """Few significant digits without an exponent."""
+    """Few significant digits without an exponent. In the unit of the value [any]."""
     text = f"{float(f'{value:.{digits}g}'):f}"
     return text.rstrip("0").rstrip(".") if "." in text else text
 
@@ -43,7 +43,7 @@ def open_words(is_open: bool, clean: int, needed: int) -> str:
 
 
 def forecast_words(f: Forecast, limit: float, axis: Axis = "hours") -> str:
-    """When a limit is reached, in one phrase."""
+    """When a limit is reached, in one phrase. `limit` has the unit of the trend [1 for ε]."""
     unit = _UNITS[axis]
     if f.state == "not_known":
         return f"not known: {f.why}"

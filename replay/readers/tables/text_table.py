@@ -22,7 +22,7 @@ from replay.readers.tables.row_kernel import FILLED, MISSING, MOMENT, TEXT
 from replay.readers.tables.rows import MAX_COLUMNS, Dialect, Rows
 from replay.readers.tables.text_file import BLOCK, TextFile, decoded
 from replay.readers.tables.time_cells import TimeBase
-from replay.readers.tables.title_lines import LOOKED_AT, is_number, title_lines
+from replay.readers.tables.title_lines import LOOKED_AT, is_number, skip_titles
 from replay.readers.tables.units_row import units_of_row
 
 SEPARATORS = ("\t", ";", ",", "|")
@@ -64,7 +64,7 @@ class TextTable:
         return Rows(self.file.path.name, self.dialect, len(self.names), report)
 
     def blocks(self, rows: Rows) -> Iterator[NDArray[np.int64]]:
-        """Parse all rows; see `Rows.blocks`."""
+        """Parse all rows; see `Rows.blocks`. Each of shape (columns, rows)."""
 
         def end(text: bytes) -> bytes:
             return self._whole_rows(text, rows.report)
@@ -81,6 +81,8 @@ class TextTable:
 
     def sample(self, text: bytes, dates: bool = True) -> dict[str, NDArray[Any]]:
         """First columns of some rows: int64, float64, or datetime64[ns] where they hold dates; no texts.
+
+        Each of shape (rows,).
 
         Parameters
         ----------
@@ -117,7 +119,7 @@ def _gathered(rows: Rows, text: bytes) -> list[NDArray[Any]]:
 
 
 def is_text(rows: Rows) -> NDArray[np.bool_]:
-    """Columns of which most cells that are not empty are neither numbers nor dates."""
+    """Columns of which most cells that are not empty are neither numbers nor dates. Shape (columns,)."""
     found: NDArray[np.bool_] = rows.columns[:, TEXT] > _MOSTLY * rows.columns[:, FILLED]
     return found
 
@@ -174,7 +176,7 @@ def open_text(path: Path, options: SourceOptions, report: Report) -> TextTable:
         raise LogError(
             f"{path}: separator = {separator!r} is not one plain character; give [sources] separator such as ';'"
         )
-    at += _titles(file, head, at, separator)
+    at += skip_titles(file, head, at, separator)
     names, size = _names(file, head, at, separator, skipped)
     skip = at + size
     below = head[skip : head.find(b"\n", skip) + 1]
@@ -198,18 +200,6 @@ def _first_line(head: bytes) -> tuple[bytes, int, str | None]:
         at = stop + 1
     stated = re.match(rb"sep=([^\r\n])\r?\n", head[at : at + 8])
     return skipped, at + (stated.end() if stated else 0), decoded(stated[1]) if stated else None
-
-
-def _titles(file: TextFile, head: bytes, at: int, separator: str) -> int:
-    """Bytes of the lines above the header."""
-    raw = head[at:].split(b"\n", LOOKED_AT)[:LOOKED_AT]
-    lines = [decoded(line).rstrip("\r") for line in raw]
-    above = title_lines(lines, separator)
-    titles = [line.strip(separator + " ") for line in lines[:above] if line.strip(separator + " ")]
-    if titles:
-        shown = "; ".join(title[:60] for title in titles[:3]) + ("; …" if len(titles) > 3 else "")
-        file.report.note(f"{file.path.name}: its header is its line {above + 1}; above it: {shown}")
-    return sum(len(line) + 1 for line in raw[:above])
 
 
 def _names(file: TextFile, head: bytes, at: int, separator: str, skipped: bytes) -> tuple[tuple[str, ...], int]:
@@ -287,6 +277,8 @@ def span(
     base: TimeBase, head: Sequence[NDArray[Any]] | None, tail: Sequence[NDArray[Any]] | None, count: int
 ) -> tuple[int, int]:
     """First and last stamp of a table [ns].
+
+    Cells of shape (rows,) each.
 
     Parameters
     ----------

@@ -7,6 +7,7 @@ import re
 from collections import Counter
 from collections.abc import Sequence
 
+from replay.readers.tables.text_file import TextFile, decoded
 from replay.readers.tables.units_row import units_of_row
 
 LOOKED_AT = 100
@@ -38,6 +39,30 @@ def title_lines(lines: Sequence[str], separator: str) -> int:
         if _may_name(row, width) and all(_filled(rows[j]) <= _filled(row) for j in below):
             return i
     return 0
+
+
+def skip_titles(file: TextFile, head: bytes, at: int, separator: str) -> int:
+    """Bytes of the lines above a table's header; the file's report gets a note of them.
+
+    Parameters
+    ----------
+    file : TextFile
+        The table.
+    head : bytes
+        Its beginning.
+    at : int
+        Where the first line begins [bytes].
+    separator : str
+        Between cells.
+    """
+    raw = head[at:].split(b"\n", LOOKED_AT)[:LOOKED_AT]
+    lines = [decoded(line).rstrip("\r") for line in raw]
+    above = title_lines(lines, separator)
+    titles = [line.strip(separator + " ") for line in lines[:above] if line.strip(separator + " ")]
+    if titles:
+        shown = "; ".join(title[:60] for title in titles[:3]) + ("; …" if len(titles) > 3 else "")
+        file.report.note(f"{file.path.name}: its header is its line {above + 1}; above it: {shown}")
+    return sum(len(line) + 1 for line in raw[:above])
 
 
 def is_number(cell: str) -> bool:
