@@ -47,7 +47,7 @@ _MEANINGS = {
 _ENGLISH = {word: meaning for meaning, words in _MEANINGS.items() for word in words.split()}
 # Words that say nothing more behind others: Gierrate, Ventil Y VR.
 _DROPPED = {"yaw_rate": ("rate", "geschwindigkeit", "vitesse", "vit"), "valve": ("y", "u")}
-_FILLERS = frozenset(("wert", "werte", "value", "val", "values"))
+_FILLERS = frozenset(("wert", "werte", "value", "val", "values", "percent", "pct", "prozent", "pourcent"))
 #: Words that ask for something: setpoints and commands, in English.
 ASKING = frozenset(
     ("ref", "reference", "cmd", "command", "commanded", "set", "setpoint", "des", "desired", "target", "demand", "soll",

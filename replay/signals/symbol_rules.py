@@ -215,9 +215,10 @@ def _family(channel: Channel, template: str) -> str:
 
 
 def _is_speed(last: Sequence[str], unit: str) -> bool:
-    """Whether words speak of a speed: by name, or as ``v`` or a joystick in a unit of speed."""
+    """Whether words speak of a speed: by name, or as ``v``, a joystick or nothing but a setpoint in a unit of speed."""
     speed = (known := known_unit(unit)) is not None and UNITS[known][0] == "speed"
-    return bool({"speed", "velocity", "vel"} & {*last}) or (speed and bool({"v", "joystick"} & {*last}))
+    says = {"v", "joystick"} & {*last} or {*last} <= ASKING
+    return bool({"speed", "velocity", "vel"} & {*last}) or (speed and bool(says))
 
 
 def _by_word(channel: Channel, text: str, last: Sequence[str], unit: str) -> Iterator[Candidate]:
