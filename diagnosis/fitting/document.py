@@ -13,7 +13,7 @@ SCHEMA = "mfhca-fit/1"
 
 
 def number(value: float | None) -> str:
-    """Four digits; a dash where there is none. In the unit of the value [any]."""
+    """Four digits; a dash where there is none."""
     return "–" if value is None else f"{value:.4g}"
 
 

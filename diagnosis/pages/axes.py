@@ -78,7 +78,7 @@ class Frame:
 
 
 def ticks(low: float, high: float, most: int) -> list[float]:
-    """At most `most` round values between two. In the unit of the axis [any]."""
+    """At most `most` round values between two. In the unit of the axis."""
     rough = (high - low) / most
     if not rough > 0:
         return [low]
@@ -91,7 +91,7 @@ def ticks(low: float, high: float, most: int) -> list[float]:
 def limits(*series: NDArray[np.float64], least: float = 0.0) -> tuple[float, float] | None:
     """Range that holds all finite values with a margin, at least `least` high; None where there is none.
 
-    In the unit of the series [any]; NaN are left out.
+    In the unit of the series; NaN are left out.
     """
     finite = [s[np.isfinite(s)] for s in series]
     values = np.concatenate(finite) if finite else np.zeros(0)

@@ -6,10 +6,7 @@ from math import isfinite
 
 
 def plain(value: float, digits: int = 3) -> str:
-    """A value in significant digits without an exponent: ``127``, ``0.0031``; below a millionth 0.
-
-    In the unit of the value [any].
-    """
+    """A value in significant digits without an exponent: ``127``, ``0.0031``; below a millionth 0."""
     text = f"{value:.{digits}g}"
     if "e" not in text or not isfinite(value):
         return text

@@ -26,5 +26,5 @@ def winds_up(raw: float, e: float, u_max: float) -> bool:
 
 @njit(cache=True)
 def bounded(value: float, bound: float) -> float:
-    """Projection of a parameter estimate onto ±bound. In the unit of the estimate [any]."""
+    """Projection of a parameter estimate onto ±bound. In the unit of the estimate."""
     return float(min(max(value, -bound), bound))

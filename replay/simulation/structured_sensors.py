@@ -13,7 +13,7 @@ _HALL_TIMEOUT = 250  # control steps without a pole after which the sensor reads
 
 @njit(cache=True)
 def play(value: float, held: float, half: float) -> float:
-    """Backlash: the output follows once the input has crossed the play. All in one unit [any]."""
+    """Backlash: the output follows once the input has crossed the play. All in one unit."""
     return float(min(max(held, value - half), value + half))
 
 

@@ -131,7 +131,7 @@ def bounds_row(b: Bounds | None) -> BoundsRow | None:
 
 
 def rounded(value: float | None) -> float | None:
-    """Six significant digits, None where there is no finite number. In the unit of the value [any]."""
+    """Six significant digits, None where there is no finite number."""
     return None if value is None or not np.isfinite(value) else six_digits(value)
 
 
@@ -149,5 +149,5 @@ def six_digits_of(values: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def six_digits(value: float) -> float:
-    """Six significant digits; the same on every computer. In the unit of the value [any]."""
+    """Six significant digits; the same on every computer."""
     return float(f"{value:.6g}") + 0.0

@@ -27,7 +27,7 @@ def count(n: int, word: str) -> str:
 
 
 def round_to(value: float, digits: int = 2) -> str:
-    """Few significant digits without an exponent. In the unit of the value [any]."""
+    """Few significant digits without an exponent."""
     text = f"{float(f'{value:.{digits}g}'):f}"
     return text.rstrip("0").rstrip(".") if "." in text else text
 
