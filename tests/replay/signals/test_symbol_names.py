@@ -62,6 +62,8 @@ def found(channel: Channel) -> list[tuple[str, str]]:
         ("Sollwert [m/s]", "cmd.v"),
         ("Sollwert [bar]", None),
         ("cmd_yaw", "cmd.omega"),
+        ("heater_cmd_w", None),
+        ("antenna_ref_yaw", None),
         ("valve_percent_FL", "wheel.FL.u"),
         ("Joystick_w [rad/s]", "cmd.omega"),
         ("Ventil Y VR [%]", "wheel.FR.u"),
