@@ -55,7 +55,7 @@ def taken(m: int, gain: float, bias: float, K: float, x: float) -> float:
 def weights(lag: float, here: Array, after: Array) -> None:
     """Weights with which an opening at place q of a block drives the mean speed of its own and of the next block.
 
-    `here` and `after` of shape (q,); `lag` in samples.
+    `here` and `after` of shape (samples of a block,); `lag` is the length of a block over τ [1].
     """
     width = here.size
     a = np.exp(-lag / width)
