@@ -28,7 +28,8 @@ ENV PATH=/opt/mfhca/bin:$PATH \
 RUN useradd --uid 1000 --create-home mfhca \
  && install -d -o mfhca -g mfhca -m 1777 /var/cache/mfhca \
  && install -d -o mfhca -g mfhca /data
-USER mfhca
+# By number, so that a cluster that demands a user without rights can tell
+USER 1000
 # Compile the kernels now, not in the first run; another kind of processor compiles its own
 RUN mfhca simulate -o /tmp/warm.mcap --duration 20 --rate 100 -q \
  && mfhca diagnose /tmp/warm.mcap -o /tmp/warm -q --fail-on never \

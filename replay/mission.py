@@ -21,6 +21,7 @@ from replay.log.stamp_order import in_order
 from replay.machine.config import Machine
 from replay.progress import Progress, Stage, Subscriber, silent
 from replay.readers.registry import read_log, summarise_log
+from replay.signals.file_names import named_channels
 from replay.signals.mapping import NO_CHANNEL, map_signals, plan_topics
 from replay.signals.near_misses import near_misses
 from replay.signals.rules import candidates
@@ -163,7 +164,10 @@ def read_signals(
     logs = joined_tables(parts)
     heads = [next(i for i, part in enumerate(parts) if part.source == log.source) for log in logs]
     options = [asked[i] for i in heads]
-    known = [any(True for _ in candidates(log.channels, machine)) or _given_in(log, machine) for log in logs]
+    known = [
+        any(True for _ in candidates(channels, machine)) or _given_in(log, machine)
+        for log, channels in zip(logs, named_channels(logs), strict=True)
+    ]
     known = known if any(known) else [True] * len(known)
     use = dict(zip(heads, known, strict=True))
     logs, options = list(compress(logs, known)), list(compress(options, known))

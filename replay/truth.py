@@ -50,7 +50,10 @@ class TruthInterval:
 
     @classmethod
     def of(cls, fault: FaultSpec, kind: str, sat_mean: float, length_s: float) -> TruthInterval:
-        """What was injected into a mission of some length for a fault, with the saturation term that was drawn."""
+        """What was injected into a mission of some length for a fault, with the saturation term that was drawn.
+
+        `sat_mean` in the channel's unit, `length_s` in s.
+        """
         return cls(
             fault.component,
             kind,

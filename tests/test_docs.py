@@ -10,6 +10,7 @@ import os
 import re
 import shlex
 import shutil
+import sqlite3
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -21,9 +22,16 @@ import pytest
 from cli.main import run
 from replay.machine.toml_file import load_machine
 from tests.documented_files import write_documented_files
+from tests.object_store import stored_logs
 
 ROOT = Path(__file__).resolve().parents[1]
-PAGES = ["README.md", "CONTRIBUTING.md", *sorted(p.relative_to(ROOT).as_posix() for p in (ROOT / "docs").rglob("*.md"))]
+PAGES = [
+    "README.md",
+    "CONTRIBUTING.md",
+    "SECURITY.md",
+    "sample_logs/README.md",
+    *sorted(p.relative_to(ROOT).as_posix() for p in (ROOT / "docs").rglob("*.md")),
+]
 _BLOCK = re.compile(r"^```(\w*)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 _LINK = re.compile(r"\]\((?!\w+:)([^)#\s]*)(?:#([^)\s]+))?\)")
 #: Parts of a command line that set an environment up or run these tests.
@@ -111,6 +119,9 @@ class Follower:
             parser = configparser.ConfigParser()
             parser.optionxform = str  # type: ignore[assignment,method-assign]
             parser.read_string(block.text)
+        elif block.language == "sql":
+            with contextlib.closing(sqlite3.connect(":memory:")) as database:
+                database.executescript(block.text)
         elif block.language == "yaml":
             yaml = pytest.importorskip("yaml", reason="PyYAML comes with the extra dev")
             assert list(yaml.safe_load_all(block.text)), where
@@ -161,8 +172,11 @@ def _check_printed(shown: str, printed: str, where: str) -> None:
 @pytest.mark.parametrize("page", [page for page in PAGES if any(block.language for block in blocks(page))])
 def test_a_reader_can_follow(page: str, place: Path) -> None:
     follower = Follower(page)
-    for block in blocks(page):
-        follower.follow(block)
+    steps = blocks(page)
+    bucket = any("s3://fleet/2026" in block.text for block in steps if block.language == "bash")
+    with stored_logs("fleet", "2026", place / "logs") if bucket else contextlib.nullcontext():
+        for block in steps:
+            follower.follow(block)
 
 
 def test_a_block_that_is_wrong_is_noticed(place: Path) -> None:
@@ -191,7 +205,7 @@ def _links(page: str) -> Iterator[tuple[str, str]]:
     yield from ((m[1], m[2] or "") for m in _LINK.finditer(text))
 
 
-@pytest.mark.parametrize("page", [*PAGES, "sample_logs/README.md"])
+@pytest.mark.parametrize("page", PAGES)
 def test_links_lead_to_files(page: str) -> None:
     for target, _ in _links(page):
         assert not target or ((ROOT / page).parent / target).exists(), target

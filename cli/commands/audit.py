@@ -11,7 +11,7 @@ import typer
 from cli.commands.audit_repairs import RepairRequest, run_repairs
 from cli.commands.audit_run import AuditRequest, run_audit
 from cli.terminal.command import Quiet, Verbose, terminal_of
-from cli.terminal.options import FailOn, Json, MachineFile, MaxSize
+from cli.terminal.options import FailOn, Json, MaxSize
 
 EXAMPLES = """\b
 Examples:
@@ -38,6 +38,16 @@ Paths = Annotated[
 ]
 Output = Annotated[
     Path, typer.Option("--output", "-o", metavar="DIR", help="Folder of the store, the fleet page and the reports.")
+]
+MachineFile = Annotated[
+    Path | None,
+    typer.Option(
+        "--machine",
+        "-m",
+        metavar="FILE",
+        help="Machine file (TOML) of all missions. Default: the machine.toml in or above each log's folder, else the paper's Haulotte.",
+        show_default=False,
+    ),
 ]
 MachineId = Annotated[
     str | None,

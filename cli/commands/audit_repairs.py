@@ -75,6 +75,8 @@ def run_repairs(terminal: Terminal, request: RepairRequest) -> None:
         if not withdrawn:
             closes = "; ".join(t.closes) or "no fault that stands"
             terminal.show(text(f"  closes: {closes}", "dim"))
+            for left in t.stays:
+                terminal.show(text(f"  stays open: {left}", "dim"))
     terminal.show(*machine_parts(recorded.machines), "", text(f"fleet page  {request.output / 'fleet.html'}"))
 
 

@@ -66,7 +66,7 @@ class Plan:
         return self.clock() - self._start
 
     def share(self) -> float | None:
-        """Share of the work done, None before the first stage."""
+        """Share of the work done, None before the first stage. From 0 to 1 [1]."""
         if self._at < 0:
             return None
         done = self._worked + self._here()
@@ -77,7 +77,7 @@ class Plan:
         return None if self._at < 0 or self.spent < _SHOWN_AFTER_S else self._rest() * self._pace()
 
     def rate(self) -> float | None:
-        """Megabytes of log per second, None where that is not known."""
+        """Megabytes of log per second, None where that is not known. In MB/s."""
         share = self.share()
         return (
             self.megabytes * share / self.spent if share and self.megabytes and self.spent >= _SHOWN_AFTER_S else None

@@ -94,7 +94,7 @@ class AuditRequest:
         """Missions, and how each is to be diagnosed."""
         from diagnosis.audit.discovery.discover import discover
         from diagnosis.audit.isolation.limits import Limits, usual_memory_mb
-        from diagnosis.audit.plan import AuditOptions, merged_machines
+        from diagnosis.audit.plan import AuditOptions, machine_notes
 
         missions = discover(self.words, exclude=self.output)
         memory = self.memory_mb or (usual_memory_mb(self.at_once) if self.dask is None else Limits.memory_mb)
@@ -102,7 +102,7 @@ class AuditRequest:
         asked = AuditOptions(
             self.output, self.machine, self.machine_id or "", limits, self.retries, self.resume, self.max_size_mb
         )
-        return replace(missions, notes=(*missions.notes, *merged_machines(missions.missions, asked))), asked
+        return replace(missions, notes=(*missions.notes, *machine_notes(missions.missions, asked))), asked
 
 
 def processors() -> int:
@@ -211,7 +211,8 @@ def audit(
     output : str or Path
         Folder of the store, the fleet page and the reports.
     machine : str, Path or None
-        Machine file of missions that name none of their own; None: the paper's machine.
+        Machine file of all missions; None: what their ``mission.toml`` names or the closest ``machine.toml``, else the paper's
+        machine.
     machine_id : str or None
         Id of the machine that all missions belong to.
     jobs : int or None

@@ -126,7 +126,7 @@ def check_output(outputs: Iterable[Path], inputs: Iterable[Path]) -> None:
 
 
 def check_times(start: float | None, end: float | None, names: tuple[str, str] = ("--start", "--end")) -> None:
-    """Raise a `ConfigError` where the asked part of a mission cannot be one."""
+    """Raise a `ConfigError` where the asked part of a mission cannot be one. Times in s of the mission."""
     for name, value in zip(names, (start, end), strict=True):
         if value is not None and not (math.isfinite(value) and value >= 0):
             raise ConfigError(f"{name} {value:g}: expected seconds from the mission's start, 0 or more")
@@ -135,7 +135,13 @@ def check_times(start: float | None, end: float | None, names: tuple[str, str] =
 
 
 def check_wheels(wheels: Sequence[str] | None, machine: Machine, name: str = "--wheel") -> tuple[str, ...] | None:
-    """Give the asked wheels as the machine spells them, in its order; None where none are asked for."""
+    """Give the asked wheels as the machine spells them, in its order; None where none are asked for.
+
+    Raises
+    ------
+    ConfigError
+        Where a wheel is not one of the machine's.
+    """
     if not wheels:
         return None
     spelling = {w.casefold(): w for w in machine.wheels}

@@ -64,7 +64,7 @@ class Series:
 
     @cached_property
     def columns(self) -> Mapping[str, NDArray[Any]]:
-        """Columns that hold samples, with ε̂ and the bounds of estimates."""
+        """Columns that hold samples, with ε̂ and the bounds of estimates. Each of shape (rows,)."""
         filled = {k: v for k, v in self.raw.items() if np.isfinite(v).any()} if self.axis.rows else {}
         return derived(filled, self.report)
 

@@ -175,7 +175,7 @@ def again(end: Ending, one: Planned, machine: Path | None, output: Path) -> str:
 
 
 def _machine_words(one: Planned, machine: Path | None) -> list[str]:
-    file = one.mission.machine_file or (str(machine) if machine is not None else "")
+    file = str(machine) if machine is not None else one.mission.machine_file
     words = ["-m", absolute(file)] if file else []
     return [*words, "--machine-id", one.machine_id] if one.machine_id else words
 

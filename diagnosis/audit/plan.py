@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+import os
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
@@ -35,7 +36,7 @@ class AuditOptions:
     output : Path
         Folder of the audit.
     machine : Path or None
-        Machine file of missions that name none of their own; None: the paper's machine.
+        Machine file of all missions; None: their own, else the paper's machine.
     machine_id : str
         Identity of all missions; empty: their own.
     limits : Limits
@@ -97,7 +98,7 @@ def plan(missions: Iterable[MissionSource], options: AuditOptions) -> list[Plann
     Raises
     ------
     ConfigError
-        Where the given machine file is wrong; one that a mission names costs that mission alone.
+        Where the given machine file is wrong; one of a mission's own costs that mission alone.
     """
 
     @cache
@@ -110,7 +111,7 @@ def plan(missions: Iterable[MissionSource], options: AuditOptions) -> list[Plann
     hashed = {"max_size_mb": options.max_size_mb}
     planned = []
     for mission in missions:
-        name, problem = mission.machine_file or usual, mission.problem
+        name, problem = usual or mission.machine_file, mission.problem
         try:
             machine, document = loaded(name)
         except ConfigError as error:
@@ -125,26 +126,50 @@ def plan(missions: Iterable[MissionSource], options: AuditOptions) -> list[Plann
     return planned
 
 
-def merged_machines(missions: Iterable[MissionSource], options: AuditOptions) -> tuple[str, ...]:
-    """Say so where the machine file's identity makes one machine of what folders would tell apart; else nothing.
+def machine_notes(missions: Iterable[MissionSource], options: AuditOptions) -> tuple[str, ...]:
+    """What the given machine file overrides, one sentence each: machine files beside logs, and folders that are one machine by its id.
 
     Raises
     ------
     ConfigError
         Where the machine file is wrong.
     """
-    if options.machine is None or options.machine_id:
+    if options.machine is None:
         return ()
-    name = machine_at(str(options.machine)).id
-    usual = [m for m in missions if not m.machine_id and m.machine_file is None]
-    folders = list(dict.fromkeys(fallback_id(m) for m in usual)) if name else []
-    if len(folders) < 2:
-        return ()
-    shown = ", ".join(folders[:3]) + (", …" if len(folders) > 3 else "")
-    return (
-        f"{options.machine}: its id {name!r} makes one machine of the logs of {len(folders)} folders ({shown}), unless the "
-        "logs name their own; leave the id out where each folder is a machine",
-    )
+    missions, notes = list(missions), []
+    own = [
+        m.machine_file
+        for m in missions
+        if m.machine_file is not None and not _same_file(m.machine_file, options.machine)
+    ]
+    if own:
+        logs = (
+            f"{len(own)} of {len(missions)} missions, which have"
+            if len(own) != 1
+            else f"1 of {len(missions)} missions, which has"
+        )
+        notes.append(
+            f"-m {options.machine} counts also for {logs} another machine file beside them: {_few(own)}; without -m each "
+            "mission has its own, and a machine.toml in the topmost folder stands for the rest"
+        )
+    name = "" if options.machine_id else machine_at(str(options.machine)).id
+    folders = [fallback_id(m) for m in missions if not m.machine_id] if name else []
+    if len(set(folders)) > 1:
+        notes.append(
+            f"{options.machine}: its id {name!r} makes one machine of the logs of {len(set(folders))} folders ({_few(folders)}), "
+            "unless the logs name their own; leave the id out where each folder is a machine"
+        )
+    return tuple(notes)
+
+
+def _same_file(one: str, other: Path) -> bool:
+    return "://" not in one and os.path.realpath(one) == os.path.realpath(other)
+
+
+def _few(names: Sequence[str]) -> str:
+    """The first three of different names."""
+    names = list(dict.fromkeys(names))
+    return ", ".join(names[:3]) + (", …" if len(names) > 3 else "")
 
 
 def known_hashes(planned: Planned, store: Store) -> tuple[str, ...]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,25 +14,33 @@ from diagnosis.audit.fleet.machines import Machine, Run
 from diagnosis.audit.fleet.words import fault_words
 from diagnosis.audit.fleet_files import load_fleet
 from diagnosis.audit.fleet_page import FleetPage
-from diagnosis.audit.store.repairs import Repair, read_repairs, record_repair
+from diagnosis.audit.store.repairs import Repair, read_repairs, record_repair, repaired_at
 from diagnosis.audit.store.store import FILE_NAME, Store
 from diagnosis.pages.labels import utc
 from replay.errors import ConfigError, OutputError
 from replay.faults import Side
 
-_SIDES = {"sensor": Side.SENSOR.value, "actuator": Side.ACTUATOR.value, "valve": Side.ACTUATOR.value}
-_EXPECTED = 'expected "MACHINE PART", or "MACHINE PART sensor" or "MACHINE PART actuator"'
+_SENSOR, _DRIVE = (
+    r"(?:(?:speed|steering|joint) )?sensor",
+    r"(?:(?:drive|steering|joint) )?(?:valve|motor|drive|actuator)",
+)
+#: A side in the words of a report, behind a machine and a part.
+_SIDE = re.compile(
+    rf" (?:(?P<either>{_SENSOR} or {_DRIVE})|(?P<sensor>{_SENSOR})|(?P<actuator>{_DRIVE}))$", re.IGNORECASE
+)
+_EXPECTED = 'expected "MACHINE PART", or with "sensor" or "actuator" behind it'
 _NAMED = 12
 
 
 @dataclass(frozen=True)
 class Told:
-    """One repair that was recorded or withdrawn: the machine's label, the part in words, and the faults it closes."""
+    """One repair that was recorded or withdrawn: the machine's label, the part in words, the faults it closes, and those of it that stay."""
 
     machine: str
     part: str
     repaired_ns: int
     closes: tuple[str, ...]
+    stays: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -86,7 +95,12 @@ def record_repairs(
     page = FleetPage(output, None, "hours", emit)
     page.renew()
     told = [
-        Told(m.label, f"{r.component} {r.side}".strip(), r.repaired_ns, () if withdrawn else _closed(m, r))
+        Told(
+            m.label,
+            f"{r.component} {r.side}".strip(),
+            r.repaired_ns,
+            *(((), ()) if withdrawn else _closed(m, r, known)),
+        )
         for m, r in found
     ]
     return Recorded(tuple(told), page.machines())
@@ -98,9 +112,11 @@ def _dates(repairs: Iterable[Repair]) -> list[str]:
 
 def _meant(words: str, fleet: Fleet, repaired_ns: int) -> tuple[Machine, Repair]:
     """Machine and part that are meant."""
-    parts = words.split()
-    side = _SIDES.get(parts[-1].casefold(), "") if len(parts) > 2 else ""
-    parts = parts[:-1] if side else parts
+    said = _SIDE.search(" ".join(words.split()))
+    if said is not None and " " not in said.string[: said.start()]:
+        said = None  # a part may be called so
+    side = "" if said is None or said["either"] else Side.SENSOR.value if said["sensor"] else Side.ACTUATOR.value
+    parts = (words if said is None else said.string[: said.start()]).split()
     if len(parts) < 2:
         raise ConfigError(f"--repaired {words!r}: {_EXPECTED}")
     name, part = " ".join(parts[:-1]), parts[-1]
@@ -111,7 +127,9 @@ def _meant(words: str, fleet: Fleet, repaired_ns: int) -> tuple[Machine, Repair]
         raise ConfigError(f"--repaired {words!r}: {name}: {what}; the audit has {known or 'none'}; {_EXPECTED}")
     machine = machines[0]
     components = list(dict.fromkeys(component for component, _ in machine.parts))
-    component = next((c for c in components if c.casefold() == part.casefold()), None)
+    component = next(
+        (c for c in components if part.casefold() in (c.casefold(), c.removesuffix("_steer").casefold())), None
+    )
     if component is None:
         raise ConfigError(
             f"--repaired {words!r}: {machine.label} has no part {part}; it has {', '.join(components) or 'none'}; {_EXPECTED}"
@@ -139,12 +157,22 @@ def _faults(run: Run, repair: Repair) -> bool:
     return any(f.component == repair.component and repair.side in ("", *Side(f.side).sides) for f in run.faults)
 
 
-def _closed(machine: Machine, repair: Repair) -> tuple[str, ...]:
-    """Standing faults whose last mission was before the repair."""
-    out = []
+def _closed(machine: Machine, repair: Repair, known: Sequence[Repair]) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Standing faults of the part that the repair closes, with those that were recorded before; and those that it does not."""
+    closes, stays = [], []
+    own = [repair, *(r for r in known if r.machine == repair.machine)]
     for f in machine.faults:
         start = f.last.result.start_ns
-        meant = f.component == repair.component and repair.side in ("", f.side)
-        if f.standing and meant and start is not None and start < repair.repaired_ns:
-            out.append(fault_words(f, machine.limits.words))
-    return tuple(out)
+        if not f.standing or start is None or f.component != repair.component:
+            continue
+        if repair.side and repair.side not in Side(f.side).sides:
+            continue
+        when = repaired_at(own, f.component, f.side)
+        words = fault_words(f, machine.limits.words)
+        if when is not None and start < when:
+            closes.append(words)
+        elif start >= repair.repaired_ns:
+            stays.append(f"{words}: found again on {utc(start)[:10]}")
+        else:
+            stays.append(f"{words}: the repair of one side does not tell which it was; without a side both are meant")
+    return tuple(closes), tuple(stays)

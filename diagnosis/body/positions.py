@@ -41,7 +41,10 @@ class Positions:
 
 
 def on_plane(t: Array, lat: Array, lon: Array) -> Positions:
-    """Fixes of latitude and longitude [deg] on the plane that touches the earth at the first one."""
+    """Fixes of latitude and longitude [deg] on the plane that touches the earth at the first one.
+
+    All of shape (k,), `t` in s; positions in m, east + i·north.
+    """
     north = np.radians(lat - lat[0]) * _EARTH_RADIUS
     east = np.radians(lon - lon[0]) * _EARTH_RADIUS * np.cos(np.radians(lat[0]))
     return Positions(t, east + 1j * north)
@@ -123,7 +126,10 @@ def agreement(positions: Positions, rolling: Rolling) -> float:
 
 
 def way_readings(positions: Positions, rolling: Rolling, yaw_rate: Array | None, delay: float) -> Readings:
-    """What fixes say of the way, per cell; several in one cell are averaged."""
+    """What fixes say of the way, per cell; several in one cell are averaged.
+
+    Shape (cells,): the way in m; `yaw_rate` of shape (n,) in rad/s, `delay` in s.
+    """
     way, displacement, heading = moves(positions, rolling, yaw_rate, delay)
     beyond = np.concatenate([[0.0], np.cumsum(displacement.real - way)])
     noise = _noise(beyond)

@@ -87,20 +87,20 @@ class Rolling:
 
     @cached_property
     def cells(self) -> Array:
-        """Times at which sensors are filtered [s]."""
+        """Times at which sensors are filtered [s]. Shape (cells,)."""
         return np.asarray(np.arange(int(self.size * self.dt / CELL_S) + 1) * CELL_S)
 
     def cell_of(self, t: Array) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
-        """Nearest cell of each time, and which of them lie within the mission."""
+        """Nearest cell of each time, and which of them lie within the mission. All of the shape (k,) of `t` [s]."""
         cell = np.rint(t / CELL_S).astype(np.int64)
         return cell, np.asarray((cell >= 0) & (cell < self.cells.size))
 
     def at_cells(self, values: Array) -> Array:
-        """Values of blocks at the cells."""
+        """Values of blocks at the cells. From shape (n,) to (cells,)."""
         return np.asarray(np.interp(self.cells, self.edges[:-1] + self.dt / 2, values))
 
     def per_block(self, values: Array) -> Array:
-        """Values of cells for every block."""
+        """Values of cells for every block. From shape (cells,) to (n,)."""
         return np.asarray(np.interp(self.edges[:-1] + self.dt / 2, self.cells, values))
 
     def heading(self, yaw_rate: Array | None) -> Array:
@@ -117,5 +117,5 @@ class Rolling:
 
 
 def integral(values: Array, dt: float) -> Array:
-    """Sum of values of blocks up to each edge, shape (n + 1,)."""
+    """Sum of values of blocks up to each edge, shape (n + 1,). `dt` is a block's length [s]."""
     return np.concatenate([[0.0], np.cumsum(values) * dt])

@@ -54,7 +54,7 @@ class Habit(NamedTuple):
     tick: float = 0.0
 
     def hold(self, speed: Array) -> Array:
-        """Time between two updates at some speeds [s]."""
+        """Time between two updates at some speeds [s]. Both of one shape (k,); speeds in m/s."""
         if not self.travel:
             return np.full(speed.shape, self.window)
         with np.errstate(divide="ignore"):
@@ -69,7 +69,7 @@ class Habit(NamedTuple):
         return lsb**2 / 12 * (20.0 / 6.0 if self.stepwise else 1.0)
 
     def rounding(self, speed: Array) -> Array:
-        """Rounding step at some speeds by the counted time [unit]."""
+        """Rounding step at some speeds by the counted time [unit]. Both of one shape (k,)."""
         return np.asarray(self.tick * speed**2)
 
 

@@ -17,7 +17,10 @@ _LEAST_SAMPLES = 3
 
 
 def alive_sources(timeline: Timeline) -> dict[str, NDArray[np.int16]]:
-    """Number of signals of each group (`replay.signals.signal.Signal.group`) that bring a new sample at each step."""
+    """Number of signals of each group (`replay.signals.signal.Signal.group`) that bring a new sample at each step.
+
+    Of shape (n,) each.
+    """
     out: dict[str, NDArray[np.int16]] = {}
     for name, fresh in timeline.fresh.items():
         count = out.setdefault(_group(timeline, name), np.zeros(timeline.size, dtype=np.int16))

@@ -47,6 +47,8 @@ def usual_rounding(values: Array) -> float:
     """Rounding step of a channel of which parts may be off their grid; 0 where most show none.
 
     A faulty channel's noise or loss of gain takes its values off the grid of the healthy ones.
+
+    `values` of shape (n,); the step in their unit.
     """
     whole = rounding_step(values)
     if whole > 0.0 or values.size < _GRID_PARTS * _GRID_SAMPLES:
@@ -57,7 +59,7 @@ def usual_rounding(values: Array) -> float:
 
 
 def usual_distance(new: NDArray[np.bool_]) -> float:
-    """Median distance of the first 20 000 new samples in steps."""
+    """Median distance of the first 20 000 new samples in steps. `new` of shape (n,)."""
     for size in (1 << 16, new.size):
         places = np.flatnonzero(new[:size])
         if places.size >= 20_000 or size == new.size:
@@ -66,7 +68,10 @@ def usual_distance(new: NDArray[np.bool_]) -> float:
 
 
 def quick_noise(residual: Array, dt: float) -> float:
-    """Root mean square of what changes within half a second in a residual, in its median window; NaN where none."""
+    """Root mean square of what changes within half a second in a residual, in its median window; NaN where none.
+
+    In the unit of `residual`, shape (n,); `dt` in s.
+    """
     width = max(3, round(0.5 / dt))
     known = np.isfinite(residual)
     filled = np.where(known, residual, 0.0)
@@ -110,6 +115,8 @@ def quiet_rms(x: Array, dt: float) -> float:
     """Root mean square of x in its quieter windows of half a second: healthy ones where less than half are faulty.
 
     NaN are left out; the result is NaN where no window is half full.
+
+    `x` of shape (n,), `dt` in s; the result in the unit of x.
     """
     length = max(5, round(_QUIET_WINDOW_S / dt))
     windows = x[: x.size // length * length].reshape(-1, length)
@@ -120,7 +127,10 @@ def quiet_rms(x: Array, dt: float) -> float:
 
 
 def shifted(x: Array, lag: float) -> Array:
-    """x delayed by `lag` steps (advanced where negative), interpolated between steps; NaN where nothing is known."""
+    """x delayed by `lag` steps (advanced where negative), interpolated between steps; NaN where nothing is known.
+
+    Both of shape (n,), in one unit.
+    """
     whole = int(np.floor(lag))
     part = lag - whole
     out = _moved(x, whole)
@@ -144,6 +154,8 @@ def relative_lag(y: Array, x: Array, use: NDArray[np.bool_], least_lag: int, max
     What is ten times as large as the lower third counts no more than that, so that faults for half of the time leave the
     delay alone. It must lower the mean square by 2 % to be believed; a valve cannot answer before its command, so there
     `least_lag` is 0.
+
+    `y`, `x` and `use` of shape (n,); lags in steps.
     """
     rate = np.abs(np.diff(x, prepend=x[:1]))
     smooth = moving_sum(np.nan_to_num(rate), 9) / 9

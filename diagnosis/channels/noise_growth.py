@@ -30,7 +30,7 @@ class NoiseGrowth(NamedTuple):
     share: float
 
     def variance(self, size: Array) -> Array:
-        """Variance at some sizes [unit²]."""
+        """Variance at some sizes [unit²]. Both of one shape (k,)."""
         return np.asarray(self.floor**2 + (self.share * size) ** 2)
 
 

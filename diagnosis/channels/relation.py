@@ -53,7 +53,7 @@ class Relation(NamedTuple):
     gain: float = 1.0
 
     def expected(self, x: Array, dt: float) -> Array:
-        """What a healthy channel reads beside x, shape (n,); NaN where x is."""
+        """What a healthy channel reads beside x, shape (n,); NaN where x is. `dt` in s; both in the channel's unit."""
         followed = x if self.lag == 0.0 and self.play == 0.0 else _followed(x, self.play, self.lag, dt)
         moved = shifted(followed, self.delay)
         return moved if self.gain == 1.0 else self.gain * moved

@@ -94,7 +94,10 @@ def _longest_still(cells: Cells, j: int) -> tuple[float, float]:
 
 
 def commanded_still(cells: Cells, j: int) -> Array:
-    """Mean command of each window of `still_frame` [1], 0 where the axle moves or is at its end stop, NaN where nothing is known."""
+    """Mean command of each window of `still_frame` [1], 0 where the axle moves or is at its end stop, NaN where nothing is known.
+
+    Shape (windows,).
+    """
     angle, command, opening = (cells.axles(leaf)[:, j] for leaf in ("phi", "u", "u_applied"))
     command, frame = np.where(np.isfinite(command), command, opening), still_frame(cells)
     mean, at = frame.mean(command), frame.mean(angle)

@@ -126,7 +126,7 @@ class Frame:
 
     @property
     def starts(self) -> NDArray[np.intp]:
-        """First cell of each window; one window where the mission is shorter than it."""
+        """First cell of each window; one window where the mission is shorter than it. Shape (windows,)."""
         return np.arange(0, max(self.cells - self.length, 0) + 1, self.hop)
 
     def sums(self, x: Array) -> Array:
@@ -136,11 +136,14 @@ class Frame:
         return np.asarray(total[stops] - total[self.starts])
 
     def mean(self, x: Array) -> Array:
-        """Mean over each window; NaN where less than most of it is known. Shape (windows, …)."""
+        """Mean over each window; NaN where less than most of it is known. Shape (windows, …).
+
+        `x` has shape (cells, …), its unit is kept.
+        """
         count = self.sums(np.isfinite(x).astype(np.float64))
         enough = count >= _LEAST_SHARE * min(self.length, self.cells)
         return np.asarray(np.where(enough, self.sums(x) / np.maximum(count, 1), np.nan))
 
     def rms(self, x: Array) -> Array:
-        """Root mean square over each window, as `mean`."""
+        """Root mean square over each window, as `mean`. From shape (cells, …) to (windows, …), in the unit of x."""
         return np.asarray(np.sqrt(self.mean(x**2)))

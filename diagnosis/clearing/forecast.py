@@ -54,16 +54,18 @@ def forecast(logged: Collection[str], machine: Machine, words: MachineWords) -> 
         How to speak of it.
     """
     speeds = sum(f"wheel.{w}.v" in logged for w in machine.wheels)
+    commanded = "cmd.v" in logged or any(f"wheel.{w}.v_ref" in logged for w in machine.wheels)
     groups: dict[tuple[Kind, Side, bool, str, tuple[str, ...]], list[str]] = {}
     for kind, prefix, names in ((Kind.WHEEL, "wheel", machine.wheels), (Kind.STEER, "steer", machine.axles)):
         for name in names:
             has = {signal.rpartition(".")[2] for signal in logged if signal.startswith(f"{prefix}.{name}.")}
             if kind is Kind.WHEEL:
-                sides = _wheel_sensor(has, speeds, words), _wheel_drive(has, speeds, words)
+                sides = _wheel_sensor(has, speeds, words, commanded), _wheel_drive(has, speeds, words, commanded)
             else:
                 sides = _angle_sensor(has, "imu.yaw_rate" in logged, words), _steering_drive(has, words)
-            for side, found in zip((Side.SENSOR, Side.ACTUATOR), sides, strict=True):
-                groups.setdefault((kind, side, *found), []).append(name)
+            for side, (told, text, more) in zip((Side.SENSOR, Side.ACTUATOR), sides, strict=True):
+                lacking = tuple(signal for signal in more if "<" not in signal or signal.rpartition(".")[2] not in has)
+                groups.setdefault((kind, side, told, text, lacking), []).append(name)
     return tuple(
         Forecast(tuple(who), kind, side, told, words.fill(text), more)
         for (kind, side, told, text, more), who in groups.items()
@@ -74,13 +76,15 @@ def forecast(logged: Collection[str], machine: Machine, words: MachineWords) -> 
 _Told = tuple[bool, str, tuple[str, ...]]
 
 
-def _wheel_sensor(has: set[str], speeds: int, words: MachineWords) -> _Told:
+def _wheel_sensor(has: set[str], speeds: int, words: MachineWords, commanded: bool) -> _Told:
     more: tuple[str, ...] = ("wheel.<W>.v_true",)
     if "v" not in has:
         return False, "not judged: no speed is logged", ("wheel.<W>.v",)
     if "v_true" in has:
         return True, "told at any time, against its second measurement", ()
     if not has & {"u", "u_applied"}:
+        if speeds == 1 and not commanded:
+            return False, "not judged: no command is logged, and no other speed to compare with", ("cmd.v", *more)
         if words.drive == "valve":
             more = ("wheel.<W>.u", *more)
         return (
@@ -97,11 +101,13 @@ def _wheel_sensor(has: set[str], speeds: int, words: MachineWords) -> _Told:
     )
 
 
-def _wheel_drive(has: set[str], speeds: int, words: MachineWords) -> _Told:
+def _wheel_drive(has: set[str], speeds: int, words: MachineWords, commanded: bool) -> _Told:
     more = ("wheel.<W>.u_applied",)
     if "u" not in has and words.drive != "valve":
         if "effort" in has:
             return False, "whether it is weak is not judged: what effort is healthy is not known", ()
+        if not commanded:
+            return False, "not judged: no command is logged", ("cmd.v", "wheel.<W>.effort")
         return False, "only a standstill under command shows; whether it is weak is not judged", ("wheel.<W>.effort",)
     if "u" not in has:
         return False, "not judged: no {valve} command is logged", ("wheel.<W>.u", *more)

@@ -73,12 +73,18 @@ class Gauges:
         return self.kind is Kind.STEER and self.side is Side.SENSOR
 
     def excesses(self, places: Placements) -> Array:
-        """`sizes` of an excess; an axle that turns faster for some seconds shows by its second measurements alone."""
+        """`sizes` of an excess; an axle that turns faster for some seconds shows by its second measurements alone.
+
+        Shape (places,) [1].
+        """
         alone = replace(self, ratio=None) if self.kind is Kind.STEER else self
         return alone.sizes(places, lambda r: r.excess, lambda r: r.excess)
 
     def offsets(self, places: Placements) -> Array:
-        """`sizes` of an offset; of an angle it is no motion per opening, but one shows where the machine goes straight."""
+        """`sizes` of an offset; of an angle it is no motion per opening, but one shows where the machine goes straight.
+
+        Shape (places,), in the channel's unit.
+        """
         if self.kind is not Kind.STEER:
             return self.sizes(places, lambda r: r.offset, lambda r: r.offset)
         alone = replace(self, ratio=None).sizes(places, lambda r: r.offset, lambda r: r.offset)

@@ -22,7 +22,7 @@ _LOSSES = (Check.RESPONSE, Check.LASTING_RESPONSE, Check.RATE, Check.LASTING_RAT
 
 
 def lowest_passed(x: Array, dt: float, lag_s: float) -> Array:
-    """Columns behind a lag of first order, shape as x; gaps count as 0."""
+    """Columns behind a lag of first order, shape as x; gaps count as 0. In the unit of x; `dt` and `lag_s` in s."""
     columns = x[:, np.newaxis] if x.ndim == 1 else x
     passed = [low_passed(np.append(np.nan_to_num(column), 0.0), lag_s, dt)[1:] for column in columns.T]
     return np.column_stack(passed).reshape(x.shape)
@@ -70,6 +70,8 @@ class Compared(NamedTuple):
 
 def compared(cells: Cells, y: Array, x: Array, floor: float) -> Compared:
     """A channel y and its reference x.
+
+    All in the channel's unit: m/s, rad or fractions of opening.
 
     Parameters
     ----------
@@ -125,6 +127,8 @@ def late(speed: Array, reference: Array, dt: float) -> list[float | None]:
     """By how much each wheel's speed is later, or earlier, than the other wheels', by its changes beside the command's [s].
 
     None where a wheel's speed does not follow its command at any delay.
+
+    Both of shape (cells, wheels) in m/s, `dt` in s.
     """
     steps = np.arange(-round(_EARLIEST_S / dt), round(_LATEST_S / dt) + 1)
     found: list[float | None] = []
@@ -150,7 +154,10 @@ def _alike(x: Array, y: Array, delay: int) -> float:
 
 
 def worst(cells: Cells, part: tuple[Kind, str, Side, Check], values: Array, limit: float) -> Checked:
-    """The check of a part with its largest value among the windows; None where no window shows it."""
+    """The check of a part with its largest value among the windows; None where no window shows it.
+
+    `values` of shape (windows,), in the unit of `limit`.
+    """
     if not np.isfinite(values).any():
         return Checked(*part, None, limit)
     values = np.where(cells.explained(part[1]), 0.0, values)
@@ -162,7 +169,10 @@ def worst(cells: Cells, part: tuple[Kind, str, Side, Check], values: Array, limi
 
 
 def lasts(cells: Cells, part: tuple[Kind, str, Side, Check], value: float | None, limit: float) -> Checked:
-    """The check of a part over the whole mission; nothing new where its faults are stated for much of it."""
+    """The check of a part over the whole mission; nothing new where its faults are stated for much of it.
+
+    `value` and `limit` in the check's unit.
+    """
     stated = value is not None and cells.mostly_explained(part[1])
     return Checked(*part, 0.0 if stated else value, limit, shows=None if value is None else _shown(part[3], limit))
 

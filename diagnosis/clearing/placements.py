@@ -92,7 +92,10 @@ def least(sizes: Array) -> Array:
 
 
 def countered(less: Array) -> Array:
-    """Excess of which a loop that keeps the motion as commanded leaves an opening, or a true motion, less by this share."""
+    """Excess of which a loop that keeps the motion as commanded leaves an opening, or a true motion, less by this share.
+
+    Both of one shape (places, windows), shares [1].
+    """
     return np.asarray(np.where(less < 1.0, np.maximum(less, 0.0) / np.maximum(1.0 - less, 1e-9), np.inf))
 
 
@@ -139,7 +142,7 @@ class Ratio:
         return np.asarray(full.sum(axis=1) / max(1, np.count_nonzero(known)))
 
     def share(self, over: Overlap) -> Array:
-        """Part of each window's motion that lies in the fault; NaN for none."""
+        """Part of each window's motion that lies in the fault; NaN for none. Shape (places, windows) [1]."""
         inside = over.sums(self.weight)
         with np.errstate(divide="ignore", invalid="ignore"):
             return np.asarray(np.where(inside > 0.0, inside / self.frame.sums(self.weight)[over.windows], np.nan))
@@ -153,7 +156,10 @@ class Ratio:
         return np.maximum(out, 0.0)
 
     def excess(self, over: Overlap) -> Array:
-        """Smallest excess [1], likewise; the loop closes the valve until the motion is as commanded again."""
+        """Smallest excess [1], likewise; the loop closes the valve until the motion is as commanded again.
+
+        Shape (places,).
+        """
         share = self.share(over)
         out = least(countered(-np.expm1(self.room(over, share) - self.above) / share))
         for kind, (_, above) in enumerate(self.lasting):
@@ -161,7 +167,7 @@ class Ratio:
         return np.maximum(out, 0.0)
 
     def offset(self, over: Overlap) -> Array:
-        """Smallest offset of either sign, in the motion's unit, likewise."""
+        """Smallest offset of either sign, in the motion's unit, likewise. Shape (places,)."""
         inside, window = over.sums((self.weight > 0.0).astype(np.float64)), self.frame.sums(self.weight)[over.windows]
         with_it = np.where(inside > 0.0, window / inside, np.nan)
         off = self.room(over, self.share(over))
@@ -204,7 +210,10 @@ class Reference:
         return np.minimum(least(np.where(shown, gain, np.nan)), least(shifted))
 
     def excess(self, over: Overlap) -> Array:
-        """Smallest excess [1], likewise; the loop takes the reference back until the motion is as commanded again."""
+        """Smallest excess [1], likewise; the loop takes the reference back until the motion is as commanded again.
+
+        Shape (places,).
+        """
         c = self.compared
         power = self._power(over)
         with np.errstate(divide="ignore", invalid="ignore"):
@@ -232,7 +241,7 @@ class Reference:
         return self._window(over, np.where(np.isfinite(c.a), c.b * c.b, 0.0))
 
     def offset(self, over: Overlap) -> Array:
-        """Smallest offset of either sign, in the channel's unit, likewise."""
+        """Smallest offset of either sign, in the channel's unit, likewise. Shape (places,)."""
         c = self.compared
         with np.errstate(divide="ignore", invalid="ignore"):
             share = over.sums(np.isfinite(c.a).astype(np.float64)) / self._window(over, np.isfinite(c.a).astype(float))

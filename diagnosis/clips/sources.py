@@ -38,7 +38,7 @@ class Source:
     log_ns: Stamps
 
     def places(self, ns: Stamps) -> Stamps:
-        """Log stamps of moments of the mission; beyond both ends the clocks run alike."""
+        """Log stamps of moments of the mission; beyond both ends the clocks run alike. Both in ns, shape (k,)."""
         a, b = self.mission_ns, self.log_ns
         if not a.size:
             return ns

@@ -41,7 +41,7 @@ def headline(counts: Mapping[str, int]) -> str:
 
 
 def times(count: int, seconds: float) -> str:
-    """Number and whole time of faults."""
+    """Number and whole time of faults. Time in s."""
     return (f"{count}×, " if count > 1 else "") + (f"{seconds * 1e3:.0f} ms" if seconds < 1 else f"{seconds:.1f} s")
 
 

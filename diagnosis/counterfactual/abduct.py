@@ -273,7 +273,10 @@ def _notes(machine: Machine, known: Flags, faulty: Flags, faults: tuple[KnownFau
 
 
 def weighted(abducted: Abducted, epsilon: Mapping[int, float]) -> tuple[Array, Array]:
-    """δ_s and δ_a with another ε of some faults, by their place in `Abducted.faults`."""
+    """δ_s and δ_a with another ε of some faults, by their place in `Abducted.faults`.
+
+    Both of shape (n, wheels), gains [1].
+    """
     world = abducted.world
     sensor, valve = np.array(world.let_sensor), np.array(world.let_valve)
     for j, value in epsilon.items():

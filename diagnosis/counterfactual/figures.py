@@ -64,6 +64,8 @@ def recoveries(abducted: Abducted, machine: Machine, shift: Array) -> list[Recov
 
     Back is |e|, averaged over 0.1 s, below twice the recorded mission's mean outside of faults, and 0.02 m/s at least, for half a
     second.
+
+    `shift` of shape (n, wheels) in m/s; times in s.
     """
     world = abducted.world
     error = np.abs(world.speed + shift - world.v_ref)

@@ -47,6 +47,8 @@ def build_counterfactual_page(
 ) -> str:
     """Page of a counterfactual; the same input gives the same text.
 
+    Columns of shape (n,), SI.
+
     Parameters
     ----------
     document : CounterfactualDocument

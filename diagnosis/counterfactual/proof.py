@@ -36,7 +36,7 @@ def proof_of(abducted: Abducted, replay: Replay, machine: Machine) -> ProofTerms
 
 
 def proof_rows(terms: ProofTerms, machine: Machine, dt: float) -> list[ProofRow]:
-    """Sizes of the terms, and where the bound does not hold, by wheel."""
+    """Sizes of the terms, and where the bound does not hold, by wheel. `dt` in s."""
     rows: list[ProofRow] = []
     for i, wheel in enumerate(machine.wheels):
         known = np.isfinite(terms.rate[:, i]) & np.isfinite(terms.bound[:, i])

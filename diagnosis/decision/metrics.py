@@ -44,6 +44,8 @@ def loop_metrics(timeline: Timeline, replay: Replay, machine: Machine, moving: N
     """Mean |e_i| [m/s] and mean |u_a,i| [fraction] per wheel and on average, for the mission and for driving.
 
     e is taken with v_true where that is logged, and not with a speed into which faults were injected.
+
+    `moving` of shape (n, wheels).
     """
     nothing = np.broadcast_to(np.nan, (timeline.size,))
     per_wheel: dict[str, LoopRow] = {}
@@ -96,7 +98,10 @@ def _mean_size(moving: NDArray[np.bool_], x: Array, less: Array | None = None) -
 def coverage(
     assessments: Mapping[tuple[str, str], Assessment], moving: NDArray[np.bool_], machine: Machine, dt: float
 ) -> tuple[list[CoverageRow], dict[tuple[str, str], float]]:
-    """Seconds of each state per component and side, and seconds of driving that were decided."""
+    """Seconds of each state per component and side, and seconds of driving that were decided.
+
+    `moving` of shape (n, wheels), `dt` in s.
+    """
     rows: list[CoverageRow] = []
     decided: dict[tuple[str, str], float] = {}
     anything = moving.any(axis=1)
@@ -121,7 +126,10 @@ def coverage(
 def open_states(
     assessments: Mapping[tuple[str, str], Assessment], moving: NDArray[np.bool_], machine: Machine
 ) -> dict[tuple[str, str], State]:
-    """The commonest state that is no judgement while a part is driven, by component and side; none where all is decided."""
+    """The commonest state that is no judgement while a part is driven, by component and side; none where all is decided.
+
+    `moving` of shape (n, wheels).
+    """
     out: dict[tuple[str, str], State] = {}
     anything = moving.any(axis=1)
     for (component, side), assessment in assessments.items():
@@ -134,7 +142,7 @@ def open_states(
 
 
 def body_motion(timeline: Timeline, replay: Replay, machine: Machine) -> tuple[Array, Array]:
-    """Commanded or mean measured speed of the body [m/s], and its yaw rate where known [rad/s]."""
+    """Commanded or mean measured speed of the body [m/s], and its yaw rate where known [rad/s]. Both of shape (n,)."""
     v = timeline.get("cmd.v")
     if v is None or not np.isfinite(v).any():
         v = timeline.map(_mean_speed, replay.v_ref, stack(timeline, [f"wheel.{w}.v" for w in machine.wheels]))
@@ -183,7 +191,10 @@ def phases(timeline: Timeline, replay: Replay, machine: Machine) -> list[PhaseRo
 
 
 def path_of(timeline: Timeline) -> dict[str, Array]:
-    """The machine's path [m] for pictures, from odometry, else from GNSS on a local plane; empty where neither is logged."""
+    """The machine's path [m] for pictures, from odometry, else from GNSS on a local plane; empty where neither is logged.
+
+    Each of the rows of its envelope, shape (rows,).
+    """
     x, y = timeline.get("odom.x"), timeline.get("odom.y")
     if x is not None and y is not None and np.isfinite(x).any():
         return {"path.x": shown(x), "path.y": shown(y)}

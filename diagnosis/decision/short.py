@@ -138,11 +138,11 @@ def _act(
 ) -> str:
     """What somebody does to have a part judged; ``{who}`` and ``{c}`` are filled in by the parts that it holds for."""
     sensor, tier, reason = part[1] == Side.SENSOR, assessment.tier, main_reason(assessment, state)
-    faster = f"faster than {limits.driving_speed:g} {words.speed_unit}"
+    faster = f"faster than {limits.driving_speed:.3g} {words.speed_unit}"
     if driven is not None and driven < limits.min_assessed and tier is not Tier.NONE:
         return f"move {words.parts_moved} {faster} for at least {limits.min_assessed:g} s, and diagnose that log"
     if tier is Tier.NONE:
-        return _of_silent(sensor, state)
+        return _of_silent(sensor, state, reason)
     by_state = {
         State.NO_DATA: "record again, with wheel.{c}.v and its command in the log all the time",
         State.NOT_EXCITED: f"move {words.parts_moved} {faster} for at least {limits.min_assessed:g} s",
@@ -187,8 +187,8 @@ def _act_of_axle(side: str, state: State | None) -> str:
     return "steer from stop to stop several times while driving"
 
 
-def _of_silent(sensor: bool, state: State | None) -> str:
+def _of_silent(sensor: bool, state: State | None, reason: str) -> str:
     """What to log for a part of which nothing is judged."""
-    if state is State.NO_DATA:
+    if state is State.NO_DATA or reason.endswith("not its command"):
         return "log wheel.{c}.v" if sensor else "log wheel.{c}.u"
     return "log wheel.{c}.u or wheel.{c}.v_ref" if sensor else "log wheel.{c}.v"

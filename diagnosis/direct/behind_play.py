@@ -17,6 +17,8 @@ _LEAST, _MOST = 0.05, 0.95
 def gain_behind_play(run: Run, found: IdentifiedPair) -> float | None:
     """δ of y = relation(δ·x) where that explains a run as well as a healthy channel is explained; None where none does.
 
+    Without a unit [1].
+
     Parameters
     ----------
     run : Run

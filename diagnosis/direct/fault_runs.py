@@ -28,7 +28,10 @@ _PLAYS = 3.0  # by which a command must move for a valve with a loss of gain to 
 
 
 def fault_runs(path: ModePath, samples: Samples, model: ModeModel, dt: float, shortest: int, play: float) -> list[Run]:
-    """Faulty runs of a path, joined where they belong together, without the ends in which nothing moves."""
+    """Faulty runs of a path, joined where they belong together, without the ends in which nothing moves.
+
+    `dt` in s, `play` in the channel's unit.
+    """
     runs = absorb_short(runs_of(path), shortest)
     runs = join_noisy(runs)
     runs = merge_equal(runs, max(2, round(0.02 / dt)), VARYING_ROWS + UNSATURATED_ROWS)

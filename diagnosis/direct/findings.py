@@ -161,7 +161,8 @@ def _mode_of(isolated: Isolated, found: IdentifiedPair, limits: Limits) -> Fault
     if found.pair.side is Side.ACTUATOR:
         relation = found.relation
         returns = _LEFT_S + 2.0 * (relation.lag + max(0.0, relation.delay * found.pair.dt))
-        least = max(_CLEAR * noise, _LOST * found.pair.span)
+        # a relation found in the mission is no truer than half a saturation term
+        least = max(_CLEAR * noise, _LOST * found.pair.span, limits.min_sat / 2)
         return None if seen.deviation < least or away < returns else mode
     if np.isfinite(seen.y).any() and away < min(_LEFT_S, 0.5 * isolated.run.size * found.pair.dt):
         return None

@@ -117,7 +117,10 @@ class IdentifiedPair:
 
     @cached_property
     def news(self) -> slice | NDArray[np.intp]:
-        """Samples that bring something new: all, or those that do where others come more often on the timeline."""
+        """Samples that bring something new: all, or those that do where others come more often on the timeline.
+
+        Indices, shape (k,), or a slice of the n samples.
+        """
         return _news(np.isin(self.samples.status, (PAIR, BLIND)))[0]
 
     @cached_property
@@ -127,7 +130,7 @@ class IdentifiedPair:
 
     @cached_property
     def holds(self) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-        """Where y begins to hold a value other than 0, and for how many steps."""
+        """Where y begins to hold a value other than 0, and for how many steps. Both of shape (k,)."""
         known = np.flatnonzero(self.pair.fresh & np.isfinite(self.pair.y))
         values = self.pair.y[known]
         first = known[np.flatnonzero(np.r_[True, values[1:] != values[:-1]])] if known.size else known

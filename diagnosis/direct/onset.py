@@ -21,6 +21,8 @@ _INNER_S = 2.5
 def refine(run: Run, samples: Samples, delta: float, model: ModeModel, before: int, after: int) -> Run:
     """Move the ends of a noisy run to where its fault most probably began and ended.
 
+    The gain is without a unit [1].
+
     Parameters
     ----------
     run : Run

@@ -235,6 +235,9 @@ def repeated_share(news: Array, lsb: float, period: float, habit: Habit) -> floa
     """Probability that a healthy, moving channel gives the same value twice [1], by what it does and by its rounding.
 
     The noise of a channel within a rounding step shows by p = erf(lsb / (√8·noise)) at most, which is 1 without noise.
+
+    `news` holds the new values in turn, shape (k,); `lsb` and what is compared with it are in the channel's unit,
+    `period` in s.
     """
     count = news.size // _REPEATS
     share = 0.0

@@ -17,7 +17,10 @@ _LEAST_STEPS = 5
 
 
 def step_means(record: DriveRecord, least_speed: float) -> tuple[Array, Array, int]:
-    """Mean |v| and effort along it in steps of one second; NaN where less than 90 % of a step is driven."""
+    """Mean |v| and effort along it in steps of one second; NaN where less than 90 % of a step is driven.
+
+    Both of shape (steps,), and the samples in a step; `least_speed` in m/s.
+    """
     length = max(1, round(STEP_S / record.dt))
     count = record.y.size // length
     y, u = record.y[: count * length].reshape(count, length), record.u[: count * length].reshape(count, length)

@@ -101,7 +101,10 @@ def find_rows(pair: SpeedPair, limits: Limits) -> tuple[list[Finding], Array, in
 
 
 def merged_runs(runs: list[Run], dt: float) -> list[Run]:
-    """Faulty runs: soft ones separated by little are one, brief ones belong to the longer one that they touch."""
+    """Faulty runs: soft ones separated by little are one, brief ones belong to the longer one that they touch.
+
+    `dt` in s.
+    """
     gap, brief = max(2, round(_GAP_S / dt)), max(3, round(_BRIEF_S / dt))
     runs = merge_equal(runs, gap, _SOFT)
     changed = True
@@ -149,7 +152,10 @@ def _isolated(run: Run, pair: SpeedPair, model: RowModel, limits: Limits) -> Iso
 
 
 def thinnest(switch_cost: float, *, ends: bool) -> float:
-    """Least log-evidence of a finding: into its row and out of it again; one that lasts to the end of the log need not end."""
+    """Least log-evidence of a finding: into its row and out of it again; one that lasts to the end of the log need not end.
+
+    Log-evidences, without a unit [1].
+    """
     return (2.0 if ends else 1.5) * switch_cost
 
 

@@ -124,6 +124,6 @@ def drive_data(
 
 
 def stretches(valid: NDArray[np.bool_], least: int) -> list[slice]:
-    """Stretches of valid samples that are at least `least` long."""
+    """Stretches of valid samples that are at least `least` long. `valid` of shape (n,)."""
     edge = np.flatnonzero(np.diff(np.r_[False, valid, False].astype(np.int8)))
     return [slice(int(a), int(b)) for a, b in zip(edge[::2], edge[1::2], strict=True) if b - a >= least]

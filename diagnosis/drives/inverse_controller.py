@@ -19,7 +19,7 @@ _SETTLE_S = 0.6  # from this much of a stretch the controller's state before it 
 
 
 def high_passed(x: Array, memory_s: float, dt: float) -> Array:
-    """First-order high-pass of x with its first value as the level before it, shape (n,)."""
+    """First-order high-pass of x with its first value as the level before it, shape (n,). `memory_s` and `dt` in s."""
     from scipy.signal import lfilter
 
     a = memory_s / (memory_s + dt)
@@ -27,12 +27,15 @@ def high_passed(x: Array, memory_s: float, dt: float) -> Array:
 
 
 def led(x: Array, lead: int) -> Array:
-    """x earlier by `lead` steps; the ends are held."""
+    """x earlier by `lead` steps; the ends are held. Both of shape (n,)."""
     return x[np.clip(np.arange(x.size) + lead, 0, x.size - 1)]
 
 
 def fading(size: int, memory_s: float, dt: float) -> Array:
-    """What is left of the integral state before the first of `size` samples, shape (size,)."""
+    """What is left of the integral state before the first of `size` samples, shape (size,).
+
+    `memory_s` and `dt` in s.
+    """
     return np.asarray(np.exp(-np.arange(size) * dt / memory_s), dtype=np.float64)
 
 

@@ -106,7 +106,7 @@ class LoadStretch:
 
 
 def onset_of(y: Array, start: int, wanted: float, dt: float) -> Onset:
-    """Look for a jump of y around sample `start`; see `Onset`."""
+    """Look for a jump of y around sample `start`; see `Onset`. `y` of shape (n,), `dt` in s."""
     n = _SIDE_BY_SIDE
     size = np.abs(y)
     ahead = np.convolve(size, np.ones(n) / n, mode="valid")

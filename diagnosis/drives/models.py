@@ -105,13 +105,13 @@ class RowModel:
 
     @property
     def added(self) -> Array:
-        """Noise w of each state [m/s]; 0 outside the noisy row."""
+        """Noise w of each state [m/s]; 0 outside the noisy row. Shape (states,)."""
         out: Array = np.r_[np.zeros(3 + _EPSILONS.size), np.repeat(_POWERS * self.noise, _BIASES.size)]
         return out
 
     @property
     def bias(self) -> Array:
-        """Bias m of each state [m/s]; 0 outside the noisy row."""
+        """Bias m of each state [m/s]; 0 outside the noisy row. Shape (states,)."""
         out: Array = np.r_[np.zeros(3 + _EPSILONS.size), (_POWERS[:, None] * self.noise * _BIASES).ravel()]
         return out
 

@@ -96,7 +96,7 @@ def forward(samples: SpeedSamples, model: RowModel, state: RowState) -> tuple[ND
 
 
 def most_probable(samples: SpeedSamples, model: RowModel) -> tuple[NDArray[np.int64], Array]:
-    """Row of every sample of a whole channel, and the causal lead of a fault; see `forward`."""
+    """Row of every sample of a whole channel, and the causal lead of a fault; see `forward`. Both of shape (n,)."""
     back, lead, state = forward(samples, model, initial_state(model))
     return ROW[trace(back, int(np.argmax(state.score)))[0]], lead
 

@@ -30,7 +30,10 @@ _ADDED = np.geomspace(
 
 
 def noncentrality(needed: float) -> float:
-    """d at which log-evidence of mean d²/2 and variance d² exceeds `needed` in 95 of 100 cases: d²/2 − 1.645·d = needed."""
+    """d at which log-evidence of mean d²/2 and variance d² exceeds `needed` in 95 of 100 cases: d²/2 − 1.645·d = needed.
+
+    A log-evidence, without a unit [1].
+    """
     return float(_QUANTILE + np.sqrt(_QUANTILE**2 + 2.0 * needed))
 
 
@@ -39,6 +42,8 @@ def added_noise(count: Array, needed: float) -> Array:
 
     Against noise of its own power, healthy noise loses (κ² − ln(1 + κ²))/2 a sample on average, with variance κ⁴/2. Infinite where
     not even the strongest state shows.
+
+    Both of one shape (k,); `needed` is a log-evidence [1].
     """
     power = _ADDED**2
     rate, spread = 0.5 * (power - np.log1p(power)), _QUANTILE * np.sqrt(0.5) * power

@@ -63,7 +63,10 @@ class _Tracking(NamedTuple):
 
 
 def estimate_lag(response: Array, command: Array, dt: float) -> int:
-    """Delay of the response against the command in steps, by the largest correlation up to 2.5 s; 0 where none is clear."""
+    """Delay of the response against the command in steps, by the largest correlation up to 2.5 s; 0 where none is clear.
+
+    Both of shape (n,), `dt` in s.
+    """
     r, c = np.nan_to_num(response - np.nanmean(response)), np.nan_to_num(command - np.nanmean(command))
     limit = min(round(_MAX_LAG_S / dt), r.size // 3)
     norms = np.sqrt(float(r @ r) * float(c @ c))

@@ -42,7 +42,10 @@ class Course(NamedTuple):
 
 
 def likelihoods(courses: Sequence[Course]) -> list[Array]:
-    """Log-likelihood of each sample given those before it, as `RowFilter.step` gives it, for every course."""
+    """Log-likelihood of each sample given those before it, as `RowFilter.step` gives it, for every course.
+
+    Each of the shape (k,) of its course.
+    """
     # those of like length beside one another: the shorter ones of a group wait for its longest
     order = sorted(range(len(courses)), key=lambda i: courses[i].y.size)
     out: list[Array] = [np.empty(0)] * len(courses)

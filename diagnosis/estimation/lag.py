@@ -12,12 +12,18 @@ Array = NDArray[np.float64]
 
 
 def low_passed(u: Array, tau: float, dt: float) -> Array:
-    """Response of a first-order lag of tau [s], 0 for none, to u held over each step; NaN counts as 0."""
+    """Response of a first-order lag of tau [s], 0 for none, to u held over each step; NaN counts as 0.
+
+    Both of shape (n,).
+    """
     return low_passed_on(u, tau, dt, None)[0] if u.size else u
 
 
 def low_passed_on(u: Array, tau: float, dt: float, state: float | None) -> tuple[Array, float]:
-    """`low_passed` of a block, with the state from the block before and for the next; None before the first."""
+    """`low_passed` of a block, with the state from the block before and for the next; None before the first.
+
+    Both of shape (k,), in the unit of u; times in s.
+    """
     a = np.exp(-dt / tau) if tau > 0 else 0.0
     filled = without_nan(u)
     out = np.empty(u.size)

@@ -82,7 +82,7 @@ class RowFilter:
         self.kf = kf
 
     def row(self, x: float) -> list[float]:
-        """H for a reference x."""
+        """H for a reference x. `x` is in the channel's unit [m/s, rad or 1]."""
         if self.m == CONSTANT:
             return [1.0, 0.0]
         if self.m == ZERO:

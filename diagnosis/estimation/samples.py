@@ -48,5 +48,5 @@ class Samples(NamedTuple):
 
     @classmethod
     def even(cls, y: Array, x: Array, status: NDArray[np.int8], quiet: NDArray[np.bool_]) -> Samples:
-        """Samples whose noise is the same everywhere."""
+        """Samples whose noise is the same everywhere. All of shape (n,)."""
         return cls(y, x, status, quiet, *(np.broadcast_to(1.0, y.shape).copy() for _ in range(3)))

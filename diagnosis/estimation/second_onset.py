@@ -87,7 +87,7 @@ class Readings(NamedTuple):
 
     @property
     def known(self) -> NDArray[np.intp]:
-        """Places of the samples that have both."""
+        """Places of the samples that have both. Shape (k,)."""
         return np.flatnonzero(np.isfinite(self.y) & np.isfinite(self.x))
 
     def courses(self) -> list[Course]:

@@ -137,7 +137,7 @@ def with_leads(runs: list[Run], lead: int, tail: int, gap: int) -> list[tuple[Ru
 
 
 def trim(run: Run, quiet: NDArray[np.bool_]) -> Run | None:
-    """Cut samples off both ends in which nothing moves; None where nothing is left."""
+    """Cut samples off both ends in which nothing moves; None where nothing is left. `quiet` of shape (n,)."""
     moving = np.flatnonzero(~quiet[run.start : run.stop])
     if not moving.size:
         return None

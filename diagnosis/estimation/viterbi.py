@@ -128,7 +128,7 @@ class ModePath:
 
     @property
     def row(self) -> NDArray[np.int8]:
-        """Row of the table per sample."""
+        """Row of the table per sample. Shape (n,)."""
         return np.asarray(ROW_OF_MODEL.astype(np.int8)[self.model])
 
     def crossing(self, start: int, stop: int, slack: int, hold: int) -> int | None:

@@ -14,12 +14,12 @@ Array = NDArray[np.float64]
 
 
 def ratio(a: float, b: float) -> float | None:
-    """a/b, None where there is nothing to divide by."""
+    """a/b, None where there is nothing to divide by. In the unit of a per b."""
     return float(a) / float(b) if b > 0 else None
 
 
 def mean(values: Sequence[float | None]) -> float | None:
-    """Mean of the known values; None where there is none."""
+    """Mean of the known values; None where there is none. In the unit of the values."""
     known = [v for v in values if v is not None]
     return float(np.mean(known)) if known else None
 

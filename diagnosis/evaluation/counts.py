@@ -178,5 +178,5 @@ def add(parts: Sequence[Counts]) -> Counts:
 
 
 def band_of(value: float, bands: Sequence[tuple[float, float]]) -> int:
-    """Index of the band that holds a value; beyond the last one it is the last."""
+    """Index of the band that holds a value; beyond the last one it is the last. In the unit of the bands."""
     return next((i for i, (_, high) in enumerate(bands) if value < high), len(bands) - 1)

@@ -30,7 +30,7 @@ def length(spans: Iterable[Span]) -> float:
 
 
 def within(spans: Iterable[Span], start: float, stop: float) -> list[Span]:
-    """The parts of spans between `start` and `stop`."""
+    """The parts of spans between `start` and `stop`. Times in s."""
     cut = [(max(a, start), min(b, stop)) for a, b in spans]
     return [(a, b) for a, b in cut if b > a]
 

@@ -29,7 +29,10 @@ _FULL = 20
 
 
 def offset_pattern(machine: Machine) -> Array:
-    """Share of the common offset that each wheel has: as in the geometry, else outwards (left positive)."""
+    """Share of the common offset that each wheel has: as in the geometry, else outwards (left positive).
+
+    Shape (wheels,), shares [1].
+    """
     assert machine.geometry is not None
     places = list(machine.geometry.wheels.values())
     given = np.array([w.offset for w in places])

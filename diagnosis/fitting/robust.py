@@ -30,7 +30,10 @@ UNKNOWN = Estimate(float("nan"), float("nan"))
 
 
 def weighted_median(x: Array, weight: Array) -> float:
-    """Value below which half of the weight lies; NaN where there is none."""
+    """Value below which half of the weight lies; NaN where there is none.
+
+    Both of shape (n,); the result in the unit of x.
+    """
     if not x.size:
         return float("nan")
     order = np.argsort(x)
@@ -49,6 +52,8 @@ def robust_solve(regressors: Array, instruments: Array, y: Array, weight: Array,
 
     The start is the smallest median residual over small subsets, which holds while fewer than half of the weight
     disagrees; Tukey's weights refine it.
+
+    Units are those of the equation; weights and their sum are plain numbers [1].
 
     Parameters
     ----------
@@ -91,7 +96,10 @@ def robust_solve(regressors: Array, instruments: Array, y: Array, weight: Array,
 
 
 def solve(regressors: Array, instruments: Array, y: Array, weight: Array) -> Array:
-    """β of Z'WX β = Z'Wy; NaN where it is not fixed."""
+    """β of Z'WX β = Z'Wy; NaN where it is not fixed.
+
+    `regressors` and `instruments` of shape (n, k), `y` and `weight` of shape (n,), β of shape (k,).
+    """
     left = (instruments * weight[:, None]).T @ regressors
     if np.linalg.matrix_rank(left) < left.shape[0]:
         return np.full(left.shape[0], np.nan)

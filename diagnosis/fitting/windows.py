@@ -49,12 +49,15 @@ def window_length(dt: float) -> int:
 
 
 def opened(u: Array, dead: float) -> Array:
-    """Opening beyond the dead zone, sgn(u)·max(|u| − dead, 0) [fraction]."""
+    """Opening beyond the dead zone, sgn(u)·max(|u| − dead, 0) [fraction]. Both of shape (n,)."""
     return np.asarray(np.sign(u) * np.maximum(np.abs(u) - dead, 0.0)) if dead > 0 else u
 
 
 def fed(record: WheelRecord, dead: float, tau: float) -> Array:
-    """Lagged opening beyond the dead zone, the mean of all in the record, shape (n,)."""
+    """Lagged opening beyond the dead zone, the mean of all in the record, shape (n,).
+
+    In fractions of opening; `dead` likewise, `tau` in s.
+    """
     each = [low_passed(opened(u, dead), tau, record.dt) for u in record.u.T]
     return np.asarray(np.mean(each, axis=0))
 
@@ -83,7 +86,10 @@ def _cut(x: NDArray[Any], length: int) -> NDArray[Any]:
 
 
 def cut_windows(records: list[WheelRecord], dead: float, tau: float) -> Windows:
-    """Means, and scatter about them, of speed and fed opening in windows that drive."""
+    """Means, and scatter about them, of speed and fed opening in windows that drive.
+
+    `dead` in fractions of opening, `tau` in s.
+    """
     parts: list[tuple[NDArray[Any], ...]] = []
     whole = [max(1, int(r.y.size * r.dt / WINDOW_S)) for r in records]
     several = len(records) >= 4

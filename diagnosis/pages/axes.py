@@ -27,26 +27,26 @@ class Frame:
 
     @property
     def left(self) -> float:
-        """Place of the left border."""
+        """Place of the left border. In px."""
         return _LEFT
 
     @property
     def right(self) -> float:
-        """Place of the right border."""
+        """Place of the right border. In px."""
         return self.width - self.margin
 
     @property
     def bottom(self) -> float:
-        """Place of the lower border."""
+        """Place of the lower border. In px."""
         return self.height - _BOTTOM
 
     def px(self, x: NDArray[np.float64] | float) -> NDArray[np.float64]:
-        """Places of times."""
+        """Places of times. Both of shape (k,): times in s, places in px."""
         share = (np.asarray(x) - self.x[0]) / (self.x[1] - self.x[0])
         return self.left + share * (self.right - self.left)
 
     def py(self, y: NDArray[np.float64] | float) -> NDArray[np.float64]:
-        """Places of values; those outside stand at the border."""
+        """Places of values; those outside stand at the border. Both of shape (k,), places in px."""
         share = (np.asarray(y) - self.y[0]) / (self.y[1] - self.y[0])
         return self.bottom - np.clip(share, 0.0, 1.0) * (self.bottom - self.top)
 
@@ -65,12 +65,12 @@ class Frame:
         return Markup("".join(parts))
 
     def line(self, x: float, style: str) -> Markup:
-        """Upright line at a time."""
+        """Upright line at a time. Time in s."""
         shape = '<path class="{}" d="M{:.1f} {:.1f}V{:.1f}"/>'
         return Markup(shape).format(style, float(self.px(x)), self.top, self.bottom)
 
     def shade(self, a: float, b: float, style: str) -> Markup:
-        """Part of the time in the colour of a mode."""
+        """Part of the time in the colour of a mode. Times in s."""
         x0, x1 = (min(self.right, max(self.left, float(self.px(v)))) for v in (a, b))
         return Markup('<rect class="f {}" x="{:.1f}" y="{:.1f}" width="{:.1f}" height="{:.1f}"/>').format(
             style, x0, self.top, max(1.0, x1 - x0), self.bottom - self.top
@@ -78,7 +78,7 @@ class Frame:
 
 
 def ticks(low: float, high: float, most: int) -> list[float]:
-    """At most `most` round values between two."""
+    """At most `most` round values between two. In the unit of the axis."""
     rough = (high - low) / most
     if not rough > 0:
         return [low]
@@ -89,7 +89,10 @@ def ticks(low: float, high: float, most: int) -> list[float]:
 
 
 def limits(*series: NDArray[np.float64], least: float = 0.0) -> tuple[float, float] | None:
-    """Range that holds all finite values with a margin, at least `least` high; None where there is none."""
+    """Range that holds all finite values with a margin, at least `least` high; None where there is none.
+
+    In the unit of the series; NaN are left out.
+    """
     finite = [s[np.isfinite(s)] for s in series]
     values = np.concatenate(finite) if finite else np.zeros(0)
     if not values.size:
@@ -100,5 +103,5 @@ def limits(*series: NDArray[np.float64], least: float = 0.0) -> tuple[float, flo
 
 
 def label(x: float, y: float, words: str, style: str) -> Markup:
-    """Text of a picture; `words` may come from a log."""
+    """Text of a picture; `words` may come from a log. Places in px."""
     return Markup(f'<text x="{x:.1f}" y="{y:.1f}" class="{style}">{escape(words)}</text>')

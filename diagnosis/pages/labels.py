@@ -67,7 +67,7 @@ def mode_legend(mode: FaultMode) -> str:
 
 
 def clock(seconds: float, digits: int = 0) -> str:
-    """Mission time as ``m:ss`` or ``h:mm:ss``, with decimals where asked for."""
+    """Mission time as ``m:ss`` or ``h:mm:ss``, with decimals where asked for. Time in s."""
     ticks = round(seconds * 10**digits)
     whole, rest = divmod(abs(ticks), 10**digits)
     minutes, s = divmod(whole, 60)
@@ -77,7 +77,7 @@ def clock(seconds: float, digits: int = 0) -> str:
 
 
 def span(seconds: float) -> str:
-    """Length of time with a unit that suits it."""
+    """Length of time with a unit that suits it. Length in s."""
     seconds = round(seconds, 6)  # which a difference of times may miss by its last digit
     if seconds < 1:
         return f"{seconds * 1e3:.0f} ms"
@@ -143,7 +143,10 @@ def utc_mark(start_ns: Any, length: int = 19, *, both: bool = False) -> Markup:
 
 
 def sat_text(mean: float, unit: str, words: MachineWords) -> str:
-    """Saturation value with its unit; angles in degrees, commands in percent."""
+    """Saturation value with its unit; angles in degrees, commands in percent.
+
+    `unit` is that of the mean: m/s, rad or a fraction of opening.
+    """
     if unit == OPENING:
         return f"{number(100 * mean)}{words.percent}"
     if unit == "rad":

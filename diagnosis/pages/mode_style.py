@@ -45,7 +45,7 @@ def _variables(state: str, colour: str, dark_letters: str) -> str:
 
 
 def contrast(a: str, b: str) -> float:
-    """Contrast of two colours ``#rgb`` or ``#rrggbb``, 1 to 21 (WCAG 2.2)."""
+    """Contrast of two colours ``#rgb`` or ``#rrggbb``, 1 to 21 (WCAG 2.2). A ratio, without a unit [1]."""
     low, high = sorted((_luminance(a), _luminance(b)))
     return (high + 0.05) / (low + 0.05)
 

@@ -25,7 +25,7 @@ def icon(state: str) -> Markup:
 
 
 def badge(state: str, x: float, y: float, size: float) -> Markup:
-    """Symbol of a state inside another picture, centred at (x, y)."""
+    """Symbol of a state inside another picture, centred at (x, y). All in px."""
     inner = size * 0.6 / 12
     return Markup(
         '<g class="bg {}" transform="translate({:.1f},{:.1f})"><rect width="{:.1f}" height="{:.1f}" rx="{:.1f}"/>'
@@ -34,5 +34,5 @@ def badge(state: str, x: float, y: float, size: float) -> Markup:
 
 
 def text(x: float, y: float, words: str, style: str) -> Markup:
-    """Text inside a picture; `words` may come from a log."""
+    """Text inside a picture; `words` may come from a log. Places in px."""
     return Markup('<text x="{:.1f}" y="{:.1f}" class="{}">{}</text>').format(x, y, style, escape(words))

@@ -63,7 +63,10 @@ class Encodable:
         return rows if self.per == 1 else rows // 2 * self.per
 
     def pieces(self, column: str, spans: Spans) -> list[tuple[int, Values]]:
-        """Every sample of a column over some spans [samples], as far as it is there."""
+        """Every sample of a column over some spans [samples], as far as it is there.
+
+        First sample and values, shape (k,), of each.
+        """
         values = self.columns[column]
         if self.per == 1:
             return [(a, values[a:b]) for a, b in spans if b > a]

@@ -70,7 +70,7 @@ class Pair:
     evidence: str
 
     def text(self, value: float) -> str:
-        """Value with its unit."""
+        """Value with its unit. In the pair's SI unit."""
         return f"{number(value)}{'' if self.unit == '°' else ' '}{self.unit}"
 
 

@@ -214,5 +214,5 @@ def _times(value: float, edge: Edge) -> str:
 
 
 def time_words(seconds: float) -> str:
-    """Short time in ms, else in s, to three digits."""
+    """Short time in ms, else in s, to three digits. Time in s."""
     return f"{number(seconds * 1e3)} ms" if abs(seconds) < 1.0 else f"{number(seconds)} s"

@@ -203,7 +203,7 @@ def _extremes(values: NDArray[np.floating], rows: int) -> NDArray[np.floating]:
 
 
 def whole(name: str, values: NDArray[np.floating], plan: Plan) -> Channel:
-    """Channel with every sample."""
+    """Channel with every sample. `values` of shape (n,)."""
     levels, step, base = levels_of(values, plan.step)
     return Channel(name, step, base, (_segment(0, 1, [levels], plan.way),))
 
@@ -230,7 +230,10 @@ def reduced(name: str, values: NDArray[np.floating], plan: Plan, per: int, strid
 
 
 def with_pieces(channel: Channel, pieces: Sequence[tuple[int, NDArray[np.floating]]], plan: Plan) -> Channel:
-    """Channel of extremes with every sample of some stretches (first sample and values) beside them."""
+    """Channel of extremes with every sample of some stretches (first sample and values) beside them.
+
+    Values of shape (k,) each.
+    """
     full = []
     for start, values in pieces:
         levels = _quantised(values, channel.step, channel.base)

@@ -96,7 +96,10 @@ def worst(faults: Sequence[IntervalRow], count: int) -> list[IntervalRow]:
 def figures_of(
     faults: Sequence[IntervalRow], machine: MachineRow, columns: Columns, limit: float | None
 ) -> dict[str, tuple[Row, ...]]:
-    """Rows of each fault's figure; those of faults of one part are the same object."""
+    """Rows of each fault's figure; those of faults of one part are the same object.
+
+    Columns of shape (n,), SI; `limit` is a probability [1].
+    """
     known: dict[tuple[str, ...], tuple[Row, ...]] = {}
     out = {}
     for f in faults:
@@ -156,7 +159,10 @@ def view(
     axis: Axis,
     duration: float,
 ) -> dict[str, object]:
-    """What the page's scripts need to know, as JSON; a segment's last number is its place among `blocks_of`."""
+    """What the page's scripts need to know, as JSON; a segment's last number is its place among `blocks_of`.
+
+    `duration` in s.
+    """
     block = {id(s): i for i, s in enumerate(blocks_of(channels))}
     index = {c.name: i for i, c in enumerate(channels)}
     distinct = {id(rows): rows for rows in figures.values()}

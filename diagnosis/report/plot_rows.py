@@ -103,7 +103,10 @@ def course_rows(fault: IntervalRow, pair: Pair, columns: Columns, limit: float |
 
 
 def residual_row(base: str, unit: str, scale: float, of: str = "") -> Row:
-    """Residual within ± its threshold, of the evidence columns that begin with `base`."""
+    """Residual within ± its threshold, of the evidence columns that begin with `base`.
+
+    `scale` takes SI to the shown unit [1].
+    """
     return Row(
         f"residual{of}",
         f"Residual{of}",
@@ -117,7 +120,10 @@ def residual_row(base: str, unit: str, scale: float, of: str = "") -> Row:
 def probability_row(
     base: str, limit: float | None, columns: Columns, of: str = "", limits: tuple[float, float] = (-0.03, 1.03)
 ) -> Row:
-    """Probability that a side deviates, also by less than counts as a fault, and the limit from which a fault is stated."""
+    """Probability that a side deviates, also by less than counts as a fault, and the limit from which a fault is stated.
+
+    Limits are probabilities [1].
+    """
     return Row(
         f"probability{of}",
         f"Probability that it deviates{of}",

@@ -91,7 +91,10 @@ class Row:
     unknown: tuple[tuple[float, float], ...] = ()
 
     def shown(self, columns: Columns) -> list[Row]:
-        """The row with the curves that exist, or nothing; a band or threshold without its column is left out."""
+        """The row with the curves that exist, or nothing; a band or threshold without its column is left out.
+
+        `columns` are arrays of shape (n,).
+        """
         traces = tuple(t for t in self.traces if t.column in columns)
         if not traces:
             return []
@@ -119,6 +122,8 @@ def derived(
     columns: Columns, report: ReportDocument, times: tuple[NDArray[np.floating], float] | None = None
 ) -> dict[str, NDArray[np.floating]]:
     """Columns with ε̂ and saturation terms of the parts with faults, as the document states them.
+
+    Every column of shape (n,).
 
     Parameters
     ----------

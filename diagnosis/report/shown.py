@@ -110,7 +110,7 @@ def _told(kind: Kind, side: str, rows: Mapping[tuple[str, float | None], Detecta
 
 
 def shown_lanes(report: ReportDocument, duration: float) -> list[ShownLane]:
-    """Lanes of the picture, in the machine's order."""
+    """Lanes of the picture, in the machine's order. `duration` in s."""
     out: list[ShownLane] = []
     for trace in _merged(report["detectability"]["traces"]):
         component, side = trace["component"], trace["side"]

@@ -12,7 +12,10 @@ from diagnosis.results.document import IntervalRow
 
 
 def extremes(y: NDArray[np.floating], count: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Smallest and largest value in each of `count` stretches of a series; NaN where a stretch is empty."""
+    """Smallest and largest value in each of `count` stretches of a series; NaN where a stretch is empty.
+
+    From shape (n,) to two of shape (count,).
+    """
     edges = np.linspace(0, len(y), count + 1).astype(int)
     starts = np.minimum(edges[:-1], len(y) - 1)
     low = np.fmin.reduceat(y.astype(np.float64), starts)

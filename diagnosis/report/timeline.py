@@ -91,7 +91,10 @@ class Timeline:
 
 
 def merged(spans: Iterable[Span], duration: float) -> list[tuple[str, int, int]]:
-    """Spans on a grid of 2000 stretches: faults are never lost, of the others the one at a stretch's middle counts."""
+    """Spans on a grid of 2000 stretches: faults are never lost, of the others the one at a stretch's middle counts.
+
+    Times in s.
+    """
     order: list[str] = []
     grid = np.full(_BUCKETS, -1)
     faults: list[tuple[int, int, int]] = []
@@ -189,7 +192,7 @@ def _main_state(spans: Sequence[Span]) -> str:
 
 
 def ticks(duration: float) -> tuple[tuple[float, str], ...]:
-    """Time marks: place in percent and words."""
+    """Time marks: place in percent and words. `duration` in s."""
     if duration <= 0:
         return ()
     step = next((s for s in _TICKS if duration / s <= 8), duration)

@@ -69,6 +69,8 @@ def samples_of(y: Array, fresh: Flags) -> Samples:
 def holds_of(samples: Samples, still: float, dt: float) -> Array:
     """How long a channel stays at one value of more than `still` [m/s], for each time that it does [s], the longest first.
 
+    Shape (holds,).
+
     Parameters
     ----------
     samples : Samples

@@ -53,7 +53,7 @@ def standing(data: Mapping[str, FollowerData], driving_speed: float, dt: float) 
 
 
 def spans_of(there: Flags) -> list[tuple[int, int]]:
-    """Steps [start, stop) of each stretch in which something holds."""
+    """Steps [start, stop) of each stretch in which something holds. `there` of shape (n,)."""
     edge = np.flatnonzero(np.diff(np.r_[False, there, False].astype(np.int8)))
     return list(zip(edge[::2].tolist(), edge[1::2].tolist(), strict=True))
 

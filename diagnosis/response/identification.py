@@ -136,7 +136,7 @@ def _within(asked: Array, weights: Array, limit: float) -> Array:
 
 
 def beyond(y: Array, low: Array, high: Array) -> Array:
-    """How far values lie outside of a band; 0 within. Shape of y."""
+    """How far values lie outside of a band; 0 within. Shape of y. All of shape (k,), in one unit."""
     return np.asarray(y - np.clip(y, low, high))
 
 

@@ -47,7 +47,7 @@ class FollowerData:
 
 
 def cell_of(dt: float) -> int:
-    """Steps of a cell."""
+    """Steps of a cell. `dt` is a step [s]."""
     return max(1, round(CELL_S / dt))
 
 

@@ -53,7 +53,10 @@ class Past(NamedTuple):
 
 
 def pasts_of(one: Judged, block_s: float) -> list[Past]:
-    """Command and other view of a wheel, with usual misfits found in the mission."""
+    """Command and other view of a wheel, with usual misfits found in the mission.
+
+    `block_s` is the length of a block [s].
+    """
     blocks = one.wheel.blocks
     views = [0.5 * (blocks.low + blocks.high)] if one.response.answered else []
     if one.speed is not None:
@@ -190,6 +193,8 @@ def late_wheels(judged: Mapping[str, Judged], block_s: float) -> dict[str, list[
 
     None where several do: then commands, or clocks, are late. None where another wheel is evidently wrong: what is held against its
     readings, and dragged by its loop, tells no delay.
+
+    `block_s` is the length of a block [s].
     """
     found = {w: late_of(j, block_s) for w, j in judged.items()}
     width = {w: int(j.wheel.blocks.start[1]) for w, j in judged.items() if j.wheel.blocks.start.size > 1}

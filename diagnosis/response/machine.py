@@ -98,7 +98,10 @@ def unexplained(drives: Sequence[FollowerData], limits: Limits, dt: float) -> tu
 
 
 def otherwise(judged: Mapping[str, Judged], block_s: float) -> tuple[str, ...]:
-    """A sentence where all drives together did something else than their commands for long; no wheel is blamed for it."""
+    """A sentence where all drives together did something else than their commands for long; no wheel is blamed for it.
+
+    `block_s` is the length of a block [s].
+    """
     off = []
     for j in judged.values():
         if not j.response.answered:

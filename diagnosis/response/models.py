@@ -71,12 +71,12 @@ class Blocks(NamedTuple):
 
     @property
     def white(self) -> Array:
-        """What changes from sample to sample beside the usual (logarithm)."""
+        """What changes from sample to sample beside the usual (logarithm). Shape (blocks,)."""
         return np.asarray(np.log((self.rough + 0.3 * self.usual) / (1.3 * self.usual)))
 
     @property
     def held(self) -> Flags:
-        """Blocks whose every reading repeats the one before."""
+        """Blocks whose every reading repeats the one before. Shape (blocks,)."""
         return np.asarray((self.readings > 0) & (self.same == self.readings))
 
 
@@ -221,6 +221,8 @@ def hold_shares(blocks: Blocks, driving: Flags, block_s: float) -> tuple[float, 
     """Share of blocks without any change while the wheel moves, after one with a change and after one without, beside long holds [1].
 
     Parameters are those of `scores`.
+
+    `driving` of shape (blocks,), `block_s` in s.
     """
     use, long = _long_holds(blocks, driving, block_s)
     if blocks.habitual and np.count_nonzero(long) > 0.25 * max(int(np.count_nonzero(use)), 1):
@@ -235,7 +237,10 @@ def hold_shares(blocks: Blocks, driving: Flags, block_s: float) -> tuple[float, 
 
 
 def held_long(blocks: Blocks, driving: Flags, block_s: float) -> float:
-    """Share of the driving in which a value is held for long [1]; parameters are those of `scores`."""
+    """Share of the driving in which a value is held for long [1]; parameters are those of `scores`.
+
+    `driving` of shape (blocks,), `block_s` in s.
+    """
     use, long = _long_holds(blocks, driving, block_s)
     return float(np.count_nonzero(long)) / max(int(np.count_nonzero(use)), 1)
 

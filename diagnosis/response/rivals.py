@@ -28,7 +28,10 @@ _CLEARLY = 2.0  # times the misfit of another wheel beside its command: then it 
 
 
 def by_each_other(found: Mapping[str, Judged], block_s: float) -> dict[str, Judged]:
-    """Wheels with what is usual in them, by the others: a fault of half the mission is no habit where no other wheel has it."""
+    """Wheels with what is usual in them, by the others: a fault of half the mission is no habit where no other wheel has it.
+
+    `block_s` is the length of a block [s].
+    """
     rough = {w: float(np.median(j.wheel.blocks.usual)) for w, j in found.items()}
     held = {w: held_long(j.wheel.blocks, j.driving, block_s) for w, j in found.items()}
     wild = {w: float(np.mean(j.wheel.samples.wild)) if j.wheel.samples.wild.size else 0.0 for w, j in found.items()}

@@ -39,6 +39,8 @@ def sides_of(
 ) -> tuple[Assessment, Assessment]:
     """Sensor and drive of a wheel.
 
+    Flags by steps of shape (n,), by blocks of shape (blocks,).
+
     Parameters
     ----------
     one : Judged

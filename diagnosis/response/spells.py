@@ -33,7 +33,10 @@ class Spell(NamedTuple):
 
 
 def spells_of(posterior: Array, block_s: float) -> list[Spell]:
-    """Spells of faults along the most probable states; short interruptions of one mode are bridged."""
+    """Spells of faults along the most probable states; short interruptions of one mode are bridged.
+
+    `posterior` of shape (blocks, states), probabilities; `block_s` in s.
+    """
     modes = _modes()
     best = posterior.argmax(axis=1)
     out: list[Spell] = []

@@ -156,7 +156,7 @@ class Checked:
 
 
 def size_words(check: str, value: float) -> str:
-    """A value of a check in its unit."""
+    """A value of a check in its unit. By the check: a share [1], rad, rad/s or m/s."""
     if check in (Check.YAW, Check.LASTING_YAW):
         return f"{math.degrees(value):.1f}°"
     return f"{value:.2f} s" if check == Check.DELAY else f"{100 * min(value, 9.99):.0f} %"

@@ -62,6 +62,8 @@ def steps_around(spans: Iterable[tuple[int, int]], size: int, dt: float, most: i
 def steps_of(findings: Sequence[Finding], size: int, dt: float) -> Steps:
     """Steps that one component's evidence keeps: none where the mission is short enough to keep all.
 
+    Shape (k,).
+
     Parameters
     ----------
     findings : Sequence[Finding]
@@ -87,7 +89,10 @@ class Pictured:
 
     @classmethod
     def of(cls, step: Steps, series: Iterable[tuple[str, NDArray[np.floating]]]) -> Pictured:
-        """Reduce columns of n steps one after another; `series` may make each when it is asked for."""
+        """Reduce columns of n steps one after another; `series` may make each when it is asked for.
+
+        Columns of shape (n,).
+        """
         out = cls(step)
         for leaf, values in series:
             out.columns[leaf] = shown(values)

@@ -178,7 +178,10 @@ def codes_of(side: Side) -> tuple[int, ...]:
 
 
 def prior(code: int, side: Side = Side.SENSOR) -> float:
-    """Probability of a row of one side before any evidence, by its code; 0 for a row that its table lacks."""
+    """Probability of a row of one side before any evidence, by its code; 0 for a row that its table lacks.
+
+    A probability [1].
+    """
     rows = {ROWS.index(State(row.mode.value)): row.prior for row in FAULT_ROWS if row.side is side}
     return rows.get(code, 0.0) if code else 1.0 - sum(rows.values())
 

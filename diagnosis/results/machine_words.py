@@ -130,7 +130,10 @@ class MachineWords:
         return entry.shown_unit if entry.group in ("cmd", "gnss") else self.unit(entry.shown_unit)
 
     def amount(self, value: float, unit: str = "m/s", digits: int = 3) -> str:
-        """A value with its unit, to follow a verb: ``0.31 m/s``, ``2.1 % of opening``."""
+        """A value with its unit, to follow a verb: ``0.31 m/s``, ``2.1 % of opening``.
+
+        The value is in `unit`, openings as fractions [1].
+        """
         if unit == OPENING:
             return f"{plain(100 * value, digits)}{self.percent}"
         return f"{plain(value, digits)} {self.unit(unit)}".rstrip()

@@ -34,7 +34,10 @@ def not_reported(below: int, name: str) -> str:
 
 
 def times_as_probable(log_evidence: float) -> str:
-    """A log-evidence in words, to be followed by *with this fault as without*: ``about 3 000 times as probable``."""
+    """A log-evidence in words, to be followed by *with this fault as without*: ``about 3 000 times as probable``.
+
+    A difference of natural logarithms [1].
+    """
     if log_evidence > math.log(_MOST):
         return "more than a million times as probable"
     times = math.exp(log_evidence)

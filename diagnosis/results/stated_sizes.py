@@ -67,7 +67,10 @@ def size_columns(
 def known_probability(
     report: ReportDocument, t: NDArray[np.floating], step: float, columns: Mapping[str, NDArray[Any]]
 ) -> dict[str, NDArray[Any]]:
-    """The columns ``evidence.<component>.<side>.probability`` without what was not decided, which is NaN; see `size_columns`."""
+    """The columns ``evidence.<component>.<side>.probability`` without what was not decided, which is NaN; see `size_columns`.
+
+    Columns and `t` [s] of shape (n,).
+    """
     out = {}
     for component, side in {(s["component"], s["side"]): None for s in report["states"]}:
         name = f"evidence.{component}.{side}.probability"

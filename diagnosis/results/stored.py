@@ -60,7 +60,10 @@ def _bits_of(name: str, otherwise: tuple[int, int]) -> tuple[int, int]:
 
 
 def grids_of(columns: Mapping[str, NDArray[np.floating]], lsb: Mapping[str, float]) -> dict[str, float]:
-    """Step of every column's grid, as `grid_of`; a difference from a recorded column is no finer than that one's."""
+    """Step of every column's grid, as `grid_of`; a difference from a recorded column is no finer than that one's.
+
+    Columns of shape (n,); each step in its column's unit.
+    """
     grids = {name: grid_of(name, values, lsb.get(name)) for name, values in columns.items()}
     for name in grids:
         group, _, rest = name.partition(".")

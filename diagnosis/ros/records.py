@@ -26,6 +26,8 @@ def diagnosis_records(
 ) -> Iterator[Records]:
     """Records of the topics ``/mfhca/diagnostics`` and ``/mfhca/events``; their channels are added at once.
 
+    `places` takes and gives stamps of shape (k,) [ns].
+
     Parameters
     ----------
     report : ReportDocument
@@ -64,5 +66,5 @@ def _records(
 
 
 def unmoved(stamps: NDArray[np.int64]) -> NDArray[np.int64]:
-    """`Places` where the recorder's clock is the mission's, or not known."""
+    """`Places` where the recorder's clock is the mission's, or not known. Shape (k,) [ns]."""
     return stamps

@@ -216,8 +216,8 @@ def _assessment(side: Side, inputs: AxleInputs, judged: _Judged | None) -> Asses
             return unassessed(size, State.NOT_ASSESSED, "the {position} is logged but not its command")
     if judged is not None:
         return judged.sides[side]
-    if inputs.blocks is None:
-        why = "neither a steering command nor the {position} is in the log"
+    if inputs.blocks is None or not {"u", "u_applied"} & inputs.logged:
+        why = "neither the command of its {valve} nor the {position} is in the log"
     else:
         why = "the axle was steered too little to identify what its {valve} does"
     return unassessed(size, State.NOT_ASSESSED, why)

@@ -70,7 +70,10 @@ class SteeringBlocks:
 
 
 def between(x: Array, length: int, blocks: int, function: Callable[[Array], Array] = np.asarray) -> Array:
-    """Mean of function(x) over `length` samples up to the middle of each block."""
+    """Mean of function(x) over `length` samples up to the middle of each block.
+
+    From shape (n,) to (blocks,), in the unit of function(x).
+    """
     middle = np.minimum(np.arange(blocks) * length + length // 2, x.size)
     until, total = np.empty(blocks), 0.0
     for part in cut(x.size, length):
@@ -83,7 +86,10 @@ def between(x: Array, length: int, blocks: int, function: Callable[[Array], Arra
 
 
 def second_differences(values: Array) -> Array:
-    """(y_k − 2y_{k−1} + y_{k−2})²/6 of consecutive samples: their mean is the white noise's power; 0 for the first two."""
+    """(y_k − 2y_{k−1} + y_{k−2})²/6 of consecutive samples: their mean is the white noise's power; 0 for the first two.
+
+    Shape (n,).
+    """
     out = np.zeros(values.size)
     if values.size > 2:
         out[2:] = (values[2:] - 2 * values[1:-1] + values[:-2]) ** 2 / 6.0
@@ -144,7 +150,7 @@ def blocks_of(
 
 
 def window_means(x: Array, length: int) -> Array:
-    """Means over consecutive windows of `length`; the last, cut one is left out."""
+    """Means over consecutive windows of `length`; the last, cut one is left out. From shape (n,) to (windows,)."""
     count = x.size // length
     return np.asarray(x[: count * length].reshape(count, length).mean(axis=1))
 
@@ -211,6 +217,8 @@ def _rates(blocks: SteeringBlocks) -> Array:
 
 def sensor_noise(blocks: SteeringBlocks, values: Array, known: Noise, stop: float) -> SensorNoise:
     """Noise of an axle's sensor from its median window, or from the machine file.
+
+    `values` of shape (k,).
 
     Parameters
     ----------

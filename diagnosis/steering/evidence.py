@@ -42,7 +42,7 @@ def evidence_columns(
 
 
 def path_angle(axle: AxleFilter, path: SteeringPath, timeline: Timeline) -> Array:
-    """Angle along a path at every step [rad]."""
+    """Angle along a path at every step [rad]. Shape (n,)."""
     length = axle.blocks.length
     middles = np.arange(path.model.size) * length + (length - 1) / 2
     angle = timeline.store.column(np.float64, rows=timeline.size)

@@ -158,10 +158,10 @@ class SteeringPath(NamedTuple):
 
     @property
     def sensor(self) -> NDArray[np.int64]:
-        """Row of the sensor."""
+        """Row of the sensor. Shape (m,)."""
         return np.asarray(SENSOR[self.model])
 
     @property
     def actuator(self) -> NDArray[np.int64]:
-        """Row of the valve."""
+        """Row of the valve. Shape (m,)."""
         return np.asarray(ACTUATOR[self.model])

@@ -127,7 +127,7 @@ def _fit_axles(windows: Sequence[AxleWindows], scale: float) -> list[FittedPlant
 
 
 def own_spread(cov: Array) -> Array:
-    """Covariance of one axle's constants about those of another."""
+    """Covariance of one axle's constants about those of another. Both of shape (8, 8)."""
     return np.asarray(cov + _structure(0.2, 0.012, 0.1, lag=0.2, play=0.002))
 
 
@@ -191,7 +191,10 @@ def _best_of_grid(parts: Sequence[Windows], scale: float) -> list[Array]:
 
 
 def plant_of(parts: Sequence[Windows], fitted: FittedPlant, scale: float) -> SteeringPlant:
-    """The plant of an axle with what it leaves unexplained in the windows that it explains better."""
+    """The plant of an axle with what it leaves unexplained in the windows that it explains better.
+
+    `scale` is the rate [rad/s] against which errors are counted.
+    """
     valve, lag, play = unpacked(fitted.x)
     shares, low, high = [], 0.0, 0.0
     for part in parts:

@@ -98,7 +98,7 @@ class AxleInputs:
         return f"steer.{self.name}.{leaf}"
 
     def values(self, leaf: str) -> Array:
-        """Values on the timeline; NaN where it is not logged."""
+        """Values on the timeline; NaN where it is not logged. Shape (n,), SI."""
         if leaf in self.logged:
             return self.timeline.signals[self.channel(leaf)]
         return np.broadcast_to(np.nan, (self.timeline.size,))
@@ -106,6 +106,8 @@ class AxleInputs:
 
 def axle_inputs(timeline: Timeline, replay: Replay, machine: Machine, axle: int, counts: Counts) -> AxleInputs:
     """Take an axle's channels from a mission.
+
+    All of shape (n,).
 
     Parameters
     ----------

@@ -100,6 +100,8 @@ class SteeringModel:
         """What a healthy axle at rest loses per block, by its freedom, on a constant reading; and a little more.
 
         A constant reading must gain as much to be taken for a stuck sensor where rounding hides the noise.
+
+        A difference of log-likelihoods [1].
         """
         return float(0.5 * np.log(1 + self.rest_variance / self.block_variance) + 0.03)
 

@@ -63,13 +63,19 @@ class AxleFilter:
 
 
 def allowed_models(*, sensor: bool, actuator: bool, redundant: bool) -> NDArray[np.bool_]:
-    """Models that leave a side healthy which is not judged here, and combine more where something is redundant."""
+    """Models that leave a side healthy which is not judged here, and combine more where something is redundant.
+
+    Shape (MODELS,).
+    """
     rows = ((SENSOR == HEALTHY) | sensor) & ((ACTUATOR == HEALTHY) | actuator)
     return np.asarray(rows & ((np.arange(MODELS) < FIRST_HIDDEN) | redundant))
 
 
 def start_states(first: float, constants: FilterConstants) -> tuple[Array, FilterBank]:
-    """Scores and states of all models before the first block of a mission that may begin with a fault."""
+    """Scores and states of all models before the first block of a mission that may begin with a fault.
+
+    Scores of shape (MODELS,); `first` is an angle [rad].
+    """
     score = np.full(MODELS, -0.5 * constants.switch_cost)
     score[HEALTHY_MODEL] = 0.0
     bank = path_kernel.empty_bank()
@@ -89,7 +95,7 @@ def most_probable(axle: AxleFilter) -> Models:
 
 
 def follow_path(axle: AxleFilter, models: Models) -> SteeringPath:
-    """States along a given path."""
+    """States along a given path. `models` of shape (m,), a model per block."""
     size = models.size
     path = SteeringPath(
         model=models.copy(),
@@ -108,6 +114,8 @@ def evidence_of(axle: AxleFilter, known: SteeringPath, models: Models, start: in
     """Log-evidence of a path over [start, stop), its switches paid for, and its state [φ, r, a, b, d, c] at the end.
 
     Up to `start` it is the path `known`, whose states are there.
+
+    `models` of shape (m,); the state of shape (6,).
     """
     found: tuple[float, Array] = path_kernel.path_evidence(axle.series, models, start, stop, known, axle.constants)
     return found

@@ -167,7 +167,7 @@ def empty_bank() -> FilterBank:
 
 @njit(cache=True, error_model="numpy")
 def start(m: int, first: float, constants: FilterConstants, bank: FilterBank) -> None:
-    """Begin model m of a mission at the measured angle `first`."""
+    """Begin model m of a mission at the measured angle `first`. In rad."""
     stop = constants.axle.stop
     bank.mean[m, 0] = min(max(first, -stop), stop)
     bank.cov[m, 0, 0], bank.cov[m, 1, 1] = stop**2, (0.2 * constants.axle.rate_limit) ** 2
@@ -187,6 +187,8 @@ def path_evidence(
     """Log-evidence of blocks begin…end of a path, less the price of its switches, and [φ, r, a, b, d, c] at the end.
 
     The states before block `begin` are those of the path `known`.
+
+    `models` of shape (m,), the state of shape (6,).
     """
     bank = empty_bank()
     if begin > 0:

@@ -28,7 +28,7 @@ _SHIFTS_S = (0.01, 0.02, 0.04, 0.08, 0.16, 0.32, 0.64, 1.28)
 
 
 def runs_of(x: NDArray[np.int64]) -> Iterator[tuple[int, int, int]]:
-    """Stretches (start, stop, value) of equal values."""
+    """Stretches (start, stop, value) of equal values. `x` of shape (n,)."""
     cut = np.flatnonzero(np.r_[True, x[1:] != x[:-1]])
     for a, b in zip(cut, np.r_[cut[1:], x.size], strict=True):
         yield int(a), int(b), int(x[a])

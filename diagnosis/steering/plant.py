@@ -60,7 +60,7 @@ class SteeringPlant:
 
     @property
     def lag_std(self) -> float:
-        """Standard deviation of the lag's logarithm, at most 1."""
+        """Standard deviation of the lag's logarithm, at most 1. Of ln(lag), so without a unit [1]."""
         return float(min(np.sqrt(self.cov[LAG, LAG]), 1.0))
 
     @property

@@ -59,7 +59,7 @@ class FittedPlant:
 
 
 def unpacked(x: Array) -> tuple[ValveMap, float, float]:
-    """Valve map, lag [s] and half the play [rad] of a vector of constants."""
+    """Valve map, lag [s] and half the play [rad] of a vector of constants. `x` of shape (8,)."""
     slope, limit = np.exp(x[SLOPES]), np.exp(x[LIMITS])
     dead = np.maximum(x[DEAD], 0.0)
     valve = ValveMap(float(slope[0]), float(slope[1]), float(dead[0]), float(dead[1]), float(limit[0]), float(limit[1]))
@@ -67,13 +67,13 @@ def unpacked(x: Array) -> tuple[ValveMap, float, float]:
 
 
 def packed(valve: ValveMap, lag: float, play: float) -> Array:
-    """Vector of constants."""
+    """Vector of constants. Shape (8,); lag in s, play in rad."""
     logs = np.log([valve.slope_up, valve.slope_down, valve.limit_up, valve.limit_down, max(lag, 1e-3)])
     return np.array([logs[0], logs[1], valve.dead_up, valve.dead_down, logs[2], logs[3], logs[4], play])
 
 
 def predicted_by(part: Windows, x: Array) -> Array:
-    """Rates of a window's axle by a vector of constants [rad/s]."""
+    """Rates of a window's axle by a vector of constants [rad/s]. Shape (w,); `x` of shape (8,)."""
     return part.predicted(*unpacked(x))
 
 
@@ -86,17 +86,20 @@ def predicted_with_slopes(part: Windows, x: Array) -> tuple[Array, Array]:
 
 
 def tolerance_of(part: Windows, scale: float, share: float) -> Array:
-    """What a window's rate may differ by: noise, and a share of the rate [rad/s]."""
+    """What a window's rate may differ by: noise, and a share of the rate [rad/s]. Shape (w,)."""
     return np.asarray(np.hypot(2 * part.noise, share * np.maximum(np.abs(part.rate), 0.1 * scale)))
 
 
 def moving(part: Windows, predicted: Array, scale: float) -> NDArray[np.bool_]:
-    """Windows in which the axle turns, or should."""
+    """Windows in which the axle turns, or should. Shape (w,); rates and `scale` in rad/s."""
     return np.asarray(part.good & (np.maximum(np.abs(predicted), np.abs(part.rate)) > 0.1 * scale))
 
 
 def robust_loss(parts: Sequence[Windows], x: Array, scale: float, share: float) -> float:
-    """Mean of r²/(1 + r²) over the windows in which an axle moves or should; inf where there are none."""
+    """Mean of r²/(1 + r²) over the windows in which an axle moves or should; inf where there are none.
+
+    `x` of shape (8,), `scale` in rad/s, `share` a fraction.
+    """
     total, count = 0.0, 0
     for part in parts:
         predicted = predicted_by(part, x)

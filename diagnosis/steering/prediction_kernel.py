@@ -82,7 +82,10 @@ def _turn(m: int, move: float, driven: float, axle: AxleConstants, bank: FilterB
 
 @njit(cache=True, error_model="numpy")
 def predict(m: int, block: Block, axle: AxleConstants, coloured_decay: float, bank: FilterBank) -> None:
-    """x = f(x, u), P = F P Fᵀ + Q over one block."""
+    """x = f(x, u), P = F P Fᵀ + Q over one block.
+
+    Angles in rad, openings in fractions; `coloured_decay` is the factor per block of coloured noise [1].
+    """
     z, P, row = bank.mean, bank.cov, bank.room
     dt, fade, lift = axle.dt, axle.rate_decay, axle.rate_limit
     f, by_a, by_b = _drive(m, block, axle, bank)

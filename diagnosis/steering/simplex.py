@@ -17,6 +17,8 @@ class _Spent(Exception):
 def minimize(function: Callable[[Array], float], simplex: Array, *, calls: int, x_tol: float, f_tol: float) -> Array:
     """Search for the least value of a function.
 
+    Every unit is that of the function or of its argument.
+
     Parameters
     ----------
     function : Callable

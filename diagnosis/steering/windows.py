@@ -132,7 +132,10 @@ class Windows:
         return np.asarray(np.diff(angles) / (self.length * self.dt))
 
     def slopes(self, valve: ValveMap, lag: float, play: float) -> tuple[Array, Array]:
-        """What `predicted` gives, and its derivatives by both slopes, dead bands and limits, lag and play, shape (w, 8)."""
+        """What `predicted` gives, and its derivatives by both slopes, dead bands and limits, lag and play, shape (w, 8).
+
+        Lag in s, play in rad, rates in rad/s.
+        """
         angles, by = _window_slopes(self.u, valve, lag, play, self.dt, self.length)
         span = self.length * self.dt
         return np.diff(angles) / span, np.diff(by, axis=0) / span
@@ -145,7 +148,10 @@ class Windows:
 
 
 def windows_of(blocks: SteeringBlocks, noise: SensorNoise, stop: float, window_s: float) -> Windows:
-    """Rates between windows of `window_s`, marked where the sensor shows its usual noise and no end stop is near."""
+    """Rates between windows of `window_s`, marked where the sensor shows its usual noise and no end stop is near.
+
+    `stop` in rad, `window_s` in s.
+    """
     length = max(2, round(window_s / blocks.dt))
     known = blocks.count > 0
     mean = blocks.mean

@@ -143,7 +143,7 @@ class WheelBlocks:
 
 
 def block_width(dt: float) -> int:
-    """Samples in a block."""
+    """Samples in a block. `dt` in s."""
     return max(1, round(BLOCK_S / dt))
 
 

@@ -36,7 +36,10 @@ def is_scaled(m: int) -> bool:
 
 @njit(cache=True, error_model="numpy")
 def enter(m: int, old: int, k: WheelConstants, z: Array, P: Array) -> None:
-    """Start model m from the state of model `old`: speed and load are carried over, the unknowns get their priors."""
+    """Start model m from the state of model `old`: speed and load are carried over, the unknowns get their priors.
+
+    States `z` of shape (models, 4) and covariances `P` of shape (models, 4, 4).
+    """
     v, var = z[old, 0], P[old, 0, 0]
     x, x_var = z[old, 2], min(P[old, 2, 2], 1.0)
     if is_scaled(old):

@@ -89,7 +89,7 @@ def initial_state(first: Array, model: JointModel, dt: float, raw_dt: float) -> 
 
 
 def first_speeds(blocks: WheelBlocks) -> Array:
-    """First known speed of each wheel [m/s], 0 where there is none."""
+    """First known speed of each wheel [m/s], 0 where there is none. Shape (wheels,)."""
     out = np.zeros(blocks.y.shape[1])
     for i in range(out.size):
         known = np.flatnonzero(blocks.count[:, i] > 0)

@@ -77,7 +77,10 @@ class Run:
     lives: bool = False
 
     def ahead(self, m: int) -> float:
-        """Log-evidence of model m against a healthy wheel, also one under an unusual load."""
+        """Log-evidence of model m against a healthy wheel, also one under an unusual load.
+
+        A difference of log-likelihoods [1].
+        """
         return float(self.evidence[m] - max(self.evidence[HEALTHY], self.evidence[ODD] - _ODD_COST))
 
 

@@ -59,7 +59,10 @@ def against_command(y: Array, reference: Array) -> float:
 def slip_of(
     timeline: Timeline, replay: Replay, machine: Machine, v: Array, angle: Array, doubtful: NDArray[np.bool_]
 ) -> NDArray[np.bool_]:
-    """Where a wheel breaks the parity of the body; nowhere without geometry, or where an axle's angle is in doubt."""
+    """Where a wheel breaks the parity of the body; nowhere without geometry, or where an axle's angle is in doubt.
+
+    Shape (n, wheels); `v` likewise in m/s, `angle` of shape (n, axles) in rad, `doubtful` of shape (n, axles).
+    """
     geometry = machine.geometry
     if geometry is None or v.shape[1] < 4 or not any_finite(v).all() or not any_finite(angle).all():
         return np.zeros(v.shape, dtype=np.bool_)
@@ -70,7 +73,10 @@ def slip_of(
 
 
 def in_motion(angle: Array, machine: Machine, timeline: Timeline) -> tuple[Array, Array]:
-    """Wheel speed per speed of the body [1], and what each wheel rolls less because it steers [m/s]."""
+    """Wheel speed per speed of the body [1], and what each wheel rolls less because it steers [m/s].
+
+    Both of shape (n, wheels); `angle` of shape (n, axles) in rad.
+    """
     wheels = len(machine.wheels)
     geometry = machine.geometry
     if geometry is None or not any_finite(angle).all():

@@ -14,7 +14,10 @@ _SILENT = 10  # readings after an onset that are looked at for silence
 
 
 def onset_sentence(start: int, y: Array, model: WheelFilterModel, dt: float, name: str, side: Side) -> str:
-    """What the shape of the onset says: a sensor's fault may jump by more than a wheel can, a valve's bends."""
+    """What the shape of the onset says: a sensor's fault may jump by more than a wheel can, a valve's bends.
+
+    `y` of shape (n,); `dt` in s.
+    """
     low, high = max(1, start - 2), min(y.size, start + 3)
     if side is Side.SENSOR and start and not np.isfinite(y[start + _SILENT : start + 2 * _SILENT]).any():
         return f"At its onset {name} falls silent."
@@ -72,7 +75,7 @@ def refined(start: int, y: Array, reach: int, m: int, noise: float) -> int:
 
 
 def released(stop: int, y: Array, reach: int) -> int:
-    """First sample at which a constant sensor moves again, within `reach` samples of `stop`."""
+    """First sample at which a constant sensor moves again, within `reach` samples of `stop`. `y` of shape (n,)."""
     low, high = max(1, stop - reach), min(y.size, stop + reach + 1)
     moved = np.flatnonzero(np.nan_to_num(y[low:high] - y[low - 1 : high - 1]) != 0)
     return low + int(moved[0]) if moved.size else stop

@@ -68,7 +68,10 @@ class Trial:
 
 
 def plants_of(drives: Sequence[Drive], best: Trial, span: float, *, healthy: bool) -> PlantFit:
-    """Every wheel's own coefficients near the machine's, and what they leave unexplained."""
+    """Every wheel's own coefficients near the machine's, and what they leave unexplained.
+
+    `span` is the largest speed [m/s].
+    """
     body = best.found.values.size > RAMPS
     normal, wheel = best.windows.normal, best.windows.wheel
     chosen = np.zeros(wheel.size, dtype=np.bool_)
@@ -92,7 +95,10 @@ def plants_of(drives: Sequence[Drive], best: Trial, span: float, *, healthy: boo
 
 
 def penalty(body: bool) -> Array:
-    """Ridge on the change of slope between neighbouring ramps, forward and in reverse."""
+    """Ridge on the change of slope between neighbouring ramps, forward and in reverse.
+
+    Shape (p, p), p ramps and the body's share where that is asked.
+    """
     half = RAMPS // 2
     steps = np.zeros((2 * (half - 1), RAMPS + body))
     for side in range(2):

@@ -52,12 +52,15 @@ class Windows:
     place: NDArray[np.intp]
 
     def part(self, chosen: NDArray[np.intp]) -> Windows:
-        """Some of them."""
+        """Some of them. `chosen` are indices, shape (k,)."""
         return Windows(self.normal.part(chosen), self.drive[chosen], self.wheel[chosen], self.place[chosen])
 
 
 def usual_driving(drives: Sequence[Drive], span: float) -> list[Drive]:
-    """The missions without what takes far more opening per speed than most of the driving does."""
+    """The missions without what takes far more opening per speed than most of the driving does.
+
+    `span` is the largest speed [m/s].
+    """
     effort = []
     for d in drives:
         with np.errstate(invalid="ignore", divide="ignore"):
@@ -83,7 +86,7 @@ def rows_of(dt: float) -> tuple[int, int]:
 
 
 def windows_of(drives: Sequence[Drive], hysteresis: float, lag: float, span: float, *, body: bool) -> Windows:
-    """All windows in which a wheel drives."""
+    """All windows in which a wheel drives. Hysteresis in fractions of opening, lag in s, span in m/s."""
     parts = [Normal(np.zeros((0, RAMPS + body, RAMPS + body)), np.zeros((0, RAMPS + body)), np.zeros(0), np.zeros(0))]
     sources = [np.zeros((3, 0), dtype=np.intp)]
     for number, drive in enumerate(drives):
@@ -108,7 +111,10 @@ def windows_of(drives: Sequence[Drive], hysteresis: float, lag: float, span: flo
 
 
 def regressors(drive: Drive, i: int, hysteresis: float, lag: float, every: int, *, body: bool) -> Array:
-    """Lagged ramps of wheel i's opening, and the lagged speed of the body; shape (rows, p)."""
+    """Lagged ramps of wheel i's opening, and the lagged speed of the body; shape (rows, p).
+
+    Hysteresis in fractions of opening, lag in s.
+    """
     rows = -(-drive.u.shape[0] // every)
     out = np.zeros((rows, RAMPS + body))
     fade = float(np.exp(-drive.dt / lag))

@@ -64,6 +64,8 @@ def news(status: NDArray[np.int8], y: Array, habits: Sequence[Habit], dt: float)
     """Status with `SKIP` for what repeats the reading before within the habit of its sensor, shape (n, wheels).
 
     The hold is that of the wheels' usual speed or of the wheel's own, whichever is shorter.
+
+    Speeds in m/s, `dt` in s.
     """
     if not any(h.stepwise for h in habits):
         return status
@@ -88,7 +90,10 @@ def _usual_speed(y: Array) -> Array:
 
 
 def speed_noises(y: Array, status: NDArray[np.int8], habits: Sequence[Habit], dt: float) -> list[SpeedNoise | None]:
-    """White noise of every sensor whose noise depends on the speed; None where it does not, or nothing shows it."""
+    """White noise of every sensor whose noise depends on the speed; None where it does not, or nothing shows it.
+
+    `y` and `status` of shape (n, wheels), speeds in m/s, `dt` in s.
+    """
     found = [_growth(y[:, i], status[:, i] == PAIR, habit, dt) for i, habit in enumerate(habits)]
     known = np.array([g for g in found if g is not None]).reshape(-1, 3)
     if len(known) < _SIBLINGS:

@@ -36,7 +36,7 @@ class Normal(NamedTuple):
     samples: Array
 
     def part(self, chosen: NDArray[np.bool_] | NDArray[np.intp]) -> Normal:
-        """Some of the windows."""
+        """Some of the windows. `chosen` are indices, shape (k,), or flags, shape (n,)."""
         return Normal(*(x[chosen] for x in self))
 
 
@@ -94,7 +94,10 @@ def _system(w: Normal, penalty: Array, prior: Array | None) -> tuple[Array, Arra
 
 
 def misfits(w: Normal, values: Array, floor: float) -> Array:
-    """Mean square that each window leaves, over its own mean square, which counts as `floor`² at least; shape (n,)."""
+    """Mean square that each window leaves, over its own mean square, which counts as `floor`² at least; shape (n,).
+
+    `floor` has the unit of the responses [m/s].
+    """
     left = w.power - 2 * w.moment @ values + ((w.gram @ values) @ values)
     count = np.maximum(w.samples, 1.0)
     return np.asarray(np.maximum(left, 0.0) / count / np.maximum(w.power / count, floor**2))
@@ -149,7 +152,10 @@ def trimmed(
 
 
 def mode(values: Array) -> float:
-    """Half-sample mode: the densest half, over and over, until a few values are left; their median."""
+    """Half-sample mode: the densest half, over and over, until a few values are left; their median.
+
+    `values` of shape (n,), and the mode in their unit.
+    """
     x = np.sort(values)
     while x.size > 4:
         half = (x.size + 1) // 2

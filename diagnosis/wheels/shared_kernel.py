@@ -33,7 +33,7 @@ _APART = 3.0  # standard deviations from which on wheels and sensors of the body
 
 @njit(cache=True, error_model="numpy")
 def constants_of(row: Array) -> WheelConstants:
-    """Constants of one wheel."""
+    """Constants of one wheel. `row` of shape (constants,)."""
     return WheelConstants(*to_fixed_tuple(row, _CONSTANTS))
 
 
@@ -53,7 +53,10 @@ def taken(m: int, gain: float, bias: float, K: float, x: float) -> float:
 
 @njit(cache=True, error_model="numpy")
 def weights(lag: float, here: Array, after: Array) -> None:
-    """Weights with which an opening at place q of a block drives the mean speed of its own and of the next block."""
+    """Weights with which an opening at place q of a block drives the mean speed of its own and of the next block.
+
+    `here` and `after` of shape (samples of a block,); `lag` is the length of a block over τ [1].
+    """
     width = here.size
     a = np.exp(-lag / width)
     c = (1.0 - a) / (1.0 - np.exp(-lag)) / width
@@ -139,7 +142,10 @@ def feed(
 
 @njit(cache=True, error_model="numpy", inline="always")
 def rolls_at(i: int, speed: Array, trust: Array) -> tuple[float, float]:
-    """Weighted median of the other wheels' speeds of the body, and their mean distance from it; NaN without any."""
+    """Weighted median of the other wheels' speeds of the body, and their mean distance from it; NaN without any.
+
+    `speed` and `trust` of shape (wheels,); m/s.
+    """
     body, doubt = np.nan, 0.0
     total = trust.sum() - trust[i]
     if total > 0.0:
@@ -159,7 +165,10 @@ def rolls_at(i: int, speed: Array, trust: Array) -> tuple[float, float]:
 
 @njit(cache=True, error_model="numpy", inline="always")
 def lagged(m: int, k: WheelConstants, x: Array, z: Array, before: float) -> float:
-    """What valve and lag alone ask of a wheel in model m after a block with inputs x [m/s]."""
+    """What valve and lag alone ask of a wheel in model m after a block with inputs x [m/s].
+
+    `x` of shape (8,), `z` of shape (models, 4).
+    """
     takes = x[DRIVE]
     if m == A_GAIN or m == A_BIAS:
         takes *= z[m, 1]
@@ -176,6 +185,8 @@ def with_sensors(body: float, doubt: float, sensed: float, std: float, least: fl
 
     Both weigh by their variances; where they contradict each other, wheels that agree upon a fault of theirs are believed
     less than a sensor that has nothing to do with them.
+
+    All in m/s.
     """
     if sensed != sensed:
         return body, doubt

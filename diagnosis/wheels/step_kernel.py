@@ -138,6 +138,8 @@ def predict(m: int, q: WheelInput, k: WheelConstants, z: Array, P: Array) -> flo
     """z = F z + G, P = F P Fᵀ + Q of model m over one block; the share of a demand that the pump feeds.
 
     τ ν̇ = −ν + K·opening + load, and the load is a tyre's: grip·(body − ν) up to `grip_most`, plus what x makes of it.
+
+    `z` of shape (models, 4), `P` of shape (models, 4, 4); speeds in m/s.
     """
     drive, share = _fed(m, q, k, z)
     drive *= k.K
@@ -203,6 +205,8 @@ def correct(m: int, q: WheelInput, share: float, k: WheelConstants, z: Array, P:
 
     The steps from sample to sample tell noise, and constancy, without any model of the wheel: their mean square is
     distributed as χ² with two thirds of a degree of freedom each.
+
+    `z` of shape (models, 4), `P` of shape (models, 4, 4).
     """
     h0, h3, white, steps = _readout(m, q, k, z)
     r = white / max(q.samples, 1.0) + 1e-12
@@ -246,7 +250,10 @@ def correct(m: int, q: WheelInput, share: float, k: WheelConstants, z: Array, P:
 def advance(
     models: int, q: WheelInput, status: int, quiet: bool, k: WheelConstants, z: Array, P: Array, gain: Array
 ) -> None:
-    """One block of all models of one wheel; writes the log-likelihood of each into `gain`."""
+    """One block of all models of one wheel; writes the log-likelihood of each into `gain`.
+
+    `z` of shape (models, 4), `P` of shape (models, 4, 4), `gain` of shape (models,).
+    """
     top = -1e300
     for m in range(models):
         share = predict(m, q, k, z, P)

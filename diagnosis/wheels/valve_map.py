@@ -50,7 +50,10 @@ def played(u: Array, hysteresis: float, held: float | None = None) -> tuple[Arra
 
 @njit(cache=True)
 def lagged_ramps(u: Array, knots: Array, fade: float, every: int, out: Array) -> None:
-    """Responses of a first-order lag to every ramp of the opening; writes each `every`-th one into `out` (m, ramps)."""
+    """Responses of a first-order lag to every ramp of the opening; writes each `every`-th one into `out` (m, ramps).
+
+    `u` of shape (n,) and `knots` in fractions of full opening; `fade` is the lag's factor per step [1].
+    """
     half = knots.size - 1
     state = np.zeros(2 * half)
     for k in range(u.size):

@@ -35,12 +35,12 @@ class WheelChannels:
 
     @cached_property
     def has_true(self) -> NDArray[np.bool_]:
-        """Wheels with a second speed."""
+        """Wheels with a second speed. Shape (wheels,)."""
         return any_finite(self.true)
 
     @cached_property
     def has_applied(self) -> NDArray[np.bool_]:
-        """Wheels whose opening is measured."""
+        """Wheels whose opening is measured. Shape (wheels,)."""
         return any_finite(self.applied)
 
     def names(self, wheels: Sequence[str]) -> list[tuple[str, str]]:
@@ -52,14 +52,14 @@ class WheelChannels:
 
     @cached_property
     def speed(self) -> Array:
-        """The better speed of each wheel [m/s]."""
+        """The better speed of each wheel [m/s]. Shape (n, wheels)."""
         if not self.has_true.any():
             return self.v
         return self.store.map(lambda true, v: np.asarray(np.where(self.has_true, true, v)), self.true, self.v)
 
     @cached_property
     def opening(self) -> Array:
-        """The better opening of each wheel [fraction]."""
+        """The better opening of each wheel [fraction]. Shape (n, wheels)."""
         if not self.has_applied.any():
             return self.u
         return self.store.map(

@@ -75,7 +75,10 @@ def wheel_drive(
     angle: Array,
     body: MeasuredBody | None = None,
 ) -> Drive:
-    """Block means of all wheels for `diagnosis.wheels.plant_identification`; parameters as in `wheel_fit`."""
+    """Block means of all wheels for `diagnosis.wheels.plant_identification`; parameters as in `wheel_fit`.
+
+    `angle` of shape (n, axles) in rad.
+    """
     width = min(block_width(timeline.dt), timeline.size)
     means = partial(_means, timeline, width)
     ratio, turn = in_motion(angle, machine, timeline)

@@ -121,7 +121,10 @@ class ColumnStore:
         return tuple(column.finish() for column in out), state
 
     def keep(self, values: NDArray[Any]) -> NDArray[Any]:
-        """Return the same numbers, in a temporary file where they are long; the argument should be let go of."""
+        """Return the same numbers, in a temporary file where they are long; the argument should be let go of.
+
+        Of any shape (n, …), which stays.
+        """
         return self._counted(values) if self._has_room(values.nbytes) else self.map(np.copy, values)
 
     def beside(self, columns: Sequence[NDArray[Any]]) -> NDArray[Any]:
@@ -130,6 +133,8 @@ class ColumnStore:
 
     def zeros(self, shape: tuple[int, ...], dtype: DTypeLike) -> NDArray[Any]:
         """Zeros to be filled in by a compiled scan; in a temporary file where they are many.
+
+        Of the asked shape.
 
         Raises
         ------

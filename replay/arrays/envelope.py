@@ -34,7 +34,7 @@ def rows_of(size: int, bucket: int) -> int:
 
 
 def step_of(bucket: int) -> float:
-    """Steps between rows."""
+    """Steps between rows. A number of steps, without a unit [1]."""
     return 1.0 if bucket == 1 else bucket / 2
 
 
@@ -65,7 +65,7 @@ def envelope(values: NDArray[Any], bucket: int) -> NDArray[Any]:
 
 
 def shown(values: NDArray[Any]) -> NDArray[Any]:
-    """A column of n steps for pictures; the envelope of long ones, as 32-bit numbers."""
+    """A column of n steps for pictures; the envelope of long ones, as 32-bit numbers. From shape (n,) to (rows,)."""
     bucket = bucket_of(len(values))
     return values if bucket == 1 else envelope(values, bucket).astype(np.float32)
 
@@ -100,7 +100,10 @@ def _scan_extremes(rows, out, bucket):  # type: ignore[no-untyped-def]
 def in_buckets(
     function: Callable[..., NDArray[Any]], bucket: int, store: ColumnStore, *columns: NDArray[Any]
 ) -> NDArray[Any]:
-    """Envelope of a function of whole rows, one block after another; see `ColumnStore.map`."""
+    """Envelope of a function of whole rows, one block after another; see `ColumnStore.map`.
+
+    Columns of shape (n,), the result of shape (rows,).
+    """
 
     def rows(_: None, *parts: NDArray[Any]) -> tuple[tuple[NDArray[Any]], None]:
         return (envelope(np.asarray(function(*parts)), bucket),), None

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 
 def without_nan(x: NDArray[np.float64]) -> NDArray[np.float64]:
-    """NaN as 0; four times as fast as `numpy.nan_to_num`, which looks for infinities too."""
+    """NaN as 0; four times as fast as `numpy.nan_to_num`, which looks for infinities too. Both of one shape (n,)."""
     return np.asarray(np.where(np.isnan(x), 0.0, x))
 
 

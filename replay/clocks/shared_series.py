@@ -47,16 +47,19 @@ class Series:
     recorded: float
 
     def within(self, first: float, last: float) -> Series:
-        """Samples of a stretch of time."""
+        """Samples of a stretch of time. Times in s."""
         a, b = np.searchsorted(self.t, (first, last))
         return Series(self.t[a:b], self.x[a:b], self.period, self.recorded)
 
     def rows(self, kept: NDArray[np.bool_]) -> Series:
-        """Some of the samples."""
+        """Some of the samples. `kept` of shape (n,)."""
         return Series(self.t[kept], self.x[kept], self.period, self.recorded)
 
     def thinned(self, width: float) -> Series:
-        """Means of stamps and values over bins, so that a straight line stays where it is; slow samples stay as they are."""
+        """Means of stamps and values over bins, so that a straight line stays where it is; slow samples stay as they are.
+
+        `width` in s.
+        """
         if self.period > 0.6 * width or len(self.t) < 2:
             return self
         first = np.flatnonzero(np.diff(np.floor(self.t / width), prepend=-np.inf) > 0)

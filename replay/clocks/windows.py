@@ -56,11 +56,11 @@ class Line:
     reason: str = ""
 
     def lag(self, t: Array) -> Array:
-        """Lag at some times of the other file [s]."""
+        """Lag at some times of the other file [s]. Both of one shape (k,)."""
         return self.lag_s + self.drift * (t - self.at_s)
 
     def bound(self, t: Array) -> Array:
-        """95 % bound of the lag at some times [s]."""
+        """95 % bound of the lag at some times [s]. Both of one shape (k,)."""
         u = t - self.at_s
         c = self.covariance
         return np.asarray(1.96 * np.sqrt(c[0, 0] + 2 * u * c[0, 1] + u * u * c[1, 1]), np.float64)

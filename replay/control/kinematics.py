@@ -84,7 +84,10 @@ def steering_angle(
 
 
 def low_pass(x: NDArray[np.float64], dt: float, cutoff_hz: float, state: float = np.nan) -> NDArray[np.float64]:
-    """First-order low-pass, started at the first sample or at the last output of the block before; NaN is passed over."""
+    """First-order low-pass, started at the first sample or at the last output of the block before; NaN is passed over.
+
+    Both of shape (n,); `dt` in s, `cutoff_hz` in Hz.
+    """
     a = 1.0 - np.exp(-2 * np.pi * cutoff_hz * dt)
     return np.asarray(_scan_low_pass(x, a, state)[0])
 

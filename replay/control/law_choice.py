@@ -30,7 +30,10 @@ class Reading:
 def choose_law(
     machine: Machine, u: Array, v: Array, v_ref: Array, dt: float, unfit: str, readings: list[Reading]
 ) -> tuple[LoopLaw | None, list[float | None], tuple[LawFit, ...], PiFit | None]:
-    """Law, mode of Ψ̂ and constants to replay with; Ψ̂(0) of each wheel, None where it is to be fitted; and what was fitted."""
+    """Law, mode of Ψ̂ and constants to replay with; Ψ̂(0) of each wheel, None where it is to be fitted; and what was fitted.
+
+    `u`, `v` and `v_ref` of shape (n, wheels): fractions of opening, m/s, m/s; `dt` in s.
+    """
     control = machine.control
     given = [control.psi0] * len(machine.wheels)
 

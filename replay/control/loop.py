@@ -95,7 +95,10 @@ class Replay:
 
 
 def stack(timeline: Timeline, names: list[str]) -> Array:
-    """Columns of a timeline side by side, not to be written to; NaN columns for signals that are not logged."""
+    """Columns of a timeline side by side, not to be written to; NaN columns for signals that are not logged.
+
+    Shape (n, names).
+    """
     return timeline.beside(names)
 
 

@@ -67,6 +67,8 @@ def replayed_unit(leaf: str) -> str | None:
 def replay_columns(timeline: Timeline, replay: Replay, machine: Machine, *, detail: bool = False) -> dict[str, Array]:
     """Name the recorded signals and the replayed loop.
 
+    Columns of shape (rows,).
+
     Parameters
     ----------
     timeline : Timeline

@@ -102,6 +102,8 @@ def decay_shapes(v: Array, v_ref: Array, dt: float, xi: float, beta: float) -> t
     """Ψ̂/Ψ̂(0) of the printed law, and Ψ̂/ζ of the forced one before and after each step, at every `decimated` step.
 
     The state runs through all steps.
+
+    `v` and `v_ref` of shape (n,) in m/s, the results of shape (rows,); `dt` in s.
     """
     stride = decimated(v.size)
     printed, driven, ahead = [], [], []

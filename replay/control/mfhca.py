@@ -29,12 +29,12 @@ LAW_TEXT = {
 
 
 def decay_rate(v: Array, v_c: Array, xi: float, beta: float) -> Array:
-    """ρ = β + |v_c| + |v| + ξ of L16 (13) [1/s]; speeds in m/s."""
+    """ρ = β + |v_c| + |v| + ξ of L16 (13) [1/s]; speeds in m/s. All of one shape (n,)."""
     return np.asarray(beta + np.abs(v_c) + np.abs(v) + xi)
 
 
 def proportional_part(law: str, v: Array, v_c: Array) -> Array:
-    """Factor of λ in L15 (14) under a reading of the law [m/s]."""
+    """Factor of λ in L15 (14) under a reading of the law [m/s]. All of one shape (n,)."""
     if law in ("signed", "opposed"):
         return np.asarray(v_c - v)
     part = np.abs(v_c) - np.abs(v)
@@ -43,7 +43,7 @@ def proportional_part(law: str, v: Array, v_c: Array) -> Array:
 
 
 def adaptive_sign(law: str, v: Array, v_c: Array) -> Array:
-    """Sign with which Ψ̂² enters L15 (14) under a reading of the law."""
+    """Sign with which Ψ̂² enters L15 (14) under a reading of the law. All of one shape (n,), speeds in m/s."""
     if law == "printed":
         return np.ones_like(v)
     if law == "opposed":
@@ -121,7 +121,7 @@ def printed_decay(rho: Array, dt: float, start: float = 0.0, before: float = 0.0
 
 
 def fill_forward(x: Array, first: float = 0.0) -> Array:
-    """Replace NaN by the last value before it (`first` before any)."""
+    """Replace NaN by the last value before it (`first` before any). Both of shape (n,), in one unit."""
     out = np.empty(x.size)
     _scan_fill(x, first, out)
     return out
@@ -202,7 +202,10 @@ def _scan_event_reset(rho, implied, dt, threshold, run, state, count):  # type: 
 
 
 def jump_threshold(steps: Array) -> float:
-    """Change of the implied Ψ̂² from step to step that counts as a jump: six robust standard deviations [fraction]."""
+    """Change of the implied Ψ̂² from step to step that counts as a jump: six robust standard deviations [fraction].
+
+    `steps` of shape (n,).
+    """
     steps = steps[np.isfinite(steps)]
     spread = 1.4826 * float(np.median(np.abs(steps - np.median(steps)))) if steps.size else 0.0
     return max(6 * spread, 1e-4)
@@ -250,7 +253,10 @@ def event_reset_psi(
 
 
 def fit_psi0(decay: Array, implied: Array, usable: NDArray[np.bool_]) -> float:
-    """Ψ̂(0) of the printed law that fits the implied Ψ̂² best: Ψ̂₀² = max(0, ΣE²y/ΣE⁴)."""
+    """Ψ̂(0) of the printed law that fits the implied Ψ̂² best: Ψ̂₀² = max(0, ΣE²y/ΣE⁴).
+
+    All of shape (n,), fractions of full opening.
+    """
     use = usable & np.isfinite(implied)
     basis = decay[use] ** 2
     norm = float(basis @ basis)
@@ -281,5 +287,8 @@ def implied_forcing(implied: Array, rho: Array, dt: float, window_s: float = 0.2
 
 
 def steering_command(phi_c: Array, phi: Array, k_ps: float, u_max: float) -> Array:
-    """L17 (15): u_s = k_ps(φ_c − φ), saturated at ±u_max; angles in rad, result in fractions of full opening."""
+    """L17 (15): u_s = k_ps(φ_c − φ), saturated at ±u_max; angles in rad, result in fractions of full opening.
+
+    All of one shape (n,).
+    """
     return np.asarray(np.clip(k_ps * (phi_c - phi), -u_max, u_max))

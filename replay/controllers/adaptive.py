@@ -47,7 +47,10 @@ ADAPTIVE_STATES = 7  # θ̂ (5), ρ̂, v_f
 
 @njit(cache=True)
 def adaptive_step(v_ref: F, y: F, dt: float, u_max: float, g: AdaptiveGains, s: F, u: F) -> None:
-    """Command of every wheel into `u`, shape (wheels,); `s`, shape (wheels, ADAPTIVE_STATES), is advanced."""
+    """Command of every wheel into `u`, shape (wheels,); `s`, shape (wheels, ADAPTIVE_STATES), is advanced.
+
+    Speeds in m/s, `dt` in s, u in fractions of full opening.
+    """
     gamma = (g.gamma_v, g.gamma_tanh, g.gamma_one, g.gamma_rate, g.gamma_y)
     sigma = (g.sigma_v, g.sigma_tanh, g.sigma_one, g.sigma_rate, g.sigma_y)
     for i in range(y.size):

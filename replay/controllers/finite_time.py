@@ -39,7 +39,10 @@ FINITE_TIME_STATES = 2  # ∫|e|^α sgn e, ρ̂
 
 @njit(cache=True)
 def finite_time_step(v_ref: F, y: F, dt: float, u_max: float, g: FiniteTimeGains, s: F, u: F) -> None:
-    """Command of every wheel into `u`, shape (wheels,); `s`, shape (wheels, FINITE_TIME_STATES), is advanced."""
+    """Command of every wheel into `u`, shape (wheels,); `s`, shape (wheels, FINITE_TIME_STATES), is advanced.
+
+    Speeds in m/s, `dt` in s, u in fractions of full opening.
+    """
     for i in range(y.size):
         e = y[i] - v_ref[i]
         surface = e + g.c * s[i, 0]

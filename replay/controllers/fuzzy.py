@@ -43,7 +43,10 @@ FUZZY_STATES = 11  # θ̂ (9), ∫e, e_f
 
 @njit(cache=True)
 def fuzzy_step(v_ref: F, y: F, dt: float, u_max: float, g: FuzzyGains, s: F, u: F) -> None:
-    """Command of every wheel into `u`, shape (wheels,); `s`, shape (wheels, FUZZY_STATES), is advanced."""
+    """Command of every wheel into `u`, shape (wheels,); `s`, shape (wheels, FUZZY_STATES), is advanced.
+
+    Speeds in m/s, `dt` in s, u in fractions of full opening.
+    """
     rule = np.empty(9)
     for i in range(y.size):
         e = y[i] - v_ref[i]

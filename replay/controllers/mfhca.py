@@ -40,7 +40,10 @@ MFHCA_STATES = 1  # Ψ̂
 
 @njit(cache=True)
 def read_law(reading: int, v_ref: float, v: float, psi: float, lam: float, u_max: float) -> float:
-    """u_a in its readings, L15 (14): 0 opposed, 1 signed, 2 printed, 3 sign_abs, 4 proportional alone, 5 event_reset."""
+    """u_a in its readings, L15 (14): 0 opposed, 1 signed, 2 printed, 3 sign_abs, 4 proportional alone, 5 event_reset.
+
+    Speeds in m/s, commands in fractions of full opening.
+    """
     e = v - v_ref
     s = 1.0 if v_ref >= 0.0 else -1.0
     if reading == 0:
@@ -58,7 +61,10 @@ def read_law(reading: int, v_ref: float, v: float, psi: float, lam: float, u_max
 
 @njit(cache=True)
 def mfhca_step(v_ref: F, y: F, dt: float, u_max: float, g: MfhcaGains, s: F, u: F) -> None:
-    """Command of every wheel into `u`, shape (wheels,); `s`, shape (wheels, MFHCA_STATES), is advanced."""
+    """Command of every wheel into `u`, shape (wheels,); `s`, shape (wheels, MFHCA_STATES), is advanced.
+
+    Speeds in m/s, `dt` in s, u in fractions of full opening.
+    """
     for i in range(y.size):
         before = s[i, 0]
         rho = g.beta + abs(v_ref[i]) + abs(y[i]) + g.xi

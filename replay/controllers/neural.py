@@ -39,7 +39,10 @@ NEURAL_STATES = NODES  # Ŵ
 
 @njit(cache=True)
 def neural_step(v_ref: F, y: F, dt: float, u_max: float, g: NeuralGains, s: F, u: F) -> None:
-    """Command of every wheel into `u`, shape (wheels,); `s`, shape (wheels, NEURAL_STATES), is advanced."""
+    """Command of every wheel into `u`, shape (wheels,); `s`, shape (wheels, NEURAL_STATES), is advanced.
+
+    Speeds in m/s, `dt` in s, u in fractions of full opening.
+    """
     basis = np.empty(NODES)
     for i in range(y.size):
         e = y[i] - v_ref[i]

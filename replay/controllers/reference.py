@@ -28,14 +28,17 @@ PI_STATES = 1  # ∫e
 
 @njit(cache=True)
 def p_step(v_ref: F, y: F, u_max: float, g: PGains, u: F) -> None:
-    """u = −k e, into `u`; all of shape (wheels,)."""
+    """u = −k e, into `u`; all of shape (wheels,). Speeds in m/s, u in fractions of full opening."""
     for i in range(y.size):
         u[i] = clipped(-g.k * (y[i] - v_ref[i]), u_max)
 
 
 @njit(cache=True)
 def pi_step(v_ref: F, y: F, dt: float, u_max: float, g: PiGains, s: F, u: F) -> None:
-    """u = f v_c − k_p e − k_i ∫e, into `u`; `s`, shape (wheels, PI_STATES), is advanced."""
+    """u = f v_c − k_p e − k_i ∫e, into `u`; `s`, shape (wheels, PI_STATES), is advanced.
+
+    Speeds in m/s, `dt` in s, u in fractions of full opening.
+    """
     for i in range(y.size):
         e = y[i] - v_ref[i]
         raw = g.ff * v_ref[i] - g.kp * e - g.ki * s[i, 0]

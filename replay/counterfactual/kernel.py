@@ -143,7 +143,10 @@ def scan(
     out_shift: F,
     out_load: F,
 ) -> None:
-    """Run both worlds over the mission; fills the four outputs, each of shape (n, wheels), and changes `state`."""
+    """Run both worlds over the mission; fills the four outputs, each of shape (n, wheels), and changes `state`.
+
+    Speeds in m/s, `dt` in s, openings in fractions.
+    """
     n, wheels = r.y.shape
     y, u, opening = np.zeros(wheels), np.zeros(wheels), np.zeros(wheels)
     driven, driven_other = np.zeros(wheels), np.zeros(wheels)

@@ -28,7 +28,7 @@ class Draft:
         self._steps: dict[str, float] = {}
 
     def step(self, name: str) -> float:
-        """Rounding step of a channel as recorded; 0 where its values lie on no grid."""
+        """Rounding step of a channel as recorded; 0 where its values lie on no grid. In the channel's unit."""
         if name not in self._steps:
             known = self.machine.noise.get(name)
             given = known.lsb if known is not None else None
@@ -36,7 +36,7 @@ class Draft:
         return self._steps[name]
 
     def rounded(self, name: str, values: Array) -> Array:
-        """Values on the channel's own grid, which runs through a recorded value."""
+        """Values on the channel's own grid, which runs through a recorded value. Both of shape (n,)."""
         step, recorded = self.step(name), self.clean[name].values
         if step <= 0.0:
             return values
@@ -45,19 +45,22 @@ class Draft:
         return np.asarray(anchor + np.round((values - anchor) / step) * step + 0.0, np.float64)
 
     def time(self, name: str) -> Array:
-        """Mission time of each sample [s]."""
+        """Mission time of each sample [s]. Shape (n,)."""
         return np.asarray((self.items[name].stamps - self.start) * 1e-9, np.float64)
 
 
 def strength(fault: FaultSpec, t: Array) -> Array:
-    """ε at each time: 0 outside the fault, growing over its ramp."""
+    """ε at each time: 0 outside the fault, growing over its ramp. Both of shape (n,), times in s."""
     active = (t >= fault.start_s - _TOLERANCE_S) & (t < fault.stop_s - _TOLERANCE_S)
     grown = np.ones(t.size) if fault.ramp_s == 0.0 else np.clip((t - fault.start_s) / fault.ramp_s, 0.0, 1.0)
     return np.where(active, fault.epsilon * grown, 0.0)
 
 
 def varying(fault: FaultSpec, t: Array, rng: np.random.Generator) -> Array:
-    """Varying part of the saturation term at each time: white, or first-order with the fault's correlation time."""
+    """Varying part of the saturation term at each time: white, or first-order with the fault's correlation time.
+
+    Both of shape (n,), times in s, the term in the channel's unit.
+    """
     if fault.sat_std == 0.0 or t.size == 0:
         return np.zeros(t.size)
     if fault.sat_tau_s == 0.0:
@@ -73,7 +76,10 @@ def varying(fault: FaultSpec, t: Array, rng: np.random.Generator) -> Array:
 
 
 def held_value(fault: FaultSpec, t: Array, values: Array) -> float:
-    """Mean saturation term; for a part that stays where it was, its last value before the fault."""
+    """Mean saturation term; for a part that stays where it was, its last value before the fault.
+
+    `t` [s] and `values` of shape (n,), the term in the unit of the values.
+    """
     if not np.isnan(fault.sat):
         return fault.sat
     known = np.flatnonzero(np.isfinite(values))
@@ -82,7 +88,15 @@ def held_value(fault: FaultSpec, t: Array, values: Array) -> float:
 
 
 def saturation(draft: Draft, fault: FaultSpec, name: str, rng: np.random.Generator) -> tuple[Array, Array, float]:
-    """ε and saturation term at each sample of a channel, and the term's mean."""
+    """ε and saturation term at each sample of a channel, and the term's mean.
+
+    Both of shape (n,), ε a fraction, the term in the channel's unit.
+
+    Raises
+    ------
+    ConfigError
+        Where no sample of the channel lies in the fault.
+    """
     t, values = draft.time(name), draft.items[name].values
     epsilon = strength(fault, t)
     active = epsilon > 0.0

@@ -21,7 +21,10 @@ _QUIET = 0.1  # quantile over windows that stands for a valve at rest
 
 
 def inject_valve(draft: Draft, fault: FaultSpec, rng: np.random.Generator) -> float:
-    """L8 (7) on the measured position, whose sensor keeps its noise, and on the speed where a wheel model is used."""
+    """L8 (7) on the measured position, whose sensor keeps its noise, and on the speed where a wheel model is used.
+
+    Gives the mean saturation term as a fraction of full opening [1].
+    """
     name = measured_name(fault.component, fault.side, draft.machine)
     plant = draft.machine.plant.wheels.get(fault.component) if draft.options.plant else None
     mean = fault.sat

@@ -165,5 +165,5 @@ class InspectReport:
 
 
 def mean_rate(count: int, duration_s: float) -> float | None:
-    """Messages per second of the log; None below two messages."""
+    """Messages per second of the log; None below two messages. In Hz; `duration_s` in s."""
     return (count - 1) / duration_s if count > 1 and duration_s > 0 else None

@@ -61,7 +61,7 @@ class Geometry:
 
 
 def four_wheel_geometry(wheelbase: float, joint_spacing: float, wheel_diameter: float, wheel_offset: float) -> Geometry:
-    """Four steered wheels FR, FL, RR, RL on a front and a rear axle; all lengths in m."""
+    """Four steered wheels FR, FL, RR, RL on a front and a rear axle; all lengths in m. Lengths [m]."""
     check_range("geometry.wheelbase", wheelbase, 0.05, 40.0, "m", mistaken=MILLIMETRES)
     check_range("geometry.joint_spacing", joint_spacing, 0.05, 20.0, "m", mistaken=MILLIMETRES)
     half, side = wheelbase / 2, joint_spacing / 2

@@ -120,7 +120,7 @@ def _inline(value: Any) -> str:
 
 
 def real_text(value: float) -> str:
-    """A number that reads back as it is."""
+    """A number that reads back as it is. In the unit of the key."""
     return repr(float(value))
 
 

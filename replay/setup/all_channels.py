@@ -12,6 +12,7 @@ from replay.arrays.blocks import blocks
 from replay.log.raw_log import Channel, RawLog
 from replay.machine.config import Machine
 from replay.machine.units import known_unit
+from replay.signals.file_names import in_its_file, named_channels
 from replay.signals.mapping import sparse_rows
 from replay.signals.named_units import unit_by_end
 from replay.signals.rules import candidates
@@ -79,10 +80,10 @@ def channel_rows(logs: Sequence[RawLog], machine: Machine) -> list[ChannelRow]:
         Whose signals they could be.
     """
     rows = []
-    for log in logs:
+    for log, channels in zip(logs, named_channels(logs), strict=True):
         fits: dict[str, list[tuple[int, str]]] = {}
-        for c in candidates(log.channels, machine):
-            fits.setdefault(c.origin.label, []).append((c.rank, c.signal))
+        for c in candidates(channels, machine):
+            fits.setdefault(in_its_file(c.origin, log).label, []).append((c.rank, c.signal))
         for channel in log.channels.values():
             label = channel.name
             if channel.field.startswith("pose.pose.orientation."):  # four numbers, one heading

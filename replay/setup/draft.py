@@ -22,6 +22,7 @@ from replay.setup.preset import Preset
 from replay.setup.robot_description import RobotDescription, parse_description
 from replay.setup.structure import ONE, Structure, described_structure, named_structure, preset_structure
 from replay.setup.unstated_units import usual_units, valve_currents
+from replay.signals.file_names import named_channels
 from replay.signals.mapping import by_number, map_signals
 from replay.signals.signal import Signals
 
@@ -141,8 +142,8 @@ def _finished(draft: Draft, logs: Sequence[RawLog]) -> Draft:
 def _all_channels(logs: Sequence[RawLog]) -> dict[str, Channel]:
     """Channels of all files; of two of one name in several tables both are kept."""
     out: dict[str, Channel] = {}
-    for log in logs:
-        for name, channel in log.channels.items():
+    for log, channels in zip(logs, named_channels(logs), strict=True):
+        for name, channel in channels.items():
             out[name if name not in out else f"{log.source} {name}"] = channel
     return out
 

@@ -92,7 +92,7 @@ def _lagged(x: Array, a: float) -> Array:
 
 
 def held(signal: Signal, at: NDArray[np.int64]) -> Array:
-    """Last value before each moment; NaN before the first."""
+    """Last value before each moment; NaN before the first. `at` [ns] and the result of shape (k,)."""
     index = np.searchsorted(signal.stamps, at, side="right") - 1
     return np.where(index >= 0, signal.values[np.maximum(index, 0)], np.nan)
 

@@ -20,6 +20,7 @@ from replay.log.source_options import SignalSource
 from replay.machine.config import Machine
 from replay.machine.units import known_unit
 from replay.signals.candidate import Candidate
+from replay.signals.file_names import in_its_file, named_channels
 from replay.signals.name_parts import wheel_said
 from replay.signals.rules import candidates, wanted_type
 from replay.signals.scale_doubt import scale_doubt
@@ -114,8 +115,9 @@ def map_signals(logs: Sequence[RawLog], machine: Machine) -> Signals:
     for name, source in machine.signals.items():
         _take_given(draft, name, source, logs)
     by_signal: dict[str, list[tuple[Candidate, RawLog]]] = {}
-    for log in logs:
-        for candidate in candidates(log.channels, machine):
+    for log, channels in zip(logs, named_channels(logs), strict=True):
+        for found in candidates(channels, machine):
+            candidate = replace(found, origin=in_its_file(found.origin, log))
             by_signal.setdefault(candidate.signal, []).append((candidate, log))
     for name in machine.canonical_signals():
         if name not in machine.signals:
@@ -281,7 +283,10 @@ def _sparse(stamps: NDArray[np.int64], values: NDArray[Any]) -> tuple[NDArray[np
 
 
 def sparse_rows(values: NDArray[Any]) -> NDArray[np.int64]:
-    """Rows of a slow column beside fast ones that hold its samples; all rows where the column is not slow."""
+    """Rows of a slow column beside fast ones that hold its samples; all rows where the column is not slow.
+
+    From shape (n,) to (k,).
+    """
     rows = np.flatnonzero(~np.isnan(values))
     steps = np.diff(rows)
     if len(rows) < 3 or len(rows) > 0.6 * len(values):

@@ -42,10 +42,12 @@ _MEANINGS = {
     "motor": "moteur",
     "axle": "achse achs essieu",
     "yaw_rate": "gierrate drehrate lacet gier",
+    "joystick": "fahrhebel manche",
 }
 _ENGLISH = {word: meaning for meaning, words in _MEANINGS.items() for word in words.split()}
-_TURNING = frozenset(("rate", "geschwindigkeit", "vitesse", "vit"))  # beside a word for yaw
-_FILLERS = frozenset(("wert", "werte", "value", "val", "values"))
+# Words that say nothing more behind others: Gierrate, Ventil Y VR.
+_DROPPED = {"yaw_rate": ("rate", "geschwindigkeit", "vitesse", "vit"), "valve": ("y", "u")}
+_FILLERS = frozenset(("wert", "werte", "value", "val", "values", "percent", "pct", "prozent", "pourcent"))
 #: Words that ask for something: setpoints and commands, in English.
 ASKING = frozenset(
     ("ref", "reference", "cmd", "command", "commanded", "set", "setpoint", "des", "desired", "target", "demand", "soll",
@@ -88,7 +90,7 @@ def english(words: Sequence[str]) -> list[str]:
             out[-1:] = ["valve", "cmd"]
         elif word == "stellung" and out[-1:] == ["valve"]:
             out.append("pos")
-        elif word in _FILLERS or (word in _TURNING and out[-1:] == ["yaw_rate"]):
+        elif word in _FILLERS or (word in _DROPPED.get(out[-1], ()) if out else False):
             continue
         else:
             out.append("valve" if word.endswith("ventil") else _ENGLISH.get(word, word))  # Proportionalventil

@@ -15,6 +15,8 @@ _WINDOW_S = 0.25
 def rounding_step(values: Array) -> float:
     """Rounding step (LSB) of a channel; 0 where the values lie on no grid.
 
+    In the unit of the values.
+
     Parameters
     ----------
     values : Array, shape (n,)

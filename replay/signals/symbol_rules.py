@@ -56,7 +56,7 @@ _OWN = frozenset(("n", "v", "rad", "wheel"))  # that say it even alone: ``Rad VL
 # Words beside which an asked speed is that of the whole machine.
 _WHOLE = ASKING | frozenset(
     (*("speed", "velocity", "vel", "v", "r", "f", "lr", "x", "lin", "linear", "longitudinal", "fahr", "fahrzeug", "fzg", "vehicle"),
-     *("machine", "maschine", "engin", "vehicule", "body", "robot", "chassis", "forward")),
+     *("machine", "maschine", "engin", "vehicule", "body", "robot", "chassis", "forward", "joystick")),
 )  # fmt: skip
 
 
@@ -215,9 +215,10 @@ def _family(channel: Channel, template: str) -> str:
 
 
 def _is_speed(last: Sequence[str], unit: str) -> bool:
-    """Whether words speak of a speed: by name, or as ``v`` in a unit of speed."""
+    """Whether words speak of a speed: by name, or as ``v``, a joystick or nothing but a setpoint in a unit of speed."""
     speed = (known := known_unit(unit)) is not None and UNITS[known][0] == "speed"
-    return bool({"speed", "velocity", "vel"} & {*last}) or (speed and "v" in last)
+    says = {"v", "joystick"} & {*last} or {*last} <= ASKING
+    return bool({"speed", "velocity", "vel"} & {*last}) or (speed and bool(says))
 
 
 def _by_word(channel: Channel, text: str, last: Sequence[str], unit: str) -> Iterator[Candidate]:
@@ -228,7 +229,7 @@ def _by_word(channel: Channel, text: str, last: Sequence[str], unit: str) -> Ite
     asks = role(last)
     if "yaw_rate" in last and asks != "both":
         signal = "cmd.omega" if asks == "ref" else signal or "imu.yaw_rate"
-    elif signal is None and asks == "ref" and _is_speed(last, unit) and {*last} <= _WHOLE:
+    elif signal is None and (asks == "ref" or "joystick" in last) and _is_speed(last, unit) and {*last} <= _WHOLE:
         signal = "cmd.v"
     if signal is not None:
         yield Candidate(signal, source_of(channel, unit), 9, f"{channel.name} by its name")

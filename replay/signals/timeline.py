@@ -79,11 +79,11 @@ class Timeline:
 
     @property
     def t(self) -> NDArray[np.float64]:
-        """Mission time of each step [s]."""
+        """Mission time of each step [s]. Shape (n,)."""
         return np.asarray(np.arange(self.size) * self.dt, dtype=np.float64)
 
     def get(self, name: str) -> NDArray[np.float64] | None:
-        """Values of a signal, or None where it is not in the log."""
+        """Values of a signal, or None where it is not in the log. Shape (n,), SI."""
         return self.signals.get(name)
 
     def beside(self, names: Sequence[str]) -> NDArray[np.float64]:
@@ -101,7 +101,10 @@ class Timeline:
         return self.store.blocks(self.size, multiple)
 
     def map(self, function: Callable[..., NDArray[Any]], *columns: NDArray[Any]) -> NDArray[Any]:
-        """Apply a function of whole rows block by block; see `ColumnStore.map`."""
+        """Apply a function of whole rows block by block; see `ColumnStore.map`.
+
+        Columns of shape (n, …), as the result.
+        """
         return self.store.map(function, *columns)
 
     def scan(
@@ -111,12 +114,15 @@ class Timeline:
         *columns: NDArray[Any],
         multiple: int = 1,
     ) -> tuple[tuple[NDArray[Any], ...], State]:
-        """Run a recursion block by block with its state carried; see `ColumnStore.scan`."""
+        """Run a recursion block by block with its state carried; see `ColumnStore.scan`.
+
+        Columns of shape (n, …), as the results.
+        """
         return self.store.scan(kernel, state, *columns, multiple=multiple)
 
 
 def median_period(stamps: NDArray[np.int64]) -> int:
-    """Median distance of stamps [ns]; 0 for fewer than two."""
+    """Median distance of stamps [ns]; 0 for fewer than two. Stamps of shape (n,)."""
     return int(np.median(np.diff(stamps))) if stamps.size > 1 else 0
 
 
@@ -245,7 +251,13 @@ def _scan_hold(stamps, values, start, step, longest, largest, at, held, fresh): 
 
 
 def check_overlap(signals: Signals) -> list[str]:
-    """Refuse sources whose stamps do not overlap; say where they barely do."""
+    """Refuse sources whose stamps do not overlap; say where they barely do.
+
+    Raises
+    ------
+    LogError
+        Where the files of one mission share no time.
+    """
     spans: dict[str, tuple[int, int]] = {}
     for s in signals.items.values():
         if s.stamps.size:

@@ -54,7 +54,10 @@ def usable_unit(signal: str, unit: str | None) -> str | None:
 
 
 def factor_of(signal: str, origin: SignalSource, machine: Machine) -> float:
-    """Factor from the recorded unit to SI; raises `ConfigError` where the unit does not fit."""
+    """Factor from the recorded unit to SI; raises `ConfigError` where the unit does not fit.
+
+    In SI units per recorded unit.
+    """
     unit = origin.unit
     if not unit:
         quantity = quantity_of(signal)
@@ -171,20 +174,26 @@ def slope(stamps: NDArray[np.int64], position: NDArray[np.float64]) -> NDArray[n
 
 
 def magnitudes(values: NDArray[Any]) -> NDArray[np.float64]:
-    """Magnitudes of the numbers of a signal, of a long one those of every few samples."""
+    """Magnitudes of the numbers of a signal, of a long one those of every few samples.
+
+    From shape (n,) to (k,), in the recorded unit.
+    """
     some = values[:: max(1, len(values) // _PEAK_SAMPLES)]
     out: NDArray[np.float64] = np.abs(some[np.isfinite(some)].astype(np.float64))
     return out
 
 
 def peak_of(values: NDArray[Any]) -> float:
-    """99th percentile of the magnitude; 0 where there is no number."""
+    """99th percentile of the magnitude; 0 where there is no number. `values` of shape (n,), the peak in their unit."""
     finite = magnitudes(values)
     return float(np.percentile(finite, 99)) if len(finite) else 0.0
 
 
 def choose_motor_or_wheel(signal: str, origin: SignalSource, values: NDArray[Any], machine: Machine) -> SignalSource:
-    """Decide where a guessed rotation was measured: at the motor where only that fits the machine's top speed."""
+    """Decide where a guessed rotation was measured: at the motor where only that fits the machine's top speed.
+
+    `values` of shape (n,), as recorded.
+    """
     if not signal.startswith("wheel.") or known_unit(origin.unit) != "rpm" or machine.gear_ratio == 1.0:
         return origin
     motor = replace(origin, at="motor")

@@ -80,6 +80,8 @@ def table_options(scenario: str, controller: Controller, seed: int, duration_s: 
 
     MFHCA takes its own parameters from the paper and Ψ̂'s forcing from the preset, whatever the scenario; the others the gains of
     their class.
+
+    `duration_s` in s.
     """
     own = None if controller.name == "mfhca" else controller
     options = SimulationOptions(

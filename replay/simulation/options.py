@@ -172,7 +172,7 @@ class SimulationOptions:
 
     @property
     def ice_share(self) -> float:
-        """Share of the ground under ice."""
+        """Share of the ground under ice. A fraction [1]."""
         return (0.25 if self.scenario in PAPER_DRIVES else 0.0) if self.ice is None else self.ice
 
     @property
@@ -259,7 +259,7 @@ class SimulatedMission:
         return self.kept.get(channel_group(name), np.ones(self.stamps.size, np.bool_))
 
     def series(self) -> Iterator[tuple[str, NDArray[np.int64], NDArray[np.float64]]]:
-        """Name, stamps [ns] and values of every recorded signal, lost rows left out."""
+        """Name, stamps [ns] and values of every recorded signal, lost rows left out. Both of shape (k,), SI."""
         for name, values in self.columns.items():
             rows = self.rows(name)
             yield name, self.stamps[rows], values[rows]

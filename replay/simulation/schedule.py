@@ -63,6 +63,8 @@ def draw_fault(
     Stuck sensors hold their value at onset or jump to another one; stuck valves stand open either way; noise and
     disturbances vary about a mean.
 
+    Times in s.
+
     Raises
     ------
     ValueError

@@ -13,13 +13,13 @@ _HALL_TIMEOUT = 250  # control steps without a pole after which the sensor reads
 
 @njit(cache=True)
 def play(value: float, held: float, half: float) -> float:
-    """Backlash: the output follows once the input has crossed the play."""
+    """Backlash: the output follows once the input has crossed the play. All in one unit."""
     return float(min(max(held, value - half), value + half))
 
 
 @njit(cache=True)
 def read_speed(i: int, k: int, v: float, normal: float, p: PlantModel, m: StructureModel, s: StructureState) -> float:
-    """What a wheel's healthy speed sensor reads."""
+    """What a wheel's healthy speed sensor reads. In m/s."""
     v = v * (1.0 + m.scale[i])
     s.travel[i] += v * p.dt
     if m.sensor == SAMPLED:

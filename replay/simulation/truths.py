@@ -35,7 +35,10 @@ def mission_truth(
     realised: NDArray[np.float64],
     recording: Recording,
 ) -> MissionTruth:
-    """Contents of the truth file; `realised` (one per fault) is the saturation term that the loop used."""
+    """Contents of the truth file; `realised` (one per fault) is the saturation term that the loop used.
+
+    `realised` of shape (faults,), in the unit of each fault's channel.
+    """
     duration = options.samples / options.rate_hz
     driving = options.machine.limits.driving_speed
     within = [(f, sat) for f, sat in zip(faults, realised.tolist(), strict=True) if f.start_s < duration]
@@ -65,7 +68,10 @@ def _interval(fault: FaultSpec, sat: float, duration: float) -> TruthInterval:
 
 
 def spans_where(component: str, flag: NDArray[np.bool_], rate_hz: float) -> list[TruthSpan]:
-    """Stretches in which a flag holds; gaps below 0.1 s are closed, stretches below 0.1 s left out."""
+    """Stretches in which a flag holds; gaps below 0.1 s are closed, stretches below 0.1 s left out.
+
+    `flag` of shape (n,).
+    """
     edges = np.flatnonzero(np.diff(np.concatenate([[False], flag, [False]]).astype(np.int8)))
     start, stop = edges[::2] / rate_hz, edges[1::2] / rate_hz
     apart = start[1:] - stop[:-1] >= 0.1

@@ -11,8 +11,8 @@
 
 Results of audits and reports, and what is hidden, are no logs.
 
-**Which machine file a mission has**: the one that its ``mission.toml`` names, else the ``machine.toml`` in its folder or the
-closest searched one around it.
+**Which machine file a mission has**, where the audit is given none for all: the one that its ``mission.toml`` names, else the
+``machine.toml`` in its folder or the closest searched one around it.
 
 **What ``mission.toml`` says** (`read_mission_file`): ``files`` of the mission, its ``name``, the ``machine_id``, and
 ``machine``, a machine file; all of them inside its folder, all of them optional. One that is wrong makes its folder a

@@ -148,7 +148,13 @@ class RemotePlace:
         return []
 
     def text(self, file: Entry) -> str:
-        """Text of a small object."""
+        """Text of a small object.
+
+        Raises
+        ------
+        OSError
+            Where the object cannot be read.
+        """
         try:
             raw: bytes = self._system.cat_file(self._path(file), start=0, end=_MOST_TEXT)
         except Exception as error:

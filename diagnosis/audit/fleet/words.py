@@ -43,7 +43,7 @@ def open_words(is_open: bool, clean: int, needed: int) -> str:
 
 
 def forecast_words(f: Forecast, limit: float, axis: Axis = "hours") -> str:
-    """When a limit is reached, in one phrase."""
+    """When a limit is reached, in one phrase. `limit` has the unit of the trend [1 for ε]."""
     unit = _UNITS[axis]
     if f.state == "not_known":
         return f"not known: {f.why}"
@@ -59,7 +59,7 @@ def forecast_words(f: Forecast, limit: float, axis: Axis = "hours") -> str:
 
 
 def standing(m: Machine) -> str:
-    """Where a machine stands: ``Stop and repair, and later missions not judged``."""
+    """Where a machine stands: ``Stop and repair, and later missions not assessed``."""
     words = m.verdict.short
     if m.verdict is Verdict.READY:
         return words
@@ -82,7 +82,7 @@ def standing(m: Machine) -> str:
             words += ", not cleared"
         elif lasting and m.cleared and not m.unjudged:
             words = "Ready, with faults to watch"
-    return words + (", and later missions not judged" if m.unjudged else "")
+    return words + (", and later missions not assessed" if m.unjudged else "")
 
 
 def _is_open(m: Machine) -> bool:

@@ -51,7 +51,13 @@ class ForkServer:
         self.closed = False
 
     def run(self, work: Work, limits: Limits) -> Ended | str:
-        """As in `diagnosis.audit.isolation.run.Isolation`."""
+        """As in `diagnosis.audit.isolation.run.Isolation`.
+
+        Raises
+        ------
+        Stopped
+            Where the audit is asked to end meanwhile.
+        """
         waiting: Future[Ended | str] = Future()
         with self._lock:
             if self.closed:

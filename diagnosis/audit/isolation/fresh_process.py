@@ -32,7 +32,13 @@ class Spawner:
         """Nothing can be made ready."""
 
     def run(self, work: Work, limits: Limits) -> Ended | str:
-        """As in `diagnosis.audit.isolation.run.Isolation`."""
+        """As in `diagnosis.audit.isolation.run.Isolation`.
+
+        Raises
+        ------
+        Stopped
+            Where the audit is asked to end meanwhile.
+        """
         if self.closed:
             raise Stopped
         task = Path(work.folder) / _TASK

@@ -105,6 +105,8 @@ def check_locks(output: Path) -> None:
 def exclusively(output: Path, name: str, patience_s: float) -> Iterator[None]:
     """Do something that only one audit of an output may do at a time; after `patience_s` it is done all the same.
 
+    Patience in s.
+
     Raises
     ------
     OutputError

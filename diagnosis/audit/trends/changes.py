@@ -89,7 +89,10 @@ def find_changes(x: Array, y: Array, sigma: Array, known: Weighted | None = None
 
 
 def possible_bend(x: Array, y: Array, sigma: Array, known: Weighted | None = None) -> int | None:
-    """First mission after the likeliest bend of a stretch; None where the stretch is too short. `known` as in `fit_line`."""
+    """First mission after the likeliest bend of a stretch; None where the stretch is too short. `known` as in `fit_line`.
+
+    `x`, `y` and `sigma` of shape (m,).
+    """
     if len(x) < 2 * _SIDE_BEND or not varies(x):
         return None
     of = known or weighted(x, y, sigma)

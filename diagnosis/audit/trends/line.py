@@ -50,15 +50,18 @@ class Line:
     dof: int
 
     def at(self, x: float) -> float:
-        """Line at a place."""
+        """Line at a place. x in hours or days, the value in the trend's unit [1 for ε]."""
         return self.level + self.slope * (x - self.centre)
 
     def half(self, x: float, confidence: float) -> float:
-        """Half width of the two-sided confidence interval of the line at a place."""
+        """Half width of the two-sided confidence interval of the line at a place.
+
+        x in hours or days, the width in the trend's unit [1 for ε].
+        """
         return self.quantile(confidence) * math.sqrt(self.level_var + self.slope_var * (x - self.centre) ** 2)
 
     def quantile(self, confidence: float) -> float:
-        """Factor of the standard error for a two-sided interval."""
+        """Factor of the standard error for a two-sided interval. Both without a unit [1]."""
         return float(stdtrit(self.dof, 0.5 + confidence / 2))
 
     def crossing(self, limit: float, start: float, confidence: float) -> tuple[float, float, float]:
@@ -100,12 +103,15 @@ def _roots(a: float, b: float, c: float) -> list[float]:
 
 
 def sigmas(value: Array, low: Array, high: Array) -> Array:
-    """Standard errors behind 95 % bounds; the wider half counts, so that a bound cut at 0 or 1 hides nothing."""
+    """Standard errors behind 95 % bounds; the wider half counts, so that a bound cut at 0 or 1 hides nothing.
+
+    All of shape (m,), in the unit of the values.
+    """
     return np.asarray(np.maximum(np.maximum(high - value, value - low) / 1.959963984540054, LEAST_SIGMA))
 
 
 def sums(x: Array, y: Array, w: Array) -> tuple[float, float, float, float, Array]:
-    """Weighted x̄, a, b, Sxx and residuals of the least-squares line."""
+    """Weighted x̄, a, b, Sxx and residuals of the least-squares line. x, y, w and the residuals of shape (m,)."""
     total = float(w.sum())
     centre = float(w @ x) / total
     d = x - centre
@@ -116,7 +122,10 @@ def sums(x: Array, y: Array, w: Array) -> tuple[float, float, float, float, Arra
 
 
 def between(x: Array, y: Array, variance: Array) -> float:
-    """τ² by Paule and Mandel; 0 where the missions' own bounds explain the scatter."""
+    """τ² by Paule and Mandel; 0 where the missions' own bounds explain the scatter.
+
+    All of shape (m,); the result in the unit of `variance`.
+    """
     tau2, dof = 0.0, len(x) - 2
     for _ in range(_STEPS):  # Newton from below on a convex function: never passes the root
         w = 1.0 / (variance + tau2)
@@ -142,7 +151,7 @@ class Weighted(NamedTuple):
 
 
 def weighted(x: Array, y: Array, sigma: Array) -> Weighted:
-    """Find τ², and the line with the weights that it gives; x must vary."""
+    """Find τ², and the line with the weights that it gives; x must vary. All of shape (m,)."""
     variance = sigma * sigma
     tau2 = between(x, y, variance)
     w = 1.0 / (variance + tau2)
@@ -176,5 +185,5 @@ def fit_line(x: Array, y: Array, sigma: Array, known: Weighted | None = None) ->
 
 
 def varies(x: Array) -> bool:
-    """Whether not all places are the same; they are in order."""
+    """Whether not all places are the same; they are in order. `x` of shape (m,)."""
     return float(x[-1]) > float(x[0])

@@ -46,7 +46,10 @@ class Deviations:
 
 
 def shorth(values: Array) -> tuple[float, float]:
-    """Middle and width (as a standard deviation) of the shortest half of some values (Andrews et al., 1972)."""
+    """Middle and width (as a standard deviation) of the shortest half of some values (Andrews et al., 1972).
+
+    `values` of shape (n,); both results in their unit.
+    """
     x = np.sort(values[np.isfinite(values)])
     if x.size < 8:
         return 0.0, 1.0

@@ -28,13 +28,16 @@ _CUT_FRAMES = 4000
 
 
 def frames_at(n: int, dt: float) -> Steps:
-    """Steps in the middle of each frame of n steps of dt [s]."""
+    """Steps in the middle of each frame of n steps of dt [s]. Shape (frames,)."""
     hop = max(1, round(FRAME_S / dt))
     return np.arange(min(hop // 2, n - 1), n, hop)
 
 
 def cuts(at: Steps, n: int, dt: float) -> Iterator[tuple[slice, Steps]]:
-    """Frames in turn: the steps (of n) that their windows need, and the frames counted from the first of these."""
+    """Frames in turn: the steps (of n) that their windows need, and the frames counted from the first of these.
+
+    `at` of shape (frames,), `dt` in s.
+    """
     reach = round(_REACH_S / dt) + 1
     for k in range(0, at.size, _CUT_FRAMES):
         mine = at[k : k + _CUT_FRAMES]
@@ -43,7 +46,10 @@ def cuts(at: Steps, n: int, dt: float) -> Iterator[tuple[slice, Steps]]:
 
 
 def windowed(columns: Array, at: Steps, dt: float) -> list[Array]:
-    """Means of columns (n, k) over each of `WINDOWS` around the steps `at`, shape (frames, k) each."""
+    """Means of columns (n, k) over each of `WINDOWS` around the steps `at`, shape (frames, k) each.
+
+    `dt` in s; units of the columns are kept.
+    """
     n = len(columns)
     sums = np.concatenate([np.zeros((1, columns.shape[1])), np.cumsum(columns, axis=0)])
     out = []
@@ -55,5 +61,8 @@ def windowed(columns: Array, at: Steps, dt: float) -> list[Array]:
 
 
 def bounded(features: Array) -> Array:
-    """Features within the range that the trees know; `MISSING` where there is none."""
+    """Features within the range that the trees know; `MISSING` where there is none.
+
+    Both of shape (frames, features).
+    """
     return np.clip(np.nan_to_num(features, nan=MISSING), MISSING, LARGEST)

@@ -63,6 +63,8 @@ def evidence_topic(
 ) -> tuple[TopicBatch, tuple[str, ...]] | None:
     """Evidence of one component as the topic ``/mfhca/evidence``, with its names; None where there is none.
 
+    Each column of shape (n,).
+
     Parameters
     ----------
     columns : Mapping[str, NDArray[np.floating]]
@@ -98,5 +100,8 @@ def open_loop_topic(stamp: int) -> TopicBatch:
 
 
 def columns_topic(topic: str, columns: Mapping[str, NDArray[np.float64]], stamps: NDArray[np.int64]) -> TopicBatch:
-    """JointState messages whose joints are the columns and whose positions are their values."""
+    """JointState messages whose joints are the columns and whose positions are their values.
+
+    Columns and stamps [ns] of shape (n,).
+    """
     return joint_states(topic, list(columns), np.column_stack(list(columns.values())), stamps)

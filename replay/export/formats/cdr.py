@@ -21,7 +21,7 @@ class Cdr:
         self._bytes = bytearray()
 
     def number(self, code: str, value: float) -> None:
-        """Append a number; `code` as in `struct`."""
+        """Append a number; `code` as in `struct`. In the field's own unit."""
         size = struct.calcsize(code)
         self._bytes += bytes(-(self._start + len(self._bytes)) % size)
         self._bytes += struct.pack("<" + code, value)

@@ -188,6 +188,9 @@ def plan_chunks(batches: Sequence[TopicBatch], overhead: int, chunk_size: int) -
 
 
 def place_rows(chunk: NDArray[np.uint8], offsets: NDArray[np.int64], rows: NDArray[np.uint8]) -> None:
-    """Copy rows of equal length into a chunk, each to its offset."""
+    """Copy rows of equal length into a chunk, each to its offset.
+
+    `chunk` of shape (bytes,), `offsets` of shape (k,), `rows` of shape (k, length).
+    """
     windows = np.lib.stride_tricks.sliding_window_view(chunk, rows.shape[1], writeable=True)
     windows[offsets] = rows

@@ -33,7 +33,10 @@ class Lead:
 
     @staticmethod
     def of(log: NDArray[np.int64], header: NDArray[np.int64], count: int) -> Lead | None:
-        """Return the line of some of `count` stamps, or None where the stamps are too few or do not run with the log."""
+        """Return the line of some of `count` stamps, or None where the stamps are too few or do not run with the log.
+
+        Both of shape (n,) [ns].
+        """
         n = len(log)
         if n < 12 or not 0.1 < _extent(header) / max(_extent(log), 1.0) < 10:
             return None
@@ -55,7 +58,7 @@ class Lead:
         return abs(self.ahead[1] - self.ahead[0]) > max(_DRIFT_NS, 4 * self.scatter)
 
     def to_header(self, log: NDArray[np.int64]) -> NDArray[np.int64]:
-        """Header stamps that messages with these log stamps would carry."""
+        """Header stamps that messages with these log stamps would carry. Both of shape (n,) [ns]."""
         drift = np.clip(self.rate * (log.astype(np.float64) - self.at[0]), -(2.0**61), 2.0**61)
         moved: NDArray[np.int64] = log + self.ahead[0] + np.rint(drift).astype(np.int64)
         return moved

@@ -39,13 +39,16 @@ class Step:
 
 
 def lead_of(stamps: Stamps, other: Stamps) -> Stamps:
-    """Lead of the stamps [ns]; stamps beyond the year 2116 count as that, so that it fits 64 bits."""
+    """Lead of the stamps [ns]; stamps beyond the year 2116 count as that, so that it fits 64 bits.
+
+    All of shape (n,).
+    """
     lead: Stamps = np.clip(stamps, -_FAR, _FAR) - np.clip(other, -_FAR, _FAR)
     return lead
 
 
 def steady(stamps: Stamps, other: Stamps) -> bool:
-    """Whether the lead stays within 50 ms, so that nothing is to be repaired."""
+    """Whether the lead stays within 50 ms, so that nothing is to be repaired. Both of shape (n,) [ns]."""
     low, high = [], []
     for rows in blocks(len(stamps)):
         lead = lead_of(stamps[rows], other[rows])
@@ -56,6 +59,8 @@ def steady(stamps: Stamps, other: Stamps) -> bool:
 
 def unwrapped(stamps: Stamps, other: Stamps) -> tuple[Stamps, int, int]:
     """Continue a 32-bit counter over its wraps.
+
+    Both of shape (n,).
 
     Returns
     -------
@@ -75,7 +80,7 @@ def unwrapped(stamps: Stamps, other: Stamps) -> tuple[Stamps, int, int]:
 
 
 def usual_step(stamps: Stamps) -> float:
-    """Median distance of stamps that rise [ns]."""
+    """Median distance of stamps that rise [ns]. Of shape (n,)."""
     steps = np.diff(stamps)
     rising = steps[steps > 0]
     return float(np.median(rising)) if len(rising) else 0.0
@@ -85,6 +90,8 @@ def find_steps(stamps: Stamps, other: Stamps) -> tuple[list[Step], list[Step]]:
     """Lasting jumps of the stamp clock, and of the second clock.
 
     A jump counts where the lead before and after it is steady and differs by more than 50 ms and more than it scatters.
+
+    Both of shape (n,) [ns].
     """
     lead = lead_of(stamps, other)
     change = np.diff(lead)
@@ -120,7 +127,10 @@ def find_steps(stamps: Stamps, other: Stamps) -> tuple[list[Step], list[Step]]:
 
 
 def without_steps(stamps: Stamps, steps: list[Step], lead: Stamps) -> Stamps:
-    """Take steps out; the part whose lead is nearest to none stays, where none is near the longest."""
+    """Take steps out; the part whose lead is nearest to none stays, where none is near the longest.
+
+    `stamps`, `lead` and the result of shape (n,) [ns].
+    """
     edges = [0, *(s.at for s in steps), len(stamps)]
     offset = np.cumsum([0, *(s.size for s in steps)])
     level = np.array([abs(float(np.median(lead[a:b]))) for a, b in pairwise(edges)])
@@ -132,6 +142,8 @@ def without_steps(stamps: Stamps, steps: list[Step], lead: Stamps) -> Stamps:
 
 def strays(stamps: Stamps, other: Stamps) -> tuple[NDArray[np.bool_], Stamps]:
     """Single stamps that leave the course of the others.
+
+    All of shape (n,) [ns].
 
     Returns
     -------

@@ -30,7 +30,10 @@ def routine(function: _F) -> _F:
 
 
 def plain(data: NDArray[Any]) -> NDArray[Any]:
-    """View the same numbers as a plain array that cannot be written, so that one compiled version serves all."""
+    """View the same numbers as a plain array that cannot be written, so that one compiled version serves all.
+
+    Both of one shape (n, …).
+    """
     data = data.view(np.ndarray)
     data.flags.writeable = False
     return data

@@ -146,7 +146,7 @@ class McapFile:
 
 
 def mapped_bytes(path: Path) -> NDArray[np.uint8]:
-    """Map a file; raises `LogError` where it is empty, unreadable or not MCAP."""
+    """Map a file; raises `LogError` where it is empty, unreadable or not MCAP. Shape (bytes,)."""
     try:
         with path.open("rb") as source:
             if path.stat().st_size == 0:

@@ -118,7 +118,7 @@ class Scanner:
         self._names = np.empty((MAX_NAMES, 3), np.int64)
 
     def census(self, data: NDArray[np.uint8], start: int, stop: int) -> Census:
-        """Count what stands in a stretch, up to `BATCH` messages."""
+        """Count what stands in a stretch, up to `BATCH` messages. `data` of shape (bytes,)."""
         _check_inside(data, start, stop)
         bounds = np.array([2**63 - 1, -1], np.int64)
         _, met, named, other, end = scan_census(
@@ -179,7 +179,13 @@ def _within(data: NDArray[np.uint8], rows: NDArray[np.int64], size: int) -> NDAr
 
 
 def index_counts(data: NDArray[np.uint8], rows: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Channel and number of messages of message index records, shape (n, 2)."""
+    """Channel and number of messages of message index records, shape (n, 2).
+
+    Raises
+    ------
+    IndexError
+        Where a message index does not lie within the bytes.
+    """
     if not _within(data, rows, 15).all():
         raise IndexError("a message index does not lie within the bytes")
     out = np.empty((len(rows), 2), np.int64)

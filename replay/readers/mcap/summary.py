@@ -55,7 +55,10 @@ class Summary:
     metadata: tuple[MetadataIndex, ...]
 
     def covers(self, data: NDArray[np.uint8]) -> bool:
-        """Whether listed chunks and plain records between them fill the data section, so that no chunk is missing."""
+        """Whether listed chunks and plain records between them fill the data section, so that no chunk is missing.
+
+        `data` of shape (bytes,).
+        """
         if not (self.sound and self.checked):
             return False
         stated = self.statistics
@@ -114,7 +117,10 @@ def read_summary(data: NDArray[np.uint8], footer: int, place: int | None = None)
 def summary_from(
     data: NDArray[np.uint8], rows: NDArray[np.int64], place: tuple[int, int], checked: bool, sound: bool
 ) -> Summary:
-    """Gather the summary from the rows of a walk over it."""
+    """Gather the summary from the rows of a walk over it.
+
+    `data` of shape (bytes,), `rows` of shape (records, columns).
+    """
     listed = rows[(rows[:, 0] == fmt.CHUNK_INDEX) & (rows[:, 3] == fmt.SOUND)]
     chunks, indexes = scan.chunk_indexes(data, listed)
     chunks[:, 2:], indexes[:, 2] = _bounded(chunks[:, 2:]), _bounded(indexes[:, 2])

@@ -137,7 +137,7 @@ def _take_rows(file: McapFile, rows: NDArray[np.int64], closed: bool) -> None:
 
 
 def take_record(file: McapFile, op: int, start: int, stop: int) -> None:
-    """Take one of the few records beside messages and their indexes."""
+    """Take one of the few records beside messages and their indexes; a damaged one is told, and left out."""
     try:
         if op == fmt.ATTACHMENT:
             _take_attachment(file, start, stop)
@@ -243,6 +243,6 @@ def take_listed_names(file: McapFile, summary: Summary) -> None:
 
 
 def listed_chunks(summary: Summary) -> NDArray[np.int64]:
-    """Start, end, first and last stamp of the listed chunks."""
+    """Start, end, first and last stamp of the listed chunks. Shape (chunks, 4)."""
     first, last, start, length = summary.chunks[:, :4].T
     return np.stack((start, start + length, first, last), axis=1)

@@ -123,14 +123,26 @@ class Compiler:
         return Program(ops, names, specs, (self.layout.dialect, *self.exact), self.layout.dialect)
 
     def column(self, path: Path, dtype: str, guard: tuple[str, int] | None = None) -> int:
-        """Add a column and return its number."""
+        """Add a column and return its number.
+
+        Raises
+        ------
+        TooWide
+            Where it would need too many columns or steps.
+        """
         if len(self.specs) >= MAX_COLUMNS:
             raise TooWide
         self.specs.append((path, dtype, *(self.guard if guard is None else guard)))
         return len(self.specs) - 1
 
     def message(self, path: Path, name: str, parent: Scope | None, emit: bool, loose: bool) -> None:
-        """Compile one message; `loose` where it stands in a free sequence, so that no sample tells its lengths."""
+        """Compile one message; `loose` where it stands in a free sequence, so that no sample tells its lengths.
+
+        Raises
+        ------
+        TooWide
+            Where it would need too many columns or steps.
+        """
         self.visits += 1 + len(self.kind.fields[name])
         if self.visits > MAX_STEPS:  # a definition may name parts in parts without end, none of which a message fills
             raise TooWide
@@ -261,7 +273,13 @@ class Compiler:
             self.ops[at] = [MUTE, len(self.ops) - 1, length, fewest]
 
     def strings(self, path: Path, length: int, counted: int, scope: Scope, loose: bool) -> None:
-        """Compile an array of strings, which may be names."""
+        """Compile an array of strings, which may be names.
+
+        Raises
+        ------
+        TooWide
+            Where it would need too many columns or steps.
+        """
         names = None if loose else self.layout.names.get(place_of(path))
         if names is not None:
             scope.add(length >= 0, names)

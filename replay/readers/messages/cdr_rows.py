@@ -132,7 +132,10 @@ class OpenTable(NamedTuple):
 
 
 def views(data: NDArray[np.uint8]) -> tuple[NDArray[Any], NDArray[Any], NDArray[Any], NDArray[Any]]:
-    """View bytes as numbers of 1, 2, 4 and 8 bytes that start at every byte."""
+    """View bytes as numbers of 1, 2, 4 and 8 bytes that start at every byte.
+
+    `data` of shape (bytes,), the views of shape (bytes − width + 1,).
+    """
     data = data.view(np.ndarray)
     if len(data) < _SHORT or not data.flags.c_contiguous:
         data = np.concatenate([data, np.zeros(_SHORT, np.uint8)])

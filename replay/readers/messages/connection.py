@@ -79,7 +79,7 @@ class Block:
     publish_ns: NDArray[np.int64] | None = None
 
     def part(self, kept: NDArray[np.bool_] | slice) -> Block:
-        """Some of its messages."""
+        """Some of its messages. `kept` are flags of shape (messages,)."""
         publish = None if self.publish_ns is None else self.publish_ns[kept]
         return replace(
             self, starts=self.starts[kept], lengths=self.lengths[kept], log_ns=self.log_ns[kept], publish_ns=publish

@@ -35,6 +35,8 @@ def parse_together(data: NDArray[np.uint8], starts: NDArray[np.int64], lengths: 
     """Values of all payloads, or None where one of them is not JSON value of its own.
 
     A word that no payload can know stands between them, so that two broken ones cannot make up a valid whole.
+
+    `data` of shape (bytes,), `starts` and `lengths` of shape (payloads,).
     """
     word = secrets.token_hex(8)
     between = np.frombuffer(f',"{word}",'.encode(), np.uint8)
@@ -51,7 +53,10 @@ def parse_together(data: NDArray[np.uint8], starts: NDArray[np.int64], lengths: 
 def parse_singly(
     data: NDArray[np.uint8], starts: NDArray[np.int64], lengths: NDArray[np.int64], outcome: Outcome
 ) -> Iterator[tuple[int, Any]]:
-    """Yield number and value of each payload that is JSON, or JSON with NaN and Infinity."""
+    """Yield number and value of each payload that is JSON, or JSON with NaN and Infinity.
+
+    `data` of shape (bytes,), `starts` and `lengths` of shape (payloads,).
+    """
     for i, (start, size) in enumerate(zip(starts.tolist(), lengths.tolist(), strict=True)):
         raw = data[start : start + size].tobytes()
         try:

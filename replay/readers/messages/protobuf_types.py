@@ -82,7 +82,13 @@ def _collect(
 
 
 def parts_of(raw: bytes) -> Iterator[tuple[int, int | bytes]]:
-    """Yield number and value of each field of a serialised message."""
+    """Yield number and value of each field of a serialised message.
+
+    Raises
+    ------
+    ValueError
+        Where a field does not lie within the message, or is of no known kind.
+    """
     at = 0
     while at < len(raw):
         tag, at = _varint(raw, at)

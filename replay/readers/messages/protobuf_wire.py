@@ -35,7 +35,7 @@ class Wire(NamedTuple):
 
 @routine
 def varint(data: NDArray[np.uint8], at: int, stop: int, most: int) -> tuple[Any, int]:
-    """Value and the place behind it; place −1 where it is cut or longer than `most` bytes."""
+    """Value and the place behind it; place −1 where it is cut or longer than `most` bytes. `data` of shape (bytes,)."""
     if at < stop and data[at] < 128:
         return np.uint64(data[at]), at + 1
     value = np.uint64(0)
@@ -51,7 +51,7 @@ def varint(data: NDArray[np.uint8], at: int, stop: int, most: int) -> tuple[Any,
 
 @routine
 def is_text(data: NDArray[np.uint8], at: int, stop: int) -> bool:
-    """Whether bytes are UTF-8 without surrogates and overlong forms."""
+    """Whether bytes are UTF-8 without surrogates and overlong forms. `data` of shape (bytes,)."""
     while at < stop:
         lead = data[at]
         if lead < 0x80:
@@ -95,7 +95,10 @@ def wire_of(kind: int) -> int:
 
 @routine
 def find(number: NDArray[np.int64], low: int, high: int, code: int) -> int:
-    """Field of a type by its number on the wire; −1 for none."""
+    """Field of a type by its number on the wire; −1 for none.
+
+    `number` of shape (fields,), rising from `low` to `high`.
+    """
     end = high
     while low < end:
         middle = (low + end) >> 1
@@ -128,7 +131,7 @@ def number_at(wire: Wire, at: int, stop: int, kind: int) -> tuple[Any, int]:
 
 @routine
 def add_hash(data: NDArray[np.uint8], at: int, stop: int, place: int, row: int, values: NDArray[np.uint64]) -> None:
-    """Add one name to the hash of an array of names."""
+    """Add one name to the hash of an array of names. `data` of shape (bytes,), `values` of shape (columns, rows)."""
     mark = values[place, row] ^ np.uint64(0xCBF29CE484222325)
     for i in range(at, stop):
         mark = (mark ^ np.uint64(data[i])) * np.uint64(0x100000001B3)

@@ -200,6 +200,8 @@ class Table:
     def close(self, picked: Rows | None, rows: int, before: int) -> None:
         """Take the rows of a batch that were written; those between move up.
 
+        Rows of shape (k,).
+
         Parameters
         ----------
         picked : NDArray[np.int64] or None
@@ -243,7 +245,10 @@ class Table:
         return (cells != 0).view(np.uint8) if spec.dtype == "?" else cells.view(dtype)
 
     def finish(self) -> tuple[Rows | None, list[NDArray[Any]]]:
-        """Return the rows (None for the first to the last of the topic) and all columns; the table is empty then."""
+        """Return the rows (None for the first to the last of the topic) and all columns; the table is empty then.
+
+        Rows of shape (k,), columns of shape (k,) each.
+        """
         rows = None if self.rows is None else self.rows.finish()
         if self.spilled is not None:
             self._keep()

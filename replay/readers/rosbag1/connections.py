@@ -29,7 +29,10 @@ def fields_of(raw: bytes) -> dict[str, bytes]:
 
 
 def take_connection(bag: Bag, data: NDArray[np.uint8], records: BagRecords, i: int) -> None:
-    """Take a connection record; of two copies that differ, the one that its checksum confirms."""
+    """Take a connection record; of two copies that differ, the one that its checksum confirms.
+
+    `data` of shape (bytes,).
+    """
     head, body, size, number = (int(a[i]) for a in (records.head, records.body, records.size, records.conn))
     raw = data[head : body + min(size, MAX_TEXT)].tobytes()
     if bag.raw.get(number) == raw:

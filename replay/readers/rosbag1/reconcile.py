@@ -22,7 +22,7 @@ Info = tuple[int, int, dict[int, int]]
 
 
 def take_entries(bag: Bag, chunk: Chunk, records: BagRecords, rows: NDArray[np.int64]) -> None:
-    """Take the index records behind a chunk: what they count, and where they stand."""
+    """Take the index records behind a chunk: what they count, and where they stand. `rows` of shape (k,)."""
     chunk.entries, chunk.stated = [], {}
     for i in rows.tolist():
         number, body, size = int(records.conn[i]), int(records.body[i]), int(records.size[i])

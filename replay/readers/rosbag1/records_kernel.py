@@ -152,7 +152,15 @@ def _scan(data, start, stop, op, head, body, size, conn, stamp):  # type: ignore
 
 
 def end_of_chunk(data: NDArray[np.uint8], body: int) -> int:
-    """Where the record behind a chunk starts whose length is not to be trusted; the end of the data without one."""
+    """Where the record behind a chunk starts whose length is not to be trusted; the end of the data without one.
+
+    `data` of shape (bytes,).
+
+    Raises
+    ------
+    IndexError
+        Where the chunk begins before the data.
+    """
     if body < 0:
         raise IndexError(f"byte {body} is not one of {len(data)} bytes")
     return int(_find(data, body, len(data), len(data)))
@@ -170,6 +178,11 @@ def scan_bag(data: NDArray[np.uint8], start: int = 0, stop: int | None = None) -
         Bytes of the bag or chunk.
     start, stop : int
         Where the walk starts and ends [bytes]; what of it leaves the data is not walked.
+
+    Raises
+    ------
+    IndexError
+        Where `start` is negative.
     """
     data = plain(data)
     stop = len(data) if stop is None else min(stop, len(data))

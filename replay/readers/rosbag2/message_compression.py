@@ -31,6 +31,11 @@ def unpacked(blocks: Iterable[Block], name: str, report: Report) -> Iterator[lis
     ------
     list[Block]
         Blocks of one buffer of bounded size each.
+
+    Raises
+    ------
+    ZstdError
+        Where the data are damaged or expand beyond all measure.
     """
     given = list(blocks)
     if not given:

@@ -62,7 +62,10 @@ class Image:
     encoding: str
 
     def leaves(self, root: int, wanted: NDArray[np.int64] | None = None) -> NDArray[np.int64]:
-        """Leaves of a table in the order of its rows; with `wanted` only those that may hold these rows (sorted)."""
+        """Leaves of a table in the order of its rows; with `wanted` only those that may hold these rows (sorted).
+
+        Page numbers, shape (k,).
+        """
         if not 1 <= root < len(self.seen) or self.seen[root]:
             self.suspects.append(0)
             return np.empty(0, np.int64)
@@ -73,7 +76,7 @@ class Image:
         return found
 
     def rows(self, leaves: NDArray[np.int64], most: int = 100_000) -> list[tuple[int, list[Value]]]:
-        """Row numbers and values of a small table; rows that cannot be read are left out."""
+        """Row numbers and values of a small table; rows that cannot be read are left out. `leaves` of shape (k,)."""
         out = []
         row, place, local, total, status = scan.locate(self.data, self.page, self.usable, leaves)
         for i in np.flatnonzero((status == scan.OK) & (total <= _MAX_CELL))[:most].tolist():

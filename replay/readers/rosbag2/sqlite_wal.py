@@ -88,7 +88,7 @@ def _holds(path: Path, text: bytes, start: int) -> bool:
 
 
 def with_wal(path: Path, data: NDArray[np.uint8], report: Report) -> NDArray[np.uint8]:
-    """Return the database as its write-ahead log leaves it."""
+    """Return the database as its write-ahead log leaves it. Both of shape (bytes,)."""
     wal = path.with_name(path.name + "-wal")
     if not wal.is_file() or wal.stat().st_size < 32:
         return data
@@ -120,7 +120,7 @@ def with_wal(path: Path, data: NDArray[np.uint8], report: Report) -> NDArray[np.
 
 
 def with_journal(path: Path, data: NDArray[np.uint8], report: Report) -> NDArray[np.uint8]:
-    """Return the database as it was before the transaction that a rollback journal undoes."""
+    """Return the database as it was before the transaction that a rollback journal undoes. Both of shape (bytes,)."""
     journal = path.with_name(path.name + "-journal")
     if not journal.is_file() or journal.stat().st_size < 28:
         return data

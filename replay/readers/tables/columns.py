@@ -77,7 +77,7 @@ class ArrayColumn:
 
 
 def pick(stamps: NDArray[np.int64], window: Window | None) -> NDArray[np.bool_]:
-    """Return which stamps are there and lie in the window."""
+    """Return which stamps are there and lie in the window. Both of shape (n,); stamps in ns."""
     keep: NDArray[np.bool_] = stamps != MISSING
     if window is not None:
         keep &= (stamps >= window[0]) & (stamps < window[1])
@@ -85,7 +85,10 @@ def pick(stamps: NDArray[np.int64], window: Window | None) -> NDArray[np.bool_]:
 
 
 def compressed(values: NDArray[Any], keep: NDArray[np.bool_], store: ColumnStore) -> NDArray[Any]:
-    """Return the kept values, as a column of the store; the same array where all are kept."""
+    """Return the kept values, as a column of the store; the same array where all are kept.
+
+    From shape (n,) to (kept,).
+    """
     if keep.all():
         return values
     if values.dtype == object:

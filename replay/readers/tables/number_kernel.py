@@ -157,6 +157,8 @@ def _settled(w: Any, q: int, negative: bool, inexact: bool) -> tuple[int, Any]:
 def number(data: NDArray[np.uint8], at: int, decimal: np.uint8) -> tuple[int, Any, int]:
     """Read one number.
 
+    `data` of shape (bytes,).
+
     Parameters
     ----------
     data : NDArray[np.uint8]

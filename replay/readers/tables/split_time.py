@@ -45,6 +45,8 @@ class Part(NamedTuple):
 def split_times(sample: Mapping[str, NDArray[Any]]) -> Iterator[tuple[str, Part]]:
     """Yield columns of whole seconds with the column of their parts, by names and contents.
 
+    Samples of shape (rows,) each.
+
     Parameters
     ----------
     sample : Mapping[str, NDArray]

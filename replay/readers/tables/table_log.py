@@ -77,6 +77,8 @@ class RowTimes:
     def finish(self) -> tuple[NDArray[np.int64], NDArray[np.bool_] | None]:
         """Stamps of all kept rows, and which of them remain (None: all).
 
+        Stamps [ns] of shape (kept,), flags of shape (rows,).
+
         Raises
         ------
         LogError

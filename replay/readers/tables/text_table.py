@@ -22,6 +22,7 @@ from replay.readers.tables.row_kernel import FILLED, MISSING, MOMENT, TEXT
 from replay.readers.tables.rows import MAX_COLUMNS, Dialect, Rows
 from replay.readers.tables.text_file import BLOCK, TextFile, decoded
 from replay.readers.tables.time_cells import TimeBase
+from replay.readers.tables.title_lines import LOOKED_AT, is_number, skip_titles
 from replay.readers.tables.units_row import units_of_row
 
 SEPARATORS = ("\t", ";", ",", "|")
@@ -63,7 +64,7 @@ class TextTable:
         return Rows(self.file.path.name, self.dialect, len(self.names), report)
 
     def blocks(self, rows: Rows) -> Iterator[NDArray[np.int64]]:
-        """Parse all rows; see `Rows.blocks`."""
+        """Parse all rows; see `Rows.blocks`. Each of shape (columns, rows)."""
 
         def end(text: bytes) -> bytes:
             return self._whole_rows(text, rows.report)
@@ -80,6 +81,8 @@ class TextTable:
 
     def sample(self, text: bytes, dates: bool = True) -> dict[str, NDArray[Any]]:
         """First columns of some rows: int64, float64, or datetime64[ns] where they hold dates; no texts.
+
+        Each of shape (rows,).
 
         Parameters
         ----------
@@ -116,7 +119,7 @@ def _gathered(rows: Rows, text: bytes) -> list[NDArray[Any]]:
 
 
 def is_text(rows: Rows) -> NDArray[np.bool_]:
-    """Columns of which most cells that are not empty are neither numbers nor dates."""
+    """Columns of which most cells that are not empty are neither numbers nor dates. Shape (columns,)."""
     found: NDArray[np.bool_] = rows.columns[:, TEXT] > _MOSTLY * rows.columns[:, FILLED]
     return found
 
@@ -131,15 +134,10 @@ def separator_of(lines: list[str]) -> str | None:
             rows = [line.split(mark) for line in lines]
         width, agree = Counter(len(row) for row in rows).most_common(1)[0]
         cells = rows[-1] if len(rows) < 3 else rows[-2]
-        numeric = sum(_is_number(c) for c in cells)
+        numeric = sum(is_number(c) for c in cells)
         if width > 1 and agree * 2 > len(rows) and numeric and numeric * (mark != "," or 0.9) > score - 1:
             best, score = (mark, numeric + 1.0) if best is None or numeric > score - 1 else (best, score)
     return best
-
-
-def _is_number(cell: str) -> bool:
-    # possessive: a cell of very many digits is looked at once
-    return re.fullmatch(r"\s*+\"?[+-]?(\d++([.,]\d*+)?|[.,]\d++)([eE][+-]?\d++)?\"?\s*+", cell) is not None
 
 
 def open_text(path: Path, options: SourceOptions, report: Report) -> TextTable:
@@ -162,7 +160,7 @@ def open_text(path: Path, options: SourceOptions, report: Report) -> TextTable:
         if error.end < len(head) - 3:
             report.note(f"{path.name} is not UTF-8; it was read as Windows-1252, so some letters may be wrong")
     skipped, at, stated = _first_line(head)
-    lines = [x for x in decoded(head[at : at + HEAD]).splitlines()[:50] if x.strip()]
+    lines = [x for x in decoded(head[at : at + HEAD]).splitlines()[:LOOKED_AT] if x.strip()]
     separator = options.separator or stated
     if separator is None and len(lines) > 1:
         separator = separator_of(lines)
@@ -178,6 +176,7 @@ def open_text(path: Path, options: SourceOptions, report: Report) -> TextTable:
         raise LogError(
             f"{path}: separator = {separator!r} is not one plain character; give [sources] separator such as ';'"
         )
+    at += skip_titles(file, head, at, separator)
     names, size = _names(file, head, at, separator, skipped)
     skip = at + size
     below = head[skip : head.find(b"\n", skip) + 1]
@@ -209,7 +208,7 @@ def _names(file: TextFile, head: bytes, at: int, separator: str, skipped: bytes)
     names, size = _header(path, head[at:], separator)
     if len(names) > MAX_COLUMNS:
         raise LogError(f"{path} has {len(names)} columns; at most {MAX_COLUMNS} are read")
-    if all(_is_number(c) or not c for c in names):
+    if all(is_number(c) or not c for c in names):
         if file.tail(at).rstrip().endswith(b"EOF"):
             raise LogError(
                 f'{path} looks like a TwinCAT Scope export without its header (header "None"), so its columns cannot be '
@@ -278,6 +277,8 @@ def span(
     base: TimeBase, head: Sequence[NDArray[Any]] | None, tail: Sequence[NDArray[Any]] | None, count: int
 ) -> tuple[int, int]:
     """First and last stamp of a table [ns].
+
+    Cells of shape (rows,) each.
 
     Parameters
     ----------

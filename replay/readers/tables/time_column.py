@@ -70,6 +70,8 @@ def find_time(
 ) -> TimeColumn:
     """Time column: as given, seconds and nanoseconds in two columns, by its name, or the first that only rises.
 
+    Samples of shape (rows,) each.
+
     Parameters
     ----------
     path : Path
@@ -196,7 +198,10 @@ def _given(column: NDArray[Any]) -> NDArray[Any]:
 
 
 def rises(column: NDArray[Any], often: bool = True) -> bool:
-    """Whether a column never falls, and rises in most steps (or at all); a rare step back is allowed."""
+    """Whether a column never falls, and rises in most steps (or at all); a rare step back is allowed.
+
+    Of shape (rows,).
+    """
     values = _given(column)
     if len(values) < 2 or len(values) < 0.9 * min(len(column), 2000):
         return often and len(column) == 1 and len(values) == 1
@@ -207,7 +212,10 @@ def rises(column: NDArray[Any], often: bool = True) -> bool:
 
 
 def turns(column: NDArray[Any]) -> bool:
-    """Whether a column counts evenly and starts again at 2^32, as the lower half of a distributed clock does."""
+    """Whether a column counts evenly and starts again at 2^32, as the lower half of a distributed clock does.
+
+    Of shape (rows,).
+    """
     values = _given(column)
     if len(values) < 3 or column.dtype.kind not in "iu" or values.min() < 0 or values.max() >= _TURN:
         return False

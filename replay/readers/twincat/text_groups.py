@@ -94,6 +94,8 @@ def finished_stamps(
 ) -> tuple[NDArray[np.int64], NDArray[np.bool_] | None]:
     """Stamps of a group, and which of its rows remain (None: all).
 
+    Both of shape (rows,), stamps in ns.
+
     Raises
     ------
     LogError
@@ -189,7 +191,10 @@ class Repeats:
     def drop(
         self, group: Group, column: int, label: str, stamps: NDArray[np.int64], values: NDArray[Any]
     ) -> tuple[NDArray[np.int64], NDArray[Any]]:
-        """Stamps and values without repetitions where the sample time of the header proves them."""
+        """Stamps and values without repetitions where the sample time of the header proves them.
+
+        From shape (n,) to (kept,), stamps in ns.
+        """
         if len(stamps) < 3:
             return stamps, values
         step = float(np.median(np.diff(stamps[:10_000])))

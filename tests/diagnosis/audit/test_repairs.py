@@ -271,6 +271,36 @@ def test_a_part_that_is_not_known_is_refused(tmp_path: Path, words: str, said: s
     assert not (tmp_path / "results").exists()
 
 
+@pytest.mark.parametrize(
+    ("words", "part"),
+    [
+        ("HX-1 FR speed sensor", "FR sensor"),
+        ("HX-1 fr Drive  Valve", "FR actuator"),
+        ("HX-1 FR motor", "FR actuator"),
+        ("HX-1 front steering sensor", "front sensor"),
+        ("HX-1 front steering valve", "front actuator"),
+        ("HX-1 FR speed sensor or drive valve", "FR"),
+        ("HX-1 FR", "FR"),
+    ],
+)
+def test_sides_have_the_names_that_reports_give_them(tmp_path: Path, words: str, part: str) -> None:
+    stored(tmp_path, course("..x"))
+    assert repair(tmp_path, words, 3.0).told[0].part == part
+
+
+def test_what_stays_open_is_said(tmp_path: Path) -> None:
+    either = Fault("FR", "sensor_or_actuator", "no_signal", "high")
+    stored(tmp_path, [Sample("m", day=0.0, verdict="stop", faults=(SILENT, either))])
+    first = repair(tmp_path, "HX-1 FR sensor", 3.0).told[0]
+    assert [w.split(":")[0] for w in first.closes] == ["FR speed sensor without signal"]
+    (stays,) = first.stays
+    assert stays.startswith("FR speed sensor or drive valve without signal or motion: the repair of one side")
+    second = repair(tmp_path, "HX-1 FR drive valve", 4.0).told[0]
+    assert (len(second.closes), second.stays) == (1, ())
+    stored(tmp_path / "later", course("..x"))
+    assert "found again on" in repair(tmp_path / "later", "HX-1 FR", 1.5).told[0].stays[0]
+
+
 def test_a_day_on_which_the_fault_was_found_needs_a_time(tmp_path: Path) -> None:
     stored(tmp_path, course("..x"))
     day = utc(at(2.0))[:10]

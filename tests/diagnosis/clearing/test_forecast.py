@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from diagnosis.clearing.forecast import Forecast, forecast
-from diagnosis.results.machine_words import HYDRAULIC
+from diagnosis.results.machine_words import HYDRAULIC, MachineWords
 from replay.faults import Side
 from replay.machine.config import haulotte
 
@@ -49,3 +51,21 @@ def test_what_is_not_logged_is_not_judged() -> None:
     assert found["FL", Side.ACTUATOR].words == "not judged: no speed and no opening is logged"
     assert found["front", Side.SENSOR].log[0] == "steer.<A>.u"
     assert "too few wheels" in _by_part(["wheel.FR.v", "wheel.FR.u"])["FR", Side.SENSOR].words
+
+
+def test_only_what_is_not_logged_is_asked_for() -> None:
+    found = _by_part(["wheel.FR.v", "wheel.FR.v_ref", "wheel.FR.u_applied", "wheel.FL.v"])
+    assert found["FR", Side.ACTUATOR].log == ("wheel.<W>.u",)
+    assert found["FL", Side.ACTUATOR].log == ("wheel.<W>.u", "wheel.<W>.u_applied")
+
+
+def test_one_speed_without_a_command_is_not_judged() -> None:
+    one = replace(haulotte(), wheels=("D",), geometry=None)
+    told = forecast(["wheel.D.v"], one, MachineWords(drive="drive"))
+    assert [(f.words, f.log) for f in told] == [
+        ("not judged: no command is logged, and no other speed to compare with", ("cmd.v", "wheel.<W>.v_true")),
+        ("not judged: no command is logged", ("cmd.v", "wheel.<W>.effort")),
+    ]
+    sensor, drive = forecast(["wheel.D.v", "wheel.D.v_ref"], one, MachineWords(drive="drive"))
+    assert "standstill" in sensor.words
+    assert "standstill" in drive.words

@@ -184,6 +184,21 @@ def test_loss_below_the_limit_is_no_finding(side: Side) -> None:
     assert any("below the limits" in note for note in assessment.notes)
 
 
+@pytest.mark.parametrize("seed", [0, 4, 5])
+def test_a_valve_within_its_play_of_a_resting_command_is_not_stuck(seed: int) -> None:
+    """A finely resolved position lies 0.3 % of opening off what the mission's play makes of the command."""
+    rng = np.random.default_rng(seed)
+    t = np.arange(N) * 0.01
+    x = rng.uniform(0.3, 0.9) * np.sin(2 * np.pi * t / 9) + 0.1 * np.sin(2 * np.pi * t / 2.3)
+    x[8000:9500] = 1.0
+    y, at = np.zeros(N), 0.0
+    for i, command in enumerate(x):
+        y[i] = at = float(np.clip(at, command - 0.004, command + 0.004))
+    y[8000:9500] = 1.0  # its end stop
+    y = rounded(y + 1e-4 * rng.normal(size=N), 1e-4)
+    assert not assess_pair(pair(Side.ACTUATOR, y, rounded(x, 1e-4), 0.01), LIMITS).findings
+
+
 @SIDES
 @pytest.mark.parametrize("seed", range(6))
 def test_healthy_channel_has_no_finding(side: Side, seed: int) -> None:

@@ -27,6 +27,7 @@ from replay.inspection.report import InspectReport
 from replay.log.source_options import SourceOptions
 from replay.mission import content_hash
 from replay.readers.registry import read_log, summarise_log
+from tests.object_store import object_store
 
 SAMPLES = Path(__file__).resolve().parents[4] / "sample_logs"
 pytestmark = pytest.mark.filterwarnings("ignore::DeprecationWarning", "ignore::ResourceWarning")
@@ -51,32 +52,8 @@ class Bucket:
 @pytest.fixture(scope="module")
 def server() -> Iterator[list[str]]:
     """Requests of a server of S3's protocol."""
-    pytest.importorskip("s3fs", reason="s3fs is not installed")
-    moto = pytest.importorskip("moto.server", reason="moto is not installed")
-    from werkzeug.serving import WSGIRequestHandler
-
-    requests: list[str] = []
-
-    def met(self: Any, *_: object) -> None:
-        requests.append(f"{self.command} {self.path} {self.headers.get('Range', '')}".strip())
-
-    patch = pytest.MonkeyPatch()
-    patch.setattr(WSGIRequestHandler, "log_request", met)
-    running = moto.ThreadedMotoServer(ip_address="127.0.0.1", port=0, verbose=False)
-    running.start()
-    host, port = running.get_host_and_port()
-    for name, value in {
-        "AWS_ENDPOINT_URL": f"http://{host}:{port}",
-        "AWS_ACCESS_KEY_ID": "made-up",
-        "AWS_SECRET_ACCESS_KEY": "made-up",
-        "AWS_DEFAULT_REGION": "us-east-1",
-        "AWS_EC2_METADATA_DISABLED": "true",
-    }.items():
-        patch.setenv(name, value)
-    yield requests
-    fsspec.get_filesystem_class("s3").clear_instance_cache()
-    running.stop()
-    patch.undo()
+    with object_store() as requests:
+        yield requests
 
 
 @pytest.fixture
