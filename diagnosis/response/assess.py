@@ -99,9 +99,7 @@ def assess_response(
     sideways = any(d.commands.shape[1] > _BODY_COMMANDS for d in drives)
     bodies = Bodies(speeds, None if yaw is None else cells(yaw, width), width * dt, sideways)
     efforts = {w: cells(j.data.effort, width) for w, j in found.items() if j.data.effort is not None and not sideways}
-    pulls = shares_of(
-        found, efforts, {w: tuple(o for o in found if o != w and same_side(w, o, geometry)) for w in found}
-    )
+    pulls = shares_of(found, efforts, {w: _sharing(w, found, geometry) for w in found})
     found = {
         w: j._replace(wheel=j.wheel._replace(pull=own_pull(j, efforts.get(w), pulls.get(w)))) for w, j in found.items()
     }
@@ -138,6 +136,12 @@ def assess_response(
         powers = powers._replace(rows=(*powers.rows, delay))
         parts[w] = replace(sensor, powers=powers, notes=(*sensor.notes, told, *remarks)), drive
     return Judgement(parts, standstills(idle, dt))
+
+
+def _sharing(wheel: str, found: Mapping[str, Judged], geometry: Geometry | None) -> tuple[str, ...]:
+    """Wheels that share a wheel's load: those of its side, or, where it has none, all others."""
+    others = tuple(o for o in found if o != wheel)
+    return tuple(o for o in others if same_side(wheel, o, geometry)) or others
 
 
 def _doubted(sensor: Assessment, why: str) -> Assessment:

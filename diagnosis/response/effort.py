@@ -25,6 +25,7 @@ _NOTHING, _USUALLY = (
     0.15,
     0.4,
 )  # of its share of the load: nothing; and what it has in nine tenths of the mission at least
+_USUAL = 0.75  # quantile of the ratio of two efforts that is its usual one: a drive may pull nothing for half of the mission
 _GAP_BLOCKS = 3
 _LEAST_S, _P = 3.0, 0.94
 _CHANGES = 0.25  # of the top speed
@@ -84,7 +85,7 @@ def _beside(e: Array, other: Array, driving: NDArray[np.bool_]) -> Array | None:
     if np.count_nonzero(use) < _LEAST_BLOCKS:
         return None
     pulled = use & (load > _PULLS * float(np.median(load[use])))
-    ratio = float(np.median(np.abs(e[pulled]) / load[pulled])) if pulled.any() else 0.0
+    ratio = float(np.quantile(np.abs(e[pulled]) / load[pulled], _USUAL)) if pulled.any() else 0.0
     return np.where(pulled, np.abs(e) / (ratio * np.maximum(load, 1e-12)), np.nan) if ratio > 0.0 else None
 
 
