@@ -124,7 +124,8 @@ def assess_response(
     parts = {
         w: sides_of(j, kept[w], (weak[w], late[w]), (left_out[w], together), limits, dt) for w, j in judged.items()
     }
-    remarks = (*otherwise(judged, width * dt), *left_notes)
+    astray, lasts = otherwise(judged, width * dt)
+    remarks = (*astray, *left_notes)
     doubts = {w: j.joint.unlike for w, j in judged.items() if j.joint is not None and j.joint.unlike}
     for w, text in (doubts | unlike(judged)).items():
         parts[w] = _doubted(parts[w][0], text), parts[w][1]
@@ -135,7 +136,7 @@ def assess_response(
         delay, told = smallest_delay(j, width * dt)
         powers = powers._replace(rows=(*powers.rows, delay))
         parts[w] = replace(sensor, powers=powers, notes=(*sensor.notes, told, *remarks)), drive
-    return Judgement(parts, standstills(idle, dt))
+    return Judgement(parts, (*standstills(idle, dt), *(astray if lasts else ())))
 
 
 def _sharing(wheel: str, found: Mapping[str, Judged], geometry: Geometry | None) -> tuple[str, ...]:
