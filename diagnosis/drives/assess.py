@@ -34,6 +34,11 @@ from replay.machine.drive_model import EffortMap, InverseController
 Array = NDArray[np.float64]
 
 _STEP_RANGE = 0.1
+_MOST = 0.5  # of the driving
+_NO_MODEL = (
+    "the controller that command and effort show in this mission explains less than half of its driving; `mfhca fit` with healthy missions "
+    "finds it more surely"
+)
 
 
 @dataclass(frozen=True)
@@ -93,6 +98,10 @@ def assess_drive(data: DriveData, limits: Limits) -> tuple[Assessment, Assessmen
         return missing, unassessed(data.y.size, State.NOT_ASSESSED, why)
     pair = speed_pair(data, controller, implied_speed(controller, data.record), limits)
     findings, lead, below = find_rows(pair, limits)
+    known = data.model is not None and controller is data.model.echo
+    if not known and _mostly_faulty(data, findings, limits):
+        missing = unassessed(data.y.size, State.NOT_ASSESSED, _NO_MODEL)
+        return missing, unassessed(data.y.size, State.NOT_ASSESSED, _NO_MODEL)
     load, more = _extra_effort(data, pair, findings, limits)
     evidence = _Evidence(pair, lead, findings, load, more)
     sensor, actuator = _assessments(data, evidence, _notes(data, pair, controller, below))
@@ -100,6 +109,18 @@ def assess_drive(data: DriveData, limits: Limits) -> tuple[Assessment, Assessmen
     if load is not None and data.model is not None and data.model.effort is not None:
         actuator = _as_far_as_seen(replace(actuator, powers=load_powers(load, data.model.effort, limits)), limits)
     return sensor, actuator
+
+
+def _mostly_faulty(data: DriveData, findings: list[Finding], limits: Limits) -> bool:
+    """Whether a controller that was found in this mission alone calls most of its driving faulty: then it is not the drive's.
+
+    It is identified by what holds in more than half of the time.
+    """
+    driving = np.isfinite(data.y) & (np.abs(np.nan_to_num(data.command)) > limits.driving_speed)
+    there = np.zeros(data.y.size, np.bool_)
+    for f in findings:
+        there[f.start : f.stop] = True
+    return bool(np.count_nonzero(there & driving) > _MOST * max(int(np.count_nonzero(driving)), 1))
 
 
 def _as_far_as_seen(drive: Assessment, limits: Limits) -> Assessment:

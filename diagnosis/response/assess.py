@@ -93,15 +93,14 @@ def assess_response(
     found = _wheels(data, left_out, (cell, width), limits, dt)
     if not found:
         return Judgement({}, standstills(idle, dt) or unexplained(drives, limits, dt))
-    found = by_each_other(found, width * dt)
+    rest = {w: samples_of(d.y, d.fresh) for w, d in data.items() if w not in found}
+    found = by_each_other(found, width * dt, rest)
     holds = {w: holds_of(j.wheel.samples, _MOVES * limits.driving_speed, dt) for w, j in found.items()}
     found = {w: j._replace(wheel=j.wheel._replace(habit=_habit(w, holds))) for w, j in found.items()}
     sideways = any(d.commands.shape[1] > _BODY_COMMANDS for d in drives)
     bodies = Bodies(speeds, None if yaw is None else cells(yaw, width), width * dt, sideways)
     efforts = {w: cells(j.data.effort, width) for w, j in found.items() if j.data.effort is not None and not sideways}
-    pulls = shares_of(
-        found, efforts, {w: tuple(o for o in found if o != w and same_side(w, o, geometry)) for w in found}
-    )
+    pulls = shares_of(found, efforts, {w: _sharing(w, found, geometry) for w in found})
     found = {
         w: j._replace(wheel=j.wheel._replace(pull=own_pull(j, efforts.get(w), pulls.get(w)))) for w, j in found.items()
     }
@@ -126,7 +125,8 @@ def assess_response(
     parts = {
         w: sides_of(j, kept[w], (weak[w], late[w]), (left_out[w], together), limits, dt) for w, j in judged.items()
     }
-    remarks = (*otherwise(judged, width * dt), *left_notes)
+    astray, lasts = otherwise(judged, width * dt)
+    remarks = (*astray, *left_notes)
     doubts = {w: j.joint.unlike for w, j in judged.items() if j.joint is not None and j.joint.unlike}
     for w, text in (doubts | unlike(judged)).items():
         parts[w] = _doubted(parts[w][0], text), parts[w][1]
@@ -137,7 +137,13 @@ def assess_response(
         delay, told = smallest_delay(j, width * dt)
         powers = powers._replace(rows=(*powers.rows, delay))
         parts[w] = replace(sensor, powers=powers, notes=(*sensor.notes, told, *remarks)), drive
-    return Judgement(parts, standstills(idle, dt))
+    return Judgement(parts, (*standstills(idle, dt), *(astray if lasts else ())))
+
+
+def _sharing(wheel: str, found: Mapping[str, Judged], geometry: Geometry | None) -> tuple[str, ...]:
+    """Wheels that share a wheel's load: those of its side, or, where it has none, all others."""
+    others = tuple(o for o in found if o != wheel)
+    return tuple(o for o in others if same_side(wheel, o, geometry)) or others
 
 
 def _doubted(sensor: Assessment, why: str) -> Assessment:

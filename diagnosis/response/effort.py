@@ -20,11 +20,14 @@ from replay.faults import FaultMode, Side, State
 Array = NDArray[np.float64]
 
 _LEAST_BLOCKS = 80
+_USUAL = 0.75  # quantile that is the usual size: a drive may pull nothing for half of the mission
 _PULLS = 0.4  # of the usual effort of the others: from there on something is to be pulled
-_NOTHING, _USUALLY = (
+_NOTHING, _USUALLY, _SELDOM = (
     0.15,
-    0.4,
-)  # of its share of the load: nothing; and what it has in nine tenths of the mission at least
+    0.25,
+    0.05,
+)  # of its share of the load: nothing; and what it has but for a small share of the rest
+_AROUND = 4  # blocks to each side of one, of which the median counts
 _GAP_BLOCKS = 3
 _LEAST_S, _P = 3.0, 0.94
 _CHANGES = 0.25  # of the top speed
@@ -83,8 +86,8 @@ def _beside(e: Array, other: Array, driving: NDArray[np.bool_]) -> Array | None:
     use = driving & np.isfinite(e) & np.isfinite(load)
     if np.count_nonzero(use) < _LEAST_BLOCKS:
         return None
-    pulled = use & (load > _PULLS * float(np.median(load[use])))
-    ratio = float(np.median(np.abs(e[pulled]) / load[pulled])) if pulled.any() else 0.0
+    pulled = use & (load > _PULLS * float(np.quantile(load[use], _USUAL)))
+    ratio = float(np.quantile(np.abs(e[pulled]) / load[pulled], _USUAL)) if pulled.any() else 0.0
     return np.where(pulled, np.abs(e) / (ratio * np.maximum(load, 1e-12)), np.nan) if ratio > 0.0 else None
 
 
@@ -102,6 +105,7 @@ def idle_drives(one: Judged, share: Array | None, block_s: float) -> list[Findin
     """
     if share is None or not np.isfinite(share).any():
         return []
+    share = _smooth(share)
     nothing = np.nan_to_num(share, nan=1.0) < _NOTHING
     spans: list[tuple[int, int]] = []
     for k in np.flatnonzero(nothing).tolist():
@@ -114,9 +118,18 @@ def idle_drives(one: Judged, share: Array | None, block_s: float) -> list[Findin
     for a, b in long:
         outside[a:b] = False
     # a wheel whose effort often comes near nothing tells nothing by it
-    if not long or not outside.any() or np.quantile(share[outside], 0.1) < _USUALLY:
+    if not long or not outside.any() or np.quantile(share[outside], _SELDOM) < _USUALLY:
         return []
     return [_finding(one, a, b, block_s) for a, b in long if _sped_up(one, a, b)]
+
+
+def _smooth(share: Array) -> Array:
+    """Median of what is known around each block where something is known, shape (b,)."""
+    wide = np.pad(share, _AROUND, constant_values=np.nan)
+    known = np.flatnonzero(np.isfinite(share))
+    out = np.full(share.size, np.nan)
+    out[known] = np.nanmedian(np.lib.stride_tricks.sliding_window_view(wide, 2 * _AROUND + 1)[known], axis=1)
+    return out
 
 
 def _sped_up(one: Judged, start: int, stop: int) -> bool:

@@ -19,8 +19,7 @@ from replay.faults import FaultMode, Side, State
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
-_SPIKE_GAP_S, _LEAST_SPIKES = 10.0, 3
-_SENSOR = 0.96  # that what a channel alone shows is the sensor's
+SENSOR_SHARE = 0.96  # that what a channel alone shows is the sensor's
 _ONE_JUMP, _TWO_JUMPS = 0.92, 0.97
 _EITHER = 0.6  # that it is the sensor's, up to which its side is left open
 _LEAST_PULLS, _AS_USUAL = 8, (0.6, 1.5)  # blocks with an effort, and its size by the usual one
@@ -100,24 +99,6 @@ def finding_of(spell: Spell, wheel: Wheel, speed: Array | None) -> Finding | Non
     return _scaled(spell, wheel, (first, last), speed)
 
 
-def spikes_of(wheel: Wheel) -> list[Finding]:
-    """Findings of wild readings that come again and again; none where those of the other wheels do, too."""
-    if not wheel.spiky:
-        return []
-    places = wheel.samples.step[wheel.samples.wild]
-    groups = np.split(places, np.flatnonzero(np.diff(places) * wheel.dt > _SPIKE_GAP_S) + 1) if places.size else []
-    out = []
-    for group in groups:
-        if group.size < _LEAST_SPIKES:
-            continue
-        text = (
-            f"Spikes: {group.size} readings of {wheel.name} within {(group[-1] - group[0]) * wheel.dt:.1f} s are far off those "
-            "before and after them, and no machine moves like that."
-        )
-        out.append(_finding(int(group[0]), int(group[-1]) + 1, FaultMode.NOISY, 0.97, None, None, (text,)))
-    return out
-
-
 def _stuck(spell: Spell, wheel: Wheel, first: int, last: int) -> Finding | None:
     inside = np.flatnonzero((wheel.samples.step >= first) & (wheel.samples.step < last))
     value = float(wheel.samples.value[inside[inside.size // 2]])
@@ -135,7 +116,7 @@ def _stuck(spell: Spell, wheel: Wheel, first: int, last: int) -> Finding | None:
         "while it drives it otherwise changes all the time."
     )
     sat = Sat(value, abs(value), value, value, "m/s")
-    return _finding(begin, end, FaultMode.STUCK, spell.p * _SENSOR, Epsilon(1.0, 1.0, 1.0), sat, (text,))
+    return sensor_finding(begin, end, FaultMode.STUCK, spell.p * SENSOR_SHARE, Epsilon(1.0, 1.0, 1.0), sat, (text,))
 
 
 def _silent(spell: Spell, wheel: Wheel, first: int, last: int, speed: Array | None) -> Finding:
@@ -162,9 +143,9 @@ def _silent(spell: Spell, wheel: Wheel, first: int, last: int, speed: Array | No
         sensor = 0.5  # another view of this wheel has it at rest, too
     if seen or spell.own:
         texts.append(f"{wheel.compared} went on moving.")
-        sensor = max(sensor, _SENSOR) if wheel.own or spell.own else sensor
-    if sensor < _SENSOR and _pulls_as_usual(wheel, part):
-        sensor = _SENSOR
+        sensor = max(sensor, SENSOR_SHARE) if wheel.own or spell.own else sensor
+    if sensor < SENSOR_SHARE and _pulls_as_usual(wheel, part):
+        sensor = SENSOR_SHARE
         texts.append("Its drive pulls as usual, as it does not where a {wheel} is held, or the drive has no power.")
     if _lives(wheel, begin, end):
         sensor = min(sensor, 0.5)
@@ -175,7 +156,7 @@ def _silent(spell: Spell, wheel: Wheel, first: int, last: int, speed: Array | No
             "100 times a second, the position of its joint, or {or_view}the drive's effort would tell them apart."
         )
     sat = Sat(0.0, 0.0, 0.0, 0.0, "m/s")
-    return _finding(
+    return sensor_finding(
         begin, max(end, begin + 1), FaultMode.NO_SIGNAL, spell.p, Epsilon(1.0, 1.0, 1.0), sat, tuple(texts), sensor
     )
 
@@ -220,7 +201,7 @@ def _noisy(spell: Spell, wheel: Wheel, first: int, last: int) -> Finding | None:
         "the inertia of a {wheel} forbids that."
     )
     sat = Sat(0.0, rms, -rms, rms, "m/s")
-    return _finding(first, last, FaultMode.NOISY, spell.p * _SENSOR, None, sat, (text,))
+    return sensor_finding(first, last, FaultMode.NOISY, spell.p * SENSOR_SHARE, None, sat, (text,))
 
 
 def _scaled(spell: Spell, wheel: Wheel, span: tuple[int, int], speed: Array | None) -> Finding | None:
@@ -270,12 +251,12 @@ def _scaled(spell: Spell, wheel: Wheel, span: tuple[int, int], speed: Array | No
     wide = 2.0 * misfit / np.sqrt(max(1.0, x.size / 4.0))
     loss = 1.0 - gain
     p = spell.p * (0.5 + 0.5 * spell.mine) if speed is not None or bare else 1.0 - (1.0 - spell.p) * 0.5
-    return _finding(
+    return sensor_finding(
         begin, max(end, begin + 1), spell.mode, p, Epsilon(loss, loss - wide, loss + wide), None, tuple(texts), sensor
     )
 
 
-def _finding(
+def sensor_finding(
     start: int,
     stop: int,
     mode: FaultMode,

@@ -7,12 +7,15 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from diagnosis.channels.liveness import alive
 from diagnosis.evidence import SENSOR, MissionView
 
 Array = NDArray[np.float64]
 
 CELL_S = 0.05
 _SIDEWAYS_S = 1.0
+_LOST_S, _LOST_PERIODS = 1.0, 10.0  # of silence from which a channel is lost rather than late
+_LIVES = 0.5  # of the samples to be expected meanwhile that others must bring
 
 
 @dataclass(frozen=True)
@@ -35,6 +38,8 @@ class FollowerData:
         Speed by the position of its joint [m/s]; None where that is not logged.
     effort : Array or None, shape (n,)
         Torque, current or duty of its drive, in any unit; None where that is not logged.
+    lost : tuple[tuple[int, int], ...]
+        Steps [start, stop) in which nothing came of it, while what is recorded with it went on.
     """
 
     y: Array
@@ -44,6 +49,7 @@ class FollowerData:
     name: str
     rolled: Array | None = None
     effort: Array | None = None
+    lost: tuple[tuple[int, int], ...] = ()
 
 
 def cell_of(dt: float) -> int:
@@ -88,5 +94,23 @@ def followers(mission: MissionView) -> dict[str, FollowerData]:
         position = f"wheel.{w}.v_position"
         rolled = mission.values(position) if mission.logged(position) else None
         effort = mission.values(f"wheel.{w}.effort") if mission.logged(f"wheel.{w}.effort") else None
-        out[w] = FollowerData(mission.values(name), timeline.fresh[name], commands, asked, name, rolled, effort)
+        out[w] = FollowerData(
+            mission.values(name), timeline.fresh[name], commands, asked, name, rolled, effort, _lost(mission, name)
+        )
     return out
+
+
+def _lost(mission: MissionView, name: str) -> tuple[tuple[int, int], ...]:
+    """Steps [start, stop) after its first sample in which a channel is silent for long beside others that are not."""
+    timeline = mission.timeline
+    seen = np.flatnonzero(timeline.fresh[name])
+    if not seen.size:
+        return ()
+    edge = np.r_[seen, timeline.size]
+    period = max(timeline.periods_ns[name], timeline.step_ns) * 1e-9
+    lives = np.r_[0, np.cumsum(alive(timeline, mission.alive, name))]
+    least = max(_LOST_S, _LOST_PERIODS * period)
+    long = np.flatnonzero(np.diff(edge) * timeline.dt > least)
+    came = lives[edge[long + 1]] - lives[edge[long] + 1]
+    enough = came * period > _LIVES * np.diff(edge)[long] * timeline.dt
+    return tuple((int(edge[k]) + 1, int(edge[k + 1])) for k in long[enough])

@@ -22,6 +22,7 @@ _LASTING = 0.8  # of what the other wheels make of the same command: over a whol
 _NEAR = 0.5, 2.0  # of its command: what any healthy drive makes of it
 _UNMADE, _UNMADE_S = 0.6, 10.0  # of its command, and commanded time, below which nothing is made of a command
 _ELSEWHERE, _ELSEWHERE_S = 0.35, 1.5  # of the top speed: all drives that far off their commands, for so long
+_STATE_S = 4.0  # of that, from which on it is worth a verdict
 
 
 class Judged(NamedTuple):
@@ -97,26 +98,28 @@ def unexplained(drives: Sequence[FollowerData], limits: Limits, dt: float) -> tu
     )
 
 
-def otherwise(judged: Mapping[str, Judged], block_s: float) -> tuple[str, ...]:
-    """A sentence where all drives together did something else than their commands for long; no wheel is blamed for it.
+def otherwise(judged: Mapping[str, Judged], block_s: float) -> tuple[tuple[str, ...], bool]:
+    """A sentence where all drives together did something else than their commands, and whether so long that it is the machine's state.
 
-    `block_s` is the length of a block [s].
+    No wheel is blamed for it. `block_s` is the length of a block [s].
     """
     off = []
     for j in judged.values():
         if not j.response.answered:
-            return ()
+            return (), False
         b = j.wheel.blocks
         off.append(np.abs(b.mean - np.clip(b.mean, b.low, b.high)) > _ELSEWHERE * np.nanquantile(np.abs(b.mean), 0.99))
     edge = np.flatnonzero(np.diff(np.r_[False, np.logical_and.reduce(off), False].astype(np.int8)))
     spans = [(a, b) for a, b in zip(edge[::2] * block_s, edge[1::2] * block_s, strict=True) if b - a >= _ELSEWHERE_S]
     if len(judged) < 2 or not spans:
-        return ()
+        return (), False
     longest = max(spans, key=lambda s: s[1] - s[0])
-    return (
+    text = (
         f"For {sum(b - a for a, b in spans):.1f} s all drives together did something else than their commands (longest "
-        f"{longest[0]:.1f}–{longest[1]:.1f} s): commands that are held or ignored, another source of commands, or a slope.",
+        f"{longest[0]:.1f}–{longest[1]:.1f} s): commands that are held or ignored, another source of commands, or a slope; no {{wheel}} is "
+        "blamed for it."
     )
+    return (text,), bool(longest[1] - longest[0] >= _STATE_S)
 
 
 def unlike(judged: Mapping[str, Judged]) -> dict[str, str]:

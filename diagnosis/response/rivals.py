@@ -7,6 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
+from diagnosis.response.channel import Samples
 from diagnosis.response.machine import Judged
 from diagnosis.response.models import Beside, held_long
 from diagnosis.response.spells import Spell
@@ -22,19 +23,20 @@ _NO_SHARE = 1e9
 _DOUBT_S = 0.5  # around the beginning and the end of a spell
 _ROUGHER = 2.0  # times what changes from sample to sample in other wheels, at most, is usual
 _SPIKIER = 4.0  # times the wild readings of the other wheels (median): fewer are a habit of the machine, as coarse encoders have
+_TURNS = 0.05  # of the usual speed
 _ALSO_HELD = 0.05  # of the driving in which another wheel stays at one value for long: then it is a habit
 _WITHIN, _LONGER = 0.9, 2.0  # of a spell, and times its length: what lies so within another wheel's is its consequence
 _CLEARLY = 2.0  # times the misfit of another wheel beside its command: then it is clear whose fault it is
 
 
-def by_each_other(found: Mapping[str, Judged], block_s: float) -> dict[str, Judged]:
+def by_each_other(found: Mapping[str, Judged], block_s: float, rest: Mapping[str, Samples]) -> dict[str, Judged]:
     """Wheels with what is usual in them, by the others: a fault of half the mission is no habit where no other wheel has it.
 
-    `block_s` is the length of a block [s].
+    `rest` are the readings of wheels that are not judged, whose habits count as well. `block_s` is the length of a block [s].
     """
     rough = {w: float(np.median(j.wheel.blocks.usual)) for w, j in found.items()}
     held = {w: held_long(j.wheel.blocks, j.driving, block_s) for w, j in found.items()}
-    wild = {w: float(np.mean(j.wheel.samples.wild)) if j.wheel.samples.wild.size else 0.0 for w, j in found.items()}
+    wild = {w: _wild_share(s) for w, s in {**rest, **{w: j.wheel.samples for w, j in found.items()}}.items()}
     out = {}
     for w, j in found.items():
         others = [o for o in found if o != w]
@@ -43,9 +45,18 @@ def by_each_other(found: Mapping[str, Judged], block_s: float) -> dict[str, Judg
             most = _ROUGHER * float(np.median([rough[o] for o in others]))
             share = min(1.0, most / rough[w]) if rough[w] > 0.0 and most > 0.0 else 1.0
             blocks = blocks._replace(usual=share * blocks.usual, habitual=max(held[o] for o in others) > _ALSO_HELD)
-        usual = bool(others) and wild[w] <= _SPIKIER * float(np.median([wild[o] for o in others]))
+        known = [x for o, x in wild.items() if o != w]
+        usual = bool(known) and wild[w] <= _SPIKIER * float(np.median(known))
         out[w] = j._replace(wheel=j.wheel._replace(blocks=blocks, spiky=not usual))
     return out
+
+
+def _wild_share(samples: Samples) -> float:
+    """Share of wild readings while the wheel turns [1]: one that is held has none, whatever its habit."""
+    known = np.abs(samples.value[np.isfinite(samples.value)])
+    turns = np.abs(np.nan_to_num(samples.value)) > _TURNS * float(np.quantile(known, 0.9) if known.size else 0.0)
+    number = int(np.count_nonzero(turns | samples.wild))
+    return float(np.count_nonzero(samples.wild)) / number if number else 0.0
 
 
 def shared(spell: Spell, beside: Beside | None) -> Spell:

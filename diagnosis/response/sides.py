@@ -7,7 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from diagnosis.response.findings import Wheel, finding_of, spikes_of
+from diagnosis.response.by_channel import lost_of, spikes_of
+from diagnosis.response.findings import Wheel, finding_of
 from diagnosis.response.inputs import cell_of
 from diagnosis.response.machine import Judged
 from diagnosis.response.models import HEALTHY, LEAST_P, NOISY, OTHER, SILENT
@@ -78,9 +79,9 @@ def sides_of(
             one, spell, width, dt
         ):
             doubtful[spell.start : spell.stop] = False  # what came slowly is slip or load, no sensor's fault
-    findings = _without_doubles([*findings, *late])
     there = np.isfinite(one.data.y)
     driving = np.repeat(one.driving, width)[:size]
+    findings = _without_doubles([*findings, *late, *lost_of(wheel, one.data.lost, driving)])
     sensor = np.where(driving, CODE[State.HEALTHY], CODE[State.NOT_EXCITED]).astype(np.int8)
     unseen = not one.response.answered and one.speed is None
     sensor[np.repeat(doubtful | (one.driving & unseen), width)[:size]] = CODE[State.NOT_ASSESSED]

@@ -12,6 +12,7 @@ from replay.log.raw_log import Channel, RawLog
 from replay.log.source_options import SignalSource
 from replay.machine.config import Control, Machine, haulotte
 from replay.machine.geometry import Geometry
+from replay.setup.by_the_body import radius_by_body
 from replay.setup.contradictions import in_turn_with_commands, units_by_positions
 from replay.setup.draft_notes import Draft
 from replay.setup.given import given_signals, odometry, table_sources
@@ -110,8 +111,11 @@ def draft_machine(logs: Sequence[RawLog], preset: Preset | None = None) -> Draft
     origins = _in_one_direction(draft, structure, found, motions)
     _ask_for_what_is_missing(draft, found)
     motions = in_turn_with_commands(draft, structure, found, motions, origins)
-    radius = wheel_radius(draft, structure, found, motions, origins)
-    places = wheel_places(draft, structure, motions)
+    straight = [w for w, p in (structure.places or {}).items() if p.axle == "fixed"]
+    radius = wheel_radius(
+        draft, structure, found, motions, origins, radius_by_body(found, structure.wheels, straight, origins)
+    )
+    places = wheel_places(draft, structure, motions, (found, radius, origins))
     geometry = None if places is None else Geometry(dict(places), 2 * radius)
     if geometry is None:
         origins = {n: without_size(o, radius) if n.startswith("wheel.") else o for n, o in origins.items()}

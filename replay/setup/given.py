@@ -27,6 +27,7 @@ def given_signals(
 ) -> dict[str, SignalSource]:
     """Signals by canonical name, with their units; the rules find the others."""
     given: dict[str, SignalSource] = {}
+    speeds = {c.field for c in channels.values() if c.field.startswith("velocity[")}
     for wheel, joint in structure.joints.items():
         for c in channels.values():
             if c.type_name.rpartition("/")[2] not in _JOINT_TYPES or re.search(r"cmd|command|ref|target", c.topic):
@@ -36,6 +37,9 @@ def given_signals(
                 given.setdefault(f"wheel.{wheel}.v", replace(where, unit="rad/s"))
             elif c.field == f"effort[{joint.joint}]":
                 given.setdefault(f"wheel.{wheel}.effort", replace(where, unit="N·m"))
+            elif c.field == f"position[{joint.joint}]":
+                leaf = "v_position" if f"velocity[{joint.joint}]" in speeds else "v"
+                given.setdefault(f"wheel.{wheel}.{leaf}", replace(where, unit="rad", derivative=True))
             elif c.field == f"position[{joint.steering}]" and joint.steering:
                 given.setdefault(f"steer.{own_axle(wheel)}.phi", replace(where, unit="rad"))
     whole = odometry(channels)

@@ -14,6 +14,7 @@ from replay.machine.config import Limits, Machine, haulotte
 from replay.machine.geometry import WheelGeometry
 from replay.machine.quantities import UNITS
 from replay.machine.units import known_unit
+from replay.setup.by_the_body import Measured, track_by_yaw
 from replay.setup.draft_notes import Draft
 from replay.setup.motion import WheelMotion
 from replay.setup.structure import ONE, Structure
@@ -25,6 +26,7 @@ from replay.signals.to_si import peak_of
 _RADII, _TRACKS = (0.02, 2.5), (0.05, 4.0)  # m
 _HEADROOM = 1.2
 _DIFFERS = 0.15
+_STANDS_IN_RADIUS = 0.1  # m; where nothing tells it
 _LEAST_SPEED = 0.05  # m/s
 _ANY_MACHINE, _STANDS_IN = 30.0, 10.0  # m/s; faster than any wheeled machine, and what is written then
 _AGREE = 1.33
@@ -33,9 +35,9 @@ _WHEEL_SIZES = (0.04, 1.0)  # m; of a radius that explains a speed without a uni
 
 def wheel_radius(
     draft: Draft, structure: Structure, found: Signals, motions: Mapping[str, WheelMotion],
-    origins: dict[str, SignalSource],
+    origins: dict[str, SignalSource], by_body: Measured | None = None,
 ) -> float:  # fmt: skip
-    """Wheel radius [m]. Signals without a unit get the one that fits the command."""
+    """Wheel radius [m], by the measured speed of the body before the commands. Signals without a unit get the one that fits the command."""
     turning = [n for w in structure.wheels if (n := f"wheel.{w}.v") in origins and _is_rotation(origins[n])]
     bare = [n for w in structure.wheels if (n := f"wheel.{w}.v") in origins and not origins[n].unit]
     asked = [n for w in structure.wheels if (n := f"wheel.{w}.v_ref") in origins and _is_rotation(origins[n])]
@@ -54,6 +56,13 @@ def wheel_radius(
                 f"is the wheel radius {structure.radius:g} m? By commanded and measured speeds it would be {measured:.3g} m.",
             )
         return structure.radius
+    if by_body is not None and turning and _RADII[0] <= by_body.length <= _RADII[1]:
+        draft.ask(
+            "geometry",
+            f"is the wheel radius {by_body.length:.3g} m? By {by_body.by} beside the turns of the wheels; odometry is as right as the radius that "
+            "its own software has. Measure the wheel.",
+        )
+        return float(_round(by_body.length))
     # a ROS joint that is called a wheel turns as the wheel; symbols of a PLC called so often hold its motor's turns
     wheels_own = all(origins[n].topic is not None and "wheel" in english(tokens(origins[n].label)) for n in turning)
     if measured is not None and measured < (_RADII[0] if wheels_own else _WHEEL_SIZES[0]):
@@ -79,7 +88,7 @@ def wheel_radius(
             "how large are the wheels? Nothing in the log tells it; 0.1 m radius stands in, and with it every speed. If the motors' "
             'turns were logged, add gear_ratio here, and at = "motor" to the speeds below.',
         )
-    return 0.1
+    return _STANDS_IN_RADIUS
 
 
 def _is_rotation(origin: SignalSource) -> bool:
@@ -146,20 +155,34 @@ def _round(value: float) -> str:
 
 
 def wheel_places(
-    draft: Draft, structure: Structure, motions: Mapping[str, WheelMotion]
+    draft: Draft,
+    structure: Structure,
+    motions: Mapping[str, WheelMotion],
+    measured: tuple[Signals, float, Mapping[str, SignalSource]] | None = None,
 ) -> Mapping[str, WheelGeometry] | None:
-    """Places with the track that turns show, where no description gives them."""
+    """Places with the track that turns show, where no description gives them.
+
+    Measured turns come before commanded ones: `measured` has the signals, the wheel radius [m] and the signals' origins.
+    """
     places = structure.places
     if places is None:
         return None if structure.wheels == ONE else _sides(draft, structure.wheels, motions)
+    turned = None if measured is None else track_by_yaw(measured[0], places, *measured[1:])
     tracks = [2 * m.y * (1 if places[n.split(".")[1]].y > 0 else -1) for n, m in motions.items() if m.y is not None]
-    found = _agreed([t if _TRACKS[0] <= t <= _TRACKS[1] else math.inf for t in tracks])
+    asked = _agreed([t if _TRACKS[0] <= t <= _TRACKS[1] else math.inf for t in tracks])
     fixed = all(p.axle == "fixed" for p in places.values())
     track = max(p.y for p in places.values()) - min(p.y for p in places.values())
     if "track" in structure.measured:
         draft.say("geometry", f"Track {track:.4g} m from {structure.how}.")
-    elif found is not None and math.isfinite(found) and fixed:
-        track = float(_round(found))
+    elif turned is not None and _TRACKS[0] <= turned.length <= _TRACKS[1]:
+        track = float(_round(turned.length))
+        draft.ask(
+            "geometry",
+            f"is the track {track:g} m? By {turned.by} beside the speeds of the wheels: a machine that skids turns as one with a wider track "
+            "would. Measure it.",
+        )
+    elif asked is not None and math.isfinite(asked) and fixed:
+        track = float(_round(asked))
         draft.ask(
             "geometry", f"is the track {track:g} m? It is what makes commanded turns and speeds agree. Measure it."
         )

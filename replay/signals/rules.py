@@ -139,7 +139,7 @@ def _by_joint(channel: Channel, machine: Machine, others: Mapping[str, Channel])
     axle = axle_of(joint, machine) if is_steering(joint) else None
     wheel = None if is_steering(joint) else wheel_of(joint, machine)
     if wheel is None and axle is None and is_drive(joint):
-        wheel, rank = _numbered(joint, machine, others, channel), rank + 2
+        wheel, rank = _only(joint, machine, others, channel) or _numbered(joint, machine, others, channel), rank + 2
     why = f"joint {joint!r} on {channel.topic}"
     if role in ("u", "u_applied"):
         part = f"wheel.{wheel}" if wheel else f"steer.{axle}" if axle else None
@@ -163,12 +163,23 @@ def _by_joint(channel: Channel, machine: Machine, others: Mapping[str, Channel])
             yield Candidate(f"steer.{axle}.{leaf}", source_of(channel, "rad"), rank, why)
 
 
+def _only(joint: str, machine: Machine, others: Iterable[str], channel: Channel) -> str | None:
+    """The wheel of a machine with one, where no other joint is a wheel's: that of a tricycle."""
+    drives = [j for j in _joints(others, channel) if is_drive(j) and not is_steering(j)]
+    return machine.wheels[0] if len(machine.wheels) == 1 and drives == [joint] else None
+
+
+def _joints(others: Iterable[str], channel: Channel) -> list[str]:
+    """Joints beside a channel's in its field of one message."""
+    prefix = f"{channel.topic}.{channel.field.split('[')[0]}["
+    return [o[len(prefix) :].split("]")[0] for o in others if o.startswith(prefix)]
+
+
 def _numbered(joint: str, machine: Machine, others: Iterable[str], channel: Channel) -> str | None:
     found = index_of(joint)
     if found is None:
         return None
-    prefix = f"{channel.topic}.{channel.field.split('[')[0]}["
-    joints = [o[len(prefix) :].split("]")[0] for o in others if o.startswith(prefix)]
+    joints = _joints(others, channel)
     at = found[1] - min(first_indices(joints).get(found[0], found[1]), 1)
     return machine.wheels[at] if 0 <= at < len(machine.wheels) else None
 

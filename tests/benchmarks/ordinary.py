@@ -1,7 +1,8 @@
 """Verdicts on ordinary robots that share nothing with the project's simulator; `python tests/benchmarks/ordinary.py --seeds reporting`.
 
-Differential, skid, rocker, Ackermann and mecanum robots of random size, motors and encoders drive random missions (slip, slopes,
-kerbs, payload, pauses, emergency stops) and record /joint_states, /cmd_vel, /imu/data, and mostly /odom, as MCAP or rosbag2. The
+Differential, skid, rocker, Ackermann and mecanum robots, tricycles and cars of random size, motors and encoders drive random missions (slip,
+slopes, kerbs, payload, pauses, emergency stops) and record /joint_states, /cmd_vel, /imu/data, and mostly /odom, as MCAP or rosbag2;
+--habits are those of `ordinary_robots/habits.py`. The
 machine file is the one that `mfhca config init --log` writes, unedited, from the same log. What is printed:
 
 1. healthy missions: parts named although nothing was wrong, verdicts, and the share of driving in which sensors were judged;
@@ -26,6 +27,7 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
 from ordinary_robots.faults import EVENTS, FAULTS, Fault, fault_of
+from ordinary_robots.habits import HABITS, Habits
 from ordinary_robots.log import write_log
 from ordinary_robots.machines import KINDS, H, Robot, course_of, robot_of
 from ordinary_robots.physics import drive
@@ -69,7 +71,7 @@ class Case:
         return f is not None and i["start_s"] < f.last * H + _SLACK_S and i["stop_s"] > f.first * H - _SLACK_S
 
 
-def case(kind: str, fault_kind: str, seed: int, folder: Path) -> Case:
+def case(kind: str, fault_kind: str, seed: int, folder: Path, habits: str = "usual") -> Case:
     """Drive, write, set up and diagnose one mission."""
     rng = np.random.default_rng([seed, KINDS.index(kind), (FAULTS.index(fault_kind) + 1) if fault_kind else 0])
     robot = robot_of(kind, rng)
@@ -80,7 +82,7 @@ def case(kind: str, fault_kind: str, seed: int, folder: Path) -> Case:
         fault = fault_of(fault_kind, len(robot.wheels), moving, H, rng)
     driven = drive(robot, course, fault, rng)
     path = folder / (f"{kind}.mcap" if rng.random() < 0.7 else kind)
-    write_log(path, robot, course, driven, fault, rng)
+    write_log(path, robot, course, driven, fault, rng, Habits(habits, seed))
     text = machine_text(draft_machine(read_everything([path], every=False)), path.name)
     (folder / "machine.toml").write_text(text, encoding="utf-8")
     machine = load_machine(folder / "machine.toml")
@@ -156,6 +158,7 @@ def main() -> None:
     parser.add_argument("--faulty", type=int, default=3, help="missions of each kind of robot and fault")
     parser.add_argument("--kinds", nargs="+", choices=KINDS, default=KINDS)
     parser.add_argument("--faults", nargs="*", choices=FAULTS, default=FAULTS)
+    parser.add_argument("--habits", choices=HABITS, default="usual", help="of the recorder")
     parser.add_argument(
         "--detail", action="store_true", help="one line for each mission with something wrong in what was said"
     )
@@ -165,7 +168,7 @@ def main() -> None:
     for kind in args.kinds:
         for seed in range(first, first + args.healthy):
             with tempfile.TemporaryDirectory() as folder:
-                c = case(kind, "", seed, Path(folder))
+                c = case(kind, "", seed, Path(folder), args.habits)
             by[kind] += healthy_score(c)
             if args.detail:
                 _detail(c, seed)
@@ -181,7 +184,7 @@ def main() -> None:
         for kind in args.kinds:
             for seed in range(first, first + args.faulty):
                 with tempfile.TemporaryDirectory() as folder:
-                    c = case(kind, fault_kind, seed, Path(folder))
+                    c = case(kind, fault_kind, seed, Path(folder), args.habits)
                 score = fault_score(c)
                 for name in (fault_kind, kind, c.fault.side if c.fault else "", "together"):
                     faults[name] += score

@@ -12,7 +12,8 @@ from rosbags.rosbag2 import Writer as BagWriter
 from rosbags.typesys import Stores, get_typestore
 
 from .faults import Fault, published
-from .machines import Course, H, Robot
+from .habits import USUAL, Habits
+from .machines import STEERED, Course, H, Robot
 from .physics import Driven
 
 Array = NDArray[np.float64]
@@ -23,15 +24,22 @@ _NONE = np.zeros(0)
 
 
 def write_log(
-    path: Path, robot: Robot, course: Course, driven: Driven, fault: Fault | None, rng: np.random.Generator
+    path: Path,
+    robot: Robot,
+    course: Course,
+    driven: Driven,
+    fault: Fault | None,
+    rng: np.random.Generator,
+    habits: Habits = USUAL,
 ) -> None:
     """Write a mission: an MCAP file, or a folder of rosbag2 where `path` has no ending."""
     rows = [
-        *_joints(robot, driven, fault, rng),
-        *_commands(robot, course, rng),
+        *_joints(robot, driven, fault, rng, habits),
+        *habits.sent(_commands(robot, course, rng)),
         *_inertia(course, driven, rng),
         *_odometry(robot, driven, fault, rng),
     ]
+    rows = habits.stamped([r for r in rows if r[1] not in habits.without])
     if robot.described:
         rows.append(
             (0.0, "/robot_description", "std_msgs/msg/String", STORE.types["std_msgs/msg/String"](_urdf(robot)))
@@ -70,9 +78,9 @@ def _sampled(x: Array, t: Array) -> Array:
 
 
 def _joints(
-    robot: Robot, driven: Driven, fault: Fault | None, rng: np.random.Generator
+    robot: Robot, driven: Driven, fault: Fault | None, rng: np.random.Generator, habits: Habits
 ) -> list[tuple[float, str, str, Any]]:
-    t, arrives = _clock(robot.rate, len(driven.steer) * H, rng)
+    t, arrives = habits.clocked(*_clock(robot.rate, len(driven.steer) * H, rng))
     step = 2 * np.pi / robot.counts
     angle = np.floor(_sampled(np.cumsum(driven.seen, axis=0) * H, t) / step) * step
     speed = np.diff(angle, axis=0, prepend=0.0) / np.diff(t, prepend=t[0] - 1.0 / robot.rate)[:, None]
@@ -90,23 +98,27 @@ def _joints(
     names = [w.joint for w in robot.wheels]
     effort = sign * _sampled(driven.torque, t)
     effort = effort + rng.normal(0.0, 0.02 * robot.rail * robot.radius, effort.shape)
-    steer = _sampled(driven.steer, t)
+    turned, steering = _steering_joints(robot), _sampled(driven.steer, t)
     made, kind = STORE.types["sensor_msgs/msg/JointState"], "sensor_msgs/msg/JointState"
     rows: list[tuple[float, str, str, Any]] = []
     for k in range(t.size):
-        position, velocity, torque = sign * angle[k], sign * speed[k], effort[k] if robot.efforts else _NONE
-        if robot.kind == "ackermann":
-            position, velocity = np.r_[position, steer[k]], np.r_[velocity, 0.0]
-            torque = np.r_[torque, 0.0] if robot.efforts else _NONE
+        torque = np.r_[effort[k], np.zeros(len(turned))] if robot.efforts else _NONE
+        position, velocity = sign * angle[k], sign * speed[k]
+        position, velocity = np.r_[position, np.full(len(turned), steering[k])], np.r_[velocity, np.zeros(len(turned))]
         message = made(
             _header(t[k]),
-            [*names, "front_steering_joint"] if robot.kind == "ackermann" else names,
-            position if robot.positions or robot.kind == "ackermann" else _NONE,
-            velocity,
+            [*names, *turned],
+            position if robot.positions or turned or not habits.velocities else _NONE,
+            velocity if habits.velocities else _NONE,
             torque,
         )
         rows.append((arrives[k], "/joint_states", kind, message))
     return rows
+
+
+def _steering_joints(robot: Robot) -> list[str]:
+    names = {"car": ["front_left_steering_joint", "front_right_steering_joint"]}
+    return names.get(robot.kind, ["front_steering_joint"] if robot.kind in STEERED else [])
 
 
 def _commands(robot: Robot, course: Course, rng: np.random.Generator) -> list[tuple[float, str, str, Any]]:
@@ -155,7 +167,10 @@ def _odometry(
             rim[:, fault.wheel] = robot.radius * published(t, rim[:, fault.wheel] / robot.radius, fault, H, rng)
         left, right = (np.array([(w.y > 0) == s for w in robot.wheels]) for s in (True, False))
         v = rim.mean(axis=1)
-        omega = (rim[:, right].mean(axis=1) - rim[:, left].mean(axis=1)) / (2 * abs(robot.wheels[0].y))
+        if robot.kind == "tricycle":
+            v, omega = v * np.cos(_sampled(driven.steer, t)), v * np.sin(_sampled(driven.steer, t)) / robot.wheelbase
+        else:
+            omega = (rim[:, right].mean(axis=1) - rim[:, left].mean(axis=1)) / (2 * abs(robot.wheels[0].y))
     else:
         v, omega = (_sampled(driven.body[:, i], t) * rng.normal(1.0, 0.01) for i in (0, 2))
         v, omega = v + rng.normal(0.0, 0.02, t.size), omega + rng.normal(0.0, 0.01, t.size)
@@ -188,13 +203,22 @@ def _header(t: float, frame: str = "base_link") -> Any:
 
 
 def _urdf(robot: Robot) -> str:
-    """Wheels that roll about their own y, and a steering joint for a car."""
+    """Wheels that roll about their own y, those that are steered on a joint about z."""
     parts = ['<?xml version="1.0"?><robot name="rover"><link name="base_link"/>']
     for w in robot.wheels:
         link = w.joint.replace("_joint", "_link")
         shape = f'<geometry><cylinder radius="{robot.radius:.4f}" length="0.08"/></geometry>'
+        parent, place = "base_link", f"{w.x:.4f} {w.y:.4f} 0"
+        if w.steered:
+            name = w.joint.replace("wheel", "steering")
+            parent = name.replace("_joint", "_link")
+            parts.append(
+                f'<link name="{parent}"/><joint name="{name}" type="revolute"><parent link="base_link"/><child link="{parent}"/>'
+                f'<origin xyz="{place}" rpy="0 0 0"/><axis xyz="0 0 1"/><limit lower="-0.5" upper="0.5" effort="50" velocity="3"/></joint>'
+            )
+            place = "0 0 0"
         parts.append(
             f'<link name="{link}"><collision>{shape}</collision></link><joint name="{w.joint}" type="continuous">'
-            f'<parent link="base_link"/><child link="{link}"/><origin xyz="{w.x:.4f} {w.y:.4f} 0" rpy="0 0 0"/><axis xyz="0 1 0"/></joint>'
+            f'<parent link="{parent}"/><child link="{link}"/><origin xyz="{place}" rpy="0 0 0"/><axis xyz="0 1 0"/></joint>'
         )
     return "".join([*parts, "</robot>"])

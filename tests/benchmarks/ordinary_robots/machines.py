@@ -1,4 +1,4 @@
-"""Five kinds of robot with random sizes, motors, encoders and habits, and the missions that they are sent on."""
+"""Seven kinds of robot with random sizes, motors, encoders and habits, and the missions that they are sent on."""
 
 from __future__ import annotations
 
@@ -9,18 +9,21 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
-KINDS = ("differential", "skid", "rocker", "ackermann", "mecanum")
+KINDS = ("differential", "skid", "rocker", "ackermann", "mecanum", "tricycle", "car")
+#: Kinds that turn by steering: on a circle about the middle of the rear axle.
+STEERED = ("ackermann", "tricycle", "car")
 H = 1e-3  # step of the physics [s]
 
 
 @dataclass(frozen=True)
 class Wheel:
-    """A driven wheel: joint name, place [m], and the direction of its rollers (0: none)."""
+    """A driven wheel: joint name, place [m], the direction of its rollers (0: none), and whether it is steered."""
 
     joint: str
     x: float
     y: float
     roller: float = 0.0
+    steered: bool = False
 
 
 @dataclass(frozen=True)
@@ -103,25 +106,51 @@ class Course:
 
 def robot_of(kind: str, rng: np.random.Generator) -> Robot:
     """A random robot of a kind."""
-    size = {"differential": 0.4, "skid": 1.0, "rocker": 1.1, "ackermann": 0.8, "mecanum": 0.7}[kind] * rng.uniform(
-        0.7, 1.4
-    )
+    size = {
+        "differential": 0.4,
+        "skid": 1.0,
+        "rocker": 1.1,
+        "ackermann": 0.8,
+        "mecanum": 0.7,
+        "tricycle": 1.2,
+        "car": 1.0,
+    }[kind] * rng.uniform(0.7, 1.4)
     half, base = 0.3 * size, 0.5 * size
-    rows = {"differential": [0.0], "skid": [base / 2, -base / 2], "rocker": [base, 0.0, -base], "ackermann": [0.0]}
+    rows = {
+        "differential": [0.0],
+        "skid": [base / 2, -base / 2],
+        "rocker": [base, 0.0, -base],
+        "ackermann": [0.0],
+        "tricycle": [0.6 * size],
+        "car": [0.6 * size, 0.0],
+    }
     names = {1: [""], 2: ["front_", "rear_"], 3: ["front_", "middle_", "rear_"]}
     xs = rows.get(kind, [base / 2, -base / 2])
     prefix = ["rear_"] if kind == "ackermann" else names[len(xs)]
     wheels = tuple(
-        Wheel(f"{p}{side}_wheel_joint", x, y, 0.0 if kind != "mecanum" else float(np.sign(x) * np.sign(y)))
+        Wheel(
+            f"{p}{side}_wheel_joint", x, y, 0.0 if kind != "mecanum" else float(np.sign(x) * np.sign(y)),
+            kind == "car" and x > 0.0,
+        )
         for p, x in zip(prefix, xs, strict=True)
         for side, y in (("left", half), ("right", -half))
-    )
+    )  # fmt: skip
+    if kind == "tricycle":  # one wheel that drives and steers
+        wheels = (Wheel("front_wheel_joint", xs[0], 0.0, steered=True),)
     mass = 60.0 * size**2 * rng.uniform(0.6, 1.6)
-    rate = {"differential": 20.0, "skid": 50.0, "rocker": 20.0, "ackermann": 50.0, "mecanum": 30.0}[kind]
+    rate = {
+        "differential": 20.0,
+        "skid": 50.0,
+        "rocker": 20.0,
+        "ackermann": 50.0,
+        "mecanum": 30.0,
+        "tricycle": 20.0,
+        "car": 50.0,
+    }[kind]
     radius = (0.1 + 0.09 * size) * rng.uniform(0.7, 1.2)
     return Robot(
         kind, wheels, radius, 0.6 * size, mass,
-        top=float(rng.uniform(0.6, 1.4) * (2.0 if kind == "ackermann" else 1.0)), rate=float(rng.choice([rate, rate, 10.0, 100.0])),
+        top=float(rng.uniform(0.6, 1.4) * (2.0 if kind in ("ackermann", "car") else 1.0)), rate=float(rng.choice([rate, rate, 10.0, 100.0])),
         counts=float(np.exp(rng.uniform(np.log(3e3), np.log(8e4)))), smooth=float(rng.choice([0.0, 0.05, 0.1])),
         closed=bool(rng.random() < 0.8), lag=float(rng.uniform(0.05, 0.3)), accel=float(rng.uniform(0.6, 3.0)),
         dead_time=float(rng.uniform(0.0, 0.15)), deadband=float(rng.uniform(0.0, 0.06)),
@@ -137,14 +166,14 @@ def course_of(robot: Robot, seconds: float, rng: np.random.Generator) -> Course:
     joystick = rng.random() < 0.5
     v, lateral, omega, silent = np.zeros(n), np.zeros(n), np.zeros(n), np.zeros(n, np.bool_)
     at = round(rng.uniform(1.0, 4.0) / H)
-    turn = robot.top / (3.0 * abs(robot.wheels[0].y) + 0.3)
+    turn = robot.top / (3.0 * (abs(robot.wheels[0].y) or 0.5 * robot.wheelbase) + 0.3)
     while at < n:
         length = round(rng.uniform(2.0, 9.0) / H)
         part = slice(at, min(n, at + length))
         what = rng.random()
         if what < 0.15:
             silent[part] = joystick
-        elif what < 0.25 and robot.kind != "ackermann":
+        elif what < 0.25 and robot.kind not in STEERED:
             omega[part] = rng.choice([-1, 1]) * rng.uniform(0.3, 0.9) * turn
         else:
             v[part] = rng.uniform(0.25, 1.0) * robot.top * (-1 if rng.random() < 0.15 else 1)

@@ -9,7 +9,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from .faults import Fault
-from .machines import Course, H, Robot
+from .machines import STEERED, Course, H, Robot
 
 Array = NDArray[np.float64]
 
@@ -47,13 +47,14 @@ def drive(robot: Robot, course: Course, fault: Fault | None, rng: np.random.Gene
     if fault is not None and fault.kind == "ignored":
         held = slice(fault.first, fault.last)
         v[held], lateral[held], omega[held] = v[fault.first], lateral[fault.first], omega[fault.first]
-    ackermann = robot.kind == "ackermann"
-    steer = _steering(v, omega, robot.wheelbase) if ackermann else np.zeros(n)
+    by_steering = robot.kind in STEERED
+    steer = _steering(v, omega, robot.wheelbase) if by_steering else np.zeros(n)
+    heading = np.where([w.steered for w in robot.wheels], np.cos(steer)[:, None], 1.0)
     if robot.kind == "mecanum":
         target = v[:, None] - omega[:, None] * (y + np.sign(y) * np.abs(x)) - roller * lateral[:, None]
     else:
-        turn = v * np.tan(steer) / robot.wheelbase if ackermann else omega
-        target = v[:, None] - turn[:, None] * y
+        turn = v * np.tan(steer) / robot.wheelbase if by_steering else omega
+        target = (v[:, None] - turn[:, None] * y) / heading
     effect, scale = np.zeros((n, m), np.int64), np.ones((n, m))
     stop = course.stop.copy()
     if fault is not None:
@@ -70,10 +71,23 @@ def drive(robot: Robot, course: Course, fault: Fault | None, rng: np.random.Gene
     grip = float(rng.uniform(0.5, 0.9))
     numbers = np.array(
         [robot.radius, robot.mass, robot.rail, robot.lag, robot.accel, robot.deadband, 1.7 * robot.top, grip,
-         robot.wheelbase if ackermann else 0.0, float(robot.closed)]
+         robot.wheelbase if by_steering else 0.0, float(robot.closed)]
     )  # fmt: skip
     out = _scan(
-        target, steer, effect, scale, stop, course.slope, course.load, course.kerbs, x, y, roller, bias, numbers
+        target,
+        steer,
+        heading,
+        effect,
+        scale,
+        stop,
+        course.slope,
+        course.load,
+        course.kerbs,
+        x,
+        y,
+        roller,
+        bias,
+        numbers,
     )
     return Driven(*out, steer)
 
@@ -87,7 +101,7 @@ def _steering(v: Array, omega: Array, base: float) -> Array:
 
 
 @njit(cache=True)
-def _scan(target: Any, steer: Any, effect: Any, scale: Any, stop: Any, slope: Any, load: Any, kerbs: Any, xs: Any, ys: Any,
+def _scan(target: Any, steer: Any, heading: Any, effect: Any, scale: Any, stop: Any, slope: Any, load: Any, kerbs: Any, xs: Any, ys: Any,
           roller: Any, bias: Any, numbers: Any) -> Any:  # fmt: skip
     """One mission; one function, for its state is one."""
     radius, mass, rail, lag, accel, deadband, free, grip, base, closed = numbers
@@ -131,11 +145,11 @@ def _scan(target: Any, steer: Any, effect: Any, scale: Any, stop: Any, slope: An
                 torque = 0.0  # without power
             pull[k, i] = torque * radius
             torque -= rail * 0.03 * np.tanh(speed[i] / 0.02)
-            along = vx - ys[i] * wz
+            along = (vx - ys[i] * wz) / heading[k, i]
             across = vy + xs[i] * wz
             slip = speed[i] - (along - roller[i] * across) if roller[i] != 0.0 else speed[i] - along
             force = grip * weight * load[k] * np.tanh(slip / 0.06)
-            push_x += force - kerbs[k, i] * np.tanh(along / 0.05)
+            push_x += force * heading[k, i] - kerbs[k, i] * np.tanh(along / 0.05)
             moment += -ys[i] * (force - kerbs[k, i] * np.tanh(along / 0.05))
             side = -roller[i] * force if roller[i] != 0.0 else -0.6 * grip * weight * load[k] * np.tanh(across / 0.1)
             push_y += side

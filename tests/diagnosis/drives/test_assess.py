@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -172,3 +173,18 @@ def test_the_side_of_an_onset_is_open_where_a_jump_could_be_overlooked() -> None
     assert onset_of(y, 10, 1.0, DT).side is Side.SENSOR_OR_ACTUATOR
     y[200:] -= 1.0
     assert onset_of(y, 200, 1.0, DT).side is Side.SENSOR
+
+
+def test_a_controller_of_this_mission_alone_that_calls_most_of_it_faulty_is_not_believed(
+    monkeypatch: pytest.MonkeyPatch, model: DriveModel
+) -> None:
+    every = [
+        replace(f, start=100, stop=1400)
+        for f in assess_drive(written(mission(5), FaultMode.NOISY), LIMITS)[0].findings[:1]
+    ]
+    assert every
+    monkeypatch.setattr("diagnosis.drives.assess.find_rows", lambda pair, limits: (every, np.zeros(SIZE), 0))
+    own, known = assess_drive(mission(5), LIMITS), assess_drive(mission(5, model=model), LIMITS)
+    assert [share(a, State.NOT_ASSESSED) for a in own] == [1.0, 1.0]
+    assert "explains less than half" in own[0].reasons[State.NOT_ASSESSED]
+    assert share(known[0], State.NOISY) > 0.8

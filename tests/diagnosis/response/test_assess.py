@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from numpy.typing import NDArray
@@ -109,6 +111,8 @@ def test_commands_that_go_elsewhere_are_told_and_blame_no_wheel() -> None:
     j = judged(measured, asked, body)
     assert findings(j) == []
     assert any("all drives together did something else" in n for n in j.parts["FR"][0].notes)
+    assert len(j.events) == 1
+    assert "no {wheel} is blamed" in j.events[0]
 
 
 @pytest.mark.parametrize("scale", [0.5, 0.7, 1.5])
@@ -192,3 +196,20 @@ def test_drives_that_make_nothing_of_their_commands_are_told_and_blame_no_wheel(
     )
     assert findings(j) == []
     assert any("nothing relates the two" in e for e in j.events)
+
+
+@pytest.mark.parametrize(("others", "told"), [(True, True), (False, False)])
+def test_a_channel_that_falls_silent_while_others_go_on_is_the_sensors_fault(others: bool, told: bool) -> None:
+    measured, asked, body = speeds(41)
+    data = followers_of(measured, asked, body)
+    first, last = 1200, 1400
+    for w, d in data.items():
+        if w == "FL" or not others:
+            d.y[first:last] = np.nan
+            d.fresh[first:last] = False
+    if others:  # as `followers` finds it by what is recorded beside it
+        data["FL"] = replace(data["FL"], lost=((first, last),))
+    parts = assess_response(data, geometry(), None, Limits(), DT).parts
+    found = [f for f in parts["FL"][0].findings if f.mode is FaultMode.NO_SIGNAL]
+    assert [(f.start, f.stop, f.side) for f in found] == ([(first, last, Side.SENSOR)] if told else [])
+    assert all(not parts[w][0].findings for w in ("FR", "RR", "RL"))

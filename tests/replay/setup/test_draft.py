@@ -279,3 +279,15 @@ def test_every_channel_is_listed_with_unit_range_and_signals(tmp_path: Path) -> 
     assert speed.low < speed.high
     assert rows["/cmd_vel.linear.x"].could_be == ("cmd.v",)
     assert (rows["/imu.linear_acceleration.z"].unit, rows["/imu.linear_acceleration.z"].could_be) == ("m/s^2", ())
+
+
+def test_the_wheel_of_a_tricycle_is_found(tmp_path: Path) -> None:
+    draft = drafted(tmp_path, Robot(wheels={"front_wheel_joint": (0.5, 0.0)}))
+    assert draft.machine.wheels == ("D",)
+    assert draft.machine.signals["wheel.D.v"].field == "velocity[front_wheel_joint]"
+
+
+def test_joints_of_a_description_are_found_by_their_positions(tmp_path: Path) -> None:
+    places = {"rear_left_wheel_joint": (0.0, TRACK / 2), "rear_right_wheel_joint": (0.0, -TRACK / 2)}
+    draft = drafted(tmp_path, Robot(wheels=places, description=urdf(places), positions=True))
+    assert draft.machine.signals["wheel.L.v_position"].derivative

@@ -1,0 +1,130 @@
+"""Wheel radius and track by what measures the body itself: odometry or GNSS beside the wheels, the yaw rate beside the two sides."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from replay.log.source_options import SignalSource
+from replay.machine.geometry import WheelGeometry
+from replay.setup.motion import held
+from replay.signals.signal import Signal, Signals
+
+Array = NDArray[np.float64]
+
+_STEP_S = 0.1
+_MOST_S = 0.5  # by which one channel may come later than the other
+_LEAST_S = 10.0  # of motion
+_MOVES = 0.2  # of the largest speed
+_TRIMMED = 0.2  # of the moments are left out that fit worst, twice: slip, faults, jumps of a position
+_SOUND = 0.95  # share of the rest that the fit must explain
+_SPEEDS = (("odom.v", "odometry"), ("gnss.speed", "GNSS"))
+
+
+class Measured(NamedTuple):
+    """A length [m] and what it is by."""
+
+    length: float
+    by: str
+
+
+def radius_by_body(
+    found: Signals, wheels: Sequence[str], fixed: Sequence[str], origins: Mapping[str, SignalSource]
+) -> Measured | None:
+    """Wheel radius that makes the mean of the wheels the measured speed of the body; None where nothing measures it.
+
+    Odometry that the robot computes from its wheels tells the radius that its own software has.
+
+    Parameters
+    ----------
+    found : Signals
+        With rotations of the wheels in rad/s.
+    wheels, fixed : Sequence[str]
+        Wheels whose rotation is known, and those of them that no axle steers, which are preferred.
+    origins : Mapping[str, SignalSource]
+        Of all signals, with a negative gain where a wheel counts backwards.
+    """
+    names = [f"wheel.{w}.v" for w in (fixed or wheels) if f"wheel.{w}.v" in found.items]
+    for name, by in _SPEEDS:
+        body = found.items.get(name)
+        if body is None or not names:
+            continue
+        at = _moments([*(found.items[n] for n in names), body])
+        mean = np.mean([_forward(found.items[n], origins, at) for n in names], axis=0)
+        if name == "gnss.speed":
+            mean = np.abs(mean)
+        gain = _gain(mean, held(body, at))
+        if gain is not None and gain > 0.0:
+            return Measured(gain, by)
+    return None
+
+
+def track_by_yaw(
+    found: Signals, places: Mapping[str, WheelGeometry], radius: float, origins: Mapping[str, SignalSource]
+) -> Measured | None:
+    """Track that makes what right wheels run faster than left ones the measured yaw rate; None where nothing measures it.
+
+    Of a machine that skids it is the track of one that turned so without skidding.
+
+    Parameters
+    ----------
+    found : Signals
+        With rotations of the wheels in rad/s.
+    places : Mapping[str, WheelGeometry]
+        Which wheels are fixed, and on which side.
+    radius : float
+        Of the wheels [m].
+    origins : Mapping[str, SignalSource]
+        As for `radius_by_body`.
+    """
+    yaw = found.items.get("imu.yaw_rate")
+    sides = [
+        [found.items[n] for w, p in places.items() if p.axle == "fixed" and sign * p.y > 0 and (n := f"wheel.{w}.v") in found.items]
+        for sign in (1.0, -1.0)
+    ]  # fmt: skip
+    if yaw is None or not all(sides):
+        return None
+    at = _moments([yaw, *sides[0], *sides[1]])
+    left, right = (np.mean([_forward(s, origins, at) for s in side], axis=0) for side in sides)
+    gain = _gain(held(yaw, at), radius * (right - left))
+    return Measured(abs(gain), "the yaw rate") if gain is not None else None
+
+
+def _forward(signal: Signal, origins: Mapping[str, SignalSource], at: NDArray[np.int64]) -> Array:
+    """Rotation at some moments, positive forward."""
+    origin = origins.get(signal.name, signal.origin)
+    return held(signal, at) * (1.0 if origin.gain * signal.origin.gain > 0.0 else -1.0)
+
+
+def _moments(signals: Sequence[Signal]) -> NDArray[np.int64]:
+    """Moments at which all of some signals were recorded."""
+    first, last = max(int(s.stamps[0]) for s in signals), min(int(s.stamps[-1]) for s in signals)
+    return np.arange(first, last, round(_STEP_S * 1e9), dtype=np.int64)
+
+
+def _gain(x: Array, y: Array) -> float | None:
+    """Share of x that y is, by least trimmed squares at the delay that fits best; None where y is no share of x."""
+    most = round(_MOST_S / _STEP_S)
+    best: tuple[float, float] | None = None
+    for late in range(-most, most + 1):
+        a, b = (x[: x.size - late], y[late:]) if late >= 0 else (x[-late:], y[:late])
+        known = np.isfinite(a) & np.isfinite(b)
+        a, b = a[known], b[known]
+        moving = np.abs(a) > _MOVES * float(np.quantile(np.abs(a), 0.95)) if a.size else np.zeros(0, np.bool_)
+        if np.count_nonzero(moving) * _STEP_S < _LEAST_S:
+            continue
+        a, b = a[moving], b[moving]
+        kept = np.ones(a.size, np.bool_)
+        gain = 0.0
+        for _ in range(3):
+            gain = float(a[kept] @ b[kept] / (a[kept] @ a[kept]))
+            off = np.abs(b - gain * a)
+            kept = off <= np.quantile(off, 1.0 - _TRIMMED)
+        spread = float(b[kept] @ b[kept])
+        sound = 1.0 - float(off[kept] @ off[kept]) / spread if spread > 0.0 else 0.0
+        if best is None or sound > best[0]:
+            best = sound, gain
+    return best[1] if best is not None and best[0] >= _SOUND else None
