@@ -66,7 +66,7 @@ def test_a_newest_mission_that_was_not_judged_is_no_leave(
 
 def test_an_earlier_mission_that_was_not_judged_takes_nothing_away(tmp_path: Path) -> None:
     d = document(tmp_path, Sample("d0", verdict="not_assessed"), *READY[1:])
-    assert d["verdict"]["title"] == "The machine is ready"
+    assert d["verdict"]["title"] == "The machine may go out"
 
 
 @pytest.mark.parametrize(("day", "verdict"), [(0.9, "ready"), (1.1, "not_assessed")])
@@ -226,14 +226,14 @@ def test_a_damaged_log_is_no_work_to_do(tmp_path: Path) -> None:
         Sample("b", "M2"),
         Sample("c", "M3", verdict="stop", faults=[Fault()]),
     )
-    assert d["verdict"]["title"] == "1 of 3 machines needs work, 1 has a damaged log"
+    assert d["verdict"]["title"] == "1 of 3 machines must not go out, 1 may go out, of 1 it is not known"
     standing = {m["id"]: m["standing"] for m in d["machines"]}
     assert standing["M1"] == "No fault found, but its last log is damaged"
     d = document(tmp_path / "two", Sample("a", "M1", verdict="watch"), Sample("b", "M2"))
-    assert d["verdict"]["title"] == "1 of 2 machines is ready, 1 has a damaged log"
+    assert d["verdict"]["title"] == "1 of 2 machines may go out, of 1 it is not known"
     assert (d["verdict"]["status"], d["verdict"]["tag"]) == ("watch", "1 machine: damaged logs")
     d = document(tmp_path / "one", Sample("a", "M1", verdict="watch"))
-    assert d["verdict"]["title"] == "The machine is not known to be ready"
+    assert d["verdict"]["title"] == "It is not known whether the machine may go out"
 
 
 def test_a_file_that_was_left_out_is_no_damage(tmp_path: Path) -> None:
@@ -241,7 +241,7 @@ def test_a_file_that_was_left_out_is_no_damage(tmp_path: Path) -> None:
     d = document(tmp_path, Sample("a", "M1", state="degraded", verdict="watch", reason=reason), Sample("b", "M2"))
     standing = {m["id"]: m["standing"] for m in d["machines"]}
     assert standing["M1"] == "No fault found, but a file of its last log was left out"
-    assert d["verdict"]["title"] == "1 of 2 machines is ready, 1 has a log without one of its files"
+    assert d["verdict"]["title"] == "1 of 2 machines may go out, of 1 it is not known"
     assert d["verdict"]["tag"] == "1 machine: files left out"
 
 
