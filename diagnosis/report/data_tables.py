@@ -10,6 +10,7 @@ from diagnosis.report.judged_parts import kind_of
 from diagnosis.results.clearing import size_words
 from diagnosis.results.document import (
     FileRow,
+    IntervalRow,
     MissingRow,
     ReportDocument,
     SignalRow,
@@ -18,11 +19,13 @@ from diagnosis.results.fault_rows import state_label
 from diagnosis.results.left_out import only_left_out
 from diagnosis.results.loop_rows import LoopRow, MetricsRow
 from diagnosis.results.machine_words import MachineWords, words_of
-from replay.faults import FAULT_STATES, UNDECIDED, State
+from replay.faults import FAULT_STATES, UNDECIDED, Side, State
 from replay.machine.quantities import OPENING
 
 #: What the template is given.
 Context = dict[str, Any]
+
+_TOLD_S = 0.1  # of a fault in which nothing of it shows, from which on that is worth a word
 
 
 def coverage_rows(report: ReportDocument) -> list[Context]:
@@ -44,10 +47,23 @@ def coverage_rows(report: ReportDocument) -> list[Context]:
                 "open": total - healthy - faulty,
                 "driving": row["decided_driving_s"],
                 "loss": loss.get(key, ""),
-                "why": why.get(key, []),
+                "why": [*why.get(key, []), *_unseen(report["intervals"], key, faulty)],
             }
         )
     return rows
+
+
+def _unseen(faults: Sequence[IntervalRow], part: tuple[str, str], seen_s: float) -> list[str]:
+    """How long the faults of a part last, where that is longer than it was seen to be faulty: between its traces it may not be judged."""
+    mine = sorted(
+        (f["start_s"], f["stop_s"]) for f in faults if f["component"] == part[0] and part[1] in Side(f["side"]).sides
+    )
+    lasting, end = 0.0, 0.0
+    for start, stop in mine:
+        lasting += max(0.0, stop - max(start, end))
+        end = max(end, stop)
+    rest = lasting - seen_s
+    return [f"{rest:.1f} s of the {lasting:.1f} s that its faults last show nothing of them"] if rest >= _TOLD_S else []
 
 
 def check_rows(report: ReportDocument) -> list[Context]:

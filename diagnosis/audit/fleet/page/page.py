@@ -62,7 +62,7 @@ _DEFINITIONS = (
     "Counted: missions with a report. A copy of a log, a log that was not read and one that is not audited yet are missions that "
     "do not count in machines, faults and trends.",
     "Assessed: judged for the seconds that the verdict “ready” takes, and for four fifths of its driving.",
-    "Trend: weighted line through the missions' ε̂ over time; the spread from mission to mission is estimated with it. "
+    "Trend: weighted line through the missions' ε̂ over time, each over its whole mission, while a fault's ε̂ is that of the fault's own time; the spread from mission to mission is estimated with it. "
     "Outliers (×) are excluded. A step or bend (↓ ↑ ∠), such as a repair, starts a new line. "
     "The band is its 90 % interval, the bar on the limit the 90 % interval of the crossing.",
     "A forecast needs five missions since the last change, and reaches at most three times as far ahead as the time that "
