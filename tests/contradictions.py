@@ -17,6 +17,7 @@ from diagnosis.results.machine_words import HYDRAULIC
 from diagnosis.results.vocabulary import Severity
 from replay.machine.quantities import OPENING
 from tests.plot_contradictions import of_faults, of_states
+from tests.word_slips import slips
 
 _TOTAL = ("stuck", "no_signal")
 _AT_RISK = 0.75
@@ -34,7 +35,14 @@ def contradictions(report: Mapping[str, Any], columns: Mapping[str, NDArray[Any]
     columns : Mapping[str, NDArray] or None
         Columns of its plots, with ``t``: every sample of a short mission.
     """
-    out = [*_verdict(report), *_actions(report), *_coverage(report), *_open(report), *_terminal(report)]
+    out = [
+        *_verdict(report),
+        *_actions(report),
+        *_coverage(report),
+        *_open(report),
+        *_terminal(report),
+        *slips(report),
+    ]
     for fault in report["intervals"]:
         name = f"{fault['id']} {fault['component']} {fault['side']} {fault['mode']}"
         out += [f"{name}: {text}" for text in (*_chances(fault), *_sizes(fault), *_urgency(fault, report))]

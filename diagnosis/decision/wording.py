@@ -103,7 +103,8 @@ def _lost(faults: Sequence[FaultInterval]) -> str:
         return ""
     if len(known) == 1:
         value, low, high = (f"{100 * x:.0f}" for x in (known[0].value, known[0].low, known[0].high))
-        return f" ({value} % lost, 95 % bounds {low} to {high} %)"
+        bounds = f", 95 % bounds {low} to {high} %" if low != high else ""  # which the rounding holds
+        return f" ({value} % lost{bounds})"
     span = dict.fromkeys(f"{100 * x:.0f}" for x in (min(e.value for e in known), max(e.value for e in known)))
     return f" ({' to '.join(span)} % lost{', from fault to fault' if len(span) > 1 else ''})"
 

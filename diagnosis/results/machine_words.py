@@ -7,6 +7,7 @@ unit of speed to a reader asks this table, which is made from the machine file a
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
@@ -133,6 +134,8 @@ class MachineWords:
         """A value with its unit, to follow a verb: ``0.31 m/s``, ``2.1 % of opening``."""
         if unit == OPENING:
             return f"{plain(100 * value, digits)}{self.percent}"
+        if unit == "rad":
+            return f"{plain(math.degrees(value), digits)}°"
         return f"{plain(value, digits)} {self.unit(unit)}".rstrip()
 
     def fill(self, text: str) -> str:
