@@ -148,7 +148,7 @@ def decide(
         hints=tuple(hints),
         open_state=open_state or {},
     )
-    open_points = to_clear(against, assessments, decided_s, driven, axles, limits)
+    open_points = to_clear(against, assessments, decided_s, driven, axles, limits, intervals)
     found = _with_faults(intervals, against) or _without_faults(assessments, decided_s, axles, against)
     if found.status is Verdict.NOT_ASSESSED and open_points:
         found = replace(found, text=f"{found.text} To clear it: {open_points[0].act}.")

@@ -8,6 +8,7 @@ from typing import Any
 from diagnosis.pages.labels import bounded, grouped, number
 from diagnosis.report.judged_parts import kind_of
 from diagnosis.results.clearing import size_words
+from diagnosis.results.clearing_rows import ClearingRow
 from diagnosis.results.document import (
     FileRow,
     IntervalRow,
@@ -25,6 +26,7 @@ from replay.machine.quantities import OPENING
 #: What the template is given.
 Context = dict[str, Any]
 
+_AFTER_S = 0.5  # of a fault, in which it still shows in checks
 _TOLD_S = 0.1  # of a fault in which nothing of it shows, from which on that is worth a word
 
 
@@ -53,6 +55,15 @@ def coverage_rows(report: ReportDocument) -> list[Context]:
     return rows
 
 
+def _meanwhile(report: ReportDocument, check: ClearingRow) -> str:
+    """The faults during which a check that does not pass deviates most, to follow its time."""
+    start, stop = check["start_s"], check["stop_s"]
+    if check["passed"] or start is None or stop is None:
+        return ""
+    names = [f["id"] for f in report["intervals"] if f["start_s"] < stop and f["stop_s"] + _AFTER_S > start]
+    return f", during {', '.join(names)}" if names else ""
+
+
 def _unseen(faults: Sequence[IntervalRow], part: tuple[str, str], seen_s: float) -> list[str]:
     """How long the faults of a part last, where that is longer than it was seen to be faulty: between its traces it may not be judged."""
     mine = sorted(
@@ -78,7 +89,7 @@ def check_rows(report: ReportDocument) -> list[Context]:
                 "asked": c["asked"],
                 "worst": "not shown" if c["worst"] is None else size_words(c["check"], c["worst"]),
                 "limit": size_words(c["check"], c["limit"]),
-                "when": "" if start is None or stop is None else f"{start:.1f}–{stop:.1f} s",
+                "when": "" if start is None or stop is None else f"{start:.1f}–{stop:.1f} s{_meanwhile(report, c)}",
                 "shows": "" if c["shows"] is None else f"from {100 * c['shows']:.0f} %",
             }
         )
