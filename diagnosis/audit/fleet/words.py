@@ -60,7 +60,7 @@ def forecast_words(f: Forecast, limit: float, axis: Axis = "hours") -> str:
     if f.state == "not_known":
         return f"not known: {f.why}"
     if f.state == "above":
-        return f"already at the limit of {round_to(limit)}"
+        return f"already above the limit of {round_to(limit)}"
     if f.state == "not_within" or f.soonest is None:
         return f"does not reach the limit of {round_to(limit)} within {round_to(f.horizon)} {unit}"
     if f.latest is None:
@@ -210,8 +210,9 @@ def sentences(
         out.append(f"{m.label}: the loss of the {m.limits.words.part_words(t.kind, t.component, t.side)} {words}.")
     unread, open_, pending = failed
     if unread or open_:
-        both = f": {unread} not read, {open_} read but not assessed" if unread and open_ else ""
-        out.append(f"{count(unread + open_, 'log')} could not be read or judged{both}.")
+        said = [f"{count(unread, 'log')} could not be read"] if unread else []
+        said += [f"{count(open_, 'mission')} {_was(open_)} read, but not assessed"] if open_ else []
+        out.append(f"{'; '.join(said)}.")
     if unknown and any(m.verdict is not Verdict.READY for m in machines):  # else the headline says so
         out.append(
             f"{count(unknown, 'log')} {_was(unknown)} not judged and may be of a machine that is shown as ready."

@@ -213,8 +213,8 @@ def _kpis(document: ShownDocument) -> list[tuple[str, str, str]]:
         for n, words in (
             (c["not_assessed"], "not assessed"),
             (c["pending"], MissionState.PENDING.words),
-            (c["copies"], "copies"),
-            (c["gone"], "logs no longer there"),
+            (c["copies"], "copy" if c["copies"] == 1 else "copies"),
+            (c["gone"], "log no longer there" if c["gone"] == 1 else "logs no longer there"),
         )
         if n
     ]

@@ -24,7 +24,8 @@ def interest(t: TrendRow) -> tuple[bool, float, float]:
 
 def level_words(t: TrendRow) -> str:
     """Loss of the last mission, as its report has it, and where the losses go."""
-    return f"ε̂ {t['points'][-1][2]:.2f} in its last mission".replace("-", "−") + (
+    last = round(t["points"][-1][2], 2) + 0.0  # no negative zero
+    return f"ε̂ {last:.2f} in its last mission".replace("-", "−") + (
         f", {t['direction']}" if t["direction"] != "not_known" else ""
     )
 

@@ -194,7 +194,7 @@ def test_logs_not_read_and_missions_not_assessed_are_both_counted(tmp_path: Path
     bad = [Sample(f"u{k}", state="unreadable") for k in range(2)]
     open_ = [Sample(f"n{k}", day=k + 1.0, verdict="not_assessed") for k in range(2)]
     text = document(tmp_path, Sample("a"), *bad, *open_)["verdict"]["text"]
-    assert "4 logs could not be read or judged: 2 not read, 2 read but not assessed." in text
+    assert "2 logs could not be read; 2 missions were read, but not assessed." in text
 
 
 @pytest.mark.parametrize(("n", "more"), [(5, ""), (12, ""), (15, " and 3 more: listed below")])
