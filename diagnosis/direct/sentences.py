@@ -65,8 +65,9 @@ def _values(isolated: Isolated, found: IdentifiedPair, epsilon: Epsilon | None, 
             if seen.still
             else f"moved over {amount(float(np.ptp(x)), pair.unit, 2)}"
         )
+        inner = y[1:-1] if y.size > 4 else y  # the first and the last sample may be beside it
         return [
-            f"{pair.y_name} stayed within {amount(float(np.ptp(y)), pair.unit, 2)} of {amount(float(np.mean(y)), pair.unit)} "
+            f"{pair.y_name} stayed within {amount(float(np.ptp(inner)), pair.unit, 2)} of {amount(float(np.mean(y)), pair.unit)} "
             f"for {seconds:.3f} s while {pair.x_name} {other}."
         ]
     if epsilon is None:

@@ -236,6 +236,43 @@ def test_a_damaged_log_is_no_work_to_do(tmp_path: Path) -> None:
     assert d["verdict"]["title"] == "It is not known whether the machine may go out"
 
 
+@pytest.mark.parametrize(
+    ("verdicts", "title"),
+    [
+        (["ready"], "The machine may go out"),
+        (["stop"], "The machine must not go out"),
+        (["ready", "ready", "ready"], "All 3 machines may go out"),
+        (["stop", "stop"], "Both machines must not go out"),
+        (["stop", "ready", "not_assessed"], "1 of 3 machines must not go out, 1 may go out, of 1 it is not known"),
+        (["not_assessed", "not_assessed"], "Both machines need a look: whether they may go out is not known"),
+    ],
+)
+def test_the_headline_counts_machines_as_the_lists_do(tmp_path: Path, verdicts: list[str], title: str) -> None:
+    stuck = [Fault(mode="stuck", severity="high")]
+    d = document(
+        tmp_path,
+        *(Sample(f"{k}", f"M{k}", verdict=v, faults=stuck if v == "stop" else []) for k, v in enumerate(verdicts)),
+    )
+    assert d["verdict"]["title"] == title
+
+
+def test_missions_that_count_are_told_from_all(tmp_path: Path) -> None:
+    d = document(
+        tmp_path,
+        Sample("a", copies=["copy"]),
+        Sample("b", day=1.0),
+        Sample("c", state="unreadable"),
+        Sample("d", state=None),
+    )
+    assert (d["counts"]["missions"], d["counts"]["counted"]) == (5, 2)
+    assert "5 missions, 2 of them counted" in build_fleet_page(d)
+
+
+def test_parts_that_the_last_mission_did_not_assess_are_named(tmp_path: Path) -> None:
+    d = document(tmp_path, Sample("a"), Sample("b", day=1.0, blind=[("rear", "sensor"), ("RL", "actuator")]))
+    assert "RL drive valve and rear steering sensor – <a" in build_fleet_page(d)
+
+
 def test_a_file_that_was_left_out_is_no_damage(tmp_path: Path) -> None:
     reason = "plc.csv was left out: its clock could not be compared with a.mcap: nothing in common"
     d = document(tmp_path, Sample("a", "M1", state="degraded", verdict="watch", reason=reason), Sample("b", "M2"))
