@@ -53,7 +53,7 @@ def require_use(files: Sequence[ReadFile], signals: Signals) -> None:
         With the columns of tables that hold no signal, or the file that adds none.
     """
     if not signals.items and all(t.encoding == "table" for f in files for t in f.summary.topics):
-        columns = [c for f in files for t in f.summary.topics for c in t.fields]
+        columns = [c for f in files for t in f.summary.topics for c in t.fields if c.strip()]
         shown = f" ({', '.join(columns[:_SHOWN])}{' …' if len(columns) > _SHOWN else ''})" if columns else ""
         raise LogError(
             f"{', '.join(str(f.path) for f in files)}: no wheel signal: no column{shown} is called like a signal of a machine "

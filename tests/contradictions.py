@@ -17,6 +17,7 @@ from diagnosis.results.machine_words import HYDRAULIC
 from diagnosis.results.vocabulary import Severity
 from replay.machine.quantities import OPENING
 from tests.plot_contradictions import of_faults, of_states
+from tests.word_slips import slips
 
 _TOTAL = ("stuck", "no_signal")
 _AT_RISK = 0.75
@@ -34,7 +35,14 @@ def contradictions(report: Mapping[str, Any], columns: Mapping[str, NDArray[Any]
     columns : Mapping[str, NDArray] or None
         Columns of its plots, with ``t``: every sample of a short mission.
     """
-    out = [*_verdict(report), *_actions(report), *_coverage(report), *_open(report), *_terminal(report)]
+    out = [
+        *_verdict(report),
+        *_actions(report),
+        *_coverage(report),
+        *_open(report),
+        *_terminal(report),
+        *slips(report),
+    ]
     for fault in report["intervals"]:
         name = f"{fault['id']} {fault['component']} {fault['side']} {fault['mode']}"
         out += [f"{name}: {text}" for text in (*_chances(fault), *_sizes(fault), *_urgency(fault, report))]
@@ -66,6 +74,12 @@ def _verdict(report: Mapping[str, Any]) -> Iterator[str]:
             yield "not cleared, and nobody is told what would clear it"
     if verdict["status"] == "not_assessed" and len(re.findall(r"[.](?= [A-Z]|$)", verdict["text"])) > 2:
         yield f"more than two sentences: {verdict['text']!r}"
+    parts = {(f["component"], f["side"]) for f in faults if f["severity"] != "info"}
+    on = re.search(r", on (\d+) parts?$", verdict["title"])
+    if _counted_on(on, high + watch) != len(parts) and verdict["status"] in ("stop", "watch"):
+        yield f"title {verdict['title']!r}, and faults on {len(parts)} parts"
+    if len(verdict["actions"]) != len(parts):
+        yield f"{len(verdict['actions'])} things to do for {len(parts)} parts"
     counts = [
         int(n)
         for n in re.findall(r"(\d+) faults? to repair|(\d+) (?:faults? )?to watch", verdict["title"])
@@ -77,6 +91,11 @@ def _verdict(report: Mapping[str, Any]) -> Iterator[str]:
     open_checks = [c for c in report.get("clearing", []) if not c["passed"]]
     if verdict["cleared"] and open_checks:
         yield f"cleared with {len(open_checks)} open checks"
+
+
+def _counted_on(on: re.Match[str] | None, faults: int) -> int:
+    """Parts that a title counts; as many as faults where it does not say."""
+    return int(on.group(1)) if on else faults
 
 
 def _actions(report: Mapping[str, Any]) -> Iterator[str]:
@@ -92,7 +111,7 @@ def _actions(report: Mapping[str, Any]) -> Iterator[str]:
             named[f] = named.get(f, 0) + 1
     for action in report["verdict"]["actions"]:
         sizes = [faults[f]["epsilon"]["value"] for f in action["faults"] if faults[f]["epsilon"]]
-        for found in re.finditer(r"\((?:(\d+) to )?(\d+) % lost\)", action["text"]):
+        for found in re.finditer(r"\((?:(\d+) to )?(\d+) % lost\b", action["text"]):
             said = [int(x) for x in found.groups() if x]
             if not all(any(abs(x - 100 * size) <= 0.6 for size in sizes) for x in said):
                 yield f"action {action['n']} says {found.group(0)!r}, its faults {[round(100 * x) for x in sizes]} %"
@@ -161,7 +180,8 @@ def _sizes(fault: Mapping[str, Any]) -> Iterator[str]:
             yield f"ε̂ from {epsilon['low']:.2f} to {epsilon['high']:.2f}"
         if fault["mode"] != "outside_table" and epsilon["high"] <= 0.0:
             yield "a fault that for certain takes nothing away"
-        if fault["mode"] in _TOTAL and epsilon["low"] <= 0.0 and fault["probability"] > 0.9:
+        healthy = sum(h["p"] for h in fault["hypotheses"] if h["mode"] == "healthy")
+        if fault["mode"] in _TOTAL and epsilon["low"] <= 0.0 and healthy < 0.05:
             yield f"{fault['mode']} with {fault['probability']:.2f}, and bounds of ε̂ that hold a healthy part"
         if fault["mode"] == "no_signal" and epsilon["value"] < 0.9:
             yield f"no signal with ε̂ {epsilon['value']:.2f}"

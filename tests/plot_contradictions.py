@@ -40,8 +40,9 @@ def of_faults(
             if not np.allclose(drawn, said, atol=1e-3, equal_nan=True):
                 yield f"its plot shows {leaf} from {np.nanmin(drawn):.2f} to {np.nanmax(drawn):.2f}, its table {said:.2f}"
         chance = columns.get(base + "probability")
-        # an onset is where a channel began to hold, which shows only later
-        late = inside & _rows(columns, 0.5 * (fault["start_s"] + fault["stop_s"]), fault["stop_s"])
+        # an onset is where a channel began to hold, which shows only later: from its detection on, where that is told
+        seen = max(0.5 * (fault["start_s"] + fault["stop_s"]), fault["detected_s"] or 0.0)
+        late = inside & _rows(columns, seen, fault["stop_s"])
         if chance is not None and fault["severity"] != "info" and np.isfinite(chance[late]).any():
             both = [columns.get(f"evidence.{fault['component']}.{s}.probability", chance)[late] for s in _sides(fault)]
             mean = float(

@@ -13,7 +13,7 @@ from rich.text import Text
 
 from cli.tables.layout import bullets, key_values, section, table, text
 from cli.tables.looks import verdict_style
-from diagnosis.audit.fleet.leave import Leave
+from diagnosis.audit.fleet.may_leave import Leave
 from diagnosis.audit.store.outcome import ENDS, READ, MissionState
 from diagnosis.results.vocabulary import Verdict
 

@@ -132,11 +132,14 @@ class Rates(NamedTuple):
 
 
 def rates_of(cells: Cells, rate: Array, opening: Array) -> Rates:
-    """Steering rates per opening beyond what of it moves nothing; arrays (cells, axles)."""
+    """Steering rates per opening beyond what of it moves nothing, while no fault is stated; arrays (cells, axles)."""
     dead = np.array([min(_longest_still(cells, j)[0], _WIDEST) for j in range(rate.shape[1])])
     frame = Frame(cells.size, max(1, round(_RATE_S / cells.dt)), cells.frame.hop)
     beyond = np.maximum(np.abs(opening) - np.nan_to_num(dead), 0.0)
-    steered = np.isfinite(rate) & (np.nan_to_num(beyond) > _STEERED)
+    told = np.zeros(rate.shape, dtype=np.bool_)
+    for k, axle in enumerate(cells.machine.axles):
+        told[:, k] = cells.told(axle) & ~cells.mostly_explained(axle)
+    steered = np.isfinite(rate) & (np.nan_to_num(beyond) > _STEERED) & ~told
     ahead = np.where(steered, rate * np.sign(opening), 0.0)
     opened = np.where(steered, beyond, 0.0)
     time = frame.sums(steered.astype(np.float64)) * cells.dt

@@ -71,6 +71,13 @@ class Cells:
             out |= (stops > a) & (starts < b)
         return out
 
+    def told(self, component: str) -> NDArray[np.bool_]:
+        """Cells in which a fault of the component is stated, and those beside them, shape (cells,)."""
+        out = np.zeros(self.size, dtype=np.bool_)
+        for a, b in self.stated.get(component, ()):
+            out[max(0, int(a / self.dt) - 1) : int(np.ceil(b / self.dt)) + 1] = True
+        return out
+
     def mostly_explained(self, component: str) -> bool:
         """Whether faults of the component are stated for so long that its usual behaviour is theirs."""
         return bool(self.explained(component).mean() > _MOSTLY)

@@ -138,7 +138,7 @@ def _wheels(cells: Cells) -> Iterator[Gauges]:
             continue
         twice, measured = _known(a) and _known(u), _known(x)
         motion = np.where(np.isfinite(cells.reference[:, i]), cells.reference[:, i], v)
-        moving = (np.abs(motion) > wheels.MOVING * top / 0.36) & ~_stated(cells, name)
+        moving = (np.abs(motion) > wheels.MOVING * top / 0.36) & ~cells.told(name)
         ratio = None
         lasting: dict[Deviation, float] = {}
         if _known(used[:, i]) and speed.shape[1] > wheels.OTHERS and (follows or not (twice and measured)):
@@ -178,7 +178,7 @@ def _axles(cells: Cells) -> Iterator[Gauges]:
         if not _known(phi):
             continue
         twice, measured = _known(a) and _known(u), _known(x)
-        moving = (rates.weight[:, j] != 0.0) & ~_stated(cells, name)
+        moving = (rates.weight[:, j] != 0.0) & ~cells.told(name)
         ratio = None
         lasting: dict[Deviation, float] = {}
         if _known(used[:, j]):
@@ -227,15 +227,6 @@ def _reference(cells: Cells, component: str, pair: tuple[Array, Array, float], l
     """A channel, its reference and its floor; nothing where a fault is stated."""
     found = compared(cells, *pair)
     return Reference(found._replace(moves=found.moves & ~cells.explained(component)), limit)
-
-
-def _stated(cells: Cells, component: str) -> NDArray[np.bool_]:
-    """Cells in which a fault of the component is stated."""
-    at = np.arange(cells.size) * cells.dt
-    out = np.zeros(cells.size, dtype=np.bool_)
-    for start, stop in cells.stated.get(component, ()):
-        out |= (at + cells.dt > start) & (at < stop)
-    return out
 
 
 def _known(x: Array) -> bool:

@@ -144,7 +144,8 @@ def _axle(check: Checked, cells: Cells) -> Finding:
         f"The {check.component} axle stands still while its {{valve}} is commanded to {100 * check.worst:.0f}{{percent}}; a healthy one "
         f"moves from {100 * check.limit:.0f}{{percent}} on."
     )
-    return _finding((start, stop), FaultMode.NO_SIGNAL, Epsilon(1.0, 0.0, 1.0), (text, _UNTOLD))
+    least = max(0.0, 1.0 - check.limit / check.worst)  # what is left of the command moves no axle
+    return _finding((start, stop), FaultMode.NO_SIGNAL, Epsilon(1.0, least, 1.0), (text, _UNTOLD))
 
 
 def _finding(span: tuple[int, int], mode: FaultMode, size: Epsilon, evidence: tuple[str, ...]) -> Finding:

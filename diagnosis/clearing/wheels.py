@@ -170,19 +170,21 @@ def responses_of(cells: Cells, speed: Array, opening: Array, reference: Array) -
     ahead = frame.mean(np.sign(np.nan_to_num(motion))) >= 0.0
     off = np.full(log.shape, np.nan)
     lasting: list[Usual] = []
-    for i in range(log.shape[1]):
+    for i, wheel in enumerate(cells.machine.wheels):
+        told = cells.explained(wheel) if not cells.mostly_explained(wheel) else np.zeros(len(log), dtype=np.bool_)
+        own = np.where(told, np.nan, log[:, i])  # what a stated fault makes of the wheel is not what is usual
         usual: list[float] = []
         ways: list[float | None] = []
         for way in (ahead[:, i], ~ahead[:, i]):
             ways.append(None)
-            here = way & np.isfinite(log[:, i])
+            here = way & np.isfinite(own)
             if here.any():
-                middle = float(np.median(log[here, i]))
-                off[here, i] = log[here, i] - middle
+                middle = float(np.median(own[here]))
+                off[way, i] = log[way, i] - middle
                 if np.count_nonzero(here) * frame.hop * cells.dt >= 3.0:
                     usual.append(middle)
                     ways[-1] = middle
-        changed = _CHANGED * _change(log[:, i], [ahead[:, i], ~ahead[:, i]])
+        changed = _CHANGED * _change(own, [ahead[:, i], ~ahead[:, i]])
         below = max(0.0, -min(usual), changed) if usual else None
         lasting.append(Usual(below, max(0.0, *usual), min(usual), max(usual), (ways[0], ways[1])) if usual else Usual())
     return Responses(off, log, lasting, np.where(settled, np.abs(speed), 0.0), ahead)

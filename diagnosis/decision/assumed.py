@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 
+from diagnosis.results.sizes import amount
 from replay.machine.config import Machine
 
 _WORDS: Mapping[str, Callable[[Machine], str]] = {
@@ -13,7 +14,7 @@ _WORDS: Mapping[str, Callable[[Machine], str]] = {
         f"top speed {m.max_speed:g} {m.speed_unit}, and with it the limits: a {m.part} is driven above "
         f"{m.limits.driving_speed:.3g} {m.speed_unit}"
     ),
-    "max_steer": lambda m: f"largest steering angle {m.max_steer:.3g} rad",
+    "max_steer": lambda m: f"largest steering angle {amount(m.max_steer, 'rad')}",
     "flow": lambda m: f"pump flow for {m.plant.flow:g} m/s over all wheels",
     "control": lambda m: (
         f"control law MFHCA with ξ = {m.control.xi:g} 1/s, β = {m.control.beta:g} 1/s, steering gain {m.control.k_ps:g} 1/rad"

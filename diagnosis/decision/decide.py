@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from diagnosis.decision.caveats import Reservations, caveats_of, doubt_of, limits_of, open_words, smallest_loads
 from diagnosis.decision.short import ToClear
 from diagnosis.decision.to_clear import to_clear
-from diagnosis.decision.wording import actions_of, count_words, join_words, seconds_words, sentence_of
+from diagnosis.decision.wording import actions_of, count_faults, join_words, seconds_words, sentence_of
 from diagnosis.results.assessed import needed_s
 from diagnosis.results.assessment import Assessment
 from diagnosis.results.clearing import Check, Checked
@@ -148,7 +148,7 @@ def decide(
         hints=tuple(hints),
         open_state=open_state or {},
     )
-    open_points = to_clear(against, assessments, decided_s, driven, axles, limits)
+    open_points = to_clear(against, assessments, decided_s, driven, axles, limits, intervals)
     found = _with_faults(intervals, against) or _without_faults(assessments, decided_s, axles, against)
     if found.status is Verdict.NOT_ASSESSED and open_points:
         found = replace(found, text=f"{found.text} To clear it: {open_points[0].act}.")
@@ -214,11 +214,16 @@ def _with_faults(intervals: Sequence[FaultInterval], against: Reservations) -> D
     stop = [f for f in intervals if f.severity is Severity.HIGH]
     watch = [f for f in intervals if f.severity in (Severity.MEDIUM, Severity.LOW)]
     if stop:
-        title = f"{count_words(len(stop), 'fault')} to repair" + (f", {len(watch)} to watch" if watch else "")
-        return Decision(Verdict.STOP, title, sentence_of(stop, against.words))
+        return Decision(Verdict.STOP, count_faults(stop, watch), sentence_of(stop, against.words))
     if watch:
-        title, doubt = f"{count_words(len(watch), 'fault')} to watch", doubt_of(watch, against)
-        return Decision(Verdict.WATCH, title, sentence_of(watch, against.words), cleared=not doubt, not_cleared=doubt)
+        doubt = doubt_of(watch, against)
+        return Decision(
+            Verdict.WATCH,
+            count_faults((), watch),
+            sentence_of(watch, against.words),
+            cleared=not doubt,
+            not_cleared=doubt,
+        )
     return None
 
 

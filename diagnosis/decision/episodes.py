@@ -1,8 +1,9 @@
 """Findings of one part that are one fault: the same row, as large, and nothing healthy seen between them.
 
 A constant loss that shows only while the wheel is driven hard is found in pieces. Between them nothing can be judged; where the part
-was seen to be healthy for longer, the pieces are faults of their own. A shorter piece beside a fault, of which no row is probable
-enough to give it a name and that may be of the row of that fault, is the end or the beginning of it.
+was seen to be healthy for longer, the pieces are faults of their own. Losses that touch are one that grows or fades. A shorter piece
+beside a fault, of which no row is probable enough to give it a name and that may be of the row of that fault, is the end or the
+beginning of it.
 """
 
 from __future__ import annotations
@@ -10,6 +11,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -129,7 +131,8 @@ def _continues(a: Finding, b: Finding, states: Mapping[str, NDArray[np.int8]], d
     sides = [states[s.value][a.stop : b.start] for s in a.side.sides if s.value in states]
     healthy = np.logical_and.reduce([np.isin(s, (CODE[State.HEALTHY], CODE[State.NO_DATA])) for s in sides])
     seen = np.count_nonzero(healthy) * dt >= _SEEN_HEALTHY_S.get(a.tier, _SEEN_BY_MODELS_S)
-    return not seen and _alike(a.epsilon, b.epsilon) and _same_value(a, b)
+    changes = a.mode is FaultMode.INEFFICIENT and (b.start - a.stop) * dt <= _TOUCHES_S  # a loss that grows or fades
+    return not seen and (changes or _alike(a.epsilon, b.epsilon)) and _same_value(a, b)
 
 
 def _alike(a: Epsilon | None, b: Epsilon | None) -> bool:
@@ -151,7 +154,8 @@ def _episode(group: Sequence[Finding], dt: float) -> Finding:
     length = np.array([f.stop - f.start for f in group], dtype=np.float64)
     longest = group[int(np.argmax(length))]
     best = max(group, key=lambda f: f.probability)
-    spans = [f"{f.start * dt:.1f}–{f.stop * dt:.1f} s" for f in group[:_NAMED]]
+    one_size = all(_alike(a.epsilon, b.epsilon) for a, b in pairwise(group))
+    spans = [f"{f.start * dt:.1f}–{f.stop * dt:.1f} s{'' if one_size else _lost(f)}" for f in group[:_NAMED]]
     more = f" and {len(group) - _NAMED} more" if len(group) > _NAMED else ""
     course = f"It shows in {len(group)} stretches ({', '.join(spans)}{more}); between them nothing healthy was seen of this part: one fault."
     known = [f.detected for f in group if f.detected is not None]
@@ -165,6 +169,11 @@ def _episode(group: Sequence[Finding], dt: float) -> Finding:
         evidence=(*longest.evidence, course),
         detected=min(known) if known else None,
     )
+
+
+def _lost(finding: Finding) -> str:
+    """How much a stretch lost, to follow its time."""
+    return "" if finding.epsilon is None else f": {100 * finding.epsilon.value:.0f} % lost"
 
 
 def _pooled(sizes: Sequence[Epsilon | None], length: NDArray[np.float64]) -> Epsilon | None:

@@ -14,12 +14,14 @@ from diagnosis.results.assessment import Assessment
 from diagnosis.results.clearing import Check, Checked
 from diagnosis.results.left_out import is_left_out
 from diagnosis.results.machine_words import MachineWords
-from diagnosis.results.vocabulary import Kind, Tier
+from diagnosis.results.result import FaultInterval
+from diagnosis.results.vocabulary import Kind, Severity, Tier
 from replay.faults import Side
 from replay.machine.config import Limits
 
 _STEERING = "steering was not judged"
-_NAMED = 2  # parts with an open check
+_NAMED = 2  # open checks
+_AFTER_S = 0.5  # of a fault, in which it still shows
 _STEERED = (Check.STILL, Check.RATE, Check.LASTING_RATE)
 _TURNED = (Check.YAW, Check.LASTING_YAW)
 
@@ -31,6 +33,7 @@ def to_clear(
     driven: Mapping[Part, float],
     axles: Sequence[str],
     limits: Limits,
+    faults: Sequence[FaultInterval] = (),
 ) -> tuple[ToClear, ...]:
     """Every reservation with what would clear it, in the order in which a verdict names them.
 
@@ -46,6 +49,8 @@ def to_clear(
         Steering axles.
     limits : Limits
         What counts.
+    faults : Sequence[FaultInterval]
+        What is stated: checks that deviate while a fault lasts may be its doing.
     """
     words = against.words
     out = [ToClear(event.text, event.act) for event in against.events]
@@ -89,7 +94,9 @@ def to_clear(
             )
         )
     twice = {c for (c, side), a in assessments.items() if a.tier is Tier.DIRECT and side == Side.SENSOR}
-    out += _of_checks(against.open, twice)
+    blamed = {k: f for k, c in enumerate(against.open) if (f := _meanwhile(c, faults)) is not None}
+    out += _of_faults([(against.open[k], f) for k, f in blamed.items()], words)
+    out += _of_checks([c for k, c in enumerate(against.open) if k not in blamed], twice)
     steered = [k for k in assessments if k[0] in axles]
     unjudged = [k for k in steered if assessments[k].tier is Tier.NONE]
     brief = [k for k in steered if k not in unjudged and _brief(k, decided_s, driven, limits)]
@@ -100,6 +107,33 @@ def to_clear(
 def _brief(part: Part, decided_s: Mapping[Part, float], driven: Mapping[Part, float], limits: Limits) -> bool:
     """Whether a part of an axle was judged for less than a part of a wheel must be."""
     return part in driven and decided_s.get(part, 0.0) < needed_s(driven[part], limits.min_assessed)
+
+
+def _meanwhile(check: Checked, faults: Sequence[FaultInterval]) -> FaultInterval | None:
+    """The most severe fault that lasts while a check deviates, or just before; None where there is none."""
+    start, stop = check.start_s, check.stop_s
+    if start is None or stop is None:
+        return None
+    counted = (f for f in faults if f.severity is not Severity.INFO)
+    return next((f for f in counted if f.start_s < stop and f.stop_s + _AFTER_S > start), None)
+
+
+def _of_faults(blamed: Sequence[tuple[Checked, FaultInterval]], words: MachineWords) -> list[ToClear]:
+    """Checks that deviate while faults last, those of one fault together."""
+    by: dict[str, list[tuple[Checked, FaultInterval]]] = {}
+    for check, fault in blamed:
+        by.setdefault(fault.id, []).append((check, fault))
+    out = []
+    for name, mine in by.items():
+        fault = mine[0][1]
+        part = words.part_words(fault.kind, fault.component, fault.side)
+        out.append(
+            ToClear(
+                f"While {name} lasts, which may explain it: {_some([check.text for check, _ in mine])}.",
+                f"repair the {part} ({name}), then diagnose the next mission",
+            )
+        )
+    return out
 
 
 def _of_checks(checks: Sequence[Checked], twice: Collection[str]) -> list[ToClear]:
@@ -129,9 +163,9 @@ def _same_but_name(text: str, check: Checked) -> bool:
 
 
 def _some(texts: Sequence[str]) -> str:
-    """The first reasons, and how many more parts have one."""
+    """The first reasons, and how many more there are."""
     rest = len(texts) - _NAMED
-    return "; ".join([*texts[:_NAMED], *([f"and {count_words(rest, 'more part')}"] if rest > 0 else [])])
+    return "; ".join([*texts[:_NAMED], *([f"and {count_words(rest, 'more check')}"] if rest > 0 else [])])
 
 
 def _act(check: Checked, twice: Collection[str]) -> str:

@@ -20,6 +20,15 @@ def actions_of(intervals: Sequence[FaultInterval], words: MachineWords) -> tuple
     return tuple(_action(n, faults, words) for n, faults in enumerate(_by_part(intervals), 1))
 
 
+def count_faults(stop: Sequence[FaultInterval], watch: Sequence[FaultInterval]) -> str:
+    """How many faults there are, and on how many parts where that is another number: ``6 faults to repair, 2 to watch, on 5 parts``."""
+    counted = [(len(stop), "to repair"), (len(watch), "to watch")]
+    (n, what), *more = [(n, what) for n, what in counted if n]
+    words = ", ".join([f"{count_words(n, 'fault')} {what}", *(f"{n} {what}" for n, what in more)])
+    parts = len({(f.component, f.side) for f in (*stop, *watch)})
+    return words if parts == len(stop) + len(watch) else f"{words}, on {count_words(parts, 'part')}"
+
+
 def _by_part(intervals: Sequence[FaultInterval]) -> list[list[FaultInterval]]:
     """Faults that are worth an action, those of one part together, the most urgent part first."""
     parts: dict[tuple[str, str], list[FaultInterval]] = {}
@@ -82,16 +91,22 @@ def _course(faults: Sequence[FaultInterval]) -> str:
 def _how_long(words: str, faults: Sequence[FaultInterval]) -> str:
     """What faults are, how much they take, the whole time of them on one part, and how many they are."""
     total = seconds_words(sum(f.stop_s - f.start_s for f in faults))
-    return f"{words}{_lost(faults)} for {total}" + ("" if len(faults) == 1 else f" in {len(faults)} intervals")
+    return f"{words}{_lost(faults)} for {total}" + ("" if len(faults) == 1 else f" in {len(faults)} faults")
 
 
 def _lost(faults: Sequence[FaultInterval]) -> str:
-    """What faults take of their part's effectiveness, where that is what they are: `` (50 % lost)``."""
+    """What faults take of their part's effectiveness, where that is what they are: of one its 95 % bounds, of several their course."""
     if not all(f.mode.scaled and f.mode is not FaultMode.OUTSIDE_TABLE for f in faults):
         return ""
-    known = [round(100 * f.epsilon.value) for f in faults if f.epsilon is not None]
-    span = dict.fromkeys((min(known), max(known))) if known else {}
-    return f" ({' to '.join(map(str, span))} % lost)" if span else ""
+    known = [f.epsilon for f in faults if f.epsilon is not None]
+    if not known:
+        return ""
+    if len(known) == 1:
+        value, low, high = (f"{100 * x:.0f}" for x in (known[0].value, known[0].low, known[0].high))
+        bounds = f", 95 % bounds {low} to {high} %" if low != high else ""  # which the rounding holds
+        return f" ({value} % lost{bounds})"
+    span = dict.fromkeys(f"{100 * x:.0f}" for x in (min(e.value for e in known), max(e.value for e in known)))
+    return f" ({' to '.join(span)} % lost{', from fault to fault' if len(span) > 1 else ''})"
 
 
 def sentence_of(faults: Sequence[FaultInterval], words: MachineWords) -> str:

@@ -123,10 +123,9 @@ class IdentifiedPair:
         """
         return _news(np.isin(self.samples.status, (PAIR, BLIND)))[0]
 
-    @cached_property
-    def gain_spread(self) -> float:
-        """Standard deviation of y per reference from second to second while healthy [1]: it lasts, and does not average out."""
-        return gain_spread(self.samples, self.model.span, self.pair.dt)
+    def gain_spread(self, start: int, stop: int) -> float:
+        """Standard deviation of y per reference from second to second outside of a fault [1]: it lasts, and does not average out."""
+        return gain_spread(self.samples, self.model.span, self.pair.dt, slice(start, stop))
 
     @cached_property
     def holds(self) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
@@ -148,7 +147,7 @@ class IdentifiedPair:
         return Texture(y.size, white, self.lsb, own)
 
 
-def gain_spread(samples: Samples, span: float, dt: float) -> float:
+def gain_spread(samples: Samples, span: float, dt: float, fault: slice = slice(0)) -> float:
     """Robust standard deviation of the gain Σxy/Σx² of windows of a second about 1; 0 where few windows move.
 
     Parameters
@@ -159,10 +158,13 @@ def gain_spread(samples: Samples, span: float, dt: float) -> float:
         Of the channel [unit of y].
     dt : float
         Step [s].
+    fault : slice
+        Samples that are not healthy: a fault that lasts for most of the driving would else be taken for the usual spread.
     """
     width = max(2, round(_GAIN_S / dt))
     size = samples.y.size // width * width
     use = (samples.status[:size] == PAIR) & ~samples.quiet[:size]
+    use[fault] = False
     x, y = (np.where(use, np.nan_to_num(z[:size]), 0.0).reshape(-1, width) for z in (samples.x, samples.y))
     power, moved = np.einsum("ij,ij->i", x, x), np.einsum("ij,ij->i", x, y)
     driven = power > width * (_GAIN_DRIVEN * span) ** 2

@@ -41,6 +41,7 @@ _WILD, _WILD_S, _WILD_SAMPLES = 10.0, 0.04, 4.0  # times the noise; motion that 
 _RESTLESS, _RESTLESS_P = 0.1, 0.8  # share of changing news from which a channel is not stuck, and how probably so
 _OF_PLAY = 0.2  # of its width per rms opening: standard deviation of the gain that a play leaves in simulated valves
 _CLEARLY = 2.0  # times as probable as the path's row, from which on another one is stated
+_MAJORITY = 0.5  # of the probability: a fault is called by it
 
 
 @dataclass(frozen=True, eq=False)
@@ -125,14 +126,14 @@ def estimate_run(run: Run, found: IdentifiedPair) -> Estimate | None:
     if estimate is None or run.row in TOTAL_ROWS:
         return estimate
     epsilon, sat, delta = estimate
-    return estimate if epsilon is None else (epsilon.with_gain(_gain_std(x[use], found, delta)), sat, delta)
+    return estimate if epsilon is None else (epsilon.with_gain(_gain_std(x[use], found, delta, run)), sat, delta)
 
 
-def _gain_std(x: Array, found: IdentifiedPair, delta: float) -> float:
+def _gain_std(x: Array, found: IdentifiedPair, delta: float, run: Run) -> float:
     """Standard deviation of a gain as a share of it: what the healthy channel's own varies by, and the side of the play it is on."""
     large = float(np.sqrt(np.mean(x**2))) if x.size else 0.0
     played = _OF_PLAY * found.relation.play / (large * abs(delta)) if large > 0.0 and delta != 0.0 else 0.0
-    return float(np.hypot(found.gain_spread, min(played, 1.0)))
+    return float(np.hypot(found.gain_spread(run.start, run.stop), min(played, 1.0)))
 
 
 def isolate(run: Run, found: IdentifiedPair) -> Isolated | None:
@@ -221,7 +222,7 @@ def _shifted_away(seen: RunSamples, delta: float, noise: float) -> bool:
 
 
 def stated_row(row: int, p: Array, *, zero: bool, still: bool) -> int:
-    """The path's row of a run, or another fault's where that is clearly more probable.
+    """The path's row of a run, or another fault's where that is clearly more probable, or has the majority.
 
     Parameters
     ----------
@@ -236,7 +237,8 @@ def stated_row(row: int, p: Array, *, zero: bool, still: bool) -> int:
     best = max(faults, key=lambda r: float(p[r]))
     constant = {*TOTAL_ROWS, *(SCALED_ROWS if row not in SCALED_ROWS else ())}
     alike = (zero and {row, best} <= constant) or (still and {row, best} <= set(STEADY_ROWS))
-    return best if p[best] > _CLEARLY * p[row] and not alike else row
+    other = p[best] > _CLEARLY * p[row] or p[best] > _MAJORITY
+    return best if other and not alike else row
 
 
 def _with_lapses(p: Array, row: int, side: Side, seconds: float | None) -> Array:

@@ -42,7 +42,7 @@ def sentences(isolated: Isolated, found: IdentifiedPair, mode: FaultMode, epsilo
             out += [s for s in [shape_sentence(seen.y[seen.use], seen.x[seen.use], pair.dt, names, pair.unit)] if s]
         out += _values(isolated, found, epsilon, seconds)
         out.append(
-            f"Residual {amount(seen.deviation, pair.unit)} root mean square; threshold {amount(3 * seen.noise, pair.unit, 2)}."
+            f"Residual, loss and noise together, {amount(seen.deviation, pair.unit)} root mean square; threshold {amount(3 * seen.noise, pair.unit, 2)}."
         )
     if mode is FaultMode.OUTSIDE_TABLE:
         out.append("The gain is outside 0…1, which no row of the tables describes.")
@@ -65,8 +65,9 @@ def _values(isolated: Isolated, found: IdentifiedPair, epsilon: Epsilon | None, 
             if seen.still
             else f"moved over {amount(float(np.ptp(x)), pair.unit, 2)}"
         )
+        inner = y[1:-1] if y.size > 4 else y  # the first and the last sample may be beside it
         return [
-            f"{pair.y_name} stayed within {amount(float(np.ptp(y)), pair.unit, 2)} of {amount(float(np.mean(y)), pair.unit)} "
+            f"{pair.y_name} stayed within {amount(float(np.ptp(inner)), pair.unit, 2)} of {amount(float(np.mean(y)), pair.unit)} "
             f"for {seconds:.3f} s while {pair.x_name} {other}."
         ]
     if epsilon is None:
@@ -79,6 +80,6 @@ def _values(isolated: Isolated, found: IdentifiedPair, epsilon: Epsilon | None, 
     if sat is not None:
         out.append(
             f"The rest has a mean of {amount(sat.mean * epsilon.value, pair.unit)} and a root mean square of "
-            f"{amount(sat.rms * epsilon.value, pair.unit)}; healthy noise is {amount(seen.noise, pair.unit, 2)}."
+            f"{amount(sat.rms * epsilon.value, pair.unit)}, which is ε̂ × sat; healthy noise is {amount(seen.noise, pair.unit, 2)}."
         )
     return out

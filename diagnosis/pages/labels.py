@@ -162,7 +162,8 @@ def fault_title(fault: IntervalRow, words: MachineWords) -> str:
         return f"{part} {unclear_words(side, modes)}"
     sizes = {"part": part}
     if sat:
-        sizes |= {"mean": sat_text(sat["mean"], sat["unit"], words), "rms": sat_text(sat["rms"], sat["unit"], words)}
+        noise = sat["rms"] * (epsilon["value"] if epsilon else 1.0)  # what stands in the readings is ε × sat
+        sizes |= {"mean": sat_text(sat["mean"], sat["unit"], words), "rms": sat_text(noise, sat["unit"], words)}
     if epsilon:
         sizes["lost"] = f"{100 * epsilon['value']:.0f}"
     row = row_of(side, mode)

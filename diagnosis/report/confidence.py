@@ -59,10 +59,17 @@ def _likely(p: float) -> str:
 
 
 def judged(report: ReportDocument) -> str:
-    """How many parts were judged as far as a verdict of *ready* takes; empty where there are none."""
-    sides = sides_of(report)
-    done = sum(s.long_enough for s in sides.values())
-    return f"{done} of {len(sides)} parts" if sides else ""
+    """How many parts were judged as far as a verdict of *ready* takes, and which were not; empty where there are none."""
+    sides, words, axles = sides_of(report), words_of(report["machine"]), report["machine"]["axles"]
+    short = [part for part, s in sides.items() if not s.long_enough]
+    if not sides or not short:
+        return f"all {len(sides)} parts" if sides else ""
+    named = [
+        words.listed(kind, mine)
+        for kind in (Kind.WHEEL, Kind.STEER)
+        if (mine := [part for part in short if (part[0] in axles) is (kind is Kind.STEER)])
+    ]
+    return f"{len(sides) - len(short)} of {len(sides)} parts; not {'; '.join(named)}"
 
 
 def sure_of_verdict(report: ReportDocument) -> str:

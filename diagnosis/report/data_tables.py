@@ -8,8 +8,10 @@ from typing import Any
 from diagnosis.pages.labels import bounded, grouped, number
 from diagnosis.report.judged_parts import kind_of
 from diagnosis.results.clearing import size_words
+from diagnosis.results.clearing_rows import ClearingRow
 from diagnosis.results.document import (
     FileRow,
+    IntervalRow,
     MissingRow,
     ReportDocument,
     SignalRow,
@@ -18,11 +20,14 @@ from diagnosis.results.fault_rows import state_label
 from diagnosis.results.left_out import only_left_out
 from diagnosis.results.loop_rows import LoopRow, MetricsRow
 from diagnosis.results.machine_words import MachineWords, words_of
-from replay.faults import FAULT_STATES, UNDECIDED, State
+from replay.faults import FAULT_STATES, UNDECIDED, Side, State
 from replay.machine.quantities import OPENING
 
 #: What the template is given.
 Context = dict[str, Any]
+
+_AFTER_S = 0.5  # of a fault, in which it still shows in checks
+_TOLD_S = 0.1  # of a fault in which nothing of it shows, from which on that is worth a word
 
 
 def coverage_rows(report: ReportDocument) -> list[Context]:
@@ -44,10 +49,32 @@ def coverage_rows(report: ReportDocument) -> list[Context]:
                 "open": total - healthy - faulty,
                 "driving": row["decided_driving_s"],
                 "loss": loss.get(key, ""),
-                "why": why.get(key, []),
+                "why": [*why.get(key, []), *_unseen(report["intervals"], key, faulty)],
             }
         )
     return rows
+
+
+def _meanwhile(report: ReportDocument, check: ClearingRow) -> str:
+    """The faults during which a check that does not pass deviates most, to follow its time."""
+    start, stop = check["start_s"], check["stop_s"]
+    if check["passed"] or start is None or stop is None:
+        return ""
+    names = [f["id"] for f in report["intervals"] if f["start_s"] < stop and f["stop_s"] + _AFTER_S > start]
+    return f", during {', '.join(names)}" if names else ""
+
+
+def _unseen(faults: Sequence[IntervalRow], part: tuple[str, str], seen_s: float) -> list[str]:
+    """How long the faults of a part last, where that is longer than it was seen to be faulty: between its traces it may not be judged."""
+    mine = sorted(
+        (f["start_s"], f["stop_s"]) for f in faults if f["component"] == part[0] and part[1] in Side(f["side"]).sides
+    )
+    lasting, end = 0.0, 0.0
+    for start, stop in mine:
+        lasting += max(0.0, stop - max(start, end))
+        end = max(end, stop)
+    rest = lasting - seen_s
+    return [f"{rest:.1f} s of the {lasting:.1f} s that its faults last show nothing of them"] if rest >= _TOLD_S else []
 
 
 def check_rows(report: ReportDocument) -> list[Context]:
@@ -62,7 +89,7 @@ def check_rows(report: ReportDocument) -> list[Context]:
                 "asked": c["asked"],
                 "worst": "not shown" if c["worst"] is None else size_words(c["check"], c["worst"]),
                 "limit": size_words(c["check"], c["limit"]),
-                "when": "" if start is None or stop is None else f"{start:.1f}–{stop:.1f} s",
+                "when": "" if start is None or stop is None else f"{start:.1f}–{stop:.1f} s{_meanwhile(report, c)}",
                 "shows": "" if c["shows"] is None else f"from {100 * c['shows']:.0f} %",
             }
         )

@@ -176,6 +176,8 @@ def view(
             "detected": f["detected_s"],
             "mode": f["mode"],
             "component": f["component"],
+            "side": f["side"],
+            "p": round(f["probability"], 3),
             "words": state_label(f["mode"], f["side"]).lower(),
             "severity": f["severity"],
             "title": labels.fault_title(f, words),

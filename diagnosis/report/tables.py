@@ -118,7 +118,8 @@ def _fault(fault: IntervalRow, words: MachineWords) -> Context:
         unit = sat["unit"]
         bounds = f"{sat_text(sat['low'], unit, words).partition(' ')[0]} to {sat_text(sat['high'], unit, words)}"
         figures.append(("sat", sat_text(sat["mean"], unit, words), bounds))
-        figures.append(("sat r.m.s.", sat_text(sat["rms"], unit, words), ""))
+        if FaultMode(fault["mode"]).varying:
+            figures.append(("sat r.m.s.", sat_text(sat["rms"], unit, words), "the rest’s, divided by ε̂"))
     hypotheses = sorted(fault["hypotheses"], key=lambda h: -h["p"])
     likely = max(1, sum(h["p"] >= _SHOWN for h in hypotheses))
     return {

@@ -62,7 +62,7 @@ FAULT_ROWS: tuple[FaultRow, ...] = (
         0.05,
         "Noisy",
         "noisy",
-        "{part} noisy, {rms} r.m.s.",
+        "{part} noisy, {rms} r.m.s. of noise",
     ),
     FaultRow(Side.ACTUATOR, FaultMode.STUCK, 0.05, "Stuck", "stuck", "{part} stuck at {mean}"),
     FaultRow(
@@ -82,7 +82,7 @@ FAULT_ROWS: tuple[FaultRow, ...] = (
         0.05,
         "Disturbed",
         "disturbed",
-        "{part} disturbed, {rms} r.m.s.",
+        "{part} disturbed, {rms} r.m.s. of noise",
     ),
 )
 

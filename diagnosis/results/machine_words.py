@@ -7,6 +7,7 @@ unit of speed to a reader asks this table, which is made from the machine file a
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
@@ -136,6 +137,8 @@ class MachineWords:
         """
         if unit == OPENING:
             return f"{plain(100 * value, digits)}{self.percent}"
+        if unit == "rad":
+            return f"{plain(math.degrees(value), digits)}°"
         return f"{plain(value, digits)} {self.unit(unit)}".rstrip()
 
     def fill(self, text: str) -> str:

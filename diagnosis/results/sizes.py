@@ -11,7 +11,7 @@ _MOST, _LEAST = 1e6, 1.5
 
 
 def amount(value: float, unit: str, digits: int = 3) -> str:
-    """A value with its unit, for `MachineWords.fill`: ``0.31 {speed_unit}``, of a command ``2.1{percent}``.
+    """A value with its unit, for `MachineWords.fill`: ``0.31 {speed_unit}``, of a command ``2.1{percent}``, an angle in degrees.
 
     Parameters
     ----------
@@ -24,6 +24,8 @@ def amount(value: float, unit: str, digits: int = 3) -> str:
     """
     if unit == OPENING:
         return f"{plain(100 * value, digits)}{{percent}}"
+    if unit == "rad":
+        return f"{plain(math.degrees(value), digits)}°"
     return f"{plain(value, digits)} {'{speed_unit}' if unit == 'm/s' else unit}".rstrip()
 
 

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from diagnosis.evidence import Part
 from diagnosis.results.assessment import CODE, Assessment, unassessed
+from diagnosis.results.sizes import amount
 from diagnosis.results.vocabulary import Tier
 from diagnosis.steering.acquittal import acquitted, moves_otherwise, scatter_of
 from diagnosis.steering.blocks import SteeringBlocks, without_growth
@@ -198,9 +199,9 @@ def _note(axle: AxleFilter) -> str:
     """The figures that the judgement used."""
     plant, noise = axle.model.plant, axle.model.noise
     return (
-        f"{axle.names[0]} by the steering model with {axle.names[1]}: {plant.gain:.3g} rad/s at 100{{percent}}, at most "
-        f"{plant.rate:.3g} rad/s, lag {plant.lag:.2g} s, noise {noise.std:.2g} rad, rounding step "
-        f"{noise.lsb:.2g} rad, error of the rate {axle.model.rate_error:.2g} rad/s."
+        f"{axle.names[0]} by the steering model with {axle.names[1]}: {amount(plant.gain, 'rad')}/s at 100{{percent}}, at most "
+        f"{amount(plant.rate, 'rad')}/s, lag {plant.lag:.2g} s, noise {amount(noise.std, 'rad', 2)}, rounding step "
+        f"{amount(noise.lsb, 'rad', 2)}, error of the rate {amount(axle.model.rate_error, 'rad', 2)}/s."
     )
 
 

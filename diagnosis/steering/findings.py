@@ -12,7 +12,7 @@ from diagnosis.results.assessment import Finding
 from diagnosis.results.fault_rows import mode_words
 from diagnosis.results.machine_words import part_token
 from diagnosis.results.result import Epsilon, Hypothesis
-from diagnosis.results.sizes import times_as_probable
+from diagnosis.results.sizes import amount, times_as_probable
 from diagnosis.results.vocabulary import Kind, Tier
 from diagnosis.steering.excitation import asked
 from diagnosis.steering.fault_size import estimate_size, level_of
@@ -253,7 +253,7 @@ def _sentences(choice: _Choice, gain: float, ranked: Sequence[tuple[Fault, float
     if choice.dead_sensor:
         level, spread, count = level_of(run.start, run.stop, run.axle)
         lines.append(
-            f"{channel} stayed within {spread:.2g} rad of {level:.4g} rad over {count} samples."
+            f"{channel} stayed within {amount(spread, 'rad', 2)} of {amount(level, 'rad')} over {count} samples."
             if count
             else f"{channel} delivered nothing while other channels of its source did."
         )

@@ -1,7 +1,8 @@
 """Results that contradict themselves, over hundreds of missions: `python tests/benchmarks/contradictions.py --count 6`.
 
-Three kinds of data: the simulator's scenarios and machines of other structures, in every tier; the reference data's foreign
-plant; real robots and arms as they are, and with faults written into them. Each result is read by `tests.contradictions`:
+Five kinds of data: the simulator's scenarios and machines of other structures, in every tier; the machines of other physics beside
+this file, with every sort of trouble; ordinary robots set up as `config init` does; the reference data's foreign plant; real robots
+and arms as they are, and with faults written into them. Each result is read by `tests.contradictions`:
 verdict, title, hypotheses, severity, advice, sizes, times, states and the terminal's words must agree. Ends with 1 where one
 does not. Seeds from 2000 on. The real logs and the plant lie where ``MFHCA_REFERENCE_DATA`` says; without them they are left out.
 """
@@ -11,6 +12,7 @@ from __future__ import annotations
 import argparse
 import os
 import sys
+import tempfile
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import replace
@@ -18,13 +20,19 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
+import electrohydraulic
 import foreign_machine
+import hydrostatic
 import numpy as np
+import ordinary
 import orjson
 import robots
+from ordinary_robots.faults import FAULTS
+from ordinary_robots.machines import KINDS
+from troubles import troubles
 from variation import recorded_signals
 
-from diagnosis.pipeline import diagnose, diagnose_mission
+from diagnosis.pipeline import diagnose, diagnose_mission, diagnose_signals
 from diagnosis.results.result import MissionResult
 from replay.errors import MfhcaError
 from replay.machine.config import haulotte
@@ -63,6 +71,33 @@ def simulated(count: int) -> Iterator[Named]:
                     yield name, diagnose_mission(mission, haulotte())
                 except MfhcaError as error:
                     print(f"{name}: {error}")
+
+
+def other_physics(count: int) -> Iterator[Named]:
+    """Machines of other physics with every so many-th sort of trouble, and sound."""
+    kinds = troubles(75.0)
+    for place, physics in enumerate((hydrostatic, electrohydraulic)):
+        for k in range(2 * count):
+            trouble = None if k % 6 == 5 else kinds[(17 * k + 7 * place) % len(kinds)]
+            seed = FIRST + 300 + k
+            for tier in TIERS:
+                signals = physics.signals(seed, trouble.faults if trouble else (), 75.0, tier)
+                if trouble is not None and trouble.edit is not None:
+                    signals = trouble.edit(signals)
+                name = f"{physics.NAME} {seed} {trouble.name if trouble else 'healthy'} {tier}"
+                try:
+                    yield name, diagnose_signals(signals, physics.machine_of(physics.build(seed)))
+                except MfhcaError as error:
+                    print(f"{name}: {error}")
+
+
+def ordinary_robots(count: int) -> Iterator[Named]:
+    """Ordinary robots with one fault each, every sixth sound."""
+    for k in range(3 * count):
+        kind, fault = KINDS[k % len(KINDS)], "" if k % 6 == 5 else FAULTS[(5 * k) % len(FAULTS)]
+        with tempfile.TemporaryDirectory() as folder:
+            made = ordinary.case(kind, fault, FIRST + 900 + k, Path(folder))
+            yield f"{kind} {FIRST + 900 + k} {fault or 'healthy'}", made.result
 
 
 def foreign(count: int) -> Iterator[Named]:
@@ -115,9 +150,16 @@ def main() -> None:
     """Diagnose, check, print."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--count", type=int, default=6)
-    parser.add_argument("--only", nargs="*", help="kinds of data: simulated, foreign plant, real")
+    parser.add_argument(
+        "--only", nargs="*", help="kinds of data: simulated, other physics, ordinary robots, foreign plant, real"
+    )
     asked = parser.parse_args()
-    count, sources = asked.count, {"simulated": simulated(asked.count)}
+    count = asked.count
+    sources = {
+        "simulated": simulated(count),
+        "other physics": other_physics(count),
+        "ordinary robots": ordinary_robots(count),
+    }
     if (Path(os.environ.get("MFHCA_REFERENCE_DATA", "../shared")) / "fault_data").is_dir():
         sources |= {"foreign plant": foreign(count), "real": real(count)}
     results: Counter[str] = Counter()

@@ -34,6 +34,7 @@ from ordinary_robots.physics import drive
 
 from diagnosis.pipeline import diagnose
 from diagnosis.results.document import IntervalRow, ReportDocument
+from diagnosis.results.result import MissionResult
 from replay.machine.toml_file import load_machine
 from replay.setup.draft import draft_machine
 from replay.setup.machine_text import machine_text
@@ -50,8 +51,13 @@ class Case:
 
     robot: Robot
     fault: Fault | None
-    report: ReportDocument
+    result: MissionResult
     names: dict[str, str]
+
+    @property
+    def report(self) -> ReportDocument:
+        """Its result document."""
+        return self.result.report
 
     @property
     def told(self) -> list[IntervalRow]:
@@ -86,14 +92,14 @@ def case(kind: str, fault_kind: str, seed: int, folder: Path, habits: str = "usu
     text = machine_text(draft_machine(read_everything([path], every=False)), path.name)
     (folder / "machine.toml").write_text(text, encoding="utf-8")
     machine = load_machine(folder / "machine.toml")
-    report = diagnose([path], machine).report
+    result = diagnose([path], machine)
     names = {
         w.joint: name.split(".")[1]
         for w in robot.wheels
         for name, source in machine.signals.items()
         if name.endswith(".v") and w.joint in source.label
     }
-    return Case(robot, fault, report, names)
+    return Case(robot, fault, result, names)
 
 
 def healthy_score(c: Case) -> Counter[str]:

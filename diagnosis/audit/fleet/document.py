@@ -147,6 +147,7 @@ def _counts(fleet: Fleet, first: Mapping[int, str]) -> CountsRow:
     return {
         "machines": len(fleet.machines),
         "missions": len(fleet.missions),
+        "counted": len(runs),
         "states": {s.value: states[s] for s in ENDS},
         "not_assessed": sum(r.verdict is Verdict.NOT_ASSESSED for r in results),
         "unknown": len(fleet.unknown),

@@ -42,6 +42,8 @@ class CountsRow(TypedDict):
     ----------
     machines, missions : int
         All of them.
+    counted : int
+        Missions that machines, faults and trends count: those with a report, copies of a log once.
     states : dict[str, int]
         How missions ended.
     not_assessed : int
@@ -71,6 +73,7 @@ class CountsRow(TypedDict):
 
     machines: int
     missions: int
+    counted: int
     states: dict[str, int]
     not_assessed: int
     unknown: int

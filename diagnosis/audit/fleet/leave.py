@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
-from enum import StrEnum
 
 from diagnosis.audit.fleet.fault_types import FleetFaultRow
 from diagnosis.audit.fleet.fleet_types import FleetDocument, MachineRow, MissionRow
+from diagnosis.audit.fleet.may_leave import Leave, leave_of
 from diagnosis.audit.fleet.page.rows import fault_words
 from diagnosis.audit.fleet.words import count, open_words
 from diagnosis.results.machine_words import words_of
@@ -17,14 +17,6 @@ from diagnosis.results.vocabulary import Severity, Verdict
 GONE = ("past", "repaired")
 _FAULTS = 2
 _DAMAGE = "the log is damaged: "
-
-
-class Leave(StrEnum):
-    """Whether a machine may go out."""
-
-    MUST_NOT = "must not go out"
-    NOT_KNOWN = "not known whether it may go out"
-    MAY = "may go out"
 
 
 @dataclass(frozen=True)
@@ -55,20 +47,12 @@ class Left:
     name: str
 
 
-def leave_of(m: MachineRow) -> Leave:
-    """Whether a machine may go out, by its verdict and what later missions leave open."""
-    if m["verdict"] == Verdict.STOP:
-        return Leave.MUST_NOT
-    fit = m["verdict"] == Verdict.READY or (m["verdict"] == Verdict.WATCH and m["cleared"] is True)
-    return Leave.MAY if fit and not m["unjudged"] else Leave.NOT_KNOWN
-
-
 def lists_of(document: FleetDocument) -> tuple[Left, ...]:
     """Every machine of a fleet in one list, in the document's order."""
     out = []
     for k, m in enumerate(document["machines"]):
         standing = [f for f in document["faults"] if f["machine"] == k and f["status"] not in GONE]
-        leave = leave_of(m)
+        leave = leave_of(m["verdict"], m["cleared"], m["unjudged"])
         rising = {
             (t["component"], t["side"])
             for t in document["trends"]

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from diagnosis.audit.fleet.machines import FleetFault, Machine
+from diagnosis.audit.fleet.may_leave import Leave, leave_of
 from diagnosis.audit.fleet.trend_types import Axis
 from diagnosis.audit.fleet.trends import PartTrend
 from diagnosis.audit.trends.trend import Forecast
@@ -37,6 +38,17 @@ def fault_words(f: FleetFault, words: MachineWords) -> str:
     return f"{words.part_words(f.kind, f.component, f.side)} {mode_words(f.side, f.mode)}"
 
 
+def found_in(missions: int, assessed: int) -> str:
+    """In how many missions a fault was found: ``in 3 of the 14 missions that assessed the part``."""
+    return f"in {missions} of the {count(assessed, 'mission')} that assessed the part"
+
+
+def missions_words(all_missions: int, counted: int) -> str:
+    """How many missions there are and how many count: ``22 missions, 21 of them counted``."""
+    words = f"{all_missions:,} mission{'' if all_missions == 1 else 's'}".replace(",", "\u202f")
+    return words if counted == all_missions else f"{words}, {f'{counted:,}'.replace(',', chr(0x202F))} of them counted"
+
+
 def open_words(is_open: bool, clean: int, needed: int) -> str:
     """How far an open fault is refuted: ``, clean in 3 of the 10 missions that close it``; empty where it is not, or just found."""
     return f", clean in {clean} of the {needed} missions that close it" if is_open and clean else ""
@@ -48,14 +60,14 @@ def forecast_words(f: Forecast, limit: float, axis: Axis = "hours") -> str:
     if f.state == "not_known":
         return f"not known: {f.why}"
     if f.state == "above":
-        return f"already at {round_to(limit)}"
+        return f"already above the limit of {round_to(limit)}"
     if f.state == "not_within" or f.soonest is None:
-        return f"does not reach {round_to(limit)} within {round_to(f.horizon)} {unit}"
+        return f"does not reach the limit of {round_to(limit)} within {round_to(f.horizon)} {unit}"
     if f.latest is None:
         begin = f"in {round_to(f.soonest)} {unit} at the soonest" if f.soonest > 0 else "at any time"
         likely = f", likely in {round_to(f.likely)}" if f.likely is not None else ""
-        return f"may reach {round_to(limit)} {begin}{likely}; latest not known"
-    return f"reaches {round_to(limit)} in {round_to(f.soonest)} to {round_to(f.latest)} {unit} (90 %)"
+        return f"may reach the limit of {round_to(limit)} {begin}{likely}; latest not known"
+    return f"reaches the limit of {round_to(limit)} in {round_to(f.soonest)} to {round_to(f.latest)} {unit} (90 %)"
 
 
 def standing(m: Machine) -> str:
@@ -102,7 +114,7 @@ def is_damaged(m: Machine) -> bool:
 
 
 def headline(machines: Sequence[Machine], unknown: int = 0) -> tuple[Verdict, str, str]:
-    """Status of the fleet, a few words above its sentence, and the sentence.
+    """Status of the fleet, a few words above its sentence, and the sentence: how many may go out, as the lists have it.
 
     Parameters
     ----------
@@ -113,47 +125,38 @@ def headline(machines: Sequence[Machine], unknown: int = 0) -> tuple[Verdict, st
     """
     verdicts = [m.verdict for m in machines]
     status = max(verdicts, key=lambda verdict: verdict.rank, default=Verdict.NOT_ASSESSED)
-    n, damaged = len(machines), sum(map(is_damaged, machines))
-    apart = all(_lacks_a_file(m) for m in machines if is_damaged(m))
-    work = sum(v in _WORK for v in verdicts) - damaged
-    open_ = verdicts.count(Verdict.NOT_ASSESSED)
-    if not n:
+    damaged = [m for m in machines if is_damaged(m)]
+    if not machines:
         return Verdict.NOT_ASSESSED, "nothing judged", "No mission could be judged"
     tag = f"{count(verdicts.count(status), 'machine')}: {_small(status.short)}"
-    if status is Verdict.WATCH and not work:
-        tag = f"{count(damaged, 'machine')}: {'files left out' if apart else 'damaged logs'}"
-    if work and n == 1:
-        title = "The machine needs work"
-    elif work:
-        title = f"{work} of {count(n, 'machine')} {'needs' if work == 1 else 'need'} work"
-    elif open_ + damaged == n:
-        title = _none_ready(machines)
-    elif open_ or damaged:
-        fine = n - open_ - damaged
-        title = f"{fine} of {count(n, 'machine')} {'is' if fine == 1 else 'are'} ready"
-    elif unknown:
+    if status is Verdict.WATCH and len(damaged) == verdicts.count(Verdict.WATCH):
+        apart = all(_lacks_a_file(m) for m in damaged)
+        tag = f"{count(len(damaged), 'machine')}: {'files left out' if apart else 'damaged logs'}"
+    title = _leave_words([leave_of(m.verdict, m.cleared, m.unjudged) for m in machines])
+    if unknown and status is Verdict.READY:
         status, tag = Verdict.NOT_ASSESSED, "not all assessed"
-        known = "The machine is" if n == 1 else f"{n} machines are"
-        title = f"{known} ready, but {count(unknown, 'log')} of no known machine {_was(unknown)} not judged"
-    else:
-        title = "The machine is ready" if n == 1 else f"All {n} machines are ready"
-    if open_ and open_ < n:
-        title += f", {open_} {'is' if open_ == 1 else 'are'} not assessed"
-    if damaged and damaged < n:
-        one, many = (
-            ("a log without one of its files", "logs without all of their files")
-            if apart
-            else ("a damaged log", "damaged logs")
-        )
-        title += f", {damaged} {f'has {one}' if damaged == 1 else f'have {many}'}"
+        title += f", but {count(unknown, 'log')} of no known machine {_was(unknown)} not judged"
     return status, tag, title
 
 
-def _none_ready(machines: Sequence[Machine]) -> str:
-    n = len(machines)
-    if any(m.last_verdict is not Verdict.NOT_ASSESSED for m in machines):
-        return "The machine is not known to be ready" if n == 1 else f"None of {n} machines is known to be ready"
-    return "The machine could not be assessed" if n == 1 else f"None of {n} machines could be assessed"
+def _leave_words(leaves: Sequence[Leave]) -> str:
+    """How many machines must not go out, may, or are not known to be fit to."""
+    n, must, may = len(leaves), leaves.count(Leave.MUST_NOT), leaves.count(Leave.MAY)
+    rest = n - must - may
+    if n == 1:
+        return {
+            Leave.MUST_NOT: "The machine must not go out",
+            Leave.MAY: "The machine may go out",
+            Leave.NOT_KNOWN: "It is not known whether the machine may go out",
+        }[leaves[0]]
+    if max(must, may, rest) == n:
+        said = (
+            "may go out" if may else "must not go out" if must else "need a look: whether they may go out is not known"
+        )
+        return f"{'Both' if n == 2 else f'All {n}'} machines {said}"
+    parts = [f"{k} {words}" for k, words in ((must, "must not go out"), (may, "may go out")) if k]
+    parts[0] = f"{must or may} of {n} machines {parts[0].partition(' ')[2]}"
+    return ", ".join(parts) + (f", of {rest} it is not known" if rest else "")
 
 
 def _small(text: str) -> str:
@@ -207,8 +210,9 @@ def sentences(
         out.append(f"{m.label}: the loss of the {m.limits.words.part_words(t.kind, t.component, t.side)} {words}.")
     unread, open_, pending = failed
     if unread or open_:
-        both = f": {unread} not read, {open_} read but not assessed" if unread and open_ else ""
-        out.append(f"{count(unread + open_, 'log')} could not be read or judged{both}.")
+        said = [f"{count(unread, 'log')} could not be read"] if unread else []
+        said += [f"{count(open_, 'mission')} {_was(open_)} read, but not assessed"] if open_ else []
+        out.append(f"{'; '.join(said)}.")
     if unknown and any(m.verdict is not Verdict.READY for m in machines):  # else the headline says so
         out.append(
             f"{count(unknown, 'log')} {_was(unknown)} not judged and may be of a machine that is shown as ready."
@@ -222,11 +226,16 @@ def new_words(missions: int, faults: Sequence[tuple[Machine, FleetFault]]) -> li
     """What the last audit run brought, in no or one sentence; see `diagnosis.audit.fleet.news.news`."""
     if not missions:
         return []
-    named = [f"{m.label} {fault_words(f, m.limits.words)} ({f.severity})" for m, f in faults[:_NAMED]]
+    named = [f"{m.label} {fault_words(f, m.limits.words)} ({f.severity}{_often(f)})" for m, f in faults[:_NAMED]]
     more = f" and {len(faults) - len(named)} more" if len(faults) > len(named) else ""
-    return [
-        f"New since the run before, in {count(missions, 'mission')}: {'; '.join(named) + more if named else 'no new fault'}."
-    ]
+    known = "without a fault that was not known"
+    said = f"first seen in {'it' if missions == 1 else 'them'}: {'; '.join(named) + more}" if named else known
+    return [f"The last audit run brought {count(missions, 'mission')}{';' if named else ','} {said}."]
+
+
+def _often(f: FleetFault) -> str:
+    """That a fault came in several missions of the last run at once, which is why it is called recurring."""
+    return f", recurring in {f.missions} of them" if f.missions > 1 else ""
 
 
 def _named(machines: Sequence[Machine]) -> str:
@@ -243,5 +252,5 @@ def _named(machines: Sequence[Machine]) -> str:
 
 
 def _found(m: Machine, f: FleetFault) -> str:
-    many = f" in {f.missions} of {len(m.runs)} missions" if len(m.runs) > 1 else ""
+    many = f" {found_in(f.missions, f.assessed)}" if len(m.runs) > 1 else ""
     return f"{fault_words(f, m.limits.words)}{many}{open_words(f.open, f.clean, f.needed)}"

@@ -34,7 +34,7 @@ const Lanes = {
     const row = rows.find((r) => r.threshold !== undefined);
     if (row) {
       const { part, time, residual, limit } = await Lanes.nearest(row), unit = row.unit === "1" ? "" : ` ${row.unit}`;
-      words.textContent = part < 0 ? "Its residual was never held against a threshold." : `Nearest to its threshold at ${time.toFixed(3)} s: residual ${Now.number(residual)}${unit}, ${Now.number(100 * part)} % of the threshold of ${Now.number(limit)}${unit}.`;
+      words.textContent = part < 0 ? "Its residual was never held against a threshold." : `Nearest to its threshold at ${time.toFixed(3)} s: residual ${Now.number(residual)}${unit}, ${Now.number(100 * part)} % of the threshold of ${Now.number(limit)}${unit}.${part >= 1 ? " Single readings beyond it are no fault: one lasts." : ""}`;
     }
     await figure.draw(rows, Data.view.faults.filter((f) => f.component === component).slice(0, 40).map((f) => ({ ...f, main: false })), [0, Data.view.duration]);
   },

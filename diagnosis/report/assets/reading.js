@@ -40,6 +40,7 @@ class Reading {
     line(Now.b, "B");
     figure.rows.forEach((row, i) => parts.push(this.heading(row, i, values[i])));
     box.replaceChildren(...parts);
+    for (const head of box.querySelectorAll("p")) head.style.top = `${Math.max(parseFloat(head.style.top), head.offsetHeight + 2)}px`; // none above the figure
     this.values = values;
   }
 

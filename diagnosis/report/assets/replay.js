@@ -25,6 +25,9 @@ class Replay {
     return this.parts.flatMap((part) => {
       const modes = Object.keys(Data.view.words[part.side] ?? {});
       part.modes = modes.map((m) => ({ m, channel: this.names.get(`${part.base}p_${m}`) })).filter((x) => x.channel !== undefined);
+      // without probabilities over time: those of its faults, as they are stated
+      part.faults = part.modes.length ? [] : Data.view.faults.filter((f) => Replay.of(f, part));
+      if (part.faults.length) part.modes = [...new Set(part.faults.map((f) => f.mode))].map((m) => ({ m }));
       if (!part.modes.length) return [];
       const row = document.createElement("div"), name = document.createElement("span"), bar = document.createElement("span");
       name.textContent = part.words;
@@ -38,6 +41,9 @@ class Replay {
       return [row];
     });
   }
+
+  // Whether a fault is, or may be, of a part.
+  static of(f, part) { return f.component === part.c && (f.side === part.side || f.side === "sensor_or_actuator"); }
 
   // Rows of the plot beside the pictures: every wheel in one panel.
   rows() {
@@ -92,7 +98,7 @@ class Replay {
   }
 
   async crossings(part) {
-    const { t0, duration, limit } = Data.view, words = Data.view.words[part.side] ?? {}, out = [], near = (s) => Data.view.faults.some((f) => f.component === part.c && f.start - Replay.BESIDE < s.stop && s.start < f.stop + Replay.BESIDE), get = (leaf) => this.names.get(part.base + leaf), clock = (t) => `${t.toFixed(3)} s`;
+    const { t0, duration, limit } = Data.view, words = Data.view.words[part.side] ?? {}, out = [], mine = Data.view.faults.filter((f) => Replay.of(f, part)), near = (s) => mine.some((f) => f.start - Replay.BESIDE < s.stop && s.start < f.stop + Replay.BESIDE), get = (leaf) => this.names.get(part.base + leaf), clock = (t) => `${t.toFixed(3)} s`;
     const value = async (leaf, t) => { const c = get(leaf); if (c === undefined) return null; const { k, unit } = Data.view.channels[c], [a, b] = await Data.at(c, t); return { v: k * (a + b) / 2, text: `${Now.number(+(k * (a + b) / 2).toPrecision(3))}${unit === "1" ? "" : unit === "°" ? unit : ` ${unit}`}` }; };
     const p = get("probability"), r = get("residual"), h = get("threshold");
     if (r !== undefined && h !== undefined) {
@@ -105,9 +111,11 @@ class Replay {
     if (p !== undefined && limit) {
       const d = await Data.samples(p, t0, duration, true);
       for (const s of Replay.stretches(d, (i) => d.y[i] >= limit).slice(0, Replay.MOST)) {
-        const t = Math.min(s.start + d.dt, s.stop), shares = (await Promise.all(part.modes.map(async ({ m }) => ({ m, p: (await value(`p_${m}`, t)).v })))).filter((x) => x.m !== "healthy" && Number.isFinite(x.p)).sort((a, b) => b.p - a.p), [now, top] = [await value("residual", t), await value("threshold", t)];
+        const t = Math.min(s.start + d.dt, s.stop), shares = (await Promise.all(part.modes.map(async ({ m }) => ({ m, p: (await value(`p_${m}`, t))?.v })))).filter((x) => x.m !== "healthy" && Number.isFinite(x.p)).sort((a, b) => b.p - a.p), [now, top] = [await value("residual", t), await value("threshold", t)];
         const ratio = now && top && top.v > 0 && Math.abs(now.v) > top.v ? `; the residual is ${Now.number(+(Math.abs(now.v) / top.v).toPrecision(2))} times its threshold` : "";
-        out.push({ t: s.start, sure: 1, words: `${clock(s.start)} · ${part.words}: the probability that it deviates passes ${Now.number(100 * limit)} %${shares.length ? `, ${words[shares[0].m]} ${Math.round(100 * shares[0].p)} %` : ""}${ratio}.` });
+        const whole = mine.find((f) => f.start <= t && t < f.stop), first = shares.length ? words[shares[0].m] : "";
+        const then = first && whole && whole.words !== first ? ` at first; the whole of it is ${whole.words}` : "";
+        out.push({ t: s.start, sure: 1, words: `${clock(s.start)} · ${part.words}: the probability that it deviates passes ${Now.number(100 * limit)} %${first ? `, ${first} ${Math.round(100 * shares[0].p)} %${then}` : ""}${ratio}.` });
         out.push({ t: s.stop, sure: 1, words: `${clock(s.stop)} · ${part.words}: the probability that it deviates falls below ${Now.number(100 * limit)} % again.` });
       }
     }
@@ -132,6 +140,13 @@ class Replay {
     if (one("#why").textContent !== why) one("#why").textContent = why;
     for (const part of this.parts) {
       if (!part.bar) continue;
+      if (part.faults.length) {
+        const f = part.faults.find((x) => x.start <= t && t < x.stop);
+        part.modes.forEach(({ m }, i) => { part.bar.children[i].style.width = `${f?.mode === m ? 100 * f.p : 0}%`; });
+        part.says.textContent = f ? `${f.words} ${Math.round(100 * f.p)} %` : "no fault stated";
+        part.bar.setAttribute("aria-label", `${part.words}: ${part.says.textContent}`);
+        continue;
+      }
       const shares = await Promise.all(part.modes.map(({ channel }) => Data.at(channel, t).then(([a, b]) => (a + b) / 2)));
       let top = -1;
       shares.forEach((p, i) => { part.bar.children[i].style.width = `${100 * (p || 0)}%`; if (p > (shares[top] ?? -1)) top = i; });

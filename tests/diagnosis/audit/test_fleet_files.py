@@ -78,7 +78,7 @@ def test_every_way_to_end_is_counted_and_told(tmp_path: Path) -> None:
     assert d["counts"]["states"] == dict.fromkeys(ends, 1)
     assert d["counts"]["pending"] == 1
     assert d["machines"][0]["note"] == "4 logs not read, 1 log not audited yet"
-    assert "4 logs could not be read or judged." in d["verdict"]["text"]
+    assert "4 logs could not be read." in d["verdict"]["text"]
     assert "1 mission is not audited yet." in d["verdict"]["text"]
     assert [m["reason"] for m in d["missions"] if m["state"] == "crashed"] == ["It ends too early."]
 
@@ -150,8 +150,8 @@ def test_worst_machines_come_first_then_those_whose_limit_comes_near(tmp_path: P
     d = document(tmp_path, *others, *wear)
     assert [m["label"] for m in d["machines"]] == ["S", "N", "W", "R"]
     assert d["verdict"]["status"] == "stop"
-    assert d["verdict"]["title"] == "1 of 4 machines needs work, 1 is not assessed"
-    assert any("W: the loss of the RL drive valve reaches 0.1 in" in t for t in d["verdict"]["text"])
+    assert d["verdict"]["title"] == "1 of 4 machines must not go out, 2 may go out, of 1 it is not known"
+    assert any("W: the loss of the RL drive valve reaches the limit of 0.1 in" in t for t in d["verdict"]["text"])
 
 
 def test_limits_come_from_the_machines_last_report(tmp_path: Path) -> None:

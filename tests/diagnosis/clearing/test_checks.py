@@ -7,11 +7,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from diagnosis.clearing.checks import checks_of
 from diagnosis.results.clearing import Check, Checked
+from diagnosis.results.machine_words import HYDRAULIC
 from replay.faults import FaultMode, FaultSpec, Side
 from replay.simulation.options import SimulatedMission, SimulationOptions
 from replay.simulation.run import simulate_mission
-from tests.diagnosis.clearing.missions import LENGTH, simulated
+from tests.diagnosis.clearing.missions import LENGTH, in_cells, simulated
 from tests.diagnosis.clearing.missions import checks as checks_by_part
 
 
@@ -49,6 +51,16 @@ def test_a_fault_that_lasts_the_whole_mission_does_not_pass(
 ) -> None:
     checks = checks_by_part(simulated(FaultSpec(component, side, mode, 0.0, LENGTH, epsilon, sat)), base=base)
     assert _open(checks, component)
+
+
+def test_what_a_stated_fault_makes_of_its_part_is_not_held_against_it() -> None:
+    fault = FaultSpec("FR", Side.SENSOR, FaultMode.INEFFICIENT, 20.0, 34.0, 0.7, 0.0)
+    cells = in_cells(simulated(fault), base=True)
+    part, stated = fault.component, {fault.component: [(fault.start_s, fault.stop_s)]}
+    unstated = {c.check for c in checks_of(cells, HYDRAULIC) if c.component == part and not c.passed}
+    told = {c.check: c for c in checks_of(replace(cells, stated=stated), HYDRAULIC) if c.component == part}
+    assert unstated
+    assert [c.text for c in told.values() if not c.passed and c.worst is not None] == []
 
 
 def test_spikes_and_delay_do_not_pass() -> None:

@@ -16,6 +16,6 @@ def test_every_number_is_named_with_its_figure() -> None:
 
 
 def test_what_a_file_gives_is_not_assumed() -> None:
-    assert assumed_words(replace(haulotte(), assumed=("max_steer",))) == ["largest steering angle 0.785 rad"]
+    assert assumed_words(replace(haulotte(), assumed=("max_steer",))) == ["largest steering angle 45°"]
     assert not assumed_words(replace(haulotte(), assumed=()))
     assert not assumed_words(replace(haulotte(), geometry=None, assumed=("geometry",)))

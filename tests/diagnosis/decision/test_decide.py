@@ -121,7 +121,7 @@ def test_every_fault_above_info_has_an_action() -> None:
     assert got.actions[0]["severity"] == "high"
     assert "FR speed sensor" in str(got.actions[0]["text"])
     assert "without signal" in str(got.actions[0]["text"])
-    assert got.title == "1 fault to repair, 2 to watch"
+    assert got.title == "1 fault to repair, 2 to watch, on 2 parts"
 
 
 def test_deviations_that_nothing_explains_give_no_all_clear() -> None:
@@ -260,7 +260,7 @@ def test_the_sentence_names_parts_in_the_order_of_the_actions_with_what_they_los
     assert got.text == (
         "The FL drive valve was without control signal for 4.0 s and stuck for 2.0 s; the FR speed sensor was stuck for 9.0 s."
     )
-    assert "inefficient (40 % lost) for 3.0 s" in str(got.actions[0]["text"])
+    assert "inefficient (40 % lost, 95 % bounds 39 to 41 %) for 3.0 s" in str(got.actions[0]["text"])
 
 
 def test_open_driving_has_the_reason_that_it_has_while_driving() -> None:

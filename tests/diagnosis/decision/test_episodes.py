@@ -57,6 +57,14 @@ def test_losses_of_another_size_are_another_fault() -> None:
     assert len(joined(loss(1000, 1500, 0.2), loss(3000, 3500, 0.6))) == 2
 
 
+def test_a_loss_that_grows_is_one_fault_with_its_course() -> None:
+    (one,) = joined(loss(1000, 1500, 0.1), loss(1500, 4500, 0.4))
+    assert (one.start, one.stop) == (1000, 4500)
+    assert one.epsilon is not None
+    assert 0.3 < one.epsilon.value <= 0.4
+    assert "2 stretches (1.0–1.5 s: 10 % lost, 1.5–4.5 s: 40 % lost)" in one.evidence[-1]
+
+
 def test_other_rows_are_other_faults() -> None:
     stuck = finding(Side.ACTUATOR, FaultMode.STUCK, 3000, 3500)
     assert len(joined(loss(1000, 1500), stuck, loss(6000, 6500))) == 3

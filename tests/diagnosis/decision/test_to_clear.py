@@ -5,12 +5,15 @@ from dataclasses import replace
 import numpy as np
 
 from diagnosis.decision.caveats import Reservations
+from diagnosis.decision.intervals import intervals_of
 from diagnosis.decision.to_clear import to_clear
 from diagnosis.results.assessment import CODE, Assessment, unassessed
 from diagnosis.results.clearing import Check, Checked
+from diagnosis.results.machine_words import HYDRAULIC
 from diagnosis.results.vocabulary import Kind, Tier
-from replay.faults import Side, State
-from replay.machine.config import Limits
+from replay.faults import FaultMode, Side, State
+from replay.machine.config import Limits, haulotte
+from tests.diagnosis.decision.findings import assessed, finding
 
 N = 1000
 OPEN = Assessment(np.full(N, CODE[State.NOT_ASSESSED]), {State.NOT_ASSESSED: "it may be either"}, tier=Tier.MODEL)
@@ -53,6 +56,19 @@ def test_of_many_open_checks_each_component_has_one_line() -> None:
     assert "by 40 % at 1.0–4.0 s" in one
     assert "20 %" not in one
     assert "hand tachometer" in one
+
+
+def test_what_deviates_while_a_fault_lasts_is_told_as_its_possible_doing() -> None:
+    parts = {("RR", "actuator"): assessed(finding(Side.ACTUATOR, FaultMode.STUCK, 1000, 3000))}
+    faults = intervals_of(parts, haulotte(), HYDRAULIC, 0, 1_000_000)
+    part = (Kind.WHEEL, "FR", Side.SENSOR_OR_ACTUATOR, Check.RESPONSE, 0.4, 0.1)
+    during, after, lasting = (Checked(*part, a, b) for a, b in ((2.0, 5.0), (4.0, 7.0), (None, None)))
+    rows = to_clear(Reservations(open=(during,)), PARTS, {}, {}, [], Limits(), faults)
+    assert rows[0].reason.startswith("While F1 lasts, which may explain it: the speed of FR per opening falls")
+    assert rows[0].act == "repair the RR drive valve (F1), then diagnose the next mission"
+    for check in (after, lasting):
+        (row,) = to_clear(Reservations(open=(check,)), PARTS, {}, {}, [], Limits(), faults)
+        assert "F1" not in row.reason + row.act
 
 
 def test_what_the_yaw_rate_shows_of_either_axle_is_said_once() -> None:

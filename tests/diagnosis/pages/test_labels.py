@@ -97,12 +97,12 @@ def test_titles_of_all_rows_with_their_sizes() -> None:
     assert list(titles.values()) == [
         "FR speed sensor: no signal",
         "FR speed sensor inefficient, 12 % lost",
-        "FR speed sensor noisy, 0.25 m/s r.m.s.",
+        "FR speed sensor noisy, 0.0307 m/s r.m.s. of noise",
         "FR drive valve: no control signal",
         "FR drive valve inefficient, 12 % lost",
-        "FR drive valve disturbed, 0.25 m/s r.m.s.",
+        "FR drive valve disturbed, 0.0307 m/s r.m.s. of noise",
         "FR speed sensor or drive valve: no signal",
         "FR speed sensor or drive valve inefficient, 12 % lost",
-        "FR speed sensor or drive valve noisy, 0.25 m/s r.m.s.",
+        "FR speed sensor or drive valve noisy, 0.0307 m/s r.m.s. of noise",
     ]
     assert labels.fault_title(fault(mode="inefficient", epsilon=None), HYDRAULIC) == "FR speed sensor inefficient"

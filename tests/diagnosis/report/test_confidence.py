@@ -72,7 +72,7 @@ def test_phrase_of_a_verdict() -> None:
         "All 2 wheel parts were judged, each for at least 90 % of its driving, by second measurements and a model of the "
         "wheels."
     )
-    assert judged(done) == "2 of 2 parts"
+    assert judged(done) == "all 2 parts"
     short = samples.report_with(coverage=[row("sensor", 98.0), row("actuator", 0.0, tier="none")])
     assert sure_of_verdict(short).startswith("1 of 2 wheel parts were judged long enough")
     assert sure_of_verdict(samples.report_with(coverage=[])) == ""

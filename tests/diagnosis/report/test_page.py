@@ -314,14 +314,14 @@ def test_a_verdict_without_an_answer_says_that_it_is_not_known() -> None:
 
 def test_loss_over_the_mission_stands_with_the_coverage() -> None:
     report, columns = samples.five_faults()
-    assert "Loss ε̂ over the mission" not in build_page(report, columns)
+    assert "Loss ε̂ over the whole mission" not in build_page(report, columns)
     epsilon = {"value": 0.123, "low": 0.1, "high": 0.15}
     first = report["coverage"][0]
     loss = [
         {"component": first["component"], "side": first["side"], "epsilon": epsilon, "seconds": 40.0, "relative": False}
     ]
     page = build_page({**report, "loss": loss}, columns)
-    assert "Loss ε̂ over the mission" in page
+    assert "Loss ε̂ over the whole mission" in page
     assert "0.123 (0.100 to 0.150)" in page
 
 

@@ -18,8 +18,9 @@ from markupsafe import Markup
 
 from diagnosis.audit.fleet.fault_types import FleetFaultRow
 from diagnosis.audit.fleet.fleet_types import AuditRow, CountsRow, FleetDocument, MachineRow
-from diagnosis.audit.fleet.leave import GONE, Leave, Left, lists_of
+from diagnosis.audit.fleet.leave import GONE, Left, lists_of
 from diagnosis.audit.fleet.listed import machine_words
+from diagnosis.audit.fleet.may_leave import Leave
 from diagnosis.audit.fleet.page import rows
 from diagnosis.audit.fleet.page.changes import changes_of
 from diagnosis.audit.fleet.page.matrix import matrix
@@ -27,8 +28,9 @@ from diagnosis.audit.fleet.page.shown import Context, ShownDocument, fault_addre
 from diagnosis.audit.fleet.page.svg import LEGEND, mark, sparkline, sprite
 from diagnosis.audit.fleet.page.trends import MOST, chosen, course, interest, level_words
 from diagnosis.audit.fleet.trend_types import TrendRow
-from diagnosis.audit.fleet.words import count, open_words
+from diagnosis.audit.fleet.words import count, missions_words, open_words
 from diagnosis.audit.store.outcome import MissionState
+from diagnosis.decision.wording import join_words
 from diagnosis.pages import labels
 from diagnosis.pages.environment import DARK, SHARED, asset, environment, shared_style
 from diagnosis.pages.mode_style import mode_rules
@@ -40,6 +42,7 @@ from replay.faults import SCALED
 _HERE = Path(__file__).parent
 _FAULTS = 400
 _OPEN_ROWS = 40
+_BLIND = 100  # machines whose parts that were not assessed are listed
 _FAILURES = 1000
 _FILTER = (Verdict.STOP, Verdict.WATCH, Verdict.READY, Verdict.NOT_ASSESSED)
 _UNITS = {"hours": "h", "days": "d"}
@@ -56,13 +59,15 @@ _DEFINITIONS = (
     "A fault of high severity that no longer shows may be a loose contact. It stays open until the repair of its part is recorded "
     "(mfhca audit --repaired), or until ten missions are clean that would have shown it: the part was assessed, and by its report the "
     "mission would have shown such a fault of ten seconds more often than not. Repaired: not found since the repair.",
+    "Counted: missions with a report. A copy of a log, a log that was not read and one that is not audited yet are missions that "
+    "do not count in machines, faults and trends.",
     "Assessed: judged for the seconds that the verdict “ready” takes, and for four fifths of its driving.",
-    "Trend: weighted line through the missions' ε̂ over time; the spread from mission to mission is estimated with it. "
+    "Trend: weighted line through the missions' ε̂ over time, each over its whole mission, while a fault's ε̂ is that of the fault's own time; the spread from mission to mission is estimated with it. "
     "Outliers (×) are excluded. A step or bend (↓ ↑ ∠), such as a repair, starts a new line. "
     "The band is its 90 % interval, the bar on the limit the 90 % interval of the crossing.",
     "A forecast needs five missions since the last change, and reaches at most three times as far ahead as the time that "
     "they cover. It gives the time at which the mean of missions reaches the limit if wear continues at this rate.",
-    "Copies of a log count once in machines, faults and trends, and for one machine: that in whose folder an audit saw the log first.",
+    "Copies of a log count once, and for one machine: that in whose folder an audit saw the log first.",
 )
 
 
@@ -95,6 +100,7 @@ def build_fleet_page(found: FleetDocument) -> str:
         "verdict": {**document["verdict"], "icon": document["verdict"]["status"].symbol},
         "counts": document["counts"],
         "span": _span(document["counts"]),
+        "missions_words": missions_words(document["counts"]["missions"], document["counts"]["counted"]),
         "audit": _audit(document["audit"]),
         "kpis": _kpis(document),
         "baseline": changes_of(document["baseline"], {m["label"]: words_of(m) for m in document["machines"]}),
@@ -110,6 +116,7 @@ def build_fleet_page(found: FleetDocument) -> str:
         "brief": sum(t["forecast"]["state"] == "not_known" for t in trends if all(t is not d for d in drawn)),
         "crowded": len(drawn) == MOST,
         "matrix": matrix(document["machines"]),
+        "blind": _blind(document["machines"][:_BLIND], document),
         "groups": [(*g, len(document["missions"]) <= _OPEN_ROWS) for g in rows.groups(document)],
         "cut": len(document["missions"]) > rows.LISTED,
         "failures": [document["missions"][k] for k in failed[:_FAILURES]],
@@ -206,16 +213,24 @@ def _kpis(document: ShownDocument) -> list[tuple[str, str, str]]:
         for n, words in (
             (c["not_assessed"], "not assessed"),
             (c["pending"], MissionState.PENDING.words),
-            (c["copies"], "copies"),
-            (c["gone"], "logs no longer there"),
+            (c["copies"], "copy" if c["copies"] == 1 else "copies"),
+            (c["gone"], "log no longer there" if c["gone"] == 1 else "logs no longer there"),
         )
         if n
     ]
-    judged = sum(len(m["missions"]) + len(m["undated"]) for m in document["machines"])
-    share = f"{100 * c['with_faults'] / judged:.0f} % of those judged" if judged else "none judged"
+    counted = c["counted"]
+    share = (
+        f"{100 * c['with_faults'] / counted:.0f} % of the {labels.grouped(counted)} counted"
+        if counted
+        else "none counted"
+    )
     f = c["faults"]
     return [
-        (labels.grouped(c["missions"]), "missions", ", ".join([*unread, *rest]) or "all read whole"),
+        (
+            labels.grouped(c["missions"]),
+            "missions",
+            ", ".join([f"{labels.grouped(counted)} counted", *unread, *rest]),
+        ),
         (
             _hours(c["driving_s"]),
             "driving time",
@@ -237,13 +252,31 @@ def _kpis(document: ShownDocument) -> list[tuple[str, str, str]]:
 
 def _coverage(machines: Sequence[MachineRow]) -> str:
     """What the machines' last missions assessed; not known where the last one may be one without a date or a report."""
-    blind = sum(p["assessed_last"] is False for m in machines for p in m["parts"])
+    blind = sum(len(unassessed(m)) for m in machines)
     dark = sum(
         not m["parts"] or m["unjudged"] > 0 or any(p["assessed_last"] is None for p in m["parts"]) for m in machines
     )
     words = [f"{count(blind, 'part')} not assessed in the last mission"] if blind else []
     words += [f"{'' if blind else 'last mission '}not known of {count(dark, 'machine')}"] if dark else []
     return ", ".join(words) or "every part assessed in the last mission"
+
+
+def unassessed(m: MachineRow) -> list[str]:
+    """Parts that the machine's last mission did not assess."""
+    words = words_of(m)
+    return [words.part_words(p["kind"], p["component"], p["side"]) for p in m["parts"] if p["assessed_last"] is False]
+
+
+def _blind(machines: Sequence[MachineRow], document: ShownDocument) -> list[Context]:
+    """Machines with parts that their last mission did not assess: which, and the report that says what would assess them."""
+    out: list[Context] = []
+    for m in machines:
+        parts = unassessed(m)
+        if parts:
+            last = document["missions"][m["missions"][-1]] if m["missions"] else None
+            address = "" if last is None or not last["address"] else last["address"]
+            out.append({"label": m["label"], "parts": join_words(parts), "address": address})
+    return out
 
 
 def _machine(

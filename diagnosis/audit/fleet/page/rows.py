@@ -11,6 +11,7 @@ from diagnosis.audit.fleet.fault_types import FleetFaultRow, MissionFaultRow
 from diagnosis.audit.fleet.fleet_types import MachineRow, MissionRow
 from diagnosis.audit.fleet.page.shown import ShownDocument, ShownMission
 from diagnosis.audit.fleet.page.svg import mark
+from diagnosis.audit.fleet.words import missions_words
 from diagnosis.audit.store.outcome import MissionState
 from diagnosis.pages import labels
 from diagnosis.results.fault_rows import state_label
@@ -98,9 +99,8 @@ def groups(document: ShownDocument) -> Iterator[tuple[str, str, int, Markup]]:
     for k, m in enumerate(machines):
         every = [*reversed(m["missions"]), *m["undated"], *m["failed"], *copies[k]]
         listed = _telling(missions.as_found, every, most)
-        words = (
-            f"{len(every)} mission{'s' if len(every) != 1 else ''}, {m['with_faults']} with faults{_cut(listed, every)}"
-        )
+        counted = missions_words(len(every), len(m["missions"]) + len(m["undated"]))
+        words = f"{counted}, {m['with_faults']} with faults{_cut(listed, every)}"
         yield m["label"], words, len(listed), Markup("".join(_row(missions[r], words_of(m)) for r in listed))
     if rest:
         listed = rest[:most]

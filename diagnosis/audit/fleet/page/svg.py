@@ -57,6 +57,11 @@ def sparkline(trend: TrendRow) -> Markup:
     ).format(limit, d, float(x[-1]), float(y[-1]))
 
 
+def physical(trend: TrendRow) -> tuple[float, float]:
+    """Least and largest value that a line can mean: ε is 0 to 1; estimates of a loss may lie somewhat below 0."""
+    return min(0.0, *(p[2] for p in trend["points"])), 1.0
+
+
 def trend_picture(trend: TrendRow, title: str, unit: str) -> Markup:
     """Estimates with 95 % bounds, the last stretch's line with its 90 % band, and where that meets the limit.
 
@@ -126,20 +131,34 @@ def _line(frame: Frame, trend: TrendRow, line: LineRow, points: Array, end: floa
     inside = half**2 + spread**2 * ((x - centre) ** 2 - (now - centre) ** 2)
     band = scale * np.sqrt(np.maximum(inside, 0.0))
     middle = level["value"] + slope["value"] * (x - now)
-    px, upper, lower = frame.px(x), frame.py(middle + band), frame.py(middle - band)
+    least, most = physical(trend)
+    least, most = max(least, frame.y[0]), min(most, frame.y[1])
+    px, upper, lower = (
+        frame.px(x),
+        frame.py(np.clip(middle + band, least, most)),
+        frame.py(np.clip(middle - band, least, most)),
+    )
     path = "L".join(f"{a:.1f} {b:.1f}" for a, b in zip([*px, *px[::-1]], [*upper, *lower[::-1]], strict=True))
-    d = "M{:.1f} {:.1f}L{:.1f} {:.1f}"
-    if slope["value"] > 0:  # to where it leaves the picture
-        stop = min(stop, max(now, now + (frame.y[1] - level["value"]) / slope["value"]))
-    ends = [(v, level["value"] + slope["value"] * (v - now)) for v in (begin, now, stop)]
-    (x0, y0), (x1, y1), (x2, y2) = ((float(frame.px(v)), float(frame.py(w))) for v, w in ends)
-    out = [
-        Markup('<path class="band" d="M{}Z"/>').format(path),
-        Markup('<path class="fit" d="{}"/>').format(d.format(x0, y0, x1, y1)),
-    ]
-    if stop > now:
-        out.append(Markup('<path class="fit far" d="{}"/>').format(d.format(x1, y1, x2, y2)))
+    out = [Markup('<path class="band" d="M{}Z"/>').format(path)]
+    for style, a, b in (("fit", begin, now), ("fit far", now, stop)):
+        within = _within(a, b, (level["value"] - slope["value"] * now, slope["value"]), least, most)
+        if within is not None:
+            (x0, y0), (x1, y1) = ((float(frame.px(v)), float(frame.py(w))) for v, w in within)
+            out.append(Markup('<path class="{}" d="M{:.1f} {:.1f}L{:.1f} {:.1f}"/>').format(style, x0, y0, x1, y1))
     return out
+
+
+def _within(
+    a: float, b: float, line: tuple[float, float], least: float, most: float
+) -> tuple[tuple[float, float], tuple[float, float]] | None:
+    """Ends of a line (its value at 0, its slope) from a to b as far as it lies between two values; None where it does not."""
+    at, slope = line
+    if slope:
+        first, last = sorted(((least - at) / slope, (most - at) / slope))
+        a, b = max(a, first), min(b, last)
+    elif not least <= at <= most:
+        return None
+    return ((a, at + slope * a), (b, at + slope * b)) if b > a else None
 
 
 def _crossing(frame: Frame, limit: float, now: float, f: ForecastRow, end: float) -> Markup:

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from diagnosis.audit.fleet.fleet_types import MachineRow
 from diagnosis.audit.fleet.page.shown import Context
-from diagnosis.audit.fleet.page.svg import trend_picture
+from diagnosis.audit.fleet.page.svg import physical, trend_picture
 from diagnosis.audit.fleet.trend_types import TrendRow
 from diagnosis.audit.fleet.words import count, round_to
 from diagnosis.results.machine_words import words_of
@@ -24,7 +24,8 @@ def interest(t: TrendRow) -> tuple[bool, float, float]:
 
 def level_words(t: TrendRow) -> str:
     """Loss of the last mission, as its report has it, and where the losses go."""
-    return f"ε̂ {t['points'][-1][2]:.2f} in its last mission".replace("-", "−") + (
+    last = round(t["points"][-1][2], 2) + 0.0  # no negative zero
+    return f"ε̂ {last:.2f} in its last mission".replace("-", "−") + (
         f", {t['direction']}" if t["direction"] != "not_known" else ""
     )
 
@@ -58,7 +59,8 @@ def course(t: TrendRow, machines: Sequence[MachineRow], unit: str) -> Context:
     if line is not None and t["forecast"]["state"] != "not_known":
         between = _between(t)
         low, high = (f"{between * v:+.3f}".replace("-", "−") for v in (line["slope"]["low"], line["slope"]["high"]))
-        level = line["level"]
+        least, most = physical(t)
+        level = {k: min(max(line["level"][k], least), most) for k in ("value", "low", "high")}
         notes.append(
             f"by the line, ε̂ is {level['value']:.3f} now ({level['low']:.3f} to {level['high']:.3f}) and changes by {low} to {high} per mission "
             f"({round_to(between)} {unit} apart), 95 %".replace("-", "−")
@@ -81,5 +83,5 @@ def course(t: TrendRow, machines: Sequence[MachineRow], unit: str) -> Context:
         "state": state,
         "picture": trend_picture(t, title, unit),
         "words": words[:1].upper() + words[1:],
-        "more": "; ".join(notes),
+        "more": " ".join(f"{note[:1].upper()}{note[1:]}." for note in notes),
     }

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from diagnosis.audit.fleet.leave import Leave, Left, lists_of
+from diagnosis.audit.fleet.leave import Left, lists_of
+from diagnosis.audit.fleet.may_leave import Leave
 from diagnosis.audit.fleet.page.page import build_fleet_page
 from diagnosis.audit.fleet_files import fleet_json, load_fleet
 from tests import fleet_samples as samples

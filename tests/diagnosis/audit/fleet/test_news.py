@@ -15,7 +15,7 @@ from tests.fleet_samples import Fault, Sample
 
 OLD = [Sample("d0", verdict="watch", faults=[Fault()]), Sample("d1", day=1.0)]
 STUCK = Sample("d2", day=2.0, verdict="stop", faults=[Fault("FR", "sensor", "stuck", "high"), Fault()])
-SAID = "New since the run before, in 1 mission: HX-1 FR speed sensor stuck (high)."
+SAID = "The last audit run brought 1 mission; first seen in it: HX-1 FR speed sensor stuck (high)."
 
 
 def written(tmp_path: Path, run: int, missions: Sequence[Sample]) -> dict[str, Any]:
@@ -29,7 +29,7 @@ def written(tmp_path: Path, run: int, missions: Sequence[Sample]) -> dict[str, A
 
 
 def news_of(document: dict[str, Any]) -> list[str]:
-    return [t for t in document["verdict"]["text"] if t.startswith("New since")]
+    return [t for t in document["verdict"]["text"] if t.startswith("The last audit run")]
 
 
 def test_the_first_run_calls_nothing_new(tmp_path: Path) -> None:
@@ -62,7 +62,7 @@ def test_a_mission_is_new_in_the_run_that_judged_it(tmp_path: Path) -> None:
 def test_new_missions_without_a_new_fault_say_so(tmp_path: Path) -> None:
     written(tmp_path, 1, OLD)
     d = written(tmp_path, 2, [*OLD, Sample("d2", day=2.0)])
-    assert d["verdict"]["text"][0] == "New since the run before, in 1 mission: no new fault."
+    assert d["verdict"]["text"][0] == "The last audit run brought 1 mission, without a fault that was not known."
 
 
 def test_nothing_is_called_new_where_the_run_before_is_not_known(tmp_path: Path) -> None:

@@ -29,14 +29,14 @@ def test_a_log_that_may_be_of_several_machines_leaves_none_ready_for_certain(tmp
     d = document(tmp_path, Sample("d0"), Sample("d1", "HX-2"), EMPTY)
     assert [m["verdict"] for m in d["machines"]] == ["ready", "ready"]
     assert d["verdict"]["status"] == "not_assessed"
-    assert d["verdict"]["title"] == "2 machines are ready, but 1 log of no known machine was not judged"
+    assert d["verdict"]["title"] == "Both machines may go out, but 1 log of no known machine was not judged"
 
 
 def test_a_log_counts_for_the_machine_that_alone_has_judged_missions_around_it(tmp_path: Path) -> None:
     broken = Sample("a/new/day2", "", state="unreadable")
     d = document(tmp_path, Sample("a/old/day0"), Sample("a/old/day1", day=1.0), Sample("b/day0", "HX-2"), broken)
     assert {m["label"]: m["verdict"] for m in d["machines"]} == {"HX-1": "not_assessed", "HX-2": "ready"}
-    assert d["verdict"]["title"] == "1 of 2 machines is ready, 1 is not assessed"
+    assert d["verdict"]["title"] == "1 of 2 machines may go out, of 1 it is not known"
     assert "Not assessed (1): HX-1 (since 2026-10-27: last judged ready)." in d["verdict"]["text"]
 
 

@@ -66,7 +66,7 @@ def test_a_newest_mission_that_was_not_judged_is_no_leave(
 
 def test_an_earlier_mission_that_was_not_judged_takes_nothing_away(tmp_path: Path) -> None:
     d = document(tmp_path, Sample("d0", verdict="not_assessed"), *READY[1:])
-    assert d["verdict"]["title"] == "The machine is ready"
+    assert d["verdict"]["title"] == "The machine may go out"
 
 
 @pytest.mark.parametrize(("day", "verdict"), [(0.9, "ready"), (1.1, "not_assessed")])
@@ -194,7 +194,7 @@ def test_logs_not_read_and_missions_not_assessed_are_both_counted(tmp_path: Path
     bad = [Sample(f"u{k}", state="unreadable") for k in range(2)]
     open_ = [Sample(f"n{k}", day=k + 1.0, verdict="not_assessed") for k in range(2)]
     text = document(tmp_path, Sample("a"), *bad, *open_)["verdict"]["text"]
-    assert "4 logs could not be read or judged: 2 not read, 2 read but not assessed." in text
+    assert "2 logs could not be read; 2 missions were read, but not assessed." in text
 
 
 @pytest.mark.parametrize(("n", "more"), [(5, ""), (12, ""), (15, " and 3 more: listed below")])
@@ -226,14 +226,51 @@ def test_a_damaged_log_is_no_work_to_do(tmp_path: Path) -> None:
         Sample("b", "M2"),
         Sample("c", "M3", verdict="stop", faults=[Fault()]),
     )
-    assert d["verdict"]["title"] == "1 of 3 machines needs work, 1 has a damaged log"
+    assert d["verdict"]["title"] == "1 of 3 machines must not go out, 1 may go out, of 1 it is not known"
     standing = {m["id"]: m["standing"] for m in d["machines"]}
     assert standing["M1"] == "No fault found, but its last log is damaged"
     d = document(tmp_path / "two", Sample("a", "M1", verdict="watch"), Sample("b", "M2"))
-    assert d["verdict"]["title"] == "1 of 2 machines is ready, 1 has a damaged log"
+    assert d["verdict"]["title"] == "1 of 2 machines may go out, of 1 it is not known"
     assert (d["verdict"]["status"], d["verdict"]["tag"]) == ("watch", "1 machine: damaged logs")
     d = document(tmp_path / "one", Sample("a", "M1", verdict="watch"))
-    assert d["verdict"]["title"] == "The machine is not known to be ready"
+    assert d["verdict"]["title"] == "It is not known whether the machine may go out"
+
+
+@pytest.mark.parametrize(
+    ("verdicts", "title"),
+    [
+        (["ready"], "The machine may go out"),
+        (["stop"], "The machine must not go out"),
+        (["ready", "ready", "ready"], "All 3 machines may go out"),
+        (["stop", "stop"], "Both machines must not go out"),
+        (["stop", "ready", "not_assessed"], "1 of 3 machines must not go out, 1 may go out, of 1 it is not known"),
+        (["not_assessed", "not_assessed"], "Both machines need a look: whether they may go out is not known"),
+    ],
+)
+def test_the_headline_counts_machines_as_the_lists_do(tmp_path: Path, verdicts: list[str], title: str) -> None:
+    stuck = [Fault(mode="stuck", severity="high")]
+    d = document(
+        tmp_path,
+        *(Sample(f"{k}", f"M{k}", verdict=v, faults=stuck if v == "stop" else []) for k, v in enumerate(verdicts)),
+    )
+    assert d["verdict"]["title"] == title
+
+
+def test_missions_that_count_are_told_from_all(tmp_path: Path) -> None:
+    d = document(
+        tmp_path,
+        Sample("a", copies=["copy"]),
+        Sample("b", day=1.0),
+        Sample("c", state="unreadable"),
+        Sample("d", state=None),
+    )
+    assert (d["counts"]["missions"], d["counts"]["counted"]) == (5, 2)
+    assert "5 missions, 2 of them counted" in build_fleet_page(d)
+
+
+def test_parts_that_the_last_mission_did_not_assess_are_named(tmp_path: Path) -> None:
+    d = document(tmp_path, Sample("a"), Sample("b", day=1.0, blind=[("rear", "sensor"), ("RL", "actuator")]))
+    assert "RL drive valve and rear steering sensor – <a" in build_fleet_page(d)
 
 
 def test_a_file_that_was_left_out_is_no_damage(tmp_path: Path) -> None:
@@ -241,7 +278,7 @@ def test_a_file_that_was_left_out_is_no_damage(tmp_path: Path) -> None:
     d = document(tmp_path, Sample("a", "M1", state="degraded", verdict="watch", reason=reason), Sample("b", "M2"))
     standing = {m["id"]: m["standing"] for m in d["machines"]}
     assert standing["M1"] == "No fault found, but a file of its last log was left out"
-    assert d["verdict"]["title"] == "1 of 2 machines is ready, 1 has a log without one of its files"
+    assert d["verdict"]["title"] == "1 of 2 machines may go out, of 1 it is not known"
     assert d["verdict"]["tag"] == "1 machine: files left out"
 
 

@@ -1,0 +1,33 @@
+"""Whether a machine may go out, by its verdict and what is open: one rule for headline, lists and terminal."""
+
+from __future__ import annotations
+
+from enum import StrEnum
+
+from diagnosis.results.vocabulary import Verdict
+
+
+class Leave(StrEnum):
+    """Whether a machine may go out."""
+
+    MUST_NOT = "must not go out"
+    NOT_KNOWN = "not known whether it may go out"
+    MAY = "may go out"
+
+
+def leave_of(verdict: Verdict | str, cleared: bool | None, unjudged: int) -> Leave:
+    """Whether a machine may go out.
+
+    Parameters
+    ----------
+    verdict : Verdict or str
+        Where the machine stands.
+    cleared : bool or None
+        Whether its reports let it go out; None: they do not say.
+    unjudged : int
+        Missions that were not judged and may be later than the last judged one.
+    """
+    if verdict == Verdict.STOP:
+        return Leave.MUST_NOT
+    fit = verdict == Verdict.READY or (verdict == Verdict.WATCH and cleared is True)
+    return Leave.MAY if fit and not unjudged else Leave.NOT_KNOWN
