@@ -23,14 +23,13 @@ from diagnosis.audit.fleet.listed import machine_words
 from diagnosis.audit.fleet.may_leave import Leave
 from diagnosis.audit.fleet.page import rows
 from diagnosis.audit.fleet.page.changes import changes_of
+from diagnosis.audit.fleet.page.figures import blind, hours, kpis
 from diagnosis.audit.fleet.page.matrix import matrix
 from diagnosis.audit.fleet.page.shown import Context, ShownDocument, fault_address, shown
 from diagnosis.audit.fleet.page.svg import LEGEND, mark, sparkline, sprite
 from diagnosis.audit.fleet.page.trends import MOST, chosen, course, interest, level_words
 from diagnosis.audit.fleet.trend_types import TrendRow
 from diagnosis.audit.fleet.words import count, missions_words, open_words
-from diagnosis.audit.store.outcome import MissionState
-from diagnosis.decision.wording import join_words
 from diagnosis.pages import labels
 from diagnosis.pages.environment import DARK, SHARED, asset, environment, shared_style
 from diagnosis.pages.mode_style import mode_rules
@@ -102,7 +101,7 @@ def build_fleet_page(found: FleetDocument) -> str:
         "span": _span(document["counts"]),
         "missions_words": missions_words(document["counts"]["missions"], document["counts"]["counted"]),
         "audit": _audit(document["audit"]),
-        "kpis": _kpis(document),
+        "kpis": kpis(document),
         "baseline": changes_of(document["baseline"], {m["label"]: words_of(m) for m in document["machines"]}),
         "leave": _leave(lists_of(found), document),
         "strip": rows.strip_length(len(document["machines"])),
@@ -116,7 +115,7 @@ def build_fleet_page(found: FleetDocument) -> str:
         "brief": sum(t["forecast"]["state"] == "not_known" for t in trends if all(t is not d for d in drawn)),
         "crowded": len(drawn) == MOST,
         "matrix": matrix(document["machines"]),
-        "blind": _blind(document["machines"][:_BLIND], document),
+        "blind": blind(document["machines"][:_BLIND], document),
         "groups": [(*g, len(document["missions"]) <= _OPEN_ROWS) for g in rows.groups(document)],
         "cut": len(document["missions"]) > rows.LISTED,
         "failures": [document["missions"][k] for k in failed[:_FAILURES]],
@@ -198,87 +197,6 @@ def _audit(audit: AuditRow) -> str:
     return Markup(", ").join(words)
 
 
-def _hours(seconds: float) -> str:
-    if not seconds:
-        return "–"
-    return f"{seconds / 3600:.1f} h" if seconds >= 1800 else labels.span(seconds)
-
-
-def _kpis(document: ShownDocument) -> list[tuple[str, str, str]]:
-    """Value, what it is, and what belongs to it."""
-    c = document["counts"]
-    unread = [f"{labels.grouped(c['states'][s])} {s.words}" for s in MissionState if s.words and c["states"].get(s)]
-    rest = [
-        f"{labels.grouped(n)} {words}"
-        for n, words in (
-            (c["not_assessed"], "not assessed"),
-            (c["pending"], MissionState.PENDING.words),
-            (c["copies"], "copy" if c["copies"] == 1 else "copies"),
-            (c["gone"], "log no longer there" if c["gone"] == 1 else "logs no longer there"),
-        )
-        if n
-    ]
-    counted = c["counted"]
-    share = (
-        f"{100 * c['with_faults'] / counted:.0f} % of the {labels.grouped(counted)} counted"
-        if counted
-        else "none counted"
-    )
-    f = c["faults"]
-    return [
-        (
-            labels.grouped(c["missions"]),
-            "missions",
-            ", ".join([f"{labels.grouped(counted)} counted", *unread, *rest]),
-        ),
-        (
-            _hours(c["driving_s"]),
-            "driving time",
-            f"{c['distance_m'] / 1000:.{1 if c['distance_m'] >= 1000 else 3}f} km",
-        ),
-        (labels.grouped(c["with_faults"]), "missions with faults", share),
-        (
-            f"{f['new']} / {f['recurring']} / {f['past']}",
-            "new, recurring, past faults",
-            f"{count(f['once'], 'other')} found once",
-        ),
-        (
-            "–" if c["decided"] is None else f"{100 * c['decided']:.1f} %",
-            "of driving time judged",
-            "nothing judged" if c["decided"] is None else _coverage(document["machines"]),
-        ),
-    ]
-
-
-def _coverage(machines: Sequence[MachineRow]) -> str:
-    """What the machines' last missions assessed; not known where the last one may be one without a date or a report."""
-    blind = sum(len(unassessed(m)) for m in machines)
-    dark = sum(
-        not m["parts"] or m["unjudged"] > 0 or any(p["assessed_last"] is None for p in m["parts"]) for m in machines
-    )
-    words = [f"{count(blind, 'part')} not assessed in the last mission"] if blind else []
-    words += [f"{'' if blind else 'last mission '}not known of {count(dark, 'machine')}"] if dark else []
-    return ", ".join(words) or "every part assessed in the last mission"
-
-
-def unassessed(m: MachineRow) -> list[str]:
-    """Parts that the machine's last mission did not assess."""
-    words = words_of(m)
-    return [words.part_words(p["kind"], p["component"], p["side"]) for p in m["parts"] if p["assessed_last"] is False]
-
-
-def _blind(machines: Sequence[MachineRow], document: ShownDocument) -> list[Context]:
-    """Machines with parts that their last mission did not assess: which, and the report that says what would assess them."""
-    out: list[Context] = []
-    for m in machines:
-        parts = unassessed(m)
-        if parts:
-            last = document["missions"][m["missions"][-1]] if m["missions"] else None
-            address = "" if last is None or not last["address"] else last["address"]
-            out.append({"label": m["label"], "parts": join_words(parts), "address": address})
-    return out
-
-
 def _machine(
     k: int,
     m: MachineRow,
@@ -311,7 +229,7 @@ def _machine(
         if leading and line
         else "",
         "level": leading["points"][-1][2] if leading and line else -1.0,
-        "driven": _hours(m["driving_s"]),
+        "driven": hours(m["driving_s"]),
         "driving_s": m["driving_s"],
         "decided": "–" if m["decided"] is None else f"{100 * m['decided']:.0f} %",
         "share": m["decided"] or 0.0,

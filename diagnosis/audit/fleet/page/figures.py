@@ -1,0 +1,95 @@
+"""The fleet page's figures: missions, driving, faults, what was judged, and the parts that the last missions did not assess."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from diagnosis.audit.fleet.fleet_types import MachineRow
+from diagnosis.audit.fleet.page.shown import Context, ShownDocument
+from diagnosis.audit.fleet.words import count
+from diagnosis.audit.store.outcome import MissionState
+from diagnosis.decision.wording import join_words
+from diagnosis.pages import labels
+from diagnosis.results.machine_words import words_of
+
+
+def hours(seconds: float) -> str:
+    """A driving time in hours, a short one in minutes and seconds."""
+    if not seconds:
+        return "–"
+    return f"{seconds / 3600:.1f} h" if seconds >= 1800 else labels.span(seconds)
+
+
+def kpis(document: ShownDocument) -> list[tuple[str, str, str]]:
+    """Value, what it is, and what belongs to it."""
+    c = document["counts"]
+    unread = [f"{labels.grouped(c['states'][s])} {s.words}" for s in MissionState if s.words and c["states"].get(s)]
+    rest = [
+        f"{labels.grouped(n)} {words}"
+        for n, words in (
+            (c["not_assessed"], "not assessed"),
+            (c["pending"], MissionState.PENDING.words),
+            (c["copies"], "copy" if c["copies"] == 1 else "copies"),
+            (c["gone"], "log no longer there" if c["gone"] == 1 else "logs no longer there"),
+        )
+        if n
+    ]
+    counted = c["counted"]
+    share = (
+        f"{100 * c['with_faults'] / counted:.0f} % of the {labels.grouped(counted)} counted"
+        if counted
+        else "none counted"
+    )
+    f = c["faults"]
+    return [
+        (
+            labels.grouped(c["missions"]),
+            "missions",
+            ", ".join([f"{labels.grouped(counted)} counted", *unread, *rest]),
+        ),
+        (
+            hours(c["driving_s"]),
+            "driving time",
+            f"{c['distance_m'] / 1000:.{1 if c['distance_m'] >= 1000 else 3}f} km",
+        ),
+        (labels.grouped(c["with_faults"]), "missions with faults", share),
+        (
+            f"{f['new']} / {f['recurring']} / {f['past']}",
+            "new, recurring, past faults",
+            f"{count(f['once'], 'other')} found once",
+        ),
+        (
+            "–" if c["decided"] is None else f"{100 * c['decided']:.1f} %",
+            "of driving time judged",
+            "nothing judged" if c["decided"] is None else _coverage(document["machines"]),
+        ),
+    ]
+
+
+def _coverage(machines: Sequence[MachineRow]) -> str:
+    """What the machines' last missions assessed; not known where the last one may be one without a date or a report."""
+    blind = sum(len(unassessed(m)) for m in machines)
+    dark = sum(
+        not m["parts"] or m["unjudged"] > 0 or any(p["assessed_last"] is None for p in m["parts"]) for m in machines
+    )
+    words = [f"{count(blind, 'part')} not assessed in the last mission"] if blind else []
+    words += [f"{'' if blind else 'last mission '}not known of {count(dark, 'machine')}"] if dark else []
+    return ", ".join(words) or "every part assessed in the last mission"
+
+
+def unassessed(m: MachineRow) -> list[str]:
+    """Parts that the machine's last mission did not assess."""
+    words = words_of(m)
+    return [words.part_words(p["kind"], p["component"], p["side"]) for p in m["parts"] if p["assessed_last"] is False]
+
+
+def blind(machines: Sequence[MachineRow], document: ShownDocument) -> list[Context]:
+    """Machines with parts that their last mission did not assess: which, and the report that says what would assess them."""
+    out: list[Context] = []
+    for m in machines:
+        parts = unassessed(m)
+        if parts:
+            last = document["missions"][m["missions"][-1]] if m["missions"] else None
+            address = "" if last is None or not last["address"] else last["address"]
+            out.append({"label": m["label"], "parts": join_words(parts), "address": address})
+    return out
