@@ -5,12 +5,14 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from diagnosis.decision.caveats import Reservations, caveats_of, doubt_of, limits_of, open_words, smallest_loads
 from diagnosis.decision.short import ToClear
 from diagnosis.decision.to_clear import to_clear
 from diagnosis.decision.wording import actions_of, count_faults, join_words, seconds_words, sentence_of
 from diagnosis.results.assessed import needed_s
-from diagnosis.results.assessment import Assessment
+from diagnosis.results.assessment import STATES, Assessment
 from diagnosis.results.clearing import Check, Checked
 from diagnosis.results.document import ActionRow, VerdictRow
 from diagnosis.results.left_out import only_left_out
@@ -27,6 +29,7 @@ Part = tuple[str, str]
 
 _COMPARED_WHEELS = 3
 _UNEXPLAINED_S = 0.5
+_MOSTLY = 0.5
 _NO_YAW = "An offset of a steering sensor that is there from start to end does not show in this log. A yaw rate (imu.yaw_rate) would show it."
 
 _SENSORS_ALONE = "No sensor fault seen, drives not judged"
@@ -199,10 +202,19 @@ def _reservations(
     own_model = _modelled(assessments) and model is not None and model.identified
     return Reservations(
         short=tuple(p for p in wheels if decided_s.get(p, 0.0) < needed_s(driven.get(p, 0.0), limits.min_assessed)),
-        unexplained=tuple(p for p in wheels if assessments[p].unexplained_s >= _UNEXPLAINED_S),
+        unexplained=tuple(
+            p
+            for p, a in assessments.items()
+            if (a.unexplained_s >= _UNEXPLAINED_S if p in wheels else a.unexplained_s > 0.0 and _mostly_open(a))
+        ),
         not_compared=own_model and model is not None and len(model.plants) < _COMPARED_WHEELS,
         damage=tuple(damage),
     )
+
+
+def _mostly_open(assessment: Assessment) -> bool:
+    """Whether a side was not assessed for most of the mission."""
+    return bool(np.mean(assessment.states == STATES.index(State.NOT_ASSESSED)) > _MOSTLY)
 
 
 def _modelled(assessments: Mapping[Part, Assessment]) -> bool:
@@ -246,7 +258,12 @@ def _without_faults(
         return Decision(Verdict.NOT_ASSESSED, "Not judged long enough", text)
     if against.unexplained:
         who = join_words(
-            sorted({against.words.part_words(Kind.WHEEL, c, Side.SENSOR_OR_ACTUATOR) for c, _ in against.unexplained})
+            sorted(
+                {
+                    against.words.part_words(Kind.STEER if c in axles else Kind.WHEEL, c, Side.SENSOR_OR_ACTUATOR)
+                    for c, _ in against.unexplained
+                }
+            )
         )
         most = max(assessments[part].unexplained_s for part in against.unexplained)
         text = f"No fault was identified, but no single fault explains the residual of the {who} for up to {seconds_words(most)}."

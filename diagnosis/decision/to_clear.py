@@ -57,16 +57,25 @@ def to_clear(
     out += [ToClear(text, "correct [signals] in the machine file, and diagnose again") for text in against.hints]
     out += short_parts(against.short, assessments, decided_s, driven, limits, words, open_state=against.open_state)
     if against.unexplained:
-        who = join_words(
-            sorted({words.part_words(Kind.WHEEL, c, Side.SENSOR_OR_ACTUATOR) for c, _ in against.unexplained})
-        )
-        other = " or wheel.<part>.u_applied (the valve position)" if words.drive == "valve" else ""
-        out.append(
-            ToClear(
-                f"{who}: no single fault explains the residual.",
-                f"inspect these parts, and log wheel.<part>.v_true (a second speed){other}",
+        for kind, second in (
+            (Kind.WHEEL, "wheel.<part>.v_true (a second speed)"),
+            (Kind.STEER, "steer.<part>.phi_true (a second angle)"),
+        ):
+            parts = {c for c, _ in against.unexplained if (c in axles) is (kind is Kind.STEER)}
+            if not parts:
+                continue
+            who = join_words(sorted(words.part_words(kind, c, Side.SENSOR_OR_ACTUATOR) for c in parts))
+            other = (
+                " or wheel.<part>.u_applied (the valve position)"
+                if words.drive == "valve" and kind is Kind.WHEEL
+                else ""
             )
-        )
+            out.append(
+                ToClear(
+                    f"{who}: no single fault explains the residual.",
+                    f"inspect these parts, and log {second}{other}",
+                )
+            )
     if against.not_compared:
         out.append(
             ToClear(
