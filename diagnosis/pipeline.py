@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 from diagnosis.assess import ComponentResult, assess_components
 from diagnosis.channels.copied_rows import without_copied_rows
 from diagnosis.channels.recording_gaps import recording_gaps, without_gaps
-from diagnosis.clearing.mapping import mapping_hints
+from diagnosis.clearing.backwards import without_claims
+from diagnosis.clearing.mapping import backwards, mapping_hints
 from diagnosis.clearing.standing_out import what_stands_out, with_findings
 from diagnosis.decision import metrics, quality
 from diagnosis.decision.episodes import with_episodes
@@ -157,7 +158,7 @@ def _walk(
     found = _outside_gaps(assess_components(timeline, replay, machine, chosen, publish), timeline)
     _require_something(found.assessments, mission, machine)
     publish(Progress(Stage.DECIDING))
-    judged = _with_what_stands_out(Judged(mission, recorded, machine, replay, found))
+    judged = _with_what_stands_out(_without_backwards(Judged(mission, recorded, machine, replay, found)))
     found = judged.found
     report = report_of_mission(judged, identity)
     timeline.store.release()
@@ -174,6 +175,16 @@ def _outside_gaps(found: ComponentResult, timeline: Timeline) -> ComponentResult
     seen = {key: without_gaps(a, gaps, timeline) for key, a in found.assessments.items()}
     joined = with_episodes(seen, timeline.dt)
     return replace(found, assessments=with_second_onsets(joined, timeline.dt))
+
+
+def _without_backwards(judged: Judged) -> Judged:
+    """The same without what models claim of parts whose channel counts backwards."""
+    found = judged.found
+    named = {component for (component, _), a in found.assessments.items() if a.findings}
+    if not (wrong := named & backwards(judged.cells)):
+        return judged
+    told = without_claims(found.assessments, wrong, judged.mission.timeline.dt)
+    return Judged(judged.mission, judged.recorded, judged.machine, judged.replay, replace(found, assessments=told))
 
 
 def _with_what_stands_out(judged: Judged) -> Judged:

@@ -40,6 +40,7 @@ _FACTORS: tuple[tuple[float, str], ...] = (
     (0.001, "1/1000 times"),
 )
 
+_THROUGHOUT = "runs against"
 _LOOK = "look at its entry in the machine file ([signals] channel, sign, unit or scale) before any part is replaced."
 
 
@@ -70,6 +71,11 @@ def mapping_hints(cells: Cells) -> tuple[str, ...]:
         )
 
 
+def backwards(cells: Cells) -> frozenset[str]:
+    """Components whose speed, angle or command runs against what it should follow throughout, as `mapping_hints` says."""
+    return frozenset(_part(text) for text in mapping_hints(cells) if _THROUGHOUT in text)
+
+
 def _openings(cells: Cells, opening: Array, wanted: Array, names: Sequence[str], what: str) -> Iterator[str]:
     """Hints for valve commands, whose size says nothing, by what they cause."""
     scaled = opening * (np.nanmean(np.abs(wanted), axis=0) / np.maximum(np.nanmean(np.abs(opening), axis=0), 1e-6))
@@ -94,7 +100,7 @@ def _hints(
     usual = float(np.median([r for r in ratios.values() if np.isfinite(r)] or [0.0]))
     for i, (y, x) in pairs.items():
         if _alike(y, x) < _AGAINST:
-            yield f"{names[i]} runs against {what} throughout: {_LOOK}"
+            yield f"{names[i]} {_THROUGHOUT} {what} throughout: {_LOOK}"
         elif sizes and (
             words := _factor(ratios[i] - (usual if abs(usual) < _TRACKS else 0.0), cells.machine.gear_ratio)
         ):

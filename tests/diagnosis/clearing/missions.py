@@ -29,14 +29,19 @@ def simulated(*faults: FaultSpec, seed: int = 5) -> SimulatedMission:
     )
 
 
-def in_cells(mission: SimulatedMission, *, base: bool, clear_at: float = 0.25) -> Cells:
+def signals_of(mission: SimulatedMission, *, base: bool) -> Signals:
     """A mission as it was logged, or with commands and single measurements alone."""
     items = {
         name: Signal(name, mission.stamps, values, SignalSource(column=name), "simulated", guessed=False)
         for name, values in mission.columns.items()
         if not (base and name.endswith(_BASE))
     }
-    timeline, machine = align(Signals(items=items, missing={})), haulotte()
+    return Signals(items=items, missing={})
+
+
+def in_cells(mission: SimulatedMission, *, base: bool, clear_at: float = 0.25) -> Cells:
+    """The same in cells."""
+    timeline, machine = align(signals_of(mission, base=base)), haulotte()
     machine = replace(machine, limits=replace(machine.limits, clear_at=clear_at))
     return cells_of(timeline, replay_loop(timeline, machine, bucket_of(timeline.size)), machine)
 

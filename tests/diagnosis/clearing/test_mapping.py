@@ -7,10 +7,12 @@ from dataclasses import replace
 
 import pytest
 
-from diagnosis.clearing.mapping import mapping_hints
+from diagnosis.clearing.mapping import backwards, mapping_hints
+from diagnosis.pipeline import diagnose_signals
 from replay.faults import FaultMode, FaultSpec, Side
+from replay.machine.config import haulotte
 from replay.simulation.options import SimulatedMission
-from tests.diagnosis.clearing.missions import LENGTH, in_cells, simulated
+from tests.diagnosis.clearing.missions import LENGTH, in_cells, signals_of, simulated
 
 EDIT = Callable[[SimulatedMission], SimulatedMission]
 
@@ -68,3 +70,13 @@ def test_the_gear_read_into_every_speed_is_told_and_clears_nothing() -> None:
 def test_a_size_that_no_loop_stays_behind_by_is_told() -> None:
     (hint,) = mapping_hints(in_cells(_times("wheel.FR.v", 0.2)(simulated()), base=True))
     assert hint.startswith("wheel.FR.v is 0.2 times its commanded speed throughout")
+
+
+def test_parts_that_count_backwards_are_named_and_nothing_that_a_model_claims_of_them_is_stated() -> None:
+    turned = _times("wheel.RR.v", -1.0)(simulated())
+    assert backwards(in_cells(turned, base=True)) == {"RR"}
+    assert not backwards(in_cells(simulated(), base=True))
+    report = diagnose_signals(signals_of(turned, base=True), haulotte()).report
+    assert not [f for f in report["intervals"] if f["component"] == "RR"]
+    assert report["verdict"]["status"] == "not_assessed"
+    assert "wheel.RR.v runs against its commanded speed" in report["verdict"]["text"]

@@ -1,0 +1,40 @@
+"""Parts whose channel counts backwards: no model says anything of them before the machine file is right."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Set
+from dataclasses import replace
+
+from diagnosis.results.assessment import CODE, Assessment
+from diagnosis.results.vocabulary import Tier
+from replay.faults import State
+
+#: A component and its side.
+Part = tuple[str, str]
+
+
+def without_claims(assessments: Mapping[Part, Assessment], components: Set[str], dt: float) -> dict[Part, Assessment]:
+    """Assessments of which those of some components state what second measurements show, and nothing that a model claims.
+
+    Parameters
+    ----------
+    assessments : Mapping[tuple[str, str], Assessment]
+        By component and side.
+    components : Set[str]
+        Wheels and axles of which a channel runs against what it should follow.
+    dt : float
+        Sample [s].
+    """
+    return {part: _without(a, dt) if part[0] in components else a for part, a in assessments.items()}
+
+
+def _without(a: Assessment, dt: float) -> Assessment:
+    claimed = tuple(f for f in a.findings if f.tier is not Tier.DIRECT)
+    if not claimed:
+        return a
+    states, seconds = a.states.copy(), 0.0
+    for f in claimed:
+        states[f.start : f.stop] = CODE[State.NOT_ASSESSED]
+        seconds += (f.stop - f.start) * dt
+    kept = tuple(f for f in a.findings if f not in claimed)
+    return replace(a, states=states, findings=kept, unexplained_s=a.unexplained_s + seconds)
