@@ -113,7 +113,7 @@ def as_followed(cells: Cells, openings: Array, commands: Array, floor: float) ->
     def left(lag: float) -> float:
         usual = [compared(cells, y, _behind(x, cells.dt, lag), floor).off for y, x in pairs]
         known = [float(np.nanquantile(off, _FOLLOWED)) for off in usual if np.isfinite(off).any()]
-        return float(np.median(known)) if known else 0.0
+        return float(np.median(known)) if known else float("inf")
 
     return _behind(commands, cells.dt, min(_LAGS_S, key=left))
 

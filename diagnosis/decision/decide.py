@@ -142,9 +142,11 @@ def decide(
     """
     driven = driving_s or {}
     against = _reservations(assessments, decided_s, driven, axles, limits, damage, model)
+    twice = {(c.component, c.side.value) for c in checks if c.check is Check.SECOND_MEASUREMENT}
     against = replace(
         against,
         words=words,
+        unexplained=tuple(p for p in against.unexplained if p[0] not in axles or p not in twice),
         open=tuple(c for c in checks if not c.passed),
         scope=tuple(scope),
         events=tuple(events),

@@ -31,7 +31,7 @@ Sources = dict[str, tuple[str, ...]]
 
 
 def differences_of(name: str, columns: Columns) -> tuple[str, str] | None:
-    """The two of some columns whose difference a column is, by its name; None where there are none."""
+    """The two of some columns, each of shape (n,), whose difference a column is, by its name; None where there are none."""
     group, _, rest = name.partition(".")
     for whole, *two in _DIFFERENCES:
         leaf = whole.removeprefix(f"{group}.{{part}}")
@@ -112,14 +112,14 @@ def _is_difference(exact: NDArray[Any], first: NDArray[Any], second: NDArray[Any
 
 
 def difference(first: NDArray[Any], second: NDArray[Any]) -> NDArray[np.float32]:
-    """First less second, as it is shown and as every reader of the file makes it."""
+    """First less second, all of shape (n,), as it is shown and as every reader of the file makes it."""
     with np.errstate(over="ignore", invalid="ignore"):
         made: NDArray[np.float32] = np.subtract(first, second, dtype=np.float32)
     return made
 
 
 def restored(held: Columns, layout: Layout) -> dict[str, NDArray[Any]]:
-    """All columns, in their order; those that the file does not hold are made of those that it does."""
+    """All columns, each of shape (n,), in their order; those that the file does not hold are made of those that it does."""
     out = {}
     for name in layout.order:
         if name in held:

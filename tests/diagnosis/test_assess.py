@@ -177,7 +177,7 @@ def test_injected_fault_is_found_where_it_is(
 
 
 def test_stuck_sensor_masks_its_valve() -> None:
-    spec = FaultSpec("FR", Side.SENSOR, FaultMode.STUCK, 5.0, 11.0, 1.0, 0.2)
+    spec = FaultSpec("FR", Side.SENSOR, FaultMode.STUCK, 5.0, 11.0, 1.0, 0.35)
     got = assess(dict(simulated("base", (spec,)).columns))
     states = got.assessments["FR", "actuator"].states
     assert np.mean(states[2525:5475] == CODE[State.MASKED]) > 0.99

@@ -120,8 +120,8 @@ def test_an_open_fault_is_on_the_page_and_on_the_terminal(tmp_path: Path, capsys
     assert "Fault open, no repair recorded" in page
     assert "open, clean in 3 of the 10 missions that close it" in page
     assert document(tmp_path)["verdict"]["text"][0] == (
-        "HX-1 – fault open, no repair recorded: FR speed sensor without signal in 2 of 11 missions, clean in 3 of the 10 "
-        "missions that close it."
+        "HX-1 – fault open, no repair recorded: FR speed sensor without signal in 2 of the 11 missions that assessed the part, "
+        "clean in 3 of the 10 missions that close it."
     )
     listed = listed_machines(document(tmp_path))  # type: ignore[arg-type]
     assert [(m.label, m.words) for m in listed] == [("HX-1", "Fault open, no repair recorded"), ("HX-2", "Ready")]
