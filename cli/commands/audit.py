@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from cli.commands.audit_repairs import RepairRequest, run_repairs
+from cli.commands.audit_repairs import RepairRequest, one_date, run_repairs
 from cli.commands.audit_run import AuditRequest, run_audit
 from cli.terminal.command import Quiet, Verbose, terminal_of
 from cli.terminal.options import FailOn, Json, MaxSize
@@ -137,7 +137,7 @@ NotRepaired = Annotated[
     typer.Option("--not-repaired", metavar="WORDS", help="Take back a repair of that date.", show_default=False),
 ]
 On = Annotated[
-    str | None,
+    list[str] | None,
     typer.Option(
         "--on",
         metavar="DATE",
@@ -175,7 +175,7 @@ def audit(
     verbose: Verbose = False,
 ) -> None:
     """Diagnose a tree of logs: a report per mission and a page about the fleet; or record a repair."""
-    repairs = RepairRequest(output, repaired or [], not_repaired or [], on, json)
+    repairs = RepairRequest(output, repaired or [], not_repaired or [], one_date(on), json)
     if repairs.is_asked(paths or []):
         run_repairs(terminal_of(context, json=json), repairs)
         return

@@ -53,6 +53,21 @@ class RepairRequest:
         return True
 
 
+def one_date(dates: Sequence[str] | None) -> str | None:
+    """The date that is given with --on; None where there is none.
+
+    Raises
+    ------
+    ConfigError
+        Where there are several: which part each is for is not known.
+    """
+    if dates is not None and len(dates) > 1:
+        raise ConfigError(
+            f"--on: is given {len(dates)} times, and one date holds for all parts of a command; run it once for each date"
+        )
+    return dates[0] if dates else None
+
+
 def run_repairs(terminal: Terminal, request: RepairRequest) -> None:
     """Record repairs, or take them back, and show the machines as the fleet page has them afterwards."""
     with terminal.progress(Stage.WRITING):

@@ -20,6 +20,7 @@ from diagnosis.pages.labels import utc
 from replay.errors import ConfigError, OutputError
 from replay.faults import Side
 
+_MINUTE_NS = 60 * 10**9
 _SENSOR, _DRIVE = (
     r"(?:(?:speed|steering|joint) )?sensor",
     r"(?:(?:drive|steering|joint) )?(?:valve|motor|drive|actuator)",
@@ -146,10 +147,12 @@ def _check_day(machine: Machine, repair: Repair, words: str) -> None:
     day = utc(repair.repaired_ns)[:10]
     same = [r for r in machine.dated if utc(r.result.start_ns)[:10] == day and _faults(r, repair)]
     if same:
-        at = utc(same[-1].result.start_ns)[11:16]
+        last = same[-1].result
+        assert last.start_ns is not None
+        end = utc(last.start_ns + round((last.duration_s or 0.0) * 1e9) + _MINUTE_NS)
         raise ConfigError(
-            f"--repaired {words!r}: a mission that began on {day} at {at} UTC shows the fault; give the time of the repair, such as "
-            f"--on {day}T{at}"
+            f"--repaired {words!r}: a mission that began on {day} at {utc(last.start_ns)[11:16]} UTC shows the fault; give the time of the "
+            f"repair; after that mission it is --on {end[:10]}T{end[11:16]} or later"
         )
 
 

@@ -338,3 +338,9 @@ def test_ended_at_any_moment_it_goes_on_where_it_was(
         json.loads((out / mission["report"] / "report.json").read_bytes())
     assert [p.name for p in (out / ".work").iterdir()] == ["claims"]
     until(lambda: not [p for p in temporary_folders(tmp_path) if p.startswith("mfhca-audit-")])
+
+
+def test_one_date_holds_for_all_repairs_of_a_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    asked = ["--repaired", "A FL speed sensor", "--on", "2026-10-17", "--repaired", "B FR valve", "--on", "2026-10-22"]
+    assert run(["audit", "-o", str(tmp_path), *asked]) == 2
+    assert "--on: is given 2 times" in capsys.readouterr().err

@@ -304,7 +304,7 @@ def test_what_stays_open_is_said(tmp_path: Path) -> None:
 def test_a_day_on_which_the_fault_was_found_needs_a_time(tmp_path: Path) -> None:
     stored(tmp_path, course("..x"))
     day = utc(at(2.0))[:10]
-    with pytest.raises(ConfigError, match=f"give the time of the repair, such as --on {day}T"):
+    with pytest.raises(ConfigError, match=f"after that mission it is --on {day}T"):
         record_repairs(tmp_path, ["HX-1 FR"], at(2.0) // DAY_NS * DAY_NS, lambda *_: None)
 
 
