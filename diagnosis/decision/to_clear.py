@@ -65,11 +65,11 @@ def to_clear(
             if not parts:
                 continue
             who = join_words(sorted(words.part_words(kind, c, Side.SENSOR_OR_ACTUATOR) for c in parts))
-            other = (
-                " or wheel.<part>.u_applied (the valve position)"
-                if words.drive == "valve" and kind is Kind.WHEEL
-                else ""
+            logged = all(
+                p in assessments and assessments[p].tier is Tier.DIRECT for p in ((c, "actuator") for c in parts)
             )
+            asked = words.drive == "valve" and kind is Kind.WHEEL and not logged
+            other = " or wheel.<part>.u_applied (the valve position)" if asked else ""
             out.append(
                 ToClear(
                     f"{who}: no single fault explains the residual.",
