@@ -270,7 +270,7 @@ def test_what_cannot_be_done_is_one_sentence(
     assert shown.splitlines()[-1].startswith("error: ")
 
 
-_MISSIONS = 12  # enough that three audits that are ended do not finish them
+_MISSIONS = 30  # enough that three audits that are ended do not finish them
 
 
 @pytest.fixture(scope="session")
@@ -317,7 +317,7 @@ def test_ended_at_any_moment_it_goes_on_where_it_was(
         before = len(acknowledged(out))
         with started(short, out, "-j", "1") as process:
             until(lambda done=before: len(acknowledged(out)) > done)
-            time.sleep(draw.uniform(0.0, 0.2))
+            time.sleep(draw.uniform(0.0, 0.1))
             os.kill(process.pid, asked)
             _, errors = process.communicate()
         if asked is not signal.SIGKILL:
