@@ -13,7 +13,6 @@ from diagnosis.assess import ComponentResult, assess_components
 from diagnosis.channels.copied_rows import without_copied_rows
 from diagnosis.channels.recording_gaps import recording_gaps, without_gaps
 from diagnosis.clearing.backwards import without_claims
-from diagnosis.clearing.mapping import backwards, mapping_hints
 from diagnosis.clearing.standing_out import what_stands_out, with_findings
 from diagnosis.decision import metrics, quality
 from diagnosis.decision.episodes import with_episodes
@@ -181,7 +180,7 @@ def _without_backwards(judged: Judged) -> Judged:
     """The same without what models claim of parts whose channel counts backwards."""
     found = judged.found
     named = {component for (component, _), a in found.assessments.items() if a.findings}
-    if not (wrong := named & backwards(judged.cells)):
+    if not (wrong := named & {h.component for h in judged.hints if h.backwards}):
         return judged
     told = without_claims(found.assessments, wrong, judged.mission.timeline.dt)
     return Judged(judged.mission, judged.recorded, judged.machine, judged.replay, replace(found, assessments=told))
@@ -190,7 +189,7 @@ def _without_backwards(judged: Judged) -> Judged:
 def _with_what_stands_out(judged: Judged) -> Judged:
     """The same with parts named that the checks of the all-clear leave no doubt about, unless the whole machine explains them."""
     found = judged.found
-    if found.events or mapping_hints(judged.cells):
+    if found.events or judged.hints:
         return judged
     more = what_stands_out(judged.checks, judged.cells, found.words)
     if not more:

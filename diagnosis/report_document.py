@@ -12,7 +12,7 @@ from diagnosis.assess import ComponentResult
 from diagnosis.clearing.cells import Cells
 from diagnosis.clearing.checks import cells_of, checks_of
 from diagnosis.clearing.detectable import detectable
-from diagnosis.clearing.mapping import mapping_hints
+from diagnosis.clearing.mapping import Hint, mapping_hints
 from diagnosis.decision import metrics, quality
 from diagnosis.decision.assumed import assumed_words
 from diagnosis.decision.caveats import more_caveats
@@ -80,6 +80,11 @@ class Judged:
         """What stands behind an all-clear."""
         told = {(c.component, c.check): c for c in self.named_by}
         return tuple(told.get((c.component, c.check), c) for c in checks_of(self.cells, self.found.words))
+
+    @cached_property
+    def hints(self) -> tuple[Hint, ...]:
+        """Signals that the machine file may have wrong."""
+        return mapping_hints(self.cells)
 
     @property
     def damage(self) -> list[str]:
@@ -159,7 +164,7 @@ def _decision(
         checks=judged.checks,
         scope=_scope(judged),
         events=judged.found.events,
-        hints=mapping_hints(judged.cells),
+        hints=tuple(h.text for h in judged.hints),
         open_state=open_state,
     )
 

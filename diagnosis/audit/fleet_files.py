@@ -16,9 +16,9 @@ from diagnosis.audit.fleet.elsewhere import copies_elsewhere
 from diagnosis.audit.fleet.first_seen import first_seen_times, newest_result_ns, without_false_dates
 from diagnosis.audit.fleet.fleet_types import FleetDocument
 from diagnosis.audit.fleet.gather import machines_of
-from diagnosis.audit.fleet.machines import Limits
 from diagnosis.audit.fleet.news import first_runs
 from diagnosis.audit.fleet.read import Mission, content_mark, fleet_repairs, read_missions, read_run
+from diagnosis.audit.fleet.runs import Limits
 from diagnosis.audit.fleet.table import fleet_csv
 from diagnosis.audit.fleet.trend_types import Axis
 from diagnosis.audit.store.database import unless_damaged

@@ -10,7 +10,8 @@ from pathlib import Path
 from diagnosis.audit.events import Emit
 from diagnosis.audit.fleet.document import Fleet
 from diagnosis.audit.fleet.listed import ListedMachine
-from diagnosis.audit.fleet.machines import Machine, Run
+from diagnosis.audit.fleet.machines import Machine
+from diagnosis.audit.fleet.runs import Run
 from diagnosis.audit.fleet.words import fault_words
 from diagnosis.audit.fleet_files import load_fleet
 from diagnosis.audit.fleet_page import FleetPage

@@ -6,6 +6,7 @@ import warnings
 from collections.abc import Iterator, Sequence
 from itertools import combinations
 from math import pi
+from typing import NamedTuple
 
 import numpy as np
 
@@ -40,14 +41,31 @@ _FACTORS: tuple[tuple[float, str], ...] = (
     (0.001, "1/1000 times"),
 )
 
-_THROUGHOUT = "runs against"
 _LOOK = "look at its entry in the machine file ([signals] channel, sign, unit or scale) before any part is replaced."
 
 
-def mapping_hints(cells: Cells) -> tuple[str, ...]:
-    """Sentences on signals that fit another sign, unit or place better over the whole mission; none where all fit.
+class Hint(NamedTuple):
+    """A signal that fits another sign, unit or place better.
 
-    A fault that lasts from start to end can look alike: the sentences ask for the machine file to be looked at first.
+    Attributes
+    ----------
+    component : str
+        Wheel or axle; the first one of two that are swapped.
+    backwards : bool
+        Whether it runs against what it should follow.
+    text : str
+        A sentence.
+    """
+
+    component: str
+    backwards: bool
+    text: str
+
+
+def mapping_hints(cells: Cells) -> tuple[Hint, ...]:
+    """Signals that fit another sign, unit or place better over the whole mission; none where all fit.
+
+    A fault that lasts from start to end can look alike: its sentence asks for the machine file to be looked at first.
     """
     machine, wanted = cells.machine, cells.reference
     with warnings.catch_warnings():  # means without any value
@@ -71,12 +89,7 @@ def mapping_hints(cells: Cells) -> tuple[str, ...]:
         )
 
 
-def backwards(cells: Cells) -> frozenset[str]:
-    """Components whose speed, angle or command runs against what it should follow throughout, as `mapping_hints` says."""
-    return frozenset(_part(text) for text in mapping_hints(cells) if _THROUGHOUT in text)
-
-
-def _openings(cells: Cells, opening: Array, wanted: Array, names: Sequence[str], what: str) -> Iterator[str]:
+def _openings(cells: Cells, opening: Array, wanted: Array, names: Sequence[str], what: str) -> Iterator[Hint]:
     """Hints for valve commands, whose size says nothing, by what they cause."""
     scaled = opening * (np.nanmean(np.abs(wanted), axis=0) / np.maximum(np.nanmean(np.abs(opening), axis=0), 1e-6))
     yield from _hints(cells, scaled, wanted, names, what, sizes=False)
@@ -84,7 +97,7 @@ def _openings(cells: Cells, opening: Array, wanted: Array, names: Sequence[str],
 
 def _hints(
     cells: Cells, measured: Array, wanted: Array, names: Sequence[str], what: str, *, sizes: bool = True
-) -> Iterator[str]:
+) -> Iterator[Hint]:
     """Hints for signals `measured`, each of which follows its own of `wanted`, both (cells, n)."""
     if not measured.size or not np.isfinite(wanted).any():
         return
@@ -93,18 +106,21 @@ def _hints(
     for i, j in combinations(range(len(names)), 2):
         if _swapped(measured[:, [i, j]], follows[:, [i, j]]):
             told |= {i, j}
-            yield f"{names[i]} follows {what.replace('its', 'the')} of {_part(names[j])}, and {names[j]} that of {_part(names[i])}: {_LOOK}"
+            one, other = _part(names[i]), _part(names[j])
+            text = f"{names[i]} follows {what.replace('its', 'the')} of {other}, and {names[j]} that of {one}: {_LOOK}"
+            yield Hint(one, backwards=False, text=text)
     rest = [i for i in range(len(names)) if i not in told]
     pairs = {i: pair for i in rest if len((pair := _moving(measured[:, i], follows[:, i]))[0]) * cells.dt >= _LEAST_S}
     ratios = {i: _ratio(*pair) for i, pair in pairs.items()}
     usual = float(np.median([r for r in ratios.values() if np.isfinite(r)] or [0.0]))
     for i, (y, x) in pairs.items():
         if _alike(y, x) < _AGAINST:
-            yield f"{names[i]} {_THROUGHOUT} {what} throughout: {_LOOK}"
+            text = f"{names[i]} runs against {what} throughout: {_LOOK}"
+            yield Hint(_part(names[i]), backwards=True, text=text)
         elif sizes and (
             words := _factor(ratios[i] - (usual if abs(usual) < _TRACKS else 0.0), cells.machine.gear_ratio)
         ):
-            yield f"{names[i]} is {words} {what} throughout: {_LOOK}"
+            yield Hint(_part(names[i]), backwards=False, text=f"{names[i]} is {words} {what} throughout: {_LOOK}")
 
 
 def _moving(y: Array, x: Array) -> tuple[Array, Array]:

@@ -125,7 +125,11 @@ class IdentifiedPair:
 
     def gain_spread(self, start: int, stop: int) -> float:
         """Standard deviation of y per reference from second to second outside of a fault [1]: it lasts, and does not average out."""
-        return gain_spread(self.samples, self.model.span, self.pair.dt, slice(start, stop))
+        return self._gains.spread(self.model.span, start, stop)
+
+    @cached_property
+    def _gains(self) -> GainWindows:
+        return gain_windows(self.samples, self.pair.dt)
 
     @cached_property
     def holds(self) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
@@ -147,30 +151,45 @@ class IdentifiedPair:
         return Texture(y.size, white, self.lsb, own)
 
 
-def gain_spread(samples: Samples, span: float, dt: float, fault: slice = slice(0)) -> float:
-    """Robust standard deviation of the gain Σxy/Σx² of windows of a second about 1; 0 where few windows move.
+class GainWindows(NamedTuple):
+    """Sums over windows of a second.
 
-    Parameters
+    Attributes
     ----------
-    samples : Samples
-        A channel and its reference.
-    span : float
-        Of the channel [unit of y].
-    dt : float
-        Step [s].
-    fault : slice
-        Samples that are not healthy: a fault that lasts for most of the driving would else be taken for the usual spread.
+    power, moved : Array, shape (windows,)
+        Σx² and Σxy [unit²].
+    width : int
+        Samples in a window.
     """
+
+    power: Array
+    moved: Array
+    width: int
+
+    def spread(self, span: float, start: int = 0, stop: int = 0) -> float:
+        """Robust standard deviation of the gain Σxy/Σx² about 1 [1]; 0 where few windows move.
+
+        Parameters
+        ----------
+        span : float
+            Of the channel [unit of y].
+        start, stop : int
+            Samples of a fault: one that lasts for most of the driving would else be taken for the usual spread.
+        """
+        driven = self.power > self.width * (_GAIN_DRIVEN * span) ** 2
+        driven[start // self.width : -(-stop // self.width)] = False
+        if np.count_nonzero(driven) < _GAIN_WINDOWS:
+            return 0.0
+        return float(np.median(np.abs(self.moved[driven] / self.power[driven] - 1.0)) / _NORMAL_MEDIAN)
+
+
+def gain_windows(samples: Samples, dt: float) -> GainWindows:
+    """Windows of a channel and its reference, of samples of `dt` s."""
     width = max(2, round(_GAIN_S / dt))
     size = samples.y.size // width * width
     use = (samples.status[:size] == PAIR) & ~samples.quiet[:size]
-    use[fault] = False
     x, y = (np.where(use, np.nan_to_num(z[:size]), 0.0).reshape(-1, width) for z in (samples.x, samples.y))
-    power, moved = np.einsum("ij,ij->i", x, x), np.einsum("ij,ij->i", x, y)
-    driven = power > width * (_GAIN_DRIVEN * span) ** 2
-    if np.count_nonzero(driven) < _GAIN_WINDOWS:
-        return 0.0
-    return float(np.median(np.abs(moved[driven] / power[driven] - 1.0)) / _NORMAL_MEDIAN)
+    return GainWindows(np.einsum("ij,ij->i", x, x), np.einsum("ij,ij->i", x, y), width)
 
 
 def identify(

@@ -19,11 +19,12 @@ from replay.faults import FaultMode, Side
 
 _SHAKEN = 2.0  # times the usual power of what changes from reading to reading
 _RESTLESS = 0.1  # share of changing readings from which on a sensor lives
+_READ = 0.5  # of a finding: what delivers less is silent
 _LEAST_USUAL_S = 5.0  # for which a reading must be known without its fault
 _DISTURBED = 0.6  # probability of noise behind an opening that nobody measured: none of 10 was right on tuning seeds
 _BURST_S = 0.6  # length at which half of the bursts of noise are what a model leaves out of a motion
-_BURST = "Bursts of noise of this length"
-_SORT = "Disturbances of {valve}s whose opening is not logged"
+_BURST = "Noise as brief as this may be what the model leaves out of a motion, which makes it less probable."
+_UNSEEN = "Where no opening is logged, a disturbance of the {valve} looks like what the model leaves out, which makes it less probable."
 
 
 def not_denied(
@@ -53,7 +54,7 @@ def not_denied(
         kept = tuple(f for f in sensor.findings if f not in denied)
         out[Side.SENSOR] = SideFindings(kept, (*sensor.unexplained, *(_span(f, blocks) for f in denied)))
     if not inputs.valve_redundant:
-        findings = tuple(limited(f, _DISTURBED, _SORT) if f.mode is FaultMode.NOISY else f for f in valve.findings)
+        findings = tuple(limited(f, _DISTURBED, _UNSEEN) if f.mode is FaultMode.NOISY else f for f in valve.findings)
         out[Side.ACTUATOR] = valve._replace(findings=findings)
     return {side: one._replace(findings=_not_brief(one.findings, inputs.timeline.dt)) for side, one in out.items()}
 
@@ -73,7 +74,7 @@ def _trembles(finding: Finding, inputs: AxleInputs) -> bool:
     part = slice(finding.start, finding.stop)
     known = np.isfinite(inputs.angle[part])
     y = inputs.angle[part][known & inputs.fresh[part]]
-    return bool(y.size > 1 and np.mean(known) > 0.5 and np.mean(np.diff(y) != 0.0) > _RESTLESS)
+    return bool(y.size > 1 and np.mean(known) > _READ and np.mean(np.diff(y) != 0.0) > _RESTLESS)
 
 
 def _span(finding: Finding, blocks: SteeringBlocks) -> tuple[int, int]:

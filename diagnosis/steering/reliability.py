@@ -121,7 +121,7 @@ def weighed(found: Mapping[Side, SideFindings], length: int, dt: float) -> dict[
             mine = (
                 f
                 if f.tier is Tier.SIGNAL
-                else limited(f, _usually(features_of(spans[side][k], f.mode, same, others)), _SORT)
+                else _as_usual(f, _usually(features_of(spans[side][k], f.mode, same, others)), _SORT)
             )
             if mine.probability >= _LEAST:
                 kept.append(mine)
@@ -140,7 +140,7 @@ def paired(found: Mapping[Side, SideFindings]) -> dict[Side, SideFindings]:
     for side, one in found.items():
         others = [(f.start, f.stop) for who, of in found.items() if who is not side for f in of.findings]
         kept = tuple(
-            limited(f, _PAIRED, _BESIDE) if not f.mode.total and _shared((f.start, f.stop), others) else f
+            _as_usual(f, _PAIRED, _BESIDE) if not f.mode.total and _shared((f.start, f.stop), others) else f
             for f in one.findings
         )
         out[side] = SideFindings(kept, one.unexplained)
@@ -157,14 +157,18 @@ def _usually(features: NDArray[np.float64]) -> float:
     return float(1.0 / (1.0 + np.exp(-_WEIGHTS[0] - features @ np.array(_WEIGHTS[1:]))))
 
 
-def limited(finding: Finding, most: float, words: str) -> Finding:
-    """A finding that is no more probable than findings of its sort are right; what is missing goes to no fault."""
+def limited(finding: Finding, most: float, why: str) -> Finding:
+    """A finding that is at most so probable, with a sentence that says why; what is missing goes to no fault."""
     if finding.probability <= most:
         return finding
     share = most / finding.probability
     named = [replace(h, p=h.p * share) for h in finding.hypotheses]
     faults = [h for h in named if h.mode != State.HEALTHY.value]
     none = Hypothesis("none", State.HEALTHY.value, 1.0 - sum(h.p for h in faults))
-    line = f"{words} were right in {100 * most:.0f} of 100 cases on simulated machines."
     hypotheses = tuple(sorted([*faults, none], key=lambda h: -h.p))
-    return replace(finding, probability=most, hypotheses=hypotheses, evidence=(*finding.evidence, line))
+    return replace(finding, probability=most, hypotheses=hypotheses, evidence=(*finding.evidence, why))
+
+
+def _as_usual(finding: Finding, share: float, words: str) -> Finding:
+    """A finding that is no more probable than findings of its sort are right."""
+    return limited(finding, share, f"{words} were right in {100 * share:.0f} of 100 cases on simulated machines.")

@@ -23,12 +23,12 @@ from electric_physics import (
     drive_line,
     loads_of,
     motor,
-    places,
     rise_of,
     steer,
     turn,
     tyre,
 )  # fmt: skip
+from electrohydraulic_physics import hit, places
 
 #: State of an encoder: edges passed, time of the last one, edges and time at the last reading, speed shown, lag-filtered speed.
 COUNT, EDGE_T, SEEN, SEEN_T, SHOWN, SMOOTH = range(6)
@@ -36,15 +36,6 @@ COUNT, EDGE_T, SEEN, SEEN_T, SHOWN, SMOOTH = range(6)
 #: slope that the inclinometer shows.
 SPEED, ACCEL, REST, BRAKE, RELEASED, SHARED, TILT = range(7)
 _RELEASE_S, _REST_S, _SILENT_S = 0.2, 0.7, 0.4
-
-
-@nb.njit(cache=True)
-def hit(good: float, e: float, sat: float, held: Array, i: int) -> float:
-    """L16 (4) and (8): (1 − ε)·good + ε·sat; a sat of NaN is what was there at onset."""
-    if e == 0.0:
-        held[i] = good
-        return good
-    return (1 - e) * good + e * (held[i] if math.isnan(sat) else sat)
 
 
 @nb.njit(cache=True)

@@ -173,16 +173,6 @@ def steer(axle: Array, want: float, speed: float, supply: float, b: Build) -> No
 
 
 @nb.njit(cache=True)
-def places(b: Build) -> Array:
-    """Where the king pins are, and the wheels' offsets from them [m], shape (4, 3); order FR, FL, RR, RL."""
-    out = np.empty((4, 3))
-    for i in range(4):
-        side = -1.0 if i % 2 == 0 else 1.0
-        out[i] = (b.base / 2 if i < 2 else -b.base / 2), side * b.track / 2, side * b.lateral
-    return out
-
-
-@nb.njit(cache=True)
 def angle_of(axle: float, x: float, y: float, b: Build) -> float:
     """Angle of a wheel by that of its axle [rad]: the linkage gives the inner wheel some of what Ackermann asks for."""
     exact = math.atan(math.tan(axle) / (1.0 - y * math.tan(axle) / x))

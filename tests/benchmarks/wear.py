@@ -18,8 +18,9 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 import numpy as np
 from accuracy import signals_of
 
-from diagnosis.audit.fleet.machines import Machine, Run
+from diagnosis.audit.fleet.machines import Machine
 from diagnosis.audit.fleet.read import Bounds, Part, Result
+from diagnosis.audit.fleet.runs import Run
 from diagnosis.audit.fleet.trends import trends_of
 from diagnosis.pipeline import diagnose_signals
 from diagnosis.results.document import ReportDocument

@@ -21,6 +21,8 @@ WATCH = (
     "document.addEventListener('securitypolicyviolation', e => breaches.push(e.violatedDirective + ' ' + e.blockedURI))"
 )
 
+_PATIENCE_MS = 20_000  # a busy machine draws slowly; what is there at once is not waited for
+
 
 @pytest.fixture(scope="module")
 def browser() -> Iterator[Any]:
@@ -28,6 +30,7 @@ def browser() -> Iterator[Any]:
     if not chromium:
         pytest.skip("no Chromium found; install it or set CHROMIUM to its path")
     playwright = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
+    playwright.expect.set_options(timeout=_PATIENCE_MS)
     with playwright.sync_playwright() as p:
         browser = p.chromium.launch(executable_path=chromium, args=ARGS)
         yield browser

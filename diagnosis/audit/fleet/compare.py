@@ -12,7 +12,8 @@ from diagnosis.audit.fleet.document import Fleet
 from diagnosis.audit.fleet.document_rows import bounds_row
 from diagnosis.audit.fleet.fault_types import FaultChange, FaultChangeRow, FaultStandingRow
 from diagnosis.audit.fleet.fleet_types import BaselineRow, CoverageChangeRow
-from diagnosis.audit.fleet.machines import FleetFault, Machine, is_assessed
+from diagnosis.audit.fleet.machines import FleetFault, Machine
+from diagnosis.audit.fleet.runs import is_assessed
 from diagnosis.pages.labels import utc
 from replay.faults import Side
 

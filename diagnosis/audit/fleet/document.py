@@ -19,9 +19,10 @@ from diagnosis.audit.fleet.fleet_types import (
     MachineRow,
     PartRow,
 )
-from diagnosis.audit.fleet.machines import FleetFault, Machine, sides_of
+from diagnosis.audit.fleet.machines import FleetFault, Machine
 from diagnosis.audit.fleet.news import news, since_run
 from diagnosis.audit.fleet.read import Mission
+from diagnosis.audit.fleet.runs import sides_of
 from diagnosis.audit.fleet.trend_types import Axis
 from diagnosis.audit.fleet.trends import PartTrend, trends_of
 from diagnosis.audit.store.outcome import ENDS, READ

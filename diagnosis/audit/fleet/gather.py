@@ -9,9 +9,10 @@ from functools import cache
 from typing import NamedTuple
 
 from diagnosis.audit.fleet.fault_types import Status
-from diagnosis.audit.fleet.machines import OPEN, STANDING, FleetFault, Limits, Machine, Run
+from diagnosis.audit.fleet.machines import OPEN, STANDING, FleetFault, Machine
 from diagnosis.audit.fleet.owners import Owner, Owners
 from diagnosis.audit.fleet.read import FoundFault, Mission
+from diagnosis.audit.fleet.runs import Limits, Run
 from diagnosis.audit.store.repairs import Repair, repaired_at
 from diagnosis.results.vocabulary import Severity, Verdict
 

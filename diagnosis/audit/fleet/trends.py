@@ -8,7 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from diagnosis.audit.fleet.machines import Machine, Run
+from diagnosis.audit.fleet.machines import Machine
+from diagnosis.audit.fleet.runs import Run
 from diagnosis.audit.fleet.trend_types import Axis
 from diagnosis.audit.trends.trend import REACH, Forecast, Series, Trend, trend_of
 

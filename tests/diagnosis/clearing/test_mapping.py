@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import pytest
 
-from diagnosis.clearing.mapping import backwards, mapping_hints
+from diagnosis.clearing.mapping import mapping_hints
 from diagnosis.pipeline import diagnose_signals
 from replay.faults import FaultMode, FaultSpec, Side
 from replay.machine.config import haulotte
@@ -43,8 +43,8 @@ def _swapped(a: str, b: str) -> EDIT:
 )
 def test_a_wrong_sign_unit_or_place_is_told(edit: EDIT, words: str) -> None:
     (hint, *others) = mapping_hints(in_cells(edit(simulated()), base=True))
-    assert hint.startswith(words)
-    assert "look at its entry in the machine file" in hint
+    assert hint.text.startswith(words)
+    assert "look at its entry in the machine file" in hint.text
     assert len(others) <= 1
 
 
@@ -64,18 +64,19 @@ def test_the_gear_read_into_every_speed_is_told_and_clears_nothing() -> None:
     columns = {n: x / 17.7 if n.startswith("wheel.") and n.endswith(".v") else x for n, x in mission.columns.items()}
     hints = mapping_hints(in_cells(replace(mission, columns=columns), base=True))
     assert len(hints) == 4
-    assert all("1/17.7 times (the wheel's speed read as the motor's?) its commanded speed" in hint for hint in hints)
+    assert all(
+        "1/17.7 times (the wheel's speed read as the motor's?) its commanded speed" in hint.text for hint in hints
+    )
 
 
 def test_a_size_that_no_loop_stays_behind_by_is_told() -> None:
     (hint,) = mapping_hints(in_cells(_times("wheel.FR.v", 0.2)(simulated()), base=True))
-    assert hint.startswith("wheel.FR.v is 0.2 times its commanded speed throughout")
+    assert hint.text.startswith("wheel.FR.v is 0.2 times its commanded speed throughout")
 
 
 def test_parts_that_count_backwards_are_named_and_nothing_that_a_model_claims_of_them_is_stated() -> None:
     turned = _times("wheel.RR.v", -1.0)(simulated())
-    assert backwards(in_cells(turned, base=True)) == {"RR"}
-    assert not backwards(in_cells(simulated(), base=True))
+    assert [(h.component, h.backwards) for h in mapping_hints(in_cells(turned, base=True))] == [("RR", True)]
     report = diagnose_signals(signals_of(turned, base=True), haulotte()).report
     assert not [f for f in report["intervals"] if f["component"] == "RR"]
     assert report["verdict"]["status"] == "not_assessed"

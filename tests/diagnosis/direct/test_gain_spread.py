@@ -7,7 +7,7 @@ import pytest
 from numpy.typing import NDArray
 
 from diagnosis.channels.sample_status import PAIR
-from diagnosis.direct.identification import gain_spread
+from diagnosis.direct.identification import gain_windows
 from diagnosis.estimation.samples import Samples
 
 DT = 0.01
@@ -21,14 +21,22 @@ def samples(gain: NDArray[np.float64]) -> Samples:
 
 def test_the_spread_of_the_gain_from_second_to_second() -> None:
     gain = 1.0 + 0.02 * np.random.default_rng(1).standard_normal(200)
-    assert gain_spread(samples(gain), 0.36, DT) == pytest.approx(0.02, rel=0.2)
+    assert gain_windows(samples(gain), DT).spread(0.36) == pytest.approx(0.02, rel=0.2)
 
 
 def test_a_fault_of_a_fifth_of_the_mission_hardly_changes_it() -> None:
     gain = 1.0 + 0.02 * np.random.default_rng(1).standard_normal(200)
     gain[:40] = 0.4
-    assert gain_spread(samples(gain), 0.36, DT) < 0.03
+    assert gain_windows(samples(gain), DT).spread(0.36) < 0.03
 
 
 def test_nothing_is_known_of_what_hardly_moves() -> None:
-    assert gain_spread(samples(np.full(3, 0.9)), 0.36, DT) == 0.0
+    assert gain_windows(samples(np.full(3, 0.9)), DT).spread(0.36) == 0.0
+
+
+def test_the_time_of_a_fault_can_be_left_out() -> None:
+    gain = 1.0 + 0.02 * np.random.default_rng(1).standard_normal(200)
+    gain[:150] = 0.4
+    windows = gain_windows(samples(gain), DT)
+    assert windows.spread(0.36) > 0.5
+    assert windows.spread(0.36, 0, 15_000) == pytest.approx(0.02, rel=0.3)
