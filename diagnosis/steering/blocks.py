@@ -1,4 +1,5 @@
-"""A steering axle's samples in blocks of about 10 ms: mean, power of the white part, valve command, status."""
+"""A steering axle's samples in blocks of about 10 ms, or of a sample where they come more rarely: mean, power of the white part,
+valve command, status."""
 
 from __future__ import annotations
 
@@ -22,6 +23,8 @@ Array = NDArray[np.float64]
 
 WHITE_DOF = 0.514  # degrees of freedom per sample in the mean square of second differences
 _BLOCK_S = 0.01
+_LOOKED, _FEW = 100_000, 20  # steps in which the distance of samples is found, and samples that do not tell it
+_USUAL = 0.9  # quantile of these distances: beyond it samples are missing
 _WINDOW_S = 0.25
 _RATE_S = 0.05  # to either side, for the steering rate
 
@@ -69,6 +72,24 @@ class SteeringBlocks:
     store: ColumnStore = field(default_factory=ColumnStore, repr=False)
 
 
+def block_length(fresh: Sequence[NDArray[np.bool_]], dt: float) -> int:
+    """Steps per block: about 10 ms, and no less than between two samples of the slowest of some channels.
+
+    Parameters
+    ----------
+    fresh : Sequence[NDArray[np.bool_]], each of shape (n,)
+        Steps with a new sample of each channel.
+    dt : float
+        Step [s].
+    """
+    length = max(1, round(_BLOCK_S / dt))
+    for new in fresh:
+        at = np.flatnonzero(new[:_LOOKED])
+        if at.size > _FEW:
+            length = max(length, round(float(np.quantile(np.diff(at), _USUAL))))
+    return length
+
+
 def between(x: Array, length: int, blocks: int, function: Callable[[Array], Array] = np.asarray) -> Array:
     """Mean of function(x) over `length` samples up to the middle of each block.
 
@@ -103,6 +124,7 @@ def blocks_of(
     alive: NDArray[np.bool_],
     dt: float,
     store: ColumnStore | None = None,
+    length: int | None = None,
 ) -> SteeringBlocks:
     """Cut an axle's channels into blocks.
 
@@ -118,9 +140,11 @@ def blocks_of(
         Step [s].
     store : ColumnStore or None
         Where long columns stand; None: one of their own.
+    length : int or None
+        Samples per block; None: as `block_length` has it.
     """
     store = store or ColumnStore()
-    length = max(1, round(_BLOCK_S / dt))
+    length = length or block_length([fresh], dt)
     opening, parts = store.column(np.float64), []
     before = np.zeros(0)  # the last two new samples of the part before
     for part in store.blocks(y.size, length):

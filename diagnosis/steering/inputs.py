@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from diagnosis.channels.liveness import alive
-from diagnosis.steering.blocks import SensorNoise, SteeringBlocks, blocks_of, sensor_noise
+from diagnosis.steering.blocks import SensorNoise, SteeringBlocks, block_length, blocks_of, sensor_noise
 from diagnosis.steering.redundancy import with_second_angle, with_valve_opening
 from replay.control.loop import Replay
 from replay.machine.config import Machine, Noise
@@ -127,13 +127,20 @@ def axle_inputs(timeline: Timeline, replay: Replay, machine: Machine, axle: int,
     inputs = AxleInputs(name, timeline, logged, u)
     if inputs.measured not in logged or not np.isfinite(u).any():
         return inputs
-    return _with_blocks(inputs, machine, counts)
+    return _with_blocks(inputs, machine, counts, _length(timeline, machine))
 
 
-def _with_blocks(inputs: AxleInputs, machine: Machine, counts: Counts) -> AxleInputs:
+def _length(timeline: Timeline, machine: Machine) -> int:
+    """Steps per block, the same for all axles."""
+    angles = [timeline.fresh.get(f"steer.{axle}.{leaf}") for axle in machine.axles for leaf in ("phi", "phi_true")]
+    return block_length([new for new in angles if new is not None], timeline.dt)
+
+
+def _with_blocks(inputs: AxleInputs, machine: Machine, counts: Counts, length: int) -> AxleInputs:
     """Add the blocks, the sensor's noise and what is measured redundantly."""
     timeline, channel, y, fresh = inputs.timeline, inputs.names[0], inputs.angle, inputs.fresh
-    blocks = blocks_of(y, inputs.command, fresh, alive(timeline, dict(counts), channel), timeline.dt, timeline.store)
+    delivers = alive(timeline, dict(counts), channel)
+    blocks = blocks_of(y, inputs.command, fresh, delivers, timeline.dt, timeline.store, length)
     noise = sensor_noise(blocks, y[fresh & np.isfinite(y)], machine.noise.get(channel, Noise()), machine.max_steer)
     deviation = None
     if inputs.angle_redundant:

@@ -14,6 +14,7 @@ from diagnosis.steering.valve_map import ValveMap, rate_at
 Array = NDArray[np.float64]
 
 _DEAD_STEP, _PLAY_STEP = 1e-4, 5e-5  # over which differences are taken [fraction], [rad]
+_MISSED = 2.0  # times the usual distance of samples: from there on some are missing
 _OBEYED, _NEARLY = 4.0, 1e-3  # standard deviations and opening [fraction] by which a healthy valve may differ
 
 
@@ -157,12 +158,13 @@ def windows_of(blocks: SteeringBlocks, noise: SensorNoise, stop: float, window_s
     mean = blocks.mean
     if not known.all() and known.any():
         mean = np.interp(np.arange(mean.size), np.flatnonzero(known), mean[known])
-    power = window_means(blocks.power, length)
+    samples = window_means(blocks.count, length)
+    power = window_means(blocks.power * blocks.count, length) / np.maximum(samples, 1e-9)
     middle = window_means(mean, length)
     # less or more noise than usual: not the healthy sensor; at its end stop an axle does not answer
     counts = float(np.median(blocks.count[known])) * length if known.any() else 1.0
     usual = 1 + max(0.3, 4 * float(np.sqrt(2 / (WHITE_DOF * counts))))
-    alive = (window_means(known.astype(np.float64), length) > 0.9) & (np.abs(middle) < 0.97 * stop)
+    alive = (window_means(_sampled(known).astype(np.float64), length) > 0.9) & (np.abs(middle) < 0.97 * stop)
     alive &= window_means(blocks.blind.astype(np.float64), length) == 0.0
     alive &= power < usual * noise.white
     if noise.resolved:
@@ -173,6 +175,16 @@ def windows_of(blocks: SteeringBlocks, noise: SensorNoise, stop: float, window_s
     spread = float(np.sqrt(2 * noise.white / max(counts, 1.0))) / (length * blocks.dt)
     middle_u = (opening[1:] + opening[:-1]) / 2
     return Windows(rate, blocks.u, middle_u, alive[1:] & alive[:-1], length, blocks.dt, spread)
+
+
+def _sampled(known: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Blocks with a sample, and those between two samples of a channel that comes more rarely than blocks do. Shape (m,)."""
+    at = np.flatnonzero(known)
+    if at.size < 2:
+        return known
+    gaps, sampled = np.diff(at), known.copy()
+    sampled[at[0] : at[-1]] = np.repeat(gaps, gaps) <= _MISSED * np.median(gaps)
+    return sampled
 
 
 def _obeyed(blocks: SteeringBlocks, length: int) -> NDArray[np.bool_]:
