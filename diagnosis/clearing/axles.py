@@ -53,8 +53,20 @@ def axle_checks(cells: Cells, clear_at: float) -> Iterator[Checked]:
             yield _still(cells, j, limit)
             twice = bool(np.isfinite(second[:, j]).any() and np.isfinite(opening[:, j]).any())
             brief, long = RATE[twice]
-            yield worst(cells, (*about, either, Check.RATE), np.abs(rates.off[place, j]), brief * share)
+            off = _alone(rates.off, j) if twice else np.abs(rates.off[:, j])
+            yield worst(cells, (*about, either, Check.RATE), off[place], brief * share)
             yield lasts(cells, (*about, either, Check.LASTING_RATE), rates.apart[j], long * share)
+
+
+def _alone(off: Array, j: int) -> Array:
+    """How far an axle, of which both sides are measured twice, is off its usual rate while the other axle is not, shape (windows,).
+
+    What all axles do together is of their supply or their load. `off` of shape (windows, axles) [ln].
+    """
+    own = off[:, [j]]
+    beside = np.abs(np.where(np.isfinite(off), own - off, own))
+    beside[:, j] = np.abs(own[:, 0])
+    return np.asarray(beside.min(axis=1))
 
 
 def rate_of(angle: Array, dt: float) -> Array:

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from diagnosis.clearing import axles, wheels, yaw
+from diagnosis.clearing import responses as resp
 from diagnosis.clearing.alone import Rough, Still, Straight
 from diagnosis.clearing.cells import Array, Cells
 from diagnosis.clearing.measure import as_followed, compared, late
@@ -127,10 +128,11 @@ def gauges_of(cells: Cells) -> Iterator[Gauges]:
 def _wheels(cells: Cells) -> Iterator[Gauges]:
     speed, command, opening, second = (cells.wheels(leaf) for leaf in ("v", "u", "u_applied", "v_true"))
     clear_at, top = cells.machine.limits.clear_at, cells.machine.max_speed
-    used, share = np.where(np.isfinite(opening), opening, command), -np.log1p(-clear_at)
+    used = np.where(np.isfinite(opening), opening, command)
     followed = as_followed(cells, opening, command, wheels.OPENING)
-    responses = wheels.responses_of(cells, speed, used, cells.reference)
-    follows = wheels.speeds_follow_openings(cells)
+    responses = resp.responses_of(cells, speed, used, cells.reference)
+    limits = resp.response_limits(responses, resp.measured_twice(cells), clear_at)
+    tells = resp.openings_tell(cells, responses)
     delays, rough = late(speed, cells.reference, cells.dt), wheels.roughness_of(cells, speed)
     for i, name in enumerate(cells.machine.wheels):
         v, u, a, x = (z[:, i] for z in (speed, command, opening, second))
@@ -138,17 +140,17 @@ def _wheels(cells: Cells) -> Iterator[Gauges]:
             continue
         twice, measured = _known(a) and _known(u), _known(x)
         motion = np.where(np.isfinite(cells.reference[:, i]), cells.reference[:, i], v)
-        moving = (np.abs(motion) > wheels.MOVING * top / 0.36) & ~cells.told(name)
+        moving = (np.abs(motion) > resp.MOVING * top / 0.36) & ~cells.told(name)
         ratio = None
         lasting: dict[Deviation, float] = {}
-        if _known(used[:, i]) and speed.shape[1] > wheels.OTHERS and (follows or not (twice and measured)):
-            below, above = (np.array(pair) * share for pair in wheels.RESPONSE[twice, measured])
+        if _known(used[:, i]) and speed.shape[1] > resp.OTHERS and (tells or not (twice and measured)):
+            limit = limits[i]
             off = np.where(cells.explained(name), np.nan, responses.windows[:, i])
             usual, back = responses.usual[i], (~responses.ahead[:, i]).astype(np.intp)
-            rooms = _rooms(usual.ways, below[1], above[1])
-            ratio = Ratio(cells.frame, off, responses.weight[:, i], below[0], above[0], back, rooms)
+            rooms = _rooms(usual.ways, limit.lasting_below, limit.lasting_above)
+            ratio = Ratio(cells.frame, off, responses.weight[:, i], limit.below, limit.above, back, rooms)
             if usual.least is not None and usual.most is not None:
-                lasting = _lasting(below[1] + usual.least, above[1] - usual.most)
+                lasting = _lasting(limit.lasting_below + usual.least, limit.lasting_above - usual.most)
         delay = delays[i]
         late_by = {} if delay is None else {Deviation.DELAY: wheels.LATE_S + delay + cells.dt}
         second_one = _reference(cells, name, (v, x, wheels.FLOOR * top), clear_at) if measured else None

@@ -1,6 +1,6 @@
 """One wheel, or an axle, that deviates so far that no other explanation is left, although no row could be told: a fault of either side.
 
-What a part does per opening is compared with the other wheels without any model of a fault (`diagnosis.clearing.wheels`). A
+What a part does per opening is compared with the other wheels without any model of a fault (`diagnosis.clearing.responses`). A
 deviation of several times what stands against an all-clear, of one wheel alone, is a fault of its sensor or its valve; where
 several deviate nobody knows which of them are healthy. An axle that stands still while it is commanded is one likewise.
 """
@@ -12,8 +12,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from diagnosis.clearing import axles, wheels
+from diagnosis.clearing import axles
 from diagnosis.clearing.cells import Array, Cells, Frame
+from diagnosis.clearing.responses import Limits, measured_twice, responses_of, speeds_follow_openings, usual_limits
 from diagnosis.results.assessment import CODE, Assessment, Finding
 from diagnosis.results.clearing import Check, Checked
 from diagnosis.results.machine_words import MachineWords
@@ -95,10 +96,12 @@ def _alone(checks: Sequence[Checked], cells: Cells) -> Checked | None:
     if any(cells.stated.get(part) for part in (*cells.machine.wheels, *cells.machine.axles)):
         return None
     worst: dict[str, Checked] = {}
-    for c in checks:
-        if c.kind is Kind.WHEEL and c.check in _BESIDE_OTHERS and c.worst is not None:
+    twice = dict(zip(cells.machine.wheels, measured_twice(cells), strict=True))
+    for check in checks:
+        if check.kind is Kind.WHEEL and check.check in _BESIDE_OTHERS and check.worst is not None:
+            c = _by_usual_limit(check, usual_limits(twice[check.component], cells.machine.limits.clear_at))
             worst[c.component] = max(worst.get(c.component, c), c, key=_times)
-    if len(worst) < _WHEELS or not wheels.speeds_follow_openings(cells):
+    if len(worst) < _WHEELS or not speeds_follow_openings(cells):
         return None
     first, second, *_ = sorted(worst.values(), key=_times, reverse=True)
     alone = _times(second) <= max(_OTHERS, _times(first) / _BY_FAR) and _times(first) >= max(
@@ -107,10 +110,19 @@ def _alone(checks: Sequence[Checked], cells: Cells) -> Checked | None:
     return first if alone else None
 
 
+def _by_usual_limit(check: Checked, usual: Limits) -> Checked:
+    """A check with the limit that it has whatever the other wheels do."""
+    if check.check is Check.RESPONSE:
+        return replace(check, limit=usual.below)
+    if check.check is Check.EXCESS:
+        return replace(check, limit=usual.above)
+    return replace(check, limit=usual.changed) if check.limit < usual.lasting_below else check
+
+
 def _wheel(check: Checked, cells: Cells) -> Finding:
     """The fault of a wheel whose speed per opening is not that of the others."""
     speed, command, opening = (cells.wheels(leaf) for leaf in ("v", "u", "u_applied"))
-    responses = wheels.responses_of(cells, speed, np.where(np.isfinite(opening), opening, command), cells.reference)
+    responses = responses_of(cells, speed, np.where(np.isfinite(opening), opening, command), cells.reference)
     beside = responses.beside[:, cells.machine.wheels.index(check.component)]
     lost, gained = (float(np.nansum(np.maximum(x - check.limit, 0.0))) for x in (-beside, beside))
     below = lost >= gained

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from diagnosis.results.assessment import STATES, Assessment
 from diagnosis.results.document import CoverageRow, PhaseRow
 from diagnosis.results.loop_rows import LoopRow, MeanRow, MetricsRow, PaperRow
+from diagnosis.results.vocabulary import Tier
 from replay.arrays.blocks import blocks
 from replay.arrays.envelope import shown
 from replay.arrays.numeric import without_nan
@@ -28,6 +29,7 @@ PAPER_TABLE = (
     ("Sun", 0.035, 0.135, 12),
 )
 _DECIDED = np.array([s in DECIDED for s in STATES])
+_RESTS = STATES.index(State.NOT_EXCITED)
 _EARTH_RADIUS = 6_371_008.8
 
 
@@ -100,6 +102,8 @@ def coverage(
 ) -> tuple[list[CoverageRow], dict[tuple[str, str], float]]:
     """Seconds of each state per component and side, and seconds of driving that were decided.
 
+    A drive whose command and opening are measured drives while either is beyond rest.
+
     `moving` of shape (n, wheels), `dt` in s.
     """
     rows: list[CoverageRow] = []
@@ -108,6 +112,8 @@ def coverage(
     for (component, side), assessment in assessments.items():
         counts = np.bincount(assessment.states, minlength=len(STATES))
         drives = moving[:, machine.wheels.index(component)] if component in machine.wheels else anything
+        if side == Side.ACTUATOR and assessment.tier is Tier.DIRECT:  # a motor that coasts is not asked for anything
+            drives = drives & (assessment.states != _RESTS)
         seconds = float(np.count_nonzero(_DECIDED[assessment.states] & drives)) * dt
         decided[component, side] = seconds
         rows.append(

@@ -1,0 +1,229 @@
+"""Speed per opening of each wheel beside the other wheels', and the limits that an all-clear sets to it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from diagnosis.clearing.cells import Array, Cells
+from diagnosis.clearing.measure import lowest_passed
+
+_LAG_S = 0.15  # of a valve and its drive
+_SETTLED_S, _SETTLED = 0.6, 0.03  # a command that has changed by less than this [m/s] over this time
+MOVING = 0.08  # m/s, for a machine of .36 m/s
+_LEAST_CELLS = 0.5  # of a window
+_LEAST_WINDOWS, _PART = 8, 0.2  # before and after a change, at least
+_ALIKE = 0.5  # of the limit: where half of the wheels deviate by more, openings tell little of speeds
+_FOLLOWS = 0.45  # of the power of a speed: openings explain 0.56 and more on tuning machines, torques 0.31 and less
+_CHANGED = 0.88  # a change counts by its limit in windows, not over the mission
+#: A deviation counts from so many times the largest of the other wheels' on, and from this [ln]: tyres hide most of a valve's loss.
+_ALONE, _LEAST = 3.0, 0.1
+OTHERS = 2
+#: Limits of speed per opening below and above the other wheels', in windows and over the mission, as multiples of the loss
+#: that counts, by whether opening and speed are measured twice. What measurements judge need not be judged by its likeness to
+#: others as strictly; what reads too much is in no row of the tables, so that nothing else would tell it.
+RESPONSE = {
+    (False, False): ((0.75, 0.65), (0.9, 0.7)),
+    (True, False): ((1.4, 1.15), (1.25, 0.95)),
+    (False, True): ((1.15, 1.0), (1.4, 1.2)),
+    (True, True): ((2.0, 1.4), (2.0, 1.4)),
+}
+
+
+class Usual(NamedTuple):
+    """By how much a wheel's usual speed per opening is below and above the other wheels'; None where it is not known.
+
+    `least` and `most` are the lower and the higher one of forward and reverse, signed [ln], `ways` both.
+    """
+
+    below: float | None = None
+    above: float | None = None
+    least: float | None = None
+    most: float | None = None
+    ways: tuple[float | None, float | None] = (None, None)
+
+
+class Responses(NamedTuple):
+    """ln of speed per opening over that of the other wheels.
+
+    Attributes
+    ----------
+    windows : Array, shape (windows, wheels)
+        Against the wheel's usual one.
+    beside : Array, shape (windows, wheels)
+        As they are.
+    usual : list[Usual]
+        The usual ones.
+    weight : Array, shape (cells, wheels)
+        Speed that counts in a window, 0 where none does [m/s].
+    ahead : NDArray[np.bool_], shape (windows, wheels)
+        Windows whose usual one is that of driving forward.
+    changes : list[float | None]
+        By how much each wheel's usual one changes in the mission at most; None where it is not known.
+    """
+
+    windows: Array
+    beside: Array
+    usual: list[Usual]
+    weight: Array
+    ahead: NDArray[np.bool_]
+    changes: list[float | None]
+
+
+def responses_of(cells: Cells, speed: Array, opening: Array, reference: Array) -> Responses:
+    """Speed per opening beside the other wheels', arrays (cells, wheels).
+
+    Only where a command (without one: the wheel) has settled; forward and reverse have usual ones of their own.
+    """
+    frame = cells.frame
+    scale = cells.machine.max_speed / 0.36
+    known = np.isfinite(reference)
+    motion = np.where(known, reference, speed)
+    back = max(1, round(_SETTLED_S / cells.dt))
+    before = np.concatenate([np.full((min(back, len(motion)), motion.shape[1]), np.nan), motion[:-back]])
+    with np.errstate(invalid="ignore"):
+        settled = (np.abs(motion) > MOVING * scale) & (np.abs(motion - before) < _SETTLED * scale)
+    settled &= np.isfinite(speed) & np.isfinite(opening)
+    passed = lowest_passed(opening, cells.dt, _LAG_S)
+    moved, opened = (frame.sums(np.where(settled, np.abs(x), 0.0)) for x in (speed, passed))
+    enough = frame.sums(settled.astype(np.float64)) >= _LEAST_CELLS * min(frame.length, frame.cells)
+    ratio = np.where(enough, moved / np.maximum(opened, 1e-3 * frame.length), np.nan)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        log = np.log(np.maximum(ratio, 1e-3) / others_at(ratio))
+    ahead = frame.mean(np.sign(np.nan_to_num(motion))) >= 0.0
+    off = np.full(log.shape, np.nan)
+    lasting: list[Usual] = []
+    changes: list[float | None] = []
+    for i, wheel in enumerate(cells.machine.wheels):
+        told = cells.explained(wheel) if not cells.mostly_explained(wheel) else np.zeros(len(log), dtype=np.bool_)
+        own = np.where(told, np.nan, log[:, i])  # what a stated fault makes of the wheel is not what is usual
+        usual: list[float] = []
+        ways: list[float | None] = []
+        for way in (ahead[:, i], ~ahead[:, i]):
+            ways.append(None)
+            here = way & np.isfinite(own)
+            if here.any():
+                middle = float(np.median(own[here]))
+                off[way, i] = log[way, i] - middle
+                if np.count_nonzero(here) * frame.hop * cells.dt >= 3.0:
+                    usual.append(middle)
+                    ways[-1] = middle
+        changes.append(_change(own, [ahead[:, i], ~ahead[:, i]]) if usual else None)
+        lasting.append(
+            Usual(max(0.0, -min(usual)), max(0.0, *usual), min(usual), max(usual), (ways[0], ways[1]))
+            if usual
+            else Usual()
+        )
+    return Responses(off, log, lasting, np.where(settled, np.abs(speed), 0.0), ahead, changes)
+
+
+def _change(log: Array, ways: list[NDArray[np.bool_]]) -> float:
+    """Largest difference between the medians before and after any moment, of forward or of reverse [ln].
+
+    A loss that lasts about half of the mission is half of what is usual.
+    """
+    largest = 0.0
+    for way in ways:
+        x = log[way & np.isfinite(log)]
+        least = max(_LEAST_WINDOWS, round(_PART * x.size))
+        for k in range(least, x.size - least + 1, max(1, x.size // 40)):
+            largest = max(largest, abs(_median(x[:k]) - _median(x[k:])))
+    return largest
+
+
+def _median(x: Array) -> float:
+    """Median of finite values; `np.median` looks for NaN and axes first, which takes most of its time here."""
+    half = x.size // 2
+    if x.size % 2:
+        return float(np.partition(x, half)[half])
+    low, high = np.partition(x, [half - 1, half])[half - 1 : half + 1]
+    return float((low + high) / 2.0)
+
+
+class Limits(NamedTuple):
+    """Limits of a wheel's speed per opening [ln]: in windows below and above, of a change, and over the mission."""
+
+    below: float
+    above: float
+    changed: float
+    lasting_below: float
+    lasting_above: float
+
+
+def measured_twice(cells: Cells) -> list[tuple[bool, bool]]:
+    """Whether the opening, and the speed, of each wheel are measured twice."""
+    command, opening, second = (
+        [bool(np.isfinite(x).any()) for x in cells.wheels(leaf).T] for leaf in ("u", "u_applied", "v_true")
+    )
+    return [(a and u, x) for u, a, x in zip(command, opening, second, strict=True)]
+
+
+def usual_limits(twice: tuple[bool, bool], clear_at: float) -> Limits:
+    """Limits of a wheel whatever the other wheels do; `twice` as of `measured_twice`, `clear_at` the loss that counts [1]."""
+    share = -float(np.log1p(-clear_at))
+    (below, lasting_below), (above, lasting_above) = RESPONSE[twice]
+    return Limits(*(share * x for x in (below, above, lasting_below / _CHANGED, lasting_below, lasting_above)))
+
+
+def response_limits(responses: Responses, twice: Sequence[tuple[bool, bool]], clear_at: float) -> list[Limits]:
+    """Limits of every wheel: those of windows and of changes are lower where the other wheels deviate by much less.
+
+    Arguments as of `usual_limits`.
+    """
+
+    def alone(values: Sequence[float | None], i: int, limit: float) -> float:
+        others = [abs(x) for j, x in enumerate(values) if j != i and x is not None and np.isfinite(x)]
+        return min(limit, max(_LEAST, _ALONE * max(others))) if len(others) >= OTHERS else limit
+
+    largest = [[float(x) for x in _largest(sign * responses.windows)] for sign in (-1.0, 1.0)]
+    usual = [usual_limits(both, clear_at) for both in twice]
+    return [
+        limit._replace(
+            below=alone(largest[0], i, limit.below),
+            above=alone(largest[1], i, limit.above),
+            changed=alone(responses.changes, i, limit.changed),
+        )
+        for i, limit in enumerate(usual)
+    ]
+
+
+def _largest(windows: Array) -> Array:
+    """Largest value of each wheel; NaN where none is known. From shape (windows, wheels) to (wheels,)."""
+    most = np.max(np.where(np.isfinite(windows), windows, -np.inf), axis=0, initial=-np.inf)
+    return np.where(np.isfinite(most), np.maximum(most, 0.0), np.nan)
+
+
+def speeds_follow_openings(cells: Cells) -> bool:
+    """Whether any wheel's speed is a multiple of its opening, as a valve's is and a torque's is not."""
+    speed, command, opening = (cells.wheels(leaf) for leaf in ("v", "u", "u_applied"))
+    used = lowest_passed(np.where(np.isfinite(opening), opening, command), cells.dt, _LAG_S)
+    explained = []
+    for v, u in zip(speed.T, used.T, strict=True):
+        moves = np.isfinite(v) & np.isfinite(u) & (np.abs(np.nan_to_num(v)) > MOVING * cells.machine.max_speed / 0.36)
+        v, u = v[moves], u[moves]
+        power = float(u @ u) * float(v @ v)
+        explained.append(float(u @ v) ** 2 / power if power > 0.0 else 1.0)
+    return max(explained, default=1.0) > _FOLLOWS
+
+
+def openings_tell(cells: Cells, responses: Responses) -> bool:
+    """Whether an opening is a speed: speeds follow openings, and most wheels' stay near what is usual, as torques do not."""
+    limit = usual_limits((True, True), cells.machine.limits.clear_at).below
+    largest = _largest(np.abs(responses.windows))
+    known = np.sort(largest[np.isfinite(largest)])
+    alike = not known.size or known[(known.size - 1) // 2] <= _ALIKE * limit
+    return bool(alike and speeds_follow_openings(cells))
+
+
+def others_at(x: Array) -> Array:
+    """Median of the other wheels at the same time, shape (windows, wheels)."""
+    columns = range(x.shape[1])
+    out = np.full(x.shape, np.nan)
+    for i in columns:
+        rest = x[:, [j for j in columns if j != i]]
+        enough = np.isfinite(rest).sum(axis=1) >= min(OTHERS, rest.shape[1])
+        out[enough, i] = np.nanmedian(rest[enough], axis=1)
+    return out
