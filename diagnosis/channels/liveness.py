@@ -35,15 +35,26 @@ def alive(timeline: Timeline, counts: dict[str, NDArray[np.int16]], name: str) -
     there is none, the other signals of its own; a short gap is then lost data where others of the file have gaps like it.
     """
     group = _group(timeline, name)
-    if any(_group(timeline, other) == group for other in timeline.fresh if other != name):
-        return (counts[group] - timeline.fresh[name]) > 0
+    together = [other for other in timeline.fresh if other != name and _group(timeline, other) == group]
+    if together:
+        return _while_most_run(timeline, together, (counts[group] - timeline.fresh[name]) > 0)
     others = [n for n in timeline.fresh if n != name and timeline.sources[n] == timeline.sources[name]]
     near = [n for n in others if quantity_kind(n) == quantity_kind(name)]
     near = near or [n for n in others if n.rpartition(".")[0] == name.rpartition(".")[0]]
     if not near:
         return np.zeros(timeline.size, dtype=np.bool_)
     delivers = np.logical_or.reduce([timeline.fresh[n] for n in near])
-    return np.asarray(delivers & _not_lost(timeline, name, delivers, others))
+    return _while_most_run(timeline, near, delivers & _not_lost(timeline, name, delivers, others))
+
+
+def _while_most_run(timeline: Timeline, names: Sequence[str], delivers: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """`delivers` from when half of some signals have begun until half have ended: what comes alone then is late, or early."""
+    begun = sorted(int(np.argmax(timeline.fresh[n])) for n in names)
+    ended = sorted(timeline.size - int(np.argmax(timeline.fresh[n][::-1])) for n in names)
+    delivers = delivers.copy()
+    delivers[: begun[(len(begun) - 1) // 2]] = False
+    delivers[ended[len(ended) // 2] :] = False
+    return delivers
 
 
 def _group(timeline: Timeline, name: str) -> str:

@@ -19,8 +19,8 @@ _LEAST_WINDOWS, _PART = 8, 0.2  # before and after a change, at least
 _ALIKE = 0.5  # of the limit: where half of the wheels deviate by more, openings tell little of speeds
 _FOLLOWS = 0.45  # of the power of a speed: openings explain 0.56 and more on tuning machines, torques 0.31 and less
 _CHANGED = 0.88  # a change counts by its limit in windows, not over the mission
-#: A deviation counts from so many times the largest of the other wheels' on, and from this [ln]: tyres hide most of a valve's loss.
-_ALONE, _LEAST = 3.0, 0.1
+#: A deviation counts from so many times the largest of the other wheels' on, a change likewise, and from this [ln]: tyres hide most of a valve's loss.
+_ALONE, _CHANGED_ALONE, _LEAST = 3.0, 2.2, 0.1
 OTHERS = 2
 #: Limits of speed per opening below and above the other wheels', in windows and over the mission, as multiples of the loss
 #: that counts, by whether opening and speed are measured twice. What measurements judge need not be judged by its likeness to
@@ -174,9 +174,9 @@ def response_limits(responses: Responses, twice: Sequence[tuple[bool, bool]], cl
     Arguments as of `usual_limits`.
     """
 
-    def alone(values: Sequence[float | None], i: int, limit: float) -> float:
+    def alone(values: Sequence[float | None], i: int, limit: float, times: float = _ALONE) -> float:
         others = [abs(x) for j, x in enumerate(values) if j != i and x is not None and np.isfinite(x)]
-        return min(limit, max(_LEAST, _ALONE * max(others))) if len(others) >= OTHERS else limit
+        return min(limit, max(_LEAST, times * max(others))) if len(others) >= OTHERS else limit
 
     largest = [[float(x) for x in _largest(sign * responses.windows)] for sign in (-1.0, 1.0)]
     usual = [usual_limits(both, clear_at) for both in twice]
@@ -184,7 +184,7 @@ def response_limits(responses: Responses, twice: Sequence[tuple[bool, bool]], cl
         limit._replace(
             below=alone(largest[0], i, limit.below),
             above=alone(largest[1], i, limit.above),
-            changed=alone(responses.changes, i, limit.changed),
+            changed=alone(responses.changes, i, limit.changed, _CHANGED_ALONE),
         )
         for i, limit in enumerate(usual)
     ]

@@ -1,5 +1,4 @@
-"""A steering axle's samples in blocks of about 10 ms, or of a sample where they come more rarely: mean, power of the white part,
-valve command, status."""
+"""A steering axle's samples in blocks of about 10 ms, or of one sample: mean, power of the white part, valve command, status."""
 
 from __future__ import annotations
 

@@ -51,6 +51,15 @@ def test_message_that_is_missing_silences_none_of_its_signals() -> None:
         assert silent_steps("wheel.FR.v", *joints, commands).size == 0
 
 
+def test_signals_that_end_before_one_that_comes_late_are_not_silent() -> None:
+    joints = [recorded(f"wheel.{w}.v", "/joint_states", (2800, N)) for w in ("FR", "FL", "RR")]
+    late = recorded("wheel.RL.v", "/joint_states")
+    assert silent_steps("wheel.FR.v", *joints, late).size == 0
+    early = recorded("wheel.FR.v", "/joint_states", (2500, N))
+    steps = silent_steps("wheel.FR.v", early, *joints[1:], late)
+    assert steps[-1] == 2799
+
+
 @pytest.mark.parametrize("nan", [False, True])
 def test_signal_that_is_missing_from_its_message_is_silent(nan: bool) -> None:
     whole, cut = recorded("wheel.FL.v", "/joint_states"), recorded("wheel.FR.v", "/joint_states", (1000, 1030), nan=nan)

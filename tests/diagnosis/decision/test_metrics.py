@@ -148,3 +148,12 @@ def test_path_from_odometry_then_gnss() -> None:
     assert_allclose(gnss["path.y"], [np.nan, 0.0, 111.195], atol=0.01)
     assert_allclose(gnss["path.x"], [np.nan, 0.0, 111.195 * np.cos(np.radians(61))], atol=0.01)
     assert path_of(timeline(wheel__A__v=[0.0])) == {}
+
+
+def test_a_drive_that_is_commanded_to_rest_is_not_asked_for_anything() -> None:
+    states = np.repeat([CODE[State.HEALTHY], CODE[State.NOT_EXCITED]], [600, 400]).astype(np.int8)
+    moving = np.ones((1000, 2), dtype=np.bool_)
+    for tier, driven in ((Tier.DIRECT, 6.0), (Tier.MODEL, 10.0)):
+        one = Assessment(states=states, reasons={}, tier=tier)
+        rows, _ = coverage({("A", "actuator"): one, ("A", "sensor"): one}, moving, MACHINE, 0.01)
+        assert [row["driving_s"] for row in rows] == pytest.approx([driven, 10.0])

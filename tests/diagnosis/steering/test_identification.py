@@ -22,8 +22,12 @@ def axle(
     seed: int = 0,
     reach: float = 0.5,
     lost: tuple[float, float, float] = (0, 0, 0),
+    every: int = 1,
 ) -> SteeringBlocks:
-    """A minute and a half of an axle that follows a wandering angle; `lost` is a loss of the valve from … to … [s]."""
+    """A minute and a half of an axle that follows a wandering angle; `lost` is a loss of the valve from … to … [s].
+
+    The angle has a new sample at `every` step.
+    """
     rng = np.random.default_rng(seed)
     t = np.arange(0.0, 90.0, DT)
     corners = rng.uniform(-reach, reach, 24)
@@ -38,7 +42,7 @@ def axle(
         rate += DT / 0.05 * (rate_at(opening, valve) - rate)
         phi += DT * rate
     always = np.ones(t.size, np.bool_)
-    return blocks_of(y, u, always, always, DT)
+    return blocks_of(y, u, np.arange(t.size) % every == 0, always, DT)
 
 
 def found(*axles: SteeringBlocks) -> list[SteeringPlant]:
@@ -60,6 +64,15 @@ def test_both_axles_are_found_each_with_its_own_valve() -> None:
     for plant, valve in zip(found(axle(VALVES[0]), axle(VALVES[1], seed=1)), VALVES, strict=True):
         same(plant, valve)
         assert plant.play < 3e-4
+
+
+@pytest.mark.parametrize("every", [7, 10])
+def test_an_angle_that_is_recorded_more_rarely_than_blocks_are_long_is_identified(every: int) -> None:
+    blocks = axle(VALVES[0], every=every)
+    assert blocks.length == every
+    (plant,) = found(blocks)
+    assert plant.reliable
+    assert plant.valve.slope_up == pytest.approx(VALVES[0].slope_up, rel=0.05)
 
 
 def test_play_is_found() -> None:

@@ -1,0 +1,62 @@
+"""Limits of a wheel's speed per opening: lower where the other wheels hardly deviate; none asked where openings tell no speeds."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from diagnosis.clearing.axles import _alone
+from diagnosis.clearing.cells import Frame
+from diagnosis.clearing.responses import (
+    Responses,
+    Usual,
+    openings_tell,
+    response_limits,
+    usual_limits,
+)
+
+ONCE, TWICE, CLEAR_AT = (False, False), (True, True), 0.25
+
+
+def responses(*largest: float, changes: tuple[float | None, ...] = ()) -> Responses:
+    """Wheels whose largest deviation below and above their usual speed per opening is given."""
+    rows = [np.concatenate([np.zeros(20), [x, -x]]) for x in largest]
+    windows = np.column_stack(rows)
+    known = list(changes or [0.0] * len(largest))
+    return Responses(windows, windows, [Usual()] * len(largest), windows, windows >= 0.0, known)
+
+
+def test_a_wheel_that_deviates_alone_is_held_to_a_lower_limit() -> None:
+    of, usual = responses(0.17, 0.02, 0.03, 0.03, changes=(0.15, 0.02, 0.01, None)), usual_limits(ONCE, CLEAR_AT)
+    first, second, *_ = response_limits(of, [ONCE] * 4, CLEAR_AT)
+    assert first.below == first.above == pytest.approx(0.1)  # no lower than that, however quiet the others are
+    assert first.changed == pytest.approx(0.1)
+    assert (first.lasting_below, first.lasting_above) == (usual.lasting_below, usual.lasting_above)
+    assert second.below == usual.below  # another wheel deviates by far more
+
+
+def test_where_all_deviate_alike_the_limit_stays() -> None:
+    limits = response_limits(responses(0.17, 0.15, 0.16, 0.14, changes=(0.1, 0.1, 0.1, 0.1)), [ONCE] * 4, CLEAR_AT)
+    assert limits == [usual_limits(ONCE, CLEAR_AT)] * 4
+    assert response_limits(responses(0.17, 0.02), [ONCE] * 2, CLEAR_AT) == [usual_limits(ONCE, CLEAR_AT)] * 2
+
+
+def test_openings_tell_no_speeds_where_most_wheels_stray() -> None:
+    speed = np.linspace(0.1, 0.3, 200)[:, np.newaxis] * np.ones(4)
+    columns = {"v": speed, "u": speed, "u_applied": speed}
+    of: Any = SimpleNamespace(
+        dt=0.1,
+        frame=Frame(200, 30, 5),
+        machine=SimpleNamespace(max_speed=0.36, limits=SimpleNamespace(clear_at=CLEAR_AT)),
+        wheels=lambda leaf: columns[leaf],
+    )
+    assert openings_tell(of, responses(0.9, 0.05, 0.05, 0.05))
+    assert not openings_tell(of, responses(0.9, 0.6, 0.5, 0.05))
+
+
+def test_what_both_axles_do_at_once_is_of_neither() -> None:
+    off = np.array([[0.9, 0.8], [0.9, 0.0], [0.9, np.nan], [0.1, -0.9]])
+    assert _alone(off, 0) == pytest.approx([0.1, 0.9, 0.9, 0.1])
