@@ -226,7 +226,7 @@ class Machine:
 
     @property
     def columns(self) -> dict[PartKey, NDArray[np.intp]]:
-        """Each component and side in every judged mission, in the order of `runs`: its row in `table`, −1 where it has none."""
+        """Each component and side in every judged mission, in the order of `runs`: its row in `table`, −1 where it has none; shape (runs,)."""
         return self._columns[1]
 
     @property

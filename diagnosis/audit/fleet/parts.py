@@ -51,7 +51,10 @@ class PartTable(NamedTuple):
     relative: NDArray[np.bool_]
 
     def assessed(self, rows: NDArray[np.intp], least_s: float) -> NDArray[np.bool_]:
-        """Which of some rows were judged for `least_s` seconds and four fifths of their driving; no row (−1) was not. Shape of `rows`."""
+        """Which of some rows were judged for `least_s` seconds and four fifths of their driving; no row (−1) was not.
+
+        Both of shape (m,).
+        """
         decided = self.decided_s[rows]
         enough = decided >= np.maximum(least_s, _LEAST_SHARE * self.driving_s[rows])
         return np.asarray((rows >= 0) & (decided > 0) & enough)
