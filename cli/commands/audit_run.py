@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Literal
 
 from cli.terminal.console import Terminal
 from cli.terminal.options import FailOn
-from diagnosis.api.auditing import AuditRequest as ApiRequest
+from diagnosis.api.audit_request import AuditRequest as ApiRequest
 from replay.errors import ConfigError, OutputError
 from replay.progress import Stage
 

@@ -64,26 +64,31 @@ def write_fleet(store_path: Path, out: Path, *, baseline: Path | None = None, ax
     OutputError
         Where a store cannot be read, or a file cannot be written.
     """
-    from diagnosis.audit.fleet.page.page import build_fleet_page
-
     if baseline is not None:
         check_baseline(baseline, store_path)
+    files = FleetFiles(out / "fleet.html", out / "fleet.json", out / "fleet.csv")
     with _uncollected(), unless_damaged(_store(store_path)):
-        mark = content_mark(store_path)  # first: what is written meanwhile makes the page an old one
-        fleet = load_fleet(store_path, out, axis)
-        fleet = replace(fleet, first_runs=first_runs(out / "fleet.json", fleet.missions, fleet.run))
-        document = fleet_json(fleet, baseline)
-        document["mark"] = mark
-        files = FleetFiles(out / "fleet.html", out / "fleet.json", out / "fleet.csv")
-        texts = {
-            files.json: orjson.dumps(document, option=orjson.OPT_APPEND_NEWLINE),
-            files.csv: fleet_csv(document).encode("utf-8-sig", "backslashreplace"),
-            files.html: build_fleet_page(document).encode("utf-8", "backslashreplace"),
-        }
-    for path, content in texts.items():
+        contents = _contents(store_path, out, baseline, axis)
+    for path, content in zip((files.json, files.csv, files.html), contents, strict=True):
         with atomic_path(path) as temporary:
             temporary.write_bytes(content)
     return files
+
+
+def _contents(store_path: Path, out: Path, baseline: Path | None, axis: Axis) -> tuple[bytes, bytes, bytes]:
+    """Document, table and page; all else is gone before the search for cycles sets in again."""
+    from diagnosis.audit.fleet.page.page import build_fleet_page
+
+    mark = content_mark(store_path)  # first: what is written meanwhile makes the page an old one
+    fleet = load_fleet(store_path, out, axis)
+    fleet = replace(fleet, first_runs=first_runs(out / "fleet.json", fleet.missions, fleet.run))
+    document = fleet_json(fleet, baseline)
+    document["mark"] = mark
+    return (
+        orjson.dumps(document, option=orjson.OPT_APPEND_NEWLINE),
+        fleet_csv(document).encode("utf-8-sig", "backslashreplace"),
+        build_fleet_page(document).encode("utf-8", "backslashreplace"),
+    )
 
 
 @contextmanager

@@ -44,11 +44,14 @@ def made_visible(value: T) -> T:
 
 
 def _made_visible(value: object) -> object:
-    if isinstance(value, Enum):
+    kind = value.__class__
+    if kind is str:
+        return visible(cast(str, value))
+    if kind is float or kind is int or value is None or isinstance(value, Enum):
         return value
     if isinstance(value, str):
         return visible(value)
-    if isinstance(value, Mapping):
+    if isinstance(value, dict | Mapping):
         return {visible(str(k)): _made_visible(v) for k, v in value.items()}
     if isinstance(value, list | tuple):
         return [_made_visible(v) for v in value]
@@ -124,7 +127,7 @@ def utc(start_ns: Any) -> str:
         moment = datetime.datetime.fromtimestamp(int(start_ns) // 10**9, tz=datetime.UTC)
     except (TypeError, ValueError, OverflowError, OSError):
         return "unknown"
-    return moment.strftime("%Y-%m-%d %H:%M:%S")
+    return moment.isoformat(" ")[:19]
 
 
 def utc_mark(start_ns: Any, length: int = 19, *, both: bool = False) -> Markup:
@@ -139,7 +142,8 @@ def utc_mark(start_ns: Any, length: int = 19, *, both: bool = False) -> Markup:
     both : bool
         Whether local time stands beside it.
     """
-    return Markup("<time{}>{}</time>").format(Markup(' class="both"') if both else "", utc(start_ns)[:length])
+    kind = ' class="both"' if both else ""
+    return Markup(f"<time{kind}>{utc(start_ns)[:length]}</time>")
 
 
 def sat_text(mean: float, unit: str, words: MachineWords) -> str:

@@ -115,7 +115,7 @@ def below(pid: int) -> list[int]:
     return [one for child in children_of(pid) for one in (child, *below(child))]
 
 
-def still_there(pids: list[int], patience_s: float = 5.0) -> int:
+def still_there(pids: list[int], patience_s: float = 30.0) -> int:
     """How many of some processes do not end by themselves within a time."""
     end = time.monotonic() + patience_s
     while time.monotonic() < end and any(map(_alive, pids)):

@@ -13,7 +13,7 @@ from diagnosis.audit.fleet.document_rows import bounds_row
 from diagnosis.audit.fleet.fault_types import FaultChange, FaultChangeRow, FaultStandingRow
 from diagnosis.audit.fleet.fleet_types import BaselineRow, CoverageChangeRow
 from diagnosis.audit.fleet.machines import FleetFault, Machine
-from diagnosis.audit.fleet.runs import is_assessed
+from diagnosis.audit.fleet.parts import PartKey
 from diagnosis.pages.labels import utc
 from replay.faults import Side
 
@@ -183,10 +183,7 @@ def _standing(f: FleetFault | None) -> FaultStandingRow | None:
 
 def _coverage(a: Machine, b: Machine) -> list[CoverageChangeRow]:
     """Parts that were assessed in the last mission of one audit alone."""
-    had, has = (
-        {k for k, p in (m.runs[len(m.dated) - 1].parts.items() if m.dated else ()) if is_assessed(p, m.limits)}
-        for m in (a, b)
-    )
+    had, has = (m.dated[-1].assessed_parts(m.limits) if m.dated else set[PartKey]() for m in (a, b))
     if not a.dated or not b.dated:
         return []
     return [

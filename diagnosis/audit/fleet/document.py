@@ -20,7 +20,7 @@ from diagnosis.audit.fleet.fleet_types import (
     PartRow,
 )
 from diagnosis.audit.fleet.machines import FleetFault, Machine
-from diagnosis.audit.fleet.news import news, since_run
+from diagnosis.audit.fleet.news import news, since_runs
 from diagnosis.audit.fleet.read import Mission
 from diagnosis.audit.fleet.runs import sides_of
 from diagnosis.audit.fleet.trend_types import Axis
@@ -121,7 +121,9 @@ def fleet_document(fleet: Fleet, baseline: BaselineRow | None = None) -> FleetDo
         "counts": counts,
         "machines": [_machine(m, at) for m in fleet.machines],
         "faults": [
-            _fault(k, f, at, since_run(m, f, fleet.first_runs)) for k, m in enumerate(fleet.machines) for f in m.faults
+            _fault(k, f, at, first_run)
+            for k, m in enumerate(fleet.machines)
+            for f, first_run in zip(m.faults, since_runs(m, fleet.first_runs), strict=True)
         ],
         "trends": [trend_row(k, t, at, fleet.axis) for k, own in enumerate(fleet.trends) for t in own],
         "missions": [

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 
 import numpy as np
@@ -132,7 +133,7 @@ def bounds_row(b: Bounds | None) -> BoundsRow | None:
 
 def rounded(value: float | None) -> float | None:
     """Six significant digits, None where there is no finite number."""
-    return None if value is None or not np.isfinite(value) else six_digits(value)
+    return None if value is None or not math.isfinite(value) else six_digits(value)
 
 
 def six_digits_of(values: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
@@ -50,15 +51,17 @@ class Left:
 def lists_of(document: FleetDocument) -> tuple[Left, ...]:
     """Every machine of a fleet in one list, in the document's order."""
     out = []
+    standing: dict[int, list[FleetFaultRow]] = defaultdict(list)
+    rising: dict[int, set[tuple[str, str]]] = defaultdict(set)
+    for f in document["faults"]:
+        if f["status"] not in GONE:
+            standing[f["machine"]].append(f)
+    for t in document["trends"]:
+        if t["direction"] == "rising" and t["points"][-1][2] >= t["limit"]:
+            rising[t["machine"]].add((t["component"], t["side"]))
     for k, m in enumerate(document["machines"]):
-        standing = [f for f in document["faults"] if f["machine"] == k and f["status"] not in GONE]
         leave = leave_of(m["verdict"], m["cleared"], m["unjudged"])
-        rising = {
-            (t["component"], t["side"])
-            for t in document["trends"]
-            if t["machine"] == k and t["direction"] == "rising" and t["points"][-1][2] >= t["limit"]
-        }
-        place, reason = _why(leave, m, standing, document["missions"], rising)
+        place, reason = _why(leave, m, standing[k], document["missions"], rising[k])
         name = "" if place is None else document["missions"][place]["name"]
         out.append(Left(leave, k, m["label"], reason, place, name))
     return tuple(out)

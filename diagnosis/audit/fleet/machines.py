@@ -17,16 +17,20 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from diagnosis.audit.fleet.fault_types import Status
-from diagnosis.audit.fleet.read import Bounds, Mission, Part
-from diagnosis.audit.fleet.runs import Limits, Run, is_assessed, sides_of
+from diagnosis.audit.fleet.parts import PartKey, PartTable, columns_of
+from diagnosis.audit.fleet.read import Bounds, Mission
+from diagnosis.audit.fleet.runs import Limits, Run, sides_of
 from diagnosis.results.vocabulary import Kind, Severity, Verdict
 
 #: Missions that assessed the part without the fault after which a fault is past.
 STANDING = 3
 #: The same of a fault that was of high severity and that nobody is known to have repaired.
 OPEN = 10
-_OF_RUNS = ("columns", "_assessed", "runs", "judged_s", "_kinds")
+_OF_RUNS = ("_columns", "_assessed", "runs", "judged_s", "_kinds")
 
 
 @dataclass(frozen=True)
@@ -220,25 +224,24 @@ class Machine:
         """Judged missions with a fault."""
         return sum(bool(r.faults) for r in self.runs)
 
-    @cached_property
-    def columns(self) -> dict[tuple[str, str], list[Part | None]]:
-        """Each component and side in every judged mission, in the order of `runs`; None where it has none."""
-        runs = self.runs
-        out: dict[tuple[str, str], list[Part | None]] = {}
-        for k, run in enumerate(runs):
-            for part in run.result.parts:
-                key = part[:2]
-                column = out.get(key)
-                if column is None:
-                    column = out[key] = [None] * len(runs)
-                column[k] = part
-        return out
+    @property
+    def columns(self) -> dict[PartKey, NDArray[np.intp]]:
+        """Each component and side in every judged mission, in the order of `runs`: its row in `table`, −1 where it has none; shape (runs,)."""
+        return self._columns[1]
+
+    @property
+    def table(self) -> PartTable:
+        """Parts of its store."""
+        return self._columns[0]
 
     @cached_property
-    def _assessed(self) -> dict[tuple[str, str], list[bool]]:
-        return {
-            key: [p is not None and is_assessed(p, self.limits) for p in column] for key, column in self.columns.items()
-        }
+    def _columns(self) -> tuple[PartTable, dict[PartKey, NDArray[np.intp]]]:
+        return columns_of([r.result.parts for r in self.runs])
+
+    @cached_property
+    def _assessed(self) -> dict[PartKey, list[bool]]:
+        least = self.limits.min_assessed
+        return {key: self.table.assessed(rows, least).tolist() for key, rows in self.columns.items()}
 
     def assessed(self, component: str, side: str) -> list[bool]:
         """Which missions judged a part for as long as a verdict of ``ready`` takes, in the order of `runs`."""
@@ -266,8 +269,9 @@ class Machine:
     @cached_property
     def judged_s(self) -> tuple[float, float]:
         """Driving time over all parts of all missions, and how much of it was judged [s]."""
-        parts = [p for r in self.runs for p in r.result.parts]
-        return sum(p.driving_s for p in parts), sum(p.decided_s for p in parts)
+        rows = np.concatenate([np.empty(0, np.intp), *self.columns.values()])
+        rows = rows[rows >= 0]
+        return float(self.table.driving_s[rows].sum()), float(self.table.decided_s[rows].sum())
 
     @property
     def decided(self) -> float | None:

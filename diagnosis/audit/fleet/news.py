@@ -62,14 +62,15 @@ def _known(path: Path, run: int) -> dict[str, tuple[int | None, int | None]] | N
         return None
 
 
-def since_run(m: Machine, f: FleetFault, runs: Mapping[str, int]) -> int | None:
-    """Run that first brought a mission with a fault; None where that is not known."""
-    found = [
-        runs.get(r.name, 0)
-        for r in m.runs
-        if any((g.component, g.side, g.mode) == (f.component, f.side, f.mode) for g in r.faults)
-    ]
-    return min(found, default=0) or None
+def since_runs(m: Machine, runs: Mapping[str, int]) -> list[int | None]:
+    """Run that first brought a mission with each of a machine's faults; None where that is not known."""
+    first: dict[tuple[str, str, str], int] = {}
+    for r in m.runs:
+        run = runs.get(r.name, 0)
+        for g in r.faults:
+            key = g.component, g.side, g.mode
+            first[key] = min(run, first.get(key, run))
+    return [first.get((f.component, f.side, f.mode), 0) or None for f in m.faults]
 
 
 def news(
@@ -82,5 +83,10 @@ def news(
     new = sum(runs.get(r.name) == run for m in machines for r in m.runs)
     if not new or new == sum(len(m.runs) for m in machines):
         return 0, []
-    found = [(m, f) for m in machines for f in m.faults if f.standing and since_run(m, f, runs) == run]
+    found = [
+        (m, f)
+        for m in machines
+        for f, first in zip(m.faults, since_runs(m, runs), strict=True)
+        if f.standing and first == run
+    ]
     return new, sorted(found, key=lambda p: -max(p[1].severity.rank, Severity.LOW.rank))

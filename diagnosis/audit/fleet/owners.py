@@ -36,6 +36,8 @@ class Owners:
     def __init__(self, missions: Iterable[Mission], folder: str) -> None:
         self._store = os.path.realpath(folder)
         self._around: dict[str, dict[Owner, bool]] = {}
+        self._entered: set[tuple[str, Owner, bool]] = set()
+        self._names: dict[str, tuple[str, ...]] = {}
         self._found: dict[str, tuple[Owner | None, bool]] = {}
         sure, doubtful, others = list[Mission](), list[Mission](), list[Mission]()
         for m in missions:
@@ -74,15 +76,23 @@ class Owners:
         if owner is None or m.result is None or not m.result.judged:
             return
         named = owner == owner_of(m.result) and self._by_folder(m)
+        told = next(_folders(m), ""), owner, named
+        if told in self._entered:
+            return
+        self._entered.add(told)
         for folder in _folders(m):
             owners = self._around.setdefault(folder, {})
             owners[owner] = owners.get(owner, True) and named
 
     def _by_folder(self, m: Mission) -> bool:
         """Whether a result's machine is called as `diagnosis.audit.discovery.identity.fallback_id` calls it, or as its folder."""
-        path = whole_path(self._store, m.files[0]) if m.files else ""
-        folders = path.replace(os.sep, "/").split("/")[:-1]
-        return m.result is not None and m.result.machine_id in (telling_folder(folders), *folders[-1:])
+        place = next(_folders(m), "")
+        names = self._names.get(place)
+        if names is None:
+            path = whole_path(self._store, m.files[0]) if m.files else ""
+            folders = path.replace(os.sep, "/").split("/")[:-1]
+            names = self._names[place] = (telling_folder(folders), *folders[-1:])
+        return m.result is not None and m.result.machine_id in names
 
 
 def _folders(mission: Mission) -> Iterator[str]:

@@ -14,6 +14,9 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
+import orjson
+
+from diagnosis.audit.fleet.parts import LARGEST, LONGEST, NO_PARTS, Parts, read_parts
 from diagnosis.audit.store.database import Database
 from diagnosis.audit.store.outcome import MissionState
 from diagnosis.audit.store.reason_template import ReasonTemplate, reason_template, whole_path
@@ -22,7 +25,6 @@ from diagnosis.audit.store.store import FILE_NAME
 from diagnosis.results.vocabulary import Severity, Verdict
 from replay.faults import Side
 
-_LARGEST, _LONGEST = 1e6, 1e15  # of a loss ε, and of seconds and metres: more is damage
 CALENDAR_NS = 946_684_800 * 10**9  # a clock that says a time before 2000 does not know the date
 
 
@@ -47,17 +49,6 @@ class FoundFault:
     seconds: float
     epsilon: Bounds | None
     probability: float
-
-
-class Part(NamedTuple):
-    """One component and side of one mission; see the table ``component``."""
-
-    component: str
-    side: str
-    driving_s: float
-    decided_s: float
-    epsilon: Bounds | None
-    relative: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,7 +76,7 @@ class Result:
     log_hash: str
     config_hash: str
     faults: tuple[FoundFault, ...]
-    parts: tuple[Part, ...]
+    parts: Parts
 
     @property
     def judged(self) -> bool:
@@ -104,25 +95,17 @@ class Mission:
     gone: bool
 
 
-_RESULTS = (
-    "SELECT id, state, reason, attempts, machine_id, machine_name, verdict, title, start_ns, duration_s, driving_s, "
-    "distance_m, open_loop, report, version, log_hash, config_hash FROM result WHERE id IN (SELECT result FROM mission) ORDER BY id"
-)
+_COLUMNS = (
+    "id", "state", "reason", "attempts", "machine_id", "machine_name", "verdict", "title", "start_ns", "duration_s", "driving_s",
+    "distance_m", "open_loop", "report", "version", "log_hash", "config_hash",
+)  # fmt: skip
+_RESULTS = f"SELECT {', '.join(_COLUMNS)} FROM result WHERE id IN (SELECT result FROM mission) ORDER BY id"
 _FAULTS = (
     "SELECT result, id, component, kind, side, mode, severity, stop_s - start_s, epsilon, epsilon_low, epsilon_high, "
     "probability FROM fault ORDER BY result, start_ns, length(id), id"
 )
-_PARTS = (
-    "SELECT result, component, side, driving_s, decided_s, epsilon, epsilon_low, epsilon_high, epsilon_relative FROM component "
-    "ORDER BY rowid"
-)
-_ABSURD = (
-    "SELECT count(*) FROM component WHERE (abs(driving_s) <= :long AND abs(decided_s) <= :long AND "
-    "coalesce(abs(epsilon), 0) <= :large AND coalesce(abs(epsilon_low), 0) <= :large AND coalesce(abs(epsilon_high), 0) <= :large "
-    "AND typeof(driving_s) IN ('real', 'integer') AND typeof(decided_s) IN ('real', 'integer') "
-    "AND typeof(epsilon) IN ('real', 'integer', 'null') AND typeof(epsilon_low) IN ('real', 'integer', 'null') "
-    "AND typeof(epsilon_high) IN ('real', 'integer', 'null')) IS NOT TRUE"
-)
+_STATES = {state.value: state for state in MissionState}
+_VERDICTS: dict[str | None, Verdict | None] = {None: None, **{verdict.value: verdict for verdict in Verdict}}
 _MISSIONS = "SELECT name, files, bytes, result, gone IS NOT NULL FROM mission ORDER BY name"
 _CONTENT = ("SELECT id, attempts, state, reason, machine_id, verdict, report FROM result ORDER BY id", _MISSIONS)
 
@@ -148,17 +131,13 @@ def read_missions(store: Path) -> list[Mission]:
                 name, component, kind, Side(side), mode, Severity(severity), seconds, _bounds(e, low, high), p
             )
             faults[r].append(found)
-        _check_parts(db)
-        parts: dict[int, list[Part]] = defaultdict(list)
-        sides = {side.value: side for side in Side}
-        for r, component, side, driving, decided, e, low, high, relative in db.rows(_PARTS):
-            bounds = None if e is None or low is None or high is None else Bounds(e, low, high)
-            parts[r].append(Part(component, sides[side], driving, decided, bounds, relative != 0))
-        rows = db.rows(_RESULTS)
-        names = rows[0].keys() if rows else []
-        results = {row[0]: _result(names, row, tuple(faults[row[0]]), tuple(parts[row[0]])) for row in rows}
+        parts = read_parts(db)
+        results = {
+            row[0]: _result(row, tuple(faults.get(row[0], ())), parts.get(row[0], NO_PARTS))
+            for row in db.rows(_RESULTS)
+        }
         missions = [
-            Mission(name, tuple(map(str, json.loads(files))), size, results.get(r), bool(gone))
+            Mission(name, _files(files), size, results.get(r), bool(gone))
             for name, files, size, r, gone in db.rows(_MISSIONS)
         ]
     return _with_own_reasons(missions, os.path.realpath(store if store.is_dir() else store.parent))
@@ -219,8 +198,8 @@ def content_mark(store: Path) -> str:
     digest = hashlib.sha256()
     with closing(_opened(store)) as db, db.snapshot():
         for query in _CONTENT:
-            for row in db.rows(query):
-                digest.update(repr(tuple(row)).encode("utf-8", "backslashreplace"))
+            for rows in db.blocks(query, 1 << 12):
+                digest.update("".join(map(repr, rows)).encode("utf-8", "backslashreplace"))
         for repair in read_repairs(db):
             digest.update(repr(repair).encode("utf-8", "backslashreplace"))
     return digest.hexdigest()[:16]
@@ -230,34 +209,32 @@ def _opened(store: Path) -> Database:
     return Database(store / FILE_NAME if store.is_dir() else store, read_only=True)
 
 
-def _result(names: Sequence[str], row: sqlite3.Row, faults: tuple[FoundFault, ...], parts: tuple[Part, ...]) -> Result:
-    values = dict(zip(names, _plausible(row), strict=True))
-    start, verdict = values["start_ns"], values["verdict"]
+def _result(row: sqlite3.Row, faults: tuple[FoundFault, ...], parts: Parts) -> Result:
+    values = dict(zip(_COLUMNS, _plausible(row), strict=True))
+    start = values["start_ns"]
     values["start_ns"] = start if start is not None and start >= CALENDAR_NS else None
-    values["state"] = MissionState(values["state"])
-    values["verdict"] = Verdict(verdict) if verdict is not None else None
+    values["state"] = _STATES[values["state"]]
+    values["verdict"] = _VERDICTS[values["verdict"]]
     values["open_loop"] = bool(values["open_loop"])
     return Result(**values, faults=faults, parts=parts)
 
 
-def _check_parts(db: Database) -> None:
-    """Raise a `ValueError` where a number of a part is none that sums and squares may be made of; there are many of them."""
-    found = db.rows(_ABSURD.replace(":long", repr(_LONGEST)).replace(":large", repr(_LARGEST)))[0][0]
-    if found:
-        raise ValueError(f"absurd numbers in {found} rows of parts")
+def _files(text: str) -> tuple[str, ...]:
+    """Paths of a mission's files; orjson knows no names that are no Unicode, which JSON has as escapes."""
+    return tuple(map(str, json.loads(text) if "\\" in text else orjson.loads(text)))
 
 
 def _plausible(row: sqlite3.Row) -> tuple[Any, ...]:
     """Values of a row; raises a `ValueError` where a real number is so large that sums and squares of it would not be."""
     values = tuple(row)
-    if wrong := next((v for v in values if isinstance(v, float) and not abs(v) <= _LONGEST), None):
-        raise ValueError(f"a value of {wrong:g}")
+    if wrong := [v for v in values if v.__class__ is float and not abs(v) <= LONGEST]:
+        raise ValueError(f"a value of {wrong[0]:g}")
     return values
 
 
 def _bounds(value: float | None, low: float | None, high: float | None) -> Bounds | None:
     if value is None or low is None or high is None or not all(map(math.isfinite, (value, low, high))):
         return None
-    if max(map(abs, (value, low, high))) > _LARGEST:
+    if max(map(abs, (value, low, high))) > LARGEST:
         raise ValueError(f"a loss ε of {value:g} ({low:g} to {high:g})")
     return Bounds(value, low, high)

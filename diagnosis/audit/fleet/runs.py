@@ -6,12 +6,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 
-from diagnosis.audit.fleet.read import FoundFault, Part, Result
+import numpy as np
+
+from diagnosis.audit.fleet.parts import PartKey
+from diagnosis.audit.fleet.read import FoundFault, Result
 from diagnosis.results.machine_words import HYDRAULIC, MachineWords
 from diagnosis.results.vocabulary import Severity
 from replay.faults import Side
-
-_LEAST_SHARE = 0.8
 
 
 @dataclass(frozen=True)
@@ -49,22 +50,17 @@ class Run:
         """The most severe and longest of them."""
         return max(self.faults, key=lambda f: (f.severity.rank, f.seconds), default=None)
 
-    @cached_property
-    def parts(self) -> dict[tuple[str, str], Part]:
-        """Its parts by component and side."""
-        return {(p.component, p.side): p for p in self.result.parts}
+    def assessed_parts(self, limits: Limits) -> set[PartKey]:
+        """Components and sides that were judged for as long as a verdict of ``ready`` takes."""
+        rows = self.result.parts.rows()
+        assessed = self.result.parts.table.assessed(np.array(list(rows.values()), np.intp), limits.min_assessed)
+        return {key for key, enough in zip(rows, assessed.tolist(), strict=True) if enough}
 
     def assessed(self, component: str, side: str, limits: Limits) -> bool:
-        """Whether a part was judged for as long as a verdict of ``ready`` takes."""
-        keys = [(component, s) for s in sides_of(side)]
-        return all(k in self.parts and is_assessed(self.parts[k], limits) for k in keys)
+        """Whether a part, or both sides of it, were."""
+        return {(component, s) for s in sides_of(side)} <= self.assessed_parts(limits)
 
 
 def sides_of(side: str) -> tuple[str, ...]:
     """The two sides of a fault that may be of either."""
     return (Side.SENSOR, Side.ACTUATOR) if side == Side.SENSOR_OR_ACTUATOR else (side,)
-
-
-def is_assessed(part: Part, limits: Limits) -> bool:
-    """Whether a part was judged for `min_assessed` seconds and four fifths of its driving."""
-    return part.decided_s > 0 and part.decided_s >= max(limits.min_assessed, _LEAST_SHARE * part.driving_s)

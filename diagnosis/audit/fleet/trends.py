@@ -14,6 +14,7 @@ from diagnosis.audit.fleet.trend_types import Axis
 from diagnosis.audit.trends.trend import REACH, Forecast, Series, Trend, trend_of
 
 _DAY_NS = 86_400 * 10**9
+_NONE = np.empty(0, np.intp)
 _FIRST = 2  # missions whose mean is where a relative loss begins
 
 
@@ -48,17 +49,18 @@ def trends_of(machine: Machine, axis: Axis = "hours") -> list[PartTrend]:
     """
     if not machine.dated:
         return []
-    places, now = _places(machine.dated, axis)
+    table, (places, now) = machine.table, _places(machine.dated, axis)
     out = []
     for component, side in machine.parts:
-        column = machine.columns.get((component, side), [])[: len(machine.dated)]
-        found = [(k, part) for k, part in enumerate(column) if part is not None and part.epsilon is not None]
-        if not found:
+        column = machine.columns.get((component, side), _NONE)[: len(machine.dated)]
+        found = np.flatnonzero((column >= 0) & np.isfinite(table.value[column]))
+        if not len(found):
             continue
-        relative = found[-1][1].relative
-        found = [(k, part) for k, part in found if part.relative == relative]
-        value, low, high = np.array([part.epsilon for _, part in found], np.float64).T
-        x = places[[k for k, _ in found]]
+        relative = bool(table.relative[column[found[-1]]])
+        found = found[table.relative[column[found]] == relative]
+        rows = column[found]
+        value, low, high = table.value[rows], table.low[rows], table.high[rows]
+        x = places[found]
         if relative:  # how unlike the wheels are made is no loss: it counts from the machine's first missions
             made = float(value[:_FIRST].mean())
             value, low, high = value - made, low - made, high - made
@@ -67,7 +69,7 @@ def trends_of(machine: Machine, axis: Axis = "hours") -> list[PartTrend]:
         if not machine.id:
             none = Forecast("not_known", why="the machine has no identity, so that missions of several may be mixed")
             trend = Trend(None, trend.first, trend.outliers, trend.changes, "not_known", none)
-        runs = tuple(machine.dated[k] for k, _ in found)
+        runs = tuple(map(machine.dated.__getitem__, found.tolist()))
         kind = machine.kind(component)
         out.append(PartTrend(component, side, kind, machine.limits.min_epsilon, runs, series, trend))
     return out

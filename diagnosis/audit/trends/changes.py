@@ -96,7 +96,8 @@ def possible_bend(x: Array, y: Array, sigma: Array, known: Weighted | None = Non
     if len(x) < 2 * _SIDE_BEND or not varies(x):
         return None
     of = known or weighted(x, y, sigma)
-    best = _bend(x - of.centre, of.w, of.rest, of.whole, of.sxx, float(np.mean(of.w * sigma**2)))
+    d = x - of.centre
+    best = _bend(d, _behind(d, of.w, of.rest), of.w, of.whole, of.sxx, float(np.mean(of.w * sigma**2)))
     return None if best is None else best.place
 
 
@@ -134,10 +135,12 @@ def _best(x: Array, y: Array, sigma: Array, known: Weighted | None = None) -> tu
     floor = float(np.mean(w * sigma**2))
     if whole <= floor * (n - 2) * 0.5:
         return None
+    d = x - centre
+    behind = _behind(d, w, rest)
     found = [
-        _outlier(x - centre, w, rest, whole, sxx, floor),
-        _step(x - centre, w, rest, whole, sxx, floor),
-        _bend(x - centre, w, rest, whole, sxx, floor),
+        _outlier(d, w, rest, whole, sxx, floor),
+        _step(behind, w, whole, sxx, floor),
+        _bend(d, behind, w, whole, sxx, floor),
     ]
     best = min((f for f in found if f is not None), key=lambda f: f.p, default=None)
     return None if best is None else (best, found[0].place if found[0] is not None else None)
@@ -158,42 +161,45 @@ def _outlier(d: Array, w: Array, rest: Array, whole: float, sxx: float, floor: f
     return _Best(p, place, "outlier", float(size[place])) if abs(size[place]) >= _JUMP else None
 
 
-def _step(d: Array, w: Array, rest: Array, whole: float, sxx: float, floor: float) -> _Best | None:
+def _behind(d: Array, w: Array, rest: Array) -> Array:
+    """Sums of w, w d, w r, w d², w d r over each mission and those behind it, shape (5, n)."""
+    terms = np.empty((5, len(d)))
+    terms[0] = w
+    np.multiply(w, d, out=terms[1])
+    np.multiply(w, rest, out=terms[2])
+    np.multiply(terms[1], d, out=terms[3])
+    np.multiply(terms[1], rest, out=terms[4])
+    return np.asarray(np.cumsum(terms[:, ::-1], axis=1)[:, ::-1])
+
+
+def _step(behind: Array, w: Array, whole: float, sxx: float, floor: float) -> _Best | None:
     """Step with one slope: the regressor 1[i ≥ k], freed of level and slope, against the residuals."""
-    behind = slice(_SIDE_STEP, len(d) - _SIDE_STEP + 1)
-
-    def tails(values: Array) -> Array:
-        return np.asarray(np.cumsum(values[::-1])[::-1][behind])
-
-    weight, moment, product = tails(w), tails(w * d), tails(w * rest)
+    n = len(w)
+    weight, moment, product = behind[:3, _SIDE_STEP : n - _SIDE_STEP + 1]
     own = weight - weight**2 / float(w.sum()) - moment**2 / sxx
     good = own > 1e-9 * weight
     if not good.any():
         return None
     size = np.where(good, product / np.where(good, own, 1.0), 0.0)
-    p, place = _tail(size * product, whole, 1, len(d) - 3, floor)
+    p, place = _tail(size * product, whole, 1, n - 3, floor)
     return _Best(p, place + _SIDE_STEP, "step", float(size[place])) if abs(size[place]) >= _JUMP else None
 
 
-def _bend(d: Array, w: Array, rest: Array, whole: float, sxx: float, floor: float) -> _Best | None:
+def _bend(d: Array, behind: Array, w: Array, whole: float, sxx: float, floor: float) -> _Best | None:
     """Broken stick: the regressor max(0, x − x_k), freed of level and slope, against the residuals."""
     n = len(d)
     if n < 2 * _SIDE_BEND:
         return None
     inside = slice(_SIDE_BEND - 1, n - _SIDE_BEND)
-
-    def tails(values: Array) -> Array:
-        return np.asarray(np.cumsum(values[::-1])[::-1][inside])
-
     knot = d[inside]
-    weight, moment, square = tails(w), tails(w * d), tails(w * d * d)
+    weight, moment, product, square, steep = behind[:, inside]
     one = moment - knot * weight  # Σ w h
     two = square - knot * moment  # Σ w d h
     own = square - 2 * knot * moment + knot * knot * weight - one**2 / float(w.sum()) - two**2 / sxx
     good = own > 1e-9 * sxx
     if not good.any():
         return None
-    slope = np.where(good, (tails(w * d * rest) - knot * tails(w * rest)) / np.where(good, own, 1.0), 0.0)
+    slope = np.where(good, (steep - knot * product) / np.where(good, own, 1.0), 0.0)
     gain = slope**2 * own
     p, place = _tail(gain, whole, 1, n - 3, floor)
     return _Best(p / len(gain) * min(len(gain), _BEND_PLACES) * _ALPHA / _ALPHA_BEND, place + _SIDE_BEND, "bend", 0.0)

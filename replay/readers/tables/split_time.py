@@ -96,11 +96,7 @@ def with_part(stamps: NDArray[np.int64], cells: NDArray[Any], unit_ns: int) -> N
     NDArray[np.int64], shape (m,)
         Stamps [ns]; `MISSING` where a half is missing or no part of a second.
     """
-    if cells.dtype.kind == "f":
-        given = np.isfinite(cells)
-        parts = np.rint(np.where(given, cells, 0.0) * unit_ns).astype(np.int64)
-    else:
-        given = cells != MISSING
-        parts = np.where(given, cells, 0).astype(np.int64) * unit_ns
-    good = given & (stamps != MISSING) & (parts >= 0) & (parts < _SECOND)
+    given = (cells >= 0) & (cells < _SECOND // unit_ns)  # before they become whole numbers, which know no larger ones
+    parts = np.rint(np.where(given, cells, 0) * unit_ns).astype(np.int64)
+    good = given & (stamps != MISSING) & (parts < _SECOND)
     return np.where(good, stamps + parts, MISSING)

@@ -26,6 +26,7 @@ _DATE = re.compile(r"date|datum|tag|day|jour")
 _DAY = 86_400_000_000_000  # ns
 _SUFFIX = re.compile(r"[ _.](s|sec|ms|us|ns|nsec)$")
 _TURN = 1 << 32
+_FAR_S = 4e9  # seconds that nanoseconds since 1970 still count
 _LONGEST_NAME = 60
 _LONGEST_STEP = 5000  # a larger usual step is neither of seconds nor of milliseconds
 _UNITS = {"s": "s", "sec": "s", "seconds": "s", "ms": "ms", "us": "us", "µs": "us", "ns": "ns", "nsec": "ns"}
@@ -136,9 +137,11 @@ def _split(path: Path, sample: Sample, options: SourceOptions, report: Report) -
     for name, part in split_times(sample):
         if wanted not in (None, name):
             continue
-        seconds = _given(sample[name]).astype(np.int64)
-        cells = sample[part.name]
-        if len(seconds) == len(cells) and rises(with_part(seconds * 1_000_000_000, cells, part.unit_ns)):
+        seconds, cells = _given(sample[name]), sample[part.name]
+        near = np.abs(seconds.astype(np.float64)) < _FAR_S
+        if len(seconds) != len(cells) or near.mean() < 0.9:
+            continue
+        if rises(with_part(seconds[near].astype(np.int64) * 1_000_000_000, cells[near], part.unit_ns)):
             report.note(
                 f"{path.name}: time is column {name!r} in s with {part.name!r} in {part.unit}; [sources] time sets it"
             )

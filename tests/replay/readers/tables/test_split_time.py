@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 import pytest
 
+from replay.errors import LogError
 from replay.log.raw_log import RawLog
 from replay.log.source_options import SourceOptions
 from replay.readers.registry import read_log, summarise_log
@@ -82,3 +84,34 @@ def test_zero_header_stamps_are_no_clock(tmp_path: Path) -> None:
 def test_a_missing_half_is_no_time() -> None:
     seconds = np.array([1, 1, MISSING, 2]) * np.array([10**9, 10**9, 1, 10**9])
     assert with_part(seconds, np.array([5.0, np.nan, 7.0, 2e9]), 1).tolist() == [10**9 + 5, MISSING, MISSING, MISSING]
+
+
+@pytest.mark.parametrize("kind", [np.float64, np.uint64])
+@pytest.mark.parametrize("where", ["everywhere", "once", "often"])
+@pytest.mark.filterwarnings("error")
+def test_seconds_that_no_clock_counts_are_not_stamps(tmp_path: Path, kind: type, where: str) -> None:
+    """Beyond what nanoseconds can be counted in: a column of them is no clock in two parts, a cell is damage."""
+    seconds = SECONDS.astype(kind)
+    seconds[{"everywhere": slice(None), "once": slice(7, 8), "often": slice(0, None, 3)}[where]] += kind(2.0**63)
+    path = tmp_path / "run.csv"
+    text = [f"{int(s)},{n},{k}.5" for k, (s, n) in enumerate(zip(seconds.tolist(), PARTS.tolist(), strict=True))]
+    path.write_text("\n".join(["sec,nanosec,speed", *text]) + "\n")
+    if where == "once":
+        log = read(path)
+        np.testing.assert_array_equal(log.channels["speed"].stamps, np.delete(STAMPS, 7))
+        assert "1 of 30 rows have no readable time" in log.summary.damage[0]
+    else:
+        with suppress(LogError):
+            assert not any("nanosec" in note for note in read(path).summary.notes)
+
+
+@pytest.mark.parametrize(
+    "far",
+    [1e300, -1e300, np.inf, -np.inf, np.nan, 1e9, -1.0, 2.0**63, np.uint64(2**64 - 1), np.uint64(2**55), np.int64(-1)],
+)
+@pytest.mark.parametrize("unit_ns", [1, 1000])
+@pytest.mark.filterwarnings("error")
+def test_what_is_no_part_of_a_second_gives_no_stamp(far: float, unit_ns: int) -> None:
+    cells = np.array([1, far, 2], getattr(far, "dtype", np.float64))
+    stamps = with_part(np.array([10, 20, 30]) * 10**9, cells, unit_ns)
+    assert stamps.tolist() == [10 * 10**9 + unit_ns, MISSING, 30 * 10**9 + 2 * unit_ns]
