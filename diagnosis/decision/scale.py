@@ -84,7 +84,7 @@ class Scale(NamedTuple):
         others = f", or {one.lengths}" if one.lengths else ""
         return (
             f"By {one.by} the machine is {one.factor:.2f} times as fast as by its wheels throughout: check {what}{others} in the "
-            "machine file; if these are right, the wheels slip, or that sensor's scale is wrong. All wheels share the factor: "
+            "machine file; if that is right, the wheels slip, or that sensor's scale is wrong. All wheels share the factor: "
             "it is no part's fault."
         )
 
